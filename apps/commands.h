@@ -1,0 +1,19 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace upswing {
+
+/// What the chosen subcommand does; returns the exit code.
+using Command = std::function<int()>;
+
+/// Each adds its subcommand to the program and sets `command` when it is the one that was typed.
+void AddTrain(CLI::App& program, Command& command);
+void AddEval(CLI::App& program, Command& command);
+void AddSimulate(CLI::App& program, Command& command);
+void AddInfo(CLI::App& program, Command& command);
+
+}  // namespace upswing

@@ -1,0 +1,257 @@
+#include "apps/config.h"
+
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "apps/named_agents.h"
+#include "core/error.h"
+#include "core/file.h"
+#include "core/text.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+/// A TOML value as the text that Option::Set takes; nothing for a type that no setting has.
+std::optional<std::string> TextOf(const toml::node& node) {
+  if (const auto* value = node.as_boolean()) return value->get() ? "true" : "false";
+  if (const auto* value = node.as_integer()) return std::to_string(value->get());
+  if (const auto* value = node.as_floating_point()) return FormatNumber(value->get());
+  if (const auto* value = node.as_string()) return value->get();
+  const auto* array = node.as_array();
+  if (array == nullptr) return std::nullopt;
+  std::vector<std::string> items;
+  for (const toml::node& item : *array) {
+    if (!item.is_integer()) return std::nullopt;
+    items.push_back(std::to_string(item.as_integer()->get()));
+  }
+  return Concat("[", Join(items, ", "), "]");
+}
+
+/// Sets one key of a TOML table.
+void ApplyNode(const Options& options, const std::string& section, const std::string& key,
+               const toml::node& node, const std::string& where) {
+  const std::string place = Concat(where, ":", node.source().begin.line, ": ");
+  for (const Option* option : options.Find(key, place + "[" + section + "]")) {
+    if (option->section != section) {
+      throw BadInput(
+          Concat(place, key, ": expected in [", option->section, "], got in [", section, "]"));
+    }
+    const auto text = TextOf(node);
+    const bool wants_text = std::holds_alternative<std::string*>(option->target);
+    if (!text || node.is_string() != wants_text) {
+      const std::string got = text ? Concat("\"", *text, "\"") : "another type";
+      throw BadInput(Concat(place, key, ": expected ", option->expected(), ", got ", got));
+    }
+    option->Set(*text, place + key);
+  }
+}
+
+toml::table ParseToml(std::string_view text, const std::string& where) {
+  try {
+    return toml::parse(text);
+  } catch (const toml::parse_error& error) {
+    throw BadInput(Concat(where, ":", error.source().begin.line, ": ", error.description()));
+  }
+}
+
+const NamedAgent& FindAgent(const std::string& name) {
+  const auto agents = EmbeddedAgents();
+  const auto found = std::ranges::find_if(agents, [&](const auto& a) { return a.name == name; });
+  if (found != agents.end()) return *found;
+  std::vector<std::string> names;
+  for (const NamedAgent& agent : agents) names.emplace_back(agent.name);
+  throw BadInput(Concat("--agent: no agent is called \"", name, "\"", DidYouMean(name, names),
+                        "; there are ", Join(names, ", ")));
+}
+
+/// The value of a text setting in the last of the layers that has it.
+std::string LastText(std::string_view section, std::string_view key, const toml::table& file,
+                     const std::vector<FlagValue>& flags, std::string value) {
+  value = file[section][key].value_or(value);
+  for (const auto& [name, text] : flags) {
+    if (name == key) value = text;
+  }
+  return value;
+}
+
+}  // namespace
+
+void Config::Describe(Options& o) {
+  o.Section("train");
+  o.Add(&agent, "agent", "d3qn", "named agent whose settings the others begin with");
+  train.Describe(o);
+  o.Section("task");
+  o.Add(&episode_seconds, "episode_seconds", 4, {0.02, 1e6}, "s", "length of a training episode");
+  o.Add(&random_start_share, "random_start_share", 0.5, kUnit, "",
+        "share of the episodes that begin anywhere instead of hanging");
+  o.Add(&random_start_velocity, "random_start_velocity", 5, {0, 50}, "rad/s",
+        "largest velocity of those");
+  o.Section("plant");
+  o.Add(&model, "model", "", "MJCF file to use instead of the built-in model");
+  plant.Describe(o);
+  reward.Describe(o);
+  dqn.Describe(o);
+}
+
+PendulumEnvConfig Config::Environments() const {
+  PendulumEnvConfig env;
+  env.plants = {plant};
+  env.num_envs = static_cast<int>(train.envs);
+  env.episode_seconds = episode_seconds;
+  env.start = {train.start_noise, random_start_share, random_start_velocity};
+  env.weights = reward;
+  env.seed = static_cast<uint64_t>(train.seed);
+  env.stream = "training environment";
+  env.mjcf = mjcf;
+  return env;
+}
+
+void ApplyToml(const Options& options, std::string_view text, const std::string& where) {
+  std::vector<std::string> sections;
+  for (const Option& option : options.all()) sections.push_back(option.section);
+  for (const auto& [section_key, node] : ParseToml(text, where)) {
+    const std::string section(section_key.str());
+    const std::string place = Concat(where, ":", node.source().begin.line, ": ");
+    const auto* table = node.as_table();
+    if (table == nullptr || std::ranges::find(sections, section) == sections.end()) {
+      throw BadInput(
+          Concat(place, "no section is called [", section, "]", DidYouMean(section, sections)));
+    }
+    for (const auto& [key, value] : *table) {
+      ApplyNode(options, section, std::string(key.str()), value, where);
+    }
+  }
+}
+
+Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
+  Config config;
+  Options options;
+  config.Describe(options);
+  const std::string where = file.string();
+  const std::string text = file.empty() ? "" : ReadTextFile(file);
+  const toml::table table = ParseToml(text, where);
+
+  // A model file brings its own plant, which other settings may change.
+  const std::string file_model = LastText("plant", "model", table, {}, "");
+  std::string model = LastText("plant", "model", {}, flags, "");
+  if (model.empty() && !file_model.empty()) {
+    model = (file.parent_path() / file_model).string();  // a relative path counts from its file
+  }
+  if (!model.empty()) config.plant = ChangedPlant(config.plant, model, {}, config.mjcf);
+
+  const NamedAgent& agent = FindAgent(LastText("train", "agent", table, flags, config.agent));
+  ApplyToml(options, agent.toml, Concat("agent ", agent.name));
+  if (!file.empty()) ApplyToml(options, text, where);
+  for (const auto& [name, value] : flags) {
+    const std::string flag = options.Find(name, "").front()->flag();
+    options.Set(name, value, flag);
+  }
+  config.agent = agent.name;
+  config.model = model;
+  return config;
+}
+
+std::string ConfigToml(Config config, bool identity_only) {
+  Options options;
+  const Config values = config;  // Describe sets defaults
+  config.Describe(options);
+  config = values;
+  return options.Toml(!identity_only,
+                      [&](const Option& option) { return !identity_only || option.identity; });
+}
+
+std::vector<std::pair<std::string, std::string>> NamedAgents() {
+  std::vector<std::pair<std::string, std::string>> names;
+  for (const NamedAgent& agent : EmbeddedAgents()) {
+    // The first line of the file is a comment that says what it is.
+    const std::string_view first_line = agent.toml.substr(0, agent.toml.find('\n'));
+    names.emplace_back(agent.name, Trim(first_line.substr(first_line.find_first_not_of("# "))));
+  }
+  return names;
+}
+
+LoadedPolicy LoadPolicy(const fs::path& path) {
+  fs::path file = path;
+  if (fs::is_directory(path)) {
+    file = path / "policy.safetensors";
+    if (fs::exists(path / "config.toml") && !fs::exists(file)) {
+      throw BadInput(Concat(path.string(), ": this run has no policy yet: expected ",
+                            "policy.safetensors, which its first evaluation writes"));
+    }
+  }
+  if (!fs::exists(file)) {
+    throw BadInput(
+        Concat(file.string(), ": no such file; expected a policy.safetensors or a run ", "folder"));
+  }
+  LoadedPolicy loaded{file, Policy::Load(file), Plant(), ""};
+  if (loaded.policy.shape().inputs != kObservationSize) {
+    throw BadInput(Concat(file.string(), ": expected a policy of ", kObservationSize,
+                          " observations, got ", loaded.policy.shape().inputs));
+  }
+  Options options;
+  loaded.plant.Describe(options);
+  try {
+    const json plant = json::parse(loaded.policy.About("plant"));
+    for (const Option& option : options.all()) {
+      option.Set(FormatNumber(plant.at(option.name).get<double>()), option.name);
+    }
+  } catch (const std::exception& error) {
+    throw BadInput(Concat(file.string(), ": metadata \"plant\": ", error.what()));
+  }
+  const auto model = loaded.policy.about().find("model");
+  if (model != loaded.policy.about().end()) loaded.mjcf = model->second;
+  return loaded;
+}
+
+std::map<std::string, std::string> AboutTask(const Config& config) {
+  json plant;
+  Options options;
+  Plant copy;
+  copy.Describe(options);
+  copy = config.plant;
+  for (const Option& option : options.all()) plant[option.name] = *std::get<double*>(option.target);
+  std::map<std::string, std::string> about{
+      {"agent", config.agent},
+      {"seed", std::to_string(config.train.seed)},
+      {"upswing_version", UPSWING_VERSION},
+      {"config", ConfigToml(config, true)},
+      {"plant", plant.dump()},
+      {"control_period", FormatNumber(kControlPeriod)},
+      {"observation",
+       json{{"names", {"cos q1", "sin q1", "w1", "cos q2", "sin q2", "w2", "energy", "height"}},
+            {"max_velocity", {kMaxVelocity1, kMaxVelocity2}}}
+           .dump()},
+  };
+  if (!config.mjcf.empty()) about["model"] = config.mjcf;
+  return about;
+}
+
+Plant ChangedPlant(const Plant& base, const std::string& model, const std::vector<std::string>& set,
+                   std::string& mjcf) {
+  Plant plant;
+  Options options;
+  plant.Describe(options);
+  plant = base;
+  if (!model.empty()) {
+    mjcf = ReadTextFile(model);
+    const ModelPtr compiled = CompileModel(mjcf, model);
+    CheckModel(*compiled, model);
+    plant = PlantOf(*compiled);
+  }
+  for (const std::string& change : set) {
+    const size_t equals = change.find('=');
+    if (equals == std::string::npos) {
+      throw BadInput(Concat("--set: expected NAME=VALUE, got \"", change, "\""));
+    }
+    const std::string name(Trim(std::string_view(change).substr(0, equals)));
+    options.Set(name, Trim(std::string_view(change).substr(equals + 1)), "--set " + name);
+  }
+  return plant;
+}
+
+}  // namespace upswing

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/options.h"
+#include "nn/policy.h"
+#include "rl/dqn.h"
+#include "rl/train.h"
+#include "sim/double_pendulum.h"
+#include "sim/pendulum_env.h"
+
+namespace upswing {
+
+/// All settings of a training.
+struct Config {
+  std::string agent;  // the named agent that the other settings began with
+  std::string model;  // path of an MJCF file instead of the built-in model; empty: built-in
+  TrainConfig train;
+  double episode_seconds, random_start_share, random_start_velocity;
+  Plant plant;
+  RewardWeights reward;
+  DqnConfig dqn;
+
+  std::string mjcf;  // the text of `model`; not a setting
+
+  Config() { SetDefaults(*this); }
+  void Describe(Options& options);
+
+  /// Training environments as these settings have them.
+  PendulumEnvConfig Environments() const;
+};
+
+/// A setting given on the command line: name and text.
+using FlagValue = std::pair<std::string, std::string>;
+
+/// Builds the settings in their order: defaults < named agent < configuration file (none if empty)
+/// < flags; a model file's plant counts as defaults. Throws BadInput.
+Config BuildConfig(const std::filesystem::path& file, const std::vector<FlagValue>& flags);
+
+/// Applies a TOML document. `where` names it in messages, which give the line too.
+void ApplyToml(const Options& options, std::string_view toml, const std::string& where);
+
+/// The settings as TOML; without those that do not make another run of it, if `identity_only`.
+std::string ConfigToml(Config config, bool identity_only);
+
+/// Names of the agents in configs/, in alphabetical order, and what each is.
+std::vector<std::pair<std::string, std::string>> NamedAgents();
+
+/// A policy and what it needs to be tried out.
+struct LoadedPolicy {
+  std::filesystem::path path;
+  Policy policy;
+  Plant plant;       // at training
+  std::string mjcf;  // empty: the built-in model
+};
+
+/// Loads a policy file, or the best policy of a run folder. Throws BadInput.
+LoadedPolicy LoadPolicy(const std::filesystem::path& path);
+
+/// What a policy file says of the task that it was trained on.
+std::map<std::string, std::string> AboutTask(const Config& config);
+
+/// The plant to try something on: `base`, or that of the model file if there is one, with the
+/// given changes ("mass2=1.2"). Reads the model into `mjcf`. Throws BadInput.
+Plant ChangedPlant(const Plant& base, const std::string& model, const std::vector<std::string>& set,
+                   std::string& mjcf);
+
+}  // namespace upswing

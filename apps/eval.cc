@@ -1,0 +1,164 @@
+#include <fmt/format.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "apps/commands.h"
+#include "apps/config.h"
+#include "apps/progress.h"
+#include "core/error.h"
+#include "core/text.h"
+#include "rl/evaluate.h"
+
+namespace upswing {
+namespace {
+
+struct EvalArguments {
+  std::string policy, model;
+  std::vector<std::string> set;
+  int episodes = 100, threads = 0;
+  uint64_t seed = 0;
+  bool as_json = false;
+};
+
+std::string PlantText(const Plant& plant) {
+  Options options;
+  Plant copy;
+  copy.Describe(options);
+  copy = plant;
+  std::string text;
+  for (const Option& option : options.all()) {
+    text += Concat(text.empty() ? "" : ", ", option.name, " ", option.text());
+  }
+  return text;
+}
+
+void PrintTable(const Evaluation& e, const LoadedPolicy& loaded, const Plant& plant) {
+  const auto moments = [](const Moments& m) {
+    return fmt::format("{:.4g} ± {:.2g}", m.mean, m.deviation);
+  };
+  fmt::print("{}\n", loaded.path.string());
+  fmt::print("  plant          {}\n", PlantText(plant));
+  fmt::print("  success        {} of {} = {:.1f}%   (95% interval {:.1f}% to {:.1f}%)\n",
+             e.successes, e.episodes, 100 * e.success_rate(), 100 * e.success_interval.low,
+             100 * e.success_interval.high);
+  if (e.successes > 0) {
+    fmt::print("  swing-up time  {:.2f} s   (middle half {:.2f} to {:.2f} s)\n",
+               e.swing_up_seconds.median, e.swing_up_seconds.low, e.swing_up_seconds.high);
+  } else {
+    fmt::print("  swing-up time  none swung up to stay\n");
+  }
+  fmt::print("  return         {}   in the first {} s\n", moments(e.reward_sum), kReturnSeconds);
+  for (size_t k = 0; k < e.term_means.size(); ++k) {
+    fmt::print("    {:<18}{:8.2f}\n", kRewardTermNames[k], e.term_means[k]);
+  }
+  fmt::print("  energy used    {} J   in {} s\n", moments(e.work), kEvaluationSeconds);
+  fmt::print("  torque         peak {:.4g} N·m, rms {} N·m\n", e.peak_torque,
+             moments(e.rms_torque));
+}
+
+void PrintJson(const Evaluation& e, const LoadedPolicy& loaded, const EvalArguments& arguments,
+               const Plant& plant) {
+  using nlohmann::ordered_json;
+  Options options;
+  Plant copy;
+  copy.Describe(options);
+  copy = plant;
+  ordered_json j;
+  j["policy"] = loaded.path.string();
+  j["seed"] = arguments.seed;
+  for (const Option& o : options.all()) j["plant"][o.name] = *std::get<double*>(o.target);
+  j["episodes"] = e.episodes;
+  j["successes"] = e.successes;
+  j["success_rate"] = e.success_rate();
+  j["success_interval_95"] = {e.success_interval.low, e.success_interval.high};
+  if (e.successes > 0) {
+    j["swing_up_seconds"] = {{"median", e.swing_up_seconds.median},
+                             {"quartiles", {e.swing_up_seconds.low, e.swing_up_seconds.high}}};
+  } else {
+    j["swing_up_seconds"] = nullptr;
+  }
+  const auto moments = [](const Moments& m) -> ordered_json {
+    return {{"mean", m.mean}, {"deviation", m.deviation}};
+  };
+  j["return"] = moments(e.reward_sum);
+  for (size_t k = 0; k < e.term_means.size(); ++k) {
+    j["reward_terms"][kRewardTermNames[k]] = e.term_means[k];
+  }
+  j["energy_used"] = moments(e.work);
+  j["peak_torque"] = e.peak_torque;
+  j["rms_torque"] = moments(e.rms_torque);
+  fmt::print("{}\n", j.dump(2));
+}
+
+int RunEval(const EvalArguments& arguments) {
+  LoadedPolicy loaded = LoadPolicy(arguments.policy);
+  PendulumEnvConfig config;
+  config.mjcf = loaded.mjcf;
+  const Plant plant = ChangedPlant(loaded.plant, arguments.model, arguments.set, config.mjcf);
+  config.plants = {plant};
+  config.num_envs = arguments.episodes;
+  config.episode_seconds = kEvaluationSeconds;
+  config.seed = arguments.seed;
+  config.stream = "evaluation";
+  config.threads = arguments.threads > 0
+                       ? arguments.threads
+                       : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  PendulumEnv env(config);
+
+  Evaluation evaluation;
+  {
+    ProgressLine line;
+    const auto begin = std::chrono::steady_clock::now();
+    evaluation = Evaluate(loaded.policy, env, [&](double share) {
+      if (!line.due() || arguments.as_json) return;
+      const double seconds =
+          std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+      line.Show(share, fmt::format("{} episodes/s  {} left",
+                                   FormatCount(share * arguments.episodes / seconds),
+                                   FormatDuration(seconds * (1 - share) / share)));
+    });
+  }
+  if (arguments.as_json) {
+    PrintJson(evaluation, loaded, arguments, plant);
+  } else {
+    PrintTable(evaluation, loaded, plant);
+  }
+  return 0;
+}
+
+}  // namespace
+
+void AddEval(CLI::App& program, Command& command) {
+  CLI::App* app = program.add_subcommand("eval", "Judge a policy over many episodes");
+  auto a = std::make_shared<EvalArguments>();
+  app->add_option("policy", a->policy, "policy.safetensors or run folder")
+      ->required()
+      ->type_name("POLICY|RUN");
+  app->add_option("--episodes", a->episodes, "how many [100]")
+      ->check(CLI::Range(1, 1000000))
+      ->type_name("");
+  app->add_option("--seed", a->seed, "of the start states [0]")->type_name("");
+  app->add_option("--set", a->set, "another plant, such as mass2=1.2 (repeat for more)")
+      ->type_name("NAME=VALUE")
+      ->take_all()
+      ->allow_extra_args(false);
+  app->add_option("--model", a->model, "MJCF file to evaluate on")->type_name("FILE");
+  app->add_option("--threads", a->threads, "0: one for each processor")
+      ->check(CLI::Range(0, 256))
+      ->type_name("");
+  app->add_flag("--json", a->as_json, "print JSON instead of a table");
+  app->footer(fmt::format(
+      "An episode lasts {} s from hanging with normal noise of 0.1 (rad, rad/s). It succeeds if "
+      "both\nlinks are within 30° of upright for the whole of the last {} s. The return is the "
+      "undiscounted\nsum of the reward, standard weights, over the first {} s.\n\n"
+      "Examples:\n"
+      "  upswing eval runs/d3qn-seed1\n"
+      "  upswing eval policy.safetensors --episodes 1000 --seed 7 --json\n"
+      "  upswing eval runs/d3qn-seed1 --set mass2=1.2 --set damping=0.1\n",
+      kEvaluationSeconds, kHoldSeconds, kReturnSeconds));
+  app->callback([a, &command] { command = [a] { return RunEval(*a); }; });
+}
+
+}  // namespace upswing

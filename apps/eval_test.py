@@ -1,0 +1,118 @@
+#!/usr/bin/env python3
+"""`upswing eval`: its table, its JSON, and that the same question gets the same answer."""
+
+import json
+import math
+import re
+import tempfile
+import unittest
+from pathlib import Path
+
+from testing import REWARD_TERMS, ProgramTest, run, small
+
+PLANT = {"mass1": 1, "mass2": 1, "length1": 0.5, "length2": 0.5, "damping1": 0.2, "damping2": 0.2,
+         "gravity": 9.81, "torque_limit": 5}
+
+
+def wilson(successes, trials):
+    """95% score interval of a success rate (Wilson, 1927)."""
+    z = 1.959963984540054
+    p = successes / trials
+    center = (p + z * z / (2 * trials)) / (1 + z * z / trials)
+    half = z / (1 + z * z / trials) * math.sqrt(p * (1 - p) / trials + z * z / (4 * trials**2))
+    return max(0, center - half), min(1, center + half)
+
+
+class EvalTest(ProgramTest):
+    @classmethod
+    def setUpClass(cls):
+        # A plant that is soon learned, so that there are successes to look at.
+        cls.trained = tempfile.TemporaryDirectory(prefix="upswing-")
+        cls.addClassCleanup(cls.trained.cleanup)
+        cls.policy = Path(cls.trained.name, "run")
+        done = run(*small(gravity=0.05, damping=1, hidden="64,64", head=32, eval_episodes=1,
+                          steps=100000, checkpoint_every=20000, out=cls.policy))
+        assert done.returncode == 0, done
+
+    def evaluate(self, *more, episodes=10):
+        return json.loads(self.succeed("eval", self.policy, "--json", "--episodes", episodes, *more))
+
+    def test_json_has_all_fields(self):
+        result = self.evaluate()
+        self.assertEqual(list(result), ["policy", "seed", "plant", "episodes", "successes",
+                                        "success_rate", "success_interval_95", "swing_up_seconds",
+                                        "return", "reward_terms", "energy_used", "peak_torque",
+                                        "rms_torque"])
+        self.assertEqual(result["plant"], PLANT | {"gravity": 0.05, "damping1": 1, "damping2": 1})
+        self.assertEqual(result["policy"], str(self.policy / "policy.safetensors"))
+        self.assertEqual(list(result["reward_terms"]), REWARD_TERMS)
+
+    def test_numbers_are_plausible(self):
+        result = self.evaluate()
+        self.assertEqual(result["success_rate"], result["successes"] / 10)
+        self.assertGreater(result["successes"], 0)
+        low, high = result["swing_up_seconds"]["quartiles"]
+        self.assertTrue(0 < low <= result["swing_up_seconds"]["median"] <= high <= 10)
+        self.assertAlmostEqual(sum(result["reward_terms"].values()), result["return"]["mean"],
+                               delta=1e-6)
+        self.assertTrue(0 < result["rms_torque"]["mean"] <= result["peak_torque"] <= 5)
+        self.assertGreater(result["energy_used"]["mean"], 0)
+
+    def test_interval_is_wilsons_and_holds_the_rate(self):
+        for change in ("gravity=0.05", "gravity=0.8", "gravity=9.81"):
+            result = self.evaluate("--set", change)
+            low, high = result["success_interval_95"]
+            self.assertTrue(0 <= low <= result["success_rate"] <= high <= 1)
+            expected = wilson(result["successes"], 10)
+            self.assertAlmostEqual(low, expected[0], delta=1e-12)
+            self.assertAlmostEqual(high, expected[1], delta=1e-12)
+
+    def test_nothing_swung_up_is_null(self):
+        result = self.evaluate("--set", "gravity=30", "--set", "torque_limit=0.01", episodes=2)
+        self.assertEqual((result["successes"], result["swing_up_seconds"]), (0, None))
+        table = self.succeed("eval", self.policy, "--episodes", 2, "--set", "gravity=30",
+                             "--set", "torque_limit=0.01")
+        self.assertIn("none swung up to stay", table)
+
+    def test_same_seed_same_answer_and_another_seed_another(self):
+        self.assertEqual(self.evaluate("--seed", 7), self.evaluate("--seed", 7))
+        self.assertNotEqual(self.evaluate("--seed", 7)["return"], self.evaluate("--seed", 8)["return"])
+
+    def test_threads_do_not_matter(self):
+        self.assertEqual(self.evaluate("--threads", 1), self.evaluate("--threads", 3))
+
+    def test_set_changes_plant_and_result(self):
+        usual = self.evaluate()
+        changed = self.evaluate("--set", "mass2=1.2")
+        self.assertEqual(changed["plant"], usual["plant"] | {"mass2": 1.2})
+        self.assertNotEqual(changed["return"], usual["return"])
+
+    def test_set_of_both(self):
+        both = self.evaluate("--set", "mass=2")
+        self.assertEqual((both["plant"]["mass1"], both["plant"]["mass2"]), (2, 2))
+        self.assertEqual(both, self.evaluate("--set", "mass1=2", "--set", "mass2=2"))
+
+    def test_the_last_set_counts(self):
+        self.assertEqual(self.evaluate("--set", "mass=2", "--set", "mass2=1")["plant"]["mass2"], 1)
+
+    def test_table_says_what_the_json_says(self):
+        result = self.evaluate()
+        table = self.succeed("eval", self.policy, "--episodes", 10)
+        self.assertNotIn("\x1b", table)
+        low, high = result["success_interval_95"]
+        self.assertIn(f"{result['successes']} of 10 = {100 * result['success_rate']:.1f}%", table)
+        self.assertIn(f"(95% interval {100 * low:.1f}% to {100 * high:.1f}%)", table)
+        self.assertIn(f"swing-up time  {result['swing_up_seconds']['median']:.2f} s", table)
+        for term, value in result["reward_terms"].items():
+            self.assertRegex(table, rf"{term} +{re.escape(f'{value:.2f}')}\n")
+        for words in ("return", "energy used", "peak", "rms", "gravity 0.05"):
+            self.assertIn(words, table)
+
+    def test_policy_file_and_run_folder_are_the_same(self):
+        by_file = json.loads(self.succeed("eval", self.policy / "policy.safetensors", "--json",
+                                          "--episodes", 10))
+        self.assertEqual(by_file, self.evaluate())
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,84 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+
+#include "apps/commands.h"
+#include "apps/config.h"
+#include "apps/progress.h"
+#include "core/error.h"
+#include "core/text.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+void PrintPolicy(const fs::path& path) {
+  const LoadedPolicy loaded = LoadPolicy(path);
+  const Policy& policy = loaded.policy;
+  const QNetworkShape& shape = policy.shape();
+  const auto about = [&](const std::string& key) {
+    const auto found = policy.about().find(key);
+    return found == policy.about().end() ? "unknown" : found->second;
+  };
+  fmt::print("{}\n", loaded.path.string());
+  fmt::print("  what        greedy policy of a {} Q-network {}-{}-{}{}{}, {} parameters\n",
+             shape.dueling ? "dueling" : "plain", shape.inputs, fmt::join(shape.hidden, "-"),
+             shape.dueling ? fmt::format("({0}→1, {0}→{1})", shape.head, shape.actions)
+                           : std::to_string(shape.actions),
+             shape.layer_norm ? ", layer normalisation" : "", "",
+             FormatCount(static_cast<double>(policy.num_parameters())));
+  fmt::print("  torques     {} N·m, every {} s\n", fmt::join(policy.torques(), ", "),
+             about("control_period"));
+  fmt::print("  made by     agent {}, seed {}, step {}, upswing {}\n", about("agent"),
+             about("seed"), about("step"), about("upswing_version"));
+  fmt::print("  judged      success rate {}, mean return {} (at that step)\n",
+             about("success_rate"), about("mean_return"));
+  fmt::print("  plant       {}\n", about("plant"));
+  fmt::print("  self-check  passed, largest difference {:.1e}\n", policy.self_check_error());
+}
+
+void PrintRun(const fs::path& path) {
+  const TensorFile checkpoint = TensorFile::Load(RunFolder::CheckpointPath(path));
+  const Config config = BuildConfig(path / "config.toml", {});
+  TrainState state(static_cast<int>(config.train.envs), kRewardTerms);
+  state.State(Archive::Loader(checkpoint).In("train"));
+  const auto count = [](int64_t n) { return FormatCount(static_cast<double>(n)); };
+  fmt::print("{}\n", path.string());
+  fmt::print("  agent       {}, seed {}, upswing {}\n", config.agent, config.train.seed,
+             checkpoint.Metadata("upswing_version"));
+  fmt::print("  checkpoint  step {} of {}, {} episodes, {} of training\n", count(state.steps),
+             count(config.train.steps), count(state.episodes), FormatDuration(state.seconds));
+  if (state.solved) {
+    fmt::print("  solved      at step {}, after {} of training\n", count(state.first_full_step),
+               FormatDuration(state.first_full_seconds));
+  } else {
+    fmt::print("  solved      not yet; last success rate {}\n", state.last_success_rate);
+  }
+}
+
+int RunInfo(const std::string& path) {
+  const bool is_run = fs::exists(fs::path(path) / "config.toml");
+  if (is_run) PrintRun(path);
+  if (!is_run || fs::exists(fs::path(path) / "policy.safetensors")) {
+    PrintPolicy(path);
+  } else {
+    fmt::print("  policy      none yet: the first evaluation writes it\n");
+  }
+  return 0;
+}
+
+}  // namespace
+
+void AddInfo(CLI::App& program, Command& command) {
+  CLI::App* app = program.add_subcommand("info", "Say what a policy or a run is, and check it");
+  auto path = std::make_shared<std::string>();
+  app->add_option("policy", *path, "policy.safetensors or run folder")
+      ->required()
+      ->type_name("POLICY|RUN");
+  app->footer("Examples:\n  upswing info runs/d3qn-seed1\n  upswing info policy.safetensors\n");
+  app->callback([path, &command] { command = [path] { return RunInfo(*path); }; });
+}
+
+}  // namespace upswing

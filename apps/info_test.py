@@ -1,0 +1,58 @@
+#!/usr/bin/env python3
+"""`upswing info`: what a policy or a run is, how it was made, and its self-check."""
+
+import re
+import signal
+import unittest
+
+from testing import ProgramTest, small
+
+
+class InfoTest(ProgramTest):
+    def assert_says(self, text, *words):
+        for word in words:
+            self.assertIn(word, text)
+
+    def test_policy(self):
+        self.succeed(*small(seed=5, mass2=1.25))
+        text = self.succeed("info", "run/policy.safetensors")
+        self.assert_says(text, "run/policy.safetensors", "dueling", "8-32-", "16", "1,578 parameters",
+                         "layer normalisation", "-5, -3.75, -2.5, -1.25, 0, 1.25, 2.5, 3.75, 5 N·m",
+                         "agent d3qn-small", "seed 5", "upswing ", '"mass2":1.25', "self-check  passed")
+        self.assertRegex(text, r"step (2000|4000)")
+        self.assertRegex(text, r"success rate [\d.]+, mean return -?[\d.]+")
+
+    def test_plain_network(self):
+        self.succeed(*small(agent="dqn", layer_norm=False))
+        text = self.succeed("info", "run/policy.safetensors")
+        self.assert_says(text, "plain Q-network 8-32-9", "585 parameters", "agent dqn")
+        self.assertNotIn("layer normalisation", text)
+
+    def test_run(self):
+        self.succeed(*small())
+        text = self.succeed("info", "run")
+        self.assert_says(text, "agent d3qn-small, seed 1", "step 4,000 of 4,000, 16 episodes",
+                         "not yet", "self-check  passed")
+        self.assertIn(self.succeed("info", "run/policy.safetensors"), text)
+
+    def test_run_without_a_policy(self):
+        process = self.start(*small(steps=10**9, eval_every=10**9))
+        self.end(process, signal.SIGTERM)
+        text = self.succeed("info", "run")
+        self.assert_says(text, "none yet")
+        self.assertTrue(re.search(r"checkpoint  step [\d,]+ of 1,000,000,000", text), text)
+
+    def test_nothing_is_written(self):
+        self.succeed(*small())
+        before = (self.folder / "run/log.txt").read_bytes()
+        self.succeed("info", "run")
+        self.assertEqual((self.folder / "run/log.txt").read_bytes(), before)
+
+    def test_version_and_help(self):
+        self.assertRegex(self.succeed("--version"), r"^upswing \d+\.\d+\.\d+\n$")
+        for command in ([], ["train"], ["eval"], ["simulate"], ["info"]):
+            self.assertIn("Examples:", self.succeed(*command, "--help"))
+
+
+if __name__ == "__main__":
+    unittest.main()

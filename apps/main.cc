@@ -1,0 +1,81 @@
+#include <fmt/format.h>
+
+#include <csignal>
+#include <cstdio>
+#include <exception>
+
+#include "apps/commands.h"
+#include "core/error.h"
+#include "core/text.h"
+
+namespace upswing {
+namespace {
+
+/// Every flag of a subcommand, and the subcommands' names.
+std::vector<std::string> KnownWords(const CLI::App& app) {
+  std::vector<std::string> words;
+  for (const CLI::Option* option : app.get_options()) {
+    for (const std::string& name : option->get_lnames()) words.push_back("--" + name);
+  }
+  for (const CLI::App* sub : app.get_subcommands({})) words.push_back(sub->get_name());
+  return words;
+}
+
+/// One line on what was wrong with the command line.
+std::string Explain(const CLI::App& program, const CLI::ParseError& error) {
+  const auto chosen = program.get_subcommands();
+  const CLI::App& app = chosen.empty() ? program : *chosen.front();
+  const std::vector<std::string> unknown = app.remaining();
+  if (unknown.empty()) return error.what();
+  const std::string word = unknown.front().substr(0, unknown.front().find('='));
+  return Concat(word.starts_with("-") ? "unknown flag " : "did not expect ", word,
+                DidYouMean(word, KnownWords(app)));
+}
+
+int Main(int argc, char** argv) {
+  CLI::App program(
+      "Upswing trains, judges and keeps controllers that swing up and balance a double\n"
+      "pendulum with one motor at its first joint, in MuJoCo.",
+      "upswing");
+  program.set_version_flag("--version", "upswing " UPSWING_VERSION);
+  program.require_subcommand(1);
+  program.footer(
+      "Examples:\n"
+      "  upswing train                      train the default agent until the task is solved\n"
+      "  upswing eval runs/d3qn-seed1       judge its best policy\n"
+      "  upswing train --help               every setting, with its default\n");
+  Command command;
+  AddTrain(program, command);
+  AddEval(program, command);
+  AddSimulate(program, command);
+  AddInfo(program, command);
+
+  try {
+    program.parse(argc, argv);
+    return command();
+  } catch (const CLI::Success& request) {
+    return program.exit(request);  // --help and --version
+  } catch (const CLI::ParseError& error) {
+    fmt::print(stderr, "upswing: {}\n", Explain(program, error));
+    return 2;
+  } catch (const Error& error) {
+    fmt::print(stderr, "upswing: {}\n", error.what());
+    return error.exit_code();
+  } catch (const std::bad_alloc&) {
+    fmt::print(stderr, "upswing: out of memory\n");
+    return 1;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "upswing: {}\n", error.what());
+    return 1;
+  }
+}
+
+}  // namespace
+}  // namespace upswing
+
+int main(int argc, char** argv) {
+  // A write that cannot be done shall fail where it is made, with a message.
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
+  return upswing::Main(argc, argv);
+}

@@ -1,0 +1,72 @@
+#include "apps/progress.h"
+
+#include <fmt/format.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace upswing {
+namespace {
+
+int TerminalWidth() {
+  winsize size{};
+  const bool known = ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
+  return known ? size.ws_col : 80;
+}
+
+}  // namespace
+
+ProgressLine::ProgressLine() : terminal_(isatty(STDOUT_FILENO) == 1) {}
+
+bool ProgressLine::due() const {
+  return terminal_ && Clock::now() - last_ > std::chrono::milliseconds(200);
+}
+
+void ProgressLine::Show(double share, const std::string& text) {
+  constexpr int kBar = 16;
+  const int full = static_cast<int>(std::lround(std::clamp(share, 0.0, 1.0) * kBar));
+  std::string line =
+      fmt::format("[{:=>{}}{: >{}}] {:3.0f}% {}", "", full, "", kBar - full, 100 * share, text);
+  const auto width = static_cast<size_t>(std::max(20, TerminalWidth() - 1));
+  if (line.size() > width) line.resize(width);
+  fmt::print("\r\x1b[K{}", line);
+  std::fflush(stdout);
+  shown_ = true;
+  last_ = Clock::now();
+}
+
+void ProgressLine::Print(const std::string& line) {
+  Clear();
+  fmt::print("{}\n", line);
+  std::fflush(stdout);
+}
+
+void ProgressLine::Clear() {
+  if (shown_) fmt::print("\r\x1b[K");
+  std::fflush(stdout);
+  shown_ = false;
+  last_ = {};
+}
+
+std::string FormatDuration(double seconds) {
+  if (seconds < 60) return fmt::format("{:.1f} s", seconds);
+  const auto whole = static_cast<int64_t>(std::llround(seconds));
+  if (whole < 3600) return fmt::format("{} min {:02} s", whole / 60, whole % 60);
+  return fmt::format("{} h {:02} min", whole / 3600, whole / 60 % 60);
+}
+
+std::string FormatCount(double number) {
+  const std::string digits = std::to_string(std::llround(number));
+  std::string grouped;
+  for (size_t i = 0; i < digits.size(); ++i) {
+    const bool group_begins = i > 0 && (digits.size() - i) % 3 == 0 && digits[i - 1] != '-';
+    if (group_begins) grouped += ',';
+    grouped += digits[i];
+  }
+  return grouped;
+}
+
+}  // namespace upswing

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <chrono>
+#include <string>
+
+namespace upswing {
+
+/// A line at the bottom of the terminal that is written anew a few times a second. Where standard
+/// output is no terminal it stays silent, and what is printed are plain lines.
+class ProgressLine {
+ public:
+  ProgressLine();
+  ~ProgressLine() { Clear(); }
+  ProgressLine(const ProgressLine&) = delete;
+  ProgressLine& operator=(const ProgressLine&) = delete;
+
+  /// Whether a line would be shown now: there is a terminal, and the last one is old enough.
+  bool due() const;
+
+  /// Shows a bar of `share` (0 to 1) and a text behind it, cut to the terminal's width.
+  void Show(double share, const std::string& text);
+
+  /// Prints a line that stays, above the bar.
+  void Print(const std::string& line);
+
+  /// Takes the bar away.
+  void Clear();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  bool terminal_;
+  bool shown_ = false;
+  Clock::time_point last_{};
+};
+
+/// Seconds as people read them: `8.3 s`, `2 min 05 s`, `1 h 04 min`.
+std::string FormatDuration(double seconds);
+
+/// A whole number with commas between groups of three digits: `1,250,000`.
+std::string FormatCount(double number);
+
+}  // namespace upswing

@@ -1,0 +1,182 @@
+"""What the end-to-end tests of the program share: running it, small settings, reading its files.
+
+The program is taken from the environment variable UPSWING, else from the release build of the
+repository in UPSWING_ROOT.
+"""
+
+import csv
+import json
+import os
+import signal
+import struct
+import subprocess
+import tempfile
+import unittest
+from pathlib import Path
+
+ROOT = Path(os.environ.get("UPSWING_ROOT", Path(__file__).resolve().parent.parent))
+UPSWING = Path(os.environ.get("UPSWING", ROOT / "build/release/apps/upswing"))
+
+RUN_FILES = {"config.toml", "metrics.csv", "episodes.csv", "evals.csv", "log.txt",
+             "events.out.tfevents.0.upswing", "checkpoint.safetensors", "policy.safetensors"}
+REWARD_TERMS = ["energy", "height", "balance", "velocity_penalty", "torque_penalty"]
+
+# A training of a fraction of a second that evaluates twice.
+SMALL = {"agent": "d3qn-small", "hidden": 32, "head": 16, "steps": 4000, "eval_every": 2000,
+         "eval_episodes": 4, "checkpoint_every": 500, "log_every": 500, "learning_starts": 200,
+         "threads": 1, "out": "run"}
+
+
+def small(**changes):
+    """`train` with small settings and the given changes; None takes a setting away, True and False
+    are flags."""
+    arguments = ["train"]
+    for name, value in (SMALL | changes).items():
+        flag = name.replace("_", "-")
+        if isinstance(value, bool):
+            arguments.append(f"--{flag}" if value else f"--no-{flag}")
+        elif value is not None:
+            arguments += [f"--{flag}", str(value)]
+    return arguments
+
+
+def run(*arguments, cwd=None, **more):
+    """Runs the program to its end; text comes back in stdout and stderr."""
+    return subprocess.run([UPSWING, *map(str, arguments)], cwd=cwd, check=False,
+                          stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                          stderr=subprocess.PIPE, encoding="utf-8", **more)
+
+
+def read_csv(path):
+    """The rows of a table, as dictionaries of numbers."""
+    with open(path, encoding="utf-8", newline="") as file:
+        return [{name: float(text) for name, text in row.items()} for row in csv.DictReader(file)]
+
+
+def without_seconds(path):
+    """The rows of a table as text, without the column that differs from run to run."""
+    with open(path, encoding="utf-8", newline="") as file:
+        return [{name: text for name, text in row.items() if name != "seconds"}
+                for row in csv.DictReader(file)]
+
+
+def snapshot(folder):
+    """Every file below a folder with its bytes, and every folder with None."""
+    return {str(path.relative_to(folder)): path.read_bytes() if path.is_file() else None
+            for path in sorted(Path(folder).rglob("*"))}
+
+
+def read_tensors(path):
+    """Metadata and {name: (type, shape, bytes)} of a safetensors file."""
+    data = Path(path).read_bytes()
+    length = struct.unpack_from("<Q", data)[0]
+    header = json.loads(data[8:8 + length])
+    metadata = header.pop("__metadata__", {})
+    tensors = {}
+    for name, entry in header.items():
+        begin, end = (8 + length + offset for offset in entry["data_offsets"])
+        tensors[name] = (entry["dtype"], entry["shape"], data[begin:end])
+    return metadata, tensors
+
+
+def write_tensors(path, metadata, tensors):
+    """Writes a safetensors file without a checksum, so that only its content can be wrong."""
+    header = {"__metadata__": {key: text for key, text in metadata.items() if key != "checksum"}}
+    offset = 0
+    for name, (dtype, shape, data) in tensors.items():
+        header[name] = {"dtype": dtype, "shape": shape, "data_offsets": [offset, offset + len(data)]}
+        offset += len(data)
+    text = json.dumps(header).encode()
+    pieces = [struct.pack("<Q", len(text)), text, *(data for _, _, data in tensors.values())]
+    Path(path).write_bytes(b"".join(pieces))
+
+
+def with_number(tensor, index, number):
+    """The tensor with one of its numbers replaced."""
+    dtype, shape, data = tensor
+    code = {"F32": "f", "F64": "d", "I64": "q", "U64": "Q"}[dtype]
+    changed = bytearray(data)
+    struct.pack_into("<" + code, changed, index * struct.calcsize(code), number)
+    return dtype, shape, bytes(changed)
+
+
+def state_of(path):
+    """What a checkpoint holds, without what depends on the clock: the seconds, and with them the
+    lengths of the tables."""
+    _, tensors = read_tensors(path)
+    return {name: tensor for name, tensor in tensors.items()
+            if not name.endswith("seconds") and not name.startswith("run/size/")}
+
+
+class ProgramTest(unittest.TestCase):
+    """Tests of the program, each in a folder of its own that is the current one."""
+
+    maxDiff = 2000
+
+    def setUp(self):
+        temporary = tempfile.TemporaryDirectory(prefix="upswing-")
+        self.addCleanup(temporary.cleanup)
+        self.folder = Path(temporary.name)
+
+    def run_here(self, *arguments, **more):
+        return run(*arguments, cwd=self.folder, **more)
+
+    def succeed(self, *arguments, **more):
+        """Runs the program, which shall succeed without a word on stderr; returns stdout."""
+        done = self.run_here(*arguments, **more)
+        self.assertEqual((done.returncode, done.stderr), (0, ""), done)
+        return done.stdout
+
+    def assert_one_line(self, done, code, *words):
+        """It ended with this exit code and one line on stderr in which all words occur."""
+        self.assertEqual(done.returncode, code, done)
+        self.assertEqual(len(done.stderr.splitlines()), 1, done.stderr)
+        self.assertTrue(done.stderr.startswith("upswing: "), done.stderr)
+        self.assertTrue(done.stderr.endswith("\n"), done.stderr)
+        for word in words:
+            self.assertIn(str(word), done.stderr)
+
+    def refuse(self, arguments, *words, code=2, **more):
+        """Runs the program, which shall refuse: one line, no output, no file touched."""
+        before = snapshot(self.folder)
+        done = self.run_here(*arguments, **more)
+        self.assert_one_line(done, code, *words)
+        self.assertEqual(done.stdout, "")
+        self.assertEqual(snapshot(self.folder), before)
+
+    def write(self, name, text):
+        """Writes a text file; returns its name."""
+        (self.folder / name).write_text(text, encoding="utf-8")
+        return name
+
+    def start(self, *arguments, wait=True):
+        """Starts the program, waits until it says that it trains, and kills it in the end."""
+        process = subprocess.Popen([UPSWING, *map(str, arguments)], cwd=self.folder,
+                                   stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                                   stderr=subprocess.STDOUT, encoding="utf-8")
+        self.addCleanup(self.end, process)
+        if wait:
+            self.assertIn("Training", process.stdout.readline())
+        return process
+
+    @staticmethod
+    def end(process, number=signal.SIGKILL):
+        """Sends a signal and waits; returns the exit code and the rest of the output."""
+        if process.poll() is None:
+            process.send_signal(number)
+        rest = "" if process.stdout.closed else process.stdout.read()
+        process.stdout.close()
+        return process.wait(), rest
+
+    def assert_same_run(self, a, b):
+        """Two run folders hold the same but for the clock: policy, tables, whole state."""
+        a, b = self.folder / a, self.folder / b
+        self.assertEqual((a / "policy.safetensors").read_bytes(),
+                         (b / "policy.safetensors").read_bytes())
+        for table in ("metrics.csv", "episodes.csv", "evals.csv"):
+            self.assertEqual(without_seconds(a / table), without_seconds(b / table), table)
+        state_a = state_of(a / "checkpoint.safetensors")
+        state_b = state_of(b / "checkpoint.safetensors")
+        self.assertEqual(state_a.keys(), state_b.keys())
+        for name, tensor in state_a.items():
+            self.assertTrue(tensor == state_b[name], f"checkpoint: {name} differs")

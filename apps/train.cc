@@ -1,0 +1,349 @@
+#include "rl/train.h"
+
+#include <fmt/format.h>
+
+#include <atomic>
+#include <csignal>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <thread>
+
+#include "apps/commands.h"
+#include "apps/config.h"
+#include "apps/progress.h"
+#include "core/error.h"
+#include "core/file.h"
+#include "core/text.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kCheckpointFormat = "upswing-checkpoint-1";
+
+// ---- Signals: the handler only notes them, the training loop asks at each step.
+
+std::atomic<int> g_stop_signal{0};
+std::atomic<bool> g_checkpoint_wanted{false};
+static_assert(std::atomic<int>::is_always_lock_free);
+
+void InstallSignalHandlers() {
+  struct sigaction stop {};
+  stop.sa_handler = [](int signal) { g_stop_signal = signal; };
+  stop.sa_flags = SA_RESETHAND | SA_RESTART;  // a second one ends the program at once
+  sigaction(SIGINT, &stop, nullptr);
+  sigaction(SIGTERM, &stop, nullptr);
+  struct sigaction checkpoint {};
+  checkpoint.sa_handler = [](int) { g_checkpoint_wanted = true; };
+  checkpoint.sa_flags = SA_RESTART;
+  sigaction(SIGUSR1, &checkpoint, nullptr);
+}
+
+TrainRequest PollSignals() {
+  if (g_stop_signal != 0) return TrainRequest::kStop;
+  if (g_checkpoint_wanted.exchange(false)) return TrainRequest::kCheckpoint;
+  return TrainRequest::kGoOn;
+}
+
+// ---- Where a run comes from.
+
+/// What was typed.
+struct TrainArguments {
+  std::string config, out, resume;
+  std::vector<FlagValue> flags;
+};
+
+/// A folder under runs/ that is not there yet.
+fs::path FreeRunFolder(const Config& config) {
+  const std::string base = fmt::format("runs/{}-seed{}", config.agent, config.train.seed);
+  fs::path path = base;
+  for (int i = 2; fs::exists(path); ++i) path = fmt::format("{}-{}", base, i);
+  return path;
+}
+
+/// Throws unless the checkpoint is one of this program's version and of these settings.
+void CheckCheckpoint(const TensorFile& checkpoint, const Config& config) {
+  const auto expect = [&](const std::string& key, std::string_view expected) {
+    const std::string& got = checkpoint.Metadata(key);
+    if (got != expected) {
+      throw BadInput(
+          Concat(checkpoint.path(), ": ", key, ": expected \"", expected, "\", got \"", got, "\""));
+    }
+  };
+  expect("format", kCheckpointFormat);
+  expect("upswing_version", UPSWING_VERSION);
+  Config old_config;
+  Config new_config;
+  Options old_options, new_options;
+  old_config.Describe(old_options);
+  new_config.Describe(new_options);
+  new_config = config;
+  ApplyToml(old_options, checkpoint.Metadata("config"), checkpoint.path());
+  for (size_t i = 0; i < new_options.all().size(); ++i) {
+    const Option& before = old_options.all()[i];
+    const Option& now = new_options.all()[i];
+    if (now.identity && before.text() != now.text()) {
+      throw BadInput(Concat(checkpoint.path(), ": made with ", before.section, ".", before.name,
+                            " = ", before.text(), ", but the configuration says ", now.text()));
+    }
+  }
+  if (checkpoint.Metadata("model") != config.mjcf) {
+    throw BadInput(Concat(checkpoint.path(), ": made with another model than ", config.model));
+  }
+}
+
+/// Everything that a training is made of, built from its settings.
+struct Session {
+  Config config;
+  ThreadPool pool;
+  PendulumEnv env;
+  Dqn agent;
+  TrainState state;
+
+  Session(const Config& c, int threads)
+      : config(c),
+        pool(threads),
+        env(c.Environments()),
+        agent(c.dqn, env.num_envs(), env.obs_size(), TorqueLevels(env.torque_limit()),
+              static_cast<uint64_t>(c.train.seed), pool),
+        state(env.num_envs(), kRewardTerms) {}
+
+  /// Evaluation from fresh starts, with the reward's standard weights, on the training plant.
+  Evaluation Judge(const Policy& policy, uint64_t number) const {
+    PendulumEnvConfig judge = config.Environments();
+    judge.num_envs = static_cast<int>(config.train.eval_episodes);
+    judge.episode_seconds = kEvaluationSeconds;
+    judge.start = StartStates();
+    judge.weights = RewardWeights();
+    judge.stream = Concat("evaluation at step ", number);
+    judge.threads = pool.threads();
+    PendulumEnv env_of_judge(judge);
+    return Evaluate(policy, env_of_judge);
+  }
+
+  std::map<std::string, std::string> CheckpointMetadata() const {
+    return {{"format", std::string(kCheckpointFormat)},
+            {"upswing_version", UPSWING_VERSION},
+            {"config", ConfigToml(config, true)},
+            {"model", config.mjcf}};
+  }
+};
+
+// ---- What people see.
+
+/// Steps and updates per second of training, between two log intervals at least half a second
+/// apart.
+struct Rates {
+  double steps_per_second = 0, updates_per_second = 0;
+  int64_t steps = 0, updates = 0;
+  double seconds = 0;
+
+  void Update(const TrainState& s, const AgentReport& report) {
+    const double elapsed = s.seconds - seconds;
+    if (elapsed < 0.5) return;
+    steps_per_second = static_cast<double>(s.steps - steps) / elapsed;
+    updates_per_second = static_cast<double>(report.updates - updates) / elapsed;
+    *this = {steps_per_second, updates_per_second, s.steps, report.updates, s.seconds};
+  }
+};
+
+void Announce(const Session& session, const fs::path& path) {
+  const Config& c = session.config;
+  const DqnConfig& d = c.dqn;
+  fmt::print("Training {} (seed {}) in {}\n", c.agent, c.train.seed, path.string());
+  fmt::print("  {}{} network {}{}, {} parameters; {} environments, {} threads\n",
+             d.double_q ? "double, " : "", d.dueling ? "dueling" : "plain",
+             fmt::join(d.hidden, "-"), d.dueling ? fmt::format(" with heads of {}", d.head) : "",
+             FormatCount(static_cast<double>(session.agent.online().size())), c.train.envs,
+             session.pool.threads());
+  if (session.state.steps > 0) {
+    fmt::print("  going on from step {}\n", FormatCount(static_cast<double>(session.state.steps)));
+  }
+  std::fflush(stdout);
+}
+
+/// Shows the training as it goes on.
+void Report(Training& training, ProgressLine& line, Rates& rates, AgentReport& last) {
+  const double total = static_cast<double>(training.config.steps);
+  training.on_metrics = [&](const TrainState& s, const AgentReport& report) {
+    last = report;
+    rates.Update(s, report);
+  };
+  training.on_step = [&, total](const TrainState& s) {
+    if (!line.due()) return;
+    const double left = rates.steps_per_second > 0
+                            ? (total - static_cast<double>(s.steps)) / rates.steps_per_second
+                            : 0;
+    line.Show(
+        static_cast<double>(s.steps) / total,
+        fmt::format("{} steps  {}/s  {} updates/s  eps {:.2f}  loss {:.4f}  return {:.0f}  "
+                    "success {:.0f}%  at most {} left",
+                    FormatCount(static_cast<double>(s.steps)), FormatCount(rates.steps_per_second),
+                    FormatCount(rates.updates_per_second), last.epsilon, last.loss, s.mean_return(),
+                    100 * s.last_success_rate, FormatDuration(left)));
+  };
+  training.on_evaluation = [&](const TrainState& s, const Evaluation& e) {
+    line.Print(fmt::format(
+        "{:>9} steps  {:>10}  {:>6} updates/s  eps {:.2f}  loss {:.4f}  return {:6.0f}  "
+        "success {:3}/{}",
+        FormatCount(static_cast<double>(s.steps)), FormatDuration(s.seconds),
+        FormatCount(rates.updates_per_second), last.epsilon, last.loss, e.reward_sum.mean,
+        e.successes, e.episodes));
+  };
+}
+
+void Summarize(const TrainState& s, const fs::path& run, bool finished) {
+  const std::string at = FormatCount(static_cast<double>(s.steps));
+  if (s.solved) {
+    fmt::print("Solved after {} of training, at step {} (training so far: {}, {} steps).\n",
+               FormatDuration(s.first_full_seconds),
+               FormatCount(static_cast<double>(s.first_full_step)), FormatDuration(s.seconds), at);
+  } else {
+    fmt::print("{} at step {} after {} of training; not solved yet.\n",
+               finished ? "Done" : "Stopped", at, FormatDuration(s.seconds));
+  }
+  const std::string go_on = fmt::format("upswing train --resume {}{}", run.string(),
+                                        !finished  ? ""
+                                        : s.solved ? " --no-stop-when-solved"
+                                                   : fmt::format(" --steps {}", 2 * s.steps));
+  if (s.best_success_rate >= 0) {
+    fmt::print("Best policy: {} (step {}, success {:.0f}%, return {:.0f})\n",
+               (run / "policy.safetensors").string(), FormatCount(static_cast<double>(s.best_step)),
+               100 * s.best_success_rate, s.best_return);
+    fmt::print("Next:\n  ./upswing eval {}\n  ./upswing info {}\n", run.string(), run.string());
+  } else {
+    fmt::print("Next:\n");
+  }
+  fmt::print("  ./{}\n", go_on);
+}
+
+int RunTrain(const TrainArguments& arguments) {
+  const bool resuming = !arguments.resume.empty();
+  const fs::path resume = arguments.resume;
+  if (resuming && !fs::exists(resume / "config.toml")) {
+    throw BadInput(
+        Concat("--resume ", resume.string(), ": expected a run folder with a config.toml"));
+  }
+  Config config =
+      BuildConfig(resuming ? resume / "config.toml" : fs::path(arguments.config), arguments.flags);
+  if (!config.mjcf.empty()) config.model = "model.xml";  // the copy in the run folder
+
+  const int threads = config.train.threads > 0
+                          ? static_cast<int>(config.train.threads)
+                          : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  Session session(config, threads);
+  fs::path path = resume;
+  if (!resuming) {
+    path = arguments.out.empty() ? FreeRunFolder(config) : fs::path(arguments.out);
+    std::vector<std::pair<std::string, std::string>> files{
+        {"config.toml", ConfigToml(config, false)}};
+    if (!config.mjcf.empty()) files.emplace_back("model.xml", config.mjcf);
+    RunFolder::Create(path, files, [&](TensorFile& checkpoint) {
+      checkpoint.metadata = session.CheckpointMetadata();
+      AddToCheckpoint(session.agent, session.env, session.state, checkpoint);
+    });
+  }
+
+  // A new run, too, begins from its checkpoint.
+  const TensorFile checkpoint = TensorFile::Load(RunFolder::CheckpointPath(path));
+  CheckCheckpoint(checkpoint, config);
+  LoadCheckpoint(session.agent, session.env, session.state, checkpoint);
+  RunFolder run(path, checkpoint);
+  if (resuming) WriteFileAtomically(path / "config.toml", ConfigToml(config, false));
+
+  Training training{config.train, session.agent, session.env, run, {}, {}, {}, {}, {}, {}, {}};
+  training.evaluate = [&](const Policy& p, uint64_t number) { return session.Judge(p, number); };
+  training.about = AboutTask(config);
+  training.checkpoint_metadata = session.CheckpointMetadata();
+  training.poll = PollSignals;
+  ProgressLine line;
+  AgentReport last = session.agent.Report();
+  Rates rates{0, 0, session.state.steps, last.updates, session.state.seconds};
+  Report(training, line, rates, last);
+
+  InstallSignalHandlers();
+  Announce(session, path);
+  run.Log(
+      Concat(session.state.steps > 0 ? "resumed" : "started", " at step ", session.state.steps));
+  bool finished = false;
+  try {
+    finished = Train(training, session.state);
+  } catch (const Error& error) {
+    run.Log(error.what());
+    throw;
+  }
+  line.Clear();
+  run.Log(Concat(finished ? "finished" : "stopped", " at step ", session.state.steps));
+  Summarize(session.state, path, finished);
+  return finished ? 0 : 128 + g_stop_signal;
+}
+
+/// Adds a flag for each setting, in the order in which they were described.
+void AddSettings(CLI::App& app, std::vector<FlagValue>& flags) {
+  Config defaults;
+  Options options;
+  defaults.Describe(options);
+  for (const Option& option : options.all()) {
+    std::string help = option.help;
+    if (!option.unit.empty()) help += ", " + option.unit;
+    help += " [" + option.text() + "]";
+    const std::string name = option.name;
+    if (std::holds_alternative<bool*>(option.target)) {
+      app.add_flag_function(
+             option.flag() + ",!--no-" + option.flag().substr(2),
+             [&flags, name](int64_t on) { flags.emplace_back(name, on > 0 ? "true" : "false"); },
+             help)
+          ->group(option.section);
+      continue;
+    }
+    app.add_option_function<std::string>(
+           option.flag(),
+           [&flags, name](const std::string& text) { flags.emplace_back(name, text); }, help)
+        ->group(option.section)
+        ->type_name("");
+  }
+  for (const auto& alias : options.aliases()) {
+    const std::string name = alias.name;
+    app.add_option_function<std::string>(
+           "--" + name, [&flags, name](const std::string& text) { flags.emplace_back(name, text); },
+           Concat("both ", alias.members[0], " and ", alias.members[1]))
+        ->group(alias.section)
+        ->type_name("");
+  }
+}
+
+}  // namespace
+
+void AddTrain(CLI::App& program, Command& command) {
+  CLI::App* app = program.add_subcommand("train", "Train an agent until the task is solved");
+  auto arguments = std::make_shared<TrainArguments>();
+  app->add_option("--out", arguments->out, "run folder to make [runs/AGENT-seedSEED]");
+  app->add_option("--config", arguments->config, "TOML file of settings (flags come after it)");
+  app->add_option("--resume", arguments->resume, "go on with a run folder");
+  AddSettings(*app, arguments->flags);
+
+  std::string agents = "Named agents:\n";
+  for (const auto& [name, what] : NamedAgents()) agents += fmt::format("  {:<14}{}\n", name, what);
+  app->footer(
+      agents +
+      "\nExamples:\n"
+      "  upswing train                                  the default agent, until solved\n"
+      "  upswing train --agent dqn --seed 3 --out runs/a\n"
+      "  upswing train --gamma 0.98 --hidden 128,128    any setting as a flag\n"
+      "  upswing train --mass2 1.2 --no-stop-when-solved --steps 500000\n"
+      "  upswing train --resume runs/a --steps 2000000  go on, from any moment\n"
+      "\nSIGINT and SIGTERM write a checkpoint and end with 130 and 143; SIGUSR1 writes one\n"
+      "and goes on. Exit code 0: done; 1: failed; 2: bad usage or input.\n");
+  app->callback([app, arguments, &command] {
+    if (app->count("--resume") > 0 && app->count("--out") + app->count("--config") > 0) {
+      throw BadInput(
+          "--resume: takes settings and folder from the run; expected neither --out nor "
+          "--config beside it");
+    }
+    command = [arguments] { return RunTrain(*arguments); };
+  });
+}
+
+}  // namespace upswing

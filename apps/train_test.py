@@ -1,0 +1,237 @@
+#!/usr/bin/env python3
+"""`upswing train`: what it prints and writes, that it learns, and that it does the same twice."""
+
+import os
+import pty
+import re
+import subprocess
+import unittest
+
+from testing import (REWARD_TERMS, ROOT, RUN_FILES, UPSWING, ProgramTest, read_csv, read_tensors,
+                     small)
+
+METRICS = ["step", "episodes", "updates", "epsilon", "learning_rate", "loss", "q", "td_error",
+           "gradient_norm", "mean_return", "success_rate", "seconds"]
+EPISODES = ["step", "episode", "return", "length", "terminated", *REWARD_TERMS]
+EVALS = ["step", "success_rate", "success_low", "success_high", "mean_return", "swing_up_seconds",
+         "work", "rms_torque", "seconds"]
+
+
+class TrainTest(ProgramTest):
+    def policy_of(self, name):
+        return (self.folder / name / "policy.safetensors").read_bytes()
+
+    def table(self, name, columns):
+        """The rows of a table of the run, which has just these columns."""
+        path = self.folder / "run" / name
+        self.assertEqual(path.read_text(encoding="utf-8").splitlines()[0], ",".join(columns))
+        return read_csv(path)
+
+    # ---- What it prints.
+
+    def test_plain_lines_when_piped(self):
+        output = self.succeed(*small())
+        self.assertNotIn("\x1b", output)
+        self.assertNotIn("\r", output)
+        self.assertTrue(output.startswith("Training d3qn-small (seed 1) in run\n"), output)
+        self.assertEqual(len(re.findall(r"^ *[24],000 steps .*success +\d/4$", output, re.M)), 2)
+
+    def test_summary_says_not_solved_and_what_to_type_next(self):
+        output = self.succeed(*small())
+        self.assertIn("not solved yet", output)
+        self.assertIn("Best policy: run/policy.safetensors", output)
+        for command in re.findall(r"^  \./upswing (.*)$", output, re.M):
+            self.succeed(*command.split())
+        self.assertEqual(output.count("  ./upswing "), 3)
+
+    def test_progress_bar_on_a_terminal(self):
+        terminal, its_end = pty.openpty()
+        with subprocess.Popen([UPSWING, *small(steps=60000)], cwd=self.folder, stdout=its_end,
+                              stderr=subprocess.PIPE) as process:
+            os.close(its_end)
+            shown = self.read_terminal(terminal)
+            self.assertEqual(process.stderr.read(), b"")
+        self.assertEqual(process.returncode, 0)
+        bars = re.findall(r"\r\x1b\[K\[[= ]{16}\] +\d+% [^\r]*", shown)
+        self.assertTrue(bars, shown)
+        self.assertRegex(bars[-1], r"\d+ steps  [\d,]+/s ")
+
+    def test_progress_bar_tells_all_on_a_wide_terminal(self):
+        terminal, its_end = pty.openpty()
+        with subprocess.Popen(["sh", "-c", 'stty cols 200; exec "$@"', "sh", UPSWING,
+                               *small(steps=60000)], cwd=self.folder, stdin=its_end, stdout=its_end,
+                              stderr=its_end) as process:
+            os.close(its_end)
+            shown = self.read_terminal(terminal)
+        self.assertRegex(shown, r"[1-9][\d,]* steps  [\d,]+/s  [\d,]+ updates/s  eps \d\.\d\d  "
+                                r"loss \d\.\d{4}  return -?\d+  success \d+%  at most .* left")
+
+    def read_terminal(self, terminal):
+        """All that is written to a terminal until its other end is closed."""
+        pieces = []
+        while True:
+            try:
+                piece = os.read(terminal, 65536)
+            except OSError:  # Linux's way to say that nobody is left there
+                piece = b""
+            if not piece:
+                os.close(terminal)
+                return b"".join(pieces).decode()
+            pieces.append(piece)
+
+    # ---- What it writes.
+
+    def test_run_folder_holds_just_its_files(self):
+        self.succeed(*small())
+        self.assertEqual({path.name for path in (self.folder / "run").iterdir()}, RUN_FILES)
+        self.assertEqual([path.name for path in self.folder.iterdir()], ["run"])
+
+    def test_metrics(self):
+        self.succeed(*small())
+        rows = self.table("metrics.csv", METRICS)
+        # Eight environments in lock-step: the row comes with the first step at or past a multiple.
+        self.assertEqual([row["step"] for row in rows],
+                         [504, 1000, 1504, 2000, 2504, 3000, 3504, 4000])
+        self.assertEqual([row["updates"] for row in rows],
+                         [(row["step"] - 200) // 4 for row in rows])
+        for before, after in zip(rows, rows[1:]):
+            self.assertGreaterEqual(before["epsilon"], after["epsilon"])
+            self.assertGreater(before["learning_rate"], after["learning_rate"])
+            self.assertLessEqual(before["seconds"], after["seconds"])
+        for row in rows:
+            self.assertGreater(row["loss"], 0)
+            self.assertGreater(row["td_error"], 0)
+            self.assertGreater(row["gradient_norm"], 0)
+            self.assertAlmostEqual(row["epsilon"], max(0.05, 0.97 ** row["episodes"]), delta=1e-12)
+
+    def test_episodes(self):
+        self.succeed(*small())
+        rows = self.table("episodes.csv", EPISODES)
+        self.assertEqual([row["episode"] for row in rows], list(range(1, 17)))  # 4000 / 200 - 4
+        for row in rows:
+            self.assertEqual((row["length"], row["terminated"]), (200, 0))
+            self.assertAlmostEqual(sum(row[term] for term in REWARD_TERMS), row["return"],
+                                   delta=1e-9)
+            self.assertTrue(0 <= row["energy"] <= 300 and 0 <= row["height"] <= 200, row)
+            self.assertEqual(row["balance"] % 5, 0)
+            self.assertTrue(row["velocity_penalty"] <= 0 and row["torque_penalty"] < 0, row)
+
+    def test_evaluations(self):
+        self.succeed(*small())
+        rows = self.table("evals.csv", EVALS)
+        self.assertEqual([row["step"] for row in rows], [2000, 4000])
+        for row in rows:
+            self.assertTrue(0 <= row["success_low"] <= row["success_rate"] <= row["success_high"]
+                            <= 1, row)
+            self.assertTrue(row["work"] > 0 and 0 < row["rms_torque"] <= 5, row)
+
+    def test_best_evaluation_is_kept(self):
+        self.succeed(*small(steps=20000))
+        rows = self.table("evals.csv", EVALS)
+        best = max(rows, key=lambda row: (row["success_rate"], row["mean_return"]))
+        about, _ = read_tensors(self.folder / "run/policy.safetensors")
+        self.assertEqual(float(about["step"]), best["step"])
+        self.assertEqual(float(about["mean_return"]), best["mean_return"])
+
+    def test_folder_without_a_name_is_a_new_one(self):
+        self.succeed(*small(out=None))
+        self.succeed(*small(out=None))
+        names = sorted(path.name for path in (self.folder / "runs").iterdir())
+        self.assertEqual(names, ["d3qn-small-seed1", "d3qn-small-seed1-2"])
+
+    def test_an_empty_folder_may_be_filled(self):
+        (self.folder / "run").mkdir()
+        self.succeed(*small())
+
+    def test_a_neighbour_with_a_similar_name_is_left_alone(self):
+        for name in ("run.new", "run.tmp"):
+            (self.folder / name).mkdir()
+            (self.folder / name / "precious").write_text("mine")
+        self.succeed(*small())
+        for name in ("run.new", "run.tmp"):
+            self.assertTrue((self.folder / name / "precious").exists(), name)
+
+    # ---- The same again.
+
+    def test_config_runs_again_to_the_same_bytes(self):
+        self.succeed(*small(gamma=0.97, mass2=1.1, epsilon_decay=0.9, double=False))
+        self.succeed("train", "--config", "run/config.toml", "--out", "again")
+        self.assert_same_run("run", "again")
+        config = (self.folder / "run/config.toml").read_text(encoding="utf-8")
+        self.assertEqual((self.folder / "again/config.toml").read_text(encoding="utf-8"), config)
+        for line in ("gamma = 0.97 ", "mass2 = 1.1 ", "epsilon_decay = 0.9 ", "double = false "):
+            self.assertIn("\n" + line, config)
+
+    def test_flags_come_after_the_file_and_the_file_after_the_agent(self):
+        self.write("s.toml", '[train]\nagent = "dqn"\nseed = 4\n[agent]\ngamma = 0.9\n'
+                             'double = true\n[network]\nhidden = [16, 16]\n')
+        self.succeed(*small(agent=None, hidden=None, seed=5), "--config", "s.toml")
+        config = (self.folder / "run/config.toml").read_text(encoding="utf-8")
+        for line in ('agent = "dqn" ', "seed = 5 ", "gamma = 0.9 ", "double = true ",
+                     "dueling = false ", "hidden = [16, 16] "):
+            self.assertIn("\n" + line, config)
+
+    def test_own_model_is_kept_and_runs_again(self):
+        self.write("own.xml", OWN_MODEL)
+        self.succeed(*small(model="own.xml"))
+        (self.folder / "own.xml").unlink()
+        self.assertIn("mass2 = 0.7 ", (self.folder / "run/config.toml").read_text(encoding="utf-8"))
+        self.succeed("train", "--config", "run/config.toml", "--out", "again")
+        self.assert_same_run("run", "again")
+        self.succeed("train", "--resume", "run", "--steps", 6000)
+        self.succeed("eval", "run", "--episodes", 1)
+
+    def test_same_seed_gives_the_same_bytes_and_another_does_not(self):
+        self.succeed(*small(out="a", seed=3))
+        self.succeed(*small(out="b", seed=3))
+        self.succeed(*small(out="c", seed=4))
+        self.assert_same_run("a", "b")
+        self.assertNotEqual(self.policy_of("a"), self.policy_of("c"))
+
+    def test_one_and_two_threads_give_the_same_bytes(self):
+        self.succeed(*small(out="one", threads=1))
+        self.succeed(*small(out="two", threads=2))
+        self.assert_same_run("one", "two")
+
+    # ---- That it learns.
+
+    def named_agents(self):
+        help_text = self.succeed("train", "--help")
+        listed = help_text[help_text.index("Named agents:\n"):].split("\n\n")[0]
+        return re.findall(r"^  (\S+) +\S", listed, re.M)
+
+    def test_every_named_agent_makes_a_policy(self):
+        names = self.named_agents()
+        self.assertEqual(set(names), {path.stem for path in (ROOT / "configs").glob("*.toml")})
+        for name in names:
+            with self.subTest(agent=name):
+                self.succeed(*small(agent=name, hidden=None, head=None, steps=400, eval_every=400,
+                                    eval_episodes=2, log_every=200, out=name))
+                self.assertIn(f"agent {name},", self.succeed("info", name))
+
+    def test_learns_until_solved(self):
+        output = self.succeed("train", "--agent", "d3qn-small", "--seed", 1)
+        self.assertIn("Solved after", output)
+        output = self.succeed("eval", "runs/d3qn-small-seed1")
+        successes = int(re.search(r"success +(\d+) of 100", output)[1])
+        self.assertGreaterEqual(successes, 97)
+
+
+OWN_MODEL = """<mujoco>
+  <option gravity="0 0 -9.7" timestep="0.005" integrator="RK4"/>
+  <worldbody>
+    <body>
+      <joint name="a" type="hinge" axis="0 1 0" damping="0.1" armature="0.01"/>
+      <geom type="capsule" size="0.04" fromto="0 0 0 0 0 -0.6" mass="1.2" contype="0"/>
+      <body pos="0 0 -0.6">
+        <joint name="b" type="hinge" axis="0 1 0" damping="0.1" armature="0.01"/>
+        <geom type="capsule" size="0.04" fromto="0 0 0 0 0 -0.4" mass="0.7" contype="0"/>
+      </body>
+    </body>
+  </worldbody>
+  <actuator><motor joint="a" ctrllimited="true" ctrlrange="-6 6"/></actuator>
+</mujoco>
+"""
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstddef>
+#include <new>
+#include <vector>
+
+namespace upswing {
+
+/// Allocates on cache lines. Vectorised sums start where the memory is aligned, so their order, and
+/// with it the last bit, would otherwise depend on where an array happens to lie.
+template <typename T>
+struct AlignedAllocator {
+  using value_type = T;
+  static constexpr std::align_val_t kAlignment{64};
+
+  AlignedAllocator() = default;
+  template <typename U>
+  AlignedAllocator(const AlignedAllocator<U>&) {}  // NOLINT(google-explicit-constructor)
+
+  T* allocate(size_t n) { return static_cast<T*>(::operator new(n * sizeof(T), kAlignment)); }
+  void deallocate(T* p, size_t) { ::operator delete(p, kAlignment); }
+  bool operator==(const AlignedAllocator&) const = default;
+};
+
+/// A vector for numbers that the kernels work on.
+template <typename T>
+using AlignedVector = std::vector<T, AlignedAllocator<T>>;
+
+}  // namespace upswing

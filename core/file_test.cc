@@ -1,0 +1,82 @@
+#include "core/file.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <csignal>
+#include <filesystem>
+
+#include "core/error.h"
+#include "core/temp_folder.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+class FileTest : public ::testing::Test {
+ protected:
+  TempFolder temp_;
+  fs::path folder_ = temp_.path();
+};
+
+TEST_F(FileTest, WrittenTextIsReadBackAndReplaced) {
+  const fs::path path = folder_ / "a";
+  WriteFileAtomically(path, "one");
+  WriteFileAtomically(path, "three");
+  EXPECT_EQ(ReadTextFile(path), "three");
+  WriteFileAtomically(path, "");
+  EXPECT_EQ(ReadTextFile(path), "");
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 1);
+}
+
+TEST_F(FileTest, AWriteThatDoesNotFitLeavesTheOldFileAndNothingElse) {
+  const fs::path path = folder_ / "a";
+  WriteFileAtomically(path, "old");
+  std::signal(SIGXFSZ, SIG_IGN);
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  const rlimit small{1000, before.rlim_max};
+  setrlimit(RLIMIT_FSIZE, &small);
+  EXPECT_THROW(WriteFileAtomically(path, std::string(5000, 'x')), Error);
+  setrlimit(RLIMIT_FSIZE, &before);
+  EXPECT_EQ(ReadTextFile(path), "old");
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 1);
+}
+
+TEST_F(FileTest, MissingFilesAndFoldersAreBadInput) {
+  for (const fs::path& path : {folder_ / "missing", folder_}) {
+    try {
+      ReadFile(path);
+      FAIL();
+    } catch (const Error& error) {
+      EXPECT_EQ(error.exit_code(), 2);
+      EXPECT_NE(std::string(error.what()).find(path.string()), std::string::npos);
+    }
+  }
+  EXPECT_THROW(WriteFileAtomically(folder_ / "no" / "such", "x"), Error);
+}
+
+TEST_F(FileTest, AppendFileIsCutBackToTheSizeThatIsKnown) {
+  const fs::path path = folder_ / "log";
+  {
+    AppendFile file(path, 0);
+    file.Append("first\n");
+    EXPECT_EQ(file.size(), 6);
+    file.Append("after the checkpoint\n");
+  }
+  {
+    AppendFile file(path, 6);
+    file.Append("again\n");
+  }
+  EXPECT_EQ(ReadTextFile(path), "first\nagain\n");
+  {
+    AppendFile file(path, AppendFile::kKeepAll);
+    file.Append("more\n");
+  }
+  EXPECT_EQ(ReadTextFile(path), "first\nagain\nmore\n");
+  EXPECT_THROW(AppendFile(path, 100), Error);
+}
+
+}  // namespace
+}  // namespace upswing

@@ -1,0 +1,210 @@
+#include "core/options.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "core/error.h"
+#include "core/text.h"
+
+namespace upswing {
+namespace {
+
+template <class... Ts>
+struct Overloaded : Ts... {
+  using Ts::operator()...;
+};
+template <class... Ts>
+Overloaded(Ts...) -> Overloaded<Ts...>;  // clang 14 needs it spelled out
+
+std::string FlagOf(std::string name) {
+  std::replace(name.begin(), name.end(), '_', '-');
+  return Concat("--", name);
+}
+
+/// A TOML basic string.
+std::string Quote(std::string_view text) {
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') quoted += '\\';
+    quoted += c;
+  }
+  quoted += '"';
+  return quoted;
+}
+
+std::string ListText(const std::vector<int64_t>& values) {
+  std::vector<std::string> texts;
+  for (const int64_t value : values) texts.push_back(std::to_string(value));
+  return Concat("[", Join(texts, ", "), "]");
+}
+
+std::string RangeText(Range range) {
+  const bool low = std::isfinite(range.low);
+  const bool high = std::isfinite(range.high);
+  if (low && high)
+    return Concat(" in [", FormatNumber(range.low), ", ", FormatNumber(range.high), "]");
+  if (low) return Concat(" of at least ", FormatNumber(range.low));
+  if (high) return Concat(" of at most ", FormatNumber(range.high));
+  return "";
+}
+
+bool Inside(double value, Range range) { return value >= range.low && value <= range.high; }
+
+/// "64,64" or "[64, 64]"; nothing if an item is no integer or out of range.
+std::optional<std::vector<int64_t>> ParseList(std::string_view text, Range range) {
+  text = Trim(text);
+  if (text.starts_with('[') && text.ends_with(']')) text = Trim(text.substr(1, text.size() - 2));
+  std::vector<int64_t> values;
+  if (text.empty()) return values;
+  for (const std::string_view piece : Split(text, ',')) {
+    const auto value = ParseInteger(piece);
+    if (!value || !Inside(static_cast<double>(*value), range)) return std::nullopt;
+    values.push_back(*value);
+  }
+  return values;
+}
+
+}  // namespace
+
+std::string Option::flag() const { return FlagOf(name); }
+
+std::string Option::text() const {
+  return std::visit(Overloaded{
+                        [](const bool* value) -> std::string { return *value ? "true" : "false"; },
+                        [](const int64_t* value) { return std::to_string(*value); },
+                        [](const double* value) { return FormatNumber(*value); },
+                        [](const std::string* value) { return Quote(*value); },
+                        [](const std::vector<int64_t>* value) { return ListText(*value); },
+                    },
+                    target);
+}
+
+std::string Option::expected() const {
+  return std::visit(Overloaded{
+                        [](const bool*) -> std::string { return "true or false"; },
+                        [&](const int64_t*) { return Concat("an integer", RangeText(range)); },
+                        [&](const double*) { return Concat("a number", RangeText(range)); },
+                        [](const std::string*) -> std::string { return "a text"; },
+                        [&](const std::vector<int64_t>*) {
+                          return Concat("a list of integers", RangeText(range));
+                        },
+                    },
+                    target);
+}
+
+void Option::Set(std::string_view text, const std::string& where) const {
+  const bool valid =
+      std::visit(Overloaded{
+                     [&](bool* value) {
+                       *value = text == "true";
+                       return text == "true" || text == "false";
+                     },
+                     [&](int64_t* value) {
+                       const auto parsed = ParseInteger(text);
+                       if (!parsed || !Inside(static_cast<double>(*parsed), range)) return false;
+                       *value = *parsed;
+                       return true;
+                     },
+                     [&](double* value) {
+                       const auto parsed = ParseNumber(text);
+                       if (!parsed || !std::isfinite(*parsed) || !Inside(*parsed, range))
+                         return false;
+                       *value = *parsed;
+                       return true;
+                     },
+                     [&](std::string* value) {
+                       *value = text;
+                       return text.find_first_of("\n\r") == std::string_view::npos;
+                     },
+                     [&](std::vector<int64_t>* value) {
+                       auto parsed = ParseList(text, range);
+                       if (!parsed) return false;
+                       *value = std::move(*parsed);
+                       return true;
+                     },
+                 },
+                 target);
+  if (!valid) throw BadInput(Concat(where, ": expected ", expected(), ", got \"", text, "\""));
+}
+
+Option& Options::AddOption(Option::Target target, std::string_view name, Range range,
+                           std::string_view unit, std::string_view help) {
+  return options_.emplace_back(Option{section_, std::string(name), target, range, std::string(unit),
+                                      std::string(help), true});
+}
+
+Option& Options::Add(bool* target, std::string_view name, bool value, std::string_view help) {
+  *target = value;
+  return AddOption(target, name, {}, "", help);
+}
+
+Option& Options::Add(int64_t* target, std::string_view name, int64_t value, Range range,
+                     std::string_view unit, std::string_view help) {
+  *target = value;
+  return AddOption(target, name, range, unit, help);
+}
+
+Option& Options::Add(double* target, std::string_view name, double value, Range range,
+                     std::string_view unit, std::string_view help) {
+  *target = value;
+  return AddOption(target, name, range, unit, help);
+}
+
+Option& Options::Add(std::string* target, std::string_view name, std::string_view value,
+                     std::string_view help) {
+  *target = value;
+  return AddOption(target, name, {}, "", help);
+}
+
+Option& Options::Add(std::vector<int64_t>* target, std::string_view name,
+                     std::vector<int64_t> value, Range range, std::string_view help) {
+  *target = std::move(value);
+  return AddOption(target, name, range, "", help);
+}
+
+void Options::Alias(std::string_view name, std::vector<std::string> members) {
+  aliases_.push_back({section_, std::string(name), std::move(members)});
+}
+
+std::vector<const Option*> Options::Find(std::string_view name, const std::string& where) const {
+  std::vector<std::string> names{std::string(name)};
+  std::vector<std::string> known;
+  for (const AliasEntry& alias : aliases_) {
+    known.push_back(alias.name);
+    if (alias.name == name) names = alias.members;
+  }
+  std::vector<const Option*> found;
+  for (const Option& option : options_) {
+    known.push_back(option.name);
+    if (std::count(names.begin(), names.end(), option.name) != 0) found.push_back(&option);
+  }
+  if (found.empty()) {
+    throw BadInput(Concat(where, ": no setting is called \"", name, "\"", DidYouMean(name, known)));
+  }
+  return found;
+}
+
+void Options::Set(std::string_view name, std::string_view text, const std::string& where) const {
+  for (const Option* option : Find(name, where)) option->Set(text, where);
+}
+
+std::string Options::Toml(bool comments, const std::function<bool(const Option&)>& wanted) const {
+  std::string toml;
+  std::string_view section;
+  for (const Option& option : options_) {
+    if (!wanted(option)) continue;
+    if (option.section != section) {
+      toml += Concat(toml.empty() ? "" : "\n", "[", option.section, "]\n");
+      section = option.section;
+    }
+    toml += Concat(option.name, " = ", option.text());
+    if (comments) {
+      toml += Concat("  # ", option.help, option.unit.empty() ? "" : ", " + option.unit);
+    }
+    toml += '\n';
+  }
+  return toml;
+}
+
+}  // namespace upswing

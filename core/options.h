@@ -1,0 +1,98 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+namespace upswing {
+
+/// A closed range of allowed numbers.
+struct Range {
+  double low = -std::numeric_limits<double>::infinity();
+  double high = std::numeric_limits<double>::infinity();
+};
+inline constexpr Range kPositive{1e-9, 1e9};
+inline constexpr Range kNotNegative{0, 1e12};
+inline constexpr Range kUnit{0, 1};  // a share or probability
+
+/// One setting: all that flags, configuration files, help and validation need to know.
+struct Option {
+  using Target = std::variant<bool*, int64_t*, double*, std::string*, std::vector<int64_t>*>;
+
+  std::string section;  // TOML table
+  std::string name;     // TOML key; the flag is the same with - for _
+  Target target;        // where the value lives
+  Range range;          // numbers only
+  std::string unit;     // such as "s"; may be empty
+  std::string help;
+  bool identity;  // two runs that differ in it are different runs
+
+  /// The flag, such as `--eval-every`.
+  std::string flag() const;
+  /// The value as TOML writes it.
+  std::string text() const;
+  /// Such as `a number in [0, 1]`.
+  std::string expected() const;
+  /// Parses and checks `text`; `where` (such as `--gamma` or `FILE:3: gamma`) begins the message
+  /// of the BadInput that it throws.
+  void Set(std::string_view text, const std::string& where) const;
+};
+
+/// The settings of one or more components, in the order in which they were added. Every component
+/// has a `void Describe(Options&)`; each of its lines names target, section, key, default, range,
+/// unit and help of one setting, and gives the target its default.
+class Options {
+ public:
+  /// Names the section that the following settings belong to.
+  void Section(std::string_view section) { section_ = section; }
+
+  Option& Add(bool* target, std::string_view name, bool value, std::string_view help);
+  Option& Add(int64_t* target, std::string_view name, int64_t value, Range range,
+              std::string_view unit, std::string_view help);
+  Option& Add(double* target, std::string_view name, double value, Range range,
+              std::string_view unit, std::string_view help);
+  Option& Add(std::string* target, std::string_view name, std::string_view value,
+              std::string_view help);
+  Option& Add(std::vector<int64_t>* target, std::string_view name, std::vector<int64_t> value,
+              Range range, std::string_view help);
+
+  /// One name that sets several others, such as `mass` for `mass1` and `mass2`.
+  void Alias(std::string_view name, std::vector<std::string> members);
+
+  const std::vector<Option>& all() const { return options_; }
+  struct AliasEntry {
+    std::string section, name;
+    std::vector<std::string> members;
+  };
+  const std::vector<AliasEntry>& aliases() const { return aliases_; }
+
+  /// The settings that a name or an alias stands for. Throws BadInput with the nearest name.
+  std::vector<const Option*> Find(std::string_view name, const std::string& where) const;
+
+  /// Sets what the name or alias stands for; see Option::Set.
+  void Set(std::string_view name, std::string_view text, const std::string& where) const;
+
+  /// All settings as a TOML document, with unit and help as comments where `comments` is true.
+  std::string Toml(bool comments, const std::function<bool(const Option&)>& wanted) const;
+
+ private:
+  Option& AddOption(Option::Target target, std::string_view name, Range range,
+                    std::string_view unit, std::string_view help);
+
+  std::string section_;
+  std::vector<Option> options_;
+  std::vector<AliasEntry> aliases_;
+};
+
+/// Gives a configuration struct its defaults, which stand in its Describe.
+template <typename Config>
+void SetDefaults(Config& config) {
+  Options options;
+  config.Describe(options);
+}
+
+}  // namespace upswing

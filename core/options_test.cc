@@ -1,0 +1,103 @@
+#include "core/options.h"
+
+#include <gtest/gtest.h>
+
+#include "core/error.h"
+
+namespace upswing {
+namespace {
+
+struct Sample {
+  bool fast;
+  int64_t count;
+  double rate;
+  std::string name;
+  std::vector<int64_t> widths;
+  double mass1, mass2;
+
+  Sample() { SetDefaults(*this); }
+  void Describe(Options& o) {
+    o.Section("one");
+    o.Add(&fast, "fast", true, "be fast");
+    o.Add(&count, "count", 3, {1, 10}, "pieces", "how many");
+    o.Add(&rate, "the_rate", 0.5, kUnit, "", "share");
+    o.Section("two");
+    o.Add(&name, "name", "x", "a name");
+    o.Add(&widths, "widths", {4, 5}, {1, 100}, "layers");
+    o.Add(&mass1, "mass1", 1, kPositive, "kg", "mass");
+    o.Add(&mass2, "mass2", 2, kPositive, "kg", "mass");
+    o.Alias("mass", {"mass1", "mass2"});
+  }
+};
+
+class OptionsTest : public ::testing::Test {
+ protected:
+  OptionsTest() { sample_.Describe(options_); }
+  std::string ErrorOf(const std::string& name, const std::string& text) {
+    try {
+      options_.Set(name, text, "here");
+    } catch (const Error& error) {
+      EXPECT_EQ(error.exit_code(), 2);
+      return error.what();
+    }
+    return "no error";
+  }
+  Sample sample_;
+  Options options_;
+};
+
+TEST_F(OptionsTest, DescribeGivesTheDefaults) {
+  EXPECT_TRUE(sample_.fast);
+  EXPECT_EQ(sample_.count, 3);
+  EXPECT_EQ(sample_.rate, 0.5);
+  EXPECT_EQ(sample_.name, "x");
+  EXPECT_EQ(sample_.widths, (std::vector<int64_t>{4, 5}));
+}
+
+TEST_F(OptionsTest, SetsEveryType) {
+  options_.Set("fast", "false", "");
+  options_.Set("count", "7", "");
+  options_.Set("the_rate", "0.25", "");
+  options_.Set("name", "a \"b\" c", "");
+  options_.Set("widths", "[8, 9,10]", "");
+  EXPECT_FALSE(sample_.fast);
+  EXPECT_EQ(sample_.count, 7);
+  EXPECT_EQ(sample_.rate, 0.25);
+  EXPECT_EQ(sample_.name, "a \"b\" c");
+  EXPECT_EQ(sample_.widths, (std::vector<int64_t>{8, 9, 10}));
+  options_.Set("widths", "3", "");
+  EXPECT_EQ(sample_.widths, (std::vector<int64_t>{3}));
+}
+
+TEST_F(OptionsTest, AnAliasSetsAllItsMembers) {
+  options_.Set("mass", "4", "");
+  EXPECT_EQ(sample_.mass1, 4);
+  EXPECT_EQ(sample_.mass2, 4);
+}
+
+TEST_F(OptionsTest, SaysWhatWasExpectedWhatCameAndWhere) {
+  EXPECT_EQ(ErrorOf("count", "11"), "here: expected an integer in [1, 10], got \"11\"");
+  EXPECT_EQ(ErrorOf("count", "2.5"), "here: expected an integer in [1, 10], got \"2.5\"");
+  EXPECT_EQ(ErrorOf("the_rate", "nan"), "here: expected a number in [0, 1], got \"nan\"");
+  EXPECT_EQ(ErrorOf("fast", "yes"), "here: expected true or false, got \"yes\"");
+  EXPECT_EQ(ErrorOf("widths", "4,x"), "here: expected a list of integers in [1, 100], got \"4,x\"");
+  EXPECT_EQ(ErrorOf("cuont", "1"), "here: no setting is called \"cuont\" (did you mean count?)");
+}
+
+TEST_F(OptionsTest, ARejectedValueLeavesNumbersAndListsAsTheyWere) {
+  ErrorOf("count", "11");
+  ErrorOf("widths", "4,x");
+  EXPECT_EQ(sample_.count, 3);
+  EXPECT_EQ(sample_.widths, (std::vector<int64_t>{4, 5}));
+}
+
+TEST_F(OptionsTest, FlagsAndTomlFollowFromTheSameLine) {
+  EXPECT_EQ(options_.Find("the_rate", "").front()->flag(), "--the-rate");
+  options_.Set("name", "a\\\"", "");
+  EXPECT_EQ(options_.Toml(false, [](const Option&) { return true; }),
+            "[one]\nfast = true\ncount = 3\nthe_rate = 0.5\n\n"
+            "[two]\nname = \"a\\\\\\\"\"\nwidths = [4, 5]\nmass1 = 1\nmass2 = 2\n");
+}
+
+}  // namespace
+}  // namespace upswing

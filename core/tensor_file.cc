@@ -1,0 +1,243 @@
+#include "core/tensor_file.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "core/error.h"
+#include "core/file.h"
+#include "core/text.h"
+
+namespace upswing {
+namespace {
+
+using nlohmann::json;
+
+static_assert(std::endian::native == std::endian::little, "safetensors are little-endian");
+
+struct DtypeFacts {
+  Dtype dtype;
+  std::string_view name;
+  size_t size;
+};
+constexpr std::array kDtypes{
+    DtypeFacts{Dtype::kU8, "U8", 1},   DtypeFacts{Dtype::kF32, "F32", 4},
+    DtypeFacts{Dtype::kF64, "F64", 8}, DtypeFacts{Dtype::kI64, "I64", 8},
+    DtypeFacts{Dtype::kU64, "U64", 8},
+};
+
+const DtypeFacts& FactsOf(Dtype dtype) {
+  return *std::find_if(kDtypes.begin(), kDtypes.end(),
+                       [&](const DtypeFacts& facts) { return facts.dtype == dtype; });
+}
+
+constexpr std::string_view kChecksumKey = "\"checksum\":\"";
+constexpr std::string_view kNoChecksum = "0000000000000000";
+
+/// FNV-1a over 8-byte words (the last one padded with zeros): finds broken files, not forged ones.
+class Checksum {
+ public:
+  void Update(std::span<const std::byte> bytes) {
+    for (; bytes.size() >= 8; bytes = bytes.subspan(8)) Mix(bytes);
+    if (!bytes.empty()) Mix(bytes);
+  }
+  /// 16 hexadecimal digits.
+  std::string Hex() const {
+    std::string hex;
+    for (int shift = 60; shift >= 0; shift -= 4) hex += "0123456789abcdef"[(hash_ >> shift) & 15];
+    return hex;
+  }
+
+ private:
+  void Mix(std::span<const std::byte> bytes) {
+    uint64_t word = 0;
+    std::memcpy(&word, bytes.data(), std::min<size_t>(8, bytes.size()));
+    hash_ = (hash_ ^ word) * 0x100000001b3;
+    hash_ ^= hash_ >> 32;  // a product spreads bits upwards only
+  }
+  uint64_t hash_ = 0xcbf29ce484222325;
+};
+
+/// Where the checksum's digits stand in the header; npos if the file has none.
+size_t FindChecksum(std::string_view header) {
+  const size_t key = header.find(kChecksumKey);
+  return key == std::string_view::npos ? key : key + kChecksumKey.size();
+}
+
+/// What `shape` needs in bytes; nothing on a negative size or overflow.
+std::optional<size_t> ByteCount(const std::vector<int64_t>& shape, Dtype dtype) {
+  size_t count = SizeOf(dtype);
+  for (const int64_t extent : shape) {
+    if (extent < 0) return std::nullopt;
+    if (__builtin_mul_overflow(count, static_cast<size_t>(extent), &count)) return std::nullopt;
+  }
+  return count;
+}
+
+/// One entry of the header, checked against the file's data.
+Tensor ParseTensor(const json& entry, std::span<const std::byte> data) {
+  const auto dtype_name = entry.at("dtype").get<std::string>();
+  const auto facts = std::find_if(kDtypes.begin(), kDtypes.end(),
+                                  [&](const DtypeFacts& f) { return f.name == dtype_name; });
+  if (facts == kDtypes.end()) throw std::runtime_error(Concat("type ", dtype_name, " is not ours"));
+  Tensor tensor{facts->dtype, entry.at("shape").get<std::vector<int64_t>>(), {}};
+  const auto offsets = entry.at("data_offsets").get<std::array<uint64_t, 2>>();
+  if (offsets[0] > offsets[1] || offsets[1] > data.size()) {
+    throw std::runtime_error(Concat("data end at byte ", offsets[1], " of ", data.size()));
+  }
+  tensor.bytes = data.subspan(offsets[0], offsets[1] - offsets[0]);
+  if (ByteCount(tensor.shape, tensor.dtype) != tensor.bytes.size()) {
+    throw std::runtime_error(
+        Concat("expected the bytes of ", tensor.Describe(), ", got ", tensor.bytes.size()));
+  }
+  return tensor;
+}
+
+}  // namespace
+
+std::string_view NameOf(Dtype dtype) { return FactsOf(dtype).name; }
+size_t SizeOf(Dtype dtype) { return FactsOf(dtype).size; }
+
+std::string Tensor::Describe() const {
+  std::vector<std::string> extents;
+  for (const int64_t extent : shape) extents.push_back(std::to_string(extent));
+  return Concat(NameOf(dtype), " [", Join(extents, ", "), "]");
+}
+
+const std::string& TensorFile::Metadata(const std::string& key) const {
+  const auto found = metadata.find(key);
+  if (found == metadata.end()) throw BadInput(Concat(path_, ": no metadata \"", key, "\""));
+  return found->second;
+}
+
+const Tensor& TensorFile::Find(const std::string& name, Dtype dtype) const {
+  const auto found = tensors_.find(name);
+  if (found == tensors_.end()) throw BadInput(Concat(path_, ": no tensor \"", name, "\""));
+  if (found->second.dtype != dtype) {
+    throw BadInput(Concat(path_, ": tensor \"", name, "\": expected ", NameOf(dtype), ", got ",
+                          found->second.Describe()));
+  }
+  return found->second;
+}
+
+void TensorFile::ReadBytes(const std::string& name, Dtype dtype, const std::vector<int64_t>& shape,
+                           std::span<std::byte> bytes) const {
+  const Tensor& tensor = Find(name, dtype);
+  const Tensor expected{dtype, shape, {}};
+  if (tensor.bytes.size() != bytes.size() || (!shape.empty() && tensor.shape != shape)) {
+    throw BadInput(Concat(
+        path_, ": tensor \"", name, "\": expected ",
+        shape.empty() ? Concat(bytes.size() / SizeOf(dtype), " numbers") : expected.Describe(),
+        ", got ", tensor.Describe()));
+  }
+  if (!bytes.empty()) std::memcpy(bytes.data(), tensor.bytes.data(), bytes.size());
+}
+
+void TensorFile::Save(const std::filesystem::path& path) const {
+  // Wide types first, so that each tensor is aligned to its own size.
+  std::vector<std::pair<std::string, const Tensor*>> order;
+  for (const auto& [name, tensor] : tensors_) order.emplace_back(name, &tensor);
+  std::stable_sort(order.begin(), order.end(), [](const auto& a, const auto& b) {
+    return SizeOf(a.second->dtype) > SizeOf(b.second->dtype);
+  });
+
+  json header;
+  header["__metadata__"] = metadata;
+  header["__metadata__"]["checksum"] = kNoChecksum;
+  size_t offset = 0;
+  for (const auto& [name, tensor] : order) {
+    const size_t end = offset + tensor->bytes.size();
+    header[name] = {{"dtype", NameOf(tensor->dtype)},
+                    {"shape", tensor->shape},
+                    {"data_offsets", {offset, end}}};
+    offset = end;
+  }
+  std::string text = header.dump();
+  text.resize((text.size() + 7) / 8 * 8, ' ');
+
+  // The checksum covers everything behind the length, with zeros where it will stand itself.
+  Checksum checksum;
+  checksum.Update(BytesOf(text));
+  for (const auto& [name, tensor] : order) checksum.Update(tensor->bytes);
+  text.replace(FindChecksum(text), kNoChecksum.size(), checksum.Hex());
+
+  const uint64_t length = text.size();
+  std::vector<std::span<const std::byte>> parts{std::as_bytes(std::span(&length, 1)),
+                                                BytesOf(text)};
+  for (const auto& [name, tensor] : order) parts.push_back(tensor->bytes);
+  WriteFileAtomically(path, parts);
+}
+
+TensorFile TensorFile::Load(const std::filesystem::path& path) {
+  TensorFile file;
+  file.path_ = path.string();
+  const auto& bytes = file.kept_.emplace_back(ReadFile(path));
+  const auto broken = [&](const auto&... why) {
+    return BadInput(Concat(file.path_, ": not a whole safetensors file: ", why...));
+  };
+
+  // The header: its length (8 bytes), then JSON.
+  uint64_t length = 0;
+  if (bytes.size() < sizeof(length)) throw broken("it has ", bytes.size(), " bytes");
+  std::memcpy(&length, bytes.data(), sizeof(length));
+  if (length > bytes.size() - sizeof(length)) {
+    throw broken("its header should have ", length, " bytes, the file has ", bytes.size());
+  }
+  std::string text(reinterpret_cast<const char*>(bytes.data()) + sizeof(length), length);
+  const auto data = std::span(bytes).subspan(sizeof(length) + length);
+
+  // The tensors, which must cover the data without gap or overlap.
+  try {
+    const json header = json::parse(text);
+    if (!header.is_object()) throw std::runtime_error("its header is no JSON object");
+    std::vector<std::span<const std::byte>> covered;
+    for (const auto& [name, entry] : header.items()) {
+      if (name == "__metadata__") {
+        file.metadata = entry.get<std::map<std::string, std::string>>();
+        continue;
+      }
+      try {
+        const Tensor& tensor = file.tensors_[name] = ParseTensor(entry, data);
+        covered.push_back(tensor.bytes);
+      } catch (const std::exception& error) {
+        throw std::runtime_error(Concat("tensor \"", name, "\": ", error.what()));
+      }
+    }
+    std::sort(covered.begin(), covered.end(), [](const auto& a, const auto& b) {
+      return std::pair(a.data(), a.size()) < std::pair(b.data(), b.size());
+    });
+    const std::byte* end = data.data();
+    for (const auto& piece : covered) {
+      if (!piece.empty() && piece.data() != end) throw std::runtime_error("tensors overlap");
+      end += piece.size();
+    }
+    if (end != data.data() + data.size()) {
+      throw std::runtime_error(Concat(data.data() + data.size() - end, " bytes too many"));
+    }
+  } catch (const std::exception& error) {
+    throw broken(error.what());
+  }
+
+  // The checksum, where a writer left one.
+  if (const size_t at = FindChecksum(text); at != std::string::npos) {
+    const std::string expected = text.substr(at, kNoChecksum.size());
+    text.replace(at, kNoChecksum.size(), kNoChecksum);
+    Checksum checksum;
+    checksum.Update(BytesOf(text));
+    // Tensor by tensor, as Save did: a tensor's last word is padded.
+    std::vector<const Tensor*> order;
+    for (const auto& [name, tensor] : file.tensors_) order.push_back(&tensor);
+    std::sort(order.begin(), order.end(),
+              [](const Tensor* a, const Tensor* b) { return a->bytes.data() < b->bytes.data(); });
+    for (const Tensor* tensor : order) checksum.Update(tensor->bytes);
+    if (checksum.Hex() != expected) {
+      throw broken("its checksum is ", checksum.Hex(), ", expected ", expected);
+    }
+    file.metadata.erase("checksum");
+  }
+  return file;
+}
+
+}  // namespace upswing

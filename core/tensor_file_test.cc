@@ -1,0 +1,202 @@
+#include "core/tensor_file.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <filesystem>
+#include <limits>
+
+#include "core/archive.h"
+#include "core/error.h"
+#include "core/file.h"
+#include "core/rng.h"
+#include "core/temp_folder.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+class TensorFileTest : public ::testing::Test {
+ protected:
+  /// A file with every type, an empty tensor and sizes that do not fill words.
+  void SaveSample() const {
+    const std::vector<uint8_t> bytes{1, 2, 3};
+    const std::vector<float> floats{1.5F, -2, 3, 4, 5, 6};
+    const std::vector<double> doubles{0.1};
+    const std::vector<uint64_t> words{~uint64_t{0}, 7};
+    TensorFile file;
+    file.metadata = {{"who", "a \"test\" ☺"}, {"what", ""}};
+    file.Add<uint8_t>("bytes", bytes);
+    file.Add<float>("floats", floats, {2, 3});
+    file.Add<float>("empty", std::span<const float>(), {0, 5});
+    file.Add<double>("doubles", doubles);
+    file.Add<uint64_t>("words", words);
+    file.AddScalar("scalar", int64_t{-9});
+    file.Save(path_);
+  }
+
+  /// The message of the error that loading these bytes gives.
+  std::string LoadError(std::span<const std::byte> bytes) const {
+    WriteFileAtomically(path_, std::vector{bytes});
+    try {
+      TensorFile::Load(path_);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.exit_code(), 2);
+      return error.what();
+    }
+    return "";
+  }
+
+  /// A file with this header and so many zero bytes of data, without a checksum.
+  std::string HeaderError(const std::string& header, size_t data) const {
+    const uint64_t length = header.size();
+    std::string file(8, '\0');
+    std::memcpy(file.data(), &length, 8);
+    file += header + std::string(data, '\0');
+    return LoadError(BytesOf(file));
+  }
+
+  TempFolder folder_;
+  fs::path path_ = folder_ / "a.safetensors";
+};
+
+TEST_F(TensorFileTest, RoundTrip) {
+  SaveSample();
+  const TensorFile file = TensorFile::Load(path_);
+  EXPECT_EQ(file.Metadata("who"), "a \"test\" ☺");
+  EXPECT_EQ(file.metadata.size(), 2U);
+  EXPECT_EQ(file.tensors().size(), 6U);
+  std::vector<float> floats(6);
+  file.Read("floats", std::span(floats), {2, 3});
+  EXPECT_EQ(floats, (std::vector<float>{1.5F, -2, 3, 4, 5, 6}));
+  int64_t scalar = 0;
+  file.Read("scalar", std::span(&scalar, 1));
+  EXPECT_EQ(scalar, -9);
+  EXPECT_EQ(file.Count<float>("empty"), 0U);
+  EXPECT_EQ(file.Count<uint8_t>("bytes"), 3U);
+}
+
+TEST_F(TensorFileTest, WrongNameTypeShapeAndSizeAreNamed) {
+  SaveSample();
+  const TensorFile file = TensorFile::Load(path_);
+  std::vector<float> six(6), five(5);
+  std::vector<double> doubles(6);
+  EXPECT_THROW(file.Read("none", std::span(six)), Error);
+  EXPECT_THROW(file.Read("floats", std::span(five)), Error);
+  EXPECT_THROW(file.Read("floats", std::span(doubles)), Error);
+  try {
+    file.Read("floats", std::span(six), {3, 2});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(std::string(error.what()),
+              path_.string() + ": tensor \"floats\": expected F32 [3, 2], got F32 [2, 3]");
+  }
+}
+
+TEST_F(TensorFileTest, EveryTruncationIsFound) {
+  SaveSample();
+  const std::vector<std::byte> whole = ReadFile(path_);
+  for (size_t size = 0; size < whole.size(); ++size) {
+    EXPECT_NE(LoadError(std::span(whole).first(size)), "") << size;
+  }
+}
+
+TEST_F(TensorFileTest, EveryFlippedBitIsFound) {
+  SaveSample();
+  const std::vector<std::byte> whole = ReadFile(path_);
+  // But for the key "checksum": under another name there is no checksum, as in a foreign file.
+  const size_t key = ReadTextFile(path_).find("checksum");
+  for (size_t at = 0; at < whole.size(); ++at) {
+    for (int bit = 0; bit < 8; bit += 3) {
+      std::vector<std::byte> broken = whole;
+      broken[at] ^= std::byte{1} << bit;
+      const bool in_key = at >= key && at < key + 8;
+      EXPECT_TRUE(in_key || LoadError(broken) != "") << "byte " << at << " bit " << bit;
+    }
+  }
+}
+
+TEST_F(TensorFileTest, HostileHeadersAreRefused) {
+  EXPECT_NE(HeaderError("{", 0), "");
+  EXPECT_NE(HeaderError("[]", 0), "");
+  EXPECT_NE(HeaderError(R"({"a":{"dtype":"F32","shape":[2],"data_offsets":[0,4]}})", 4), "");
+  EXPECT_NE(HeaderError(R"({"a":{"dtype":"F32","shape":[-1],"data_offsets":[0,4]}})", 4), "");
+  EXPECT_NE(HeaderError(R"({"a":{"dtype":"F99","shape":[1],"data_offsets":[0,4]}})", 4), "");
+  EXPECT_NE(HeaderError(R"({"a":{"dtype":"F32","shape":[1],"data_offsets":[4,8]}})", 4), "");
+  EXPECT_NE(HeaderError(R"({"a":{"dtype":"F32","shape":[1],"data_offsets":[0,4]}})", 5), "");
+  EXPECT_NE(HeaderError(
+                R"({"a":{"dtype":"U8","shape":[4611686018427387904,8],"data_offsets":[0,0]}})", 0),
+            "");
+  EXPECT_NE(HeaderError(R"({"a":{"dtype":"F32","shape":[1],"data_offsets":[0,4]},)"
+                        R"("b":{"dtype":"F32","shape":[1],"data_offsets":[0,4]}})",
+                        4),
+            "");
+  EXPECT_EQ(HeaderError(R"({"a":{"dtype":"F32","shape":[1],"data_offsets":[0,4]}})", 4), "");
+}
+
+/// A component with every kind of state.
+struct Component {
+  std::vector<float> fixed = std::vector<float>(3);
+  std::vector<double> growing;
+  int64_t number = 0;
+  bool flag = false;
+  Rng rng = Rng(0, "component");
+
+  void State(Archive archive) {
+    archive.Array("fixed", std::span(fixed));
+    archive.Vector("growing", growing, 4);
+    archive.Scalar("number", number);
+    archive.Scalar("flag", flag);
+    rng.State(archive.In("rng"));
+  }
+};
+
+TEST_F(TensorFileTest, ArchiveLoadsWhatItSaved) {
+  Component saved;
+  saved.fixed = {1, 2, 3};
+  saved.growing = {4, 5};
+  saved.number = -6;
+  saved.flag = true;
+  saved.rng.Next();
+  TensorFile target;
+  saved.State(Archive::Saver(target).In("part"));
+  target.Save(path_);
+
+  const TensorFile source = TensorFile::Load(path_);
+  EXPECT_EQ(source.tensors().count("part/rng/state"), 1U);
+  Component loaded;
+  loaded.State(Archive::Loader(source).In("part"));
+  EXPECT_EQ(loaded.fixed, saved.fixed);
+  EXPECT_EQ(loaded.growing, saved.growing);
+  EXPECT_EQ(loaded.number, -6);
+  EXPECT_TRUE(loaded.flag);
+  EXPECT_EQ(loaded.rng.Next(), saved.rng.Next());
+}
+
+TEST_F(TensorFileTest, ArchiveNeitherSavesNorLoadsNumbersThatAreNotFinite) {
+  Component component;
+  component.fixed[1] = std::numeric_limits<float>::quiet_NaN();
+  TensorFile target;
+  EXPECT_THROW(component.State(Archive::Saver(target)), Error);
+  const std::vector<float> bad{1, std::numeric_limits<float>::infinity(), 2};
+  TensorFile written;
+  written.Add<float>("fixed", bad);
+  written.Save(path_);
+  const TensorFile source = TensorFile::Load(path_);
+  EXPECT_THROW(component.State(Archive::Loader(source)), Error);
+}
+
+TEST_F(TensorFileTest, ArchiveRefusesMoreThanTheLargestSize) {
+  Component saved;
+  saved.growing = {1, 2, 3, 4, 5};
+  TensorFile target;
+  saved.State(Archive::Saver(target));
+  target.Save(path_);
+  const TensorFile source = TensorFile::Load(path_);
+  Component loaded;
+  EXPECT_THROW(loaded.State(Archive::Loader(source)), Error);
+}
+
+}  // namespace
+}  // namespace upswing

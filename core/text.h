@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <sstream>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace upswing {
+
+/// Joins its arguments, as `<<` prints them, into one string.
+template <typename... Parts>
+std::string Concat(const Parts&... parts) {
+  std::ostringstream out;
+  (out << ... << parts);
+  return out.str();
+}
+
+/// The shortest text that reads back as the same double, such as `0.1` or `1e-05`.
+std::string FormatNumber(double value);
+
+/// The whole of `text` as a finite or infinite number; nothing if it is anything else.
+std::optional<double> ParseNumber(std::string_view text);
+
+/// The whole of `text` as a decimal integer; nothing if it is anything else.
+std::optional<int64_t> ParseInteger(std::string_view text);
+
+/// `text` without blanks at either end.
+std::string_view Trim(std::string_view text);
+
+/// The pieces of `text` between separators, each trimmed; "a,,b" has three.
+std::vector<std::string_view> Split(std::string_view text, char separator);
+
+/// `parts` with `separator` between them.
+std::string Join(const std::vector<std::string>& parts, std::string_view separator);
+
+/// " (did you mean NAME?)" for the name nearest to `word` in edit distance, "" if none is near.
+std::string DidYouMean(std::string_view word, const std::vector<std::string>& names);
+
+}  // namespace upswing

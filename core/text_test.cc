@@ -1,0 +1,49 @@
+#include "core/text.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+namespace upswing {
+namespace {
+
+TEST(Text, NumbersRoundTripInTheirShortestForm) {
+  for (const double x : {0.1, 1e-5, 1.0 / 3, -0.0, 5e-324, 1.7976931348623157e308, 2e22}) {
+    const auto back = ParseNumber(FormatNumber(x));
+    ASSERT_TRUE(back);
+    EXPECT_EQ(*back, x);
+  }
+  EXPECT_EQ(FormatNumber(0.1), "0.1");
+  EXPECT_EQ(FormatNumber(3), "3");
+}
+
+TEST(Text, NumbersAreReadWholeOrNotAtAll) {
+  EXPECT_EQ(ParseNumber("+1.5"), 1.5);
+  EXPECT_EQ(ParseInteger("-12"), -12);
+  EXPECT_TRUE(std::isnan(*ParseNumber("nan")));
+  for (const char* bad : {"", " 1", "1 ", "1x", "--1", "+-1", "1e", "abc"}) {
+    EXPECT_FALSE(ParseNumber(bad)) << bad;
+  }
+  EXPECT_FALSE(ParseInteger("1.0"));
+  EXPECT_FALSE(ParseInteger("99999999999999999999"));
+}
+
+TEST(Text, SplitTrimsAndKeepsEmptyPieces) {
+  const auto pieces = Split(" a, ,b\r", ',');
+  ASSERT_EQ(pieces.size(), 3U);
+  EXPECT_EQ(pieces[0], "a");
+  EXPECT_EQ(pieces[1], "");
+  EXPECT_EQ(pieces[2], "b");
+}
+
+TEST(Text, SuggestsTheNearestNameOnlyIfItIsNear) {
+  const std::vector<std::string> names{"gamma", "batch", "eval_every"};
+  EXPECT_EQ(DidYouMean("gama", names), " (did you mean gamma?)");
+  EXPECT_EQ(DidYouMean("eval-evry", names), " (did you mean eval_every?)");
+  EXPECT_EQ(DidYouMean("zzzzzz", names), "");
+  EXPECT_EQ(DidYouMean("gamma", {}), "");
+}
+
+}  // namespace
+}  // namespace upswing

@@ -1,0 +1,74 @@
+#include "core/thread_pool.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace upswing {
+namespace {
+
+/// Waits until `value` differs from `old`: first spinning (work of well under a millisecond comes
+/// back to back), then asleep, so that an idle pool costs nothing.
+template <typename T>
+void WaitWhile(const std::atomic<T>& value, T old) {
+  for (int spin = 0; spin < 2000; ++spin) {
+    if (value.load(std::memory_order_acquire) != old) return;
+#if defined(__x86_64__)
+    __builtin_ia32_pause();
+#endif
+  }
+  value.wait(old, std::memory_order_acquire);
+}
+
+}  // namespace
+
+ThreadPool::ThreadPool(int threads) : errors_(static_cast<size_t>(std::max(1, threads))) {
+  for (int thread = 1; thread < threads; ++thread) {
+    workers_.emplace_back([this, thread] { Work(thread); });
+  }
+}
+
+ThreadPool::~ThreadPool() {
+  stopping_ = true;
+  ++round_;
+  round_.notify_all();
+  for (std::thread& worker : workers_) worker.join();
+}
+
+void ThreadPool::ParallelFor(int n, const std::function<void(int)>& task) {
+  task_ = &task;
+  n_ = n;
+  running_ = static_cast<int>(workers_.size());
+  ++round_;
+  round_.notify_all();
+  RunShare(0);
+  for (int left = running_; left != 0; left = running_) WaitWhile(running_, left);
+
+  // Every thread is at rest again, so errors_ is ours.
+  std::exception_ptr first;
+  for (std::exception_ptr& error : errors_) {
+    if (!first) first = error;
+    error = nullptr;
+  }
+  if (first) std::rethrow_exception(first);
+}
+
+void ThreadPool::Work(int thread) {
+  unsigned seen = 0;
+  while (true) {
+    WaitWhile(round_, seen);
+    ++seen;
+    if (stopping_) return;
+    RunShare(thread);
+    if (--running_ == 0) running_.notify_one();
+  }
+}
+
+void ThreadPool::RunShare(int thread) {
+  try {
+    for (int i = thread; i < n_; i += threads()) (*task_)(i);
+  } catch (...) {
+    errors_[static_cast<size_t>(thread)] = std::current_exception();
+  }
+}
+
+}  // namespace upswing

@@ -1,0 +1,183 @@
+#include "nn/policy.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "core/error.h"
+#include "core/tensor_file.h"
+#include "core/text.h"
+
+namespace upswing {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::string_view kFormat = "upswing-policy";
+constexpr std::string_view kFormatVersion = "1";
+constexpr int kBlock = 128;   // rows in one forward pass: the activations stay in the L2 cache
+constexpr int kSamples = 16;  // stored inputs and outputs
+
+/// Sample observations (kSamples × D), the same for every policy: uniform in ±1.
+std::vector<float> SampleObservations(int obs_size) {
+  Rng rng(0, "policy self-check");
+  std::vector<float> obs(static_cast<size_t>(kSamples) * static_cast<size_t>(obs_size));
+  for (float& x : obs) x = static_cast<float>(rng.Uniform(-1, 1));
+  return obs;
+}
+
+/// What makes the network, as the metadata hold it.
+std::string ShapeToJson(const QNetworkShape& shape) {
+  return json{{"inputs", shape.inputs},   {"actions", shape.actions},
+              {"hidden", shape.hidden},   {"head", shape.head},
+              {"dueling", shape.dueling}, {"layer_norm", shape.layer_norm}}
+      .dump();
+}
+
+QNetworkShape ShapeFromJson(const std::string& text, const std::string& path) {
+  try {
+    const json j = json::parse(text);
+    return {j.at("inputs").get<int>(),
+            j.at("actions").get<int>(),
+            j.at("hidden").get<std::vector<int64_t>>(),
+            j.at("head").get<int64_t>(),
+            j.at("dueling").get<bool>(),
+            j.at("layer_norm").get<bool>()};
+  } catch (const json::exception& error) {
+    throw BadInput(Concat(path, ": metadata \"network\": ", error.what()));
+  }
+}
+
+/// Throws unless every number is finite.
+template <typename T>
+void CheckFinite(std::span<const T> values, const std::string& what) {
+  const auto bad =
+      std::find_if(values.begin(), values.end(), [](T x) { return !std::isfinite(x); });
+  if (bad != values.end()) {
+    throw BadInput(
+        Concat(what, ": expected finite numbers, got ", *bad, " at index ", bad - values.begin()));
+  }
+}
+
+}  // namespace
+
+int ArgMax(std::span<const float> values) {
+  return static_cast<int>(std::max_element(values.begin(), values.end()) - values.begin());
+}
+
+Policy::Policy(QNetworkShape shape, std::vector<float> parameters, std::vector<double> torques,
+               std::map<std::string, std::string> about)
+    : network_(std::move(shape)),
+      parameters_(parameters.begin(), parameters.end()),
+      torques_(std::move(torques)),
+      about_(std::move(about)),
+      activations_(network_.MakeActivations(kBlock)),
+      q_(static_cast<size_t>(kBlock) * static_cast<size_t>(network_.shape().actions)) {
+  if (parameters_.size() != network_.num_parameters() ||
+      torques_.size() != static_cast<size_t>(network_.shape().actions)) {
+    throw BadInput(Concat("policy: expected ", network_.num_parameters(), " parameters and ",
+                          network_.shape().actions, " torques, got ", parameters_.size(), " and ",
+                          torques_.size()));
+  }
+}
+
+const std::string& Policy::About(const std::string& key) const {
+  const auto found = about_.find(key);
+  if (found == about_.end()) throw BadInput(Concat("policy: no metadata \"", key, "\""));
+  return found->second;
+}
+
+void Policy::QValues(Matrix<const float> obs, Matrix<float> q) const {
+  for (int first = 0; first < obs.rows(); first += kBlock) {
+    const int rows = std::min(kBlock, obs.rows() - first);
+    network_.Forward(parameters_, obs.Rows(first, rows), activations_, q.Rows(first, rows));
+  }
+}
+
+void Policy::Act(Matrix<const float> obs, std::span<double> torque) const {
+  for (int first = 0; first < obs.rows(); first += kBlock) {
+    const int rows = std::min(kBlock, obs.rows() - first);
+    const Matrix<float> q(q_, rows, network_.shape().actions);
+    QValues(obs.Rows(first, rows), q);
+    for (int i = 0; i < rows; ++i) {
+      torque[static_cast<size_t>(first + i)] = torques_[static_cast<size_t>(ArgMax(q.row(i)))];
+    }
+  }
+}
+
+void Policy::Save(const std::filesystem::path& path) const {
+  CheckFinite<float>(parameters_, "policy parameters");
+  const int inputs = shape().inputs;
+  const int actions = shape().actions;
+  const std::vector<float> obs = SampleObservations(inputs);
+  std::vector<float> q(static_cast<size_t>(kSamples) * static_cast<size_t>(actions));
+  std::vector<double> torque(kSamples);
+  const Matrix<const float> obs_rows(obs.data(), kSamples, inputs);
+  QValues(obs_rows, Matrix<float>(q.data(), kSamples, actions));
+  Act(obs_rows, torque);
+
+  TensorFile file;
+  file.metadata = about_;
+  file.metadata["format"] = kFormat;
+  file.metadata["format_version"] = kFormatVersion;
+  file.metadata["output"] = "levels";
+  file.metadata["network"] = ShapeToJson(shape());
+  for (const ParameterBlock& block : network_.blocks()) {
+    file.Add<float>(block.name, std::span(parameters_).subspan(block.offset, block.size()),
+                    block.extents());
+  }
+  file.Add<double>("torques", torques_);
+  file.Add<float>("sample.obs", obs, {kSamples, inputs});
+  file.Add<float>("sample.q", q, {kSamples, actions});
+  file.Add<double>("sample.torque", torque);
+  file.Save(path);
+}
+
+Policy Policy::Load(const std::filesystem::path& path) {
+  const TensorFile file = TensorFile::Load(path);
+  const auto expect = [&](const std::string& key, std::string_view expected) {
+    if (file.Metadata(key) != expected) {
+      throw BadInput(Concat(path.string(), ": ", key, ": expected \"", expected, "\", got \"",
+                            file.Metadata(key), "\""));
+    }
+  };
+  expect("format", kFormat);
+  expect("format_version", kFormatVersion);
+  expect("output", "levels");
+
+  // Parameters, each with the shape that the network asks for.
+  const QNetworkShape shape = ShapeFromJson(file.Metadata("network"), path.string());
+  const QNetwork<float> network(shape);
+  std::vector<float> parameters(network.num_parameters());
+  for (const ParameterBlock& block : network.blocks()) {
+    const auto values = std::span(parameters).subspan(block.offset, block.size());
+    file.Read(block.name, values, block.extents());
+    CheckFinite<float>(values, Concat(path.string(), ": tensor \"", block.name, "\""));
+  }
+  std::vector<double> torques(static_cast<size_t>(shape.actions));
+  file.Read("torques", std::span(torques));
+  CheckFinite<double>(torques, Concat(path.string(), ": tensor \"torques\""));
+  Policy policy(shape, std::move(parameters), std::move(torques), file.metadata);
+
+  // The samples: another machine may sum in another order, but not differ by more than rounding.
+  const size_t samples = file.Count<double>("sample.torque");
+  std::vector<float> obs(samples * static_cast<size_t>(shape.inputs));
+  std::vector<float> expected(samples * static_cast<size_t>(shape.actions));
+  std::vector<float> got(expected.size());
+  file.Read("sample.obs", std::span(obs));
+  file.Read("sample.q", std::span(expected));
+  const int rows = static_cast<int>(samples);
+  policy.QValues(Matrix<const float>(obs.data(), rows, shape.inputs),
+                 Matrix<float>(got.data(), rows, shape.actions));
+  for (size_t i = 0; i < got.size(); ++i) {
+    const double error = std::abs(static_cast<double>(got[i]) - expected[i]);
+    if (!(error <= 1e-4 * (1.0 + std::abs(expected[i])))) {
+      throw BadInput(Concat(path.string(), ": self-check: expected Q-value ", expected[i], ", got ",
+                            got[i], " (sample ", i / static_cast<size_t>(shape.actions), ")"));
+    }
+    policy.self_check_error_ = std::max(policy.self_check_error_, error);
+  }
+  return policy;
+}
+
+}  // namespace upswing

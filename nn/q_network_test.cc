@@ -1,0 +1,168 @@
+#include "nn/q_network.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numeric>
+
+#include "core/error.h"
+
+namespace upswing {
+namespace {
+
+struct NetworkCase {
+  const char* name;
+  QNetworkShape shape;
+};
+
+class QNetworkTest : public ::testing::TestWithParam<NetworkCase> {};
+
+/// f = Σ dq · q as a function of the parameters, in double.
+struct Objective {
+  QNetwork<double> network;
+  QNetwork<double>::Activations activations;
+  AlignedVector<double> parameters, x, dq, q;
+  int B;
+
+  Objective(const QNetworkShape& shape, int batch)
+      : network(shape),
+        activations(network.MakeActivations(batch)),
+        parameters(network.num_parameters()),
+        x(static_cast<size_t>(batch * shape.inputs)),
+        dq(static_cast<size_t>(batch * shape.actions)),
+        q(dq.size()),
+        B(batch) {
+    Rng rng(3, "q network test");
+    network.Initialize(rng, parameters);
+    // Gains and biases of the layer norm away from 1 and 0, so that their part shows.
+    for (const ParameterBlock& block : network.blocks()) {
+      if (block.name.find("norm") == std::string::npos) continue;
+      for (size_t i = 0; i < block.size(); ++i) parameters[block.offset + i] += 0.3 * rng.Normal();
+    }
+    for (double& value : x) value = rng.Normal();
+    for (double& value : dq) value = rng.Normal();
+  }
+
+  double Value() {
+    network.Forward(parameters, Matrix<const double>(x.data(), B, network.shape().inputs),
+                    activations, Matrix<double>(q, B, network.shape().actions));
+    return std::inner_product(q.begin(), q.end(), dq.begin(), 0.0);
+  }
+
+  AlignedVector<double> Gradient() {
+    Value();
+    AlignedVector<double> gradient(parameters.size(), 1e300);  // all of it must be written
+    network.Backward(parameters, Matrix<const double>(x.data(), B, network.shape().inputs),
+                     activations, Matrix<const double>(dq.data(), B, network.shape().actions),
+                     gradient);
+    return gradient;
+  }
+};
+
+TEST_P(QNetworkTest, GradientMatchesFiniteDifferences) {
+  Objective f(GetParam().shape, 7);
+  const AlignedVector<double> gradient = f.Gradient();
+  // Central differences with h = 1e-6: truncation ~h², rounding ~1e-16/h. The norm of the
+  // difference is compared with that of the gradient, array by array.
+  constexpr double h = 1e-6;
+  for (const ParameterBlock& block : f.network.blocks()) {
+    double error = 0, norm = 0;
+    for (size_t i = block.offset; i < block.offset + block.size(); ++i) {
+      const double p = f.parameters[i];
+      f.parameters[i] = p + h;
+      const double above = f.Value();
+      f.parameters[i] = p - h;
+      const double below = f.Value();
+      f.parameters[i] = p;
+      const double numeric = (above - below) / (2 * h);
+      error += std::pow(gradient[i] - numeric, 2);
+      norm += std::pow(numeric, 2);
+    }
+    EXPECT_LE(std::sqrt(error), 1e-6 * std::sqrt(norm)) << block.name;
+  }
+}
+
+TEST_P(QNetworkTest, FloatAgreesWithDoubleAndRowsWithTheirBatch) {
+  Objective f(GetParam().shape, 5);
+  f.Value();
+  const QNetwork<float> network(GetParam().shape);
+  const AlignedVector<float> parameters(f.parameters.begin(), f.parameters.end());
+  const AlignedVector<float> x(f.x.begin(), f.x.end());
+  auto activations = network.MakeActivations(1);
+  AlignedVector<float> q(static_cast<size_t>(network.shape().actions));
+  const Matrix<const float> rows(x.data(), 5, network.shape().inputs);
+  for (int i = 0; i < 5; ++i) {
+    network.Forward(parameters, rows.Rows(i, 1), activations,
+                    Matrix<float>(q, 1, network.shape().actions));
+    for (size_t a = 0; a < q.size(); ++a) {
+      EXPECT_NEAR(q[a], f.q[static_cast<size_t>(i) * q.size() + a], 1e-4);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Shapes, QNetworkTest,
+    ::testing::Values(NetworkCase{"plain", {8, 9, {16, 12}, 0, false, false}},
+                      NetworkCase{"plain_norm", {8, 9, {16, 12}, 0, false, true}},
+                      NetworkCase{"dueling", {8, 9, {16, 12}, 10, true, false}},
+                      NetworkCase{"dueling_norm", {8, 9, {16, 12}, 10, true, true}},
+                      NetworkCase{"one_layer", {3, 2, {5}, 4, true, true}},
+                      NetworkCase{"three_layers", {3, 2, {5, 17, 6}, 9, true, true}}),
+    [](const auto& info) { return info.param.name; });
+
+TEST(QNetwork, ThePostsNetworksHaveTheirParameterCounts) {
+  EXPECT_EQ(QNetwork<float>({8, 9, {256, 256}, 0, false, false}).num_parameters(),
+            8U * 256 + 256 + 256 * 256 + 256 + 256 * 9 + 9);
+  EXPECT_EQ(QNetwork<float>({8, 9, {256, 256}, 128, true, false}).num_parameters(),
+            8U * 256 + 256 + 256 * 256 + 256 + 2 * (256 * 128 + 128) + 128 + 1 + 128 * 9 + 9);
+}
+
+TEST(QNetwork, DuelingIsTheValuePlusAdvantagesAboutTheirMean) {
+  // All weights zero: V and A are the last biases. V = 3, A = 1, 2, 6 → Q = 3 + (-2, -1, 3).
+  const QNetwork<double> network({2, 3, {4}, 2, true, false});
+  AlignedVector<double> parameters(network.num_parameters());
+  for (const ParameterBlock& block : network.blocks()) {
+    if (block.name == "value.bias") parameters[block.offset] = 3;
+    if (block.name == "advantage.bias") {
+      parameters[block.offset] = 1;
+      parameters[block.offset + 1] = 2;
+      parameters[block.offset + 2] = 6;
+    }
+  }
+  auto activations = network.MakeActivations(1);
+  const AlignedVector<double> x{0.5, -0.5};
+  AlignedVector<double> q(3);
+  network.Forward(parameters, Matrix<const double>(x.data(), 1, 2), activations,
+                  Matrix<double>(q, 1, 3));
+  EXPECT_EQ(q, (AlignedVector<double>{1, 2, 6}));  // mean(Q) = 3 = V
+  EXPECT_DOUBLE_EQ((q[0] + q[1] + q[2]) / 3, 3);
+}
+
+TEST(QNetwork, InitialWeightsFillTheirRange) {
+  const QNetwork<float> network({8, 9, {64}, 16, true, true});
+  AlignedVector<float> parameters(network.num_parameters());
+  Rng rng(1, "init");
+  network.Initialize(rng, parameters);
+  for (const ParameterBlock& block : network.blocks()) {
+    const auto values = std::span(parameters).subspan(block.offset, block.size());
+    if (block.name.find("norm") != std::string::npos) {
+      EXPECT_EQ(values[5], block.name.ends_with("weight") ? 1 : 0);
+    }
+    if (block.name != "feature.0.weight") continue;
+    const auto [low, high] = std::ranges::minmax(values);
+    EXPECT_GE(low, -1 / std::sqrt(8.0F));
+    EXPECT_LT(low, -0.9F / std::sqrt(8.0F));
+    EXPECT_LE(high, 1 / std::sqrt(8.0F));
+    EXPECT_GT(high, 0.9F / std::sqrt(8.0F));
+  }
+}
+
+TEST(QNetwork, RefusesSizesThatAreNone) {
+  EXPECT_THROW(QNetwork<float>({0, 9, {4}, 0, false, false}), Error);
+  EXPECT_THROW(QNetwork<float>({8, 9, {}, 0, false, false}), Error);
+  EXPECT_THROW(QNetwork<float>({8, 9, {1 << 20}, 0, false, false}), Error);
+  EXPECT_THROW(QNetwork<float>({8, 9, {4}, 0, true, false}), Error);
+}
+
+}  // namespace
+}  // namespace upswing

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <span>
+#include <string>
+
+#include "core/archive.h"
+#include "core/matrix.h"
+#include "core/vector_env.h"
+#include "nn/policy.h"
+
+namespace upswing {
+
+/// What an agent says of its learning: means over the updates since BeginReport.
+struct AgentReport {
+  int64_t updates = 0;       // gradient steps since the beginning of the run
+  double epsilon = 0;        // present share of random actions
+  double learning_rate = 0;  // present
+  double loss = 0;           // mean Huber loss of scaled rewards
+  double q = 0;              // mean Q-value of the sampled actions
+  double td_error = 0;       // mean |temporal-difference error|
+  double gradient_norm = 0;  // mean, before clipping
+};
+
+/// A learner. The training loop calls Act, Observe, Learn for each lock-step of the environments.
+class Agent {
+ public:
+  virtual ~Agent() = default;
+
+  /// Torques (N) for the observations (N × D), exploring.
+  virtual void Act(Matrix<const float> obs, std::span<double> torque) = 0;
+
+  /// What came of the last Act.
+  virtual void Observe(const StepResult& result) = 0;
+
+  /// All gradient steps that are due by now. Throws Failure if a number is not finite.
+  virtual void Learn() = 0;
+
+  /// How learning goes.
+  virtual AgentReport Report() const = 0;
+
+  /// Begins the averages of the report anew.
+  virtual void BeginReport() = 0;
+
+  /// The greedy policy as it stands, with `about` in its file.
+  virtual Policy ExportPolicy(std::map<std::string, std::string> about) const = 0;
+
+  /// Saves or loads the whole state.
+  virtual void State(Archive archive) = 0;
+};
+
+}  // namespace upswing

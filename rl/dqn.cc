@@ -1,0 +1,267 @@
+#include "rl/dqn.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "nn/linear.h"
+
+namespace upswing {
+namespace {
+
+// A minibatch is cut into slices of at least this many rows, whatever the number of threads: each
+// slice's gradient is a sum of its own, and the slices are added in their order.
+constexpr int kShardRows = 32;
+
+QNetworkShape ShapeOf(const DqnConfig& config, int obs_size, size_t actions) {
+  return {obs_size,       static_cast<int>(actions),
+          config.hidden,  config.dueling ? config.head : 0,
+          config.dueling, config.layer_norm};
+}
+
+}  // namespace
+
+void DqnConfig::Describe(Options& o) {
+  o.Section("network");
+  o.Add(&hidden, "hidden", {256, 256}, {1, 4096}, "widths of the feature layers");
+  o.Add(&head, "head", 128, {1, 4096}, "", "width of each dueling stream's hidden layer");
+  o.Add(&layer_norm, "layer_norm", true, "layer normalisation after each feature layer");
+
+  o.Section("agent");
+  o.Add(&double_q, "double", true, "Double DQN: choose online, evaluate with the target");
+  o.Add(&dueling, "dueling", true, "Dueling: Q = V + A - mean(A)");
+  o.Add(&gamma, "gamma", 0.99, kUnit, "", "discount per control step");
+  o.Add(&n_step, "n_step", 3, {1, 100}, "steps", "length of the returns in the targets");
+  o.Add(&reward_scale, "reward_scale", 0.1, kPositive, "",
+        "the agent learns from reward times this");
+  o.Add(&batch, "batch", 128, {1, 65536}, "", "transitions in a minibatch");
+  o.Add(&replay, "replay", 300000, {1, 10000000}, "", "transitions that the replay memory holds");
+  o.Add(&learning_starts, "learning_starts", 2000, kNotNegative, "steps",
+        "before the first update");
+  o.Add(&updates_per_step, "updates_per_step", 0.25, {0, 100}, "", "gradient steps per step");
+  o.Add(&learning_rate, "learning_rate", 1e-3, {0, 10}, "", "of Adam, at the beginning");
+  o.Add(&learning_rate_end, "learning_rate_end", 1e-4, {0, 10}, "", "of Adam, at the end");
+  o.Add(&learning_rate_steps, "learning_rate_steps", 300000, {1, 1e12}, "steps",
+        "over which it falls linearly");
+  o.Add(&max_gradient_norm, "max_gradient_norm", 10, kPositive, "", "clip the global norm to this");
+  o.Add(&tau, "tau", 0.02, kUnit, "", "Polyak averaging of the target, per update");
+  o.Add(&target_period, "target_period", 0, {0, 1e9}, "updates",
+        "copy the target this often instead of averaging; 0: average");
+  o.Add(&epsilon_start, "epsilon_start", 1.0, kUnit, "",
+        "share of random actions at the beginning");
+  o.Add(&epsilon_end, "epsilon_end", 0.05, kUnit, "", "and at least");
+  o.Add(&epsilon_decay, "epsilon_decay", 0.97, kUnit, "", "factor per episode");
+}
+
+std::vector<double> TorqueLevels(double torque_limit) {
+  std::vector<double> levels;
+  for (int quarter = -4; quarter <= 4; ++quarter) levels.push_back(torque_limit * quarter / 4);
+  return levels;
+}
+
+void TdTargets(Matrix<const float> select, Matrix<const float> evaluate,
+               std::span<const float> reward, std::span<const float> discount, std::span<float> y) {
+  for (int i = 0; i < select.rows(); ++i) {
+    const auto row = static_cast<size_t>(i);
+    y[row] = reward[row] + discount[row] * evaluate(i, ArgMax(select.row(i)));
+  }
+}
+
+float HuberLoss(float delta) {
+  const float size = std::abs(delta);
+  return size <= 1 ? 0.5F * delta * delta : size - 0.5F;
+}
+
+float HuberGradient(float delta) { return std::clamp(delta, -1.0F, 1.0F); }
+
+Dqn::Dqn(const DqnConfig& config, int num_envs, int obs_size, std::vector<double> torques,
+         uint64_t seed, ThreadPool& pool)
+    : config_(config),
+      obs_size_(static_cast<size_t>(obs_size)),
+      torques_(std::move(torques)),
+      pool_(pool),
+      explore_rng_(seed, "exploration"),
+      sample_rng_(seed, "replay sampling"),
+      network_(ShapeOf(config, obs_size, torques_.size())),
+      theta_(network_.num_parameters()),
+      adam_(network_.num_parameters()),
+      replay_(config.replay, obs_size),
+      n_step_(num_envs, static_cast<int>(config.n_step), config.gamma, obs_size),
+      batch_(static_cast<int>(config.batch), obs_size),
+      act_activations_(network_.MakeActivations(num_envs)),
+      act_obs_(static_cast<size_t>(num_envs) * obs_size_),
+      act_q_(static_cast<size_t>(num_envs) * torques_.size()),
+      act_action_(static_cast<size_t>(num_envs)) {
+  Rng init_rng(seed, "initial parameters");
+  network_.Initialize(init_rng, theta_);
+  theta_target_ = theta_;
+
+  const int batch = static_cast<int>(config.batch);
+  const int count = std::clamp(batch / kShardRows, 1, 4);
+  for (int i = 0; i < count; ++i) {
+    const int first = batch * i / count;
+    const int rows = batch * (i + 1) / count - first;
+    const AlignedVector<float> q(static_cast<size_t>(rows) * torques_.size());
+    shards_.push_back({first, rows, network_.MakeActivations(rows), q, q, q, q,
+                       AlignedVector<float>(static_cast<size_t>(rows)),
+                       AlignedVector<float>(network_.num_parameters())});
+  }
+}
+
+double Dqn::epsilon() const {
+  const double decayed =
+      config_.epsilon_start * std::pow(config_.epsilon_decay, static_cast<double>(episodes_));
+  return std::max(decayed, config_.epsilon_end);
+}
+
+double Dqn::learning_rate() const {
+  const double progress =
+      std::min(1.0, static_cast<double>(steps_) / static_cast<double>(config_.learning_rate_steps));
+  return config_.learning_rate + progress * (config_.learning_rate_end - config_.learning_rate);
+}
+
+void Dqn::Act(Matrix<const float> obs, std::span<double> torque) {
+  const Matrix<float> q(act_q_, obs.rows(), static_cast<int>(torques_.size()));
+  network_.Forward(theta_, obs, act_activations_, q);
+  std::ranges::copy(obs.values(), act_obs_.begin());
+
+  // ε-greedy.
+  for (int env = 0; env < obs.rows(); ++env) {
+    const bool random = explore_rng_.Uniform() < epsilon();
+    const int action =
+        random ? static_cast<int>(explore_rng_.Below(torques_.size())) : ArgMax(q.row(env));
+    act_action_[static_cast<size_t>(env)] = action;
+    torque[static_cast<size_t>(env)] = torques_[static_cast<size_t>(action)];
+  }
+}
+
+void Dqn::Observe(const StepResult& result) {
+  for (size_t env = 0; env < act_action_.size(); ++env) {
+    const auto obs = std::span(act_obs_).subspan(env * obs_size_, obs_size_);
+    const auto next_obs = std::span(result.next_obs).subspan(env * obs_size_, obs_size_);
+    const bool finite = std::isfinite(result.reward[env]) &&
+                        std::ranges::all_of(next_obs, [](float x) { return std::isfinite(x); });
+    if (!finite) {
+      throw Failure(Concat("environment ", env, " gave a reward or an observation that is not a ",
+                           "finite number"));
+    }
+    n_step_.Push(static_cast<int>(env), obs, act_action_[env],
+                 config_.reward_scale * result.reward[env], next_obs, result.terminated[env] != 0,
+                 result.truncated[env] != 0, [&](const Transition& t) { replay_.Add(t); });
+    if (result.done(env)) ++episodes_;
+  }
+  steps_ += static_cast<int64_t>(act_action_.size());
+}
+
+void Dqn::Learn() {
+  const int64_t learning_steps = steps_ - config_.learning_starts;
+  if (learning_steps <= 0 || replay_.size() == 0) return;
+  const auto due =
+      static_cast<int64_t>(static_cast<double>(learning_steps) * config_.updates_per_step);
+  while (updates_ < due) {
+    replay_.Sample(sample_rng_, batch_);
+    Update(batch_);
+  }
+}
+
+void Dqn::Update(const Minibatch& batch) {
+  // Gradient of the mean Huber loss: each slice on its own, then summed in order.
+  pool_.ParallelFor(static_cast<int>(shards_.size()),
+                    [&](int i) { ComputeGradient(batch, shards_[static_cast<size_t>(i)]); });
+  Shard& total = shards_.front();
+  double loss = total.loss;
+  q_sum_ += total.q_sum / static_cast<double>(config_.batch);
+  td_sum_ += total.td_sum / static_cast<double>(config_.batch);
+  for (size_t i = 1; i < shards_.size(); ++i) {
+    AddTo<float>(shards_[i].gradient, total.gradient);
+    loss += shards_[i].loss;
+    q_sum_ += shards_[i].q_sum / static_cast<double>(config_.batch);
+    td_sum_ += shards_[i].td_sum / static_cast<double>(config_.batch);
+  }
+  loss /= static_cast<double>(config_.batch);
+  if (!std::isfinite(loss)) {
+    throw Failure(
+        Concat("the loss is ", loss, " in update ", updates_ + 1, ", expected a finite number"));
+  }
+
+  // θ moves against it, then θ⁻ follows θ.
+  norm_sum_ += adam_.Step(total.gradient, learning_rate(), config_.max_gradient_norm, theta_);
+  ++updates_;
+  if (config_.target_period == 0) {
+    MoveTowards<float>(theta_, static_cast<float>(config_.tau), theta_target_);
+  } else if (updates_ % config_.target_period == 0) {
+    theta_target_ = theta_;
+  }
+  loss_sum_ += loss;
+  ++report_updates_;
+}
+
+void Dqn::ComputeGradient(const Minibatch& batch, Shard& shard) {
+  const auto first = static_cast<size_t>(shard.first);
+  const auto rows = static_cast<size_t>(shard.rows);
+  const int actions = static_cast<int>(torques_.size());
+  const int obs_size = static_cast<int>(obs_size_);
+  const Matrix<const float> s(batch.obs.data() + first * obs_size_, shard.rows, obs_size);
+  const Matrix<const float> s_next(batch.next_obs.data() + first * obs_size_, shard.rows, obs_size);
+  const Matrix<float> q(shard.q, shard.rows, actions);
+  const Matrix<float> q_select(shard.q_select, shard.rows, actions);
+  const Matrix<float> q_target(shard.q_target, shard.rows, actions);
+  const Matrix<float> dq(shard.dq, shard.rows, actions);
+
+  // y = r + γⁿ Q(s', a*; θ⁻)
+  network_.Forward(theta_target_, s_next, shard.activations, q_target);
+  if (config_.double_q) network_.Forward(theta_, s_next, shard.activations, q_select);
+  TdTargets(config_.double_q ? q_select : q_target, q_target,
+            std::span(batch.reward).subspan(first, rows),
+            std::span(batch.discount).subspan(first, rows), shard.y);
+
+  // dL/dQ(s, a) = clip(Q(s, a; θ) - y, ±1) / B, and 0 for all other actions
+  network_.Forward(theta_, s, shard.activations, q);
+  std::ranges::fill(dq.values(), 0.0F);
+  shard.loss = shard.q_sum = shard.td_sum = 0;
+  for (int i = 0; i < shard.rows; ++i) {
+    const int a = batch.action[first + static_cast<size_t>(i)];
+    const float delta = q(i, a) - shard.y[static_cast<size_t>(i)];
+    dq(i, a) = HuberGradient(delta) / static_cast<float>(config_.batch);
+    shard.loss += HuberLoss(delta);
+    shard.q_sum += q(i, a);
+    shard.td_sum += std::abs(delta);
+  }
+  network_.Backward(theta_, s, shard.activations, dq, shard.gradient);
+}
+
+AgentReport Dqn::Report() const {
+  const double n = static_cast<double>(std::max<int64_t>(1, report_updates_));
+  return {updates_,   epsilon(),   learning_rate(), loss_sum_ / n,
+          q_sum_ / n, td_sum_ / n, norm_sum_ / n};
+}
+
+void Dqn::BeginReport() {
+  loss_sum_ = q_sum_ = td_sum_ = norm_sum_ = 0;
+  report_updates_ = 0;
+}
+
+Policy Dqn::ExportPolicy(std::map<std::string, std::string> about) const {
+  return {network_.shape(), {theta_.begin(), theta_.end()}, torques_, std::move(about)};
+}
+
+void Dqn::State(Archive archive) {
+  archive.Array("theta", std::span(theta_));
+  archive.Array("theta_target", std::span(theta_target_));
+  adam_.State(archive.In("adam"));
+  replay_.State(archive.In("replay"));
+  n_step_.State(archive.In("n_step"));
+  explore_rng_.State(archive.In("explore_rng"));
+  sample_rng_.State(archive.In("sample_rng"));
+  archive.Scalar("steps", steps_);
+  archive.Scalar("episodes", episodes_);
+  archive.Scalar("updates", updates_);
+  archive.Scalar("loss_sum", loss_sum_);
+  archive.Scalar("q_sum", q_sum_);
+  archive.Scalar("td_sum", td_sum_);
+  archive.Scalar("norm_sum", norm_sum_);
+  archive.Scalar("report_updates", report_updates_);
+}
+
+}  // namespace upswing

@@ -1,0 +1,118 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/options.h"
+#include "core/thread_pool.h"
+#include "nn/adam.h"
+#include "nn/q_network.h"
+#include "rl/agent.h"
+#include "rl/n_step.h"
+#include "rl/replay.h"
+
+/// Deep Q-Network (Mnih et al., 2015) and its extensions, each a flag.
+///
+/// Symbols: s observation, a action, r reward, γ discount, θ online parameters, θ⁻ target
+/// parameters, y target, B batch size, A number of actions, D observation size.
+namespace upswing {
+
+/// Settings of the agent.
+struct DqnConfig {
+  std::vector<int64_t> hidden;
+  int64_t head;
+  bool layer_norm, double_q, dueling;
+  double gamma;
+  int64_t n_step;
+  double reward_scale;
+  int64_t batch, replay, learning_starts;
+  double updates_per_step;
+  double learning_rate, learning_rate_end;
+  int64_t learning_rate_steps;
+  double max_gradient_norm;
+  double tau;
+  int64_t target_period;
+  double epsilon_start, epsilon_end, epsilon_decay;
+
+  DqnConfig() { SetDefaults(*this); }
+  /// One line per setting: name, default, range, unit, help.
+  void Describe(Options& options);
+};
+
+/// The torque levels of the nine actions (N·m): -limit to limit in steps of a quarter.
+std::vector<double> TorqueLevels(double torque_limit);
+
+/// TD targets y (B). `select` chooses a* = argmax_a select(s', a), and y = r + discount ·
+/// evaluate(s', a*):
+/// - DQN: both are Q(s', ·; θ⁻), so that y = r + γ max_a Q(s', a; θ⁻) (Mnih et al., 2015);
+/// - Double DQN: select = Q(s', ·; θ), evaluate = Q(s', ·; θ⁻) (van Hasselt et al., 2016, Eq 4).
+/// All Q-values are (B × A), reward and discount (B); discount is γⁿ, or 0 after a termination.
+void TdTargets(Matrix<const float> select, Matrix<const float> evaluate,
+               std::span<const float> reward, std::span<const float> discount, std::span<float> y);
+
+/// Huber loss with threshold 1: δ²/2 where |δ| ≤ 1, |δ| - 1/2 beyond.
+float HuberLoss(float delta);
+/// Its derivative: δ clipped to ±1.
+float HuberGradient(float delta);
+
+/// A DQN agent for N environments.
+class Dqn : public Agent {
+ public:
+  Dqn(const DqnConfig& config, int num_envs, int obs_size, std::vector<double> torques,
+      uint64_t seed, ThreadPool& pool);
+
+  void Act(Matrix<const float> obs, std::span<double> torque) override;
+  void Observe(const StepResult& result) override;
+  void Learn() override;
+  AgentReport Report() const override;
+  void BeginReport() override;
+  Policy ExportPolicy(std::map<std::string, std::string> about) const override;
+  void State(Archive archive) override;
+
+  std::span<const float> online() const { return theta_; }
+  std::span<const float> target() const { return theta_target_; }
+  const Replay& replay() const { return replay_; }
+  double epsilon() const;
+  double learning_rate() const;
+  /// One gradient step on a given minibatch; Report tells of it.
+  void Update(const Minibatch& batch);
+
+ private:
+  /// One slice of a minibatch: what one thread computes on its own.
+  struct Shard {
+    int first, rows;
+    QNetwork<float>::Activations activations;
+    AlignedVector<float> q, q_select, q_target, dq;  // (rows × A)
+    AlignedVector<float> y;                          // (rows)
+    AlignedVector<float> gradient;                   // (num_parameters)
+    double loss = 0, q_sum = 0, td_sum = 0;
+  };
+  void ComputeGradient(const Minibatch& batch, Shard& shard);
+
+  DqnConfig config_;
+  size_t obs_size_;
+  std::vector<double> torques_;  // (A)
+  ThreadPool& pool_;
+  Rng explore_rng_, sample_rng_;
+
+  QNetwork<float> network_;
+  AlignedVector<float> theta_, theta_target_;  // (num_parameters)
+  Adam adam_;
+  Replay replay_;
+  NStep n_step_;
+  Minibatch batch_;
+  std::vector<Shard> shards_;
+
+  QNetwork<float>::Activations act_activations_;
+  AlignedVector<float> act_obs_, act_q_;  // (N × D), (N × A) of the last Act
+  std::vector<int> act_action_;           // (N)
+
+  int64_t steps_ = 0, episodes_ = 0, updates_ = 0;
+  // Sums since BeginReport.
+  double loss_sum_ = 0, q_sum_ = 0, td_sum_ = 0, norm_sum_ = 0;
+  int64_t report_updates_ = 0;
+};
+
+}  // namespace upswing

@@ -1,0 +1,282 @@
+#include "rl/dqn.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "core/error.h"
+#include "core/temp_folder.h"
+#include "rl/toy_env.h"
+
+namespace upswing {
+namespace {
+
+DqnConfig SmallConfig() {
+  DqnConfig config;
+  config.hidden = {16, 16};
+  config.head = 8;
+  config.batch = 16;
+  config.replay = 1000;
+  config.learning_starts = 32;
+  config.updates_per_step = 0.5;
+  config.n_step = 1;
+  config.reward_scale = 1;
+  return config;
+}
+
+const std::vector<double> kTorques{-1, 0, 1};
+
+Minibatch RandomBatch(int size) {
+  Minibatch batch(size, 1);
+  Rng rng(1, "batch");
+  for (size_t i = 0; i < batch.action.size(); ++i) {
+    batch.obs[i] = static_cast<float>(rng.Normal());
+    batch.next_obs[i] = static_cast<float>(rng.Normal());
+    batch.action[i] = static_cast<int>(rng.Below(3));
+    batch.reward[i] = static_cast<float>(rng.Normal());
+    batch.discount[i] = i % 3 == 0 ? 0.0F : 0.9F;
+  }
+  return batch;
+}
+
+TEST(TdTargets, VanillaAndDoubleByHand) {
+  const std::vector<float> online{1, 5, 2, /**/ 4, 0, 3};
+  const std::vector<float> target{7, 2, 6, /**/ 1, 9, 8};
+  const Matrix<const float> Q(online.data(), 2, 3), Q_target(target.data(), 2, 3);
+  const std::vector<float> reward{0.5F, -1}, discount{0.9F, 0.81F};
+  std::vector<float> y(2);
+  TdTargets(Q_target, Q_target, reward, discount, y);  // max of the target: 7 and 9
+  EXPECT_FLOAT_EQ(y[0], 0.5F + 0.9F * 7);
+  EXPECT_FLOAT_EQ(y[1], -1 + 0.81F * 9);
+  TdTargets(Q, Q_target, reward, discount, y);  // the target at the online argmax: 2 and 1
+  EXPECT_FLOAT_EQ(y[0], 0.5F + 0.9F * 2);
+  EXPECT_FLOAT_EQ(y[1], -1 + 0.81F * 1);
+  TdTargets(Q, Q_target, reward, std::vector<float>{0, 0}, y);  // terminated: the reward alone
+  EXPECT_EQ(y, reward);
+}
+
+TEST(Huber, TheGradientIsClippedAndBelongsToTheLoss) {
+  for (const float delta : {-3.0F, -1.0F, -0.2F, 0.0F, 0.7F, 1.0F, 12.0F}) {
+    const double h = 1e-3;
+    const double numeric =
+        (HuberLoss(delta + static_cast<float>(h)) - HuberLoss(delta - static_cast<float>(h))) /
+        (2 * h);
+    EXPECT_NEAR(HuberGradient(delta), numeric, 1e-3);
+    EXPECT_LE(std::abs(HuberGradient(delta)), 1);
+  }
+}
+
+TEST(Torques, AreTheNineOfThePost) {
+  EXPECT_EQ(TorqueLevels(5), (std::vector<double>{-5, -3.75, -2.5, -1.25, 0, 1.25, 2.5, 3.75, 5}));
+}
+
+/// Loss of a minibatch as the papers write it, in plain code from the exported networks.
+double LossByHand(const DqnConfig& config, std::span<const float> online,
+                  std::span<const float> target, const Minibatch& batch) {
+  const QNetwork<float> network(
+      {1, 3, config.hidden, config.dueling ? config.head : 0, config.dueling, config.layer_norm});
+  auto activations = network.MakeActivations(1);
+  const auto q = [&](std::span<const float> parameters, const float& x) {
+    std::vector<float> values(3);
+    network.Forward(parameters, Matrix<const float>(&x, 1, 1), activations,
+                    Matrix<float>(values.data(), 1, 3));
+    return values;
+  };
+  double loss = 0;
+  for (size_t i = 0; i < batch.action.size(); ++i) {
+    const auto q_target = q(target, batch.next_obs[i]);
+    const auto q_online = q(online, batch.next_obs[i]);
+    const double next = config.double_q ? q_target[static_cast<size_t>(ArgMax(q_online))]
+                                        : *std::ranges::max_element(q_target);
+    const double y = batch.reward[i] + batch.discount[i] * next;
+    const double delta = q(online, batch.obs[i])[static_cast<size_t>(batch.action[i])] - y;
+    loss += std::abs(delta) <= 1 ? delta * delta / 2 : std::abs(delta) - 0.5;
+  }
+  return loss / static_cast<double>(batch.action.size());
+}
+
+class DqnVariants : public ::testing::TestWithParam<std::tuple<bool, bool>> {};
+
+TEST_P(DqnVariants, LossIsThatOfThePapersAndFalls) {
+  DqnConfig config = SmallConfig();
+  std::tie(config.double_q, config.dueling) = GetParam();
+  config.learning_rate = config.learning_rate_end = 1e-2;
+  ThreadPool pool(1);
+  Dqn agent(config, 1, 1, kTorques, 1, pool);
+  const Minibatch batch = RandomBatch(16);
+  const double first = LossByHand(config, agent.online(), agent.target(), batch);
+  // Apart from the first update online and target differ.
+  for (int update = 0; update < 30; ++update) {
+    agent.BeginReport();
+    const double expected = LossByHand(config, agent.online(), agent.target(), batch);
+    agent.Update(batch);
+    ASSERT_NEAR(agent.Report().loss, expected, 1e-5);
+  }
+  EXPECT_LT(LossByHand(config, agent.online(), agent.target(), batch), first / 2);
+}
+
+INSTANTIATE_TEST_SUITE_P(Flags, DqnVariants,
+                         ::testing::Combine(::testing::Bool(), ::testing::Bool()));
+
+TEST(Dqn, TargetFollowsByPolyakAveragingAtEachUpdate) {
+  DqnConfig config = SmallConfig();
+  config.tau = 0.25;
+  ThreadPool pool(1);
+  Dqn agent(config, 1, 1, kTorques, 1, pool);
+  const std::vector<float> before(agent.target().begin(), agent.target().end());
+  agent.Update(RandomBatch(16));
+  for (size_t i = 0; i < before.size(); ++i) {
+    EXPECT_NEAR(agent.target()[i], 0.75F * before[i] + 0.25F * agent.online()[i], 1e-6);
+  }
+}
+
+TEST(Dqn, TargetCanBeCopiedPeriodically) {
+  DqnConfig config = SmallConfig();
+  config.target_period = 3;
+  ThreadPool pool(1);
+  Dqn agent(config, 1, 1, kTorques, 1, pool);
+  const std::vector<float> first(agent.target().begin(), agent.target().end());
+  for (int update = 1; update <= 3; ++update) {
+    agent.Update(RandomBatch(16));
+    EXPECT_EQ(std::ranges::equal(agent.target(), first), update < 3);
+  }
+  EXPECT_TRUE(std::ranges::equal(agent.target(), agent.online()));
+}
+
+/// Trains on the toy environment for a number of lock-steps.
+void Walk(Dqn& agent, ToyEnv& env, int steps) {
+  StepResult result = env.MakeResult();
+  std::vector<double> torque(static_cast<size_t>(env.num_envs()));
+  for (int i = 0; i < steps; ++i) {
+    agent.Act(env.obs(), torque);
+    env.Step(torque, result);
+    agent.Observe(result);
+    agent.Learn();
+  }
+}
+
+TEST(Dqn, ATruncationBootstrapsFromItsOwnLastObservationAndATerminationFromNothing) {
+  // Through the whole path: environment → agent → memory. Outward steps leave ±5; an episode of
+  // ten steps is truncated. A start is drawn near 0, so a reset observation would show.
+  DqnConfig config = SmallConfig();
+  config.updates_per_step = 0;
+  ThreadPool pool(1);
+  Dqn agent(config, 2, 1, kTorques, 1, pool);
+  ToyEnv env(2);
+  Walk(agent, env, 400);
+  int terminated = 0;
+  for (int64_t i = 0; i < agent.replay().size(); ++i) {
+    const Transition t = agent.replay().at(i);
+    const float moved = t.next_obs[0] - t.obs[0];
+    ASSERT_NEAR(moved, kTorques[static_cast<size_t>(t.action)], 1e-5);
+    const bool left = std::abs(t.next_obs[0]) > 5;
+    ASSERT_EQ(t.discount, left ? 0.0F : static_cast<float>(config.gamma));
+    terminated += left ? 1 : 0;
+  }
+  EXPECT_EQ(agent.replay().size(), 800);
+  EXPECT_GT(terminated, 0);
+}
+
+TEST(Dqn, UpdatesFollowTheStepsWhateverTheNumberOfEnvironments) {
+  for (const int envs : {1, 4}) {
+    ThreadPool pool(1);
+    Dqn agent(SmallConfig(), envs, 1, kTorques, 1, pool);
+    ToyEnv env(envs);
+    Walk(agent, env, 400 / envs);
+    EXPECT_EQ(agent.Report().updates, (400 - 32) / 2);
+  }
+}
+
+TEST(Dqn, EpsilonDecaysWithEachEpisodeToItsEnd) {
+  DqnConfig config = SmallConfig();
+  config.epsilon_decay = 0.5;
+  config.epsilon_end = 0.2;
+  ThreadPool pool(1);
+  Dqn agent(config, 1, 1, kTorques, 1, pool);
+  ToyEnv env(1);
+  env.episode_steps = 4;
+  EXPECT_EQ(agent.epsilon(), 1);
+  Walk(agent, env, 4);
+  EXPECT_EQ(agent.epsilon(), 0.5);
+  Walk(agent, env, 4);
+  EXPECT_EQ(agent.epsilon(), 0.25);
+  Walk(agent, env, 4);
+  EXPECT_EQ(agent.epsilon(), 0.2);
+}
+
+TEST(Dqn, LearnsToStayNearZero) {
+  for (const uint64_t seed : {1, 2, 3}) {
+    ThreadPool pool(1);
+    Dqn agent(SmallConfig(), 4, 1, kTorques, seed, pool);
+    ToyEnv env(4, seed);
+    Walk(agent, env, 1500);
+    const Policy policy = agent.ExportPolicy({});
+    for (const float x : {-2.0F, 0.0F, 2.0F}) {
+      double torque = 9;
+      policy.Act(Matrix<const float>(&x, 1, 1), std::span(&torque, 1));
+      EXPECT_EQ(torque, x == 0 ? 0 : -x / 2) << "seed " << seed << ", x = " << x;
+    }
+  }
+}
+
+TEST(Dqn, TheNumberOfThreadsChangesNoBit) {
+  DqnConfig config = SmallConfig();
+  config.batch = 128;  // four slices
+  std::vector<float> parameters[2];
+  for (const int threads : {1, 3}) {
+    ThreadPool pool(threads);
+    Dqn agent(config, 4, 1, kTorques, 1, pool);
+    ToyEnv env(4);
+    Walk(agent, env, 200);
+    parameters[threads == 1 ? 0 : 1].assign(agent.online().begin(), agent.online().end());
+  }
+  EXPECT_EQ(parameters[0], parameters[1]);
+}
+
+TEST(Dqn, LoadedGoesOnToTheBit) {
+  DqnConfig config = SmallConfig();
+  config.n_step = 3;
+  ThreadPool pool(1);
+  Dqn saved(config, 2, 1, kTorques, 1, pool);
+  ToyEnv env(2);
+  Walk(saved, env, 101);
+  const TempFolder folder;
+  const auto path = folder / "state.safetensors";
+  {
+    TensorFile file;
+    saved.State(Archive::Saver(file).In("agent"));
+    env.State(Archive::Saver(file).In("env"));
+    file.Save(path);
+  }
+  Walk(saved, env, 100);
+
+  const TensorFile source = TensorFile::Load(path);
+  Dqn loaded(config, 2, 1, kTorques, 99, pool);  // another seed, which loading must undo
+  ToyEnv loaded_env(2, 99);
+  loaded.State(Archive::Loader(source).In("agent"));
+  loaded_env.State(Archive::Loader(source).In("env"));
+  Walk(loaded, loaded_env, 100);
+  EXPECT_TRUE(std::ranges::equal(saved.online(), loaded.online()));
+  EXPECT_TRUE(std::ranges::equal(saved.target(), loaded.target()));
+  EXPECT_EQ(saved.epsilon(), loaded.epsilon());
+  EXPECT_EQ(saved.learning_rate(), loaded.learning_rate());
+}
+
+TEST(Dqn, NumbersThatAreNotFiniteStopIt) {
+  ThreadPool pool(1);
+  Dqn agent(SmallConfig(), 1, 1, kTorques, 1, pool);
+  ToyEnv env(1);
+  env.poison = true;
+  EXPECT_THROW(Walk(agent, env, 1), Error);
+
+  Dqn other(SmallConfig(), 1, 1, kTorques, 1, pool);
+  const std::vector<float> before(other.online().begin(), other.online().end());
+  Minibatch batch = RandomBatch(16);
+  batch.reward[3] = std::numeric_limits<float>::infinity();
+  EXPECT_THROW(other.Update(batch), Error);
+  EXPECT_TRUE(std::ranges::equal(other.online(), before));
+}
+
+}  // namespace
+}  // namespace upswing

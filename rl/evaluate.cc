@@ -1,0 +1,115 @@
+#include "rl/evaluate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace upswing {
+namespace {
+
+int64_t StepsIn(double seconds, const VectorEnv& env) {
+  return std::llround(seconds / env.step_seconds());
+}
+
+Evaluation Summarize(std::span<const EvaluationEpisode> episodes) {
+  Evaluation e;
+  e.episodes = static_cast<int64_t>(episodes.size());
+  std::vector<double> swing_up, reward_sum, work, rms;
+  for (const EvaluationEpisode& episode : episodes) {
+    if (episode.success) swing_up.push_back(episode.swing_up_seconds);
+    reward_sum.push_back(episode.reward_sum);
+    work.push_back(episode.work);
+    rms.push_back(episode.rms_torque);
+    e.peak_torque = std::max(e.peak_torque, episode.peak_torque);
+  }
+  e.successes = static_cast<int64_t>(swing_up.size());
+  e.success_interval = WilsonInterval(e.successes, e.episodes);
+  e.swing_up_seconds = QuartilesOf(std::move(swing_up));
+  e.reward_sum = MomentsOf(reward_sum);
+  e.work = MomentsOf(work);
+  e.rms_torque = MomentsOf(rms);
+  return e;
+}
+
+}  // namespace
+
+Quartiles QuartilesOf(std::vector<double> values) {
+  if (values.empty()) return {};
+  std::ranges::sort(values);
+  const auto at = [&](double share) {
+    const double place = share * static_cast<double>(values.size() - 1);
+    const auto below = static_cast<size_t>(place);
+    const size_t above = std::min(below + 1, values.size() - 1);
+    return std::lerp(values[below], values[above], place - static_cast<double>(below));
+  };
+  return {at(0.25), at(0.5), at(0.75)};
+}
+
+Interval WilsonInterval(int64_t successes, int64_t trials) {
+  if (trials == 0) return {};
+  constexpr double kZ = 1.959963984540054;  // 97.5% quantile of the standard normal
+  const double n = static_cast<double>(trials);
+  const double p = static_cast<double>(successes) / n;
+  const double center = (p + kZ * kZ / (2 * n)) / (1 + kZ * kZ / n);
+  const double half = kZ / (1 + kZ * kZ / n) * std::sqrt(p * (1 - p) / n + kZ * kZ / (4 * n * n));
+  return {std::max(0.0, center - half), std::min(1.0, center + half)};
+}
+
+Moments MomentsOf(std::span<const double> values) {
+  if (values.empty()) return {};
+  const double n = static_cast<double>(values.size());
+  const double mean = std::accumulate(values.begin(), values.end(), 0.0) / n;
+  double squares = 0;
+  for (const double x : values) squares += (x - mean) * (x - mean);
+  return {mean, n > 1 ? std::sqrt(squares / (n - 1)) : 0.0};
+}
+
+Evaluation Evaluate(const Policy& policy, VectorEnv& env,
+                    const std::function<void(double)>& progress) {
+  const auto n = static_cast<size_t>(env.num_envs());
+  const int64_t steps = StepsIn(kEvaluationSeconds, env);
+  const int64_t return_steps = StepsIn(kReturnSeconds, env);
+  const size_t terms = env.reward_term_names().size();
+  StepResult result = env.MakeResult();
+  std::vector<double> torque(n);
+  std::vector<EvaluationEpisode> episodes(n);
+  std::vector<int64_t> goal_since(n, -1);  // first state of the present stretch at the goal
+  std::vector<uint8_t> ended(n);           // blown up: what follows is another episode
+  std::vector<double> term_means(terms);
+
+  for (int64_t k = 1; k <= steps; ++k) {
+    policy.Act(env.obs(), torque);
+    env.Step(torque, result);
+    for (size_t i = 0; i < n; ++i) {
+      if (ended[i]) continue;
+      EvaluationEpisode& episode = episodes[i];
+      episode.work += result.work[i];
+      episode.peak_torque = std::max(episode.peak_torque, std::abs(torque[i]));
+      episode.rms_torque += torque[i] * torque[i];
+      if (k <= return_steps) {
+        episode.reward_sum += result.reward[i];
+        for (size_t j = 0; j < terms; ++j) {
+          term_means[j] += result.reward_terms[i * terms + j] / static_cast<double>(n);
+        }
+      }
+      if (!result.at_goal[i]) goal_since[i] = -1;
+      if (result.at_goal[i] && goal_since[i] < 0) goal_since[i] = k;
+      ended[i] = result.terminated[i];
+    }
+    if (progress) progress(static_cast<double>(k) / static_cast<double>(steps));
+  }
+
+  for (size_t i = 0; i < n; ++i) {
+    const bool at_goal = goal_since[i] >= 0 && !ended[i];
+    EvaluationEpisode& episode = episodes[i];
+    episode.swing_up_seconds =
+        at_goal ? static_cast<double>(goal_since[i]) * env.step_seconds() : kEvaluationSeconds;
+    episode.success = at_goal && goal_since[i] <= steps - StepsIn(kHoldSeconds, env);
+    episode.rms_torque = std::sqrt(episode.rms_torque / static_cast<double>(steps));
+  }
+  Evaluation evaluation = Summarize(episodes);
+  evaluation.term_means = std::move(term_means);
+  return evaluation;
+}
+
+}  // namespace upswing

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/vector_env.h"
+#include "nn/policy.h"
+
+namespace upswing {
+
+/// An evaluation episode lasts this long; it succeeds if every state of its last half is at the
+/// goal; its return counts the first half.
+inline constexpr double kEvaluationSeconds = 20;
+inline constexpr double kHoldSeconds = 10;
+inline constexpr double kReturnSeconds = 10;
+
+/// What one evaluation episode came to.
+struct EvaluationEpisode {
+  bool success = false;
+  double swing_up_seconds = 0;  // start of the last stretch at the goal that lasts to the end;
+                                // kEvaluationSeconds if the end is not at the goal
+  double reward_sum = 0;        // return: undiscounted, over the first kReturnSeconds
+  double work = 0;              // Σ |mechanical work of the motor|, J
+  double peak_torque = 0;       // largest |torque|, N·m
+  double rms_torque = 0;        // root mean square, N·m
+};
+
+/// Median and the middle half of a sample.
+struct Quartiles {
+  double low = 0, median = 0, high = 0;
+};
+
+/// Quartiles by linear interpolation between order statistics; zeros for an empty sample.
+Quartiles QuartilesOf(std::vector<double> values);
+
+/// A closed interval.
+struct Interval {
+  double low = 0, high = 1;
+};
+
+/// 95% interval of a proportion (Wilson, 1927) after `successes` of `trials`.
+Interval WilsonInterval(int64_t successes, int64_t trials);
+
+/// Mean and sample standard deviation.
+struct Moments {
+  double mean = 0, deviation = 0;
+};
+Moments MomentsOf(std::span<const double> values);
+
+/// An evaluation in figures.
+struct Evaluation {
+  int64_t episodes = 0, successes = 0;
+  Interval success_interval;
+  Quartiles swing_up_seconds;  // of the successful episodes
+  Moments reward_sum, work, rms_torque;
+  double peak_torque = 0;
+  std::vector<double> term_means;  // (K) mean sum of each reward term over the first half
+
+  double success_rate() const {
+    return episodes == 0 ? 0 : static_cast<double>(successes) / static_cast<double>(episodes);
+  }
+  bool all_succeeded() const { return episodes > 0 && successes == episodes; }
+};
+
+/// Lets `policy` control every environment for kEvaluationSeconds from where it stands. The
+/// environments must not end before that. `progress` (may be empty) is told the share done.
+Evaluation Evaluate(const Policy& policy, VectorEnv& env,
+                    const std::function<void(double)>& progress = {});
+
+}  // namespace upswing

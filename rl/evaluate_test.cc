@@ -1,0 +1,99 @@
+#include "rl/evaluate.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "rl/toy_env.h"
+
+namespace upswing {
+namespace {
+
+/// A policy on one observation x that always chooses the same torque.
+Policy Constant(double torque) {
+  const QNetworkShape shape{1, 1, {1}, 0, false, false};
+  return {shape, std::vector<float>(QNetwork<float>(shape).num_parameters()), {torque}, {}};
+}
+
+/// Environment i is at the goal from its goal_from[i]-th state on, but for a gap.
+class ScriptedEnv : public ToyEnv {
+ public:
+  explicit ScriptedEnv(std::vector<int> goal_from, int gap = -1)
+      : ToyEnv(static_cast<int>(goal_from.size())), goal_from_(std::move(goal_from)), gap_(gap) {}
+  double step_seconds() const override { return 0.02; }
+  void Step(std::span<const double> torque, StepResult& r) override {
+    ++k_;
+    for (size_t i = 0; i < goal_from_.size(); ++i) {
+      r.at_goal[i] = k_ >= goal_from_[i] && k_ != gap_ ? 1 : 0;
+      r.reward[i] = r.reward_terms[i] = k_;
+      r.work[i] = 0.5;
+      r.terminated[i] = static_cast<int>(i) == blow_up && k_ == 900 ? 1 : 0;
+      r.truncated[i] = 0;
+      r.next_obs[i] = static_cast<float>(torque[i]);
+    }
+  }
+  int blow_up = -1;
+
+ private:
+  std::vector<int> goal_from_;
+  int gap_;
+  int k_ = 0;
+};
+
+TEST(Evaluate, SuccessAsksForTheWholeOfTheLastTenSeconds) {
+  // State 500 is at t = 10 s: from there on is a success, one later is not.
+  ScriptedEnv env({500, 501, 100, 2000});
+  const Evaluation e = Evaluate(Constant(-2), env);
+  EXPECT_EQ(e.episodes, 4);
+  EXPECT_EQ(e.successes, 2);
+  EXPECT_DOUBLE_EQ(e.swing_up_seconds.median, (10 + 2) / 2.0);
+  EXPECT_DOUBLE_EQ(e.reward_sum.mean, 500 * 501 / 2.0);  // the first 500 rewards: 1 + … + 500
+  EXPECT_DOUBLE_EQ(e.term_means[0], e.reward_sum.mean);
+  EXPECT_DOUBLE_EQ(e.work.mean, 500);  // 1000 steps of half a joule
+  EXPECT_EQ(e.peak_torque, 2);
+  EXPECT_DOUBLE_EQ(e.rms_torque.mean, 2);
+}
+
+TEST(Evaluate, OneStateElsewhereUndoesAStretch) {
+  ScriptedEnv early({100}, 499), late({100}, 501);
+  EXPECT_EQ(Evaluate(Constant(0), early).successes, 1);
+  EXPECT_EQ(Evaluate(Constant(0), late).successes, 0);
+}
+
+TEST(Evaluate, ABlownUpEpisodeFailsWhateverFollows) {
+  ScriptedEnv env({100, 100});
+  env.blow_up = 1;
+  const Evaluation e = Evaluate(Constant(0), env);
+  EXPECT_EQ(e.successes, 1);
+}
+
+TEST(Statistics, WilsonIntervalMatchesPublishedValues) {
+  // Newcombe (1998), Statistics in Medicine 17, Table I, method 3: 81/263, 15/148, 0/20, 1/29.
+  const struct {
+    int64_t x, n;
+    double low, high;
+  } kCases[] = {{81, 263, 0.2553, 0.3662},
+                {15, 148, 0.0624, 0.1605},
+                {0, 20, 0, 0.1611},
+                {1, 29, 0.0061, 0.1718}};
+  for (const auto& c : kCases) {
+    EXPECT_NEAR(WilsonInterval(c.x, c.n).low, c.low, 5e-5);
+    EXPECT_NEAR(WilsonInterval(c.x, c.n).high, c.high, 5e-5);
+  }
+  EXPECT_NEAR(WilsonInterval(100, 100).high, 1, 1e-15);
+}
+
+TEST(Statistics, QuartilesAndMomentsByHand) {
+  const Quartiles q = QuartilesOf({5, 1, 3, 2, 4});
+  EXPECT_EQ(q.low, 2);
+  EXPECT_EQ(q.median, 3);
+  EXPECT_EQ(q.high, 4);
+  EXPECT_EQ(QuartilesOf({1, 2}).median, 1.5);
+  EXPECT_EQ(QuartilesOf({}).median, 0);
+  const Moments m = MomentsOf(std::vector<double>{2, 4, 4, 4, 5, 5, 7, 9});
+  EXPECT_EQ(m.mean, 5);
+  EXPECT_NEAR(m.deviation, std::sqrt(32.0 / 7), 1e-15);
+}
+
+}  // namespace
+}  // namespace upswing

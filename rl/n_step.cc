@@ -1,0 +1,57 @@
+#include "rl/n_step.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace upswing {
+
+NStep::NStep(int num_envs, int n, double gamma, int obs_size)
+    : n_(static_cast<size_t>(n)),
+      obs_size_(static_cast<size_t>(obs_size)),
+      gamma_(gamma),
+      count_(static_cast<size_t>(num_envs)),
+      obs_(count_.size() * n_ * obs_size_),
+      action_(count_.size() * n_),
+      reward_(count_.size() * n_) {}
+
+void NStep::Push(int env, std::span<const float> obs, int action, double reward,
+                 std::span<const float> next_obs, bool terminated, bool truncated,
+                 const std::function<void(const Transition&)>& emit) {
+  const auto e = static_cast<size_t>(env);
+  const auto waiting_obs = std::span(obs_).subspan(e * n_ * obs_size_, n_ * obs_size_);
+  const auto waiting_action = std::span(action_).subspan(e * n_, n_);
+  const auto waiting_reward = std::span(reward_).subspan(e * n_, n_);
+
+  const auto last = static_cast<size_t>(count_[e]++);
+  std::ranges::copy(obs, waiting_obs.begin() + static_cast<ptrdiff_t>(last * obs_size_));
+  waiting_action[last] = action;
+  waiting_reward[last] = reward;
+
+  // A full window emits its oldest step; the end of an episode emits all that wait.
+  const bool done = terminated || truncated;
+  auto k = static_cast<size_t>(count_[e]);
+  size_t first = 0;
+  for (; k == n_ || (done && k > 0); --k, ++first) {
+    double sum = 0;
+    for (size_t i = k; i-- > 0;) sum = waiting_reward[first + i] + gamma_ * sum;
+    const double discount = terminated ? 0.0 : std::pow(gamma_, static_cast<double>(k));
+    emit({waiting_obs.subspan(first * obs_size_, obs_size_), next_obs,
+          static_cast<int>(waiting_action[first]), static_cast<float>(sum),
+          static_cast<float>(discount)});
+  }
+
+  // What still waits moves to the front.
+  std::ranges::copy(waiting_obs.subspan(first * obs_size_), waiting_obs.begin());
+  std::ranges::copy(waiting_action.subspan(first), waiting_action.begin());
+  std::ranges::copy(waiting_reward.subspan(first), waiting_reward.begin());
+  count_[e] = static_cast<int64_t>(k);
+}
+
+void NStep::State(Archive archive) {
+  archive.Array("count", std::span(count_));
+  archive.Array("obs", std::span(obs_));
+  archive.Array("action", std::span(action_));
+  archive.Array("reward", std::span(reward_));
+}
+
+}  // namespace upswing

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "core/archive.h"
+#include "rl/replay.h"
+
+namespace upswing {
+
+/// Joins the steps of each environment into transitions over n steps (Sutton, 1988; Mnih et al.,
+/// 2016, Section 4). At the end of an episode the shorter tails are emitted too, each with the
+/// γᵏ of its true length k.
+class NStep {
+ public:
+  NStep(int num_envs, int n, double gamma, int obs_size);
+
+  /// Adds one step of environment `env` and hands every transition that it completes to `emit`.
+  void Push(int env, std::span<const float> obs, int action, double reward,
+            std::span<const float> next_obs, bool terminated, bool truncated,
+            const std::function<void(const Transition&)>& emit);
+
+  /// Saves or loads the steps that wait for their successors.
+  void State(Archive archive);
+
+ private:
+  size_t n_, obs_size_;
+  double gamma_;
+  // The waiting steps of each environment, oldest first.
+  std::vector<int64_t> count_;   // (N)
+  std::vector<float> obs_;       // (N × n × D)
+  std::vector<int64_t> action_;  // (N × n)
+  std::vector<double> reward_;   // (N × n)
+};
+
+}  // namespace upswing

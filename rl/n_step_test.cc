@@ -1,0 +1,93 @@
+#include "rl/n_step.h"
+
+#include <gtest/gtest.h>
+
+#include "core/temp_folder.h"
+
+namespace upswing {
+namespace {
+
+/// What was emitted, copied.
+struct Emitted {
+  float obs, next_obs;
+  int action;
+  float reward, discount;
+  bool operator==(const Emitted&) const = default;
+};
+
+/// Pushes step i of an environment: observation 10·env + i, action i, reward 2^i, next i + 1.
+void PushStep(NStep& n_step, int env, int i, bool terminated, bool truncated,
+              std::vector<Emitted>& out) {
+  const float obs = static_cast<float>(10 * env + i);
+  const float next = obs + 1;
+  n_step.Push(env, std::span(&obs, 1), i, static_cast<double>(1 << i), std::span(&next, 1),
+              terminated, truncated, [&](const Transition& t) {
+                out.push_back({t.obs[0], t.next_obs[0], t.action, t.reward, t.discount});
+              });
+}
+
+TEST(NStep, OneStepPassesThrough) {
+  NStep n_step(1, 1, 0.5, 1);
+  std::vector<Emitted> out;
+  PushStep(n_step, 0, 0, false, false, out);
+  PushStep(n_step, 0, 1, false, true, out);
+  PushStep(n_step, 0, 2, true, false, out);
+  EXPECT_EQ(out, (std::vector<Emitted>{{0, 1, 0, 1, 0.5F}, {1, 2, 1, 2, 0.5F}, {2, 3, 2, 4, 0}}));
+}
+
+TEST(NStep, ThreeStepsWithTheirTailsAtATruncation) {
+  // γ = 0.5, rewards 1, 2, 4, 8. Full windows: 1 + 2/2 + 4/4 = 3 and 2 + 4/2 + 8/4 = 6, both with
+  // γ³. Tails: 4 + 8/2 = 8 with γ², 8 with γ; all bootstrap from the last observation.
+  NStep n_step(1, 3, 0.5, 1);
+  std::vector<Emitted> out;
+  for (int i = 0; i < 3; ++i) PushStep(n_step, 0, i, false, false, out);
+  EXPECT_EQ(out, (std::vector<Emitted>{{0, 3, 0, 3, 0.125F}}));
+  PushStep(n_step, 0, 3, false, true, out);
+  EXPECT_EQ(
+      out,
+      (std::vector<Emitted>{
+          {0, 3, 0, 3, 0.125F}, {1, 4, 1, 6, 0.125F}, {2, 4, 2, 8, 0.25F}, {3, 4, 3, 8, 0.5F}}));
+}
+
+TEST(NStep, ATerminationBootstrapsFromNothing) {
+  NStep n_step(1, 3, 0.5, 1);
+  std::vector<Emitted> out;
+  PushStep(n_step, 0, 0, false, false, out);
+  PushStep(n_step, 0, 1, true, false, out);
+  EXPECT_EQ(out, (std::vector<Emitted>{{0, 2, 0, 2, 0}, {1, 2, 1, 2, 0}}));
+}
+
+TEST(NStep, EpisodesAndEnvironmentsDoNotMix) {
+  NStep n_step(2, 2, 0.5, 1);
+  std::vector<Emitted> out;
+  PushStep(n_step, 0, 0, false, false, out);
+  PushStep(n_step, 1, 0, false, false, out);
+  EXPECT_TRUE(out.empty());
+  PushStep(n_step, 0, 1, false, true, out);  // ends environment 0: a window and a tail
+  EXPECT_EQ(out.size(), 2U);
+  PushStep(n_step, 0, 2, false, false, out);  // a new episode waits for its second step
+  EXPECT_EQ(out.size(), 2U);
+  PushStep(n_step, 1, 1, false, false, out);
+  EXPECT_EQ(out.back(), (Emitted{10, 12, 0, 2, 0.25F}));
+}
+
+TEST(NStep, LoadedGoesOnLikeSaved) {
+  NStep saved(2, 3, 0.9, 1), loaded(2, 3, 0.9, 1);
+  std::vector<Emitted> a, b;
+  for (int i = 0; i < 4; ++i) PushStep(saved, i % 2, i, false, false, a);
+  TensorFile file;
+  saved.State(Archive::Saver(file));
+  const TempFolder folder;
+  const auto path = folder / "state.safetensors";
+  file.Save(path);
+  const TensorFile source = TensorFile::Load(path);
+  loaded.State(Archive::Loader(source));
+  a.clear();
+  PushStep(saved, 1, 5, false, true, a);
+  PushStep(loaded, 1, 5, false, true, b);
+  EXPECT_EQ(a, b);
+  EXPECT_EQ(a.size(), 3U);
+}
+
+}  // namespace
+}  // namespace upswing

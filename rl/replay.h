@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/aligned.h"
+#include "core/archive.h"
+#include "core/matrix.h"
+#include "core/rng.h"
+
+namespace upswing {
+
+/// A transition over one or more steps, ready to learn from: y = reward + discount · V(next_obs).
+struct Transition {
+  std::span<const float> obs;       // (D)
+  std::span<const float> next_obs;  // (D)
+  int action = 0;
+  float reward = 0;    // Σ γᵏ r over its steps
+  float discount = 0;  // γ to the number of steps; 0 if the last one terminated
+};
+
+/// A minibatch, gathered: row i of each array is one transition.
+struct Minibatch {
+  AlignedVector<float> obs, next_obs;     // (B × D)
+  std::vector<int> action;                // (B)
+  AlignedVector<float> reward, discount;  // (B)
+
+  Minibatch(int size, int obs_size);
+};
+
+/// Replay memory of the newest `capacity` transitions (Lin, 1992). One row of 2 D + 3 floats holds
+/// a whole transition, so that sampling one touches one place in memory; a million of ours take
+/// 76 MB. Memory is taken as it fills.
+class Replay {
+ public:
+  Replay(int64_t capacity, int obs_size);
+
+  int64_t size() const { return static_cast<int64_t>(rows_.size() / row_size()); }
+  int64_t capacity() const { return capacity_; }
+
+  /// Adds a transition; when full, in place of the oldest.
+  void Add(const Transition& transition);
+
+  /// Draws as many as the minibatch holds, uniformly and with replacement. Not for an empty memory.
+  void Sample(Rng& rng, Minibatch& batch) const;
+
+  /// The transition at a place below size().
+  Transition at(int64_t index) const;
+
+  /// Saves or loads what is stored.
+  void State(Archive archive);
+
+ private:
+  size_t row_size() const { return 2 * obs_size_ + 3; }
+
+  int64_t capacity_;
+  size_t obs_size_;
+  int64_t next_ = 0;         // where the next one goes
+  std::vector<float> rows_;  // (size × row_size): obs, next_obs, action, reward, discount
+};
+
+}  // namespace upswing

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "core/file.h"
+#include "core/tensor_file.h"
+#include "rl/event_file.h"
+
+namespace upswing {
+
+/// A row of a table: column names and values in their order. The first column is the step.
+using Row = std::vector<std::pair<std::string, double>>;
+
+/// A run on disk:
+///   config.toml             every setting; `train --config` runs it again
+///   metrics.csv             a row for each log interval
+///   episodes.csv            a row for each training episode
+///   evals.csv               a row for each evaluation
+///   events.out.tfevents.*   metrics and evaluations for TensorBoard
+///   checkpoint.safetensors  the whole state
+///   policy.safetensors      the best policy at evaluation
+///   log.txt                 what happened when
+/// The sizes of the tables are part of the checkpoint; opening a run cuts the tables back to them,
+/// so that what a killed run wrote after its checkpoint is not there twice.
+class RunFolder {
+ public:
+  /// Makes the folder with these files in it (name, text); `first_checkpoint` adds to the first
+  /// checkpoint what the run itself does not know. The folder appears under its name whole or not
+  /// at all. Throws BadInput if something is there already, Failure if it cannot be written.
+  static void Create(const std::filesystem::path& path,
+                     const std::vector<std::pair<std::string, std::string>>& files,
+                     const std::function<void(TensorFile&)>& first_checkpoint);
+
+  /// Opens a run whose checkpoint has been loaded. Throws BadInput or Failure.
+  RunFolder(std::filesystem::path path, const TensorFile& checkpoint);
+
+  const std::filesystem::path& path() const { return path_; }
+  std::filesystem::path policy_path() const { return path_ / "policy.safetensors"; }
+  static std::filesystem::path CheckpointPath(const std::filesystem::path& run) {
+    return run / "checkpoint.safetensors";
+  }
+
+  void LogMetrics(const Row& row) { AppendRow(metrics_, row); }
+  void LogEpisode(const Row& row) { AppendRow(episodes_, row); }
+  void LogEvaluation(const Row& row) { AppendRow(evals_, row); }
+  /// A line with date and time in log.txt.
+  void Log(std::string_view line);
+
+  /// Adds the tables' sizes to a checkpoint and writes it in place of the last one.
+  void SaveCheckpoint(TensorFile& checkpoint) const;
+
+ private:
+  struct Table {
+    std::string tag;  // prefix of its columns in TensorBoard; empty: not there
+    AppendFile file;
+  };
+  Table OpenTable(std::string_view name, std::string tag, const TensorFile& checkpoint) const;
+  void AppendRow(Table& table, const Row& row);
+
+  std::filesystem::path path_;
+  Table metrics_, episodes_, evals_;
+  EventFile events_;
+  AppendFile log_;
+};
+
+}  // namespace upswing

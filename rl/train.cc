@@ -1,0 +1,246 @@
+#include "rl/train.h"
+
+#include <algorithm>
+#include <chrono>
+#include <numeric>
+
+#include "core/error.h"
+#include "core/text.h"
+
+namespace upswing {
+namespace {
+
+constexpr size_t kRecentEpisodes = 100;  // in the mean return that the progress line shows
+
+/// Seconds since the last call.
+class Stopwatch {
+ public:
+  double Lap() {
+    const auto now = Clock::now();
+    return std::chrono::duration<double>(now - std::exchange(last_, now)).count();
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point last_ = Clock::now();
+};
+
+/// Adds a lock-step to the running episodes and logs those that it finished.
+void CountEpisodes(const StepResult& result, const std::vector<std::string>& term_names,
+                   TrainState& s, RunFolder& run) {
+  const size_t terms = term_names.size();
+  for (size_t env = 0; env < s.episode_return.size(); ++env) {
+    const auto sums = std::span(s.episode_terms).subspan(env * terms, terms);
+    s.episode_return[env] += result.reward[env];
+    ++s.episode_length[env];
+    for (size_t k = 0; k < terms; ++k) sums[k] += result.reward_terms[env * terms + k];
+    if (!result.done(env)) continue;
+
+    ++s.episodes;
+    Row row{{"step", s.steps},
+            {"episode", s.episodes},
+            {"return", s.episode_return[env]},
+            {"length", s.episode_length[env]},
+            {"terminated", result.terminated[env]}};
+    for (size_t k = 0; k < terms; ++k) row.emplace_back(term_names[k], sums[k]);
+    run.LogEpisode(row);
+    if (s.recent_returns.size() == kRecentEpisodes)
+      s.recent_returns.erase(s.recent_returns.begin());
+    s.recent_returns.push_back(s.episode_return[env]);
+    s.episode_return[env] = 0;
+    s.episode_length[env] = 0;
+    std::ranges::fill(sums, 0.0);
+  }
+}
+
+void LogMetrics(Training& t, const TrainState& s) {
+  const AgentReport report = t.agent.Report();
+  t.agent.BeginReport();
+  t.run.LogMetrics({{"step", s.steps},
+                    {"episodes", s.episodes},
+                    {"updates", report.updates},
+                    {"epsilon", report.epsilon},
+                    {"learning_rate", report.learning_rate},
+                    {"loss", report.loss},
+                    {"q", report.q},
+                    {"td_error", report.td_error},
+                    {"gradient_norm", report.gradient_norm},
+                    {"mean_return", s.mean_return()},
+                    {"success_rate", s.last_success_rate},
+                    {"seconds", s.seconds}});
+  if (t.on_metrics) t.on_metrics(s, report);
+}
+
+/// Judges the present policy, keeps it if it is the best so far, and sees whether the task is
+/// solved: nothing but successes in two evaluations in a row.
+void JudgePolicy(Training& t, TrainState& s) {
+  std::map<std::string, std::string> about = t.about;
+  about["step"] = std::to_string(s.steps);
+  Policy policy = t.agent.ExportPolicy(about);
+  const Evaluation e = t.evaluate(policy, static_cast<uint64_t>(s.steps));
+  s.evaluated_at = s.steps;
+  s.last_success_rate = e.success_rate();
+
+  const double rate = e.success_rate();
+  const double mean_return = e.reward_sum.mean;
+  if (std::pair(rate, mean_return) > std::pair(s.best_success_rate, s.best_return)) {
+    s.best_success_rate = rate;
+    s.best_return = mean_return;
+    s.best_step = s.steps;
+    about["success_rate"] = FormatNumber(rate);
+    about["mean_return"] = FormatNumber(mean_return);
+    t.agent.ExportPolicy(about).Save(t.run.policy_path());
+  }
+
+  if (!e.all_succeeded()) {
+    s.full_successes = 0;
+  } else if (++s.full_successes == 1 && !s.solved) {
+    s.first_full_step = s.steps;
+    s.first_full_seconds = s.seconds;
+  }
+  s.solved = s.solved || s.full_successes >= 2;
+
+  t.run.LogEvaluation({{"step", s.steps},
+                       {"success_rate", rate},
+                       {"success_low", e.success_interval.low},
+                       {"success_high", e.success_interval.high},
+                       {"mean_return", mean_return},
+                       {"swing_up_seconds", e.swing_up_seconds.median},
+                       {"work", e.work.mean},
+                       {"rms_torque", e.rms_torque.mean},
+                       {"seconds", s.seconds}});
+  t.run.Log(Concat("step ", s.steps, ": ", e.successes, " of ", e.episodes,
+                   " episodes succeed, mean return ", FormatNumber(mean_return)));
+  if (t.on_evaluation) t.on_evaluation(s, e);
+}
+
+void SaveCheckpoint(Training& t, TrainState& s) {
+  s.checkpoint_at = s.steps;
+  TensorFile checkpoint;
+  checkpoint.metadata = t.checkpoint_metadata;
+  AddToCheckpoint(t.agent, t.env, s, checkpoint);
+  t.run.SaveCheckpoint(checkpoint);
+}
+
+/// The loop itself; see Train.
+bool RunLoop(Training& t, TrainState& s) {
+  const TrainConfig& config = t.config;
+  const std::vector<std::string> term_names = t.env.reward_term_names();
+  StepResult result = t.env.MakeResult();
+  std::vector<double> torque(static_cast<size_t>(t.env.num_envs()));
+  Stopwatch watch;
+
+  while (s.steps < config.steps && !(s.solved && config.stop_when_solved)) {
+    // One lock-step of all environments, and what can be learned from it.
+    t.env.SetStartNoise(config.StartNoise(s.steps));
+    t.agent.Act(t.env.obs(), torque);
+    t.env.Step(torque, result);
+    t.agent.Observe(result);
+    t.agent.Learn();
+    const int64_t before = s.steps;
+    s.steps += t.env.num_envs();
+    s.seconds += watch.Lap();
+
+    // Whatever falls due: a multiple of its interval has been reached or passed.
+    const auto due = [&](int64_t every) { return s.steps / every != before / every; };
+    CountEpisodes(result, term_names, s, t.run);
+    if (due(config.log_every)) LogMetrics(t, s);
+    if (due(config.eval_every) || s.steps >= config.steps) {
+      JudgePolicy(t, s);
+      watch.Lap();  // evaluations are not training
+    }
+    if (t.on_step) t.on_step(s);
+    const TrainRequest request = t.poll ? t.poll() : TrainRequest::kGoOn;
+    if (due(config.checkpoint_every) || request != TrainRequest::kGoOn) SaveCheckpoint(t, s);
+    if (request == TrainRequest::kStop) return false;
+  }
+  if (s.checkpoint_at != s.steps) SaveCheckpoint(t, s);
+  return true;
+}
+
+}  // namespace
+
+void TrainConfig::Describe(Options& o) {
+  constexpr Range kCount{1, 1e12};
+  o.Section("train");
+  o.Add(&seed, "seed", 1, {0, 9e15}, "", "of every random stream");
+  o.Add(&steps, "steps", 1000000, kCount, "steps", "train for at most this many").identity = false;
+  o.Add(&envs, "envs", 8, {1, 4096}, "", "environments in lock-step");
+  o.Add(&stop_when_solved, "stop_when_solved", true,
+        "stop once all episodes of two evaluations in a row succeed")
+      .identity = false;
+  o.Add(&eval_every, "eval_every", 10000, kCount, "steps", "between evaluations");
+  o.Add(&eval_episodes, "eval_episodes", 100, {1, 100000}, "", "episodes of an evaluation");
+  o.Add(&log_every, "log_every", 2000, kCount, "steps", "between rows of metrics.csv");
+  o.Add(&checkpoint_every, "checkpoint_every", 50000, kCount, "steps", "between checkpoints")
+      .identity = false;
+  o.Add(&threads, "threads", 0, {0, 256}, "", "0: one for each processor").identity = false;
+  o.Add(&start_noise, "start_noise", 0.1, {0, 10}, "rad, rad/s",
+        "standard deviation of the start states around hanging");
+  o.Add(&start_noise_end, "start_noise_end", 0.1, {0, 10}, "rad, rad/s", "at the curriculum's end");
+  o.Add(&curriculum_steps, "curriculum_steps", 200000, kCount, "steps",
+        "over which the noise changes linearly");
+}
+
+double TrainConfig::StartNoise(int64_t step) const {
+  const double progress =
+      std::min(1.0, static_cast<double>(step) / static_cast<double>(curriculum_steps));
+  return start_noise + progress * (start_noise_end - start_noise);
+}
+
+TrainState::TrainState(int num_envs, int num_terms)
+    : episode_return(static_cast<size_t>(num_envs)),
+      episode_terms(static_cast<size_t>(num_envs) * static_cast<size_t>(num_terms)),
+      episode_length(static_cast<size_t>(num_envs)) {}
+
+double TrainState::mean_return() const {
+  if (recent_returns.empty()) return 0;
+  return std::accumulate(recent_returns.begin(), recent_returns.end(), 0.0) /
+         static_cast<double>(recent_returns.size());
+}
+
+void TrainState::State(Archive archive) {
+  archive.Scalar("steps", steps);
+  archive.Scalar("episodes", episodes);
+  archive.Scalar("seconds", seconds);
+  archive.Scalar("evaluated_at", evaluated_at);
+  archive.Scalar("checkpoint_at", checkpoint_at);
+  archive.Scalar("full_successes", full_successes);
+  archive.Scalar("first_full_step", first_full_step);
+  archive.Scalar("first_full_seconds", first_full_seconds);
+  archive.Scalar("solved", solved);
+  archive.Scalar("last_success_rate", last_success_rate);
+  archive.Scalar("best_success_rate", best_success_rate);
+  archive.Scalar("best_return", best_return);
+  archive.Scalar("best_step", best_step);
+  archive.Array("episode_return", std::span(episode_return));
+  archive.Array("episode_terms", std::span(episode_terms));
+  archive.Array("episode_length", std::span(episode_length));
+  archive.Vector("recent_returns", recent_returns, kRecentEpisodes);
+}
+
+void AddToCheckpoint(Agent& agent, VectorEnv& env, TrainState& state, TensorFile& checkpoint) {
+  const Archive archive = Archive::Saver(checkpoint);
+  agent.State(archive.In("agent"));
+  env.State(archive.In("env"));
+  state.State(archive.In("train"));
+}
+
+void LoadCheckpoint(Agent& agent, VectorEnv& env, TrainState& state, const TensorFile& checkpoint) {
+  const Archive archive = Archive::Loader(checkpoint);
+  agent.State(archive.In("agent"));
+  env.State(archive.In("env"));
+  state.State(archive.In("train"));
+}
+
+bool Train(Training& training, TrainState& state) {
+  try {
+    return RunLoop(training, state);
+  } catch (const Error& error) {
+    throw Failure(Concat("training stopped at step ", state.steps, ": ", error.what(),
+                         "; the checkpoint of step ", state.checkpoint_at, " is kept in ",
+                         training.run.path().string()));
+  }
+}
+
+}  // namespace upswing

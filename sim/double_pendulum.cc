@@ -1,0 +1,117 @@
+#include "sim/double_pendulum.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/text.h"
+
+namespace upswing {
+
+void Plant::Describe(Options& o) {
+  constexpr Range kMass{0.01, 100}, kLength{0.1, 10}, kDamping{0, 100};
+  o.Section("plant");
+  o.Add(&mass1, "mass1", 1.0, kMass, "kg", "mass of link 1");
+  o.Add(&mass2, "mass2", 1.0, kMass, "kg", "mass of link 2");
+  o.Add(&length1, "length1", 0.5, kLength, "m", "length of link 1");
+  o.Add(&length2, "length2", 0.5, kLength, "m", "length of link 2");
+  o.Add(&damping1, "damping1", 0.2, kDamping, "N·m·s/rad", "damping of joint 1");
+  o.Add(&damping2, "damping2", 0.2, kDamping, "N·m·s/rad", "damping of joint 2");
+  o.Add(&gravity, "gravity", 9.81, {0.01, 100}, "m/s²", "gravity, downwards");
+  o.Add(&torque_limit, "torque_limit", 5.0, {0.01, 1000}, "N·m", "largest torque of the motor");
+  o.Alias("mass", {"mass1", "mass2"});
+  o.Alias("length", {"length1", "length2"});
+  o.Alias("damping", {"damping1", "damping2"});
+}
+
+void RewardWeights::Describe(Options& o) {
+  constexpr Range kWeight{0, 1000};
+  auto& [energy, height, balance, velocity, torque] = weight;
+  o.Section("reward");
+  o.Add(&energy, "energy_weight", 1, kWeight, "", "weight of the energy term");
+  o.Add(&height, "height_weight", 1, kWeight, "", "weight of the height term");
+  o.Add(&balance, "balance_weight", 1, kWeight, "", "weight of the balance term");
+  o.Add(&velocity, "velocity_weight", 1, kWeight, "", "weight of the velocity penalty");
+  o.Add(&torque, "torque_weight", 1, kWeight, "", "weight of the torque penalty");
+}
+
+double Energy(const Plant& plant, const PendulumState& s) {
+  const auto& [m1, m2, l1, l2, d1, d2, g, limit] = plant;
+  const double I1 = m1 * l1 * l1 / 12;
+  const double I2 = m2 * l2 * l2 / 12;
+  const double w12 = s.w1 + s.w2;  // absolute velocity of link 2
+  const double potential = -m1 * g * (l1 / 2) * std::cos(s.q1) -
+                           m2 * g * (l1 * std::cos(s.q1) + (l2 / 2) * std::cos(s.q1 + s.q2));
+  const double v1_squared = (l1 / 2) * (l1 / 2) * s.w1 * s.w1;  // of link 1's centre
+  const double v2_squared = l1 * l1 * s.w1 * s.w1 + (l2 / 2) * (l2 / 2) * w12 * w12 +
+                            l1 * l2 * std::cos(s.q2) * s.w1 * w12;  // of link 2's centre
+  const double kinetic =
+      0.5 * (I1 * s.w1 * s.w1 + I2 * w12 * w12 + m1 * v1_squared + m2 * v2_squared);
+  return kinetic + potential;
+}
+
+double EnergyTarget(const Plant& plant) {
+  return plant.mass1 * plant.gravity * plant.length1 / 2 +
+         plant.mass2 * plant.gravity * (plant.length1 + plant.length2 / 2);
+}
+
+double NormalizedEnergy(const Plant& plant, const PendulumState& s) {
+  const double target = EnergyTarget(plant);
+  return (Energy(plant, s) + target) / (2 * target);
+}
+
+double TipHeight(const Plant& plant, const PendulumState& s) {
+  return -plant.length1 * std::cos(s.q1) - plant.length2 * std::cos(s.q1 + s.q2);
+}
+
+bool Inverted(const PendulumState& s) {
+  constexpr double kCos30 = std::numbers::sqrt3 / 2;
+  return -std::cos(s.q1) >= kCos30 && -std::cos(s.q1 + s.q2) >= kCos30;
+}
+
+std::array<float, kObservationSize> Observe(const Plant& plant, const PendulumState& s) {
+  const double height = TipHeight(plant, s) / (plant.length1 + plant.length2);
+  const std::array<double, kObservationSize> obs{
+      std::cos(s.q1), std::sin(s.q1),       s.w1 / kMaxVelocity1,       std::cos(s.q2),
+      std::sin(s.q2), s.w2 / kMaxVelocity2, NormalizedEnergy(plant, s), height};
+  std::array<float, kObservationSize> result;
+  std::transform(obs.begin(), obs.end(), result.begin(),
+                 [](double x) { return static_cast<float>(x); });
+  return result;
+}
+
+std::array<double, kRewardTerms> RewardTerms(const Plant& plant, const PendulumState& s,
+                                             double tau) {
+  const bool inverted = Inverted(s);
+  const double height = TipHeight(plant, s) / (plant.length1 + plant.length2);
+  return {
+      std::clamp(NormalizedEnergy(plant, s), 0.0, 1.5),
+      (height + 1) / 2,
+      inverted ? 5.0 : 0.0,
+      inverted ? -0.01 * (s.w1 * s.w1 + s.w2 * s.w2) : 0.0,
+      (inverted ? -0.05 : -0.01) * tau * tau,
+  };
+}
+
+std::string Mjcf(const Plant& plant) {
+  const auto& [m1, m2, l1, l2, d1, d2, g, limit] = plant;
+  const auto link = [](int i, double z, double mass, double length, double damping) {
+    return Concat("<body name=\"link", i, "\" pos=\"0 0 ", FormatNumber(z), "\">\n",
+                  "  <joint name=\"joint", i, "\" type=\"hinge\" axis=\"0 1 0\" damping=\"",
+                  FormatNumber(damping), "\" armature=\"0.01\"/>\n",
+                  "  <geom type=\"capsule\" size=\"0.04\" fromto=\"0 0 0 0 0 ",
+                  FormatNumber(-length), "\" mass=\"", FormatNumber(mass), "\"/>\n");
+  };
+  // Nothing touches and nothing is constrained: without these stages a step takes less time and
+  // the trajectory is the same.
+  return Concat("<mujoco model=\"double_pendulum\">\n", "<option gravity=\"0 0 ", FormatNumber(-g),
+                "\" timestep=\"0.005\"", " integrator=\"RK4\">\n",
+                "  <flag contact=\"disable\" constraint=\"disable\"/>\n",
+                "</option>\n<worldbody>\n", link(1, 0, m1, l1, d1), link(2, -l1, m2, l2, d2),
+                "</body>\n</body>\n</worldbody>\n<actuator>\n",
+                "  <motor name=\"torque1\" joint=\"joint1\" ctrllimited=\"true\" ctrlrange=\"",
+                FormatNumber(-limit), " ", FormatNumber(limit), "\"/>\n",
+                "</actuator>\n</mujoco>\n");
+}
+
+}  // namespace upswing

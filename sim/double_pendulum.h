@@ -1,0 +1,84 @@
+#pragma once
+
+#include <array>
+#include <string>
+
+#include "core/options.h"
+
+/// The double pendulum and its task as formulas, without a simulator.
+///
+/// Symbols: q1, q2 joint angles (rad; both 0 hanging, q2 relative to link 1), w1, w2 their
+/// velocities (rad/s), m mass (kg), l length (m), g gravity (m/s²), tau torque at joint 1 (N·m).
+namespace upswing {
+
+/// What can be set at run time. The capsules keep their radius; inertia and centre of mass follow
+/// mass and length.
+struct Plant {
+  double mass1, mass2;        // kg
+  double length1, length2;    // m
+  double damping1, damping2;  // N·m·s/rad
+  double gravity;             // m/s², along -z
+  double torque_limit;        // N·m
+
+  Plant() { SetDefaults(*this); }
+  /// One line per setting: name, default, range, unit, help.
+  void Describe(Options& options);
+};
+
+/// State of the two joints.
+struct PendulumState {
+  double q1 = 0, q2 = 0;  // rad
+  double w1 = 0, w2 = 0;  // rad/s
+};
+
+/// Mechanical energy (J), with thin-rod inertias m l²/12 and heights counted from the pivot.
+double Energy(const Plant& plant, const PendulumState& s);
+
+/// Energy at rest upright (J); hanging at rest it is the negative of this.
+double EnergyTarget(const Plant& plant);
+
+/// Energy mapped so that hanging at rest is 0 and upright at rest is 1.
+double NormalizedEnergy(const Plant& plant, const PendulumState& s);
+
+/// Height of the second link's tip over the pivot (m).
+double TipHeight(const Plant& plant, const PendulumState& s);
+
+/// Both links within 30° of straight up; the second by its absolute angle q1 + q2.
+bool Inverted(const PendulumState& s);
+
+inline constexpr int kObservationSize = 8;
+/// Heuristic largest velocities (rad/s), by which the observation divides: swinging up from
+/// hanging stays well within them, so that all inputs are of a size.
+inline constexpr double kMaxVelocity1 = 10.0;
+inline constexpr double kMaxVelocity2 = 20.0;
+
+/// [cos q1, sin q1, w1/kMaxVelocity1, cos q2, sin q2, w2/kMaxVelocity2, Ê, ĥ] with Ê =
+/// NormalizedEnergy and ĥ = TipHeight over l1 + l2, in [-1, 1].
+std::array<float, kObservationSize> Observe(const Plant& plant, const PendulumState& s);
+
+inline constexpr int kRewardTerms = 5;
+inline constexpr std::array<const char*, kRewardTerms> kRewardTermNames{
+    "energy", "height", "balance", "velocity_penalty", "torque_penalty"};
+
+/// The reward's terms for being in state s under torque tau (N·m), before weighting and signed,
+/// so that their sum is the reward:
+///   energy   clip(Ê, 0, 1.5)
+///   height   (ĥ + 1) / 2
+///   balance  5 when inverted
+///   velocity -0.01 (w1² + w2²) when inverted
+///   torque   -0.05 tau² when inverted, -0.01 tau² otherwise
+std::array<double, kRewardTerms> RewardTerms(const Plant& plant, const PendulumState& s,
+                                             double tau);
+
+/// A weight for each term of the reward; 0 leaves it out.
+struct RewardWeights {
+  std::array<double, kRewardTerms> weight;
+
+  RewardWeights() { SetDefaults(*this); }
+  void Describe(Options& options);
+};
+
+/// The model as MJCF, with the plant's numbers to the last digit.
+std::string Mjcf(const Plant& plant);
+
+}  // namespace upswing

@@ -1,0 +1,114 @@
+#include "sim/model.h"
+
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "core/error.h"
+#include "core/text.h"
+
+namespace upswing {
+namespace {
+
+/// Principal moments of inertia (kg·m²) of a solid capsule: mass m, radius r, cylinder length l.
+struct CapsuleInertia {
+  double across, along;
+
+  CapsuleInertia(double m, double r, double l) {
+    // The mass is shared out by volume between the cylinder and the two half spheres.
+    const double cylinder = std::numbers::pi * r * r * l;
+    const double sphere = 4.0 / 3.0 * std::numbers::pi * r * r * r;
+    const double mc = m * cylinder / (cylinder + sphere);
+    const double ms = m - mc;
+    across = mc * (3 * r * r + l * l) / 12 + ms * (2 * r * r / 5 + l * l / 4 + 3 * l * r / 8);
+    along = mc * r * r / 2 + ms * 2 * r * r / 5;
+  }
+};
+
+constexpr int kLinkBodies[2] = {1, 2};  // body 0 is the world
+
+}  // namespace
+
+ModelPtr CompileModel(const std::string& mjcf, const std::string& where) {
+  // MuJoCo would print its warnings and log them to a file in the current folder.
+  mju_user_warning = [](const char*) {};
+  std::array<char, 1000> message{};
+  const std::unique_ptr<mjSpec, MuJoCoDeleter> spec(
+      mj_parseXMLString(mjcf.c_str(), nullptr, message.data(), message.size()));
+  if (spec == nullptr) throw BadInput(Concat(where, ": ", message.data()));
+  ModelPtr model(mj_compile(spec.get(), nullptr));
+  if (model == nullptr) throw BadInput(Concat(where, ": ", mjs_getError(spec.get())));
+  return model;
+}
+
+void CheckModel(const mjModel& model, const std::string& where) {
+  const auto expect = [&](bool valid, std::string_view expected) {
+    if (!valid) throw BadInput(Concat(where, ": not a double pendulum: expected ", expected));
+  };
+  expect(model.nbody == 3 && model.body_parentid[2] == 1, "two bodies, the second on the first");
+  expect(model.njnt == 2 && model.jnt_type[0] == mjJNT_HINGE && model.jnt_type[1] == mjJNT_HINGE &&
+             model.jnt_bodyid[0] == 1 && model.jnt_bodyid[1] == 2,
+         "a hinge for each body");
+  expect(std::abs(model.jnt_axis[1] - 1) < 1e-9 && std::abs(model.jnt_axis[4] - 1) < 1e-9,
+         "hinges about +y");
+  expect(model.ngeom == 2 && model.geom_type[0] == mjGEOM_CAPSULE &&
+             model.geom_type[1] == mjGEOM_CAPSULE && model.geom_bodyid[0] == 1 &&
+             model.geom_bodyid[1] == 2,
+         "one capsule for each body");
+  expect(model.nu == 1 && model.actuator_trnid[0] == 0 && model.na == 0 &&
+             model.actuator_ctrllimited[0] != 0,
+         "one motor with a control range, on the first hinge");
+  for (const int body : kLinkBodies) {
+    const int geom = body - 1;
+    const mjtNum* from = model.geom_pos + 3 * geom;
+    expect(std::abs(from[2] + model.geom_size[3 * geom + 1]) < 1e-9 && from[0] == 0 && from[1] == 0,
+           "capsules along -z from their hinge");
+  }
+  expect(std::abs(model.body_pos[8] + PlantOf(model).length1) < 1e-9,
+         "the second link at the end of the first");
+}
+
+Plant PlantOf(const mjModel& model) {
+  Plant plant;
+  plant.mass1 = model.body_mass[1];
+  plant.mass2 = model.body_mass[2];
+  plant.length1 = 2 * model.geom_size[1];
+  plant.length2 = 2 * model.geom_size[4];
+  plant.damping1 = model.dof_damping[0];
+  plant.damping2 = model.dof_damping[1];
+  plant.gravity = -model.opt.gravity[2];
+  plant.torque_limit = model.actuator_ctrlrange[1];
+  return plant;
+}
+
+ModelFields FieldsOf(mjModel& model) {
+  return {model.body_mass,   model.body_inertia,       model.body_ipos,
+          model.body_pos,    model.geom_pos,           model.geom_size,
+          model.dof_damping, model.actuator_ctrlrange, model.opt.gravity};
+}
+
+void WritePlant(const Plant& plant, const ModelFields& fields) {
+  const std::array<double, 2> masses{plant.mass1, plant.mass2};
+  const std::array<double, 2> lengths{plant.length1, plant.length2};
+  for (const int body : kLinkBodies) {
+    const int geom = body - 1;
+    const double length = lengths[static_cast<size_t>(geom)];
+    const double mass = masses[static_cast<size_t>(geom)];
+    const CapsuleInertia inertia(mass, fields.geom_size[3 * geom], length);
+    fields.body_mass[body] = mass;
+    fields.body_inertia[3 * body] = inertia.across;
+    fields.body_inertia[3 * body + 1] = inertia.across;
+    fields.body_inertia[3 * body + 2] = inertia.along;
+    fields.body_ipos[3 * body + 2] = -length / 2;
+    fields.geom_pos[3 * geom + 2] = -length / 2;
+    fields.geom_size[3 * geom + 1] = length / 2;
+  }
+  fields.body_pos[3 * 2 + 2] = -plant.length1;
+  fields.dof_damping[0] = plant.damping1;
+  fields.dof_damping[1] = plant.damping2;
+  fields.actuator_ctrlrange[0] = -plant.torque_limit;
+  fields.actuator_ctrlrange[1] = plant.torque_limit;
+  fields.gravity[2] = -plant.gravity;
+}
+
+}  // namespace upswing

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <mujoco/mjbatch.h>
+#include <mujoco/mujoco.h>
+
+#include <memory>
+#include <string>
+
+#include "sim/double_pendulum.h"
+
+/// Handles of MuJoCo that free themselves, and the plant's numbers within a compiled model.
+namespace upswing {
+
+struct MuJoCoDeleter {
+  void operator()(mjModel* model) const { mj_deleteModel(model); }
+  void operator()(mjData* data) const { mj_deleteData(data); }
+  void operator()(mjSpec* spec) const { mj_deleteSpec(spec); }
+  void operator()(mjBatch* batch) const { mjb_deleteBatch(batch); }
+};
+using ModelPtr = std::unique_ptr<mjModel, MuJoCoDeleter>;
+using DataPtr = std::unique_ptr<mjData, MuJoCoDeleter>;
+using BatchPtr = std::unique_ptr<mjBatch, MuJoCoDeleter>;
+
+/// Compiles MJCF. Throws BadInput with MuJoCo's own message, after `where` (a file's name).
+ModelPtr CompileModel(const std::string& mjcf, const std::string& where);
+
+/// Throws BadInput unless the model is built like ours: two capsule links on hinges, one motor.
+void CheckModel(const mjModel& model, const std::string& where);
+
+/// The plant that a model like ours describes.
+Plant PlantOf(const mjModel& model);
+
+/// Where the numbers of one simulation's model live: in an mjModel, or in rows that a batch has
+/// expanded. The comments give sizes.
+struct ModelFields {
+  mjtNum* body_mass;           // (3)
+  mjtNum* body_inertia;        // (3 × 3)
+  mjtNum* body_ipos;           // (3 × 3)
+  mjtNum* body_pos;            // (3 × 3)
+  mjtNum* geom_pos;            // (2 × 3)
+  mjtNum* geom_size;           // (2 × 3)
+  mjtNum* dof_damping;         // (2)
+  mjtNum* actuator_ctrlrange;  // (1 × 2)
+  mjtNum* gravity;             // (3)
+};
+ModelFields FieldsOf(mjModel& model);
+
+/// Writes a plant into a model like ours, as if its MJCF had been written with it. mj_setConst or
+/// mjb_setConst must follow.
+void WritePlant(const Plant& plant, const ModelFields& fields);
+
+}  // namespace upswing

@@ -1,0 +1,191 @@
+#include "sim/pendulum_env.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/error.h"
+#include "core/temp_folder.h"
+
+namespace upswing {
+namespace {
+
+PendulumEnvConfig SmallConfig() {
+  PendulumEnvConfig config;
+  config.num_envs = 3;
+  config.episode_seconds = 0.1;  // five steps
+  config.seed = 4;
+  return config;
+}
+
+TEST(PendulumEnv, TruncatesWithTheTrueSuccessorAndThenResets) {
+  PendulumEnv env(SmallConfig());
+  // Another environment with the same start, which goes on beyond the fifth step.
+  PendulumEnvConfig longer = SmallConfig();
+  longer.episode_seconds = 1;
+  PendulumEnv reference(longer);
+  StepResult result = env.MakeResult(), expected = reference.MakeResult();
+  const std::vector<double> torque{1, -2, 3};
+  for (int step = 1; step <= 5; ++step) {
+    env.Step(torque, result);
+    reference.Step(torque, expected);
+    EXPECT_EQ(result.next_obs, expected.next_obs);
+    EXPECT_EQ(result.reward, expected.reward);
+    for (size_t i = 0; i < 3; ++i) {
+      EXPECT_EQ(result.truncated[i], step == 5);
+      EXPECT_EQ(result.terminated[i], 0);
+    }
+  }
+  // What to act on next is a fresh start, not the successor.
+  const auto next = std::span<const float>(result.next_obs);
+  EXPECT_FALSE(std::ranges::equal(env.obs().values(), next));
+  EXPECT_TRUE(std::ranges::equal(reference.obs().values(), next));
+  EXPECT_LT(std::abs(env.state(0).q1), 0.5);
+  env.Step(torque, result);
+  EXPECT_EQ(result.truncated[0], 0);
+}
+
+TEST(PendulumEnv, ABlowUpTerminatesWithFiniteNumbersAndStartsAnew) {
+  PendulumEnv env(SmallConfig());
+  StepResult result = env.MakeResult();
+  env.SetState(1, {0, 0, 1e200, 0});
+  env.Step(std::vector<double>{0, 0, 0}, result);
+  EXPECT_EQ(result.terminated[1], 1);
+  EXPECT_EQ(result.truncated[1], 0);
+  EXPECT_EQ(result.terminated[0] + result.terminated[2], 0);
+  for (const double reward : result.reward) EXPECT_TRUE(std::isfinite(reward));
+  EXPECT_LT(std::abs(env.state(1).w1), 1);
+  env.Step(std::vector<double>{0, 0, 0}, result);
+  EXPECT_EQ(result.terminated[1], 0);
+}
+
+TEST(PendulumEnv, RewardIsTheWeightedSumOfItsTermsAtTheSuccessor) {
+  PendulumEnvConfig config = SmallConfig();
+  config.weights.weight = {1, 0.5, 2, 3, 0};
+  PendulumEnv env(config);
+  StepResult result = env.MakeResult();
+  env.SetState(0, {std::numbers::pi, 0, 1, 1});
+  env.Step(std::vector<double>{7, 0, 0}, result);  // beyond the limit of 5
+  const auto terms = RewardTerms(env.plant(0), env.state(0), 5);
+  double sum = 0;
+  for (size_t k = 0; k < kRewardTerms; ++k) {
+    EXPECT_DOUBLE_EQ(result.reward_terms[k], config.weights.weight[k] * terms[k]);
+    sum += result.reward_terms[k];
+  }
+  EXPECT_DOUBLE_EQ(result.reward[0], sum);
+  EXPECT_EQ(result.at_goal[0], 1);
+  EXPECT_EQ(result.at_goal[1], 0);
+  EXPECT_DOUBLE_EQ(result.work[0], std::abs(5 * (env.state(0).q1 - std::numbers::pi)));
+}
+
+TEST(PendulumEnv, EveryEnvironmentCanHaveItsOwnPlant) {
+  Plant light, heavy;
+  heavy.mass2 = 2;
+  heavy.length1 = 0.7;
+  heavy.gravity = 5;
+  heavy.damping1 = 0.05;
+  heavy.torque_limit = 2;
+  PendulumEnvConfig both = SmallConfig();
+  both.num_envs = 2;
+  both.episode_seconds = 10;
+  both.plants = {light, heavy};
+  PendulumEnv mixed(both);
+  PendulumEnvConfig one = both;
+  one.num_envs = 1;
+  one.plants = {heavy};
+  PendulumEnv alone(one);
+  const PendulumState start{0.3, -0.2, 0.1, 0};
+  mixed.SetState(1, start);
+  alone.SetState(0, start);
+  StepResult mixed_result = mixed.MakeResult(), alone_result = alone.MakeResult();
+  for (int step = 0; step < 100; ++step) {
+    const double torque = 5 * std::sin(0.1 * step);
+    mixed.Step(std::vector<double>{torque, torque}, mixed_result);
+    alone.Step(std::vector<double>{torque}, alone_result);
+    ASSERT_EQ(mixed.state(1).q1, alone.state(0).q1);
+    ASSERT_EQ(mixed.state(1).w2, alone.state(0).w2);
+    ASSERT_EQ(mixed_result.reward[1], alone_result.reward[0]);
+  }
+  EXPECT_NE(mixed.state(0).q1, mixed.state(1).q1);
+}
+
+TEST(PendulumEnv, TheNumberOfThreadsChangesNoBit) {
+  PendulumEnvConfig config = SmallConfig();
+  config.num_envs = 17;
+  PendulumEnv one(config);
+  config.threads = 3;
+  PendulumEnv three(config);
+  StepResult a = one.MakeResult(), b = three.MakeResult();
+  std::vector<double> torque(17);
+  for (int step = 0; step < 50; ++step) {
+    for (size_t i = 0; i < torque.size(); ++i) torque[i] = std::sin(step + static_cast<double>(i));
+    one.Step(torque, a);
+    three.Step(torque, b);
+    ASSERT_EQ(a.next_obs, b.next_obs);
+    ASSERT_EQ(a.reward, b.reward);
+  }
+}
+
+TEST(PendulumEnv, LoadedStateGoesOnToTheBit) {
+  const TempFolder folder;
+  const auto path = folder / "state.safetensors";
+  PendulumEnv saved(SmallConfig());
+  StepResult a = saved.MakeResult(), b = saved.MakeResult();
+  const std::vector<double> torque{1, 2, 3};
+  for (int step = 0; step < 7; ++step) saved.Step(torque, a);
+  TensorFile file;
+  saved.State(Archive::Saver(file));
+  file.Save(path);
+
+  const TensorFile source = TensorFile::Load(path);
+  PendulumEnv loaded(SmallConfig());
+  loaded.State(Archive::Loader(source));
+  EXPECT_TRUE(std::ranges::equal(saved.obs().values(), loaded.obs().values()));
+  for (int step = 0; step < 12; ++step) {  // over two resets
+    saved.Step(torque, a);
+    loaded.Step(torque, b);
+    ASSERT_EQ(a.next_obs, b.next_obs);
+    ASSERT_EQ(a.truncated, b.truncated);
+  }
+}
+
+TEST(PendulumEnv, StartsAreHangingWithNoiseOrAnywhere) {
+  PendulumEnvConfig config;
+  config.num_envs = 4000;
+  config.start = {0.1, 0.25, 5};
+  const PendulumEnv env(config);
+  int anywhere = 0;
+  double square = 0;
+  for (int i = 0; i < config.num_envs; ++i) {
+    const PendulumState s = env.state(i);
+    EXPECT_LE(std::abs(s.q1), std::numbers::pi);
+    const bool far =
+        std::max({std::abs(s.q1), std::abs(s.q2), std::abs(s.w1), std::abs(s.w2)}) > 0.6;
+    anywhere += far ? 1 : 0;
+    if (!far) square += s.w2 * s.w2;
+  }
+  EXPECT_NEAR(anywhere, 1000, 5 * std::sqrt(4000 * 0.25 * 0.75));
+  EXPECT_NEAR(std::sqrt(square / (config.num_envs - anywhere)), 0.1, 0.01);
+}
+
+TEST(PendulumEnv, TheCurriculumsNoiseHoldsFromTheNextStartOn) {
+  PendulumEnvConfig config = SmallConfig();
+  config.num_envs = 500;
+  PendulumEnv env(config);
+  env.SetStartNoise(0);
+  StepResult result = env.MakeResult();
+  for (int step = 0; step < 5; ++step) env.Step(std::vector<double>(500), result);
+  for (int i = 0; i < 500; ++i) ASSERT_EQ(env.state(i).q1, 0);
+}
+
+TEST(PendulumEnv, RefusesATimestepThatDoesNotDivideTheControlPeriod) {
+  PendulumEnvConfig config;
+  config.mjcf = Mjcf(Plant());
+  config.mjcf.replace(config.mjcf.find("0.005"), 5, "0.003");
+  EXPECT_THROW(PendulumEnv{config}, Error);
+}
+
+}  // namespace
+}  // namespace upswing

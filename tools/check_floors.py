@@ -1,0 +1,110 @@
+#!/usr/bin/env python3
+"""Proves that folders are floors: an include may only point down, and there is no cycle.
+
+    tools/check_floors.py [ROOT]
+
+Prints one line for each offender, as file:line: what is wrong, and exits with 1 if there is one.
+"""
+
+import re
+import sys
+from pathlib import Path
+
+# What each folder may include besides itself.
+FLOORS = {
+    "core": set(),
+    "nn": {"core"},
+    "sim": {"core"},
+    "rl": {"nn", "core"},
+    "control": {"sim", "core"},
+    "report": {"core"},
+    "apps": {"core", "nn", "sim", "rl", "control", "report", "python"},
+    "python": {"core", "nn", "sim", "rl", "control", "report", "apps"},
+}
+
+# One door per foreign library: the files that may include it.
+DOORS = {
+    "mujoco": re.compile(r"sim/"),
+    "Eigen": re.compile(r"nn/(linear\.(h|cc)|[^/]*_test\.cc)$"),
+}
+
+SOURCE_ENDINGS = (".h", ".cc", ".cc.in")
+INCLUDE = re.compile(r'\s*#\s*include\s*(["<])([^">]+)[">]')
+
+
+def includes(root):
+    """Yields (file, line, quote, included path) of all sources; file is relative to root."""
+    for folder in FLOORS:
+        for path in sorted((root / folder).rglob("*")):
+            if not path.name.endswith(SOURCE_ENDINGS):
+                continue
+            for line, text in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+                if match := INCLUDE.match(text):
+                    yield path.relative_to(root).as_posix(), line, *match.groups()
+
+
+def offence(root, file, quote, included):
+    """What is wrong with one include, or None."""
+    folder = file.split("/")[0]
+    target = included.split("/")[0]
+    if target in DOORS:
+        door = DOORS[target]
+        return None if door.match(file) else f"{included} is not for this file ({door.pattern})"
+    if quote == "<" and target not in FLOORS:
+        return None  # the standard library, another library or a generated header
+    if target not in FLOORS:
+        return f'"{included}": expected "folder/file.h" with one of our folders'
+    if not (root / included).is_file():
+        return f'"{included}" does not exist'
+    if target != folder and target not in FLOORS[folder]:
+        allowed = ", ".join(sorted(FLOORS[folder])) or "no other folder"
+        return f'{folder}/ may not include "{included}" (allowed: {allowed})'
+    return None
+
+
+def cycles(edges):
+    """The cycles between folders, each as a list of folders that begins with its first by name."""
+    found = []
+
+    def walk(path):
+        for target in sorted(edges.get(path[-1], ())):
+            if target == path[0]:
+                found.append(path)
+            elif target > path[0] and target not in path:
+                walk(path + [target])
+
+    for folder in sorted(edges):
+        walk([folder])
+    return found
+
+
+def check(root):
+    """All offenders, as lines of text."""
+    problems = []
+    edges = {}  # folder -> {folder it includes: where it first does so}
+    for file, line, quote, included in includes(root):
+        if problem := offence(root, file, quote, included):
+            problems.append(f"{file}:{line}: {problem}")
+        folder, target = file.split("/")[0], included.split("/")[0]
+        if target in FLOORS and target != folder:
+            edges.setdefault(folder, {}).setdefault(target, f"{file}:{line}")
+    for cycle in cycles(edges):
+        steps = list(zip(cycle, cycle[1:] + cycle[:1]))
+        where = ", ".join(edges[a][b] for a, b in steps[1:])
+        problems.append(f"{edges[steps[0][0]][steps[0][1]]}: a cycle between folders: "
+                        f"{' -> '.join(cycle + cycle[:1])} (and {where})")
+    return problems
+
+
+def main():
+    root = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).resolve().parent.parent
+    if not any((root / folder).is_dir() for folder in FLOORS):
+        sys.exit(f"check_floors: expected one of the folders {', '.join(FLOORS)} in {root}")
+    problems = check(root)
+    for problem in problems:
+        print(problem)
+    return 1 if problems else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
