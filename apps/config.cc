@@ -59,24 +59,32 @@ toml::table ParseToml(std::string_view text, const std::string& where) {
   }
 }
 
-const NamedAgent& FindAgent(const std::string& name) {
+const NamedAgent& FindAgent(const std::string& name, const std::string& where) {
   const auto agents = EmbeddedAgents();
   const auto found = std::ranges::find_if(agents, [&](const auto& a) { return a.name == name; });
   if (found != agents.end()) return *found;
   std::vector<std::string> names;
   for (const NamedAgent& agent : agents) names.emplace_back(agent.name);
-  throw BadInput(Concat("--agent: no agent is called \"", name, "\"", DidYouMean(name, names),
+  throw BadInput(Concat(where, ": no agent is called \"", name, "\"", DidYouMean(name, names),
                         "; there are ", Join(names, ", ")));
 }
 
-/// The value of a text setting in the last of the layers that has it.
-std::string LastText(std::string_view section, std::string_view key, const toml::table& file,
-                     const std::vector<FlagValue>& flags, std::string value) {
-  value = file[section][key].value_or(value);
-  for (const auto& [name, text] : flags) {
-    if (name == key) value = text;
+/// A text setting that other settings depend on: its value in the last layer that has it, and
+/// where that is, for messages.
+struct EarlySetting {
+  std::string value, where;
+};
+
+EarlySetting FindEarly(std::string_view section, std::string_view key, const toml::table& file,
+                       const std::string& file_name, const std::vector<FlagValue>& flags) {
+  EarlySetting setting;
+  if (const auto* node = file[section][key].as_string()) {
+    setting = {node->get(), Concat(file_name, ":", node->source().begin.line, ": ", key)};
   }
-  return value;
+  for (const auto& [name, text] : flags) {
+    if (name == key) setting = {text, Concat("--", key)};
+  }
+  return setting;
 }
 
 }  // namespace
@@ -130,21 +138,22 @@ void ApplyToml(const Options& options, std::string_view text, const std::string&
 
 Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
   Config config;
-  Options options;
-  config.Describe(options);
+  const Options options = OptionsOf(config);
   const std::string where = file.string();
   const std::string text = file.empty() ? "" : ReadTextFile(file);
   const toml::table table = ParseToml(text, where);
 
   // A model file brings its own plant, which other settings may change.
-  const std::string file_model = LastText("plant", "model", table, {}, "");
-  std::string model = LastText("plant", "model", {}, flags, "");
-  if (model.empty() && !file_model.empty()) {
-    model = (file.parent_path() / file_model).string();  // a relative path counts from its file
+  const EarlySetting model = FindEarly("plant", "model", table, where, flags);
+  std::string model_path = model.value;
+  if (!model_path.empty() && model.where != "--model") {
+    model_path = (file.parent_path() / model.value).string();  // counts from its file
   }
-  if (!model.empty()) config.plant = ChangedPlant(config.plant, model, {}, config.mjcf);
+  if (!model_path.empty()) config.plant = ChangedPlant(config.plant, model_path, {}, config.mjcf);
 
-  const NamedAgent& agent = FindAgent(LastText("train", "agent", table, flags, config.agent));
+  EarlySetting agent_setting = FindEarly("train", "agent", table, where, flags);
+  if (agent_setting.where.empty()) agent_setting.value = config.agent;
+  const NamedAgent& agent = FindAgent(agent_setting.value, agent_setting.where);
   ApplyToml(options, agent.toml, Concat("agent ", agent.name));
   if (!file.empty()) ApplyToml(options, text, where);
   for (const auto& [name, value] : flags) {
@@ -152,17 +161,22 @@ Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
     options.Set(name, value, flag);
   }
   config.agent = agent.name;
-  config.model = model;
+  config.model = model_path;
   return config;
 }
 
 std::string ConfigToml(Config config, bool identity_only) {
-  Options options;
-  const Config values = config;  // Describe sets defaults
-  config.Describe(options);
-  config = values;
-  return options.Toml(!identity_only,
-                      [&](const Option& option) { return !identity_only || option.identity; });
+  return OptionsOf(config).Toml(
+      !identity_only, [&](const Option& option) { return !identity_only || option.identity; });
+}
+
+std::vector<std::pair<std::string, double>> PlantValues(Plant plant) {
+  std::vector<std::pair<std::string, double>> values;
+  const Options options = OptionsOf(plant);
+  for (const Option& option : options.all()) {
+    values.emplace_back(option.name, *std::get<double*>(option.target));
+  }
+  return values;
 }
 
 std::vector<std::pair<std::string, std::string>> NamedAgents() {
@@ -193,8 +207,7 @@ LoadedPolicy LoadPolicy(const fs::path& path) {
     throw BadInput(Concat(file.string(), ": expected a policy of ", kObservationSize,
                           " observations, got ", loaded.policy.shape().inputs));
   }
-  Options options;
-  loaded.plant.Describe(options);
+  const Options options = OptionsOf(loaded.plant);
   try {
     const json plant = json::parse(loaded.policy.About("plant"));
     for (const Option& option : options.all()) {
@@ -210,11 +223,7 @@ LoadedPolicy LoadPolicy(const fs::path& path) {
 
 std::map<std::string, std::string> AboutTask(const Config& config) {
   json plant;
-  Options options;
-  Plant copy;
-  copy.Describe(options);
-  copy = config.plant;
-  for (const Option& option : options.all()) plant[option.name] = *std::get<double*>(option.target);
+  for (const auto& [name, value] : PlantValues(config.plant)) plant[name] = value;
   std::map<std::string, std::string> about{
       {"agent", config.agent},
       {"seed", std::to_string(config.train.seed)},
@@ -233,15 +242,11 @@ std::map<std::string, std::string> AboutTask(const Config& config) {
 
 Plant ChangedPlant(const Plant& base, const std::string& model, const std::vector<std::string>& set,
                    std::string& mjcf) {
-  Plant plant;
-  Options options;
-  plant.Describe(options);
-  plant = base;
+  Plant plant = base;
+  const Options options = OptionsOf(plant);
   if (!model.empty()) {
     mjcf = ReadTextFile(model);
-    const ModelPtr compiled = CompileModel(mjcf, model);
-    CheckModel(*compiled, model);
-    plant = PlantOf(*compiled);
+    plant = PlantOf(*LoadModel(mjcf, model));
   }
   for (const std::string& change : set) {
     const size_t equals = change.find('=');

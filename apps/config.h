@@ -47,6 +47,9 @@ void ApplyToml(const Options& options, std::string_view toml, const std::string&
 /// The settings as TOML; without those that do not make another run of it, if `identity_only`.
 std::string ConfigToml(Config config, bool identity_only);
 
+/// Name and value of each parameter of a plant.
+std::vector<std::pair<std::string, double>> PlantValues(Plant plant);
+
 /// Names of the agents in configs/, in alphabetical order, and what each is.
 std::vector<std::pair<std::string, std::string>> NamedAgents();
 

@@ -2,13 +2,13 @@
 
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <thread>
 
 #include "apps/commands.h"
 #include "apps/config.h"
 #include "apps/progress.h"
 #include "core/error.h"
 #include "core/text.h"
+#include "core/thread_pool.h"
 #include "rl/evaluate.h"
 
 namespace upswing {
@@ -18,20 +18,16 @@ struct EvalArguments {
   std::string policy, model;
   std::vector<std::string> set;
   int episodes = 100, threads = 0;
-  uint64_t seed = 0;
+  int64_t seed = 0;
   bool as_json = false;
 };
 
 std::string PlantText(const Plant& plant) {
-  Options options;
-  Plant copy;
-  copy.Describe(options);
-  copy = plant;
-  std::string text;
-  for (const Option& option : options.all()) {
-    text += Concat(text.empty() ? "" : ", ", option.name, " ", option.text());
+  std::vector<std::string> texts;
+  for (const auto& [name, value] : PlantValues(plant)) {
+    texts.push_back(Concat(name, " ", FormatNumber(value)));
   }
-  return text;
+  return Join(texts, ", ");
 }
 
 void PrintTable(const Evaluation& e, const LoadedPolicy& loaded, const Plant& plant) {
@@ -61,14 +57,10 @@ void PrintTable(const Evaluation& e, const LoadedPolicy& loaded, const Plant& pl
 void PrintJson(const Evaluation& e, const LoadedPolicy& loaded, const EvalArguments& arguments,
                const Plant& plant) {
   using nlohmann::ordered_json;
-  Options options;
-  Plant copy;
-  copy.Describe(options);
-  copy = plant;
   ordered_json j;
   j["policy"] = loaded.path.string();
   j["seed"] = arguments.seed;
-  for (const Option& o : options.all()) j["plant"][o.name] = *std::get<double*>(o.target);
+  for (const auto& [name, value] : PlantValues(plant)) j["plant"][name] = value;
   j["episodes"] = e.episodes;
   j["successes"] = e.successes;
   j["success_rate"] = e.success_rate();
@@ -100,11 +92,9 @@ int RunEval(const EvalArguments& arguments) {
   config.plants = {plant};
   config.num_envs = arguments.episodes;
   config.episode_seconds = kEvaluationSeconds;
-  config.seed = arguments.seed;
+  config.seed = static_cast<uint64_t>(arguments.seed);
   config.stream = "evaluation";
-  config.threads = arguments.threads > 0
-                       ? arguments.threads
-                       : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  config.threads = ResolveThreads(arguments.threads);
   PendulumEnv env(config);
 
   Evaluation evaluation;
@@ -139,7 +129,9 @@ void AddEval(CLI::App& program, Command& command) {
   app->add_option("--episodes", a->episodes, "how many [100]")
       ->check(CLI::Range(1, 1000000))
       ->type_name("");
-  app->add_option("--seed", a->seed, "of the start states [0]")->type_name("");
+  app->add_option("--seed", a->seed, "of the start states [0]")
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("");
   app->add_option("--set", a->set, "another plant, such as mass2=1.2 (repeat for more)")
       ->type_name("NAME=VALUE")
       ->take_all()

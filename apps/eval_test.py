@@ -35,7 +35,8 @@ class EvalTest(ProgramTest):
         assert done.returncode == 0, done
 
     def evaluate(self, *more, episodes=10):
-        return json.loads(self.succeed("eval", self.policy, "--json", "--episodes", episodes, *more))
+        return json.loads(self.succeed("eval", self.policy, "--json", "--episodes", episodes,
+                                       *more))
 
     def test_json_has_all_fields(self):
         result = self.evaluate()
@@ -76,7 +77,8 @@ class EvalTest(ProgramTest):
 
     def test_same_seed_same_answer_and_another_seed_another(self):
         self.assertEqual(self.evaluate("--seed", 7), self.evaluate("--seed", 7))
-        self.assertNotEqual(self.evaluate("--seed", 7)["return"], self.evaluate("--seed", 8)["return"])
+        self.assertNotEqual(self.evaluate("--seed", 7)["return"],
+                            self.evaluate("--seed", 8)["return"])
 
     def test_threads_do_not_matter(self):
         self.assertEqual(self.evaluate("--threads", 1), self.evaluate("--threads", 3))

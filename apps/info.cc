@@ -28,7 +28,7 @@ void PrintPolicy(const fs::path& path) {
              shape.dueling ? fmt::format("({0}→1, {0}→{1})", shape.head, shape.actions)
                            : std::to_string(shape.actions),
              shape.layer_norm ? ", layer normalisation" : "", "",
-             FormatCount(static_cast<double>(policy.num_parameters())));
+             FormatCount(policy.num_parameters()));
   fmt::print("  torques     {} N·m, every {} s\n", fmt::join(policy.torques(), ", "),
              about("control_period"));
   fmt::print("  made by     agent {}, seed {}, step {}, upswing {}\n", about("agent"),
@@ -44,15 +44,15 @@ void PrintRun(const fs::path& path) {
   const Config config = BuildConfig(path / "config.toml", {});
   TrainState state(static_cast<int>(config.train.envs), kRewardTerms);
   state.State(Archive::Loader(checkpoint).In("train"));
-  const auto count = [](int64_t n) { return FormatCount(static_cast<double>(n)); };
   fmt::print("{}\n", path.string());
   fmt::print("  agent       {}, seed {}, upswing {}\n", config.agent, config.train.seed,
              checkpoint.Metadata("upswing_version"));
-  fmt::print("  checkpoint  step {} of {}, {} episodes, {} of training\n", count(state.steps),
-             count(config.train.steps), count(state.episodes), FormatDuration(state.seconds));
+  fmt::print("  checkpoint  step {} of {}, {} episodes, {} of training\n", FormatCount(state.steps),
+             FormatCount(config.train.steps), FormatCount(state.episodes),
+             FormatDuration(state.seconds));
   if (state.solved) {
-    fmt::print("  solved      at step {}, after {} of training\n", count(state.first_full_step),
-               FormatDuration(state.first_full_seconds));
+    fmt::print("  solved      at step {}, after {} of training\n",
+               FormatCount(state.first_full_step), FormatDuration(state.first_full_seconds));
   } else {
     fmt::print("  solved      not yet; last success rate {}\n", state.last_success_rate);
   }

@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 
+#include <cerrno>
 #include <csignal>
 #include <cstdio>
+#include <cstring>
 #include <exception>
 
 #include "apps/commands.h"
@@ -52,7 +54,11 @@ int Main(int argc, char** argv) {
 
   try {
     program.parse(argc, argv);
-    return command();
+    const int exit_code = command();
+    if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
+      throw Failure(Concat("cannot write the output: ", std::strerror(errno)));
+    }
+    return exit_code;
   } catch (const CLI::Success& request) {
     return program.exit(request);  // --help and --version
   } catch (const CLI::ParseError& error) {

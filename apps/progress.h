@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <concepts>
 #include <string>
 
 namespace upswing {
@@ -38,5 +39,9 @@ std::string FormatDuration(double seconds);
 
 /// A whole number with commas between groups of three digits: `1,250,000`.
 std::string FormatCount(double number);
+template <std::integral T>
+std::string FormatCount(T number) {
+  return FormatCount(static_cast<double>(number));
+}
 
 }  // namespace upswing

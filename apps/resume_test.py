@@ -126,8 +126,8 @@ class ResumeTest(ProgramTest):
         self.assertIn("Solved after", self.succeed(*small(**easy)))
         solved_at = self.step_of()
         self.assertLess(solved_at, 100000)
-        self.assertEqual([row["success_rate"] for row in read_csv(self.folder / "run/evals.csv")][-2:],
-                         [1, 1])
+        evaluations = read_csv(self.folder / "run/evals.csv")
+        self.assertEqual([row["success_rate"] for row in evaluations[-2:]], [1, 1])
 
         self.succeed("train", "--resume", "run")
         self.assertEqual(self.step_of(), solved_at)

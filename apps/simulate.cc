@@ -96,6 +96,7 @@ int RunSimulate(const SimulateArguments& a) {
   // As many steps as were asked for, or as the schedule has rows.
   const double scheduled = static_cast<double>(schedule.size()) / kStepsPerSecond;
   const double seconds = a.seconds.value_or(schedule.empty() ? 20.0 : scheduled);
+  if (!std::isfinite(seconds)) throw BadInput("--seconds: expected a finite number");
   const int64_t steps = std::llround(seconds * kStepsPerSecond);
   if (!schedule.empty() && steps > static_cast<int64_t>(schedule.size())) {
     throw BadInput(Concat("--seconds: expected at most ", FormatNumber(scheduled), ", for which ",

@@ -29,7 +29,7 @@ def numbers(row):
 
 def energy(plant, row):
     """Mechanical energy (J) of two thin rods, heights counted from the pivot."""
-    m1, m2, l1, l2, g = (plant[name] for name in ("mass1", "mass2", "length1", "length2", "gravity"))
+    m1, m2, l1, l2, g = (plant[name] for name in STANDARD)
     q1, q2, w1, w2 = (row[name] for name in STATE)
     potential = (-m1 * g * (l1 / 2) * math.cos(q1)
                  - m2 * g * (l1 * math.cos(q1) + (l2 / 2) * math.cos(q1 + q2)))
@@ -167,7 +167,8 @@ class SimulateTest(ProgramTest):
     # ---- CSV in and out.
 
     def test_columns(self):
-        self.assertEqual(self.succeed("simulate", "--seconds", 0).splitlines()[0], ",".join(COLUMNS))
+        self.assertEqual(self.succeed("simulate", "--seconds", 0).splitlines()[0],
+                         ",".join(COLUMNS))
 
     def test_numbers_are_the_shortest_that_come_back(self):
         for row in parse(self.succeed("simulate", "--start", "0.1,-0.05,0,0", "--seconds", 5)):
@@ -235,7 +236,8 @@ class PolicyRolloutTest(ProgramTest):
     def test_its_torques_as_a_schedule_give_the_same_rollout(self):
         output = self.succeed("simulate", "run", "--seconds", 5)
         self.write("torques.csv", output)
-        self.assertEqual(self.succeed("simulate", "--torque", "torques.csv", "--seconds", 5), output)
+        again = self.succeed("simulate", "--torque", "torques.csv", "--seconds", 5)
+        self.assertEqual(again, output)
 
     def test_another_plant_gives_another_rollout(self):
         usual = self.succeed("simulate", "run", "--seconds", 5)

@@ -84,8 +84,9 @@ def write_tensors(path, metadata, tensors):
     header = {"__metadata__": {key: text for key, text in metadata.items() if key != "checksum"}}
     offset = 0
     for name, (dtype, shape, data) in tensors.items():
-        header[name] = {"dtype": dtype, "shape": shape, "data_offsets": [offset, offset + len(data)]}
-        offset += len(data)
+        end = offset + len(data)
+        header[name] = {"dtype": dtype, "shape": shape, "data_offsets": [offset, end]}
+        offset = end
     text = json.dumps(header).encode()
     pieces = [struct.pack("<Q", len(text)), text, *(data for _, _, data in tensors.values())]
     Path(path).write_bytes(b"".join(pieces))

@@ -2,16 +2,16 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <atomic>
 #include <csignal>
 #include <filesystem>
 #include <map>
 #include <memory>
-#include <thread>
 
 #include "apps/commands.h"
 #include "apps/config.h"
-#include "apps/progress.h"
+#include "apps/train_view.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/text.h"
@@ -75,11 +75,9 @@ void CheckCheckpoint(const TensorFile& checkpoint, const Config& config) {
   expect("format", kCheckpointFormat);
   expect("upswing_version", UPSWING_VERSION);
   Config old_config;
-  Config new_config;
-  Options old_options, new_options;
-  old_config.Describe(old_options);
-  new_config.Describe(new_options);
-  new_config = config;
+  Config new_config = config;
+  const Options old_options = OptionsOf(old_config);
+  const Options new_options = OptionsOf(new_config);
   ApplyToml(old_options, checkpoint.Metadata("config"), checkpoint.path());
   for (size_t i = 0; i < new_options.all().size(); ++i) {
     const Option& before = old_options.all()[i];
@@ -95,14 +93,14 @@ void CheckCheckpoint(const TensorFile& checkpoint, const Config& config) {
 }
 
 /// Everything that a training is made of, built from its settings.
-struct Session {
+struct Parts {
   Config config;
   ThreadPool pool;
   PendulumEnv env;
   Dqn agent;
   TrainState state;
 
-  Session(const Config& c, int threads)
+  Parts(const Config& c, int threads)
       : config(c),
         pool(threads),
         env(c.Environments()),
@@ -131,92 +129,12 @@ struct Session {
   }
 };
 
-// ---- What people see.
-
-/// Steps and updates per second of training, between two log intervals at least half a second
-/// apart.
-struct Rates {
-  double steps_per_second = 0, updates_per_second = 0;
-  int64_t steps = 0, updates = 0;
-  double seconds = 0;
-
-  void Update(const TrainState& s, const AgentReport& report) {
-    const double elapsed = s.seconds - seconds;
-    if (elapsed < 0.5) return;
-    steps_per_second = static_cast<double>(s.steps - steps) / elapsed;
-    updates_per_second = static_cast<double>(report.updates - updates) / elapsed;
-    *this = {steps_per_second, updates_per_second, s.steps, report.updates, s.seconds};
+/// A disk that is full may be why there is something to log.
+void LogIfPossible(RunFolder& run, const std::string& line) {
+  try {
+    run.Log(line);
+  } catch (const Error&) {  // NOLINT(bugprone-empty-catch): the line is told to the user anyway
   }
-};
-
-void Announce(const Session& session, const fs::path& path) {
-  const Config& c = session.config;
-  const DqnConfig& d = c.dqn;
-  fmt::print("Training {} (seed {}) in {}\n", c.agent, c.train.seed, path.string());
-  fmt::print("  {}{} network {}{}, {} parameters; {} environments, {} threads\n",
-             d.double_q ? "double, " : "", d.dueling ? "dueling" : "plain",
-             fmt::join(d.hidden, "-"), d.dueling ? fmt::format(" with heads of {}", d.head) : "",
-             FormatCount(static_cast<double>(session.agent.online().size())), c.train.envs,
-             session.pool.threads());
-  if (session.state.steps > 0) {
-    fmt::print("  going on from step {}\n", FormatCount(static_cast<double>(session.state.steps)));
-  }
-  std::fflush(stdout);
-}
-
-/// Shows the training as it goes on.
-void Report(Training& training, ProgressLine& line, Rates& rates, AgentReport& last) {
-  const double total = static_cast<double>(training.config.steps);
-  training.on_metrics = [&](const TrainState& s, const AgentReport& report) {
-    last = report;
-    rates.Update(s, report);
-  };
-  training.on_step = [&, total](const TrainState& s) {
-    if (!line.due()) return;
-    const double left = rates.steps_per_second > 0
-                            ? (total - static_cast<double>(s.steps)) / rates.steps_per_second
-                            : 0;
-    line.Show(
-        static_cast<double>(s.steps) / total,
-        fmt::format("{} steps  {}/s  {} updates/s  eps {:.2f}  loss {:.4f}  return {:.0f}  "
-                    "success {:.0f}%  at most {} left",
-                    FormatCount(static_cast<double>(s.steps)), FormatCount(rates.steps_per_second),
-                    FormatCount(rates.updates_per_second), last.epsilon, last.loss, s.mean_return(),
-                    100 * s.last_success_rate, FormatDuration(left)));
-  };
-  training.on_evaluation = [&](const TrainState& s, const Evaluation& e) {
-    line.Print(fmt::format(
-        "{:>9} steps  {:>10}  {:>6} updates/s  eps {:.2f}  loss {:.4f}  return {:6.0f}  "
-        "success {:3}/{}",
-        FormatCount(static_cast<double>(s.steps)), FormatDuration(s.seconds),
-        FormatCount(rates.updates_per_second), last.epsilon, last.loss, e.reward_sum.mean,
-        e.successes, e.episodes));
-  };
-}
-
-void Summarize(const TrainState& s, const fs::path& run, bool finished) {
-  const std::string at = FormatCount(static_cast<double>(s.steps));
-  if (s.solved) {
-    fmt::print("Solved after {} of training, at step {} (training so far: {}, {} steps).\n",
-               FormatDuration(s.first_full_seconds),
-               FormatCount(static_cast<double>(s.first_full_step)), FormatDuration(s.seconds), at);
-  } else {
-    fmt::print("{} at step {} after {} of training; not solved yet.\n",
-               finished ? "Done" : "Stopped", at, FormatDuration(s.seconds));
-  }
-  const std::string go_on = fmt::format("upswing train --resume {}{}", run.string(),
-                                        !finished  ? ""
-                                        : s.solved ? " --no-stop-when-solved"
-                                                   : fmt::format(" --steps {}", 2 * s.steps));
-  if (s.best_success_rate >= 0) {
-    fmt::print("Best policy: {} (step {}, success {:.0f}%, return {:.0f})\n",
-               (run / "policy.safetensors").string(), FormatCount(static_cast<double>(s.best_step)),
-               100 * s.best_success_rate, s.best_return);
-    fmt::print("Next:\n  ./upswing eval {}\n  ./upswing info {}\n", run.string(), run.string());
-  } else {
-    fmt::print("Next:\n");
-  }
-  fmt::print("  ./{}\n", go_on);
 }
 
 int RunTrain(const TrainArguments& arguments) {
@@ -230,10 +148,8 @@ int RunTrain(const TrainArguments& arguments) {
       BuildConfig(resuming ? resume / "config.toml" : fs::path(arguments.config), arguments.flags);
   if (!config.mjcf.empty()) config.model = "model.xml";  // the copy in the run folder
 
-  const int threads = config.train.threads > 0
-                          ? static_cast<int>(config.train.threads)
-                          : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-  Session session(config, threads);
+  const int threads = ResolveThreads(config.train.threads);
+  Parts parts(config, threads);
   fs::path path = resume;
   if (!resuming) {
     path = arguments.out.empty() ? FreeRunFolder(config) : fs::path(arguments.out);
@@ -241,50 +157,51 @@ int RunTrain(const TrainArguments& arguments) {
         {"config.toml", ConfigToml(config, false)}};
     if (!config.mjcf.empty()) files.emplace_back("model.xml", config.mjcf);
     RunFolder::Create(path, files, [&](TensorFile& checkpoint) {
-      checkpoint.metadata = session.CheckpointMetadata();
-      AddToCheckpoint(session.agent, session.env, session.state, checkpoint);
+      checkpoint.metadata = parts.CheckpointMetadata();
+      AddToCheckpoint(parts.agent, parts.env, parts.state, checkpoint);
     });
   }
 
   // A new run, too, begins from its checkpoint.
   const TensorFile checkpoint = TensorFile::Load(RunFolder::CheckpointPath(path));
   CheckCheckpoint(checkpoint, config);
-  LoadCheckpoint(session.agent, session.env, session.state, checkpoint);
+  LoadCheckpoint(parts.agent, parts.env, parts.state, checkpoint);
   RunFolder run(path, checkpoint);
   if (resuming) WriteFileAtomically(path / "config.toml", ConfigToml(config, false));
 
-  Training training{config.train, session.agent, session.env, run, {}, {}, {}, {}, {}, {}, {}};
-  training.evaluate = [&](const Policy& p, uint64_t number) { return session.Judge(p, number); };
+  Training training{config.train, parts.agent, parts.env, run, {}, {}, {}, {}, {}, {}, {}};
+  training.evaluate = [&](const Policy& p, uint64_t number) { return parts.Judge(p, number); };
   training.about = AboutTask(config);
-  training.checkpoint_metadata = session.CheckpointMetadata();
+  training.checkpoint_metadata = parts.CheckpointMetadata();
   training.poll = PollSignals;
-  ProgressLine line;
-  AgentReport last = session.agent.Report();
-  Rates rates{0, 0, session.state.steps, last.updates, session.state.seconds};
-  Report(training, line, rates, last);
+  TrainView view(parts.state, parts.agent.Report());
+  view.Follow(training);
 
   InstallSignalHandlers();
-  Announce(session, path);
-  run.Log(
-      Concat(session.state.steps > 0 ? "resumed" : "started", " at step ", session.state.steps));
+  view.Announce(config, threads, parts.agent.online().size(), path);
+  run.Log(Concat(parts.state.steps > 0 ? "resumed" : "started", " at step ", parts.state.steps));
   bool finished = false;
   try {
-    finished = Train(training, session.state);
+    finished = Train(training, parts.state);
   } catch (const Error& error) {
-    run.Log(error.what());
+    LogIfPossible(run, error.what());
     throw;
   }
-  line.Clear();
-  run.Log(Concat(finished ? "finished" : "stopped", " at step ", session.state.steps));
-  Summarize(session.state, path, finished);
+  run.Log(Concat(finished ? "finished" : "stopped", " at step ", parts.state.steps));
+  view.Summarize(parts.state, path, finished);
   return finished ? 0 : 128 + g_stop_signal;
+}
+
+/// What --help shows for a flag's value.
+std::string TypeName(const Option& option) {
+  constexpr std::array kNames{"", "INTEGER", "NUMBER", "TEXT", "LIST"};  // in Target's order
+  return kNames.at(option.target.index());
 }
 
 /// Adds a flag for each setting, in the order in which they were described.
 void AddSettings(CLI::App& app, std::vector<FlagValue>& flags) {
   Config defaults;
-  Options options;
-  defaults.Describe(options);
+  const Options options = OptionsOf(defaults);
   for (const Option& option : options.all()) {
     std::string help = option.help;
     if (!option.unit.empty()) help += ", " + option.unit;
@@ -302,7 +219,8 @@ void AddSettings(CLI::App& app, std::vector<FlagValue>& flags) {
            option.flag(),
            [&flags, name](const std::string& text) { flags.emplace_back(name, text); }, help)
         ->group(option.section)
-        ->type_name("");
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)
+        ->type_name(TypeName(option));
   }
   for (const auto& alias : options.aliases()) {
     const std::string name = alias.name;
@@ -310,7 +228,8 @@ void AddSettings(CLI::App& app, std::vector<FlagValue>& flags) {
            "--" + name, [&flags, name](const std::string& text) { flags.emplace_back(name, text); },
            Concat("both ", alias.members[0], " and ", alias.members[1]))
         ->group(alias.section)
-        ->type_name("");
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)
+        ->type_name("NUMBER");
   }
 }
 

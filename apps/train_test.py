@@ -4,6 +4,7 @@
 import os
 import pty
 import re
+import signal
 import subprocess
 import unittest
 
@@ -44,40 +45,45 @@ class TrainTest(ProgramTest):
             self.succeed(*command.split())
         self.assertEqual(output.count("  ./upswing "), 3)
 
-    def test_progress_bar_on_a_terminal(self):
+    def watch(self, columns, *patterns):
+        """Trains on a terminal of that width until it has shown all patterns, or a lot; returns
+        what it showed."""
         terminal, its_end = pty.openpty()
-        with subprocess.Popen([UPSWING, *small(steps=60000)], cwd=self.folder, stdout=its_end,
-                              stderr=subprocess.PIPE) as process:
+        with subprocess.Popen(["sh", "-c", 'stty cols "$0"; exec "$@"', str(columns), UPSWING,
+                               *small(steps=10**9, stop_when_solved=False)], cwd=self.folder,
+                              stdin=its_end, stdout=its_end, stderr=its_end) as process:
             os.close(its_end)
-            shown = self.read_terminal(terminal)
-            self.assertEqual(process.stderr.read(), b"")
-        self.assertEqual(process.returncode, 0)
-        bars = re.findall(r"\r\x1b\[K\[[= ]{16}\] +\d+% [^\r]*", shown)
-        self.assertTrue(bars, shown)
-        self.assertRegex(bars[-1], r"\d+ steps  [\d,]+/s ")
-
-    def test_progress_bar_tells_all_on_a_wide_terminal(self):
-        terminal, its_end = pty.openpty()
-        with subprocess.Popen(["sh", "-c", 'stty cols 200; exec "$@"', "sh", UPSWING,
-                               *small(steps=60000)], cwd=self.folder, stdin=its_end, stdout=its_end,
-                              stderr=its_end) as process:
-            os.close(its_end)
-            shown = self.read_terminal(terminal)
-        self.assertRegex(shown, r"[1-9][\d,]* steps  [\d,]+/s  [\d,]+ updates/s  eps \d\.\d\d  "
-                                r"loss \d\.\d{4}  return -?\d+  success \d+%  at most .* left")
+            shown = ""
+            stopping = False
+            while piece := self.read_terminal(terminal):
+                shown += piece
+                all_seen = all(re.search(pattern, shown) for pattern in patterns)
+                if not stopping and (all_seen or len(shown) > 20000):
+                    stopping = True  # a second signal would end it at once
+                    process.send_signal(signal.SIGINT)
+            os.close(terminal)
+        self.assertEqual(process.returncode, 130, shown)
+        for pattern in patterns:
+            self.assertRegex(shown, pattern)
+        return shown
 
     def read_terminal(self, terminal):
-        """All that is written to a terminal until its other end is closed."""
-        pieces = []
-        while True:
-            try:
-                piece = os.read(terminal, 65536)
-            except OSError:  # Linux's way to say that nobody is left there
-                piece = b""
-            if not piece:
-                os.close(terminal)
-                return b"".join(pieces).decode()
-            pieces.append(piece)
+        """What comes next; nothing when its other end is closed."""
+        try:
+            return os.read(terminal, 65536).decode()
+        except OSError:  # Linux's way to say that nobody is left there
+            return ""
+
+    def test_progress_bar_tells_all_on_a_terminal(self):
+        facts = (r"[1-9][\d,]* steps/s", r"[1-9][\d,]* updates/s", r"eps \d\.\d\d",
+                 r"loss \d\.\d+", r"return -?\d+", r"success \d+%", r"at most [^\r]+ left")
+        shown = self.watch(200, *(rf"\r\x1b\[K\[[= ]{{16}}\] +\d+% [^\r]*{fact}" for fact in facts))
+        self.assertIn("\r\x1b[KStopped at step", shown)  # in the bar's place
+
+    def test_progress_bar_keeps_to_the_width(self):
+        bar = r"\r\x1b\[K(\[[= ]{16}\] +\d+% [^\r]*)\r"
+        for shown in re.findall(bar, self.watch(60, bar)):
+            self.assertLess(len(shown), 60)
 
     # ---- What it writes.
 

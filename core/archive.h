@@ -52,6 +52,14 @@ class Archive {
     Array(name, std::span(values));
   }
 
+  /// On loading, throws BadInput unless what was loaded under `name` is valid.
+  void Check(bool valid, std::string_view name, std::string_view expected) const {
+    if (loading() && !valid) {
+      throw BadInput(
+          Concat(source_->path(), ": tensor \"", prefix_, name, "\": expected ", expected));
+    }
+  }
+
   /// One number. Integers are stored as I64, bool too.
   template <typename T>
   requires std::integral<T> || std::floating_point<T>

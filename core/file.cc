@@ -1,6 +1,7 @@
 #include "core/file.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -111,6 +112,20 @@ void WriteFileAtomically(const fs::path& path, std::span<const std::span<const s
 void WriteFileAtomically(const fs::path& path, std::string_view text) {
   WriteFileAtomically(path, std::array{BytesOf(text)});
 }
+
+FolderLock::FolderLock(const fs::path& folder)
+    : descriptor_(open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+  if (descriptor_ < 0) throw BadInput(SystemError("cannot read", folder));
+  if (flock(descriptor_, LOCK_EX | LOCK_NB) != 0) {
+    const bool taken = errno == EWOULDBLOCK;
+    const std::string message = taken ? Concat(folder.string(), ": another process is at work here")
+                                      : SystemError("cannot lock", folder);
+    close(descriptor_);
+    throw BadInput(message);
+  }
+}
+
+FolderLock::~FolderLock() { close(descriptor_); }
 
 AppendFile::AppendFile(fs::path path, int64_t size)
     : path_(std::move(path)),

@@ -26,6 +26,19 @@ void WriteFileAtomically(const std::filesystem::path& path,
                          std::span<const std::span<const std::byte>> parts);
 void WriteFileAtomically(const std::filesystem::path& path, std::string_view text);
 
+/// Keeps other processes from working in a folder for as long as it lives, or its process does.
+class FolderLock {
+ public:
+  /// Throws BadInput if another process holds it.
+  explicit FolderLock(const std::filesystem::path& folder);
+  ~FolderLock();
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
+
+ private:
+  int descriptor_;
+};
+
 /// A file that only grows (a log, a CSV). Its size goes into the checkpoint; on resume it is cut
 /// back to that size, so that what a killed run wrote after its checkpoint is not there twice.
 class AppendFile {

@@ -57,6 +57,14 @@ TEST_F(FileTest, MissingFilesAndFoldersAreBadInput) {
   EXPECT_THROW(WriteFileAtomically(folder_ / "no" / "such", "x"), Error);
 }
 
+TEST_F(FileTest, AFolderIsLockedForOneAtATime) {
+  {
+    const FolderLock lock(folder_);
+    EXPECT_THROW(FolderLock{folder_}, Error);
+  }
+  EXPECT_NO_THROW(FolderLock{folder_});
+}
+
 TEST_F(FileTest, AppendFileIsCutBackToTheSizeThatIsKnown) {
   const fs::path path = folder_ / "log";
   {

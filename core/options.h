@@ -95,4 +95,14 @@ void SetDefaults(Config& config) {
   config.Describe(options);
 }
 
+/// The settings of a struct that has values already, which stay. They point into it.
+template <typename Config>
+Options OptionsOf(Config& config) {
+  Options options;
+  const Config values = config;
+  config.Describe(options);
+  config = values;
+  return options;
+}
+
 }  // namespace upswing

@@ -21,6 +21,11 @@ void WaitWhile(const std::atomic<T>& value, T old) {
 
 }  // namespace
 
+int ResolveThreads(int64_t wanted) {
+  if (wanted > 0) return static_cast<int>(wanted);
+  return static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+}
+
 ThreadPool::ThreadPool(int threads) : errors_(static_cast<size_t>(std::max(1, threads))) {
   for (int thread = 1; thread < threads; ++thread) {
     workers_.emplace_back([this, thread] { Work(thread); });

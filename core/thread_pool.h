@@ -1,12 +1,16 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <exception>
 #include <functional>
 #include <thread>
 #include <vector>
 
 namespace upswing {
+
+/// `wanted`, or if that is 0 the number of processors that this process may use.
+int ResolveThreads(int64_t wanted);
 
 /// Threads that wait for work. The caller is one of them, so a pool of one starts none.
 class ThreadPool {

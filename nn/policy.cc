@@ -48,6 +48,15 @@ QNetworkShape ShapeFromJson(const std::string& text, const std::string& path) {
   }
 }
 
+/// The network of a file. Throws if it has sizes that none has.
+QNetwork<float> NetworkOf(const QNetworkShape& shape, const std::string& path) {
+  try {
+    return QNetwork<float>(shape);
+  } catch (const Error& error) {
+    throw BadInput(Concat(path, ": ", error.what()));
+  }
+}
+
 /// Throws unless every number is finite.
 template <typename T>
 void CheckFinite(std::span<const T> values, const std::string& what) {
@@ -147,7 +156,7 @@ Policy Policy::Load(const std::filesystem::path& path) {
 
   // Parameters, each with the shape that the network asks for.
   const QNetworkShape shape = ShapeFromJson(file.Metadata("network"), path.string());
-  const QNetwork<float> network(shape);
+  const QNetwork<float> network = NetworkOf(shape, path.string());
   std::vector<float> parameters(network.num_parameters());
   for (const ParameterBlock& block : network.blocks()) {
     const auto values = std::span(parameters).subspan(block.offset, block.size());
@@ -159,25 +168,46 @@ Policy Policy::Load(const std::filesystem::path& path) {
   CheckFinite<double>(torques, Concat(path.string(), ": tensor \"torques\""));
   Policy policy(shape, std::move(parameters), std::move(torques), file.metadata);
 
-  // The samples: another machine may sum in another order, but not differ by more than rounding.
+  policy.CheckSamples(file);
+  return policy;
+}
+
+void Policy::CheckSamples(const TensorFile& file) {
+  const auto inputs = static_cast<size_t>(shape().inputs);
+  const auto actions = static_cast<size_t>(shape().actions);
   const size_t samples = file.Count<double>("sample.torque");
-  std::vector<float> obs(samples * static_cast<size_t>(shape.inputs));
-  std::vector<float> expected(samples * static_cast<size_t>(shape.actions));
-  std::vector<float> got(expected.size());
+  std::vector<float> obs(samples * inputs);
+  std::vector<float> expected(samples * actions);
+  std::vector<float> q(expected.size());
+  std::vector<double> torque(samples);
   file.Read("sample.obs", std::span(obs));
   file.Read("sample.q", std::span(expected));
+  file.Read("sample.torque", std::span(torque));
   const int rows = static_cast<int>(samples);
-  policy.QValues(Matrix<const float>(obs.data(), rows, shape.inputs),
-                 Matrix<float>(got.data(), rows, shape.actions));
-  for (size_t i = 0; i < got.size(); ++i) {
-    const double error = std::abs(static_cast<double>(got[i]) - expected[i]);
-    if (!(error <= 1e-4 * (1.0 + std::abs(expected[i])))) {
-      throw BadInput(Concat(path.string(), ": self-check: expected Q-value ", expected[i], ", got ",
-                            got[i], " (sample ", i / static_cast<size_t>(shape.actions), ")"));
+  QValues(Matrix<const float>(obs.data(), rows, shape().inputs),
+          Matrix<float>(q.data(), rows, shape().actions));
+
+  // Another machine may sum in another order, but not differ by more than rounding.
+  const auto tolerance = [](double x) { return 1e-4 * (1.0 + std::abs(x)); };
+  for (size_t i = 0; i < q.size(); ++i) {
+    const double error = std::abs(static_cast<double>(q[i]) - expected[i]);
+    if (!(error <= tolerance(expected[i]))) {
+      throw BadInput(Concat(file.path(), ": self-check: expected Q-value ", expected[i], ", got ",
+                            q[i], " (sample ", i / actions, ")"));
     }
-    policy.self_check_error_ = std::max(policy.self_check_error_, error);
+    self_check_error_ = std::max(self_check_error_, error);
   }
-  return policy;
+  // The torque is that of the largest Q-value, or of one that rounding cannot tell from it.
+  for (size_t i = 0; i < samples; ++i) {
+    const auto row = std::span(q).subspan(i * actions, actions);
+    const float best = row[static_cast<size_t>(ArgMax(row))];
+    const auto level = std::ranges::find(torques_, torque[i]) - torques_.begin();
+    if (static_cast<size_t>(level) == actions ||
+        best - row[static_cast<size_t>(level)] > 2 * tolerance(best)) {
+      throw BadInput(Concat(file.path(), ": self-check: expected torque ", torque[i], ", got ",
+                            torques_[static_cast<size_t>(ArgMax(row))], " (sample ", i, ")"));
+    }
+  }
 }
 
 }  // namespace upswing

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/matrix.h"
+#include "core/tensor_file.h"
 #include "nn/q_network.h"
 
 namespace upswing {
@@ -47,6 +48,9 @@ class Policy {
   static Policy Load(const std::filesystem::path& path);
 
  private:
+  /// Recomputes the stored outputs from the stored inputs. Throws BadInput.
+  void CheckSamples(const TensorFile& file);
+
   QNetwork<float> network_;
   AlignedVector<float> parameters_;
   std::vector<double> torques_;

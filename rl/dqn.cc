@@ -246,12 +246,24 @@ Policy Dqn::ExportPolicy(std::map<std::string, std::string> about) const {
   return {network_.shape(), {theta_.begin(), theta_.end()}, torques_, std::move(about)};
 }
 
+void Dqn::CheckActions(const Archive& archive) const {
+  const auto valid = [&](int64_t action) {
+    return action >= 0 && action < static_cast<int64_t>(torques_.size());
+  };
+  bool replay_valid = true;
+  for (int64_t i = 0; i < replay_.size(); ++i) replay_valid &= valid(replay_.at(i).action);
+  archive.Check(replay_valid, "replay/rows", "actions that the agent has");
+  archive.Check(std::ranges::all_of(n_step_.actions(), valid), "n_step/action",
+                "actions that the agent has");
+}
+
 void Dqn::State(Archive archive) {
   archive.Array("theta", std::span(theta_));
   archive.Array("theta_target", std::span(theta_target_));
   adam_.State(archive.In("adam"));
   replay_.State(archive.In("replay"));
   n_step_.State(archive.In("n_step"));
+  CheckActions(archive);
   explore_rng_.State(archive.In("explore_rng"));
   sample_rng_.State(archive.In("sample_rng"));
   archive.Scalar("steps", steps_);

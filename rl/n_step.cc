@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/text.h"
+
 namespace upswing {
 
 NStep::NStep(int num_envs, int n, double gamma, int obs_size)
@@ -51,6 +53,9 @@ void NStep::State(Archive archive) {
   archive.Array("count", std::span(count_));
   archive.Array("obs", std::span(obs_));
   archive.Array("action", std::span(action_));
+  archive.Check(std::ranges::all_of(
+                    count_, [&](int64_t c) { return c >= 0 && c < static_cast<int64_t>(n_); }),
+                "count", Concat("numbers from 0 to ", n_ - 1));
   archive.Array("reward", std::span(reward_));
 }
 

@@ -21,6 +21,9 @@ class NStep {
             std::span<const float> next_obs, bool terminated, bool truncated,
             const std::function<void(const Transition&)>& emit);
 
+  /// Actions of the steps that wait, and of some that no longer do (N × n).
+  std::span<const int64_t> actions() const { return action_; }
+
   /// Saves or loads the steps that wait for their successors.
   void State(Archive archive);
 

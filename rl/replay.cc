@@ -46,6 +46,11 @@ void Replay::Sample(Rng& rng, Minibatch& batch) const {
 void Replay::State(Archive archive) {
   archive.Scalar("next", next_);
   archive.Vector("rows", rows_, static_cast<size_t>(capacity_) * row_size());
+  archive.Check(rows_.size() % row_size() == 0, "rows", "whole transitions");
+  // Until the memory is full, the next place is behind the last.
+  const bool full = size() == capacity_;
+  archive.Check(full ? next_ >= 0 && next_ < capacity_ : next_ == size(), "next",
+                "a place to write to");
 }
 
 }  // namespace upswing

@@ -61,6 +61,7 @@ void RunFolder::Create(const fs::path& path,
 
 RunFolder::RunFolder(fs::path path, const TensorFile& checkpoint)
     : path_(std::move(path)),
+      lock_(path_),
       metrics_(OpenTable("metrics", "train/", checkpoint)),
       episodes_(OpenTable("episodes", "", checkpoint)),
       evals_(OpenTable("evals", "evaluation/", checkpoint)),

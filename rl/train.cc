@@ -115,11 +115,11 @@ void JudgePolicy(Training& t, TrainState& s) {
 }
 
 void SaveCheckpoint(Training& t, TrainState& s) {
-  s.checkpoint_at = s.steps;
   TensorFile checkpoint;
   checkpoint.metadata = t.checkpoint_metadata;
   AddToCheckpoint(t.agent, t.env, s, checkpoint);
   t.run.SaveCheckpoint(checkpoint);
+  s.checkpoint_at = s.steps;
 }
 
 /// The loop itself; see Train.
@@ -204,7 +204,7 @@ void TrainState::State(Archive archive) {
   archive.Scalar("episodes", episodes);
   archive.Scalar("seconds", seconds);
   archive.Scalar("evaluated_at", evaluated_at);
-  archive.Scalar("checkpoint_at", checkpoint_at);
+  if (archive.loading()) checkpoint_at = steps;
   archive.Scalar("full_successes", full_successes);
   archive.Scalar("first_full_step", first_full_step);
   archive.Scalar("first_full_seconds", first_full_seconds);

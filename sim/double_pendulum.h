@@ -11,6 +11,9 @@
 /// velocities (rad/s), m mass (kg), l length (m), g gravity (m/s²), tau torque at joint 1 (N·m).
 namespace upswing {
 
+/// Time between two actions (s); the physics makes several steps in it.
+inline constexpr double kControlPeriod = 0.02;
+
 /// What can be set at run time. The capsules keep their radius; inertia and centre of mass follow
 /// mass and length.
 struct Plant {

@@ -1,5 +1,6 @@
 #include "sim/model.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -35,13 +36,19 @@ ModelPtr CompileModel(const std::string& mjcf, const std::string& where) {
   std::array<char, 1000> message{};
   const std::unique_ptr<mjSpec, MuJoCoDeleter> spec(
       mj_parseXMLString(mjcf.c_str(), nullptr, message.data(), message.size()));
-  if (spec == nullptr) throw BadInput(Concat(where, ": ", message.data()));
+  const auto complaint = [&](std::string text) {
+    std::ranges::replace(text, '\n', ' ');  // an error is one line
+    return BadInput(Concat(where, ": ", Trim(text)));
+  };
+  if (spec == nullptr) throw complaint(message.data());
   ModelPtr model(mj_compile(spec.get(), nullptr));
-  if (model == nullptr) throw BadInput(Concat(where, ": ", mjs_getError(spec.get())));
+  if (model == nullptr) throw complaint(mjs_getError(spec.get()));
   return model;
 }
 
-void CheckModel(const mjModel& model, const std::string& where) {
+ModelPtr LoadModel(const std::string& mjcf, const std::string& where) {
+  ModelPtr compiled = CompileModel(mjcf, where);
+  const mjModel& model = *compiled;
   const auto expect = [&](bool valid, std::string_view expected) {
     if (!valid) throw BadInput(Concat(where, ": not a double pendulum: expected ", expected));
   };
@@ -58,14 +65,26 @@ void CheckModel(const mjModel& model, const std::string& where) {
   expect(model.nu == 1 && model.actuator_trnid[0] == 0 && model.na == 0 &&
              model.actuator_ctrllimited[0] != 0,
          "one motor with a control range, on the first hinge");
-  for (const int body : kLinkBodies) {
-    const int geom = body - 1;
-    const mjtNum* from = model.geom_pos + 3 * geom;
-    expect(std::abs(from[2] + model.geom_size[3 * geom + 1]) < 1e-9 && from[0] == 0 && from[1] == 0,
-           "capsules along -z from their hinge");
-  }
-  expect(std::abs(model.body_pos[8] + PlantOf(model).length1) < 1e-9,
-         "the second link at the end of the first");
+  expect(model.actuator_gear[0] == 1 && model.actuator_gainprm[0] == 1 &&
+             model.actuator_biastype[0] == mjBIAS_NONE,
+         "a motor whose control is its torque");
+  const double substeps = kControlPeriod / model.opt.timestep;
+  expect(substeps > 0.5 && std::abs(substeps - std::round(substeps)) < 1e-6,
+         Concat("a timestep that divides ", kControlPeriod, " s, got ", model.opt.timestep));
+
+  // Its plant written into it must change nothing: else it has what a Plant cannot say.
+  const ModelPtr written(mj_copyModel(nullptr, &model));
+  WritePlant(PlantOf(model), FieldsOf(*written));
+  const auto same = [&](const mjtNum* a, const mjtNum* b, int n, std::string_view what) {
+    for (int i = 0; i < n; ++i) expect(std::abs(a[i] - b[i]) < 1e-9, what);
+  };
+  same(model.body_pos, written->body_pos, 9, "the second link at the end of the first");
+  same(model.geom_pos, written->geom_pos, 6, "capsules along -z from their hinge");
+  same(model.body_ipos, written->body_ipos, 9, "the mass of each link to be that of its capsule");
+  same(model.body_inertia, written->body_inertia, 9, "the inertia of solid capsules");
+  same(model.actuator_ctrlrange, written->actuator_ctrlrange, 2, "a symmetric control range");
+  same(model.opt.gravity, written->opt.gravity, 3, "gravity along -z");
+  return compiled;
 }
 
 Plant PlantOf(const mjModel& model) {
@@ -108,6 +127,7 @@ void WritePlant(const Plant& plant, const ModelFields& fields) {
   fields.dof_damping[1] = plant.damping2;
   fields.actuator_ctrlrange[0] = -plant.torque_limit;
   fields.actuator_ctrlrange[1] = plant.torque_limit;
+  fields.gravity[0] = fields.gravity[1] = 0;
   fields.gravity[2] = -plant.gravity;
 }
 

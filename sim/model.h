@@ -24,8 +24,10 @@ using BatchPtr = std::unique_ptr<mjBatch, MuJoCoDeleter>;
 /// Compiles MJCF. Throws BadInput with MuJoCo's own message, after `where` (a file's name).
 ModelPtr CompileModel(const std::string& mjcf, const std::string& where);
 
-/// Throws BadInput unless the model is built like ours: two capsule links on hinges, one motor.
-void CheckModel(const mjModel& model, const std::string& where);
+/// Compiles somebody's MJCF. Throws BadInput, too, unless it is built like ours: two solid capsules
+/// on hinges about +y, one motor at the first, a timestep that divides the control period, nothing
+/// that a Plant cannot say.
+ModelPtr LoadModel(const std::string& mjcf, const std::string& where);
 
 /// The plant that a model like ours describes.
 Plant PlantOf(const mjModel& model);

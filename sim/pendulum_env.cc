@@ -27,23 +27,12 @@ ModelFields ExpandedFields(mjBatch* batch, int env) {
           Expand(batch, "opt.gravity", env)};
 }
 
-/// Physics steps in a control period. Throws BadInput if the period is no multiple of the timestep.
-int SubstepsOf(const mjModel& model) {
-  const double substeps = kControlPeriod / model.opt.timestep;
-  if (substeps < 0.5 || std::abs(substeps - std::round(substeps)) > 1e-6) {
-    throw BadInput(Concat("model: expected a timestep that divides ", kControlPeriod, " s, got ",
-                          model.opt.timestep));
-  }
-  return static_cast<int>(std::round(substeps));
-}
-
 }  // namespace
 
 PendulumEnv::PendulumEnv(const PendulumEnvConfig& config) : config_(config) {
   // The model, with the one plant that all environments share or as the base of many.
-  const std::string where = "model";
-  const ModelPtr model = CompileModel(config_.mjcf.empty() ? Mjcf(Plant()) : config_.mjcf, where);
-  CheckModel(*model, where);
+  const ModelPtr model = config_.mjcf.empty() ? CompileModel(Mjcf(Plant()), "model")
+                                              : LoadModel(config_.mjcf, "model");
   WritePlant(plant(0), FieldsOf(*model));
   const DataPtr data(mj_makeData(model.get()));
   mj_setConst(model.get(), data.get());
@@ -69,7 +58,7 @@ PendulumEnv::PendulumEnv(const PendulumEnvConfig& config) : config_(config) {
   qvel_ = mjb_stateComponent(batch_.get(), mjSTATE_QVEL, nullptr);
   ctrl_ = mjb_stateComponent(batch_.get(), mjSTATE_CTRL, nullptr);
 
-  substeps_ = SubstepsOf(*model);
+  substeps_ = static_cast<int>(std::round(kControlPeriod / model->opt.timestep));
   episode_steps_ = std::max<int64_t>(1, std::llround(config_.episode_seconds / kControlPeriod));
   step_counts_.resize(n);
   previous_q1_.resize(n);

@@ -11,9 +11,6 @@
 
 namespace upswing {
 
-/// Time between two actions (s); the physics makes several steps in it.
-inline constexpr double kControlPeriod = 0.02;
-
 /// Where episodes begin: a share of them anywhere, the others hanging with normal noise on all
 /// four state variables.
 struct StartStates {

@@ -1,0 +1,202 @@
+#!/usr/bin/env python3
+"""Independent readers agree with what the program writes: TensorBoard's own reader of event files,
+the safetensors package, and the forward pass of the network in numpy.
+
+These packages live in a virtual environment in build/readers-venv, which is made when it is missing
+or when tools/readers-requirements.txt has changed; the test then goes on in its Python.
+"""
+
+import fcntl
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+import unittest
+
+from testing import ROOT, ProgramTest, read_csv, read_tensors, small
+
+VENV = ROOT / "build/readers-venv"
+REQUIREMENTS = ROOT / "tools/readers-requirements.txt"
+
+
+def wanted():
+    """What the environment has to be made of."""
+    return f"{sys.version}\n{sys.base_exec_prefix}\n{REQUIREMENTS.read_text(encoding='utf-8')}"
+
+
+def make_environment():
+    """Makes the virtual environment unless it is there; its mark is written last."""
+    mark = VENV / "made-of.txt"
+    VENV.parent.mkdir(exist_ok=True)
+    with open(f"{VENV}.lock", "w", encoding="utf-8") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if mark.exists() and mark.read_text(encoding="utf-8") == wanted():
+            return
+        shutil.rmtree(VENV, ignore_errors=True)
+        command("cannot make a virtual environment (is python3-venv installed?)",
+                sys.executable, "-m", "venv", VENV)
+        command("cannot install the readers (is there a network?)", VENV / "bin/python", "-m",
+                "pip", "--disable-pip-version-check", "install", "--quiet", "--only-binary=:all:",
+                "--requirement", REQUIREMENTS)
+        mark.write_text(wanted(), encoding="utf-8")
+
+
+def command(problem, *arguments):
+    """Runs a command to its end; if it fails, so does the test."""
+    done = subprocess.run(arguments, check=False, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                          encoding="utf-8")
+    if done.returncode != 0:
+        sys.exit(f"readers_test: {problem}:\n{done.stdout}")
+
+
+def inside_environment():
+    return VENV.exists() and os.path.samefile(sys.prefix, VENV)
+
+
+if __name__ == "__main__" and not inside_environment():
+    make_environment()
+    os.execv(VENV / "bin/python", [str(VENV / "bin/python"), "-B", *sys.argv])
+
+# pylint: disable=wrong-import-position
+import numpy as np
+from safetensors import safe_open
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+
+def forward(network, weights, obs):
+    """Q-values (B × A) of observations (B × D), in double precision."""
+    x = obs.astype(np.float64)
+
+    def linear(name, x):
+        return x @ weights[name + ".weight"].T.astype(np.float64) + weights[name + ".bias"]
+
+    for i in range(len(network["hidden"])):
+        x = linear(f"feature.{i}", x)
+        if network["layer_norm"]:
+            x = (x - x.mean(axis=1, keepdims=True)) / np.sqrt(x.var(axis=1, keepdims=True) + 1e-5)
+            x = x * weights[f"feature.{i}.norm.weight"] + weights[f"feature.{i}.norm.bias"]
+        x = np.maximum(x, 0)
+    if not network["dueling"]:
+        return linear("output", x)
+    streams = np.maximum(linear("streams", x), 0)
+    value = linear("value", streams[:, :network["head"]])
+    advantage = linear("advantage", streams[:, network["head"]:])
+    return value + advantage - advantage.mean(axis=1, keepdims=True)
+
+
+def load(path):
+    """Metadata and arrays of a safetensors file, by the package."""
+    with safe_open(path, framework="np") as file:
+        return file.metadata(), {name: file.get_tensor(name) for name in file.keys()}
+
+
+class ReadersTest(ProgramTest):
+    def scalars(self):
+        """{tag: [(step, value)]} of the run's event file, by TensorBoard."""
+        events = EventAccumulator(str(self.folder / "run"), size_guidance={"scalars": 0})
+        events.Reload()
+        return {tag: [(event.step, event.value) for event in events.Scalars(tag)]
+                for tag in events.Tags()["scalars"]}
+
+    def assert_scalars_are_the_tables(self):
+        scalars = self.scalars()
+        for prefix, table in (("train/", "metrics.csv"), ("evaluation/", "evals.csv")):
+            rows = read_csv(self.folder / "run" / table)
+            for column in list(rows[0])[1:]:
+                self.assertEqual(scalars.pop(prefix + column),
+                                 [(row["step"], float(np.float32(row[column]))) for row in rows],
+                                 column)
+        self.assertEqual(scalars, {})
+
+    def test_tensorboard_reads_what_the_tables_say(self):
+        self.succeed(*small())
+        self.assert_scalars_are_the_tables()
+
+    def test_tensorboard_reads_a_run_that_was_killed_and_resumed(self):
+        process = self.start(*small(steps=10**9))
+        while not (self.folder / "run/policy.safetensors").exists():
+            self.assertIsNone(process.poll())
+            time.sleep(0.01)
+        self.end(process)
+        steps = int(load(self.folder / "run/checkpoint.safetensors")[1]["train/steps"]) + 4000
+        self.succeed("train", "--resume", "run", "--steps", steps)
+        self.assert_scalars_are_the_tables()
+
+    def check_policy(self, **changes):
+        """The package reads the names, shapes and samples that the network ought to have."""
+        self.succeed(*small(**changes))
+        path = self.folder / "run/policy.safetensors"
+        about, tensors = load(path)
+        network = json.loads(about["network"])
+        self.assertEqual({name: list(array.shape) for name, array in tensors.items()},
+                         expected_shapes(network))
+        self.assertEqual(about["format"], "upswing-policy")
+        self.assertEqual(json.loads(about["plant"])["gravity"], 9.81)
+        np.testing.assert_array_equal(tensors["torques"], np.linspace(-5, 5, 9))
+
+        q = forward(network, tensors, tensors["sample.obs"])
+        # The program computes in single precision: some roundings of numbers of this size.
+        np.testing.assert_allclose(tensors["sample.q"], q, rtol=0, atol=2e-5 * np.abs(q).max())
+        np.testing.assert_array_equal(tensors["sample.torque"],
+                                      tensors["torques"][tensors["sample.q"].argmax(axis=1)])
+        self.assertGreater(np.ptp(tensors["sample.q"]), 0)
+
+    def test_dueling_policy(self):
+        self.check_policy(hidden="32,24")
+
+    def test_plain_policy(self):
+        self.check_policy(agent="dqn", hidden="24,32")
+
+    def test_policy_without_layer_normalisation(self):
+        self.check_policy(layer_norm=False)
+
+    def test_policy_of_the_default_agent(self):
+        self.check_policy(agent="d3qn", hidden=None, head=None, steps=400, eval_every=400)
+
+    def test_checkpoint(self):
+        self.succeed(*small())
+        path = self.folder / "run/checkpoint.safetensors"
+        about, tensors = load(path)
+        self.assertEqual(about["format"], "upswing-checkpoint-1")
+        self.assertIn("gamma = 0.99", about["config"])
+        self.assertEqual(int(tensors["train/steps"]), 4000)
+        _, expected = read_tensors(path)
+        self.assertEqual(tensors.keys(), expected.keys())
+        parameters = tensors["agent/theta"].size
+        self.assertEqual(parameters, 1578)
+        for name in ("agent/theta", "agent/theta_target", "agent/adam/m", "agent/adam/v"):
+            self.assertEqual((tensors[name].dtype, tensors[name].shape),
+                             (np.float32, (parameters,)))
+            self.assertTrue(np.isfinite(tensors[name]).all(), name)
+        self.assertEqual(tensors["run/size/metrics"],
+                         (self.folder / "run/metrics.csv").stat().st_size)
+
+
+def expected_shapes(network):
+    """Names and shapes of a policy file's tensors."""
+    shapes = {}
+
+    def linear(name, out, width):
+        shapes[name + ".weight"] = [out, width]
+        shapes[name + ".bias"] = [out]
+
+    width = network["inputs"]
+    for i, out in enumerate(network["hidden"]):
+        linear(f"feature.{i}", out, width)
+        if network["layer_norm"]:
+            shapes[f"feature.{i}.norm.weight"] = shapes[f"feature.{i}.norm.bias"] = [out]
+        width = out
+    if network["dueling"]:
+        linear("streams", 2 * network["head"], width)
+        linear("value", 1, network["head"])
+        linear("advantage", network["actions"], network["head"])
+    else:
+        linear("output", network["actions"], width)
+    return shapes | {"torques": [9], "sample.obs": [16, 8], "sample.q": [16, 9],
+                     "sample.torque": [16]}
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,93 @@
+#include "apps/train_view.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+
+namespace upswing {
+
+TrainView::TrainView(const TrainState& state, const AgentReport& report)
+    : report_(report),
+      since_step_(state.steps),
+      since_updates_(report.updates),
+      since_seconds_(state.seconds) {}
+
+void TrainView::Announce(const Config& config, int threads, size_t num_parameters,
+                         const std::filesystem::path& run) const {
+  const DqnConfig& d = config.dqn;
+  fmt::print("Training {} (seed {}) in {}\n", config.agent, config.train.seed, run.string());
+  fmt::print("  {}{} network {}{}, {} parameters; {} environments, {} thread{}\n",
+             d.double_q ? "double, " : "", d.dueling ? "dueling" : "plain",
+             fmt::join(d.hidden, "-"), d.dueling ? fmt::format(" with heads of {}", d.head) : "",
+             FormatCount(num_parameters), config.train.envs, threads, threads == 1 ? "" : "s");
+  if (since_step_ > 0) fmt::print("  going on from step {}\n", FormatCount(since_step_));
+  std::fflush(stdout);
+}
+
+void TrainView::Follow(Training& training) {
+  const int64_t steps_in_all = training.config.steps;
+  training.on_metrics = [this](const TrainState& s, const AgentReport& report) {
+    UpdateRates(s, report);
+  };
+  training.on_step = [this, steps_in_all](const TrainState& s) {
+    if (line_.due()) ShowProgress(s, steps_in_all);
+  };
+  training.on_evaluation = [this](const TrainState& s, const Evaluation& e) {
+    line_.Print(fmt::format(
+        "{:>9} steps  {:>11}  {:>6} updates/s  eps {:.2f}  loss {:.4f}  return {:6.0f}  "
+        "success {:3}/{}",
+        FormatCount(s.steps), FormatDuration(s.seconds), FormatCount(updates_per_second_),
+        report_.epsilon, report_.loss, e.reward_sum.mean, e.successes, e.episodes));
+  };
+}
+
+void TrainView::UpdateRates(const TrainState& s, const AgentReport& report) {
+  report_ = report;
+  const double elapsed = s.seconds - since_seconds_;
+  if (elapsed < 0.5) return;
+  steps_per_second_ = static_cast<double>(s.steps - since_step_) / elapsed;
+  updates_per_second_ = static_cast<double>(report.updates - since_updates_) / elapsed;
+  since_step_ = s.steps;
+  since_updates_ = report.updates;
+  since_seconds_ = s.seconds;
+}
+
+void TrainView::ShowProgress(const TrainState& s, int64_t steps_in_all) {
+  const auto steps_left = static_cast<double>(steps_in_all - s.steps);
+  const std::string left =
+      steps_per_second_ > 0 ? FormatDuration(steps_left / steps_per_second_) : "?";
+  // The most telling first: a narrow terminal cuts the end.
+  line_.Show(
+      static_cast<double>(s.steps) / static_cast<double>(steps_in_all),
+      fmt::format("at most {} left  success {:.0f}%  return {:.0f}  {} steps/s  "
+                  "{} updates/s  eps {:.2f}  loss {:.3f}",
+                  left, 100 * s.last_success_rate, s.mean_return(), FormatCount(steps_per_second_),
+                  FormatCount(updates_per_second_), report_.epsilon, report_.loss));
+}
+
+void TrainView::Summarize(const TrainState& s, const std::filesystem::path& run, bool finished) {
+  line_.Clear();
+  if (s.solved) {
+    fmt::print("Solved after {} of training, at step {} (training so far: {}, {} steps).\n",
+               FormatDuration(s.first_full_seconds), FormatCount(s.first_full_step),
+               FormatDuration(s.seconds), FormatCount(s.steps));
+  } else {
+    fmt::print("{} at step {} after {} of training; not solved yet.\n",
+               finished ? "Done" : "Stopped", FormatCount(s.steps), FormatDuration(s.seconds));
+  }
+  if (s.best_step > 0) {
+    fmt::print("Best policy: {} (step {}, success {:.0f}%, return {:.0f})\n",
+               (run / "policy.safetensors").string(), FormatCount(s.best_step),
+               100 * s.best_success_rate, s.best_return);
+    fmt::print("Next:\n  ./upswing eval {0}\n  ./upswing info {0}\n", run.string());
+  } else {
+    fmt::print("Next:\n");
+  }
+  const std::string how = !finished  ? ""
+                          : s.solved ? " --no-stop-when-solved"
+                                     : fmt::format(" --steps {}", 2 * s.steps);
+  fmt::print("  ./upswing train --resume {}{}\n", run.string(), how);
+}
+
+}  // namespace upswing

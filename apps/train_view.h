@@ -1,0 +1,39 @@
+#pragma once
+
+#include <filesystem>
+
+#include "apps/config.h"
+#include "apps/progress.h"
+#include "rl/train.h"
+
+namespace upswing {
+
+/// What people see of a training: a progress line, a line for each evaluation, a summary.
+class TrainView {
+ public:
+  /// A training that stands at `state`, whose agent reports `report`.
+  TrainView(const TrainState& state, const AgentReport& report);
+
+  /// Says what begins here.
+  void Announce(const Config& config, int threads, size_t num_parameters,
+                const std::filesystem::path& run) const;
+
+  /// Lets the training tell this view how it goes on.
+  void Follow(Training& training);
+
+  /// Says what came of it and what to type next. `finished`: nobody stopped it.
+  void Summarize(const TrainState& state, const std::filesystem::path& run, bool finished);
+
+ private:
+  void UpdateRates(const TrainState& state, const AgentReport& report);
+  void ShowProgress(const TrainState& state, int64_t steps_in_all);
+
+  ProgressLine line_;
+  AgentReport report_;  // the last one
+  // Rates of training, between two reports at least half a second apart.
+  double steps_per_second_ = 0, updates_per_second_ = 0;
+  int64_t since_step_, since_updates_;
+  double since_seconds_;
+};
+
+}  // namespace upswing
