@@ -34,6 +34,13 @@ GOOD_MODEL = """<mujoco>
 
 
 class CommandLineTest(ProgramTest):
+    def test_empty_path(self):
+        for command in (["train", "--resume", ""], ["train", "--out", ""], ["train", "--config", ""],
+                        ["eval", ""], ["info", ""], ["simulate", "--torque", ""],
+                        ["simulate", "--csv", ""], ["simulate", "--model", ""]):
+            with self.subTest(command=command):
+                self.refuse(command, "empty")
+
     def test_unknown_flag(self):
         self.refuse(["train", "--gama", "0.9"], "--gama", "did you mean --gamma?")
         self.refuse(["train", "--gama=0.9"], "--gama", "did you mean --gamma?")

@@ -16,4 +16,10 @@ void AddEval(CLI::App& program, Command& command);
 void AddSimulate(CLI::App& program, Command& command);
 void AddInfo(CLI::App& program, Command& command);
 
+/// Refuses an empty path, such as that of a shell variable that is not set.
+CLI::Validator NotEmpty();
+
+/// Adds --set and --model, which choose another plant.
+void AddPlantOptions(CLI::App& app, std::vector<std::string>& set, std::string& model);
+
 }  // namespace upswing

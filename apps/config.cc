@@ -59,6 +59,16 @@ toml::table ParseToml(std::string_view text, const std::string& where) {
   }
 }
 
+/// Whether a text may stand in a file's metadata.
+bool IsUtf8(const std::string& text) {
+  try {
+    (void)json(text).dump();
+    return true;
+  } catch (const json::exception&) {
+    return false;
+  }
+}
+
 const NamedAgent& FindAgent(const std::string& name, const std::string& where) {
   const auto agents = EmbeddedAgents();
   const auto found = std::ranges::find_if(agents, [&](const auto& a) { return a.name == name; });
@@ -246,6 +256,7 @@ Plant ChangedPlant(const Plant& base, const std::string& model, const std::vecto
   const Options options = OptionsOf(plant);
   if (!model.empty()) {
     mjcf = ReadTextFile(model);
+    if (!IsUtf8(mjcf)) throw BadInput(Concat(model, ": expected UTF-8 text"));
     plant = PlantOf(*LoadModel(mjcf, model));
   }
   for (const std::string& change : set) {

@@ -125,18 +125,15 @@ void AddEval(CLI::App& program, Command& command) {
   auto a = std::make_shared<EvalArguments>();
   app->add_option("policy", a->policy, "policy.safetensors or run folder")
       ->required()
-      ->type_name("POLICY|RUN");
+      ->type_name("POLICY|RUN")
+      ->check(NotEmpty());
   app->add_option("--episodes", a->episodes, "how many [100]")
       ->check(CLI::Range(1, 1000000))
       ->type_name("");
   app->add_option("--seed", a->seed, "of the start states [0]")
       ->check(CLI::NonNegativeNumber)
       ->type_name("");
-  app->add_option("--set", a->set, "another plant, such as mass2=1.2 (repeat for more)")
-      ->type_name("NAME=VALUE")
-      ->take_all()
-      ->allow_extra_args(false);
-  app->add_option("--model", a->model, "MJCF file to evaluate on")->type_name("FILE");
+  AddPlantOptions(*app, a->set, a->model);
   app->add_option("--threads", a->threads, "0: one for each processor")
       ->check(CLI::Range(0, 256))
       ->type_name("");

@@ -23,12 +23,11 @@ void PrintPolicy(const fs::path& path) {
     return found == policy.about().end() ? "unknown" : found->second;
   };
   fmt::print("{}\n", loaded.path.string());
-  fmt::print("  what        greedy policy of a {} Q-network {}-{}-{}{}{}, {} parameters\n",
+  fmt::print("  what        greedy policy of a {} Q-network {}-{}-{}{}, {} parameters\n",
              shape.dueling ? "dueling" : "plain", shape.inputs, fmt::join(shape.hidden, "-"),
              shape.dueling ? fmt::format("({0}→1, {0}→{1})", shape.head, shape.actions)
                            : std::to_string(shape.actions),
-             shape.layer_norm ? ", layer normalisation" : "", "",
-             FormatCount(policy.num_parameters()));
+             shape.layer_norm ? ", layer normalisation" : "", FormatCount(policy.num_parameters()));
   fmt::print("  torques     {} N·m, every {} s\n", fmt::join(policy.torques(), ", "),
              about("control_period"));
   fmt::print("  made by     agent {}, seed {}, step {}, upswing {}\n", about("agent"),
@@ -51,8 +50,8 @@ void PrintRun(const fs::path& path) {
              FormatCount(config.train.steps), FormatCount(state.episodes),
              FormatDuration(state.seconds));
   if (state.solved) {
-    fmt::print("  solved      at step {}, after {} of training\n",
-               FormatCount(state.first_full_step), FormatDuration(state.first_full_seconds));
+    fmt::print("  solved      at step {}, after {} of training\n", FormatCount(state.streak_step),
+               FormatDuration(state.streak_seconds));
   } else {
     fmt::print("  solved      not yet; last success rate {}\n", state.last_success_rate);
   }
@@ -76,7 +75,8 @@ void AddInfo(CLI::App& program, Command& command) {
   auto path = std::make_shared<std::string>();
   app->add_option("policy", *path, "policy.safetensors or run folder")
       ->required()
-      ->type_name("POLICY|RUN");
+      ->type_name("POLICY|RUN")
+      ->check(NotEmpty());
   app->footer("Examples:\n  upswing info runs/d3qn-seed1\n  upswing info policy.safetensors\n");
   app->callback([path, &command] { command = [path] { return RunInfo(*path); }; });
 }

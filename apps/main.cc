@@ -11,6 +11,24 @@
 #include "core/text.h"
 
 namespace upswing {
+
+CLI::Validator NotEmpty() {
+  return {[](const std::string& path) -> std::string {
+            return path.empty() ? "expected a path, got an empty text" : "";
+          },
+          ""};
+}
+
+void AddPlantOptions(CLI::App& app, std::vector<std::string>& set, std::string& model) {
+  app.add_option("--set", set, "another plant, such as mass2=1.2 (repeat for more)")
+      ->type_name("NAME=VALUE")
+      ->take_all()
+      ->allow_extra_args(false);
+  app.add_option("--model", model, "MJCF file to use instead of the policy's model")
+      ->type_name("FILE")
+      ->check(NotEmpty());
+}
+
 namespace {
 
 /// Every flag of a subcommand, and the subcommands' names.

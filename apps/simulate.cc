@@ -145,21 +145,22 @@ void AddSimulate(CLI::App& program, Command& command) {
   CLI::App* app = program.add_subcommand(
       "simulate", "Write one rollout of a policy, of given torques, or of none as CSV");
   auto a = std::make_shared<SimulateArguments>();
-  app->add_option("policy", a->policy, "policy.safetensors or run folder")->type_name("POLICY|RUN");
+  app->add_option("policy", a->policy, "policy.safetensors or run folder")
+      ->type_name("POLICY|RUN")
+      ->check(NotEmpty());
   app->add_option("--torque", a->torque,
                   "CSV file with a column `torque` (N·m), a row for each 0.02 s")
-      ->type_name("FILE");
+      ->type_name("FILE")
+      ->check(NotEmpty());
   app->add_option("--start", a->start, "q1,q2,w1,w2 in rad and rad/s [0,0,0,0: hanging]")
       ->type_name("");
   app->add_option("--seconds", a->seconds, "how long [20, or as long as the torques last]")
       ->check(CLI::Range(0.0, 1e5))
       ->type_name("");
-  app->add_option("--set", a->set, "another plant, such as mass2=1.2 (repeat for more)")
-      ->type_name("NAME=VALUE")
-      ->take_all()
-      ->allow_extra_args(false);
-  app->add_option("--model", a->model, "MJCF file to simulate")->type_name("FILE");
-  app->add_option("--csv", a->csv, "file to write [standard output]")->type_name("FILE");
+  AddPlantOptions(*app, a->set, a->model);
+  app->add_option("--csv", a->csv, "file to write [standard output]")
+      ->type_name("FILE")
+      ->check(NotEmpty());
   app->footer(
       "Columns: t (s), qpos0, qpos1 (rad), qvel0, qvel1 (rad/s), torque (N·m, held over the next\n"
       "0.02 s, within the motor's limit), energy (J), height of the tip (m), inverted (0 or 1), "

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 
 #include "apps/commands.h"
 #include "apps/config.h"
@@ -109,13 +110,13 @@ struct Parts {
         state(env.num_envs(), kRewardTerms) {}
 
   /// Evaluation from fresh starts, with the reward's standard weights, on the training plant.
-  Evaluation Judge(const Policy& policy, uint64_t number) const {
+  Evaluation Judge(const Policy& policy, int64_t step) const {
     PendulumEnvConfig judge = config.Environments();
     judge.num_envs = static_cast<int>(config.train.eval_episodes);
     judge.episode_seconds = kEvaluationSeconds;
     judge.start = StartStates();
     judge.weights = RewardWeights();
-    judge.stream = Concat("evaluation at step ", number);
+    judge.stream = Concat("evaluation at step ", step);
     judge.threads = pool.threads();
     PendulumEnv env_of_judge(judge);
     return Evaluate(policy, env_of_judge);
@@ -137,48 +138,38 @@ void LogIfPossible(RunFolder& run, const std::string& line) {
   }
 }
 
-int RunTrain(const TrainArguments& arguments) {
-  const bool resuming = !arguments.resume.empty();
-  const fs::path resume = arguments.resume;
-  if (resuming && !fs::exists(resume / "config.toml")) {
-    throw BadInput(
-        Concat("--resume ", resume.string(), ": expected a run folder with a config.toml"));
-  }
-  Config config =
-      BuildConfig(resuming ? resume / "config.toml" : fs::path(arguments.config), arguments.flags);
-  if (!config.mjcf.empty()) config.model = "model.xml";  // the copy in the run folder
+/// Makes the folder of a new run, with its first checkpoint.
+fs::path MakeRun(const TrainArguments& arguments, Parts& parts) {
+  const Config& config = parts.config;
+  const fs::path path = arguments.out.empty() ? FreeRunFolder(config) : fs::path(arguments.out);
+  std::vector<std::pair<std::string, std::string>> files{
+      {"config.toml", ConfigToml(config, false)}};
+  if (!config.mjcf.empty()) files.emplace_back("model.xml", config.mjcf);
+  RunFolder::Create(path, files, [&](TensorFile& checkpoint) {
+    checkpoint.metadata = parts.CheckpointMetadata();
+    CheckpointState(Archive::Saver(checkpoint), parts.agent, parts.env, parts.state);
+  });
+  return path;
+}
 
-  const int threads = ResolveThreads(config.train.threads);
-  Parts parts(config, threads);
-  fs::path path = resume;
-  if (!resuming) {
-    path = arguments.out.empty() ? FreeRunFolder(config) : fs::path(arguments.out);
-    std::vector<std::pair<std::string, std::string>> files{
-        {"config.toml", ConfigToml(config, false)}};
-    if (!config.mjcf.empty()) files.emplace_back("model.xml", config.mjcf);
-    RunFolder::Create(path, files, [&](TensorFile& checkpoint) {
-      checkpoint.metadata = parts.CheckpointMetadata();
-      AddToCheckpoint(parts.agent, parts.env, parts.state, checkpoint);
-    });
-  }
-
-  // A new run, too, begins from its checkpoint.
+/// Goes on with a run from its checkpoint, where a new one begins too. Returns the exit code.
+int TrainRun(const fs::path& path, Parts& parts) {
   const TensorFile checkpoint = TensorFile::Load(RunFolder::CheckpointPath(path));
-  CheckCheckpoint(checkpoint, config);
-  LoadCheckpoint(parts.agent, parts.env, parts.state, checkpoint);
+  CheckCheckpoint(checkpoint, parts.config);
+  CheckpointState(Archive::Loader(checkpoint), parts.agent, parts.env, parts.state);
   RunFolder run(path, checkpoint);
-  if (resuming) WriteFileAtomically(path / "config.toml", ConfigToml(config, false));
+  WriteFileAtomically(path / "config.toml", ConfigToml(parts.config, false));
 
-  Training training{config.train, parts.agent, parts.env, run, {}, {}, {}, {}, {}, {}, {}};
-  training.evaluate = [&](const Policy& p, uint64_t number) { return parts.Judge(p, number); };
-  training.about = AboutTask(config);
+  Training training{parts.config.train, parts.agent, parts.env, run};
+  training.evaluate = [&](const Policy& p, int64_t step) { return parts.Judge(p, step); };
+  training.about = AboutTask(parts.config);
   training.checkpoint_metadata = parts.CheckpointMetadata();
   training.poll = PollSignals;
   TrainView view(parts.state, parts.agent.Report());
   view.Follow(training);
 
   InstallSignalHandlers();
-  view.Announce(config, threads, parts.agent.online().size(), path);
+  view.Announce(parts.config, parts.pool.threads(), parts.agent.online().size(), path);
   run.Log(Concat(parts.state.steps > 0 ? "resumed" : "started", " at step ", parts.state.steps));
   bool finished = false;
   try {
@@ -192,6 +183,27 @@ int RunTrain(const TrainArguments& arguments) {
   return finished ? 0 : 128 + g_stop_signal;
 }
 
+int RunTrain(const TrainArguments& arguments) {
+  const bool resuming = !arguments.resume.empty();
+  fs::path path = arguments.resume;
+  if (resuming && !fs::exists(path / "config.toml")) {
+    throw BadInput(
+        Concat("--resume ", path.string(), ": expected a run folder with a config.toml"));
+  }
+  std::optional<FolderLock> lock;
+  if (resuming) lock.emplace(path);  // before anything of it is read
+
+  Config config =
+      BuildConfig(resuming ? path / "config.toml" : fs::path(arguments.config), arguments.flags);
+  if (!config.mjcf.empty()) config.model = "model.xml";  // the copy in the run folder
+  Parts parts(config, ResolveThreads(config.train.threads));
+  if (!resuming) {
+    path = MakeRun(arguments, parts);
+    lock.emplace(path);
+  }
+  return TrainRun(path, parts);
+}
+
 /// What --help shows for a flag's value.
 std::string TypeName(const Option& option) {
   constexpr std::array kNames{"", "INTEGER", "NUMBER", "TEXT", "LIST"};  // in Target's order
@@ -202,6 +214,16 @@ std::string TypeName(const Option& option) {
 void AddSettings(CLI::App& app, std::vector<FlagValue>& flags) {
   Config defaults;
   const Options options = OptionsOf(defaults);
+  // CLI11 applies flags in this order: aliases first, so that what is more specific wins.
+  for (const auto& alias : options.aliases()) {
+    const std::string name = alias.name;
+    app.add_option_function<std::string>(
+           "--" + name, [&flags, name](const std::string& text) { flags.emplace_back(name, text); },
+           Concat("both ", alias.members[0], " and ", alias.members[1]))
+        ->group(alias.section)
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)
+        ->type_name("NUMBER");
+  }
   for (const Option& option : options.all()) {
     std::string help = option.help;
     if (!option.unit.empty()) help += ", " + option.unit;
@@ -222,15 +244,6 @@ void AddSettings(CLI::App& app, std::vector<FlagValue>& flags) {
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)
         ->type_name(TypeName(option));
   }
-  for (const auto& alias : options.aliases()) {
-    const std::string name = alias.name;
-    app.add_option_function<std::string>(
-           "--" + name, [&flags, name](const std::string& text) { flags.emplace_back(name, text); },
-           Concat("both ", alias.members[0], " and ", alias.members[1]))
-        ->group(alias.section)
-        ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)
-        ->type_name("NUMBER");
-  }
 }
 
 }  // namespace
@@ -238,9 +251,15 @@ void AddSettings(CLI::App& app, std::vector<FlagValue>& flags) {
 void AddTrain(CLI::App& program, Command& command) {
   CLI::App* app = program.add_subcommand("train", "Train an agent until the task is solved");
   auto arguments = std::make_shared<TrainArguments>();
-  app->add_option("--out", arguments->out, "run folder to make [runs/AGENT-seedSEED]");
-  app->add_option("--config", arguments->config, "TOML file of settings (flags come after it)");
-  app->add_option("--resume", arguments->resume, "go on with a run folder");
+  app->add_option("--out", arguments->out, "run folder to make [runs/AGENT-seedSEED]")
+      ->type_name("FOLDER")
+      ->check(NotEmpty());
+  app->add_option("--config", arguments->config, "TOML file of settings (flags come after it)")
+      ->type_name("FILE")
+      ->check(NotEmpty());
+  app->add_option("--resume", arguments->resume, "go on with a run folder")
+      ->type_name("RUN")
+      ->check(NotEmpty());
   AddSettings(*app, arguments->flags);
 
   std::string agents = "Named agents:\n";

@@ -215,6 +215,19 @@ class TrainTest(ProgramTest):
                                     eval_episodes=2, log_every=200, out=name))
                 self.assertIn(f"agent {name},", self.succeed("info", name))
 
+    def test_a_parameter_beats_the_name_for_both_whatever_the_order(self):
+        for flags in (["--mass", "3", "--mass2", "1.2"], ["--mass2", "1.2", "--mass", "3"]):
+            self.succeed(*small(out=flags[0]), *flags)
+            config = (self.folder / flags[0] / "config.toml").read_text()
+            self.assertRegex(config, r"(?m)^mass1 = 3 ")
+            self.assertRegex(config, r"(?m)^mass2 = 1\.2 ")
+
+    def test_a_slash_behind_the_folder_is_no_other_folder(self):
+        self.succeed(*small(out="a/b/"))
+        self.assertTrue((self.folder / "a/b/policy.safetensors").exists())
+        self.assertEqual([path.name for path in (self.folder / "a").iterdir()], ["b"])
+
+    @unittest.skipIf("UPSWING_SANITIZED" in os.environ, "takes an hour under sanitizers")
     def test_learns_until_solved(self):
         output = self.succeed("train", "--agent", "d3qn-small", "--seed", 1)
         self.assertIn("Solved after", output)

@@ -70,7 +70,7 @@ void TrainView::Summarize(const TrainState& s, const std::filesystem::path& run,
   line_.Clear();
   if (s.solved) {
     fmt::print("Solved after {} of training, at step {} (training so far: {}, {} steps).\n",
-               FormatDuration(s.first_full_seconds), FormatCount(s.first_full_step),
+               FormatDuration(s.streak_seconds), FormatCount(s.streak_step),
                FormatDuration(s.seconds), FormatCount(s.steps));
   } else {
     fmt::print("{} at step {} after {} of training; not solved yet.\n",

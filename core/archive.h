@@ -1,7 +1,5 @@
 #pragma once
 
-#include <algorithm>
-#include <cmath>
 #include <concepts>
 #include <span>
 #include <string>
@@ -9,6 +7,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/finite.h"
 #include "core/tensor_file.h"
 #include "core/text.h"
 
@@ -78,10 +77,9 @@ class Archive {
  private:
   template <typename T>
   void CheckFinite(const std::string& path, std::span<T> values) const {
-    const auto bad = std::ranges::find_if(values, [](T x) { return !std::isfinite(x); });
-    if (bad == values.end()) return;
-    const std::string what = Concat("tensor \"", path, "\": expected finite numbers, got ", *bad,
-                                    " at index ", bad - values.begin());
+    const std::string problem = FindNotFinite<T>(values);
+    if (problem.empty()) return;
+    const std::string what = Concat("tensor \"", path, "\": ", problem);
     throw loading() ? BadInput(Concat(source_->path(), ": ", what)) : Failure(what);
   }
 

@@ -48,6 +48,14 @@ bool WriteAll(int fd, std::span<const std::byte> bytes) {
   return true;
 }
 
+void WriteInPlace(const fs::path& path, std::span<const std::span<const std::byte>> parts) {
+  const Descriptor fd(open(path.c_str(), O_WRONLY));
+  if (fd.get() < 0) throw Failure(SystemError("cannot write", path));
+  for (const auto part : parts) {
+    if (!WriteAll(fd.get(), part)) throw Failure(SystemError("cannot write", path));
+  }
+}
+
 /// Makes a rename in `folder` durable. Some file systems cannot; the rename is atomic all the same.
 void SyncFolder(const fs::path& folder) {
   const Descriptor fd(open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY));
@@ -89,7 +97,14 @@ std::string ReadTextFile(const fs::path& path) {
   return text;
 }
 
-void WriteFileAtomically(const fs::path& path, std::span<const std::span<const std::byte>> parts) {
+void WriteFileAtomically(const fs::path& given, std::span<const std::span<const std::byte>> parts) {
+  // The file that a link leads to is what shall change, not the link.
+  std::error_code error;
+  const fs::path path = fs::exists(given, error) ? fs::canonical(given, error) : given;
+  if (fs::exists(path, error) && !fs::is_regular_file(path, error)) {
+    return WriteInPlace(path, parts);  // a pipe or a device cannot be replaced
+  }
+
   const fs::path temporary =
       path.parent_path() / Concat(".", path.filename().string(), ".upswing-tmp");
   try {
@@ -158,6 +173,10 @@ AppendFile::AppendFile(AppendFile&& other) noexcept
     : path_(std::move(other.path_)),
       descriptor_(std::exchange(other.descriptor_, -1)),
       size_(other.size_) {}
+
+void AppendFile::Sync() const {
+  if (fsync(descriptor_) != 0) throw Failure(SystemError("cannot write", path_));
+}
 
 void AppendFile::Append(std::span<const std::byte> bytes) {
   if (!WriteAll(descriptor_, bytes)) throw Failure(SystemError("cannot write", path_));

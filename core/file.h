@@ -21,7 +21,8 @@ std::string ReadTextFile(const std::filesystem::path& path);
 
 /// Replaces the file by `parts`, one after the other: written to a temporary file beside it,
 /// synchronised to disk, then renamed, so that at every moment the old file or the new one is
-/// there whole. Throws Failure; the old file then stays and the temporary one is removed.
+/// there whole. What is no regular file (a pipe, a device) is written in place. Throws Failure; the
+/// old file then stays and the temporary one is removed.
 void WriteFileAtomically(const std::filesystem::path& path,
                          std::span<const std::span<const std::byte>> parts);
 void WriteFileAtomically(const std::filesystem::path& path, std::string_view text);
@@ -55,6 +56,9 @@ class AppendFile {
   /// Appends all bytes at once. Throws Failure (a full disk).
   void Append(std::span<const std::byte> bytes);
   void Append(std::string_view text) { Append(BytesOf(text)); }
+
+  /// Waits until everything is on disk. Throws Failure.
+  void Sync() const;
 
   /// Bytes so far.
   int64_t size() const { return size_; }

@@ -44,6 +44,16 @@ TEST_F(FileTest, AWriteThatDoesNotFitLeavesTheOldFileAndNothingElse) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 1);
 }
 
+TEST_F(FileTest, ALinkStaysAndADeviceIsWrittenInPlace) {
+  WriteFileAtomically(folder_ / "target", "old");
+  fs::create_symlink("target", folder_ / "link");
+  WriteFileAtomically(folder_ / "link", "new");
+  EXPECT_TRUE(fs::is_symlink(folder_ / "link"));
+  EXPECT_EQ(ReadTextFile(folder_ / "target"), "new");
+  WriteFileAtomically("/dev/null", "gone");
+  EXPECT_TRUE(fs::is_character_file("/dev/null"));
+}
+
 TEST_F(FileTest, MissingFilesAndFoldersAreBadInput) {
   for (const fs::path& path : {folder_ / "missing", folder_}) {
     try {

@@ -97,8 +97,9 @@ void Option::Set(std::string_view text, const std::string& where) const {
   const bool valid =
       std::visit(Overloaded{
                      [&](bool* value) {
+                       if (text != "true" && text != "false") return false;
                        *value = text == "true";
-                       return text == "true" || text == "false";
+                       return true;
                      },
                      [&](int64_t* value) {
                        const auto parsed = ParseInteger(text);
@@ -114,8 +115,9 @@ void Option::Set(std::string_view text, const std::string& where) const {
                        return true;
                      },
                      [&](std::string* value) {
+                       if (text.find_first_of("\n\r") != std::string_view::npos) return false;
                        *value = text;
-                       return text.find_first_of("\n\r") == std::string_view::npos;
+                       return true;
                      },
                      [&](std::vector<int64_t>* value) {
                        auto parsed = ParseList(text, range);

@@ -36,7 +36,8 @@ const DtypeFacts& FactsOf(Dtype dtype) {
 constexpr std::string_view kChecksumKey = "\"checksum\":\"";
 constexpr std::string_view kNoChecksum = "0000000000000000";
 
-/// FNV-1a over 8-byte words (the last one padded with zeros): finds broken files, not forged ones.
+/// Finds broken files, not forged ones. After FNV-1a (its offset basis and prime), but over 8-byte
+/// words, the last of each piece padded with zeros, and with the high half folded into the low one.
 class Checksum {
  public:
   void Update(std::span<const std::byte> bytes) {

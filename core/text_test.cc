@@ -16,6 +16,8 @@ TEST(Text, NumbersRoundTripInTheirShortestForm) {
   }
   EXPECT_EQ(FormatNumber(0.1), "0.1");
   EXPECT_EQ(FormatNumber(3), "3");
+  EXPECT_EQ(FormatNumber(100000), "100000");
+  EXPECT_EQ(FormatNumber(-2e14), "-200000000000000");
 }
 
 TEST(Text, NumbersAreReadWholeOrNotAtAll) {

@@ -1,5 +1,7 @@
 #include "core/thread_pool.h"
 
+#include <sched.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -23,16 +25,25 @@ void WaitWhile(const std::atomic<T>& value, T old) {
 
 int ResolveThreads(int64_t wanted) {
   if (wanted > 0) return static_cast<int>(wanted);
-  return static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  cpu_set_t usable;
+  const bool known = sched_getaffinity(0, sizeof(usable), &usable) == 0;
+  return known ? std::max(1, CPU_COUNT(&usable)) : 1;
 }
 
 ThreadPool::ThreadPool(int threads) : errors_(static_cast<size_t>(std::max(1, threads))) {
-  for (int thread = 1; thread < threads; ++thread) {
-    workers_.emplace_back([this, thread] { Work(thread); });
+  try {
+    for (int thread = 1; thread < threads; ++thread) {
+      workers_.emplace_back([this, thread] { Work(thread); });
+    }
+  } catch (...) {
+    Stop();
+    throw;
   }
 }
 
-ThreadPool::~ThreadPool() {
+ThreadPool::~ThreadPool() { Stop(); }
+
+void ThreadPool::Stop() {
   stopping_ = true;
   ++round_;
   round_.notify_all();

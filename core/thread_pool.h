@@ -28,6 +28,7 @@ class ThreadPool {
   void ParallelFor(int n, const std::function<void(int)>& task);
 
  private:
+  void Stop();
   void Work(int thread);
   void RunShare(int thread);
 

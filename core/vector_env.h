@@ -15,6 +15,7 @@ struct StepResult {
   std::vector<float> next_obs;       // (N, D) true successor: of a finished episode its last one
   std::vector<double> reward;        // (N) per control step, the weighted sum of the terms
   std::vector<double> reward_terms;  // (N, K) weighted, signed: they add up to the reward
+  std::vector<double> torque;        // (N) what the motor really gave, N·m
   std::vector<double> work;          // (N) |mechanical work of the motor|, J
   std::vector<uint8_t> at_goal;      // (N) the successor is where the task wants it (inverted)
   std::vector<uint8_t> terminated;   // (N) the episode ended in a state without a future
@@ -24,6 +25,7 @@ struct StepResult {
       : next_obs(static_cast<size_t>(num_envs) * static_cast<size_t>(obs_size)),
         reward(static_cast<size_t>(num_envs)),
         reward_terms(static_cast<size_t>(num_envs) * static_cast<size_t>(num_terms)),
+        torque(static_cast<size_t>(num_envs)),
         work(static_cast<size_t>(num_envs)),
         at_goal(static_cast<size_t>(num_envs)),
         terminated(static_cast<size_t>(num_envs)),

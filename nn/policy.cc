@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
+#include "core/finite.h"
 #include "core/tensor_file.h"
 #include "core/text.h"
 
@@ -57,15 +58,11 @@ QNetwork<float> NetworkOf(const QNetworkShape& shape, const std::string& path) {
   }
 }
 
-/// Throws unless every number is finite.
+/// Throws BadInput unless every number of a file's tensor is finite.
 template <typename T>
-void CheckFinite(std::span<const T> values, const std::string& what) {
-  const auto bad =
-      std::find_if(values.begin(), values.end(), [](T x) { return !std::isfinite(x); });
-  if (bad != values.end()) {
-    throw BadInput(
-        Concat(what, ": expected finite numbers, got ", *bad, " at index ", bad - values.begin()));
-  }
+void CheckFinite(std::span<const T> values, const std::string& path, const std::string& tensor) {
+  const std::string problem = FindNotFinite(values);
+  if (!problem.empty()) throw BadInput(Concat(path, ": tensor \"", tensor, "\": ", problem));
 }
 
 }  // namespace
@@ -115,7 +112,8 @@ void Policy::Act(Matrix<const float> obs, std::span<double> torque) const {
 }
 
 void Policy::Save(const std::filesystem::path& path) const {
-  CheckFinite<float>(parameters_, "policy parameters");
+  const std::string problem = FindNotFinite<float>(parameters_);
+  if (!problem.empty()) throw Failure(Concat("policy parameters: ", problem));
   const int inputs = shape().inputs;
   const int actions = shape().actions;
   const std::vector<float> obs = SampleObservations(inputs);
@@ -161,11 +159,11 @@ Policy Policy::Load(const std::filesystem::path& path) {
   for (const ParameterBlock& block : network.blocks()) {
     const auto values = std::span(parameters).subspan(block.offset, block.size());
     file.Read(block.name, values, block.extents());
-    CheckFinite<float>(values, Concat(path.string(), ": tensor \"", block.name, "\""));
+    CheckFinite<float>(values, path.string(), block.name);
   }
   std::vector<double> torques(static_cast<size_t>(shape.actions));
   file.Read("torques", std::span(torques));
-  CheckFinite<double>(torques, Concat(path.string(), ": tensor \"torques\""));
+  CheckFinite<double>(torques, path.string(), "torques");
   Policy policy(shape, std::move(parameters), std::move(torques), file.metadata);
 
   policy.CheckSamples(file);
@@ -176,6 +174,7 @@ void Policy::CheckSamples(const TensorFile& file) {
   const auto inputs = static_cast<size_t>(shape().inputs);
   const auto actions = static_cast<size_t>(shape().actions);
   const size_t samples = file.Count<double>("sample.torque");
+  if (samples == 0) throw BadInput(Concat(file.path(), ": expected samples to check, got none"));
   std::vector<float> obs(samples * inputs);
   std::vector<float> expected(samples * actions);
   std::vector<float> q(expected.size());

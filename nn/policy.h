@@ -2,7 +2,6 @@
 
 #include <filesystem>
 #include <map>
-#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -37,8 +36,8 @@ class Policy {
   /// The torque (B), N·m, of the action with the largest Q-value, the first of equals.
   void Act(Matrix<const float> obs, std::span<double> torque) const;
 
-  /// Recomputes the sample outputs of the file that it was loaded from: the largest |difference|
-  /// from the stored Q-values, 0 for a policy that never was in a file.
+  /// Largest |difference| between the sample Q-values of the file that it was loaded from and those
+  /// that loading recomputed; 0 for a policy that never was in a file.
   double self_check_error() const { return self_check_error_; }
 
   /// Writes the file atomically. Throws Failure, also if a parameter is not finite.

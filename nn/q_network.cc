@@ -60,7 +60,7 @@ QNetwork<T>::QNetwork(QNetworkShape shape) : shape_(std::move(shape)) {
   const bool sizes_valid = valid(shape_.inputs) && valid(shape_.actions) &&
                            !shape_.hidden.empty() && shape_.hidden.size() <= 16 &&
                            std::all_of(shape_.hidden.begin(), shape_.hidden.end(), valid) &&
-                           (!shape_.dueling || valid(shape_.head));
+                           (shape_.dueling ? valid(shape_.head) : shape_.head == 0);
   if (!sizes_valid) {
     throw BadInput(Concat("network: expected 1 to 16 layers of 1 to ", kMaxWidth,
                           " units, got inputs ", shape_.inputs, ", actions ", shape_.actions, ", ",
@@ -132,7 +132,7 @@ typename QNetwork<T>::Activations QNetwork<T>::MakeActivations(int max_batch) co
   const auto room = [&](int64_t width) {
     return AlignedVector<T>(static_cast<size_t>(max_batch) * static_cast<size_t>(width));
   };
-  int64_t widest = std::max<int64_t>(shape_.actions, 2 * shape_.head);
+  int64_t widest = 0;
   for (const int64_t width : shape_.hidden) {
     widest = std::max(widest, width);
     a.feature.push_back(room(width));
@@ -146,6 +146,9 @@ typename QNetwork<T>::Activations QNetwork<T>::MakeActivations(int max_batch) co
     a.value_in = room(shape_.head);
     a.advantage_in = room(shape_.head);
     a.value = room(1);
+    a.grad_streams = room(2 * shape_.head);
+    a.grad_head = room(shape_.head);
+    a.grad_advantage = room(shape_.actions);
   }
   a.grad_a = room(widest);
   a.grad_b = room(widest);
@@ -218,54 +221,60 @@ void QNetwork<T>::Forward(std::span<const T> parameters, Matrix<const T> x, Acti
 }
 
 template <typename T>
+void QNetwork<T>::BackwardStreams(std::span<const T> parameters, Matrix<const T> feature,
+                                  Activations& a, Matrix<const T> dq, std::span<T> gradient,
+                                  Matrix<T> dfeature) const {
+  const int batch = dq.rows();
+  const int head = static_cast<int>(shape_.head);
+  const Matrix<T> streams(a.streams, batch, 2 * head);
+  const Matrix<T> value_in(a.value_in, batch, head);
+  const Matrix<T> advantage_in(a.advantage_in, batch, head);
+  const Matrix<T> dvalue(a.value, batch, 1);  // V itself is no longer needed
+  const Matrix<T> dadvantage(a.grad_advantage, batch, shape_.actions);
+  const Matrix<T> dhead(a.grad_head, batch, head);
+  const Matrix<T> dstreams(a.grad_streams, batch, 2 * head);
+  CombineStreamsBackward(dq, dvalue, dadvantage);
+  ApplyBackward(parameters, value_, value_in, dvalue, gradient, dhead);
+  PasteColumns<T>(dhead, 0, dstreams);
+  ApplyBackward(parameters, output_, advantage_in, dadvantage, gradient, dhead);
+  PasteColumns<T>(dhead, head, dstreams);
+  ReluBackward<T>(streams, dstreams);
+  ApplyBackward(parameters, streams_, feature, dstreams, gradient, dfeature);
+}
+
+template <typename T>
 void QNetwork<T>::Backward(std::span<const T> parameters, Matrix<const T> x, Activations& a,
                            Matrix<const T> dq, std::span<T> gradient) const {
   const int batch = x.rows();
   const size_t last = features_.size() - 1;
-  const auto feature = [&](size_t i) {
-    return Matrix<const T>(Matrix<T>(a.feature[i], batch, static_cast<int>(shape_.hidden[i])));
+  const auto width = [&](size_t i) { return static_cast<int>(shape_.hidden[i]); };
+  const auto feature = [&](size_t i) -> Matrix<const T> {
+    return Matrix<T>(a.feature[i], batch, width(i));
   };
-  Matrix<T> dy(a.grad_a, batch, static_cast<int>(shape_.hidden[last]));  // of feature layer i
-  AlignedVector<T>*next = &a.grad_b, *current = &a.grad_a;
 
-  if (!shape_.dueling) {
-    ApplyBackward(parameters, output_, feature(last), dq, gradient, dy);
+  // dy: gradient of feature layer i's output.
+  Matrix<T> dy(a.grad_a, batch, width(last));
+  if (shape_.dueling) {
+    BackwardStreams(parameters, feature(last), a, dq, gradient, dy);
   } else {
-    // Streams: the inputs of their last layers are overwritten by their own gradients.
-    const int head = static_cast<int>(shape_.head);
-    const Matrix<T> streams(a.streams, batch, 2 * head);
-    const Matrix<T> dstreams(a.grad_b, batch, 2 * head);
-    const Matrix<T> value_in(a.value_in, batch, head);
-    const Matrix<T> advantage_in(a.advantage_in, batch, head);
-    const Matrix<T> dvalue(a.value, batch, 1);
-    const Matrix<T> dadvantage(a.grad_a, batch, shape_.actions);
-    const Matrix<T> dhead(a.grad_b, batch, head);
-    CombineStreamsBackward(dq, dvalue, dadvantage);
-    ApplyBackward(parameters, value_, value_in, dvalue, gradient, dhead);
-    std::copy_n(dhead.data(), dhead.size(), value_in.data());
-    ApplyBackward(parameters, output_, advantage_in, dadvantage, gradient, dhead);
-    std::copy_n(dhead.data(), dhead.size(), advantage_in.data());
-    PasteColumns<T>(value_in, 0, dstreams);
-    PasteColumns<T>(advantage_in, head, dstreams);
-    ReluBackward<T>(streams, dstreams);
-    ApplyBackward(parameters, streams_, feature(last), dstreams, gradient, dy);
+    ApplyBackward(parameters, output_, feature(last), dq, gradient, dy);
   }
 
   // Feature layers from last to first: ReLU, layer norm, linear.
-  for (size_t i = features_.size(); i-- > 0;) {
+  for (size_t i = last + 1; i-- > 0;) {
     ReluBackward(feature(i), dy);
     if (shape_.layer_norm) {
       const ParameterBlock& gain = blocks_[norms_[i].weight];
       const ParameterBlock& bias = blocks_[norms_[i].bias];
-      const Matrix<T> normal(a.normal[i], batch, dy.cols());
+      const Matrix<T> normal(a.normal[i], batch, width(i));
       LayerNormBackward<T>(normal, Vector(parameters, norms_[i].weight), a.inv_std[i],
                            gradient.subspan(gain.offset, gain.size()),
                            gradient.subspan(bias.offset, bias.size()), dy);
     }
-    Matrix<T> dx;
-    if (i > 0) dx = Matrix<T>(*next, batch, static_cast<int>(shape_.hidden[i - 1]));
+    Matrix<T> dx;  // the observation's gradient is not wanted
+    if (i > 0)
+      dx = Matrix<T>(dy.data() == a.grad_a.data() ? a.grad_b : a.grad_a, batch, width(i - 1));
     ApplyBackward(parameters, features_[i], i > 0 ? feature(i - 1) : x, dy, gradient, dx);
-    std::swap(current, next);
     dy = dx;
   }
 }

@@ -66,7 +66,9 @@ class QNetwork {
     AlignedVector<T> streams;                 // (B × 2·head) hidden layers of both streams
     AlignedVector<T> value_in, advantage_in;  // (B × head) each
     AlignedVector<T> value;                   // (B × 1)
-    AlignedVector<T> grad_a, grad_b;          // (B × widest) gradients on their way back
+    // Gradients on their way back.
+    AlignedVector<T> grad_a, grad_b;  // (B × widest feature layer), by turns
+    AlignedVector<T> grad_streams, grad_head, grad_advantage;  // (B × 2·head), (B × head), (B × A)
   };
   /// Room for up to `max_batch` rows.
   Activations MakeActivations(int max_batch) const;
@@ -74,8 +76,8 @@ class QNetwork {
   /// Q-values q (B × A) of observations x (B × D).
   void Forward(std::span<const T> parameters, Matrix<const T> x, Activations& a, Matrix<T> q) const;
 
-  /// Gradient of sum(dq · q) with respect to the parameters, after Forward on the same x: writes
-  /// all of `gradient` (num_parameters).
+  /// Gradient of sum(dq · q) with respect to the parameters, once after each Forward on the same x,
+  /// whose activations it uses up: writes all of `gradient` (num_parameters).
   void Backward(std::span<const T> parameters, Matrix<const T> x, Activations& a,
                 Matrix<const T> dq, std::span<T> gradient) const;
 
@@ -90,6 +92,8 @@ class QNetwork {
   std::span<const T> Vector(std::span<const T> parameters, size_t block) const;
   void Apply(std::span<const T> parameters, const Linear& layer, Matrix<const T> x,
              Matrix<T> y) const;
+  void BackwardStreams(std::span<const T> parameters, Matrix<const T> feature, Activations& a,
+                       Matrix<const T> dq, std::span<T> gradient, Matrix<T> dfeature) const;
   void ApplyBackward(std::span<const T> parameters, const Linear& layer, Matrix<const T> x,
                      Matrix<const T> dy, std::span<T> gradient, Matrix<T> dx) const;
 

@@ -1,3 +1,6 @@
+// Deep Q-Network (Mnih et al., 2015). Symbols: s observation, a action, r reward, γ discount,
+// θ online and θ⁻ target parameters, y target, B batch size, A number of actions, D observation
+// size, N environments.
 #include "rl/dqn.h"
 
 #include <algorithm>
@@ -10,9 +13,10 @@
 namespace upswing {
 namespace {
 
-// A minibatch is cut into slices of at least this many rows, whatever the number of threads: each
-// slice's gradient is a sum of its own, and the slices are added in their order.
+// A minibatch is cut into up to kMaxShards slices of kShardRows rows or more, whatever the number
+// of threads: each slice's gradient is a sum of its own, and the slices are added in their order.
 constexpr int kShardRows = 32;
+constexpr int kMaxShards = 4;
 
 QNetworkShape ShapeOf(const DqnConfig& config, int obs_size, size_t actions) {
   return {obs_size,       static_cast<int>(actions),
@@ -98,7 +102,7 @@ Dqn::Dqn(const DqnConfig& config, int num_envs, int obs_size, std::vector<double
   theta_target_ = theta_;
 
   const int batch = static_cast<int>(config.batch);
-  const int count = std::clamp(batch / kShardRows, 1, 4);
+  const int count = std::clamp(batch / kShardRows, 1, kMaxShards);
   for (int i = 0; i < count; ++i) {
     const int first = batch * i / count;
     const int rows = batch * (i + 1) / count - first;
@@ -170,16 +174,15 @@ void Dqn::Update(const Minibatch& batch) {
   pool_.ParallelFor(static_cast<int>(shards_.size()),
                     [&](int i) { ComputeGradient(batch, shards_[static_cast<size_t>(i)]); });
   Shard& total = shards_.front();
-  double loss = total.loss;
-  q_sum_ += total.q_sum / static_cast<double>(config_.batch);
-  td_sum_ += total.td_sum / static_cast<double>(config_.batch);
-  for (size_t i = 1; i < shards_.size(); ++i) {
-    AddTo<float>(shards_[i].gradient, total.gradient);
-    loss += shards_[i].loss;
-    q_sum_ += shards_[i].q_sum / static_cast<double>(config_.batch);
-    td_sum_ += shards_[i].td_sum / static_cast<double>(config_.batch);
+  double loss = 0, q = 0, td = 0;
+  for (Shard& shard : shards_) {
+    if (&shard != &total) AddTo<float>(shard.gradient, total.gradient);
+    loss += shard.loss;
+    q += shard.q_sum;
+    td += shard.td_sum;
   }
-  loss /= static_cast<double>(config_.batch);
+  const double B = static_cast<double>(config_.batch);
+  loss /= B;
   if (!std::isfinite(loss)) {
     throw Failure(
         Concat("the loss is ", loss, " in update ", updates_ + 1, ", expected a finite number"));
@@ -194,6 +197,8 @@ void Dqn::Update(const Minibatch& batch) {
     theta_target_ = theta_;
   }
   loss_sum_ += loss;
+  q_sum_ += q / B;
+  td_sum_ += td / B;
   ++report_updates_;
 }
 
@@ -202,6 +207,7 @@ void Dqn::ComputeGradient(const Minibatch& batch, Shard& shard) {
   const auto rows = static_cast<size_t>(shard.rows);
   const int actions = static_cast<int>(torques_.size());
   const int obs_size = static_cast<int>(obs_size_);
+  // s, s' (rows × D); all Q-values (rows × A)
   const Matrix<const float> s(batch.obs.data() + first * obs_size_, shard.rows, obs_size);
   const Matrix<const float> s_next(batch.next_obs.data() + first * obs_size_, shard.rows, obs_size);
   const Matrix<float> q(shard.q, shard.rows, actions);
@@ -246,24 +252,13 @@ Policy Dqn::ExportPolicy(std::map<std::string, std::string> about) const {
   return {network_.shape(), {theta_.begin(), theta_.end()}, torques_, std::move(about)};
 }
 
-void Dqn::CheckActions(const Archive& archive) const {
-  const auto valid = [&](int64_t action) {
-    return action >= 0 && action < static_cast<int64_t>(torques_.size());
-  };
-  bool replay_valid = true;
-  for (int64_t i = 0; i < replay_.size(); ++i) replay_valid &= valid(replay_.at(i).action);
-  archive.Check(replay_valid, "replay/rows", "actions that the agent has");
-  archive.Check(std::ranges::all_of(n_step_.actions(), valid), "n_step/action",
-                "actions that the agent has");
-}
-
 void Dqn::State(Archive archive) {
   archive.Array("theta", std::span(theta_));
   archive.Array("theta_target", std::span(theta_target_));
   adam_.State(archive.In("adam"));
-  replay_.State(archive.In("replay"));
-  n_step_.State(archive.In("n_step"));
-  CheckActions(archive);
+  const int actions = static_cast<int>(torques_.size());
+  replay_.State(archive.In("replay"), actions);
+  n_step_.State(archive.In("n_step"), actions);
   explore_rng_.State(archive.In("explore_rng"));
   sample_rng_.State(archive.In("sample_rng"));
   archive.Scalar("steps", steps_);

@@ -90,8 +90,6 @@ class Dqn : public Agent {
     double loss = 0, q_sum = 0, td_sum = 0;
   };
   void ComputeGradient(const Minibatch& batch, Shard& shard);
-  /// On loading, throws BadInput unless every stored action is one of ours.
-  void CheckActions(const Archive& archive) const;
 
   DqnConfig config_;
   size_t obs_size_;

@@ -52,7 +52,8 @@ Interval WilsonInterval(int64_t successes, int64_t trials) {
   const double p = static_cast<double>(successes) / n;
   const double center = (p + kZ * kZ / (2 * n)) / (1 + kZ * kZ / n);
   const double half = kZ / (1 + kZ * kZ / n) * std::sqrt(p * (1 - p) / n + kZ * kZ / (4 * n * n));
-  return {std::max(0.0, center - half), std::min(1.0, center + half)};
+  // At the ends rounding must not cut the bound off.
+  return {successes == 0 ? 0.0 : center - half, successes == trials ? 1.0 : center + half};
 }
 
 Moments MomentsOf(std::span<const double> values) {
@@ -84,8 +85,8 @@ Evaluation Evaluate(const Policy& policy, VectorEnv& env,
       if (ended[i]) continue;
       EvaluationEpisode& episode = episodes[i];
       episode.work += result.work[i];
-      episode.peak_torque = std::max(episode.peak_torque, std::abs(torque[i]));
-      episode.rms_torque += torque[i] * torque[i];
+      episode.peak_torque = std::max(episode.peak_torque, std::abs(result.torque[i]));
+      episode.rms_torque += result.torque[i] * result.torque[i];
       if (k <= return_steps) {
         episode.reward_sum += result.reward[i];
         for (size_t j = 0; j < terms; ++j) {

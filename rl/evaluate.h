@@ -10,11 +10,9 @@
 
 namespace upswing {
 
-/// An evaluation episode lasts this long; it succeeds if every state of its last half is at the
-/// goal; its return counts the first half.
-inline constexpr double kEvaluationSeconds = 20;
-inline constexpr double kHoldSeconds = 10;
-inline constexpr double kReturnSeconds = 10;
+inline constexpr double kEvaluationSeconds = 20;  // length of an evaluation episode
+inline constexpr double kHoldSeconds = 10;  // success: every state of the last so many at the goal
+inline constexpr double kReturnSeconds = 10;  // the return counts the first so many
 
 /// What one evaluation episode came to.
 struct EvaluationEpisode {

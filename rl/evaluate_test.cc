@@ -26,6 +26,7 @@ class ScriptedEnv : public ToyEnv {
     for (size_t i = 0; i < goal_from_.size(); ++i) {
       r.at_goal[i] = k_ >= goal_from_[i] && k_ != gap_ ? 1 : 0;
       r.reward[i] = r.reward_terms[i] = k_;
+      r.torque[i] = torque[i];
       r.work[i] = 0.5;
       r.terminated[i] = static_cast<int>(i) == blow_up && k_ == 900 ? 1 : 0;
       r.truncated[i] = 0;

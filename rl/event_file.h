@@ -20,6 +20,8 @@ class EventFile {
   void Append(int64_t step, const std::vector<std::pair<std::string, double>>& scalars);
 
   int64_t size() const { return file_.size(); }
+  /// Waits until everything is on disk. Throws Failure.
+  void Sync() const { file_.Sync(); }
 
  private:
   void AppendRecord(const std::string& payload);

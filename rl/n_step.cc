@@ -43,20 +43,25 @@ void NStep::Push(int env, std::span<const float> obs, int action, double reward,
   }
 
   // What still waits moves to the front.
+  count_[e] = static_cast<int64_t>(k);
+  if (first == 0) return;
   std::ranges::copy(waiting_obs.subspan(first * obs_size_), waiting_obs.begin());
   std::ranges::copy(waiting_action.subspan(first), waiting_action.begin());
   std::ranges::copy(waiting_reward.subspan(first), waiting_reward.begin());
-  count_[e] = static_cast<int64_t>(k);
 }
 
-void NStep::State(Archive archive) {
+void NStep::State(Archive archive, int num_actions) {
   archive.Array("count", std::span(count_));
   archive.Array("obs", std::span(obs_));
   archive.Array("action", std::span(action_));
-  archive.Check(std::ranges::all_of(
-                    count_, [&](int64_t c) { return c >= 0 && c < static_cast<int64_t>(n_); }),
-                "count", Concat("numbers from 0 to ", n_ - 1));
   archive.Array("reward", std::span(reward_));
+  const auto below = [](int64_t bound) {
+    return [bound](int64_t x) { return x >= 0 && x < bound; };
+  };
+  archive.Check(std::ranges::all_of(count_, below(static_cast<int64_t>(n_))), "count",
+                Concat("numbers from 0 to ", n_ - 1));
+  archive.Check(std::ranges::all_of(action_, below(num_actions)), "action",
+                Concat("actions from 0 to ", num_actions - 1));
 }
 
 }  // namespace upswing

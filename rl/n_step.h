@@ -21,11 +21,9 @@ class NStep {
             std::span<const float> next_obs, bool terminated, bool truncated,
             const std::function<void(const Transition&)>& emit);
 
-  /// Actions of the steps that wait, and of some that no longer do (N × n).
-  std::span<const int64_t> actions() const { return action_; }
-
-  /// Saves or loads the steps that wait for their successors.
-  void State(Archive archive);
+  /// Saves or loads the steps that wait for their successors; loading throws BadInput on an action
+  /// of num_actions or more.
+  void State(Archive archive, int num_actions);
 
  private:
   size_t n_, obs_size_;

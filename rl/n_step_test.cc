@@ -76,12 +76,12 @@ TEST(NStep, LoadedGoesOnLikeSaved) {
   std::vector<Emitted> a, b;
   for (int i = 0; i < 4; ++i) PushStep(saved, i % 2, i, false, false, a);
   TensorFile file;
-  saved.State(Archive::Saver(file));
+  saved.State(Archive::Saver(file), 9);
   const TempFolder folder;
   const auto path = folder / "state.safetensors";
   file.Save(path);
   const TensorFile source = TensorFile::Load(path);
-  loaded.State(Archive::Loader(source));
+  loaded.State(Archive::Loader(source), 9);
   a.clear();
   PushStep(saved, 1, 5, false, true, a);
   PushStep(loaded, 1, 5, false, true, b);

@@ -1,6 +1,9 @@
 #include "rl/replay.h"
 
 #include <algorithm>
+#include <cmath>
+
+#include "core/text.h"
 
 namespace upswing {
 
@@ -43,7 +46,7 @@ void Replay::Sample(Rng& rng, Minibatch& batch) const {
   }
 }
 
-void Replay::State(Archive archive) {
+void Replay::State(Archive archive, int num_actions) {
   archive.Scalar("next", next_);
   archive.Vector("rows", rows_, static_cast<size_t>(capacity_) * row_size());
   archive.Check(rows_.size() % row_size() == 0, "rows", "whole transitions");
@@ -51,6 +54,11 @@ void Replay::State(Archive archive) {
   const bool full = size() == capacity_;
   archive.Check(full ? next_ >= 0 && next_ < capacity_ : next_ == size(), "next",
                 "a place to write to");
+  if (!archive.loading()) return;
+  const auto valid = [&](float a) { return a >= 0 && a < num_actions && a == std::trunc(a); };
+  for (size_t action = 2 * obs_size_; action < rows_.size(); action += row_size()) {
+    archive.Check(valid(rows_[action]), "rows", Concat("actions from 0 to ", num_actions - 1));
+  }
 }
 
 }  // namespace upswing

@@ -59,7 +59,7 @@ TEST(Replay, AMillionTransitionsOfThePendulumFitIn100Megabytes) {
   const std::array<float, 8> obs{};
   for (int i = 0; i < 1000; ++i) replay.Add({obs, obs, 0, 0, 0});
   TensorFile file;
-  replay.State(Archive::Saver(file));
+  replay.State(Archive::Saver(file), 9);
   EXPECT_EQ(file.tensors().at("rows").bytes.size(), 1000 * kRow);
   EXPECT_LE(1000000 * kRow, 100000000U);
 }
@@ -68,12 +68,12 @@ TEST(Replay, LoadedGoesOnLikeSaved) {
   Replay saved(5, 2), loaded(5, 2);
   for (int i = 0; i < 7; ++i) saved.Add(Numbered(i).transition);
   TensorFile file;
-  saved.State(Archive::Saver(file));
+  saved.State(Archive::Saver(file), 9);
   const TempFolder folder;
   const auto path = folder / "state.safetensors";
   file.Save(path);
   const TensorFile source = TensorFile::Load(path);
-  loaded.State(Archive::Loader(source));
+  loaded.State(Archive::Loader(source), 9);
   saved.Add(Numbered(7).transition);
   loaded.Add(Numbered(7).transition);
   for (int i = 0; i < 5; ++i) EXPECT_EQ(saved.at(i).reward, loaded.at(i).reward);

@@ -3,6 +3,7 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include <array>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
@@ -26,11 +27,21 @@ int64_t SizeOf(const TensorFile& checkpoint, std::string_view table) {
   return size;
 }
 
+/// Adds the sizes of metrics, episodes, evals and events.
+void AddSizes(TensorFile& checkpoint, const std::array<int64_t, 4>& sizes) {
+  constexpr std::array kTables{"metrics", "episodes", "evals", "events"};
+  for (size_t i = 0; i < sizes.size(); ++i) {
+    checkpoint.AddScalar(SizeName(kTables.at(i)), sizes.at(i));
+  }
+}
+
 }  // namespace
 
-void RunFolder::Create(const fs::path& path,
+void RunFolder::Create(const fs::path& given,
                        const std::vector<std::pair<std::string, std::string>>& files,
                        const std::function<void(TensorFile&)>& first_checkpoint) {
+  fs::path path = given.lexically_normal();
+  if (!path.has_filename()) path = path.parent_path();  // a slash at the end
   std::error_code error;
   if (fs::exists(path, error) && !(fs::is_directory(path, error) && fs::is_empty(path, error))) {
     throw BadInput(Concat(path.string(),
@@ -38,30 +49,30 @@ void RunFolder::Create(const fs::path& path,
                           path.string(), ", or choose another --out)"));
   }
   if (path.has_parent_path()) fs::create_directories(path.parent_path(), error);
-  std::string making_name = Concat(path.string(), ".XXXXXX");
-  if (mkdtemp(making_name.data()) == nullptr) {
-    throw Failure(Concat("cannot make the run folder ", path.string(), ": ", std::strerror(errno)));
-  }
-  const fs::path making = making_name;
+  std::string making = Concat(path.string(), ".XXXXXX");
+  const auto cannot = [&](int exit_code, std::string_view why) {
+    return Error(exit_code, Concat("cannot make the run folder ", path.string(), ": ", why));
+  };
+  if (mkdtemp(making.data()) == nullptr) throw cannot(1, std::strerror(errno));
   try {
     fs::permissions(making, fs::perms(0755));  // mkdtemp makes it for the owner alone
-    for (const auto& [name, text] : files) WriteFileAtomically(making / name, text);
+    for (const auto& [name, text] : files) WriteFileAtomically(fs::path(making) / name, text);
     TensorFile checkpoint;
-    for (const std::string_view table : {"metrics", "episodes", "evals", "events"}) {
-      checkpoint.AddScalar(SizeName(table), int64_t{0});
-    }
+    AddSizes(checkpoint, {0, 0, 0, 0});
     first_checkpoint(checkpoint);
     checkpoint.Save(CheckpointPath(making));
     fs::rename(making, path);
-  } catch (const std::exception& failure) {
+  } catch (const Error& failure) {
     fs::remove_all(making, error);
-    throw Failure(Concat("cannot make the run folder ", path.string(), ": ", failure.what()));
+    throw cannot(failure.exit_code(), failure.what());
+  } catch (const fs::filesystem_error& failure) {
+    fs::remove_all(making, error);
+    throw cannot(1, failure.code().message());
   }
 }
 
 RunFolder::RunFolder(fs::path path, const TensorFile& checkpoint)
     : path_(std::move(path)),
-      lock_(path_),
       metrics_(OpenTable("metrics", "train/", checkpoint)),
       episodes_(OpenTable("episodes", "", checkpoint)),
       evals_(OpenTable("evals", "evaluation/", checkpoint)),
@@ -97,10 +108,11 @@ void RunFolder::Log(std::string_view line) {
 }
 
 void RunFolder::SaveCheckpoint(TensorFile& checkpoint) const {
-  checkpoint.AddScalar(SizeName("metrics"), metrics_.file.size());
-  checkpoint.AddScalar(SizeName("episodes"), episodes_.file.size());
-  checkpoint.AddScalar(SizeName("evals"), evals_.file.size());
-  checkpoint.AddScalar(SizeName("events"), events_.size());
+  // On disk before the checkpoint that knows of them.
+  for (const Table* table : {&metrics_, &episodes_, &evals_}) table->file.Sync();
+  events_.Sync();
+  AddSizes(checkpoint,
+           {metrics_.file.size(), episodes_.file.size(), evals_.file.size(), events_.size()});
   checkpoint.Save(CheckpointPath(path_));
 }
 

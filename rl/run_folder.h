@@ -37,8 +37,7 @@ class RunFolder {
                      const std::vector<std::pair<std::string, std::string>>& files,
                      const std::function<void(TensorFile&)>& first_checkpoint);
 
-  /// Opens a run whose checkpoint has been loaded. Throws BadInput, also if another process has it
-  /// open, or Failure.
+  /// Opens a run whose checkpoint has been loaded; the caller holds its FolderLock. Throws Failure.
   RunFolder(std::filesystem::path path, const TensorFile& checkpoint);
 
   const std::filesystem::path& path() const { return path_; }
@@ -65,7 +64,6 @@ class RunFolder {
   void AppendRow(Table& table, const Row& row);
 
   std::filesystem::path path_;
-  FolderLock lock_;
   Table metrics_, episodes_, evals_;
   EventFile events_;
   AppendFile log_;

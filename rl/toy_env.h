@@ -30,6 +30,7 @@ class ToyEnv : public VectorEnv {
       r.next_obs[i] = poison ? std::numeric_limits<float>::quiet_NaN() : x_[i];
       r.at_goal[i] = std::abs(x_[i]) < 0.5F ? 1 : 0;
       r.reward[i] = r.reward_terms[i] = r.at_goal[i];
+      r.torque[i] = torque[i];
       r.work[i] = std::abs(torque[i]);
       r.terminated[i] = std::abs(x_[i]) > 5 ? 1 : 0;
       r.truncated[i] = ++steps_[i] >= episode_steps && !r.terminated[i] ? 1 : 0;

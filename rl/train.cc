@@ -1,3 +1,4 @@
+// The training loop. N environments, K reward terms; steps are control steps over all environments.
 #include "rl/train.h"
 
 #include <algorithm>
@@ -71,53 +72,63 @@ void LogMetrics(Training& t, const TrainState& s) {
   if (t.on_metrics) t.on_metrics(s, report);
 }
 
-/// Judges the present policy, keeps it if it is the best so far, and sees whether the task is
-/// solved: nothing but successes in two evaluations in a row.
-void JudgePolicy(Training& t, TrainState& s) {
-  std::map<std::string, std::string> about = t.about;
-  about["step"] = std::to_string(s.steps);
-  Policy policy = t.agent.ExportPolicy(about);
-  const Evaluation e = t.evaluate(policy, static_cast<uint64_t>(s.steps));
-  s.evaluated_at = s.steps;
-  s.last_success_rate = e.success_rate();
-
+/// Writes the policy if it is the best so far: by its success rate, then by its return.
+void KeepIfBest(Training& t, TrainState& s, const Evaluation& e) {
   const double rate = e.success_rate();
   const double mean_return = e.reward_sum.mean;
-  if (std::pair(rate, mean_return) > std::pair(s.best_success_rate, s.best_return)) {
-    s.best_success_rate = rate;
-    s.best_return = mean_return;
-    s.best_step = s.steps;
-    about["success_rate"] = FormatNumber(rate);
-    about["mean_return"] = FormatNumber(mean_return);
-    t.agent.ExportPolicy(about).Save(t.run.policy_path());
-  }
+  if (std::pair(rate, mean_return) <= std::pair(s.best_success_rate, s.best_return)) return;
+  std::map<std::string, std::string> about = t.about;
+  about["step"] = std::to_string(s.steps);
+  about["success_rate"] = FormatNumber(rate);
+  about["mean_return"] = FormatNumber(mean_return);
+  t.agent.ExportPolicy(about).Save(t.run.policy_path());
+  s.best_success_rate = rate;
+  s.best_return = mean_return;
+  s.best_step = s.steps;
+}
 
+/// Solved: nothing but successes in two evaluations in a row.
+void CountStreak(TrainState& s, const Evaluation& e) {
+  if (s.solved) return;
   if (!e.all_succeeded()) {
-    s.full_successes = 0;
-  } else if (++s.full_successes == 1 && !s.solved) {
-    s.first_full_step = s.steps;
-    s.first_full_seconds = s.seconds;
+    s.streak = 0;
+    return;
   }
-  s.solved = s.solved || s.full_successes >= 2;
+  if (++s.streak == 1) {
+    s.streak_step = s.steps;
+    s.streak_seconds = s.seconds;
+  }
+  s.solved = s.streak == 2;
+}
 
+void LogEvaluation(Training& t, const TrainState& s, const Evaluation& e) {
   t.run.LogEvaluation({{"step", s.steps},
-                       {"success_rate", rate},
+                       {"success_rate", e.success_rate()},
                        {"success_low", e.success_interval.low},
                        {"success_high", e.success_interval.high},
-                       {"mean_return", mean_return},
+                       {"mean_return", e.reward_sum.mean},
                        {"swing_up_seconds", e.swing_up_seconds.median},
                        {"work", e.work.mean},
                        {"rms_torque", e.rms_torque.mean},
                        {"seconds", s.seconds}});
   t.run.Log(Concat("step ", s.steps, ": ", e.successes, " of ", e.episodes,
-                   " episodes succeed, mean return ", FormatNumber(mean_return)));
+                   " episodes succeed, mean return ", FormatNumber(e.reward_sum.mean)));
   if (t.on_evaluation) t.on_evaluation(s, e);
+}
+
+/// Judges the present policy. An evaluation out of turn, at the end, does not count for `solved`.
+void JudgePolicy(Training& t, TrainState& s, bool in_turn) {
+  const Evaluation e = t.evaluate(t.agent.ExportPolicy({}), s.steps);
+  s.last_success_rate = e.success_rate();
+  KeepIfBest(t, s, e);
+  if (in_turn) CountStreak(s, e);
+  LogEvaluation(t, s, e);
 }
 
 void SaveCheckpoint(Training& t, TrainState& s) {
   TensorFile checkpoint;
   checkpoint.metadata = t.checkpoint_metadata;
-  AddToCheckpoint(t.agent, t.env, s, checkpoint);
+  CheckpointState(Archive::Saver(checkpoint), t.agent, t.env, s);
   t.run.SaveCheckpoint(checkpoint);
   s.checkpoint_at = s.steps;
 }
@@ -146,7 +157,7 @@ bool RunLoop(Training& t, TrainState& s) {
     CountEpisodes(result, term_names, s, t.run);
     if (due(config.log_every)) LogMetrics(t, s);
     if (due(config.eval_every) || s.steps >= config.steps) {
-      JudgePolicy(t, s);
+      JudgePolicy(t, s, due(config.eval_every));
       watch.Lap();  // evaluations are not training
     }
     if (t.on_step) t.on_step(s);
@@ -203,11 +214,10 @@ void TrainState::State(Archive archive) {
   archive.Scalar("steps", steps);
   archive.Scalar("episodes", episodes);
   archive.Scalar("seconds", seconds);
-  archive.Scalar("evaluated_at", evaluated_at);
   if (archive.loading()) checkpoint_at = steps;
-  archive.Scalar("full_successes", full_successes);
-  archive.Scalar("first_full_step", first_full_step);
-  archive.Scalar("first_full_seconds", first_full_seconds);
+  archive.Scalar("streak", streak);
+  archive.Scalar("streak_step", streak_step);
+  archive.Scalar("streak_seconds", streak_seconds);
   archive.Scalar("solved", solved);
   archive.Scalar("last_success_rate", last_success_rate);
   archive.Scalar("best_success_rate", best_success_rate);
@@ -219,15 +229,7 @@ void TrainState::State(Archive archive) {
   archive.Vector("recent_returns", recent_returns, kRecentEpisodes);
 }
 
-void AddToCheckpoint(Agent& agent, VectorEnv& env, TrainState& state, TensorFile& checkpoint) {
-  const Archive archive = Archive::Saver(checkpoint);
-  agent.State(archive.In("agent"));
-  env.State(archive.In("env"));
-  state.State(archive.In("train"));
-}
-
-void LoadCheckpoint(Agent& agent, VectorEnv& env, TrainState& state, const TensorFile& checkpoint) {
-  const Archive archive = Archive::Loader(checkpoint);
+void CheckpointState(Archive archive, Agent& agent, VectorEnv& env, TrainState& state) {
   agent.State(archive.In("agent"));
   env.State(archive.In("env"));
   state.State(archive.In("train"));

@@ -34,13 +34,12 @@ struct TrainConfig {
 /// Where a training stands, apart from agent and environments.
 struct TrainState {
   int64_t steps = 0, episodes = 0;
-  double seconds = 0;             // of training, evaluations excluded
-  int64_t evaluated_at = -1;      // step of the last evaluation
-  int64_t checkpoint_at = 0;      // step of the last checkpoint
-  int64_t full_successes = 0;     // evaluations in a row with nothing but successes
-  int64_t first_full_step = 0;    // of those, the first: step
-  double first_full_seconds = 0;  // and training time
-  bool solved = false;            // two such in a row
+  double seconds = 0;         // of training, evaluations excluded
+  int64_t checkpoint_at = 0;  // step of the last checkpoint
+  int64_t streak = 0;         // evaluations in a row with nothing but successes, until solved
+  int64_t streak_step = 0;    // step of the streak's first
+  double streak_seconds = 0;  // training time then: the time to solve, once solved
+  bool solved = false;        // two such in a row
   double last_success_rate = 0;
   double best_success_rate = -1, best_return = 0;
   int64_t best_step = 0;
@@ -62,26 +61,22 @@ struct Training {
   Agent& agent;
   VectorEnv& env;
   RunFolder& run;
-  /// Judges a policy by fresh starts, drawn from the given number.
-  std::function<Evaluation(const Policy&, uint64_t)> evaluate;
+  /// Judges the policy of a step by fresh starts, other ones at each step.
+  std::function<Evaluation(const Policy&, int64_t step)> evaluate = {};
   /// What the policy file says of its origin, besides the run's own figures.
-  std::map<std::string, std::string> about;
+  std::map<std::string, std::string> about = {};
   /// What the checkpoint's metadata hold: version and configuration.
-  std::map<std::string, std::string> checkpoint_metadata;
+  std::map<std::string, std::string> checkpoint_metadata = {};
 
   // Told as it goes on; any may be empty.
-  std::function<void(const TrainState&, const AgentReport&)> on_metrics;
-  std::function<void(const TrainState&, const Evaluation&)> on_evaluation;
-  std::function<void(const TrainState&)> on_step;
-  std::function<TrainRequest()> poll;
+  std::function<void(const TrainState&, const AgentReport&)> on_metrics = {};
+  std::function<void(const TrainState&, const Evaluation&)> on_evaluation = {};
+  std::function<void(const TrainState&)> on_step = {};
+  std::function<TrainRequest()> poll = {};
 };
 
-/// Adds the whole state of agent, environments and loop to a checkpoint. They must not change
-/// before it is saved.
-void AddToCheckpoint(Agent& agent, VectorEnv& env, TrainState& state, TensorFile& checkpoint);
-
-/// Takes it from one. Throws BadInput that names what is missing or has another shape.
-void LoadCheckpoint(Agent& agent, VectorEnv& env, TrainState& state, const TensorFile& checkpoint);
+/// Saves or loads the whole state of a training; see Archive.
+void CheckpointState(Archive archive, Agent& agent, VectorEnv& env, TrainState& state);
 
 /// Trains until the task is solved, the steps are done or a request to stop; writes tables,
 /// evaluations, the best policy and checkpoints into the run folder. Throws Failure, which names

@@ -40,7 +40,7 @@ class TrainTest : public ::testing::Test {
   void Create(const std::string& name) {
     Parts parts(dqn_);
     RunFolder::Create(folder_ / name, {{"config.toml", ""}}, [&](TensorFile& checkpoint) {
-      AddToCheckpoint(parts.agent, parts.env, parts.state, checkpoint);
+      CheckpointState(Archive::Saver(checkpoint), parts.agent, parts.env, parts.state);
     });
   }
 
@@ -48,11 +48,11 @@ class TrainTest : public ::testing::Test {
   TrainState Run(const std::string& name, int64_t stop_at = 1000000) {
     Parts parts(dqn_);
     const TensorFile checkpoint = TensorFile::Load(RunFolder::CheckpointPath(folder_ / name));
-    LoadCheckpoint(parts.agent, parts.env, parts.state, checkpoint);
+    CheckpointState(Archive::Loader(checkpoint), parts.agent, parts.env, parts.state);
     parts.env.poison = parts.state.steps < poison_after_ && poison_after_ > 0;
     RunFolder run(folder_ / name, checkpoint);
-    Training t{config_, parts.agent, parts.env, run, {}, {}, {}, {}, {}, {}, {}};
-    t.evaluate = [&](const Policy&, uint64_t) {
+    Training t{config_, parts.agent, parts.env, run};
+    t.evaluate = [&](const Policy&, int64_t) {
       Evaluation e;
       e.episodes = 4;
       e.successes = static_cast<size_t>(evaluations_) < scripted_.size()
@@ -84,7 +84,15 @@ TEST_F(TrainTest, StopsWhenTwoEvaluationsInARowAreFull) {
   const TrainState state = Run("run");
   EXPECT_TRUE(state.solved);
   EXPECT_EQ(state.steps, 400);
-  EXPECT_EQ(state.first_full_step, 300);  // the first of the two
+  EXPECT_EQ(state.streak_step, 300);  // the first of the two
+}
+
+TEST_F(TrainTest, AnEvaluationOutOfTurnDoesNotCount) {
+  scripted_ = {0, 0, 4, 4};
+  config_.steps = 304;
+  Create("run");
+  EXPECT_FALSE(Run("run").solved);
+  EXPECT_EQ(evaluations_, 4);
 }
 
 TEST_F(TrainTest, GoesOnBeyondSolvedIfToldSo) {
@@ -94,7 +102,7 @@ TEST_F(TrainTest, GoesOnBeyondSolvedIfToldSo) {
   const TrainState state = Run("run");
   EXPECT_TRUE(state.solved);
   EXPECT_EQ(state.steps, 600);
-  EXPECT_EQ(state.first_full_step, 100);
+  EXPECT_EQ(state.streak_step, 100);
   EXPECT_EQ(evaluations_, 6);
 }
 

@@ -1,3 +1,6 @@
+// The double pendulum as formulas. Symbols: q1, q2 joint angles (rad; 0 hanging, q2 relative to
+// link 1), w1, w2 their velocities (rad/s), m mass (kg), l length (m), g gravity (m/s²), tau torque
+// (N·m). Every constant is that of the post, "Balancing a Double Pendulum with DQN and MuJoCo".
 #include "sim/double_pendulum.h"
 
 #include <algorithm>
@@ -94,24 +97,37 @@ std::array<double, kRewardTerms> RewardTerms(const Plant& plant, const PendulumS
 }
 
 std::string Mjcf(const Plant& plant) {
-  const auto& [m1, m2, l1, l2, d1, d2, g, limit] = plant;
-  const auto link = [](int i, double z, double mass, double length, double damping) {
-    return Concat("<body name=\"link", i, "\" pos=\"0 0 ", FormatNumber(z), "\">\n",
-                  "  <joint name=\"joint", i, "\" type=\"hinge\" axis=\"0 1 0\" damping=\"",
-                  FormatNumber(damping), "\" armature=\"0.01\"/>\n",
-                  "  <geom type=\"capsule\" size=\"0.04\" fromto=\"0 0 0 0 0 ",
-                  FormatNumber(-length), "\" mass=\"", FormatNumber(mass), "\"/>\n");
-  };
   // Nothing touches and nothing is constrained: without these stages a step takes less time and
   // the trajectory is the same.
-  return Concat("<mujoco model=\"double_pendulum\">\n", "<option gravity=\"0 0 ", FormatNumber(-g),
-                "\" timestep=\"0.005\"", " integrator=\"RK4\">\n",
-                "  <flag contact=\"disable\" constraint=\"disable\"/>\n",
-                "</option>\n<worldbody>\n", link(1, 0, m1, l1, d1), link(2, -l1, m2, l2, d2),
-                "</body>\n</body>\n</worldbody>\n<actuator>\n",
-                "  <motor name=\"torque1\" joint=\"joint1\" ctrllimited=\"true\" ctrlrange=\"",
-                FormatNumber(-limit), " ", FormatNumber(limit), "\"/>\n",
-                "</actuator>\n</mujoco>\n");
+  std::string mjcf = R"(<mujoco model="double_pendulum">
+  <option gravity="0 0 -@gravity" timestep="0.005" integrator="RK4">
+    <flag contact="disable" constraint="disable"/>
+  </option>
+  <worldbody>
+    <body name="link1">
+      <joint name="joint1" type="hinge" axis="0 1 0" damping="@damping1" armature="0.01"/>
+      <geom type="capsule" size="0.04" fromto="0 0 0 0 0 -@length1" mass="@mass1"/>
+      <body name="link2" pos="0 0 -@length1">
+        <joint name="joint2" type="hinge" axis="0 1 0" damping="@damping2" armature="0.01"/>
+        <geom type="capsule" size="0.04" fromto="0 0 0 0 0 -@length2" mass="@mass2"/>
+      </body>
+    </body>
+  </worldbody>
+  <actuator>
+    <motor name="torque1" joint="joint1" ctrllimited="true" ctrlrange="-@torque_limit @torque_limit"/>
+  </actuator>
+</mujoco>
+)";
+  // Each @name stands for that parameter.
+  Plant values = plant;
+  const Options options = OptionsOf(values);
+  for (const Option& option : options.all()) {
+    const std::string field = "@" + option.name;
+    for (size_t at = 0; (at = mjcf.find(field, at)) != std::string::npos;) {
+      mjcf.replace(at, field.size(), option.text());
+    }
+  }
+  return mjcf;
 }
 
 }  // namespace upswing

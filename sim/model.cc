@@ -26,13 +26,19 @@ struct CapsuleInertia {
   }
 };
 
+/// MuJoCo would print its warnings and log them to a file in the current folder, and end the
+/// program on an error.
+void TakeOverMessages() {
+  mju_user_warning = [](const char*) {};
+  mju_user_error = [](const char* message) { throw Failure(Concat("MuJoCo: ", message)); };
+}
+
 constexpr int kLinkBodies[2] = {1, 2};  // body 0 is the world
 
 }  // namespace
 
 ModelPtr CompileModel(const std::string& mjcf, const std::string& where) {
-  // MuJoCo would print its warnings and log them to a file in the current folder.
-  mju_user_warning = [](const char*) {};
+  TakeOverMessages();
   std::array<char, 1000> message{};
   const std::unique_ptr<mjSpec, MuJoCoDeleter> spec(
       mj_parseXMLString(mjcf.c_str(), nullptr, message.data(), message.size()));
@@ -72,18 +78,23 @@ ModelPtr LoadModel(const std::string& mjcf, const std::string& where) {
   expect(substeps > 0.5 && std::abs(substeps - std::round(substeps)) < 1e-6,
          Concat("a timestep that divides ", kControlPeriod, " s, got ", model.opt.timestep));
 
-  // Its plant written into it must change nothing: else it has what a Plant cannot say.
+  // Where the links are must follow from the plant, and writing the plant must change nothing that
+  // the file says. Armature, friction, stiffness, radius and integrator are the file's own affair.
+  const ModelPtr ours = CompileModel(Mjcf(PlantOf(model)), where);
   const ModelPtr written(mj_copyModel(nullptr, &model));
   WritePlant(PlantOf(model), FieldsOf(*written));
   const auto same = [&](const mjtNum* a, const mjtNum* b, int n, std::string_view what) {
     for (int i = 0; i < n; ++i) expect(std::abs(a[i] - b[i]) < 1e-9, what);
   };
-  same(model.body_pos, written->body_pos, 9, "the second link at the end of the first");
-  same(model.geom_pos, written->geom_pos, 6, "capsules along -z from their hinge");
-  same(model.body_ipos, written->body_ipos, 9, "the mass of each link to be that of its capsule");
+  same(model.qpos0, ours->qpos0, 2, "joint angles that are 0 hanging");
+  same(model.jnt_pos, ours->jnt_pos, 6, "hinges at the ends of their links");
+  same(model.body_quat, ours->body_quat, 12, "links that hang along -z");
+  same(model.body_pos, ours->body_pos, 9, "the second link at the end of the first");
+  same(model.geom_pos, ours->geom_pos, 6, "capsules along -z from their hinge");
+  same(model.body_ipos, ours->body_ipos, 9, "the mass of each link to be that of its capsule");
   same(model.body_inertia, written->body_inertia, 9, "the inertia of solid capsules");
-  same(model.actuator_ctrlrange, written->actuator_ctrlrange, 2, "a symmetric control range");
-  same(model.opt.gravity, written->opt.gravity, 3, "gravity along -z");
+  same(model.actuator_ctrlrange, ours->actuator_ctrlrange, 2, "a symmetric control range");
+  same(model.opt.gravity, ours->opt.gravity, 3, "gravity along -z");
   return compiled;
 }
 

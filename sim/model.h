@@ -25,8 +25,9 @@ using BatchPtr = std::unique_ptr<mjBatch, MuJoCoDeleter>;
 ModelPtr CompileModel(const std::string& mjcf, const std::string& where);
 
 /// Compiles somebody's MJCF. Throws BadInput, too, unless it is built like ours: two solid capsules
-/// on hinges about +y, one motor at the first, a timestep that divides the control period, nothing
-/// that a Plant cannot say.
+/// hanging on hinges about +y, a motor of the same limit both ways at the first, gravity along -z,
+/// a timestep that divides the control period. Armature, friction, stiffness, the capsules' radius
+/// and the integrator may differ.
 ModelPtr LoadModel(const std::string& mjcf, const std::string& where);
 
 /// The plant that a model like ours describes.

@@ -191,5 +191,27 @@ TEST(Model, BrokenMjcfPassesOnWhatMuJoCoSays) {
   EXPECT_EQ(error_of(Mjcf(Plant())), "");
 }
 
+TEST(Model, RefusesWhatThePlantsParametersWouldHide) {
+  const auto loads = [](const std::string& from, const std::string& to) {
+    std::string mjcf = Mjcf(Plant());
+    mjcf.replace(mjcf.find(from), from.size(), to);
+    try {
+      LoadModel(mjcf, "file.xml");
+      return true;
+    } catch (const Error&) {
+      return false;
+    }
+  };
+  EXPECT_TRUE(loads("armature=\"0.01\"", "armature=\"0.02\" stiffness=\"0.1\""));
+  EXPECT_TRUE(loads("RK4", "implicit"));
+  EXPECT_FALSE(loads("name=\"link1\"", "name=\"link1\" quat=\"0 0 1 0\""));
+  EXPECT_FALSE(loads("axis=\"0 1 0\"", "axis=\"0 1 0\" ref=\"90\""));
+  EXPECT_FALSE(loads("axis=\"0 1 0\"", "axis=\"0 1 0\" pos=\"0 0 0.1\""));
+  EXPECT_FALSE(loads("gravity=\"0 0", "gravity=\"1 0"));
+  EXPECT_FALSE(loads("ctrlrange=\"-5", "ctrlrange=\"-4"));
+  EXPECT_FALSE(loads("ctrllimited", "gear=\"2\" ctrllimited"));
+  EXPECT_FALSE(loads("0.005", "0.003"));
+}
+
 }  // namespace
 }  // namespace upswing

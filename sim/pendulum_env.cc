@@ -147,6 +147,7 @@ void PendulumEnv::Step(std::span<const double> torque, StepResult& result) {
                   next_obs.begin());
       std::ranges::fill(terms, 0.0);
       result.at_goal[i] = 0;
+      result.torque[i] = 0;
       result.work[i] = 0;
     } else {
       const PendulumState s = state(env);
@@ -159,6 +160,7 @@ void PendulumEnv::Step(std::span<const double> torque, StepResult& result) {
         result.reward[i] += terms[k];
       }
       result.at_goal[i] = Inverted(s) ? 1 : 0;
+      result.torque[i] = tau;
       result.work[i] = std::abs(tau * (s.q1 - previous_q1_[i]));
     }
     if (result.done(i)) {

@@ -75,6 +75,7 @@ TEST(PendulumEnv, RewardIsTheWeightedSumOfItsTermsAtTheSuccessor) {
     sum += result.reward_terms[k];
   }
   EXPECT_DOUBLE_EQ(result.reward[0], sum);
+  EXPECT_EQ(result.torque[0], 5);
   EXPECT_EQ(result.at_goal[0], 1);
   EXPECT_EQ(result.at_goal[1], 0);
   EXPECT_DOUBLE_EQ(result.work[0], std::abs(5 * (env.state(0).q1 - std::numbers::pi)));
