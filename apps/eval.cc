@@ -128,15 +128,15 @@ void AddEval(CLI::App& program, Command& command) {
       ->type_name("POLICY|RUN")
       ->check(NotEmpty());
   app->add_option("--episodes", a->episodes, "how many [100]")
-      ->check(CLI::Range(1, 1000000))
-      ->type_name("");
+      ->check(CLI::Range(1, 1000000).description(""))
+      ->type_name("INTEGER");
   app->add_option("--seed", a->seed, "of the start states [0]")
-      ->check(CLI::NonNegativeNumber)
-      ->type_name("");
+      ->check(CLI::Range(int64_t{0}, int64_t{9000000000000000}).description(""))
+      ->type_name("INTEGER");
   AddPlantOptions(*app, a->set, a->model);
   app->add_option("--threads", a->threads, "0: one for each processor")
-      ->check(CLI::Range(0, 256))
-      ->type_name("");
+      ->check(CLI::Range(0, 256).description(""))
+      ->type_name("INTEGER");
   app->add_flag("--json", a->as_json, "print JSON instead of a table");
   app->footer(fmt::format(
       "An episode lasts {} s from hanging with normal noise of 0.1 (rad, rad/s). It succeeds if "

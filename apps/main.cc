@@ -52,6 +52,17 @@ std::string Explain(const CLI::App& program, const CLI::ParseError& error) {
                 DidYouMean(word, KnownWords(app)));
 }
 
+/// CLI11's help without the `{false}` that it puts behind a flag's --no- form.
+class HelpFormatter : public CLI::Formatter {
+ public:
+  std::string make_option_name(const CLI::Option* option, bool is_positional) const override {
+    std::string name = CLI::Formatter::make_option_name(option, is_positional);
+    constexpr std::string_view kNoise = "{false}";
+    const size_t at = name.find(kNoise);
+    return at == std::string::npos ? name : name.erase(at, kNoise.size());
+  }
+};
+
 int Main(int argc, char** argv) {
   CLI::App program(
       "Upswing trains, judges and keeps controllers that swing up and balance a double\n"
@@ -59,6 +70,7 @@ int Main(int argc, char** argv) {
       "upswing");
   program.set_version_flag("--version", "upswing " UPSWING_VERSION);
   program.require_subcommand(1);
+  program.formatter(std::make_shared<HelpFormatter>());
   program.footer(
       "Examples:\n"
       "  upswing train                      train the default agent until the task is solved\n"

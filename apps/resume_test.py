@@ -48,6 +48,13 @@ class ResumeTest(ProgramTest):
         self.finish()
         self.assert_same_run("run", "never-stopped")
 
+    def test_a_run_that_is_being_trained_is_not_resumed(self):
+        process = self.start(*small(steps=ENDLESS, stop_when_solved=False))
+        self.refuse(["train", "--resume", "run"], "run: another process is at work here")
+        self.end(process, signal.SIGKILL)
+        self.finish()
+        self.assert_same_run("run", "never-stopped")
+
     def test_killed_before_it_trains_leaves_a_whole_run_or_none(self):
         moments = random.Random(2)
         for i in range(10):

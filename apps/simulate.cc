@@ -152,11 +152,11 @@ void AddSimulate(CLI::App& program, Command& command) {
                   "CSV file with a column `torque` (N·m), a row for each 0.02 s")
       ->type_name("FILE")
       ->check(NotEmpty());
-  app->add_option("--start", a->start, "q1,q2,w1,w2 in rad and rad/s [0,0,0,0: hanging]")
-      ->type_name("");
+  app->add_option("--start", a->start, "where it begins, rad and rad/s [0,0,0,0: hanging]")
+      ->type_name("q1,q2,w1,w2");
   app->add_option("--seconds", a->seconds, "how long [20, or as long as the torques last]")
-      ->check(CLI::Range(0.0, 1e5))
-      ->type_name("");
+      ->check(CLI::Range(0.0, 1e5).description(""))
+      ->type_name("SECONDS");
   AddPlantOptions(*app, a->set, a->model);
   app->add_option("--csv", a->csv, "file to write [standard output]")
       ->type_name("FILE")

@@ -7,7 +7,7 @@
 #include <filesystem>
 
 #include "core/error.h"
-#include "core/temp_folder.h"
+#include "core/testing.h"
 
 namespace upswing {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <set>
 
-#include "core/temp_folder.h"
+#include "core/testing.h"
 
 namespace upswing {
 namespace {
@@ -14,15 +14,10 @@ TEST(Rng, XoshiroMatchesItsReferenceCode) {
   // xoshiro256++ by Blackman and Vigna (public domain, prng.di.unimi.it), from state {1, 2, 3, 4}.
   const uint64_t kExpected[] = {41943041, 58720359, 3588806011781223, 3591011842654386,
                                 9228616714210784205U};
-  TensorFile file;
-  const std::array<uint64_t, 4> state{1, 2, 3, 4};
-  file.Add<uint64_t>("state", state);
+  std::array<uint64_t, 4> state{1, 2, 3, 4};
   Rng rng(0, "any");
-  const TempFolder folder;
-  const auto path = folder / "rng.safetensors";
-  file.Save(path);
-  const TensorFile loaded = TensorFile::Load(path);
-  rng.State(Archive::Loader(loaded));
+  SaveAndLoad([&](Archive archive) { archive.Array("state", std::span<uint64_t>(state)); },
+              [&](Archive archive) { rng.State(archive); });
   for (const uint64_t expected : kExpected) EXPECT_EQ(rng.Next(), expected);
 }
 

@@ -6,8 +6,8 @@
 #include <limits>
 
 #include "core/error.h"
-#include "core/temp_folder.h"
 #include "core/tensor_file.h"
+#include "core/testing.h"
 
 namespace upswing {
 namespace {

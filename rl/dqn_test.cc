@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "core/error.h"
-#include "core/temp_folder.h"
+#include "core/testing.h"
 #include "rl/toy_env.h"
 
 namespace upswing {
@@ -241,21 +241,16 @@ TEST(Dqn, LoadedGoesOnToTheBit) {
   Dqn saved(config, 2, 1, kTorques, 1, pool);
   ToyEnv env(2);
   Walk(saved, env, 101);
-  const TempFolder folder;
-  const auto path = folder / "state.safetensors";
-  {
-    TensorFile file;
-    saved.State(Archive::Saver(file).In("agent"));
-    env.State(Archive::Saver(file).In("env"));
-    file.Save(path);
-  }
-  Walk(saved, env, 100);
-
-  const TensorFile source = TensorFile::Load(path);
   Dqn loaded(config, 2, 1, kTorques, 99, pool);  // another seed, which loading must undo
   ToyEnv loaded_env(2, 99);
-  loaded.State(Archive::Loader(source).In("agent"));
-  loaded_env.State(Archive::Loader(source).In("env"));
+  const auto state = [](Dqn& agent, ToyEnv& walk) {
+    return [&](Archive archive) {
+      agent.State(archive.In("agent"));
+      walk.State(archive.In("env"));
+    };
+  };
+  SaveAndLoad(state(saved, env), state(loaded, loaded_env));
+  Walk(saved, env, 100);
   Walk(loaded, loaded_env, 100);
   EXPECT_TRUE(std::ranges::equal(saved.online(), loaded.online()));
   EXPECT_TRUE(std::ranges::equal(saved.target(), loaded.target()));

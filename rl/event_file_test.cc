@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/temp_folder.h"
+#include "core/testing.h"
 
 namespace upswing {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/temp_folder.h"
+#include "core/testing.h"
 
 namespace upswing {
 namespace {
@@ -75,13 +75,8 @@ TEST(NStep, LoadedGoesOnLikeSaved) {
   NStep saved(2, 3, 0.9, 1), loaded(2, 3, 0.9, 1);
   std::vector<Emitted> a, b;
   for (int i = 0; i < 4; ++i) PushStep(saved, i % 2, i, false, false, a);
-  TensorFile file;
-  saved.State(Archive::Saver(file), 9);
-  const TempFolder folder;
-  const auto path = folder / "state.safetensors";
-  file.Save(path);
-  const TensorFile source = TensorFile::Load(path);
-  loaded.State(Archive::Loader(source), 9);
+  SaveAndLoad([&](Archive archive) { saved.State(archive, 9); },
+              [&](Archive archive) { loaded.State(archive, 9); });
   a.clear();
   PushStep(saved, 1, 5, false, true, a);
   PushStep(loaded, 1, 5, false, true, b);

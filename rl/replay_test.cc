@@ -5,7 +5,7 @@
 #include <cmath>
 #include <set>
 
-#include "core/temp_folder.h"
+#include "core/testing.h"
 
 namespace upswing {
 namespace {
@@ -67,13 +67,8 @@ TEST(Replay, AMillionTransitionsOfThePendulumFitIn100Megabytes) {
 TEST(Replay, LoadedGoesOnLikeSaved) {
   Replay saved(5, 2), loaded(5, 2);
   for (int i = 0; i < 7; ++i) saved.Add(Numbered(i).transition);
-  TensorFile file;
-  saved.State(Archive::Saver(file), 9);
-  const TempFolder folder;
-  const auto path = folder / "state.safetensors";
-  file.Save(path);
-  const TensorFile source = TensorFile::Load(path);
-  loaded.State(Archive::Loader(source), 9);
+  SaveAndLoad([&](Archive archive) { saved.State(archive, 9); },
+              [&](Archive archive) { loaded.State(archive, 9); });
   saved.Add(Numbered(7).transition);
   loaded.Add(Numbered(7).transition);
   for (int i = 0; i < 5; ++i) EXPECT_EQ(saved.at(i).reward, loaded.at(i).reward);

@@ -5,7 +5,7 @@
 #include <filesystem>
 
 #include "core/error.h"
-#include "core/temp_folder.h"
+#include "core/testing.h"
 #include "rl/dqn.h"
 #include "rl/toy_env.h"
 

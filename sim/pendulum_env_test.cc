@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "core/error.h"
-#include "core/temp_folder.h"
+#include "core/testing.h"
 
 namespace upswing {
 namespace {
@@ -130,19 +130,13 @@ TEST(PendulumEnv, TheNumberOfThreadsChangesNoBit) {
 }
 
 TEST(PendulumEnv, LoadedStateGoesOnToTheBit) {
-  const TempFolder folder;
-  const auto path = folder / "state.safetensors";
   PendulumEnv saved(SmallConfig());
   StepResult a = saved.MakeResult(), b = saved.MakeResult();
   const std::vector<double> torque{1, 2, 3};
   for (int step = 0; step < 7; ++step) saved.Step(torque, a);
-  TensorFile file;
-  saved.State(Archive::Saver(file));
-  file.Save(path);
-
-  const TensorFile source = TensorFile::Load(path);
   PendulumEnv loaded(SmallConfig());
-  loaded.State(Archive::Loader(source));
+  SaveAndLoad([&](Archive archive) { saved.State(archive); },
+              [&](Archive archive) { loaded.State(archive); });
   EXPECT_TRUE(std::ranges::equal(saved.obs().values(), loaded.obs().values()));
   for (int step = 0; step < 12; ++step) {  // over two resets
     saved.Step(torque, a);

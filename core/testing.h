@@ -4,6 +4,9 @@
 #include <filesystem>
 #include <string>
 
+#include "core/archive.h"
+
+/// What tests share.
 namespace upswing {
 
 /// A new folder for a test, with all that is in it gone at the end. Tests may run side by side.
@@ -23,5 +26,16 @@ class TempFolder {
  private:
   std::filesystem::path path_;
 };
+
+/// Saves by `save(archive)` and loads by `load(archive)`, through a file.
+template <typename Save, typename Load>
+void SaveAndLoad(const Save& save, const Load& load) {
+  const TempFolder folder;
+  TensorFile saved;
+  save(Archive::Saver(saved));
+  saved.Save(folder / "state.safetensors");
+  const TensorFile loaded = TensorFile::Load(folder / "state.safetensors");
+  load(Archive::Loader(loaded));
+}
 
 }  // namespace upswing
