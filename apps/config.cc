@@ -36,7 +36,7 @@ std::optional<std::string> TextOf(const toml::node& node) {
 void ApplyNode(const Options& options, const std::string& section, const std::string& key,
                const toml::node& node, const std::string& where) {
   const std::string place = Concat(where, ":", node.source().begin.line, ": ");
-  for (const Option* option : options.Find(key, place + "[" + section + "]")) {
+  for (const Option* option : options.Find(key, Concat(place, "[", section, "]"))) {
     if (option->section != section) {
       throw BadInput(
           Concat(place, key, ": expected in [", option->section, "], got in [", section, "]"));

@@ -109,6 +109,7 @@ int Main(int argc, char** argv) {
 }  // namespace
 }  // namespace upswing
 
+// NOLINTNEXTLINE(bugprone-exception-escape): only what fails while a failure is being told
 int main(int argc, char** argv) {
   // A write that cannot be done shall fail where it is made, with a message.
   std::signal(SIGPIPE, SIG_IGN);

@@ -13,8 +13,8 @@
 
 namespace upswing {
 
-/// Saves or loads state under names. A component has one `void State(Archive)` that serves both
-/// ways, so that what is saved and what is loaded cannot drift apart.
+/// Saves or loads state under names. A component has one `void State(const Archive&)` that serves
+/// both ways, so that what is saved and what is loaded cannot drift apart.
 class Archive {
  public:
   /// An archive that adds to `file`. Arrays are viewed, not copied: save before they change.
@@ -30,7 +30,7 @@ class Archive {
   /// An array whose size is settled before it is loaded. Throws BadInput on loading and Failure on
   /// saving if a number is not finite: no such state is worth keeping.
   template <typename T>
-  void Array(std::string_view name, std::span<T> values) {
+  void Array(std::string_view name, std::span<T> values) const {
     const std::string path = Concat(prefix_, name);
     if (loading()) source_->Read(path, values);
     if constexpr (std::floating_point<T>) CheckFinite(path, values);
@@ -39,7 +39,7 @@ class Archive {
 
   /// An array that is resized to what is loaded, of at most `max_size` numbers.
   template <typename T>
-  void Vector(std::string_view name, std::vector<T>& values, size_t max_size) {
+  void Vector(std::string_view name, std::vector<T>& values, size_t max_size) const {
     if (loading()) {
       const size_t count = source_->Count<T>(Concat(prefix_, name));
       if (count > max_size) {
@@ -62,7 +62,7 @@ class Archive {
   /// One number. Integers are stored as I64, bool too.
   template <typename T>
   requires std::integral<T> || std::floating_point<T>
-  void Scalar(std::string_view name, T& value) {
+  void Scalar(std::string_view name, T& value) const {
     using Stored = std::conditional_t<std::floating_point<T>, T, int64_t>;
     const std::string path = Concat(prefix_, name);
     if (loading()) {

@@ -35,6 +35,7 @@ std::string Quote(std::string_view text) {
 
 std::string ListText(const std::vector<int64_t>& values) {
   std::vector<std::string> texts;
+  texts.reserve(values.size());
   for (const int64_t value : values) texts.push_back(std::to_string(value));
   return Concat("[", Join(texts, ", "), "]");
 }

@@ -61,6 +61,6 @@ double Rng::Normal() {
   return radius * std::cos(2.0 * std::numbers::pi * Uniform());
 }
 
-void Rng::State(Archive archive) { archive.Array("state", std::span<uint64_t>(state_)); }
+void Rng::State(const Archive& archive) { archive.Array("state", std::span<uint64_t>(state_)); }
 
 }  // namespace upswing

@@ -31,7 +31,7 @@ class Rng {
   double Normal();
 
   /// Saves or loads the stream's state.
-  void State(Archive archive);
+  void State(const Archive& archive);
 
  private:
   std::array<uint64_t, 4> state_;

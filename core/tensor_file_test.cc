@@ -112,7 +112,7 @@ TEST_F(TensorFileTest, EveryFlippedBitIsFound) {
       std::vector<std::byte> broken = whole;
       broken[at] ^= std::byte{1} << bit;
       const bool in_key = at >= key && at < key + 8;
-      EXPECT_TRUE(in_key || LoadError(broken) != "") << "byte " << at << " bit " << bit;
+      EXPECT_TRUE(in_key || !LoadError(broken).empty()) << "byte " << at << " bit " << bit;
     }
   }
 }
@@ -143,7 +143,7 @@ struct Component {
   bool flag = false;
   Rng rng = Rng(0, "component");
 
-  void State(Archive archive) {
+  void State(const Archive& archive) {
     archive.Array("fixed", std::span(fixed));
     archive.Vector("growing", growing, 4);
     archive.Scalar("number", number);

@@ -56,7 +56,7 @@ class VectorEnv {
   virtual void SetStartNoise(double sigma) = 0;
 
   /// Saves or loads the whole state.
-  virtual void State(Archive archive) = 0;
+  virtual void State(const Archive& archive) = 0;
 
   StepResult MakeResult() const {
     return {num_envs(), obs_size(), static_cast<int>(reward_term_names().size())};

@@ -34,7 +34,7 @@ double Adam::Step(std::span<const float> gradient, double learning_rate, double 
   return norm;
 }
 
-void Adam::State(Archive archive) {
+void Adam::State(const Archive& archive) {
   archive.Scalar("steps", steps_);
   archive.Array("m", std::span(m_));
   archive.Array("v", std::span(v_));

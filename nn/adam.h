@@ -21,7 +21,7 @@ class Adam {
               std::span<float> parameters);
 
   /// Saves or loads the moments and the step count.
-  void State(Archive archive);
+  void State(const Archive& archive);
 
  private:
   int64_t steps_ = 0;

@@ -47,7 +47,7 @@ class Agent {
   virtual Policy ExportPolicy(std::map<std::string, std::string> about) const = 0;
 
   /// Saves or loads the whole state.
-  virtual void State(Archive archive) = 0;
+  virtual void State(const Archive& archive) = 0;
 };
 
 }  // namespace upswing

@@ -252,7 +252,7 @@ Policy Dqn::ExportPolicy(std::map<std::string, std::string> about) const {
   return {network_.shape(), {theta_.begin(), theta_.end()}, torques_, std::move(about)};
 }
 
-void Dqn::State(Archive archive) {
+void Dqn::State(const Archive& archive) {
   archive.Array("theta", std::span(theta_));
   archive.Array("theta_target", std::span(theta_target_));
   adam_.State(archive.In("adam"));

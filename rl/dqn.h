@@ -69,7 +69,7 @@ class Dqn : public Agent {
   AgentReport Report() const override;
   void BeginReport() override;
   Policy ExportPolicy(std::map<std::string, std::string> about) const override;
-  void State(Archive archive) override;
+  void State(const Archive& archive) override;
 
   std::span<const float> online() const { return theta_; }
   std::span<const float> target() const { return theta_target_; }

@@ -244,7 +244,7 @@ TEST(Dqn, LoadedGoesOnToTheBit) {
   Dqn loaded(config, 2, 1, kTorques, 99, pool);  // another seed, which loading must undo
   ToyEnv loaded_env(2, 99);
   const auto state = [](Dqn& agent, ToyEnv& walk) {
-    return [&](Archive archive) {
+    return [&](const Archive& archive) {
       agent.State(archive.In("agent"));
       walk.State(archive.In("env"));
     };

@@ -50,7 +50,7 @@ void NStep::Push(int env, std::span<const float> obs, int action, double reward,
   std::ranges::copy(waiting_reward.subspan(first), waiting_reward.begin());
 }
 
-void NStep::State(Archive archive, int num_actions) {
+void NStep::State(const Archive& archive, int num_actions) {
   archive.Array("count", std::span(count_));
   archive.Array("obs", std::span(obs_));
   archive.Array("action", std::span(action_));

@@ -23,7 +23,7 @@ class NStep {
 
   /// Saves or loads the steps that wait for their successors; loading throws BadInput on an action
   /// of num_actions or more.
-  void State(Archive archive, int num_actions);
+  void State(const Archive& archive, int num_actions);
 
  private:
   size_t n_, obs_size_;

@@ -75,8 +75,8 @@ TEST(NStep, LoadedGoesOnLikeSaved) {
   NStep saved(2, 3, 0.9, 1), loaded(2, 3, 0.9, 1);
   std::vector<Emitted> a, b;
   for (int i = 0; i < 4; ++i) PushStep(saved, i % 2, i, false, false, a);
-  SaveAndLoad([&](Archive archive) { saved.State(archive, 9); },
-              [&](Archive archive) { loaded.State(archive, 9); });
+  SaveAndLoad([&](const Archive& archive) { saved.State(archive, 9); },
+              [&](const Archive& archive) { loaded.State(archive, 9); });
   a.clear();
   PushStep(saved, 1, 5, false, true, a);
   PushStep(loaded, 1, 5, false, true, b);

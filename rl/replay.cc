@@ -46,7 +46,7 @@ void Replay::Sample(Rng& rng, Minibatch& batch) const {
   }
 }
 
-void Replay::State(Archive archive, int num_actions) {
+void Replay::State(const Archive& archive, int num_actions) {
   archive.Scalar("next", next_);
   archive.Vector("rows", rows_, static_cast<size_t>(capacity_) * row_size());
   archive.Check(rows_.size() % row_size() == 0, "rows", "whole transitions");

@@ -49,7 +49,7 @@ class Replay {
   Transition at(int64_t index) const;
 
   /// Saves or loads what is stored; loading throws BadInput on an action of num_actions or more.
-  void State(Archive archive, int num_actions);
+  void State(const Archive& archive, int num_actions);
 
  private:
   size_t row_size() const { return 2 * obs_size_ + 3; }

@@ -67,8 +67,8 @@ TEST(Replay, AMillionTransitionsOfThePendulumFitIn100Megabytes) {
 TEST(Replay, LoadedGoesOnLikeSaved) {
   Replay saved(5, 2), loaded(5, 2);
   for (int i = 0; i < 7; ++i) saved.Add(Numbered(i).transition);
-  SaveAndLoad([&](Archive archive) { saved.State(archive, 9); },
-              [&](Archive archive) { loaded.State(archive, 9); });
+  SaveAndLoad([&](const Archive& archive) { saved.State(archive, 9); },
+              [&](const Archive& archive) { loaded.State(archive, 9); });
   saved.Add(Numbered(7).transition);
   loaded.Add(Numbered(7).transition);
   for (int i = 0; i < 5; ++i) EXPECT_EQ(saved.at(i).reward, loaded.at(i).reward);

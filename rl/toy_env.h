@@ -40,7 +40,7 @@ class ToyEnv : public VectorEnv {
     }
   }
 
-  void State(Archive archive) override {
+  void State(const Archive& archive) override {
     rng_.State(archive.In("rng"));
     archive.Array("x", std::span(x_));
     archive.Array("steps", std::span(steps_));

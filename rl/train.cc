@@ -210,7 +210,7 @@ double TrainState::mean_return() const {
          static_cast<double>(recent_returns.size());
 }
 
-void TrainState::State(Archive archive) {
+void TrainState::State(const Archive& archive) {
   archive.Scalar("steps", steps);
   archive.Scalar("episodes", episodes);
   archive.Scalar("seconds", seconds);
@@ -229,7 +229,7 @@ void TrainState::State(Archive archive) {
   archive.Vector("recent_returns", recent_returns, kRecentEpisodes);
 }
 
-void CheckpointState(Archive archive, Agent& agent, VectorEnv& env, TrainState& state) {
+void CheckpointState(const Archive& archive, Agent& agent, VectorEnv& env, TrainState& state) {
   agent.State(archive.In("agent"));
   env.State(archive.In("env"));
   state.State(archive.In("train"));

@@ -49,7 +49,7 @@ struct TrainState {
 
   TrainState(int num_envs, int num_terms);
   double mean_return() const;
-  void State(Archive archive);
+  void State(const Archive& archive);
 };
 
 /// What a user may ask for while it runs.
@@ -76,7 +76,7 @@ struct Training {
 };
 
 /// Saves or loads the whole state of a training; see Archive.
-void CheckpointState(Archive archive, Agent& agent, VectorEnv& env, TrainState& state);
+void CheckpointState(const Archive& archive, Agent& agent, VectorEnv& env, TrainState& state);
 
 /// Trains until the task is solved, the steps are done or a request to stop; writes tables,
 /// evaluations, the best policy and checkpoints into the run folder. Throws Failure, which names

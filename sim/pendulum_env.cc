@@ -171,7 +171,7 @@ void PendulumEnv::Step(std::span<const double> torque, StepResult& result) {
   }
 }
 
-void PendulumEnv::State(Archive archive) {
+void PendulumEnv::State(const Archive& archive) {
   const auto n = static_cast<size_t>(config_.num_envs);
   archive.Array("state", std::span(mjb_state(batch_.get()), n * static_cast<size_t>(state_size_)));
   archive.Array("step_counts", std::span(step_counts_));

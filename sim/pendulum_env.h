@@ -47,7 +47,7 @@ class PendulumEnv : public VectorEnv {
   Matrix<const float> obs() const override;
   void Step(std::span<const double> torque, StepResult& result) override;
   void SetStartNoise(double sigma) override { config_.start.noise = sigma; }
-  void State(Archive archive) override;
+  void State(const Archive& archive) override;
 
   const Plant& plant(int env) const;
   PendulumState state(int env) const;

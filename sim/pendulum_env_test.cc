@@ -135,8 +135,8 @@ TEST(PendulumEnv, LoadedStateGoesOnToTheBit) {
   const std::vector<double> torque{1, 2, 3};
   for (int step = 0; step < 7; ++step) saved.Step(torque, a);
   PendulumEnv loaded(SmallConfig());
-  SaveAndLoad([&](Archive archive) { saved.State(archive); },
-              [&](Archive archive) { loaded.State(archive); });
+  SaveAndLoad([&](const Archive& archive) { saved.State(archive); },
+              [&](const Archive& archive) { loaded.State(archive); });
   EXPECT_TRUE(std::ranges::equal(saved.obs().values(), loaded.obs().values()));
   for (int step = 0; step < 12; ++step) {  // over two resets
     saved.Step(torque, a);
