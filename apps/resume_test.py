@@ -7,7 +7,7 @@ import signal
 import time
 import unittest
 
-from testing import ProgramTest, read_csv, read_tensors, small, snapshot
+from testing import ProgramTest, read_csv, read_tensors, run, small, snapshot
 
 ENDLESS = 10**9  # more steps than any test waits for
 EVAL_EVERY = 2000
@@ -50,7 +50,8 @@ class ResumeTest(ProgramTest):
 
     def test_a_run_that_is_being_trained_is_not_resumed(self):
         process = self.start(*small(steps=ENDLESS, stop_when_solved=False))
-        self.refuse(["train", "--resume", "run"], "run: another process is at work here")
+        refused = run("train", "--resume", "run", cwd=self.folder)
+        self.assert_one_line(refused, 2, "run: another process is at work here")
         self.end(process, signal.SIGKILL)
         self.finish()
         self.assert_same_run("run", "never-stopped")
