@@ -34,6 +34,13 @@ GOOD_MODEL = """<mujoco>
 
 
 class CommandLineTest(ProgramTest):
+    def test_value_for_a_flag_that_takes_none(self):
+        for flag in ("--double=maybe", "--no-double=maybe", "--json=3"):
+            with self.subTest(flag=flag):
+                command = "eval" if flag.startswith("--json") else "train"
+                self.refuse([command, "x", flag] if command == "eval" else [command, flag],
+                            flag.split("=")[0].replace("--no-", ""))
+
     def test_empty_path(self):
         for command in (["train", "--resume", ""], ["train", "--out", ""], ["train", "--config", ""],
                         ["eval", ""], ["info", ""], ["simulate", "--torque", ""],
@@ -83,7 +90,7 @@ class CommandLineTest(ProgramTest):
                 self.refuse([*TRAIN, flag, value], flag, allowed, f'got "{value}"')
 
     def test_no_layers(self):
-        self.refuse([*TRAIN, "--hidden", "[]"], "expected", "layers")
+        self.refuse([*TRAIN, "--hidden", "[]"], "expected", "--hidden")
 
     def test_eval_values(self):
         for flag, value in (("--episodes", "0"), ("--episodes", "many"), ("--episodes", "1.5"),

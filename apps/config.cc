@@ -189,6 +189,14 @@ std::vector<std::pair<std::string, double>> PlantValues(Plant plant) {
   return values;
 }
 
+std::string PlantText(const Plant& plant) {
+  std::vector<std::string> texts;
+  for (const auto& [name, value] : PlantValues(plant)) {
+    texts.push_back(Concat(name, " ", FormatNumber(value)));
+  }
+  return Join(texts, ", ");
+}
+
 std::vector<std::pair<std::string, std::string>> NamedAgents() {
   std::vector<std::pair<std::string, std::string>> names;
   for (const NamedAgent& agent : EmbeddedAgents()) {

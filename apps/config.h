@@ -50,6 +50,9 @@ std::string ConfigToml(Config config, bool identity_only);
 /// Name and value of each parameter of a plant.
 std::vector<std::pair<std::string, double>> PlantValues(Plant plant);
 
+/// The same as text: `mass1 1, mass2 1, …`.
+std::string PlantText(const Plant& plant);
+
 /// Names of the agents in configs/, in alphabetical order, and what each is.
 std::vector<std::pair<std::string, std::string>> NamedAgents();
 

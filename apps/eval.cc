@@ -22,14 +22,6 @@ struct EvalArguments {
   bool as_json = false;
 };
 
-std::string PlantText(const Plant& plant) {
-  std::vector<std::string> texts;
-  for (const auto& [name, value] : PlantValues(plant)) {
-    texts.push_back(Concat(name, " ", FormatNumber(value)));
-  }
-  return Join(texts, ", ");
-}
-
 void PrintTable(const Evaluation& e, const LoadedPolicy& loaded, const Plant& plant) {
   const auto moments = [](const Moments& m) {
     return fmt::format("{:.4g} ± {:.2g}", m.mean, m.deviation);
@@ -105,9 +97,9 @@ int RunEval(const EvalArguments& arguments) {
       if (!line.due() || arguments.as_json) return;
       const double seconds =
           std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-      line.Show(share, fmt::format("{} episodes/s  {} left",
-                                   FormatCount(share * arguments.episodes / seconds),
-                                   FormatDuration(seconds * (1 - share) / share)));
+      line.Show(share,
+                {fmt::format("{} episodes/s", FormatCount(share * arguments.episodes / seconds)),
+                 fmt::format("{} left", FormatDuration(seconds * (1 - share) / share))});
     });
   }
   if (arguments.as_json) {
@@ -137,15 +129,17 @@ void AddEval(CLI::App& program, Command& command) {
   app->add_option("--threads", a->threads, "0: one for each processor")
       ->check(CLI::Range(0, 256).description(""))
       ->type_name("INTEGER");
-  app->add_flag("--json", a->as_json, "print JSON instead of a table");
+  app->add_flag("--json", a->as_json, "print JSON instead of a table")->disable_flag_override();
   app->footer(fmt::format(
       "An episode lasts {} s from hanging with normal noise of 0.1 (rad, rad/s). It succeeds if "
       "both\nlinks are within 30° of upright for the whole of the last {} s. The return is the "
       "undiscounted\nsum of the reward, standard weights, over the first {} s.\n\n"
       "Examples:\n"
-      "  upswing eval runs/d3qn-seed1\n"
-      "  upswing eval policy.safetensors --episodes 1000 --seed 7 --json\n"
-      "  upswing eval runs/d3qn-seed1 --set mass2=1.2 --set damping=0.1\n",
+      "  ./upswing eval runs/d3qn-seed1\n"
+      "  ./upswing eval policy.safetensors --episodes 1000 --seed 7 --json\n"
+      "  ./upswing eval runs/d3qn-seed1 --set mass2=1.05 --set gravity=9.7\n\n"
+      "--set takes mass1, mass2, length1, length2, damping1, damping2, gravity, torque_limit, and\n"
+      "mass, length, damping for both.\n",
       kEvaluationSeconds, kHoldSeconds, kReturnSeconds));
   app->callback([a, &command] { command = [a] { return RunEval(*a); }; });
 }

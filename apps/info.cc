@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <limits>
 #include <memory>
 
 #include "apps/commands.h"
@@ -32,9 +33,12 @@ void PrintPolicy(const fs::path& path) {
              about("control_period"));
   fmt::print("  made by     agent {}, seed {}, step {}, upswing {}\n", about("agent"),
              about("seed"), about("step"), about("upswing_version"));
-  fmt::print("  judged      success rate {}, mean return {} (at that step)\n",
-             about("success_rate"), about("mean_return"));
-  fmt::print("  plant       {}\n", about("plant"));
+  const auto number = [&](const std::string& key) {
+    return ParseNumber(about(key)).value_or(std::numeric_limits<double>::quiet_NaN());
+  };
+  fmt::print("  judged      success {:.0f}%, mean return {:.0f} (at that step)\n",
+             100 * number("success_rate"), number("mean_return"));
+  fmt::print("  plant       {}\n", PlantText(loaded.plant));
   fmt::print("  self-check  passed, largest difference {:.1e}\n", policy.self_check_error());
 }
 
@@ -59,8 +63,16 @@ void PrintRun(const fs::path& path) {
 
 int RunInfo(const std::string& path) {
   const bool is_run = fs::exists(fs::path(path) / "config.toml");
-  if (is_run) PrintRun(path);
-  if (!is_run || fs::exists(fs::path(path) / "policy.safetensors")) {
+  const fs::path run_policy = fs::path(path) / "policy.safetensors";
+  try {
+    if (is_run) PrintRun(path);
+  } catch (const Error& error) {
+    if (!fs::exists(run_policy)) throw;
+    throw Error(
+        error.exit_code(),
+        Concat(error.what(), " (its policy is a file of its own: ", run_policy.string(), ")"));
+  }
+  if (!is_run || fs::exists(run_policy)) {
     PrintPolicy(path);
   } else {
     fmt::print("  policy      none yet: the first evaluation writes it\n");
@@ -77,7 +89,7 @@ void AddInfo(CLI::App& program, Command& command) {
       ->required()
       ->type_name("POLICY|RUN")
       ->check(NotEmpty());
-  app->footer("Examples:\n  upswing info runs/d3qn-seed1\n  upswing info policy.safetensors\n");
+  app->footer("Examples:\n  ./upswing info runs/d3qn-seed1\n  ./upswing info policy.safetensors\n");
   app->callback([path, &command] { command = [path] { return RunInfo(*path); }; });
 }
 

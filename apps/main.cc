@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <cstring>
 #include <exception>
+#include <iostream>
 
 #include "apps/commands.h"
 #include "core/error.h"
@@ -46,7 +47,12 @@ std::string Explain(const CLI::App& program, const CLI::ParseError& error) {
   const auto chosen = program.get_subcommands();
   const CLI::App& app = chosen.empty() ? program : *chosen.front();
   const std::vector<std::string> unknown = app.remaining();
-  if (unknown.empty()) return error.what();
+  const std::string message = error.what();
+  if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr &&
+      message.find("flag override") != std::string::npos) {
+    return Concat("--", message.substr(0, message.find(' ')), ": takes no value");
+  }
+  if (unknown.empty()) return message;
   const std::string word = unknown.front().substr(0, unknown.front().find('='));
   return Concat(word.starts_with("-") ? "unknown flag " : "did not expect ", word,
                 DidYouMean(word, KnownWords(app)));
@@ -63,6 +69,14 @@ class HelpFormatter : public CLI::Formatter {
   }
 };
 
+/// The exit code, unless the output cannot be written.
+int Finish(int exit_code) {
+  std::cout.flush();
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0 && std::cout.good()) return exit_code;
+  fmt::print(stderr, "upswing: cannot write the output: {}\n", std::strerror(errno));
+  return 1;
+}
+
 int Main(int argc, char** argv) {
   CLI::App program(
       "Upswing trains, judges and keeps controllers that swing up and balance a double\n"
@@ -73,9 +87,9 @@ int Main(int argc, char** argv) {
   program.formatter(std::make_shared<HelpFormatter>());
   program.footer(
       "Examples:\n"
-      "  upswing train                      train the default agent until the task is solved\n"
-      "  upswing eval runs/d3qn-seed1       judge its best policy\n"
-      "  upswing train --help               every setting, with its default\n");
+      "  ./upswing train                      train the default agent until the task is solved\n"
+      "  ./upswing eval runs/d3qn-seed1       judge its best policy\n"
+      "  ./upswing train --help               every setting, with its default\n");
   Command command;
   AddTrain(program, command);
   AddEval(program, command);
@@ -84,13 +98,9 @@ int Main(int argc, char** argv) {
 
   try {
     program.parse(argc, argv);
-    const int exit_code = command();
-    if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
-      throw Failure(Concat("cannot write the output: ", std::strerror(errno)));
-    }
-    return exit_code;
+    return Finish(command());
   } catch (const CLI::Success& request) {
-    return program.exit(request);  // --help and --version
+    return Finish(program.exit(request));  // --help and --version
   } catch (const CLI::ParseError& error) {
     fmt::print(stderr, "upswing: {}\n", Explain(program, error));
     return 2;

@@ -25,13 +25,16 @@ bool ProgressLine::due() const {
   return terminal_ && Clock::now() - last_ > std::chrono::milliseconds(200);
 }
 
-void ProgressLine::Show(double share, const std::string& text) {
+void ProgressLine::Show(double share, const std::vector<std::string>& fields) {
   constexpr int kBar = 16;
   const int full = static_cast<int>(std::lround(std::clamp(share, 0.0, 1.0) * kBar));
   std::string line =
-      fmt::format("[{:=>{}}{: >{}}] {:3.0f}% {}", "", full, "", kBar - full, 100 * share, text);
-  const auto width = static_cast<size_t>(std::max(20, TerminalWidth() - 1));
-  if (line.size() > width) line.resize(width);
+      fmt::format("[{:=>{}}{: >{}}] {:3.0f}%", "", full, "", kBar - full, 100 * share);
+  const auto width = static_cast<size_t>(std::max(30, TerminalWidth() - 1));
+  for (const std::string& field : fields) {
+    if (line.size() + 2 + field.size() > width) break;
+    line += "  " + field;
+  }
   fmt::print("\r\x1b[K{}", line);
   std::fflush(stdout);
   shown_ = true;

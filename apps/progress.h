@@ -3,6 +3,7 @@
 #include <chrono>
 #include <concepts>
 #include <string>
+#include <vector>
 
 namespace upswing {
 
@@ -18,8 +19,9 @@ class ProgressLine {
   /// Whether a line would be shown now: there is a terminal, and the last one is old enough.
   bool due() const;
 
-  /// Shows a bar of `share` (0 to 1) and a text behind it, cut to the terminal's width.
-  void Show(double share, const std::string& text);
+  /// Shows a bar of `share` (0 to 1) and behind it as many of the fields as the terminal has room
+  /// for, the first ones first.
+  void Show(double share, const std::vector<std::string>& fields);
 
   /// Prints a line that stays, above the bar.
   void Print(const std::string& line);

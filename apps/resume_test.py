@@ -48,6 +48,10 @@ class ResumeTest(ProgramTest):
         self.finish()
         self.assert_same_run("run", "never-stopped")
 
+    def test_fewer_steps_than_were_made_are_refused(self):
+        self.succeed(*small())
+        self.refuse(["train", "--resume", "run", "--steps", "3000"], "--steps", "4000", "3000")
+
     def test_a_run_that_is_being_trained_is_not_resumed(self):
         process = self.start(*small(steps=ENDLESS, stop_when_solved=False))
         refused = run("train", "--resume", "run", cwd=self.folder)

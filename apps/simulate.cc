@@ -80,7 +80,7 @@ std::string CsvRow(double t, const PendulumState& s, double torque, const Plant&
                          Inverted(s) ? 1.0 : 0.0, reward}) {
     row += ',' + FormatNumber(x);
   }
-  for (const double term : terms) row += ',' + FormatNumber(term);
+  for (const double term : terms) row += ',' + FormatNumber(term + 0.0);  // no -0
   return row + '\n';
 }
 
@@ -167,9 +167,9 @@ void AddSimulate(CLI::App& program, Command& command) {
       "and\n"
       "the reward with its five terms for the state and the torque of that row.\n\n"
       "Examples:\n"
-      "  upswing simulate runs/d3qn-seed1 --csv rollout.csv\n"
-      "  upswing simulate --torque torques.csv --start 0.1,-0.05,0,0 --seconds 10\n"
-      "  upswing simulate --start 3.0,0,0,0 --set damping=0      let it fall\n");
+      "  ./upswing simulate runs/d3qn-seed1 --csv rollout.csv\n"
+      "  ./upswing simulate --torque torques.csv --start 0.1,-0.05,0,0 --seconds 10\n"
+      "  ./upswing simulate --start 3.0,0,0,0 --set damping=0      let it fall\n");
   app->callback([a, &command] { command = [a] { return RunSimulate(*a); }; });
 }
 

@@ -1,7 +1,9 @@
 #include "rl/train.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <csignal>
@@ -32,7 +34,12 @@ static_assert(std::atomic<int>::is_always_lock_free);
 
 void InstallSignalHandlers() {
   struct sigaction stop {};
-  stop.sa_handler = [](int signal) { g_stop_signal = signal; };
+  stop.sa_handler = [](int signal) {
+    g_stop_signal = signal;
+    constexpr std::string_view kNotice =
+        "\nstopping: a checkpoint is written; once more ends at once\n";
+    if (isatty(STDERR_FILENO) == 1) (void)!write(STDERR_FILENO, kNotice.data(), kNotice.size());
+  };
   stop.sa_flags = SA_RESETHAND | SA_RESTART;  // a second one ends the program at once
   sigaction(SIGINT, &stop, nullptr);
   sigaction(SIGTERM, &stop, nullptr);
@@ -153,10 +160,15 @@ fs::path MakeRun(const TrainArguments& arguments, Parts& parts) {
 }
 
 /// Goes on with a run from its checkpoint, where a new one begins too. Returns the exit code.
-int TrainRun(const fs::path& path, Parts& parts) {
+int TrainRun(const fs::path& path, Parts& parts, bool steps_given) {
   const TensorFile checkpoint = TensorFile::Load(RunFolder::CheckpointPath(path));
   CheckCheckpoint(checkpoint, parts.config);
   CheckpointState(Archive::Loader(checkpoint), parts.agent, parts.env, parts.state);
+  if (steps_given && parts.config.train.steps < parts.state.steps) {
+    throw BadInput(Concat("--steps: the run is at step ", parts.state.steps,
+                          " already; expected at least that in all, got ",
+                          parts.config.train.steps));
+  }
   RunFolder run(path, checkpoint);
   WriteFileAtomically(path / "config.toml", ConfigToml(parts.config, false));
 
@@ -201,13 +213,15 @@ int RunTrain(const TrainArguments& arguments) {
     path = MakeRun(arguments, parts);
     lock.emplace(path);
   }
-  return TrainRun(path, parts);
+  const bool steps_given = std::ranges::any_of(
+      arguments.flags, [](const FlagValue& flag) { return flag.first == "steps"; });
+  return TrainRun(path, parts, resuming && steps_given);
 }
 
 /// What --help shows for a flag's value.
 std::string TypeName(const Option& option) {
   constexpr std::array kNames{"", "INTEGER", "NUMBER", "TEXT", "LIST"};  // in Target's order
-  return kNames.at(option.target.index());
+  return option.name == "model" ? "FILE" : kNames.at(option.target.index());
 }
 
 /// Adds a flag for each setting, in the order in which they were described.
@@ -234,7 +248,8 @@ void AddSettings(CLI::App& app, std::vector<FlagValue>& flags) {
              option.flag() + ",!--no-" + option.flag().substr(2),
              [&flags, name](int64_t on) { flags.emplace_back(name, on > 0 ? "true" : "false"); },
              help)
-          ->group(option.section);
+          ->group(option.section)
+          ->disable_flag_override();
       continue;
     }
     app.add_option_function<std::string>(
@@ -254,10 +269,12 @@ void AddTrain(CLI::App& program, Command& command) {
   app->add_option("--out", arguments->out, "run folder to make [runs/AGENT-seedSEED]")
       ->type_name("FOLDER")
       ->check(NotEmpty());
-  app->add_option("--config", arguments->config, "TOML file of settings (flags come after it)")
+  app->add_option("--config", arguments->config, "TOML file of settings; flags override it")
       ->type_name("FILE")
       ->check(NotEmpty());
-  app->add_option("--resume", arguments->resume, "go on with a run folder")
+  app->add_option("--resume", arguments->resume,
+                  "go on where a run stopped; --steps, --threads, --checkpoint-every and\n"
+                  "--stop-when-solved may be given anew")
       ->type_name("RUN")
       ->check(NotEmpty());
   AddSettings(*app, arguments->flags);
@@ -267,11 +284,11 @@ void AddTrain(CLI::App& program, Command& command) {
   app->footer(
       agents +
       "\nExamples:\n"
-      "  upswing train                                  the default agent, until solved\n"
-      "  upswing train --agent dqn --seed 3 --out runs/a\n"
-      "  upswing train --gamma 0.98 --hidden 128,128    any setting as a flag\n"
-      "  upswing train --mass2 1.2 --no-stop-when-solved --steps 500000\n"
-      "  upswing train --resume runs/a --steps 2000000  go on, from any moment\n"
+      "  ./upswing train                                  the default agent, until solved\n"
+      "  ./upswing train --agent dqn --seed 3 --out runs/a\n"
+      "  ./upswing train --gamma 0.98 --hidden 128,128    any setting as a flag\n"
+      "  ./upswing train --mass2 1.2 --no-stop-when-solved --steps 500000\n"
+      "  ./upswing train --resume runs/a --steps 2000000  go on, from any moment\n"
       "\nSIGINT and SIGTERM write a checkpoint and end with 130 and 143; SIGUSR1 writes one\n"
       "and goes on. Exit code 0: done; 1: failed; 2: bad usage or input.\n");
   app->callback([app, arguments, &command] {

@@ -35,10 +35,10 @@ void TrainView::Follow(Training& training) {
   };
   training.on_evaluation = [this](const TrainState& s, const Evaluation& e) {
     line_.Print(fmt::format(
-        "{:>9} steps  {:>11}  {:>6} updates/s  eps {:.2f}  loss {:.4f}  return {:6.0f}  "
+        "{:>9} steps  {:>11}  {:>6} updates/s  eps {:.2f}  loss {:>6}  return {:6.0f}  "
         "success {:3}/{}",
         FormatCount(s.steps), FormatDuration(s.seconds), FormatCount(updates_per_second_),
-        report_.epsilon, report_.loss, e.reward_sum.mean, e.successes, e.episodes));
+        report_.epsilon, LossText(), e.reward_sum.mean, e.successes, e.episodes));
   };
 }
 
@@ -57,13 +57,17 @@ void TrainView::ShowProgress(const TrainState& s, int64_t steps_in_all) {
   const auto steps_left = static_cast<double>(steps_in_all - s.steps);
   const std::string left =
       steps_per_second_ > 0 ? FormatDuration(steps_left / steps_per_second_) : "?";
-  // The most telling first: a narrow terminal cuts the end.
-  line_.Show(
-      static_cast<double>(s.steps) / static_cast<double>(steps_in_all),
-      fmt::format("at most {} left  success {:.0f}%  return {:.0f}  {} steps/s  "
-                  "{} updates/s  eps {:.2f}  loss {:.3f}",
-                  left, 100 * s.last_success_rate, s.mean_return(), FormatCount(steps_per_second_),
-                  FormatCount(updates_per_second_), report_.epsilon, report_.loss));
+  line_.Show(static_cast<double>(s.steps) / static_cast<double>(steps_in_all),
+             {fmt::format("at most {} left", left),
+              fmt::format("success {:.0f}%", 100 * s.last_success_rate),
+              fmt::format("return {:.0f}", s.mean_return()),
+              fmt::format("{} steps/s", FormatCount(steps_per_second_)),
+              fmt::format("{} updates/s", FormatCount(updates_per_second_)),
+              fmt::format("eps {:.2f}", report_.epsilon), "loss " + LossText()});
+}
+
+std::string TrainView::LossText() const {
+  return report_.updates == 0 ? "-" : fmt::format("{:.4f}", report_.loss);
 }
 
 void TrainView::Summarize(const TrainState& s, const std::filesystem::path& run, bool finished) {

@@ -26,6 +26,7 @@ class TrainView {
 
  private:
   void UpdateRates(const TrainState& state, const AgentReport& report);
+  std::string LossText() const;
   void ShowProgress(const TrainState& state, int64_t steps_in_all);
 
   ProgressLine line_;

@@ -57,7 +57,6 @@ std::optional<std::vector<int64_t>> ParseList(std::string_view text, Range range
   text = Trim(text);
   if (text.starts_with('[') && text.ends_with(']')) text = Trim(text.substr(1, text.size() - 2));
   std::vector<int64_t> values;
-  if (text.empty()) return values;
   for (const std::string_view piece : Split(text, ',')) {
     const auto value = ParseInteger(piece);
     if (!value || !Inside(static_cast<double>(*value), range)) return std::nullopt;
@@ -183,7 +182,9 @@ std::vector<const Option*> Options::Find(std::string_view name, const std::strin
     if (std::count(names.begin(), names.end(), option.name) != 0) found.push_back(&option);
   }
   if (found.empty()) {
-    throw BadInput(Concat(where, ": no setting is called \"", name, "\"", DidYouMean(name, known)));
+    std::string hint = DidYouMean(name, known);
+    if (hint.empty() && known.size() < 16) hint = Concat("; there are ", Join(known, ", "));
+    throw BadInput(Concat(where, ": no setting is called \"", name, "\"", hint));
   }
   return found;
 }

@@ -174,6 +174,10 @@ void TensorFile::Save(const std::filesystem::path& path) const {
 TensorFile TensorFile::Load(const std::filesystem::path& path) {
   TensorFile file;
   file.path_ = path.string();
+  std::error_code error;
+  if (std::filesystem::exists(path, error) && !std::filesystem::is_regular_file(path, error)) {
+    throw BadInput(Concat("cannot read ", file.path_, ": expected a regular file"));
+  }
   const auto& bytes = file.kept_.emplace_back(ReadFile(path));
   const auto broken = [&](const auto&... why) {
     return BadInput(Concat(file.path_, ": not a whole safetensors file: ", why...));

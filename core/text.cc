@@ -38,7 +38,7 @@ std::optional<T> ParseWhole(std::string_view text) {
 std::string FormatNumber(double value) {
   std::array<char, 32> buffer;
   // Integers in full, as tables want them: 100000 rather than 1e+05.
-  const bool integer = std::abs(value) < 1e15 && value == std::trunc(value);
+  const bool integer = std::abs(value) < 1e16 && value == std::trunc(value);
   char* const end = buffer.data() + buffer.size();
   const auto result = integer ? std::to_chars(buffer.data(), end, value, std::chars_format::fixed)
                               : std::to_chars(buffer.data(), end, value);

@@ -44,14 +44,15 @@ void DqnConfig::Describe(Options& o) {
   o.Add(&learning_starts, "learning_starts", 2000, kNotNegative, "steps",
         "before the first update");
   o.Add(&updates_per_step, "updates_per_step", 0.25, {0, 100}, "", "gradient steps per step");
-  o.Add(&learning_rate, "learning_rate", 1e-3, {0, 10}, "", "of Adam, at the beginning");
-  o.Add(&learning_rate_end, "learning_rate_end", 1e-4, {0, 10}, "", "of Adam, at the end");
+  o.Add(&learning_rate, "learning_rate", 1e-3, {0, 10}, "",
+        "learning rate of Adam at the beginning");
+  o.Add(&learning_rate_end, "learning_rate_end", 1e-4, {0, 10}, "", "and at the end");
   o.Add(&learning_rate_steps, "learning_rate_steps", 300000, {1, 1e12}, "steps",
         "over which it falls linearly");
   o.Add(&max_gradient_norm, "max_gradient_norm", 10, kPositive, "", "clip the global norm to this");
   o.Add(&tau, "tau", 0.02, kUnit, "", "Polyak averaging of the target, per update");
   o.Add(&target_period, "target_period", 0, {0, 1e9}, "updates",
-        "copy the target this often instead of averaging; 0: average");
+        "copy the target every so many instead; 0: Polyak averaging");
   o.Add(&epsilon_start, "epsilon_start", 1.0, kUnit, "",
         "share of random actions at the beginning");
   o.Add(&epsilon_end, "epsilon_end", 0.05, kUnit, "", "and at least");

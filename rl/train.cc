@@ -174,18 +174,21 @@ bool RunLoop(Training& t, TrainState& s) {
 void TrainConfig::Describe(Options& o) {
   constexpr Range kCount{1, 1e12};
   o.Section("train");
-  o.Add(&seed, "seed", 1, {0, 9e15}, "", "of every random stream");
-  o.Add(&steps, "steps", 1000000, kCount, "steps", "train for at most this many").identity = false;
+  o.Add(&seed, "seed", 1, {0, 9e15}, "", "seed of every random stream");
+  o.Add(&steps, "steps", 1000000, kCount, "steps", "train for at most this many in all").identity =
+      false;
   o.Add(&envs, "envs", 8, {1, 4096}, "", "environments in lock-step");
   o.Add(&stop_when_solved, "stop_when_solved", true,
         "stop once all episodes of two evaluations in a row succeed")
       .identity = false;
-  o.Add(&eval_every, "eval_every", 10000, kCount, "steps", "between evaluations");
+  o.Add(&eval_every, "eval_every", 10000, kCount, "steps", "from one evaluation to the next");
   o.Add(&eval_episodes, "eval_episodes", 100, {1, 100000}, "", "episodes of an evaluation");
-  o.Add(&log_every, "log_every", 2000, kCount, "steps", "between rows of metrics.csv");
-  o.Add(&checkpoint_every, "checkpoint_every", 50000, kCount, "steps", "between checkpoints")
+  o.Add(&log_every, "log_every", 2000, kCount, "steps", "from one row of metrics.csv to the next");
+  o.Add(&checkpoint_every, "checkpoint_every", 50000, kCount, "steps",
+        "from one checkpoint to the next")
       .identity = false;
-  o.Add(&threads, "threads", 0, {0, 256}, "", "0: one for each processor").identity = false;
+  o.Add(&threads, "threads", 0, {0, 256}, "", "threads to use; 0: one for each processor")
+      .identity = false;
   o.Add(&start_noise, "start_noise", 0.1, {0, 10}, "rad, rad/s",
         "standard deviation of the start states around hanging");
   o.Add(&start_noise_end, "start_noise_end", 0.1, {0, 10}, "rad, rad/s", "at the curriculum's end");
