@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cerrno>
 #include <csignal>
 #include <filesystem>
 #include <map>
@@ -30,15 +31,20 @@ constexpr std::string_view kCheckpointFormat = "upswing-checkpoint-1";
 
 std::atomic<int> g_stop_signal{0};
 std::atomic<bool> g_checkpoint_wanted{false};
+std::atomic<bool> g_person_watches{false};  // standard error is a terminal
 static_assert(std::atomic<int>::is_always_lock_free);
 
 void InstallSignalHandlers() {
+  g_person_watches = isatty(STDERR_FILENO) == 1;
   struct sigaction stop {};
   stop.sa_handler = [](int signal) {
     g_stop_signal = signal;
+    if (!g_person_watches) return;
     constexpr std::string_view kNotice =
         "\nstopping: a checkpoint is written; once more ends at once\n";
-    if (isatty(STDERR_FILENO) == 1) (void)!write(STDERR_FILENO, kNotice.data(), kNotice.size());
+    const int interrupted_errno = errno;
+    (void)!write(STDERR_FILENO, kNotice.data(), kNotice.size());
+    errno = interrupted_errno;
   };
   stop.sa_flags = SA_RESETHAND | SA_RESTART;  // a second one ends the program at once
   sigaction(SIGINT, &stop, nullptr);
