@@ -10,27 +10,11 @@ import tempfile
 import unittest
 from pathlib import Path
 
-from testing import (UPSWING, ProgramTest, read_tensors, run, small, snapshot, with_number,
+from testing import (MODEL, UPSWING, ProgramTest, read_tensors, run, small, snapshot, with_number,
                      write_tensors)
 
 # Should it be accepted against expectation, it does not take long.
 TRAIN = ["train", "--steps", "8", "--eval-episodes", "1", "--out", "run"]
-
-GOOD_MODEL = """<mujoco>
-  <option timestep="0.005" integrator="RK4"/>
-  <worldbody>
-    <body>
-      <joint name="a" type="hinge" axis="0 1 0" armature="0.01"/>
-      <geom type="capsule" size="0.04" fromto="0 0 0 0 0 -0.5" mass="1" contype="0"/>
-      <body pos="0 0 -0.5">
-        <joint name="b" type="hinge" axis="0 1 0" armature="0.01"/>
-        <geom type="capsule" size="0.04" fromto="0 0 0 0 0 -0.5" mass="1" contype="0"/>
-      </body>
-    </body>
-  </worldbody>
-  <actuator><motor joint="a" ctrllimited="true" ctrlrange="-5 5"/></actuator>
-</mujoco>
-"""
 
 
 class CommandLineTest(ProgramTest):
@@ -584,7 +568,7 @@ class ModelTest(ProgramTest):
             self.refuse([*command, "--model", "m.xml"], "m.xml", *words)
 
     def test_good_model(self):
-        self.write("m.xml", GOOD_MODEL)
+        self.write("m.xml", MODEL)
         self.succeed("simulate", "--seconds", "1", "--model", "m.xml")
 
     def test_missing(self):
@@ -594,40 +578,40 @@ class ModelTest(ProgramTest):
         self.refuse_model("<mujoco><worldbody>", "XML")
         self.refuse_model("", "XML")
         self.refuse_model("no XML at all", "XML")
-        self.refuse_model(GOOD_MODEL.replace('mass="1"', 'mas="1"', 1),
+        self.refuse_model(MODEL.replace('mass="1"', 'mas="1"', 1),
                           "unrecognized attribute: 'mas'", "line 6")
-        self.refuse_model(GOOD_MODEL.replace("<motor", "<moter"), "moter")
-        self.refuse_model(GOOD_MODEL.replace('joint="a" ctrl', 'joint="z" ctrl'), "z")
-        self.refuse_model(GOOD_MODEL.replace('mass="1"', 'mass="-1"', 1), "mass")
+        self.refuse_model(MODEL.replace("<motor", "<moter"), "moter")
+        self.refuse_model(MODEL.replace('joint="a" ctrl', 'joint="z" ctrl'), "z")
+        self.refuse_model(MODEL.replace('mass="1"', 'mass="-1"', 1), "mass")
 
     def test_not_a_double_pendulum(self):
-        two_bodies = GOOD_MODEL.replace('<body pos="0 0 -0.5">', '</body>\n<body pos="0 0 -0.5">')
+        two_bodies = MODEL.replace('<body pos="0 0 -0.5">', '</body>\n<body pos="0 0 -0.5">')
         two_bodies = two_bodies.replace("      </body>\n    </body>\n", "      </body>\n")
         for text in (
                 "<mujoco/>",
                 two_bodies,
-                GOOD_MODEL.replace('type="hinge"', 'type="slide"', 1),
-                GOOD_MODEL.replace('axis="0 1 0"', 'axis="1 0 0"', 1),
-                GOOD_MODEL.replace('joint="a" ctrl', 'joint="b" ctrl'),
-                GOOD_MODEL.replace('ctrllimited="true" ctrlrange="-5 5"', ""),
-                GOOD_MODEL.replace('type="capsule" size="0.04" fromto="0 0 0 0 0 -0.5"',
+                MODEL.replace('type="hinge"', 'type="slide"', 1),
+                MODEL.replace('axis="0 1 0"', 'axis="1 0 0"', 1),
+                MODEL.replace('joint="a" ctrl', 'joint="b" ctrl'),
+                MODEL.replace('ctrllimited="true" ctrlrange="-5 5"', ""),
+                MODEL.replace('type="capsule" size="0.04" fromto="0 0 0 0 0 -0.5"',
                                    'type="sphere" size="0.1"', 1),
-                GOOD_MODEL.replace('<body pos="0 0 -0.5">', '<body pos="0 0 -0.4">'),
-                GOOD_MODEL.replace('fromto="0 0 0 0 0 -0.5"', 'fromto="0 0 0 0.5 0 0"', 1),
-                GOOD_MODEL.replace("<actuator>", '<actuator><motor joint="b"/>')):
+                MODEL.replace('<body pos="0 0 -0.5">', '<body pos="0 0 -0.4">'),
+                MODEL.replace('fromto="0 0 0 0 0 -0.5"', 'fromto="0 0 0 0.5 0 0"', 1),
+                MODEL.replace("<actuator>", '<actuator><motor joint="b"/>')):
             with self.subTest(model=text):
                 self.refuse_model(text, "not a double pendulum: expected")
 
     def test_what_the_settings_cannot_express_is_not_silently_changed(self):
         body = '<joint name="b"'
-        for text in (GOOD_MODEL.replace('ctrlrange="-5 5"', 'ctrlrange="-1 5"'),
-                     GOOD_MODEL.replace(body, '<inertial pos="0 0 -0.25" mass="1" '
+        for text in (MODEL.replace('ctrlrange="-5 5"', 'ctrlrange="-1 5"'),
+                     MODEL.replace(body, '<inertial pos="0 0 -0.25" mass="1" '
                                               'diaginertia="0.1 0.1 0.1"/>' + body)):
             with self.subTest(model=text):
                 self.refuse_model(text, "expected")
 
     def test_timestep_that_does_not_divide_the_control_period(self):
-        self.refuse_model(GOOD_MODEL.replace("0.005", "0.007", 1), "timestep", "0.02", "0.007")
+        self.refuse_model(MODEL.replace("0.005", "0.007", 1), "timestep", "0.02", "0.007")
 
 
 class TorqueFileTest(FileTest):

@@ -166,17 +166,17 @@ fs::path MakeRun(const TrainArguments& arguments, Parts& parts) {
 }
 
 /// Goes on with a run from its checkpoint, where a new one begins too. Returns the exit code.
-int TrainRun(const fs::path& path, Parts& parts, bool steps_given) {
+int TrainRun(const fs::path& path, Parts& parts, bool resuming, bool steps_given) {
   const TensorFile checkpoint = TensorFile::Load(RunFolder::CheckpointPath(path));
   CheckCheckpoint(checkpoint, parts.config);
   CheckpointState(Archive::Loader(checkpoint), parts.agent, parts.env, parts.state);
-  if (steps_given && parts.config.train.steps < parts.state.steps) {
+  if (resuming && steps_given && parts.config.train.steps < parts.state.steps) {
     throw BadInput(Concat("--steps: the run is at step ", parts.state.steps,
                           " already; expected at least that in all, got ",
                           parts.config.train.steps));
   }
   RunFolder run(path, checkpoint);
-  WriteFileAtomically(path / "config.toml", ConfigToml(parts.config, false));
+  if (resuming) WriteFileAtomically(path / "config.toml", ConfigToml(parts.config, false));
 
   Training training{parts.config.train, parts.agent, parts.env, run};
   training.evaluate = [&](const Policy& p, int64_t step) { return parts.Judge(p, step); };
@@ -221,7 +221,7 @@ int RunTrain(const TrainArguments& arguments) {
   }
   const bool steps_given = std::ranges::any_of(
       arguments.flags, [](const FlagValue& flag) { return flag.first == "steps"; });
-  return TrainRun(path, parts, resuming && steps_given);
+  return TrainRun(path, parts, resuming, steps_given);
 }
 
 /// What --help shows for a flag's value.

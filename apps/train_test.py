@@ -8,8 +8,8 @@ import signal
 import subprocess
 import unittest
 
-from testing import (REWARD_TERMS, ROOT, RUN_FILES, UPSWING, ProgramTest, read_csv, read_tensors,
-                     small)
+from testing import (MODEL, REWARD_TERMS, ROOT, RUN_FILES, UPSWING, ProgramTest, read_csv,
+                     read_tensors, small)
 
 METRICS = ["step", "episodes", "updates", "epsilon", "learning_rate", "loss", "q", "td_error",
            "gradient_norm", "mean_return", "success_rate", "seconds"]
@@ -178,7 +178,8 @@ class TrainTest(ProgramTest):
             self.assertIn("\n" + line, config)
 
     def test_own_model_is_kept_and_runs_again(self):
-        self.write("own.xml", OWN_MODEL)
+        self.write("own.xml", MODEL.replace('mass="1"', 'mass="1.2"', 1)
+                   .replace('mass="1"', 'mass="0.7"').replace('damping="0"', 'damping="0.1"'))
         self.succeed(*small(model="own.xml"))
         (self.folder / "own.xml").unlink()
         self.assertIn("mass2 = 0.7 ", (self.folder / "run/config.toml").read_text(encoding="utf-8"))
@@ -235,22 +236,6 @@ class TrainTest(ProgramTest):
         successes = int(re.search(r"success +(\d+) of 100", output)[1])
         self.assertGreaterEqual(successes, 97)
 
-
-OWN_MODEL = """<mujoco>
-  <option gravity="0 0 -9.7" timestep="0.005" integrator="RK4"/>
-  <worldbody>
-    <body>
-      <joint name="a" type="hinge" axis="0 1 0" damping="0.1" armature="0.01"/>
-      <geom type="capsule" size="0.04" fromto="0 0 0 0 0 -0.6" mass="1.2" contype="0"/>
-      <body pos="0 0 -0.6">
-        <joint name="b" type="hinge" axis="0 1 0" damping="0.1" armature="0.01"/>
-        <geom type="capsule" size="0.04" fromto="0 0 0 0 0 -0.4" mass="0.7" contype="0"/>
-      </body>
-    </body>
-  </worldbody>
-  <actuator><motor joint="a" ctrllimited="true" ctrlrange="-6 6"/></actuator>
-</mujoco>
-"""
 
 if __name__ == "__main__":
     unittest.main()
