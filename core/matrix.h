@@ -8,12 +8,15 @@
 
 namespace upswing {
 
-/// A view of `rows` × `cols` numbers, row after row without gaps. Owns nothing.
+/// A view of `rows` × `cols` numbers, row after row, each `stride` numbers after the one before.
+/// Owns nothing.
 template <typename T>
 class Matrix {
  public:
   Matrix() = default;
-  Matrix(T* data, int rows, int cols) : data_(data), rows_(rows), cols_(cols) {}
+  Matrix(T* data, int rows, int cols) : Matrix(data, rows, cols, cols) {}
+  Matrix(T* data, int rows, int cols, int stride)
+      : data_(data), rows_(rows), cols_(cols), stride_(stride) {}
   Matrix(std::span<T> values, int rows, int cols) : Matrix(values.data(), rows, cols) {
     assert(values.size() >= size());
   }
@@ -21,11 +24,13 @@ class Matrix {
   template <typename U>
   requires std::is_same_v<const U, T>
   // NOLINTNEXTLINE(google-explicit-constructor): as a pointer converts
-  Matrix(const Matrix<U>& other) : Matrix(other.data(), other.rows(), other.cols()) {}
+  Matrix(const Matrix<U>& other)
+      : Matrix(other.data(), other.rows(), other.cols(), other.stride()) {}
 
   T* data() const { return data_; }
   int rows() const { return rows_; }
   int cols() const { return cols_; }
+  int stride() const { return stride_; }
   size_t size() const { return static_cast<size_t>(rows_) * static_cast<size_t>(cols_); }
   bool empty() const { return size() == 0; }
 
@@ -35,17 +40,26 @@ class Matrix {
   /// `count` rows from `first` on.
   Matrix Rows(int first, int count) const {
     assert(first >= 0 && first + count <= rows_);
-    return {data_ + Offset(first), count, cols_};
+    return {data_ + Offset(first), count, cols_, stride_};
   }
-  /// All numbers as one span (rows · cols).
-  std::span<T> values() const { return {data_, size()}; }
+  /// `count` columns from `first` on.
+  Matrix Cols(int first, int count) const {
+    assert(first >= 0 && first + count <= cols_);
+    return {data_ + first, rows_, count, stride_};
+  }
+  /// All numbers as one span (rows · cols); there must be no gaps between the rows.
+  std::span<T> values() const {
+    assert(stride_ == cols_ || rows_ <= 1);
+    return {data_, size()};
+  }
 
  private:
-  ptrdiff_t Offset(int row) const { return static_cast<ptrdiff_t>(row) * cols_; }
+  ptrdiff_t Offset(int row) const { return static_cast<ptrdiff_t>(row) * stride_; }
 
   T* data_ = nullptr;
   int rows_ = 0;
   int cols_ = 0;
+  int stride_ = 0;
 };
 
 }  // namespace upswing

@@ -53,10 +53,11 @@ void ThreadPool::Stop() {
 void ThreadPool::ParallelFor(int n, const std::function<void(int)>& task) {
   task_ = &task;
   n_ = n;
+  next_ = 0;
   running_ = static_cast<int>(workers_.size());
   ++round_;
   round_.notify_all();
-  RunShare(0);
+  RunTasks(0);
   for (int left = running_; left != 0; left = running_) WaitWhile(running_, left);
 
   // Every thread is at rest again, so errors_ is ours.
@@ -74,14 +75,14 @@ void ThreadPool::Work(int thread) {
     WaitWhile(round_, seen);
     ++seen;
     if (stopping_) return;
-    RunShare(thread);
+    RunTasks(thread);
     if (--running_ == 0) running_.notify_one();
   }
 }
 
-void ThreadPool::RunShare(int thread) {
+void ThreadPool::RunTasks(int thread) {
   try {
-    for (int i = thread; i < n_; i += threads()) (*task_)(i);
+    for (int i = next_++; i < n_; i = next_++) (*task_)(i);
   } catch (...) {
     errors_[static_cast<size_t>(thread)] = std::current_exception();
   }

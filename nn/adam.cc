@@ -11,27 +11,41 @@ namespace upswing {
 
 Adam::Adam(size_t num_parameters) : m_(num_parameters), v_(num_parameters) {}
 
-double Adam::Step(std::span<const float> gradient, double learning_rate, double max_norm,
-                  std::span<float> parameters) {
+void Adam::Step(const Size& size, std::span<const float> gradient, std::span<float> parameters,
+                std::span<float> target, ThreadPool& pool) {
   constexpr double kBeta1 = 0.9;
   constexpr double kBeta2 = 0.999;
   constexpr double kEpsilon = 1e-8;
+  constexpr size_t kChunk = 8192;  // numbers in a task
 
-  const double norm = std::sqrt(SquaredNorm(gradient));
-  if (!std::isfinite(norm)) {
-    throw Failure(Concat("the gradient's norm is ", norm, ", expected a finite number"));
+  if (!std::isfinite(size.gradient_norm)) {
+    throw Failure(
+        Concat("the gradient's norm is ", size.gradient_norm, ", expected a finite number"));
   }
-  const double scale = norm > max_norm ? max_norm / norm : 1.0;
+  const bool clip = size.gradient_norm > size.max_norm;
+  const double scale = clip ? size.max_norm / size.gradient_norm : 1.0;
 
   // m̂ / (sqrt(v̂) + ε) with both bias corrections drawn into step and ε, as the paper proposes.
   ++steps_;
   const double t = static_cast<double>(steps_);
   const double correction1 = 1.0 - std::pow(kBeta1, t);
   const double correction2 = std::sqrt(1.0 - std::pow(kBeta2, t));
-  AdamStep<float>(gradient, static_cast<float>(scale), kBeta1, kBeta2,
-                  static_cast<float>(learning_rate * correction2 / correction1),
-                  static_cast<float>(kEpsilon * correction2), m_, v_, parameters);
-  return norm;
+  const AdamConstants<float> constants{
+      static_cast<float>(scale),
+      kBeta1,
+      kBeta2,
+      static_cast<float>(size.learning_rate * correction2 / correction1),
+      static_cast<float>(kEpsilon * correction2),
+      static_cast<float>(size.tau)};
+
+  const size_t chunks = (parameters.size() + kChunk - 1) / kChunk;
+  pool.ParallelFor(static_cast<int>(chunks), [&](int chunk) {
+    const size_t first = static_cast<size_t>(chunk) * kChunk;
+    const size_t count = std::min(kChunk, parameters.size() - first);
+    const auto part = [&](auto values) { return values.subspan(first, count); };
+    AdamPolyakStep<float>(constants, part(gradient), part(std::span(m_)), part(std::span(v_)),
+                          part(parameters), part(target));
+  });
 }
 
 void Adam::State(const Archive& archive) {

@@ -5,20 +5,29 @@
 
 #include "core/aligned.h"
 #include "core/archive.h"
+#include "core/thread_pool.h"
 
 namespace upswing {
 
 /// Adam (Kingma and Ba, 2015, Algorithm 1) with β1 = 0.9, β2 = 0.999, ε = 1e-8, behind clipping by
-/// global norm (Pascanu et al., 2013, Algorithm 1).
+/// global norm (Pascanu et al., 2013, Algorithm 1). In the same pass over memory, target parameters
+/// follow by Polyak averaging.
 class Adam {
  public:
   explicit Adam(size_t num_parameters);
 
-  /// Moves `parameters` against `gradient` (both num_parameters). If the gradient's norm is above
-  /// `max_norm` it is scaled down to that. Returns the norm before; throws Failure, with nothing
-  /// changed, if it is not finite.
-  double Step(std::span<const float> gradient, double learning_rate, double max_norm,
-              std::span<float> parameters);
+  /// How far a step goes.
+  struct Size {
+    double learning_rate;
+    double gradient_norm;  // the global norm of the gradient…
+    double max_norm;       // …and what it is scaled down to if it is above
+    double tau;            // target ← target + tau · (parameters - target), after the step
+  };
+
+  /// Moves `parameters` against `gradient`, then `target` towards them (num_parameters each).
+  /// Throws Failure, with nothing changed, if the norm is not finite.
+  void Step(const Size& size, std::span<const float> gradient, std::span<float> parameters,
+            std::span<float> target, ThreadPool& pool);
 
   /// Saves or loads the moments and the step count.
   void State(const Archive& archive);

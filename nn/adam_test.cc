@@ -10,6 +10,16 @@
 namespace upswing {
 namespace {
 
+/// One step with targets that stay where they are.
+void Step(Adam& adam, const AlignedVector<float>& gradient, double learning_rate, double max_norm,
+          AlignedVector<float>& p) {
+  double squares = 0;
+  for (const float g : gradient) squares += static_cast<double>(g) * g;
+  ThreadPool pool(1);
+  AlignedVector<float> target(p.size());
+  adam.Step({learning_rate, std::sqrt(squares), max_norm, 0.0}, gradient, p, target, pool);
+}
+
 TEST(Adam, FollowsTheAlgorithmAsThePaperWritesIt) {
   // Kingma and Ba, Algorithm 1, in double, with m̂ and v̂ written out.
   Adam adam(1);
@@ -23,7 +33,7 @@ TEST(Adam, FollowsTheAlgorithmAsThePaperWritesIt) {
     const double v_hat = v / (1 - std::pow(0.999, t));
     expected -= 1e-2 * m_hat / (std::sqrt(v_hat) + 1e-8);
     const AlignedVector<float> gradient{static_cast<float>(g)};
-    EXPECT_NEAR(adam.Step(gradient, 1e-2, 1e9, p), std::abs(g), 1e-6);
+    Step(adam, gradient, 1e-2, 1e9, p);
     ASSERT_NEAR(p[0], expected, 1.2e-5);  // 200 roundings to float, 6e-8 each
   }
 }
@@ -32,10 +42,10 @@ TEST(Adam, ClipsByTheGlobalNorm) {
   // A gradient of norm 5 clipped to 1 acts like that gradient divided by 5, also in later steps.
   Adam clipped(2), plain(2);
   AlignedVector<float> p{0, 0}, q{0, 0};
-  EXPECT_FLOAT_EQ(static_cast<float>(clipped.Step(AlignedVector<float>{3, 4}, 0.1, 1, p)), 5);
-  plain.Step(AlignedVector<float>{0.6F, 0.8F}, 0.1, 1e9, q);
-  clipped.Step(AlignedVector<float>{0.1F, 0}, 0.1, 1, p);
-  plain.Step(AlignedVector<float>{0.1F, 0}, 0.1, 1e9, q);
+  Step(clipped, {3, 4}, 0.1, 1, p);
+  Step(plain, {0.6F, 0.8F}, 0.1, 1e9, q);
+  Step(clipped, {0.1F, 0}, 0.1, 1, p);
+  Step(plain, {0.1F, 0}, 0.1, 1e9, q);
   EXPECT_NEAR(p[0], q[0], 1e-7);
   EXPECT_NEAR(p[1], q[1], 1e-7);
 }
@@ -45,9 +55,23 @@ TEST(Adam, AGradientThatIsNotFiniteChangesNothing) {
        {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
     Adam adam(2);
     AlignedVector<float> p{1, 2};
-    EXPECT_THROW(adam.Step(AlignedVector<float>{0, bad}, 0.1, 10, p), Error);
+    EXPECT_THROW(Step(adam, {0, bad}, 0.1, 10, p), Error);
     EXPECT_EQ(p, (AlignedVector<float>{1, 2}));
   }
+}
+
+TEST(Adam, TargetsFollowAndThreadsChangeNoBit) {
+  constexpr size_t kMany = 20000;  // several tasks
+  AlignedVector<float> gradient(kMany, 0.25F), p(kMany, 1), target(kMany, 2), p2 = p,
+                                                                              target2 = target;
+  ThreadPool one(1), three(3);
+  const Adam::Size size{0.1, 1, 10, 0.5};
+  Adam(kMany).Step(size, gradient, p, target, one);
+  Adam(kMany).Step(size, gradient, p2, target2, three);
+  EXPECT_EQ(p, p2);
+  EXPECT_EQ(target, target2);
+  EXPECT_NEAR(p[kMany - 1], 0.9, 1e-6);  // the first step is the learning rate
+  EXPECT_NEAR(target[kMany - 1], 2 + 0.5 * (0.9 - 2), 1e-6);
 }
 
 }  // namespace

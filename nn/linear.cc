@@ -1,139 +1,463 @@
+// The kernels of small networks, written once with Highway and compiled for each kind of vector
+// instructions. The three matrix products of a linear layer are one kernel, C = A · B, whose A is
+// read along its rows or its columns.
 #include "nn/linear.h"
 
-#include <Eigen/Core>
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "nn/linear.cc"
+#include <hwy/foreach_target.h>  // includes this file once for each target
+// must come after foreach_target
+#include <hwy/highway.h>
 
+#ifndef UPSWING_NN_LINEAR_ONCE  // what all targets share
+#define UPSWING_NN_LINEAR_ONCE
+#include <cmath>
+#include <type_traits>
+
+namespace upswing {
+
+/// C (M × N) = A (M × K) · B (K × N) + bias, where A(m, k) = a[m · a_m + k · a_k].
+template <typename T>
+struct Product {
+  int M, N, K;
+  const T* a;
+  ptrdiff_t a_m, a_k;
+  Matrix<const T> b;     // (K × N)
+  Matrix<T> c;           // (M × N)
+  const T* bias;         // (N), or null for none
+  bool relu;             // C = max(C, 0)
+  Matrix<const T> gate;  // C = 0 where gate (M × N) is not positive; empty for none
+};
+
+/// The kernels of one target.
+template <typename T>
+struct KernelTable {
+  void (*multiply)(const Product<T>&);
+  decltype(&Transpose<T>) transpose;
+  decltype(&SumRows<T>) sum_rows;
+  decltype(&LayerNormReluForward<T>) layer_norm_relu_forward;
+  decltype(&LayerNormBackwardInput<T>) layer_norm_backward_input;
+  decltype(&LayerNormBackwardGain<T>) layer_norm_backward_gain;
+  decltype(&SquaredNorm<T>) squared_norm;
+  decltype(&AdamPolyakStep<T>) adam_polyak_step;
+};
+
+}  // namespace upswing
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace upswing::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+template <typename T>
+using Tag = hn::ScalableTag<T>;
+template <typename T>
+using Vec = hn::Vec<Tag<T>>;
+
+// ------------------------------------------------------------------------------------------------
+// Matrix products. A tile of C, kRows × kVectors registers, stays in registers over the whole of K;
+// weights of these sizes stay in the L2 cache, and packing them would gain nothing.
+
+/// Tile shapes: as many registers for C as leave room for a row of B and a number of A. Tiles of
+/// fewer rows, for what remains of M and for single rows, are wider, because a multiply-add takes
+/// several cycles and as many must be under way.
+#if HWY_TARGET == HWY_AVX2
+constexpr int kTileRows = 6;
+constexpr int kRegisters = 12;
+#else
+constexpr int kTileRows = 8;
+constexpr int kRegisters = 16;
+#endif
+
+/// Up to `count` numbers, or a whole register of them.
+template <bool kPartial, typename T>
+HWY_INLINE Vec<T> Load(const T* from, size_t count) {
+  const Tag<T> d;
+  if constexpr (kPartial) return hn::MaskedLoad(hn::FirstN(d, count), d, from);
+  return hn::LoadU(d, from);
+}
+template <bool kPartial, typename T>
+HWY_INLINE void Store(Vec<T> value, T* to, size_t count) {
+  const Tag<T> d;
+  if constexpr (kPartial) {
+    hn::BlendedStore(value, hn::FirstN(d, count), d, to);
+  } else {
+    hn::StoreU(value, d, to);
+  }
+}
+
+/// The tile of C at (m, n); if kPartial it has one register in a row, of which `count` numbers.
+template <int kRows, int kVectors, bool kPartial, typename T>
+HWY_INLINE void MultiplyTile(const Product<T>& p, int m, int n, size_t count) {
+  const Tag<T> d;
+  const int lanes = static_cast<int>(hn::Lanes(d));
+  Vec<T> c[kRows][kVectors];
+  HWY_UNROLL(16)
+  for (int v = 0; v < kVectors; ++v) {
+    const Vec<T> start =
+        p.bias == nullptr ? hn::Zero(d) : Load<kPartial>(p.bias + n + v * lanes, count);
+    HWY_UNROLL(16)
+    for (int i = 0; i < kRows; ++i) c[i][v] = start;
+  }
+
+  const T* a = p.a + m * p.a_m;
+  const T* b = p.b.data() + n;
+  for (int k = 0; k < p.K; ++k) {
+    Vec<T> b_row[kVectors];
+    HWY_UNROLL(16)
+    for (int v = 0; v < kVectors; ++v) b_row[v] = Load<kPartial>(b + v * lanes, count);
+    HWY_UNROLL(16)
+    for (int i = 0; i < kRows; ++i) {
+      const Vec<T> a_ik = hn::Set(d, a[i * p.a_m]);
+      HWY_UNROLL(16)
+      for (int v = 0; v < kVectors; ++v) c[i][v] = hn::MulAdd(a_ik, b_row[v], c[i][v]);
+    }
+    a += p.a_k;
+    b += p.b.stride();
+  }
+
+  HWY_UNROLL(16)
+  for (int i = 0; i < kRows; ++i) {
+    HWY_UNROLL(16)
+    for (int v = 0; v < kVectors; ++v) {
+      const int col = n + v * lanes;
+      if (p.relu) c[i][v] = hn::Max(c[i][v], hn::Zero(d));
+      if (!p.gate.empty()) {
+        const Vec<T> gate = Load<kPartial>(&p.gate(m + i, col), count);
+        c[i][v] = hn::IfThenElseZero(hn::Gt(gate, hn::Zero(d)), c[i][v]);
+      }
+      Store<kPartial>(c[i][v], &p.c(m + i, col), count);
+    }
+  }
+}
+
+/// All of C from row m on that can be cut into tiles of kRows rows; returns the first row after.
+template <int kRows, typename T>
+int MultiplyRows(const Product<T>& p, int m) {
+  constexpr int kVectors = kRegisters / kRows;
+  const int lanes = static_cast<int>(hn::Lanes(Tag<T>()));
+  const int end = m + (p.M - m) / kRows * kRows;
+  int n = 0;
+  for (; n + kVectors * lanes <= p.N; n += kVectors * lanes) {
+    for (int i = m; i < end; i += kRows) MultiplyTile<kRows, kVectors, false>(p, i, n, 0);
+  }
+  for (; n + lanes <= p.N; n += lanes) {
+    for (int i = m; i < end; i += kRows) MultiplyTile<kRows, 1, false>(p, i, n, 0);
+  }
+  if (n < p.N) {
+    const auto count = static_cast<size_t>(p.N - n);
+    for (int i = m; i < end; i += kRows) MultiplyTile<kRows, 1, true>(p, i, n, count);
+  }
+  return end;
+}
+
+template <typename T>
+void Multiply(const Product<T>& p) {
+  int m = MultiplyRows<kTileRows>(p, 0);
+  m = MultiplyRows<4>(p, m);
+  m = MultiplyRows<2>(p, m);
+  MultiplyRows<1>(p, m);
+}
+
+/// y = xᵀ. Floats go by blocks of 4 × 4 in registers of four.
+template <typename T>
+void Transpose(Matrix<const T> x, Matrix<T> y) {
+  int rows = 0;  // done by blocks
+  int cols = 0;
+#if HWY_TARGET != HWY_SCALAR
+  if constexpr (sizeof(T) == 4) {
+    const hn::Full128<T> d;
+    const hn::Repartition<double, decltype(d)> pairs;
+    rows = x.rows() / 4 * 4;
+    cols = x.cols() / 4 * 4;
+    for (int c = 0; c < cols; c += 4) {
+      for (int r = 0; r < rows; r += 4) {
+        const auto r0 = hn::LoadU(d, &x(r, c));
+        const auto r1 = hn::LoadU(d, &x(r + 1, c));
+        const auto r2 = hn::LoadU(d, &x(r + 2, c));
+        const auto r3 = hn::LoadU(d, &x(r + 3, c));
+        const auto low01 = hn::BitCast(pairs, hn::InterleaveLower(d, r0, r1));
+        const auto low23 = hn::BitCast(pairs, hn::InterleaveLower(d, r2, r3));
+        const auto high01 = hn::BitCast(pairs, hn::InterleaveUpper(d, r0, r1));
+        const auto high23 = hn::BitCast(pairs, hn::InterleaveUpper(d, r2, r3));
+        hn::StoreU(hn::BitCast(d, hn::InterleaveLower(pairs, low01, low23)), d, &y(c, r));
+        hn::StoreU(hn::BitCast(d, hn::InterleaveUpper(pairs, low01, low23)), d, &y(c + 1, r));
+        hn::StoreU(hn::BitCast(d, hn::InterleaveLower(pairs, high01, high23)), d, &y(c + 2, r));
+        hn::StoreU(hn::BitCast(d, hn::InterleaveUpper(pairs, high01, high23)), d, &y(c + 3, r));
+      }
+    }
+  }
+#endif
+  for (int r = 0; r < x.rows(); ++r) {
+    for (int c = r < rows ? cols : 0; c < x.cols(); ++c) y(c, r) = x(r, c);
+  }
+}
+
+// ------------------------------------------------------------------------------------------------
+// Passes over vectors. Each applies `f(i, count, partial)` to whole registers and then, with
+// partial = true, to the `count` numbers that remain.
+
+template <typename T, typename F>
+HWY_INLINE void ForVectors(size_t n, const F& f) {
+  const size_t lanes = hn::Lanes(Tag<T>());
+  size_t i = 0;
+  for (; i + lanes <= n; i += lanes) f(i, lanes, std::false_type());
+  if (i < n) f(i, n - i, std::true_type());
+}
+
+/// Σ term(i, count, partial) over all vectors, with four sums under way.
+template <typename T, typename F>
+HWY_INLINE T SumVectors(size_t n, const F& term) {
+  const Tag<T> d;
+  Vec<T> sum[4] = {hn::Zero(d), hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+  const size_t lanes = hn::Lanes(d);
+  size_t i = 0;
+  for (; i + 4 * lanes <= n; i += 4 * lanes) {
+    for (size_t k = 0; k < 4; ++k) {
+      sum[k] = hn::Add(sum[k], term(i + k * lanes, lanes, std::false_type()));
+    }
+  }
+  for (; i + lanes <= n; i += lanes) sum[0] = hn::Add(sum[0], term(i, lanes, std::false_type()));
+  if (i < n) sum[1] = hn::Add(sum[1], term(i, n - i, std::true_type()));
+  const Vec<T> all = hn::Add(hn::Add(sum[0], sum[1]), hn::Add(sum[2], sum[3]));
+  return hn::GetLane(hn::SumOfLanes(d, all));
+}
+
+template <typename T>
+void SumRows(Matrix<const T> x, std::span<T> sum) {
+  ForVectors<T>(sum.size(), [&](size_t i, size_t count, auto partial) HWY_ATTR {
+    Vec<T> column = hn::Zero(Tag<T>());
+    for (int r = 0; r < x.rows(); ++r) {
+      column = hn::Add(column, Load<partial.value>(x.row(r).data() + i, count));
+    }
+    Store<partial.value>(column, sum.data() + i, count);
+  });
+}
+
+template <typename T>
+void LayerNormReluForward(Matrix<T> x, std::span<const T> gain, std::span<const T> bias,
+                          std::span<T> inv_std, Matrix<T> y) {
+  constexpr T kEpsilon = T(1e-5);
+  const Tag<T> d;
+  const auto n = static_cast<size_t>(x.cols());
+  for (int r = 0; r < x.rows(); ++r) {
+    T* row = x.row(r).data();
+    T* out = y.row(r).data();
+    const T mean = SumVectors<T>(n, [&](size_t i, size_t count, auto partial)
+                                        HWY_ATTR { return Load<partial.value>(row + i, count); }) /
+                   static_cast<T>(n);
+    const Vec<T> center = hn::Set(d, mean);
+    const T square = SumVectors<T>(n, [&](size_t i, size_t count, auto partial) HWY_ATTR {
+      Vec<T> e = hn::Sub(Load<partial.value>(row + i, count), center);
+      if constexpr (partial.value) e = hn::IfThenElseZero(hn::FirstN(d, count), e);
+      return hn::Mul(e, e);
+    });
+    const T scale = T{1} / std::sqrt(square / static_cast<T>(n) + kEpsilon);
+    inv_std[static_cast<size_t>(r)] = scale;
+    ForVectors<T>(n, [&](size_t i, size_t count, auto partial) HWY_ATTR {
+      const Vec<T> e = hn::Sub(Load<partial.value>(row + i, count), center);
+      const Vec<T> x_hat = hn::Mul(e, hn::Set(d, scale));
+      Store<partial.value>(x_hat, row + i, count);
+      const Vec<T> normal = hn::MulAdd(Load<partial.value>(gain.data() + i, count), x_hat,
+                                       Load<partial.value>(bias.data() + i, count));
+      Store<partial.value>(hn::Max(normal, hn::Zero(d)), out + i, count);
+    });
+  }
+}
+
+template <typename T>
+void LayerNormBackwardInput(Matrix<const T> x_hat, std::span<const T> gain,
+                            std::span<const T> inv_std, Matrix<const T> dy, Matrix<T> dx) {
+  const Tag<T> d;
+  const auto n = static_cast<size_t>(dy.cols());
+  for (int r = 0; r < dy.rows(); ++r) {
+    const T* normal = x_hat.row(r).data();
+    const T* gradient = dy.row(r).data();
+    // dx = inv_std (g - mean(g) - x̂ mean(g x̂)) with g = gain · dy
+    const auto g = [&](size_t i, size_t count, auto partial) HWY_ATTR {
+      return hn::Mul(Load<partial.value>(gain.data() + i, count),
+                     Load<partial.value>(gradient + i, count));
+    };
+    const T mean = SumVectors<T>(n, g) / static_cast<T>(n);
+    const T along = SumVectors<T>(n,
+                                  [&](size_t i, size_t count, auto partial) HWY_ATTR {
+                                    return hn::Mul(g(i, count, partial),
+                                                   Load<partial.value>(normal + i, count));
+                                  }) /
+                    static_cast<T>(n);
+    ForVectors<T>(n, [&](size_t i, size_t count, auto partial) HWY_ATTR {
+      const Vec<T> rest = hn::Sub(g(i, count, partial), hn::Set(d, mean));
+      const Vec<T> result =
+          hn::NegMulAdd(Load<partial.value>(normal + i, count), hn::Set(d, along), rest);
+      const Vec<T> scale = hn::Set(d, inv_std[static_cast<size_t>(r)]);
+      Store<partial.value>(hn::Mul(scale, result), dx.row(r).data() + i, count);
+    });
+  }
+}
+
+template <typename T>
+void LayerNormBackwardGain(Matrix<const T> x_hat, Matrix<const T> dy, std::span<T> dgain) {
+  ForVectors<T>(dgain.size(), [&](size_t i, size_t count, auto partial) HWY_ATTR {
+    Vec<T> sum = hn::Zero(Tag<T>());
+    for (int r = 0; r < dy.rows(); ++r) {
+      sum = hn::MulAdd(Load<partial.value>(dy.row(r).data() + i, count),
+                       Load<partial.value>(x_hat.row(r).data() + i, count), sum);
+    }
+    Store<partial.value>(sum, dgain.data() + i, count);
+  });
+}
+
+template <typename T>
+T SquaredNorm(std::span<const T> x) {
+  return SumVectors<T>(x.size(), [&](size_t i, size_t count, auto partial) HWY_ATTR {
+    const Vec<T> value = Load<partial.value>(x.data() + i, count);
+    return hn::Mul(value, value);
+  });
+}
+
+template <typename T>
+void AdamPolyakStep(const AdamConstants<T>& constants, std::span<const T> g, std::span<T> m,
+                    std::span<T> v, std::span<T> p, std::span<T> target) {
+  const Tag<T> d;
+  const Vec<T> beta1 = hn::Set(d, constants.beta1);
+  const Vec<T> beta2 = hn::Set(d, constants.beta2);
+  const Vec<T> rest1 = hn::Set(d, T{1} - constants.beta1);
+  const Vec<T> rest2 = hn::Set(d, T{1} - constants.beta2);
+  const Vec<T> scale = hn::Set(d, constants.scale);
+  const Vec<T> step = hn::Set(d, constants.step);
+  const Vec<T> epsilon = hn::Set(d, constants.epsilon);
+  const Vec<T> tau = hn::Set(d, constants.tau);
+  ForVectors<T>(g.size(), [&](size_t i, size_t count, auto partial) HWY_ATTR {
+    const auto load = [&](auto values)
+                          HWY_ATTR { return Load<partial.value>(values.data() + i, count); };
+    const auto store = [&](Vec<T> value, std::span<T> to)
+                           HWY_ATTR { Store<partial.value>(value, to.data() + i, count); };
+    const Vec<T> gradient = hn::Mul(load(g), scale);
+    const Vec<T> m_new = hn::MulAdd(beta1, load(m), hn::Mul(rest1, gradient));
+    const Vec<T> v_new = hn::MulAdd(beta2, load(v), hn::Mul(rest2, hn::Mul(gradient, gradient)));
+    const Vec<T> move = hn::Div(hn::Mul(step, m_new), hn::Add(hn::Sqrt(v_new), epsilon));
+    const Vec<T> p_new = hn::Sub(load(p), move);
+    const Vec<T> old_target = load(target);
+    store(m_new, m);
+    store(v_new, v);
+    store(p_new, p);
+    store(hn::MulAdd(tau, hn::Sub(p_new, old_target), old_target), target);
+  });
+}
+
+template <typename T>
+constexpr KernelTable<T> kKernels{
+    &Multiply<T>,
+    &Transpose<T>,
+    &SumRows<T>,
+    &LayerNormReluForward<T>,
+    &LayerNormBackwardInput<T>,
+    &LayerNormBackwardGain<T>,
+    &SquaredNorm<T>,
+    &AdamPolyakStep<T>,
+};
+const KernelTable<float>* FloatKernels() { return &kKernels<float>; }
+const KernelTable<double>* DoubleKernels() { return &kKernels<double>; }
+
+}  // namespace upswing::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
 namespace upswing {
 namespace {
 
-template <typename T>
-using Map = Eigen::Map<Eigen::Matrix<T, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>;
-template <typename T>
-using ConstMap =
-    Eigen::Map<const Eigen::Matrix<T, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>;
-template <typename T>
-using ArrayMap = Eigen::Map<Eigen::Array<T, Eigen::Dynamic, 1>>;
-template <typename T>
-using ConstArrayMap = Eigen::Map<const Eigen::Array<T, Eigen::Dynamic, 1>>;
+HWY_EXPORT(FloatKernels);
+HWY_EXPORT(DoubleKernels);
 
+/// The kernels of the target in use.
 template <typename T>
-Map<T> View(Matrix<T> x) {
-  return {x.data(), x.rows(), x.cols()};
-}
-template <typename T>
-ConstMap<T> View(Matrix<const T> x) {
-  return {x.data(), x.rows(), x.cols()};
-}
-template <typename T>
-ArrayMap<T> View(std::span<T> x) {
-  return {x.data(), static_cast<Eigen::Index>(x.size())};
-}
-template <typename T>
-ConstArrayMap<T> View(std::span<const T> x) {
-  return {x.data(), static_cast<Eigen::Index>(x.size())};
+const KernelTable<T>& Kernels() {
+  if constexpr (std::is_same_v<T, float>) {
+    return *HWY_DYNAMIC_DISPATCH(FloatKernels)();
+  } else {
+    return *HWY_DYNAMIC_DISPATCH(DoubleKernels)();
+  }
 }
 
 }  // namespace
 
 template <typename T>
-void LinearForward(Matrix<const T> x, Matrix<const T> w, std::span<const T> b, Matrix<T> y) {
-  auto out = View(y);
-  out.rowwise() = View(b).matrix().transpose();
-  out.noalias() += View(x) * View(w).transpose();
+void LinearForward(Matrix<const T> x, Matrix<const T> w, std::span<const T> b, bool relu,
+                   Matrix<T> y) {
+  Kernels<T>().multiply(
+      {x.rows(), w.cols(), x.cols(), x.data(), x.stride(), 1, w, y, b.data(), relu, {}});
 }
 
 template <typename T>
-void LinearBackward(Matrix<const T> x, Matrix<const T> w, Matrix<const T> dy, Matrix<T> dw,
-                    std::span<T> db, Matrix<T> dx) {
-  View(dw).noalias() = View(dy).transpose() * View(x);
-  View(db).matrix().transpose() = View(dy).colwise().sum();
-  if (!dx.empty()) View(dx).noalias() = View(dy) * View(w);
+void LinearBackwardInput(Matrix<const T> dy, Matrix<const T> w_transposed, Matrix<const T> relu,
+                         Matrix<T> dx) {
+  Kernels<T>().multiply({dy.rows(), w_transposed.cols(), dy.cols(), dy.data(), dy.stride(), 1,
+                         w_transposed, dx, nullptr, false, relu});
 }
 
 template <typename T>
-void ReluForward(Matrix<T> y) {
-  auto values = View(y.values());
-  values = values.max(T{0});
+void LinearBackwardWeight(Matrix<const T> x, Matrix<const T> dy, Matrix<T> dw) {
+  Kernels<T>().multiply(
+      {x.cols(), dy.cols(), x.rows(), x.data(), 1, x.stride(), dy, dw, nullptr, false, {}});
 }
 
 template <typename T>
-void ReluBackward(Matrix<const T> y, Matrix<T> dy) {
-  auto gradient = View(dy.values());
-  gradient = (View(y.values()) > T{0}).select(gradient, T{0});
+void Transpose(Matrix<const T> x, Matrix<T> y) {
+  Kernels<T>().transpose(x, y);
 }
 
 template <typename T>
-void LayerNormForward(Matrix<T> x, std::span<const T> gain, std::span<const T> bias,
-                      std::span<T> inv_std, Matrix<T> y) {
-  constexpr T kEpsilon = T(1e-5);
-  for (int i = 0; i < x.rows(); ++i) {
-    auto row = View(x.row(i));
-    row -= row.mean();
-    const T scale = T{1} / std::sqrt(row.square().mean() + kEpsilon);
-    row *= scale;
-    inv_std[static_cast<size_t>(i)] = scale;
-    View(y.row(i)) = View(gain) * row + View(bias);
-  }
+void SumRows(Matrix<const T> x, std::span<T> sum) {
+  Kernels<T>().sum_rows(x, sum);
 }
 
 template <typename T>
-void LayerNormBackward(Matrix<const T> x_hat, std::span<const T> gain, std::span<const T> inv_std,
-                       std::span<T> dgain, std::span<T> dbias, Matrix<T> dy) {
-  View(dgain).setZero();
-  View(dbias).setZero();
-  for (int i = 0; i < dy.rows(); ++i) {
-    auto gradient = View(dy.row(i));
-    const auto normal = View(x_hat.row(i));
-    View(dgain) += gradient * normal;
-    View(dbias) += gradient;
-    // dx = inv_std (g - mean(g) - x̂ mean(g x̂)) with g = gain · dy
-    gradient *= View(gain);
-    const T mean = gradient.mean();
-    const T along = (gradient * normal).mean();
-    gradient = inv_std[static_cast<size_t>(i)] * (gradient - mean - normal * along);
-  }
+void LayerNormReluForward(Matrix<T> x, std::span<const T> gain, std::span<const T> bias,
+                          std::span<T> inv_std, Matrix<T> y) {
+  Kernels<T>().layer_norm_relu_forward(x, gain, bias, inv_std, y);
+}
+
+template <typename T>
+void LayerNormBackwardInput(Matrix<const T> x_hat, std::span<const T> gain,
+                            std::span<const T> inv_std, Matrix<const T> dy, Matrix<T> dx) {
+  Kernels<T>().layer_norm_backward_input(x_hat, gain, inv_std, dy, dx);
+}
+
+template <typename T>
+void LayerNormBackwardGain(Matrix<const T> x_hat, Matrix<const T> dy, std::span<T> dgain) {
+  Kernels<T>().layer_norm_backward_gain(x_hat, dy, dgain);
 }
 
 template <typename T>
 T SquaredNorm(std::span<const T> x) {
-  return View(x).matrix().squaredNorm();
+  return Kernels<T>().squared_norm(x);
 }
 
 template <typename T>
-void AddTo(std::span<const T> x, std::span<T> y) {
-  View(y) += View(x);
-}
-
-template <typename T>
-void MoveTowards(std::span<const T> x, T tau, std::span<T> y) {
-  View(y) += tau * (View(x) - View(y));
-}
-
-template <typename T>
-void AdamStep(std::span<const T> g, T scale, T beta1, T beta2, T step, T epsilon, std::span<T> m,
-              std::span<T> v, std::span<T> p) {
-  View(m) = beta1 * View(m) + (T{1} - beta1) * scale * View(g);
-  View(v) = beta2 * View(v) + (T{1} - beta2) * (scale * View(g)).square();
-  View(p) -= step * View(m) / (View(v).sqrt() + epsilon);
+void AdamPolyakStep(const AdamConstants<T>& constants, std::span<const T> g, std::span<T> m,
+                    std::span<T> v, std::span<T> p, std::span<T> target) {
+  Kernels<T>().adam_polyak_step(constants, g, m, v, p, target);
 }
 
 // Float to work with, double to check gradients by finite differences.
-#define UPSWING_INSTANTIATE(T)                                                                    \
-  template void LinearForward(Matrix<const T>, Matrix<const T>, std::span<const T>, Matrix<T>);   \
-  template void LinearBackward(Matrix<const T>, Matrix<const T>, Matrix<const T>, Matrix<T>,      \
-                               std::span<T>, Matrix<T>);                                          \
-  template void ReluForward(Matrix<T>);                                                           \
-  template void ReluBackward(Matrix<const T>, Matrix<T>);                                         \
-  template void LayerNormForward(Matrix<T>, std::span<const T>, std::span<const T>, std::span<T>, \
-                                 Matrix<T>);                                                      \
-  template void LayerNormBackward(Matrix<const T>, std::span<const T>, std::span<const T>,        \
-                                  std::span<T>, std::span<T>, Matrix<T>);                         \
-  template T SquaredNorm(std::span<const T>);                                                     \
-  template void AddTo(std::span<const T>, std::span<T>);                                          \
-  template void MoveTowards(std::span<const T>, T, std::span<T>);                                 \
-  template void AdamStep(std::span<const T>, T, T, T, T, T, std::span<T>, std::span<T>,           \
-                         std::span<T>);
+#define UPSWING_INSTANTIATE(T)                                                                     \
+  template void LinearForward(Matrix<const T>, Matrix<const T>, std::span<const T>, bool,          \
+                              Matrix<T>);                                                          \
+  template void LinearBackwardInput(Matrix<const T>, Matrix<const T>, Matrix<const T>, Matrix<T>); \
+  template void LinearBackwardWeight(Matrix<const T>, Matrix<const T>, Matrix<T>);                 \
+  template void Transpose(Matrix<const T>, Matrix<T>);                                             \
+  template void SumRows(Matrix<const T>, std::span<T>);                                            \
+  template void LayerNormReluForward(Matrix<T>, std::span<const T>, std::span<const T>,            \
+                                     std::span<T>, Matrix<T>);                                     \
+  template void LayerNormBackwardInput(Matrix<const T>, std::span<const T>, std::span<const T>,    \
+                                       Matrix<const T>, Matrix<T>);                                \
+  template void LayerNormBackwardGain(Matrix<const T>, Matrix<const T>, std::span<T>);             \
+  template T SquaredNorm(std::span<const T>);                                                      \
+  template void AdamPolyakStep(const AdamConstants<T>&, std::span<const T>, std::span<T>,          \
+                               std::span<T>, std::span<T>, std::span<T>);
 UPSWING_INSTANTIATE(float)
 UPSWING_INSTANTIATE(double)
 #undef UPSWING_INSTANTIATE
 
 }  // namespace upswing
+#endif  // HWY_ONCE

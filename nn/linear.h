@@ -5,56 +5,71 @@
 #include "core/matrix.h"
 
 /// Kernels of small networks, for T = float and double. B = batch size.
-/// This is the only file of the project that knows how they are made fast.
+/// This is the only file of the project that knows how they are made fast: every kernel is compiled
+/// for several kinds of vector instructions (core/simd.h).
+///
+/// What a kernel writes into one place is summed in an order that depends on the sizes alone, not
+/// on where in a batch a row stands: cutting a batch into slices changes no bit.
 namespace upswing {
 
-/// y (B × out) = x (B × in) · Wᵀ + b, with W (out × in) and b (out), as torch.nn.Linear has them.
+/// y (B × out) = x (B × in) · W + b, with W (in × out) and b (out); y = max(y, 0) if `relu`.
+/// W is the transpose of torch.nn.Linear's.
 template <typename T>
-void LinearForward(Matrix<const T> x, Matrix<const T> w, std::span<const T> b, Matrix<T> y);
+void LinearForward(Matrix<const T> x, Matrix<const T> w, std::span<const T> b, bool relu,
+                   Matrix<T> y);
 
-/// Gradients of LinearForward, given dy (B × out): writes dw (out × in), db (out) and, unless it
-/// is empty, dx (B × in).
+/// dx (B × in) = dy (B × out) · Wᵀ, given Wᵀ (out × in). If x is the output of a ReLU, `relu` is
+/// that output (B × in), and dx = 0 where it is 0; else `relu` is empty.
 template <typename T>
-void LinearBackward(Matrix<const T> x, Matrix<const T> w, Matrix<const T> dy, Matrix<T> dw,
-                    std::span<T> db, Matrix<T> dx);
+void LinearBackwardInput(Matrix<const T> dy, Matrix<const T> w_transposed, Matrix<const T> relu,
+                         Matrix<T> dx);
 
-/// y = max(y, 0) in place.
+/// dW (in × out) = xᵀ (in × B) · dy (B × out).
 template <typename T>
-void ReluForward(Matrix<T> y);
+void LinearBackwardWeight(Matrix<const T> x, Matrix<const T> dy, Matrix<T> dw);
 
-/// dy = 0 where the output y of ReluForward is 0, in place.
+/// sum (n) of the rows of x (B × n).
 template <typename T>
-void ReluBackward(Matrix<const T> y, Matrix<T> dy);
+void SumRows(Matrix<const T> x, std::span<T> sum);
 
-/// y = gain · x̂ + bias with x̂ = (x - mean) / sqrt(var + 1e-5) over each row (Ba et al., 2016,
-/// Eq 3). x (B × n) is replaced by x̂, and inv_std (B) = 1 / sqrt(var + 1e-5), for the way back.
+/// y (cols × rows) = the transpose of x (rows × cols).
 template <typename T>
-void LayerNormForward(Matrix<T> x, std::span<const T> gain, std::span<const T> bias,
-                      std::span<T> inv_std, Matrix<T> y);
+void Transpose(Matrix<const T> x, Matrix<T> y);
 
-/// Gradients of LayerNormForward, given dy (B × n), x̂ and inv_std: writes dgain (n) and dbias (n)
-/// and replaces dy by dx.
+/// y = max(gain · x̂ + bias, 0) with x̂ = (x - mean) / sqrt(var + 1e-5) over each row (Ba et al.,
+/// 2016, Eq 3). x (B × n) is replaced by x̂, and inv_std (B) = 1 / sqrt(var + 1e-5), for the way
+/// back.
 template <typename T>
-void LayerNormBackward(Matrix<const T> x_hat, std::span<const T> gain, std::span<const T> inv_std,
-                       std::span<T> dgain, std::span<T> dbias, Matrix<T> dy);
+void LayerNormReluForward(Matrix<T> x, std::span<const T> gain, std::span<const T> bias,
+                          std::span<T> inv_std, Matrix<T> y);
 
-/// Sum of squares, summed in an order that depends on the size alone.
+/// dx (B × n) of the layer normalisation, given dy (B × n) before the ReLU, x̂ and inv_std.
+template <typename T>
+void LayerNormBackwardInput(Matrix<const T> x_hat, std::span<const T> gain,
+                            std::span<const T> inv_std, Matrix<const T> dy, Matrix<T> dx);
+
+/// dgain (n) = Σ dy · x̂ over the rows; the gradient of the bias is SumRows(dy).
+template <typename T>
+void LayerNormBackwardGain(Matrix<const T> x_hat, Matrix<const T> dy, std::span<T> dgain);
+
+/// Sum of squares.
 template <typename T>
 T SquaredNorm(std::span<const T> x);
 
-/// y += x.
+/// The constants of one step of Adam (Kingma and Ba, 2015, Algorithm 1), with both bias corrections
+/// drawn into step and epsilon, and of Polyak averaging.
 template <typename T>
-void AddTo(std::span<const T> x, std::span<T> y);
+struct AdamConstants {
+  T scale;          // of the gradient: below 1 if it is clipped
+  T beta1, beta2;   // decay of the moments
+  T step, epsilon;  // corrected step size and ε
+  T tau;            // of Polyak averaging
+};
 
-/// y += tau · (x - y): Polyak averaging.
+/// In one pass, with g scaled: m ← β1 m + (1-β1) g, v ← β2 v + (1-β2) g²,
+/// p ← p - step · m / (sqrt(v) + ε), target ← target + tau · (p - target).
 template <typename T>
-void MoveTowards(std::span<const T> x, T tau, std::span<T> y);
-
-/// One step of Adam (Kingma and Ba, 2015, Algorithm 1) with gradient scale · g:
-/// m ← β1 m + (1-β1) g, v ← β2 v + (1-β2) g², p ← p - step · m / (sqrt(v) + epsilon), where the
-/// caller has put both bias corrections into step and epsilon.
-template <typename T>
-void AdamStep(std::span<const T> g, T scale, T beta1, T beta2, T step, T epsilon, std::span<T> m,
-              std::span<T> v, std::span<T> p);
+void AdamPolyakStep(const AdamConstants<T>& constants, std::span<const T> g, std::span<T> m,
+                    std::span<T> v, std::span<T> p, std::span<T> target);
 
 }  // namespace upswing

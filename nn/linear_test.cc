@@ -3,104 +3,207 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numeric>
+#include <string>
+#include <tuple>
 #include <vector>
 
 #include "core/aligned.h"
 #include "core/rng.h"
+#include "core/simd.h"
 
 namespace upswing {
 namespace {
 
-AlignedVector<double> RandomNumbers(size_t n, const char* stream) {
-  Rng rng(7, stream);
-  AlignedVector<double> values(n);
-  for (double& x : values) x = rng.Normal();
-  return values;
-}
+size_t Size(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
 
-/// Sizes that are and are not multiples of a vector register, down to one.
-class LinearTest : public ::testing::TestWithParam<std::array<int, 3>> {
- protected:
-  int B() const { return GetParam()[0]; }
-  int in() const { return GetParam()[1]; }
-  int out() const { return GetParam()[2]; }
-  size_t size(int rows, int cols) const {
-    return static_cast<size_t>(rows) * static_cast<size_t>(cols);
+/// A matrix that owns its numbers, with a gap after each row.
+template <typename T>
+struct Table {
+  AlignedVector<T> values;
+  Matrix<T> view;
+
+  Table(int rows, int cols, const char* stream)
+      : values(Size(rows, cols + 3)), view(values.data(), rows, cols, cols + 3) {
+    Rng rng(7, stream);
+    for (T& x : values) x = static_cast<T>(rng.Normal());
   }
+  // As a template's argument only this type can be deduced from.
+  operator Matrix<const T>() const { return view; }  // NOLINT(google-explicit-constructor)
+  std::span<const T> row() const { return view.row(0); }
 };
 
-TEST_P(LinearTest, ForwardAndBackwardMatchTheirDefinitions) {
-  auto x = RandomNumbers(size(B(), in()), "x");
-  auto w = RandomNumbers(size(out(), in()), "w");
-  auto b = RandomNumbers(size(1, out()), "b");
-  auto dy = RandomNumbers(size(B(), out()), "dy");
-  AlignedVector<double> y(dy.size()), dw(w.size()), db(b.size()), dx(x.size());
-  const Matrix<double> X(x, B(), in()), W(w, out(), in()), Y(y, B(), out()), DY(dy, B(), out()),
-      DW(dw, out(), in()), DX(dx, B(), in());
-  LinearForward<double>(X, W, b, Y);
-  LinearBackward<double>(X, W, DY, DW, db, DX);
+/// Each kernel on each kind of vector instructions that this machine has, against its definition
+/// as plain loops in double.
+class KernelTest : public ::testing::TestWithParam<std::string> {
+ protected:
+  void SetUp() override { UseSimdPath(GetParam()); }
+  void TearDown() override { UseSimdPath(SimdPaths().front()); }
+};
+INSTANTIATE_TEST_SUITE_P(Paths, KernelTest, ::testing::ValuesIn(SimdPaths()),
+                         [](const auto& info) { return info.param; });
 
-  // The sums in another order differ by rounding: n terms of size ~1.
-  const double tolerance = 1e-12;
-  for (int i = 0; i < B(); ++i) {
-    for (int o = 0; o < out(); ++o) {
-      double sum = b[static_cast<size_t>(o)];
-      for (int k = 0; k < in(); ++k) sum += X(i, k) * W(o, k);
-      ASSERT_NEAR(Y(i, o), sum, tolerance);
+/// Rounding of a sum of n products of numbers of size 1, with room to spare.
+template <typename T>
+double Tolerance(int n) {
+  return 4 * std::numeric_limits<T>::epsilon() * (n + 8.0);
+}
+
+template <typename T>
+void CheckLinear(int B, int in, int out) {
+  SCOPED_TRACE(::testing::Message() << B << " × " << in << " × " << out);
+  const Table<T> x(B, in, "x"), w(in, out, "w"), b(1, out, "b"), dy(B, out, "dy"),
+      gate(B, in, "gate"), w_transposed(out, in, "wt");
+  Table<T> y(B, out, ""), y_relu(B, out, ""), dx(B, in, ""), dw(in, out, "");
+  LinearForward<T>(x, w, b.row(), false, y.view);
+  LinearForward<T>(x, w, b.row(), true, y_relu.view);
+  LinearBackwardInput<T>(dy, w_transposed, gate, dx.view);
+  LinearBackwardWeight<T>(x, dy, dw.view);
+  for (int i = 0; i < B; ++i) {
+    for (int o = 0; o < out; ++o) {
+      double sum = b.view(0, o);
+      for (int k = 0; k < in; ++k) sum += static_cast<double>(x.view(i, k)) * w.view(k, o);
+      ASSERT_NEAR(y.view(i, o), sum, Tolerance<T>(in));
+      ASSERT_EQ(y_relu.view(i, o), std::max(y.view(i, o), T{0}));
     }
-    for (int k = 0; k < in(); ++k) {
+    for (int k = 0; k < in; ++k) {
       double sum = 0;
-      for (int o = 0; o < out(); ++o) sum += DY(i, o) * W(o, k);
-      ASSERT_NEAR(DX(i, k), sum, tolerance);
+      for (int o = 0; o < out; ++o) {
+        sum += static_cast<double>(dy.view(i, o)) * w_transposed.view(o, k);
+      }
+      ASSERT_NEAR(dx.view(i, k), gate.view(i, k) > 0 ? sum : 0, Tolerance<T>(out));
     }
   }
-  for (int o = 0; o < out(); ++o) {
-    double bias = 0;
-    for (int i = 0; i < B(); ++i) bias += DY(i, o);
-    ASSERT_NEAR(db[static_cast<size_t>(o)], bias, tolerance);
-    for (int k = 0; k < in(); ++k) {
+  for (int k = 0; k < in; ++k) {
+    for (int o = 0; o < out; ++o) {
       double sum = 0;
-      for (int i = 0; i < B(); ++i) sum += DY(i, o) * X(i, k);
-      ASSERT_NEAR(DW(o, k), sum, tolerance);
+      for (int i = 0; i < B; ++i) sum += static_cast<double>(x.view(i, k)) * dy.view(i, o);
+      ASSERT_NEAR(dw.view(k, o), sum, Tolerance<T>(B));
     }
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Sizes, LinearTest,
-                         ::testing::Values(std::array{1, 1, 1}, std::array{1, 8, 256},
-                                           std::array{3, 5, 7}, std::array{32, 8, 9},
-                                           std::array{33, 64, 1}, std::array{20, 65, 31}));
+TEST_P(KernelTest, LinearLayersMatchTheirDefinitions) {
+  // Sizes that are and are not multiples of tiles and registers, down to one.
+  for (const auto& [B, in, out] : std::vector<std::tuple<int, int, int>>{
+           {1, 1, 1}, {1, 8, 256}, {2, 3, 130}, {3, 5, 7}, {7, 64, 31}, {15, 8, 9}, {33, 65, 1}}) {
+    CheckLinear<float>(B, in, out);
+    CheckLinear<double>(B, in, out);
+  }
+}
 
-TEST(LayerNorm, RowsGetMeanZeroAndVarianceOneBeforeGainAndBias) {
-  const int B = 3, n = 37;
-  auto x = RandomNumbers(B * n, "layer norm");
-  const auto raw = x;
-  AlignedVector<double> gain(n, 2.0), bias(n, -1.0), inv_std(B), y(B * n);
-  LayerNormForward<double>(Matrix<double>(x, B, n), gain, bias, inv_std, Matrix<double>(y, B, n));
-  for (size_t i = 0; i < B; ++i) {
-    double mean = 0, square = 0;
-    for (size_t k = 0; k < n; ++k) mean += raw[i * n + k] / n;
-    for (size_t k = 0; k < n; ++k) square += std::pow(raw[i * n + k] - mean, 2) / n;
-    for (size_t k = 0; k < n; ++k) {
-      const double normal = (raw[i * n + k] - mean) / std::sqrt(square + 1e-5);
-      EXPECT_NEAR(x[i * n + k], normal, 1e-12);
-      EXPECT_NEAR(y[i * n + k], 2 * normal - 1, 1e-12);
+TEST_P(KernelTest, ARowDoesNotDependOnTheRowsBesideIt) {
+  // To the bit: or else the number of threads would show.
+  const int B = 37, in = 70, out = 45;
+  const Table<float> x(B, in, "x"), w(in, out, "w"), b(1, out, "b");
+  Table<float> together(B, out, ""), alone(1, out, "");
+  LinearForward<float>(x, w, b.row(), true, together.view);
+  for (int i = 0; i < B; ++i) {
+    LinearForward<float>(x.view.Rows(i, 1), w, b.row(), true, alone.view);
+    ASSERT_TRUE(std::ranges::equal(alone.view.row(0), together.view.row(i))) << i;
+  }
+  Table<float> dw(in, out, ""), dw_rows(5, out, "");
+  LinearBackwardWeight<float>(x, together, dw.view);
+  LinearBackwardWeight<float>(x.view.Cols(11, 5), together, dw_rows.view);
+  for (int k = 0; k < 5; ++k) {
+    ASSERT_TRUE(std::ranges::equal(dw_rows.view.row(k), dw.view.row(11 + k)));
+  }
+}
+
+TEST_P(KernelTest, TransposeTransposes) {
+  for (const auto& [rows, cols] :
+       std::vector<std::pair<int, int>>{{1, 1}, {4, 8}, {9, 256}, {37, 6}}) {
+    const Table<float> x(rows, cols, "x");
+    Table<float> y(cols, rows, "");
+    Transpose<float>(x, y.view);
+    for (int r = 0; r < rows; ++r) {
+      for (int c = 0; c < cols; ++c) ASSERT_EQ(y.view(c, r), x.view(r, c));
     }
   }
 }
 
-TEST(Kernels, ElementwiseOnes) {
-  AlignedVector<double> y{-1, 0, 2}, dy{5, 6, 7};
-  ReluForward(Matrix<double>(y, 1, 3));
-  EXPECT_EQ(y, (AlignedVector<double>{0, 0, 2}));
-  ReluBackward<double>(Matrix<double>(y, 1, 3), Matrix<double>(dy, 1, 3));
-  EXPECT_EQ(dy, (AlignedVector<double>{0, 0, 7}));
-  AddTo<double>(y, dy);
-  EXPECT_EQ(dy, (AlignedVector<double>{0, 0, 9}));
-  MoveTowards<double>(y, 0.25, dy);  // 9 + (2 - 9) / 4
-  EXPECT_EQ(dy, (AlignedVector<double>{0, 0, 7.25}));
-  EXPECT_EQ(SquaredNorm<double>(AlignedVector<double>{3, 4}), 25);
+TEST_P(KernelTest, SumsMatchTheirDefinitions) {
+  for (const int n : {1, 7, 16, 37, 300}) {
+    const Table<double> x(9, n, "x"), y(9, n, "y");
+    AlignedVector<double> sum(static_cast<size_t>(n)), along(sum.size());
+    SumRows<double>(x, sum);
+    LayerNormBackwardGain<double>(x, y, along);
+    double squares = 0;
+    for (int k = 0; k < n; ++k) {
+      double column = 0, products = 0;
+      for (int i = 0; i < 9; ++i) {
+        column += x.view(i, k);
+        products += x.view(i, k) * y.view(i, k);
+      }
+      ASSERT_NEAR(sum[static_cast<size_t>(k)], column, 1e-13);
+      ASSERT_NEAR(along[static_cast<size_t>(k)], products, 1e-13);
+      squares += x.view(0, k) * x.view(0, k);
+    }
+    ASSERT_NEAR(SquaredNorm<double>(x.row()), squares, 1e-13 * n);
+  }
+}
+
+TEST_P(KernelTest, LayerNormRowsGetMeanZeroAndVarianceOneBeforeGainAndBias) {
+  for (const int n : {1, 5, 37, 256}) {
+    const int B = 3;
+    Table<double> x(B, n, "layer norm"), y(B, n, "");
+    const Table<double> raw(B, n, "layer norm"), gain(1, n, "gain"), bias(1, n, "bias");
+    AlignedVector<double> inv_std(B);
+    LayerNormReluForward<double>(x.view, gain.row(), bias.row(), inv_std, y.view);
+    for (int i = 0; i < B; ++i) {
+      double mean = 0, square = 0;
+      for (int k = 0; k < n; ++k) mean += raw.view(i, k) / n;
+      for (int k = 0; k < n; ++k) square += std::pow(raw.view(i, k) - mean, 2) / n;
+      for (int k = 0; k < n; ++k) {
+        const double normal = (raw.view(i, k) - mean) / std::sqrt(square + 1e-5);
+        ASSERT_NEAR(x.view(i, k), normal, 1e-12);
+        ASSERT_NEAR(y.view(i, k), std::max(0.0, gain.view(0, k) * normal + bias.view(0, k)), 1e-12);
+      }
+    }
+  }
+}
+
+TEST_P(KernelTest, LayerNormGradientMatchesFiniteDifferences) {
+  // f = Σ dy · (gain · x̂ + bias): the ReLU is kept out by a large bias.
+  const int n = 21;
+  const double h = 1e-5;
+  const Table<double> x(1, n, "x"), gain(1, n, "gain"), dy(1, n, "dy");
+  const AlignedVector<double> bias(static_cast<size_t>(n), 100.0);
+  AlignedVector<double> inv_std(1);
+  const auto f = [&](int k, double step) {
+    Table<double> moved(1, n, "x"), y(1, n, "");
+    moved.view(0, k) += step;
+    LayerNormReluForward<double>(moved.view, gain.row(), bias, inv_std, y.view);
+    double sum = 0;
+    for (int i = 0; i < n; ++i) sum += dy.view(0, i) * (y.view(0, i) - 100);
+    return sum;
+  };
+  Table<double> x_hat(1, n, "x"), y(1, n, ""), dx(1, n, "");
+  LayerNormReluForward<double>(x_hat.view, gain.row(), bias, inv_std, y.view);
+  LayerNormBackwardInput<double>(x_hat, gain.row(), inv_std, dy, dx.view);
+  for (int k = 0; k < n; ++k) {
+    EXPECT_NEAR(dx.view(0, k), (f(k, h) - f(k, -h)) / (2 * h), 1e-8);  // 1e-13 · 100 / h, and h²
+  }
+}
+
+TEST_P(KernelTest, AdamAndPolyakInOnePass) {
+  const AdamConstants<double> c{0.5, 0.9, 0.99, 0.01, 1e-3, 0.25};
+  for (const int n : {1, 3, 50}) {
+    const Table<double> g(1, n, "g"), m0(1, n, "m"), v0(1, n, "v"), p0(1, n, "p"), t0(1, n, "t");
+    Table<double> m(1, n, "m"), v(1, n, "v"), p(1, n, "p"), t(1, n, "t");
+    const auto square = [](double x) { return x * x; };
+    for (double& x : v.values) x = square(x);
+    AdamPolyakStep<double>(c, g.row(), m.view.row(0), v.view.row(0), p.view.row(0), t.view.row(0));
+    for (int k = 0; k < n; ++k) {
+      const double gradient = 0.5 * g.view(0, k);
+      const double m_new = 0.9 * m0.view(0, k) + 0.1 * gradient;
+      const double v_new = 0.99 * square(v0.view(0, k)) + 0.01 * square(gradient);
+      const double p_new = p0.view(0, k) - 0.01 * m_new / (std::sqrt(v_new) + 1e-3);
+      EXPECT_NEAR(m.view(0, k), m_new, 1e-14);
+      EXPECT_NEAR(v.view(0, k), v_new, 1e-14);
+      EXPECT_NEAR(p.view(0, k), p_new, 1e-14);
+      EXPECT_NEAR(t.view(0, k), t0.view(0, k) + 0.25 * (p_new - t0.view(0, k)), 1e-14);
+    }
+  }
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include "core/finite.h"
 #include "core/tensor_file.h"
 #include "core/text.h"
+#include "nn/linear.h"
 
 namespace upswing {
 namespace {
@@ -49,6 +50,12 @@ QNetworkShape ShapeFromJson(const std::string& text, const std::string& path) {
   }
 }
 
+/// The shape of a parameter array in the file: weights are (out, in), as torch.nn.Linear has them.
+std::vector<int64_t> FileShape(const ParameterBlock& block) {
+  if (block.in == 0) return {block.out};
+  return {block.out, block.in};
+}
+
 /// The network of a file. Throws if it has sizes that none has.
 QNetwork<float> NetworkOf(const QNetworkShape& shape, const std::string& path) {
   try {
@@ -77,7 +84,7 @@ Policy::Policy(QNetworkShape shape, std::vector<float> parameters, std::vector<d
       parameters_(parameters.begin(), parameters.end()),
       torques_(std::move(torques)),
       about_(std::move(about)),
-      activations_(network_.MakeActivations(kBlock)),
+      activations_(network_.MakeActivations(kBlock, false)),
       q_(static_cast<size_t>(kBlock) * static_cast<size_t>(network_.shape().actions)) {
   if (parameters_.size() != network_.num_parameters() ||
       torques_.size() != static_cast<size_t>(network_.shape().actions)) {
@@ -96,17 +103,20 @@ const std::string& Policy::About(const std::string& key) const {
 void Policy::QValues(Matrix<const float> obs, Matrix<float> q) const {
   for (int first = 0; first < obs.rows(); first += kBlock) {
     const int rows = std::min(kBlock, obs.rows() - first);
-    network_.Forward(parameters_, obs.Rows(first, rows), activations_, q.Rows(first, rows));
+    network_.Forward(parameters_, obs.Rows(first, rows), {0, rows}, activations_,
+                     q.Rows(first, rows));
   }
 }
 
 void Policy::Act(Matrix<const float> obs, std::span<double> torque) const {
   for (int first = 0; first < obs.rows(); first += kBlock) {
     const int rows = std::min(kBlock, obs.rows() - first);
-    const Matrix<float> q(q_, rows, network_.shape().actions);
-    QValues(obs.Rows(first, rows), q);
+    const Matrix<float> preferences(q_, rows, network_.shape().actions);
+    network_.ForwardPreferences(parameters_, obs.Rows(first, rows), {0, rows}, activations_,
+                                preferences);
     for (int i = 0; i < rows; ++i) {
-      torque[static_cast<size_t>(first + i)] = torques_[static_cast<size_t>(ArgMax(q.row(i)))];
+      const auto action = static_cast<size_t>(ArgMax(preferences.row(i)));
+      torque[static_cast<size_t>(first + i)] = torques_[action];
     }
   }
 }
@@ -129,9 +139,13 @@ void Policy::Save(const std::filesystem::path& path) const {
   file.metadata["format_version"] = kFormatVersion;
   file.metadata["output"] = "levels";
   file.metadata["network"] = ShapeToJson(shape());
+  std::vector<float> in_file(parameters_.size());  // the file refers to it until it is saved
   for (const ParameterBlock& block : network_.blocks()) {
-    file.Add<float>(block.name, std::span(parameters_).subspan(block.offset, block.size()),
-                    block.extents());
+    const Matrix<const float> values(parameters_.data() + block.offset, std::max(1, block.in),
+                                     block.out);
+    const auto array = std::span(in_file).subspan(block.offset, block.size());
+    Transpose(values, Matrix<float>(array, values.cols(), values.rows()));
+    file.Add<float>(block.name, array, FileShape(block));
   }
   file.Add<double>("torques", torques_);
   file.Add<float>("sample.obs", obs, {kSamples, inputs});
@@ -156,10 +170,13 @@ Policy Policy::Load(const std::filesystem::path& path) {
   const QNetworkShape shape = ShapeFromJson(file.Metadata("network"), path.string());
   const QNetwork<float> network = NetworkOf(shape, path.string());
   std::vector<float> parameters(network.num_parameters());
+  std::vector<float> array;
   for (const ParameterBlock& block : network.blocks()) {
-    const auto values = std::span(parameters).subspan(block.offset, block.size());
-    file.Read(block.name, values, block.extents());
-    CheckFinite<float>(values, path.string(), block.name);
+    array.resize(block.size());
+    file.Read(block.name, std::span(array), FileShape(block));
+    CheckFinite<float>(array, path.string(), block.name);
+    const Matrix<float> values(parameters.data() + block.offset, std::max(1, block.in), block.out);
+    Transpose<float>(Matrix<float>(array, values.cols(), values.rows()), values);
   }
   std::vector<double> torques(static_cast<size_t>(shape.actions));
   file.Read("torques", std::span(torques));

@@ -10,20 +10,16 @@
 namespace upswing {
 namespace {
 
-/// Copies `cols` columns of x, from `first` on, into y (B × cols).
-template <typename T>
-void CopyColumns(Matrix<const T> x, int first, Matrix<T> y) {
-  for (int i = 0; i < y.rows(); ++i) {
-    std::copy_n(x.row(i).begin() + first, y.cols(), y.row(i).begin());
-  }
-}
+constexpr int kTaskRows = 32;  // of a weight matrix
 
-/// Copies y (B × cols) into the columns of x from `first` on.
+/// A batch's matrix (… × cols) in `values`, or the given rows of it.
 template <typename T>
-void PasteColumns(Matrix<const T> y, int first, Matrix<T> x) {
-  for (int i = 0; i < y.rows(); ++i) {
-    std::copy_n(y.row(i).begin(), y.cols(), x.row(i).begin() + first);
-  }
+Matrix<T> RowsOf(AlignedVector<T>& values, RowRange rows, int cols) {
+  return Matrix<T>(values, rows.first + rows.count, cols).Rows(rows.first, rows.count);
+}
+template <typename T>
+Matrix<const T> AllRows(const AlignedVector<T>& values, int rows, int cols) {
+  return {std::span<const T>(values), rows, cols};
 }
 
 /// q = V + A - mean(A) (Wang et al., 2016, Eq 9), in place on the advantages q (B × A).
@@ -70,9 +66,8 @@ QNetwork<T>::QNetwork(QNetworkShape shape) : shape_(std::move(shape)) {
   int width = shape_.inputs;
   for (size_t i = 0; i < shape_.hidden.size(); ++i) {
     const std::string name = Concat("feature.", i);
-    const int out = static_cast<int>(shape_.hidden[i]);
-    features_.push_back(AddLinear(name, out, width));
-    width = out;
+    AddLayer(name, width, static_cast<int>(shape_.hidden[i]));
+    width = static_cast<int>(shape_.hidden[i]);
     if (shape_.layer_norm) {
       norms_.push_back(
           {AddBlock(name + ".norm.weight", 0, width), AddBlock(name + ".norm.bias", 0, width)});
@@ -80,44 +75,49 @@ QNetwork<T>::QNetwork(QNetworkShape shape) : shape_(std::move(shape)) {
   }
   if (shape_.dueling) {
     const int head = static_cast<int>(shape_.head);
-    streams_ = AddLinear("streams", 2 * head, width);
-    value_ = AddLinear("value", 1, head);
-    output_ = AddLinear("advantage", shape_.actions, head);
+    AddLayer("streams", width, 2 * head);
+    AddLayer("value", head, 1);
+    AddLayer("advantage", head, shape_.actions);
   } else {
-    output_ = AddLinear("output", shape_.actions, width);
+    AddLayer("output", width, shape_.actions);
   }
+  AddTasks();
 }
 
 template <typename T>
-size_t QNetwork<T>::AddBlock(std::string name, int rows, int cols) {
-  blocks_.push_back({std::move(name), num_parameters_, rows, cols});
+size_t QNetwork<T>::AddBlock(std::string name, int in, int out) {
+  blocks_.push_back({std::move(name), num_parameters_, in, out});
   num_parameters_ += blocks_.back().size();
   return blocks_.size() - 1;
 }
 
 template <typename T>
-typename QNetwork<T>::Linear QNetwork<T>::AddLinear(const std::string& name, int out, int in) {
-  const size_t weight = AddBlock(name + ".weight", out, in);
-  return {weight, AddBlock(name + ".bias", 0, out)};
+void QNetwork<T>::AddLayer(const std::string& name, int in, int out) {
+  const size_t weight = AddBlock(name + ".weight", in, out);
+  layers_.push_back({weight, AddBlock(name + ".bias", 0, out)});
+}
+
+template <typename T>
+void QNetwork<T>::AddTasks() {
+  for (size_t layer = 0; layer < layers_.size(); ++layer) {
+    const int in = blocks_[layers_[layer].weight].in;
+    for (int first = 0; first < in; first += kTaskRows) {
+      tasks_.push_back({layer, {first, std::min(kTaskRows, in - first)}});
+    }
+  }
 }
 
 template <typename T>
 void QNetwork<T>::Initialize(Rng& rng, std::span<T> parameters) const {
-  const auto fill = [&](const Linear& layer) {
-    const double bound = 1.0 / std::sqrt(blocks_[layer.weight].cols);
+  for (const Layer& layer : layers_) {
+    const double bound = 1.0 / std::sqrt(blocks_[layer.weight].in);
     for (const size_t block : {layer.weight, layer.bias}) {
       for (T& p : parameters.subspan(blocks_[block].offset, blocks_[block].size())) {
         p = static_cast<T>(rng.Uniform(-bound, bound));
       }
     }
-  };
-  for (const Linear& layer : features_) fill(layer);
-  if (shape_.dueling) {
-    fill(streams_);
-    fill(value_);
   }
-  fill(output_);
-  for (const Linear& norm : norms_) {
+  for (const Layer& norm : norms_) {
     const ParameterBlock& gain = blocks_[norm.weight];
     std::fill_n(parameters.begin() + static_cast<ptrdiff_t>(gain.offset), gain.size(), T{1});
     const ParameterBlock& bias = blocks_[norm.bias];
@@ -126,39 +126,40 @@ void QNetwork<T>::Initialize(Rng& rng, std::span<T> parameters) const {
 }
 
 template <typename T>
-typename QNetwork<T>::Activations QNetwork<T>::MakeActivations(int max_batch) const {
+typename QNetwork<T>::Activations QNetwork<T>::MakeActivations(int max_batch,
+                                                               bool gradients) const {
   Activations a;
-  a.max_batch = max_batch;
   const auto room = [&](int64_t width) {
     return AlignedVector<T>(static_cast<size_t>(max_batch) * static_cast<size_t>(width));
   };
-  int64_t widest = 0;
   for (const int64_t width : shape_.hidden) {
-    widest = std::max(widest, width);
     a.feature.push_back(room(width));
-    if (shape_.layer_norm) {
-      a.normal.push_back(room(width));
-      a.inv_std.push_back(room(1));
-    }
+    if (gradients) a.grad_feature.push_back(room(width));
+    if (!shape_.layer_norm) continue;
+    a.normal.push_back(room(width));
+    a.inv_std.push_back(room(1));
+    if (gradients) a.grad_normal.push_back(room(width));
   }
   if (shape_.dueling) {
     a.streams = room(2 * shape_.head);
-    a.value_in = room(shape_.head);
-    a.advantage_in = room(shape_.head);
     a.value = room(1);
-    a.grad_streams = room(2 * shape_.head);
-    a.grad_head = room(shape_.head);
-    a.grad_advantage = room(shape_.actions);
+    if (gradients) a.grad_streams = room(2 * shape_.head);
+    if (gradients) a.grad_value = room(1);
   }
-  a.grad_a = room(widest);
-  a.grad_b = room(widest);
+  if (gradients) a.grad_output = room(shape_.actions);
   return a;
 }
 
 template <typename T>
-Matrix<const T> QNetwork<T>::Weight(std::span<const T> parameters, const Linear& layer) const {
+Matrix<const T> QNetwork<T>::Weight(std::span<const T> parameters, const Layer& layer) const {
   const ParameterBlock& w = blocks_[layer.weight];
-  return {parameters.data() + w.offset, w.rows, w.cols};
+  return {parameters.data() + w.offset, w.in, w.out};
+}
+
+template <typename T>
+Matrix<const T> QNetwork<T>::Transposed(std::span<const T> transposed, const Layer& layer) const {
+  const ParameterBlock& w = blocks_[layer.weight];
+  return {transposed.data() + w.offset, w.out, w.in};
 }
 
 template <typename T>
@@ -167,116 +168,180 @@ std::span<const T> QNetwork<T>::Vector(std::span<const T> parameters, size_t blo
 }
 
 template <typename T>
-void QNetwork<T>::Apply(std::span<const T> parameters, const Linear& layer, Matrix<const T> x,
-                        Matrix<T> y) const {
-  LinearForward(x, Weight(parameters, layer), Vector(parameters, layer.bias), y);
-}
-
-template <typename T>
-void QNetwork<T>::ApplyBackward(std::span<const T> parameters, const Linear& layer,
-                                Matrix<const T> x, Matrix<const T> dy, std::span<T> gradient,
-                                Matrix<T> dx) const {
-  const ParameterBlock& w = blocks_[layer.weight];
-  const ParameterBlock& b = blocks_[layer.bias];
-  const Matrix<T> dw(gradient.data() + w.offset, w.rows, w.cols);
-  LinearBackward(x, Weight(parameters, layer), dy, dw, gradient.subspan(b.offset, b.size()), dx);
-}
-
-template <typename T>
-void QNetwork<T>::Forward(std::span<const T> parameters, Matrix<const T> x, Activations& a,
-                          Matrix<T> q) const {
-  const int batch = x.rows();
-
-  // Feature layers: linear, layer norm, ReLU.
-  Matrix<const T> input = x;
-  for (size_t i = 0; i < features_.size(); ++i) {
-    const int width = static_cast<int>(shape_.hidden[i]);
-    const Matrix<T> y(a.feature[i], batch, width);
+Matrix<const T> QNetwork<T>::ForwardFeatures(std::span<const T> parameters, Matrix<const T> x,
+                                             RowRange rows, Activations& a) const {
+  // Linear, layer norm, ReLU.
+  Matrix<const T> input = x.Rows(rows.first, rows.count);
+  for (size_t i = 0; i < num_features(); ++i) {
+    const auto width = static_cast<int>(shape_.hidden[i]);
+    const Matrix<const T> w = Weight(parameters, layers_[i]);
+    const std::span<const T> b = Vector(parameters, layers_[i].bias);
+    const Matrix<T> y = RowsOf(a.feature[i], rows, width);
     if (shape_.layer_norm) {
-      const Matrix<T> normal(a.normal[i], batch, width);
-      Apply(parameters, features_[i], input, normal);
-      LayerNormForward(normal, Vector(parameters, norms_[i].weight),
-                       Vector(parameters, norms_[i].bias), std::span(a.inv_std[i]), y);
+      const Matrix<T> normal = RowsOf(a.normal[i], rows, width);
+      LinearForward(input, w, b, false, normal);
+      LayerNormReluForward(
+          normal, Vector(parameters, norms_[i].weight), Vector(parameters, norms_[i].bias),
+          std::span(a.inv_std[i])
+              .subspan(static_cast<size_t>(rows.first), static_cast<size_t>(rows.count)),
+          y);
     } else {
-      Apply(parameters, features_[i], input, y);
+      LinearForward(input, w, b, true, y);
     }
-    ReluForward(y);
     input = y;
   }
-  if (!shape_.dueling) return Apply(parameters, output_, input, q);
-
-  // Value and advantage streams.
-  const int head = static_cast<int>(shape_.head);
-  const Matrix<T> streams(a.streams, batch, 2 * head);
-  const Matrix<T> value_in(a.value_in, batch, head);
-  const Matrix<T> advantage_in(a.advantage_in, batch, head);
-  const Matrix<T> value(a.value, batch, 1);
-  Apply(parameters, streams_, input, streams);
-  ReluForward(streams);
-  CopyColumns<T>(streams, 0, value_in);
-  CopyColumns<T>(streams, head, advantage_in);
-  Apply(parameters, value_, value_in, value);
-  Apply(parameters, output_, advantage_in, q);
-  CombineStreams<T>(value, q);
+  return input;
 }
 
 template <typename T>
-void QNetwork<T>::BackwardStreams(std::span<const T> parameters, Matrix<const T> feature,
-                                  Activations& a, Matrix<const T> dq, std::span<T> gradient,
-                                  Matrix<T> dfeature) const {
-  const int batch = dq.rows();
+void QNetwork<T>::Forward(std::span<const T> parameters, Matrix<const T> x, RowRange rows,
+                          Activations& a, Matrix<T> q) const {
+  const Matrix<const T> feature = ForwardFeatures(parameters, x, rows, a);
+  const Matrix<T> q_rows = q.Rows(rows.first, rows.count);
+  const auto apply = [&](const Layer& layer, Matrix<const T> input, bool relu, Matrix<T> y) {
+    LinearForward(input, Weight(parameters, layer), Vector(parameters, layer.bias), relu, y);
+  };
+  if (!shape_.dueling) return apply(output(), feature, false, q_rows);
+
   const int head = static_cast<int>(shape_.head);
-  const Matrix<T> streams(a.streams, batch, 2 * head);
-  const Matrix<T> value_in(a.value_in, batch, head);
-  const Matrix<T> advantage_in(a.advantage_in, batch, head);
-  const Matrix<T> dvalue(a.value, batch, 1);  // V itself is no longer needed
-  const Matrix<T> dadvantage(a.grad_advantage, batch, shape_.actions);
-  const Matrix<T> dhead(a.grad_head, batch, head);
-  const Matrix<T> dstreams(a.grad_streams, batch, 2 * head);
+  const Matrix<T> hidden = RowsOf(a.streams, rows, 2 * head);
+  const Matrix<T> v = RowsOf(a.value, rows, 1);
+  apply(streams(), feature, true, hidden);
+  apply(value(), hidden.Cols(0, head), false, v);
+  apply(output(), hidden.Cols(head, head), false, q_rows);
+  CombineStreams<T>(v, q_rows);
+}
+
+template <typename T>
+void QNetwork<T>::ForwardPreferences(std::span<const T> parameters, Matrix<const T> x,
+                                     RowRange rows, Activations& a, Matrix<T> preferences) const {
+  if (!shape_.dueling) return Forward(parameters, x, rows, a, preferences);
+  const Matrix<const T> feature = ForwardFeatures(parameters, x, rows, a);
+  const int head = static_cast<int>(shape_.head);
+  const Matrix<T> hidden = RowsOf(a.streams, rows, 2 * head).Cols(head, head);
+  LinearForward(feature, Weight(parameters, streams()).Cols(head, head),
+                Vector(parameters, streams().bias).subspan(static_cast<size_t>(head)), true,
+                hidden);
+  LinearForward<T>(hidden, Weight(parameters, output()), Vector(parameters, output().bias), false,
+                   preferences.Rows(rows.first, rows.count));
+}
+
+template <typename T>
+void QNetwork<T>::TransposeWeights(int task, std::span<const T> parameters,
+                                   std::span<T> transposed) const {
+  const Task& t = tasks_[static_cast<size_t>(task)];
+  const ParameterBlock& w = blocks_[layers_[t.layer].weight];
+  const Matrix<T> target(transposed.data() + w.offset, w.out, w.in);
+  Transpose(Weight(parameters, layers_[t.layer]).Rows(t.rows.first, t.rows.count),
+            target.Cols(t.rows.first, t.rows.count));
+}
+
+template <typename T>
+void QNetwork<T>::BackwardStreams(std::span<const T> transposed, Matrix<const T> dq, RowRange rows,
+                                  Activations& a) const {
+  const int head = static_cast<int>(shape_.head);
+  const Matrix<const T> hidden = RowsOf(a.streams, rows, 2 * head);
+  const Matrix<T> dhidden = RowsOf(a.grad_streams, rows, 2 * head);
+  const Matrix<T> dvalue = RowsOf(a.grad_value, rows, 1);
+  const Matrix<T> dadvantage = RowsOf(a.grad_output, rows, shape_.actions);
   CombineStreamsBackward(dq, dvalue, dadvantage);
-  ApplyBackward(parameters, value_, value_in, dvalue, gradient, dhead);
-  PasteColumns<T>(dhead, 0, dstreams);
-  ApplyBackward(parameters, output_, advantage_in, dadvantage, gradient, dhead);
-  PasteColumns<T>(dhead, head, dstreams);
-  ReluBackward<T>(streams, dstreams);
-  ApplyBackward(parameters, streams_, feature, dstreams, gradient, dfeature);
+  LinearBackwardInput<T>(dvalue, Transposed(transposed, value()), hidden.Cols(0, head),
+                         dhidden.Cols(0, head));
+  LinearBackwardInput<T>(dadvantage, Transposed(transposed, output()), hidden.Cols(head, head),
+                         dhidden.Cols(head, head));
+}
+
+template <typename T>
+void QNetwork<T>::BackwardInputs(std::span<const T> parameters, std::span<const T> transposed,
+                                 Matrix<const T> dq, RowRange rows, Activations& a) const {
+  // dy: gradient of the input of the layer above feature layer i, whose transposed weight is w.
+  const size_t last = num_features() - 1;
+  Matrix<const T> dy;
+  const Layer* above = nullptr;
+  if (shape_.dueling) {
+    BackwardStreams(transposed, dq.Rows(rows.first, rows.count), rows, a);
+    dy = RowsOf(a.grad_streams, rows, 2 * static_cast<int>(shape_.head));
+    above = &streams();
+  } else {
+    const Matrix<T> doutput = RowsOf(a.grad_output, rows, shape_.actions);
+    std::ranges::copy(dq.Rows(rows.first, rows.count).values(), doutput.values().begin());
+    dy = doutput;
+    above = &output();
+  }
+
+  for (size_t i = last + 1; i-- > 0;) {
+    const auto width = static_cast<int>(shape_.hidden[i]);
+    const Matrix<T> dx = RowsOf(a.grad_feature[i], rows, width);
+    const Matrix<T> dnormal = shape_.layer_norm ? RowsOf(a.grad_normal[i], rows, width) : dx;
+    LinearBackwardInput<T>(dy, Transposed(transposed, *above), RowsOf(a.feature[i], rows, width),
+                           dnormal);
+    if (shape_.layer_norm) {
+      LayerNormBackwardInput<T>(
+          RowsOf(a.normal[i], rows, width), Vector(parameters, norms_[i].weight),
+          std::span<const T>(a.inv_std[i])
+              .subspan(static_cast<size_t>(rows.first), static_cast<size_t>(rows.count)),
+          dnormal, dx);
+    }
+    dy = dx;
+    above = &layers_[i];
+  }
+}
+
+template <typename T>
+Matrix<const T> QNetwork<T>::LayerInput(size_t layer, Matrix<const T> x,
+                                        const Activations& a) const {
+  if (layer == 0) return x;
+  const int head = static_cast<int>(shape_.head);
+  if (layer <= num_features()) {
+    return AllRows(a.feature[layer - 1], x.rows(), static_cast<int>(shape_.hidden[layer - 1]));
+  }
+  const bool advantage = layer == layers_.size() - 1;
+  return AllRows(a.streams, x.rows(), 2 * head).Cols(advantage ? head : 0, head);
+}
+
+template <typename T>
+Matrix<const T> QNetwork<T>::LayerGradient(size_t layer, int batch, const Activations& a) const {
+  const int out = blocks_[layers_[layer].weight].out;
+  if (layer < num_features()) return AllRows(a.grad_feature[layer], batch, out);
+  if (layer == layers_.size() - 1) return AllRows(a.grad_output, batch, out);
+  return AllRows(layer == num_features() ? a.grad_streams : a.grad_value, batch, out);
+}
+
+template <typename T>
+T QNetwork<T>::BackwardWeights(int task, Matrix<const T> x, const Activations& a,
+                               std::span<T> gradient) const {
+  const Task& t = tasks_[static_cast<size_t>(task)];
+  const Layer& layer = layers_[t.layer];
+  const Matrix<const T> dy = LayerGradient(t.layer, x.rows(), a);
+  const auto part = [&](size_t block) {
+    return gradient.subspan(blocks_[block].offset, blocks_[block].size());
+  };
+
+  const ParameterBlock& w = blocks_[layer.weight];
+  const Matrix<T> dw = Matrix<T>(part(layer.weight), w.in, w.out).Rows(t.rows.first, t.rows.count);
+  LinearBackwardWeight(LayerInput(t.layer, x, a).Cols(t.rows.first, t.rows.count), dy, dw);
+  T squares = SquaredNorm<T>(dw.values());
+  if (t.rows.first > 0) return squares;
+
+  SumRows(dy, part(layer.bias));
+  squares += SquaredNorm<T>(part(layer.bias));
+  if (t.layer < norms_.size()) {
+    const Layer& norm = norms_[t.layer];
+    const Matrix<const T> dnormal = AllRows(a.grad_normal[t.layer], x.rows(), w.out);
+    LayerNormBackwardGain(AllRows(a.normal[t.layer], x.rows(), w.out), dnormal, part(norm.weight));
+    SumRows(dnormal, part(norm.bias));
+    squares += SquaredNorm<T>(part(norm.weight)) + SquaredNorm<T>(part(norm.bias));
+  }
+  return squares;
 }
 
 template <typename T>
 void QNetwork<T>::Backward(std::span<const T> parameters, Matrix<const T> x, Activations& a,
                            Matrix<const T> dq, std::span<T> gradient) const {
-  const int batch = x.rows();
-  const size_t last = features_.size() - 1;
-  const auto width = [&](size_t i) { return static_cast<int>(shape_.hidden[i]); };
-  const auto feature = [&](size_t i) -> Matrix<const T> {
-    return Matrix<T>(a.feature[i], batch, width(i));
-  };
-
-  // dy: gradient of feature layer i's output.
-  Matrix<T> dy(a.grad_a, batch, width(last));
-  if (shape_.dueling) {
-    BackwardStreams(parameters, feature(last), a, dq, gradient, dy);
-  } else {
-    ApplyBackward(parameters, output_, feature(last), dq, gradient, dy);
-  }
-
-  // Feature layers from last to first: ReLU, layer norm, linear.
-  for (size_t i = last + 1; i-- > 0;) {
-    ReluBackward(feature(i), dy);
-    if (shape_.layer_norm) {
-      const ParameterBlock& gain = blocks_[norms_[i].weight];
-      const ParameterBlock& bias = blocks_[norms_[i].bias];
-      const Matrix<T> normal(a.normal[i], batch, width(i));
-      LayerNormBackward<T>(normal, Vector(parameters, norms_[i].weight), a.inv_std[i],
-                           gradient.subspan(gain.offset, gain.size()),
-                           gradient.subspan(bias.offset, bias.size()), dy);
-    }
-    Matrix<T> dx;  // the observation's gradient is not wanted
-    if (i > 0)
-      dx = Matrix<T>(dy.data() == a.grad_a.data() ? a.grad_b : a.grad_a, batch, width(i - 1));
-    ApplyBackward(parameters, features_[i], i > 0 ? feature(i - 1) : x, dy, gradient, dx);
-    dy = dx;
-  }
+  AlignedVector<T> transposed(num_parameters_);
+  for (int task = 0; task < num_tasks(); ++task) TransposeWeights(task, parameters, transposed);
+  BackwardInputs(parameters, transposed, dq, {0, x.rows()}, a);
+  for (int task = 0; task < num_tasks(); ++task) BackwardWeights(task, x, a, gradient);
 }
 
 template class QNetwork<float>;

@@ -28,12 +28,13 @@ struct QNetworkShape {
 struct ParameterBlock {
   std::string name;  // such as "feature.0.weight"
   size_t offset;     // first number
-  int rows, cols;    // (out, in) of a matrix; rows is 0 for a vector of cols numbers
-  size_t size() const { return static_cast<size_t>(std::max(1, rows)) * static_cast<size_t>(cols); }
-  /// Its shape as a tensor: two extents or one.
-  std::vector<int64_t> extents() const {
-    return rows == 0 ? std::vector<int64_t>{cols} : std::vector<int64_t>{rows, cols};
-  }
+  int in, out;       // a weight is (in × out); in is 0 for a vector of `out` numbers
+  size_t size() const { return static_cast<size_t>(std::max(1, in)) * static_cast<size_t>(out); }
+};
+
+/// Some consecutive rows of a batch.
+struct RowRange {
+  int first, count;
 };
 
 /// A plain or dueling multi-layer perceptron from observations to Q-values. Immutable: parameters,
@@ -43,7 +44,11 @@ struct ParameterBlock {
 ///   plain:    D → hidden… → A
 ///   dueling:  D → hidden… → { head → 1,  head → A },  Q = V + A - mean(A)
 ///
-/// The hidden layers of the two streams are one matrix (2·head × H): value first, then advantage.
+/// The hidden layers of the two streams are one matrix (H × 2·head): value first, then advantage.
+///
+/// A gradient takes three steps, each of which threads can share: TransposeWeights over all tasks;
+/// Forward and BackwardInputs over slices of the batch; BackwardWeights over all tasks. However
+/// they are shared out, the result has the same bits. Backward does all of it.
 template <typename T>
 class QNetwork {
  public:
@@ -57,52 +62,84 @@ class QNetwork {
   /// PyTorch's defaults: weights and biases uniform in ±1/√inputs, layer norm gain 1 and bias 0.
   void Initialize(Rng& rng, std::span<T> parameters) const;
 
-  /// The activations of one forward pass, which the backward pass needs. One for each thread.
+  /// What forward and backward passes leave in each row of a batch.
   struct Activations {
-    int max_batch = 0;
-    std::vector<AlignedVector<T>> normal;     // per feature layer (B × width): x̂, if layer_norm
-    std::vector<AlignedVector<T>> inv_std;    // per feature layer (B), if layer_norm
-    std::vector<AlignedVector<T>> feature;    // per feature layer (B × width), after ReLU
-    AlignedVector<T> streams;                 // (B × 2·head) hidden layers of both streams
-    AlignedVector<T> value_in, advantage_in;  // (B × head) each
-    AlignedVector<T> value;                   // (B × 1)
-    // Gradients on their way back.
-    AlignedVector<T> grad_a, grad_b;  // (B × widest feature layer), by turns
-    AlignedVector<T> grad_streams, grad_head, grad_advantage;  // (B × 2·head), (B × head), (B × A)
+    std::vector<AlignedVector<T>> normal;   // per feature layer (B × width): x̂, if layer_norm
+    std::vector<AlignedVector<T>> inv_std;  // per feature layer (B), if layer_norm
+    std::vector<AlignedVector<T>> feature;  // per feature layer (B × width), after ReLU
+    AlignedVector<T> streams;               // (B × 2·head) hidden layers of both streams
+    AlignedVector<T> value;                 // (B × 1)
+    // Gradients of the same places; of a feature layer before ReLU and before layer norm.
+    std::vector<AlignedVector<T>> grad_normal, grad_feature;
+    AlignedVector<T> grad_streams, grad_value, grad_output;  // grad_output (B × A)
   };
-  /// Room for up to `max_batch` rows.
-  Activations MakeActivations(int max_batch) const;
+  /// Room for up to `max_batch` rows; those of gradients only if asked for.
+  Activations MakeActivations(int max_batch, bool gradients) const;
 
-  /// Q-values q (B × A) of observations x (B × D).
-  void Forward(std::span<const T> parameters, Matrix<const T> x, Activations& a, Matrix<T> q) const;
+  /// Q-values q (B × A) of observations x (B × D), in the given rows.
+  void Forward(std::span<const T> parameters, Matrix<const T> x, RowRange rows, Activations& a,
+               Matrix<T> q) const;
 
-  /// Gradient of sum(dq · q) with respect to the parameters, once after each Forward on the same x,
-  /// whose activations it uses up: writes all of `gradient` (num_parameters).
+  /// Something to be largest where Q is largest, with less work: of a dueling network the
+  /// advantages, without the value stream.
+  void ForwardPreferences(std::span<const T> parameters, Matrix<const T> x, RowRange rows,
+                          Activations& a, Matrix<T> preferences) const;
+
+  /// The tasks of TransposeWeights and BackwardWeights: 0 … num_tasks() - 1.
+  int num_tasks() const { return static_cast<int>(tasks_.size()); }
+
+  /// Writes the task's share of `transposed` (num_parameters): each weight as (out × in), in the
+  /// place where `parameters` have it; nothing where there is no weight.
+  void TransposeWeights(int task, std::span<const T> parameters, std::span<T> transposed) const;
+
+  /// Gradients of sum(dq · q) with respect to all activations in the given rows of the last
+  /// Forward.
+  void BackwardInputs(std::span<const T> parameters, std::span<const T> transposed,
+                      Matrix<const T> dq, RowRange rows, Activations& a) const;
+
+  /// Writes the task's share of `gradient` (num_parameters) with respect to the parameters, summed
+  /// over all rows of x. Returns the sum of its squares.
+  T BackwardWeights(int task, Matrix<const T> x, const Activations& a, std::span<T> gradient) const;
+
+  /// Gradient of sum(dq · q) after Forward on all rows of x: writes all of `gradient`.
   void Backward(std::span<const T> parameters, Matrix<const T> x, Activations& a,
                 Matrix<const T> dq, std::span<T> gradient) const;
 
  private:
-  struct Linear {
-    size_t weight, bias;  // indices into blocks_
+  struct Layer {
+    size_t weight, bias;  // indices into blocks_; of a layer norm, gain and bias
   };
-  size_t AddBlock(std::string name, int rows, int cols);
-  Linear AddLinear(const std::string& name, int out, int in);
+  /// Consecutive rows of one layer's weight. The first of a layer's tasks has its vectors too.
+  struct Task {
+    size_t layer;  // index into layers_
+    RowRange rows;
+  };
+  size_t AddBlock(std::string name, int in, int out);
+  void AddLayer(const std::string& name, int in, int out);
+  void AddTasks();
 
-  Matrix<const T> Weight(std::span<const T> parameters, const Linear& layer) const;
+  // The layers: features, then streams and value if dueling, and the output (or advantage) last.
+  size_t num_features() const { return shape_.hidden.size(); }
+  const Layer& streams() const { return layers_[num_features()]; }
+  const Layer& value() const { return layers_[num_features() + 1]; }
+  const Layer& output() const { return layers_.back(); }
+
+  Matrix<const T> Weight(std::span<const T> parameters, const Layer& layer) const;
+  Matrix<const T> Transposed(std::span<const T> transposed, const Layer& layer) const;
   std::span<const T> Vector(std::span<const T> parameters, size_t block) const;
-  void Apply(std::span<const T> parameters, const Linear& layer, Matrix<const T> x,
-             Matrix<T> y) const;
-  void BackwardStreams(std::span<const T> parameters, Matrix<const T> feature, Activations& a,
-                       Matrix<const T> dq, std::span<T> gradient, Matrix<T> dfeature) const;
-  void ApplyBackward(std::span<const T> parameters, const Linear& layer, Matrix<const T> x,
-                     Matrix<const T> dy, std::span<T> gradient, Matrix<T> dx) const;
+  Matrix<const T> ForwardFeatures(std::span<const T> parameters, Matrix<const T> x, RowRange rows,
+                                  Activations& a) const;
+  void BackwardStreams(std::span<const T> transposed, Matrix<const T> dq, RowRange rows,
+                       Activations& a) const;
+  Matrix<const T> LayerInput(size_t layer, Matrix<const T> x, const Activations& a) const;
+  Matrix<const T> LayerGradient(size_t layer, int batch, const Activations& a) const;
 
   QNetworkShape shape_;
   size_t num_parameters_ = 0;
   std::vector<ParameterBlock> blocks_;
-  std::vector<Linear> features_;           // one for each hidden width
-  std::vector<Linear> norms_;              // gain and bias, if layer_norm
-  Linear streams_{}, value_{}, output_{};  // dueling: all three; plain: output_ alone
+  std::vector<Layer> layers_;
+  std::vector<Layer> norms_;  // one for each feature layer, if layer_norm
+  std::vector<Task> tasks_;
 };
 
 extern template class QNetwork<float>;

@@ -26,7 +26,7 @@ struct Objective {
 
   Objective(const QNetworkShape& shape, int batch)
       : network(shape),
-        activations(network.MakeActivations(batch)),
+        activations(network.MakeActivations(batch, true)),
         parameters(network.num_parameters()),
         x(static_cast<size_t>(batch * shape.inputs)),
         dq(static_cast<size_t>(batch * shape.actions)),
@@ -44,7 +44,7 @@ struct Objective {
   }
 
   double Value() {
-    network.Forward(parameters, Matrix<const double>(x.data(), B, network.shape().inputs),
+    network.Forward(parameters, Matrix<const double>(x.data(), B, network.shape().inputs), {0, B},
                     activations, Matrix<double>(q, B, network.shape().actions));
     return std::inner_product(q.begin(), q.end(), dq.begin(), 0.0);
   }
@@ -88,15 +88,53 @@ TEST_P(QNetworkTest, FloatAgreesWithDoubleAndRowsWithTheirBatch) {
   const QNetwork<float> network(GetParam().shape);
   const AlignedVector<float> parameters(f.parameters.begin(), f.parameters.end());
   const AlignedVector<float> x(f.x.begin(), f.x.end());
-  auto activations = network.MakeActivations(1);
+  auto activations = network.MakeActivations(1, false);
   AlignedVector<float> q(static_cast<size_t>(network.shape().actions));
   const Matrix<const float> rows(x.data(), 5, network.shape().inputs);
   for (int i = 0; i < 5; ++i) {
-    network.Forward(parameters, rows.Rows(i, 1), activations,
+    network.Forward(parameters, rows.Rows(i, 1), {0, 1}, activations,
                     Matrix<float>(q, 1, network.shape().actions));
     for (size_t a = 0; a < q.size(); ++a) {
       EXPECT_NEAR(q[a], f.q[static_cast<size_t>(i) * q.size() + a], 1e-4);
     }
+  }
+}
+
+TEST_P(QNetworkTest, SlicesOfTheBatchGiveTheSameBits) {
+  Objective f(GetParam().shape, 7);
+  const AlignedVector<double> whole = f.Gradient();
+  const AlignedVector<double> q = f.q;
+  const Matrix<const double> x(f.x.data(), 7, f.network.shape().inputs);
+  const Matrix<const double> dq(f.dq.data(), 7, f.network.shape().actions);
+  AlignedVector<double> transposed(whole.size()), gradient(whole.size());
+  for (int task = f.network.num_tasks() - 1; task >= 0; --task) {
+    f.network.TransposeWeights(task, f.parameters, transposed);
+  }
+  for (const RowRange rows : {RowRange{3, 4}, RowRange{0, 1}, RowRange{1, 2}}) {
+    f.network.Forward(f.parameters, x, rows, f.activations, Matrix<double>(f.q, 7, dq.cols()));
+    f.network.BackwardInputs(f.parameters, transposed, dq, rows, f.activations);
+  }
+  double squares = 0;
+  for (int task = f.network.num_tasks() - 1; task >= 0; --task) {
+    squares += f.network.BackwardWeights(task, x, f.activations, gradient);
+  }
+  EXPECT_EQ(f.q, q);
+  EXPECT_EQ(gradient, whole);
+  const double norm = std::inner_product(whole.begin(), whole.end(), whole.begin(), 0.0);
+  EXPECT_NEAR(squares, norm, 1e-12 * norm);
+}
+
+TEST_P(QNetworkTest, PreferencesDifferFromQValuesByAConstantOfTheRow) {
+  Objective f(GetParam().shape, 5);
+  f.Value();
+  AlignedVector<double> preferences(f.q.size());
+  const Matrix<const double> x(f.x.data(), 5, f.network.shape().inputs);
+  const auto A = static_cast<size_t>(f.network.shape().actions);
+  f.network.ForwardPreferences(f.parameters, x, {0, 5}, f.activations,
+                               Matrix<double>(preferences, 5, static_cast<int>(A)));
+  for (size_t i = 0; i < f.q.size(); ++i) {
+    const size_t first = i / A * A;
+    EXPECT_NEAR(preferences[i] - preferences[first], f.q[i] - f.q[first], 1e-12);
   }
 }
 
@@ -129,10 +167,10 @@ TEST(QNetwork, DuelingIsTheValuePlusAdvantagesAboutTheirMean) {
       parameters[block.offset + 2] = 6;
     }
   }
-  auto activations = network.MakeActivations(1);
+  auto activations = network.MakeActivations(1, false);
   const AlignedVector<double> x{0.5, -0.5};
   AlignedVector<double> q(3);
-  network.Forward(parameters, Matrix<const double>(x.data(), 1, 2), activations,
+  network.Forward(parameters, Matrix<const double>(x.data(), 1, 2), {0, 1}, activations,
                   Matrix<double>(q, 1, 3));
   EXPECT_EQ(q, (AlignedVector<double>{1, 2, 6}));  // mean(Q) = 3 = V
   EXPECT_DOUBLE_EQ((q[0] + q[1] + q[2]) / 3, 3);

@@ -5,18 +5,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "core/error.h"
 #include "core/text.h"
-#include "nn/linear.h"
 
 namespace upswing {
 namespace {
 
-// A minibatch is cut into up to kMaxShards slices of kShardRows rows or more, whatever the number
-// of threads: each slice's gradient is a sum of its own, and the slices are added in their order.
-constexpr int kShardRows = 32;
-constexpr int kMaxShards = 4;
+/// Rows in a slice of a minibatch of B: enough slices for some threads, enough rows for the
+/// kernels.
+int SliceRows(int B) { return std::clamp(B / 4, 8, 32); }
 
 QNetworkShape ShapeOf(const DqnConfig& config, int obs_size, size_t actions) {
   return {obs_size,       static_cast<int>(actions),
@@ -91,27 +90,26 @@ Dqn::Dqn(const DqnConfig& config, int num_envs, int obs_size, std::vector<double
       network_(ShapeOf(config, obs_size, torques_.size())),
       theta_(network_.num_parameters()),
       adam_(network_.num_parameters()),
+      activations_(network_.MakeActivations(static_cast<int>(config.batch), true)),
+      q_(static_cast<size_t>(config.batch) * torques_.size()),
+      q_select_(q_.size()),
+      q_target_(q_.size()),
+      dq_(q_.size()),
+      y_(static_cast<size_t>(config.batch)),
+      q_taken_(y_.size()),
+      transposed_(network_.num_parameters()),
+      gradient_(network_.num_parameters()),
+      squares_(static_cast<size_t>(network_.num_tasks())),
       replay_(config.replay, obs_size),
       n_step_(num_envs, static_cast<int>(config.n_step), config.gamma, obs_size),
       batch_(static_cast<int>(config.batch), obs_size),
-      act_activations_(network_.MakeActivations(num_envs)),
+      act_activations_(network_.MakeActivations(num_envs, false)),
       act_obs_(static_cast<size_t>(num_envs) * obs_size_),
       act_q_(static_cast<size_t>(num_envs) * torques_.size()),
       act_action_(static_cast<size_t>(num_envs)) {
   Rng init_rng(seed, "initial parameters");
   network_.Initialize(init_rng, theta_);
   theta_target_ = theta_;
-
-  const int batch = static_cast<int>(config.batch);
-  const int count = std::clamp(batch / kShardRows, 1, kMaxShards);
-  for (int i = 0; i < count; ++i) {
-    const int first = batch * i / count;
-    const int rows = batch * (i + 1) / count - first;
-    const AlignedVector<float> q(static_cast<size_t>(rows) * torques_.size());
-    shards_.push_back({first, rows, network_.MakeActivations(rows), q, q, q, q,
-                       AlignedVector<float>(static_cast<size_t>(rows)),
-                       AlignedVector<float>(network_.num_parameters())});
-  }
 }
 
 double Dqn::epsilon() const {
@@ -128,7 +126,7 @@ double Dqn::learning_rate() const {
 
 void Dqn::Act(Matrix<const float> obs, std::span<double> torque) {
   const Matrix<float> q(act_q_, obs.rows(), static_cast<int>(torques_.size()));
-  network_.Forward(theta_, obs, act_activations_, q);
+  network_.ForwardPreferences(theta_, obs, {0, obs.rows()}, act_activations_, q);
   std::ranges::copy(obs.values(), act_obs_.begin());
 
   // ε-greedy.
@@ -171,71 +169,86 @@ void Dqn::Learn() {
 }
 
 void Dqn::Update(const Minibatch& batch) {
-  // Gradient of the mean Huber loss: each slice on its own, then summed in order.
-  pool_.ParallelFor(static_cast<int>(shards_.size()),
-                    [&](int i) { ComputeGradient(batch, shards_[static_cast<size_t>(i)]); });
-  Shard& total = shards_.front();
-  double loss = 0, q = 0, td = 0;
-  for (Shard& shard : shards_) {
-    if (&shard != &total) AddTo<float>(shard.gradient, total.gradient);
-    loss += shard.loss;
-    q += shard.q_sum;
-    td += shard.td_sum;
+  // Gradient of the mean Huber loss. Threads share slices of the batch, then weights.
+  const int B = static_cast<int>(config_.batch);
+  const int slice_rows = SliceRows(B);
+  const int slices = (B + slice_rows - 1) / slice_rows;
+  pool_.ParallelFor(network_.num_tasks(),
+                    [&](int task) { network_.TransposeWeights(task, theta_, transposed_); });
+  pool_.ParallelFor(slices, [&](int slice) {
+    const int first = slice * slice_rows;
+    BackwardRows(batch, {first, std::min(slice_rows, B - first)});
+  });
+  CountErrors();
+  const Matrix<const float> s(batch.obs.data(), B, static_cast<int>(obs_size_));
+  pool_.ParallelFor(network_.num_tasks(), [&](int task) {
+    squares_[static_cast<size_t>(task)] =
+        network_.BackwardWeights(task, s, activations_, gradient_);
+  });
+  const double norm = std::sqrt(std::accumulate(squares_.begin(), squares_.end(), 0.0));
+
+  // θ moves against it, and θ⁻ follows θ.
+  const bool polyak = config_.target_period == 0;
+  adam_.Step({learning_rate(), norm, config_.max_gradient_norm, polyak ? config_.tau : 0.0},
+             gradient_, theta_, theta_target_, pool_);
+  ++updates_;
+  if (!polyak && updates_ % config_.target_period == 0) theta_target_ = theta_;
+  norm_sum_ += norm;
+  ++report_updates_;
+}
+
+void Dqn::BackwardRows(const Minibatch& batch, RowRange rows) {
+  const int B = static_cast<int>(config_.batch);
+  const int actions = static_cast<int>(torques_.size());
+  const int obs_size = static_cast<int>(obs_size_);
+  // s, s' (B × D); all Q-values (B × A)
+  const Matrix<const float> s(batch.obs.data(), B, obs_size);
+  const Matrix<const float> s_next(batch.next_obs.data(), B, obs_size);
+  const Matrix<float> q(q_, B, actions);
+  const Matrix<float> q_select(config_.double_q ? q_select_ : q_target_, B, actions);
+  const Matrix<float> q_target(q_target_, B, actions);
+  const Matrix<float> dq(dq_, B, actions);
+  const auto part = [&](const auto& values) {
+    return std::span(values).subspan(static_cast<size_t>(rows.first),
+                                     static_cast<size_t>(rows.count));
+  };
+
+  // y = r + γⁿ Q(s', a*; θ⁻)
+  network_.Forward(theta_target_, s_next, rows, activations_, q_target);
+  if (config_.double_q) network_.Forward(theta_, s_next, rows, activations_, q_select);
+  TdTargets(q_select.Rows(rows.first, rows.count), q_target.Rows(rows.first, rows.count),
+            part(batch.reward), part(batch.discount),
+            std::span(y_).subspan(static_cast<size_t>(rows.first)));
+
+  // dL/dQ(s, a) = clip(Q(s, a; θ) - y, ±1) / B, and 0 for all other actions
+  network_.Forward(theta_, s, rows, activations_, q);
+  std::ranges::fill(dq.Rows(rows.first, rows.count).values(), 0.0F);
+  for (int i = rows.first; i < rows.first + rows.count; ++i) {
+    const auto row = static_cast<size_t>(i);
+    const int a = batch.action[row];
+    q_taken_[row] = q(i, a);
+    dq(i, a) = HuberGradient(q(i, a) - y_[row]) / static_cast<float>(B);
   }
+  network_.BackwardInputs(theta_, transposed_, dq, rows, activations_);
+}
+
+void Dqn::CountErrors() {
   const double B = static_cast<double>(config_.batch);
+  double loss = 0, q = 0, td = 0;
+  for (size_t i = 0; i < y_.size(); ++i) {
+    const float delta = q_taken_[i] - y_[i];
+    loss += HuberLoss(delta);
+    q += q_taken_[i];
+    td += std::abs(delta);
+  }
   loss /= B;
   if (!std::isfinite(loss)) {
     throw Failure(
         Concat("the loss is ", loss, " in update ", updates_ + 1, ", expected a finite number"));
   }
-
-  // θ moves against it, then θ⁻ follows θ.
-  norm_sum_ += adam_.Step(total.gradient, learning_rate(), config_.max_gradient_norm, theta_);
-  ++updates_;
-  if (config_.target_period == 0) {
-    MoveTowards<float>(theta_, static_cast<float>(config_.tau), theta_target_);
-  } else if (updates_ % config_.target_period == 0) {
-    theta_target_ = theta_;
-  }
   loss_sum_ += loss;
   q_sum_ += q / B;
   td_sum_ += td / B;
-  ++report_updates_;
-}
-
-void Dqn::ComputeGradient(const Minibatch& batch, Shard& shard) {
-  const auto first = static_cast<size_t>(shard.first);
-  const auto rows = static_cast<size_t>(shard.rows);
-  const int actions = static_cast<int>(torques_.size());
-  const int obs_size = static_cast<int>(obs_size_);
-  // s, s' (rows × D); all Q-values (rows × A)
-  const Matrix<const float> s(batch.obs.data() + first * obs_size_, shard.rows, obs_size);
-  const Matrix<const float> s_next(batch.next_obs.data() + first * obs_size_, shard.rows, obs_size);
-  const Matrix<float> q(shard.q, shard.rows, actions);
-  const Matrix<float> q_select(shard.q_select, shard.rows, actions);
-  const Matrix<float> q_target(shard.q_target, shard.rows, actions);
-  const Matrix<float> dq(shard.dq, shard.rows, actions);
-
-  // y = r + γⁿ Q(s', a*; θ⁻)
-  network_.Forward(theta_target_, s_next, shard.activations, q_target);
-  if (config_.double_q) network_.Forward(theta_, s_next, shard.activations, q_select);
-  TdTargets(config_.double_q ? q_select : q_target, q_target,
-            std::span(batch.reward).subspan(first, rows),
-            std::span(batch.discount).subspan(first, rows), shard.y);
-
-  // dL/dQ(s, a) = clip(Q(s, a; θ) - y, ±1) / B, and 0 for all other actions
-  network_.Forward(theta_, s, shard.activations, q);
-  std::ranges::fill(dq.values(), 0.0F);
-  shard.loss = shard.q_sum = shard.td_sum = 0;
-  for (int i = 0; i < shard.rows; ++i) {
-    const int a = batch.action[first + static_cast<size_t>(i)];
-    const float delta = q(i, a) - shard.y[static_cast<size_t>(i)];
-    dq(i, a) = HuberGradient(delta) / static_cast<float>(config_.batch);
-    shard.loss += HuberLoss(delta);
-    shard.q_sum += q(i, a);
-    shard.td_sum += std::abs(delta);
-  }
-  network_.Backward(theta_, s, shard.activations, dq, shard.gradient);
 }
 
 AgentReport Dqn::Report() const {

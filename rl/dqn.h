@@ -80,16 +80,10 @@ class Dqn : public Agent {
   void Update(const Minibatch& batch);
 
  private:
-  /// One slice of a minibatch: what one thread computes on its own.
-  struct Shard {
-    int first, rows;
-    QNetwork<float>::Activations activations;
-    AlignedVector<float> q, q_select, q_target, dq;  // (rows × A)
-    AlignedVector<float> y;                          // (rows)
-    AlignedVector<float> gradient;                   // (num_parameters)
-    double loss = 0, q_sum = 0, td_sum = 0;
-  };
-  void ComputeGradient(const Minibatch& batch, Shard& shard);
+  /// TD errors of some rows of a minibatch, and their gradient's way back to the activations.
+  void BackwardRows(const Minibatch& batch, RowRange rows);
+  /// Adds a minibatch to the sums of the report; throws Failure if the loss is not finite.
+  void CountErrors();
 
   DqnConfig config_;
   size_t obs_size_;
@@ -100,10 +94,15 @@ class Dqn : public Agent {
   QNetwork<float> network_;
   AlignedVector<float> theta_, theta_target_;  // (num_parameters)
   Adam adam_;
+  // Of an update: B rows.
+  QNetwork<float>::Activations activations_;
+  AlignedVector<float> q_, q_select_, q_target_, dq_;  // (B × A)
+  AlignedVector<float> y_, q_taken_;                   // (B) targets, Q(s, a)
+  AlignedVector<float> transposed_, gradient_;         // (num_parameters)
+  std::vector<float> squares_;                         // of the gradient, by task
   Replay replay_;
   NStep n_step_;
   Minibatch batch_;
-  std::vector<Shard> shards_;
 
   QNetwork<float>::Activations act_activations_;
   AlignedVector<float> act_obs_, act_q_;  // (N × D), (N × A) of the last Act
