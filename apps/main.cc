@@ -95,6 +95,7 @@ int Main(int argc, char** argv) {
   AddEval(program, command);
   AddSimulate(program, command);
   AddInfo(program, command);
+  AddBench(program, command);
 
   try {
     program.parse(argc, argv);

@@ -40,6 +40,8 @@ struct KernelTable {
   decltype(&LayerNormBackwardGain<T>) layer_norm_backward_gain;
   decltype(&SquaredNorm<T>) squared_norm;
   decltype(&AdamPolyakStep<T>) adam_polyak_step;
+  decltype(&MultiplyAddChains<T>) multiply_add_chains;
+  decltype(&Triad<T>) triad;
 };
 
 }  // namespace upswing
@@ -345,6 +347,39 @@ void AdamPolyakStep(const AdamConstants<T>& constants, std::span<const T> g, std
   });
 }
 
+// ------------------------------------------------------------------------------------------------
+// What the kernels can be measured against.
+
+template <typename T>
+int64_t MultiplyAddChains(int64_t rounds, T& result) {
+  // More than enough chains to hide the latency, few enough for 16 registers. Each tends to its own
+  // fixed point, so that no number overflows or becomes denormal.
+  constexpr int kChains = 12;
+  const Tag<T> d;
+  const Vec<T> factor = hn::Set(d, T(0.75));
+  const Vec<T> addend = hn::Set(d, T(0.25));
+  Vec<T> x[kChains];
+  HWY_UNROLL(12)
+  for (int i = 0; i < kChains; ++i) x[i] = hn::Set(d, static_cast<T>(i));
+  for (int64_t round = 0; round < rounds; ++round) {
+    HWY_UNROLL(12)
+    for (int i = 0; i < kChains; ++i) x[i] = hn::MulAdd(x[i], factor, addend);
+  }
+  for (int i = 1; i < kChains; ++i) x[0] = hn::Add(x[0], x[i]);
+  result = hn::GetLane(hn::SumOfLanes(d, x[0]));
+  return rounds * kChains * static_cast<int64_t>(hn::Lanes(d));
+}
+
+template <typename T>
+void Triad(std::span<const T> b, std::span<const T> c, T factor, std::span<T> a) {
+  const Vec<T> factors = hn::Set(Tag<T>(), factor);
+  ForVectors<T>(a.size(), [&](size_t i, size_t count, auto partial) HWY_ATTR {
+    const Vec<T> product_and_sum = hn::MulAdd(factors, Load<partial.value>(c.data() + i, count),
+                                              Load<partial.value>(b.data() + i, count));
+    Store<partial.value>(product_and_sum, a.data() + i, count);
+  });
+}
+
 template <typename T>
 constexpr KernelTable<T> kKernels{
     &Multiply<T>,
@@ -355,6 +390,8 @@ constexpr KernelTable<T> kKernels{
     &LayerNormBackwardGain<T>,
     &SquaredNorm<T>,
     &AdamPolyakStep<T>,
+    &MultiplyAddChains<T>,
+    &Triad<T>,
 };
 const KernelTable<float>* FloatKernels() { return &kKernels<float>; }
 const KernelTable<double>* DoubleKernels() { return &kKernels<double>; }
@@ -439,6 +476,16 @@ void AdamPolyakStep(const AdamConstants<T>& constants, std::span<const T> g, std
   Kernels<T>().adam_polyak_step(constants, g, m, v, p, target);
 }
 
+template <typename T>
+int64_t MultiplyAddChains(int64_t rounds, T& result) {
+  return Kernels<T>().multiply_add_chains(rounds, result);
+}
+
+template <typename T>
+void Triad(std::span<const T> b, std::span<const T> c, T factor, std::span<T> a) {
+  Kernels<T>().triad(b, c, factor, a);
+}
+
 // Float to work with, double to check gradients by finite differences.
 #define UPSWING_INSTANTIATE(T)                                                                     \
   template void LinearForward(Matrix<const T>, Matrix<const T>, std::span<const T>, bool,          \
@@ -454,7 +501,9 @@ void AdamPolyakStep(const AdamConstants<T>& constants, std::span<const T> g, std
   template void LayerNormBackwardGain(Matrix<const T>, Matrix<const T>, std::span<T>);             \
   template T SquaredNorm(std::span<const T>);                                                      \
   template void AdamPolyakStep(const AdamConstants<T>&, std::span<const T>, std::span<T>,          \
-                               std::span<T>, std::span<T>, std::span<T>);
+                               std::span<T>, std::span<T>, std::span<T>);                          \
+  template int64_t MultiplyAddChains(int64_t, T&);                                                 \
+  template void Triad(std::span<const T>, std::span<const T>, T, std::span<T>);
 UPSWING_INSTANTIATE(float)
 UPSWING_INSTANTIATE(double)
 #undef UPSWING_INSTANTIATE

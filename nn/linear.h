@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <span>
 
 #include "core/matrix.h"
@@ -71,5 +72,17 @@ struct AdamConstants {
 template <typename T>
 void AdamPolyakStep(const AdamConstants<T>& constants, std::span<const T> g, std::span<T> m,
                     std::span<T> v, std::span<T> p, std::span<T> target);
+
+// What the kernels can be measured against.
+
+/// Multiply-adds in registers, `rounds` on each of many independent chains: as fast as the
+/// processor can. Returns how many it made; `result` depends on all of them.
+template <typename T>
+int64_t MultiplyAddChains(int64_t rounds, T& result);
+
+/// a (n) = b + factor · c: two numbers read and one written for each, the STREAM triad (McCalpin,
+/// 1995).
+template <typename T>
+void Triad(std::span<const T> b, std::span<const T> c, T factor, std::span<T> a);
 
 }  // namespace upswing

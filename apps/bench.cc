@@ -1,0 +1,241 @@
+#include "apps/bench.h"
+
+#include <benchmark/benchmark.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <csignal>
+#include <filesystem>
+#include <memory>
+
+#include "apps/bench_report.h"
+#include "apps/commands.h"
+#include "core/error.h"
+#include "core/file.h"
+#include "core/simd.h"
+#include "core/text.h"
+#include "core/thread_pool.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A part of the benchmarks, by the name that the user types.
+struct BenchPart {
+  std::string name, help;
+  BenchCases (*cases)(const BenchOptions&);
+};
+
+const std::vector<BenchPart>& Parts() {
+  static const std::vector<BenchPart> parts{
+      {"kernels", "products of a layer, Adam, transposition, memory bandwidth", KernelCases},
+      {"gradient", "gradient steps: a minibatch sampled and learned from", GradientCases},
+      {"act", "actions of a policy", ActCases},
+      {"replay", "sampling from and adding to a replay memory of 300,000", ReplayCases},
+      {"env", "environment steps: physics, observation, reward, reset", EnvCases},
+      {"train", "training steps: environment and agent, without evaluations", TrainCases},
+  };
+  return parts;
+}
+
+std::vector<std::string> PartNames() {
+  std::vector<std::string> names;
+  for (const BenchPart& part : Parts()) names.push_back(part.name);
+  return names;
+}
+
+// ---- A signal: the measurement that runs is given up, and those that follow.
+
+std::atomic<int> g_stop_signal{0};
+static_assert(std::atomic<int>::is_always_lock_free);
+
+void InstallSignalHandlers() {
+  struct sigaction stop {};
+  stop.sa_handler = [](int signal) { g_stop_signal = signal; };
+  stop.sa_flags = SA_RESETHAND | SA_RESTART;  // a second one ends the program at once
+  sigaction(SIGINT, &stop, nullptr);
+  sigaction(SIGTERM, &stop, nullptr);
+}
+
+/// Hands the cases to Google Benchmark, which calls back several times for each of them.
+class BenchRunner {
+ public:
+  BenchRunner(const BenchCases& cases, const BenchContext& context)
+      : cases_(cases), context_(context), reporter_(cases, context) {}
+
+  void Run() {
+    for (const BenchCase& c : cases_) {
+      benchmark::RegisterBenchmark(c.name.c_str(),
+                                   [this, &c](benchmark::State& state) { Measure(c, state); })
+          ->UseRealTime()
+          ->MeasureProcessCPUTime()
+          ->MinTime(context_.seconds)
+          ->Repetitions(context_.repetitions);
+    }
+    benchmark::RunSpecifiedBenchmarks(&reporter_);
+    benchmark::ClearRegisteredBenchmarks();
+  }
+
+  const BenchReporter& reporter() const { return reporter_; }
+
+ private:
+  void Measure(const BenchCase& c, benchmark::State& state) {
+    if (g_stop_signal != 0) return Stop(state);
+    reporter_.ShowProgress(c);
+    if (prepared_ != &c) {
+      work_ = nullptr;  // first free what it holds
+      work_ = c.prepare();
+      prepared_ = &c;
+    }
+    for ([[maybe_unused]] auto iteration : state) {
+      work_();
+      if (g_stop_signal == 0) continue;
+      Stop(state);
+      break;
+    }
+    Count(c, state);
+  }
+
+  void Stop(benchmark::State& state) {
+    state.SkipWithError("stopped");
+    reporter_.Stop();
+  }
+
+  /// Rates for the JSON file.
+  void Count(const BenchCase& c, benchmark::State& state) const {
+    const auto calls = static_cast<double>(state.iterations());
+    const auto rate = [&](const std::string& name, double amount) {
+      state.counters[name] = benchmark::Counter(amount * calls, benchmark::Counter::kIsRate);
+    };
+    rate("items_per_second", c.count);
+    if (c.bytes > 0) rate("bytes_per_second", c.bytes);
+    if (c.flops <= 0) return;
+    rate("gflops", 1e-9 * c.flops);
+    rate("peak_share", 1e-9 * c.flops / context_.peak_gflops.at(c.threads));
+  }
+
+  const BenchCases& cases_;
+  const BenchContext& context_;
+  BenchReporter reporter_;
+  const BenchCase* prepared_ = nullptr;  // the case that work_ is of
+  BenchWork work_;
+};
+
+/// Throws BadInput on what the command line's own checks cannot see.
+void CheckOptions(const BenchOptions& options) {
+  const std::vector<std::string> names = PartNames();
+  for (const std::string& part : options.parts) {
+    if (std::ranges::find(names, part) == names.end()) {
+      throw BadInput(Concat("bench: no part is called \"", part, "\"", DidYouMean(part, names),
+                            "; there are ", Join(names, ", ")));
+    }
+  }
+  if (std::isnan(options.seconds)) throw BadInput("--seconds: expected a number, got \"nan\"");
+  const bool gradient =
+      options.parts.empty() || std::ranges::find(options.parts, "gradient") != options.parts.end();
+  const bool restricted = !options.network.empty() || !options.hidden.empty() || options.batch > 0;
+  if (restricted && !gradient) {
+    throw BadInput("bench: --network, --hidden and --batch are for the part gradient");
+  }
+  if (!options.json) return;
+  const fs::path folder = fs::absolute(*options.json).parent_path();
+  if (!fs::is_directory(folder)) {
+    throw BadInput(Concat("--json ", *options.json, ": there is no folder ", folder.string()));
+  }
+}
+
+BenchCases WantedCases(const BenchOptions& options) {
+  BenchCases cases;
+  for (const BenchPart& part : Parts()) {
+    const auto& wanted = options.parts;
+    if (!wanted.empty() && std::ranges::find(wanted, part.name) == wanted.end()) continue;
+    for (BenchCase& c : part.cases(options)) cases.push_back(std::move(c));
+  }
+  return cases;
+}
+
+int RunBench(BenchOptions options) {
+  CheckOptions(options);
+  if (!options.simd.empty()) UseSimdPath(options.simd);
+  if (options.threads.empty()) options.threads = {1, ResolveThreads(0)};
+  std::ranges::sort(options.threads);
+  options.threads.erase(std::ranges::unique(options.threads).begin(), options.threads.end());
+
+  InstallSignalHandlers();
+  const BenchCases cases = WantedCases(options);
+  BenchContext context{CpuModel(), SimdPath(),      options.threads,
+                       {},         options.seconds, options.repetitions};
+  for (const BenchCase& c : cases) {
+    double& peak = context.peak_gflops[c.threads];
+    if (c.flops > 0 && peak == 0) peak = MeasurePeakGflops(c.threads);
+  }
+  std::erase_if(context.peak_gflops, [](const auto& peak) { return peak.second == 0; });
+
+  BenchRunner runner(cases, context);
+  runner.Run();
+  if (g_stop_signal != 0) {
+    fmt::print(stderr, "upswing: stopped after {} of {} cases{}\n", runner.reporter().cases_done(),
+               cases.size(), options.json ? "; " + *options.json + " is not written" : "");
+    return 128 + g_stop_signal;
+  }
+  if (options.json) WriteFileAtomically(*options.json, runner.reporter().Json());
+  return 0;
+}
+
+}  // namespace
+
+void AddBench(CLI::App& program, Command& command) {
+  CLI::App* app = program.add_subcommand("bench", "Measure how fast it is on this machine");
+  auto o = std::make_shared<BenchOptions>();
+  app->add_option("parts", o->parts, "what to measure [everything]")->type_name("PART");
+  app->add_option("--threads", o->threads, "numbers of threads [1 and one for each processor]")
+      ->delimiter(',')
+      ->take_all()
+      ->allow_extra_args(false)
+      ->check(CLI::Range(1, 256).description(""))
+      ->type_name("INTEGERS");
+  app->add_option("--simd", o->simd,
+                  Concat("vector instructions: ", Join(SimdPaths(), ", "), " [the first]"))
+      ->check(NotEmpty())
+      ->type_name("PATH");
+  app->add_option("--seconds", o->seconds, "for each repetition of a case [0.2]")
+      ->check(CLI::Range(0.001, 1000.0).description(""))
+      ->type_name("SECONDS");
+  app->add_option("--repetitions", o->repetitions, "of a case; the median is printed [3]")
+      ->check(CLI::Range(1, 1000).description(""))
+      ->type_name("INTEGER");
+  app->add_option("--json", o->json, "file to write, in Google Benchmark's format")
+      ->check(NotEmpty())
+      ->type_name("FILE");
+  app->add_option("--network", o->network, "gradient: plain (DQN) or dueling (Dueling Double DQN)")
+      ->check(CLI::IsMember({"plain", "dueling"}).description(""))
+      ->type_name("NAME");
+  app->add_option("--hidden", o->hidden, "gradient: widths of the feature layers")
+      ->delimiter(',')
+      ->take_all()
+      ->allow_extra_args(false)
+      ->check(CLI::Range(1, 4096).description(""))
+      ->type_name("LIST");
+  app->add_option("--batch", o->batch, "gradient: size of the minibatches")
+      ->check(CLI::Range(1, 65536).description(""))
+      ->type_name("INTEGER");
+
+  std::string parts = "Parts:\n";
+  for (const BenchPart& part : Parts()) parts += fmt::format("  {:<10}{}\n", part.name, part.help);
+  app->footer(
+      parts +
+      "\nGFLOP/s count the multiplications and additions that cannot be done without. The peak is\n"
+      "what as many threads reach at once with multiply-adds in registers, measured before. CPU\n"
+      "time is that of all threads; other load disturbs it less than wall time.\n\n"
+      "Examples:\n"
+      "  ./upswing bench                                  everything, about two minutes\n"
+      "  ./upswing bench gradient train --threads 1,2\n"
+      "  ./upswing bench gradient --network plain --hidden 256,256 --batch 128 --json rate.json\n"
+      "  ./upswing bench kernels --simd avx2 --seconds 1 --repetitions 5\n");
+  app->callback([o, &command] { command = [o] { return RunBench(*o); }; });
+}
+
+}  // namespace upswing

@@ -1,0 +1,228 @@
+// Cases of `upswing bench` for the agent: gradient, act, replay, train.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "apps/bench.h"
+#include "apps/config.h"
+#include "core/rng.h"
+#include "core/thread_pool.h"
+#include "rl/dqn.h"
+#include "rl/replay.h"
+
+namespace upswing {
+namespace {
+
+constexpr int kActions = 9;
+
+/// Of the nine actions, N·m.
+std::vector<double> Torques() { return TorqueLevels(Plant().torque_limit); }
+
+/// A replay memory filled with random transitions, 2% of which terminate.
+std::shared_ptr<Replay> FilledReplay(int64_t size) {
+  Rng rng(1, "benchmark");
+  auto replay = std::make_shared<Replay>(size, kObservationSize);
+  std::vector<float> obs(kObservationSize);
+  std::vector<float> next_obs(kObservationSize);
+  for (int64_t i = 0; i < size; ++i) {
+    for (float& x : obs) x = static_cast<float>(rng.Uniform(-1, 1));
+    for (float& x : next_obs) x = static_cast<float>(rng.Uniform(-1, 1));
+    replay->Add({obs, next_obs, static_cast<int>(rng.Below(kActions)),
+                 static_cast<float>(rng.Uniform(-1, 1)), rng.Uniform() < 0.02 ? 0.0F : 0.99F});
+  }
+  return replay;
+}
+
+/// Multiply-adds that each layer of a network takes for one row, the first layer first.
+std::vector<double> LayerMultiplyAdds(const QNetworkShape& shape) {
+  const QNetwork<float> network(shape);
+  std::vector<double> layers;
+  for (const ParameterBlock& block : network.blocks()) {
+    if (block.in > 0) layers.push_back(static_cast<double>(block.in) * block.out);
+  }
+  return layers;
+}
+
+double Sum(const std::vector<double>& numbers) {
+  double sum = 0;
+  for (const double x : numbers) sum += x;
+  return sum;
+}
+
+/// The network of a gradient case: in its bare form, without layer normalisation.
+DqnConfig BareConfig(bool dueling, const std::vector<int>& hidden, int batch) {
+  DqnConfig config;
+  config.hidden.assign(hidden.begin(), hidden.end());
+  config.head = std::max<int64_t>(1, config.hidden.back() / 2);
+  config.layer_norm = false;
+  config.dueling = config.double_q = dueling;
+  config.batch = config.replay = batch;
+  return config;
+}
+
+QNetworkShape ShapeOf(const DqnConfig& config) {
+  return {kObservationSize, kActions,         config.hidden, config.dueling ? config.head : 0,
+          config.dueling,   config.layer_norm};
+}
+
+/// Operations of a gradient step: all forward passes, the gradients of all inputs but the
+/// observations, the gradients of all weights.
+double UpdateFlops(const DqnConfig& config) {
+  const std::vector<double> layers = LayerMultiplyAdds(ShapeOf(config));
+  const double all = Sum(layers);
+  const double forward = (config.double_q ? 3 : 2) * all;
+  return 2 * static_cast<double>(config.batch) * (forward + (all - layers.front()) + all);
+}
+
+/// Gradient steps: a minibatch is sampled and learned from.
+BenchCase GradientCase(const DqnConfig& config, int threads,
+                       const std::shared_ptr<Replay>& replay) {
+  const std::string name =
+      fmt::format("gradient/{}/{}/batch:{}/threads:{}", config.dueling ? "dueling" : "plain",
+                  fmt::join(config.hidden, "-"), config.batch, threads);
+  return {name, "updates", 1, UpdateFlops(config), 0, threads, [=]() -> BenchWork {
+            struct Parts {
+              ThreadPool pool;
+              Dqn agent;
+              Minibatch batch;
+              Rng rng{1, "replay sampling"};
+              Parts(const DqnConfig& c, int pool_threads)
+                  : pool(pool_threads),
+                    agent(c, 1, kObservationSize, Torques(), 1, pool),
+                    batch(static_cast<int>(c.batch), kObservationSize) {}
+            };
+            const auto parts = std::make_shared<Parts>(config, threads);
+            return [parts, replay] {
+              replay->Sample(parts->rng, parts->batch);
+              parts->agent.Update(parts->batch);
+            };
+          }};
+}
+
+BenchCase ActCase(int batch) {
+  const QNetworkShape shape = ShapeOf(BareConfig(true, {256, 256}, batch));
+  // The value stream is left out: half of the streams' hidden layer, and the value.
+  const std::vector<double> layers = LayerMultiplyAdds(shape);
+  const double multiply_adds = layers[0] + layers[1] + layers[2] / 2 + layers[4];
+  return {fmt::format("act/256-256/batch:{}", batch),
+          "actions",
+          static_cast<double>(batch),
+          2.0 * multiply_adds * batch,
+          0,
+          1,
+          [=]() -> BenchWork {
+            Rng rng(1, "benchmark");
+            const QNetwork<float> network(shape);
+            std::vector<float> parameters(network.num_parameters());
+            network.Initialize(rng, parameters);
+            const auto policy = std::make_shared<Policy>(shape, parameters, Torques(),
+                                                         std::map<std::string, std::string>());
+            const auto n = static_cast<size_t>(batch);
+            const auto obs = std::make_shared<AlignedVector<float>>(n * kObservationSize);
+            for (float& x : *obs) x = static_cast<float>(rng.Uniform(-1, 1));
+            const auto torque = std::make_shared<std::vector<double>>(n);
+            return [=] {
+              policy->Act(Matrix<const float>(obs->data(), batch, kObservationSize), *torque);
+            };
+          }};
+}
+
+/// A training as `upswing train --agent NAME` has it, without files and evaluations.
+struct LearningLoop {
+  LearningLoop(const Config& config, int threads)
+      : pool(threads),
+        env(config.Environments()),
+        agent(config.dqn, env.num_envs(), env.obs_size(), TorqueLevels(env.torque_limit()), 1,
+              pool),
+        result(env.MakeResult()),
+        torque(static_cast<size_t>(env.num_envs())) {}
+
+  /// One lock-step of all environments and the gradient steps that fall due.
+  void Step() {
+    agent.Act(env.obs(), torque);
+    env.Step(torque, result);
+    agent.Observe(result);
+    agent.Learn();
+  }
+
+  ThreadPool pool;
+  PendulumEnv env;
+  Dqn agent;
+  StepResult result;
+  std::vector<double> torque;  // (N)
+};
+
+BenchCase TrainCase(const std::string& name, const std::vector<FlagValue>& flags, int threads) {
+  const Config config = BuildConfig({}, flags);
+  return {fmt::format("train/{}/threads:{}", name, threads),
+          "steps",
+          static_cast<double>(config.train.envs),
+          0,
+          0,
+          threads,
+          [=]() -> BenchWork {
+            const auto loop = std::make_shared<LearningLoop>(config, threads);
+            while (loop->agent.Report().updates == 0) loop->Step();
+            return [loop] { loop->Step(); };
+          }};
+}
+
+}  // namespace
+
+BenchCases GradientCases(const BenchOptions& options) {
+  std::vector<std::vector<int>> networks{{64, 64}, {128, 128}, {256, 256}};
+  if (!options.hidden.empty()) networks = {options.hidden};
+  std::vector<int> batches{32, 64, 128, 256};
+  if (options.batch > 0) batches = {options.batch};
+
+  const std::shared_ptr<Replay> replay = FilledReplay(100'000);
+  BenchCases cases;
+  for (const bool dueling : {false, true}) {
+    if (!options.network.empty() && (options.network == "dueling") != dueling) continue;
+    for (const std::vector<int>& hidden : networks) {
+      for (const int batch : batches) {
+        for (const int threads : options.threads) {
+          cases.push_back(GradientCase(BareConfig(dueling, hidden, batch), threads, replay));
+        }
+      }
+    }
+  }
+  return cases;
+}
+
+BenchCases ActCases(const BenchOptions& /*options*/) {
+  return {ActCase(1), ActCase(8), ActCase(100)};
+}
+
+BenchCases ReplayCases(const BenchOptions& /*options*/) {
+  constexpr int kBatch = 128;
+  constexpr int64_t kStored = 300'000;
+  const auto sample = [=]() -> BenchWork {
+    const std::shared_ptr<Replay> replay = FilledReplay(kStored);
+    const auto batch = std::make_shared<Minibatch>(kBatch, kObservationSize);
+    const auto rng = std::make_shared<Rng>(1, "replay sampling");
+    return [=] { replay->Sample(*rng, *batch); };
+  };
+  const auto add = [=]() -> BenchWork {
+    const std::shared_ptr<Replay> replay = FilledReplay(kStored);
+    const std::vector<float> obs(kObservationSize, 0.5F);
+    return [=] {
+      for (int i = 0; i < kBatch; ++i) replay->Add({obs, obs, 1, 0.5F, 0.99F});
+    };
+  };
+  return {{fmt::format("replay/sample/batch:{}", kBatch), "transitions", kBatch, 0, 0, 1, sample},
+          {fmt::format("replay/add/batch:{}", kBatch), "transitions", kBatch, 0, 0, 1, add}};
+}
+
+BenchCases TrainCases(const BenchOptions& options) {
+  BenchCases cases;
+  for (const std::string agent : {"d3qn", "d3qn-small"}) {
+    for (const int threads : options.threads) {
+      cases.push_back(TrainCase(agent, {{"agent", agent}}, threads));
+    }
+  }
+  return cases;
+}
+
+}  // namespace upswing

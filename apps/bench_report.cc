@@ -1,0 +1,142 @@
+#include "apps/bench_report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "core/text.h"
+
+namespace upswing {
+namespace {
+
+/// The middle one, of an even number the mean of the two in the middle.
+double Median(std::vector<double> numbers) {
+  std::ranges::sort(numbers);
+  const size_t n = numbers.size();
+  return (numbers[(n - 1) / 2] + numbers[n / 2]) / 2;
+}
+
+/// Seconds with three digits and the unit that suits them.
+std::string FormatTime(double seconds) {
+  if (seconds < 1e-6) return fmt::format("{:.3g} ns", 1e9 * seconds);
+  if (seconds < 1e-3) return fmt::format("{:.3g} µs", 1e6 * seconds);
+  if (seconds < 1) return fmt::format("{:.3g} ms", 1e3 * seconds);
+  return fmt::format("{:.3g} s", seconds);
+}
+
+std::string Row(size_t name_width, const std::string& name, const std::string& rate,
+                const std::string& gflops, const std::string& share, const std::string& gigabytes,
+                const std::string& wall, const std::string& cpu) {
+  std::string row = fmt::format("{:<{}}  {:>25}  {:>8}  {:>7}  {:>6}  {:>8}  {:>8}", name,
+                                name_width, rate, gflops, share, gigabytes, wall, cpu);
+  return row.substr(0, row.find_last_not_of(' ') + 1);
+}
+
+}  // namespace
+
+std::string CpuModel() {
+  std::ifstream file("/proc/cpuinfo");
+  std::string line;
+  while (std::getline(file, line)) {
+    const size_t colon = line.find(':');
+    if (line.starts_with("model name") && colon != std::string::npos) {
+      return std::string(Trim(std::string_view(line).substr(colon + 1)));
+    }
+  }
+  return "unknown";
+}
+
+BenchReporter::BenchReporter(const BenchCases& cases, const BenchContext& context)
+    : cases_(cases), context_(context) {
+  json_.SetOutputStream(&json_text_);
+  json_.SetErrorStream(&json_text_);
+  for (const BenchCase& c : cases_) name_width_ = std::max(name_width_, c.name.size());
+}
+
+bool BenchReporter::ReportContext(const Context& context) {
+  std::string peaks;
+  for (const auto& [threads, gflops] : context_.peak_gflops) {
+    peaks += fmt::format("{} {:.1f} GFLOP/s with {} thread{}", peaks.empty() ? "; peak" : ",",
+                         gflops, threads, threads == 1 ? "" : "s");
+  }
+  line_.Print(fmt::format("{}, {} processors, vector instructions {}{}", context_.cpu_model,
+                          context.cpu_info.num_cpus, context_.simd_path, peaks));
+  line_.Print(fmt::format("Median of {} × {} s for each of {} cases; times are those of one item",
+                          context_.repetitions, FormatNumber(context_.seconds), cases_.size()));
+  line_.Print(Row(name_width_, "case", "rate", "GFLOP/s", "of peak", "GB/s", "wall", "CPU"));
+  return json_.ReportContext(context);
+}
+
+void BenchReporter::ReportRuns(const std::vector<Run>& runs) {
+  if (stopped_ || runs.empty()) return;
+  // Names are ours alone, without the settings that Google Benchmark appends; threads are those of
+  // the work.
+  const BenchCase& measured = FindCase(runs.front().run_name.function_name);
+  std::vector<Run> named = runs;
+  for (Run& run : named) {
+    run.run_name = {};
+    run.run_name.function_name = measured.name;
+    run.threads = measured.threads;
+  }
+  json_.ReportRuns(named);
+
+  std::vector<double> wall, cpu;
+  for (const Run& run : named) {
+    if (run.run_type != Run::RT_Iteration) continue;
+    wall.push_back(run.real_accumulated_time / static_cast<double>(run.iterations));
+    cpu.push_back(run.cpu_accumulated_time / static_cast<double>(run.iterations));
+  }
+  if (wall.empty()) return;
+  PrintRow(measured, Median(wall), Median(cpu));
+  ++done_;
+}
+
+const BenchCase& BenchReporter::FindCase(const std::string& name) const {
+  return *std::ranges::find(cases_, name, &BenchCase::name);
+}
+
+void BenchReporter::PrintRow(const BenchCase& measured, double wall, double cpu) {
+  const double rate = measured.count / wall;
+  const double gflops = 1e-9 * measured.flops / wall;
+  const auto peak = context_.peak_gflops.find(measured.threads);
+  const bool has_flops = measured.flops > 0;
+  line_.Print(Row(name_width_, measured.name,
+                  fmt::format("{} {}/s", FormatCount(rate), measured.items),
+                  has_flops ? fmt::format("{:.1f}", gflops) : "",
+                  has_flops && peak != context_.peak_gflops.end()
+                      ? fmt::format("{:.0f}%", 100 * gflops / peak->second)
+                      : "",
+                  measured.bytes > 0 ? fmt::format("{:.1f}", 1e-9 * measured.bytes / wall) : "",
+                  FormatTime(wall / measured.count), FormatTime(cpu / measured.count)));
+}
+
+void BenchReporter::ShowProgress(const BenchCase& running) {
+  if (!line_.due()) return;
+  const double share = static_cast<double>(done_) / static_cast<double>(cases_.size());
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin_;
+  std::vector<std::string> fields{running.name};
+  if (done_ > 0) {
+    fields.push_back(FormatDuration(elapsed.count() * (1 - share) / share) + " left");
+  }
+  line_.Show(share, fields);
+}
+
+std::string BenchReporter::Json() const {
+  auto json = nlohmann::ordered_json::parse(json_text_.str());
+  auto& context = json["context"];
+  context["upswing_version"] = UPSWING_VERSION;
+  context["cpu_model"] = context_.cpu_model;
+  context["simd_path"] = context_.simd_path;
+  context["threads"] = context_.threads;
+  context["peak_gflops"] = nlohmann::ordered_json::object();
+  for (const auto& [threads, gflops] : context_.peak_gflops) {
+    context["peak_gflops"][std::to_string(threads)] = gflops;
+  }
+  context["seconds"] = context_.seconds;
+  context["repetitions"] = context_.repetitions;
+  return json.dump(2) + "\n";
+}
+
+}  // namespace upswing
