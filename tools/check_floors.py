@@ -26,7 +26,7 @@ FLOORS = {
 DOORS = {
     "mujoco": re.compile(r"sim/"),
     "hwy": re.compile(r"(core/simd|nn/linear|sim/closed_form)\.(h|cc)$"),
-    "Eigen": re.compile(r"nn/(linear\.(h|cc)|[^/]*_test\.cc)$"),
+    "Eigen": re.compile(r"nn/[^/]*_(test|bench)\.cc$"),
 }
 
 SOURCE_ENDINGS = (".h", ".cc", ".cc.in")

@@ -12,7 +12,8 @@ CHECK = Path(__file__).resolve().parent / "check_floors.py"
 GOOD = {
     "core/rng.h": "#include <vector>\n",
     "nn/linear.h": '#pragma once\n#include "core/rng.h"\n',
-    "nn/linear.cc": '#include "nn/linear.h"\n#include <Eigen/Core>\n',
+    "nn/linear.cc": '#include "nn/linear.h"\n#include <hwy/highway.h>\n',
+    "nn/linear_bench.cc": '#include "nn/linear.h"\n#include <Eigen/Core>\n',
     "nn/adam_test.cc": "#include <Eigen/Core>\n",
     "sim/model.h": "#include <mujoco/mujoco.h>\n",
     "sim/model_test.cc": '#include "sim/model.h"\n#include <mujoco/mjbatch.h>\n',
