@@ -43,7 +43,7 @@ class CommandLineTest(ProgramTest):
         self.refuse([], "subcommand")
 
     def test_too_much_or_too_little(self):
-        self.refuse(["info"], "policy")
+        self.refuse(["eval"], "policy")
         self.refuse(["eval", "a", "b"], "b")
         self.refuse(["train", "--gamma"], "--gamma")
         self.refuse(["train", "something"], "something")
@@ -53,6 +53,7 @@ class CommandLineTest(ProgramTest):
 
     def test_value_of_the_wrong_type(self):
         for flag, value, expected in (("--gamma", "high", "a number"),
+                                      ("--precision", "half", "one of float32, bfloat16"),
                                       ("--batch", "1.5", "an integer"),
                                       ("--seed", "", "an integer"),
                                       ("--eval-every", "1O0", "an integer"),

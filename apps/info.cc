@@ -8,7 +8,11 @@
 #include "apps/config.h"
 #include "apps/progress.h"
 #include "core/error.h"
+#include "core/simd.h"
 #include "core/text.h"
+#include "core/thread_pool.h"
+#include "nn/bfloat16.h"
+#include "sim/model.h"
 
 namespace upswing {
 namespace {
@@ -61,7 +65,22 @@ void PrintRun(const fs::path& path) {
   }
 }
 
+/// What the program is and what it makes of this machine.
+void PrintProgram() {
+  const std::vector<std::string> bfloat16 = Bfloat16Paths();
+  fmt::print("upswing {}\n", UPSWING_VERSION);
+  fmt::print("  physics     MuJoCo {}\n", MuJoCoVersion());
+  fmt::print("  threads     {} by default\n", ResolveThreads(0));
+  fmt::print("  vectors     {} (this processor can take: {})\n", SimdPath(),
+             fmt::join(SimdPaths(), ", "));
+  fmt::print("  bfloat16    {}\n", bfloat16.empty() ? "none" : bfloat16.front());
+}
+
 int RunInfo(const std::string& path) {
+  if (path.empty()) {
+    PrintProgram();
+    return 0;
+  }
   const bool is_run = fs::exists(fs::path(path) / "config.toml");
   const fs::path run_policy = fs::path(path) / "policy.safetensors";
   try {
@@ -83,13 +102,17 @@ int RunInfo(const std::string& path) {
 }  // namespace
 
 void AddInfo(CLI::App& program, Command& command) {
-  CLI::App* app = program.add_subcommand("info", "Say what a policy or a run is, and check it");
+  CLI::App* app = program.add_subcommand(
+      "info", "Say what a policy or a run is, and check it; or what this machine can do");
   auto path = std::make_shared<std::string>();
-  app->add_option("policy", *path, "policy.safetensors or run folder")
-      ->required()
+  app->add_option("policy", *path, "policy.safetensors or run folder; none: about this machine")
       ->type_name("POLICY|RUN")
       ->check(NotEmpty());
-  app->footer("Examples:\n  ./upswing info runs/d3qn-seed1\n  ./upswing info policy.safetensors\n");
+  app->footer(
+      "Examples:\n"
+      "  ./upswing info runs/d3qn-seed1\n"
+      "  ./upswing info policy.safetensors\n"
+      "  ./upswing info                      which instructions the kernels use here\n");
   app->callback([path, &command] { command = [path] { return RunInfo(*path); }; });
 }
 

@@ -23,6 +23,12 @@ class InfoTest(ProgramTest):
         self.assertRegex(text, r"step (2000|4000)")
         self.assertRegex(text, r"success \d+%, mean return -?\d+")
 
+    def test_this_machine(self):
+        text = self.succeed("info")
+        self.assert_says(text, "MuJoCo ", "threads ")
+        used, choice = re.search(r"vectors +(\S+) \(this processor can take: (.*)\)", text).groups()
+        self.assertEqual(used, choice.split(", ")[0])
+
     def test_plain_network(self):
         self.succeed(*small(agent="dqn", layer_norm=False))
         text = self.succeed("info", "run/policy.safetensors")

@@ -85,7 +85,10 @@ std::string Option::expected() const {
                         [](const bool*) -> std::string { return "true or false"; },
                         [&](const int64_t*) { return Concat("an integer", RangeText(range)); },
                         [&](const double*) { return Concat("a number", RangeText(range)); },
-                        [](const std::string*) -> std::string { return "a text"; },
+                        [&](const std::string*) -> std::string {
+                          return choices.empty() ? "a text"
+                                                 : Concat("one of ", Join(choices, ", "));
+                        },
                         [&](const std::vector<int64_t>*) {
                           return Concat("a list of integers", RangeText(range));
                         },
@@ -116,6 +119,9 @@ void Option::Set(std::string_view text, const std::string& where) const {
                      },
                      [&](std::string* value) {
                        if (text.find_first_of("\n\r") != std::string_view::npos) return false;
+                       if (!choices.empty() && std::ranges::find(choices, text) == choices.end()) {
+                         return false;
+                       }
                        *value = text;
                        return true;
                      },
@@ -157,6 +163,13 @@ Option& Options::Add(std::string* target, std::string_view name, std::string_vie
                      std::string_view help) {
   *target = value;
   return AddOption(target, name, {}, "", help);
+}
+
+Option& Options::AddChoice(std::string* target, std::string_view name,
+                           std::vector<std::string> choices, std::string_view help) {
+  Option& option = Add(target, name, choices.front(), help);
+  option.choices = std::move(choices);
+  return option;
 }
 
 Option& Options::Add(std::vector<int64_t>* target, std::string_view name,

@@ -29,7 +29,8 @@ struct Option {
   Range range;          // numbers only
   std::string unit;     // such as "s"; may be empty
   std::string help;
-  bool identity;  // two runs that differ in it are different runs
+  bool identity;                          // two runs that differ in it are different runs
+  std::vector<std::string> choices = {};  // texts only: what it may be; empty for anything
 
   /// The flag, such as `--eval-every`.
   std::string flag() const;
@@ -57,6 +58,9 @@ class Options {
               std::string_view unit, std::string_view help);
   Option& Add(std::string* target, std::string_view name, std::string_view value,
               std::string_view help);
+  /// A text that is one of `choices`; the first is the default.
+  Option& AddChoice(std::string* target, std::string_view name, std::vector<std::string> choices,
+                    std::string_view help);
   Option& Add(std::vector<int64_t>* target, std::string_view name, std::vector<int64_t> value,
               Range range, std::string_view help);
 

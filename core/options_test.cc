@@ -91,6 +91,24 @@ TEST_F(OptionsTest, ARejectedValueLeavesNumbersAndListsAsTheyWere) {
   EXPECT_EQ(sample_.widths, (std::vector<int64_t>{4, 5}));
 }
 
+TEST(Choice, IsOneOfThoseGivenAndTheFirstUnlessSet) {
+  std::string color;
+  Options options;
+  options.AddChoice(&color, "color", {"red", "green"}, "of the pen");
+  EXPECT_EQ(color, "red");
+  options.Set("color", "green", "--color");
+  EXPECT_EQ(color, "green");
+  try {
+    options.Set("color", "blue", "--color");
+    FAIL() << "blue was taken";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("--color: expected one of red, green"),
+              std::string::npos)
+        << error.what();
+  }
+  EXPECT_EQ(color, "green");
+}
+
 TEST_F(OptionsTest, FlagsAndTomlFollowFromTheSameLine) {
   EXPECT_EQ(options_.Find("the_rate", "").front()->flag(), "--the-rate");
   options_.Set("name", "a\\\"", "");

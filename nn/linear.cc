@@ -3,6 +3,8 @@
 // read along its rows or its columns.
 #include "nn/linear.h"
 
+#include "nn/product.h"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "nn/linear.cc"
 #include <hwy/foreach_target.h>  // includes this file once for each target
@@ -15,19 +17,6 @@
 #include <type_traits>
 
 namespace upswing {
-
-/// C (M × N) = A (M × K) · B (K × N) + bias, where A(m, k) = a[m · a_m + k · a_k].
-template <typename T>
-struct Product {
-  int M, N, K;
-  const T* a;
-  ptrdiff_t a_m, a_k;
-  Matrix<const T> b;     // (K × N)
-  Matrix<T> c;           // (M × N)
-  const T* bias;         // (N), or null for none
-  bool relu;             // C = max(C, 0)
-  Matrix<const T> gate;  // C = 0 where gate (M × N) is not positive; empty for none
-};
 
 /// The kernels of one target.
 template <typename T>

@@ -103,7 +103,7 @@ const std::string& Policy::About(const std::string& key) const {
 void Policy::QValues(Matrix<const float> obs, Matrix<float> q) const {
   for (int first = 0; first < obs.rows(); first += kBlock) {
     const int rows = std::min(kBlock, obs.rows() - first);
-    network_.Forward(parameters_, obs.Rows(first, rows), {0, rows}, activations_,
+    network_.Forward({parameters_}, obs.Rows(first, rows), {0, rows}, activations_,
                      q.Rows(first, rows));
   }
 }
@@ -112,7 +112,7 @@ void Policy::Act(Matrix<const float> obs, std::span<double> torque) const {
   for (int first = 0; first < obs.rows(); first += kBlock) {
     const int rows = std::min(kBlock, obs.rows() - first);
     const Matrix<float> preferences(q_, rows, network_.shape().actions);
-    network_.ForwardPreferences(parameters_, obs.Rows(first, rows), {0, rows}, activations_,
+    network_.ForwardPreferences({parameters_}, obs.Rows(first, rows), {0, rows}, activations_,
                                 preferences);
     for (int i = 0; i < rows; ++i) {
       const auto action = static_cast<size_t>(ArgMax(preferences.row(i)));

@@ -2,15 +2,25 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 #include "core/error.h"
 #include "core/text.h"
+#include "nn/bfloat16.h"
 #include "nn/linear.h"
 
 namespace upswing {
 namespace {
 
-constexpr int kTaskRows = 32;  // of a weight matrix
+constexpr int kTaskRows = 64;  // of a weight matrix
+
+int PairsIn(int n) { return (n + 1) / 2; }
+
+/// The numbers of some rows in an array that has one for each row.
+template <typename T>
+std::span<T> PartOf(std::span<T> values, RowRange rows) {
+  return values.subspan(static_cast<size_t>(rows.first), static_cast<size_t>(rows.count));
+}
 
 /// A batch's matrix (… × cols) in `values`, or the given rows of it.
 template <typename T>
@@ -49,7 +59,13 @@ void CombineStreamsBackward(Matrix<const T> dq, Matrix<T> dvalue, Matrix<T> dadv
 }  // namespace
 
 template <typename T>
-QNetwork<T>::QNetwork(QNetworkShape shape) : shape_(std::move(shape)) {
+QNetwork<T>::QNetwork(QNetworkShape shape, bool bfloat16)
+    : shape_(std::move(shape)), bfloat16_(bfloat16) {
+  if (bfloat16_ && (!std::is_same_v<T, float> || Bfloat16Paths().empty())) {
+    throw BadInput(
+        "precision: expected float32, got bfloat16: this processor has no instructions for it "
+        "(AVX512_BF16 or AMX)");
+  }
   // A policy file brings these numbers too, so they are checked here, where both ways meet.
   constexpr int64_t kMaxWidth = 4096;
   const auto valid = [](int64_t n) { return n >= 1 && n <= kMaxWidth; };
@@ -157,36 +173,90 @@ Matrix<const T> QNetwork<T>::Weight(std::span<const T> parameters, const Layer& 
 }
 
 template <typename T>
-Matrix<const T> QNetwork<T>::Transposed(std::span<const T> transposed, const Layer& layer) const {
-  const ParameterBlock& w = blocks_[layer.weight];
-  return {transposed.data() + w.offset, w.out, w.in};
-}
-
-template <typename T>
 std::span<const T> QNetwork<T>::Vector(std::span<const T> parameters, size_t block) const {
   return parameters.subspan(blocks_[block].offset, blocks_[block].size());
 }
 
 template <typename T>
-Matrix<const T> QNetwork<T>::ForwardFeatures(std::span<const T> parameters, Matrix<const T> x,
-                                             RowRange rows, Activations& a) const {
+typename QNetwork<T>::Prepared QNetwork<T>::MakePrepared(bool backward) const {
+  Prepared prepared;
+  if (backward) prepared.transposed.resize(num_parameters_);
+  if (bfloat16_) prepared.pairs.resize(num_parameters_);
+  if (bfloat16_ && backward) prepared.transposed_pairs.resize(num_parameters_);
+  return prepared;
+}
+
+template <typename T>
+void QNetwork<T>::Prepare(int task, std::span<const T> parameters, Prepared& prepared) const {
+  const Task& t = tasks_[static_cast<size_t>(task)];
+  const ParameterBlock& block = blocks_[layers_[t.layer].weight];
+  const int first = t.rows.first;
+  const int count = t.rows.count;
+  const Matrix<const T> rows = Weight(parameters, layers_[t.layer]).Rows(first, count);
+  Matrix<T> columns;
+  if (!prepared.transposed.empty()) {
+    const Matrix<T> all(prepared.transposed.data() + block.offset, block.out, block.in);
+    columns = all.Cols(first, count);
+    Transpose(rows, columns);
+  }
+  if constexpr (std::is_same_v<T, float>) {
+    if (!prepared.pairs.empty()) {
+      const Matrix<uint32_t> pairs(prepared.pairs.data() + block.offset, PairsIn(block.in),
+                                   block.out);
+      PackPairs(rows, pairs.Rows(first / 2, PairsIn(count)));
+    }
+    if (!prepared.transposed_pairs.empty()) {
+      const Matrix<uint32_t> pairs(prepared.transposed_pairs.data() + block.offset,
+                                   PairsIn(block.out), block.in);
+      PackPairs(columns, pairs.Cols(first, count));
+    }
+  }
+}
+
+template <typename T>
+void QNetwork<T>::Apply(Weights weights, const Layer& layer, Matrix<const T> x, bool relu,
+                        Matrix<T> y) const {
+  const ParameterBlock& w = blocks_[layer.weight];
+  const std::span<const T> b = Vector(weights.parameters, layer.bias);
+  if constexpr (std::is_same_v<T, float>) {
+    if (bfloat16_ && weights.prepared != nullptr) {
+      const uint32_t* pairs = weights.prepared->pairs.data() + w.offset;
+      return LinearForward(x, Matrix<const uint32_t>(pairs, PairsIn(w.in), w.out), b, relu, y);
+    }
+  }
+  LinearForward(x, Weight(weights.parameters, layer), b, relu, y);
+}
+
+template <typename T>
+void QNetwork<T>::ApplyBackward(Weights weights, const Layer& layer, Matrix<const T> dy,
+                                Matrix<const T> relu, Matrix<T> dx) const {
+  const ParameterBlock& w = blocks_[layer.weight];
+  if constexpr (std::is_same_v<T, float>) {
+    if (bfloat16_) {
+      const uint32_t* pairs = weights.prepared->transposed_pairs.data() + w.offset;
+      return LinearBackwardInput(dy, Matrix<const uint32_t>(pairs, PairsIn(w.out), w.in), relu, dx);
+    }
+  }
+  const T* transposed = weights.prepared->transposed.data() + w.offset;
+  LinearBackwardInput(dy, Matrix<const T>(transposed, w.out, w.in), relu, dx);
+}
+
+template <typename T>
+Matrix<const T> QNetwork<T>::ForwardFeatures(Weights weights, Matrix<const T> x, RowRange rows,
+                                             Activations& a) const {
   // Linear, layer norm, ReLU.
   Matrix<const T> input = x.Rows(rows.first, rows.count);
   for (size_t i = 0; i < num_features(); ++i) {
     const auto width = static_cast<int>(shape_.hidden[i]);
-    const Matrix<const T> w = Weight(parameters, layers_[i]);
-    const std::span<const T> b = Vector(parameters, layers_[i].bias);
     const Matrix<T> y = RowsOf(a.feature[i], rows, width);
     if (shape_.layer_norm) {
       const Matrix<T> normal = RowsOf(a.normal[i], rows, width);
-      LinearForward(input, w, b, false, normal);
-      LayerNormReluForward(
-          normal, Vector(parameters, norms_[i].weight), Vector(parameters, norms_[i].bias),
-          std::span(a.inv_std[i])
-              .subspan(static_cast<size_t>(rows.first), static_cast<size_t>(rows.count)),
-          y);
+      Apply(weights, layers_[i], input, false, normal);
+      LayerNormReluForward(normal, Vector(weights.parameters, norms_[i].weight),
+                           Vector(weights.parameters, norms_[i].bias),
+                           PartOf(std::span(a.inv_std[i]), rows), y);
     } else {
-      LinearForward(input, w, b, true, y);
+      Apply(weights, layers_[i], input, true, y);
     }
     input = y;
   }
@@ -194,50 +264,36 @@ Matrix<const T> QNetwork<T>::ForwardFeatures(std::span<const T> parameters, Matr
 }
 
 template <typename T>
-void QNetwork<T>::Forward(std::span<const T> parameters, Matrix<const T> x, RowRange rows,
-                          Activations& a, Matrix<T> q) const {
-  const Matrix<const T> feature = ForwardFeatures(parameters, x, rows, a);
+void QNetwork<T>::Forward(Weights weights, Matrix<const T> x, RowRange rows, Activations& a,
+                          Matrix<T> q) const {
+  const Matrix<const T> feature = ForwardFeatures(weights, x, rows, a);
   const Matrix<T> q_rows = q.Rows(rows.first, rows.count);
-  const auto apply = [&](const Layer& layer, Matrix<const T> input, bool relu, Matrix<T> y) {
-    LinearForward(input, Weight(parameters, layer), Vector(parameters, layer.bias), relu, y);
-  };
-  if (!shape_.dueling) return apply(output(), feature, false, q_rows);
+  if (!shape_.dueling) return Apply(weights, output(), feature, false, q_rows);
 
   const int head = static_cast<int>(shape_.head);
   const Matrix<T> hidden = RowsOf(a.streams, rows, 2 * head);
   const Matrix<T> v = RowsOf(a.value, rows, 1);
-  apply(streams(), feature, true, hidden);
-  apply(value(), hidden.Cols(0, head), false, v);
-  apply(output(), hidden.Cols(head, head), false, q_rows);
+  Apply(weights, streams(), feature, true, hidden);
+  Apply(weights, value(), hidden.Cols(0, head), false, v);
+  Apply(weights, output(), hidden.Cols(head, head), false, q_rows);
   CombineStreams<T>(v, q_rows);
 }
 
 template <typename T>
-void QNetwork<T>::ForwardPreferences(std::span<const T> parameters, Matrix<const T> x,
-                                     RowRange rows, Activations& a, Matrix<T> preferences) const {
-  if (!shape_.dueling) return Forward(parameters, x, rows, a, preferences);
-  const Matrix<const T> feature = ForwardFeatures(parameters, x, rows, a);
+void QNetwork<T>::ForwardPreferences(Weights weights, Matrix<const T> x, RowRange rows,
+                                     Activations& a, Matrix<T> preferences) const {
+  if (!shape_.dueling) return Forward(weights, x, rows, a, preferences);
+  const Matrix<const T> feature = ForwardFeatures(weights, x, rows, a);
   const int head = static_cast<int>(shape_.head);
   const Matrix<T> hidden = RowsOf(a.streams, rows, 2 * head).Cols(head, head);
-  LinearForward(feature, Weight(parameters, streams()).Cols(head, head),
-                Vector(parameters, streams().bias).subspan(static_cast<size_t>(head)), true,
-                hidden);
-  LinearForward<T>(hidden, Weight(parameters, output()), Vector(parameters, output().bias), false,
-                   preferences.Rows(rows.first, rows.count));
+  const Matrix<const T> w = Weight(weights.parameters, streams()).Cols(head, head);
+  const auto b = Vector(weights.parameters, streams().bias).subspan(static_cast<size_t>(head));
+  LinearForward(feature, w, b, true, hidden);
+  Apply(weights, output(), hidden, false, preferences.Rows(rows.first, rows.count));
 }
 
 template <typename T>
-void QNetwork<T>::TransposeWeights(int task, std::span<const T> parameters,
-                                   std::span<T> transposed) const {
-  const Task& t = tasks_[static_cast<size_t>(task)];
-  const ParameterBlock& w = blocks_[layers_[t.layer].weight];
-  const Matrix<T> target(transposed.data() + w.offset, w.out, w.in);
-  Transpose(Weight(parameters, layers_[t.layer]).Rows(t.rows.first, t.rows.count),
-            target.Cols(t.rows.first, t.rows.count));
-}
-
-template <typename T>
-void QNetwork<T>::BackwardStreams(std::span<const T> transposed, Matrix<const T> dq, RowRange rows,
+void QNetwork<T>::BackwardStreams(Weights weights, Matrix<const T> dq, RowRange rows,
                                   Activations& a) const {
   const int head = static_cast<int>(shape_.head);
   const Matrix<const T> hidden = RowsOf(a.streams, rows, 2 * head);
@@ -245,42 +301,35 @@ void QNetwork<T>::BackwardStreams(std::span<const T> transposed, Matrix<const T>
   const Matrix<T> dvalue = RowsOf(a.grad_value, rows, 1);
   const Matrix<T> dadvantage = RowsOf(a.grad_output, rows, shape_.actions);
   CombineStreamsBackward(dq, dvalue, dadvantage);
-  LinearBackwardInput<T>(dvalue, Transposed(transposed, value()), hidden.Cols(0, head),
-                         dhidden.Cols(0, head));
-  LinearBackwardInput<T>(dadvantage, Transposed(transposed, output()), hidden.Cols(head, head),
-                         dhidden.Cols(head, head));
+  ApplyBackward(weights, value(), dvalue, hidden.Cols(0, head), dhidden.Cols(0, head));
+  ApplyBackward(weights, output(), dadvantage, hidden.Cols(head, head), dhidden.Cols(head, head));
 }
 
 template <typename T>
-void QNetwork<T>::BackwardInputs(std::span<const T> parameters, std::span<const T> transposed,
-                                 Matrix<const T> dq, RowRange rows, Activations& a) const {
-  // dy: gradient of the input of the layer above feature layer i, whose transposed weight is w.
-  const size_t last = num_features() - 1;
+void QNetwork<T>::BackwardInputs(Weights weights, Matrix<const T> dq, RowRange rows,
+                                 Activations& a) const {
+  // dy: gradient of the output of the layer above feature layer i.
+  const Matrix<const T> dq_rows = dq.Rows(rows.first, rows.count);
   Matrix<const T> dy;
-  const Layer* above = nullptr;
+  const Layer* above = &layers_[num_features()];
   if (shape_.dueling) {
-    BackwardStreams(transposed, dq.Rows(rows.first, rows.count), rows, a);
+    BackwardStreams(weights, dq_rows, rows, a);
     dy = RowsOf(a.grad_streams, rows, 2 * static_cast<int>(shape_.head));
-    above = &streams();
   } else {
     const Matrix<T> doutput = RowsOf(a.grad_output, rows, shape_.actions);
-    std::ranges::copy(dq.Rows(rows.first, rows.count).values(), doutput.values().begin());
+    std::ranges::copy(dq_rows.values(), doutput.values().begin());
     dy = doutput;
-    above = &output();
   }
 
-  for (size_t i = last + 1; i-- > 0;) {
+  for (size_t i = num_features(); i-- > 0;) {
     const auto width = static_cast<int>(shape_.hidden[i]);
     const Matrix<T> dx = RowsOf(a.grad_feature[i], rows, width);
     const Matrix<T> dnormal = shape_.layer_norm ? RowsOf(a.grad_normal[i], rows, width) : dx;
-    LinearBackwardInput<T>(dy, Transposed(transposed, *above), RowsOf(a.feature[i], rows, width),
-                           dnormal);
+    ApplyBackward(weights, *above, dy, RowsOf(a.feature[i], rows, width), dnormal);
     if (shape_.layer_norm) {
-      LayerNormBackwardInput<T>(
-          RowsOf(a.normal[i], rows, width), Vector(parameters, norms_[i].weight),
-          std::span<const T>(a.inv_std[i])
-              .subspan(static_cast<size_t>(rows.first), static_cast<size_t>(rows.count)),
-          dnormal, dx);
+      LayerNormBackwardInput<T>(RowsOf(a.normal[i], rows, width),
+                                Vector(weights.parameters, norms_[i].weight),
+                                PartOf(std::span<const T>(a.inv_std[i]), rows), dnormal, dx);
     }
     dy = dx;
     above = &layers_[i];
@@ -319,7 +368,12 @@ T QNetwork<T>::BackwardWeights(int task, Matrix<const T> x, const Activations& a
 
   const ParameterBlock& w = blocks_[layer.weight];
   const Matrix<T> dw = Matrix<T>(part(layer.weight), w.in, w.out).Rows(t.rows.first, t.rows.count);
-  LinearBackwardWeight(LayerInput(t.layer, x, a).Cols(t.rows.first, t.rows.count), dy, dw);
+  const Matrix<const T> input = LayerInput(t.layer, x, a).Cols(t.rows.first, t.rows.count);
+  if constexpr (std::is_same_v<T, float>) {
+    bfloat16_ ? LinearBackwardWeightBfloat16(input, dy, dw) : LinearBackwardWeight(input, dy, dw);
+  } else {
+    LinearBackwardWeight(input, dy, dw);
+  }
   T squares = SquaredNorm<T>(dw.values());
   if (t.rows.first > 0) return squares;
 
@@ -338,9 +392,9 @@ T QNetwork<T>::BackwardWeights(int task, Matrix<const T> x, const Activations& a
 template <typename T>
 void QNetwork<T>::Backward(std::span<const T> parameters, Matrix<const T> x, Activations& a,
                            Matrix<const T> dq, std::span<T> gradient) const {
-  AlignedVector<T> transposed(num_parameters_);
-  for (int task = 0; task < num_tasks(); ++task) TransposeWeights(task, parameters, transposed);
-  BackwardInputs(parameters, transposed, dq, {0, x.rows()}, a);
+  Prepared prepared = MakePrepared(true);
+  for (int task = 0; task < num_tasks(); ++task) Prepare(task, parameters, prepared);
+  BackwardInputs({parameters, &prepared}, dq, {0, x.rows()}, a);
   for (int task = 0; task < num_tasks(); ++task) BackwardWeights(task, x, a, gradient);
 }
 

@@ -46,13 +46,16 @@ struct RowRange {
 ///
 /// The hidden layers of the two streams are one matrix (H × 2·head): value first, then advantage.
 ///
-/// A gradient takes three steps, each of which threads can share: TransposeWeights over all tasks;
-/// Forward and BackwardInputs over slices of the batch; BackwardWeights over all tasks. However
-/// they are shared out, the result has the same bits. Backward does all of it.
+/// A gradient takes three steps, each of which threads can share: Prepare over all tasks; Forward
+/// and BackwardInputs over slices of the batch; BackwardWeights over all tasks. However they are
+/// shared out, the result has the same bits. Backward does all of it.
 template <typename T>
 class QNetwork {
  public:
-  explicit QNetwork(QNetworkShape shape);
+  /// With `bfloat16`, which T = float alone can have, products of prepared weights round their
+  /// operands (nn/bfloat16.h); sums, activations and parameters stay float. Throws BadInput on
+  /// sizes that are none, and if this processor has no such instructions.
+  explicit QNetwork(QNetworkShape shape, bool bfloat16 = false);
 
   const QNetworkShape& shape() const { return shape_; }
   size_t num_parameters() const { return num_parameters_; }
@@ -76,26 +79,38 @@ class QNetwork {
   /// Room for up to `max_batch` rows; those of gradients only if asked for.
   Activations MakeActivations(int max_batch, bool gradients) const;
 
+  /// Weights in other forms, each in the place where the parameters have it.
+  struct Prepared {
+    AlignedVector<T> transposed;                      // (out × in), for the way back
+    AlignedVector<uint32_t> pairs, transposed_pairs;  // bfloat16 pairs of both; else empty
+  };
+  /// Room for them (num_parameters each); for the way back only if asked for.
+  Prepared MakePrepared(bool backward) const;
+
+  /// Parameters, and what was prepared of them: nothing will do to go forward in float.
+  struct Weights {
+    std::span<const T> parameters;
+    const Prepared* prepared = nullptr;
+  };
+
   /// Q-values q (B × A) of observations x (B × D), in the given rows.
-  void Forward(std::span<const T> parameters, Matrix<const T> x, RowRange rows, Activations& a,
+  void Forward(Weights weights, Matrix<const T> x, RowRange rows, Activations& a,
                Matrix<T> q) const;
 
   /// Something to be largest where Q is largest, with less work: of a dueling network the
   /// advantages, without the value stream.
-  void ForwardPreferences(std::span<const T> parameters, Matrix<const T> x, RowRange rows,
-                          Activations& a, Matrix<T> preferences) const;
+  void ForwardPreferences(Weights weights, Matrix<const T> x, RowRange rows, Activations& a,
+                          Matrix<T> preferences) const;
 
-  /// The tasks of TransposeWeights and BackwardWeights: 0 … num_tasks() - 1.
+  /// The tasks of Prepare and BackwardWeights: 0 … num_tasks() - 1.
   int num_tasks() const { return static_cast<int>(tasks_.size()); }
 
-  /// Writes the task's share of `transposed` (num_parameters): each weight as (out × in), in the
-  /// place where `parameters` have it; nothing where there is no weight.
-  void TransposeWeights(int task, std::span<const T> parameters, std::span<T> transposed) const;
+  /// Writes the task's share of `prepared`, of what it has room for.
+  void Prepare(int task, std::span<const T> parameters, Prepared& prepared) const;
 
   /// Gradients of sum(dq · q) with respect to all activations in the given rows of the last
   /// Forward.
-  void BackwardInputs(std::span<const T> parameters, std::span<const T> transposed,
-                      Matrix<const T> dq, RowRange rows, Activations& a) const;
+  void BackwardInputs(Weights weights, Matrix<const T> dq, RowRange rows, Activations& a) const;
 
   /// Writes the task's share of `gradient` (num_parameters) with respect to the parameters, summed
   /// over all rows of x. Returns the sum of its squares.
@@ -125,16 +140,18 @@ class QNetwork {
   const Layer& output() const { return layers_.back(); }
 
   Matrix<const T> Weight(std::span<const T> parameters, const Layer& layer) const;
-  Matrix<const T> Transposed(std::span<const T> transposed, const Layer& layer) const;
   std::span<const T> Vector(std::span<const T> parameters, size_t block) const;
-  Matrix<const T> ForwardFeatures(std::span<const T> parameters, Matrix<const T> x, RowRange rows,
+  void Apply(Weights weights, const Layer& layer, Matrix<const T> x, bool relu, Matrix<T> y) const;
+  void ApplyBackward(Weights weights, const Layer& layer, Matrix<const T> dy, Matrix<const T> relu,
+                     Matrix<T> dx) const;
+  Matrix<const T> ForwardFeatures(Weights weights, Matrix<const T> x, RowRange rows,
                                   Activations& a) const;
-  void BackwardStreams(std::span<const T> transposed, Matrix<const T> dq, RowRange rows,
-                       Activations& a) const;
+  void BackwardStreams(Weights weights, Matrix<const T> dq, RowRange rows, Activations& a) const;
   Matrix<const T> LayerInput(size_t layer, Matrix<const T> x, const Activations& a) const;
   Matrix<const T> LayerGradient(size_t layer, int batch, const Activations& a) const;
 
   QNetworkShape shape_;
+  bool bfloat16_;
   size_t num_parameters_ = 0;
   std::vector<ParameterBlock> blocks_;
   std::vector<Layer> layers_;

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "core/error.h"
+#include "nn/bfloat16.h"
 
 namespace upswing {
 namespace {
@@ -44,7 +45,7 @@ struct Objective {
   }
 
   double Value() {
-    network.Forward(parameters, Matrix<const double>(x.data(), B, network.shape().inputs), {0, B},
+    network.Forward({parameters}, Matrix<const double>(x.data(), B, network.shape().inputs), {0, B},
                     activations, Matrix<double>(q, B, network.shape().actions));
     return std::inner_product(q.begin(), q.end(), dq.begin(), 0.0);
   }
@@ -92,7 +93,7 @@ TEST_P(QNetworkTest, FloatAgreesWithDoubleAndRowsWithTheirBatch) {
   AlignedVector<float> q(static_cast<size_t>(network.shape().actions));
   const Matrix<const float> rows(x.data(), 5, network.shape().inputs);
   for (int i = 0; i < 5; ++i) {
-    network.Forward(parameters, rows.Rows(i, 1), {0, 1}, activations,
+    network.Forward({parameters}, rows.Rows(i, 1), {0, 1}, activations,
                     Matrix<float>(q, 1, network.shape().actions));
     for (size_t a = 0; a < q.size(); ++a) {
       EXPECT_NEAR(q[a], f.q[static_cast<size_t>(i) * q.size() + a], 1e-4);
@@ -106,13 +107,14 @@ TEST_P(QNetworkTest, SlicesOfTheBatchGiveTheSameBits) {
   const AlignedVector<double> q = f.q;
   const Matrix<const double> x(f.x.data(), 7, f.network.shape().inputs);
   const Matrix<const double> dq(f.dq.data(), 7, f.network.shape().actions);
-  AlignedVector<double> transposed(whole.size()), gradient(whole.size());
+  auto prepared = f.network.MakePrepared(true);
+  AlignedVector<double> gradient(whole.size());
   for (int task = f.network.num_tasks() - 1; task >= 0; --task) {
-    f.network.TransposeWeights(task, f.parameters, transposed);
+    f.network.Prepare(task, f.parameters, prepared);
   }
   for (const RowRange rows : {RowRange{3, 4}, RowRange{0, 1}, RowRange{1, 2}}) {
-    f.network.Forward(f.parameters, x, rows, f.activations, Matrix<double>(f.q, 7, dq.cols()));
-    f.network.BackwardInputs(f.parameters, transposed, dq, rows, f.activations);
+    f.network.Forward({f.parameters}, x, rows, f.activations, Matrix<double>(f.q, 7, dq.cols()));
+    f.network.BackwardInputs({f.parameters, &prepared}, dq, rows, f.activations);
   }
   double squares = 0;
   for (int task = f.network.num_tasks() - 1; task >= 0; --task) {
@@ -130,7 +132,7 @@ TEST_P(QNetworkTest, PreferencesDifferFromQValuesByAConstantOfTheRow) {
   AlignedVector<double> preferences(f.q.size());
   const Matrix<const double> x(f.x.data(), 5, f.network.shape().inputs);
   const auto A = static_cast<size_t>(f.network.shape().actions);
-  f.network.ForwardPreferences(f.parameters, x, {0, 5}, f.activations,
+  f.network.ForwardPreferences({f.parameters}, x, {0, 5}, f.activations,
                                Matrix<double>(preferences, 5, static_cast<int>(A)));
   for (size_t i = 0; i < f.q.size(); ++i) {
     const size_t first = i / A * A;
@@ -147,6 +149,56 @@ INSTANTIATE_TEST_SUITE_P(
                       NetworkCase{"one_layer", {3, 2, {5}, 4, true, true}},
                       NetworkCase{"three_layers", {3, 2, {5, 17, 6}, 9, true, true}}),
     [](const auto& info) { return info.param.name; });
+
+TEST(QNetwork, Bfloat16FollowsFloatAndSlicesGiveTheSameBits) {
+  if (Bfloat16Paths().empty()) GTEST_SKIP() << "no bfloat16 instructions on this processor";
+  // 130 rows, 100 units: whole tiles and margins. The last slice has an odd number of rows.
+  const QNetworkShape shape{8, 9, {100, 96}, 40, true, true};
+  constexpr int B = 129;
+  const QNetwork<float> network(shape, true);
+  AlignedVector<float> parameters(network.num_parameters()), x(B * 8), dq(B * 9), q(B * 9);
+  Rng rng(3, "bfloat16");
+  network.Initialize(rng, parameters);
+  for (float& value : x) value = static_cast<float>(rng.Normal());
+  for (float& value : dq) value = static_cast<float>(rng.Normal());
+  const Matrix<const float> X(x.data(), B, 8), DQ(dq.data(), B, 9);
+  auto activations = network.MakeActivations(B, true);
+  auto prepared = network.MakePrepared(true);
+  for (int task = 0; task < network.num_tasks(); ++task) {
+    network.Prepare(task, parameters, prepared);
+  }
+  const auto gradient_by = [&](const std::vector<RowRange>& slices) {
+    AlignedVector<float> gradient(parameters.size());
+    for (const RowRange rows : slices) {
+      network.Forward({parameters, &prepared}, X, rows, activations, Matrix<float>(q, B, 9));
+      network.BackwardInputs({parameters, &prepared}, DQ, rows, activations);
+    }
+    for (int task = 0; task < network.num_tasks(); ++task) {
+      network.BackwardWeights(task, X, activations, gradient);
+    }
+    return gradient;
+  };
+  const auto gradient = gradient_by({{0, 64}, {64, 65}});
+  const AlignedVector<float> q_bfloat16 = q;
+  EXPECT_EQ(gradient_by({{64, 65}, {0, 64}}), gradient);
+
+  // A bfloat16 has 8 bits: relative 2^-9 each. What is nearly 0 may pass a ReLU or not.
+  const QNetwork<float> exact(shape);
+  AlignedVector<float> exact_gradient(parameters.size());
+  exact.Forward({parameters}, X, {0, B}, activations, Matrix<float>(q, B, 9));
+  exact.Backward(parameters, X, activations, DQ, exact_gradient);
+  const auto distance = [](const AlignedVector<float>& a, const AlignedVector<float>& b) {
+    double error = 0, norm = 0;
+    for (size_t i = 0; i < a.size(); ++i) {
+      error += std::pow(a[i] - b[i], 2);
+      norm += std::pow(b[i], 2);
+    }
+    return std::sqrt(error / norm);
+  };
+  EXPECT_LT(distance(q_bfloat16, q), 0.02);
+  EXPECT_LT(distance(gradient, exact_gradient), 0.1);
+  EXPECT_GT(distance(gradient, exact_gradient), 1e-5);  // it is rounded
+}
 
 TEST(QNetwork, ThePostsNetworksHaveTheirParameterCounts) {
   EXPECT_EQ(QNetwork<float>({8, 9, {256, 256}, 0, false, false}).num_parameters(),
@@ -170,7 +222,7 @@ TEST(QNetwork, DuelingIsTheValuePlusAdvantagesAboutTheirMean) {
   auto activations = network.MakeActivations(1, false);
   const AlignedVector<double> x{0.5, -0.5};
   AlignedVector<double> q(3);
-  network.Forward(parameters, Matrix<const double>(x.data(), 1, 2), {0, 1}, activations,
+  network.Forward({parameters}, Matrix<const double>(x.data(), 1, 2), {0, 1}, activations,
                   Matrix<double>(q, 1, 3));
   EXPECT_EQ(q, (AlignedVector<double>{1, 2, 6}));  // mean(Q) = 3 = V
   EXPECT_DOUBLE_EQ((q[0] + q[1] + q[2]) / 3, 3);

@@ -31,6 +31,9 @@ void DqnConfig::Describe(Options& o) {
   o.Add(&head, "head", 128, {1, 4096}, "", "width of each dueling stream's hidden layer");
   o.Add(&layer_norm, "layer_norm", true, "layer normalisation after each feature layer");
 
+  o.AddChoice(&precision, "precision", {"float32", "bfloat16"},
+              "of the products while learning; bfloat16 needs AVX512_BF16 or AMX");
+
   o.Section("agent");
   o.Add(&double_q, "double", true, "Double DQN: choose online, evaluate with the target");
   o.Add(&dueling, "dueling", true, "Dueling: Q = V + A - mean(A)");
@@ -87,7 +90,7 @@ Dqn::Dqn(const DqnConfig& config, int num_envs, int obs_size, std::vector<double
       pool_(pool),
       explore_rng_(seed, "exploration"),
       sample_rng_(seed, "replay sampling"),
-      network_(ShapeOf(config, obs_size, torques_.size())),
+      network_(ShapeOf(config, obs_size, torques_.size()), config.precision == "bfloat16"),
       theta_(network_.num_parameters()),
       adam_(network_.num_parameters()),
       activations_(network_.MakeActivations(static_cast<int>(config.batch), true)),
@@ -97,7 +100,8 @@ Dqn::Dqn(const DqnConfig& config, int num_envs, int obs_size, std::vector<double
       dq_(q_.size()),
       y_(static_cast<size_t>(config.batch)),
       q_taken_(y_.size()),
-      transposed_(network_.num_parameters()),
+      prepared_(network_.MakePrepared(true)),
+      prepared_target_(network_.MakePrepared(false)),
       gradient_(network_.num_parameters()),
       squares_(static_cast<size_t>(network_.num_tasks())),
       replay_(config.replay, obs_size),
@@ -126,7 +130,7 @@ double Dqn::learning_rate() const {
 
 void Dqn::Act(Matrix<const float> obs, std::span<double> torque) {
   const Matrix<float> q(act_q_, obs.rows(), static_cast<int>(torques_.size()));
-  network_.ForwardPreferences(theta_, obs, {0, obs.rows()}, act_activations_, q);
+  network_.ForwardPreferences({theta_}, obs, {0, obs.rows()}, act_activations_, q);
   std::ranges::copy(obs.values(), act_obs_.begin());
 
   // ε-greedy.
@@ -173,8 +177,10 @@ void Dqn::Update(const Minibatch& batch) {
   const int B = static_cast<int>(config_.batch);
   const int slice_rows = SliceRows(B);
   const int slices = (B + slice_rows - 1) / slice_rows;
-  pool_.ParallelFor(network_.num_tasks(),
-                    [&](int task) { network_.TransposeWeights(task, theta_, transposed_); });
+  pool_.ParallelFor(network_.num_tasks(), [&](int task) {
+    network_.Prepare(task, theta_, prepared_);
+    network_.Prepare(task, theta_target_, prepared_target_);
+  });
   pool_.ParallelFor(slices, [&](int slice) {
     const int first = slice * slice_rows;
     BackwardRows(batch, {first, std::min(slice_rows, B - first)});
@@ -201,6 +207,8 @@ void Dqn::BackwardRows(const Minibatch& batch, RowRange rows) {
   const int B = static_cast<int>(config_.batch);
   const int actions = static_cast<int>(torques_.size());
   const int obs_size = static_cast<int>(obs_size_);
+  const QNetwork<float>::Weights online{theta_, &prepared_};
+  const QNetwork<float>::Weights target{theta_target_, &prepared_target_};
   // s, s' (B × D); all Q-values (B × A)
   const Matrix<const float> s(batch.obs.data(), B, obs_size);
   const Matrix<const float> s_next(batch.next_obs.data(), B, obs_size);
@@ -214,14 +222,14 @@ void Dqn::BackwardRows(const Minibatch& batch, RowRange rows) {
   };
 
   // y = r + γⁿ Q(s', a*; θ⁻)
-  network_.Forward(theta_target_, s_next, rows, activations_, q_target);
-  if (config_.double_q) network_.Forward(theta_, s_next, rows, activations_, q_select);
+  network_.Forward(target, s_next, rows, activations_, q_target);
+  if (config_.double_q) network_.Forward(online, s_next, rows, activations_, q_select);
   TdTargets(q_select.Rows(rows.first, rows.count), q_target.Rows(rows.first, rows.count),
             part(batch.reward), part(batch.discount),
             std::span(y_).subspan(static_cast<size_t>(rows.first)));
 
   // dL/dQ(s, a) = clip(Q(s, a; θ) - y, ±1) / B, and 0 for all other actions
-  network_.Forward(theta_, s, rows, activations_, q);
+  network_.Forward(online, s, rows, activations_, q);
   std::ranges::fill(dq.Rows(rows.first, rows.count).values(), 0.0F);
   for (int i = rows.first; i < rows.first + rows.count; ++i) {
     const auto row = static_cast<size_t>(i);
@@ -229,7 +237,7 @@ void Dqn::BackwardRows(const Minibatch& batch, RowRange rows) {
     q_taken_[row] = q(i, a);
     dq(i, a) = HuberGradient(q(i, a) - y_[row]) / static_cast<float>(B);
   }
-  network_.BackwardInputs(theta_, transposed_, dq, rows, activations_);
+  network_.BackwardInputs(online, dq, rows, activations_);
 }
 
 void Dqn::CountErrors() {

@@ -24,6 +24,7 @@ struct DqnConfig {
   std::vector<int64_t> hidden;
   int64_t head;
   bool layer_norm, double_q, dueling;
+  std::string precision;
   double gamma;
   int64_t n_step;
   double reward_scale;
@@ -98,8 +99,9 @@ class Dqn : public Agent {
   QNetwork<float>::Activations activations_;
   AlignedVector<float> q_, q_select_, q_target_, dq_;  // (B × A)
   AlignedVector<float> y_, q_taken_;                   // (B) targets, Q(s, a)
-  AlignedVector<float> transposed_, gradient_;         // (num_parameters)
-  std::vector<float> squares_;                         // of the gradient, by task
+  QNetwork<float>::Prepared prepared_, prepared_target_;
+  AlignedVector<float> gradient_;  // (num_parameters)
+  std::vector<float> squares_;     // of the gradient, by task
   Replay replay_;
   NStep n_step_;
   Minibatch batch_;

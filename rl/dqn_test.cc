@@ -79,7 +79,7 @@ double LossByHand(const DqnConfig& config, std::span<const float> online,
   auto activations = network.MakeActivations(1, false);
   const auto q = [&](std::span<const float> parameters, const float& x) {
     std::vector<float> values(3);
-    network.Forward(parameters, Matrix<const float>(&x, 1, 1), {0, 1}, activations,
+    network.Forward({parameters}, Matrix<const float>(&x, 1, 1), {0, 1}, activations,
                     Matrix<float>(values.data(), 1, 3));
     return values;
   };

@@ -37,6 +37,8 @@ constexpr int kLinkBodies[2] = {1, 2};  // body 0 is the world
 
 }  // namespace
 
+std::string MuJoCoVersion() { return mj_versionString(); }
+
 ModelPtr CompileModel(const std::string& mjcf, const std::string& where) {
   TakeOverMessages();
   std::array<char, 1000> message{};

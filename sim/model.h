@@ -21,6 +21,9 @@ using ModelPtr = std::unique_ptr<mjModel, MuJoCoDeleter>;
 using DataPtr = std::unique_ptr<mjData, MuJoCoDeleter>;
 using BatchPtr = std::unique_ptr<mjBatch, MuJoCoDeleter>;
 
+/// Such as "4.0.0".
+std::string MuJoCoVersion();
+
 /// Compiles MJCF. Throws BadInput with MuJoCo's own message, after `where` (a file's name).
 ModelPtr CompileModel(const std::string& mjcf, const std::string& where);
 

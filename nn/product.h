@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstddef>
+
+#include "core/matrix.h"
+
+namespace upswing {
+
+/// C (M × N) = A (M × K) · B (K × N) + bias, where A(m, k) = a[m · a_m + k · a_k]: the one product
+/// that all three of a linear layer are. An operand is a number or, with numbers in bfloat16, a
+/// pair of them that lie one after the other along K.
+template <typename Operand, typename T = Operand>
+struct Product {
+  int M, N, K;
+  const Operand* a;
+  ptrdiff_t a_m, a_k;
+  Matrix<const Operand> b;  // (K × N)
+  Matrix<T> c;              // (M × N)
+  const T* bias;            // (N), or null for none
+  bool relu;                // C = max(C, 0)
+  Matrix<const T> gate;     // C = 0 where gate (M × N) is not positive; empty for none
+
+  /// The part of it that computes `rows` rows from m on and `cols` columns from n on.
+  Product Part(int m, int rows, int n, int cols) const {
+    return {rows,
+            cols,
+            K,
+            a + m * a_m,
+            a_m,
+            a_k,
+            b.Cols(n, cols),
+            c.Rows(m, rows).Cols(n, cols),
+            bias == nullptr ? nullptr : bias + n,
+            relu,
+            gate.empty() ? gate : gate.Rows(m, rows).Cols(n, cols)};
+  }
+};
+
+}  // namespace upswing
