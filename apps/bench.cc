@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cmath>
 #include <csignal>
+#include <exception>
 #include <filesystem>
 #include <memory>
 
@@ -77,24 +78,30 @@ class BenchRunner {
     }
     benchmark::RunSpecifiedBenchmarks(&reporter_);
     benchmark::ClearRegisteredBenchmarks();
+    if (error_) std::rethrow_exception(error_);
   }
 
   const BenchReporter& reporter() const { return reporter_; }
 
  private:
   void Measure(const BenchCase& c, benchmark::State& state) {
-    if (g_stop_signal != 0) return Stop(state);
+    if (g_stop_signal != 0 || error_) return Stop(state);
     reporter_.ShowProgress(c);
-    if (prepared_ != &c) {
-      work_ = nullptr;  // first free what it holds
-      work_ = c.prepare();
-      prepared_ = &c;
-    }
-    for ([[maybe_unused]] auto iteration : state) {
-      work_();
-      if (g_stop_signal == 0) continue;
-      Stop(state);
-      break;
+    try {
+      if (prepared_ != &c) {
+        work_ = nullptr;  // first free what it holds
+        work_ = c.prepare();
+        prepared_ = &c;
+      }
+      for ([[maybe_unused]] auto iteration : state) {
+        work_();
+        if (g_stop_signal == 0) continue;
+        Stop(state);
+        break;
+      }
+    } catch (...) {  // Google Benchmark shall see no exception
+      error_ = std::current_exception();
+      return Stop(state);
     }
     Count(c, state);
   }
@@ -122,6 +129,7 @@ class BenchRunner {
   BenchReporter reporter_;
   const BenchCase* prepared_ = nullptr;  // the case that work_ is of
   BenchWork work_;
+  std::exception_ptr error_;
 };
 
 /// Throws BadInput on what the command line's own checks cannot see.
@@ -136,9 +144,10 @@ void CheckOptions(const BenchOptions& options) {
   if (std::isnan(options.seconds)) throw BadInput("--seconds: expected a number, got \"nan\"");
   const bool gradient =
       options.parts.empty() || std::ranges::find(options.parts, "gradient") != options.parts.end();
-  const bool restricted = !options.network.empty() || !options.hidden.empty() || options.batch > 0;
+  const bool restricted = !options.network.empty() || !options.hidden.empty() ||
+                          !options.precision.empty() || options.batch > 0;
   if (restricted && !gradient) {
-    throw BadInput("bench: --network, --hidden and --batch are for the part gradient");
+    throw BadInput("bench: --network, --hidden, --batch and --precision are for the part gradient");
   }
   if (!options.json) return;
   const fs::path folder = fs::absolute(*options.json).parent_path();
@@ -222,6 +231,10 @@ void AddBench(CLI::App& program, Command& command) {
   app->add_option("--batch", o->batch, "gradient: size of the minibatches")
       ->check(CLI::Range(1, 65536).description(""))
       ->type_name("INTEGER");
+  app->add_option("--precision", o->precision,
+                  "gradient: float32 or bfloat16 [float32]; the peak remains that of float32")
+      ->check(CLI::IsMember({"float32", "bfloat16"}).description(""))
+      ->type_name("NAME");
 
   std::string parts = "Parts:\n";
   for (const BenchPart& part : Parts()) parts += fmt::format("  {:<10}{}\n", part.name, part.help);

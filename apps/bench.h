@@ -16,6 +16,7 @@ struct BenchOptions {
   std::vector<int> threads;         // each case that can use threads runs with each of these
   std::string network;              // of gradient: "plain", "dueling" or "" for both
   std::vector<int> hidden;          // of gradient: widths of the feature layers; empty: several
+  std::string precision;            // of gradient, as DqnConfig has it; empty: its default
   int batch = 0;                    // of gradient; 0: several
   std::string simd;                 // vector instructions; empty: the best
   std::optional<std::string> json;  // file to write

@@ -79,8 +79,9 @@ double UpdateFlops(const DqnConfig& config) {
 BenchCase GradientCase(const DqnConfig& config, int threads,
                        const std::shared_ptr<Replay>& replay) {
   const std::string name =
-      fmt::format("gradient/{}/{}/batch:{}/threads:{}", config.dueling ? "dueling" : "plain",
-                  fmt::join(config.hidden, "-"), config.batch, threads);
+      fmt::format("gradient/{}{}/{}/batch:{}/threads:{}", config.dueling ? "dueling" : "plain",
+                  config.precision == "bfloat16" ? "-bfloat16" : "", fmt::join(config.hidden, "-"),
+                  config.batch, threads);
   return {name, "updates", 1, UpdateFlops(config), 0, threads, [=]() -> BenchWork {
             struct Parts {
               ThreadPool pool;
@@ -183,7 +184,9 @@ BenchCases GradientCases(const BenchOptions& options) {
     for (const std::vector<int>& hidden : networks) {
       for (const int batch : batches) {
         for (const int threads : options.threads) {
-          cases.push_back(GradientCase(BareConfig(dueling, hidden, batch), threads, replay));
+          DqnConfig config = BareConfig(dueling, hidden, batch);
+          if (!options.precision.empty()) config.precision = options.precision;
+          cases.push_back(GradientCase(config, threads, replay));
         }
       }
     }

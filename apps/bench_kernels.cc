@@ -142,12 +142,12 @@ BenchCases KernelCases(const BenchOptions& /*options*/) {
 }
 
 double MeasurePeakGflops(int threads) {
-  constexpr int kTries = 20;
-  constexpr int64_t kRounds = 1 << 19;  // a few milliseconds
+  constexpr std::chrono::milliseconds kDuration(300);  // time enough to be alone on all processors
+  constexpr int64_t kRounds = 1 << 19;                 // a few milliseconds
   using Clock = std::chrono::steady_clock;
   ThreadPool pool(threads);
   double best = 0;
-  for (int i = 0; i < kTries; ++i) {
+  for (const auto end = Clock::now() + kDuration; Clock::now() < end;) {
     std::atomic<int> arrived{0};
     std::atomic<int64_t> multiply_adds{0};
     std::vector<Clock::time_point> began(static_cast<size_t>(threads));
