@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/text.h"
+#include "sim/model.h"
 
 namespace upswing {
 namespace {
@@ -109,6 +110,8 @@ void Config::Describe(Options& o) {
         "share of the episodes that begin anywhere instead of hanging");
   o.Add(&random_start_velocity, "random_start_velocity", 5, {0, 50}, "rad/s",
         "largest velocity of those");
+  o.Add(&physics, "physics", "mujoco",
+        "engine to train in: mujoco, or closed-form, its faster twin; evaluations use mujoco");
   o.Section("plant");
   o.Add(&model, "model", "", "MJCF file to use instead of the built-in model");
   plant.Describe(o);
@@ -118,6 +121,7 @@ void Config::Describe(Options& o) {
 
 PendulumEnvConfig Config::Environments() const {
   PendulumEnvConfig env;
+  env.physics = ParsePhysics(physics, "--physics");
   env.plants = {plant};
   env.num_envs = static_cast<int>(train.envs);
   env.episode_seconds = episode_seconds;
@@ -160,6 +164,9 @@ Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
     model_path = (file.parent_path() / model.value).string();  // counts from its file
   }
   if (!model_path.empty()) config.plant = ChangedPlant(config.plant, model_path, {}, config.mjcf);
+
+  const EarlySetting engine = FindEarly("task", "physics", table, where, flags);
+  if (!engine.where.empty()) ParsePhysics(engine.value, engine.where);
 
   EarlySetting agent_setting = FindEarly("train", "agent", table, where, flags);
   if (agent_setting.where.empty()) agent_setting.value = config.agent;

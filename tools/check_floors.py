@@ -25,7 +25,7 @@ FLOORS = {
 # One door per foreign library: the files that may include it.
 DOORS = {
     "mujoco": re.compile(r"sim/"),
-    "hwy": re.compile(r"(core/simd|nn/linear|sim/closed_form)\.(h|cc)$"),
+    "hwy": re.compile(r"(core/simd|nn/linear|sim/closed_form|sim/sine_cosine-inl)\.(h|cc)$"),
     "Eigen": re.compile(r"nn/(linear\.(h|cc)|[^/]*_test\.cc)$"),
 }
 
