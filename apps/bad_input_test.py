@@ -74,6 +74,16 @@ class CommandLineTest(ProgramTest):
             with self.subTest(flag=flag, value=value):
                 self.refuse([*TRAIN, flag, value], flag, allowed, f'got "{value}"')
 
+    def test_physics(self):
+        for engine in ("mujco", "", "MuJoCo"):
+            with self.subTest(engine=engine):
+                words = ["--physics", "expected one of mujoco, closed-form", f'got "{engine}"']
+                self.refuse([*TRAIN, "--physics", engine], *words)
+                self.refuse(["eval", "run", "--physics", engine], *words)
+        self.write("m.xml", MODEL)
+        self.refuse([*TRAIN, "--physics", "closed-form", "--model", "m.xml"],
+                    "physics closed-form: expected the built-in model")
+
     def test_no_layers(self):
         self.refuse([*TRAIN, "--hidden", "[]"], "expected", "--hidden")
 
@@ -149,6 +159,10 @@ class TomlTest(ProgramTest):
         self.refuse_toml("[agent]\ngamma = 0.9\ntau = 2\n", "s.toml:3:", "tau", "[0, 1]", "2")
         self.refuse_toml("[plant]\nmass = -1\n", "s.toml:2:", "mass", "[0.01, 100]", "-1")
         self.refuse_toml("[network]\nhidden = [64, 0]\n", "s.toml:2:", "hidden", "[1, 4096]")
+
+    def test_physics(self):
+        self.refuse_toml('[task]\n\nphysics = "bullet"\n', "s.toml:3:", "physics",
+                         "expected one of mujoco, closed-form", 'got "bullet"')
 
     def test_syntax_error(self):
         for text in ("[agent]\ngamma = = 3\n", "[agent]\ngamma\n", "[agent]\ngamma = 0.9 tau = 1\n",

@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/text.h"
+#include "sim/model.h"
 
 namespace upswing {
 namespace {
@@ -109,6 +110,9 @@ void Config::Describe(Options& o) {
         "share of the episodes that begin anywhere instead of hanging");
   o.Add(&random_start_velocity, "random_start_velocity", 5, {0, 50}, "rad/s",
         "largest velocity of those");
+  o.AddChoice(
+      &physics, "physics", {"mujoco", "closed-form"},
+      "engine to train in: mujoco, or closed-form, its faster twin; evaluations use mujoco");
   o.Section("plant");
   o.Add(&model, "model", "", "MJCF file to use instead of the built-in model");
   plant.Describe(o);
@@ -118,6 +122,7 @@ void Config::Describe(Options& o) {
 
 PendulumEnvConfig Config::Environments() const {
   PendulumEnvConfig env;
+  env.physics = ParsePhysics(physics, "--physics");
   env.plants = {plant};
   env.num_envs = static_cast<int>(train.envs);
   env.episode_seconds = episode_seconds;

@@ -15,7 +15,7 @@ namespace upswing {
 namespace {
 
 struct EvalArguments {
-  std::string policy, model;
+  std::string policy, model, physics = "mujoco";
   std::vector<std::string> set;
   int episodes = 100, threads = 0;
   int64_t seed = 0;
@@ -52,6 +52,7 @@ void PrintJson(const Evaluation& e, const LoadedPolicy& loaded, const EvalArgume
   ordered_json j;
   j["policy"] = loaded.path.string();
   j["seed"] = arguments.seed;
+  j["physics"] = arguments.physics;
   for (const auto& [name, value] : PlantValues(plant)) j["plant"][name] = value;
   j["episodes"] = e.episodes;
   j["successes"] = e.successes;
@@ -77,8 +78,9 @@ void PrintJson(const Evaluation& e, const LoadedPolicy& loaded, const EvalArgume
 }
 
 int RunEval(const EvalArguments& arguments) {
-  LoadedPolicy loaded = LoadPolicy(arguments.policy);
   PendulumEnvConfig config;
+  config.physics = ParsePhysics(arguments.physics, "--physics");
+  const LoadedPolicy loaded = LoadPolicy(arguments.policy);
   config.mjcf = loaded.mjcf;
   const Plant plant = ChangedPlant(loaded.plant, arguments.model, arguments.set, config.mjcf);
   config.plants = {plant};
@@ -126,6 +128,9 @@ void AddEval(CLI::App& program, Command& command) {
       ->check(CLI::Range(int64_t{0}, int64_t{9000000000000000}).description(""))
       ->type_name("INTEGER");
   AddPlantOptions(*app, a->set, a->model);
+  app->add_option("--physics", a->physics,
+                  "engine: mujoco, or closed-form, its faster twin [mujoco]")
+      ->type_name("TEXT");
   app->add_option("--threads", a->threads, "0: one for each processor")
       ->check(CLI::Range(0, 256).description(""))
       ->type_name("INTEGER");

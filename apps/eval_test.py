@@ -40,7 +40,7 @@ class EvalTest(ProgramTest):
 
     def test_json_has_all_fields(self):
         result = self.evaluate()
-        self.assertEqual(list(result), ["policy", "seed", "plant", "episodes", "successes",
+        self.assertEqual(list(result), ["policy", "seed", "physics", "plant", "episodes", "successes",
                                         "success_rate", "success_interval_95", "swing_up_seconds",
                                         "return", "reward_terms", "energy_used", "peak_torque",
                                         "rms_torque"])
@@ -88,6 +88,14 @@ class EvalTest(ProgramTest):
         changed = self.evaluate("--set", "mass2=1.2")
         self.assertEqual(changed["plant"], usual["plant"] | {"mass2": 1.2})
         self.assertNotEqual(changed["return"], usual["return"])
+
+    def test_the_closed_form_judges_as_mujoco_does(self):
+        usual = self.evaluate()
+        twin = self.evaluate("--physics", "closed-form")
+        self.assertEqual((usual["physics"], twin["physics"]), ("mujoco", "closed-form"))
+        self.assertEqual(twin["successes"], usual["successes"])
+        self.assertAlmostEqual(twin["return"]["mean"], usual["return"]["mean"],
+                               delta=1e-3 * abs(usual["return"]["mean"]))
 
     def test_set_of_both(self):
         both = self.evaluate("--set", "mass=2")

@@ -125,6 +125,13 @@ class ResumeTest(ProgramTest):
         self.assert_same_run("run", "at-once")
         self.assertIn("steps = 8000", (self.folder / "run/config.toml").read_text())
 
+    def test_more_steps_in_closed_form_equal_a_run_of_that_many(self):
+        self.succeed(*small(steps=4000, physics="closed-form"))
+        self.succeed("train", "--resume", "run", "--steps", 8000)
+        self.succeed(*small(steps=8000, physics="closed-form", out="at-once"))
+        self.assert_same_run("run", "at-once")
+        self.assertIn('physics = "closed-form"', (self.folder / "run/config.toml").read_text())
+
     def test_another_number_of_threads_may_resume(self):
         self.succeed(*small(steps=4000, threads=1))
         self.succeed("train", "--resume", "run", "--steps", 8000, "--threads", 2)

@@ -195,7 +195,8 @@ TensorFile TensorFile::Load(const std::filesystem::path& path) {
 
   // The tensors, which must cover the data without gap or overlap.
   try {
-    const json header = json::parse(text);
+    // Without the parser's own message, which would quote bytes that need not be text.
+    const json header = json::parse(text, nullptr, false);
     if (!header.is_object()) throw std::runtime_error("its header is no JSON object");
     std::vector<std::span<const std::byte>> covered;
     for (const auto& [name, entry] : header.items()) {

@@ -120,6 +120,7 @@ TEST_F(TensorFileTest, EveryFlippedBitIsFound) {
 TEST_F(TensorFileTest, HostileHeadersAreRefused) {
   EXPECT_NE(HeaderError("{", 0), "");
   EXPECT_NE(HeaderError("[]", 0), "");
+  EXPECT_EQ(HeaderError("{}\xff\n", 0).find_first_of("\xff\n"), std::string::npos);
   EXPECT_NE(HeaderError(R"({"a":{"dtype":"F32","shape":[2],"data_offsets":[0,4]}})", 4), "");
   EXPECT_NE(HeaderError(R"({"a":{"dtype":"F32","shape":[-1],"data_offsets":[0,4]}})", 4), "");
   EXPECT_NE(HeaderError(R"({"a":{"dtype":"F99","shape":[1],"data_offsets":[0,4]}})", 4), "");

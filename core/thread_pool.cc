@@ -51,6 +51,10 @@ void ThreadPool::Stop() {
 }
 
 void ThreadPool::ParallelFor(int n, const std::function<void(int)>& task) {
+  if (workers_.empty() || n <= 1) {  // nobody needs to be woken
+    for (int i = 0; i < n; ++i) task(i);
+    return;
+  }
   task_ = &task;
   n_ = n;
   next_ = 0;

@@ -38,6 +38,16 @@ void RewardWeights::Describe(Options& o) {
   o.Add(&torque, "torque_weight", 1, kWeight, "", "weight of the torque penalty");
 }
 
+CapsuleInertia::CapsuleInertia(double m, double r, double l) {
+  // The mass is shared out by volume between the cylinder and the two half spheres.
+  const double cylinder = std::numbers::pi * r * r * l;
+  const double sphere = 4.0 / 3.0 * std::numbers::pi * r * r * r;
+  const double mc = m * cylinder / (cylinder + sphere);
+  const double ms = m - mc;
+  across = mc * (3 * r * r + l * l) / 12 + ms * (2 * r * r / 5 + l * l / 4 + 3 * l * r / 8);
+  along = mc * r * r / 2 + ms * 2 * r * r / 5;
+}
+
 double Energy(const Plant& plant, const PendulumState& s) {
   const auto& [m1, m2, l1, l2, d1, d2, g, limit] = plant;
   const double I1 = m1 * l1 * l1 / 12;

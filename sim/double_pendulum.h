@@ -14,6 +14,11 @@ namespace upswing {
 /// Time between two actions (s); the physics makes several steps in it.
 inline constexpr double kControlPeriod = 0.02;
 
+/// Of every plant, as Mjcf has them.
+inline constexpr double kPhysicsTimestep = 0.005;  // s
+inline constexpr double kArmature = 0.01;          // of both joints, kg·m²
+inline constexpr double kCapsuleRadius = 0.04;     // of both links, m
+
 /// What can be set at run time. The capsules keep their radius; inertia and centre of mass follow
 /// mass and length.
 struct Plant {
@@ -26,6 +31,14 @@ struct Plant {
   Plant() { SetDefaults(*this); }
   /// One line per setting: name, default, range, unit, help.
   void Describe(Options& options);
+};
+
+/// Principal moments of inertia (kg·m²) of a solid capsule, across and along its axis: mass m (kg),
+/// radius r (m), length l of its cylinder (m).
+struct CapsuleInertia {
+  double across, along;
+
+  CapsuleInertia(double m, double r, double l);
 };
 
 /// State of the two joints.

@@ -3,28 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include "core/error.h"
 #include "core/text.h"
 
 namespace upswing {
 namespace {
-
-/// Principal moments of inertia (kg·m²) of a solid capsule: mass m, radius r, cylinder length l.
-struct CapsuleInertia {
-  double across, along;
-
-  CapsuleInertia(double m, double r, double l) {
-    // The mass is shared out by volume between the cylinder and the two half spheres.
-    const double cylinder = std::numbers::pi * r * r * l;
-    const double sphere = 4.0 / 3.0 * std::numbers::pi * r * r * r;
-    const double mc = m * cylinder / (cylinder + sphere);
-    const double ms = m - mc;
-    across = mc * (3 * r * r + l * l) / 12 + ms * (2 * r * r / 5 + l * l / 4 + 3 * l * r / 8);
-    along = mc * r * r / 2 + ms * 2 * r * r / 5;
-  }
-};
 
 /// MuJoCo would print its warnings and log them to a file in the current folder, and end the
 /// program on an error.

@@ -1,13 +1,15 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "core/rng.h"
 #include "core/vector_env.h"
 #include "sim/double_pendulum.h"
-#include "sim/model.h"
+#include "sim/physics.h"
 
 namespace upswing {
 
@@ -20,23 +22,19 @@ struct StartStates {
 };
 
 /// What a PendulumEnv is made of.
-struct PendulumEnvConfig {
-  std::vector<Plant> plants{Plant()};  // one for all environments, or one for each
-  int num_envs = 1;
+struct PendulumEnvConfig : PhysicsConfig {
   double episode_seconds = 10;
   StartStates start;
-  RewardWeights weights;
   uint64_t seed = 0;
   std::string stream = "environment";  // environment i draws its starts from (seed, stream, i)
-  std::string mjcf;                    // another model than Mjcf(Plant()); built like it
-  int threads = 1;
 };
 
-/// N double pendulums in MuJoCo, on its batch interface. Reaching the time limit truncates; only a
-/// numerical blow-up (MuJoCo's own warning, or numbers that are not finite) terminates.
+/// N double pendulums and their episodes. Reaching the time limit truncates; only a numerical
+/// blow-up (MuJoCo's own warning, or numbers that are not finite) terminates. The starts do not
+/// depend on the physics.
 class PendulumEnv : public VectorEnv {
  public:
-  /// Throws BadInput on a model that does not compile or is no double pendulum.
+  /// Throws BadInput as MakePhysics does.
   explicit PendulumEnv(const PendulumEnvConfig& config);
 
   int num_envs() const override { return config_.num_envs; }
@@ -49,27 +47,28 @@ class PendulumEnv : public VectorEnv {
   void SetStartNoise(double sigma) override { config_.start.noise = sigma; }
   void State(const Archive& archive) override;
 
-  const Plant& plant(int env) const;
-  PendulumState state(int env) const;
+  const Plant& plant(int env) const { return config_.plant(env); }
+  PendulumState state(int env) const { return physics_->state(env); }
   /// Puts an environment into a state, at the beginning of an episode.
   void SetState(int env, const PendulumState& state);
 
  private:
-  void ObserveInto(int env, std::span<float> obs) const;
   void Reset(int env);
-  bool BlewUp(int env) const;
-  mjtNum* Component(mjtNum* first, int env) const { return first + env * state_size_; }
+  /// There is no successor of a state that blew up; the last that had numbers stands in for it.
+  void StandIn(int env, StepResult& result) const;
+
+  /// One environment's observation (D) within a table of them.
+  template <typename Table>
+  static auto Row(Table& table, int env) {
+    return std::span(table).subspan(static_cast<size_t>(env) * kObservationSize, kObservationSize);
+  }
 
   PendulumEnvConfig config_;
-  BatchPtr batch_;
-  int substeps_ = 0;  // physics steps in a control period
-  int64_t episode_steps_ = 0;
-  int state_size_ = 0;                                          // numbers in a state row
-  mjtNum *qpos_ = nullptr, *qvel_ = nullptr, *ctrl_ = nullptr;  // in row 0 of the state table
-  std::vector<Rng> rngs_;                                       // (N)
+  std::unique_ptr<Physics> physics_;
+  int64_t episode_steps_;
+  std::vector<Rng> rngs_;             // (N)
   std::vector<int64_t> step_counts_;  // (N) control steps since the episode began
   std::vector<float> obs_;            // (N, D)
-  std::vector<double> previous_q1_;   // (N) before the step
 };
 
 }  // namespace upswing

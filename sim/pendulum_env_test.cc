@@ -12,15 +12,32 @@
 namespace upswing {
 namespace {
 
-PendulumEnvConfig SmallConfig() {
-  PendulumEnvConfig config;
+/// What holds of the environment whatever its physics.
+class PendulumEnvs : public testing::TestWithParam<PhysicsEngine> {
+ protected:
+  static PendulumEnvConfig Config() {
+    PendulumEnvConfig config;
+    config.physics = GetParam();
+    return config;
+  }
+  static PendulumEnvConfig SmallConfig();
+};
+
+INSTANTIATE_TEST_SUITE_P(Physics, PendulumEnvs,
+                         testing::Values(PhysicsEngine::kMuJoCo, PhysicsEngine::kClosedForm),
+                         [](const auto& info) -> std::string {
+                           return info.param == PhysicsEngine::kMuJoCo ? "MuJoCo" : "ClosedForm";
+                         });
+
+PendulumEnvConfig PendulumEnvs::SmallConfig() {
+  PendulumEnvConfig config = Config();
   config.num_envs = 3;
   config.episode_seconds = 0.1;  // five steps
   config.seed = 4;
   return config;
 }
 
-TEST(PendulumEnv, TruncatesWithTheTrueSuccessorAndThenResets) {
+TEST_P(PendulumEnvs, TruncatesWithTheTrueSuccessorAndThenResets) {
   PendulumEnv env(SmallConfig());
   // Another environment with the same start, which goes on beyond the fifth step.
   PendulumEnvConfig longer = SmallConfig();
@@ -47,7 +64,7 @@ TEST(PendulumEnv, TruncatesWithTheTrueSuccessorAndThenResets) {
   EXPECT_EQ(result.truncated[0], 0);
 }
 
-TEST(PendulumEnv, ABlowUpTerminatesWithFiniteNumbersAndStartsAnew) {
+TEST_P(PendulumEnvs, ABlowUpTerminatesWithFiniteNumbersAndStartsAnew) {
   PendulumEnv env(SmallConfig());
   StepResult result = env.MakeResult();
   env.SetState(1, {0, 0, 1e200, 0});
@@ -61,7 +78,7 @@ TEST(PendulumEnv, ABlowUpTerminatesWithFiniteNumbersAndStartsAnew) {
   EXPECT_EQ(result.terminated[1], 0);
 }
 
-TEST(PendulumEnv, RewardIsTheWeightedSumOfItsTermsAtTheSuccessor) {
+TEST_P(PendulumEnvs, RewardIsTheWeightedSumOfItsTermsAtTheSuccessor) {
   PendulumEnvConfig config = SmallConfig();
   config.weights.weight = {1, 0.5, 2, 3, 0};
   PendulumEnv env(config);
@@ -71,7 +88,7 @@ TEST(PendulumEnv, RewardIsTheWeightedSumOfItsTermsAtTheSuccessor) {
   const auto terms = RewardTerms(env.plant(0), env.state(0), 5);
   double sum = 0;
   for (size_t k = 0; k < kRewardTerms; ++k) {
-    EXPECT_DOUBLE_EQ(result.reward_terms[k], config.weights.weight[k] * terms[k]);
+    EXPECT_NEAR(result.reward_terms[k], config.weights.weight[k] * terms[k], 1e-13);
     sum += result.reward_terms[k];
   }
   EXPECT_DOUBLE_EQ(result.reward[0], sum);
@@ -81,7 +98,7 @@ TEST(PendulumEnv, RewardIsTheWeightedSumOfItsTermsAtTheSuccessor) {
   EXPECT_DOUBLE_EQ(result.work[0], std::abs(5 * (env.state(0).q1 - std::numbers::pi)));
 }
 
-TEST(PendulumEnv, EveryEnvironmentCanHaveItsOwnPlant) {
+TEST_P(PendulumEnvs, EveryEnvironmentCanHaveItsOwnPlant) {
   Plant light, heavy;
   heavy.mass2 = 2;
   heavy.length1 = 0.7;
@@ -112,14 +129,14 @@ TEST(PendulumEnv, EveryEnvironmentCanHaveItsOwnPlant) {
   EXPECT_NE(mixed.state(0).q1, mixed.state(1).q1);
 }
 
-TEST(PendulumEnv, TheNumberOfThreadsChangesNoBit) {
+TEST_P(PendulumEnvs, TheNumberOfThreadsChangesNoBit) {
   PendulumEnvConfig config = SmallConfig();
-  config.num_envs = 17;
+  config.num_envs = 170;
   PendulumEnv one(config);
   config.threads = 3;
   PendulumEnv three(config);
   StepResult a = one.MakeResult(), b = three.MakeResult();
-  std::vector<double> torque(17);
+  std::vector<double> torque(170);
   for (int step = 0; step < 50; ++step) {
     for (size_t i = 0; i < torque.size(); ++i) torque[i] = std::sin(step + static_cast<double>(i));
     one.Step(torque, a);
@@ -129,7 +146,7 @@ TEST(PendulumEnv, TheNumberOfThreadsChangesNoBit) {
   }
 }
 
-TEST(PendulumEnv, LoadedStateGoesOnToTheBit) {
+TEST_P(PendulumEnvs, LoadedStateGoesOnToTheBit) {
   PendulumEnv saved(SmallConfig());
   StepResult a = saved.MakeResult(), b = saved.MakeResult();
   const std::vector<double> torque{1, 2, 3};
@@ -146,8 +163,8 @@ TEST(PendulumEnv, LoadedStateGoesOnToTheBit) {
   }
 }
 
-TEST(PendulumEnv, StartsAreHangingWithNoiseOrAnywhere) {
-  PendulumEnvConfig config;
+TEST_P(PendulumEnvs, StartsAreHangingWithNoiseOrAnywhere) {
+  PendulumEnvConfig config = Config();
   config.num_envs = 4000;
   config.start = {0.1, 0.25, 5};
   const PendulumEnv env(config);
@@ -165,7 +182,7 @@ TEST(PendulumEnv, StartsAreHangingWithNoiseOrAnywhere) {
   EXPECT_NEAR(std::sqrt(square / (config.num_envs - anywhere)), 0.1, 0.01);
 }
 
-TEST(PendulumEnv, TheCurriculumsNoiseHoldsFromTheNextStartOn) {
+TEST_P(PendulumEnvs, TheCurriculumsNoiseHoldsFromTheNextStartOn) {
   PendulumEnvConfig config = SmallConfig();
   config.num_envs = 500;
   PendulumEnv env(config);
@@ -173,6 +190,51 @@ TEST(PendulumEnv, TheCurriculumsNoiseHoldsFromTheNextStartOn) {
   StepResult result = env.MakeResult();
   for (int step = 0; step < 5; ++step) env.Step(std::vector<double>(500), result);
   for (int i = 0; i < 500; ++i) ASSERT_EQ(env.state(i).q1, 0);
+}
+
+TEST(PendulumEnv, BothPhysicsGoTheSameWayFromTheSameStarts) {
+  constexpr int kEnvs = 37;
+  PendulumEnvConfig config;
+  config.num_envs = kEnvs;
+  config.episode_seconds = 1;
+  config.start.random_share = 0.5;
+  Rng rng(1, "plants");
+  config.plants.resize(kEnvs);
+  for (Plant& plant : config.plants) {
+    plant.mass2 = rng.Uniform(0.5, 2);
+    plant.length1 = rng.Uniform(0.3, 1);
+    plant.gravity = rng.Uniform(5, 15);
+  }
+  PendulumEnv mujoco(config);
+  config.physics = PhysicsEngine::kClosedForm;
+  PendulumEnv twin(config);
+  StepResult a = mujoco.MakeResult(), b = twin.MakeResult();
+  std::vector<double> torque(kEnvs);
+  for (int step = 0; step < 130; ++step) {  // over two resets
+    for (double& x : torque) x = rng.Uniform(-6, 6);
+    mujoco.Step(torque, a);
+    twin.Step(torque, b);
+    ASSERT_EQ(a.truncated, b.truncated);
+    ASSERT_EQ(a.terminated, b.terminated);
+    ASSERT_EQ(a.torque, b.torque);
+    ASSERT_EQ(a.at_goal, b.at_goal);
+    for (size_t i = 0; i < kEnvs; ++i) {
+      ASSERT_NEAR(a.reward[i], b.reward[i], 1e-9);
+      ASSERT_NEAR(a.work[i], b.work[i], 1e-9);
+      ASSERT_NEAR(mujoco.state(static_cast<int>(i)).q2, twin.state(static_cast<int>(i)).q2, 1e-9);
+    }
+    for (size_t i = 0; i < a.next_obs.size(); ++i) {
+      ASSERT_NEAR(a.next_obs[i], b.next_obs[i], 1e-6);
+      ASSERT_NEAR(mujoco.obs().values()[i], twin.obs().values()[i], 1e-6);
+    }
+  }
+}
+
+TEST(PendulumEnv, TheClosedFormTakesNoOtherModel) {
+  PendulumEnvConfig config;
+  config.physics = PhysicsEngine::kClosedForm;
+  config.mjcf = Mjcf(Plant());
+  EXPECT_THROW(PendulumEnv{config}, Error);
 }
 
 TEST(PendulumEnv, RefusesATimestepThatDoesNotDivideTheControlPeriod) {

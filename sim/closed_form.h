@@ -1,0 +1,65 @@
+#pragma once
+
+#include <span>
+
+#include "core/aligned.h"
+#include "core/vector_env.h"
+#include "sim/double_pendulum.h"
+
+/// The double pendulum in closed form, a twin of the built-in MJCF: equations of motion,
+/// Runge-Kutta steps as MuJoCo makes them, and the task's observation and reward, vectorised over
+/// environments.
+///
+/// An environment's results have the same bits wherever it stands among how many others, and on
+/// every path of core/simd.h that has fused multiply-adds.
+namespace upswing {
+
+/// N double pendulums, each number as an array over the environments. P is N rounded up to whole
+/// vectors; what is behind N is a standard plant at rest.
+struct ClosedFormBatch {
+  explicit ClosedFormBatch(size_t num_envs);
+
+  size_t padded() const { return q1.size(); }  // P
+  /// Works out what the equations need of a plant.
+  void SetPlant(size_t env, const Plant& plant);
+  /// Sets the motors (N), N·m, within their limits.
+  void SetTorque(std::span<const double> torque);
+
+  using Array = AlignedVector<double>;  // (P)
+  // State.
+  Array q1, q2, w1, w2;  // rad, rad/s
+  Array tau;             // N·m, held until it is set anew
+  Array q1_before;       // rad, before the last Advance
+
+  // Equations of motion, with c = l/2 and MuJoCo's capsules of inertia I about their centres.
+  Array J1;  // I1 + m1 c1² + m2 l1² + armature: inertia about joint 1, link 2 as a point, kg·m²
+  Array J2;  // I2 + m2 c2²: inertia of link 2 about joint 2, kg·m²
+  Array b;   // m2 l1 c2: coupling of the links, kg·m²
+  Array G1;  // (m1 c1 + m2 l1) g: largest moment of gravity about joint 1, link 2 as a point, N·m
+  Array G2;  // m2 c2 g: the same of link 2 about joint 2, N·m
+  Array d1, d2;  // damping, N·m·s/rad
+  Array limit;   // of the torque, N·m
+
+  // Task, whose energy is that of thin rods.
+  Array T1, T2;          // inertias like J1 and J2, kg·m²
+  Array energy_scale;    // 1 / (2 EnergyTarget), 1/J
+  Array share1, share2;  // l1 / (l1 + l2), l2 / (l1 + l2)
+};
+
+/// Where the kernels may split a batch: multiples of this many environments.
+inline constexpr size_t kClosedFormChunk = 64;
+
+/// Makes `steps` Runge-Kutta steps of kPhysicsTimestep with environments `first` to `last`, each a
+/// multiple of kClosedFormChunk or N.
+void Advance(ClosedFormBatch& batch, int steps, size_t first, size_t last);
+
+/// Fills all of `result` but `truncated` with what the states are to the task, as Observe,
+/// RewardTerms and Inverted have it. A state that is not finite, or beyond MuJoCo's 1e10, has
+/// terminated; the rest is then without meaning.
+void Judge(const ClosedFormBatch& batch, const RewardWeights& weights, size_t first, size_t last,
+           StepResult& result);
+
+/// Sine and cosine of x (n), rad, within 2 ulp for |x| ≤ 1e6. As fdlibm's k_sin.c and k_cos.c.
+void SineCosine(std::span<const double> x, std::span<double> sine, std::span<double> cosine);
+
+}  // namespace upswing

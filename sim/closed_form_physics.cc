@@ -1,0 +1,58 @@
+#include "sim/closed_form_physics.h"
+
+#include <algorithm>
+
+namespace upswing {
+namespace {
+
+constexpr int kSubsteps = 4;  // physics steps in a control period
+static_assert(kSubsteps * kPhysicsTimestep == kControlPeriod);
+
+int Chunks(size_t num_envs) {
+  return static_cast<int>((num_envs + kClosedFormChunk - 1) / kClosedFormChunk);
+}
+
+}  // namespace
+
+ClosedFormPhysics::ClosedFormPhysics(const PhysicsConfig& config)
+    : num_envs_(static_cast<size_t>(config.num_envs)),
+      weights_(config.weights),
+      batch_(num_envs_),
+      pool_(std::clamp(config.threads, 1, Chunks(num_envs_))) {
+  for (int env = 0; env < config.num_envs; ++env) {
+    batch_.SetPlant(static_cast<size_t>(env), config.plant(env));
+  }
+}
+
+PendulumState ClosedFormPhysics::state(int env) const {
+  const auto i = static_cast<size_t>(env);
+  return {batch_.q1[i], batch_.q2[i], batch_.w1[i], batch_.w2[i]};
+}
+
+void ClosedFormPhysics::SetState(int env, const PendulumState& s) {
+  const auto i = static_cast<size_t>(env);
+  batch_.q1[i] = s.q1;
+  batch_.q2[i] = s.q2;
+  batch_.w1[i] = s.w1;
+  batch_.w2[i] = s.w2;
+}
+
+void ClosedFormPhysics::Step(std::span<const double> torque, StepResult& result) {
+  batch_.SetTorque(torque);
+  // With two references the task fits into std::function without an allocation.
+  pool_.ParallelFor(Chunks(num_envs_), [this, &result](int chunk) {
+    const size_t first = static_cast<size_t>(chunk) * kClosedFormChunk;
+    const size_t last = std::min(first + kClosedFormChunk, num_envs_);
+    Advance(batch_, kSubsteps, first, last);
+    Judge(batch_, weights_, first, last, result);
+  });
+}
+
+void ClosedFormPhysics::State(const Archive& archive) {
+  archive.Array("q1", std::span(batch_.q1).first(num_envs_));
+  archive.Array("q2", std::span(batch_.q2).first(num_envs_));
+  archive.Array("w1", std::span(batch_.w1).first(num_envs_));
+  archive.Array("w2", std::span(batch_.w2).first(num_envs_));
+}
+
+}  // namespace upswing

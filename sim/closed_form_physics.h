@@ -1,0 +1,26 @@
+#pragma once
+
+#include "core/thread_pool.h"
+#include "sim/closed_form.h"
+#include "sim/physics.h"
+
+namespace upswing {
+
+/// N double pendulums in closed form, the environments shared out among threads.
+class ClosedFormPhysics : public Physics {
+ public:
+  explicit ClosedFormPhysics(const PhysicsConfig& config);
+
+  PendulumState state(int env) const override;
+  void SetState(int env, const PendulumState& state) override;
+  void Step(std::span<const double> torque, StepResult& result) override;
+  void State(const Archive& archive) override;
+
+ private:
+  size_t num_envs_;
+  RewardWeights weights_;
+  ClosedFormBatch batch_;
+  ThreadPool pool_;
+};
+
+}  // namespace upswing
