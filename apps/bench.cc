@@ -36,6 +36,7 @@ const std::vector<BenchPart>& Parts() {
       {"gradient", "gradient steps: a minibatch sampled and learned from", GradientCases},
       {"act", "actions of a policy", ActCases},
       {"replay", "sampling from and adding to a replay memory of 300,000", ReplayCases},
+      {"physics", "Runge-Kutta steps of MuJoCo and of the closed form", PhysicsCases},
       {"env", "environment steps: physics, observation, reward, reset", EnvCases},
       {"train", "training steps: environment and agent, without evaluations", TrainCases},
   };

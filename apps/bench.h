@@ -45,6 +45,7 @@ BenchCases KernelCases(const BenchOptions& options);
 BenchCases GradientCases(const BenchOptions& options);
 BenchCases ActCases(const BenchOptions& options);
 BenchCases ReplayCases(const BenchOptions& options);
+BenchCases PhysicsCases(const BenchOptions& options);
 BenchCases EnvCases(const BenchOptions& options);
 BenchCases TrainCases(const BenchOptions& options);
 

@@ -154,9 +154,9 @@ struct LearningLoop {
   std::vector<double> torque;  // (N)
 };
 
-BenchCase TrainCase(const std::string& name, const std::vector<FlagValue>& flags, int threads) {
-  const Config config = BuildConfig({}, flags);
-  return {fmt::format("train/{}/threads:{}", name, threads),
+BenchCase TrainCase(const std::string& agent, const std::string& physics, int threads) {
+  const Config config = BuildConfig({}, {{"agent", agent}, {"physics", physics}});
+  return {fmt::format("train/{}/{}/threads:{}", agent, physics, threads),
           "steps",
           static_cast<double>(config.train.envs),
           0,
@@ -221,8 +221,10 @@ BenchCases ReplayCases(const BenchOptions& /*options*/) {
 BenchCases TrainCases(const BenchOptions& options) {
   BenchCases cases;
   for (const std::string agent : {"d3qn", "d3qn-small"}) {
-    for (const int threads : options.threads) {
-      cases.push_back(TrainCase(agent, {{"agent", agent}}, threads));
+    for (const std::string physics : {"mujoco", "closed-form"}) {
+      for (const int threads : options.threads) {
+        cases.push_back(TrainCase(agent, physics, threads));
+      }
     }
   }
   return cases;

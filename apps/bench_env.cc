@@ -1,12 +1,16 @@
 // Cases of `upswing bench` for physics and environments.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
 
 #include "apps/bench.h"
 #include "core/rng.h"
+#include "core/thread_pool.h"
 #include "rl/dqn.h"
+#include "sim/closed_form.h"
 #include "sim/pendulum_env.h"
+#include "sim/physics.h"
 
 namespace upswing {
 namespace {
@@ -34,9 +38,66 @@ class Torques {
   std::vector<double> values_;  // (kSteps, N)
 };
 
+struct Engine {
+  PhysicsEngine engine;
+  std::string name;
+};
+const std::vector<Engine>& Engines() {
+  static const std::vector<Engine> engines{{PhysicsEngine::kMuJoCo, "mujoco"},
+                                           {PhysicsEngine::kClosedForm, "closed-form"}};
+  return engines;
+}
+
+constexpr int kSubsteps = 4;  // physics steps in a control period
+static_assert(kSubsteps * kPhysicsTimestep == kControlPeriod);
+
+/// MuJoCo's steps as the environment makes them: with what the task says of each fourth, a few
+/// percent of the time.
+BenchWork PhysicsInMuJoCo(int num_envs, int threads) {
+  PhysicsConfig config;
+  config.num_envs = num_envs;
+  config.threads = threads;
+  const std::shared_ptr<Physics> physics = MakePhysics(config);
+  const auto torques = std::make_shared<Torques>(num_envs);
+  const auto result = std::make_shared<StepResult>(num_envs, kObservationSize, kRewardTerms);
+  return [=] { physics->Step(torques->Next(), *result); };
+}
+
+/// The closed form's steps alone, in chunks as the environment shares them out.
+BenchWork PhysicsInClosedForm(int num_envs, int threads) {
+  const auto n = static_cast<size_t>(num_envs);
+  const size_t chunks = (n + kClosedFormChunk - 1) / kClosedFormChunk;
+  const auto batch = std::make_shared<ClosedFormBatch>(n);
+  for (size_t env = 0; env < n; ++env) batch->SetPlant(env, Plant());
+  const auto pool = std::make_shared<ThreadPool>(std::min(threads, static_cast<int>(chunks)));
+  const auto torques = std::make_shared<Torques>(num_envs);
+  return [=] {
+    batch->SetTorque(torques->Next());
+    pool->ParallelFor(static_cast<int>(chunks), [&batch = *batch, n](int chunk) {
+      const size_t first = static_cast<size_t>(chunk) * kClosedFormChunk;
+      Advance(batch, kSubsteps, first, std::min(first + kClosedFormChunk, n));
+    });
+  };
+}
+
+/// Runge-Kutta steps, four to a control period.
+BenchCase PhysicsCase(const Engine& engine, int num_envs, int threads) {
+  const bool closed_form = engine.engine == PhysicsEngine::kClosedForm;
+  return {fmt::format("physics/{}/envs:{}/threads:{}", engine.name, num_envs, threads),
+          "steps",
+          static_cast<double>(kSubsteps) * num_envs,
+          0,
+          0,
+          threads,
+          [=]() -> BenchWork {
+            return closed_form ? PhysicsInClosedForm(num_envs, threads)
+                               : PhysicsInMuJoCo(num_envs, threads);
+          }};
+}
+
 /// Whole environment steps: physics, observation, reward and, at the end of episodes, reset.
-BenchCase EnvCase(int num_envs, int threads) {
-  return {fmt::format("env/mujoco/envs:{}/threads:{}", num_envs, threads),
+BenchCase EnvCase(const Engine& engine, int num_envs, int threads) {
+  return {fmt::format("env/{}/envs:{}/threads:{}", engine.name, num_envs, threads),
           "steps",
           static_cast<double>(num_envs),
           0,
@@ -44,6 +105,7 @@ BenchCase EnvCase(int num_envs, int threads) {
           threads,
           [=]() -> BenchWork {
             PendulumEnvConfig config;
+            config.physics = engine.engine;
             config.num_envs = num_envs;
             config.threads = threads;
             const auto env = std::make_shared<PendulumEnv>(config);
@@ -53,14 +115,22 @@ BenchCase EnvCase(int num_envs, int threads) {
           }};
 }
 
-}  // namespace
-
-BenchCases EnvCases(const BenchOptions& options) {
+/// A case for each engine, number of environments and number of threads.
+template <typename MakeCase>
+BenchCases CasesOf(const BenchOptions& options, const MakeCase& make) {
   BenchCases cases;
-  for (const int num_envs : {8, 128}) {
-    for (const int threads : options.threads) cases.push_back(EnvCase(num_envs, threads));
+  for (const Engine& engine : Engines()) {
+    for (const int num_envs : {8, 128, 1024}) {
+      for (const int threads : options.threads) cases.push_back(make(engine, num_envs, threads));
+    }
   }
   return cases;
 }
+
+}  // namespace
+
+BenchCases PhysicsCases(const BenchOptions& options) { return CasesOf(options, PhysicsCase); }
+
+BenchCases EnvCases(const BenchOptions& options) { return CasesOf(options, EnvCase); }
 
 }  // namespace upswing

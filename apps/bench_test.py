@@ -21,8 +21,11 @@ GRADIENT = [f"gradient/{network}/{width}-{width}/batch:{batch}/threads:1"
             for batch in (32, 64, 128, 256)]
 ACT = [f"act/256-256/batch:{batch}" for batch in (1, 8, 100)]
 REPLAY = ["replay/sample/batch:128", "replay/add/batch:128"]
-ENV = [f"env/mujoco/envs:{envs}/threads:1" for envs in (8, 128)]
-TRAIN = ["train/d3qn/threads:1", "train/d3qn-small/threads:1"]
+PHYSICS = [f"physics/{engine}/envs:{envs}/threads:1" for engine in ("mujoco", "closed-form")
+           for envs in (8, 128, 1024)]
+ENV = [name.replace("physics", "env") for name in PHYSICS]
+TRAIN = [f"train/{agent}/{engine}/threads:1" for agent in ("d3qn", "d3qn-small")
+         for engine in ("mujoco", "closed-form")]
 
 
 class BenchTest(ProgramTest):
@@ -59,7 +62,7 @@ class BenchTest(ProgramTest):
 
     def test_every_part(self):
         parts = {"kernels": KERNELS, "gradient": GRADIENT, "act": ACT, "replay": REPLAY,
-                 "env": ENV, "train": TRAIN}
+                 "physics": PHYSICS, "env": ENV, "train": TRAIN}
         rows, written = self.bench("--threads", 1)
         self.check([name for names in parts.values() for name in names], rows, written)
         with_flops = {entry["name"] for entry in written["benchmarks"] if "gflops" in entry}
@@ -102,13 +105,13 @@ class BenchTest(ProgramTest):
     def test_repetitions_and_threads(self):
         text = self.succeed("bench", "env", "--seconds", "0.001", "--repetitions", 3,
                             "--threads", "1,2", "--json", "bench.json")
-        self.assertEqual(len(text.splitlines()), 3 + 4)
+        self.assertEqual(len(text.splitlines()), 3 + 12)
         entries = json.loads((self.folder / "bench.json").read_text())["benchmarks"]
         names = {entry["name"] for entry in entries if entry["run_type"] == "iteration"}
-        self.assertEqual(names, {f"env/mujoco/envs:{envs}/threads:{threads}"
-                                 for envs in (8, 128) for threads in (1, 2)})
+        self.assertEqual(names, {name.replace("threads:1", f"threads:{threads}")
+                                 for name in ENV for threads in (1, 2)})
         medians = [entry for entry in entries if entry.get("aggregate_name") == "median"]
-        self.assertEqual(len(medians), 4)
+        self.assertEqual(len(medians), 12)
 
     def test_vector_instructions(self):
         rows, written = self.bench("act", "--simd", "portable")
@@ -125,10 +128,20 @@ class BenchTest(ProgramTest):
                 (["--network", "cnn"], ["--network", "cnn"]), (["--hidden", "64,x"], ["--hidden"]),
                 (["--batch", "0"], ["--batch"]), (["--json", ""], ["empty"]),
                 (["--json", "no/such/bench.json"], ["no/such"]),
+                (["--precision", "float16"], ["--precision", "float16"]),
                 (["act", "--batch", "8"], ["--batch", "gradient"]),
                 (["--thread", "2"], ["did you mean --threads?"])):
             with self.subTest(arguments=arguments):
                 self.refuse(["bench", *SHORT[2:], *arguments], *words)
+
+    def test_bfloat16(self):
+        """Measured where the processor can do it, refused where not."""
+        arguments = ["gradient", "--precision", "bfloat16", "--network", "dueling", "--hidden", 32,
+                     "--batch", 32, "--threads", 1]
+        done = self.run_here("bench", *SHORT, *arguments)
+        if done.returncode != 0:
+            return self.assert_one_line(done, 2, "bfloat16")
+        self.assertIn("gradient/dueling-bfloat16/32/batch:32/threads:1 ", done.stdout)
 
     def test_interrupt(self):
         process = self.start("bench", "act", "--seconds", 1000, "--json", "b.json", wait=False)
