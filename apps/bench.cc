@@ -30,8 +30,8 @@ struct BenchPart {
   BenchCases (*cases)(const BenchOptions&);
 };
 
-const std::vector<BenchPart>& Parts() {
-  static const std::vector<BenchPart> parts{
+std::vector<BenchPart> Parts() {
+  return {
       {"kernels", "products of a layer, Adam, transposition, memory bandwidth", KernelCases},
       {"gradient", "gradient steps: a minibatch sampled and learned from", GradientCases},
       {"act", "actions of a policy", ActCases},
@@ -40,7 +40,6 @@ const std::vector<BenchPart>& Parts() {
       {"env", "environment steps: physics, observation, reward, reset", EnvCases},
       {"train", "training steps: environment and agent, without evaluations", TrainCases},
   };
-  return parts;
 }
 
 std::vector<std::string> PartNames() {
@@ -172,7 +171,8 @@ int RunBench(BenchOptions options) {
   if (!options.simd.empty()) UseSimdPath(options.simd);
   if (options.threads.empty()) options.threads = {1, ResolveThreads(0)};
   std::ranges::sort(options.threads);
-  options.threads.erase(std::ranges::unique(options.threads).begin(), options.threads.end());
+  options.threads.erase(std::unique(options.threads.begin(), options.threads.end()),
+                        options.threads.end());
 
   InstallSignalHandlers();
   const BenchCases cases = WantedCases(options);

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <memory>
 
 #include "apps/bench.h"
@@ -40,13 +41,10 @@ class Torques {
 
 struct Engine {
   PhysicsEngine engine;
-  std::string name;
+  std::string_view name;
 };
-const std::vector<Engine>& Engines() {
-  static const std::vector<Engine> engines{{PhysicsEngine::kMuJoCo, "mujoco"},
-                                           {PhysicsEngine::kClosedForm, "closed-form"}};
-  return engines;
-}
+constexpr std::array kEngines{Engine{PhysicsEngine::kMuJoCo, "mujoco"},
+                              Engine{PhysicsEngine::kClosedForm, "closed-form"}};
 
 constexpr int kSubsteps = 4;  // physics steps in a control period
 static_assert(kSubsteps * kPhysicsTimestep == kControlPeriod);
@@ -119,7 +117,7 @@ BenchCase EnvCase(const Engine& engine, int num_envs, int threads) {
 template <typename MakeCase>
 BenchCases CasesOf(const BenchOptions& options, const MakeCase& make) {
   BenchCases cases;
-  for (const Engine& engine : Engines()) {
+  for (const Engine& engine : kEngines) {
     for (const int num_envs : {8, 128, 1024}) {
       for (const int threads : options.threads) cases.push_back(make(engine, num_envs, threads));
     }

@@ -91,6 +91,7 @@ void BenchReporter::ReportRuns(const std::vector<Run>& runs) {
   if (wall.empty()) return;
   PrintRow(measured, Median(wall), Median(cpu));
   ++done_;
+  seconds_done_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
 }
 
 const BenchCase& BenchReporter::FindCase(const std::string& name) const {
@@ -115,10 +116,9 @@ void BenchReporter::PrintRow(const BenchCase& measured, double wall, double cpu)
 void BenchReporter::ShowProgress(const BenchCase& running) {
   if (!line_.due()) return;
   const double share = static_cast<double>(done_) / static_cast<double>(cases_.size());
-  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin_;
   std::vector<std::string> fields{running.name};
   if (done_ > 0) {
-    fields.push_back(FormatDuration(elapsed.count() * (1 - share) / share) + " left");
+    fields.push_back(FormatDuration(seconds_done_ * (1 - share) / share) + " left");
   }
   line_.Show(share, fields);
 }

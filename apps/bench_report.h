@@ -53,6 +53,7 @@ class BenchReporter : public benchmark::BenchmarkReporter {
   ProgressLine line_;
   bool stopped_ = false;
   size_t done_ = 0;
+  double seconds_done_ = 0;  // that they took
   size_t name_width_ = 0;
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };
