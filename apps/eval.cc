@@ -88,7 +88,8 @@ int RunEval(const EvalArguments& arguments) {
   config.episode_seconds = kEvaluationSeconds;
   config.seed = static_cast<uint64_t>(arguments.seed);
   config.stream = "evaluation";
-  config.threads = ResolveThreads(arguments.threads);
+  ThreadPool pool(ResolveThreads(arguments.threads));
+  config.pool = &pool;
   PendulumEnv env(config);
 
   Evaluation evaluation;
