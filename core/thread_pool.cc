@@ -3,10 +3,24 @@
 #include <sched.h>
 
 #include <algorithm>
+#include <fstream>
 #include <utility>
 
 namespace upswing {
 namespace {
+
+/// More hardly help: a minibatch of 128 is cut into 4 slices, and idle threads get in the way.
+constexpr int kMostThreads = 8;
+
+/// How many processors' worth of time a container's limit leaves us (Linux, control groups 2:
+/// "QUOTA PERIOD" in microseconds, or "max PERIOD").
+int ProcessorQuota() {
+  std::ifstream file("/sys/fs/cgroup/cpu.max");
+  double quota = 0;
+  double period = 0;
+  if (!(file >> quota >> period) || !(period > 0)) return kMostThreads;
+  return std::max(1, static_cast<int>(quota / period));
+}
 
 /// Waits until `value` differs from `old`: first spinning (work of well under a millisecond comes
 /// back to back), then asleep, so that an idle pool costs nothing.
@@ -32,7 +46,8 @@ int ResolveThreads(int64_t wanted) {
   if (wanted > 0) return static_cast<int>(wanted);
   cpu_set_t usable;
   const bool known = sched_getaffinity(0, sizeof(usable), &usable) == 0;
-  return known ? std::max(1, CPU_COUNT(&usable)) : 1;
+  const int processors = std::min(known ? CPU_COUNT(&usable) : 1, ProcessorQuota());
+  return std::clamp(processors, 1, kMostThreads);
 }
 
 ThreadPool::ThreadPool(int threads) {

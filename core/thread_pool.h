@@ -10,7 +10,7 @@
 
 namespace upswing {
 
-/// `wanted`, or if that is 0 the number of processors that this process may use.
+/// `wanted`, or if that is 0 the number of processors that this process may use, but no more than 8.
 int ResolveThreads(int64_t wanted);
 
 /// Threads that wait for work. The caller is one of them, so a pool of one starts none.
