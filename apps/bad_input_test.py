@@ -378,7 +378,7 @@ class CheckpointTest(FileTest):
 
     def test_tensor_of_another_shape_or_type_or_none(self):
         _, tensors = read_tensors(self.checkpoint)
-        for name in ("agent/theta", "agent/adam/m", "agent/n_step/reward", "env/state",
+        for name in ("agent/theta", "agent/adam/m", "agent/n_step/reward", "env/state.0",
                      "env/step_counts", "train/episode_return", "train/steps", "run/size/metrics"):
             dtype, shape, data = tensors[name]
             with self.subTest(name=name):
@@ -397,7 +397,7 @@ class CheckpointTest(FileTest):
     def test_not_finite(self):
         _, tensors = read_tensors(self.checkpoint)
         for name in ("agent/theta", "agent/theta_target", "agent/adam/m", "agent/adam/v",
-                     "agent/replay/rows", "env/state", "env/obs", "train/episode_return"):
+                     "agent/replay/rows", "env/state.0", "env/obs", "train/episode_return"):
             with self.subTest(name=name):
                 self.change(tensors={name: with_number(tensors[name], 2, math.nan)})
                 self.refuse_checkpoint(f'"{name}"', "finite", "nan")

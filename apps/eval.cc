@@ -88,7 +88,8 @@ int RunEval(const EvalArguments& arguments) {
   config.episode_seconds = kEvaluationSeconds;
   config.seed = static_cast<uint64_t>(arguments.seed);
   config.stream = "evaluation";
-  config.threads = ResolveThreads(arguments.threads);
+  ThreadPool pool(ResolveThreads(arguments.threads));
+  config.pool = &pool;
   PendulumEnv env(config);
 
   Evaluation evaluation;
@@ -131,7 +132,7 @@ void AddEval(CLI::App& program, Command& command) {
   app->add_option("--physics", a->physics,
                   "engine: mujoco, or closed-form, its faster twin [mujoco]")
       ->type_name("TEXT");
-  app->add_option("--threads", a->threads, "0: one for each processor")
+  app->add_option("--threads", a->threads, "0: one for each processor, at most 8")
       ->check(CLI::Range(0, 256).description(""))
       ->type_name("INTEGER");
   app->add_flag("--json", a->as_json, "print JSON instead of a table")->disable_flag_override();

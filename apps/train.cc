@@ -117,22 +117,28 @@ struct Parts {
   Parts(const Config& c, int threads)
       : config(c),
         pool(threads),
-        env(c.Environments()),
+        env(Environments()),
         agent(c.dqn, env.num_envs(), env.obs_size(), TorqueLevels(env.torque_limit()),
               static_cast<uint64_t>(c.train.seed), pool),
         state(env.num_envs(), kRewardTerms) {}
 
+  /// The training environments.
+  PendulumEnvConfig Environments() {
+    PendulumEnvConfig environments = config.Environments();
+    environments.pool = &pool;
+    return environments;
+  }
+
   /// Evaluation from fresh starts in MuJoCo, with the reward's standard weights, on the training
   /// plant.
-  Evaluation Judge(const Policy& policy, int64_t step) const {
-    PendulumEnvConfig judge = config.Environments();
+  Evaluation Judge(const Policy& policy, int64_t step) {
+    PendulumEnvConfig judge = Environments();
     judge.physics = PhysicsEngine::kMuJoCo;
     judge.num_envs = static_cast<int>(config.train.eval_episodes);
     judge.episode_seconds = kEvaluationSeconds;
     judge.start = StartStates();
     judge.weights = RewardWeights();
     judge.stream = Concat("evaluation at step ", step);
-    judge.threads = pool.threads();
     PendulumEnv env_of_judge(judge);
     return Evaluate(policy, env_of_judge);
   }

@@ -3,10 +3,24 @@
 #include <sched.h>
 
 #include <algorithm>
+#include <fstream>
 #include <utility>
 
 namespace upswing {
 namespace {
+
+/// More hardly help: a minibatch of 128 is cut into 4 slices, and idle threads get in the way.
+constexpr int kMostThreads = 8;
+
+/// How many processors' worth of time a container's limit leaves us (Linux, control groups 2:
+/// "QUOTA PERIOD" in microseconds, or "max PERIOD").
+int ProcessorQuota() {
+  std::ifstream file("/sys/fs/cgroup/cpu.max");
+  double quota = 0;
+  double period = 0;
+  if (!(file >> quota >> period) || !(period > 0)) return kMostThreads;
+  return std::max(1, static_cast<int>(quota / period));
+}
 
 /// Waits until `value` differs from `old`: first spinning (work of well under a millisecond comes
 /// back to back), then asleep, so that an idle pool costs nothing.
@@ -21,20 +35,24 @@ void WaitWhile(const std::atomic<T>& value, T old) {
   value.wait(old, std::memory_order_acquire);
 }
 
+// A ticket holds the number of tasks and the next of them that nobody has taken, in one number: who
+// takes a task by exchanging the ticket knows that its round goes on, which cannot end before that
+// task does.
+constexpr int kTaskBits = 32;
+
 }  // namespace
 
 int ResolveThreads(int64_t wanted) {
   if (wanted > 0) return static_cast<int>(wanted);
   cpu_set_t usable;
   const bool known = sched_getaffinity(0, sizeof(usable), &usable) == 0;
-  return known ? std::max(1, CPU_COUNT(&usable)) : 1;
+  const int processors = std::min(known ? CPU_COUNT(&usable) : 1, ProcessorQuota());
+  return std::clamp(processors, 1, kMostThreads);
 }
 
-ThreadPool::ThreadPool(int threads) : errors_(static_cast<size_t>(std::max(1, threads))) {
+ThreadPool::ThreadPool(int threads) {
   try {
-    for (int thread = 1; thread < threads; ++thread) {
-      workers_.emplace_back([this, thread] { Work(thread); });
-    }
+    for (int thread = 1; thread < threads; ++thread) workers_.emplace_back([this] { Work(); });
   } catch (...) {
     Stop();
     throw;
@@ -56,40 +74,46 @@ void ThreadPool::ParallelFor(int n, const std::function<void(int)>& task) {
     return;
   }
   task_ = &task;
-  n_ = n;
-  next_ = 0;
-  running_ = static_cast<int>(workers_.size());
+  unfinished_ = static_cast<uint32_t>(n);
+  ticket_ = static_cast<uint64_t>(n) << kTaskBits;
   ++round_;
   round_.notify_all();
-  RunTasks(0);
-  for (int left = running_; left != 0; left = running_) WaitWhile(running_, left);
-
-  // Every thread is at rest again, so errors_ is ours.
-  std::exception_ptr first;
-  for (std::exception_ptr& error : errors_) {
-    if (!first) first = error;
-    error = nullptr;
-  }
-  if (first) std::rethrow_exception(first);
+  RunTasks();
+  for (uint32_t left = unfinished_; left != 0; left = unfinished_) WaitWhile(unfinished_, left);
+  if (error_) std::rethrow_exception(std::exchange(error_, nullptr));
 }
 
-void ThreadPool::Work(int thread) {
-  unsigned seen = 0;
+void ThreadPool::Work() {
+  uint32_t seen = 0;
   while (true) {
     WaitWhile(round_, seen);
-    ++seen;
+    seen = round_;
     if (stopping_) return;
-    RunTasks(thread);
-    if (--running_ == 0) running_.notify_one();
+    RunTasks();
   }
 }
 
-void ThreadPool::RunTasks(int thread) {
-  try {
-    for (int i = next_++; i < n_; i = next_++) (*task_)(i);
-  } catch (...) {
-    errors_[static_cast<size_t>(thread)] = std::current_exception();
+void ThreadPool::RunTasks() {
+  uint64_t ticket = ticket_;
+  while (true) {
+    const uint64_t tasks = ticket >> kTaskBits;
+    const auto next = static_cast<uint32_t>(ticket);
+    if (next >= tasks) return;
+    if (!ticket_.compare_exchange_weak(ticket, ticket + 1)) continue;
+    try {
+      (*task_)(static_cast<int>(next));
+    } catch (...) {
+      const std::lock_guard lock(error_mutex_);
+      if (!error_) error_ = std::current_exception();
+    }
+    if (--unfinished_ == 0) unfinished_.notify_one();
+    ticket = ticket_;
   }
+}
+
+void ParallelFor(ThreadPool* pool, int n, const std::function<void(int)>& task) {
+  if (pool != nullptr) return pool->ParallelFor(n, task);
+  for (int i = 0; i < n; ++i) task(i);
 }
 
 }  // namespace upswing

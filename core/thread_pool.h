@@ -4,12 +4,13 @@
 #include <cstdint>
 #include <exception>
 #include <functional>
+#include <mutex>
 #include <thread>
 #include <vector>
 
 namespace upswing {
 
-/// `wanted`, or if that is 0 the number of processors that this process may use.
+/// `wanted`, or if that is 0 the number of processors that this process may use, but no more than 8.
 int ResolveThreads(int64_t wanted);
 
 /// Threads that wait for work. The caller is one of them, so a pool of one starts none.
@@ -22,24 +23,28 @@ class ThreadPool {
 
   int threads() const { return static_cast<int>(workers_.size()) + 1; }
 
-  /// Calls task(0) … task(n-1), each on the thread that comes first, and returns when all are done.
-  /// What a task computes must depend on its index alone: then the result has the same bits
-  /// whatever the number of threads. Rethrows the exception of one task that raised one.
+  /// Calls task(0) … task(n-1), each on the thread that comes first, and returns when all are done;
+  /// it does not wait for a thread that comes too late to do any. What a task computes must depend
+  /// on its index alone: then the result has the same bits whatever the number of threads. Rethrows
+  /// the exception of the first task that raised one. Not for two callers at once.
   void ParallelFor(int n, const std::function<void(int)>& task);
 
  private:
   void Stop();
-  void Work(int thread);
-  void RunTasks(int thread);
+  void Work();
+  void RunTasks();
 
   const std::function<void(int)>* task_ = nullptr;
-  int n_ = 0;
-  std::atomic<int> next_{0};        // task that nobody has taken
-  std::atomic<unsigned> round_{0};  // counts up at each hand-over
-  std::atomic<int> running_{0};     // workers that have not finished this round
+  std::atomic<uint64_t> ticket_{0};  // the next task to take; see thread_pool.cc
+  std::atomic<uint32_t> round_{0};   // counts up at each ParallelFor: what idle threads wait for
+  std::atomic<uint32_t> unfinished_{0};  // tasks of this round
   std::atomic<bool> stopping_{false};
-  std::vector<std::exception_ptr> errors_;  // (threads)
-  std::vector<std::thread> workers_;        // (threads - 1)
+  std::mutex error_mutex_;
+  std::exception_ptr error_;
+  std::vector<std::thread> workers_;  // (threads - 1)
 };
+
+/// The same on a pool that need not be there: without one the caller does all.
+void ParallelFor(ThreadPool* pool, int n, const std::function<void(int)>& task);
 
 }  // namespace upswing

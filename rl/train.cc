@@ -187,7 +187,8 @@ void TrainConfig::Describe(Options& o) {
   o.Add(&checkpoint_every, "checkpoint_every", 50000, kCount, "steps",
         "from one checkpoint to the next")
       .identity = false;
-  o.Add(&threads, "threads", 0, {0, 256}, "", "threads to use; 0: one for each processor")
+  o.Add(&threads, "threads", 0, {0, 256}, "",
+        "threads to use; 0: one for each processor, at most 8")
       .identity = false;
   o.Add(&start_noise, "start_noise", 0.1, {0, 10}, "rad, rad/s",
         "standard deviation of the start states around hanging");

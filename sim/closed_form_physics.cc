@@ -18,7 +18,7 @@ ClosedFormPhysics::ClosedFormPhysics(const PhysicsConfig& config)
     : num_envs_(static_cast<size_t>(config.num_envs)),
       weights_(config.weights),
       batch_(num_envs_),
-      pool_(std::clamp(config.threads, 1, Chunks(num_envs_))) {
+      pool_(config.pool) {
   for (int env = 0; env < config.num_envs; ++env) {
     batch_.SetPlant(static_cast<size_t>(env), config.plant(env));
   }
@@ -40,7 +40,7 @@ void ClosedFormPhysics::SetState(int env, const PendulumState& s) {
 void ClosedFormPhysics::Step(std::span<const double> torque, StepResult& result) {
   batch_.SetTorque(torque);
   // With two references the task fits into std::function without an allocation.
-  pool_.ParallelFor(Chunks(num_envs_), [this, &result](int chunk) {
+  ParallelFor(pool_, Chunks(num_envs_), [this, &result](int chunk) {
     const size_t first = static_cast<size_t>(chunk) * kClosedFormChunk;
     const size_t last = std::min(first + kClosedFormChunk, num_envs_);
     Advance(batch_, kSubsteps, first, last);

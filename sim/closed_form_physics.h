@@ -1,12 +1,11 @@
 #pragma once
 
-#include "core/thread_pool.h"
 #include "sim/closed_form.h"
 #include "sim/physics.h"
 
 namespace upswing {
 
-/// N double pendulums in closed form, the environments shared out among threads.
+/// N double pendulums in closed form.
 class ClosedFormPhysics : public Physics {
  public:
   explicit ClosedFormPhysics(const PhysicsConfig& config);
@@ -20,7 +19,7 @@ class ClosedFormPhysics : public Physics {
   size_t num_envs_;
   RewardWeights weights_;
   ClosedFormBatch batch_;
-  ThreadPool pool_;
+  ThreadPool* pool_;
 };
 
 }  // namespace upswing

@@ -3,12 +3,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "core/error.h"
 #include "core/text.h"
 
 namespace upswing {
 namespace {
+
+constexpr int kSmallestSlice = 4;  // environments: fewer are not worth another thread
+constexpr int kMostSlices = 32;
 
 /// Gives every simulation of the batch a row of its own for a model field.
 mjtNum* Expand(mjBatch* batch, const char* field, int env) {
@@ -28,55 +32,65 @@ ModelFields ExpandedFields(mjBatch* batch, int env) {
 
 }  // namespace
 
-MuJoCoPhysics::MuJoCoPhysics(const PhysicsConfig& config) : config_(config) {
+MuJoCoPhysics::MuJoCoPhysics(const PhysicsConfig& config)
+    : config_(config), slice_size_(std::max(kSmallestSlice, config.num_envs / kMostSlices)) {
   // The model, with the one plant that all environments share or as the base of many.
   const ModelPtr model = config_.mjcf.empty() ? CompileModel(Mjcf(Plant()), "model")
                                               : LoadModel(config_.mjcf, "model");
   WritePlant(config_.plant(0), FieldsOf(*model));
   const DataPtr data(mj_makeData(model.get()));
   mj_setConst(model.get(), data.get());
-
-  // The batch. MuJoCo's results have the same bits whatever the number of threads.
-  std::array<char, 1000> message{};
-  mjBatchConfig batch_config;
-  mjb_defaultConfig(&batch_config);
-  batch_config.nthread = std::clamp(config_.threads, 1, config_.num_envs);
-  batch_.reset(
-      mjb_makeBatch(model.get(), config_.num_envs, &batch_config, message.data(), message.size()));
-  if (batch_ == nullptr) throw Failure(Concat("MuJoCo: ", message.data()));
-  if (config_.plants.size() > 1) {
-    for (int i = 0; i < config_.num_envs; ++i) {
-      WritePlant(config_.plant(i), ExpandedFields(batch_.get(), i));
-    }
-    mjb_setConst(batch_.get(), nullptr, 0);
-  }
-  mjb_reset(batch_.get(), nullptr, 0, nullptr, mjSTAGE_NONE);
-  state_size_ = mjb_nstate(batch_.get());
-  qpos_ = mjb_stateComponent(batch_.get(), mjSTATE_QPOS, nullptr);
-  qvel_ = mjb_stateComponent(batch_.get(), mjSTATE_QVEL, nullptr);
-  ctrl_ = mjb_stateComponent(batch_.get(), mjSTATE_CTRL, nullptr);
-
   substeps_ = static_cast<int>(std::round(kControlPeriod / model->opt.timestep));
+
+  for (int first = 0; first < config_.num_envs; first += slice_size_) {
+    slices_.push_back(MakeSlice(*model, first, std::min(slice_size_, config_.num_envs - first)));
+  }
+  state_size_ = mjb_nstate(slices_.front().batch.get());
   previous_q1_.resize(static_cast<size_t>(config_.num_envs));
 }
 
+MuJoCoPhysics::Slice MuJoCoPhysics::MakeSlice(const mjModel& model, int first, int count) const {
+  std::array<char, 1000> message{};
+  mjBatchConfig batch_config;
+  mjb_defaultConfig(&batch_config);
+  batch_config.nthread = 1;
+  BatchPtr batch(mjb_makeBatch(&model, count, &batch_config, message.data(), message.size()));
+  if (batch == nullptr) throw Failure(Concat("MuJoCo: ", message.data()));
+  if (config_.plants.size() > 1) {
+    for (int i = 0; i < count; ++i) {
+      WritePlant(config_.plant(first + i), ExpandedFields(batch.get(), i));
+    }
+    mjb_setConst(batch.get(), nullptr, 0);
+  }
+  mjb_reset(batch.get(), nullptr, 0, nullptr, mjSTAGE_NONE);
+  const auto component = [&](int what) { return mjb_stateComponent(batch.get(), what, nullptr); };
+  mjtNum* qpos = component(mjSTATE_QPOS);
+  mjtNum* qvel = component(mjSTATE_QVEL);
+  mjtNum* ctrl = component(mjSTATE_CTRL);
+  return {first, count, std::move(batch), qpos, qvel, ctrl};
+}
+
 PendulumState MuJoCoPhysics::state(int env) const {
-  const mjtNum* q = Component(qpos_, env);
-  const mjtNum* w = Component(qvel_, env);
+  const mjtNum* q = Component(SliceOf(env).qpos, env);
+  const mjtNum* w = Component(SliceOf(env).qvel, env);
   return {q[0], q[1], w[0], w[1]};
 }
 
 void MuJoCoPhysics::SetState(int env, const PendulumState& s) {
+  const Slice& slice = SliceOf(env);
   // Reset by MuJoCo: time, control, warm start and warnings go back too.
-  mjb_reset(batch_.get(), &env, 1, nullptr, mjSTAGE_NONE);
-  std::copy_n(std::array{s.q1, s.q2}.data(), 2, Component(qpos_, env));
-  std::copy_n(std::array{s.w1, s.w2}.data(), 2, Component(qvel_, env));
+  const int row = env - slice.first;
+  mjb_reset(slice.batch.get(), &row, 1, nullptr, mjSTAGE_NONE);
+  std::copy_n(std::array{s.q1, s.q2}.data(), 2, Component(slice.qpos, env));
+  std::copy_n(std::array{s.w1, s.w2}.data(), 2, Component(slice.qvel, env));
 }
 
 bool MuJoCoPhysics::BlewUp(int env) const {
   const PendulumState s = state(env);
-  const mjWarningStat* warnings = mjb_warning(batch_.get()) + env * mjNWARNING;
-  return mjb_status(batch_.get())[env] != 0 || warnings[mjWARN_BADQPOS].number > 0 ||
+  const Slice& slice = SliceOf(env);
+  const int row = env - slice.first;
+  const mjWarningStat* warnings = mjb_warning(slice.batch.get()) + row * mjNWARNING;
+  return mjb_status(slice.batch.get())[row] != 0 || warnings[mjWARN_BADQPOS].number > 0 ||
          warnings[mjWARN_BADQVEL].number > 0 || warnings[mjWARN_BADQACC].number > 0 ||
          !std::isfinite(s.q1 + s.q2 + s.w1 + s.w2);
 }
@@ -101,12 +115,25 @@ void MuJoCoPhysics::Judge(int env, double torque, StepResult& result) const {
 }
 
 void MuJoCoPhysics::Step(std::span<const double> torque, StepResult& result) {
-  for (int env = 0; env < config_.num_envs; ++env) {
+  // The references in one, so that the task fits into std::function without an allocation.
+  const struct {
+    std::span<const double> torque;
+    StepResult& result;
+  } step{torque, result};
+  ParallelFor(config_.pool, static_cast<int>(slices_.size()), [this, &step](int slice) {
+    StepSlice(slices_[static_cast<size_t>(slice)], step.torque, step.result);
+  });
+}
+
+void MuJoCoPhysics::StepSlice(const Slice& slice, std::span<const double> torque,
+                              StepResult& result) {
+  const int end = slice.first + slice.count;
+  for (int env = slice.first; env < end; ++env) {
     previous_q1_[static_cast<size_t>(env)] = state(env).q1;
-    Component(ctrl_, env)[0] = torque[static_cast<size_t>(env)];
+    Component(slice.ctrl, env)[0] = torque[static_cast<size_t>(env)];
   }
-  mjb_step(batch_.get(), nullptr, 0, substeps_, mjSTAGE_NONE);
-  for (int env = 0; env < config_.num_envs; ++env) {
+  mjb_step(slice.batch.get(), nullptr, 0, substeps_, mjSTAGE_NONE);
+  for (int env = slice.first; env < end; ++env) {
     const auto i = static_cast<size_t>(env);
     result.terminated[i] = BlewUp(env) ? 1 : 0;
     if (!result.terminated[i]) Judge(env, torque[i], result);
@@ -114,8 +141,10 @@ void MuJoCoPhysics::Step(std::span<const double> torque, StepResult& result) {
 }
 
 void MuJoCoPhysics::State(const Archive& archive) {
-  const size_t size = static_cast<size_t>(config_.num_envs) * static_cast<size_t>(state_size_);
-  archive.Array("state", std::span(mjb_state(batch_.get()), size));
+  for (const Slice& slice : slices_) {
+    const size_t size = static_cast<size_t>(slice.count) * static_cast<size_t>(state_size_);
+    archive.Array(Concat("state.", slice.first), std::span(mjb_state(slice.batch.get()), size));
+  }
 }
 
 }  // namespace upswing

@@ -7,7 +7,9 @@
 
 namespace upswing {
 
-/// N double pendulums in MuJoCo, on its batch interface. Its own warnings count as a blow-up too.
+/// N double pendulums in MuJoCo, on its batch interface: a batch for each few environments, so that
+/// they are shared out by our thread pool and MuJoCo needs none of its own. Its own warnings count
+/// as a blow-up too.
 class MuJoCoPhysics : public Physics {
  public:
   /// Throws BadInput on a model that does not compile or is no double pendulum.
@@ -19,16 +21,28 @@ class MuJoCoPhysics : public Physics {
   void State(const Archive& archive) override;
 
  private:
+  /// Consecutive environments, which one thread steps at a time, with MuJoCo's batch of them.
+  struct Slice {
+    int first, count;
+    BatchPtr batch;
+    mjtNum *qpos, *qvel, *ctrl;  // in row 0 of the state table
+  };
+  Slice MakeSlice(const mjModel& model, int first, int count) const;
+  const Slice& SliceOf(int env) const { return slices_[static_cast<size_t>(env / slice_size_)]; }
+  /// The part of an environment's state that starts at `first` in row 0 of its slice.
+  mjtNum* Component(mjtNum* first, int env) const {
+    return first + env % slice_size_ * state_size_;
+  }
+  void StepSlice(const Slice& slice, std::span<const double> torque, StepResult& result);
   bool BlewUp(int env) const;
   void Judge(int env, double torque, StepResult& result) const;
-  mjtNum* Component(mjtNum* first, int env) const { return first + env * state_size_; }
 
   PhysicsConfig config_;
-  BatchPtr batch_;
-  int substeps_ = 0;                                            // physics steps in a control period
-  int state_size_ = 0;                                          // numbers in a state row
-  mjtNum *qpos_ = nullptr, *qvel_ = nullptr, *ctrl_ = nullptr;  // in row 0 of the state table
-  std::vector<double> previous_q1_;                             // (N) before the step
+  int slice_size_;
+  std::vector<Slice> slices_;
+  int substeps_ = 0;                 // physics steps in a control period
+  int state_size_ = 0;               // numbers in a state row
+  std::vector<double> previous_q1_;  // (N) before the step
 };
 
 }  // namespace upswing

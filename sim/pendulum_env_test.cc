@@ -133,7 +133,8 @@ TEST_P(PendulumEnvs, TheNumberOfThreadsChangesNoBit) {
   PendulumEnvConfig config = SmallConfig();
   config.num_envs = 170;
   PendulumEnv one(config);
-  config.threads = 3;
+  ThreadPool pool(3);
+  config.pool = &pool;
   PendulumEnv three(config);
   StepResult a = one.MakeResult(), b = three.MakeResult();
   std::vector<double> torque(170);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/archive.h"
+#include "core/thread_pool.h"
 #include "core/vector_env.h"
 #include "sim/double_pendulum.h"
 
@@ -27,8 +28,8 @@ struct PhysicsConfig {
   std::vector<Plant> plants{Plant()};  // one for all environments, or one for each
   int num_envs = 1;
   RewardWeights weights;
-  std::string mjcf;  // another model than Mjcf(Plant()); built like it
-  int threads = 1;   // changes no bit of a result
+  std::string mjcf;            // another model than Mjcf(Plant()); built like it
+  ThreadPool* pool = nullptr;  // who shares the work; changes no bit of a result
 
   const Plant& plant(int env) const {
     return plants[plants.size() > 1 ? static_cast<size_t>(env) : 0];
