@@ -201,7 +201,8 @@ void AddBench(CLI::App& program, Command& command) {
   CLI::App* app = program.add_subcommand("bench", "Measure how fast it is on this machine");
   auto o = std::make_shared<BenchOptions>();
   app->add_option("parts", o->parts, "what to measure [everything]")->type_name("PART");
-  app->add_option("--threads", o->threads, "numbers of threads [1 and one for each processor]")
+  app->add_option("--threads", o->threads,
+                  "numbers of threads [1 and one for each processor, up to 8]")
       ->delimiter(',')
       ->take_all()
       ->allow_extra_args(false)

@@ -133,11 +133,17 @@ BenchCase ActCase(int batch) {
 struct LearningLoop {
   LearningLoop(const Config& config, int threads)
       : pool(threads),
-        env(config.Environments()),
+        env(EnvironmentsOf(config, pool)),
         agent(config.dqn, env.num_envs(), env.obs_size(), TorqueLevels(env.torque_limit()), 1,
               pool),
         result(env.MakeResult()),
         torque(static_cast<size_t>(env.num_envs())) {}
+
+  static PendulumEnvConfig EnvironmentsOf(const Config& config, ThreadPool& shared) {
+    PendulumEnvConfig environments = config.Environments();
+    environments.pool = &shared;
+    return environments;
+  }
 
   /// One lock-step of all environments and the gradient steps that fall due.
   void Step() {

@@ -52,13 +52,14 @@ static_assert(kSubsteps * kPhysicsTimestep == kControlPeriod);
 /// MuJoCo's steps as the environment makes them: with what the task says of each fourth, a few
 /// percent of the time.
 BenchWork PhysicsInMuJoCo(int num_envs, int threads) {
+  const auto pool = std::make_shared<ThreadPool>(threads);
   PhysicsConfig config;
   config.num_envs = num_envs;
-  config.threads = threads;
+  config.pool = pool.get();
   const std::shared_ptr<Physics> physics = MakePhysics(config);
   const auto torques = std::make_shared<Torques>(num_envs);
   const auto result = std::make_shared<StepResult>(num_envs, kObservationSize, kRewardTerms);
-  return [=] { physics->Step(torques->Next(), *result); };
+  return [=, keep = pool] { physics->Step(torques->Next(), *result); };
 }
 
 /// The closed form's steps alone, in chunks as the environment shares them out.
@@ -67,7 +68,7 @@ BenchWork PhysicsInClosedForm(int num_envs, int threads) {
   const size_t chunks = (n + kClosedFormChunk - 1) / kClosedFormChunk;
   const auto batch = std::make_shared<ClosedFormBatch>(n);
   for (size_t env = 0; env < n; ++env) batch->SetPlant(env, Plant());
-  const auto pool = std::make_shared<ThreadPool>(std::min(threads, static_cast<int>(chunks)));
+  const auto pool = std::make_shared<ThreadPool>(threads);
   const auto torques = std::make_shared<Torques>(num_envs);
   return [=] {
     batch->SetTorque(torques->Next());
@@ -102,14 +103,15 @@ BenchCase EnvCase(const Engine& engine, int num_envs, int threads) {
           0,
           threads,
           [=]() -> BenchWork {
+            const auto pool = std::make_shared<ThreadPool>(threads);
             PendulumEnvConfig config;
             config.physics = engine.engine;
             config.num_envs = num_envs;
-            config.threads = threads;
+            config.pool = pool.get();
             const auto env = std::make_shared<PendulumEnv>(config);
             const auto torques = std::make_shared<Torques>(num_envs);
             const auto result = std::make_shared<StepResult>(env->MakeResult());
-            return [=] { env->Step(torques->Next(), *result); };
+            return [=, keep = pool] { env->Step(torques->Next(), *result); };
           }};
 }
 
