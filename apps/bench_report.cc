@@ -61,8 +61,11 @@ bool BenchReporter::ReportContext(const Context& context) {
     peaks += fmt::format("{} {:.1f} GFLOP/s with {} thread{}", peaks.empty() ? "; peak" : ",",
                          gflops, threads, threads == 1 ? "" : "s");
   }
-  line_.Print(fmt::format("{}, {} processors, vector instructions {}{}", context_.cpu_model,
-                          context.cpu_info.num_cpus, context_.simd_path, peaks));
+  const std::vector<double>& load = context.cpu_info.load_avg;
+  line_.Print(fmt::format("{}, {} processors{}, vector instructions {}{}", context_.cpu_model,
+                          context.cpu_info.num_cpus,
+                          load.empty() ? "" : fmt::format(" (load {:.1f})", load.front()),
+                          context_.simd_path, peaks));
   line_.Print(fmt::format("Median of {} × {} s for each of {} cases; times are those of one item",
                           context_.repetitions, FormatNumber(context_.seconds), cases_.size()));
   line_.Print(Row(name_width_, "case", "rate", "GFLOP/s", "of peak", "GB/s", "wall", "CPU"));
