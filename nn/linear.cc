@@ -122,19 +122,25 @@ HWY_INLINE void MultiplyTile(const Product<T>& p, int m, int n, size_t count) {
   }
 }
 
+/// Rows m to `end` of C, from column n on as far as tiles of kRows × kVectors registers go; returns
+/// the first column after them.
+template <int kRows, int kVectors, typename T>
+int MultiplyColumns(const Product<T>& p, int m, int end, int n) {
+  const int step = kVectors * static_cast<int>(hn::Lanes(Tag<T>()));
+  for (; n + step <= p.N; n += step) {
+    for (int i = m; i < end; i += kRows) MultiplyTile<kRows, kVectors, false>(p, i, n, 0);
+  }
+  return n;
+}
+
 /// All of C from row m on that can be cut into tiles of kRows rows; returns the first row after.
 template <int kRows, typename T>
 int MultiplyRows(const Product<T>& p, int m) {
   constexpr int kVectors = kRegisters / kRows;
-  const int lanes = static_cast<int>(hn::Lanes(Tag<T>()));
   const int end = m + (p.M - m) / kRows * kRows;
-  int n = 0;
-  for (; n + kVectors * lanes <= p.N; n += kVectors * lanes) {
-    for (int i = m; i < end; i += kRows) MultiplyTile<kRows, kVectors, false>(p, i, n, 0);
-  }
-  for (; n + lanes <= p.N; n += lanes) {
-    for (int i = m; i < end; i += kRows) MultiplyTile<kRows, 1, false>(p, i, n, 0);
-  }
+  int n = MultiplyColumns<kRows, kVectors>(p, m, end, 0);
+  if constexpr (kVectors > 4) n = MultiplyColumns<kRows, 4>(p, m, end, n);
+  n = MultiplyColumns<kRows, 1>(p, m, end, n);
   if (n < p.N) {
     const auto count = static_cast<size_t>(p.N - n);
     for (int i = m; i < end; i += kRows) MultiplyTile<kRows, 1, true>(p, i, n, count);
