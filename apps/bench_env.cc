@@ -39,16 +39,6 @@ class Torques {
   std::vector<double> values_;  // (kSteps, N)
 };
 
-struct Engine {
-  PhysicsEngine engine;
-  std::string_view name;
-};
-constexpr std::array kEngines{Engine{PhysicsEngine::kMuJoCo, "mujoco"},
-                              Engine{PhysicsEngine::kClosedForm, "closed-form"}};
-
-constexpr int kSubsteps = 4;  // physics steps in a control period
-static_assert(kSubsteps * kPhysicsTimestep == kControlPeriod);
-
 /// MuJoCo's steps as the environment makes them: with what the task says of each fourth, a few
 /// percent of the time.
 BenchWork PhysicsInMuJoCo(int num_envs, int threads) {
@@ -74,17 +64,17 @@ BenchWork PhysicsInClosedForm(int num_envs, int threads) {
     batch->SetTorque(torques->Next());
     pool->ParallelFor(static_cast<int>(chunks), [&batch = *batch, n](int chunk) {
       const size_t first = static_cast<size_t>(chunk) * kClosedFormChunk;
-      Advance(batch, kSubsteps, first, std::min(first + kClosedFormChunk, n));
+      Advance(batch, kPhysicsSteps, first, std::min(first + kClosedFormChunk, n));
     });
   };
 }
 
 /// Runge-Kutta steps, four to a control period.
-BenchCase PhysicsCase(const Engine& engine, int num_envs, int threads) {
-  const bool closed_form = engine.engine == PhysicsEngine::kClosedForm;
-  return {fmt::format("physics/{}/envs:{}/threads:{}", engine.name, num_envs, threads),
+BenchCase PhysicsCase(const std::string& physics, int num_envs, int threads) {
+  const bool closed_form = ParsePhysics(physics, "physics") == PhysicsEngine::kClosedForm;
+  return {fmt::format("physics/{}/envs:{}/threads:{}", physics, num_envs, threads),
           "steps",
-          static_cast<double>(kSubsteps) * num_envs,
+          static_cast<double>(kPhysicsSteps) * num_envs,
           0,
           0,
           threads,
@@ -95,8 +85,8 @@ BenchCase PhysicsCase(const Engine& engine, int num_envs, int threads) {
 }
 
 /// Whole environment steps: physics, observation, reward and, at the end of episodes, reset.
-BenchCase EnvCase(const Engine& engine, int num_envs, int threads) {
-  return {fmt::format("env/{}/envs:{}/threads:{}", engine.name, num_envs, threads),
+BenchCase EnvCase(const std::string& physics, int num_envs, int threads) {
+  return {fmt::format("env/{}/envs:{}/threads:{}", physics, num_envs, threads),
           "steps",
           static_cast<double>(num_envs),
           0,
@@ -105,7 +95,7 @@ BenchCase EnvCase(const Engine& engine, int num_envs, int threads) {
           [=]() -> BenchWork {
             const auto pool = std::make_shared<ThreadPool>(threads);
             PendulumEnvConfig config;
-            config.physics = engine.engine;
+            config.physics = ParsePhysics(physics, "physics");
             config.num_envs = num_envs;
             config.pool = pool.get();
             const auto env = std::make_shared<PendulumEnv>(config);
@@ -119,9 +109,9 @@ BenchCase EnvCase(const Engine& engine, int num_envs, int threads) {
 template <typename MakeCase>
 BenchCases CasesOf(const BenchOptions& options, const MakeCase& make) {
   BenchCases cases;
-  for (const Engine& engine : kEngines) {
+  for (const std::string& physics : PhysicsNames()) {
     for (const int num_envs : {8, 128, 1024}) {
-      for (const int threads : options.threads) cases.push_back(make(engine, num_envs, threads));
+      for (const int threads : options.threads) cases.push_back(make(physics, num_envs, threads));
     }
   }
   return cases;

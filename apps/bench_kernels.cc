@@ -12,6 +12,7 @@
 #include "core/rng.h"
 #include "core/thread_pool.h"
 #include "nn/linear.h"
+#include "nn/roofline.h"
 
 namespace upswing {
 namespace {
@@ -94,8 +95,10 @@ BenchCase TransposeCase(int width) {
           }};
 }
 
-/// The STREAM triad on three arrays of n numbers: what the memory gives that they fit into.
-BenchCase TriadCase(const char* memory, size_t n) {
+/// The STREAM triad on three arrays of so many bytes in all: what the memory gives that they fit
+/// into.
+BenchCase TriadCase(const char* memory, size_t bytes) {
+  const size_t n = bytes / (3 * sizeof(float)) / 16 * 16;
   return {fmt::format("kernels/triad/{}", memory),
           "passes",
           1,
@@ -106,7 +109,7 @@ BenchCase TriadCase(const char* memory, size_t n) {
             const auto a = std::make_shared<AlignedVector<float>>(n, 1.0F);
             const auto b = std::make_shared<AlignedVector<float>>(n, 1.0F);
             const auto c = std::make_shared<AlignedVector<float>>(n, 1.0F);
-            return [=] { Triad<float>(*b, *c, 3, *a); };
+            return [=] { Triad(*b, *c, 3, *a); };
           }};
 }
 
@@ -136,8 +139,8 @@ BenchCases KernelCases(const BenchOptions& /*options*/) {
   constexpr size_t kMiB = 1 << 20;
   const size_t in_l2 = CacheBytes(2, kMiB / 2) / 2;
   const size_t in_dram = std::clamp(4 * CacheBytes(0, 32 * kMiB), 128 * kMiB, 1024 * kMiB);
-  cases.push_back(TriadCase("L2", in_l2 / (3 * sizeof(float))));
-  cases.push_back(TriadCase("DRAM", in_dram / (3 * sizeof(float))));
+  cases.push_back(TriadCase("L2", in_l2));
+  cases.push_back(TriadCase("DRAM", in_dram));
   return cases;
 }
 
@@ -152,7 +155,7 @@ double MeasurePeakGflops(int threads) {
     std::atomic<int64_t> multiply_adds{0};
     std::vector<Clock::time_point> began(static_cast<size_t>(threads));
     pool.ParallelFor(threads, [&](int thread) {
-      // None begins before all are there.
+      // None begins before all are there: a thread takes no second task before it ends its first.
       ++arrived;
       while (arrived < threads) std::this_thread::yield();
       began[static_cast<size_t>(thread)] = Clock::now();

@@ -111,8 +111,8 @@ void Config::Describe(Options& o) {
   o.Add(&random_start_velocity, "random_start_velocity", 5, {0, 50}, "rad/s",
         "largest velocity of those");
   o.AddChoice(
-      &physics, "physics", {"mujoco", "closed-form"},
-      "engine to train in: mujoco, or closed-form, its faster twin; evaluations use mujoco");
+      &physics, "physics", PhysicsNames(),
+      "engine to train in; closed-form is a faster twin of mujoco, which all evaluations use");
   o.Section("plant");
   o.Add(&model, "model", "", "MJCF file to use instead of the built-in model");
   plant.Describe(o);

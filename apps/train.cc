@@ -18,6 +18,7 @@
 #include "apps/train_view.h"
 #include "core/error.h"
 #include "core/file.h"
+#include "core/simd.h"
 #include "core/text.h"
 
 namespace upswing {
@@ -196,7 +197,8 @@ int TrainRun(const fs::path& path, Parts& parts, bool resuming, bool steps_given
 
   InstallSignalHandlers();
   view.Announce(parts.config, parts.pool.threads(), parts.agent.online().size(), path);
-  run.Log(Concat(parts.state.steps > 0 ? "resumed" : "started", " at step ", parts.state.steps));
+  run.Log(Concat(parts.state.steps > 0 ? "resumed" : "started", " at step ", parts.state.steps,
+                 ", vector instructions ", SimdPath()));
   bool finished = false;
   try {
     finished = Train(training, parts.state);
@@ -255,6 +257,7 @@ void AddSettings(CLI::App& app, std::vector<FlagValue>& flags) {
   for (const Option& option : options.all()) {
     std::string help = option.help;
     if (!option.unit.empty()) help += ", " + option.unit;
+    if (!option.choices.empty()) help += ": " + Join(option.choices, ", ");
     help += " [" + option.text() + "]";
     const std::string name = option.name;
     if (std::holds_alternative<bool*>(option.target)) {

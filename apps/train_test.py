@@ -202,7 +202,7 @@ class TrainTest(ProgramTest):
 
     def test_bfloat16_learns_with_the_same_bytes_on_any_threads_or_is_refused(self):
         if "bfloat16    none" in self.succeed("info"):
-            return self.refuse(small(precision="bfloat16"), "precision", "float32", "AVX512_BF16")
+            return self.refuse(small(precision="bfloat16"), "bfloat16", "AVX512_BF16")
         self.succeed(*small(out="one", threads=1, precision="bfloat16"))
         self.succeed(*small(out="two", threads=2, precision="bfloat16"))
         self.succeed(*small(out="float"))

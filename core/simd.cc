@@ -16,18 +16,23 @@ struct Path {
   std::string name;
 };
 
+/// Every path that can be compiled, best first.
+const Path kPaths[] = {
+    {HWY_AVX3, "avx512"}, {HWY_AVX2, "avx2"}, {HWY_NEON, "neon"}, {HWY_WASM, "wasm128"}};
+static_assert((HWY_DISABLED_TARGETS & (HWY_AVX3 | HWY_AVX2 | HWY_NEON | HWY_WASM)) == 0);
+
 /// What this processor has and the program was compiled for, best first. The last is the
 /// compiler's own baseline, which every processor of the architecture has.
 const std::vector<Path>& Paths() {
   static const std::vector<Path> paths = [] {
     std::vector<Path> found;
-    const int64_t supported = hwy::SupportedTargets() & HWY_TARGETS & ~HWY_STATIC_TARGET;
-    for (const Path& path : {Path{HWY_AVX3, "avx512"}, Path{HWY_AVX2, "avx2"}}) {
+    const int64_t supported = (hwy::SupportedTargets() & HWY_TARGETS) | HWY_STATIC_TARGET;
+    for (const Path& path : kPaths) {
       if ((supported & path.target) != 0) found.push_back(path);
     }
-    const bool neon = HWY_STATIC_TARGET == HWY_NEON;
-    const bool wasm = HWY_STATIC_TARGET == HWY_WASM;
-    found.push_back({HWY_STATIC_TARGET, neon ? "neon" : wasm ? "wasm128" : "portable"});
+    if (std::ranges::find(found, HWY_STATIC_TARGET, &Path::target) == found.end()) {
+      found.push_back({HWY_STATIC_TARGET, "portable"});
+    }
     return found;
   }();
   return paths;

@@ -3,13 +3,14 @@
 #include <sched.h>
 
 #include <algorithm>
+#include <cassert>
 #include <fstream>
 #include <utility>
 
 namespace upswing {
 namespace {
 
-/// More hardly help: a minibatch of 128 is cut into 4 slices, and idle threads get in the way.
+/// More hardly help where work is cut into a few slices, and idle threads get in the way.
 constexpr int kMostThreads = 8;
 
 /// How many processors' worth of time a container's limit leaves us (Linux, control groups 2:
@@ -45,8 +46,11 @@ constexpr int kTaskBits = 32;
 int ResolveThreads(int64_t wanted) {
   if (wanted > 0) return static_cast<int>(wanted);
   cpu_set_t usable;
+  // It fails where the system knows of more processors than a cpu_set_t has room for.
   const bool known = sched_getaffinity(0, sizeof(usable), &usable) == 0;
-  const int processors = std::min(known ? CPU_COUNT(&usable) : 1, ProcessorQuota());
+  const int present =
+      known ? CPU_COUNT(&usable) : static_cast<int>(std::thread::hardware_concurrency());
+  const int processors = std::min(present, ProcessorQuota());
   return std::clamp(processors, 1, kMostThreads);
 }
 
@@ -73,6 +77,7 @@ void ThreadPool::ParallelFor(int n, const std::function<void(int)>& task) {
     for (int i = 0; i < n; ++i) task(i);
     return;
   }
+  assert(unfinished_ == 0);  // not from within a task
   task_ = &task;
   unfinished_ = static_cast<uint32_t>(n);
   ticket_ = static_cast<uint64_t>(n) << kTaskBits;

@@ -10,7 +10,8 @@
 
 namespace upswing {
 
-/// `wanted`, or if that is 0 the number of processors that this process may use, but no more than 8.
+/// `wanted`, or if that is 0 the number of processors that this process may use, but no more
+/// than 8.
 int ResolveThreads(int64_t wanted);
 
 /// Threads that wait for work. The caller is one of them, so a pool of one starts none.
@@ -25,8 +26,9 @@ class ThreadPool {
 
   /// Calls task(0) … task(n-1), each on the thread that comes first, and returns when all are done;
   /// it does not wait for a thread that comes too late to do any. What a task computes must depend
-  /// on its index alone: then the result has the same bits whatever the number of threads. Rethrows
-  /// the exception of the first task that raised one. Not for two callers at once.
+  /// on its index alone: then the result has the same bits whatever the number of threads. If tasks
+  /// raise exceptions, one of them is rethrown, and the other tasks may have run or not. Not for
+  /// two callers at once, nor from within a task.
   void ParallelFor(int n, const std::function<void(int)>& task);
 
  private:

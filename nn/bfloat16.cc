@@ -24,8 +24,6 @@ namespace {
 
 using PairProduct = Product<uint32_t, float>;
 
-int Half(int n) { return (n + 1) / 2; }
-
 }  // namespace
 
 #if HWY_ARCH_X86_64
@@ -126,7 +124,7 @@ void RoundRows(Matrix<const float> x, Matrix<uint32_t> y) {
       const int left = x.cols() - k;
       const __m512 low = _mm512_maskz_loadu_ps(FirstLanes(left), from + k);
       const __m512 high = _mm512_maskz_loadu_ps(FirstLanes(left - kLanes), from + k + kLanes);
-      _mm512_mask_storeu_epi32(to + k / 2, FirstLanes(Half(left)),
+      _mm512_mask_storeu_epi32(to + k / 2, FirstLanes(PairsIn(left)),
                                (__m512i)_mm512_cvtne2ps_pbh(high, low));
     }
   }
@@ -182,7 +180,7 @@ struct AmxTiles {
   }
 };
 
-/// What _tile_loadconfig reads (Intel, Software Developer's Manual, volume 1, 18.3).
+/// What the instruction LDTILECFG reads (Intel, Software Developer's Manual, volume 1, 18.3).
 struct alignas(64) TileConfig {
   uint8_t palette = 1;
   uint8_t start_row = 0;
@@ -195,9 +193,10 @@ void MultiplyTiles(const PairProduct& p) {
   TileConfig config;
   std::fill_n(config.row_bytes, 8, static_cast<uint16_t>(kTile * sizeof(uint32_t)));
   std::fill_n(config.rows, 8, static_cast<uint8_t>(kTile));
-  _tile_loadconfig(&config);
+  // g++ 12's intrinsic tells the compiler of the first 8 bytes only.
+  asm volatile("ldtilecfg %0" ::"m"(config));
   MultiplyByTiles<AmxTiles>(p);
-  _tile_release();
+  asm volatile("tilerelease");
 }
 
 }  // namespace
@@ -217,19 +216,26 @@ void Finish(const PairProduct& p) {
   }
 }
 
+/// Room for an operand in pairs, which lives until the next call on this thread.
+template <int kOperand>
+Matrix<uint32_t> Scratch(int rows, int cols) {
+  thread_local AlignedVector<uint32_t> values;
+  values.resize(std::max(values.size(), static_cast<size_t>(rows) * static_cast<size_t>(cols)));
+  return {values.data(), rows, cols};
+}
+
 /// Whole tiles by AMX, the margins by AVX512_BF16. The tiles want A by rows.
 void MultiplyAmx(const PairProduct& p) {
   const int M = p.M / kTileBlock * kTileBlock;
   const int N = p.N / kTileBlock * kTileBlock;
   if (M == 0 || N == 0 || p.K % kTile != 0) return MultiplyAvx512(p);
   PairProduct whole = p.Part(0, M, 0, N);
-  thread_local AlignedVector<uint32_t> a_rows;
   if (p.a_k != 1) {
-    a_rows.resize(static_cast<size_t>(M) * static_cast<size_t>(p.K));
+    const Matrix<uint32_t> rows = Scratch<2>(M, p.K);
     // A pair is moved as if it were a float.
     Transpose<float>({reinterpret_cast<const float*>(p.a), p.K, M, static_cast<int>(p.a_k)},
-                     {reinterpret_cast<float*>(a_rows.data()), M, p.K});
-    whole.a = a_rows.data();
+                     {reinterpret_cast<float*>(rows.data()), M, p.K});
+    whole.a = rows.data();
     whole.a_m = p.K;
     whole.a_k = 1;
   }
@@ -271,8 +277,14 @@ bool AmxWorks() {
   PackPairs({a_values.data(), 2 * kPairs, n}, {a_pairs.data(), kPairs, n});
   PackPairs({b_values.data(), 2 * kPairs, n}, {b_pairs.data(), kPairs, n});
   AlignedVector<float> by_avx512(by_tiles.size());
-  PairProduct product{n,       n,     kPairs, a_pairs.data(), 1, n, {b_pairs.data(), kPairs, n}, {},
-                      nullptr, false, {}};
+  PairProduct product{.M = n,
+                      .N = n,
+                      .K = kPairs,
+                      .a = a_pairs.data(),
+                      .a_m = 1,
+                      .a_k = n,
+                      .b = {b_pairs.data(), kPairs, n},
+                      .c = {}};
   product.c = {by_tiles.data(), n, n};
   MultiplyAmx(product);
   product.c = {by_avx512.data(), n, n};
@@ -300,14 +312,6 @@ const Path*& Used() {
   return used;
 }
 
-/// Room for an operand in pairs, which lives until the next call on this thread.
-template <int kOperand>
-Matrix<uint32_t> Scratch(int rows, int cols) {
-  thread_local AlignedVector<uint32_t> values;
-  values.resize(std::max(values.size(), static_cast<size_t>(rows) * static_cast<size_t>(cols)));
-  return {values.data(), rows, cols};
-}
-
 }  // namespace
 
 std::vector<std::string> Bfloat16Paths() {
@@ -326,29 +330,50 @@ void UseBfloat16Path(std::string_view path) {
   Used() = &*found;
 }
 
-void LinearForward(Matrix<const float> x, Matrix<const uint32_t> w_pairs, std::span<const float> b,
-                   bool relu, Matrix<float> y) {
+void LinearForwardBfloat16(Matrix<const float> x, Matrix<const uint32_t> w_pairs,
+                           std::span<const float> b, bool relu, Matrix<float> y) {
   const Matrix<uint32_t> a = Scratch<0>(x.rows(), w_pairs.rows());
   RoundRows(x, a);
-  Used()->multiply(
-      {x.rows(), y.cols(), a.cols(), a.data(), a.stride(), 1, w_pairs, y, b.data(), relu, {}});
+  Used()->multiply({.M = y.rows(),
+                    .N = y.cols(),
+                    .K = a.cols(),
+                    .a = a.data(),
+                    .a_m = a.stride(),
+                    .a_k = 1,
+                    .b = w_pairs,
+                    .c = y,
+                    .bias = b.data(),
+                    .relu = relu});
 }
 
-void LinearBackwardInput(Matrix<const float> dy, Matrix<const uint32_t> w_transposed_pairs,
-                         Matrix<const float> relu, Matrix<float> dx) {
+void LinearBackwardInputBfloat16(Matrix<const float> dy, Matrix<const uint32_t> w_transposed_pairs,
+                                 Matrix<const float> gate, Matrix<float> dx) {
   const Matrix<uint32_t> a = Scratch<0>(dy.rows(), w_transposed_pairs.rows());
   RoundRows(dy, a);
-  Used()->multiply({dy.rows(), dx.cols(), a.cols(), a.data(), a.stride(), 1, w_transposed_pairs, dx,
-                    nullptr, false, relu});
+  Used()->multiply({.M = dx.rows(),
+                    .N = dx.cols(),
+                    .K = a.cols(),
+                    .a = a.data(),
+                    .a_m = a.stride(),
+                    .a_k = 1,
+                    .b = w_transposed_pairs,
+                    .c = dx,
+                    .gate = gate});
 }
 
 void LinearBackwardWeightBfloat16(Matrix<const float> x, Matrix<const float> dy, Matrix<float> dw) {
-  const Matrix<uint32_t> a = Scratch<0>(Half(x.rows()), x.cols());
-  const Matrix<uint32_t> b = Scratch<1>(Half(dy.rows()), dy.cols());
+  const Matrix<uint32_t> a = Scratch<0>(PairsIn(x.rows()), x.cols());
+  const Matrix<uint32_t> b = Scratch<1>(PairsIn(dy.rows()), dy.cols());
   PackPairs(x, a);
   PackPairs(dy, b);
-  Used()->multiply(
-      {x.cols(), dy.cols(), a.rows(), a.data(), 1, a.stride(), b, dw, nullptr, false, {}});
+  Used()->multiply({.M = dw.rows(),
+                    .N = dw.cols(),
+                    .K = a.rows(),
+                    .a = a.data(),
+                    .a_m = 1,
+                    .a_k = a.stride(),
+                    .b = b,
+                    .c = dw});
 }
 
 #else  // no processor with bfloat16 instructions that we know
@@ -359,17 +384,19 @@ void UseBfloat16Path(std::string_view path) {
   throw BadInput(Concat("bfloat16 instructions: this processor has none, got '", path, "'"));
 }
 
-void PackPairs(Matrix<const float>, Matrix<uint32_t>) { std::abort(); }
-void LinearForward(Matrix<const float>, Matrix<const uint32_t>, std::span<const float>, bool,
-                   Matrix<float>) {
-  std::abort();
+void PackPairs(Matrix<const float>, Matrix<uint32_t>) {
+  throw Failure("this processor has no bfloat16 instructions");
 }
-void LinearBackwardInput(Matrix<const float>, Matrix<const uint32_t>, Matrix<const float>,
-                         Matrix<float>) {
-  std::abort();
+void LinearForwardBfloat16(Matrix<const float> x, Matrix<const uint32_t>, std::span<const float>,
+                           bool, Matrix<float>) {
+  PackPairs(x, {});
 }
-void LinearBackwardWeightBfloat16(Matrix<const float>, Matrix<const float>, Matrix<float>) {
-  std::abort();
+void LinearBackwardInputBfloat16(Matrix<const float> dy, Matrix<const uint32_t>,
+                                 Matrix<const float>, Matrix<float>) {
+  PackPairs(dy, {});
+}
+void LinearBackwardWeightBfloat16(Matrix<const float> x, Matrix<const float>, Matrix<float>) {
+  PackPairs(x, {});
 }
 
 #endif

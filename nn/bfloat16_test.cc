@@ -52,10 +52,10 @@ TEST_P(Bfloat16Test, ProductsAreThoseOfRoundedNumbers) {
     AlignedVector<uint32_t> pairs(w.size() + static_cast<size_t>(in + out));
     const Matrix<uint32_t> w_pairs(pairs.data(), (in + 1) / 2, out);
     PackPairs(W, w_pairs);
-    LinearForward(X, w_pairs, b, true, Y);
+    LinearForwardBfloat16(X, w_pairs, b, true, Y);
     const Matrix<uint32_t> wt_pairs(pairs.data(), (out + 1) / 2, in);
     PackPairs(WT, wt_pairs);
-    LinearBackwardInput(DY, wt_pairs, G, DX);
+    LinearBackwardInputBfloat16(DY, wt_pairs, G, DX);
     LinearBackwardWeightBfloat16(X, DY, DW);
 
     // Products of two bfloat16 are exact in float; the sums round as float.
@@ -150,17 +150,14 @@ TEST(AmxTiles, TheOrderOfTilesMakesAProduct) {
                b_number[static_cast<size_t>((2 * k + 1) * N + n)]);
     }
   }
-  MultiplyByTiles<PlainTiles>({M,
-                               N,
-                               K,
-                               a.data(),
-                               K + kGap,
-                               1,
-                               {b.data(), K, N, N + kGap},
-                               {c.data(), M, N, N + kGap},
-                               nullptr,
-                               false,
-                               {}});
+  MultiplyByTiles<PlainTiles>({.M = M,
+                               .N = N,
+                               .K = K,
+                               .a = a.data(),
+                               .a_m = K + kGap,
+                               .a_k = 1,
+                               .b = {b.data(), K, N, N + kGap},
+                               .c = {c.data(), M, N, N + kGap}});
   for (int m = 0; m < M; ++m) {
     for (int n = 0; n < N; ++n) {
       int sum = 0;

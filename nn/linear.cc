@@ -13,6 +13,7 @@
 
 #ifndef UPSWING_NN_LINEAR_ONCE  // what all targets share
 #define UPSWING_NN_LINEAR_ONCE
+#include <algorithm>
 #include <cmath>
 #include <type_traits>
 
@@ -29,8 +30,6 @@ struct KernelTable {
   decltype(&LayerNormBackwardGain<T>) layer_norm_backward_gain;
   decltype(&SquaredNorm<T>) squared_norm;
   decltype(&AdamPolyakStep<T>) adam_polyak_step;
-  decltype(&MultiplyAddChains<T>) multiply_add_chains;
-  decltype(&Triad<T>) triad;
 };
 
 }  // namespace upswing
@@ -52,28 +51,39 @@ using Vec = hn::Vec<Tag<T>>;
 /// Tile shapes: as many registers for C as leave room for a row of B and a number of A. Tiles of
 /// fewer rows, for what remains of M and for single rows, are wider, because a multiply-add takes
 /// several cycles and as many must be under way.
-#if HWY_TARGET == HWY_AVX2
-constexpr int kTileRows = 6;
-constexpr int kRegisters = 12;
-#else
+#if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_NEON  // of 32 registers
 constexpr int kTileRows = 8;
 constexpr int kRegisters = 16;
+#else  // of 16
+constexpr int kTileRows = 6;
+constexpr int kRegisters = 12;
 #endif
+
+/// Whether masked memory operations leave the numbers behind the mask alone, as threads that write
+/// next to each other need; elsewhere Highway reads and rewrites the whole register.
+constexpr bool kMasked = HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3;
 
 /// Up to `count` numbers, or a whole register of them.
 template <bool kPartial, typename T>
 HWY_INLINE Vec<T> Load(const T* from, size_t count) {
   const Tag<T> d;
-  if constexpr (kPartial) return hn::MaskedLoad(hn::FirstN(d, count), d, from);
-  return hn::LoadU(d, from);
+  if constexpr (!kPartial) return hn::LoadU(d, from);
+  if constexpr (kMasked) return hn::MaskedLoad(hn::FirstN(d, count), d, from);
+  HWY_ALIGN T lanes[HWY_LANES(T)] = {};
+  std::copy_n(from, count, lanes);
+  return hn::Load(d, lanes);
 }
 template <bool kPartial, typename T>
 HWY_INLINE void Store(Vec<T> value, T* to, size_t count) {
   const Tag<T> d;
-  if constexpr (kPartial) {
+  if constexpr (!kPartial) {
+    hn::StoreU(value, d, to);
+  } else if constexpr (kMasked) {
     hn::BlendedStore(value, hn::FirstN(d, count), d, to);
   } else {
-    hn::StoreU(value, d, to);
+    HWY_ALIGN T lanes[HWY_LANES(T)];
+    hn::Store(value, d, lanes);
+    std::copy_n(lanes, count, to);
   }
 }
 
@@ -346,36 +356,6 @@ void AdamPolyakStep(const AdamConstants<T>& constants, std::span<const T> g, std
 // What the kernels can be measured against.
 
 template <typename T>
-int64_t MultiplyAddChains(int64_t rounds, T& result) {
-  // More than enough chains to hide the latency, few enough for 16 registers. Each tends to its own
-  // fixed point, so that no number overflows or becomes denormal.
-  constexpr int kChains = 12;
-  const Tag<T> d;
-  const Vec<T> factor = hn::Set(d, T(0.75));
-  const Vec<T> addend = hn::Set(d, T(0.25));
-  Vec<T> x[kChains];
-  HWY_UNROLL(12)
-  for (int i = 0; i < kChains; ++i) x[i] = hn::Set(d, static_cast<T>(i));
-  for (int64_t round = 0; round < rounds; ++round) {
-    HWY_UNROLL(12)
-    for (int i = 0; i < kChains; ++i) x[i] = hn::MulAdd(x[i], factor, addend);
-  }
-  for (int i = 1; i < kChains; ++i) x[0] = hn::Add(x[0], x[i]);
-  result = hn::GetLane(hn::SumOfLanes(d, x[0]));
-  return rounds * kChains * static_cast<int64_t>(hn::Lanes(d));
-}
-
-template <typename T>
-void Triad(std::span<const T> b, std::span<const T> c, T factor, std::span<T> a) {
-  const Vec<T> factors = hn::Set(Tag<T>(), factor);
-  ForVectors<T>(a.size(), [&](size_t i, size_t count, auto partial) HWY_ATTR {
-    const Vec<T> product_and_sum = hn::MulAdd(factors, Load<partial.value>(c.data() + i, count),
-                                              Load<partial.value>(b.data() + i, count));
-    Store<partial.value>(product_and_sum, a.data() + i, count);
-  });
-}
-
-template <typename T>
 constexpr KernelTable<T> kKernels{
     &Multiply<T>,
     &Transpose<T>,
@@ -385,8 +365,6 @@ constexpr KernelTable<T> kKernels{
     &LayerNormBackwardGain<T>,
     &SquaredNorm<T>,
     &AdamPolyakStep<T>,
-    &MultiplyAddChains<T>,
-    &Triad<T>,
 };
 const KernelTable<float>* FloatKernels() { return &kKernels<float>; }
 const KernelTable<double>* DoubleKernels() { return &kKernels<double>; }
@@ -416,21 +394,42 @@ const KernelTable<T>& Kernels() {
 template <typename T>
 void LinearForward(Matrix<const T> x, Matrix<const T> w, std::span<const T> b, bool relu,
                    Matrix<T> y) {
-  Kernels<T>().multiply(
-      {x.rows(), w.cols(), x.cols(), x.data(), x.stride(), 1, w, y, b.data(), relu, {}});
+  Kernels<T>().multiply({.M = y.rows(),
+                         .N = y.cols(),
+                         .K = x.cols(),
+                         .a = x.data(),
+                         .a_m = x.stride(),
+                         .a_k = 1,
+                         .b = w,
+                         .c = y,
+                         .bias = b.data(),
+                         .relu = relu});
 }
 
 template <typename T>
-void LinearBackwardInput(Matrix<const T> dy, Matrix<const T> w_transposed, Matrix<const T> relu,
+void LinearBackwardInput(Matrix<const T> dy, Matrix<const T> w_transposed, Matrix<const T> gate,
                          Matrix<T> dx) {
-  Kernels<T>().multiply({dy.rows(), w_transposed.cols(), dy.cols(), dy.data(), dy.stride(), 1,
-                         w_transposed, dx, nullptr, false, relu});
+  Kernels<T>().multiply({.M = dx.rows(),
+                         .N = dx.cols(),
+                         .K = dy.cols(),
+                         .a = dy.data(),
+                         .a_m = dy.stride(),
+                         .a_k = 1,
+                         .b = w_transposed,
+                         .c = dx,
+                         .gate = gate});
 }
 
 template <typename T>
 void LinearBackwardWeight(Matrix<const T> x, Matrix<const T> dy, Matrix<T> dw) {
-  Kernels<T>().multiply(
-      {x.cols(), dy.cols(), x.rows(), x.data(), 1, x.stride(), dy, dw, nullptr, false, {}});
+  Kernels<T>().multiply({.M = dw.rows(),
+                         .N = dw.cols(),
+                         .K = x.rows(),
+                         .a = x.data(),
+                         .a_m = 1,
+                         .a_k = x.stride(),
+                         .b = dy,
+                         .c = dw});
 }
 
 template <typename T>
@@ -471,16 +470,6 @@ void AdamPolyakStep(const AdamConstants<T>& constants, std::span<const T> g, std
   Kernels<T>().adam_polyak_step(constants, g, m, v, p, target);
 }
 
-template <typename T>
-int64_t MultiplyAddChains(int64_t rounds, T& result) {
-  return Kernels<T>().multiply_add_chains(rounds, result);
-}
-
-template <typename T>
-void Triad(std::span<const T> b, std::span<const T> c, T factor, std::span<T> a) {
-  Kernels<T>().triad(b, c, factor, a);
-}
-
 // Float to work with, double to check gradients by finite differences.
 #define UPSWING_INSTANTIATE(T)                                                                     \
   template void LinearForward(Matrix<const T>, Matrix<const T>, std::span<const T>, bool,          \
@@ -496,9 +485,7 @@ void Triad(std::span<const T> b, std::span<const T> c, T factor, std::span<T> a)
   template void LayerNormBackwardGain(Matrix<const T>, Matrix<const T>, std::span<T>);             \
   template T SquaredNorm(std::span<const T>);                                                      \
   template void AdamPolyakStep(const AdamConstants<T>&, std::span<const T>, std::span<T>,          \
-                               std::span<T>, std::span<T>, std::span<T>);                          \
-  template int64_t MultiplyAddChains(int64_t, T&);                                                 \
-  template void Triad(std::span<const T>, std::span<const T>, T, std::span<T>);
+                               std::span<T>, std::span<T>, std::span<T>);
 UPSWING_INSTANTIATE(float)
 UPSWING_INSTANTIATE(double)
 #undef UPSWING_INSTANTIATE

@@ -6,8 +6,8 @@
 #include "core/matrix.h"
 
 /// Kernels of small networks, for T = float and double. B = batch size.
-/// This is the only file of the project that knows how they are made fast: every kernel is compiled
-/// for several kinds of vector instructions (core/simd.h).
+/// With bfloat16.*, this is the only file of nn/ that knows how they are made fast: every kernel is
+/// compiled for several kinds of vector instructions (core/simd.h).
 ///
 /// What a kernel writes into one place is summed in an order that depends on the sizes alone, not
 /// on where in a batch a row stands: cutting a batch into slices changes no bit.
@@ -19,10 +19,10 @@ template <typename T>
 void LinearForward(Matrix<const T> x, Matrix<const T> w, std::span<const T> b, bool relu,
                    Matrix<T> y);
 
-/// dx (B × in) = dy (B × out) · Wᵀ, given Wᵀ (out × in). If x is the output of a ReLU, `relu` is
-/// that output (B × in), and dx = 0 where it is 0; else `relu` is empty.
+/// dx (B × in) = dy (B × out) · Wᵀ, given Wᵀ (out × in). If x is the output of a ReLU, `gate` is
+/// that output (B × in), and dx = 0 where it is 0; else `gate` is empty.
 template <typename T>
-void LinearBackwardInput(Matrix<const T> dy, Matrix<const T> w_transposed, Matrix<const T> relu,
+void LinearBackwardInput(Matrix<const T> dy, Matrix<const T> w_transposed, Matrix<const T> gate,
                          Matrix<T> dx);
 
 /// dW (in × out) = xᵀ (in × B) · dy (B × out).
@@ -72,17 +72,5 @@ struct AdamConstants {
 template <typename T>
 void AdamPolyakStep(const AdamConstants<T>& constants, std::span<const T> g, std::span<T> m,
                     std::span<T> v, std::span<T> p, std::span<T> target);
-
-// What the kernels can be measured against.
-
-/// Multiply-adds in registers, `rounds` on each of many independent chains: as fast as the
-/// processor can. Returns how many it made; `result` depends on all of them.
-template <typename T>
-int64_t MultiplyAddChains(int64_t rounds, T& result);
-
-/// a (n) = b + factor · c: two numbers read and one written for each, the STREAM triad (McCalpin,
-/// 1995).
-template <typename T>
-void Triad(std::span<const T> b, std::span<const T> c, T factor, std::span<T> a);
 
 }  // namespace upswing

@@ -206,24 +206,5 @@ TEST_P(KernelTest, AdamAndPolyakInOnePass) {
   }
 }
 
-TEST_P(KernelTest, MultiplyAddChainsCountWhatTheyDo) {
-  // x ← 0.75 x + 0.25 tends to 1 on every chain, whatever it began with.
-  float result = 0;
-  const int64_t rounds = 100;
-  const int64_t chains = MultiplyAddChains<float>(rounds, result) / rounds;
-  EXPECT_GE(chains, 12);
-  EXPECT_NEAR(result, static_cast<float>(chains), 1e-4F * static_cast<float>(chains));
-}
-
-TEST_P(KernelTest, Triad) {
-  for (const int n : {1, 7, 100}) {
-    const Table<float> b(1, n, "b"), c(1, n, "c");
-    Table<float> a(1, n, "");
-    Triad<float>(b.row(), c.row(), 0.5F, a.view.row(0));
-    // Halving is exact, so one rounding is left, fused or not.
-    for (int k = 0; k < n; ++k) EXPECT_EQ(a.view(0, k), b.view(0, k) + 0.5F * c.view(0, k));
-  }
-}
-
 }  // namespace
 }  // namespace upswing

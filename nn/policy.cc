@@ -112,7 +112,7 @@ void Policy::Act(Matrix<const float> obs, std::span<double> torque) const {
   for (int first = 0; first < obs.rows(); first += kBlock) {
     const int rows = std::min(kBlock, obs.rows() - first);
     const Matrix<float> preferences(q_, rows, network_.shape().actions);
-    network_.ForwardPreferences({parameters_}, obs.Rows(first, rows), {0, rows}, activations_,
+    network_.ForwardPreferences(parameters_, obs.Rows(first, rows), {0, rows}, activations_,
                                 preferences);
     for (int i = 0; i < rows; ++i) {
       const auto action = static_cast<size_t>(ArgMax(preferences.row(i)));
@@ -131,7 +131,11 @@ void Policy::Save(const std::filesystem::path& path) const {
   std::vector<double> torque(kSamples);
   const Matrix<const float> obs_rows(obs.data(), kSamples, inputs);
   QValues(obs_rows, Matrix<float>(q.data(), kSamples, actions));
-  Act(obs_rows, torque);
+  for (int i = 0; i < kSamples; ++i) {
+    const auto row = std::span<const float>(q).subspan(static_cast<size_t>(i * actions),
+                                                       static_cast<size_t>(actions));
+    torque[static_cast<size_t>(i)] = torques_[static_cast<size_t>(ArgMax(row))];
+  }
 
   TensorFile file;
   file.metadata = about_;

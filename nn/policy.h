@@ -33,7 +33,8 @@ class Policy {
   /// Q-values (B × A) of observations (B × D). Not for two threads at once.
   void QValues(Matrix<const float> obs, Matrix<float> q) const;
 
-  /// The torque (B), N·m, of the action with the largest Q-value, the first of equals.
+  /// The torque (B), N·m, of the action with the largest Q-value, up to rounding; of a dueling
+  /// network by its advantages alone.
   void Act(Matrix<const float> obs, std::span<double> torque) const;
 
   /// Largest |difference| between the sample Q-values of the file that it was loaded from and those

@@ -14,11 +14,11 @@ struct Product {
   int M, N, K;
   const Operand* a;
   ptrdiff_t a_m, a_k;
-  Matrix<const Operand> b;  // (K × N)
-  Matrix<T> c;              // (M × N)
-  const T* bias;            // (N), or null for none
-  bool relu;                // C = max(C, 0)
-  Matrix<const T> gate;     // C = 0 where gate (M × N) is not positive; empty for none
+  Matrix<const Operand> b;    // (K × N)
+  Matrix<T> c;                // (M × N)
+  const T* bias = nullptr;    // (N), or null for none
+  bool relu = false;          // C = max(C, 0)
+  Matrix<const T> gate = {};  // C = 0 where gate (M × N) is not positive; empty for none
 
   /// The part of it that computes `rows` rows from m on and `cols` columns from n on.
   Product Part(int m, int rows, int n, int cols) const {

@@ -13,8 +13,7 @@ namespace upswing {
 namespace {
 
 constexpr int kTaskRows = 64;  // of a weight matrix
-
-int PairsIn(int n) { return (n + 1) / 2; }
+static_assert(kTaskRows % 2 == 0, "tasks do not share pairs of rows");
 
 /// The numbers of some rows in an array that has one for each row.
 template <typename T>
@@ -63,8 +62,8 @@ QNetwork<T>::QNetwork(QNetworkShape shape, bool bfloat16)
     : shape_(std::move(shape)), bfloat16_(bfloat16) {
   if (bfloat16_ && (!std::is_same_v<T, float> || Bfloat16Paths().empty())) {
     throw BadInput(
-        "precision: expected float32, got bfloat16: this processor has no instructions for it "
-        "(AVX512_BF16 or AMX)");
+        "bfloat16 products: this processor has no instructions for them (AVX512_BF16); expected "
+        "precision float32");
   }
   // A policy file brings these numbers too, so they are checked here, where both ways meet.
   constexpr int64_t kMaxWidth = 4096;
@@ -221,7 +220,8 @@ void QNetwork<T>::Apply(Weights weights, const Layer& layer, Matrix<const T> x, 
   if constexpr (std::is_same_v<T, float>) {
     if (bfloat16_ && weights.prepared != nullptr) {
       const uint32_t* pairs = weights.prepared->pairs.data() + w.offset;
-      return LinearForward(x, Matrix<const uint32_t>(pairs, PairsIn(w.in), w.out), b, relu, y);
+      return LinearForwardBfloat16(x, Matrix<const uint32_t>(pairs, PairsIn(w.in), w.out), b, relu,
+                                   y);
     }
   }
   LinearForward(x, Weight(weights.parameters, layer), b, relu, y);
@@ -229,16 +229,17 @@ void QNetwork<T>::Apply(Weights weights, const Layer& layer, Matrix<const T> x, 
 
 template <typename T>
 void QNetwork<T>::ApplyBackward(Weights weights, const Layer& layer, Matrix<const T> dy,
-                                Matrix<const T> relu, Matrix<T> dx) const {
+                                Matrix<const T> gate, Matrix<T> dx) const {
   const ParameterBlock& w = blocks_[layer.weight];
   if constexpr (std::is_same_v<T, float>) {
     if (bfloat16_) {
       const uint32_t* pairs = weights.prepared->transposed_pairs.data() + w.offset;
-      return LinearBackwardInput(dy, Matrix<const uint32_t>(pairs, PairsIn(w.out), w.in), relu, dx);
+      return LinearBackwardInputBfloat16(dy, Matrix<const uint32_t>(pairs, PairsIn(w.out), w.in),
+                                         gate, dx);
     }
   }
   const T* transposed = weights.prepared->transposed.data() + w.offset;
-  LinearBackwardInput(dy, Matrix<const T>(transposed, w.out, w.in), relu, dx);
+  LinearBackwardInput(dy, Matrix<const T>(transposed, w.out, w.in), gate, dx);
 }
 
 template <typename T>
@@ -280,14 +281,15 @@ void QNetwork<T>::Forward(Weights weights, Matrix<const T> x, RowRange rows, Act
 }
 
 template <typename T>
-void QNetwork<T>::ForwardPreferences(Weights weights, Matrix<const T> x, RowRange rows,
-                                     Activations& a, Matrix<T> preferences) const {
+void QNetwork<T>::ForwardPreferences(std::span<const T> parameters, Matrix<const T> x,
+                                     RowRange rows, Activations& a, Matrix<T> preferences) const {
+  const Weights weights{parameters};
   if (!shape_.dueling) return Forward(weights, x, rows, a, preferences);
   const Matrix<const T> feature = ForwardFeatures(weights, x, rows, a);
   const int head = static_cast<int>(shape_.head);
   const Matrix<T> hidden = RowsOf(a.streams, rows, 2 * head).Cols(head, head);
-  const Matrix<const T> w = Weight(weights.parameters, streams()).Cols(head, head);
-  const auto b = Vector(weights.parameters, streams().bias).subspan(static_cast<size_t>(head));
+  const Matrix<const T> w = Weight(parameters, streams()).Cols(head, head);
+  const auto b = Vector(parameters, streams().bias).subspan(static_cast<size_t>(head));
   LinearForward(feature, w, b, true, hidden);
   Apply(weights, output(), hidden, false, preferences.Rows(rows.first, rows.count));
 }

@@ -47,8 +47,9 @@ struct RowRange {
 /// The hidden layers of the two streams are one matrix (H × 2·head): value first, then advantage.
 ///
 /// A gradient takes three steps, each of which threads can share: Prepare over all tasks; Forward
-/// and BackwardInputs over slices of the batch; BackwardWeights over all tasks. However they are
-/// shared out, the result has the same bits. Backward does all of it.
+/// and BackwardInputs over slices of the batch; BackwardWeights over all tasks. Whoever does which,
+/// the result has the same bits; with `bfloat16` as long as the slices are the same. Backward does
+/// all of it.
 template <typename T>
 class QNetwork {
  public:
@@ -99,8 +100,8 @@ class QNetwork {
 
   /// Something to be largest where Q is largest, with less work: of a dueling network the
   /// advantages, without the value stream.
-  void ForwardPreferences(Weights weights, Matrix<const T> x, RowRange rows, Activations& a,
-                          Matrix<T> preferences) const;
+  void ForwardPreferences(std::span<const T> parameters, Matrix<const T> x, RowRange rows,
+                          Activations& a, Matrix<T> preferences) const;
 
   /// The tasks of Prepare and BackwardWeights: 0 … num_tasks() - 1.
   int num_tasks() const { return static_cast<int>(tasks_.size()); }
@@ -142,7 +143,7 @@ class QNetwork {
   Matrix<const T> Weight(std::span<const T> parameters, const Layer& layer) const;
   std::span<const T> Vector(std::span<const T> parameters, size_t block) const;
   void Apply(Weights weights, const Layer& layer, Matrix<const T> x, bool relu, Matrix<T> y) const;
-  void ApplyBackward(Weights weights, const Layer& layer, Matrix<const T> dy, Matrix<const T> relu,
+  void ApplyBackward(Weights weights, const Layer& layer, Matrix<const T> dy, Matrix<const T> gate,
                      Matrix<T> dx) const;
   Matrix<const T> ForwardFeatures(Weights weights, Matrix<const T> x, RowRange rows,
                                   Activations& a) const;

@@ -132,7 +132,7 @@ TEST_P(QNetworkTest, PreferencesDifferFromQValuesByAConstantOfTheRow) {
   AlignedVector<double> preferences(f.q.size());
   const Matrix<const double> x(f.x.data(), 5, f.network.shape().inputs);
   const auto A = static_cast<size_t>(f.network.shape().actions);
-  f.network.ForwardPreferences({f.parameters}, x, {0, 5}, f.activations,
+  f.network.ForwardPreferences(f.parameters, x, {0, 5}, f.activations,
                                Matrix<double>(preferences, 5, static_cast<int>(A)));
   for (size_t i = 0; i < f.q.size(); ++i) {
     const size_t first = i / A * A;

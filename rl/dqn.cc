@@ -14,7 +14,7 @@ namespace upswing {
 namespace {
 
 /// Rows in a slice of a minibatch of B: enough slices for some threads, enough rows for the
-/// kernels.
+/// kernels. From B alone, so that the number of threads changes no bit.
 int SliceRows(int B) { return std::clamp(B / 4, 8, 32); }
 
 QNetworkShape ShapeOf(const DqnConfig& config, int obs_size, size_t actions) {
@@ -32,7 +32,7 @@ void DqnConfig::Describe(Options& o) {
   o.Add(&layer_norm, "layer_norm", true, "layer normalisation after each feature layer");
 
   o.AddChoice(&precision, "precision", {"float32", "bfloat16"},
-              "of the products while learning; bfloat16 needs AVX512_BF16 or AMX");
+              "of the products while learning; bfloat16 needs AVX512_BF16");
 
   o.Section("agent");
   o.Add(&double_q, "double", true, "Double DQN: choose online, evaluate with the target");
@@ -130,7 +130,7 @@ double Dqn::learning_rate() const {
 
 void Dqn::Act(Matrix<const float> obs, std::span<double> torque) {
   const Matrix<float> q(act_q_, obs.rows(), static_cast<int>(torques_.size()));
-  network_.ForwardPreferences({theta_}, obs, {0, obs.rows()}, act_activations_, q);
+  network_.ForwardPreferences(theta_, obs, {0, obs.rows()}, act_activations_, q);
   std::ranges::copy(obs.values(), act_obs_.begin());
 
   // ε-greedy.
@@ -173,7 +173,8 @@ void Dqn::Learn() {
 }
 
 void Dqn::Update(const Minibatch& batch) {
-  // Gradient of the mean Huber loss. Threads share slices of the batch, then weights.
+  // Gradient of the mean Huber loss. Threads share weights (to bring them into the forms that the
+  // products want), then slices of the batch, then weights again.
   const int B = static_cast<int>(config_.batch);
   const int slice_rows = SliceRows(B);
   const int slices = (B + slice_rows - 1) / slice_rows;
@@ -216,7 +217,7 @@ void Dqn::BackwardRows(const Minibatch& batch, RowRange rows) {
   const Matrix<float> q_select(config_.double_q ? q_select_ : q_target_, B, actions);
   const Matrix<float> q_target(q_target_, B, actions);
   const Matrix<float> dq(dq_, B, actions);
-  const auto part = [&](const auto& values) {
+  const auto part = [&](auto& values) {
     return std::span(values).subspan(static_cast<size_t>(rows.first),
                                      static_cast<size_t>(rows.count));
   };
@@ -225,8 +226,7 @@ void Dqn::BackwardRows(const Minibatch& batch, RowRange rows) {
   network_.Forward(target, s_next, rows, activations_, q_target);
   if (config_.double_q) network_.Forward(online, s_next, rows, activations_, q_select);
   TdTargets(q_select.Rows(rows.first, rows.count), q_target.Rows(rows.first, rows.count),
-            part(batch.reward), part(batch.discount),
-            std::span(y_).subspan(static_cast<size_t>(rows.first)));
+            part(batch.reward), part(batch.discount), part(y_));
 
   // dL/dQ(s, a) = clip(Q(s, a; θ) - y, ±1) / B, and 0 for all other actions
   network_.Forward(online, s, rows, activations_, q);

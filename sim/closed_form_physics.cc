@@ -5,9 +5,6 @@
 namespace upswing {
 namespace {
 
-constexpr int kSubsteps = 4;  // physics steps in a control period
-static_assert(kSubsteps * kPhysicsTimestep == kControlPeriod);
-
 int Chunks(size_t num_envs) {
   return static_cast<int>((num_envs + kClosedFormChunk - 1) / kClosedFormChunk);
 }
@@ -43,7 +40,7 @@ void ClosedFormPhysics::Step(std::span<const double> torque, StepResult& result)
   ParallelFor(pool_, Chunks(num_envs_), [this, &result](int chunk) {
     const size_t first = static_cast<size_t>(chunk) * kClosedFormChunk;
     const size_t last = std::min(first + kClosedFormChunk, num_envs_);
-    Advance(batch_, kSubsteps, first, last);
+    Advance(batch_, kPhysicsSteps, first, last);
     Judge(batch_, weights_, first, last, result);
   });
 }

@@ -16,8 +16,10 @@ inline constexpr double kControlPeriod = 0.02;
 
 /// Of every plant, as Mjcf has them.
 inline constexpr double kPhysicsTimestep = 0.005;  // s
-inline constexpr double kArmature = 0.01;          // of both joints, kg·m²
-inline constexpr double kCapsuleRadius = 0.04;     // of both links, m
+inline constexpr int kPhysicsSteps = 4;            // in a control period
+static_assert(kPhysicsSteps * kPhysicsTimestep == kControlPeriod);
+inline constexpr double kArmature = 0.01;       // of both joints, kg·m²
+inline constexpr double kCapsuleRadius = 0.04;  // of both links, m
 
 /// What can be set at run time. The capsules keep their radius; inertia and centre of mass follow
 /// mass and length.

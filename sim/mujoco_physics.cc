@@ -33,7 +33,8 @@ ModelFields ExpandedFields(mjBatch* batch, int env) {
 }  // namespace
 
 MuJoCoPhysics::MuJoCoPhysics(const PhysicsConfig& config)
-    : config_(config), slice_size_(std::max(kSmallestSlice, config.num_envs / kMostSlices)) {
+    : config_(config),
+      slice_size_(std::max(kSmallestSlice, (config.num_envs + kMostSlices - 1) / kMostSlices)) {
   // The model, with the one plant that all environments share or as the base of many.
   const ModelPtr model = config_.mjcf.empty() ? CompileModel(Mjcf(Plant()), "model")
                                               : LoadModel(config_.mjcf, "model");

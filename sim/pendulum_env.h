@@ -30,7 +30,7 @@ struct PendulumEnvConfig : PhysicsConfig {
 };
 
 /// N double pendulums and their episodes. Reaching the time limit truncates; only a numerical
-/// blow-up (MuJoCo's own warning, or numbers that are not finite) terminates. The starts do not
+/// blow-up (see Physics::Step) terminates. The starts do not
 /// depend on the physics.
 class PendulumEnv : public VectorEnv {
  public:

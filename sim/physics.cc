@@ -7,10 +7,29 @@
 
 namespace upswing {
 
+namespace {
+
+struct Engine {
+  PhysicsEngine engine;
+  const char* name;
+};
+constexpr Engine kEngines[] = {{PhysicsEngine::kMuJoCo, "mujoco"},
+                               {PhysicsEngine::kClosedForm, "closed-form"}};
+
+}  // namespace
+
+std::vector<std::string> PhysicsNames() {
+  std::vector<std::string> names;
+  for (const Engine& engine : kEngines) names.emplace_back(engine.name);
+  return names;
+}
+
 PhysicsEngine ParsePhysics(std::string_view name, const std::string& where) {
-  if (name == "mujoco") return PhysicsEngine::kMuJoCo;
-  if (name == "closed-form") return PhysicsEngine::kClosedForm;
-  throw BadInput(Concat(where, ": expected one of mujoco, closed-form, got \"", name, "\""));
+  for (const Engine& engine : kEngines) {
+    if (name == engine.name) return engine.engine;
+  }
+  throw BadInput(
+      Concat(where, ": expected one of ", Join(PhysicsNames(), ", "), ", got \"", name, "\""));
 }
 
 std::unique_ptr<Physics> MakePhysics(const PhysicsConfig& config) {

@@ -18,8 +18,10 @@ enum class PhysicsEngine {
   kClosedForm,  // the built-in model only: many times faster, the same to 12 digits a step
 };
 
-/// The engine that a text names: "mujoco" or "closed-form". Throws BadInput that begins with
-/// `where`.
+/// What the engines are called, the default first: "mujoco", "closed-form".
+std::vector<std::string> PhysicsNames();
+
+/// The engine of a name. Throws BadInput that begins with `where`.
 PhysicsEngine ParsePhysics(std::string_view name, const std::string& where);
 
 /// What physics are made of.
@@ -46,7 +48,8 @@ class Physics {
   virtual void SetState(int env, const PendulumState& state) = 0;
 
   /// Holds `torque` (N), N·m, for one control period and fills `result`, all but `truncated`. Of an
-  /// environment whose state has blown up only `terminated` has a meaning.
+  /// environment whose state has blown up (numbers that are not finite or beyond 1e10, or a warning
+  /// of MuJoCo's) only `terminated` has a meaning.
   virtual void Step(std::span<const double> torque, StepResult& result) = 0;
 
   /// Saves or loads the state.

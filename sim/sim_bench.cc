@@ -17,8 +17,6 @@
 namespace upswing {
 namespace {
 
-constexpr int kSubsteps = 4;  // physics steps in a control period
-
 /// Plants as domain randomisation would draw them.
 std::vector<Plant> RandomPlants(size_t n) {
   Rng rng(1, "plants");
@@ -47,8 +45,8 @@ void PhysicsInMuJoCo(benchmark::State& state) {
   mjb_reset(batch.get(), nullptr, 0, nullptr, mjSTAGE_NONE);
   mjtNum* q1 = mjb_stateComponent(batch.get(), mjSTATE_QPOS, nullptr);  // of the first
   for (int i = 0; i < n; ++i) q1[i * mjb_nstate(batch.get())] = std::sin(i);
-  for (auto _ : state) mjb_step(batch.get(), nullptr, 0, kSubsteps, mjSTAGE_NONE);
-  CountSteps(state, n * kSubsteps);
+  for (auto _ : state) mjb_step(batch.get(), nullptr, 0, kPhysicsSteps, mjSTAGE_NONE);
+  CountSteps(state, n * kPhysicsSteps);
 }
 BENCHMARK(PhysicsInMuJoCo)->Arg(8)->Arg(128)->Arg(1024);
 
@@ -65,10 +63,10 @@ void PhysicsInClosedForm(benchmark::State& state) {
   }
   batch.SetTorque(std::vector<double>(n, 1.0));
   for (auto _ : state) {
-    Advance(batch, kSubsteps, 0, n);
+    Advance(batch, kPhysicsSteps, 0, n);
     benchmark::ClobberMemory();
   }
-  CountSteps(state, static_cast<int64_t>(n) * kSubsteps);
+  CountSteps(state, static_cast<int64_t>(n) * kPhysicsSteps);
 }
 
 void StepEnvironment(benchmark::State& state, PhysicsEngine physics) {
