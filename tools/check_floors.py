@@ -25,7 +25,7 @@ FLOORS = {
 # One door per foreign library: the files that may include it.
 DOORS = {
     "mujoco": re.compile(r"sim/"),
-    "hwy": re.compile(r"(core/simd|nn/linear|nn/bfloat16|sim/closed_form|sim/sine_cosine-inl)"
+    "hwy": re.compile(r"(core/simd(_test)?|nn/linear|nn/bfloat16|sim/closed_form|sim/sine_cosine-inl)"
                       r"\.(h|cc)$"),
     "Eigen": re.compile(r"nn/[^/]*_(test|bench)\.cc$"),
 }
