@@ -178,11 +178,23 @@ class TrainTest(ProgramTest):
             self.assertIn("\n" + line, config)
 
     def test_own_model_is_kept_and_runs_again(self):
-        self.write("own.xml", MODEL.replace('mass="1"', 'mass="1.2"', 1)
-                   .replace('mass="1"', 'mass="0.7"').replace('damping="0"', 'damping="0.1"'))
+        model = MODEL
+        for old, new in (('mass="1"', 'mass="1.2"'), ('mass="1"', 'mass="0.7"'),
+                         ('damping="0"', 'damping="0.1"'), ('damping="0"', 'damping="0.2"'),
+                         # The first link's end, and the second link's place on it.
+                         ('fromto="0 0 0 0 0 -0.5"', 'fromto="0 0 0 0 0 -0.6"'),
+                         ('pos="0 0 -0.5"', 'pos="0 0 -0.6"'),
+                         ("<option ", '<option gravity="0 0 -9.5" '),
+                         ('ctrlrange="-5 5"', 'ctrlrange="-4.5 4.5"')):
+            self.assertIn(old, model)
+            model = model.replace(old, new, 1)
+        self.write("own.xml", model)
         self.succeed(*small(model="own.xml"))
         (self.folder / "own.xml").unlink()
-        self.assertIn("mass2 = 0.7 ", (self.folder / "run/config.toml").read_text(encoding="utf-8"))
+        config = (self.folder / "run/config.toml").read_text(encoding="utf-8")
+        for line in ("mass1 = 1.2 ", "mass2 = 0.7 ", "damping1 = 0.1 ", "damping2 = 0.2 ",
+                     "length1 = 0.6 ", "length2 = 0.5 ", "gravity = 9.5 ", "torque_limit = 4.5 "):
+            self.assertIn("\n" + line, config)
         self.succeed("train", "--config", "run/config.toml", "--out", "again")
         self.assert_same_run("run", "again")
         self.succeed("train", "--resume", "run", "--steps", 6000)

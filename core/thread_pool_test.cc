@@ -1,12 +1,47 @@
 #include "core/thread_pool.h"
 
 #include <gtest/gtest.h>
+#include <sched.h>
 
 #include <numeric>
 #include <stdexcept>
 
 namespace upswing {
 namespace {
+
+/// While it lives this thread, and any that it starts, may use one processor alone.
+class OnOneProcessor {
+ public:
+  OnOneProcessor() {
+    EXPECT_EQ(sched_getaffinity(0, sizeof(before_), &before_), 0);
+    int processor = 0;
+    while (processor < CPU_SETSIZE && !CPU_ISSET(processor, &before_)) ++processor;
+    cpu_set_t one;
+    CPU_ZERO(&one);
+    CPU_SET(processor, &one);
+    EXPECT_EQ(sched_setaffinity(0, sizeof(one), &one), 0);
+  }
+  ~OnOneProcessor() { EXPECT_EQ(sched_setaffinity(0, sizeof(before_), &before_), 0); }
+  OnOneProcessor(const OnOneProcessor&) = delete;
+  OnOneProcessor& operator=(const OnOneProcessor&) = delete;
+
+ private:
+  cpu_set_t before_;
+};
+
+TEST(ResolveThreads, TakesANumberAsItIs) {
+  EXPECT_EQ(ResolveThreads(1), 1);
+  EXPECT_EQ(ResolveThreads(3), 3);
+  EXPECT_EQ(ResolveThreads(12), 12);  // more than it would choose itself
+}
+
+TEST(ResolveThreads, ChoosesAsManyAsItMayUseUpToEight) {
+  EXPECT_GE(ResolveThreads(0), 1);
+  EXPECT_LE(ResolveThreads(0), 8);
+  const OnOneProcessor one;
+  EXPECT_EQ(ResolveThreads(0), 1);
+  EXPECT_EQ(ResolveThreads(2), 2);
+}
 
 TEST(ThreadPool, RunsEveryTaskOnceWhateverTheNumberOfThreads) {
   for (const int threads : {1, 2, 3, 8}) {
@@ -18,6 +53,24 @@ TEST(ThreadPool, RunsEveryTaskOnceWhateverTheNumberOfThreads) {
       for (const int count : calls) ASSERT_EQ(count, 1);
     }
   }
+}
+
+TEST(ThreadPool, ManyShortRoundsWithMoreThreadsThanProcessors) {
+  const OnOneProcessor one;
+  ThreadPool pool(8);
+  const auto caller = std::this_thread::get_id();
+  std::atomic<int> by_others{0};
+  for (int round = 0; round < 500; ++round) {
+    const int n = 2 + round % 5;
+    std::vector<int> done(static_cast<size_t>(n), -1);  // gone at the end of the round
+    pool.ParallelFor(n, [&](int i) {
+      std::this_thread::yield();  // or the caller would be done before anybody else came
+      done[static_cast<size_t>(i)] = round;
+      by_others += std::this_thread::get_id() != caller ? 1 : 0;
+    });
+    for (const int last : done) ASSERT_EQ(last, round);
+  }
+  EXPECT_GT(by_others, 0);
 }
 
 TEST(ThreadPool, SumsInAFixedOrderHaveTheSameBits) {
@@ -46,6 +99,23 @@ TEST(ThreadPool, AnExceptionReachesTheCallerAndThePoolGoesOn) {
   std::atomic<int> calls{0};
   pool.ParallelFor(4, [&](int) { ++calls; });
   EXPECT_EQ(calls, 4);
+}
+
+TEST(ThreadPool, OfTwoExceptionsOneReachesTheCallerAndNoneIsLeft) {
+  ThreadPool pool(3);
+  for (int round = 0; round < 200; ++round) {
+    std::atomic<int> calls{0};
+    EXPECT_THROW(pool.ParallelFor(6,
+                                  [&](int i) {
+                                    ++calls;
+                                    if (i == 1 || i == 2) throw std::runtime_error("task");
+                                  }),
+                 std::runtime_error);
+    EXPECT_EQ(calls, 6);  // the others are done nevertheless
+    calls = 0;
+    EXPECT_NO_THROW(pool.ParallelFor(6, [&](int) { ++calls; }));
+    EXPECT_EQ(calls, 6);
+  }
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
+#include <limits>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -16,31 +18,79 @@ namespace {
 
 size_t Size(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
 
-/// A matrix that owns its numbers, with a gap after each row.
+/// Each kernel on each kind of vector instructions that this machine has, against its definition
+/// as plain loops in double; with tables whose rows have a gap of so many numbers behind them, and
+/// with tables that end with their last row, where a sanitizer sees what goes beyond.
+class KernelTest : public ::testing::TestWithParam<std::tuple<std::string, int>> {
+ public:
+  static int Gap() { return std::get<1>(GetParam()); }
+
+ protected:
+  void SetUp() override { UseSimdPath(std::get<0>(GetParam())); }
+  void TearDown() override { UseSimdPath(SimdPaths().front()); }
+};
+INSTANTIATE_TEST_SUITE_P(Paths, KernelTest,
+                         ::testing::Combine(::testing::ValuesIn(SimdPaths()),
+                                            ::testing::Values(3, 0)),
+                         [](const auto& info) {
+                           const bool gaps = std::get<1>(info.param) > 0;
+                           return std::get<0>(info.param) + (gaps ? "_gaps" : "_no_gaps");
+                         });
+
+/// A matrix that owns its numbers. The gap after each row holds large ones, which show if they are
+/// read, and must have the same bits at the end of the table.
 template <typename T>
 struct Table {
   AlignedVector<T> values;
   Matrix<T> view;
+  AlignedVector<T> before;  // as `values`; all but its gaps is without meaning
 
   Table(int rows, int cols, const char* stream)
-      : values(Size(rows, cols + 3)), view(values.data(), rows, cols, cols + 3) {
+      : values(Size(rows, cols + KernelTest::Gap())),
+        view(values.data(), rows, cols, cols + KernelTest::Gap()) {
     Rng rng(7, stream);
     for (T& x : values) x = static_cast<T>(rng.Normal());
+    FillGaps([&] { return static_cast<T>(1e30 * (1 + rng.Uniform())); });
   }
+  Table(const Table&) = delete;
+  Table& operator=(const Table&) = delete;
+  ~Table() {
+    for (int row = 0; row < view.rows(); ++row) {
+      const std::span<const T> gap = GapBehind(row);
+      const T* expected = before.data() + (gap.data() - values.data());
+      EXPECT_EQ(std::memcmp(gap.data(), expected, gap.size_bytes()), 0)
+          << "written behind row " << row << " of " << view.rows() << " × " << view.cols();
+    }
+  }
+
   // As a template's argument only this type can be deduced from.
   operator Matrix<const T>() const { return view; }  // NOLINT(google-explicit-constructor)
   std::span<const T> row() const { return view.row(0); }
+  std::span<T> row() { return view.row(0); }
+
+ protected:
+  template <typename Number>
+  void FillGaps(const Number& number) {
+    for (int row = 0; row < view.rows(); ++row) {
+      for (T& x : GapBehind(row)) x = number();
+    }
+    before = values;
+  }
+
+ private:
+  std::span<T> GapBehind(int row) const {
+    return {view.row(row).data() + view.cols(), static_cast<size_t>(KernelTest::Gap())};
+  }
 };
 
-/// Each kernel on each kind of vector instructions that this machine has, against its definition
-/// as plain loops in double.
-class KernelTest : public ::testing::TestWithParam<std::string> {
- protected:
-  void SetUp() override { UseSimdPath(GetParam()); }
-  void TearDown() override { UseSimdPath(SimdPaths().front()); }
+/// A table that is only read: its gaps are not a number, so that not even 0 times one goes unseen.
+/// (Those of other tables are numbers, because what is computed with NaN may have the same bits.)
+template <typename T>
+struct Input : Table<T> {
+  Input(int rows, int cols, const char* stream) : Table<T>(rows, cols, stream) {
+    this->FillGaps([] { return std::numeric_limits<T>::quiet_NaN(); });
+  }
 };
-INSTANTIATE_TEST_SUITE_P(Paths, KernelTest, ::testing::ValuesIn(SimdPaths()),
-                         [](const auto& info) { return info.param; });
 
 /// Rounding of a sum of n products of numbers of size 1, with room to spare.
 template <typename T>
@@ -51,7 +101,7 @@ double Tolerance(int n) {
 template <typename T>
 void CheckLinear(int B, int in, int out) {
   SCOPED_TRACE(::testing::Message() << B << " × " << in << " × " << out);
-  const Table<T> x(B, in, "x"), w(in, out, "w"), b(1, out, "b"), dy(B, out, "dy"),
+  const Input<T> x(B, in, "x"), w(in, out, "w"), b(1, out, "b"), dy(B, out, "dy"),
       gate(B, in, "gate"), w_transposed(out, in, "wt");
   Table<T> y(B, out, ""), y_relu(B, out, ""), dx(B, in, ""), dw(in, out, "");
   LinearForward<T>(x, w, b.row(), false, y.view);
@@ -94,7 +144,7 @@ TEST_P(KernelTest, LinearLayersMatchTheirDefinitions) {
 TEST_P(KernelTest, ARowDoesNotDependOnTheRowsBesideIt) {
   // To the bit: or else the number of threads would show.
   const int B = 37, in = 70, out = 45;
-  const Table<float> x(B, in, "x"), w(in, out, "w"), b(1, out, "b");
+  const Input<float> x(B, in, "x"), w(in, out, "w"), b(1, out, "b");
   Table<float> together(B, out, ""), alone(1, out, "");
   LinearForward<float>(x, w, b.row(), true, together.view);
   for (int i = 0; i < B; ++i) {
@@ -112,7 +162,7 @@ TEST_P(KernelTest, ARowDoesNotDependOnTheRowsBesideIt) {
 TEST_P(KernelTest, TransposeTransposes) {
   for (const auto& [rows, cols] :
        std::vector<std::pair<int, int>>{{1, 1}, {4, 8}, {9, 256}, {37, 6}}) {
-    const Table<float> x(rows, cols, "x");
+    const Input<float> x(rows, cols, "x");
     Table<float> y(cols, rows, "");
     Transpose<float>(x, y.view);
     for (int r = 0; r < rows; ++r) {
@@ -123,10 +173,10 @@ TEST_P(KernelTest, TransposeTransposes) {
 
 TEST_P(KernelTest, SumsMatchTheirDefinitions) {
   for (const int n : {1, 7, 16, 37, 300}) {
-    const Table<double> x(9, n, "x"), y(9, n, "y");
-    AlignedVector<double> sum(static_cast<size_t>(n)), along(sum.size());
-    SumRows<double>(x, sum);
-    LayerNormBackwardGain<double>(x, y, along);
+    const Input<double> x(9, n, "x"), y(9, n, "y");
+    Table<double> sum(1, n, ""), along(1, n, "");
+    SumRows<double>(x, sum.row());
+    LayerNormBackwardGain<double>(x, y, along.row());
     double squares = 0;
     for (int k = 0; k < n; ++k) {
       double column = 0, products = 0;
@@ -134,8 +184,8 @@ TEST_P(KernelTest, SumsMatchTheirDefinitions) {
         column += x.view(i, k);
         products += x.view(i, k) * y.view(i, k);
       }
-      ASSERT_NEAR(sum[static_cast<size_t>(k)], column, 1e-13);
-      ASSERT_NEAR(along[static_cast<size_t>(k)], products, 1e-13);
+      ASSERT_NEAR(sum.view(0, k), column, 1e-13);
+      ASSERT_NEAR(along.view(0, k), products, 1e-13);
       squares += x.view(0, k) * x.view(0, k);
     }
     ASSERT_NEAR(SquaredNorm<double>(x.row()), squares, 1e-13 * n);
@@ -146,9 +196,9 @@ TEST_P(KernelTest, LayerNormRowsGetMeanZeroAndVarianceOneBeforeGainAndBias) {
   for (const int n : {1, 5, 37, 256}) {
     const int B = 3;
     Table<double> x(B, n, "layer norm"), y(B, n, "");
-    const Table<double> raw(B, n, "layer norm"), gain(1, n, "gain"), bias(1, n, "bias");
-    AlignedVector<double> inv_std(B);
-    LayerNormReluForward<double>(x.view, gain.row(), bias.row(), inv_std, y.view);
+    const Input<double> raw(B, n, "layer norm"), gain(1, n, "gain"), bias(1, n, "bias");
+    Table<double> inv_std(1, B, "");
+    LayerNormReluForward<double>(x.view, gain.row(), bias.row(), inv_std.row(), y.view);
     for (int i = 0; i < B; ++i) {
       double mean = 0, square = 0;
       for (int k = 0; k < n; ++k) mean += raw.view(i, k) / n;
@@ -166,7 +216,7 @@ TEST_P(KernelTest, LayerNormGradientMatchesFiniteDifferences) {
   // f = Σ dy · (gain · x̂ + bias): the ReLU is kept out by a large bias.
   const int n = 21;
   const double h = 1e-5;
-  const Table<double> x(1, n, "x"), gain(1, n, "gain"), dy(1, n, "dy");
+  const Input<double> x(1, n, "x"), gain(1, n, "gain"), dy(1, n, "dy");
   const AlignedVector<double> bias(static_cast<size_t>(n), 100.0);
   AlignedVector<double> inv_std(1);
   const auto f = [&](int k, double step) {
@@ -188,11 +238,11 @@ TEST_P(KernelTest, LayerNormGradientMatchesFiniteDifferences) {
 TEST_P(KernelTest, AdamAndPolyakInOnePass) {
   const AdamConstants<double> c{0.5, 0.9, 0.99, 0.01, 1e-3, 0.25};
   for (const int n : {1, 3, 50}) {
-    const Table<double> g(1, n, "g"), m0(1, n, "m"), v0(1, n, "v"), p0(1, n, "p"), t0(1, n, "t");
+    const Input<double> g(1, n, "g"), m0(1, n, "m"), v0(1, n, "v"), p0(1, n, "p"), t0(1, n, "t");
     Table<double> m(1, n, "m"), v(1, n, "v"), p(1, n, "p"), t(1, n, "t");
     const auto square = [](double x) { return x * x; };
-    for (double& x : v.values) x = square(x);
-    AdamPolyakStep<double>(c, g.row(), m.view.row(0), v.view.row(0), p.view.row(0), t.view.row(0));
+    for (double& x : v.row()) x = square(x);
+    AdamPolyakStep<double>(c, g.row(), m.row(), v.row(), p.row(), t.row());
     for (int k = 0; k < n; ++k) {
       const double gradient = 0.5 * g.view(0, k);
       const double m_new = 0.9 * m0.view(0, k) + 0.1 * gradient;

@@ -25,8 +25,8 @@ FLOORS = {
 # One door per foreign library: the files that may include it.
 DOORS = {
     "mujoco": re.compile(r"sim/"),
-    "hwy": re.compile(r"(core/simd|nn/linear|nn/bfloat16|nn/roofline|sim/closed_form|sim/sine_cosine-inl)"
-                      r"\.(h|cc)$"),
+    "hwy": re.compile(r"(core/simd(_test)?|nn/(linear|bfloat16|roofline)|"
+                      r"sim/(closed_form|sine_cosine-inl))\.(h|cc)$"),
     "Eigen": re.compile(r"nn/[^/]*_(test|bench)\.cc$"),
 }
 

@@ -11,6 +11,7 @@ CHECK = Path(__file__).resolve().parent / "check_floors.py"
 
 GOOD = {
     "core/rng.h": "#include <vector>\n",
+    "core/simd_test.cc": "#include <hwy/highway.h>\n",
     "nn/linear.h": '#pragma once\n#include "core/rng.h"\n',
     "nn/linear.cc": '#include "nn/linear.h"\n#include <hwy/highway.h>\n',
     "nn/linear_bench.cc": '#include "nn/linear.h"\n#include <Eigen/Core>\n',
@@ -79,6 +80,8 @@ class CheckFloors(unittest.TestCase):
                                  "apps/view.cc:1", "mujoco/mujoco.h is not for this file")
         self.assert_one_offender({"nn/adam.cc": "#include <Eigen/Core>\n"},
                                  "nn/adam.cc:1", "Eigen/Core is not for this file")
+        self.assert_one_offender({"nn/linear_test.cc": "#include <hwy/highway.h>\n"},
+                                 "nn/linear_test.cc:1", "hwy/highway.h is not for this file")
 
     def test_missing_header(self):
         self.assert_one_offender({"rl/ppo.cc": '#include "rl/ppo.h"\n'},

@@ -102,7 +102,8 @@ def gradient(width, batch, threads, seconds):
     with tempfile.TemporaryDirectory(prefix="upswing-peers-") as folder:
         file = Path(folder, "bench.json")
         run([PROGRAM, "bench", "gradient", "--network", "plain", "--hidden", f"{width},{width}",
-             "--batch", batch, "--threads", threads, "--seconds", seconds, "--json", file])
+             "--batch", batch, "--threads", threads, "--seconds", seconds, "--repetitions", 1,
+             "--json", file])
         return read_bench(file.read_text(encoding="utf-8"))
 
 
