@@ -121,7 +121,7 @@ class BenchRunner {
     if (c.bytes > 0) rate("bytes_per_second", c.bytes);
     if (c.flops <= 0) return;
     rate("gflops", 1e-9 * c.flops);
-    rate("peak_share", 1e-9 * c.flops / context_.peak_gflops.at(c.threads));
+    if (c.float32) rate("peak_share", 1e-9 * c.flops / context_.peak_gflops.at(c.threads));
   }
 
   const BenchCases& cases_;
@@ -149,7 +149,14 @@ void CheckOptions(const BenchOptions& options) {
   if (restricted && !gradient) {
     throw BadInput("bench: --network, --hidden, --batch and --precision are for the part gradient");
   }
+  if (options.precision == "bfloat16" && !options.simd.empty()) {
+    throw BadInput(
+        "--simd: expected none with --precision bfloat16, which has instructions of its own");
+  }
   if (!options.json) return;
+  if (fs::is_directory(*options.json)) {
+    throw BadInput(Concat("--json ", *options.json, ": expected a file, got a folder"));
+  }
   const fs::path folder = fs::absolute(*options.json).parent_path();
   if (!fs::is_directory(folder)) {
     throw BadInput(Concat("--json ", *options.json, ": there is no folder ", folder.string()));
@@ -233,8 +240,7 @@ void AddBench(CLI::App& program, Command& command) {
   app->add_option("--batch", o->batch, "gradient: size of the minibatches")
       ->check(CLI::Range(1, 65536).description(""))
       ->type_name("INTEGER");
-  app->add_option("--precision", o->precision,
-                  "gradient: float32 or bfloat16 [float32]; the peak remains that of float32")
+  app->add_option("--precision", o->precision, "gradient: float32 or bfloat16 [float32]")
       ->check(CLI::IsMember({"float32", "bfloat16"}).description(""))
       ->type_name("NAME");
 

@@ -37,6 +37,7 @@ struct BenchCase {
   int threads = 1;    // that work at once
   /// Makes the work, with all that it needs.
   std::function<BenchWork()> prepare = {};
+  bool float32 = true;  // so that the peak says something of it
 };
 using BenchCases = std::vector<BenchCase>;
 

@@ -82,7 +82,13 @@ BenchCase GradientCase(const DqnConfig& config, int threads,
       fmt::format("gradient/{}{}/{}/batch:{}/threads:{}", config.dueling ? "dueling" : "plain",
                   config.precision == "bfloat16" ? "-bfloat16" : "", fmt::join(config.hidden, "-"),
                   config.batch, threads);
-  return {name, "updates", 1, UpdateFlops(config), 0, threads, [=]() -> BenchWork {
+  return {name,
+          "updates",
+          1,
+          UpdateFlops(config),
+          0,
+          threads,
+          [=]() -> BenchWork {
             struct Parts {
               ThreadPool pool;
               Dqn agent;
@@ -98,7 +104,8 @@ BenchCase GradientCase(const DqnConfig& config, int threads,
               replay->Sample(parts->rng, parts->batch);
               parts->agent.Update(parts->batch);
             };
-          }};
+          },
+          config.precision != "bfloat16"};
 }
 
 BenchCase ActCase(int batch) {

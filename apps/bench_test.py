@@ -142,6 +142,8 @@ class BenchTest(ProgramTest):
         if done.returncode != 0:
             return self.assert_one_line(done, 2, "bfloat16")
         self.assertIn("gradient/dueling-bfloat16/32/batch:32/threads:1 ", done.stdout)
+        self.assertNotIn("%", done.stdout)  # the peak is that of float32
+        self.refuse(["bench", *arguments, "--simd", "portable"], "--simd", "bfloat16")
 
     def test_interrupt(self):
         process = self.start("bench", "act", "--seconds", 1000, "--json", "b.json", wait=False)

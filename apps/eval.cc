@@ -22,12 +22,13 @@ struct EvalArguments {
   bool as_json = false;
 };
 
-void PrintTable(const Evaluation& e, const LoadedPolicy& loaded, const Plant& plant) {
+void PrintTable(const Evaluation& e, const LoadedPolicy& loaded, const EvalArguments& arguments,
+                const Plant& plant) {
   const auto moments = [](const Moments& m) {
     return fmt::format("{:.4g} ± {:.2g}", m.mean, m.deviation);
   };
   fmt::print("{}\n", loaded.path.string());
-  fmt::print("  plant          {}\n", PlantText(plant));
+  fmt::print("  plant          {}, physics {}\n", PlantText(plant), arguments.physics);
   fmt::print("  success        {} of {} = {:.1f}%   (95% interval {:.1f}% to {:.1f}%)\n",
              e.successes, e.episodes, 100 * e.success_rate(), 100 * e.success_interval.low,
              100 * e.success_interval.high);
@@ -108,7 +109,7 @@ int RunEval(const EvalArguments& arguments) {
   if (arguments.as_json) {
     PrintJson(evaluation, loaded, arguments, plant);
   } else {
-    PrintTable(evaluation, loaded, plant);
+    PrintTable(evaluation, loaded, arguments, plant);
   }
   return 0;
 }

@@ -21,6 +21,9 @@ void TrainView::Announce(const Config& config, int threads, size_t num_parameter
              d.double_q ? "double, " : "", d.dueling ? "dueling" : "plain",
              fmt::join(d.hidden, "-"), d.dueling ? fmt::format(" with heads of {}", d.head) : "",
              FormatCount(num_parameters), config.train.envs, threads, threads == 1 ? "" : "s");
+  if (config.physics != PhysicsNames().front() || d.precision != "float32") {
+    fmt::print("  physics {}, products in {}\n", config.physics, d.precision);
+  }
   if (since_step_ > 0) fmt::print("  going on from step {}\n", FormatCount(since_step_));
   std::fflush(stdout);
 }

@@ -188,6 +188,8 @@ def parse_arguments():
                         help="length of a measurement, about [3]")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there, too")
     a = parser.parse_args()
+    if a.json and a.json.is_dir():
+        parser.error(f"--json {a.json}: expected a file, got a folder")
     if a.json and not a.json.resolve().parent.is_dir():
         parser.error(f"--json {a.json}: there is no folder {a.json.resolve().parent}")
     return a
