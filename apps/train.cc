@@ -163,7 +163,7 @@ void LogIfPossible(RunFolder& run, const std::string& line) {
 /// Makes the folder of a new run, with its first checkpoint.
 fs::path MakeRun(const TrainArguments& arguments, Parts& parts) {
   const Config& config = parts.config;
-  const fs::path path = arguments.out.empty() ? FreeRunFolder(config) : fs::path(arguments.out);
+  fs::path path = arguments.out.empty() ? FreeRunFolder(config) : fs::path(arguments.out);
   std::vector<std::pair<std::string, std::string>> files{
       {"config.toml", ConfigToml(config, false)}};
   if (!config.mjcf.empty()) files.emplace_back("model.xml", config.mjcf);

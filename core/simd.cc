@@ -24,7 +24,7 @@ static_assert((HWY_DISABLED_TARGETS & (HWY_AVX3 | HWY_AVX2 | HWY_NEON | HWY_WASM
 /// What this processor has and the program was compiled for, best first. The last is the
 /// compiler's own baseline, which every processor of the architecture has.
 const std::vector<Path>& Paths() {
-  static const std::vector<Path> paths = [] {
+  static const std::vector<Path> kUsable = [] {
     std::vector<Path> found;
     const int64_t supported = (hwy::SupportedTargets() & HWY_TARGETS) | HWY_STATIC_TARGET;
     for (const Path& path : kPaths) {
@@ -35,7 +35,7 @@ const std::vector<Path>& Paths() {
     }
     return found;
   }();
-  return paths;
+  return kUsable;
 }
 
 }  // namespace

@@ -293,7 +293,7 @@ bool AmxWorks() {
 }
 
 const std::vector<Path>& Paths() {
-  static const std::vector<Path> paths = [] {
+  static const std::vector<Path> kUsable = [] {
     std::vector<Path> found;
     __builtin_cpu_init();
     if (__builtin_cpu_supports("avx512bf16") && __builtin_cpu_supports("avx512bw") &&
@@ -303,7 +303,7 @@ const std::vector<Path>& Paths() {
     }
     return found;
   }();
-  return paths;
+  return kUsable;
 }
 
 /// The path in use; asked for only where there is one.

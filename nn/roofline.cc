@@ -27,7 +27,7 @@ int64_t MultiplyAddChains(int64_t rounds, float& result) {
   for (int i = 0; i < kChains; ++i) x[i] = hn::Set(d, static_cast<float>(i));
   for (int64_t round = 0; round < rounds; ++round) {
     HWY_UNROLL(12)
-    for (int i = 0; i < kChains; ++i) x[i] = hn::MulAdd(x[i], factor, addend);
+    for (Vec& chain : x) chain = hn::MulAdd(chain, factor, addend);
   }
   for (int i = 1; i < kChains; ++i) x[0] = hn::Add(x[0], x[i]);
   result = hn::GetLane(hn::SumOfLanes(d, x[0]));
