@@ -61,15 +61,10 @@ DqnConfig BareConfig(bool dueling, const std::vector<int>& hidden, int batch) {
   return config;
 }
 
-QNetworkShape ShapeOf(const DqnConfig& config) {
-  return {kObservationSize, kActions,         config.hidden, config.dueling ? config.head : 0,
-          config.dueling,   config.layer_norm};
-}
-
 /// Operations of a gradient step: all forward passes, the gradients of all inputs but the
 /// observations, the gradients of all weights.
 double UpdateFlops(const DqnConfig& config) {
-  const std::vector<double> layers = LayerMultiplyAdds(ShapeOf(config));
+  const std::vector<double> layers = LayerMultiplyAdds(config.Shape(kObservationSize, kActions));
   const double all = Sum(layers);
   const double forward = (config.double_q ? 3 : 2) * all;
   return 2 * static_cast<double>(config.batch) * (forward + (all - layers.front()) + all);
@@ -109,7 +104,7 @@ BenchCase GradientCase(const DqnConfig& config, int threads,
 }
 
 BenchCase ActCase(int batch) {
-  const QNetworkShape shape = ShapeOf(BareConfig(true, {256, 256}, batch));
+  const QNetworkShape shape = BareConfig(true, {256, 256}, batch).Shape(kObservationSize, kActions);
   // The value stream is left out: half of the streams' hidden layer, and the value.
   const std::vector<double> layers = LayerMultiplyAdds(shape);
   const double multiply_adds = layers[0] + layers[1] + layers[2] / 2 + layers[4];
@@ -140,17 +135,11 @@ BenchCase ActCase(int batch) {
 struct LearningLoop {
   LearningLoop(const Config& config, int threads)
       : pool(threads),
-        env(EnvironmentsOf(config, pool)),
+        env(config.Environments(pool)),
         agent(config.dqn, env.num_envs(), env.obs_size(), TorqueLevels(env.torque_limit()), 1,
               pool),
         result(env.MakeResult()),
         torque(static_cast<size_t>(env.num_envs())) {}
-
-  static PendulumEnvConfig EnvironmentsOf(const Config& config, ThreadPool& shared) {
-    PendulumEnvConfig environments = config.Environments();
-    environments.pool = &shared;
-    return environments;
-  }
 
   /// One lock-step of all environments and the gradient steps that fall due.
   void Step() {
@@ -234,7 +223,7 @@ BenchCases ReplayCases(const BenchOptions& /*options*/) {
 BenchCases TrainCases(const BenchOptions& options) {
   BenchCases cases;
   for (const std::string agent : {"d3qn", "d3qn-small"}) {
-    for (const std::string physics : {"mujoco", "closed-form"}) {
+    for (const std::string& physics : PhysicsNames()) {
       for (const int threads : options.threads) {
         cases.push_back(TrainCase(agent, physics, threads));
       }

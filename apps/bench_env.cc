@@ -55,14 +55,13 @@ BenchWork PhysicsInMuJoCo(int num_envs, int threads) {
 /// The closed form's steps alone, in chunks as the environment shares them out.
 BenchWork PhysicsInClosedForm(int num_envs, int threads) {
   const auto n = static_cast<size_t>(num_envs);
-  const size_t chunks = (n + kClosedFormChunk - 1) / kClosedFormChunk;
   const auto batch = std::make_shared<ClosedFormBatch>(n);
   for (size_t env = 0; env < n; ++env) batch->SetPlant(env, Plant());
   const auto pool = std::make_shared<ThreadPool>(threads);
   const auto torques = std::make_shared<Torques>(num_envs);
   return [=] {
     batch->SetTorque(torques->Next());
-    pool->ParallelFor(static_cast<int>(chunks), [&batch = *batch, n](int chunk) {
+    pool->ParallelFor(ClosedFormChunks(n), [&batch = *batch, n](int chunk) {
       const size_t first = static_cast<size_t>(chunk) * kClosedFormChunk;
       Advance(batch, kPhysicsSteps, first, std::min(first + kClosedFormChunk, n));
     });

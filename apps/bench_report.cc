@@ -7,16 +7,10 @@
 #include <nlohmann/json.hpp>
 
 #include "core/text.h"
+#include "rl/evaluate.h"
 
 namespace upswing {
 namespace {
-
-/// The middle one, of an even number the mean of the two in the middle.
-double Median(std::vector<double> numbers) {
-  std::ranges::sort(numbers);
-  const size_t n = numbers.size();
-  return (numbers[(n - 1) / 2] + numbers[n / 2]) / 2;
-}
 
 /// Seconds with three digits and the unit that suits them.
 std::string FormatTime(double seconds) {
@@ -92,7 +86,7 @@ void BenchReporter::ReportRuns(const std::vector<Run>& runs) {
     cpu.push_back(run.cpu_accumulated_time / static_cast<double>(run.iterations));
   }
   if (wall.empty()) return;
-  PrintRow(measured, Median(wall), Median(cpu));
+  PrintRow(measured, QuartilesOf(wall).median, QuartilesOf(cpu).median);
   ++done_;
   seconds_done_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
 }

@@ -120,8 +120,9 @@ void Config::Describe(Options& o) {
   dqn.Describe(o);
 }
 
-PendulumEnvConfig Config::Environments() const {
+PendulumEnvConfig Config::Environments(ThreadPool& pool) const {
   PendulumEnvConfig env;
+  env.pool = &pool;
   env.physics = ParsePhysics(physics, "--physics");
   env.plants = {plant};
   env.num_envs = static_cast<int>(train.envs);

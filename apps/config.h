@@ -31,8 +31,8 @@ struct Config {
   Config() { SetDefaults(*this); }
   void Describe(Options& options);
 
-  /// Training environments as these settings have them.
-  PendulumEnvConfig Environments() const;
+  /// Training environments as these settings have them, whose work the pool shares.
+  PendulumEnvConfig Environments(ThreadPool& pool) const;
 };
 
 /// A setting given on the command line: name and text.

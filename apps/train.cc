@@ -118,22 +118,15 @@ struct Parts {
   Parts(const Config& c, int threads)
       : config(c),
         pool(threads),
-        env(Environments()),
+        env(c.Environments(pool)),
         agent(c.dqn, env.num_envs(), env.obs_size(), TorqueLevels(env.torque_limit()),
               static_cast<uint64_t>(c.train.seed), pool),
         state(env.num_envs(), kRewardTerms) {}
 
-  /// The training environments.
-  PendulumEnvConfig Environments() {
-    PendulumEnvConfig environments = config.Environments();
-    environments.pool = &pool;
-    return environments;
-  }
-
   /// Evaluation from fresh starts in MuJoCo, with the reward's standard weights, on the training
   /// plant.
   Evaluation Judge(const Policy& policy, int64_t step) {
-    PendulumEnvConfig judge = Environments();
+    PendulumEnvConfig judge = config.Environments(pool);
     judge.physics = PhysicsEngine::kMuJoCo;
     judge.num_envs = static_cast<int>(config.train.eval_episodes);
     judge.episode_seconds = kEvaluationSeconds;

@@ -60,7 +60,6 @@ void UseSimdPath(std::string_view path) {
                           " on this processor, got '", path, "'"));
   }
   hwy::SetSupportedTargetsForTest(found->target);
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
 }
 
 }  // namespace upswing

@@ -17,12 +17,6 @@ namespace {
 /// kernels. From B alone, so that the number of threads changes no bit.
 int SliceRows(int B) { return std::clamp(B / 4, 8, 32); }
 
-QNetworkShape ShapeOf(const DqnConfig& config, int obs_size, size_t actions) {
-  return {obs_size,       static_cast<int>(actions),
-          config.hidden,  config.dueling ? config.head : 0,
-          config.dueling, config.layer_norm};
-}
-
 }  // namespace
 
 void DqnConfig::Describe(Options& o) {
@@ -61,6 +55,10 @@ void DqnConfig::Describe(Options& o) {
   o.Add(&epsilon_decay, "epsilon_decay", 0.97, kUnit, "", "factor per episode");
 }
 
+QNetworkShape DqnConfig::Shape(int obs_size, int actions) const {
+  return {obs_size, actions, hidden, dueling ? head : 0, dueling, layer_norm};
+}
+
 std::vector<double> TorqueLevels(double torque_limit) {
   std::vector<double> levels;
   for (int quarter = -4; quarter <= 4; ++quarter) levels.push_back(torque_limit * quarter / 4);
@@ -90,7 +88,8 @@ Dqn::Dqn(const DqnConfig& config, int num_envs, int obs_size, std::vector<double
       pool_(pool),
       explore_rng_(seed, "exploration"),
       sample_rng_(seed, "replay sampling"),
-      network_(ShapeOf(config, obs_size, torques_.size()), config.precision == "bfloat16"),
+      network_(config.Shape(obs_size, static_cast<int>(torques_.size())),
+               config.precision == "bfloat16"),
       theta_(network_.num_parameters()),
       adam_(network_.num_parameters()),
       activations_(network_.MakeActivations(static_cast<int>(config.batch), true)),

@@ -40,6 +40,9 @@ struct DqnConfig {
   DqnConfig() { SetDefaults(*this); }
   /// One line per setting: name, default, range, unit, help.
   void Describe(Options& options);
+
+  /// The network that it asks for.
+  QNetworkShape Shape(int obs_size, int actions) const;
 };
 
 /// The torque levels of the nine actions (N·m): -limit to limit in steps of a quarter.

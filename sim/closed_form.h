@@ -48,6 +48,10 @@ struct ClosedFormBatch {
 
 /// Where the kernels may split a batch: multiples of this many environments.
 inline constexpr size_t kClosedFormChunk = 64;
+/// How many such parts N environments make.
+inline int ClosedFormChunks(size_t num_envs) {
+  return static_cast<int>((num_envs + kClosedFormChunk - 1) / kClosedFormChunk);
+}
 
 /// Makes `steps` Runge-Kutta steps of kPhysicsTimestep with environments `first` to `last`, each a
 /// multiple of kClosedFormChunk or N.

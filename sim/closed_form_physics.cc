@@ -3,13 +3,6 @@
 #include <algorithm>
 
 namespace upswing {
-namespace {
-
-int Chunks(size_t num_envs) {
-  return static_cast<int>((num_envs + kClosedFormChunk - 1) / kClosedFormChunk);
-}
-
-}  // namespace
 
 ClosedFormPhysics::ClosedFormPhysics(const PhysicsConfig& config)
     : num_envs_(static_cast<size_t>(config.num_envs)),
@@ -37,7 +30,7 @@ void ClosedFormPhysics::SetState(int env, const PendulumState& s) {
 void ClosedFormPhysics::Step(std::span<const double> torque, StepResult& result) {
   batch_.SetTorque(torque);
   // With two references the task fits into std::function without an allocation.
-  ParallelFor(pool_, Chunks(num_envs_), [this, &result](int chunk) {
+  ParallelFor(pool_, ClosedFormChunks(num_envs_), [this, &result](int chunk) {
     const size_t first = static_cast<size_t>(chunk) * kClosedFormChunk;
     const size_t last = std::min(first + kClosedFormChunk, num_envs_);
     Advance(batch_, kPhysicsSteps, first, last);
