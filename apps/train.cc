@@ -120,7 +120,7 @@ struct Parts {
         pool(threads),
         env(c.Environments(pool)),
         agent(c.dqn, env.num_envs(), env.obs_size(), TorqueLevels(env.torque_limit()),
-              static_cast<uint64_t>(c.train.seed), pool),
+              env.mirror_signs(), static_cast<uint64_t>(c.train.seed), pool),
         state(env.num_envs(), kRewardTerms) {}
 
   /// Evaluation from fresh starts with the reward's standard weights, on the training plant.

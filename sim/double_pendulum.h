@@ -74,6 +74,9 @@ inline constexpr double kMaxVelocity2 = 20.0;
 /// NormalizedEnergy and ĥ = TipHeight over l1 + l2, in [-1, 1].
 std::array<float, kObservationSize> Observe(const Plant& plant, const PendulumState& s);
 
+/// How an observation's signs change in a mirror, which turns angles, velocities and torque around.
+inline constexpr std::array<float, kObservationSize> kMirrorSigns{1, -1, -1, 1, -1, -1, 1, 1};
+
 inline constexpr int kRewardTerms = 5;
 inline constexpr std::array<const char*, kRewardTerms> kRewardTermNames{
     "energy", "height", "balance", "velocity_penalty", "torque_penalty"};

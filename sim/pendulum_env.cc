@@ -25,6 +25,10 @@ std::vector<std::string> PendulumEnv::reward_term_names() const {
   return {kRewardTermNames.begin(), kRewardTermNames.end()};
 }
 
+std::vector<float> PendulumEnv::mirror_signs() const {
+  return {kMirrorSigns.begin(), kMirrorSigns.end()};
+}
+
 Matrix<const float> PendulumEnv::obs() const {
   return {obs_.data(), config_.num_envs, kObservationSize};
 }

@@ -42,6 +42,7 @@ class PendulumEnv : public VectorEnv {
   std::vector<std::string> reward_term_names() const override;
   double step_seconds() const override { return kControlPeriod; }
   double torque_limit() const override { return plant(0).torque_limit; }
+  std::vector<float> mirror_signs() const override;
   Matrix<const float> obs() const override;
   void Step(std::span<const double> torque, StepResult& result) override;
   void SetStartNoise(double sigma) override { config_.start.noise = sigma; }

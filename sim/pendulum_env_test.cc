@@ -231,6 +231,26 @@ TEST(PendulumEnv, BothPhysicsGoTheSameWayFromTheSameStarts) {
   }
 }
 
+TEST_P(PendulumEnvs, GoesTheSameWayInAMirror) {
+  PendulumEnvConfig config = Config();
+  config.num_envs = 2;
+  PendulumEnv env(config);
+  const std::vector<float> signs = env.mirror_signs();
+  Rng rng(1, "mirror");
+  const PendulumState s{1, -2, 3, 0.5};
+  env.SetState(0, s);
+  env.SetState(1, {-s.q1, -s.q2, -s.w1, -s.w2});
+  StepResult result = env.MakeResult();
+  for (int step = 0; step < 200; ++step) {
+    const double torque = rng.Uniform(-5, 5);
+    env.Step(std::vector<double>{torque, -torque}, result);
+    ASSERT_NEAR(result.reward[0], result.reward[1], 1e-9);
+    for (size_t j = 0; j < kObservationSize; ++j) {
+      ASSERT_NEAR(result.next_obs[j], signs[j] * result.next_obs[kObservationSize + j], 1e-6);
+    }
+  }
+}
+
 TEST(PendulumEnv, TheClosedFormTakesNoOtherModel) {
   PendulumEnvConfig config;
   config.physics = PhysicsEngine::kClosedForm;
