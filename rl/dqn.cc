@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "core/text.h"
+#include "rl/representation.h"
 
 namespace upswing {
 namespace {
@@ -310,8 +311,11 @@ void Dqn::CountErrors(const Minibatch& batch) {
 
 AgentReport Dqn::Report() const {
   const double n = static_cast<double>(std::max<int64_t>(1, report_updates_));
-  return {updates_,   epsilon(),   learning_rate(), loss_sum_ / n,
-          q_sum_ / n, td_sum_ / n, norm_sum_ / n};
+  const Matrix<const float> features(activations_.feature.back().data(),
+                                     static_cast<int>(config_.batch),
+                                     static_cast<int>(config_.hidden.back()));
+  return {updates_,    epsilon(),     learning_rate(),       loss_sum_ / n,         q_sum_ / n,
+          td_sum_ / n, norm_sum_ / n, FeatureRank(features), DormantShare(features)};
 }
 
 void Dqn::BeginReport() {
@@ -342,6 +346,7 @@ void Dqn::State(const Archive& archive) {
   archive.Scalar("td_sum", td_sum_);
   archive.Scalar("norm_sum", norm_sum_);
   archive.Scalar("report_updates", report_updates_);
+  archive.Array("last_features", std::span(activations_.feature.back()));
 }
 
 }  // namespace upswing

@@ -66,6 +66,8 @@ void LogMetrics(Training& t, const TrainState& s) {
                     {"q", report.q},
                     {"td_error", report.td_error},
                     {"gradient_norm", report.gradient_norm},
+                    {"feature_rank", report.feature_rank},
+                    {"dormant_share", report.dormant_share},
                     {"mean_return", s.mean_return()},
                     {"success_rate", s.last_success_rate},
                     {"seconds", s.seconds}});
