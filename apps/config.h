@@ -23,6 +23,7 @@ struct Config {
   double episode_seconds, random_start_share, random_start_velocity;
   std::string physics;  // as ParsePhysics has it, of the training environments
   Plant plant;
+  Disturbance disturbance;
   RewardWeights reward;
   DqnConfig dqn;
 

@@ -8,10 +8,26 @@
 
 namespace upswing {
 
+namespace {
+
+/// Sensors and motors as these settings have them; nothing if all are perfect.
+std::optional<Disturber> MakeDisturber(const PendulumEnvConfig& config) {
+  if (std::ranges::none_of(config.disturbances, &Disturbance::any)) return std::nullopt;
+  int max_delay = 0;
+  for (const Disturbance& each : config.disturbances) {
+    max_delay = std::max(max_delay, each.delay_steps());
+  }
+  return Disturber(config.disturbances, config.num_envs, max_delay, config.seed,
+                   Concat(config.stream, ": sensor noise"));
+}
+
+}  // namespace
+
 PendulumEnv::PendulumEnv(const PendulumEnvConfig& config)
     : config_(config),
       physics_(MakePhysics(config)),
-      episode_steps_(std::max<int64_t>(1, std::llround(config_.episode_seconds / kControlPeriod))) {
+      episode_steps_(std::max<int64_t>(1, std::llround(config_.episode_seconds / kControlPeriod))),
+      disturber_(MakeDisturber(config)) {
   const auto n = static_cast<size_t>(config_.num_envs);
   step_counts_.resize(n);
   obs_.resize(n * kObservationSize);
@@ -32,7 +48,13 @@ Matrix<const float> PendulumEnv::obs() const {
 void PendulumEnv::SetState(int env, const PendulumState& s) {
   physics_->SetState(env, s);
   step_counts_[static_cast<size_t>(env)] = 0;
-  std::ranges::copy(Observe(plant(env), s), Row(obs_, env).begin());
+  if (disturber_) disturber_->Begin(env);
+  std::ranges::copy(Observation(env), Row(obs_, env).begin());
+}
+
+std::array<float, kObservationSize> PendulumEnv::Observation(int env) {
+  const PendulumState s = state(env);
+  return Observe(plant(env), disturber_ ? disturber_->Measure(env, s) : s);
 }
 
 void PendulumEnv::Reset(int env) {
@@ -62,11 +84,15 @@ void PendulumEnv::StandIn(int env, StepResult& result) const {
 }
 
 void PendulumEnv::Step(std::span<const double> torque, StepResult& result) {
-  physics_->Step(torque, result);
+  physics_->Step(disturber_ ? disturber_->Apply(torque, step_counts_) : torque, result);
   for (int env = 0; env < config_.num_envs; ++env) {
     const auto i = static_cast<size_t>(env);
     ++step_counts_[i];
-    if (result.terminated[i]) StandIn(env, result);
+    if (result.terminated[i]) {
+      StandIn(env, result);
+    } else if (disturber_) {
+      std::ranges::copy(Observation(env), Row(result.next_obs, env).begin());
+    }
     result.truncated[i] = step_counts_[i] >= episode_steps_ && !result.terminated[i] ? 1 : 0;
   }
   // What to act on next is the successor, or a new start.
@@ -81,6 +107,7 @@ void PendulumEnv::State(const Archive& archive) {
   archive.Array("step_counts", std::span(step_counts_));
   archive.Array("obs", std::span(obs_));
   archive.Scalar("start_noise", config_.start.noise);
+  if (disturber_) disturber_->State(archive.In("disturbance"));
   for (size_t i = 0; i < rngs_.size(); ++i) rngs_[i].State(archive.In(Concat("rng.", i)));
 }
 

@@ -2,12 +2,14 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "core/rng.h"
 #include "core/vector_env.h"
+#include "sim/disturbance.h"
 #include "sim/double_pendulum.h"
 #include "sim/physics.h"
 
@@ -27,11 +29,15 @@ struct PendulumEnvConfig : PhysicsConfig {
   StartStates start;
   uint64_t seed = 0;
   std::string stream = "environment";  // environment i draws its starts from (seed, stream, i)
+  std::vector<Disturbance> disturbances{
+      Disturbance()};  // one for all environments, or one for each
 };
 
 /// N double pendulums and their episodes. Reaching the time limit truncates; only a numerical
-/// blow-up (see Physics::Step) terminates. The starts do not
-/// depend on the physics.
+/// blow-up (see Physics::Step) terminates. The starts do not depend on the physics.
+///
+/// Of a disturbance observations know what the sensors say and motors what arrives; state, reward
+/// and goal are the true ones.
 class PendulumEnv : public VectorEnv {
  public:
   /// Throws BadInput as MakePhysics does.
@@ -54,6 +60,8 @@ class PendulumEnv : public VectorEnv {
 
  private:
   void Reset(int env);
+  /// What the environment's sensors say now.
+  std::array<float, kObservationSize> Observation(int env);
   /// There is no successor of a state that blew up; the last that had numbers stands in for it.
   void StandIn(int env, StepResult& result) const;
 
@@ -66,9 +74,10 @@ class PendulumEnv : public VectorEnv {
   PendulumEnvConfig config_;
   std::unique_ptr<Physics> physics_;
   int64_t episode_steps_;
-  std::vector<Rng> rngs_;             // (N)
-  std::vector<int64_t> step_counts_;  // (N) control steps since the episode began
-  std::vector<float> obs_;            // (N, D)
+  std::optional<Disturber> disturber_;  // where there is something to disturb
+  std::vector<Rng> rngs_;               // (N)
+  std::vector<int64_t> step_counts_;    // (N) control steps since the episode began
+  std::vector<float> obs_;              // (N, D)
 };
 
 }  // namespace upswing
