@@ -24,6 +24,7 @@ struct Config {
   std::string physics;  // as ParsePhysics has it, of the training environments
   Plant plant;
   Disturbance disturbance;
+  Randomization randomization;
   RewardWeights reward;
   DqnConfig dqn;
 
