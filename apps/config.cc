@@ -110,9 +110,9 @@ void Config::Describe(Options& o) {
         "share of the episodes that begin anywhere instead of hanging");
   o.Add(&random_start_velocity, "random_start_velocity", 5, {0, 50}, "rad/s",
         "largest velocity of those");
-  o.AddChoice(
-      &physics, "physics", PhysicsNames(),
-      "engine to train in; closed-form is a faster twin of mujoco, which all evaluations use");
+  o.AddChoice(&physics, "physics", PhysicsNames(),
+              "engine to train in; closed-form is a faster twin of mujoco");
+  o.AddChoice(&eval_physics, "eval_physics", PhysicsNames(), "engine of the evaluations");
   o.Section("plant");
   o.Add(&model, "model", "", "MJCF file to use instead of the built-in model");
   plant.Describe(o);

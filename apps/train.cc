@@ -123,11 +123,11 @@ struct Parts {
               static_cast<uint64_t>(c.train.seed), pool),
         state(env.num_envs(), kRewardTerms) {}
 
-  /// Evaluation from fresh starts in MuJoCo, with the reward's standard weights, on the training
-  /// plant or, where plants are random, on a fresh one for each episode; disturbed as in training.
+  /// Evaluation from fresh starts with the reward's standard weights, on the training plant or, where
+  /// plants are random, on a fresh one for each episode; disturbed as in training.
   Evaluation Judge(const Policy& policy, int64_t step) {
     PendulumEnvConfig judge = config.Environments(pool);
-    judge.physics = PhysicsEngine::kMuJoCo;
+    judge.physics = ParsePhysics(config.eval_physics, "--eval-physics");
     judge.num_envs = static_cast<int>(config.train.eval_episodes);
     judge.episode_seconds = kEvaluationSeconds;
     judge.start = StartStates();
