@@ -156,6 +156,13 @@ void ApplyToml(const Options& options, std::string_view text, const std::string&
   }
 }
 
+void SetFlags(const Options& options, const std::vector<FlagValue>& flags) {
+  for (const auto& [name, value] : flags) {
+    const std::string flag = options.Find(name, "").front()->flag();
+    options.Set(name, value, flag);
+  }
+}
+
 Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
   Config config;
   const Options options = OptionsOf(config);
@@ -176,10 +183,7 @@ Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
   const NamedAgent& agent = FindAgent(agent_setting.value, agent_setting.where);
   ApplyToml(options, agent.toml, Concat("agent ", agent.name));
   if (!file.empty()) ApplyToml(options, text, where);
-  for (const auto& [name, value] : flags) {
-    const std::string flag = options.Find(name, "").front()->flag();
-    options.Set(name, value, flag);
-  }
+  SetFlags(options, flags);
   config.agent = agent.name;
   config.model = model_path;
   return config;

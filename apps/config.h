@@ -40,6 +40,9 @@ struct Config {
 /// A setting given on the command line: name and text.
 using FlagValue = std::pair<std::string, std::string>;
 
+/// Sets what the flags say. Throws BadInput.
+void SetFlags(const Options& options, const std::vector<FlagValue>& flags);
+
 /// Builds the settings in their order: defaults < named agent < configuration file (none if empty)
 /// < flags; a model file's plant counts as defaults. Throws BadInput.
 Config BuildConfig(const std::filesystem::path& file, const std::vector<FlagValue>& flags);
