@@ -112,10 +112,15 @@ void Config::Describe(Options& o) {
         "largest velocity of those");
   o.AddChoice(&physics, "physics", PhysicsNames(),
               "engine to train in; closed-form is a faster twin of mujoco");
-  o.AddChoice(&eval_physics, "eval_physics", PhysicsNames(), "engine of the evaluations");
+  std::vector<std::string> judges = PhysicsNames();
+  judges.insert(judges.begin(), std::string(kScreened));
+  o.AddChoice(&eval_physics, "eval_physics", judges,
+              "engine of the evaluations; screened: in mujoco what succeeds in closed-form");
   o.Section("plant");
   o.Add(&model, "model", "", "MJCF file to use instead of the built-in model");
   plant.Describe(o);
+  disturbance.Describe(o);
+  randomization.Describe(o);
   reward.Describe(o);
   dqn.Describe(o);
 }
@@ -125,6 +130,8 @@ PendulumEnvConfig Config::Environments(ThreadPool& pool) const {
   env.pool = &pool;
   env.physics = ParsePhysics(physics, "--physics");
   env.plants = {plant};
+  env.disturbances = {disturbance};
+  env.randomization = randomization;
   env.num_envs = static_cast<int>(train.envs);
   env.episode_seconds = episode_seconds;
   env.start = {train.start_noise, random_start_share, random_start_velocity};
@@ -152,6 +159,13 @@ void ApplyToml(const Options& options, std::string_view text, const std::string&
   }
 }
 
+void SetFlags(const Options& options, const std::vector<FlagValue>& flags) {
+  for (const auto& [name, value] : flags) {
+    const std::string flag = options.Find(name, "").front()->flag();
+    options.Set(name, value, flag);
+  }
+}
+
 Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
   Config config;
   const Options options = OptionsOf(config);
@@ -172,10 +186,7 @@ Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
   const NamedAgent& agent = FindAgent(agent_setting.value, agent_setting.where);
   ApplyToml(options, agent.toml, Concat("agent ", agent.name));
   if (!file.empty()) ApplyToml(options, text, where);
-  for (const auto& [name, value] : flags) {
-    const std::string flag = options.Find(name, "").front()->flag();
-    options.Set(name, value, flag);
-  }
+  SetFlags(options, flags);
   config.agent = agent.name;
   config.model = model_path;
   return config;

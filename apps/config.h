@@ -15,6 +15,9 @@
 
 namespace upswing {
 
+/// Evaluations in the closed form, and once more in MuJoCo if all of its episodes succeed there.
+inline constexpr std::string_view kScreened = "screened";
+
 /// All settings of a training.
 struct Config {
   std::string agent;  // the named agent that the other settings began with
@@ -23,6 +26,8 @@ struct Config {
   double episode_seconds, random_start_share, random_start_velocity;
   std::string physics, eval_physics;  // as ParsePhysics has it, to train and to judge in
   Plant plant;
+  Disturbance disturbance;
+  Randomization randomization;
   RewardWeights reward;
   DqnConfig dqn;
 
@@ -37,6 +42,9 @@ struct Config {
 
 /// A setting given on the command line: name and text.
 using FlagValue = std::pair<std::string, std::string>;
+
+/// Sets what the flags say. Throws BadInput.
+void SetFlags(const Options& options, const std::vector<FlagValue>& flags);
 
 /// Builds the settings in their order: defaults < named agent < configuration file (none if empty)
 /// < flags; a model file's plant counts as defaults. Throws BadInput.
