@@ -94,6 +94,7 @@ int Main(int argc, char** argv) {
   AddTrain(program, command);
   AddEval(program, command);
   AddSimulate(program, command);
+  AddMap(program, command);
   AddInfo(program, command);
   AddBench(program, command);
 
