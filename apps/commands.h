@@ -17,6 +17,7 @@ void AddTrain(CLI::App& program, Command& command);
 void AddEval(CLI::App& program, Command& command);
 void AddSimulate(CLI::App& program, Command& command);
 void AddMap(CLI::App& program, Command& command);
+void AddPlot(CLI::App& program, Command& command);
 void AddInfo(CLI::App& program, Command& command);
 void AddBench(CLI::App& program, Command& command);
 

@@ -141,6 +141,7 @@ int Main(int argc, char** argv) {
   AddEval(program, command);
   AddSimulate(program, command);
   AddMap(program, command);
+  AddPlot(program, command);
   AddInfo(program, command);
   AddBench(program, command);
 
