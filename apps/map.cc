@@ -33,12 +33,28 @@ struct MapArguments {
   bool as_json = false;
 };
 
+/// The plant that a policy was trained on, with the disturbance where its file tells.
+MapPoint TrainingPoint(const LoadedPolicy& loaded) {
+  MapPoint point;
+  point.plant = loaded.plant;
+  const auto text = loaded.policy.about().find("config");
+  if (text == loaded.policy.about().end()) return point;
+  Config config;
+  try {
+    ApplyToml(OptionsOf(config), text->second, "config");
+    point.disturbance = config.disturbance;
+  } catch (const Error&) {  // NOLINT(bugprone-empty-catch): written by another version
+  }
+  return point;
+}
+
 MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded) {
   MapConfig config;
   config.point.plant = loaded.plant;
   config.mjcf = loaded.mjcf;
-  config.x = ParseMapAxis(a.x, config.point, "--x");
-  config.y = ParseMapAxis(a.y, config.point, "--y");
+  const MapPoint training = TrainingPoint(loaded);
+  config.x = ParseMapAxis(a.x, training, "--x");
+  config.y = ParseMapAxis(a.y, training, "--y");
   CheckDifferent(config.x, config.y);
   const Options options = OptionsOf(config.point);
   for (const Option* option : ApplyChanges(options, a.set)) {

@@ -178,8 +178,9 @@ MapAxis ParseMapAxis(const std::string& text, const MapPoint& training, const st
   }
   const int64_t cells = pieces.size() == 3 ? ParseCells(pieces[2], place) : kDefaultCells;
   for (int64_t i = 0; i < cells; ++i) {
-    const double share = static_cast<double>(i) / static_cast<double>(cells - 1);
-    axis.values.push_back(std::lerp(from, to, share));
+    // In this order of operations ends and simple fractions come out exact.
+    const double at = (to - from) * static_cast<double>(i) / static_cast<double>(cells - 1);
+    axis.values.push_back(i == cells - 1 ? to : from + at);
   }
   return axis;
 }

@@ -68,9 +68,9 @@ void BreakAtWraps(Line& line, std::vector<double> Line::*values) {
   line = std::move(broken);
 }
 
-// Hanging and upright are both well inside -90° to 270°.
-double Link1(const RolloutRow& row) { return Wrapped(row.state.q1, -90); }
-double Link2(const RolloutRow& row) { return Wrapped(row.state.q1 + row.state.q2, -90); }
+// Hanging and upright are both well inside -135° to 225°.
+double Link1(const RolloutRow& row) { return Wrapped(row.state.q1, -135); }
+double Link2(const RolloutRow& row) { return Wrapped(row.state.q1 + row.state.q2, -135); }
 double Joint2(const RolloutRow& row) { return Wrapped(row.state.q2, -180); }
 
 Panel PanelOf(const std::string& y_label, std::vector<Line> lines) {
@@ -155,7 +155,7 @@ Panel QValues(const Rows& rows, std::span<const double> torques) {
 }
 
 Panel LargestQ(const Rows& rows) {
-  Line line = OverTime("greedy action", rows, [](const RolloutRow& row) {
+  Line line = OverTime("greedy (band: all)", rows, [](const RolloutRow& row) {
     return static_cast<double>(*std::ranges::max_element(row.q));
   });
   for (const RolloutRow& row : rows) {

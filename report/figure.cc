@@ -8,6 +8,7 @@
 #include "core/file.h"
 #include "core/text.h"
 #include "report/gnuplot.h"
+#include "report/layout.h"
 
 namespace upswing {
 namespace {
@@ -22,12 +23,6 @@ constexpr std::array kViridis{"#440154", "#48186a", "#472d7b", "#424086", "#3b52
                               "#2c728e", "#26828e", "#21918c", "#1fa088", "#28ae80", "#3fbc73",
                               "#5ec962", "#84d44b", "#addc30", "#d8e219", "#fde725"};
 
-// Sizes in pixels.
-constexpr int kFont = 12;
-constexpr double kCharacter = 7.2;  // mean width of a character of that size
-constexpr double kLegendSample = 44;
-constexpr double kLegendLine = 18;
-
 /// A text as gnuplot takes it literally: in single quotes nothing is special but the quote.
 std::string Quoted(const std::string& text) {
   std::string quoted = "'";
@@ -40,93 +35,6 @@ std::string Quoted(const std::string& text) {
 }
 
 std::string Number(double x) { return std::isfinite(x) ? FormatNumber(x) : "NaN"; }
-
-/// Characters in UTF-8 text: all bytes but those that continue one.
-double Characters(const std::string& text) {
-  return static_cast<double>(std::ranges::count_if(
-      text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; }));
-}
-
-bool HasLegend(const Panel& panel) {
-  return std::ranges::any_of(panel.lines, [](const Line& line) { return !line.name.empty(); });
-}
-
-/// Height of a heat map's legend, which lies below it.
-double LegendBelow(const Panel& panel) {
-  return panel.heat_map && HasLegend(panel) ? kLegendLine + 4 : 0;
-}
-
-double LegendWidth(const Panel& panel) {
-  double longest = 0;
-  for (const Line& line : panel.lines) longest = std::max(longest, Characters(line.name));
-  return kLegendSample + kCharacter * longest;
-}
-
-/// What a panel needs around its axes, pixels.
-struct Margins {
-  double left = 0, right = 0, top = 0, bottom = 0;
-
-  void Include(const Margins& other) {
-    left = std::max(left, other.left);
-    right = std::max(right, other.right);
-    top = std::max(top, other.top);
-    bottom = std::max(bottom, other.bottom);
-  }
-};
-
-Margins MarginsOf(const Panel& panel) {
-  Margins m{54, 18, 12, 29};
-  if (!panel.y_label.empty()) m.left += 20;
-  if (!panel.x_label.empty()) m.bottom += 18;
-  if (!panel.title.empty()) m.top += 18;
-  if (panel.heat_map) {
-    m.right = panel.heat_map->label.empty() ? 76 : 98;
-    m.bottom += LegendBelow(panel);
-  } else if (HasLegend(panel)) {
-    m.right = 12 + LegendWidth(panel);
-  }
-  return m;
-}
-
-/// Where a panel's axes are, pixels from the lower left corner.
-struct Box {
-  double left, right, bottom, top;
-};
-
-/// Axes of one size, in line with those beside, above and below.
-std::vector<Box> Layout(const Figure& figure) {
-  const auto columns = static_cast<size_t>(std::max(1, figure.columns));
-  const size_t rows = (figure.panels.size() + columns - 1) / columns;
-  std::vector<Margins> column(columns), row(rows);
-  for (size_t i = 0; i < figure.panels.size(); ++i) {
-    column[i % columns].Include(MarginsOf(figure.panels[i]));
-    row[i / columns].Include(MarginsOf(figure.panels[i]));
-  }
-  double width = figure.width;
-  double height = figure.height - (figure.title.empty() ? 0 : 28);
-  double top = height;
-  for (const Margins& m : column) width -= m.left + m.right;
-  for (const Margins& m : row) height -= m.top + m.bottom;
-  width /= static_cast<double>(columns);
-  height /= static_cast<double>(rows);
-  if (width < 20 || height < 20) {
-    throw BadInput(Concat("figure: expected more room for ", rows, " × ", columns, " panels than ",
-                          figure.width, " × ", figure.height, " pixels"));
-  }
-
-  std::vector<Box> boxes;
-  for (size_t i = 0; i < figure.panels.size(); ++i) {
-    const Margins& m = row[i / columns];
-    double left = column[i % columns].left;
-    for (size_t j = 0; j < i % columns; ++j) left += column[j].left + column[j].right + width;
-    if (i % columns == 0 && i > 0) {
-      const Margins& above = row[i / columns - 1];
-      top -= above.top + height + above.bottom;
-    }
-    boxes.push_back({left, left + width, top - m.top - height, top - m.top});
-  }
-  return boxes;
-}
 
 /// Edges of cells halfway between their centres, one more than there are centres.
 std::vector<double> Edges(const std::vector<double>& centers) {
@@ -159,14 +67,14 @@ void CheckSizes(const Panel& panel) {
 /// What the two formats count differently.
 struct Terminal {
   std::string name;
-  double font;         // size of text that is kFont pixels high
+  double font;         // size of text that is kFontSize pixels high
   double legend_line;  // pixels between two entries at spacing 1
   double marker;       // size of markers that look the same
   std::string cell;    // borders of cells, so that there are no seams between them
 };
-const Terminal kSvg{"svg dynamic", kFont, 18, 0.75, "noborder"};
+const Terminal kSvg{"svg dynamic", kFontSize, 18, 0.75, "noborder"};
 // pngcairo counts the font in points, of which 72 make 96 pixels, and blends edges.
-const Terminal kPng{"pngcairo", kFont * 0.75, 14, 1, ""};
+const Terminal kPng{"pngcairo", kFontSize * 0.75, 14, 1, ""};
 
 /// The commands that draw one panel.
 class PanelScript {
@@ -230,7 +138,7 @@ class PanelScript {
     Say("set bmargin at ", ScreenY(box_.bottom), "; set tmargin at ", ScreenY(box_.top));
     // Labels stand where the margins have room for them, whatever the numbers at the ticks.
     Label(2, panel_.title, (box_.left + box_.right) / 2, box_.top + 14, false);
-    const double bottom = box_.bottom - MarginsOf(panel_).bottom + LegendBelow(panel_);
+    const double bottom = box_.bottom - BottomMargin(panel_) + LegendBelow(panel_);
     Label(3, panel_.x_label, (box_.left + box_.right) / 2, bottom + 8, false);
     Label(4, panel_.y_label, box_.left - 60, (box_.bottom + box_.top) / 2, true);
     Say("unset label 5");
@@ -281,8 +189,7 @@ class PanelScript {
                                      Number(0.95 * line / terminal_.legend_line));
     if (panel_.heat_map) {
       return Say("set key at ", ScreenX(box_.left), ',',
-                 ScreenY(box_.bottom - MarginsOf(panel_).bottom + 4), " left bottom horizontal",
-                 style);
+                 ScreenY(box_.bottom - BottomMargin(panel_) + 4), " left bottom horizontal", style);
     }
     Say("set key at ", ScreenX(box_.right + 8), ',', ScreenY(box_.top), " left top vertical",
         style);
@@ -348,11 +255,11 @@ class PanelScript {
 std::string Script(const Figure& figure, const Terminal& terminal) {
   std::vector<std::string> palette;
   for (const char* color : kViridis) palette.push_back(Concat(palette.size(), " '", color, "'"));
-  std::string script = Concat(
-      "set encoding utf8\n", "set terminal ", terminal.name, " noenhanced size ", figure.width, ',',
-      figure.height, " font 'sans-serif,", terminal.font, "' background rgb 'white'\n",
-      "set datafile missing 'NaN'\n", "set border 3 lw 0.8 lc rgb '#404040'\n",
-      "set palette maxcolors 256 defined (", Join(palette, ", "), ")\n", "set multiplot\n");
+  std::string script =
+      Concat("set encoding utf8\n", "set terminal ", terminal.name, " noenhanced size ",
+             figure.width, ',', figure.height, " font 'sans-serif,", terminal.font,
+             "' background rgb 'white'\n", "set border 3 lw 0.8 lc rgb '#404040'\n",
+             "set palette maxcolors 256 defined (", Join(palette, ", "), ")\n", "set multiplot\n");
   if (!figure.title.empty()) {
     script +=
         Concat("set label 1 ", Quoted(figure.title), " at screen 0.5, screen ",

@@ -2,12 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 
 #include "core/error.h"
 #include "core/file.h"
 #include "core/testing.h"
+#include "report/layout.h"
 
 namespace upswing {
 namespace {
@@ -132,6 +134,36 @@ TEST_F(FigureTest, TextsComeThroughAsTheyAre) {
     EXPECT_NE(svg.find(kHostileXml + number), std::string::npos) << number;
   }
   EXPECT_FALSE(fs::exists("bad"));
+}
+
+TEST_F(FigureTest, ANumberThatIsNoneLeavesAGap) {
+  // Each piece of the curve begins with a move.
+  const auto pieces = [&](double middle) {
+    Figure figure;
+    figure.panels.resize(1);
+    figure.panels[0].lines = {{"", {0, 1, 2, 3, 4}, {0, 1, middle, 3, 4}, {}, {}}};
+    const std::string svg = Svg(figure);
+    return std::ranges::count(svg, 'M');
+  };
+  EXPECT_EQ(pieces(NAN), pieces(2) + 1);
+}
+
+TEST_F(FigureTest, PanelsAreInLine) {
+  Figure figure = Example();
+  figure.panels.push_back({"", "", "", {}, {}, {}, {}});
+  figure.columns = 2;
+  const std::vector<Box> boxes = Layout(figure);
+  ASSERT_EQ(boxes.size(), 3U);
+  for (const Box& box : boxes) {
+    EXPECT_NEAR(box.right - box.left, boxes[0].right - boxes[0].left, 1e-9);
+    EXPECT_NEAR(box.top - box.bottom, boxes[0].top - boxes[0].bottom, 1e-9);
+    EXPECT_GT(box.bottom, 0);
+    EXPECT_LT(box.right, figure.width);
+  }
+  EXPECT_EQ(boxes[0].top, boxes[1].top);
+  EXPECT_EQ(boxes[0].left, boxes[2].left);
+  EXPECT_GT(boxes[1].left, boxes[0].right);
+  EXPECT_GT(boxes[0].bottom, boxes[2].top);
 }
 
 TEST_F(FigureTest, PanelsWithoutNumbersAreDrawn) {
