@@ -178,9 +178,11 @@ MapAxis ParseMapAxis(const std::string& text, const MapPoint& training, const st
   }
   const int64_t cells = pieces.size() == 3 ? ParseCells(pieces[2], place) : kDefaultCells;
   for (int64_t i = 0; i < cells; ++i) {
-    // In this order of operations ends and simple fractions come out exact.
-    const double at = (to - from) * static_cast<double>(i) / static_cast<double>(cells - 1);
-    axis.values.push_back(i == cells - 1 ? to : from + at);
+    // Weighted like this, the middle of the ends comes out exact.
+    const double between =
+        (from * static_cast<double>(cells - 1 - i) + to * static_cast<double>(i)) /
+        static_cast<double>(cells - 1);
+    axis.values.push_back(i == 0 ? from : i == cells - 1 ? to : between);
   }
   return axis;
 }

@@ -131,7 +131,7 @@ class MapTest(ProgramTest):
 
     def test_bad_axes(self):
         for axis, *words in (
-                ("lenght2=1:2", "lenght2", "did you mean length2?"),
+                ("gravty=1:2", "gravty", "did you mean gravity?"),
                 ("mass2", "--x", "NAME=FROM:TO", '"mass2"'),
                 ("mass2=1", "NAME=FROM:TO"),
                 ("mass2=1:2:3:4", "NAME=FROM:TO"),
