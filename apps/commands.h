@@ -16,6 +16,8 @@ using Command = std::function<int()>;
 void AddTrain(CLI::App& program, Command& command);
 void AddEval(CLI::App& program, Command& command);
 void AddSimulate(CLI::App& program, Command& command);
+void AddMap(CLI::App& program, Command& command);
+void AddPlot(CLI::App& program, Command& command);
 void AddInfo(CLI::App& program, Command& command);
 void AddBench(CLI::App& program, Command& command);
 

@@ -275,6 +275,23 @@ std::map<std::string, std::string> AboutTask(const Config& config) {
   return about;
 }
 
+std::vector<const Option*> ApplyChanges(const Options& options,
+                                        const std::vector<std::string>& set) {
+  std::vector<const Option*> changed;
+  for (const std::string& change : set) {
+    const size_t equals = change.find('=');
+    if (equals == std::string::npos) {
+      throw BadInput(Concat("--set: expected NAME=VALUE, got \"", change, "\""));
+    }
+    const std::string name(Trim(std::string_view(change).substr(0, equals)));
+    for (const Option* option : options.Find(name, "--set " + name)) {
+      option->Set(Trim(std::string_view(change).substr(equals + 1)), "--set " + name);
+      changed.push_back(option);
+    }
+  }
+  return changed;
+}
+
 Plant ChangedPlant(const Plant& base, const std::string& model, const std::vector<std::string>& set,
                    std::string& mjcf) {
   Plant plant = base;
@@ -284,14 +301,7 @@ Plant ChangedPlant(const Plant& base, const std::string& model, const std::vecto
     if (!IsUtf8(mjcf)) throw BadInput(Concat(model, ": expected UTF-8 text"));
     plant = PlantOf(*LoadModel(mjcf, model));
   }
-  for (const std::string& change : set) {
-    const size_t equals = change.find('=');
-    if (equals == std::string::npos) {
-      throw BadInput(Concat("--set: expected NAME=VALUE, got \"", change, "\""));
-    }
-    const std::string name(Trim(std::string_view(change).substr(0, equals)));
-    options.Set(name, Trim(std::string_view(change).substr(equals + 1)), "--set " + name);
-  }
+  ApplyChanges(options, set);
   return plant;
 }
 

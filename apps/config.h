@@ -79,6 +79,10 @@ LoadedPolicy LoadPolicy(const std::filesystem::path& path);
 /// What a policy file says of the task that it was trained on.
 std::map<std::string, std::string> AboutTask(const Config& config);
 
+/// Sets what --set gives ("mass2=1.2") and returns it. Throws BadInput.
+std::vector<const Option*> ApplyChanges(const Options& options,
+                                        const std::vector<std::string>& set);
+
 /// The plant to try something on: `base`, or that of the model file if there is one, with the
 /// given changes ("mass2=1.2"). Reads the model into `mjcf`. Throws BadInput.
 Plant ChangedPlant(const Plant& base, const std::string& model, const std::vector<std::string>& set,

@@ -138,7 +138,7 @@ int RunEval(const EvalArguments& arguments) {
   {
     ProgressLine line;
     const auto begin = std::chrono::steady_clock::now();
-    evaluation = Evaluate(loaded.policy, env, [&](double share) {
+    evaluation = Evaluate(loaded.policy, env, &pool, [&](double share) {
       if (!line.due() || arguments.as_json) return;
       const double seconds =
           std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

@@ -140,6 +140,8 @@ int Main(int argc, char** argv) {
   AddTrain(program, command);
   AddEval(program, command);
   AddSimulate(program, command);
+  AddMap(program, command);
+  AddPlot(program, command);
   AddInfo(program, command);
   AddBench(program, command);
 

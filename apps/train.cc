@@ -146,7 +146,7 @@ struct Parts {
     judge.weights = RewardWeights();
     judge.stream = Concat("evaluation at step ", step);
     PendulumEnv env_of_judge(judge);
-    return Evaluate(policy, env_of_judge);
+    return Evaluate(policy, env_of_judge, &pool);
   }
 
   std::map<std::string, std::string> CheckpointMetadata() const {
