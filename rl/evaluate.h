@@ -1,10 +1,9 @@
 #pragma once
 
 #include <functional>
-#include <span>
-#include <string>
 #include <vector>
 
+#include "core/sample.h"
 #include "core/vector_env.h"
 #include "nn/policy.h"
 
@@ -24,28 +23,6 @@ struct EvaluationEpisode {
   double peak_torque = 0;       // largest |torque|, N·m
   double rms_torque = 0;        // root mean square, N·m
 };
-
-/// Median and the middle half of a sample.
-struct Quartiles {
-  double low = 0, median = 0, high = 0;
-};
-
-/// Quartiles by linear interpolation between order statistics; zeros for an empty sample.
-Quartiles QuartilesOf(std::vector<double> values);
-
-/// A closed interval.
-struct Interval {
-  double low = 0, high = 1;
-};
-
-/// 95% interval of a proportion (Wilson, 1927) after `successes` of `trials`.
-Interval WilsonInterval(int64_t successes, int64_t trials);
-
-/// Mean and sample standard deviation.
-struct Moments {
-  double mean = 0, deviation = 0;
-};
-Moments MomentsOf(std::span<const double> values);
 
 /// An evaluation in figures.
 struct Evaluation {
