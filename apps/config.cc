@@ -116,6 +116,8 @@ void Config::Describe(Options& o) {
   o.Section("plant");
   o.Add(&model, "model", "", "MJCF file to use instead of the built-in model");
   plant.Describe(o);
+  disturbance.Describe(o);
+  randomization.Describe(o);
   reward.Describe(o);
   dqn.Describe(o);
 }
@@ -125,6 +127,8 @@ PendulumEnvConfig Config::Environments(ThreadPool& pool) const {
   env.pool = &pool;
   env.physics = ParsePhysics(physics, "--physics");
   env.plants = {plant};
+  env.disturbances = {disturbance};
+  env.randomization = randomization;
   env.num_envs = static_cast<int>(train.envs);
   env.episode_seconds = episode_seconds;
   env.start = {train.start_noise, random_start_share, random_start_velocity};

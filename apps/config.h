@@ -23,6 +23,8 @@ struct Config {
   double episode_seconds, random_start_share, random_start_velocity;
   std::string physics;  // as ParsePhysics has it, of the training environments
   Plant plant;
+  Disturbance disturbance;
+  Randomization randomization;
   RewardWeights reward;
   DqnConfig dqn;
 

@@ -124,7 +124,7 @@ struct Parts {
         state(env.num_envs(), kRewardTerms) {}
 
   /// Evaluation from fresh starts in MuJoCo, with the reward's standard weights, on the training
-  /// plant.
+  /// plant or, where plants are random, on a fresh one for each episode; disturbed as in training.
   Evaluation Judge(const Policy& policy, int64_t step) {
     PendulumEnvConfig judge = config.Environments(pool);
     judge.physics = PhysicsEngine::kMuJoCo;
@@ -242,7 +242,7 @@ void AddSettings(CLI::App& app, std::vector<FlagValue>& flags) {
     const std::string name = alias.name;
     app.add_option_function<std::string>(
            "--" + name, [&flags, name](const std::string& text) { flags.emplace_back(name, text); },
-           Concat("both ", alias.members[0], " and ", alias.members[1]))
+           Concat(alias.members.size() == 2 ? "both " : "all of ", Join(alias.members, " and ")))
         ->group(alias.section)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)
         ->type_name("NUMBER");

@@ -27,6 +27,10 @@ void ClosedFormPhysics::SetState(int env, const PendulumState& s) {
   batch_.w2[i] = s.w2;
 }
 
+void ClosedFormPhysics::SetPlant(int env, const Plant& plant) {
+  batch_.SetPlant(static_cast<size_t>(env), plant);
+}
+
 void ClosedFormPhysics::Step(std::span<const double> torque, StepResult& result) {
   batch_.SetTorque(torque);
   // With two references the task fits into std::function without an allocation.

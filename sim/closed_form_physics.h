@@ -12,6 +12,7 @@ class ClosedFormPhysics : public Physics {
 
   PendulumState state(int env) const override;
   void SetState(int env, const PendulumState& state) override;
+  void SetPlant(int env, const Plant& plant) override;
   void Step(std::span<const double> torque, StepResult& result) override;
   void State(const Archive& archive) override;
 

@@ -86,6 +86,16 @@ void MuJoCoPhysics::SetState(int env, const PendulumState& s) {
   std::copy_n(std::array{s.w1, s.w2}.data(), 2, Component(slice.qvel, env));
 }
 
+void MuJoCoPhysics::SetPlant(int env, const Plant& plant) {
+  // Environments that shared a plant have their own from now on.
+  config_.plants.resize(static_cast<size_t>(config_.num_envs), config_.plants.front());
+  config_.plants[static_cast<size_t>(env)] = plant;
+  const Slice& slice = SliceOf(env);
+  const int row = env - slice.first;
+  WritePlant(plant, ExpandedFields(slice.batch.get(), row));
+  mjb_setConst(slice.batch.get(), &row, 1);
+}
+
 bool MuJoCoPhysics::BlewUp(int env) const {
   const PendulumState s = state(env);
   const Slice& slice = SliceOf(env);

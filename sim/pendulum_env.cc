@@ -8,17 +8,42 @@
 
 namespace upswing {
 
+namespace {
+
+/// Sensors and motors as these settings have them; nothing if all are perfect.
+std::optional<Disturber> MakeDisturber(const PendulumEnvConfig& config) {
+  const Randomization& random = config.randomization;
+  int max_delay = 0;
+  bool any = random.sensor_noise > 0 || random.delay > 0;
+  for (const Disturbance& each : config.disturbances) {
+    max_delay = std::max(max_delay, each.delay_steps() + random.max_delay_steps());
+    any = any || each.any();
+  }
+  if (!any) return std::nullopt;
+  return Disturber(config.disturbances, config.num_envs, max_delay, config.seed,
+                   Concat(config.stream, ": sensor noise"));
+}
+
+}  // namespace
+
 PendulumEnv::PendulumEnv(const PendulumEnvConfig& config)
     : config_(config),
       physics_(MakePhysics(config)),
-      episode_steps_(std::max<int64_t>(1, std::llround(config_.episode_seconds / kControlPeriod))) {
+      episode_steps_(std::max<int64_t>(1, std::llround(config_.episode_seconds / kControlPeriod))),
+      disturber_(MakeDisturber(config)) {
   const auto n = static_cast<size_t>(config_.num_envs);
   step_counts_.resize(n);
   obs_.resize(n * kObservationSize);
+  if (config_.randomization.any()) plants_.resize(n);
   for (int i = 0; i < config_.num_envs; ++i) {
-    rngs_.emplace_back(config_.seed, config_.stream, static_cast<uint64_t>(i));
-    Reset(i);
+    const auto index = static_cast<uint64_t>(i);
+    if (!plants_.empty()) {
+      plant_rngs_.emplace_back(config_.seed, Concat(config_.stream, ": plant"), index);
+    }
+    rngs_.emplace_back(config_.seed, config_.stream, index);
   }
+  plant_seeds_ = plant_rngs_;
+  for (int i = 0; i < config_.num_envs; ++i) Reset(i);
 }
 
 std::vector<std::string> PendulumEnv::reward_term_names() const {
@@ -32,11 +57,28 @@ Matrix<const float> PendulumEnv::obs() const {
 void PendulumEnv::SetState(int env, const PendulumState& s) {
   physics_->SetState(env, s);
   step_counts_[static_cast<size_t>(env)] = 0;
-  std::ranges::copy(Observe(plant(env), s), Row(obs_, env).begin());
+  if (disturber_) disturber_->Begin(env);
+  std::ranges::copy(Observation(env), Row(obs_, env).begin());
+}
+
+std::array<float, kObservationSize> PendulumEnv::Observation(int env) {
+  const PendulumState s = state(env);
+  return Observe(plant(env), disturber_ ? disturber_->Measure(env, s) : s);
+}
+
+void PendulumEnv::Randomize(int env) {
+  const auto i = static_cast<size_t>(env);
+  const Randomization& random = config_.randomization;
+  plant_seeds_[i] = plant_rngs_[i];
+  plants_[i] = random.Draw(config_.plant(env), plant_rngs_[i]);
+  const Disturbance disturbance = random.Draw(config_.disturbance(env), plant_rngs_[i]);
+  physics_->SetPlant(env, plants_[i]);
+  if (disturber_) disturber_->Set(env, disturbance);
 }
 
 void PendulumEnv::Reset(int env) {
   constexpr double kPi = std::numbers::pi;
+  if (!plants_.empty()) Randomize(env);
   Rng& rng = rngs_[static_cast<size_t>(env)];
   const StartStates& start = config_.start;
   PendulumState s;
@@ -62,11 +104,15 @@ void PendulumEnv::StandIn(int env, StepResult& result) const {
 }
 
 void PendulumEnv::Step(std::span<const double> torque, StepResult& result) {
-  physics_->Step(torque, result);
+  physics_->Step(disturber_ ? disturber_->Apply(torque, step_counts_) : torque, result);
   for (int env = 0; env < config_.num_envs; ++env) {
     const auto i = static_cast<size_t>(env);
     ++step_counts_[i];
-    if (result.terminated[i]) StandIn(env, result);
+    if (result.terminated[i]) {
+      StandIn(env, result);
+    } else if (disturber_) {
+      std::ranges::copy(Observation(env), Row(result.next_obs, env).begin());
+    }
     result.truncated[i] = step_counts_[i] >= episode_steps_ && !result.terminated[i] ? 1 : 0;
   }
   // What to act on next is the successor, or a new start.
@@ -77,10 +123,18 @@ void PendulumEnv::Step(std::span<const double> torque, StepResult& result) {
 }
 
 void PendulumEnv::State(const Archive& archive) {
+  for (size_t i = 0; i < plants_.size(); ++i) {
+    // A plant is kept as the stream that it was drawn from, and drawn again.
+    plant_seeds_[i].State(archive.In(Concat("plant_seed.", i)));
+    if (!archive.loading()) continue;
+    plant_rngs_[i] = plant_seeds_[i];
+    Randomize(static_cast<int>(i));
+  }
   physics_->State(archive);
   archive.Array("step_counts", std::span(step_counts_));
   archive.Array("obs", std::span(obs_));
   archive.Scalar("start_noise", config_.start.noise);
+  if (disturber_) disturber_->State(archive.In("disturbance"));
   for (size_t i = 0; i < rngs_.size(); ++i) rngs_[i].State(archive.In(Concat("rng.", i)));
 }
 

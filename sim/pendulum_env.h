@@ -2,14 +2,17 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "core/rng.h"
 #include "core/vector_env.h"
+#include "sim/disturbance.h"
 #include "sim/double_pendulum.h"
 #include "sim/physics.h"
+#include "sim/randomization.h"
 
 namespace upswing {
 
@@ -27,11 +30,20 @@ struct PendulumEnvConfig : PhysicsConfig {
   StartStates start;
   uint64_t seed = 0;
   std::string stream = "environment";  // environment i draws its starts from (seed, stream, i)
+  std::vector<Disturbance> disturbances{Disturbance()};  // one for all, or one for each
+  Randomization randomization;  // around plants and disturbances, at each reset
+
+  const Disturbance& disturbance(int env) const {
+    return disturbances[disturbances.size() > 1 ? static_cast<size_t>(env) : 0];
+  }
 };
 
 /// N double pendulums and their episodes. Reaching the time limit truncates; only a numerical
-/// blow-up (see Physics::Step) terminates. The starts do not
-/// depend on the physics.
+/// blow-up (see Physics::Step) terminates. The starts do not depend on the physics.
+///
+/// Of randomised plants, observation and reward are those of the episode's own plant.
+/// Of a disturbance observations know what the sensors say and motors what arrives; state, reward
+/// and goal are the true ones.
 class PendulumEnv : public VectorEnv {
  public:
   /// Throws BadInput as MakePhysics does.
@@ -41,19 +53,26 @@ class PendulumEnv : public VectorEnv {
   int obs_size() const override { return kObservationSize; }
   std::vector<std::string> reward_term_names() const override;
   double step_seconds() const override { return kControlPeriod; }
-  double torque_limit() const override { return plant(0).torque_limit; }
+  double torque_limit() const override { return config_.plant(0).torque_limit; }
   Matrix<const float> obs() const override;
   void Step(std::span<const double> torque, StepResult& result) override;
   void SetStartNoise(double sigma) override { config_.start.noise = sigma; }
   void State(const Archive& archive) override;
 
-  const Plant& plant(int env) const { return config_.plant(env); }
+  /// The plant of the running episode.
+  const Plant& plant(int env) const {
+    return plants_.empty() ? config_.plant(env) : plants_[static_cast<size_t>(env)];
+  }
   PendulumState state(int env) const { return physics_->state(env); }
   /// Puts an environment into a state, at the beginning of an episode.
   void SetState(int env, const PendulumState& state);
 
  private:
   void Reset(int env);
+  /// Gives a new episode its own plant and disturbance.
+  void Randomize(int env);
+  /// What the environment's sensors say now.
+  std::array<float, kObservationSize> Observation(int env);
   /// There is no successor of a state that blew up; the last that had numbers stands in for it.
   void StandIn(int env, StepResult& result) const;
 
@@ -66,7 +85,12 @@ class PendulumEnv : public VectorEnv {
   PendulumEnvConfig config_;
   std::unique_ptr<Physics> physics_;
   int64_t episode_steps_;
-  std::vector<Rng> rngs_;             // (N)
+  std::optional<Disturber> disturber_;  // where there is something to disturb
+  std::vector<Rng> rngs_;               // (N)
+  // Where plants are random; else empty.
+  std::vector<Plant> plants_;     // (N) of the running episodes
+  std::vector<Rng> plant_rngs_;   // (N) for the next episodes'
+  std::vector<Rng> plant_seeds_;  // (N) the streams as they were before the running episodes' draws
   std::vector<int64_t> step_counts_;  // (N) control steps since the episode began
   std::vector<float> obs_;            // (N, D)
 };

@@ -47,12 +47,15 @@ class Physics {
   /// Puts an environment into a state, whatever became of it before.
   virtual void SetState(int env, const PendulumState& state) = 0;
 
+  /// Gives an environment another plant; SetState must follow.
+  virtual void SetPlant(int env, const Plant& plant) = 0;
+
   /// Holds `torque` (N), N·m, for one control period and fills `result`, all but `truncated`. Of an
   /// environment whose state has blown up (numbers that are not finite or beyond 1e10, or a warning
   /// of MuJoCo's) only `terminated` has a meaning.
   virtual void Step(std::span<const double> torque, StepResult& result) = 0;
 
-  /// Saves or loads the state.
+  /// Saves or loads the state, which plants are no part of.
   virtual void State(const Archive& archive) = 0;
 };
 

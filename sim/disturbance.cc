@@ -1,0 +1,59 @@
+#include "sim/disturbance.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/text.h"
+
+namespace upswing {
+
+void Disturbance::Describe(Options& o) {
+  o.Section("disturbance");
+  o.Add(&sensor_noise, "sensor_noise", 0, {0, 10}, "rad, rad/s",
+        "standard deviation of the noise on all measured angles and velocities");
+  o.Add(&delay, "delay", 0, {0, kLargestDelay}, "s",
+        "from the choice of a torque to its effect, to the nearest 0.02 s");
+}
+
+int Disturbance::delay_steps() const {
+  return static_cast<int>(std::lround(delay / kControlPeriod));
+}
+
+Disturber::Disturber(std::vector<Disturbance> disturbances, int num_envs, int max_delay,
+                     uint64_t seed, const std::string& stream)
+    : capacity_(static_cast<size_t>(max_delay)), disturbances_(std::move(disturbances)) {
+  const auto n = static_cast<size_t>(num_envs);
+  disturbances_.resize(n, disturbances_.front());
+  queues_.resize(n * capacity_);
+  applied_.resize(n);
+  for (size_t i = 0; i < n; ++i) rngs_.emplace_back(seed, stream, i);
+}
+
+void Disturber::Begin(int env) { std::ranges::fill(Queue(env), 0.0); }
+
+std::span<const double> Disturber::Apply(std::span<const double> torque,
+                                         std::span<const int64_t> steps) {
+  for (size_t i = 0; i < torque.size(); ++i) {
+    applied_[i] = torque[i];
+    const int delay = disturbances_[i].delay_steps();
+    // A ring as long as the delay: what stands where the new torque goes is the one whose time it
+    // is.
+    if (delay > 0) std::swap(applied_[i], Queue(static_cast<int>(i))[steps[i] % delay]);
+  }
+  return applied_;
+}
+
+PendulumState Disturber::Measure(int env, PendulumState s) {
+  const double noise = disturbances_[static_cast<size_t>(env)].sensor_noise;
+  if (noise == 0) return s;
+  Rng& rng = rngs_[static_cast<size_t>(env)];
+  for (double* x : {&s.q1, &s.q2, &s.w1, &s.w2}) *x += noise * rng.Normal();
+  return s;
+}
+
+void Disturber::State(const Archive& archive) {
+  archive.Array("queues", std::span(queues_));
+  for (size_t i = 0; i < rngs_.size(); ++i) rngs_[i].State(archive.In(Concat("rng.", i)));
+}
+
+}  // namespace upswing

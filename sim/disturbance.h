@@ -1,0 +1,74 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/archive.h"
+#include "core/options.h"
+#include "core/rng.h"
+#include "sim/double_pendulum.h"
+
+namespace upswing {
+
+inline constexpr double kLargestDelay = 1;  // that can be set, s
+
+/// What sensors and motor of one environment do wrong; zeros: nothing.
+///
+/// The delay is the motor's: the torque chosen at one step is applied so many control periods
+/// later, and none before the first arrives. So an observation is always that of the present state,
+/// and what the delay hides is the torques that are under way.
+struct Disturbance {
+  double sensor_noise;  // standard deviation, on each measured angle and velocity, rad and rad/s
+  double delay;         // from the choice of a torque to its effect, s
+
+  Disturbance() { SetDefaults(*this); }
+  Disturbance(double noise, double seconds) : sensor_noise(noise), delay(seconds) {}
+  /// One line per setting: name, default, range, unit, help.
+  void Describe(Options& options);
+
+  bool any() const { return sensor_noise > 0 || delay > 0; }
+  /// The delay in control periods, to the nearest.
+  int delay_steps() const;
+};
+
+/// The sensors and motors of N environments.
+class Disturber {
+ public:
+  /// For environments with one of `disturbances` for all or one for each, none of which will have a
+  /// delay of more than `max_delay` control periods. Environment i draws its noise from (seed,
+  /// stream, i).
+  Disturber(std::vector<Disturbance> disturbances, int num_envs, int max_delay, uint64_t seed,
+            const std::string& stream);
+
+  /// Begins an episode: no torque is under way.
+  void Begin(int env);
+  /// Another disturbance from the next episode on.
+  void Set(int env, const Disturbance& disturbance) {
+    disturbances_[static_cast<size_t>(env)] = disturbance;
+  }
+
+  /// Takes the torques (N), N·m, that were chosen at step `steps[i]` of each episode (N), counted
+  /// from 0, and gives those that the motors hold now (N).
+  std::span<const double> Apply(std::span<const double> torque, std::span<const int64_t> steps);
+
+  /// What the sensors say of a state.
+  PendulumState Measure(int env, PendulumState state);
+
+  /// Saves or loads the state, which what was set is no part of.
+  void State(const Archive& archive);
+
+ private:
+  std::span<double> Queue(int env) {
+    return std::span(queues_).subspan(static_cast<size_t>(env) * capacity_, capacity_);
+  }
+
+  size_t capacity_;                        // the largest delay, control periods
+  std::vector<Disturbance> disturbances_;  // (N)
+  std::vector<double> queues_;             // (N × capacity) torques under way, N·m
+  std::vector<double> applied_;            // (N) N·m
+  std::vector<Rng> rngs_;                  // (N)
+};
+
+}  // namespace upswing

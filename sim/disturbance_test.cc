@@ -1,0 +1,173 @@
+#include "sim/disturbance.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "core/testing.h"
+#include "sim/pendulum_env.h"
+
+namespace upswing {
+namespace {
+
+/// Four environments in closed form: perfect, with noise, with a delay, with both.
+PendulumEnvConfig FourKinds() {
+  PendulumEnvConfig config;
+  config.physics = PhysicsEngine::kClosedForm;
+  config.num_envs = 4;
+  config.episode_seconds = 0.14;  // seven steps
+  config.disturbances = {{0, 0}, {0.02, 0}, {0, 0.06}, {0.05, 0.02}};
+  return config;
+}
+
+TEST(Disturbance, DelaysAreWholeControlPeriods) {
+  EXPECT_EQ(Disturbance(0, 0).delay_steps(), 0);
+  EXPECT_EQ(Disturbance(0, 0.009).delay_steps(), 0);
+  EXPECT_EQ(Disturbance(0, 0.011).delay_steps(), 1);
+  EXPECT_EQ(Disturbance(0, 0.06).delay_steps(), 3);
+  EXPECT_EQ(Disturbance(0, 1).delay_steps(), 50);
+}
+
+TEST(Disturbance, SettingsAreChecked) {
+  Disturbance disturbance;
+  const Options options = OptionsOf(disturbance);
+  EXPECT_THROW(options.Set("delay", "-0.02", "test"), Error);
+  EXPECT_THROW(options.Set("delay", "1.5", "test"), Error);
+  EXPECT_THROW(options.Set("sensor_noise", "-1", "test"), Error);
+  EXPECT_THROW(options.Set("sensor_noise", "nan", "test"), Error);
+  EXPECT_FALSE(disturbance.any());
+}
+
+TEST(Disturber, TorquesArriveWhenTheirTimeHasComeAndNoneComesFromAnEpisodeBefore) {
+  Disturber motors({{0, 0}, {0, 0.02}, {0, 0.06}}, 3, 3, 1, "test");
+  // What three motors hold at each step, of the torques 1, 2, 3, … of all; the episode of the last
+  // two begins anew before the step at which 5 is chosen.
+  const double expected[7][3] = {{1, 0, 0}, {2, 1, 0}, {3, 2, 0}, {4, 3, 1},
+                                 {5, 0, 0}, {6, 5, 0}, {7, 6, 0}};
+  std::vector<int64_t> steps{0, 0, 0};
+  for (int k = 0; k < 7; ++k) {
+    if (k == 4) {
+      motors.Begin(1);
+      motors.Begin(2);
+      steps[1] = steps[2] = 0;
+    }
+    const auto held = motors.Apply(std::vector<double>(3, k + 1), steps);
+    for (size_t i = 0; i < 3; ++i) EXPECT_EQ(held[i], expected[k][i]) << k << ", " << i;
+    for (int64_t& step : steps) ++step;
+  }
+}
+
+TEST(Disturber, NoiseIsNormalAndIndependentOnAllFour) {
+  constexpr int kCount = 20000;
+  Disturber sensors({{0.3, 0}}, 1, 0, 1, "test");
+  const PendulumState truth{1, 2, 3, 4};
+  double sum[4] = {}, product[4][4] = {}, fourth[4] = {}, lag = 0, last = 0;
+  for (int n = 0; n < kCount; ++n) {
+    const PendulumState s = sensors.Measure(0, truth);
+    const double z[4] = {(s.q1 - 1) / 0.3, (s.q2 - 2) / 0.3, (s.w1 - 3) / 0.3, (s.w2 - 4) / 0.3};
+    for (int i = 0; i < 4; ++i) {
+      sum[i] += z[i];
+      fourth[i] += std::pow(z[i], 4);
+      for (int j = 0; j < 4; ++j) product[i][j] += z[i] * z[j];
+    }
+    lag += z[0] * last;
+    last = z[0];
+  }
+  // Five standard errors: of a mean or product 1/√n, of the variance √(2/n), of z⁴ √(96/n).
+  const double error = 5 / std::sqrt(kCount);
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_NEAR(sum[i] / kCount, 0, error);
+    EXPECT_NEAR(fourth[i] / kCount, 3, std::sqrt(96) * error);
+    for (int j = 0; j < 4; ++j) {
+      EXPECT_NEAR(product[i][j] / kCount, i == j ? 1 : 0, (i == j ? std::sqrt(2) : 1) * error);
+    }
+  }
+  EXPECT_NEAR(lag / kCount, 0, error);
+}
+
+TEST(Disturber, EnvironmentsHaveStreamsOfTheirOwn) {
+  Disturber two({{1, 0}}, 2, 0, 7, "test");
+  Disturber second({{0, 0}, {1, 0}}, 2, 0, 7, "test"), other({{1, 0}}, 2, 0, 7, "other");
+  (void)two.Measure(0, {});  // takes nothing from the second's stream
+  const double noise = two.Measure(1, {}).q1;
+  EXPECT_EQ(noise, second.Measure(1, {}).q1);
+  EXPECT_NE(noise, other.Measure(1, {}).q1);
+  EXPECT_NE(noise, Disturber({{1, 0}}, 1, 0, 7, "test").Measure(0, {}).q1);
+}
+
+TEST(DisturbedEnv, OnlyWhatTheSensorsSayHasNoise) {
+  PendulumEnvConfig config = FourKinds();
+  config.disturbances = {{0, 0}, {0.02, 0}};
+  config.num_envs = 2;
+  PendulumEnv env(config);
+  StepResult result = env.MakeResult();
+  double largest = 0;
+  for (int step = 0; step < 6; ++step) {
+    // Both from the same state under the same torque: what happens is the same, but not what is
+    // seen.
+    env.SetState(0, {0.3, 0.1, 0, 0});
+    env.SetState(1, {0.3, 0.1, 0, 0});
+    env.Step(std::vector<double>{2, 2}, result);
+    EXPECT_EQ(env.state(0).w1, env.state(1).w1);
+    EXPECT_EQ(result.reward[0], result.reward[1]);
+    const auto seen = std::span(result.next_obs).subspan(kObservationSize, kObservationSize);
+    // One angle, seen as sine and cosine, and height and energy of what is seen.
+    EXPECT_NEAR(std::hypot(seen[0], seen[1]), 1, 1e-6);
+    const PendulumState said{std::atan2(seen[1], seen[0]), std::atan2(seen[4], seen[3]),
+                             seen[2] * kMaxVelocity1, seen[5] * kMaxVelocity2};
+    const auto expected = Observe(env.plant(1), said);
+    for (size_t k = 0; k < kObservationSize; ++k) EXPECT_NEAR(seen[k], expected[k], 1e-6);
+    largest = std::max(largest, std::abs(said.w1 - env.state(1).w1));
+    // What to act on next is the same measurement.
+    EXPECT_TRUE(std::ranges::equal(env.obs().row(1), seen));
+  }
+  EXPECT_GT(largest, 0.005);
+  EXPECT_LT(largest, 0.2);
+}
+
+TEST(DisturbedEnv, ADelayedMotorIsOneThatWasToldLater) {
+  PendulumEnv env(FourKinds());
+  PendulumEnvConfig perfect = FourKinds();
+  perfect.disturbances = {Disturbance()};
+  PendulumEnv reference(perfect);
+  StepResult result = env.MakeResult(), expected = reference.MakeResult();
+  for (int step = 0; step < 20; ++step) {  // over two resets
+    const int in_episode = step % 7;
+    const auto chosen = [&](int k) {
+      return k < 0 ? 0.0 : 4 * std::sin(1.0 + step - in_episode + k);
+    };
+    env.Step(std::vector<double>(4, chosen(in_episode)), result);
+    reference.Step(std::vector<double>{chosen(in_episode), chosen(in_episode),
+                                       chosen(in_episode - 3), chosen(in_episode - 1)},
+                   expected);
+    EXPECT_EQ(result.reward, expected.reward);
+    EXPECT_EQ(result.torque, expected.torque);
+    EXPECT_EQ(result.truncated, expected.truncated);
+    for (int i = 0; i < 4; ++i) EXPECT_EQ(env.state(i).q2, reference.state(i).q2);
+    // Perfect sensors see the same.
+    for (const int i : {0, 2}) {
+      EXPECT_TRUE(std::ranges::equal(env.obs().row(i), reference.obs().row(i),
+                                     [](float a, float b) { return std::abs(a - b) < 1e-6; }));
+    }
+  }
+}
+
+TEST(DisturbedEnv, LoadedStateGoesOnToTheBit) {
+  PendulumEnv saved(FourKinds()), loaded(FourKinds());
+  StepResult a = saved.MakeResult(), b = saved.MakeResult();
+  const std::vector<double> torque{1, 2, 3, 4};
+  for (int step = 0; step < 5; ++step) saved.Step(torque, a);  // with torques under way
+  SaveAndLoad([&](const Archive& archive) { saved.State(archive); },
+              [&](const Archive& archive) { loaded.State(archive); });
+  for (int step = 0; step < 12; ++step) {  // over two resets
+    saved.Step(torque, a);
+    loaded.Step(torque, b);
+    ASSERT_EQ(a.next_obs, b.next_obs);
+    ASSERT_EQ(a.torque, b.torque);
+  }
+}
+
+}  // namespace
+}  // namespace upswing

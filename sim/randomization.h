@@ -1,0 +1,33 @@
+#pragma once
+
+#include <array>
+
+#include "core/options.h"
+#include "core/rng.h"
+#include "sim/disturbance.h"
+#include "sim/double_pendulum.h"
+
+namespace upswing {
+
+/// How far each episode's plant, sensors and motor may be from the nominal ones; zeros: nowhere.
+struct Randomization {
+  /// Half-widths relative to the nominal value, in the order of Plant: 0.25 stands for ±25%.
+  std::array<double, 8> plant;
+  double sensor_noise;  // largest addition to the nominal one, rad and rad/s
+  double delay;         // the same, s
+
+  Randomization() { SetDefaults(*this); }
+  /// One line per setting: name, default, range, unit, help.
+  void Describe(Options& options);
+  bool any() const;
+  /// Control periods that a delay may be above the nominal one.
+  int max_delay_steps() const { return Disturbance(0, delay).delay_steps(); }
+
+  /// A plant from the box: each parameter uniform and independent of the others. Takes eight
+  /// numbers of the stream, whatever the box.
+  Plant Draw(const Plant& nominal, Rng& rng) const;
+  /// Uniform noise, and a uniform number of control periods. Takes two numbers of the stream.
+  Disturbance Draw(const Disturbance& nominal, Rng& rng) const;
+};
+
+}  // namespace upswing
