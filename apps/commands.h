@@ -15,6 +15,7 @@ void AddTrain(CLI::App& program, Command& command);
 void AddEval(CLI::App& program, Command& command);
 void AddSimulate(CLI::App& program, Command& command);
 void AddInfo(CLI::App& program, Command& command);
+void AddCompare(CLI::App& program, Command& command);
 void AddBench(CLI::App& program, Command& command);
 
 /// Refuses an empty path, such as that of a shell variable that is not set.

@@ -86,7 +86,11 @@ Figure LearningCurves(const std::vector<RunGroup>& groups) {
     panel.x_label = x_label;
     panel.y_label = y_label;
     const std::vector<double> grid = CurveGrid(groups, x);
-    for (const RunGroup& group : groups) panel.lines.push_back(LearningCurve(group, x, y, grid));
+    for (const RunGroup& group : groups) {
+      panel.lines.push_back(LearningCurve(group, x, y, grid));
+      // One legend, at the right of the upper row, is enough.
+      if (figure.panels.size() != 2) panel.lines.back().name.clear();
+    }
     return panel;
   };
   constexpr const char* kSteps = "steps";

@@ -48,6 +48,8 @@ TEST(LearningCurve, TheFigureSaysWhereValuesAreKept) {
   EXPECT_NE(uneven.title.find("keeps its last value"), std::string::npos);
   ASSERT_EQ(uneven.panels.size(), 4U);
   for (const Panel& panel : uneven.panels) EXPECT_EQ(panel.lines.size(), 2U);
+  EXPECT_EQ(uneven.panels[0].lines[1].name, "");  // one legend for all
+  EXPECT_EQ(uneven.panels[1].lines[1].name, "b");
 }
 
 }  // namespace
