@@ -70,9 +70,20 @@ class CommandLineTest(ProgramTest):
                                      ("--hidden", "5000", "[1, 4096]"),
                                      ("--threads", "-1", "[0, 256]"),
                                      ("--seed", "99999999999999999999", "an integer"),
-                                     ("--length1", "1e3", "[0.1, 10]")):
+                                     ("--length1", "1e3", "[0.1, 10]"),
+                                     ("--randomize-mass1", "1", "[0, 0.99]"),
+                                     ("--randomize-gravity", "-0.1", "[0, 0.99]"),
+                                     ("--sensor-noise", "-1", "[0, 10]"),
+                                     ("--delay", "1.02", "[0, 1]")):
             with self.subTest(flag=flag, value=value):
                 self.refuse([*TRAIN, flag, value], flag, allowed, f'got "{value}"')
+
+    def test_boxes_and_disturbances_of_an_evaluation(self):
+        for flag, value in (("--randomize", "1"), ("--randomize-mass", "-0.25"),
+                            ("--randomize-delay", "2"), ("--sensor-noise", "nan"),
+                            ("--delay", "20ms")):
+            with self.subTest(flag=flag, value=value):
+                self.refuse(["eval", self.write("policy", ""), flag, value], f'got "{value}"')
 
     def test_physics(self):
         for engine in ("mujco", "", "MuJoCo"):

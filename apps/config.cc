@@ -110,9 +110,9 @@ void Config::Describe(Options& o) {
         "share of the episodes that begin anywhere instead of hanging");
   o.Add(&random_start_velocity, "random_start_velocity", 5, {0, 50}, "rad/s",
         "largest velocity of those");
-  o.AddChoice(
-      &physics, "physics", PhysicsNames(),
-      "engine to train in; closed-form is a faster twin of mujoco, which all evaluations use");
+  o.AddChoice(&physics, "physics", PhysicsNames(),
+              "engine to train in; closed-form is a faster twin of mujoco");
+  o.AddChoice(&eval_physics, "eval_physics", PhysicsNames(), "engine of the evaluations");
   o.Section("plant");
   o.Add(&model, "model", "", "MJCF file to use instead of the built-in model");
   plant.Describe(o);
@@ -156,6 +156,13 @@ void ApplyToml(const Options& options, std::string_view text, const std::string&
   }
 }
 
+void SetFlags(const Options& options, const std::vector<FlagValue>& flags) {
+  for (const auto& [name, value] : flags) {
+    const std::string flag = options.Find(name, "").front()->flag();
+    options.Set(name, value, flag);
+  }
+}
+
 Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
   Config config;
   const Options options = OptionsOf(config);
@@ -176,10 +183,7 @@ Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
   const NamedAgent& agent = FindAgent(agent_setting.value, agent_setting.where);
   ApplyToml(options, agent.toml, Concat("agent ", agent.name));
   if (!file.empty()) ApplyToml(options, text, where);
-  for (const auto& [name, value] : flags) {
-    const std::string flag = options.Find(name, "").front()->flag();
-    options.Set(name, value, flag);
-  }
+  SetFlags(options, flags);
   config.agent = agent.name;
   config.model = model_path;
   return config;
@@ -268,6 +272,23 @@ std::map<std::string, std::string> AboutTask(const Config& config) {
   return about;
 }
 
+std::vector<const Option*> ApplyChanges(const Options& options,
+                                        const std::vector<std::string>& set) {
+  std::vector<const Option*> changed;
+  for (const std::string& change : set) {
+    const size_t equals = change.find('=');
+    if (equals == std::string::npos) {
+      throw BadInput(Concat("--set: expected NAME=VALUE, got \"", change, "\""));
+    }
+    const std::string name(Trim(std::string_view(change).substr(0, equals)));
+    for (const Option* option : options.Find(name, "--set " + name)) {
+      option->Set(Trim(std::string_view(change).substr(equals + 1)), "--set " + name);
+      changed.push_back(option);
+    }
+  }
+  return changed;
+}
+
 Plant ChangedPlant(const Plant& base, const std::string& model, const std::vector<std::string>& set,
                    std::string& mjcf) {
   Plant plant = base;
@@ -277,14 +298,7 @@ Plant ChangedPlant(const Plant& base, const std::string& model, const std::vecto
     if (!IsUtf8(mjcf)) throw BadInput(Concat(model, ": expected UTF-8 text"));
     plant = PlantOf(*LoadModel(mjcf, model));
   }
-  for (const std::string& change : set) {
-    const size_t equals = change.find('=');
-    if (equals == std::string::npos) {
-      throw BadInput(Concat("--set: expected NAME=VALUE, got \"", change, "\""));
-    }
-    const std::string name(Trim(std::string_view(change).substr(0, equals)));
-    options.Set(name, Trim(std::string_view(change).substr(equals + 1)), "--set " + name);
-  }
+  ApplyChanges(options, set);
   return plant;
 }
 

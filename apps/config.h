@@ -21,7 +21,7 @@ struct Config {
   std::string model;  // path of an MJCF file instead of the built-in model; empty: built-in
   TrainConfig train;
   double episode_seconds, random_start_share, random_start_velocity;
-  std::string physics;  // as ParsePhysics has it, of the training environments
+  std::string physics, eval_physics;  // as ParsePhysics has it, to train and to judge in
   Plant plant;
   Disturbance disturbance;
   Randomization randomization;
@@ -39,6 +39,9 @@ struct Config {
 
 /// A setting given on the command line: name and text.
 using FlagValue = std::pair<std::string, std::string>;
+
+/// Sets what the flags say. Throws BadInput.
+void SetFlags(const Options& options, const std::vector<FlagValue>& flags);
 
 /// Builds the settings in their order: defaults < named agent < configuration file (none if empty)
 /// < flags; a model file's plant counts as defaults. Throws BadInput.
@@ -72,6 +75,10 @@ LoadedPolicy LoadPolicy(const std::filesystem::path& path);
 
 /// What a policy file says of the task that it was trained on.
 std::map<std::string, std::string> AboutTask(const Config& config);
+
+/// Sets what --set gives ("mass2=1.2") and returns it. Throws BadInput.
+std::vector<const Option*> ApplyChanges(const Options& options,
+                                        const std::vector<std::string>& set);
 
 /// The plant to try something on: `base`, or that of the model file if there is one, with the
 /// given changes ("mass2=1.2"). Reads the model into `mjcf`. Throws BadInput.

@@ -20,15 +20,49 @@ struct EvalArguments {
   int episodes = 100, threads = 0;
   int64_t seed = 0;
   bool as_json = false;
+  std::vector<FlagValue> flags;
 };
 
+/// What an evaluation may try a policy with, besides another plant.
+struct Trial {
+  Disturbance disturbance;
+  Randomization randomization;
+
+  void Describe(Options& o) {
+    disturbance.Describe(o);
+    randomization.Describe(o);
+  }
+};
+
+/// Throws BadInput.
+Trial TrialOf(const std::vector<FlagValue>& flags) {
+  Trial trial;
+  SetFlags(OptionsOf(trial), flags);
+  return trial;
+}
+
+/// The settings that are not at their default, as text: `delay 0.02, …`; empty if there are none.
+std::string ChangesText(Trial trial) {
+  Trial defaults;
+  const Options options = OptionsOf(trial), usual = OptionsOf(defaults);
+  std::vector<std::string> texts;
+  for (size_t k = 0; k < options.all().size(); ++k) {
+    const Option& option = options.all()[k];
+    if (option.text() == usual.all()[k].text()) continue;
+    texts.push_back(Concat(option.name, " ", option.text()));
+  }
+  return Join(texts, ", ");
+}
+
 void PrintTable(const Evaluation& e, const LoadedPolicy& loaded, const EvalArguments& arguments,
-                const Plant& plant) {
+                const Plant& plant, const Trial& trial) {
   const auto moments = [](const Moments& m) {
     return fmt::format("{:.4g} ± {:.2g}", m.mean, m.deviation);
   };
   fmt::print("{}\n", loaded.path.string());
   fmt::print("  plant          {}, physics {}\n", PlantText(plant), arguments.physics);
+  const std::string changes = ChangesText(trial);
+  if (!changes.empty()) fmt::print("  {:<15}{}\n", "with", changes);
   fmt::print("  success        {} of {} = {:.1f}%   (95% interval {:.1f}% to {:.1f}%)\n",
              e.successes, e.episodes, 100 * e.success_rate(), 100 * e.success_interval.low,
              100 * e.success_interval.high);
@@ -48,13 +82,17 @@ void PrintTable(const Evaluation& e, const LoadedPolicy& loaded, const EvalArgum
 }
 
 void PrintJson(const Evaluation& e, const LoadedPolicy& loaded, const EvalArguments& arguments,
-               const Plant& plant) {
+               const Plant& plant, Trial trial) {
   using nlohmann::ordered_json;
   ordered_json j;
   j["policy"] = loaded.path.string();
   j["seed"] = arguments.seed;
   j["physics"] = arguments.physics;
   for (const auto& [name, value] : PlantValues(plant)) j["plant"][name] = value;
+  const Options options = OptionsOf(trial);
+  for (const Option& option : options.all()) {
+    j[option.section][option.name] = *std::get<double*>(option.target);
+  }
   j["episodes"] = e.episodes;
   j["successes"] = e.successes;
   j["success_rate"] = e.success_rate();
@@ -81,10 +119,13 @@ void PrintJson(const Evaluation& e, const LoadedPolicy& loaded, const EvalArgume
 int RunEval(const EvalArguments& arguments) {
   PendulumEnvConfig config;
   config.physics = ParsePhysics(arguments.physics, "--physics");
+  const Trial trial = TrialOf(arguments.flags);
   const LoadedPolicy loaded = LoadPolicy(arguments.policy);
   config.mjcf = loaded.mjcf;
   const Plant plant = ChangedPlant(loaded.plant, arguments.model, arguments.set, config.mjcf);
   config.plants = {plant};
+  config.disturbances = {trial.disturbance};
+  config.randomization = trial.randomization;
   config.num_envs = arguments.episodes;
   config.episode_seconds = kEvaluationSeconds;
   config.seed = static_cast<uint64_t>(arguments.seed);
@@ -97,7 +138,7 @@ int RunEval(const EvalArguments& arguments) {
   {
     ProgressLine line;
     const auto begin = std::chrono::steady_clock::now();
-    evaluation = Evaluate(loaded.policy, env, [&](double share) {
+    evaluation = Evaluate(loaded.policy, env, &pool, [&](double share) {
       if (!line.due() || arguments.as_json) return;
       const double seconds =
           std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -107,9 +148,9 @@ int RunEval(const EvalArguments& arguments) {
     });
   }
   if (arguments.as_json) {
-    PrintJson(evaluation, loaded, arguments, plant);
+    PrintJson(evaluation, loaded, arguments, plant, trial);
   } else {
-    PrintTable(evaluation, loaded, arguments, plant);
+    PrintTable(evaluation, loaded, arguments, plant, trial);
   }
   return 0;
 }
@@ -133,6 +174,8 @@ void AddEval(CLI::App& program, Command& command) {
   app->add_option("--physics", a->physics,
                   "engine: mujoco, or closed-form, its faster twin [mujoco]")
       ->type_name("TEXT");
+  Trial defaults;
+  AddSettings(*app, OptionsOf(defaults), a->flags);
   app->add_option("--threads", a->threads, "0: one for each processor, at most 8")
       ->check(CLI::Range(0, 256).description(""))
       ->type_name("INTEGER");
@@ -144,9 +187,13 @@ void AddEval(CLI::App& program, Command& command) {
       "Examples:\n"
       "  ./upswing eval runs/d3qn-seed1\n"
       "  ./upswing eval policy.safetensors --episodes 1000 --seed 7 --json\n"
-      "  ./upswing eval runs/d3qn-seed1 --set mass2=1.05 --set gravity=9.7\n\n"
+      "  ./upswing eval runs/d3qn-seed1 --set mass2=1.05 --set gravity=9.7\n"
+      "  ./upswing eval runs/d3qn-seed1 --randomize 0.25 --episodes 1000   share of a box of "
+      "plants\n"
+      "  ./upswing eval runs/d3qn-seed1 --sensor-noise 0.02 --delay 0.02\n\n"
       "--set takes mass1, mass2, length1, length2, damping1, damping2, gravity, torque_limit, and\n"
-      "mass, length, damping for both.\n",
+      "mass, length, damping for both. With --randomize each episode has its own plant, drawn from "
+      "a\nbox around that one.\n",
       kEvaluationSeconds, kHoldSeconds, kReturnSeconds));
   app->callback([a, &command] { command = [a] { return RunEval(*a); }; });
 }

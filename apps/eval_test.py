@@ -40,13 +40,15 @@ class EvalTest(ProgramTest):
 
     def test_json_has_all_fields(self):
         result = self.evaluate()
-        self.assertEqual(list(result), ["policy", "seed", "physics", "plant", "episodes", "successes",
-                                        "success_rate", "success_interval_95", "swing_up_seconds",
+        self.assertEqual(list(result), ["policy", "seed", "physics", "plant", "disturbance",
+                                        "randomize", "episodes", "successes", "success_rate", "success_interval_95", "swing_up_seconds",
                                         "return", "reward_terms", "energy_used", "peak_torque",
                                         "rms_torque"])
         self.assertEqual(result["plant"], PLANT | {"gravity": 0.05, "damping1": 1, "damping2": 1})
         self.assertEqual(result["policy"], str(self.policy / "policy.safetensors"))
         self.assertEqual(list(result["reward_terms"]), REWARD_TERMS)
+        self.assertEqual(result["disturbance"], {"sensor_noise": 0, "delay": 0})
+        self.assertEqual(set(result["randomize"].values()), {0})
 
     def test_numbers_are_plausible(self):
         result = self.evaluate()
@@ -117,6 +119,34 @@ class EvalTest(ProgramTest):
             self.assertRegex(table, rf"{term} +{re.escape(f'{value:.2f}')}\n")
         for words in ("return", "energy used", "peak", "rms", "gravity 0.05"):
             self.assertIn(words, table)
+
+    def test_random_plants_are_said_and_change_the_result(self):
+        usual = self.evaluate()
+        box = self.evaluate("--randomize", 0.25)
+        self.assertEqual({name: width for name, width in box["randomize"].items() if width},
+                         {f"randomize_{name}": 0.25 for name in PLANT if name != "torque_limit"})
+        self.assertEqual(box["plant"], usual["plant"])
+        self.assertNotEqual(box["return"], usual["return"])
+        self.assertEqual(box, self.evaluate("--randomize", 0.25, "--threads", 3))
+        # One plant out of the box, and the box without a width.
+        self.assertNotEqual(box, self.evaluate("--randomize", 0.25, "--randomize-length", 0))
+        self.assertEqual(usual, self.evaluate("--randomize", 0))
+
+    def test_random_plants_are_the_same_in_closed_form(self):
+        usual, twin = (self.evaluate("--randomize", 0.25, "--physics", physics)
+                       for physics in ("mujoco", "closed-form"))
+        self.assertAlmostEqual(twin["return"]["mean"], usual["return"]["mean"],
+                               delta=1e-3 * abs(usual["return"]["mean"]))
+
+    def test_noise_and_delay_are_said_and_change_the_result(self):
+        usual = self.evaluate()
+        for flag, name in (("--sensor-noise", "sensor_noise"), ("--delay", "delay")):
+            disturbed = self.evaluate(flag, 0.1)
+            self.assertEqual(disturbed["disturbance"], usual["disturbance"] | {name: 0.1})
+            self.assertNotEqual(disturbed["return"], usual["return"])
+        table = self.succeed("eval", self.policy, "--episodes", 2, "--delay", 0.04,
+                             "--randomize-mass2", 0.5)
+        self.assertIn("delay 0.04, randomize_mass2 0.5\n", table)
 
     def test_policy_file_and_run_folder_are_the_same(self):
         by_file = json.loads(self.succeed("eval", self.policy / "policy.safetensors", "--json",

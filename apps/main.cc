@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <array>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
@@ -28,6 +29,51 @@ void AddPlantOptions(CLI::App& app, std::vector<std::string>& set, std::string& 
   app.add_option("--model", model, "MJCF file to use instead of the policy's model")
       ->type_name("FILE")
       ->check(NotEmpty());
+}
+
+namespace {
+
+/// What --help shows for a flag's value.
+std::string TypeName(const Option& option) {
+  constexpr std::array kNames{"", "INTEGER", "NUMBER", "TEXT", "LIST"};  // in Target's order
+  return option.name == "model" ? "FILE" : kNames.at(option.target.index());
+}
+
+}  // namespace
+
+void AddSettings(CLI::App& app, const Options& options, std::vector<FlagValue>& flags) {
+  // CLI11 applies flags in this order: aliases first, so that what is more specific wins.
+  for (const auto& alias : options.aliases()) {
+    const std::string name = alias.name;
+    app.add_option_function<std::string>(
+           alias.flag(),
+           [&flags, name](const std::string& text) { flags.emplace_back(name, text); }, alias.help)
+        ->group(alias.section)
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)
+        ->type_name("NUMBER");
+  }
+  for (const Option& option : options.all()) {
+    std::string help = option.help;
+    if (!option.unit.empty()) help += ", " + option.unit;
+    if (!option.choices.empty()) help += ": " + Join(option.choices, ", ");
+    help += " [" + option.text() + "]";
+    const std::string name = option.name;
+    if (std::holds_alternative<bool*>(option.target)) {
+      app.add_flag_function(
+             option.flag() + ",!--no-" + option.flag().substr(2),
+             [&flags, name](int64_t on) { flags.emplace_back(name, on > 0 ? "true" : "false"); },
+             help)
+          ->group(option.section)
+          ->disable_flag_override();
+      continue;
+    }
+    app.add_option_function<std::string>(
+           option.flag(),
+           [&flags, name](const std::string& text) { flags.emplace_back(name, text); }, help)
+        ->group(option.section)
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)
+        ->type_name(TypeName(option));
+  }
 }
 
 namespace {
@@ -95,6 +141,7 @@ int Main(int argc, char** argv) {
   AddTrain(program, command);
   AddEval(program, command);
   AddSimulate(program, command);
+  AddMap(program, command);
   AddInfo(program, command);
   AddCompare(program, command);
   AddBench(program, command);

@@ -132,6 +132,18 @@ class ResumeTest(ProgramTest):
         self.assert_same_run("run", "at-once")
         self.assertIn('physics = "closed-form"', (self.folder / "run/config.toml").read_text())
 
+    def test_more_steps_with_random_plants_equal_a_run_of_that_many(self):
+        # Episodes of 21 steps: the run is resumed within them, with torques under way.
+        for physics in ("mujoco", "closed-form"):
+            changes = {"physics": physics, "episode_seconds": 0.42, "randomize": 0.25,
+                       "sensor_noise": 0.01, "randomize_delay": 0.06}
+            self.succeed(*small(steps=4000, out=f"{physics}-run", **changes))
+            self.succeed("train", "--resume", f"{physics}-run", "--steps", 8000)
+            self.succeed(*small(steps=8000, out=f"{physics}-at-once", **changes))
+            self.assert_same_run(f"{physics}-run", f"{physics}-at-once")
+        self.assertIn("randomize_length2 = 0.25",
+                      (self.folder / "mujoco-run/config.toml").read_text())
+
     def test_another_number_of_threads_may_resume(self):
         self.succeed(*small(steps=4000, threads=1))
         self.succeed("train", "--resume", "run", "--steps", 8000, "--threads", 2)

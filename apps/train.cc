@@ -123,18 +123,18 @@ struct Parts {
               static_cast<uint64_t>(c.train.seed), pool),
         state(env.num_envs(), kRewardTerms) {}
 
-  /// Evaluation from fresh starts in MuJoCo, with the reward's standard weights, on the training
-  /// plant or, where plants are random, on a fresh one for each episode; disturbed as in training.
+  /// Evaluation from fresh starts with the reward's standard weights, on the training plant or,
+  /// where plants are random, on a fresh one for each episode; disturbed as in training.
   Evaluation Judge(const Policy& policy, int64_t step) {
     PendulumEnvConfig judge = config.Environments(pool);
-    judge.physics = PhysicsEngine::kMuJoCo;
+    judge.physics = ParsePhysics(config.eval_physics, "--eval-physics");
     judge.num_envs = static_cast<int>(config.train.eval_episodes);
     judge.episode_seconds = kEvaluationSeconds;
     judge.start = StartStates();
     judge.weights = RewardWeights();
     judge.stream = Concat("evaluation at step ", step);
     PendulumEnv env_of_judge(judge);
-    return Evaluate(policy, env_of_judge);
+    return Evaluate(policy, env_of_judge, &pool);
   }
 
   std::map<std::string, std::string> CheckpointMetadata() const {
@@ -227,50 +227,6 @@ int RunTrain(const TrainArguments& arguments) {
   return TrainRun(path, parts, resuming, steps_given);
 }
 
-/// What --help shows for a flag's value.
-std::string TypeName(const Option& option) {
-  constexpr std::array kNames{"", "INTEGER", "NUMBER", "TEXT", "LIST"};  // in Target's order
-  return option.name == "model" ? "FILE" : kNames.at(option.target.index());
-}
-
-/// Adds a flag for each setting, in the order in which they were described.
-void AddSettings(CLI::App& app, std::vector<FlagValue>& flags) {
-  Config defaults;
-  const Options options = OptionsOf(defaults);
-  // CLI11 applies flags in this order: aliases first, so that what is more specific wins.
-  for (const auto& alias : options.aliases()) {
-    const std::string name = alias.name;
-    app.add_option_function<std::string>(
-           "--" + name, [&flags, name](const std::string& text) { flags.emplace_back(name, text); },
-           Concat(alias.members.size() == 2 ? "both " : "all of ", Join(alias.members, " and ")))
-        ->group(alias.section)
-        ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)
-        ->type_name("NUMBER");
-  }
-  for (const Option& option : options.all()) {
-    std::string help = option.help;
-    if (!option.unit.empty()) help += ", " + option.unit;
-    if (!option.choices.empty()) help += ": " + Join(option.choices, ", ");
-    help += " [" + option.text() + "]";
-    const std::string name = option.name;
-    if (std::holds_alternative<bool*>(option.target)) {
-      app.add_flag_function(
-             option.flag() + ",!--no-" + option.flag().substr(2),
-             [&flags, name](int64_t on) { flags.emplace_back(name, on > 0 ? "true" : "false"); },
-             help)
-          ->group(option.section)
-          ->disable_flag_override();
-      continue;
-    }
-    app.add_option_function<std::string>(
-           option.flag(),
-           [&flags, name](const std::string& text) { flags.emplace_back(name, text); }, help)
-        ->group(option.section)
-        ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)
-        ->type_name(TypeName(option));
-  }
-}
-
 }  // namespace
 
 void AddTrain(CLI::App& program, Command& command) {
@@ -287,7 +243,8 @@ void AddTrain(CLI::App& program, Command& command) {
                   "--stop-when-solved may be given anew")
       ->type_name("RUN")
       ->check(NotEmpty());
-  AddSettings(*app, arguments->flags);
+  Config defaults;
+  AddSettings(*app, OptionsOf(defaults), arguments->flags);
 
   std::string agents = "Named agents:\n";
   for (const auto& [name, what] : NamedAgents()) agents += fmt::format("  {:<14}{}\n", name, what);
@@ -298,6 +255,7 @@ void AddTrain(CLI::App& program, Command& command) {
       "  ./upswing train --agent dqn --seed 3 --out runs/a\n"
       "  ./upswing train --gamma 0.98 --hidden 128,128    any setting as a flag\n"
       "  ./upswing train --mass2 1.2 --no-stop-when-solved --steps 500000\n"
+      "  ./upswing train --randomize 0.25 --delay 0.02    each episode another plant\n"
       "  ./upswing train --resume runs/a --steps 2000000  go on, from any moment\n"
       "\nSIGINT and SIGTERM write a checkpoint and end with 130 and 143; SIGUSR1 writes one\n"
       "and goes on. Exit code 0: done; 1: failed; 2: bad usage or input.\n");

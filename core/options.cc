@@ -69,6 +69,8 @@ std::optional<std::vector<int64_t>> ParseList(std::string_view text, Range range
 
 std::string Option::flag() const { return FlagOf(name); }
 
+std::string Options::AliasEntry::flag() const { return FlagOf(name); }
+
 std::string Option::text() const {
   return std::visit(Overloaded{
                         [](const bool* value) -> std::string { return *value ? "true" : "false"; },
@@ -178,8 +180,10 @@ Option& Options::Add(std::vector<int64_t>* target, std::string_view name,
   return AddOption(target, name, range, "", help);
 }
 
-void Options::Alias(std::string_view name, std::vector<std::string> members) {
-  aliases_.push_back({section_, std::string(name), std::move(members)});
+void Options::Alias(std::string_view name, std::vector<std::string> members,
+                    std::string_view help) {
+  std::string text = help.empty() ? Concat("both ", Join(members, " and ")) : std::string(help);
+  aliases_.push_back({section_, std::string(name), std::move(members), std::move(text)});
 }
 
 std::vector<const Option*> Options::Find(std::string_view name, const std::string& where) const {

@@ -64,13 +64,17 @@ class Options {
   Option& Add(std::vector<int64_t>* target, std::string_view name, std::vector<int64_t> value,
               Range range, std::string_view help);
 
-  /// One name that sets several others, such as `mass` for `mass1` and `mass2`.
-  void Alias(std::string_view name, std::vector<std::string> members);
+  /// One name that sets several others, such as `mass` for `mass1` and `mass2`. Without `help` it
+  /// says that it sets both.
+  void Alias(std::string_view name, std::vector<std::string> members, std::string_view help = "");
 
   const std::vector<Option>& all() const { return options_; }
   struct AliasEntry {
     std::string section, name;
     std::vector<std::string> members;
+    std::string help;
+
+    std::string flag() const;
   };
   const std::vector<AliasEntry>& aliases() const { return aliases_; }
 

@@ -7,7 +7,7 @@ namespace upswing {
 namespace {
 
 constexpr int64_t kCurveResamples = 2000;  // at each point
-constexpr double kIntervals = 100;         // of a grid
+constexpr double kIntervals = 200;         // of a grid
 
 /// y of one run at `x`.
 double At(const RunRecord& run, const EvaluationFigure& x_of, const EvaluationFigure& y_of,
@@ -26,17 +26,22 @@ double Seconds(const EvaluationRow& row) { return row.seconds; }
 double SuccessPercent(const EvaluationRow& row) { return 100 * row.success_rate; }
 double Return(const EvaluationRow& row) { return row.mean_return; }
 
+/// Where the longest run ends.
+double LastOf(const std::vector<RunGroup>& groups, const EvaluationFigure& x) {
+  double last = 0;
+  for (const RunGroup& group : groups) {
+    for (const RunRecord& run : group.runs) last = std::max(last, x(run.evaluations.back()));
+  }
+  return last;
+}
+
 /// Whether a run ends before the longest one does.
 bool AnyHolds(const std::vector<RunGroup>& groups) {
-  int64_t shortest = INT64_MAX;
-  int64_t longest = 0;
-  for (const RunGroup& group : groups) {
-    for (const RunRecord& run : group.runs) {
-      shortest = std::min(shortest, run.evaluations.back().step);
-      longest = std::max(longest, run.evaluations.back().step);
-    }
-  }
-  return shortest < longest;
+  const double last = LastOf(groups, Steps);
+  return std::ranges::any_of(groups, [&](const RunGroup& group) {
+    return std::ranges::any_of(
+        group.runs, [&](const RunRecord& run) { return Steps(run.evaluations.back()) < last; });
+  });
 }
 
 }  // namespace
@@ -58,16 +63,10 @@ Line LearningCurve(const RunGroup& group, const EvaluationFigure& x, const Evalu
   return line;
 }
 
-std::vector<double> CurveGrid(const std::vector<RunGroup>& groups, const EvaluationFigure& x) {
+std::vector<double> CurveGrid(const RunGroup& group, const EvaluationFigure& x, double end) {
   double begin = 0;
-  double end = 0;
-  for (const RunGroup& group : groups) {
-    for (const RunRecord& run : group.runs) {
-      begin = std::max(begin, x(run.evaluations.front()));
-      end = std::max(end, x(run.evaluations.back()));
-    }
-  }
-  if (begin >= end) return {end};
+  for (const RunRecord& run : group.runs) begin = std::max(begin, x(run.evaluations.front()));
+  if (begin >= end) return {begin};
   std::vector<double> grid;
   for (double i = 0; i <= kIntervals; ++i) grid.push_back(std::lerp(begin, end, i / kIntervals));
   return grid;
@@ -85,9 +84,9 @@ Figure LearningCurves(const std::vector<RunGroup>& groups) {
     Panel& panel = figure.panels.emplace_back();
     panel.x_label = x_label;
     panel.y_label = y_label;
-    const std::vector<double> grid = CurveGrid(groups, x);
+    const double end = LastOf(groups, x);
     for (const RunGroup& group : groups) {
-      panel.lines.push_back(LearningCurve(group, x, y, grid));
+      panel.lines.push_back(LearningCurve(group, x, y, CurveGrid(group, x, end)));
       // One legend, at the right of the upper row, is enough.
       if (figure.panels.size() != 2) panel.lines.back().name.clear();
     }

@@ -17,8 +17,8 @@ using EvaluationFigure = std::function<double(const EvaluationRow&)>;
 Line LearningCurve(const RunGroup& group, const EvaluationFigure& x, const EvaluationFigure& y,
                    const std::vector<double>& grid);
 
-/// From where every run has been evaluated to where the longest ends, in equal intervals.
-std::vector<double> CurveGrid(const std::vector<RunGroup>& groups, const EvaluationFigure& x);
+/// From where every run of the group has been evaluated to `end`, in equal intervals.
+std::vector<double> CurveGrid(const RunGroup& group, const EvaluationFigure& x, double end);
 
 /// Success and return over steps and over training time: four panels with a curve for each group.
 Figure LearningCurves(const std::vector<RunGroup>& groups);

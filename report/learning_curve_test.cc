@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "report/testing.h"
 
 namespace upswing {
@@ -30,14 +32,16 @@ TEST(LearningCurve, IsTheInterquartileMeanWithItsInterval) {
   EXPECT_EQ(line.high, (std::vector<double>{interval.high, 7}));
 }
 
-TEST(LearningCurve, TheGridSpansWhatAllRunsHave) {
-  RunRecord late = MadeRun(2, {{0, 0}, {0, 0}, {0, 0}, {0, 0}});
+TEST(LearningCurve, TheGridBeginsWhereAllRunsHaveBeenEvaluated) {
+  RunRecord late = MadeRun(2, {{0, 0}, {0, 0}});
   late.evaluations.front().seconds = 1.5;
-  const std::vector<RunGroup> groups{{"a", {MadeRun(1, {{0, 0}, {0, 0}})}}, {"b", {late}}};
-  const auto grid = CurveGrid(groups, Seconds);
+  const RunGroup group{"a", {MadeRun(1, {{0, 0}, {0, 0}}), late}};
+  const auto grid = CurveGrid(group, Seconds, 4);
+  ASSERT_GT(grid.size(), 100U);
   EXPECT_EQ(grid.front(), 1.5);
   EXPECT_EQ(grid.back(), 4);
-  EXPECT_EQ(CurveGrid({{"a", {MadeRun(1, {{0, 0}})}}}, Seconds), std::vector<double>{1});
+  EXPECT_TRUE(std::ranges::is_sorted(grid));
+  EXPECT_EQ(CurveGrid(group, Seconds, 1.5), std::vector<double>{1.5});
 }
 
 TEST(LearningCurve, TheFigureSaysWhereValuesAreKept) {

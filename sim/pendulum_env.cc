@@ -21,7 +21,7 @@ std::optional<Disturber> MakeDisturber(const PendulumEnvConfig& config) {
   }
   if (!any) return std::nullopt;
   return Disturber(config.disturbances, config.num_envs, max_delay, config.seed,
-                   Concat(config.stream, ": sensor noise"));
+                   Concat(config.stream, ": sensor noise"), config.first_index);
 }
 
 }  // namespace
@@ -36,7 +36,7 @@ PendulumEnv::PendulumEnv(const PendulumEnvConfig& config)
   obs_.resize(n * kObservationSize);
   if (config_.randomization.any()) plants_.resize(n);
   for (int i = 0; i < config_.num_envs; ++i) {
-    const auto index = static_cast<uint64_t>(i);
+    const uint64_t index = config_.first_index + static_cast<uint64_t>(i);
     if (!plants_.empty()) {
       plant_rngs_.emplace_back(config_.seed, Concat(config_.stream, ": plant"), index);
     }

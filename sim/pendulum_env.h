@@ -29,7 +29,8 @@ struct PendulumEnvConfig : PhysicsConfig {
   double episode_seconds = 10;
   StartStates start;
   uint64_t seed = 0;
-  std::string stream = "environment";  // environment i draws its starts from (seed, stream, i)
+  std::string stream = "environment";  // environment i draws from (seed, stream, first_index + i)
+  uint64_t first_index = 0;
   std::vector<Disturbance> disturbances{Disturbance()};  // one for all, or one for each
   Randomization randomization;  // around plants and disturbances, at each reset
 

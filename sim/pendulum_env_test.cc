@@ -64,6 +64,23 @@ TEST_P(PendulumEnvs, TruncatesWithTheTrueSuccessorAndThenResets) {
   EXPECT_EQ(result.truncated[0], 0);
 }
 
+TEST_P(PendulumEnvs, APartOfTheEnvironmentsIsAsThoseOfTheWhole) {
+  PendulumEnvConfig whole = SmallConfig();
+  whole.disturbances = {{0.02, 0}};
+  whole.randomization.plant.fill(0.2);
+  PendulumEnvConfig part = whole;
+  part.num_envs = 2;
+  part.first_index = 1;
+  PendulumEnv all(whole), last(part);
+  StepResult expected = all.MakeResult(), result = last.MakeResult();
+  for (int step = 0; step < 8; ++step) {  // over a reset
+    all.Step(std::vector<double>{1, 2, 3}, expected);
+    last.Step(std::vector<double>{2, 3}, result);
+    ASSERT_EQ(all.state(1).q2, last.state(0).q2);
+    ASSERT_TRUE(std::ranges::equal(all.obs().row(2), last.obs().row(1)));
+  }
+}
+
 TEST_P(PendulumEnvs, ABlowUpTerminatesWithFiniteNumbersAndStartsAnew) {
   PendulumEnv env(SmallConfig());
   StepResult result = env.MakeResult();

@@ -18,7 +18,7 @@ void Randomization::Describe(Options& o) {
   const auto add = [&](double* target, std::string_view name, std::string_view what) {
     o.Add(target, name, 0, kRelative, "", what);
   };
-  add(&mass1, "randomize_mass1", "each episode's mass1 is within ± this share of the nominal");
+  add(&mass1, "randomize_mass1", "each episode's mass1 is within ± this share of the plant's");
   add(&mass2, "randomize_mass2", "the same of mass2");
   add(&length1, "randomize_length1", "the same of length1");
   add(&length2, "randomize_length2", "the same of length2");
