@@ -19,6 +19,7 @@ void AddSimulate(CLI::App& program, Command& command);
 void AddMap(CLI::App& program, Command& command);
 void AddPlot(CLI::App& program, Command& command);
 void AddInfo(CLI::App& program, Command& command);
+void AddCompare(CLI::App& program, Command& command);
 void AddBench(CLI::App& program, Command& command);
 
 /// Refuses an empty path, such as that of a shell variable that is not set.

@@ -135,6 +135,7 @@ int Main(int argc, char** argv) {
       "Examples:\n"
       "  ./upswing train                      train the default agent until the task is solved\n"
       "  ./upswing eval runs/d3qn-seed1       judge its best policy\n"
+      "  ./upswing compare runs               compare the agents in runs over their seeds\n"
       "  ./upswing train --help               every setting, with its default\n");
   Command command;
   AddTrain(program, command);
@@ -143,6 +144,7 @@ int Main(int argc, char** argv) {
   AddMap(program, command);
   AddPlot(program, command);
   AddInfo(program, command);
+  AddCompare(program, command);
   AddBench(program, command);
 
   try {

@@ -7,6 +7,7 @@
 #include "apps/commands.h"
 #include "apps/config.h"
 #include "apps/rollout.h"
+#include "core/csv.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/text.h"
@@ -20,38 +21,9 @@ struct SimulateArguments {
   std::optional<double> seconds;
 };
 
-/// The column `torque` of a CSV file. Lines that begin with # and empty lines are skipped. Throws
-/// BadInput with the line.
+/// The column `torque` of a CSV file. Throws BadInput with the line.
 std::vector<double> ReadTorqueFile(const std::string& path) {
-  const std::string text = ReadTextFile(path);
-  std::vector<double> torques;
-  std::optional<size_t> column;
-  size_t columns = 0;
-  int line_number = 0;
-  for (const std::string_view line : Split(text, '\n')) {
-    ++line_number;
-    if (line.empty() || line.starts_with('#')) continue;
-    const std::vector<std::string_view> cells = Split(line, ',');
-    const std::string place = Concat(path, ":", line_number, ": ");
-    if (!column) {
-      const auto found = std::find(cells.begin(), cells.end(), "torque");
-      if (found == cells.end()) {
-        throw BadInput(Concat(place, "expected a column \"torque\", got \"", line, "\""));
-      }
-      column = static_cast<size_t>(found - cells.begin());
-      columns = cells.size();
-      continue;
-    }
-    if (cells.size() != columns) {
-      throw BadInput(Concat(place, "expected ", columns, " columns, got ", cells.size()));
-    }
-    const auto torque = ParseNumber(cells[*column]);
-    if (!torque || !std::isfinite(*torque)) {
-      throw BadInput(
-          Concat(place, "torque: expected a finite number, got \"", cells[*column], "\""));
-    }
-    torques.push_back(*torque);
-  }
+  std::vector<double> torques = ReadCsv(ReadTextFile(path), {"torque"}, path).front().values;
   if (torques.empty()) throw BadInput(Concat(path, ": expected rows of torques, got none"));
   return torques;
 }

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/sample.h"
 #include "core/thread_pool.h"
 #include "core/vector_env.h"
 #include "nn/policy.h"
@@ -26,28 +27,6 @@ struct EvaluationEpisode {
   double rms_torque = 0;        // root mean square, N·m
   std::vector<double> terms;    // (K) sum of each reward term over the first kReturnSeconds
 };
-
-/// Median and the middle half of a sample.
-struct Quartiles {
-  double low = 0, median = 0, high = 0;
-};
-
-/// Quartiles by linear interpolation between order statistics; zeros for an empty sample.
-Quartiles QuartilesOf(std::vector<double> values);
-
-/// A closed interval.
-struct Interval {
-  double low = 0, high = 1;
-};
-
-/// 95% interval of a proportion (Wilson, 1927) after `successes` of `trials`.
-Interval WilsonInterval(int64_t successes, int64_t trials);
-
-/// Mean and sample standard deviation.
-struct Moments {
-  double mean = 0, deviation = 0;
-};
-Moments MomentsOf(std::span<const double> values);
 
 /// An evaluation in figures.
 struct Evaluation {
