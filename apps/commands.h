@@ -15,10 +15,14 @@ void AddTrain(CLI::App& program, Command& command);
 void AddEval(CLI::App& program, Command& command);
 void AddSimulate(CLI::App& program, Command& command);
 void AddInfo(CLI::App& program, Command& command);
+void AddStudy(CLI::App& program, Command& command);
 void AddBench(CLI::App& program, Command& command);
 
 /// Refuses an empty path, such as that of a shell variable that is not set.
 CLI::Validator NotEmpty();
+
+/// Adds --seeds and --jobs, for many runs; 0 jobs: as many as there are processors.
+void AddManyOptions(CLI::App& app, std::string& seeds, int& jobs);
 
 /// Adds --set and --model, which choose another plant.
 void AddPlantOptions(CLI::App& app, std::vector<std::string>& set, std::string& model);

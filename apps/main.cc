@@ -20,6 +20,15 @@ CLI::Validator NotEmpty() {
           ""};
 }
 
+void AddManyOptions(CLI::App& app, std::string& seeds, int& jobs) {
+  app.add_option("--seeds", seeds, "a run for each: 10 for 1 to 10, or a list such as 3,5,8-12")
+      ->type_name("SEEDS")
+      ->check(NotEmpty());
+  app.add_option("--jobs", jobs, "runs at a time [one for each processor]")
+      ->type_name("INTEGER")
+      ->check(CLI::Range(1, 4096));
+}
+
 void AddPlantOptions(CLI::App& app, std::vector<std::string>& set, std::string& model) {
   app.add_option("--set", set, "another plant, such as mass2=1.2 (repeat for more)")
       ->type_name("NAME=VALUE")
@@ -95,6 +104,7 @@ int Main(int argc, char** argv) {
   AddEval(program, command);
   AddSimulate(program, command);
   AddInfo(program, command);
+  AddStudy(program, command);
   AddBench(program, command);
 
   try {
