@@ -26,7 +26,7 @@ void AddManyOptions(CLI::App& app, std::string& seeds, int& jobs) {
       ->check(NotEmpty());
   app.add_option("--jobs", jobs, "runs at a time [one for each processor]")
       ->type_name("INTEGER")
-      ->check(CLI::Range(1, 4096));
+      ->check(CLI::Range(1, 4096).description(""));
 }
 
 void AddPlantOptions(CLI::App& app, std::vector<std::string>& set, std::string& model) {

@@ -144,14 +144,12 @@ class Scheduler {
 
   /// Returns when all have ended; after a request to stop those that run do so in order.
   void Run() {
-    bool stopping = false;
-    while (!running_.empty() || (!waiting_.empty() && !stopping)) {
-      while (!stopping && running_.size() < jobs_ && !waiting_.empty()) Start();
-      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    while (!running_.empty() || !waiting_.empty()) {
       const TrainRequest request = PollSignals();
-      if (request == TrainRequest::kStop && !stopping) SignalAll(StopSignal());
       if (request == TrainRequest::kCheckpoint) SignalAll(SIGUSR1);
-      stopping = request == TrainRequest::kStop;
+      if (request == TrainRequest::kStop && !stopping_) Stop();
+      while (running_.size() < jobs_ && !waiting_.empty()) Start();
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
       for (auto it = running_.begin(); it != running_.end();) {
         const auto code = it->process.Poll();
         if (code) End(*it->run, *code);
@@ -173,12 +171,18 @@ class Scheduler {
     running_.push_back({&run, ChildProcess(ArgumentsOf(run), run.log())});
   }
 
+  void Stop() {
+    stopping_ = true;
+    waiting_.clear();
+    SignalAll(StopSignal());
+  }
+
   void SignalAll(int signal) {
     for (const Running& running : running_) running.process.Signal(signal);
   }
 
   void End(SeedRun& run, int code) {
-    const bool asked_to_stop = StopSignal() != 0 && code == 128 + StopSignal();
+    const bool asked_to_stop = stopping_ && code == 128 + StopSignal();
     try {
       run.ReadState();
       if (code != 0 && !asked_to_stop) {
@@ -198,6 +202,7 @@ class Scheduler {
 
   size_t jobs_;
   ManyRunsView& view_;
+  bool stopping_ = false;
   std::list<SeedRun*> waiting_;
   std::list<Running> running_;
 };
@@ -237,13 +242,13 @@ int TrainMany(const ManyRuns& plan) {
   for (const Variant& variant : plan.variants) {
     CheckRuns(plan.folder / variant.name, variant.config, plan.more_steps);
   }
+  InstallSignalHandlers();  // from here on what is begun is ended in order
   WriteSettings(plan);
   if (!lock) lock.emplace(plan.folder);
 
   std::vector<SeedRun> runs = ListRuns(plan);
   ManyRunsView view(plan, runs);
   view.Announce();
-  InstallSignalHandlers();
   Scheduler(runs, plan.jobs, view).Run();
   view.Summarize(StopSignal() != 0);
 

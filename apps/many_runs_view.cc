@@ -28,9 +28,8 @@ std::string DurationOrDash(double value) {
 
 void PrintRow(const std::string& name, double step, double seconds, double success, double reward,
               const std::string& remark) {
-  fmt::print("  {:<12} {:>11}  {:>12}  {:>6.0f}%  {:>8.0f}  {}", name, CountOrDash(step),
-             DurationOrDash(seconds), 100 * success, reward, remark);
-  fmt::print("\n");
+  fmt::print("  {:<12} {:>11}  {:>12}  {:>6.0f}%  {:>8.0f}{}{}\n", name, CountOrDash(step),
+             DurationOrDash(seconds), 100 * success, reward, remark.empty() ? "" : "  ", remark);
 }
 
 }  // namespace
@@ -109,16 +108,18 @@ void ManyRunsView::PrintEnd(const SeedRun& run) {
 
 void ManyRunsView::PrintTable(const Variant& variant) const {
   fmt::print("\n{}\n", variant.name.empty() ? plan_.what : variant.name);
-  fmt::print("  {:<12} {:>11}  {:>12}  {:>7}  {:>8}\n", "", "solved at", "after", "success",
-             "return");
   std::vector<double> steps, seconds, success, reward;
   size_t solved = 0;
+  size_t not_judged = 0;
   for (const SeedRun& run : runs_) {
     if (run.variant != &variant) continue;
-    const std::string name = fmt::format("seed {}", run.seed);
     if (!run.state || run.state->best_step == 0) {
-      fmt::print("  {:<12} {}\n", name, run.problem.empty() ? "not judged yet" : "failed");
+      ++not_judged;
       continue;
+    }
+    if (steps.empty()) {
+      fmt::print("  {:<12} {:>11}  {:>12}  {:>7}  {:>8}\n", "", "solved at", "after", "success",
+                 "return");
     }
     const TrainState& s = *run.state;
     solved += s.solved ? 1 : 0;
@@ -126,24 +127,30 @@ void ManyRunsView::PrintTable(const Variant& variant) const {
     seconds.push_back(s.solved ? s.streak_seconds : kNever);
     success.push_back(s.best_success_rate);
     reward.push_back(s.best_return);
-    PrintRow(name, steps.back(), seconds.back(), success.back(), reward.back(),
+    PrintRow(fmt::format("seed {}", run.seed), steps.back(), seconds.back(), success.back(),
+             reward.back(),
              !run.problem.empty() ? "failed"
              : run.finished()     ? ""
                                   : fmt::format("at step {}", FormatCount(s.steps)));
   }
-  if (steps.empty()) return;
-  PrintRow("median", MedianOf(steps), MedianOf(seconds), MedianOf(success), MedianOf(reward),
-           fmt::format("{} of {} solved", solved, steps.size()));
+  if (!steps.empty()) {
+    PrintRow("median", MedianOf(steps), MedianOf(seconds), MedianOf(success), MedianOf(reward),
+             fmt::format("{} of {} solved", solved, steps.size()));
+  }
+  if (not_judged > 0) {
+    fmt::print("  {} run{} not judged yet\n", not_judged, not_judged == 1 ? "" : "s");
+  }
 }
 
 void ManyRunsView::Summarize(bool stopped) {
   line_.Clear();
   for (const Variant& variant : plan_.variants) PrintTable(variant);
   const size_t done = Measure().done;
-  if (stopped) fmt::print("\nStopped, {} of {} runs done", done, runs_.size());
-  if (stopped) fmt::print("; the same command goes on.\n");
-  fmt::print("\nSuccess and return are those of each run's best policy.\nNext:\n");
-  fmt::print("  ./upswing compare {}\n", plan_.folder.string());
+  fmt::print("\nSuccess and return are those of each run's best policy at evaluation.\n");
+  if (stopped) {
+    fmt::print("Stopped, {} of {} runs done; the same command goes on.\n", done, runs_.size());
+  }
+  fmt::print("Next:\n  ./upswing compare {}\n", plan_.folder.string());
   std::fflush(stdout);
 }
 

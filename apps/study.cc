@@ -113,7 +113,7 @@ ManyRuns ReadStudy(const StudyArguments& arguments) {
 
   ManyRuns plan;
   const std::string title = ReadText(study, "title", where);
-  plan.what = title.empty() ? file.stem().string() : title;
+  plan.what = title.empty() ? file.stem().string() : Concat("\"", title, "\"");
   plan.folder = arguments.out.empty() ? fs::path("runs") / file.stem() : fs::path(arguments.out);
   plan.mark = {"study.toml", text};
   plan.variants = ReadVariants(study, where);
