@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <string>
 #include <utility>
@@ -40,8 +41,12 @@ struct Config {
   PendulumEnvConfig Environments(ThreadPool& pool) const;
 };
 
-/// A setting given on the command line: name and text.
-using FlagValue = std::pair<std::string, std::string>;
+/// A setting given on the command line or in a study: name, text, and where, which begins messages;
+/// an empty place stands for the setting's flag.
+struct FlagValue {
+  std::string name, text;
+  std::string where = {};
+};
 
 /// Sets what the flags say. Throws BadInput.
 void SetFlags(const Options& options, const std::vector<FlagValue>& flags);
@@ -52,6 +57,11 @@ Config BuildConfig(const std::filesystem::path& file, const std::vector<FlagValu
 
 /// Applies a TOML document. `where` names it in messages, which give the line too.
 void ApplyToml(const Options& options, std::string_view toml, const std::string& where);
+
+/// Throws BadInput that names the first of the settings for which `counts` is true that two
+/// configurations do not have in common. `where` is what was made with the one `before`.
+void ExpectSameSettings(const Options& before, const Options& now, const std::string& where,
+                        const std::function<bool(const Option&)>& counts);
 
 /// The settings as TOML; without those that do not make another run of it, if `identity_only`.
 std::string ConfigToml(Config config, bool identity_only);

@@ -38,27 +38,27 @@ void DqnConfig::Describe(Options& o) {
         "the agent learns from reward times this");
   o.Add(&batch, "batch", 128, {1, 65536}, "", "transitions in a minibatch");
   o.Add(&replay, "replay", 300000, {1, 10000000}, "", "transitions that the replay memory holds");
-  o.Add(&prioritized, "prioritized", false,
+  o.Add(&prioritized, "prioritized", true,
         "prioritised replay: draw transitions by their last |TD error|");
   o.Add(&priority_exponent, "priority_exponent", 0.6, kUnit, "",
         "alpha of prioritised replay; 0: uniform");
   o.Add(&importance_exponent, "importance_exponent", 0.4, kUnit, "",
         "beta of prioritised replay at the beginning; it rises to 1 as the learning rate falls");
-  o.Add(&mirror, "mirror", false,
+  o.Add(&mirror, "mirror", true,
         "learn from a random half of each minibatch as a mirror would show it");
   o.Add(&learning_starts, "learning_starts", 2000, kNotNegative, "steps",
         "before the first update");
-  o.Add(&updates_per_step, "updates_per_step", 0.25, {0, 100}, "", "gradient steps per step");
+  o.Add(&updates_per_step, "updates_per_step", 0.0625, {0, 100}, "", "gradient steps per step");
   o.Add(&learning_rate, "learning_rate", 1e-3, {0, 10}, "",
         "learning rate of Adam at the beginning");
   o.Add(&learning_rate_end, "learning_rate_end", 1e-4, {0, 10}, "", "and at the end");
-  o.Add(&learning_rate_steps, "learning_rate_steps", 300000, {1, 1e12}, "steps",
+  o.Add(&learning_rate_steps, "learning_rate_steps", 600000, {1, 1e12}, "steps",
         "over which it falls linearly");
   o.Add(&max_gradient_norm, "max_gradient_norm", 10, kPositive, "", "clip the global norm to this");
   o.Add(&tau, "tau", 0.02, kUnit, "", "Polyak averaging of the target, per update");
   o.Add(&target_period, "target_period", 0, {0, 1e9}, "updates",
         "copy the target every so many instead; 0: Polyak averaging");
-  o.Add(&policy_tau, "policy_tau", 1, kUnit, "",
+  o.Add(&policy_tau, "policy_tau", 0.01, kUnit, "",
         "Polyak averaging of the policy that is judged and kept, per update; 1: as learned last");
   o.Add(&epsilon_start, "epsilon_start", 1.0, kUnit, "",
         "share of random actions at the beginning");
