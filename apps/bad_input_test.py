@@ -27,7 +27,7 @@ class CommandLineTest(ProgramTest):
 
     def test_empty_path(self):
         for command in (["train", "--resume", ""], ["train", "--out", ""], ["train", "--config", ""],
-                        ["eval", ""], ["info", ""], ["simulate", "--torque", ""],
+                        ["eval", ""], ["info", ""], ["compare", ""], ["simulate", "--torque", ""],
                         ["simulate", "--csv", ""], ["simulate", "--model", ""]):
             with self.subTest(command=command):
                 self.refuse(command, "empty")

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <set>
 
@@ -16,7 +17,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr size_t kLongText = 48;  // longer ones are not shown
+constexpr const char* kModelText = "text of the model";  // as the name of a setting
+constexpr size_t kLongText = 48;                         // longer ones are not shown
 
 /// Name (`section.key`) and value of a setting.
 using Setting = std::pair<std::string, std::string>;
@@ -65,15 +67,18 @@ std::vector<Setting> SettingsOf(Config config) {
     settings.emplace_back(Concat(option.section, ".", option.name),
                           text != nullptr ? **text : option.text());
   }
-  settings.emplace_back("text of the model", config.mjcf);
+  settings.emplace_back(kModelText, config.mjcf);
   return settings;
 }
 
-/// Whether a setting says what a policy is judged on, or when, and not how it is trained.
+/// Whether a setting says what a policy is judged on, or when, and not how it is trained: those
+/// that the evaluations of `train` share with its episodes, and their own.
 bool IsJudged(const std::string& name) {
-  return name.starts_with("plant.") || name.starts_with("disturbance.") ||
-         name.starts_with("train.eval_") || name.starts_with("task.eval_") ||
-         name == "text of the model";
+  constexpr std::array<std::string_view, 5> kBeginnings{"plant.", "disturbance.", "randomize.",
+                                                        "train.eval_", "task.eval_"};
+  return name == kModelText || std::ranges::any_of(kBeginnings, [&](std::string_view beginning) {
+           return name.starts_with(beginning);
+         });
 }
 
 FoundRun ReadRun(const fs::path& path, const fs::path& argument, bool unfinished) {

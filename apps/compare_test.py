@@ -8,7 +8,7 @@ import statistics
 import unittest
 import xml.etree.ElementTree as ET
 
-from testing import ProgramTest, read_csv, small
+from testing import MODEL, ProgramTest, read_csv, small
 
 OUTPUTS = ["curves.png", "curves.svg", "runs.csv", "summary.csv"]
 
@@ -126,6 +126,9 @@ class CompareTest(ProgramTest):
         self.make_group("r", [1, 2])
         self.make_run("heavy", 3, [(1, 1), (1, 1)], more="[plant]\nmass2 = 1.2\n")
         self.make_run("seldom", 3, [(1, 1), (1, 1)], more="eval_episodes = 7\n")
+        self.make_run("noisy", 3, [(1, 1), (1, 1)], more="[disturbance]\nsensor_noise = 0.1\n")
+        self.make_run("model", 3, [(1, 1), (1, 1)], more='[plant]\nmodel = "model.xml"\n')
+        self.write("model/model.xml", MODEL)
         self.make_run("twin", 1, [(1, 1), (1, 1)])
         self.make_run("begun", 3, [(0, 1), (1, 1)])
         self.make_run("bare", 4, [])
@@ -140,6 +143,8 @@ class CompareTest(ProgramTest):
         refuse(["r", "heavy"], "heavy", "another task than r/seed1",
                "plant.mass2 = 1.2 instead of 1", "--different-tasks")
         refuse(["r", "seldom"], "train.eval_episodes = 7 instead of 100")
+        refuse(["r", "noisy"], "disturbance.sensor_noise = 0.1 instead of 0")
+        refuse(["r", "model"], "model: judged on another task than r/seed1")
         refuse(["r", "r/seed2"], "r/seed2", "given twice")
         refuse(["r", "twin"], "twin: the same training as r/seed1", "seed 1")
         refuse(["r", "begun"], "begun", "unfinished", "2,000 of 4,000", "--unfinished")
