@@ -1,10 +1,12 @@
 // A study: variants of the settings, each trained with many seeds.
+#include <fmt/format.h>
 #include <toml++/toml.h>
 
 #include <algorithm>
 #include <memory>
 
 #include "apps/commands.h"
+#include "apps/compare.h"
 #include "apps/many_runs.h"
 #include "apps/seeds.h"
 #include "apps/toml_settings.h"
@@ -134,8 +136,14 @@ ManyRuns ReadStudy(const StudyArguments& arguments) {
 int RunStudy(const StudyArguments& arguments) {
   const ManyRuns plan = ReadStudy(arguments);
   const int exit_code = TrainMany(plan);
-  // All runs are done where the code is 0: the place to compare the variants.
-  return exit_code;
+  if (exit_code != 0) return exit_code;
+  // All runs are done: what do they show?
+  const Comparison comparison = Compare({.paths = {plan.folder}, .different_tasks = true});
+  WriteComparison(comparison, plan.folder, true);
+  PrintComparison(comparison);
+  fmt::print("Written: summary.csv, runs.csv, curves.svg and curves.png in {}\n",
+             plan.folder.string());
+  return 0;
 }
 
 }  // namespace
