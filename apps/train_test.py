@@ -13,7 +13,7 @@ METRICS = ["step", "episodes", "updates", "epsilon", "learning_rate", "loss", "q
            "gradient_norm", "mean_return", "success_rate", "seconds"]
 EPISODES = ["step", "episode", "return", "length", "terminated", *REWARD_TERMS]
 EVALS = ["step", "success_rate", "success_low", "success_high", "mean_return", "swing_up_seconds",
-         "work", "rms_torque", "seconds"]
+         "work", "rms_torque", "value", "discounted_return", "seconds"]
 
 
 class TrainTest(ProgramTest):

@@ -324,6 +324,8 @@ void Dqn::BeginReport() {
 }
 
 Policy Dqn::ExportPolicy(std::map<std::string, std::string> about) const {
+  about["gamma"] = FormatNumber(config_.gamma);
+  about["reward_scale"] = FormatNumber(config_.reward_scale);
   const auto& theta = config_.policy_tau < 1 ? theta_policy_ : theta_;
   return {network_.shape(), {theta.begin(), theta.end()}, torques_, std::move(about)};
 }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/text.h"
+
 namespace upswing {
 namespace {
 
@@ -42,7 +44,25 @@ class SharedActing {
   std::vector<Policy::Workspace> workspaces_;  // one for each slice
 };
 
+/// What the policy expects of where the environments stand.
+void EstimateValues(const Policy& policy, const VectorEnv& env, const ValueUnits& units,
+                    std::span<EvaluationEpisode> episodes) {
+  AlignedVector<float> values(episodes.size() * policy.torques().size());
+  const Matrix<float> q(values, env.num_envs(), static_cast<int>(policy.torques().size()));
+  policy.QValues(env.obs(), q);
+  for (int i = 0; i < env.num_envs(); ++i) {
+    episodes[static_cast<size_t>(i)].value = std::ranges::max(q.row(i)) / units.reward_scale;
+  }
+}
+
 }  // namespace
+
+ValueUnits ValueUnitsOf(const Policy& policy) {
+  const auto& about = policy.about();
+  if (!about.contains("gamma") || !about.contains("reward_scale")) return {};
+  return {ParseNumber(about.at("gamma")).value_or(0),
+          ParseNumber(about.at("reward_scale")).value_or(1)};
+}
 
 Evaluation Summarize(std::span<const EvaluationEpisode> episodes) {
   Evaluation e;
@@ -62,9 +82,12 @@ Evaluation Summarize(std::span<const EvaluationEpisode> episodes) {
   e.work = MomentsOf(work);
   e.rms_torque = MomentsOf(rms);
   if (!episodes.empty()) e.term_means.resize(episodes.front().terms.size());
+  const double share = 1 / static_cast<double>(std::max<size_t>(1, episodes.size()));
   for (const EvaluationEpisode& episode : episodes) {
+    e.value += share * episode.value;
+    e.discounted_return += share * episode.discounted_return;
     for (size_t j = 0; j < e.term_means.size(); ++j) {
-      e.term_means[j] += episode.terms[j] / static_cast<double>(episodes.size());
+      e.term_means[j] += share * episode.terms[j];
     }
   }
   return e;
@@ -82,8 +105,11 @@ std::vector<EvaluationEpisode> EvaluateEpisodes(const Policy& policy, VectorEnv&
   std::vector<double> torque(n);
   std::vector<EvaluationEpisode> episodes(n);
   for (EvaluationEpisode& episode : episodes) episode.terms.resize(terms);
-  std::vector<int64_t> goal_since(n, -1);  // first state of the present stretch at the goal
-  std::vector<uint8_t> ended(n);           // blown up: what follows is another episode
+  const ValueUnits units = ValueUnitsOf(policy);
+  if (units.gamma > 0) EstimateValues(policy, env, units, episodes);
+  double discount = units.gamma > 0 ? 1 : 0;  // γᵏ
+  std::vector<int64_t> goal_since(n, -1);     // first state of the present stretch at the goal
+  std::vector<uint8_t> ended(n);              // blown up: what follows is another episode
 
   for (int64_t k = 1; k <= steps; ++k) {
     act(env.obs(), torque);
@@ -94,6 +120,7 @@ std::vector<EvaluationEpisode> EvaluateEpisodes(const Policy& policy, VectorEnv&
       episode.work += result.work[i];
       episode.peak_torque = std::max(episode.peak_torque, std::abs(result.torque[i]));
       episode.rms_torque += result.torque[i] * result.torque[i];
+      episode.discounted_return += discount * result.reward[i];
       if (k <= return_steps) {
         episode.reward_sum += result.reward[i];
         for (size_t j = 0; j < terms; ++j) episode.terms[j] += result.reward_terms[i * terms + j];
@@ -102,6 +129,7 @@ std::vector<EvaluationEpisode> EvaluateEpisodes(const Policy& policy, VectorEnv&
       if (result.at_goal[i] && goal_since[i] < 0) goal_since[i] = k;
       ended[i] = result.terminated[i];
     }
+    discount *= units.gamma;
     if (progress) progress(static_cast<double>(k) / static_cast<double>(steps));
   }
 

@@ -19,13 +19,15 @@ inline constexpr double kReturnSeconds = 10;  // the return counts the first so 
 /// What one evaluation episode came to.
 struct EvaluationEpisode {
   bool success = false;
-  double swing_up_seconds = 0;  // start of the last stretch at the goal that lasts to the end;
-                                // kEvaluationSeconds if the end is not at the goal
-  double reward_sum = 0;        // return: undiscounted, over the first kReturnSeconds
-  double work = 0;              // Σ |mechanical work of the motor|, J
-  double peak_torque = 0;       // largest |torque|, N·m
-  double rms_torque = 0;        // root mean square, N·m
-  std::vector<double> terms;    // (K) sum of each reward term over the first kReturnSeconds
+  double swing_up_seconds = 0;   // start of the last stretch at the goal that lasts to the end;
+                                 // kEvaluationSeconds if the end is not at the goal
+  double reward_sum = 0;         // return: undiscounted, over the first kReturnSeconds
+  double work = 0;               // Σ |mechanical work of the motor|, J
+  double peak_torque = 0;        // largest |torque|, N·m
+  double rms_torque = 0;         // root mean square, N·m
+  double value = 0;              // largest Q-value of the first observation, in units of reward
+  double discounted_return = 0;  // what that estimates: Σ γᵏ r over the whole episode
+  std::vector<double> terms;     // (K) sum of each reward term over the first kReturnSeconds
 };
 
 /// An evaluation in figures.
@@ -35,13 +37,21 @@ struct Evaluation {
   Quartiles swing_up_seconds;  // of the successful episodes
   Moments reward_sum, work, rms_torque;
   double peak_torque = 0;
-  std::vector<double> term_means;  // (K) of the episodes' sums of each reward term
+  double value = 0, discounted_return = 0;  // means; 0 for a policy that does not say its γ
+  std::vector<double> term_means;           // (K) of the episodes' sums of each reward term
 
   double success_rate() const {
     return episodes == 0 ? 0 : static_cast<double>(successes) / static_cast<double>(episodes);
   }
   bool all_succeeded() const { return episodes > 0 && successes == episodes; }
 };
+
+/// What Q-values estimate, as a policy's metadata `gamma` and `reward_scale` say: the sum of
+/// γᵏ · scale · r. γ = 0 if it does not say.
+struct ValueUnits {
+  double gamma = 0, reward_scale = 1;
+};
+ValueUnits ValueUnitsOf(const Policy& policy);
 
 /// Lets `policy` control every environment for kEvaluationSeconds from where it stands, and says
 /// what each episode came to. The environments must not end before that. Acting is shared by the

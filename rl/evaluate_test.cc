@@ -53,6 +53,21 @@ TEST(Evaluate, SuccessAsksForTheWholeOfTheLastTenSeconds) {
   EXPECT_DOUBLE_EQ(e.rms_torque.mean, 2);
 }
 
+TEST(Evaluate, AValueStandsBesideWhatItEstimates) {
+  const QNetworkShape shape{1, 1, {1}, 0, false, false};
+  std::vector<float> parameters(QNetwork<float>(shape).num_parameters());
+  parameters.back() = 3;  // the output's bias: Q = 3 everywhere
+  const Policy policy(shape, parameters, {1}, {{"gamma", "0.5"}, {"reward_scale", "2"}});
+  ScriptedEnv env({500, 501});
+  const Evaluation e = Evaluate(policy, env);
+  EXPECT_DOUBLE_EQ(e.value, 1.5);
+  EXPECT_NEAR(e.discounted_return, 4, 1e-12);  // Σ k γᵏ⁻¹ = 1 / (1 - γ)²
+
+  const Evaluation silent = Evaluate(Constant(0), env);
+  EXPECT_EQ(silent.value, 0);
+  EXPECT_EQ(silent.discounted_return, 0);
+}
+
 TEST(Evaluate, OneStateElsewhereUndoesAStretch) {
   ScriptedEnv early({100}, 499), late({100}, 501);
   EXPECT_EQ(Evaluate(Constant(0), early).successes, 1);

@@ -21,6 +21,7 @@ class ToyEnv : public VectorEnv {
   std::vector<std::string> reward_term_names() const override { return {"near"}; }
   double step_seconds() const override { return 1; }
   double torque_limit() const override { return 1; }
+  std::vector<float> mirror_signs() const override { return {-1}; }
   Matrix<const float> obs() const override { return {x_.data(), num_envs(), 1}; }
   void SetStartNoise(double sigma) override { noise_ = sigma; }
 

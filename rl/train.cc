@@ -112,6 +112,8 @@ void LogEvaluation(Training& t, const TrainState& s, const Evaluation& e) {
                        {"swing_up_seconds", e.swing_up_seconds.median},
                        {"work", e.work.mean},
                        {"rms_torque", e.rms_torque.mean},
+                       {"value", e.value},
+                       {"discounted_return", e.discounted_return},
                        {"seconds", s.seconds}});
   t.run.Log(Concat("step ", s.steps, ": ", e.successes, " of ", e.episodes,
                    " episodes succeed, mean return ", FormatNumber(e.reward_sum.mean)));
