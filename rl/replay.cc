@@ -40,21 +40,29 @@ Transition Replay::at(int64_t index) const {
           scalars[1], scalars[2]};
 }
 
-void Replay::Gather(int64_t index, size_t i, Minibatch& batch) const {
-  const Transition t = at(index);
-  std::ranges::copy(t.obs, batch.obs.data() + i * obs_size_);
-  std::ranges::copy(t.next_obs, batch.next_obs.data() + i * obs_size_);
-  batch.action[i] = t.action;
-  batch.reward[i] = t.reward;
-  batch.discount[i] = t.discount;
-  batch.index[i] = index;
-  batch.weight[i] = 1;
+void Replay::Gather(Minibatch& batch) const {
+  // The memory is larger than any cache: fetch all rows at once, instead of waiting for each.
+  for (const int64_t index : batch.index) {
+    const float* row = rows_.data() + static_cast<size_t>(index) * row_size();
+    __builtin_prefetch(row);
+    __builtin_prefetch(row + row_size() - 1);
+  }
+  for (size_t i = 0; i < batch.index.size(); ++i) {
+    const Transition t = at(batch.index[i]);
+    std::ranges::copy(t.obs, batch.obs.data() + i * obs_size_);
+    std::ranges::copy(t.next_obs, batch.next_obs.data() + i * obs_size_);
+    batch.action[i] = t.action;
+    batch.reward[i] = t.reward;
+    batch.discount[i] = t.discount;
+  }
 }
 
 void Replay::Sample(Rng& rng, Minibatch& batch) const {
-  for (size_t i = 0; i < batch.action.size(); ++i) {
-    Gather(static_cast<int64_t>(rng.Below(static_cast<uint64_t>(size()))), i, batch);
+  for (int64_t& index : batch.index) {
+    index = static_cast<int64_t>(rng.Below(static_cast<uint64_t>(size())));
   }
+  Gather(batch);
+  std::ranges::fill(batch.weight, 1.0F);
 }
 
 void Replay::SamplePrioritized(Rng& rng, double beta, Minibatch& batch) const {
@@ -62,10 +70,10 @@ void Replay::SamplePrioritized(Rng& rng, double beta, Minibatch& batch) const {
   const double part = priorities_->total() / static_cast<double>(B);
   double smallest = largest_priority_;
   for (size_t i = 0; i < B; ++i) {
-    const int64_t index = priorities_->Find(part * (static_cast<double>(i) + rng.Uniform()));
-    Gather(index, i, batch);
-    smallest = std::min(smallest, priority(index));
+    batch.index[i] = priorities_->Find(part * (static_cast<double>(i) + rng.Uniform()));
+    smallest = std::min(smallest, priority(batch.index[i]));
   }
+  Gather(batch);
   // N and Σ p fall out of the ratio to the largest weight, that of the smallest priority.
   for (size_t i = 0; i < B; ++i) {
     batch.weight[i] = static_cast<float>(std::pow(smallest / priority(batch.index[i]), beta));

@@ -70,8 +70,8 @@ class Replay {
 
  private:
   size_t row_size() const { return 2 * obs_size_ + 3; }
-  /// Copies a stored transition into row i of a minibatch.
-  void Gather(int64_t index, size_t i, Minibatch& batch) const;
+  /// Copies the transitions of batch.index into the minibatch.
+  void Gather(Minibatch& batch) const;
 
   int64_t capacity_;
   size_t obs_size_;

@@ -11,10 +11,10 @@ double FeatureRank(Matrix<const float> features) {
   double trace = 0, squares = 0;
   for (int i = 0; i < features.rows(); ++i) {
     const auto x = features.row(i);
-    for (int j = 0; j < features.rows(); ++j) {
+    for (int j = 0; j <= i; ++j) {
       const double dot = std::inner_product(x.begin(), x.end(), features.row(j).begin(), 0.0);
       if (i == j) trace += dot;
-      squares += dot * dot;
+      squares += (i == j ? 1 : 2) * dot * dot;
     }
   }
   return squares > 0 ? trace * trace / squares : 0;

@@ -22,11 +22,11 @@ int64_t SumTree::Find(double mass) const {
   size_t node = 1;
   while (node < leaves_) {
     node *= 2;
-    // To the right, unless rounding alone leads there.
-    if (mass >= nodes_[node] && nodes_[node + 1] > 0) {
-      mass -= nodes_[node];
-      ++node;
-    }
+    // To the right, unless rounding alone leads there. No branch: which way is for nobody to guess.
+    const double left = nodes_[node];
+    const bool right = (mass >= left) & (nodes_[node + 1] > 0);
+    mass -= right ? left : 0;
+    node += right ? 1 : 0;
   }
   return static_cast<int64_t>(node - leaves_);
 }
