@@ -51,15 +51,16 @@ void DqnConfig::Describe(Options& o) {
   o.Add(&updates_per_step, "updates_per_step", 0.0625, {0, 100}, "", "gradient steps per step");
   o.Add(&learning_rate, "learning_rate", 1e-3, {0, 10}, "",
         "learning rate of Adam at the beginning");
-  o.Add(&learning_rate_end, "learning_rate_end", 1e-4, {0, 10}, "", "and at the end");
-  o.Add(&learning_rate_steps, "learning_rate_steps", 600000, {1, 1e12}, "steps",
+  o.Add(&learning_rate_end, "learning_rate_end", 2e-5, {0, 10}, "", "and at the end");
+  o.Add(&learning_rate_steps, "learning_rate_steps", 250000, {1, 1e12}, "steps",
         "over which it falls linearly");
   o.Add(&max_gradient_norm, "max_gradient_norm", 10, kPositive, "", "clip the global norm to this");
   o.Add(&tau, "tau", 0.02, kUnit, "", "Polyak averaging of the target, per update");
   o.Add(&target_period, "target_period", 0, {0, 1e9}, "updates",
         "copy the target every so many instead; 0: Polyak averaging");
   o.Add(&policy_tau, "policy_tau", 0.01, kUnit, "",
-        "Polyak averaging of the policy that is judged and kept, per update; 1: as learned last");
+        "Polyak averaging of the policy that is judged and kept, per update, which falls with the "
+        "learning rate; 1: as learned last");
   o.Add(&epsilon_start, "epsilon_start", 1.0, kUnit, "",
         "share of random actions at the beginning");
   o.Add(&epsilon_end, "epsilon_end", 0.05, kUnit, "", "and at least");
@@ -248,7 +249,8 @@ void Dqn::Update(const Minibatch& batch) {
 }
 
 void Dqn::AveragePolicy() {
-  const auto tau = static_cast<float>(config_.policy_tau);
+  // The longer the slower learning is: Polyak and Juditsky (1992) average over a growing window.
+  const auto tau = static_cast<float>(config_.policy_tau * learning_rate() / config_.learning_rate);
   for (size_t i = 0; i < theta_.size(); ++i) {
     theta_policy_[i] += tau * (theta_[i] - theta_policy_[i]);
   }
