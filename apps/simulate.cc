@@ -105,6 +105,7 @@ int RunSimulate(const SimulateArguments& a) {
 
   PendulumEnvConfig config;
   if (loaded) config.mjcf = loaded->mjcf;
+  if (loaded) config.memory = loaded->memory;
   const Plant plant = ChangedPlant(loaded ? loaded->plant : Plant(), a.model, a.set, config.mjcf);
   config.plants = {plant};
   config.episode_seconds = seconds + 1;

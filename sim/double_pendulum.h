@@ -74,6 +74,14 @@ inline constexpr double kMaxVelocity2 = 20.0;
 /// NormalizedEnergy and ĥ = TipHeight over l1 + l2, in [-1, 1].
 std::array<float, kObservationSize> Observe(const Plant& plant, const PendulumState& s);
 
+/// What an observation may remember of each past control step, from the last one backwards: [Δw1,
+/// Δw2, tau], the change of the velocities in it over kMemoryVelocity, and the torque that was
+/// chosen for it over kMemoryTorque. How the plant answered tells what the state alone does not:
+/// how heavy and how long it is, and which torques are still under way.
+inline constexpr int kMemorySize = 3;
+/// About what the motor can do in a control period (rad/s), and its usual limit (N·m).
+inline constexpr double kMemoryVelocity = 1.0, kMemoryTorque = 5.0;
+
 inline constexpr int kRewardTerms = 5;
 inline constexpr std::array<const char*, kRewardTerms> kRewardTermNames{
     "energy", "height", "balance", "velocity_penalty", "torque_penalty"};
