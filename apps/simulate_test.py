@@ -254,13 +254,13 @@ class PolicyRolloutTest(ProgramTest):
 
 
     def test_a_policy_with_memory_acts_on_it(self):
-        self.succeed(*small(memory=2))
-        rows = parse(self.succeed("simulate", "run", "--seconds", "0.1"))
+        self.succeed(*small(memory=2, out="remembering"))
+        rows = parse(self.succeed("simulate", "remembering", "--seconds", "0.1"))
         self.assertEqual(len(rows), 6)
-        self.assertIn('"steps":2', read_tensors(self.folder / "run/policy.safetensors")[0]
+        self.assertIn('"steps":2', read_tensors(self.folder / "remembering/policy.safetensors")[0]
                       ["observation"])
-        self.succeed("eval", "run", "--episodes", 2)
-        self.succeed("info", "run")
+        self.succeed("eval", "remembering", "--episodes", 2)
+        self.succeed("info", "remembering")
 
 
 if __name__ == "__main__":
