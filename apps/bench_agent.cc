@@ -91,7 +91,7 @@ BenchCase GradientCase(const DqnConfig& config, int threads,
               Rng rng{1, "replay sampling"};
               Parts(const DqnConfig& c, int pool_threads)
                   : pool(pool_threads),
-                    agent(c, 1, kObservationSize, Torques(), 1, pool),
+                    agent(c, 1, kObservationSize, Torques(), {}, 1, pool),
                     batch(static_cast<int>(c.batch), kObservationSize) {}
             };
             const auto parts = std::make_shared<Parts>(config, threads);
@@ -136,8 +136,8 @@ struct LearningLoop {
   LearningLoop(const Config& config, int threads)
       : pool(threads),
         env(config.Environments(pool)),
-        agent(config.dqn, env.num_envs(), env.obs_size(), TorqueLevels(env.torque_limit()), 1,
-              pool),
+        agent(config.dqn, env.num_envs(), env.obs_size(), TorqueLevels(env.torque_limit()),
+              env.mirror_signs(), 1, pool),
         result(env.MakeResult()),
         torque(static_cast<size_t>(env.num_envs())) {}
 

@@ -6,8 +6,8 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "core/sample.h"
 #include "core/text.h"
-#include "rl/evaluate.h"
 
 namespace upswing {
 namespace {

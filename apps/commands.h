@@ -16,7 +16,11 @@ using Command = std::function<int()>;
 void AddTrain(CLI::App& program, Command& command);
 void AddEval(CLI::App& program, Command& command);
 void AddSimulate(CLI::App& program, Command& command);
+void AddMap(CLI::App& program, Command& command);
+void AddPlot(CLI::App& program, Command& command);
 void AddInfo(CLI::App& program, Command& command);
+void AddCompare(CLI::App& program, Command& command);
+void AddStudy(CLI::App& program, Command& command);
 void AddBench(CLI::App& program, Command& command);
 
 /// Refuses an empty path, such as that of a shell variable that is not set.
@@ -25,6 +29,9 @@ CLI::Validator NotEmpty();
 /// Adds a flag for each setting and alias, in the order in which they were described. What is given
 /// is added to `flags`.
 void AddSettings(CLI::App& app, const Options& options, std::vector<FlagValue>& flags);
+
+/// Adds --seeds and --jobs, for many runs; 0 jobs: as many as there are processors.
+void AddManyOptions(CLI::App& app, std::string& seeds, int& jobs);
 
 /// Adds --set and --model, which choose another plant.
 void AddPlantOptions(CLI::App& app, std::vector<std::string>& set, std::string& model);

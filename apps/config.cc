@@ -1,11 +1,10 @@
 #include "apps/config.h"
 
-#include <toml++/toml.h>
-
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "apps/named_agents.h"
+#include "apps/toml_settings.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/text.h"
@@ -16,49 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
-
-/// A TOML value as the text that Option::Set takes; nothing for a type that no setting has.
-std::optional<std::string> TextOf(const toml::node& node) {
-  if (const auto* value = node.as_boolean()) return value->get() ? "true" : "false";
-  if (const auto* value = node.as_integer()) return std::to_string(value->get());
-  if (const auto* value = node.as_floating_point()) return FormatNumber(value->get());
-  if (const auto* value = node.as_string()) return value->get();
-  const auto* array = node.as_array();
-  if (array == nullptr) return std::nullopt;
-  std::vector<std::string> items;
-  for (const toml::node& item : *array) {
-    if (!item.is_integer()) return std::nullopt;
-    items.push_back(std::to_string(item.as_integer()->get()));
-  }
-  return Concat("[", Join(items, ", "), "]");
-}
-
-/// Sets one key of a TOML table.
-void ApplyNode(const Options& options, const std::string& section, const std::string& key,
-               const toml::node& node, const std::string& where) {
-  const std::string place = Concat(where, ":", node.source().begin.line, ": ");
-  for (const Option* option : options.Find(key, Concat(place, "[", section, "]"))) {
-    if (option->section != section) {
-      throw BadInput(
-          Concat(place, key, ": expected in [", option->section, "], got in [", section, "]"));
-    }
-    const auto text = TextOf(node);
-    const bool wants_text = std::holds_alternative<std::string*>(option->target);
-    if (!text || node.is_string() != wants_text) {
-      const std::string got = text ? Concat("\"", *text, "\"") : "another type";
-      throw BadInput(Concat(place, key, ": expected ", option->expected(), ", got ", got));
-    }
-    option->Set(*text, place + key);
-  }
-}
-
-toml::table ParseToml(std::string_view text, const std::string& where) {
-  try {
-    return toml::parse(text);
-  } catch (const toml::parse_error& error) {
-    throw BadInput(Concat(where, ":", error.source().begin.line, ": ", error.description()));
-  }
-}
 
 /// Whether a text may stand in a file's metadata.
 bool IsUtf8(const std::string& text) {
@@ -84,16 +40,17 @@ const NamedAgent& FindAgent(const std::string& name, const std::string& where) {
 /// where that is, for messages.
 struct EarlySetting {
   std::string value, where;
+  bool in_file = false;
 };
 
 EarlySetting FindEarly(std::string_view section, std::string_view key, const toml::table& file,
                        const std::string& file_name, const std::vector<FlagValue>& flags) {
   EarlySetting setting;
   if (const auto* node = file[section][key].as_string()) {
-    setting = {node->get(), Concat(file_name, ":", node->source().begin.line, ": ", key)};
+    setting = {node->get(), Concat(PlaceOf(*node, file_name), ": ", key), true};
   }
-  for (const auto& [name, text] : flags) {
-    if (name == key) setting = {text, Concat("--", key)};
+  for (const auto& [name, text, where] : flags) {
+    if (name == key) setting = {text, where.empty() ? Concat("--", key) : where};
   }
   return setting;
 }
@@ -114,7 +71,10 @@ void Config::Describe(Options& o) {
         "past steps whose torque and change of velocities the agent sees too");
   o.AddChoice(&physics, "physics", PhysicsNames(),
               "engine to train in; closed-form is a faster twin of mujoco");
-  o.AddChoice(&eval_physics, "eval_physics", PhysicsNames(), "engine of the evaluations");
+  std::vector<std::string> judges = PhysicsNames();
+  judges.insert(judges.begin(), std::string(kScreened));
+  o.AddChoice(&eval_physics, "eval_physics", judges,
+              "engine of the evaluations; screened: in mujoco what succeeds in closed-form");
   o.Section("plant");
   o.Add(&model, "model", "", "MJCF file to use instead of the built-in model");
   plant.Describe(o);
@@ -143,26 +103,25 @@ PendulumEnvConfig Config::Environments(ThreadPool& pool) const {
 }
 
 void ApplyToml(const Options& options, std::string_view text, const std::string& where) {
-  std::vector<std::string> sections;
-  for (const Option& option : options.all()) sections.push_back(option.section);
-  for (const auto& [section_key, node] : ParseToml(text, where)) {
-    const std::string section(section_key.str());
-    const std::string place = Concat(where, ":", node.source().begin.line, ": ");
-    const auto* table = node.as_table();
-    if (table == nullptr || std::ranges::find(sections, section) == sections.end()) {
-      throw BadInput(
-          Concat(place, "no section is called [", section, "]", DidYouMean(section, sections)));
-    }
-    for (const auto& [key, value] : *table) {
-      ApplyNode(options, section, std::string(key.str()), value, where);
+  ApplyTable(options, ParseToml(text, where), where, false);
+}
+
+void ExpectSameSettings(const Options& before, const Options& now, const std::string& where,
+                        const std::function<bool(const Option&)>& counts) {
+  for (size_t i = 0; i < now.all().size(); ++i) {
+    const Option& old_one = before.all()[i];
+    const Option& new_one = now.all()[i];
+    if (counts(new_one) && old_one.text() != new_one.text()) {
+      throw BadInput(Concat(where, ": made with ", old_one.section, ".", old_one.name, " = ",
+                            old_one.text(), ", but the configuration says ", new_one.text()));
     }
   }
 }
 
 void SetFlags(const Options& options, const std::vector<FlagValue>& flags) {
-  for (const auto& [name, value] : flags) {
+  for (const auto& [name, value, place] : flags) {
     const std::string flag = options.Find(name, "").front()->flag();
-    options.Set(name, value, flag);
+    options.Set(name, value, place.empty() ? flag : place);
   }
 }
 
@@ -176,7 +135,7 @@ Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
   // A model file brings its own plant, which other settings may change.
   const EarlySetting model = FindEarly("plant", "model", table, where, flags);
   std::string model_path = model.value;
-  if (!model_path.empty() && model.where != "--model") {
+  if (!model_path.empty() && model.in_file) {
     model_path = (file.parent_path() / model.value).string();  // counts from its file
   }
   if (!model_path.empty()) config.plant = ChangedPlant(config.plant, model_path, {}, config.mjcf);
@@ -237,14 +196,13 @@ LoadedPolicy LoadPolicy(const fs::path& path) {
     throw BadInput(
         Concat(file.string(), ": no such file; expected a policy.safetensors or a run ", "folder"));
   }
-  LoadedPolicy loaded{file, Policy::Load(file), Plant(), 0, ""};
+  LoadedPolicy loaded{file, Policy::Load(file), Plant(), ""};
   const int remembered = static_cast<int>(loaded.policy.shape().inputs) - kObservationSize;
   if (remembered < 0 || remembered % kMemorySize != 0) {
     throw BadInput(Concat(file.string(), ": expected a policy of ", kObservationSize,
                           " observations and ", kMemorySize, " for each step of memory, got ",
                           loaded.policy.shape().inputs));
   }
-  loaded.memory = remembered / kMemorySize;
   const Options options = OptionsOf(loaded.plant);
   try {
     const json plant = json::parse(loaded.policy.About("plant"));
@@ -284,6 +242,23 @@ std::map<std::string, std::string> AboutTask(const Config& config) {
   return about;
 }
 
+std::vector<const Option*> ApplyChanges(const Options& options,
+                                        const std::vector<std::string>& set) {
+  std::vector<const Option*> changed;
+  for (const std::string& change : set) {
+    const size_t equals = change.find('=');
+    if (equals == std::string::npos) {
+      throw BadInput(Concat("--set: expected NAME=VALUE, got \"", change, "\""));
+    }
+    const std::string name(Trim(std::string_view(change).substr(0, equals)));
+    for (const Option* option : options.Find(name, "--set " + name)) {
+      option->Set(Trim(std::string_view(change).substr(equals + 1)), "--set " + name);
+      changed.push_back(option);
+    }
+  }
+  return changed;
+}
+
 Plant ChangedPlant(const Plant& base, const std::string& model, const std::vector<std::string>& set,
                    std::string& mjcf) {
   Plant plant = base;
@@ -293,14 +268,7 @@ Plant ChangedPlant(const Plant& base, const std::string& model, const std::vecto
     if (!IsUtf8(mjcf)) throw BadInput(Concat(model, ": expected UTF-8 text"));
     plant = PlantOf(*LoadModel(mjcf, model));
   }
-  for (const std::string& change : set) {
-    const size_t equals = change.find('=');
-    if (equals == std::string::npos) {
-      throw BadInput(Concat("--set: expected NAME=VALUE, got \"", change, "\""));
-    }
-    const std::string name(Trim(std::string_view(change).substr(0, equals)));
-    options.Set(name, Trim(std::string_view(change).substr(equals + 1)), "--set " + name);
-  }
+  ApplyChanges(options, set);
   return plant;
 }
 

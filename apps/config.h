@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <string>
 #include <utility>
@@ -14,6 +15,9 @@
 #include "sim/pendulum_env.h"
 
 namespace upswing {
+
+/// Evaluations in the closed form, and once more in MuJoCo if all of its episodes succeed there.
+inline constexpr std::string_view kScreened = "screened";
 
 /// All settings of a training.
 struct Config {
@@ -38,8 +42,12 @@ struct Config {
   PendulumEnvConfig Environments(ThreadPool& pool) const;
 };
 
-/// A setting given on the command line: name and text.
-using FlagValue = std::pair<std::string, std::string>;
+/// A setting given on the command line or in a study: name, text, and where, which begins messages;
+/// an empty place stands for the setting's flag.
+struct FlagValue {
+  std::string name, text;
+  std::string where = {};
+};
 
 /// Sets what the flags say. Throws BadInput.
 void SetFlags(const Options& options, const std::vector<FlagValue>& flags);
@@ -50,6 +58,11 @@ Config BuildConfig(const std::filesystem::path& file, const std::vector<FlagValu
 
 /// Applies a TOML document. `where` names it in messages, which give the line too.
 void ApplyToml(const Options& options, std::string_view toml, const std::string& where);
+
+/// Throws BadInput that names the first of the settings for which `counts` is true that two
+/// configurations do not have in common. `where` is what was made with the one `before`.
+void ExpectSameSettings(const Options& before, const Options& now, const std::string& where,
+                        const std::function<bool(const Option&)>& counts);
 
 /// The settings as TOML; without those that do not make another run of it, if `identity_only`.
 std::string ConfigToml(Config config, bool identity_only);
@@ -68,7 +81,6 @@ struct LoadedPolicy {
   std::filesystem::path path;
   Policy policy;
   Plant plant;       // at training
-  int memory;        // past control steps in its observations
   std::string mjcf;  // empty: the built-in model
 };
 
@@ -77,6 +89,10 @@ LoadedPolicy LoadPolicy(const std::filesystem::path& path);
 
 /// What a policy file says of the task that it was trained on.
 std::map<std::string, std::string> AboutTask(const Config& config);
+
+/// Sets what --set gives ("mass2=1.2") and returns it. Throws BadInput.
+std::vector<const Option*> ApplyChanges(const Options& options,
+                                        const std::vector<std::string>& set);
 
 /// The plant to try something on: `base`, or that of the model file if there is one, with the
 /// given changes ("mass2=1.2"). Reads the model into `mjcf`. Throws BadInput.

@@ -122,7 +122,7 @@ int RunEval(const EvalArguments& arguments) {
   const Trial trial = TrialOf(arguments.flags);
   const LoadedPolicy loaded = LoadPolicy(arguments.policy);
   config.mjcf = loaded.mjcf;
-  config.memory = loaded.memory;
+  config.memory = MemorySteps(loaded.policy.shape().inputs);
   const Plant plant = ChangedPlant(loaded.plant, arguments.model, arguments.set, config.mjcf);
   config.plants = {plant};
   config.disturbances = {trial.disturbance};
@@ -139,7 +139,7 @@ int RunEval(const EvalArguments& arguments) {
   {
     ProgressLine line;
     const auto begin = std::chrono::steady_clock::now();
-    evaluation = Evaluate(loaded.policy, env, [&](double share) {
+    evaluation = Evaluate(loaded.policy, env, &pool, [&](double share) {
       if (!line.due() || arguments.as_json) return;
       const double seconds =
           std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

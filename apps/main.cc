@@ -21,6 +21,15 @@ CLI::Validator NotEmpty() {
           ""};
 }
 
+void AddManyOptions(CLI::App& app, std::string& seeds, int& jobs) {
+  app.add_option("--seeds", seeds, "a run for each: 10 for 1 to 10, or a list such as 3,5,8-12")
+      ->type_name("SEEDS")
+      ->check(NotEmpty());
+  app.add_option("--jobs", jobs, "runs at a time [one for each processor]")
+      ->type_name("INTEGER")
+      ->check(CLI::Range(1, 4096).description(""));
+}
+
 void AddPlantOptions(CLI::App& app, std::vector<std::string>& set, std::string& model) {
   app.add_option("--set", set, "another plant, such as mass2=1.2 (repeat for more)")
       ->type_name("NAME=VALUE")
@@ -47,7 +56,10 @@ void AddSettings(CLI::App& app, const Options& options, std::vector<FlagValue>& 
     const std::string name = alias.name;
     app.add_option_function<std::string>(
            alias.flag(),
-           [&flags, name](const std::string& text) { flags.emplace_back(name, text); }, alias.help)
+           [&flags, name](const std::string& text) {
+             flags.push_back({name, text});
+           },
+           alias.help)
         ->group(alias.section)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)
         ->type_name("NUMBER");
@@ -61,7 +73,9 @@ void AddSettings(CLI::App& app, const Options& options, std::vector<FlagValue>& 
     if (std::holds_alternative<bool*>(option.target)) {
       app.add_flag_function(
              option.flag() + ",!--no-" + option.flag().substr(2),
-             [&flags, name](int64_t on) { flags.emplace_back(name, on > 0 ? "true" : "false"); },
+             [&flags, name](int64_t on) {
+               flags.push_back({name, on > 0 ? "true" : "false"});
+             },
              help)
           ->group(option.section)
           ->disable_flag_override();
@@ -69,7 +83,10 @@ void AddSettings(CLI::App& app, const Options& options, std::vector<FlagValue>& 
     }
     app.add_option_function<std::string>(
            option.flag(),
-           [&flags, name](const std::string& text) { flags.emplace_back(name, text); }, help)
+           [&flags, name](const std::string& text) {
+             flags.push_back({name, text});
+           },
+           help)
         ->group(option.section)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)
         ->type_name(TypeName(option));
@@ -135,12 +152,17 @@ int Main(int argc, char** argv) {
       "Examples:\n"
       "  ./upswing train                      train the default agent until the task is solved\n"
       "  ./upswing eval runs/d3qn-seed1       judge its best policy\n"
+      "  ./upswing compare runs               compare the agents in runs over their seeds\n"
       "  ./upswing train --help               every setting, with its default\n");
   Command command;
   AddTrain(program, command);
   AddEval(program, command);
   AddSimulate(program, command);
+  AddMap(program, command);
+  AddPlot(program, command);
   AddInfo(program, command);
+  AddCompare(program, command);
+  AddStudy(program, command);
   AddBench(program, command);
 
   try {

@@ -27,14 +27,6 @@ class ResumeTest(ProgramTest):
         self.succeed(*small(steps=steps, stop_when_solved=False, out="never-stopped"))
         return steps
 
-    def wait_for(self, condition):
-        """Waits as long as it takes, an hour at most."""
-        for _ in range(360000):
-            if condition():
-                return
-            time.sleep(0.01)
-        self.fail("nothing happened")
-
     def test_killed_at_ten_random_moments(self):
         moments = random.Random(1)
         arguments = small(steps=ENDLESS, stop_when_solved=False)

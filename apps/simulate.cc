@@ -6,6 +6,8 @@
 
 #include "apps/commands.h"
 #include "apps/config.h"
+#include "apps/rollout.h"
+#include "core/csv.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/text.h"
@@ -13,75 +15,27 @@
 namespace upswing {
 namespace {
 
-constexpr double kStepsPerSecond = 50;  // 1 / kControlPeriod, exactly
-static_assert(kStepsPerSecond * kControlPeriod == 1);
-
 struct SimulateArguments {
-  std::string policy, torque, start = "0,0,0,0", csv, model;
+  std::string policy, torque, start = "0,0,0,0", csv, model, physics = "mujoco";
   std::vector<std::string> set;
   std::optional<double> seconds;
 };
 
-/// The column `torque` of a CSV file. Lines that begin with # and empty lines are skipped. Throws
-/// BadInput with the line.
+/// The column `torque` of a CSV file. Throws BadInput with the line.
 std::vector<double> ReadTorqueFile(const std::string& path) {
-  const std::string text = ReadTextFile(path);
-  std::vector<double> torques;
-  std::optional<size_t> column;
-  size_t columns = 0;
-  int line_number = 0;
-  for (const std::string_view line : Split(text, '\n')) {
-    ++line_number;
-    if (line.empty() || line.starts_with('#')) continue;
-    const std::vector<std::string_view> cells = Split(line, ',');
-    const std::string place = Concat(path, ":", line_number, ": ");
-    if (!column) {
-      const auto found = std::find(cells.begin(), cells.end(), "torque");
-      if (found == cells.end()) {
-        throw BadInput(Concat(place, "expected a column \"torque\", got \"", line, "\""));
-      }
-      column = static_cast<size_t>(found - cells.begin());
-      columns = cells.size();
-      continue;
-    }
-    if (cells.size() != columns) {
-      throw BadInput(Concat(place, "expected ", columns, " columns, got ", cells.size()));
-    }
-    const auto torque = ParseNumber(cells[*column]);
-    if (!torque || !std::isfinite(*torque)) {
-      throw BadInput(
-          Concat(place, "torque: expected a finite number, got \"", cells[*column], "\""));
-    }
-    torques.push_back(*torque);
-  }
+  std::vector<double> torques = ReadCsv(ReadTextFile(path), {"torque"}, path).front().values;
   if (torques.empty()) throw BadInput(Concat(path, ": expected rows of torques, got none"));
   return torques;
 }
 
-PendulumState ParseStart(const std::string& text) {
-  const std::vector<std::string_view> pieces = Split(text, ',');
-  std::vector<double> numbers;
-  for (const std::string_view piece : pieces) {
-    const auto number = ParseNumber(piece);
-    if (number && std::isfinite(*number)) numbers.push_back(*number);
+std::string CsvRow(const RolloutRow& row) {
+  std::string text = FormatNumber(row.t);
+  for (const double x : {row.state.q1, row.state.q2, row.state.w1, row.state.w2, row.torque,
+                         row.energy, row.height, row.inverted ? 1.0 : 0.0, row.reward}) {
+    text += ',' + FormatNumber(x);
   }
-  if (pieces.size() != 4 || numbers.size() != 4) {
-    throw BadInput(Concat("--start: expected four numbers q1,q2,w1,w2, got \"", text, "\""));
-  }
-  return {numbers[0], numbers[1], numbers[2], numbers[3]};
-}
-
-std::string CsvRow(double t, const PendulumState& s, double torque, const Plant& plant) {
-  const auto terms = RewardTerms(plant, s, torque);
-  double reward = 0;
-  for (const double term : terms) reward += term;
-  std::string row = FormatNumber(t);
-  for (const double x : {s.q1, s.q2, s.w1, s.w2, torque, Energy(plant, s), TipHeight(plant, s),
-                         Inverted(s) ? 1.0 : 0.0, reward}) {
-    row += ',' + FormatNumber(x);
-  }
-  for (const double term : terms) row += ',' + FormatNumber(term + 0.0);  // no -0
-  return row + '\n';
+  for (const double term : row.terms) text += ',' + FormatNumber(term + 0.0);  // no -0
+  return text + '\n';
 }
 
 int RunSimulate(const SimulateArguments& a) {
@@ -90,52 +44,37 @@ int RunSimulate(const SimulateArguments& a) {
   }
   std::optional<LoadedPolicy> loaded;
   if (!a.policy.empty()) loaded.emplace(LoadPolicy(a.policy));
-  std::vector<double> schedule;
-  if (!a.torque.empty()) schedule = ReadTorqueFile(a.torque);
+  RolloutConfig config;
+  if (!a.torque.empty()) config.schedule = ReadTorqueFile(a.torque);
 
   // As many steps as were asked for, or as the schedule has rows.
-  const double scheduled = static_cast<double>(schedule.size()) / kStepsPerSecond;
-  const double seconds = a.seconds.value_or(schedule.empty() ? 20.0 : scheduled);
-  if (!std::isfinite(seconds)) throw BadInput("--seconds: expected a finite number");
-  const int64_t steps = std::llround(seconds * kStepsPerSecond);
-  if (!schedule.empty() && steps > static_cast<int64_t>(schedule.size())) {
+  const double scheduled = static_cast<double>(config.schedule.size()) * kControlPeriod;
+  config.seconds = a.seconds.value_or(config.schedule.empty() ? 20.0 : scheduled);
+  if (!std::isfinite(config.seconds)) throw BadInput("--seconds: expected a finite number");
+  if (!config.schedule.empty() &&
+      RolloutSteps(config.seconds) > static_cast<int64_t>(config.schedule.size())) {
     throw BadInput(Concat("--seconds: expected at most ", FormatNumber(scheduled), ", for which ",
-                          a.torque, " has torques, got ", FormatNumber(seconds)));
+                          a.torque, " has torques, got ", FormatNumber(config.seconds)));
   }
 
-  PendulumEnvConfig config;
-  if (loaded) config.mjcf = loaded->mjcf;
-  if (loaded) config.memory = loaded->memory;
-  const Plant plant = ChangedPlant(loaded ? loaded->plant : Plant(), a.model, a.set, config.mjcf);
-  config.plants = {plant};
-  config.episode_seconds = seconds + 1;
-  PendulumEnv env(config);
-  env.SetState(0, ParseStart(a.start));
+  if (loaded) {
+    config.policy = &loaded->policy;
+    config.mjcf = loaded->mjcf;
+  }
+  config.physics = ParsePhysics(a.physics, "--physics");
+  config.plant = ChangedPlant(loaded ? loaded->plant : Plant(), a.model, a.set, config.mjcf);
+  config.start = ParseStart(a.start);
+  const std::vector<RolloutRow> rows = RunRollout(config);
 
   std::string csv =
       "t,qpos0,qpos1,qvel0,qvel1,torque,energy,height,inverted,reward,energy_reward,height_reward,"
       "balance_reward,velocity_penalty,torque_penalty\n";
-  StepResult result = env.MakeResult();
-  for (int64_t k = 0; k <= steps; ++k) {
-    // Behind the end of a schedule there is one more state, which no torque follows.
-    double torque = 0;
-    if (loaded) loaded->policy.Act(env.obs(), std::span(&torque, 1));
-    if (static_cast<size_t>(k) < schedule.size()) torque = schedule[static_cast<size_t>(k)];
-    torque = std::clamp(torque, -plant.torque_limit, plant.torque_limit);
-    const double t = static_cast<double>(k) / kStepsPerSecond;
-    csv += CsvRow(t, env.state(0), torque, plant);
-    if (k == steps) break;
-    env.Step(std::span(&torque, 1), result);
-    if (result.terminated[0]) {
-      throw Failure(Concat("simulate: the state blew up numerically after t = ", FormatNumber(t),
-                           " s (MuJoCo gave it up)"));
-    }
-  }
+  for (const RolloutRow& row : rows) csv += CsvRow(row);
   if (a.csv.empty()) {
     fmt::print("{}", csv);
   } else {
     WriteFileAtomically(a.csv, csv);
-    fmt::print("{}: {} rows\n", a.csv, steps + 1);
+    fmt::print("{}: {} rows\n", a.csv, rows.size());
   }
   return 0;
 }
@@ -159,6 +98,8 @@ void AddSimulate(CLI::App& program, Command& command) {
       ->check(CLI::Range(0.0, 1e5).description(""))
       ->type_name("SECONDS");
   AddPlantOptions(*app, a->set, a->model);
+  app->add_option("--physics", a->physics, "engine: mujoco, or closed-form, its twin [mujoco]")
+      ->type_name("TEXT");
   app->add_option("--csv", a->csv, "file to write [standard output]")
       ->type_name("FILE")
       ->check(NotEmpty());

@@ -7,10 +7,13 @@ repository in UPSWING_ROOT.
 import csv
 import json
 import os
+import pty
+import re
 import signal
 import struct
 import subprocess
 import tempfile
+import time
 import unittest
 from pathlib import Path
 
@@ -186,6 +189,43 @@ class ProgramTest(unittest.TestCase):
         rest = "" if process.stdout.closed else process.stdout.read()
         process.stdout.close()
         return process.wait(), rest
+
+    def wait_for(self, condition):
+        """Waits as long as it takes, an hour at most."""
+        for _ in range(360000):
+            if condition():
+                return
+            time.sleep(0.01)
+        self.fail("nothing happened")
+
+    def watch(self, columns, arguments, *patterns):
+        """Runs the program on a terminal of that width until it has shown all patterns, or a lot,
+        and interrupts it; returns what it showed."""
+        terminal, its_end = pty.openpty()
+        with subprocess.Popen(["sh", "-c", 'stty cols "$0"; exec "$@"', str(columns), UPSWING,
+                               *map(str, arguments)], cwd=self.folder,
+                              stdin=its_end, stdout=its_end, stderr=its_end) as process:
+            os.close(its_end)
+            shown = ""
+            stopping = False
+            while piece := self.read_terminal(terminal):
+                shown += piece
+                all_seen = all(re.search(pattern, shown) for pattern in patterns)
+                if not stopping and (all_seen or len(shown) > 20000):
+                    stopping = True  # a second signal would end it at once
+                    process.send_signal(signal.SIGINT)
+            os.close(terminal)
+        self.assertEqual(process.returncode, 130, shown)
+        for pattern in patterns:
+            self.assertRegex(shown, pattern)
+        return shown
+
+    def read_terminal(self, terminal):
+        """What comes next; nothing when its other end is closed."""
+        try:
+            return os.read(terminal, 65536).decode()
+        except OSError:  # Linux's way to say that nobody is left there
+            return ""
 
     def assert_same_run(self, a, b):
         """Two run folders hold the same but for the clock: policy, tables, whole state."""

@@ -1,13 +1,9 @@
 #include "rl/train.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
-#include <atomic>
-#include <cerrno>
-#include <csignal>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -15,6 +11,9 @@
 
 #include "apps/commands.h"
 #include "apps/config.h"
+#include "apps/many_runs.h"
+#include "apps/seeds.h"
+#include "apps/signals.h"
 #include "apps/train_view.h"
 #include "core/error.h"
 #include "core/file.h"
@@ -28,45 +27,12 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kCheckpointFormat = "upswing-checkpoint-1";
 
-// ---- Signals: the handler only notes them, the training loop asks at each step.
-
-std::atomic<int> g_stop_signal{0};
-std::atomic<bool> g_checkpoint_wanted{false};
-std::atomic<bool> g_person_watches{false};  // standard error is a terminal
-static_assert(std::atomic<int>::is_always_lock_free);
-
-void InstallSignalHandlers() {
-  g_person_watches = isatty(STDERR_FILENO) == 1;
-  struct sigaction stop {};
-  stop.sa_handler = [](int signal) {
-    g_stop_signal = signal;
-    if (!g_person_watches) return;
-    constexpr std::string_view kNotice =
-        "\nstopping: a checkpoint is written; once more ends at once\n";
-    const int interrupted_errno = errno;
-    (void)!write(STDERR_FILENO, kNotice.data(), kNotice.size());
-    errno = interrupted_errno;
-  };
-  stop.sa_flags = SA_RESETHAND | SA_RESTART;  // a second one ends the program at once
-  sigaction(SIGINT, &stop, nullptr);
-  sigaction(SIGTERM, &stop, nullptr);
-  struct sigaction checkpoint {};
-  checkpoint.sa_handler = [](int) { g_checkpoint_wanted = true; };
-  checkpoint.sa_flags = SA_RESTART;
-  sigaction(SIGUSR1, &checkpoint, nullptr);
-}
-
-TrainRequest PollSignals() {
-  if (g_stop_signal != 0) return TrainRequest::kStop;
-  if (g_checkpoint_wanted.exchange(false)) return TrainRequest::kCheckpoint;
-  return TrainRequest::kGoOn;
-}
-
 // ---- Where a run comes from.
 
 /// What was typed.
 struct TrainArguments {
-  std::string config, out, resume;
+  std::string config, out, resume, seeds;
+  int jobs = 0;  // 0: as many as there are processors
   std::vector<FlagValue> flags;
 };
 
@@ -94,14 +60,8 @@ void CheckCheckpoint(const TensorFile& checkpoint, const Config& config) {
   const Options old_options = OptionsOf(old_config);
   const Options new_options = OptionsOf(new_config);
   ApplyToml(old_options, checkpoint.Metadata("config"), checkpoint.path());
-  for (size_t i = 0; i < new_options.all().size(); ++i) {
-    const Option& before = old_options.all()[i];
-    const Option& now = new_options.all()[i];
-    if (now.identity && before.text() != now.text()) {
-      throw BadInput(Concat(checkpoint.path(), ": made with ", before.section, ".", before.name,
-                            " = ", before.text(), ", but the configuration says ", now.text()));
-    }
-  }
+  ExpectSameSettings(old_options, new_options, checkpoint.path(),
+                     [](const Option& option) { return option.identity; });
   if (checkpoint.Metadata("model") != config.mjcf) {
     throw BadInput(Concat(checkpoint.path(), ": made with another model than ", config.model));
   }
@@ -120,21 +80,33 @@ struct Parts {
         pool(threads),
         env(c.Environments(pool)),
         agent(c.dqn, env.num_envs(), env.obs_size(), TorqueLevels(env.torque_limit()),
-              static_cast<uint64_t>(c.train.seed), pool),
+              env.mirror_signs(), static_cast<uint64_t>(c.train.seed), pool),
         state(env.num_envs(), kRewardTerms) {}
 
   /// Evaluation from fresh starts with the reward's standard weights, on the training plant or,
   /// where plants are random, on a fresh one for each episode; disturbed as in training.
   Evaluation Judge(const Policy& policy, int64_t step) {
+    // The twin says at once who fails; who does not is judged in MuJoCo.
+    const bool screened = config.eval_physics == kScreened;
+    if (screened && config.mjcf.empty()) {
+      const Evaluation screening = JudgeIn(PhysicsEngine::kClosedForm, policy, step);
+      if (!screening.all_succeeded()) return screening;
+    }
+    return JudgeIn(
+        screened ? PhysicsEngine::kMuJoCo : ParsePhysics(config.eval_physics, "--eval-physics"),
+        policy, step);
+  }
+
+  Evaluation JudgeIn(PhysicsEngine physics, const Policy& policy, int64_t step) {
     PendulumEnvConfig judge = config.Environments(pool);
-    judge.physics = ParsePhysics(config.eval_physics, "--eval-physics");
+    judge.physics = physics;
     judge.num_envs = static_cast<int>(config.train.eval_episodes);
     judge.episode_seconds = kEvaluationSeconds;
     judge.start = StartStates();
     judge.weights = RewardWeights();
     judge.stream = Concat("evaluation at step ", step);
     PendulumEnv env_of_judge(judge);
-    return Evaluate(policy, env_of_judge);
+    return Evaluate(policy, env_of_judge, &pool);
   }
 
   std::map<std::string, std::string> CheckpointMetadata() const {
@@ -188,7 +160,6 @@ int TrainRun(const fs::path& path, Parts& parts, bool resuming, bool steps_given
   TrainView view(parts.state, parts.agent.Report());
   view.Follow(training);
 
-  InstallSignalHandlers();
   view.Announce(parts.config, parts.pool.threads(), parts.agent.online().size(), path);
   run.Log(Concat(parts.state.steps > 0 ? "resumed" : "started", " at step ", parts.state.steps,
                  ", vector instructions ", SimdPath()));
@@ -201,10 +172,30 @@ int TrainRun(const fs::path& path, Parts& parts, bool resuming, bool steps_given
   }
   run.Log(Concat(finished ? "finished" : "stopped", " at step ", parts.state.steps));
   view.Summarize(parts.state, path, finished);
-  return finished ? 0 : 128 + g_stop_signal;
+  return finished ? 0 : 128 + StopSignal();
+}
+
+bool StepsGiven(const TrainArguments& arguments) {
+  return std::ranges::any_of(arguments.flags,
+                             [](const FlagValue& flag) { return flag.name == "steps"; });
+}
+
+/// The same settings with many seeds.
+int RunSeeds(const TrainArguments& arguments) {
+  ManyRuns plan;
+  plan.variants = {{"", BuildConfig(arguments.config, arguments.flags)}};
+  Config& config = plan.variants.front().config;
+  MakeReadyForMany(config);
+  plan.what = config.agent;
+  plan.folder = arguments.out.empty() ? fs::path("runs") / config.agent : fs::path(arguments.out);
+  plan.seeds = ParseSeeds(arguments.seeds, "--seeds");
+  plan.jobs = arguments.jobs > 0 ? arguments.jobs : DefaultJobs(config.train.threads);
+  plan.more_steps = StepsGiven(arguments);
+  return TrainMany(plan);
 }
 
 int RunTrain(const TrainArguments& arguments) {
+  if (!arguments.seeds.empty()) return RunSeeds(arguments);
   const bool resuming = !arguments.resume.empty();
   fs::path path = arguments.resume;
   if (resuming && !fs::exists(path / "config.toml")) {
@@ -218,13 +209,24 @@ int RunTrain(const TrainArguments& arguments) {
       BuildConfig(resuming ? path / "config.toml" : fs::path(arguments.config), arguments.flags);
   if (!config.mjcf.empty()) config.model = "model.xml";  // the copy in the run folder
   Parts parts(config, ResolveThreads(config.train.threads));
+  InstallSignalHandlers();  // from here on what is begun is ended in order
   if (!resuming) {
     path = MakeRun(arguments, parts);
     lock.emplace(path);
   }
-  const bool steps_given = std::ranges::any_of(
-      arguments.flags, [](const FlagValue& flag) { return flag.first == "steps"; });
-  return TrainRun(path, parts, resuming, steps_given);
+  return TrainRun(path, parts, resuming, StepsGiven(arguments));
+}
+
+/// Throws if what is for many runs and what is for one come together.
+void CheckManyArguments(const CLI::App& app) {
+  if (app.count("--seeds") > 0) {
+    for (const std::string other : {"--seed", "--resume"}) {
+      if (app.count(other) > 0)
+        throw BadInput(Concat("--seeds: expected no ", other, " beside it"));
+    }
+  } else if (app.count("--jobs") > 0) {
+    throw BadInput("--jobs: expected --seeds beside it");
+  }
 }
 
 }  // namespace
@@ -243,6 +245,7 @@ void AddTrain(CLI::App& program, Command& command) {
                   "--stop-when-solved may be given anew")
       ->type_name("RUN")
       ->check(NotEmpty());
+  AddManyOptions(*app, arguments->seeds, arguments->jobs);
   Config defaults;
   AddSettings(*app, OptionsOf(defaults), arguments->flags);
 
@@ -257,6 +260,9 @@ void AddTrain(CLI::App& program, Command& command) {
       "  ./upswing train --mass2 1.2 --no-stop-when-solved --steps 500000\n"
       "  ./upswing train --randomize 0.25 --delay 0.02    each episode another plant\n"
       "  ./upswing train --resume runs/a --steps 2000000  go on, from any moment\n"
+      "  ./upswing train --seeds 10                       in runs/d3qn/seed1 to seed10, in\n"
+      "                                                   parallel; the same command goes on\n"
+      "  ./upswing train --seeds 3,5,8-12 --jobs 2 --out runs/many\n"
       "\nSIGINT and SIGTERM write a checkpoint and end with 130 and 143; SIGUSR1 writes one\n"
       "and goes on. Exit code 0: done; 1: failed; 2: bad usage or input.\n");
   app->callback([app, arguments, &command] {
@@ -265,6 +271,7 @@ void AddTrain(CLI::App& program, Command& command) {
           "--resume: takes settings and folder from the run; expected neither --out nor "
           "--config beside it");
     }
+    CheckManyArguments(*app);
     command = [arguments] { return RunTrain(*arguments); };
   });
 }

@@ -128,6 +128,21 @@ void WriteFileAtomically(const fs::path& path, std::string_view text) {
   WriteFileAtomically(path, std::array{BytesOf(text)});
 }
 
+void CheckFree(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::exists(fs::symlink_status(folder, error))) return;
+  throw BadInput(Concat(folder.string(), ": exists already; expected the name of a new folder"));
+}
+
+void MakeNewFolder(const fs::path& folder) {
+  CheckFree(folder);
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) {
+    throw Failure(Concat("cannot make the folder ", folder.string(), ": ", error.message()));
+  }
+}
+
 FolderLock::FolderLock(const fs::path& folder)
     : descriptor_(open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
   if (descriptor_ < 0) throw BadInput(SystemError("cannot read", folder));

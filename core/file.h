@@ -27,6 +27,13 @@ void WriteFileAtomically(const std::filesystem::path& path,
                          std::span<const std::span<const std::byte>> parts);
 void WriteFileAtomically(const std::filesystem::path& path, std::string_view text);
 
+/// Throws BadInput if there is something at `folder` already; for before work whose result shall go
+/// there.
+void CheckFree(const std::filesystem::path& folder);
+
+/// Makes a folder that is not there yet, and those above it. Throws as CheckFree does, or Failure.
+void MakeNewFolder(const std::filesystem::path& folder);
+
 /// Keeps other processes from working in a folder for as long as it lives, or its process does.
 class FolderLock {
  public:

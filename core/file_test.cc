@@ -54,6 +54,20 @@ TEST_F(FileTest, ALinkStaysAndADeviceIsWrittenInPlace) {
   EXPECT_TRUE(fs::is_character_file("/dev/null"));
 }
 
+TEST_F(FileTest, ANewFolderIsMadeOnceAndNothingIsTakenForOne) {
+  MakeNewFolder(folder_ / "a/b");
+  EXPECT_TRUE(fs::is_directory(folder_ / "a/b"));
+  WriteFileAtomically(folder_ / "file", "kept");
+  fs::create_symlink("nowhere", folder_ / "link");
+  for (const char* taken : {"a/b", "file", "link"}) {
+    EXPECT_THROW(CheckFree(folder_ / taken), Error) << taken;
+    EXPECT_THROW(MakeNewFolder(folder_ / taken), Error) << taken;
+  }
+  EXPECT_EQ(ReadTextFile(folder_ / "file"), "kept");
+  EXPECT_NO_THROW(CheckFree(folder_ / "file/below"));
+  EXPECT_THROW(MakeNewFolder(folder_ / "file/below"), Error);
+}
+
 TEST_F(FileTest, MissingFilesAndFoldersAreBadInput) {
   for (const fs::path& path : {folder_ / "missing", folder_}) {
     try {

@@ -4,7 +4,9 @@
 #include <array>
 #include <bit>
 #include <cstring>
+#include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "core/error.h"
 #include "core/file.h"
@@ -77,23 +79,41 @@ std::optional<size_t> ByteCount(const std::vector<int64_t>& shape, Dtype dtype) 
   return count;
 }
 
-/// One entry of the header, checked against the file's data.
-Tensor ParseTensor(const json& entry, std::span<const std::byte> data) {
+/// An entry of the header: a tensor whose bytes are still to be found, and where they begin in the
+/// file's data.
+struct Entry {
+  Tensor tensor;
+  size_t begin, size;
+};
+
+/// One entry of the header, checked against the size of the file's data.
+Entry ParseEntry(const json& entry, size_t data_size) {
   const auto dtype_name = entry.at("dtype").get<std::string>();
   const auto facts = std::find_if(kDtypes.begin(), kDtypes.end(),
                                   [&](const DtypeFacts& f) { return f.name == dtype_name; });
   if (facts == kDtypes.end()) throw std::runtime_error(Concat("type ", dtype_name, " is not ours"));
   Tensor tensor{facts->dtype, entry.at("shape").get<std::vector<int64_t>>(), {}};
   const auto offsets = entry.at("data_offsets").get<std::array<uint64_t, 2>>();
-  if (offsets[0] > offsets[1] || offsets[1] > data.size()) {
-    throw std::runtime_error(Concat("data end at byte ", offsets[1], " of ", data.size()));
+  if (offsets[0] > offsets[1] || offsets[1] > data_size) {
+    throw std::runtime_error(Concat("data end at byte ", offsets[1], " of ", data_size));
   }
-  tensor.bytes = data.subspan(offsets[0], offsets[1] - offsets[0]);
-  if (ByteCount(tensor.shape, tensor.dtype) != tensor.bytes.size()) {
-    throw std::runtime_error(
-        Concat("expected the bytes of ", tensor.Describe(), ", got ", tensor.bytes.size()));
+  const size_t size = offsets[1] - offsets[0];
+  if (ByteCount(tensor.shape, tensor.dtype) != size) {
+    throw std::runtime_error(Concat("expected the bytes of ", tensor.Describe(), ", got ", size));
   }
-  return tensor;
+  return {std::move(tensor), offsets[0], size};
+}
+
+/// The header's JSON object. Throws without the parser's own message, which would quote bytes that
+/// need not be text.
+json ParseHeader(std::string_view text) {
+  json header = json::parse(text, nullptr, false);
+  if (!header.is_object()) throw std::runtime_error("its header is no JSON object");
+  return header;
+}
+
+Error Broken(const std::string& path, std::string_view why) {
+  return BadInput(Concat(path, ": not a whole safetensors file: ", why));
 }
 
 }  // namespace
@@ -179,9 +199,7 @@ TensorFile TensorFile::Load(const std::filesystem::path& path) {
     throw BadInput(Concat("cannot read ", file.path_, ": expected a regular file"));
   }
   const auto& bytes = file.kept_.emplace_back(ReadFile(path));
-  const auto broken = [&](const auto&... why) {
-    return BadInput(Concat(file.path_, ": not a whole safetensors file: ", why...));
-  };
+  const auto broken = [&](const auto&... why) { return Broken(file.path_, Concat(why...)); };
 
   // The header: its length (8 bytes), then JSON.
   uint64_t length = 0;
@@ -195,9 +213,7 @@ TensorFile TensorFile::Load(const std::filesystem::path& path) {
 
   // The tensors, which must cover the data without gap or overlap.
   try {
-    // Without the parser's own message, which would quote bytes that need not be text.
-    const json header = json::parse(text, nullptr, false);
-    if (!header.is_object()) throw std::runtime_error("its header is no JSON object");
+    const json header = ParseHeader(text);
     std::vector<std::span<const std::byte>> covered;
     for (const auto& [name, entry] : header.items()) {
       if (name == "__metadata__") {
@@ -205,8 +221,10 @@ TensorFile TensorFile::Load(const std::filesystem::path& path) {
         continue;
       }
       try {
-        const Tensor& tensor = file.tensors_[name] = ParseTensor(entry, data);
+        auto [tensor, begin, size] = ParseEntry(entry, data.size());
+        tensor.bytes = data.subspan(begin, size);
         covered.push_back(tensor.bytes);
+        file.tensors_[name] = std::move(tensor);
       } catch (const std::exception& error) {
         throw std::runtime_error(Concat("tensor \"", name, "\": ", error.what()));
       }
@@ -244,6 +262,47 @@ TensorFile TensorFile::Load(const std::filesystem::path& path) {
     file.metadata.erase("checksum");
   }
   return file;
+}
+
+TensorFile TensorFile::LoadPart(const std::filesystem::path& path, std::string_view prefix) {
+  TensorFile part;
+  part.path_ = path.string();
+  std::ifstream file(path, std::ios::binary);
+  std::error_code error;
+  const uint64_t file_size = std::filesystem::file_size(path, error);
+  if (!file || error) throw BadInput(Concat("cannot read ", part.path_));
+  const auto read = [&](char* bytes, size_t size) {
+    if (!file.read(bytes, static_cast<std::streamsize>(size)))
+      throw std::runtime_error("too short");
+  };
+  try {
+    uint64_t length = 0;
+    if (file_size < sizeof(length)) throw std::runtime_error("too short");
+    read(reinterpret_cast<char*>(&length), sizeof(length));
+    const uint64_t behind_length = file_size - sizeof(length);
+    if (length > behind_length) throw std::runtime_error("too short for its header");
+    std::string text(length, '\0');
+    read(text.data(), length);
+
+    const json header = ParseHeader(text);
+    for (const auto& [name, entry] : header.items()) {
+      if (name == "__metadata__") {
+        part.metadata = entry.get<std::map<std::string, std::string>>();
+        continue;
+      }
+      if (!name.starts_with(prefix)) continue;
+      auto [tensor, begin, size] = ParseEntry(entry, behind_length - length);
+      auto& bytes = part.kept_.emplace_back(size);
+      file.seekg(static_cast<std::streamoff>(sizeof(length) + length + begin));
+      read(reinterpret_cast<char*>(bytes.data()), size);
+      tensor.bytes = bytes;
+      part.tensors_[name] = std::move(tensor);
+    }
+  } catch (const std::exception& problem) {
+    throw Broken(part.path_, problem.what());
+  }
+  part.metadata.erase("checksum");
+  return part;
 }
 
 }  // namespace upswing

@@ -117,6 +117,35 @@ TEST_F(TensorFileTest, EveryFlippedBitIsFound) {
   }
 }
 
+TEST_F(TensorFileTest, APartHoldsWhatBeginsSoAndItsBytesAreThoseOfTheWhole) {
+  SaveSample();
+  const TensorFile part = TensorFile::LoadPart(path_, "s");
+  EXPECT_EQ(part.metadata, TensorFile::Load(path_).metadata);
+  EXPECT_EQ(part.tensors().size(), 1U);
+  int64_t scalar = 0;
+  part.Read("scalar", std::span(&scalar, 1));
+  EXPECT_EQ(scalar, -9);
+
+  const TensorFile all = TensorFile::LoadPart(path_, "");
+  EXPECT_EQ(all.tensors().size(), 6U);
+  std::vector<float> floats(6);
+  all.Read("floats", std::span(floats), {2, 3});
+  EXPECT_EQ(floats, (std::vector<float>{1.5F, -2, 3, 4, 5, 6}));
+  std::vector<uint8_t> bytes(3);
+  all.Read("bytes", std::span(bytes));
+  EXPECT_EQ(bytes, (std::vector<uint8_t>{1, 2, 3}));
+}
+
+TEST_F(TensorFileTest, APartOfATruncatedFileIsRefused) {
+  SaveSample();
+  const std::vector<std::byte> whole = ReadFile(path_);
+  for (size_t size = 0; size < whole.size(); size += 3) {
+    WriteFileAtomically(path_, std::vector{std::span(whole).first(size)});
+    EXPECT_THROW(TensorFile::LoadPart(path_, ""), Error) << size;
+  }
+  EXPECT_THROW(TensorFile::LoadPart(folder_ / "none", ""), Error);
+}
+
 TEST_F(TensorFileTest, HostileHeadersAreRefused) {
   EXPECT_NE(HeaderError("{", 0), "");
   EXPECT_NE(HeaderError("[]", 0), "");

@@ -13,14 +13,14 @@ namespace {
 /// More hardly help where work is cut into a few slices, and idle threads get in the way.
 constexpr int kMostThreads = 8;
 
-/// How many processors' worth of time a container's limit leaves us (Linux, control groups 2:
-/// "QUOTA PERIOD" in microseconds, or "max PERIOD").
-int ProcessorQuota() {
+/// How many of `present` processors a container's limit leaves us the time of (Linux, control
+/// groups 2: "QUOTA PERIOD" in microseconds, or "max PERIOD").
+int WithinQuota(int present) {
   std::ifstream file("/sys/fs/cgroup/cpu.max");
   double quota = 0;
   double period = 0;
-  if (!(file >> quota >> period) || !(period > 0)) return kMostThreads;
-  return std::max(1, static_cast<int>(quota / period));
+  if (!(file >> quota >> period) || !(period > 0)) return present;
+  return static_cast<int>(std::clamp(quota / period, 1.0, static_cast<double>(present)));
 }
 
 /// Waits until `value` differs from `old`: first spinning (work of well under a millisecond comes
@@ -43,15 +43,18 @@ constexpr int kTaskBits = 32;
 
 }  // namespace
 
-int ResolveThreads(int64_t wanted) {
-  if (wanted > 0) return static_cast<int>(wanted);
+int UsableProcessors() {
   cpu_set_t usable;
   // It fails where the system knows of more processors than a cpu_set_t has room for.
   const bool known = sched_getaffinity(0, sizeof(usable), &usable) == 0;
   const int present =
       known ? CPU_COUNT(&usable) : static_cast<int>(std::thread::hardware_concurrency());
-  const int processors = std::min(present, ProcessorQuota());
-  return std::clamp(processors, 1, kMostThreads);
+  return WithinQuota(std::max(1, present));
+}
+
+int ResolveThreads(int64_t wanted) {
+  if (wanted > 0) return static_cast<int>(wanted);
+  return std::min(UsableProcessors(), kMostThreads);
 }
 
 ThreadPool::ThreadPool(int threads) {

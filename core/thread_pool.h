@@ -10,8 +10,11 @@
 
 namespace upswing {
 
-/// `wanted`, or if that is 0 the number of processors that this process may use, but no more
-/// than 8.
+/// Number of processors that this process may use, by its affinity and its container's limit; at
+/// least 1.
+int UsableProcessors();
+
+/// `wanted`, or if that is 0 as many as UsableProcessors, but no more than 8.
 int ResolveThreads(int64_t wanted);
 
 /// Threads that wait for work. The caller is one of them, so a pool of one starts none.

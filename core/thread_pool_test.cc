@@ -38,7 +38,9 @@ TEST(ResolveThreads, TakesANumberAsItIs) {
 TEST(ResolveThreads, ChoosesAsManyAsItMayUseUpToEight) {
   EXPECT_GE(ResolveThreads(0), 1);
   EXPECT_LE(ResolveThreads(0), 8);
+  EXPECT_GE(UsableProcessors(), ResolveThreads(0));
   const OnOneProcessor one;
+  EXPECT_EQ(UsableProcessors(), 1);
   EXPECT_EQ(ResolveThreads(0), 1);
   EXPECT_EQ(ResolveThreads(2), 2);
 }

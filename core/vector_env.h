@@ -46,6 +46,10 @@ class VectorEnv {
   virtual double step_seconds() const = 0;                         // control period, s
   virtual double torque_limit() const = 0;                         // N·m
 
+  /// The sign (D) that each observation takes in a mirror, where the task goes on in the same way
+  /// under torques of the other sign; empty if there is no such symmetry.
+  virtual std::vector<float> mirror_signs() const { return {}; }
+
   /// What to act on next (N × D); for an environment that has just finished, its new start.
   virtual Matrix<const float> obs() const = 0;
 

@@ -84,8 +84,7 @@ Policy::Policy(QNetworkShape shape, std::vector<float> parameters, std::vector<d
       parameters_(parameters.begin(), parameters.end()),
       torques_(std::move(torques)),
       about_(std::move(about)),
-      activations_(network_.MakeActivations(kBlock, false)),
-      q_(static_cast<size_t>(kBlock) * static_cast<size_t>(network_.shape().actions)) {
+      workspace_(MakeWorkspace()) {
   if (parameters_.size() != network_.num_parameters() ||
       torques_.size() != static_cast<size_t>(network_.shape().actions)) {
     throw BadInput(Concat("policy: expected ", network_.num_parameters(), " parameters and ",
@@ -103,17 +102,22 @@ const std::string& Policy::About(const std::string& key) const {
 void Policy::QValues(Matrix<const float> obs, Matrix<float> q) const {
   for (int first = 0; first < obs.rows(); first += kBlock) {
     const int rows = std::min(kBlock, obs.rows() - first);
-    network_.Forward({parameters_}, obs.Rows(first, rows), {0, rows}, activations_,
+    network_.Forward({parameters_}, obs.Rows(first, rows), {0, rows}, workspace_.activations,
                      q.Rows(first, rows));
   }
 }
 
-void Policy::Act(Matrix<const float> obs, std::span<double> torque) const {
+Policy::Workspace Policy::MakeWorkspace() const {
+  const auto actions = static_cast<size_t>(network_.shape().actions);
+  return {network_.MakeActivations(kBlock, false), AlignedVector<float>(kBlock * actions)};
+}
+
+void Policy::Act(Matrix<const float> obs, std::span<double> torque, Workspace& workspace) const {
   for (int first = 0; first < obs.rows(); first += kBlock) {
     const int rows = std::min(kBlock, obs.rows() - first);
-    const Matrix<float> preferences(q_, rows, network_.shape().actions);
-    network_.ForwardPreferences(parameters_, obs.Rows(first, rows), {0, rows}, activations_,
-                                preferences);
+    const Matrix<float> preferences(workspace.preferences, rows, network_.shape().actions);
+    network_.ForwardPreferences(parameters_, obs.Rows(first, rows), {0, rows},
+                                workspace.activations, preferences);
     for (int i = 0; i < rows; ++i) {
       const auto action = static_cast<size_t>(ArgMax(preferences.row(i)));
       torque[static_cast<size_t>(first + i)] = torques_[action];

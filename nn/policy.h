@@ -33,9 +33,22 @@ class Policy {
   /// Q-values (B × A) of observations (B × D). Not for two threads at once.
   void QValues(Matrix<const float> obs, Matrix<float> q) const;
 
+  /// Room to act in.
+  struct Workspace {
+    QNetwork<float>::Activations activations;  // of a block of rows
+    AlignedVector<float> preferences;          // (block × A)
+  };
+  Workspace MakeWorkspace() const;
+
   /// The torque (B), N·m, of the action with the largest Q-value, up to rounding; of a dueling
-  /// network by its advantages alone.
-  void Act(Matrix<const float> obs, std::span<double> torque) const;
+  /// network by its advantages alone. Threads may act at once, each in a workspace of its own; a
+  /// row's torque does not depend on what other rows there are.
+  void Act(Matrix<const float> obs, std::span<double> torque, Workspace& workspace) const;
+
+  /// The same in the policy's own workspace. Not for two threads at once.
+  void Act(Matrix<const float> obs, std::span<double> torque) const {
+    Act(obs, torque, workspace_);
+  }
 
   /// Largest |difference| between the sample Q-values of the file that it was loaded from and those
   /// that loading recomputed; 0 for a policy that never was in a file.
@@ -56,8 +69,7 @@ class Policy {
   std::vector<double> torques_;
   std::map<std::string, std::string> about_;
   double self_check_error_ = 0;
-  mutable QNetwork<float>::Activations activations_;
-  mutable AlignedVector<float> q_;  // (block × A)
+  mutable Workspace workspace_;
 };
 
 /// Index of the largest number, the first of equals.

@@ -21,6 +21,8 @@ struct AgentReport {
   double q = 0;              // mean Q-value of the sampled actions
   double td_error = 0;       // mean |temporal-difference error|
   double gradient_norm = 0;  // mean, before clipping
+  double feature_rank = 0;   // of the last update; see rl/representation.h
+  double dormant_share = 0;  // the same
 };
 
 /// A learner. The training loop calls Act, Observe, Learn for each lock-step of the environments.

@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "core/text.h"
+#include "rl/representation.h"
 
 namespace upswing {
 namespace {
@@ -37,18 +38,28 @@ void DqnConfig::Describe(Options& o) {
         "the agent learns from reward times this");
   o.Add(&batch, "batch", 128, {1, 65536}, "", "transitions in a minibatch");
   o.Add(&replay, "replay", 300000, {1, 10000000}, "", "transitions that the replay memory holds");
+  o.Add(&prioritized, "prioritized", true,
+        "prioritised replay: draw transitions by their last |TD error|");
+  o.Add(&priority_exponent, "priority_exponent", 0.6, kUnit, "",
+        "alpha of prioritised replay; 0: uniform");
+  o.Add(&importance_exponent, "importance_exponent", 0.4, kUnit, "",
+        "beta of prioritised replay at the beginning; it rises to 1 as the learning rate falls");
+  o.Add(&mirror, "mirror", true,
+        "learn from a random half of each minibatch as a mirror would show it");
   o.Add(&learning_starts, "learning_starts", 2000, kNotNegative, "steps",
         "before the first update");
-  o.Add(&updates_per_step, "updates_per_step", 0.25, {0, 100}, "", "gradient steps per step");
+  o.Add(&updates_per_step, "updates_per_step", 0.0625, {0, 100}, "", "gradient steps per step");
   o.Add(&learning_rate, "learning_rate", 1e-3, {0, 10}, "",
         "learning rate of Adam at the beginning");
   o.Add(&learning_rate_end, "learning_rate_end", 1e-4, {0, 10}, "", "and at the end");
-  o.Add(&learning_rate_steps, "learning_rate_steps", 300000, {1, 1e12}, "steps",
+  o.Add(&learning_rate_steps, "learning_rate_steps", 600000, {1, 1e12}, "steps",
         "over which it falls linearly");
   o.Add(&max_gradient_norm, "max_gradient_norm", 10, kPositive, "", "clip the global norm to this");
   o.Add(&tau, "tau", 0.02, kUnit, "", "Polyak averaging of the target, per update");
   o.Add(&target_period, "target_period", 0, {0, 1e9}, "updates",
         "copy the target every so many instead; 0: Polyak averaging");
+  o.Add(&policy_tau, "policy_tau", 0.01, kUnit, "",
+        "Polyak averaging of the policy that is judged and kept, per update; 1: as learned last");
   o.Add(&epsilon_start, "epsilon_start", 1.0, kUnit, "",
         "share of random actions at the beginning");
   o.Add(&epsilon_end, "epsilon_end", 0.05, kUnit, "", "and at least");
@@ -80,11 +91,24 @@ float HuberLoss(float delta) {
 
 float HuberGradient(float delta) { return std::clamp(delta, -1.0F, 1.0F); }
 
+void MirrorHalf(Rng& rng, std::span<const float> signs, int actions, Minibatch& batch) {
+  const size_t D = signs.size();
+  for (size_t i = 0; i < batch.action.size(); ++i) {
+    if (rng.Below(2) == 0) continue;
+    for (size_t j = 0; j < D; ++j) {
+      batch.obs[i * D + j] *= signs[j];
+      batch.next_obs[i * D + j] *= signs[j];
+    }
+    batch.action[i] = actions - 1 - batch.action[i];
+  }
+}
+
 Dqn::Dqn(const DqnConfig& config, int num_envs, int obs_size, std::vector<double> torques,
-         uint64_t seed, ThreadPool& pool)
+         std::vector<float> mirror_signs, uint64_t seed, ThreadPool& pool)
     : config_(config),
       obs_size_(static_cast<size_t>(obs_size)),
       torques_(std::move(torques)),
+      mirror_signs_(std::move(mirror_signs)),
       pool_(pool),
       explore_rng_(seed, "exploration"),
       sample_rng_(seed, "replay sampling"),
@@ -99,20 +123,24 @@ Dqn::Dqn(const DqnConfig& config, int num_envs, int obs_size, std::vector<double
       dq_(q_.size()),
       y_(static_cast<size_t>(config.batch)),
       q_taken_(y_.size()),
+      td_error_(y_.size()),
       prepared_(network_.MakePrepared(true)),
       prepared_target_(network_.MakePrepared(false)),
       gradient_(network_.num_parameters()),
       squares_(static_cast<size_t>(network_.num_tasks())),
-      replay_(config.replay, obs_size),
+      replay_(config.replay, obs_size, config.prioritized),
       n_step_(num_envs, static_cast<int>(config.n_step), config.gamma, obs_size),
       batch_(static_cast<int>(config.batch), obs_size),
       act_activations_(network_.MakeActivations(num_envs, false)),
       act_obs_(static_cast<size_t>(num_envs) * obs_size_),
       act_q_(static_cast<size_t>(num_envs) * torques_.size()),
       act_action_(static_cast<size_t>(num_envs)) {
+  if (config.mirror && mirror_signs_.empty()) {
+    throw BadInput("--mirror: expected a task that is the same in a mirror");
+  }
   Rng init_rng(seed, "initial parameters");
   network_.Initialize(init_rng, theta_);
-  theta_target_ = theta_;
+  theta_target_ = theta_policy_ = theta_;
 }
 
 double Dqn::epsilon() const {
@@ -121,10 +149,17 @@ double Dqn::epsilon() const {
   return std::max(decayed, config_.epsilon_end);
 }
 
+double Dqn::schedule() const {
+  return std::min(1.0,
+                  static_cast<double>(steps_) / static_cast<double>(config_.learning_rate_steps));
+}
+
 double Dqn::learning_rate() const {
-  const double progress =
-      std::min(1.0, static_cast<double>(steps_) / static_cast<double>(config_.learning_rate_steps));
-  return config_.learning_rate + progress * (config_.learning_rate_end - config_.learning_rate);
+  return std::lerp(config_.learning_rate, config_.learning_rate_end, schedule());
+}
+
+double Dqn::importance_exponent() const {
+  return std::lerp(config_.importance_exponent, 1.0, schedule());
 }
 
 void Dqn::Act(Matrix<const float> obs, std::span<double> torque) {
@@ -166,8 +201,16 @@ void Dqn::Learn() {
   const auto due =
       static_cast<int64_t>(static_cast<double>(learning_steps) * config_.updates_per_step);
   while (updates_ < due) {
-    replay_.Sample(sample_rng_, batch_);
+    if (config_.prioritized) {
+      replay_.SamplePrioritized(sample_rng_, importance_exponent(), batch_);
+    } else {
+      replay_.Sample(sample_rng_, batch_);
+    }
+    if (config_.mirror) {
+      MirrorHalf(sample_rng_, mirror_signs_, static_cast<int>(torques_.size()), batch_);
+    }
     Update(batch_);
+    if (config_.prioritized) replay_.Prioritize(batch_, td_error_, config_.priority_exponent);
   }
 }
 
@@ -185,7 +228,7 @@ void Dqn::Update(const Minibatch& batch) {
     const int first = slice * slice_rows;
     BackwardRows(batch, {first, std::min(slice_rows, B - first)});
   });
-  CountErrors();
+  CountErrors(batch);
   const Matrix<const float> s(batch.obs.data(), B, static_cast<int>(obs_size_));
   pool_.ParallelFor(network_.num_tasks(), [&](int task) {
     squares_[static_cast<size_t>(task)] =
@@ -199,8 +242,16 @@ void Dqn::Update(const Minibatch& batch) {
              gradient_, theta_, theta_target_, pool_);
   ++updates_;
   if (!polyak && updates_ % config_.target_period == 0) theta_target_ = theta_;
+  if (config_.policy_tau < 1) AveragePolicy();
   norm_sum_ += norm;
   ++report_updates_;
+}
+
+void Dqn::AveragePolicy() {
+  const auto tau = static_cast<float>(config_.policy_tau);
+  for (size_t i = 0; i < theta_.size(); ++i) {
+    theta_policy_[i] += tau * (theta_[i] - theta_policy_[i]);
+  }
 }
 
 void Dqn::BackwardRows(const Minibatch& batch, RowRange rows) {
@@ -227,26 +278,26 @@ void Dqn::BackwardRows(const Minibatch& batch, RowRange rows) {
   TdTargets(q_select.Rows(rows.first, rows.count), q_target.Rows(rows.first, rows.count),
             part(batch.reward), part(batch.discount), part(y_));
 
-  // dL/dQ(s, a) = clip(Q(s, a; θ) - y, ±1) / B, and 0 for all other actions
+  // dL/dQ(s, a) = w clip(Q(s, a; θ) - y, ±1) / B, and 0 for all other actions
   network_.Forward(online, s, rows, activations_, q);
   std::ranges::fill(dq.Rows(rows.first, rows.count).values(), 0.0F);
   for (int i = rows.first; i < rows.first + rows.count; ++i) {
     const auto row = static_cast<size_t>(i);
     const int a = batch.action[row];
     q_taken_[row] = q(i, a);
-    dq(i, a) = HuberGradient(q(i, a) - y_[row]) / static_cast<float>(B);
+    td_error_[row] = q(i, a) - y_[row];
+    dq(i, a) = batch.weight[row] * HuberGradient(td_error_[row]) / static_cast<float>(B);
   }
   network_.BackwardInputs(online, dq, rows, activations_);
 }
 
-void Dqn::CountErrors() {
+void Dqn::CountErrors(const Minibatch& batch) {
   const double B = static_cast<double>(config_.batch);
   double loss = 0, q = 0, td = 0;
   for (size_t i = 0; i < y_.size(); ++i) {
-    const float delta = q_taken_[i] - y_[i];
-    loss += HuberLoss(delta);
+    loss += batch.weight[i] * HuberLoss(td_error_[i]);
     q += q_taken_[i];
-    td += std::abs(delta);
+    td += std::abs(td_error_[i]);
   }
   loss /= B;
   if (!std::isfinite(loss)) {
@@ -260,8 +311,11 @@ void Dqn::CountErrors() {
 
 AgentReport Dqn::Report() const {
   const double n = static_cast<double>(std::max<int64_t>(1, report_updates_));
-  return {updates_,   epsilon(),   learning_rate(), loss_sum_ / n,
-          q_sum_ / n, td_sum_ / n, norm_sum_ / n};
+  const Matrix<const float> features(activations_.feature.back().data(),
+                                     static_cast<int>(config_.batch),
+                                     static_cast<int>(config_.hidden.back()));
+  return {updates_,    epsilon(),     learning_rate(),       loss_sum_ / n,         q_sum_ / n,
+          td_sum_ / n, norm_sum_ / n, FeatureRank(features), DormantShare(features)};
 }
 
 void Dqn::BeginReport() {
@@ -270,12 +324,14 @@ void Dqn::BeginReport() {
 }
 
 Policy Dqn::ExportPolicy(std::map<std::string, std::string> about) const {
-  return {network_.shape(), {theta_.begin(), theta_.end()}, torques_, std::move(about)};
+  const auto& theta = config_.policy_tau < 1 ? theta_policy_ : theta_;
+  return {network_.shape(), {theta.begin(), theta.end()}, torques_, std::move(about)};
 }
 
 void Dqn::State(const Archive& archive) {
   archive.Array("theta", std::span(theta_));
   archive.Array("theta_target", std::span(theta_target_));
+  if (config_.policy_tau < 1) archive.Array("theta_policy", std::span(theta_policy_));
   adam_.State(archive.In("adam"));
   const int actions = static_cast<int>(torques_.size());
   replay_.State(archive.In("replay"), actions);
@@ -290,6 +346,7 @@ void Dqn::State(const Archive& archive) {
   archive.Scalar("td_sum", td_sum_);
   archive.Scalar("norm_sum", norm_sum_);
   archive.Scalar("report_updates", report_updates_);
+  archive.Array("last_features", std::span(activations_.feature.back()));
 }
 
 }  // namespace upswing

@@ -29,12 +29,16 @@ struct DqnConfig {
   int64_t n_step;
   double reward_scale;
   int64_t batch, replay, learning_starts;
+  bool prioritized;
+  double priority_exponent, importance_exponent;
+  bool mirror;
   double updates_per_step;
   double learning_rate, learning_rate_end;
   int64_t learning_rate_steps;
   double max_gradient_norm;
   double tau;
   int64_t target_period;
+  double policy_tau;
   double epsilon_start, epsilon_end, epsilon_decay;
 
   DqnConfig() { SetDefaults(*this); }
@@ -61,11 +65,17 @@ float HuberLoss(float delta);
 /// Its derivative: δ clipped to ±1.
 float HuberGradient(float delta);
 
+/// Mirrors a random half of a minibatch: observations take `signs` (D), and action a becomes
+/// A - 1 - a, the torque of the other sign.
+void MirrorHalf(Rng& rng, std::span<const float> signs, int actions, Minibatch& batch);
+
 /// A DQN agent for N environments.
 class Dqn : public Agent {
  public:
+  /// `torques` (A) belong to the actions, in rising order. `mirror_signs` (D) are as VectorEnv has
+  /// them; throws BadInput if they are empty but asked for.
   Dqn(const DqnConfig& config, int num_envs, int obs_size, std::vector<double> torques,
-      uint64_t seed, ThreadPool& pool);
+      std::vector<float> mirror_signs, uint64_t seed, ThreadPool& pool);
 
   void Act(Matrix<const float> obs, std::span<double> torque) override;
   void Observe(const StepResult& result) override;
@@ -80,6 +90,8 @@ class Dqn : public Agent {
   const Replay& replay() const { return replay_; }
   double epsilon() const;
   double learning_rate() const;
+  /// β of prioritised replay, which rises to 1 as the learning rate falls (Schaul et al., 2016).
+  double importance_exponent() const;
   /// One gradient step on a given minibatch; Report tells of it.
   void Update(const Minibatch& batch);
 
@@ -87,21 +99,27 @@ class Dqn : public Agent {
   /// TD errors of some rows of a minibatch, and their gradient's way back to the activations.
   void BackwardRows(const Minibatch& batch, RowRange rows);
   /// Adds a minibatch to the sums of the report; throws Failure if the loss is not finite.
-  void CountErrors();
+  void CountErrors(const Minibatch& batch);
+  /// Lets theta_policy_ follow θ.
+  void AveragePolicy();
+  /// Share of the way from the first to the last learning rate, 0 to 1.
+  double schedule() const;
 
   DqnConfig config_;
   size_t obs_size_;
-  std::vector<double> torques_;  // (A)
+  std::vector<double> torques_;      // (A)
+  std::vector<float> mirror_signs_;  // (D)
   ThreadPool& pool_;
   Rng explore_rng_, sample_rng_;
 
   QNetwork<float> network_;
   AlignedVector<float> theta_, theta_target_;  // (num_parameters)
+  AlignedVector<float> theta_policy_;  // the same, of the policy that is kept; see policy_tau
   Adam adam_;
   // Of an update: B rows.
   QNetwork<float>::Activations activations_;
   AlignedVector<float> q_, q_select_, q_target_, dq_;  // (B × A)
-  AlignedVector<float> y_, q_taken_;                   // (B) targets, Q(s, a)
+  AlignedVector<float> y_, q_taken_, td_error_;        // (B) targets, Q(s, a), Q(s, a) - y
   QNetwork<float>::Prepared prepared_, prepared_target_;
   AlignedVector<float> gradient_;  // (num_parameters)
   std::vector<float> squares_;     // of the gradient, by task

@@ -103,7 +103,7 @@ TEST_P(DqnVariants, LossIsThatOfThePapersAndFalls) {
   std::tie(config.double_q, config.dueling) = GetParam();
   config.learning_rate = config.learning_rate_end = 1e-2;
   ThreadPool pool(1);
-  Dqn agent(config, 1, 1, kTorques, 1, pool);
+  Dqn agent(config, 1, 1, kTorques, {-1}, 1, pool);
   const Minibatch batch = RandomBatch(16);
   const double first = LossByHand(config, agent.online(), agent.target(), batch);
   // Apart from the first update online and target differ.
@@ -119,11 +119,79 @@ TEST_P(DqnVariants, LossIsThatOfThePapersAndFalls) {
 INSTANTIATE_TEST_SUITE_P(Flags, DqnVariants,
                          ::testing::Combine(::testing::Bool(), ::testing::Bool()));
 
+TEST(Dqn, WeightsMultiplyTheGradientOfTheirTransition) {
+  // A transition of weight 1/2, twice, is one of weight 1; one of weight 0 is as if it were not.
+  DqnConfig config = SmallConfig();
+  config.batch = 4;
+  config.max_gradient_norm = 1e9;
+  ThreadPool pool(1);
+  Minibatch whole = RandomBatch(4), parts = RandomBatch(4);
+  whole.weight = {1, 0, 1, 0};
+  parts.weight = {0.5F, 0.5F, 0.5F, 0.5F};
+  for (const size_t copy : {1, 3}) {
+    parts.obs[copy] = parts.obs[copy - 1];
+    parts.next_obs[copy] = parts.next_obs[copy - 1];
+    parts.action[copy] = parts.action[copy - 1];
+    parts.reward[copy] = parts.reward[copy - 1];
+    parts.discount[copy] = parts.discount[copy - 1];
+  }
+  Dqn a(config, 1, 1, kTorques, {-1}, 1, pool), b(config, 1, 1, kTorques, {-1}, 1, pool);
+  a.Update(whole);
+  b.Update(parts);
+  EXPECT_NEAR(a.Report().loss, b.Report().loss, 1e-6);
+  EXPECT_NEAR(a.Report().gradient_norm, b.Report().gradient_norm, 1e-5);
+}
+
+TEST(Dqn, AMirrorTurnsObservationsAndTorquesAround) {
+  const Minibatch before = RandomBatch(64);
+  Minibatch batch = before;
+  Rng rng(1, "mirror");
+  MirrorHalf(rng, std::vector<float>{-1}, 3, batch);
+  int mirrored = 0;
+  for (size_t i = 0; i < 64; ++i) {
+    const bool turned = batch.obs[i] != before.obs[i];
+    mirrored += turned ? 1 : 0;
+    EXPECT_EQ(batch.obs[i], turned ? -before.obs[i] : before.obs[i]);
+    EXPECT_EQ(batch.next_obs[i], turned ? -before.next_obs[i] : before.next_obs[i]);
+    EXPECT_EQ(kTorques.at(static_cast<size_t>(batch.action[i])),
+              (turned ? -1 : 1) * kTorques.at(static_cast<size_t>(before.action[i])));
+  }
+  EXPECT_GT(mirrored, 16);
+  EXPECT_LT(mirrored, 48);
+
+  DqnConfig config = SmallConfig();
+  config.mirror = true;
+  ThreadPool pool(1);
+  EXPECT_THROW(Dqn(config, 1, 1, kTorques, {}, 1, pool), Error);
+}
+
+TEST(Dqn, TheKeptPolicyIsAnAverageOfThoseLearned) {
+  DqnConfig config = SmallConfig();
+  config.policy_tau = 0.25;
+  ThreadPool pool(1);
+  Dqn agent(config, 1, 1, kTorques, {-1}, 1, pool);
+  // The first network is what the average begins with.
+  std::vector<float> average(agent.online().begin(), agent.online().end());
+  for (int update = 0; update < 3; ++update) {
+    agent.Update(RandomBatch(16));
+    for (size_t i = 0; i < average.size(); ++i) {
+      average[i] += 0.25F * (agent.online()[i] - average[i]);
+    }
+  }
+  const QNetwork<float> network(config.Shape(1, 3));
+  auto activations = network.MakeActivations(1, false);
+  const float x = 0.7F;
+  std::vector<float> expected(3), got(3);
+  network.Forward({average}, {&x, 1, 1}, {0, 1}, activations, {expected.data(), 1, 3});
+  agent.ExportPolicy({}).QValues({&x, 1, 1}, {got.data(), 1, 3});
+  for (size_t a = 0; a < 3; ++a) EXPECT_NEAR(got[a], expected[a], 1e-5);
+}
+
 TEST(Dqn, TargetFollowsByPolyakAveragingAtEachUpdate) {
   DqnConfig config = SmallConfig();
   config.tau = 0.25;
   ThreadPool pool(1);
-  Dqn agent(config, 1, 1, kTorques, 1, pool);
+  Dqn agent(config, 1, 1, kTorques, {-1}, 1, pool);
   const std::vector<float> before(agent.target().begin(), agent.target().end());
   agent.Update(RandomBatch(16));
   for (size_t i = 0; i < before.size(); ++i) {
@@ -135,7 +203,7 @@ TEST(Dqn, TargetCanBeCopiedPeriodically) {
   DqnConfig config = SmallConfig();
   config.target_period = 3;
   ThreadPool pool(1);
-  Dqn agent(config, 1, 1, kTorques, 1, pool);
+  Dqn agent(config, 1, 1, kTorques, {-1}, 1, pool);
   const std::vector<float> first(agent.target().begin(), agent.target().end());
   for (int update = 1; update <= 3; ++update) {
     agent.Update(RandomBatch(16));
@@ -162,7 +230,7 @@ TEST(Dqn, ATruncationBootstrapsFromItsOwnLastObservationAndATerminationFromNothi
   DqnConfig config = SmallConfig();
   config.updates_per_step = 0;
   ThreadPool pool(1);
-  Dqn agent(config, 2, 1, kTorques, 1, pool);
+  Dqn agent(config, 2, 1, kTorques, {-1}, 1, pool);
   ToyEnv env(2);
   Walk(agent, env, 400);
   int terminated = 0;
@@ -181,7 +249,7 @@ TEST(Dqn, ATruncationBootstrapsFromItsOwnLastObservationAndATerminationFromNothi
 TEST(Dqn, UpdatesFollowTheStepsWhateverTheNumberOfEnvironments) {
   for (const int envs : {1, 4}) {
     ThreadPool pool(1);
-    Dqn agent(SmallConfig(), envs, 1, kTorques, 1, pool);
+    Dqn agent(SmallConfig(), envs, 1, kTorques, {-1}, 1, pool);
     ToyEnv env(envs);
     Walk(agent, env, 400 / envs);
     EXPECT_EQ(agent.Report().updates, (400 - 32) / 2);
@@ -193,7 +261,7 @@ TEST(Dqn, EpsilonDecaysWithEachEpisodeToItsEnd) {
   config.epsilon_decay = 0.5;
   config.epsilon_end = 0.2;
   ThreadPool pool(1);
-  Dqn agent(config, 1, 1, kTorques, 1, pool);
+  Dqn agent(config, 1, 1, kTorques, {-1}, 1, pool);
   ToyEnv env(1);
   env.episode_steps = 4;
   EXPECT_EQ(agent.epsilon(), 1);
@@ -208,7 +276,7 @@ TEST(Dqn, EpsilonDecaysWithEachEpisodeToItsEnd) {
 TEST(Dqn, LearnsToStayNearZero) {
   for (const uint64_t seed : {1, 2, 3}) {
     ThreadPool pool(1);
-    Dqn agent(SmallConfig(), 4, 1, kTorques, seed, pool);
+    Dqn agent(SmallConfig(), 4, 1, kTorques, {-1}, seed, pool);
     ToyEnv env(4, seed);
     Walk(agent, env, 1500);
     const Policy policy = agent.ExportPolicy({});
@@ -229,7 +297,7 @@ TEST(Dqn, TheNumberOfThreadsChangesNoBit) {
   std::vector<float> parameters[2];
   for (const int threads : {1, 3}) {
     ThreadPool pool(threads);
-    Dqn agent(config, 4, 1, kTorques, 1, pool);
+    Dqn agent(config, 4, 1, kTorques, {-1}, 1, pool);
     ToyEnv env(4);
     Walk(agent, env, 100);
     parameters[threads == 1 ? 0 : 1].assign(agent.online().begin(), agent.online().end());
@@ -240,11 +308,13 @@ TEST(Dqn, TheNumberOfThreadsChangesNoBit) {
 TEST(Dqn, LoadedGoesOnToTheBit) {
   DqnConfig config = SmallConfig();
   config.n_step = 3;
+  config.prioritized = config.mirror = true;
+  config.policy_tau = 0.1;
   ThreadPool pool(1);
-  Dqn saved(config, 2, 1, kTorques, 1, pool);
+  Dqn saved(config, 2, 1, kTorques, {-1}, 1, pool);
   ToyEnv env(2);
   Walk(saved, env, 101);
-  Dqn loaded(config, 2, 1, kTorques, 99, pool);  // another seed, which loading must undo
+  Dqn loaded(config, 2, 1, kTorques, {-1}, 99, pool);  // another seed, which loading must undo
   ToyEnv loaded_env(2, 99);
   const auto state = [](Dqn& agent, ToyEnv& walk) {
     return [&](const Archive& archive) {
@@ -263,12 +333,12 @@ TEST(Dqn, LoadedGoesOnToTheBit) {
 
 TEST(Dqn, NumbersThatAreNotFiniteStopIt) {
   ThreadPool pool(1);
-  Dqn agent(SmallConfig(), 1, 1, kTorques, 1, pool);
+  Dqn agent(SmallConfig(), 1, 1, kTorques, {-1}, 1, pool);
   ToyEnv env(1);
   env.poison = true;
   EXPECT_THROW(Walk(agent, env, 1), Error);
 
-  Dqn other(SmallConfig(), 1, 1, kTorques, 1, pool);
+  Dqn other(SmallConfig(), 1, 1, kTorques, {-1}, 1, pool);
   const std::vector<float> before(other.online().begin(), other.online().end());
   Minibatch batch = RandomBatch(16);
   batch.reward[3] = std::numeric_limits<float>::infinity();

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 namespace upswing {
 namespace {
@@ -10,6 +9,40 @@ namespace {
 int64_t StepsIn(double seconds, const VectorEnv& env) {
   return std::llround(seconds / env.step_seconds());
 }
+
+/// Acts for all environments, in slices that a pool can share.
+class SharedActing {
+ public:
+  SharedActing(const Policy& policy, int num_envs, ThreadPool* pool)
+      : policy_(policy), pool_(pool) {
+    // Enough slices to level out threads of unequal speed; fewer rows are not worth another thread.
+    constexpr int kSmallestSlice = 16;
+    const int most = pool == nullptr ? 1 : 2 * pool->threads();
+    const int slices = std::clamp(num_envs / kSmallestSlice, 1, most);
+    size_ = (num_envs + slices - 1) / slices;
+    for (int first = 0; first < num_envs; first += size_) {
+      workspaces_.push_back(policy.MakeWorkspace());
+    }
+  }
+
+  void operator()(Matrix<const float> obs, std::span<double> torque) {
+    ParallelFor(pool_, static_cast<int>(workspaces_.size()), [&](int slice) {
+      const int first = slice * size_;
+      const int count = std::min(size_, obs.rows() - first);
+      policy_.Act(obs.Rows(first, count),
+                  torque.subspan(static_cast<size_t>(first), static_cast<size_t>(count)),
+                  workspaces_[static_cast<size_t>(slice)]);
+    });
+  }
+
+ private:
+  const Policy& policy_;
+  ThreadPool* pool_;
+  int size_;                                   // rows in a slice
+  std::vector<Policy::Workspace> workspaces_;  // one for each slice
+};
+
+}  // namespace
 
 Evaluation Summarize(std::span<const EvaluationEpisode> episodes) {
   Evaluation e;
@@ -28,58 +61,32 @@ Evaluation Summarize(std::span<const EvaluationEpisode> episodes) {
   e.reward_sum = MomentsOf(reward_sum);
   e.work = MomentsOf(work);
   e.rms_torque = MomentsOf(rms);
+  if (!episodes.empty()) e.term_means.resize(episodes.front().terms.size());
+  for (const EvaluationEpisode& episode : episodes) {
+    for (size_t j = 0; j < e.term_means.size(); ++j) {
+      e.term_means[j] += episode.terms[j] / static_cast<double>(episodes.size());
+    }
+  }
   return e;
 }
 
-}  // namespace
-
-Quartiles QuartilesOf(std::vector<double> values) {
-  if (values.empty()) return {};
-  std::ranges::sort(values);
-  const auto at = [&](double share) {
-    const double place = share * static_cast<double>(values.size() - 1);
-    const auto below = static_cast<size_t>(place);
-    const size_t above = std::min(below + 1, values.size() - 1);
-    return std::lerp(values[below], values[above], place - static_cast<double>(below));
-  };
-  return {at(0.25), at(0.5), at(0.75)};
-}
-
-Interval WilsonInterval(int64_t successes, int64_t trials) {
-  if (trials == 0) return {};
-  constexpr double kZ = 1.959963984540054;  // 97.5% quantile of the standard normal
-  const double n = static_cast<double>(trials);
-  const double p = static_cast<double>(successes) / n;
-  const double center = (p + kZ * kZ / (2 * n)) / (1 + kZ * kZ / n);
-  const double half = kZ / (1 + kZ * kZ / n) * std::sqrt(p * (1 - p) / n + kZ * kZ / (4 * n * n));
-  // At the ends rounding must not cut the bound off.
-  return {successes == 0 ? 0.0 : center - half, successes == trials ? 1.0 : center + half};
-}
-
-Moments MomentsOf(std::span<const double> values) {
-  if (values.empty()) return {};
-  const double n = static_cast<double>(values.size());
-  const double mean = std::accumulate(values.begin(), values.end(), 0.0) / n;
-  double squares = 0;
-  for (const double x : values) squares += (x - mean) * (x - mean);
-  return {mean, n > 1 ? std::sqrt(squares / (n - 1)) : 0.0};
-}
-
-Evaluation Evaluate(const Policy& policy, VectorEnv& env,
-                    const std::function<void(double)>& progress) {
+std::vector<EvaluationEpisode> EvaluateEpisodes(const Policy& policy, VectorEnv& env,
+                                                ThreadPool* pool,
+                                                const std::function<void(double)>& progress) {
   const auto n = static_cast<size_t>(env.num_envs());
   const int64_t steps = StepsIn(kEvaluationSeconds, env);
   const int64_t return_steps = StepsIn(kReturnSeconds, env);
   const size_t terms = env.reward_term_names().size();
+  SharedActing act(policy, env.num_envs(), pool);
   StepResult result = env.MakeResult();
   std::vector<double> torque(n);
   std::vector<EvaluationEpisode> episodes(n);
+  for (EvaluationEpisode& episode : episodes) episode.terms.resize(terms);
   std::vector<int64_t> goal_since(n, -1);  // first state of the present stretch at the goal
   std::vector<uint8_t> ended(n);           // blown up: what follows is another episode
-  std::vector<double> term_means(terms);
 
   for (int64_t k = 1; k <= steps; ++k) {
-    policy.Act(env.obs(), torque);
+    act(env.obs(), torque);
     env.Step(torque, result);
     for (size_t i = 0; i < n; ++i) {
       if (ended[i]) continue;
@@ -89,9 +96,7 @@ Evaluation Evaluate(const Policy& policy, VectorEnv& env,
       episode.rms_torque += result.torque[i] * result.torque[i];
       if (k <= return_steps) {
         episode.reward_sum += result.reward[i];
-        for (size_t j = 0; j < terms; ++j) {
-          term_means[j] += result.reward_terms[i * terms + j] / static_cast<double>(n);
-        }
+        for (size_t j = 0; j < terms; ++j) episode.terms[j] += result.reward_terms[i * terms + j];
       }
       if (!result.at_goal[i]) goal_since[i] = -1;
       if (result.at_goal[i] && goal_since[i] < 0) goal_since[i] = k;
@@ -108,9 +113,12 @@ Evaluation Evaluate(const Policy& policy, VectorEnv& env,
     episode.success = at_goal && goal_since[i] <= steps - StepsIn(kHoldSeconds, env);
     episode.rms_torque = std::sqrt(episode.rms_torque / static_cast<double>(steps));
   }
-  Evaluation evaluation = Summarize(episodes);
-  evaluation.term_means = std::move(term_means);
-  return evaluation;
+  return episodes;
+}
+
+Evaluation Evaluate(const Policy& policy, VectorEnv& env, ThreadPool* pool,
+                    const std::function<void(double)>& progress) {
+  return Summarize(EvaluateEpisodes(policy, env, pool, progress));
 }
 
 }  // namespace upswing

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "core/sample.h"
+#include "core/thread_pool.h"
 #include "core/vector_env.h"
 #include "nn/policy.h"
 
@@ -23,29 +25,8 @@ struct EvaluationEpisode {
   double work = 0;              // Σ |mechanical work of the motor|, J
   double peak_torque = 0;       // largest |torque|, N·m
   double rms_torque = 0;        // root mean square, N·m
+  std::vector<double> terms;    // (K) sum of each reward term over the first kReturnSeconds
 };
-
-/// Median and the middle half of a sample.
-struct Quartiles {
-  double low = 0, median = 0, high = 0;
-};
-
-/// Quartiles by linear interpolation between order statistics; zeros for an empty sample.
-Quartiles QuartilesOf(std::vector<double> values);
-
-/// A closed interval.
-struct Interval {
-  double low = 0, high = 1;
-};
-
-/// 95% interval of a proportion (Wilson, 1927) after `successes` of `trials`.
-Interval WilsonInterval(int64_t successes, int64_t trials);
-
-/// Mean and sample standard deviation.
-struct Moments {
-  double mean = 0, deviation = 0;
-};
-Moments MomentsOf(std::span<const double> values);
 
 /// An evaluation in figures.
 struct Evaluation {
@@ -54,7 +35,7 @@ struct Evaluation {
   Quartiles swing_up_seconds;  // of the successful episodes
   Moments reward_sum, work, rms_torque;
   double peak_torque = 0;
-  std::vector<double> term_means;  // (K) mean sum of each reward term over the first half
+  std::vector<double> term_means;  // (K) of the episodes' sums of each reward term
 
   double success_rate() const {
     return episodes == 0 ? 0 : static_cast<double>(successes) / static_cast<double>(episodes);
@@ -62,9 +43,18 @@ struct Evaluation {
   bool all_succeeded() const { return episodes > 0 && successes == episodes; }
 };
 
-/// Lets `policy` control every environment for kEvaluationSeconds from where it stands. The
-/// environments must not end before that. `progress` (may be empty) is told the share done.
-Evaluation Evaluate(const Policy& policy, VectorEnv& env,
+/// Lets `policy` control every environment for kEvaluationSeconds from where it stands, and says
+/// what each episode came to. The environments must not end before that. Acting is shared by the
+/// pool, which changes no bit. `progress` (may be empty) is told the share done.
+std::vector<EvaluationEpisode> EvaluateEpisodes(const Policy& policy, VectorEnv& env,
+                                                ThreadPool* pool = nullptr,
+                                                const std::function<void(double)>& progress = {});
+
+/// The episodes in figures.
+Evaluation Summarize(std::span<const EvaluationEpisode> episodes);
+
+/// Both in one.
+Evaluation Evaluate(const Policy& policy, VectorEnv& env, ThreadPool* pool = nullptr,
                     const std::function<void(double)>& progress = {});
 
 }  // namespace upswing

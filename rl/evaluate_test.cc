@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "rl/toy_env.h"
 
 namespace upswing {
@@ -68,32 +66,50 @@ TEST(Evaluate, ABlownUpEpisodeFailsWhateverFollows) {
   EXPECT_EQ(e.successes, 1);
 }
 
-TEST(Statistics, WilsonIntervalMatchesPublishedValues) {
-  // Newcombe (1998), Statistics in Medicine 17, Table I, method 3: 81/263, 15/148, 0/20, 1/29.
-  const struct {
-    int64_t x, n;
-    double low, high;
-  } kCases[] = {{81, 263, 0.2553, 0.3662},
-                {15, 148, 0.0624, 0.1605},
-                {0, 20, 0, 0.1611},
-                {1, 29, 0.0061, 0.1718}};
-  for (const auto& c : kCases) {
-    EXPECT_NEAR(WilsonInterval(c.x, c.n).low, c.low, 5e-5);
-    EXPECT_NEAR(WilsonInterval(c.x, c.n).high, c.high, 5e-5);
+TEST(Evaluate, EpisodesAreThoseOfTheSummary) {
+  ScriptedEnv env({500, 501, 100, 2000}), again({500, 501, 100, 2000});
+  const std::vector<EvaluationEpisode> episodes = EvaluateEpisodes(Constant(-2), env);
+  ASSERT_EQ(episodes.size(), 4U);
+  const double seconds[] = {10, 10.02, 2, kEvaluationSeconds};
+  for (size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(episodes[i].success, i % 2 == 0);
+    EXPECT_DOUBLE_EQ(episodes[i].swing_up_seconds, seconds[i]);
+    EXPECT_DOUBLE_EQ(episodes[i].terms[0], 500 * 501 / 2.0);
   }
-  EXPECT_NEAR(WilsonInterval(100, 100).high, 1, 1e-15);
+  const Evaluation summary = Summarize(episodes);
+  EXPECT_EQ(summary.successes, Evaluate(Constant(-2), again).successes);
+  EXPECT_EQ(summary.swing_up_seconds.median, 6);
 }
 
-TEST(Statistics, QuartilesAndMomentsByHand) {
-  const Quartiles q = QuartilesOf({5, 1, 3, 2, 4});
-  EXPECT_EQ(q.low, 2);
-  EXPECT_EQ(q.median, 3);
-  EXPECT_EQ(q.high, 4);
-  EXPECT_EQ(QuartilesOf({1, 2}).median, 1.5);
-  EXPECT_EQ(QuartilesOf({}).median, 0);
-  const Moments m = MomentsOf(std::vector<double>{2, 4, 4, 4, 5, 5, 7, 9});
-  EXPECT_EQ(m.mean, 5);
-  EXPECT_NEAR(m.deviation, std::sqrt(32.0 / 7), 1e-15);
+/// A dueling policy on one observation whose torque changes often with it.
+Policy Fickle() {
+  const QNetworkShape shape{1, 9, {32, 32}, 16, true, true};
+  const QNetwork<float> network(shape);
+  std::vector<float> parameters(network.num_parameters());
+  Rng rng(3, "fickle");
+  network.Initialize(rng, parameters);
+  return {shape, parameters, {-0.8, -0.6, -0.4, -0.2, 0, 0.2, 0.4, 0.6, 0.8}, {}};
+}
+
+TEST(Evaluate, ThreadsChangeNoBit) {
+  const auto episodes = [](ThreadPool* pool) {
+    ToyEnv env(203);  // slices of unequal size
+    env.episode_steps = 30;
+    return EvaluateEpisodes(Fickle(), env, pool);
+  };
+  const std::vector<EvaluationEpisode> alone = episodes(nullptr);
+  std::vector<double> rms;
+  for (const EvaluationEpisode& episode : alone) rms.push_back(episode.rms_torque);
+  EXPECT_GT(MomentsOf(rms).deviation, 0);  // the episodes differ
+  for (const int threads : {1, 2, 5}) {
+    ThreadPool pool(threads);
+    const std::vector<EvaluationEpisode> shared = episodes(&pool);
+    for (size_t i = 0; i < alone.size(); ++i) {
+      ASSERT_EQ(alone[i].reward_sum, shared[i].reward_sum) << i;
+      ASSERT_EQ(alone[i].rms_torque, shared[i].rms_torque) << i;
+      ASSERT_EQ(alone[i].swing_up_seconds, shared[i].swing_up_seconds) << i;
+    }
+  }
 }
 
 }  // namespace

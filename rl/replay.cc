@@ -12,10 +12,14 @@ Minibatch::Minibatch(int size, int obs_size)
       next_obs(obs.size()),
       action(static_cast<size_t>(size)),
       reward(action.size()),
-      discount(action.size()) {}
+      discount(action.size()),
+      index(action.size()),
+      weight(action.size(), 1.0F) {}
 
-Replay::Replay(int64_t capacity, int obs_size)
-    : capacity_(capacity), obs_size_(static_cast<size_t>(obs_size)) {}
+Replay::Replay(int64_t capacity, int obs_size, bool prioritized)
+    : capacity_(capacity), obs_size_(static_cast<size_t>(obs_size)) {
+  if (prioritized) priorities_.emplace(capacity);
+}
 
 void Replay::Add(const Transition& t) {
   if (size() < capacity_) rows_.resize(rows_.size() + row_size());
@@ -25,6 +29,7 @@ void Replay::Add(const Transition& t) {
   row[0] = static_cast<float>(t.action);
   row[1] = t.reward;
   row[2] = t.discount;
+  if (priorities_) priorities_->Set(next_, largest_priority_);
   next_ = (next_ + 1) % capacity_;
 }
 
@@ -35,14 +40,43 @@ Transition Replay::at(int64_t index) const {
           scalars[1], scalars[2]};
 }
 
+void Replay::Gather(int64_t index, size_t i, Minibatch& batch) const {
+  const Transition t = at(index);
+  std::ranges::copy(t.obs, batch.obs.data() + i * obs_size_);
+  std::ranges::copy(t.next_obs, batch.next_obs.data() + i * obs_size_);
+  batch.action[i] = t.action;
+  batch.reward[i] = t.reward;
+  batch.discount[i] = t.discount;
+  batch.index[i] = index;
+  batch.weight[i] = 1;
+}
+
 void Replay::Sample(Rng& rng, Minibatch& batch) const {
   for (size_t i = 0; i < batch.action.size(); ++i) {
-    const Transition t = at(static_cast<int64_t>(rng.Below(static_cast<uint64_t>(size()))));
-    std::ranges::copy(t.obs, batch.obs.data() + i * obs_size_);
-    std::ranges::copy(t.next_obs, batch.next_obs.data() + i * obs_size_);
-    batch.action[i] = t.action;
-    batch.reward[i] = t.reward;
-    batch.discount[i] = t.discount;
+    Gather(static_cast<int64_t>(rng.Below(static_cast<uint64_t>(size()))), i, batch);
+  }
+}
+
+void Replay::SamplePrioritized(Rng& rng, double beta, Minibatch& batch) const {
+  const size_t B = batch.action.size();
+  const double part = priorities_->total() / static_cast<double>(B);
+  double smallest = largest_priority_;
+  for (size_t i = 0; i < B; ++i) {
+    const int64_t index = priorities_->Find(part * (static_cast<double>(i) + rng.Uniform()));
+    Gather(index, i, batch);
+    smallest = std::min(smallest, priority(index));
+  }
+  // N and Σ p fall out of the ratio to the largest weight, that of the smallest priority.
+  for (size_t i = 0; i < B; ++i) {
+    batch.weight[i] = static_cast<float>(std::pow(smallest / priority(batch.index[i]), beta));
+  }
+}
+
+void Replay::Prioritize(const Minibatch& batch, std::span<const float> td_error, double alpha) {
+  for (size_t i = 0; i < td_error.size(); ++i) {
+    const double p = std::pow(std::abs(td_error[i]) + 1e-6, alpha);
+    largest_priority_ = std::max(largest_priority_, p);
+    priorities_->Set(batch.index[i], p);
   }
 }
 
@@ -54,6 +88,10 @@ void Replay::State(const Archive& archive, int num_actions) {
   const bool full = size() == capacity_;
   archive.Check(full ? next_ >= 0 && next_ < capacity_ : next_ == size(), "next",
                 "a place to write to");
+  if (priorities_) {
+    archive.Scalar("largest_priority", largest_priority_);
+    priorities_->State(archive.In("priorities"), size());
+  }
   if (!archive.loading()) return;
   const auto valid = [&](float a) { return a >= 0 && a < num_actions && a == std::trunc(a); };
   for (size_t action = 2 * obs_size_; action < rows_.size(); action += row_size()) {

@@ -64,6 +64,69 @@ TEST(Replay, AMillionTransitionsOfThePendulumFitIn100Megabytes) {
   EXPECT_LE(1000000 * kRow, 100000000U);
 }
 
+TEST(Replay, DrawsByPriorityAndWeighsAsThePaperDoes) {
+  Replay replay(4, 2, true);
+  for (int i = 0; i < 4; ++i) replay.Add(Numbered(i).transition);
+  // Nothing learned yet: all are drawn alike, and weigh 1.
+  Rng rng(1, "replay test");
+  Minibatch batch(4, 2);
+  replay.SamplePrioritized(rng, 0.5, batch);
+  EXPECT_EQ(batch.index, (std::vector<int64_t>{0, 1, 2, 3}));
+  EXPECT_EQ(batch.weight[2], 1);
+
+  // α = 1/2: priorities of 1, 2, 3, 4 from |TD errors| of 1, 4, 9, 16.
+  replay.Prioritize(batch, std::vector<float>{1, -4, 9, -16}, 0.5);
+  for (int i = 0; i < 4; ++i) EXPECT_NEAR(replay.priority(i), i + 1, 1e-6);
+  std::array<int, 4> count{};
+  constexpr int rounds = 10000;
+  constexpr double beta = 0.7;
+  for (int round = 0; round < rounds; ++round) {
+    replay.SamplePrioritized(rng, beta, batch);
+    double largest = 0;
+    for (const int64_t i : batch.index) largest = std::max(largest, std::pow(i + 1, -beta));
+    for (size_t i = 0; i < 4; ++i) {
+      ++count.at(static_cast<size_t>(batch.index[i]));
+      const double p = static_cast<double>(batch.index[i] + 1);
+      ASSERT_NEAR(batch.weight[i], std::pow(p, -beta) / largest, 1e-6);
+      ASSERT_EQ(batch.obs[2 * i], static_cast<float>(batch.index[i]));
+    }
+  }
+  for (size_t i = 0; i < 4; ++i) {
+    const double expected = rounds * 4 * static_cast<double>(i + 1) / 10;
+    EXPECT_NEAR(count.at(i), expected, 5 * std::sqrt(expected));
+  }
+}
+
+TEST(Replay, ANewTransitionHasTheLargestPrioritySoFar) {
+  Replay replay(3, 2, true);
+  for (int i = 0; i < 3; ++i) replay.Add(Numbered(i).transition);
+  Minibatch batch(3, 2);
+  batch.index = {0, 1, 2};
+  replay.Prioritize(batch, std::vector<float>{0.1F, 8, 0.2F}, 1);
+  replay.Prioritize(batch, std::vector<float>{0.1F, 0.3F, 0.2F}, 1);
+  replay.Add(Numbered(3).transition);  // in place of the oldest
+  EXPECT_NEAR(replay.priority(0), 8, 1e-5);
+  EXPECT_NEAR(replay.priority(1), 0.3, 1e-5);
+}
+
+TEST(Replay, LoadedPrioritiesDrawTheSame) {
+  Replay saved(5, 2, true), loaded(5, 2, true);
+  for (int i = 0; i < 7; ++i) saved.Add(Numbered(i).transition);
+  Minibatch batch(3, 2), other(3, 2);
+  batch.index = {0, 2, 4};
+  saved.Prioritize(batch, std::vector<float>{3, 0.5F, 0.01F}, 0.6);
+  SaveAndLoad([&](const Archive& archive) { saved.State(archive, 9); },
+              [&](const Archive& archive) { loaded.State(archive, 9); });
+  for (Replay* replay : {&saved, &loaded}) replay->Add(Numbered(7).transition);
+  Rng rng(1, "replay test"), other_rng(1, "replay test");
+  for (int round = 0; round < 100; ++round) {
+    saved.SamplePrioritized(rng, 0.5, batch);
+    loaded.SamplePrioritized(other_rng, 0.5, other);
+    ASSERT_EQ(batch.index, other.index);
+    ASSERT_EQ(batch.weight, other.weight);
+  }
+}
+
 TEST(Replay, LoadedGoesOnLikeSaved) {
   Replay saved(5, 2), loaded(5, 2);
   for (int i = 0; i < 7; ++i) saved.Add(Numbered(i).transition);

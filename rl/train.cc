@@ -66,6 +66,8 @@ void LogMetrics(Training& t, const TrainState& s) {
                     {"q", report.q},
                     {"td_error", report.td_error},
                     {"gradient_norm", report.gradient_norm},
+                    {"feature_rank", report.feature_rank},
+                    {"dormant_share", report.dormant_share},
                     {"mean_return", s.mean_return()},
                     {"success_rate", s.last_success_rate},
                     {"seconds", s.seconds}});
@@ -177,7 +179,7 @@ void TrainConfig::Describe(Options& o) {
   o.Add(&seed, "seed", 1, {0, 9e15}, "", "seed of every random stream");
   o.Add(&steps, "steps", 1000000, kCount, "steps", "train for at most this many in all").identity =
       false;
-  o.Add(&envs, "envs", 8, {1, 4096}, "", "environments in lock-step");
+  o.Add(&envs, "envs", 32, {1, 4096}, "", "environments in lock-step");
   o.Add(&stop_when_solved, "stop_when_solved", true,
         "stop once all episodes of two evaluations in a row succeed")
       .identity = false;

@@ -34,7 +34,7 @@ class TrainTest : public ::testing::Test {
     Dqn agent;
     TrainState state;
     explicit Parts(const DqnConfig& dqn)
-        : pool(1), env(4), agent(dqn, 4, 1, {-1, 0, 1}, 1, pool), state(4, 1) {}
+        : pool(1), env(4), agent(dqn, 4, 1, {-1, 0, 1}, {}, 1, pool), state(4, 1) {}
   };
 
   void Create(const std::string& name) {

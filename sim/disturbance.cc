@@ -20,13 +20,13 @@ int Disturbance::delay_steps() const {
 }
 
 Disturber::Disturber(std::vector<Disturbance> disturbances, int num_envs, int max_delay,
-                     uint64_t seed, const std::string& stream)
+                     uint64_t seed, const std::string& stream, uint64_t first_index)
     : capacity_(static_cast<size_t>(max_delay)), disturbances_(std::move(disturbances)) {
   const auto n = static_cast<size_t>(num_envs);
   disturbances_.resize(n, disturbances_.front());
   queues_.resize(n * capacity_);
   applied_.resize(n);
-  for (size_t i = 0; i < n; ++i) rngs_.emplace_back(seed, stream, i);
+  for (size_t i = 0; i < n; ++i) rngs_.emplace_back(seed, stream, first_index + i);
 }
 
 void Disturber::Begin(int env) { std::ranges::fill(Queue(env), 0.0); }

@@ -38,9 +38,9 @@ class Disturber {
  public:
   /// For environments with one of `disturbances` for all or one for each, none of which will have a
   /// delay of more than `max_delay` control periods. Environment i draws its noise from (seed,
-  /// stream, i).
+  /// stream, first_index + i).
   Disturber(std::vector<Disturbance> disturbances, int num_envs, int max_delay, uint64_t seed,
-            const std::string& stream);
+            const std::string& stream, uint64_t first_index = 0);
 
   /// Begins an episode: no torque is under way.
   void Begin(int env);

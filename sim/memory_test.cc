@@ -84,6 +84,20 @@ TEST_P(RememberingEnvs, WithADelayTheTorquesUnderWayAreSeen) {
   EXPECT_EQ(result.torque[0], 1);
 }
 
+TEST_P(RememberingEnvs, AMirrorTurnsMemoriesAround) {
+  PendulumEnv env(Config(2));
+  StepResult result = env.MakeResult();
+  env.SetState(0, {0.3, -0.5, 1, -2});
+  env.SetState(1, {-0.3, 0.5, -1, 2});
+  for (const double torque : {1.0, -3.0, 2.0}) env.Step(std::vector{torque, -torque, 0.0}, result);
+  const std::vector<float> signs = env.mirror_signs();
+  ASSERT_EQ(static_cast<int>(signs.size()), env.obs_size());
+  for (size_t k = 0; k < signs.size(); ++k) {
+    EXPECT_NEAR(env.obs().row(0)[k], signs[k] * env.obs().row(1)[k], 1e-6) << k;
+    EXPECT_NE(env.obs().row(0)[k], 0) << k;
+  }
+}
+
 TEST_P(RememberingEnvs, LoadedStateGoesOnToTheBit) {
   PendulumEnv saved(Config(3)), loaded(Config(3));
   StepResult a = saved.MakeResult(), b = saved.MakeResult();

@@ -21,7 +21,7 @@ std::optional<Disturber> MakeDisturber(const PendulumEnvConfig& config) {
   }
   if (!any) return std::nullopt;
   return Disturber(config.disturbances, config.num_envs, max_delay, config.seed,
-                   Concat(config.stream, ": sensor noise"));
+                   Concat(config.stream, ": sensor noise"), config.first_index);
 }
 
 }  // namespace
@@ -36,7 +36,7 @@ PendulumEnv::PendulumEnv(const PendulumEnvConfig& config)
   obs_.resize(n * static_cast<size_t>(obs_size()));
   if (config_.randomization.any()) plants_.resize(n);
   for (int i = 0; i < config_.num_envs; ++i) {
-    const auto index = static_cast<uint64_t>(i);
+    const uint64_t index = config_.first_index + static_cast<uint64_t>(i);
     if (!plants_.empty()) {
       plant_rngs_.emplace_back(config_.seed, Concat(config_.stream, ": plant"), index);
     }
@@ -48,6 +48,12 @@ PendulumEnv::PendulumEnv(const PendulumEnvConfig& config)
 
 std::vector<std::string> PendulumEnv::reward_term_names() const {
   return {kRewardTermNames.begin(), kRewardTermNames.end()};
+}
+
+std::vector<float> PendulumEnv::mirror_signs() const {
+  std::vector<float> signs(kMirrorSigns.begin(), kMirrorSigns.end());
+  signs.resize(static_cast<size_t>(obs_size()), -1.0F);
+  return signs;
 }
 
 Matrix<const float> PendulumEnv::obs() const { return {obs_.data(), config_.num_envs, obs_size()}; }

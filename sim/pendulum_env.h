@@ -30,7 +30,8 @@ struct PendulumEnvConfig : PhysicsConfig {
   int memory = 0;  // past control steps in an observation
   StartStates start;
   uint64_t seed = 0;
-  std::string stream = "environment";  // environment i draws its starts from (seed, stream, i)
+  std::string stream = "environment";  // environment i draws from (seed, stream, first_index + i)
+  uint64_t first_index = 0;
   std::vector<Disturbance> disturbances{Disturbance()};  // one for all, or one for each
   Randomization randomization;  // around plants and disturbances, at each reset
 
@@ -55,6 +56,7 @@ class PendulumEnv : public VectorEnv {
   std::vector<std::string> reward_term_names() const override;
   double step_seconds() const override { return kControlPeriod; }
   double torque_limit() const override { return config_.plant(0).torque_limit; }
+  std::vector<float> mirror_signs() const override;
   Matrix<const float> obs() const override;
   void Step(std::span<const double> torque, StepResult& result) override;
   void SetStartNoise(double sigma) override { config_.start.noise = sigma; }

@@ -64,6 +64,23 @@ TEST_P(PendulumEnvs, TruncatesWithTheTrueSuccessorAndThenResets) {
   EXPECT_EQ(result.truncated[0], 0);
 }
 
+TEST_P(PendulumEnvs, APartOfTheEnvironmentsIsAsThoseOfTheWhole) {
+  PendulumEnvConfig whole = SmallConfig();
+  whole.disturbances = {{0.02, 0}};
+  whole.randomization.plant.fill(0.2);
+  PendulumEnvConfig part = whole;
+  part.num_envs = 2;
+  part.first_index = 1;
+  PendulumEnv all(whole), last(part);
+  StepResult expected = all.MakeResult(), result = last.MakeResult();
+  for (int step = 0; step < 8; ++step) {  // over a reset
+    all.Step(std::vector<double>{1, 2, 3}, expected);
+    last.Step(std::vector<double>{2, 3}, result);
+    ASSERT_EQ(all.state(1).q2, last.state(0).q2);
+    ASSERT_TRUE(std::ranges::equal(all.obs().row(2), last.obs().row(1)));
+  }
+}
+
 TEST_P(PendulumEnvs, ABlowUpTerminatesWithFiniteNumbersAndStartsAnew) {
   PendulumEnv env(SmallConfig());
   StepResult result = env.MakeResult();
@@ -227,6 +244,26 @@ TEST(PendulumEnv, BothPhysicsGoTheSameWayFromTheSameStarts) {
     for (size_t i = 0; i < a.next_obs.size(); ++i) {
       ASSERT_NEAR(a.next_obs[i], b.next_obs[i], 1e-6);
       ASSERT_NEAR(mujoco.obs().values()[i], twin.obs().values()[i], 1e-6);
+    }
+  }
+}
+
+TEST_P(PendulumEnvs, GoesTheSameWayInAMirror) {
+  PendulumEnvConfig config = Config();
+  config.num_envs = 2;
+  PendulumEnv env(config);
+  const std::vector<float> signs = env.mirror_signs();
+  Rng rng(1, "mirror");
+  const PendulumState s{1, -2, 3, 0.5};
+  env.SetState(0, s);
+  env.SetState(1, {-s.q1, -s.q2, -s.w1, -s.w2});
+  StepResult result = env.MakeResult();
+  for (int step = 0; step < 200; ++step) {
+    const double torque = rng.Uniform(-5, 5);
+    env.Step(std::vector<double>{torque, -torque}, result);
+    ASSERT_NEAR(result.reward[0], result.reward[1], 1e-9);
+    for (size_t j = 0; j < kObservationSize; ++j) {
+      ASSERT_NEAR(result.next_obs[j], signs[j] * result.next_obs[kObservationSize + j], 1e-6);
     }
   }
 }

@@ -1,0 +1,78 @@
+#include "apps/child_process.h"
+
+#include <fcntl.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+#include <utility>
+
+#include "core/error.h"
+#include "core/text.h"
+
+namespace upswing {
+namespace {
+
+/// What the new process does: it becomes the program, or ends with 127. Between fork and exec only
+/// plain system calls are safe.
+[[noreturn]] void BecomeProgram(char* const* arguments, int log, pid_t parent) {
+  // The order counts: a parent that died before the first line is found out by the second.
+  const bool tied = prctl(PR_SET_PDEATHSIG, SIGKILL) == 0 && getppid() == parent;
+  setpgid(0, 0);
+  // It listens to this one a moment later; until then it would be its end.
+  std::signal(SIGUSR1, SIG_IGN);
+  const int nothing = open("/dev/null", O_RDONLY | O_CLOEXEC);
+  if (tied && nothing >= 0 && dup2(nothing, STDIN_FILENO) >= 0 && dup2(log, STDOUT_FILENO) >= 0 &&
+      dup2(log, STDERR_FILENO) >= 0) {
+    execv("/proc/self/exe", arguments);  // this very program, even if its file has been replaced
+    constexpr char kNotice[] = "upswing: cannot start itself\n";
+    (void)!write(STDERR_FILENO, kNotice, sizeof(kNotice) - 1);
+  }
+  _exit(127);
+}
+
+}  // namespace
+
+ChildProcess::ChildProcess(const std::vector<std::string>& arguments,
+                           const std::filesystem::path& log) {
+  std::vector<std::string> texts{"upswing"};
+  texts.insert(texts.end(), arguments.begin(), arguments.end());
+  std::vector<char*> pointers;
+  for (std::string& text : texts) pointers.push_back(text.data());
+  pointers.push_back(nullptr);
+  const int log_file = open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+  if (log_file < 0) {
+    throw Failure(Concat("cannot write ", log.string(), ": ", std::strerror(errno)));
+  }
+  const pid_t parent = getpid();
+  pid_ = fork();
+  if (pid_ == 0) BecomeProgram(pointers.data(), log_file, parent);
+  const int fork_errno = errno;
+  close(log_file);
+  if (pid_ < 0) throw Failure(Concat("cannot start a process: ", std::strerror(fork_errno)));
+}
+
+ChildProcess::ChildProcess(ChildProcess&& other) noexcept : pid_(std::exchange(other.pid_, -1)) {}
+
+ChildProcess::~ChildProcess() {
+  if (pid_ < 0) return;
+  kill(pid_, SIGKILL);
+  while (waitpid(pid_, nullptr, 0) < 0 && errno == EINTR) {
+  }
+}
+
+void ChildProcess::Signal(int signal) const {
+  if (pid_ >= 0) kill(pid_, signal);
+}
+
+std::optional<int> ChildProcess::Poll() {
+  int status = 0;
+  if (waitpid(pid_, &status, WNOHANG) != pid_) return std::nullopt;
+  pid_ = -1;
+  return WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status);
+}
+
+}  // namespace upswing

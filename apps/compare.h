@@ -1,0 +1,40 @@
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "apps/compare_groups.h"
+#include "report/comparison.h"
+
+namespace upswing {
+
+/// Groups of runs in figures, and pairs of groups beside each other.
+struct Comparison {
+  GroupedRuns runs;
+  std::vector<GroupSummary> summaries;  // of each group
+  std::vector<PairSummary> pairs;       // each group with each one before it
+};
+
+/// The figures of a group that are scores over its runs, under the names that files give them.
+std::span<const std::pair<const char*, Scores GroupSummary::*>> NamedScores();
+
+/// Compares runs; see GroupRuns. Throws BadInput.
+Comparison Compare(const CompareRequest& request);
+
+/// Prints it as tables.
+void PrintComparison(const Comparison& comparison);
+
+/// The same as JSON, with every run's figures. What is not reached (the time to solve of a run that
+/// never did) is null.
+std::string ComparisonJson(const Comparison& comparison);
+
+/// Writes summary.csv (a row for each group), runs.csv (a row for each run) and the learning curves
+/// as curves.svg and curves.png. Makes the folder if it is not there. Throws BadInput if one of
+/// them is there already, unless `replace`; Failure if it cannot write or draw.
+void WriteComparison(const Comparison& comparison, const std::filesystem::path& folder,
+                     bool replace);
+
+}  // namespace upswing

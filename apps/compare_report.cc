@@ -1,0 +1,173 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "apps/compare.h"
+#include "apps/progress.h"
+
+namespace upswing {
+namespace {
+
+using nlohmann::ordered_json;
+
+/// A number as the table shows it; what no run or no half of them reached is not.
+using Formatter = std::string (*)(double);
+
+std::string Seconds(double x) { return std::isfinite(x) ? FormatDuration(x) : "not solved"; }
+std::string Steps(double x) { return std::isfinite(x) ? FormatCount(x) : "not solved"; }
+std::string Whole(double x) { return FormatCount(x); }
+std::string Percent(double x) { return fmt::format("{:.1f}%", 100 * x); }
+std::string Share(double x) { return fmt::format("{:.2f}", x); }
+std::string Signed(double x) { return fmt::format("{:+.1f}", x); }
+
+/// `18.7 s (95% 17.0 s to 22.3 s)`.
+std::string EstimateText(const Estimate& e, Formatter format) {
+  if (!e.interval) return format(e.value) + " (no interval)";
+  return fmt::format("{} (95% {} to {})", format(e.value), format(e.interval->low),
+                     format(e.interval->high));
+}
+
+/// A probability over pairs of runs. Where all pairs agree, so do all resamples, and an interval of
+/// no width would say more than is known.
+std::string PairsText(const Estimate& e) {
+  if (e.value != 0 && e.value != 1) return "with probability " + EstimateText(e, Share);
+  return e.value == 1 ? "in every pair of runs" : "in no pair of runs";
+}
+
+void PrintScores(const char* name, const Scores& s, Formatter format) {
+  if (s.low == s.high) {
+    fmt::print("  {:<16}{} in every run\n", name, format(s.low));
+    return;
+  }
+  fmt::print("  {:<16}median {}, IQM {}, range {} to {}\n", name, format(s.median),
+             EstimateText(s.iqm, format), format(s.low), format(s.high));
+}
+
+void PrintStability(const GroupSummary& summary) {
+  const Stability& s = summary.stability;
+  if (summary.solved == 0) return;
+  if (s.runs == 0) {
+    fmt::print("  {:<16}no later evaluations: every run that solved stopped there\n",
+               "once solved");
+    return;
+  }
+  fmt::print(
+      "  {:<16}{} of {} seeds keep at least {:.0f}% in every later evaluation; so are {} of "
+      "{}, lowest {}\n",
+      "once solved", s.steady_runs, s.runs, 100 * kSteadyRate, s.steady_evaluations, s.evaluations,
+      Percent(s.lowest));
+}
+
+void PrintGroup(const RunGroup& group, const GroupSummary& s, const std::string& differences) {
+  std::string seeds;
+  for (const RunRecord& run : group.runs) {
+    seeds += fmt::format("{}{}", seeds.empty() ? "" : ", ", run.plan.seed);
+  }
+  fmt::print("{}\n", group.label);
+  if (!differences.empty()) fmt::print("  {:<16}{}\n", "settings", differences);
+  fmt::print("  {:<16}{} ({})\n", "seeds", group.runs.size(), seeds);
+  fmt::print("  {:<16}{} of {} (95% {} to {})\n", "solved", s.solved, group.runs.size(),
+             Percent(s.solved_interval.low), Percent(s.solved_interval.high));
+  if (s.solved > 0) {
+    PrintScores("time to solve", s.solve_seconds, Seconds);
+    PrintScores("steps to solve", s.solve_steps, Steps);
+  }
+  PrintScores("final return", s.final_return, Whole);
+  PrintScores("final success", s.final_success, Percent);
+  PrintScores("best return", s.best_return, Whole);
+  PrintScores("best success", s.best_success, Percent);
+  PrintStability(s);
+  fmt::print("\n");
+}
+
+void PrintPair(const Comparison& comparison, const PairSummary& pair) {
+  fmt::print("{} against {}\n", comparison.runs.groups[pair.a].label,
+             comparison.runs.groups[pair.b].label);
+  fmt::print("  {:<16}{}", "solves sooner", PairsText(pair.sooner));
+  if (pair.seconds_difference) {
+    fmt::print("; difference of IQMs, s: {}", EstimateText(*pair.seconds_difference, Signed));
+  }
+  fmt::print("\n  {:<16}{}; difference of IQMs: {}\n\n", "higher return",
+             PairsText(pair.higher_return), EstimateText(pair.return_difference, Signed));
+}
+
+/// A number, or null for one that is not reached.
+ordered_json Number(double x) { return std::isfinite(x) ? ordered_json(x) : ordered_json(); }
+
+ordered_json EstimateJson(const Estimate& e) {
+  ordered_json j{{"value", Number(e.value)}, {"interval_95", nullptr}};
+  if (e.interval) j["interval_95"] = {Number(e.interval->low), Number(e.interval->high)};
+  return j;
+}
+
+ordered_json ScoresJson(const Scores& s) {
+  ordered_json j;
+  j["median"] = Number(s.median);
+  j["iqm"] = EstimateJson(s.iqm);
+  j["range"] = {Number(s.low), Number(s.high)};
+  for (const double value : s.values) j["values"].push_back(Number(value));
+  return j;
+}
+
+ordered_json GroupJson(const RunGroup& group, const GroupSummary& s) {
+  ordered_json j;
+  j["group"] = group.label;
+  for (const RunRecord& run : group.runs) {
+    j["runs"].push_back({{"path", run.path.string()},
+                         {"seed", run.plan.seed},
+                         {"steps", run.evaluations.back().step},
+                         {"seconds", run.evaluations.back().seconds},
+                         {"finished", Finished(run)}});
+  }
+  j["solved"] = s.solved;
+  j["solved_interval_95"] = {s.solved_interval.low, s.solved_interval.high};
+  for (const auto& [name, scores] : NamedScores()) j[name] = ScoresJson(s.*scores);
+  j["once_solved"] = {
+      {"seeds", s.stability.runs},
+      {"steady_seeds", s.stability.steady_runs},
+      {"evaluations", s.stability.evaluations},
+      {"steady_evaluations", s.stability.steady_evaluations},
+      {"lowest_success",
+       s.stability.evaluations > 0 ? ordered_json(s.stability.lowest) : ordered_json()}};
+  return j;
+}
+
+}  // namespace
+
+void PrintComparison(const Comparison& comparison) {
+  const GroupedRuns& runs = comparison.runs;
+  for (size_t i = 0; i < runs.groups.size(); ++i) {
+    PrintGroup(runs.groups[i], comparison.summaries[i], runs.differences[i]);
+  }
+  for (const PairSummary& pair : comparison.pairs) PrintPair(comparison, pair);
+  for (const std::string& note : runs.notes) fmt::print("Note: {}\n", note);
+  fmt::print(
+      "Intervals: Wilson for shares, else percentile bootstrap of {} resamples of the runs.\n",
+      FormatCount(kResamples));
+}
+
+std::string ComparisonJson(const Comparison& comparison) {
+  ordered_json j;
+  j["resamples"] = kResamples;
+  j["notes"] = comparison.runs.notes;
+  for (size_t i = 0; i < comparison.summaries.size(); ++i) {
+    j["groups"].push_back(GroupJson(comparison.runs.groups[i], comparison.summaries[i]));
+    j["groups"].back()["settings"] = comparison.runs.differences[i];
+  }
+  j["pairs"] = ordered_json::array();
+  for (const PairSummary& pair : comparison.pairs) {
+    ordered_json p;
+    p["group"] = comparison.runs.groups[pair.a].label;
+    p["against"] = comparison.runs.groups[pair.b].label;
+    p["solves_sooner"] = EstimateJson(pair.sooner);
+    p["solve_seconds_difference"] =
+        pair.seconds_difference ? EstimateJson(*pair.seconds_difference) : ordered_json();
+    p["higher_return"] = EstimateJson(pair.higher_return);
+    p["return_difference"] = EstimateJson(pair.return_difference);
+    j["pairs"].push_back(p);
+  }
+  return j.dump(2);
+}
+
+}  // namespace upswing

@@ -1,0 +1,200 @@
+#!/usr/bin/env python3
+"""`upswing compare`: groups, figures over seeds, what it refuses, and the files that it writes."""
+
+import csv
+import json
+import re
+import statistics
+import unittest
+import xml.etree.ElementTree as ET
+
+from testing import ProgramTest, read_csv, small
+
+OUTPUTS = ["curves.png", "curves.svg", "runs.csv", "summary.csv"]
+
+
+def iqm(values):
+    """Mean without the floor(n/4) smallest and largest."""
+    cut = len(values) // 4
+    return statistics.fmean(sorted(values)[cut:len(values) - cut])
+
+
+class CompareTest(ProgramTest):
+    def make_run(self, path, seed, rows, *, agent="d3qn", steps=4000, stop=True, more=""):
+        """A run folder with an evaluation (success rate, return) every 1,000 steps, of 2.5 s each,
+        as `train` writes it."""
+        folder = self.folder / path
+        folder.mkdir(parents=True)
+        (folder / "config.toml").write_text(
+            f'[train]\nagent = "{agent}"\nseed = {seed}\nsteps = {steps}\neval_every = 1000\n'
+            f"stop_when_solved = {str(stop).lower()}\n{more}")
+        (folder / "evals.csv").write_text(
+            "step,success_rate,success_low,mean_return,seconds\n"
+            + "".join(f"{1000 * k},{rate},0,{value},{2.5 * k}\n"
+                      for k, (rate, value) in enumerate(rows, 1)))
+        return path
+
+    def make_group(self, path, solved_at, **more):
+        """A run for each entry: the evaluation that solves it, or None."""
+        for seed, k in enumerate(solved_at, 1):
+            rows = ([(0.5, 1000 + seed)] * (k - 1) + [(1, 2600 + seed), (1, 2500 + seed)] if k
+                    else [(0.5, 900 + seed)] * 4)
+            self.make_run(f"{path}/seed{seed}", seed, rows, **more)
+
+    def compare(self, *arguments):
+        return json.loads(self.succeed("compare", *arguments, "--json"))
+
+    def test_figures_of_a_group(self):
+        self.make_group("runs", [1, 2, 3, 1, None])
+        (group,) = self.compare("runs")["groups"]
+        self.assertEqual(group["group"], "d3qn")
+        self.assertEqual([run["seed"] for run in group["runs"]], [1, 2, 3, 4, 5])
+        self.assertEqual(group["solved"], 4)
+        self.assertEqual(group["solve_seconds"]["values"], [2.5, 5, 7.5, 2.5, None])
+        self.assertEqual(group["solve_seconds"]["median"], 5)
+        self.assertEqual(group["solve_steps"]["iqm"]["value"], iqm([1000, 2000, 3000, 1000, 9e9]))
+        self.assertIsNone(group["solve_seconds"]["iqm"]["interval_95"][1])
+        final = [2501, 2502, 2503, 2504, 905]
+        self.assertEqual(group["final_return"]["values"], final)
+        self.assertAlmostEqual(group["final_return"]["iqm"]["value"], iqm(final), delta=1e-9)
+        low, high = group["final_return"]["iqm"]["interval_95"]
+        self.assertLess(low, iqm(final))
+        self.assertGreater(high, iqm(final))
+        self.assertEqual(group["best_return"]["values"], [2601, 2602, 2603, 2604, 905])
+        self.assertEqual(group["once_solved"]["evaluations"], 0)
+        text = self.succeed("compare", "runs")
+        for words in ("4 of 5", "not solved", "seeds           5 (1, 2, 3, 4, 5)", "no later"):
+            self.assertIn(words, text)
+
+    def test_the_median_of_runs_half_of_which_never_solve_is_not_reached(self):
+        self.make_group("runs", [1, 2, None, None])
+        (group,) = self.compare("runs")["groups"]
+        self.assertIsNone(group["solve_seconds"]["median"])
+        self.assertRegex(self.succeed("compare", "runs"), "time to solve +median not solved")
+
+    def test_two_groups(self):
+        self.make_group("a", [1, 1, 2])
+        self.make_group("b", [3, 3, None], agent="dqn")
+        answer = self.compare("a", "b")
+        self.assertEqual([g["group"] for g in answer["groups"]], ["d3qn", "dqn"])
+        self.assertEqual([g["settings"] for g in answer["groups"]],
+                         ["double true, dueling true", "double false, dueling false"])
+        (pair,) = answer["pairs"]
+        self.assertEqual((pair["group"], pair["against"]), ("dqn", "d3qn"))
+        self.assertEqual(pair["solves_sooner"]["value"], 0)
+        self.assertIsNone(pair["solve_seconds_difference"])
+        self.assertEqual(pair["return_difference"]["value"],
+                         (2501 + 2502 + 903) / 3 - (2501 + 2502 + 2503) / 3)
+        self.assertIn("solves sooner   in no pair of runs\n", self.succeed("compare", "a", "b"))
+        self.assertEqual(self.compare("b", "a")["pairs"][0]["solves_sooner"]["value"], 1)
+
+    def test_stability(self):
+        late = [(1, 2), (1, 2), (0.98, 2), (1, 2)]
+        self.make_run("runs/seed1", 1, late, stop=False)
+        self.make_run("runs/seed2", 2, [(1, 2)] * 4, stop=False)
+        once = self.compare("runs")["groups"][0]["once_solved"]
+        self.assertEqual(once, {"seeds": 2, "steady_seeds": 1, "evaluations": 4,
+                                "steady_evaluations": 3, "lowest_success": 0.98})
+
+    def test_labels(self):
+        self.make_group("study/fast", [1, 1], more="[agent]\ngamma = 0.9\n")
+        self.make_group("study/slow", [2, 2])
+        self.assertEqual([g["group"] for g in self.compare("study")["groups"]], ["fast", "slow"])
+        self.assertEqual([g["group"] for g in self.compare("study/fast", "study/slow")["groups"]],
+                         ["d3qn (gamma 0.9)", "d3qn (gamma 0.99)"])
+
+    def test_what_makes_no_other_run_makes_no_other_group(self):
+        self.make_run("r/1", 1, [(1, 1), (1, 1)], steps=9000)
+        self.make_run("r/2", 2, [(0, 1)] * 4, stop=False, more="threads = 2\n")
+        answer = self.compare("r")
+        self.assertEqual(len(answer["groups"]), 1)
+        self.assertTrue(any("budgets, 4,000 to 9,000 steps" in n for n in answer["notes"]), answer)
+        self.assertTrue(any("some go on" in n for n in answer["notes"]), answer)
+
+    def test_one_seed_has_no_interval(self):
+        self.make_run("run", 1, [(1, 2600), (1, 2610)])
+        answer = self.compare("run")
+        self.assertIsNone(answer["groups"][0]["final_return"]["iqm"]["interval_95"])
+        self.assertIn("no intervals, there is one seed only", answer["notes"][0])
+
+    def test_order_of_the_arguments_changes_no_figure(self):
+        self.make_group("r", [1, 2, 3])
+        forth = self.compare("r/seed1", "r/seed2", "r/seed3")
+        self.assertEqual(self.compare("r/seed3", "r/seed1", "r/seed2"), forth)
+
+    def test_refuses(self):
+        self.make_group("r", [1, 2])
+        self.make_run("heavy", 3, [(1, 1), (1, 1)], more="[plant]\nmass2 = 1.2\n")
+        self.make_run("seldom", 3, [(1, 1), (1, 1)], more="eval_episodes = 7\n")
+        self.make_run("twin", 1, [(1, 1), (1, 1)])
+        self.make_run("begun", 3, [(0, 1), (1, 1)])
+        self.make_run("bare", 4, [])
+        self.make_run("odd", 5, [(1, 1)], more="no_such_key = 1\n")
+        (self.folder / "empty").mkdir()
+        self.write("file", "")
+        refuse = lambda arguments, *words: self.refuse(["compare", *arguments], *words)
+        refuse([], "runs")
+        refuse(["none"], "none", "nothing of that name")
+        refuse(["file"], "file", "got a file")
+        refuse(["empty"], "empty", "config.toml", "got none")
+        refuse(["r", "heavy"], "heavy", "another task than r/seed1",
+               "plant.mass2 = 1.2 instead of 1", "--different-tasks")
+        refuse(["r", "seldom"], "train.eval_episodes = 7 instead of 100")
+        refuse(["r", "r/seed2"], "r/seed2", "given twice")
+        refuse(["r", "twin"], "twin: the same training as r/seed1", "seed 1")
+        refuse(["r", "begun"], "begun", "unfinished", "2,000 of 4,000", "--unfinished")
+        refuse(["bare"], "bare", "no evaluation yet")
+        refuse(["bare", "--unfinished"], "expected a run with an evaluation")
+        refuse(["odd"], "odd/config.toml:", "no_such_key")
+        self.assertEqual(len(self.compare("r", "heavy", "--different-tasks")["groups"]), 2)
+
+    def test_unfinished_runs_on_demand(self):
+        self.make_group("r", [1, 2])
+        self.make_run("begun", 3, [(0, 1), (1, 1)])
+        self.make_run("bare", 4, [])
+        with open(self.folder / "begun/evals.csv", "a", encoding="utf-8") as file:
+            file.write("3000,1,0,2")  # what a full disk leaves
+        self.refuse(["compare", "begun"], "begun/evals.csv", "half-written", "--resume")
+        answer = self.compare("r", "begun", "bare", "--unfinished")
+        self.assertEqual([run["steps"] for run in answer["groups"][0]["runs"]], [2000, 3000, 2000])
+        self.assertIn("begun is unfinished, evaluated up to step 2,000 of 4,000", answer["notes"])
+        self.assertIn("bare has no evaluation yet: left out", answer["notes"])
+
+    def test_files(self):
+        self.make_group("a", [1, 1, None])
+        self.make_group("b", [3, 3, 2], more='[agent]\nn_step = 1\n[network]\nhidden = [9, 9]\n')
+        text = self.succeed("compare", "a", "b", "--out", "out")
+        self.assertIn("Written", text)
+        self.assertEqual(sorted(p.name for p in (self.folder / "out").iterdir()), OUTPUTS)
+        with open(self.folder / "out/summary.csv", encoding="utf-8", newline="") as file:
+            rows = list(csv.DictReader(file))
+        self.assertEqual([row["group"] for row in rows],
+                         ["d3qn (hidden [256, 256], n_step 3)", "d3qn (hidden [9, 9], n_step 1)"])
+        self.assertEqual(rows[0]["solve_seconds_iqm"], "inf")
+        self.assertAlmostEqual(float(rows[1]["solve_seconds_iqm"]), 20 / 3, delta=1e-12)
+        with open(self.folder / "out/runs.csv", encoding="utf-8", newline="") as file:
+            runs = list(csv.DictReader(file))
+        self.assertEqual([row["run"] for row in runs],
+                         [f"{g}/seed{s}" for g in "ab" for s in (1, 2, 3)])
+        self.assertEqual([row["solve_seconds"] for row in runs],
+                         ["2.5", "2.5", "inf", "7.5", "7.5", "5"])
+        self.assertTrue((self.folder / "out/curves.png").read_bytes().startswith(b"\x89PNG"))
+        svg = (self.folder / "out/curves.svg").read_text(encoding="utf-8")
+        ET.fromstring(svg)
+        for words in ("n_step 1", "keeps its last value", "training time"):
+            self.assertIn(words, re.sub(r"<[^>]*>|&#160;", " ", svg))
+        self.refuse(["compare", "a", "--out", "out"], "exists already")
+
+    def test_a_run_as_train_makes_it(self):
+        self.succeed(*small())
+        rows = read_csv(self.folder / "run/evals.csv")
+        self.assertEqual(len(rows), 2)
+        (group,) = self.compare("run")["groups"]
+        self.assertEqual(group["group"], "d3qn-small")
+        self.assertEqual(group["final_return"]["values"], [rows[1]["mean_return"]])
+        self.assertEqual(group["runs"][0]["steps"], 4000)
+        self.assertEqual(group["runs"][0]["seconds"], rows[1]["seconds"])
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,274 @@
+#include "apps/many_runs.h"
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <fstream>
+#include <list>
+#include <thread>
+
+#include "apps/child_process.h"
+#include "apps/many_runs_view.h"
+#include "apps/signals.h"
+#include "core/error.h"
+#include "core/file.h"
+#include "core/tensor_file.h"
+#include "core/text.h"
+#include "core/thread_pool.h"
+#include "sim/double_pendulum.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kSettingsName = "settings.toml";  // of a variant, without seed
+
+/// The end of a file, at most so many bytes.
+std::string TailOf(const fs::path& path, std::streamoff bytes) {
+  std::ifstream file(path, std::ios::binary | std::ios::ate);
+  if (!file) return "";
+  const std::streamoff size = file.tellg();
+  file.seekg(std::max<std::streamoff>(0, size - bytes));
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+/// The last line that says something.
+std::string LastLine(const fs::path& path) {
+  const std::string tail = TailOf(path, 4096);
+  std::string last = "it says nothing";
+  for (const std::string_view line : Split(tail, '\n')) {
+    if (!line.empty()) last = line;
+  }
+  return last;
+}
+
+// ---- Before anything runs.
+
+/// Throws unless the folder is free or holds what `mark` stands for.
+void CheckFolder(const fs::path& folder, const fs::path& mark) {
+  std::error_code error;
+  if (!fs::exists(folder, error) || fs::is_empty(folder, error)) return;
+  if (fs::is_regular_file(folder / mark, error)) return;
+  throw BadInput(Concat(folder.string(), ": exists already, without a ", mark.string(),
+                        "; nothing is overwritten (choose another --out)"));
+}
+
+/// Throws if one of the runs in a variant's folder was made with other settings.
+void CheckRuns(const fs::path& folder, const Config& config, bool more_steps) {
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    if (!fs::is_regular_file(entry.path() / "config.toml", error)) continue;
+    Config before = BuildConfig(entry.path() / "config.toml", {});
+    if (!before.mjcf.empty()) before.model = config.model;
+    const auto counts = [&](const Option& option) {
+      if (option.name == "steps") {
+        return !more_steps || config.train.steps < before.train.steps;
+      }
+      return option.name == "stop_when_solved" || (option.identity && option.name != "seed");
+    };
+    Config now = config;
+    const std::string what = entry.path().string();
+    try {
+      ExpectSameSettings(OptionsOf(before), OptionsOf(now), what, counts);
+      if (before.mjcf != now.mjcf) throw BadInput(Concat(what, ": made with another model"));
+    } catch (const Error& other) {
+      throw BadInput(Concat(other.what(), "; choose another --out"));
+    }
+  }
+}
+
+void WriteIfOther(const fs::path& path, const std::string& text) {
+  if (!fs::exists(path) || ReadTextFile(path) != text) WriteFileAtomically(path, text);
+}
+
+/// Writes what the runs begin with.
+void WriteSettings(const ManyRuns& plan) {
+  std::error_code error;
+  for (const Variant& variant : plan.variants) {
+    const fs::path folder = plan.folder / variant.name;
+    fs::create_directories(folder, error);
+    if (error) throw Failure(Concat("cannot make ", folder.string(), ": ", error.message()));
+    if (!variant.config.mjcf.empty()) WriteIfOther(folder / "model.xml", variant.config.mjcf);
+    Config config = variant.config;
+    const auto wanted = [](const Option& option) { return option.name != "seed"; };
+    WriteIfOther(folder / kSettingsName, OptionsOf(config).Toml(true, wanted));
+  }
+  if (!plan.mark.first.empty()) WriteIfOther(plan.folder / plan.mark.first, plan.mark.second);
+}
+
+/// All runs, the first seed of each variant first.
+std::vector<SeedRun> ListRuns(const ManyRuns& plan) {
+  std::vector<SeedRun> runs;
+  for (const int64_t seed : plan.seeds) {
+    for (const Variant& variant : plan.variants) {
+      const fs::path name = fs::path(variant.name) / Concat("seed", seed);
+      runs.push_back({&variant, seed, name.string(), plan.folder / name, {}, ""});
+      try {
+        runs.back().ReadState();
+      } catch (const Error& error) {
+        runs.back().problem = error.what();
+      }
+    }
+  }
+  return runs;
+}
+
+// ---- While they run.
+
+/// The program's arguments that begin a run or go on with it.
+std::vector<std::string> ArgumentsOf(const SeedRun& run) {
+  const TrainConfig& train = run.variant->config.train;
+  if (!run.state) {
+    const fs::path settings = run.path.parent_path() / kSettingsName;
+    return {"train", Concat("--config=", settings.string()), Concat("--seed=", run.seed),
+            Concat("--out=", run.path.string())};
+  }
+  return {"train",
+          Concat("--resume=", run.path.string()),
+          Concat("--steps=", train.steps),
+          Concat("--threads=", train.threads),
+          Concat("--checkpoint-every=", train.checkpoint_every),
+          train.stop_when_solved ? "--stop-when-solved" : "--no-stop-when-solved"};
+}
+
+/// The processes, as many at a time as there are jobs.
+class Scheduler {
+ public:
+  Scheduler(std::vector<SeedRun>& runs, int jobs, ManyRunsView& view)
+      : jobs_(static_cast<size_t>(jobs)), view_(view) {
+    for (SeedRun& run : runs) {
+      if (!run.finished() && run.problem.empty()) waiting_.push_back(&run);
+    }
+  }
+
+  /// Returns when all have ended; after a request to stop those that run do so in order.
+  void Run() {
+    while (!running_.empty() || !waiting_.empty()) {
+      const TrainRequest request = PollSignals();
+      if (request == TrainRequest::kCheckpoint) SignalAll(SIGUSR1);
+      if (request == TrainRequest::kStop && !stopping_) Stop();
+      while (running_.size() < jobs_ && !waiting_.empty()) Start();
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      for (auto it = running_.begin(); it != running_.end();) {
+        const auto code = it->process.Poll();
+        if (code) End(*it->run, *code);
+        it = code ? running_.erase(it) : std::next(it);
+      }
+      if (view_.due()) view_.ShowProgress(RunningNow());
+    }
+  }
+
+ private:
+  struct Running {
+    SeedRun* run;
+    ChildProcess process;
+  };
+
+  void Start() {
+    SeedRun& run = *waiting_.front();
+    waiting_.pop_front();
+    running_.push_back({&run, ChildProcess(ArgumentsOf(run), run.log())});
+  }
+
+  void Stop() {
+    stopping_ = true;
+    waiting_.clear();
+    SignalAll(StopSignal());
+  }
+
+  void SignalAll(int signal) {
+    for (const Running& running : running_) running.process.Signal(signal);
+  }
+
+  void End(SeedRun& run, int code) {
+    const bool asked_to_stop = stopping_ && code == 128 + StopSignal();
+    try {
+      run.ReadState();
+      if (code != 0 && !asked_to_stop) {
+        run.problem = code > 128 ? Concat("ended by signal ", code - 128) : LastLine(run.log());
+      }
+    } catch (const Error& error) {
+      run.problem = error.what();
+    }
+    view_.PrintEnd(run);
+  }
+
+  std::vector<const SeedRun*> RunningNow() const {
+    std::vector<const SeedRun*> runs;
+    for (const Running& running : running_) runs.push_back(running.run);
+    return runs;
+  }
+
+  size_t jobs_;
+  ManyRunsView& view_;
+  bool stopping_ = false;
+  std::list<SeedRun*> waiting_;
+  std::list<Running> running_;
+};
+
+}  // namespace
+
+bool SeedRun::finished() const {
+  const TrainConfig& train = variant->config.train;
+  return state && (state->steps >= train.steps || (state->solved && train.stop_when_solved));
+}
+
+int64_t SeedRun::Steps() const {
+  const int64_t at_checkpoint = state ? state->steps : 0;
+  // A row begins with its step; the last one may be half written.
+  const std::string tail = TailOf(path / "metrics.csv", 1024);
+  const std::vector<std::string_view> rows = Split(tail, '\n');
+  if (rows.size() < 3) return at_checkpoint;
+  const auto at_metrics = ParseInteger(Split(rows[rows.size() - 2], ',').front());
+  return std::max(at_checkpoint, at_metrics.value_or(0));
+}
+
+void SeedRun::ReadState() {
+  if (!fs::exists(path / "config.toml")) return;
+  const TensorFile checkpoint = TensorFile::LoadPart(RunFolder::CheckpointPath(path), "train/");
+  TrainState read(static_cast<int>(variant->config.train.envs), kRewardTerms);
+  read.State(Archive::Loader(checkpoint).In("train"));
+  state = std::move(read);
+}
+
+int TrainMany(const ManyRuns& plan) {
+  // Nothing is touched before all is checked, nor while another process is at work there.
+  const bool is_study = !plan.mark.first.empty();
+  CheckFolder(plan.folder, is_study ? fs::path(plan.mark.first) : fs::path(kSettingsName));
+  std::error_code error;
+  std::optional<FolderLock> lock;
+  if (fs::exists(plan.folder, error)) lock.emplace(plan.folder);
+  for (const Variant& variant : plan.variants) {
+    CheckRuns(plan.folder / variant.name, variant.config, plan.more_steps);
+  }
+  InstallSignalHandlers();  // from here on what is begun is ended in order
+  WriteSettings(plan);
+  if (!lock) lock.emplace(plan.folder);
+
+  std::vector<SeedRun> runs = ListRuns(plan);
+  ManyRunsView view(plan, runs);
+  view.Announce();
+  Scheduler(runs, plan.jobs, view).Run();
+  view.Summarize(StopSignal() != 0);
+
+  const auto failed =
+      std::ranges::find_if(runs, [](const SeedRun& run) { return !run.problem.empty(); });
+  if (StopSignal() != 0) return 128 + StopSignal();
+  if (failed == runs.end()) return 0;
+  const auto count =
+      std::ranges::count_if(runs, [](const SeedRun& run) { return !run.problem.empty(); });
+  throw Failure(Concat(count, " of ", runs.size(), " runs failed, the first of them ", failed->name,
+                       ": ", failed->problem));
+}
+
+void MakeReadyForMany(Config& config) {
+  if (config.train.threads == 0) config.train.threads = 1;
+  if (!config.mjcf.empty()) config.model = "model.xml";
+}
+
+int DefaultJobs(int64_t threads) {
+  return std::max(1, UsableProcessors() / static_cast<int>(std::max<int64_t>(1, threads)));
+}
+
+}  // namespace upswing

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "apps/config.h"
+#include "rl/train.h"
+
+namespace upswing {
+
+/// One set of settings that is trained with many seeds.
+struct Variant {
+  std::string name;  // its folder in that of all; empty: the same folder
+  Config config;     // whose seed does not count
+};
+
+/// Many trainings: each variant with each seed, in FOLDER/VARIANT/seedN.
+struct ManyRuns {
+  std::string what;  // such as `d3qn` or a study's title
+  std::filesystem::path folder;
+  std::pair<std::string, std::string> mark;  // name and text of the file that says what FOLDER is
+  std::vector<Variant> variants;
+  std::vector<int64_t> seeds;
+  int jobs = 1;             // runs at a time
+  bool more_steps = false;  // runs that made fewer steps may go on
+};
+
+/// One of them.
+struct SeedRun {
+  const Variant* variant;
+  int64_t seed;
+  std::string name;  // such as `seed3` or `dqn/seed3`
+  std::filesystem::path path;
+  std::optional<TrainState> state;  // of its checkpoint, without the agent's; nothing: no run yet
+  std::string problem;              // why it failed; empty if it did not
+
+  std::filesystem::path log() const { return path.string() + ".log"; }
+  bool finished() const;
+  /// Steps made, of its checkpoint or, where that is further, of its metrics.
+  int64_t Steps() const;
+  /// Reads `state` anew. Throws BadInput.
+  void ReadState();
+};
+
+/// Trains all that is not finished, the first seed of each variant first, each run as a process of
+/// its own; shows how it goes on and what came of it. A folder of the same runs is gone on with;
+/// finished runs are left alone. Returns the exit code: 0, or 128 and a stop signal. Throws
+/// BadInput before anything is touched if the folder holds something else or runs of other
+/// settings; Failure at the end if a run failed.
+int TrainMany(const ManyRuns& plan);
+
+/// Settles what a run among many differs in from one alone: it has one thread, unless more are
+/// asked for, and its model lies beside it.
+void MakeReadyForMany(Config& config);
+
+/// How many runs at a time are best, if each has so many threads.
+int DefaultJobs(int64_t threads);
+
+}  // namespace upswing

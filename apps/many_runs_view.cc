@@ -1,0 +1,157 @@
+#include "apps/many_runs_view.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "apps/seeds.h"
+
+namespace upswing {
+namespace {
+
+constexpr double kNever = std::numeric_limits<double>::infinity();
+
+/// Median where some values are infinite: it is, too, if the middle is.
+double MedianOf(std::vector<double> values) {
+  if (values.empty()) return kNever;
+  std::ranges::sort(values);
+  const size_t middle = values.size() / 2;
+  return values.size() % 2 == 1 ? values[middle] : (values[middle - 1] + values[middle]) / 2;
+}
+
+std::string CountOrDash(double value) { return std::isfinite(value) ? FormatCount(value) : "-"; }
+std::string DurationOrDash(double value) {
+  return std::isfinite(value) ? FormatDuration(value) : "-";
+}
+
+void PrintRow(const std::string& name, double step, double seconds, double success, double reward,
+              const std::string& remark) {
+  fmt::print("  {:<12} {:>11}  {:>12}  {:>6.0f}%  {:>8.0f}{}{}\n", name, CountOrDash(step),
+             DurationOrDash(seconds), 100 * success, reward, remark.empty() ? "" : "  ", remark);
+}
+
+}  // namespace
+
+ManyRunsView::ManyRunsView(const ManyRuns& plan, const std::vector<SeedRun>& runs)
+    : plan_(plan), runs_(runs), steps_before_(0) {
+  steps_before_ = Measure().steps;
+}
+
+void ManyRunsView::Announce() const {
+  const size_t variants = plan_.variants.size();
+  fmt::print("Training {} in {}\n", plan_.what, plan_.folder.string());
+  fmt::print("  {}seed{} {}: {} run{}, {} at a time\n",
+             variants == 1 ? "" : fmt::format("{} variants, ", variants),
+             plan_.seeds.size() == 1 ? "" : "s", SeedsText(plan_.seeds), runs_.size(),
+             runs_.size() == 1 ? "" : "s", plan_.jobs);
+  const auto begun = std::ranges::count_if(runs_, [](const SeedRun& run) { return !!run.state; });
+  if (begun > 0) {
+    const size_t done = Measure().done;
+    fmt::print("  {} done before, going on with {}\n", done, static_cast<size_t>(begun) - done);
+  }
+  std::fflush(stdout);
+}
+
+ManyRunsView::Progress ManyRunsView::Measure() const {
+  Progress progress;
+  for (const SeedRun& run : runs_) {
+    const auto steps = static_cast<double>(run.Steps());
+    progress.steps += steps;
+    progress.done += run.finished() ? 1 : 0;
+    if (run.finished() || !run.problem.empty()) continue;
+    progress.left += std::max(0.0, static_cast<double>(run.variant->config.train.steps) - steps);
+  }
+  const double all = progress.steps + progress.left;
+  progress.share = all > 0 ? progress.steps / all : 1;
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin_;
+  progress.steps_per_second = (progress.steps - steps_before_) / std::max(1e-3, elapsed.count());
+  const bool may_end_early = std::ranges::any_of(
+      runs_, [](const SeedRun& run) { return run.variant->config.train.stop_when_solved; });
+  progress.time_left = fmt::format("{} {} left", may_end_early ? "at most" : "about",
+                                   progress.steps_per_second > 0
+                                       ? FormatDuration(progress.left / progress.steps_per_second)
+                                       : "?");
+  return progress;
+}
+
+void ManyRunsView::ShowProgress(const std::vector<const SeedRun*>& running) {
+  const Progress progress = Measure();
+  std::vector<std::string> fields{
+      fmt::format("{} of {} runs", progress.done, runs_.size()), progress.time_left,
+      fmt::format("{} steps/s", FormatCount(std::max(0.0, progress.steps_per_second)))};
+  for (const SeedRun* run : running) {
+    const auto all = static_cast<double>(run->variant->config.train.steps);
+    fields.push_back(
+        fmt::format("{} {:.0f}%", run->name, 100 * static_cast<double>(run->Steps()) / all));
+  }
+  line_.Show(progress.share, fields);
+}
+
+void ManyRunsView::PrintEnd(const SeedRun& run) {
+  if (!run.problem.empty()) {
+    return line_.Print(
+        fmt::format("  {:<20} failed: {} (log: {})", run.name, run.problem, run.log().string()));
+  }
+  if (!run.state) return line_.Print(fmt::format("  {:<20} stopped before it began", run.name));
+  const TrainState& s = *run.state;
+  const Progress progress = Measure();
+  line_.Print(fmt::format("  {:<20} {:>11} steps  {:>12}  {:<22}  {} of {} runs done{}", run.name,
+                          FormatCount(s.steps), FormatDuration(s.seconds),
+                          s.solved         ? "solved at " + FormatCount(s.streak_step)
+                          : run.finished() ? "done, not solved"
+                                           : "stopped",
+                          progress.done, runs_.size(),
+                          progress.left > 0 ? ", " + progress.time_left : ""));
+}
+
+void ManyRunsView::PrintTable(const Variant& variant) const {
+  fmt::print("\n{}\n", variant.name.empty() ? plan_.what : variant.name);
+  std::vector<double> steps, seconds, success, reward;
+  size_t solved = 0;
+  size_t not_judged = 0;
+  for (const SeedRun& run : runs_) {
+    if (run.variant != &variant) continue;
+    if (!run.state || run.state->best_step == 0) {
+      ++not_judged;
+      continue;
+    }
+    if (steps.empty()) {
+      fmt::print("  {:<12} {:>11}  {:>12}  {:>7}  {:>8}\n", "", "solved at", "after", "success",
+                 "return");
+    }
+    const TrainState& s = *run.state;
+    solved += s.solved ? 1 : 0;
+    steps.push_back(s.solved ? static_cast<double>(s.streak_step) : kNever);
+    seconds.push_back(s.solved ? s.streak_seconds : kNever);
+    success.push_back(s.best_success_rate);
+    reward.push_back(s.best_return);
+    PrintRow(fmt::format("seed {}", run.seed), steps.back(), seconds.back(), success.back(),
+             reward.back(),
+             !run.problem.empty() ? "failed"
+             : run.finished()     ? ""
+                                  : fmt::format("at step {}", FormatCount(s.steps)));
+  }
+  if (!steps.empty()) {
+    PrintRow("median", MedianOf(steps), MedianOf(seconds), MedianOf(success), MedianOf(reward),
+             fmt::format("{} of {} solved", solved, steps.size()));
+  }
+  if (not_judged > 0) {
+    fmt::print("  {} run{} not judged yet\n", not_judged, not_judged == 1 ? "" : "s");
+  }
+}
+
+void ManyRunsView::Summarize(bool stopped) {
+  line_.Clear();
+  for (const Variant& variant : plan_.variants) PrintTable(variant);
+  const size_t done = Measure().done;
+  fmt::print("\nSuccess and return are those of each run's best policy at evaluation.\n");
+  if (stopped) {
+    fmt::print("Stopped, {} of {} runs done; the same command goes on.\n", done, runs_.size());
+  }
+  fmt::print("Next:\n  ./upswing compare {}\n", plan_.folder.string());
+  std::fflush(stdout);
+}
+
+}  // namespace upswing

@@ -1,0 +1,176 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <memory>
+#include <numeric>
+#include <optional>
+
+#include "apps/commands.h"
+#include "apps/config.h"
+#include "apps/map_grid.h"
+#include "apps/map_output.h"
+#include "apps/progress.h"
+#include "core/error.h"
+#include "core/file.h"
+#include "core/text.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+constexpr int64_t kMostEpisodes = 10000000;
+
+struct MapArguments {
+  std::string policy, x = "mass2=-50%:+50%", y = "length2=-50%:+50%", physics = "closed-form", out;
+  std::vector<std::string> set;
+  std::optional<int> episodes;
+  int threads = 0;
+  int64_t seed = 0;
+  double check = 0.02;
+  bool as_json = false;
+};
+
+/// The plant that a policy was trained on, with the disturbance where its file tells.
+MapPoint TrainingPoint(const LoadedPolicy& loaded) {
+  MapPoint point;
+  point.plant = loaded.plant;
+  const auto text = loaded.policy.about().find("config");
+  if (text == loaded.policy.about().end()) return point;
+  Config config;
+  try {
+    ApplyToml(OptionsOf(config), text->second, "config");
+    point.disturbance = config.disturbance;
+  } catch (const Error&) {  // NOLINT(bugprone-empty-catch): written by another version
+  }
+  return point;
+}
+
+MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded) {
+  MapConfig config;
+  config.point.plant = loaded.plant;
+  config.mjcf = loaded.mjcf;
+  const MapPoint training = TrainingPoint(loaded);
+  config.x = ParseMapAxis(a.x, training, "--x");
+  config.y = ParseMapAxis(a.y, training, "--y");
+  CheckDifferent(config.x, config.y);
+  const Options options = OptionsOf(config.point);
+  for (const Option* option : ApplyChanges(options, a.set)) {
+    config.start_given |= option->section == "start";
+    for (const MapAxis* axis : {&config.x, &config.y}) {
+      const auto members = options.Find(axis->name, "map");
+      if (std::ranges::find(members, option) == members.end()) continue;
+      throw BadInput(Concat("--set ", option->name, ": expected another name, ", axis->name,
+                            " is an axis of the map"));
+    }
+  }
+  config.start_given |= config.x.start || config.y.start;
+  // From one start each episode is the same, unless there is noise.
+  config.episodes = a.episodes.value_or(config.start_given ? 1 : 10);
+  config.physics = ParsePhysics(a.physics, "--physics");
+  config.seed = static_cast<uint64_t>(a.seed);
+  if (config.cells() * config.episodes > kMostEpisodes) {
+    throw BadInput(Concat("map: expected at most ", FormatCount(kMostEpisodes), " episodes, got ",
+                          FormatCount(config.cells()), " cells of ", config.episodes));
+  }
+  return config;
+}
+
+/// Runs cells behind a progress line.
+std::vector<MapCell> RunCells(const MapConfig& config, const Policy& policy,
+                              std::span<const int64_t> cells, ThreadPool& pool, bool quiet) {
+  ProgressLine line;
+  const auto begin = Clock::now();
+  const double episodes = static_cast<double>(cells.size()) * config.episodes;
+  return RunMap(config, policy, cells, pool, [&](double share) {
+    if (quiet || !line.due()) return;
+    const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+    line.Show(share, {fmt::format("{} episodes/s", FormatCount(share * episodes / seconds)),
+                      fmt::format("{} left", FormatDuration(seconds * (1 - share) / share))});
+  });
+}
+
+int RunMapCommand(const MapArguments& a) {
+  const LoadedPolicy loaded = LoadPolicy(a.policy);
+  MapResult map;
+  map.config = ConfigOf(a, loaded);
+  map.policy = loaded.path.string();
+  map.physics = a.physics;
+  const fs::path folder =
+      a.out.empty() ? Concat("map-", map.config.x.name, "-", map.config.y.name) : a.out;
+  CheckFree(folder);
+
+  ThreadPool pool(ResolveThreads(a.threads));
+  std::vector<int64_t> all(static_cast<size_t>(map.config.cells()));
+  std::iota(all.begin(), all.end(), int64_t{0});
+  const auto begin = Clock::now();
+  map.cells = RunCells(map.config, loaded.policy, all, pool, a.as_json);
+  map.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+  if (map.config.physics != PhysicsEngine::kMuJoCo) {
+    map.checked = DrawCells(map.config, a.check);
+    MapConfig mujoco = map.config;
+    mujoco.physics = PhysicsEngine::kMuJoCo;
+    map.in_mujoco = RunCells(mujoco, loaded.policy, map.checked, pool, a.as_json);
+  }
+
+  MakeNewFolder(folder);
+  WriteMap(map, folder);
+  a.as_json ? PrintMapJson(map) : PrintMapTable(map);
+  return 0;
+}
+
+}  // namespace
+
+void AddMap(CLI::App& program, Command& command) {
+  CLI::App* app =
+      program.add_subcommand("map", "Map how a policy does on other plants or from other starts");
+  auto a = std::make_shared<MapArguments>();
+  app->add_option("policy", a->policy, "policy.safetensors or run folder")
+      ->required()
+      ->type_name("POLICY|RUN")
+      ->check(NotEmpty());
+  constexpr const char* kAxis = "NAME=FROM:TO[:CELLS]";
+  app->add_option("--x", a->x, "horizontal axis [mass2=-50%:+50%:31]")->type_name(kAxis);
+  app->add_option("--y", a->y, "vertical axis [length2=-50%:+50%:31]")->type_name(kAxis);
+  app->add_option("--episodes", a->episodes, "in a cell [10, or 1 where the start is given]")
+      ->check(CLI::Range(1, 100000).description(""))
+      ->type_name("INTEGER");
+  app->add_option("--set", a->set, "what the axes leave alone, such as gravity=9.7 (repeatable)")
+      ->type_name("NAME=VALUE")
+      ->take_all()
+      ->allow_extra_args(false);
+  app->add_option("--physics", a->physics,
+                  "engine: closed-form, or mujoco, far slower [closed-form]")
+      ->type_name("TEXT");
+  app->add_option("--check", a->check, "share of the cells to do again in MuJoCo [0.02]")
+      ->check(CLI::Range(0.0, 1.0).description(""))
+      ->type_name("SHARE");
+  app->add_option("--out", a->out, "new folder for map.csv, map.svg and map.png [map-X-Y]")
+      ->type_name("FOLDER")
+      ->check(NotEmpty());
+  app->add_option("--seed", a->seed, "of starts and noise [0]")
+      ->check(CLI::Range(int64_t{0}, int64_t{9000000000000000}).description(""))
+      ->type_name("INTEGER");
+  app->add_option("--threads", a->threads, "0: one for each processor, at most 8")
+      ->check(CLI::Range(0, 256).description(""))
+      ->type_name("INTEGER");
+  app->add_flag("--json", a->as_json, "print JSON instead of a table")->disable_flag_override();
+  app->footer(
+      "Axes and --set take mass1, mass2, length1, length2, damping1, damping2 (mass, length, "
+      "damping\nfor both), gravity, torque_limit, sensor_noise (rad and rad/s), delay (s), and the "
+      "start: q1, q2\n(degrees), w1, w2 (rad/s). Percentages are on top of the training's value. "
+      "An "
+      "episode is that of\n`upswing eval`; with a start, every episode begins exactly there, at "
+      "rest "
+      "and hanging in what is\nnot given.\n\n"
+      "Examples:\n"
+      "  ./upswing map runs/d3qn-seed1\n"
+      "  ./upswing map runs/d3qn-seed1 --x mass=0.8:1.2 --y damping=0:0.4:21 --episodes 20\n"
+      "  ./upswing map runs/d3qn-seed1 --x sensor_noise=0:0.1 --y delay=0:0.1:6\n"
+      "  ./upswing map runs/d3qn-seed1 --x q1=-180:180:73 --y q2=-180:180:73    from any angle\n");
+  app->callback([a, &command] { command = [a] { return RunMapCommand(*a); }; });
+}
+
+}  // namespace upswing

@@ -1,0 +1,213 @@
+#include "apps/map_output.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <numeric>
+
+#include "apps/config.h"
+#include "apps/progress.h"
+#include "core/file.h"
+#include "core/text.h"
+#include "report/figure.h"
+#include "rl/evaluate.h"
+
+namespace upswing {
+namespace {
+
+/// A number as a table has it: empty for none.
+std::string Cell(double number) { return std::isfinite(number) ? FormatNumber(number) : ""; }
+
+double RateOf(const MapResult& map, const MapCell& cell) {
+  return static_cast<double>(cell.successes) / map.config.episodes;
+}
+
+/// "mass2 0.5 to 1.5 kg".
+std::string RangeText(const MapAxis& axis) {
+  return fmt::format("{} {:.4g} to {:.4g} {}", axis.name, axis.values.front(), axis.values.back(),
+                     axis.unit);
+}
+
+Panel MapPanel(const MapResult& map, const std::string& title, HeatMap heat_map) {
+  const MapAxis& x = map.config.x;
+  const MapAxis& y = map.config.y;
+  heat_map.x = x.values;
+  heat_map.y = y.values;
+  Panel panel;
+  panel.title = title;
+  panel.x_label = x.label();
+  panel.y_label = y.label();
+  panel.heat_map = std::move(heat_map);
+  const auto inside = [](const MapAxis& axis) {
+    return axis.at_training && *axis.at_training >= axis.values.front() &&
+           *axis.at_training <= axis.values.back();
+  };
+  if (inside(x) && inside(y)) {
+    const std::string name = x.start && y.start ? "hanging" : "as in training";
+    panel.lines.push_back({name, {*x.at_training}, {*y.at_training}, {}, {}, true});
+  }
+  return panel;
+}
+
+Figure MapFigure(const MapResult& map) {
+  HeatMap success, swing_up;
+  success.label = map.config.episodes > 1 ? "share of the episodes" : "success";
+  success.high = 1;
+  swing_up.label = "s";
+  for (const MapCell& cell : map.cells) {
+    success.z.push_back(RateOf(map, cell));
+    swing_up.z.push_back(cell.swing_up_seconds);
+  }
+  Figure figure;
+  figure.title = map.policy;
+  figure.width = 1100;
+  figure.height = 500;
+  figure.columns = 2;
+  figure.panels = {
+      MapPanel(map, "Success", std::move(success)),
+      MapPanel(map, map.config.episodes > 1 ? "Swing-up time, median" : "Swing-up time",
+               std::move(swing_up))};
+  return figure;
+}
+
+std::string CheckText(const MapResult& map) {
+  const MapAgreement a = map.agreement();
+  std::string text =
+      fmt::format("{} of {} cells again in MuJoCo: {} with as many successes", FormatCount(a.cells),
+                  FormatCount(map.config.cells()),
+                  a.same_successes == a.cells ? "all" : FormatCount(a.same_successes));
+  if (a.same_successes < a.cells) {
+    text += fmt::format(", the others differ by up to {:.0f}%", 100 * a.largest_success_difference);
+  }
+  if (a.largest_swing_up_difference == 0) return text + ", swing-up times the same";
+  return text +
+         fmt::format(", swing-up times differ by up to {:.2f} s", a.largest_swing_up_difference);
+}
+
+}  // namespace
+
+double MapResult::mean_success() const {
+  double sum = 0;
+  for (const MapCell& cell : cells) sum += static_cast<double>(cell.successes);
+  return sum / static_cast<double>(episodes());
+}
+
+double MapResult::always_success() const {
+  const auto always = std::ranges::count_if(
+      cells, [this](const MapCell& cell) { return cell.successes == config.episodes; });
+  return static_cast<double>(always) / static_cast<double>(cells.size());
+}
+
+double MapResult::median_swing_up() const {
+  std::vector<double> medians;
+  for (const MapCell& cell : cells) {
+    if (cell.successes > 0) medians.push_back(cell.swing_up_seconds);
+  }
+  if (medians.empty()) return std::numeric_limits<double>::quiet_NaN();
+  return QuartilesOf(std::move(medians)).median;
+}
+
+MapAgreement MapResult::agreement() const {
+  std::vector<MapCell> same;
+  for (const int64_t cell : checked) same.push_back(cells[static_cast<size_t>(cell)]);
+  return Compare(same, in_mujoco, config.episodes);
+}
+
+std::string MapCsv(const MapResult& map) {
+  const MapAxis& x = map.config.x;
+  const MapAxis& y = map.config.y;
+  std::string csv = Concat(x.name, ",", y.name,
+                           ",episodes,successes,success_rate,swing_up_seconds,mujoco_successes,"
+                           "mujoco_swing_up_seconds\n");
+  size_t next_checked = 0;
+  for (size_t i = 0; i < map.cells.size(); ++i) {
+    const MapCell& cell = map.cells[i];
+    csv += Concat(FormatNumber(x.values[i % x.values.size()]), ",",
+                  FormatNumber(y.values[i / x.values.size()]), ",", map.config.episodes, ",",
+                  cell.successes, ",", FormatNumber(RateOf(map, cell)), ",",
+                  Cell(cell.swing_up_seconds), ",");
+    const bool checked =
+        next_checked < map.checked.size() && map.checked[next_checked] == static_cast<int64_t>(i);
+    if (checked) {
+      const MapCell& again = map.in_mujoco[next_checked++];
+      csv += Concat(again.successes, ",", Cell(again.swing_up_seconds));
+    } else {
+      csv += ",";
+    }
+    csv += '\n';
+  }
+  return csv;
+}
+
+void WriteMap(MapResult& map, const std::filesystem::path& folder) {
+  const auto note = [&](const char* name) {
+    map.files.push_back((folder / name).string());
+    return folder / name;
+  };
+  WriteFileAtomically(note("map.csv"), MapCsv(map));
+  const Figure figure = MapFigure(map);
+  Draw(figure, note("map.svg"));
+  Draw(figure, note("map.png"));
+}
+
+void PrintMapTable(const MapResult& map) {
+  const MapConfig& config = map.config;
+  fmt::print("{}\n", map.policy);
+  fmt::print("  plant      {}, physics {}\n", PlantText(config.point.plant), map.physics);
+  fmt::print("  map        {} × {}: {} × {} cells, {} episode{} each\n", RangeText(config.x),
+             RangeText(config.y), config.x.values.size(), config.y.values.size(), config.episodes,
+             config.episodes == 1 ? "" : "s");
+  fmt::print("  success    {:.1f}% of all episodes; {:.1f}% of the cells without a failure\n",
+             100 * map.mean_success(), 100 * map.always_success());
+  if (std::isfinite(map.median_swing_up())) {
+    fmt::print("  swing-up   {:.2f} s, median of the cells' medians\n", map.median_swing_up());
+  } else {
+    fmt::print("  swing-up   none swung up to stay\n");
+  }
+  fmt::print("  rate       {} episodes in {}: {} a second\n", FormatCount(map.episodes()),
+             FormatDuration(map.seconds),
+             FormatCount(static_cast<double>(map.episodes()) / map.seconds));
+  if (!map.checked.empty()) fmt::print("  check      {}\n", CheckText(map));
+  fmt::print("  written    {}\n", Join(map.files, ", "));
+}
+
+void PrintMapJson(const MapResult& map) {
+  using nlohmann::ordered_json;
+  const auto number = [](double x) { return std::isfinite(x) ? ordered_json(x) : nullptr; };
+  const auto axis = [](const MapAxis& a) -> ordered_json {
+    return {{"name", a.name}, {"unit", a.unit}, {"values", a.values}};
+  };
+  ordered_json j;
+  j["policy"] = map.policy;
+  j["seed"] = map.config.seed;
+  j["physics"] = map.physics;
+  for (const auto& [name, value] : PlantValues(map.config.point.plant)) j["plant"][name] = value;
+  j["x"] = axis(map.config.x);
+  j["y"] = axis(map.config.y);
+  j["episodes_per_cell"] = map.config.episodes;
+  j["mean_success_rate"] = map.mean_success();
+  j["cells_without_failure"] = map.always_success();
+  j["median_swing_up_seconds"] = number(map.median_swing_up());
+  const size_t columns = map.config.x.values.size();
+  for (size_t i = 0; i < map.cells.size(); ++i) {
+    j["success_rate"][i / columns].push_back(RateOf(map, map.cells[i]));
+    j["swing_up_seconds"][i / columns].push_back(number(map.cells[i].swing_up_seconds));
+  }
+  j["check"] = nullptr;
+  if (!map.checked.empty()) {
+    const MapAgreement a = map.agreement();
+    j["check"] = {{"cells", a.cells},
+                  {"same_successes", a.same_successes},
+                  {"largest_success_difference", a.largest_success_difference},
+                  {"largest_swing_up_difference", a.largest_swing_up_difference}};
+  }
+  j["seconds"] = map.seconds;
+  j["episodes_per_second"] = static_cast<double>(map.episodes()) / map.seconds;
+  j["files"] = map.files;
+  fmt::print("{}\n", j.dump(2));
+}
+
+}  // namespace upswing

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "apps/map_grid.h"
+
+namespace upswing {
+
+/// A finished map.
+struct MapResult {
+  MapConfig config;
+  std::string policy;              // path
+  std::string physics;             // name of the engine
+  std::vector<MapCell> cells;      // (ny × nx)
+  std::vector<int64_t> checked;    // cells that were done again in MuJoCo, rising
+  std::vector<MapCell> in_mujoco;  // what they came to there
+  double seconds = 0;              // wall time of the map itself
+  std::vector<std::string> files;  // written
+
+  int64_t episodes() const { return config.cells() * config.episodes; }
+  double mean_success() const;     // rate over all episodes
+  double always_success() const;   // share of the cells where every episode succeeds
+  double median_swing_up() const;  // of the cells' medians, s; NaN if there are none
+  MapAgreement agreement() const;  // of the engines
+};
+
+/// One row for each cell, x first; what MuJoCo came to is empty where it was not asked.
+std::string MapCsv(const MapResult& map);
+
+/// Writes map.csv, map.svg and map.png into a folder and notes them in `files`.
+void WriteMap(MapResult& map, const std::filesystem::path& folder);
+
+void PrintMapTable(const MapResult& map);
+void PrintMapJson(const MapResult& map);
+
+}  // namespace upswing

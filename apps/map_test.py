@@ -1,0 +1,179 @@
+#!/usr/bin/env python3
+"""`upswing map`: its table, its files, that a cell is what `eval` says, and bad input."""
+
+import csv
+import json
+import math
+import struct
+import tempfile
+import unittest
+import xml.dom.minidom
+from pathlib import Path
+
+from testing import MODEL, ProgramTest, run, small
+
+GRID = ("--x", "gravity=0.05:3:3", "--y", "mass2=-50%:+50%:3")
+
+
+class MapTest(ProgramTest):
+    @classmethod
+    def setUpClass(cls):
+        # A plant that is soon learned, so that there are successes and failures to look at.
+        cls.trained = tempfile.TemporaryDirectory(prefix="upswing-")
+        cls.addClassCleanup(cls.trained.cleanup)
+        cls.policy = Path(cls.trained.name, "run")
+        done = run(*small(gravity=0.05, damping=1, hidden="64,64", head=32, eval_episodes=1,
+                          steps=60000, checkpoint_every=20000, out=cls.policy))
+        assert done.returncode == 0, done
+
+    def map(self, *more, out="map"):
+        return json.loads(self.succeed("map", self.policy, "--json", "--out", out, *more))
+
+    def rows(self, out="map"):
+        with open(self.folder / out / "map.csv", encoding="utf-8", newline="") as file:
+            return list(csv.DictReader(file))
+
+    def test_files_and_fields_agree(self):
+        result = self.map(*GRID, "--episodes", 4, "--check", 0.3)
+        self.assertEqual(result["x"], {"name": "gravity", "unit": "m/s²",
+                                       "values": [0.05, 1.525, 3]})
+        self.assertEqual(result["y"], {"name": "mass2", "unit": "kg", "values": [0.5, 1, 1.5]})
+        rows = self.rows()
+        self.assertEqual([(float(row["gravity"]), float(row["mass2"])) for row in rows],
+                         [(x, y) for y in result["y"]["values"] for x in result["x"]["values"]])
+        rates = [float(row["success_rate"]) for row in rows]
+        self.assertEqual(sum(result["success_rate"], []), rates)
+        self.assertEqual(rates, [int(row["successes"]) / 4 for row in rows])
+        self.assertGreater(max(rates), 0)
+        self.assertLess(min(rates), 1)
+        self.assertAlmostEqual(result["mean_success_rate"], sum(rates) / 9)
+        self.assertAlmostEqual(result["cells_without_failure"], rates.count(1) / 9)
+        for row, seconds in zip(rows, sum(result["swing_up_seconds"], [])):
+            self.assertEqual(row["swing_up_seconds"] == "", int(row["successes"]) == 0)
+            self.assertEqual(row["swing_up_seconds"], "" if seconds is None else
+                             row["swing_up_seconds"])
+            self.assertTrue(seconds is None or 0 < seconds <= 10)
+        # The engines do the same.
+        checked = [row for row in rows if row["mujoco_successes"]]
+        self.assertEqual(len(checked), 3)
+        self.assertEqual(result["check"]["cells"], 3)
+        self.assertEqual(result["check"]["same_successes"],
+                         sum(row["mujoco_successes"] == row["successes"] for row in checked))
+        self.assertGreaterEqual(result["check"]["same_successes"], 2)
+
+        png = (self.folder / "map/map.png").read_bytes()
+        self.assertEqual(png[:8], b"\x89PNG\r\n\x1a\n")
+        self.assertEqual(struct.unpack(">II", png[16:24]), (1100, 500))
+        text = (self.folder / "map/map.svg").read_text(encoding="utf-8")
+        xml.dom.minidom.parseString(text)
+        for word in ("gravity (m/s²)", "mass2 (kg)", "Success", "Swing-up time, median",
+                     "as in training"):
+            self.assertIn(word, text)
+        self.assertEqual(result["files"], ["map/map.csv", "map/map.svg", "map/map.png"])
+
+    def test_a_cell_is_what_an_evaluation_of_its_plant_finds(self):
+        result = self.map("--x", "gravity=0.05:0.1:2", "--y", "torque_limit=4:5:2", "--episodes",
+                          100, "--check", 0)
+        for row, torque in enumerate((4, 5)):
+            for column, gravity in enumerate((0.05, 0.1)):
+                judged = json.loads(self.succeed(
+                    "eval", self.policy, "--json", "--set", f"gravity={gravity}", "--set",
+                    f"torque_limit={torque}", "--physics", "closed-form"))
+                rate = result["success_rate"][row][column]
+                # Other starts: within five standard deviations of two samples of 100.
+                p = (rate + judged["success_rate"]) / 2
+                self.assertAlmostEqual(rate, judged["success_rate"],
+                                       delta=5 * math.sqrt(p * (1 - p) / 50) + 1e-9)
+
+    def test_threads_engine_and_neighbours_change_nothing(self):
+        grid = ("--x", "gravity=0.05:3:3", "--y", "sensor_noise=0:0.05:2", "--episodes", 12)
+        one = self.map(*grid, "--threads", 1, out="one")
+        many = self.map(*grid, "--threads", 3, out="many")
+        mujoco = self.map(*grid, "--physics", "mujoco", out="mujoco")
+        self.assertIsNone(mujoco["check"])
+        for key in ("success_rate", "swing_up_seconds"):
+            self.assertEqual(one[key], many[key])
+        # A chaotic motion may tell the engines apart by rounding, but hardly ever does.
+        for a, b in zip(sum(one["success_rate"], []), sum(mujoco["success_rate"], [])):
+            self.assertAlmostEqual(a, b, delta=0.1)
+        self.assertNotEqual(self.map(*grid, "--seed", 1, out="seed")["swing_up_seconds"],
+                            one["swing_up_seconds"])
+
+    def test_from_given_starts(self):
+        result = self.map("--x", "q1=-180:180:9", "--y", "q2=-20:20:3", "--set", "w1=0.1",
+                          "--check", 0)
+        self.assertEqual(result["episodes_per_cell"], 1)
+        for rate, seconds in zip(sum(result["success_rate"], []),
+                                 sum(result["swing_up_seconds"], [])):
+            self.assertIn(rate, (0, 1))
+            self.assertEqual(seconds is None, rate == 0)
+        # The same state a turn away has the same observation.
+        self.assertEqual([row[0] for row in result["success_rate"]],
+                         [row[-1] for row in result["success_rate"]])
+        # The episode that `simulate` makes from there.
+        table = self.succeed("simulate", self.policy, "--physics", "closed-form", "--start",
+                             f"{-math.pi / 2},0,0.1,0").splitlines()
+        inverted = [line.split(",")[8] == "1" for line in table[1:]]
+        since = len(inverted)
+        while since > 0 and inverted[since - 1]:
+            since -= 1
+        self.assertEqual(result["success_rate"][1][2], int(since <= 500))
+        if since <= 500:
+            self.assertAlmostEqual(result["swing_up_seconds"][1][2], 0.02 * max(since, 1))
+
+    def test_table(self):
+        text = self.succeed("map", self.policy, *GRID, "--episodes", 2)
+        for word in ("gravity 0.05 to 3 m/s² × mass2 0.5 to 1.5 kg: 3 × 3 cells, 2 episodes each",
+                     "% of all episodes", "18 episodes in", "1 of 9 cells again in MuJoCo",
+                     "map-gravity-mass2/map.csv"):
+            self.assertIn(word, text)
+        self.assertTrue((self.folder / "map-gravity-mass2/map.svg").is_file())
+
+    def test_bad_axes(self):
+        for axis, *words in (
+                ("gravty=1:2", "gravty", "did you mean gravity?"),
+                ("mass2", "--x", "NAME=FROM:TO", '"mass2"'),
+                ("mass2=1", "NAME=FROM:TO"),
+                ("mass2=1:2:3:4", "NAME=FROM:TO"),
+                ("mass2=2:1", "mass2", "FROM < TO", "2 and 1"),
+                ("mass2=1:1", "FROM < TO"),
+                ("mass2=1:2:1", "2 to 1000 cells", '"1"'),
+                ("mass2=1:2:x", "cells", '"x"'),
+                ("mass2=1:2:2000", "cells"),
+                ("mass2=-1:2", "mass2", "expected a number"),
+                ("mass2=-150%:0%", "mass2", "expected a number"),
+                ("mass2=a:2", "mass2", '"a"'),
+                ("mass2=:2", "mass2", '""'),
+                ("mass2=1:nan", "mass2", '"nan"'),
+                ("delay=0:2", "delay", "in [0, 1]"),
+                ("delay=-50%:50%", "delay", "percentage of 0"),
+                ("q1=-400:0", "q1", "in [-360, 360]")):
+            with self.subTest(axis=axis):
+                self.refuse(["map", self.policy, "--x", axis], *words)
+        self.refuse(["map", self.policy, "--x", "mass=1:2", "--y", "mass2=1:2"], "two different",
+                    "both set mass2")
+
+    def test_other_bad_input(self):
+        self.refuse(["map"], "policy")
+        self.refuse(["map", "nowhere"], "nowhere", "no such file")
+        self.refuse(["map", self.policy, "--set", "mass2=1"], "mass2", "axis of the map")
+        self.refuse(["map", self.policy, "--set", "gravit=1"], "did you mean gravity?")
+        self.refuse(["map", self.policy, "--check", "2"], "--check")
+        self.refuse(["map", self.policy, "--episodes", "0"], "--episodes")
+        self.refuse(["map", self.policy, "--episodes", "20000"], "10,000,000 episodes")
+        self.refuse(["map", self.policy, "--physics", "own"], "closed-form")
+        self.write("taken", "")
+        self.refuse(["map", self.policy, "--out", "taken"], "taken", "exists already")
+        (self.folder / "map-mass2-length2").mkdir()
+        self.refuse(["map", self.policy], "map-mass2-length2", "exists already")
+
+    def test_another_model_needs_mujoco(self):
+        self.write("model.xml", MODEL)
+        self.succeed(*small(model="model.xml", out="run", steps=2000))
+        grid = ("--x", "mass2=0.9:1.1:2", "--y", "gravity=9:10:2", "--episodes", 1)
+        self.refuse(["map", "run", *grid, "--out", "map"], "closed-form", "another MJCF model")
+        self.succeed("map", "run", *grid, "--physics", "mujoco", "--out", "map")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,49 @@
+#include "apps/signals.h"
+
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <csignal>
+#include <string_view>
+
+namespace upswing {
+namespace {
+
+std::atomic<int> g_stop_signal{0};
+std::atomic<bool> g_checkpoint_wanted{false};
+std::atomic<bool> g_person_watches{false};  // standard error is a terminal
+static_assert(std::atomic<int>::is_always_lock_free);
+
+}  // namespace
+
+void InstallSignalHandlers() {
+  g_person_watches = isatty(STDERR_FILENO) == 1;
+  struct sigaction stop {};
+  stop.sa_handler = [](int signal) {
+    g_stop_signal = signal;
+    if (!g_person_watches) return;
+    constexpr std::string_view kNotice =
+        "\nstopping: a checkpoint is written; once more ends at once\n";
+    const int interrupted_errno = errno;
+    (void)!write(STDERR_FILENO, kNotice.data(), kNotice.size());
+    errno = interrupted_errno;
+  };
+  stop.sa_flags = SA_RESETHAND | SA_RESTART;  // a second one ends the program at once
+  sigaction(SIGINT, &stop, nullptr);
+  sigaction(SIGTERM, &stop, nullptr);
+  struct sigaction checkpoint {};
+  checkpoint.sa_handler = [](int) { g_checkpoint_wanted = true; };
+  checkpoint.sa_flags = SA_RESTART;
+  sigaction(SIGUSR1, &checkpoint, nullptr);
+}
+
+TrainRequest PollSignals() {
+  if (g_stop_signal != 0) return TrainRequest::kStop;
+  if (g_checkpoint_wanted.exchange(false)) return TrainRequest::kCheckpoint;
+  return TrainRequest::kGoOn;
+}
+
+int StopSignal() { return g_stop_signal; }
+
+}  // namespace upswing

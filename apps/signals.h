@@ -1,0 +1,19 @@
+#pragma once
+
+#include "rl/train.h"
+
+namespace upswing {
+
+// Signals that long work listens to: the handler only notes them, the work asks from time to time.
+
+/// From now on SIGINT and SIGTERM are noted, each once: a second one ends the program at once.
+/// SIGUSR1 is noted too.
+void InstallSignalHandlers();
+
+/// What has been asked for; kCheckpoint is told once.
+TrainRequest PollSignals();
+
+/// SIGINT or SIGTERM, whichever came; 0 if none did.
+int StopSignal();
+
+}  // namespace upswing

@@ -1,0 +1,167 @@
+#!/usr/bin/env python3
+"""`upswing study`: variants and seeds of a file, in their folders, stopped and gone on with."""
+
+import re
+import signal
+import unittest
+
+from testing import MODEL, ROOT, ProgramTest, small, snapshot
+
+HEAD = """title = "Little"
+seeds = 2
+[settings]
+hidden = [8]
+head = 8
+steps = 400
+[settings.train]
+agent = "d3qn-small"
+eval_every = 200
+eval_episodes = 2
+log_every = 200
+[settings.agent]
+learning_starts = 50
+"""
+STUDY = HEAD + """
+[variants.with]
+
+[variants.but]
+layer_norm = false
+[variants.but.agent]
+gamma = 0.9
+
+[variants.plain]
+agent = "dqn"
+"""
+# The same settings as flags.
+FLAGS = {"hidden": 8, "head": 8, "steps": 400, "eval_every": 200, "eval_episodes": 2,
+         "log_every": 200, "learning_starts": 50, "checkpoint_every": None, "threads": None}
+VARIANTS = {"with": {}, "but": {"layer_norm": False, "gamma": 0.9}, "plain": {"agent": "dqn"}}
+
+
+class StudyTest(ProgramTest):
+    def refuse_study(self, text, *words):
+        self.write("bad.toml", text)
+        self.refuse(["study", "bad.toml"], "bad.toml", *words)
+
+    def test_each_run_equals_the_same_settings_alone(self):
+        self.write("little.toml", STUDY)
+        output = self.succeed("study", "little.toml")
+        self.assertTrue(output.startswith(
+            'Training "Little" in runs/little\n  3 variants, seeds 1-2: 6 runs'), output)
+        self.assertIn("./upswing compare runs/little\n", output)
+        study = self.folder / "runs/little"
+        self.assertEqual({path.name for path in study.iterdir()}, {"study.toml", *VARIANTS})
+        self.assertEqual((study / "study.toml").read_text(encoding="utf-8"), STUDY)
+        for name, changes in VARIANTS.items():
+            for seed in (1, 2):
+                alone = f"alone/{name}{seed}"
+                self.succeed(*small(**FLAGS | changes | {"seed": seed, "out": alone}))
+                self.assert_same_run(f"runs/little/{name}/seed{seed}", alone)
+
+    def test_the_first_seed_of_every_variant_comes_first_in_the_order_of_the_file(self):
+        self.write("little.toml", STUDY)
+        output = self.succeed("study", "little.toml", "--jobs", 1, "--out", "x")
+        self.assertEqual(re.findall(r"^  (\w+/seed\d) ", output, re.M),
+                         ["with/seed1", "but/seed1", "plain/seed1",
+                          "with/seed2", "but/seed2", "plain/seed2"])
+
+    def test_seeds_in_the_file_and_on_the_command_line(self):
+        for text, flags, seeds in (('"2,7-8"', [], {2, 7, 8}), ("[3]", [], {3}),
+                                   ("[1, 4]", [], {1, 4}), ("9", ["--seeds", "5,6"], {5, 6})):
+            with self.subTest(seeds=text):
+                self.write("s.toml", HEAD.replace("seeds = 2", f"seeds = {text}")
+                           + "[variants.a]\n")
+                out = f"out{min(seeds)}"
+                self.succeed("study", "s.toml", "--out", out, *flags)
+                self.assertEqual({path.name for path in (self.folder / out / "a").glob("*[0-9]")},
+                                 {f"seed{seed}" for seed in seeds})
+
+    def test_finished_runs_are_left_alone_and_a_new_variant_comes_to_them(self):
+        self.write("little.toml", STUDY)
+        self.succeed("study", "little.toml")
+        before = snapshot(self.folder / "runs/little")
+        self.assertIn("6 done before", self.succeed("study", "little.toml"))
+        self.assertEqual(snapshot(self.folder / "runs/little"), before)
+        self.write("little.toml", STUDY + "[variants.new]\ngamma = 0.5\n")
+        self.succeed("study", "little.toml")
+        after = snapshot(self.folder / "runs/little")
+        self.assertIn("new/seed2/policy.safetensors", after)
+        before.pop("study.toml")
+        self.assertEqual({name: after[name] for name in before}, before)
+
+    def test_killed_and_gone_on_with_equals_never_stopped(self):
+        longer = STUDY.replace("steps = 400", "steps = 6000").replace("= 200\n", "= 1000\n")
+        self.write("little.toml", longer)
+        process = self.start("study", "little.toml", "--jobs", 1, "--out", "killed")
+        self.wait_for(lambda: (self.folder / "killed/with/seed1/metrics.csv").exists())
+        self.assertEqual(self.end(process, signal.SIGINT)[0], 130)
+        self.assertFalse((self.folder / "killed/plain/seed2").exists())
+        self.succeed("study", "little.toml", "--out", "killed")
+        self.succeed("study", "little.toml", "--out", "never-stopped")
+        for name in VARIANTS:
+            for seed in (1, 2):
+                self.assert_same_run(f"killed/{name}/seed{seed}", f"never-stopped/{name}/seed{seed}")
+
+    def test_a_model_counts_from_the_study(self):
+        (self.folder / "sub").mkdir()
+        self.write("sub/own.xml", MODEL.replace('mass="1"', 'mass="1.25"', 1))
+        self.write("sub/s.toml", HEAD + '[variants.own]\nmodel = "own.xml"\n[variants.ours]\n')
+        self.succeed("study", "sub/s.toml", "--seeds", "1-1", "--out", "x")
+        config = (self.folder / "x/own/seed1/config.toml").read_text(encoding="utf-8")
+        self.assertIn("\nmass1 = 1.25 ", config)
+        again = self.succeed("study", "sub/s.toml", "--seeds", "1-1", "--out", "x")
+        self.assertIn("2 done before", again)
+
+    def test_other_settings_are_refused_with_what_differs(self):
+        self.write("little.toml", STUDY)
+        self.succeed("study", "little.toml")
+        self.write("little.toml", STUDY.replace("gamma = 0.9", "gamma = 0.8"))
+        self.refuse(["study", "little.toml"], "runs/little/but/seed1: made with agent.gamma = 0.9",
+                    "says 0.8", "choose another --out")
+
+    def test_a_folder_of_something_else_is_refused(self):
+        self.write("little.toml", STUDY)
+        self.succeed(*small(**FLAGS | {"out": "run"}))
+        self.refuse(["study", "little.toml", "--out", "run"], "run: exists already", "study.toml")
+
+    def test_bad_studies(self):
+        one = "[variants.a]\n"
+        for text, words in (
+                ("seed = 3\n" + one, [":1:", '"seed"', "did you mean seeds?"]),
+                ("seeds = 2\n", ["[variants.NAME]"]),
+                ("seeds = 2\n[variants]\n", ["[variants.NAME]"]),
+                (one, ['"seeds = 10"']),
+                ('seeds = "0-"\n' + one, [":1: seeds: expected", "3,5,8-12"]),
+                ("seeds = [1, 1]\n" + one, [":1: seeds:", "1 is twice"]),
+                ("seeds = 0\n" + one, [":1: seeds:", "1 to 10000"]),
+                ("seeds = [1.5]\n" + one, [":1: seeds:"]),
+                ("title = 3\nseeds = 2\n" + one, [":1: title: expected a text"]),
+                ("seeds = 2\n[settings]\ngama = 0.9\n" + one, [":3:", "did you mean gamma?"]),
+                ("seeds = 2\n[settings.agnet]\n" + one, [":2:", "did you mean agent?"]),
+                ("seeds = 2\n[settings.task]\ngamma = 1\n" + one, [":3: gamma: expected in [agent]"]),
+                ("seeds = 2\n" + one + 'gamma = "0.9"\n', [":3: gamma: expected a number"]),
+                ("seeds = 2\n" + one + "gamma = 1.9\n", [":3: gamma: expected a number in [0, 1]"]),
+                ("seeds = 2\n" + one + 'agent = "d3qm"\n', [":3: agent:", "did you mean d3qn?"]),
+                ("seeds = 2\n" + one + "seed = 7\n", [":3: seed:", "seeds"]),
+                ("seeds = 2\nvariants.a = 3\n", [":2: a: expected a table"]),
+                ('seeds = 2\n[variants."../x"]\n', [":2:", "letters"]),
+                ('seeds = 2\n[variants.""]\n', [":2:", "letters"]),
+                ("seeds = \n" + one, [":1:"])):
+            with self.subTest(text=text):
+                self.refuse_study(text, *words)
+        self.refuse(["study", "none.toml"], "none.toml")
+        self.refuse(["study"], "file")
+
+    def test_the_studies_of_the_project_can_be_run(self):
+        studies = sorted((ROOT / "configs/studies").glob("*.toml"))
+        self.assertEqual(len(studies), 4)
+        for path in studies:
+            with self.subTest(study=path.stem):
+                process = self.start("study", path, "--seeds", "1-1", "--jobs", 1)
+                output = self.end(process, signal.SIGINT)[1]
+                self.assertIn("compare runs/" + path.stem, output)
+                self.assertTrue((self.folder / "runs" / path.stem / "study.toml").exists())
+
+
+if __name__ == "__main__":
+    unittest.main()

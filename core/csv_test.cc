@@ -1,0 +1,41 @@
+#include "core/csv.h"
+
+#include <gtest/gtest.h>
+
+#include "core/error.h"
+
+namespace upswing {
+namespace {
+
+TEST(Csv, WantedColumnsInTheOrderOfTheQuestion) {
+  const auto columns = ReadCsv("# made by hand\na, b ,note,c\n\n1,2,x,3\n# half\n-4,5e1,,0.5\n",
+                               {"c", "b"}, "t.csv");
+  ASSERT_EQ(columns.size(), 2U);
+  EXPECT_EQ(columns[0].name, "c");
+  EXPECT_EQ(columns[0].values, (std::vector<double>{3, 0.5}));
+  EXPECT_EQ(columns[1].values, (std::vector<double>{2, 50}));
+  EXPECT_TRUE(ReadCsv("", {"a"}, "t.csv").front().values.empty());
+  EXPECT_TRUE(ReadCsv("a\n", {"a"}, "t.csv").front().values.empty());
+}
+
+/// What ReadCsv says of a text whose column b is wanted.
+std::string Complaint(std::string_view text) {
+  try {
+    ReadCsv(text, {"b"}, "t.csv");
+  } catch (const Error& error) {
+    EXPECT_EQ(error.exit_code(), 2);
+    return error.what();
+  }
+  return "none";
+}
+
+TEST(Csv, MessagesNameLineAndColumn) {
+  EXPECT_EQ(Complaint("a,c\n1,2\n"), "t.csv:1: expected a column \"b\", got \"a,c\"");
+  EXPECT_EQ(Complaint("a,b\n1,2\n3\n"), "t.csv:3: expected 2 columns, got 1");
+  EXPECT_EQ(Complaint("a,b\n# c\n1,x\n"), "t.csv:3: b: expected a finite number, got \"x\"");
+  EXPECT_EQ(Complaint("a,b\n1,inf\n"), "t.csv:2: b: expected a finite number, got \"inf\"");
+  EXPECT_EQ(Complaint("a,b\nx,1\n"), "none");
+}
+
+}  // namespace
+}  // namespace upswing

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/sample.h"
+#include "report/runs.h"
+#include "report/statistics.h"
+
+namespace upswing {
+
+inline constexpr double kSteadyRate = 0.99;  // success rate that a solved run is to keep
+
+/// Runs of one agent, which differ in their seeds.
+struct RunGroup {
+  std::string label;
+  std::vector<RunRecord> runs;  // by seed, each finished or taken as it is; all have evaluations
+};
+
+/// One figure over the runs of a group.
+struct Scores {
+  std::vector<double> values;  // a run each, in the order of the runs; not solved: +infinity
+  double low, median, high;    // range and median
+  Estimate iqm;                // interquartile mean
+};
+
+/// What became of the runs after they were solved: evaluations after the two that solved them.
+struct Stability {
+  int64_t runs = 0, steady_runs = 0;  // with such evaluations; all of them at least kSteadyRate
+  int64_t evaluations = 0, steady_evaluations = 0;
+  double lowest = 1;  // success rate
+};
+
+/// A group in figures.
+struct GroupSummary {
+  int64_t solved;
+  Interval solved_interval;            // 95%, of the share of runs that solve
+  Scores solve_seconds, solve_steps;   // to the first of the two evaluations that solve
+  Scores final_return, final_success;  // at the last evaluation
+  Scores best_return, best_success;    // at the best one: by success, then by return
+  Stability stability;
+};
+GroupSummary Summarize(const RunGroup& group);
+
+/// Two groups beside each other: `a` less or against `b`.
+struct PairSummary {
+  size_t a, b;             // which groups
+  Estimate sooner;         // probability that a run of a solves in less time than one of b
+  Estimate higher_return;  // probability that its final return is higher
+  /// Differences of the interquartile means; that of the times only if all runs are solved.
+  std::optional<Estimate> seconds_difference;
+  Estimate return_difference;
+};
+PairSummary ComparePair(const std::vector<GroupSummary>& groups, size_t a, size_t b);
+
+}  // namespace upswing

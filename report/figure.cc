@@ -1,0 +1,286 @@
+#include "report/figure.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/error.h"
+#include "core/file.h"
+#include "core/text.h"
+#include "report/gnuplot.h"
+#include "report/layout.h"
+
+namespace upswing {
+namespace {
+
+/// The palette of Okabe and Ito (2008), told apart by colour-blind people too; yellow last, since
+/// it is faint on white.
+constexpr std::array kColors{"#0072B2", "#D55E00", "#009E73", "#CC79A7",
+                             "#E69F00", "#56B4E9", "#000000", "#F0E442"};
+
+/// Viridis (van der Walt and Smith, 2015) at 17 places: equal steps look equal, in grey too.
+constexpr std::array kViridis{"#440154", "#48186a", "#472d7b", "#424086", "#3b528b", "#33638d",
+                              "#2c728e", "#26828e", "#21918c", "#1fa088", "#28ae80", "#3fbc73",
+                              "#5ec962", "#84d44b", "#addc30", "#d8e219", "#fde725"};
+
+/// A text as gnuplot takes it literally: in single quotes nothing is special but the quote.
+std::string Quoted(const std::string& text) {
+  std::string quoted = "'";
+  for (const char c : text) {
+    const bool control = static_cast<unsigned char>(c) < ' ' || c == '\x7f';
+    quoted += control ? ' ' : c;
+    if (c == '\'') quoted += c;
+  }
+  return quoted + "'";
+}
+
+std::string Number(double x) { return std::isfinite(x) ? FormatNumber(x) : "NaN"; }
+
+/// Edges of cells halfway between their centres, one more than there are centres.
+std::vector<double> Edges(const std::vector<double>& centers) {
+  std::vector<double> edges;
+  const size_t n = centers.size();
+  for (size_t i = 0; i + 1 < n; ++i) edges.push_back((centers[i] + centers[i + 1]) / 2);
+  const double first = n > 1 ? centers[0] - edges.front() : -0.5;
+  const double last = n > 1 ? centers[n - 1] - edges.back() : 0.5;
+  edges.insert(edges.begin(), centers[0] + first);
+  edges.push_back(centers[n - 1] + last);
+  return edges;
+}
+
+void CheckSizes(const Panel& panel) {
+  for (const Line& line : panel.lines) {
+    const size_t n = line.x.size();
+    const bool band = line.low.size() == n && line.high.size() == n;
+    if (line.y.size() != n || !(band || (line.low.empty() && line.high.empty()))) {
+      throw Failure(Concat("figure: line \"", line.name, "\": expected ", n, " numbers, got ",
+                           line.y.size(), ", ", line.low.size(), " and ", line.high.size()));
+    }
+  }
+  const auto& map = panel.heat_map;
+  if (map && (map->x.empty() || map->y.empty() || map->z.size() != map->x.size() * map->y.size())) {
+    throw Failure(Concat("figure: heat map: expected ", map->y.size(), " × ", map->x.size(),
+                         " numbers, got ", map->z.size()));
+  }
+}
+
+/// What the two formats count differently.
+struct Terminal {
+  std::string name;
+  double font;         // size of text that is kFontSize pixels high
+  double legend_line;  // pixels between two entries at spacing 1
+  double marker;       // size of markers that look the same
+  std::string cell;    // borders of cells, so that there are no seams between them
+};
+const Terminal kSvg{"svg dynamic", kFontSize, 18, 0.75, "noborder"};
+// pngcairo counts the font in points, of which 72 make 96 pixels, and blends edges.
+const Terminal kPng{"pngcairo", kFontSize * 0.75, 14, 1, ""};
+
+/// The commands that draw one panel.
+class PanelScript {
+ public:
+  PanelScript(const Panel& panel, const Box& box, const Figure& figure, const Terminal& terminal)
+      : panel_(panel),
+        box_(box),
+        width_(figure.width),
+        height_(figure.height),
+        terminal_(terminal) {
+    CheckSizes(panel);
+    Data();
+    Axes();
+    if (panel.heat_map) ColorBar();
+    Legend();
+    Plot();
+  }
+  const std::string& text() const { return text_; }
+
+ private:
+  template <typename... Parts>
+  void Say(const Parts&... parts) {
+    text_ += Concat(parts...) + '\n';
+  }
+  std::string ScreenX(double pixel) const { return "screen " + Number(pixel / width_); }
+  std::string ScreenY(double pixel) const { return "screen " + Number(pixel / height_); }
+
+  /// $L0, $L1, … of the lines and $H of the heat map.
+  void Data() {
+    for (size_t i = 0; i < panel_.lines.size(); ++i) {
+      const Line& line = panel_.lines[i];
+      Say("$L", i, " << END");
+      for (size_t k = 0; k < line.x.size(); ++k) {
+        std::string row = Number(line.x[k]) + ' ' + Number(line.y[k]);
+        if (!line.low.empty()) row += ' ' + Number(line.low[k]) + ' ' + Number(line.high[k]);
+        has_numbers_ |= std::isfinite(line.x[k]) && std::isfinite(line.y[k]);
+        Say(row);
+      }
+      Say("END");
+    }
+    if (!panel_.heat_map) return;
+    const HeatMap& map = *panel_.heat_map;
+    const std::vector<double> x = Edges(map.x);
+    const std::vector<double> y = Edges(map.y);
+    Say("$H << END");
+    for (size_t i = 0; i < map.z.size(); ++i) {
+      const size_t row = i / map.x.size();
+      const size_t col = i % map.x.size();
+      if (!std::isfinite(map.z[i])) continue;
+      Say(Number(map.x[col]), ' ', Number(map.y[row]), ' ', Number(x[col]), ' ', Number(x[col + 1]),
+          ' ', Number(y[row]), ' ', Number(y[row + 1]), ' ', Number(map.z[i]));
+      has_cells_ = true;
+    }
+    Say("END");
+    x_range_ = {x.front(), x.back()};
+    y_range_ = {y.front(), y.back()};
+  }
+
+  void Axes() {
+    Say("set lmargin at ", ScreenX(box_.left), "; set rmargin at ", ScreenX(box_.right));
+    Say("set bmargin at ", ScreenY(box_.bottom), "; set tmargin at ", ScreenY(box_.top));
+    // Labels stand where the margins have room for them, whatever the numbers at the ticks.
+    Label(2, panel_.title, (box_.left + box_.right) / 2, box_.top + 14, false);
+    const double bottom = box_.bottom - BottomMargin(panel_) + LegendBelow(panel_);
+    Label(3, panel_.x_label, (box_.left + box_.right) / 2, bottom + 8, false);
+    Label(4, panel_.y_label, box_.left - 60, (box_.bottom + box_.top) / 2, true);
+    Say("unset label 5");
+    Say("set xtics out nomirror autofreq; set ytics out nomirror autofreq");
+    Say(panel_.heat_map ? "unset grid" : "set grid back lt 1 lw 0.5 lc rgb '#d8d8d8'");
+    Range("x", panel_.x_range, x_range_);
+    Range("y", panel_.y_range, y_range_);
+    // Empty cells are grey.
+    Say("unset object 1");
+    if (panel_.heat_map) {
+      Say("set object 1 rectangle from graph 0,0 to graph 1,1 behind fc rgb '#e4e4e4' fs noborder");
+    }
+  }
+
+  void Label(int tag, const std::string& text, double x, double y, bool upright) {
+    if (text.empty()) return Say("unset label ", tag);
+    Say("set label ", tag, " ", Quoted(text), " at ", ScreenX(x), ',', ScreenY(y), " center",
+        upright ? " rotate by 90" : " norotate");
+  }
+
+  void Range(std::string_view axis, std::optional<std::pair<double, double>> wanted,
+             std::optional<std::pair<double, double>> found) {
+    if (!wanted) wanted = found;
+    if (!wanted && !has_numbers_) wanted = {0, 1};  // nothing to take a range from
+    if (wanted)
+      return Say("set ", axis, "range [", Number(wanted->first), ":", Number(wanted->second), "]");
+    Say("set ", axis, "range [*:*]; set autoscale ", axis == "x" ? "xfix" : "y");
+  }
+
+  void ColorBar() {
+    const HeatMap& map = *panel_.heat_map;
+    const bool fixed = map.low < map.high;
+    Say("set cbrange [", fixed ? Number(map.low) : "*", ":", fixed ? Number(map.high) : "*", "]");
+    Say("set colorbox user origin ", ScreenX(box_.right + 12), ',', ScreenY(box_.bottom), " size ",
+        ScreenX(14), ',', ScreenY(box_.top - box_.bottom), " noborder");
+    Say("set cbtics out nomirror scale 0.5");
+    Label(5, map.label, box_.right + 84, (box_.bottom + box_.top) / 2, true);
+  }
+
+  /// Beside the axes, or below those of a heat map, where nothing is hidden.
+  void Legend() {
+    if (!HasLegend(panel_)) return Say("unset key");
+    const auto entries =
+        std::ranges::count_if(panel_.lines, [](const Line& line) { return !line.name.empty(); });
+    const double line =
+        std::min(kLegendLine, (box_.top - box_.bottom) / static_cast<double>(entries));
+    const std::string style = Concat(" noenhanced Left reverse samplen 1.8 maxrows 99 spacing ",
+                                     Number(0.95 * line / terminal_.legend_line));
+    if (panel_.heat_map) {
+      return Say("set key at ", ScreenX(box_.left), ',',
+                 ScreenY(box_.bottom - BottomMargin(panel_) + 4), " left bottom horizontal", style);
+    }
+    Say("set key at ", ScreenX(box_.right + 8), ',', ScreenY(box_.top), " left top vertical",
+        style);
+  }
+
+  /// Heat map, then bands, then lines: each above what is before it.
+  void Plot() {
+    std::vector<std::string> layers;
+    if (has_cells_) {
+      layers.push_back(Concat("$H using 1:2:3:4:5:6:7 with boxxyerror fs solid 1 ", terminal_.cell,
+                              " lc palette notitle"));
+    }
+    for (size_t i = 0; i < panel_.lines.size(); ++i) {
+      const Line& line = panel_.lines[i];
+      if (line.low.empty() || line.points) continue;
+      layers.push_back(Concat("$L", i, " using 1:3:4 with filledcurves fs transparent solid 0.2 ",
+                              "noborder lc rgb '", Color(i), "' notitle"));
+    }
+    for (size_t i = 0; i < panel_.lines.size(); ++i) AddLine(i, layers);
+    if (layers.empty()) layers.emplace_back("NaN notitle");
+    Say("plot ", Join(layers, ", \\\n  "));
+  }
+
+  void AddLine(size_t i, std::vector<std::string>& layers) const {
+    const Line& line = panel_.lines[i];
+    if (line.x.empty()) return;
+    const std::string data = Concat("$L", i, " using 1:2 with ");
+    const std::string title = line.name.empty() ? " notitle" : " title " + Quoted(line.name);
+    const std::string color = Concat(" lc rgb '", Color(i), "'");
+    if (!line.points) {
+      // Beyond the palette's colours lines are dashed.
+      layers.push_back(Concat(data, "lines lw 2 dt ", 1 + i / kColors.size() % 4, color, title));
+      return;
+    }
+    if (!line.low.empty()) {
+      layers.push_back(Concat("$L", i, " using 1:2:3:4 with yerrorbars pt 7 ps ", Size(0.7),
+                              " lw 1.5", color, title));
+      return;
+    }
+    // On a heat map a white rim sets markers off from every colour.
+    if (panel_.heat_map)
+      layers.push_back(Concat(data, "points pt 7 ps ", Size(1.5), " lc rgb 'white' notitle"));
+    layers.push_back(
+        Concat(data, "points pt 7 ps ", Size(panel_.heat_map ? 1.0 : 0.6), color, title));
+  }
+
+  double Size(double marker) const { return marker * terminal_.marker; }
+
+  /// Red-orange first on a heat map: viridis has no such colour.
+  std::string Color(size_t i) const {
+    return kColors[(i + (panel_.heat_map ? 1 : 0)) % kColors.size()];
+  }
+
+  const Panel& panel_;
+  Box box_;
+  double width_, height_;
+  Terminal terminal_;
+  bool has_numbers_ = false, has_cells_ = false;
+  std::optional<std::pair<double, double>> x_range_, y_range_;  // of the heat map
+  std::string text_;
+};
+
+std::string Script(const Figure& figure, const Terminal& terminal) {
+  std::vector<std::string> palette;
+  for (const char* color : kViridis) palette.push_back(Concat(palette.size(), " '", color, "'"));
+  std::string script =
+      Concat("set encoding utf8\n", "set terminal ", terminal.name, " noenhanced size ",
+             figure.width, ',', figure.height, " font 'sans-serif,", terminal.font,
+             "' background rgb 'white'\n", "set border 3 lw 0.8 lc rgb '#404040'\n",
+             "set palette maxcolors 256 defined (", Join(palette, ", "), ")\n", "set multiplot\n");
+  if (!figure.title.empty()) {
+    script +=
+        Concat("set label 1 ", Quoted(figure.title), " at screen 0.5, screen ",
+               Number(1 - 16.0 / figure.height), " center font ',", terminal.font * 1.2, "'\n");
+  }
+  const std::vector<Box> boxes = Layout(figure);
+  for (size_t i = 0; i < boxes.size(); ++i) {
+    script += PanelScript(figure.panels[i], boxes[i], figure, terminal).text();
+    script += "unset label 1\n";  // the figure's title is drawn once
+  }
+  return script + "unset multiplot\n";
+}
+
+}  // namespace
+
+void Draw(const Figure& figure, const std::filesystem::path& file) {
+  const std::string ending = file.extension().string();
+  if (ending != ".svg" && ending != ".png") {
+    throw BadInput(Concat(file.string(), ": expected a name that ends with .svg or .png"));
+  }
+  WriteFileAtomically(file, RunGnuplot(Script(figure, ending == ".svg" ? kSvg : kPng)));
+}
+
+}  // namespace upswing

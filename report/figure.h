@@ -1,0 +1,47 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace upswing {
+
+/// One curve of a panel. Numbers that are not finite leave a gap.
+struct Line {
+  std::string name;               // in the legend; empty: none
+  std::vector<double> x, y;       // (n)
+  std::vector<double> low, high;  // (n) a band around it, or of points error bars; empty: none
+  bool points = false;            // markers instead of a line
+};
+
+/// A table of numbers as colours, cell (i, j) around (x[j], y[i]); x and y rise.
+struct HeatMap {
+  std::vector<double> x, y;  // (nx), (ny) centres of the cells
+  std::vector<double> z;     // (ny × nx); NaN: an empty cell
+  std::string label;         // of the colour bar
+  double low = 0, high = 0;  // colour range; where low ≥ high, that of the numbers
+};
+
+/// One pair of axes. Lines lie above the heat map.
+struct Panel {
+  std::string title, x_label, y_label;
+  std::vector<Line> lines;
+  std::optional<HeatMap> heat_map;
+  std::optional<std::pair<double, double>> x_range, y_range;  // else as the numbers ask for
+};
+
+/// Panels row after row, `columns` in each, with their axes in line.
+struct Figure {
+  std::string title;
+  std::vector<Panel> panels;
+  int columns = 1;
+  int width = 900, height = 600;  // pixels
+};
+
+/// Writes .svg or .png, by the ending, atomically. Texts are drawn as they are; control characters
+/// become blanks. Throws BadInput on another ending, Failure if gnuplot is missing or fails.
+void Draw(const Figure& figure, const std::filesystem::path& file);
+
+}  // namespace upswing

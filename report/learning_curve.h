@@ -1,0 +1,26 @@
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "report/comparison.h"
+#include "report/figure.h"
+
+namespace upswing {
+
+/// A number of an evaluation, for an axis of a figure.
+using EvaluationFigure = std::function<double(const EvaluationRow&)>;
+
+/// The interquartile mean of `y` over the runs at each x of the grid, as a curve with its pointwise
+/// 95% interval as a band (none for a single run). Between two evaluations of a run y is
+/// interpolated; behind its last one it keeps the last value.
+Line LearningCurve(const RunGroup& group, const EvaluationFigure& x, const EvaluationFigure& y,
+                   const std::vector<double>& grid);
+
+/// From where every run of the group has been evaluated to `end`, in equal intervals.
+std::vector<double> CurveGrid(const RunGroup& group, const EvaluationFigure& x, double end);
+
+/// Success and return over steps and over training time: four panels with a curve for each group.
+Figure LearningCurves(const std::vector<RunGroup>& groups);
+
+}  // namespace upswing

@@ -1,0 +1,57 @@
+#include "report/runs.h"
+
+#include "core/csv.h"
+#include "core/error.h"
+#include "core/file.h"
+#include "core/text.h"
+
+namespace upswing {
+
+namespace fs = std::filesystem;
+
+std::vector<EvaluationRow> ReadEvaluations(const fs::path& run, bool may_be_cut) {
+  const fs::path path = run / "evals.csv";
+  if (!fs::exists(path)) return {};
+  std::string text = ReadTextFile(path);
+  if (!text.empty() && !text.ends_with('\n')) {
+    if (!may_be_cut) {
+      throw BadInput(Concat(path.string(), ": its last line is half-written: expected a run that ",
+                            "has finished (train --resume mends it)"));
+    }
+    text.erase(text.rfind('\n') + 1);  // everything if there is no whole line
+  }
+  const auto columns =
+      ReadCsv(text, {"step", "seconds", "success_rate", "mean_return"}, path.string());
+  std::vector<EvaluationRow> rows;
+  for (size_t i = 0; i < columns[0].values.size(); ++i) {
+    rows.push_back({static_cast<int64_t>(columns[0].values[i]), columns[1].values[i],
+                    columns[2].values[i], columns[3].values[i]});
+    if (i > 0 && (rows[i].step <= rows[i - 1].step || rows[i].seconds < rows[i - 1].seconds)) {
+      throw BadInput(Concat(path.string(), ": expected steps and seconds that rise, got ",
+                            rows[i - 1].step, " and ", rows[i].step, " steps, ",
+                            FormatNumber(rows[i - 1].seconds), " and ",
+                            FormatNumber(rows[i].seconds), " s in rows ", i, " and ", i + 1));
+    }
+  }
+  return rows;
+}
+
+std::optional<size_t> SolvedAt(const RunRecord& run) {
+  const RunPlan& plan = run.plan;
+  const auto counts = [&](const EvaluationRow& row) {
+    const bool in_turn = row.step / plan.eval_every != (row.step - plan.envs) / plan.eval_every;
+    return in_turn && row.success_rate == 1;
+  };
+  for (size_t i = 1; i < run.evaluations.size(); ++i) {
+    if (counts(run.evaluations[i - 1]) && counts(run.evaluations[i])) return i - 1;
+  }
+  return std::nullopt;
+}
+
+bool Finished(const RunRecord& run) {
+  if (run.evaluations.empty()) return false;
+  const bool used_up = run.evaluations.back().step >= run.plan.steps;
+  return used_up || (run.plan.stop_when_solved && SolvedAt(run).has_value());
+}
+
+}  // namespace upswing

@@ -1,0 +1,80 @@
+#include "report/runs.h"
+
+#include <gtest/gtest.h>
+
+#include "core/error.h"
+#include "core/file.h"
+#include "core/testing.h"
+#include "report/testing.h"
+
+namespace upswing {
+namespace {
+
+TEST(Runs, SolvedAtTheFirstOfTwoPerfectEvaluationsInARow) {
+  EXPECT_EQ(SolvedAt(MadeRun(1, {{0, 0}, {1, 0}, {1, 0}, {0, 0}})), 1U);
+  EXPECT_EQ(SolvedAt(MadeRun(1, {{1, 0}, {0.99, 0}, {1, 0}, {0, 0}, {1, 0}, {1, 0}})), 4U);
+  EXPECT_FALSE(SolvedAt(MadeRun(1, {{1, 0}, {0.5, 0}, {1, 0}})));
+  EXPECT_FALSE(SolvedAt(MadeRun(1, {})));
+}
+
+TEST(Runs, AnEvaluationOutOfTurnDoesNotCount) {
+  RunRecord run = MadeRun(1, {{0, 0}, {1, 0}, {1, 0}}, 2504);
+  EXPECT_EQ(SolvedAt(run), 1U);
+  run.evaluations.back().step = 2504;  // the end of the budget, between two turns
+  EXPECT_FALSE(SolvedAt(run));
+  EXPECT_TRUE(Finished(run));
+  run.evaluations.back().step = 3000 + 4;  // the first multiple of 8 after the turn
+  EXPECT_EQ(SolvedAt(run), 1U);
+}
+
+TEST(Runs, FinishedOnceTheBudgetIsUsedOrItWasToStop) {
+  EXPECT_FALSE(Finished(MadeRun(1, {})));
+  EXPECT_FALSE(Finished(MadeRun(1, {{0, 0}, {1, 0}})));
+  EXPECT_TRUE(Finished(MadeRun(1, {{1, 0}, {1, 0}})));
+  EXPECT_FALSE(Finished(MadeRun(1, {{1, 0}, {1, 0}}, 5000, false)));
+  EXPECT_TRUE(Finished(MadeRun(1, {{0, 0}, {0, 0}}, 2000)));
+}
+
+class ReadEvaluationsTest : public testing::Test {
+ protected:
+  std::string Complaint(const std::string& text) {
+    WriteFileAtomically(folder_ / "evals.csv", text);
+    try {
+      ReadEvaluations(folder_.path(), false);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.exit_code(), 2);
+      return error.what();
+    }
+    return "none";
+  }
+  const std::string head_ = "step,success_rate,mean_return,seconds\n";
+  TempFolder folder_;
+};
+
+TEST_F(ReadEvaluationsTest, RowsAndNone) {
+  EXPECT_TRUE(ReadEvaluations(folder_.path(), false).empty());
+  EXPECT_EQ(Complaint(head_ + "1000,0.5,20,1.5\n2000,1,2600,3\n"), "none");
+  const auto rows = ReadEvaluations(folder_.path(), false);
+  ASSERT_EQ(rows.size(), 2U);
+  EXPECT_EQ(rows[1].step, 2000);
+  EXPECT_EQ(rows[1].success_rate, 1);
+  EXPECT_EQ(rows[1].mean_return, 2600);
+  EXPECT_EQ(rows[1].seconds, 3);
+}
+
+TEST_F(ReadEvaluationsTest, HalfALineIsToldOrLeftOut) {
+  EXPECT_NE(Complaint(head_ + "1000,0,20,1\n2000,1,26").find("half-written"), std::string::npos);
+  EXPECT_EQ(ReadEvaluations(folder_.path(), true).size(), 1U);
+  EXPECT_NE(Complaint("step,succ").find("half-written"), std::string::npos);
+  EXPECT_TRUE(ReadEvaluations(folder_.path(), true).empty());
+}
+
+TEST_F(ReadEvaluationsTest, TablesThatCannotBe) {
+  EXPECT_NE(Complaint(head_ + "1000,0,x,1\n").find("evals.csv:2: mean_return"), std::string::npos);
+  EXPECT_NE(Complaint("step,seconds\n1,2\n").find("\"success_rate\""), std::string::npos);
+  EXPECT_NE(Complaint(head_ + "1000,0,20,1\n1000,0,20,2\n").find("rise"), std::string::npos);
+  EXPECT_NE(Complaint(head_ + "1000,0,20,1\n2000,0,20,0.5\n").find("rise"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace upswing

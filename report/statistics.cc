@@ -1,0 +1,94 @@
+#include "report/statistics.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "core/rng.h"
+
+namespace upswing {
+namespace {
+
+/// Scores of all tasks together.
+std::vector<double> Pooled(std::span<const std::vector<double>> strata) {
+  std::vector<double> pooled;
+  for (const std::vector<double>& stratum : strata) {
+    pooled.insert(pooled.end(), stratum.begin(), stratum.end());
+  }
+  return pooled;
+}
+
+/// A figure of two agents, who are resampled independently: the strata of one, then of the other.
+Estimate EstimateOfTwo(const Strata& x, const Strata& y,
+                       const std::function<double(std::span<const std::vector<double>>,
+                                                  std::span<const std::vector<double>>)>& figure,
+                       int64_t resamples) {
+  Strata both = x;
+  both.insert(both.end(), y.begin(), y.end());
+  const auto statistic = [&](const Strata& strata) {
+    const std::span<const std::vector<double>> all = strata;
+    return figure(all.first(x.size()), all.subspan(x.size()));
+  };
+  return {statistic(both), BootstrapInterval(both, statistic, resamples)};
+}
+
+}  // namespace
+
+double InterquartileMean(std::vector<double> values) {
+  std::ranges::sort(values);
+  const size_t cut = values.size() / 4;
+  const std::span middle = std::span(values).subspan(cut, values.size() - 2 * cut);
+  return std::accumulate(middle.begin(), middle.end(), 0.0) / static_cast<double>(middle.size());
+}
+
+double ProbabilityOfImprovement(std::span<const double> x, std::span<const double> y) {
+  double u = 0;
+  for (const double a : x) {
+    for (const double b : y) u += a > b ? 1.0 : a == b ? 0.5 : 0.0;
+  }
+  return u / (static_cast<double>(x.size()) * static_cast<double>(y.size()));
+}
+
+std::optional<Interval> BootstrapInterval(Strata strata,
+                                          const std::function<double(const Strata&)>& statistic,
+                                          int64_t resamples) {
+  for (std::vector<double>& stratum : strata) {
+    if (stratum.size() < 2) return std::nullopt;
+    std::ranges::sort(stratum);
+  }
+  Rng rng(0, "bootstrap");
+  Strata resample = strata;
+  std::vector<double> values(static_cast<size_t>(resamples));
+  for (double& value : values) {
+    for (size_t s = 0; s < strata.size(); ++s) {
+      for (double& score : resample[s]) score = strata[s][rng.Below(strata[s].size())];
+    }
+    value = statistic(resample);
+  }
+  std::ranges::sort(values);
+  return Interval{Quantile(values, 0.025), Quantile(values, 0.975)};
+}
+
+Estimate EstimateIqm(const Strata& scores, int64_t resamples) {
+  const auto iqm = [](const Strata& strata) { return InterquartileMean(Pooled(strata)); };
+  return {iqm(scores), BootstrapInterval(scores, iqm, resamples)};
+}
+
+Estimate EstimateIqmDifference(const Strata& x, const Strata& y, int64_t resamples) {
+  const auto difference = [](auto a, auto b) {
+    return InterquartileMean(Pooled(a)) - InterquartileMean(Pooled(b));
+  };
+  return EstimateOfTwo(x, y, difference, resamples);
+}
+
+Estimate EstimateImprovement(const Strata& x, const Strata& y, int64_t resamples) {
+  const auto mean_probability = [](auto a, auto b) {
+    double sum = 0;
+    for (size_t task = 0; task < a.size(); ++task) {
+      sum += ProbabilityOfImprovement(a[task], b[task]);
+    }
+    return sum / static_cast<double>(a.size());
+  };
+  return EstimateOfTwo(x, y, mean_probability, resamples);
+}
+
+}  // namespace upswing

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/sample.h"
+
+/// Figures over independent runs, as Agarwal, Schwarzer, Castro, Courville and Bellemare (2021),
+/// "Deep Reinforcement Learning at the Edge of the Statistical Precipice", recommend them.
+/// docs/statistics.md has the formulas. A score may be infinite (a run that never solved its task),
+/// but not NaN.
+namespace upswing {
+
+inline constexpr int64_t kResamples = 10000;  // of a bootstrap interval, unless said otherwise
+
+/// Scores of one agent: for each task, which is a stratum, the scores of its runs.
+using Strata = std::vector<std::vector<double>>;
+
+/// A figure with its 95% interval; none where a stratum has less than two runs.
+struct Estimate {
+  double value = 0;
+  std::optional<Interval> interval = {};
+};
+
+/// Mean of the middle half: what is left without the floor(n/4) smallest and largest of n values.
+/// Infinite once an infinite value is among them. `values` is not empty.
+double InterquartileMean(std::vector<double> values);
+
+/// Share of the pairs with x > y, ties as half (Mann and Whitney's U over the number of pairs).
+/// Neither is empty.
+double ProbabilityOfImprovement(std::span<const double> x, std::span<const double> y);
+
+/// 95% interval of a statistic by the stratified percentile bootstrap (Efron, 1979): each resample
+/// draws as many scores from each stratum as it has, with replacement, and the interval reaches
+/// from the 2.5% to the 97.5% quantile of the statistic over the resamples. The same scores give
+/// the same interval, in whatever order a stratum has them. Nothing if a stratum has less than two.
+std::optional<Interval> BootstrapInterval(Strata strata,
+                                          const std::function<double(const Strata&)>& statistic,
+                                          int64_t resamples = kResamples);
+
+/// Interquartile mean over the runs of all tasks.
+Estimate EstimateIqm(const Strata& scores, int64_t resamples = kResamples);
+
+/// Interquartile mean of `x` less that of `y`; scores are finite.
+Estimate EstimateIqmDifference(const Strata& x, const Strata& y, int64_t resamples = kResamples);
+
+/// Probability that a run of `x` has the higher score than one of `y` on the same task, as a mean
+/// over the tasks.
+Estimate EstimateImprovement(const Strata& x, const Strata& y, int64_t resamples = kResamples);
+
+}  // namespace upswing

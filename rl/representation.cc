@@ -1,0 +1,35 @@
+#include "rl/representation.h"
+
+#include <algorithm>
+#include <numeric>
+#include <vector>
+
+namespace upswing {
+
+double FeatureRank(Matrix<const float> features) {
+  // XXᵀ has the same eigenvalues that are not 0; its trace is Σ λ, the sum of its squares Σ λ².
+  double trace = 0, squares = 0;
+  for (int i = 0; i < features.rows(); ++i) {
+    const auto x = features.row(i);
+    for (int j = 0; j < features.rows(); ++j) {
+      const double dot = std::inner_product(x.begin(), x.end(), features.row(j).begin(), 0.0);
+      if (i == j) trace += dot;
+      squares += dot * dot;
+    }
+  }
+  return squares > 0 ? trace * trace / squares : 0;
+}
+
+double DormantShare(Matrix<const float> features) {
+  std::vector<double> sums(static_cast<size_t>(features.cols()));
+  for (int i = 0; i < features.rows(); ++i) {
+    const auto x = features.row(i);
+    for (size_t unit = 0; unit < sums.size(); ++unit) sums[unit] += x[unit];
+  }
+  const double units = static_cast<double>(sums.size());
+  const double threshold = 0.025 * std::accumulate(sums.begin(), sums.end(), 0.0) / units;
+  const auto dormant = std::ranges::count_if(sums, [&](double sum) { return sum <= threshold; });
+  return static_cast<double>(dormant) / units;
+}
+
+}  // namespace upswing

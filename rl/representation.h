@@ -1,0 +1,17 @@
+#pragma once
+
+#include "core/matrix.h"
+
+/// How much of itself a network still uses: two figures that fall when value learning decays.
+namespace upswing {
+
+/// Participation ratio (Σ λ)² / Σ λ² of the eigenvalues λ of XᵀX, for features X (B × W): 1 if all
+/// rows point in one direction, up to min(B, W) if they fill all evenly. A smooth relative of the
+/// effective rank of Kumar et al. (2021); 0 if all features are 0.
+double FeatureRank(Matrix<const float> features);
+
+/// Share of the units (columns of features (B × W) after ReLU) whose mean activation is at most
+/// 0.025 of the layer's mean (Sokar et al., 2023, Definition 3.1); 1 if all features are 0.
+double DormantShare(Matrix<const float> features);
+
+}  // namespace upswing

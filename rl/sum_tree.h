@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/archive.h"
+
+namespace upswing {
+
+/// Numbers that are not negative, with a binary tree of their sums: setting one and finding where a
+/// partial sum is reached take O(log n) (Schaul et al., 2016, Appendix B.2.1).
+///
+/// Each sum is that of its two children, so that the same numbers give the same bits, in whatever
+/// order they were set.
+class SumTree {
+ public:
+  /// Room for `capacity` numbers, all 0.
+  explicit SumTree(int64_t capacity);
+
+  void Set(int64_t index, double value);
+  double at(int64_t index) const { return nodes_[leaves_ + static_cast<size_t>(index)]; }
+  double total() const { return nodes_[1]; }
+
+  /// The index at which the running sum of the numbers first exceeds `mass`, for mass below
+  /// total(). Never one whose number is 0.
+  int64_t Find(double mass) const;
+
+  /// Saves or loads the first `count` numbers; loading throws BadInput unless all are above 0.
+  void State(const Archive& archive, int64_t count);
+
+ private:
+  size_t leaves_;              // a power of two
+  std::vector<double> nodes_;  // (2 · leaves): the root is 1, the children of i are 2i and 2i + 1
+};
+
+}  // namespace upswing
