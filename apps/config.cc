@@ -67,6 +67,8 @@ void Config::Describe(Options& o) {
         "share of the episodes that begin anywhere instead of hanging");
   o.Add(&random_start_velocity, "random_start_velocity", 5, {0, 50}, "rad/s",
         "largest velocity of those");
+  o.Add(&memory, "memory", 0, {0, 100}, "steps",
+        "past steps whose torque and change of velocities the agent sees too");
   o.AddChoice(&physics, "physics", PhysicsNames(),
               "engine to train in; closed-form is a faster twin of mujoco");
   std::vector<std::string> judges = PhysicsNames();
@@ -91,6 +93,7 @@ PendulumEnvConfig Config::Environments(ThreadPool& pool) const {
   env.randomization = randomization;
   env.num_envs = static_cast<int>(train.envs);
   env.episode_seconds = episode_seconds;
+  env.memory = static_cast<int>(memory);
   env.start = {train.start_noise, random_start_share, random_start_velocity};
   env.weights = reward;
   env.seed = static_cast<uint64_t>(train.seed);
@@ -194,9 +197,11 @@ LoadedPolicy LoadPolicy(const fs::path& path) {
         Concat(file.string(), ": no such file; expected a policy.safetensors or a run ", "folder"));
   }
   LoadedPolicy loaded{file, Policy::Load(file), Plant(), ""};
-  if (loaded.policy.shape().inputs != kObservationSize) {
+  const int remembered = static_cast<int>(loaded.policy.shape().inputs) - kObservationSize;
+  if (remembered < 0 || remembered % kMemorySize != 0) {
     throw BadInput(Concat(file.string(), ": expected a policy of ", kObservationSize,
-                          " observations, got ", loaded.policy.shape().inputs));
+                          " observations and ", kMemorySize, " for each step of memory, got ",
+                          loaded.policy.shape().inputs));
   }
   const Options options = OptionsOf(loaded.plant);
   try {
@@ -215,6 +220,15 @@ LoadedPolicy LoadPolicy(const fs::path& path) {
 std::map<std::string, std::string> AboutTask(const Config& config) {
   json plant;
   for (const auto& [name, value] : PlantValues(config.plant)) plant[name] = value;
+  json observation{
+      {"names", {"cos q1", "sin q1", "w1", "cos q2", "sin q2", "w2", "energy", "height"}},
+      {"max_velocity", {kMaxVelocity1, kMaxVelocity2}}};
+  if (config.memory > 0) {
+    observation["memory"] = {{"steps", config.memory},
+                             {"names", {"change of w1", "change of w2", "torque"}},
+                             {"velocity", kMemoryVelocity},
+                             {"torque", kMemoryTorque}};
+  }
   std::map<std::string, std::string> about{
       {"agent", config.agent},
       {"seed", std::to_string(config.train.seed)},
@@ -222,10 +236,7 @@ std::map<std::string, std::string> AboutTask(const Config& config) {
       {"config", ConfigToml(config, true)},
       {"plant", plant.dump()},
       {"control_period", FormatNumber(kControlPeriod)},
-      {"observation",
-       json{{"names", {"cos q1", "sin q1", "w1", "cos q2", "sin q2", "w2", "energy", "height"}},
-            {"max_velocity", {kMaxVelocity1, kMaxVelocity2}}}
-           .dump()},
+      {"observation", observation.dump()},
   };
   if (!config.mjcf.empty()) about["model"] = config.mjcf;
   return about;

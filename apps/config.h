@@ -25,6 +25,7 @@ struct Config {
   std::string model;  // path of an MJCF file instead of the built-in model; empty: built-in
   TrainConfig train;
   double episode_seconds, random_start_share, random_start_velocity;
+  int64_t memory;
   std::string physics, eval_physics;  // as ParsePhysics has it, to train and to judge in
   Plant plant;
   Disturbance disturbance;

@@ -122,6 +122,7 @@ int RunEval(const EvalArguments& arguments) {
   const Trial trial = TrialOf(arguments.flags);
   const LoadedPolicy loaded = LoadPolicy(arguments.policy);
   config.mjcf = loaded.mjcf;
+  config.memory = MemorySteps(loaded.policy.shape().inputs);
   const Plant plant = ChangedPlant(loaded.plant, arguments.model, arguments.set, config.mjcf);
   config.plants = {plant};
   config.disturbances = {trial.disturbance};

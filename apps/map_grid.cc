@@ -79,6 +79,7 @@ std::vector<EpisodeResult> RunRange(const MapConfig& config, const Policy& polic
   PendulumEnvConfig env_config;
   env_config.physics = config.physics;
   env_config.mjcf = config.mjcf;
+  env_config.memory = MemorySteps(policy.shape().inputs);
   env_config.num_envs = range.count;
   env_config.episode_seconds = kEvaluationSeconds + 1;
   env_config.seed = config.seed;

@@ -40,6 +40,9 @@ std::vector<RolloutRow> RunRollout(const RolloutConfig& config) {
   PendulumEnvConfig env_config;
   env_config.physics = config.physics;
   env_config.mjcf = config.mjcf;
+  if (config.policy != nullptr) {
+    env_config.memory = MemorySteps(config.policy->shape().inputs);
+  }
   env_config.plants = {config.plant};
   env_config.episode_seconds = config.seconds + 1;
   PendulumEnv env(env_config);

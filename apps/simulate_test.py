@@ -6,7 +6,7 @@ import math
 import unittest
 from pathlib import Path
 
-from testing import ProgramTest, small
+from testing import ProgramTest, read_tensors, small
 
 REFERENCE = Path(__file__).resolve().parent / "testdata/mujoco_trajectory.csv"
 COLUMNS = ["t", "qpos0", "qpos1", "qvel0", "qvel1", "torque", "energy", "height", "inverted",
@@ -251,6 +251,16 @@ class PolicyRolloutTest(ProgramTest):
                          output)
         self.assertNotEqual(self.succeed("simulate", "heavy", "--seconds", 2, "--set", "mass2=1"),
                             output)
+
+
+    def test_a_policy_with_memory_acts_on_it(self):
+        self.succeed(*small(memory=2, out="remembering"))
+        rows = parse(self.succeed("simulate", "remembering", "--seconds", "0.1"))
+        self.assertEqual(len(rows), 6)
+        self.assertIn('"steps":2', read_tensors(self.folder / "remembering/policy.safetensors")[0]
+                      ["observation"])
+        self.succeed("eval", "remembering", "--episodes", 2)
+        self.succeed("info", "remembering")
 
 
 if __name__ == "__main__":

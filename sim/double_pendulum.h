@@ -74,7 +74,18 @@ inline constexpr double kMaxVelocity2 = 20.0;
 /// NormalizedEnergy and ĥ = TipHeight over l1 + l2, in [-1, 1].
 std::array<float, kObservationSize> Observe(const Plant& plant, const PendulumState& s);
 
-/// How an observation's signs change in a mirror, which turns angles, velocities and torque around.
+/// What an observation may remember of each past control step, from the last one backwards: [Δw1,
+/// Δw2, tau], the change of the velocities in it over kMemoryVelocity, and the torque that was
+/// chosen for it over kMemoryTorque. How the plant answered tells what the state alone does not:
+/// how heavy and how long it is, and which torques are still under way.
+inline constexpr int kMemorySize = 3;
+/// How many steps an observation of so many numbers remembers.
+constexpr int MemorySteps(int obs_size) { return (obs_size - kObservationSize) / kMemorySize; }
+/// About what the motor can do in a control period (rad/s), and its usual limit (N·m).
+inline constexpr double kMemoryVelocity = 1.0, kMemoryTorque = 5.0;
+
+/// How an observation's signs change in a mirror, which turns angles, velocities and torque around;
+/// what it remembers changes all signs.
 inline constexpr std::array<float, kObservationSize> kMirrorSigns{1, -1, -1, 1, -1, -1, 1, 1};
 
 inline constexpr int kRewardTerms = 5;

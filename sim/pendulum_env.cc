@@ -33,7 +33,7 @@ PendulumEnv::PendulumEnv(const PendulumEnvConfig& config)
       disturber_(MakeDisturber(config)) {
   const auto n = static_cast<size_t>(config_.num_envs);
   step_counts_.resize(n);
-  obs_.resize(n * kObservationSize);
+  obs_.resize(n * static_cast<size_t>(obs_size()));
   if (config_.randomization.any()) plants_.resize(n);
   for (int i = 0; i < config_.num_envs; ++i) {
     const uint64_t index = config_.first_index + static_cast<uint64_t>(i);
@@ -51,23 +51,43 @@ std::vector<std::string> PendulumEnv::reward_term_names() const {
 }
 
 std::vector<float> PendulumEnv::mirror_signs() const {
-  return {kMirrorSigns.begin(), kMirrorSigns.end()};
+  std::vector<float> signs(kMirrorSigns.begin(), kMirrorSigns.end());
+  signs.resize(static_cast<size_t>(obs_size()), -1.0F);
+  return signs;
 }
 
-Matrix<const float> PendulumEnv::obs() const {
-  return {obs_.data(), config_.num_envs, kObservationSize};
-}
+Matrix<const float> PendulumEnv::obs() const { return {obs_.data(), config_.num_envs, obs_size()}; }
 
 void PendulumEnv::SetState(int env, const PendulumState& s) {
   physics_->SetState(env, s);
   step_counts_[static_cast<size_t>(env)] = 0;
   if (disturber_) disturber_->Begin(env);
+  std::ranges::fill(Row(obs_, env), 0.0F);  // nothing to remember yet
   std::ranges::copy(Observation(env), Row(obs_, env).begin());
 }
 
 std::array<float, kObservationSize> PendulumEnv::Observation(int env) {
   const PendulumState s = state(env);
   return Observe(plant(env), disturber_ ? disturber_->Measure(env, s) : s);
+}
+
+void PendulumEnv::SpreadRows(std::vector<float>& table) const {
+  // From the last one backwards, so that none is overwritten before it was moved.
+  for (int env = config_.num_envs - 1; env > 0; --env) {
+    const auto from = table.begin() + static_cast<ptrdiff_t>(env) * kObservationSize;
+    std::copy(from, from + kObservationSize, Row(table, env).begin());
+  }
+}
+
+void PendulumEnv::Remember(int env, double torque, std::span<float> obs) const {
+  const auto before = Row(obs_, env);
+  const auto entry = obs.subspan(kObservationSize, kMemorySize);
+  entry[0] = (obs[2] - before[2]) * static_cast<float>(kMaxVelocity1 / kMemoryVelocity);
+  entry[1] = (obs[5] - before[5]) * static_cast<float>(kMaxVelocity2 / kMemoryVelocity);
+  entry[2] = static_cast<float>(torque / kMemoryTorque);
+  const auto older =
+      before.subspan(kObservationSize).first(obs.size() - kObservationSize - kMemorySize);
+  std::ranges::copy(older, obs.subspan(kObservationSize + kMemorySize).begin());
 }
 
 void PendulumEnv::Randomize(int env) {
@@ -109,14 +129,14 @@ void PendulumEnv::StandIn(int env, StepResult& result) const {
 
 void PendulumEnv::Step(std::span<const double> torque, StepResult& result) {
   physics_->Step(disturber_ ? disturber_->Apply(torque, step_counts_) : torque, result);
+  if (config_.memory > 0) SpreadRows(result.next_obs);  // physics write them without a memory
   for (int env = 0; env < config_.num_envs; ++env) {
     const auto i = static_cast<size_t>(env);
     ++step_counts_[i];
-    if (result.terminated[i]) {
-      StandIn(env, result);
-    } else if (disturber_) {
-      std::ranges::copy(Observation(env), Row(result.next_obs, env).begin());
-    }
+    const auto next_obs = Row(result.next_obs, env);
+    if (disturber_) std::ranges::copy(Observation(env), next_obs.begin());
+    if (config_.memory > 0) Remember(env, torque[i], next_obs);
+    if (result.terminated[i]) StandIn(env, result);
     result.truncated[i] = step_counts_[i] >= episode_steps_ && !result.terminated[i] ? 1 : 0;
   }
   // What to act on next is the successor, or a new start.

@@ -27,6 +27,7 @@ struct StartStates {
 /// What a PendulumEnv is made of.
 struct PendulumEnvConfig : PhysicsConfig {
   double episode_seconds = 10;
+  int memory = 0;  // past control steps in an observation
   StartStates start;
   uint64_t seed = 0;
   std::string stream = "environment";  // environment i draws from (seed, stream, first_index + i)
@@ -51,7 +52,7 @@ class PendulumEnv : public VectorEnv {
   explicit PendulumEnv(const PendulumEnvConfig& config);
 
   int num_envs() const override { return config_.num_envs; }
-  int obs_size() const override { return kObservationSize; }
+  int obs_size() const override { return kObservationSize + config_.memory * kMemorySize; }
   std::vector<std::string> reward_term_names() const override;
   double step_seconds() const override { return kControlPeriod; }
   double torque_limit() const override { return config_.plant(0).torque_limit; }
@@ -75,13 +76,18 @@ class PendulumEnv : public VectorEnv {
   void Randomize(int env);
   /// What the environment's sensors say now.
   std::array<float, kObservationSize> Observation(int env);
+  /// Moves rows of kObservationSize numbers to where those of an observation with memory begin.
+  void SpreadRows(std::vector<float>& table) const;
+  /// Adds to a new observation (D) what is remembered under the torque chosen for the last step.
+  void Remember(int env, double torque, std::span<float> obs) const;
   /// There is no successor of a state that blew up; the last that had numbers stands in for it.
   void StandIn(int env, StepResult& result) const;
 
   /// One environment's observation (D) within a table of them.
   template <typename Table>
-  static auto Row(Table& table, int env) {
-    return std::span(table).subspan(static_cast<size_t>(env) * kObservationSize, kObservationSize);
+  auto Row(Table& table, int env) const {
+    const auto size = static_cast<size_t>(obs_size());
+    return std::span(table).subspan(static_cast<size_t>(env) * size, size);
   }
 
   PendulumEnvConfig config_;
