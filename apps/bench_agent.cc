@@ -91,7 +91,8 @@ BenchCase GradientCase(const DqnConfig& config, int threads,
               Rng rng{1, "replay sampling"};
               Parts(const DqnConfig& c, int pool_threads)
                   : pool(pool_threads),
-                    agent(c, 1, kObservationSize, Torques(), {}, 1, pool),
+                    agent(c, 1, kObservationSize, Torques(),
+                          {kMirrorSigns.begin(), kMirrorSigns.end()}, 1, pool),
                     batch(static_cast<int>(c.batch), kObservationSize) {}
             };
             const auto parts = std::make_shared<Parts>(config, threads);

@@ -34,7 +34,9 @@ agent = "dqn"
 """
 # The same settings as flags.
 FLAGS = {"hidden": 8, "head": 8, "steps": 400, "eval_every": 200, "eval_episodes": 2,
-         "log_every": 200, "learning_starts": 50, "checkpoint_every": None, "threads": None}
+         "log_every": 200, "learning_starts": 50, "checkpoint_every": None, "threads": None,
+         "envs": None, "updates_per_step": None}
+SUMMARY = {"summary.csv", "runs.csv", "curves.svg", "curves.png"}
 VARIANTS = {"with": {}, "but": {"layer_norm": False, "gamma": 0.9}, "plain": {"agent": "dqn"}}
 
 
@@ -50,7 +52,7 @@ class StudyTest(ProgramTest):
             'Training "Little" in runs/little\n  3 variants, seeds 1-2: 6 runs'), output)
         self.assertIn("./upswing compare runs/little\n", output)
         study = self.folder / "runs/little"
-        self.assertEqual({path.name for path in study.iterdir()}, {"study.toml", *VARIANTS})
+        self.assertEqual({path.name for path in study.iterdir()}, {"study.toml", *VARIANTS, *SUMMARY})
         self.assertEqual((study / "study.toml").read_text(encoding="utf-8"), STUDY)
         for name, changes in VARIANTS.items():
             for seed in (1, 2):
@@ -86,7 +88,8 @@ class StudyTest(ProgramTest):
         self.succeed("study", "little.toml")
         after = snapshot(self.folder / "runs/little")
         self.assertIn("new/seed2/policy.safetensors", after)
-        before.pop("study.toml")
+        for name in ("study.toml", *SUMMARY):
+            before.pop(name)
         self.assertEqual({name: after[name] for name in before}, before)
 
     def test_killed_and_gone_on_with_equals_never_stopped(self):
@@ -154,7 +157,7 @@ class StudyTest(ProgramTest):
 
     def test_the_studies_of_the_project_can_be_run(self):
         studies = sorted((ROOT / "configs/studies").glob("*.toml"))
-        self.assertEqual(len(studies), 4)
+        self.assertEqual(len(studies), 5)
         for path in studies:
             with self.subTest(study=path.stem):
                 process = self.start("study", path, "--seeds", "1-1", "--jobs", 1)

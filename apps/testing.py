@@ -27,7 +27,7 @@ REWARD_TERMS = ["energy", "height", "balance", "velocity_penalty", "torque_penal
 # A training of a fraction of a second that evaluates twice.
 SMALL = {"agent": "d3qn-small", "hidden": 32, "head": 16, "steps": 4000, "eval_every": 2000,
          "eval_episodes": 4, "checkpoint_every": 500, "log_every": 500, "learning_starts": 200,
-         "threads": 1, "out": "run"}
+         "threads": 1, "out": "run", "envs": 8, "updates_per_step": 0.25}
 
 
 # A double pendulum as MJCF that another hand might have written.

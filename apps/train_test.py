@@ -10,7 +10,7 @@ from testing import (MODEL, REWARD_TERMS, ROOT, RUN_FILES, ProgramTest, read_csv
 
 ENDLESS = small(steps=10**9, stop_when_solved=False)
 METRICS = ["step", "episodes", "updates", "epsilon", "learning_rate", "loss", "q", "td_error",
-           "gradient_norm", "mean_return", "success_rate", "seconds"]
+           "gradient_norm", "feature_rank", "dormant_share", "mean_return", "success_rate", "seconds"]
 EPISODES = ["step", "episode", "return", "length", "terminated", *REWARD_TERMS]
 EVALS = ["step", "success_rate", "success_low", "success_high", "mean_return", "swing_up_seconds",
          "work", "rms_torque", "value", "discounted_return", "seconds"]
