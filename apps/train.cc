@@ -250,7 +250,7 @@ void AddTrain(CLI::App& program, Command& command) {
   AddSettings(*app, OptionsOf(defaults), arguments->flags);
 
   std::string agents = "Named agents:\n";
-  for (const auto& [name, what] : NamedAgents()) agents += fmt::format("  {:<14}{}\n", name, what);
+  for (const auto& [name, what] : NamedAgents()) agents += fmt::format("  {:<17}{}\n", name, what);
   app->footer(
       agents +
       "\nExamples:\n"
