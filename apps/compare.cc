@@ -149,10 +149,12 @@ void AddCompare(CLI::App& program, Command& command) {
   app->add_option("--out", a->out, "write summary.csv, runs.csv, curves.svg and curves.png there")
       ->type_name("FOLDER")
       ->check(NotEmpty());
-  app->add_flag("--unfinished", a->unfinished, "take runs that are unfinished as they are");
+  app->add_flag("--unfinished", a->unfinished, "take runs that are unfinished as they are")
+      ->disable_flag_override();
   app->add_flag("--different-tasks", a->different_tasks,
-                "compare runs that are judged on different tasks (plant, evaluations) as well");
-  app->add_flag("--json", a->as_json, "print JSON");
+                "compare runs that are judged on different tasks (plant, evaluations) as well")
+      ->disable_flag_override();
+  app->add_flag("--json", a->as_json, "print JSON")->disable_flag_override();
   app->footer(
       "Runs with the same settings but the seed are one group. Figures are over its runs: the\n"
       "interquartile mean (IQM) with a 95% bootstrap interval; docs/statistics.md defines each.\n"

@@ -28,6 +28,7 @@ struct FoundRun {
   RunRecord run;
   std::string agent, variant;     // its named agent; its folder's name within a study, or empty
   std::vector<Setting> settings;  // that make it another run, without the seed
+  bool named = false;             // asked for itself, not found in a folder
 };
 
 bool IsRun(const fs::path& folder) {
@@ -81,7 +82,7 @@ bool IsJudged(const std::string& name) {
          });
 }
 
-FoundRun ReadRun(const fs::path& path, const fs::path& argument, bool unfinished) {
+FoundRun ReadRun(const fs::path& path, const fs::path& root, bool unfinished) {
   const Config config = BuildConfig(path / "config.toml", {});
   const TrainConfig& t = config.train;
   FoundRun found{{path, {t.seed, t.steps, t.envs, t.eval_every, t.stop_when_solved}, {}},
@@ -90,23 +91,31 @@ FoundRun ReadRun(const fs::path& path, const fs::path& argument, bool unfinished
                  SettingsOf(config)};
   found.run.evaluations = ReadEvaluations(path, unfinished);
   // STUDY/VARIANT/seed1: the variant has a name of its own.
-  const fs::path below = path.lexically_relative(argument);
+  const fs::path below = path.lexically_relative(root);
   if (std::distance(below.begin(), below.end()) > 1) {
     found.variant = path.parent_path().filename().string();
   }
   return found;
 }
 
-/// Refuses runs that are the same, or that are judged on different tasks.
-void CheckTogether(const std::vector<FoundRun>& runs, bool different_tasks) {
+/// Takes out trainings that were found before, and notes it; throws at one that was named itself.
+void LeaveOutTwins(std::vector<FoundRun>& runs, std::vector<std::string>& notes) {
   std::map<std::pair<int64_t, std::vector<Setting>>, fs::path> seen;
-  for (const FoundRun& f : runs) {
+  std::erase_if(runs, [&](const FoundRun& f) {
     const auto [before, is_new] = seen.try_emplace({f.run.plan.seed, f.settings}, f.run.path);
-    if (!is_new) {
-      throw BadInput(Concat(f.run.path.string(), ": the same training as ", before->second.string(),
-                            " (all settings and seed ", f.run.plan.seed,
-                            "); expected each run once"));
-    }
+    if (is_new) return false;
+    const std::string what =
+        Concat(f.run.path.string(), ": the same training as ", before->second.string(),
+               " (all settings and seed ", f.run.plan.seed, ")");
+    if (f.named) throw BadInput(Concat(what, "; expected each run once"));
+    notes.push_back(what + ": left out");
+    return true;
+  });
+}
+
+/// Refuses runs that are judged on different tasks.
+void CheckTogether(const std::vector<FoundRun>& runs, bool different_tasks) {
+  for (const FoundRun& f : runs) {
     for (size_t i = 0; i < f.settings.size() && !different_tasks; ++i) {
       const auto& [name, value] = f.settings[i];
       const std::string& first = runs.front().settings[i].second;
@@ -123,7 +132,8 @@ void CheckTogether(const std::vector<FoundRun>& runs, bool different_tasks) {
 /// Takes out what cannot be compared: runs without an evaluation. Throws at unfinished ones, unless
 /// they are asked for; then they are noted.
 void CheckFinished(std::vector<FoundRun>& runs, bool unfinished, std::vector<std::string>& notes) {
-  for (const auto& [run, agent, variant, settings] : runs) {
+  for (const FoundRun& f : runs) {
+    const RunRecord& run = f.run;
     if (Finished(run)) continue;
     const std::string path = run.path.string();
     const int64_t step = run.evaluations.empty() ? 0 : run.evaluations.back().step;
@@ -217,10 +227,13 @@ GroupedRuns GroupRuns(const CompareRequest& request) {
       if (!seen.insert(fs::weakly_canonical(path)).second) {
         throw BadInput(Concat(path.string(), ": given twice; expected each run once"));
       }
-      runs.push_back(ReadRun(path, argument, request.unfinished));
+      const fs::path& root = request.root.empty() ? argument : request.root;
+      runs.push_back(ReadRun(path, root, request.unfinished));
+      runs.back().named = path == argument;
     }
   }
   GroupedRuns grouped;
+  LeaveOutTwins(runs, grouped.notes);
   CheckTogether(runs, request.different_tasks);
   CheckFinished(runs, request.unfinished, grouped.notes);
 

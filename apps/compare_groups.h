@@ -11,8 +11,9 @@ namespace upswing {
 /// Which runs to compare.
 struct CompareRequest {
   std::vector<std::filesystem::path> paths;  // run folders, or folders that hold some, at any depth
-  bool unfinished = false;                   // also those that have not come to their end
-  bool different_tasks = false;              // also those that are judged on different tasks
+  std::filesystem::path root = {};  // below which a run's folder tells its variant; empty: its path
+  bool unfinished = false;          // also those that have not come to their end
+  bool different_tasks = false;     // also those that are judged on different tasks
 };
 
 /// Runs by their settings: those of one group differ in nothing but the seed and what makes no

@@ -7,19 +7,12 @@
 #include <limits>
 
 #include "apps/seeds.h"
+#include "core/sample.h"
 
 namespace upswing {
 namespace {
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
-
-/// Median where some values are infinite: it is, too, if the middle is.
-double MedianOf(std::vector<double> values) {
-  if (values.empty()) return kNever;
-  std::ranges::sort(values);
-  const size_t middle = values.size() / 2;
-  return values.size() % 2 == 1 ? values[middle] : (values[middle - 1] + values[middle]) / 2;
-}
 
 std::string CountOrDash(double value) { return std::isfinite(value) ? FormatCount(value) : "-"; }
 std::string DurationOrDash(double value) {
@@ -134,7 +127,8 @@ void ManyRunsView::PrintTable(const Variant& variant) const {
                                   : fmt::format("at step {}", FormatCount(s.steps)));
   }
   if (!steps.empty()) {
-    PrintRow("median", MedianOf(steps), MedianOf(seconds), MedianOf(success), MedianOf(reward),
+    PrintRow("median", QuartilesOf(steps).median, QuartilesOf(seconds).median,
+             QuartilesOf(success).median, QuartilesOf(reward).median,
              fmt::format("{} of {} solved", solved, steps.size()));
   }
   if (not_judged > 0) {
@@ -150,7 +144,8 @@ void ManyRunsView::Summarize(bool stopped) {
   if (stopped) {
     fmt::print("Stopped, {} of {} runs done; the same command goes on.\n", done, runs_.size());
   }
-  fmt::print("Next:\n  ./upswing compare {}\n", plan_.folder.string());
+  fmt::print("Next:\n  ./upswing compare {}{}\n", plan_.folder.string(),
+             stopped ? " --unfinished" : "");
   std::fflush(stdout);
 }
 

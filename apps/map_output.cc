@@ -82,6 +82,7 @@ std::string CheckText(const MapResult& map) {
   if (a.same_successes < a.cells) {
     text += fmt::format(", the others differ by up to {:.0f}%", 100 * a.largest_success_difference);
   }
+  if (map.mean_success() == 0) return text;  // and no swing-up to compare
   if (a.largest_swing_up_difference == 0) return text + ", swing-up times the same";
   return text +
          fmt::format(", swing-up times differ by up to {:.2f} s", a.largest_swing_up_difference);

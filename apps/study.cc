@@ -76,6 +76,13 @@ std::vector<Variant> ReadVariants(const toml::table& study, const std::string& w
     settings.insert(settings.end(), own.begin(), own.end());
     Variant variant{name, BuildConfig("", settings)};
     MakeReadyForMany(variant.config);
+    for (const auto& [line, other] : placed) {
+      if (ConfigToml(other.config, true) == ConfigToml(variant.config, true)) {
+        throw BadInput(Concat(PlaceOf(node, where), ": variant \"", name,
+                              "\" has the settings of \"", other.name, "\" in line ", line,
+                              "; expected other ones"));
+      }
+    }
     placed.emplace_back(node.source().begin.line, std::move(variant));
   }
   std::ranges::stable_sort(placed, {}, [](const auto& entry) { return entry.first; });
@@ -138,7 +145,15 @@ int RunStudy(const StudyArguments& arguments) {
   const int exit_code = TrainMany(plan);
   if (exit_code != 0) return exit_code;
   // All runs are done: what do they show?
-  const Comparison comparison = Compare({.paths = {plan.folder}, .different_tasks = true});
+  CompareRequest request;
+  request.root = plan.folder;
+  request.different_tasks = true;
+  for (const Variant& variant : plan.variants) {
+    for (const int64_t seed : plan.seeds) {
+      request.paths.push_back(plan.folder / variant.name / Concat("seed", seed));
+    }
+  }
+  const Comparison comparison = Compare(request);
   WriteComparison(comparison, plan.folder, true);
   PrintComparison(comparison);
   fmt::print("Written: summary.csv, runs.csv, curves.svg and curves.png in {}\n",

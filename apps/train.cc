@@ -234,7 +234,9 @@ void CheckManyArguments(const CLI::App& app) {
 void AddTrain(CLI::App& program, Command& command) {
   CLI::App* app = program.add_subcommand("train", "Train an agent until the task is solved");
   auto arguments = std::make_shared<TrainArguments>();
-  app->add_option("--out", arguments->out, "run folder to make [runs/AGENT-seedSEED]")
+  app->add_option("--out", arguments->out,
+                  "run folder to make [runs/AGENT-seedSEED];\n"
+                  "with --seeds the folder of all of them [runs/AGENT]")
       ->type_name("FOLDER")
       ->check(NotEmpty());
   app->add_option("--config", arguments->config, "TOML file of settings; flags override it")

@@ -12,7 +12,7 @@ double Quantile(std::span<const double> sorted, double share) {
   const size_t above = std::min(below + 1, sorted.size() - 1);
   const double between = place - static_cast<double>(below);
   // Interpolating is not defined from infinity to infinity, nor over none of the way to it.
-  if (between == 0 || sorted[below] == sorted[above]) return sorted[below];
+  if (between == 0 || std::isinf(sorted[below])) return sorted[below];
   return std::lerp(sorted[below], sorted[above], between);
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 namespace upswing {
 namespace {
@@ -35,7 +36,7 @@ double LastOf(const std::vector<RunGroup>& groups, const EvaluationFigure& x) {
   return last;
 }
 
-/// Whether a run ends before the longest one does.
+/// Whether a run ends before the longest one does, in steps.
 bool AnyHolds(const std::vector<RunGroup>& groups) {
   const double last = LastOf(groups, Steps);
   return std::ranges::any_of(groups, [&](const RunGroup& group) {

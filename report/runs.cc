@@ -24,6 +24,11 @@ std::vector<EvaluationRow> ReadEvaluations(const fs::path& run, bool may_be_cut)
       ReadCsv(text, {"step", "seconds", "success_rate", "mean_return"}, path.string());
   std::vector<EvaluationRow> rows;
   for (size_t i = 0; i < columns[0].values.size(); ++i) {
+    constexpr double kMostSteps = 1e15;
+    if (!(columns[0].values[i] >= 0 && columns[0].values[i] <= kMostSteps)) {
+      throw BadInput(Concat(path.string(), ": row ", i + 1, ": expected a number of steps, got ",
+                            FormatNumber(columns[0].values[i])));
+    }
     rows.push_back({static_cast<int64_t>(columns[0].values[i]), columns[1].values[i],
                     columns[2].values[i], columns[3].values[i]});
     if (i > 0 && (rows[i].step <= rows[i - 1].step || rows[i].seconds < rows[i - 1].seconds)) {
@@ -38,12 +43,18 @@ std::vector<EvaluationRow> ReadEvaluations(const fs::path& run, bool may_be_cut)
 
 std::optional<size_t> SolvedAt(const RunRecord& run) {
   const RunPlan& plan = run.plan;
-  const auto counts = [&](const EvaluationRow& row) {
+  std::optional<size_t> first;  // of a streak
+  for (size_t i = 0; i < run.evaluations.size(); ++i) {
+    const EvaluationRow& row = run.evaluations[i];
     const bool in_turn = row.step / plan.eval_every != (row.step - plan.envs) / plan.eval_every;
-    return in_turn && row.success_rate == 1;
-  };
-  for (size_t i = 1; i < run.evaluations.size(); ++i) {
-    if (counts(run.evaluations[i - 1]) && counts(run.evaluations[i])) return i - 1;
+    if (!in_turn) continue;
+    if (row.success_rate != 1) {
+      first.reset();
+    } else if (first) {
+      return first;
+    } else {
+      first = i;
+    }
   }
   return std::nullopt;
 }

@@ -21,8 +21,9 @@ struct AgentReport {
   double q = 0;              // mean Q-value of the sampled actions
   double td_error = 0;       // mean |temporal-difference error|
   double gradient_norm = 0;  // mean, before clipping
-  double feature_rank = 0;   // of the last update; see rl/representation.h
-  double dormant_share = 0;  // the same
+  // Of the last update's features; see rl/representation.h. Before the first there are none: 0
+  // and 1.
+  double feature_rank = 0, dormant_share = 1;
 };
 
 /// A learner. The training loop calls Act, Observe, Learn for each lock-step of the environments.

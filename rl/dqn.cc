@@ -20,57 +20,6 @@ int SliceRows(int B) { return std::clamp(B / 4, 8, 32); }
 
 }  // namespace
 
-void DqnConfig::Describe(Options& o) {
-  o.Section("network");
-  o.Add(&hidden, "hidden", {256, 256}, {1, 4096}, "widths of the feature layers");
-  o.Add(&head, "head", 128, {1, 4096}, "", "width of each dueling stream's hidden layer");
-  o.Add(&layer_norm, "layer_norm", true, "layer normalisation after each feature layer");
-
-  o.AddChoice(&precision, "precision", {"float32", "bfloat16"},
-              "of the products while learning; bfloat16 needs AVX512_BF16");
-
-  o.Section("agent");
-  o.Add(&double_q, "double", true, "Double DQN: choose online, evaluate with the target");
-  o.Add(&dueling, "dueling", true, "Dueling: Q = V + A - mean(A)");
-  o.Add(&gamma, "gamma", 0.99, kUnit, "", "discount per control step");
-  o.Add(&n_step, "n_step", 3, {1, 100}, "steps", "length of the returns in the targets");
-  o.Add(&reward_scale, "reward_scale", 0.1, kPositive, "",
-        "the agent learns from reward times this");
-  o.Add(&batch, "batch", 128, {1, 65536}, "", "transitions in a minibatch");
-  o.Add(&replay, "replay", 300000, {1, 10000000}, "", "transitions that the replay memory holds");
-  o.Add(&prioritized, "prioritized", true,
-        "prioritised replay: draw transitions by their last |TD error|");
-  o.Add(&priority_exponent, "priority_exponent", 0.6, kUnit, "",
-        "alpha of prioritised replay; 0: uniform");
-  o.Add(&importance_exponent, "importance_exponent", 0.4, kUnit, "",
-        "beta of prioritised replay at the beginning; it rises to 1 as the learning rate falls");
-  o.Add(&mirror, "mirror", true,
-        "learn from a random half of each minibatch as a mirror would show it");
-  o.Add(&learning_starts, "learning_starts", 2000, kNotNegative, "steps",
-        "before the first update");
-  o.Add(&updates_per_step, "updates_per_step", 0.0625, {0, 100}, "", "gradient steps per step");
-  o.Add(&learning_rate, "learning_rate", 1e-3, {0, 10}, "",
-        "learning rate of Adam at the beginning");
-  o.Add(&learning_rate_end, "learning_rate_end", 2e-5, {0, 10}, "", "and at the end");
-  o.Add(&learning_rate_steps, "learning_rate_steps", 250000, {1, 1e12}, "steps",
-        "over which it falls linearly");
-  o.Add(&max_gradient_norm, "max_gradient_norm", 10, kPositive, "", "clip the global norm to this");
-  o.Add(&tau, "tau", 0.02, kUnit, "", "Polyak averaging of the target, per update");
-  o.Add(&target_period, "target_period", 0, {0, 1e9}, "updates",
-        "copy the target every so many instead; 0: Polyak averaging");
-  o.Add(&policy_tau, "policy_tau", 0.01, kUnit, "",
-        "Polyak averaging of the policy that is judged and kept, per update, which falls with the "
-        "learning rate; 1: as learned last");
-  o.Add(&epsilon_start, "epsilon_start", 1.0, kUnit, "",
-        "share of random actions at the beginning");
-  o.Add(&epsilon_end, "epsilon_end", 0.05, kUnit, "", "and at least");
-  o.Add(&epsilon_decay, "epsilon_decay", 0.97, kUnit, "", "factor per episode");
-}
-
-QNetworkShape DqnConfig::Shape(int obs_size, int actions) const {
-  return {obs_size, actions, hidden, dueling ? head : 0, dueling, layer_norm};
-}
-
 std::vector<double> TorqueLevels(double torque_limit) {
   std::vector<double> levels;
   for (int quarter = -4; quarter <= 4; ++quarter) levels.push_back(torque_limit * quarter / 4);
@@ -91,18 +40,6 @@ float HuberLoss(float delta) {
 }
 
 float HuberGradient(float delta) { return std::clamp(delta, -1.0F, 1.0F); }
-
-void MirrorHalf(Rng& rng, std::span<const float> signs, int actions, Minibatch& batch) {
-  const size_t D = signs.size();
-  for (size_t i = 0; i < batch.action.size(); ++i) {
-    if (rng.Below(2) == 0) continue;
-    for (size_t j = 0; j < D; ++j) {
-      batch.obs[i * D + j] *= signs[j];
-      batch.next_obs[i * D + j] *= signs[j];
-    }
-    batch.action[i] = actions - 1 - batch.action[i];
-  }
-}
 
 Dqn::Dqn(const DqnConfig& config, int num_envs, int obs_size, std::vector<double> torques,
          std::vector<float> mirror_signs, uint64_t seed, ThreadPool& pool)
@@ -250,7 +187,9 @@ void Dqn::Update(const Minibatch& batch) {
 
 void Dqn::AveragePolicy() {
   // The longer the slower learning is: Polyak and Juditsky (1992) average over a growing window.
-  const auto tau = static_cast<float>(config_.policy_tau * learning_rate() / config_.learning_rate);
+  const double initial = config_.learning_rate;
+  const double tau_now = initial > 0 ? config_.policy_tau * learning_rate() / initial : 1;
+  const auto tau = static_cast<float>(std::min(config_.policy_tau, tau_now));
   for (size_t i = 0; i < theta_.size(); ++i) {
     theta_policy_[i] += tau * (theta_[i] - theta_policy_[i]);
   }
@@ -313,8 +252,9 @@ void Dqn::CountErrors(const Minibatch& batch) {
 
 AgentReport Dqn::Report() const {
   const double n = static_cast<double>(std::max<int64_t>(1, report_updates_));
+  constexpr int64_t kMostRows = 256;  // which tell enough of a large minibatch
   const Matrix<const float> features(activations_.feature.back().data(),
-                                     static_cast<int>(config_.batch),
+                                     static_cast<int>(std::min(config_.batch, kMostRows)),
                                      static_cast<int>(config_.hidden.back()));
   return {updates_,    epsilon(),     learning_rate(),       loss_sum_ / n,         q_sum_ / n,
           td_sum_ / n, norm_sum_ / n, FeatureRank(features), DormantShare(features)};

@@ -2,14 +2,15 @@
 
 #include <cstdint>
 #include <map>
+#include <span>
 #include <string>
 #include <vector>
 
-#include "core/options.h"
 #include "core/thread_pool.h"
 #include "nn/adam.h"
 #include "nn/q_network.h"
 #include "rl/agent.h"
+#include "rl/dqn_config.h"
 #include "rl/n_step.h"
 #include "rl/replay.h"
 
@@ -18,36 +19,6 @@
 /// Symbols: s observation, a action, r reward, γ discount, θ online parameters, θ⁻ target
 /// parameters, y target, B batch size, A number of actions, D observation size.
 namespace upswing {
-
-/// Settings of the agent.
-struct DqnConfig {
-  std::vector<int64_t> hidden;
-  int64_t head;
-  bool layer_norm, double_q, dueling;
-  std::string precision;
-  double gamma;
-  int64_t n_step;
-  double reward_scale;
-  int64_t batch, replay, learning_starts;
-  bool prioritized;
-  double priority_exponent, importance_exponent;
-  bool mirror;
-  double updates_per_step;
-  double learning_rate, learning_rate_end;
-  int64_t learning_rate_steps;
-  double max_gradient_norm;
-  double tau;
-  int64_t target_period;
-  double policy_tau;
-  double epsilon_start, epsilon_end, epsilon_decay;
-
-  DqnConfig() { SetDefaults(*this); }
-  /// One line per setting: name, default, range, unit, help.
-  void Describe(Options& options);
-
-  /// The network that it asks for.
-  QNetworkShape Shape(int obs_size, int actions) const;
-};
 
 /// The torque levels of the nine actions (N·m): -limit to limit in steps of a quarter.
 std::vector<double> TorqueLevels(double torque_limit);
@@ -65,15 +36,12 @@ float HuberLoss(float delta);
 /// Its derivative: δ clipped to ±1.
 float HuberGradient(float delta);
 
-/// Mirrors a random half of a minibatch: observations take `signs` (D), and action a becomes
-/// A - 1 - a, the torque of the other sign.
-void MirrorHalf(Rng& rng, std::span<const float> signs, int actions, Minibatch& batch);
-
 /// A DQN agent for N environments.
 class Dqn : public Agent {
  public:
-  /// `torques` (A) belong to the actions, in rising order. `mirror_signs` (D) are as VectorEnv has
-  /// them; throws BadInput if they are empty but asked for.
+  /// `torques` (A) belong to the actions, in rising order, and symmetric about 0 to learn in a
+  /// mirror. `mirror_signs` (D) are as VectorEnv has them; throws BadInput if they are empty but
+  /// asked for.
   Dqn(const DqnConfig& config, int num_envs, int obs_size, std::vector<double> torques,
       std::vector<float> mirror_signs, uint64_t seed, ThreadPool& pool);
 
@@ -90,7 +58,7 @@ class Dqn : public Agent {
   const Replay& replay() const { return replay_; }
   double epsilon() const;
   double learning_rate() const;
-  /// β of prioritised replay, which rises to 1 as the learning rate falls (Schaul et al., 2016).
+  /// β of prioritised replay, which rises to 1 over learning_rate_steps (Schaul et al., 2016).
   double importance_exponent() const;
   /// One gradient step on a given minibatch; Report tells of it.
   void Update(const Minibatch& batch);

@@ -26,7 +26,8 @@ struct EvaluationEpisode {
   double peak_torque = 0;        // largest |torque|, N·m
   double rms_torque = 0;         // root mean square, N·m
   double value = 0;              // largest Q-value of the first observation, in units of reward
-  double discounted_return = 0;  // what that estimates: Σ γᵏ r over the whole episode
+  double discounted_return = 0;  // Σ γᵏ r over the whole episode: what that estimates, if the
+                                 // policy learned from the reward that is judged
   std::vector<double> terms;     // (K) sum of each reward term over the first kReturnSeconds
 };
 

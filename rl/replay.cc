@@ -16,6 +16,18 @@ Minibatch::Minibatch(int size, int obs_size)
       index(action.size()),
       weight(action.size(), 1.0F) {}
 
+void MirrorHalf(Rng& rng, std::span<const float> signs, int actions, Minibatch& batch) {
+  const size_t D = signs.size();
+  for (size_t i = 0; i < batch.action.size(); ++i) {
+    if (rng.Below(2) == 0) continue;
+    for (size_t j = 0; j < D; ++j) {
+      batch.obs[i * D + j] *= signs[j];
+      batch.next_obs[i * D + j] *= signs[j];
+    }
+    batch.action[i] = actions - 1 - batch.action[i];
+  }
+}
+
 Replay::Replay(int64_t capacity, int obs_size, bool prioritized)
     : capacity_(capacity), obs_size_(static_cast<size_t>(obs_size)) {
   if (prioritized) priorities_.emplace(capacity);
@@ -44,8 +56,10 @@ void Replay::Gather(Minibatch& batch) const {
   // The memory is larger than any cache: fetch all rows at once, instead of waiting for each.
   for (const int64_t index : batch.index) {
     const float* row = rows_.data() + static_cast<size_t>(index) * row_size();
-    __builtin_prefetch(row);
-    __builtin_prefetch(row + row_size() - 1);
+    constexpr size_t kLine = 16;  // floats in a line of the cache
+    for (size_t at = 0; at < row_size() + kLine; at += kLine) {
+      __builtin_prefetch(row + std::min(at, row_size() - 1));
+    }
   }
   for (size_t i = 0; i < batch.index.size(); ++i) {
     const Transition t = at(batch.index[i]);
@@ -98,6 +112,8 @@ void Replay::State(const Archive& archive, int num_actions) {
                 "a place to write to");
   if (priorities_) {
     archive.Scalar("largest_priority", largest_priority_);
+    archive.Check(std::isfinite(largest_priority_) && largest_priority_ > 0, "largest_priority",
+                  "a finite number above 0");
     priorities_->State(archive.In("priorities"), size());
   }
   if (!archive.loading()) return;

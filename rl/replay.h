@@ -33,6 +33,10 @@ struct Minibatch {
   Minibatch(int size, int obs_size);
 };
 
+/// Mirrors a random half of a minibatch: observations take `signs` (D), and action a becomes
+/// A - 1 - a, the torque of the other sign.
+void MirrorHalf(Rng& rng, std::span<const float> signs, int actions, Minibatch& batch);
+
 /// Replay memory of the newest `capacity` transitions (Lin, 1992). One row of 2 D + 3 floats holds
 /// a whole transition, so that sampling one touches one place in memory; a million of ours take
 /// 76 MB. Memory is taken as it fills.
@@ -56,8 +60,8 @@ class Replay {
   /// is β.
   void SamplePrioritized(Rng& rng, double beta, Minibatch& batch) const;
 
-  /// Sets p = (|TD error| + 1e-6)^α of what a minibatch holds (Section 3.3). `alpha` is α. A new
-  /// transition has the largest priority so far.
+  /// Sets the priorities of what a minibatch holds. Stored is p = (|TD error| + 1e-6)^α, the
+  /// paper's p^α (Section 3.3); `alpha` is α. A new transition has the largest so far.
   void Prioritize(const Minibatch& batch, std::span<const float> td_error, double alpha);
   /// p of a place below size(); only of a memory with priorities.
   double priority(int64_t index) const { return priorities_->at(index); }

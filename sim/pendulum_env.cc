@@ -75,7 +75,7 @@ void PendulumEnv::SpreadRows(std::vector<float>& table) const {
   // From the last one backwards, so that none is overwritten before it was moved.
   for (int env = config_.num_envs - 1; env > 0; --env) {
     const auto from = table.begin() + static_cast<ptrdiff_t>(env) * kObservationSize;
-    std::copy(from, from + kObservationSize, Row(table, env).begin());
+    std::copy_backward(from, from + kObservationSize, Row(table, env).begin() + kObservationSize);
   }
 }
 

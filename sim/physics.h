@@ -47,10 +47,11 @@ class Physics {
   /// Puts an environment into a state, whatever became of it before.
   virtual void SetState(int env, const PendulumState& state) = 0;
 
-  /// Gives an environment another plant; SetState must follow.
+  /// Gives an environment another plant; SetState or the loading of a state must follow.
   virtual void SetPlant(int env, const Plant& plant) = 0;
 
-  /// Holds `torque` (N), N·m, for one control period and fills `result`, all but `truncated`. Of an
+  /// Holds `torque` (N), N·m, for one control period and fills `result`, all but `truncated`; of
+  /// `next_obs` N packed rows of kObservationSize, whatever the table's width. Of an
   /// environment whose state has blown up (numbers that are not finite or beyond 1e10, or a warning
   /// of MuJoCo's) only `terminated` has a meaning.
   virtual void Step(std::span<const double> torque, StepResult& result) = 0;

@@ -32,7 +32,8 @@ void Randomization::Describe(Options& o) {
         "each episode's delay is up to so much above delay");
   o.Alias("randomize",
           {"randomize_mass1", "randomize_mass2", "randomize_length1", "randomize_length2",
-           "randomize_damping1", "randomize_damping2", "randomize_gravity"});
+           "randomize_damping1", "randomize_damping2", "randomize_gravity"},
+          "masses, lengths, dampings and gravity");
   o.Alias("randomize_mass", {"randomize_mass1", "randomize_mass2"});
   o.Alias("randomize_length", {"randomize_length1", "randomize_length2"});
   o.Alias("randomize_damping", {"randomize_damping1", "randomize_damping2"});
