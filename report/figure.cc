@@ -143,6 +143,10 @@ class PanelScript {
     Label(4, panel_.y_label, box_.left - 60, (box_.bottom + box_.top) / 2, true);
     Say("unset label 5");
     Say("set xtics out nomirror autofreq; set ytics out nomirror autofreq");
+    // Large numbers in thousands and millions, or they run into each other.
+    const double largest = LargestX();
+    if (largest < 1e4) Say("set format x");
+    if (largest >= 1e4) Say("set format x '", largest < 1e6 ? "%.0s%c" : "%.1s%c", "'");
     Say(panel_.heat_map ? "unset grid" : "set grid back lt 1 lw 0.5 lc rgb '#d8d8d8'");
     Range("x", panel_.x_range, x_range_);
     Range("y", panel_.y_range, y_range_);
@@ -151,6 +155,14 @@ class PanelScript {
     if (panel_.heat_map) {
       Say("set object 1 rectangle from graph 0,0 to graph 1,1 behind fc rgb '#e4e4e4' fs noborder");
     }
+  }
+
+  double LargestX() const {
+    double largest = 0;
+    for (const Line& line : panel_.lines) {
+      for (const double x : line.x) largest = std::max(largest, x);
+    }
+    return largest;
   }
 
   void Label(int tag, const std::string& text, double x, double y, bool upright) {
