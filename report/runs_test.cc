@@ -25,6 +25,12 @@ TEST(Runs, AnEvaluationOutOfTurnDoesNotCount) {
   EXPECT_TRUE(Finished(run));
   run.evaluations.back().step = 3000 + 4;  // the first multiple of 8 after the turn
   EXPECT_EQ(SolvedAt(run), 1U);
+
+  // A run that ended at step 2,504 and was gone on with: neither counted nor in the way.
+  RunRecord resumed = MadeRun(1, {{0, 0}, {1, 0}, {0.5, 0}, {1, 0}}, 4000);
+  resumed.evaluations[2].step = 2504;
+  resumed.evaluations[3].step = 3000;
+  EXPECT_EQ(SolvedAt(resumed), 1U);
 }
 
 TEST(Runs, FinishedOnceTheBudgetIsUsedOrItWasToStop) {

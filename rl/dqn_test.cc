@@ -119,6 +119,18 @@ TEST_P(DqnVariants, LossIsThatOfThePapersAndFalls) {
 INSTANTIATE_TEST_SUITE_P(Flags, DqnVariants,
                          ::testing::Combine(::testing::Bool(), ::testing::Bool()));
 
+/// Trains on the toy environment for a number of lock-steps.
+void Walk(Dqn& agent, ToyEnv& env, int steps) {
+  StepResult result = env.MakeResult();
+  std::vector<double> torque(static_cast<size_t>(env.num_envs()));
+  for (int i = 0; i < steps; ++i) {
+    agent.Act(env.obs(), torque);
+    env.Step(torque, result);
+    agent.Observe(result);
+    agent.Learn();
+  }
+}
+
 TEST(Dqn, WeightsMultiplyTheGradientOfTheirTransition) {
   // A transition of weight 1/2, twice, is one of weight 1; one of weight 0 is as if it were not.
   DqnConfig config = SmallConfig();
@@ -187,6 +199,36 @@ TEST(Dqn, TheKeptPolicyIsAnAverageOfThoseLearned) {
   for (size_t a = 0; a < 3; ++a) EXPECT_NEAR(got[a], expected[a], 1e-5);
 }
 
+TEST(Dqn, TheAverageGrowsLongerAsTheLearningRateFalls) {
+  DqnConfig config = SmallConfig();
+  config.policy_tau = 0.5;
+  config.learning_rate = 1e-2;
+  config.learning_rate_end = 1e-3;
+  config.learning_rate_steps = 100;
+  config.updates_per_step = 0;
+  config.importance_exponent = 0.4;
+  ThreadPool pool(1);
+  Dqn agent(config, 1, 1, kTorques, {-1}, 1, pool);
+  ToyEnv env(1);
+  Walk(agent, env, 200);
+  EXPECT_DOUBLE_EQ(agent.learning_rate(), 1e-3);
+  EXPECT_DOUBLE_EQ(agent.importance_exponent(), 1);
+  // At a tenth of the rate the average moves a tenth as fast: by 0.05 of the way.
+  const std::vector<float> first(agent.online().begin(), agent.online().end());
+  agent.Update(RandomBatch(16));
+  std::vector<float> average(first);
+  for (size_t i = 0; i < average.size(); ++i) average[i] += 0.05F * (agent.online()[i] - first[i]);
+  const QNetwork<float> network(config.Shape(1, 3));
+  auto activations = network.MakeActivations(1, false);
+  const float x = 0.7F;
+  std::vector<float> expected(3), got(3), fast(3);
+  network.Forward({average}, {&x, 1, 1}, {0, 1}, activations, {expected.data(), 1, 3});
+  network.Forward({agent.online()}, {&x, 1, 1}, {0, 1}, activations, {fast.data(), 1, 3});
+  agent.ExportPolicy({}).QValues({&x, 1, 1}, {got.data(), 1, 3});
+  for (size_t a = 0; a < 3; ++a) EXPECT_NEAR(got[a], expected[a], 1e-5);
+  EXPECT_GT(std::abs(fast[0] - got[0]), 1e-4);
+}
+
 TEST(Dqn, TargetFollowsByPolyakAveragingAtEachUpdate) {
   DqnConfig config = SmallConfig();
   config.tau = 0.25;
@@ -210,18 +252,6 @@ TEST(Dqn, TargetCanBeCopiedPeriodically) {
     EXPECT_EQ(std::ranges::equal(agent.target(), first), update < 3);
   }
   EXPECT_TRUE(std::ranges::equal(agent.target(), agent.online()));
-}
-
-/// Trains on the toy environment for a number of lock-steps.
-void Walk(Dqn& agent, ToyEnv& env, int steps) {
-  StepResult result = env.MakeResult();
-  std::vector<double> torque(static_cast<size_t>(env.num_envs()));
-  for (int i = 0; i < steps; ++i) {
-    agent.Act(env.obs(), torque);
-    env.Step(torque, result);
-    agent.Observe(result);
-    agent.Learn();
-  }
 }
 
 TEST(Dqn, ATruncationBootstrapsFromItsOwnLastObservationAndATerminationFromNothing) {

@@ -52,7 +52,8 @@ def train_flags(width, batch, threads, steps, out):
         # One evaluation at the end, of one episode; no checkpoint but the last.
         "eval-every": steps + 1, "eval-episodes": 1, "checkpoint-every": steps + 1,
     }
-    flags = ["--no-double", "--no-dueling", "--no-layer-norm", "--no-stop-when-solved"]
+    flags = ["--no-double", "--no-dueling", "--no-layer-norm", "--no-prioritized", "--no-mirror",
+             "--policy-tau=1", "--no-stop-when-solved"]
     return flags + [f"--{name}={value}" for name, value in settings.items()]
 
 
