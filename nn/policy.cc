@@ -99,10 +99,10 @@ const std::string& Policy::About(const std::string& key) const {
   return found->second;
 }
 
-void Policy::QValues(Matrix<const float> obs, Matrix<float> q) const {
+void Policy::QValues(Matrix<const float> obs, Matrix<float> q, Workspace& workspace) const {
   for (int first = 0; first < obs.rows(); first += kBlock) {
     const int rows = std::min(kBlock, obs.rows() - first);
-    network_.Forward({parameters_}, obs.Rows(first, rows), {0, rows}, workspace_.activations,
+    network_.Forward({parameters_}, obs.Rows(first, rows), {0, rows}, workspace.activations,
                      q.Rows(first, rows));
   }
 }

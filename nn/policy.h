@@ -30,15 +30,19 @@ class Policy {
   /// An `about` text that must be there; throws BadInput naming the key.
   const std::string& About(const std::string& key) const;
 
-  /// Q-values (B × A) of observations (B × D). Not for two threads at once.
-  void QValues(Matrix<const float> obs, Matrix<float> q) const;
-
-  /// Room to act in.
+  /// Room to work in.
   struct Workspace {
     QNetwork<float>::Activations activations;  // of a block of rows
     AlignedVector<float> preferences;          // (block × A)
   };
   Workspace MakeWorkspace() const;
+
+  /// Q-values (B × A) of observations (B × D). Threads may ask at once, each in a workspace of its
+  /// own.
+  void QValues(Matrix<const float> obs, Matrix<float> q, Workspace& workspace) const;
+
+  /// The same in the policy's own workspace. Not for two threads at once.
+  void QValues(Matrix<const float> obs, Matrix<float> q) const { QValues(obs, q, workspace_); }
 
   /// The torque (B), N·m, of the action with the largest Q-value, up to rounding; of a dueling
   /// network by its advantages alone. Threads may act at once, each in a workspace of its own; a

@@ -12,6 +12,32 @@ int64_t StepsIn(double seconds, const VectorEnv& env) {
   return std::llround(seconds / env.step_seconds());
 }
 
+/// What Q-values estimate, as a policy's metadata `gamma` and `reward_scale` say: the sum of
+/// γᵏ · scale · r. γ = 0 if it does not say.
+struct ValueUnits {
+  double gamma = 0, reward_scale = 1;
+};
+
+ValueUnits ValueUnitsOf(const Policy& policy) {
+  const auto& about = policy.about();
+  if (!about.contains("gamma") || !about.contains("reward_scale")) return {};
+  return {ParseNumber(about.at("gamma")).value_or(0),
+          ParseNumber(about.at("reward_scale")).value_or(1)};
+}
+
+/// What the policy expects of where the environments stand.
+void EstimateValues(const Policy& policy, const VectorEnv& env, const ValueUnits& units,
+                    std::span<EvaluationEpisode> episodes) {
+  // A workspace of its own: evaluations in other threads may share the policy.
+  Policy::Workspace workspace = policy.MakeWorkspace();
+  AlignedVector<float> values(episodes.size() * policy.torques().size());
+  const Matrix<float> q(values, env.num_envs(), static_cast<int>(policy.torques().size()));
+  policy.QValues(env.obs(), q, workspace);
+  for (int i = 0; i < env.num_envs(); ++i) {
+    episodes[static_cast<size_t>(i)].value = std::ranges::max(q.row(i)) / units.reward_scale;
+  }
+}
+
 /// Acts for all environments, in slices that a pool can share.
 class SharedActing {
  public:
@@ -44,25 +70,7 @@ class SharedActing {
   std::vector<Policy::Workspace> workspaces_;  // one for each slice
 };
 
-/// What the policy expects of where the environments stand.
-void EstimateValues(const Policy& policy, const VectorEnv& env, const ValueUnits& units,
-                    std::span<EvaluationEpisode> episodes) {
-  AlignedVector<float> values(episodes.size() * policy.torques().size());
-  const Matrix<float> q(values, env.num_envs(), static_cast<int>(policy.torques().size()));
-  policy.QValues(env.obs(), q);
-  for (int i = 0; i < env.num_envs(); ++i) {
-    episodes[static_cast<size_t>(i)].value = std::ranges::max(q.row(i)) / units.reward_scale;
-  }
-}
-
 }  // namespace
-
-ValueUnits ValueUnitsOf(const Policy& policy) {
-  const auto& about = policy.about();
-  if (!about.contains("gamma") || !about.contains("reward_scale")) return {};
-  return {ParseNumber(about.at("gamma")).value_or(0),
-          ParseNumber(about.at("reward_scale")).value_or(1)};
-}
 
 Evaluation Summarize(std::span<const EvaluationEpisode> episodes) {
   Evaluation e;

@@ -47,13 +47,6 @@ struct Evaluation {
   bool all_succeeded() const { return episodes > 0 && successes == episodes; }
 };
 
-/// What Q-values estimate, as a policy's metadata `gamma` and `reward_scale` say: the sum of
-/// γᵏ · scale · r. γ = 0 if it does not say.
-struct ValueUnits {
-  double gamma = 0, reward_scale = 1;
-};
-ValueUnits ValueUnitsOf(const Policy& policy);
-
 /// Lets `policy` control every environment for kEvaluationSeconds from where it stands, and says
 /// what each episode came to. The environments must not end before that. Acting is shared by the
 /// pool, which changes no bit. `progress` (may be empty) is told the share done.

@@ -103,7 +103,10 @@ Policy Fickle() {
   std::vector<float> parameters(network.num_parameters());
   Rng rng(3, "fickle");
   network.Initialize(rng, parameters);
-  return {shape, parameters, {-0.8, -0.6, -0.4, -0.2, 0, 0.2, 0.4, 0.6, 0.8}, {}};
+  return {shape,
+          parameters,
+          {-0.8, -0.6, -0.4, -0.2, 0, 0.2, 0.4, 0.6, 0.8},
+          {{"gamma", "0.9"}, {"reward_scale", "1"}}};
 }
 
 TEST(Evaluate, ThreadsChangeNoBit) {
@@ -125,6 +128,20 @@ TEST(Evaluate, ThreadsChangeNoBit) {
       ASSERT_EQ(alone[i].swing_up_seconds, shared[i].swing_up_seconds) << i;
     }
   }
+}
+
+TEST(Evaluate, ThreadsMayShareAPolicy) {
+  const Policy policy = Fickle();
+  const auto value = [&](int seed) {
+    ToyEnv env(203, static_cast<uint64_t>(seed));
+    return Evaluate(policy, env).value;
+  };
+  constexpr int kEvaluations = 16;
+  std::vector<double> alone, together(kEvaluations);
+  for (int i = 0; i < kEvaluations; ++i) alone.push_back(value(i));
+  ThreadPool pool(4);
+  pool.ParallelFor(kEvaluations, [&](int i) { together[static_cast<size_t>(i)] = value(i); });
+  EXPECT_EQ(together, alone);
 }
 
 }  // namespace
