@@ -4,11 +4,9 @@
 import json
 import math
 import re
-import tempfile
 import unittest
-from pathlib import Path
 
-from testing import REWARD_TERMS, ProgramTest, run, small
+from testing import REWARD_TERMS, ProgramTest, train_once
 
 PLANT = {"mass1": 1, "mass2": 1, "length1": 0.5, "length2": 0.5, "damping1": 0.2, "damping2": 0.2,
          "gravity": 9.81, "torque_limit": 5}
@@ -27,12 +25,8 @@ class EvalTest(ProgramTest):
     @classmethod
     def setUpClass(cls):
         # A plant that is soon learned, so that there are successes to look at.
-        cls.trained = tempfile.TemporaryDirectory(prefix="upswing-")
-        cls.addClassCleanup(cls.trained.cleanup)
-        cls.policy = Path(cls.trained.name, "run")
-        done = run(*small(gravity=0.05, damping=1, hidden="64,64", head=32, eval_episodes=1,
-                          steps=100000, checkpoint_every=20000, out=cls.policy))
-        assert done.returncode == 0, done
+        cls.policy = train_once(cls, gravity=0.05, damping=1, hidden="64,64", head=32,
+                                eval_episodes=1, steps=100000, checkpoint_every=20000)
 
     def evaluate(self, *more, episodes=10):
         return json.loads(self.succeed("eval", self.policy, "--json", "--episodes", episodes,

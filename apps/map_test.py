@@ -5,12 +5,10 @@ import csv
 import json
 import math
 import struct
-import tempfile
 import unittest
 import xml.dom.minidom
-from pathlib import Path
 
-from testing import MODEL, ProgramTest, run, small
+from testing import MODEL, ProgramTest, small, train_once
 
 GRID = ("--x", "gravity=0.05:3:3", "--y", "mass2=-50%:+50%:3")
 
@@ -19,12 +17,8 @@ class MapTest(ProgramTest):
     @classmethod
     def setUpClass(cls):
         # A plant that is soon learned, so that there are successes and failures to look at.
-        cls.trained = tempfile.TemporaryDirectory(prefix="upswing-")
-        cls.addClassCleanup(cls.trained.cleanup)
-        cls.policy = Path(cls.trained.name, "run")
-        done = run(*small(gravity=0.05, damping=1, hidden="64,64", head=32, eval_episodes=1,
-                          steps=60000, checkpoint_every=20000, out=cls.policy))
-        assert done.returncode == 0, done
+        cls.policy = train_once(cls, gravity=0.05, damping=1, hidden="64,64", head=32,
+                                eval_episodes=1, steps=60000, checkpoint_every=20000)
 
     def map(self, *more, out="map"):
         return json.loads(self.succeed("map", self.policy, "--json", "--out", out, *more))

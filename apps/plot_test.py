@@ -2,12 +2,10 @@
 """`upswing plot`: its figures, its summary, and bad input."""
 
 import struct
-import tempfile
 import unittest
 import xml.dom.minidom
-from pathlib import Path
 
-from testing import REWARD_TERMS, ProgramTest, run, small
+from testing import REWARD_TERMS, ProgramTest, train_once
 
 FILES = ("episode.svg", "episode.png", "phase.svg", "phase.png")
 
@@ -15,11 +13,7 @@ FILES = ("episode.svg", "episode.png", "phase.svg", "phase.png")
 class PlotTest(ProgramTest):
     @classmethod
     def setUpClass(cls):
-        cls.trained = tempfile.TemporaryDirectory(prefix="upswing-")
-        cls.addClassCleanup(cls.trained.cleanup)
-        cls.policy = Path(cls.trained.name, "run")
-        done = run(*small(out=cls.policy))
-        assert done.returncode == 0, done
+        cls.policy = train_once(cls)
 
     def svg(self, name):
         text = (self.folder / name).read_text(encoding="utf-8")

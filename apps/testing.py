@@ -130,6 +130,16 @@ def state_of(path):
             if not name.endswith("seconds") and not name.startswith("run/size/")}
 
 
+def train_once(test_class, **changes):
+    """Trains with small settings for all tests of a class; the run folder goes with them."""
+    folder = tempfile.TemporaryDirectory(prefix="upswing-")
+    test_class.addClassCleanup(folder.cleanup)
+    path = Path(folder.name, "run")
+    done = run(*small(out=path, **changes))
+    assert done.returncode == 0, done
+    return path
+
+
 class ProgramTest(unittest.TestCase):
     """Tests of the program, each in a folder of its own that is the current one."""
 

@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "core/testing.h"
 #include "sim/pendulum_env.h"
+#include "sim/testing.h"
 
 namespace upswing {
 namespace {
@@ -155,18 +155,7 @@ TEST(DisturbedEnv, ADelayedMotorIsOneThatWasToldLater) {
 }
 
 TEST(DisturbedEnv, LoadedStateGoesOnToTheBit) {
-  PendulumEnv saved(FourKinds()), loaded(FourKinds());
-  StepResult a = saved.MakeResult(), b = saved.MakeResult();
-  const std::vector<double> torque{1, 2, 3, 4};
-  for (int step = 0; step < 5; ++step) saved.Step(torque, a);  // with torques under way
-  SaveAndLoad([&](const Archive& archive) { saved.State(archive); },
-              [&](const Archive& archive) { loaded.State(archive); });
-  for (int step = 0; step < 12; ++step) {  // over two resets
-    saved.Step(torque, a);
-    loaded.Step(torque, b);
-    ASSERT_EQ(a.next_obs, b.next_obs);
-    ASSERT_EQ(a.torque, b.torque);
-  }
+  ExpectLoadedGoesOn(FourKinds(), 5);  // with torques under way
 }
 
 }  // namespace

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/testing.h"
 #include "sim/pendulum_env.h"
+#include "sim/testing.h"
 
 namespace upswing {
 namespace {
@@ -21,11 +21,7 @@ class RememberingEnvs : public testing::TestWithParam<PhysicsEngine> {
   }
 };
 
-INSTANTIATE_TEST_SUITE_P(Physics, RememberingEnvs,
-                         testing::Values(PhysicsEngine::kMuJoCo, PhysicsEngine::kClosedForm),
-                         [](const auto& info) -> std::string {
-                           return info.param == PhysicsEngine::kMuJoCo ? "MuJoCo" : "ClosedForm";
-                         });
+INSTANTIATE_TEST_SUITE_P(Physics, RememberingEnvs, Engines(), EngineName);
 
 TEST_P(RememberingEnvs, ObservationsEndWithTorquesAndChangesOfVelocities) {
   PendulumEnv env(Config(2)), plain(Config(0));
@@ -98,20 +94,7 @@ TEST_P(RememberingEnvs, AMirrorTurnsMemoriesAround) {
   }
 }
 
-TEST_P(RememberingEnvs, LoadedStateGoesOnToTheBit) {
-  PendulumEnv saved(Config(3)), loaded(Config(3));
-  StepResult a = saved.MakeResult(), b = saved.MakeResult();
-  const std::vector<double> torque{1, 2, 3};
-  for (int step = 0; step < 7; ++step) saved.Step(torque, a);
-  SaveAndLoad([&](const Archive& archive) { saved.State(archive); },
-              [&](const Archive& archive) { loaded.State(archive); });
-  for (int step = 0; step < 12; ++step) {
-    saved.Step(torque, a);
-    loaded.Step(torque, b);
-    ASSERT_EQ(a.next_obs, b.next_obs);
-    ASSERT_TRUE(std::ranges::equal(saved.obs().values(), loaded.obs().values()));
-  }
-}
+TEST_P(RememberingEnvs, LoadedStateGoesOnToTheBit) { ExpectLoadedGoesOn(Config(3), 7); }
 
 }  // namespace
 }  // namespace upswing

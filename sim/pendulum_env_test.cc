@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "core/error.h"
-#include "core/testing.h"
+#include "sim/testing.h"
 
 namespace upswing {
 namespace {
@@ -23,11 +23,7 @@ class PendulumEnvs : public testing::TestWithParam<PhysicsEngine> {
   static PendulumEnvConfig SmallConfig();
 };
 
-INSTANTIATE_TEST_SUITE_P(Physics, PendulumEnvs,
-                         testing::Values(PhysicsEngine::kMuJoCo, PhysicsEngine::kClosedForm),
-                         [](const auto& info) -> std::string {
-                           return info.param == PhysicsEngine::kMuJoCo ? "MuJoCo" : "ClosedForm";
-                         });
+INSTANTIATE_TEST_SUITE_P(Physics, PendulumEnvs, Engines(), EngineName);
 
 PendulumEnvConfig PendulumEnvs::SmallConfig() {
   PendulumEnvConfig config = Config();
@@ -164,22 +160,7 @@ TEST_P(PendulumEnvs, TheNumberOfThreadsChangesNoBit) {
   }
 }
 
-TEST_P(PendulumEnvs, LoadedStateGoesOnToTheBit) {
-  PendulumEnv saved(SmallConfig());
-  StepResult a = saved.MakeResult(), b = saved.MakeResult();
-  const std::vector<double> torque{1, 2, 3};
-  for (int step = 0; step < 7; ++step) saved.Step(torque, a);
-  PendulumEnv loaded(SmallConfig());
-  SaveAndLoad([&](const Archive& archive) { saved.State(archive); },
-              [&](const Archive& archive) { loaded.State(archive); });
-  EXPECT_TRUE(std::ranges::equal(saved.obs().values(), loaded.obs().values()));
-  for (int step = 0; step < 12; ++step) {  // over two resets
-    saved.Step(torque, a);
-    loaded.Step(torque, b);
-    ASSERT_EQ(a.next_obs, b.next_obs);
-    ASSERT_EQ(a.truncated, b.truncated);
-  }
-}
+TEST_P(PendulumEnvs, LoadedStateGoesOnToTheBit) { ExpectLoadedGoesOn(SmallConfig(), 7); }
 
 TEST_P(PendulumEnvs, StartsAreHangingWithNoiseOrAnywhere) {
   PendulumEnvConfig config = Config();

@@ -7,8 +7,8 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "core/testing.h"
 #include "sim/pendulum_env.h"
+#include "sim/testing.h"
 
 namespace upswing {
 namespace {
@@ -122,11 +122,7 @@ class RandomizedEnvs : public testing::TestWithParam<PhysicsEngine> {
   }
 };
 
-INSTANTIATE_TEST_SUITE_P(Physics, RandomizedEnvs,
-                         testing::Values(PhysicsEngine::kMuJoCo, PhysicsEngine::kClosedForm),
-                         [](const auto& info) -> std::string {
-                           return info.param == PhysicsEngine::kMuJoCo ? "MuJoCo" : "ClosedForm";
-                         });
+INSTANTIATE_TEST_SUITE_P(Physics, RandomizedEnvs, Engines(), EngineName);
 
 TEST_P(RandomizedEnvs, EveryEpisodeMovesAsItsOwnPlantDoes) {
   PendulumEnvConfig config = Config(3);
@@ -179,21 +175,7 @@ TEST_P(RandomizedEnvs, StartsAreThoseOfOnePlantAndStreamsAreNamed) {
 }
 
 TEST_P(RandomizedEnvs, LoadedStateGoesOnToTheBit) {
-  PendulumEnv saved(Config(3)), loaded(Config(3));
-  StepResult a = saved.MakeResult(), b = saved.MakeResult();
-  const std::vector<double> torque{1, 2, 3};
-  for (int step = 0; step < 8; ++step) saved.Step(torque, a);  // in the second episode
-  SaveAndLoad([&](const Archive& archive) { saved.State(archive); },
-              [&](const Archive& archive) { loaded.State(archive); });
-  EXPECT_TRUE(std::ranges::equal(saved.obs().values(), loaded.obs().values()));
-  for (int step = 0; step < 12; ++step) {  // over two resets
-    saved.Step(torque, a);
-    loaded.Step(torque, b);
-    ASSERT_EQ(a.next_obs, b.next_obs);
-    ASSERT_EQ(a.reward, b.reward);
-    ASSERT_EQ(a.torque, b.torque);
-  }
-  EXPECT_EQ(saved.plant(2).length1, loaded.plant(2).length1);
+  ExpectLoadedGoesOn(Config(3), 8);  // in the second episode
 }
 
 TEST(RandomizedEnv, BothPhysicsGoTheSameWayOverManyResets) {
