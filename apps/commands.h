@@ -1,6 +1,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
@@ -29,6 +30,18 @@ CLI::Validator NotEmpty();
 /// Adds a flag for each setting and alias, in the order in which they were described. What is given
 /// is added to `flags`.
 void AddSettings(CLI::App& app, const Options& options, std::vector<FlagValue>& flags);
+
+/// Adds the policy to try, a file or a run folder; not required unless the caller says so.
+CLI::Option* AddPolicy(CLI::App& app, std::string& policy);
+
+/// Adds --start, which ParseStart reads.
+void AddStart(CLI::App& app, std::string& start);
+
+/// Adds --seed, with `what` it is of.
+void AddSeed(CLI::App& app, int64_t& seed, const std::string& what);
+
+/// Adds --threads, which ResolveThreads reads.
+void AddThreads(CLI::App& app, int& threads);
 
 /// Adds --seeds and --jobs, for many runs; 0 jobs: as many as there are processors.
 void AddManyOptions(CLI::App& app, std::string& seeds, int& jobs);

@@ -85,11 +85,7 @@ int RunCompare(const CompareArguments& arguments) {
   if (arguments.as_json) {
     fmt::print("{}\n", ComparisonJson(comparison));
   } else {
-    PrintComparison(comparison);
-    if (!arguments.out.empty()) {
-      fmt::print("Written: summary.csv, runs.csv, curves.svg and curves.png in {}\n",
-                 arguments.out);
-    }
+    PrintComparison(comparison, arguments.out);
   }
   return 0;
 }

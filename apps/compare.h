@@ -24,8 +24,8 @@ std::span<const std::pair<const char*, Scores GroupSummary::*>> NamedScores();
 /// Compares runs; see GroupRuns. Throws BadInput.
 Comparison Compare(const CompareRequest& request);
 
-/// Prints it as tables.
-void PrintComparison(const Comparison& comparison);
+/// Prints it as tables, and says that it was written to a folder, unless that is empty.
+void PrintComparison(const Comparison& comparison, const std::filesystem::path& written_to);
 
 /// The same as JSON, with every run's figures. What is not reached (the time to solve of a run that
 /// never did) is null.

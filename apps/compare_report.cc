@@ -135,7 +135,7 @@ ordered_json GroupJson(const RunGroup& group, const GroupSummary& s) {
 
 }  // namespace
 
-void PrintComparison(const Comparison& comparison) {
+void PrintComparison(const Comparison& comparison, const std::filesystem::path& written_to) {
   const GroupedRuns& runs = comparison.runs;
   for (size_t i = 0; i < runs.groups.size(); ++i) {
     PrintGroup(runs.groups[i], comparison.summaries[i], runs.differences[i]);
@@ -145,6 +145,9 @@ void PrintComparison(const Comparison& comparison) {
   fmt::print(
       "Intervals: Wilson for shares, else percentile bootstrap of {} resamples of the runs.\n",
       FormatCount(kResamples));
+  if (written_to.empty()) return;
+  fmt::print("Written: summary.csv, runs.csv, curves.svg and curves.png in {}\n",
+             written_to.string());
 }
 
 std::string ComparisonJson(const Comparison& comparison) {

@@ -129,8 +129,7 @@ Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
   Config config;
   const Options options = OptionsOf(config);
   const std::string where = file.string();
-  const std::string text = file.empty() ? "" : ReadTextFile(file);
-  const toml::table table = ParseToml(text, where);
+  const toml::table table = ParseToml(file.empty() ? "" : ReadTextFile(file), where);
 
   // A model file brings its own plant, which other settings may change.
   const EarlySetting model = FindEarly("plant", "model", table, where, flags);
@@ -144,7 +143,7 @@ Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
   if (agent_setting.where.empty()) agent_setting.value = config.agent;
   const NamedAgent& agent = FindAgent(agent_setting.value, agent_setting.where);
   ApplyToml(options, agent.toml, Concat("agent ", agent.name));
-  if (!file.empty()) ApplyToml(options, text, where);
+  ApplyTable(options, table, where, false);
   SetFlags(options, flags);
   config.agent = agent.name;
   config.model = model_path;

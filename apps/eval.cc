@@ -137,16 +137,8 @@ int RunEval(const EvalArguments& arguments) {
 
   Evaluation evaluation;
   {
-    ProgressLine line;
-    const auto begin = std::chrono::steady_clock::now();
-    evaluation = Evaluate(loaded.policy, env, &pool, [&](double share) {
-      if (!line.due() || arguments.as_json) return;
-      const double seconds =
-          std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-      line.Show(share,
-                {fmt::format("{} episodes/s", FormatCount(share * arguments.episodes / seconds)),
-                 fmt::format("{} left", FormatDuration(seconds * (1 - share) / share))});
-    });
+    EpisodeProgress progress(arguments.episodes, arguments.as_json);
+    evaluation = Evaluate(loaded.policy, env, &pool, [&](double share) { progress.Show(share); });
   }
   if (arguments.as_json) {
     PrintJson(evaluation, loaded, arguments, plant, trial);
@@ -161,25 +153,18 @@ int RunEval(const EvalArguments& arguments) {
 void AddEval(CLI::App& program, Command& command) {
   CLI::App* app = program.add_subcommand("eval", "Judge a policy over many episodes");
   auto a = std::make_shared<EvalArguments>();
-  app->add_option("policy", a->policy, "policy.safetensors or run folder")
-      ->required()
-      ->type_name("POLICY|RUN")
-      ->check(NotEmpty());
+  AddPolicy(*app, a->policy)->required();
   app->add_option("--episodes", a->episodes, "how many [100]")
       ->check(CLI::Range(1, 1000000).description(""))
       ->type_name("INTEGER");
-  app->add_option("--seed", a->seed, "of the start states [0]")
-      ->check(CLI::Range(int64_t{0}, int64_t{9000000000000000}).description(""))
-      ->type_name("INTEGER");
+  AddSeed(*app, a->seed, "the start states");
   AddPlantOptions(*app, a->set, a->model);
   app->add_option("--physics", a->physics,
                   "engine: mujoco, or closed-form, its faster twin [mujoco]")
       ->type_name("TEXT");
   Trial defaults;
   AddSettings(*app, OptionsOf(defaults), a->flags);
-  app->add_option("--threads", a->threads, "0: one for each processor, at most 8")
-      ->check(CLI::Range(0, 256).description(""))
-      ->type_name("INTEGER");
+  AddThreads(*app, a->threads);
   app->add_flag("--json", a->as_json, "print JSON instead of a table")->disable_flag_override();
   app->footer(fmt::format(
       "An episode lasts {} s from hanging with normal noise of 0.1 (rad, rad/s). It succeeds if "

@@ -21,6 +21,29 @@ CLI::Validator NotEmpty() {
           ""};
 }
 
+CLI::Option* AddPolicy(CLI::App& app, std::string& policy) {
+  return app.add_option("policy", policy, "policy.safetensors or run folder")
+      ->type_name("POLICY|RUN")
+      ->check(NotEmpty());
+}
+
+void AddStart(CLI::App& app, std::string& start) {
+  app.add_option("--start", start, "where it begins, rad and rad/s [0,0,0,0: hanging]")
+      ->type_name("q1,q2,w1,w2");
+}
+
+void AddSeed(CLI::App& app, int64_t& seed, const std::string& what) {
+  app.add_option("--seed", seed, Concat("of ", what, " [0]"))
+      ->check(CLI::Range(int64_t{0}, int64_t{9000000000000000}).description(""))
+      ->type_name("INTEGER");
+}
+
+void AddThreads(CLI::App& app, int& threads) {
+  app.add_option("--threads", threads, "0: one for each processor, at most 8")
+      ->check(CLI::Range(0, 256).description(""))
+      ->type_name("INTEGER");
+}
+
 void AddManyOptions(CLI::App& app, std::string& seeds, int& jobs) {
   app.add_option("--seeds", seeds, "a run for each: 10 for 1 to 10, or a list such as 3,5,8-12")
       ->type_name("SEEDS")

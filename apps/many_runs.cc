@@ -102,7 +102,7 @@ std::vector<SeedRun> ListRuns(const ManyRuns& plan) {
   std::vector<SeedRun> runs;
   for (const int64_t seed : plan.seeds) {
     for (const Variant& variant : plan.variants) {
-      const fs::path name = fs::path(variant.name) / Concat("seed", seed);
+      const fs::path name = ManyRuns::NameOf(variant, seed);
       runs.push_back({&variant, seed, name.string(), plan.folder / name, {}, ""});
       try {
         runs.back().ReadState();
@@ -209,12 +209,17 @@ class Scheduler {
 
 }  // namespace
 
+fs::path ManyRuns::NameOf(const Variant& variant, int64_t seed) {
+  return fs::path(variant.name) / Concat("seed", seed);
+}
+
 bool SeedRun::finished() const {
   const TrainConfig& train = variant->config.train;
   return state && (state->steps >= train.steps || (state->solved && train.stop_when_solved));
 }
 
 int64_t SeedRun::Steps() const {
+  if (finished()) return state->steps;
   const int64_t at_checkpoint = state ? state->steps : 0;
   // A row begins with its step; the last one may be half written.
   const std::string tail = TailOf(path / "metrics.csv", 1024);
@@ -252,14 +257,12 @@ int TrainMany(const ManyRuns& plan) {
   Scheduler(runs, plan.jobs, view).Run();
   view.Summarize(StopSignal() != 0);
 
-  const auto failed =
-      std::ranges::find_if(runs, [](const SeedRun& run) { return !run.problem.empty(); });
   if (StopSignal() != 0) return 128 + StopSignal();
-  if (failed == runs.end()) return 0;
-  const auto count =
-      std::ranges::count_if(runs, [](const SeedRun& run) { return !run.problem.empty(); });
-  throw Failure(Concat(count, " of ", runs.size(), " runs failed, the first of them ", failed->name,
-                       ": ", failed->problem));
+  const size_t all = runs.size();
+  std::erase_if(runs, [](const SeedRun& run) { return run.problem.empty(); });
+  if (runs.empty()) return 0;
+  throw Failure(Concat(runs.size(), " of ", all, " runs failed, the first of them ",
+                       runs.front().name, ": ", runs.front().problem));
 }
 
 void MakeReadyForMany(Config& config) {

@@ -81,15 +81,8 @@ MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded) {
 /// Runs cells behind a progress line.
 std::vector<MapCell> RunCells(const MapConfig& config, const Policy& policy,
                               std::span<const int64_t> cells, ThreadPool& pool, bool quiet) {
-  ProgressLine line;
-  const auto begin = Clock::now();
-  const double episodes = static_cast<double>(cells.size()) * config.episodes;
-  return RunMap(config, policy, cells, pool, [&](double share) {
-    if (quiet || !line.due()) return;
-    const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
-    line.Show(share, {fmt::format("{} episodes/s", FormatCount(share * episodes / seconds)),
-                      fmt::format("{} left", FormatDuration(seconds * (1 - share) / share))});
-  });
+  EpisodeProgress progress(static_cast<double>(cells.size()) * config.episodes, quiet);
+  return RunMap(config, policy, cells, pool, [&](double share) { progress.Show(share); });
 }
 
 int RunMapCommand(const MapArguments& a) {
@@ -127,10 +120,7 @@ void AddMap(CLI::App& program, Command& command) {
   CLI::App* app =
       program.add_subcommand("map", "Map how a policy does on other plants or from other starts");
   auto a = std::make_shared<MapArguments>();
-  app->add_option("policy", a->policy, "policy.safetensors or run folder")
-      ->required()
-      ->type_name("POLICY|RUN")
-      ->check(NotEmpty());
+  AddPolicy(*app, a->policy)->required();
   constexpr const char* kAxis = "NAME=FROM:TO[:CELLS]";
   app->add_option("--x", a->x, "horizontal axis [mass2=-50%:+50%:31]")->type_name(kAxis);
   app->add_option("--y", a->y, "vertical axis [length2=-50%:+50%:31]")->type_name(kAxis);
@@ -150,12 +140,8 @@ void AddMap(CLI::App& program, Command& command) {
   app->add_option("--out", a->out, "new folder for map.csv, map.svg and map.png [map-X-Y]")
       ->type_name("FOLDER")
       ->check(NotEmpty());
-  app->add_option("--seed", a->seed, "of starts and noise [0]")
-      ->check(CLI::Range(int64_t{0}, int64_t{9000000000000000}).description(""))
-      ->type_name("INTEGER");
-  app->add_option("--threads", a->threads, "0: one for each processor, at most 8")
-      ->check(CLI::Range(0, 256).description(""))
-      ->type_name("INTEGER");
+  AddSeed(*app, a->seed, "starts and noise");
+  AddThreads(*app, a->threads);
   app->add_flag("--json", a->as_json, "print JSON instead of a table")->disable_flag_override();
   app->footer(
       "Axes and --set take mass1, mass2, length1, length2, damping1, damping2 (mass, length, "

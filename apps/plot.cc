@@ -248,12 +248,8 @@ int RunPlot(const PlotArguments& a) {
 void AddPlot(CLI::App& program, Command& command) {
   CLI::App* app = program.add_subcommand("plot", "Draw one episode of a policy");
   auto a = std::make_shared<PlotArguments>();
-  app->add_option("policy", a->policy, "policy.safetensors or run folder")
-      ->required()
-      ->type_name("POLICY|RUN")
-      ->check(NotEmpty());
-  app->add_option("--start", a->start, "where it begins, rad and rad/s [0,0,0,0: hanging]")
-      ->type_name("q1,q2,w1,w2");
+  AddPolicy(*app, a->policy)->required();
+  AddStart(*app, a->start);
   app->add_option("--seconds", a->seconds, "how long [10]")
       ->check(CLI::Range(0.1, 1000.0).description(""))
       ->type_name("SECONDS");

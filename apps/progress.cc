@@ -54,6 +54,13 @@ void ProgressLine::Clear() {
   last_ = {};
 }
 
+void EpisodeProgress::Show(double share) {
+  if (quiet_ || !line_.due()) return;
+  const double seconds = std::chrono::duration<double>(Clock::now() - begin_).count();
+  line_.Show(share, {fmt::format("{} episodes/s", FormatCount(share * episodes_ / seconds)),
+                     fmt::format("{} left", FormatDuration(seconds * (1 - share) / share))});
+}
+
 std::string FormatDuration(double seconds) {
   if (seconds < 60) return fmt::format("{:.1f} s", seconds);
   const auto whole = static_cast<int64_t>(std::llround(seconds));

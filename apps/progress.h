@@ -36,6 +36,23 @@ class ProgressLine {
   Clock::time_point last_{};
 };
 
+/// A progress line for work on so many episodes: their rate and the time left.
+class EpisodeProgress {
+ public:
+  /// Shows nothing if `quiet`.
+  EpisodeProgress(double episodes, bool quiet) : episodes_(episodes), quiet_(quiet) {}
+
+  /// `share` of the work is done, above 0 and up to 1.
+  void Show(double share);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  double episodes_;
+  bool quiet_;
+  ProgressLine line_;
+  Clock::time_point begin_ = Clock::now();
+};
+
 /// Seconds as people read them: `8.3 s`, `2 min 05 s`, `1 h 04 min`.
 std::string FormatDuration(double seconds);
 

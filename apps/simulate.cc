@@ -85,15 +85,12 @@ void AddSimulate(CLI::App& program, Command& command) {
   CLI::App* app = program.add_subcommand(
       "simulate", "Write one rollout of a policy, of given torques, or of none as CSV");
   auto a = std::make_shared<SimulateArguments>();
-  app->add_option("policy", a->policy, "policy.safetensors or run folder")
-      ->type_name("POLICY|RUN")
-      ->check(NotEmpty());
+  AddPolicy(*app, a->policy);
   app->add_option("--torque", a->torque,
                   "CSV file with a column `torque` (N·m), a row for each 0.02 s")
       ->type_name("FILE")
       ->check(NotEmpty());
-  app->add_option("--start", a->start, "where it begins, rad and rad/s [0,0,0,0: hanging]")
-      ->type_name("q1,q2,w1,w2");
+  AddStart(*app, a->start);
   app->add_option("--seconds", a->seconds, "how long [20, or as long as the torques last]")
       ->check(CLI::Range(0.0, 1e5).description(""))
       ->type_name("SECONDS");

@@ -1,5 +1,4 @@
 // A study: variants of the settings, each trained with many seeds.
-#include <fmt/format.h>
 #include <toml++/toml.h>
 
 #include <algorithm>
@@ -150,14 +149,12 @@ int RunStudy(const StudyArguments& arguments) {
   request.different_tasks = true;
   for (const Variant& variant : plan.variants) {
     for (const int64_t seed : plan.seeds) {
-      request.paths.push_back(plan.folder / variant.name / Concat("seed", seed));
+      request.paths.push_back(plan.folder / ManyRuns::NameOf(variant, seed));
     }
   }
   const Comparison comparison = Compare(request);
   WriteComparison(comparison, plan.folder, true);
-  PrintComparison(comparison);
-  fmt::print("Written: summary.csv, runs.csv, curves.svg and curves.png in {}\n",
-             plan.folder.string());
+  PrintComparison(comparison, plan.folder);
   return 0;
 }
 
