@@ -1,11 +1,10 @@
 import { Network, parseShape } from './network';
 import type { QValues } from './network';
+import { MEMORY_SIZE } from './observer';
 import { CONTROL_PERIOD, NOMINAL, OBSERVATION_SIZE } from './pendulum';
 import type { Parameter, Plant } from './pendulum';
 import { BadFile, parseSafetensors, read } from './safetensors';
 import type { TensorFile } from './safetensors';
-
-export const MEMORY_SIZE = 3; // numbers that an observation remembers of each past step
 
 /// Index of the largest number, the first of equals.
 export function argMax(values: ArrayLike<number>): number {

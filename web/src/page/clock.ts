@@ -36,7 +36,7 @@ export class Clock {
   /// Where the pendulum is between two physics steps, so that slow motion is smooth.
   get state(): State {
     const [from, to] = [this.before, this.world.state];
-    const between = (a: number, b: number) => (this.due === 0 ? b : a + this.due * (b - a));
+    const between = (a: number, b: number) => a + this.due * (b - a);
     return {
       q1: between(from.q1, to.q1),
       q2: between(from.q2, to.q2),

@@ -18,7 +18,7 @@ export class Page {
   readonly world: World;
   readonly clock: Clock;
   readonly history = new History(REMEMBERED);
-  private readonly agents: Agents;
+  readonly agents: Agents;
   private readonly settings: Settings;
   private readonly scene = new Scene();
   private readonly dashboard = new Dashboard();
