@@ -7,7 +7,7 @@ import shlex
 import shutil
 import unittest
 
-from testing import (MODEL, ProgramTest, read_csv, read_tensors, small, with_number, write_tensors)
+from testing import (MODEL, ROOT, ProgramTest, read_csv, read_tensors, small, with_number, write_tensors)
 
 PLANT = ["mass1", "mass2", "length1", "length2", "damping1", "damping2", "gravity", "torque_limit"]
 
@@ -282,6 +282,23 @@ class PageTest(ProgramTest):
                 (["run", "--page", "file"], "file", "folder")):
             with self.subTest(arguments=arguments):
                 self.refuse(["export", *arguments], *words)
+
+
+class ShippedTest(ProgramTest):
+    def test_the_pages_own_agents_are_what_their_list_says(self):
+        folder = ROOT / "web/public/agents"
+        entries = json.loads((folder / "agents.json").read_text())["agents"]
+        self.assertEqual({path.name for path in folder.iterdir()},
+                         {entry["file"] for entry in entries} | {"agents.json"})
+        for entry in entries:
+            with self.subTest(agent=entry["id"]):
+                self.assertEqual(entry["success_rate"], 1)
+                self.assertEqual(max(entry["curve"]["success_rate"]), 1)
+                self.succeed("export", folder / entry["file"], "--id", entry["id"],
+                             "--page", entry["id"])
+                text = (self.folder / entry["id"] / "agents.json").read_text()
+                del entry["curve"]  # that of the run, which is not here
+                self.assertEqual(json.loads(text)["agents"], [entry])
 
 
 if __name__ == "__main__":
