@@ -1,9 +1,11 @@
+import { existsSync } from 'node:fs';
 import { defineConfig } from '@playwright/test';
 
 /// The built page in Chromium. tools/web_test says which build, on which port, in which browser.
 const page = process.env.UPSWING_PAGE ?? '../build/web';
 const port = Number(process.env.UPSWING_PAGE_PORT ?? 4174);
-const chromium = process.env.UPSWING_CHROMIUM; // unset: Playwright's own
+const debians = '/usr/bin/chromium';
+const chromium = process.env.UPSWING_CHROMIUM ?? (existsSync(debians) ? debians : undefined);
 
 export default defineConfig({
   testDir: 'tests',
@@ -15,7 +17,7 @@ export default defineConfig({
   use: {
     baseURL: `http://127.0.0.1:${port}/`,
     launchOptions: {
-      ...(chromium ? { executablePath: chromium } : {}),
+      ...(chromium ? { executablePath: chromium } : {}), // else Playwright's own
       args: [
         '--no-sandbox', // there is none for root, nor in most containers
         '--disable-gpu',
