@@ -27,8 +27,8 @@ const TITLES: Record<string, string> = {
   dqn: 'DQN',
   'double-dqn': 'Double DQN',
   'dueling-dqn': 'Dueling DQN',
-  fast: 'The fast one: a small network',
-  'd3qn-randomized': 'Randomised: trained on many pendulums',
+  fast: 'Fast: a small network',
+  'd3qn-randomized': 'Randomised Dueling Double DQN',
 };
 
 /// Reads at most so many bytes as a policy can have; `onProgress` hears how many there are.

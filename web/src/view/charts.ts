@@ -70,7 +70,7 @@ export class PhasePortrait {
     canvas.clear();
     const [cx, cy] = [canvas.width / 2, canvas.height / 2];
     const x = (angle: number) => cx + (angle / Math.PI) * (cx - 4);
-    const fastest = 15; // rad/s
+    const fastest = 12; // rad/s
     const y = (w: number) => cy - (Math.min(Math.max(w, -fastest), fastest) / fastest) * (cy - 10);
     canvas.line(
       [

@@ -1,0 +1,47 @@
+// npm run pictures: the page as docs/ and the README show it.
+import { fileURLToPath } from 'node:url';
+import { ready, serve, visit } from './visit.mjs';
+
+const server = await serve();
+const docs = fileURLToPath(new URL('../../docs/', import.meta.url));
+
+/// The agent swings up from hanging; stopped on the way.
+async function swingUp(page) {
+  await page.goto(server.address);
+  await ready(page);
+  await page.click('#agent-on');
+  await page.waitForFunction(() => {
+    const { q1, q2 } = upswing.world.state;
+    return Math.cos(q1) < 0.1 && Math.cos(q1 + q2) < -0.3;
+  });
+  await page.click('#pause');
+}
+
+/// A heavier pendulum, held upright by the randomised agent, is pulled at its tip.
+async function pull(page) {
+  await page.goto(`${server.address}#agent=d3qn-randomized&mass2=1.2&length1=0.55&on=1`);
+  await ready(page);
+  await page.waitForFunction(
+    () => upswing.world.time - (upswing.world.uprightSince ?? Infinity) > 3,
+  );
+  await page.evaluate(() => {
+    const target = { x: 0.45, z: 0.95 };
+    upswing.world.drag = { link: 2, along: 0.5, target };
+  });
+  await page.waitForTimeout(150);
+}
+
+const desktop = { viewport: { width: 1400, height: 860 } };
+const phone = { viewport: { width: 390, height: 844 }, deviceScaleFactor: 2, isMobile: true };
+for (const [name, options, scene] of [
+  ['page', desktop, swingUp],
+  ['page-dark', { ...desktop, colorScheme: 'dark' }, pull],
+  ['page-phone', phone, swingUp],
+]) {
+  await visit(options, async (page) => {
+    await scene(page);
+    await page.screenshot({ path: `${docs}${name}.png` });
+  });
+  console.log(`docs/${name}.png`);
+}
+await server.close();
