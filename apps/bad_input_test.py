@@ -470,12 +470,14 @@ class CheckpointTest(FileTest):
 
 class RunFolderTest(FileTest):
     def test_existing_run_is_never_overwritten(self):
-        self.refuse(small(), "run", "exists already", "--resume run", "--out")
-        self.refuse(["train", "--config", "run/config.toml", "--out", "run"], "exists already")
+        self.refuse(small(), "run: expected a new or empty folder", "--resume run",
+                    "--out")
+        self.refuse(["train", "--config", "run/config.toml", "--out", "run"],
+                    "run: expected a new or empty folder")
 
     def test_file_in_the_place_of_the_folder(self):
         self.write("taken", "mine")
-        self.refuse(small(out="taken"), "taken", "exists already")
+        self.refuse(small(out="taken"), "taken: expected a new or empty folder, got a file")
 
     def test_unwritable_place(self):
         self.write("file", "mine")

@@ -188,7 +188,13 @@ class CompareTest(ProgramTest):
         ET.fromstring(svg)
         for words in ("n_step 1", "keeps its last value", "training time"):
             self.assertIn(words, re.sub(r"<[^>]*>|&#160;", " ", svg))
-        self.refuse(["compare", "a", "--out", "out"], "exists already")
+        self.refuse(["compare", "a", "--out", "out"], "out: expected a new or empty folder")
+
+    def test_without_gnuplot_there_are_figures_in_numbers_only(self):
+        self.make_group("a", [1, 1])
+        path = {"PATH": str(self.folder)}
+        self.refuse(["compare", "a", "--out", "out"], "gnuplot-nox", code=1, env=path)
+        self.assertIn("2 of 2", self.succeed("compare", "a", env=path))
 
     def test_a_run_as_train_makes_it(self):
         self.succeed(*small())

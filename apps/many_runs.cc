@@ -48,10 +48,8 @@ std::string LastLine(const fs::path& path) {
 /// Throws unless the folder is free or holds what `mark` stands for.
 void CheckFolder(const fs::path& folder, const fs::path& mark) {
   std::error_code error;
-  if (!fs::exists(folder, error) || fs::is_empty(folder, error)) return;
   if (fs::is_regular_file(folder / mark, error)) return;
-  throw BadInput(Concat(folder.string(), ": exists already, without a ", mark.string(),
-                        "; nothing is overwritten (choose another --out)"));
+  CheckFree(folder, Concat("it has no ", mark.string(), " to go on with; choose another --out"));
 }
 
 /// Throws if one of the runs in a variant's folder was made with other settings.
@@ -84,11 +82,9 @@ void WriteIfOther(const fs::path& path, const std::string& text) {
 
 /// Writes what the runs begin with.
 void WriteSettings(const ManyRuns& plan) {
-  std::error_code error;
   for (const Variant& variant : plan.variants) {
     const fs::path folder = plan.folder / variant.name;
-    fs::create_directories(folder, error);
-    if (error) throw Failure(Concat("cannot make ", folder.string(), ": ", error.message()));
+    MakeFolder(folder);
     if (!variant.config.mjcf.empty()) WriteIfOther(folder / "model.xml", variant.config.mjcf);
     Config config = variant.config;
     const auto wanted = [](const Option& option) { return option.name != "seed"; };

@@ -14,6 +14,7 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/text.h"
+#include "report/figure.h"
 
 namespace upswing {
 namespace {
@@ -94,6 +95,7 @@ int RunMapCommand(const MapArguments& a) {
   const fs::path folder =
       a.out.empty() ? Concat("map-", map.config.x.name, "-", map.config.y.name) : a.out;
   CheckFree(folder);
+  CheckCanDraw();
 
   ThreadPool pool(ResolveThreads(a.threads));
   std::vector<int64_t> all(static_cast<size_t>(map.config.cells()));

@@ -157,9 +157,13 @@ class MapTest(ProgramTest):
         self.refuse(["map", self.policy, "--episodes", "20000"], "10,000,000 episodes")
         self.refuse(["map", self.policy, "--physics", "own"], "closed-form")
         self.write("taken", "")
-        self.refuse(["map", self.policy, "--out", "taken"], "taken", "exists already")
-        (self.folder / "map-mass2-length2").mkdir()
-        self.refuse(["map", self.policy], "map-mass2-length2", "exists already")
+        self.refuse(["map", self.policy, "--out", "taken"], "taken: expected a new or empty folder, got a file")
+        (self.folder / "map-mass2-length2/mine").mkdir(parents=True)
+        self.refuse(["map", self.policy], "map-mass2-length2: expected a new or empty folder, got "
+                    "one that holds something")
+
+    def test_without_gnuplot_it_does_not_begin(self):
+        self.refuse(["map", self.policy], "gnuplot-nox", code=1, env={"PATH": str(self.folder)})
 
     def test_another_model_needs_mujoco(self):
         self.write("model.xml", MODEL)

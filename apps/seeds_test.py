@@ -159,8 +159,8 @@ class SeedsTest(ProgramTest):
         self.write("many/seed2/precious", "mine")
         self.write("many/settings.toml", "")
         failed = self.run_here(*small(**TINY), "--seeds", 3)
-        self.assert_one_line(failed, 1, "1 of 3 runs failed", "seed2: upswing: many/seed2: exists")
-        self.assertRegex(failed.stdout, r"(?m)^  seed2 +failed: .*exists already.*many/seed2\.log")
+        self.assert_one_line(failed, 1, "1 of 3 runs failed", "seed2: upswing: many/seed2: expected")
+        self.assertRegex(failed.stdout, r"(?m)^  seed2 +failed: .*expected a new or empty folder.*many/seed2\.log")
         self.assertIn("2 of 3 runs done", failed.stdout)
         self.assertEqual([path.name for path in (self.folder / "many/seed2").iterdir()],
                          ["precious"])
@@ -190,7 +190,8 @@ class SeedsTest(ProgramTest):
 
     def test_a_folder_of_something_else_is_refused(self):
         self.succeed(*small(**TINY))
-        self.refuse([*small(**TINY), "--seeds", "2"], "many: exists already", "settings.toml")
+        self.refuse([*small(**TINY), "--seeds", "2"], "many: expected a new or empty folder",
+                    "no settings.toml")
 
     def test_bad_seeds(self):
         for text, words in (("0", "1 to 10000"), ("-3", "1 to 10000"), ("0-", "3,5,8-12"),

@@ -12,6 +12,7 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/text.h"
+#include "report/figure.h"
 
 namespace upswing {
 namespace {
@@ -141,6 +142,7 @@ ManyRuns ReadStudy(const StudyArguments& arguments) {
 
 int RunStudy(const StudyArguments& arguments) {
   const ManyRuns plan = ReadStudy(arguments);
+  CheckCanDraw();  // not only after hours of training
   const int exit_code = TrainMany(plan);
   if (exit_code != 0) return exit_code;
   // All runs are done: what do they show?
@@ -153,7 +155,7 @@ int RunStudy(const StudyArguments& arguments) {
     }
   }
   const Comparison comparison = Compare(request);
-  WriteComparison(comparison, plan.folder, true);
+  WriteComparison(comparison, plan.folder);
   PrintComparison(comparison, plan.folder);
   return 0;
 }

@@ -125,7 +125,13 @@ class StudyTest(ProgramTest):
     def test_a_folder_of_something_else_is_refused(self):
         self.write("little.toml", STUDY)
         self.succeed(*small(**FLAGS | {"out": "run"}))
-        self.refuse(["study", "little.toml", "--out", "run"], "run: exists already", "study.toml")
+        self.refuse(["study", "little.toml", "--out", "run"], "run: expected a new or empty folder",
+                    "no study.toml")
+
+    def test_without_gnuplot_it_does_not_begin(self):
+        self.write("little.toml", STUDY)
+        self.refuse(["study", "little.toml"], "gnuplot-nox", code=1,
+                    env={"PATH": str(self.folder)})
 
     def test_bad_studies(self):
         one = "[variants.a]\n"

@@ -287,6 +287,8 @@ std::string Script(const Figure& figure, const Terminal& terminal) {
 
 }  // namespace
 
+void CheckCanDraw() { RunGnuplot(""); }
+
 void Draw(const Figure& figure, const std::filesystem::path& file) {
   const std::string ending = file.extension().string();
   if (ending != ".svg" && ending != ".png") {
