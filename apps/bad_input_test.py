@@ -76,14 +76,26 @@ class CommandLineTest(ProgramTest):
                                      ("--sensor-noise", "-1", "[0, 10]"),
                                      ("--delay", "1.02", "[0, 1]")):
             with self.subTest(flag=flag, value=value):
-                self.refuse([*TRAIN, flag, value], flag, allowed, f'got "{value}"')
+                self.refuse([*TRAIN, flag, value], f" {flag}: expected", allowed,
+                            f'got "{value}"')
 
     def test_boxes_and_disturbances_of_an_evaluation(self):
         for flag, value in (("--randomize", "1"), ("--randomize-mass", "-0.25"),
                             ("--randomize-delay", "2"), ("--sensor-noise", "nan"),
                             ("--delay", "20ms")):
             with self.subTest(flag=flag, value=value):
-                self.refuse(["eval", self.write("policy", ""), flag, value], f'got "{value}"')
+                self.refuse(["eval", self.write("policy", ""), flag, value], f" {flag}: expected",
+                            f'got "{value}"')
+
+    def test_delay_that_is_no_whole_number_of_control_periods(self):
+        for flag in ("--delay", "--randomize-delay"):
+            for value, nearest in (("0.001", "0 and 0.02"), ("0.99", "0.98 and 1"),
+                                   ("0.70001", "0.7 and 0.72")):
+                with self.subTest(flag=flag, value=value):
+                    words = [f" {flag}: expected a multiple of 0.02 in [0, 1]", f'got "{value}"',
+                             f"the nearest are {nearest}"]
+                    self.refuse([*TRAIN, flag, value], *words)
+                    self.refuse(["eval", self.write("policy", ""), flag, value], *words)
 
     def test_physics(self):
         for engine in ("mujco", "", "MuJoCo"):

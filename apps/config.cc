@@ -50,7 +50,7 @@ EarlySetting FindEarly(std::string_view section, std::string_view key, const tom
     setting = {node->get(), Concat(PlaceOf(*node, file_name), ": ", key), true};
   }
   for (const auto& [name, text, where] : flags) {
-    if (name == key) setting = {text, where.empty() ? Concat("--", key) : where};
+    if (name == key) setting = {text, where.empty() ? FlagOf(name) : where};
   }
   return setting;
 }
@@ -120,8 +120,7 @@ void ExpectSameSettings(const Options& before, const Options& now, const std::st
 
 void SetFlags(const Options& options, const std::vector<FlagValue>& flags) {
   for (const auto& [name, value, place] : flags) {
-    const std::string flag = options.Find(name, "").front()->flag();
-    options.Set(name, value, place.empty() ? flag : place);
+    options.Set(name, value, place.empty() ? FlagOf(name) : place);
   }
 }
 

@@ -42,8 +42,8 @@ struct Config {
   PendulumEnvConfig Environments(ThreadPool& pool) const;
 };
 
-/// A setting given on the command line or in a study: name, text, and where, which begins messages;
-/// an empty place stands for the setting's flag.
+/// A setting given on the command line or in a study: name (or that of an alias), text, and where,
+/// which begins messages; an empty place stands for the flag of that name.
 struct FlagValue {
   std::string name, text;
   std::string where = {};
