@@ -638,7 +638,8 @@ class ModelTest(ProgramTest):
                                    'type="sphere" size="0.1"', 1),
                 MODEL.replace('<body pos="0 0 -0.5">', '<body pos="0 0 -0.4">'),
                 MODEL.replace('fromto="0 0 0 0 0 -0.5"', 'fromto="0 0 0 0.5 0 0"', 1),
-                MODEL.replace("<actuator>", '<actuator><motor joint="b"/>')):
+                MODEL.replace("<actuator>", '<actuator><motor joint="b"/>'),
+                MODEL.replace('<joint name="b"', '<joint name="b" stiffness="1" springref="5"')):
             with self.subTest(model=text):
                 self.refuse_model(text, "not a double pendulum: expected")
 
