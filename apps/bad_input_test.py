@@ -465,6 +465,18 @@ class CheckpointTest(FileTest):
         self.refuse([*self.RESUME, "--gamma", "0.98"], "agent.gamma", "0.99", "0.98")
         self.succeed(*self.RESUME)
 
+    def test_configuration_of_another_version(self):
+        config = self.folder / "run/config.toml"
+        lines = config.read_text(encoding="utf-8").splitlines(keepends=True)
+        config.write_text("".join(line for line in lines if not line.startswith("gamma = ")),
+                          encoding="utf-8")
+        for command in (self.RESUME, ["info", "run"], ["compare", "run"]):
+            with self.subTest(command=command):
+                self.refuse(command, "run/config.toml: expected every setting",
+                            "got none of agent.gamma: another version wrote it")
+        # As a user's own file it need not be whole.
+        self.succeed(*small(steps=400, out="again"), "--config", "run/config.toml")
+
     def test_broken_configuration(self):
         config = self.folder / "run/config.toml"
         text = config.read_text(encoding="utf-8")

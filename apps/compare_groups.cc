@@ -83,7 +83,7 @@ bool IsJudged(const std::string& name) {
 }
 
 FoundRun ReadRun(const fs::path& path, const fs::path& root, bool unfinished) {
-  const Config config = BuildConfig(path / "config.toml", {});
+  const Config config = ReadRunConfig(path);
   const TrainConfig& t = config.train;
   FoundRun found{{path, {t.seed, t.steps, t.envs, t.eval_every, t.stop_when_solved}, {}},
                  config.agent,

@@ -56,6 +56,10 @@ void SetFlags(const Options& options, const std::vector<FlagValue>& flags);
 /// < flags; a model file's plant counts as defaults. Throws BadInput.
 Config BuildConfig(const std::filesystem::path& file, const std::vector<FlagValue>& flags);
 
+/// The settings of a run folder, changed by the flags. Throws BadInput, too, if the run's own file
+/// lacks one: that run is of another version, and today's default is not what it was made with.
+Config ReadRunConfig(const std::filesystem::path& run, const std::vector<FlagValue>& flags = {});
+
 /// Applies a TOML document. `where` names it in messages, which give the line too.
 void ApplyToml(const Options& options, std::string_view toml, const std::string& where);
 
