@@ -6,7 +6,6 @@
 #include <memory>
 
 #include "apps/commands.h"
-#include "core/error.h"
 #include "core/file.h"
 #include "core/text.h"
 #include "report/learning_curve.h"

@@ -87,6 +87,7 @@ std::vector<Variant> ReadVariants(const toml::table& study, const std::string& w
   }
   std::ranges::stable_sort(placed, {}, [](const auto& entry) { return entry.first; });
   std::vector<Variant> in_order;
+  in_order.reserve(placed.size());
   for (auto& [line, variant] : placed) in_order.push_back(std::move(variant));
   return in_order;
 }

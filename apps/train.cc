@@ -89,7 +89,7 @@ struct Parts {
     // The twin says at once who fails; who does not is judged in MuJoCo.
     const bool screened = config.eval_physics == kScreened;
     if (screened && config.mjcf.empty()) {
-      const Evaluation screening = JudgeIn(PhysicsEngine::kClosedForm, policy, step);
+      Evaluation screening = JudgeIn(PhysicsEngine::kClosedForm, policy, step);
       if (!screening.all_succeeded()) return screening;
     }
     return JudgeIn(

@@ -147,6 +147,7 @@ Header ParseHeader(std::string_view text, size_t data_size, std::string_view pre
 /// Throws unless the tensors cover the data without gap or overlap.
 void CheckCovered(const std::map<std::string, Entry>& entries, size_t data_size) {
   std::vector<std::pair<size_t, size_t>> pieces;  // begin and size
+  pieces.reserve(entries.size());
   for (const auto& [name, entry] : entries) pieces.emplace_back(entry.begin, entry.size);
   std::ranges::sort(pieces);
   size_t end = 0;

@@ -266,6 +266,7 @@ class PanelScript {
 
 std::string Script(const Figure& figure, const Terminal& terminal) {
   std::vector<std::string> palette;
+  palette.reserve(kViridis.size());
   for (const char* color : kViridis) palette.push_back(Concat(palette.size(), " '", color, "'"));
   std::string script =
       Concat("set encoding utf8\n", "set terminal ", terminal.name, " noenhanced size ",
