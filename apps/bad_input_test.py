@@ -76,14 +76,26 @@ class CommandLineTest(ProgramTest):
                                      ("--sensor-noise", "-1", "[0, 10]"),
                                      ("--delay", "1.02", "[0, 1]")):
             with self.subTest(flag=flag, value=value):
-                self.refuse([*TRAIN, flag, value], flag, allowed, f'got "{value}"')
+                self.refuse([*TRAIN, flag, value], f" {flag}: expected", allowed,
+                            f'got "{value}"')
 
     def test_boxes_and_disturbances_of_an_evaluation(self):
         for flag, value in (("--randomize", "1"), ("--randomize-mass", "-0.25"),
                             ("--randomize-delay", "2"), ("--sensor-noise", "nan"),
                             ("--delay", "20ms")):
             with self.subTest(flag=flag, value=value):
-                self.refuse(["eval", self.write("policy", ""), flag, value], f'got "{value}"')
+                self.refuse(["eval", self.write("policy", ""), flag, value], f" {flag}: expected",
+                            f'got "{value}"')
+
+    def test_delay_that_is_no_whole_number_of_control_periods(self):
+        for flag in ("--delay", "--randomize-delay"):
+            for value, nearest in (("0.001", "0 and 0.02"), ("0.99", "0.98 and 1"),
+                                   ("0.70001", "0.7 and 0.72")):
+                with self.subTest(flag=flag, value=value):
+                    words = [f" {flag}: expected a multiple of 0.02 in [0, 1]", f'got "{value}"',
+                             f"the nearest are {nearest}"]
+                    self.refuse([*TRAIN, flag, value], *words)
+                    self.refuse(["eval", self.write("policy", ""), flag, value], *words)
 
     def test_physics(self):
         for engine in ("mujco", "", "MuJoCo"):
@@ -453,6 +465,18 @@ class CheckpointTest(FileTest):
         self.refuse([*self.RESUME, "--gamma", "0.98"], "agent.gamma", "0.99", "0.98")
         self.succeed(*self.RESUME)
 
+    def test_configuration_of_another_version(self):
+        config = self.folder / "run/config.toml"
+        lines = config.read_text(encoding="utf-8").splitlines(keepends=True)
+        config.write_text("".join(line for line in lines if not line.startswith("gamma = ")),
+                          encoding="utf-8")
+        for command in (self.RESUME, ["info", "run"], ["compare", "run"]):
+            with self.subTest(command=command):
+                self.refuse(command, "run/config.toml: expected every setting",
+                            "got none of agent.gamma: another version wrote it")
+        # As a user's own file it need not be whole.
+        self.succeed(*small(steps=400, out="again"), "--config", "run/config.toml")
+
     def test_broken_configuration(self):
         config = self.folder / "run/config.toml"
         text = config.read_text(encoding="utf-8")
@@ -470,12 +494,14 @@ class CheckpointTest(FileTest):
 
 class RunFolderTest(FileTest):
     def test_existing_run_is_never_overwritten(self):
-        self.refuse(small(), "run", "exists already", "--resume run", "--out")
-        self.refuse(["train", "--config", "run/config.toml", "--out", "run"], "exists already")
+        self.refuse(small(), "run: expected a new or empty folder", "--resume run",
+                    "--out")
+        self.refuse(["train", "--config", "run/config.toml", "--out", "run"],
+                    "run: expected a new or empty folder")
 
     def test_file_in_the_place_of_the_folder(self):
         self.write("taken", "mine")
-        self.refuse(small(out="taken"), "taken", "exists already")
+        self.refuse(small(out="taken"), "taken: expected a new or empty folder, got a file")
 
     def test_unwritable_place(self):
         self.write("file", "mine")
@@ -624,7 +650,8 @@ class ModelTest(ProgramTest):
                                    'type="sphere" size="0.1"', 1),
                 MODEL.replace('<body pos="0 0 -0.5">', '<body pos="0 0 -0.4">'),
                 MODEL.replace('fromto="0 0 0 0 0 -0.5"', 'fromto="0 0 0 0.5 0 0"', 1),
-                MODEL.replace("<actuator>", '<actuator><motor joint="b"/>')):
+                MODEL.replace("<actuator>", '<actuator><motor joint="b"/>'),
+                MODEL.replace('<joint name="b"', '<joint name="b" stiffness="1" springref="5"')):
             with self.subTest(model=text):
                 self.refuse_model(text, "not a double pendulum: expected")
 

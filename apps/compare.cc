@@ -6,7 +6,6 @@
 #include <memory>
 
 #include "apps/commands.h"
-#include "core/error.h"
 #include "core/file.h"
 #include "core/text.h"
 #include "report/learning_curve.h"
@@ -80,8 +79,15 @@ int RunCompare(const CompareArguments& arguments) {
   request.paths.assign(arguments.runs.begin(), arguments.runs.end());
   request.unfinished = arguments.unfinished;
   request.different_tasks = arguments.different_tasks;
+  if (!arguments.out.empty()) {
+    CheckFree(arguments.out);
+    CheckCanDraw();
+  }
   const Comparison comparison = Compare(request);
-  if (!arguments.out.empty()) WriteComparison(comparison, arguments.out, false);
+  if (!arguments.out.empty()) {
+    MakeNewFolder(arguments.out);
+    WriteComparison(comparison, arguments.out);
+  }
   if (arguments.as_json) {
     fmt::print("{}\n", ComparisonJson(comparison));
   } else {
@@ -117,16 +123,7 @@ Comparison Compare(const CompareRequest& request) {
   return comparison;
 }
 
-void WriteComparison(const Comparison& comparison, const fs::path& folder, bool replace) {
-  for (const char* name : {"summary.csv", "runs.csv", "curves.svg", "curves.png"}) {
-    if (!replace && fs::exists(folder / name)) {
-      throw BadInput(Concat((folder / name).string(), ": exists already; nothing is overwritten ",
-                            "(choose another --out)"));
-    }
-  }
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) throw Failure(Concat("cannot make ", folder.string(), ": ", error.message()));
+void WriteComparison(const Comparison& comparison, const fs::path& folder) {
   const Figure curves = LearningCurves(comparison.runs.groups);
   Draw(curves, folder / "curves.svg");
   Draw(curves, folder / "curves.png");
@@ -142,7 +139,8 @@ void AddCompare(CLI::App& program, Command& command) {
       ->type_name("RUN|FOLDER")
       ->required()
       ->check(NotEmpty());
-  app->add_option("--out", a->out, "write summary.csv, runs.csv, curves.svg and curves.png there")
+  app->add_option("--out", a->out,
+                  "new folder for summary.csv, runs.csv, curves.svg and curves.png")
       ->type_name("FOLDER")
       ->check(NotEmpty());
   app->add_flag("--unfinished", a->unfinished, "take runs that are unfinished as they are")

@@ -32,9 +32,8 @@ void PrintComparison(const Comparison& comparison, const std::filesystem::path& 
 std::string ComparisonJson(const Comparison& comparison);
 
 /// Writes summary.csv (a row for each group), runs.csv (a row for each run) and the learning curves
-/// as curves.svg and curves.png. Makes the folder if it is not there. Throws BadInput if one of
-/// them is there already, unless `replace`; Failure if it cannot write or draw.
-void WriteComparison(const Comparison& comparison, const std::filesystem::path& folder,
-                     bool replace);
+/// as curves.svg and curves.png, in place of those that are there. Throws Failure if it cannot
+/// write or draw.
+void WriteComparison(const Comparison& comparison, const std::filesystem::path& folder);
 
 }  // namespace upswing

@@ -81,7 +81,7 @@ bool IsJudged(const std::string& name) {
 }
 
 FoundRun ReadRun(const fs::path& path, const fs::path& root, bool unfinished) {
-  const Config config = BuildConfig(path / "config.toml", {});
+  const Config config = ReadRunConfig(path);
   const TrainConfig& t = config.train;
   FoundRun found{{path, {t.seed, t.steps, t.envs, t.eval_every, t.stop_when_solved}, {}},
                  config.agent,
@@ -154,7 +154,8 @@ void CheckFinished(std::vector<FoundRun>& runs, bool unfinished, std::vector<std
 std::string Differences(const FoundRun& of, const std::vector<const FoundRun*>& others) {
   std::vector<std::string> parts;
   for (size_t i = 0; i < of.settings.size(); ++i) {
-    const auto& [name, value] = of.settings[i];
+    const std::string& name = of.settings[i].first;
+    const std::string& value = of.settings[i].second;  // clang 14 captures no structured binding
     const bool differs = std::ranges::any_of(
         others, [&](const FoundRun* other) { return other->settings[i].second != value; });
     if (!differs || name == "train.agent") continue;

@@ -8,7 +8,7 @@ import statistics
 import unittest
 import xml.etree.ElementTree as ET
 
-from testing import MODEL, ProgramTest, read_csv, small
+from testing import MODEL, ProgramTest, read_csv, small, train_once
 
 OUTPUTS = ["curves.png", "curves.svg", "runs.csv", "summary.csv"]
 
@@ -20,14 +20,28 @@ def iqm(values):
 
 
 class CompareTest(ProgramTest):
+    @classmethod
+    def setUpClass(cls):
+        # The settings of a run as `train` writes them.
+        cls.settings = {}
+        for agent in ("d3qn", "dqn"):
+            path = train_once(cls, agent=agent, hidden=None, head=None, steps=8, eval_every=None,
+                              eval_episodes=None, checkpoint_every=None, log_every=None,
+                              learning_starts=None, threads=None, envs=None, updates_per_step=None)
+            cls.settings[agent] = (path / "config.toml").read_text(encoding="utf-8")
+
     def make_run(self, path, seed, rows, *, agent="d3qn", steps=4000, stop=True, more=""):
         """A run folder with an evaluation (success rate, return) every 1,000 steps, of 2.5 s each,
-        as `train` writes it."""
+        as `train` writes it; `more` are lines of other settings."""
         folder = self.folder / path
         folder.mkdir(parents=True)
-        (folder / "config.toml").write_text(
-            f'[train]\nagent = "{agent}"\nseed = {seed}\nsteps = {steps}\neval_every = 1000\n'
-            f"stop_when_solved = {str(stop).lower()}\n{more}")
+        settings = self.settings[agent]
+        lines = (f"seed = {seed}\nsteps = {steps}\neval_every = 1000\n"
+                 f"stop_when_solved = {str(stop).lower()}\n{more}").splitlines()
+        for line in lines:
+            settings, count = re.subn(rf"(?m)^{line.split()[0]} = .*", lambda _: line, settings)
+            self.assertEqual(count, 1, line)
+        (folder / "config.toml").write_text(settings, encoding="utf-8")
         (folder / "evals.csv").write_text(
             "step,success_rate,success_low,mean_return,seconds\n"
             + "".join(f"{1000 * k},{rate},0,{value},{2.5 * k}\n"
@@ -97,7 +111,7 @@ class CompareTest(ProgramTest):
                                 "steady_evaluations": 3, "lowest_success": 0.98})
 
     def test_labels(self):
-        self.make_group("study/fast", [1, 1], more="[agent]\ngamma = 0.9\n")
+        self.make_group("study/fast", [1, 1], more="gamma = 0.9\n")
         self.make_group("study/slow", [2, 2])
         self.assertEqual([g["group"] for g in self.compare("study")["groups"]], ["fast", "slow"])
         self.assertEqual([g["group"] for g in self.compare("study/fast", "study/slow")["groups"]],
@@ -124,15 +138,17 @@ class CompareTest(ProgramTest):
 
     def test_refuses(self):
         self.make_group("r", [1, 2])
-        self.make_run("heavy", 3, [(1, 1), (1, 1)], more="[plant]\nmass2 = 1.2\n")
+        self.make_run("heavy", 3, [(1, 1), (1, 1)], more="mass2 = 1.2\n")
         self.make_run("seldom", 3, [(1, 1), (1, 1)], more="eval_episodes = 7\n")
-        self.make_run("noisy", 3, [(1, 1), (1, 1)], more="[disturbance]\nsensor_noise = 0.1\n")
-        self.make_run("model", 3, [(1, 1), (1, 1)], more='[plant]\nmodel = "model.xml"\n')
+        self.make_run("noisy", 3, [(1, 1), (1, 1)], more="sensor_noise = 0.1\n")
+        self.make_run("model", 3, [(1, 1), (1, 1)], more='model = "model.xml"\n')
         self.write("model/model.xml", MODEL)
         self.make_run("twin", 1, [(1, 1), (1, 1)])
         self.make_run("begun", 3, [(0, 1), (1, 1)])
         self.make_run("bare", 4, [])
-        self.make_run("odd", 5, [(1, 1)], more="no_such_key = 1\n")
+        self.make_run("odd", 5, [(1, 1)])
+        with open(self.folder / "odd/config.toml", "a", encoding="utf-8") as file:
+            file.write("no_such_key = 1\n")
         (self.folder / "empty").mkdir()
         self.write("file", "")
         refuse = lambda arguments, *words: self.refuse(["compare", *arguments], *words)
@@ -153,6 +169,19 @@ class CompareTest(ProgramTest):
         refuse(["odd"], "odd/config.toml:", "no_such_key")
         self.assertEqual(len(self.compare("r", "heavy", "--different-tasks")["groups"]), 2)
 
+    def test_a_run_that_lacks_settings_is_not_filled_up_with_todays_defaults(self):
+        self.make_run("old", 1, [(1, 1), (1, 1)])
+        config = self.folder / "old/config.toml"
+        whole = config.read_text(encoding="utf-8")
+        config.write_text(re.sub(r"(?m)^memory = .*\n", "", whole), encoding="utf-8")
+        self.refuse(["compare", "old"], "old/config.toml: expected every setting",
+                    "got none of task.memory: another version wrote it")
+        config.write_text(re.sub(r"(?m)^(hidden|head) = .*\n", "", whole), encoding="utf-8")
+        self.refuse(["compare", "old"], "got none of network.hidden, network.head")
+        config.write_text('[train]\nagent = "d3qn"\n', encoding="utf-8")
+        self.assertRegex(self.run_here("compare", "old").stderr,
+                         r"got none of (\w+\.\w+, ){5}\w+\.\w+ and \d+ more: another version")
+
     def test_unfinished_runs_on_demand(self):
         self.make_group("r", [1, 2])
         self.make_run("begun", 3, [(0, 1), (1, 1)])
@@ -167,7 +196,7 @@ class CompareTest(ProgramTest):
 
     def test_files(self):
         self.make_group("a", [1, 1, None])
-        self.make_group("b", [3, 3, 2], more='[agent]\nn_step = 1\n[network]\nhidden = [9, 9]\n')
+        self.make_group("b", [3, 3, 2], more="n_step = 1\nhidden = [9, 9]\n")
         text = self.succeed("compare", "a", "b", "--out", "out")
         self.assertIn("Written", text)
         self.assertEqual(sorted(p.name for p in (self.folder / "out").iterdir()), OUTPUTS)
@@ -188,7 +217,13 @@ class CompareTest(ProgramTest):
         ET.fromstring(svg)
         for words in ("n_step 1", "keeps its last value", "training time"):
             self.assertIn(words, re.sub(r"<[^>]*>|&#160;", " ", svg))
-        self.refuse(["compare", "a", "--out", "out"], "exists already")
+        self.refuse(["compare", "a", "--out", "out"], "out: expected a new or empty folder")
+
+    def test_without_gnuplot_there_are_figures_in_numbers_only(self):
+        self.make_group("a", [1, 1])
+        path = {"PATH": str(self.folder)}
+        self.refuse(["compare", "a", "--out", "out"], "gnuplot-nox", code=1, env=path)
+        self.assertIn("2 of 2", self.succeed("compare", "a", env=path))
 
     def test_a_run_as_train_makes_it(self):
         self.succeed(*small())

@@ -50,7 +50,7 @@ EarlySetting FindEarly(std::string_view section, std::string_view key, const tom
     setting = {node->get(), Concat(PlaceOf(*node, file_name), ": ", key), true};
   }
   for (const auto& [name, text, where] : flags) {
-    if (name == key) setting = {text, where.empty() ? Concat("--", key) : where};
+    if (name == key) setting = {text, where.empty() ? FlagOf(name) : where};
   }
   return setting;
 }
@@ -120,8 +120,7 @@ void ExpectSameSettings(const Options& before, const Options& now, const std::st
 
 void SetFlags(const Options& options, const std::vector<FlagValue>& flags) {
   for (const auto& [name, value, place] : flags) {
-    const std::string flag = options.Find(name, "").front()->flag();
-    options.Set(name, value, place.empty() ? flag : place);
+    options.Set(name, value, place.empty() ? FlagOf(name) : place);
   }
 }
 
@@ -180,6 +179,26 @@ std::string TrainCommand(Config config) {
     if (now[i].text() != before[i].text()) command += ' ' + now[i].on_command_line();
   }
   return command;
+}
+
+Config ReadRunConfig(const fs::path& run, const std::vector<FlagValue>& flags) {
+  const fs::path file = run / "config.toml";
+  const toml::table table = ParseToml(ReadTextFile(file), file.string());
+  Config scratch;
+  const Options options = OptionsOf(scratch);
+  std::vector<std::string> missing;
+  for (const Option& option : options.all()) {
+    if (table[option.section][option.name]) continue;
+    missing.push_back(Concat(option.section, ".", option.name));
+  }
+  if (missing.empty()) return BuildConfig(file, flags);
+  constexpr size_t kMostNames = 6;  // that make a line which can still be read
+  const size_t more = missing.size() - std::min(missing.size(), kMostNames);
+  missing.resize(missing.size() - more);
+  throw BadInput(Concat(file.string(), ": expected every setting, as this version writes a run; ",
+                        "got none of ", Join(missing, ", "),
+                        more > 0 ? Concat(" and ", more, " more") : "",
+                        ": another version wrote it"));
 }
 
 std::string ConfigToml(Config config, bool identity_only) {

@@ -42,8 +42,8 @@ struct Config {
   PendulumEnvConfig Environments(ThreadPool& pool) const;
 };
 
-/// A setting given on the command line or in a study: name, text, and where, which begins messages;
-/// an empty place stands for the setting's flag.
+/// A setting given on the command line or in a study: name (or that of an alias), text, and where,
+/// which begins messages; an empty place stands for the flag of that name.
 struct FlagValue {
   std::string name, text;
   std::string where = {};
@@ -55,6 +55,10 @@ void SetFlags(const Options& options, const std::vector<FlagValue>& flags);
 /// Builds the settings in their order: defaults < named agent < configuration file (none if empty)
 /// < flags; a model file's plant counts as defaults. Throws BadInput.
 Config BuildConfig(const std::filesystem::path& file, const std::vector<FlagValue>& flags);
+
+/// The settings of a run folder, changed by the flags. Throws BadInput, too, if the run's own file
+/// lacks one: that run is of another version, and today's default is not what it was made with.
+Config ReadRunConfig(const std::filesystem::path& run, const std::vector<FlagValue>& flags = {});
 
 /// Applies a TOML document. `where` names it in messages, which give the line too.
 void ApplyToml(const Options& options, std::string_view toml, const std::string& where);

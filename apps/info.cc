@@ -48,7 +48,7 @@ void PrintPolicy(const fs::path& path) {
 
 void PrintRun(const fs::path& path) {
   const TensorFile checkpoint = TensorFile::Load(RunFolder::CheckpointPath(path));
-  const Config config = BuildConfig(path / "config.toml", {});
+  const Config config = ReadRunConfig(path);
   TrainState state(static_cast<int>(config.train.envs), kRewardTerms);
   state.State(Archive::Loader(checkpoint).In("train"));
   fmt::print("{}\n", path.string());

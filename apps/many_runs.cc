@@ -40,7 +40,8 @@ std::string LastLine(const fs::path& path) {
   for (const std::string_view line : Split(tail, '\n')) {
     if (!line.empty()) last = line;
   }
-  return last;
+  constexpr std::string_view kProgram = "upswing: ";  // said by the one who passes it on, too
+  return last.starts_with(kProgram) ? last.substr(kProgram.size()) : last;
 }
 
 // ---- Before anything runs.
@@ -48,34 +49,36 @@ std::string LastLine(const fs::path& path) {
 /// Throws unless the folder is free or holds what `mark` stands for.
 void CheckFolder(const fs::path& folder, const fs::path& mark) {
   std::error_code error;
-  if (!fs::exists(folder, error) || fs::is_empty(folder, error)) return;
   if (fs::is_regular_file(folder / mark, error)) return;
-  throw BadInput(Concat(folder.string(), ": exists already, without a ", mark.string(),
-                        "; nothing is overwritten (choose another --out)"));
+  CheckFree(folder, Concat("it has no ", mark.string(), " to go on with; choose another --out"));
 }
 
-/// Throws if one of the runs in a variant's folder was made with other settings.
+/// Throws if `what` was made with settings, `before`, that those of now cannot go on with.
+void CheckSame(Config before, Config now, bool more_steps, const std::string& what) {
+  if (!before.mjcf.empty()) before.model = now.model;
+  const auto counts = [&](const Option& option) {
+    if (option.name == "steps") return !more_steps || now.train.steps < before.train.steps;
+    return option.name == "stop_when_solved" || (option.identity && option.name != "seed");
+  };
+  try {
+    ExpectSameSettings(OptionsOf(before), OptionsOf(now), what, counts);
+    if (before.mjcf != now.mjcf) throw BadInput(Concat(what, ": made with another model"));
+  } catch (const Error& other) {
+    throw BadInput(Concat(other.what(), "; choose another --out"));
+  }
+}
+
+/// Throws if what is in a variant's folder was made with other settings: one of its runs, or, where
+/// none has begun, the settings themselves.
 void CheckRuns(const fs::path& folder, const Config& config, bool more_steps) {
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     if (!fs::is_regular_file(entry.path() / "config.toml", error)) continue;
-    Config before = BuildConfig(entry.path() / "config.toml", {});
-    if (!before.mjcf.empty()) before.model = config.model;
-    const auto counts = [&](const Option& option) {
-      if (option.name == "steps") {
-        return !more_steps || config.train.steps < before.train.steps;
-      }
-      return option.name == "stop_when_solved" || (option.identity && option.name != "seed");
-    };
-    Config now = config;
-    const std::string what = entry.path().string();
-    try {
-      ExpectSameSettings(OptionsOf(before), OptionsOf(now), what, counts);
-      if (before.mjcf != now.mjcf) throw BadInput(Concat(what, ": made with another model"));
-    } catch (const Error& other) {
-      throw BadInput(Concat(other.what(), "; choose another --out"));
-    }
+    CheckSame(ReadRunConfig(entry.path()), config, more_steps, entry.path().string());
   }
+  const fs::path settings = folder / kSettingsName;
+  if (!fs::is_regular_file(settings, error)) return;
+  CheckSame(BuildConfig(settings, {}), config, more_steps, settings.string());
 }
 
 void WriteIfOther(const fs::path& path, const std::string& text) {
@@ -84,11 +87,9 @@ void WriteIfOther(const fs::path& path, const std::string& text) {
 
 /// Writes what the runs begin with.
 void WriteSettings(const ManyRuns& plan) {
-  std::error_code error;
   for (const Variant& variant : plan.variants) {
     const fs::path folder = plan.folder / variant.name;
-    fs::create_directories(folder, error);
-    if (error) throw Failure(Concat("cannot make ", folder.string(), ": ", error.message()));
+    MakeFolder(folder);
     if (!variant.config.mjcf.empty()) WriteIfOther(folder / "model.xml", variant.config.mjcf);
     Config config = variant.config;
     const auto wanted = [](const Option& option) { return option.name != "seed"; };
@@ -261,8 +262,9 @@ int TrainMany(const ManyRuns& plan) {
   const size_t all = runs.size();
   std::erase_if(runs, [](const SeedRun& run) { return run.problem.empty(); });
   if (runs.empty()) return 0;
-  throw Failure(Concat(runs.size(), " of ", all, " runs failed, the first of them ",
-                       runs.front().name, ": ", runs.front().problem));
+  throw Failure(Concat(runs.size(), " of ", all, " runs in ", plan.folder.string(),
+                       " failed, the first of them ", runs.front().name, ": ",
+                       runs.front().problem));
 }
 
 void MakeReadyForMany(Config& config) {

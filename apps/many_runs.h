@@ -27,6 +27,7 @@ struct ManyRuns {
   std::vector<int64_t> seeds;
   int jobs = 1;             // runs at a time
   bool more_steps = false;  // runs that made fewer steps may go on
+  bool compared = false;    // a comparison follows when all are done
 
   /// Where a run lies in the folder.
   static std::filesystem::path NameOf(const Variant& variant, int64_t seed);

@@ -44,6 +44,9 @@ void ManyRunsView::Announce() const {
     const size_t done = Measure().done;
     fmt::print("  {} done before, going on with {}\n", done, static_cast<size_t>(begun) - done);
   }
+  for (const SeedRun& run : runs_) {
+    if (!run.problem.empty()) fmt::print("  {:<20} failed: {}\n", run.name, run.problem);
+  }
   std::fflush(stdout);
 }
 
@@ -103,11 +106,11 @@ void ManyRunsView::PrintTable(const Variant& variant) const {
   fmt::print("\n{}\n", variant.name.empty() ? plan_.what : variant.name);
   std::vector<double> steps, seconds, success, reward;
   size_t solved = 0;
-  size_t not_judged = 0;
+  size_t not_judged = 0, failed = 0;
   for (const SeedRun& run : runs_) {
     if (run.variant != &variant) continue;
     if (!run.state || run.state->best_step == 0) {
-      ++not_judged;
+      ++(run.problem.empty() ? not_judged : failed);
       continue;
     }
     if (steps.empty()) {
@@ -134,6 +137,7 @@ void ManyRunsView::PrintTable(const Variant& variant) const {
   if (not_judged > 0) {
     fmt::print("  {} run{} not judged yet\n", not_judged, not_judged == 1 ? "" : "s");
   }
+  if (failed > 0) fmt::print("  {} run{} failed\n", failed, failed == 1 ? "" : "s");
 }
 
 void ManyRunsView::Summarize(bool stopped) {
@@ -144,8 +148,10 @@ void ManyRunsView::Summarize(bool stopped) {
   if (stopped) {
     fmt::print("Stopped, {} of {} runs done; the same command goes on.\n", done, runs_.size());
   }
-  fmt::print("Next:\n  ./upswing compare {}{}\n", plan_.folder.string(),
-             stopped ? " --unfinished" : "");
+  if (done < runs_.size() || !plan_.compared) {
+    fmt::print("Next:\n  ./upswing compare {}{}\n", plan_.folder.string(),
+               done < runs_.size() ? " --unfinished" : "");
+  }
   std::fflush(stdout);
 }
 

@@ -14,6 +14,7 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/text.h"
+#include "report/figure.h"
 
 namespace upswing {
 namespace {
@@ -94,6 +95,7 @@ int RunMapCommand(const MapArguments& a) {
   const fs::path folder =
       a.out.empty() ? Concat("map-", map.config.x.name, "-", map.config.y.name) : a.out;
   CheckFree(folder);
+  CheckCanDraw();
 
   ThreadPool pool(ResolveThreads(a.threads));
   std::vector<int64_t> all(static_cast<size_t>(map.config.cells()));
@@ -144,13 +146,12 @@ void AddMap(CLI::App& program, Command& command) {
   AddThreads(*app, a->threads);
   app->add_flag("--json", a->as_json, "print JSON instead of a table")->disable_flag_override();
   app->footer(
-      "Axes and --set take mass1, mass2, length1, length2, damping1, damping2 (mass, length, "
-      "damping\nfor both), gravity, torque_limit, sensor_noise (rad and rad/s), delay (s), and the "
-      "start: q1, q2\n(degrees), w1, w2 (rad/s). Percentages are on top of the training's value. "
-      "An "
-      "episode is that of\n`upswing eval`; with a start, every episode begins exactly there, at "
-      "rest "
-      "and hanging in what is\nnot given.\n\n"
+      "Axes and --set take mass1, mass2, length1, length2, damping1, damping2 (mass, length,\n"
+      "damping for both), gravity, torque_limit, sensor_noise (rad, rad/s), delay (s, in whole\n"
+      "control periods of 0.02 s; each is a cell), and the start: q1, q2 (degrees), w1, w2\n"
+      "(rad/s). Percentages are on top of the training's value. An episode is that of `upswing\n"
+      "eval`; with a start, every episode begins exactly there, at rest and hanging in what is\n"
+      "not given.\n\n"
       "Examples:\n"
       "  ./upswing map runs/d3qn-seed1\n"
       "  ./upswing map runs/d3qn-seed1 --x mass=0.8:1.2 --y damping=0:0.4:21 --episodes 20\n"

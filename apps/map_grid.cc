@@ -177,13 +177,17 @@ MapAxis ParseMapAxis(const std::string& text, const MapPoint& training, const st
     throw BadInput(
         Concat(place, ": expected FROM < TO, got ", FormatNumber(from), " and ", FormatNumber(to)));
   }
-  const int64_t cells = pieces.size() == 3 ? ParseCells(pieces[2], place) : kDefaultCells;
+  // What goes in steps has a cell for each, unless the text says otherwise.
+  const double step = members.front()->step;
+  const int64_t usual = step > 0 ? std::llround((to - from) / step) + 1 : kDefaultCells;
+  const int64_t cells = pieces.size() == 3 ? ParseCells(pieces[2], place) : usual;
   for (int64_t i = 0; i < cells; ++i) {
     // Weighted like this, the middle of the ends comes out exact.
     const double between =
         (from * static_cast<double>(cells - 1 - i) + to * static_cast<double>(i)) /
         static_cast<double>(cells - 1);
     axis.values.push_back(i == 0 ? from : i == cells - 1 ? to : between);
+    options.Set(axis.name, FormatNumber(axis.values.back()), place);
   }
   return axis;
 }

@@ -39,8 +39,9 @@ struct MapAxis {
   std::string label() const;
 };
 
-/// Reads NAME=FROM:TO[:CELLS], where both ends may be percentages on top of what `training` has.
-/// `where` begins the message of the BadInput that it throws.
+/// Reads NAME=FROM:TO[:CELLS] ([:CELLS] is 31, or one for each step of what goes in steps), where
+/// both ends may be percentages on top of what `training` has. `where` begins the message of the
+/// BadInput that it throws.
 MapAxis ParseMapAxis(const std::string& text, const MapPoint& training, const std::string& where);
 
 /// Throws BadInput if both axes set the same.

@@ -115,6 +115,13 @@ class MapTest(ProgramTest):
         if since <= 500:
             self.assertAlmostEqual(result["swing_up_seconds"][1][2], 0.02 * max(since, 1))
 
+    def test_delay_has_a_cell_for_each_control_period(self):
+        result = self.map("--x", "delay=0.02:0.08", "--y", "gravity=0.05:0.1:2", "--episodes", 1,
+                          "--check", 0)
+        self.assertEqual(result["x"]["unit"], "s")
+        for value, expected in zip(result["x"]["values"], (0.02, 0.04, 0.06, 0.08), strict=True):
+            self.assertAlmostEqual(value, expected, delta=1e-12)
+
     def test_table(self):
         text = self.succeed("map", self.policy, *GRID, "--episodes", 2)
         for word in ("gravity 0.05 to 3 m/s² × mass2 0.5 to 1.5 kg: 3 × 3 cells, 2 episodes each",
@@ -141,6 +148,8 @@ class MapTest(ProgramTest):
                 ("mass2=1:nan", "mass2", '"nan"'),
                 ("delay=0:2", "delay", "in [0, 1]"),
                 ("delay=-50%:50%", "delay", "percentage of 0"),
+                ("delay=0:0.05", "delay", "a multiple of 0.02", "the nearest are 0.04 and 0.06"),
+                ("delay=0:0.1:5", "--x delay", '"0.025"', "the nearest are 0.02 and 0.04"),
                 ("q1=-400:0", "q1", "in [-360, 360]")):
             with self.subTest(axis=axis):
                 self.refuse(["map", self.policy, "--x", axis], *words)
@@ -157,9 +166,13 @@ class MapTest(ProgramTest):
         self.refuse(["map", self.policy, "--episodes", "20000"], "10,000,000 episodes")
         self.refuse(["map", self.policy, "--physics", "own"], "closed-form")
         self.write("taken", "")
-        self.refuse(["map", self.policy, "--out", "taken"], "taken", "exists already")
-        (self.folder / "map-mass2-length2").mkdir()
-        self.refuse(["map", self.policy], "map-mass2-length2", "exists already")
+        self.refuse(["map", self.policy, "--out", "taken"], "taken: expected a new or empty folder, got a file")
+        (self.folder / "map-mass2-length2/mine").mkdir(parents=True)
+        self.refuse(["map", self.policy], "map-mass2-length2: expected a new or empty folder, got "
+                    "one that holds something")
+
+    def test_without_gnuplot_it_does_not_begin(self):
+        self.refuse(["map", self.policy], "gnuplot-nox", code=1, env={"PATH": str(self.folder)})
 
     def test_another_model_needs_mujoco(self):
         self.write("model.xml", MODEL)

@@ -220,6 +220,7 @@ int RunPlot(const PlotArguments& a) {
   config.seconds = a.seconds;
   config.q_values = true;
   CheckFree(a.out);
+  CheckCanDraw();
   const Rows rows = RunRollout(config);
 
   MakeNewFolder(a.out);

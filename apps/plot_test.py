@@ -61,11 +61,12 @@ class PlotTest(ProgramTest):
         self.refuse(["plot", self.policy, "--set", "gravty=2"], "did you mean gravity?")
         self.refuse(["plot", self.policy, "--physics", "own"], "closed-form")
         self.write("taken", "")
-        self.refuse(["plot", self.policy, "--out", "taken"], "taken", "exists already")
+        self.refuse(["plot", self.policy, "--out", "taken"],
+                    "taken: expected a new or empty folder, got a file")
 
     def test_without_gnuplot(self):
-        done = self.run_here("plot", self.policy, "--seconds", 0.1, env={"PATH": str(self.folder)})
-        self.assert_one_line(done, 1, "gnuplot-nox")
+        self.refuse(["plot", self.policy, "--seconds", 0.1], "gnuplot-nox", code=1,
+                    env={"PATH": str(self.folder)})
 
 
 if __name__ == "__main__":

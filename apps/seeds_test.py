@@ -155,12 +155,13 @@ class SeedsTest(ProgramTest):
     # ---- What goes wrong.
 
     def test_a_run_that_fails_is_named_and_the_others_go_on(self):
-        (self.folder / "many/seed2").mkdir(parents=True)
+        self.succeed(*small(**TINY), "--seeds", "1-1")
+        (self.folder / "many/seed2").mkdir()
         self.write("many/seed2/precious", "mine")
-        self.write("many/settings.toml", "")
         failed = self.run_here(*small(**TINY), "--seeds", 3)
-        self.assert_one_line(failed, 1, "1 of 3 runs failed", "seed2: upswing: many/seed2: exists")
-        self.assertRegex(failed.stdout, r"(?m)^  seed2 +failed: .*exists already.*many/seed2\.log")
+        self.assert_one_line(failed, 1, "1 of 3 runs in many failed",
+                             "seed2: many/seed2: expected")
+        self.assertRegex(failed.stdout, r"(?m)^  seed2 +failed: .*expected a new or empty folder.*many/seed2\.log")
         self.assertIn("2 of 3 runs done", failed.stdout)
         self.assertEqual([path.name for path in (self.folder / "many/seed2").iterdir()],
                          ["precious"])
@@ -170,12 +171,26 @@ class SeedsTest(ProgramTest):
         self.succeed(*small(**TINY | {"out": "at-once"}), "--seeds", 3)
         self.assert_same_runs("many", "at-once", (1, 2, 3))
 
-    def test_a_broken_checkpoint_is_named(self):
+    def test_a_broken_checkpoint_is_named_and_the_others_go_on(self):
         self.succeed(*small(**TINY), "--seeds", 2)
         checkpoint = self.folder / "many/seed1/checkpoint.safetensors"
         checkpoint.write_bytes(checkpoint.read_bytes()[:1000])
-        failed = self.run_here(*small(**TINY), "--seeds", 2)
-        self.assert_one_line(failed, 1, "seed1", checkpoint.name, "not a whole safetensors file")
+        failed = self.run_here(*small(**TINY | {"steps": 800}), "--seeds", 3)
+        reason = f"many/seed1/{checkpoint.name}: not a whole safetensors file"
+        self.assert_one_line(failed, 1, "1 of 3 runs in many failed", "seed1: " + reason)
+        # Told before the others work, and in its place among them.
+        self.assertRegex(failed.stdout, rf"(?m)\A.*\n.*\n.*done before.*\n  seed1 +failed: {reason}")
+        self.assertRegex(failed.stdout, r"(?m)^  1 run failed$")
+        self.assertNotIn("not judged yet", failed.stdout)
+        self.assertIn("./upswing compare many --unfinished\n", failed.stdout)
+        self.succeed(*small(**TINY | {"steps": 800, "out": "alone"}), "--seeds", "2-3")
+        self.assert_same_runs("many", "alone", (2, 3))
+
+    def test_settings_count_where_no_run_has_begun(self):
+        (self.folder / "many").mkdir()
+        self.write("many/settings.toml", "")
+        self.refuse([*small(**TINY), "--seeds", "1"], "many/settings.toml: made with",
+                    "choose another --out")
 
     def test_other_settings_are_refused_with_what_differs(self):
         self.succeed(*small(**TINY), "--seeds", 1)
@@ -190,7 +205,8 @@ class SeedsTest(ProgramTest):
 
     def test_a_folder_of_something_else_is_refused(self):
         self.succeed(*small(**TINY))
-        self.refuse([*small(**TINY), "--seeds", "2"], "many: exists already", "settings.toml")
+        self.refuse([*small(**TINY), "--seeds", "2"], "many: expected a new or empty folder",
+                    "no settings.toml")
 
     def test_bad_seeds(self):
         for text, words in (("0", "1 to 10000"), ("-3", "1 to 10000"), ("0-", "3,5,8-12"),

@@ -12,6 +12,7 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/text.h"
+#include "report/figure.h"
 
 namespace upswing {
 namespace {
@@ -86,6 +87,7 @@ std::vector<Variant> ReadVariants(const toml::table& study, const std::string& w
   }
   std::ranges::stable_sort(placed, {}, [](const auto& entry) { return entry.first; });
   std::vector<Variant> in_order;
+  in_order.reserve(placed.size());
   for (auto& [line, variant] : placed) in_order.push_back(std::move(variant));
   return in_order;
 }
@@ -112,6 +114,29 @@ std::string ReadText(const toml::table& study, const std::string& key, const std
   return *text;
 }
 
+/// Throws if the folder is that of another study, which this one would take the place of: it has
+/// another title, or a variant that this one has not. (TrainMany tells of other settings.)
+void CheckSameStudy(const ManyRuns& plan, const std::string& title) {
+  const fs::path file = plan.folder / plan.mark.first;
+  const std::string where = file.string();
+  std::error_code error;
+  if (!fs::is_regular_file(file, error)) return;
+  const toml::table before = ParseToml(ReadTextFile(file), where);
+  const std::string old_title = ReadText(before, "title", where);
+  if (old_title != title) {
+    throw BadInput(Concat(where, ": made with title \"", old_title, "\", but the study says \"",
+                          title, "\"; choose another --out"));
+  }
+  const auto* variants = before["variants"].as_table();
+  if (variants == nullptr) return;
+  for (const auto& [key, node] : *variants) {
+    if (std::ranges::find(plan.variants, key.str(), &Variant::name) != plan.variants.end())
+      continue;
+    throw BadInput(Concat(where, ": made with a variant \"", key.str(),
+                          "\", which the study has not; choose another --out"));
+  }
+}
+
 ManyRuns ReadStudy(const StudyArguments& arguments) {
   const fs::path file = arguments.file;
   const std::string where = file.string();
@@ -125,7 +150,8 @@ ManyRuns ReadStudy(const StudyArguments& arguments) {
   plan.folder = arguments.out.empty() ? fs::path("runs") / file.stem() : fs::path(arguments.out);
   plan.mark = {"study.toml", text};
   plan.variants = ReadVariants(study, where);
-  plan.more_steps = true;
+  plan.more_steps = plan.compared = true;
+  CheckSameStudy(plan, title);
   const std::string seeds = ReadText(study, "seeds", where);
   if (!arguments.seeds.empty()) {
     plan.seeds = ParseSeeds(arguments.seeds, "--seeds");
@@ -141,6 +167,7 @@ ManyRuns ReadStudy(const StudyArguments& arguments) {
 
 int RunStudy(const StudyArguments& arguments) {
   const ManyRuns plan = ReadStudy(arguments);
+  CheckCanDraw();  // not only after hours of training
   const int exit_code = TrainMany(plan);
   if (exit_code != 0) return exit_code;
   // All runs are done: what do they show?
@@ -153,7 +180,7 @@ int RunStudy(const StudyArguments& arguments) {
     }
   }
   const Comparison comparison = Compare(request);
-  WriteComparison(comparison, plan.folder, true);
+  WriteComparison(comparison, plan.folder);
   PrintComparison(comparison, plan.folder);
   return 0;
 }

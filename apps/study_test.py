@@ -2,6 +2,7 @@
 """`upswing study`: variants and seeds of a file, in their folders, stopped and gone on with."""
 
 import re
+import shutil
 import signal
 import unittest
 
@@ -50,7 +51,8 @@ class StudyTest(ProgramTest):
         output = self.succeed("study", "little.toml")
         self.assertTrue(output.startswith(
             'Training "Little" in runs/little\n  3 variants, seeds 1-2: 6 runs'), output)
-        self.assertIn("./upswing compare runs/little\n", output)
+        self.assertIn("Written: summary.csv", output)
+        self.assertNotIn("Next:", output)  # it has compared them itself
         study = self.folder / "runs/little"
         self.assertEqual({path.name for path in study.iterdir()}, {"study.toml", *VARIANTS, *SUMMARY})
         self.assertEqual((study / "study.toml").read_text(encoding="utf-8"), STUDY)
@@ -122,10 +124,39 @@ class StudyTest(ProgramTest):
         self.refuse(["study", "little.toml"], "runs/little/but/seed1: made with agent.gamma = 0.9",
                     "says 0.8", "choose another --out")
 
+    def test_another_study_does_not_take_the_place_of_one(self):
+        endless = STUDY.replace("steps = 400", "steps = 10000000")
+        process = self.start("study", self.write("little.toml", endless), "--out", "x")
+        self.assertEqual(self.end(process, signal.SIGINT)[0], 130)
+        for old, new, *words in (
+                ('"Little"', '"Large"', 'x/study.toml: made with title "Little"', 'says "Large"'),
+                ('title = "Little"', "", 'made with title "Little"', 'says ""'),
+                ("[variants.with]", "", 'made with a variant "with"'),
+                ("gamma = 0.9", "gamma = 0.8", "x/but", "made with agent.gamma = 0.9", "says 0.8")):
+            with self.subTest(new=new):
+                self.write("other.toml", endless.replace(old, new))
+                self.refuse(["study", "other.toml", "--out", "x"], *words, "choose another --out")
+
+    def test_settings_count_where_no_run_has_begun(self):
+        self.write("little.toml", STUDY)
+        self.succeed("study", "little.toml", "--seeds", "1-1")
+        for seed in (self.folder / "runs/little/but").iterdir():
+            if seed.name != "settings.toml":
+                shutil.rmtree(seed) if seed.is_dir() else seed.unlink()
+        self.write("little.toml", STUDY.replace("gamma = 0.9", "gamma = 0.8"))
+        self.refuse(["study", "little.toml"], "little/but/settings.toml: made with agent.gamma = 0.9",
+                    "says 0.8", "choose another --out")
+
     def test_a_folder_of_something_else_is_refused(self):
         self.write("little.toml", STUDY)
         self.succeed(*small(**FLAGS | {"out": "run"}))
-        self.refuse(["study", "little.toml", "--out", "run"], "run: exists already", "study.toml")
+        self.refuse(["study", "little.toml", "--out", "run"], "run: expected a new or empty folder",
+                    "no study.toml")
+
+    def test_without_gnuplot_it_does_not_begin(self):
+        self.write("little.toml", STUDY)
+        self.refuse(["study", "little.toml"], "gnuplot-nox", code=1,
+                    env={"PATH": str(self.folder)})
 
     def test_bad_studies(self):
         one = "[variants.a]\n"

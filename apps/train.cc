@@ -89,7 +89,7 @@ struct Parts {
     // The twin says at once who fails; who does not is judged in MuJoCo.
     const bool screened = config.eval_physics == kScreened;
     if (screened && config.mjcf.empty()) {
-      const Evaluation screening = JudgeIn(PhysicsEngine::kClosedForm, policy, step);
+      Evaluation screening = JudgeIn(PhysicsEngine::kClosedForm, policy, step);
       if (!screening.all_succeeded()) return screening;
     }
     return JudgeIn(
@@ -205,8 +205,8 @@ int RunTrain(const TrainArguments& arguments) {
   std::optional<FolderLock> lock;
   if (resuming) lock.emplace(path);  // before anything of it is read
 
-  Config config =
-      BuildConfig(resuming ? path / "config.toml" : fs::path(arguments.config), arguments.flags);
+  Config config = resuming ? ReadRunConfig(path, arguments.flags)
+                           : BuildConfig(arguments.config, arguments.flags);
   if (!config.mjcf.empty()) config.model = "model.xml";  // the copy in the run folder
   Parts parts(config, ResolveThreads(config.train.threads));
   InstallSignalHandlers();  // from here on what is begun is ended in order

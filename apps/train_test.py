@@ -33,7 +33,14 @@ class TrainTest(ProgramTest):
         self.assertNotIn("\x1b", output)
         self.assertNotIn("\r", output)
         self.assertTrue(output.startswith("Training d3qn-small (seed 1) in run\n"), output)
-        self.assertEqual(len(re.findall(r"^ *[24],000 steps .*success +\d/4$", output, re.M)), 2)
+        # Rates are known from the first report on, however short the time.
+        self.assertEqual(len(re.findall(r"^ *[24],000 steps .* [1-9][\d,]* updates/s .*"
+                                        r"success +\d/4$", output, re.M)), 2)
+
+    def test_a_rate_is_told_once_it_is_known(self):
+        output = self.succeed(*small(log_every=3000))
+        self.assertRegex(output, r"(?m)^ *2,000 steps .* - updates/s ")
+        self.assertRegex(output, r"(?m)^ *4,000 steps .* [1-9][\d,]* updates/s ")
 
     def test_summary_says_not_solved_and_what_to_type_next(self):
         output = self.succeed(*small())

@@ -37,36 +37,45 @@ void TrainView::Follow(Training& training) {
     if (line_.due()) ShowProgress(s, steps_in_all);
   };
   training.on_evaluation = [this](const TrainState& s, const Evaluation& e) {
-    line_.Print(fmt::format(
-        "{:>9} steps  {:>11}  {:>6} updates/s  eps {:.2f}  loss {:>6}  return {:6.0f}  "
-        "success {:3}/{}",
-        FormatCount(s.steps), FormatDuration(s.seconds), FormatCount(updates_per_second_),
-        report_.epsilon, LossText(), e.reward_sum.mean, e.successes, e.episodes));
+    line_.Print(
+        fmt::format("{:>9} steps  {:>11}  {:>6} updates/s  eps {:.2f}  loss {:>6}  return {:6.0f}  "
+                    "success {:3}/{}",
+                    FormatCount(s.steps), FormatDuration(s.seconds), UpdatesText(), report_.epsilon,
+                    LossText(), e.reward_sum.mean, e.successes, e.episodes));
   };
 }
 
 void TrainView::UpdateRates(const TrainState& s, const AgentReport& report) {
   report_ = report;
   const double elapsed = s.seconds - since_seconds_;
-  if (elapsed < 0.5) return;
+  const bool is_long = elapsed >= 0.5;
+  if (elapsed <= 0 || (rates_settled_ && !is_long)) return;
   steps_per_second_ = static_cast<double>(s.steps - since_step_) / elapsed;
   updates_per_second_ = static_cast<double>(report.updates - since_updates_) / elapsed;
+  if (!is_long) return;
+  rates_settled_ = true;
   since_step_ = s.steps;
   since_updates_ = report.updates;
   since_seconds_ = s.seconds;
 }
 
+std::string TrainView::UpdatesText() const {
+  return steps_per_second_ > 0 ? FormatCount(updates_per_second_) : "-";
+}
+
 void TrainView::ShowProgress(const TrainState& s, int64_t steps_in_all) {
   const auto steps_left = static_cast<double>(steps_in_all - s.steps);
-  const std::string left =
-      steps_per_second_ > 0 ? FormatDuration(steps_left / steps_per_second_) : "?";
-  line_.Show(static_cast<double>(s.steps) / static_cast<double>(steps_in_all),
-             {fmt::format("at most {} left", left),
-              fmt::format("success {:.0f}%", 100 * s.last_success_rate),
-              fmt::format("return {:.0f}", s.mean_return()),
-              fmt::format("{} steps/s", FormatCount(steps_per_second_)),
-              fmt::format("{} updates/s", FormatCount(updates_per_second_)),
-              fmt::format("eps {:.2f}", report_.epsilon), "loss " + LossText()});
+  std::vector<std::string> fields{fmt::format("success {:.0f}%", 100 * s.last_success_rate),
+                                  fmt::format("return {:.0f}", s.mean_return())};
+  if (steps_per_second_ > 0) {
+    fields.insert(fields.begin(),
+                  fmt::format("at most {} left", FormatDuration(steps_left / steps_per_second_)));
+    fields.push_back(fmt::format("{} steps/s", FormatCount(steps_per_second_)));
+    fields.push_back(fmt::format("{} updates/s", UpdatesText()));
+  }
+  fields.push_back(fmt::format("eps {:.2f}", report_.epsilon));
+  fields.push_back("loss " + LossText());
+  line_.Show(static_cast<double>(s.steps) / static_cast<double>(steps_in_all), fields);
 }
 
 std::string TrainView::LossText() const {

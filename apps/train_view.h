@@ -31,8 +31,13 @@ class TrainView {
 
   ProgressLine line_;
   AgentReport report_;  // the last one
-  // Rates of training, between two reports at least half a second apart.
+  /// The rate of updates as the lines show it.
+  std::string UpdatesText() const;
+
+  // Rates of training, between two reports at least half a second apart; before there are such, of
+  // all that was reported; 0 before the first report.
   double steps_per_second_ = 0, updates_per_second_ = 0;
+  bool rates_settled_ = false;
   int64_t since_step_, since_updates_;
   double since_seconds_;
 };

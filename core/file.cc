@@ -128,14 +128,21 @@ void WriteFileAtomically(const fs::path& path, std::string_view text) {
   WriteFileAtomically(path, std::array{BytesOf(text)});
 }
 
-void CheckFree(const fs::path& folder) {
+void CheckFree(const fs::path& folder, std::string_view advice) {
   std::error_code error;
   if (!fs::exists(fs::symlink_status(folder, error))) return;
-  throw BadInput(Concat(folder.string(), ": exists already; expected the name of a new folder"));
+  const bool is_folder = fs::is_directory(folder, error);
+  if (is_folder && fs::is_empty(folder, error)) return;
+  throw BadInput(Concat(folder.string(), ": expected a new or empty folder, got ",
+                        is_folder ? "one that holds something" : "a file", " (", advice, ")"));
 }
 
 void MakeNewFolder(const fs::path& folder) {
   CheckFree(folder);
+  MakeFolder(folder);
+}
+
+void MakeFolder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) {

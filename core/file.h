@@ -27,11 +27,15 @@ void WriteFileAtomically(const std::filesystem::path& path,
                          std::span<const std::span<const std::byte>> parts);
 void WriteFileAtomically(const std::filesystem::path& path, std::string_view text);
 
-/// Throws BadInput if there is something at `folder` already; for before work whose result shall go
-/// there.
-void CheckFree(const std::filesystem::path& folder);
+/// Throws BadInput, with `advice` in brackets, unless there is nothing at `folder`, or an empty
+/// folder; for before work whose result shall go there, so that nothing is overwritten.
+void CheckFree(const std::filesystem::path& folder,
+               std::string_view advice = "choose another --out");
 
-/// Makes a folder that is not there yet, and those above it. Throws as CheckFree does, or Failure.
+/// Makes a folder and those above it, where they are not there yet. Throws Failure.
+void MakeFolder(const std::filesystem::path& folder);
+
+/// Makes a folder that is new or takes one that is empty. Throws as CheckFree and MakeFolder do.
 void MakeNewFolder(const std::filesystem::path& folder);
 
 /// Keeps other processes from working in a folder for as long as it lives, or its process does.

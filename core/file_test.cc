@@ -54,14 +54,24 @@ TEST_F(FileTest, ALinkStaysAndADeviceIsWrittenInPlace) {
   EXPECT_TRUE(fs::is_character_file("/dev/null"));
 }
 
-TEST_F(FileTest, ANewFolderIsMadeOnceAndNothingIsTakenForOne) {
+TEST_F(FileTest, ANewOrEmptyFolderIsTakenAndNothingElse) {
   MakeNewFolder(folder_ / "a/b");
   EXPECT_TRUE(fs::is_directory(folder_ / "a/b"));
+  EXPECT_NO_THROW(MakeNewFolder(folder_ / "a/b"));
   WriteFileAtomically(folder_ / "file", "kept");
   fs::create_symlink("nowhere", folder_ / "link");
-  for (const char* taken : {"a/b", "file", "link"}) {
+  for (const char* taken : {"a", "file", "link"}) {
     EXPECT_THROW(CheckFree(folder_ / taken), Error) << taken;
     EXPECT_THROW(MakeNewFolder(folder_ / taken), Error) << taken;
+  }
+  try {
+    CheckFree(folder_ / "a", "go on with it");
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.exit_code(), 2);
+    EXPECT_EQ(error.what(), (folder_ / "a").string() +
+                                ": expected a new or empty folder, got one "
+                                "that holds something (go on with it)");
   }
   EXPECT_EQ(ReadTextFile(folder_ / "file"), "kept");
   EXPECT_NO_THROW(CheckFree(folder_ / "file/below"));

@@ -17,11 +17,6 @@ struct Overloaded : Ts... {
 template <class... Ts>
 Overloaded(Ts...) -> Overloaded<Ts...>;  // clang 14 needs it spelled out
 
-std::string FlagOf(std::string name) {
-  std::replace(name.begin(), name.end(), '_', '-');
-  return Concat("--", name);
-}
-
 /// A TOML basic string.
 std::string Quote(std::string_view text) {
   std::string quoted = "\"";
@@ -52,6 +47,25 @@ std::string RangeText(Range range) {
 
 bool Inside(double value, Range range) { return value >= range.low && value <= range.high; }
 
+/// Whether a number is a multiple of `step`, but for rounding; each one is if that is 0.
+bool IsMultiple(double value, double step) {
+  constexpr double kRounding = 1e-9;
+  return step == 0 || std::abs(value - step * std::round(value / step)) <= kRounding;
+}
+
+/// `; the nearest are 0.04 and 0.06` for a number within the range that is no multiple of `step`;
+/// else empty.
+std::string NearestText(std::string_view text, Range range, double step) {
+  const auto value = ParseNumber(text);
+  if (!value || !Inside(*value, range) || IsMultiple(*value, step)) return "";
+  const auto multiple = [&](double count) {
+    constexpr double kDigits = 1e12;  // 35 × 0.02 is 0.7, not 0.7000000000000001
+    return FormatNumber(std::round(count * step * kDigits) / kDigits);
+  };
+  const double below = std::floor(*value / step);
+  return Concat("; the nearest are ", multiple(below), " and ", multiple(below + 1));
+}
+
 /// "64,64" or "[64, 64]"; nothing if an item is no integer or out of range.
 std::optional<std::vector<int64_t>> ParseList(std::string_view text, Range range) {
   text = Trim(text);
@@ -66,6 +80,11 @@ std::optional<std::vector<int64_t>> ParseList(std::string_view text, Range range
 }
 
 }  // namespace
+
+std::string FlagOf(std::string name) {
+  std::replace(name.begin(), name.end(), '_', '-');
+  return Concat("--", name);
+}
 
 std::string Option::flag() const { return FlagOf(name); }
 
@@ -96,19 +115,22 @@ std::string Option::on_command_line() const {
 }
 
 std::string Option::expected() const {
-  return std::visit(Overloaded{
-                        [](const bool*) -> std::string { return "true or false"; },
-                        [&](const int64_t*) { return Concat("an integer", RangeText(range)); },
-                        [&](const double*) { return Concat("a number", RangeText(range)); },
-                        [&](const std::string*) -> std::string {
-                          return choices.empty() ? "a text"
-                                                 : Concat("one of ", Join(choices, ", "));
-                        },
-                        [&](const std::vector<int64_t>*) {
-                          return Concat("a list of integers", RangeText(range));
-                        },
-                    },
-                    target);
+  return std::visit(
+      Overloaded{
+          [](const bool*) -> std::string { return "true or false"; },
+          [&](const int64_t*) { return Concat("an integer", RangeText(range)); },
+          [&](const double*) {
+            return Concat(step == 0 ? "a number" : "a multiple of " + FormatNumber(step),
+                          RangeText(range));
+          },
+          [&](const std::string*) -> std::string {
+            return choices.empty() ? "a text" : Concat("one of ", Join(choices, ", "));
+          },
+          [&](const std::vector<int64_t>*) {
+            return Concat("a list of integers", RangeText(range));
+          },
+      },
+      target);
 }
 
 void Option::Set(std::string_view text, const std::string& where) const {
@@ -127,8 +149,10 @@ void Option::Set(std::string_view text, const std::string& where) const {
                      },
                      [&](double* value) {
                        const auto parsed = ParseNumber(text);
-                       if (!parsed || !std::isfinite(*parsed) || !Inside(*parsed, range))
+                       if (!parsed || !std::isfinite(*parsed) || !Inside(*parsed, range) ||
+                           !IsMultiple(*parsed, step)) {
                          return false;
+                       }
                        *value = *parsed;
                        return true;
                      },
@@ -148,7 +172,9 @@ void Option::Set(std::string_view text, const std::string& where) const {
                      },
                  },
                  target);
-  if (!valid) throw BadInput(Concat(where, ": expected ", expected(), ", got \"", text, "\""));
+  if (valid) return;
+  throw BadInput(Concat(where, ": expected ", expected(), ", got \"", text, "\"",
+                        NearestText(text, range, step)));
 }
 
 Option& Options::AddOption(Option::Target target, std::string_view name, Range range,

@@ -19,6 +19,9 @@ inline constexpr Range kPositive{1e-9, 1e9};
 inline constexpr Range kNotNegative{0, 1e12};
 inline constexpr Range kUnit{0, 1};  // a share or probability
 
+/// The flag of a setting or an alias, such as `--eval-every` for `eval_every`.
+std::string FlagOf(std::string name);
+
 /// One setting: all that flags, configuration files, help and validation need to know.
 struct Option {
   using Target = std::variant<bool*, int64_t*, double*, std::string*, std::vector<int64_t>*>;
@@ -31,14 +34,14 @@ struct Option {
   std::string help;
   bool identity;                          // two runs that differ in it are different runs
   std::vector<std::string> choices = {};  // texts only: what it may be; empty for anything
+  double step = 0;                        // numbers only: of which it is a multiple; 0: of nothing
 
-  /// The flag, such as `--eval-every`.
   std::string flag() const;
   /// The value as TOML writes it.
   std::string text() const;
   /// Flag and value as a command line has them, such as `--hidden 64,64` or `--no-double`.
   std::string on_command_line() const;
-  /// Such as `a number in [0, 1]`.
+  /// Such as `a number in [0, 1]` or `a multiple of 0.02 in [0, 1]`.
   std::string expected() const;
   /// Parses and checks `text`; `where` (such as `--gamma` or `FILE:3: gamma`) begins the message
   /// of the BadInput that it throws.

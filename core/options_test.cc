@@ -119,6 +119,35 @@ TEST_F(OptionsTest, OnACommandLine) {
   EXPECT_EQ(options_.Find("fast", "").front()->on_command_line(), "--no-fast");
 }
 
+TEST(Step, LetsThroughMultiplesAndNamesTheNearestOnes) {
+  double pause = 0;
+  Options options;
+  options.Add(&pause, "pause", 0, {0, 1}, "s", "between two steps").step = 0.02;
+  for (int count = 0; count <= 50; ++count) {
+    // As people write it, and as arithmetic makes it.
+    for (const double value : {count / 50.0, count * 0.02, 1 - (50 - count) * 0.02}) {
+      options.Set("pause", FormatNumber(value), "--pause");
+      EXPECT_EQ(pause, value);
+    }
+  }
+  const auto error_of = [&](const char* text) -> std::string {
+    try {
+      options.Set("pause", text, "--pause");
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "no error";
+  };
+  EXPECT_EQ(error_of("0.001"),
+            "--pause: expected a multiple of 0.02 in [0, 1], got \"0.001\"; the nearest are 0 and "
+            "0.02");
+  EXPECT_EQ(error_of("0.6999"),
+            "--pause: expected a multiple of 0.02 in [0, 1], got \"0.6999\"; the nearest are 0.68 "
+            "and 0.7");
+  EXPECT_EQ(error_of("1.001"), "--pause: expected a multiple of 0.02 in [0, 1], got \"1.001\"");
+  EXPECT_EQ(pause, 1);
+}
+
 TEST_F(OptionsTest, FlagsAndTomlFollowFromTheSameLine) {
   EXPECT_EQ(options_.Find("the_rate", "").front()->flag(), "--the-rate");
   options_.Set("name", "a\\\"", "");

@@ -104,12 +104,67 @@ Entry ParseEntry(const json& entry, size_t data_size) {
   return {std::move(tensor), offsets[0], size};
 }
 
-/// The header's JSON object. Throws without the parser's own message, which would quote bytes that
-/// need not be text.
-json ParseHeader(std::string_view text) {
-  json header = json::parse(text, nullptr, false);
-  if (!header.is_object()) throw std::runtime_error("its header is no JSON object");
+/// Length of the header, which the file's first bytes tell, checked against the size of the file.
+uint64_t ParseLength(std::span<const std::byte> first_bytes, uint64_t file_size) {
+  uint64_t length = 0;
+  if (first_bytes.size() < sizeof(length)) {
+    throw std::runtime_error(Concat("it has ", file_size, " bytes"));
+  }
+  std::memcpy(&length, first_bytes.data(), sizeof(length));
+  if (length > file_size - sizeof(length)) {
+    throw std::runtime_error(
+        Concat("its header should have ", length, " bytes, the file has ", file_size));
+  }
+  return length;
+}
+
+/// What a header says.
+struct Header {
+  std::map<std::string, std::string> metadata;
+  std::map<std::string, Entry> entries;  // of the tensors that were asked for
+};
+
+/// Reads a header's JSON object: the metadata, and the tensors whose names begin with `prefix`. The
+/// parser's own message would quote bytes that need not be text.
+Header ParseHeader(std::string_view text, size_t data_size, std::string_view prefix) {
+  const json object = json::parse(text, nullptr, false);
+  if (!object.is_object()) throw std::runtime_error("its header is no JSON object");
+  Header header;
+  for (const auto& [name, entry] : object.items()) {
+    if (name == "__metadata__") {
+      header.metadata = entry.get<std::map<std::string, std::string>>();
+    } else if (name.starts_with(prefix)) {
+      try {
+        header.entries.emplace(name, ParseEntry(entry, data_size));
+      } catch (const std::exception& error) {
+        throw std::runtime_error(Concat("tensor \"", name, "\": ", error.what()));
+      }
+    }
+  }
   return header;
+}
+
+/// Throws unless the tensors cover the data without gap or overlap.
+void CheckCovered(const std::map<std::string, Entry>& entries, size_t data_size) {
+  std::vector<std::pair<size_t, size_t>> pieces;  // begin and size
+  pieces.reserve(entries.size());
+  for (const auto& [name, entry] : entries) pieces.emplace_back(entry.begin, entry.size);
+  std::ranges::sort(pieces);
+  size_t end = 0;
+  for (const auto& [begin, size] : pieces) {
+    if (size > 0 && begin != end) throw std::runtime_error("tensors overlap");
+    end += size;
+  }
+  if (end != data_size) throw std::runtime_error(Concat(data_size - end, " bytes too many"));
+}
+
+/// Throws at what is no regular file; a pipe, say, would never end. (What is not there is told by
+/// who reads it.)
+void CheckRegular(const std::filesystem::path& path) {
+  std::error_code error;
+  if (!std::filesystem::exists(path, error) || std::filesystem::is_regular_file(path, error))
+    return;
+  throw BadInput(Concat("cannot read ", path.string(), ": expected a regular file"));
 }
 
 Error Broken(const std::string& path, std::string_view why) {
@@ -194,54 +249,22 @@ void TensorFile::Save(const std::filesystem::path& path) const {
 TensorFile TensorFile::Load(const std::filesystem::path& path) {
   TensorFile file;
   file.path_ = path.string();
-  std::error_code error;
-  if (std::filesystem::exists(path, error) && !std::filesystem::is_regular_file(path, error)) {
-    throw BadInput(Concat("cannot read ", file.path_, ": expected a regular file"));
-  }
+  CheckRegular(path);
   const auto& bytes = file.kept_.emplace_back(ReadFile(path));
-  const auto broken = [&](const auto&... why) { return Broken(file.path_, Concat(why...)); };
-
-  // The header: its length (8 bytes), then JSON.
-  uint64_t length = 0;
-  if (bytes.size() < sizeof(length)) throw broken("it has ", bytes.size(), " bytes");
-  std::memcpy(&length, bytes.data(), sizeof(length));
-  if (length > bytes.size() - sizeof(length)) {
-    throw broken("its header should have ", length, " bytes, the file has ", bytes.size());
-  }
-  std::string text(reinterpret_cast<const char*>(bytes.data()) + sizeof(length), length);
-  const auto data = std::span(bytes).subspan(sizeof(length) + length);
-
-  // The tensors, which must cover the data without gap or overlap.
+  std::string text;  // of the header
   try {
-    const json header = ParseHeader(text);
-    std::vector<std::span<const std::byte>> covered;
-    for (const auto& [name, entry] : header.items()) {
-      if (name == "__metadata__") {
-        file.metadata = entry.get<std::map<std::string, std::string>>();
-        continue;
-      }
-      try {
-        auto [tensor, begin, size] = ParseEntry(entry, data.size());
-        tensor.bytes = data.subspan(begin, size);
-        covered.push_back(tensor.bytes);
-        file.tensors_[name] = std::move(tensor);
-      } catch (const std::exception& error) {
-        throw std::runtime_error(Concat("tensor \"", name, "\": ", error.what()));
-      }
-    }
-    std::sort(covered.begin(), covered.end(), [](const auto& a, const auto& b) {
-      return std::pair(a.data(), a.size()) < std::pair(b.data(), b.size());
-    });
-    const std::byte* end = data.data();
-    for (const auto& piece : covered) {
-      if (!piece.empty() && piece.data() != end) throw std::runtime_error("tensors overlap");
-      end += piece.size();
-    }
-    if (end != data.data() + data.size()) {
-      throw std::runtime_error(Concat(data.data() + data.size() - end, " bytes too many"));
+    const uint64_t length = ParseLength(bytes, bytes.size());
+    text.assign(reinterpret_cast<const char*>(bytes.data()) + sizeof(length), length);
+    const auto data = std::span(bytes).subspan(sizeof(length) + length);
+    Header header = ParseHeader(text, data.size(), "");
+    CheckCovered(header.entries, data.size());
+    file.metadata = std::move(header.metadata);
+    for (auto& [name, entry] : header.entries) {
+      entry.tensor.bytes = data.subspan(entry.begin, entry.size);
+      file.tensors_[name] = std::move(entry.tensor);
     }
   } catch (const std::exception& error) {
-    throw broken(error.what());
+    throw Broken(file.path_, error.what());
   }
 
   // The checksum, where a writer left one.
@@ -257,7 +280,7 @@ TensorFile TensorFile::Load(const std::filesystem::path& path) {
               [](const Tensor* a, const Tensor* b) { return a->bytes.data() < b->bytes.data(); });
     for (const Tensor* tensor : order) checksum.Update(tensor->bytes);
     if (checksum.Hex() != expected) {
-      throw broken("its checksum is ", checksum.Hex(), ", expected ", expected);
+      throw Broken(file.path_, Concat("its checksum is ", checksum.Hex(), ", expected ", expected));
     }
     file.metadata.erase("checksum");
   }
@@ -267,36 +290,30 @@ TensorFile TensorFile::Load(const std::filesystem::path& path) {
 TensorFile TensorFile::LoadPart(const std::filesystem::path& path, std::string_view prefix) {
   TensorFile part;
   part.path_ = path.string();
+  CheckRegular(path);
   std::ifstream file(path, std::ios::binary);
   std::error_code error;
   const uint64_t file_size = std::filesystem::file_size(path, error);
   if (!file || error) throw BadInput(Concat("cannot read ", part.path_));
-  const auto read = [&](char* bytes, size_t size) {
-    if (!file.read(bytes, static_cast<std::streamsize>(size)))
-      throw std::runtime_error("too short");
+  const auto read = [&](uint64_t from, std::span<std::byte> bytes) {
+    file.seekg(static_cast<std::streamoff>(from));
+    file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    if (!file) throw std::runtime_error("it became shorter while it was read");
   };
   try {
-    uint64_t length = 0;
-    if (file_size < sizeof(length)) throw std::runtime_error("too short");
-    read(reinterpret_cast<char*>(&length), sizeof(length));
-    const uint64_t behind_length = file_size - sizeof(length);
-    if (length > behind_length) throw std::runtime_error("too short for its header");
+    std::vector<std::byte> first(std::min<uint64_t>(sizeof(uint64_t), file_size));
+    read(0, first);
+    const uint64_t length = ParseLength(first, file_size);
     std::string text(length, '\0');
-    read(text.data(), length);
-
-    const json header = ParseHeader(text);
-    for (const auto& [name, entry] : header.items()) {
-      if (name == "__metadata__") {
-        part.metadata = entry.get<std::map<std::string, std::string>>();
-        continue;
-      }
-      if (!name.starts_with(prefix)) continue;
-      auto [tensor, begin, size] = ParseEntry(entry, behind_length - length);
-      auto& bytes = part.kept_.emplace_back(size);
-      file.seekg(static_cast<std::streamoff>(sizeof(length) + length + begin));
-      read(reinterpret_cast<char*>(bytes.data()), size);
-      tensor.bytes = bytes;
-      part.tensors_[name] = std::move(tensor);
+    read(first.size(), std::as_writable_bytes(std::span(text)));
+    const uint64_t data_begin = first.size() + length;
+    Header header = ParseHeader(text, file_size - data_begin, prefix);
+    part.metadata = std::move(header.metadata);
+    for (auto& [name, entry] : header.entries) {
+      auto& bytes = part.kept_.emplace_back(entry.size);
+      read(data_begin + entry.begin, bytes);
+      entry.tensor.bytes = bytes;
+      part.tensors_[name] = std::move(entry.tensor);
     }
   } catch (const std::exception& problem) {
     throw Broken(part.path_, problem.what());

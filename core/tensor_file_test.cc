@@ -1,6 +1,7 @@
 #include "core/tensor_file.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <cstring>
 #include <filesystem>
@@ -136,14 +137,35 @@ TEST_F(TensorFileTest, APartHoldsWhatBeginsSoAndItsBytesAreThoseOfTheWhole) {
   EXPECT_EQ(bytes, (std::vector<uint8_t>{1, 2, 3}));
 }
 
-TEST_F(TensorFileTest, APartOfATruncatedFileIsRefused) {
+TEST_F(TensorFileTest, APartOfABrokenFileIsRefusedAsTheWholeIs) {
   SaveSample();
   const std::vector<std::byte> whole = ReadFile(path_);
+  const auto part_error = [](const fs::path& path) -> std::string {
+    try {
+      TensorFile::LoadPart(path, "");
+    } catch (const Error& error) {
+      EXPECT_EQ(error.exit_code(), 2);
+      return error.what();
+    }
+    return "";
+  };
   for (size_t size = 0; size < whole.size(); size += 3) {
-    WriteFileAtomically(path_, std::vector{std::span(whole).first(size)});
-    EXPECT_THROW(TensorFile::LoadPart(path_, ""), Error) << size;
+    const std::string error = LoadError(std::span(whole).first(size));
+    EXPECT_NE(error, "") << size;
+    EXPECT_EQ(part_error(path_), error) << size;
   }
-  EXPECT_THROW(TensorFile::LoadPart(folder_ / "none", ""), Error);
+  EXPECT_NE(HeaderError(R"({"a":{"dtype":"F32","shape":[2],"data_offsets":[0,4]}})", 4), "");
+  EXPECT_EQ(part_error(path_),
+            HeaderError(R"({"a":{"dtype":"F32","shape":[2],"data_offsets":[0,4]}})", 4));
+  EXPECT_NE(part_error(folder_ / "none"), "");
+  // Reading a pipe would wait for somebody who writes.
+  const fs::path pipe = folder_ / "pipe";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  for (const fs::path& path : {pipe, folder_.path()}) {
+    const std::string error = "cannot read " + path.string() + ": expected a regular file";
+    EXPECT_EQ(part_error(path), error);
+    EXPECT_THROW(TensorFile::Load(path), Error);
+  }
 }
 
 TEST_F(TensorFileTest, HostileHeadersAreRefused) {

@@ -266,6 +266,7 @@ class PanelScript {
 
 std::string Script(const Figure& figure, const Terminal& terminal) {
   std::vector<std::string> palette;
+  palette.reserve(kViridis.size());
   for (const char* color : kViridis) palette.push_back(Concat(palette.size(), " '", color, "'"));
   std::string script =
       Concat("set encoding utf8\n", "set terminal ", terminal.name, " noenhanced size ",
@@ -286,6 +287,8 @@ std::string Script(const Figure& figure, const Terminal& terminal) {
 }
 
 }  // namespace
+
+void CheckCanDraw() { RunGnuplot(""); }
 
 void Draw(const Figure& figure, const std::filesystem::path& file) {
   const std::string ending = file.extension().string();

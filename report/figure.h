@@ -40,6 +40,10 @@ struct Figure {
   int width = 900, height = 600;  // pixels
 };
 
+/// Throws Failure if figures cannot be drawn here: gnuplot is missing or broken. For before long
+/// work whose result shall be drawn.
+void CheckCanDraw();
+
 /// Writes .svg or .png, by the ending, atomically. Texts are drawn as they are; control characters
 /// become blanks. Throws BadInput on another ending, Failure if gnuplot is missing or fails.
 void Draw(const Figure& figure, const std::filesystem::path& file);

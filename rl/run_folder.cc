@@ -43,12 +43,9 @@ void RunFolder::Create(const fs::path& given,
   fs::path path = given.lexically_normal();
   if (!path.has_filename()) path = path.parent_path();  // a slash at the end
   std::error_code error;
-  if (fs::exists(path, error) && !(fs::is_directory(path, error) && fs::is_empty(path, error))) {
-    const std::string go_on = Concat("go on with --resume ", path.string(), ", or ");
-    throw BadInput(Concat(path.string(), ": exists already; nothing is overwritten (",
-                          fs::exists(path / "config.toml", error) ? go_on : "",
-                          "choose another --out)"));
-  }
+  const bool is_run = fs::exists(path / "config.toml", error);
+  CheckFree(path, Concat(is_run ? Concat("go on with --resume ", path.string(), ", or ") : "",
+                         "choose another --out"));
   if (path.has_parent_path()) fs::create_directories(path.parent_path(), error);
   std::string making = Concat(path.string(), ".XXXXXX");
   const auto cannot = [&](int exit_code, std::string_view why) {

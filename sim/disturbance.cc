@@ -12,7 +12,8 @@ void Disturbance::Describe(Options& o) {
   o.Add(&sensor_noise, "sensor_noise", 0, {0, 10}, "rad, rad/s",
         "standard deviation of the noise on all measured angles and velocities");
   o.Add(&delay, "delay", 0, {0, kLargestDelay}, "s",
-        "from the choice of a torque to its effect, to the nearest 0.02 s");
+        "from the choice of a torque to its effect, a multiple of 0.02")
+      .step = kControlPeriod;
 }
 
 int Disturbance::delay_steps() const {

@@ -20,8 +20,8 @@ inline constexpr double kLargestDelay = 1;  // that can be set, s
 /// later, and none before the first arrives. So an observation is always that of the present state,
 /// and what the delay hides is the torques that are under way.
 struct Disturbance {
-  double sensor_noise;  // standard deviation, on each measured angle and velocity, rad and rad/s
-  double delay;         // from the choice of a torque to its effect, s
+  double sensor_noise;  // standard deviation, on each measured angle and velocity, rad, rad/s
+  double delay;         // from the choice of a torque to its effect, s, in whole control periods
 
   Disturbance() { SetDefaults(*this); }
   Disturbance(double noise, double seconds) : sensor_noise(noise), delay(seconds) {}
@@ -29,7 +29,7 @@ struct Disturbance {
   void Describe(Options& options);
 
   bool any() const { return sensor_noise > 0 || delay > 0; }
-  /// The delay in control periods, to the nearest.
+  /// The delay in control periods.
   int delay_steps() const;
 };
 

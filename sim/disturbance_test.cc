@@ -24,8 +24,7 @@ PendulumEnvConfig FourKinds() {
 
 TEST(Disturbance, DelaysAreWholeControlPeriods) {
   EXPECT_EQ(Disturbance(0, 0).delay_steps(), 0);
-  EXPECT_EQ(Disturbance(0, 0.009).delay_steps(), 0);
-  EXPECT_EQ(Disturbance(0, 0.011).delay_steps(), 1);
+  EXPECT_EQ(Disturbance(0, 0.02).delay_steps(), 1);
   EXPECT_EQ(Disturbance(0, 0.06).delay_steps(), 3);
   EXPECT_EQ(Disturbance(0, 1).delay_steps(), 50);
 }
@@ -35,6 +34,7 @@ TEST(Disturbance, SettingsAreChecked) {
   const Options options = OptionsOf(disturbance);
   EXPECT_THROW(options.Set("delay", "-0.02", "test"), Error);
   EXPECT_THROW(options.Set("delay", "1.5", "test"), Error);
+  EXPECT_THROW(options.Set("delay", "0.001", "test"), Error);
   EXPECT_THROW(options.Set("sensor_noise", "-1", "test"), Error);
   EXPECT_THROW(options.Set("sensor_noise", "nan", "test"), Error);
   EXPECT_FALSE(disturbance.any());

@@ -73,6 +73,15 @@ ModelPtr LoadModel(const std::string& mjcf, const std::string& where) {
     for (int i = 0; i < n; ++i) expect(std::abs(a[i] - b[i]) < 1e-9, what);
   };
   same(model.qpos0, ours->qpos0, 2, "joint angles that are 0 hanging");
+  for (const int joint : {0, 1}) {
+    // A mirrored motion is a motion, which learning in a mirror relies on.
+    const mjtNum* more = model.jnt_stiffnesspoly + mjNPOLY * joint;
+    const bool is_spring = model.jnt_stiffness[joint] != 0 ||
+                           std::any_of(more, more + mjNPOLY, [](mjtNum k) { return k != 0; });
+    expect(!is_spring || model.qpos_spring[joint] == 0,
+           Concat("springs at rest where the links hang (springref 0), got ",
+                  FormatNumber(model.qpos_spring[joint]), " rad"));
+  }
   same(model.jnt_pos, ours->jnt_pos, 6, "hinges at the ends of their links");
   same(model.body_quat, ours->body_quat, 12, "links that hang along -z");
   same(model.body_pos, ours->body_pos, 9, "the second link at the end of the first");

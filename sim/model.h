@@ -29,8 +29,8 @@ ModelPtr CompileModel(const std::string& mjcf, const std::string& where);
 
 /// Compiles somebody's MJCF. Throws BadInput, too, unless it is built like ours: two solid capsules
 /// hanging on hinges about +y, a motor of the same limit both ways at the first, gravity along -z,
-/// a timestep that divides the control period. Armature, friction, stiffness, the capsules' radius
-/// and the integrator may differ.
+/// springs at rest hanging, a timestep that divides the control period. Armature, friction,
+/// stiffness, the capsules' radius and the integrator may differ.
 ModelPtr LoadModel(const std::string& mjcf, const std::string& where);
 
 /// The plant that a model like ours describes.

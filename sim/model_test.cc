@@ -203,6 +203,8 @@ TEST(Model, RefusesWhatThePlantsParametersWouldHide) {
     }
   };
   EXPECT_TRUE(loads("armature=\"0.01\"", "armature=\"0.02\" stiffness=\"0.1\""));
+  EXPECT_TRUE(loads("armature=\"0.01\"", "armature=\"0.02\" springref=\"10\""));  // no spring
+  EXPECT_FALSE(loads("axis=\"0 1 0\"", "axis=\"0 1 0\" stiffness=\"0.1\" springref=\"10\""));
   EXPECT_TRUE(loads("RK4", "implicit"));
   EXPECT_FALSE(loads("name=\"link1\"", "name=\"link1\" quat=\"0 0 1 0\""));
   EXPECT_FALSE(loads("axis=\"0 1 0\"", "axis=\"0 1 0\" ref=\"90\""));

@@ -13,7 +13,7 @@ namespace upswing {
 struct Randomization {
   /// Half-widths relative to the nominal value, in the order of Plant: 0.25 stands for ±25%.
   std::array<double, 8> plant;
-  double sensor_noise;  // largest addition to the nominal one, rad and rad/s
+  double sensor_noise;  // largest addition to the nominal one, rad, rad/s
   double delay;         // the same, s
 
   Randomization() { SetDefaults(*this); }
