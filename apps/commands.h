@@ -22,6 +22,7 @@ void AddPlot(CLI::App& program, Command& command);
 void AddInfo(CLI::App& program, Command& command);
 void AddCompare(CLI::App& program, Command& command);
 void AddStudy(CLI::App& program, Command& command);
+void AddExport(CLI::App& program, Command& command);
 void AddBench(CLI::App& program, Command& command);
 
 /// Refuses an empty path, such as that of a shell variable that is not set.

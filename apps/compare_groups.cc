@@ -61,9 +61,7 @@ std::vector<Setting> SettingsOf(Config config) {
   std::vector<Setting> settings;
   // A model is what is in its file, not where that lies.
   config.model = config.mjcf.empty() ? "" : "model.xml";
-  const Options options = OptionsOf(config);
-  for (const Option& option : options.all()) {
-    if (!option.identity || option.target == Option::Target(&config.train.seed)) continue;
+  for (const Option& option : TrainingSettings(config)) {
     const auto* text = std::get_if<std::string*>(&option.target);
     settings.emplace_back(Concat(option.section, ".", option.name),
                           text != nullptr ? **text : option.text());

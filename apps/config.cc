@@ -169,6 +169,38 @@ Config ReadRunConfig(const fs::path& run, const std::vector<FlagValue>& flags) {
                         ": another version wrote it"));
 }
 
+std::vector<Option> TrainingSettings(Config& config) {
+  std::vector<Option> settings;
+  const Options options = OptionsOf(config);
+  for (const Option& option : options.all()) {
+    const bool is_seed = option.target == Option::Target(&config.train.seed);
+    if (option.identity && !is_seed) settings.push_back(option);
+  }
+  return settings;
+}
+
+Config ConfigOf(const Policy& policy, const std::string& where) {
+  try {
+    Config config = BuildConfig("", {{"agent", policy.About("agent")}});
+    ApplyToml(OptionsOf(config), policy.About("config"), "metadata \"config\"");
+    return config;
+  } catch (const Error& error) {
+    throw BadInput(Concat(where, ": ", error.what()));
+  }
+}
+
+std::string TrainCommand(Config config) {
+  Config named = BuildConfig("", {{"agent", config.agent}});
+  const std::vector<Option> before = TrainingSettings(named);
+  const std::vector<Option> now = TrainingSettings(config);
+  std::string command =
+      Concat("./upswing train --agent ", config.agent, " --seed ", config.train.seed);
+  for (size_t i = 0; i < now.size(); ++i) {
+    if (now[i].text() != before[i].text()) command += ' ' + now[i].on_command_line();
+  }
+  return command;
+}
+
 std::string ConfigToml(Config config, bool identity_only) {
   return OptionsOf(config).Toml(
       !identity_only, [&](const Option& option) { return !identity_only || option.identity; });

@@ -68,6 +68,17 @@ void ApplyToml(const Options& options, std::string_view toml, const std::string&
 void ExpectSameSettings(const Options& before, const Options& now, const std::string& where,
                         const std::function<bool(const Option&)>& counts);
 
+/// The settings that make a training another one, the seed aside; they point into `config`.
+std::vector<Option> TrainingSettings(Config& config);
+
+/// The settings that a policy was made with, as its file tells them. Throws BadInput that begins
+/// with `where`.
+Config ConfigOf(const Policy& policy, const std::string& where);
+
+/// The line that makes this training: its agent, its seed, and a flag for each setting that differs
+/// from the named agent's.
+std::string TrainCommand(Config config);
+
 /// The settings as TOML; without those that do not make another run of it, if `identity_only`.
 std::string ConfigToml(Config config, bool identity_only);
 

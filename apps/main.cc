@@ -186,6 +186,7 @@ int Main(int argc, char** argv) {
   AddInfo(program, command);
   AddCompare(program, command);
   AddStudy(program, command);
+  AddExport(program, command);
   AddBench(program, command);
 
   try {

@@ -3,7 +3,7 @@ find_package(mujoco 4.0.0 CONFIG QUIET)
 if(NOT mujoco_FOUND)
   set(MUJOCO_DIR ${PROJECT_SOURCE_DIR}/build/deps/mujoco-4.0.0)
   if(NOT EXISTS ${MUJOCO_DIR}/lib/libmujoco.so.4.0.0)
-    execute_process(COMMAND ${PROJECT_SOURCE_DIR}/tools/fetch_mujoco ${MUJOCO_DIR}
+    execute_process(COMMAND ${PROJECT_SOURCE_DIR}/tools/fetch_wheel mujoco ${MUJOCO_DIR}
                     RESULT_VARIABLE MUJOCO_FETCH_FAILED)
     if(MUJOCO_FETCH_FAILED)
       message(FATAL_ERROR "MuJoCo 4.0.0 could not be fetched (see above)")

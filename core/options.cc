@@ -101,6 +101,19 @@ std::string Option::text() const {
                     target);
 }
 
+std::string Option::on_command_line() const {
+  if (const auto* on = std::get_if<bool*>(&target)) {
+    return **on ? flag() : Concat("--no-", flag().substr(2));
+  }
+  std::string value = text();
+  if (const auto* words = std::get_if<std::string*>(&target)) value = **words;
+  std::erase_if(value, [&](char c) {  // a list needs neither brackets nor blanks there
+    return std::holds_alternative<std::vector<int64_t>*>(target) &&
+           (c == '[' || c == ']' || c == ' ');
+  });
+  return Concat(flag(), " ", value);
+}
+
 std::string Option::expected() const {
   return std::visit(
       Overloaded{

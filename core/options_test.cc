@@ -139,6 +139,15 @@ TEST(Step, LetsThroughMultiplesAndNamesTheNearestOnes) {
   EXPECT_EQ(pause, 1);
 }
 
+TEST_F(OptionsTest, OnACommandLine) {
+  std::vector<std::string> words;
+  for (const Option& option : options_.all()) words.push_back(option.on_command_line());
+  EXPECT_EQ(Join(words, " "),
+            "--fast --count 3 --the-rate 0.5 --name x --widths 4,5 --mass1 1 --mass2 2");
+  options_.Set("fast", "false", "");
+  EXPECT_EQ(options_.Find("fast", "").front()->on_command_line(), "--no-fast");
+}
+
 TEST_F(OptionsTest, FlagsAndTomlFollowFromTheSameLine) {
   EXPECT_EQ(options_.Find("the_rate", "").front()->flag(), "--the-rate");
   options_.Set("name", "a\\\"", "");

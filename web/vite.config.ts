@@ -1,5 +1,5 @@
-import { defineConfig } from 'vite';
-import { mujoco } from './build/mujoco';
+import { defineConfig } from 'vitest/config';
+import { mujoco } from './build/mujoco.ts';
 
 export default defineConfig({
   base: './', // served from any folder
@@ -11,5 +11,9 @@ export default defineConfig({
     target: 'es2022',
     assetsInlineLimit: 0,
     modulePreload: { polyfill: false },
+  },
+  test: {
+    include: ['src/**/*.test.ts', 'build/**/*.test.ts'],
+    environment: 'node',
   },
 });

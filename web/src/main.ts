@@ -1,5 +1,33 @@
-import loadMujoco from '@mujoco/mujoco';
-import wasmUrl from '@mujoco/mujoco/mujoco.wasm?url';
+import { Agents } from './page/agents';
+import { startSimulator } from './page/boot';
+import { element } from './page/dom';
+import { Page } from './page/page';
+import { World } from './world';
 
-const mujoco = await loadMujoco({ locateFile: () => wasmUrl });
-document.body.append(`MuJoCo ${mujoco.mj_versionString()}`);
+declare global {
+  /// For the console of the browser, and for tests.
+  var upswing: Page;
+}
+
+try {
+  const progress = element<HTMLProgressElement>('progress');
+  const [simulator, agents] = await Promise.all([
+    startSimulator((share) => (progress.value = share)),
+    Agents.fetch(),
+  ]);
+  const page = new Page(new World(simulator), agents);
+  globalThis.upswing = page;
+  await page.open();
+  for (const group of document.querySelectorAll<HTMLFieldSetElement>('fieldset')) {
+    group.disabled = false;
+  }
+  page.run();
+} catch (error) {
+  const reason = error instanceof Error ? error.message : String(error);
+  element('message').textContent = `The page could not start: ${reason}.`;
+  element('message').hidden = false;
+  element('badge').hidden = true;
+  console.error(error);
+} finally {
+  element('loading').hidden = true;
+}

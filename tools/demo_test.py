@@ -1,0 +1,133 @@
+#!/usr/bin/env python3
+"""`./upswing demo`: what it serves and what it refuses. tools/web_test runs this with the built page
+in UPSWING_PAGE; nothing is installed or built."""
+
+import json
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import unittest
+import urllib.request
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "apps"))
+from testing import ProgramTest, small, snapshot  # noqa: E402
+
+PAGE = Path(os.environ["UPSWING_PAGE"])
+
+
+def free_port():
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        return listener.getsockname()[1]
+
+
+class DemoTest(ProgramTest):
+    def setUp(self):
+        super().setUp()
+        self.page = self.folder / "built page"
+        shutil.copytree(PAGE, self.page)
+        self.environment = os.environ | {"UPSWING_PAGE": str(self.page)}
+        self.work = self.folder / "work"
+        self.work.mkdir()
+
+    def command(self, *arguments):
+        return [ROOT / "upswing", "--no-setup", "demo", *map(str, arguments)]
+
+    def demo(self, *arguments):
+        return subprocess.run(self.command(*arguments), cwd=self.work, env=self.environment,
+                              stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, check=False,
+                              stderr=subprocess.PIPE, encoding="utf-8")
+
+    def serve(self, *arguments):
+        """Starts the server; returns it and its address, which its first line tells."""
+        server = subprocess.Popen(self.command(*arguments), cwd=self.work, env=self.environment,
+                                  stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                                  stderr=subprocess.DEVNULL, encoding="utf-8")
+        self.addCleanup(self.end, server)
+        line = server.stdout.readline()
+        self.assertRegex(line, r"http://localhost:\d+/ ")
+        return server, line.split()[4]
+
+    def fetch(self, address):
+        # Straight, whatever proxy there is.
+        opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
+        with opener.open(address.replace("localhost", "127.0.0.1")) as reply:
+            return reply.read()
+
+    def test_serves_the_page_until_it_is_interrupted(self):
+        for number, code in ((signal.SIGINT, 130), (signal.SIGTERM, 143)):
+            server, address = self.serve()
+            self.assertEqual(self.fetch(address), (self.page / "index.html").read_bytes())
+            self.assertEqual(self.end(server, number), (code, ""))
+
+    def test_port(self):
+        port = free_port()
+        _, address = self.serve("--port", port)
+        self.assertEqual(address, f"http://localhost:{port}/")
+        busy = self.demo(f"--port={port}")
+        self.assert_one_line(busy, 1, port, "already in use")
+        self.assertEqual(busy.stdout, "")
+
+    def test_runs_are_in_the_page(self):
+        self.succeed(*small(out="work/My Run"))
+        self.assertEqual(self.demo("My Run", "--dist", "site").returncode, 0)
+        self.assertEqual(snapshot(self.page), snapshot(PAGE))  # a copy was made
+        _, address = self.serve("My Run")
+        for agents in (json.loads(self.fetch(address + "agents/agents.json")),
+                       json.loads((self.work / "site/agents/agents.json").read_text())):
+            (mine,) = [each for each in agents["agents"] if each["id"] == "my-run"]
+        policy = (self.work / "My Run/policy.safetensors").read_bytes()
+        self.assertEqual(self.fetch(address + "agents/" + mine["file"]), policy)
+        self.assertEqual((self.work / "site/agents" / mine["file"]).read_bytes(), policy)
+
+    def test_dist_is_the_page(self):
+        (self.work / "empty").mkdir()
+        for folder in ("new", "empty"):
+            done = self.demo("--dist", folder)
+            self.assertEqual((done.returncode, done.stderr), (0, ""), done)
+            self.assertIn(f"http.server -d {folder}\n", done.stdout)
+            self.assertEqual(snapshot(self.work / folder), snapshot(self.page))
+            self.assertEqual((self.work / folder).stat().st_mode & 0o777, 0o755)
+        self.assertEqual({path.name for path in self.work.iterdir()}, {"new", "empty"})
+
+    def test_bad_input_is_refused_in_one_line(self):
+        (self.work / "full").mkdir()
+        (self.work / "full/file").touch()
+        before = snapshot(self.work)
+        for arguments, *words in ((["--prot", "1"], "--prot", "--help"),
+                                  (["--port"], "--port"),
+                                  (["--port", "0"], "--port", "'0'"),
+                                  (["--port", "65536"], "--port"),
+                                  (["--port=80x"], "80x"),
+                                  (["--dist", "full"], "full", "empty"),
+                                  (["--dist", "full/file"], "full/file"),
+                                  (["--dist", "no/where"], "no"),
+                                  (["--dist="], "--dist"),
+                                  (["--dist", "x", "--port", "1024"], "both"),
+                                  (["nothing"], "nothing"),
+                                  (["full", "--dist", "x"], "full")):
+            with self.subTest(arguments=arguments):
+                done = self.demo(*arguments)
+                self.assert_one_line(done, 2, *words)
+                self.assertEqual(done.stdout, "")
+                self.assertEqual(snapshot(self.work), before)
+        self.assertEqual(snapshot(self.page), snapshot(PAGE))
+
+    def test_a_page_that_was_never_built(self):
+        self.environment["UPSWING_PAGE"] = str(self.folder / "none")
+        self.assert_one_line(self.demo(), 1, "not built", "--no-setup")
+
+    def test_help(self):
+        done = self.demo("--help")
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        for word in ("--port", "--dist", "Examples"):
+            self.assertIn(word, done.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,84 @@
+# shellcheck shell=sh
+# What the page needs besides the C++ program: Node, its packages, a Chromium for the tests.
+# Read by ./upswing and tools/web_test, which have the repository's folder in $root.
+: "${root:?}"
+
+# Fetched where there is none that will do.
+own_node=$root/build/deps/node-$(sed -n 's/.*==\([0-9.]*\).*/\1/p' "$root/tools/node-requirements.txt")
+
+# Whether Vite runs on this version of Node: 20.19, 22.12 or later ones.
+node_will_do() {
+  minor=${1#*.}
+  minor=${minor%%.*}
+  case $1 in
+    v20.*) [ "$minor" -ge 19 ] ;;
+    v22.*) [ "$minor" -ge 12 ] ;;
+    v2[3-9].* | v[3-9][0-9].*) ;;
+    *) false ;;
+  esac
+}
+
+# Puts Node and npm on the PATH if they are not there yet; fails if there are none that will do.
+find_node() {
+  ! { node_will_do "$(node --version 2>/dev/null)" && command -v npm >/dev/null; } || return 0
+  [ -x "$own_node/bin/npm" ] || return 1
+  PATH=$own_node/bin:$PATH
+}
+
+lock_hash() { sha256sum <"$root/web/package-lock.json"; }
+
+# Whether web/node_modules is what the lock file says.
+modules_are_current() {
+  stamp=$root/web/node_modules/.upswing-lock
+  [ -f "$stamp" ] && [ "$(cat "$stamp")" = "$(lock_hash)" ]
+}
+
+# Prints the Chromium that tests run: UPSWING_CHROMIUM or one on the PATH. It has to start, since
+# Ubuntu's chromium-browser may be no more than a hint at a snap.
+find_chromium() {
+  for chromium in ${UPSWING_CHROMIUM:+"$UPSWING_CHROMIUM"} chromium chromium-browser google-chrome; do
+    "$chromium" --version >/dev/null 2>&1 </dev/null || continue
+    command -v "$chromium"
+    return
+  done
+  return 1
+}
+
+# Where Playwright puts its own Chromium, on systems that have no package of one.
+export PLAYWRIGHT_BROWSERS_PATH="$root/build/deps/playwright"
+has_own_chromium() { [ -n "$(find "$PLAYWRIGHT_BROWSERS_PATH" -name INSTALLATION_COMPLETE 2>/dev/null)" ]; }
+
+# What follows installs; it is for ./upswing alone and uses what that defines.
+
+# Puts Node on the PATH and its packages into web/node_modules, each if it is not there yet.
+set_up_node() {
+  if ! find_node; then
+    (install_packages python3 python3-pip ca-certificates && lock &&
+      "$root/tools/fetch_wheel" node "$own_node") </dev/null || exit 1
+    find_node || fail "Node was fetched but does not run: $own_node/bin/node"
+  fi
+  ! modules_are_current || return 0
+  (
+    lock
+    ! modules_are_current || exit 0 # another one did it meanwhile
+    say "installing the page's packages (npm ci)"
+    cd web
+    npm ci --loglevel=error >../build/npm.log 2>&1 ||
+      fail "npm could not install the page's packages (no network?), see build/npm.log:" \
+        "$(grep -m 1 'npm error' ../build/npm.log)"
+  ) </dev/null || exit 1
+}
+
+# The package that has a Chromium, where one is wanted and there is one that works without snap.
+chromium_package() {
+  ! find_chromium >/dev/null || return 0
+  case $(system_name) in debian*) echo chromium ;; esac
+}
+
+# Elsewhere: Playwright's own, with the libraries that it needs.
+set_up_chromium() {
+  ! { find_chromium >/dev/null || has_own_chromium; } || return 0
+  say "installing Chromium (playwright install)"
+  (cd "$root/web" && npx playwright install --with-deps chromium-headless-shell) </dev/null >&2 ||
+    fail "no Chromium could be installed (see above); set UPSWING_CHROMIUM to one"
+}

@@ -1,0 +1,37 @@
+import type { State } from './pendulum';
+
+/// What sensors and motor do wrong; zeros: nothing.
+export interface Disturbance {
+  sensor_noise: number; // standard deviation, on each measured angle and velocity, rad and rad/s
+  delay: number; // from the choice of a torque to its effect, in control periods
+}
+
+/// A draw from the normal distribution (Box and Muller 1958).
+function normal(): number {
+  return Math.sqrt(-2 * Math.log(1 - Math.random())) * Math.cos(2 * Math.PI * Math.random());
+}
+
+/// What the sensors say of a state.
+export function measure(s: State, noise: number): State {
+  if (noise === 0) return s;
+  const blur = (x: number) => x + noise * normal();
+  return { q1: blur(s.q1), q2: blur(s.q2), w1: blur(s.w1), w2: blur(s.w2) };
+}
+
+/// A motor that answers some control periods late, and not at all before the first torque arrives.
+export class DelayLine {
+  private underWay: number[] = [];
+
+  clear(): void {
+    this.underWay = [];
+  }
+
+  /// Takes the torque chosen now, gives the one that acts now. A shorter delay than before skips the
+  /// oldest torques that are under way.
+  apply(torque: number, delay: number): number {
+    this.underWay.push(torque);
+    if (this.underWay.length <= delay) return 0;
+    this.underWay = this.underWay.slice(this.underWay.length - 1 - delay);
+    return this.underWay.shift()!;
+  }
+}

@@ -1,0 +1,24 @@
+import { expect, test } from 'vitest';
+import { HANGING } from './pendulum';
+import { History } from './history';
+
+const moment = (t: number) => ({ t, state: { ...HANGING }, torque: 1.25, energy: 0, height: -1 });
+
+test('keeps the last seconds, oldest first', () => {
+  const history = new History(10);
+  for (let k = 0; k <= 5000; ++k) history.add(moment(k / 50));
+  const shown = history.from(95);
+  expect(shown.length).toBe(251);
+  expect([shown[0]!.t, shown.at(-1)!.t]).toEqual([95, 100]);
+  expect(history.from(0).length).toBeLessThanOrEqual(2 * 501);
+  expect(history.from(101)).toEqual([]);
+});
+
+test('as CSV, with time from its start', () => {
+  const history = new History(10);
+  history.add(moment(3));
+  history.add({ ...moment(3.02), state: { q1: 0.1, q2: -1 / 3, w1: 0, w2: 2 } });
+  expect(history.csv()).toBe(
+    't,qpos0,qpos1,qvel0,qvel1,torque\n0.00,0,0,0,0,1.25\n0.02,0.1,-0.3333333333333333,0,2,1.25\n',
+  );
+});

@@ -1,0 +1,47 @@
+import type { State } from '../pendulum';
+import { STEPS_PER_SECOND } from '../world';
+import type { World } from '../world';
+
+const LONGEST_FRAME = 0.1; // s: a tab that comes back does not jump
+
+/// Lets the world go on in step with real time, or slower, or faster.
+export class Clock {
+  speed = 1;
+  private readonly world: World;
+  private due = 0; // physics steps that should have been made, with a fraction
+  private before: State;
+
+  constructor(world: World) {
+    this.world = world;
+    this.before = world.state;
+  }
+
+  /// Real time has gone on by `seconds`. False if the state blew up.
+  advance(seconds: number): boolean {
+    this.due += Math.min(seconds, LONGEST_FRAME) * this.speed * STEPS_PER_SECOND;
+    let sound = true;
+    for (; this.due >= 1; --this.due) {
+      this.before = this.world.state;
+      sound = this.world.advance() && sound;
+    }
+    return sound;
+  }
+
+  /// Forgets the fraction of a step: the state was set, or is looked at step by step.
+  settle(): void {
+    this.due = 0;
+    this.before = this.world.state;
+  }
+
+  /// Where the pendulum is between two physics steps, so that slow motion is smooth.
+  get state(): State {
+    const [from, to] = [this.before, this.world.state];
+    const between = (a: number, b: number) => a + this.due * (b - a);
+    return {
+      q1: between(from.q1, to.q1),
+      q2: between(from.q2, to.q2),
+      w1: between(from.w1, to.w1),
+      w2: between(from.w2, to.w2),
+    };
+  }
+}

@@ -1,0 +1,97 @@
+import type { History } from '../history';
+import { energyTarget } from '../pendulum';
+import type { State } from '../pendulum';
+import { PhasePortrait, QBars, SECONDS_SHOWN, signed, Strip } from '../view/charts';
+import type { World } from '../world';
+import { element } from './dom';
+
+const FRAMES = 2; // of the screen for one of the charts
+
+/// The charts of what happens, and the numbers beside them.
+export class Dashboard {
+  private readonly energy = new Strip('energy', 'energy', (m) => m.energy);
+  private readonly height = new Strip('height', 'link2', (m) => m.height);
+  private readonly torque = new Strip('torque', 'torque', (m) => m.torque);
+  private readonly phase = new PhasePortrait();
+  private readonly bars = new QBars();
+  private frame = 0;
+
+  get canvases() {
+    return [this.energy, this.height, this.torque, this.phase, this.bars].map((c) => c.canvas);
+  }
+
+  draw(world: World, history: History): void {
+    if (this.frame++ % FRAMES !== 0) return;
+    const now = world.time;
+    const moments = history.from(now - SECONDS_SHOWN);
+    const limit = world.plant.torque_limit;
+    this.energy.draw(moments, now, {
+      low: -0.1,
+      high: 1.6,
+      target: 1,
+      labels: [
+        [0, 'hang'],
+        [1, 'up'],
+      ],
+    });
+    this.height.draw(moments, now, {
+      low: -1.1,
+      high: 1.1,
+      target: 1,
+      labels: [
+        [-1, '−1'],
+        [0, '0'],
+        [1, '1'],
+      ],
+    });
+    this.torque.draw(moments, now, {
+      low: -1.1 * limit,
+      high: 1.1 * limit,
+      labels: [
+        [-limit, signed(-limit)],
+        [0, '0'],
+        [limit, signed(limit)],
+      ],
+    });
+    this.phase.draw(moments);
+    this.bars.draw(world.policy, world.thought);
+    if (this.frame % (5 * FRAMES) === 1) this.tell(world, history);
+  }
+
+  /// The numbers change a few times a second, so that they can be read.
+  private tell(world: World, history: History): void {
+    const last = history.last;
+    const { plant, thought } = world;
+    if (!last) return;
+    const target = energyTarget(plant);
+    const joules = (2 * last.energy - 1) * target;
+    element('energy-value').textContent = `${joules.toFixed(1)} J of ${target.toFixed(1)} J`;
+    element('height-value').textContent =
+      `${(last.height * (plant.length1 + plant.length2)).toFixed(2)} m`;
+    element('torque-value').textContent = `${signed(Number(last.torque.toFixed(2)))} N·m`;
+    element('q-value').textContent = thought
+      ? qText(thought.q[thought.action]!, thought.value)
+      : '';
+  }
+}
+
+function qText(best: number, value: number): string {
+  const text = `best ${best.toFixed(2)}`;
+  return Number.isNaN(value) ? text : `${text}, state ${value.toFixed(2)}`;
+}
+
+/// What the pendulum does, in words.
+export function situation(world: World): { state: string; text: string } {
+  if (world.uprightSince !== null) {
+    const seconds = (world.time - world.uprightSince).toFixed(1);
+    return { state: 'balanced', text: `balanced for ${seconds} s` };
+  }
+  if (world.agentOn) return { state: 'swinging', text: 'swinging up' };
+  return isAtRest(world.state)
+    ? { state: 'hanging', text: 'hanging' }
+    : { state: 'free', text: 'free' };
+}
+
+function isAtRest({ q1, q2, w1, w2 }: State): boolean {
+  return Math.abs(w1) + Math.abs(w2) < 0.02 && Math.cos(q1) > 0.999 && Math.cos(q1 + q2) > 0.999;
+}

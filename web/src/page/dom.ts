@@ -1,0 +1,10 @@
+/// The element with this id, which index.html has.
+export function element<T extends HTMLElement = HTMLElement>(id: string): T {
+  return document.getElementById(id) as T;
+}
+
+export function button(id: string, onClick: () => void): HTMLButtonElement {
+  const found = element<HTMLButtonElement>(id);
+  found.addEventListener('click', onClick);
+  return found;
+}

@@ -1,0 +1,108 @@
+import { NOMINAL } from '../pendulum';
+import type { Parameter, Plant } from '../pendulum';
+import type { Policy } from '../policy';
+import type { World } from '../world';
+import { element } from './dom';
+import type { Range } from './share';
+import { Slider } from './sliders';
+import type { SliderSpec } from './sliders';
+
+type Row = Omit<SliderSpec, 'name' | 'initial'> & { name: Parameter };
+
+const PLANT: readonly Row[] = [
+  { name: 'mass1', label: 'Mass of the upper link', unit: 'kg', min: 0.2, max: 3, step: 0.05 },
+  { name: 'mass2', label: 'Mass of the lower link', unit: 'kg', min: 0.2, max: 3, step: 0.05 },
+  { name: 'length1', label: 'Length of the upper link', unit: 'm', min: 0.2, max: 1, step: 0.01 },
+  { name: 'length2', label: 'Length of the lower link', unit: 'm', min: 0.2, max: 1, step: 0.01 },
+  {
+    name: 'damping1',
+    label: 'Damping of the upper joint',
+    unit: 'N·m·s',
+    min: 0,
+    max: 1,
+    step: 0.01,
+  },
+  {
+    name: 'damping2',
+    label: 'Damping of the lower joint',
+    unit: 'N·m·s',
+    min: 0,
+    max: 1,
+    step: 0.01,
+  },
+  { name: 'gravity', label: 'Gravity', unit: 'm/s²', min: 1, max: 25, step: 0.01 },
+  { name: 'torque_limit', label: 'Limit of the motor', unit: 'N·m', min: 1, max: 10, step: 0.25 },
+];
+
+const DISTURBANCE: readonly SliderSpec[] = [
+  {
+    name: 'sensor_noise',
+    label: 'Sensor noise',
+    unit: 'rad, rad/s',
+    min: 0,
+    max: 0.2,
+    step: 0.005,
+    initial: 0,
+  },
+  {
+    name: 'delay',
+    label: 'Delay of the motor',
+    unit: '× 0.02 s',
+    min: 0,
+    max: 5,
+    step: 1,
+    initial: 0,
+  },
+];
+
+/// The largest and smallest that a link to this page may bring.
+export const RANGES: ReadonlyMap<string, Range> = new Map<string, Range>([
+  ...[...PLANT, ...DISTURBANCE].map(({ name, min, max }): [string, Range] => [name, [min, max]]),
+  ['speed', [0.1, 2]],
+]);
+
+/// The sliders of the plant, its sensors and its motor.
+export class Settings {
+  private readonly plant = new Map<Parameter, Slider>();
+  private readonly world: World;
+  private readonly disturbance: Record<'sensor_noise' | 'delay', Slider>;
+
+  constructor(world: World, onChange: () => void) {
+    this.world = world;
+    for (const row of PLANT) {
+      const slider = new Slider({ ...row, initial: NOMINAL[row.name] }, (value) => {
+        world.plant = { ...world.plant, [row.name]: value };
+        onChange();
+      });
+      this.plant.set(row.name, slider);
+      element('plant-sliders').append(slider.element);
+    }
+    const [noise, delay] = DISTURBANCE.map(
+      (spec) =>
+        new Slider(spec, (value) => {
+          world.disturbance[spec.name as 'sensor_noise' | 'delay'] = value;
+          onChange();
+        }),
+    ) as [Slider, Slider];
+    this.disturbance = { sensor_noise: noise, delay };
+    element('disturbance-sliders').append(noise.element, delay.element);
+  }
+
+  setPlant(plant: Plant): void {
+    this.world.plant = plant;
+    for (const [name, slider] of this.plant) slider.value = plant[name];
+  }
+
+  setDisturbance(sensor_noise: number, delay: number): void {
+    Object.assign(this.world.disturbance, { sensor_noise, delay });
+    this.disturbance.sensor_noise.value = sensor_noise;
+    this.disturbance.delay.value = delay;
+  }
+
+  /// Marks on each slider what this policy was trained on.
+  mark(policy: Policy): void {
+    for (const [name, slider] of this.plant) slider.trained = policy.trainedRange(name);
+    this.disturbance.sensor_noise.trained = null;
+    this.disturbance.delay.trained = null;
+  }
+}

@@ -1,0 +1,48 @@
+import { expect, test } from 'vitest';
+import { NOMINAL } from '../pendulum';
+import { decode, encode } from './share';
+import type { Range, Shared } from './share';
+
+const RANGES: ReadonlyMap<string, Range> = new Map<string, Range>([
+  ['mass1', [0.2, 3]],
+  ['gravity', [1, 25]],
+  ['speed', [0.1, 2]],
+  ['sensor_noise', [0, 0.2]],
+  ['delay', [0, 5]],
+]);
+const BEGINNING: Shared = {
+  agent: null,
+  on: false,
+  speed: 1,
+  plant: { ...NOMINAL },
+  sensor_noise: 0,
+  delay: 0,
+};
+
+test('what is as at the beginning needs no link', () => {
+  expect(encode(BEGINNING)).toBe('');
+  expect(decode('', RANGES)).toEqual({ shared: BEGINNING, problems: [] });
+});
+
+test('a link brings back what it was made from', () => {
+  const shared: Shared = {
+    agent: 'a b&c',
+    on: true,
+    speed: 0.3,
+    plant: { ...NOMINAL, mass1: 1.2345678901234567, gravity: 3.71 },
+    sensor_noise: 0.05,
+    delay: 2,
+  };
+  expect(decode(`#${encode(shared)}`, RANGES)).toEqual({ shared, problems: [] });
+});
+
+test.each([
+  ['mass1=0.1', 'mass1: expected 0.2 to 3, got "0.1"'],
+  ['mass1=1e99', 'mass1: expected 0.2 to 3, got "1e99"'],
+  ['mass1=NaN', 'mass1: expected 0.2 to 3, got "NaN"'],
+  ['mass1=', 'mass1: expected 0.2 to 3, got ""'],
+  ['mass3=1', 'unknown "mass3"'],
+  ['__proto__=1', 'unknown "__proto__"'],
+])('%s is told and left out', (hash, problem) => {
+  expect(decode(hash, RANGES)).toEqual({ shared: BEGINNING, problems: [problem] });
+});

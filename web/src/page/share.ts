@@ -1,0 +1,66 @@
+import { NOMINAL } from '../pendulum';
+import type { Parameter, Plant } from '../pendulum';
+
+/// What a link holds: the agent, whether it is on, and all that was changed.
+export interface Shared {
+  agent: string | null;
+  on: boolean;
+  speed: number;
+  plant: Plant;
+  sensor_noise: number;
+  delay: number; // control periods
+}
+
+export type Range = readonly [number, number];
+
+/// As the part of an address behind #; only what differs from the beginning.
+export function encode(shared: Shared): string {
+  const fields = new URLSearchParams();
+  if (shared.agent) fields.set('agent', shared.agent);
+  if (shared.on) fields.set('on', '1');
+  if (shared.speed !== 1) fields.set('speed', String(shared.speed));
+  for (const name of Object.keys(NOMINAL) as Parameter[]) {
+    if (shared.plant[name] !== NOMINAL[name]) fields.set(name, String(shared.plant[name]));
+  }
+  if (shared.sensor_noise !== 0) fields.set('sensor_noise', String(shared.sensor_noise));
+  if (shared.delay !== 0) fields.set('delay', String(shared.delay));
+  return fields.toString();
+}
+
+/// Reads such an address. What is not understood is left out and told in `problems`, a line each.
+export function decode(
+  hash: string,
+  ranges: ReadonlyMap<string, Range>,
+): { shared: Shared; problems: string[] } {
+  const shared: Shared = {
+    agent: null,
+    on: false,
+    speed: 1,
+    plant: { ...NOMINAL },
+    sensor_noise: 0,
+    delay: 0,
+  };
+  const problems: string[] = [];
+  for (const [name, text] of new URLSearchParams(hash.replace(/^#/, ''))) {
+    const range = ranges.get(name);
+    const value = Number(text);
+    if (name === 'agent') {
+      shared.agent = text;
+    } else if (name === 'on') {
+      shared.on = text === '1';
+    } else if (!range) {
+      problems.push(`unknown "${name}"`);
+    } else if (text.trim() === '' || !(value >= range[0] && value <= range[1])) {
+      problems.push(`${name}: expected ${range[0]} to ${range[1]}, got "${text}"`);
+    } else if (name === 'speed') {
+      shared.speed = value;
+    } else if (name === 'sensor_noise') {
+      shared.sensor_noise = value;
+    } else if (name === 'delay') {
+      shared.delay = Math.round(value);
+    } else {
+      shared.plant[name as Parameter] = value;
+    }
+  }
+  return { shared, problems };
+}

@@ -1,0 +1,81 @@
+/// Sliders with a label, a value, a way back, and a mark for what the agent was trained on.
+
+export interface SliderSpec {
+  name: string;
+  label: string;
+  unit: string;
+  min: number;
+  max: number;
+  step: number;
+  initial: number;
+}
+
+export class Slider {
+  readonly element: HTMLElement;
+  private readonly input: HTMLInputElement;
+  private readonly output: HTMLOutputElement;
+  private readonly back: HTMLButtonElement;
+  private readonly spec: SliderSpec;
+
+  constructor(spec: SliderSpec, onInput: (value: number) => void) {
+    this.spec = spec;
+    const template = document.getElementById('slider') as HTMLTemplateElement;
+    this.element = template.content.firstElementChild!.cloneNode(true) as HTMLElement;
+    this.input = this.element.querySelector('input')!;
+    this.output = this.element.querySelector('output')!;
+    this.back = this.element.querySelector('button')!;
+    const { input } = this;
+    input.id = spec.name;
+    [input.min, input.max, input.step] = [spec.min, spec.max, spec.step].map(String) as [
+      string,
+      string,
+      string,
+    ];
+    const label = this.element.querySelector('label')!;
+    label.htmlFor = spec.name;
+    label.textContent = spec.label;
+    this.output.htmlFor.add(spec.name);
+    this.back.ariaLabel = `Reset ${spec.label}`;
+    input.addEventListener('input', () => {
+      this.show();
+      onInput(this.value);
+    });
+    this.back.addEventListener('click', () => {
+      this.value = spec.initial;
+      onInput(this.value);
+    });
+    this.value = spec.initial;
+  }
+
+  get value(): number {
+    return Number(this.input.value);
+  }
+
+  /// Also one between two steps of the slider, as a link may bring it.
+  set value(value: number) {
+    const { step, min } = this.spec;
+    const onStep = Math.abs((value - min) / step - Math.round((value - min) / step)) < 1e-6;
+    this.input.step = onStep ? String(step) : 'any';
+    this.input.value = String(value);
+    this.show();
+  }
+
+  /// Marks what the agent was trained on, [low, high]; null: no mark.
+  set trained(range: [number, number] | null) {
+    const { min, max } = this.spec;
+    const share = (value: number) => String(Math.min(Math.max((value - min) / (max - min), 0), 1));
+    const mark = this.element.querySelector<HTMLElement>('.trained')!;
+    mark.hidden = range === null;
+    if (range) {
+      mark.style.setProperty('--share-from', share(range[0]));
+      mark.style.setProperty('--share-to', share(range[1]));
+    }
+  }
+
+  private show(): void {
+    const text = `${Number(this.value.toPrecision(4))} ${this.spec.unit}`;
+    this.output.textContent = text;
+    this.input.ariaValueText = text;
+    this.back.disabled = this.value === this.spec.initial;
+  }
+}

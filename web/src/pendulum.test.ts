@@ -1,0 +1,114 @@
+import { beforeAll, describe, expect, test } from 'vitest';
+import { upswing } from '../tests/program';
+import { DelayLine } from './disturbance';
+import { Observer } from './observer';
+import * as pendulum from './pendulum';
+import type { Plant, State } from './pendulum';
+
+/// Everything that the page computes as the C++ program does, against vectors that the program writes.
+
+type Numbers = number[];
+interface Case {
+  plant: Plant;
+  state: Numbers;
+  torque: number;
+  observation: Numbers;
+  energy: number;
+  energy_target: number;
+  normalized_energy: number;
+  tip_height: number;
+  inverted: boolean;
+  reward_terms: Numbers;
+}
+interface Vectors {
+  constants: Record<string, number | Numbers>;
+  cases: Case[];
+  capsules: { mass: number; radius: number; length: number; across: number; along: number }[];
+  models: { plant: Plant; mjcf: string }[];
+  observation_memory: {
+    plant: Plant;
+    torques: Numbers;
+    observations: Numbers[];
+    with_memory: { memory: number; observations: Numbers[] }[];
+  };
+  delays: { steps: number; chosen: Numbers; applied: Numbers }[];
+}
+
+let vectors: Vectors;
+beforeAll(() => {
+  vectors = JSON.parse(upswing('export', '--test-vectors', '-')) as Vectors;
+});
+
+const stateOf = ([q1, q2, w1, w2]: Numbers): State => ({ q1: q1!, q2: q2!, w1: w1!, w2: w2! });
+
+/// Equal but for the rounding of sines and cosines.
+function expectClose(got: ArrayLike<number>, expected: Numbers, tolerance = 1e-12): void {
+  expect(got.length).toBe(expected.length);
+  expected.forEach((x, i) => {
+    expect(Math.abs(got[i]! - x)).toBeLessThanOrEqual(tolerance * (1 + Math.abs(x)));
+  });
+}
+
+test('constants', () => {
+  const { constants } = vectors;
+  expect(pendulum.CONTROL_PERIOD).toBe(constants.control_period);
+  expect(pendulum.PHYSICS_STEPS).toBe(constants.physics_steps);
+  expect(pendulum.CAPSULE_RADIUS).toBe(constants.capsule_radius);
+  expect(pendulum.MAX_VELOCITY).toEqual(constants.max_velocity);
+});
+
+test('energy, height, upright, reward', () => {
+  expect(vectors.cases.length).toBeGreaterThan(50);
+  expect(new Set(vectors.cases.map((c) => c.inverted)).size).toBe(2);
+  for (const c of vectors.cases) {
+    const state = stateOf(c.state);
+    expectClose([pendulum.energy(c.plant, state)], [c.energy]);
+    expectClose([pendulum.energyTarget(c.plant)], [c.energy_target]);
+    expectClose([pendulum.normalizedEnergy(c.plant, state)], [c.normalized_energy]);
+    expectClose([pendulum.tipHeight(c.plant, state)], [c.tip_height]);
+    expect(pendulum.inverted(state)).toBe(c.inverted);
+    expectClose(pendulum.rewardTerms(c.plant, state, c.torque), c.reward_terms);
+  }
+});
+
+test('observation', () => {
+  for (const c of vectors.cases) {
+    const observation = new Float32Array(pendulum.OBSERVATION_SIZE);
+    pendulum.observe(c.plant, stateOf(c.state), observation);
+    expectClose(observation, c.observation, 2 ** -24); // float32
+  }
+});
+
+test('inertia of capsules', () => {
+  for (const { mass, radius, length, across, along } of vectors.capsules) {
+    const got = pendulum.capsuleInertia(mass, radius, length);
+    expectClose([got.across, got.along], [across, along]);
+  }
+});
+
+test('the model, letter by letter', () => {
+  for (const { plant, mjcf } of vectors.models) expect(pendulum.mjcf(plant)).toBe(mjcf);
+});
+
+describe('what an observation remembers', () => {
+  test.each([0, 1])('memory %i of the list', (which) => {
+    const { torques, observations, with_memory } = vectors.observation_memory;
+    const { memory, observations: expected } = with_memory[which]!;
+    const observer = new Observer(memory);
+    expected.forEach((row, k) => {
+      // The observation of now is the program's; what is remembered is worked out here.
+      const now = Float32Array.from(observations[k]!);
+      if (k === 0) observer.beginWith(now);
+      else observer.nextWith(now, torques[k - 1]!);
+      expectClose(observer.observation, row, 0);
+    });
+  });
+});
+
+test('a motor that is late', () => {
+  expect(vectors.delays.some((d) => d.steps > 1)).toBe(true);
+  for (const { steps, chosen, applied } of vectors.delays) {
+    const motor = new DelayLine();
+    expect(chosen.map((torque) => motor.apply(torque, steps))).toEqual(applied);
+  }
+});

@@ -1,0 +1,125 @@
+import { Network, parseShape } from './network';
+import type { QValues } from './network';
+import { MEMORY_SIZE } from './observer';
+import { CONTROL_PERIOD, NOMINAL, OBSERVATION_SIZE } from './pendulum';
+import type { Parameter, Plant } from './pendulum';
+import { BadFile, parseSafetensors, read } from './safetensors';
+import type { TensorFile } from './safetensors';
+
+/// Index of the largest number, the first of equals.
+export function argMax(values: ArrayLike<number>): number {
+  let best = 0;
+  for (let i = 1; i < values.length; ++i) if (values[i]! > values[best]!) best = i;
+  return best;
+}
+
+/// A greedy controller: observation → torque, nothing else needed (docs/policy-format.md).
+export class Policy {
+  readonly metadata: ReadonlyMap<string, string>;
+  readonly network: Network;
+  readonly torques: Float64Array; // (A) N·m
+  /// How many past steps an observation remembers.
+  readonly memory: number;
+  /// The plant at training.
+  readonly plant: Plant;
+  /// Largest |difference| between the Q-values in the file and those computed here.
+  readonly selfCheckError: number;
+
+  /// Reads and checks the file: format, shapes, finite numbers, samples. Throws BadFile.
+  constructor(bytes: ArrayBuffer) {
+    const file = parseSafetensors(bytes);
+    this.metadata = file.metadata;
+    this.expect('format', 'upswing-policy');
+    this.expect('format_version', '1');
+    this.expect('output', 'levels');
+    this.expect('control_period', String(CONTROL_PERIOD));
+    if (file.metadata.has('model')) {
+      throw new BadFile('it was trained on a model of its own, which this page does not have');
+    }
+
+    const shape = parseShape(this.about('network'));
+    this.memory = (shape.inputs - OBSERVATION_SIZE) / MEMORY_SIZE;
+    if (!Number.isInteger(this.memory) || this.memory < 0) {
+      throw new BadFile(`expected 8 inputs and 3 for each step remembered, got ${shape.inputs}`);
+    }
+    this.plant = parsePlant(this.about('plant'));
+    this.network = new Network(shape, file);
+    this.torques = read(file, 'torques', 'F64', [shape.actions]) as Float64Array;
+    this.selfCheckError = this.checkSamples(file);
+  }
+
+  about(key: string): string {
+    const text = this.metadata.get(key);
+    if (text === undefined) throw new BadFile(`expected metadata "${key}", found none`);
+    return text;
+  }
+
+  act(observation: Float32Array): QValues & { action: number; torque: number } {
+    const values = this.network.forward(observation);
+    const action = argMax(values.q);
+    return { ...values, action, torque: this.torques[action]! };
+  }
+
+  /// What the policy was trained on: [low, high] of a parameter.
+  trainedRange(name: Parameter): [number, number] {
+    const setting = new RegExp(`^randomize_${name} = ([0-9.eE+-]+)$`, 'm');
+    const share = Number(setting.exec(this.metadata.get('config') ?? '')?.[1] ?? 0);
+    const nominal = this.plant[name];
+    return [nominal * (1 - share), nominal * (1 + share)];
+  }
+
+  private expect(key: string, expected: string): void {
+    const got = this.about(key);
+    if (got !== expected) throw new BadFile(`${key}: expected "${expected}", got "${got}"`);
+  }
+
+  /// Recomputes the stored outputs from the stored inputs; returns the largest difference. The torque
+  /// is that of the largest Q-value, or of one that rounding cannot tell from it. Throws BadFile.
+  private checkSamples(file: TensorFile): number {
+    const samples = file.tensors.get('sample.torque')?.shape[0] ?? 0;
+    if (samples === 0 || samples > 1000) throw new BadFile('expected samples to check');
+    const { inputs, actions } = this.network.shape;
+    const obs = read(file, 'sample.obs', 'F32', [samples, inputs]) as Float32Array;
+    const expected = read(file, 'sample.q', 'F32', [samples, actions]);
+    const torque = read(file, 'sample.torque', 'F64', [samples]);
+
+    const tolerance = (x: number) => 1e-4 * (1 + Math.abs(x));
+    let largest = 0;
+    for (let i = 0; i < samples; ++i) {
+      const { q } = this.network.forward(obs.subarray(i * inputs, (i + 1) * inputs));
+      q.forEach((value, a) => {
+        const error = Math.abs(value - expected[i * actions + a]!);
+        if (!(error <= tolerance(value))) {
+          throw new BadFile(
+            `self-check: expected Q-value ${expected[i * actions + a]}, got ${value} (sample ${i})`,
+          );
+        }
+        largest = Math.max(largest, error);
+      });
+      const best = q[argMax(q)]!;
+      const chosen = q[this.torques.indexOf(torque[i]!)];
+      if (chosen === undefined || best - chosen > 2 * tolerance(best)) {
+        throw new BadFile(`self-check: a torque of ${torque[i]} is not the best (sample ${i})`);
+      }
+    }
+    return largest;
+  }
+}
+
+function parsePlant(text: string): Plant {
+  let given: Partial<Record<Parameter, unknown>>;
+  try {
+    given = JSON.parse(text) as typeof given;
+  } catch {
+    throw new BadFile('metadata "plant" is not JSON');
+  }
+  const plant = { ...NOMINAL };
+  for (const name of Object.keys(NOMINAL) as Parameter[]) {
+    const value = given?.[name];
+    if (typeof value !== 'number' || !Number.isFinite(value) || value < 0 || value > 1000) {
+      throw new BadFile(`metadata "plant": expected a number for ${name}`);
+    }
+    plant[name] = value;
+  }
+  return plant;
+}

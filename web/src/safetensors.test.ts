@@ -1,0 +1,136 @@
+import { describe, expect, test } from 'vitest';
+import { readPolicy } from '../tests/program';
+import { Policy } from './policy';
+import { BadFile, MAX_FILE_BYTES, parseSafetensors, read } from './safetensors';
+
+/// What comes from a stranger is refused with a reason, whatever it is.
+
+type Header = Record<string, unknown>;
+
+function fileOf(header: Header | string, data: Uint8Array = new Uint8Array()): ArrayBuffer {
+  const text = typeof header === 'string' ? header : JSON.stringify(header);
+  const json = new TextEncoder().encode(text);
+  const file = new Uint8Array(8 + json.length + data.length);
+  new DataView(file.buffer).setBigUint64(0, BigInt(json.length), true);
+  file.set(json, 8);
+  file.set(data, 8 + json.length);
+  return file.buffer;
+}
+
+function partsOf(file: ArrayBuffer): {
+  header: Record<string, Record<string, unknown>>;
+  data: Uint8Array;
+} {
+  const size = Number(new DataView(file).getBigUint64(0, true));
+  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(file, 8, size)));
+  return { header, data: new Uint8Array(file.slice(8 + size)) };
+}
+
+const DATA = new Uint8Array(new Float32Array([1, 2, 3, 4]).buffer);
+const tensor = (shape: unknown, offsets: unknown, dtype: unknown = 'F32') => ({
+  x: { dtype, shape, data_offsets: offsets },
+});
+
+test('reads what it was given', () => {
+  const file = parseSafetensors(
+    fileOf({ __metadata__: { a: 'b' }, ...tensor([2, 2], [0, 16]) }, DATA),
+  );
+  expect(file.metadata.get('a')).toBe('b');
+  expect([...read(file, 'x', 'F32', [2, 2])]).toEqual([1, 2, 3, 4]);
+});
+
+test.each<[string, Header | string]>([
+  ['not JSON', 'hello'],
+  ['a header that is a list', '[1]'],
+  ['metadata that are no text', { __metadata__: { a: 1 } }],
+  ['metadata that are a list', { __metadata__: [] }],
+  ['a tensor that is null', { x: null }],
+  ['an unknown type', tensor([4], [0, 16], 'BF16')],
+  ['a type that every object has', tensor([4], [0, 16], 'constructor')],
+  ['a negative size', tensor([-4], [0, 16])],
+  ['a size that is no whole number', tensor([0.5], [0, 2])],
+  ['sizes whose product is too large', tensor([1e7, 1e7, 1e7], [0, 16])],
+  ['a shape that is no list', tensor('4', [0, 16])],
+  ['offsets behind the end', tensor([4], [4, 20])],
+  ['offsets that go backwards', tensor([0], [8, 4])],
+  ['three offsets', tensor([4], [0, 16, 16])],
+  ['fewer bytes than the shape asks for', tensor([4], [0, 12])],
+])('refuses %s', (_, header) => {
+  expect(() => parseSafetensors(fileOf(header, DATA))).toThrow(BadFile);
+});
+
+test('refuses what is cut off, too long, or says so', () => {
+  expect(() => parseSafetensors(new ArrayBuffer(0))).toThrow('too short');
+  expect(() => parseSafetensors(new ArrayBuffer(MAX_FILE_BYTES + 1))).toThrow('larger than 16 MB');
+  const long = fileOf({});
+  new DataView(long).setBigUint64(0, 2n ** 63n, true);
+  expect(() => parseSafetensors(long)).toThrow('cut off');
+});
+
+test('refuses tensors of another shape or type, and numbers that are none', () => {
+  const file = parseSafetensors(fileOf(tensor([2, 2], [0, 16]), DATA));
+  expect(() => read(file, 'y', 'F32', [4])).toThrow('found none');
+  expect(() => read(file, 'x', 'F32', [4])).toThrow('expected F32 (4), got F32 (2, 2)');
+  expect(() => read(file, 'x', 'F64', [2, 2])).toThrow('expected F64');
+  const infinite = new Uint8Array(new Float32Array([1, Infinity, 3, 4]).buffer);
+  const broken = parseSafetensors(fileOf(tensor([4], [0, 16]), infinite));
+  expect(() => read(broken, 'x', 'F32', [4])).toThrow('not finite');
+});
+
+describe('a policy', () => {
+  const original = readPolicy('fast');
+  const changed = (change: (parts: ReturnType<typeof partsOf>) => void) => {
+    const parts = partsOf(original);
+    change(parts);
+    return fileOf(parts.header, parts.data);
+  };
+  const metadata = (key: string, text: string | undefined) =>
+    changed(({ header }) => {
+      if (text === undefined) delete header.__metadata__![key];
+      else header.__metadata__![key] = text;
+    });
+
+  test('is read, and computes what the C++ program did', () => {
+    const policy = new Policy(changed(() => {}));
+    expect(policy.selfCheckError).toBeLessThan(1e-4);
+    expect(policy.torques.length).toBe(9);
+    expect(policy.trainedRange('mass1')).toEqual([1, 1]);
+  });
+
+  test.each([
+    ['format', 'other'],
+    ['format_version', '2'],
+    ['output', 'mean'],
+    ['control_period', '0.05'],
+    ['model', '<mujoco/>'],
+    ['network', 'x'],
+    ['network', 'null'],
+    [
+      'network',
+      '{"inputs":8,"actions":9,"hidden":[1000000],"head":32,"dueling":true,"layer_norm":true}',
+    ],
+    [
+      'network',
+      '{"inputs":9,"actions":9,"hidden":[64,64],"head":32,"dueling":true,"layer_norm":true}',
+    ],
+    ['plant', '{"mass1":"heavy"}'],
+    ['plant', 'null'],
+    ['plant', undefined],
+  ])('is refused with a %s of %s', (key, text) => {
+    expect(() => new Policy(metadata(key, text))).toThrow(BadFile);
+  });
+
+  test('is refused when one weight is another', () => {
+    const file = changed(({ header, data }) => {
+      const [begin] = header['feature.0.weight']!.data_offsets as [number];
+      new DataView(data.buffer).setFloat32(begin, 50, true);
+    });
+    expect(() => new Policy(file)).toThrow('self-check');
+  });
+
+  test('is refused at every place where it may be cut off', () => {
+    for (let bytes = 0; bytes < original.byteLength; bytes += 997) {
+      expect(() => new Policy(original.slice(0, bytes))).toThrow(BadFile);
+    }
+  });
+});

@@ -1,0 +1,109 @@
+/// A reader of safetensors files (https://huggingface.co/docs/safetensors) that trusts nothing: sizes
+/// are bounded, offsets stay within the file, a header is data and never code.
+
+export const MAX_FILE_BYTES = 16 * 1024 * 1024;
+const MAX_HEADER_BYTES = 1024 * 1024;
+const MAX_TENSORS = 200;
+
+export interface Tensor {
+  dtype: string;
+  shape: number[];
+  bytes: Uint8Array;
+}
+
+export interface TensorFile {
+  metadata: Map<string, string>;
+  tensors: Map<string, Tensor>;
+}
+
+/// Says what was expected of a file and what came.
+export class BadFile extends Error {}
+
+const BYTES: Record<string, number> = { F32: 4, F64: 8 };
+
+function isObject(value: unknown): value is Record<string, unknown> {
+  return typeof value === 'object' && value !== null && !Array.isArray(value);
+}
+
+/// Whole numbers from 0 on that a file of ours can have.
+export function isSize(value: unknown): value is number {
+  return Number.isInteger(value) && (value as number) >= 0 && (value as number) <= MAX_FILE_BYTES;
+}
+
+function parseHeader(bytes: Uint8Array): Record<string, unknown> {
+  let header: unknown;
+  try {
+    header = JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(bytes));
+  } catch {
+    throw new BadFile('the header is not JSON');
+  }
+  if (!isObject(header)) throw new BadFile('the header is not a JSON object');
+  return header;
+}
+
+function parseTensor(name: string, entry: unknown, data: Uint8Array): Tensor {
+  const broken = (what: string) => new BadFile(`tensor "${name}": ${what}`);
+  if (!isObject(entry)) throw broken('expected dtype, shape and data_offsets');
+  const { dtype, shape, data_offsets: offsets } = entry;
+  const size = typeof dtype === 'string' && Object.hasOwn(BYTES, dtype) ? BYTES[dtype]! : 0;
+  if (typeof dtype !== 'string' || size === 0) throw broken('expected a dtype of F32 or F64');
+  if (!Array.isArray(shape) || shape.length > 4 || !shape.every(isSize)) {
+    throw broken('expected a shape of at most four sizes');
+  }
+  if (!Array.isArray(offsets) || offsets.length !== 2 || !offsets.every(isSize)) {
+    throw broken('expected two data_offsets');
+  }
+  const [begin, end] = offsets as [number, number];
+  const bytes = (shape as number[]).reduce((product, n) => product * n, size);
+  if (begin > end || end > data.length || end - begin !== bytes) {
+    throw broken(`expected ${bytes} bytes within the file, got ${begin} to ${end}`);
+  }
+  return { dtype, shape: shape as number[], bytes: data.subarray(begin, end) };
+}
+
+/// Throws BadFile.
+export function parseSafetensors(file: ArrayBuffer): TensorFile {
+  if (file.byteLength > MAX_FILE_BYTES) throw new BadFile('it is larger than 16 MB');
+  if (file.byteLength < 8) throw new BadFile('it is too short for a safetensors file');
+  const headerBytes = Number(new DataView(file).getBigUint64(0, true));
+  if (headerBytes > MAX_HEADER_BYTES || headerBytes > file.byteLength - 8) {
+    throw new BadFile('it is not a safetensors file, or it is cut off');
+  }
+  const header = parseHeader(new Uint8Array(file, 8, headerBytes));
+  const data = new Uint8Array(file, 8 + headerBytes);
+
+  const metadata = new Map<string, string>();
+  const { __metadata__: about = {}, ...entries } = header;
+  if (!isObject(about)) throw new BadFile('__metadata__ is not a JSON object');
+  for (const [key, value] of Object.entries(about)) {
+    if (typeof value !== 'string') throw new BadFile(`metadata "${key}" is not text`);
+    metadata.set(key, value);
+  }
+  if (Object.keys(entries).length > MAX_TENSORS) {
+    throw new BadFile(`more than ${MAX_TENSORS} tensors`);
+  }
+  const tensors = new Map(
+    Object.entries(entries).map(([name, entry]) => [name, parseTensor(name, entry, data)]),
+  );
+  return { metadata, tensors };
+}
+
+/// The numbers of a tensor of this type and shape, all finite. Throws BadFile.
+export function read(
+  file: TensorFile,
+  name: string,
+  dtype: 'F32' | 'F64',
+  shape: readonly number[],
+): Float32Array | Float64Array {
+  const tensor = file.tensors.get(name);
+  if (!tensor) throw new BadFile(`expected a tensor "${name}", found none`);
+  if (tensor.dtype !== dtype || tensor.shape.join() !== shape.join()) {
+    const got = `${tensor.dtype} (${tensor.shape.join(', ')})`;
+    throw new BadFile(`tensor "${name}": expected ${dtype} (${shape.join(', ')}), got ${got}`);
+  }
+  // Copied: where they stand in the file need not suit an array of numbers.
+  const { buffer } = tensor.bytes.slice();
+  const values = dtype === 'F32' ? new Float32Array(buffer) : new Float64Array(buffer);
+  if (!values.every(Number.isFinite)) throw new BadFile(`tensor "${name}" is not finite`);
+  return values;
+}

@@ -1,0 +1,73 @@
+/// A canvas that is as sharp as the screen, in CSS pixels, with colours from the style sheet.
+export class Canvas {
+  readonly element: HTMLCanvasElement;
+  readonly context: CanvasRenderingContext2D;
+  width = 0; // CSS pixels
+  height = 0;
+  private colors = new Map<string, string>();
+
+  constructor(id: string) {
+    this.element = document.getElementById(id) as HTMLCanvasElement;
+    this.context = this.element.getContext('2d')!;
+    new ResizeObserver(() => this.resize()).observe(this.element);
+    this.resize();
+  }
+
+  /// A colour by its name in the style sheet.
+  color(name: string): string {
+    let color = this.colors.get(name);
+    if (color === undefined) {
+      color = getComputedStyle(this.element).getPropertyValue(`--${name}`).trim();
+      this.colors.set(name, color);
+    }
+    return color;
+  }
+
+  /// The theme is another.
+  forgetColors(): void {
+    this.colors.clear();
+  }
+
+  clear(): CanvasRenderingContext2D {
+    this.context.clearRect(0, 0, this.width, this.height);
+    return this.context;
+  }
+
+  text(text: string, x: number, y: number, align: CanvasTextAlign = 'left'): void {
+    this.context.font = '11px system-ui, sans-serif';
+    this.context.fillStyle = this.color('quiet');
+    this.context.textAlign = align;
+    this.context.textBaseline = 'middle';
+    this.context.fillText(text, x, y);
+  }
+
+  line(points: readonly (readonly [number, number])[], color: string, width = 1.5): void {
+    const { context } = this;
+    context.beginPath();
+    for (const [x, y] of points) context.lineTo(x, y);
+    context.strokeStyle = this.color(color);
+    context.lineWidth = width;
+    context.stroke();
+  }
+
+  rectangle(x: number, y: number, width: number, height: number, color: string): void {
+    this.context.fillStyle = this.color(color);
+    this.context.fillRect(x, y, width, height);
+  }
+
+  disc(x: number, y: number, radius: number, color: string): void {
+    this.context.beginPath();
+    this.context.arc(x, y, radius, 0, 2 * Math.PI);
+    this.context.fillStyle = this.color(color);
+    this.context.fill();
+  }
+
+  private resize(): void {
+    const ratio = Math.min(window.devicePixelRatio || 1, 2);
+    this.width = this.element.clientWidth;
+    this.height = this.element.clientHeight;
+    this.element.width = Math.round(this.width * ratio);
+    this.element.height = Math.round(this.height * ratio);
+    this.context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  }
+}

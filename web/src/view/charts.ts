@@ -1,0 +1,200 @@
+import type { Policy } from '../policy';
+import type { Moment, Thought } from '../world';
+import { Canvas } from './canvas';
+
+export const SECONDS_SHOWN = 10;
+
+interface StripScale {
+  low: number;
+  high: number;
+  target?: number; // a line to reach
+  labels: readonly (readonly [number, string])[];
+}
+
+/// One quantity over the last ten seconds.
+export class Strip {
+  readonly canvas: Canvas;
+  private readonly color: string;
+  private readonly value: (moment: Moment) => number;
+
+  constructor(id: string, color: string, value: (moment: Moment) => number) {
+    this.canvas = new Canvas(id);
+    this.color = color;
+    this.value = value;
+  }
+
+  draw(moments: readonly Moment[], now: number, scale: StripScale): void {
+    const { canvas, value } = this;
+    canvas.clear();
+    const left = 34;
+    const y = (v: number) =>
+      6 + ((canvas.height - 12) * (scale.high - v)) / (scale.high - scale.low);
+    const x = (t: number) =>
+      canvas.width - ((now - t) / SECONDS_SHOWN) * (canvas.width - left - 2) - 2;
+    for (const [v, label] of scale.labels) {
+      canvas.text(label, left - 5, y(v), 'right');
+      canvas.line(
+        [
+          [left, y(v)],
+          [canvas.width, y(v)],
+        ],
+        'faint',
+        1,
+      );
+    }
+    if (scale.target !== undefined) {
+      canvas.context.setLineDash([5, 4]);
+      canvas.line(
+        [
+          [left, y(scale.target)],
+          [canvas.width, y(scale.target)],
+        ],
+        'good',
+        1.5,
+      );
+      canvas.context.setLineDash([]);
+    }
+    canvas.line(
+      moments.map((m) => [x(m.t), y(Math.min(Math.max(value(m), scale.low), scale.high))]),
+      this.color,
+    );
+  }
+}
+
+/// Velocity over angle of both links; upright in the middle.
+export class PhasePortrait {
+  readonly canvas = new Canvas('phase');
+
+  draw(moments: readonly Moment[]): void {
+    const { canvas } = this;
+    canvas.clear();
+    const [cx, cy] = [canvas.width / 2, canvas.height / 2];
+    const x = (angle: number) => cx + (angle / Math.PI) * (cx - 4);
+    const fastest = 15; // rad/s
+    const y = (w: number) => cy - (Math.min(Math.max(w, -fastest), fastest) / fastest) * (cy - 10);
+    canvas.line(
+      [
+        [0, cy],
+        [canvas.width, cy],
+      ],
+      'faint',
+      1,
+    );
+    canvas.line(
+      [
+        [cx, 0],
+        [cx, canvas.height - 14],
+      ],
+      'faint',
+      1,
+    );
+    canvas.text('−180°', 2, canvas.height - 6);
+    canvas.text('upright', cx, canvas.height - 6, 'center');
+    canvas.text('180°', canvas.width - 2, canvas.height - 6, 'right');
+    canvas.text(`${fastest} rad/s`, cx + 4, 8);
+    for (const [color, angleOf, rateOf] of LINKS) {
+      let piece: [number, number][] = [];
+      for (const { state } of moments) {
+        const next: [number, number] = [x(fromUpright(angleOf(state))), y(rateOf(state))];
+        const previous = piece.at(-1);
+        if (previous && Math.abs(next[0] - previous[0]) > cx) {
+          canvas.line(piece, color); // over the edge: go on at the other side
+          piece = [];
+        }
+        piece.push(next);
+      }
+      canvas.line(piece, color);
+      const last = piece.at(-1);
+      if (last) canvas.disc(last[0], last[1], 4, color);
+    }
+  }
+}
+
+type Of = (state: Moment['state']) => number;
+const LINKS: readonly [string, Of, Of][] = [
+  ['link1', (s) => s.q1, (s) => s.w1],
+  ['link2', (s) => s.q1 + s.q2, (s) => s.w1 + s.w2],
+];
+
+/// An absolute angle as that from upright, in ±π.
+function fromUpright(angle: number): number {
+  const turns = (angle + Math.PI) / (2 * Math.PI);
+  return (turns - Math.round(turns)) * 2 * Math.PI;
+}
+
+/// What the agent expects of each torque. Q-values differ by little beside what they all have in
+/// common, so the bars hang from the largest.
+export class QBars {
+  readonly canvas = new Canvas('q');
+  private room = 1; // from the bottom of the chart to the largest
+
+  draw(policy: Policy | null, thought: Thought | null): void {
+    const { canvas } = this;
+    canvas.clear();
+    if (!policy || !thought) return;
+    const { q, action } = thought;
+    const best = q[action]!;
+    // The scale grows at once and shrinks slowly.
+    const spread = Math.max(0.05, 1.1 * (best - Math.min(...q)));
+    this.room = Math.max(spread, 0.95 * this.room);
+    const width = canvas.width / q.length;
+    const bottom = canvas.height - 16;
+    q.forEach((value, i) => {
+      const height = (bottom - 4) * (1 - (best - value) / this.room);
+      const color = i === action ? 'torque' : 'bar';
+      canvas.rectangle(i * width + 2, bottom - height, width - 4, height, color);
+      canvas.text(signed(policy.torques[i]!), (i + 0.5) * width, canvas.height - 7, 'center');
+    });
+  }
+}
+
+/// With a sign that is as wide as a digit.
+export function signed(value: number): string {
+  return value < 0 ? `−${-value}` : `${value}`;
+}
+
+export interface Curve {
+  step: number[];
+  success_rate: number[];
+  mean_return: number[];
+}
+
+/// Share of evaluation episodes that succeeded, over the steps of training.
+export class LearningCurve {
+  readonly canvas = new Canvas('curve');
+
+  draw(curve: Curve | null): void {
+    const { canvas } = this;
+    canvas.clear();
+    if (!curve) {
+      canvas.text('not known of this policy', canvas.width / 2, canvas.height / 2, 'center');
+      return;
+    }
+    const left = 38;
+    const bottom = canvas.height - 16;
+    const last = curve.step.at(-1) ?? 1;
+    const x = (step: number) => left + (step / last) * (canvas.width - left - 6);
+    const y = (share: number) => 6 + (bottom - 6) * (1 - share);
+    for (const share of [0, 0.5, 1]) {
+      canvas.text(`${100 * share}%`, left - 5, y(share), 'right');
+      canvas.line(
+        [
+          [left, y(share)],
+          [canvas.width, y(share)],
+        ],
+        'faint',
+        1,
+      );
+    }
+    canvas.text('0', left, canvas.height - 6);
+    canvas.text(`${last.toLocaleString('en')} steps`, canvas.width - 2, canvas.height - 6, 'right');
+    canvas.line(
+      [
+        [x(0), y(0)],
+        ...curve.step.map((s, i): [number, number] => [x(s), y(curve.success_rate[i]!)]),
+      ],
+      'link1',
+      2,
+    );
+  }
+}

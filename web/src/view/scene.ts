@@ -1,0 +1,162 @@
+import type { State } from '../pendulum';
+import type { Vec } from '../simulator';
+import { pointOn } from '../world';
+import type { World } from '../world';
+import { Canvas } from './canvas';
+
+const TRAIL_POINTS = 78; // frames: 1.3 s
+const TRAIL_PIECES = 13; // of one shade each
+const LARGEST_ARC = (150 / 180) * Math.PI; // at the motor's limit
+
+/// The pendulum in its plane, seen so that positive angles and torques are clockwise.
+export class Scene {
+  readonly canvas = new Canvas('scene');
+  private trail: Vec[] = [];
+
+  /// Pixels per metre.
+  private scale = 1;
+
+  /// A place on the canvas as a point of the pendulum's plane (m).
+  toPlane(px: number, py: number): Vec {
+    const { width, height } = this.canvas;
+    return { x: (px - width / 2) / this.scale, z: (height / 2 - py) / this.scale };
+  }
+
+  /// Pixels of this many metres.
+  toPixels(metres: number): number {
+    return metres * this.scale;
+  }
+
+  addToTrail(tip: Vec): void {
+    this.trail.push(tip);
+    if (this.trail.length > 2 * TRAIL_POINTS) this.trail = this.trail.slice(-TRAIL_POINTS);
+  }
+
+  clearTrail(): void {
+    this.trail = [];
+  }
+
+  draw(world: World, state: State): void {
+    const { canvas } = this;
+    const { plant } = world;
+    const reach = Math.max(1, plant.length1 + plant.length2);
+    this.scale = (0.44 * Math.min(canvas.width, canvas.height)) / reach;
+    canvas.clear();
+    this.drawGuides(plant.length1 + plant.length2);
+    this.drawTrail();
+
+    const elbow = pointOn(plant, state, 1, plant.length1).position;
+    const tip = pointOn(plant, state, 2, plant.length2).position;
+    this.drawLink({ x: 0, z: 0 }, elbow, 'link1', plant.mass1);
+    this.drawLink(elbow, tip, 'link2', plant.mass2);
+    canvas.disc(...this.at({ x: 0, z: 0 }), 7, 'ink');
+    canvas.disc(...this.at(elbow), 4, 'panel');
+    this.drawTorque(world.torque / plant.torque_limit);
+    this.drawPush(world, state);
+  }
+
+  private at({ x, z }: Vec): [number, number] {
+    const { width, height } = this.canvas;
+    return [width / 2 + this.scale * x, height / 2 - this.scale * z];
+  }
+
+  /// How far the tip reaches, and the cone within which a link is upright.
+  private drawGuides(reach: number): void {
+    const { context } = this.canvas;
+    const [x, y] = this.at({ x: 0, z: 0 });
+    const radius = this.scale * reach;
+    context.beginPath();
+    context.arc(x, y, radius, 0, 2 * Math.PI);
+    context.strokeStyle = this.canvas.color('faint');
+    context.lineWidth = 1;
+    context.stroke();
+    context.beginPath();
+    context.moveTo(x, y);
+    context.arc(x, y, radius, (-120 / 180) * Math.PI, (-60 / 180) * Math.PI);
+    context.fillStyle = this.canvas.color('cone');
+    context.fill();
+  }
+
+  private drawTrail(): void {
+    const points = this.trail.slice(-TRAIL_POINTS);
+    const { context } = this.canvas;
+    const piece = Math.ceil(TRAIL_POINTS / TRAIL_PIECES);
+    for (let end = points.length, shade = 1; end > 1; end -= piece, shade -= 1 / TRAIL_PIECES) {
+      context.globalAlpha = 0.6 * Math.max(0, shade);
+      const from = Math.max(0, end - piece - 1);
+      this.canvas.line(
+        points.slice(from, end).map((p) => this.at(p)),
+        'link2',
+        2,
+      );
+    }
+    context.globalAlpha = 1;
+  }
+
+  /// A link is as thick as its capsule, or more so that a finger finds it; heavier is darker.
+  private drawLink(from: Vec, to: Vec, color: string, mass: number): void {
+    const { context } = this.canvas;
+    context.lineCap = 'round';
+    context.globalAlpha = Math.min(1, 0.55 + 0.3 * mass);
+    this.canvas.line([this.at(from), this.at(to)], color, Math.max(10, 0.06 * this.scale));
+    context.globalAlpha = 1;
+    context.lineCap = 'butt';
+  }
+
+  /// An arc about the pivot, from above, clockwise for a positive torque; its length is the share of
+  /// the motor's limit.
+  private drawTorque(share: number): void {
+    if (Math.abs(share) < 1e-9) return;
+    const { context } = this.canvas;
+    const [x, y] = this.at({ x: 0, z: 0 });
+    const radius = 0.17 * this.scale;
+    const [start, end] = [-Math.PI / 2, -Math.PI / 2 + share * LARGEST_ARC];
+    context.beginPath();
+    context.arc(x, y, radius, start, end, share < 0);
+    context.strokeStyle = this.canvas.color('torque');
+    context.lineWidth = 5;
+    context.stroke();
+    const direction = end + (share > 0 ? Math.PI / 2 : -Math.PI / 2);
+    this.arrowHead(x + radius * Math.cos(end), y + radius * Math.sin(end), direction, 'torque');
+  }
+
+  private drawPush(world: World, state: State): void {
+    const { push, drag, plant } = world;
+    const { context } = this.canvas;
+    if (drag) {
+      const held = pointOn(plant, state, drag.link, drag.along).position;
+      context.setLineDash([4, 4]);
+      this.canvas.line([this.at(held), this.at(drag.target)], 'quiet', 1.5);
+      context.setLineDash([]);
+    }
+    if (!push) return;
+    const size = Math.hypot(push.force.x, push.force.z); // N
+    if (size < 0.05) return;
+    const [x, y] = this.at(pointOn(plant, state, push.link, push.along).position);
+    const [dx, dy] = [push.force.x / size, -push.force.z / size];
+    const length = 14 + 5 * size; // pixels
+    this.canvas.line(
+      [
+        [x, y],
+        [x + length * dx, y + length * dy],
+      ],
+      'push',
+      4,
+    );
+    this.arrowHead(x + length * dx, y + length * dy, Math.atan2(dy, dx), 'push');
+  }
+
+  private arrowHead(x: number, y: number, direction: number, color: string): void {
+    const { context } = this.canvas;
+    context.save();
+    context.translate(x, y);
+    context.rotate(direction);
+    context.beginPath();
+    context.moveTo(11, 0);
+    context.lineTo(-3, 8);
+    context.lineTo(-3, -8);
+    context.fillStyle = this.canvas.color(color);
+    context.fill();
+    context.restore();
+  }
+}

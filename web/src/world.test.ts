@@ -1,0 +1,116 @@
+import loadMujoco from '@mujoco/mujoco';
+import type { MainModule } from '@mujoco/mujoco';
+import { beforeAll, beforeEach, expect, test } from 'vitest';
+import { policyPath, readPolicy, simulate } from '../tests/program';
+import { HANGING, NOMINAL } from './pendulum';
+import { Policy } from './policy';
+import { Simulator } from './simulator';
+import { pointOn, World } from './world';
+import type { Moment } from './world';
+
+let mujoco: MainModule;
+let world: World;
+beforeAll(async () => {
+  mujoco = await loadMujoco();
+});
+beforeEach(() => {
+  world = new World(new Simulator(mujoco));
+});
+
+function agentOn(id: string): void {
+  world.policy = new Policy(readPolicy(id));
+  world.agentOn = true;
+}
+
+function run(seconds: number): Moment[] {
+  const moments: Moment[] = [];
+  world.onMoment = (moment) => moments.push(moment);
+  for (let k = 0; k < seconds * 200; ++k) world.advance();
+  return moments;
+}
+
+/// State by state and torque by torque what the C++ program computes with its own MuJoCo.
+function expectTrajectory(moments: Moment[], rows: number[][], tolerance: number): void {
+  expect(moments.length).toBeGreaterThan(100);
+  moments.forEach(({ state: { q1, q2, w1, w2 }, torque }, k) => {
+    const row = rows[k]!;
+    [q1, q2, w1, w2].forEach((x, i) => expect(Math.abs(x - row[i + 1]!)).toBeLessThan(tolerance));
+    expect(torque).toBe(row[5]);
+  });
+}
+
+test.each(['d3qn', 'd3qn-randomized'])('%s acts as in `upswing simulate`', (id) => {
+  agentOn(id);
+  expectTrajectory(run(5), simulate(policyPath(id), '--seconds', '5'), 1e-6);
+});
+
+test('another plant, too', () => {
+  agentOn('d3qn');
+  world.plant = { ...NOMINAL, mass2: 1.1, damping1: 0.15, torque_limit: 4 };
+  const other = ['mass2=1.1', 'damping1=0.15', 'torque_limit=4'].flatMap((s) => ['--set', s]);
+  expectTrajectory(run(5), simulate(policyPath('d3qn'), '--seconds', '5', ...other), 1e-6);
+});
+
+test('it falls as in `upswing simulate`', () => {
+  world.reset({ q1: 3, q2: 0.2, w1: 0, w2: 0 });
+  expectTrajectory(run(5), simulate('--start', '3,0.2,0,0', '--seconds', '5'), 1e-9);
+});
+
+test('a shove throws the balanced pendulum off, and the agent brings it back', () => {
+  agentOn('d3qn');
+  run(10);
+  expect(world.uprightSince).not.toBeNull();
+  world.shoveTo(1);
+  const moments = run(0.2);
+  expect(Math.max(...moments.map((m) => Math.abs(m.state.w2)))).toBeGreaterThan(0.5);
+  run(15);
+  expect(world.uprightSince).not.toBeNull();
+});
+
+test('a hand pulls no harder than it may, and its damper calms', () => {
+  world.drag = { link: 2, along: 0.5, target: { x: 5, z: 5 } };
+  world.advance();
+  const { force } = world.push!;
+  expect(Math.hypot(force.x, force.z)).toBeCloseTo(15, 9);
+  // Held at a place within reach, it comes to rest there.
+  world.drag.target = { x: 0.6, z: -0.5 };
+  run(20);
+  const { position, velocity } = pointOn(world.plant, world.state, 2, 0.5);
+  expect(Math.hypot(position.x - 0.6, position.z + 0.5)).toBeLessThan(0.2);
+  expect(Math.hypot(velocity.x, velocity.z)).toBeLessThan(0.01);
+});
+
+test('a motor that is late holds what was chosen before', () => {
+  agentOn('d3qn');
+  world.disturbance.delay = 3;
+  expect(
+    run(1)
+      .slice(0, 3)
+      .map((m) => m.torque),
+  ).toEqual([0, 0, 0]);
+});
+
+test('without the agent the motor is off, but the agent still thinks', () => {
+  agentOn('d3qn');
+  world.agentOn = false;
+  world.reset({ ...HANGING, q1: 1 });
+  expect(run(2).every((m) => m.torque === 0)).toBe(true);
+  expect(world.thought!.q.length).toBe(9);
+});
+
+test('the sensors blur by as much as they should', () => {
+  let [sum, squares, count] = [0, 0, 0];
+  const policy = new Policy(readPolicy('fast'));
+  const act = policy.act.bind(policy);
+  policy.act = (observation) => {
+    const noise = observation[2]! * 10; // of w1, hanging at rest
+    [sum, squares, count] = [sum + noise, squares + noise * noise, count + 1];
+    return act(observation);
+  };
+  world.policy = policy;
+  world.disturbance.sensor_noise = 0.1;
+  run(60);
+  // Of 3,000 draws the mean is within five of its standard errors, and so is the variance.
+  expect(Math.abs(sum / count)).toBeLessThan((5 * 0.1) / Math.sqrt(count));
+  expect(squares / count / 0.01).toBeCloseTo(1, 0.6);
+});

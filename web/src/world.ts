@@ -1,0 +1,186 @@
+import { DelayLine, measure } from './disturbance';
+import type { Disturbance } from './disturbance';
+import { Observer } from './observer';
+import { HANGING, inverted, NOMINAL, normalizedEnergy, PHYSICS_STEPS, tipHeight } from './pendulum';
+import type { Plant, State } from './pendulum';
+import type { Policy } from './policy';
+import type { Push, Simulator, Vec } from './simulator';
+
+export const STEPS_PER_SECOND = 200; // of physics
+
+const SPRING = 60; // N/m, of the hand that drags
+const DAMPER = 5; // N·s/m
+const STRONGEST = 15; // N
+const SHOVE = 3; // N, sideways at the tip
+const SHOVE_STEPS = 20; // 0.1 s
+
+/// One moment, at each control step.
+export interface Moment {
+  t: number; // s
+  state: State;
+  torque: number; // N·m, that the motor holds from then on
+  energy: number; // 0 hanging, 1 upright
+  height: number; // of the tip over l1 + l2
+}
+
+/// What the agent thinks of the present moment.
+export interface Thought {
+  q: Float32Array; // (A)
+  value: number; // V, or NaN
+  action: number; // the greedy one
+}
+
+/// The pendulum with its motor, its agent, and the hand that disturbs it. Knows no page.
+export class World {
+  readonly simulator: Simulator;
+  readonly disturbance: Disturbance = { sensor_noise: 0, delay: 0 };
+  agentOn = false;
+  /// Where on the pendulum a hand holds it, and where the hand is.
+  drag: { link: 1 | 2; along: number; target: Vec } | null = null;
+  onMoment: (moment: Moment) => void = () => {};
+
+  torque = 0; // N·m, that the motor holds now
+  push: Push | null = null; // that acts now
+  thought: Thought | null = null;
+  /// Time (s) since when both links are upright without a break; null if they are not.
+  uprightSince: number | null = null;
+
+  private _plant: Plant = { ...NOMINAL };
+  private _policy: Policy | null = null;
+  private observer = new Observer(0);
+  private readonly motor = new DelayLine();
+  private chosen: number | null = null; // torque of the last control step; null at a start
+  private steps = 0; // of physics, in all
+  private untilControl = 0; // steps until the agent chooses again
+  private shove = { direction: 0, steps: 0 };
+
+  constructor(simulator: Simulator) {
+    this.simulator = simulator;
+    this.reset();
+  }
+
+  get plant(): Readonly<Plant> {
+    return this._plant;
+  }
+  set plant(plant: Plant) {
+    this._plant = { ...plant };
+    this.simulator.plant = plant;
+  }
+
+  get policy(): Policy | null {
+    return this._policy;
+  }
+  set policy(policy: Policy | null) {
+    this._policy = policy;
+    this.thought = null;
+    this.observer = new Observer(policy?.memory ?? 0);
+    this.chosen = null;
+  }
+
+  get state(): State {
+    return this.simulator.state;
+  }
+
+  /// s since the page began; goes on over resets.
+  get time(): number {
+    return this.steps / STEPS_PER_SECOND;
+  }
+
+  /// Another start: at rest as given, nothing under way.
+  reset(state: State = HANGING): void {
+    this.simulator.state = state;
+    this.motor.clear();
+    this.chosen = null;
+    this.untilControl = 0;
+    this.torque = 0;
+    this.push = null;
+    this.shove.steps = 0;
+    this.uprightSince = null;
+  }
+
+  shoveTo(direction: -1 | 1): void {
+    this.shove = { direction, steps: SHOVE_STEPS };
+  }
+
+  /// One physics step. The agent chooses a torque before each fourth. False if the state blew up and
+  /// the pendulum hangs again.
+  advance(): boolean {
+    if (this.untilControl === 0) {
+      this.control();
+      this.untilControl = PHYSICS_STEPS;
+    }
+    this.push = this.hand() ?? this.shoving();
+    const sound = this.simulator.step(this.torque, this.push);
+    ++this.steps;
+    --this.untilControl;
+    if (!sound) this.reset();
+    return sound;
+  }
+
+  /// To the next moment at which the agent chooses.
+  advanceToControl(): boolean {
+    let sound = this.advance();
+    while (sound && this.untilControl > 0) sound = this.advance();
+    return sound;
+  }
+
+  private control(): void {
+    const { plant, policy, observer, state } = this;
+    const measured = measure(state, this.disturbance.sensor_noise);
+    if (this.chosen === null) observer.begin(plant, measured);
+    else observer.next(plant, measured, this.chosen);
+
+    this.chosen = 0;
+    if (policy) {
+      const { torque, ...thought } = policy.act(observer.observation);
+      this.thought = thought;
+      const limit = plant.torque_limit;
+      if (this.agentOn) this.chosen = Math.min(Math.max(torque, -limit), limit);
+    }
+    this.torque = this.motor.apply(this.chosen, this.disturbance.delay);
+
+    if (!inverted(state)) this.uprightSince = null;
+    else this.uprightSince ??= this.time;
+    this.onMoment({
+      t: this.time,
+      state,
+      torque: this.torque,
+      energy: normalizedEnergy(plant, state),
+      height: tipHeight(plant, state) / (plant.length1 + plant.length2),
+    });
+  }
+
+  /// The force of a spring and a damper between the hand and what it holds.
+  private hand(): Push | null {
+    if (!this.drag) return null;
+    const { link, along, target } = this.drag;
+    const { position, velocity } = pointOn(this.plant, this.state, link, along);
+    const x = SPRING * (target.x - position.x) - DAMPER * velocity.x;
+    const z = SPRING * (target.z - position.z) - DAMPER * velocity.z;
+    const scale = Math.min(1, STRONGEST / Math.hypot(x, z));
+    return { link, along, force: { x: scale * x, z: scale * z } };
+  }
+
+  private shoving(): Push | null {
+    if (this.shove.steps === 0) return null;
+    --this.shove.steps;
+    const force = { x: SHOVE * this.shove.direction, z: 0 };
+    return { link: 2, along: this.plant.length2, force };
+  }
+}
+
+/// Position (m) and velocity (m/s) of the point of a link at `along` m from its hinge.
+export function pointOn(plant: Plant, s: State, link: 1 | 2, along: number) {
+  const swing = (angle: number, rate: number, length: number) => ({
+    position: { x: -length * Math.sin(angle), z: -length * Math.cos(angle) },
+    velocity: { x: -length * Math.cos(angle) * rate, z: length * Math.sin(angle) * rate },
+  });
+  const first = swing(s.q1, s.w1, link === 1 ? along : plant.length1);
+  if (link === 1) return first;
+  const second = swing(s.q1 + s.q2, s.w1 + s.w2, along);
+  const sum = (a: Vec, b: Vec): Vec => ({ x: a.x + b.x, z: a.z + b.z });
+  return {
+    position: sum(first.position, second.position),
+    velocity: sum(first.velocity, second.velocity),
+  };
+}

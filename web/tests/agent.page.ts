@@ -1,0 +1,48 @@
+import { expect, test } from '@playwright/test';
+import { balanced, largestDifference, open, run, startFrom } from './page';
+import { policyPath, simulate } from './program';
+
+test('Get Inverted swings up and balances, while one watches', async ({ page }) => {
+  await open(page);
+  await expect(page.locator('#badge')).toHaveText('hanging');
+  await page.getByRole('button', { name: 'Get Inverted' }).click();
+  await expect(page.locator('#badge')).toHaveText(/balanced for/, { timeout: 20_000 });
+  await expect(page.locator('#live')).toHaveText('balanced');
+  await page.getByRole('button', { name: 'Get Inverted' }).click(); // off: it falls
+  await expect(page.locator('#badge')).toHaveText('free', { timeout: 20_000 });
+});
+
+test('every agent is up within 10 s and holds for 20 s', async ({ page }) => {
+  await open(page);
+  const ids = await page.evaluate(() => upswing.agents.list.map(({ id }) => id));
+  expect(ids.length).toBeGreaterThan(3);
+  for (const id of ids) {
+    await page.evaluate((agent) => upswing.choose(agent), id);
+    await startFrom(page, 0);
+    await page.evaluate(() => (upswing.world.agentOn = true));
+    await run(page, 30);
+    expect(await balanced(page), id).toBeGreaterThan(20);
+  }
+});
+
+test('the first 5 s are those of `upswing simulate`: states and torques', async ({ page }) => {
+  await open(page, '#agent=d3qn&on=1');
+  await startFrom(page, 0);
+  const rows = await run(page, 5);
+  const expected = simulate(policyPath('d3qn'), '--seconds', '5');
+  expect(rows.length).toBe(250);
+  expect(largestDifference(rows, expected)).toBeLessThan(1e-6);
+  expect(rows.map((row) => row[5])).toEqual(expected.slice(0, 250).map((row) => row[5]));
+});
+
+test('another agent can be chosen, and has its own text, curve and mark', async ({ page }) => {
+  await open(page);
+  await page.locator('#agent').selectOption('d3qn-randomized');
+  await expect(page.locator('#agent-text')).toContainText('random pendulums');
+  await expect(page.locator('#agent-command')).toContainText('--agent d3qn-randomized');
+  const width = () =>
+    page.locator('.slider:has(#mass1) .trained').evaluate((mark) => mark.clientWidth);
+  const wide = await width();
+  await page.locator('#agent').selectOption('d3qn');
+  await expect.poll(width).toBeLessThan(wide / 2);
+});

@@ -1,0 +1,141 @@
+import { expect, test } from '@playwright/test';
+import { readFileSync } from 'node:fs';
+import { open, slide, startFrom } from './page';
+import { policyPath, readPolicy } from './program';
+
+const time = () => upswing.world.time;
+
+test('pause stands still, step goes on by 0.02 s, reset hangs', async ({ page }) => {
+  await open(page, '#on=1');
+  await page.getByRole('button', { name: 'Pause' }).click();
+  const stopped = await page.evaluate(time);
+  await page.waitForTimeout(200);
+  expect(await page.evaluate(time)).toBe(stopped);
+  await startFrom(page, 1);
+  await page.getByRole('button', { name: 'Step' }).click();
+  expect(await page.evaluate(time)).toBeCloseTo(stopped + 0.02, 9);
+  await page.getByRole('button', { name: 'Reset', exact: true }).click();
+  expect(await page.evaluate(() => upswing.world.state)).toEqual({ q1: 0, q2: 0, w1: 0, w2: 0 });
+  await page.getByRole('button', { name: 'Go on' }).click();
+  await expect.poll(() => page.evaluate(time)).toBeGreaterThan(stopped + 0.1);
+});
+
+test('speed', async ({ page }) => {
+  await open(page);
+  const rate = async () => {
+    const [t, start] = await page.evaluate(() => [upswing.world.time, performance.now()]);
+    await page.waitForTimeout(1000);
+    const [later, end] = await page.evaluate(() => [upswing.world.time, performance.now()]);
+    return (1000 * (later! - t!)) / (end! - start!);
+  };
+  await slide(page, 'speed', 0.1);
+  const slow = await rate();
+  await slide(page, 'speed', 2);
+  const fast = await rate();
+  // A busy machine may drop frames, and then the page does not jump.
+  expect(slow).toBeLessThan(0.15);
+  expect(fast).toBeGreaterThan(5 * slow);
+  expect(fast).toBeLessThan(2.2);
+});
+
+test('by keyboard alone', async ({ page }) => {
+  await open(page);
+  await page.keyboard.press('g');
+  await expect(page.locator('#agent-on')).toHaveAttribute('aria-pressed', 'true');
+  await page.keyboard.press('Space');
+  await expect(page.locator('#pause')).toHaveAttribute('aria-pressed', 'true');
+  await page.keyboard.press('.'); // to the next moment at which the agent chooses
+  const stopped = await page.evaluate(time);
+  await page.keyboard.press('.');
+  expect(await page.evaluate(time)).toBeCloseTo(stopped + 0.02, 9);
+  // Everything can be reached with the tabulator, and sliders take the arrows for themselves.
+  const reached = new Set<string>();
+  for (let k = 0; k < 60; ++k) {
+    await page.keyboard.press('Tab');
+    reached.add(await page.evaluate(() => document.activeElement!.id));
+  }
+  for (const id of ['agent-on', 'pause', 'step', 'reset', 'shove-left', 'speed', 'agent', 'file']) {
+    expect(reached, id).toContain(id);
+  }
+  await page.locator('#mass1').focus();
+  await page.keyboard.press('ArrowRight');
+  expect(await page.evaluate(() => upswing.world.plant.mass1)).toBeCloseTo(1.05, 9);
+  await page.locator('#agent-on').focus();
+  await page.keyboard.press('Enter');
+  await expect(page.locator('#agent-on')).toHaveAttribute('aria-pressed', 'false');
+});
+
+test("a policy of one's own", async ({ page }) => {
+  await open(page);
+  await page.locator('#file').setInputFiles(policyPath('fast'));
+  await expect(page.locator('#agent')).toHaveValue('own');
+  await expect(page.locator('#agent-text')).toContainText('8-64-64');
+  await expect(page.locator('#message')).toBeHidden();
+});
+
+test('a policy that is dropped on the page', async ({ page }) => {
+  await open(page);
+  const bytes = [...readFileSync(policyPath('fast'))];
+  await page.evaluate((content) => {
+    const data = new DataTransfer();
+    data.items.add(new File([new Uint8Array(content)], 'mine.safetensors'));
+    dispatchEvent(new DragEvent('drop', { dataTransfer: data, cancelable: true }));
+  }, bytes);
+  await expect(page.locator('#agent option:checked')).toHaveText('mine.safetensors (yours)');
+});
+
+test('a broken policy is refused with a reason, and the agent stays', async ({ page }) => {
+  await open(page, '#agent=d3qn');
+  const whole = Buffer.from(readPolicy('fast'));
+  const files = [
+    ['cut.safetensors', whole.subarray(0, whole.length - 100), 'within the file'],
+    ['text.safetensors', Buffer.from('<script>alert(1)</script>'), 'not a safetensors file'],
+    ['empty.safetensors', Buffer.alloc(0), 'too short'],
+    ['huge.safetensors', Buffer.alloc(17 * 1024 * 1024), 'larger than 16 MB'],
+  ] as const;
+  for (const [name, buffer, reason] of files) {
+    await page.locator('#file').setInputFiles({ name, mimeType: '', buffer });
+    await expect(page.locator('#message')).toContainText(`${name} cannot be used`);
+    await expect(page.locator('#message')).toContainText(reason);
+    await expect(page.locator('#agent')).toHaveValue('d3qn');
+  }
+});
+
+test('the trajectory can be saved', async ({ page }) => {
+  await open(page, '#on=1');
+  await page.waitForTimeout(500);
+  await page.getByRole('button', { name: 'Pause' }).click();
+  const download = page.waitForEvent('download');
+  await page.getByRole('button', { name: 'Save trajectory' }).click();
+  const csv = readFileSync(await (await download).path(), 'utf8').split('\n');
+  expect(csv[0]).toBe('t,qpos0,qpos1,qvel0,qvel1,torque');
+  expect(csv.length).toBeGreaterThan(5);
+});
+
+test('dark and light', async ({ page }) => {
+  await open(page);
+  const background = () => page.evaluate(() => getComputedStyle(document.body).backgroundColor);
+  const light = await background();
+  await page.locator('#theme').click();
+  expect(await background()).not.toBe(light);
+  await page.locator('#theme').click();
+  expect(await background()).toBe(light);
+  await page.emulateMedia({ colorScheme: 'dark' });
+});
+
+test('on a phone everything fits its width, and the agent can be switched on', async ({
+  browser,
+}) => {
+  const context = await browser.newContext({
+    viewport: { width: 360, height: 740 },
+    hasTouch: true,
+    isMobile: true,
+  });
+  const page = await context.newPage();
+  await open(page);
+  const widths = await page.evaluate(() => [document.body.scrollWidth, innerWidth]);
+  expect(widths[0]).toBeLessThanOrEqual(widths[1]!);
+  await page.locator('#agent-on').tap();
+  await expect(page.locator('#badge')).toHaveText('swinging up');
+  await context.close();
+});

@@ -1,0 +1,92 @@
+import { expect, test } from '@playwright/test';
+import { balanced, onScreen, open, run, startFrom } from './page';
+
+const state = () => upswing.world.state;
+
+test('a drag pulls the balanced pendulum down, and the agent brings it back', async ({ page }) => {
+  await open(page, '#agent=d3qn&on=1');
+  await expect(page.locator('#badge')).toHaveText(/balanced for/, { timeout: 20_000 });
+  const tip = await onScreen(page, 0, 0.98);
+  const away = await onScreen(page, 0.9, 0.1);
+  await page.mouse.move(tip.x, tip.y);
+  await page.mouse.down();
+  await page.mouse.move(away.x, away.y, { steps: 5 });
+  await expect.poll(() => page.evaluate(() => upswing.world.push !== null)).toBe(true);
+  await expect(page.locator('#badge')).toHaveText('swinging up', { timeout: 20_000 });
+  await page.mouse.up();
+  expect(await page.evaluate(() => upswing.world.drag)).toBeNull();
+  await expect(page.locator('#badge')).toHaveText(/balanced for [1-9]/, { timeout: 30_000 });
+});
+
+test('a shove moves it, to the side of its arrow', async ({ page }) => {
+  await open(page);
+  for (const [name, key, side] of [
+    ['Shove to the right', 'ArrowRight', -1],
+    ['Shove to the left', 'ArrowLeft', 1],
+  ] as const) {
+    await startFrom(page, 0);
+    await page.getByRole('button', { name }).click();
+    await run(page, 0.3);
+    const shoved = await page.evaluate(state);
+    expect(Math.sign(shoved.q1 + shoved.q2)).toBe(side); // a positive angle is to the left
+    await startFrom(page, 0);
+    await page.keyboard.press(key);
+    await run(page, 0.3);
+    const pressed = await page.evaluate(state);
+    expect(pressed.q1).toBeCloseTo(shoved.q1, 9);
+  }
+});
+
+test('the agent recovers from a shove', async ({ page }) => {
+  await open(page, '#agent=d3qn&on=1');
+  await startFrom(page, Math.PI);
+  await run(page, 3);
+  await page.getByRole('button', { name: 'Shove to the left' }).click();
+  await run(page, 20);
+  expect(await balanced(page)).toBeGreaterThan(1);
+});
+
+test('while paused, dragging sets the start', async ({ page }) => {
+  await open(page);
+  await page.getByRole('button', { name: 'Pause' }).click();
+  const drag = async (from: [number, number], to: [number, number]) => {
+    const [a, b] = [await onScreen(page, ...from), await onScreen(page, ...to)];
+    await page.mouse.move(a.x, a.y);
+    await page.mouse.down();
+    await page.mouse.move(b.x, b.y);
+    await page.mouse.up();
+  };
+  await drag([0, -0.3], [0.4, 0]); // the upper link to the right
+  let posed = await page.evaluate(state);
+  expect(posed.q1).toBeCloseTo(-Math.PI / 2, 1);
+  expect(posed.q2).toBeCloseTo(0, 5);
+  await drag([0.8, 0], [0.5, 0.4]); // the lower link up
+  posed = await page.evaluate(state);
+  expect(posed.q1 + posed.q2).toBeCloseTo(-Math.PI, 1);
+  expect([posed.w1, posed.w2]).toEqual([0, 0]);
+});
+
+test('a finger that takes hold of the pendulum does not scroll', async ({ browser }) => {
+  const context = await browser.newContext({
+    hasTouch: true,
+    viewport: { width: 390, height: 700 },
+  });
+  const page = await context.newPage();
+  await open(page);
+  const prevented = await page.evaluate(() => {
+    const canvas = document.getElementById('scene')!;
+    const { left, top, width, height } = canvas.getBoundingClientRect();
+    return [0, 0.45 * width].map((aside) => {
+      const touch = new Touch({
+        identifier: 1,
+        target: canvas,
+        clientX: left + width / 2 + aside,
+        clientY: top + height / 2 + 60,
+      });
+      const event = new TouchEvent('touchstart', { touches: [touch], cancelable: true });
+      return !canvas.dispatchEvent(event);
+    });
+  });
+  expect(prevented).toEqual([true, false]);
+  await context.close();
+});

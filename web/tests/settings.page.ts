@@ -1,0 +1,103 @@
+import { expect, test } from '@playwright/test';
+import { largestDifference, open, run, slide, startFrom } from './page';
+import { simulate } from './program';
+
+const OTHER = [
+  ['mass1', 1.6],
+  ['mass2', 0.45],
+  ['length1', 0.38],
+  ['length2', 0.71],
+  ['damping1', 0.05],
+  ['damping2', 0.6],
+  ['gravity', 3.71],
+] as const;
+
+const START = [2.5, 0.4, 0.3, -0.5] as const;
+const free = (...set: string[]) =>
+  simulate('--start', START.join(), '--seconds', '3', ...set.flatMap((s) => ['--set', s]));
+
+test('each slider changes the physics as in `upswing simulate`', async ({ page }) => {
+  await open(page);
+  const nominal = free();
+  for (const [name, value] of OTHER) {
+    await slide(page, name, value);
+    await startFrom(page, ...START);
+    const rows = await run(page, 3);
+    expect(largestDifference(rows, free(`${name}=${value}`)), name).toBeLessThan(1e-9);
+    expect(largestDifference(rows, nominal), name).toBeGreaterThan(0.05);
+    await page.getByRole('button', { name: 'Reset all' }).click();
+  }
+  await startFrom(page, ...START);
+  expect(largestDifference(await run(page, 3), nominal)).toBeLessThan(1e-9);
+});
+
+test('all of them together, live', async ({ page }) => {
+  await open(page);
+  await startFrom(page, ...START);
+  await run(page, 1);
+  for (const [name, value] of OTHER) await slide(page, name, value);
+  await startFrom(page, ...START);
+  const rows = await run(page, 3);
+  const other = free(...OTHER.map(([name, value]) => `${name}=${value}`));
+  expect(largestDifference(rows, other)).toBeLessThan(1e-9);
+});
+
+test('limit of the motor, sensor noise and delay act on the agent', async ({ page }) => {
+  await open(page, '#agent=d3qn&on=1');
+  const torques = async () => {
+    await startFrom(page, 0.3);
+    return (await run(page, 2)).map((row) => row[5]!);
+  };
+  const before = await torques();
+  expect(Math.max(...before.map(Math.abs))).toBe(5);
+  await slide(page, 'torque_limit', 2);
+  expect(Math.max(...(await torques()).map(Math.abs))).toBe(2);
+  await page.getByRole('button', { name: 'Reset Limit of the motor' }).click();
+  await slide(page, 'delay', 2);
+  const late = await torques();
+  expect(late.slice(0, 2)).toEqual([0, 0]);
+  expect(late[2]).toBe(before[0]);
+  await page.getByRole('button', { name: 'Reset Delay of the motor' }).click();
+  expect(await torques()).toEqual(before);
+  await slide(page, 'sensor_noise', 0.1);
+  expect(await torques()).not.toEqual(before);
+});
+
+test('one slider goes back alone', async ({ page }) => {
+  await open(page);
+  const back = page.getByRole('button', { name: 'Reset Gravity' });
+  await expect(back).toBeDisabled();
+  await slide(page, 'gravity', 3.71);
+  await slide(page, 'mass1', 2);
+  await back.click();
+  expect(await page.evaluate(() => upswing.world.plant)).toMatchObject({ gravity: 9.81, mass1: 2 });
+});
+
+test('the address holds what was set, and brings it back', async ({ page, context }) => {
+  await open(page);
+  await page.locator('#agent').selectOption('fast');
+  await slide(page, 'mass2', 1.25);
+  await slide(page, 'sensor_noise', 0.02);
+  await slide(page, 'speed', 0.5);
+  await page.getByRole('button', { name: 'Get Inverted' }).click();
+  const other = await context.newPage();
+  await open(other, new URL(page.url()).hash);
+  await expect(other.locator('#agent')).toHaveValue('fast');
+  await expect(other.locator('#mass2')).toHaveValue('1.25');
+  await expect(other.locator('#agent-on')).toHaveAttribute('aria-pressed', 'true');
+  const set = await other.evaluate(() => ({
+    mass2: upswing.world.plant.mass2,
+    noise: upswing.world.disturbance.sensor_noise,
+    speed: upswing.clock.speed,
+  }));
+  expect(set).toEqual({ mass2: 1.25, noise: 0.02, speed: 0.5 });
+});
+
+test('an address that is not understood is told, and the rest of it holds', async ({ page }) => {
+  await open(page, '#agent=none&mass1=-3&mass2=1.5&colour=red');
+  const message = page.locator('#message');
+  await expect(message).toContainText('unknown agent "none"');
+  await expect(message).toContainText('mass1: expected 0.2 to 3, got "-3"');
+  await expect(message).toContainText('unknown "colour"');
+  expect(await page.evaluate(() => upswing.world.plant)).toMatchObject({ mass1: 1, mass2: 1.5 });
+});
