@@ -149,6 +149,26 @@ Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
   return config;
 }
 
+Config ReadRunConfig(const fs::path& run, const std::vector<FlagValue>& flags) {
+  const fs::path file = run / "config.toml";
+  const toml::table table = ParseToml(ReadTextFile(file), file.string());
+  Config scratch;
+  const Options options = OptionsOf(scratch);
+  std::vector<std::string> missing;
+  for (const Option& option : options.all()) {
+    if (table[option.section][option.name]) continue;
+    missing.push_back(Concat(option.section, ".", option.name));
+  }
+  if (missing.empty()) return BuildConfig(file, flags);
+  constexpr size_t kMostNames = 6;  // that make a line which can still be read
+  const size_t more = missing.size() - std::min(missing.size(), kMostNames);
+  missing.resize(missing.size() - more);
+  throw BadInput(Concat(file.string(), ": expected every setting, as this version writes a run; ",
+                        "got none of ", Join(missing, ", "),
+                        more > 0 ? Concat(" and ", more, " more") : "",
+                        ": another version wrote it"));
+}
+
 std::vector<Option> TrainingSettings(Config& config) {
   std::vector<Option> settings;
   const Options options = OptionsOf(config);
@@ -179,26 +199,6 @@ std::string TrainCommand(Config config) {
     if (now[i].text() != before[i].text()) command += ' ' + now[i].on_command_line();
   }
   return command;
-}
-
-Config ReadRunConfig(const fs::path& run, const std::vector<FlagValue>& flags) {
-  const fs::path file = run / "config.toml";
-  const toml::table table = ParseToml(ReadTextFile(file), file.string());
-  Config scratch;
-  const Options options = OptionsOf(scratch);
-  std::vector<std::string> missing;
-  for (const Option& option : options.all()) {
-    if (table[option.section][option.name]) continue;
-    missing.push_back(Concat(option.section, ".", option.name));
-  }
-  if (missing.empty()) return BuildConfig(file, flags);
-  constexpr size_t kMostNames = 6;  // that make a line which can still be read
-  const size_t more = missing.size() - std::min(missing.size(), kMostNames);
-  missing.resize(missing.size() - more);
-  throw BadInput(Concat(file.string(), ": expected every setting, as this version writes a run; ",
-                        "got none of ", Join(missing, ", "),
-                        more > 0 ? Concat(" and ", more, " more") : "",
-                        ": another version wrote it"));
 }
 
 std::string ConfigToml(Config config, bool identity_only) {

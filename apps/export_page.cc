@@ -152,9 +152,7 @@ std::vector<std::string> ExportToPage(const std::vector<fs::path>& paths, const 
   }
   const fs::path index_file = folder / "agents.json";
   (void)ReadIndex(index_file);  // before anything is written
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) throw Failure(Concat(folder.string(), ": cannot make it: ", error.message()));
+  MakeFolder(folder);
 
   const FolderLock lock(folder);  // two at a time would lose entries of each other
   ordered_json index = ReadIndex(index_file);

@@ -110,15 +110,6 @@ TEST(Choice, IsOneOfThoseGivenAndTheFirstUnlessSet) {
   EXPECT_EQ(color, "green");
 }
 
-TEST_F(OptionsTest, OnACommandLine) {
-  std::vector<std::string> words;
-  for (const Option& option : options_.all()) words.push_back(option.on_command_line());
-  EXPECT_EQ(Join(words, " "),
-            "--fast --count 3 --the-rate 0.5 --name x --widths 4,5 --mass1 1 --mass2 2");
-  options_.Set("fast", "false", "");
-  EXPECT_EQ(options_.Find("fast", "").front()->on_command_line(), "--no-fast");
-}
-
 TEST(Step, LetsThroughMultiplesAndNamesTheNearestOnes) {
   double pause = 0;
   Options options;
@@ -146,6 +137,15 @@ TEST(Step, LetsThroughMultiplesAndNamesTheNearestOnes) {
             "and 0.7");
   EXPECT_EQ(error_of("1.001"), "--pause: expected a multiple of 0.02 in [0, 1], got \"1.001\"");
   EXPECT_EQ(pause, 1);
+}
+
+TEST_F(OptionsTest, OnACommandLine) {
+  std::vector<std::string> words;
+  for (const Option& option : options_.all()) words.push_back(option.on_command_line());
+  EXPECT_EQ(Join(words, " "),
+            "--fast --count 3 --the-rate 0.5 --name x --widths 4,5 --mass1 1 --mass2 2");
+  options_.Set("fast", "false", "");
+  EXPECT_EQ(options_.Find("fast", "").front()->on_command_line(), "--no-fast");
 }
 
 TEST_F(OptionsTest, FlagsAndTomlFollowFromTheSameLine) {
