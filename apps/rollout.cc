@@ -57,9 +57,11 @@ std::vector<RolloutRow> RunRollout(const RolloutConfig& config) {
     if (config.policy != nullptr) config.policy->Act(env.obs(), std::span(&torque, 1));
     const auto step = static_cast<size_t>(k);
     if (step < config.schedule.size()) torque = config.schedule[step];
-    torque = std::clamp(torque, -config.plant.torque_limit, config.plant.torque_limit);
+    // The motor gives what it can; what an observation remembers is what was chosen.
+    const double limit = config.plant.torque_limit;
+    const double applied = std::clamp(torque, -limit, limit);
     const double t = static_cast<double>(k) / kStepsPerSecond;
-    rows.push_back(RowOf(t, env.state(0), torque, config.plant));
+    rows.push_back(RowOf(t, env.state(0), applied, config.plant));
     if (config.q_values) rows.back().q = QValuesOf(*config.policy, env.obs());
     if (k == steps) break;
     env.Step(std::span(&torque, 1), result);

@@ -3,6 +3,7 @@ import type { Moment } from './world';
 /// The last moments, oldest first.
 export class History {
   private moments: Moment[] = [];
+  private first = 0; // index of the oldest that counts
   private readonly seconds: number;
 
   constructor(seconds: number) {
@@ -11,15 +12,18 @@ export class History {
 
   add(moment: Moment): void {
     this.moments.push(moment);
+    while (this.moments[this.first]!.t < moment.t - this.seconds) ++this.first;
     // Cut now and then, not at each step.
-    const kept = this.from(moment.t - this.seconds);
-    if (this.moments.length > 2 * kept.length) this.moments = kept;
+    if (this.first < 1000) return;
+    this.moments = this.moments.slice(this.first);
+    this.first = 0;
   }
 
   /// Those from time t (s) on.
   from(t: number): Moment[] {
-    const first = this.moments.findIndex((moment) => moment.t >= t);
-    return first < 0 ? [] : this.moments.slice(first);
+    let first = this.moments.length;
+    while (first > this.first && this.moments[first - 1]!.t >= t) --first;
+    return this.moments.slice(first);
   }
 
   get last(): Moment | undefined {
@@ -28,12 +32,14 @@ export class History {
 
   clear(): void {
     this.moments = [];
+    this.first = 0;
   }
 
-  /// As `upswing simulate` writes it, to the last digit.
+  /// As `upswing simulate` writes it, to the last digit; time from the first.
   csv(): string {
-    const start = this.moments[0]?.t ?? 0;
-    const rows = this.moments.map(({ t, state: { q1, q2, w1, w2 }, torque }) =>
+    const kept = this.moments.slice(this.first);
+    const start = kept[0]?.t ?? 0;
+    const rows = kept.map(({ t, state: { q1, q2, w1, w2 }, torque }) =>
       [(t - start).toFixed(2), q1, q2, w1, w2, torque].join(),
     );
     return ['t,qpos0,qpos1,qvel0,qvel1,torque', ...rows].join('\n') + '\n';

@@ -1,13 +1,9 @@
 import { Agents } from './page/agents';
 import { startSimulator } from './page/boot';
 import { element } from './page/dom';
+import { warn } from './page/message';
 import { Page } from './page/page';
 import { World } from './world';
-
-declare global {
-  /// For the console of the browser, and for tests.
-  var upswing: Page;
-}
 
 try {
   const progress = element<HTMLProgressElement>('progress');
@@ -24,8 +20,7 @@ try {
   page.run();
 } catch (error) {
   const reason = error instanceof Error ? error.message : String(error);
-  element('message').textContent = `The page could not start: ${reason}.`;
-  element('message').hidden = false;
+  warn(`The page could not start: ${reason}.`);
   element('badge').hidden = true;
   console.error(error);
 } finally {

@@ -1,4 +1,4 @@
-import { BadFile, read } from './safetensors';
+import { BadInput, read } from './safetensors';
 import type { TensorFile } from './safetensors';
 
 /// A Q-network: feature layers, then one output layer, or a value and an advantage stream
@@ -49,13 +49,13 @@ function relu(y: Float32Array): Float32Array {
   return y;
 }
 
-/// What the metadata say of the network. Throws BadFile.
+/// What the metadata say of the network. Throws BadInput.
 export function parseShape(text: string): NetworkShape {
   let shape: NetworkShape;
   try {
     shape = JSON.parse(text) as NetworkShape;
   } catch {
-    throw new BadFile('metadata "network" is not JSON');
+    throw new BadInput('metadata "network" is not JSON');
   }
   const isUnits = (n: unknown) =>
     Number.isInteger(n) && (n as number) > 0 && (n as number) <= MAX_UNITS;
@@ -69,7 +69,7 @@ export function parseShape(text: string): NetworkShape {
     (!shape.dueling || isUnits(shape.head)) &&
     typeof shape.dueling === 'boolean' &&
     typeof shape.layer_norm === 'boolean';
-  if (!valid) throw new BadFile('metadata "network" has sizes that no policy of Upswing has');
+  if (!valid) throw new BadInput('metadata "network" has sizes that no policy of Upswing has');
   return shape;
 }
 
@@ -80,7 +80,7 @@ export class Network {
   private readonly output: Layer; // advantages, if dueling
   readonly shape: NetworkShape;
 
-  /// Throws BadFile unless the file holds every array with the shape that it must have.
+  /// Throws BadInput unless the file holds every array with the shape that it must have.
   constructor(shape: NetworkShape, file: TensorFile) {
     this.shape = shape;
     const f32 = (name: string, ...size: number[]) => read(file, name, 'F32', size) as Float32Array;

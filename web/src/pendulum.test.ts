@@ -1,7 +1,7 @@
 import { beforeAll, describe, expect, test } from 'vitest';
-import { upswing } from '../tests/program';
+import { runProgram } from '../tests/program';
 import { DelayLine } from './disturbance';
-import { Observer } from './observer';
+import { withMemory } from './observation';
 import * as pendulum from './pendulum';
 import type { Plant, State } from './pendulum';
 
@@ -36,7 +36,7 @@ interface Vectors {
 
 let vectors: Vectors;
 beforeAll(() => {
-  vectors = JSON.parse(upswing('export', '--test-vectors', '-')) as Vectors;
+  vectors = JSON.parse(runProgram('export', '--test-vectors', '-')) as Vectors;
 });
 
 const stateOf = ([q1, q2, w1, w2]: Numbers): State => ({ q1: q1!, q2: q2!, w1: w1!, w2: w2! });
@@ -73,9 +73,7 @@ test('energy, height, upright, reward', () => {
 
 test('observation', () => {
   for (const c of vectors.cases) {
-    const observation = new Float32Array(pendulum.OBSERVATION_SIZE);
-    pendulum.observe(c.plant, stateOf(c.state), observation);
-    expectClose(observation, c.observation, 2 ** -24); // float32
+    expectClose(pendulum.observe(c.plant, stateOf(c.state)), c.observation, 2 ** -24); // float32
   }
 });
 
@@ -94,13 +92,11 @@ describe('what an observation remembers', () => {
   test.each([0, 1])('memory %i of the list', (which) => {
     const { torques, observations, with_memory } = vectors.observation_memory;
     const { memory, observations: expected } = with_memory[which]!;
-    const observer = new Observer(memory);
+    let before: Float32Array | null = null;
     expected.forEach((row, k) => {
       // The observation of now is the program's; what is remembered is worked out here.
-      const now = Float32Array.from(observations[k]!);
-      if (k === 0) observer.beginWith(now);
-      else observer.nextWith(now, torques[k - 1]!);
-      expectClose(observer.observation, row, 0);
+      before = withMemory(Float32Array.from(observations[k]!), memory, before, torques[k - 1] ?? 0);
+      expectClose(before, row, 0);
     });
   });
 });

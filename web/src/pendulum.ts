@@ -99,17 +99,19 @@ export const OBSERVATION_SIZE = 8;
 /// Heuristic largest velocities (rad/s), by which the observation divides.
 export const MAX_VELOCITY: readonly [number, number] = [10, 20];
 
-/// Writes [cos q1, sin q1, w1/10, cos q2, sin q2, w2/20, Ê, ĥ] in front of `out`, with Ê =
-/// normalizedEnergy and ĥ = tipHeight over l1 + l2, in [-1, 1].
-export function observe(plant: Plant, s: State, out: Float32Array): void {
-  out[0] = Math.cos(s.q1);
-  out[1] = Math.sin(s.q1);
-  out[2] = s.w1 / MAX_VELOCITY[0];
-  out[3] = Math.cos(s.q2);
-  out[4] = Math.sin(s.q2);
-  out[5] = s.w2 / MAX_VELOCITY[1];
-  out[6] = normalizedEnergy(plant, s);
-  out[7] = tipHeight(plant, s) / (plant.length1 + plant.length2);
+/// [cos q1, sin q1, w1/10, cos q2, sin q2, w2/20, Ê, ĥ] with Ê = normalizedEnergy and ĥ = tipHeight over
+/// l1 + l2, in [-1, 1].
+export function observe(plant: Plant, s: State): Float32Array {
+  return Float32Array.of(
+    Math.cos(s.q1),
+    Math.sin(s.q1),
+    s.w1 / MAX_VELOCITY[0],
+    Math.cos(s.q2),
+    Math.sin(s.q2),
+    s.w2 / MAX_VELOCITY[1],
+    normalizedEnergy(plant, s),
+    tipHeight(plant, s) / (plant.length1 + plant.length2),
+  );
 }
 
 /// The reward's five terms for being in state s under torque tau, signed, so that their sum is the

@@ -1,16 +1,24 @@
 import { Network, parseShape } from './network';
 import type { QValues } from './network';
-import { MEMORY_SIZE } from './observer';
-import { CONTROL_PERIOD, NOMINAL, OBSERVATION_SIZE } from './pendulum';
+import { MEMORY_SIZE } from './observation';
+import { CONTROL_PERIOD, MAX_VELOCITY, NOMINAL, OBSERVATION_SIZE } from './pendulum';
 import type { Parameter, Plant } from './pendulum';
-import { BadFile, parseSafetensors, read } from './safetensors';
+import { BadInput, parseSafetensors, read } from './safetensors';
 import type { TensorFile } from './safetensors';
+
+const MAX_SAMPLES = 64; // that are checked while the visitor waits
 
 /// Index of the largest number, the first of equals.
 export function argMax(values: ArrayLike<number>): number {
   let best = 0;
   for (let i = 1; i < values.length; ++i) if (values[i]! > values[best]!) best = i;
   return best;
+}
+
+/// What a policy makes of an observation.
+export interface Decision extends QValues {
+  action: number; // the greedy one
+  torque: number; // that it applies, N·m
 }
 
 /// A greedy controller: observation → torque, nothing else needed (docs/policy-format.md).
@@ -22,10 +30,12 @@ export class Policy {
   readonly memory: number;
   /// The plant at training.
   readonly plant: Plant;
+  /// What rewards were multiplied by while it learned, and so its Q-values.
+  readonly rewardScale: number;
   /// Largest |difference| between the Q-values in the file and those computed here.
   readonly selfCheckError: number;
 
-  /// Reads and checks the file: format, shapes, finite numbers, samples. Throws BadFile.
+  /// Reads and checks the file: format, shapes, finite numbers, samples. Throws BadInput.
   constructor(bytes: ArrayBuffer) {
     const file = parseSafetensors(bytes);
     this.metadata = file.metadata;
@@ -34,15 +44,20 @@ export class Policy {
     this.expect('output', 'levels');
     this.expect('control_period', String(CONTROL_PERIOD));
     if (file.metadata.has('model')) {
-      throw new BadFile('it was trained on a model of its own, which this page does not have');
+      throw new BadInput('it was trained on a model of its own, which this page does not have');
     }
 
     const shape = parseShape(this.about('network'));
     this.memory = (shape.inputs - OBSERVATION_SIZE) / MEMORY_SIZE;
     if (!Number.isInteger(this.memory) || this.memory < 0) {
-      throw new BadFile(`expected 8 inputs and 3 for each step remembered, got ${shape.inputs}`);
+      throw new BadInput(`expected 8 inputs and 3 for each step remembered, got ${shape.inputs}`);
     }
+    this.checkObservation();
     this.plant = parsePlant(this.about('plant'));
+    this.rewardScale = Number(this.metadata.get('reward_scale') ?? 1);
+    if (!(this.rewardScale > 0 && this.rewardScale < Infinity)) {
+      throw new BadInput('metadata "reward_scale": expected a positive number');
+    }
     this.network = new Network(shape, file);
     this.torques = read(file, 'torques', 'F64', [shape.actions]) as Float64Array;
     this.selfCheckError = this.checkSamples(file);
@@ -50,11 +65,11 @@ export class Policy {
 
   about(key: string): string {
     const text = this.metadata.get(key);
-    if (text === undefined) throw new BadFile(`expected metadata "${key}", found none`);
+    if (text === undefined) throw new BadInput(`expected metadata "${key}", found none`);
     return text;
   }
 
-  act(observation: Float32Array): QValues & { action: number; torque: number } {
+  act(observation: Float32Array): Decision {
     const values = this.network.forward(observation);
     const action = argMax(values.q);
     return { ...values, action, torque: this.torques[action]! };
@@ -62,22 +77,53 @@ export class Policy {
 
   /// What the policy was trained on: [low, high] of a parameter.
   trainedRange(name: Parameter): [number, number] {
-    const setting = new RegExp(`^randomize_${name} = ([0-9.eE+-]+)$`, 'm');
-    const share = Number(setting.exec(this.metadata.get('config') ?? '')?.[1] ?? 0);
+    const share = this.setting(`randomize_${name}`);
     const nominal = this.plant[name];
     return [nominal * (1 - share), nominal * (1 + share)];
   }
 
+  /// The same of what was wrong with sensors and motor: rad and rad/s, s.
+  trainedDisturbance(name: 'sensor_noise' | 'delay'): [number, number] {
+    const least = this.setting(name);
+    return [least, least + this.setting(`randomize_${name}`)];
+  }
+
+  /// A number of the training's configuration; 0 if that does not say.
+  private setting(name: string): number {
+    const line = new RegExp(`^${name} = ([0-9.eE+-]+)$`, 'm');
+    const value = Number(line.exec(this.metadata.get('config') ?? '')?.[1] ?? 0);
+    return Number.isFinite(value) ? value : 0;
+  }
+
   private expect(key: string, expected: string): void {
     const got = this.about(key);
-    if (got !== expected) throw new BadFile(`${key}: expected "${expected}", got "${got}"`);
+    if (got !== expected) throw new BadInput(`${key}: expected "${expected}", got "${got}"`);
+  }
+
+  /// That observations are scaled as here.
+  private checkObservation(): void {
+    const text = this.about('observation');
+    let given: { max_velocity?: unknown; memory?: { steps?: unknown } } | null;
+    try {
+      given = JSON.parse(text) as typeof given;
+    } catch {
+      throw new BadInput('metadata "observation" is not JSON');
+    }
+    const scaled = JSON.stringify(given?.max_velocity) === JSON.stringify(MAX_VELOCITY);
+    if (!scaled || (given?.memory?.steps ?? 0) !== this.memory) {
+      throw new BadInput(
+        'metadata "observation": expected the scales and memory of docs/policy-format.md',
+      );
+    }
   }
 
   /// Recomputes the stored outputs from the stored inputs; returns the largest difference. The torque
-  /// is that of the largest Q-value, or of one that rounding cannot tell from it. Throws BadFile.
+  /// is that of the largest Q-value, or of one that rounding cannot tell from it. Throws BadInput.
   private checkSamples(file: TensorFile): number {
     const samples = file.tensors.get('sample.torque')?.shape[0] ?? 0;
-    if (samples === 0 || samples > 1000) throw new BadFile('expected samples to check');
+    if (samples === 0 || samples > MAX_SAMPLES) {
+      throw new BadInput(`expected 1 to ${MAX_SAMPLES} samples to check, got ${samples}`);
+    }
     const { inputs, actions } = this.network.shape;
     const obs = read(file, 'sample.obs', 'F32', [samples, inputs]) as Float32Array;
     const expected = read(file, 'sample.q', 'F32', [samples, actions]);
@@ -90,7 +136,7 @@ export class Policy {
       q.forEach((value, a) => {
         const error = Math.abs(value - expected[i * actions + a]!);
         if (!(error <= tolerance(value))) {
-          throw new BadFile(
+          throw new BadInput(
             `self-check: expected Q-value ${expected[i * actions + a]}, got ${value} (sample ${i})`,
           );
         }
@@ -99,7 +145,7 @@ export class Policy {
       const best = q[argMax(q)]!;
       const chosen = q[this.torques.indexOf(torque[i]!)];
       if (chosen === undefined || best - chosen > 2 * tolerance(best)) {
-        throw new BadFile(`self-check: a torque of ${torque[i]} is not the best (sample ${i})`);
+        throw new BadInput(`self-check: a torque of ${torque[i]} is not the best (sample ${i})`);
       }
     }
     return largest;
@@ -111,13 +157,13 @@ function parsePlant(text: string): Plant {
   try {
     given = JSON.parse(text) as typeof given;
   } catch {
-    throw new BadFile('metadata "plant" is not JSON');
+    throw new BadInput('metadata "plant" is not JSON');
   }
   const plant = { ...NOMINAL };
   for (const name of Object.keys(NOMINAL) as Parameter[]) {
     const value = given?.[name];
     if (typeof value !== 'number' || !Number.isFinite(value) || value < 0 || value > 1000) {
-      throw new BadFile(`metadata "plant": expected a number for ${name}`);
+      throw new BadInput(`metadata "plant": expected a number for ${name}`);
     }
     plant[name] = value;
   }

@@ -1,7 +1,7 @@
 import { describe, expect, test } from 'vitest';
 import { readPolicy } from '../tests/program';
 import { Policy } from './policy';
-import { BadFile, MAX_FILE_BYTES, parseSafetensors, read } from './safetensors';
+import { BadInput, MAX_FILE_BYTES, parseSafetensors, read } from './safetensors';
 
 /// What comes from a stranger is refused with a reason, whatever it is.
 
@@ -55,8 +55,14 @@ test.each<[string, Header | string]>([
   ['offsets that go backwards', tensor([0], [8, 4])],
   ['three offsets', tensor([4], [0, 16, 16])],
   ['fewer bytes than the shape asks for', tensor([4], [0, 12])],
+  ['a gap', tensor([2], [8, 16])],
+  ['bytes that nobody claims', tensor([2], [0, 8])],
+  [
+    'tensors that share bytes',
+    { ...tensor([4], [0, 16]), y: { dtype: 'F32', shape: [2], data_offsets: [8, 16] } },
+  ],
 ])('refuses %s', (_, header) => {
-  expect(() => parseSafetensors(fileOf(header, DATA))).toThrow(BadFile);
+  expect(() => parseSafetensors(fileOf(header, DATA))).toThrow(BadInput);
 });
 
 test('refuses what is cut off, too long, or says so', () => {
@@ -115,9 +121,12 @@ describe('a policy', () => {
     ],
     ['plant', '{"mass1":"heavy"}'],
     ['plant', 'null'],
+    ['observation', '{"max_velocity":[1,1]}'],
+    ['observation', 'null'],
+    ['reward_scale', '-1'],
     ['plant', undefined],
   ])('is refused with a %s of %s', (key, text) => {
-    expect(() => new Policy(metadata(key, text))).toThrow(BadFile);
+    expect(() => new Policy(metadata(key, text))).toThrow(BadInput);
   });
 
   test('is refused when one weight is another', () => {
@@ -130,7 +139,7 @@ describe('a policy', () => {
 
   test('is refused at every place where it may be cut off', () => {
     for (let bytes = 0; bytes < original.byteLength; bytes += 997) {
-      expect(() => new Policy(original.slice(0, bytes))).toThrow(BadFile);
+      expect(() => new Policy(original.slice(0, bytes))).toThrow(BadInput);
     }
   });
 });

@@ -16,8 +16,8 @@ export interface TensorFile {
   tensors: Map<string, Tensor>;
 }
 
-/// Says what was expected of a file and what came.
-export class BadFile extends Error {}
+/// What came from outside and is not what was expected: one line says both.
+export class BadInput extends Error {}
 
 const BYTES: Record<string, number> = { F32: 4, F64: 8 };
 
@@ -35,14 +35,14 @@ function parseHeader(bytes: Uint8Array): Record<string, unknown> {
   try {
     header = JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(bytes));
   } catch {
-    throw new BadFile('the header is not JSON');
+    throw new BadInput('the header is not JSON');
   }
-  if (!isObject(header)) throw new BadFile('the header is not a JSON object');
+  if (!isObject(header)) throw new BadInput('the header is not a JSON object');
   return header;
 }
 
 function parseTensor(name: string, entry: unknown, data: Uint8Array): Tensor {
-  const broken = (what: string) => new BadFile(`tensor "${name}": ${what}`);
+  const broken = (what: string) => new BadInput(`tensor "${name}": ${what}`);
   if (!isObject(entry)) throw broken('expected dtype, shape and data_offsets');
   const { dtype, shape, data_offsets: offsets } = entry;
   const size = typeof dtype === 'string' && Object.hasOwn(BYTES, dtype) ? BYTES[dtype]! : 0;
@@ -61,34 +61,49 @@ function parseTensor(name: string, entry: unknown, data: Uint8Array): Tensor {
   return { dtype, shape: shape as number[], bytes: data.subarray(begin, end) };
 }
 
-/// Throws BadFile.
+/// Throws unless the tensors share out the data among them, without a gap or an overlap: the size of
+/// the file then bounds what there is to compute.
+function checkCovered(tensors: Tensor[], data: Uint8Array): void {
+  const begin = ({ bytes }: Tensor) => bytes.byteOffset - data.byteOffset;
+  let end = 0;
+  for (const tensor of tensors.sort(
+    (a, b) => begin(a) - begin(b) || a.bytes.length - b.bytes.length,
+  )) {
+    if (begin(tensor) !== end) throw new BadInput('tensors overlap or leave a gap');
+    end += tensor.bytes.length;
+  }
+  if (end !== data.length) throw new BadInput('tensors do not fill the file');
+}
+
+/// Throws BadInput.
 export function parseSafetensors(file: ArrayBuffer): TensorFile {
-  if (file.byteLength > MAX_FILE_BYTES) throw new BadFile('it is larger than 16 MB');
-  if (file.byteLength < 8) throw new BadFile('it is too short for a safetensors file');
+  if (file.byteLength > MAX_FILE_BYTES) throw new BadInput('it is larger than 16 MB');
+  if (file.byteLength < 8) throw new BadInput('it is too short for a safetensors file');
   const headerBytes = Number(new DataView(file).getBigUint64(0, true));
   if (headerBytes > MAX_HEADER_BYTES || headerBytes > file.byteLength - 8) {
-    throw new BadFile('it is not a safetensors file, or it is cut off');
+    throw new BadInput('it is not a safetensors file, or it is cut off');
   }
   const header = parseHeader(new Uint8Array(file, 8, headerBytes));
   const data = new Uint8Array(file, 8 + headerBytes);
 
   const metadata = new Map<string, string>();
   const { __metadata__: about = {}, ...entries } = header;
-  if (!isObject(about)) throw new BadFile('__metadata__ is not a JSON object');
+  if (!isObject(about)) throw new BadInput('__metadata__ is not a JSON object');
   for (const [key, value] of Object.entries(about)) {
-    if (typeof value !== 'string') throw new BadFile(`metadata "${key}" is not text`);
+    if (typeof value !== 'string') throw new BadInput(`metadata "${key}" is not text`);
     metadata.set(key, value);
   }
   if (Object.keys(entries).length > MAX_TENSORS) {
-    throw new BadFile(`more than ${MAX_TENSORS} tensors`);
+    throw new BadInput(`more than ${MAX_TENSORS} tensors`);
   }
   const tensors = new Map(
     Object.entries(entries).map(([name, entry]) => [name, parseTensor(name, entry, data)]),
   );
+  checkCovered([...tensors.values()], data);
   return { metadata, tensors };
 }
 
-/// The numbers of a tensor of this type and shape, all finite. Throws BadFile.
+/// The numbers of a tensor of this type and shape, all finite. Throws BadInput.
 export function read(
   file: TensorFile,
   name: string,
@@ -96,14 +111,14 @@ export function read(
   shape: readonly number[],
 ): Float32Array | Float64Array {
   const tensor = file.tensors.get(name);
-  if (!tensor) throw new BadFile(`expected a tensor "${name}", found none`);
+  if (!tensor) throw new BadInput(`expected a tensor "${name}", found none`);
   if (tensor.dtype !== dtype || tensor.shape.join() !== shape.join()) {
     const got = `${tensor.dtype} (${tensor.shape.join(', ')})`;
-    throw new BadFile(`tensor "${name}": expected ${dtype} (${shape.join(', ')}), got ${got}`);
+    throw new BadInput(`tensor "${name}": expected ${dtype} (${shape.join(', ')}), got ${got}`);
   }
   // Copied: where they stand in the file need not suit an array of numbers.
   const { buffer } = tensor.bytes.slice();
   const values = dtype === 'F32' ? new Float32Array(buffer) : new Float64Array(buffer);
-  if (!values.every(Number.isFinite)) throw new BadFile(`tensor "${name}" is not finite`);
+  if (!values.every(Number.isFinite)) throw new BadInput(`tensor "${name}" is not finite`);
   return values;
 }

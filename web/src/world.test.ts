@@ -51,18 +51,26 @@ test('another plant, too', () => {
   expectTrajectory(run(5), simulate(policyPath('d3qn'), '--seconds', '5', ...other), 1e-6);
 });
 
+test('what is remembered is what was chosen, also where the motor cannot give it', () => {
+  agentOn('d3qn-randomized');
+  world.plant = { ...NOMINAL, torque_limit: 4 };
+  const rows = simulate(policyPath('d3qn-randomized'), '--seconds', '5', '--set', 'torque_limit=4');
+  expectTrajectory(run(5), rows, 1e-6);
+});
+
 test('it falls as in `upswing simulate`', () => {
   world.reset({ q1: 3, q2: 0.2, w1: 0, w2: 0 });
   expectTrajectory(run(5), simulate('--start', '3,0.2,0,0', '--seconds', '5'), 1e-9);
 });
 
-test('a shove throws the balanced pendulum off, and the agent brings it back', () => {
+test('a pull throws the balanced pendulum down, and the agent brings it back', () => {
   agentOn('d3qn');
   run(10);
   expect(world.uprightSince).not.toBeNull();
-  world.shoveTo(1);
-  const moments = run(0.2);
-  expect(Math.max(...moments.map((m) => Math.abs(m.state.w2)))).toBeGreaterThan(0.5);
+  world.drag = { link: 2, along: 0.5, target: { x: 1, z: 0 } };
+  run(1);
+  expect(world.uprightSince).toBeNull();
+  world.drag = null;
   run(15);
   expect(world.uprightSince).not.toBeNull();
 });
@@ -82,12 +90,13 @@ test('a hand pulls no harder than it may, and its damper calms', () => {
 
 test('a motor that is late holds what was chosen before', () => {
   agentOn('d3qn');
+  const start = { ...HANGING, q1: 0.5 };
+  world.reset(start);
+  const prompt = run(0.02)[0]!.torque;
+  expect(prompt).not.toBe(0);
   world.disturbance.delay = 3;
-  expect(
-    run(1)
-      .slice(0, 3)
-      .map((m) => m.torque),
-  ).toEqual([0, 0, 0]);
+  world.reset(start);
+  expect(run(0.08).map((m) => m.torque)).toEqual([0, 0, 0, prompt]);
 });
 
 test('without the agent the motor is off, but the agent still thinks', () => {
@@ -95,22 +104,27 @@ test('without the agent the motor is off, but the agent still thinks', () => {
   world.agentOn = false;
   world.reset({ ...HANGING, q1: 1 });
   expect(run(2).every((m) => m.torque === 0)).toBe(true);
-  expect(world.thought!.q.length).toBe(9);
+  expect(world.decision!.q.length).toBe(9);
 });
 
-test('the sensors blur by as much as they should', () => {
-  let [sum, squares, count] = [0, 0, 0];
+test('the sensors blur angles and velocities by as much as they should', () => {
   const policy = new Policy(readPolicy('fast'));
   const act = policy.act.bind(policy);
+  const seen: number[][] = [];
   policy.act = (observation) => {
-    const noise = observation[2]! * 10; // of w1, hanging at rest
-    [sum, squares, count] = [sum + noise, squares + noise * noise, count + 1];
+    const [, sin1, w1, , sin2, w2] = observation; // hanging at rest: all 0 but for noise
+    seen.push([Math.asin(sin1!), w1! * 10, Math.asin(sin2!), w2! * 20]);
     return act(observation);
   };
-  world.policy = policy;
   world.disturbance.sensor_noise = 0.1;
+  world.policy = policy;
   run(60);
-  // Of 3,000 draws the mean is within five of its standard errors, and so is the variance.
-  expect(Math.abs(sum / count)).toBeLessThan((5 * 0.1) / Math.sqrt(count));
-  expect(squares / count / 0.01).toBeCloseTo(1, 0.6);
+  for (const i of [0, 1, 2, 3]) {
+    const noise = seen.map((row) => row[i]!);
+    const mean = noise.reduce((sum, x) => sum + x, 0) / noise.length;
+    const variance = noise.reduce((sum, x) => sum + x * x, 0) / noise.length;
+    // Within five standard errors of 3,000 draws.
+    expect(Math.abs(mean)).toBeLessThan((5 * 0.1) / Math.sqrt(noise.length));
+    expect(Math.abs(variance / 0.01 - 1)).toBeLessThan(5 * Math.sqrt(2 / noise.length));
+  }
 });

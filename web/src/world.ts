@@ -1,9 +1,17 @@
 import { DelayLine, measure } from './disturbance';
 import type { Disturbance } from './disturbance';
-import { Observer } from './observer';
-import { HANGING, inverted, NOMINAL, normalizedEnergy, PHYSICS_STEPS, tipHeight } from './pendulum';
+import { withMemory } from './observation';
+import {
+  HANGING,
+  inverted,
+  NOMINAL,
+  normalizedEnergy,
+  observe,
+  PHYSICS_STEPS,
+  tipHeight,
+} from './pendulum';
 import type { Plant, State } from './pendulum';
-import type { Policy } from './policy';
+import type { Decision, Policy } from './policy';
 import type { Push, Simulator, Vec } from './simulator';
 
 export const STEPS_PER_SECOND = 200; // of physics
@@ -23,13 +31,6 @@ export interface Moment {
   height: number; // of the tip over l1 + l2
 }
 
-/// What the agent thinks of the present moment.
-export interface Thought {
-  q: Float32Array; // (A)
-  value: number; // V, or NaN
-  action: number; // the greedy one
-}
-
 /// The pendulum with its motor, its agent, and the hand that disturbs it. Knows no page.
 export class World {
   readonly simulator: Simulator;
@@ -41,15 +42,16 @@ export class World {
 
   torque = 0; // N·m, that the motor holds now
   push: Push | null = null; // that acts now
-  thought: Thought | null = null;
+  /// What the agent makes of the last control step, whether it is on or not; see also look().
+  decision: Decision | null = null;
   /// Time (s) since when both links are upright without a break; null if they are not.
   uprightSince: number | null = null;
 
   private _plant: Plant = { ...NOMINAL };
   private _policy: Policy | null = null;
-  private observer = new Observer(0);
+  private observation: Float32Array | null = null; // of the last control step; null at a start
+  private chosen = 0; // N·m, at that step
   private readonly motor = new DelayLine();
-  private chosen: number | null = null; // torque of the last control step; null at a start
   private steps = 0; // of physics, in all
   private untilControl = 0; // steps until the agent chooses again
   private shove = { direction: 0, steps: 0 };
@@ -72,9 +74,8 @@ export class World {
   }
   set policy(policy: Policy | null) {
     this._policy = policy;
-    this.thought = null;
-    this.observer = new Observer(policy?.memory ?? 0);
-    this.chosen = null;
+    this.observation = null;
+    this.look();
   }
 
   get state(): State {
@@ -86,16 +87,17 @@ export class World {
     return this.steps / STEPS_PER_SECOND;
   }
 
-  /// Another start: at rest as given, nothing under way.
+  /// Another start, with nothing under way.
   reset(state: State = HANGING): void {
     this.simulator.state = state;
     this.motor.clear();
-    this.chosen = null;
+    this.observation = null;
     this.untilControl = 0;
     this.torque = 0;
     this.push = null;
     this.shove.steps = 0;
     this.uprightSince = null;
+    this.look();
   }
 
   shoveTo(direction: -1 | 1): void {
@@ -110,34 +112,41 @@ export class World {
       this.untilControl = PHYSICS_STEPS;
     }
     this.push = this.hand() ?? this.shoving();
-    const sound = this.simulator.step(this.torque, this.push);
+    const valid = this.simulator.step(this.torque, this.push);
+    this.shove.steps = Math.max(0, this.shove.steps - 1);
     ++this.steps;
     --this.untilControl;
-    if (!sound) this.reset();
-    return sound;
+    if (!valid) this.reset();
+    return valid;
   }
 
   /// To the next moment at which the agent chooses.
   advanceToControl(): boolean {
-    let sound = this.advance();
-    while (sound && this.untilControl > 0) sound = this.advance();
-    return sound;
+    let valid = this.advance();
+    while (valid && this.untilControl > 0) valid = this.advance();
+    return valid;
+  }
+
+  /// Lets the agent judge the present moment, without acting: for a pendulum that stands still.
+  look(): void {
+    this.decision = this.policy?.act(this.observe()) ?? null;
+  }
+
+  /// What the agent would see now.
+  private observe(): Float32Array {
+    const { plant, policy, observation, chosen } = this;
+    const now = observe(plant, measure(this.state, this.disturbance.sensor_noise));
+    return withMemory(now, policy?.memory ?? 0, observation, chosen);
   }
 
   private control(): void {
-    const { plant, policy, observer, state } = this;
-    const measured = measure(state, this.disturbance.sensor_noise);
-    if (this.chosen === null) observer.begin(plant, measured);
-    else observer.next(plant, measured, this.chosen);
-
-    this.chosen = 0;
-    if (policy) {
-      const { torque, ...thought } = policy.act(observer.observation);
-      this.thought = thought;
-      const limit = plant.torque_limit;
-      if (this.agentOn) this.chosen = Math.min(Math.max(torque, -limit), limit);
-    }
-    this.torque = this.motor.apply(this.chosen, this.disturbance.delay);
+    const { plant, policy, state } = this;
+    this.observation = this.observe();
+    this.decision = policy?.act(this.observation) ?? null;
+    this.chosen = this.agentOn ? (this.decision?.torque ?? 0) : 0;
+    const limit = plant.torque_limit;
+    const arriving = this.motor.apply(this.chosen, this.disturbance.delay);
+    this.torque = Math.min(Math.max(arriving, -limit), limit);
 
     if (!inverted(state)) this.uprightSince = null;
     else this.uprightSince ??= this.time;
@@ -153,7 +162,9 @@ export class World {
   /// The force of a spring and a damper between the hand and what it holds.
   private hand(): Push | null {
     if (!this.drag) return null;
-    const { link, along, target } = this.drag;
+    const { link, target } = this.drag;
+    // The link may have become shorter since it was taken.
+    const along = Math.min(this.drag.along, link === 1 ? this.plant.length1 : this.plant.length2);
     const { position, velocity } = pointOn(this.plant, this.state, link, along);
     const x = SPRING * (target.x - position.x) - DAMPER * velocity.x;
     const z = SPRING * (target.z - position.z) - DAMPER * velocity.z;
@@ -163,7 +174,6 @@ export class World {
 
   private shoving(): Push | null {
     if (this.shove.steps === 0) return null;
-    --this.shove.steps;
     const force = { x: SHOVE * this.shove.direction, z: 0 };
     return { link: 2, along: this.plant.length2, force };
   }

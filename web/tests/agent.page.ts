@@ -1,5 +1,5 @@
-import { expect, test } from '@playwright/test';
-import { balanced, largestDifference, open, run, startFrom } from './page';
+import { expect } from '@playwright/test';
+import { balanced, largestDifference, open, run, startFrom, test } from './page';
 import { policyPath, simulate } from './program';
 
 test('Get Inverted swings up and balances, while one watches', async ({ page }) => {
@@ -45,4 +45,30 @@ test('another agent can be chosen, and has its own text, curve and mark', async 
   const wide = await width();
   await page.locator('#agent').selectOption('d3qn');
   await expect.poll(width).toBeLessThan(wide / 2);
+});
+
+test('of two agents that are asked for, the last one counts', async ({ page }) => {
+  await open(page);
+  await page.route(/dueling-dqn\.safetensors$/, async (route) => {
+    await new Promise((resolve) => setTimeout(resolve, 500));
+    await route.continue();
+  });
+  const slow = page.waitForResponse(/dueling-dqn\.safetensors$/);
+  await page.locator('#agent').selectOption('dueling-dqn');
+  await page.locator('#agent').selectOption('fast');
+  await (await slow).finished();
+  await page.waitForTimeout(200);
+  await expect(page.locator('#agent')).toHaveValue('fast');
+  expect(await page.evaluate(() => upswing.world.policy!.network.shape.hidden)).toEqual([64, 64]);
+});
+
+test('before and after the agent acts, its Q-values are those of what is seen', async ({
+  page,
+}) => {
+  await open(page, '#agent=d3qn');
+  const best = () => page.evaluate(() => Math.max(...upswing.world.decision!.q));
+  await startFrom(page, 0);
+  const hanging = await best();
+  await startFrom(page, Math.PI);
+  expect(await best()).toBeGreaterThan(2 * hanging);
 });

@@ -1,6 +1,6 @@
-import { expect, test } from '@playwright/test';
+import { expect } from '@playwright/test';
 import { readFileSync } from 'node:fs';
-import { open, slide, startFrom } from './page';
+import { open, slide, startFrom, test } from './page';
 import { policyPath, readPolicy } from './program';
 
 const time = () => upswing.world.time;
@@ -43,7 +43,7 @@ test('by keyboard alone', async ({ page }) => {
   await page.keyboard.press('g');
   await expect(page.locator('#agent-on')).toHaveAttribute('aria-pressed', 'true');
   await page.keyboard.press('Space');
-  await expect(page.locator('#pause')).toHaveAttribute('aria-pressed', 'true');
+  await expect(page.locator('#pause')).toHaveText('Go on');
   await page.keyboard.press('.'); // to the next moment at which the agent chooses
   const stopped = await page.evaluate(time);
   await page.keyboard.press('.');
@@ -68,7 +68,7 @@ test('by keyboard alone', async ({ page }) => {
 test("a policy of one's own", async ({ page }) => {
   await open(page);
   await page.locator('#file').setInputFiles(policyPath('fast'));
-  await expect(page.locator('#agent')).toHaveValue('own');
+  await expect(page.locator('#agent')).toHaveValue('own:');
   await expect(page.locator('#agent-text')).toContainText('8-64-64');
   await expect(page.locator('#message')).toBeHidden();
 });
@@ -120,7 +120,19 @@ test('dark and light', async ({ page }) => {
   expect(await background()).not.toBe(light);
   await page.locator('#theme').click();
   expect(await background()).toBe(light);
+});
+
+test('dark where the system is dark, on canvases too', async ({ page }) => {
+  await open(page);
+  const colors = () =>
+    page.evaluate(() => [
+      getComputedStyle(document.body).backgroundColor,
+      upswing.scene.canvas.color('ink'),
+    ]);
+  const light = await colors();
   await page.emulateMedia({ colorScheme: 'dark' });
+  await expect.poll(colors).not.toContain(light[0]);
+  await expect.poll(colors).not.toContain(light[1]);
 });
 
 test('on a phone everything fits its width, and the agent can be switched on', async ({

@@ -1,5 +1,5 @@
-import { expect, test } from '@playwright/test';
-import { balanced, onScreen, open, run, startFrom } from './page';
+import { expect } from '@playwright/test';
+import { balanced, onScreen, open, run, startFrom, test } from './page';
 
 const state = () => upswing.world.state;
 
@@ -37,13 +37,62 @@ test('a shove moves it, to the side of its arrow', async ({ page }) => {
   }
 });
 
-test('the agent recovers from a shove', async ({ page }) => {
+test('the agent holds against a shove', async ({ page }) => {
   await open(page, '#agent=d3qn&on=1');
   await startFrom(page, Math.PI);
   await run(page, 3);
+  const before = await page.evaluate(state);
   await page.getByRole('button', { name: 'Shove to the left' }).click();
-  await run(page, 20);
+  const rows = await run(page, 20);
+  const farthest = Math.max(
+    ...rows.map((row) => Math.abs(row[1]! + row[2]! - before.q1 - before.q2)),
+  );
+  expect(farthest).toBeGreaterThan(0.05);
   expect(await balanced(page)).toBeGreaterThan(1);
+});
+
+test('a shove during a drag is not kept for later', async ({ page }) => {
+  await open(page);
+  await startFrom(page, 0);
+  await page.evaluate(() => {
+    upswing.world.drag = { link: 2, along: 0.5, target: { x: 0, z: -1 } };
+    upswing.world.shoveTo(1);
+  });
+  await run(page, 1);
+  await page.evaluate(() => (upswing.world.drag = null));
+  await run(page, 0.1);
+  expect(await page.evaluate(() => upswing.world.push)).toBeNull();
+});
+
+test('one hand at a time, with the left button of a mouse', async ({ page }) => {
+  await open(page);
+  const [tip, aside] = [await onScreen(page, 0, -0.9), await onScreen(page, 0.5, 0.5)];
+  const drag = () => page.evaluate(() => upswing.world.drag?.target ?? null);
+  await page.mouse.move(tip.x, tip.y);
+  await page.mouse.down({ button: 'right' });
+  expect(await drag()).toBeNull();
+  await page.mouse.up({ button: 'right' });
+  await page.mouse.down();
+  const held = await drag();
+  expect(held).not.toBeNull();
+  await page.evaluate(({ x, y }) => {
+    const canvas = document.getElementById('scene')!;
+    for (const type of ['pointerdown', 'pointermove', 'pointerup']) {
+      const place = { clientX: x, clientY: y };
+      canvas.dispatchEvent(new PointerEvent(type, { pointerId: 77, button: 0, ...place }));
+    }
+  }, aside);
+  expect(await drag()).toEqual(held);
+  await page.mouse.up();
+  expect(await drag()).toBeNull();
+});
+
+test('a mere touch while paused changes nothing', async ({ page }) => {
+  await open(page);
+  await startFrom(page, 1, 0.5, 2, -1);
+  const elbow = await onScreen(page, -0.3 * Math.sin(1), -0.3 * Math.cos(1));
+  await page.mouse.click(elbow.x, elbow.y);
+  expect(await page.evaluate(state)).toEqual({ q1: 1, q2: 0.5, w1: 2, w2: -1 });
 });
 
 test('while paused, dragging sets the start', async ({ page }) => {

@@ -1,21 +1,28 @@
-import { expect } from '@playwright/test';
+import { test as base, expect } from '@playwright/test';
 import type { Page } from '@playwright/test';
-import type { Page as Upswing } from '../src/page/page';
+import '../src/page/global';
 
-declare global {
-  var upswing: Upswing;
-}
+/// A test whose page says nothing on the console, unless `complains` allows it.
+export const test = base.extend<{ complains: boolean; silent: void }>({
+  complains: [false, { option: true }],
+  silent: [
+    async ({ context, complains }, use) => {
+      const complaints: string[] = [];
+      context.on('console', (message) => {
+        if (['error', 'warning'].includes(message.type())) complaints.push(message.text());
+      });
+      context.on('weberror', (error) => complaints.push(String(error.error())));
+      await use();
+      if (!complains) expect(complaints).toEqual([]);
+    },
+    { auto: true },
+  ],
+});
 
-/// Opens the page and waits until the pendulum hangs in it. What it says on the console is returned.
-export async function open(page: Page, hash = ''): Promise<string[]> {
-  const complaints: string[] = [];
-  page.on('console', (message) => {
-    if (['error', 'warning'].includes(message.type())) complaints.push(message.text());
-  });
-  page.on('pageerror', (error) => complaints.push(String(error)));
+/// Opens the page and waits until the pendulum hangs in it.
+export async function open(page: Page, hash = ''): Promise<void> {
   await page.goto(`./${hash}`);
   await expect(page.locator('#agent-on')).toBeEnabled();
-  return complaints;
 }
 
 /// Lets so many seconds of the pendulum's time go by at once, and returns the rows
@@ -38,8 +45,8 @@ export function run(page: Page, seconds: number): Promise<number[][]> {
 
 /// From this state at rest or not, with time standing still but for run().
 export async function startFrom(page: Page, q1: number, q2 = 0, w1 = 0, w2 = 0): Promise<void> {
-  const pause = page.locator('#pause');
-  if ((await pause.getAttribute('aria-pressed')) === 'false') await pause.click();
+  const pause = page.getByRole('button', { name: 'Pause' });
+  if (await pause.isVisible()) await pause.click();
   await page.evaluate((s) => upswing.world.reset(s), { q1, q2, w1, w2 });
 }
 
@@ -53,6 +60,8 @@ export function balanced(page: Page): Promise<number> {
 
 /// The largest difference in q1, q2, w1, w2 over two trajectories' common rows.
 export function largestDifference(rows: number[][], others: number[][]): number {
+  expect(rows.length).toBeGreaterThan(0);
+  expect(others.length).toBeGreaterThanOrEqual(rows.length);
   const differences = rows.flatMap((row, k) =>
     [1, 2, 3, 4].map((i) => Math.abs(row[i]! - others[k]![i]!)),
   );
@@ -67,14 +76,11 @@ export async function slide(page: Page, id: string, value: number): Promise<void
 /// Where a point of the pendulum's plane (m) is on the screen.
 export function onScreen(page: Page, x: number, z: number): Promise<{ x: number; y: number }> {
   return page.evaluate(
-    ([px, pz]) => {
-      const canvas = document.getElementById('scene')!;
-      const { left, top, width, height } = canvas.getBoundingClientRect();
-      const { plant } = upswing.world;
-      const reach = Math.max(1, plant.length1 + plant.length2);
-      const scale = (0.44 * Math.min(width, height)) / reach;
-      return { x: left + width / 2 + scale * px, y: top + height / 2 - scale * pz };
+    (point) => {
+      const { left, top } = document.getElementById('scene')!.getBoundingClientRect();
+      const [px, py] = upswing.scene.at(point);
+      return { x: left + px, y: top + py };
     },
-    [x, z] as const,
+    { x, z },
   );
 }

@@ -4,7 +4,7 @@ import { fileURLToPath } from 'node:url';
 
 /// What `upswing ARGUMENTS` prints: the C++ program is what the page is tested against. UPSWING names
 /// the built program.
-export function upswing(...args: string[]): string {
+export function runProgram(...args: string[]): string {
   const launcher = fileURLToPath(new URL('../../upswing', import.meta.url));
   const [program, first] = process.env.UPSWING
     ? [process.env.UPSWING, []]
@@ -14,7 +14,7 @@ export function upswing(...args: string[]): string {
 
 /// The rows of `upswing simulate ARGUMENTS`: [t, q1, q2, w1, w2, torque].
 export function simulate(...args: string[]): number[][] {
-  const rows = upswing('simulate', ...args)
+  const rows = runProgram('simulate', ...args)
     .trim()
     .split('\n')
     .slice(1);

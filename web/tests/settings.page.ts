@@ -1,5 +1,5 @@
-import { expect, test } from '@playwright/test';
-import { largestDifference, open, run, slide, startFrom } from './page';
+import { expect } from '@playwright/test';
+import { largestDifference, open, run, slide, startFrom, test } from './page';
 import { simulate } from './program';
 
 const OTHER = [
@@ -80,6 +80,7 @@ test('the address holds what was set, and brings it back', async ({ page, contex
   await slide(page, 'sensor_noise', 0.02);
   await slide(page, 'speed', 0.5);
   await page.getByRole('button', { name: 'Get Inverted' }).click();
+  await expect(page).toHaveURL(/on=1/); // the address follows a little later
   const other = await context.newPage();
   await open(other, new URL(page.url()).hash);
   await expect(other.locator('#agent')).toHaveValue('fast');
@@ -100,4 +101,14 @@ test('an address that is not understood is told, and the rest of it holds', asyn
   await expect(message).toContainText('mass1: expected 0.2 to 3, got "-3"');
   await expect(message).toContainText('unknown "colour"');
   expect(await page.evaluate(() => upswing.world.plant)).toMatchObject({ mass1: 1, mass2: 1.5 });
+});
+
+test('another address in the same tab begins anew with it', async ({ page }) => {
+  await open(page, '#agent=d3qn&on=1');
+  await page.waitForTimeout(500);
+  await page.evaluate(() => (location.hash = '#agent=fast&mass1=1.4'));
+  await expect(page.locator('#agent')).toHaveValue('fast');
+  await expect(page.locator('#mass1')).toHaveValue('1.4');
+  await expect(page.locator('#agent-on')).toHaveAttribute('aria-pressed', 'false');
+  expect(await page.evaluate(() => upswing.world.state)).toEqual({ q1: 0, q2: 0, w1: 0, w2: 0 });
 });

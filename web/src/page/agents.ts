@@ -1,5 +1,7 @@
+import { NOMINAL } from '../pendulum';
+import type { Parameter } from '../pendulum';
 import { Policy } from '../policy';
-import { BadFile, MAX_FILE_BYTES } from '../safetensors';
+import { BadInput, MAX_FILE_BYTES } from '../safetensors';
 import type { Curve } from '../view/charts';
 
 /// The agents that the page comes with, and those that a visitor brings.
@@ -22,32 +24,48 @@ export interface Agent {
   policy: Policy;
 }
 
-const TITLES: Record<string, string> = {
-  d3qn: 'Dueling Double DQN',
-  dqn: 'DQN',
-  'double-dqn': 'Double DQN',
-  'dueling-dqn': 'Dueling DQN',
-  fast: 'Fast: a small network',
-  'd3qn-randomized': 'Randomised Dueling Double DQN',
-};
+const TITLES = new Map([
+  ['d3qn', 'Dueling Double DQN'],
+  ['dqn', 'DQN'],
+  ['double-dqn', 'Double DQN'],
+  ['dueling-dqn', 'Dueling DQN'],
+  ['fast', 'Fast: a small network'],
+  ['d3qn-randomized', 'Randomised Dueling Double DQN'],
+]);
 
-/// Reads at most so many bytes as a policy can have; `onProgress` hears how many there are.
+/// A visitor's own; no entry of agents.json has such an ID.
+export const OWN = 'own:';
+
+/// Throws BadInput if nobody answers.
+export async function fetchFrom(address: string): Promise<Response> {
+  try {
+    return await fetch(address);
+  } catch {
+    throw new BadInput(`${address} cannot be fetched`);
+  }
+}
+
+/// Reads at most `limit` bytes; `onProgress` hears how many there are. Throws BadInput.
 export async function readBytes(
   response: Response,
   limit: number,
   onProgress: (bytes: number) => void = () => {},
 ): Promise<Uint8Array<ArrayBuffer>> {
-  if (!response.ok) throw new BadFile(`the server says ${response.status}`);
+  if (!response.ok) throw new BadInput(`the server says ${response.status}`);
   const pieces: Uint8Array[] = [];
   let bytes = 0;
   const reader = response.body!.getReader();
-  for (let piece = await reader.read(); !piece.done; piece = await reader.read()) {
+  const next = () =>
+    reader.read().catch(() => {
+      throw new BadInput('the connection broke off');
+    });
+  for (let piece = await next(); !piece.done; piece = await next()) {
     pieces.push(piece.value);
     bytes += piece.value.length;
     onProgress(bytes);
     if (bytes > limit) {
       await reader.cancel();
-      throw new BadFile(`it is larger than ${limit / 1024 / 1024} MB`);
+      throw new BadInput(`it is larger than ${limit / 1024 / 1024} MB`);
     }
   }
   const all = new Uint8Array(bytes);
@@ -59,18 +77,32 @@ export async function readBytes(
   return all;
 }
 
+/// A title for an entry: that of its agent, and its ID if that says more.
+function titleOf({ id, agent }: Entry): string {
+  const title = TITLES.get(agent) ?? agent;
+  return id === agent ? title : `${title}, ${id}`;
+}
+
 function describe(policy: Policy): string {
-  const { hidden, dueling, head, layer_norm } = policy.network.shape;
-  const range = policy.trainedRange('mass1');
+  const { inputs, hidden, dueling, head, layer_norm } = policy.network.shape;
+  const randomized = (Object.keys(NOMINAL) as Parameter[]).some((name) => {
+    const [low, high] = policy.trainedRange(name);
+    return low < high;
+  });
   return [
-    `${dueling ? 'Dueling' : 'Plain'} network ${[policy.network.shape.inputs, ...hidden].join('-')}`,
+    `${dueling ? 'Dueling' : 'Plain'} network ${[inputs, ...hidden].join('-')}`,
     dueling ? ` with heads of ${head}` : '',
     layer_norm ? ', layer normalisation' : '',
     `, ${policy.torques.length} torques`,
     policy.memory > 0 ? `, remembers ${policy.memory} steps` : '',
-    range[0] < range[1] ? ', trained on random pendulums' : '',
+    randomized ? ', trained on random pendulums' : '',
     '.',
   ].join('');
+}
+
+/// What cannot be fetched is told like what is broken.
+async function fetchBytes(address: string): Promise<Uint8Array<ArrayBuffer>> {
+  return readBytes(await fetchFrom(address), MAX_FILE_BYTES);
 }
 
 export class Agents {
@@ -81,54 +113,55 @@ export class Agents {
     this.entries = new Map(entries.map((entry) => [entry.id, entry]));
   }
 
-  /// Reads the list of agents. Throws BadFile.
+  /// Reads the list of agents. Throws BadInput.
   static async fetch(): Promise<Agents> {
-    const bytes = await readBytes(await fetch('agents/agents.json'), MAX_FILE_BYTES);
+    const bytes = await fetchBytes('agents/agents.json');
     try {
       const { agents } = JSON.parse(new TextDecoder().decode(bytes)) as { agents: Entry[] };
       if (agents.length > 0) return new Agents(agents);
     } catch {
       // told below
     }
-    throw new BadFile('agents/agents.json is not a list of agents');
+    throw new BadInput('agents/agents.json is not a list of agents');
   }
 
   /// All that there are, by id and title.
   get list(): { id: string; title: string }[] {
-    const ids = new Set([...this.entries.keys(), ...this.loaded.keys()]);
-    return [...ids].map((id) => ({ id, title: this.loaded.get(id)?.title ?? TITLES[id] ?? id }));
+    const list = [...this.entries.values()].map((entry) => ({
+      id: entry.id,
+      title: titleOf(entry),
+    }));
+    const own = this.loaded.get(OWN);
+    return own ? [...list, { id: OWN, title: own.title }] : list;
   }
 
   has(id: string): boolean {
     return this.entries.has(id) || this.loaded.has(id);
   }
 
-  /// Fetches and checks the policy when it is asked for the first time. Throws BadFile.
+  /// Fetches and checks the policy when it is asked for the first time. Throws BadInput.
   async get(id: string): Promise<Agent> {
     const known = this.loaded.get(id);
     if (known) return known;
     const entry = this.entries.get(id);
-    if (!entry) throw new BadFile(`there is no agent "${id}"`);
-    const response = await fetch(`agents/${encodeURIComponent(entry.file)}`);
-    const policy = new Policy((await readBytes(response, MAX_FILE_BYTES)).buffer);
+    if (!entry) throw new BadInput(`there is no agent "${id}"`);
+    const { buffer } = await fetchBytes(`agents/${encodeURIComponent(entry.file)}`);
+    const policy = new Policy(buffer);
     const { command, curve = null } = entry;
-    return this.add({
-      id,
-      title: TITLES[id] ?? id,
-      text: describe(policy),
-      command,
-      curve,
-      policy,
-    });
+    const title = titleOf(entry);
+    return this.add({ id, title, text: describe(policy), command, curve, policy });
   }
 
-  /// Reads and checks a visitor's file. Throws BadFile.
+  /// Reads and checks a visitor's file. Throws BadInput.
   async open(file: File): Promise<Agent> {
-    if (file.size > MAX_FILE_BYTES) throw new BadFile('it is larger than 16 MB');
-    const policy = new Policy(await file.arrayBuffer());
+    if (file.size > MAX_FILE_BYTES) throw new BadInput('it is larger than 16 MB');
+    const bytes = await file.arrayBuffer().catch(() => {
+      throw new BadInput('it cannot be read');
+    });
+    const policy = new Policy(bytes);
     const title = `${file.name} (yours)`;
     const text = describe(policy);
-    return this.add({ id: 'own', title, text, command: null, curve: null, policy });
+    return this.add({ id: OWN, title, text, command: null, curve: null, policy });
   }
 
   private add(agent: Agent): Agent {

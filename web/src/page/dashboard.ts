@@ -1,6 +1,7 @@
 import type { History } from '../history';
 import { energyTarget } from '../pendulum';
 import type { State } from '../pendulum';
+import type { Decision, Policy } from '../policy';
 import { PhasePortrait, QBars, SECONDS_SHOWN, signed, Strip } from '../view/charts';
 import type { World } from '../world';
 import { element } from './dom';
@@ -54,14 +55,15 @@ export class Dashboard {
       ],
     });
     this.phase.draw(moments);
-    this.bars.draw(world.policy, world.thought);
+    this.bars.draw(world.policy, world.decision);
     if (this.frame % (5 * FRAMES) === 1) this.tell(world, history);
   }
 
   /// The numbers change a few times a second, so that they can be read.
   private tell(world: World, history: History): void {
+    const { plant, policy, decision } = world;
+    element('q-value').textContent = policy && decision ? qText(policy, decision) : '';
     const last = history.last;
-    const { plant, thought } = world;
     if (!last) return;
     const target = energyTarget(plant);
     const joules = (2 * last.energy - 1) * target;
@@ -69,23 +71,24 @@ export class Dashboard {
     element('height-value').textContent =
       `${(last.height * (plant.length1 + plant.length2)).toFixed(2)} m`;
     element('torque-value').textContent = `${signed(Number(last.torque.toFixed(2)))} N·m`;
-    element('q-value').textContent = thought
-      ? qText(thought.q[thought.action]!, thought.value)
-      : '';
   }
 }
 
-function qText(best: number, value: number): string {
-  const text = `best ${best.toFixed(2)}`;
-  return Number.isNaN(value) ? text : `${text}, state ${value.toFixed(2)}`;
+/// In units of the reward.
+function qText(policy: Policy, { q, action, value }: Decision): string {
+  const reward = (x: number) => (x / policy.rewardScale).toFixed(1);
+  const text = `best ${reward(q[action]!)}`;
+  return Number.isNaN(value) ? text : `${text}, state ${reward(value)}`;
 }
+
+const BALANCED = 1; // s upright, from which on it is no swing through the top
 
 /// What the pendulum does, in words.
 export function situation(world: World): { state: string; text: string } {
-  if (world.uprightSince !== null) {
-    const seconds = (world.time - world.uprightSince).toFixed(1);
-    return { state: 'balanced', text: `balanced for ${seconds} s` };
-  }
+  const upright = world.time - (world.uprightSince ?? world.time);
+  if (upright >= BALANCED)
+    return { state: 'balanced', text: `balanced for ${upright.toFixed(1)} s` };
+  if (world.uprightSince !== null) return { state: 'upright', text: 'upright' };
   if (world.agentOn) return { state: 'swinging', text: 'swinging up' };
   return isAtRest(world.state)
     ? { state: 'hanging', text: 'hanging' }

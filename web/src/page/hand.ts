@@ -6,13 +6,24 @@ import type { World } from '../world';
 
 const NEAR = 28; // pixels from a link within which it is grabbed: a fingertip
 
+const MOVED = 4; // pixels, from which on a touch is a drag
+
+/// What a mouse or finger holds.
+interface Held {
+  link: 1 | 2;
+  along: number; // m from the link's hinge
+  pointer: number;
+  from: Vec;
+  moved: boolean;
+}
+
 /// Lets mouse and finger grab the pendulum: to drag it while it moves, to pose it while it is paused.
 export class Hand {
   private readonly world: World;
   private readonly scene: Scene;
   private readonly paused: () => boolean;
   private readonly onPose: () => void;
-  private held: { link: 1 | 2; along: number } | null = null;
+  private held: Held | null = null;
 
   constructor(world: World, scene: Scene, paused: () => boolean, onPose: () => void) {
     this.world = world;
@@ -23,15 +34,14 @@ export class Hand {
     // A finger on the pendulum does not scroll the page; one beside it does.
     const keep = (event: TouchEvent) => {
       const { left, top } = canvas.getBoundingClientRect();
-      const touch = event.touches[0]!;
-      const place = scene.toPlane(touch.clientX - left, touch.clientY - top);
-      if (this.nearest(place)) event.preventDefault();
+      const { clientX, clientY } = event.changedTouches[0]!;
+      if (this.nearest(scene.toPlane(clientX - left, clientY - top))) event.preventDefault();
     };
     canvas.addEventListener('touchstart', keep, { passive: false });
     canvas.addEventListener('pointerdown', (event) => this.grab(event));
     canvas.addEventListener('pointermove', (event) => this.move(event));
     for (const end of ['pointerup', 'pointercancel', 'lostpointercapture'] as const) {
-      canvas.addEventListener(end, () => this.release());
+      canvas.addEventListener(end, (event) => this.release(event));
     }
   }
 
@@ -40,32 +50,41 @@ export class Hand {
   }
 
   private grab(event: PointerEvent): void {
+    if (this.held || event.button !== 0) return; // one hand, and the left button of a mouse
     const place = this.at(event);
-    this.held = this.nearest(place);
-    if (!this.held) return;
+    const nearest = this.nearest(place);
+    if (!nearest) return;
     event.preventDefault();
     this.scene.canvas.element.setPointerCapture(event.pointerId);
+    this.held = { ...nearest, pointer: event.pointerId, from: place, moved: false };
     this.hold(place);
   }
 
   private move(event: PointerEvent): void {
     const place = this.at(event);
-    this.scene.canvas.element.style.cursor = this.held || this.nearest(place) ? 'grab' : '';
-    if (this.held) this.hold(place);
+    if (!this.held) {
+      this.scene.canvas.element.style.cursor = this.nearest(place) ? 'grab' : '';
+    } else if (this.held.pointer === event.pointerId) {
+      const distance = Math.hypot(place.x - this.held.from.x, place.z - this.held.from.z);
+      this.held.moved ||= this.scene.toPixels(distance) > MOVED;
+      this.hold(place);
+    }
   }
 
-  private release(): void {
+  private release(event: PointerEvent): void {
+    if (this.held?.pointer !== event.pointerId) return;
     this.held = null;
     this.world.drag = null;
   }
 
   private hold(target: Vec): void {
-    if (this.paused()) {
+    const { link, along, moved } = this.held!;
+    if (!this.paused()) {
+      this.world.drag = { link, along, target };
+    } else if (moved) {
       this.world.drag = null;
       this.world.reset(this.posed(target));
       this.onPose();
-    } else {
-      this.world.drag = { ...this.held!, target };
     }
   }
 

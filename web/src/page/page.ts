@@ -1,73 +1,75 @@
 import { History } from '../history';
-import { BadFile } from '../safetensors';
+import { BadInput } from '../safetensors';
 import { LearningCurve } from '../view/charts';
 import { Scene } from '../view/scene';
-import { pointOn, World } from '../world';
+import { pointOn } from '../world';
+import type { World } from '../world';
+import { OWN } from './agents';
 import type { Agent, Agents } from './agents';
 import { Clock } from './clock';
 import { Dashboard, situation } from './dashboard';
 import { button, element } from './dom';
 import { Hand } from './hand';
+import { listenToKeys } from './keys';
+import { warn, hideMessage, note } from './message';
 import { RANGES, Settings } from './settings';
-import { decode, encode } from './share';
+import { BEGINNING, decode, encode } from './share';
+import type { Shared } from './share';
+import { changeTheme, onThemeChange } from './theme';
 
 const REMEMBERED = 60; // s of history
+const ADDRESS_DELAY = 300; // ms: browsers refuse an address that changes with each pixel of a slider
 
 /// What stands on the page, and what its buttons do.
 export class Page {
   readonly world: World;
   readonly clock: Clock;
-  readonly history = new History(REMEMBERED);
   readonly agents: Agents;
+  readonly scene = new Scene();
+  private readonly history = new History(REMEMBERED);
   private readonly settings: Settings;
-  private readonly scene = new Scene();
   private readonly dashboard = new Dashboard();
   private readonly curve = new LearningCurve();
   private readonly still = matchMedia('(prefers-reduced-motion: reduce)');
   private agent: Agent | null = null;
+  private requests = 0; // for agents; the last one counts
   private paused = false;
-  private told = ''; // the last situation that was read out
+  private announced = ''; // the last situation that was read out
+  private addressTimer = 0;
 
   constructor(world: World, agents: Agents) {
     this.world = world;
     this.agents = agents;
     this.clock = new Clock(world);
-    this.settings = new Settings(world, () => this.remember());
+    this.settings = new Settings(world, () => this.changed());
     world.onMoment = (moment) => this.history.add(moment);
-    new Hand(
-      world,
-      this.scene,
-      () => this.paused,
-      () => this.restarted(),
-    );
-    this.listen();
   }
 
-  /// Begins with what the address says.
+  /// Begins with what the address says, anew.
   async open(): Promise<void> {
     const { shared, problems } = decode(location.hash, RANGES);
-    this.settings.setPlant(shared.plant);
-    this.settings.setDisturbance(shared.sensor_noise, shared.delay);
-    this.setSpeed(shared.speed);
-    this.world.reset();
     if (shared.agent !== null && !this.agents.has(shared.agent)) {
       problems.push(`unknown agent "${shared.agent}"`);
       shared.agent = null;
     }
-    await this.choose(shared.agent ?? this.agents.list[0]!.id);
-    this.setAgentOn(shared.on && this.agent !== null);
-    if (problems.length > 0) this.say(`The link was not understood: ${problems.join('; ')}.`);
+    this.world.agentOn = false;
+    if (!(await this.choose(shared.agent ?? this.agents.list[0]!.id)) && !this.agent) return;
+    this.apply(shared);
+    this.world.reset();
+    this.restarted();
+    if (problems.length > 0) warn(`The link was not understood: ${problems.join('; ')}.`);
   }
 
-  /// Draws, and goes on by itself.
+  /// Takes what people do, draws, and goes on by itself.
   run(): void {
+    this.listen();
     let before = performance.now();
     const frame = (now: number) => {
       const seconds = Math.max(0, now - before) / 1000;
       before = now;
       if (!this.paused && !this.clock.advance(seconds)) {
         this.restarted();
-        this.say('The simulation blew up with these settings; the pendulum hangs again.');
+        warn('The simulation blew up with these settings; the pendulum hangs again.');
       }
       this.draw();
       requestAnimationFrame(frame);
@@ -75,58 +77,90 @@ export class Page {
     requestAnimationFrame(frame);
   }
 
-  /// Takes another agent. One that cannot be had is told, and the old one stays.
-  async choose(id: string): Promise<void> {
-    await this.take(() => this.agents.get(id), `Agent "${id}"`);
+  /// Takes another agent; false if it cannot be had, which is told, and the old one stays.
+  choose(id: string): Promise<boolean> {
+    return this.take(() => this.agents.get(id), `Agent "${id}"`);
   }
 
-  /// Takes a visitor's own policy.
+  /// Takes a visitor's own policy, and gives it the plant that it was trained on.
   async openFile(file: File): Promise<void> {
-    await this.take(() => this.agents.open(file), file.name);
+    if (!(await this.take(() => this.agents.open(file), file.name))) return;
+    this.settings.setPlant(this.agent!.policy.plant);
+    this.changed();
   }
 
-  private async take(get: () => Promise<Agent>, name: string): Promise<void> {
+  private async take(get: () => Promise<Agent>, name: string): Promise<boolean> {
+    const request = ++this.requests;
     try {
-      this.agent = await get();
-      this.world.policy = this.agent.policy;
-      this.settings.mark(this.agent.policy);
-      this.say('');
+      const agent = await get();
+      if (request !== this.requests) return false; // another was asked for meanwhile
+      this.agent = agent;
+      this.world.policy = agent.policy;
+      this.settings.mark(agent.policy);
+      hideMessage();
     } catch (error) {
-      if (!(error instanceof BadFile || error instanceof TypeError)) throw error;
-      this.say(`${name} cannot be used: ${error.message}.`);
+      if (!(error instanceof BadInput)) throw error;
+      if (request !== this.requests) return false;
+      warn(`${name} cannot be used: ${error.message}.`);
+      this.showAgent();
+      return false;
     }
     this.showAgent();
-    this.remember();
+    this.changed();
+    return true;
   }
 
   private showAgent(): void {
     const options = this.agents.list.map(({ id, title }) => new Option(title, id));
     element<HTMLSelectElement>('agent').replaceChildren(...options);
+    element<HTMLButtonElement>('agent-on').disabled = this.agent === null;
     if (!this.agent) return;
     element<HTMLSelectElement>('agent').value = this.agent.id;
     element('agent-text').textContent = this.agent.text;
     element('agent-command').hidden = this.agent.command === null;
     element('agent-command').firstElementChild!.textContent = this.agent.command;
-    const steps = this.agent.policy.metadata.get('step');
-    element('curve-value').textContent = steps
-      ? `best after ${Number(steps).toLocaleString('en')} steps`
+    const step = Number(this.agent.policy.metadata.get('step') ?? NaN);
+    element('curve-value').textContent = Number.isFinite(step)
+      ? `best after ${step.toLocaleString('en')} steps`
       : '';
     this.curve.draw(this.agent.curve);
   }
 
   private listen(): void {
-    button('agent-on', () => this.setAgentOn(!this.world.agentOn));
-    button('pause', () => this.setPaused(!this.paused));
-    button('step', () => this.step());
-    button('reset', () => this.reset());
-    button('shove-left', () => this.world.shoveTo(-1));
-    button('shove-right', () => this.world.shoveTo(1));
+    new Hand(
+      this.world,
+      this.scene,
+      () => this.paused,
+      () => this.restarted(),
+    );
+    const toggleAgent = () => this.setAgentOn(!this.world.agentOn);
+    const togglePause = () => this.setPaused(!this.paused);
+    const step = () => this.step();
+    const reset = () => this.reset();
+    const shoveLeft = () => this.world.shoveTo(-1);
+    const shoveRight = () => this.world.shoveTo(1);
+    listenToKeys({ toggleAgent, togglePause, step, reset, shoveLeft, shoveRight });
+    button('agent-on', toggleAgent);
+    button('pause', togglePause);
+    button('step', step);
+    button('reset', reset);
+    button('shove-left', shoveLeft);
+    button('shove-right', shoveRight);
     button('plant-reset', () => this.resetSettings());
     button('share', () => void this.share());
     button('save', () => this.save());
-    button('theme', () => this.changeTheme());
+    button('theme', changeTheme);
     const speed = element<HTMLInputElement>('speed');
     speed.addEventListener('input', () => this.setSpeed(Number(speed.value)));
+    this.listenToAgents();
+    addEventListener('hashchange', () => void this.open());
+    onThemeChange(() => this.repaint());
+    new ResizeObserver(() => this.curve.draw(this.agent?.curve ?? null)).observe(
+      this.curve.canvas.element,
+    );
+  }
+
+  private listenToAgents(): void {
     const agent = element<HTMLSelectElement>('agent');
     agent.addEventListener('change', () => void this.choose(agent.value));
     const file = element<HTMLInputElement>('file');
@@ -140,45 +174,19 @@ export class Page {
       const dropped = event.dataTransfer?.files[0];
       if (dropped) void this.openFile(dropped);
     });
-    addEventListener('hashchange', () => void this.open());
-    addEventListener('keydown', (event) => this.key(event));
-    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.repaint());
-    new ResizeObserver(() => this.curve.draw(this.agent?.curve ?? null)).observe(
-      this.curve.canvas.element,
-    );
-  }
-
-  private key(event: KeyboardEvent): void {
-    const actions: Record<string, () => void> = {
-      g: () => this.setAgentOn(!this.world.agentOn),
-      ' ': () => this.setPaused(!this.paused),
-      '.': () => this.step(),
-      r: () => this.reset(),
-      ArrowLeft: () => this.world.shoveTo(-1),
-      ArrowRight: () => this.world.shoveTo(1),
-    };
-    // Keys that mean something where the focus is are left alone.
-    const target = event.target as HTMLElement;
-    if (event.ctrlKey || event.altKey || event.metaKey) return;
-    if (target.closest('input, select, textarea')) return;
-    if (event.key === ' ' && target.closest('button, summary')) return;
-    const action = actions[event.key.length === 1 ? event.key.toLowerCase() : event.key];
-    if (!action) return;
-    event.preventDefault();
-    action();
   }
 
   private setAgentOn(on: boolean): void {
+    if (!this.agent) return;
     this.world.agentOn = on;
     element('agent-on').ariaPressed = String(on);
-    this.remember();
+    this.changed();
   }
 
   private setPaused(paused: boolean): void {
     this.paused = paused;
     this.world.drag = null;
     this.clock.settle();
-    element('pause').ariaPressed = String(paused);
     element('pause').textContent = paused ? 'Go on' : 'Pause';
   }
 
@@ -186,13 +194,15 @@ export class Page {
     this.clock.speed = speed;
     element<HTMLInputElement>('speed').value = String(speed);
     element('speed-value').textContent = `${speed}×`;
-    this.remember();
+    this.changed();
   }
 
   /// One control step, after which the page is paused.
   private step(): void {
     this.setPaused(true);
-    this.world.advanceToControl();
+    const valid = this.world.advanceToControl();
+    if (!valid) this.restarted();
+    this.world.look();
     this.clock.settle();
   }
 
@@ -208,18 +218,31 @@ export class Page {
     this.scene.clearTrail();
   }
 
+  /// Pendulum, sensors and motor as at the beginning.
   private resetSettings(): void {
-    const { shared } = decode('', RANGES);
-    this.settings.setPlant(shared.plant);
-    this.settings.setDisturbance(shared.sensor_noise, shared.delay);
-    this.remember();
+    const { agentOn: on } = this.world;
+    this.apply({ ...BEGINNING, on, speed: this.clock.speed });
   }
 
-  /// Keeps the address up to date, so that it can be shared at any time.
-  private remember(): void {
-    const own = this.agent?.id === 'own';
+  private apply(shared: Shared): void {
+    this.settings.setPlant(shared.plant);
+    this.settings.setDisturbance(shared.sensor_noise, shared.delay);
+    this.setSpeed(shared.speed);
+    this.setAgentOn(shared.on);
+    if (this.paused) this.world.look();
+  }
+
+  /// A setting is another: the address follows, so that it can be shared at any time.
+  private changed(): void {
+    clearTimeout(this.addressTimer);
+    this.addressTimer = window.setTimeout(() => this.writeAddress(), ADDRESS_DELAY);
+  }
+
+  private writeAddress(): void {
+    clearTimeout(this.addressTimer);
+    const id = this.agent?.id ?? null;
     const hash = encode({
-      agent: own ? null : (this.agent?.id ?? null),
+      agent: id === OWN ? null : id,
       on: this.world.agentOn,
       speed: this.clock.speed,
       plant: this.world.plant,
@@ -229,12 +252,13 @@ export class Page {
   }
 
   private async share(): Promise<void> {
-    this.remember();
+    this.writeAddress();
+    const own = this.agent?.id === OWN ? ' (without your policy, which stays with you)' : '';
     try {
       await navigator.clipboard.writeText(location.href);
-      this.say('The link is in the clipboard.');
+      note(`The link is in the clipboard${own}.`);
     } catch {
-      this.say(`The link is ${location.href}`);
+      note(`The link${own}: ${location.href}`);
     }
   }
 
@@ -244,13 +268,6 @@ export class Page {
     link.download = 'trajectory.csv';
     link.click();
     URL.revokeObjectURL(link.href);
-  }
-
-  private changeTheme(): void {
-    const root = document.documentElement;
-    const dark = getComputedStyle(root).getPropertyValue('--scheme').trim() === 'dark';
-    root.dataset.theme = dark ? 'light' : 'dark';
-    this.repaint();
   }
 
   private repaint(): void {
@@ -271,17 +288,11 @@ export class Page {
     const badge = element('badge');
     badge.textContent = this.paused ? `paused, ${text}` : text;
     badge.dataset.state = state;
-    if (state !== this.told) {
-      // Read out when it changes, not at each tenth of a second.
-      this.told = state;
-      const words = state === 'balanced' ? 'balanced' : text;
-      element('live').textContent = words;
-      this.scene.canvas.element.ariaLabel = `The pendulum: ${words}`;
-    }
-  }
-
-  private say(text: string): void {
-    element('message').textContent = text;
-    element('message').hidden = text === '';
+    if (state === this.announced) return;
+    // Read out when it changes, not at each tenth of a second.
+    this.announced = state;
+    const words = state === 'balanced' ? 'balanced' : text;
+    element('live').textContent = words;
+    this.scene.canvas.element.ariaLabel = `The pendulum: ${words}`;
   }
 }

@@ -1,4 +1,4 @@
-import { NOMINAL } from '../pendulum';
+import { CONTROL_PERIOD, NOMINAL } from '../pendulum';
 import type { Parameter, Plant } from '../pendulum';
 import type { Policy } from '../policy';
 import type { World } from '../world';
@@ -102,7 +102,8 @@ export class Settings {
   /// Marks on each slider what this policy was trained on.
   mark(policy: Policy): void {
     for (const [name, slider] of this.plant) slider.trained = policy.trainedRange(name);
-    this.disturbance.sensor_noise.trained = null;
-    this.disturbance.delay.trained = null;
+    this.disturbance.sensor_noise.trained = policy.trainedDisturbance('sensor_noise');
+    const [least, most] = policy.trainedDisturbance('delay');
+    this.disturbance.delay.trained = [least / CONTROL_PERIOD, most / CONTROL_PERIOD];
   }
 }

@@ -1,6 +1,6 @@
 import { expect, test } from 'vitest';
 import { NOMINAL } from '../pendulum';
-import { decode, encode } from './share';
+import { BEGINNING, decode, encode } from './share';
 import type { Range, Shared } from './share';
 
 const RANGES: ReadonlyMap<string, Range> = new Map<string, Range>([
@@ -10,15 +10,6 @@ const RANGES: ReadonlyMap<string, Range> = new Map<string, Range>([
   ['sensor_noise', [0, 0.2]],
   ['delay', [0, 5]],
 ]);
-const BEGINNING: Shared = {
-  agent: null,
-  on: false,
-  speed: 1,
-  plant: { ...NOMINAL },
-  sensor_noise: 0,
-  delay: 0,
-};
-
 test('what is as at the beginning needs no link', () => {
   expect(encode(BEGINNING)).toBe('');
   expect(decode('', RANGES)).toEqual({ shared: BEGINNING, problems: [] });

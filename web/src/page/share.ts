@@ -11,6 +11,16 @@ export interface Shared {
   delay: number; // control periods
 }
 
+/// How the page begins.
+export const BEGINNING: Readonly<Shared> = {
+  agent: null,
+  on: false,
+  speed: 1,
+  plant: NOMINAL,
+  sensor_noise: 0,
+  delay: 0,
+};
+
 export type Range = readonly [number, number];
 
 /// As the part of an address behind #; only what differs from the beginning.
@@ -32,14 +42,7 @@ export function decode(
   hash: string,
   ranges: ReadonlyMap<string, Range>,
 ): { shared: Shared; problems: string[] } {
-  const shared: Shared = {
-    agent: null,
-    on: false,
-    speed: 1,
-    plant: { ...NOMINAL },
-    sensor_noise: 0,
-    delay: 0,
-  };
+  const shared: Shared = { ...BEGINNING, plant: { ...NOMINAL } };
   const problems: string[] = [];
   for (const [name, text] of new URLSearchParams(hash.replace(/^#/, ''))) {
     const range = ranges.get(name);

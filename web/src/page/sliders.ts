@@ -37,11 +37,13 @@ export class Slider {
     this.output.htmlFor.add(spec.name);
     this.back.ariaLabel = `Reset ${spec.label}`;
     input.addEventListener('input', () => {
+      input.step = String(spec.step); // a link may have brought a value between two steps
       this.show();
       onInput(this.value);
     });
     this.back.addEventListener('click', () => {
       this.value = spec.initial;
+      this.input.focus(); // the button disables itself
       onInput(this.value);
     });
     this.value = spec.initial;

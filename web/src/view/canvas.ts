@@ -17,7 +17,9 @@ export class Canvas {
   color(name: string): string {
     let color = this.colors.get(name);
     if (color === undefined) {
-      color = getComputedStyle(this.element).getPropertyValue(`--${name}`).trim();
+      // Through the canvas's own colour, which nothing else needs: so light-dark() is resolved.
+      this.element.style.color = `var(--${name})`;
+      color = getComputedStyle(this.element).color;
       this.colors.set(name, color);
     }
     return color;

@@ -1,5 +1,5 @@
-import type { Policy } from '../policy';
-import type { Moment, Thought } from '../world';
+import type { Decision, Policy } from '../policy';
+import type { Moment } from '../world';
 import { Canvas } from './canvas';
 
 export const SECONDS_SHOWN = 10;
@@ -128,11 +128,11 @@ export class QBars {
   readonly canvas = new Canvas('q');
   private room = 1; // from the bottom of the chart to the largest
 
-  draw(policy: Policy | null, thought: Thought | null): void {
+  draw(policy: Policy | null, decision: Decision | null): void {
     const { canvas } = this;
     canvas.clear();
-    if (!policy || !thought) return;
-    const { q, action } = thought;
+    if (!policy || !decision) return;
+    const { q, action } = decision;
     const best = q[action]!;
     // The scale grows at once and shrinks slowly.
     const spread = Math.max(0.05, 1.1 * (best - Math.min(...q)));
@@ -148,9 +148,10 @@ export class QBars {
   }
 }
 
-/// With a sign that is as wide as a digit.
+/// Three digits, with a sign that is as wide as one.
 export function signed(value: number): string {
-  return value < 0 ? `−${-value}` : `${value}`;
+  const text = String(Number(Math.abs(value).toPrecision(3)));
+  return value < 0 ? `−${text}` : text;
 }
 
 export interface Curve {

@@ -22,6 +22,12 @@ export class Scene {
     return { x: (px - width / 2) / this.scale, z: (height / 2 - py) / this.scale };
   }
 
+  /// And back.
+  at({ x, z }: Vec): [number, number] {
+    const { width, height } = this.canvas;
+    return [width / 2 + this.scale * x, height / 2 - this.scale * z];
+  }
+
   /// Pixels of this many metres.
   toPixels(metres: number): number {
     return metres * this.scale;
@@ -53,11 +59,6 @@ export class Scene {
     canvas.disc(...this.at(elbow), 4, 'panel');
     this.drawTorque(world.torque / plant.torque_limit);
     this.drawPush(world, state);
-  }
-
-  private at({ x, z }: Vec): [number, number] {
-    const { width, height } = this.canvas;
-    return [width / 2 + this.scale * x, height / 2 - this.scale * z];
   }
 
   /// How far the tip reaches, and the cone within which a link is upright.

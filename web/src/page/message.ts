@@ -1,0 +1,29 @@
+import { button, element } from './dom';
+
+const NOTE_SECONDS = 6;
+let timer = 0;
+
+function show(text: string, kind: 'warning' | 'note'): void {
+  clearTimeout(timer);
+  element('message-text').textContent = text;
+  element('message').dataset.kind = kind;
+  element('message').hidden = false;
+}
+
+/// What went wrong; stays until it is closed.
+export function warn(text: string): void {
+  show(text, 'warning');
+}
+
+/// What went well; goes by itself.
+export function note(text: string): void {
+  show(text, 'note');
+  timer = window.setTimeout(hideMessage, 1000 * NOTE_SECONDS);
+}
+
+export function hideMessage(): void {
+  clearTimeout(timer);
+  element('message').hidden = true;
+}
+
+button('message-close', hideMessage);
