@@ -114,8 +114,8 @@ ordered_json Models() {
 /// N·m, one for each control step.
 std::vector<double> DrawTorques(int steps, const std::string& stream) {
   Rng rng(0, stream);
-  std::vector<double> torques;
-  for (int i = 0; i < steps; ++i) torques.push_back(1.25 * (static_cast<double>(rng.Below(9)) - 4));
+  std::vector<double> torques(static_cast<size_t>(steps));
+  for (double& torque : torques) torque = 1.25 * (static_cast<double>(rng.Below(9)) - 4);
   return torques;
 }
 
