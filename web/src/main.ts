@@ -6,6 +6,7 @@ import { Page } from './page/page';
 import { World } from './world';
 
 try {
+  element('loading').hidden = false;
   const progress = element<HTMLProgressElement>('progress');
   const [simulator, agents] = await Promise.all([
     startSimulator((share) => (progress.value = share)),

@@ -2,6 +2,8 @@ import type { MainModule, MjData, MjModel } from '@mujoco/mujoco';
 import { CAPSULE_RADIUS, capsuleInertia, HANGING, mjcf, NOMINAL } from './pendulum';
 import type { Plant, State } from './pendulum';
 
+const FASTEST = 150; // rad/s, 0.75 rad in a step
+
 /// A point in the pendulum's plane: x to the right, z up, the pivot at 0 (m); or a force (N).
 export interface Vec {
   x: number;
@@ -64,7 +66,7 @@ export class Simulator {
   }
 
   /// One physics step, 0.005 s, under a torque (N·m) and perhaps a push. False if the state has blown
-  /// up: MuJoCo then starts again from hanging.
+  /// up, or spins so fast that steps of this size do not follow it: then it hangs again.
   step(torque: number, push: Push | null): boolean {
     const { data } = this;
     const before = data.time;
@@ -72,7 +74,9 @@ export class Simulator {
     data.xfrc_applied.fill(0);
     if (push) this.apply(push);
     this.mujoco.mj_step(this.model, data);
-    if (data.time > before && Number.isFinite(data.qpos[0] + data.qpos[1])) return true;
+    const { q1, q2, w1, w2 } = this.state;
+    const slow = Math.abs(w1) < FASTEST && Math.abs(w2) < FASTEST;
+    if (data.time > before && Number.isFinite(q1 + q2) && slow) return true;
     this.mujoco.mj_resetData(this.model, data);
     this.state = HANGING;
     return false;
@@ -86,10 +90,5 @@ export class Simulator {
     const arm = { x: -Math.sin(angle) * (along - centre), z: -Math.cos(angle) * (along - centre) };
     this.data.xfrc_applied.set([force.x, 0, force.z], 6 * link);
     this.data.xfrc_applied[6 * link + 4] = arm.z * force.x - arm.x * force.z;
-  }
-
-  dispose(): void {
-    this.data.delete();
-    this.model.delete();
   }
 }

@@ -19,7 +19,8 @@ export const STEPS_PER_SECOND = 200; // of physics
 const SPRING = 60; // N/m, of the hand that drags
 const DAMPER = 5; // N·s/m
 const STRONGEST = 15; // N
-const SHOVE = 3; // N, sideways at the tip
+const SHOVE = 0.4; // N, sideways at the tip; those in quick succession add up
+const STRONGEST_SHOVE = 6; // N
 const SHOVE_STEPS = 20; // 0.1 s
 
 /// One moment, at each control step.
@@ -54,7 +55,7 @@ export class World {
   private readonly motor = new DelayLine();
   private steps = 0; // of physics, in all
   private untilControl = 0; // steps until the agent chooses again
-  private shove = { direction: 0, steps: 0 };
+  private shove = { force: 0, steps: 0 };
 
   constructor(simulator: Simulator) {
     this.simulator = simulator;
@@ -96,12 +97,15 @@ export class World {
     this.torque = 0;
     this.push = null;
     this.shove.steps = 0;
-    this.uprightSince = null;
+    this.uprightSince = inverted(state) ? this.time : null;
     this.look();
   }
 
   shoveTo(direction: -1 | 1): void {
-    this.shove = { direction, steps: SHOVE_STEPS };
+    const before = this.shove.steps > 0 ? this.shove.force : 0;
+    const force = before + SHOVE * direction;
+    const limited = Math.min(Math.max(force, -STRONGEST_SHOVE), STRONGEST_SHOVE);
+    this.shove = { force: limited, steps: SHOVE_STEPS };
   }
 
   /// One physics step. The agent chooses a torque before each fourth. False if the state blew up and
@@ -174,8 +178,7 @@ export class World {
 
   private shoving(): Push | null {
     if (this.shove.steps === 0) return null;
-    const force = { x: SHOVE * this.shove.direction, z: 0 };
-    return { link: 2, along: this.plant.length2, force };
+    return { link: 2, along: this.plant.length2, force: { x: this.shove.force, z: 0 } };
   }
 }
 

@@ -62,13 +62,35 @@ test('of two agents that are asked for, the last one counts', async ({ page }) =
   expect(await page.evaluate(() => upswing.world.policy!.network.shape.hidden)).toEqual([64, 64]);
 });
 
-test('before and after the agent acts, its Q-values are those of what is seen', async ({
-  page,
-}) => {
+test('a pendulum that is posed is judged at once', async ({ page }) => {
   await open(page, '#agent=d3qn');
-  const best = () => page.evaluate(() => Math.max(...upswing.world.decision!.q));
   await startFrom(page, 0);
+  const best = () => page.evaluate(() => Math.max(...upswing.world.decision!.q));
   const hanging = await best();
+  await expect(page.locator('#height-value')).toHaveText('−1.00 m of 1.00 m');
   await startFrom(page, Math.PI);
-  expect(await best()).toBeGreaterThan(2 * hanging);
+  expect(await best()).toBeGreaterThan(1.5 * hanging);
+  await expect(page.locator('#height-value')).toHaveText('1.00 m of 1.00 m');
+  await expect(page.locator('#energy')).toHaveAccessibleName('Energy: 9.81 J of 9.81 J');
+  await expect(page.locator('#badge')).toHaveText('paused, upright');
+});
+
+test('what "Try this" promises is so', async ({ page }) => {
+  test.setTimeout(120_000);
+  await open(page);
+  const tries = await page
+    .locator('a[data-balances]')
+    .evaluateAll((links) =>
+      links.map((link) => [link.getAttribute('href')!, (link as HTMLElement).dataset.balances!]),
+    );
+  expect(tries.length).toBeGreaterThan(5);
+  for (const [hash, balances] of tries) {
+    await page.goto('about:blank');
+    await open(page, hash);
+    await startFrom(page, 0);
+    await run(page, 20);
+    const held = await balanced(page);
+    if (balances === 'yes') expect(held, hash).toBeGreaterThan(10);
+    else expect(held, hash).toBeLessThan(5);
+  }
 });

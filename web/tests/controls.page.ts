@@ -68,7 +68,7 @@ test('by keyboard alone', async ({ page }) => {
 test("a policy of one's own", async ({ page }) => {
   await open(page);
   await page.locator('#file').setInputFiles(policyPath('fast'));
-  await expect(page.locator('#agent')).toHaveValue('own:');
+  await expect(page.locator('#agent')).toHaveValue('own');
   await expect(page.locator('#agent-text')).toContainText('8-64-64');
   await expect(page.locator('#message')).toBeHidden();
 });
@@ -106,7 +106,7 @@ test('the trajectory can be saved', async ({ page }) => {
   await page.waitForTimeout(500);
   await page.getByRole('button', { name: 'Pause' }).click();
   const download = page.waitForEvent('download');
-  await page.getByRole('button', { name: 'Save trajectory' }).click();
+  await page.getByRole('button', { name: 'Save CSV' }).click();
   const csv = readFileSync(await (await download).path(), 'utf8').split('\n');
   expect(csv[0]).toBe('t,qpos0,qpos1,qvel0,qvel1,torque');
   expect(csv.length).toBeGreaterThan(5);

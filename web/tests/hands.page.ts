@@ -37,7 +37,7 @@ test('a shove moves it, to the side of its arrow', async ({ page }) => {
   }
 });
 
-test('the agent holds against a shove', async ({ page }) => {
+test('the agent holds against one shove, not against ten, and gets up again', async ({ page }) => {
   await open(page, '#agent=d3qn&on=1');
   await startFrom(page, Math.PI);
   await run(page, 3);
@@ -132,7 +132,7 @@ test('a finger that takes hold of the pendulum does not scroll', async ({ browse
         clientX: left + width / 2 + aside,
         clientY: top + height / 2 + 60,
       });
-      const event = new TouchEvent('touchstart', { touches: [touch], cancelable: true });
+      const event = new TouchEvent('touchstart', { changedTouches: [touch], cancelable: true });
       return !canvas.dispatchEvent(event);
     });
   });

@@ -1,6 +1,6 @@
 import { test as base, expect } from '@playwright/test';
 import type { Page } from '@playwright/test';
-import '../src/page/global';
+import type {} from '../src/page/global';
 
 /// A test whose page says nothing on the console, unless `complains` allows it.
 export const test = base.extend<{ complains: boolean; silent: void }>({

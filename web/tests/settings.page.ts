@@ -25,7 +25,7 @@ test('each slider changes the physics as in `upswing simulate`', async ({ page }
     const rows = await run(page, 3);
     expect(largestDifference(rows, free(`${name}=${value}`)), name).toBeLessThan(1e-9);
     expect(largestDifference(rows, nominal), name).toBeGreaterThan(0.05);
-    await page.getByRole('button', { name: 'Reset all' }).click();
+    await page.getByRole('button', { name: 'Reset sliders' }).click();
   }
   await startFrom(page, ...START);
   expect(largestDifference(await run(page, 3), nominal)).toBeLessThan(1e-9);

@@ -3,6 +3,7 @@ import type { Parameter } from '../pendulum';
 import { Policy } from '../policy';
 import { BadInput, MAX_FILE_BYTES } from '../safetensors';
 import type { Curve } from '../view/charts';
+import { OWN } from './share';
 
 /// The agents that the page comes with, and those that a visitor brings.
 
@@ -33,9 +34,6 @@ const TITLES = new Map([
   ['d3qn-randomized', 'Randomised Dueling Double DQN'],
 ]);
 
-/// A visitor's own; no entry of agents.json has such an ID.
-export const OWN = 'own:';
-
 /// Throws BadInput if nobody answers.
 export async function fetchFrom(address: string): Promise<Response> {
   try {
@@ -51,7 +49,7 @@ export async function readBytes(
   limit: number,
   onProgress: (bytes: number) => void = () => {},
 ): Promise<Uint8Array<ArrayBuffer>> {
-  if (!response.ok) throw new BadInput(`the server says ${response.status}`);
+  if (!response.ok) throw new BadInput(`${response.url}: the server says ${response.status}`);
   const pieces: Uint8Array[] = [];
   let bytes = 0;
   const reader = response.body!.getReader();
@@ -110,7 +108,8 @@ export class Agents {
   private readonly loaded = new Map<string, Agent>();
 
   private constructor(entries: Entry[]) {
-    this.entries = new Map(entries.map((entry) => [entry.id, entry]));
+    const others = entries.filter(({ id }) => id !== OWN);
+    this.entries = new Map(others.map((entry) => [entry.id, entry]));
   }
 
   /// Reads the list of agents. Throws BadInput.
@@ -135,8 +134,9 @@ export class Agents {
     return own ? [...list, { id: OWN, title: own.title }] : list;
   }
 
+  /// Of an agent that a link may name.
   has(id: string): boolean {
-    return this.entries.has(id) || this.loaded.has(id);
+    return this.entries.has(id);
   }
 
   /// Fetches and checks the policy when it is asked for the first time. Throws BadInput.

@@ -1,5 +1,5 @@
 import type { History } from '../history';
-import { energyTarget } from '../pendulum';
+import { energy, energyTarget, rewardTerms, tipHeight } from '../pendulum';
 import type { State } from '../pendulum';
 import type { Decision, Policy } from '../policy';
 import { PhasePortrait, QBars, SECONDS_SHOWN, signed, Strip } from '../view/charts';
@@ -46,6 +46,7 @@ export class Dashboard {
       ],
     });
     this.torque.draw(moments, now, {
+      timed: true,
       low: -1.1 * limit,
       high: 1.1 * limit,
       labels: [
@@ -56,22 +57,39 @@ export class Dashboard {
     });
     this.phase.draw(moments);
     this.bars.draw(world.policy, world.decision);
-    if (this.frame % (5 * FRAMES) === 1) this.tell(world, history);
+    if (this.frame % (5 * FRAMES) === 1) this.tell(world);
   }
 
   /// The numbers change a few times a second, so that they can be read.
-  private tell(world: World, history: History): void {
-    const { plant, policy, decision } = world;
-    element('q-value').textContent = policy && decision ? qText(policy, decision) : '';
-    const last = history.last;
-    if (!last) return;
+  private tell(world: World): void {
+    const { plant, policy, decision, state } = world;
     const target = energyTarget(plant);
-    const joules = (2 * last.energy - 1) * target;
-    element('energy-value').textContent = `${joules.toFixed(1)} J of ${target.toFixed(1)} J`;
-    element('height-value').textContent =
-      `${(last.height * (plant.length1 + plant.length2)).toFixed(2)} m`;
-    element('torque-value').textContent = `${signed(Number(last.torque.toFixed(2)))} N·m`;
+    const reach = plant.length1 + plant.length2;
+    tell('energy', `${fixed(energy(plant, state))} J of ${fixed(target)} J`);
+    tell('height', `${fixed(tipHeight(plant, state))} m of ${fixed(reach)} m`);
+    tell('torque', `${fixed(world.torque)} N·m`);
+    tell('q', policy && decision ? qText(policy, decision) : '');
+    element('reward').textContent = rewardText(rewardTerms(plant, state, world.torque));
   }
+}
+
+/// Beside a chart, and in its name for those who cannot see it.
+function tell(chart: string, text: string): void {
+  element(`${chart}-value`).textContent = text;
+  element(chart).ariaLabel = `${element(chart).dataset.name}: ${text}`;
+}
+
+/// Two digits behind the point, with a minus that is as wide as a digit.
+function fixed(value: number): string {
+  return value.toFixed(2).replace('-', '−');
+}
+
+function rewardText(terms: number[]): string {
+  const sum = terms.reduce((total, term) => total + term, 0);
+  const text = terms.map(
+    (term, i) => (i > 0 ? `${term < 0 ? '−' : '+'} ` : '') + Math.abs(term).toFixed(2),
+  );
+  return `${text.join(' ')} = ${sum.toFixed(2)}`;
 }
 
 /// In units of the reward.

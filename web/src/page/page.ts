@@ -4,7 +4,6 @@ import { LearningCurve } from '../view/charts';
 import { Scene } from '../view/scene';
 import { pointOn } from '../world';
 import type { World } from '../world';
-import { OWN } from './agents';
 import type { Agent, Agents } from './agents';
 import { Clock } from './clock';
 import { Dashboard, situation } from './dashboard';
@@ -13,7 +12,7 @@ import { Hand } from './hand';
 import { listenToKeys } from './keys';
 import { warn, hideMessage, note } from './message';
 import { RANGES, Settings } from './settings';
-import { BEGINNING, decode, encode } from './share';
+import { BEGINNING, decode, encode, OWN } from './share';
 import type { Shared } from './share';
 import { changeTheme, onThemeChange } from './theme';
 
@@ -49,7 +48,11 @@ export class Page {
   async open(): Promise<void> {
     const { shared, problems } = decode(location.hash, RANGES);
     if (shared.agent !== null && !this.agents.has(shared.agent)) {
-      problems.push(`unknown agent "${shared.agent}"`);
+      problems.push(
+        shared.agent === OWN
+          ? "it was made with somebody's own policy, which is not in it"
+          : `unknown agent "${shared.agent}"`,
+      );
       shared.agent = null;
     }
     this.world.agentOn = false;
@@ -57,7 +60,9 @@ export class Page {
     this.apply(shared);
     this.world.reset();
     this.restarted();
-    if (problems.length > 0) warn(`The link was not understood: ${problems.join('; ')}.`);
+    if (problems.length === 0) return;
+    const more = problems.length > 3 ? `; and ${problems.length - 3} more` : '';
+    warn(`Not all of the link could be used: ${problems.slice(0, 3).join('; ')}${more}.`);
   }
 
   /// Takes what people do, draws, and goes on by itself.
@@ -69,7 +74,7 @@ export class Page {
       before = now;
       if (!this.paused && !this.clock.advance(seconds)) {
         this.restarted();
-        warn('The simulation blew up with these settings; the pendulum hangs again.');
+        warn('The pendulum spun too fast to be computed; it hangs again.');
       }
       this.draw();
       requestAnimationFrame(frame);
@@ -91,6 +96,7 @@ export class Page {
 
   private async take(get: () => Promise<Agent>, name: string): Promise<boolean> {
     const request = ++this.requests;
+    element('agent-text').textContent = 'Loading …';
     try {
       const agent = await get();
       if (request !== this.requests) return false; // another was asked for meanwhile
@@ -171,7 +177,8 @@ export class Page {
     addEventListener('dragover', (event) => event.preventDefault());
     addEventListener('drop', (event) => {
       event.preventDefault();
-      const dropped = event.dataTransfer?.files[0];
+      const files = [...(event.dataTransfer?.files ?? [])];
+      const dropped = files.find(({ name }) => name.endsWith('.safetensors')) ?? files[0];
       if (dropped) void this.openFile(dropped);
     });
   }
@@ -229,11 +236,11 @@ export class Page {
     this.settings.setDisturbance(shared.sensor_noise, shared.delay);
     this.setSpeed(shared.speed);
     this.setAgentOn(shared.on);
-    if (this.paused) this.world.look();
   }
 
   /// A setting is another: the address follows, so that it can be shared at any time.
   private changed(): void {
+    if (this.paused) this.world.look();
     clearTimeout(this.addressTimer);
     this.addressTimer = window.setTimeout(() => this.writeAddress(), ADDRESS_DELAY);
   }
@@ -242,7 +249,7 @@ export class Page {
     clearTimeout(this.addressTimer);
     const id = this.agent?.id ?? null;
     const hash = encode({
-      agent: id === OWN ? null : id,
+      agent: id,
       on: this.world.agentOn,
       speed: this.clock.speed,
       plant: this.world.plant,
@@ -262,7 +269,9 @@ export class Page {
     }
   }
 
+  /// The last minute.
   private save(): void {
+    if (!this.history.last) return note('There is no trajectory yet.');
     const link = document.createElement('a');
     link.href = URL.createObjectURL(new Blob([this.history.csv()], { type: 'text/csv' }));
     link.download = 'trajectory.csv';

@@ -37,7 +37,7 @@ const PLANT: readonly Row[] = [
 const DISTURBANCE: readonly SliderSpec[] = [
   {
     name: 'sensor_noise',
-    label: 'Sensor noise',
+    label: 'Sensor noise (σ)',
     unit: 'rad, rad/s',
     min: 0,
     max: 0.2,
@@ -47,11 +47,12 @@ const DISTURBANCE: readonly SliderSpec[] = [
   {
     name: 'delay',
     label: 'Delay of the motor',
-    unit: '× 0.02 s',
+    unit: 'ms',
     min: 0,
     max: 5,
     step: 1,
     initial: 0,
+    format: (periods) => `${1000 * CONTROL_PERIOD * periods} ms`,
   },
 ];
 

@@ -1,6 +1,9 @@
 import { NOMINAL } from '../pendulum';
 import type { Parameter, Plant } from '../pendulum';
 
+/// Stands for a visitor's own policy, which no link can hold.
+export const OWN = 'own';
+
 /// What a link holds: the agent, whether it is on, and all that was changed.
 export interface Shared {
   agent: string | null;

@@ -8,6 +8,8 @@ export interface SliderSpec {
   max: number;
   step: number;
   initial: number;
+  /// How the value is shown; by default with its unit.
+  format?: (value: number) => string;
 }
 
 export class Slider {
@@ -75,7 +77,8 @@ export class Slider {
   }
 
   private show(): void {
-    const text = `${Number(this.value.toPrecision(4))} ${this.spec.unit}`;
+    const { unit, format = (value) => `${Number(value.toPrecision(4))} ${unit}` } = this.spec;
+    const text = format(this.value);
     this.output.textContent = text;
     this.input.ariaValueText = text;
     this.back.disabled = this.value === this.spec.initial;

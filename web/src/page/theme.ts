@@ -1,11 +1,27 @@
+/// Dark or light: the system's choice, until the visitor makes another, which is kept.
+
+const KEY = 'upswing-theme';
 const system = matchMedia('(prefers-color-scheme: dark)');
+const { dataset } = document.documentElement;
 const listeners: (() => void)[] = [];
 
-/// Dark for light, or the other way round; until then it is the system's choice.
+/// Browsers may forbid a page to keep anything.
+function storage<T>(use: (store: Storage) => T): T | null {
+  try {
+    return use(localStorage);
+  } catch {
+    return null;
+  }
+}
+
+const kept = storage((store) => store.getItem(KEY));
+if (kept === 'dark' || kept === 'light') dataset.theme = kept;
+
 export function changeTheme(): void {
-  const { dataset } = document.documentElement;
   const now = dataset.theme ?? (system.matches ? 'dark' : 'light');
-  dataset.theme = now === 'dark' ? 'light' : 'dark';
+  const theme = now === 'dark' ? 'light' : 'dark';
+  dataset.theme = theme;
+  storage((store) => store.setItem(KEY, theme));
   for (const listener of listeners) listener();
 }
 

@@ -8,6 +8,7 @@ interface StripScale {
   low: number;
   high: number;
   target?: number; // a line to reach
+  timed?: boolean; // says how long ago its left edge is
   labels: readonly (readonly [number, string])[];
 }
 
@@ -54,6 +55,7 @@ export class Strip {
       );
       canvas.context.setLineDash([]);
     }
+    if (scale.timed) canvas.text(`−${SECONDS_SHOWN} s`, left + 2, canvas.height - 6);
     canvas.line(
       moments.map((m) => [x(m.t), y(Math.min(Math.max(value(m), scale.low), scale.high))]),
       this.color,

@@ -68,8 +68,8 @@ export class Scene {
     const radius = this.scale * reach;
     context.beginPath();
     context.arc(x, y, radius, 0, 2 * Math.PI);
-    context.strokeStyle = this.canvas.color('faint');
-    context.lineWidth = 1;
+    context.strokeStyle = this.canvas.color('edge');
+    context.lineWidth = 0.5;
     context.stroke();
     context.beginPath();
     context.moveTo(x, y);
@@ -135,7 +135,7 @@ export class Scene {
     if (size < 0.05) return;
     const [x, y] = this.at(pointOn(plant, state, push.link, push.along).position);
     const [dx, dy] = [push.force.x / size, -push.force.z / size];
-    const length = 14 + 5 * size; // pixels
+    const length = Math.min(14 + 5 * size, this.room(x, y, dx, dy)); // pixels
     this.canvas.line(
       [
         [x, y],
@@ -145,6 +145,14 @@ export class Scene {
       4,
     );
     this.arrowHead(x + length * dx, y + length * dy, Math.atan2(dy, dx), 'push');
+  }
+
+  /// Pixels from a place to the edge of the canvas in some direction, less the head of an arrow.
+  private room(x: number, y: number, dx: number, dy: number): number {
+    const { width, height } = this.canvas;
+    const along = (at: number, step: number, end: number) =>
+      step > 0 ? (end - at) / step : step < 0 ? -at / step : Infinity;
+    return Math.max(0, Math.min(along(x, dx, width), along(y, dy, height)) - 12);
   }
 
   private arrowHead(x: number, y: number, direction: number, color: string): void {
