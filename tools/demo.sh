@@ -81,6 +81,7 @@ set_demo_option() {
     --dist)
       [ -n "$2" ] || bad_input "--dist: expected a folder, got an empty text"
       dist=${2%/}
+      dist=${dist:-/}
       [ ! -e "$dist" ] || { [ -d "$dist" ] && [ -z "$(ls -A -- "$dist")" ]; } ||
         bad_input "$dist: there is something already; expected a new or an empty folder"
       [ -d "$(dirname -- "$dist")" ] ||
