@@ -149,16 +149,22 @@ Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
   return config;
 }
 
-Config ReadRunConfig(const fs::path& run, const std::vector<FlagValue>& flags) {
-  const fs::path file = run / "config.toml";
-  const toml::table table = ParseToml(ReadTextFile(file), file.string());
+std::vector<std::string> MissingSettings(const std::string& text, const std::string& where,
+                                         bool identity_only) {
+  const toml::table table = ParseToml(text, where);
   Config scratch;
   const Options options = OptionsOf(scratch);
   std::vector<std::string> missing;
   for (const Option& option : options.all()) {
-    if (table[option.section][option.name]) continue;
+    if (table[option.section][option.name] || (identity_only && !option.identity)) continue;
     missing.push_back(Concat(option.section, ".", option.name));
   }
+  return missing;
+}
+
+Config ReadRunConfig(const fs::path& run, const std::vector<FlagValue>& flags) {
+  const fs::path file = run / "config.toml";
+  std::vector<std::string> missing = MissingSettings(ReadTextFile(file), file.string(), false);
   if (missing.empty()) return BuildConfig(file, flags);
   constexpr size_t kMostNames = 6;  // that make a line which can still be read
   const size_t more = missing.size() - std::min(missing.size(), kMostNames);
@@ -177,28 +183,6 @@ std::vector<Option> TrainingSettings(Config& config) {
     if (option.identity && !is_seed) settings.push_back(option);
   }
   return settings;
-}
-
-Config ConfigOf(const Policy& policy, const std::string& where) {
-  try {
-    Config config = BuildConfig("", {{"agent", policy.About("agent")}});
-    ApplyToml(OptionsOf(config), policy.About("config"), "metadata \"config\"");
-    return config;
-  } catch (const Error& error) {
-    throw BadInput(Concat(where, ": ", error.what()));
-  }
-}
-
-std::string TrainCommand(Config config) {
-  Config named = BuildConfig("", {{"agent", config.agent}});
-  const std::vector<Option> before = TrainingSettings(named);
-  const std::vector<Option> now = TrainingSettings(config);
-  std::string command =
-      Concat("./upswing train --agent ", config.agent, " --seed ", config.train.seed);
-  for (size_t i = 0; i < now.size(); ++i) {
-    if (now[i].text() != before[i].text()) command += ' ' + now[i].on_command_line();
-  }
-  return command;
 }
 
 std::string ConfigToml(Config config, bool identity_only) {

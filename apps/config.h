@@ -56,6 +56,10 @@ void SetFlags(const Options& options, const std::vector<FlagValue>& flags);
 /// < flags; a model file's plant counts as defaults. Throws BadInput.
 Config BuildConfig(const std::filesystem::path& file, const std::vector<FlagValue>& flags);
 
+/// The settings, such as agent.gamma, that TOML text of a run lacks: it is of another version then.
+std::vector<std::string> MissingSettings(const std::string& text, const std::string& where,
+                                         bool identity_only);
+
 /// The settings of a run folder, changed by the flags. Throws BadInput, too, if the run's own file
 /// lacks one: that run is of another version, and today's default is not what it was made with.
 Config ReadRunConfig(const std::filesystem::path& run, const std::vector<FlagValue>& flags = {});
@@ -70,14 +74,6 @@ void ExpectSameSettings(const Options& before, const Options& now, const std::st
 
 /// The settings that make a training another one, the seed aside; they point into `config`.
 std::vector<Option> TrainingSettings(Config& config);
-
-/// The settings that a policy was made with, as its file tells them. Throws BadInput that begins
-/// with `where`.
-Config ConfigOf(const Policy& policy, const std::string& where);
-
-/// The line that makes this training: its agent, its seed, and a flag for each setting that differs
-/// from the named agent's.
-std::string TrainCommand(Config config);
 
 /// The settings as TOML; without those that do not make another run of it, if `identity_only`.
 std::string ConfigToml(Config config, bool identity_only);

@@ -3,6 +3,7 @@
 
 #include "apps/config.h"
 #include "apps/export.h"
+#include "apps/train_command.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/text.h"
@@ -71,23 +72,23 @@ PageAgent ReadAgent(const fs::path& path, const std::string& given_id) {
                           ": was made with a model of its own, and the page shows the "
                           "built-in one alone"));
   }
-  const Config config = ConfigOf(policy, where);
+  const std::optional<std::string> command = TrainCommand(policy, where);
   const fs::path run = RunOf(loaded.path);
   std::string id = CleanId(run.filename().string());
-  if (id.empty()) id = CleanId(config.agent);
+  if (id.empty()) id = CleanId(policy.About("agent"));
   if (!given_id.empty()) id = given_id;
 
   PageAgent agent{id, path, ReadFile(loaded.path), {}};
   agent.entry = {{"id", id},
                  {"file", id + ".safetensors"},
-                 {"agent", config.agent},
-                 {"seed", config.train.seed},
-                 {"command", TrainCommand(config)},
+                 {"agent", policy.About("agent")},
+                 {"seed", static_cast<int64_t>(NumberAbout(policy, "seed", loaded.path))},
                  {"parameters", policy.num_parameters()},
                  {"success_rate", NumberAbout(policy, "success_rate", loaded.path)},
                  {"mean_return", NumberAbout(policy, "mean_return", loaded.path)},
                  {"step", static_cast<int64_t>(NumberAbout(policy, "step", loaded.path))},
                  {"upswing_version", policy.About("upswing_version")}};
+  if (command) agent.entry["command"] = *command;
   if (run.empty()) return agent;
   const std::vector<EvaluationRow> evaluations = ReadEvaluations(run, true);
   if (!evaluations.empty()) agent.entry["curve"] = CurveJson(evaluations);

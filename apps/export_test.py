@@ -283,6 +283,16 @@ class PageTest(ProgramTest):
             with self.subTest(arguments=arguments):
                 self.refuse(["export", *arguments], *words)
 
+    def test_a_policy_that_does_not_tell_every_setting_has_no_command(self):
+        self.succeed(*small(out="run"))
+        metadata, tensors = read_tensors(self.folder / "run/policy.safetensors")
+        self.assertIn("\ngamma = 0.99\n", metadata["config"])
+        older = metadata["config"].replace("\ngamma = 0.99\n", "\n")
+        write_tensors(self.folder / "older.safetensors", metadata | {"config": older}, tensors)
+        self.succeed("export", "run", "older.safetensors", "--page", "page")
+        entries = json.loads((self.folder / "page/agents.json").read_text())["agents"]
+        self.assertEqual(["command" in entry for entry in entries], [True, False])
+
 
 class ShippedTest(ProgramTest):
     def test_the_pages_own_agents_are_what_their_list_says(self):

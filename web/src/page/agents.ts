@@ -12,7 +12,7 @@ interface Entry {
   id: string;
   file: string;
   agent: string;
-  command: string;
+  command?: string;
   curve?: Curve;
 }
 
@@ -147,7 +147,7 @@ export class Agents {
     if (!entry) throw new BadInput(`there is no agent "${id}"`);
     const { buffer } = await fetchBytes(`agents/${encodeURIComponent(entry.file)}`);
     const policy = new Policy(buffer);
-    const { command, curve = null } = entry;
+    const { command = null, curve = null } = entry;
     const title = titleOf(entry);
     return this.add({ id, title, text: describe(policy), command, curve, policy });
   }
