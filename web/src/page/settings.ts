@@ -103,6 +103,8 @@ export class Settings {
   /// Marks on each slider what this policy was trained on.
   mark(policy: Policy): void {
     for (const [name, slider] of this.plant) slider.trained = policy.trainedRange(name);
+    const strongest = Math.max(...policy.torques);
+    this.plant.get('torque_limit')!.label = `Limit of the motor (agent: ±${strongest})`;
     this.disturbance.sensor_noise.trained = policy.trainedDisturbance('sensor_noise');
     const [least, most] = policy.trainedDisturbance('delay');
     this.disturbance.delay.trained = [least / CONTROL_PERIOD, most / CONTROL_PERIOD];

@@ -33,9 +33,8 @@ export class Slider {
       string,
       string,
     ];
-    const label = this.element.querySelector('label')!;
-    label.htmlFor = spec.name;
-    label.textContent = spec.label;
+    this.element.querySelector('label')!.htmlFor = spec.name;
+    this.label = spec.label;
     this.output.htmlFor.add(spec.name);
     this.back.ariaLabel = `Reset ${spec.label}`;
     input.addEventListener('input', () => {
@@ -62,6 +61,10 @@ export class Slider {
     this.input.step = onStep ? String(step) : 'any';
     this.input.value = String(value);
     this.show();
+  }
+
+  set label(text: string) {
+    this.element.querySelector('label')!.textContent = text;
   }
 
   /// Marks what the agent was trained on, [low, high]; null: no mark.
