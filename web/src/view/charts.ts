@@ -124,6 +124,8 @@ function fromUpright(angle: number): number {
   return (turns - Math.round(turns)) * 2 * Math.PI;
 }
 
+const LABEL_WIDTH = 30; // pixels, of a torque under its bar
+
 /// What the agent expects of each torque. Q-values differ by little beside what they all have in
 /// common, so the bars hang from the largest.
 export class QBars {
@@ -141,11 +143,14 @@ export class QBars {
     this.room = Math.max(spread, 0.95 * this.room);
     const width = canvas.width / q.length;
     const bottom = canvas.height - 16;
+    const labelled = Math.ceil(LABEL_WIDTH / width); // each, or each second, …
     q.forEach((value, i) => {
       const height = (bottom - 4) * (1 - (best - value) / this.room);
       const color = i === action ? 'torque' : 'bar';
       canvas.rectangle(i * width + 2, bottom - height, width - 4, height, color);
-      canvas.text(signed(policy.torques[i]!), (i + 0.5) * width, canvas.height - 7, 'center');
+      if (i % labelled === 0) {
+        canvas.text(signed(policy.torques[i]!), (i + 0.5) * width, canvas.height - 7, 'center');
+      }
     });
   }
 }
