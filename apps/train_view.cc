@@ -96,7 +96,8 @@ void TrainView::Summarize(const TrainState& s, const std::filesystem::path& run,
     fmt::print("Best policy: {} (step {}, success {:.0f}%, return {:.0f})\n",
                (run / "policy.safetensors").string(), FormatCount(s.best_step),
                100 * s.best_success_rate, s.best_return);
-    fmt::print("Next:\n  ./upswing eval {0}\n  ./upswing info {0}\n", run.string());
+    fmt::print("Next:\n  ./upswing demo {0}\n  ./upswing eval {0}\n  ./upswing info {0}\n",
+               run.string());
   } else {
     fmt::print("Next:\n");
   }
