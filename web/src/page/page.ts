@@ -10,7 +10,7 @@ import { Dashboard, situation } from './dashboard';
 import { button, element } from './dom';
 import { Hand } from './hand';
 import { listenToKeys } from './keys';
-import { warn, hideMessage, note } from './message';
+import { hideMessage, note, warn } from './message';
 import { RANGES, Settings } from './settings';
 import { BEGINNING, decode, encode, OWN } from './share';
 import type { Shared } from './share';
