@@ -89,6 +89,11 @@ export function tipHeight(plant: Plant, s: State): number {
   return -plant.length1 * Math.cos(s.q1) - plant.length2 * Math.cos(s.q1 + s.q2);
 }
 
+/// The same over l1 + l2: -1 hanging, 1 upright.
+export function relativeHeight(plant: Plant, s: State): number {
+  return tipHeight(plant, s) / (plant.length1 + plant.length2);
+}
+
 /// Both links within 30° of straight up; the second by its absolute angle q1 + q2.
 export function inverted({ q1, q2 }: State): boolean {
   const cos30 = Math.sqrt(3) / 2;
@@ -99,8 +104,8 @@ export const OBSERVATION_SIZE = 8;
 /// Heuristic largest velocities (rad/s), by which the observation divides.
 export const MAX_VELOCITY: readonly [number, number] = [10, 20];
 
-/// [cos q1, sin q1, w1/10, cos q2, sin q2, w2/20, Ê, ĥ] with Ê = normalizedEnergy and ĥ = tipHeight over
-/// l1 + l2, in [-1, 1].
+/// [cos q1, sin q1, w1/10, cos q2, sin q2, w2/20, Ê, ĥ] with Ê = normalizedEnergy and ĥ =
+/// relativeHeight.
 export function observe(plant: Plant, s: State): Float32Array {
   return Float32Array.of(
     Math.cos(s.q1),
@@ -110,7 +115,7 @@ export function observe(plant: Plant, s: State): Float32Array {
     Math.sin(s.q2),
     s.w2 / MAX_VELOCITY[1],
     normalizedEnergy(plant, s),
-    tipHeight(plant, s) / (plant.length1 + plant.length2),
+    relativeHeight(plant, s),
   );
 }
 
@@ -118,10 +123,9 @@ export function observe(plant: Plant, s: State): Float32Array {
 /// reward: energy, height, balance, velocity penalty, torque penalty.
 export function rewardTerms(plant: Plant, s: State, tau: number): number[] {
   const up = inverted(s);
-  const height = tipHeight(plant, s) / (plant.length1 + plant.length2);
   return [
     Math.min(Math.max(normalizedEnergy(plant, s), 0), 1.5),
-    (height + 1) / 2,
+    (relativeHeight(plant, s) + 1) / 2,
     up ? 5 : 0,
     up ? -0.01 * (s.w1 * s.w1 + s.w2 * s.w2) : 0,
     (up ? -0.05 : -0.01) * tau * tau,

@@ -2,19 +2,20 @@ import { DelayLine, measure } from './disturbance';
 import type { Disturbance } from './disturbance';
 import { withMemory } from './observation';
 import {
+  CONTROL_PERIOD,
   HANGING,
   inverted,
   NOMINAL,
   normalizedEnergy,
   observe,
   PHYSICS_STEPS,
-  tipHeight,
+  relativeHeight,
 } from './pendulum';
 import type { Plant, State } from './pendulum';
 import type { Decision, Policy } from './policy';
 import type { Push, Simulator, Vec } from './simulator';
 
-export const STEPS_PER_SECOND = 200; // of physics
+export const STEPS_PER_SECOND = PHYSICS_STEPS / CONTROL_PERIOD; // of physics
 
 const SPRING = 60; // N/m, of the hand that drags
 const DAMPER = 5; // N·s/m
@@ -159,7 +160,7 @@ export class World {
       state,
       torque: this.torque,
       energy: normalizedEnergy(plant, state),
-      height: tipHeight(plant, state) / (plant.length1 + plant.length2),
+      height: relativeHeight(plant, state),
     });
   }
 

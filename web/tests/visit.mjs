@@ -1,5 +1,6 @@
 import { chromium } from '@playwright/test';
 import { preview } from 'vite';
+import { launchOptions } from './chromium.mjs';
 
 /// Serves the built page and opens it in fresh browsers, for figures and pictures.
 
@@ -9,12 +10,9 @@ export async function serve() {
   return { address: server.resolvedUrls.local[0], close: () => server.close() };
 }
 
-/// Calls visit(page) in a browser that has nothing cached, and returns what it returns.
+/// Calls use(page) in a browser that has nothing cached, and returns what it returns.
 export async function visit(options, use) {
-  const browser = await chromium.launch({
-    executablePath: process.env.UPSWING_CHROMIUM ?? '/usr/bin/chromium', // Debian's
-    args: ['--no-sandbox', '--disable-gpu'],
-  });
+  const browser = await chromium.launch(launchOptions);
   const page = await browser.newPage(options);
   const result = await use(page);
   await browser.close();

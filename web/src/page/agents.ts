@@ -50,7 +50,7 @@ export async function readBytes(
   onProgress: (bytes: number) => void = () => {},
 ): Promise<Uint8Array<ArrayBuffer>> {
   if (!response.ok) throw new BadInput(`${response.url}: the server says ${response.status}`);
-  const pieces: Uint8Array[] = [];
+  const pieces: Uint8Array<ArrayBuffer>[] = [];
   let bytes = 0;
   const reader = response.body!.getReader();
   const next = () =>
@@ -66,13 +66,7 @@ export async function readBytes(
       throw new BadInput(`it is larger than ${limit / 1024 / 1024} MB`);
     }
   }
-  const all = new Uint8Array(bytes);
-  let at = 0;
-  for (const piece of pieces) {
-    all.set(piece, at);
-    at += piece.length;
-  }
-  return all;
+  return new Uint8Array(await new Blob(pieces).arrayBuffer());
 }
 
 /// A title for an entry: that of its agent, and its ID if that says more.

@@ -2,7 +2,7 @@ import type { History } from '../history';
 import { energy, energyTarget, rewardTerms, tipHeight } from '../pendulum';
 import type { State } from '../pendulum';
 import type { Decision, Policy } from '../policy';
-import { PhasePortrait, QBars, SECONDS_SHOWN, signed, Strip } from '../view/charts';
+import { PhasePortrait, QBars, SECONDS_SHOWN, signed, Strip, withMinus } from '../view/charts';
 import type { World } from '../world';
 import { element } from './dom';
 
@@ -57,11 +57,11 @@ export class Dashboard {
     });
     this.phase.draw(moments);
     this.bars.draw(world.policy, world.decision);
-    if (this.frame % (5 * FRAMES) === 1) this.tell(world);
+    if (this.frame % (5 * FRAMES) === 1) this.showNumbers(world);
   }
 
   /// The numbers change a few times a second, so that they can be read.
-  private tell(world: World): void {
+  private showNumbers(world: World): void {
     const { plant, policy, decision, state } = world;
     const target = energyTarget(plant);
     const reach = plant.length1 + plant.length2;
@@ -79,9 +79,9 @@ function tell(chart: string, text: string): void {
   element(chart).ariaLabel = `${element(chart).dataset.name}: ${text}`;
 }
 
-/// Two digits behind the point, with a minus that is as wide as a digit.
+/// Two digits behind the point.
 function fixed(value: number): string {
-  return value.toFixed(2).replace('-', '−');
+  return withMinus(value.toFixed(2));
 }
 
 function rewardText(terms: number[]): string {

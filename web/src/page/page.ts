@@ -129,7 +129,7 @@ export class Page {
     element('curve-value').textContent = Number.isFinite(step)
       ? `best after ${step.toLocaleString('en')} steps`
       : '';
-    this.curve.draw(this.agent.curve);
+    this.drawCurve();
   }
 
   private listen(): void {
@@ -161,9 +161,7 @@ export class Page {
     this.listenToAgents();
     addEventListener('hashchange', () => void this.open());
     onThemeChange(() => this.repaint());
-    new ResizeObserver(() => this.curve.draw(this.agent?.curve ?? null)).observe(
-      this.curve.canvas.element,
-    );
+    new ResizeObserver(() => this.drawCurve()).observe(this.curve.canvas.element);
   }
 
   private listenToAgents(): void {
@@ -247,9 +245,8 @@ export class Page {
 
   private writeAddress(): void {
     clearTimeout(this.addressTimer);
-    const id = this.agent?.id ?? null;
     const hash = encode({
-      agent: id,
+      agent: this.agent?.id ?? null,
       on: this.world.agentOn,
       speed: this.clock.speed,
       plant: this.world.plant,
@@ -283,6 +280,10 @@ export class Page {
     for (const canvas of [this.scene.canvas, this.curve.canvas, ...this.dashboard.canvases]) {
       canvas.forgetColors();
     }
+    this.drawCurve();
+  }
+
+  private drawCurve(): void {
     this.curve.draw(this.agent?.curve ?? null);
   }
 

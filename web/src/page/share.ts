@@ -26,17 +26,20 @@ export const BEGINNING: Readonly<Shared> = {
 
 export type Range = readonly [number, number];
 
+/// The numbers of a link, by the names that they have there.
+function numbersOf({ speed, plant, sensor_noise, delay }: Shared): Record<string, number> {
+  return { speed, ...plant, sensor_noise, delay };
+}
+
 /// As the part of an address behind #; only what differs from the beginning.
 export function encode(shared: Shared): string {
   const fields = new URLSearchParams();
   if (shared.agent) fields.set('agent', shared.agent);
   if (shared.on) fields.set('on', '1');
-  if (shared.speed !== 1) fields.set('speed', String(shared.speed));
-  for (const name of Object.keys(NOMINAL) as Parameter[]) {
-    if (shared.plant[name] !== NOMINAL[name]) fields.set(name, String(shared.plant[name]));
+  const beginning = numbersOf(BEGINNING);
+  for (const [name, value] of Object.entries(numbersOf(shared))) {
+    if (value !== beginning[name]) fields.set(name, String(value));
   }
-  if (shared.sensor_noise !== 0) fields.set('sensor_noise', String(shared.sensor_noise));
-  if (shared.delay !== 0) fields.set('delay', String(shared.delay));
   return fields.toString();
 }
 
@@ -58,12 +61,10 @@ export function decode(
       problems.push(`unknown "${name}"`);
     } else if (text.trim() === '' || !(value >= range[0] && value <= range[1])) {
       problems.push(`${name}: expected ${range[0]} to ${range[1]}, got "${text}"`);
-    } else if (name === 'speed') {
-      shared.speed = value;
-    } else if (name === 'sensor_noise') {
-      shared.sensor_noise = value;
     } else if (name === 'delay') {
       shared.delay = Math.round(value);
+    } else if (name === 'speed' || name === 'sensor_noise') {
+      shared[name] = value;
     } else {
       shared.plant[name as Parameter] = value;
     }

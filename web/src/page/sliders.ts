@@ -67,16 +67,13 @@ export class Slider {
     this.element.querySelector('label')!.textContent = text;
   }
 
-  /// Marks what the agent was trained on, [low, high]; null: no mark.
-  set trained(range: [number, number] | null) {
+  /// Marks what the agent was trained on.
+  set trained([low, high]: [number, number]) {
     const { min, max } = this.spec;
     const share = (value: number) => String(Math.min(Math.max((value - min) / (max - min), 0), 1));
     const mark = this.element.querySelector<HTMLElement>('.trained')!;
-    mark.hidden = range === null;
-    if (range) {
-      mark.style.setProperty('--share-from', share(range[0]));
-      mark.style.setProperty('--share-to', share(range[1]));
-    }
+    mark.style.setProperty('--share-from', share(low));
+    mark.style.setProperty('--share-to', share(high));
   }
 
   private show(): void {

@@ -30,9 +30,8 @@ export class Canvas {
     this.colors.clear();
   }
 
-  clear(): CanvasRenderingContext2D {
+  clear(): void {
     this.context.clearRect(0, 0, this.width, this.height);
-    return this.context;
   }
 
   text(text: string, x: number, y: number, align: CanvasTextAlign = 'left'): void {

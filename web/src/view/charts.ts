@@ -155,10 +155,14 @@ export class QBars {
   }
 }
 
-/// Three digits, with a sign that is as wide as one.
+/// A number's text with a minus that is as wide as a digit.
+export function withMinus(text: string): string {
+  return text.replace(/^-/, '−');
+}
+
+/// Three digits.
 export function signed(value: number): string {
-  const text = String(Number(Math.abs(value).toPrecision(3)));
-  return value < 0 ? `−${text}` : text;
+  return withMinus(String(Number(value.toPrecision(3))));
 }
 
 export interface Curve {

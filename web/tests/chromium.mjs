@@ -1,0 +1,19 @@
+import { existsSync } from 'node:fs';
+
+const debians = '/usr/bin/chromium';
+
+/// How tests, figures and pictures start their browser: the one that UPSWING_CHROMIUM names, Debian's,
+/// or else Playwright's own.
+export const launchOptions = {
+  executablePath: process.env.UPSWING_CHROMIUM ?? (existsSync(debians) ? debians : undefined),
+  args: [
+    '--no-sandbox', // there is none for root, nor in most containers
+    '--disable-gpu',
+    // No word to anyone else.
+    '--disable-quic',
+    '--no-first-run',
+    '--disable-background-networking',
+    '--disable-component-update',
+    '--disable-sync',
+  ],
+};
