@@ -33,6 +33,49 @@ std::optional<T> ParseWhole(std::string_view text) {
   return value;
 }
 
+/// A character of a UTF-8 text, and of how many bytes it is made.
+struct CodePoint {
+  char32_t value;
+  size_t size;
+};
+
+/// The first character of `text`; nothing if it does not begin with one in its shortest form.
+std::optional<CodePoint> FirstCodePoint(std::string_view text) {
+  const auto byte = [&](size_t i) { return static_cast<unsigned char>(text[i]); };
+  const size_t size = byte(0) < 0x80   ? 1
+                      : byte(0) < 0xc0 ? 0
+                      : byte(0) < 0xe0 ? 2
+                      : byte(0) < 0xf0 ? 3
+                      : byte(0) < 0xf8 ? 4
+                                       : 0;
+  if (size == 0 || size > text.size()) return std::nullopt;
+  char32_t value = size == 1 ? byte(0) : byte(0) & (0x7fU >> size);
+  for (size_t i = 1; i < size; ++i) {
+    if ((byte(i) & 0xc0) != 0x80) return std::nullopt;
+    value = value << 6 | (byte(i) & 0x3fU);
+  }
+  constexpr std::array<char32_t, 5> kSmallest{0, 0, 0x80, 0x800, 0x10000};  // of each size
+  const bool surrogate = value >= 0xd800 && value < 0xe000;
+  if (value < kSmallest.at(size) || value > 0x10ffff || surrogate) return std::nullopt;
+  return CodePoint{value, size};
+}
+
+/// Whether a terminal would do something else with the character than show it where it stands.
+bool IsControl(char32_t c) {
+  const auto in = [c](char32_t first, char32_t last) { return c >= first && c <= last; };
+  return in(0, 0x1f) || in(0x7f, 0x9f) || c == 0x61c || in(0x200b, 0x200f) || in(0x2028, 0x202e) ||
+         in(0x2060, 0x206f) || c == 0xfeff || in(0xfff9, 0xfffb) || in(0xe0000, 0xe007f);
+}
+
+/// Such as `\x1b`: the last `digits` hexadecimal digits of `value` behind a backslash and `kind`.
+std::string Escape(char kind, char32_t value, int digits) {
+  std::string escape{'\\', kind};
+  for (int shift = 4 * (digits - 1); shift >= 0; shift -= 4) {
+    escape += "0123456789abcdef"[(value >> shift) & 15];
+  }
+  return escape;
+}
+
 }  // namespace
 
 std::string FormatNumber(double value) {
@@ -77,6 +120,38 @@ std::string Join(const std::vector<std::string>& parts, std::string_view separat
     joined += part;
   }
   return joined;
+}
+
+std::string Printable(std::string_view text) {
+  std::string shown;
+  while (!text.empty()) {
+    const auto c = FirstCodePoint(text);
+    const size_t size = c ? c->size : 1;
+    if (!c) {
+      shown += Escape('x', static_cast<unsigned char>(text.front()), 2);
+    } else if (!IsControl(c->value)) {
+      shown += text.substr(0, size);
+    } else if (c->value == '\n' || c->value == '\r' || c->value == '\t') {
+      shown += c->value == '\n' ? "\\n" : c->value == '\r' ? "\\r" : "\\t";
+    } else if (c->value < 0x80) {
+      shown += Escape('x', c->value, 2);
+    } else {
+      shown += c->value < 0x10000 ? Escape('u', c->value, 4) : Escape('U', c->value, 8);
+    }
+    text.remove_prefix(size);
+  }
+  return shown;
+}
+
+std::string ShellQuoted(std::string_view text) {
+  constexpr std::string_view kSafe =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-./,:=+@%";
+  if (!text.empty() && text.find_first_not_of(kSafe) == std::string_view::npos) {
+    return std::string(text);
+  }
+  std::string quoted = "'";
+  for (const char c : text) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return quoted + "'";
 }
 
 std::string DidYouMean(std::string_view word, const std::vector<std::string>& names) {

@@ -36,6 +36,15 @@ std::vector<std::string_view> Split(std::string_view text, char separator);
 /// `parts` with `separator` between them.
 std::string Join(const std::vector<std::string>& parts, std::string_view separator);
 
+/// `text`, which may come from a stranger's file, on one line of a terminal: control characters,
+/// bytes that are not UTF-8, and the characters that reorder text or break lines stand as escapes
+/// such as `\n`, `\x1b` or `\u202e`. Everything else, a backslash too, stays as it is.
+std::string Printable(std::string_view text);
+
+/// `text` as one word of a POSIX shell's command line: as it is where that is safe, else in single
+/// quotes. What is not on one line of a terminal is for Printable to show, not for a shell to run.
+std::string ShellQuoted(std::string_view text);
+
 /// " (did you mean NAME?)" for the name nearest to `word` in edit distance, "" if none is near.
 std::string DidYouMean(std::string_view word, const std::vector<std::string>& names);
 

@@ -47,5 +47,31 @@ TEST(Text, SuggestsTheNearestNameOnlyIfItIsNear) {
   EXPECT_EQ(DidYouMean("gamma", {}), "");
 }
 
+TEST(Text, PrintableLeavesTextAndEscapesWhatATerminalWouldObey) {
+  EXPECT_EQ(Printable("N·m θ₁ 漢 😀 C:\\x"), "N·m θ₁ 漢 😀 C:\\x");
+  EXPECT_EQ(Printable("a\nb\rc\td"), "a\\nb\\rc\\td");
+  EXPECT_EQ(Printable("\x1b[2J\x07\x7f"), "\\x1b[2J\\x07\\x7f");
+  EXPECT_EQ(Printable(std::string_view("\0", 1)), "\\x00");
+  EXPECT_EQ(Printable("\u009b31m"), "\\u009b31m");  // a control sequence in one character
+  EXPECT_EQ(Printable("\u202egnp"), "\\u202egnp");  // written from right to left
+  EXPECT_EQ(Printable("\U000e0041"), "\\U000e0041");
+}
+
+TEST(Text, PrintableEscapesEachByteThatIsNotUtf8) {
+  EXPECT_EQ(Printable("\xff"), "\\xff");
+  EXPECT_EQ(Printable("\xc3"), "\\xc3");                             // cut short
+  EXPECT_EQ(Printable("\xc0\xaf"), "\\xc0\\xaf");                    // not the shortest form
+  EXPECT_EQ(Printable("\xed\xa0\x80"), "\\xed\\xa0\\x80");           // half of a pair
+  EXPECT_EQ(Printable("\xf4\x90\x80\x80"), "\\xf4\\x90\\x80\\x80");  // beyond Unicode
+}
+
+TEST(Text, ShellQuotedIsOneWordToAShell) {
+  EXPECT_EQ(ShellQuoted("runs/d3qn-seed1"), "runs/d3qn-seed1");
+  EXPECT_EQ(ShellQuoted(""), "''");
+  EXPECT_EQ(ShellQuoted("x; touch y; $(id)"), "'x; touch y; $(id)'");
+  EXPECT_EQ(ShellQuoted("it's"), "'it'\\''s'");
+  EXPECT_EQ(ShellQuoted("~"), "'~'");
+}
+
 }  // namespace
 }  // namespace upswing
