@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The floor check finds each kind of offender, and nothing in a good tree."""
+"""The layer check finds each kind of offender, and nothing in a good tree."""
 
 import subprocess
 import sys
@@ -7,7 +7,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-CHECK = Path(__file__).resolve().parent / "check_floors.py"
+CHECK = Path(__file__).resolve().parent / "check_layers.py"
 
 GOOD = {
     "core/rng.h": "#include <vector>\n",
@@ -25,7 +25,7 @@ GOOD = {
 }
 
 
-class CheckFloors(unittest.TestCase):
+class CheckLayers(unittest.TestCase):
     def check(self, changes):
         """Runs the check on the good tree with `changes`; returns exit status and lines."""
         with tempfile.TemporaryDirectory() as root:

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Proves that folders are floors: an include may only point down, and there is no cycle.
+"""Proves that folders are layers: an include may only point down, and there is no cycle.
 
-    tools/check_floors.py [ROOT]
+    tools/check_layers.py [ROOT]
 
 Prints one line for each offender, as file:line: what is wrong, and exits with 1 if there is one.
 """
@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 # What each folder may include besides itself.
-FLOORS = {
+LAYERS = {
     "core": set(),
     "nn": {"core"},
     "sim": {"core"},
@@ -22,8 +22,8 @@ FLOORS = {
     "python": {"core", "nn", "sim", "rl", "control", "report", "apps"},
 }
 
-# One door per foreign library: the files that may include it.
-DOORS = {
+# The files that may include each foreign library.
+ALLOWED_FILES = {
     "mujoco": re.compile(r"sim/"),
     "hwy": re.compile(r"(core/simd(_test)?|nn/(linear|bfloat16|roofline)|"
                       r"sim/(closed_form|sine_cosine-inl))\.(h|cc)$"),
@@ -36,7 +36,7 @@ INCLUDE = re.compile(r'\s*#\s*include\s*(["<])([^">]+)[">]')
 
 def includes(root):
     """Yields (file, line, quote, included path) of all sources; file is relative to root."""
-    for folder in FLOORS:
+    for folder in LAYERS:
         for path in sorted((root / folder).rglob("*")):
             if not path.name.endswith(SOURCE_ENDINGS):
                 continue
@@ -49,17 +49,17 @@ def offence(root, file, quote, included):
     """What is wrong with one include, or None."""
     folder = file.split("/")[0]
     target = included.split("/")[0]
-    if target in DOORS:
-        door = DOORS[target]
-        return None if door.match(file) else f"{included} is not for this file ({door.pattern})"
-    if quote == "<" and target not in FLOORS:
+    if target in ALLOWED_FILES:
+        files = ALLOWED_FILES[target]
+        return None if files.match(file) else f"{included} is not for this file ({files.pattern})"
+    if quote == "<" and target not in LAYERS:
         return None  # the standard library, another library or a generated header
-    if target not in FLOORS:
+    if target not in LAYERS:
         return f'"{included}": expected "folder/file.h" with one of our folders'
     if not (root / included).is_file():
         return f'"{included}" does not exist'
-    if target != folder and target not in FLOORS[folder]:
-        allowed = ", ".join(sorted(FLOORS[folder])) or "no other folder"
+    if target != folder and target not in LAYERS[folder]:
+        allowed = ", ".join(sorted(LAYERS[folder])) or "no other folder"
         return f'{folder}/ may not include "{included}" (allowed: {allowed})'
     return None
 
@@ -88,7 +88,7 @@ def check(root):
         if problem := offence(root, file, quote, included):
             problems.append(f"{file}:{line}: {problem}")
         folder, target = file.split("/")[0], included.split("/")[0]
-        if target in FLOORS and target != folder:
+        if target in LAYERS and target != folder:
             edges.setdefault(folder, {}).setdefault(target, f"{file}:{line}")
     for cycle in cycles(edges):
         steps = list(zip(cycle, cycle[1:] + cycle[:1]))
@@ -100,8 +100,8 @@ def check(root):
 
 def main():
     root = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).resolve().parent.parent
-    if not any((root / folder).is_dir() for folder in FLOORS):
-        sys.exit(f"check_floors: expected one of the folders {', '.join(FLOORS)} in {root}")
+    if not any((root / folder).is_dir() for folder in LAYERS):
+        sys.exit(f"check_layers: expected one of the folders {', '.join(LAYERS)} in {root}")
     problems = check(root)
     for problem in problems:
         print(problem)
