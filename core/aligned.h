@@ -6,8 +6,8 @@
 
 namespace upswing {
 
-/// Allocates on cache lines. Vectorised sums start where the memory is aligned, so their order, and
-/// with it the last bit, would otherwise depend on where an array happens to lie.
+/// Allocates on cache lines. The order of vectorised sums depends on alignment, so without this
+/// their last bit could change with an array's address.
 template <typename T>
 struct AlignedAllocator {
   using value_type = T;
@@ -22,7 +22,7 @@ struct AlignedAllocator {
   bool operator==(const AlignedAllocator&) const = default;
 };
 
-/// A vector for numbers that the kernels work on.
+/// A vector of numbers for the kernels.
 template <typename T>
 using AlignedVector = std::vector<T, AlignedAllocator<T>>;
 

@@ -14,7 +14,7 @@ std::vector<std::string> SimdPaths();
 /// The path in use: the first of SimdPaths, unless UseSimdPath chose another.
 std::string SimdPath();
 
-/// Takes another path from now on, for tests and benchmarks; no kernel may be running. Throws
+/// Switches to another path, for tests and benchmarks; no kernel may be running. Throws
 /// BadInput if this processor does not have it.
 void UseSimdPath(std::string_view path);
 

@@ -10,11 +10,11 @@
 namespace upswing {
 namespace {
 
-/// More hardly help where work is cut into a few slices, and idle threads get in the way.
+/// More threads hardly help where work is cut into a few slices, and idle ones cost time.
 constexpr int kMostThreads = 8;
 
-/// How many of `present` processors a container's limit leaves us the time of (Linux, control
-/// groups 2: "QUOTA PERIOD" in microseconds, or "max PERIOD").
+/// How many of `present` processors a container's CPU quota amounts to (Linux, control groups 2:
+/// "QUOTA PERIOD" in microseconds, or "max PERIOD").
 int WithinQuota(int present) {
   std::ifstream file("/sys/fs/cgroup/cpu.max");
   double quota = 0;
@@ -23,8 +23,8 @@ int WithinQuota(int present) {
   return static_cast<int>(std::clamp(quota / period, 1.0, static_cast<double>(present)));
 }
 
-/// Waits until `value` differs from `old`: first spinning (work of well under a millisecond comes
-/// back to back), then asleep, so that an idle pool costs nothing.
+/// Waits until `value` differs from `old`: first spinning, as pieces of work of well under a
+/// millisecond follow each other closely, then asleep, so that an idle pool costs nothing.
 template <typename T>
 void WaitWhile(const std::atomic<T>& value, T old) {
   for (int spin = 0; spin < 2000; ++spin) {
@@ -36,9 +36,9 @@ void WaitWhile(const std::atomic<T>& value, T old) {
   value.wait(old, std::memory_order_acquire);
 }
 
-// A ticket holds the number of tasks and the next of them that nobody has taken, in one number: who
-// takes a task by exchanging the ticket knows that its round goes on, which cannot end before that
-// task does.
+// A ticket holds the number of tasks and the index of the next one in a single number. A thread
+// that takes a task by compare-and-swap of the ticket knows that the round is still running: it
+// cannot end before that task does.
 constexpr int kTaskBits = 32;
 
 }  // namespace
@@ -76,7 +76,7 @@ void ThreadPool::Stop() {
 }
 
 void ThreadPool::ParallelFor(int n, const std::function<void(int)>& task) {
-  if (workers_.empty() || n <= 1) {  // nobody needs to be woken
+  if (workers_.empty() || n <= 1) {  // no thread needs to be woken
     for (int i = 0; i < n; ++i) task(i);
     return;
   }

@@ -10,14 +10,14 @@
 
 namespace upswing {
 
-/// What one lock-step of N environments brought. D = observation size, K = number of reward terms.
+/// Result of one step of N parallel environments. D = observation size, K = number of reward terms.
 struct StepResult {
-  std::vector<float> next_obs;       // (N, D) true successor: of a finished episode its last one
-  std::vector<double> reward;        // (N) per control step, the weighted sum of the terms
+  std::vector<float> next_obs;  // (N, D) true successor; of a finished episode its last observation
+  std::vector<double> reward;   // (N) per control step, the weighted sum of the terms
   std::vector<double> reward_terms;  // (N, K) weighted, signed: they add up to the reward
-  std::vector<double> torque;        // (N) what the motor really gave, N·m
+  std::vector<double> torque;        // (N) torque that was applied, N·m
   std::vector<double> work;          // (N) |mechanical work of the motor|, J
-  std::vector<uint8_t> at_goal;      // (N) the successor is where the task wants it (inverted)
+  std::vector<uint8_t> at_goal;      // (N) whether the successor is at the goal (inverted)
   std::vector<uint8_t> terminated;   // (N) the episode ended in a state without a future
   std::vector<uint8_t> truncated;    // (N) the episode ran out of time; its state has a future
 
@@ -34,8 +34,8 @@ struct StepResult {
   bool done(size_t env) const { return terminated[env] != 0 || truncated[env] != 0; }
 };
 
-/// N environments in lock-step, each with one continuous input (a torque) and an observation of D
-/// numbers. A truncated transition bootstraps, a terminated one does not.
+/// N environments stepped together, each with one continuous input (a torque) and an observation of
+/// D numbers. A truncated transition bootstraps, a terminated one does not.
 class VectorEnv {
  public:
   virtual ~VectorEnv() = default;
@@ -46,8 +46,8 @@ class VectorEnv {
   virtual double step_seconds() const = 0;                         // control period, s
   virtual double torque_limit() const = 0;                         // N·m
 
-  /// The sign (D) that each observation takes in a mirror, where the task goes on in the same way
-  /// under torques of the other sign; empty if there is no such symmetry.
+  /// Sign (D) of each observation under the task's mirror symmetry, step(-s, -u) = -step(s, u);
+  /// empty if there is none.
   virtual std::vector<float> mirror_signs() const { return {}; }
 
   /// What to act on next (N × D); for an environment that has just finished, its new start.

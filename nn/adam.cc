@@ -25,7 +25,7 @@ void Adam::Step(const Size& size, std::span<const float> gradient, std::span<flo
   const bool clip = size.gradient_norm > size.max_norm;
   const double scale = clip ? size.max_norm / size.gradient_norm : 1.0;
 
-  // m̂ / (sqrt(v̂) + ε) with both bias corrections drawn into step and ε, as the paper proposes.
+  // m̂ / (sqrt(v̂) + ε) with both bias corrections folded into step and ε, as the paper proposes.
   ++steps_;
   const double t = static_cast<double>(steps_);
   const double correction1 = 1.0 - std::pow(kBeta1, t);

@@ -9,14 +9,14 @@
 
 namespace upswing {
 
-/// Adam (Kingma and Ba, 2015, Algorithm 1) with β1 = 0.9, β2 = 0.999, ε = 1e-8, behind clipping by
-/// global norm (Pascanu et al., 2013, Algorithm 1). In the same pass over memory, target parameters
-/// follow by Polyak averaging.
+/// Adam (Kingma and Ba, 2015, Algorithm 1) with β1 = 0.9, β2 = 0.999, ε = 1e-8, after clipping by
+/// global norm (Pascanu et al., 2013, Algorithm 1). The same pass over memory moves the target
+/// parameters by Polyak averaging.
 class Adam {
  public:
   explicit Adam(size_t num_parameters);
 
-  /// How far a step goes.
+  /// The size of one step.
   struct Size {
     double learning_rate;
     double gradient_norm;  // the global norm of the gradient…

@@ -224,7 +224,7 @@ Matrix<uint32_t> Scratch(int rows, int cols) {
   return {values.data(), rows, cols};
 }
 
-/// Whole tiles by AMX, the margins by AVX512_BF16. The tiles want A by rows.
+/// Whole tiles by AMX, the margins by AVX512_BF16. Tiles read A by rows.
 void MultiplyAmx(const PairProduct& p) {
   const int M = p.M / kTileBlock * kTileBlock;
   const int N = p.N / kTileBlock * kTileBlock;
@@ -232,7 +232,7 @@ void MultiplyAmx(const PairProduct& p) {
   PairProduct whole = p.Part(0, M, 0, N);
   if (p.a_k != 1) {
     const Matrix<uint32_t> rows = Scratch<2>(M, p.K);
-    // A pair is moved as if it were a float.
+    // Pairs are copied as floats, which have the same size.
     Transpose<float>({reinterpret_cast<const float*>(p.a), p.K, M, static_cast<int>(p.a_k)},
                      {reinterpret_cast<float*>(rows.data()), M, p.K});
     whole.a = rows.data();
@@ -246,7 +246,7 @@ void MultiplyAmx(const PairProduct& p) {
 }
 
 // ------------------------------------------------------------------------------------------------
-// Which of them.
+// Choice of the path.
 
 struct Path {
   const char* name;
@@ -306,7 +306,7 @@ const std::vector<Path>& Paths() {
   return kUsable;
 }
 
-/// The path in use; asked for only where there is one.
+/// The path in use; only called where there is one.
 const Path*& Used() {
   static const Path* used = &Paths().front();
   return used;
@@ -376,7 +376,7 @@ void LinearBackwardWeightBfloat16(Matrix<const float> x, Matrix<const float> dy,
                     .c = dw});
 }
 
-#else  // no processor with bfloat16 instructions that we know
+#else  // an architecture for which we know no bfloat16 instructions
 
 std::vector<std::string> Bfloat16Paths() { return {}; }
 

@@ -50,7 +50,7 @@ using Vec = hn::Vec<Tag<T>>;
 
 /// Tile shapes: as many registers for C as leave room for a row of B and a number of A. Tiles of
 /// fewer rows, for what remains of M and for single rows, are wider, because a multiply-add takes
-/// several cycles and as many must be under way.
+/// several cycles and as many must be in flight.
 #if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_NEON  // of 32 registers
 constexpr int kTileRows = 8;
 constexpr int kRegisters = 16;
@@ -59,8 +59,8 @@ constexpr int kTileRows = 6;
 constexpr int kRegisters = 12;
 #endif
 
-/// Whether masked memory operations leave the numbers behind the mask alone, as threads that write
-/// next to each other need; elsewhere Highway reads and rewrites the whole register.
+/// Whether masked stores leave the other numbers untouched, which threads that write next to each
+/// other need; on other targets Highway reads and rewrites the whole register.
 constexpr bool kMasked = HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3;
 
 /// Up to `count` numbers, or a whole register of them.
@@ -212,7 +212,7 @@ HWY_INLINE void ForVectors(size_t n, const F& f) {
   if (i < n) f(i, n - i, std::true_type());
 }
 
-/// Σ term(i, count, partial) over all vectors, with four sums under way.
+/// Σ term(i, count, partial) over all vectors, with four independent sums.
 template <typename T, typename F>
 HWY_INLINE T SumVectors(size_t n, const F& term) {
   const Tag<T> d;
@@ -353,7 +353,7 @@ void AdamPolyakStep(const AdamConstants<T>& constants, std::span<const T> g, std
 }
 
 // ------------------------------------------------------------------------------------------------
-// What the kernels can be measured against.
+// Rooflines, against which kernels are measured.
 
 template <typename T>
 constexpr KernelTable<T> kKernels{
@@ -470,7 +470,7 @@ void AdamPolyakStep(const AdamConstants<T>& constants, std::span<const T> g, std
   Kernels<T>().adam_polyak_step(constants, g, m, v, p, target);
 }
 
-// Float to work with, double to check gradients by finite differences.
+// Float for training, double to check gradients by finite differences.
 #define UPSWING_INSTANTIATE(T)                                                                     \
   template void LinearForward(Matrix<const T>, Matrix<const T>, std::span<const T>, bool,          \
                               Matrix<T>);                                                          \

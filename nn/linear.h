@@ -6,11 +6,11 @@
 #include "core/matrix.h"
 
 /// Kernels of small networks, for T = float and double. B = batch size.
-/// With bfloat16.*, this is the only file of nn/ that knows how they are made fast: every kernel is
-/// compiled for several kinds of vector instructions (core/simd.h).
+/// Every kernel is compiled for several kinds of vector instructions (core/simd.h). Apart from the
+/// rooflines, only linear.cc and bfloat16.cc contain vector code.
 ///
-/// What a kernel writes into one place is summed in an order that depends on the sizes alone, not
-/// on where in a batch a row stands: cutting a batch into slices changes no bit.
+/// The order of each sum depends on the sizes alone, not on a row's position in the batch: cutting
+/// a batch into slices changes no bit.
 namespace upswing {
 
 /// y (B × out) = x (B × in) · W + b, with W (in × out) and b (out); y = max(y, 0) if `relu`.
@@ -38,8 +38,8 @@ template <typename T>
 void Transpose(Matrix<const T> x, Matrix<T> y);
 
 /// y = max(gain · x̂ + bias, 0) with x̂ = (x - mean) / sqrt(var + 1e-5) over each row (Ba et al.,
-/// 2016, Eq 3). x (B × n) is replaced by x̂, and inv_std (B) = 1 / sqrt(var + 1e-5), for the way
-/// back.
+/// 2016, Eq 3). x (B × n) is replaced by x̂, and inv_std (B) = 1 / sqrt(var + 1e-5), both for the
+/// backward pass.
 template <typename T>
 void LayerNormReluForward(Matrix<T> x, std::span<const T> gain, std::span<const T> bias,
                           std::span<T> inv_std, Matrix<T> y);
@@ -58,7 +58,7 @@ template <typename T>
 T SquaredNorm(std::span<const T> x);
 
 /// The constants of one step of Adam (Kingma and Ba, 2015, Algorithm 1), with both bias corrections
-/// drawn into step and epsilon, and of Polyak averaging.
+/// folded into step and epsilon, and of Polyak averaging.
 template <typename T>
 struct AdamConstants {
   T scale;          // of the gradient: below 1 if it is clipped

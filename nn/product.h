@@ -6,9 +6,9 @@
 
 namespace upswing {
 
-/// C (M × N) = A (M × K) · B (K × N) + bias, where A(m, k) = a[m · a_m + k · a_k]: the one product
-/// that all three of a linear layer are. An operand is a number or, with numbers in bfloat16, a
-/// pair of them that lie one after the other along K.
+/// C (M × N) = A (M × K) · B (K × N) + bias, where A(m, k) = a[m · a_m + k · a_k]. All three
+/// products of a linear layer have this form. An operand is a number or, in bfloat16, a pair of
+/// consecutive numbers along K.
 template <typename Operand, typename T = Operand>
 struct Product {
   int M, N, K;
@@ -20,7 +20,7 @@ struct Product {
   bool relu = false;          // C = max(C, 0)
   Matrix<const T> gate = {};  // C = 0 where gate (M × N) is not positive; empty for none
 
-  /// The part of it that computes `rows` rows from m on and `cols` columns from n on.
+  /// The part that computes `rows` rows from m on and `cols` columns from n on.
   Product Part(int m, int rows, int n, int cols) const {
     return {rows,
             cols,

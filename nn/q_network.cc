@@ -42,7 +42,7 @@ void CombineStreams(Matrix<const T> value, Matrix<T> q) {
   }
 }
 
-/// The way back of CombineStreams: dV = sum(dq), dA = dq - mean(dq).
+/// Backward pass of CombineStreams: dV = sum(dq), dA = dq - mean(dq).
 template <typename T>
 void CombineStreamsBackward(Matrix<const T> dq, Matrix<T> dvalue, Matrix<T> dadvantage) {
   for (int i = 0; i < dq.rows(); ++i) {
@@ -65,7 +65,7 @@ QNetwork<T>::QNetwork(QNetworkShape shape, bool bfloat16)
         "bfloat16 products: this processor has no instructions for them (AVX512_BF16); expected "
         "precision float32");
   }
-  // A policy file brings these numbers too, so they are checked here, where both ways meet.
+  // Settings and policy files both end here, so the sizes are checked here.
   constexpr int64_t kMaxWidth = 4096;
   const auto valid = [](int64_t n) { return n >= 1 && n <= kMaxWidth; };
   const bool sizes_valid = valid(shape_.inputs) && valid(shape_.actions) &&

@@ -47,15 +47,15 @@ struct RowRange {
 /// The hidden layers of the two streams are one matrix (H × 2·head): value first, then advantage.
 ///
 /// A gradient takes three steps, each of which threads can share: Prepare over all tasks; Forward
-/// and BackwardInputs over slices of the batch; BackwardWeights over all tasks. Whoever does which,
-/// the result has the same bits; with `bfloat16` as long as the slices are the same. Backward does
-/// all of it.
+/// and BackwardInputs over slices of the batch; BackwardWeights over all tasks. The result has the
+/// same bits for any number of threads; with `bfloat16`, for the same slices. Backward does all of
+/// it.
 template <typename T>
 class QNetwork {
  public:
   /// With `bfloat16`, which T = float alone can have, products of prepared weights round their
   /// operands (nn/bfloat16.h); sums, activations and parameters stay float. Throws BadInput on
-  /// sizes that are none, and if this processor has no such instructions.
+  /// invalid sizes, and if this processor has no such instructions.
   explicit QNetwork(QNetworkShape shape, bool bfloat16 = false);
 
   const QNetworkShape& shape() const { return shape_; }
@@ -77,18 +77,18 @@ class QNetwork {
     std::vector<AlignedVector<T>> grad_normal, grad_feature;
     AlignedVector<T> grad_streams, grad_value, grad_output;  // grad_output (B × A)
   };
-  /// Room for up to `max_batch` rows; those of gradients only if asked for.
+  /// Buffers for up to `max_batch` rows; those of gradients only if asked for.
   Activations MakeActivations(int max_batch, bool gradients) const;
 
-  /// Weights in other forms, each in the place where the parameters have it.
+  /// Copies of the weights in the layouts that products read, each at its parameter's offset.
   struct Prepared {
-    AlignedVector<T> transposed;                      // (out × in), for the way back
+    AlignedVector<T> transposed;                      // (out × in), for the backward pass
     AlignedVector<uint32_t> pairs, transposed_pairs;  // bfloat16 pairs of both; else empty
   };
-  /// Room for them (num_parameters each); for the way back only if asked for.
+  /// Buffers for them (num_parameters each); those of the backward pass only if asked for.
   Prepared MakePrepared(bool backward) const;
 
-  /// Parameters, and what was prepared of them: nothing will do to go forward in float.
+  /// Parameters and their prepared copies; a forward pass in float works without the copies.
   struct Weights {
     std::span<const T> parameters;
     const Prepared* prepared = nullptr;
@@ -98,15 +98,15 @@ class QNetwork {
   void Forward(Weights weights, Matrix<const T> x, RowRange rows, Activations& a,
                Matrix<T> q) const;
 
-  /// Something to be largest where Q is largest, with less work: of a dueling network the
-  /// advantages, without the value stream.
+  /// Values with the same argmax as Q, at less cost: of a dueling network the advantages alone,
+  /// without the value stream.
   void ForwardPreferences(std::span<const T> parameters, Matrix<const T> x, RowRange rows,
                           Activations& a, Matrix<T> preferences) const;
 
   /// The tasks of Prepare and BackwardWeights: 0 … num_tasks() - 1.
   int num_tasks() const { return static_cast<int>(tasks_.size()); }
 
-  /// Writes the task's share of `prepared`, of what it has room for.
+  /// Writes the task's share of `prepared`, for the buffers that it has.
   void Prepare(int task, std::span<const T> parameters, Prepared& prepared) const;
 
   /// Gradients of sum(dq · q) with respect to all activations in the given rows of the last

@@ -12,7 +12,7 @@
 
 namespace upswing {
 
-/// What an agent says of its learning: means over the updates since BeginReport.
+/// Learning metrics of an agent: means over the updates since BeginReport.
 struct AgentReport {
   int64_t updates = 0;       // gradient steps since the beginning of the run
   double epsilon = 0;        // present share of random actions
@@ -26,7 +26,7 @@ struct AgentReport {
   double feature_rank = 0, dormant_share = 1;
 };
 
-/// A learner. The training loop calls Act, Observe, Learn for each lock-step of the environments.
+/// A learner. The training loop calls Act, Observe, Learn once for each step of the environments.
 class Agent {
  public:
   virtual ~Agent() = default;
@@ -34,16 +34,16 @@ class Agent {
   /// Torques (N) for the observations (N × D), exploring.
   virtual void Act(Matrix<const float> obs, std::span<double> torque) = 0;
 
-  /// What came of the last Act.
+  /// The result of the last Act.
   virtual void Observe(const StepResult& result) = 0;
 
   /// All gradient steps that are due by now. Throws Failure if a number is not finite.
   virtual void Learn() = 0;
 
-  /// How learning goes.
+  /// The metrics since BeginReport.
   virtual AgentReport Report() const = 0;
 
-  /// Begins the averages of the report anew.
+  /// Resets the report's averages.
   virtual void BeginReport() = 0;
 
   /// The greedy policy as it stands, with `about` in its file.

@@ -10,7 +10,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "sim/closed_form.cc"
 #include <hwy/foreach_target.h>
-// After it, as it includes this file again for every target:
+// After foreach_target.h, which includes this file once for every target:
 #include "sim/sine_cosine-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -24,7 +24,7 @@ HWY_INLINE V LoadFrom(const AlignedVector<double>& x, size_t i) {
   return hn::Load(kDoubles, x.data() + i);
 }
 
-/// What the equations of motion need.
+/// The constants of the equations of motion.
 struct Dynamics {
   V J2, b, G1, G2, d1, d2, tau;
   V J12;  // J1 + J2
@@ -160,14 +160,14 @@ void AdvanceRange(ClosedFormBatch& batch, int steps, size_t first, size_t last) 
   if (i < last) AdvanceVectors<1>(batch, steps, i);
 }
 
-/// What one vector of states is to the task, each number as an array over the lanes.
+/// The task's view of one vector of states, each number as an array over the lanes.
 struct Verdict {
   alignas(64) float obs[kObservationSize][kWidest];
   alignas(64) double terms[kRewardTerms][kWidest];
   alignas(64) double reward[kWidest], work[kWidest], inverted[kWidest], blew_up[kWidest];
 };
 
-/// What the task looks at.
+/// The quantities that the task's formulas use.
 struct Pose {
   Angle q1, q2;
   V c12;
@@ -230,7 +230,7 @@ HWY_INLINE void JudgeReward(const Pose& pose, const State& x, V tau, const Rewar
   hn::Store(reward, kDoubles, verdict.reward);
 }
 
-/// Whether all numbers are within MuJoCo's limit; comparisons with what is no number are false.
+/// Whether all numbers are within MuJoCo's limit; comparisons with NaN are false.
 HWY_INLINE hn::Mask<D> IsSound(const State& x) {
   const V largest = Constant(kLargestCoordinate);
   return hn::And(hn::And(hn::Le(hn::Abs(x.q.one), largest), hn::Le(hn::Abs(x.q.two), largest)),

@@ -6,21 +6,21 @@
 #include "core/vector_env.h"
 #include "sim/double_pendulum.h"
 
-/// The double pendulum in closed form, a twin of the built-in MJCF: equations of motion,
+/// The double pendulum in closed form, equivalent to the built-in MJCF: equations of motion,
 /// Runge-Kutta steps as MuJoCo makes them, and the task's observation and reward, vectorised over
 /// environments.
 ///
-/// An environment's results have the same bits wherever it stands among how many others, and on
-/// every path of core/simd.h that has fused multiply-adds.
+/// An environment's results have the same bits at any index and for any number of environments, and
+/// on every path of core/simd.h that has fused multiply-adds.
 namespace upswing {
 
 /// N double pendulums, each number as an array over the environments. P is N rounded up to whole
-/// vectors; what is behind N is a standard plant at rest.
+/// vectors; the entries beyond N are standard plants at rest.
 struct ClosedFormBatch {
   explicit ClosedFormBatch(size_t num_envs);
 
   size_t padded() const { return q1.size(); }  // P
-  /// Works out what the equations need of a plant.
+  /// Computes an environment's constants from its plant.
   void SetPlant(size_t env, const Plant& plant);
   /// Sets the motors (N), N·m, within their limits.
   void SetTorque(std::span<const double> torque);
@@ -28,7 +28,7 @@ struct ClosedFormBatch {
   using Array = AlignedVector<double>;  // (P)
   // State.
   Array q1, q2, w1, w2;  // rad, rad/s
-  Array tau;             // N·m, held until it is set anew
+  Array tau;             // N·m, held until it is set again
   Array q1_before;       // rad, before the last Advance
 
   // Equations of motion, with c = l/2 and MuJoCo's capsules of inertia I about their centres.
@@ -57,8 +57,8 @@ inline int ClosedFormChunks(size_t num_envs) {
 /// multiple of kClosedFormChunk or N.
 void Advance(ClosedFormBatch& batch, int steps, size_t first, size_t last);
 
-/// Fills all of `result` but `truncated` with what the states are to the task, as Observe,
-/// RewardTerms and Inverted have it. A state that is not finite, or beyond MuJoCo's 1e10, has
+/// Fills all of `result` but `truncated` from the states, as Observe, RewardTerms and Inverted
+/// do. A state that is not finite, or beyond MuJoCo's 1e10, has
 /// terminated; the rest is then without meaning.
 void Judge(const ClosedFormBatch& batch, const RewardWeights& weights, size_t first, size_t last,
            StepResult& result);

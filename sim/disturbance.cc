@@ -37,8 +37,7 @@ std::span<const double> Disturber::Apply(std::span<const double> torque,
   for (size_t i = 0; i < torque.size(); ++i) {
     applied_[i] = torque[i];
     const int delay = disturbances_[i].delay_steps();
-    // A ring as long as the delay: what stands where the new torque goes is the one whose time it
-    // is.
+    // A ring as long as the delay: the new torque takes the place of the one that is due.
     if (delay > 0) std::swap(applied_[i], Queue(static_cast<int>(i))[steps[i] % delay]);
   }
   return applied_;

@@ -12,13 +12,13 @@
 
 namespace upswing {
 
-inline constexpr double kLargestDelay = 1;  // that can be set, s
+inline constexpr double kLargestDelay = 1;  // s
 
-/// What sensors and motor of one environment do wrong; zeros: nothing.
+/// Sensor noise and motor delay of one environment; zeros: none.
 ///
 /// The delay is the motor's: the torque chosen at one step is applied so many control periods
-/// later, and none before the first arrives. So an observation is always that of the present state,
-/// and what the delay hides is the torques that are under way.
+/// later, and zero torque before the first arrives. So an observation is always that of the present
+/// state, and what the delay hides are the torques that are still waiting.
 struct Disturbance {
   double sensor_noise;  // standard deviation, on each measured angle and velocity, rad, rad/s
   double delay;         // from the choice of a torque to its effect, s, in whole control periods
@@ -42,21 +42,21 @@ class Disturber {
   Disturber(std::vector<Disturbance> disturbances, int num_envs, int max_delay, uint64_t seed,
             const std::string& stream, uint64_t first_index = 0);
 
-  /// Begins an episode: no torque is under way.
+  /// Begins an episode: no torque is waiting.
   void Begin(int env);
-  /// Another disturbance from the next episode on.
+  /// Sets another disturbance, in effect from the next episode on.
   void Set(int env, const Disturbance& disturbance) {
     disturbances_[static_cast<size_t>(env)] = disturbance;
   }
 
-  /// Takes the torques (N), N·m, that were chosen at step `steps[i]` of each episode (N), counted
-  /// from 0, and gives those that the motors hold now (N).
+  /// Takes the torques (N), N·m, chosen at step `steps[i]` of each episode (N), counted from 0, and
+  /// returns those that the motors apply now (N).
   std::span<const double> Apply(std::span<const double> torque, std::span<const int64_t> steps);
 
-  /// What the sensors say of a state.
+  /// The state as the sensors measure it.
   PendulumState Measure(int env, PendulumState state);
 
-  /// Saves or loads the state, which what was set is no part of.
+  /// Saves or loads the state; the disturbances themselves are not part of it.
   void State(const Archive& archive);
 
  private:
@@ -66,7 +66,7 @@ class Disturber {
 
   size_t capacity_;                        // the largest delay, control periods
   std::vector<Disturbance> disturbances_;  // (N)
-  std::vector<double> queues_;             // (N × capacity) torques under way, N·m
+  std::vector<double> queues_;             // (N × capacity) torques that wait, N·m
   std::vector<double> applied_;            // (N) N·m
   std::vector<Rng> rngs_;                  // (N)
 };

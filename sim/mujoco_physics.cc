@@ -11,10 +11,10 @@
 namespace upswing {
 namespace {
 
-constexpr int kSmallestSlice = 4;  // environments: fewer are not worth another thread
+constexpr int kSmallestSlice = 4;  // environments; fewer are not worth a task
 constexpr int kMostSlices = 32;
 
-/// Gives every simulation of the batch a row of its own for a model field.
+/// Gives every simulation of the batch its own row of a model field.
 mjtNum* Expand(mjBatch* batch, const char* field, int env) {
   int size = 0;
   auto* rows = static_cast<mjtNum*>(mjb_expand(batch, field, &size, nullptr));
@@ -79,7 +79,7 @@ PendulumState MuJoCoPhysics::state(int env) const {
 
 void MuJoCoPhysics::SetState(int env, const PendulumState& s) {
   const Slice& slice = SliceOf(env);
-  // Reset by MuJoCo: time, control, warm start and warnings go back too.
+  // MuJoCo's own reset also clears time, control, warm start and warnings.
   const int row = env - slice.first;
   mjb_reset(slice.batch.get(), &row, 1, nullptr, mjSTAGE_NONE);
   std::copy_n(std::array{s.q1, s.q2}.data(), 2, Component(slice.qpos, env));
@@ -87,7 +87,7 @@ void MuJoCoPhysics::SetState(int env, const PendulumState& s) {
 }
 
 void MuJoCoPhysics::SetPlant(int env, const Plant& plant) {
-  // Environments that shared a plant have their own from now on.
+  // Environments that shared one plant get a plant each.
   config_.plants.resize(static_cast<size_t>(config_.num_envs), config_.plants.front());
   config_.plants[static_cast<size_t>(env)] = plant;
   const Slice& slice = SliceOf(env);
@@ -126,7 +126,7 @@ void MuJoCoPhysics::Judge(int env, double torque, StepResult& result) const {
 }
 
 void MuJoCoPhysics::Step(std::span<const double> torque, StepResult& result) {
-  // The references in one, so that the task fits into std::function without an allocation.
+  // One captured reference, so that the task fits into std::function without an allocation.
   const struct {
     std::span<const double> torque;
     StepResult& result;

@@ -7,9 +7,9 @@
 
 namespace upswing {
 
-/// N double pendulums in MuJoCo, on its batch interface: a batch for each few environments, so that
-/// they are shared out by our thread pool and MuJoCo needs none of its own. Its own warnings count
-/// as a blow-up too.
+/// N double pendulums in MuJoCo, by its batch interface: one batch for each slice of a few
+/// environments, so that our thread pool distributes them and MuJoCo needs no pool of its own. A
+/// warning of MuJoCo counts as a blow-up too.
 class MuJoCoPhysics : public Physics {
  public:
   /// Throws BadInput on a model that does not compile or is no double pendulum.

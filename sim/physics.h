@@ -15,39 +15,39 @@ namespace upswing {
 
 enum class PhysicsEngine {
   kMuJoCo,
-  kClosedForm,  // the built-in model only: many times faster, the same to 12 digits a step
+  kClosedForm,  // the built-in model only: many times faster, equal to 12 digits a step
 };
 
-/// What the engines are called, the default first: "mujoco", "closed-form".
+/// The engines' names, the default first: "mujoco", "closed-form".
 std::vector<std::string> PhysicsNames();
 
-/// The engine of a name. Throws BadInput that begins with `where`.
+/// The engine with this name. Throws BadInput whose message begins with `where`.
 PhysicsEngine ParsePhysics(std::string_view name, const std::string& where);
 
-/// What physics are made of.
+/// Settings of the physics.
 struct PhysicsConfig {
   PhysicsEngine physics = PhysicsEngine::kMuJoCo;
   std::vector<Plant> plants{Plant()};  // one for all environments, or one for each
   int num_envs = 1;
   RewardWeights weights;
-  std::string mjcf;            // another model than Mjcf(Plant()); built like it
-  ThreadPool* pool = nullptr;  // who shares the work; changes no bit of a result
+  std::string mjcf;            // replaces the built-in model if not empty; see LoadModel
+  ThreadPool* pool = nullptr;  // runs the work in parallel; changes no bit of a result
 
   const Plant& plant(int env) const {
     return plants[plants.size() > 1 ? static_cast<size_t>(env) : 0];
   }
 };
 
-/// The motion of N double pendulums in lock-step, and what the task says of it.
+/// N double pendulums stepped together, with the task's observation and reward of each.
 class Physics {
  public:
   virtual ~Physics() = default;
 
   virtual PendulumState state(int env) const = 0;
-  /// Puts an environment into a state, whatever became of it before.
+  /// Puts an environment into a state, also after a blow-up.
   virtual void SetState(int env, const PendulumState& state) = 0;
 
-  /// Gives an environment another plant; SetState or the loading of a state must follow.
+  /// Gives an environment another plant; SetState or loading a state must follow.
   virtual void SetPlant(int env, const Plant& plant) = 0;
 
   /// Holds `torque` (N), N·m, for one control period and fills `result`, all but `truncated`; of
@@ -56,11 +56,11 @@ class Physics {
   /// of MuJoCo's) only `terminated` has a meaning.
   virtual void Step(std::span<const double> torque, StepResult& result) = 0;
 
-  /// Saves or loads the state, which plants are no part of.
+  /// Saves or loads the state; plants are not part of it.
   virtual void State(const Archive& archive) = 0;
 };
 
-/// Throws BadInput on a model that does not compile, is no double pendulum or not for this engine.
+/// Throws BadInput if the model does not compile, is no double pendulum, or is not for this engine.
 std::unique_ptr<Physics> MakePhysics(const PhysicsConfig& config);
 
 }  // namespace upswing

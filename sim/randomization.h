@@ -9,7 +9,8 @@
 
 namespace upswing {
 
-/// How far each episode's plant, sensors and motor may be from the nominal ones; zeros: nowhere.
+/// Domain randomisation: how far each episode's plant, sensor noise and delay may be from the
+/// nominal ones; zeros: not at all.
 struct Randomization {
   /// Half-widths relative to the nominal value, in the order of Plant: 0.25 stands for ±25%.
   std::array<double, 8> plant;
@@ -20,13 +21,13 @@ struct Randomization {
   /// One line per setting: name, default, range, unit, help.
   void Describe(Options& options);
   bool any() const;
-  /// Control periods that a delay may be above the nominal one.
+  /// Largest number of control periods that a delay may be above the nominal one.
   int max_delay_steps() const { return Disturbance(0, delay).delay_steps(); }
 
-  /// A plant from the box: each parameter uniform and independent of the others. Takes eight
-  /// numbers of the stream, whatever the box.
+  /// A plant from the box: each parameter uniform and independent of the others. Always draws eight
+  /// numbers from the stream.
   Plant Draw(const Plant& nominal, Rng& rng) const;
-  /// Uniform noise, and a uniform number of control periods. Takes two numbers of the stream.
+  /// Uniform noise, and a uniform number of control periods. Draws two numbers from the stream.
   Disturbance Draw(const Disturbance& nominal, Rng& rng) const;
 };
 
