@@ -230,11 +230,16 @@ LoadedPolicy LoadPolicy(const fs::path& path) {
     throw BadInput(
         Concat(file.string(), ": no such file; expected a policy.safetensors or a run ", "folder"));
   }
-  LoadedPolicy loaded{file, Policy::Load(file), Plant(), ""};
+  return ReadPolicy(TensorFile::Load(file));
+}
+
+LoadedPolicy ReadPolicy(const TensorFile& file) {
+  const std::string& where = file.path();
+  LoadedPolicy loaded{where, Policy::From(file), Plant(), ""};
   const int remembered = static_cast<int>(loaded.policy.shape().inputs) - kObservationSize;
   if (remembered < 0 || remembered % kMemorySize != 0) {
-    throw BadInput(Concat(file.string(), ": expected a policy of ", kObservationSize,
-                          " observations and ", kMemorySize, " for each step of memory, got ",
+    throw BadInput(Concat(where, ": expected a policy of ", kObservationSize, " observations and ",
+                          kMemorySize, " for each step of memory, got ",
                           loaded.policy.shape().inputs));
   }
   const Options options = OptionsOf(loaded.plant);
@@ -244,7 +249,7 @@ LoadedPolicy LoadPolicy(const fs::path& path) {
       option.Set(FormatNumber(plant.at(option.name).get<double>()), option.name);
     }
   } catch (const std::exception& error) {
-    throw BadInput(Concat(file.string(), ": metadata \"plant\": ", error.what()));
+    throw BadInput(Concat(where, ": metadata \"plant\": ", error.what()));
   }
   const auto model = loaded.policy.about().find("model");
   if (model != loaded.policy.about().end()) loaded.mjcf = model->second;

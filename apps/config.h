@@ -98,6 +98,9 @@ struct LoadedPolicy {
 /// Loads a policy file, or the best policy of a run folder. Throws BadInput.
 LoadedPolicy LoadPolicy(const std::filesystem::path& path);
 
+/// The same of a policy file that has been read.
+LoadedPolicy ReadPolicy(const TensorFile& file);
+
 /// What a policy file says of the task that it was trained on.
 std::map<std::string, std::string> AboutTask(const Config& config);
 

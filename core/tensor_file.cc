@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "core/checksum.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/text.h"
@@ -37,31 +38,6 @@ const DtypeFacts& FactsOf(Dtype dtype) {
 
 constexpr std::string_view kChecksumKey = "\"checksum\":\"";
 constexpr std::string_view kNoChecksum = "0000000000000000";
-
-/// Finds broken files, not forged ones. After FNV-1a (its offset basis and prime), but over 8-byte
-/// words, the last of each piece padded with zeros, and with the high half folded into the low one.
-class Checksum {
- public:
-  void Update(std::span<const std::byte> bytes) {
-    for (; bytes.size() >= 8; bytes = bytes.subspan(8)) Mix(bytes);
-    if (!bytes.empty()) Mix(bytes);
-  }
-  /// 16 hexadecimal digits.
-  std::string Hex() const {
-    std::string hex;
-    for (int shift = 60; shift >= 0; shift -= 4) hex += "0123456789abcdef"[(hash_ >> shift) & 15];
-    return hex;
-  }
-
- private:
-  void Mix(std::span<const std::byte> bytes) {
-    uint64_t word = 0;
-    std::memcpy(&word, bytes.data(), std::min<size_t>(8, bytes.size()));
-    hash_ = (hash_ ^ word) * 0x100000001b3;
-    hash_ ^= hash_ >> 32;  // a product spreads bits upwards only
-  }
-  uint64_t hash_ = 0xcbf29ce484222325;
-};
 
 /// Where the checksum's digits stand in the header; npos if the file has none.
 size_t FindChecksum(std::string_view header) {
@@ -247,10 +223,14 @@ void TensorFile::Save(const std::filesystem::path& path) const {
 }
 
 TensorFile TensorFile::Load(const std::filesystem::path& path) {
-  TensorFile file;
-  file.path_ = path.string();
   CheckRegular(path);
-  const auto& bytes = file.kept_.emplace_back(ReadFile(path));
+  return Parse(ReadFile(path), path.string());
+}
+
+TensorFile TensorFile::Parse(std::vector<std::byte> content, std::string where) {
+  TensorFile file;
+  file.path_ = std::move(where);
+  const auto& bytes = file.kept_.emplace_back(std::move(content));
   std::string text;  // of the header
   try {
     const uint64_t length = ParseLength(bytes, bytes.size());

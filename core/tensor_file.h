@@ -97,6 +97,9 @@ class TensorFile {
   /// Reads and checks everything: sizes, shapes, offsets, checksum. Throws BadInput.
   static TensorFile Load(const std::filesystem::path& path);
 
+  /// The same of a file's bytes; `where` stands for its path.
+  static TensorFile Parse(std::vector<std::byte> content, std::string where);
+
   /// Reads the metadata and the tensors whose names begin with `prefix`, and nothing else: of a
   /// large file a small part, without the checksum, which covers the whole. Throws BadInput.
   static TensorFile LoadPart(const std::filesystem::path& path, std::string_view prefix);

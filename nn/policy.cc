@@ -162,11 +162,11 @@ void Policy::Save(const std::filesystem::path& path) const {
   file.Save(path);
 }
 
-Policy Policy::Load(const std::filesystem::path& path) {
-  const TensorFile file = TensorFile::Load(path);
+Policy Policy::From(const TensorFile& file) {
+  const std::string& where = file.path();
   const auto expect = [&](const std::string& key, std::string_view expected) {
     if (file.Metadata(key) != expected) {
-      throw BadInput(Concat(path.string(), ": ", key, ": expected \"", expected, "\", got \"",
+      throw BadInput(Concat(where, ": ", key, ": expected \"", expected, "\", got \"",
                             file.Metadata(key), "\""));
     }
   };
@@ -175,20 +175,20 @@ Policy Policy::Load(const std::filesystem::path& path) {
   expect("output", "levels");
 
   // Parameters, each with the shape that the network asks for.
-  const QNetworkShape shape = ShapeFromJson(file.Metadata("network"), path.string());
-  const QNetwork<float> network = NetworkOf(shape, path.string());
+  const QNetworkShape shape = ShapeFromJson(file.Metadata("network"), where);
+  const QNetwork<float> network = NetworkOf(shape, where);
   std::vector<float> parameters(network.num_parameters());
   std::vector<float> array;
   for (const ParameterBlock& block : network.blocks()) {
     array.resize(block.size());
     file.Read(block.name, std::span(array), FileShape(block));
-    CheckFinite<float>(array, path.string(), block.name);
+    CheckFinite<float>(array, where, block.name);
     const Matrix<float> values(parameters.data() + block.offset, std::max(1, block.in), block.out);
     Transpose<float>(Matrix<float>(array, values.cols(), values.rows()), values);
   }
   std::vector<double> torques(static_cast<size_t>(shape.actions));
   file.Read("torques", std::span(torques));
-  CheckFinite<double>(torques, path.string(), "torques");
+  CheckFinite<double>(torques, where, "torques");
   Policy policy(shape, std::move(parameters), std::move(torques), file.metadata);
 
   policy.CheckSamples(file);

@@ -62,7 +62,10 @@ class Policy {
   void Save(const std::filesystem::path& path) const;
 
   /// Reads and checks the file: format, shapes, finite numbers, samples. Throws BadInput.
-  static Policy Load(const std::filesystem::path& path);
+  static Policy Load(const std::filesystem::path& path) { return From(TensorFile::Load(path)); }
+
+  /// The same of a file that has been read.
+  static Policy From(const TensorFile& file);
 
  private:
   /// Recomputes the stored outputs from the stored inputs. Throws BadInput.
