@@ -1,0 +1,37 @@
+import loadMujoco from '@mujoco/mujoco';
+import { readFileSync } from 'node:fs';
+import { expect, test } from 'vitest';
+import { readPolicy } from '../tests/program';
+import { Policy } from './policy';
+import { Simulator } from './simulator';
+import { World } from './world';
+
+/// The agents that come with the page.
+
+interface List {
+  agents: { id: string }[];
+}
+
+const list = JSON.parse(
+  readFileSync(new URL('../public/agents/agents.json', import.meta.url), 'utf8'),
+) as List;
+const mujoco = await loadMujoco();
+
+/// Degrees between an absolute angle, 0 hanging, and upright.
+function lean(angle: number): number {
+  return (180 / Math.PI) * Math.acos(-Math.cos(angle));
+}
+
+// The rule by which their seeds were chosen (docs/page.md).
+test.each(list.agents.map(({ id }) => id))('%s stands upright, not at a lean', (id) => {
+  const world = new World(new Simulator(mujoco));
+  world.policy = new Policy(readPolicy(id));
+  world.agentOn = true;
+  const leans: number[] = [];
+  world.onMoment = ({ t, state: { q1, q2 } }) => {
+    if (t >= 10) leans.push(lean(q1), lean(q1 + q2));
+  };
+  for (let k = 0; k < 20 * 200; ++k) world.advance();
+  expect(leans.length).toBe(1000);
+  expect(Math.max(...leans)).toBeLessThan(10);
+});
