@@ -4,7 +4,7 @@
     tools/upright_modes.py POLICY|RUN [--plants 250] [--episodes 5] [--share 0.25] [--seed 5]
 
 Upright, the pendulum has two unstable modes, which grow as exp(a t) and exp(b t); the nearer b/a is to
-1, the less one motor can hold both. Plants are drawn from a box of ± SHARE, and judged in closed form.
+1, the less one motor can hold both. Plants are drawn from a box of ± SHARE, and evaluated in closed form.
 Needs numpy and a built program (./upswing --version).
 """
 import argparse

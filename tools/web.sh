@@ -33,8 +33,8 @@ modules_are_current() {
   [ -f "$stamp" ] && [ "$(cat "$stamp")" = "$(lock_hash)" ]
 }
 
-# Prints the Chromium that tests run: UPSWING_CHROMIUM or one on the PATH. It has to start, since
-# Ubuntu's chromium-browser may be no more than a hint at a snap.
+# Prints the Chromium that tests run: UPSWING_CHROMIUM or one on the PATH. It has to start: on Ubuntu
+# (where none of this was ever tried) chromium-browser may do no more than point to a snap.
 find_chromium() {
   for chromium in ${UPSWING_CHROMIUM:+"$UPSWING_CHROMIUM"} chromium chromium-browser google-chrome; do
     "$chromium" --version >/dev/null 2>&1 </dev/null || continue
@@ -44,7 +44,7 @@ find_chromium() {
   return 1
 }
 
-# Where Playwright puts its own Chromium, on systems that have no package of one.
+# Where Playwright puts its own Chromium, for systems whose packages have none, such as Ubuntu.
 export PLAYWRIGHT_BROWSERS_PATH="$root/build/deps/playwright"
 has_own_chromium() { [ -n "$(find "$PLAYWRIGHT_BROWSERS_PATH" -name INSTALLATION_COMPLETE 2>/dev/null)" ]; }
 
