@@ -125,10 +125,15 @@ void SetFlags(const Options& options, const std::vector<FlagValue>& flags) {
 }
 
 Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
+  return ParseConfig(file.empty() ? "" : ReadTextFile(file), file, flags);
+}
+
+Config ParseConfig(std::string_view text, const fs::path& file,
+                   const std::vector<FlagValue>& flags) {
   Config config;
   const Options options = OptionsOf(config);
   const std::string where = file.string();
-  const toml::table table = ParseToml(file.empty() ? "" : ReadTextFile(file), where);
+  const toml::table table = ParseToml(text, where);
 
   // A model file brings its own plant, which other settings may change.
   const EarlySetting model = FindEarly("plant", "model", table, where, flags);
@@ -147,6 +152,11 @@ Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
   config.agent = agent.name;
   config.model = model_path;
   return config;
+}
+
+void MakeReadyForMany(Config& config) {
+  if (config.train.threads == 0) config.train.threads = 1;
+  if (!config.mjcf.empty()) config.model = "model.xml";
 }
 
 std::vector<std::string> MissingSettings(const std::string& text, const std::string& where,

@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -55,6 +56,15 @@ void SetFlags(const Options& options, const std::vector<FlagValue>& flags);
 /// Builds the settings in their order: defaults < named agent < configuration file (none if empty)
 /// < flags; a model file's plant counts as defaults. Throws BadInput.
 Config BuildConfig(const std::filesystem::path& file, const std::vector<FlagValue>& flags);
+
+/// The same of a configuration file's text; `file` names it, and a model of it counts from its
+/// folder.
+Config ParseConfig(std::string_view text, const std::filesystem::path& file,
+                   const std::vector<FlagValue>& flags);
+
+/// Settles what a run among many differs in from one alone: it has one thread, unless more are
+/// asked for, and its model lies beside it.
+void MakeReadyForMany(Config& config);
 
 /// The settings, such as agent.gamma, that TOML text of a run lacks: it is of another version then.
 std::vector<std::string> MissingSettings(const std::string& text, const std::string& where,

@@ -267,11 +267,6 @@ int TrainMany(const ManyRuns& plan) {
                        runs.front().problem));
 }
 
-void MakeReadyForMany(Config& config) {
-  if (config.train.threads == 0) config.train.threads = 1;
-  if (!config.mjcf.empty()) config.model = "model.xml";
-}
-
 int DefaultJobs(int64_t threads) {
   return std::max(1, UsableProcessors() / static_cast<int>(std::max<int64_t>(1, threads)));
 }

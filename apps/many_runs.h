@@ -57,10 +57,6 @@ struct SeedRun {
 /// settings; Failure at the end if a run failed.
 int TrainMany(const ManyRuns& plan);
 
-/// Settles what a run among many differs in from one alone: it has one thread, unless more are
-/// asked for, and its model lies beside it.
-void MakeReadyForMany(Config& config);
-
 /// How many runs at a time are best, if each has so many threads.
 int DefaultJobs(int64_t threads);
 

@@ -12,30 +12,33 @@ namespace fs = std::filesystem;
 std::vector<EvaluationRow> ReadEvaluations(const fs::path& run, bool may_be_cut) {
   const fs::path path = run / "evals.csv";
   if (!fs::exists(path)) return {};
-  std::string text = ReadTextFile(path);
+  return ParseEvaluations(ReadTextFile(path), path.string(), may_be_cut);
+}
+
+std::vector<EvaluationRow> ParseEvaluations(std::string text, const std::string& where,
+                                            bool may_be_cut) {
   if (!text.empty() && !text.ends_with('\n')) {
     if (!may_be_cut) {
-      throw BadInput(Concat(path.string(), ": its last line is half-written: expected a run that ",
+      throw BadInput(Concat(where, ": its last line is half-written: expected a run that ",
                             "has finished (train --resume mends it)"));
     }
     text.erase(text.rfind('\n') + 1);  // everything if there is no whole line
   }
-  const auto columns =
-      ReadCsv(text, {"step", "seconds", "success_rate", "mean_return"}, path.string());
+  const auto columns = ReadCsv(text, {"step", "seconds", "success_rate", "mean_return"}, where);
   std::vector<EvaluationRow> rows;
   for (size_t i = 0; i < columns[0].values.size(); ++i) {
     constexpr double kMostSteps = 1e15;
     if (!(columns[0].values[i] >= 0 && columns[0].values[i] <= kMostSteps)) {
-      throw BadInput(Concat(path.string(), ": row ", i + 1, ": expected a number of steps, got ",
+      throw BadInput(Concat(where, ": row ", i + 1, ": expected a number of steps, got ",
                             FormatNumber(columns[0].values[i])));
     }
     rows.push_back({static_cast<int64_t>(columns[0].values[i]), columns[1].values[i],
                     columns[2].values[i], columns[3].values[i]});
     if (i > 0 && (rows[i].step <= rows[i - 1].step || rows[i].seconds < rows[i - 1].seconds)) {
-      throw BadInput(Concat(path.string(), ": expected steps and seconds that rise, got ",
-                            rows[i - 1].step, " and ", rows[i].step, " steps, ",
-                            FormatNumber(rows[i - 1].seconds), " and ",
-                            FormatNumber(rows[i].seconds), " s in rows ", i, " and ", i + 1));
+      throw BadInput(Concat(where, ": expected steps and seconds that rise, got ", rows[i - 1].step,
+                            " and ", rows[i].step, " steps, ", FormatNumber(rows[i - 1].seconds),
+                            " and ", FormatNumber(rows[i].seconds), " s in rows ", i, " and ",
+                            i + 1));
     }
   }
   return rows;

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 namespace upswing {
@@ -33,6 +34,10 @@ struct RunRecord {
 /// with file and line, also for steps or seconds that fall. Where a killed run left half a line at
 /// the end, that is an error too, unless `may_be_cut`: then it is left out.
 std::vector<EvaluationRow> ReadEvaluations(const std::filesystem::path& run, bool may_be_cut);
+
+/// The same of the table's text; `where` is its path.
+std::vector<EvaluationRow> ParseEvaluations(std::string text, const std::string& where,
+                                            bool may_be_cut);
 
 /// Where a run has solved its task: index of the first of the first two evaluations in a row whose
 /// episodes all succeed. An evaluation out of turn, at the end, does not count. Nothing if it has

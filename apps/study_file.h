@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "apps/many_runs.h"
+
+namespace upswing {
+
+/// What a study file asks for.
+struct StudyFile {
+  std::string title;              // may be empty
+  std::vector<Variant> variants;  // in the order in which they stand in the file; at least one
+  std::vector<int64_t> seeds;     // empty: the file names none
+};
+
+/// Reads the text of a study file; a model of it counts from its folder. `where` is its path.
+/// Throws BadInput with the line.
+StudyFile ParseStudy(std::string_view text, const std::string& where);
+
+/// What tells one study from another before its settings are looked at.
+struct StudyOutline {
+  std::string title;
+  std::vector<std::string> variants;  // names
+};
+
+/// Reads nothing but the outline, in which a study of another version of the program is like one of
+/// this version. Throws BadInput.
+StudyOutline ParseStudyOutline(std::string_view text, const std::string& where);
+
+}  // namespace upswing
