@@ -20,6 +20,7 @@ LAYERS = {
     "report": {"core"},
     "apps": {"core", "nn", "sim", "rl", "control", "report", "python"},
     "python": {"core", "nn", "sim", "rl", "control", "report", "apps"},
+    "fuzz": {"core", "nn", "sim", "rl", "control", "report", "apps"},
 }
 
 # The files that may include each foreign library.

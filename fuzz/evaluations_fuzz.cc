@@ -1,0 +1,19 @@
+// The table of a run's evaluations, as `compare` and `export` read it.
+#include "fuzz/target.h"
+#include "report/runs.h"
+
+namespace upswing {
+
+bool TryInput(std::string_view input) {
+  RunRecord run{"", {1, 1000000, 32, 10000, true}, {}};
+  // Of a run that goes on the last line may be cut; of others it must be whole.
+  const bool whole =
+      Accepts([&] { run.evaluations = ParseEvaluations(std::string(input), kInputName, false); });
+  const bool cut =
+      Accepts([&] { run.evaluations = ParseEvaluations(std::string(input), kInputName, true); });
+  Expect(cut || !whole, "a whole table where a cut one may be");
+  (void)Finished(run);
+  return whole;
+}
+
+}  // namespace upswing

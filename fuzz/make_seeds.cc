@@ -1,0 +1,66 @@
+// Writes the inputs of the corpus that the program itself makes, anew after a change of its
+// formats:
+//   fuzz_seeds fuzz/corpus
+#include <cstdio>
+#include <filesystem>
+
+#include "core/error.h"
+#include "fuzz/tiny_training.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A checkpoint after a few steps, when the replay memory is full.
+void SaveCheckpoint(TinyTraining& training, const std::string& physics, const fs::path& file) {
+  TensorFile checkpoint;
+  if (physics == "mujoco") checkpoint.metadata["mujoco"] = "";
+  training.State(Archive::Saver(checkpoint));
+  checkpoint.Save(file);
+}
+
+void MakeSeeds(const fs::path& corpus) {
+  ThreadPool pool(1);
+  for (const std::string physics : {"closed-form", "mujoco"}) {
+    const Config config = TinyConfig(physics);
+    TinyTraining training(config, pool);
+    SaveCheckpoint(training, physics,
+                   corpus / "checkpoint/accepted" / (physics + "-new.safetensors"));
+    for (int step = 0; step < 9; ++step) training.Step();
+    SaveCheckpoint(training, physics, corpus / "checkpoint/accepted" / (physics + ".safetensors"));
+
+    std::map<std::string, std::string> about = AboutTask(config);
+    about["step"] = "18";
+    about["success_rate"] = "0.5";
+    about["mean_return"] = "-12.5";
+    const fs::path file = corpus / "policy/accepted" / ("dueling-" + physics + ".safetensors");
+    training.agent.ExportPolicy(about).Save(file);
+  }
+  // The other kind of network, as short as can be.
+  const Plant plant;
+  const QNetworkShape shape{kObservationSize, 2, {1}, 0, false, false};
+  const QNetwork<float> network(shape);
+  std::map<std::string, std::string> about = AboutTask(Config());
+  for (const char* key : {"upswing_version", "config", "agent", "seed", "observation"})
+    about.erase(key);
+  Policy(shape, std::vector<float>(network.num_parameters(), 0.25F), {-1, 1}, about)
+      .Save(corpus / "policy/accepted/plain-of-another-writer.safetensors");
+}
+
+}  // namespace
+}  // namespace upswing
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::fprintf(stderr, "fuzz_seeds: expected the folder of the corpus\n");
+    return 2;
+  }
+  try {
+    upswing::MakeSeeds(argv[1]);
+    return 0;
+  } catch (const upswing::Error& error) {
+    std::fprintf(stderr, "fuzz_seeds: %s\n", error.what());
+    return error.exit_code();
+  }
+}

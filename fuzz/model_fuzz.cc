@@ -1,0 +1,22 @@
+// A model in MJCF, as --model, a run folder and a policy bring it.
+#include "fuzz/target.h"
+#include "sim/model.h"
+#include "sim/pendulum_env.h"
+
+namespace upswing {
+
+bool TryInput(std::string_view input) {
+  const std::string mjcf(input);
+  PendulumEnvConfig config;
+  config.num_envs = 1;
+  config.mjcf = mjcf;
+  if (!Accepts([&] { config.plants = {PlantOf(*LoadModel(mjcf, kInputName))}; })) return false;
+  // It swings.
+  PendulumEnv env(config);
+  StepResult result = env.MakeResult();
+  const double torque = 1;
+  for (int step = 0; step < 3; ++step) env.Step(std::span(&torque, 1), result);
+  return true;
+}
+
+}  // namespace upswing

@@ -1,0 +1,34 @@
+// The policy file: what `eval`, `info`, `export` and the others read of a stranger.
+#include <cmath>
+#include <optional>
+
+#include "apps/config.h"
+#include "apps/train_command.h"
+#include "core/file.h"
+#include "core/text.h"
+#include "fuzz/target.h"
+
+namespace upswing {
+
+bool TryInput(std::string_view input) {
+  const auto bytes = BytesOf(input);
+  std::optional<LoadedPolicy> loaded;
+  const bool accepted = Accepts([&] {
+    loaded = ReadPolicy(TensorFile::Parse({bytes.begin(), bytes.end()}, kInputName));
+  });
+  if (!accepted) return false;
+
+  // It acts, and says how it was made.
+  const Policy& policy = loaded->policy;
+  const std::vector<float> obs(static_cast<size_t>(policy.shape().inputs), 0.5F);
+  double torque = 0;
+  policy.Act(Matrix<const float>(obs.data(), 1, policy.shape().inputs), std::span(&torque, 1));
+  Expect(std::isfinite(torque), "a finite torque");
+  std::optional<std::string> command;
+  if (Accepts([&] { command = TrainCommand(policy, kInputName); }) && command) {
+    Expect(Printable(*command) == *command, "a command on one line");
+  }
+  return true;
+}
+
+}  // namespace upswing

@@ -1,0 +1,18 @@
+// A study file.
+#include "apps/study_file.h"
+#include "fuzz/target.h"
+
+namespace upswing {
+
+bool TryInput(std::string_view input) {
+  StudyFile study;
+  StudyOutline outline;
+  // The outline is read of studies of other versions too.
+  (void)Accepts([&] { outline = ParseStudyOutline(input, kInputName); });
+  if (!Accepts([&] { study = ParseStudy(input, kInputName); })) return false;
+  Expect(outline.title == study.title && outline.variants.size() == study.variants.size(),
+         "an outline of the same study");
+  return true;
+}
+
+}  // namespace upswing

@@ -1,0 +1,18 @@
+// A table of torques, as `simulate --torque` reads it.
+#include <algorithm>
+#include <cmath>
+
+#include "core/csv.h"
+#include "fuzz/target.h"
+
+namespace upswing {
+
+bool TryInput(std::string_view input) {
+  std::vector<CsvColumn> columns;
+  if (!Accepts([&] { columns = ReadCsv(input, {"torque"}, kInputName); })) return false;
+  Expect(std::ranges::all_of(columns.at(0).values, [](double x) { return std::isfinite(x); }),
+         "finite torques");
+  return true;
+}
+
+}  // namespace upswing
