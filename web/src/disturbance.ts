@@ -1,10 +1,17 @@
-import type { State } from './pendulum';
+import { CONTROL_PERIOD } from './pendulum';
+import type { Range, State } from './pendulum';
 
 /// What sensors and motor do wrong; zeros: nothing.
 export interface Disturbance {
   sensor_noise: number; // standard deviation, on each measured angle and velocity, rad and rad/s
   delay: number; // from the choice of a torque to its effect, in control periods
 }
+
+/// What may be set at all, as in the program.
+export const DISTURBANCE_LIMITS: Readonly<Record<keyof Disturbance, Range>> = {
+  sensor_noise: [0, 10],
+  delay: [0, Math.round(1 / CONTROL_PERIOD)], // up to 1 s
+};
 
 /// A draw from the normal distribution (Box and Muller 1958).
 function normal(): number {

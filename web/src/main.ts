@@ -1,12 +1,16 @@
 import { Agents } from './page/agents';
 import { startSimulator } from './page/boot';
 import { element } from './page/dom';
-import { warn } from './page/message';
+import { focusWideFormulas, placeQValues } from './page/layout';
 import { Page } from './page/page';
+import { printable } from './text';
 import { World } from './world';
 
+document.documentElement.dataset.script = 'running'; // public/watch.js and style.css need no longer wait
+
 try {
-  element('loading').hidden = false;
+  placeQValues();
+  focusWideFormulas();
   const progress = element<HTMLProgressElement>('progress');
   const [simulator, agents] = await Promise.all([
     startSimulator((share) => (progress.value = share)),
@@ -18,11 +22,13 @@ try {
   for (const group of document.querySelectorAll<HTMLFieldSetElement>('fieldset')) {
     group.disabled = false;
   }
+  element('badge').hidden = false;
   page.run();
 } catch (error) {
   const reason = error instanceof Error ? error.message : String(error);
-  warn(`The page could not start: ${reason}.`);
-  element('badge').hidden = true;
+  const problem = element('problem');
+  problem.textContent = `The page could not start: ${printable(reason, 300)}. Try to reload it.`;
+  problem.hidden = false;
   console.error(error);
 } finally {
   element('loading').hidden = true;

@@ -1,6 +1,6 @@
 import { beforeAll, describe, expect, test } from 'vitest';
 import { runProgram } from '../tests/program';
-import { DelayLine } from './disturbance';
+import { DelayLine, DISTURBANCE_LIMITS } from './disturbance';
 import { withMemory } from './observation';
 import * as pendulum from './pendulum';
 import type { Plant, State } from './pendulum';
@@ -75,6 +75,26 @@ test('observation', () => {
   for (const c of vectors.cases) {
     expectClose(pendulum.observe(c.plant, stateOf(c.state)), c.observation, 2 ** -24); // float32
   }
+});
+
+test('what can be set is what the program takes', () => {
+  const { CONTROL_PERIOD: period, PLANT_LIMITS } = pendulum;
+  const takes = (name: string, value: number) => {
+    try {
+      runProgram('simulate', '--seconds', '0.02', '--set', `${name}=${value}`);
+      return true;
+    } catch {
+      return false;
+    }
+  };
+  for (const [name, [low, high]] of Object.entries(PLANT_LIMITS)) {
+    const around = [low * 0.99 - 1e-3, low, high, high * 1.01];
+    expect(
+      around.map((value) => takes(name, value)),
+      name,
+    ).toEqual([false, true, true, false]);
+  }
+  expect(DISTURBANCE_LIMITS.delay[1] * period).toBe(1);
 });
 
 test('inertia of capsules', () => {

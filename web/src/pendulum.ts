@@ -23,6 +23,21 @@ export interface Plant {
 
 export type Parameter = keyof Plant;
 
+/// Smallest and largest value.
+export type Range = readonly [number, number];
+
+/// What a plant may be at all: the program refuses others, too.
+export const PLANT_LIMITS: Readonly<Record<Parameter, Range>> = {
+  mass1: [0.01, 100],
+  mass2: [0.01, 100],
+  length1: [0.1, 10],
+  length2: [0.1, 10],
+  damping1: [0, 100],
+  damping2: [0, 100],
+  gravity: [0.01, 100],
+  torque_limit: [0.01, 1000],
+};
+
 export const NOMINAL: Readonly<Plant> = {
   mass1: 1,
   mass2: 1,

@@ -1,10 +1,12 @@
 import { Network, parseShape } from './network';
 import type { QValues } from './network';
 import { MEMORY_SIZE } from './observation';
-import { CONTROL_PERIOD, MAX_VELOCITY, NOMINAL, OBSERVATION_SIZE } from './pendulum';
-import type { Parameter, Plant } from './pendulum';
+import { DISTURBANCE_LIMITS } from './disturbance';
+import { CONTROL_PERIOD, MAX_VELOCITY, NOMINAL, OBSERVATION_SIZE, PLANT_LIMITS } from './pendulum';
+import type { Parameter, Plant, Range } from './pendulum';
 import { BadInput, parseSafetensors, read } from './safetensors';
 import type { TensorFile } from './safetensors';
+import { quoted } from './text';
 
 const MAX_SAMPLES = 64; // that are checked while the visitor waits
 
@@ -76,28 +78,32 @@ export class Policy {
   }
 
   /// What the policy was trained on: [low, high] of a parameter.
-  trainedRange(name: Parameter): [number, number] {
+  trainedRange(name: Parameter): Range {
     const share = this.setting(`randomize_${name}`);
     const nominal = this.plant[name];
-    return [nominal * (1 - share), nominal * (1 + share)];
+    return within(PLANT_LIMITS[name], nominal * (1 - share), nominal * (1 + share));
   }
 
-  /// The same of what was wrong with sensors and motor: rad and rad/s, s.
-  trainedDisturbance(name: 'sensor_noise' | 'delay'): [number, number] {
-    const least = this.setting(name);
-    return [least, least + this.setting(`randomize_${name}`)];
+  /// The same of the errors of sensors and motor: rad and rad/s, control periods.
+  trainedDisturbance(name: 'sensor_noise' | 'delay'): Range {
+    const unit = name === 'delay' ? CONTROL_PERIOD : 1;
+    const least = this.setting(name) / unit;
+    const most = least + this.setting(`randomize_${name}`) / unit;
+    return within(DISTURBANCE_LIMITS[name], least, most);
   }
 
-  /// A number of the training's configuration; 0 if that does not say.
+  /// A number from 0 on of the training's configuration; 0 if that does not say.
   private setting(name: string): number {
     const line = new RegExp(`^${name} = ([0-9.eE+-]+)$`, 'm');
     const value = Number(line.exec(this.metadata.get('config') ?? '')?.[1] ?? 0);
-    return Number.isFinite(value) ? value : 0;
+    return value > 0 && value < Infinity ? value : 0;
   }
 
   private expect(key: string, expected: string): void {
     const got = this.about(key);
-    if (got !== expected) throw new BadInput(`${key}: expected "${expected}", got "${got}"`);
+    if (got !== expected) {
+      throw new BadInput(`${key}: expected ${quoted(expected)}, got ${quoted(got)}`);
+    }
   }
 
   /// That observations are scaled as here.
@@ -152,6 +158,12 @@ export class Policy {
   }
 }
 
+/// The part of a range that is within limits.
+function within([least, most]: Range, low: number, high: number): Range {
+  const clamp = (x: number) => Math.min(Math.max(x, least), most);
+  return [clamp(low), clamp(high)];
+}
+
 function parsePlant(text: string): Plant {
   let given: Partial<Record<Parameter, unknown>>;
   try {
@@ -162,8 +174,10 @@ function parsePlant(text: string): Plant {
   const plant = { ...NOMINAL };
   for (const name of Object.keys(NOMINAL) as Parameter[]) {
     const value = given?.[name];
-    if (typeof value !== 'number' || !Number.isFinite(value) || value < 0 || value > 1000) {
-      throw new BadInput(`metadata "plant": expected a number for ${name}`);
+    const [low, high] = PLANT_LIMITS[name];
+    if (typeof value !== 'number' || !(value >= low && value <= high)) {
+      const got = value === undefined ? 'none' : quoted(String(value));
+      throw new BadInput(`metadata "plant": expected a ${name} of ${low} to ${high}, got ${got}`);
     }
     plant[name] = value;
   }

@@ -1,5 +1,6 @@
 import { describe, expect, test } from 'vitest';
 import { readPolicy } from '../tests/program';
+import { NOMINAL } from './pendulum';
 import { Policy } from './policy';
 import { BadInput, MAX_FILE_BYTES, parseSafetensors, read } from './safetensors';
 
@@ -121,12 +122,52 @@ describe('a policy', () => {
     ],
     ['plant', '{"mass1":"heavy"}'],
     ['plant', 'null'],
+    ...(['mass1', 'mass2', 'length1', 'length2', 'gravity', 'torque_limit'] as const).flatMap(
+      (name) =>
+        [0, -1, 1e9, 1e-300].map((value): [string, string] => [
+          'plant',
+          JSON.stringify({ ...NOMINAL, [name]: value }),
+        ]),
+    ),
+    ['plant', JSON.stringify({ ...NOMINAL, damping1: -0.1 })],
+    ['plant', JSON.stringify(NOMINAL).replace('9.81', '1e999')],
     ['observation', '{"max_velocity":[1,1]}'],
     ['observation', 'null'],
     ['reward_scale', '-1'],
     ['plant', undefined],
   ])('is refused with a %s of %s', (key, text) => {
     expect(() => new Policy(metadata(key, text))).toThrow(BadInput);
+  });
+
+  test('is read with a plant beyond the sliders, and marks stay within what can be set', () => {
+    const plant = { ...NOMINAL, mass1: 5, damping1: 0 };
+    const policy = new Policy(
+      changed(({ header }) => {
+        const about = header.__metadata__ as Record<string, string>;
+        about.plant = JSON.stringify(plant);
+        about.config =
+          'randomize_mass1 = 1e300\nrandomize_gravity = 0.5\nrandomize_delay = 1e9\ndelay = -3\n';
+      }),
+    );
+    expect(policy.plant).toEqual(plant);
+    expect(policy.trainedRange('mass1')).toEqual([0.01, 100]);
+    expect(policy.trainedRange('gravity')).toEqual([0.5 * 9.81, 1.5 * 9.81]);
+    expect(policy.trainedDisturbance('delay')).toEqual([0, 50]);
+  });
+
+  test('is refused in one short line, whatever it says', () => {
+    const evil = `\u001b[31m\n${'x'.repeat(100_000)}`;
+    for (const key of ['format', 'format_version', 'control_period']) {
+      let line = '';
+      try {
+        new Policy(metadata(key, evil));
+      } catch (error) {
+        line = (error as Error).message;
+      }
+      expect(line).toContain('expected');
+      expect(line.length).toBeLessThan(120);
+      expect(line).not.toMatch(/[\n\u001b]/);
+    }
   });
 
   test('is refused when one weight is another', () => {

@@ -1,3 +1,5 @@
+import { quoted } from './text';
+
 /// A reader of safetensors files (https://huggingface.co/docs/safetensors) that trusts nothing: sizes
 /// are bounded, offsets stay within the file, a header is data and never code.
 
@@ -42,7 +44,7 @@ function parseHeader(bytes: Uint8Array): Record<string, unknown> {
 }
 
 function parseTensor(name: string, entry: unknown, data: Uint8Array): Tensor {
-  const broken = (what: string) => new BadInput(`tensor "${name}": ${what}`);
+  const broken = (what: string) => new BadInput(`tensor ${quoted(name)}: ${what}`);
   if (!isObject(entry)) throw broken('expected dtype, shape and data_offsets');
   const { dtype, shape, data_offsets: offsets } = entry;
   const size = typeof dtype === 'string' && Object.hasOwn(BYTES, dtype) ? BYTES[dtype]! : 0;
@@ -90,7 +92,7 @@ export function parseSafetensors(file: ArrayBuffer): TensorFile {
   const { __metadata__: about = {}, ...entries } = header;
   if (!isObject(about)) throw new BadInput('__metadata__ is not a JSON object');
   for (const [key, value] of Object.entries(about)) {
-    if (typeof value !== 'string') throw new BadInput(`metadata "${key}" is not text`);
+    if (typeof value !== 'string') throw new BadInput(`metadata ${quoted(key)} is not text`);
     metadata.set(key, value);
   }
   if (Object.keys(entries).length > MAX_TENSORS) {
@@ -111,14 +113,16 @@ export function read(
   shape: readonly number[],
 ): Float32Array | Float64Array {
   const tensor = file.tensors.get(name);
-  if (!tensor) throw new BadInput(`expected a tensor "${name}", found none`);
+  if (!tensor) throw new BadInput(`expected a tensor ${quoted(name)}, found none`);
   if (tensor.dtype !== dtype || tensor.shape.join() !== shape.join()) {
     const got = `${tensor.dtype} (${tensor.shape.join(', ')})`;
-    throw new BadInput(`tensor "${name}": expected ${dtype} (${shape.join(', ')}), got ${got}`);
+    throw new BadInput(
+      `tensor ${quoted(name)}: expected ${dtype} (${shape.join(', ')}), got ${got}`,
+    );
   }
   // Copied: where they stand in the file need not suit an array of numbers.
   const { buffer } = tensor.bytes.slice();
   const values = dtype === 'F32' ? new Float32Array(buffer) : new Float64Array(buffer);
-  if (!values.every(Number.isFinite)) throw new BadInput(`tensor "${name}" is not finite`);
+  if (!values.every(Number.isFinite)) throw new BadInput(`tensor ${quoted(name)} is not finite`);
   return values;
 }

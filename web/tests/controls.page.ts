@@ -1,6 +1,6 @@
 import { expect } from '@playwright/test';
 import { readFileSync } from 'node:fs';
-import { open, slide, startFrom, test } from './page';
+import { open, run, slide, startFrom, test } from './page';
 import { policyPath, readPolicy } from './program';
 
 const time = () => upswing.world.time;
@@ -16,7 +16,7 @@ test('pause stands still, step goes on by 0.02 s, reset hangs', async ({ page })
   expect(await page.evaluate(time)).toBeCloseTo(stopped + 0.02, 9);
   await page.getByRole('button', { name: 'Reset', exact: true }).click();
   expect(await page.evaluate(() => upswing.world.state)).toEqual({ q1: 0, q2: 0, w1: 0, w2: 0 });
-  await page.getByRole('button', { name: 'Go on' }).click();
+  await page.getByRole('button', { name: 'Resume' }).click();
   await expect.poll(() => page.evaluate(time)).toBeGreaterThan(stopped + 0.1);
 });
 
@@ -43,7 +43,7 @@ test('by keyboard alone', async ({ page }) => {
   await page.keyboard.press('g');
   await expect(page.locator('#agent-on')).toHaveAttribute('aria-pressed', 'true');
   await page.keyboard.press('Space');
-  await expect(page.locator('#pause')).toHaveText('Go on');
+  await expect(page.locator('#pause')).toHaveText('Resume');
   await page.keyboard.press('.'); // to the next moment at which the agent chooses
   const stopped = await page.evaluate(time);
   await page.keyboard.press('.');
@@ -63,6 +63,81 @@ test('by keyboard alone', async ({ page }) => {
   await page.locator('#agent-on').focus();
   await page.keyboard.press('Enter');
   await expect(page.locator('#agent-on')).toHaveAttribute('aria-pressed', 'false');
+});
+
+test('keys can be switched off, and stay so', async ({ page }) => {
+  await open(page);
+  await page.getByText('Keyboard', { exact: true }).click();
+  await page.locator('#keys').uncheck();
+  await page.locator('body').click({ position: { x: 1, y: 1 } });
+  const nothing = async () => {
+    for (const key of ['g', ' ', '.', 'r', 'ArrowLeft']) await page.keyboard.press(key);
+    await expect(page.locator('#agent-on')).toHaveAttribute('aria-pressed', 'false');
+    await expect(page.locator('#pause')).toHaveText('Pause');
+    expect(await page.evaluate(() => upswing.world.push)).toBeNull();
+  };
+  await nothing();
+  await page.goto('about:blank');
+  await open(page);
+  await nothing();
+  await page.getByText('Keyboard', { exact: true }).click();
+  await page.locator('#keys').check();
+  await page.locator('body').click({ position: { x: 1, y: 1 } });
+  await page.keyboard.press('g');
+  await expect(page.locator('#agent-on')).toHaveAttribute('aria-pressed', 'true');
+});
+
+test('while paused, the keyboard sets the start', async ({ page }) => {
+  await open(page);
+  await expect(page.locator('#pose')).toBeHidden();
+  await startFrom(page, 3, -1, 2, 1);
+  const upper = page.getByLabel('Angle of the upper link', { exact: true });
+  await expect(page.locator('output[for=pose-q1]')).toHaveText('172°');
+  await upper.focus();
+  await page.keyboard.press('End');
+  const state = () => page.evaluate(() => upswing.world.state);
+  let posed = await state();
+  expect(posed).toEqual({ q1: Math.PI, q2: -1, w1: 0, w2: 0 });
+  await page.keyboard.press('ArrowLeft');
+  const lower = page.getByLabel('Angle of the lower link to it', { exact: true });
+  await expect(lower).toHaveAttribute('aria-valuetext', '-57°');
+  await lower.focus();
+  await page.keyboard.press('Home');
+  await page.keyboard.press('ArrowRight');
+  posed = await state();
+  expect(posed.q1).toBeCloseTo((179 * Math.PI) / 180, 9);
+  expect(posed.q2).toBeCloseTo((-179 * Math.PI) / 180, 9);
+  await expect(page.locator('#badge')).toHaveText('paused, free');
+  await page.getByRole('button', { name: 'Resume' }).click();
+  await expect(page.locator('#pose')).toBeHidden();
+});
+
+test('the trail is that of the last 1.3 s, at any rate of frames and any speed', async ({
+  page,
+}) => {
+  await open(page);
+  await startFrom(page, 0);
+  await page.locator('#reset').click(); // and what was before is forgotten
+  const ages = () =>
+    page.evaluate(async () => {
+      const { scene, world } = upswing;
+      const draw = scene.draw.bind(scene);
+      const seen = new Promise<number[]>((resolve) => {
+        scene.draw = (w, state, trail) => {
+          draw(w, state, trail);
+          resolve(trail.map(({ t }) => world.time - t));
+        };
+      });
+      const result = await seen;
+      scene.draw = draw;
+      return result;
+    });
+  await run(page, 0.5); // without a frame in between
+  expect((await ages()).length).toBe(25);
+  await run(page, 5);
+  const long = await ages();
+  expect(long.length).toBe(65);
+  expect(Math.max(...long)).toBeLessThanOrEqual(1.3 + 1e-9);
 });
 
 test("a policy of one's own", async ({ page }) => {
@@ -95,7 +170,7 @@ test('a broken policy is refused with a reason, and the agent stays', async ({ p
   ] as const;
   for (const [name, buffer, reason] of files) {
     await page.locator('#file').setInputFiles({ name, mimeType: '', buffer });
-    await expect(page.locator('#message')).toContainText(`${name} cannot be used`);
+    await expect(page.locator('#message')).toContainText(`"${name}" cannot be used`);
     await expect(page.locator('#message')).toContainText(reason);
     await expect(page.locator('#agent')).toHaveValue('d3qn');
   }

@@ -1,4 +1,5 @@
 import { expect } from '@playwright/test';
+import type { Page, Response } from '@playwright/test';
 import { gzipSync } from 'node:zlib';
 import { open, test } from './page';
 
@@ -14,11 +15,12 @@ test('the page loads and asks nobody else', async ({ page }) => {
 });
 
 test('the first load is at most 2 MB compressed', async ({ page }) => {
-  const bodies: Promise<Buffer>[] = [];
-  page.on('response', (response) => bodies.push(response.body()));
+  const responses: Response[] = [];
+  page.on('response', (response) => responses.push(response));
   await open(page);
   await page.waitForLoadState('networkidle');
-  const sizes = (await Promise.all(bodies)).map((body) => gzipSync(body).length);
+  const bodies = await Promise.all(responses.map((response) => response.body()));
+  const sizes = bodies.map((body) => gzipSync(body).length);
   expect(sizes.length).toBeGreaterThan(4);
   expect(sizes.reduce((sum, size) => sum + size, 0)).toBeLessThan(2e6);
 });
@@ -51,27 +53,114 @@ test.describe('what the policy of the page forbids', () => {
 test.describe('what is missing or broken is told', () => {
   test.use({ complains: true });
 
+  /// That the page says why, and no longer that it loads.
+  async function expectProblem(page: Page, words: string | RegExp): Promise<void> {
+    await expect(page.locator('#problem')).toContainText(words);
+    await expect(page.locator('#loading')).toBeHidden();
+    await expect(page.locator('#badge')).toBeHidden();
+    await expect(page.locator('#agent-on')).toBeDisabled();
+  }
+
   test('a browser without WebAssembly is told so', async ({ page }) => {
     await page.addInitScript(() => Reflect.deleteProperty(globalThis, 'WebAssembly'));
     await page.goto('./');
-    await expect(page.locator('#message')).toContainText('no WebAssembly');
-    await expect(page.locator('#agent-on')).toBeDisabled();
+    await expectProblem(page, 'no WebAssembly');
   });
 
-  for (const [what, pattern] of [
-    ['MuJoCo', /\.wasm$/],
-    ['the list of agents', /agents\.json$/],
-    ['a policy', /\.safetensors$/],
+  for (const [what, pattern, name] of [
+    ['MuJoCo', /\.wasm$/, '.wasm'],
+    ['the list of agents', /agents\.json$/, 'agents/agents.json'],
   ] as const) {
     test(what, async ({ page }) => {
       await page.route(pattern, (route) => route.fulfill({ status: 200, body: 'broken' }));
       await page.goto('./');
-      await expect(page.locator('#message')).toContainText(/could not start|cannot be used/);
-      await page.unroute(pattern);
-      await page.route(pattern, (route) => route.abort());
-      await page.goto('about:blank');
-      await page.goto('./');
-      await expect(page.locator('#message')).toContainText(/could not start|cannot be used/);
+      await expectProblem(page, 'could not start');
+      for (const [answer, words] of [
+        [{ status: 404 }, 'is missing'],
+        [{ status: 500 }, 'the server says 500'],
+        [null, 'cannot be fetched'],
+      ] as const) {
+        await page.unroute(pattern);
+        await page.route(pattern, (route) => (answer ? route.fulfill(answer) : route.abort()));
+        await page.reload();
+        await expectProblem(page, words);
+        await expectProblem(page, name);
+      }
     });
   }
+
+  test('a policy: the page runs without it, and another one can be chosen', async ({ page }) => {
+    for (const [answer, words] of [
+      [{ status: 200, body: 'broken' }, 'too short'],
+      [{ status: 404 }, 'agents/d3qn.safetensors is missing'],
+      [null, 'cannot be fetched'],
+    ] as const) {
+      await page.unrouteAll();
+      await page.route(/d3qn\.safetensors$/, (route) =>
+        answer ? route.fulfill(answer) : route.abort(),
+      );
+      await page.goto('about:blank');
+      await page.goto('./');
+      await expect(page.locator('#message')).toContainText('Agent "d3qn" cannot be used');
+      await expect(page.locator('#message')).toContainText(words);
+      await expect(page.locator('#agent-text')).toContainText('could not be loaded');
+      await expect(page.locator('#badge')).toHaveText('hanging');
+      await expect(page.locator('#agent-on')).toBeDisabled();
+    }
+    await page.locator('#agent').selectOption('fast');
+    await expect(page.locator('#agent-on')).toBeEnabled();
+    await expect(page.locator('#agent-text')).toContainText('8-64-64');
+  });
+
+  for (const what of ['missing', 'no answer'] as const) {
+    test(`the script itself: ${what}`, async ({ page }) => {
+      await page.route(/assets\/index-.*\.js$/, (route) =>
+        what === 'missing' ? route.fulfill({ status: 404 }) : route.abort(),
+      );
+      await page.goto('./');
+      await expectProblem(page, /its script .*index-.*\.js, or a part of it, is missing/);
+    });
+  }
+
+  test('a script that the browser cannot read', async ({ page }) => {
+    await page.route(/assets\/index-.*\.js$/, (route) =>
+      route.fulfill({ contentType: 'text/javascript', body: 'let let = ?;' }),
+    );
+    await page.goto('./');
+    await expectProblem(page, 'does not understand its script');
+  });
+
+  test('without any script a sentence appears after a while', async ({ page }) => {
+    await page.route(/\.js$/, (route) => route.abort());
+    await page.goto('./');
+    const slow = page.locator('#slow');
+    await expect(slow).toBeHidden();
+    await page.evaluate(() => {
+      for (const animation of document.getAnimations()) animation.finish();
+    });
+    await expect(slow).toBeVisible();
+    await expect(slow).toContainText('a part of the page is missing');
+  });
+
+  test('a server that falls silent', async ({ page }) => {
+    await page.clock.install();
+    await page.route(/\.wasm$/, () => {}); // never answers
+    const asked = page.waitForRequest(/\.wasm$/);
+    await page.goto('./', { waitUntil: 'commit' });
+    await asked;
+    await expect(page.locator('#loading')).toBeVisible();
+    await page.clock.fastForward(29_000);
+    await expect(page.locator('#loading')).toBeVisible();
+    await page.clock.fastForward(2_000);
+    await expectProblem(page, 'nothing arrived for 30 s');
+  });
+
+  test('JavaScript is switched off', async ({ browser }) => {
+    const context = await browser.newContext({ javaScriptEnabled: false });
+    const page = await context.newPage();
+    await page.goto('./');
+    await expect(page.locator('noscript p')).toBeVisible();
+    await expect(page.locator('#loading')).toBeHidden();
+    await context.close();
+  });
 });

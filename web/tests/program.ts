@@ -9,7 +9,11 @@ export function runProgram(...args: string[]): string {
   const [program, first] = process.env.UPSWING
     ? [process.env.UPSWING, []]
     : [launcher, ['--no-setup']];
-  return execFileSync(program, [...first, ...args], { encoding: 'utf8', maxBuffer: 64 << 20 });
+  return execFileSync(program, [...first, ...args], {
+    encoding: 'utf8',
+    maxBuffer: 64 << 20,
+    stdio: ['ignore', 'pipe', 'pipe'],
+  });
 }
 
 /// The rows of `upswing simulate ARGUMENTS`: [t, q1, q2, w1, w2, torque].

@@ -2,18 +2,26 @@ import { NOMINAL } from '../pendulum';
 import type { Parameter } from '../pendulum';
 import { Policy } from '../policy';
 import { BadInput, MAX_FILE_BYTES } from '../safetensors';
+import { isCommand, printable, quoted } from '../text';
 import type { Curve } from '../view/charts';
+import { fetchBytes } from './fetch';
 import { OWN } from './share';
+import { forgetFile, recallFile, rememberFile } from './storage';
+import type { KeptFile } from './storage';
 
-/// The agents that the page comes with, and those that a visitor brings.
+/// The agents that the page comes with, and the one that a visitor brings.
 
-/// An entry of agents/agents.json, which `upswing export --page` writes.
+const LIST = 'agents/agents.json';
+const MAX_NAME = 200; // characters, of an ID, a file, an agent
+const MAX_ROWS = 100_000; // of a learning curve
+
+/// An entry of the list, which `upswing export --page` writes.
 interface Entry {
   id: string;
   file: string;
   agent: string;
-  command?: string;
-  curve?: Curve;
+  command: string | null;
+  curve: Curve | null;
 }
 
 export interface Agent {
@@ -34,45 +42,10 @@ const TITLES = new Map([
   ['d3qn-randomized', 'Randomised Dueling Double DQN'],
 ]);
 
-/// Throws BadInput if nobody answers.
-export async function fetchFrom(address: string): Promise<Response> {
-  try {
-    return await fetch(address);
-  } catch {
-    throw new BadInput(`${address} cannot be fetched`);
-  }
-}
-
-/// Reads at most `limit` bytes; `onProgress` hears how many there are. Throws BadInput.
-export async function readBytes(
-  response: Response,
-  limit: number,
-  onProgress: (bytes: number) => void = () => {},
-): Promise<Uint8Array<ArrayBuffer>> {
-  if (!response.ok) throw new BadInput(`${response.url}: the server says ${response.status}`);
-  const pieces: Uint8Array<ArrayBuffer>[] = [];
-  let bytes = 0;
-  const reader = response.body!.getReader();
-  const next = () =>
-    reader.read().catch(() => {
-      throw new BadInput('the connection broke off');
-    });
-  for (let piece = await next(); !piece.done; piece = await next()) {
-    pieces.push(piece.value);
-    bytes += piece.value.length;
-    onProgress(bytes);
-    if (bytes > limit) {
-      await reader.cancel();
-      throw new BadInput(`it is larger than ${limit / 1024 / 1024} MB`);
-    }
-  }
-  return new Uint8Array(await new Blob(pieces).arrayBuffer());
-}
-
 /// A title for an entry: that of its agent, and its ID if that says more.
 function titleOf({ id, agent }: Entry): string {
-  const title = TITLES.get(agent) ?? agent;
-  return id === agent ? title : `${title}, ${id}`;
+  const title = TITLES.get(agent) ?? printable(agent);
+  return id === agent ? title : `${title}, ${printable(id)}`;
 }
 
 function describe(policy: Policy): string {
@@ -92,30 +65,54 @@ function describe(policy: Policy): string {
   ].join('');
 }
 
-/// What cannot be fetched is told like what is broken.
-async function fetchBytes(address: string): Promise<Uint8Array<ArrayBuffer>> {
-  return readBytes(await fetchFrom(address), MAX_FILE_BYTES);
+function isNumbers(value: unknown): value is number[] {
+  return Array.isArray(value) && value.length <= MAX_ROWS && value.every(Number.isFinite);
+}
+
+/// Evaluations of a training; null if they are not what they should be.
+export function parseCurve(value: unknown): Curve | null {
+  const { step, success_rate, mean_return } = (value ?? {}) as Partial<Record<string, unknown>>;
+  if (!isNumbers(step) || !isNumbers(success_rate) || !isNumbers(mean_return)) return null;
+  const { length } = step;
+  if (length === 0 || success_rate.length !== length || mean_return.length !== length) return null;
+  const rises = step.every((n, i) => n > (step[i - 1] ?? 0));
+  const shares = success_rate.every((share) => share >= 0 && share <= 1);
+  return rises && shares ? { step, success_rate, mean_return } : null;
+}
+
+/// An entry of the list, of which nothing but ID, file and agent must be there; null if it is none.
+export function parseEntry(value: unknown): Entry | null {
+  const given = (value ?? {}) as Partial<Record<keyof Entry, unknown>>;
+  const isName = (text: unknown): text is string =>
+    typeof text === 'string' && text !== '' && text.length <= MAX_NAME;
+  const { id, file, agent, command } = given;
+  if (!isName(id) || !isName(file) || !isName(agent) || id === OWN) return null;
+  // A line that a shell would take for more than one command is not shown for pasting.
+  const shown = typeof command === 'string' && isCommand(command) ? command : null;
+  return { id, file, agent, command: shown, curve: parseCurve(given.curve) };
 }
 
 export class Agents {
   private readonly entries: Map<string, Entry>;
   private readonly loaded = new Map<string, Agent>();
+  private own: KeptFile | null; // what the visitor brought, now or at an earlier visit
 
-  private constructor(entries: Entry[]) {
-    const others = entries.filter(({ id }) => id !== OWN);
-    this.entries = new Map(others.map((entry) => [entry.id, entry]));
+  private constructor(entries: Entry[], own: KeptFile | null) {
+    this.entries = new Map(entries.map((entry) => [entry.id, entry]));
+    this.own = own;
   }
 
-  /// Reads the list of agents. Throws BadInput.
+  /// Reads the list of agents, and what this browser keeps. Throws BadInput.
   static async fetch(): Promise<Agents> {
-    const bytes = await fetchBytes('agents/agents.json');
+    const [bytes, own] = await Promise.all([fetchBytes(LIST, MAX_FILE_BYTES), recallFile(OWN)]);
     try {
-      const { agents } = JSON.parse(new TextDecoder().decode(bytes)) as { agents: Entry[] };
-      if (agents.length > 0) return new Agents(agents);
+      const { agents } = JSON.parse(new TextDecoder().decode(bytes)) as { agents: unknown[] };
+      const entries = agents.map(parseEntry).filter((entry) => entry !== null);
+      if (entries.length > 0) return new Agents(entries, own);
     } catch {
       // told below
     }
-    throw new BadInput('agents/agents.json is not a list of agents');
+    throw new BadInput(`${LIST} is not a list of agents`);
   }
 
   /// All that there are, by id and title.
@@ -124,42 +121,66 @@ export class Agents {
       id: entry.id,
       title: titleOf(entry),
     }));
-    const own = this.loaded.get(OWN);
-    return own ? [...list, { id: OWN, title: own.title }] : list;
+    return this.own ? [...list, { id: OWN, title: ownTitle(this.own) }] : list;
   }
 
   /// Of an agent that a link may name.
   has(id: string): boolean {
-    return this.entries.has(id);
+    return this.entries.has(id) || (id === OWN && this.own !== null);
+  }
+
+  /// The name of the visitor's own file.
+  get ownName(): string | null {
+    return this.own && printable(this.own.name);
   }
 
   /// Fetches and checks the policy when it is asked for the first time. Throws BadInput.
   async get(id: string): Promise<Agent> {
     const known = this.loaded.get(id);
     if (known) return known;
+    if (id === OWN && this.own) return this.addOwn(this.own);
     const entry = this.entries.get(id);
-    if (!entry) throw new BadInput(`there is no agent "${id}"`);
-    const { buffer } = await fetchBytes(`agents/${encodeURIComponent(entry.file)}`);
+    if (!entry) throw new BadInput(`there is no agent ${quoted(id)}`);
+    const address = `agents/${encodeURIComponent(entry.file)}`;
+    const { buffer } = await fetchBytes(address, MAX_FILE_BYTES);
     const policy = new Policy(buffer);
-    const { command = null, curve = null } = entry;
-    const title = titleOf(entry);
-    return this.add({ id, title, text: describe(policy), command, curve, policy });
+    const { command, curve } = entry;
+    return this.add({ id, title: titleOf(entry), text: describe(policy), command, curve, policy });
   }
 
-  /// Reads and checks a visitor's file. Throws BadInput.
+  /// Reads and checks a visitor's file, and keeps it in this browser for the next visit, if that is
+  /// allowed. Throws BadInput.
   async open(file: File): Promise<Agent> {
     if (file.size > MAX_FILE_BYTES) throw new BadInput('it is larger than 16 MB');
     const bytes = await file.arrayBuffer().catch(() => {
       throw new BadInput('it cannot be read');
     });
-    const policy = new Policy(bytes);
-    const title = `${file.name} (yours)`;
+    const own = { name: file.name, bytes };
+    const agent = this.addOwn(own);
+    this.own = own;
+    await rememberFile(OWN, own);
+    return agent;
+  }
+
+  /// Removes the visitor's own policy, from this browser too.
+  async forgetOwn(): Promise<void> {
+    this.own = null;
+    this.loaded.delete(OWN);
+    await forgetFile(OWN);
+  }
+
+  private addOwn(own: KeptFile): Agent {
+    const policy = new Policy(own.bytes);
     const text = describe(policy);
-    return this.add({ id: OWN, title, text, command: null, curve: null, policy });
+    return this.add({ id: OWN, title: ownTitle(own), text, command: null, curve: null, policy });
   }
 
   private add(agent: Agent): Agent {
     this.loaded.set(agent.id, agent);
     return agent;
   }
+}
+
+function ownTitle({ name }: KeptFile): string {
+  return `${printable(name)} (yours)`;
 }

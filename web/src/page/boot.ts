@@ -2,7 +2,7 @@ import loadMujoco from '@mujoco/mujoco';
 import wasmUrl from '@mujoco/mujoco/mujoco.wasm?url';
 import { BadInput } from '../safetensors';
 import { Simulator } from '../simulator';
-import { fetchFrom, readBytes } from './agents';
+import { fetchBytes } from './fetch';
 
 const WASM_BYTES = 4_520_000; // about; servers that compress do not say it
 const MAX_WASM_BYTES = 64 * 1024 * 1024;
@@ -12,7 +12,7 @@ export async function startSimulator(onProgress: (share: number) => void): Promi
   if (typeof WebAssembly !== 'object') {
     throw new BadInput('this browser has no WebAssembly, or it is switched off; the page needs it');
   }
-  const wasmBinary = await readBytes(await fetchFrom(wasmUrl), MAX_WASM_BYTES, (bytes) =>
+  const wasmBinary = await fetchBytes(wasmUrl, MAX_WASM_BYTES, (bytes) =>
     onProgress(Math.min(1, bytes / WASM_BYTES)),
   );
   return new Simulator(await loadMujoco({ wasmBinary, locateFile: () => wasmUrl }));

@@ -94,7 +94,7 @@ function rewardText(terms: number[]): string {
 
 /// In units of the reward.
 function qText(policy: Policy, { q, action, value }: Decision): string {
-  const reward = (x: number) => (x / policy.rewardScale).toFixed(1);
+  const reward = (x: number) => withMinus((x / policy.rewardScale).toFixed(1));
   const text = `best ${reward(q[action]!)}`;
   return Number.isNaN(value) ? text : `${text}, state ${reward(value)}`;
 }

@@ -1,3 +1,8 @@
+import { element } from './dom';
+import { recall, remember } from './storage';
+
+const KEY = 'keys';
+
 export interface Actions {
   toggleAgent(): void;
   togglePause(): void;
@@ -7,8 +12,12 @@ export interface Actions {
   shoveRight(): void;
 }
 
-/// The page by keyboard. Keys that mean something where the focus is are left alone.
+/// The page by keyboard. Keys that mean something where the focus is are left alone, and all of them
+/// can be switched off, for those who speak to their computer or touch keys by accident.
 export function listenToKeys(actions: Actions): void {
+  const on = element<HTMLInputElement>('keys');
+  on.checked = recall(KEY) !== 'off';
+  on.addEventListener('change', () => remember(KEY, on.checked ? 'on' : 'off'));
   const keys = new Map<string, () => void>([
     ['g', actions.toggleAgent],
     [' ', actions.togglePause],
@@ -19,13 +28,13 @@ export function listenToKeys(actions: Actions): void {
   ]);
   addEventListener('keydown', (event) => {
     const target = event.target as HTMLElement;
-    if (event.ctrlKey || event.altKey || event.metaKey) return;
-    if (target.closest('input, select, textarea')) return;
+    if (!on.checked || event.ctrlKey || event.altKey || event.metaKey) return;
+    if (target.closest('input, select, textarea, math')) return; // a formula scrolls
     if (event.key === ' ' && target.closest('button, summary')) return;
     const action = keys.get(event.key.length === 1 ? event.key.toLowerCase() : event.key);
     if (!action) return;
     event.preventDefault();
-    // Of a key that is held down, steps alone repeat.
+    // Of a key that is held down, only steps repeat.
     if (!event.repeat || event.key === '.') action();
   });
 }

@@ -1,11 +1,13 @@
+import { printable } from '../text';
 import { button, element } from './dom';
 
 const NOTE_SECONDS = 6;
+const LONGEST = 2000; // characters; a shared address is the longest
 let timer = 0;
 
 function show(text: string, kind: 'warning' | 'note'): void {
   clearTimeout(timer);
-  element('message-text').textContent = text;
+  element('message-text').textContent = printable(text, LONGEST);
   element('message').dataset.kind = kind;
   element('message').hidden = false;
 }

@@ -1,8 +1,8 @@
 import { History } from '../history';
 import { BadInput } from '../safetensors';
+import { quoted } from '../text';
 import { LearningCurve } from '../view/charts';
-import { Scene } from '../view/scene';
-import { pointOn } from '../world';
+import { Scene, TRAIL_SECONDS } from '../view/scene';
 import type { World } from '../world';
 import type { Agent, Agents } from './agents';
 import { Clock } from './clock';
@@ -10,7 +10,9 @@ import { Dashboard, situation } from './dashboard';
 import { button, element } from './dom';
 import { Hand } from './hand';
 import { listenToKeys } from './keys';
+import { showStage } from './layout';
 import { hideMessage, note, warn } from './message';
+import { Pose } from './pose';
 import { RANGES, Settings } from './settings';
 import { BEGINNING, decode, encode, OWN } from './share';
 import type { Shared } from './share';
@@ -27,6 +29,7 @@ export class Page {
   readonly scene = new Scene();
   private readonly history = new History(REMEMBERED);
   private readonly settings: Settings;
+  private readonly pose: Pose;
   private readonly dashboard = new Dashboard();
   private readonly curve = new LearningCurve();
   private readonly still = matchMedia('(prefers-reduced-motion: reduce)');
@@ -41,6 +44,7 @@ export class Page {
     this.agents = agents;
     this.clock = new Clock(world);
     this.settings = new Settings(world, () => this.changed());
+    this.pose = new Pose(world, () => this.restarted());
     world.onMoment = (moment) => this.history.add(moment);
   }
 
@@ -51,12 +55,13 @@ export class Page {
       problems.push(
         shared.agent === OWN
           ? "it was made with somebody's own policy, which is not in it"
-          : `unknown agent "${shared.agent}"`,
+          : `unknown agent ${quoted(shared.agent)}`,
       );
       shared.agent = null;
     }
     this.world.agentOn = false;
-    if (!(await this.choose(shared.agent ?? this.agents.list[0]!.id)) && !this.agent) return;
+    await this.choose(shared.agent ?? this.agents.list[0]!.id);
+    this.setPaused(false);
     this.apply(shared);
     this.world.reset();
     this.restarted();
@@ -84,12 +89,12 @@ export class Page {
 
   /// Takes another agent; false if it cannot be had, which is told, and the old one stays.
   choose(id: string): Promise<boolean> {
-    return this.take(() => this.agents.get(id), `Agent "${id}"`);
+    return this.take(() => this.agents.get(id), `Agent ${quoted(id)}`);
   }
 
   /// Takes a visitor's own policy, and gives it the plant that it was trained on.
   async openFile(file: File): Promise<void> {
-    if (!(await this.take(() => this.agents.open(file), file.name))) return;
+    if (!(await this.take(() => this.agents.open(file), quoted(file.name)))) return;
     this.settings.setPlant(this.agent!.policy.plant);
     this.changed();
   }
@@ -118,10 +123,17 @@ export class Page {
 
   private showAgent(): void {
     const options = this.agents.list.map(({ id, title }) => new Option(title, id));
-    element<HTMLSelectElement>('agent').replaceChildren(...options);
+    const select = element<HTMLSelectElement>('agent');
+    select.replaceChildren(...options);
     element<HTMLButtonElement>('agent-on').disabled = this.agent === null;
-    if (!this.agent) return;
-    element<HTMLSelectElement>('agent').value = this.agent.id;
+    element('own').hidden = this.agents.ownName === null;
+    element('own-name').textContent = this.agents.ownName;
+    if (!this.agent) {
+      select.prepend(new Option('Choose an agent', '', true, true));
+      element('agent-text').textContent = 'There is no agent: its policy could not be loaded.';
+      return;
+    }
+    select.value = this.agent.id;
     element('agent-text').textContent = this.agent.text;
     element('agent-command').hidden = this.agent.command === null;
     element('agent-command').firstElementChild!.textContent = this.agent.command;
@@ -155,11 +167,13 @@ export class Page {
     button('plant-reset', () => this.resetSettings());
     button('share', () => void this.share());
     button('save', () => this.save());
+    button('own-remove', () => void this.forgetOwn());
     button('theme', changeTheme);
     const speed = element<HTMLInputElement>('speed');
     speed.addEventListener('input', () => this.setSpeed(Number(speed.value)));
     this.listenToAgents();
     addEventListener('hashchange', () => void this.open());
+    this.listenToExamples();
     onThemeChange(() => this.repaint());
     new ResizeObserver(() => this.drawCurve()).observe(this.curve.canvas.element);
   }
@@ -181,6 +195,23 @@ export class Page {
     });
   }
 
+  /// A link to an example leads back to the pendulum, and starts the same example anew as well.
+  private listenToExamples(): void {
+    element('explain').addEventListener('click', (event) => {
+      const link = (event.target as HTMLElement).closest<HTMLAnchorElement>('a[href^="#"]');
+      if (!link) return;
+      showStage();
+      if (link.hash === location.hash) void this.open();
+    });
+  }
+
+  private async forgetOwn(): Promise<void> {
+    await this.agents.forgetOwn();
+    if (this.agent?.id === OWN) await this.choose(this.agents.list[0]!.id);
+    else this.showAgent();
+    element('agent').focus(); // the button is gone
+  }
+
   private setAgentOn(on: boolean): void {
     if (!this.agent) return;
     this.world.agentOn = on;
@@ -192,7 +223,8 @@ export class Page {
     this.paused = paused;
     this.world.drag = null;
     this.clock.settle();
-    element('pause').textContent = paused ? 'Go on' : 'Pause';
+    element('pause').textContent = paused ? 'Resume' : 'Pause';
+    this.pose.shown = paused;
   }
 
   private setSpeed(speed: number): void {
@@ -220,7 +252,6 @@ export class Page {
   private restarted(): void {
     this.clock.settle();
     this.history.clear();
-    this.scene.clearTrail();
   }
 
   /// Pendulum, sensors and motor as at the beginning.
@@ -289,10 +320,9 @@ export class Page {
 
   private draw(): void {
     const { world } = this;
-    if (!this.paused && !this.still.matches) {
-      this.scene.addToTrail(pointOn(world.plant, world.state, 2, world.plant.length2).position);
-    }
-    this.scene.draw(world, this.clock.state);
+    const trail = this.still.matches ? [] : this.history.from(world.time - TRAIL_SECONDS);
+    this.scene.draw(world, this.clock.state, trail);
+    if (this.paused) this.pose.follow(world.state);
     this.dashboard.draw(world, this.history);
     const { state, text } = situation(world);
     const badge = element('badge');

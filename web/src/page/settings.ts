@@ -1,13 +1,13 @@
-import { CONTROL_PERIOD, NOMINAL } from '../pendulum';
-import type { Parameter, Plant } from '../pendulum';
+import { DISTURBANCE_LIMITS } from '../disturbance';
+import { CONTROL_PERIOD, NOMINAL, PLANT_LIMITS } from '../pendulum';
+import type { Parameter, Plant, Range } from '../pendulum';
 import type { Policy } from '../policy';
 import type { World } from '../world';
 import { element } from './dom';
-import type { Range } from './share';
 import { Slider } from './sliders';
 import type { SliderSpec } from './sliders';
 
-type Row = Omit<SliderSpec, 'name' | 'initial'> & { name: Parameter };
+type Row = Omit<SliderSpec, 'name' | 'initial' | 'limits'> & { name: Parameter };
 
 const PLANT: readonly Row[] = [
   { name: 'mass1', label: 'Mass of the upper link', unit: 'kg', min: 0.2, max: 3, step: 0.05 },
@@ -41,6 +41,7 @@ const DISTURBANCE: readonly SliderSpec[] = [
     unit: 'rad, rad/s',
     min: 0,
     max: 0.2,
+    limits: DISTURBANCE_LIMITS.sensor_noise,
     step: 0.005,
     initial: 0,
   },
@@ -50,15 +51,18 @@ const DISTURBANCE: readonly SliderSpec[] = [
     unit: 'ms',
     min: 0,
     max: 5,
+    limits: DISTURBANCE_LIMITS.delay,
     step: 1,
     initial: 0,
     format: (periods) => `${1000 * CONTROL_PERIOD * periods} ms`,
   },
 ];
 
-/// The largest and smallest that a link to this page may bring.
+/// The largest and smallest that a link to this page may bring, also beyond the sliders, which then
+/// extend.
 export const RANGES: ReadonlyMap<string, Range> = new Map<string, Range>([
-  ...[...PLANT, ...DISTURBANCE].map(({ name, min, max }): [string, Range] => [name, [min, max]]),
+  ...Object.entries(PLANT_LIMITS),
+  ...Object.entries(DISTURBANCE_LIMITS),
   ['speed', [0.1, 2]],
 ]);
 
@@ -71,7 +75,8 @@ export class Settings {
   constructor(world: World, onChange: () => void) {
     this.world = world;
     for (const row of PLANT) {
-      const slider = new Slider({ ...row, initial: NOMINAL[row.name] }, (value) => {
+      const spec = { ...row, limits: PLANT_LIMITS[row.name], initial: NOMINAL[row.name] };
+      const slider = new Slider(spec, (value) => {
         world.plant = { ...world.plant, [row.name]: value };
         onChange();
       });
@@ -106,7 +111,6 @@ export class Settings {
     const strongest = Math.max(...policy.torques);
     this.plant.get('torque_limit')!.label = `Limit of the motor (agent: ±${strongest})`;
     this.disturbance.sensor_noise.trained = policy.trainedDisturbance('sensor_noise');
-    const [least, most] = policy.trainedDisturbance('delay');
-    this.disturbance.delay.trained = [least / CONTROL_PERIOD, most / CONTROL_PERIOD];
+    this.disturbance.delay.trained = policy.trainedDisturbance('delay');
   }
 }

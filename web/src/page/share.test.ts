@@ -1,7 +1,8 @@
 import { expect, test } from 'vitest';
 import { NOMINAL } from '../pendulum';
+import type { Range } from '../pendulum';
 import { BEGINNING, decode, encode } from './share';
-import type { Range, Shared } from './share';
+import type { Shared } from './share';
 
 const RANGES: ReadonlyMap<string, Range> = new Map<string, Range>([
   ['mass1', [0.2, 3]],
@@ -33,6 +34,9 @@ test.each([
   ['mass1=NaN', 'mass1: expected 0.2 to 3, got "NaN"'],
   ['mass1=', 'mass1: expected 0.2 to 3, got ""'],
   ['mass3=1', 'unknown "mass3"'],
+  [`${'x'.repeat(5000)}=1`, `unknown "${'x'.repeat(59)}…"`],
+  [`mass1=${'1'.repeat(5000)}`, `mass1: expected 0.2 to 3, got "${'1'.repeat(59)}…"`],
+  ['a%0Ab=1', 'unknown "a\ufffdb"'],
   ['__proto__=1', 'unknown "__proto__"'],
 ])('%s is told and left out', (hash, problem) => {
   expect(decode(hash, RANGES)).toEqual({ shared: BEGINNING, problems: [problem] });

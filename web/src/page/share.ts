@@ -1,5 +1,6 @@
 import { NOMINAL } from '../pendulum';
-import type { Parameter, Plant } from '../pendulum';
+import type { Parameter, Plant, Range } from '../pendulum';
+import { quoted } from '../text';
 
 /// Stands for a visitor's own policy, which no link can hold.
 export const OWN = 'own';
@@ -23,8 +24,6 @@ export const BEGINNING: Readonly<Shared> = {
   sensor_noise: 0,
   delay: 0,
 };
-
-export type Range = readonly [number, number];
 
 /// The numbers of a link, by the names that they have there.
 function numbersOf({ speed, plant, sensor_noise, delay }: Shared): Record<string, number> {
@@ -58,9 +57,9 @@ export function decode(
     } else if (name === 'on') {
       shared.on = text === '1';
     } else if (!range) {
-      problems.push(`unknown "${name}"`);
+      problems.push(`unknown ${quoted(name)}`);
     } else if (text.trim() === '' || !(value >= range[0] && value <= range[1])) {
-      problems.push(`${name}: expected ${range[0]} to ${range[1]}, got "${text}"`);
+      problems.push(`${name}: expected ${range[0]} to ${range[1]}, got ${quoted(text)}`);
     } else if (name === 'delay') {
       shared.delay = Math.round(value);
     } else if (name === 'speed' || name === 'sensor_noise') {

@@ -1,4 +1,6 @@
-/// Sliders with a label, a value, a way back, and a mark for what the agent was trained on.
+import type { Range } from '../pendulum';
+
+/// Sliders with a label, a value, a reset button, and a mark for what the agent was trained on.
 
 export interface SliderSpec {
   name: string;
@@ -6,18 +8,24 @@ export interface SliderSpec {
   unit: string;
   min: number;
   max: number;
+  /// What a link or a policy may bring at most: the slider then reaches so far.
+  limits: Range;
   step: number;
   initial: number;
   /// How the value is shown; by default with its unit.
   format?: (value: number) => string;
 }
 
+const clamp = (value: number, [low, high]: Range) => Math.min(Math.max(value, low), high);
+
 export class Slider {
   readonly element: HTMLElement;
   private readonly input: HTMLInputElement;
   private readonly output: HTMLOutputElement;
   private readonly back: HTMLButtonElement;
+  private readonly mark: HTMLElement;
   private readonly spec: SliderSpec;
+  private marked: Range | null = null; // what the agent was trained on
 
   constructor(spec: SliderSpec, onInput: (value: number) => void) {
     this.spec = spec;
@@ -26,19 +34,20 @@ export class Slider {
     this.input = this.element.querySelector('input')!;
     this.output = this.element.querySelector('output')!;
     this.back = this.element.querySelector('button')!;
+    this.mark = this.element.querySelector('.trained')!;
     const { input } = this;
     input.id = spec.name;
-    [input.min, input.max, input.step] = [spec.min, spec.max, spec.step].map(String) as [
-      string,
-      string,
-      string,
-    ];
     this.element.querySelector('label')!.htmlFor = spec.name;
     this.label = spec.label;
     this.output.htmlFor.add(spec.name);
     this.back.ariaLabel = `Reset ${spec.label}`;
     input.addEventListener('input', () => {
       input.step = String(spec.step); // a link may have brought a value between two steps
+      // A slider that was extended by whole steps may reach below what is allowed.
+      if (clamp(this.value, spec.limits) !== this.value) {
+        input.step = 'any';
+        input.value = String(clamp(this.value, spec.limits));
+      }
       this.show();
       onInput(this.value);
     });
@@ -54,10 +63,11 @@ export class Slider {
     return Number(this.input.value);
   }
 
-  /// Also one between two steps of the slider, as a link may bring it.
+  /// Also one between two steps of the slider, or beyond its ends, as a link or a policy may bring it.
   set value(value: number) {
     const { step, min } = this.spec;
     const onStep = Math.abs((value - min) / step - Math.round((value - min) / step)) < 1e-6;
+    this.reach(value);
     this.input.step = onStep ? String(step) : 'any';
     this.input.value = String(value);
     this.show();
@@ -68,12 +78,29 @@ export class Slider {
   }
 
   /// Marks what the agent was trained on.
-  set trained([low, high]: [number, number]) {
-    const { min, max } = this.spec;
-    const share = (value: number) => String(Math.min(Math.max((value - min) / (max - min), 0), 1));
-    const mark = this.element.querySelector<HTMLElement>('.trained')!;
-    mark.style.setProperty('--share-from', share(low));
-    mark.style.setProperty('--share-to', share(high));
+  set trained(range: Range) {
+    this.marked = range;
+    this.mark.hidden = false;
+    this.reach(this.value);
+  }
+
+  /// Lets the slider reach from its own ends, by whole steps, to a value and to its mark.
+  private reach(value: number): void {
+    const { input, spec, marked } = this;
+    const wanted = [value, ...(marked ?? [])];
+    const beyond = (distance: number) => spec.step * Math.max(0, Math.ceil(distance / spec.step));
+    const low = spec.min - beyond(spec.min - Math.min(...wanted) - 1e-9);
+    const high = spec.max + beyond(Math.max(...wanted) - spec.max - 1e-9);
+    const kept = input.value;
+    [input.min, input.max] = [low, high].map((end) => String(Number(end.toPrecision(12)))) as [
+      string,
+      string,
+    ];
+    if (kept !== '') input.value = kept; // the browser may have moved it to the old end
+    const share = (at: number) => String(clamp((at - low) / (high - low), [0, 1]));
+    if (!marked) return;
+    this.mark.style.setProperty('--share-from', share(marked[0]));
+    this.mark.style.setProperty('--share-to', share(marked[1]));
   }
 
   private show(): void {

@@ -138,6 +138,10 @@ export class QBars {
     if (!policy || !decision) return;
     const { q, action } = decision;
     const best = q[action]!;
+    if (!q.every(Number.isFinite)) {
+      canvas.text('not finite', canvas.width / 2, canvas.height / 2, 'center');
+      return; // and leave the scale alone
+    }
     // The scale grows at once and shrinks slowly.
     const spread = Math.max(0.05, 1.1 * (best - Math.min(...q)));
     this.room = Math.max(spread, 0.95 * this.room);

@@ -1,17 +1,16 @@
 import type { State } from '../pendulum';
 import type { Vec } from '../simulator';
 import { pointOn } from '../world';
-import type { World } from '../world';
+import type { Moment, World } from '../world';
 import { Canvas } from './canvas';
 
-const TRAIL_POINTS = 78; // frames: 1.3 s
-const TRAIL_PIECES = 13; // of one shade each
+export const TRAIL_SECONDS = 1.3; // of the pendulum's time
+const TRAIL_SHADES = 13;
 const LARGEST_ARC = (150 / 180) * Math.PI; // at the motor's limit
 
 /// The pendulum in its plane, seen so that positive angles and torques are clockwise.
 export class Scene {
   readonly canvas = new Canvas('scene');
-  private trail: Vec[] = [];
 
   /// Pixels per metre.
   private scale = 1;
@@ -33,23 +32,15 @@ export class Scene {
     return metres * this.scale;
   }
 
-  addToTrail(tip: Vec): void {
-    this.trail.push(tip);
-    if (this.trail.length > 2 * TRAIL_POINTS) this.trail = this.trail.slice(-TRAIL_POINTS);
-  }
-
-  clearTrail(): void {
-    this.trail = [];
-  }
-
-  draw(world: World, state: State): void {
+  /// The pendulum in this state, and the way of its tip over some last moments, oldest first.
+  draw(world: World, state: State, trail: readonly Moment[]): void {
     const { canvas } = this;
     const { plant } = world;
     const reach = Math.max(1, plant.length1 + plant.length2);
     this.scale = (0.44 * Math.min(canvas.width, canvas.height)) / reach;
     canvas.clear();
     this.drawGuides(plant.length1 + plant.length2);
-    this.drawTrail();
+    this.drawTrail(world, state, trail);
 
     const elbow = pointOn(plant, state, 1, plant.length1).position;
     const tip = pointOn(plant, state, 2, plant.length2).position;
@@ -76,20 +67,26 @@ export class Scene {
     context.arc(x, y, radius, (-120 / 180) * Math.PI, (-60 / 180) * Math.PI);
     context.fillStyle = this.canvas.color('cone');
     context.fill();
+    context.closePath();
+    context.stroke();
   }
 
-  private drawTrail(): void {
-    const points = this.trail.slice(-TRAIL_POINTS);
+  /// The older, the fainter.
+  private drawTrail({ plant, time }: World, state: State, moments: readonly Moment[]): void {
+    const tip = (s: State) => this.at(pointOn(plant, s, 2, plant.length2).position);
+    const points = [...moments.map((moment) => tip(moment.state)), tip(state)];
+    const shades = moments.map(({ t }) => {
+      const age = Math.min(Math.max((time - t) / TRAIL_SECONDS, 0), 1);
+      return Math.floor(TRAIL_SHADES * (1 - age)) / TRAIL_SHADES;
+    });
     const { context } = this.canvas;
-    const piece = Math.ceil(TRAIL_POINTS / TRAIL_PIECES);
-    for (let end = points.length, shade = 1; end > 1; end -= piece, shade -= 1 / TRAIL_PIECES) {
-      context.globalAlpha = 0.6 * Math.max(0, shade);
-      const from = Math.max(0, end - piece - 1);
-      this.canvas.line(
-        points.slice(from, end).map((p) => this.at(p)),
-        'link2',
-        2,
-      );
+    context.lineJoin = 'round';
+    for (let begin = 0; begin < moments.length;) {
+      let end = begin + 1;
+      while (end < moments.length && shades[end] === shades[begin]) ++end;
+      context.globalAlpha = 0.6 * shades[begin]!;
+      this.canvas.line(points.slice(begin, end + 1), 'link2', 2);
+      begin = end;
     }
     context.globalAlpha = 1;
   }

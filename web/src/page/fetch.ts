@@ -1,0 +1,49 @@
+import { BadInput } from '../safetensors';
+
+const PATIENCE = 30; // s without a byte, after which a server counts as silent
+
+/// Fetches at most `limit` bytes; `onProgress` hears how many have arrived. Throws BadInput if the
+/// file is missing or too large, or the server cannot be reached or falls silent.
+export async function fetchBytes(
+  address: string,
+  limit: number,
+  onProgress: (bytes: number) => void = () => {},
+): Promise<Uint8Array<ArrayBuffer>> {
+  const abort = new AbortController();
+  let timer: ReturnType<typeof setTimeout>;
+  const listen = async <T>(answer: Promise<T>): Promise<T> => {
+    clearTimeout(timer);
+    timer = setTimeout(() => abort.abort(), 1000 * PATIENCE);
+    try {
+      return await answer;
+    } catch {
+      throw new BadInput(
+        abort.signal.aborted
+          ? `${address}: nothing arrived for ${PATIENCE} s`
+          : `${address} cannot be fetched`,
+      );
+    }
+  };
+  try {
+    const response = await listen(fetch(address, { signal: abort.signal }));
+    if (response.status === 404) throw new BadInput(`${address} is missing`);
+    if (!response.ok) throw new BadInput(`${address}: the server says ${response.status}`);
+    const reader = response.body!.getReader();
+    const pieces: Uint8Array<ArrayBuffer>[] = [];
+    let bytes = 0;
+    for (
+      let piece = await listen(reader.read());
+      !piece.done;
+      piece = await listen(reader.read())
+    ) {
+      pieces.push(piece.value);
+      bytes += piece.value.length;
+      onProgress(bytes);
+      if (bytes > limit) throw new BadInput(`${address} is larger than ${limit / 1024 / 1024} MB`);
+    }
+    return new Uint8Array(await new Blob(pieces).arrayBuffer());
+  } finally {
+    clearTimeout(timer!);
+    abort.abort(); // what is still under way
+  }
+}

@@ -1,0 +1,33 @@
+import { element } from './dom';
+
+/// Where there is room for three columns; the same width as in style.css.
+const wide = matchMedia('(min-width: 75em)');
+
+/// Keeps the Q-values on one screen with the pendulum: among the charts where these stand beside it,
+/// below the pendulum where they do not.
+export function placeQValues(): void {
+  const figure = element('q-figure');
+  const place = () =>
+    wide.matches ? element('phase-figure').before(figure) : element('beside').append(figure);
+  wide.addEventListener('change', place);
+  place();
+}
+
+/// A formula that is wider than its place can be scrolled by keyboard, and only then takes the focus.
+export function focusWideFormulas(): void {
+  const observer = new ResizeObserver((entries) => {
+    for (const { target } of entries) {
+      if (target.scrollWidth > target.clientWidth) target.setAttribute('tabindex', '0');
+      else target.removeAttribute('tabindex');
+    }
+  });
+  for (const formula of document.querySelectorAll('math[display]')) observer.observe(formula);
+}
+
+/// Back to the pendulum, from a link to an example further down.
+export function showStage(): void {
+  const still = matchMedia('(prefers-reduced-motion: reduce)').matches;
+  const stage = element('stage');
+  stage.focus({ preventScroll: true });
+  stage.scrollIntoView({ block: 'start', behavior: still ? 'instant' : 'smooth' });
+}

@@ -1,0 +1,81 @@
+/// What this browser keeps between visits. Browsers may forbid a page to keep anything (private
+/// windows, settings): then nothing is kept, and nothing fails.
+
+const PREFIX = 'upswing-';
+const DATABASE = 'upswing';
+const FILES = 'files';
+const PATIENCE = 3000; // ms, after which a database counts as absent
+
+export function recall(key: string): string | null {
+  try {
+    return localStorage.getItem(PREFIX + key);
+  } catch {
+    return null;
+  }
+}
+
+export function remember(key: string, value: string): void {
+  try {
+    localStorage.setItem(PREFIX + key, value);
+  } catch {
+    // not kept
+  }
+}
+
+export interface KeptFile {
+  name: string;
+  bytes: ArrayBuffer;
+}
+
+function openDatabase(): Promise<IDBDatabase> {
+  return new Promise((resolve, reject) => {
+    const request = indexedDB.open(DATABASE, 1);
+    request.onupgradeneeded = () => request.result.createObjectStore(FILES);
+    request.onsuccess = () => resolve(request.result);
+    request.onerror = () => reject(request.error);
+  });
+}
+
+/// What `use` asks of the store of files, once it is on disk; rejects if the browser refuses.
+async function transact(
+  mode: IDBTransactionMode,
+  use: (store: IDBObjectStore) => IDBRequest,
+): Promise<unknown> {
+  const database = await openDatabase();
+  try {
+    return await new Promise((resolve, reject) => {
+      const transaction = database.transaction(FILES, mode);
+      const request = use(transaction.objectStore(FILES));
+      transaction.oncomplete = () => resolve(request.result);
+      transaction.onerror = transaction.onabort = () => reject(transaction.error);
+    });
+  } finally {
+    database.close();
+  }
+}
+
+/// `work`, or null if it fails or takes too long.
+function tolerant<T>(work: () => Promise<T>): Promise<T | null> {
+  const patience = new Promise<null>((resolve) => setTimeout(() => resolve(null), PATIENCE));
+  return Promise.race([Promise.resolve().then(work), patience]).catch(() => null);
+}
+
+function isKeptFile(value: unknown): value is KeptFile {
+  const { name, bytes } = (value ?? {}) as Partial<KeptFile>;
+  return typeof name === 'string' && bytes instanceof ArrayBuffer;
+}
+
+export async function recallFile(key: string): Promise<KeptFile | null> {
+  const kept = await tolerant(() => transact('readonly', (files) => files.get(key)));
+  return isKeptFile(kept) ? kept : null;
+}
+
+/// Whether it is kept.
+export async function rememberFile(key: string, file: KeptFile): Promise<boolean> {
+  const done = tolerant(() => transact('readwrite', (files) => files.put(file, key)));
+  return (await done) !== null;
+}
+
+export async function forgetFile(key: string): Promise<void> {
+  await tolerant(() => transact('readwrite', (files) => files.delete(key)));
+}

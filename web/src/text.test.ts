@@ -1,0 +1,47 @@
+import { expect, test } from 'vitest';
+import { isCommand, printable, quoted } from './text';
+
+test('plain text stays as it is', () => {
+  expect(printable('Dueling Double DQN, größer (π)')).toBe('Dueling Double DQN, größer (π)');
+  expect(quoted('mass1')).toBe('"mass1"');
+});
+
+test.each([
+  ['a\nb', 'a�b'],
+  ['a\x1b[31mb', 'a�[31mb'],
+  ['a\u202eb', 'a�b'],
+  ['a\u2028b', 'a�b'],
+  ['a\ud800b', 'a�b'],
+])('%j is shown as %s', (text, shown) => {
+  expect(printable(text)).toBe(shown);
+});
+
+test('long text is cut, between characters', () => {
+  expect(printable('x'.repeat(61))).toBe(`${'x'.repeat(59)}…`);
+  expect(printable('😀'.repeat(60))).toBe('😀'.repeat(60));
+  expect(printable('😀'.repeat(1000), 5)).toBe('😀😀😀😀…');
+  expect(printable('x'.repeat(1e6)).length).toBe(60);
+});
+
+test.each([
+  './upswing train --agent d3qn --seed 1',
+  "./upswing train --agent 'two words' --model 'x; touch y; $(id)'",
+  "./upswing train --out 'it'\\''s'",
+])('%s may be pasted', (text) => {
+  expect(isCommand(text)).toBe(true);
+});
+
+test.each([
+  './upswing train --model x; touch y',
+  './upswing train --model $(id)',
+  './upswing train --model `id`',
+  './upswing train --model a\ntouch y',
+  "./upswing train --model 'a\ntouch y'",
+  "./upswing train --model 'open",
+  './upswing train --model a&b',
+  './upswing train > file',
+  'rm -rf x',
+  `./upswing train ${'x'.repeat(3000)}`,
+])('%j is not shown for pasting', (text) => {
+  expect(isCommand(text)).toBe(false);
+});

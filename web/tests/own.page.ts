@@ -1,0 +1,204 @@
+import { expect } from '@playwright/test';
+import type { Page } from '@playwright/test';
+import { open, slide, test } from './page';
+import { policyPath, readPolicy } from './program';
+
+/// A visitor's own policy: kept over a reload, removed when asked, and never more than text.
+
+/// The policy `fast` with some of its metadata changed.
+function changed(metadata: Record<string, string>): Buffer {
+  const file = Buffer.from(readPolicy('fast'));
+  const size = Number(file.readBigUInt64LE());
+  const header = JSON.parse(file.toString('utf8', 8, 8 + size)) as Record<string, object>;
+  Object.assign(header.__metadata__!, metadata);
+  const text = Buffer.from(JSON.stringify(header));
+  const length = Buffer.alloc(8);
+  length.writeBigUInt64LE(BigInt(text.length));
+  return Buffer.concat([length, text, file.subarray(8 + size)]);
+}
+
+const NOMINAL = {
+  ...{ mass1: 1, mass2: 1, length1: 0.5, length2: 0.5 },
+  ...{ damping1: 0.2, damping2: 0.2, gravity: 9.81, torque_limit: 5 },
+};
+const ofPlant = (plant: Record<string, number>) =>
+  changed({ plant: JSON.stringify({ ...NOMINAL, ...plant }) });
+
+const bring = (page: Page, buffer: Buffer, name = 'mine.safetensors') =>
+  page.locator('#file').setInputFiles({ name, mimeType: '', buffer });
+
+test('a reload keeps it, until it is removed', async ({ page }) => {
+  await open(page);
+  await expect(page.locator('#own')).toBeHidden();
+  await page.locator('#file').setInputFiles(policyPath('fast'));
+  await expect(page.locator('#agent')).toHaveValue('own');
+  await expect(page.locator('#own')).toContainText('fast.safetensors stays in this browser');
+  await expect(page).toHaveURL(/agent=own/);
+  await page.reload();
+  await expect(page.locator('#agent-on')).toBeEnabled();
+  await expect(page.locator('#agent')).toHaveValue('own');
+  await expect(page.locator('#agent option:checked')).toHaveText('fast.safetensors (yours)');
+  await expect(page.locator('#agent-text')).toContainText('8-64-64');
+  await expect(page.locator('#message')).toBeHidden();
+  // A plain visit begins with the default agent, and still offers it.
+  await page.goto('about:blank');
+  await open(page);
+  await expect(page.locator('#agent')).toHaveValue('d3qn');
+  await page.locator('#agent').selectOption('own');
+  await expect(page.locator('#agent-text')).toContainText('8-64-64');
+
+  await page.getByRole('button', { name: 'Remove it' }).click();
+  await expect(page.locator('#agent')).toHaveValue('d3qn');
+  await expect(page.locator('#own')).toBeHidden();
+  await page.goto('about:blank');
+  await open(page, '#agent=own');
+  await expect(page.locator('#message')).toContainText("somebody's own policy");
+  await expect(page.locator('#agent option[value=own]')).toHaveCount(0);
+});
+
+test('a browser that keeps nothing still runs it', async ({ page }) => {
+  await page.addInitScript(() => {
+    const refuse = () => {
+      throw new DOMException('private', 'SecurityError');
+    };
+    IDBFactory.prototype.open = refuse;
+    Storage.prototype.getItem = Storage.prototype.setItem = refuse;
+  });
+  await open(page);
+  await page.locator('#file').setInputFiles(policyPath('fast'));
+  await expect(page.locator('#agent')).toHaveValue('own');
+  await page.getByRole('button', { name: 'Remove it' }).click();
+  await expect(page.locator('#agent')).toHaveValue('d3qn');
+});
+
+test('a database that never answers does not stop the page', async ({ page }) => {
+  await page.addInitScript(() => {
+    IDBFactory.prototype.open = () => ({}) as IDBOpenDBRequest;
+  });
+  await open(page);
+  await page.locator('#file').setInputFiles(policyPath('fast'));
+  await expect(page.locator('#agent')).toHaveValue('own');
+});
+
+for (const name of ['gravity', 'mass1', 'mass2', 'length1', 'length2', 'torque_limit']) {
+  test(`a plant with a ${name} of 0 is refused, and the charts go on`, async ({ page }) => {
+    await open(page);
+    await bring(page, ofPlant({ [name]: 0 }));
+    await expect(page.locator('#message')).toContainText(`expected a ${name} of 0.`);
+    await expect(page.locator('#agent')).toHaveValue('d3qn');
+    await expect(page.locator('#q-value')).toHaveText(/best \d/);
+  });
+}
+
+test.describe('on a canvas that is read back', () => {
+  test.use({ complains: true }); // that it could be faster
+
+  test('Q-values that are not finite do not spoil the chart for the next ones', async ({
+    page,
+  }) => {
+    await open(page, '#agent=d3qn');
+    await page.locator('#pause').click();
+    const painted = () =>
+      page.evaluate(async () => {
+        for (let k = 0; k < 4; ++k) await new Promise(requestAnimationFrame);
+        const canvas = document.getElementById('q') as HTMLCanvasElement;
+        const { data } = canvas
+          .getContext('2d')!
+          .getImageData(0, 0, canvas.width, canvas.height - 30);
+        return data.filter((alpha, i) => i % 4 === 3 && alpha > 0).length;
+      });
+    const before = await painted();
+    await page.evaluate(() => {
+      const { world } = upswing;
+      const good = world.decision!;
+      world.decision = { ...good, q: good.q.map(() => NaN) };
+    });
+    const during = await painted();
+    expect(during).toBeLessThan(before / 2);
+    await page.evaluate(() => upswing.world.look());
+    expect(await painted()).toBeGreaterThan(0.9 * before);
+  });
+});
+
+test('sliders extend to a plant beyond them, and so do links', async ({ page }) => {
+  await open(page);
+  const plant = { mass1: 5, length2: 2, gravity: 60, mass2: 0.01, torque_limit: 400 };
+  await bring(page, ofPlant(plant));
+  await expect(page.locator('#agent')).toHaveValue('own');
+  await expect(page.locator('#message')).toBeHidden();
+  const shown = async () => {
+    for (const [name, value] of Object.entries(plant)) {
+      const slider = page.locator(`#${name}`);
+      await expect(slider).toHaveValue(String(value));
+      await expect(page.locator(`output[for=${name}]`)).toContainText(`${value} `);
+      const mark = page.locator(`.slider:has(#${name}) .trained`);
+      const share = await mark.evaluate((one) =>
+        Number(one.style.getPropertyValue('--share-from')),
+      );
+      const [low, high] = await slider.evaluate((one: HTMLInputElement) => [one.min, one.max]);
+      expect(share).toBeCloseTo((value - Number(low)) / (Number(high) - Number(low)), 9);
+    }
+  };
+  await shown();
+  expect(await page.evaluate(() => upswing.world.plant)).toMatchObject(plant);
+  await expect(page).toHaveURL(/mass1=5/);
+  await page.reload();
+  await expect(page.locator('#agent-on')).toBeEnabled();
+  await shown();
+  expect(await page.evaluate(() => upswing.world.plant)).toMatchObject(plant);
+  // Moved to the end that was extended: still a plant.
+  await slide(page, 'mass2', 0);
+  expect(await page.evaluate(() => upswing.world.plant.mass2)).toBe(0.01);
+  await expect(page.locator('output[for=mass2]')).toHaveText('0.01 kg');
+  // Another agent's sliders are the usual ones again.
+  await page.locator('#agent').selectOption('d3qn');
+  await page.getByRole('button', { name: 'Reset sliders' }).click();
+  await expect(page.locator('#mass1')).toHaveAttribute('max', '3');
+});
+
+test('what a policy file says is text, of bounded length', async ({ page }) => {
+  await open(page);
+  const evil = `<img src=x onerror="globalThis.ran=1">${'W'.repeat(5000)}`;
+  await bring(page, changed({ format_version: evil }), `${evil.slice(0, 200)}.safetensors`);
+  const message = page.locator('#message-text');
+  await expect(message).toContainText('<img src=x');
+  expect((await message.textContent())!.length).toBeLessThan(300);
+  await bring(page, changed({ agent: evil, step: '1e999' }), `${evil.slice(0, 200)}.safetensors`);
+  await expect(page.locator('#agent')).toHaveValue('own');
+  await expect(page.locator('#curve-value')).toHaveText('');
+  const title = (await page.locator('#agent option:checked').textContent())!;
+  expect(title).toContain('<img src=x');
+  expect(title.length).toBeLessThan(80);
+  expect(await page.locator('img').count()).toBe(0);
+});
+
+test('what the list of agents says is text, of bounded length', async ({ page }) => {
+  const evil = `<img src=x onerror="globalThis.ran=1">\u202e\n${'W'.repeat(100)}`;
+  const entry = { id: 'd3qn', file: 'd3qn.safetensors', agent: evil };
+  const agents = [
+    { ...entry, command: './upswing train --model x; touch y; $(id)', curve: { step: 'x' } },
+    { ...entry, id: 'quoted', command: "./upswing train --model 'x; touch y; $(id)'" },
+    null,
+    { id: 7 },
+    { ...entry, id: 'own' },
+  ];
+  await page.route(/agents\.json$/, (route) => route.fulfill({ json: { agents } }));
+  await open(page);
+  await expect(page.locator('#agent option')).toHaveCount(2);
+  await expect(page.locator('#agent-command')).toBeHidden();
+  const title = (await page.locator('#agent option:checked').textContent())!;
+  expect(title.length).toBeLessThan(130);
+  expect(title).not.toMatch(/[\n\u202e]/);
+  await page.locator('#agent').selectOption('quoted');
+  await expect(page.locator('#agent-command')).toHaveText(
+    "./upswing train --model 'x; touch y; $(id)'",
+  );
+  expect(await page.locator('img').count()).toBe(0);
+});
+
+test('a link that says too much is told in few words', async ({ page }) => {
+  await open(page, `#${'k'.repeat(3000)}=1&agent=${'a'.repeat(3000)}&mass1=${'9'.repeat(3000)}`);
+  const message = page.locator('#message-text');
+  await expect(message).toContainText('Not all of the link could be used');
+  expect((await message.textContent())!.length).toBeLessThan(400);
+});
