@@ -626,13 +626,13 @@ class ModelTest(ProgramTest):
     def test_missing(self):
         self.refuse(["simulate", "--model", "none.xml"], "none.xml", "No such file")
 
-    def test_mujocos_own_message_is_passed_on(self):
+    def test_what_is_no_mjcf_or_does_not_compile(self):
         self.refuse_model("<mujoco><worldbody>", "XML")
         self.refuse_model("", "XML")
         self.refuse_model("no XML at all", "XML")
         self.refuse_model(MODEL.replace('mass="1"', 'mas="1"', 1),
-                          "unrecognized attribute: 'mas'", "line 6")
-        self.refuse_model(MODEL.replace("<motor", "<moter"), "moter")
+                          "m.xml:6: <geom> takes no", "mas", "did you mean mass?")
+        self.refuse_model(MODEL.replace("<motor", "<moter"), "did you mean motor?")
         self.refuse_model(MODEL.replace('joint="a" ctrl', 'joint="z" ctrl'), "z")
         self.refuse_model(MODEL.replace('mass="1"', 'mass="-1"', 1), "mass")
 

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "apps/config.h"
+#include "apps/model_info.h"
 #include "apps/progress.h"
 #include "core/error.h"
 #include "core/text.h"
@@ -17,8 +18,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kModelText = "text of the model";  // as the name of a setting
-constexpr size_t kLongText = 48;                         // longer ones are not shown
+constexpr const char* kModel = "model";  // its content, as the name of a setting
+constexpr size_t kLongText = 48;         // longer ones are not shown
 
 /// Name (`section.key`) and value of a setting.
 using Setting = std::pair<std::string, std::string>;
@@ -30,6 +31,15 @@ struct FoundRun {
   std::vector<Setting> settings;  // that make it another run, without the seed
   bool named = false;             // asked for itself, not found in a folder
 };
+
+/// The content of the model that it was trained and judged on; kBuiltIn for the built-in one.
+const std::string& ModelOf(const FoundRun& f) { return f.settings.back().second; }
+
+/// What its group is called.
+std::string LabelOf(const FoundRun& f) {
+  return Concat(f.variant.empty() ? f.agent : f.variant,
+                ModelOf(f) == kBuiltIn ? "" : ", other model");
+}
 
 bool IsRun(const fs::path& folder) {
   return fs::exists(folder / "config.toml") &&
@@ -59,14 +69,13 @@ std::vector<fs::path> RunsIn(const fs::path& folder) {
 
 std::vector<Setting> SettingsOf(Config config) {
   std::vector<Setting> settings;
-  // A model is what is in its file, not where that lies.
-  config.model = config.mjcf.empty() ? "" : "model.xml";
+  config.model.clear();  // a model is what is in its file, not where that lies: see below
   for (const Option& option : TrainingSettings(config)) {
     const auto* text = std::get_if<std::string*>(&option.target);
     settings.emplace_back(Concat(option.section, ".", option.name),
                           text != nullptr ? **text : option.text());
   }
-  settings.emplace_back(kModelText, config.mjcf);
+  settings.emplace_back(kModel, ModelContent(config.mjcf));  // the last one, for ModelOf
   return settings;
 }
 
@@ -75,7 +84,7 @@ std::vector<Setting> SettingsOf(Config config) {
 bool IsJudged(const std::string& name) {
   constexpr std::array<std::string_view, 5> kBeginnings{"plant.", "disturbance.", "randomize.",
                                                         "train.eval_", "task.eval_"};
-  return name == kModelText || std::ranges::any_of(kBeginnings, [&](std::string_view beginning) {
+  return name == kModel || std::ranges::any_of(kBeginnings, [&](std::string_view beginning) {
            return name.starts_with(beginning);
          });
 }
@@ -242,7 +251,7 @@ GroupedRuns GroupRuns(const CompareRequest& request) {
     const auto at = static_cast<size_t>(std::ranges::find_if(first, same) - first.begin());
     if (at == first.size()) {
       first.push_back(&f);
-      grouped.groups.push_back({f.variant.empty() ? f.agent : f.variant, {}});
+      grouped.groups.push_back({LabelOf(f), {}});
     }
     grouped.groups[at].runs.push_back(f.run);
   }
@@ -251,6 +260,11 @@ GroupedRuns GroupRuns(const CompareRequest& request) {
   }
   TellGroupsApart(grouped, first);
   NotePlans(grouped, grouped.notes);
+  for (size_t i = 0; i < first.size(); ++i) {
+    if (ModelOf(*first[i]) == kBuiltIn) continue;
+    grouped.notes.push_back(Concat(grouped.groups[i].label, ": on a model that is not the ",
+                                   "built-in one (content ", ModelOf(*first[i]), ")"));
+  }
   return grouped;
 }
 

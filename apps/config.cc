@@ -8,6 +8,7 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/text.h"
+#include "sim/mjcf_check.h"
 #include "sim/model.h"
 
 namespace upswing {
@@ -15,16 +16,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
-
-/// Whether a text may stand in a file's metadata.
-bool IsUtf8(const std::string& text) {
-  try {
-    (void)json(text).dump();
-    return true;
-  } catch (const json::exception&) {
-    return false;
-  }
-}
 
 const NamedAgent& FindAgent(const std::string& name, const std::string& where) {
   const auto agents = EmbeddedAgents();
@@ -156,7 +147,7 @@ Config ParseConfig(std::string_view text, const fs::path& file,
 
 void MakeReadyForMany(Config& config) {
   if (config.train.threads == 0) config.train.threads = 1;
-  if (!config.mjcf.empty()) config.model = "model.xml";
+  if (!config.mjcf.empty()) config.model = kModelCopy;
 }
 
 std::vector<std::string> MissingSettings(const std::string& text, const std::string& where,
@@ -174,7 +165,14 @@ std::vector<std::string> MissingSettings(const std::string& text, const std::str
 
 Config ReadRunConfig(const fs::path& run, const std::vector<FlagValue>& flags) {
   const fs::path file = run / "config.toml";
-  std::vector<std::string> missing = MissingSettings(ReadTextFile(file), file.string(), false);
+  const std::string text = ReadTextFile(file);
+  const toml::table table = ParseToml(text, file.string());
+  const std::string model = table["plant"]["model"].value_or("");
+  if (!model.empty() && model != kModelCopy) {  // a run is whole wherever it lies
+    throw BadInput(Concat(file.string(), ": model: expected ", kModelCopy,
+                          ", the copy in the run folder, got \"", Printable(model), "\""));
+  }
+  std::vector<std::string> missing = MissingSettings(text, file.string(), false);
   if (missing.empty()) return BuildConfig(file, flags);
   constexpr size_t kMostNames = 6;  // that make a line which can still be read
   const size_t more = missing.size() - std::min(missing.size(), kMostNames);
@@ -263,6 +261,7 @@ LoadedPolicy ReadPolicy(const TensorFile& file) {
   }
   const auto model = loaded.policy.about().find("model");
   if (model != loaded.policy.about().end()) loaded.mjcf = model->second;
+  if (!loaded.mjcf.empty()) LoadModel(loaded.mjcf, Concat(where, ": metadata \"model\""));
   return loaded;
 }
 
@@ -313,8 +312,7 @@ Plant ChangedPlant(const Plant& base, const std::string& model, const std::vecto
   Plant plant = base;
   const Options options = OptionsOf(plant);
   if (!model.empty()) {
-    mjcf = ReadTextFile(model);
-    if (!IsUtf8(mjcf)) throw BadInput(Concat(model, ": expected UTF-8 text"));
+    mjcf = ReadSmallTextFile(model, kMostMjcfBytes);
     plant = PlantOf(*LoadModel(mjcf, model));
   }
   ApplyChanges(options, set);

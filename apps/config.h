@@ -20,6 +20,9 @@ namespace upswing {
 /// Evaluations in the closed form, and once more in MuJoCo if all of its episodes succeed there.
 inline constexpr std::string_view kScreened = "screened";
 
+/// The copy of another model in a run folder.
+inline constexpr const char* kModelCopy = "model.xml";
+
 /// All settings of a training.
 struct Config {
   std::string agent;  // the named agent that the other settings began with

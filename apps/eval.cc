@@ -2,9 +2,11 @@
 
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "apps/commands.h"
 #include "apps/config.h"
+#include "apps/model_info.h"
 #include "apps/progress.h"
 #include "core/error.h"
 #include "core/text.h"
@@ -55,12 +57,13 @@ std::string ChangesText(Trial trial) {
 }
 
 void PrintTable(const Evaluation& e, const LoadedPolicy& loaded, const EvalArguments& arguments,
-                const Plant& plant, const Trial& trial) {
+                const Plant& plant, const std::optional<ModelInfo>& model, const Trial& trial) {
   const auto moments = [](const Moments& m) {
     return fmt::format("{:.4g} ± {:.2g}", m.mean, m.deviation);
   };
   fmt::print("{}\n", loaded.path.string());
   fmt::print("  plant          {}, physics {}\n", PlantText(plant), arguments.physics);
+  if (model) fmt::print("  {:<15}{}\n", "model", model->Text());
   const std::string changes = ChangesText(trial);
   if (!changes.empty()) fmt::print("  {:<15}{}\n", "with", changes);
   fmt::print("  success        {} of {} = {:.1f}%   (95% interval {:.1f}% to {:.1f}%)\n",
@@ -82,13 +85,14 @@ void PrintTable(const Evaluation& e, const LoadedPolicy& loaded, const EvalArgum
 }
 
 void PrintJson(const Evaluation& e, const LoadedPolicy& loaded, const EvalArguments& arguments,
-               const Plant& plant, Trial trial) {
+               const Plant& plant, const std::optional<ModelInfo>& model, Trial trial) {
   using nlohmann::ordered_json;
   ordered_json j;
   j["policy"] = loaded.path.string();
   j["seed"] = arguments.seed;
   j["physics"] = arguments.physics;
   for (const auto& [name, value] : PlantValues(plant)) j["plant"][name] = value;
+  j["model"] = model ? model->Json() : kBuiltIn;
   const Options options = OptionsOf(trial);
   for (const Option& option : options.all()) {
     j[option.section][option.name] = *std::get<double*>(option.target);
@@ -124,6 +128,7 @@ int RunEval(const EvalArguments& arguments) {
   config.mjcf = loaded.mjcf;
   config.memory = MemorySteps(loaded.policy.shape().inputs);
   const Plant plant = ChangedPlant(loaded.plant, arguments.model, arguments.set, config.mjcf);
+  const std::optional<ModelInfo> model = InfoOfModel(config.mjcf, arguments.model);
   config.plants = {plant};
   config.disturbances = {trial.disturbance};
   config.randomization = trial.randomization;
@@ -141,9 +146,9 @@ int RunEval(const EvalArguments& arguments) {
     evaluation = Evaluate(loaded.policy, env, &pool, [&](double share) { progress.Show(share); });
   }
   if (arguments.as_json) {
-    PrintJson(evaluation, loaded, arguments, plant, trial);
+    PrintJson(evaluation, loaded, arguments, plant, model, trial);
   } else {
-    PrintTable(evaluation, loaded, arguments, plant, trial);
+    PrintTable(evaluation, loaded, arguments, plant, model, trial);
   }
   return 0;
 }

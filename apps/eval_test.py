@@ -34,8 +34,8 @@ class EvalTest(ProgramTest):
 
     def test_json_has_all_fields(self):
         result = self.evaluate()
-        self.assertEqual(list(result), ["policy", "seed", "physics", "plant", "disturbance",
-                                        "randomize", "episodes", "successes", "success_rate", "success_interval_95", "swing_up_seconds",
+        self.assertEqual(list(result), ["policy", "seed", "physics", "plant", "model",
+                                        "disturbance", "randomize", "episodes", "successes", "success_rate", "success_interval_95", "swing_up_seconds",
                                         "return", "reward_terms", "energy_used", "peak_torque",
                                         "rms_torque"])
         self.assertEqual(result["plant"], PLANT | {"gravity": 0.05, "damping1": 1, "damping2": 1})

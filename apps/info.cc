@@ -3,9 +3,11 @@
 #include <filesystem>
 #include <limits>
 #include <memory>
+#include <optional>
 
 #include "apps/commands.h"
 #include "apps/config.h"
+#include "apps/model_info.h"
 #include "apps/progress.h"
 #include "core/error.h"
 #include "core/simd.h"
@@ -43,6 +45,8 @@ void PrintPolicy(const fs::path& path) {
   fmt::print("  judged      success {:.0f}%, mean return {:.0f} (at that step)\n",
              100 * number("success_rate"), number("mean_return"));
   fmt::print("  plant       {}\n", PlantText(loaded.plant));
+  const std::optional<ModelInfo> model = InfoOfModel(loaded.mjcf, "");
+  if (model) fmt::print("  model       {}\n", model->Text());
   fmt::print("  self-check  passed, largest difference {:.1e}\n", policy.self_check_error());
 }
 
@@ -54,6 +58,8 @@ void PrintRun(const fs::path& path) {
   fmt::print("{}\n", path.string());
   fmt::print("  agent       {}, seed {}, upswing {}\n", config.agent, config.train.seed,
              checkpoint.Metadata("upswing_version"));
+  const std::optional<ModelInfo> model = InfoOfModel(config.mjcf, config.model);
+  if (model) fmt::print("  model       {}\n", model->Text());
   fmt::print("  checkpoint  step {} of {}, {} episodes, {} of training\n", FormatCount(state.steps),
              FormatCount(config.train.steps), FormatCount(state.episodes),
              FormatDuration(state.seconds));

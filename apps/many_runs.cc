@@ -90,7 +90,7 @@ void WriteSettings(const ManyRuns& plan) {
   for (const Variant& variant : plan.variants) {
     const fs::path folder = plan.folder / variant.name;
     MakeFolder(folder);
-    if (!variant.config.mjcf.empty()) WriteIfOther(folder / "model.xml", variant.config.mjcf);
+    if (!variant.config.mjcf.empty()) WriteIfOther(folder / kModelCopy, variant.config.mjcf);
     Config config = variant.config;
     const auto wanted = [](const Option& option) { return option.name != "seed"; };
     WriteIfOther(folder / kSettingsName, OptionsOf(config).Toml(true, wanted));

@@ -92,6 +92,7 @@ int RunMapCommand(const MapArguments& a) {
   map.config = ConfigOf(a, loaded);
   map.policy = loaded.path.string();
   map.physics = a.physics;
+  map.model = InfoOfModel(loaded.mjcf, "");
   const fs::path folder =
       a.out.empty() ? Concat("map-", map.config.x.name, "-", map.config.y.name) : a.out;
   CheckFree(folder);

@@ -62,7 +62,7 @@ Figure MapFigure(const MapResult& map) {
     swing_up.z.push_back(cell.swing_up_seconds);
   }
   Figure figure;
-  figure.title = map.policy;
+  figure.title = WithModel(map.policy, map.model);
   figure.width = 1100;
   figure.height = 500;
   figure.columns = 2;
@@ -158,6 +158,7 @@ void PrintMapTable(const MapResult& map) {
   const MapConfig& config = map.config;
   fmt::print("{}\n", map.policy);
   fmt::print("  plant      {}, physics {}\n", PlantText(config.point.plant), map.physics);
+  if (map.model) fmt::print("  model      {}\n", map.model->Text());
   fmt::print("  map        {} × {}: {} × {} cells, {} episode{} each\n", RangeText(config.x),
              RangeText(config.y), config.x.values.size(), config.y.values.size(), config.episodes,
              config.episodes == 1 ? "" : "s");
@@ -186,6 +187,7 @@ void PrintMapJson(const MapResult& map) {
   j["seed"] = map.config.seed;
   j["physics"] = map.physics;
   for (const auto& [name, value] : PlantValues(map.config.point.plant)) j["plant"][name] = value;
+  j["model"] = map.model ? map.model->Json() : kBuiltIn;
   j["x"] = axis(map.config.x);
   j["y"] = axis(map.config.y);
   j["episodes_per_cell"] = map.config.episodes;

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "apps/map_grid.h"
+#include "apps/model_info.h"
 
 namespace upswing {
 
@@ -13,6 +15,7 @@ struct MapResult {
   MapConfig config;
   std::string policy;              // path
   std::string physics;             // name of the engine
+  std::optional<ModelInfo> model;  // none: the built-in one
   std::vector<MapCell> cells;      // (ny × nx)
   std::vector<int64_t> checked;    // cells that were done again in MuJoCo, rising
   std::vector<MapCell> in_mujoco;  // what they came to there

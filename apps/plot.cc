@@ -6,9 +6,11 @@
 #include <memory>
 #include <numbers>
 #include <numeric>
+#include <optional>
 
 #include "apps/commands.h"
 #include "apps/config.h"
+#include "apps/model_info.h"
 #include "apps/rollout.h"
 #include "core/error.h"
 #include "core/file.h"
@@ -216,6 +218,7 @@ int RunPlot(const PlotArguments& a) {
   config.mjcf = loaded.mjcf;
   config.physics = ParsePhysics(a.physics, "--physics");
   config.plant = ChangedPlant(loaded.plant, a.model, a.set, config.mjcf);
+  const std::optional<ModelInfo> model = InfoOfModel(config.mjcf, a.model);
   config.start = ParseStart(a.start);
   config.seconds = a.seconds;
   config.q_values = true;
@@ -228,7 +231,7 @@ int RunPlot(const PlotArguments& a) {
   Figure phase = PhaseFigure(rows);
   std::vector<std::string> files;
   for (auto [name, figure] : {std::pair("episode", &episode), std::pair("phase", &phase)}) {
-    figure->title = loaded.path.string();
+    figure->title = WithModel(loaded.path.string(), model);
     for (const char* ending : {".svg", ".png"}) {
       const fs::path file = fs::path(a.out) / Concat(name, ending);
       Draw(*figure, file);
@@ -237,6 +240,7 @@ int RunPlot(const PlotArguments& a) {
   }
   fmt::print("{}\n", loaded.path.string());
   fmt::print("  plant      {}, physics {}\n", PlantText(config.plant), a.physics);
+  if (model) fmt::print("  model      {}\n", model->Text());
   const double since = UprightSince(rows);
   fmt::print("  upright    {}\n",
              since < 0 ? "not at the end" : fmt::format("from {:.2f} s to the end", since));

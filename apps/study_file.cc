@@ -67,7 +67,8 @@ std::vector<Variant> ReadVariants(const toml::table& study, const std::string& w
     Variant variant{name, BuildConfig("", settings)};
     MakeReadyForMany(variant.config);
     for (const auto& [line, other] : placed) {
-      if (ConfigToml(other.config, true) == ConfigToml(variant.config, true)) {
+      if (ConfigToml(other.config, true) == ConfigToml(variant.config, true) &&
+          other.config.mjcf == variant.config.mjcf) {
         throw BadInput(Concat(PlaceOf(node, where), ": variant \"", name,
                               "\" has the settings of \"", other.name, "\" in line ", line,
                               "; expected other ones"));

@@ -131,7 +131,7 @@ fs::path MakeRun(const TrainArguments& arguments, Parts& parts) {
   fs::path path = arguments.out.empty() ? FreeRunFolder(config) : fs::path(arguments.out);
   std::vector<std::pair<std::string, std::string>> files{
       {"config.toml", ConfigToml(config, false)}};
-  if (!config.mjcf.empty()) files.emplace_back("model.xml", config.mjcf);
+  if (!config.mjcf.empty()) files.emplace_back(kModelCopy, config.mjcf);
   RunFolder::Create(path, files, [&](TensorFile& checkpoint) {
     checkpoint.metadata = parts.CheckpointMetadata();
     CheckpointState(Archive::Saver(checkpoint), parts.agent, parts.env, parts.state);
@@ -207,7 +207,7 @@ int RunTrain(const TrainArguments& arguments) {
 
   Config config = resuming ? ReadRunConfig(path, arguments.flags)
                            : BuildConfig(arguments.config, arguments.flags);
-  if (!config.mjcf.empty()) config.model = "model.xml";  // the copy in the run folder
+  if (!config.mjcf.empty()) config.model = kModelCopy;
   Parts parts(config, ResolveThreads(config.train.threads));
   InstallSignalHandlers();  // from here on what is begun is ended in order
   if (!resuming) {

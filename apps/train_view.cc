@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <optional>
+
+#include "apps/model_info.h"
 
 namespace upswing {
 
@@ -24,6 +27,8 @@ void TrainView::Announce(const Config& config, int threads, size_t num_parameter
   if (config.physics != PhysicsNames().front() || d.precision != "float32") {
     fmt::print("  physics {}, products in {}\n", config.physics, d.precision);
   }
+  const std::optional<ModelInfo> model = InfoOfModel(config.mjcf, config.model);
+  if (model) fmt::print("  model {}\n", model->Text());
   if (since_step_ > 0) fmt::print("  going on from step {}\n", FormatCount(since_step_));
   std::fflush(stdout);
 }

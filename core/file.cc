@@ -97,6 +97,32 @@ std::string ReadTextFile(const fs::path& path) {
   return text;
 }
 
+std::string ReadSmallTextFile(const fs::path& path, size_t most_bytes) {
+  // Opening a pipe that nobody writes to would wait for somebody who does.
+  const Descriptor fd(open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
+  struct stat info {};
+  if (fd.get() < 0 || fstat(fd.get(), &info) != 0) throw BadInput(SystemError("cannot read", path));
+  const auto expect = [&](bool valid, std::string_view expected, const auto& got) {
+    if (valid) return;
+    throw BadInput(Concat("cannot read ", path.string(), ": expected ", expected, ", got ", got));
+  };
+  expect(S_ISREG(info.st_mode), "a file",
+         S_ISDIR(info.st_mode) ? "a folder" : "a pipe or a device");
+  const auto size = static_cast<size_t>(info.st_size);
+  expect(size <= most_bytes, Concat("at most ", most_bytes, " bytes"), size);
+  std::string text(size, '\0');
+  size_t filled = 0;
+  while (filled < size) {
+    const ssize_t got = read(fd.get(), text.data() + filled, size - filled);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) throw BadInput(SystemError("cannot read", path));
+    if (got == 0) break;  // it has become shorter meanwhile
+    filled += static_cast<size_t>(got);
+  }
+  text.resize(filled);
+  return text;
+}
+
 void WriteFileAtomically(const fs::path& given, std::span<const std::span<const std::byte>> parts) {
   // The file that a link leads to is what shall change, not the link.
   std::error_code error;

@@ -19,6 +19,10 @@ std::vector<std::byte> ReadFile(const std::filesystem::path& path);
 /// The whole file as text. Throws BadInput if it cannot be read.
 std::string ReadTextFile(const std::filesystem::path& path);
 
+/// The same of a regular file of at most so many bytes. Throws BadInput, too, at once, on what is
+/// something else (a pipe, a device, a folder) or longer.
+std::string ReadSmallTextFile(const std::filesystem::path& path, size_t most_bytes);
+
 /// Replaces the file by `parts`, one after the other: written to a temporary file beside it,
 /// synchronised to disk, then renamed, so that at every moment the old file or the new one is
 /// there whole. What is no regular file (a pipe, a device) is written in place. Throws Failure; the

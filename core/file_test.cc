@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 
 #include <csignal>
 #include <filesystem>
@@ -28,6 +29,31 @@ TEST_F(FileTest, WrittenTextIsReadBackAndReplaced) {
   WriteFileAtomically(path, "");
   EXPECT_EQ(ReadTextFile(path), "");
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 1);
+}
+
+TEST_F(FileTest, ASmallFileIsARegularOneWithinItsBound) {
+  const fs::path path = folder_ / "a";
+  WriteFileAtomically(path, "twelve bytes");
+  EXPECT_EQ(ReadSmallTextFile(path, 12), "twelve bytes");
+  const auto error_of = [](const fs::path& file, size_t most) -> std::string {
+    try {
+      ReadSmallTextFile(file, most);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.exit_code(), 2);
+      return error.what();
+    }
+    return "";
+  };
+  const auto ends = [](const std::string& text, std::string_view end) {
+    return text.ends_with(end) ? "" : text;
+  };
+  EXPECT_EQ(ends(error_of(path, 11), "a: expected at most 11 bytes, got 12"), "");
+  EXPECT_EQ(ends(error_of(folder_, 11), ": expected a file, got a folder"), "");
+  EXPECT_EQ(ends(error_of(folder_ / "none", 11), "none: No such file or directory"), "");
+  ASSERT_EQ(mkfifo((folder_ / "pipe").c_str(), 0666), 0);
+  for (const fs::path& file : {folder_ / "pipe", fs::path("/dev/zero")}) {
+    EXPECT_EQ(ends(error_of(file, 11), ": expected a file, got a pipe or a device"), "");
+  }
 }
 
 TEST_F(FileTest, AWriteThatDoesNotFitLeavesTheOldFileAndNothingElse) {

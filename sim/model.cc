@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "core/text.h"
+#include "sim/mjcf_check.h"
 
 namespace upswing {
 namespace {
@@ -19,6 +20,24 @@ void TakeOverMessages() {
 
 constexpr int kLinkBodies[2] = {1, 2};  // body 0 is the world
 
+/// Compiles somebody's MJCF: whatever MuJoCo cannot do with it is bad input.
+ModelPtr CompileGiven(const std::string& mjcf, const std::string& where) {
+  try {
+    return CompileModel(mjcf, where);
+  } catch (const Error& error) {
+    if (error.exit_code() == 2) throw;
+    throw BadInput(Concat(where, ": ", Printable(error.what())));
+  }
+}
+
+/// Throws BadInput unless each parameter is what its setting may be.
+void CheckRanges(Plant plant, const std::string& where) {
+  const Options options = OptionsOf(plant);
+  for (const Option& option : options.all()) {
+    option.Set(FormatNumber(*std::get<double*>(option.target)), Concat(where, ": ", option.name));
+  }
+}
+
 }  // namespace
 
 std::string MuJoCoVersion() { return mj_versionString(); }
@@ -30,7 +49,7 @@ ModelPtr CompileModel(const std::string& mjcf, const std::string& where) {
       mj_parseXMLString(mjcf.c_str(), nullptr, message.data(), message.size()));
   const auto complaint = [&](std::string text) {
     std::ranges::replace(text, '\n', ' ');  // an error is one line
-    return BadInput(Concat(where, ": ", Trim(text)));
+    return BadInput(Concat(where, ": ", Printable(Trim(text))));
   };
   if (spec == nullptr) throw complaint(message.data());
   ModelPtr model(mj_compile(spec.get(), nullptr));
@@ -39,7 +58,8 @@ ModelPtr CompileModel(const std::string& mjcf, const std::string& where) {
 }
 
 ModelPtr LoadModel(const std::string& mjcf, const std::string& where) {
-  ModelPtr compiled = CompileModel(mjcf, where);
+  CheckMjcf(mjcf, where);
+  ModelPtr compiled = CompileGiven(mjcf, where);
   const mjModel& model = *compiled;
   const auto expect = [&](bool valid, std::string_view expected) {
     if (!valid) throw BadInput(Concat(where, ": not a double pendulum: expected ", expected));
@@ -64,6 +84,18 @@ ModelPtr LoadModel(const std::string& mjcf, const std::string& where) {
   expect(substeps > 0.5 && std::abs(substeps - std::round(substeps)) < 1e-6,
          Concat("a timestep that divides ", kControlPeriod, " s, got ", model.opt.timestep));
 
+  for (const int joint : {0, 1}) {
+    const auto not_negative = [&](const mjtNum* numbers, std::string_view what) {
+      expect(std::isfinite(numbers[joint]) && numbers[joint] >= 0,
+             Concat(what, " that is not negative, got ", FormatNumber(numbers[joint])));
+    };
+    not_negative(model.dof_armature, "armature");
+    not_negative(model.dof_damping, "damping");
+    not_negative(model.dof_frictionloss, "frictionloss");
+    not_negative(model.jnt_stiffness, "stiffness");
+  }
+  CheckRanges(PlantOf(model), where);
+
   // Where the links are must follow from the plant, and writing the plant must change nothing that
   // the file says. Armature, friction, stiffness, radius and integrator are the file's own affair.
   const ModelPtr ours = CompileModel(Mjcf(PlantOf(model)), where);
@@ -81,6 +113,9 @@ ModelPtr LoadModel(const std::string& mjcf, const std::string& where) {
     expect(!is_spring || model.qpos_spring[joint] == 0,
            Concat("springs at rest where the links hang (springref 0), got ",
                   FormatNumber(model.qpos_spring[joint]), " rad"));
+    const mjtNum* range = model.jnt_range + 2 * joint;
+    expect(model.jnt_limited[joint] == 0 || std::abs(range[0] + range[1]) < 1e-9,
+           "limits of a joint that are the same both ways");
   }
   same(model.jnt_pos, ours->jnt_pos, 6, "hinges at the ends of their links");
   same(model.body_quat, ours->body_quat, 12, "links that hang along -z");
@@ -91,6 +126,32 @@ ModelPtr LoadModel(const std::string& mjcf, const std::string& where) {
   same(model.actuator_ctrlrange, ours->actuator_ctrlrange, 2, "a symmetric control range");
   same(model.opt.gravity, ours->opt.gravity, 3, "gravity along -z");
   return compiled;
+}
+
+std::vector<std::string> DifferencesFromBuiltIn(const mjModel& model) {
+  const ModelPtr ours = CompileModel(Mjcf(PlantOf(model)), "built-in model");
+  std::vector<std::string> differences;
+  const auto compare = [&](const std::string& what, double a, double b, std::string_view unit) {
+    if (a != b) differences.push_back(Concat(what, " ", FormatNumber(a), " ", unit));
+  };
+  compare("timestep", model.opt.timestep, ours->opt.timestep, "s");
+  if (model.opt.integrator != ours->opt.integrator) {
+    constexpr std::array kNames{"Euler", "RK4", "implicit", "implicitfast"};
+    const auto index = static_cast<size_t>(model.opt.integrator);
+    differences.push_back(Concat("integrator ", index < kNames.size() ? kNames.at(index) : "new"));
+  }
+  compare("density", model.opt.density, ours->opt.density, "kg/m³");
+  compare("viscosity", model.opt.viscosity, ours->opt.viscosity, "Pa·s");
+  for (const int i : {0, 1}) {
+    const std::string number = std::to_string(i + 1);
+    compare("radius" + number, model.geom_size[3 * i], ours->geom_size[3 * i], "m");
+    compare("armature" + number, model.dof_armature[i], ours->dof_armature[i], "kg·m²");
+    compare("frictionloss" + number, model.dof_frictionloss[i], ours->dof_frictionloss[i], "N·m");
+    compare("stiffness" + number, model.jnt_stiffness[i], ours->jnt_stiffness[i], "N·m/rad");
+    const double limit = model.jnt_limited[i] != 0 ? model.jnt_range[2 * i + 1] : 0;
+    compare("limit" + number, limit, 0, "rad");
+  }
+  return differences;
 }
 
 Plant PlantOf(const mjModel& model) {

@@ -5,6 +5,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "sim/double_pendulum.h"
 
@@ -27,11 +28,16 @@ std::string MuJoCoVersion();
 /// Compiles MJCF. Throws BadInput with MuJoCo's own message, after `where` (a file's name).
 ModelPtr CompileModel(const std::string& mjcf, const std::string& where);
 
-/// Compiles somebody's MJCF. Throws BadInput, too, unless it is built like ours: two solid capsules
-/// hanging on hinges about +y, a motor of the same limit both ways at the first, gravity along -z,
-/// springs at rest hanging, a timestep that divides the control period. Armature, friction,
-/// stiffness, the capsules' radius and the integrator may differ.
+/// Compiles somebody's MJCF once CheckMjcf has passed it. Throws BadInput, too, unless it is built
+/// like ours: two solid capsules hanging on hinges about +y, a motor of the same limit both ways at
+/// the first, gravity along -z, springs at rest hanging, limits of the joints the same both ways, a
+/// timestep that divides the control period, and a plant within the ranges of its settings.
+/// Armature, friction, stiffness, the capsules' radius and the integrator may differ.
 ModelPtr LoadModel(const std::string& mjcf, const std::string& where);
+
+/// In what a model like ours differs from the built-in one, the plant's parameters aside, such as
+/// "armature1 0.02 kg·m²"; none if only in what the motion does not show.
+std::vector<std::string> DifferencesFromBuiltIn(const mjModel& model);
 
 /// The plant that a model like ours describes.
 Plant PlantOf(const mjModel& model);

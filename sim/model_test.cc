@@ -191,6 +191,25 @@ TEST(Model, BrokenMjcfPassesOnWhatMuJoCoSays) {
   EXPECT_EQ(error_of(Mjcf(Plant())), "");
 }
 
+TEST(Model, RefusesAPlantBeyondTheRangesOfItsSettings) {
+  const auto error_of = [](const std::string& from, const std::string& to) -> std::string {
+    std::string mjcf = Mjcf(Plant());
+    mjcf.replace(mjcf.find(from), from.size(), to);
+    try {
+      LoadModel(mjcf, "m.xml");
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(error_of("mass=\"1\"", "mass=\"100\""), "");
+  EXPECT_NE(error_of("mass=\"1\"", "mass=\"101\"").find("m.xml: mass1: expected"),
+            std::string::npos);
+  EXPECT_NE(error_of("0 0 -9.81", "0 0 9.81").find("m.xml: gravity: expected"), std::string::npos);
+  EXPECT_NE(error_of("damping=\"0.2\"", "damping=\"101\"").find("damping1"), std::string::npos);
+  EXPECT_NE(error_of("\"-5 5\"", "\"-5000 5000\"").find("torque_limit"), std::string::npos);
+}
+
 TEST(Model, RefusesWhatThePlantsParametersWouldHide) {
   const auto loads = [](const std::string& from, const std::string& to) {
     std::string mjcf = Mjcf(Plant());
@@ -213,6 +232,8 @@ TEST(Model, RefusesWhatThePlantsParametersWouldHide) {
   EXPECT_FALSE(loads("ctrlrange=\"-5", "ctrlrange=\"-4"));
   EXPECT_FALSE(loads("ctrllimited", "gear=\"2\" ctrllimited"));
   EXPECT_FALSE(loads("0.005", "0.003"));
+  EXPECT_TRUE(loads("axis=\"0 1 0\"", "axis=\"0 1 0\" limited=\"true\" range=\"-90 90\""));
+  EXPECT_FALSE(loads("axis=\"0 1 0\"", "axis=\"0 1 0\" limited=\"true\" range=\"-90 80\""));
 }
 
 }  // namespace
