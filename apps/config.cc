@@ -121,10 +121,10 @@ Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
 
 Config ParseConfig(std::string_view text, const fs::path& file,
                    const std::vector<FlagValue>& flags) {
-  Config config;
-  const Options options = OptionsOf(config);
   const std::string where = file.string();
   const toml::table table = ParseToml(text, where);
+  Config config;
+  const Options options = OptionsOf(config);
 
   // A model file brings its own plant, which other settings may change.
   const EarlySetting model = FindEarly("plant", "model", table, where, flags);

@@ -78,6 +78,14 @@ void MutateText(std::string& text, Random& random) {
                whole ? std::to_string(OddInteger(random)) : std::to_string(OddNumber(random)));
 }
 
+/// The integers of a list in a tensor's entry; none if there is no such list.
+std::vector<int64_t> Integers(const json& entry, const char* name) {
+  const json list = entry.is_object() ? entry.value(name, json()) : json();
+  const auto is_integer = [](const json& item) { return item.is_number_integer(); };
+  if (!list.is_array() || !std::ranges::all_of(list, is_integer)) return {};
+  return list.get<std::vector<int64_t>>();
+}
+
 /// A file with this header: its length before it, its checksum in it where there is a place for
 /// one and it can be computed.
 std::string Seal(std::string header, const std::string& data) {
@@ -89,8 +97,9 @@ std::string Seal(std::string header, const std::string& data) {
     std::fill_n(place, 16, '0');
     std::map<size_t, size_t> pieces;  // where each tensor begins and ends
     for (const auto& [name, entry] : object.items()) {
-      const auto offsets = entry.value("data_offsets", std::vector<size_t>());
-      if (offsets.size() == 2) pieces[offsets[0]] = offsets[1];
+      const std::vector<int64_t> offsets = Integers(entry, "data_offsets");
+      if (offsets.size() == 2)
+        pieces[static_cast<size_t>(offsets[0])] = static_cast<size_t>(offsets[1]);
     }
     Checksum checksum;
     checksum.Update(BytesOf(header));
@@ -119,13 +128,16 @@ std::optional<std::pair<std::string, std::string>> Split(std::string_view file) 
 LooseFile TakeApart(const std::string& header, const std::string& data) {
   LooseFile file;
   std::map<size_t, LooseTensor> order;  // by where their data begin; of empty ones only one
-  for (const auto& [name, entry] : json::parse(header).items()) {
+  const json object = json::parse(header);
+  for (const auto& [name, entry] : object.items()) {
     if (name == "__metadata__") {
       file.metadata = entry.get<std::map<std::string, std::string>>();
       continue;
     }
-    const auto [begin, end] = entry.at("data_offsets").get<std::array<size_t, 2>>();
-    order[begin] = {name, entry.at("dtype"), entry.at("shape"), data.substr(begin, end - begin)};
+    const std::vector<int64_t> offsets = Integers(entry, "data_offsets");
+    const auto begin = static_cast<size_t>(offsets.at(0));
+    order[begin] = {name, entry.at("dtype"), Integers(entry, "shape"),
+                    data.substr(begin, static_cast<size_t>(offsets.at(1)) - begin)};
   }
   for (auto& [begin, tensor] : order) file.tensors.push_back(std::move(tensor));
   return file;
