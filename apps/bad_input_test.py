@@ -3,8 +3,10 @@
 
 import json
 import math
+import os
 import resource
 import shutil
+import struct
 import subprocess
 import tempfile
 import unittest
@@ -217,6 +219,7 @@ class FileTest(ProgramTest):
         super().setUp()
         shutil.copytree(Path(self.made.name, "run"), self.folder / "run")
         self.policy = self.folder / "run/policy.safetensors"
+        self.made_policy = Path(self.made.name, "run/policy.safetensors")
         self.checkpoint = self.folder / "run/checkpoint.safetensors"
 
     def flip(self, path, position):
@@ -238,6 +241,9 @@ class PolicyFileTest(FileTest):
     def refuse_policy(self, *words):
         for command in (["eval"], ["simulate"], ["info"]):
             self.refuse([*command, "run/policy.safetensors"], "run/policy.safetensors", *words)
+
+    def refuse_info(self, *words):
+        self.refuse(["info", "run/policy.safetensors"], "run/policy.safetensors", *words)
 
     def change(self, metadata=(), tensors=(), drop=()):
         """Rewrites the policy file with another content, whole in itself."""
@@ -303,7 +309,9 @@ class PolicyFileTest(FileTest):
     def test_not_finite(self):
         _, tensors = read_tensors(self.policy)
         for name, number in (("feature.0.weight", math.nan), ("value.bias", math.inf),
-                             ("torques", math.nan), ("torques", -math.inf)):
+                             ("torques", math.nan), ("torques", -math.inf),
+                             ("sample.q", math.inf), ("sample.q", math.nan),
+                             ("sample.obs", math.inf), ("sample.torque", math.nan)):
             with self.subTest(tensor=name, number=number):
                 self.change(tensors={name: with_number(tensors[name], 0, number)})
                 self.refuse_policy(f'"{name}"', "expected finite numbers", str(number))
@@ -311,13 +319,45 @@ class PolicyFileTest(FileTest):
 
     def test_samples_that_the_network_does_not_give(self):
         _, tensors = read_tensors(self.policy)
-        for name, number in (("sample.q", 3.0), ("sample.q", math.nan), ("sample.obs", 5.0),
-                             ("value.bias", 9.0), ("feature.0.weight", 9.0),
+        for name, number in (("sample.q", 3.0), ("sample.q", -1e38), ("sample.obs", 5.0),
+                             ("value.bias", 9.0), ("value.bias", 3e38), ("feature.0.weight", 9.0),
                              ("sample.torque", 4.9)):
             with self.subTest(tensor=name, number=number):
                 self.change(tensors={name: with_number(tensors[name], 0, number)})
                 self.refuse_policy("self-check")
                 shutil.copy(Path(self.made.name, "run/policy.safetensors"), self.policy)
+
+    def test_a_little_more_than_rounding(self):
+        # The bias of the value moves every Q-value by what it is moved by itself.
+        _, tensors = read_tensors(self.policy)
+        largest = max(map(abs, struct.unpack("<144f", tensors["sample.q"][2])))
+        (bias,) = struct.unpack("<f", tensors["value.bias"][2])
+        for share, accepted in ((3e-5, False), (-3e-5, False), (3e-6, True)):
+            with self.subTest(share=share):
+                changed = with_number(tensors["value.bias"], 0, bias + share * largest)
+                self.change(tensors={"value.bias": changed})
+                if accepted:
+                    self.succeed("info", "run/policy.safetensors")
+                else:
+                    self.refuse_policy("self-check: expected Q-value")
+
+    def test_our_own_file_needs_its_checksum(self):
+        whole = self.policy.read_bytes()
+        at = whole.index(b'"checksum":"')
+        for begin, text in ((at + 1, b"chequsum"), (at + 10, b" "), (at, b'"checksum" "'),
+                            (at + 12, b"0" * 16), (at + 12, b"1234567890123456")):
+            with self.subTest(text=text):
+                broken = bytearray(whole)
+                broken[begin:begin + len(text)] = text
+                self.policy.write_bytes(broken)
+                self.refuse_policy("not a whole safetensors file")
+
+    def test_a_file_of_another_writer_needs_none(self):
+        self.change(drop=["upswing_version"])
+        self.assertNotIn(b"checksum", self.policy.read_bytes())
+        text = self.succeed("info", "run/policy.safetensors")
+        self.assertIn("checksum    none: the self-check cannot notice", text)
+        self.assertIn("upswing unknown", text)
 
     def test_metadata(self):
         metadata, _ = read_tensors(self.policy)
@@ -341,6 +381,102 @@ class PolicyFileTest(FileTest):
                 self.change(drop=[key])
                 self.refuse(["eval", "run"], f'"{key}"')
                 shutil.copy(Path(self.made.name, "run/policy.safetensors"), self.policy)
+
+    def test_metadata_that_the_program_uses(self):
+        metadata, _ = read_tensors(self.policy)
+        observation = json.loads(metadata["observation"])
+        changes = [(key, text) for key, texts in {
+            "control_period": ("0.05", "0", "banana", "nan", "-0.02", ""),
+            "seed": ("nan", "1e19", "-1", "7.5", "99999999999999999999"),
+            "step": ("nan", "1e19", "-1", "many"),
+            "success_rate": ("nan", "1e19", "-0.5", "2"),
+            "mean_return": ("nan", "1e19", "-inf"),
+            "gamma": ("nan", "2"), "reward_scale": ("0", "inf"),
+            "agent": ("a\nself-check  passed", "\x1b[2J", "a" * 65),
+            "upswing_version": ("0.3.0\n", "\u202e"),
+            "observation": ("{}", "nonsense", json.dumps(observation | {"max_velocity": [10, 10]}),
+                            json.dumps(observation | {"memory": {"steps": 2, "names": [],
+                                                                 "velocity": 1, "torque": 5}})),
+        }.items() for text in texts]
+        for key, text in changes:
+            with self.subTest(key=key, text=text):
+                self.change({key: text})
+                self.refuse_info(f'metadata "{key}"')
+        for key in ("control_period", "observation"):
+            with self.subTest(missing=key):
+                shutil.copy(Path(self.made.name, "run/policy.safetensors"), self.policy)
+                self.change(drop=[key])
+                self.refuse_info(f'"{key}"')
+
+    def test_numbers_of_the_network_are_neither_rounded_nor_wrapped(self):
+        metadata, _ = read_tensors(self.policy)
+        network = json.loads(metadata["network"])
+        for change in ({"inputs": 8.9}, {"inputs": 2**32 + 8}, {"inputs": True}, {"inputs": -8},
+                       {"inputs": 2**64 + 8}, {"actions": 9.5}, {"actions": 2**32 + 9},
+                       {"head": 2**32 + 16}, {"head": 16.5}, {"hidden": [32.5]},
+                       {"hidden": [2**32 + 32]}, {"hidden": [True]}, {"hidden": 32},
+                       {"dueling": 1}, {"layer_norm": 1}):
+            with self.subTest(change=change):
+                self.change({"network": json.dumps(network | change)})
+                self.refuse_info("network")
+
+    def refuse_in_little_memory(self, *words):
+        """A gigabyte of addresses, most of which the program and its libraries take anyway."""
+        limit = None
+        if "UPSWING_SANITIZED" not in os.environ:  # a sanitizer needs far more of them
+            limit = lambda: resource.setrlimit(resource.RLIMIT_AS, (1 << 30, 1 << 30))
+        self.refuse(["info", "claims.safetensors"], "claims.safetensors", *words,
+                    preexec_fn=limit)
+
+    def claim(self, network, tensors):
+        """Writes a policy whose metadata say that it has this network."""
+        metadata, _ = read_tensors(self.policy)
+        write_tensors(self.folder / "claims.safetensors",
+                      metadata | {"network": json.dumps(network)}, tensors)
+
+    def test_sizes_that_are_claimed_ask_for_no_memory(self):
+        big = {"inputs": 8, "actions": 9, "hidden": [4096] * 16, "head": 0, "dueling": False,
+               "layer_norm": False}
+        self.claim(big, {"torques": ("F64", [9], bytes(72))})
+        self.refuse_in_little_memory('no tensor "feature.0.weight"')
+        self.claim(big | {"hidden": [1] * 100000}, {"torques": ("F64", [9], bytes(72))})
+        self.refuse_in_little_memory('"hidden": expected a list of at most 16')
+
+        # Each sample has 4096 Q-values, of which the file holds those of 16.
+        wide = {"inputs": 8, "actions": 4096, "hidden": [1], "head": 0, "dueling": False,
+                "layer_norm": False}
+        samples = 400000
+        shapes = {"feature.0.weight": [1, 8], "feature.0.bias": [1], "output.weight": [4096, 1],
+                  "output.bias": [4096], "sample.obs": [16, 8], "sample.q": [16, 4096]}
+        tensors = {name: ("F32", shape, bytes(4 * math.prod(shape)))
+                   for name, shape in shapes.items()}
+        tensors["torques"] = ("F64", [4096], bytes(8 * 4096))
+        tensors["sample.torque"] = ("F64", [samples], bytes(8 * samples))
+        self.claim(wide, tensors)
+        self.refuse_in_little_memory("expected 1 to 64 samples to check, got 400000")
+
+    def test_text_from_the_file_forges_no_line(self):
+        forged = "x\n  self-check  passed\x1b[2J\u202e"
+        shown = "x\\n  self-check  passed\\x1b[2J\\u202e"
+        self.change(tensors={forged: ("F32", [1], bytes(8))})
+        self.refuse_policy(shown)
+        self.restore()
+        self.change(tensors={forged: (forged, [1], bytes(8))})
+        self.refuse_policy(f"type {shown} is not ours")
+        self.restore()
+        self.change({"format": forged})
+        self.refuse_policy(f'got "{shown}"')
+        self.restore()
+        self.change({"network": json.dumps({"inputs": forged})})
+        self.refuse_policy("network")
+        self.restore()
+        self.change(tensors={"y" * 100000: ("F32", [1], bytes(8))})
+        done = self.run_here("info", "run/policy.safetensors")
+        self.assert_one_line(done, 2, "expected the bytes of F32 [1], got 8")
+        self.assertLess(len(done.stderr), 2500)
+
+    def restore(self):
+        shutil.copy(self.made_policy, self.policy)
 
     def test_policy_for_other_observations(self):
         self.change_inputs(4)

@@ -120,8 +120,8 @@ BenchCase ActCase(int batch) {
             const QNetwork<float> network(shape);
             std::vector<float> parameters(network.num_parameters());
             network.Initialize(rng, parameters);
-            const auto policy = std::make_shared<Policy>(shape, parameters, Torques(),
-                                                         std::map<std::string, std::string>());
+            const auto policy =
+                std::make_shared<Policy>(shape, parameters, Torques(), PolicyInfo());
             const auto n = static_cast<size_t>(batch);
             const auto obs = std::make_shared<AlignedVector<float>>(n * kObservationSize);
             for (float& x : *obs) x = static_cast<float>(rng.Uniform(-1, 1));

@@ -23,7 +23,7 @@ struct CompareArguments {
 
 /// The text of a CSV cell: quoted where it has to be.
 std::string Cell(const std::string& text) {
-  if (text.find_first_of(",\"") == std::string::npos) return text;
+  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
   std::string quoted = "\"";
   for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
   return quoted + '"';

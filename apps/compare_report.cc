@@ -5,6 +5,7 @@
 
 #include "apps/compare.h"
 #include "apps/progress.h"
+#include "core/text.h"
 
 namespace upswing {
 namespace {
@@ -64,8 +65,8 @@ void PrintGroup(const RunGroup& group, const GroupSummary& s, const std::string&
   for (const RunRecord& run : group.runs) {
     seeds += fmt::format("{}{}", seeds.empty() ? "" : ", ", run.plan.seed);
   }
-  fmt::print("{}\n", group.label);
-  if (!differences.empty()) fmt::print("  {:<16}{}\n", "settings", differences);
+  fmt::print("{}\n", Printable(group.label));
+  if (!differences.empty()) fmt::print("  {:<16}{}\n", "settings", Printable(differences));
   fmt::print("  {:<16}{} ({})\n", "seeds", group.runs.size(), seeds);
   fmt::print("  {:<16}{} of {} (95% {} to {})\n", "solved", s.solved, group.runs.size(),
              Percent(s.solved_interval.low), Percent(s.solved_interval.high));
@@ -82,8 +83,8 @@ void PrintGroup(const RunGroup& group, const GroupSummary& s, const std::string&
 }
 
 void PrintPair(const Comparison& comparison, const PairSummary& pair) {
-  fmt::print("{} against {}\n", comparison.runs.groups[pair.a].label,
-             comparison.runs.groups[pair.b].label);
+  fmt::print("{} against {}\n", Printable(comparison.runs.groups[pair.a].label),
+             Printable(comparison.runs.groups[pair.b].label));
   fmt::print("  {:<16}{}", "solves sooner", PairsText(pair.sooner));
   if (pair.seconds_difference) {
     fmt::print("; difference of IQMs, s: {}", EstimateText(*pair.seconds_difference, Signed));
@@ -141,13 +142,13 @@ void PrintComparison(const Comparison& comparison, const std::filesystem::path& 
     PrintGroup(runs.groups[i], comparison.summaries[i], runs.differences[i]);
   }
   for (const PairSummary& pair : comparison.pairs) PrintPair(comparison, pair);
-  for (const std::string& note : runs.notes) fmt::print("Note: {}\n", note);
+  for (const std::string& note : runs.notes) fmt::print("Note: {}\n", Printable(note));
   fmt::print(
       "Intervals: Wilson for shares, else percentile bootstrap of {} resamples of the runs.\n",
       FormatCount(kResamples));
   if (written_to.empty()) return;
   fmt::print("Written: summary.csv, runs.csv, curves.svg and curves.png in {}\n",
-             written_to.string());
+             Printable(written_to.string()));
 }
 
 std::string ComparisonJson(const Comparison& comparison) {
@@ -170,7 +171,7 @@ std::string ComparisonJson(const Comparison& comparison) {
     p["return_difference"] = EstimateJson(pair.return_difference);
     j["pairs"].push_back(p);
   }
-  return j.dump(2);
+  return j.dump(2, ' ', true, ordered_json::error_handler_t::replace);
 }
 
 }  // namespace upswing

@@ -58,6 +58,22 @@ class CompareTest(ProgramTest):
     def compare(self, *arguments):
         return json.loads(self.succeed("compare", *arguments, "--json"))
 
+    def test_names_of_folders_forge_neither_lines_nor_cells(self):
+        variant = 'x\x1b[2J\n"a",1\u202e'
+        self.make_group(f"study/{variant}", [1, 2], stop=False, steps=3000)
+        self.make_group("study/plain", [1, 2], stop=False, steps=4000)
+        text = self.succeed("compare", "study", "--different-tasks", "--unfinished", "--out", "figures")
+        self.assertIn('x\\x1b[2J\\n"a",1\\u202e', text)
+        self.assertTrue(all(line.isprintable() for line in text.splitlines()), repr(text))
+        with open(self.folder / "figures/summary.csv", encoding="utf-8", newline="") as file:
+            self.assertEqual({row["group"] for row in csv.DictReader(file)}, {variant, "plain"})
+        with open(self.folder / "figures/runs.csv", encoding="utf-8", newline="") as file:
+            self.assertEqual(len(list(csv.DictReader(file))), 4)
+        ET.parse(self.folder / "figures/curves.svg")
+        shown = self.succeed("compare", "study", "--different-tasks", "--unfinished", "--json")
+        self.assertTrue(all(line.isprintable() for line in shown.splitlines()), repr(shown))
+        self.assertIn(variant, [group["group"] for group in json.loads(shown)["groups"]])
+
     def test_figures_of_a_group(self):
         self.make_group("runs", [1, 2, 3, 1, None])
         (group,) = self.compare("runs")["groups"]

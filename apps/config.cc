@@ -58,7 +58,7 @@ void Config::Describe(Options& o) {
         "share of the episodes that begin anywhere instead of hanging");
   o.Add(&random_start_velocity, "random_start_velocity", 5, {0, 50}, "rad/s",
         "largest velocity of those");
-  o.Add(&memory, "memory", 0, {0, 100}, "steps",
+  o.Add(&memory, "memory", 0, {0, kMostMemory}, "steps",
         "past steps whose torque and change of velocities the agent sees too");
   o.AddChoice(&physics, "physics", PhysicsNames(),
               "engine to train in; closed-form is a faster twin of mujoco");
@@ -223,71 +223,6 @@ std::vector<std::pair<std::string, std::string>> NamedAgents() {
     names.emplace_back(agent.name, Trim(first_line.substr(first_line.find_first_not_of("# "))));
   }
   return names;
-}
-
-LoadedPolicy LoadPolicy(const fs::path& path) {
-  fs::path file = path;
-  if (fs::is_directory(path)) {
-    file = path / "policy.safetensors";
-    if (fs::exists(path / "config.toml") && !fs::exists(file)) {
-      throw BadInput(Concat(path.string(), ": this run has no policy yet: expected ",
-                            "policy.safetensors, which its first evaluation writes"));
-    }
-  }
-  if (!fs::exists(file)) {
-    throw BadInput(
-        Concat(file.string(), ": no such file; expected a policy.safetensors or a run ", "folder"));
-  }
-  return ReadPolicy(TensorFile::Load(file));
-}
-
-LoadedPolicy ReadPolicy(const TensorFile& file) {
-  const std::string& where = file.path();
-  LoadedPolicy loaded{where, Policy::From(file), Plant(), ""};
-  const int remembered = static_cast<int>(loaded.policy.shape().inputs) - kObservationSize;
-  if (remembered < 0 || remembered % kMemorySize != 0) {
-    throw BadInput(Concat(where, ": expected a policy of ", kObservationSize, " observations and ",
-                          kMemorySize, " for each step of memory, got ",
-                          loaded.policy.shape().inputs));
-  }
-  const Options options = OptionsOf(loaded.plant);
-  try {
-    const json plant = json::parse(loaded.policy.About("plant"));
-    for (const Option& option : options.all()) {
-      option.Set(FormatNumber(plant.at(option.name).get<double>()), option.name);
-    }
-  } catch (const std::exception& error) {
-    throw BadInput(Concat(where, ": metadata \"plant\": ", error.what()));
-  }
-  const auto model = loaded.policy.about().find("model");
-  if (model != loaded.policy.about().end()) loaded.mjcf = model->second;
-  if (!loaded.mjcf.empty()) LoadModel(loaded.mjcf, Concat(where, ": metadata \"model\""));
-  return loaded;
-}
-
-std::map<std::string, std::string> AboutTask(const Config& config) {
-  json plant;
-  for (const auto& [name, value] : PlantValues(config.plant)) plant[name] = value;
-  json observation{
-      {"names", {"cos q1", "sin q1", "w1", "cos q2", "sin q2", "w2", "energy", "height"}},
-      {"max_velocity", {kMaxVelocity1, kMaxVelocity2}}};
-  if (config.memory > 0) {
-    observation["memory"] = {{"steps", config.memory},
-                             {"names", {"change of w1", "change of w2", "torque"}},
-                             {"velocity", kMemoryVelocity},
-                             {"torque", kMemoryTorque}};
-  }
-  std::map<std::string, std::string> about{
-      {"agent", config.agent},
-      {"seed", std::to_string(config.train.seed)},
-      {"upswing_version", UPSWING_VERSION},
-      {"config", ConfigToml(config, true)},
-      {"plant", plant.dump()},
-      {"control_period", FormatNumber(kControlPeriod)},
-      {"observation", observation.dump()},
-  };
-  if (!config.mjcf.empty()) about["model"] = config.mjcf;
-  return about;
 }
 
 std::vector<const Option*> ApplyChanges(const Options& options,

@@ -2,20 +2,21 @@
 
 #include <filesystem>
 #include <functional>
-#include <map>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
 #include "core/options.h"
-#include "nn/policy.h"
 #include "rl/dqn.h"
 #include "rl/train.h"
 #include "sim/double_pendulum.h"
 #include "sim/pendulum_env.h"
 
 namespace upswing {
+
+/// How many past steps an observation may remember.
+inline constexpr int kMostMemory = 100;
 
 /// Evaluations in the closed form, and once more in MuJoCo if all of its episodes succeed there.
 inline constexpr std::string_view kScreened = "screened";
@@ -99,23 +100,6 @@ std::string PlantText(const Plant& plant);
 
 /// Names of the agents in configs/, in alphabetical order, and what each is.
 std::vector<std::pair<std::string, std::string>> NamedAgents();
-
-/// A policy and what it needs to be tried out.
-struct LoadedPolicy {
-  std::filesystem::path path;
-  Policy policy;
-  Plant plant;       // at training
-  std::string mjcf;  // empty: the built-in model
-};
-
-/// Loads a policy file, or the best policy of a run folder. Throws BadInput.
-LoadedPolicy LoadPolicy(const std::filesystem::path& path);
-
-/// The same of a policy file that has been read.
-LoadedPolicy ReadPolicy(const TensorFile& file);
-
-/// What a policy file says of the task that it was trained on.
-std::map<std::string, std::string> AboutTask(const Config& config);
 
 /// Sets what --set gives ("mass2=1.2") and returns it. Throws BadInput.
 std::vector<const Option*> ApplyChanges(const Options& options,

@@ -6,6 +6,7 @@
 
 #include "apps/commands.h"
 #include "apps/config.h"
+#include "apps/loaded_policy.h"
 #include "apps/model_info.h"
 #include "apps/progress.h"
 #include "core/error.h"
@@ -61,7 +62,7 @@ void PrintTable(const Evaluation& e, const LoadedPolicy& loaded, const EvalArgum
   const auto moments = [](const Moments& m) {
     return fmt::format("{:.4g} ± {:.2g}", m.mean, m.deviation);
   };
-  fmt::print("{}\n", loaded.path.string());
+  fmt::print("{}\n", Printable(loaded.path.string()));
   fmt::print("  plant          {}, physics {}\n", PlantText(plant), arguments.physics);
   if (model) fmt::print("  {:<15}{}\n", "model", model->Text());
   const std::string changes = ChangesText(trial);
@@ -117,7 +118,7 @@ void PrintJson(const Evaluation& e, const LoadedPolicy& loaded, const EvalArgume
   j["energy_used"] = moments(e.work);
   j["peak_torque"] = e.peak_torque;
   j["rms_torque"] = moments(e.rms_torque);
-  fmt::print("{}\n", j.dump(2));
+  fmt::print("{}\n", j.dump(2, ' ', true, ordered_json::error_handler_t::replace));
 }
 
 int RunEval(const EvalArguments& arguments) {
@@ -126,7 +127,7 @@ int RunEval(const EvalArguments& arguments) {
   const Trial trial = TrialOf(arguments.flags);
   const LoadedPolicy loaded = LoadPolicy(arguments.policy);
   config.mjcf = loaded.mjcf;
-  config.memory = MemorySteps(loaded.policy.shape().inputs);
+  config.memory = loaded.memory();
   const Plant plant = ChangedPlant(loaded.plant, arguments.model, arguments.set, config.mjcf);
   const std::optional<ModelInfo> model = InfoOfModel(config.mjcf, arguments.model);
   config.plants = {plant};

@@ -7,6 +7,7 @@
 #include "apps/commands.h"
 #include "core/error.h"
 #include "core/file.h"
+#include "core/text.h"
 
 namespace upswing {
 namespace {
@@ -38,7 +39,7 @@ int RunExport(const ExportArguments& a) {
   if (a.policies.empty()) throw BadInput("--page: expected policies or run folders, got none");
   const std::vector<fs::path> paths(a.policies.begin(), a.policies.end());
   for (const std::string& id : ExportToPage(paths, a.id, a.page)) {
-    fmt::print("{}\n", (fs::path(a.page) / (id + ".safetensors")).string());
+    fmt::print("{}\n", Printable((fs::path(a.page) / (id + ".safetensors")).string()));
   }
   return 0;
 }

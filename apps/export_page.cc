@@ -3,6 +3,7 @@
 
 #include "apps/config.h"
 #include "apps/export.h"
+#include "apps/loaded_policy.h"
 #include "apps/train_command.h"
 #include "core/error.h"
 #include "core/file.h"
@@ -44,12 +45,27 @@ fs::path RunOf(const fs::path& file) {
   return is_run ? folder : fs::path();
 }
 
-double NumberAbout(const Policy& policy, const std::string& key, const fs::path& file) {
-  const std::string& text = policy.About(key);
-  const std::optional<double> number = ParseNumber(text);
-  if (number) return *number;
-  throw BadInput(
-      Concat(file.string(), ": metadata \"", key, "\": expected a number, got \"", text, "\""));
+/// What the page needs to know of a policy, as its list has it. Throws BadInput.
+ordered_json EntryOf(const LoadedPolicy& loaded, const std::string& id) {
+  const PolicyInfo& info = loaded.policy.info();
+  const auto need = [&](bool there, const char* key) {
+    if (!there) throw BadInput(Concat(loaded.path.string(), ": no metadata \"", key, "\""));
+  };
+  need(!info.agent.empty(), "agent");
+  need(info.seed.has_value(), "seed");
+  need(info.success_rate.has_value(), "success_rate");
+  need(info.mean_return.has_value(), "mean_return");
+  need(info.step.has_value(), "step");
+  need(!info.upswing_version.empty(), "upswing_version");
+  return {{"id", id},
+          {"file", id + ".safetensors"},
+          {"agent", info.agent},
+          {"seed", *info.seed},
+          {"parameters", loaded.policy.num_parameters()},
+          {"success_rate", *info.success_rate},
+          {"mean_return", *info.mean_return},
+          {"step", *info.step},
+          {"upswing_version", info.upswing_version}};
 }
 
 /// The evaluations of a run as columns.
@@ -65,29 +81,20 @@ ordered_json CurveJson(const std::vector<EvaluationRow>& evaluations) {
 
 PageAgent ReadAgent(const fs::path& path, const std::string& given_id) {
   const LoadedPolicy loaded = LoadPolicy(path);
-  const Policy& policy = loaded.policy;
   const std::string where = loaded.path.string();
   if (!loaded.mjcf.empty()) {
     throw BadInput(Concat(where,
                           ": was made with a model of its own, and the page shows the "
                           "built-in one alone"));
   }
-  const std::optional<std::string> command = TrainCommand(policy, where);
   const fs::path run = RunOf(loaded.path);
   std::string id = CleanId(run.filename().string());
-  if (id.empty()) id = CleanId(policy.About("agent"));
+  if (id.empty()) id = CleanId(loaded.policy.info().agent);
   if (!given_id.empty()) id = given_id;
+  if (id.empty()) throw BadInput(Concat(where, ": names no agent; expected --id"));
 
-  PageAgent agent{id, path, ReadFile(loaded.path), {}};
-  agent.entry = {{"id", id},
-                 {"file", id + ".safetensors"},
-                 {"agent", policy.About("agent")},
-                 {"seed", static_cast<int64_t>(NumberAbout(policy, "seed", loaded.path))},
-                 {"parameters", policy.num_parameters()},
-                 {"success_rate", NumberAbout(policy, "success_rate", loaded.path)},
-                 {"mean_return", NumberAbout(policy, "mean_return", loaded.path)},
-                 {"step", static_cast<int64_t>(NumberAbout(policy, "step", loaded.path))},
-                 {"upswing_version", policy.About("upswing_version")}};
+  PageAgent agent{id, path, ReadFile(loaded.path), EntryOf(loaded, id)};
+  const std::optional<std::string> command = TrainCommand(loaded.policy.info(), where);
   if (command) agent.entry["command"] = *command;
   if (run.empty()) return agent;
   const std::vector<EvaluationRow> evaluations = ReadEvaluations(run, true);
@@ -123,7 +130,7 @@ ordered_json ReadIndex(const fs::path& file) {
   if (!fs::exists(file)) return {{"agents", ordered_json::array()}};
   try {
     ordered_json index = ordered_json::parse(ReadTextFile(file));
-    for (const ordered_json& entry : index.at("agents")) {
+    for (const ordered_json& entry : index.at("agents").get_ref<const ordered_json::array_t&>()) {
       (void)entry.at("id").get_ref<const std::string&>();
     }
     return index;

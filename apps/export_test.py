@@ -5,6 +5,7 @@ import json
 import math
 import shlex
 import shutil
+import subprocess
 import unittest
 
 from testing import (MODEL, ROOT, ProgramTest, read_csv, read_tensors, small, with_number, write_tensors)
@@ -282,6 +283,52 @@ class PageTest(ProgramTest):
                 (["run", "--page", "file"], "file", "folder")):
             with self.subTest(arguments=arguments):
                 self.refuse(["export", *arguments], *words)
+
+    def test_text_of_the_file_is_no_shell_code_in_the_command(self):
+        self.succeed(*small(out="run"))
+        metadata, tensors = read_tensors(self.folder / "run/policy.safetensors")
+        evil = "x; touch y; $(id)`id`'"
+
+        def command_of(model):
+            config = metadata["config"].replace('\nmodel = ""\n', f"\nmodel = {model}\n")
+            self.assertNotEqual(config, metadata["config"])
+            write_tensors(self.folder / "evil.safetensors", metadata | {"config": config}, tensors)
+            self.succeed("export", "evil.safetensors", "--id", "evil", "--page", "page")
+            return self.index()[0].get("command")
+
+        words = shlex.split(command_of(f'"{evil}"'))
+        self.assertEqual(words[words.index("--model") + 1], evil)
+        # A shell says so too: each word is one.
+        shown = subprocess.run(["sh", "-c", command_of(f'"{evil}"').replace("./upswing", "printf '%s\\n'")],
+                               cwd=self.folder, check=True, stdout=subprocess.PIPE,
+                               encoding="utf-8").stdout
+        self.assertEqual(shown.splitlines(), words[1:])
+        self.assertFalse((self.folder / "y").exists())
+        # What cannot be seen is not told at all.
+        for text in ('"a\\u001b[2Jb"', '"a\\u202eb"'):
+            self.assertIsNone(command_of(text), text)
+
+    def test_numbers_about_the_policy_are_numbers(self):
+        self.succeed(*small(out="run"))
+        metadata, tensors = read_tensors(self.folder / "run/policy.safetensors")
+        for key, text in (("seed", "1e19"), ("step", "nan"), ("success_rate", "nan"),
+                          ("mean_return", "1e19"), ("agent", "a\nb"), ("agent", ""),
+                          ("seed", None), ("upswing_version", None)):
+            with self.subTest(key=key, text=text):
+                about = {name: value for name, value in (metadata | {key: text}).items()
+                         if value is not None}
+                write_tensors(self.folder / "p.safetensors", about, tensors)
+                self.refuse(["export", "p.safetensors", "--page", "page"], "p.safetensors", key)
+
+    def test_a_list_that_is_none(self):
+        self.succeed(*small(out="run"))
+        for name, text in (("a", '{"agents": {"x": {"id": "y"}}}'), ("b", '{"agents": 3}'),
+                           ("c", "[]"), ("d", '{"agents": ["x"]}'), ("e", "{"), ("f", "")):
+            (self.folder / name).mkdir()
+            self.write(f"{name}/agents.json", text)
+            with self.subTest(text=text):
+                self.refuse(["export", "run", "--page", name], f"{name}/agents.json",
+                            "expected a list of agents")
 
     def test_a_policy_that_does_not_tell_every_setting_has_no_command(self):
         self.succeed(*small(out="run"))

@@ -1,12 +1,12 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <limits>
 #include <memory>
 #include <optional>
 
 #include "apps/commands.h"
 #include "apps/config.h"
+#include "apps/loaded_policy.h"
 #include "apps/model_info.h"
 #include "apps/progress.h"
 #include "core/error.h"
@@ -21,33 +21,52 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// A text from a file on one line; "unknown" where the file does not say.
+std::string Known(const std::string& text) { return text.empty() ? "unknown" : Printable(text); }
+std::string Known(std::optional<int64_t> count) {
+  return count ? std::to_string(*count) : "unknown";
+}
+
+/// How the policy did in the evaluation that it was kept for.
+std::string JudgedText(const PolicyInfo& info) {
+  if (!info.success_rate || !info.mean_return) return "unknown";
+  return fmt::format("success {:.0f}%, mean return {:.0f} (at that step)", 100 * *info.success_rate,
+                     *info.mean_return);
+}
+
+void PrintSelfCheck(const Policy::SelfCheck& check) {
+  fmt::print("  self-check  passed, largest difference {:.1e} of at most {:.1e}\n", check.error,
+             check.tolerance);
+  if (check.has_checksum) {
+    fmt::print("  checksum    right: the file is as it was written\n");
+    return;
+  }
+  fmt::print(
+      "  checksum    none: the self-check cannot notice a changed weight that moves no "
+      "Q-value of the\n"
+      "              samples by more than that\n");
+}
+
 void PrintPolicy(const fs::path& path) {
   const LoadedPolicy loaded = LoadPolicy(path);
   const Policy& policy = loaded.policy;
+  const PolicyInfo& info = policy.info();
   const QNetworkShape& shape = policy.shape();
-  const auto about = [&](const std::string& key) {
-    const auto found = policy.about().find(key);
-    return found == policy.about().end() ? "unknown" : found->second;
-  };
-  fmt::print("{}\n", loaded.path.string());
+  fmt::print("{}\n", Printable(loaded.path.string()));
   fmt::print("  what        greedy policy of a {} Q-network {}-{}-{}{}, {} parameters\n",
              shape.dueling ? "dueling" : "plain", shape.inputs, fmt::join(shape.hidden, "-"),
              shape.dueling ? fmt::format("({0}→1, {0}→{1})", shape.head, shape.actions)
                            : std::to_string(shape.actions),
              shape.layer_norm ? ", layer normalisation" : "", FormatCount(policy.num_parameters()));
   fmt::print("  torques     {} N·m, every {} s\n", fmt::join(policy.torques(), ", "),
-             about("control_period"));
-  fmt::print("  made by     agent {}, seed {}, step {}, upswing {}\n", about("agent"),
-             about("seed"), about("step"), about("upswing_version"));
-  const auto number = [&](const std::string& key) {
-    return ParseNumber(about(key)).value_or(std::numeric_limits<double>::quiet_NaN());
-  };
-  fmt::print("  judged      success {:.0f}%, mean return {:.0f} (at that step)\n",
-             100 * number("success_rate"), number("mean_return"));
+             *info.control_period);
+  fmt::print("  made by     agent {}, seed {}, step {}, upswing {}\n", Known(info.agent),
+             Known(info.seed), Known(info.step), Known(info.upswing_version));
+  fmt::print("  judged      {}\n", JudgedText(info));
   fmt::print("  plant       {}\n", PlantText(loaded.plant));
   const std::optional<ModelInfo> model = InfoOfModel(loaded.mjcf, "");
   if (model) fmt::print("  model       {}\n", model->Text());
-  fmt::print("  self-check  passed, largest difference {:.1e}\n", policy.self_check_error());
+  PrintSelfCheck(policy.self_check());
 }
 
 void PrintRun(const fs::path& path) {
@@ -55,9 +74,9 @@ void PrintRun(const fs::path& path) {
   const Config config = ReadRunConfig(path);
   TrainState state(static_cast<int>(config.train.envs), kRewardTerms);
   state.State(Archive::Loader(checkpoint).In("train"));
-  fmt::print("{}\n", path.string());
+  fmt::print("{}\n", Printable(path.string()));
   fmt::print("  agent       {}, seed {}, upswing {}\n", config.agent, config.train.seed,
-             checkpoint.Metadata("upswing_version"));
+             Printable(checkpoint.Metadata("upswing_version")));
   const std::optional<ModelInfo> model = InfoOfModel(config.mjcf, config.model);
   if (model) fmt::print("  model       {}\n", model->Text());
   fmt::print("  checkpoint  step {} of {}, {} episodes, {} of training\n", FormatCount(state.steps),

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """`upswing info`: what a policy or a run is, how it was made, and its self-check."""
 
+import os
 import re
 import signal
 import unittest
@@ -19,7 +20,8 @@ class InfoTest(ProgramTest):
         self.assert_says(text, "run/policy.safetensors", "dueling Q-network 8-32-", "16",
                          "1,578 parameters", "layer normalisation",
                          "-5, -3.75, -2.5, -1.25, 0, 1.25, 2.5, 3.75, 5 N·m", "agent d3qn-small",
-                         "seed 5", "upswing ", "mass2 1.25", "self-check  passed")
+                         "seed 5", "upswing ", "mass2 1.25", "self-check  passed",
+                         "checksum    right")
         self.assertRegex(text, r"step (2000|4000)")
         self.assertRegex(text, r"success \d+%, mean return -?\d+")
 
@@ -48,6 +50,27 @@ class InfoTest(ProgramTest):
         text = self.succeed("info", "run")
         self.assert_says(text, "none yet")
         self.assertTrue(re.search(r"checkpoint  step [\d,]+ of 1,000,000,000", text), text)
+
+    def test_nothing_of_a_stranger_reaches_the_terminal_as_it_is(self):
+        self.succeed(*small(eval_episodes=1))
+        evil = self.folder / "\x1b[2Jx\n  self-check  passed\u202e"
+        shown = "\\x1b[2Jx\\n  self-check  passed\\u202e"
+        (self.folder / "run").rename(evil)
+        for command in (["info", evil.name], ["eval", evil.name, "--episodes", "1"],
+                        ["compare", evil.name, "--json"]):
+            with self.subTest(command=command):
+                text = self.succeed(*command)
+                self.assertTrue(all(line.isprintable() for line in text.splitlines()), repr(text))
+                if command[-1] != "--json":
+                    self.assertTrue(text.startswith(shown), repr(text))
+        self.assertEqual(self.succeed("info", evil.name).count("\n  self-check  passed"), 1)
+        # Nor do bytes that are no text.
+        odd = self.folder / "run"
+        evil.rename(odd)
+        name = os.fsdecode(b"r\xff")
+        odd.rename(self.folder / name)
+        self.assertTrue(self.succeed("info", name).startswith("r\\xff\n"))
+        self.succeed("eval", name, "--episodes", "1", "--json")
 
     def test_nothing_is_written(self):
         self.succeed(*small())

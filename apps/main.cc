@@ -155,6 +155,16 @@ class HelpFormatter : public CLI::Formatter {
   }
 };
 
+/// An error's message, which may quote a stranger's file, as one line of a terminal; the middle of
+/// a very long one is left out.
+std::string OneLine(std::string_view message) {
+  constexpr size_t kBegin = 1500;  // bytes
+  constexpr size_t kEnd = 500;
+  if (message.size() <= kBegin + kEnd) return Printable(message);
+  return Concat(Printable(message.substr(0, kBegin)), " … ",
+                Printable(message.substr(message.size() - kEnd)));
+}
+
 /// The exit code, unless the output cannot be written.
 int Finish(int exit_code) {
   std::cout.flush();
@@ -195,16 +205,16 @@ int Main(int argc, char** argv) {
   } catch (const CLI::Success& request) {
     return Finish(program.exit(request));  // --help and --version
   } catch (const CLI::ParseError& error) {
-    fmt::print(stderr, "upswing: {}\n", Explain(program, error));
+    fmt::print(stderr, "upswing: {}\n", OneLine(Explain(program, error)));
     return 2;
   } catch (const Error& error) {
-    fmt::print(stderr, "upswing: {}\n", error.what());
+    fmt::print(stderr, "upswing: {}\n", OneLine(error.what()));
     return error.exit_code();
   } catch (const std::bad_alloc&) {
     fmt::print(stderr, "upswing: out of memory\n");
     return 1;
   } catch (const std::exception& error) {
-    fmt::print(stderr, "upswing: {}\n", error.what());
+    fmt::print(stderr, "upswing: {}\n", OneLine(error.what()));
     return 1;
   }
 }

@@ -8,6 +8,7 @@
 
 #include "apps/seeds.h"
 #include "core/sample.h"
+#include "core/text.h"
 
 namespace upswing {
 namespace {
@@ -34,7 +35,7 @@ ManyRunsView::ManyRunsView(const ManyRuns& plan, const std::vector<SeedRun>& run
 
 void ManyRunsView::Announce() const {
   const size_t variants = plan_.variants.size();
-  fmt::print("Training {} in {}\n", plan_.what, plan_.folder.string());
+  fmt::print("Training {} in {}\n", Printable(plan_.what), Printable(plan_.folder.string()));
   fmt::print("  {}seed{} {}: {} run{}, {} at a time\n",
              variants == 1 ? "" : fmt::format("{} variants, ", variants),
              plan_.seeds.size() == 1 ? "" : "s", SeedsText(plan_.seeds), runs_.size(),
@@ -45,7 +46,7 @@ void ManyRunsView::Announce() const {
     fmt::print("  {} done before, going on with {}\n", done, static_cast<size_t>(begun) - done);
   }
   for (const SeedRun& run : runs_) {
-    if (!run.problem.empty()) fmt::print("  {:<20} failed: {}\n", run.name, run.problem);
+    if (!run.problem.empty()) fmt::print("  {:<20} failed: {}\n", run.name, Printable(run.problem));
   }
   std::fflush(stdout);
 }
@@ -87,8 +88,8 @@ void ManyRunsView::ShowProgress(const std::vector<const SeedRun*>& running) {
 
 void ManyRunsView::PrintEnd(const SeedRun& run) {
   if (!run.problem.empty()) {
-    return line_.Print(
-        fmt::format("  {:<20} failed: {} (log: {})", run.name, run.problem, run.log().string()));
+    return line_.Print(fmt::format("  {:<20} failed: {} (log: {})", run.name,
+                                   Printable(run.problem), Printable(run.log().string())));
   }
   if (!run.state) return line_.Print(fmt::format("  {:<20} stopped before it began", run.name));
   const TrainState& s = *run.state;
@@ -103,7 +104,7 @@ void ManyRunsView::PrintEnd(const SeedRun& run) {
 }
 
 void ManyRunsView::PrintTable(const Variant& variant) const {
-  fmt::print("\n{}\n", variant.name.empty() ? plan_.what : variant.name);
+  fmt::print("\n{}\n", Printable(variant.name.empty() ? plan_.what : variant.name));
   std::vector<double> steps, seconds, success, reward;
   size_t solved = 0;
   size_t not_judged = 0, failed = 0;
@@ -148,8 +149,9 @@ void ManyRunsView::Summarize(bool stopped) {
   if (stopped) {
     fmt::print("Stopped, {} of {} runs done; the same command goes on.\n", done, runs_.size());
   }
-  if (done < runs_.size() || !plan_.compared) {
-    fmt::print("Next:\n  ./upswing compare {}{}\n", plan_.folder.string(),
+  const bool can_be_typed = Printable(plan_.folder.string()) == plan_.folder.string();
+  if (can_be_typed && (done < runs_.size() || !plan_.compared)) {
+    fmt::print("Next:\n  ./upswing compare {}{}\n", ShellQuoted(plan_.folder.string()),
                done < runs_.size() ? " --unfinished" : "");
   }
   std::fflush(stdout);

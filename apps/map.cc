@@ -8,6 +8,7 @@
 
 #include "apps/commands.h"
 #include "apps/config.h"
+#include "apps/loaded_policy.h"
 #include "apps/map_grid.h"
 #include "apps/map_output.h"
 #include "apps/progress.h"
@@ -38,11 +39,11 @@ struct MapArguments {
 MapPoint TrainingPoint(const LoadedPolicy& loaded) {
   MapPoint point;
   point.plant = loaded.plant;
-  const auto text = loaded.policy.about().find("config");
-  if (text == loaded.policy.about().end()) return point;
+  const std::string& settings = loaded.policy.info().config;
+  if (settings.empty()) return point;
   Config config;
   try {
-    ApplyToml(OptionsOf(config), text->second, "config");
+    ApplyToml(OptionsOf(config), settings, "config");
     point.disturbance = config.disturbance;
   } catch (const Error&) {  // NOLINT(bugprone-empty-catch): written by another version
   }

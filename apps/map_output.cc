@@ -156,7 +156,7 @@ void WriteMap(MapResult& map, const std::filesystem::path& folder) {
 
 void PrintMapTable(const MapResult& map) {
   const MapConfig& config = map.config;
-  fmt::print("{}\n", map.policy);
+  fmt::print("{}\n", Printable(map.policy));
   fmt::print("  plant      {}, physics {}\n", PlantText(config.point.plant), map.physics);
   if (map.model) fmt::print("  model      {}\n", map.model->Text());
   fmt::print("  map        {} × {}: {} × {} cells, {} episode{} each\n", RangeText(config.x),
@@ -173,7 +173,7 @@ void PrintMapTable(const MapResult& map) {
              FormatDuration(map.seconds),
              FormatCount(static_cast<double>(map.episodes()) / map.seconds));
   if (!map.checked.empty()) fmt::print("  check      {}\n", CheckText(map));
-  fmt::print("  written    {}\n", Join(map.files, ", "));
+  fmt::print("  written    {}\n", Printable(Join(map.files, ", ")));
 }
 
 void PrintMapJson(const MapResult& map) {
@@ -210,7 +210,7 @@ void PrintMapJson(const MapResult& map) {
   j["seconds"] = map.seconds;
   j["episodes_per_second"] = static_cast<double>(map.episodes()) / map.seconds;
   j["files"] = map.files;
-  fmt::print("{}\n", j.dump(2));
+  fmt::print("{}\n", j.dump(2, ' ', true, ordered_json::error_handler_t::replace));
 }
 
 }  // namespace upswing

@@ -10,6 +10,7 @@
 
 #include "apps/commands.h"
 #include "apps/config.h"
+#include "apps/loaded_policy.h"
 #include "apps/model_info.h"
 #include "apps/rollout.h"
 #include "core/error.h"
@@ -238,13 +239,13 @@ int RunPlot(const PlotArguments& a) {
       files.push_back(file.string());
     }
   }
-  fmt::print("{}\n", loaded.path.string());
+  fmt::print("{}\n", Printable(loaded.path.string()));
   fmt::print("  plant      {}, physics {}\n", PlantText(config.plant), a.physics);
   if (model) fmt::print("  model      {}\n", model->Text());
   const double since = UprightSince(rows);
   fmt::print("  upright    {}\n",
              since < 0 ? "not at the end" : fmt::format("from {:.2f} s to the end", since));
-  fmt::print("  written    {}\n", Join(files, ", "));
+  fmt::print("  written    {}\n", Printable(Join(files, ", ")));
   return 0;
 }
 

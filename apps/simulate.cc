@@ -6,6 +6,7 @@
 
 #include "apps/commands.h"
 #include "apps/config.h"
+#include "apps/loaded_policy.h"
 #include "apps/rollout.h"
 #include "core/csv.h"
 #include "core/error.h"

@@ -46,6 +46,13 @@ class StudyTest(ProgramTest):
         self.write("bad.toml", text)
         self.refuse(["study", "bad.toml"], "bad.toml", *words)
 
+    def test_a_title_is_text(self):
+        self.write("s.toml", HEAD.replace('"Little"', r'"\u001b[2J\nTraining \u202e"')
+                   .replace("seeds = 2", "seeds = 1") + "[variants.one]\n")
+        output = self.succeed("study", "s.toml")
+        self.assertTrue(output.startswith('Training "\\x1b[2J\\nTraining \\u202e" in runs/s\n'), output)
+        self.assertTrue(all(line.isprintable() for line in output.splitlines()), repr(output))
+
     def test_each_run_equals_the_same_settings_alone(self):
         self.write("little.toml", STUDY)
         output = self.succeed("study", "little.toml")

@@ -100,17 +100,34 @@ def read_tensors(path):
     return metadata, tensors
 
 
+def checksum(pieces):
+    """That of Upswing's files, over their header and tensors (docs/policy-format.md)."""
+    value = 0xcbf29ce484222325
+    for piece in pieces:
+        for (word,) in struct.iter_unpack("<Q", piece + bytes(-len(piece) % 8)):
+            value = (value ^ word) * 0x100000001b3 & (1 << 64) - 1
+            value ^= value >> 32
+    return f"{value:016x}"
+
+
 def write_tensors(path, metadata, tensors):
-    """Writes a safetensors file without a checksum, so that only its content can be wrong."""
-    header = {"__metadata__": {key: text for key, text in metadata.items() if key != "checksum"}}
+    """Writes a safetensors file, with the right checksum if it says an upswing_version, so that only
+    its content can be wrong."""
+    zeros = "0" * 16
+    about = {key: text for key, text in metadata.items() if key != "checksum"}
+    if "upswing_version" in about:
+        about["checksum"] = zeros
+    header = {"__metadata__": about}
     offset = 0
     for name, (dtype, shape, data) in tensors.items():
         end = offset + len(data)
         header[name] = {"dtype": dtype, "shape": shape, "data_offsets": [offset, end]}
         offset = end
-    text = json.dumps(header).encode()
-    pieces = [struct.pack("<Q", len(text)), text, *(data for _, _, data in tensors.values())]
-    Path(path).write_bytes(b"".join(pieces))
+    text = json.dumps(header, separators=(",", ":")).encode()
+    data = [data for _, _, data in tensors.values()]
+    key = b'"checksum":"'
+    text = text.replace(key + zeros.encode(), key + checksum([text, *data]).encode())
+    Path(path).write_bytes(b"".join([struct.pack("<Q", len(text)), text, *data]))
 
 
 def with_number(tensor, index, number):
@@ -165,6 +182,7 @@ class ProgramTest(unittest.TestCase):
         self.assertEqual(len(done.stderr.splitlines()), 1, done.stderr)
         self.assertTrue(done.stderr.startswith("upswing: "), done.stderr)
         self.assertTrue(done.stderr.endswith("\n"), done.stderr)
+        self.assertTrue(done.stderr[:-1].isprintable(), repr(done.stderr))
         for word in words:
             self.assertIn(str(word), done.stderr)
 

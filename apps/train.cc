@@ -11,6 +11,7 @@
 
 #include "apps/commands.h"
 #include "apps/config.h"
+#include "apps/loaded_policy.h"
 #include "apps/many_runs.h"
 #include "apps/seeds.h"
 #include "apps/signals.h"
@@ -154,7 +155,7 @@ int TrainRun(const fs::path& path, Parts& parts, bool resuming, bool steps_given
 
   Training training{parts.config.train, parts.agent, parts.env, run};
   training.evaluate = [&](const Policy& p, int64_t step) { return parts.Judge(p, step); };
-  training.about = AboutTask(parts.config);
+  training.policy_info = InfoOf(parts.config);
   training.checkpoint_metadata = parts.CheckpointMetadata();
   training.poll = PollSignals;
   TrainView view(parts.state, parts.agent.Report());

@@ -106,7 +106,7 @@ std::string Option::on_command_line() const {
     return **on ? flag() : Concat("--no-", flag().substr(2));
   }
   std::string value = text();
-  if (const auto* words = std::get_if<std::string*>(&target)) value = **words;
+  if (const auto* words = std::get_if<std::string*>(&target)) value = ShellQuoted(**words);
   std::erase_if(value, [&](char c) {  // a list needs neither brackets nor blanks there
     return std::holds_alternative<std::vector<int64_t>*>(target) &&
            (c == '[' || c == ']' || c == ' ');

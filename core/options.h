@@ -39,7 +39,7 @@ struct Option {
   std::string flag() const;
   /// The value as TOML writes it.
   std::string text() const;
-  /// Flag and value as a command line has them, such as `--hidden 64,64` or `--no-double`.
+  /// Flag and value as a shell's command line has them, such as `--hidden 64,64` or `--no-double`.
   std::string on_command_line() const;
   /// Such as `a number in [0, 1]` or `a multiple of 0.02 in [0, 1]`.
   std::string expected() const;

@@ -5,12 +5,12 @@
 #include <bit>
 #include <cstring>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "core/checksum.h"
 #include "core/error.h"
 #include "core/file.h"
+#include "core/json.h"
 #include "core/text.h"
 
 namespace upswing {
@@ -36,6 +36,8 @@ const DtypeFacts& FactsOf(Dtype dtype) {
                        [&](const DtypeFacts& facts) { return facts.dtype == dtype; });
 }
 
+constexpr uint64_t kMaxHeader = 1 << 20;  // bytes
+constexpr size_t kMaxRank = 8;            // numbers in a shape
 constexpr std::string_view kChecksumKey = "\"checksum\":\"";
 constexpr std::string_view kNoChecksum = "0000000000000000";
 
@@ -62,34 +64,49 @@ struct Entry {
   size_t begin, size;
 };
 
-/// One entry of the header, checked against the size of the file's data.
+/// The whole numbers of a list in an entry. Throws BadInput.
+std::vector<int64_t> Integers(const json& entry, const std::string& name, size_t max_size) {
+  std::vector<int64_t> integers;
+  for (const json& item : JsonList(entry, name, max_size)) {
+    const std::optional<int64_t> integer = JsonInteger(item);
+    if (!integer) throw BadInput(Concat("\"", name, "\": expected integers, got ", item.dump()));
+    integers.push_back(*integer);
+  }
+  return integers;
+}
+
+/// One entry of the header, checked against the size of the file's data. Throws BadInput.
 Entry ParseEntry(const json& entry, size_t data_size) {
-  const auto dtype_name = entry.at("dtype").get<std::string>();
+  if (!entry.is_object()) throw BadInput("expected dtype, shape and data_offsets");
+  const std::string& dtype_name = JsonText(entry, "dtype");
   const auto facts = std::find_if(kDtypes.begin(), kDtypes.end(),
                                   [&](const DtypeFacts& f) { return f.name == dtype_name; });
-  if (facts == kDtypes.end()) throw std::runtime_error(Concat("type ", dtype_name, " is not ours"));
-  Tensor tensor{facts->dtype, entry.at("shape").get<std::vector<int64_t>>(), {}};
-  const auto offsets = entry.at("data_offsets").get<std::array<uint64_t, 2>>();
-  if (offsets[0] > offsets[1] || offsets[1] > data_size) {
-    throw std::runtime_error(Concat("data end at byte ", offsets[1], " of ", data_size));
+  if (facts == kDtypes.end()) throw BadInput(Concat("type ", dtype_name, " is not ours"));
+  Tensor tensor{facts->dtype, Integers(entry, "shape", kMaxRank), {}};
+  const std::vector<int64_t> offsets = Integers(entry, "data_offsets", 2);
+  if (offsets.size() != 2 || offsets[0] < 0 || offsets[0] > offsets[1]) {
+    throw BadInput("\"data_offsets\": expected where its data begin and end");
   }
-  const size_t size = offsets[1] - offsets[0];
-  if (ByteCount(tensor.shape, tensor.dtype) != size) {
-    throw std::runtime_error(Concat("expected the bytes of ", tensor.Describe(), ", got ", size));
+  const auto begin = static_cast<uint64_t>(offsets[0]);
+  const auto end = static_cast<uint64_t>(offsets[1]);
+  if (end > data_size) throw BadInput(Concat("data end at byte ", end, " of ", data_size));
+  if (ByteCount(tensor.shape, tensor.dtype) != end - begin) {
+    throw BadInput(Concat("expected the bytes of ", tensor.Describe(), ", got ", end - begin));
   }
-  return {std::move(tensor), offsets[0], size};
+  return {std::move(tensor), begin, end - begin};
 }
 
 /// Length of the header, which the file's first bytes tell, checked against the size of the file.
+/// Throws BadInput.
 uint64_t ParseLength(std::span<const std::byte> first_bytes, uint64_t file_size) {
   uint64_t length = 0;
-  if (first_bytes.size() < sizeof(length)) {
-    throw std::runtime_error(Concat("it has ", file_size, " bytes"));
-  }
+  if (first_bytes.size() < sizeof(length)) throw BadInput(Concat("it has ", file_size, " bytes"));
   std::memcpy(&length, first_bytes.data(), sizeof(length));
   if (length > file_size - sizeof(length)) {
-    throw std::runtime_error(
-        Concat("its header should have ", length, " bytes, the file has ", file_size));
+    throw BadInput(Concat("its header should have ", length, " bytes, the file has ", file_size));
+  }
+  if (length > kMaxHeader) {
+    throw BadInput(Concat("its header has ", length, " bytes, expected at most ", kMaxHeader));
   }
   return length;
 }
@@ -97,30 +114,11 @@ uint64_t ParseLength(std::span<const std::byte> first_bytes, uint64_t file_size)
 /// What a header says.
 struct Header {
   std::map<std::string, std::string> metadata;
-  std::map<std::string, Entry> entries;  // of the tensors that were asked for
+  std::map<std::string, Entry> entries;  // of the tensors
 };
 
-/// Reads a header's JSON object: the metadata, and the tensors whose names begin with `prefix`. The
-/// parser's own message would quote bytes that need not be text.
-Header ParseHeader(std::string_view text, size_t data_size, std::string_view prefix) {
-  const json object = json::parse(text, nullptr, false);
-  if (!object.is_object()) throw std::runtime_error("its header is no JSON object");
-  Header header;
-  for (const auto& [name, entry] : object.items()) {
-    if (name == "__metadata__") {
-      header.metadata = entry.get<std::map<std::string, std::string>>();
-    } else if (name.starts_with(prefix)) {
-      try {
-        header.entries.emplace(name, ParseEntry(entry, data_size));
-      } catch (const std::exception& error) {
-        throw std::runtime_error(Concat("tensor \"", name, "\": ", error.what()));
-      }
-    }
-  }
-  return header;
-}
-
-/// Throws unless the tensors cover the data without gap or overlap.
+/// Throws BadInput unless the tensors cover the data without gap or overlap, so that what is read
+/// of a file is never more than the file.
 void CheckCovered(const std::map<std::string, Entry>& entries, size_t data_size) {
   std::vector<std::pair<size_t, size_t>> pieces;  // begin and size
   pieces.reserve(entries.size());
@@ -128,10 +126,36 @@ void CheckCovered(const std::map<std::string, Entry>& entries, size_t data_size)
   std::ranges::sort(pieces);
   size_t end = 0;
   for (const auto& [begin, size] : pieces) {
-    if (size > 0 && begin != end) throw std::runtime_error("tensors overlap");
+    if (size > 0 && begin != end) throw BadInput("tensors overlap");
     end += size;
   }
-  if (end != data_size) throw std::runtime_error(Concat(data_size - end, " bytes too many"));
+  if (end != data_size) throw BadInput(Concat(data_size - end, " bytes too many"));
+}
+
+/// Reads a header's JSON object. Throws BadInput.
+Header ParseHeader(std::string_view text, size_t data_size) {
+  json object;
+  try {
+    object = ParseJsonObject(text);
+  } catch (const Error& error) {
+    throw BadInput(Concat("its header: ", error.what()));
+  }
+  Header header;
+  for (const auto& [name, entry] : object.items()) {
+    try {
+      if (name != "__metadata__") {
+        header.entries.emplace(name, ParseEntry(entry, data_size));
+        continue;
+      }
+      if (!entry.is_object()) throw BadInput("expected a JSON object");
+      for (const auto& [key, value] : entry.items()) header.metadata[key] = JsonText(entry, key);
+    } catch (const Error& error) {
+      throw BadInput(Concat(name == "__metadata__" ? name : Concat("tensor \"", name, "\""), ": ",
+                            error.what()));
+    }
+  }
+  CheckCovered(header.entries, data_size);
+  return header;
 }
 
 /// Throws at what is no regular file; a pipe, say, would never end. (What is not there is told by
@@ -145,6 +169,39 @@ void CheckRegular(const std::filesystem::path& path) {
 
 Error Broken(const std::string& path, std::string_view why) {
   return BadInput(Concat(path, ": not a whole safetensors file: ", why));
+}
+
+/// A header as it is written, filled up to whole words. Throws Failure if nobody could read it.
+std::string HeaderText(const json& header, const std::filesystem::path& path) {
+  try {
+    std::string text = header.dump();
+    text.resize((text.size() + 7) / 8 * 8, ' ');
+    if (text.size() <= kMaxHeader) return text;
+    throw Failure(Concat("cannot write ", path.string(),
+                         ": expected names and metadata of at most ", kMaxHeader, " bytes, got ",
+                         text.size()));
+  } catch (const json::exception&) {
+    throw Failure(Concat("cannot write ", path.string(), ": expected metadata in UTF-8"));
+  }
+}
+
+/// Throws BadInput unless `header`, the text of a file's header, holds the checksum of what it says
+/// and of `tensors`. With zeros where it stands itself, as it was computed.
+void CheckSum(std::string header, const std::map<std::string, Tensor>& tensors) {
+  const size_t at = FindChecksum(header);
+  if (at == std::string::npos) throw BadInput("its checksum is not where Upswing writes it");
+  const std::string expected = header.substr(at, kNoChecksum.size());
+  header.replace(at, kNoChecksum.size(), kNoChecksum);
+  Checksum checksum;
+  checksum.Update(BytesOf(header));
+  // Tensor by tensor, as Save did: a tensor's last word is padded.
+  std::vector<const Tensor*> order;
+  for (const auto& [name, tensor] : tensors) order.push_back(&tensor);
+  std::sort(order.begin(), order.end(),
+            [](const Tensor* a, const Tensor* b) { return a->bytes.data() < b->bytes.data(); });
+  for (const Tensor* tensor : order) checksum.Update(tensor->bytes);
+  if (checksum.Hex() == expected) return;
+  throw BadInput(Concat("its checksum is ", checksum.Hex(), ", expected ", expected));
 }
 
 }  // namespace
@@ -164,6 +221,15 @@ const std::string& TensorFile::Metadata(const std::string& key) const {
   return found->second;
 }
 
+void TensorFile::Expect(const std::string& name, Dtype dtype,
+                        const std::vector<int64_t>& shape) const {
+  const Tensor& tensor = Find(name, dtype);
+  if (tensor.shape == shape) return;
+  const Tensor expected{dtype, shape, {}};
+  throw BadInput(Concat(path_, ": tensor \"", name, "\": expected ", expected.Describe(), ", got ",
+                        tensor.Describe()));
+}
+
 const Tensor& TensorFile::Find(const std::string& name, Dtype dtype) const {
   const auto found = tensors_.find(name);
   if (found == tensors_.end()) throw BadInput(Concat(path_, ": no tensor \"", name, "\""));
@@ -176,13 +242,11 @@ const Tensor& TensorFile::Find(const std::string& name, Dtype dtype) const {
 
 void TensorFile::ReadBytes(const std::string& name, Dtype dtype, const std::vector<int64_t>& shape,
                            std::span<std::byte> bytes) const {
+  if (!shape.empty()) Expect(name, dtype, shape);
   const Tensor& tensor = Find(name, dtype);
-  const Tensor expected{dtype, shape, {}};
-  if (tensor.bytes.size() != bytes.size() || (!shape.empty() && tensor.shape != shape)) {
-    throw BadInput(Concat(
-        path_, ": tensor \"", name, "\": expected ",
-        shape.empty() ? Concat(bytes.size() / SizeOf(dtype), " numbers") : expected.Describe(),
-        ", got ", tensor.Describe()));
+  if (tensor.bytes.size() != bytes.size()) {
+    throw BadInput(Concat(path_, ": tensor \"", name, "\": expected ", bytes.size() / SizeOf(dtype),
+                          " numbers, got ", tensor.Describe()));
   }
   if (!bytes.empty()) std::memcpy(bytes.data(), tensor.bytes.data(), bytes.size());
 }
@@ -206,8 +270,7 @@ void TensorFile::Save(const std::filesystem::path& path) const {
                     {"data_offsets", {offset, end}}};
     offset = end;
   }
-  std::string text = header.dump();
-  text.resize((text.size() + 7) / 8 * 8, ' ');
+  std::string text = HeaderText(header, path);
 
   // The checksum covers everything behind the length, with zeros where it will stand itself.
   Checksum checksum;
@@ -231,39 +294,25 @@ TensorFile TensorFile::Parse(std::vector<std::byte> content, std::string where) 
   TensorFile file;
   file.path_ = std::move(where);
   const auto& bytes = file.kept_.emplace_back(std::move(content));
-  std::string text;  // of the header
   try {
     const uint64_t length = ParseLength(bytes, bytes.size());
-    text.assign(reinterpret_cast<const char*>(bytes.data()) + sizeof(length), length);
+    const std::string text(reinterpret_cast<const char*>(bytes.data()) + sizeof(length), length);
     const auto data = std::span(bytes).subspan(sizeof(length) + length);
-    Header header = ParseHeader(text, data.size(), "");
-    CheckCovered(header.entries, data.size());
+    Header header = ParseHeader(text, data.size());
     file.metadata = std::move(header.metadata);
     for (auto& [name, entry] : header.entries) {
       entry.tensor.bytes = data.subspan(entry.begin, entry.size);
       file.tensors_[name] = std::move(entry.tensor);
     }
-  } catch (const std::exception& error) {
+    file.has_checksum_ = file.metadata.contains("checksum");
+    if (file.has_checksum_) CheckSum(text, file.tensors_);
+    if (!file.has_checksum_ && file.metadata.contains("upswing_version")) {
+      throw BadInput("it says an upswing_version, but has no checksum, which Upswing writes");
+    }
+  } catch (const Error& error) {
     throw Broken(file.path_, error.what());
   }
-
-  // The checksum, where a writer left one.
-  if (const size_t at = FindChecksum(text); at != std::string::npos) {
-    const std::string expected = text.substr(at, kNoChecksum.size());
-    text.replace(at, kNoChecksum.size(), kNoChecksum);
-    Checksum checksum;
-    checksum.Update(BytesOf(text));
-    // Tensor by tensor, as Save did: a tensor's last word is padded.
-    std::vector<const Tensor*> order;
-    for (const auto& [name, tensor] : file.tensors_) order.push_back(&tensor);
-    std::sort(order.begin(), order.end(),
-              [](const Tensor* a, const Tensor* b) { return a->bytes.data() < b->bytes.data(); });
-    for (const Tensor* tensor : order) checksum.Update(tensor->bytes);
-    if (checksum.Hex() != expected) {
-      throw Broken(file.path_, Concat("its checksum is ", checksum.Hex(), ", expected ", expected));
-    }
-    file.metadata.erase("checksum");
-  }
+  file.metadata.erase("checksum");
   return file;
 }
 
@@ -278,7 +327,7 @@ TensorFile TensorFile::LoadPart(const std::filesystem::path& path, std::string_v
   const auto read = [&](uint64_t from, std::span<std::byte> bytes) {
     file.seekg(static_cast<std::streamoff>(from));
     file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-    if (!file) throw std::runtime_error("it became shorter while it was read");
+    if (!file) throw BadInput("it became shorter while it was read");
   };
   try {
     std::vector<std::byte> first(std::min<uint64_t>(sizeof(uint64_t), file_size));
@@ -287,15 +336,16 @@ TensorFile TensorFile::LoadPart(const std::filesystem::path& path, std::string_v
     std::string text(length, '\0');
     read(first.size(), std::as_writable_bytes(std::span(text)));
     const uint64_t data_begin = first.size() + length;
-    Header header = ParseHeader(text, file_size - data_begin, prefix);
+    Header header = ParseHeader(text, file_size - data_begin);
     part.metadata = std::move(header.metadata);
     for (auto& [name, entry] : header.entries) {
+      if (!name.starts_with(prefix)) continue;
       auto& bytes = part.kept_.emplace_back(entry.size);
       read(data_begin + entry.begin, bytes);
       entry.tensor.bytes = bytes;
       part.tensors_[name] = std::move(entry.tensor);
     }
-  } catch (const std::exception& problem) {
+  } catch (const Error& problem) {
     throw Broken(part.path_, problem.what());
   }
   part.metadata.erase("checksum");

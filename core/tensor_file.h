@@ -44,7 +44,9 @@ struct Tensor {
 
 /// A safetensors file: named tensors and text metadata
 /// (https://huggingface.co/docs/safetensors, "Format"). Besides what the format asks, the metadata
-/// hold a checksum of the whole file, which every load verifies where it is there.
+/// hold a checksum of the whole file, which Load verifies. A file that says `upswing_version` must
+/// have one; those of other writers need not. A file may come from anybody: what is kept of it is
+/// never more than it is long, and its header has at most 1 MiB.
 class TensorFile {
  public:
   TensorFile() = default;
@@ -82,6 +84,10 @@ class TensorFile {
     ReadBytes(name, kDtypeOf<T>, shape, std::as_writable_bytes(values));
   }
 
+  /// Throws as Read does unless the tensor has this type and shape: for before there is room made
+  /// for its numbers, so that sizes that a header only claims ask for no memory.
+  void Expect(const std::string& name, Dtype dtype, const std::vector<int64_t>& shape) const;
+
   /// Number of elements of a tensor of type T; throws like Read.
   template <typename T>
   size_t Count(const std::string& name) const {
@@ -90,6 +96,9 @@ class TensorFile {
 
   /// Metadata that must be there; throws BadInput.
   const std::string& Metadata(const std::string& key) const;
+
+  /// Whether a checksum says that the file is as it was written.
+  bool has_checksum() const { return has_checksum_; }
 
   /// Writes atomically, with a checksum. Throws Failure.
   void Save(const std::filesystem::path& path) const;
@@ -101,7 +110,8 @@ class TensorFile {
   static TensorFile Parse(std::vector<std::byte> content, std::string where);
 
   /// Reads the metadata and the tensors whose names begin with `prefix`, and nothing else: of a
-  /// large file a small part, without the checksum, which covers the whole. Throws BadInput.
+  /// large file a small part, to look at. The checksum covers the whole and is not verified: who
+  /// goes on with the file loads all of it. Throws BadInput.
   static TensorFile LoadPart(const std::filesystem::path& path, std::string_view prefix);
 
   /// Where it was loaded from, for messages.
@@ -113,6 +123,7 @@ class TensorFile {
                  std::span<std::byte> bytes) const;
 
   std::string path_;
+  bool has_checksum_ = false;
   std::map<std::string, Tensor> tensors_;
   std::deque<std::vector<std::byte>> kept_;  // what tensors_ views, where nobody else keeps it
 };

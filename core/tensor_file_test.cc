@@ -12,6 +12,7 @@
 #include "core/file.h"
 #include "core/rng.h"
 #include "core/testing.h"
+#include "core/text.h"
 
 namespace upswing {
 namespace {
@@ -106,7 +107,7 @@ TEST_F(TensorFileTest, EveryTruncationIsFound) {
 TEST_F(TensorFileTest, EveryFlippedBitIsFound) {
   SaveSample();
   const std::vector<std::byte> whole = ReadFile(path_);
-  // But for the key "checksum": under another name there is no checksum, as in a foreign file.
+  // But for the key "checksum", under another name, of a file that says no upswing_version.
   const size_t key = ReadTextFile(path_).find("checksum");
   for (size_t at = 0; at < whole.size(); ++at) {
     for (int bit = 0; bit < 8; bit += 3) {
@@ -185,6 +186,70 @@ TEST_F(TensorFileTest, HostileHeadersAreRefused) {
                         4),
             "");
   EXPECT_EQ(HeaderError(R"({"a":{"dtype":"F32","shape":[1],"data_offsets":[0,4]}})", 4), "");
+}
+
+TEST_F(TensorFileTest, WhatAHeaderClaimsIsNeitherRoundedNorWrapped) {
+  const auto error = [&](const std::string& shape, const std::string& offsets) {
+    return HeaderError(
+        R"({"a":{"dtype":"F32","shape":)" + shape + R"(,"data_offsets":)" + offsets + "}}", 4);
+  };
+  EXPECT_EQ(error("[1]", "[0,4]"), "");
+  for (const char* shape :
+       {"[1.5]", "[true]", "[\"1\"]", "[-18446744073709551615]", "[18446744073709551617]",
+        "[1e300]", "1", "null", "[[1]]", "[1,1,1,1,1,1,1,1,1]"}) {
+    EXPECT_NE(error(shape, "[0,4]"), "") << shape;
+  }
+  for (const char* offsets : {"[0,4.5]", "[0]", "[0,4,4]", "[-0.5,4]", "[18446744073709551612,4]",
+                              "[0,18446744073709551620]", "{}", "[false,4]", "[4,0]"}) {
+    EXPECT_NE(error("[1]", offsets), "") << offsets;
+  }
+  EXPECT_NE(HeaderError(R"({"a":{"dtype":["F32"],"shape":[1],"data_offsets":[0,4]}})", 4), "");
+  EXPECT_NE(HeaderError(R"({"a":3})", 0), "");
+  EXPECT_NE(HeaderError(R"({"__metadata__":{"a":3}})", 0), "");
+  EXPECT_NE(HeaderError(R"({"__metadata__":["a"]})", 0), "");
+}
+
+TEST_F(TensorFileTest, HeadersAreOfSomeSizeAndDepth) {
+  const std::string deep(500000, '[');
+  EXPECT_NE(HeaderError("{\"a\":" + deep, 0).find("levels deep"), std::string::npos);
+  EXPECT_NE(HeaderError(std::string((1 << 20) + 1, ' '), 0).find("at most 1048576"),
+            std::string::npos);
+  TensorFile file;
+  file.metadata["long"] = std::string(1 << 20, 'x');
+  const fs::path path = folder_ / "long";
+  EXPECT_THROW(file.Save(path), Error);
+  file.metadata["long"] = "\xff";  // not UTF-8
+  EXPECT_THROW(file.Save(path), Error);
+  EXPECT_FALSE(fs::exists(path));
+}
+
+TEST_F(TensorFileTest, APartIsNeverMoreThanTheFile) {
+  // Many tensors that all claim the same bytes.
+  std::string header;
+  for (int i = 0; i < 100; ++i) {
+    header += Concat(i == 0 ? "{" : ",", "\"a", i,
+                     R"(":{"dtype":"U8","shape":[8],"data_offsets":[0,8]})");
+  }
+  EXPECT_NE(HeaderError(header + "}", 8).find("overlap"), std::string::npos);
+  EXPECT_THROW(TensorFile::LoadPart(path_, "a"), Error);
+  EXPECT_THROW(TensorFile::LoadPart(path_, "other"), Error);
+}
+
+TEST_F(TensorFileTest, AFileThatSaysAnUpswingVersionNeedsItsChecksum) {
+  TensorFile file;
+  file.metadata["upswing_version"] = "0.3.0";
+  file.Save(path_);
+  EXPECT_TRUE(TensorFile::Load(path_).has_checksum());
+  EXPECT_NE(HeaderError(R"({"__metadata__":{"upswing_version":"0.3.0"}})", 0).find("no checksum"),
+            std::string::npos);
+  EXPECT_EQ(HeaderError(R"({"__metadata__":{"version":"0.3.0"}})", 0), "");
+  EXPECT_FALSE(TensorFile::Load(path_).has_checksum());
+  for (const char* sum : {R"("checksum" : "0000000000000000")", R"("checksum":"")",
+                          R"("checksum":"12")", R"("checksum":"0123456789abcdef")"}) {
+    EXPECT_NE(HeaderError(std::string(R"({"__metadata__":{)") + sum + "}}", 0).find("checksum"),
+              std::string::npos)
+        << sum;
+  }
 }
 
 /// A component with every kind of state.

@@ -64,7 +64,8 @@ std::optional<CodePoint> FirstCodePoint(std::string_view text) {
 bool IsControl(char32_t c) {
   const auto in = [c](char32_t first, char32_t last) { return c >= first && c <= last; };
   return in(0, 0x1f) || in(0x7f, 0x9f) || c == 0x61c || in(0x200b, 0x200f) || in(0x2028, 0x202e) ||
-         in(0x2060, 0x206f) || c == 0xfeff || in(0xfff9, 0xfffb) || in(0xe0000, 0xe007f);
+         in(0x2060, 0x206f) || c == 0xfeff || in(0xfff9, 0xfffb) || in(0xfffe, 0xffff) ||
+         in(0xe0000, 0xe007f);
 }
 
 /// Such as `\x1b`: the last `digits` hexadecimal digits of `value` behind a backslash and `kind`.

@@ -55,6 +55,7 @@ TEST(Text, PrintableLeavesTextAndEscapesWhatATerminalWouldObey) {
   EXPECT_EQ(Printable("\u009b31m"), "\\u009b31m");  // a control sequence in one character
   EXPECT_EQ(Printable("\u202egnp"), "\\u202egnp");  // written from right to left
   EXPECT_EQ(Printable("\U000e0041"), "\\U000e0041");
+  EXPECT_EQ(Printable("\uffff"), "\\uffff");  // no character, and none in XML
 }
 
 TEST(Text, PrintableEscapesEachByteThatIsNotUtf8) {

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "apps/loaded_policy.h"
 #include "core/error.h"
 #include "fuzz/tiny_training.h"
 
@@ -30,21 +31,23 @@ void MakeSeeds(const fs::path& corpus) {
     for (int step = 0; step < 9; ++step) training.Step();
     SaveCheckpoint(training, physics, corpus / "checkpoint/accepted" / (physics + ".safetensors"));
 
-    std::map<std::string, std::string> about = AboutTask(config);
-    about["step"] = "18";
-    about["success_rate"] = "0.5";
-    about["mean_return"] = "-12.5";
+    PolicyInfo info = InfoOf(config);
+    info.step = 18;
+    info.success_rate = 0.5;
+    info.mean_return = -12.5;
     const fs::path file = corpus / "policy/accepted" / ("dueling-" + physics + ".safetensors");
-    training.agent.ExportPolicy(about).Save(file);
+    training.agent.ExportPolicy(info).Save(file);
   }
   // The other kind of network, as short as can be.
   const Plant plant;
   const QNetworkShape shape{kObservationSize, 2, {1}, 0, false, false};
   const QNetwork<float> network(shape);
-  std::map<std::string, std::string> about = AboutTask(Config());
-  for (const char* key : {"upswing_version", "config", "agent", "seed", "observation"})
-    about.erase(key);
-  Policy(shape, std::vector<float>(network.num_parameters(), 0.25F), {-1, 1}, about)
+  const PolicyInfo all = InfoOf(Config());
+  PolicyInfo info;
+  info.plant = all.plant;
+  info.control_period = all.control_period;
+  info.observation = all.observation;
+  Policy(shape, std::vector<float>(network.num_parameters(), 0.25F), {-1, 1}, info)
       .Save(corpus / "policy/accepted/plain-of-another-writer.safetensors");
 }
 

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <optional>
 
-#include "apps/config.h"
+#include "apps/loaded_policy.h"
 #include "apps/train_command.h"
 #include "core/file.h"
 #include "core/text.h"
@@ -25,7 +25,7 @@ bool TryInput(std::string_view input) {
   policy.Act(Matrix<const float>(obs.data(), 1, policy.shape().inputs), std::span(&torque, 1));
   Expect(std::isfinite(torque), "a finite torque");
   std::optional<std::string> command;
-  if (Accepts([&] { command = TrainCommand(policy, kInputName); }) && command) {
+  if (Accepts([&] { command = TrainCommand(policy.info(), kInputName); }) && command) {
     Expect(Printable(*command) == *command, "a command on one line");
   }
   return true;

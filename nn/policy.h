@@ -1,13 +1,12 @@
 #pragma once
 
 #include <filesystem>
-#include <map>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "core/matrix.h"
 #include "core/tensor_file.h"
+#include "nn/policy_info.h"
 #include "nn/q_network.h"
 
 namespace upswing {
@@ -18,17 +17,14 @@ namespace upswing {
 class Policy {
  public:
   /// `parameters` (network.num_parameters()), `torques` (A): what each action applies, N·m,
-  /// `about`: where it comes from (the plant, the run), free text under free names.
+  /// `info`: what it was made for, and how.
   Policy(QNetworkShape shape, std::vector<float> parameters, std::vector<double> torques,
-         std::map<std::string, std::string> about);
+         PolicyInfo info);
 
   const QNetworkShape& shape() const { return network_.shape(); }
   size_t num_parameters() const { return network_.num_parameters(); }
   std::span<const double> torques() const { return torques_; }
-  const std::map<std::string, std::string>& about() const { return about_; }
-
-  /// An `about` text that must be there; throws BadInput naming the key.
-  const std::string& About(const std::string& key) const;
+  const PolicyInfo& info() const { return info_; }
 
   /// Room to work in.
   struct Workspace {
@@ -54,14 +50,21 @@ class Policy {
     Act(obs, torque, workspace_);
   }
 
-  /// Largest |difference| between the sample Q-values of the file that it was loaded from and those
-  /// that loading recomputed; 0 for a policy that never was in a file.
-  double self_check_error() const { return self_check_error_; }
+  /// What loading found out about the file.
+  struct SelfCheck {
+    bool has_checksum = false;  // which says that no bit has changed
+    double error = 0;           // largest |difference| of the samples' Q-values when recomputed
+    double tolerance = 0;       // up to which it counts as rounding
+  };
+  const SelfCheck& self_check() const { return self_check_; }
 
   /// Writes the file atomically. Throws Failure, also if a parameter is not finite.
   void Save(const std::filesystem::path& path) const;
 
-  /// Reads and checks the file: format, shapes, finite numbers, samples. Throws BadInput.
+  /// Reads and checks the file: format, metadata, shapes, finite numbers, samples, and the checksum
+  /// where it has one. A change of a parameter that moves no Q-value of the samples by more than
+  /// rounding, say of a unit that none of them wakes, is noticed by the checksum alone. Asks for no
+  /// more memory than belongs to a file of this size. Throws BadInput.
   static Policy Load(const std::filesystem::path& path) { return From(TensorFile::Load(path)); }
 
   /// The same of a file that has been read.
@@ -70,12 +73,15 @@ class Policy {
  private:
   /// Recomputes the stored outputs from the stored inputs. Throws BadInput.
   void CheckSamples(const TensorFile& file);
+  /// Whether `torque` is that of the largest of the Q-values (A), or of one that rounding cannot
+  /// tell from it.
+  bool MayChoose(double torque, std::span<const float> q) const;
 
   QNetwork<float> network_;
   AlignedVector<float> parameters_;
   std::vector<double> torques_;
-  std::map<std::string, std::string> about_;
-  double self_check_error_ = 0;
+  PolicyInfo info_;
+  SelfCheck self_check_;
   mutable Workspace workspace_;
 };
 

@@ -23,7 +23,10 @@ class PolicyTest : public ::testing::Test {
     std::vector<float> parameters(network.num_parameters());
     Rng rng(1, "policy test");
     network.Initialize(rng, parameters);
-    return {kShape, parameters, {-2, 0, 2}, {{"plant", "{}"}}};
+    PolicyInfo info;
+    info.agent = "tested";
+    info.plant = {{"gravity", 9.81}};
+    return {kShape, parameters, {-2, 0, 2}, info};
   }
 
   /// Saves a policy, lets `change` alter the file's tensors and metadata, and loads it.
@@ -68,8 +71,10 @@ TEST_F(PolicyTest, LoadsWhatItSavedToTheBit) {
   policy.Save(path_);
   const Policy loaded = Policy::Load(path_);
   EXPECT_EQ(loaded.shape(), kShape);
-  EXPECT_EQ(loaded.About("plant"), "{}");
-  EXPECT_EQ(loaded.self_check_error(), 0);
+  EXPECT_EQ(loaded.info().agent, "tested");
+  EXPECT_EQ(loaded.info().plant.at("gravity"), 9.81);
+  EXPECT_TRUE(loaded.self_check().has_checksum);
+  EXPECT_EQ(loaded.self_check().error, 0);
   Rng rng(2, "obs");
   std::vector<float> obs(300 * 8), q(300 * 3), q_loaded(300 * 3);  // more than one block of rows
   for (float& x : obs) x = static_cast<float>(rng.Normal());

@@ -66,14 +66,15 @@ QNetwork<T>::QNetwork(QNetworkShape shape, bool bfloat16)
         "precision float32");
   }
   // Settings and policy files both end here, so the sizes are checked here.
-  constexpr int64_t kMaxWidth = 4096;
+  constexpr int64_t kMaxWidth = QNetworkShape::kMaxWidth;
+  constexpr size_t kMaxLayers = QNetworkShape::kMaxLayers;
   const auto valid = [](int64_t n) { return n >= 1 && n <= kMaxWidth; };
   const bool sizes_valid = valid(shape_.inputs) && valid(shape_.actions) &&
-                           !shape_.hidden.empty() && shape_.hidden.size() <= 16 &&
+                           !shape_.hidden.empty() && shape_.hidden.size() <= kMaxLayers &&
                            std::all_of(shape_.hidden.begin(), shape_.hidden.end(), valid) &&
                            (shape_.dueling ? valid(shape_.head) : shape_.head == 0);
   if (!sizes_valid) {
-    throw BadInput(Concat("network: expected 1 to 16 layers of 1 to ", kMaxWidth,
+    throw BadInput(Concat("network: expected 1 to ", kMaxLayers, " layers of 1 to ", kMaxWidth,
                           " units, got inputs ", shape_.inputs, ", actions ", shape_.actions, ", ",
                           shape_.hidden.size(), " hidden layers, head ", shape_.head));
   }

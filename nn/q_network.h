@@ -14,6 +14,9 @@ namespace upswing {
 
 /// The shape of a Q-network. D = observation size, A = number of actions, H = last feature width.
 struct QNetworkShape {
+  static constexpr int64_t kMaxWidth = 4096;  // units of a layer, inputs, actions
+  static constexpr size_t kMaxLayers = 16;    // feature layers
+
   int inputs = 0;               // D
   int actions = 0;              // A
   std::vector<int64_t> hidden;  // widths of the feature layers, each with ReLU

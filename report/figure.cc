@@ -26,9 +26,8 @@ constexpr std::array kViridis{"#440154", "#48186a", "#472d7b", "#424086", "#3b52
 /// A text as gnuplot takes it literally: in single quotes nothing is special but the quote.
 std::string Quoted(const std::string& text) {
   std::string quoted = "'";
-  for (const char c : text) {
-    const bool control = static_cast<unsigned char>(c) < ' ' || c == '\x7f';
-    quoted += control ? ' ' : c;
+  for (const char c : Printable(text)) {
+    quoted += c;
     if (c == '\'') quoted += c;
   }
   return quoted + "'";

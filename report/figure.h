@@ -44,8 +44,9 @@ struct Figure {
 /// work whose result shall be drawn.
 void CheckCanDraw();
 
-/// Writes .svg or .png, by the ending, atomically. Texts are drawn as they are; control characters
-/// become blanks. Throws BadInput on another ending, Failure if gnuplot is missing or fails.
+/// Writes .svg or .png, by the ending, atomically. Texts are drawn as they are; what is not
+/// printable as its escape. Throws BadInput on another ending, Failure if gnuplot is missing or
+/// fails.
 void Draw(const Figure& figure, const std::filesystem::path& file);
 
 }  // namespace upswing

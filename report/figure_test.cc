@@ -125,12 +125,12 @@ TEST_F(FigureTest, TextsComeThroughAsTheyAre) {
   figure.title = kHostile + "1";
   figure.panels[0].title = kHostile + "2";
   figure.panels[0].x_label = kHostile + "3\nsystem 'touch bad'";
-  figure.panels[0].y_label = kHostile + "4";
+  figure.panels[0].y_label = kHostile + "4\xff\x1b\u0085\uffff";
   figure.panels[0].lines[0].name = kHostile + "5";
   figure.panels[1].heat_map->label = kHostile + "6";
   const std::string svg = Svg(figure);
   EXPECT_TRUE(WellFormed(svg));
-  for (const char* number : {"1", "2", "3 system", "4", "5", "6"}) {
+  for (const char* number : {"1", "2", R"(3\nsystem)", R"(4\xff\x1b\u0085\uffff)", "5", "6"}) {
     EXPECT_NE(svg.find(kHostileXml + number), std::string::npos) << number;
   }
   EXPECT_FALSE(fs::exists("bad"));

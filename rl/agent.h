@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <span>
 #include <string>
 
@@ -46,8 +45,9 @@ class Agent {
   /// Resets the report's averages.
   virtual void BeginReport() = 0;
 
-  /// The greedy policy as it stands, with `about` in its file.
-  virtual Policy ExportPolicy(std::map<std::string, std::string> about) const = 0;
+  /// The greedy policy as it stands, with `info` in its file, to which it adds what
+  /// its Q-values estimate.
+  virtual Policy ExportPolicy(PolicyInfo info) const = 0;
 
   /// Saves or loads the whole state.
   virtual void State(const Archive& archive) = 0;

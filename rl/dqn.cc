@@ -265,11 +265,11 @@ void Dqn::BeginReport() {
   report_updates_ = 0;
 }
 
-Policy Dqn::ExportPolicy(std::map<std::string, std::string> about) const {
-  about["gamma"] = FormatNumber(config_.gamma);
-  about["reward_scale"] = FormatNumber(config_.reward_scale);
+Policy Dqn::ExportPolicy(PolicyInfo info) const {
+  info.gamma = config_.gamma;
+  info.reward_scale = config_.reward_scale;
   const auto& theta = config_.policy_tau < 1 ? theta_policy_ : theta_;
-  return {network_.shape(), {theta.begin(), theta.end()}, torques_, std::move(about)};
+  return {network_.shape(), {theta.begin(), theta.end()}, torques_, std::move(info)};
 }
 
 void Dqn::State(const Archive& archive) {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <span>
 #include <string>
 #include <vector>
@@ -50,7 +49,7 @@ class Dqn : public Agent {
   void Learn() override;
   AgentReport Report() const override;
   void BeginReport() override;
-  Policy ExportPolicy(std::map<std::string, std::string> about) const override;
+  Policy ExportPolicy(PolicyInfo info) const override;
   void State(const Archive& archive) override;
 
   std::span<const float> online() const { return theta_; }

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/text.h"
-
 namespace upswing {
 namespace {
 
@@ -12,17 +10,16 @@ int64_t StepsIn(double seconds, const VectorEnv& env) {
   return std::llround(seconds / env.step_seconds());
 }
 
-/// What Q-values estimate, as a policy's metadata `gamma` and `reward_scale` say: the sum of
-/// γᵏ · scale · r. γ = 0 if it does not say.
+/// What Q-values estimate, as a policy's file says: the sum of γᵏ · scale · r. γ = 0 if it does not
+/// say.
 struct ValueUnits {
   double gamma = 0, reward_scale = 1;
 };
 
 ValueUnits ValueUnitsOf(const Policy& policy) {
-  const auto& about = policy.about();
-  if (!about.contains("gamma") || !about.contains("reward_scale")) return {};
-  return {ParseNumber(about.at("gamma")).value_or(0),
-          ParseNumber(about.at("reward_scale")).value_or(1)};
+  const PolicyInfo& info = policy.info();
+  if (!info.gamma || !info.reward_scale) return {};
+  return {*info.gamma, *info.reward_scale};
 }
 
 /// What the policy expects of where the environments stand.

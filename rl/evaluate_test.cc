@@ -53,11 +53,19 @@ TEST(Evaluate, SuccessAsksForTheWholeOfTheLastTenSeconds) {
   EXPECT_DOUBLE_EQ(e.rms_torque.mean, 2);
 }
 
+/// What a policy's file says whose Q-values estimate the sum of gamma^k · reward_scale · r.
+PolicyInfo Units(double gamma, double reward_scale) {
+  PolicyInfo info;
+  info.gamma = gamma;
+  info.reward_scale = reward_scale;
+  return info;
+}
+
 TEST(Evaluate, AValueStandsBesideWhatItEstimates) {
   const QNetworkShape shape{1, 1, {1}, 0, false, false};
   std::vector<float> parameters(QNetwork<float>(shape).num_parameters());
   parameters.back() = 3;  // the output's bias: Q = 3 everywhere
-  const Policy policy(shape, parameters, {1}, {{"gamma", "0.5"}, {"reward_scale", "2"}});
+  const Policy policy(shape, parameters, {1}, Units(0.5, 2));
   ScriptedEnv env({500, 501});
   const Evaluation e = Evaluate(policy, env);
   EXPECT_DOUBLE_EQ(e.value, 1.5);
@@ -103,10 +111,7 @@ Policy Fickle() {
   std::vector<float> parameters(network.num_parameters());
   Rng rng(3, "fickle");
   network.Initialize(rng, parameters);
-  return {shape,
-          parameters,
-          {-0.8, -0.6, -0.4, -0.2, 0, 0.2, 0.4, 0.6, 0.8},
-          {{"gamma", "0.9"}, {"reward_scale", "1"}}};
+  return {shape, parameters, {-0.8, -0.6, -0.4, -0.2, 0, 0.2, 0.4, 0.6, 0.8}, Units(0.9, 1)};
 }
 
 TEST(Evaluate, ThreadsChangeNoBit) {

@@ -101,8 +101,8 @@ void RunFolder::AppendRow(Table& table, const Row& row) {
 
 void RunFolder::Log(std::string_view line) {
   const auto now = std::chrono::system_clock::now();
-  log_.Append(
-      fmt::format("{:%F %T}Z {}\n", fmt::gmtime(std::chrono::system_clock::to_time_t(now)), line));
+  log_.Append(fmt::format("{:%F %T}Z {}\n", fmt::gmtime(std::chrono::system_clock::to_time_t(now)),
+                          Printable(line)));
 }
 
 void RunFolder::SaveCheckpoint(TensorFile& checkpoint) const {

@@ -79,11 +79,11 @@ void KeepIfBest(Training& t, TrainState& s, const Evaluation& e) {
   const double rate = e.success_rate();
   const double mean_return = e.reward_sum.mean;
   if (std::pair(rate, mean_return) <= std::pair(s.best_success_rate, s.best_return)) return;
-  std::map<std::string, std::string> about = t.about;
-  about["step"] = std::to_string(s.steps);
-  about["success_rate"] = FormatNumber(rate);
-  about["mean_return"] = FormatNumber(mean_return);
-  t.agent.ExportPolicy(about).Save(t.run.policy_path());
+  PolicyInfo info = t.policy_info;
+  info.step = s.steps;
+  info.success_rate = rate;
+  info.mean_return = mean_return;
+  t.agent.ExportPolicy(info).Save(t.run.policy_path());
   s.best_success_rate = rate;
   s.best_return = mean_return;
   s.best_step = s.steps;

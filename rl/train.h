@@ -64,7 +64,7 @@ struct Training {
   /// Judges the policy of a step by fresh starts, other ones at each step.
   std::function<Evaluation(const Policy&, int64_t step)> evaluate = {};
   /// What the policy file says of its origin, besides the run's own figures.
-  std::map<std::string, std::string> about = {};
+  PolicyInfo policy_info = {};
   /// What the checkpoint's metadata hold: version and configuration.
   std::map<std::string, std::string> checkpoint_metadata = {};
 

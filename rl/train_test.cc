@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "core/error.h"
+#include "core/file.h"
 #include "core/testing.h"
 #include "rl/dqn.h"
 #include "rl/toy_env.h"
@@ -111,7 +112,7 @@ TEST_F(TrainTest, KeepsTheBestPolicyByItsSuccessAndThenItsReturn) {
   Create("run");
   const TrainState state = Run("run");
   EXPECT_EQ(state.best_step, 400);
-  EXPECT_EQ(Policy::Load(folder_ / "run" / "policy.safetensors").About("step"), "400");
+  EXPECT_EQ(Policy::Load(folder_ / "run" / "policy.safetensors").info().step, 400);
 }
 
 TEST_F(TrainTest, StoppedAndResumedEqualsNeverStopped) {
@@ -151,6 +152,14 @@ TEST_F(TrainTest, NumbersThatAreNotFiniteStopItAndTheCheckpointStays) {
     EXPECT_NE(message.find("checkpoint of step 200"), std::string::npos) << message;
   }
   EXPECT_EQ(ReadFile(folder_ / "run" / "checkpoint.safetensors"), checkpoint);
+}
+
+TEST_F(TrainTest, ALineOfTheLogIsOneLine) {
+  Create("run");
+  const TensorFile checkpoint = TensorFile::Load(RunFolder::CheckpointPath(folder_ / "run"));
+  RunFolder(folder_ / "run", checkpoint).Log("failed: x\n2026-01-01 finished\x1b[2J");
+  const std::string log = ReadTextFile(folder_ / "run" / "log.txt");
+  EXPECT_NE(log.find(R"(Z failed: x\n2026-01-01 finished\x1b[2J)"), std::string::npos) << log;
 }
 
 TEST_F(TrainTest, ARunIsNeverOverwritten) {

@@ -127,7 +127,19 @@ write_dist() {
   [ $# = 0 ] || "$program" export "$@" --page "$tmp/agents" >/dev/null || exit
   chmod 755 "$tmp"
   mv -T -- "$tmp" "$dist" || fail "could not move the page to $dist (see above)"
-  echo "$dist: the page, for any web server; to look at it: python3 -m http.server -d $dist"
+  case $dist in
+    *[[:cntrl:]]*) echo "the page is written, for any web server" ;;
+    *) echo "$dist: the page, for any web server; to look at it:" \
+      "python3 -m http.server -d $(quoted "$dist")" ;;
+  esac
+}
+
+# quoted WORD: as one word of a shell's command line.
+quoted() {
+  case $1 in
+    *[!A-Za-z0-9_./,:=+@%-]*) printf "'%s'" "$(printf '%s' "$1" | sed "s/'/'\\\\''/g")" ;;
+    *) printf '%s' "$1" ;;
+  esac
 }
 
 serve() {

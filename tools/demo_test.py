@@ -87,13 +87,15 @@ class DemoTest(ProgramTest):
 
     def test_dist_is_the_page(self):
         (self.work / "empty").mkdir()
-        for folder in ("new", "empty"):
+        folders = {"new": "new", "empty": "empty", "it's; new": "'it'\\''s; new'"}
+        for folder, quoted in folders.items():
             done = self.demo("--dist", folder)
             self.assertEqual((done.returncode, done.stderr), (0, ""), done)
-            self.assertIn(f"http.server -d {folder}\n", done.stdout)
+            self.assertIn(f"http.server -d {quoted}\n", done.stdout)
             self.assertEqual(snapshot(self.work / folder), snapshot(self.page))
             self.assertEqual((self.work / folder).stat().st_mode & 0o777, 0o755)
-        self.assertEqual({path.name for path in self.work.iterdir()}, {"new", "empty"})
+        self.assertEqual({path.name for path in self.work.iterdir()}, set(folders))
+        self.assertNotIn("\x1b", self.demo("--dist", "\x1b[2J").stdout)
 
     def test_bad_input_is_refused_in_one_line(self):
         (self.work / "full").mkdir()

@@ -18,6 +18,7 @@ export interface QValues {
 }
 
 const MAX_UNITS = 4096;
+const MAX_LAYERS = 16;
 const EPSILON = 1e-5; // of layer normalisation
 
 interface Layer {
@@ -64,7 +65,7 @@ export function parseShape(text: string): NetworkShape {
     isUnits(shape.actions) &&
     Array.isArray(shape.hidden) &&
     shape.hidden.length > 0 &&
-    shape.hidden.length <= 8 &&
+    shape.hidden.length <= MAX_LAYERS &&
     shape.hidden.every(isUnits) &&
     (!shape.dueling || isUnits(shape.head)) &&
     typeof shape.dueling === 'boolean' &&

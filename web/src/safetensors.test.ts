@@ -88,6 +88,9 @@ describe('a policy', () => {
   const original = readPolicy('fast');
   const changed = (change: (parts: ReturnType<typeof partsOf>) => void) => {
     const parts = partsOf(original);
+    // As another program writes it, without a checksum.
+    delete parts.header.__metadata__!.upswing_version;
+    delete parts.header.__metadata__!.checksum;
     change(parts);
     return fileOf(parts.header, parts.data);
   };
@@ -176,6 +179,39 @@ describe('a policy', () => {
       new DataView(data.buffer).setFloat32(begin, 50, true);
     });
     expect(() => new Policy(file)).toThrow('self-check');
+  });
+
+  test('needs the right checksum if Upswing wrote it', () => {
+    expect(new Policy(original).metadata.has('upswing_version')).toBe(true);
+    const file = new Uint8Array(original);
+    const last = file.length - 1; // of a sample
+    for (const at of [100, last, last - 8, file.length >> 1, file.length >> 2]) {
+      for (const bit of [1, 0x80]) {
+        const broken = file.slice();
+        broken[at]! ^= bit;
+        expect(() => new Policy(broken.buffer), `byte ${at}`).toThrow(BadInput);
+      }
+    }
+    const without = changed(({ header }) => (header.__metadata__!.upswing_version = '0.3.0'));
+    expect(() => new Policy(without)).toThrow('no checksum');
+    const wrong = changed(({ header }) => (header.__metadata__!.checksum = '0123456789abcdef'));
+    expect(() => new Policy(wrong)).toThrow('checksum');
+  });
+
+  test('without a checksum is refused if its values differ by more than rounding', () => {
+    const { data, header } = partsOf(original);
+    const [begin, end] = header['sample.q']!.data_offsets as [number, number];
+    const values = new Float32Array(data.slice(begin, end).buffer);
+    const largest = Math.max(...values.map(Math.abs));
+    const moved = (share: number) =>
+      changed(({ header: { 'value.bias': bias }, data: bytes }) => {
+        const [at] = bias!.data_offsets as [number];
+        const view = new DataView(bytes.buffer);
+        view.setFloat32(at, view.getFloat32(at, true) + share * largest, true);
+      });
+    expect(() => new Policy(moved(3e-5))).toThrow('self-check');
+    expect(() => new Policy(moved(-3e-5))).toThrow('self-check');
+    expect(new Policy(moved(3e-6)).torques.length).toBe(9);
   });
 
   test('is refused at every place where it may be cut off', () => {

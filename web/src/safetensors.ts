@@ -1,3 +1,4 @@
+import { Checksum } from './checksum';
 import { quoted } from './text';
 
 /// A reader of safetensors files (https://huggingface.co/docs/safetensors) that trusts nothing: sizes
@@ -32,10 +33,15 @@ export function isSize(value: unknown): value is number {
   return Number.isInteger(value) && (value as number) >= 0 && (value as number) <= MAX_FILE_BYTES;
 }
 
+/// Throws at what is not UTF-8.
+function textOf(bytes: Uint8Array): string {
+  return new TextDecoder('utf-8', { fatal: true }).decode(bytes);
+}
+
 function parseHeader(bytes: Uint8Array): Record<string, unknown> {
   let header: unknown;
   try {
-    header = JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(bytes));
+    header = JSON.parse(textOf(bytes));
   } catch {
     throw new BadInput('the header is not JSON');
   }
@@ -63,18 +69,34 @@ function parseTensor(name: string, entry: unknown, data: Uint8Array): Tensor {
   return { dtype, shape: shape as number[], bytes: data.subarray(begin, end) };
 }
 
-/// Throws unless the tensors share out the data among them, without a gap or an overlap: the size of
+/// Throws unless the tensors, in their order, share out the data among them, without a gap or an overlap: the size of
 /// the file then bounds what there is to compute.
 function checkCovered(tensors: Tensor[], data: Uint8Array): void {
   const begin = ({ bytes }: Tensor) => bytes.byteOffset - data.byteOffset;
   let end = 0;
-  for (const tensor of tensors.sort(
-    (a, b) => begin(a) - begin(b) || a.bytes.length - b.bytes.length,
-  )) {
+  for (const tensor of tensors) {
     if (begin(tensor) !== end) throw new BadInput('tensors overlap or leave a gap');
     end += tensor.bytes.length;
   }
   if (end !== data.length) throw new BadInput('tensors do not fill the file');
+}
+
+/// Throws unless the checksum is there that a file must have which says an upswing_version, and is
+/// that of the header, with zeros in its place, and of the tensors in their order.
+function checkChecksum(header: string, metadata: Map<string, string>, tensors: Tensor[]): void {
+  const digits = metadata.get('checksum');
+  if (digits === undefined) {
+    if (!metadata.has('upswing_version')) return; // another program wrote it
+    throw new BadInput('it says an upswing_version, but has no checksum');
+  }
+  const key = '"checksum":"';
+  const at = header.indexOf(key) + key.length;
+  if (at < key.length || digits.length !== 16) throw new BadInput('it has a broken checksum');
+  const checksum = new Checksum();
+  const zeros = header.slice(0, at) + '0'.repeat(16) + header.slice(at + 16);
+  checksum.update(new TextEncoder().encode(zeros));
+  for (const { bytes } of tensors) checksum.update(bytes);
+  if (checksum.hex() !== digits) throw new BadInput('its checksum says that it is damaged');
 }
 
 /// Throws BadInput.
@@ -85,7 +107,8 @@ export function parseSafetensors(file: ArrayBuffer): TensorFile {
   if (headerBytes > MAX_HEADER_BYTES || headerBytes > file.byteLength - 8) {
     throw new BadInput('it is not a safetensors file, or it is cut off');
   }
-  const header = parseHeader(new Uint8Array(file, 8, headerBytes));
+  const text = new Uint8Array(file, 8, headerBytes);
+  const header = parseHeader(text);
   const data = new Uint8Array(file, 8 + headerBytes);
 
   const metadata = new Map<string, string>();
@@ -101,7 +124,11 @@ export function parseSafetensors(file: ArrayBuffer): TensorFile {
   const tensors = new Map(
     Object.entries(entries).map(([name, entry]) => [name, parseTensor(name, entry, data)]),
   );
-  checkCovered([...tensors.values()], data);
+  const inOrder = [...tensors.values()].sort(
+    (a, b) => a.bytes.byteOffset - b.bytes.byteOffset || a.bytes.length - b.bytes.length,
+  );
+  checkCovered(inOrder, data);
+  checkChecksum(textOf(text), metadata, inOrder);
   return { metadata, tensors };
 }
 

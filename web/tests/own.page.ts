@@ -10,7 +10,11 @@ function changed(metadata: Record<string, string>): Buffer {
   const file = Buffer.from(readPolicy('fast'));
   const size = Number(file.readBigUInt64LE());
   const header = JSON.parse(file.toString('utf8', 8, 8 + size)) as Record<string, object>;
-  Object.assign(header.__metadata__!, metadata);
+  // As another program writes it, without a checksum.
+  const about = { ...header.__metadata__ } as Record<string, string>;
+  delete about.checksum;
+  delete about.upswing_version;
+  header.__metadata__ = { ...about, ...metadata };
   const text = Buffer.from(JSON.stringify(header));
   const length = Buffer.alloc(8);
   length.writeBigUInt64LE(BigInt(text.length));

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "apps/config.h"
+#include "core/tensor_file.h"
+#include "nn/policy.h"
+#include "sim/double_pendulum.h"
+
+namespace upswing {
+
+/// A policy and what it needs to be tried out.
+struct LoadedPolicy {
+  std::filesystem::path path;
+  Policy policy;
+  Plant plant;       // at training
+  std::string mjcf;  // empty: the built-in model
+
+  /// How many past steps its observations remember.
+  int memory() const { return MemorySteps(policy.shape().inputs); }
+};
+
+/// Loads a policy file, or the best policy of a run folder. Throws BadInput, too, where the file
+/// says of its task what this program cannot do: another control period, other observations.
+LoadedPolicy LoadPolicy(const std::filesystem::path& path);
+
+/// The same of a policy file that has been read.
+LoadedPolicy ReadPolicy(const TensorFile& file);
+
+/// What a policy file says of the agent and the task that it was trained on.
+PolicyInfo InfoOf(const Config& config);
+
+}  // namespace upswing

@@ -1,0 +1,79 @@
+#include "core/json.h"
+
+#include <limits>
+
+#include "core/error.h"
+#include "core/text.h"
+
+namespace upswing {
+namespace {
+
+using nlohmann::json;
+
+Error Unexpected(const std::string& name, const std::string& expected, const json& got) {
+  const std::string text = got.dump(-1, ' ', false, json::error_handler_t::replace);
+  return BadInput(Concat("\"", name, "\": expected ", expected, ", got ", text));
+}
+
+}  // namespace
+
+std::optional<int64_t> JsonInteger(const json& value) {
+  if (!value.is_number_integer()) return std::nullopt;
+  const bool too_large =
+      value.is_number_unsigned() &&
+      value.get<uint64_t>() > static_cast<uint64_t>(std::numeric_limits<int64_t>::max());
+  if (too_large) return std::nullopt;
+  return value.get<int64_t>();
+}
+
+json ParseJsonObject(std::string_view text, int max_depth) {
+  bool too_deep = false;
+  const auto keep = [&](int depth, json::parse_event_t, const json&) {
+    too_deep |= depth > max_depth;
+    return !too_deep;  // what is not kept takes no memory
+  };
+  // The parser's own message would quote bytes that need not be text.
+  json object = json::parse(text, keep, false);
+  if (too_deep) throw BadInput(Concat("expected JSON at most ", max_depth, " levels deep"));
+  if (!object.is_object()) throw BadInput("expected a JSON object");
+  return object;
+}
+
+const json& JsonMember(const json& object, const std::string& name) {
+  const auto found = object.find(name);
+  if (found == object.end()) throw BadInput(Concat("expected \"", name, "\", found none"));
+  return *found;
+}
+
+int64_t JsonInteger(const json& object, const std::string& name, int64_t low, int64_t high) {
+  const json& member = JsonMember(object, name);
+  const std::optional<int64_t> value = JsonInteger(member);
+  if (value && *value >= low && *value <= high) return *value;
+  throw Unexpected(name, Concat("an integer in [", low, ", ", high, "]"), member);
+}
+
+double JsonNumber(const json& object, const std::string& name) {
+  const json& member = JsonMember(object, name);
+  if (!member.is_number()) throw Unexpected(name, "a number", member);
+  return member.get<double>();
+}
+
+bool JsonBool(const json& object, const std::string& name) {
+  const json& member = JsonMember(object, name);
+  if (!member.is_boolean()) throw Unexpected(name, "true or false", member);
+  return member.get<bool>();
+}
+
+const std::string& JsonText(const json& object, const std::string& name) {
+  const json& member = JsonMember(object, name);
+  if (!member.is_string()) throw Unexpected(name, "a text", member);
+  return member.get_ref<const std::string&>();
+}
+
+const json& JsonList(const json& object, const std::string& name, size_t max_size) {
+  const json& member = JsonMember(object, name);
+  if (member.is_array() && member.size() <= max_size) return member;
+  throw Unexpected(name, Concat("a list of at most ", max_size), member);
+}
+
+}  // namespace upswing
