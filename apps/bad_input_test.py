@@ -42,7 +42,7 @@ class CommandLineTest(ProgramTest):
 
     def test_unknown_subcommand(self):
         self.refuse(["trian"], "trian", "did you mean train?")
-        self.refuse([], "subcommand")
+        self.refuse([], "expected a command", "train")
 
     def test_too_much_or_too_little(self):
         self.refuse(["eval"], "policy")

@@ -5,24 +5,21 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cmath>
 #include <csignal>
 #include <exception>
-#include <filesystem>
 #include <memory>
 
 #include "apps/bench_report.h"
 #include "apps/commands.h"
+#include "apps/machine.h"
+#include "apps/streams.h"
 #include "core/error.h"
-#include "core/file.h"
 #include "core/simd.h"
 #include "core/text.h"
 #include "core/thread_pool.h"
 
 namespace upswing {
 namespace {
-
-namespace fs = std::filesystem;
 
 /// A part of the benchmarks, by the name that the user types.
 struct BenchPart {
@@ -64,8 +61,8 @@ void InstallSignalHandlers() {
 /// Hands the cases to Google Benchmark, which calls back several times for each of them.
 class BenchRunner {
  public:
-  BenchRunner(const BenchCases& cases, const BenchContext& context)
-      : cases_(cases), context_(context), reporter_(cases, context) {}
+  BenchRunner(const BenchCases& cases, const BenchContext& context, bool quiet)
+      : cases_(cases), context_(context), reporter_(cases, context, quiet) {}
 
   void Run() {
     for (const BenchCase& c : cases_) {
@@ -141,7 +138,6 @@ void CheckOptions(const BenchOptions& options) {
                             "; there are ", Join(names, ", ")));
     }
   }
-  if (std::isnan(options.seconds)) throw BadInput("--seconds: expected a number, got \"nan\"");
   const bool gradient =
       options.parts.empty() || std::ranges::find(options.parts, "gradient") != options.parts.end();
   const bool restricted = !options.network.empty() || !options.hidden.empty() ||
@@ -153,14 +149,7 @@ void CheckOptions(const BenchOptions& options) {
     throw BadInput(
         "--simd: expected none with --precision bfloat16, which has instructions of its own");
   }
-  if (!options.json) return;
-  if (fs::is_directory(*options.json)) {
-    throw BadInput(Concat("--json ", *options.json, ": expected a file, got a folder"));
-  }
-  const fs::path folder = fs::absolute(*options.json).parent_path();
-  if (!fs::is_directory(folder)) {
-    throw BadInput(Concat("--json ", *options.json, ": there is no folder ", folder.string()));
-  }
+  if (options.json) CheckWritable("--json", *options.json);
 }
 
 BenchCases WantedCases(const BenchOptions& options) {
@@ -171,6 +160,14 @@ BenchCases WantedCases(const BenchOptions& options) {
     for (BenchCase& c : part.cases(options)) cases.push_back(std::move(c));
   }
   return cases;
+}
+
+/// A text that is one of `choices` and empty where it is not given; `usual` says what that means.
+void AddChoice(Options& options, std::string& target, std::string_view name,
+               std::vector<std::string> choices, std::string_view help, std::string_view usual) {
+  Option& option = options.Add(&target, name, "", help);
+  option.choices = std::move(choices);
+  option.usual = usual;
 }
 
 int RunBench(BenchOptions options) {
@@ -184,21 +181,21 @@ int RunBench(BenchOptions options) {
   InstallSignalHandlers();
   const BenchCases cases = WantedCases(options);
   BenchContext context{CpuModel(), SimdPath(),      options.threads,
-                       {},         options.seconds, options.repetitions};
+                       {},         options.seconds, static_cast<int>(options.repetitions)};
   for (const BenchCase& c : cases) {
     double& peak = context.peak_gflops[c.threads];
     if (c.flops > 0 && peak == 0) peak = MeasurePeakGflops(c.threads);
   }
   std::erase_if(context.peak_gflops, [](const auto& peak) { return peak.second == 0; });
 
-  BenchRunner runner(cases, context);
+  BenchRunner runner(cases, context, options.json && IsStandardStream(*options.json));
   runner.Run();
   if (g_stop_signal != 0) {
     fmt::print(stderr, "upswing: stopped after {} of {} cases{}\n", runner.reporter().cases_done(),
                cases.size(), options.json ? "; " + *options.json + " is not written" : "");
     return 128 + g_stop_signal;
   }
-  if (options.json) WriteFileAtomically(*options.json, runner.reporter().Json());
+  if (options.json) WriteOutput(*options.json, runner.reporter().Json());
   return 0;
 }
 
@@ -208,41 +205,26 @@ void AddBench(CLI::App& program, Command& command) {
   CLI::App* app = program.add_subcommand("bench", "Measure how fast it is on this machine");
   auto o = std::make_shared<BenchOptions>();
   app->add_option("parts", o->parts, "what to measure [everything]")->type_name("PART");
-  app->add_option("--threads", o->threads,
-                  "numbers of threads [1 and one for each processor, up to 8]")
-      ->delimiter(',')
-      ->take_all()
-      ->allow_extra_args(false)
-      ->check(CLI::Range(1, 256).description(""))
-      ->type_name("INTEGERS");
-  app->add_option("--simd", o->simd,
-                  Concat("vector instructions: ", Join(SimdPaths(), ", "), " [the first]"))
-      ->check(NotEmpty())
-      ->type_name("PATH");
-  app->add_option("--seconds", o->seconds, "for each repetition of a case [0.2]")
-      ->check(CLI::Range(0.001, 1000.0).description(""))
-      ->type_name("SECONDS");
-  app->add_option("--repetitions", o->repetitions, "of a case; the median is printed [3]")
-      ->check(CLI::Range(1, 1000).description(""))
-      ->type_name("INTEGER");
-  app->add_option("--json", o->json, "file to write, in Google Benchmark's format")
+  app->add_option(
+         "--json", o->json,
+         "file to write, in Google Benchmark's format; -: standard output, without the table")
       ->check(NotEmpty())
       ->type_name("FILE");
-  app->add_option("--network", o->network, "gradient: plain (DQN) or dueling (Dueling Double DQN)")
-      ->check(CLI::IsMember({"plain", "dueling"}).description(""))
-      ->type_name("NAME");
-  app->add_option("--hidden", o->hidden, "gradient: widths of the feature layers")
-      ->delimiter(',')
-      ->take_all()
-      ->allow_extra_args(false)
-      ->check(CLI::Range(1, 4096).description(""))
-      ->type_name("LIST");
-  app->add_option("--batch", o->batch, "gradient: size of the minibatches")
-      ->check(CLI::Range(1, 65536).description(""))
-      ->type_name("INTEGER");
-  app->add_option("--precision", o->precision, "gradient: float32 or bfloat16 [float32]")
-      ->check(CLI::IsMember({"float32", "bfloat16"}).description(""))
-      ->type_name("NAME");
+  Options own;
+  own.Add(&o->threads, "threads", {}, {1, 256}, "numbers of threads").usual =
+      "1 and one for each processor, up to 8";
+  AddChoice(own, o->simd, "simd", SimdPaths(), "vector instructions", "the first");
+  own.Add(&o->seconds, "seconds", 0.2, {0.001, 1000}, "s", "for each repetition of a case");
+  own.Add(&o->repetitions, "repetitions", 3, {1, 1000}, "", "of a case; the median is printed");
+  AddChoice(own, o->network, "network", {"plain", "dueling"}, "gradient: DQN or Dueling Double DQN",
+            "both");
+  own.Add(&o->hidden, "hidden", {}, {1, 4096}, "gradient: widths of the feature layers").usual =
+      "several";
+  own.Add(&o->batch, "batch", 0, {1, 65536}, "", "gradient: size of the minibatches").usual =
+      "several";
+  AddChoice(own, o->precision, "precision", {"float32", "bfloat16"}, "gradient: of the products",
+            "float32");
+  AddArguments(*app, own);
 
   std::string parts = "Parts:\n";
   for (const BenchPart& part : Parts()) parts += fmt::format("  {:<10}{}\n", part.name, part.help);

@@ -13,15 +13,15 @@ namespace upswing {
 /// What was typed.
 struct BenchOptions {
   std::vector<std::string> parts;   // empty: all
-  std::vector<int> threads;         // each case that can use threads runs with each of these
+  std::vector<int64_t> threads;     // each case that can use threads runs with each of these
   std::string network;              // of gradient: "plain", "dueling" or "" for both
-  std::vector<int> hidden;          // of gradient: widths of the feature layers; empty: several
-  std::string precision;            // of gradient, as DqnConfig has it; empty: its default
-  int batch = 0;                    // of gradient; 0: several
+  std::vector<int64_t> hidden;      // of gradient: widths of the feature layers; empty: several
+  std::string precision;            // of gradient, as DqnConfig has it
+  int64_t batch;                    // of gradient; 0: several
   std::string simd;                 // vector instructions; empty: the best
   std::optional<std::string> json;  // file to write
-  double seconds = 0.2;             // for each repetition, at least
-  int repetitions = 3;
+  double seconds;                   // for each repetition, at least
+  int64_t repetitions;
 };
 
 /// What is timed: one call of it.

@@ -51,9 +51,9 @@ double Sum(const std::vector<double>& numbers) {
 }
 
 /// The network of a gradient case: in its bare form, without layer normalisation.
-DqnConfig BareConfig(bool dueling, const std::vector<int>& hidden, int batch) {
+DqnConfig BareConfig(bool dueling, const std::vector<int64_t>& hidden, int64_t batch) {
   DqnConfig config;
-  config.hidden.assign(hidden.begin(), hidden.end());
+  config.hidden = hidden;
   config.head = std::max<int64_t>(1, config.hidden.back() / 2);
   config.layer_norm = false;
   config.dueling = config.double_q = dueling;
@@ -175,18 +175,18 @@ BenchCase TrainCase(const std::string& agent, const std::string& physics, int th
 }  // namespace
 
 BenchCases GradientCases(const BenchOptions& options) {
-  std::vector<std::vector<int>> networks{{64, 64}, {128, 128}, {256, 256}};
+  std::vector<std::vector<int64_t>> networks{{64, 64}, {128, 128}, {256, 256}};
   if (!options.hidden.empty()) networks = {options.hidden};
-  std::vector<int> batches{32, 64, 128, 256};
+  std::vector<int64_t> batches{32, 64, 128, 256};
   if (options.batch > 0) batches = {options.batch};
 
   const std::shared_ptr<Replay> replay = FilledReplay(100'000);
   BenchCases cases;
   for (const bool dueling : {false, true}) {
     if (!options.network.empty() && (options.network == "dueling") != dueling) continue;
-    for (const std::vector<int>& hidden : networks) {
-      for (const int batch : batches) {
-        for (const int threads : options.threads) {
+    for (const std::vector<int64_t>& hidden : networks) {
+      for (const int64_t batch : batches) {
+        for (const int64_t threads : options.threads) {
           DqnConfig config = BareConfig(dueling, hidden, batch);
           if (!options.precision.empty()) config.precision = options.precision;
           cases.push_back(GradientCase(config, threads, replay));
@@ -225,7 +225,7 @@ BenchCases TrainCases(const BenchOptions& options) {
   BenchCases cases;
   for (const std::string agent : {"d3qn", "d3qn-small"}) {
     for (const std::string& physics : PhysicsNames()) {
-      for (const int threads : options.threads) {
+      for (const int64_t threads : options.threads) {
         cases.push_back(TrainCase(agent, physics, threads));
       }
     }

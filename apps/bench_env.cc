@@ -110,7 +110,8 @@ BenchCases CasesOf(const BenchOptions& options, const MakeCase& make) {
   BenchCases cases;
   for (const std::string& physics : PhysicsNames()) {
     for (const int num_envs : {8, 128, 1024}) {
-      for (const int threads : options.threads) cases.push_back(make(physics, num_envs, threads));
+      for (const int64_t threads : options.threads)
+        cases.push_back(make(physics, num_envs, threads));
     }
   }
   return cases;

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "core/sample.h"
@@ -30,26 +29,15 @@ std::string Row(size_t name_width, const std::string& name, const std::string& r
 
 }  // namespace
 
-std::string CpuModel() {
-  std::ifstream file("/proc/cpuinfo");
-  std::string line;
-  while (std::getline(file, line)) {
-    const size_t colon = line.find(':');
-    if (line.starts_with("model name") && colon != std::string::npos) {
-      return std::string(Trim(std::string_view(line).substr(colon + 1)));
-    }
-  }
-  return "unknown";
-}
-
-BenchReporter::BenchReporter(const BenchCases& cases, const BenchContext& context)
-    : cases_(cases), context_(context) {
+BenchReporter::BenchReporter(const BenchCases& cases, const BenchContext& context, bool quiet)
+    : cases_(cases), context_(context), quiet_(quiet) {
   json_.SetOutputStream(&json_text_);
   json_.SetErrorStream(&json_text_);
   for (const BenchCase& c : cases_) name_width_ = std::max(name_width_, c.name.size());
 }
 
 bool BenchReporter::ReportContext(const Context& context) {
+  if (quiet_) return json_.ReportContext(context);
   std::string peaks;
   for (const auto& [threads, gflops] : context_.peak_gflops) {
     peaks += fmt::format("{} {:.1f} GFLOP/s with {} thread{}", peaks.empty() ? "; peak" : ",",
@@ -96,6 +84,7 @@ const BenchCase& BenchReporter::FindCase(const std::string& name) const {
 }
 
 void BenchReporter::PrintRow(const BenchCase& measured, double wall, double cpu) {
+  if (quiet_) return;
   const double rate = measured.count / wall;
   const double gflops = 1e-9 * measured.flops / wall;
   const auto peak = context_.peak_gflops.find(measured.threads);
@@ -111,7 +100,7 @@ void BenchReporter::PrintRow(const BenchCase& measured, double wall, double cpu)
 }
 
 void BenchReporter::ShowProgress(const BenchCase& running) {
-  if (!line_.due()) return;
+  if (quiet_ || !line_.due()) return;
   const double share = static_cast<double>(done_) / static_cast<double>(cases_.size());
   std::vector<std::string> fields{running.name};
   if (done_ > 0) {

@@ -15,19 +15,17 @@ namespace upswing {
 /// The machine and how it was used.
 struct BenchContext {
   std::string cpu_model, simd_path;
-  std::vector<int> threads;
+  std::vector<int64_t> threads;
   std::map<int, double> peak_gflops;  // by number of threads; empty: not measured
   double seconds;                     // of a repetition
   int repetitions;
 };
 
-/// "AMD EPYC 9454P", as the system has it.
-std::string CpuModel();
-
 /// Prints a table as the cases are measured, and keeps what Google Benchmark writes as JSON.
 class BenchReporter : public benchmark::BenchmarkReporter {
  public:
-  BenchReporter(const BenchCases& cases, const BenchContext& context);
+  /// `quiet`: no table is printed.
+  BenchReporter(const BenchCases& cases, const BenchContext& context, bool quiet);
 
   bool ReportContext(const Context& context) override;
   void ReportRuns(const std::vector<Run>& runs) override;
@@ -51,6 +49,7 @@ class BenchReporter : public benchmark::BenchmarkReporter {
   std::ostringstream json_text_;
   benchmark::JSONReporter json_;
   ProgressLine line_;
+  bool quiet_;
   bool stopped_ = false;
   size_t done_ = 0;
   double seconds_done_ = 0;  // that they took

@@ -28,9 +28,15 @@ void AddBench(CLI::App& program, Command& command);
 /// Refuses an empty path, such as that of a shell variable that is not set.
 CLI::Validator NotEmpty();
 
+/// Adds a flag for each of a command's own arguments, which sets it at once; see Option::Set.
+void AddArguments(CLI::App& app, const Options& options);
+
 /// Adds a flag for each setting and alias, in the order in which they were described. What is given
 /// is added to `flags`.
 void AddSettings(CLI::App& app, const Options& options, std::vector<FlagValue>& flags);
+
+/// Lets --help show the values that these settings have now as their defaults.
+void ShowDefaults(CLI::App& app, const Options& options);
 
 /// Adds the policy to try, a file or a run folder; not required unless the caller says so.
 CLI::Option* AddPolicy(CLI::App& app, std::string& policy);
@@ -42,10 +48,13 @@ void AddStart(CLI::App& app, std::string& start);
 void AddSeed(CLI::App& app, int64_t& seed, const std::string& what);
 
 /// Adds --threads, which ResolveThreads reads.
-void AddThreads(CLI::App& app, int& threads);
+void AddThreads(CLI::App& app, int64_t& threads);
+
+/// Adds --physics, which ParsePhysics reads; `usual` is the default.
+void AddPhysics(CLI::App& app, std::string& physics, const std::string& usual);
 
 /// Adds --seeds and --jobs, for many runs; 0 jobs: as many as there are processors.
-void AddManyOptions(CLI::App& app, std::string& seeds, int& jobs);
+void AddManyOptions(CLI::App& app, std::string& seeds, int64_t& jobs);
 
 /// Adds --set and --model, which choose another plant.
 void AddPlantOptions(CLI::App& app, std::vector<std::string>& set, std::string& model);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <memory>
 
@@ -42,7 +43,7 @@ std::string SummaryCsv(const Comparison& comparison) {
   for (const auto& [name, scores] : NamedScores()) {
     csv += fmt::format(",{0}_median,{0}_iqm,{0}_low,{0}_high", name);
   }
-  csv += ",evaluations_after_solved,of_them_steady,lowest_success_after_solved\n";
+  csv += ",evaluations_after_solved,of_them_steady,lowest_success_after_solved,task\n";
   for (size_t i = 0; i < comparison.summaries.size(); ++i) {
     const GroupSummary& s = comparison.summaries[i];
     const RunGroup& group = comparison.runs.groups[i];
@@ -50,7 +51,8 @@ std::string SummaryCsv(const Comparison& comparison) {
                   FormatNumber(s.solved_interval.low), ',', FormatNumber(s.solved_interval.high));
     for (const auto& [name, scores] : NamedScores()) csv += ScoreCells(s.*scores);
     csv += Concat(',', s.stability.evaluations, ',', s.stability.steady_evaluations, ',',
-                  s.stability.evaluations > 0 ? FormatNumber(s.stability.lowest) : "", '\n');
+                  s.stability.evaluations > 0 ? FormatNumber(s.stability.lowest) : "", ',',
+                  comparison.runs.tasks[i] + 1, '\n');
   }
   return csv;
 }
@@ -98,6 +100,12 @@ int RunCompare(const CompareArguments& arguments) {
 
 }  // namespace
 
+size_t NumTasks(const Comparison& comparison) {
+  return static_cast<size_t>(*std::ranges::max_element(comparison.runs.tasks)) + 1;
+}
+
+std::string CurvesName(size_t task) { return task == 0 ? "curves" : Concat("curves-", task + 1); }
+
 std::span<const std::pair<const char*, Scores GroupSummary::*>> NamedScores() {
   static constexpr std::array<std::pair<const char*, Scores GroupSummary::*>, 6> kScores{{
       {"solve_seconds", &GroupSummary::solve_seconds},
@@ -117,6 +125,7 @@ Comparison Compare(const CompareRequest& request) {
   }
   for (size_t b = 1; b < comparison.summaries.size(); ++b) {
     for (size_t a = 0; a < b; ++a) {
+      if (comparison.runs.tasks[a] != comparison.runs.tasks[b]) continue;
       comparison.pairs.push_back(ComparePair(comparison.summaries, b, a));
     }
   }
@@ -124,9 +133,16 @@ Comparison Compare(const CompareRequest& request) {
 }
 
 void WriteComparison(const Comparison& comparison, const fs::path& folder) {
-  const Figure curves = LearningCurves(comparison.runs.groups);
-  Draw(curves, folder / "curves.svg");
-  Draw(curves, folder / "curves.png");
+  for (size_t task = 0; task < NumTasks(comparison); ++task) {
+    std::vector<RunGroup> groups;
+    for (size_t i = 0; i < comparison.runs.groups.size(); ++i) {
+      if (static_cast<size_t>(comparison.runs.tasks[i]) != task) continue;
+      groups.push_back(comparison.runs.groups[i]);
+    }
+    const Figure curves = LearningCurves(groups);
+    Draw(curves, folder / Concat(CurvesName(task), ".svg"));
+    Draw(curves, folder / Concat(CurvesName(task), ".png"));
+  }
   WriteFileAtomically(folder / "summary.csv", SummaryCsv(comparison));
   WriteFileAtomically(folder / "runs.csv", RunsCsv(comparison));
 }
@@ -139,20 +155,27 @@ void AddCompare(CLI::App& program, Command& command) {
       ->type_name("RUN|FOLDER")
       ->required()
       ->check(NotEmpty());
-  app->add_option("--out", a->out,
-                  "new folder for summary.csv, runs.csv, curves.svg and curves.png")
+  app->add_option(
+         "--out", a->out,
+         "new folder for summary.csv, runs.csv, curves.svg and curves.png (curves-2 and so "
+         "on for further tasks)")
       ->type_name("FOLDER")
       ->check(NotEmpty());
   app->add_flag("--unfinished", a->unfinished, "take runs that are unfinished as they are")
       ->disable_flag_override();
   app->add_flag("--different-tasks", a->different_tasks,
-                "compare runs that are judged on different tasks (plant, evaluations) as well")
+                "compare groups that are judged on different tasks (plant, disturbance, number of "
+                "episodes) with each other as well")
       ->disable_flag_override();
   app->add_flag("--json", a->as_json, "print JSON")->disable_flag_override();
   app->footer(
       "Runs with the same settings but the seed are one group. Figures are over its runs: the\n"
       "interquartile mean (IQM) with a 95% bootstrap interval; docs/statistics.md defines each.\n"
-      "A run that did not solve the task counts as one that needs more than its budget.\n\n"
+      "A run that did not solve the task counts as one that needs more than its budget. Groups "
+      "are\n"
+      "compared with those that are judged on the same task. What is no run, broken or unfinished "
+      "is\n"
+      "left out, with a note.\n\n"
       "Examples:\n"
       "  ./upswing compare runs/d3qn-seed*                  one agent over its seeds\n"
       "  ./upswing compare runs --out runs/comparison       all agents in runs, with figures\n"

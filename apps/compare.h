@@ -18,6 +18,12 @@ struct Comparison {
   std::vector<PairSummary> pairs;       // each group with each one before it
 };
 
+/// How many tasks groups are compared on.
+size_t NumTasks(const Comparison& comparison);
+
+/// The name of the files with a task's learning curves, without ending: `curves`, `curves-2`, …
+std::string CurvesName(size_t task);
+
 /// The figures of a group that are scores over its runs, under the names that files give them.
 std::span<const std::pair<const char*, Scores GroupSummary::*>> NamedScores();
 
@@ -32,8 +38,8 @@ void PrintComparison(const Comparison& comparison, const std::filesystem::path& 
 std::string ComparisonJson(const Comparison& comparison);
 
 /// Writes summary.csv (a row for each group), runs.csv (a row for each run) and the learning curves
-/// as curves.svg and curves.png, in place of those that are there. Throws Failure if it cannot
-/// write or draw.
+/// of each task as CurvesName(task).svg and .png, in place of those that are there. Throws Failure
+/// if it cannot write or draw.
 void WriteComparison(const Comparison& comparison, const std::filesystem::path& folder);
 
 }  // namespace upswing

@@ -10,27 +10,14 @@
 #include "apps/config.h"
 #include "apps/model_info.h"
 #include "apps/progress.h"
+#include "apps/run_log.h"
 #include "core/error.h"
 #include "core/text.h"
 
 namespace upswing {
 namespace {
 
-namespace fs = std::filesystem;
-
-constexpr const char* kModel = "model";  // its content, as the name of a setting
-constexpr size_t kLongText = 48;         // longer ones are not shown
-
-/// Name (`section.key`) and value of a setting.
-using Setting = std::pair<std::string, std::string>;
-
-/// A run with its settings.
-struct FoundRun {
-  RunRecord run;
-  std::string agent, variant;     // its named agent; its folder's name within a study, or empty
-  std::vector<Setting> settings;  // that make it another run, without the seed
-  bool named = false;             // asked for itself, not found in a folder
-};
+constexpr size_t kLongText = 48;  // longer ones are not shown
 
 /// The content of the model that it was trained and judged on; kBuiltIn for the built-in one.
 const std::string& ModelOf(const FoundRun& f) { return f.settings.back().second; }
@@ -41,133 +28,31 @@ std::string LabelOf(const FoundRun& f) {
                 ModelOf(f) == kBuiltIn ? "" : ", other model");
 }
 
-bool IsRun(const fs::path& folder) {
-  return fs::exists(folder / "config.toml") &&
-         (fs::exists(folder / "evals.csv") || fs::exists(folder / "checkpoint.safetensors"));
+/// Whether a setting says what a policy is judged on, and not how it is trained or when and in
+/// which engine it is judged: those that the evaluations of `train` share with its episodes, and
+/// how many episodes have to succeed.
+bool IsTask(const std::string& name) {
+  constexpr std::array<std::string_view, 3> kBeginnings{"plant.", "disturbance.", "randomize."};
+  return name == kModelContent || name == "train.eval_episodes" ||
+         std::ranges::any_of(
+             kBeginnings, [&](std::string_view beginning) { return name.starts_with(beginning); });
 }
 
-/// The run folders in a folder, at any depth, in alphabetical order.
-std::vector<fs::path> RunsIn(const fs::path& folder) {
-  if (!fs::is_directory(folder)) {
-    throw BadInput(Concat(folder.string(), ": expected a run folder or one that holds some, got ",
-                          fs::exists(folder) ? "a file" : "nothing of that name"));
-  }
-  if (IsRun(folder)) return {folder};
-  std::vector<fs::path> found;
-  for (auto entry = fs::recursive_directory_iterator(folder); entry != end(entry); ++entry) {
-    if (!entry->is_directory() || !IsRun(entry->path())) continue;
-    found.push_back(entry->path());
-    entry.disable_recursion_pending();
-  }
-  std::ranges::sort(found);
-  if (found.empty()) {
-    throw BadInput(Concat(folder.string(), ": expected a run folder (config.toml beside evals.csv ",
-                          "or checkpoint.safetensors) or one that holds some, got none"));
-  }
-  return found;
-}
-
-std::vector<Setting> SettingsOf(Config config) {
-  std::vector<Setting> settings;
-  config.model.clear();  // a model is what is in its file, not where that lies: see below
-  for (const Option& option : TrainingSettings(config)) {
-    const auto* text = std::get_if<std::string*>(&option.target);
-    settings.emplace_back(Concat(option.section, ".", option.name),
-                          text != nullptr ? **text : option.text());
-  }
-  settings.emplace_back(kModel, ModelContent(config.mjcf));  // the last one, for ModelOf
-  return settings;
-}
-
-/// Whether a setting says what a policy is judged on, or when, and not how it is trained: those
-/// that the evaluations of `train` share with its episodes, and their own.
-bool IsJudged(const std::string& name) {
-  constexpr std::array<std::string_view, 5> kBeginnings{"plant.", "disturbance.", "randomize.",
-                                                        "train.eval_", "task.eval_"};
-  return name == kModel || std::ranges::any_of(kBeginnings, [&](std::string_view beginning) {
-           return name.starts_with(beginning);
-         });
-}
-
-FoundRun ReadRun(const fs::path& path, const fs::path& root, bool unfinished) {
-  const Config config = ReadRunConfig(path);
-  const TrainConfig& t = config.train;
-  FoundRun found{{path, {t.seed, t.steps, t.envs, t.eval_every, t.stop_when_solved}, {}},
-                 config.agent,
-                 "",
-                 SettingsOf(config)};
-  found.run.evaluations = ReadEvaluations(path, unfinished);
-  // STUDY/VARIANT/seed1: the variant has a name of its own.
-  const fs::path below = path.lexically_relative(root);
-  if (std::distance(below.begin(), below.end()) > 1) {
-    found.variant = path.parent_path().filename().string();
-  }
-  return found;
-}
-
-/// Takes out trainings that were found before, and notes it; throws at one that was named itself.
-void LeaveOutTwins(std::vector<FoundRun>& runs, std::vector<std::string>& notes) {
-  std::map<std::pair<int64_t, std::vector<Setting>>, fs::path> seen;
-  std::erase_if(runs, [&](const FoundRun& f) {
-    const auto [before, is_new] = seen.try_emplace({f.run.plan.seed, f.settings}, f.run.path);
-    if (is_new) return false;
-    const std::string what =
-        Concat(f.run.path.string(), ": the same training as ", before->second.string(),
-               " (all settings and seed ", f.run.plan.seed, ")");
-    if (f.named) throw BadInput(Concat(what, "; expected each run once"));
-    notes.push_back(what + ": left out");
-    return true;
-  });
-}
-
-/// Refuses runs that are judged on different tasks.
-void CheckTogether(const std::vector<FoundRun>& runs, bool different_tasks) {
-  for (const FoundRun& f : runs) {
-    for (size_t i = 0; i < f.settings.size() && !different_tasks; ++i) {
-      const auto& [name, value] = f.settings[i];
-      const std::string& first = runs.front().settings[i].second;
-      if (!IsJudged(name) || value == first) continue;
-      const bool is_short = std::max(value.size(), first.size()) < kLongText;
-      throw BadInput(Concat(f.run.path.string(), ": judged on another task than ",
-                            runs.front().run.path.string(), ": ", name,
-                            is_short ? Concat(" = ", value, " instead of ", first) : " differs",
-                            "; expected one task (--different-tasks compares them all the same)"));
-    }
-  }
-}
-
-/// Takes out what cannot be compared: runs without an evaluation. Throws at unfinished ones, unless
-/// they are asked for; then they are noted.
-void CheckFinished(std::vector<FoundRun>& runs, bool unfinished, std::vector<std::string>& notes) {
-  for (const FoundRun& f : runs) {
-    const RunRecord& run = f.run;
-    if (Finished(run)) continue;
-    const std::string path = run.path.string();
-    const int64_t step = run.evaluations.empty() ? 0 : run.evaluations.back().step;
-    const std::string how_far = step == 0
-                                    ? "has no evaluation yet"
-                                    : fmt::format("is unfinished, evaluated up to step {} of {}",
-                                                  FormatCount(step), FormatCount(run.plan.steps));
-    if (!unfinished) {
-      throw BadInput(Concat(path, ": ", how_far, "; expected a run that has finished (train ",
-                            "--resume goes on with it, --unfinished takes it as it is)"));
-    }
-    notes.push_back(Concat(path, " ", how_far, step == 0 ? ": left out" : ""));
-  }
-  std::erase_if(runs, [](const FoundRun& f) { return f.run.evaluations.empty(); });
-  if (runs.empty()) throw BadInput("expected a run with an evaluation, got none");
-}
+/// Whether a setting counts.
+using Wanted = bool (*)(const std::string& name);
 
 /// The settings of a run in which not all of `others` agree with it, such as `hidden [64, 64], head
 /// 32`.
-std::string Differences(const FoundRun& of, const std::vector<const FoundRun*>& others) {
+std::string Differences(
+    const FoundRun& of, const std::vector<const FoundRun*>& others,
+    Wanted wanted = [](const std::string& name) { return name != "train.agent"; }) {
   std::vector<std::string> parts;
   for (size_t i = 0; i < of.settings.size(); ++i) {
     const std::string& name = of.settings[i].first;
     const std::string& value = of.settings[i].second;  // clang 14 captures no structured binding
     const bool differs = std::ranges::any_of(
         others, [&](const FoundRun* other) { return other->settings[i].second != value; });
-    if (!differs || name == "train.agent") continue;
+    if (!differs || !wanted(name)) continue;
     const std::string key = name.substr(name.find('.') + 1);
     parts.push_back(value.size() < kLongText ? Concat(key, " ", value) : key);
   }
@@ -225,28 +110,91 @@ void NotePlans(const GroupedRuns& grouped, std::vector<std::string>& notes) {
   }
 }
 
+/// What the times depend on besides the settings, where it is not the same for all.
+void NoteTimes(const std::vector<FoundRun>& runs, std::vector<std::string>& notes) {
+  std::map<int64_t, int> threads;  // how many runs had so many
+  std::set<std::string> processors, vectors;
+  std::set<int64_t> intervals;
+  std::map<std::pair<std::vector<Setting>, std::set<int64_t>>, std::vector<double>> busy;
+  for (const FoundRun& f : runs) {
+    const RunConditions& c = f.conditions;
+    intervals.insert(f.run.plan.eval_every);
+    for (const int64_t count : c.threads) ++threads[count];
+    for (const std::string& name : c.processors) processors.insert(Printable(name));
+    for (const std::string& name : c.vectors) vectors.insert(Printable(name));
+    if (c.busy) busy[{f.settings, c.threads}].push_back(*c.busy);
+  }
+  const auto join = [](const std::set<std::string>& names) {
+    return Join({names.begin(), names.end()}, "; ");
+  };
+  if (threads.size() > 1) {
+    std::vector<std::string> counts;
+    for (const auto& [count, of_runs] : threads) {
+      counts.push_back(fmt::format("{} ({} run{})", count, of_runs, of_runs == 1 ? "" : "s"));
+    }
+    notes.push_back(Concat("times are of different numbers of threads: ", Join(counts, ", ")));
+  }
+  if (processors.size() > 1) {
+    notes.push_back(Concat("times are of different processors: ", join(processors)));
+  }
+  if (vectors.size() > 1) {
+    notes.push_back(Concat("times are of different vector instructions: ", join(vectors)));
+  }
+  for (const auto& [same_work, shares] : busy) {
+    constexpr double kAlike = 0.75;
+    const auto [low, high] = std::ranges::minmax(shares);
+    if (low >= kAlike * high) continue;
+    notes.push_back(fmt::format(
+        "times are of different machine loads: of runs with the same settings and threads, one "
+        "had its threads at work {:.0f}% of the time, another {:.0f}%",
+        100 * low, 100 * high));
+    break;
+  }
+  if (intervals.size() > 1) {
+    notes.push_back(fmt::format(
+        "evaluated every {} to {} steps: times and steps to solve are as coarse as that",
+        FormatCount(*intervals.begin()), FormatCount(*intervals.rbegin())));
+  }
+}
+
+/// Numbers the tasks that groups (`first` has a run of each) are judged on, in their order.
+void TellTasksApart(GroupedRuns& grouped, const std::vector<const FoundRun*>& first) {
+  std::vector<const FoundRun*> tasks;  // a run of each
+  for (const FoundRun* run : first) {
+    const auto same = [&](const FoundRun* other) {
+      return Differences(*run, {other}, IsTask).empty();
+    };
+    const auto at = std::ranges::find_if(tasks, same);
+    grouped.tasks.push_back(static_cast<int>(at - tasks.begin()));
+    if (at == tasks.end()) tasks.push_back(run);
+  }
+  for (const FoundRun* task : tasks) {
+    grouped.task_texts.push_back(Differences(*task, tasks, IsTask));
+  }
+}
+
+void NoteTasks(GroupedRuns& grouped, bool different_tasks) {
+  const size_t tasks = grouped.task_texts.size();
+  if (tasks == 1) return;
+  grouped.notes.push_back(fmt::format(
+      "there are {} tasks to be judged on: {}", tasks,
+      different_tasks ? "figures of different tasks stand beside each other"
+                      : "groups are compared within each (--different-tasks: all with all)"));
+}
+
 }  // namespace
 
 GroupedRuns GroupRuns(const CompareRequest& request) {
-  std::vector<FoundRun> runs;
-  std::set<fs::path> seen;
-  for (const fs::path& argument : request.paths) {
-    for (const fs::path& path : RunsIn(argument)) {
-      if (!seen.insert(fs::weakly_canonical(path)).second) {
-        throw BadInput(Concat(path.string(), ": given twice; expected each run once"));
-      }
-      const fs::path& root = request.root.empty() ? argument : request.root;
-      runs.push_back(ReadRun(path, root, request.unfinished));
-      runs.back().named = path == argument;
-    }
+  const Found found = FindRuns(request);
+  if (found.runs.empty()) {
+    const size_t others = found.left_out.size() - 1;
+    throw BadInput(Concat(
+        found.left_out.front(),
+        others > 0 ? Concat("; no run is left to compare (", others, " more were left out)") : ""));
   }
   GroupedRuns grouped;
-  LeaveOutTwins(runs, grouped.notes);
-  CheckTogether(runs, request.different_tasks);
-  CheckFinished(runs, request.unfinished, grouped.notes);
-
   std::vector<const FoundRun*> first;  // of each group
-  for (const FoundRun& f : runs) {
+  for (const FoundRun& f : found.runs) {
     const auto same = [&](const FoundRun* other) { return other->settings == f.settings; };
     const auto at = static_cast<size_t>(std::ranges::find_if(first, same) - first.begin());
     if (at == first.size()) {
@@ -259,12 +207,18 @@ GroupedRuns GroupRuns(const CompareRequest& request) {
     std::ranges::sort(group.runs, {}, [](const RunRecord& run) { return run.plan.seed; });
   }
   TellGroupsApart(grouped, first);
+  TellTasksApart(grouped, first);
+  grouped.notes = found.notes;
   NotePlans(grouped, grouped.notes);
   for (size_t i = 0; i < first.size(); ++i) {
     if (ModelOf(*first[i]) == kBuiltIn) continue;
     grouped.notes.push_back(Concat(grouped.groups[i].label, ": on a model that is not the ",
                                    "built-in one (content ", ModelOf(*first[i]), ")"));
   }
+  NoteTimes(found.runs, grouped.notes);
+  NoteTasks(grouped, request.different_tasks);
+  if (request.different_tasks) grouped.tasks.assign(first.size(), 0);
+  for (const std::string& line : found.left_out) grouped.notes.push_back(line + ": left out");
   return grouped;
 }
 

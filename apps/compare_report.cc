@@ -60,12 +60,14 @@ void PrintStability(const GroupSummary& summary) {
       Percent(s.lowest));
 }
 
-void PrintGroup(const RunGroup& group, const GroupSummary& s, const std::string& differences) {
+void PrintGroup(const RunGroup& group, const GroupSummary& s, const std::string& differences,
+                const std::string& task) {
   std::string seeds;
   for (const RunRecord& run : group.runs) {
     seeds += fmt::format("{}{}", seeds.empty() ? "" : ", ", run.plan.seed);
   }
   fmt::print("{}\n", Printable(group.label));
+  if (!task.empty()) fmt::print("  {:<16}{}\n", "task", Printable(task));
   if (!differences.empty()) fmt::print("  {:<16}{}\n", "settings", Printable(differences));
   fmt::print("  {:<16}{} ({})\n", "seeds", group.runs.size(), seeds);
   fmt::print("  {:<16}{} of {} (95% {} to {})\n", "solved", s.solved, group.runs.size(),
@@ -139,7 +141,10 @@ ordered_json GroupJson(const RunGroup& group, const GroupSummary& s) {
 void PrintComparison(const Comparison& comparison, const std::filesystem::path& written_to) {
   const GroupedRuns& runs = comparison.runs;
   for (size_t i = 0; i < runs.groups.size(); ++i) {
-    PrintGroup(runs.groups[i], comparison.summaries[i], runs.differences[i]);
+    const auto task = static_cast<size_t>(runs.tasks[i]);
+    const bool several = NumTasks(comparison) > 1;
+    PrintGroup(runs.groups[i], comparison.summaries[i], runs.differences[i],
+               several ? fmt::format("{} ({})", task + 1, runs.task_texts[task]) : "");
   }
   for (const PairSummary& pair : comparison.pairs) PrintPair(comparison, pair);
   for (const std::string& note : runs.notes) fmt::print("Note: {}\n", Printable(note));
@@ -147,8 +152,11 @@ void PrintComparison(const Comparison& comparison, const std::filesystem::path& 
       "Intervals: Wilson for shares, else percentile bootstrap of {} resamples of the runs.\n",
       FormatCount(kResamples));
   if (written_to.empty()) return;
-  fmt::print("Written: summary.csv, runs.csv, curves.svg and curves.png in {}\n",
-             Printable(written_to.string()));
+  std::string curves;
+  for (size_t task = 0; task < NumTasks(comparison); ++task) {
+    curves += fmt::format(", {0}.svg, {0}.png", CurvesName(task));
+  }
+  fmt::print("Written: summary.csv, runs.csv{} in {}\n", curves, Printable(written_to.string()));
 }
 
 std::string ComparisonJson(const Comparison& comparison) {
@@ -158,6 +166,7 @@ std::string ComparisonJson(const Comparison& comparison) {
   for (size_t i = 0; i < comparison.summaries.size(); ++i) {
     j["groups"].push_back(GroupJson(comparison.runs.groups[i], comparison.summaries[i]));
     j["groups"].back()["settings"] = comparison.runs.differences[i];
+    j["groups"].back()["task"] = comparison.runs.tasks[i] + 1;
   }
   j["pairs"] = ordered_json::array();
   for (const PairSummary& pair : comparison.pairs) {

@@ -154,12 +154,6 @@ class CompareTest(ProgramTest):
 
     def test_refuses(self):
         self.make_group("r", [1, 2])
-        self.make_run("heavy", 3, [(1, 1), (1, 1)], more="mass2 = 1.2\n")
-        self.make_run("seldom", 3, [(1, 1), (1, 1)], more="eval_episodes = 7\n")
-        self.make_run("noisy", 3, [(1, 1), (1, 1)], more="sensor_noise = 0.1\n")
-        self.make_run("model", 3, [(1, 1), (1, 1)], more='model = "model.xml"\n')
-        self.write("model/model.xml", MODEL)
-        self.make_run("twin", 1, [(1, 1), (1, 1)])
         self.make_run("begun", 3, [(0, 1), (1, 1)])
         self.make_run("bare", 4, [])
         self.make_run("odd", 5, [(1, 1)])
@@ -168,22 +162,106 @@ class CompareTest(ProgramTest):
         (self.folder / "empty").mkdir()
         self.write("file", "")
         refuse = lambda arguments, *words: self.refuse(["compare", *arguments], *words)
-        refuse([], "runs")
+        refuse([], "compare: expected RUN|FOLDER")
         refuse(["none"], "none", "nothing of that name")
+        refuse(["r", "none"], "none", "nothing of that name")
         refuse(["file"], "file", "got a file")
         refuse(["empty"], "empty", "config.toml", "got none")
-        refuse(["r", "heavy"], "heavy", "another task than r/seed1",
-               "plant.mass2 = 1.2 instead of 1", "--different-tasks")
-        refuse(["r", "seldom"], "train.eval_episodes = 7 instead of 100")
-        refuse(["r", "noisy"], "disturbance.sensor_noise = 0.1 instead of 0")
-        refuse(["r", "model"], "model: judged on another task than r/seed1")
         refuse(["r", "r/seed2"], "r/seed2", "given twice")
-        refuse(["r", "twin"], "twin: the same training as r/seed1", "seed 1")
-        refuse(["r", "begun"], "begun", "unfinished", "2,000 of 4,000", "--unfinished")
-        refuse(["bare"], "bare", "no evaluation yet")
-        refuse(["bare", "--unfinished"], "expected a run with an evaluation")
+        refuse(["begun"], "begun", "unfinished", "2,000 of 4,000", "--unfinished")
+        refuse(["bare"], "bare: has no evaluation yet")
+        refuse(["bare", "--unfinished"], "bare: has no evaluation yet")
         refuse(["odd"], "odd/config.toml:", "no_such_key")
-        self.assertEqual(len(self.compare("r", "heavy", "--different-tasks")["groups"]), 2)
+        refuse(["odd", "bare", "empty"], "odd/config.toml:", "no run is left", "2 more")
+
+    def test_one_bad_folder_does_not_stop_the_rest(self):
+        self.make_group("r", [1, 2])
+        expected = self.compare("r")["groups"]
+        self.make_run("r/begun", 3, [(0, 1), (1, 1)])
+        self.make_run("r/bare", 4, [])
+        self.make_run("r/odd", 5, [(1, 1), (1, 1)])
+        with open(self.folder / "r/odd/config.toml", "a", encoding="utf-8") as file:
+            file.write("no_such_key = 1\n")
+        self.make_run("r/table", 6, [(1, 1), (1, 1)])
+        self.write("r/table/evals.csv", "step,seconds\n1,x\n")
+        self.make_run("r/twin", 1, [(1, 1), (1, 1)])
+        (self.folder / "empty").mkdir()
+        self.write("file", "")
+        for arguments in (["r"], ["r", "empty", "file"]):
+            answer = self.compare(*arguments)
+            self.assertEqual(answer["groups"], expected)
+            left_out = [note for note in answer["notes"] if note.endswith(": left out")]
+            self.assertEqual(len(left_out), 3 + len(arguments) + 1, left_out)
+            for words in ("r/begun: is unfinished, evaluated up to step 2,000 of 4,000",
+                          "r/bare: has no evaluation yet", "r/odd/config.toml:", "r/table/evals.csv:",
+                          "r/twin: the same training as r/seed1 (all settings and seed 1)"):
+                self.assertEqual(sum(note.startswith(words) for note in left_out), 1, words)
+        self.assertIn("Note: file: expected a run folder", self.succeed("compare", "r", "file"))
+
+    def test_an_evaluation_interval_is_no_task(self):
+        self.make_group("a", [1, 1, 2])
+        self.make_group("b", [3, 3, 2], more="gamma = 0.9\neval_physics = \"mujoco\"\n")
+        for seed in (1, 2, 3):
+            config = self.folder / f"b/seed{seed}/config.toml"
+            text = config.read_text(encoding="utf-8")
+            text = text.replace("eval_every = 1000\n", "eval_every = 500\n")
+            text = text.replace("log_every = 2000 ", "log_every = 7 ")
+            config.write_text(text, encoding="utf-8")
+        answer = self.compare("a", "b")
+        self.assertEqual([group["task"] for group in answer["groups"]], [1, 1])
+        self.assertEqual(len(answer["pairs"]), 1)
+        self.assertIn("evaluated every 500 to 1,000 steps", " ".join(answer["notes"]))
+
+    def test_tasks_stand_apart(self):
+        self.make_group("a", [1, 1])
+        self.make_group("b", [1, 2], agent="dqn")
+        self.make_group("heavy", [1, 1], more="mass2 = 1.2\n")
+        self.make_group("heavy-too", [1, 2], agent="dqn", more="mass2 = 1.2\n")
+        self.make_group("seldom", [1, 1], more="eval_episodes = 7\n")
+        self.make_group("noisy", [1, 1], more="sensor_noise = 0.1\n")
+        folders = ["a", "b", "heavy", "heavy-too", "seldom", "noisy"]
+        answer = self.compare(*folders)
+        self.assertEqual([group["task"] for group in answer["groups"]], [1, 1, 2, 2, 3, 4])
+        self.assertEqual(len(answer["pairs"]), 2)
+        self.assertIn("there are 4 tasks to be judged on", " ".join(answer["notes"]))
+        text = self.succeed("compare", *folders, "--out", "out")
+        self.assertRegex(text, r"(?m)^  task +1 \(eval_episodes 100, mass2 1, sensor_noise 0\)$")
+        self.assertRegex(text, r"(?m)^  task +2 \(eval_episodes 100, mass2 1.2, sensor_noise 0\)$")
+        self.assertEqual(sorted(p.name for p in (self.folder / "out").glob("*.svg")),
+                         ["curves-2.svg", "curves-3.svg", "curves-4.svg", "curves.svg"])
+        self.assertEqual(len(self.compare(*folders, "--different-tasks")["pairs"]), 15)
+
+    def test_a_model_is_another_task(self):
+        self.make_group("a", [1])
+        self.make_run("model", 3, [(1, 1), (1, 1)], more='model = "model.xml"\n')
+        self.write("model/model.xml", MODEL)
+        self.assertEqual([g["task"] for g in self.compare("a", "model")["groups"]], [1, 2])
+
+    def test_times_of_other_machines_are_noted(self):
+        def log(run, *lines):
+            text = "".join(f"2026-01-01 00:00:00Z {line}\n" for line in lines)
+            self.write(run + "/log.txt", text)
+
+        self.make_group("r", [1, 2, 3])
+        begin = "started at step 0, vector instructions AVX2, threads {}, processor {}"
+        end = "finished at step 4000, threads busy {}% of {} s"
+        for seed in (1, 2, 3):
+            log(f"r/seed{seed}", begin.format(2, "A"), end.format(90, 10.5))
+        self.assertNotIn("times", " ".join(self.compare("r")["notes"]))
+        log("r/seed3", begin.format(1, "B\x1b[2J").replace("AVX2", "AVX-512"), end.format(90, 10))
+        notes = " ".join(self.compare("r")["notes"])
+        self.assertIn("different numbers of threads: 1 (1 run), 2 (2 runs)", notes)
+        self.assertIn("different processors: A; B\\x1b[2J", notes)
+        self.assertIn("different vector instructions: AVX-512; AVX2", notes)
+        self.assertNotIn("loads", notes)
+        log("r/seed3", begin.format(2, "A"), end.format(40, 22))
+        notes = " ".join(self.compare("r")["notes"])
+        self.assertIn("different machine loads", notes)
+        self.assertIn("40% of the time, another 90%", notes)
+        log("r/seed3", begin.format(2, "A"), end.format(40, 0.3))  # too short to tell
+        self.assertNotIn("loads", " ".join(self.compare("r")["notes"]))
+        log("r/seed3", "\0\xff", "threads busy , threads , processor")
+        self.compare("r")
 
     def test_a_run_that_lacks_settings_is_not_filled_up_with_todays_defaults(self):
         self.make_run("old", 1, [(1, 1), (1, 1)])
@@ -207,8 +285,8 @@ class CompareTest(ProgramTest):
         self.refuse(["compare", "begun"], "begun/evals.csv", "half-written", "--resume")
         answer = self.compare("r", "begun", "bare", "--unfinished")
         self.assertEqual([run["steps"] for run in answer["groups"][0]["runs"]], [2000, 3000, 2000])
-        self.assertIn("begun is unfinished, evaluated up to step 2,000 of 4,000", answer["notes"])
-        self.assertIn("bare has no evaluation yet: left out", answer["notes"])
+        self.assertIn("begun: is unfinished, evaluated up to step 2,000 of 4,000", answer["notes"])
+        self.assertIn("bare: has no evaluation yet: left out", answer["notes"])
 
     def test_files(self):
         self.make_group("a", [1, 1, None])

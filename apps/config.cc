@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/named_agents.h"
+#include "apps/streams.h"
 #include "apps/toml_settings.h"
 #include "core/error.h"
 #include "core/file.h"
@@ -53,7 +54,8 @@ void Config::Describe(Options& o) {
   o.Add(&agent, "agent", "d3qn", "named agent whose settings the others begin with");
   train.Describe(o);
   o.Section("task");
-  o.Add(&episode_seconds, "episode_seconds", 4, {0.02, 1e6}, "s", "length of a training episode");
+  o.Add(&episode_seconds, "episode_seconds", 4, {0.02, 1e6}, "s", "length of a training episode")
+      .step = kControlPeriod;
   o.Add(&random_start_share, "random_start_share", 0.5, kUnit, "",
         "share of the episodes that begin anywhere instead of hanging");
   o.Add(&random_start_velocity, "random_start_velocity", 5, {0, 50}, "rad/s",
@@ -116,12 +118,30 @@ void SetFlags(const Options& options, const std::vector<FlagValue>& flags) {
 }
 
 Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
-  return ParseConfig(file.empty() ? "" : ReadTextFile(file), file, flags);
+  return ParseConfig(file.empty() ? "" : ReadInput(file.string()), file, flags);
+}
+
+/// Throws BadInput that begins with `where` (may be empty) if settings, each of which could be,
+/// cannot be together, so that nothing could be learned.
+static void CheckTogether(const DqnConfig& d, const std::string& where) {
+  const std::string place = where.empty() ? "" : where + ": ";
+  if (d.batch > d.replay) {
+    throw BadInput(Concat(place,
+                          "batch: expected at most as many transitions as the replay memory holds "
+                          "(replay ",
+                          d.replay, "), got ", d.batch));
+  }
+  if (d.learning_starts > d.replay) {
+    throw BadInput(Concat(place,
+                          "learning_starts: expected at most as many steps as the replay memory "
+                          "holds transitions (replay ",
+                          d.replay, "), got ", d.learning_starts));
+  }
 }
 
 Config ParseConfig(std::string_view text, const fs::path& file,
                    const std::vector<FlagValue>& flags) {
-  const std::string where = file.string();
+  const std::string where = file.empty() ? "" : InputName(file.string());
   const toml::table table = ParseToml(text, where);
   Config config;
   const Options options = OptionsOf(config);
@@ -142,6 +162,7 @@ Config ParseConfig(std::string_view text, const fs::path& file,
   SetFlags(options, flags);
   config.agent = agent.name;
   config.model = model_path;
+  CheckTogether(config.dqn, where);
   return config;
 }
 
@@ -161,6 +182,11 @@ std::vector<std::string> MissingSettings(const std::string& text, const std::str
     missing.push_back(Concat(option.section, ".", option.name));
   }
   return missing;
+}
+
+std::string CompleteToml(Config config) {
+  if (!config.model.empty()) config.model = fs::absolute(config.model).string();
+  return ConfigToml(std::move(config), false);
 }
 
 Config ReadRunConfig(const fs::path& run, const std::vector<FlagValue>& flags) {
@@ -218,9 +244,13 @@ std::string PlantText(const Plant& plant) {
 std::vector<std::pair<std::string, std::string>> NamedAgents() {
   std::vector<std::pair<std::string, std::string>> names;
   for (const NamedAgent& agent : EmbeddedAgents()) {
-    // The first line of the file is a comment that says what it is.
-    const std::string_view first_line = agent.toml.substr(0, agent.toml.find('\n'));
-    names.emplace_back(agent.name, Trim(first_line.substr(first_line.find_first_not_of("# "))));
+    // The file begins with a comment that says what it is.
+    std::vector<std::string> comment;
+    for (const std::string_view line : Split(agent.toml, '\n')) {
+      if (!line.starts_with('#')) break;
+      comment.emplace_back(Trim(line.substr(1)));
+    }
+    names.emplace_back(agent.name, Join(comment, " "));
   }
   return names;
 }

@@ -57,8 +57,9 @@ struct FlagValue {
 /// Sets what the flags say. Throws BadInput.
 void SetFlags(const Options& options, const std::vector<FlagValue>& flags);
 
-/// Builds the settings in their order: defaults < named agent < configuration file (none if empty)
-/// < flags; a model file's plant counts as defaults. Throws BadInput.
+/// Builds the settings in their order: defaults < named agent < configuration file (none if empty,
+/// standard input if `-`) < flags; a model file's plant counts as defaults. Throws BadInput, also
+/// if they cannot be together.
 Config BuildConfig(const std::filesystem::path& file, const std::vector<FlagValue>& flags);
 
 /// The same of a configuration file's text; `file` names it, and a model of it counts from its
@@ -91,6 +92,9 @@ std::vector<Option> TrainingSettings(Config& config);
 
 /// The settings as TOML; without those that do not make another run of it, if `identity_only`.
 std::string ConfigToml(Config config, bool identity_only);
+
+/// The same with comments, for a file that may lie anywhere: the model's path is absolute.
+std::string CompleteToml(Config config);
 
 /// Name and value of each parameter of a plant.
 std::vector<std::pair<std::string, double>> PlantValues(Plant plant);

@@ -18,10 +18,9 @@ namespace upswing {
 namespace {
 
 struct EvalArguments {
-  std::string policy, model, physics = "mujoco";
+  std::string policy, model, physics;
   std::vector<std::string> set;
-  int episodes = 100, threads = 0;
-  int64_t seed = 0;
+  int64_t episodes, threads, seed;
   bool as_json = false;
   std::vector<FlagValue> flags;
 };
@@ -133,7 +132,7 @@ int RunEval(const EvalArguments& arguments) {
   config.plants = {plant};
   config.disturbances = {trial.disturbance};
   config.randomization = trial.randomization;
-  config.num_envs = arguments.episodes;
+  config.num_envs = static_cast<int>(arguments.episodes);
   config.episode_seconds = kEvaluationSeconds;
   config.seed = static_cast<uint64_t>(arguments.seed);
   config.stream = "evaluation";
@@ -143,7 +142,7 @@ int RunEval(const EvalArguments& arguments) {
 
   Evaluation evaluation;
   {
-    EpisodeProgress progress(arguments.episodes, arguments.as_json);
+    EpisodeProgress progress(static_cast<double>(arguments.episodes), arguments.as_json);
     evaluation = Evaluate(loaded.policy, env, &pool, [&](double share) { progress.Show(share); });
   }
   if (arguments.as_json) {
@@ -160,14 +159,12 @@ void AddEval(CLI::App& program, Command& command) {
   CLI::App* app = program.add_subcommand("eval", "Judge a policy over many episodes");
   auto a = std::make_shared<EvalArguments>();
   AddPolicy(*app, a->policy)->required();
-  app->add_option("--episodes", a->episodes, "how many [100]")
-      ->check(CLI::Range(1, 1000000).description(""))
-      ->type_name("INTEGER");
+  Options own;
+  own.Add(&a->episodes, "episodes", 100, {1, 1000000}, "", "how many");
+  AddArguments(*app, own);
   AddSeed(*app, a->seed, "the start states");
   AddPlantOptions(*app, a->set, a->model);
-  app->add_option("--physics", a->physics,
-                  "engine: mujoco, or closed-form, its faster twin [mujoco]")
-      ->type_name("TEXT");
+  AddPhysics(*app, a->physics, "mujoco");
   Trial defaults;
   AddSettings(*app, OptionsOf(defaults), a->flags);
   AddThreads(*app, a->threads);

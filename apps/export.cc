@@ -5,8 +5,8 @@
 #include <memory>
 
 #include "apps/commands.h"
+#include "apps/streams.h"
 #include "core/error.h"
-#include "core/file.h"
 #include "core/text.h"
 
 namespace upswing {
@@ -28,12 +28,7 @@ int RunExport(const ExportArguments& a) {
     if (!a.policies.empty() || !a.id.empty()) {
       throw BadInput("--test-vectors: expected no policy and no --id, for it is of the task alone");
     }
-    const std::string vectors = TestVectorsJson();
-    if (a.test_vectors == "-") {
-      fmt::print("{}", vectors);
-    } else {
-      WriteFileAtomically(a.test_vectors, vectors);
-    }
+    WriteOutput(a.test_vectors, TestVectorsJson());
     return 0;
   }
   if (a.policies.empty()) throw BadInput("--page: expected policies or run folders, got none");
@@ -61,8 +56,8 @@ void AddExport(CLI::App& program, Command& command) {
       ->type_name("ID")
       ->check(NotEmpty());
   app->add_option("--test-vectors", a->test_vectors,
-                  "JSON file to write: states, and what the task's formulas make of them (-: "
-                  "standard output)")
+                  "JSON file to write: states, and what the task's formulas make of them; -: "
+                  "standard output")
       ->type_name("FILE")
       ->check(NotEmpty());
   app->footer(

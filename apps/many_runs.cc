@@ -136,7 +136,7 @@ std::vector<std::string> ArgumentsOf(const SeedRun& run) {
 /// The processes, as many at a time as there are jobs.
 class Scheduler {
  public:
-  Scheduler(std::vector<SeedRun>& runs, int jobs, ManyRunsView& view)
+  Scheduler(std::vector<SeedRun>& runs, int64_t jobs, ManyRunsView& view)
       : jobs_(static_cast<size_t>(jobs)), view_(view) {
     for (SeedRun& run : runs) {
       if (!run.finished() && run.problem.empty()) waiting_.push_back(&run);

@@ -25,7 +25,7 @@ struct ManyRuns {
   std::pair<std::string, std::string> mark;  // name and text of the file that says what FOLDER is
   std::vector<Variant> variants;
   std::vector<int64_t> seeds;
-  int jobs = 1;             // runs at a time
+  int64_t jobs = 1;         // runs at a time
   bool more_steps = false;  // runs that made fewer steps may go on
   bool compared = false;    // a comparison follows when all are done
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "apps/config_checks.h"
 #include "apps/seeds.h"
 #include "core/sample.h"
 #include "core/text.h"
@@ -22,8 +23,8 @@ std::string DurationOrDash(double value) {
 
 void PrintRow(const std::string& name, double step, double seconds, double success, double reward,
               const std::string& remark) {
-  fmt::print("  {:<12} {:>11}  {:>12}  {:>6.0f}%  {:>8.0f}{}{}\n", name, CountOrDash(step),
-             DurationOrDash(seconds), 100 * success, reward, remark.empty() ? "" : "  ", remark);
+  Say("  {:<12} {:>11}  {:>12}  {:>6.0f}%  {:>8.0f}{}{}\n", name, CountOrDash(step),
+      DurationOrDash(seconds), 100 * success, reward, remark.empty() ? "" : "  ", remark);
 }
 
 }  // namespace
@@ -35,18 +36,24 @@ ManyRunsView::ManyRunsView(const ManyRuns& plan, const std::vector<SeedRun>& run
 
 void ManyRunsView::Announce() const {
   const size_t variants = plan_.variants.size();
-  fmt::print("Training {} in {}\n", Printable(plan_.what), Printable(plan_.folder.string()));
-  fmt::print("  {}seed{} {}: {} run{}, {} at a time\n",
-             variants == 1 ? "" : fmt::format("{} variants, ", variants),
-             plan_.seeds.size() == 1 ? "" : "s", SeedsText(plan_.seeds), runs_.size(),
-             runs_.size() == 1 ? "" : "s", plan_.jobs);
+  Say("Training {} in {}\n", Printable(plan_.what), Printable(plan_.folder.string()));
+  Say("  {}seed{} {}: {} run{}, {} at a time\n",
+      variants == 1 ? "" : fmt::format("{} variants, ", variants),
+      plan_.seeds.size() == 1 ? "" : "s", SeedsText(plan_.seeds), runs_.size(),
+      runs_.size() == 1 ? "" : "s", plan_.jobs);
+  for (const Variant& variant : plan_.variants) {
+    for (const std::string& warning : Warnings(variant.config)) {
+      Say("  Warning: {}{}{}\n", Printable(variant.name), variant.name.empty() ? "" : ": ",
+          warning);
+    }
+  }
   const auto begun = std::ranges::count_if(runs_, [](const SeedRun& run) { return !!run.state; });
   if (begun > 0) {
     const size_t done = Measure().done;
-    fmt::print("  {} done before, going on with {}\n", done, static_cast<size_t>(begun) - done);
+    Say("  {} done before, going on with {}\n", done, static_cast<size_t>(begun) - done);
   }
   for (const SeedRun& run : runs_) {
-    if (!run.problem.empty()) fmt::print("  {:<20} failed: {}\n", run.name, Printable(run.problem));
+    if (!run.problem.empty()) Say("  {:<20} failed: {}\n", run.name, Printable(run.problem));
   }
   std::fflush(stdout);
 }
@@ -104,7 +111,7 @@ void ManyRunsView::PrintEnd(const SeedRun& run) {
 }
 
 void ManyRunsView::PrintTable(const Variant& variant) const {
-  fmt::print("\n{}\n", Printable(variant.name.empty() ? plan_.what : variant.name));
+  Say("\n{}\n", Printable(variant.name.empty() ? plan_.what : variant.name));
   std::vector<double> steps, seconds, success, reward;
   size_t solved = 0;
   size_t not_judged = 0, failed = 0;
@@ -115,8 +122,7 @@ void ManyRunsView::PrintTable(const Variant& variant) const {
       continue;
     }
     if (steps.empty()) {
-      fmt::print("  {:<12} {:>11}  {:>12}  {:>7}  {:>8}\n", "", "solved at", "after", "success",
-                 "return");
+      Say("  {:<12} {:>11}  {:>12}  {:>7}  {:>8}\n", "", "solved at", "after", "success", "return");
     }
     const TrainState& s = *run.state;
     solved += s.solved ? 1 : 0;
@@ -136,23 +142,23 @@ void ManyRunsView::PrintTable(const Variant& variant) const {
              fmt::format("{} of {} solved", solved, steps.size()));
   }
   if (not_judged > 0) {
-    fmt::print("  {} run{} not judged yet\n", not_judged, not_judged == 1 ? "" : "s");
+    Say("  {} run{} not judged yet\n", not_judged, not_judged == 1 ? "" : "s");
   }
-  if (failed > 0) fmt::print("  {} run{} failed\n", failed, failed == 1 ? "" : "s");
+  if (failed > 0) Say("  {} run{} failed\n", failed, failed == 1 ? "" : "s");
 }
 
 void ManyRunsView::Summarize(bool stopped) {
   line_.Clear();
   for (const Variant& variant : plan_.variants) PrintTable(variant);
   const size_t done = Measure().done;
-  fmt::print("\nSuccess and return are those of each run's best policy at evaluation.\n");
+  Say("\nSuccess and return are those of each run's best policy at evaluation.\n");
   if (stopped) {
-    fmt::print("Stopped, {} of {} runs done; the same command goes on.\n", done, runs_.size());
+    Say("Stopped, {} of {} runs done; the same command goes on.\n", done, runs_.size());
   }
   const bool can_be_typed = Printable(plan_.folder.string()) == plan_.folder.string();
   if (can_be_typed && (done < runs_.size() || !plan_.compared)) {
-    fmt::print("Next:\n  ./upswing compare {}{}\n", ShellQuoted(plan_.folder.string()),
-               done < runs_.size() ? " --unfinished" : "");
+    Say("Next:\n  ./upswing compare {}{}\n", ShellQuoted(plan_.folder.string()),
+        done < runs_.size() ? " --unfinished" : "");
   }
   std::fflush(stdout);
 }

@@ -26,12 +26,11 @@ using Clock = std::chrono::steady_clock;
 constexpr int64_t kMostEpisodes = 10000000;
 
 struct MapArguments {
-  std::string policy, x = "mass2=-50%:+50%", y = "length2=-50%:+50%", physics = "closed-form", out;
+  std::string policy, x = "mass2=-50%:+50%", y = "length2=-50%:+50%", physics, out;
   std::vector<std::string> set;
-  std::optional<int> episodes;
-  int threads = 0;
-  int64_t seed = 0;
-  double check = 0.02;
+  int64_t episodes;  // 0: not given
+  int64_t threads, seed;
+  double check;
   bool as_json = false;
 };
 
@@ -70,7 +69,8 @@ MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded) {
   }
   config.start_given |= config.x.start || config.y.start;
   // From one start each episode is the same, unless there is noise.
-  config.episodes = a.episodes.value_or(config.start_given ? 1 : 10);
+  const int usual = config.start_given ? 1 : 10;
+  config.episodes = a.episodes > 0 ? static_cast<int>(a.episodes) : usual;
   config.physics = ParsePhysics(a.physics, "--physics");
   config.seed = static_cast<uint64_t>(a.seed);
   if (config.cells() * config.episodes > kMostEpisodes) {
@@ -128,19 +128,16 @@ void AddMap(CLI::App& program, Command& command) {
   constexpr const char* kAxis = "NAME=FROM:TO[:CELLS]";
   app->add_option("--x", a->x, "horizontal axis [mass2=-50%:+50%:31]")->type_name(kAxis);
   app->add_option("--y", a->y, "vertical axis [length2=-50%:+50%:31]")->type_name(kAxis);
-  app->add_option("--episodes", a->episodes, "in a cell [10, or 1 where the start is given]")
-      ->check(CLI::Range(1, 100000).description(""))
-      ->type_name("INTEGER");
+  Options own;
+  own.Add(&a->episodes, "episodes", 0, {1, 100000}, "", "in a cell").usual =
+      "10, or 1 where the start is given";
+  own.Add(&a->check, "check", 0.02, kUnit, "", "share of the cells to do again in MuJoCo");
+  AddArguments(*app, own);
   app->add_option("--set", a->set, "what the axes leave alone, such as gravity=9.7 (repeatable)")
       ->type_name("NAME=VALUE")
       ->take_all()
       ->allow_extra_args(false);
-  app->add_option("--physics", a->physics,
-                  "engine: closed-form, or mujoco, far slower [closed-form]")
-      ->type_name("TEXT");
-  app->add_option("--check", a->check, "share of the cells to do again in MuJoCo [0.02]")
-      ->check(CLI::Range(0.0, 1.0).description(""))
-      ->type_name("SHARE");
+  AddPhysics(*app, a->physics, "closed-form");
   app->add_option("--out", a->out, "new folder for map.csv, map.svg and map.png [map-X-Y]")
       ->type_name("FOLDER")
       ->check(NotEmpty());

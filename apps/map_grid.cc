@@ -157,8 +157,13 @@ MapAxis ParseMapAxis(const std::string& text, const MapPoint& training, const st
   const size_t equals = text.find('=');
   const auto pieces = Split(std::string_view(text).substr(std::min(equals, text.size())), ':');
   if (equals == std::string::npos || pieces.size() < 2 || pieces.size() > 3) {
-    throw BadInput(
-        Concat(where, ": expected NAME=FROM:TO or NAME=FROM:TO:CELLS, got \"", text, "\""));
+    std::vector<std::string> names;
+    MapPoint point;
+    const Options options = OptionsOf(point);
+    for (const Option& option : options.all()) names.push_back(option.name);
+    for (const auto& alias : options.aliases()) names.push_back(alias.name);
+    throw BadInput(Concat(where, ": expected NAME=FROM:TO or NAME=FROM:TO:CELLS, got \"", text,
+                          "\"; the names are ", Join(names, ", ")));
   }
   MapAxis axis;
   axis.name = Trim(std::string_view(text).substr(0, equals));

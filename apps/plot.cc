@@ -24,9 +24,9 @@ namespace {
 namespace fs = std::filesystem;
 
 struct PlotArguments {
-  std::string policy, start = "0,0,0,0", out = "plot", model, physics = "mujoco";
+  std::string policy, start = "0,0,0,0", out = "plot", model, physics;
   std::vector<std::string> set;
-  double seconds = 10;
+  double seconds;
 };
 
 using Rows = std::vector<RolloutRow>;
@@ -256,12 +256,11 @@ void AddPlot(CLI::App& program, Command& command) {
   auto a = std::make_shared<PlotArguments>();
   AddPolicy(*app, a->policy)->required();
   AddStart(*app, a->start);
-  app->add_option("--seconds", a->seconds, "how long [10]")
-      ->check(CLI::Range(0.1, 1000.0).description(""))
-      ->type_name("SECONDS");
+  Options own;
+  own.Add(&a->seconds, "seconds", 10, {0.1, 1000}, "s", "how long").step = kControlPeriod;
+  AddArguments(*app, own);
   AddPlantOptions(*app, a->set, a->model);
-  app->add_option("--physics", a->physics, "engine: mujoco, or closed-form, its twin [mujoco]")
-      ->type_name("TEXT");
+  AddPhysics(*app, a->physics, "mujoco");
   app->add_option("--out", a->out, "new folder for the figures [plot]")
       ->type_name("FOLDER")
       ->check(NotEmpty());

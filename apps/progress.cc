@@ -35,7 +35,7 @@ void ProgressLine::Show(double share, const std::vector<std::string>& fields) {
     if (line.size() + 2 + field.size() > width) break;
     line += "  " + field;
   }
-  fmt::print("\r\x1b[K{}", line);
+  Say("\r\x1b[K{}", line);
   std::fflush(stdout);
   shown_ = true;
   last_ = Clock::now();
@@ -43,12 +43,12 @@ void ProgressLine::Show(double share, const std::vector<std::string>& fields) {
 
 void ProgressLine::Print(const std::string& line) {
   Clear();
-  fmt::print("{}\n", line);
+  Say("{}\n", line);
   std::fflush(stdout);
 }
 
 void ProgressLine::Clear() {
-  if (shown_) fmt::print("\r\x1b[K");
+  if (shown_) Say("\r\x1b[K");
   std::fflush(stdout);
   shown_ = false;
   last_ = {};

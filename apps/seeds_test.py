@@ -218,7 +218,7 @@ class SeedsTest(ProgramTest):
             with self.subTest(seeds=text):
                 self.refuse([*small(**TINY), f"--seeds={text}"], "--seeds: expected", words,
                             f'got "{text}"')
-        self.refuse([*small(**TINY), "--seeds", ""], "empty")
+        self.refuse([*small(**TINY), "--seeds", ""], "--seeds: expected a number of seeds")
 
     def test_what_does_not_go_together(self):
         self.refuse([*small(**TINY), "--seeds", "2", "--seed", "3"], "--seeds", "--seed")

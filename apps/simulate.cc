@@ -8,24 +8,25 @@
 #include "apps/config.h"
 #include "apps/loaded_policy.h"
 #include "apps/rollout.h"
+#include "apps/streams.h"
 #include "core/csv.h"
 #include "core/error.h"
-#include "core/file.h"
 #include "core/text.h"
 
 namespace upswing {
 namespace {
 
 struct SimulateArguments {
-  std::string policy, torque, start = "0,0,0,0", csv, model, physics = "mujoco";
+  std::string policy, torque, start = "0,0,0,0", csv = "-", model, physics;
   std::vector<std::string> set;
-  std::optional<double> seconds;
+  double seconds;  // negative: not given
 };
 
 /// The column `torque` of a CSV file. Throws BadInput with the line.
 std::vector<double> ReadTorqueFile(const std::string& path) {
-  std::vector<double> torques = ReadCsv(ReadTextFile(path), {"torque"}, path).front().values;
-  if (torques.empty()) throw BadInput(Concat(path, ": expected rows of torques, got none"));
+  const std::string where = InputName(path);
+  std::vector<double> torques = ReadCsv(ReadInput(path), {"torque"}, where).front().values;
+  if (torques.empty()) throw BadInput(Concat(where, ": expected rows of torques, got none"));
   return torques;
 }
 
@@ -50,12 +51,12 @@ int RunSimulate(const SimulateArguments& a) {
 
   // As many steps as were asked for, or as the schedule has rows.
   const double scheduled = static_cast<double>(config.schedule.size()) * kControlPeriod;
-  config.seconds = a.seconds.value_or(config.schedule.empty() ? 20.0 : scheduled);
-  if (!std::isfinite(config.seconds)) throw BadInput("--seconds: expected a finite number");
+  const double usual = config.schedule.empty() ? 20 : scheduled;
+  config.seconds = a.seconds < 0 ? usual : a.seconds;
   if (!config.schedule.empty() &&
       RolloutSteps(config.seconds) > static_cast<int64_t>(config.schedule.size())) {
     throw BadInput(Concat("--seconds: expected at most ", FormatNumber(scheduled), ", for which ",
-                          a.torque, " has torques, got ", FormatNumber(config.seconds)));
+                          InputName(a.torque), " has torques, got ", FormatNumber(config.seconds)));
   }
 
   if (loaded) {
@@ -71,12 +72,8 @@ int RunSimulate(const SimulateArguments& a) {
       "t,qpos0,qpos1,qvel0,qvel1,torque,energy,height,inverted,reward,energy_reward,height_reward,"
       "balance_reward,velocity_penalty,torque_penalty\n";
   for (const RolloutRow& row : rows) csv += CsvRow(row);
-  if (a.csv.empty()) {
-    fmt::print("{}", csv);
-  } else {
-    WriteFileAtomically(a.csv, csv);
-    fmt::print("{}: {} rows\n", a.csv, rows.size());
-  }
+  WriteOutput(a.csv, csv);
+  if (!IsStandardStream(a.csv)) fmt::print("{}: {} rows\n", a.csv, rows.size());
   return 0;
 }
 
@@ -88,17 +85,18 @@ void AddSimulate(CLI::App& program, Command& command) {
   auto a = std::make_shared<SimulateArguments>();
   AddPolicy(*app, a->policy);
   app->add_option("--torque", a->torque,
-                  "CSV file with a column `torque` (N·m), a row for each 0.02 s")
+                  "CSV file with a column `torque` (N·m), a row for each 0.02 s; -: standard input")
       ->type_name("FILE")
       ->check(NotEmpty());
   AddStart(*app, a->start);
-  app->add_option("--seconds", a->seconds, "how long [20, or as long as the torques last]")
-      ->check(CLI::Range(0.0, 1e5).description(""))
-      ->type_name("SECONDS");
+  Options own;
+  Option& seconds = own.Add(&a->seconds, "seconds", -1, {0, 1e5}, "s", "how long");
+  seconds.step = kControlPeriod;
+  seconds.usual = "20, or as long as the torques last";
+  AddArguments(*app, own);
   AddPlantOptions(*app, a->set, a->model);
-  app->add_option("--physics", a->physics, "engine: mujoco, or closed-form, its twin [mujoco]")
-      ->type_name("TEXT");
-  app->add_option("--csv", a->csv, "file to write [standard output]")
+  AddPhysics(*app, a->physics, "mujoco");
+  app->add_option("--csv", a->csv, "file to write; -: standard output [-]")
       ->type_name("FILE")
       ->check(NotEmpty());
   app->footer(

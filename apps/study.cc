@@ -4,6 +4,7 @@
 
 #include "apps/commands.h"
 #include "apps/compare.h"
+#include "apps/config_checks.h"
 #include "apps/many_runs.h"
 #include "apps/seeds.h"
 #include "apps/study_file.h"
@@ -20,7 +21,7 @@ namespace fs = std::filesystem;
 /// What was typed.
 struct StudyArguments {
   std::string file, out, seeds;
-  int jobs = 0;  // 0: as many as there are processors
+  int64_t jobs = 0;  // 0: as many as there are processors
 };
 
 /// Throws if the folder is that of another study, which this one would take the place of: it has
@@ -61,6 +62,7 @@ ManyRuns ReadStudy(const StudyArguments& arguments) {
   }
   plan.jobs = arguments.jobs;
   if (plan.jobs == 0) plan.jobs = DefaultJobs(plan.variants.front().config.train.threads);
+  for (const Variant& variant : plan.variants) CheckMemory(variant.config, plan.jobs);
   return plan;
 }
 

@@ -88,6 +88,13 @@ void CheckKeys(const toml::table& study, const std::string& where) {
   for (const auto& [key, node] : study) {
     const std::string name(key.str());
     if (std::ranges::find(known, name) != known.end()) continue;
+    Config scratch;
+    const bool is_setting = std::ranges::any_of(
+        OptionsOf(scratch).all(), [&](const Option& option) { return option.name == name; });
+    if (is_setting && name != "seed") {
+      throw BadInput(Concat(PlaceOf(node, where), ": ", name, ": belongs in [settings] or in a ",
+                            "[variants.NAME]: expected it below such a line"));
+    }
     throw BadInput(Concat(PlaceOf(node, where), ": a study has no \"", name, "\"",
                           DidYouMean(name, known), "; there are ", Join(known, ", ")));
   }

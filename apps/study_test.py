@@ -191,7 +191,7 @@ class StudyTest(ProgramTest):
             with self.subTest(text=text):
                 self.refuse_study(text, *words)
         self.refuse(["study", "none.toml"], "none.toml")
-        self.refuse(["study"], "file")
+        self.refuse(["study"], "study: expected FILE.toml")
 
     def test_the_studies_of_the_project_can_be_run(self):
         studies = sorted((ROOT / "configs/studies").glob("*.toml"))

@@ -70,7 +70,12 @@ std::vector<FlagValue> ApplyTable(const Options& options, const toml::table& tab
       settings.push_back(ApplyNode(options, "", key, node, where));
       continue;
     }
-    if (section == nullptr || std::ranges::find(sections, key) == sections.end()) {
+    if (section == nullptr) {
+      const Option& option = *options.Find(key, PlaceOf(node, where)).front();
+      throw BadInput(Concat(PlaceOf(node, where), ": ", key, ": belongs in [", option.section,
+                            "]: expected it below such a line, got it in no section"));
+    }
+    if (std::ranges::find(sections, key) == sections.end()) {
       throw BadInput(Concat(PlaceOf(node, where), ": no section is called [", key, "]",
                             DidYouMean(key, sections)));
     }

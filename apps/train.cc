@@ -11,14 +11,16 @@
 
 #include "apps/commands.h"
 #include "apps/config.h"
+#include "apps/config_checks.h"
+#include "apps/help.h"
 #include "apps/loaded_policy.h"
 #include "apps/many_runs.h"
+#include "apps/run_log.h"
 #include "apps/seeds.h"
 #include "apps/signals.h"
 #include "apps/train_view.h"
 #include "core/error.h"
 #include "core/file.h"
-#include "core/simd.h"
 #include "core/text.h"
 
 namespace upswing {
@@ -33,7 +35,8 @@ constexpr std::string_view kCheckpointFormat = "upswing-checkpoint-1";
 /// What was typed.
 struct TrainArguments {
   std::string config, out, resume, seeds;
-  int jobs = 0;  // 0: as many as there are processors
+  int64_t jobs = 0;  // 0: as many as there are processors
+  bool print_config = false;
   std::vector<FlagValue> flags;
 };
 
@@ -142,15 +145,16 @@ fs::path MakeRun(const TrainArguments& arguments, Parts& parts) {
 
 /// Goes on with a run from its checkpoint, where a new one begins too. Returns the exit code.
 int TrainRun(const fs::path& path, Parts& parts, bool resuming, bool steps_given) {
-  const TensorFile checkpoint = TensorFile::Load(RunFolder::CheckpointPath(path));
-  CheckCheckpoint(checkpoint, parts.config);
-  CheckpointState(Archive::Loader(checkpoint), parts.agent, parts.env, parts.state);
+  auto checkpoint = std::make_optional(TensorFile::Load(RunFolder::CheckpointPath(path)));
+  CheckCheckpoint(*checkpoint, parts.config);
+  CheckpointState(Archive::Loader(*checkpoint), parts.agent, parts.env, parts.state);
   if (resuming && steps_given && parts.config.train.steps < parts.state.steps) {
     throw BadInput(Concat("--steps: the run is at step ", parts.state.steps,
                           " already; expected at least that in all, got ",
                           parts.config.train.steps));
   }
-  RunFolder run(path, checkpoint);
+  RunFolder run(path, *checkpoint);
+  checkpoint.reset();  // as large as the training itself
   if (resuming) WriteFileAtomically(path / "config.toml", ConfigToml(parts.config, false));
 
   Training training{parts.config.train, parts.agent, parts.env, run};
@@ -162,8 +166,8 @@ int TrainRun(const fs::path& path, Parts& parts, bool resuming, bool steps_given
   view.Follow(training);
 
   view.Announce(parts.config, parts.pool.threads(), parts.agent.online().size(), path);
-  run.Log(Concat(parts.state.steps > 0 ? "resumed" : "started", " at step ", parts.state.steps,
-                 ", vector instructions ", SimdPath()));
+  const WorkClock clock;
+  run.Log(BeginLine(parts.state.steps > 0, parts.state.steps, parts.pool.threads()));
   bool finished = false;
   try {
     finished = Train(training, parts.state);
@@ -171,8 +175,8 @@ int TrainRun(const fs::path& path, Parts& parts, bool resuming, bool steps_given
     LogIfPossible(run, error.what());
     throw;
   }
-  run.Log(Concat(finished ? "finished" : "stopped", " at step ", parts.state.steps));
-  view.Summarize(parts.state, path, finished);
+  run.Log(EndLine(finished, parts.state.steps, parts.pool.threads(), clock));
+  view.Summarize(parts.state, parts.config.train, path, finished);
   return finished ? 0 : 128 + StopSignal();
 }
 
@@ -192,10 +196,20 @@ int RunSeeds(const TrainArguments& arguments) {
   plan.seeds = ParseSeeds(arguments.seeds, "--seeds");
   plan.jobs = arguments.jobs > 0 ? arguments.jobs : DefaultJobs(config.train.threads);
   plan.more_steps = StepsGiven(arguments);
+  CheckMemory(config, plan.jobs);
   return TrainMany(plan);
 }
 
+/// Prints the settings that the training would have.
+int PrintConfig(const TrainArguments& arguments) {
+  const Config config = arguments.resume.empty() ? BuildConfig(arguments.config, arguments.flags)
+                                                 : ReadRunConfig(arguments.resume, arguments.flags);
+  fmt::print("{}", CompleteToml(config));
+  return 0;
+}
+
 int RunTrain(const TrainArguments& arguments) {
+  if (arguments.print_config) return PrintConfig(arguments);
   if (!arguments.seeds.empty()) return RunSeeds(arguments);
   const bool resuming = !arguments.resume.empty();
   fs::path path = arguments.resume;
@@ -209,6 +223,7 @@ int RunTrain(const TrainArguments& arguments) {
   Config config = resuming ? ReadRunConfig(path, arguments.flags)
                            : BuildConfig(arguments.config, arguments.flags);
   if (!config.mjcf.empty()) config.model = kModelCopy;
+  CheckMemory(config);
   Parts parts(config, ResolveThreads(config.train.threads));
   InstallSignalHandlers();  // from here on what is begun is ended in order
   if (!resuming) {
@@ -230,6 +245,30 @@ void CheckManyArguments(const CLI::App& app) {
   }
 }
 
+/// In --help the defaults are those of the agent and the configuration file that were given.
+void ShowDefaultsOfWhatIsChosen(CLI::App& app) {
+  const auto last_of = [&](const char* flag) -> std::string {
+    const std::vector<std::string> values = app.get_option(flag)->results();
+    return values.empty() ? "" : values.back();
+  };
+  std::vector<FlagValue> flags;
+  if (const std::string agent = last_of("--agent"); !agent.empty()) flags = {{"agent", agent}};
+  Config config = BuildConfig(last_of("--config"), flags);
+  ShowDefaults(app, OptionsOf(config));
+}
+
+/// The named agents, a paragraph each.
+std::string AgentsText() {
+  std::string text =
+      "Defaults are those of the agent (and file) given: train --agent fast --help.\n\n"
+      "Named agents:\n";
+  constexpr size_t kIndent = 20;
+  for (const auto& [name, what] : NamedAgents()) {
+    text += fmt::format("  {:<18}{}\n", name, WrapText(what, kHelpColumns, kIndent));
+  }
+  return text;
+}
+
 }  // namespace
 
 void AddTrain(CLI::App& program, Command& command) {
@@ -240,29 +279,33 @@ void AddTrain(CLI::App& program, Command& command) {
                   "with --seeds the folder of all of them [runs/AGENT]")
       ->type_name("FOLDER")
       ->check(NotEmpty());
-  app->add_option("--config", arguments->config, "TOML file of settings; flags override it")
+  app->add_option("--config", arguments->config,
+                  "TOML file of settings, - for standard input; flags override it")
       ->type_name("FILE")
       ->check(NotEmpty());
   app->add_option("--resume", arguments->resume,
                   "go on where a run stopped; --steps, --threads, --checkpoint-every and\n"
-                  "--stop-when-solved may be given anew")
+                  "--stop-when-solved may be given anew; a run that is solved goes on with "
+                  "--no-stop-when-solved")
       ->type_name("RUN")
       ->check(NotEmpty());
+  app->add_flag("--print-config", arguments->print_config,
+                "print the settings that it would have, as a TOML file for --config, and end")
+      ->disable_flag_override();
   AddManyOptions(*app, arguments->seeds, arguments->jobs);
   Config defaults;
   AddSettings(*app, OptionsOf(defaults), arguments->flags);
-
-  std::string agents = "Named agents:\n";
-  for (const auto& [name, what] : NamedAgents()) agents += fmt::format("  {:<18}{}\n", name, what);
+  app->formatter(std::make_shared<HelpFormatter>([app] { ShowDefaultsOfWhatIsChosen(*app); }));
   app->footer(
-      agents +
+      AgentsText() +
       "\nExamples:\n"
       "  ./upswing train                                  the default agent, until solved\n"
       "  ./upswing train --agent dqn --seed 3 --out runs/a\n"
       "  ./upswing train --gamma 0.98 --hidden 128,128    any setting as a flag\n"
       "  ./upswing train --mass2 1.2 --no-stop-when-solved --steps 500000\n"
       "  ./upswing train --randomize 0.25 --delay 0.02    each episode another plant\n"
-      "  ./upswing train --resume runs/a --steps 2000000  go on, from any moment\n"
+      "  ./upswing train --resume runs/a --no-stop-when-solved --steps 2000000   go on\n"
+      "  ./upswing train --agent fast --print-config > my.toml   then edit, and train --config\n"
       "  ./upswing train --seeds 10                       in runs/d3qn/seed1 to seed10, in\n"
       "                                                   parallel; the same command goes on\n"
       "  ./upswing train --seeds 3,5,8-12 --jobs 2 --out runs/many\n"

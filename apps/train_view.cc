@@ -6,12 +6,14 @@
 #include <cstdio>
 #include <optional>
 
+#include "apps/config_checks.h"
 #include "apps/model_info.h"
 
 namespace upswing {
 
 TrainView::TrainView(const TrainState& state, const AgentReport& report)
-    : report_(report),
+    : begin_step_(state.steps),
+      report_(report),
       since_step_(state.steps),
       since_updates_(report.updates),
       since_seconds_(state.seconds) {}
@@ -19,17 +21,24 @@ TrainView::TrainView(const TrainState& state, const AgentReport& report)
 void TrainView::Announce(const Config& config, int threads, size_t num_parameters,
                          const std::filesystem::path& run) const {
   const DqnConfig& d = config.dqn;
-  fmt::print("Training {} (seed {}) in {}\n", config.agent, config.train.seed, run.string());
-  fmt::print("  {}{} network {}{}, {} parameters; {} environments, {} thread{}\n",
-             d.double_q ? "double, " : "", d.dueling ? "dueling" : "plain",
-             fmt::join(d.hidden, "-"), d.dueling ? fmt::format(" with heads of {}", d.head) : "",
-             FormatCount(num_parameters), config.train.envs, threads, threads == 1 ? "" : "s");
+  Say("Training {} (seed {}) in {}\n", config.agent, config.train.seed, run.string());
+  Say("  {}{} network {}{}, {} parameters; {} environments, {} thread{}\n",
+      d.double_q ? "double, " : "", d.dueling ? "dueling" : "plain", fmt::join(d.hidden, "-"),
+      d.dueling ? fmt::format(" with heads of {}", d.head) : "", FormatCount(num_parameters),
+      config.train.envs, threads, threads == 1 ? "" : "s");
   if (config.physics != PhysicsNames().front() || d.precision != "float32") {
-    fmt::print("  physics {}, products in {}\n", config.physics, d.precision);
+    Say("  physics {}, products in {}\n", config.physics, d.precision);
   }
   const std::optional<ModelInfo> model = InfoOfModel(config.mjcf, config.model);
-  if (model) fmt::print("  model {}\n", model->Text());
-  if (since_step_ > 0) fmt::print("  going on from step {}\n", FormatCount(since_step_));
+  if (model) Say("  model {}\n", model->Text());
+  const TrainingSize size = SizeOf(config);
+  constexpr double kGigabyte = 1e9;
+  if (size.memory > kGigabyte) {
+    Say("  up to {:.1f} GB of memory, and {:.1f} GB for the checkpoint on disk\n",
+        size.memory / kGigabyte, size.checkpoint / kGigabyte);
+  }
+  for (const std::string& warning : Warnings(config)) Say("  Warning: {}\n", warning);
+  if (since_step_ > 0) Say("  going on from step {}\n", FormatCount(since_step_));
   std::fflush(stdout);
 }
 
@@ -87,29 +96,42 @@ std::string TrainView::LossText() const {
   return report_.updates == 0 ? "-" : fmt::format("{:.4f}", report_.loss);
 }
 
-void TrainView::Summarize(const TrainState& s, const std::filesystem::path& run, bool finished) {
+void TrainView::PrintOutcome(const TrainState& s, const TrainConfig& config, bool finished) const {
+  const bool did_nothing = begin_step_ > 0 && s.steps == begin_step_ && finished;
+  const bool all_steps_done = s.steps >= config.steps;
+  if (did_nothing && all_steps_done) {
+    Say("Nothing to do: all {} steps were done before (--steps: so many in all){}.\n",
+        FormatCount(config.steps), s.solved ? ", and it is solved" : "");
+  } else if (did_nothing) {
+    Say("Nothing to do: it was solved before, at step {} after {} of training, and stops when\n"
+        "solved. --no-stop-when-solved lets it go on to step {} (--steps).\n",
+        FormatCount(s.streak_step), FormatDuration(s.streak_seconds), FormatCount(config.steps));
+  } else if (s.solved) {
+    Say("Solved after {} of training, at step {} (training so far: {}, {} steps).\n",
+        FormatDuration(s.streak_seconds), FormatCount(s.streak_step), FormatDuration(s.seconds),
+        FormatCount(s.steps));
+  } else {
+    Say("{} at step {} after {} of training; not solved yet.\n", finished ? "Done" : "Stopped",
+        FormatCount(s.steps), FormatDuration(s.seconds));
+  }
+}
+
+void TrainView::Summarize(const TrainState& s, const TrainConfig& config,
+                          const std::filesystem::path& run, bool finished) {
   line_.Clear();
-  if (s.solved) {
-    fmt::print("Solved after {} of training, at step {} (training so far: {}, {} steps).\n",
-               FormatDuration(s.streak_seconds), FormatCount(s.streak_step),
-               FormatDuration(s.seconds), FormatCount(s.steps));
-  } else {
-    fmt::print("{} at step {} after {} of training; not solved yet.\n",
-               finished ? "Done" : "Stopped", FormatCount(s.steps), FormatDuration(s.seconds));
-  }
+  PrintOutcome(s, config, finished);
   if (s.best_step > 0) {
-    fmt::print("Best policy: {} (step {}, success {:.0f}%, return {:.0f})\n",
-               (run / "policy.safetensors").string(), FormatCount(s.best_step),
-               100 * s.best_success_rate, s.best_return);
-    fmt::print("Next:\n  ./upswing demo {0}\n  ./upswing eval {0}\n  ./upswing info {0}\n",
-               run.string());
+    Say("Best policy: {} (step {}, success {:.0f}%, return {:.0f})\n",
+        (run / "policy.safetensors").string(), FormatCount(s.best_step), 100 * s.best_success_rate,
+        s.best_return);
+    Say("Next:\n  ./upswing demo {0}\n  ./upswing eval {0}\n  ./upswing info {0}\n", run.string());
   } else {
-    fmt::print("Next:\n");
+    Say("Next:\n");
   }
-  const std::string how = !finished  ? ""
-                          : s.solved ? " --no-stop-when-solved"
-                                     : fmt::format(" --steps {}", 2 * s.steps);
-  fmt::print("  ./upswing train --resume {}{}\n", run.string(), how);
+  std::string how;
+  if (finished && s.solved && config.stop_when_solved) how += " --no-stop-when-solved";
+  if (finished && s.steps >= config.steps) how += fmt::format(" --steps {}", 2 * s.steps);
+  Say("  ./upswing train --resume {}{}\n", run.string(), how);
 }
 
 }  // namespace upswing

@@ -22,14 +22,19 @@ class TrainView {
   void Follow(Training& training);
 
   /// Says what came of it and what to type next. `finished`: nobody stopped it.
-  void Summarize(const TrainState& state, const std::filesystem::path& run, bool finished);
+  void Summarize(const TrainState& state, const TrainConfig& config,
+                 const std::filesystem::path& run, bool finished);
 
  private:
   void UpdateRates(const TrainState& state, const AgentReport& report);
   std::string LossText() const;
   void ShowProgress(const TrainState& state, int64_t steps_in_all);
 
+  /// Says where the training stands, in a sentence.
+  void PrintOutcome(const TrainState& state, const TrainConfig& config, bool finished) const;
+
   ProgressLine line_;
+  int64_t begin_step_;  // where this view's training began
   AgentReport report_;  // the last one
   /// The rate of updates as the lines show it.
   std::string UpdatesText() const;

@@ -7,6 +7,37 @@
 #include "core/text.h"
 
 namespace upswing {
+namespace {
+
+/// Where a cell ends that begins at `line[at]`: at a comma outside quotes, or at the line's end.
+size_t EndOfCell(std::string_view line, size_t at, const std::string& place) {
+  bool quoted = false;
+  for (; at < line.size() && (quoted || line[at] != ','); ++at) {
+    if (line[at] == '"') quoted = !quoted;  // two in a row leave it as it was
+  }
+  if (quoted) throw BadInput(Concat(place, "expected a quote that is closed, got \"", line, "\""));
+  return at;
+}
+
+/// The cells of a row, without blanks around them and without their quotes.
+std::vector<std::string> CellsOf(std::string_view line, const std::string& place) {
+  std::vector<std::string> cells;
+  for (size_t begin = 0; begin <= line.size();) {
+    const size_t end = EndOfCell(line, begin, place);
+    std::string_view cell = Trim(line.substr(begin, end - begin));
+    const bool quoted = cell.size() > 1 && cell.front() == '"' && cell.back() == '"';
+    if (quoted) cell = cell.substr(1, cell.size() - 2);
+    cells.emplace_back();
+    for (size_t i = 0; i < cell.size(); ++i) {
+      cells.back() += cell[i];
+      if (quoted && cell.substr(i, 2) == "\"\"") ++i;
+    }
+    begin = end + 1;
+  }
+  return cells;
+}
+
+}  // namespace
 
 std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::string>& names,
                                const std::string& where) {
@@ -15,11 +46,13 @@ std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::str
   std::vector<size_t> places;  // of the wanted columns in a row
   size_t width = 0;            // cells of a row; 0: the line of names is yet to come
   int line_number = 0;
+  constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
   for (const std::string_view line : Split(text, '\n')) {
     ++line_number;
     if (line.empty() || line.starts_with('#')) continue;
-    const std::vector<std::string_view> cells = Split(line, ',');
     const std::string place = Concat(where, ":", line_number, ": ");
+    const std::vector<std::string> cells = CellsOf(line, place);
     if (width == 0) {
       for (const std::string& name : names) {
         const auto found = std::ranges::find(cells, name);
@@ -35,7 +68,7 @@ std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::str
       throw BadInput(Concat(place, "expected ", width, " columns, got ", cells.size()));
     }
     for (size_t i = 0; i < places.size(); ++i) {
-      const std::string_view cell = cells[places[i]];
+      const std::string& cell = cells[places[i]];
       const auto number = ParseNumber(cell);
       if (!number || !std::isfinite(*number)) {
         throw BadInput(Concat(place, names[i], ": expected a finite number, got \"", cell, "\""));

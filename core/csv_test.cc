@@ -18,6 +18,18 @@ TEST(Csv, WantedColumnsInTheOrderOfTheQuestion) {
   EXPECT_TRUE(ReadCsv("a\n", {"a"}, "t.csv").front().values.empty());
 }
 
+TEST(Csv, AsSpreadsheetsAndLibrariesWriteIt) {
+  const auto values = [](std::string_view text) {
+    return ReadCsv(text, {"torque"}, "t.csv").front().values;
+  };
+  EXPECT_EQ(values("\xef\xbb\xbftorque\r\n1\r\n2\r\n"), (std::vector<double>{1, 2}));
+  EXPECT_EQ(values("\xef\xbb\xbf\"torque\",\"t\"\n\"1.5\",\"0\"\n"), (std::vector<double>{1.5}));
+  EXPECT_EQ(values("\"a, \"\"b\"\"\" , \"torque\"\n\"x,\"\"y,\",2\n,3\n"),
+            (std::vector<double>{2, 3}));
+  EXPECT_EQ(ReadCsv("\"a \"\"b\"\"\"\n4\n", {"a \"b\""}, "t.csv").front().values,
+            (std::vector<double>{4}));
+}
+
 /// What ReadCsv says of a text whose column b is wanted.
 std::string Complaint(std::string_view text) {
   try {
@@ -35,6 +47,8 @@ TEST(Csv, MessagesNameLineAndColumn) {
   EXPECT_EQ(Complaint("a,b\n# c\n1,x\n"), "t.csv:3: b: expected a finite number, got \"x\"");
   EXPECT_EQ(Complaint("a,b\n1,inf\n"), "t.csv:2: b: expected a finite number, got \"inf\"");
   EXPECT_EQ(Complaint("a,b\nx,1\n"), "none");
+  EXPECT_EQ(Complaint("a,b\n\"x,1\n"), "t.csv:2: expected a quote that is closed, got \"\"x,1\"");
+  EXPECT_EQ(Complaint("a,b\n1,\"\"\n"), "t.csv:2: b: expected a finite number, got \"\"");
 }
 
 }  // namespace

@@ -45,6 +45,13 @@ std::string RangeText(Range range) {
   return "";
 }
 
+/// ` (0 to 1)`, ` (0 to 1 in steps of 0.02)` and the like; empty where all numbers are allowed.
+std::string RangeInBrackets(Range range, double step) {
+  if (!std::isfinite(range.low) || !std::isfinite(range.high)) return "";
+  return Concat(" (", FormatNumber(range.low), " to ", FormatNumber(range.high),
+                step > 0 ? " in steps of " + FormatNumber(step) : "", ")");
+}
+
 bool Inside(double value, Range range) { return value >= range.low && value <= range.high; }
 
 /// Whether a number is a multiple of `step`, but for rounding; each one is if that is 0.
@@ -101,17 +108,33 @@ std::string Option::text() const {
                     target);
 }
 
-std::string Option::on_command_line() const {
-  if (const auto* on = std::get_if<bool*>(&target)) {
-    return **on ? flag() : Concat("--no-", flag().substr(2));
-  }
+std::string Option::plain_text() const {
   std::string value = text();
   if (const auto* words = std::get_if<std::string*>(&target)) value = ShellQuoted(**words);
   std::erase_if(value, [&](char c) {  // a list needs neither brackets nor blanks there
     return std::holds_alternative<std::vector<int64_t>*>(target) &&
            (c == '[' || c == ']' || c == ' ');
   });
-  return Concat(flag(), " ", value);
+  return value;
+}
+
+std::string Option::on_command_line() const {
+  if (const auto* on = std::get_if<bool*>(&target)) {
+    return **on ? flag() : Concat("--no-", flag().substr(2));
+  }
+  return Concat(flag(), " ", ShellQuoted(plain_text()));
+}
+
+std::string Option::about() const {
+  std::string text = help;
+  if (!unit.empty()) text += ", " + unit;
+  if (!choices.empty()) text += ": " + Join(choices, ", ");
+  return text + RangeInBrackets(range, step);
+}
+
+std::string Option::about_with_default() const {
+  const std::string value = usual.empty() ? plain_text() : usual;
+  return value.empty() ? about() : Concat(about(), " [", value, "]");
 }
 
 std::string Option::expected() const {
@@ -239,7 +262,8 @@ std::vector<const Option*> Options::Find(std::string_view name, const std::strin
   }
   if (found.empty()) {
     std::string hint = DidYouMean(name, known);
-    if (hint.empty() && known.size() < 16) hint = Concat("; there are ", Join(known, ", "));
+    constexpr size_t kMostNames = 24;  // that make a line which can still be read
+    if (hint.empty() && known.size() < kMostNames) hint = Concat("; there are ", Join(known, ", "));
     throw BadInput(Concat(where, ": no setting is called \"", name, "\"", hint));
   }
   return found;
@@ -259,9 +283,7 @@ std::string Options::Toml(bool comments, const std::function<bool(const Option&)
       section = option.section;
     }
     toml += Concat(option.name, " = ", option.text());
-    if (comments) {
-      toml += Concat("  # ", option.help, option.unit.empty() ? "" : ", " + option.unit);
-    }
+    if (comments) toml += Concat("  # ", option.about());
     toml += '\n';
   }
   return toml;

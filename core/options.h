@@ -35,12 +35,20 @@ struct Option {
   bool identity;                          // two runs that differ in it are different runs
   std::vector<std::string> choices = {};  // texts only: what it may be; empty for anything
   double step = 0;                        // numbers only: of which it is a multiple; 0: of nothing
+  std::string usual = {};                 // says the default where the value does not; may be empty
 
   std::string flag() const;
   /// The value as TOML writes it.
   std::string text() const;
+  /// The value as a command line takes it, such as `64,64`.
+  std::string plain_text() const;
   /// Flag and value as a shell's command line has them, such as `--hidden 64,64` or `--no-double`.
   std::string on_command_line() const;
+  /// What it is: help, unit, choices, range, such as `length of a training episode, s (0.02 to
+  /// 10)`.
+  std::string about() const;
+  /// The same with the value as its default behind it: `…, s (0.02 to 10) [4]`.
+  std::string about_with_default() const;
   /// Such as `a number in [0, 1]` or `a multiple of 0.02 in [0, 1]`.
   std::string expected() const;
   /// Parses and checks `text`; `where` (such as `--gamma` or `FILE:3: gamma`) begins the message
@@ -89,7 +97,7 @@ class Options {
   /// Sets what the name or alias stands for; see Option::Set.
   void Set(std::string_view name, std::string_view text, const std::string& where) const;
 
-  /// All settings as a TOML document, with unit and help as comments where `comments` is true.
+  /// All settings as a TOML document, with what each is as a comment where `comments` is true.
   std::string Toml(bool comments, const std::function<bool(const Option&)>& wanted) const;
 
  private:

@@ -148,6 +148,31 @@ TEST_F(OptionsTest, OnACommandLine) {
   EXPECT_EQ(options_.Find("fast", "").front()->on_command_line(), "--no-fast");
 }
 
+TEST_F(OptionsTest, SaysWhatEachIsWithUnitRangeAndDefault) {
+  const auto find = [&](const char* name) { return *options_.Find(name, "").front(); };
+  EXPECT_EQ(find("count").about(), "how many, pieces (1 to 10)");
+  EXPECT_EQ(find("count").about_with_default(), "how many, pieces (1 to 10) [3]");
+  EXPECT_EQ(find("widths").about_with_default(), "layers (1 to 100) [4,5]");
+  EXPECT_EQ(find("name").about_with_default(), "a name [x]");
+  EXPECT_EQ(find("fast").about_with_default(), "be fast [true]");
+  options_.Set("name", "", "");
+  EXPECT_EQ(find("name").about_with_default(), "a name");
+  Option count = find("count");
+  count.usual = "as many as there are";
+  EXPECT_EQ(count.about_with_default(), "how many, pieces (1 to 10) [as many as there are]");
+  EXPECT_NE(options_.Toml(true, [](const Option&) { return true; })
+                .find("count = 3  # how many, pieces (1 to 10)\n"),
+            std::string::npos);
+}
+
+TEST_F(OptionsTest, IntegersAreReadInOneWayWhereverTheyStand) {
+  options_.Set("count", "1e1", "");
+  EXPECT_EQ(sample_.count, 10);
+  options_.Set("widths", "1e2,+3", "");
+  EXPECT_EQ(sample_.widths, (std::vector<int64_t>{100, 3}));
+  EXPECT_EQ(ErrorOf("count", "1e3"), "here: expected an integer in [1, 10], got \"1e3\"");
+}
+
 TEST_F(OptionsTest, FlagsAndTomlFollowFromTheSameLine) {
   EXPECT_EQ(options_.Find("the_rate", "").front()->flag(), "--the-rate");
   options_.Set("name", "a\\\"", "");

@@ -33,6 +33,12 @@ std::optional<T> ParseWhole(std::string_view text) {
   return value;
 }
 
+/// from_chars takes no leading plus, which people do write.
+std::string_view WithoutPlus(std::string_view text) {
+  if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
+  return text;
+}
+
 /// A character of a UTF-8 text, and of how many bytes it is made.
 struct CodePoint {
   char32_t value;
@@ -90,12 +96,18 @@ std::string FormatNumber(double value) {
 }
 
 std::optional<double> ParseNumber(std::string_view text) {
-  // from_chars takes no leading plus, which people do write.
-  if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
-  return ParseWhole<double>(text);
+  return ParseWhole<double>(WithoutPlus(text));
 }
 
-std::optional<int64_t> ParseInteger(std::string_view text) { return ParseWhole<int64_t>(text); }
+std::optional<int64_t> ParseInteger(std::string_view text) {
+  if (const auto integer = ParseWhole<int64_t>(WithoutPlus(text))) return integer;
+  constexpr double kLargest = 9007199254740992;  // 2^53: up to here a double is exact
+  const auto number = ParseNumber(text);
+  if (!number || !(std::abs(*number) <= kLargest) || *number != std::trunc(*number)) {
+    return std::nullopt;
+  }
+  return static_cast<int64_t>(*number);
+}
 
 std::string_view Trim(std::string_view text) {
   constexpr std::string_view kBlank = " \t\r\n";

@@ -24,7 +24,7 @@ std::string FormatNumber(double value);
 /// The whole of `text` as a finite or infinite number; nothing if it is anything else.
 std::optional<double> ParseNumber(std::string_view text);
 
-/// The whole of `text` as a decimal integer; nothing if it is anything else.
+/// The whole of `text` as an integer, such as `12` or `1e6`; nothing if it is anything else.
 std::optional<int64_t> ParseInteger(std::string_view text);
 
 /// `text` without blanks at either end.

@@ -27,8 +27,18 @@ TEST(Text, NumbersAreReadWholeOrNotAtAll) {
   for (const char* bad : {"", " 1", "1 ", "1x", "--1", "+-1", "1e", "abc"}) {
     EXPECT_FALSE(ParseNumber(bad)) << bad;
   }
-  EXPECT_FALSE(ParseInteger("1.0"));
   EXPECT_FALSE(ParseInteger("99999999999999999999"));
+}
+
+TEST(Text, IntegersAreWhateverNumberIsOneExactly) {
+  EXPECT_EQ(ParseInteger("+7"), 7);
+  EXPECT_EQ(ParseInteger("1e6"), 1000000);
+  EXPECT_EQ(ParseInteger("-2.5e3"), -2500);
+  EXPECT_EQ(ParseInteger("1.0"), 1);
+  EXPECT_EQ(ParseInteger("9223372036854775807"), std::numeric_limits<int64_t>::max());
+  for (const char* bad : {"1.5", "1e-1", "1e17", "inf", "nan", "1e", "e3", "0x10", "1 000"}) {
+    EXPECT_FALSE(ParseInteger(bad)) << bad;
+  }
 }
 
 TEST(Text, SplitTrimsAndKeepsEmptyPieces) {

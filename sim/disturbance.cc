@@ -11,8 +11,7 @@ void Disturbance::Describe(Options& o) {
   o.Section("disturbance");
   o.Add(&sensor_noise, "sensor_noise", 0, {0, 10}, "rad, rad/s",
         "standard deviation of the noise on all measured angles and velocities");
-  o.Add(&delay, "delay", 0, {0, kLargestDelay}, "s",
-        "from the choice of a torque to its effect, a multiple of 0.02")
+  o.Add(&delay, "delay", 0, {0, kLargestDelay}, "s", "from the choice of a torque to its effect")
       .step = kControlPeriod;
 }
 

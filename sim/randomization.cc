@@ -29,12 +29,13 @@ void Randomization::Describe(Options& o) {
   o.Add(&sensor_noise, "randomize_sensor_noise", 0, {0, 10}, "rad, rad/s",
         "each episode's sensor noise is up to so much above sensor_noise");
   o.Add(&delay, "randomize_delay", 0, {0, kLargestDelay}, "s",
-        "each episode's delay is up to so much above delay, a multiple of 0.02")
+        "each episode's delay is up to so much above delay")
       .step = kControlPeriod;
   o.Alias("randomize",
           {"randomize_mass1", "randomize_mass2", "randomize_length1", "randomize_length2",
            "randomize_damping1", "randomize_damping2", "randomize_gravity"},
-          "masses, lengths, dampings and gravity");
+          "share: each episode's masses, lengths, dampings and gravity are within ± this of the "
+          "plant's");
   o.Alias("randomize_mass", {"randomize_mass1", "randomize_mass2"});
   o.Alias("randomize_length", {"randomize_length1", "randomize_length2"});
   o.Alias("randomize_damping", {"randomize_damping1", "randomize_damping2"});

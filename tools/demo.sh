@@ -73,9 +73,9 @@ set_demo_option() {
   case $1 in
     --port)
       case $2 in
-        "" | *[!0-9]* | ??????* | 0*) bad_input "--port: expected 1 to 65535, got '$2'" ;;
+        "" | *[!0-9]* | ??????* | 0*) bad_input "--port: expected an integer in [1, 65535], got \"$2\"" ;;
       esac
-      [ "$2" -le 65535 ] || bad_input "--port: expected 1 to 65535, got '$2'"
+      [ "$2" -le 65535 ] || bad_input "--port: expected an integer in [1, 65535], got \"$2\""
       port=$2
       ;;
     --dist)

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <ctime>
+#include <filesystem>
+#include <optional>
+#include <set>
+#include <string>
+
+namespace upswing {
+
+/// On what a run was trained and how much of it the run had, as lines of its log.txt tell: what its
+/// times depend on. Sets, for a run may have been resumed elsewhere.
+struct RunConditions {
+  std::set<int64_t> threads;
+  std::set<std::string> vectors, processors;  // instructions in use; model of the processor
+  std::optional<double> busy;  // the least share of the time that its threads were at work
+};
+
+/// The time that this process has taken since the clock was made, of the wall and of its threads.
+class WorkClock {
+ public:
+  double seconds() const;
+  /// Share of the time in which `threads` threads were at work, about 0 to 1.
+  double busy(int threads) const;
+
+ private:
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+  std::clock_t cpu_begin_ = std::clock();
+};
+
+/// The line with which a run begins (`started` or `resumed`) at a step.
+std::string BeginLine(bool resumed, int64_t step, int threads);
+
+/// The line with which it ends: `finished` or stopped.
+std::string EndLine(bool finished, int64_t step, int threads, const WorkClock& clock);
+
+/// What a run's log.txt tells, if there is one that can be read.
+RunConditions ReadConditions(const std::filesystem::path& run);
+
+}  // namespace upswing
