@@ -263,7 +263,7 @@ class PolicyFileTest(FileTest):
         self.policy.unlink()
         self.refuse_policy("no such file")
         self.refuse(["eval", "nothing"], "nothing", "no such file")
-        self.refuse(["eval", "run"], "run", "no policy yet")
+        self.refuse(["eval", "run"], "run", "this run has no policy")
 
     def test_truncated(self):
         whole = self.policy.read_bytes()
@@ -562,22 +562,6 @@ class CheckpointTest(FileTest):
                 self.refuse_checkpoint(f'"{name}"', "finite", "nan")
                 self.restore()
 
-    def test_numbers_that_no_training_writes(self):
-        _, tensors = read_tensors(self.checkpoint)
-        for name, number in (("agent/n_step/count", 7), ("agent/n_step/count", -1),
-                             ("agent/replay/next", 10**9), ("agent/replay/next", -1),
-                             ("agent/n_step/action", 99), ("train/steps", -5),
-                             ("run/size/metrics", -1), ("agent/explore_rng/state", 0)):
-            if name not in tensors:
-                continue
-            with self.subTest(name=name, number=number):
-                shutil.rmtree(self.folder / "run")
-                shutil.copytree(Path(self.made.name, "run"), self.folder / "run")
-                self.change(tensors={name: with_number(tensors[name], 0, number)})
-                done = self.run_here(*self.RESUME)
-                # It may not matter, but it must not crash.
-                self.assertIn(done.returncode, (0, 1, 2), done)
-
     def test_another_version(self):
         self.change(metadata={"upswing_version": "0.0.1"})
         self.refuse_checkpoint("upswing_version", "0.0.1")
@@ -623,9 +607,7 @@ class CheckpointTest(FileTest):
     def test_table_shorter_than_the_checkpoint_knows(self):
         table = self.folder / "run/metrics.csv"
         table.write_bytes(table.read_bytes()[:100])
-        done = self.run_here(*self.RESUME)
-        self.assert_one_line(done, done.returncode, "run/metrics.csv", "expected", "got 100")
-        self.assertIn(done.returncode, (1, 2))
+        self.refuse(self.RESUME, "run/metrics.csv", "expected", "got 100")
 
 
 class RunFolderTest(FileTest):
@@ -643,13 +625,13 @@ class RunFolderTest(FileTest):
         self.write("file", "mine")
         for out in ("file/run", "/proc/run", "/proc/1/deep/run"):
             with self.subTest(out=out):
-                self.refuse(small(out=out), out, code=1)
+                self.refuse(small(out=out), out)
 
     def test_unwritable_csv(self):
         self.write("file", "mine")
         for csv in ("file/out.csv", "/proc/out.csv", "none/out.csv", "run"):
             with self.subTest(csv=csv):
-                self.refuse(["simulate", "--seconds", "1", "--csv", csv], csv, code=1)
+                self.refuse(["simulate", "--seconds", "1", "--csv", csv], csv)
 
     def test_output_that_cannot_be_written(self):
         for command in (["simulate"], ["simulate", "--seconds", "1"], ["eval", "run", "--json"],

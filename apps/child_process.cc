@@ -1,6 +1,7 @@
 #include "apps/child_process.h"
 
 #include <fcntl.h>
+#include <sys/auxv.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -11,6 +12,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/file.h"
 #include "core/text.h"
 
 namespace upswing {
@@ -18,16 +20,18 @@ namespace {
 
 /// What the new process does: it becomes the program, or ends with 127. Between fork and exec only
 /// plain system calls are safe.
-[[noreturn]] void BecomeProgram(char* const* arguments, int log, pid_t parent) {
+[[noreturn]] void BecomeProgram(const char* program, char* const* arguments, int log,
+                                pid_t parent) {
   // The order counts: a parent that died before the first line is found out by the second.
   const bool tied = prctl(PR_SET_PDEATHSIG, SIGKILL) == 0 && getppid() == parent;
   setpgid(0, 0);
-  // It listens to this one a moment later; until then it would be its end.
+  // It listens to this one as soon as it has begun; until then it would be its end.
   std::signal(SIGUSR1, SIG_IGN);
   const int nothing = open("/dev/null", O_RDONLY | O_CLOEXEC);
   if (tied && nothing >= 0 && dup2(nothing, STDIN_FILENO) >= 0 && dup2(log, STDOUT_FILENO) >= 0 &&
       dup2(log, STDERR_FILENO) >= 0) {
     execv("/proc/self/exe", arguments);  // this very program, even if its file has been replaced
+    execv(program, arguments);           // where there is no /proc
     constexpr char kNotice[] = "upswing: cannot start itself\n";
     (void)!write(STDERR_FILENO, kNotice, sizeof(kNotice) - 1);
   }
@@ -43,16 +47,14 @@ ChildProcess::ChildProcess(const std::vector<std::string>& arguments,
   std::vector<char*> pointers;
   for (std::string& text : texts) pointers.push_back(text.data());
   pointers.push_back(nullptr);
-  const int log_file = open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
-  if (log_file < 0) {
-    throw Failure(Concat("cannot write ", log.string(), ": ", std::strerror(errno)));
-  }
+  const AppendFile log_file(log);
+  // The path by which this process was started.
+  // NOLINTNEXTLINE(performance-no-int-to-ptr): the system hands it over as a number
+  const auto* program = reinterpret_cast<const char*>(getauxval(AT_EXECFN));
   const pid_t parent = getpid();
   pid_ = fork();
-  if (pid_ == 0) BecomeProgram(pointers.data(), log_file, parent);
-  const int fork_errno = errno;
-  close(log_file);
-  if (pid_ < 0) throw Failure(Concat("cannot start a process: ", std::strerror(fork_errno)));
+  if (pid_ == 0) BecomeProgram(program, pointers.data(), log_file.descriptor(), parent);
+  if (pid_ < 0) throw Failure(Concat("cannot start a process: ", std::strerror(errno)));
 }
 
 ChildProcess::ChildProcess(ChildProcess&& other) noexcept : pid_(std::exchange(other.pid_, -1)) {}

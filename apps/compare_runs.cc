@@ -10,6 +10,7 @@
 #include "apps/model_info.h"
 #include "apps/progress.h"
 #include "core/error.h"
+#include "core/making.h"
 #include "core/text.h"
 
 namespace upswing {
@@ -33,6 +34,7 @@ void AddRuns(const fs::path& folder, Found& found, std::vector<fs::path>& paths)
   fs::directory_iterator entries(folder, error);
   if (error) return found.LeaveOut(folder, Concat("cannot be read: ", error.message()));
   for (const fs::directory_entry& entry : entries) {
+    if (IsMakingName(entry.path().filename().string())) continue;  // of a process that was killed
     const bool is_folder = fs::is_directory(entry.symlink_status(error));
     const bool is_run = fs::is_directory(entry.path(), error) && IsRun(entry.path());
     if (is_folder || is_run) AddRuns(entry.path(), found, paths);

@@ -191,7 +191,7 @@ std::string CompleteToml(Config config) {
 
 Config ReadRunConfig(const fs::path& run, const std::vector<FlagValue>& flags) {
   const fs::path file = run / "config.toml";
-  const std::string text = ReadTextFile(file);
+  const std::string text = ReadOwnFile(file);
   const toml::table table = ParseToml(text, file.string());
   const std::string model = table["plant"]["model"].value_or("");
   if (!model.empty() && model != kModelCopy) {  // a run is whole wherever it lies
@@ -277,7 +277,7 @@ Plant ChangedPlant(const Plant& base, const std::string& model, const std::vecto
   Plant plant = base;
   const Options options = OptionsOf(plant);
   if (!model.empty()) {
-    mjcf = ReadSmallTextFile(model, kMostMjcfBytes);
+    mjcf = ReadOwnFile(model, kMostMjcfBytes);
     plant = PlantOf(*LoadModel(mjcf, model));
   }
   ApplyChanges(options, set);

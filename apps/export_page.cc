@@ -40,9 +40,11 @@ std::string CleanId(std::string_view name) {
 
 /// The run folder that a policy lies in; empty if it lies elsewhere.
 fs::path RunOf(const fs::path& file) {
-  const fs::path folder = fs::absolute(file).lexically_normal().parent_path();
+  const fs::path folder = file.has_parent_path() ? file.parent_path() : ".";
   const bool is_run = file.filename() == "policy.safetensors" && fs::exists(folder / "config.toml");
-  return is_run ? folder : fs::path();
+  if (!is_run) return {};
+  const bool has_name = folder.filename() != "." && folder.filename() != "..";
+  return has_name ? folder : fs::canonical(folder);
 }
 
 /// What the page needs to know of a policy, as its list has it. Throws BadInput.
@@ -129,7 +131,7 @@ std::vector<PageAgent> ReadAgents(const std::vector<fs::path>& paths, const std:
 ordered_json ReadIndex(const fs::path& file) {
   if (!fs::exists(file)) return {{"agents", ordered_json::array()}};
   try {
-    ordered_json index = ordered_json::parse(ReadTextFile(file));
+    ordered_json index = ordered_json::parse(ReadOwnFile(file));
     for (const ordered_json& entry : index.at("agents").get_ref<const ordered_json::array_t&>()) {
       (void)entry.at("id").get_ref<const std::string&>();
     }

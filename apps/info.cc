@@ -69,7 +69,7 @@ void PrintPolicy(const fs::path& path) {
   PrintSelfCheck(policy.self_check());
 }
 
-void PrintRun(const fs::path& path) {
+void PrintRun(const fs::path& path, bool has_policy) {
   const TensorFile checkpoint = TensorFile::Load(RunFolder::CheckpointPath(path));
   const Config config = ReadRunConfig(path);
   TrainState state(static_cast<int>(config.train.envs), kRewardTerms);
@@ -88,6 +88,11 @@ void PrintRun(const fs::path& path) {
   } else {
     fmt::print("  solved      not yet; last success rate {}\n", state.last_success_rate);
   }
+  if (has_policy) return;
+  fmt::print("  policy      {}\n", state.best_step == 0
+                                       ? "none yet: the first evaluation writes it"
+                                       : fmt::format("the best, of step {}, is not there any more",
+                                                     FormatCount(state.best_step)));
 }
 
 /// What the program is and what it makes of this machine.
@@ -109,18 +114,14 @@ int RunInfo(const std::string& path) {
   const bool is_run = fs::exists(fs::path(path) / "config.toml");
   const fs::path run_policy = fs::path(path) / "policy.safetensors";
   try {
-    if (is_run) PrintRun(path);
+    if (is_run) PrintRun(path, fs::exists(run_policy));
   } catch (const Error& error) {
     if (!fs::exists(run_policy)) throw;
     throw Error(
         error.exit_code(),
         Concat(error.what(), " (its policy is a file of its own: ", run_policy.string(), ")"));
   }
-  if (!is_run || fs::exists(run_policy)) {
-    PrintPolicy(path);
-  } else {
-    fmt::print("  policy      none yet: the first evaluation writes it\n");
-  }
+  if (!is_run || fs::exists(run_policy)) PrintPolicy(path);
   return 0;
 }
 

@@ -68,7 +68,7 @@ LoadedPolicy LoadPolicy(const fs::path& path) {
   if (fs::is_directory(path)) {
     file = path / "policy.safetensors";
     if (fs::exists(path / "config.toml") && !fs::exists(file)) {
-      throw BadInput(Concat(path.string(), ": this run has no policy yet: expected ",
+      throw BadInput(Concat(path.string(), ": this run has no policy: expected ",
                             "policy.safetensors, which its first evaluation writes"));
     }
   }

@@ -7,12 +7,16 @@
 #include <cstdio>
 #include <cstring>
 #include <exception>
+#include <filesystem>
 #include <iostream>
 #include <system_error>
 
 #include "apps/commands.h"
 #include "apps/help.h"
+#include "apps/say.h"
+#include "apps/signals.h"
 #include "core/error.h"
+#include "core/file.h"
 #include "core/text.h"
 
 namespace upswing {
@@ -46,7 +50,7 @@ int Finish(int exit_code) {
   std::cout.flush();
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0 && std::cout.good()) return exit_code;
   if (OutputIsClosed()) return EndByPipe();
-  fmt::print(stderr, "upswing: cannot write the output: {}\n", std::strerror(errno));
+  SayError(Concat("cannot write the output: ", std::strerror(errno)));
   return 1;
 }
 
@@ -84,17 +88,21 @@ int Main(int argc, char** argv) {
       return Finish(program.exit(request));  // --help and --version
     }
   } catch (const CLI::ParseError& error) {
-    fmt::print(stderr, "upswing: {}\n", OneLine(Explain(program, error)));
+    SayError(OneLine(Explain(program, error)));
     return 2;
   } catch (const Error& error) {
-    fmt::print(stderr, "upswing: {}\n", OneLine(error.what()));
+    SayError(OneLine(error.what()));
     return error.exit_code();
+  } catch (const std::filesystem::filesystem_error& error) {
+    const Error of_path = PathError("cannot use", error.path1(), error.code().value());
+    SayError(OneLine(of_path.what()));
+    return of_path.exit_code();
   } catch (const std::bad_alloc&) {
-    fmt::print(stderr, "upswing: out of memory\n");
+    SayError("out of memory");
     return 1;
   } catch (const std::exception& error) {
     if (OutputIsClosed() && std::ferror(stdout) != 0) return EndByPipe();
-    fmt::print(stderr, "upswing: {}\n", OneLine(error.what()));
+    SayError(OneLine(error.what()));
     return 1;
   }
 }
@@ -102,8 +110,9 @@ int Main(int argc, char** argv) {
 }  // namespace
 }  // namespace upswing
 
-// NOLINTNEXTLINE(bugprone-exception-escape): only what fails while a failure is being told
 int main(int argc, char** argv) {
+  upswing::ListenToSignals();
+  upswing::OpenStandardFiles();
   // A write that cannot be done shall fail where it is made, with a message.
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);

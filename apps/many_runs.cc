@@ -68,11 +68,19 @@ void CheckSame(Config before, Config now, bool more_steps, const std::string& wh
   }
 }
 
+/// Throws at a link: what is written there would be written elsewhere.
+void CheckNoLink(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::is_symlink(folder, error)) return;
+  throw BadInput(Concat(folder.string(), ": expected a folder, got a link"));
+}
+
 /// Throws if what is in a variant's folder was made with other settings: one of its runs, or, where
 /// none has begun, the settings themselves.
 void CheckRuns(const fs::path& folder, const Config& config, bool more_steps) {
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
+    if (IsMakingName(entry.path().filename().string())) continue;
     if (!fs::is_regular_file(entry.path() / "config.toml", error)) continue;
     CheckSame(ReadRunConfig(entry.path()), config, more_steps, entry.path().string());
   }
@@ -82,7 +90,9 @@ void CheckRuns(const fs::path& folder, const Config& config, bool more_steps) {
 }
 
 void WriteIfOther(const fs::path& path, const std::string& text) {
-  if (!fs::exists(path) || ReadTextFile(path) != text) WriteFileAtomically(path, text);
+  std::error_code error;
+  const bool is_own = fs::is_regular_file(fs::symlink_status(path, error));
+  if (!is_own || ReadOwnFile(path) != text) WriteFileAtomically(path, text);
 }
 
 /// Writes what the runs begin with.
@@ -169,7 +179,12 @@ class Scheduler {
   void Start() {
     SeedRun& run = *waiting_.front();
     waiting_.pop_front();
-    running_.push_back({&run, ChildProcess(ArgumentsOf(run), run.log())});
+    try {
+      running_.push_back({&run, ChildProcess(ArgumentsOf(run), run.log())});
+    } catch (const Error& error) {
+      run.problem = error.what();
+      view_.PrintEnd(run);
+    }
   }
 
   void Stop() {
@@ -231,6 +246,7 @@ int64_t SeedRun::Steps() const {
 }
 
 void SeedRun::ReadState() {
+  CheckNoLink(path);
   if (!fs::exists(path / "config.toml")) return;
   const TensorFile checkpoint = TensorFile::LoadPart(RunFolder::CheckpointPath(path), "train/");
   TrainState read(static_cast<int>(variant->config.train.envs), kRewardTerms);
@@ -246,6 +262,7 @@ int TrainMany(const ManyRuns& plan) {
   std::optional<FolderLock> lock;
   if (fs::exists(plan.folder, error)) lock.emplace(plan.folder);
   for (const Variant& variant : plan.variants) {
+    if (!variant.name.empty()) CheckNoLink(plan.folder / variant.name);
     CheckRuns(plan.folder / variant.name, variant.config, plan.more_steps);
   }
   InstallSignalHandlers();  // from here on what is begun is ended in order

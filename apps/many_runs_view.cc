@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "apps/config_checks.h"
+#include "apps/say.h"
 #include "apps/seeds.h"
 #include "core/sample.h"
 #include "core/text.h"

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "apps/say.h"
+
 namespace upswing {
 namespace {
 

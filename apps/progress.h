@@ -10,13 +10,6 @@
 
 namespace upswing {
 
-/// Prints to standard output for work that does not need it: where it is closed or full the work
-/// goes on, and the program tells of it in the end.
-template <typename... T>
-void Say(fmt::format_string<T...> format, T&&... arguments) {
-  std::fputs(fmt::format(format, std::forward<T>(arguments)...).c_str(), stdout);
-}
-
 /// A line at the bottom of the terminal that is written anew a few times a second. Where standard
 /// output is no terminal it stays silent, and what is printed are plain lines.
 class ProgressLine {

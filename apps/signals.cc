@@ -17,6 +17,14 @@ static_assert(std::atomic<int>::is_always_lock_free);
 
 }  // namespace
 
+void ListenToSignals() {
+  struct sigaction checkpoint {};
+  checkpoint.sa_handler = [](int) { g_checkpoint_wanted = true; };
+  checkpoint.sa_flags = SA_RESTART;
+  sigaction(SIGUSR1, &checkpoint, nullptr);
+  std::signal(SIGUSR2, SIG_IGN);
+}
+
 void InstallSignalHandlers() {
   g_person_watches = isatty(STDERR_FILENO) == 1;
   struct sigaction stop {};
@@ -32,10 +40,6 @@ void InstallSignalHandlers() {
   stop.sa_flags = SA_RESETHAND | SA_RESTART;  // a second one ends the program at once
   sigaction(SIGINT, &stop, nullptr);
   sigaction(SIGTERM, &stop, nullptr);
-  struct sigaction checkpoint {};
-  checkpoint.sa_handler = [](int) { g_checkpoint_wanted = true; };
-  checkpoint.sa_flags = SA_RESTART;
-  sigaction(SIGUSR1, &checkpoint, nullptr);
 }
 
 TrainRequest PollSignals() {

@@ -53,7 +53,7 @@ void WriteOutput(const std::string& path, std::string_view text) {
   if (IsStandardStream(path)) {
     std::fwrite(text.data(), 1, text.size(), stdout);  // the program tells if it could not
   } else {
-    WriteFileAtomically(path, text);
+    WriteNamedFile(path, text);
   }
 }
 

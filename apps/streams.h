@@ -19,7 +19,7 @@ std::string ReadInput(const std::string& path);
 /// work; standard output always can.
 void CheckWritable(const std::string& flag, const std::string& path);
 
-/// Writes the file as WriteFileAtomically does, or standard output.
+/// Writes the file as WriteNamedFile does, or standard output.
 void WriteOutput(const std::string& path, std::string_view text);
 
 }  // namespace upswing

@@ -8,6 +8,7 @@
 
 #include "apps/config_checks.h"
 #include "apps/model_info.h"
+#include "apps/say.h"
 
 namespace upswing {
 
@@ -120,10 +121,14 @@ void TrainView::Summarize(const TrainState& s, const TrainConfig& config,
                           const std::filesystem::path& run, bool finished) {
   line_.Clear();
   PrintOutcome(s, config, finished);
-  if (s.best_step > 0) {
-    Say("Best policy: {} (step {}, success {:.0f}%, return {:.0f})\n",
-        (run / "policy.safetensors").string(), FormatCount(s.best_step), 100 * s.best_success_rate,
-        s.best_return);
+  const std::filesystem::path policy = run / "policy.safetensors";
+  std::error_code error;
+  if (s.best_step > 0 && !std::filesystem::exists(policy, error)) {
+    Say("Best policy: of step {}, but {} is not there any more\nNext:\n", FormatCount(s.best_step),
+        policy.string());
+  } else if (s.best_step > 0) {
+    Say("Best policy: {} (step {}, success {:.0f}%, return {:.0f})\n", policy.string(),
+        FormatCount(s.best_step), 100 * s.best_success_rate, s.best_return);
     Say("Next:\n  ./upswing demo {0}\n  ./upswing eval {0}\n  ./upswing info {0}\n", run.string());
   } else {
     Say("Next:\n");

@@ -1,9 +1,14 @@
 #pragma once
 
+#include <algorithm>
 #include <concepts>
+#include <cstdint>
+#include <limits>
 #include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "core/error.h"
@@ -13,8 +18,24 @@
 
 namespace upswing {
 
+/// What a number in a file may be: from `lowest` to `highest`, both included.
+template <typename T>
+struct Bounds {
+  T lowest, highest;
+};
+
+/// Any finite number.
+template <typename T>
+inline constexpr Bounds<T> kAnyNumber{std::numeric_limits<T>::lowest(),
+                                      std::numeric_limits<T>::max()};
+
 /// Saves or loads state under names. A component has one `void State(const Archive&)` that serves
 /// both ways, so that what is saved and what is loaded cannot drift apart.
+///
+/// A file may come from anybody: every number has its bounds, which no training leaves. Loading
+/// throws BadInput at a number outside them, and saving Failure, as at one that is not finite: no
+/// such state is worth keeping. Only floating-point arrays may do without, which are finite at
+/// least.
 class Archive {
  public:
   /// An archive that adds to `file`. Arrays are viewed, not copied: save before they change.
@@ -27,14 +48,18 @@ class Archive {
   /// The same archive, with names that begin with `name/`.
   Archive In(std::string_view name) const { return {target_, source_, Concat(prefix_, name, "/")}; }
 
-  /// An array whose size is settled before it is loaded. Throws BadInput on loading and Failure on
-  /// saving if a number is not finite: no such state is worth keeping.
+  /// An array whose size is settled before it is loaded.
   template <typename T>
-  void Array(std::string_view name, std::span<T> values) const {
+  void Array(std::string_view name, std::span<T> values,
+             std::type_identity_t<Bounds<T>> bounds) const {
     const std::string path = Concat(prefix_, name);
     if (loading()) source_->Read(path, values);
-    if constexpr (std::floating_point<T>) CheckFinite(path, values);
+    CheckNumbers<T>(path, values, bounds);
     if (!loading()) target_->Add<T>(path, values);
+  }
+  template <std::floating_point T>
+  void Array(std::string_view name, std::span<T> values) const {
+    Array(name, values, kAnyNumber<T>);
   }
 
   /// An array that is resized to what is loaded, of at most `max_size` numbers.
@@ -59,25 +84,33 @@ class Archive {
     }
   }
 
-  /// One number. Integers are stored as I64, bool too.
+  /// One number.
   template <typename T>
-  requires std::integral<T> || std::floating_point<T>
-  void Scalar(std::string_view name, T& value) const {
-    using Stored = std::conditional_t<std::floating_point<T>, T, int64_t>;
+  requires std::same_as<T, int64_t> || std::same_as<T, double>
+  void Scalar(std::string_view name, T& value, std::type_identity_t<Bounds<T>> bounds) const {
     const std::string path = Concat(prefix_, name);
-    if (loading()) {
-      Stored stored{};
-      source_->Read(path, std::span(&stored, 1));
-      value = static_cast<T>(stored);
-    } else {
-      target_->AddScalar(path, static_cast<Stored>(value));
-    }
+    if (loading()) source_->Read(path, std::span(&value, 1));
+    CheckNumbers<T>(path, std::span(&value, 1), bounds);
+    if (!loading()) target_->AddScalar(path, value);
+  }
+  /// True or false, stored as 1 or 0.
+  void Scalar(std::string_view name, bool& value) const {
+    int64_t number = value ? 1 : 0;
+    Scalar(name, number, {0, 1});
+    value = number == 1;
   }
 
  private:
   template <typename T>
-  void CheckFinite(const std::string& path, std::span<T> values) const {
-    const std::string problem = FindNotFinite<T>(values);
+  void CheckNumbers(const std::string& path, std::span<const T> values, Bounds<T> bounds) const {
+    std::string problem;
+    if constexpr (std::floating_point<T>) problem = FindNotFinite<T>(values);
+    const auto outside =
+        std::ranges::find_if(values, [&](T x) { return x < bounds.lowest || x > bounds.highest; });
+    if (problem.empty() && outside != values.end()) {
+      problem = Concat("expected ", bounds.lowest, " to ", bounds.highest, ", got ", *outside,
+                       values.size() > 1 ? Concat(" at index ", outside - values.begin()) : "");
+    }
     if (problem.empty()) return;
     const std::string what = Concat("tensor \"", path, "\": ", problem);
     throw loading() ? BadInput(Concat(source_->path(), ": ", what)) : Failure(what);

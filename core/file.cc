@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
@@ -18,25 +19,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string SystemError(std::string_view what, const fs::path& path) {
-  return Concat(what, " ", path.string(), ": ", std::strerror(errno));
-}
-
-/// A file descriptor that closes itself.
-class Descriptor {
- public:
-  explicit Descriptor(int fd) : fd_(fd) {}
-  ~Descriptor() {
-    if (fd_ >= 0) close(fd_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int get() const { return fd_; }
-
- private:
-  int fd_;
-};
-
 /// Writes all bytes, however many calls it takes; false with errno on failure.
 bool WriteAll(int fd, std::span<const std::byte> bytes) {
   while (!bytes.empty()) {
@@ -48,18 +30,50 @@ bool WriteAll(int fd, std::span<const std::byte> bytes) {
   return true;
 }
 
-void WriteInPlace(const fs::path& path, std::span<const std::span<const std::byte>> parts) {
-  const Descriptor fd(open(path.c_str(), O_WRONLY));
-  if (fd.get() < 0) throw Failure(SystemError("cannot write", path));
-  for (const auto part : parts) {
-    if (!WriteAll(fd.get(), part)) throw Failure(SystemError("cannot write", path));
-  }
+/// Whether a system call failed because of the path it was given, not of what it should do there.
+bool IsOfPath(int error_number) {
+  constexpr std::array kOfPath{EACCES, EEXIST, EINVAL,  EISDIR,    ELOOP, ENAMETOOLONG,
+                               ENODEV, ENOENT, ENOTDIR, ENXIO,     EPERM, ENOTEMPTY,
+                               EROFS,  EBUSY,  EXDEV,   EOPNOTSUPP};
+  return std::ranges::find(kOfPath, error_number) != kOfPath.end();
 }
 
-/// Makes a rename in `folder` durable. Some file systems cannot; the rename is atomic all the same.
-void SyncFolder(const fs::path& folder) {
-  const Descriptor fd(open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY));
-  if (fd.get() >= 0) fsync(fd.get());
+/// The whole of what was opened. Throws BadInput.
+std::vector<std::byte> ReadAll(const Descriptor& fd, const fs::path& path, bool only_regular) {
+  const auto cannot = [&](std::string_view why) {
+    return BadInput(Concat("cannot read ", path.string(), ": ", why));
+  };
+  struct stat info {};
+  if (fd.get() < 0 || fstat(fd.get(), &info) != 0) throw cannot(std::strerror(errno));
+  if (S_ISDIR(info.st_mode)) throw cannot("expected a file, got a folder");
+  if (only_regular && !S_ISREG(info.st_mode))
+    throw cannot("expected a file, got a pipe or a device");
+  // A pipe has no size, so read until the end instead of trusting one.
+  std::vector<std::byte> bytes(static_cast<size_t>(info.st_size));
+  size_t filled = 0;
+  while (true) {
+    if (filled == bytes.size()) bytes.resize(bytes.size() + 65536);
+    const ssize_t got = read(fd.get(), bytes.data() + filled, bytes.size() - filled);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) throw cannot(std::strerror(errno));
+    if (got == 0) break;
+    filled += static_cast<size_t>(got);
+  }
+  bytes.resize(filled);
+  return bytes;
+}
+
+std::string TextOf(std::span<const std::byte> bytes) {
+  std::string text(bytes.size(), '\0');
+  if (!bytes.empty()) std::memcpy(text.data(), bytes.data(), bytes.size());
+  return text;
+}
+
+void WriteInPlace(const fs::path& path, std::string_view text) {
+  const Descriptor fd(open(path.c_str(), O_WRONLY | O_CLOEXEC));
+  if (fd.get() < 0 || !WriteAll(fd.get(), BytesOf(text))) {
+    throw PathError("cannot write", path, errno);
+  }
 }
 
 }  // namespace
@@ -68,99 +82,68 @@ std::span<const std::byte> BytesOf(std::string_view text) {
   return std::as_bytes(std::span(text.data(), text.size()));
 }
 
+Error PathError(std::string_view what, const fs::path& path, int error_number) {
+  return {IsOfPath(error_number) ? 2 : 1,
+          Concat(what, " ", path.string(), ": ", std::strerror(error_number))};
+}
+
 std::vector<std::byte> ReadFile(const fs::path& path) {
-  const Descriptor fd(open(path.c_str(), O_RDONLY));
-  struct stat info {};
-  if (fd.get() < 0 || fstat(fd.get(), &info) != 0) throw BadInput(SystemError("cannot read", path));
-  if (S_ISDIR(info.st_mode)) {
-    throw BadInput(Concat("cannot read ", path.string(), ": expected a file, got a folder"));
-  }
-  // A pipe has no size, so read until the end instead of trusting one.
-  std::vector<std::byte> bytes(static_cast<size_t>(info.st_size));
-  size_t filled = 0;
-  while (true) {
-    if (filled == bytes.size()) bytes.resize(bytes.size() + 65536);
-    const ssize_t got = read(fd.get(), bytes.data() + filled, bytes.size() - filled);
-    if (got < 0 && errno == EINTR) continue;
-    if (got < 0) throw BadInput(SystemError("cannot read", path));
-    if (got == 0) break;
-    filled += static_cast<size_t>(got);
-  }
-  bytes.resize(filled);
-  return bytes;
+  return ReadAll(Descriptor(open(path.c_str(), O_RDONLY | O_CLOEXEC)), path, false);
 }
 
-std::string ReadTextFile(const fs::path& path) {
-  const std::vector<std::byte> bytes = ReadFile(path);
-  std::string text(bytes.size(), '\0');
-  if (!bytes.empty()) std::memcpy(text.data(), bytes.data(), bytes.size());
-  return text;
-}
+std::string ReadTextFile(const fs::path& path) { return TextOf(ReadFile(path)); }
 
-std::string ReadSmallTextFile(const fs::path& path, size_t most_bytes) {
-  // Opening a pipe that nobody writes to would wait for somebody who does.
+std::string ReadOwnFile(const fs::path& path, size_t most_bytes) {
+  // Without waiting for whoever might write into a pipe.
   const Descriptor fd(open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
   struct stat info {};
-  if (fd.get() < 0 || fstat(fd.get(), &info) != 0) throw BadInput(SystemError("cannot read", path));
-  const auto expect = [&](bool valid, std::string_view expected, const auto& got) {
-    if (valid) return;
-    throw BadInput(Concat("cannot read ", path.string(), ": expected ", expected, ", got ", got));
-  };
-  expect(S_ISREG(info.st_mode), "a file",
-         S_ISDIR(info.st_mode) ? "a folder" : "a pipe or a device");
-  const auto size = static_cast<size_t>(info.st_size);
-  expect(size <= most_bytes, Concat("at most ", most_bytes, " bytes"), size);
-  std::string text(size, '\0');
-  size_t filled = 0;
-  while (filled < size) {
-    const ssize_t got = read(fd.get(), text.data() + filled, size - filled);
-    if (got < 0 && errno == EINTR) continue;
-    if (got < 0) throw BadInput(SystemError("cannot read", path));
-    if (got == 0) break;  // it has become shorter meanwhile
-    filled += static_cast<size_t>(got);
+  if (fd.get() >= 0 && fstat(fd.get(), &info) == 0 && S_ISREG(info.st_mode) &&
+      static_cast<uintmax_t>(info.st_size) > most_bytes) {
+    throw BadInput(Concat("cannot read ", path.string(), ": expected at most ", most_bytes,
+                          " bytes, got ", info.st_size));
   }
-  text.resize(filled);
-  return text;
+  return TextOf(ReadAll(fd, path, true));
 }
 
-void WriteFileAtomically(const fs::path& given, std::span<const std::span<const std::byte>> parts) {
-  // The file that a link leads to is what shall change, not the link.
-  std::error_code error;
-  const fs::path path = fs::exists(given, error) ? fs::canonical(given, error) : given;
-  if (fs::exists(path, error) && !fs::is_regular_file(path, error)) {
-    return WriteInPlace(path, parts);  // a pipe or a device cannot be replaced
-  }
-
-  const fs::path temporary =
-      path.parent_path() / Concat(".", path.filename().string(), ".upswing-tmp");
-  try {
-    const Descriptor fd(open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0666));
-    if (fd.get() < 0) throw Failure(SystemError("cannot write", path));
-    for (const auto part : parts) {
-      if (!WriteAll(fd.get(), part)) throw Failure(SystemError("cannot write", path));
-    }
-    if (fsync(fd.get()) != 0) throw Failure(SystemError("cannot write", path));
-    if (rename(temporary.c_str(), path.c_str()) != 0) {
-      throw Failure(SystemError("cannot write", path));
-    }
-  } catch (...) {
-    unlink(temporary.c_str());
-    throw;
-  }
-  SyncFolder(path.parent_path());
+void WriteFileAtomically(const fs::path& path, std::span<const std::span<const std::byte>> parts) {
+  Making file(path, Making::Kind::kFile);
+  bool written = true;
+  for (const auto part : parts) written = written && WriteAll(file.descriptor(), part);
+  if (!written || fsync(file.descriptor()) != 0) throw PathError("cannot write", path, errno);
+  file.Publish();
 }
 
 void WriteFileAtomically(const fs::path& path, std::string_view text) {
   WriteFileAtomically(path, std::array{BytesOf(text)});
 }
 
+void WriteNamedFile(const fs::path& path, std::string_view text) {
+  struct stat info {};
+  if (stat(path.c_str(), &info) != 0) {
+    if (errno != ENOENT) throw PathError("cannot write", path, errno);
+    if (lstat(path.c_str(), &info) == 0) {
+      throw BadInput(Concat("cannot write ", path.string(), ": it is a link that leads nowhere"));
+    }
+    return WriteFileAtomically(path, text);
+  }
+  if (S_ISDIR(info.st_mode)) throw PathError("cannot write", path, EISDIR);
+  if (!S_ISREG(info.st_mode)) return WriteInPlace(path, text);
+  WriteFileAtomically(fs::canonical(path), text);
+}
+
 void CheckFree(const fs::path& folder, std::string_view advice) {
   std::error_code error;
-  if (!fs::exists(fs::symlink_status(folder, error))) return;
+  const fs::file_status there = fs::symlink_status(folder, error);
+  if (!fs::exists(there)) return;
   const bool is_folder = fs::is_directory(folder, error);
   if (is_folder && fs::is_empty(folder, error)) return;
+  if (is_folder && error) throw PathError("cannot read", folder, error.value());
+  const bool leads_nowhere = fs::is_symlink(there) && !fs::exists(folder, error);
   throw BadInput(Concat(folder.string(), ": expected a new or empty folder, got ",
-                        is_folder ? "one that holds something" : "a file", " (", advice, ")"));
+                        is_folder       ? "one that holds something"
+                        : leads_nowhere ? "a link that leads nowhere"
+                                        : "a file",
+                        " (", advice, ")"));
 }
 
 void MakeNewFolder(const fs::path& folder) {
@@ -171,63 +154,53 @@ void MakeNewFolder(const fs::path& folder) {
 void MakeFolder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
-  if (error) {
-    throw Failure(Concat("cannot make the folder ", folder.string(), ": ", error.message()));
-  }
+  if (error) throw PathError("cannot make the folder", folder, error.value());
 }
 
 FolderLock::FolderLock(const fs::path& folder)
     : descriptor_(open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
-  if (descriptor_ < 0) throw BadInput(SystemError("cannot read", folder));
-  if (flock(descriptor_, LOCK_EX | LOCK_NB) != 0) {
-    const bool taken = errno == EWOULDBLOCK;
-    const std::string message = taken ? Concat(folder.string(), ": another process is at work here")
-                                      : SystemError("cannot lock", folder);
-    close(descriptor_);
-    throw BadInput(message);
-  }
+  if (descriptor_.get() < 0) throw PathError("cannot read", folder, errno);
+  if (flock(descriptor_.get(), LOCK_EX | LOCK_NB) == 0) return;
+  throw errno == EWOULDBLOCK
+      ? BadInput(Concat(folder.string(), ": another process is at work here"))
+      : PathError("cannot lock", folder, errno);
 }
 
-FolderLock::~FolderLock() { close(descriptor_); }
-
-AppendFile::AppendFile(fs::path path, int64_t size)
+AppendFile::AppendFile(fs::path path)
     : path_(std::move(path)),
-      descriptor_(open(path_.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0666)),
-      size_(size) {
-  if (descriptor_ < 0) throw Failure(SystemError("cannot write", path_));
+      descriptor_(open(path_.c_str(),
+                       O_WRONLY | O_CREAT | O_APPEND | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0666)) {
+  const auto refuse = [&](std::string_view what) {
+    return BadInput(Concat("cannot write ", path_.string(),
+                           ": expected a file of this folder alone, got ", what));
+  };
+  if (descriptor_.get() < 0) {
+    const int error_number = errno;
+    std::error_code error;
+    throw error_number == ELOOP && fs::is_symlink(path_, error)
+        ? refuse("a link")
+        : PathError("cannot write", path_, error_number);
+  }
   struct stat info {};
-  std::string problem;
-  if (fstat(descriptor_, &info) != 0) {
-    problem = SystemError("cannot read", path_);
-  } else if (size == kKeepAll) {
-    size_ = info.st_size;
-  } else if (info.st_size < size) {
-    problem = Concat(path_.string(), ": expected at least the ", size,
-                     " bytes that the checkpoint knows of, got ", info.st_size);
-  } else if (ftruncate(descriptor_, size) != 0) {
-    problem = SystemError("cannot write", path_);
+  if (fstat(descriptor_.get(), &info) != 0) throw PathError("cannot write", path_, errno);
+  if (!S_ISREG(info.st_mode)) throw refuse("a pipe or a device");
+  if (info.st_nlink > 1) {
+    throw refuse(Concat("one with ", info.st_nlink, " names (hard links; a copy would do)"));
   }
-  if (!problem.empty()) {
-    close(descriptor_);
-    throw Failure(problem);
-  }
+  size_ = info.st_size;
 }
 
-AppendFile::~AppendFile() {
-  if (descriptor_ >= 0) close(descriptor_);
+void AppendFile::CutTo(int64_t size) {
+  if (ftruncate(descriptor_.get(), size) != 0) throw PathError("cannot write", path_, errno);
+  size_ = size;
 }
-
-AppendFile::AppendFile(AppendFile&& other) noexcept
-    : path_(std::move(other.path_)),
-      descriptor_(std::exchange(other.descriptor_, -1)),
-      size_(other.size_) {}
 
 void AppendFile::Sync() const {
-  if (fsync(descriptor_) != 0) throw Failure(SystemError("cannot write", path_));
+  if (fsync(descriptor_.get()) != 0) throw PathError("cannot write", path_, errno);
 }
 
 void AppendFile::Append(std::span<const std::byte> bytes) {
-  if (!WriteAll(descriptor_, bytes)) throw Failure(SystemError("cannot write", path_));
+  if (!WriteAll(descriptor_.get(), bytes)) throw PathError("cannot write", path_, errno);
   size_ += static_cast<int64_t>(bytes.size());
 }
 

@@ -34,10 +34,10 @@ TEST_F(FileTest, WrittenTextIsReadBackAndReplaced) {
 TEST_F(FileTest, ASmallFileIsARegularOneWithinItsBound) {
   const fs::path path = folder_ / "a";
   WriteFileAtomically(path, "twelve bytes");
-  EXPECT_EQ(ReadSmallTextFile(path, 12), "twelve bytes");
+  EXPECT_EQ(ReadOwnFile(path, 12), "twelve bytes");
   const auto error_of = [](const fs::path& file, size_t most) -> std::string {
     try {
-      ReadSmallTextFile(file, most);
+      ReadOwnFile(file, most);
     } catch (const Error& error) {
       EXPECT_EQ(error.exit_code(), 2);
       return error.what();
@@ -70,14 +70,51 @@ TEST_F(FileTest, AWriteThatDoesNotFitLeavesTheOldFileAndNothingElse) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 1);
 }
 
-TEST_F(FileTest, ALinkStaysAndADeviceIsWrittenInPlace) {
+TEST_F(FileTest, AFileOfAFolderIsWrittenThroughNoLink) {
   WriteFileAtomically(folder_ / "target", "old");
   fs::create_symlink("target", folder_ / "link");
+  fs::create_hard_link(folder_ / "target", folder_ / "twin");
   WriteFileAtomically(folder_ / "link", "new");
+  WriteFileAtomically(folder_ / "twin", "new");
+  EXPECT_FALSE(fs::is_symlink(folder_ / "link"));
+  EXPECT_EQ(ReadTextFile(folder_ / "link"), "new");
+  EXPECT_EQ(ReadTextFile(folder_ / "target"), "old");
+}
+
+TEST_F(FileTest, AnOutputFollowsTheUsersOwnLinkAndADeviceIsWrittenInPlace) {
+  WriteFileAtomically(folder_ / "target", "old");
+  fs::create_symlink("target", folder_ / "link");
+  WriteOutput(folder_ / "link", "new");
   EXPECT_TRUE(fs::is_symlink(folder_ / "link"));
   EXPECT_EQ(ReadTextFile(folder_ / "target"), "new");
-  WriteFileAtomically("/dev/null", "gone");
+  WriteOutput("/dev/null", "gone");
   EXPECT_TRUE(fs::is_character_file("/dev/null"));
+}
+
+TEST_F(FileTest, AnOutputThatCannotBeIsBadInputAndAFullDiskIsNot) {
+  fs::create_symlink("loop", folder_ / "loop");
+  fs::create_symlink("nowhere", folder_ / "lost");
+  fs::create_directory(folder_ / "folder");
+  WriteFileAtomically(folder_ / "file", "mine");
+  const auto exit_code = [](const fs::path& path) {
+    try {
+      WriteOutput(path, "text");
+      return 0;
+    } catch (const Error& error) {
+      return error.exit_code();
+    }
+  };
+  for (const char* name : {"loop", "lost", "folder", "file/below", "none/below", "folder/"}) {
+    EXPECT_EQ(exit_code(folder_ / name), 2) << name;
+  }
+  EXPECT_EQ(exit_code("/dev/full"), 1);
+  EXPECT_EQ(ReadTextFile(folder_ / "file"), "mine");
+}
+
+TEST_F(FileTest, APipeInAFolderIsNotWaitedFor) {
+  ASSERT_EQ(mkfifo((folder_ / "pipe").c_str(), 0666), 0);
+  EXPECT_THROW(ReadOwnFile(folder_ / "pipe"), Error);
+  EXPECT_THROW(AppendFile(folder_ / "pipe"), Error);
 }
 
 TEST_F(FileTest, ANewOrEmptyFolderIsTakenAndNothingElse) {
@@ -128,22 +165,38 @@ TEST_F(FileTest, AFolderIsLockedForOneAtATime) {
 TEST_F(FileTest, AppendFileIsCutBackToTheSizeThatIsKnown) {
   const fs::path path = folder_ / "log";
   {
-    AppendFile file(path, 0);
+    AppendFile file(path);
     file.Append("first\n");
     EXPECT_EQ(file.size(), 6);
     file.Append("after the checkpoint\n");
   }
   {
-    AppendFile file(path, 6);
+    AppendFile file(path);
+    EXPECT_EQ(file.size(), 27);
+    file.CutTo(6);
     file.Append("again\n");
   }
   EXPECT_EQ(ReadTextFile(path), "first\nagain\n");
-  {
-    AppendFile file(path, AppendFile::kKeepAll);
-    file.Append("more\n");
+}
+
+TEST_F(FileTest, AppendFileIsOpenedThroughNoLink) {
+  WriteFileAtomically(folder_ / "target", "mine");
+  fs::create_symlink("target", folder_ / "link");
+  fs::create_symlink("nowhere", folder_ / "lost");
+  fs::create_hard_link(folder_ / "target", folder_ / "twin");
+  for (const char* name : {"link", "lost", "twin"}) {
+    try {
+      AppendFile file(folder_ / name);
+      FAIL() << name;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.exit_code(), 2);
+      const std::string expected =
+          (folder_ / name).string() + ": expected a file of this folder alone";
+      EXPECT_NE(std::string(error.what()).find(expected), std::string::npos) << error.what();
+    }
   }
-  EXPECT_EQ(ReadTextFile(path), "first\nagain\nmore\n");
-  EXPECT_THROW(AppendFile(path, 100), Error);
+  EXPECT_EQ(ReadTextFile(folder_ / "target"), "mine");
+  EXPECT_FALSE(fs::exists(folder_ / "nowhere"));
 }
 
 }  // namespace

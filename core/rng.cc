@@ -1,5 +1,6 @@
 #include "core/rng.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <numbers>
@@ -61,6 +62,10 @@ double Rng::Normal() {
   return radius * std::cos(2.0 * std::numbers::pi * Uniform());
 }
 
-void Rng::State(const Archive& archive) { archive.Array("state", std::span<uint64_t>(state_)); }
+void Rng::State(const Archive& archive) {
+  archive.Array("state", std::span<uint64_t>(state_), kAnyNumber<uint64_t>);
+  const bool lives = std::ranges::any_of(state_, [](uint64_t word) { return word != 0; });
+  archive.Check(lives, "state", "a number above 0, for zeros would be followed by zeros");
+}
 
 }  // namespace upswing

@@ -263,7 +263,7 @@ struct Component {
   void State(const Archive& archive) {
     archive.Array("fixed", std::span(fixed));
     archive.Vector("growing", growing, 4);
-    archive.Scalar("number", number);
+    archive.Scalar("number", number, {-6, 6});
     archive.Scalar("flag", flag);
     rng.State(archive.In("rng"));
   }
@@ -302,6 +302,40 @@ TEST_F(TensorFileTest, ArchiveNeitherSavesNorLoadsNumbersThatAreNotFinite) {
   written.Save(path_);
   const TensorFile source = TensorFile::Load(path_);
   EXPECT_THROW(component.State(Archive::Loader(source)), Error);
+}
+
+TEST_F(TensorFileTest, ArchiveNeitherSavesNorLoadsNumbersOutOfBounds) {
+  for (const int64_t number : {int64_t{-7}, int64_t{7}, std::numeric_limits<int64_t>::min()}) {
+    Component component;
+    component.number = number;
+    TensorFile target;
+    EXPECT_THROW(component.State(Archive::Saver(target)), Error);
+    TensorFile written;
+    written.AddScalar("number", number);
+    written.AddScalar("flag", int64_t{2});
+    written.Save(path_);
+    const TensorFile source = TensorFile::Load(path_);
+    const Archive archive = Archive::Loader(source);
+    try {
+      archive.Scalar("number", component.number, {-6, 6});
+      FAIL();
+    } catch (const Error& error) {
+      EXPECT_EQ(error.exit_code(), 2);
+      EXPECT_EQ(error.what(),
+                Concat(path_.string(), ": tensor \"number\": expected -6 to 6, got ", number));
+    }
+    EXPECT_THROW(archive.Scalar("flag", component.flag), Error);
+  }
+}
+
+TEST_F(TensorFileTest, ArchiveLoadsNoRandomStreamOfZeros) {
+  const std::vector<uint64_t> zeros(4);
+  TensorFile written;
+  written.Add<uint64_t>("state", zeros);
+  written.Save(path_);
+  const TensorFile source = TensorFile::Load(path_);
+  Rng rng(1, "stream");
+  EXPECT_THROW(rng.State(Archive::Loader(source)), Error);
 }
 
 TEST_F(TensorFileTest, ArchiveRefusesMoreThanTheLargestSize) {

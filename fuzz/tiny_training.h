@@ -47,6 +47,7 @@ struct TinyTraining {
     agent.Act(env.obs(), torque);
     env.Step(torque, result);
     agent.Observe(result);
+    state.steps = agent.steps();
     agent.Learn();
     (void)agent.Report();
     (void)state.mean_return();

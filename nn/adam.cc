@@ -2,12 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/error.h"
 #include "core/text.h"
 #include "nn/linear.h"
 
 namespace upswing {
+namespace {
+
+constexpr int64_t kMostSteps = 1'000'000'000'000'000;  // no training makes as many
+
+}  // namespace
 
 Adam::Adam(size_t num_parameters) : m_(num_parameters), v_(num_parameters) {}
 
@@ -49,9 +55,9 @@ void Adam::Step(const Size& size, std::span<const float> gradient, std::span<flo
 }
 
 void Adam::State(const Archive& archive) {
-  archive.Scalar("steps", steps_);
+  archive.Scalar("steps", steps_, {0, kMostSteps});
   archive.Array("m", std::span(m_));
-  archive.Array("v", std::span(v_));
+  archive.Array("v", std::span(v_), {0, std::numeric_limits<float>::max()});
 }
 
 }  // namespace upswing

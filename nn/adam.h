@@ -29,6 +29,9 @@ class Adam {
   void Step(const Size& size, std::span<const float> gradient, std::span<float> parameters,
             std::span<float> target, ThreadPool& pool);
 
+  /// How many there were.
+  int64_t steps() const { return steps_; }
+
   /// Saves or loads the moments and the step count.
   void State(const Archive& archive);
 

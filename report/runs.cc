@@ -12,7 +12,7 @@ namespace fs = std::filesystem;
 std::vector<EvaluationRow> ReadEvaluations(const fs::path& run, bool may_be_cut) {
   const fs::path path = run / "evals.csv";
   if (!fs::exists(path)) return {};
-  return ParseEvaluations(ReadTextFile(path), path.string(), may_be_cut);
+  return ParseEvaluations(ReadOwnFile(path), path.string(), may_be_cut);
 }
 
 std::vector<EvaluationRow> ParseEvaluations(std::string text, const std::string& where,

@@ -11,6 +11,9 @@
 
 namespace upswing {
 
+/// More control steps, over all environments, than any training makes.
+inline constexpr int64_t kMostSteps = 2'000'000'000'000;
+
 /// Learning metrics of an agent: means over the updates since BeginReport.
 struct AgentReport {
   int64_t updates = 0;       // gradient steps since the beginning of the run
@@ -38,6 +41,9 @@ class Agent {
 
   /// All gradient steps that are due by now. Throws Failure if a number is not finite.
   virtual void Learn() = 0;
+
+  /// Control steps that it has observed, over all environments.
+  virtual int64_t steps() const = 0;
 
   /// The metrics since BeginReport.
   virtual AgentReport Report() const = 0;

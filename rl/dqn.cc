@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "core/error.h"
@@ -133,12 +134,14 @@ void Dqn::Observe(const StepResult& result) {
   steps_ += static_cast<int64_t>(act_action_.size());
 }
 
-void Dqn::Learn() {
+int64_t Dqn::updates_due() const {
   const int64_t learning_steps = steps_ - config_.learning_starts;
-  if (learning_steps <= 0 || replay_.size() == 0) return;
-  const auto due =
-      static_cast<int64_t>(static_cast<double>(learning_steps) * config_.updates_per_step);
-  while (updates_ < due) {
+  if (learning_steps <= 0 || replay_.size() == 0) return 0;
+  return static_cast<int64_t>(static_cast<double>(learning_steps) * config_.updates_per_step);
+}
+
+void Dqn::Learn() {
+  while (updates_ < updates_due()) {
     if (config_.prioritized) {
       replay_.SamplePrioritized(sample_rng_, importance_exponent(), batch_);
     } else {
@@ -273,6 +276,8 @@ Policy Dqn::ExportPolicy(PolicyInfo info) const {
 }
 
 void Dqn::State(const Archive& archive) {
+  constexpr int64_t kMostUpdates = 100 * kMostSteps;  // updates_per_step is at most 100
+  constexpr Bounds<double> kSum{0, std::numeric_limits<double>::max()};
   archive.Array("theta", std::span(theta_));
   archive.Array("theta_target", std::span(theta_target_));
   if (config_.policy_tau < 1) archive.Array("theta_policy", std::span(theta_policy_));
@@ -282,14 +287,18 @@ void Dqn::State(const Archive& archive) {
   n_step_.State(archive.In("n_step"), actions);
   explore_rng_.State(archive.In("explore_rng"));
   sample_rng_.State(archive.In("sample_rng"));
-  archive.Scalar("steps", steps_);
-  archive.Scalar("episodes", episodes_);
-  archive.Scalar("updates", updates_);
-  archive.Scalar("loss_sum", loss_sum_);
-  archive.Scalar("q_sum", q_sum_);
-  archive.Scalar("td_sum", td_sum_);
-  archive.Scalar("norm_sum", norm_sum_);
-  archive.Scalar("report_updates", report_updates_);
+  archive.Scalar("steps", steps_, {0, kMostSteps});
+  archive.Check(replay_.size() == std::min(replay_.capacity(), steps_ - n_step_.waiting()),
+                "replay/rows", "a transition for each step, or as many as there is room for");
+  archive.Scalar("episodes", episodes_, {0, steps_});
+  archive.Scalar("updates", updates_, {0, kMostUpdates});
+  archive.Check(updates_ == updates_due() && adam_.steps() == updates_, "updates",
+                Concat(updates_due(), " as the steps ask for, and as many of Adam"));
+  archive.Scalar("report_updates", report_updates_, {0, updates_});
+  archive.Scalar("loss_sum", loss_sum_, kSum);
+  archive.Scalar("q_sum", q_sum_, kAnyNumber<double>);
+  archive.Scalar("td_sum", td_sum_, kSum);
+  archive.Scalar("norm_sum", norm_sum_, kSum);
   archive.Array("last_features", std::span(activations_.feature.back()));
 }
 

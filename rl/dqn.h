@@ -55,6 +55,7 @@ class Dqn : public Agent {
   std::span<const float> online() const { return theta_; }
   std::span<const float> target() const { return theta_target_; }
   const Replay& replay() const { return replay_; }
+  int64_t steps() const override { return steps_; }
   double epsilon() const;
   double learning_rate() const;
   /// β of prioritised replay, which rises to 1 over learning_rate_steps (Schaul et al., 2016).
@@ -69,6 +70,8 @@ class Dqn : public Agent {
   void CountErrors(const Minibatch& batch);
   /// Lets theta_policy_ follow θ.
   void AveragePolicy();
+  /// Updates that the steps so far ask for.
+  int64_t updates_due() const;
   /// Share of the way from the first to the last learning rate, 0 to 1.
   double schedule() const;
 

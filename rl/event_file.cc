@@ -47,7 +47,8 @@ uint32_t Crc32c(std::string_view bytes) {
   return ~crc;
 }
 
-EventFile::EventFile(const std::filesystem::path& path, int64_t size) : file_(path, size) {
+void EventFile::CutTo(int64_t size) {
+  file_.CutTo(size);
   if (size > 0) return;
   tensorboard::Event event;
   event.set_wall_time(WallTime());

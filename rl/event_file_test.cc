@@ -22,13 +22,15 @@ TEST(EventFile, CutBackItHoldsWhatItHeldThen) {
   const auto path = folder / "events";
   int64_t size = 0;
   {
-    EventFile file(path, 0);
+    EventFile file(path);
+    file.CutTo(0);
     file.Append(1, {{"a", 0.5}});
     size = file.size();
     file.Append(2, {{"a", 0.25}, {"b", 1}});
   }
   const std::string whole = ReadTextFile(path);
-  EventFile file(path, size);
+  EventFile file(path);
+  file.CutTo(size);
   EXPECT_EQ(file.size(), size);
   EXPECT_EQ(ReadTextFile(path), whole.substr(0, static_cast<size_t>(size)));
 }

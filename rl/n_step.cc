@@ -2,8 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-
-#include "core/text.h"
+#include <numeric>
 
 namespace upswing {
 
@@ -50,18 +49,13 @@ void NStep::Push(int env, std::span<const float> obs, int action, double reward,
   std::ranges::copy(waiting_reward.subspan(first), waiting_reward.begin());
 }
 
+int64_t NStep::waiting() const { return std::accumulate(count_.begin(), count_.end(), int64_t{0}); }
+
 void NStep::State(const Archive& archive, int num_actions) {
-  archive.Array("count", std::span(count_));
+  archive.Array("count", std::span(count_), {0, static_cast<int64_t>(n_) - 1});
   archive.Array("obs", std::span(obs_));
-  archive.Array("action", std::span(action_));
+  archive.Array("action", std::span(action_), {0, int64_t{num_actions} - 1});
   archive.Array("reward", std::span(reward_));
-  const auto below = [](int64_t bound) {
-    return [bound](int64_t x) { return x >= 0 && x < bound; };
-  };
-  archive.Check(std::ranges::all_of(count_, below(static_cast<int64_t>(n_))), "count",
-                Concat("numbers from 0 to ", n_ - 1));
-  archive.Check(std::ranges::all_of(action_, below(num_actions)), "action",
-                Concat("actions from 0 to ", num_actions - 1));
 }
 
 }  // namespace upswing

@@ -21,8 +21,10 @@ class NStep {
             std::span<const float> next_obs, bool terminated, bool truncated,
             const std::function<void(const Transition&)>& emit);
 
-  /// Saves or loads the steps that wait for their successors; loading throws BadInput on an action
-  /// of num_actions or more.
+  /// Steps of all environments that wait for their successors.
+  int64_t waiting() const;
+
+  /// Saves or loads the steps that wait; actions are below num_actions.
   void State(const Archive& archive, int num_actions);
 
  private:

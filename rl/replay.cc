@@ -6,6 +6,12 @@
 #include "core/text.h"
 
 namespace upswing {
+namespace {
+
+// (|TD error| + 1e-6)^α with α up to 1 and a TD error that is a float, and some room for rounding.
+constexpr Bounds<double> kPriorities{1e-7, 1e39};
+
+}  // namespace
 
 Minibatch::Minibatch(int size, int obs_size)
     : obs(static_cast<size_t>(size) * static_cast<size_t>(obs_size)),
@@ -103,23 +109,22 @@ void Replay::Prioritize(const Minibatch& batch, std::span<const float> td_error,
 }
 
 void Replay::State(const Archive& archive, int num_actions) {
-  archive.Scalar("next", next_);
+  archive.Scalar("next", next_, {0, capacity_ - 1});
   archive.Vector("rows", rows_, static_cast<size_t>(capacity_) * row_size());
   archive.Check(rows_.size() % row_size() == 0, "rows", "whole transitions");
   // Until the memory is full, the next place is behind the last.
   const bool full = size() == capacity_;
-  archive.Check(full ? next_ >= 0 && next_ < capacity_ : next_ == size(), "next",
-                "a place to write to");
+  archive.Check(full || next_ == size(), "next", "the place behind the last");
   if (priorities_) {
-    archive.Scalar("largest_priority", largest_priority_);
-    archive.Check(std::isfinite(largest_priority_) && largest_priority_ > 0, "largest_priority",
-                  "a finite number above 0");
-    priorities_->State(archive.In("priorities"), size());
+    archive.Scalar("largest_priority", largest_priority_, {1, kPriorities.highest});
+    priorities_->State(archive.In("priorities"), size(), {kPriorities.lowest, largest_priority_});
   }
   if (!archive.loading()) return;
-  const auto valid = [&](float a) { return a >= 0 && a < num_actions && a == std::trunc(a); };
-  for (size_t action = 2 * obs_size_; action < rows_.size(); action += row_size()) {
-    archive.Check(valid(rows_[action]), "rows", Concat("actions from 0 to ", num_actions - 1));
+  for (size_t at = 2 * obs_size_; at < rows_.size(); at += row_size()) {
+    const float action = rows_[at], discount = rows_[at + 2];
+    archive.Check(action >= 0 && action < num_actions && action == std::trunc(action), "rows",
+                  Concat("actions from 0 to ", num_actions - 1));
+    archive.Check(discount >= 0 && discount <= 1, "rows", "discounts from 0 to 1");
   }
 }
 

@@ -69,7 +69,7 @@ class Replay {
   /// The transition at a place below size().
   Transition at(int64_t index) const;
 
-  /// Saves or loads what is stored; loading throws BadInput on an action of num_actions or more.
+  /// Saves or loads what is stored; actions are below num_actions.
   void State(const Archive& archive, int num_actions);
 
  private:

@@ -4,10 +4,8 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <cerrno>
-#include <cstdlib>
-#include <cstring>
 
+#include "core/archive.h"
 #include "core/error.h"
 #include "core/text.h"
 
@@ -17,22 +15,52 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view kEventsName = "events.out.tfevents.0.upswing";
+constexpr int64_t kMostBytes = int64_t{1} << 60;
+
+// What grows while the run goes on, and whose size the checkpoint knows.
+constexpr std::array kTables{"metrics", "episodes", "evals", "events"};
 
 /// Under which name a table's size stands in the checkpoint.
 std::string SizeName(std::string_view table) { return Concat("run/size/", table); }
 
-int64_t SizeOf(const TensorFile& checkpoint, std::string_view table) {
-  int64_t size = 0;
-  checkpoint.Read(SizeName(table), std::span(&size, 1));
-  return size;
-}
-
-/// Adds the sizes of metrics, episodes, evals and events.
-void AddSizes(TensorFile& checkpoint, const std::array<int64_t, 4>& sizes) {
-  constexpr std::array kTables{"metrics", "episodes", "evals", "events"};
+/// Adds the sizes of kTables.
+void AddSizes(TensorFile& checkpoint, const std::array<int64_t, kTables.size()>& sizes) {
   for (size_t i = 0; i < sizes.size(); ++i) {
     checkpoint.AddScalar(SizeName(kTables.at(i)), sizes.at(i));
   }
+}
+
+/// The size of a table that the checkpoint knows of, which has `size` bytes now. Throws BadInput
+/// unless it can be cut back to that.
+int64_t KnownSize(const TensorFile& checkpoint, std::string_view table, const fs::path& path,
+                  int64_t size) {
+  int64_t known = 0;
+  Archive::Loader(checkpoint).Scalar(SizeName(table), known, {0, kMostBytes});
+  if (size >= known) return known;
+  throw BadInput(Concat(path.string(), ": expected at least the ", known,
+                        " bytes that the checkpoint knows of, got ", size));
+}
+
+/// `path` without slashes at its end.
+fs::path WithoutSlash(fs::path path) {
+  while (!path.has_filename() && path.has_relative_path()) path = path.parent_path();
+  return path;
+}
+
+/// Where the folder of a run is to be made: what `path` says, after links in it. Throws BadInput if
+/// there is something already, or if it could not be put there in one piece.
+fs::path PlaceOf(const fs::path& path) {
+  std::error_code error;
+  const bool is_run = fs::exists(path / "config.toml", error);
+  CheckFree(path, Concat(is_run ? Concat("resume it with --resume ", path.string(), ", or ") : "",
+                         "choose another --out"));
+  if (!fs::exists(path, error)) return path;
+  // An empty folder is replaced, which a process that works in it would not notice.
+  if (fs::equivalent(path, fs::current_path(error), error)) {
+    throw BadInput(Concat(path.string(), ": expected a new folder, got the current one (choose ",
+                          "another --out)"));
+  }
+  return fs::canonical(path);
 }
 
 }  // namespace
@@ -40,46 +68,42 @@ void AddSizes(TensorFile& checkpoint, const std::array<int64_t, 4>& sizes) {
 void RunFolder::Create(const fs::path& given,
                        const std::vector<std::pair<std::string, std::string>>& files,
                        const std::function<void(TensorFile&)>& first_checkpoint) {
-  fs::path path = given.lexically_normal();
-  if (!path.has_filename()) path = path.parent_path();  // a slash at the end
-  std::error_code error;
-  const bool is_run = fs::exists(path / "config.toml", error);
-  CheckFree(path, Concat(is_run ? Concat("go on with --resume ", path.string(), ", or ") : "",
-                         "choose another --out"));
-  if (path.has_parent_path()) fs::create_directories(path.parent_path(), error);
-  std::string making = Concat(path.string(), ".XXXXXX");
-  const auto cannot = [&](int exit_code, std::string_view why) {
-    return Error(exit_code, Concat("cannot make the run folder ", path.string(), ": ", why));
-  };
-  if (mkdtemp(making.data()) == nullptr) throw cannot(1, std::strerror(errno));
+  const fs::path path = WithoutSlash(given);
+  const fs::path place = PlaceOf(path);
   try {
-    fs::permissions(making, fs::perms(0755));  // mkdtemp makes it for the owner alone
-    for (const auto& [name, text] : files) WriteFileAtomically(fs::path(making) / name, text);
+    if (place.has_parent_path()) MakeFolder(place.parent_path());
+    Making folder(place, Making::Kind::kFolder);
+    for (const auto& [name, text] : files) WriteFileAtomically(folder.path() / name, text);
     TensorFile checkpoint;
     AddSizes(checkpoint, {0, 0, 0, 0});
     first_checkpoint(checkpoint);
-    checkpoint.Save(CheckpointPath(making));
-    fs::rename(making, path);
+    checkpoint.Save(CheckpointPath(folder.path()));
+    folder.Publish();
   } catch (const Error& failure) {
-    fs::remove_all(making, error);
-    throw cannot(failure.exit_code(), failure.what());
-  } catch (const fs::filesystem_error& failure) {
-    fs::remove_all(making, error);
-    throw cannot(1, failure.code().message());
+    throw Error(failure.exit_code(),
+                Concat("cannot make the run folder ", path.string(), ": ", failure.what()));
   }
 }
 
 RunFolder::RunFolder(fs::path path, const TensorFile& checkpoint)
     : path_(std::move(path)),
-      metrics_(OpenTable("metrics", "train/", checkpoint)),
-      episodes_(OpenTable("episodes", "", checkpoint)),
-      evals_(OpenTable("evals", "evaluation/", checkpoint)),
-      events_(path_ / kEventsName, SizeOf(checkpoint, "events")),
-      log_(path_ / "log.txt", AppendFile::kKeepAll) {}
-
-RunFolder::Table RunFolder::OpenTable(std::string_view name, std::string tag,
-                                      const TensorFile& checkpoint) const {
-  return {std::move(tag), AppendFile(path_ / Concat(name, ".csv"), SizeOf(checkpoint, name))};
+      metrics_{"train/", AppendFile(path_ / "metrics.csv")},
+      episodes_{"", AppendFile(path_ / "episodes.csv")},
+      evals_{"evaluation/", AppendFile(path_ / "evals.csv")},
+      events_(path_ / kEventsName),
+      log_(path_ / "log.txt") {
+  // All are checked before one is cut.
+  const auto known = [&](std::string_view name, const auto& file) {
+    return KnownSize(checkpoint, name, file.path(), file.size());
+  };
+  const int64_t metrics = known("metrics", metrics_.file);
+  const int64_t episodes = known("episodes", episodes_.file);
+  const int64_t evals = known("evals", evals_.file);
+  const int64_t events = known("events", events_);
+  metrics_.file.CutTo(metrics);
+  episodes_.file.CutTo(episodes);
+  evals_.file.CutTo(evals);
+  events_.CutTo(events);
 }
 
 void RunFolder::AppendRow(Table& table, const Row& row) {

@@ -31,13 +31,16 @@ using Row = std::vector<std::pair<std::string, double>>;
 class RunFolder {
  public:
   /// Makes the folder with these files in it (name, text); `first_checkpoint` adds to the first
-  /// checkpoint what the run itself does not know. The folder appears under its name whole or not
-  /// at all. Throws BadInput if something is there already, Failure if it cannot be written.
+  /// checkpoint what the run itself does not know. Folders above it that are missing are made, as
+  /// mkdir -p does; it itself appears under its name whole or not at all (see Making). Throws
+  /// BadInput if something is there already, and as PathError does.
   static void Create(const std::filesystem::path& path,
                      const std::vector<std::pair<std::string, std::string>>& files,
                      const std::function<void(TensorFile&)>& first_checkpoint);
 
-  /// Opens a run whose checkpoint has been loaded; the caller holds its FolderLock. Throws Failure.
+  /// Opens a run whose checkpoint has been loaded; the caller holds its FolderLock. Throws
+  /// BadInput, with nothing changed, if a table is shorter than the checkpoint knows or no file of
+  /// this folder alone (see AppendFile).
   RunFolder(std::filesystem::path path, const TensorFile& checkpoint);
 
   const std::filesystem::path& path() const { return path_; }
@@ -60,7 +63,6 @@ class RunFolder {
     std::string tag;  // prefix of its columns in TensorBoard; empty: not there
     AppendFile file;
   };
-  Table OpenTable(std::string_view name, std::string tag, const TensorFile& checkpoint) const;
   void AppendRow(Table& table, const Row& row);
 
   std::filesystem::path path_;

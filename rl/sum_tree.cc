@@ -1,6 +1,5 @@
 #include "rl/sum_tree.h"
 
-#include <algorithm>
 #include <bit>
 #include <span>
 
@@ -31,11 +30,9 @@ int64_t SumTree::Find(double mass) const {
   return static_cast<int64_t>(node - leaves_);
 }
 
-void SumTree::State(const Archive& archive, int64_t count) {
+void SumTree::State(const Archive& archive, int64_t count, Bounds<double> bounds) {
   const auto numbers = std::span(nodes_).subspan(leaves_, static_cast<size_t>(count));
-  archive.Array("numbers", numbers);
-  archive.Check(std::ranges::all_of(numbers, [](double x) { return x > 0; }), "numbers",
-                "numbers above 0");
+  archive.Array("numbers", numbers, bounds);
   if (!archive.loading()) return;
   for (size_t node = leaves_ - 1; node > 0; --node) {
     nodes_[node] = nodes_[2 * node] + nodes_[2 * node + 1];

@@ -25,8 +25,8 @@ class SumTree {
   /// total(). Never one whose number is 0.
   int64_t Find(double mass) const;
 
-  /// Saves or loads the first `count` numbers; loading throws BadInput unless all are above 0.
-  void State(const Archive& archive, int64_t count);
+  /// Saves or loads the first `count` numbers.
+  void State(const Archive& archive, int64_t count, Bounds<double> bounds);
 
  private:
   size_t leaves_;              // a power of two

@@ -44,8 +44,8 @@ class ToyEnv : public VectorEnv {
   void State(const Archive& archive) override {
     rng_.State(archive.In("rng"));
     archive.Array("x", std::span(x_));
-    archive.Array("steps", std::span(steps_));
-    archive.Scalar("noise", noise_);
+    archive.Array("steps", std::span(steps_), {0, episode_steps - 1});
+    archive.Scalar("noise", noise_, {0, 10});
   }
 
   int64_t episode_steps = 10;

@@ -12,6 +12,7 @@ namespace upswing {
 namespace {
 
 constexpr size_t kRecentEpisodes = 100;  // in the mean return that the progress line shows
+constexpr double kMostSeconds = 1e12;    // more than any training lasts
 
 /// Seconds since the last call.
 class Stopwatch {
@@ -219,21 +220,26 @@ double TrainState::mean_return() const {
 }
 
 void TrainState::State(const Archive& archive) {
-  archive.Scalar("steps", steps);
-  archive.Scalar("episodes", episodes);
-  archive.Scalar("seconds", seconds);
+  const auto envs = static_cast<int64_t>(episode_length.size());
+  archive.Scalar("steps", steps, {0, kMostSteps});
+  archive.Check(steps % envs == 0, "steps", Concat("a multiple of ", envs, " environments"));
+  archive.Scalar("episodes", episodes, {0, steps});
+  archive.Scalar("seconds", seconds, {0, kMostSeconds});
   if (archive.loading()) checkpoint_at = steps;
-  archive.Scalar("streak", streak);
-  archive.Scalar("streak_step", streak_step);
-  archive.Scalar("streak_seconds", streak_seconds);
+  archive.Scalar("streak", streak, {0, 2});
+  archive.Scalar("streak_step", streak_step, {0, steps});
+  archive.Scalar("streak_seconds", streak_seconds, {0, seconds});
   archive.Scalar("solved", solved);
-  archive.Scalar("last_success_rate", last_success_rate);
-  archive.Scalar("best_success_rate", best_success_rate);
-  archive.Scalar("best_return", best_return);
-  archive.Scalar("best_step", best_step);
+  archive.Check(solved == (streak == 2), "solved", "1 after a streak of 2 evaluations, else 0");
+  archive.Scalar("last_success_rate", last_success_rate, {0, 1});
+  archive.Scalar("best_success_rate", best_success_rate, {-1, 1});
+  archive.Scalar("best_return", best_return, kAnyNumber<double>);
+  archive.Scalar("best_step", best_step, {0, steps});
+  archive.Check(best_step > 0 ? best_success_rate >= 0 : best_success_rate == -1,
+                "best_success_rate", "0 to 1 where there is a best step, else -1");
   archive.Array("episode_return", std::span(episode_return));
   archive.Array("episode_terms", std::span(episode_terms));
-  archive.Array("episode_length", std::span(episode_length));
+  archive.Array("episode_length", std::span(episode_length), {0, steps / envs});
   archive.Vector("recent_returns", recent_returns, kRecentEpisodes);
 }
 
@@ -241,6 +247,8 @@ void CheckpointState(const Archive& archive, Agent& agent, VectorEnv& env, Train
   agent.State(archive.In("agent"));
   env.State(archive.In("env"));
   state.State(archive.In("train"));
+  archive.Check(agent.steps() == state.steps, "agent/steps",
+                Concat(state.steps, ", the steps of the training"));
 }
 
 bool Train(Training& training, TrainState& state) {

@@ -155,9 +155,9 @@ void PendulumEnv::State(const Archive& archive) {
     Randomize(static_cast<int>(i));
   }
   physics_->State(archive);
-  archive.Array("step_counts", std::span(step_counts_));
+  archive.Array("step_counts", std::span(step_counts_), {0, episode_steps_ - 1});
   archive.Array("obs", std::span(obs_));
-  archive.Scalar("start_noise", config_.start.noise);
+  archive.Scalar("start_noise", config_.start.noise, {0, 10});
   if (disturber_) disturber_->State(archive.In("disturbance"));
   for (size_t i = 0; i < rngs_.size(); ++i) rngs_[i].State(archive.In(Concat("rng.", i)));
 }

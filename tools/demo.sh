@@ -125,7 +125,7 @@ write_dist() {
   trap 'exit 143' TERM
   cp -R "$page/." "$tmp/" || fail "could not copy the page (see above)"
   [ $# = 0 ] || "$program" export "$@" --page "$tmp/agents" >/dev/null || exit
-  chmod 755 "$tmp"
+  chmod =rwx "$tmp" # as the umask has it
   mv -T -- "$tmp" "$dist" || fail "could not move the page to $dist (see above)"
   case $dist in
     *[[:cntrl:]]*) echo "the page is written, for any web server" ;;
