@@ -51,7 +51,7 @@ CLI::Option* AddPolicy(CLI::App& app, std::string& policy) {
       ->check(NotEmpty());
 }
 
-void AddStart(CLI::App& app, std::string& start) {
+void AddStart(CLI::App& app, std::optional<std::string>& start) {
   app.add_option("--start", start, "where it begins, rad and rad/s [0,0,0,0: hanging]")
       ->type_name("q1,q2,w1,w2");
 }

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -42,7 +43,7 @@ void ShowDefaults(CLI::App& app, const Options& options);
 CLI::Option* AddPolicy(CLI::App& app, std::string& policy);
 
 /// Adds --start, which ParseStart reads.
-void AddStart(CLI::App& app, std::string& start);
+void AddStart(CLI::App& app, std::optional<std::string>& start);
 
 /// Adds --seed, with `what` it is of.
 void AddSeed(CLI::App& app, int64_t& seed, const std::string& what);

@@ -29,16 +29,17 @@ std::string EstimateText(const Estimate& e, Formatter format) {
                      format(e.interval->high));
 }
 
-/// A probability over pairs of runs. Where all pairs agree, so do all resamples, and an interval of
-/// no width would say more than is known.
+/// A probability over pairs of runs.
 std::string PairsText(const Estimate& e) {
-  if (e.value != 0 && e.value != 1) return "with probability " + EstimateText(e, Share);
-  return e.value == 1 ? "in every pair of runs" : "in no pair of runs";
+  const char* agreement = e.value == 1   ? ", in every pair of runs"
+                          : e.value == 0 ? ", in no pair of runs"
+                                         : "";
+  return Concat("with probability ", EstimateText(e, Share), e.interval ? agreement : "");
 }
 
 void PrintScores(const char* name, const Scores& s, Formatter format) {
   if (s.low == s.high) {
-    fmt::print("  {:<16}{} in every run\n", name, format(s.low));
+    fmt::print("  {:<16}{}{}\n", name, format(s.low), s.values.size() > 1 ? " in every run" : "");
     return;
   }
   fmt::print("  {:<16}median {}, IQM {}, range {} to {}\n", name, format(s.median),
@@ -149,7 +150,8 @@ void PrintComparison(const Comparison& comparison, const std::filesystem::path& 
   for (const PairSummary& pair : comparison.pairs) PrintPair(comparison, pair);
   for (const std::string& note : runs.notes) fmt::print("Note: {}\n", Printable(note));
   fmt::print(
-      "Intervals: Wilson for shares, else percentile bootstrap of {} resamples of the runs.\n",
+      "Intervals: Wilson for shares, else percentile bootstrap of {} resamples of the runs, or "
+      "Newcombe's\nwhere all pairs of runs agree.\n",
       FormatCount(kResamples));
   if (written_to.empty()) return;
   std::string curves;

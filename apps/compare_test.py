@@ -115,7 +115,12 @@ class CompareTest(ProgramTest):
         self.assertIsNone(pair["solve_seconds_difference"])
         self.assertEqual(pair["return_difference"]["value"],
                          (2501 + 2502 + 903) / 3 - (2501 + 2502 + 2503) / 3)
-        self.assertIn("solves sooner   in no pair of runs\n", self.succeed("compare", "a", "b"))
+        # No pair of three and three is not the same as never.
+        low, high = pair["solves_sooner"]["interval_95"]
+        self.assertEqual(low, 0)
+        self.assertAlmostEqual(high, 0.499, delta=0.001)
+        self.assertIn("solves sooner   with probability 0.00 (95% 0.00 to 0.50), in no pair of "
+                      "runs\n", self.succeed("compare", "a", "b"))
         self.assertEqual(self.compare("b", "a")["pairs"][0]["solves_sooner"]["value"], 1)
 
     def test_stability(self):
@@ -146,6 +151,13 @@ class CompareTest(ProgramTest):
         answer = self.compare("run")
         self.assertIsNone(answer["groups"][0]["final_return"]["iqm"]["interval_95"])
         self.assertIn("no intervals, there is one seed only", answer["notes"][0])
+        # "In every run" is said of several only.
+        self.assertIn("final return    2,610\n", self.succeed("compare", "run"))
+        self.make_run("two/1", 1, [(1, 2600), (1, 2610)])
+        self.make_run("two/2", 2, [(1, 2600), (1, 2610)])
+        self.assertIn("final return    2,610 in every run\n", self.succeed("compare", "two"))
+        (group,) = self.compare("two")["groups"]
+        self.assertIsNone(group["final_success"]["iqm"]["interval_95"])
 
     def test_order_of_the_arguments_changes_no_figure(self):
         self.make_group("r", [1, 2, 3])
@@ -310,7 +322,7 @@ class CompareTest(ProgramTest):
         svg = (self.folder / "out/curves.svg").read_text(encoding="utf-8")
         ET.fromstring(svg)
         for words in ("n_step 1", "keeps its last value", "training time"):
-            self.assertIn(words, re.sub(r"<[^>]*>|&#160;", " ", svg))
+            self.assertIn(words, re.sub(r"(<[^>]*>|&#160;|\s)+", " ", svg))
         self.refuse(["compare", "a", "--out", "out"], "out: expected a new or empty folder")
 
     def test_without_gnuplot_there_are_figures_in_numbers_only(self):

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """`upswing eval`: its table, its JSON, and that the same question gets the same answer."""
 
+import csv
 import json
 import math
 import re
@@ -34,10 +35,12 @@ class EvalTest(ProgramTest):
 
     def test_json_has_all_fields(self):
         result = self.evaluate()
-        self.assertEqual(list(result), ["policy", "seed", "physics", "plant", "model",
-                                        "disturbance", "randomize", "episodes", "successes", "success_rate", "success_interval_95", "swing_up_seconds",
-                                        "return", "reward_terms", "energy_used", "peak_torque",
-                                        "rms_torque"])
+        self.assertEqual(list(result), [
+            "policy", "seed", "physics", "plant", "model", "unknown_plant", "disturbance", "randomize",
+            "episodes", "successes", "success_rate", "success_interval_95", "swing_up_seconds",
+            "settled", "settling_seconds", "steady_tilt_degrees", "return", "reward_terms", "value",
+            "discounted_return", "energy_used", "peak_torque", "rms_torque", "torque_variation",
+            "torque_variation_upright", "torque_changes_upright"])
         self.assertEqual(result["plant"], PLANT | {"gravity": 0.05, "damping1": 1, "damping2": 1})
         self.assertEqual(result["policy"], str(self.policy / "policy.safetensors"))
         self.assertEqual(list(result["reward_terms"]), REWARD_TERMS)
@@ -67,6 +70,8 @@ class EvalTest(ProgramTest):
     def test_nothing_swung_up_is_null(self):
         result = self.evaluate("--set", "gravity=30", "--set", "torque_limit=0.01", episodes=2)
         self.assertEqual((result["successes"], result["swing_up_seconds"]), (0, None))
+        for name in ("settling_seconds", "steady_tilt_degrees", "torque_changes_upright"):
+            self.assertIsNone(result[name], name)
         table = self.succeed("eval", self.policy, "--episodes", 2, "--set", "gravity=30",
                              "--set", "torque_limit=0.01")
         self.assertIn("none swung up to stay", table)
@@ -111,8 +116,116 @@ class EvalTest(ProgramTest):
         self.assertIn(f"swing-up time  {result['swing_up_seconds']['median']:.2f} s", table)
         for term, value in result["reward_terms"].items():
             self.assertRegex(table, rf"{term} +{re.escape(f'{value:.2f}')}\n")
-        for words in ("return", "energy used", "peak", "rms", "gravity 0.05"):
+        for words in ("return", "energy used", "peak", "rms", "gravity 0.05",
+                      "± is the standard deviation over the episodes"):
             self.assertIn(words, table)
+        for name, words in (("torque_variation", "its variation  {} N·m/s; once upright"),
+                            ("torque_variation_upright", "once upright {} N·m/s\n"),
+                            ("torque_changes_upright", "chatter        {} changes of the torque")):
+            moments = f"{result[name]['mean']:.4g} ± {result[name]['deviation']:.2g}"
+            self.assertIn(words.format(moments), table)
+        tilt = result["steady_tilt_degrees"]["link1"]
+        self.assertIn(f"link 1 {tilt['mean']:.4g} ± {tilt['deviation']:.2g}°", table)
+        self.assertIn(f"{result['value']:.4g} expected, {result['discounted_return']:.4g} attained",
+                      table)
+
+    def replay(self, episode, *flags):
+        """What `simulate` makes of an episode."""
+        text = self.succeed("simulate", self.policy, "--episode", episode, *flags)
+        return [{name: float(cell) for name, cell in row.items()}
+                for row in csv.DictReader(text.splitlines())]
+
+    def episodes(self, *flags, count=6):
+        self.succeed("eval", self.policy, "--episodes", count, "--episodes-csv", "episodes.csv",
+                     *flags)
+        with open(self.folder / "episodes.csv", encoding="utf-8", newline="") as file:
+            return list(csv.DictReader(file))
+
+    def test_episodes_are_those_of_the_summary(self):
+        flags = ("--randomize", 0.4, "--seed", 3)
+        rows = self.episodes(*flags)
+        result = self.evaluate(*flags, episodes=6)
+        self.assertEqual([row["episode"] for row in rows], ["0", "1", "2", "3", "4", "5"])
+        self.assertEqual(sum(row["success"] == "1" for row in rows), result["successes"])
+        for column, figure in (("return", "return"), ("energy_used", "energy_used"),
+                               ("rms_torque", "rms_torque"),
+                               ("torque_variation", "torque_variation")):
+            mean = sum(float(row[column]) for row in rows) / 6
+            self.assertAlmostEqual(mean, result[figure]["mean"], delta=1e-9 * max(1, abs(mean)))
+        self.assertEqual(len({row["mass1"] for row in rows}), 6)
+        for row in rows:
+            upright = float(row["swing_up_seconds"] or 20) < 20
+            self.assertEqual(row["torque_changes_upright"] != "", upright)
+        # More episodes go on where fewer end.
+        self.assertEqual(self.episodes(*flags, count=8)[:6], rows)
+
+    def test_an_episode_can_be_made_again_to_the_last_digit(self):
+        for flags in (("--randomize", 0.5, "--sensor-noise", 0.02, "--randomize-delay", 0.06),
+                      ("--delay", 0.04, "--seed", 7, "--set", "mass2=1.2", "--unknown-plant"),
+                      ("--physics", "closed-form", "--randomize", 0.3,
+                       "--randomize-sensor-noise", 0.05)):
+            judged = self.episodes(*flags)
+            for episode in (0, 5):
+                self.assert_same_episode(judged[episode], self.replay(episode, *flags))
+
+    def assert_same_episode(self, judged, rows):
+        number = {name: float(text) for name, text in judged.items() if text}
+        self.assertEqual(len(rows), 1001)
+        for name, column in zip(("q1", "q2", "w1", "w2"), ("qpos0", "qpos1", "qvel0", "qvel1")):
+            self.assertEqual(rows[0][column], number[name])
+        # The rewards that were judged are those of the state after each step.
+        terms = [0.0] * 5
+        for before, row in zip(rows[:500], rows[1:501]):
+            torque_penalty = (-0.05 if row["inverted"] else -0.01) * before["torque"] ** 2
+            for k, value in enumerate((row["energy_reward"], row["height_reward"],
+                                       row["balance_reward"], row["velocity_penalty"],
+                                       torque_penalty)):
+                terms[k] += value
+        for name, value in zip(REWARD_TERMS, terms):
+            self.assertAlmostEqual(value, number[name], delta=1e-11 * max(1, abs(value)))
+        self.assertAlmostEqual(sum(terms), number["return"], delta=1e-9)
+        since = len(rows)
+        while since > 0 and rows[since - 1]["inverted"]:
+            since -= 1
+        self.assertEqual(number["success"], float(since <= 500))
+        if since < len(rows):
+            self.assertAlmostEqual(number["swing_up_seconds"], max(since, 1) / 50, delta=1e-12)
+        torques = [row["torque"] for row in rows[:1000]]
+        self.assertEqual(number["peak_torque"], max(map(abs, torques)))
+        variation = sum(abs(b - a) for a, b in zip(torques, torques[1:]))
+        self.assertAlmostEqual(number["torque_variation"], variation / 20, delta=1e-9)
+        for link, angle in (("tilt1_degrees", lambda row: row["qpos0"]),
+                            ("tilt2_degrees", lambda row: row["qpos0"] + row["qpos1"])):
+            lean = [math.remainder(angle(row) - math.pi, 2 * math.pi) for row in rows[950:1000]]
+            self.assertAlmostEqual(number[link], math.degrees(sum(lean) / 50), delta=1e-9)
+
+    def test_simulate_and_plot_say_what_eval_said(self):
+        flags = ("--randomize", 0.5, "--seed", 2)
+        row = self.episodes(*flags)[4]
+        verdict = "success" if row["success"] == "1" else "failure"
+        for arguments in (("simulate", self.policy, "--csv", "out.csv"), ("plot", self.policy)):
+            text = self.succeed(*arguments, "--episode", 4, *flags)
+            self.assertIn(f"4 of eval: {verdict}, ", text)
+            self.assertIn(f"return {float(row['return']):.6g}\n", text)
+            self.assertIn(f"mass1 {row['mass1']}, ", text)
+
+    def test_the_plant_may_be_unknown(self):
+        usual, blind = (self.evaluate("--set", "mass2=1.4", *more)
+                        for more in ((), ("--unknown-plant",)))
+        self.assertEqual((usual["unknown_plant"], blind["unknown_plant"]), (False, True))
+        self.assertNotEqual(usual["return"], blind["return"])
+        self.assertEqual(blind["plant"], usual["plant"])
+        # On the plant of the training it is the same.
+        self.assertEqual(self.evaluate("--unknown-plant")["return"], self.evaluate()["return"])
+        self.assertIn("the plant unknown to the policy",
+                      self.succeed("eval", self.policy, "--episodes", 1, "--unknown-plant"))
+
+    def test_bad_episodes(self):
+        self.refuse(["simulate", self.policy, "--episode", 1, "--start", "0,0,0,0"], "--start",
+                    "beside --episode")
+        self.refuse(["plot", self.policy, "--episode", -1], "--episode")
+        self.refuse(["simulate", "--unknown-plant"], "--unknown-plant: expected a policy")
+        self.refuse(["eval", self.policy, "--episodes-csv", ""], "--episodes-csv")
 
     def test_random_plants_are_said_and_change_the_result(self):
         usual = self.evaluate()

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <memory>
 #include <numeric>
@@ -12,6 +13,7 @@
 #include "apps/map_grid.h"
 #include "apps/map_output.h"
 #include "apps/progress.h"
+#include "apps/trial.h"
 #include "core/error.h"
 #include "core/file.h"
 #include "core/text.h"
@@ -31,33 +33,84 @@ struct MapArguments {
   int64_t episodes;  // 0: not given
   int64_t threads, seed;
   double check;
-  bool as_json = false;
+  bool unknown_plant = false, as_json = false;
 };
 
-/// The plant that a policy was trained on, with the disturbance where its file tells.
-MapPoint TrainingPoint(const LoadedPolicy& loaded) {
-  MapPoint point;
-  point.plant = loaded.plant;
+/// What a policy was trained on.
+struct Training {
+  MapPoint point;               // plant and disturbance; hanging
+  Randomization randomization;  // around them
+  bool known = false;           // the file tells of more than the plant
+};
+
+Training TrainingOf(const LoadedPolicy& loaded) {
+  Training training;
+  training.point.plant = loaded.plant;
   const std::string& settings = loaded.policy.info().config;
-  if (settings.empty()) return point;
+  if (settings.empty()) return training;
   Config config;
   try {
     ApplyToml(OptionsOf(config), settings, "config");
-    point.disturbance = config.disturbance;
+    training.point.disturbance = config.disturbance;
+    training.randomization = config.randomization;
+    training.known = true;
   } catch (const Error&) {  // NOLINT(bugprone-empty-catch): written by another version
   }
-  return point;
+  return training;
 }
 
-MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded) {
+/// Whether an axis sets this setting.
+bool OnAxis(const MapConfig& config, const Option& option) {
+  MapPoint point;
+  const Options options = OptionsOf(point);
+  return std::ranges::any_of(std::array{&config.x, &config.y}, [&](const MapAxis* axis) {
+    return std::ranges::any_of(options.Find(axis->name, "map"),
+                               [&](const Option* member) { return member->name == option.name; });
+  });
+}
+
+/// What no axis sets and is not as in the training: `mass1 1.2 kg (training: 1), …`.
+std::string ChangesOf(const MapConfig& config, const Training& training) {
+  MapPoint now = config.point, before = training.point;
+  const Options options = OptionsOf(now), usual = OptionsOf(before);
+  std::vector<std::string> texts;
+  for (size_t k = 0; k < options.all().size(); ++k) {
+    const Option& option = options.all()[k];
+    const double value = *std::get<double*>(option.target);
+    const double then = *std::get<double*>(usual.all()[k].target);
+    if (value == then || OnAxis(config, option)) continue;
+    texts.push_back(fmt::format("{} {:.4g} {}", option.name, value, option.unit));
+    if (option.section != "start") texts.back() += fmt::format(" (training: {:.4g})", then);
+  }
+  if (config.assumed_plant) texts.emplace_back("the plant unknown to the policy");
+  return Join(texts, ", ");
+}
+
+/// What the place of the training on the axes is called: what is true of it.
+std::string DotOf(const MapConfig& config, const Training& training, bool changed) {
+  const MapAxis &x = config.x, &y = config.y;
+  if (x.start && y.start && !changed) return "hanging";
+  if (training.randomization.any()) return "middle of the training's range";
+  if (!changed && !config.start_given && training.known) return "as in training";
+  const auto piece = [](const MapAxis& axis) {
+    return Concat(axis.name, axis.start ? " hanging" : " as in training");
+  };
+  return Concat(piece(x), ", ", piece(y));
+}
+
+MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded, const Training& training) {
   MapConfig config;
   config.point.plant = loaded.plant;
   config.mjcf = loaded.mjcf;
-  const MapPoint training = TrainingPoint(loaded);
-  config.x = ParseMapAxis(a.x, training, "--x");
-  config.y = ParseMapAxis(a.y, training, "--y");
+  if (a.unknown_plant) config.assumed_plant = loaded.plant;
+  config.x = ParseMapAxis(a.x, training.point, "--x");
+  config.y = ParseMapAxis(a.y, training.point, "--y");
   CheckDifferent(config.x, config.y);
   const Options options = OptionsOf(config.point);
+  for (MapAxis* axis : {&config.x, &config.y}) {
+    const bool told = options.Find(axis->name, "map").front()->section != "disturbance";
+    if (!told && !training.known) axis->at_training.reset();
+  }
   for (const Option* option : ApplyChanges(options, a.set)) {
     config.start_given |= option->section == "start";
     for (const MapAxis* axis : {&config.x, &config.y}) {
@@ -90,12 +143,16 @@ std::vector<MapCell> RunCells(const MapConfig& config, const Policy& policy,
 int RunMapCommand(const MapArguments& a) {
   const LoadedPolicy loaded = LoadPolicy(a.policy);
   MapResult map;
-  map.config = ConfigOf(a, loaded);
+  const Training training = TrainingOf(loaded);
+  map.config = ConfigOf(a, loaded, training);
+  map.changes = ChangesOf(map.config, training);
+  map.dot = DotOf(map.config, training, !map.changes.empty());
   map.policy = loaded.path.string();
   map.physics = a.physics;
   map.model = InfoOfModel(loaded.mjcf, "");
   const fs::path folder =
-      a.out.empty() ? Concat("map-", map.config.x.name, "-", map.config.y.name) : a.out;
+      a.out.empty() ? DefaultOut(loaded, Concat("map-", map.config.x.name, "-", map.config.y.name))
+                    : fs::path(a.out);
   CheckFree(folder);
   CheckCanDraw();
 
@@ -138,7 +195,10 @@ void AddMap(CLI::App& program, Command& command) {
       ->take_all()
       ->allow_extra_args(false);
   AddPhysics(*app, a->physics, "closed-form");
-  app->add_option("--out", a->out, "new folder for map.csv, map.svg and map.png [map-X-Y]")
+  app->add_flag("--unknown-plant", a->unknown_plant,
+                "scale the observed energy and height by the training's plant")
+      ->disable_flag_override();
+  app->add_option("--out", a->out, "new folder for map.csv, map.svg and map.png [RUN/map-X-Y]")
       ->type_name("FOLDER")
       ->check(NotEmpty());
   AddSeed(*app, a->seed, "starts and noise");
@@ -150,7 +210,10 @@ void AddMap(CLI::App& program, Command& command) {
       "control periods of 0.02 s; each is a cell), and the start: q1, q2 (degrees), w1, w2\n"
       "(rad/s). Percentages are on top of the training's value. An episode is that of `upswing\n"
       "eval`; with a start, every episode begins exactly there, at rest and hanging in what is\n"
-      "not given.\n\n"
+      "not given. Energy and height in the observation are scaled by the cell's own plant, so\n"
+      "they tell the policy of it; with --unknown-plant by that of the training.\n"
+      "Without --out a map goes into map-X-Y in the run's folder, or into runs/map-X-Y-NAME for a\n"
+      "policy file elsewhere; then map-X-Y-2, …\n\n"
       "Examples:\n"
       "  ./upswing map runs/d3qn-seed1\n"
       "  ./upswing map runs/d3qn-seed1 --x mass=0.8:1.2 --y damping=0:0.4:21 --episodes 20\n"

@@ -79,6 +79,7 @@ std::vector<EpisodeResult> RunRange(const MapConfig& config, const Policy& polic
   PendulumEnvConfig env_config;
   env_config.physics = config.physics;
   env_config.mjcf = config.mjcf;
+  env_config.assumed_plant = config.assumed_plant;
   env_config.memory = MemorySteps(policy.shape().inputs);
   env_config.num_envs = range.count;
   env_config.episode_seconds = kEvaluationSeconds + 1;
@@ -273,6 +274,7 @@ MapAgreement Compare(std::span<const MapCell> a, std::span<const MapCell> b, int
         std::max(result.largest_success_difference, successes / episodes);
     const double seconds = std::abs(a[i].swing_up_seconds - b[i].swing_up_seconds);
     if (std::isfinite(seconds)) {
+      ++result.both_succeed;
       result.largest_swing_up_difference = std::max(result.largest_swing_up_difference, seconds);
     }
   }

@@ -54,8 +54,9 @@ struct MapConfig {
   bool start_given = false;  // episodes begin at the point's start, else hanging with usual noise
   int episodes = 1;          // in a cell
   PhysicsEngine physics = PhysicsEngine::kClosedForm;
-  std::string mjcf;   // another model; empty: the built-in one
-  uint64_t seed = 0;  // of starts, sensor noise, and the choice of cells to check
+  std::string mjcf;                    // another model; empty: the built-in one
+  std::optional<Plant> assumed_plant;  // see PendulumEnvConfig
+  uint64_t seed = 0;                   // of starts, sensor noise, and the choice of cells to check
 
   int64_t cells() const { return static_cast<int64_t>(x.values.size() * y.values.size()); }
   /// What cell `i` sets; cells go along x first.
@@ -82,7 +83,8 @@ std::vector<int64_t> DrawCells(const MapConfig& config, double share);
 struct MapAgreement {
   int64_t cells = 0, same_successes = 0;   // cells, and those with as many successes
   double largest_success_difference = 0;   // of the rates
-  double largest_swing_up_difference = 0;  // of the medians, s, where both have one
+  int64_t both_succeed = 0;                // cells where both have successes
+  double largest_swing_up_difference = 0;  // of the medians of these, s
 };
 MapAgreement Compare(std::span<const MapCell> a, std::span<const MapCell> b, int episodes);
 

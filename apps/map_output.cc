@@ -45,26 +45,37 @@ Panel MapPanel(const MapResult& map, const std::string& title, HeatMap heat_map)
     return axis.at_training && *axis.at_training >= axis.values.front() &&
            *axis.at_training <= axis.values.back();
   };
-  if (inside(x) && inside(y)) {
-    const std::string name = x.start && y.start ? "hanging" : "as in training";
-    panel.lines.push_back({name, {*x.at_training}, {*y.at_training}, {}, {}, true});
+  if (!map.dot.empty() && inside(x) && inside(y)) {
+    panel.lines.push_back({map.dot, {*x.at_training}, {*y.at_training}, {}, {}, true});
   }
   return panel;
 }
 
+/// All that the axes do not say.
+std::string CaptionOf(const MapResult& map) {
+  const int episodes = map.config.episodes;
+  std::string text = Concat(episodes, episodes == 1 ? " episode" : " episodes", " a cell");
+  if (const std::string interval = map.success_interval(); !interval.empty()) {
+    text += Concat(" (", interval, ")");
+  }
+  text += Concat("; ", map.physics, "; seed ", map.config.seed);
+  return map.changes.empty() ? text : Concat(text, "; ", map.changes);
+}
+
 Figure MapFigure(const MapResult& map) {
   HeatMap success, swing_up;
-  success.label = map.config.episodes > 1 ? "share of the episodes" : "success";
-  success.high = 1;
-  swing_up.label = "s";
+  success.label = "successful episodes (%)";
+  success.high = 100;
+  swing_up.label = "swing-up time (s)";
   for (const MapCell& cell : map.cells) {
-    success.z.push_back(RateOf(map, cell));
+    success.z.push_back(100 * RateOf(map, cell));
     swing_up.z.push_back(cell.swing_up_seconds);
   }
   Figure figure;
   figure.title = WithModel(map.policy, map.model);
+  figure.caption = CaptionOf(map);
   figure.width = 1100;
-  figure.height = 500;
+  figure.height = 530;
   figure.columns = 2;
   figure.panels = {
       MapPanel(map, "Success", std::move(success)),
@@ -82,7 +93,7 @@ std::string CheckText(const MapResult& map) {
   if (a.same_successes < a.cells) {
     text += fmt::format(", the others differ by up to {:.0f}%", 100 * a.largest_success_difference);
   }
-  if (map.mean_success() == 0) return text;  // and no swing-up to compare
+  if (a.both_succeed == 0) return text + ", no successes to compare";
   if (a.largest_swing_up_difference == 0) return text + ", swing-up times the same";
   return text +
          fmt::format(", swing-up times differ by up to {:.2f} s", a.largest_swing_up_difference);
@@ -109,6 +120,14 @@ double MapResult::median_swing_up() const {
   }
   if (medians.empty()) return std::numeric_limits<double>::quiet_NaN();
   return QuartilesOf(std::move(medians)).median;
+}
+
+std::string MapResult::success_interval() const {
+  // From one given start all episodes are the same, unless there is noise.
+  if (config.episodes == 1 && config.start_given) return "";
+  const Interval interval = WilsonInterval(config.episodes, config.episodes);
+  return fmt::format("{0} of {0}: 95% interval {1:.1f}% to 100%", config.episodes,
+                     100 * interval.low);
 }
 
 MapAgreement MapResult::agreement() const {
@@ -162,8 +181,11 @@ void PrintMapTable(const MapResult& map) {
   fmt::print("  map        {} × {}: {} × {} cells, {} episode{} each\n", RangeText(config.x),
              RangeText(config.y), config.x.values.size(), config.y.values.size(), config.episodes,
              config.episodes == 1 ? "" : "s");
-  fmt::print("  success    {:.1f}% of all episodes; {:.1f}% of the cells without a failure\n",
-             100 * map.mean_success(), 100 * map.always_success());
+  if (!map.changes.empty()) fmt::print("  with       {}\n", map.changes);
+  const std::string interval = map.success_interval();
+  fmt::print("  success    {:.1f}% of all episodes; {:.1f}% of the cells without a failure{}\n",
+             100 * map.mean_success(), 100 * map.always_success(),
+             interval.empty() ? "" : Concat(" (", interval, ")"));
   if (std::isfinite(map.median_swing_up())) {
     fmt::print("  swing-up   {:.2f} s, median of the cells' medians\n", map.median_swing_up());
   } else {
@@ -188,6 +210,8 @@ void PrintMapJson(const MapResult& map) {
   j["physics"] = map.physics;
   for (const auto& [name, value] : PlantValues(map.config.point.plant)) j["plant"][name] = value;
   j["model"] = map.model ? map.model->Json() : kBuiltIn;
+  j["unknown_plant"] = map.config.assumed_plant.has_value();
+  j["changes"] = map.changes;
   j["x"] = axis(map.config.x);
   j["y"] = axis(map.config.y);
   j["episodes_per_cell"] = map.config.episodes;
@@ -202,10 +226,13 @@ void PrintMapJson(const MapResult& map) {
   j["check"] = nullptr;
   if (!map.checked.empty()) {
     const MapAgreement a = map.agreement();
-    j["check"] = {{"cells", a.cells},
-                  {"same_successes", a.same_successes},
-                  {"largest_success_difference", a.largest_success_difference},
-                  {"largest_swing_up_difference", a.largest_swing_up_difference}};
+    j["check"] = {
+        {"cells", a.cells},
+        {"same_successes", a.same_successes},
+        {"largest_success_difference", a.largest_success_difference},
+        {"both_succeed", a.both_succeed},
+        {"largest_swing_up_difference",
+         a.both_succeed > 0 ? ordered_json(a.largest_swing_up_difference) : ordered_json()}};
   }
   j["seconds"] = map.seconds;
   j["episodes_per_second"] = static_cast<double>(map.episodes()) / map.seconds;

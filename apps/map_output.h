@@ -16,6 +16,8 @@ struct MapResult {
   std::string policy;              // path
   std::string physics;             // name of the engine
   std::optional<ModelInfo> model;  // none: the built-in one
+  std::string changes;             // what is not as in the training, the axes aside; empty: nothing
+  std::string dot;                 // what the place of the training is called; empty: it is nowhere
   std::vector<MapCell> cells;      // (ny × nx)
   std::vector<int64_t> checked;    // cells that were done again in MuJoCo, rising
   std::vector<MapCell> in_mujoco;  // what they came to there
@@ -27,6 +29,8 @@ struct MapResult {
   double always_success() const;   // share of the cells where every episode succeeds
   double median_swing_up() const;  // of the cells' medians, s; NaN if there are none
   MapAgreement agreement() const;  // of the engines
+  /// What a cell without a failure tells, as text: `10 of 10: 95% interval 72.2% to 100%`.
+  std::string success_interval() const;
 };
 
 /// One row for each cell, x first; what MuJoCo came to is empty where it was not asked.

@@ -4,6 +4,8 @@
 import csv
 import json
 import math
+import re
+import shutil
 import struct
 import unittest
 import xml.dom.minidom
@@ -57,11 +59,12 @@ class MapTest(ProgramTest):
 
         png = (self.folder / "map/map.png").read_bytes()
         self.assertEqual(png[:8], b"\x89PNG\r\n\x1a\n")
-        self.assertEqual(struct.unpack(">II", png[16:24]), (1100, 500))
+        self.assertEqual(struct.unpack(">II", png[16:24]), (1100, 530))
         text = (self.folder / "map/map.svg").read_text(encoding="utf-8")
         xml.dom.minidom.parseString(text)
         for word in ("gravity (m/s²)", "mass2 (kg)", "Success", "Swing-up time, median",
-                     "as in training"):
+                     "as in training", "successful episodes (%)", "swing-up time (s)",
+                     "4 episodes a cell (4 of 4: 95% interval 51.0% to 100%); closed-form; seed 0"):
             self.assertIn(word, text)
         self.assertEqual(result["files"], ["map/map.csv", "map/map.svg", "map/map.png"])
 
@@ -126,9 +129,48 @@ class MapTest(ProgramTest):
         text = self.succeed("map", self.policy, *GRID, "--episodes", 2)
         for word in ("gravity 0.05 to 3 m/s² × mass2 0.5 to 1.5 kg: 3 × 3 cells, 2 episodes each",
                      "% of all episodes", "18 episodes in", "1 of 9 cells again in MuJoCo",
-                     "map-gravity-mass2/map.csv"):
+                     "(2 of 2: 95% interval 34.2% to 100%)",
+                     f"{self.policy}/map-gravity-mass2/map.csv"):
             self.assertIn(word, text)
-        self.assertTrue((self.folder / "map-gravity-mass2/map.svg").is_file())
+        self.assertTrue((self.policy / "map-gravity-mass2/map.svg").is_file())
+        # A second map goes beside the first.
+        self.assertIn("map-gravity-mass2-2/map.csv",
+                      self.succeed("map", self.policy, *GRID, "--episodes", 1))
+        shutil.rmtree(self.policy / "map-gravity-mass2")
+        shutil.rmtree(self.policy / "map-gravity-mass2-2")
+
+    def figure(self, *more, out):
+        result = self.map(*GRID, "--check", 0, *more, out=out)
+        return result, (self.folder / out / "map.svg").read_text(encoding="utf-8")
+
+    def test_what_is_not_the_trainings_stands_on_the_figure(self):
+        usual, text = self.figure("--episodes", 1, out="usual")
+        self.assertEqual(usual["changes"], "")
+        self.assertIn(">as in training<", text)
+        changed, text = self.figure("--episodes", 1, "--set", "mass1=1.2", "--set",
+                                    "sensor_noise=0.01", "--seed", 9, "--unknown-plant", out="other")
+        self.assertEqual(changed["changes"], "mass1 1.2 kg (training: 1), sensor_noise 0.01 rad, "
+                         "rad/s (training: 0), the plant unknown to the policy")
+        self.assertTrue(changed["unknown_plant"])
+        plain = re.sub(r"<[^>]*>\s*", " ", text)
+        for words in ("mass1 1.2 kg (training: 1)", "sensor_noise 0.01", "seed 9", "closed-form",
+                      "unknown", "gravity as in training, mass2 as in training"):
+            self.assertIn(words, plain)
+        self.assertNotIn(">as in training<", text)
+        self.assertNotEqual(changed["success_rate"], usual["success_rate"])
+        # One exact start has no chance in it.
+        _, text = self.figure("--set", "q1=20", out="start")
+        self.assertIn("q1 20 °", text)
+        self.assertNotIn("interval", text)
+
+    def test_a_check_without_successes_has_nothing_to_compare(self):
+        text = self.succeed("map", self.policy, "--x", "gravity=20:30:2", "--y", "mass2=5:6:2",
+                            "--episodes", 1, "--check", 1, "--out", "none")
+        self.assertIn("all with as many successes, no successes to compare", text)
+        result = self.map("--x", "gravity=20:30:2", "--y", "mass2=5:6:2", "--episodes", 1,
+                          "--check", 1)
+        self.assertEqual((result["check"]["both_succeed"],
+                          result["check"]["largest_swing_up_difference"]), (0, None))
 
     def test_bad_axes(self):
         for axis, *words in (
@@ -167,9 +209,9 @@ class MapTest(ProgramTest):
         self.refuse(["map", self.policy, "--physics", "own"], "closed-form")
         self.write("taken", "")
         self.refuse(["map", self.policy, "--out", "taken"], "taken: expected a new or empty folder, got a file")
-        (self.folder / "map-mass2-length2/mine").mkdir(parents=True)
-        self.refuse(["map", self.policy], "map-mass2-length2: expected a new or empty folder, got "
-                    "one that holds something")
+        (self.folder / "full/mine").mkdir(parents=True)
+        self.refuse(["map", self.policy, "--out", "full"],
+                    "full: expected a new or empty folder, got one that holds something")
 
     def test_without_gnuplot_it_does_not_begin(self):
         self.refuse(["map", self.policy], "gnuplot-nox", code=1, env={"PATH": str(self.folder)})

@@ -1,6 +1,9 @@
 #!/usr/bin/env python3
 """`upswing plot`: its figures, its summary, and bad input."""
 
+import csv
+import re
+import shutil
 import struct
 import unittest
 import xml.dom.minidom
@@ -21,20 +24,22 @@ class PlotTest(ProgramTest):
 
     def test_figures(self):
         text = self.succeed("plot", self.policy, "--seconds", 2)
-        self.assertEqual(sorted(path.name for path in (self.folder / "plot").iterdir()),
-                         sorted(FILES))
+        out = self.policy / "plot"
+        self.addCleanup(shutil.rmtree, out)
+        self.assertEqual(sorted(path.name for path in out.iterdir()), sorted(FILES))
         for name in FILES:
-            self.assertIn(f"plot/{name}", text)
-        episode, _ = self.svg("plot/episode.svg")
+            self.assertIn(f"{out}/{name}", text)
+        episode, _ = self.svg(out / "episode.svg")
         for word in ("link 1", "link 2, absolute", "velocity (rad/s)", "energy (J)", "target",
-                     "torque (N·m)", "Q-value", "greedy action", "time (s)", "policy.safetensors",
+                     "torque (N·m)", "Q-value (reward)", "greedy action", "time (s)", "policy.safetensors",
                      *(name.replace("_", " ") for name in REWARD_TERMS)):
             self.assertIn(word, episode)
-        phase, _ = self.svg("plot/phase.svg")
-        for word in ("q1 (°)", "w1 (rad/s)", "q2 (°)", "w2 (rad/s)", "begin", "end"):
+        phase, _ = self.svg(out / "phase.svg")
+        for word in ("angle of joint 1 (°)", "velocity of joint 1 (rad/s)", "angle of joint 2 (°)",
+                     "velocity of joint 2 (rad/s)", "begin", "end", "upright"):
             self.assertIn(word, phase)
-        for name, size in (("episode", (1000, 1150)), ("phase", (1100, 500))):
-            png = (self.folder / f"plot/{name}.png").read_bytes()
+        for name, size in (("episode", (1000, 1190)), ("phase", (1200, 540))):
+            png = (out / f"{name}.png").read_bytes()
             self.assertEqual(png[:8], b"\x89PNG\r\n\x1a\n")
             self.assertEqual(struct.unpack(">II", png[16:24]), size)
 
@@ -44,6 +49,61 @@ class PlotTest(ProgramTest):
         self.assertIn("from 0.00 s to the end", text)
         text = self.succeed("plot", self.policy, "--seconds", 0.1, "--out", "hanging")
         self.assertIn("not at the end", text)
+
+    def test_a_second_plot_goes_beside_the_first(self):
+        for number in ("", "-2", "-3"):
+            self.succeed("plot", self.policy, "--seconds", 0.1)
+            self.addCleanup(shutil.rmtree, self.policy / f"plot{number}")
+            self.assertTrue((self.policy / f"plot{number}/phase.png").is_file())
+        # A policy file that is in no run's folder.
+        shutil.copy(self.policy / "policy.safetensors", self.folder / "mine.safetensors")
+        for number in ("", "-2"):
+            text = self.succeed("plot", "mine.safetensors", "--seconds", 0.1)
+            self.assertIn(f"runs/plot-mine{number}/episode.svg", text)
+
+    def curves(self, name):
+        """The curves of a figure: lists of points (pixels), one for each stroke."""
+        text = (self.folder / name).read_text(encoding="utf-8")
+        return [[tuple(map(float, point.split(","))) for point in
+                 re.findall(r"[-\d.]+,[-\d.]+", stroke)]
+                for path in re.findall(r"<path stroke='[^']*' +d='M([^']*)'", text)
+                for stroke in path.split("M")]
+
+    def test_what_stands_on_the_figures(self):
+        self.succeed("plot", self.policy, "--seconds", 0.2, "--set", "mass2=1.3", "--delay", 0.04,
+                     "--start", "3,0,0,0", "--seed", 5, "--out", "out")
+        for name in ("out/episode.svg", "out/phase.svg"):
+            text, _ = self.svg(name)
+            for words in ("start 3,0,0,0", "seed 5", "mujoco", "mass2 1.3 kg (training: 1)",
+                          "delay 0.04"):
+                self.assertIn(words, text)
+
+    def test_the_way_between_two_steps_is_no_straight_line(self):
+        self.succeed("plot", self.policy, "--seconds", 1, "--start", "0,0,4,0", "--out", "out")
+        # 50 steps, four pieces each; steps of a held torque have corners of right angles instead.
+        longest = max(self.curves("out/phase.svg"), key=len)
+        self.assertGreater(len(longest), 150)
+
+    def test_what_is_held_is_drawn_as_steps(self):
+        self.succeed("plot", self.policy, "--seconds", 4, "--start", "3.1,0.1,0,0", "--out", "out")
+        rows = list(csv.DictReader(self.succeed("simulate", self.policy, "--seconds", 4, "--start",
+                                                "3.1,0.1,0,0").splitlines()))
+        flips = sum(a["inverted"] != b["inverted"] for a, b in zip(rows, rows[1:]))
+        self.assertGreater(flips, 0)
+        # Balance, 5 and 0 above each other, and torques: every piece is level or upright.
+        level = [curve for curve in self.curves("out/episode.svg") if len(curve) > 100 and
+                 all(a[0] == b[0] or a[1] == b[1] for a, b in zip(curve, curve[1:]))]
+        self.assertGreaterEqual(len(level), 4)
+
+    def test_the_greedy_line_has_chosen_torques_only(self):
+        # 20 s are more steps than the heat map has columns.
+        self.succeed("plot", self.policy, "--seconds", 20, "--out", "out")
+        torques = {row["torque"] for row in csv.DictReader(
+            self.succeed("simulate", self.policy, "--seconds", 20).splitlines())}
+        torque = [curve for curve in self.curves("out/episode.svg") if len(curve) > 100 and
+                  all(a[0] == b[0] or a[1] == b[1] for a, b in zip(curve, curve[1:]))]
+        greedy = max(torque, key=lambda curve: max(y for _, y in curve))  # the lowest panel
+        self.assertEqual(len({y for _, y in greedy}), len(torques))
 
     def test_same_episode_same_figures(self):
         for out in ("a", "b"):

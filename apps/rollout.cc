@@ -1,8 +1,11 @@
 #include "apps/rollout.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
+#include "apps/config.h"
 #include "core/error.h"
 #include "core/text.h"
 
@@ -25,30 +28,28 @@ RolloutRow RowOf(double t, const PendulumState& s, double torque, const Plant& p
   return row;
 }
 
-std::vector<float> QValuesOf(const Policy& policy, Matrix<const float> obs) {
+/// (A) in units of reward.
+std::vector<double> QValuesOf(const Policy& policy, Matrix<const float> obs) {
   const int actions = policy.shape().actions;
   std::vector<float> q(static_cast<size_t>(actions));
   policy.QValues(obs, Matrix<float>(q.data(), 1, actions));
-  return q;
+  const double scale = ValueUnitsOf(policy).reward_scale;
+  std::vector<double> values;
+  for (const float value : q) values.push_back(value / scale);
+  return values;
 }
 
 }  // namespace
 
 int64_t RolloutSteps(double seconds) { return std::llround(seconds * kStepsPerSecond); }
 
-std::vector<RolloutRow> RunRollout(const RolloutConfig& config) {
-  PendulumEnvConfig env_config;
-  env_config.physics = config.physics;
-  env_config.mjcf = config.mjcf;
-  if (config.policy != nullptr) {
-    env_config.memory = MemorySteps(config.policy->shape().inputs);
-  }
-  env_config.plants = {config.plant};
+Rollout RunRollout(const RolloutConfig& config) {
+  PendulumEnvConfig env_config = config.env;
   env_config.episode_seconds = config.seconds + 1;
   PendulumEnv env(env_config);
-  env.SetState(0, config.start);
+  if (config.start) env.SetState(0, *config.start);
 
-  std::vector<RolloutRow> rows;
+  Rollout rollout{{}, env.plant(0), env.disturbance(0)};
   const int64_t steps = RolloutSteps(config.seconds);
   StepResult result = env.MakeResult();
   for (int64_t k = 0; k <= steps; ++k) {
@@ -57,19 +58,42 @@ std::vector<RolloutRow> RunRollout(const RolloutConfig& config) {
     if (config.policy != nullptr) config.policy->Act(env.obs(), std::span(&torque, 1));
     const auto step = static_cast<size_t>(k);
     if (step < config.schedule.size()) torque = config.schedule[step];
-    // The motor gives what it can; what an observation remembers is what was chosen.
-    const double limit = config.plant.torque_limit;
-    const double applied = std::clamp(torque, -limit, limit);
     const double t = static_cast<double>(k) / kStepsPerSecond;
-    rows.push_back(RowOf(t, env.state(0), applied, config.plant));
-    if (config.q_values) rows.back().q = QValuesOf(*config.policy, env.obs());
-    if (k == steps) break;
+    const PendulumState state = env.state(0);
+    std::vector<double> q;
+    if (config.q_values) q = QValuesOf(*config.policy, env.obs());
+    // One step more than there are rows to fill: it tells what the motor gives in the last state.
     env.Step(std::span(&torque, 1), result);
-    if (result.terminated[0]) {
+    if (result.terminated[0] && k < steps) {
       throw Failure(Concat("the state blew up numerically after t = ", FormatNumber(t), " s"));
     }
+    rollout.rows.push_back(RowOf(t, state, result.torque[0], rollout.plant));
+    rollout.rows.back().q = std::move(q);
   }
-  return rows;
+  return rollout;
+}
+
+EvaluationEpisode JudgeEpisode(const Policy& policy, PendulumEnvConfig env_config) {
+  env_config.episode_seconds = kEvaluationSeconds;
+  PendulumEnv env(env_config);
+  return EvaluateEpisodes(policy, env).front();
+}
+
+std::string JudgementText(const EvaluationEpisode& episode) {
+  const std::string upright =
+      episode.swing_up_seconds < kEvaluationSeconds
+          ? fmt::format("upright from {:.2f} s to the end", episode.swing_up_seconds)
+          : "not upright at the end";
+  return fmt::format("{}, {}, return {:.6g}", episode.success ? "success" : "failure", upright,
+                     episode.reward_sum);
+}
+
+std::string EpisodeText(const Rollout& rollout) {
+  std::string text = PlantText(rollout.plant);
+  const auto& [noise, delay] = rollout.disturbance;
+  if (noise > 0) text += Concat(", sensor_noise ", FormatNumber(noise));
+  if (delay > 0) text += Concat(", delay ", FormatNumber(delay));
+  return text;
 }
 
 PendulumState ParseStart(const std::string& text) {

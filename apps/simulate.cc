@@ -9,6 +9,7 @@
 #include "apps/loaded_policy.h"
 #include "apps/rollout.h"
 #include "apps/streams.h"
+#include "apps/trial.h"
 #include "core/csv.h"
 #include "core/error.h"
 #include "core/text.h"
@@ -17,8 +18,9 @@ namespace upswing {
 namespace {
 
 struct SimulateArguments {
-  std::string policy, torque, start = "0,0,0,0", csv = "-", model, physics;
-  std::vector<std::string> set;
+  std::string policy, torque, csv = "-";
+  TrialArguments trial;
+  EpisodeArguments episode;
   double seconds;  // negative: not given
 };
 
@@ -59,21 +61,23 @@ int RunSimulate(const SimulateArguments& a) {
                           InputName(a.torque), " has torques, got ", FormatNumber(config.seconds)));
   }
 
-  if (loaded) {
-    config.policy = &loaded->policy;
-    config.mjcf = loaded->mjcf;
-  }
-  config.physics = ParsePhysics(a.physics, "--physics");
-  config.plant = ChangedPlant(loaded ? loaded->plant : Plant(), a.model, a.set, config.mjcf);
-  config.start = ParseStart(a.start);
-  const std::vector<RolloutRow> rows = RunRollout(config);
+  if (loaded) config.policy = &loaded->policy;
+  config.env = TrialEnvironments(a.trial, loaded ? &*loaded : nullptr);
+  config.start = ChooseEpisode(a.episode, config.env);
+  const Rollout rollout = RunRollout(config);
 
   std::string csv =
       "t,qpos0,qpos1,qvel0,qvel1,torque,energy,height,inverted,reward,energy_reward,height_reward,"
       "balance_reward,velocity_penalty,torque_penalty\n";
-  for (const RolloutRow& row : rows) csv += CsvRow(row);
+  for (const RolloutRow& row : rollout.rows) csv += CsvRow(row);
   WriteOutput(a.csv, csv);
-  if (!IsStandardStream(a.csv)) fmt::print("{}: {} rows\n", a.csv, rows.size());
+  if (IsStandardStream(a.csv)) return 0;
+  fmt::print("{}: {} rows\n", Printable(a.csv), rollout.rows.size());
+  fmt::print("  plant      {}\n", EpisodeText(rollout));
+  if (loaded && a.episode.given()) {
+    fmt::print("  episode    {} of eval: {}\n", a.episode.number,
+               JudgementText(JudgeEpisode(loaded->policy, config.env)));
+  }
   return 0;
 }
 
@@ -88,26 +92,29 @@ void AddSimulate(CLI::App& program, Command& command) {
                   "CSV file with a column `torque` (N·m), a row for each 0.02 s; -: standard input")
       ->type_name("FILE")
       ->check(NotEmpty());
-  AddStart(*app, a->start);
+  AddEpisodeOptions(*app, a->episode);
   Options own;
   Option& seconds = own.Add(&a->seconds, "seconds", -1, {0, 1e5}, "s", "how long");
   seconds.step = kControlPeriod;
   seconds.usual = "20, or as long as the torques last";
   AddArguments(*app, own);
-  AddPlantOptions(*app, a->set, a->model);
-  AddPhysics(*app, a->physics, "mujoco");
+  AddTrialOptions(*app, a->trial, "noise, random plants and the start of --episode");
   app->add_option("--csv", a->csv, "file to write; -: standard output [-]")
       ->type_name("FILE")
       ->check(NotEmpty());
   app->footer(
-      "Columns: t (s), qpos0, qpos1 (rad), qvel0, qvel1 (rad/s), torque (N·m, held over the next\n"
-      "0.02 s, within the motor's limit), energy (J), height of the tip (m), inverted (0 or 1), "
+      "Columns: t (s), qpos0, qpos1 (rad), qvel0, qvel1 (rad/s), torque (N·m, what the motor "
+      "gives\n"
+      "over the next 0.02 s: after its delay, within its limit), energy (J), height of the tip "
+      "(m), inverted (0 or 1), "
       "and\n"
       "the reward with its five terms for the state and the torque of that row.\n\n"
       "Examples:\n"
       "  ./upswing simulate runs/d3qn-seed1 --csv rollout.csv\n"
       "  ./upswing simulate --torque torques.csv --start 0.1,-0.05,0,0 --seconds 10\n"
-      "  ./upswing simulate --start 3.0,0,0,0 --set damping=0      let it fall\n");
+      "  ./upswing simulate --start 3.0,0,0,0 --set damping=0      let it fall\n"
+      "  ./upswing eval runs/d3qn-seed1 --randomize 0.25 --episodes-csv episodes.csv\n"
+      "  ./upswing simulate runs/d3qn-seed1 --randomize 0.25 --episode 17 --csv failure.csv\n");
   app->callback([a, &command] { command = [a] { return RunSimulate(*a); }; });
 }
 

@@ -46,8 +46,9 @@ std::vector<std::byte> ReadAll(const Descriptor& fd, const fs::path& path, bool 
   struct stat info {};
   if (fd.get() < 0 || fstat(fd.get(), &info) != 0) throw cannot(std::strerror(errno));
   if (S_ISDIR(info.st_mode)) throw cannot("expected a file, got a folder");
-  if (only_regular && !S_ISREG(info.st_mode))
+  if (only_regular && !S_ISREG(info.st_mode)) {
     throw cannot("expected a file, got a pipe or a device");
+  }
   // A pipe has no size, so read until the end instead of trusting one.
   std::vector<std::byte> bytes(static_cast<size_t>(info.st_size));
   size_t filled = 0;

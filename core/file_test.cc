@@ -84,10 +84,10 @@ TEST_F(FileTest, AFileOfAFolderIsWrittenThroughNoLink) {
 TEST_F(FileTest, AnOutputFollowsTheUsersOwnLinkAndADeviceIsWrittenInPlace) {
   WriteFileAtomically(folder_ / "target", "old");
   fs::create_symlink("target", folder_ / "link");
-  WriteOutput(folder_ / "link", "new");
+  WriteNamedFile(folder_ / "link", "new");
   EXPECT_TRUE(fs::is_symlink(folder_ / "link"));
   EXPECT_EQ(ReadTextFile(folder_ / "target"), "new");
-  WriteOutput("/dev/null", "gone");
+  WriteNamedFile("/dev/null", "gone");
   EXPECT_TRUE(fs::is_character_file("/dev/null"));
 }
 
@@ -98,7 +98,7 @@ TEST_F(FileTest, AnOutputThatCannotBeIsBadInputAndAFullDiskIsNot) {
   WriteFileAtomically(folder_ / "file", "mine");
   const auto exit_code = [](const fs::path& path) {
     try {
-      WriteOutput(path, "text");
+      WriteNamedFile(path, "text");
       return 0;
     } catch (const Error& error) {
       return error.exit_code();

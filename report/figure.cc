@@ -141,7 +141,8 @@ class PanelScript {
     Label(3, panel_.x_label, (box_.left + box_.right) / 2, bottom + 8, false);
     Label(4, panel_.y_label, box_.left - 60, (box_.bottom + box_.top) / 2, true);
     Say("unset label 5");
-    Say("set xtics out nomirror autofreq; set ytics out nomirror autofreq");
+    Ticks("x", panel_.x_tick);
+    Ticks("y", panel_.y_tick);
     // Large numbers in thousands and millions, or they run into each other.
     const double largest = LargestX();
     if (largest < 1e4) Say("set format x");
@@ -154,6 +155,10 @@ class PanelScript {
     if (panel_.heat_map) {
       Say("set object 1 rectangle from graph 0,0 to graph 1,1 behind fc rgb '#e4e4e4' fs noborder");
     }
+  }
+
+  void Ticks(std::string_view axis, double distance) {
+    Say("set ", axis, "tics out nomirror ", distance > 0 ? Number(distance) : "autofreq");
   }
 
   double LargestX() const {
@@ -228,23 +233,39 @@ class PanelScript {
     const Line& line = panel_.lines[i];
     if (line.x.empty()) return;
     const std::string data = Concat("$L", i, " using 1:2 with ");
+    const std::string type = Concat(" pt ", PointType(line.marker), " ps ");
     const std::string title = line.name.empty() ? " notitle" : " title " + Quoted(line.name);
     const std::string color = Concat(" lc rgb '", Color(i), "'");
     if (!line.points) {
       // Beyond the palette's colours lines are dashed.
-      layers.push_back(Concat(data, "lines lw 2 dt ", 1 + i / kColors.size() % 4, color, title));
+      const std::string style = Concat(" with lines lw ", panel_.heat_map ? 1 : 2, color, " dt ");
+      const size_t dash = 1 + i / kColors.size() % 4;
+      if (!line.dashed_from) {
+        layers.push_back(Concat("$L", i, " using 1:2", style, dash, title));
+        return;
+      }
+      const std::string end = Number(*line.dashed_from);
+      layers.push_back(Concat("$L", i, " using ($1<=", end, "?$1:NaN):2", style, dash, title));
+      layers.push_back(Concat("$L", i, " using ($1>=", end, "?$1:NaN):2", style, 3, " notitle"));
       return;
     }
     if (!line.low.empty()) {
-      layers.push_back(Concat("$L", i, " using 1:2:3:4 with yerrorbars pt 7 ps ", Size(0.7),
-                              " lw 1.5", color, title));
+      layers.push_back(Concat("$L", i, " using 1:2:3:4 with yerrorbars", type, Size(0.7), " lw 1.5",
+                              color, title));
       return;
     }
     // On a heat map a white rim sets markers off from every colour.
     if (panel_.heat_map)
-      layers.push_back(Concat(data, "points pt 7 ps ", Size(1.5), " lc rgb 'white' notitle"));
-    layers.push_back(
-        Concat(data, "points pt 7 ps ", Size(panel_.heat_map ? 1.0 : 0.6), color, title));
+      layers.push_back(Concat(data, "points", type, Size(1.5), " lc rgb 'white' notitle"));
+    layers.push_back(Concat(data, "points", type,
+                            Size(panel_.heat_map                 ? 1.0
+                                 : line.marker == Marker::kCross ? 1.6
+                                                                 : 0.8),
+                            " lw 2", color, title));
+  }
+
+  static int PointType(Marker marker) {
+    return marker == Marker::kSquare ? 5 : marker == Marker::kCross ? 2 : 7;
   }
 
   double Size(double marker) const { return marker * terminal_.marker; }
@@ -263,6 +284,8 @@ class PanelScript {
   std::string text_;
 };
 
+constexpr size_t kFirstCaptionLabel = 10;  // the panels have lower numbers
+
 std::string Script(const Figure& figure, const Terminal& terminal) {
   std::vector<std::string> palette;
   palette.reserve(kViridis.size());
@@ -273,14 +296,25 @@ std::string Script(const Figure& figure, const Terminal& terminal) {
              "' background rgb 'white'\n", "set border 3 lw 0.8 lc rgb '#404040'\n",
              "set palette maxcolors 256 defined (", Join(palette, ", "), ")\n", "set multiplot\n");
   if (!figure.title.empty()) {
-    script +=
-        Concat("set label 1 ", Quoted(figure.title), " at screen 0.5, screen ",
-               Number(1 - 16.0 / figure.height), " center font ',", terminal.font * 1.2, "'\n");
+    script += Concat("set label 1 ", Quoted(FittedTitle(figure)), " at screen 0.5, screen ",
+                     Number(1 - 16.0 / figure.height), " center font ',",
+                     terminal.font * kTitleScale, "'\n");
+  }
+  const std::vector<std::string> caption = CaptionLines(figure);
+  for (size_t i = 0; i < caption.size(); ++i) {
+    const double y = (figure.title.empty() ? 14 : 38) + static_cast<double>(i) * kCaptionLine;
+    script += Concat("set label ", kFirstCaptionLabel + i, ' ', Quoted(caption[i]),
+                     " at screen 0.5, screen ", Number(1 - y / figure.height),
+                     " center textcolor rgb '#404040'\n");
   }
   const std::vector<Box> boxes = Layout(figure);
   for (size_t i = 0; i < boxes.size(); ++i) {
     script += PanelScript(figure.panels[i], boxes[i], figure, terminal).text();
-    script += "unset label 1\n";  // the figure's title is drawn once
+    // The figure's title and caption are drawn once.
+    script += "unset label 1\n";
+    for (size_t k = 0; k < caption.size(); ++k) {
+      script += Concat("unset label ", kFirstCaptionLabel + k, '\n');
+    }
   }
   return script + "unset multiplot\n";
 }

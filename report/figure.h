@@ -8,12 +8,16 @@
 
 namespace upswing {
 
+enum class Marker { kDot, kSquare, kCross };
+
 /// One curve of a panel. Numbers that are not finite leave a gap.
 struct Line {
   std::string name;               // in the legend; empty: none
   std::vector<double> x, y;       // (n)
   std::vector<double> low, high;  // (n) a band around it, or of points error bars; empty: none
   bool points = false;            // markers instead of a line
+  Marker marker = Marker::kDot;
+  std::optional<double> dashed_from = {};  // the x from which the line is dashed
 };
 
 /// A table of numbers as colours, cell (i, j) around (x[j], y[i]); x and y rise.
@@ -30,14 +34,16 @@ struct Panel {
   std::vector<Line> lines;
   std::optional<HeatMap> heat_map;
   std::optional<std::pair<double, double>> x_range, y_range;  // else as the numbers ask for
+  double x_tick = 0, y_tick = 0;  // from one number at the axis to the next; 0: as is readable
 };
 
 /// Panels row after row, `columns` in each, with their axes in line.
 struct Figure {
-  std::string title;
+  std::string title;  // one line; where it is too long, its end
   std::vector<Panel> panels;
   int columns = 1;
   int width = 900, height = 600;  // pixels
+  std::string caption = {};       // below the title, on as many lines as it takes
 };
 
 /// Throws Failure if figures cannot be drawn here: gnuplot is missing or broken. For before long

@@ -148,6 +148,36 @@ TEST_F(FigureTest, ANumberThatIsNoneLeavesAGap) {
   EXPECT_EQ(pieces(NAN), pieces(2) + 1);
 }
 
+TEST_F(FigureTest, ACaptionTakesAsManyLinesAsItNeedsAndATitleIsCut) {
+  Figure figure = Example();
+  const std::vector<Box> before = Layout(figure);
+  for (int i = 0; i < 40; ++i) figure.caption += "settings ä " + std::to_string(i) + "; ";
+  const std::vector<std::string> lines = CaptionLines(figure);
+  ASSERT_GE(lines.size(), 3U);
+  EXPECT_EQ(lines.front().find("settings ä 0; settings ä 1;"), 0U);
+  const std::vector<Box> after = Layout(figure);
+  EXPECT_NEAR(before[0].top - after[0].top, static_cast<double>(lines.size()) * kCaptionLine + 6,
+              1e-9);
+  figure.title = std::string(300, 'x') + "ω/policy.safetensors";
+  const std::string title = FittedTitle(figure);
+  EXPECT_LT(title.size(), 120U);
+  EXPECT_EQ(title.find("…x"), 0U);
+  EXPECT_TRUE(title.ends_with("xω/policy.safetensors"));
+  const std::string svg = Svg(figure);
+  EXPECT_TRUE(WellFormed(svg));
+  EXPECT_NE(svg.find("settings ä 39;"), std::string::npos);
+  EXPECT_NE(svg.find("policy.safetensors"), std::string::npos);
+}
+
+TEST_F(FigureTest, ALineIsDashedFromWhereItSays) {
+  Figure figure;
+  figure.panels.resize(1);
+  figure.panels[0].lines = {{"", {0, 1, 2, 3, 4}, {0, 1, 2, 3, 4}, {}, {}}};
+  EXPECT_EQ(Svg(figure).find("stroke-dasharray"), std::string::npos);
+  figure.panels[0].lines[0].dashed_from = 2;
+  EXPECT_NE(Svg(figure).find("stroke-dasharray"), std::string::npos);
+}
+
 TEST_F(FigureTest, PanelsAreInLine) {
   Figure figure = Example();
   figure.panels.push_back({"", "", "", {}, {}, {}, {}});

@@ -1,6 +1,7 @@
 #include "report/layout.h"
 
 #include <algorithm>
+#include <string_view>
 
 #include "core/error.h"
 #include "core/text.h"
@@ -10,9 +11,10 @@ namespace {
 
 constexpr double kCharacter = 7.2;    // mean width of a character of kFontSize
 constexpr double kLegendSample = 44;  // width of a legend's piece of line
+constexpr double kTitleHeight = 28;
 
 /// Characters in UTF-8 text: all bytes but those that continue one.
-double Characters(const std::string& text) {
+double Characters(std::string_view text) {
   return static_cast<double>(std::ranges::count_if(
       text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; }));
 }
@@ -51,6 +53,27 @@ Margins MarginsOf(const Panel& panel) {
 
 }  // namespace
 
+std::vector<std::string> CaptionLines(const Figure& figure) {
+  std::vector<std::string> lines;
+  const double room = (figure.width - 32) / kCharacter;
+  for (const std::string_view word : Split(figure.caption, ' ')) {
+    if (word.empty()) continue;
+    const bool fits = !lines.empty() && Characters(lines.back()) + 1 + Characters(word) <= room;
+    if (fits) lines.back() += ' ';
+    if (!fits) lines.emplace_back();
+    lines.back() += word;
+  }
+  return lines;
+}
+
+std::string FittedTitle(const Figure& figure) {
+  const double room = (figure.width - 32) / (kTitleScale * kCharacter);
+  if (Characters(figure.title) <= room) return figure.title;
+  std::string_view end = figure.title;
+  while (Characters(end) > room - 1 || (end.front() & 0xC0) == 0x80) end.remove_prefix(1);
+  return Concat("…", end);
+}
+
 bool HasLegend(const Panel& panel) {
   return std::ranges::any_of(panel.lines, [](const Line& line) { return !line.name.empty(); });
 }
@@ -70,7 +93,10 @@ std::vector<Box> Layout(const Figure& figure) {
     row[i / columns].Include(MarginsOf(figure.panels[i]));
   }
   double width = figure.width;
-  double height = figure.height - (figure.title.empty() ? 0 : 28);
+  double height = figure.height - (figure.title.empty() ? 0 : kTitleHeight);
+  if (const auto lines = CaptionLines(figure).size(); lines > 0) {
+    height -= static_cast<double>(lines) * kCaptionLine + (figure.title.empty() ? 12 : 6);
+  }
   double top = height;
   for (const Margins& m : column) width -= m.left + m.right;
   for (const Margins& m : row) height -= m.top + m.bottom;

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <iterator>
 
+#include "core/text.h"
+
 namespace upswing {
 namespace {
 
@@ -36,13 +38,57 @@ double LastOf(const std::vector<RunGroup>& groups, const EvaluationFigure& x) {
   return last;
 }
 
-/// Whether a run ends before the longest one does, in steps.
-bool AnyHolds(const std::vector<RunGroup>& groups) {
-  const double last = LastOf(groups, Steps);
-  return std::ranges::any_of(groups, [&](const RunGroup& group) {
-    return std::ranges::any_of(
-        group.runs, [&](const RunRecord& run) { return Steps(run.evaluations.back()) < last; });
-  });
+/// Where the first run of the group ends.
+double FirstEnd(const RunGroup& group, const EvaluationFigure& x) {
+  double first = x(group.runs.front().evaluations.back());
+  for (const RunRecord& run : group.runs) first = std::min(first, x(run.evaluations.back()));
+  return first;
+}
+
+/// The groups in parts of almost the same size, of kMostCurves at most.
+std::vector<std::vector<RunGroup>> Parts(const std::vector<RunGroup>& groups) {
+  const size_t count = (groups.size() + kMostCurves - 1) / kMostCurves;
+  std::vector<std::vector<RunGroup>> parts(count);
+  for (size_t i = 0; i < groups.size(); ++i) parts[i * count / groups.size()].push_back(groups[i]);
+  return parts;
+}
+
+/// One quantity over another.
+struct Axes {
+  const char *x_label, *y_label;
+  EvaluationFigure x, y;
+};
+
+Panel CurvesPanel(const std::vector<RunGroup>& groups, const Axes& axes, double end, bool legend) {
+  Panel panel;
+  panel.x_label = axes.x_label;
+  panel.y_label = axes.y_label;
+  panel.x_range = {0, end};
+  for (const RunGroup& group : groups) {
+    std::vector<double> grid = CurveGrid(group, axes.x, end);
+    const double first_end = FirstEnd(group, axes.x);
+    const auto dashed_from = std::ranges::lower_bound(grid, first_end);
+    Line& line = panel.lines.emplace_back(LearningCurve(group, axes.x, axes.y, grid));
+    if (first_end < end && dashed_from != grid.end()) line.dashed_from = *dashed_from;
+    line.name = legend ? Concat(group.label, " (n = ", group.runs.size(), ")") : "";
+  }
+  return panel;
+}
+
+/// From 0, or from below it, to the largest number of all lines.
+std::pair<double, double> RangeFromZero(const std::vector<const Panel*>& panels) {
+  double low = 0, high = 0;
+  for (const Panel* panel : panels) {
+    for (const Line& line : panel->lines) {
+      for (const auto* values : {&line.y, &line.low, &line.high}) {
+        for (const double y : *values) {
+          low = std::min(low, y);
+          high = std::max(high, y);
+        }
+      }
+    }
+  }
+  return {1.04 * low, high > low ? 1.04 * high : 1};
 }
 
 }  // namespace
@@ -57,9 +103,10 @@ Line LearningCurve(const RunGroup& group, const EvaluationFigure& x, const Evalu
     for (const RunRecord& run : group.runs) values.push_back(At(run, x, y, place));
     const Estimate iqm = EstimateIqm({values}, kCurveResamples);
     line.y.push_back(iqm.value);
-    if (!iqm.interval) continue;
-    line.low.push_back(iqm.interval->low);
-    line.high.push_back(iqm.interval->high);
+    if (group.runs.size() < 2) continue;
+    // Where all runs agree there is nothing to see of a band.
+    line.low.push_back(iqm.interval ? iqm.interval->low : iqm.value);
+    line.high.push_back(iqm.interval ? iqm.interval->high : iqm.value);
   }
   return line;
 }
@@ -74,31 +121,37 @@ std::vector<double> CurveGrid(const RunGroup& group, const EvaluationFigure& x, 
 }
 
 Figure LearningCurves(const std::vector<RunGroup>& groups) {
+  const auto parts = Parts(groups);
   Figure figure;
-  figure.title = "Interquartile mean over runs, pointwise 95% bootstrap interval";
-  if (AnyHolds(groups)) figure.title += "; a run that ended early keeps its last value";
   figure.columns = 2;
   figure.width = 1200;
-  figure.height = 800;
-  const auto add = [&](const char* x_label, const EvaluationFigure& x, const char* y_label,
-                       const EvaluationFigure& y) -> Panel& {
-    Panel& panel = figure.panels.emplace_back();
-    panel.x_label = x_label;
-    panel.y_label = y_label;
-    const double end = LastOf(groups, x);
-    for (const RunGroup& group : groups) {
-      panel.lines.push_back(LearningCurve(group, x, y, CurveGrid(group, x, end)));
+  figure.height = 40 + 760 * static_cast<int>(parts.size());
+  figure.caption =
+      "Interquartile mean over the n runs of each agent, with the pointwise 95% bootstrap interval "
+      "as a band (none for n = 1).";
+  constexpr const char *kSteps = "steps", *kSeconds = "training time (s), evaluations excluded";
+  constexpr const char *kSuccess = "success (%)", *kReturn = "return over 10 s";
+  const Axes axes[] = {{kSteps, kSuccess, Steps, SuccessPercent},
+                       {kSeconds, kSuccess, Seconds, SuccessPercent},
+                       {kSteps, kReturn, Steps, Return},
+                       {kSeconds, kReturn, Seconds, Return}};
+  for (const std::vector<RunGroup>& part : parts) {
+    for (size_t k = 0; k < std::size(axes); ++k) {
       // One legend, at the right of the upper row, is enough.
-      if (figure.panels.size() != 2) panel.lines.back().name.clear();
+      figure.panels.push_back(CurvesPanel(part, axes[k], LastOf(groups, axes[k].x), k == 1));
     }
-    return panel;
-  };
-  constexpr const char* kSteps = "steps";
-  constexpr const char* kSeconds = "training time (s), evaluations excluded";
-  add(kSteps, Steps, "success (%)", SuccessPercent).y_range = {-2, 102};
-  add(kSeconds, Seconds, "success (%)", SuccessPercent).y_range = {-2, 102};
-  add(kSteps, Steps, "return over 10 s", Return);
-  add(kSeconds, Seconds, "return over 10 s", Return);
+  }
+  std::vector<const Panel*> returns;
+  bool dashed = false;
+  for (const Panel& panel : figure.panels) {
+    if (panel.y_label == kReturn) returns.push_back(&panel);
+    for (const Line& line : panel.lines) dashed = dashed || line.dashed_from;
+  }
+  if (dashed) figure.caption += " Dashed: a run has ended and keeps its last value.";
+  const auto return_range = RangeFromZero(returns);
+  for (Panel& panel : figure.panels) {
+    panel.y_range = panel.y_label == kReturn ? return_range : std::pair(0.0, 102.0);
+  }
   return figure;
 }
 

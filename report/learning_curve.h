@@ -20,7 +20,11 @@ Line LearningCurve(const RunGroup& group, const EvaluationFigure& x, const Evalu
 /// From where every run of the group has been evaluated to `end`, in equal intervals.
 std::vector<double> CurveGrid(const RunGroup& group, const EvaluationFigure& x, double end);
 
-/// Success and return over steps and over training time: four panels with a curve for each group.
+inline constexpr size_t kMostCurves = 5;  // in one panel
+
+/// Success and return over steps and over training time: four panels with a curve for each group;
+/// of more groups than kMostCurves four panels for each so many, all with the same axes. A curve is
+/// dashed from where the first of its runs has ended and keeps its last value.
 Figure LearningCurves(const std::vector<RunGroup>& groups);
 
 }  // namespace upswing

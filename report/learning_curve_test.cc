@@ -44,16 +44,63 @@ TEST(LearningCurve, TheGridBeginsWhereAllRunsHaveBeenEvaluated) {
   EXPECT_EQ(CurveGrid(group, Seconds, 1.5), std::vector<double>{1.5});
 }
 
-TEST(LearningCurve, TheFigureSaysWhereValuesAreKept) {
+TEST(LearningCurve, CurvesAreDashedFromWhereARunHasEndedOverStepsAndOverTime) {
   const RunGroup a{"a", {MadeRun(1, {{0, 0}, {0, 1}}), MadeRun(2, {{0, 0}, {0, 1}})}};
   const RunGroup b{"b", {MadeRun(1, {{0, 0}, {0, 1}, {0, 2}})}};
   const Figure even = LearningCurves({a}), uneven = LearningCurves({a, b});
-  EXPECT_EQ(even.title.find("keeps"), std::string::npos);
-  EXPECT_NE(uneven.title.find("keeps its last value"), std::string::npos);
+  EXPECT_EQ(even.caption.find("keeps"), std::string::npos);
+  EXPECT_NE(uneven.caption.find("keeps its last value"), std::string::npos);
   ASSERT_EQ(uneven.panels.size(), 4U);
-  for (const Panel& panel : uneven.panels) EXPECT_EQ(panel.lines.size(), 2U);
-  EXPECT_EQ(uneven.panels[0].lines[1].name, "");  // one legend for all
-  EXPECT_EQ(uneven.panels[1].lines[1].name, "b");
+  for (const Panel& panel : even.panels) EXPECT_FALSE(panel.lines[0].dashed_from);
+  for (const Panel& panel : uneven.panels) {
+    ASSERT_EQ(panel.lines.size(), 2U);
+    ASSERT_TRUE(panel.lines[0].dashed_from);
+    EXPECT_FALSE(panel.lines[1].dashed_from);
+    const double end = panel.x_label == "steps" ? 2000 : 2;
+    EXPECT_GE(*panel.lines[0].dashed_from, end);
+    EXPECT_LT(*panel.lines[0].dashed_from, 1.01 * end);
+  }
+  // Over time two runs of as many steps end apart.
+  RunGroup slow = a;
+  slow.runs[1].evaluations.back().seconds = 8;
+  const Figure apart = LearningCurves({slow});
+  EXPECT_FALSE(apart.panels[0].lines[0].dashed_from);
+  EXPECT_TRUE(apart.panels[1].lines[0].dashed_from);
+  EXPECT_NE(apart.caption.find("Dashed"), std::string::npos);
+}
+
+TEST(LearningCurve, TheFigureSaysHowManyRunsAndWhatTheBandIs) {
+  const RunGroup a{"a", {MadeRun(1, {{0, 5}, {0, 10}}), MadeRun(2, {{0, 5}, {0, 10}})}};
+  const Figure figure = LearningCurves({a});
+  EXPECT_EQ(figure.panels[0].lines[0].name, "");  // one legend for all
+  EXPECT_EQ(figure.panels[1].lines[0].name, "a (n = 2)");
+  EXPECT_NE(figure.caption.find("pointwise 95% bootstrap interval"), std::string::npos);
+  for (const Panel& panel : figure.panels) {
+    EXPECT_EQ(panel.x_range->first, 0);
+    EXPECT_EQ(panel.y_range->first, 0);
+    EXPECT_GE(panel.y_range->second, 10);
+  }
+  const Figure negative = LearningCurves({{"a", {MadeRun(1, {{0, -5}, {0, 10}})}}});
+  EXPECT_LT(negative.panels[2].y_range->first, -5);
+}
+
+TEST(LearningCurve, NoPanelHasMoreThanFiveCurves) {
+  std::vector<RunGroup> groups;
+  for (int i = 0; i < 11; ++i) {
+    groups.push_back({std::to_string(i), {MadeRun(1, {{0, 0.0 + i}, {1, 10}})}});
+  }
+  const Figure figure = LearningCurves(groups);
+  ASSERT_EQ(figure.panels.size(), 3 * 4U);
+  size_t curves = 0;
+  for (size_t i = 0; i < figure.panels.size(); ++i) {
+    const Panel& panel = figure.panels[i];
+    EXPECT_LE(panel.lines.size(), kMostCurves);
+    EXPECT_EQ(panel.x_range, figure.panels[i % 4].x_range);
+    EXPECT_EQ(panel.y_range, figure.panels[i % 4].y_range);
+    curves += panel.lines.size();
+  }
+  EXPECT_EQ(curves, 4 * groups.size());
+  EXPECT_EQ(LearningCurves({groups.begin(), groups.begin() + 5}).panels.size(), 4U);
 }
 
 }  // namespace

@@ -17,6 +17,23 @@ std::vector<double> Pooled(std::span<const std::vector<double>> strata) {
   return pooled;
 }
 
+constexpr double kZ95 = 1.959963984540054;  // 97.5% quantile of the standard normal
+
+/// Variance of the mean over the tasks of U / (m n) where the probability is p on each: that of
+/// Hanley and McNeil (1982) for scores with exponential distributions, with both m - 1 and n - 1 as
+/// (m + n) / 2 - 1 (Newcombe, 2006).
+double ImprovementVariance(double p, const Strata& x, const Strata& y) {
+  double sum = 0;
+  for (size_t task = 0; task < x.size(); ++task) {
+    const auto m = static_cast<double>(x[task].size());
+    const auto n = static_cast<double>(y[task].size());
+    const double others = (m + n) / 2 - 1;
+    sum += p * (1 - p) * (1 + others * ((1 - p) / (2 - p) + p / (1 + p))) / (m * n);
+  }
+  const auto tasks = static_cast<double>(x.size());
+  return sum / (tasks * tasks);
+}
+
 /// A figure of two agents, who are resampled independently: the strata of one, then of the other.
 Estimate EstimateOfTwo(const Strata& x, const Strata& y,
                        const std::function<double(std::span<const std::vector<double>>,
@@ -65,7 +82,26 @@ std::optional<Interval> BootstrapInterval(Strata strata,
     value = statistic(resample);
   }
   std::ranges::sort(values);
-  return Interval{Quantile(values, 0.025), Quantile(values, 0.975)};
+  const Interval interval{Quantile(values, 0.025), Quantile(values, 0.975)};
+  if (interval.low == interval.high) return std::nullopt;
+  return interval;
+}
+
+Interval ImprovementScoreInterval(double estimate, const Strata& x, const Strata& y) {
+  const auto inside = [&](double p) {
+    const double off = estimate - p;
+    return off * off <= kZ95 * kZ95 * ImprovementVariance(p, x, y);
+  };
+  // The farthest p inside between the estimate and `end`, to the last digit.
+  const auto farthest = [&](double end) {
+    double in = estimate, out = end;
+    for (int i = 0; i < 60; ++i) {
+      const double middle = (in + out) / 2;
+      (inside(middle) ? in : out) = middle;
+    }
+    return in;
+  };
+  return {farthest(0), farthest(1)};
 }
 
 Estimate EstimateIqm(const Strata& scores, int64_t resamples) {
@@ -88,7 +124,12 @@ Estimate EstimateImprovement(const Strata& x, const Strata& y, int64_t resamples
     }
     return sum / static_cast<double>(a.size());
   };
-  return EstimateOfTwo(x, y, mean_probability, resamples);
+  Estimate e = EstimateOfTwo(x, y, mean_probability, resamples);
+  const auto repeated = [](const std::vector<double>& runs) { return runs.size() > 1; };
+  if (!e.interval && std::ranges::all_of(x, repeated) && std::ranges::all_of(y, repeated)) {
+    e.interval = ImprovementScoreInterval(e.value, x, y);
+  }
+  return e;
 }
 
 }  // namespace upswing

@@ -20,7 +20,8 @@ inline constexpr int64_t kResamples = 10000;  // of a bootstrap interval, unless
 /// Scores of one agent: for each task, which is a stratum, the scores of its runs.
 using Strata = std::vector<std::vector<double>>;
 
-/// A figure with its 95% interval; none where a stratum has less than two runs.
+/// A figure with its 95% interval; none where a stratum has less than two runs, or where all
+/// resamples agree, as then the runs do not tell how far off the figure may be.
 struct Estimate {
   double value = 0;
   std::optional<Interval> interval = {};
@@ -37,10 +38,17 @@ double ProbabilityOfImprovement(std::span<const double> x, std::span<const doubl
 /// 95% interval of a statistic by the stratified percentile bootstrap (Efron, 1979): each resample
 /// draws as many scores from each stratum as it has, with replacement, and the interval reaches
 /// from the 2.5% to the 97.5% quantile of the statistic over the resamples. The same scores give
-/// the same interval, in whatever order a stratum has them. Nothing if a stratum has less than two.
+/// the same interval, in whatever order a stratum has them. Nothing if a stratum has less than two,
+/// or if the interval would have no width.
 std::optional<Interval> BootstrapInterval(Strata strata,
                                           const std::function<double(const Strata&)>& statistic,
                                           int64_t resamples = kResamples);
+
+/// 95% score interval of a probability of improvement (Newcombe, 2006, method 5) that is `estimate`
+/// over all pairs of a run of x and one of y; tasks are strata. Unlike the bootstrap's it has a
+/// width where all pairs agree, too: it holds each probability for which the estimate would not be
+/// farther off than 1.96 standard deviations.
+Interval ImprovementScoreInterval(double estimate, const Strata& x, const Strata& y);
 
 /// Interquartile mean over the runs of all tasks.
 Estimate EstimateIqm(const Strata& scores, int64_t resamples = kResamples);
@@ -49,7 +57,8 @@ Estimate EstimateIqm(const Strata& scores, int64_t resamples = kResamples);
 Estimate EstimateIqmDifference(const Strata& x, const Strata& y, int64_t resamples = kResamples);
 
 /// Probability that a run of `x` has the higher score than one of `y` on the same task, as a mean
-/// over the tasks.
+/// over the tasks. Where the bootstrap's interval would have no width it is
+/// ImprovementScoreInterval.
 Estimate EstimateImprovement(const Strata& x, const Strata& y, int64_t resamples = kResamples);
 
 }  // namespace upswing

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <numbers>
 #include <span>
 #include <string>
 #include <vector>
@@ -14,21 +15,31 @@ namespace upswing {
 
 inline constexpr double kEvaluationSeconds = 20;  // length of an evaluation episode
 inline constexpr double kHoldSeconds = 10;  // success: every state of the last so many at the goal
-inline constexpr double kReturnSeconds = 10;  // the return counts the first so many
+inline constexpr double kReturnSeconds = 10;     // the return counts the first so many
+inline constexpr double kSteadyTiltSeconds = 1;  // the steady tilt is that of the last so many
+/// Settled: every body leans less than this, rad: 5% of the half turn from hanging to upright.
+inline constexpr double kSettledTilt = 0.05 * std::numbers::pi;
 
 /// What one evaluation episode came to.
 struct EvaluationEpisode {
   bool success = false;
-  double swing_up_seconds = 0;   // start of the last stretch at the goal that lasts to the end;
-                                 // kEvaluationSeconds if the end is not at the goal
-  double reward_sum = 0;         // return: undiscounted, over the first kReturnSeconds
-  double work = 0;               // Σ |mechanical work of the motor|, J
-  double peak_torque = 0;        // largest |torque|, N·m
-  double rms_torque = 0;         // root mean square, N·m
+  double swing_up_seconds = 0;  // start of the last stretch at the goal that lasts to the end;
+                                // kEvaluationSeconds if the end is not at the goal
+  double settling_seconds = 0;  // start of the last stretch settled that lasts to the end;
+                                // kEvaluationSeconds if the end is not settled
+  double reward_sum = 0;        // return: undiscounted, over the first kReturnSeconds
+  double work = 0;              // Σ |mechanical work of the motor|, J
+  double peak_torque = 0;       // largest |torque|, N·m
+  double rms_torque = 0;        // root mean square, N·m
+  double torque_variation = 0;  // total variation Σ |τₖ - τₖ₋₁| a second, N·m/s
+  // Of the last stretch at the goal; 0 if the end is not at the goal.
+  double goal_variation = 0;     // the torque's total variation a second, N·m/s
+  double goal_changes = 0;       // how often a second the torque changes
   double value = 0;              // largest Q-value of the first observation, in units of reward
   double discounted_return = 0;  // Σ γᵏ r over the whole episode: what that estimates, if the
                                  // policy learned from the reward that is judged
   std::vector<double> terms;     // (K) sum of each reward term over the first kReturnSeconds
+  std::vector<double> tilt;      // (bodies) mean lean over the last kSteadyTiltSeconds, rad
 };
 
 /// An evaluation in figures.
@@ -36,7 +47,11 @@ struct Evaluation {
   int64_t episodes = 0, successes = 0;
   Interval success_interval;
   Quartiles swing_up_seconds;  // of the successful episodes
-  Moments reward_sum, work, rms_torque;
+  int64_t settled = 0;         // how many of the successful ones are settled at the end
+  Quartiles settling_seconds;  // of those
+  Moments reward_sum, work, rms_torque, torque_variation;
+  Moments goal_variation, goal_changes;  // of the successful episodes
+  std::vector<Moments> tilt;  // (bodies) |mean lean| at the end of the successful episodes, rad
   double peak_torque = 0;
   double value = 0, discounted_return = 0;  // means; 0 for a policy that does not say its γ
   std::vector<double> term_means;           // (K) of the episodes' sums of each reward term
@@ -46,6 +61,12 @@ struct Evaluation {
   }
   bool all_succeeded() const { return episodes > 0 && successes == episodes; }
 };
+
+/// What Q-values estimate: the sum of γᵏ · reward_scale · r, as a policy's metadata say.
+struct ValueUnits {
+  double gamma = 0, reward_scale = 1;  // γ = 0: it does not say
+};
+ValueUnits ValueUnitsOf(const Policy& policy);
 
 /// Lets `policy` control every environment for kEvaluationSeconds from where it stands, and says
 /// what each episode came to. The environments must not end before that. Acting is shared by the

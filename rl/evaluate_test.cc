@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <numbers>
+
 #include "rl/toy_env.h"
 
 namespace upswing {
@@ -102,6 +104,54 @@ TEST(Evaluate, EpisodesAreThoseOfTheSummary) {
   const Evaluation summary = Summarize(episodes);
   EXPECT_EQ(summary.successes, Evaluate(Constant(-2), again).successes);
   EXPECT_EQ(summary.swing_up_seconds.median, 6);
+}
+
+/// Environment 0 leans 1° and -2° from its state 150 on, environment 1 always 10°; torque as given.
+class LeaningEnv : public ScriptedEnv {
+ public:
+  LeaningEnv() : ScriptedEnv({100, 100}) {}
+  int bodies() const override { return 2; }
+  void Lean(int env, std::span<double> lean) const override {
+    const bool upright = env == 0 && k >= 150;
+    lean[0] = upright ? kDegree : 10 * kDegree;
+    lean[1] = upright ? -2 * kDegree : 0;
+  }
+  void Step(std::span<const double> torque, StepResult& r) override {
+    ScriptedEnv::Step(torque, r);
+    ++k;
+    // Until state 100 a change of 1 N·m at each step, from then on one of 0.5 every fifth.
+    for (double& x : r.torque) x = k <= 100 ? k % 2 : 0.5 * (k / 5 % 2);
+  }
+  static constexpr double kDegree = std::numbers::pi / 180;
+  int k = 0;
+};
+
+TEST(Evaluate, FiguresOfAControlEngineer) {
+  LeaningEnv env;
+  const std::vector<EvaluationEpisode> episodes = EvaluateEpisodes(Constant(0), env);
+  EXPECT_TRUE(episodes[0].success && episodes[1].success);
+  EXPECT_DOUBLE_EQ(episodes[0].settling_seconds, 3);
+  EXPECT_EQ(episodes[1].settling_seconds, kEvaluationSeconds);  // more than 9° off
+  EXPECT_NEAR(episodes[0].tilt[0], env.kDegree, 1e-12);
+  EXPECT_NEAR(episodes[0].tilt[1], -2 * env.kDegree, 1e-12);
+  // 99 changes of 1 N·m, then one of 0.5 at each of 105, 110, …, 1000: 180 of them in 18 s.
+  EXPECT_DOUBLE_EQ(episodes[0].torque_variation, (99 + 180 * 0.5) / 20);
+  EXPECT_DOUBLE_EQ(episodes[0].goal_variation, 180 * 0.5 / 18);
+  EXPECT_DOUBLE_EQ(episodes[0].goal_changes, 10);
+
+  const Evaluation e = Summarize(episodes);
+  EXPECT_EQ(e.settled, 1);
+  EXPECT_DOUBLE_EQ(e.settling_seconds.median, 3);
+  ASSERT_EQ(e.tilt.size(), 2U);
+  EXPECT_NEAR(e.tilt[1].mean, env.kDegree, 1e-12);  // of 2° and 0°
+  EXPECT_DOUBLE_EQ(e.goal_changes.mean, 10);
+}
+
+TEST(Evaluate, AStretchAtTheGoalCountsItsOwnChangesOnly) {
+  ScriptedEnv never({2000}), whole({1});
+  EXPECT_EQ(EvaluateEpisodes(Constant(1), never)[0].goal_changes, 0);
+  EXPECT_EQ(EvaluateEpisodes(Constant(1), whole)[0].torque_variation, 0);
+  EXPECT_TRUE(Evaluate(Constant(1), whole).tilt.empty());  // the task has no bodies
 }
 
 /// A dueling policy on one observation whose torque changes often with it.

@@ -49,6 +49,8 @@ class Disturber {
     disturbances_[static_cast<size_t>(env)] = disturbance;
   }
 
+  const Disturbance& disturbance(int env) const { return disturbances_[static_cast<size_t>(env)]; }
+
   /// Takes the torques (N), N·m, chosen at step `steps[i]` of each episode (N), counted from 0, and
   /// returns those that the motors apply now (N).
   std::span<const double> Apply(std::span<const double> torque, std::span<const int64_t> steps);

@@ -82,6 +82,14 @@ bool Inverted(const PendulumState& s) {
   return -std::cos(s.q1) >= kCos30 && -std::cos(s.q1 + s.q2) >= kCos30;
 }
 
+std::array<double, 2> Lean(const PendulumState& s) {
+  constexpr double kPi = std::numbers::pi;
+  const auto from_upright = [](double angle) {
+    return angle - kPi - 2 * kPi * std::nearbyint((angle - kPi) / (2 * kPi));
+  };
+  return {from_upright(s.q1), from_upright(s.q1 + s.q2)};
+}
+
 std::array<float, kObservationSize> Observe(const Plant& plant, const PendulumState& s) {
   const double height = TipHeight(plant, s) / (plant.length1 + plant.length2);
   const std::array<double, kObservationSize> obs{

@@ -64,6 +64,9 @@ double TipHeight(const Plant& plant, const PendulumState& s);
 /// Both links within 30° of straight up; the second by its absolute angle q1 + q2.
 bool Inverted(const PendulumState& s);
 
+/// How far both links lean from straight up, rad, in [-π, π]; the second by its absolute angle.
+std::array<double, 2> Lean(const PendulumState& s);
+
 inline constexpr int kObservationSize = 8;
 /// Heuristic largest velocities (rad/s), by which the observation divides: swinging up from
 /// hanging stays well within them, so that all inputs are of a size.

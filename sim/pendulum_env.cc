@@ -56,6 +56,10 @@ std::vector<float> PendulumEnv::mirror_signs() const {
   return signs;
 }
 
+void PendulumEnv::Lean(int env, std::span<double> lean) const {
+  std::ranges::copy(upswing::Lean(state(env)), lean.begin());
+}
+
 Matrix<const float> PendulumEnv::obs() const { return {obs_.data(), config_.num_envs, obs_size()}; }
 
 void PendulumEnv::SetState(int env, const PendulumState& s) {
@@ -68,7 +72,8 @@ void PendulumEnv::SetState(int env, const PendulumState& s) {
 
 std::array<float, kObservationSize> PendulumEnv::Observation(int env) {
   const PendulumState s = state(env);
-  return Observe(plant(env), disturber_ ? disturber_->Measure(env, s) : s);
+  const Plant& assumed = config_.assumed_plant ? *config_.assumed_plant : plant(env);
+  return Observe(assumed, disturber_ ? disturber_->Measure(env, s) : s);
 }
 
 void PendulumEnv::SpreadRows(std::vector<float>& table) const {
@@ -134,7 +139,9 @@ void PendulumEnv::Step(std::span<const double> torque, StepResult& result) {
     const auto i = static_cast<size_t>(env);
     ++step_counts_[i];
     const auto next_obs = Row(result.next_obs, env);
-    if (disturber_) std::ranges::copy(Observation(env), next_obs.begin());
+    if (disturber_ || config_.assumed_plant) {
+      std::ranges::copy(Observation(env), next_obs.begin());
+    }
     if (config_.memory > 0) Remember(env, torque[i], next_obs);
     if (result.terminated[i]) StandIn(env, result);
     result.truncated[i] = step_counts_[i] >= episode_steps_ && !result.terminated[i] ? 1 : 0;

@@ -35,6 +35,9 @@ struct PendulumEnvConfig : PhysicsConfig {
   uint64_t first_index = 0;
   std::vector<Disturbance> disturbances{Disturbance()};  // one for all, or one for each
   Randomization randomization;  // around plants and disturbances, at each reset
+  // The plant whose numbers energy and height in observations are reckoned with, such as that of
+  // a training, so that they tell nothing of the true one; none: each environment's own.
+  std::optional<Plant> assumed_plant = {};
 
   const Disturbance& disturbance(int env) const {
     return disturbances[disturbances.size() > 1 ? static_cast<size_t>(env) : 0];
@@ -58,6 +61,8 @@ class PendulumEnv : public VectorEnv {
   double step_seconds() const override { return kControlPeriod; }
   double torque_limit() const override { return config_.plant(0).torque_limit; }
   std::vector<float> mirror_signs() const override;
+  int bodies() const override { return 2; }
+  void Lean(int env, std::span<double> lean) const override;
   Matrix<const float> obs() const override;
   void Step(std::span<const double> torque, StepResult& result) override;
   void SetStartNoise(double sigma) override { config_.start.noise = sigma; }
@@ -66,6 +71,10 @@ class PendulumEnv : public VectorEnv {
   /// The plant of the running episode.
   const Plant& plant(int env) const {
     return plants_.empty() ? config_.plant(env) : plants_[static_cast<size_t>(env)];
+  }
+  /// The disturbance of the running episode.
+  Disturbance disturbance(int env) const {
+    return disturber_ ? disturber_->disturbance(env) : Disturbance();
   }
   PendulumState state(int env) const { return physics_->state(env); }
   /// Puts an environment into a state, at the beginning of an episode.

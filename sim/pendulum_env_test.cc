@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -75,6 +76,55 @@ TEST_P(PendulumEnvs, APartOfTheEnvironmentsIsAsThoseOfTheWhole) {
     ASSERT_EQ(all.state(1).q2, last.state(0).q2);
     ASSERT_TRUE(std::ranges::equal(all.obs().row(2), last.obs().row(1)));
   }
+}
+
+TEST_P(PendulumEnvs, AnAssumedPlantIsAllThatObservationsKnow) {
+  PendulumEnvConfig config = SmallConfig();
+  config.randomization.plant.fill(0.3);
+  PendulumEnvConfig blind = config;
+  blind.assumed_plant = Plant();
+  PendulumEnv usual(config), env(blind);
+  StepResult expected = usual.MakeResult(), result = env.MakeResult();
+  for (int step = 0; step < 8; ++step) {  // over a reset
+    for (int i = 0; i < 3; ++i) {
+      const auto seen = Observe(Plant(), env.state(i));
+      ASSERT_TRUE(std::ranges::equal(env.obs().row(i), seen));
+      ASSERT_FALSE(std::ranges::equal(usual.obs().row(i), seen));
+      ASSERT_EQ(env.state(i).q2, usual.state(i).q2);  // the motion is that of the true plant
+    }
+    usual.Step(std::vector<double>{1, 2, 3}, expected);
+    env.Step(std::vector<double>{1, 2, 3}, result);
+    ASSERT_EQ(result.reward, expected.reward);
+  }
+}
+
+TEST_P(PendulumEnvs, TellsTheDisturbanceOfTheRunningEpisode) {
+  PendulumEnvConfig config = SmallConfig();
+  EXPECT_EQ(PendulumEnv(config).disturbance(0).delay, 0);
+  config.disturbances = {{0.01, 0.02}};
+  EXPECT_EQ(PendulumEnv(config).disturbance(1).sensor_noise, 0.01);
+  config.randomization.delay = 0.1;
+  config.randomization.sensor_noise = 0.1;
+  const PendulumEnv env(config);
+  EXPECT_GE(env.disturbance(0).delay, 0.02);
+  EXPECT_GT(env.disturbance(0).sensor_noise, 0.01);
+  EXPECT_NE(env.disturbance(0).sensor_noise, env.disturbance(1).sensor_noise);
+}
+
+TEST_P(PendulumEnvs, LinksLeanFromStraightUp) {
+  constexpr double kPi = std::numbers::pi;
+  PendulumEnv env(SmallConfig());
+  ASSERT_EQ(env.bodies(), 2);
+  std::array<double, 2> lean{};
+  const auto of = [&](double q1, double q2) {
+    env.SetState(1, {q1, q2, 0, 0});
+    env.Lean(1, lean);
+    return lean;
+  };
+  EXPECT_NEAR(of(kPi + 0.1, -0.3)[0], 0.1, 1e-12);
+  EXPECT_NEAR(lean[1], -0.2, 1e-12);
+  EXPECT_NEAR(of(-3 * kPi - 0.1, 0)[0], -0.1, 1e-12);  // turns do not matter
+  EXPECT_NEAR(std::abs(of(0, 0)[1]), kPi, 1e-12);      // hanging
 }
 
 TEST_P(PendulumEnvs, ABlowUpTerminatesWithFiniteNumbersAndStartsAnew) {

@@ -1,0 +1,190 @@
+#include "apps/eval_report.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "apps/trial.h"
+#include "core/text.h"
+
+namespace upswing {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr double kDegrees = 180 / std::numbers::pi;
+
+std::string MomentsText(const Moments& m, double scale = 1) {
+  return fmt::format("{:.4g} ± {:.2g}", scale * m.mean, scale * m.deviation);
+}
+
+std::string QuartilesText(const Quartiles& q) {
+  return fmt::format("{:.2f} s   (median; middle half {:.2f} to {:.2f} s)", q.median, q.low,
+                     q.high);
+}
+
+/// What only episodes that succeed have.
+void PrintSuccesses(const Evaluation& e) {
+  if (e.successes == 0) {
+    fmt::print("  swing-up time  none swung up to stay\n");
+    return;
+  }
+  fmt::print("  swing-up time  {}\n", QuartilesText(e.swing_up_seconds));
+  const std::string within = fmt::format("{:.0f}° of upright", kSettledTilt * kDegrees);
+  if (e.settled > 0) {
+    fmt::print("  settling time  {}, within {}: {} of {}\n", QuartilesText(e.settling_seconds),
+               within, e.settled, e.successes);
+  } else {
+    fmt::print("  settling time  none stays within {}\n", within);
+  }
+  fmt::print("  steady tilt    link 1 {}°, link 2 {}°   of the last {} s\n",
+             MomentsText(e.tilt[0], kDegrees), MomentsText(e.tilt[1], kDegrees),
+             kSteadyTiltSeconds);
+}
+
+void PrintTorques(const Evaluation& e) {
+  fmt::print("  torque         peak {:.4g} N·m, rms {} N·m\n", e.peak_torque,
+             MomentsText(e.rms_torque));
+  fmt::print("  its variation  {} N·m/s", MomentsText(e.torque_variation));
+  if (e.successes > 0) fmt::print("; once upright {} N·m/s", MomentsText(e.goal_variation));
+  fmt::print("\n");
+  if (e.successes > 0) {
+    fmt::print("  chatter        {} changes of the torque a second, once upright\n",
+               MomentsText(e.goal_changes));
+  }
+}
+
+ordered_json MomentsJson(const Moments& m, double scale = 1) {
+  return {{"mean", scale * m.mean}, {"deviation", scale * m.deviation}};
+}
+
+/// null of no episode.
+ordered_json QuartilesJson(const Quartiles& q, int64_t episodes) {
+  if (episodes == 0) return nullptr;
+  return {{"median", q.median}, {"quartiles", {q.low, q.high}}};
+}
+
+void AddFigures(const Evaluation& e, bool knows_values, ordered_json& j) {
+  j["episodes"] = e.episodes;
+  j["successes"] = e.successes;
+  j["success_rate"] = e.success_rate();
+  j["success_interval_95"] = {e.success_interval.low, e.success_interval.high};
+  j["swing_up_seconds"] = QuartilesJson(e.swing_up_seconds, e.successes);
+  j["settled"] = e.settled;
+  j["settling_seconds"] = QuartilesJson(e.settling_seconds, e.settled);
+  j["steady_tilt_degrees"] = nullptr;
+  if (e.successes > 0) {
+    j["steady_tilt_degrees"] = {{"link1", MomentsJson(e.tilt[0], kDegrees)},
+                                {"link2", MomentsJson(e.tilt[1], kDegrees)}};
+  }
+  j["return"] = MomentsJson(e.reward_sum);
+  for (size_t k = 0; k < e.term_means.size(); ++k) {
+    j["reward_terms"][kRewardTermNames[k]] = e.term_means[k];
+  }
+  j["value"] = knows_values ? ordered_json(e.value) : nullptr;
+  j["discounted_return"] = knows_values ? ordered_json(e.discounted_return) : nullptr;
+  j["energy_used"] = MomentsJson(e.work);
+  j["peak_torque"] = e.peak_torque;
+  j["rms_torque"] = MomentsJson(e.rms_torque);
+  j["torque_variation"] = MomentsJson(e.torque_variation);
+  const bool any = e.successes > 0;
+  j["torque_variation_upright"] = any ? MomentsJson(e.goal_variation) : nullptr;
+  j["torque_changes_upright"] = any ? MomentsJson(e.goal_changes) : nullptr;
+}
+
+/// Name and text of each figure of an episode, in the order of the columns.
+std::vector<std::pair<std::string, std::string>> Cells(const JudgedEpisode& episode,
+                                                       bool knows_values) {
+  const EvaluationEpisode& e = episode.result;
+  std::vector<std::pair<std::string, std::string>> cells;
+  const auto add = [&](const std::string& name, double value, bool known = true) {
+    cells.emplace_back(name, known ? FormatNumber(value) : "");
+  };
+  add("q1", episode.start.q1);
+  add("q2", episode.start.q2);
+  add("w1", episode.start.w1);
+  add("w2", episode.start.w2);
+  for (const auto& [name, value] : PlantValues(episode.plant)) add(name, value);
+  add("sensor_noise", episode.disturbance.sensor_noise);
+  add("delay", episode.disturbance.delay);
+  add("success", e.success ? 1 : 0);
+  const bool upright = e.swing_up_seconds < kEvaluationSeconds;
+  add("swing_up_seconds", e.swing_up_seconds, upright);
+  add("settling_seconds", e.settling_seconds, e.settling_seconds < kEvaluationSeconds);
+  add("tilt1_degrees", e.tilt[0] * kDegrees);
+  add("tilt2_degrees", e.tilt[1] * kDegrees);
+  add("return", e.reward_sum);
+  for (size_t k = 0; k < e.terms.size(); ++k) add(kRewardTermNames[k], e.terms[k] + 0.0);
+  add("value", e.value, knows_values);
+  add("discounted_return", e.discounted_return, knows_values);
+  add("energy_used", e.work);
+  add("peak_torque", e.peak_torque);
+  add("rms_torque", e.rms_torque);
+  add("torque_variation", e.torque_variation);
+  add("torque_variation_upright", e.goal_variation, upright);
+  add("torque_changes_upright", e.goal_changes, upright);
+  return cells;
+}
+
+}  // namespace
+
+void PrintEvalTable(const EvalReport& report) {
+  const Evaluation& e = report.figures;
+  fmt::print("{}\n", Printable(report.policy));
+  fmt::print("  plant          {}, physics {}\n", PlantText(report.env.plant(0)), report.physics);
+  if (report.model) fmt::print("  {:<15}{}\n", "model", report.model->Text());
+  const std::string changes = ChangesText(report.env);
+  if (!changes.empty()) fmt::print("  {:<15}{}\n", "with", changes);
+  fmt::print("  success        {} of {} = {:.1f}%   (95% interval {:.1f}% to {:.1f}%)\n",
+             e.successes, e.episodes, 100 * e.success_rate(), 100 * e.success_interval.low,
+             100 * e.success_interval.high);
+  PrintSuccesses(e);
+  fmt::print("  return         {}   in the first {} s\n", MomentsText(e.reward_sum),
+             kReturnSeconds);
+  for (size_t k = 0; k < e.term_means.size(); ++k) {
+    fmt::print("    {:<18}{:8.2f}\n", kRewardTermNames[k], e.term_means[k]);
+  }
+  if (report.knows_values) {
+    fmt::print("  Q at the start {:.4g} expected, {:.4g} attained (discounted reward)\n", e.value,
+               e.discounted_return);
+  }
+  fmt::print("  energy used    {} J   in {} s\n", MomentsText(e.work), kEvaluationSeconds);
+  PrintTorques(e);
+  fmt::print("  ± is the standard deviation over the episodes\n");
+}
+
+void PrintEvalJson(const EvalReport& report) {
+  ordered_json j;
+  j["policy"] = report.policy;
+  j["seed"] = report.env.seed;
+  j["physics"] = report.physics;
+  for (const auto& [name, value] : PlantValues(report.env.plant(0))) j["plant"][name] = value;
+  j["model"] = report.model ? report.model->Json() : kBuiltIn;
+  j["unknown_plant"] = report.env.assumed_plant.has_value();
+  Disturbance disturbance = report.env.disturbance(0);
+  Randomization randomization = report.env.randomization;
+  for (const Options& options : {OptionsOf(disturbance), OptionsOf(randomization)}) {
+    for (const Option& option : options.all()) {
+      j[option.section][option.name] = *std::get<double*>(option.target);
+    }
+  }
+  AddFigures(report.figures, report.knows_values, j);
+  fmt::print("{}\n", j.dump(2));
+}
+
+std::string EpisodesCsv(const EvalReport& report) {
+  std::string csv = "episode";
+  for (const auto& [name, text] : Cells(report.episodes.front(), false)) csv += ',' + name;
+  csv += '\n';
+  for (size_t i = 0; i < report.episodes.size(); ++i) {
+    csv += std::to_string(i);
+    for (const auto& [name, text] : Cells(report.episodes[i], report.knows_values)) {
+      csv += ',' + text;
+    }
+    csv += '\n';
+  }
+  return csv;
+}
+
+}  // namespace upswing

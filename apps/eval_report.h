@@ -1,0 +1,41 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/config.h"
+#include "apps/model_info.h"
+#include "rl/evaluate.h"
+#include "sim/pendulum_env.h"
+
+/// What `eval` says of its episodes.
+namespace upswing {
+
+/// One episode: what it was given and what it came to.
+struct JudgedEpisode {
+  PendulumState start;
+  Plant plant;
+  Disturbance disturbance;
+  EvaluationEpisode result;
+};
+
+/// A finished evaluation.
+struct EvalReport {
+  std::string policy;              // path
+  std::string physics;             // name of the engine
+  std::optional<ModelInfo> model;  // none: the built-in one
+  PendulumEnvConfig env;           // what all episodes have in common
+  std::vector<JudgedEpisode> episodes;
+  Evaluation figures;
+  bool knows_values = false;  // the policy says what its Q-values estimate
+};
+
+void PrintEvalTable(const EvalReport& report);
+void PrintEvalJson(const EvalReport& report);
+
+/// A row for each episode, counted from 0; what it has not (such as the swing-up time of one that
+/// is not upright at the end) is empty.
+std::string EpisodesCsv(const EvalReport& report);
+
+}  // namespace upswing

@@ -1,0 +1,120 @@
+#include "apps/trial.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "apps/commands.h"
+#include "apps/rollout.h"
+#include "core/error.h"
+#include "core/text.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The settings of sensors, motors and what is random.
+struct Conditions {
+  Disturbance disturbance;
+  Randomization randomization;
+
+  void Describe(Options& o) {
+    disturbance.Describe(o);
+    randomization.Describe(o);
+  }
+};
+
+}  // namespace
+
+void AddTrialOptions(CLI::App& app, TrialArguments& a, const std::string& seed_of) {
+  AddSeed(app, a.seed, seed_of);
+  AddPlantOptions(app, a.set, a.model);
+  AddPhysics(app, a.physics, "mujoco");
+  app.add_flag("--unknown-plant", a.unknown_plant,
+               "scale the observed energy and height by the training's plant")
+      ->disable_flag_override();
+  Conditions defaults;
+  AddSettings(app, OptionsOf(defaults), a.flags);
+}
+
+PendulumEnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded) {
+  PendulumEnvConfig env;
+  env.physics = ParsePhysics(a.physics, "--physics");
+  Conditions conditions;
+  SetFlags(OptionsOf(conditions), a.flags);
+  env.disturbances = {conditions.disturbance};
+  env.randomization = conditions.randomization;
+  if (a.unknown_plant && loaded == nullptr) {
+    throw BadInput("--unknown-plant: expected a policy, to which the plant can be unknown");
+  }
+  if (loaded != nullptr) {
+    env.mjcf = loaded->mjcf;
+    env.memory = MemorySteps(loaded->policy.shape().inputs);
+    if (a.unknown_plant) env.assumed_plant = loaded->plant;
+  }
+  env.plants = {
+      ChangedPlant(loaded != nullptr ? loaded->plant : Plant(), a.model, a.set, env.mjcf)};
+  env.seed = static_cast<uint64_t>(a.seed);
+  env.stream = "evaluation";
+  return env;
+}
+
+std::string ChangesText(const PendulumEnvConfig& env) {
+  Conditions conditions, defaults;
+  conditions.disturbance = env.disturbance(0);
+  conditions.randomization = env.randomization;
+  const Options options = OptionsOf(conditions), usual = OptionsOf(defaults);
+  std::vector<std::string> texts;
+  for (size_t k = 0; k < options.all().size(); ++k) {
+    const Option& option = options.all()[k];
+    if (option.text() == usual.all()[k].text()) continue;
+    texts.push_back(Concat(option.name, " ", option.text()));
+  }
+  if (env.assumed_plant) texts.emplace_back("the plant unknown to the policy");
+  return Join(texts, ", ");
+}
+
+std::string PlantChangesText(Plant plant, Plant training) {
+  const Options now = OptionsOf(plant), before = OptionsOf(training);
+  std::vector<std::string> texts;
+  for (size_t k = 0; k < now.all().size(); ++k) {
+    const double value = *std::get<double*>(now.all()[k].target);
+    const double usual = *std::get<double*>(before.all()[k].target);
+    if (value == usual) continue;
+    texts.push_back(fmt::format("{} {:.4g} {} (training: {:.4g})", now.all()[k].name, value,
+                                now.all()[k].unit, usual));
+  }
+  return Join(texts, ", ");
+}
+
+fs::path DefaultOut(const LoadedPolicy& loaded, const std::string& name) {
+  const fs::path run = loaded.path.parent_path();
+  const fs::path first = fs::exists(run / "config.toml")
+                             ? run / name
+                             : fs::path("runs") / Concat(name, "-", loaded.path.stem().string());
+  fs::path out = first;
+  for (int number = 2; fs::exists(fs::symlink_status(out)); ++number) {
+    out = Concat(first.string(), "-", number);
+  }
+  return out;
+}
+
+void AddEpisodeOptions(CLI::App& app, EpisodeArguments& a) {
+  AddStart(app, a.start);
+  Options own;
+  own.Add(&a.number, "episode", -1, {0, 999999}, "", "that of `eval` with the same flags, from 0")
+      .usual = "none";
+  AddArguments(app, own);
+}
+
+std::optional<PendulumState> ChooseEpisode(const EpisodeArguments& a, PendulumEnvConfig& env) {
+  if (a.start && a.given()) {
+    throw BadInput("--start: expected none beside --episode, which has a start of its own");
+  }
+  env.first_index = static_cast<uint64_t>(std::max<int64_t>(0, a.number));
+  if (a.given()) return std::nullopt;
+  return ParseStart(a.start.value_or("0,0,0,0"));
+}
+
+}  // namespace upswing

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/config.h"
+#include "apps/loaded_policy.h"
+#include "sim/pendulum_env.h"
+
+/// On what plant, with what sensors and motor, `eval`, `simulate` and `plot` try a policy out. With
+/// the same flags they make the same episodes.
+namespace upswing {
+
+struct TrialArguments {
+  std::string model, physics;
+  std::vector<std::string> set;
+  std::vector<FlagValue> flags;  // of the disturbance and of what is random
+  int64_t seed;
+  bool unknown_plant = false;
+};
+
+/// Adds --set, --model, --physics, --seed (of `seed_of`), --unknown-plant, and the settings of
+/// Disturbance and Randomization.
+void AddTrialOptions(CLI::App& app, TrialArguments& a, const std::string& seed_of);
+
+/// The environments that the arguments ask for, those of the policy's training but for what they
+/// change; without a policy (null) those of the built-in plant. Environment i has episode i. Throws
+/// BadInput.
+PendulumEnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded);
+
+/// What is not at its default, as text: `delay 0.02, …`; empty if nothing is.
+std::string ChangesText(const PendulumEnvConfig& env);
+
+/// What a plant has otherwise than another: `mass2 1.3 kg (training: 1), …`; empty for nothing.
+std::string PlantChangesText(Plant plant, Plant training);
+
+/// Where figures of a policy go unless the user says: in its run's folder under this name, or, for
+/// a policy file elsewhere, in runs/NAME-FILE; with -2, -3, … where that is taken.
+std::filesystem::path DefaultOut(const LoadedPolicy& loaded, const std::string& name);
+
+/// Which episode `simulate` and `plot` make: episode K of `eval`, or one from a given start.
+struct EpisodeArguments {
+  std::optional<std::string> start;
+  int64_t number;  // K; negative: none
+
+  /// Whether it is an episode of `eval`.
+  bool given() const { return number >= 0; }
+};
+
+/// Adds --start and --episode.
+void AddEpisodeOptions(CLI::App& app, EpisodeArguments& a);
+
+/// Makes the one environment of `env` that of the episode, and returns where it starts: nowhere
+/// else than it does by itself, if nothing is returned. Throws BadInput.
+std::optional<PendulumState> ChooseEpisode(const EpisodeArguments& a, PendulumEnvConfig& env);
+
+}  // namespace upswing
