@@ -110,7 +110,7 @@ std::string Option::text() const {
 
 std::string Option::plain_text() const {
   std::string value = text();
-  if (const auto* words = std::get_if<std::string*>(&target)) value = ShellQuoted(**words);
+  if (const auto* words = std::get_if<std::string*>(&target)) value = **words;
   std::erase_if(value, [&](char c) {  // a list needs neither brackets nor blanks there
     return std::holds_alternative<std::vector<int64_t>*>(target) &&
            (c == '[' || c == ']' || c == ' ');
