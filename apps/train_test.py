@@ -243,5 +243,18 @@ class TrainTest(ProgramTest):
         self.assertGreaterEqual(successes, 97)
 
 
+class CommandsToTypeTest(ProgramTest):
+    def test_they_are_quoted(self):
+        text = self.succeed(*small(steps=8, eval_every=8, eval_episodes=1, out="my run; id"))
+        self.assertIn("  ./upswing eval 'my run; id'\n", text)
+        self.assertIn("  ./upswing train --resume 'my run; id'", text)
+
+    def test_what_cannot_be_seen_is_in_none(self):
+        text = self.succeed(*small(steps=8, eval_every=8, eval_episodes=1, out="a\x1b[2J"))
+        self.assertIn("in a\\x1b[2J\n", text)
+        self.assertNotIn("./upswing", text)
+        self.assertNotIn("\x1b", text)
+
+
 if __name__ == "__main__":
     unittest.main()

@@ -9,6 +9,7 @@
 #include "apps/config_checks.h"
 #include "apps/model_info.h"
 #include "apps/say.h"
+#include "core/text.h"
 
 namespace upswing {
 
@@ -22,7 +23,7 @@ TrainView::TrainView(const TrainState& state, const AgentReport& report)
 void TrainView::Announce(const Config& config, int threads, size_t num_parameters,
                          const std::filesystem::path& run) const {
   const DqnConfig& d = config.dqn;
-  Say("Training {} (seed {}) in {}\n", config.agent, config.train.seed, run.string());
+  Say("Training {} (seed {}) in {}\n", config.agent, config.train.seed, Printable(run.string()));
   Say("  {}{} network {}{}, {} parameters; {} environments, {} thread{}\n",
       d.double_q ? "double, " : "", d.dueling ? "dueling" : "plain", fmt::join(d.hidden, "-"),
       d.dueling ? fmt::format(" with heads of {}", d.head) : "", FormatCount(num_parameters),
@@ -123,20 +124,24 @@ void TrainView::Summarize(const TrainState& s, const TrainConfig& config,
   PrintOutcome(s, config, finished);
   const std::filesystem::path policy = run / "policy.safetensors";
   std::error_code error;
-  if (s.best_step > 0 && !std::filesystem::exists(policy, error)) {
-    Say("Best policy: of step {}, but {} is not there any more\nNext:\n", FormatCount(s.best_step),
-        policy.string());
-  } else if (s.best_step > 0) {
-    Say("Best policy: {} (step {}, success {:.0f}%, return {:.0f})\n", policy.string(),
+  const bool has_policy = s.best_step > 0 && std::filesystem::exists(policy, error);
+  if (has_policy) {
+    Say("Best policy: {} (step {}, success {:.0f}%, return {:.0f})\n", Printable(policy.string()),
         FormatCount(s.best_step), 100 * s.best_success_rate, s.best_return);
-    Say("Next:\n  ./upswing demo {0}\n  ./upswing eval {0}\n  ./upswing info {0}\n", run.string());
-  } else {
-    Say("Next:\n");
+  } else if (s.best_step > 0) {
+    Say("Best policy: of step {}, but {} is not there any more\n", FormatCount(s.best_step),
+        Printable(policy.string()));
+  }
+  if (Printable(run.string()) != run.string()) return;  // no line that anybody could type
+  const std::string folder = ShellQuoted(run.string());
+  Say("Next:\n");
+  if (has_policy) {
+    Say("  ./upswing demo {0}\n  ./upswing eval {0}\n  ./upswing info {0}\n", folder);
   }
   std::string how;
   if (finished && s.solved && config.stop_when_solved) how += " --no-stop-when-solved";
   if (finished && s.steps >= config.steps) how += fmt::format(" --steps {}", 2 * s.steps);
-  Say("  ./upswing train --resume {}{}\n", run.string(), how);
+  Say("  ./upswing train --resume {}{}\n", folder, how);
 }
 
 }  // namespace upswing

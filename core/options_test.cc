@@ -146,6 +146,8 @@ TEST_F(OptionsTest, OnACommandLine) {
             "--fast --count 3 --the-rate 0.5 --name x --widths 4,5 --mass1 1 --mass2 2");
   options_.Set("fast", "false", "");
   EXPECT_EQ(options_.Find("fast", "").front()->on_command_line(), "--no-fast");
+  options_.Set("name", "x; $(id)", "");
+  EXPECT_EQ(options_.Find("name", "").front()->on_command_line(), "--name 'x; $(id)'");
 }
 
 TEST_F(OptionsTest, SaysWhatEachIsWithUnitRangeAndDefault) {
