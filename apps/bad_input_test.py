@@ -402,6 +402,7 @@ class PolicyFileTest(FileTest):
             with self.subTest(key=key, text=text):
                 self.change({key: text})
                 self.refuse_info(f'metadata "{key}"')
+                self.restore()
         for key in ("control_period", "observation"):
             with self.subTest(missing=key):
                 shutil.copy(Path(self.made.name, "run/policy.safetensors"), self.policy)

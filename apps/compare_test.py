@@ -60,9 +60,9 @@ class CompareTest(ProgramTest):
 
     def test_names_of_folders_forge_neither_lines_nor_cells(self):
         variant = 'x\x1b[2J\n"a",1\u202e'
-        self.make_group(f"study/{variant}", [1, 2], stop=False, steps=3000)
-        self.make_group("study/plain", [1, 2], stop=False, steps=4000)
-        text = self.succeed("compare", "study", "--different-tasks", "--unfinished", "--out", "figures")
+        self.make_group(f"study/{variant}", [1, 2])
+        self.make_group("study/plain", [1, 2], more="gamma = 0.9\n")
+        text = self.succeed("compare", "study", "--out", "figures")
         self.assertIn('x\\x1b[2J\\n"a",1\\u202e', text)
         self.assertTrue(all(line.isprintable() for line in text.splitlines()), repr(text))
         with open(self.folder / "figures/summary.csv", encoding="utf-8", newline="") as file:
@@ -70,7 +70,7 @@ class CompareTest(ProgramTest):
         with open(self.folder / "figures/runs.csv", encoding="utf-8", newline="") as file:
             self.assertEqual(len(list(csv.DictReader(file))), 4)
         ET.parse(self.folder / "figures/curves.svg")
-        shown = self.succeed("compare", "study", "--different-tasks", "--unfinished", "--json")
+        shown = self.succeed("compare", "study", "--json")
         self.assertTrue(all(line.isprintable() for line in shown.splitlines()), repr(shown))
         self.assertIn(variant, [group["group"] for group in json.loads(shown)["groups"]])
 

@@ -299,9 +299,9 @@ class PageTest(ProgramTest):
         words = shlex.split(command_of(f'"{evil}"'))
         self.assertEqual(words[words.index("--model") + 1], evil)
         # A shell says so too: each word is one.
-        shown = subprocess.run(["sh", "-c", command_of(f'"{evil}"').replace("./upswing", "printf '%s\\n'")],
-                               cwd=self.folder, check=True, stdout=subprocess.PIPE,
-                               encoding="utf-8").stdout
+        printed = command_of(f'"{evil}"').replace("./upswing", "printf '%s\\n'")
+        shown = subprocess.run(["sh", "-c", printed], cwd=self.folder, check=True,
+                               stdout=subprocess.PIPE, encoding="utf-8").stdout
         self.assertEqual(shown.splitlines(), words[1:])
         self.assertFalse((self.folder / "y").exists())
         # What cannot be seen is not told at all.

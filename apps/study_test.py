@@ -50,7 +50,8 @@ class StudyTest(ProgramTest):
         self.write("s.toml", HEAD.replace('"Little"', r'"\u001b[2J\nTraining \u202e"')
                    .replace("seeds = 2", "seeds = 1") + "[variants.one]\n")
         output = self.succeed("study", "s.toml")
-        self.assertTrue(output.startswith('Training "\\x1b[2J\\nTraining \\u202e" in runs/s\n'), output)
+        shown = 'Training "\\x1b[2J\\nTraining \\u202e" in runs/s\n'
+        self.assertTrue(output.startswith(shown), output)
         self.assertTrue(all(line.isprintable() for line in output.splitlines()), repr(output))
 
     def test_each_run_equals_the_same_settings_alone(self):
