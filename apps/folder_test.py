@@ -128,9 +128,10 @@ class LinkTest(RunTest):
         self.assertTrue(away.exists())
 
     def test_a_variant_is_no_link(self):
-        self.write("s.toml", 'seeds = 1\n[settings]\nagent = "d3qn-small"\n[variants.a]\n')
+        study = 'seeds = 1\n[settings]\nagent = "d3qn-small"\n[variants.a]\n'
         (self.folder / "many").mkdir()
-        self.write("many/study.toml", 'seeds = 1\n[settings]\nagent = "d3qn-small"\n[variants.a]\n')
+        for name in ("s.toml", "many/study.toml"):
+            self.write(name, study)
         (self.folder / "many/a").symlink_to("../precious")
         self.refuse(["study", "s.toml", "--out", "many"], "many/a: expected a folder, got a link")
 
