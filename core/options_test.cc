@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "core/error.h"
 #include "core/text.h"
 
@@ -116,7 +118,8 @@ TEST(Step, LetsThroughMultiplesAndNamesTheNearestOnes) {
   options.Add(&pause, "pause", 0, {0, 1}, "s", "between two steps").step = 0.02;
   for (int count = 0; count <= 50; ++count) {
     // As people write it, and as arithmetic makes it.
-    for (const double value : {count / 50.0, count * 0.02, 1 - (50 - count) * 0.02}) {
+    for (const double value :
+         {count / 50.0, count * 0.02, std::max(0.0, 1 - (50 - count) * 0.02)}) {
       options.Set("pause", FormatNumber(value), "--pause");
       EXPECT_EQ(pause, value);
     }

@@ -51,7 +51,7 @@ using Vec = hn::Vec<Tag<T>>;
 /// Tile shapes: as many registers for C as leave room for a row of B and a number of A. Tiles of
 /// fewer rows, for what remains of M and for single rows, are wider, because a multiply-add takes
 /// several cycles and as many must be in flight.
-#if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_NEON  // of 32 registers
+#if HWY_TARGET == HWY_AVX3 || HWY_ARCH_ARM_A64  // of 32 registers
 constexpr int kTileRows = 8;
 constexpr int kRegisters = 16;
 #else  // of 16
