@@ -1,7 +1,7 @@
 import type { Plugin } from 'vite';
 
-/// What the official MuJoCo build needs before it is served: its glue without code made from text,
-/// so that a strict Content-Security-Policy can stand, and its wasm without debug sections.
+/// Prepares the official MuJoCo build for the page: its JavaScript without code made from text, which
+/// a strict Content-Security-Policy forbids, and its WebAssembly without debug sections.
 
 /// Emscripten writes the function that calls into C++ as text and compiles it. The same as a closure.
 const INVOKER = `(function () {
@@ -22,7 +22,7 @@ const INVOKER = `(function () {
   };
 })()`;
 
-/// And the one that C++ calls JavaScript through.
+/// The same for the function through which C++ calls JavaScript.
 const METHOD_CALLER = `(obj, func, destructorsRef, args) => {
   var values = types.map((type) => {
     var value = type.readValueFromPointer(args);

@@ -1,13 +1,13 @@
 import { CONTROL_PERIOD } from './pendulum';
 import type { Range, State } from './pendulum';
 
-/// What sensors and motor do wrong; zeros: nothing.
+/// Errors of sensors and motor; all zero: none.
 export interface Disturbance {
   sensor_noise: number; // standard deviation, on each measured angle and velocity, rad and rad/s
   delay: number; // from the choice of a torque to its effect, in control periods
 }
 
-/// What may be set at all, as in the program.
+/// Allowed values, the same as in the program.
 export const DISTURBANCE_LIMITS: Readonly<Record<keyof Disturbance, Range>> = {
   sensor_noise: [0, 10],
   delay: [0, Math.round(1 / CONTROL_PERIOD)], // up to 1 s
@@ -18,14 +18,14 @@ function normal(): number {
   return Math.sqrt(-2 * Math.log(1 - Math.random())) * Math.cos(2 * Math.PI * Math.random());
 }
 
-/// What the sensors say of a state.
+/// A state as the sensors measure it.
 export function measure(s: State, noise: number): State {
   if (noise === 0) return s;
   const blur = (x: number) => x + noise * normal();
   return { q1: blur(s.q1), q2: blur(s.q2), w1: blur(s.w1), w2: blur(s.w2) };
 }
 
-/// A motor that answers some control periods late, and not at all before the first torque arrives.
+/// A motor with a delay of some control periods; until the first torque arrives it applies none.
 export class DelayLine {
   private underWay: number[] = [];
 
@@ -34,7 +34,7 @@ export class DelayLine {
   }
 
   /// Takes the torque chosen now, gives the one that acts now. A shorter delay than before skips the
-  /// oldest torques that are under way.
+  /// oldest torques that wait.
   apply(torque: number, delay: number): number {
     this.underWay.push(torque);
     if (this.underWay.length <= delay) return 0;

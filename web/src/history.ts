@@ -13,13 +13,13 @@ export class History {
   add(moment: Moment): void {
     this.moments.push(moment);
     while (this.moments[this.first]!.t < moment.t - this.seconds) ++this.first;
-    // Cut now and then, not at each step.
+    // Cut from time to time, not at each step.
     if (this.first < 1000) return;
     this.moments = this.moments.slice(this.first);
     this.first = 0;
   }
 
-  /// Those from time t (s) on.
+  /// The moments from time t (s) on.
   from(t: number): Moment[] {
     let first = this.moments.length;
     while (first > this.first && this.moments[first - 1]!.t >= t) --first;
@@ -35,7 +35,7 @@ export class History {
     this.first = 0;
   }
 
-  /// As `upswing simulate` writes it, to the last digit; time from the first.
+  /// CSV as `upswing simulate` writes it, with all digits; time starts at 0.
   csv(): string {
     const kept = this.moments.slice(this.first);
     const start = kept[0]?.t ?? 0;

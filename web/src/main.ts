@@ -6,7 +6,7 @@ import { Page } from './page/page';
 import { printable } from './text';
 import { World } from './world';
 
-document.documentElement.dataset.script = 'running'; // public/watch.js and style.css need no longer wait
+document.documentElement.dataset.script = 'running'; // for public/watch.js and style.css
 
 try {
   placeQValues();

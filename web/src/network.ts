@@ -50,7 +50,7 @@ function relu(y: Float32Array): Float32Array {
   return y;
 }
 
-/// What the metadata say of the network. Throws BadInput.
+/// The network's shape from the metadata. Throws BadInput.
 export function parseShape(text: string): NetworkShape {
   let shape: NetworkShape;
   try {

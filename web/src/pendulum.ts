@@ -26,7 +26,7 @@ export type Parameter = keyof Plant;
 /// Smallest and largest value.
 export type Range = readonly [number, number];
 
-/// What a plant may be at all: the program refuses others, too.
+/// Allowed values, the same as in the program.
 export const PLANT_LIMITS: Readonly<Record<Parameter, Range>> = {
   mass1: [0.01, 100],
   mass2: [0.01, 100],
@@ -61,7 +61,7 @@ export const HANGING: Readonly<State> = { q1: 0, q2: 0, w1: 0, w2: 0 };
 /// Principal moments of inertia (kg·m²) of a solid capsule, across and along its axis: mass m (kg),
 /// radius r (m), length l of its cylinder (m).
 export function capsuleInertia(m: number, r: number, l: number) {
-  // The mass is shared out by volume between the cylinder and the two half spheres.
+  // The mass is divided by volume between the cylinder and the two half spheres.
   const cylinder = Math.PI * r * r * l;
   const sphere = (4 / 3) * Math.PI * r * r * r;
   const mc = (m * cylinder) / (cylinder + sphere);

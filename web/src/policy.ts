@@ -20,7 +20,7 @@ export function argMax(values: ArrayLike<number>): number {
   return best;
 }
 
-/// What a policy makes of an observation.
+/// A policy's output for an observation.
 export interface Decision extends QValues {
   action: number; // the greedy one
   torque: number; // that it applies, N·m
@@ -33,9 +33,9 @@ export class Policy {
   readonly torques: Float64Array; // (A) N·m
   /// How many past steps an observation remembers.
   readonly memory: number;
-  /// The plant at training.
+  /// The plant that it was trained on.
   readonly plant: Plant;
-  /// What rewards were multiplied by while it learned, and so its Q-values.
+  /// Factor by which rewards, and so its Q-values, were multiplied during training.
   readonly rewardScale: number;
   /// Largest |difference| between the Q-values in the file and those computed here.
   readonly selfCheckError: number;
@@ -82,14 +82,14 @@ export class Policy {
     return { ...values, action, torque: this.torques[action]! };
   }
 
-  /// What the policy was trained on: [low, high] of a parameter.
+  /// The range [low, high] of a parameter during training.
   trainedRange(name: Parameter): Range {
     const share = this.setting(`randomize_${name}`);
     const nominal = this.plant[name];
     return within(PLANT_LIMITS[name], nominal * (1 - share), nominal * (1 + share));
   }
 
-  /// The same of the errors of sensors and motor: rad and rad/s, control periods.
+  /// The same for the errors of sensors and motor: rad and rad/s, control periods.
   trainedDisturbance(name: 'sensor_noise' | 'delay'): Range {
     const unit = name === 'delay' ? CONTROL_PERIOD : 1;
     const least = this.setting(name) / unit;
@@ -97,7 +97,7 @@ export class Policy {
     return within(DISTURBANCE_LIMITS[name], least, most);
   }
 
-  /// A number from 0 on of the training's configuration; 0 if that does not say.
+  /// A positive number from the training's configuration; 0 if there is none.
   private setting(name: string): number {
     const line = new RegExp(`^${name} = ([0-9.eE+-]+)$`, 'm');
     const value = Number(line.exec(this.metadata.get('config') ?? '')?.[1] ?? 0);
@@ -111,7 +111,7 @@ export class Policy {
     }
   }
 
-  /// That observations are scaled as here.
+  /// Throws BadInput unless observations are scaled as here.
   private checkObservation(): void {
     const text = this.about('observation');
     let given: { max_velocity?: unknown; memory?: { steps?: unknown } } | null;

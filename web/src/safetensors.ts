@@ -19,7 +19,7 @@ export interface TensorFile {
   tensors: Map<string, Tensor>;
 }
 
-/// What came from outside and is not what was expected: one line says both.
+/// Input from outside that is not as expected; the message says in one line what was expected.
 export class BadInput extends Error {}
 
 const BYTES: Record<string, number> = { F32: 4, F64: 8 };
@@ -69,8 +69,8 @@ function parseTensor(name: string, entry: unknown, data: Uint8Array): Tensor {
   return { dtype, shape: shape as number[], bytes: data.subarray(begin, end) };
 }
 
-/// Throws unless the tensors, in their order, share out the data among them, without a gap or an overlap: the size of
-/// the file then bounds what there is to compute.
+/// Throws unless the tensors, in their order, cover the data without a gap or an overlap, so that the size of the file
+/// bounds the work.
 function checkCovered(tensors: Tensor[], data: Uint8Array): void {
   const begin = ({ bytes }: Tensor) => bytes.byteOffset - data.byteOffset;
   let end = 0;
@@ -147,7 +147,7 @@ export function read(
       `tensor ${quoted(name)}: expected ${dtype} (${shape.join(', ')}), got ${got}`,
     );
   }
-  // Copied: where they stand in the file need not suit an array of numbers.
+  // Copied, because their place in the file may not be aligned for an array of numbers.
   const { buffer } = tensor.bytes.slice();
   const values = dtype === 'F32' ? new Float32Array(buffer) : new Float64Array(buffer);
   if (!values.every(Number.isFinite)) throw new BadInput(`tensor ${quoted(name)} is not finite`);

@@ -17,7 +17,7 @@ export interface Push {
   force: Vec;
 }
 
-/// The double pendulum in MuJoCo. The only file that knows MuJoCo.
+/// The double pendulum in MuJoCo. Only this file uses MuJoCo's interface.
 export class Simulator {
   private readonly mujoco: MainModule;
   private readonly model: MjModel;
@@ -42,7 +42,7 @@ export class Simulator {
     this.mujoco.mj_forward(this.model, this.data);
   }
 
-  /// Another plant, as if the MJCF had been written with it; the state stays.
+  /// Changes the plant, as if the MJCF had been written with it; the state stays.
   set plant(plant: Plant) {
     const { model, mujoco } = this;
     const state = this.state;

@@ -20,7 +20,7 @@ export const STEPS_PER_SECOND = PHYSICS_STEPS / CONTROL_PERIOD; // of physics
 const SPRING = 60; // N/m, of the hand that drags
 const DAMPER = 5; // N·s/m
 const STRONGEST = 15; // N
-const SHOVE = 0.4; // N, sideways at the tip; those in quick succession add up
+const SHOVE = 0.4; // N, sideways at the tip; repeated shoves add up
 const STRONGEST_SHOVE = 6; // N
 const SHOVE_STEPS = 20; // 0.1 s
 
@@ -33,7 +33,7 @@ export interface Moment {
   height: number; // of the tip over l1 + l2
 }
 
-/// The pendulum with its motor, its agent, and the hand that disturbs it. Knows no page.
+/// The pendulum with its motor, its agent, and the hand that disturbs it. Independent of the page.
 export class World {
   readonly simulator: Simulator;
   readonly disturbance: Disturbance = { sensor_noise: 0, delay: 0 };
@@ -44,7 +44,7 @@ export class World {
 
   torque = 0; // N·m, that the motor holds now
   push: Push | null = null; // that acts now
-  /// What the agent makes of the last control step, whether it is on or not; see also look().
+  /// The agent's decision at the last control step, whether it is on or not; see also look().
   decision: Decision | null = null;
   /// Time (s) since when both links are upright without a break; null if they are not.
   uprightSince: number | null = null;
@@ -84,12 +84,12 @@ export class World {
     return this.simulator.state;
   }
 
-  /// s since the page began; goes on over resets.
+  /// Time (s) since the page was opened; a reset does not set it back.
   get time(): number {
     return this.steps / STEPS_PER_SECOND;
   }
 
-  /// Another start, with nothing under way.
+  /// Starts again from `state`, without forces or delayed torques.
   reset(state: State = HANGING): void {
     this.simulator.state = state;
     this.motor.clear();
@@ -132,12 +132,12 @@ export class World {
     return valid;
   }
 
-  /// Lets the agent judge the present moment, without acting: for a pendulum that stands still.
+  /// Updates the agent's decision for the present state without acting, for a paused pendulum.
   look(): void {
     this.decision = this.policy?.act(this.observe()) ?? null;
   }
 
-  /// What the agent would see now.
+  /// The observation at this moment.
   private observe(): Float32Array {
     const { plant, policy, observation, chosen } = this;
     const now = observe(plant, measure(this.state, this.disturbance.sensor_noise));

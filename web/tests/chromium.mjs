@@ -9,7 +9,7 @@ export const launchOptions = {
   args: [
     '--no-sandbox', // there is none for root, nor in most containers
     '--disable-gpu',
-    // No word to anyone else.
+    // No requests to other hosts.
     '--disable-quic',
     '--no-first-run',
     '--disable-background-networking',

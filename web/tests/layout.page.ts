@@ -210,9 +210,18 @@ test.describe('with forced colours', () => {
 
 test('"Get Inverted" looks pressed while it is on', async ({ page }) => {
   await open(page);
-  const shadow = () =>
-    page.locator('#agent-on').evaluate((button) => getComputedStyle(button).boxShadow);
-  expect(await shadow()).not.toContain('inset');
+  const look = () =>
+    page.locator('#agent-on').evaluate((button) => {
+      const { backgroundColor, boxShadow } = getComputedStyle(button);
+      const light = backgroundColor
+        .match(/[\d.]+/g)!
+        .slice(0, 3)
+        .map(Number);
+      return { light: Math.max(...light), inset: boxShadow.includes('inset') };
+    });
+  const off = await look();
   await page.locator('#agent-on').click();
-  expect(await shadow()).toContain('inset');
+  const on = await look();
+  expect([off.inset, on.inset]).toEqual([false, true]);
+  expect(on.light).toBeLessThan(off.light); // in the shade, not blank
 });

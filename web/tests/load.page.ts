@@ -160,7 +160,9 @@ test.describe('what is missing or broken is told', () => {
     const page = await context.newPage();
     await page.goto('./');
     await expect(page.locator('noscript p')).toBeVisible();
-    await expect(page.locator('#loading')).toBeHidden();
+    for (const id of ['loading', 'badge', 'buttons', 'agent']) {
+      await expect(page.locator(`#${id}`)).toBeHidden();
+    }
     await context.close();
   });
 });

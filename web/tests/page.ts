@@ -2,7 +2,7 @@ import { test as base, expect } from '@playwright/test';
 import type { Page } from '@playwright/test';
 import type {} from '../src/page/global';
 
-/// A test whose page says nothing on the console, unless `complains` allows it.
+/// A test that fails if the page writes errors or warnings to the console, unless `complains` is set.
 export const test = base.extend<{ complains: boolean; silent: void }>({
   complains: [false, { option: true }],
   silent: [
@@ -25,7 +25,7 @@ export async function open(page: Page, hash = ''): Promise<void> {
   await expect(page.locator('#agent-on')).toBeEnabled();
 }
 
-/// Lets so many seconds of the pendulum's time go by at once, and returns the rows
+/// Simulates so many seconds at once, and returns the rows
 /// [t, q1, q2, w1, w2, torque] of each control step.
 export function run(page: Page, seconds: number): Promise<number[][]> {
   return page.evaluate((duration) => {
@@ -43,7 +43,7 @@ export function run(page: Page, seconds: number): Promise<number[][]> {
   }, seconds);
 }
 
-/// From this state at rest or not, with time standing still but for run().
+/// Sets the state and pauses, so that only run() advances time.
 export async function startFrom(page: Page, q1: number, q2 = 0, w1 = 0, w2 = 0): Promise<void> {
   const pause = page.getByRole('button', { name: 'Pause' });
   if (await pause.isVisible()) await pause.click();

@@ -5,6 +5,12 @@ import { ready, serve, visit } from './visit.mjs';
 const server = await serve();
 const docs = fileURLToPath(new URL('../../docs/', import.meta.url));
 
+/// Time stands still, without the look of a page that is paused.
+async function stop() {
+  upswing.clock.speed = 0;
+  await new Promise((resolve) => setTimeout(resolve, 500));
+}
+
 /// The agent swings up from hanging; stopped on the way.
 async function swingUp(page) {
   await page.goto(server.address);
@@ -14,7 +20,7 @@ async function swingUp(page) {
     const { q1, q2 } = upswing.world.state;
     return Math.cos(q1) < 0.1 && Math.cos(q1 + q2) < -0.3;
   });
-  await page.click('#pause');
+  await page.evaluate(stop);
 }
 
 /// A heavier pendulum, held upright by the randomised agent, is pulled at its tip.
@@ -27,8 +33,9 @@ async function pull(page) {
   await page.evaluate(() => {
     const target = { x: 0.45, z: 0.95 };
     upswing.world.drag = { link: 2, along: 0.5, target };
+    for (let k = 0; k < 24; ++k) upswing.world.advance(); // 0.12 s
   });
-  await page.waitForTimeout(150);
+  await page.evaluate(stop);
 }
 
 const desktop = { viewport: { width: 1400, height: 860 } };

@@ -110,12 +110,12 @@ export class Agents {
       const entries = agents.map(parseEntry).filter((entry) => entry !== null);
       if (entries.length > 0) return new Agents(entries, own);
     } catch {
-      // told below
+      // reported below
     }
     throw new BadInput(`${LIST} is not a list of agents`);
   }
 
-  /// All that there are, by id and title.
+  /// All agents, by id and title.
   get list(): { id: string; title: string }[] {
     const list = [...this.entries.values()].map((entry) => ({
       id: entry.id,
@@ -124,7 +124,7 @@ export class Agents {
     return this.own ? [...list, { id: OWN, title: ownTitle(this.own) }] : list;
   }
 
-  /// Of an agent that a link may name.
+  /// Whether there is an agent of this id.
   has(id: string): boolean {
     return this.entries.has(id) || (id === OWN && this.own !== null);
   }

@@ -4,7 +4,7 @@ import { BadInput } from '../safetensors';
 import { Simulator } from '../simulator';
 import { fetchBytes } from './fetch';
 
-const WASM_BYTES = 4_520_000; // about; servers that compress do not say it
+const WASM_BYTES = 4_520_000; // approximately; servers that compress do not send the length
 const MAX_WASM_BYTES = 64 * 1024 * 1024;
 
 /// Fetches MuJoCo and starts it; `onProgress` hears the share that has arrived. Throws BadInput.

@@ -4,7 +4,7 @@ import type { World } from '../world';
 
 const LONGEST_FRAME = 0.1; // s: a tab that comes back does not jump
 
-/// Lets the world go on in step with real time, or slower, or faster.
+/// Advances the world with real time, or slower, or faster.
 export class Clock {
   speed = 1;
   private readonly world: World;
@@ -16,7 +16,7 @@ export class Clock {
     this.before = world.state;
   }
 
-  /// Real time has gone on by `seconds`. False if the state blew up.
+  /// Advances by `seconds` of real time. False if the state blew up.
   advance(seconds: number): boolean {
     this.due += Math.min(seconds, LONGEST_FRAME) * this.speed * STEPS_PER_SECOND;
     let sound = true;
@@ -27,7 +27,7 @@ export class Clock {
     return sound;
   }
 
-  /// Forgets the fraction of a step: the state was set, or is looked at step by step.
+  /// Drops the fraction of a step, after the state was set or advanced step by step.
   settle(): void {
     this.due = 0;
     this.before = this.world.state;

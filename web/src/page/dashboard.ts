@@ -6,9 +6,9 @@ import { PhasePortrait, QBars, SECONDS_SHOWN, signed, Strip, withMinus } from '.
 import type { World } from '../world';
 import { element } from './dom';
 
-const FRAMES = 2; // of the screen for one of the charts
+const FRAMES = 2; // the charts are drawn at every second frame
 
-/// The charts of what happens, and the numbers beside them.
+/// The charts and the numbers beside them.
 export class Dashboard {
   private readonly energy = new Strip('energy', 'energy', (m) => m.energy);
   private readonly height = new Strip('height', 'link2', (m) => m.height);
@@ -73,13 +73,13 @@ export class Dashboard {
   }
 }
 
-/// Beside a chart, and in its name for those who cannot see it.
+/// Writes a number beside its chart, and into the chart's name for screen readers.
 function tell(chart: string, text: string): void {
   element(`${chart}-value`).textContent = text;
   element(chart).ariaLabel = `${element(chart).dataset.name}: ${text}`;
 }
 
-/// Two digits behind the point.
+/// Two decimals.
 function fixed(value: number): string {
   return withMinus(value.toFixed(2));
 }
@@ -99,9 +99,9 @@ function qText(policy: Policy, { q, action, value }: Decision): string {
   return Number.isNaN(value) ? text : `${text}, state ${reward(value)}`;
 }
 
-const BALANCED = 1; // s upright, from which on it is no swing through the top
+const BALANCED = 1; // s upright, after which it is more than a swing through the top
 
-/// What the pendulum does, in words.
+/// What the pendulum is doing, in words.
 export function situation(world: World): { state: string; text: string } {
   const upright = world.time - (world.uprightSince ?? world.time);
   if (upright >= BALANCED)

@@ -6,7 +6,7 @@ import type { World } from '../world';
 
 const NEAR = 28; // pixels from a link within which it is grabbed: a fingertip
 
-const MOVED = 4; // pixels, from which on a touch is a drag
+const MOVED = 4; // pixels, beyond which a touch is a drag
 
 /// What a mouse or finger holds.
 interface Held {

@@ -12,12 +12,12 @@ function show(text: string, kind: 'warning' | 'note'): void {
   element('message').hidden = false;
 }
 
-/// What went wrong; stays until it is closed.
+/// Shows what went wrong; stays until it is closed.
 export function warn(text: string): void {
   show(text, 'warning');
 }
 
-/// What went well; goes by itself.
+/// Shows what went well; disappears by itself.
 export function note(text: string): void {
   show(text, 'note');
   timer = window.setTimeout(hideMessage, 1000 * NOTE_SECONDS);

@@ -21,7 +21,7 @@ import { changeTheme, onThemeChange } from './theme';
 const REMEMBERED = 60; // s of history
 const ADDRESS_DELAY = 300; // ms: browsers refuse an address that changes with each pixel of a slider
 
-/// What stands on the page, and what its buttons do.
+/// The parts of the page and what its buttons do.
 export class Page {
   readonly world: World;
   readonly clock: Clock;
@@ -48,7 +48,7 @@ export class Page {
     world.onMoment = (moment) => this.history.add(moment);
   }
 
-  /// Begins with what the address says, anew.
+  /// Starts again with the settings of the address.
   async open(): Promise<void> {
     const { shared, problems } = decode(location.hash, RANGES);
     if (shared.agent !== null && !this.agents.has(shared.agent)) {
@@ -70,7 +70,7 @@ export class Page {
     warn(`Not all of the link could be used: ${problems.slice(0, 3).join('; ')}${more}.`);
   }
 
-  /// Takes what people do, draws, and goes on by itself.
+  /// Handles input, then advances and draws at every frame.
   run(): void {
     this.listen();
     let before = performance.now();
@@ -87,12 +87,12 @@ export class Page {
     requestAnimationFrame(frame);
   }
 
-  /// Takes another agent; false if it cannot be had, which is told, and the old one stays.
+  /// Changes to another agent; if it cannot be loaded, says why, keeps the old one and returns false.
   choose(id: string): Promise<boolean> {
     return this.take(() => this.agents.get(id), `Agent ${quoted(id)}`);
   }
 
-  /// Takes a visitor's own policy, and gives it the plant that it was trained on.
+  /// Changes to a visitor's own policy and to the plant that it was trained on.
   async openFile(file: File): Promise<void> {
     if (!(await this.take(() => this.agents.open(file), quoted(file.name)))) return;
     this.settings.setPlant(this.agent!.policy.plant);
@@ -195,7 +195,7 @@ export class Page {
     });
   }
 
-  /// A link to an example leads back to the pendulum, and starts the same example anew as well.
+  /// A link to an example scrolls back to the pendulum; the same link again restarts the example.
   private listenToExamples(): void {
     element('explain').addEventListener('click', (event) => {
       const link = (event.target as HTMLElement).closest<HTMLAnchorElement>('a[href^="#"]');
@@ -248,13 +248,13 @@ export class Page {
     this.restarted();
   }
 
-  /// The pendulum begins anew: what was before is another story.
+  /// After a new start: what happened before is dropped.
   private restarted(): void {
     this.clock.settle();
     this.history.clear();
   }
 
-  /// Pendulum, sensors and motor as at the beginning.
+  /// Pendulum, sensors and motor with their initial settings.
   private resetSettings(): void {
     const { agentOn: on } = this.world;
     this.apply({ ...BEGINNING, on, speed: this.clock.speed });
@@ -267,7 +267,7 @@ export class Page {
     this.setAgentOn(shared.on);
   }
 
-  /// A setting is another: the address follows, so that it can be shared at any time.
+  /// After a setting changed: updates the address, so that it can be shared at any time.
   private changed(): void {
     if (this.paused) this.world.look();
     clearTimeout(this.addressTimer);
@@ -297,7 +297,7 @@ export class Page {
     }
   }
 
-  /// The last minute.
+  /// Saves the last minute as CSV.
   private save(): void {
     if (!this.history.last) return note('There is no trajectory yet.');
     const link = document.createElement('a');

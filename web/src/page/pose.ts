@@ -46,7 +46,7 @@ export class Pose {
     if (shown) this.follow(this.world.state);
   }
 
-  /// The pendulum is somewhere else. (180° and -180° are one place, at both ends of a slider.)
+  /// Shows the angles of a state. (180° and -180° are one place, at both ends of a slider.)
   follow({ q1, q2 }: State): void {
     for (const [slider, angle] of [
       [this.q1, q1],

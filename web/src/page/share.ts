@@ -2,10 +2,10 @@ import { NOMINAL } from '../pendulum';
 import type { Parameter, Plant, Range } from '../pendulum';
 import { quoted } from '../text';
 
-/// Stands for a visitor's own policy, which no link can hold.
+/// Stands for a visitor's own policy, which no link can contain.
 export const OWN = 'own';
 
-/// What a link holds: the agent, whether it is on, and all that was changed.
+/// What a link contains: the agent, whether it is on, and every setting that was changed.
 export interface Shared {
   agent: string | null;
   on: boolean;
@@ -15,7 +15,7 @@ export interface Shared {
   delay: number; // control periods
 }
 
-/// How the page begins.
+/// The state in which the page begins.
 export const BEGINNING: Readonly<Shared> = {
   agent: null,
   on: false,
@@ -25,12 +25,12 @@ export const BEGINNING: Readonly<Shared> = {
   delay: 0,
 };
 
-/// The numbers of a link, by the names that they have there.
+/// The numbers of a link, by their names in it.
 function numbersOf({ speed, plant, sensor_noise, delay }: Shared): Record<string, number> {
   return { speed, ...plant, sensor_noise, delay };
 }
 
-/// As the part of an address behind #; only what differs from the beginning.
+/// The part of an address after #; only what differs from the beginning.
 export function encode(shared: Shared): string {
   const fields = new URLSearchParams();
   if (shared.agent) fields.set('agent', shared.agent);
@@ -42,7 +42,7 @@ export function encode(shared: Shared): string {
   return fields.toString();
 }
 
-/// Reads such an address. What is not understood is left out and told in `problems`, a line each.
+/// Reads such an address. What is not understood is left out and reported in `problems`, one line each.
 export function decode(
   hash: string,
   ranges: ReadonlyMap<string, Range>,

@@ -13,11 +13,11 @@ export class Canvas {
     this.resize();
   }
 
-  /// A colour by its name in the style sheet.
+  /// The colour with this name in the style sheet.
   color(name: string): string {
     let color = this.colors.get(name);
     if (color === undefined) {
-      // Through the canvas's own colour, which nothing else needs: so light-dark() is resolved.
+      // Through the canvas's own CSS colour, which is not used otherwise: this resolves light-dark().
       this.element.style.color = `var(--${name})`;
       color = getComputedStyle(this.element).color;
       this.colors.set(name, color);
@@ -25,7 +25,7 @@ export class Canvas {
     return color;
   }
 
-  /// The theme is another.
+  /// To be called when the theme changed.
   forgetColors(): void {
     this.colors.clear();
   }

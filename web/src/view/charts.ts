@@ -100,7 +100,7 @@ export class PhasePortrait {
         const next: [number, number] = [x(fromUpright(angleOf(state))), y(rateOf(state))];
         const previous = piece.at(-1);
         if (previous && Math.abs(next[0] - previous[0]) > cx) {
-          canvas.line(piece, color); // over the edge: go on at the other side
+          canvas.line(piece, color); // over the edge: continue at the other side
           piece = [];
         }
         piece.push(next);
@@ -140,7 +140,7 @@ export class QBars {
     const best = q[action]!;
     if (!q.every(Number.isFinite)) {
       canvas.text('not finite', canvas.width / 2, canvas.height / 2, 'center');
-      return; // and leave the scale alone
+      return; // and keep the scale
     }
     // The scale grows at once and shrinks slowly.
     const spread = Math.max(0.05, 1.1 * (best - Math.min(...q)));
@@ -159,12 +159,12 @@ export class QBars {
   }
 }
 
-/// A number's text with a minus that is as wide as a digit.
+/// A number's text with a minus sign as wide as a digit.
 export function withMinus(text: string): string {
   return text.replace(/^-/, '−');
 }
 
-/// Three digits.
+/// Three significant digits.
 export function signed(value: number): string {
   return withMinus(String(Number(value.toPrecision(3))));
 }

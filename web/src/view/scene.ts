@@ -21,7 +21,7 @@ export class Scene {
     return { x: (px - width / 2) / this.scale, z: (height / 2 - py) / this.scale };
   }
 
-  /// And back.
+  /// The inverse: a point of the plane (m) as a place on the canvas.
   at({ x, z }: Vec): [number, number] {
     const { width, height } = this.canvas;
     return [width / 2 + this.scale * x, height / 2 - this.scale * z];
@@ -32,7 +32,7 @@ export class Scene {
     return metres * this.scale;
   }
 
-  /// The pendulum in this state, and the way of its tip over some last moments, oldest first.
+  /// Draws the pendulum in this state, and the path of its tip over `trail`, oldest first.
   draw(world: World, state: State, trail: readonly Moment[]): void {
     const { canvas } = this;
     const { plant } = world;
@@ -71,7 +71,7 @@ export class Scene {
     context.stroke();
   }
 
-  /// The older, the fainter.
+  /// Older parts are fainter.
   private drawTrail({ plant, time }: World, state: State, moments: readonly Moment[]): void {
     const tip = (s: State) => this.at(pointOn(plant, s, 2, plant.length2).position);
     const points = [...moments.map((moment) => tip(moment.state)), tip(state)];
