@@ -149,7 +149,7 @@ void WriteComparison(const Comparison& comparison, const fs::path& folder) {
 
 void AddCompare(CLI::App& program, Command& command) {
   CLI::App* app = program.add_subcommand(
-      "compare", "Compare trainings over their seeds: figures with intervals, learning curves");
+      "compare", "Compare trainings over their seeds, with intervals and curves");
   auto a = std::make_shared<CompareArguments>();
   app->add_option("runs", a->runs, "run folders, or folders that hold some")
       ->type_name("RUN|FOLDER")

@@ -170,7 +170,7 @@ void PrintEvalJson(const EvalReport& report) {
     }
   }
   AddFigures(report.figures, report.knows_values, j);
-  fmt::print("{}\n", j.dump(2));
+  fmt::print("{}\n", j.dump(2, ' ', true, ordered_json::error_handler_t::replace));
 }
 
 std::string EpisodesCsv(const EvalReport& report) {

@@ -129,7 +129,7 @@ int RunInfo(const std::string& path) {
 
 void AddInfo(CLI::App& program, Command& command) {
   CLI::App* app = program.add_subcommand(
-      "info", "Say what a policy or a run is, and check it; or what this machine can do");
+      "info", "Describe and check a policy or a run, or describe this machine");
   auto path = std::make_shared<std::string>();
   app->add_option("policy", *path, "policy.safetensors or run folder; none: about this machine")
       ->type_name("POLICY|RUN")

@@ -157,7 +157,7 @@ class MapTest(ProgramTest):
                       "unknown", "gravity as in training, mass2 as in training"):
             self.assertIn(words, plain)
         self.assertNotIn(">as in training<", text)
-        self.assertNotEqual(changed["success_rate"], usual["success_rate"])
+        self.assertNotEqual(changed["swing_up_seconds"], usual["swing_up_seconds"])
         # One exact start has no chance in it.
         _, text = self.figure("--set", "q1=20", out="start")
         self.assertIn("q1 20 °", text)

@@ -111,11 +111,11 @@ void AddPlot(CLI::App& program, Command& command) {
       ->type_name("FOLDER")
       ->check(NotEmpty());
   app->footer(
-      "episode.svg and .png: angles, velocities, energy, torque, the reward's terms and the "
-      "Q-values\n(in units of reward) over time. phase.svg and .png: velocity over angle of both "
-      "joints. `upswing\nsimulate` writes the same episode as a table. Without --out they go into "
-      "plot in the run's folder, or\ninto runs/plot-NAME for a policy file elsewhere; then plot-2, "
-      "…\n\n"
+      "episode.svg and .png: angles, velocities, energy, torque, the reward's terms and the\n"
+      "Q-values (in units of reward) over time. phase.svg and .png: velocity over angle of both\n"
+      "joints. `upswing simulate` writes the same episode as a table. Without --out they go into\n"
+      "plot in the run's folder, or into runs/plot-NAME for a policy file elsewhere; then plot-2,\n"
+      "and so on.\n\n"
       "Examples:\n"
       "  ./upswing plot runs/d3qn-seed1\n"
       "  ./upswing plot runs/d3qn-seed1 --start 3.0,0,0,0 --seconds 5 --out caught\n"

@@ -103,12 +103,11 @@ void AddSimulate(CLI::App& program, Command& command) {
       ->type_name("FILE")
       ->check(NotEmpty());
   app->footer(
-      "Columns: t (s), qpos0, qpos1 (rad), qvel0, qvel1 (rad/s), torque (N·m, what the motor "
-      "gives\n"
-      "over the next 0.02 s: after its delay, within its limit), energy (J), height of the tip "
-      "(m), inverted (0 or 1), "
-      "and\n"
-      "the reward with its five terms for the state and the torque of that row.\n\n"
+      "Columns: t (s), qpos0, qpos1 (rad), qvel0, qvel1 (rad/s), torque (N·m, as the motor "
+      "applies\n"
+      "it over the next 0.02 s: after its delay, within its limit), energy (J), height of the tip\n"
+      "(m), inverted (0 or 1), and the reward with its five terms for the state and the torque of\n"
+      "that row.\n\n"
       "Examples:\n"
       "  ./upswing simulate runs/d3qn-seed1 --csv rollout.csv\n"
       "  ./upswing simulate --torque torques.csv --start 0.1,-0.05,0,0 --seconds 10\n"

@@ -25,6 +25,13 @@ struct Conditions {
   }
 };
 
+/// Throws BadInput.
+Conditions ConditionsOf(const TrialArguments& a) {
+  Conditions conditions;
+  SetFlags(OptionsOf(conditions), a.flags);
+  return conditions;
+}
+
 }  // namespace
 
 void AddTrialOptions(CLI::App& app, TrialArguments& a, const std::string& seed_of) {
@@ -36,13 +43,14 @@ void AddTrialOptions(CLI::App& app, TrialArguments& a, const std::string& seed_o
       ->disable_flag_override();
   Conditions defaults;
   AddSettings(app, OptionsOf(defaults), a.flags);
+  // What is wrong on the command line is told before any file is read.
+  app.parse_complete_callback([&a] { (void)ConditionsOf(a); });
 }
 
 PendulumEnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded) {
   PendulumEnvConfig env;
   env.physics = ParsePhysics(a.physics, "--physics");
-  Conditions conditions;
-  SetFlags(OptionsOf(conditions), a.flags);
+  const Conditions conditions = ConditionsOf(a);
   env.disturbances = {conditions.disturbance};
   env.randomization = conditions.randomization;
   if (a.unknown_plant && loaded == nullptr) {
