@@ -103,7 +103,7 @@ class DemoTest(ProgramTest):
         before = snapshot(self.work)
         for arguments, *words in ((["--prot", "1"], "--prot", "--help"),
                                   (["--port"], "--port"),
-                                  (["--port", "0"], "--port", "'0'"),
+                                  (["--port", "0"], "--port", 'got "0"'),
                                   (["--port", "65536"], "--port"),
                                   (["--port=80x"], "80x"),
                                   (["--dist", "full"], "full", "empty"),
