@@ -4,14 +4,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
-#include <csignal>
 #include <exception>
 #include <memory>
 
 #include "apps/bench_report.h"
 #include "apps/commands.h"
 #include "apps/machine.h"
+#include "apps/say.h"
+#include "apps/signals.h"
 #include "apps/streams.h"
 #include "core/error.h"
 #include "core/simd.h"
@@ -45,20 +45,8 @@ std::vector<std::string> PartNames() {
   return names;
 }
 
-// ---- A signal: the measurement that runs is given up, and those that follow.
-
-std::atomic<int> g_stop_signal{0};
-static_assert(std::atomic<int>::is_always_lock_free);
-
-void InstallSignalHandlers() {
-  struct sigaction stop {};
-  stop.sa_handler = [](int signal) { g_stop_signal = signal; };
-  stop.sa_flags = SA_RESETHAND | SA_RESTART;  // a second one ends the program at once
-  sigaction(SIGINT, &stop, nullptr);
-  sigaction(SIGTERM, &stop, nullptr);
-}
-
-/// Hands the cases to Google Benchmark, which calls back several times for each of them.
+/// Hands the cases to Google Benchmark, which calls back several times for each of them. At a
+/// signal to stop, the measurement that runs is given up, and those that follow.
 class BenchRunner {
  public:
   BenchRunner(const BenchCases& cases, const BenchContext& context, bool quiet)
@@ -82,7 +70,7 @@ class BenchRunner {
 
  private:
   void Measure(const BenchCase& c, benchmark::State& state) {
-    if (g_stop_signal != 0 || error_) return Stop(state);
+    if (StopSignal() != 0 || error_) return Stop(state);
     reporter_.ShowProgress(c);
     try {
       if (prepared_ != &c) {
@@ -92,11 +80,11 @@ class BenchRunner {
       }
       for ([[maybe_unused]] auto iteration : state) {
         work_();
-        if (g_stop_signal == 0) continue;
+        if (StopSignal() == 0) continue;
         Stop(state);
         break;
       }
-    } catch (...) {  // Google Benchmark shall see no exception
+    } catch (...) {  // none may pass through Google Benchmark
       error_ = std::current_exception();
       return Stop(state);
     }
@@ -178,7 +166,7 @@ int RunBench(BenchOptions options) {
   options.threads.erase(std::unique(options.threads.begin(), options.threads.end()),
                         options.threads.end());
 
-  InstallSignalHandlers();
+  InstallSignalHandlers("");
   const BenchCases cases = WantedCases(options);
   BenchContext context{CpuModel(), SimdPath(),      options.threads,
                        {},         options.seconds, static_cast<int>(options.repetitions)};
@@ -190,10 +178,11 @@ int RunBench(BenchOptions options) {
 
   BenchRunner runner(cases, context, options.json && IsStandardStream(*options.json));
   runner.Run();
-  if (g_stop_signal != 0) {
-    fmt::print(stderr, "upswing: stopped after {} of {} cases{}\n", runner.reporter().cases_done(),
-               cases.size(), options.json ? "; " + *options.json + " is not written" : "");
-    return 128 + g_stop_signal;
+  if (StopSignal() != 0) {
+    SayError(fmt::format("stopped after {} of {} cases{}", runner.reporter().cases_done(),
+                         cases.size(),
+                         options.json ? "; " + Printable(*options.json) + " is not written" : ""));
+    return 128 + StopSignal();
   }
   if (options.json) WriteOutput(*options.json, runner.reporter().Json());
   return 0;

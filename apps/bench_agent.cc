@@ -137,12 +137,11 @@ struct LearningLoop {
   LearningLoop(const Config& config, int threads)
       : pool(threads),
         env(config.Environments(pool)),
-        agent(config.dqn, env.num_envs(), env.obs_size(), TorqueLevels(env.torque_limit()),
-              env.mirror_signs(), 1, pool),
+        agent(config.Agent(env, pool)),
         result(env.MakeResult()),
         torque(static_cast<size_t>(env.num_envs())) {}
 
-  /// One lock-step of all environments and the gradient steps that fall due.
+  /// One lock-step of all environments and the gradient steps that are due.
   void Step() {
     agent.Act(env.obs(), torque);
     env.Step(torque, result);

@@ -22,10 +22,10 @@ namespace {
 /// plain system calls are safe.
 [[noreturn]] void BecomeProgram(const char* program, char* const* arguments, int log,
                                 pid_t parent) {
-  // The order counts: a parent that died before the first line is found out by the second.
+  // In this order: the second call notices a parent that died before the first.
   const bool tied = prctl(PR_SET_PDEATHSIG, SIGKILL) == 0 && getppid() == parent;
   setpgid(0, 0);
-  // It listens to this one as soon as it has begun; until then it would be its end.
+  // The program handles this signal once it runs; until then it would kill it.
   std::signal(SIGUSR1, SIG_IGN);
   const int nothing = open("/dev/null", O_RDONLY | O_CLOEXEC);
   if (tied && nothing >= 0 && dup2(nothing, STDIN_FILENO) >= 0 && dup2(log, STDOUT_FILENO) >= 0 &&

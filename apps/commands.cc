@@ -1,5 +1,6 @@
 #include "apps/commands.h"
 
+#include <algorithm>
 #include <array>
 
 #include "core/text.h"
@@ -73,7 +74,7 @@ void AddPhysics(CLI::App& app, std::string& physics, const std::string& usual) {
   std::ranges::stable_partition(engines, [&](const std::string& name) { return name == usual; });
   Options options;
   options.AddChoice(&physics, "physics", std::move(engines),
-                    "engine; closed-form is a faster twin of mujoco");
+                    "engine; closed-form computes the same physics faster than mujoco");
   AddArguments(app, options);
 }
 
@@ -89,14 +90,24 @@ void AddManyOptions(CLI::App& app, std::string& seeds, int64_t& jobs) {
   AddArguments(app, options);
 }
 
-void AddPlantOptions(CLI::App& app, std::vector<std::string>& set, std::string& model) {
-  app.add_option("--set", set, "another plant, such as mass2=1.2 (repeat for more)")
+void AddSet(CLI::App& app, std::vector<std::string>& set, const std::string& help) {
+  app.add_option("--set", set, help + " (repeat for more)")
       ->type_name("NAME=VALUE")
       ->take_all()
       ->allow_extra_args(false);
+}
+
+void AddPlantOptions(CLI::App& app, std::vector<std::string>& set, std::string& model) {
+  AddSet(app, set, "another plant, such as mass2=1.2");
   app.add_option("--model", model, "MJCF file to use instead of the policy's model")
       ->type_name("FILE")
       ->check(NotEmpty());
+}
+
+void AddUnknownPlant(CLI::App& app, bool& unknown_plant) {
+  app.add_flag("--unknown-plant", unknown_plant,
+               "scale the observed energy and height by the training's plant")
+      ->disable_flag_override();
 }
 
 void AddArguments(CLI::App& app, const Options& options) {

@@ -57,7 +57,13 @@ void AddPhysics(CLI::App& app, std::string& physics, const std::string& usual);
 /// Adds --seeds and --jobs, for many runs; 0 jobs: as many as there are processors.
 void AddManyOptions(CLI::App& app, std::string& seeds, int64_t& jobs);
 
+/// Adds --set, which ApplyChanges reads.
+void AddSet(CLI::App& app, std::vector<std::string>& set, const std::string& help);
+
 /// Adds --set and --model, which choose another plant.
 void AddPlantOptions(CLI::App& app, std::vector<std::string>& set, std::string& model);
+
+/// Adds --unknown-plant: observations are scaled as in training, whatever the plant is now.
+void AddUnknownPlant(CLI::App& app, bool& unknown_plant);
 
 }  // namespace upswing

@@ -161,21 +161,20 @@ void AddCompare(CLI::App& program, Command& command) {
          "on for further tasks)")
       ->type_name("FOLDER")
       ->check(NotEmpty());
-  app->add_flag("--unfinished", a->unfinished, "take runs that are unfinished as they are")
+  app->add_flag("--unfinished", a->unfinished, "compare unfinished runs too, as they are")
       ->disable_flag_override();
-  app->add_flag("--different-tasks", a->different_tasks,
-                "compare groups that are judged on different tasks (plant, disturbance, number of "
-                "episodes) with each other as well")
+  app->add_flag(
+         "--different-tasks", a->different_tasks,
+         "compare groups that are evaluated on different tasks (plant, disturbance, number of "
+         "episodes) with each other as well")
       ->disable_flag_override();
   app->add_flag("--json", a->as_json, "print JSON")->disable_flag_override();
   app->footer(
       "Runs with the same settings but the seed are one group. Figures are over its runs: the\n"
       "interquartile mean (IQM) with a 95% bootstrap interval; docs/statistics.md defines each.\n"
-      "A run that did not solve the task counts as one that needs more than its budget. Groups "
-      "are\n"
-      "compared with those that are judged on the same task. What is no run, broken or unfinished "
-      "is\n"
-      "left out, with a note.\n\n"
+      "A run that did not solve the task counts as one that needs more than its budget. Groups\n"
+      "are compared with those that are evaluated on the same task. Broken and unfinished runs,\n"
+      "and folders without a run, are left out with a note.\n\n"
       "Examples:\n"
       "  ./upswing compare runs/d3qn-seed*                  one agent over its seeds\n"
       "  ./upswing compare runs --out runs/comparison       all agents in runs, with figures\n"

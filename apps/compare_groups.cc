@@ -19,7 +19,7 @@ namespace {
 
 constexpr size_t kLongText = 48;  // longer ones are not shown
 
-/// The content of the model that it was trained and judged on; kBuiltIn for the built-in one.
+/// The content of the model of its training and evaluations; kBuiltIn for the built-in one.
 const std::string& ModelOf(const FoundRun& f) { return f.settings.back().second; }
 
 /// What its group is called.
@@ -28,9 +28,9 @@ std::string LabelOf(const FoundRun& f) {
                 ModelOf(f) == kBuiltIn ? "" : ", other model");
 }
 
-/// Whether a setting says what a policy is judged on, and not how it is trained or when and in
-/// which engine it is judged: those that the evaluations of `train` share with its episodes, and
-/// how many episodes have to succeed.
+/// Whether a setting belongs to the task that a policy is evaluated on, and not to its training or
+/// to when and in which engine it is evaluated: model, plant, disturbance, randomisation, and how
+/// many episodes have to succeed.
 bool IsTask(const std::string& name) {
   constexpr std::array<std::string_view, 3> kBeginnings{"plant.", "disturbance.", "randomize."};
   return name == kModelContent || name == "train.eval_episodes" ||
@@ -110,19 +110,36 @@ void NotePlans(const GroupedRuns& grouped, std::vector<std::string>& notes) {
   }
 }
 
+/// Whether runs that should take the same time had different shares of their processors.
+void NoteLoads(const std::vector<FoundRun>& runs, std::vector<std::string>& notes) {
+  std::map<std::pair<std::vector<Setting>, std::set<int64_t>>, std::vector<double>> busy;
+  for (const FoundRun& f : runs) {
+    const RunConditions& c = f.conditions;
+    if (c.busy) busy[{f.settings, c.threads}].push_back(*c.busy);
+  }
+  for (const auto& [same_work, shares] : busy) {
+    constexpr double kAlike = 0.75;
+    const auto [low, high] = std::ranges::minmax(shares);
+    if (low >= kAlike * high) continue;
+    notes.push_back(fmt::format(
+        "times were measured under different machine loads: of runs with the same settings and "
+        "threads, one had its threads at work {:.0f}% of the time, another {:.0f}%",
+        100 * low, 100 * high));
+    return;
+  }
+}
+
 /// What the times depend on besides the settings, where it is not the same for all.
 void NoteTimes(const std::vector<FoundRun>& runs, std::vector<std::string>& notes) {
   std::map<int64_t, int> threads;  // how many runs had so many
   std::set<std::string> processors, vectors;
   std::set<int64_t> intervals;
-  std::map<std::pair<std::vector<Setting>, std::set<int64_t>>, std::vector<double>> busy;
   for (const FoundRun& f : runs) {
     const RunConditions& c = f.conditions;
     intervals.insert(f.run.plan.eval_every);
     for (const int64_t count : c.threads) ++threads[count];
     for (const std::string& name : c.processors) processors.insert(Printable(name));
     for (const std::string& name : c.vectors) vectors.insert(Printable(name));
-    if (c.busy) busy[{f.settings, c.threads}].push_back(*c.busy);
   }
   const auto join = [](const std::set<std::string>& names) {
     return Join({names.begin(), names.end()}, "; ");
@@ -132,24 +149,17 @@ void NoteTimes(const std::vector<FoundRun>& runs, std::vector<std::string>& note
     for (const auto& [count, of_runs] : threads) {
       counts.push_back(fmt::format("{} ({} run{})", count, of_runs, of_runs == 1 ? "" : "s"));
     }
-    notes.push_back(Concat("times are of different numbers of threads: ", Join(counts, ", ")));
+    notes.push_back(
+        Concat("times were measured with different numbers of threads: ", Join(counts, ", ")));
   }
   if (processors.size() > 1) {
-    notes.push_back(Concat("times are of different processors: ", join(processors)));
+    notes.push_back(Concat("times were measured on different processors: ", join(processors)));
   }
   if (vectors.size() > 1) {
-    notes.push_back(Concat("times are of different vector instructions: ", join(vectors)));
+    notes.push_back(
+        Concat("times were measured with different vector instructions: ", join(vectors)));
   }
-  for (const auto& [same_work, shares] : busy) {
-    constexpr double kAlike = 0.75;
-    const auto [low, high] = std::ranges::minmax(shares);
-    if (low >= kAlike * high) continue;
-    notes.push_back(fmt::format(
-        "times are of different machine loads: of runs with the same settings and threads, one "
-        "had its threads at work {:.0f}% of the time, another {:.0f}%",
-        100 * low, 100 * high));
-    break;
-  }
+  NoteLoads(runs, notes);
   if (intervals.size() > 1) {
     notes.push_back(fmt::format(
         "evaluated every {} to {} steps: times and steps to solve are as coarse as that",
@@ -157,7 +167,7 @@ void NoteTimes(const std::vector<FoundRun>& runs, std::vector<std::string>& note
   }
 }
 
-/// Numbers the tasks that groups (`first` has a run of each) are judged on, in their order.
+/// Numbers the tasks that groups (`first` has a run of each) are evaluated on, in their order.
 void TellTasksApart(GroupedRuns& grouped, const std::vector<const FoundRun*>& first) {
   std::vector<const FoundRun*> tasks;  // a run of each
   for (const FoundRun* run : first) {
@@ -177,7 +187,7 @@ void NoteTasks(GroupedRuns& grouped, bool different_tasks) {
   const size_t tasks = grouped.task_texts.size();
   if (tasks == 1) return;
   grouped.notes.push_back(fmt::format(
-      "there are {} tasks to be judged on: {}", tasks,
+      "the groups are evaluated on {} different tasks: {}", tasks,
       different_tasks ? "figures of different tasks stand beside each other"
                       : "groups are compared within each (--different-tasks: all with all)"));
 }

@@ -1,10 +1,10 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "apps/compare.h"
 #include "apps/progress.h"
+#include "core/json.h"
 #include "core/text.h"
 
 namespace upswing {
@@ -12,7 +12,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-/// A number as the table shows it; what no run or no half of them reached is not.
+/// A number as the table shows it; infinity: not reached by enough runs.
 using Formatter = std::string (*)(double);
 
 std::string Seconds(double x) { return std::isfinite(x) ? FormatDuration(x) : "not solved"; }
@@ -55,8 +55,8 @@ void PrintStability(const GroupSummary& summary) {
     return;
   }
   fmt::print(
-      "  {:<16}{} of {} seeds keep at least {:.0f}% in every later evaluation; so are {} of "
-      "{}, lowest {}\n",
+      "  {:<16}{} of {} seeds keep at least {:.0f}% in every later evaluation; so do {} of "
+      "{} evaluations, lowest {}\n",
       "once solved", s.steady_runs, s.runs, 100 * kSteadyRate, s.steady_evaluations, s.evaluations,
       Percent(s.lowest));
 }
@@ -182,7 +182,7 @@ std::string ComparisonJson(const Comparison& comparison) {
     p["return_difference"] = EstimateJson(pair.return_difference);
     j["pairs"].push_back(p);
   }
-  return j.dump(2, ' ', true, ordered_json::error_handler_t::replace);
+  return PrintableJson(j);
 }
 
 }  // namespace upswing

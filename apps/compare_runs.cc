@@ -34,7 +34,7 @@ void AddRuns(const fs::path& folder, Found& found, std::vector<fs::path>& paths)
   fs::directory_iterator entries(folder, error);
   if (error) return found.LeaveOut(folder, Concat("cannot be read: ", error.message()));
   for (const fs::directory_entry& entry : entries) {
-    if (IsMakingName(entry.path().filename().string())) continue;  // of a process that was killed
+    if (IsMakingName(entry.path().filename().string())) continue;  // left by a killed process
     const bool is_folder = fs::is_directory(entry.symlink_status(error));
     const bool is_run = fs::is_directory(entry.path(), error) && IsRun(entry.path());
     if (is_folder || is_run) AddRuns(entry.path(), found, paths);
@@ -147,8 +147,8 @@ void LeaveOutUnfinished(Found& found, bool unfinished) {
     if (unfinished) {
       found.notes.push_back(Concat(run.path.string(), ": ", how_far));
     } else {
-      found.LeaveOut(run.path, Concat(how_far, " (train --resume goes on with it, --unfinished ",
-                                      "takes it as it is)"));
+      found.LeaveOut(run.path, Concat(how_far, " (train --resume continues it, --unfinished ",
+                                      "compares it as it is)"));
     }
     return !unfinished;
   });

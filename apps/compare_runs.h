@@ -14,9 +14,9 @@ namespace upswing {
 /// Which runs to compare.
 struct CompareRequest {
   std::vector<std::filesystem::path> paths;  // run folders, or folders that hold some, at any depth
-  std::filesystem::path root = {};  // below which a run's folder tells its variant; empty: its path
-  bool unfinished = false;          // also those that have not come to their end
-  bool different_tasks = false;     // compare groups that are judged on different tasks as well
+  std::filesystem::path root = {};  // below it a run's folder names its variant; empty: each path
+  bool unfinished = false;          // include runs that are not finished
+  bool different_tasks = false;     // also compare groups evaluated on different tasks
 };
 
 /// Name (`section.key`) and value of a setting; that of the model's content is kModelContent.
@@ -26,7 +26,7 @@ using Setting = std::pair<std::string, std::string>;
 struct FoundRun {
   RunRecord run;
   std::string agent, variant;     // its named agent; its folder's name within a study, or empty
-  std::vector<Setting> settings;  // that make it another run, without the seed
+  std::vector<Setting> settings;  // those that distinguish trainings, without the seed
   RunConditions conditions;       // what its times depend on
 };
 

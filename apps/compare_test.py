@@ -235,7 +235,7 @@ class CompareTest(ProgramTest):
         answer = self.compare(*folders)
         self.assertEqual([group["task"] for group in answer["groups"]], [1, 1, 2, 2, 3, 4])
         self.assertEqual(len(answer["pairs"]), 2)
-        self.assertIn("there are 4 tasks to be judged on", " ".join(answer["notes"]))
+        self.assertIn("the groups are evaluated on 4 different tasks", " ".join(answer["notes"]))
         text = self.succeed("compare", *folders, "--out", "out")
         self.assertRegex(text, r"(?m)^  task +1 \(eval_episodes 100, mass2 1, sensor_noise 0\)$")
         self.assertRegex(text, r"(?m)^  task +2 \(eval_episodes 100, mass2 1.2, sensor_noise 0\)$")

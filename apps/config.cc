@@ -47,6 +47,24 @@ EarlySetting FindEarly(std::string_view section, std::string_view key, const tom
   return setting;
 }
 
+/// Throws BadInput that begins with `where` (may be empty) if settings, each of which is
+/// allowed, contradict each other, so that nothing could be learned.
+void CheckTogether(const DqnConfig& d, const std::string& where) {
+  const std::string place = where.empty() ? "" : where + ": ";
+  if (d.batch > d.replay) {
+    throw BadInput(Concat(place,
+                          "batch: expected at most as many transitions as the replay memory holds "
+                          "(replay ",
+                          d.replay, "), got ", d.batch));
+  }
+  if (d.learning_starts > d.replay) {
+    throw BadInput(Concat(place,
+                          "learning_starts: expected at most as many steps as the replay memory "
+                          "holds transitions (replay ",
+                          d.replay, "), got ", d.learning_starts));
+  }
+}
+
 }  // namespace
 
 void Config::Describe(Options& o) {
@@ -57,13 +75,13 @@ void Config::Describe(Options& o) {
   o.Add(&episode_seconds, "episode_seconds", 4, {0.02, 1e6}, "s", "length of a training episode")
       .step = kControlPeriod;
   o.Add(&random_start_share, "random_start_share", 0.5, kUnit, "",
-        "share of the episodes that begin anywhere instead of hanging");
+        "share of the episodes that begin in a random state instead of hanging");
   o.Add(&random_start_velocity, "random_start_velocity", 5, {0, 50}, "rad/s",
-        "largest velocity of those");
+        "largest velocity of these random states");
   o.Add(&memory, "memory", 0, {0, kMostMemory}, "steps",
         "past steps whose torque and change of velocities the agent sees too");
   o.AddChoice(&physics, "physics", PhysicsNames(),
-              "engine to train in; closed-form is a faster twin of mujoco");
+              "engine to train in; closed-form computes the same physics faster than mujoco");
   std::vector<std::string> judges = PhysicsNames();
   judges.insert(judges.begin(), std::string(kScreened));
   o.AddChoice(&eval_physics, "eval_physics", judges,
@@ -95,6 +113,11 @@ PendulumEnvConfig Config::Environments(ThreadPool& pool) const {
   return env;
 }
 
+Dqn Config::Agent(const PendulumEnv& env, ThreadPool& pool) const {
+  return Dqn(dqn, env.num_envs(), env.obs_size(), TorqueLevels(env.torque_limit()),
+             env.mirror_signs(), static_cast<uint64_t>(train.seed), pool);
+}
+
 void ApplyToml(const Options& options, std::string_view text, const std::string& where) {
   ApplyTable(options, ParseToml(text, where), where, false);
 }
@@ -121,24 +144,6 @@ Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
   return ParseConfig(file.empty() ? "" : ReadInput(file.string()), file, flags);
 }
 
-/// Throws BadInput that begins with `where` (may be empty) if settings, each of which could be,
-/// cannot be together, so that nothing could be learned.
-static void CheckTogether(const DqnConfig& d, const std::string& where) {
-  const std::string place = where.empty() ? "" : where + ": ";
-  if (d.batch > d.replay) {
-    throw BadInput(Concat(place,
-                          "batch: expected at most as many transitions as the replay memory holds "
-                          "(replay ",
-                          d.replay, "), got ", d.batch));
-  }
-  if (d.learning_starts > d.replay) {
-    throw BadInput(Concat(place,
-                          "learning_starts: expected at most as many steps as the replay memory "
-                          "holds transitions (replay ",
-                          d.replay, "), got ", d.learning_starts));
-  }
-}
-
 Config ParseConfig(std::string_view text, const fs::path& file,
                    const std::vector<FlagValue>& flags) {
   const std::string where = file.empty() ? "" : InputName(file.string());
@@ -146,7 +151,7 @@ Config ParseConfig(std::string_view text, const fs::path& file,
   Config config;
   const Options options = OptionsOf(config);
 
-  // A model file brings its own plant, which other settings may change.
+  // A model file has a plant of its own, which other settings may change.
   const EarlySetting model = FindEarly("plant", "model", table, where, flags);
   std::string model_path = model.value;
   if (!model_path.empty() && model.in_file) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -31,7 +32,7 @@ struct Config {
   TrainConfig train;
   double episode_seconds, random_start_share, random_start_velocity;
   int64_t memory;
-  std::string physics, eval_physics;  // as ParsePhysics has it, to train and to judge in
+  std::string physics, eval_physics;  // engines, see ParsePhysics, of training and evaluation
   Plant plant;
   Disturbance disturbance;
   Randomization randomization;
@@ -45,6 +46,9 @@ struct Config {
 
   /// Training environments as these settings have them, whose work the pool shares.
   PendulumEnvConfig Environments(ThreadPool& pool) const;
+
+  /// A new agent for such environments, whose work the pool shares.
+  Dqn Agent(const PendulumEnv& env, ThreadPool& pool) const;
 };
 
 /// A setting given on the command line or in a study: name (or that of an alias), text, and where,
@@ -59,19 +63,20 @@ void SetFlags(const Options& options, const std::vector<FlagValue>& flags);
 
 /// Builds the settings in their order: defaults < named agent < configuration file (none if empty,
 /// standard input if `-`) < flags; a model file's plant counts as defaults. Throws BadInput, also
-/// if they cannot be together.
+/// if settings contradict each other.
 Config BuildConfig(const std::filesystem::path& file, const std::vector<FlagValue>& flags);
 
-/// The same of a configuration file's text; `file` names it, and a model of it counts from its
-/// folder.
+/// The same from a configuration file's text; `file` is its path, to whose folder the path of a
+/// model is relative.
 Config ParseConfig(std::string_view text, const std::filesystem::path& file,
                    const std::vector<FlagValue>& flags);
 
-/// Settles what a run among many differs in from one alone: it has one thread, unless more are
-/// asked for, and its model lies beside it.
+/// Sets what differs in a run among many: it has one thread unless more are asked for, and its
+/// model lies beside it.
 void MakeReadyForMany(Config& config);
 
-/// The settings, such as agent.gamma, that TOML text of a run lacks: it is of another version then.
+/// The settings, such as agent.gamma, that are missing in the TOML text of a run: another version
+/// of the program wrote it.
 std::vector<std::string> MissingSettings(const std::string& text, const std::string& where,
                                          bool identity_only);
 
@@ -87,10 +92,11 @@ void ApplyToml(const Options& options, std::string_view toml, const std::string&
 void ExpectSameSettings(const Options& before, const Options& now, const std::string& where,
                         const std::function<bool(const Option&)>& counts);
 
-/// The settings that make a training another one, the seed aside; they point into `config`.
+/// The settings that distinguish trainings, without the seed; they point into `config`.
 std::vector<Option> TrainingSettings(Config& config);
 
-/// The settings as TOML; without those that do not make another run of it, if `identity_only`.
+/// The settings as TOML; if `identity_only`, only those that change the training (not, for example,
+/// the number of threads).
 std::string ConfigToml(Config config, bool identity_only);
 
 /// The same with comments, for a file that may lie anywhere: the model's path is absolute.

@@ -8,10 +8,10 @@
 
 namespace upswing {
 
-/// What can be trained but is hardly meant, a line for each: nothing would be learned.
+/// Settings that are allowed but hardly intended, because nothing would be learned: a line each.
 std::vector<std::string> Warnings(const Config& config);
 
-/// What a training takes, about.
+/// Approximate size of a training.
 struct TrainingSize {
   double memory;      // bytes at most, with a full replay memory
   double checkpoint;  // bytes of the file then

@@ -63,7 +63,7 @@ int RunEval(const EvalArguments& a) {
 }  // namespace
 
 void AddEval(CLI::App& program, Command& command) {
-  CLI::App* app = program.add_subcommand("eval", "Judge a policy over many episodes");
+  CLI::App* app = program.add_subcommand("eval", "Evaluate a policy over many episodes");
   auto a = std::make_shared<EvalArguments>();
   AddPolicy(*app, a->policy)->required();
   Options own;
@@ -81,9 +81,8 @@ void AddEval(CLI::App& program, Command& command) {
       "An episode lasts {} s from hanging with normal noise of 0.1 (rad, rad/s). It succeeds if "
       "both\nlinks are within 30° of upright for the whole of the last {} s. The return is the "
       "undiscounted\nsum of the reward, standard weights, over the first {} s. Settled is a link "
-      "within 9° of upright.\nSteady tilt, chatter and torque once upright are of the episodes "
-      "that "
-      "succeed.\n\n"
+      "within 9° of upright.\nSteady tilt, chatter and torque once upright are over successful "
+      "episodes.\n\n"
       "Examples:\n"
       "  ./upswing eval runs/d3qn-seed1\n"
       "  ./upswing eval policy.safetensors --episodes 1000 --seed 7 --json\n"
@@ -96,7 +95,7 @@ void AddEval(CLI::App& program, Command& command) {
       "--set takes mass1, mass2, length1, length2, damping1, damping2, gravity, torque_limit, and\n"
       "mass, length, damping for both. With --randomize each episode has its own plant, drawn from "
       "a\nbox around that one. Energy and height in the observation are scaled by the true plant "
-      "of the\nepisode, so they tell the policy of it; with --unknown-plant by that of the "
+      "of the\nepisode, which reveals it to the policy; with --unknown-plant by the plant of the "
       "training.\n",
       kEvaluationSeconds, kHoldSeconds, kReturnSeconds));
   app->callback([a, &command] { command = [a] { return RunEval(*a); }; });

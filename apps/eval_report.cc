@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "apps/trial.h"
+#include "core/json.h"
 #include "core/text.h"
 
 namespace upswing {
@@ -24,10 +24,10 @@ std::string QuartilesText(const Quartiles& q) {
                      q.high);
 }
 
-/// What only episodes that succeed have.
+/// Figures of the successful episodes alone.
 void PrintSuccesses(const Evaluation& e) {
   if (e.successes == 0) {
-    fmt::print("  swing-up time  none swung up to stay\n");
+    fmt::print("  swing-up time  no episode stays upright\n");
     return;
   }
   fmt::print("  swing-up time  {}\n", QuartilesText(e.swing_up_seconds));
@@ -59,7 +59,7 @@ ordered_json MomentsJson(const Moments& m, double scale = 1) {
   return {{"mean", scale * m.mean}, {"deviation", scale * m.deviation}};
 }
 
-/// null of no episode.
+/// null if there is no such episode.
 ordered_json QuartilesJson(const Quartiles& q, int64_t episodes) {
   if (episodes == 0) return nullptr;
   return {{"median", q.median}, {"quartiles", {q.low, q.high}}};
@@ -170,7 +170,7 @@ void PrintEvalJson(const EvalReport& report) {
     }
   }
   AddFigures(report.figures, report.knows_values, j);
-  fmt::print("{}\n", j.dump(2, ' ', true, ordered_json::error_handler_t::replace));
+  fmt::print("{}\n", PrintableJson(j));
 }
 
 std::string EpisodesCsv(const EvalReport& report) {

@@ -12,7 +12,7 @@
 /// What `eval` says of its episodes.
 namespace upswing {
 
-/// One episode: what it was given and what it came to.
+/// One episode: its conditions and its result.
 struct JudgedEpisode {
   PendulumState start;
   Plant plant;
@@ -31,11 +31,12 @@ struct EvalReport {
   bool knows_values = false;  // the policy says what its Q-values estimate
 };
 
+/// Print the report on standard output, for people and for programs.
 void PrintEvalTable(const EvalReport& report);
 void PrintEvalJson(const EvalReport& report);
 
-/// A row for each episode, counted from 0; what it has not (such as the swing-up time of one that
-/// is not upright at the end) is empty.
+/// A row for each episode, counted from 0; a figure that it does not have (such as the swing-up
+/// time of one that is not upright at the end) is empty.
 std::string EpisodesCsv(const EvalReport& report);
 
 }  // namespace upswing

@@ -24,7 +24,7 @@ struct PageAgent {
   ordered_json entry;            // in agents.json
 };
 
-/// `name` in small letters and digits, with a - for whatever else there is between them.
+/// `name` in small letters and digits, with a - in place of anything else between them.
 std::string CleanId(std::string_view name) {
   std::string id;
   for (const char c : name) {

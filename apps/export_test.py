@@ -8,7 +8,8 @@ import shutil
 import subprocess
 import unittest
 
-from testing import (MODEL, ROOT, ProgramTest, read_csv, read_tensors, small, with_number, write_tensors)
+from testing import (MODEL, ROOT, ProgramTest, read_csv, read_tensors, small, with_number,
+                     write_tensors)
 
 PLANT = ["mass1", "mass2", "length1", "length2", "damping1", "damping2", "gravity", "torque_limit"]
 
@@ -304,7 +305,7 @@ class PageTest(ProgramTest):
                                stdout=subprocess.PIPE, encoding="utf-8").stdout
         self.assertEqual(shown.splitlines(), words[1:])
         self.assertFalse((self.folder / "y").exists())
-        # What cannot be seen is not told at all.
+        # Text with invisible characters is left out.
         for text in ('"a\\u001b[2Jb"', '"a\\u202eb"'):
             self.assertIsNone(command_of(text), text)
 

@@ -1,17 +1,16 @@
 #!/usr/bin/env python3
-"""Folders that come from anybody: nothing is written through a link, every counter of a checkpoint
+"""Folders from untrusted sources: nothing is written through a link, every counter of a checkpoint
 has its bounds; and folders that are made: where they were asked for, whole or not at all."""
 
 import os
 import random
 import shutil
 import signal
-import tempfile
 import time
 import unittest
-from pathlib import Path
 
-from testing import (ProgramTest, read_tensors, run, small, snapshot, with_number, write_tensors)
+from testing import (ProgramTest, SmallRunTest, read_tensors, run, small, snapshot, with_number,
+                     write_tensors)
 
 GROWING = ["metrics.csv", "episodes.csv", "evals.csv", "events.out.tfevents.0.upswing", "log.txt"]
 REPLACED = ["config.toml", "checkpoint.safetensors", "policy.safetensors"]
@@ -19,26 +18,14 @@ TINY = {"steps": 400, "hidden": 8, "head": 8, "eval_episodes": 2, "eval_every": 
         "log_every": 200, "learning_starts": 50, "threads": None, "out": "many"}
 
 
-class RunTest(ProgramTest):
-    """A small run, made once and copied for each test, beside files of somebody else."""
+class RunTest(SmallRunTest):
+    """A small run beside another user's files."""
 
     RESUME = ["train", "--resume", "run", "--steps", "8000"]
 
-    @classmethod
-    def setUpClass(cls):
-        cls.made = tempfile.TemporaryDirectory(prefix="upswing-")
-        cls.addClassCleanup(cls.made.cleanup)
-        done = run(*small(), cwd=cls.made.name)
-        assert done.returncode == 0, done
-
     def setUp(self):
         super().setUp()
-        shutil.copytree(Path(self.made.name, "run"), self.folder / "run")
         (self.folder / "precious").mkdir()
-
-    def renew(self):
-        shutil.rmtree(self.folder / "run")
-        shutil.copytree(Path(self.made.name, "run"), self.folder / "run")
 
     def link_away(self, path, hard=False):
         """Moves a file to `precious` and leaves a link to it; returns where it is now."""
@@ -57,7 +44,7 @@ class LinkTest(RunTest):
         for name in GROWING:
             for hard in (False, True):
                 with self.subTest(name=name, hard=hard):
-                    self.renew()
+                    self.restore()
                     away = self.link_away(f"run/{name}", hard)
                     self.refuse(self.RESUME, f"run/{name}", "a file of this folder alone",
                                 "hard links" if hard else "a link")
@@ -66,7 +53,7 @@ class LinkTest(RunTest):
     def test_a_link_that_leads_nowhere_makes_no_file_there(self):
         for name in GROWING:
             with self.subTest(name=name):
-                self.renew()
+                self.restore()
                 self.link_away(f"run/{name}").unlink()
                 self.refuse(self.RESUME, f"run/{name}")
 
@@ -89,13 +76,13 @@ class LinkTest(RunTest):
     def test_a_pipe_is_not_waited_for(self):
         for name in [*GROWING, *REPLACED]:
             with self.subTest(name=name):
-                self.renew()
+                self.restore()
                 (self.folder / "run" / name).unlink()
                 os.mkfifo(self.folder / "run" / name)
                 done = self.run_here(*(self.RESUME if name != "policy.safetensors" else
                                        ["eval", "run"]), timeout=100)
                 self.assert_one_line(done, 2, f"run/{name}")
-        self.renew()
+        self.restore()
         (self.folder / "run/evals.csv").unlink()
         os.mkfifo(self.folder / "run/evals.csv")
         self.assertEqual(self.run_here("compare", "run", timeout=100).returncode, 2)
@@ -148,7 +135,6 @@ class CounterTest(RunTest):
 
     def setUp(self):
         super().setUp()
-        self.checkpoint = self.folder / "run/checkpoint.safetensors"
         self.metadata, self.tensors = read_tensors(self.checkpoint)
 
     def refuse_number(self, name, number, index=0):
@@ -290,9 +276,11 @@ class PlaceTest(ProgramTest):
         self.succeed(*small(**TINY))
         (self.folder / "many/policy.safetensors").unlink()
         output = self.succeed("train", "--resume", "many")
-        self.assertRegex(output, r"Best policy: of step \d+, but many/policy\.safetensors is not")
+        self.assertRegex(output, r"Best policy: of step \d+, but many/policy\.safetensors no longer "
+                                 r"exists")
         self.assertNotIn("upswing eval", output)
-        self.assertRegex(self.succeed("info", "many"), r"policy +the best, of step \d+, is not")
+        self.assertRegex(self.succeed("info", "many"),
+                         r"policy +the best, of step \d+, no longer exists")
         self.refuse(["eval", "many"], "many: this run has no policy")
 
 

@@ -37,7 +37,7 @@ std::string ExplainMissing(const CLI::App& program, const CLI::App& app) {
   return Concat(app.get_name(), ": an argument is missing");
 }
 
-/// What was wrong about the values behind a flag. CLI11 tells the flag only at the beginning of its
+/// What was wrong with the values of a flag. CLI11 names the flag only at the beginning of its
 /// message, such as `--gamma: 1 required NUMBER missing`.
 std::string ExplainValues(const std::string& message) {
   if (message.find("flag override") != std::string::npos) {
@@ -55,7 +55,7 @@ std::string WrapText(std::string_view text, size_t columns, size_t indent) {
   size_t column = indent;  // where the line ends so far
   for (const std::string_view word : Split(text, ' ')) {
     if (word.empty()) continue;
-    // Bytes that go on with a character of UTF-8 take no column.
+    // Continuation bytes of UTF-8 take no column.
     const auto width = static_cast<size_t>(std::ranges::count_if(
         word, [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; }));
     const bool is_first = column == indent;

@@ -1,19 +1,20 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <cstddef>
 #include <functional>
 #include <string>
+#include <string_view>
 
 namespace upswing {
 
 /// The columns that a line of --help has at most.
 inline constexpr size_t kHelpColumns = 100;
 
-/// CLI11's help within kHelpColumns, and without the `{false}` that it puts behind a flag's --no-
-/// form.
+/// CLI11's help within kHelpColumns, and without the `{false}` that it adds to a flag's --no- form.
 class HelpFormatter : public CLI::Formatter {
  public:
-  /// `before` is called before help is made, where it depends on what else was typed.
+  /// `before` is called before help is printed, which may depend on the other arguments.
   explicit HelpFormatter(std::function<void()> before = {}) : before_(std::move(before)) {}
 
   std::string make_help(const CLI::App* app, std::string name,

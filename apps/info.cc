@@ -38,7 +38,7 @@ void PrintSelfCheck(const Policy::SelfCheck& check) {
   fmt::print("  self-check  passed, largest difference {:.1e} of at most {:.1e}\n", check.error,
              check.tolerance);
   if (check.has_checksum) {
-    fmt::print("  checksum    right: the file is as it was written\n");
+    fmt::print("  checksum    correct: the file is as it was written\n");
     return;
   }
   fmt::print(
@@ -91,17 +91,17 @@ void PrintRun(const fs::path& path, bool has_policy) {
   if (has_policy) return;
   fmt::print("  policy      {}\n", state.best_step == 0
                                        ? "none yet: the first evaluation writes it"
-                                       : fmt::format("the best, of step {}, is not there any more",
+                                       : fmt::format("the best, of step {}, no longer exists",
                                                      FormatCount(state.best_step)));
 }
 
-/// What the program is and what it makes of this machine.
+/// The program's version and what it uses of this machine.
 void PrintProgram() {
   const std::vector<std::string> bfloat16 = Bfloat16Paths();
   fmt::print("upswing {}\n", UPSWING_VERSION);
   fmt::print("  physics     MuJoCo {}\n", MuJoCoVersion());
   fmt::print("  threads     {} by default\n", ResolveThreads(0));
-  fmt::print("  vectors     {} (this processor can take: {})\n", SimdPath(),
+  fmt::print("  vectors     {} (this processor supports: {})\n", SimdPath(),
              fmt::join(SimdPaths(), ", "));
   fmt::print("  bfloat16    {}\n", bfloat16.empty() ? "none" : bfloat16.front());
 }

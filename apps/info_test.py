@@ -21,14 +21,14 @@ class InfoTest(ProgramTest):
                          "1,578 parameters", "layer normalisation",
                          "-5, -3.75, -2.5, -1.25, 0, 1.25, 2.5, 3.75, 5 N·m", "agent d3qn-small",
                          "seed 5", "upswing ", "mass2 1.25", "self-check  passed",
-                         "checksum    right")
+                         "checksum    correct")
         self.assertRegex(text, r"step (2000|4000)")
         self.assertRegex(text, r"success \d+%, mean return -?\d+")
 
     def test_this_machine(self):
         text = self.succeed("info")
         self.assert_says(text, "MuJoCo ", "threads ")
-        used, choice = re.search(r"vectors +(\S+) \(this processor can take: (.*)\)", text).groups()
+        used, choice = re.search(r"vectors +(\S+) \(this processor supports: (.*)\)", text).groups()
         self.assertEqual(used, choice.split(", ")[0])
 
     def test_plain_network(self):

@@ -9,7 +9,7 @@ namespace upswing {
 std::string CpuModel();
 
 /// Bytes of memory that this process can still ask for: what the machine has free, within the
-/// limits of the process and of its control group. The largest number where nobody says.
+/// limits of the process and of its control group. The largest number where the system gives none.
 int64_t AvailableMemory();
 
 }  // namespace upswing

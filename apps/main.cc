@@ -22,13 +22,13 @@
 namespace upswing {
 namespace {
 
-/// Whether nobody reads standard output any more, as when `| head -1` has seen enough.
+/// Whether standard output has no reader left, as when `| head -1` has ended.
 bool OutputIsClosed() {
   pollfd output{STDOUT_FILENO, 0, 0};
   return poll(&output, 1, 0) == 1 && (output.revents & POLLERR) != 0;
 }
 
-/// Ends as programs do then: quietly, by SIGPIPE.
+/// Ends as programs usually do in that case: quietly, by SIGPIPE.
 int EndByPipe() {
   std::signal(SIGPIPE, SIG_DFL);
   std::raise(SIGPIPE);
@@ -56,7 +56,7 @@ int Finish(int exit_code) {
 
 int Main(int argc, char** argv) {
   CLI::App program(
-      "Upswing trains, judges and keeps controllers that swing up and balance a double\n"
+      "Upswing trains, tests and explains controllers that swing up and balance a double\n"
       "pendulum with one motor at its first joint, in MuJoCo.",
       "upswing");
   program.set_version_flag("--version", "upswing " UPSWING_VERSION);
@@ -65,7 +65,7 @@ int Main(int argc, char** argv) {
   program.footer(
       "Examples:\n"
       "  ./upswing train                      train the default agent until the task is solved\n"
-      "  ./upswing eval runs/d3qn-seed1       judge its best policy\n"
+      "  ./upswing eval runs/d3qn-seed1       evaluate its best policy\n"
       "  ./upswing compare runs               compare the agents in runs over their seeds\n"
       "  ./upswing train --help               every setting, with its default\n");
   Command command;
@@ -113,7 +113,7 @@ int Main(int argc, char** argv) {
 int main(int argc, char** argv) {
   upswing::ListenToSignals();
   upswing::OpenStandardFiles();
-  // A write that cannot be done shall fail where it is made, with a message.
+  // A write that cannot be done fails where it is made, with a message, instead of ending us.
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
   return upswing::Main(argc, argv);

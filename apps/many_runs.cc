@@ -33,14 +33,14 @@ std::string TailOf(const fs::path& path, std::streamoff bytes) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-/// The last line that says something.
+/// The last line that is not empty.
 std::string LastLine(const fs::path& path) {
   const std::string tail = TailOf(path, 4096);
-  std::string last = "it says nothing";
+  std::string last = "its log is empty";
   for (const std::string_view line : Split(tail, '\n')) {
     if (!line.empty()) last = line;
   }
-  constexpr std::string_view kProgram = "upswing: ";  // said by the one who passes it on, too
+  constexpr std::string_view kProgram = "upswing: ";  // the caller's message begins with it, too
   return last.starts_with(kProgram) ? last.substr(kProgram.size()) : last;
 }
 
@@ -50,10 +50,10 @@ std::string LastLine(const fs::path& path) {
 void CheckFolder(const fs::path& folder, const fs::path& mark) {
   std::error_code error;
   if (fs::is_regular_file(folder / mark, error)) return;
-  CheckFree(folder, Concat("it has no ", mark.string(), " to go on with; choose another --out"));
+  CheckFree(folder, Concat("it has no ", mark.string(), " to resume from; choose another --out"));
 }
 
-/// Throws if `what` was made with settings, `before`, that those of now cannot go on with.
+/// Throws if `what` was made with settings `before` that cannot be resumed with those of `now`.
 void CheckSame(Config before, Config now, bool more_steps, const std::string& what) {
   if (!before.mjcf.empty()) before.model = now.model;
   const auto counts = [&](const Option& option) {
@@ -68,7 +68,7 @@ void CheckSame(Config before, Config now, bool more_steps, const std::string& wh
   }
 }
 
-/// Throws at a link: what is written there would be written elsewhere.
+/// Throws if it is a link: what is written there would land elsewhere.
 void CheckNoLink(const fs::path& folder) {
   std::error_code error;
   if (!fs::is_symlink(folder, error)) return;
@@ -127,7 +127,7 @@ std::vector<SeedRun> ListRuns(const ManyRuns& plan) {
 
 // ---- While they run.
 
-/// The program's arguments that begin a run or go on with it.
+/// The program's arguments that begin a run or resume it.
 std::vector<std::string> ArgumentsOf(const SeedRun& run) {
   const TrainConfig& train = run.variant->config.train;
   if (!run.state) {
@@ -153,7 +153,7 @@ class Scheduler {
     }
   }
 
-  /// Returns when all have ended; after a request to stop those that run do so in order.
+  /// Returns when all have ended; after a request to stop, those that run are stopped in order.
   void Run() {
     while (!running_.empty() || !waiting_.empty()) {
       const TrainRequest request = PollSignals();
@@ -265,7 +265,7 @@ int TrainMany(const ManyRuns& plan) {
     if (!variant.name.empty()) CheckNoLink(plan.folder / variant.name);
     CheckRuns(plan.folder / variant.name, variant.config, plan.more_steps);
   }
-  InstallSignalHandlers();  // from here on what is begun is ended in order
+  InstallSignalHandlers(kStoppingTraining);  // what is begun from here on ends in order
   WriteSettings(plan);
   if (!lock) lock.emplace(plan.folder);
 

@@ -14,8 +14,8 @@ namespace upswing {
 
 /// One set of settings that is trained with many seeds.
 struct Variant {
-  std::string name;  // its folder in that of all; empty: the same folder
-  Config config;     // whose seed does not count
+  std::string name;  // its subfolder; empty: the folder of all runs
+  Config config;     // its seed is ignored
 };
 
 /// Many trainings: each variant with each seed, in FOLDER/VARIANT/seedN.
@@ -26,7 +26,7 @@ struct ManyRuns {
   std::vector<Variant> variants;
   std::vector<int64_t> seeds;
   int64_t jobs = 1;         // runs at a time
-  bool more_steps = false;  // runs that made fewer steps may go on
+  bool more_steps = false;  // runs with fewer steps may be resumed
   bool compared = false;    // a comparison follows when all are done
 
   /// Where a run lies in the folder.
@@ -46,15 +46,15 @@ struct SeedRun {
   bool finished() const;
   /// Steps made, of its checkpoint or, where that is further, of its metrics.
   int64_t Steps() const;
-  /// Reads `state` anew. Throws BadInput.
+  /// Reads `state` again from the checkpoint. Throws BadInput.
   void ReadState();
 };
 
 /// Trains all that is not finished, the first seed of each variant first, each run as a process of
-/// its own; shows how it goes on and what came of it. A folder of the same runs is gone on with;
-/// finished runs are left alone. Returns the exit code: 0, or 128 and a stop signal. Throws
-/// BadInput before anything is touched if the folder holds something else or runs of other
-/// settings; Failure at the end if a run failed.
+/// its own; shows progress and results. A folder of the same runs is resumed; finished runs are
+/// left as they are. Returns the exit code: 0, or 128 and a stop signal. Throws BadInput before
+/// anything is touched if the folder holds something else or runs of other settings; Failure at the
+/// end if a run failed.
 int TrainMany(const ManyRuns& plan);
 
 /// How many runs at a time are best, if each has so many threads.

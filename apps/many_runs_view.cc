@@ -51,7 +51,7 @@ void ManyRunsView::Announce() const {
   const auto begun = std::ranges::count_if(runs_, [](const SeedRun& run) { return !!run.state; });
   if (begun > 0) {
     const size_t done = Measure().done;
-    Say("  {} done before, going on with {}\n", done, static_cast<size_t>(begun) - done);
+    Say("  {} done before, resuming {}\n", done, static_cast<size_t>(begun) - done);
   }
   for (const SeedRun& run : runs_) {
     if (!run.problem.empty()) Say("  {:<20} failed: {}\n", run.name, Printable(run.problem));
@@ -143,7 +143,7 @@ void ManyRunsView::PrintTable(const Variant& variant) const {
              fmt::format("{} of {} solved", solved, steps.size()));
   }
   if (not_judged > 0) {
-    Say("  {} run{} not judged yet\n", not_judged, not_judged == 1 ? "" : "s");
+    Say("  {} run{} not evaluated yet\n", not_judged, not_judged == 1 ? "" : "s");
   }
   if (failed > 0) Say("  {} run{} failed\n", failed, failed == 1 ? "" : "s");
 }
@@ -154,7 +154,7 @@ void ManyRunsView::Summarize(bool stopped) {
   const size_t done = Measure().done;
   Say("\nSuccess and return are those of each run's best policy at evaluation.\n");
   if (stopped) {
-    Say("Stopped, {} of {} runs done; the same command goes on.\n", done, runs_.size());
+    Say("Stopped, {} of {} runs done; the same command resumes them.\n", done, runs_.size());
   }
   const bool can_be_typed = Printable(plan_.folder.string()) == plan_.folder.string();
   if (can_be_typed && (done < runs_.size() || !plan_.compared)) {

@@ -12,20 +12,20 @@ namespace upswing {
 /// What people see of many runs: a progress line, a line for each that has ended, a table.
 class ManyRunsView {
  public:
-  /// Both must outlive it; how far the runs are now is where the rate begins to count.
+  /// Both must outlive it. The rate counts the steps made from now on.
   ManyRunsView(const ManyRuns& plan, const std::vector<SeedRun>& runs);
 
-  /// Says what begins here.
+  /// Prints what is trained and where.
   void Announce() const;
 
-  /// Whether there is a terminal that should see how it goes on.
+  /// Whether the progress line should be updated now; false without a terminal.
   bool due() const { return line_.due(); }
   void ShowProgress(const std::vector<const SeedRun*>& running);
 
   /// A line on a run that has ended in any way.
   void PrintEnd(const SeedRun& run);
 
-  /// Says what came of all and what to type next.
+  /// Prints all results and the next command to type.
   void Summarize(bool stopped);
 
  private:

@@ -40,7 +40,7 @@ struct MapArguments {
 struct Training {
   MapPoint point;               // plant and disturbance; hanging
   Randomization randomization;  // around them
-  bool known = false;           // the file tells of more than the plant
+  bool known = false;           // the file says more than the plant
 };
 
 Training TrainingOf(const LoadedPolicy& loaded) {
@@ -86,7 +86,7 @@ std::string ChangesOf(const MapConfig& config, const Training& training) {
   return Join(texts, ", ");
 }
 
-/// What the place of the training on the axes is called: what is true of it.
+/// Label of the training's place on the axes, as far as it holds there.
 std::string DotOf(const MapConfig& config, const Training& training, bool changed) {
   const MapAxis &x = config.x, &y = config.y;
   if (x.start && y.start && !changed) return "hanging";
@@ -108,8 +108,8 @@ MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded, const Trai
   CheckDifferent(config.x, config.y);
   const Options options = OptionsOf(config.point);
   for (MapAxis* axis : {&config.x, &config.y}) {
-    const bool told = options.Find(axis->name, "map").front()->section != "disturbance";
-    if (!told && !training.known) axis->at_training.reset();
+    const bool in_plant = options.Find(axis->name, "map").front()->section != "disturbance";
+    if (!in_plant && !training.known) axis->at_training.reset();
   }
   for (const Option* option : ApplyChanges(options, a.set)) {
     config.start_given |= option->section == "start";
@@ -188,16 +188,11 @@ void AddMap(CLI::App& program, Command& command) {
   Options own;
   own.Add(&a->episodes, "episodes", 0, {1, 100000}, "", "in a cell").usual =
       "10, or 1 where the start is given";
-  own.Add(&a->check, "check", 0.02, kUnit, "", "share of the cells to do again in MuJoCo");
+  own.Add(&a->check, "check", 0.02, kUnit, "", "share of the cells to repeat in MuJoCo");
   AddArguments(*app, own);
-  app->add_option("--set", a->set, "what the axes leave alone, such as gravity=9.7 (repeatable)")
-      ->type_name("NAME=VALUE")
-      ->take_all()
-      ->allow_extra_args(false);
+  AddSet(*app, a->set, "what is on neither axis, such as gravity=9.7");
   AddPhysics(*app, a->physics, "closed-form");
-  app->add_flag("--unknown-plant", a->unknown_plant,
-                "scale the observed energy and height by the training's plant")
-      ->disable_flag_override();
+  AddUnknownPlant(*app, a->unknown_plant);
   app->add_option("--out", a->out, "new folder for map.csv, map.svg and map.png [RUN/map-X-Y]")
       ->type_name("FOLDER")
       ->check(NotEmpty());
@@ -209,9 +204,9 @@ void AddMap(CLI::App& program, Command& command) {
       "damping for both), gravity, torque_limit, sensor_noise (rad, rad/s), delay (s, in whole\n"
       "control periods of 0.02 s; each is a cell), and the start: q1, q2 (degrees), w1, w2\n"
       "(rad/s). Percentages are on top of the training's value. An episode is that of `upswing\n"
-      "eval`; with a start, every episode begins exactly there, at rest and hanging in what is\n"
-      "not given. Energy and height in the observation are scaled by the cell's own plant, so\n"
-      "they tell the policy of it; with --unknown-plant by that of the training.\n"
+      "eval`; with a start, every episode begins exactly there; what of it is not given is 0\n"
+      "(hanging, at rest). Energy and height in the observation are scaled by the cell's own\n"
+      "plant, which reveals it to the policy; with --unknown-plant by the plant of the training.\n"
       "Without --out a map goes into map-X-Y in the run's folder, or into runs/map-X-Y-NAME for a\n"
       "policy file elsewhere; then map-X-Y-2, …\n\n"
       "Examples:\n"

@@ -15,7 +15,7 @@
 /// Maps of how a policy does over two quantities: a grid of cells, some episodes in each.
 namespace upswing {
 
-/// All that a cell can set: the plant, what disturbs it, and where every episode begins.
+/// All that a cell can set: plant, disturbance, and the start of every episode.
 struct MapPoint {
   Plant plant;
   Disturbance disturbance;
@@ -49,7 +49,7 @@ void CheckDifferent(const MapAxis& x, const MapAxis& y);
 
 /// What a map is made of.
 struct MapConfig {
-  MapPoint point;            // of what the axes leave alone
+  MapPoint point;            // what is on neither axis
   MapAxis x, y;              // (nx), (ny)
   bool start_given = false;  // episodes begin at the point's start, else hanging with usual noise
   int episodes = 1;          // in a cell
@@ -63,15 +63,15 @@ struct MapConfig {
   MapPoint PointOf(int64_t cell) const;
 };
 
-/// What the episodes of a cell came to.
+/// Result of a cell's episodes.
 struct MapCell {
   int64_t successes = 0;
   double swing_up_seconds = 0;  // median over the successful ones; NaN if there are none
 };
 
-/// The cells listed, each in the order of the list. The work is shared by the pool, which changes
-/// no bit; a cell does not depend on which others there are. `progress` (may be empty) is told the
-/// share done, from any thread but one at a time.
+/// Results of the listed cells, in the order of the list. The pool shares the work, which changes
+/// no bit; a cell does not depend on which others there are. `progress` (may be empty) is called
+/// with the share done (0 to 1), from any thread, one call at a time.
 std::vector<MapCell> RunMap(const MapConfig& config, const Policy& policy,
                             std::span<const int64_t> cells, ThreadPool& pool,
                             const std::function<void(double)>& progress);

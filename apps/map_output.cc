@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <numeric>
 
 #include "apps/config.h"
 #include "apps/progress.h"
 #include "core/file.h"
+#include "core/json.h"
 #include "core/text.h"
 #include "report/figure.h"
 #include "rl/evaluate.h"
@@ -189,7 +189,7 @@ void PrintMapTable(const MapResult& map) {
   if (std::isfinite(map.median_swing_up())) {
     fmt::print("  swing-up   {:.2f} s, median of the cells' medians\n", map.median_swing_up());
   } else {
-    fmt::print("  swing-up   none swung up to stay\n");
+    fmt::print("  swing-up   no episode stays upright\n");
   }
   fmt::print("  rate       {} episodes in {}: {} a second\n", FormatCount(map.episodes()),
              FormatDuration(map.seconds),
@@ -237,7 +237,7 @@ void PrintMapJson(const MapResult& map) {
   j["seconds"] = map.seconds;
   j["episodes_per_second"] = static_cast<double>(map.episodes()) / map.seconds;
   j["files"] = map.files;
-  fmt::print("{}\n", j.dump(2, ' ', true, ordered_json::error_handler_t::replace));
+  fmt::print("{}\n", PrintableJson(j));
 }
 
 }  // namespace upswing

@@ -17,10 +17,10 @@ struct MapResult {
   std::string physics;             // name of the engine
   std::optional<ModelInfo> model;  // none: the built-in one
   std::string changes;             // what is not as in the training, the axes aside; empty: nothing
-  std::string dot;                 // what the place of the training is called; empty: it is nowhere
+  std::string dot;                 // label of the training's place; empty: it is not on the map
   std::vector<MapCell> cells;      // (ny × nx)
-  std::vector<int64_t> checked;    // cells that were done again in MuJoCo, rising
-  std::vector<MapCell> in_mujoco;  // what they came to there
+  std::vector<int64_t> checked;    // cells that were repeated in MuJoCo, rising
+  std::vector<MapCell> in_mujoco;  // their results there
   double seconds = 0;              // wall time of the map itself
   std::vector<std::string> files;  // written
 
@@ -29,11 +29,11 @@ struct MapResult {
   double always_success() const;   // share of the cells where every episode succeeds
   double median_swing_up() const;  // of the cells' medians, s; NaN if there are none
   MapAgreement agreement() const;  // of the engines
-  /// What a cell without a failure tells, as text: `10 of 10: 95% interval 72.2% to 100%`.
+  /// What a cell without a failure implies, as text: `10 of 10: 95% interval 72.2% to 100%`.
   std::string success_interval() const;
 };
 
-/// One row for each cell, x first; what MuJoCo came to is empty where it was not asked.
+/// One row for each cell, x first; MuJoCo's results are empty where the cell was not repeated.
 std::string MapCsv(const MapResult& map);
 
 /// Writes map.csv, map.svg and map.png into a folder and notes them in `files`.

@@ -208,7 +208,8 @@ class MapTest(ProgramTest):
         self.refuse(["map", self.policy, "--episodes", "20000"], "10,000,000 episodes")
         self.refuse(["map", self.policy, "--physics", "own"], "closed-form")
         self.write("taken", "")
-        self.refuse(["map", self.policy, "--out", "taken"], "taken: expected a new or empty folder, got a file")
+        self.refuse(["map", self.policy, "--out", "taken"],
+                    "taken: expected a new or empty folder, got a file")
         (self.folder / "full/mine").mkdir(parents=True)
         self.refuse(["map", self.policy, "--out", "full"],
                     "full: expected a new or empty folder, got one that holds something")

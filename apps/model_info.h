@@ -7,7 +7,7 @@
 
 namespace upswing {
 
-/// What is said, wherever results are told, of a model that is not the built-in one.
+/// What every report of results says of a model that is not the built-in one.
 struct ModelInfo {
   std::string file;                      // as it was given; empty: it came with the policy
   std::string content;                   // checksum of its text, 16 hexadecimal digits
@@ -21,8 +21,8 @@ struct ModelInfo {
   nlohmann::ordered_json Json() const;
 };
 
-/// Nothing for the built-in model, which `mjcf` is empty for. Throws BadInput if it is no model
-/// like ours.
+/// Nothing for the built-in model (`mjcf` is empty). Throws BadInput if it is no double pendulum
+/// that the program can use.
 std::optional<ModelInfo> InfoOfModel(const std::string& mjcf, const std::string& file);
 
 /// A title with the model's caption behind it, where there is one.
@@ -31,7 +31,7 @@ std::string WithModel(const std::string& title, const std::optional<ModelInfo>& 
 /// What ModelContent says of the built-in model.
 inline constexpr const char* kBuiltIn = "built-in";
 
-/// The model's checksum, or kBuiltIn: what tells models apart in a table.
+/// The model's checksum, or kBuiltIn: distinguishes models in a table.
 std::string ModelContent(const std::string& mjcf);
 
 }  // namespace upswing

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Another model than the built-in one: what of MJCF is taken, that a run keeps it, who says so."""
+"""Another model than the built-in one: what MJCF is accepted, that a run keeps it, that results
+say so."""
 
 import json
 import os
 import resource
 import shutil
 import unittest
-from pathlib import Path
 
 from testing import (MODEL, ProgramTest, read_tensors, run, small, train_once, write_tensors)
 
@@ -59,7 +59,7 @@ def limits():
 
 
 class BombTest(ProgramTest):
-    """What asks for much is refused before anybody tries."""
+    """Models that would need too much memory or time are refused before they are compiled."""
 
     @classmethod
     def setUpClass(cls):
@@ -123,7 +123,7 @@ class BombTest(ProgramTest):
 
 
 class HiddenTest(ProgramTest):
-    """What would change the motion behind the back of the plant's parameters."""
+    """What would change the motion without the plant's parameters showing it."""
 
     def test_it_is_refused(self):
         for old, new, *words in (
@@ -200,7 +200,7 @@ class RunTest(ProgramTest):
 
 
 class SaidTest(ProgramTest):
-    """Whoever shows results says that the model was not the built-in one."""
+    """Every report of results says that the model was not the built-in one."""
 
     @classmethod
     def setUpClass(cls):

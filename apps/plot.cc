@@ -27,7 +27,7 @@ struct PlotArguments {
   double seconds;  // negative: not given
 };
 
-/// Since when it has been upright, if it is at the end; else a negative number.
+/// Time (s) from which it is upright to the end; negative if it is not upright at the end.
 double UprightSince(const std::vector<RolloutRow>& rows) {
   double since = -1;
   for (const RolloutRow& row : rows) {

@@ -34,7 +34,7 @@ std::pair<double, double> Between(double q0, double w0, double q1, double w1, do
   return {q, w};
 }
 
-/// The rows with three moments between each two: the way from one to the next is no straight line.
+/// The rows, with three moments interpolated between each two: the motion is no straight line.
 std::vector<Moment> MotionOf(const Rows& rows) {
   constexpr int kPieces = 4;
   std::vector<Moment> motion;
@@ -62,8 +62,8 @@ double Wrapped(double degrees, double low) {
   return degrees - 360 * std::floor((degrees - low) / 360);
 }
 
-/// Where an angle and something else go together: `angle` wraps above `low`, and where it does, the
-/// curve ends at one edge and begins again at the other.
+/// A curve of an angle (degrees) and another quantity. The angle wraps within [low, low + 360):
+/// there the curve ends at one edge and begins again at the other.
 class WrappingCurve {
  public:
   explicit WrappingCurve(double low) : low_(low) {}
@@ -117,7 +117,7 @@ Line AngleOverTime(const std::string& name, const std::vector<Moment>& motion, A
   return line;
 }
 
-/// Stairs: what a row has is held until the next.
+/// Steps: a row's value is held until the next row.
 template <typename Y>
 Line Held(const std::string& name, const Rows& rows, Y y) {
   Line line;

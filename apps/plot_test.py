@@ -31,8 +31,8 @@ class PlotTest(ProgramTest):
             self.assertIn(f"{out}/{name}", text)
         episode, _ = self.svg(out / "episode.svg")
         for word in ("link 1", "link 2, absolute", "velocity (rad/s)", "energy (J)", "target",
-                     "torque (N·m)", "Q-value (reward)", "greedy action", "time (s)", "policy.safetensors",
-                     *(name.replace("_", " ") for name in REWARD_TERMS)):
+                     "torque (N·m)", "Q-value (reward)", "greedy action", "time (s)",
+                     "policy.safetensors", *(name.replace("_", " ") for name in REWARD_TERMS)):
             self.assertIn(word, episode)
         phase, _ = self.svg(out / "phase.svg")
         for word in ("angle of joint 1 (°)", "velocity of joint 1 (rad/s)", "angle of joint 2 (°)",

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The process: exit codes whatever becomes of its output, signals at any moment, no /proc."""
+"""The process: exit codes if its output is lost, signals at any moment, no /proc."""
 
 import os
 import signal
@@ -97,7 +97,7 @@ class NoProcTest(ProgramTest):
 
 
 class InputTest(ProgramTest):
-    """Exit code 2 where the input is at fault, whatever the system calls it."""
+    """Exit code 2 where the input is at fault, for every error of the system."""
 
     def setUp(self):
         super().setUp()

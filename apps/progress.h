@@ -10,8 +10,8 @@
 
 namespace upswing {
 
-/// A line at the bottom of the terminal that is written anew a few times a second. Where standard
-/// output is no terminal it stays silent, and what is printed are plain lines.
+/// A line at the bottom of the terminal that is rewritten a few times a second. Where standard
+/// output is no terminal it shows nothing, and Print writes plain lines.
 class ProgressLine {
  public:
   ProgressLine();

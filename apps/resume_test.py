@@ -143,7 +143,7 @@ class ResumeTest(ProgramTest):
         self.assert_same_run("run", "at-once")
 
     def test_no_stop_when_solved_goes_on(self):
-        # Almost without gravity the pendulum stays wherever it comes to rest: soon learned.
+        # Almost without gravity the pendulum stays where it comes to rest: soon learned.
         easy = {"gravity": 0.05, "damping": 1, "hidden": "64,64", "head": 32, "eval_episodes": 1,
                 "eval_every": EVAL_EVERY, "steps": 100000, "checkpoint_every": 5000}
         self.assertIn("Solved after", self.succeed(*small(**easy)))

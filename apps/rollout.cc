@@ -62,7 +62,7 @@ Rollout RunRollout(const RolloutConfig& config) {
     const PendulumState state = env.state(0);
     std::vector<double> q;
     if (config.q_values) q = QValuesOf(*config.policy, env.obs());
-    // One step more than there are rows to fill: it tells what the motor gives in the last state.
+    // One step more than there are rows: it gives the motor's torque in the last state.
     env.Step(std::span(&torque, 1), result);
     if (result.terminated[0] && k < steps) {
       throw Failure(Concat("the state blew up numerically after t = ", FormatNumber(t), " s"));

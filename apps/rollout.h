@@ -53,8 +53,8 @@ EvaluationEpisode JudgeEpisode(const Policy& policy, PendulumEnvConfig env);
 /// The same in words: `success, upright from 2.34 s to the end, return 2345`.
 std::string JudgementText(const EvaluationEpisode& episode);
 
-/// What tells an episode apart from others with the same flags: `plant mass1 0.93, …`; and its
-/// sensor noise and delay where there are any.
+/// What distinguishes an episode from others with the same flags: its plant, `mass1 0.93, …`, and
+/// its sensor noise (rad, rad/s) and delay (s) where there are any.
 std::string EpisodeText(const Rollout& rollout);
 
 /// Four numbers q1,q2,w1,w2 (rad, rad/s) as --start gives them. Throws BadInput.

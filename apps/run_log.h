@@ -10,8 +10,8 @@
 
 namespace upswing {
 
-/// On what a run was trained and how much of it the run had, as lines of its log.txt tell: what its
-/// times depend on. Sets, for a run may have been resumed elsewhere.
+/// The machine of a run and its share of it, read from the run's log.txt: what its times depend on.
+/// Sets, because a run may have been resumed on another machine.
 struct RunConditions {
   std::set<int64_t> threads;
   std::set<std::string> vectors, processors;  // instructions in use; model of the processor
@@ -36,7 +36,7 @@ std::string BeginLine(bool resumed, int64_t step, int threads);
 /// The line with which it ends: `finished` or stopped.
 std::string EndLine(bool finished, int64_t step, int threads, const WorkClock& clock);
 
-/// What a run's log.txt tells, if there is one that can be read.
+/// What a run's log.txt says; empty if there is none that can be read.
 RunConditions ReadConditions(const std::filesystem::path& run);
 
 }  // namespace upswing

@@ -8,8 +8,8 @@
 namespace upswing {
 
 void OpenStandardFiles() {
-  // The lowest free number is taken, so that each fills its own gap. Of the other access than is
-  // used: reading and writing fail as they did.
+  // The lowest free number is taken, so that each fills its own gap. Opened for the opposite
+  // access, so that reading and writing fail as before.
   for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
     if (fcntl(fd, F_GETFD) < 0) (void)!open("/dev/null", fd == STDIN_FILENO ? O_WRONLY : O_RDONLY);
   }

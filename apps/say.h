@@ -11,8 +11,8 @@ namespace upswing {
 /// their numbers. They stay what they were: nothing comes in, and every write fails.
 void OpenStandardFiles();
 
-/// `text` on standard output, for people who watch long work: should it be impossible to write, the
-/// work goes on, and the end of the program tells of it.
+/// `text` on standard output, for people who watch long work: if it cannot be written the work
+/// continues, and the program reports it at its end.
 void SayText(std::string_view text);
 template <typename... T>
 void Say(fmt::format_string<T...> format, T&&... arguments) {

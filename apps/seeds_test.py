@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""`upswing train --seeds`: many runs at a time equal as many alone, whatever comes between."""
+"""`upswing train --seeds`: many runs at a time equal as many single ones, also when interrupted."""
 
 import fcntl
 import os
@@ -58,7 +58,7 @@ class SeedsTest(ProgramTest):
         self.assertIn("./upswing compare runs/d3qn-small\n", output)
 
     def test_the_table_tells_what_the_runs_say(self):
-        # Almost without gravity the pendulum stays wherever it comes to rest: soon learned.
+        # Almost without gravity the pendulum stays where it comes to rest: soon learned.
         easy = {"gravity": 0.05, "damping": 1, "hidden": "64,64", "head": 32, "eval_episodes": 1,
                 "eval_every": 2000, "steps": 100000, "threads": None, "out": "easy"}
         output = self.succeed(*small(**easy), "--seeds", "1,2,3")
@@ -121,7 +121,7 @@ class SeedsTest(ProgramTest):
 
     def test_interrupted_and_restarted_equals_never_stopped(self):
         output = self.check_restart(signal.SIGINT, 130)
-        self.assertIn("Stopped, 0 of 2 runs done; the same command goes on.", output)
+        self.assertIn("Stopped, 0 of 2 runs done; the same command resumes them.", output)
         self.assertIn("stopped at step",
                       (self.folder / "many/seed1/log.txt").read_text(encoding="utf-8"))
 
@@ -161,7 +161,8 @@ class SeedsTest(ProgramTest):
         failed = self.run_here(*small(**TINY), "--seeds", 3)
         self.assert_one_line(failed, 1, "1 of 3 runs in many failed",
                              "seed2: many/seed2: expected")
-        self.assertRegex(failed.stdout, r"(?m)^  seed2 +failed: .*expected a new or empty folder.*many/seed2\.log")
+        self.assertRegex(failed.stdout, r"(?m)^  seed2 +failed: .*expected a new or "
+                                        r"empty folder.*many/seed2\.log")
         self.assertIn("2 of 3 runs done", failed.stdout)
         self.assertEqual([path.name for path in (self.folder / "many/seed2").iterdir()],
                          ["precious"])
@@ -178,10 +179,10 @@ class SeedsTest(ProgramTest):
         failed = self.run_here(*small(**TINY | {"steps": 800}), "--seeds", 3)
         reason = f"many/seed1/{checkpoint.name}: not a whole safetensors file"
         self.assert_one_line(failed, 1, "1 of 3 runs in many failed", "seed1: " + reason)
-        # Told before the others work, and in its place among them.
+        # Reported before the others run, and in its place among them.
         self.assertRegex(failed.stdout, rf"(?m)\A.*\n.*\n.*done before.*\n  seed1 +failed: {reason}")
         self.assertRegex(failed.stdout, r"(?m)^  1 run failed$")
-        self.assertNotIn("not judged yet", failed.stdout)
+        self.assertNotIn("not evaluated yet", failed.stdout)
         self.assertIn("./upswing compare many --unfinished\n", failed.stdout)
         self.succeed(*small(**TINY | {"steps": 800, "out": "alone"}), "--seeds", "2-3")
         self.assert_same_runs("many", "alone", (2, 3))

@@ -5,14 +5,13 @@
 #include <atomic>
 #include <cerrno>
 #include <csignal>
-#include <string_view>
 
 namespace upswing {
 namespace {
 
 std::atomic<int> g_stop_signal{0};
 std::atomic<bool> g_checkpoint_wanted{false};
-std::atomic<bool> g_person_watches{false};  // standard error is a terminal
+std::string_view g_notice;  // set before the handlers are installed
 static_assert(std::atomic<int>::is_always_lock_free);
 
 }  // namespace
@@ -25,16 +24,14 @@ void ListenToSignals() {
   std::signal(SIGUSR2, SIG_IGN);
 }
 
-void InstallSignalHandlers() {
-  g_person_watches = isatty(STDERR_FILENO) == 1;
+void InstallSignalHandlers(std::string_view notice) {
+  g_notice = isatty(STDERR_FILENO) == 1 ? notice : "";
   struct sigaction stop {};
   stop.sa_handler = [](int signal) {
     g_stop_signal = signal;
-    if (!g_person_watches) return;
-    constexpr std::string_view kNotice =
-        "\nstopping: a checkpoint is written; once more ends at once\n";
+    if (g_notice.empty()) return;
     const int interrupted_errno = errno;
-    (void)!write(STDERR_FILENO, kNotice.data(), kNotice.size());
+    (void)!write(STDERR_FILENO, g_notice.data(), g_notice.size());
     errno = interrupted_errno;
   };
   stop.sa_flags = SA_RESETHAND | SA_RESTART;  // a second one ends the program at once

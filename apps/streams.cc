@@ -51,7 +51,7 @@ void CheckWritable(const std::string& flag, const std::string& path) {
 
 void WriteOutput(const std::string& path, std::string_view text) {
   if (IsStandardStream(path)) {
-    std::fwrite(text.data(), 1, text.size(), stdout);  // the program tells if it could not
+    std::fwrite(text.data(), 1, text.size(), stdout);  // main() reports a failure
   } else {
     WriteNamedFile(path, text);
   }

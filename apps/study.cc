@@ -24,8 +24,8 @@ struct StudyArguments {
   int64_t jobs = 0;  // 0: as many as there are processors
 };
 
-/// Throws if the folder is that of another study, which this one would take the place of: it has
-/// another title, or a variant that this one has not. (TrainMany tells of other settings.)
+/// Throws if the folder belongs to another study, which this one would replace: one with another
+/// title, or with a variant that this one does not have. (TrainMany compares the settings.)
 void CheckSameStudy(const ManyRuns& plan, const std::string& title) {
   const fs::path file = plan.folder / plan.mark.first;
   const std::string where = file.string();
@@ -39,7 +39,7 @@ void CheckSameStudy(const ManyRuns& plan, const std::string& title) {
   for (const std::string& name : before.variants) {
     if (std::ranges::find(plan.variants, name, &Variant::name) != plan.variants.end()) continue;
     throw BadInput(Concat(where, ": made with a variant \"", name,
-                          "\", which the study has not; choose another --out"));
+                          "\", which the study does not have; choose another --out"));
   }
 }
 
@@ -68,10 +68,10 @@ ManyRuns ReadStudy(const StudyArguments& arguments) {
 
 int RunStudy(const StudyArguments& arguments) {
   const ManyRuns plan = ReadStudy(arguments);
-  CheckCanDraw();  // not only after hours of training
+  CheckCanDraw();  // before hours of training, not after
   const int exit_code = TrainMany(plan);
   if (exit_code != 0) return exit_code;
-  // All runs are done: what do they show?
+  // All runs are done: compare them.
   CompareRequest request;
   request.root = plan.folder;
   request.different_tasks = true;
@@ -114,7 +114,7 @@ void AddStudy(CLI::App& program, Command& command) {
       "  ./upswing study configs/studies/post.toml\n"
       "  ./upswing study configs/studies/post.toml --seeds 3 --out runs/short\n"
       "\nEach run lies in FOLDER/VARIANT/seedN, what it prints in FOLDER/VARIANT/seedN.log. The\n"
-      "same command goes on where it was stopped, or killed; finished runs are left alone.\n"
+      "same command resumes what was stopped or killed; finished runs are left as they are.\n"
       "Exit code 0: done; 1: a run failed; 2: bad usage or input; 130, 143: stopped.\n");
   app->callback([arguments, &command] { command = [arguments] { return RunStudy(*arguments); }; });
 }

@@ -15,7 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The settings of one table of the study, checked; a model's file counts from the study's folder.
+/// The settings of one table of the study, checked; a model's path is relative to the study's
+/// folder.
 std::vector<FlagValue> ReadSettings(const toml::node& node, const std::string& name,
                                     const std::string& where) {
   const auto* table = node.as_table();

@@ -16,18 +16,19 @@ struct StudyFile {
   std::vector<int64_t> seeds;     // empty: the file names none
 };
 
-/// Reads the text of a study file; a model of it counts from its folder. `where` is its path.
+/// Reads the text of a study file; the path of a model is relative to its folder. `where` is its
+/// path.
 /// Throws BadInput with the line.
 StudyFile ParseStudy(std::string_view text, const std::string& where);
 
-/// What tells one study from another before its settings are looked at.
+/// What identifies a study, without its settings.
 struct StudyOutline {
   std::string title;
   std::vector<std::string> variants;  // names
 };
 
-/// Reads nothing but the outline, in which a study of another version of the program is like one of
-/// this version. Throws BadInput.
+/// Reads only the outline, which is the same in files of other versions of the program. Throws
+/// BadInput.
 StudyOutline ParseStudyOutline(std::string_view text, const std::string& where);
 
 }  // namespace upswing

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""`upswing study`: variants and seeds of a file, in their folders, stopped and gone on with."""
+"""`upswing study`: variants and seeds of a file, in their folders, stopped and resumed."""
 
 import re
 import shutil

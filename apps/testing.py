@@ -9,6 +9,7 @@ import json
 import os
 import pty
 import re
+import shutil
 import signal
 import struct
 import subprocess
@@ -30,7 +31,7 @@ SMALL = {"agent": "d3qn-small", "hidden": 32, "head": 16, "steps": 4000, "eval_e
          "threads": 1, "out": "run", "envs": 8, "updates_per_step": 0.25}
 
 
-# A double pendulum as MJCF that another hand might have written.
+# A double pendulum as MJCF that a user might have written.
 MODEL = """<mujoco>
   <option timestep="0.005" integrator="RK4"/>
   <worldbody>
@@ -171,7 +172,7 @@ class ProgramTest(unittest.TestCase):
         return run(*arguments, cwd=self.folder, **more)
 
     def succeed(self, *arguments, **more):
-        """Runs the program, which shall succeed without a word on stderr; returns stdout."""
+        """Runs the program, which has to succeed with an empty stderr; returns stdout."""
         done = self.run_here(*arguments, **more)
         self.assertEqual((done.returncode, done.stderr), (0, ""), done)
         return done.stdout
@@ -187,7 +188,7 @@ class ProgramTest(unittest.TestCase):
             self.assertIn(str(word), done.stderr)
 
     def refuse(self, arguments, *words, code=2, **more):
-        """Runs the program, which shall refuse: one line, no output, no file touched."""
+        """Runs the program, which has to refuse: one line, no output, no file touched."""
         before = snapshot(self.folder)
         done = self.run_here(*arguments, **more)
         self.assert_one_line(done, code, *words)
@@ -252,7 +253,7 @@ class ProgramTest(unittest.TestCase):
         """What comes next; nothing when its other end is closed."""
         try:
             return os.read(terminal, 65536).decode()
-        except OSError:  # Linux's way to say that nobody is left there
+        except OSError:  # Linux's way to say that the other end is closed
             return ""
 
     def assert_same_run(self, a, b):
@@ -267,3 +268,38 @@ class ProgramTest(unittest.TestCase):
         self.assertEqual(state_a.keys(), state_b.keys())
         for name, tensor in state_a.items():
             self.assertTrue(tensor == state_b[name], f"checkpoint: {name} differs")
+
+
+class SmallRunTest(ProgramTest):
+    """Tests of a small finished run in the folder `run`, trained once and copied for each test."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.made = train_once(cls)
+
+    def setUp(self):
+        super().setUp()
+        shutil.copytree(self.made, self.folder / "run")
+        self.policy = self.folder / "run/policy.safetensors"
+        self.checkpoint = self.folder / "run/checkpoint.safetensors"
+
+    def restore(self):
+        """Replaces the run by a fresh copy."""
+        shutil.rmtree(self.folder / "run")
+        shutil.copytree(self.made, self.folder / "run")
+
+    @staticmethod
+    def flip(path, position):
+        """Inverts one bit."""
+        data = bytearray(path.read_bytes())
+        data[position] ^= 0x10
+        path.write_bytes(data)
+
+    @staticmethod
+    def places(path):
+        """Bytes all over a safetensors file: in its length, header, checksum and tensors."""
+        data = path.read_bytes()
+        header = int.from_bytes(data[:8], "little")
+        checksum = data.index(b'"checksum":"') + 12
+        return [0, 1, 7, 8, 8 + header // 4, checksum, checksum + 15, 8 + header // 2, 8 + header,
+                8 + header + 5, (8 + header + len(data)) // 2, len(data) - 1]

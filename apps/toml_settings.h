@@ -21,8 +21,8 @@ std::string PlaceOf(const toml::node& node, const std::string& where);
 /// A TOML value as the text that Option::Set takes; nothing for a type that no setting has.
 std::optional<std::string> TextOf(const toml::node& node);
 
-/// Sets the options that a table names, which stand in their sections; where `alone` is true also
-/// without. Returns what it set. Throws BadInput with the line.
+/// Sets the options that a table names in their sections; if `alone`, also outside of sections.
+/// Returns what it set. Throws BadInput with the line.
 std::vector<FlagValue> ApplyTable(const Options& options, const toml::table& table,
                                   const std::string& where, bool alone);
 

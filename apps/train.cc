@@ -30,7 +30,7 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kCheckpointFormat = "upswing-checkpoint-1";
 
-// ---- Where a run comes from.
+// ---- How a run is made or found.
 
 /// What was typed.
 struct TrainArguments {
@@ -83,14 +83,13 @@ struct Parts {
       : config(c),
         pool(threads),
         env(c.Environments(pool)),
-        agent(c.dqn, env.num_envs(), env.obs_size(), TorqueLevels(env.torque_limit()),
-              env.mirror_signs(), static_cast<uint64_t>(c.train.seed), pool),
+        agent(c.Agent(env, pool)),
         state(env.num_envs(), kRewardTerms) {}
 
   /// Evaluation from fresh starts with the reward's standard weights, on the training plant or,
   /// where plants are random, on a fresh one for each episode; disturbed as in training.
   Evaluation Judge(const Policy& policy, int64_t step) {
-    // The twin says at once who fails; who does not is judged in MuJoCo.
+    // The closed form finds a failing policy quickly; one that passes is evaluated in MuJoCo.
     const bool screened = config.eval_physics == kScreened;
     if (screened && config.mjcf.empty()) {
       Evaluation screening = JudgeIn(PhysicsEngine::kClosedForm, policy, step);
@@ -121,11 +120,11 @@ struct Parts {
   }
 };
 
-/// A disk that is full may be why there is something to log.
+/// Logs a failure; the disk may be full, which may itself be the failure.
 void LogIfPossible(RunFolder& run, const std::string& line) {
   try {
     run.Log(line);
-  } catch (const Error&) {  // NOLINT(bugprone-empty-catch): the line is told to the user anyway
+  } catch (const Error&) {  // NOLINT(bugprone-empty-catch): the user sees the line anyway
   }
 }
 
@@ -143,7 +142,7 @@ fs::path MakeRun(const TrainArguments& arguments, Parts& parts) {
   return path;
 }
 
-/// Goes on with a run from its checkpoint, where a new one begins too. Returns the exit code.
+/// Trains from the run's checkpoint, which a new run has too. Returns the exit code.
 int TrainRun(const fs::path& path, Parts& parts, bool resuming, bool steps_given) {
   auto checkpoint = std::make_optional(TensorFile::Load(RunFolder::CheckpointPath(path)));
   CheckCheckpoint(*checkpoint, parts.config);
@@ -225,7 +224,7 @@ int RunTrain(const TrainArguments& arguments) {
   if (!config.mjcf.empty()) config.model = kModelCopy;
   CheckMemory(config);
   Parts parts(config, ResolveThreads(config.train.threads));
-  InstallSignalHandlers();  // from here on what is begun is ended in order
+  InstallSignalHandlers(kStoppingTraining);  // what is begun from here on ends in order
   if (!resuming) {
     path = MakeRun(arguments, parts);
     lock.emplace(path);
@@ -233,7 +232,7 @@ int RunTrain(const TrainArguments& arguments) {
   return TrainRun(path, parts, resuming, StepsGiven(arguments));
 }
 
-/// Throws if what is for many runs and what is for one come together.
+/// Throws if flags for many runs are combined with flags for a single one.
 void CheckManyArguments(const CLI::App& app) {
   if (app.count("--seeds") > 0) {
     for (const std::string other : {"--seed", "--resume"}) {
@@ -245,7 +244,7 @@ void CheckManyArguments(const CLI::App& app) {
   }
 }
 
-/// In --help the defaults are those of the agent and the configuration file that were given.
+/// Lets --help show the defaults of the agent and the configuration file that were given.
 void ShowDefaultsOfWhatIsChosen(CLI::App& app) {
   const auto last_of = [&](const char* flag) -> std::string {
     const std::vector<std::string> values = app.get_option(flag)->results();
@@ -284,13 +283,13 @@ void AddTrain(CLI::App& program, Command& command) {
       ->type_name("FILE")
       ->check(NotEmpty());
   app->add_option("--resume", arguments->resume,
-                  "go on where a run stopped; --steps, --threads, --checkpoint-every and\n"
-                  "--stop-when-solved may be given anew; a run that is solved goes on with "
+                  "resume a run from its checkpoint; --steps, --threads, --checkpoint-every and\n"
+                  "--stop-when-solved may be given again; a solved run continues with "
                   "--no-stop-when-solved")
       ->type_name("RUN")
       ->check(NotEmpty());
   app->add_flag("--print-config", arguments->print_config,
-                "print the settings that it would have, as a TOML file for --config, and end")
+                "print the settings of this training as a TOML file for --config, and end")
       ->disable_flag_override();
   AddManyOptions(*app, arguments->seeds, arguments->jobs);
   Config defaults;
@@ -303,11 +302,11 @@ void AddTrain(CLI::App& program, Command& command) {
       "  ./upswing train --agent dqn --seed 3 --out runs/a\n"
       "  ./upswing train --gamma 0.98 --hidden 128,128    any setting as a flag\n"
       "  ./upswing train --mass2 1.2 --no-stop-when-solved --steps 500000\n"
-      "  ./upswing train --randomize 0.25 --delay 0.02    each episode another plant\n"
-      "  ./upswing train --resume runs/a --no-stop-when-solved --steps 2000000   go on\n"
+      "  ./upswing train --randomize 0.25 --delay 0.02    a new random plant each episode\n"
+      "  ./upswing train --resume runs/a --no-stop-when-solved --steps 2000000   resume\n"
       "  ./upswing train --agent fast --print-config > my.toml   then edit, and train --config\n"
       "  ./upswing train --seeds 10                       in runs/d3qn/seed1 to seed10, in\n"
-      "                                                   parallel; the same command goes on\n"
+      "                                                   parallel; the same command resumes\n"
       "  ./upswing train --seeds 3,5,8-12 --jobs 2 --out runs/many\n"
       "\nSIGINT and SIGTERM write a checkpoint and end with 130 and 143; SIGUSR1 writes one\n"
       "and goes on. Exit code 0: done; 1: failed; 2: bad usage or input.\n");

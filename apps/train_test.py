@@ -10,7 +10,8 @@ from testing import (MODEL, REWARD_TERMS, ROOT, RUN_FILES, ProgramTest, read_csv
 
 ENDLESS = small(steps=10**9, stop_when_solved=False)
 METRICS = ["step", "episodes", "updates", "epsilon", "learning_rate", "loss", "q", "td_error",
-           "gradient_norm", "feature_rank", "dormant_share", "mean_return", "success_rate", "seconds"]
+           "gradient_norm", "feature_rank", "dormant_share", "mean_return", "success_rate",
+           "seconds"]
 EPISODES = ["step", "episode", "return", "length", "terminated", *REWARD_TERMS]
 EVALS = ["step", "success_rate", "success_low", "success_high", "mean_return", "swing_up_seconds",
          "work", "rms_torque", "value", "discounted_return", "seconds"]
@@ -55,7 +56,8 @@ class TrainTest(ProgramTest):
     def test_progress_bar_tells_all_on_a_terminal(self):
         facts = (r"[1-9][\d,]* steps/s", r"[1-9][\d,]* updates/s", r"eps \d\.\d\d",
                  r"loss \d\.\d+", r"return -?\d+", r"success \d+%", r"at most [^\r]+ left")
-        shown = self.watch(200, ENDLESS, *(rf"\r\x1b\[K\[[= ]{{16}}\] +\d+% [^\r]*{fact}" for fact in facts))
+        bar = r"\r\x1b\[K\[[= ]{16}\] +\d+% [^\r]*"
+        shown = self.watch(200, ENDLESS, *(bar + fact for fact in facts))
         self.assertIn("\r\x1b[KStopped at step", shown)  # in the bar's place
 
     def test_progress_bar_keeps_to_the_width(self):

@@ -40,7 +40,7 @@ void TrainView::Announce(const Config& config, int threads, size_t num_parameter
         size.memory / kGigabyte, size.checkpoint / kGigabyte);
   }
   for (const std::string& warning : Warnings(config)) Say("  Warning: {}\n", warning);
-  if (since_step_ > 0) Say("  going on from step {}\n", FormatCount(since_step_));
+  if (since_step_ > 0) Say("  resuming at step {}\n", FormatCount(since_step_));
   std::fflush(stdout);
 }
 
@@ -102,11 +102,11 @@ void TrainView::PrintOutcome(const TrainState& s, const TrainConfig& config, boo
   const bool did_nothing = begin_step_ > 0 && s.steps == begin_step_ && finished;
   const bool all_steps_done = s.steps >= config.steps;
   if (did_nothing && all_steps_done) {
-    Say("Nothing to do: all {} steps were done before (--steps: so many in all){}.\n",
+    Say("Nothing to do: all {} steps were done before (--steps is the total){}.\n",
         FormatCount(config.steps), s.solved ? ", and it is solved" : "");
   } else if (did_nothing) {
     Say("Nothing to do: it was solved before, at step {} after {} of training, and stops when\n"
-        "solved. --no-stop-when-solved lets it go on to step {} (--steps).\n",
+        "solved. With --no-stop-when-solved it continues to step {} (--steps).\n",
         FormatCount(s.streak_step), FormatDuration(s.streak_seconds), FormatCount(config.steps));
   } else if (s.solved) {
     Say("Solved after {} of training, at step {} (training so far: {}, {} steps).\n",
@@ -129,10 +129,10 @@ void TrainView::Summarize(const TrainState& s, const TrainConfig& config,
     Say("Best policy: {} (step {}, success {:.0f}%, return {:.0f})\n", Printable(policy.string()),
         FormatCount(s.best_step), 100 * s.best_success_rate, s.best_return);
   } else if (s.best_step > 0) {
-    Say("Best policy: of step {}, but {} is not there any more\n", FormatCount(s.best_step),
+    Say("Best policy: of step {}, but {} no longer exists\n", FormatCount(s.best_step),
         Printable(policy.string()));
   }
-  if (Printable(run.string()) != run.string()) return;  // no line that anybody could type
+  if (Printable(run.string()) != run.string()) return;  // such a name cannot be typed
   const std::string folder = ShellQuoted(run.string());
   Say("Next:\n");
   if (has_policy) {

@@ -14,30 +14,30 @@ class TrainView {
   /// A training that stands at `state`, whose agent reports `report`.
   TrainView(const TrainState& state, const AgentReport& report);
 
-  /// Says what begins here.
+  /// Prints what is trained and where.
   void Announce(const Config& config, int threads, size_t num_parameters,
                 const std::filesystem::path& run) const;
 
-  /// Lets the training tell this view how it goes on.
+  /// Connects this view to the training's callbacks.
   void Follow(Training& training);
 
-  /// Says what came of it and what to type next. `finished`: nobody stopped it.
+  /// Prints the result and the next commands to type. `finished`: the training was not stopped.
   void Summarize(const TrainState& state, const TrainConfig& config,
                  const std::filesystem::path& run, bool finished);
 
  private:
   void UpdateRates(const TrainState& state, const AgentReport& report);
+  /// The rate of updates and the loss as the lines show them.
+  std::string UpdatesText() const;
   std::string LossText() const;
   void ShowProgress(const TrainState& state, int64_t steps_in_all);
 
-  /// Says where the training stands, in a sentence.
+  /// Prints in one sentence how far the training is.
   void PrintOutcome(const TrainState& state, const TrainConfig& config, bool finished) const;
 
   ProgressLine line_;
   int64_t begin_step_;  // where this view's training began
   AgentReport report_;  // the last one
-  /// The rate of updates as the lines show it.
-  std::string UpdatesText() const;
 
   // Rates of training, between two reports at least half a second apart; before there are such, of
   // all that was reported; 0 before the first report.

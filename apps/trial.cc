@@ -38,12 +38,10 @@ void AddTrialOptions(CLI::App& app, TrialArguments& a, const std::string& seed_o
   AddSeed(app, a.seed, seed_of);
   AddPlantOptions(app, a.set, a.model);
   AddPhysics(app, a.physics, "mujoco");
-  app.add_flag("--unknown-plant", a.unknown_plant,
-               "scale the observed energy and height by the training's plant")
-      ->disable_flag_override();
+  AddUnknownPlant(app, a.unknown_plant);
   Conditions defaults;
   AddSettings(app, OptionsOf(defaults), a.flags);
-  // What is wrong on the command line is told before any file is read.
+  // Mistakes on the command line are reported before any file is read.
   app.parse_complete_callback([&a] { (void)ConditionsOf(a); });
 }
 

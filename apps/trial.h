@@ -11,7 +11,7 @@
 #include "apps/loaded_policy.h"
 #include "sim/pendulum_env.h"
 
-/// On what plant, with what sensors and motor, `eval`, `simulate` and `plot` try a policy out. With
+/// The plant, sensors and motor on which `eval`, `simulate` and `plot` try a policy out. With
 /// the same flags they make the same episodes.
 namespace upswing {
 
@@ -27,15 +27,16 @@ struct TrialArguments {
 /// Disturbance and Randomization.
 void AddTrialOptions(CLI::App& app, TrialArguments& a, const std::string& seed_of);
 
-/// The environments that the arguments ask for, those of the policy's training but for what they
-/// change; without a policy (null) those of the built-in plant. Environment i has episode i. Throws
-/// BadInput.
+/// The environments that the arguments ask for: those of the policy's training with the given
+/// changes; without a policy (null) those of the built-in plant. Environment i has episode i.
+/// Throws BadInput.
 PendulumEnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded);
 
 /// What is not at its default, as text: `delay 0.02, …`; empty if nothing is.
 std::string ChangesText(const PendulumEnvConfig& env);
 
-/// What a plant has otherwise than another: `mass2 1.3 kg (training: 1), …`; empty for nothing.
+/// How a plant differs from that of the training: `mass2 1.3 kg (training: 1), …`; empty: not at
+/// all.
 std::string PlantChangesText(Plant plant, Plant training);
 
 /// Where figures of a policy go unless the user says: in its run's folder under this name, or, for
@@ -54,8 +55,8 @@ struct EpisodeArguments {
 /// Adds --start and --episode.
 void AddEpisodeOptions(CLI::App& app, EpisodeArguments& a);
 
-/// Makes the one environment of `env` that of the episode, and returns where it starts: nowhere
-/// else than it does by itself, if nothing is returned. Throws BadInput.
+/// Sets the episode of `env`, which has one environment. Returns where it starts; nothing: in the
+/// episode's own start. Throws BadInput.
 std::optional<PendulumState> ChooseEpisode(const EpisodeArguments& a, PendulumEnvConfig& env);
 
 }  // namespace upswing

@@ -76,4 +76,8 @@ const json& JsonList(const json& object, const std::string& name, size_t max_siz
   throw Unexpected(name, Concat("a list of at most ", max_size), member);
 }
 
+std::string PrintableJson(const nlohmann::ordered_json& document) {
+  return document.dump(2, ' ', true, nlohmann::ordered_json::error_handler_t::replace);
+}
+
 }  // namespace upswing

@@ -28,4 +28,7 @@ const std::string& JsonText(const nlohmann::json& object, const std::string& nam
 const nlohmann::json& JsonList(const nlohmann::json& object, const std::string& name,
                                size_t max_size);
 
+/// A document as the program prints it: indented, ASCII alone, U+FFFD for bytes that are not UTF-8.
+std::string PrintableJson(const nlohmann::ordered_json& document);
+
 }  // namespace upswing

@@ -59,5 +59,10 @@ TEST(Json, OnlyObjectsOfSomeDepthAreTaken) {
   }
 }
 
+TEST(Json, PrintedJsonIsAscii) {
+  const nlohmann::ordered_json document{{"z", "\x1b° \xff"}, {"a", 0.5}};
+  EXPECT_EQ(PrintableJson(document), "{\n  \"z\": \"\\u001b\\u00b0 \\ufffd\",\n  \"a\": 0.5\n}");
+}
+
 }  // namespace
 }  // namespace upswing

@@ -1,4 +1,4 @@
-// The checkpoint: the whole state of a training, which is then gone on with.
+// The checkpoint: the whole state of a training, which is then resumed.
 #include <cmath>
 
 #include "core/error.h"
@@ -21,7 +21,7 @@ bool TryInput(std::string_view input) {
   TinyTraining training(config, pool);
   if (!Accepts([&] { training.State(Archive::Loader(file)); })) return false;
 
-  // What was loaded can be saved and loaded again, and be gone on with.
+  // What was loaded can be saved, loaded again, and resumed.
   TensorFile saved;
   training.State(Archive::Saver(saved));
   TinyTraining again(config, pool);

@@ -1,4 +1,4 @@
-// Writes the inputs of the corpus that the program itself makes, anew after a change of its
+// Writes those inputs of the corpus that the program itself makes; to be run after a change of its
 // formats:
 //   fuzz_seeds fuzz/corpus
 #include <cstdio>

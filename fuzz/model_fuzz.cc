@@ -1,4 +1,4 @@
-// A model in MJCF, as --model, a run folder and a policy bring it.
+// A model in MJCF, as it comes with --model, in a run folder or in a policy.
 #include "fuzz/target.h"
 #include "sim/model.h"
 #include "sim/pendulum_env.h"
@@ -11,7 +11,7 @@ bool TryInput(std::string_view input) {
   config.num_envs = 1;
   config.mjcf = mjcf;
   if (!Accepts([&] { config.plants = {PlantOf(*LoadModel(mjcf, kInputName))}; })) return false;
-  // It swings.
+  // It can be simulated.
   PendulumEnv env(config);
   StepResult result = env.MakeResult();
   const double torque = 1;

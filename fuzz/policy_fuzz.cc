@@ -1,4 +1,4 @@
-// The policy file: what `eval`, `info`, `export` and the others read of a stranger.
+// The policy file, which `eval`, `info`, `export` and others read from untrusted sources.
 #include <cmath>
 #include <optional>
 
@@ -18,7 +18,7 @@ bool TryInput(std::string_view input) {
   });
   if (!accepted) return false;
 
-  // It acts, and says how it was made.
+  // It chooses torques, and the program can print the command that trained it.
   const Policy& policy = loaded->policy;
   const std::vector<float> obs(static_cast<size_t>(policy.shape().inputs), 0.5F);
   double torque = 0;

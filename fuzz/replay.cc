@@ -15,8 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// More than any input of a corpus needs at once; who asks for it believes a size that a file
-/// claims. libFuzzer's -malloc_limit_mb finds the same.
+/// More than any input of a corpus needs at once: a reader that asks for more trusts a size that
+/// the file claims. libFuzzer's -malloc_limit_mb finds the same.
 constexpr size_t kMostBytes = size_t{64} << 20;
 
 /// Tries one file. Returns whether it was accepted.

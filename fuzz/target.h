@@ -3,8 +3,8 @@
 #include <functional>
 #include <string_view>
 
-/// What a fuzz target is made of. Each tries one reader of files that may come from anybody; with
-/// libFuzzer it is given inputs without end, in the ordinary tests those of its corpus.
+/// What a fuzz target is made of. Each tests one reader of files from untrusted sources: libFuzzer
+/// generates inputs without end, the ordinary tests use those of its corpus.
 namespace upswing {
 
 /// Reads one input, as its target does, and works with what was read as the program would. Returns

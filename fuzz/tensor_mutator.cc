@@ -1,5 +1,5 @@
-// Changes safetensors so that they stay readable enough to be read further: libFuzzer's own changes
-// would fail at the header's length or the checksum nearly always. A change is one of
+// Changes safetensors so that most of the reader still runs: nearly all of libFuzzer's own changes
+// would fail at the header's length or the checksum. A change is one of
 //   - any bytes of the file,
 //   - the header as text,
 //   - the text of one metadatum, or a number in it,
@@ -30,7 +30,7 @@ namespace {
 using nlohmann::json;
 using Random = std::minstd_rand;
 
-/// A tensor apart from its file.
+/// A tensor taken out of its file.
 struct LooseTensor {
   std::string name, dtype;
   std::vector<int64_t> shape;
@@ -45,7 +45,7 @@ struct LooseFile {
 
 size_t Below(Random& random, size_t count) { return random() % std::max<size_t>(1, count); }
 
-/// A number of which readers may think wrongly.
+/// An integer that readers may handle wrongly.
 int64_t OddInteger(Random& random) {
   constexpr auto kMost = std::numeric_limits<int64_t>::max();
   constexpr std::array<int64_t, 18> kIntegers{

@@ -34,8 +34,7 @@ inline Config TinyConfig(const std::string& physics) {
 struct TinyTraining {
   explicit TinyTraining(const Config& config, ThreadPool& pool)
       : env(config.Environments(pool)),
-        agent(config.dqn, env.num_envs(), env.obs_size(), TorqueLevels(env.torque_limit()),
-              env.mirror_signs(), 1, pool),
+        agent(config.Agent(env, pool)),
         state(env.num_envs(), kRewardTerms) {}
 
   void State(const Archive& archive) { CheckpointState(archive, agent, env, state); }

@@ -14,8 +14,8 @@ Usage: ./upswing demo [POLICY|RUN...] [--port N] [--dist FOLDER]
 Serves the page in which the pendulum is swung up live, on this machine alone. Installs Node and
 what the page is built with, and builds it, if that has not been done.
 
-  POLICY|RUN     policy.safetensors or run folder, to be had in the page besides those that come
-                 with it; stays there until the page is built anew
+  POLICY|RUN     policy.safetensors or run folder, added to the policies that come with the
+                 page; stays there until the page is rebuilt
   --port N       where to listen [4173, or the next one that is free]
   --dist FOLDER  put the finished page there instead, to be copied to any web server; FOLDER must
                  be new or empty
@@ -90,13 +90,13 @@ set_demo_option() {
   esac
 }
 
-# All that the page is made of.
+# A checksum of all sources of the page.
 page_hash() {
   (cd "$root/web" && find . \( -name node_modules -o -name tests \) -prune -o -type f -print0 |
     LC_ALL=C sort -z | xargs -0 sha256sum | sha256sum)
 }
 
-# Sets up Node, and builds the page if it is not there or other than its sources.
+# Sets up Node, and builds the page if it is missing or made from other sources.
 build_demo() {
   if [ "$setup" = no ]; then
     [ -f "$page/index.html" ] || fail "the page is not built: run it once without --no-setup"

@@ -44,7 +44,7 @@ class DemoTest(ProgramTest):
                               stderr=subprocess.PIPE, encoding="utf-8")
 
     def serve(self, *arguments):
-        """Starts the server; returns it and its address, which its first line tells."""
+        """Starts the server; returns it and its address, from its first line."""
         server = subprocess.Popen(self.command(*arguments), cwd=self.work, env=self.environment,
                                   stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                   stderr=subprocess.DEVNULL, encoding="utf-8")
@@ -54,7 +54,7 @@ class DemoTest(ProgramTest):
         return server, line.split()[4]
 
     def fetch(self, address):
-        # Straight, whatever proxy there is.
+        # Directly, even where a proxy is configured.
         opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
         with opener.open(address.replace("localhost", "127.0.0.1")) as reply:
             return reply.read()

@@ -3,11 +3,11 @@
 # Read by ./upswing and tools/web_test, which have the repository's folder in $root.
 : "${root:?}"
 
-# Fetched where there is none that will do.
+# Downloaded where no suitable Node is installed.
 own_node=$root/build/deps/node-$(sed -n 's/.*==\([0-9.]*\).*/\1/p' "$root/tools/node-requirements.txt")
 
 # Whether Vite runs on this version of Node: 20.19, 22.12 or later ones.
-node_will_do() {
+node_is_suitable() {
   minor=${1#*.}
   minor=${minor%%.*}
   case $1 in
@@ -18,9 +18,9 @@ node_will_do() {
   esac
 }
 
-# Puts Node and npm on the PATH if they are not there yet; fails if there are none that will do.
+# Puts Node and npm on the PATH if they are not there yet; fails if there are no suitable ones.
 find_node() {
-  ! { node_will_do "$(node --version 2>/dev/null)" && command -v npm >/dev/null; } || return 0
+  ! { node_is_suitable "$(node --version 2>/dev/null)" && command -v npm >/dev/null; } || return 0
   [ -x "$own_node/bin/npm" ] || return 1
   PATH=$own_node/bin:$PATH
 }
@@ -60,7 +60,7 @@ set_up_node() {
   ! modules_are_current || return 0
   (
     lock
-    ! modules_are_current || exit 0 # another one did it meanwhile
+    ! modules_are_current || exit 0 # another process did it meanwhile
     say "installing the page's packages (npm ci)"
     cd web
     npm ci --loglevel=error >../build/npm.log 2>&1 ||
