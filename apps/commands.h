@@ -63,7 +63,7 @@ void AddSet(CLI::App& app, std::vector<std::string>& set, const std::string& hel
 /// Adds --set and --model, which choose another plant.
 void AddPlantOptions(CLI::App& app, std::vector<std::string>& set, std::string& model);
 
-/// Adds --unknown-plant: observations are scaled as in training, whatever the plant is now.
+/// Adds --unknown-plant: observations are scaled as in training, also on another plant.
 void AddUnknownPlant(CLI::App& app, bool& unknown_plant);
 
 }  // namespace upswing

@@ -173,7 +173,7 @@ class EvalTest(ProgramTest):
         self.assertEqual(len(rows), 1001)
         for name, column in zip(("q1", "q2", "w1", "w2"), ("qpos0", "qpos1", "qvel0", "qvel1")):
             self.assertEqual(rows[0][column], number[name])
-        # The rewards that were judged are those of the state after each step.
+        # An evaluation counts the rewards of the state after each step.
         terms = [0.0] * 5
         for before, row in zip(rows[:500], rows[1:501]):
             torque_penalty = (-0.05 if row["inverted"] else -0.01) * before["torque"] ** 2

@@ -28,7 +28,7 @@ std::string Known(std::optional<int64_t> count) {
 }
 
 /// How the policy did in the evaluation that it was kept for.
-std::string JudgedText(const PolicyInfo& info) {
+std::string EvaluationText(const PolicyInfo& info) {
   if (!info.success_rate || !info.mean_return) return "unknown";
   return fmt::format("success {:.0f}%, mean return {:.0f} (at that step)", 100 * *info.success_rate,
                      *info.mean_return);
@@ -62,7 +62,7 @@ void PrintPolicy(const fs::path& path) {
              *info.control_period);
   fmt::print("  made by     agent {}, seed {}, step {}, upswing {}\n", Known(info.agent),
              Known(info.seed), Known(info.step), Known(info.upswing_version));
-  fmt::print("  judged      {}\n", JudgedText(info));
+  fmt::print("  evaluated   {}\n", EvaluationText(info));
   fmt::print("  plant       {}\n", PlantText(loaded.plant));
   const std::optional<ModelInfo> model = InfoOfModel(loaded.mjcf, "");
   if (model) fmt::print("  model       {}\n", model->Text());

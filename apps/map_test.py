@@ -90,7 +90,7 @@ class MapTest(ProgramTest):
         self.assertIsNone(mujoco["check"])
         for key in ("success_rate", "swing_up_seconds"):
             self.assertEqual(one[key], many[key])
-        # A chaotic motion may tell the engines apart by rounding, but hardly ever does.
+        # In a chaotic motion rounding may make the engines differ, but hardly ever does.
         for a, b in zip(sum(one["success_rate"], []), sum(mujoco["success_rate"], [])):
             self.assertAlmostEqual(a, b, delta=0.1)
         self.assertNotEqual(self.map(*grid, "--seed", 1, out="seed")["swing_up_seconds"],

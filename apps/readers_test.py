@@ -3,7 +3,7 @@
 the safetensors package, and the forward pass of the network in numpy.
 
 These packages live in a virtual environment in build/readers-venv, which is made when it is missing
-or when tools/readers-requirements.txt has changed; the test then goes on in its Python.
+or when tools/readers-requirements.txt has changed; the test then continues in its Python.
 """
 
 import fcntl

@@ -309,7 +309,7 @@ void AddTrain(CLI::App& program, Command& command) {
       "                                                   parallel; the same command resumes\n"
       "  ./upswing train --seeds 3,5,8-12 --jobs 2 --out runs/many\n"
       "\nSIGINT and SIGTERM write a checkpoint and end with 130 and 143; SIGUSR1 writes one\n"
-      "and goes on. Exit code 0: done; 1: failed; 2: bad usage or input.\n");
+      "and continues. Exit code 0: done; 1: failed; 2: bad usage or input.\n");
   app->callback([app, arguments, &command] {
     if (app->count("--resume") > 0 && app->count("--out") + app->count("--config") > 0) {
       throw BadInput(

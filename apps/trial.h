@@ -15,6 +15,7 @@
 /// the same flags they make the same episodes.
 namespace upswing {
 
+/// The flags of AddTrialOptions.
 struct TrialArguments {
   std::string model, physics;
   std::vector<std::string> set;

@@ -6,7 +6,7 @@ namespace upswing {
 
 bool TryInput(std::string_view input) {
   RunRecord run{"", {1, 1000000, 32, 10000, true}, {}};
-  // Of a run that goes on the last line may be cut; of others it must be whole.
+  // The last line of an unfinished run may be cut off; that of others must be whole.
   const bool whole =
       Accepts([&] { run.evaluations = ParseEvaluations(std::string(input), kInputName, false); });
   const bool cut =
