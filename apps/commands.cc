@@ -71,7 +71,8 @@ void AddThreads(CLI::App& app, int64_t& threads) {
 
 void AddPhysics(CLI::App& app, std::string& physics, const std::string& usual) {
   std::vector<std::string> engines = PhysicsNames();
-  std::ranges::stable_partition(engines, [&](const std::string& name) { return name == usual; });
+  std::stable_partition(engines.begin(), engines.end(),  // clang 14 cannot compile ranges::
+                        [&](const std::string& name) { return name == usual; });
   Options options;
   options.AddChoice(&physics, "physics", std::move(engines),
                     "engine; closed-form computes the same physics faster than mujoco");

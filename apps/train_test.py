@@ -82,7 +82,7 @@ class TrainTest(ProgramTest):
     def test_metrics(self):
         self.succeed(*small())
         rows = self.table("metrics.csv", METRICS)
-        # Eight environments in lock-step: the row comes with the first step at or past a multiple.
+        # Eight parallel environments: the row comes with the first step at or past a multiple.
         self.assertEqual([row["step"] for row in rows],
                          [504, 1000, 1504, 2000, 2504, 3000, 3504, 4000])
         self.assertEqual([row["updates"] for row in rows],

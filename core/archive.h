@@ -18,7 +18,7 @@
 
 namespace upswing {
 
-/// What a number in a file may be: from `lowest` to `highest`, both included.
+/// The allowed range of a number in a file: from `lowest` to `highest`, both included.
 template <typename T>
 struct Bounds {
   T lowest, highest;
@@ -29,13 +29,13 @@ template <typename T>
 inline constexpr Bounds<T> kAnyNumber{std::numeric_limits<T>::lowest(),
                                       std::numeric_limits<T>::max()};
 
-/// Saves or loads state under names. A component has one `void State(const Archive&)` that serves
-/// both ways, so that what is saved and what is loaded cannot drift apart.
+/// Saves or loads state under names. A component has one `void State(const Archive&)` for both
+/// directions, so that saving and loading cannot drift apart.
 ///
-/// A file may come from anybody: every number has its bounds, which no training leaves. Loading
-/// throws BadInput at a number outside them, and saving Failure, as at one that is not finite: no
-/// such state is worth keeping. Only floating-point arrays may do without, which are finite at
-/// least.
+/// Files are not trusted: every number has bounds, which no training exceeds. Loading throws
+/// BadInput at a number that is not finite or out of bounds, and saving throws Failure, as such a
+/// state is not worth keeping. Only floating-point arrays need no bounds; they must be finite
+/// anyway.
 class Archive {
  public:
   /// An archive that adds to `file`. Arrays are viewed, not copied: save before they change.
@@ -48,7 +48,7 @@ class Archive {
   /// The same archive, with names that begin with `name/`.
   Archive In(std::string_view name) const { return {target_, source_, Concat(prefix_, name, "/")}; }
 
-  /// An array whose size is settled before it is loaded.
+  /// An array whose size is known before it is loaded.
   template <typename T>
   void Array(std::string_view name, std::span<T> values,
              std::type_identity_t<Bounds<T>> bounds) const {
@@ -62,7 +62,7 @@ class Archive {
     Array(name, values, kAnyNumber<T>);
   }
 
-  /// An array that is resized to what is loaded, of at most `max_size` numbers.
+  /// An array that loading resizes, of at most `max_size` numbers.
   template <typename T>
   void Vector(std::string_view name, std::vector<T>& values, size_t max_size) const {
     if (loading()) {
@@ -76,7 +76,7 @@ class Archive {
     Array(name, std::span(values));
   }
 
-  /// On loading, throws BadInput unless what was loaded under `name` is valid.
+  /// On loading, throws BadInput about the tensor `name` unless `valid`.
   void Check(bool valid, std::string_view name, std::string_view expected) const {
     if (loading() && !valid) {
       throw BadInput(

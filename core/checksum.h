@@ -9,8 +9,9 @@
 
 namespace upswing {
 
-/// Finds broken files, not forged ones. After FNV-1a (its offset basis and prime), but over 8-byte
-/// words, the last of each piece padded with zeros, and with the high half folded into the low one.
+/// Detects broken files, not forged ones. Like FNV-1a (its offset basis and prime), but over 8-byte
+/// words, the last of each Update padded with zeros, and with the high half folded into the low
+/// one.
 class Checksum {
  public:
   void Update(std::span<const std::byte> bytes) {

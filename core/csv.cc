@@ -9,11 +9,11 @@
 namespace upswing {
 namespace {
 
-/// Where a cell ends that begins at `line[at]`: at a comma outside quotes, or at the line's end.
+/// The end of the cell that begins at `line[at]`: a comma outside quotes, or the end of the line.
 size_t EndOfCell(std::string_view line, size_t at, const std::string& place) {
   bool quoted = false;
   for (; at < line.size() && (quoted || line[at] != ','); ++at) {
-    if (line[at] == '"') quoted = !quoted;  // two in a row leave it as it was
+    if (line[at] == '"') quoted = !quoted;  // two quotes in a row change nothing
   }
   if (quoted) throw BadInput(Concat(place, "expected a quote that is closed, got \"", line, "\""));
   return at;
@@ -43,8 +43,8 @@ std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::str
                                const std::string& where) {
   std::vector<CsvColumn> columns;
   for (const std::string& name : names) columns.push_back({name, {}});
-  std::vector<size_t> places;  // of the wanted columns in a row
-  size_t width = 0;            // cells of a row; 0: the line of names is yet to come
+  std::vector<size_t> places;  // indices of the wanted columns in a row
+  size_t width = 0;            // cells of a row; 0 before the line of names
   int line_number = 0;
   constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());

@@ -9,15 +9,15 @@ namespace upswing {
 /// A column of numbers from a CSV table.
 struct CsvColumn {
   std::string name;
-  std::vector<double> values;  // a row each
+  std::vector<double> values;  // one for each row
 };
 
-/// The columns called `names` of a CSV text: a line of names, then rows of cells. A cell may stand
-/// in double quotes, in which a comma is one of its characters, and a quote where there are two. A
-/// byte-order mark at the beginning, lines that begin with # and empty lines are skipped, and so
-/// are other columns, whatever is in them. `where` (a path) begins messages, which give the line
-/// too. Throws BadInput if a column is missing, a row has another number of cells than the names, a
-/// quote is not closed in its line, or a cell is no finite number.
+/// The columns called `names` of a CSV text: a line of names, then rows of cells. A cell may be in
+/// double quotes, within which a comma is part of the text and two quotes stand for one. A
+/// byte-order mark at the beginning, lines that begin with #, empty lines and the contents of other
+/// columns are ignored. Messages begin with `where` (a path) and the line. Throws BadInput if a
+/// column is missing, a row has another number of cells than the first line, a quote is not closed
+/// in its line, or a cell is not a finite number.
 std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::string>& names,
                                const std::string& where);
 

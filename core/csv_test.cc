@@ -7,7 +7,7 @@
 namespace upswing {
 namespace {
 
-TEST(Csv, WantedColumnsInTheOrderOfTheQuestion) {
+TEST(Csv, WantedColumnsInTheOrderOfTheirNames) {
   const auto columns = ReadCsv("# made by hand\na, b ,note,c\n\n1,2,x,3\n# half\n-4,5e1,,0.5\n",
                                {"c", "b"}, "t.csv");
   ASSERT_EQ(columns.size(), 2U);
@@ -30,7 +30,7 @@ TEST(Csv, AsSpreadsheetsAndLibrariesWriteIt) {
             (std::vector<double>{4}));
 }
 
-/// What ReadCsv says of a text whose column b is wanted.
+/// The error message of ReadCsv for a text whose column b is wanted.
 std::string Complaint(std::string_view text) {
   try {
     ReadCsv(text, {"b"}, "t.csv");

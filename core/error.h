@@ -6,7 +6,7 @@
 namespace upswing {
 
 /// The project's one exception type. The message is one line for the user: what was expected,
-/// what came, and where. `exit_code` is what the program ends with when nobody handles it.
+/// what was given, and where. `exit_code` is the program's exit status if it is not handled.
 class Error : public std::runtime_error {
  public:
   Error(int exit_code, const std::string& message)
@@ -19,7 +19,7 @@ class Error : public std::runtime_error {
   int exit_code_;
 };
 
-/// Bad usage or bad input: the user can mend it (exit code 2).
+/// Bad usage or bad input: the user can correct it (exit code 2).
 inline Error BadInput(const std::string& message) { return {2, message}; }
 
 /// The work itself failed: a full disk, a number that is not finite (exit code 1).

@@ -30,7 +30,7 @@ bool WriteAll(int fd, std::span<const std::byte> bytes) {
   return true;
 }
 
-/// Whether a system call failed because of the path it was given, not of what it should do there.
+/// Whether an error of a system call is due to the path that it was given.
 bool IsOfPath(int error_number) {
   constexpr std::array kOfPath{EACCES, EEXIST, EINVAL,  EISDIR,    ELOOP, ENAMETOOLONG,
                                ENODEV, ENOENT, ENOTDIR, ENXIO,     EPERM, ENOTEMPTY,
@@ -95,7 +95,7 @@ std::vector<std::byte> ReadFile(const fs::path& path) {
 std::string ReadTextFile(const fs::path& path) { return TextOf(ReadFile(path)); }
 
 std::string ReadOwnFile(const fs::path& path, size_t most_bytes) {
-  // Without waiting for whoever might write into a pipe.
+  // O_NONBLOCK: opening a pipe would wait for a writer.
   const Descriptor fd(open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
   struct stat info {};
   if (fd.get() >= 0 && fstat(fd.get(), &info) == 0 && S_ISREG(info.st_mode) &&

@@ -23,57 +23,57 @@ std::vector<std::byte> ReadFile(const std::filesystem::path& path);
 /// The whole file as text. Throws BadInput if it cannot be read.
 std::string ReadTextFile(const std::filesystem::path& path);
 
-/// What to throw where the system refuses to do `what` (such as "cannot write") with a path, which
-/// says so in `error_number` (errno): BadInput where another path would have done, as where there
-/// is no such folder or no permission; Failure where the work itself failed, as on a full disk.
+/// The error to throw if a system call failed with `error_number` (errno) to do `what` (such as
+/// "cannot write") with a path: BadInput if another path would have worked, as where a folder or
+/// permission is missing; Failure if the work itself failed, as on a full disk.
 Error PathError(std::string_view what, const std::filesystem::path& path, int error_number);
 
-/// A file that may come from anybody, as those of a run folder and models: only a regular file of
-/// at most `most_bytes` is read, for a pipe might never end. Throws BadInput, at once, at all else.
+/// The whole of an untrusted file, such as those of run folders and models: only a regular file of
+/// at most `most_bytes`, as a pipe might never end. Throws BadInput, without waiting, for all else.
 std::string ReadOwnFile(const std::filesystem::path& path,
                         size_t most_bytes = std::numeric_limits<size_t>::max());
 
-/// Replaces what has this path by a file of `parts`, one after the other: written to a temporary
-/// file beside it (see Making), synchronised to disk, then renamed, so that at every moment the old
-/// file or the new one is there whole. A link is replaced, not followed. Throws as PathError does;
-/// the old file then stays and the temporary one is removed.
+/// Replaces the file at this path by one of `parts`, one after the other: written to a temporary
+/// file beside it (see Making), synchronised to disk, then renamed, so that at every moment either
+/// the old file or the new one is complete. A link is replaced, not followed. Throws as PathError
+/// does; the old file then stays and the temporary one is removed.
 void WriteFileAtomically(const std::filesystem::path& path,
                          std::span<const std::span<const std::byte>> parts);
 void WriteFileAtomically(const std::filesystem::path& path, std::string_view text);
 
-/// Writes a file that the user named. As WriteFileAtomically, but for what is there already: of a
-/// link, the file that it leads to is replaced, and what is no regular file (a pipe, a device) is
-/// written in place.
+/// Writes a file that the user named. Like WriteFileAtomically, except that a link is followed and
+/// its target replaced, and that something else than a regular file (a pipe, a device) is written
+/// in place.
 void WriteNamedFile(const std::filesystem::path& path, std::string_view text);
 
-/// Throws BadInput, with `advice` in brackets, unless there is nothing at `folder`, or an empty
-/// folder; for before work whose result shall go there, so that nothing is overwritten.
+/// Throws BadInput, with `advice` in brackets, unless `folder` does not exist or is empty. To be
+/// called before work whose result will be written there, so that nothing is overwritten.
 void CheckFree(const std::filesystem::path& folder,
                std::string_view advice = "choose another --out");
 
-/// Makes a folder and those above it, where they are not there yet. Throws as PathError does.
+/// Makes a folder and its missing parents. Throws as PathError does.
 void MakeFolder(const std::filesystem::path& folder);
 
-/// Makes a folder that is new or takes one that is empty. Throws as CheckFree and MakeFolder do.
+/// Makes a folder, which may exist if it is empty. Throws as CheckFree and MakeFolder do.
 void MakeNewFolder(const std::filesystem::path& folder);
 
-/// Keeps other processes from working in a folder for as long as it lives, or its process does.
+/// Keeps other processes from working in a folder during its lifetime.
 class FolderLock {
  public:
-  /// Throws BadInput if another process holds it.
+  /// Throws BadInput if another process holds the lock, else as PathError does.
   explicit FolderLock(const std::filesystem::path& folder);
 
  private:
   Descriptor descriptor_;
 };
 
-/// A file that only grows (a log, a CSV). Its size goes into the checkpoint; on resume it is cut
-/// back to that size, so that what a killed run wrote after its checkpoint is not there twice.
+/// A file that only grows (a log, a CSV). Its size is saved in the checkpoint; on resume it is cut
+/// back to that size, so that what a killed run wrote after its checkpoint does not appear twice.
 class AppendFile {
  public:
-  /// Opens or makes the file. Throws BadInput, with nothing changed, at a link, at a file that has
-  /// other names besides (hard links), and at what is no regular file: it is not of the folder
-  /// alone. Else throws as PathError does.
+  /// Opens or makes the file. Throws BadInput, with nothing changed, if it is a link, has further
+  /// names (hard links) or is not a regular file, as it may then belong to another folder too. Else
+  /// throws as PathError does.
   explicit AppendFile(std::filesystem::path path);
 
   /// Cuts it back to `size` bytes, at most its size. Throws Failure.

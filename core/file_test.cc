@@ -91,7 +91,7 @@ TEST_F(FileTest, AnOutputFollowsTheUsersOwnLinkAndADeviceIsWrittenInPlace) {
   EXPECT_TRUE(fs::is_character_file("/dev/null"));
 }
 
-TEST_F(FileTest, AnOutputThatCannotBeIsBadInputAndAFullDiskIsNot) {
+TEST_F(FileTest, AnImpossibleOutputIsBadInputAndAFullDiskIsNot) {
   fs::create_symlink("loop", folder_ / "loop");
   fs::create_symlink("nowhere", folder_ / "lost");
   fs::create_directory(folder_ / "folder");
@@ -162,7 +162,7 @@ TEST_F(FileTest, AFolderIsLockedForOneAtATime) {
   EXPECT_NO_THROW(FolderLock{folder_});
 }
 
-TEST_F(FileTest, AppendFileIsCutBackToTheSizeThatIsKnown) {
+TEST_F(FileTest, AppendFileIsCutBackToAGivenSize) {
   const fs::path path = folder_ / "log";
   {
     AppendFile file(path);

@@ -6,18 +6,18 @@
 #include <string>
 #include <string_view>
 
-/// JSON from files that may come from anybody, read strictly: nothing is rounded, wrapped around or
-/// taken for another type. Each throws BadInput that says what was expected and what is there; who
-/// knows the file puts its name in front.
+/// JSON from untrusted files, read strictly: nothing is rounded, wrapped around or converted from
+/// another type. Each function throws BadInput that says what was expected and what was found; the
+/// caller, who knows the file, adds its name.
 namespace upswing {
 
-/// An integer as JSON has it, neither 8.9 nor true; nothing if it is anything else.
+/// The value of a JSON integer (not 8.9, not true) that fits; nothing if it is anything else.
 std::optional<int64_t> JsonInteger(const nlohmann::json& value);
 
-/// Parses an object of at most `max_depth` objects and lists inside one another.
+/// Parses an object in which objects and lists are nested at most `max_depth` deep.
 nlohmann::json ParseJsonObject(std::string_view text, int max_depth = 3);
 
-/// Members of an object, which must be there.
+/// Members of an object that must exist; integers are in [low, high].
 const nlohmann::json& JsonMember(const nlohmann::json& object, const std::string& name);
 int64_t JsonInteger(const nlohmann::json& object, const std::string& name, int64_t low,
                     int64_t high);

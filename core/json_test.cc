@@ -30,7 +30,7 @@ std::string ErrorOf(const Read& read) {
   return "";
 }
 
-TEST(Json, MembersSayWhatWasExpectedAndWhatCame) {
+TEST(Json, MessagesSayWhatWasExpectedAndWhatWasFound) {
   const json object = ParseJsonObject(R"({"n": 4294967304, "x": 0.5, "t": "text", "l": [1, 2]})");
   EXPECT_EQ(JsonInteger(object, "n", 0, 1LL << 40), 4294967304);
   EXPECT_EQ(JsonNumber(object, "x"), 0.5);
@@ -47,7 +47,7 @@ TEST(Json, MembersSayWhatWasExpectedAndWhatCame) {
             "\"l\": expected a list of at most 1, got [1,2]");
 }
 
-TEST(Json, OnlyObjectsOfSomeDepthAreTaken) {
+TEST(Json, OnlyObjectsOfLimitedDepthAreAccepted) {
   for (const char* bad : {"", "[]", "3", "nonsense", "{", "{}x", "\xff"}) {
     EXPECT_EQ(ErrorOf([&] { ParseJsonObject(bad); }), "expected a JSON object") << bad;
   }

@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kMark = ".making-";
 constexpr size_t kDigits = 16;
-constexpr int kMostTries = 100;  // of which one will do, unless somebody is against it
+constexpr int kMostTries = 100;  // one suffices unless another process interferes
 
 std::string RandomDigits() {
   uint64_t number = 0;
@@ -36,10 +36,10 @@ std::string RandomDigits() {
   return digits;
 }
 
-/// Whether nobody holds the lock of what this descriptor stands for; then we do.
+/// Tries to lock an open file or folder; false if another process holds the lock.
 bool Lock(const Descriptor& fd) { return flock(fd.get(), LOCK_EX | LOCK_NB) == 0; }
 
-/// Whether what was opened still has a name.
+/// Whether an open file or folder still has a name.
 bool HasName(const Descriptor& fd) {
   struct stat info {};
   return fstat(fd.get(), &info) == 0 && info.st_nlink > 0;
@@ -79,7 +79,7 @@ Making::Making(const fs::path& path, Kind kind)
 
 bool Making::TryOpen(Kind kind) {
   descriptor_ = Descriptor(-1);
-  constexpr size_t kLongest = 200;  // bytes of a name, so that there is room for the rest
+  constexpr size_t kLongest = 200;  // bytes of NAME, so that the rest fits into 255
   name_ = Concat('.', target_.filename().string().substr(0, kLongest), kMark, RandomDigits());
   path_ = target_.parent_path() / name_;
   constexpr int kCommon = O_NOFOLLOW | O_CLOEXEC;
@@ -89,14 +89,14 @@ bool Making::TryOpen(Kind kind) {
   } else if (mkdirat(folder_.get(), name_.c_str(), 0777) == 0) {
     descriptor_ =
         Descriptor(openat(folder_.get(), name_.c_str(), O_RDONLY | O_DIRECTORY | kCommon));
-    // Removed by another process before it was locked.
+    // Another process removed it before it was locked.
     if (descriptor_.get() < 0 && errno == ENOENT) return false;
   }
   if (descriptor_.get() < 0) {
     if (errno == EEXIST) return false;
     throw PathError("cannot write", target_, errno);
   }
-  // Where the file system has no locks nothing is removed either.
+  // On a file system without locks, nothing is removed either.
   const bool is_ours = Lock(descriptor_) || errno != EWOULDBLOCK;
   return is_ours && HasName(descriptor_);
 }
@@ -113,14 +113,14 @@ void Making::Publish() {
     throw PathError("cannot write", target_, errno);
   }
   published_ = true;
-  // Makes it last. Some file systems cannot; the change is atomic all the same.
+  // Synchronises the new name to disk. Some file systems cannot; the change is atomic anyway.
   const Descriptor folder(openat(folder_.get(), ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (folder.get() >= 0) fsync(folder.get());
 }
 
 void Making::RemoveAbandoned() const {
   const int fd = openat(folder_.get(), ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd < 0) return;  // one may write there and not look
+  if (fd < 0) return;  // a folder that is writable but not readable
   const std::unique_ptr<DIR, int (*)(DIR*)> entries(fdopendir(fd), &closedir);
   if (!entries) {
     close(fd);

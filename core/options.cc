@@ -54,7 +54,7 @@ std::string RangeInBrackets(Range range, double step) {
 
 bool Inside(double value, Range range) { return value >= range.low && value <= range.high; }
 
-/// Whether a number is a multiple of `step`, but for rounding; each one is if that is 0.
+/// Whether a number is a multiple of `step`, up to rounding; true if that is 0.
 bool IsMultiple(double value, double step) {
   constexpr double kRounding = 1e-9;
   return step == 0 || std::abs(value - step * std::round(value / step)) <= kRounding;
@@ -262,7 +262,7 @@ std::vector<const Option*> Options::Find(std::string_view name, const std::strin
   }
   if (found.empty()) {
     std::string hint = DidYouMean(name, known);
-    constexpr size_t kMostNames = 24;  // that make a line which can still be read
+    constexpr size_t kMostNames = 24;  // more would make the line unreadable
     if (hint.empty() && known.size() < kMostNames) hint = Concat("; there are ", Join(known, ", "));
     throw BadInput(Concat(where, ": no setting is called \"", name, "\"", hint));
   }

@@ -22,7 +22,7 @@ inline constexpr Range kUnit{0, 1};  // a share or probability
 /// The flag of a setting or an alias, such as `--eval-every` for `eval_every`.
 std::string FlagOf(std::string name);
 
-/// One setting: all that flags, configuration files, help and validation need to know.
+/// One setting, with all that flags, configuration files, help and validation need.
 struct Option {
   using Target = std::variant<bool*, int64_t*, double*, std::string*, std::vector<int64_t>*>;
 
@@ -32,11 +32,12 @@ struct Option {
   Range range;          // numbers only
   std::string unit;     // such as "s"; may be empty
   std::string help;
-  bool identity;                          // two runs that differ in it are different runs
-  std::vector<std::string> choices = {};  // texts only: what it may be; empty for anything
-  double step = 0;                        // numbers only: of which it is a multiple; 0: of nothing
-  std::string usual = {};                 // says the default where the value does not; may be empty
+  bool identity;                          // whether runs that differ in it are different runs
+  std::vector<std::string> choices = {};  // texts only: allowed values; empty: any
+  double step = 0;                        // numbers only: must be a multiple of it; 0: any number
+  std::string usual = {};  // describes the default instead of the value; may be empty
 
+  /// Such as `--eval-every`.
   std::string flag() const;
   /// The value as TOML writes it.
   std::string text() const;
@@ -44,15 +45,14 @@ struct Option {
   std::string plain_text() const;
   /// Flag and value as a shell's command line has them, such as `--hidden 64,64` or `--no-double`.
   std::string on_command_line() const;
-  /// What it is: help, unit, choices, range, such as `length of a training episode, s (0.02 to
-  /// 10)`.
+  /// Help, unit, choices and range, such as `length of a training episode, s (0.02 to 10)`.
   std::string about() const;
-  /// The same with the value as its default behind it: `…, s (0.02 to 10) [4]`.
+  /// The same, then the value as its default: `…, s (0.02 to 10) [4]`.
   std::string about_with_default() const;
   /// Such as `a number in [0, 1]` or `a multiple of 0.02 in [0, 1]`.
   std::string expected() const;
-  /// Parses and checks `text`; `where` (such as `--gamma` or `FILE:3: gamma`) begins the message
-  /// of the BadInput that it throws.
+  /// Parses and checks `text`. Throws BadInput that begins with `where` (such as `--gamma` or
+  /// `FILE:3: gamma`).
   void Set(std::string_view text, const std::string& where) const;
 };
 
@@ -77,8 +77,8 @@ class Options {
   Option& Add(std::vector<int64_t>* target, std::string_view name, std::vector<int64_t> value,
               Range range, std::string_view help);
 
-  /// One name that sets several others, such as `mass` for `mass1` and `mass2`. Without `help` it
-  /// says that it sets both.
+  /// One name that sets several settings, such as `mass` for `mass1` and `mass2`. Without `help`
+  /// the text is "both … and …".
   void Alias(std::string_view name, std::vector<std::string> members, std::string_view help = "");
 
   const std::vector<Option>& all() const { return options_; }
@@ -97,7 +97,7 @@ class Options {
   /// Sets what the name or alias stands for; see Option::Set.
   void Set(std::string_view name, std::string_view text, const std::string& where) const;
 
-  /// All settings as a TOML document, with what each is as a comment where `comments` is true.
+  /// The `wanted` settings as a TOML document; with `comments`, each with its description.
   std::string Toml(bool comments, const std::function<bool(const Option&)>& wanted) const;
 
  private:
@@ -109,14 +109,14 @@ class Options {
   std::vector<AliasEntry> aliases_;
 };
 
-/// Gives a configuration struct its defaults, which stand in its Describe.
+/// Gives a configuration struct the defaults of its Describe.
 template <typename Config>
 void SetDefaults(Config& config) {
   Options options;
   config.Describe(options);
 }
 
-/// The settings of a struct that has values already, which stay. They point into it.
+/// The settings of a struct, which keeps its values. They point into it.
 template <typename Config>
 Options OptionsOf(Config& config) {
   Options options;

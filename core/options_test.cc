@@ -78,7 +78,7 @@ TEST_F(OptionsTest, AnAliasSetsAllItsMembers) {
   EXPECT_EQ(sample_.mass2, 4);
 }
 
-TEST_F(OptionsTest, SaysWhatWasExpectedWhatCameAndWhere) {
+TEST_F(OptionsTest, SaysWhatWasExpectedWhatWasGivenAndWhere) {
   EXPECT_EQ(ErrorOf("count", "11"), "here: expected an integer in [1, 10], got \"11\"");
   EXPECT_EQ(ErrorOf("count", "2.5"), "here: expected an integer in [1, 10], got \"2.5\"");
   EXPECT_EQ(ErrorOf("the_rate", "nan"), "here: expected a number in [0, 1], got \"nan\"");
@@ -117,7 +117,7 @@ TEST(Step, LetsThroughMultiplesAndNamesTheNearestOnes) {
   Options options;
   options.Add(&pause, "pause", 0, {0, 1}, "s", "between two steps").step = 0.02;
   for (int count = 0; count <= 50; ++count) {
-    // As people write it, and as arithmetic makes it.
+    // As people write it, and as arithmetic rounds it.
     for (const double value :
          {count / 50.0, count * 0.02, std::max(0.0, 1 - (50 - count) * 0.02)}) {
       options.Set("pause", FormatNumber(value), "--pause");

@@ -65,7 +65,7 @@ double Rng::Normal() {
 void Rng::State(const Archive& archive) {
   archive.Array("state", std::span<uint64_t>(state_), kAnyNumber<uint64_t>);
   const bool lives = std::ranges::any_of(state_, [](uint64_t word) { return word != 0; });
-  archive.Check(lives, "state", "a number above 0, for zeros would be followed by zeros");
+  archive.Check(lives, "state", "a number above 0, as a state of zeros generates only zeros");
 }
 
 }  // namespace upswing

@@ -4,10 +4,10 @@
 #include <span>
 #include <vector>
 
-/// What describes a sample of numbers.
+/// Descriptive statistics of a sample of numbers.
 namespace upswing {
 
-/// Median and the middle half of a sample.
+/// Quartiles of a sample.
 struct Quartiles {
   double low = 0, median = 0, high = 0;
 };
@@ -24,13 +24,14 @@ struct Interval {
   double low = 0, high = 1;
 };
 
-/// 95% interval of a proportion (Wilson, 1927) after `successes` of `trials`.
+/// 95% interval of a proportion (Wilson, 1927) after `successes` of `trials`; [0, 1] after none.
 Interval WilsonInterval(int64_t successes, int64_t trials);
 
 /// Mean and sample standard deviation.
 struct Moments {
   double mean = 0, deviation = 0;
 };
+/// Moments of a sample; zeros if it is empty.
 Moments MomentsOf(std::span<const double> values);
 
 }  // namespace upswing

@@ -21,8 +21,8 @@ const Path kPaths[] = {
     {HWY_AVX3, "avx512"}, {HWY_AVX2, "avx2"}, {HWY_NEON, "neon"}, {HWY_WASM, "wasm128"}};
 static_assert((HWY_DISABLED_TARGETS & (HWY_AVX3 | HWY_AVX2 | HWY_NEON | HWY_WASM)) == 0);
 
-/// What this processor has and the program was compiled for, best first. The last is the
-/// compiler's own baseline, which every processor of the architecture has.
+/// The compiled paths that this processor supports, best first. The last is the compiler's own
+/// baseline, which every processor of the architecture supports.
 const std::vector<Path>& Paths() {
   static const std::vector<Path> kUsable = [] {
     std::vector<Path> found;

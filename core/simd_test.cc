@@ -7,17 +7,17 @@
 
 #include "core/error.h"
 
-// What follows is compiled once for each target, by including this file again.
+// The rest is compiled once for each target, by including this file again.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "core/simd_test.cc"
 #include <hwy/foreach_target.h>
-// After it.
+// After foreach_target.h, which includes this file once for every target:
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
 namespace upswing::HWY_NAMESPACE {
 
-/// A kernel that tells which target it was compiled for.
+/// A kernel that returns the target for which it was compiled.
 int64_t Target() { return HWY_TARGET; }
 
 }  // namespace upswing::HWY_NAMESPACE
@@ -32,7 +32,7 @@ HWY_EXPORT(Target);
 /// Highway's name of the target whose kernels are dispatched now.
 std::string Dispatched() { return hwy::TargetName(HWY_DYNAMIC_DISPATCH(Target)()); }
 
-TEST(Simd, TakesTheBestPathUnlessTold) {
+TEST(Simd, TakesTheBestPathByDefault) {
   const std::vector<std::string> paths = SimdPaths();
   ASSERT_FALSE(paths.empty());
   EXPECT_EQ(SimdPath(), paths.front());

@@ -47,7 +47,7 @@ size_t FindChecksum(std::string_view header) {
   return key == std::string_view::npos ? key : key + kChecksumKey.size();
 }
 
-/// What `shape` needs in bytes; nothing on a negative size or overflow.
+/// Bytes of a tensor of this shape; nothing on a negative size or overflow.
 std::optional<size_t> ByteCount(const std::vector<int64_t>& shape, Dtype dtype) {
   size_t count = SizeOf(dtype);
   for (const int64_t extent : shape) {
@@ -64,7 +64,7 @@ struct Entry {
   size_t begin, size;
 };
 
-/// The whole numbers of a list in an entry. Throws BadInput.
+/// The integers of a list in an entry. Throws BadInput.
 std::vector<int64_t> Integers(const json& entry, const std::string& name, size_t max_size) {
   std::vector<int64_t> integers;
   for (const json& item : JsonList(entry, name, max_size)) {
@@ -96,7 +96,7 @@ Entry ParseEntry(const json& entry, size_t data_size) {
   return {std::move(tensor), begin, end - begin};
 }
 
-/// Length of the header, which the file's first bytes tell, checked against the size of the file.
+/// Length of the header, from the file's first bytes, checked against the size of the file.
 /// Throws BadInput.
 uint64_t ParseLength(std::span<const std::byte> first_bytes, uint64_t file_size) {
   uint64_t length = 0;
@@ -111,7 +111,7 @@ uint64_t ParseLength(std::span<const std::byte> first_bytes, uint64_t file_size)
   return length;
 }
 
-/// What a header says.
+/// The contents of a header.
 struct Header {
   std::map<std::string, std::string> metadata;
   std::map<std::string, Entry> entries;  // of the tensors
@@ -158,8 +158,8 @@ Header ParseHeader(std::string_view text, size_t data_size) {
   return header;
 }
 
-/// Throws at what is no regular file; a pipe, say, would never end. (What is not there is told by
-/// who reads it.)
+/// Throws BadInput for anything but a regular file: a pipe might never end. (That a file is missing
+/// is reported by the reader.)
 void CheckRegular(const std::filesystem::path& path) {
   std::error_code error;
   if (!std::filesystem::exists(path, error) || std::filesystem::is_regular_file(path, error))
@@ -171,7 +171,8 @@ Error Broken(const std::string& path, std::string_view why) {
   return BadInput(Concat(path, ": not a whole safetensors file: ", why));
 }
 
-/// A header as it is written, filled up to whole words. Throws Failure if nobody could read it.
+/// The text of a header, padded to whole words. Throws Failure if it would be too long to load or
+/// is not UTF-8.
 std::string HeaderText(const json& header, const std::filesystem::path& path) {
   try {
     std::string text = header.dump();
@@ -185,9 +186,9 @@ std::string HeaderText(const json& header, const std::filesystem::path& path) {
   }
 }
 
-/// Throws BadInput unless `header`, the text of a file's header, holds the checksum of what it says
-/// and of `tensors`. With zeros where it stands itself, as it was computed.
-void CheckSum(std::string header, const std::map<std::string, Tensor>& tensors) {
+/// Throws BadInput unless `header`, the text of a file's header, holds the checksum of itself (with
+/// zeros in place of the checksum) and of `tensors`.
+void VerifyChecksum(std::string header, const std::map<std::string, Tensor>& tensors) {
   const size_t at = FindChecksum(header);
   if (at == std::string::npos) throw BadInput("its checksum is not where Upswing writes it");
   const std::string expected = header.substr(at, kNoChecksum.size());
@@ -272,7 +273,7 @@ void TensorFile::Save(const std::filesystem::path& path) const {
   }
   std::string text = HeaderText(header, path);
 
-  // The checksum covers everything behind the length, with zeros where it will stand itself.
+  // The checksum covers everything after the length, with zeros in its own place.
   Checksum checksum;
   checksum.Update(BytesOf(text));
   for (const auto& [name, tensor] : order) checksum.Update(tensor->bytes);
@@ -305,9 +306,9 @@ TensorFile TensorFile::Parse(std::vector<std::byte> content, std::string where) 
       file.tensors_[name] = std::move(entry.tensor);
     }
     file.has_checksum_ = file.metadata.contains("checksum");
-    if (file.has_checksum_) CheckSum(text, file.tensors_);
+    if (file.has_checksum_) VerifyChecksum(text, file.tensors_);
     if (!file.has_checksum_ && file.metadata.contains("upswing_version")) {
-      throw BadInput("it says an upswing_version, but has no checksum, which Upswing writes");
+      throw BadInput("it has an upswing_version, but no checksum, which Upswing always writes");
     }
   } catch (const Error& error) {
     throw Broken(file.path_, error.what());

@@ -32,7 +32,7 @@ inline constexpr Dtype kDtypeOf<int64_t> = Dtype::kI64;
 template <>
 inline constexpr Dtype kDtypeOf<uint64_t> = Dtype::kU64;
 
-/// A named array in a file. The bytes belong to somebody else.
+/// A named array in a file; a view of its bytes.
 struct Tensor {
   Dtype dtype;
   std::vector<int64_t> shape;  // row-major; empty for a scalar
@@ -43,10 +43,10 @@ struct Tensor {
 };
 
 /// A safetensors file: named tensors and text metadata
-/// (https://huggingface.co/docs/safetensors, "Format"). Besides what the format asks, the metadata
-/// hold a checksum of the whole file, which Load verifies. A file that says `upswing_version` must
-/// have one; those of other writers need not. A file may come from anybody: what is kept of it is
-/// never more than it is long, and its header has at most 1 MiB.
+/// (https://huggingface.co/docs/safetensors, "Format"). In addition, the metadata hold a checksum
+/// of the whole file, which Load verifies. A file with an `upswing_version` must have one; those of
+/// other writers need not. Files are not trusted: loading takes no more memory than their size, and
+/// a header has at most 1 MiB.
 class TensorFile {
  public:
   TensorFile() = default;
@@ -57,15 +57,14 @@ class TensorFile {
 
   std::map<std::string, std::string> metadata;
 
-  /// Adds a view of `values`, which must stay where they are until Save. Without a shape: one
-  /// dimension.
+  /// Adds a view of `values`, which must stay valid until Save. Without a shape: one dimension.
   template <typename T>
   void Add(const std::string& name, std::span<const T> values, std::vector<int64_t> shape = {}) {
     if (shape.empty()) shape = {static_cast<int64_t>(values.size())};
     tensors_[name] = {kDtypeOf<T>, std::move(shape), std::as_bytes(values)};
   }
 
-  /// Adds a scalar, kept here.
+  /// Adds a copy of a scalar.
   template <typename T>
   void AddScalar(const std::string& name, T value) {
     const auto bytes = std::as_bytes(std::span(&value, 1));
@@ -75,29 +74,29 @@ class TensorFile {
 
   const std::map<std::string, Tensor>& tensors() const { return tensors_; }
 
-  /// Copies a tensor of just this type and number of elements into `values`; of just this shape
-  /// too, where one is given. Throws BadInput that names file, tensor, what was expected and what
-  /// is there.
+  /// Copies a tensor into `values`. Throws BadInput, which names file, tensor, what was expected
+  /// and what was found, unless it has this type and number of elements, and the shape if one is
+  /// given.
   template <typename T>
   void Read(const std::string& name, std::span<T> values,
             const std::vector<int64_t>& shape = {}) const {
     ReadBytes(name, kDtypeOf<T>, shape, std::as_writable_bytes(values));
   }
 
-  /// Throws as Read does unless the tensor has this type and shape: for before there is room made
-  /// for its numbers, so that sizes that a header only claims ask for no memory.
+  /// Throws as Read does unless the tensor has this type and shape. To be called before memory for
+  /// it is allocated, so that a false size in a header takes none.
   void Expect(const std::string& name, Dtype dtype, const std::vector<int64_t>& shape) const;
 
-  /// Number of elements of a tensor of type T; throws like Read.
+  /// Number of elements of a tensor of type T; throws as Read does.
   template <typename T>
   size_t Count(const std::string& name) const {
     return Find(name, kDtypeOf<T>).bytes.size() / sizeof(T);
   }
 
-  /// Metadata that must be there; throws BadInput.
+  /// The metadata under a key; throws BadInput if there are none.
   const std::string& Metadata(const std::string& key) const;
 
-  /// Whether a checksum says that the file is as it was written.
+  /// Whether the loaded file had a checksum, which was then right.
   bool has_checksum() const { return has_checksum_; }
 
   /// Writes atomically, with a checksum. Throws Failure.
@@ -106,12 +105,12 @@ class TensorFile {
   /// Reads and checks everything: sizes, shapes, offsets, checksum. Throws BadInput.
   static TensorFile Load(const std::filesystem::path& path);
 
-  /// The same of a file's bytes; `where` stands for its path.
+  /// Load, from a file's bytes; `where` is used as its path in messages.
   static TensorFile Parse(std::vector<std::byte> content, std::string where);
 
-  /// Reads the metadata and the tensors whose names begin with `prefix`, and nothing else: of a
-  /// large file a small part, to look at. The checksum covers the whole and is not verified: who
-  /// goes on with the file loads all of it. Throws BadInput.
+  /// Reads only the metadata and the tensors whose names begin with `prefix`, a small part of a
+  /// large file, for display. The checksum, which covers the whole file, is not verified; use Load
+  /// to work with the file. Throws BadInput.
   static TensorFile LoadPart(const std::filesystem::path& path, std::string_view prefix);
 
   /// Where it was loaded from, for messages.
@@ -125,7 +124,7 @@ class TensorFile {
   std::string path_;
   bool has_checksum_ = false;
   std::map<std::string, Tensor> tensors_;
-  std::deque<std::vector<std::byte>> kept_;  // what tensors_ views, where nobody else keeps it
+  std::deque<std::vector<std::byte>> kept_;  // bytes that tensors_ views and no caller owns
 };
 
 }  // namespace upswing

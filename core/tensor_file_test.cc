@@ -119,7 +119,7 @@ TEST_F(TensorFileTest, EveryFlippedBitIsFound) {
   }
 }
 
-TEST_F(TensorFileTest, APartHoldsWhatBeginsSoAndItsBytesAreThoseOfTheWhole) {
+TEST_F(TensorFileTest, APartHasTheTensorsOfThePrefixWithTheirBytes) {
   SaveSample();
   const TensorFile part = TensorFile::LoadPart(path_, "s");
   EXPECT_EQ(part.metadata, TensorFile::Load(path_).metadata);
@@ -159,7 +159,7 @@ TEST_F(TensorFileTest, APartOfABrokenFileIsRefusedAsTheWholeIs) {
   EXPECT_EQ(part_error(path_),
             HeaderError(R"({"a":{"dtype":"F32","shape":[2],"data_offsets":[0,4]}})", 4));
   EXPECT_NE(part_error(folder_ / "none"), "");
-  // Reading a pipe would wait for somebody who writes.
+  // Opening a pipe would wait for a writer.
   const fs::path pipe = folder_ / "pipe";
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
   for (const fs::path& path : {pipe, folder_.path()}) {
@@ -188,7 +188,7 @@ TEST_F(TensorFileTest, HostileHeadersAreRefused) {
   EXPECT_EQ(HeaderError(R"({"a":{"dtype":"F32","shape":[1],"data_offsets":[0,4]}})", 4), "");
 }
 
-TEST_F(TensorFileTest, WhatAHeaderClaimsIsNeitherRoundedNorWrapped) {
+TEST_F(TensorFileTest, NumbersInAHeaderAreNeitherRoundedNorWrapped) {
   const auto error = [&](const std::string& shape, const std::string& offsets) {
     return HeaderError(
         R"({"a":{"dtype":"F32","shape":)" + shape + R"(,"data_offsets":)" + offsets + "}}", 4);
@@ -209,7 +209,7 @@ TEST_F(TensorFileTest, WhatAHeaderClaimsIsNeitherRoundedNorWrapped) {
   EXPECT_NE(HeaderError(R"({"__metadata__":["a"]})", 0), "");
 }
 
-TEST_F(TensorFileTest, HeadersAreOfSomeSizeAndDepth) {
+TEST_F(TensorFileTest, SizeAndDepthOfHeadersAreLimited) {
   const std::string deep(500000, '[');
   EXPECT_NE(HeaderError("{\"a\":" + deep, 0).find("levels deep"), std::string::npos);
   EXPECT_NE(HeaderError(std::string((1 << 20) + 1, ' '), 0).find("at most 1048576"),
@@ -235,7 +235,7 @@ TEST_F(TensorFileTest, APartIsNeverMoreThanTheFile) {
   EXPECT_THROW(TensorFile::LoadPart(path_, "other"), Error);
 }
 
-TEST_F(TensorFileTest, AFileThatSaysAnUpswingVersionNeedsItsChecksum) {
+TEST_F(TensorFileTest, AFileWithAnUpswingVersionNeedsItsChecksum) {
   TensorFile file;
   file.metadata["upswing_version"] = "0.3.0";
   file.Save(path_);

@@ -6,10 +6,10 @@
 
 #include "core/archive.h"
 
-/// What tests share.
+/// Helpers of tests.
 namespace upswing {
 
-/// A new folder for a test, with all that is in it gone at the end. Tests may run side by side.
+/// A new folder for a test, removed with its contents at the end. Tests may run in parallel.
 class TempFolder {
  public:
   TempFolder() {

@@ -33,13 +33,13 @@ std::optional<T> ParseWhole(std::string_view text) {
   return value;
 }
 
-/// from_chars takes no leading plus, which people do write.
+/// from_chars accepts no leading plus.
 std::string_view WithoutPlus(std::string_view text) {
   if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
   return text;
 }
 
-/// A character of a UTF-8 text, and of how many bytes it is made.
+/// A character of UTF-8 text, and its number of bytes.
 struct CodePoint {
   char32_t value;
   size_t size;
@@ -66,7 +66,7 @@ std::optional<CodePoint> FirstCodePoint(std::string_view text) {
   return CodePoint{value, size};
 }
 
-/// Whether a terminal would do something else with the character than show it where it stands.
+/// Whether a terminal would do anything else than show the character in its place.
 bool IsControl(char32_t c) {
   const auto in = [c](char32_t first, char32_t last) { return c >= first && c <= last; };
   return in(0, 0x1f) || in(0x7f, 0x9f) || c == 0x61c || in(0x200b, 0x200f) || in(0x2028, 0x202e) ||
@@ -87,7 +87,7 @@ std::string Escape(char kind, char32_t value, int digits) {
 
 std::string FormatNumber(double value) {
   std::array<char, 32> buffer;
-  // Integers in full, as tables want them: 100000 rather than 1e+05.
+  // Integers are written in full: 100000 rather than 1e+05.
   const bool integer = std::abs(value) < 1e16 && value == std::trunc(value);
   char* const end = buffer.data() + buffer.size();
   const auto result = integer ? std::to_chars(buffer.data(), end, value, std::chars_format::fixed)

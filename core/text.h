@@ -36,13 +36,13 @@ std::vector<std::string_view> Split(std::string_view text, char separator);
 /// `parts` with `separator` between them.
 std::string Join(const std::vector<std::string>& parts, std::string_view separator);
 
-/// `text`, which may come from a stranger's file, on one line of a terminal: control characters,
-/// bytes that are not UTF-8, and the characters that reorder text or break lines stand as escapes
-/// such as `\n`, `\x1b` or `\u202e`. Everything else, a backslash too, stays as it is.
+/// `text`, which may come from an untrusted file, for one line of a terminal: control characters,
+/// bytes that are not UTF-8, and the characters that reorder text or break lines are replaced by
+/// escapes such as `\n`, `\x1b` or `\u202e`. Everything else, including backslashes, is kept.
 std::string Printable(std::string_view text);
 
-/// `text` as one word of a POSIX shell's command line: as it is where that is safe, else in single
-/// quotes. What is not on one line of a terminal is for Printable to show, not for a shell to run.
+/// `text` as one word of a POSIX shell's command line: unchanged if that is safe, else in single
+/// quotes. Control characters are kept, so a command with them is not fit to be printed.
 std::string ShellQuoted(std::string_view text);
 
 /// " (did you mean NAME?)" for the name nearest to `word` in edit distance, "" if none is near.

@@ -30,7 +30,7 @@ TEST(Text, NumbersAreReadWholeOrNotAtAll) {
   EXPECT_FALSE(ParseInteger("99999999999999999999"));
 }
 
-TEST(Text, IntegersAreWhateverNumberIsOneExactly) {
+TEST(Text, IntegersMayBeWrittenAsAnyNumberThatIsExactlyOne) {
   EXPECT_EQ(ParseInteger("+7"), 7);
   EXPECT_EQ(ParseInteger("1e6"), 1000000);
   EXPECT_EQ(ParseInteger("-2.5e3"), -2500);
@@ -57,7 +57,7 @@ TEST(Text, SuggestsTheNearestNameOnlyIfItIsNear) {
   EXPECT_EQ(DidYouMean("gamma", {}), "");
 }
 
-TEST(Text, PrintableLeavesTextAndEscapesWhatATerminalWouldObey) {
+TEST(Text, PrintableKeepsTextAndEscapesControlCharacters) {
   EXPECT_EQ(Printable("N·m θ₁ 漢 😀 C:\\x"), "N·m θ₁ 漢 😀 C:\\x");
   EXPECT_EQ(Printable("a\nb\rc\td"), "a\\nb\\rc\\td");
   EXPECT_EQ(Printable("\x1b[2J\x07\x7f"), "\\x1b[2J\\x07\\x7f");

@@ -45,7 +45,7 @@ constexpr int kTaskBits = 32;
 
 int UsableProcessors() {
   cpu_set_t usable;
-  // It fails where the system knows of more processors than a cpu_set_t has room for.
+  // It fails on systems with more processors than a cpu_set_t can hold.
   const bool known = sched_getaffinity(0, sizeof(usable), &usable) == 0;
   const int present =
       known ? CPU_COUNT(&usable) : static_cast<int>(std::thread::hardware_concurrency());

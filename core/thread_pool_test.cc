@@ -9,7 +9,7 @@
 namespace upswing {
 namespace {
 
-/// While it lives this thread, and any that it starts, may use one processor alone.
+/// Limits this thread, and any that it starts, to one processor during its lifetime.
 class OnOneProcessor {
  public:
   OnOneProcessor() {
@@ -45,7 +45,7 @@ TEST(ResolveThreads, ChoosesAsManyAsItMayUseUpToEight) {
   EXPECT_EQ(ResolveThreads(2), 2);
 }
 
-TEST(ThreadPool, RunsEveryTaskOnceWhateverTheNumberOfThreads) {
+TEST(ThreadPool, RunsEveryTaskOnceForAnyNumberOfThreads) {
   for (const int threads : {1, 2, 3, 8}) {
     ThreadPool pool(threads);
     EXPECT_EQ(pool.threads(), threads);
@@ -66,7 +66,7 @@ TEST(ThreadPool, ManyShortRoundsWithMoreThreadsThanProcessors) {
     const int n = 2 + round % 5;
     std::vector<int> done(static_cast<size_t>(n), -1);  // gone at the end of the round
     pool.ParallelFor(n, [&](int i) {
-      std::this_thread::yield();  // or the caller would be done before anybody else came
+      std::this_thread::yield();  // or the caller might run all tasks before others wake
       done[static_cast<size_t>(i)] = round;
       by_others += std::this_thread::get_id() != caller ? 1 : 0;
     });
@@ -89,7 +89,7 @@ TEST(ThreadPool, SumsInAFixedOrderHaveTheSameBits) {
   EXPECT_EQ(sum(1), sum(4));
 }
 
-TEST(ThreadPool, AnExceptionReachesTheCallerAndThePoolGoesOn) {
+TEST(ThreadPool, AnExceptionReachesTheCallerAndThePoolStaysUsable) {
   ThreadPool pool(2);
   for (const int bad : {0, 1}) {
     EXPECT_THROW(pool.ParallelFor(4,

@@ -50,13 +50,13 @@ class VectorEnv {
   /// empty if there is none.
   virtual std::vector<float> mirror_signs() const { return {}; }
 
-  /// How many bodies there are whose lean can be told; 0: the task has no such thing.
+  /// Number of bodies whose lean is defined; 0 if the task has none.
   virtual int bodies() const { return 0; }
   /// How far each body of an environment leans from its pose at the goal now (bodies), rad, in
   /// [-π, π].
   virtual void Lean(int /*env*/, std::span<double> /*lean*/) const {}
 
-  /// What to act on next (N × D); for an environment that has just finished, its new start.
+  /// Present observations (N × D); of an environment that has just finished, that of its new start.
   virtual Matrix<const float> obs() const = 0;
 
   /// Holds `torque` (N), N·m, for one control period. Environments that finish reset themselves.

@@ -11,7 +11,7 @@
 namespace upswing {
 namespace {
 
-constexpr int64_t kMostSteps = 1'000'000'000'000'000;  // no training makes as many
+constexpr int64_t kMostSteps = 1'000'000'000'000'000;  // more than any training makes
 
 }  // namespace
 

@@ -193,7 +193,7 @@ void MultiplyTiles(const PairProduct& p) {
   TileConfig config;
   std::fill_n(config.row_bytes, 8, static_cast<uint16_t>(kTile * sizeof(uint32_t)));
   std::fill_n(config.rows, 8, static_cast<uint8_t>(kTile));
-  // g++ 12's intrinsic tells the compiler of the first 8 bytes only.
+  // g++ 12's intrinsic declares only the first 8 bytes as read.
   asm volatile("ldtilecfg %0" ::"m"(config));
   MultiplyByTiles<AmxTiles>(p);
   asm volatile("tilerelease");
@@ -216,7 +216,7 @@ void Finish(const PairProduct& p) {
   }
 }
 
-/// Room for an operand in pairs, which lives until the next call on this thread.
+/// A buffer for an operand in pairs, valid until the next call on this thread.
 template <int kOperand>
 Matrix<uint32_t> Scratch(int rows, int cols) {
   thread_local AlignedVector<uint32_t> values;

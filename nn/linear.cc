@@ -48,7 +48,7 @@ using Vec = hn::Vec<Tag<T>>;
 // Matrix products. A tile of C, kRows × kVectors registers, stays in registers over the whole of K;
 // weights of these sizes stay in the L2 cache, and packing them would gain nothing.
 
-/// Tile shapes: as many registers for C as leave room for a row of B and a number of A. Tiles of
+/// Tile shapes: registers for C, besides those for a row of B and a number of A. Tiles of
 /// fewer rows, for what remains of M and for single rows, are wider, because a multiply-add takes
 /// several cycles and as many must be in flight.
 #if HWY_TARGET == HWY_AVX3 || HWY_ARCH_ARM_A64  // of 32 registers

@@ -1,4 +1,4 @@
-// The three products of a linear layer by four hands: our kernels on each kind of vector
+// The three products of a linear layer in four implementations: our kernels on each kind of vector
 // instructions, Eigen, libxsmm (where it is installed) and a register tile in plain C++ that the
 // compiler vectorises. This file is compiled for the processor of the building machine.
 //
@@ -71,7 +71,7 @@ struct Problem {
   Task task;
 };
 
-/// Somebody's way to do a task; what needs preparation is prepared when it is made.
+/// One library's implementation of a task; the constructor makes its preparations.
 using Doer = std::function<void()>;
 
 // ---- Our kernels.
@@ -191,7 +191,7 @@ double Error(const Task& t) {
   return largest / (4 * std::numeric_limits<float>::epsilon() * (t.K() + 8.0));
 }
 
-/// Whether this hand does the task right; registers its benchmark if it does.
+/// Whether this implementation is correct; registers its benchmark if it is.
 bool CheckAndRegister(const Hand& hand, const std::shared_ptr<Problem>& problem) {
   if (!hand.simd.empty()) UseSimdPath(hand.simd);
   const std::string name = hand.name + "/" + problem->task.name;

@@ -92,7 +92,7 @@ struct Input : Table<T> {
   }
 };
 
-/// Rounding of a sum of n products of numbers of size 1, with room to spare.
+/// Bound of the rounding error of a sum of n products of numbers of size 1.
 template <typename T>
 double Tolerance(int n) {
   return 4 * std::numeric_limits<T>::epsilon() * (n + 8.0);

@@ -11,9 +11,9 @@
 
 namespace upswing {
 
-/// A greedy controller: observation → torque, nothing else needed. It lives in one
-/// `policy.safetensors`, with what it is, where it comes from, and sample inputs and outputs that
-/// every load recomputes. docs/policy-format.md describes the file for other readers.
+/// A greedy controller: observation → torque. It is stored in one `policy.safetensors`, with its
+/// description and origin, and with sample inputs and outputs that every load recomputes.
+/// docs/policy-format.md describes the file for other readers.
 class Policy {
  public:
   /// `parameters` (network.num_parameters()), `torques` (A): what each action applies, N·m,
@@ -26,23 +26,23 @@ class Policy {
   std::span<const double> torques() const { return torques_; }
   const PolicyInfo& info() const { return info_; }
 
-  /// Room to work in.
+  /// Buffers of a forward pass.
   struct Workspace {
     QNetwork<float>::Activations activations;  // of a block of rows
     AlignedVector<float> preferences;          // (block × A)
   };
   Workspace MakeWorkspace() const;
 
-  /// Q-values (B × A) of observations (B × D). Threads may ask at once, each in a workspace of its
-  /// own.
+  /// Q-values (B × A) of observations (B × D). Safe from several threads, each with its own
+  /// workspace.
   void QValues(Matrix<const float> obs, Matrix<float> q, Workspace& workspace) const;
 
   /// The same in the policy's own workspace. Not for two threads at once.
   void QValues(Matrix<const float> obs, Matrix<float> q) const { QValues(obs, q, workspace_); }
 
   /// The torque (B), N·m, of the action with the largest Q-value, up to rounding; of a dueling
-  /// network by its advantages alone. Threads may act at once, each in a workspace of its own; a
-  /// row's torque does not depend on what other rows there are.
+  /// network by its advantages alone. Safe from several threads, each with its own workspace; a
+  /// row's torque does not depend on the other rows.
   void Act(Matrix<const float> obs, std::span<double> torque, Workspace& workspace) const;
 
   /// The same in the policy's own workspace. Not for two threads at once.
@@ -50,11 +50,11 @@ class Policy {
     Act(obs, torque, workspace_);
   }
 
-  /// What loading found out about the file.
+  /// Result of the checks on loading.
   struct SelfCheck {
-    bool has_checksum = false;  // which says that no bit has changed
+    bool has_checksum = false;  // a right one: no bit has changed
     double error = 0;           // largest |difference| of the samples' Q-values when recomputed
-    double tolerance = 0;       // up to which it counts as rounding
+    double tolerance = 0;       // largest error that counts as rounding
   };
   const SelfCheck& self_check() const { return self_check_; }
 
@@ -62,19 +62,19 @@ class Policy {
   void Save(const std::filesystem::path& path) const;
 
   /// Reads and checks the file: format, metadata, shapes, finite numbers, samples, and the checksum
-  /// where it has one. A change of a parameter that moves no Q-value of the samples by more than
-  /// rounding, say of a unit that none of them wakes, is noticed by the checksum alone. Asks for no
-  /// more memory than belongs to a file of this size. Throws BadInput.
+  /// where it has one. A changed parameter that moves no Q-value of the samples by more than
+  /// rounding, say of a unit that none of them activates, is detected by the checksum alone. Takes
+  /// memory in proportion to the file's size. Throws BadInput.
   static Policy Load(const std::filesystem::path& path) { return From(TensorFile::Load(path)); }
 
-  /// The same of a file that has been read.
+  /// Load, from a file that has been read.
   static Policy From(const TensorFile& file);
 
  private:
   /// Recomputes the stored outputs from the stored inputs. Throws BadInput.
   void CheckSamples(const TensorFile& file);
-  /// Whether `torque` is that of the largest of the Q-values (A), or of one that rounding cannot
-  /// tell from it.
+  /// Whether `torque` belongs to the largest of the Q-values (A), or to one that equals it up to
+  /// rounding.
   bool MayChoose(double torque, std::span<const float> q) const;
 
   QNetwork<float> network_;

@@ -8,23 +8,23 @@
 
 namespace upswing {
 
-/// What a policy's observations are made of (docs/policy-format.md).
+/// The contents of a policy's observations (docs/policy-format.md).
 struct ObservationInfo {
   std::vector<std::string> names;    // of the inputs, without those of the memory
   std::vector<double> max_velocity;  // rad/s, by which w1 and w2 are divided
 
-  /// Past steps of which an observation tells too.
+  /// Past steps that are part of an observation.
   struct Memory {
     int64_t steps = 0;
-    std::vector<std::string> names;   // of what there is of each step
+    std::vector<std::string> names;   // of the numbers of each step
     double velocity = 0, torque = 0;  // rad/s, N·m, by which changes and torques are divided
     bool operator==(const Memory&) const = default;
   };
   std::optional<Memory> memory;
 };
 
-/// What a policy's file says besides the network, each with its type and within its range. What
-/// need not be there and is not, is empty. The only place that knows the metadata's keys and texts.
+/// The metadata of a policy's file, with their types and within their ranges; optional ones that
+/// are missing are empty. Only this pair of files knows the metadata's keys and texts.
 struct PolicyInfo {
   // How it was made.
   std::string agent;            // name of the agent, at most 64 characters
@@ -48,7 +48,7 @@ struct PolicyInfo {
 PolicyInfo ParsePolicyInfo(const std::map<std::string, std::string>& metadata,
                            const std::string& where);
 
-/// The metadata of which ParsePolicyInfo makes `info`.
+/// The metadata from which ParsePolicyInfo makes `info`.
 std::map<std::string, std::string> PolicyMetadata(const PolicyInfo& info);
 
 }  // namespace upswing

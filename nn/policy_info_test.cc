@@ -26,7 +26,7 @@ const Metadata kWhole{
     {"reward_scale", "0.1"},
 };
 
-TEST(PolicyInfo, IsWhatTheMetadataSay) {
+TEST(PolicyInfo, HoldsTheMetadata) {
   const PolicyInfo info = ParsePolicyInfo(kWhole, "a");
   EXPECT_EQ(info.agent, "d3qn");
   EXPECT_EQ(info.seed, 7);
@@ -43,7 +43,7 @@ TEST(PolicyInfo, IsWhatTheMetadataSay) {
   EXPECT_EQ(PolicyMetadata(info), kWhole);
 }
 
-TEST(PolicyInfo, WhatIsNotThereIsEmptyAndStaysAway) {
+TEST(PolicyInfo, MissingMetadataAreEmptyAndNotWritten) {
   const PolicyInfo info = ParsePolicyInfo({{"another", "key"}}, "a");
   EXPECT_EQ(info.agent, "");
   EXPECT_FALSE(info.seed || info.step || info.success_rate || info.mean_return);

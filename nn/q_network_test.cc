@@ -204,7 +204,7 @@ TEST(QNetwork, Bfloat16FollowsFloatAndSlicesGiveTheSameBits) {
   EXPECT_GT(distance(gradient, exact_gradient), 1e-5);  // it is rounded
 }
 
-TEST(QNetwork, ThePostsNetworksHaveTheirParameterCounts) {
+TEST(QNetwork, ParameterCountsOfThePublishedNetworks) {
   EXPECT_EQ(QNetwork<float>({8, 9, {256, 256}, 0, false, false}).num_parameters(),
             8U * 256 + 256 + 256 * 256 + 256 + 256 * 9 + 9);
   EXPECT_EQ(QNetwork<float>({8, 9, {256, 256}, 128, true, false}).num_parameters(),
@@ -251,7 +251,7 @@ TEST(QNetwork, InitialWeightsFillTheirRange) {
   }
 }
 
-TEST(QNetwork, RefusesSizesThatAreNone) {
+TEST(QNetwork, RefusesInvalidSizes) {
   EXPECT_THROW(QNetwork<float>({0, 9, {4}, 0, false, false}), Error);
   EXPECT_THROW(QNetwork<float>({8, 9, {}, 0, false, false}), Error);
   EXPECT_THROW(QNetwork<float>({8, 9, {1 << 20}, 0, false, false}), Error);

@@ -17,7 +17,7 @@ INSTANTIATE_TEST_SUITE_P(Paths, RooflineTest, ::testing::ValuesIn(SimdPaths()),
                          [](const auto& info) { return info.param; });
 
 TEST_P(RooflineTest, MultiplyAddChainsCountWhatTheyDo) {
-  // x ← 0.75 x + 0.25 tends to 1 on every chain, whatever it began with.
+  // x ← 0.75 x + 0.25 tends to 1 on every chain, from any start.
   float result = 0;
   const int64_t rounds = 100;
   const int64_t chains = MultiplyAddChains(rounds, result) / rounds;

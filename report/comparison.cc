@@ -21,14 +21,14 @@ Scores ScoresOf(const RunGroup& group, const std::function<double(const RunRecor
   return scores;
 }
 
-/// A figure of the evaluation that solved the run. One that is not solved would have needed more
-/// than its budget, how much more nobody knows: infinity.
+/// A figure of the evaluation that solved the run. A run that is not solved would have needed an
+/// unknown amount more than its budget: infinity.
 double WhenSolved(const RunRecord& run, const std::function<double(const EvaluationRow&)>& figure) {
   const auto at = SolvedAt(run);
   return at ? figure(run.evaluations[*at]) : std::numeric_limits<double>::infinity();
 }
 
-/// The evaluation whose policy the run has kept.
+/// The evaluation whose policy the run kept.
 const EvaluationRow& Best(const RunRecord& run) {
   return *std::ranges::max_element(run.evaluations, {}, [](const EvaluationRow& row) {
     return std::pair(row.success_rate, row.mean_return);
@@ -54,7 +54,7 @@ Stability StabilityOf(const RunGroup& group) {
   return s;
 }
 
-/// For times, of which the shorter is the better one.
+/// For times, of which shorter ones are better.
 std::vector<double> Negated(std::vector<double> values) {
   for (double& value : values) value = -value;
   return values;

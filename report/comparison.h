@@ -11,29 +11,29 @@
 
 namespace upswing {
 
-inline constexpr double kSteadyRate = 0.99;  // success rate that a solved run is to keep
+inline constexpr double kSteadyRate = 0.99;  // success rate that a steady run keeps once solved
 
-/// Runs of one agent, which differ in their seeds.
+/// Runs of one agent with different seeds.
 struct RunGroup {
   std::string label;
-  std::vector<RunRecord> runs;  // by seed, each finished or taken as it is; all have evaluations
+  std::vector<RunRecord> runs;  // by seed; each has at least one evaluation
 };
 
-/// One figure over the runs of a group.
+/// One quantity over the runs of a group.
 struct Scores {
-  std::vector<double> values;  // a run each, in the order of the runs; not solved: +infinity
+  std::vector<double> values;  // one for each run, in their order; not solved: +infinity
   double low, median, high;    // range and median
   Estimate iqm;                // interquartile mean
 };
 
-/// What became of the runs after they were solved: evaluations after the two that solved them.
+/// How well runs kept the solution: evaluations after the two that solved them.
 struct Stability {
   int64_t runs = 0, steady_runs = 0;  // with such evaluations; all of them at least kSteadyRate
   int64_t evaluations = 0, steady_evaluations = 0;
   double lowest = 1;  // success rate
 };
 
-/// A group in figures.
+/// Summary of a group.
 struct GroupSummary {
   int64_t solved;
   Interval solved_interval;            // 95%, of the share of runs that solve
@@ -44,7 +44,7 @@ struct GroupSummary {
 };
 GroupSummary Summarize(const RunGroup& group);
 
-/// Two groups beside each other: `a` less or against `b`.
+/// Comparison of two groups: differences are a - b.
 struct PairSummary {
   size_t a, b;             // which groups
   Estimate sooner;         // probability that a run of a solves in less time than one of b

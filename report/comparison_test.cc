@@ -45,7 +45,7 @@ TEST(Comparison, FinalAndBestEvaluation) {
   EXPECT_EQ(s.final_return.iqm.value, 2525);
 }
 
-TEST(Comparison, StabilityIsOfWhatFollowsTheTwoThatSolve) {
+TEST(Comparison, StabilityCountsEvaluationsAfterTheTwoThatSolve) {
   EXPECT_EQ(Summarize(kGroup).stability.runs, 0);  // they stopped
   RunGroup group;
   group.runs = {MadeRun(1, {{1, 0}, {1, 0}, {0.99, 0}, {1, 0}, {1, 0}}, 5000, false),
@@ -72,7 +72,7 @@ TEST(Comparison, PairsAreTheSameFromBothSides) {
   EXPECT_DOUBLE_EQ(ab.sooner.value + ba.sooner.value, 1);
   EXPECT_EQ(ba.higher_return.value, 1);
   EXPECT_EQ(ab.return_difference.value, 2525 - 2700);
-  EXPECT_FALSE(ab.seconds_difference);  // one run's time is not known
+  EXPECT_FALSE(ab.seconds_difference);  // one run has no time
 
   RunGroup solved = kGroup;
   solved.runs.pop_back();

@@ -13,7 +13,7 @@
 namespace upswing {
 namespace {
 
-/// The palette of Okabe and Ito (2008), told apart by colour-blind people too; yellow last, since
+/// The palette of Okabe and Ito (2008), which colour-blind people can distinguish; yellow last, as
 /// it is faint on white.
 constexpr std::array kColors{"#0072B2", "#D55E00", "#009E73", "#CC79A7",
                              "#E69F00", "#56B4E9", "#000000", "#F0E442"};
@@ -63,7 +63,7 @@ void CheckSizes(const Panel& panel) {
   }
 }
 
-/// What the two formats count differently.
+/// What differs between the two formats.
 struct Terminal {
   std::string name;
   double font;         // size of text that is kFontSize pixels high
@@ -135,7 +135,7 @@ class PanelScript {
   void Axes() {
     Say("set lmargin at ", ScreenX(box_.left), "; set rmargin at ", ScreenX(box_.right));
     Say("set bmargin at ", ScreenY(box_.bottom), "; set tmargin at ", ScreenY(box_.top));
-    // Labels stand where the margins have room for them, whatever the numbers at the ticks.
+    // Labels are placed in the margins, at the same distance for any width of the tick labels.
     Label(2, panel_.title, (box_.left + box_.right) / 2, box_.top + 14, false);
     const double bottom = box_.bottom - BottomMargin(panel_) + LegendBelow(panel_);
     Label(3, panel_.x_label, (box_.left + box_.right) / 2, bottom + 8, false);

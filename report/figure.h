@@ -14,7 +14,7 @@ enum class Marker { kDot, kSquare, kCross };
 struct Line {
   std::string name;               // in the legend; empty: none
   std::vector<double> x, y;       // (n)
-  std::vector<double> low, high;  // (n) a band around it, or of points error bars; empty: none
+  std::vector<double> low, high;  // (n) a band around the line, error bars of points; empty: none
   bool points = false;            // markers instead of a line
   Marker marker = Marker::kDot;
   std::optional<double> dashed_from = {};  // the x from which the line is dashed
@@ -33,26 +33,26 @@ struct Panel {
   std::string title, x_label, y_label;
   std::vector<Line> lines;
   std::optional<HeatMap> heat_map;
-  std::optional<std::pair<double, double>> x_range, y_range;  // else as the numbers ask for
-  double x_tick = 0, y_tick = 0;  // from one number at the axis to the next; 0: as is readable
+  std::optional<std::pair<double, double>> x_range, y_range;  // none: by the data
+  double x_tick = 0, y_tick = 0;  // distance of the ticks; 0: chosen by gnuplot
 };
 
-/// Panels row after row, `columns` in each, with their axes in line.
+/// Panels row by row, `columns` in each, with aligned axes.
 struct Figure {
-  std::string title;  // one line; where it is too long, its end
+  std::string title;  // one line; of a title that is too long, its end is shown
   std::vector<Panel> panels;
   int columns = 1;
   int width = 900, height = 600;  // pixels
-  std::string caption = {};       // below the title, on as many lines as it takes
+  std::string caption = {};       // below the title, on as many lines as it needs
 };
 
-/// Throws Failure if figures cannot be drawn here: gnuplot is missing or broken. For before long
-/// work whose result shall be drawn.
+/// Throws Failure if figures cannot be drawn: gnuplot is missing or broken. To be called before
+/// long work whose result will be drawn.
 void CheckCanDraw();
 
-/// Writes .svg or .png, by the ending, atomically. Texts are drawn as they are; what is not
-/// printable as its escape. Throws BadInput on another ending, Failure if gnuplot is missing or
-/// fails.
+/// Writes .svg or .png, by the ending, atomically. Texts are drawn literally, unprintable
+/// characters as escapes (see Printable). Throws BadInput on another ending, Failure if gnuplot is
+/// missing or fails.
 void Draw(const Figure& figure, const std::filesystem::path& file);
 
 }  // namespace upswing

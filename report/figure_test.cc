@@ -16,9 +16,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Each character here means something to gnuplot, to a shell or to XML.
+// Each of these characters is special in gnuplot, a shell or XML.
 const std::string kHostile = R"(it's "q" $HOME `ls` a_b^2 {/Bold x} \alpha 100% @m ~ & <b> ω₁)";
-// A bare > is right in XML.
+// A bare > is allowed in XML.
 const std::string kHostileXml =
     R"(it's "q" $HOME `ls` a_b^2 {/Bold x} \alpha 100% @m ~ &amp; &lt;b> ω₁)";
 
@@ -120,7 +120,7 @@ TEST_F(FigureTest, PngHasSignatureAndSize) {
   EXPECT_EQ(png.substr(16, 8), std::string("\0\0\x02\x80\0\0\x01\xe0", 8));
 }
 
-TEST_F(FigureTest, TextsComeThroughAsTheyAre) {
+TEST_F(FigureTest, TextsAreDrawnLiterally) {
   Figure figure = Example();
   figure.title = kHostile + "1";
   figure.panels[0].title = kHostile + "2";
@@ -136,7 +136,7 @@ TEST_F(FigureTest, TextsComeThroughAsTheyAre) {
   EXPECT_FALSE(fs::exists("bad"));
 }
 
-TEST_F(FigureTest, ANumberThatIsNoneLeavesAGap) {
+TEST_F(FigureTest, NaNLeavesAGap) {
   // Each piece of the curve begins with a move.
   const auto pieces = [&](double middle) {
     Figure figure;
@@ -178,7 +178,7 @@ TEST_F(FigureTest, ALineIsDashedFromWhereItSays) {
   EXPECT_NE(Svg(figure).find("stroke-dasharray"), std::string::npos);
 }
 
-TEST_F(FigureTest, PanelsAreInLine) {
+TEST_F(FigureTest, PanelsAreAligned) {
   Figure figure = Example();
   figure.panels.push_back({"", "", "", {}, {}, {}, {}});
   figure.columns = 2;
@@ -218,7 +218,7 @@ TEST_F(FigureTest, AnotherEndingIsBadInputAndWritesNothing) {
   EXPECT_TRUE(fs::is_empty(folder_.path()));
 }
 
-/// The message of the Failure that drawing with PATH = `path` brings; the old file stays.
+/// The message of the Failure of drawing with PATH = `path`; the old file stays.
 std::string FailureWithPath(const std::string& path, const fs::path& file) {
   WriteFileAtomically(file, "old");
   const std::string before = getenv("PATH");
@@ -240,7 +240,7 @@ TEST_F(FigureTest, WithoutGnuplotTheMessageNamesThePackage) {
   EXPECT_NE(message.find("Debian's package gnuplot-nox"), std::string::npos) << message;
 }
 
-TEST_F(FigureTest, WhatGnuplotSaysOfAnErrorIsOneLine) {
+TEST_F(FigureTest, AnErrorOfGnuplotIsReportedOnOneLine) {
   WriteFileAtomically(
       folder_ / "gnuplot",
       "#!/bin/sh\nprintf '\\nplot x\\n     ^\\n\"-\" line 7: the reason\\n\\n' >&2\n"
@@ -250,7 +250,7 @@ TEST_F(FigureTest, WhatGnuplotSaysOfAnErrorIsOneLine) {
             "figure: gnuplot failed: the reason");
 }
 
-TEST_F(FigureTest, NumbersThatDoNotFitOneAnotherAreRefused) {
+TEST_F(FigureTest, ArraysOfDifferentLengthsAreRefused) {
   Figure short_line = Example();
   short_line.panels[0].lines[0].y.pop_back();
   EXPECT_THROW(Draw(short_line, folder_ / "a.svg"), Error);

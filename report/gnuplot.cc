@@ -20,7 +20,7 @@ Error SystemFailure(std::string_view what) {
   return Failure(Concat("figure: cannot ", what, ": ", std::strerror(errno)));
 }
 
-/// A file without a name, gone when it is closed. Unlike pipes, three of them cannot block.
+/// A nameless temporary file. Unlike pipes, three of them cannot block.
 class Scratch {
  public:
   Scratch() : file_(std::tmpfile(), &std::fclose) {
@@ -51,7 +51,7 @@ class Scratch {
   std::unique_ptr<FILE, int (*)(FILE*)> file_;
 };
 
-/// What a child's standard files are.
+/// The standard input, output and error of a child process.
 class FileActions {
  public:
   FileActions() { posix_spawn_file_actions_init(&actions_); }
@@ -67,7 +67,7 @@ class FileActions {
   posix_spawn_file_actions_t actions_{};
 };
 
-/// The line of gnuplot's message that tells the error, without where in the script it was.
+/// The line of gnuplot's message with the error, without its place in the script.
 std::string ErrorIn(const std::string& message) {
   std::string last;
   for (const std::string_view line : Split(message, '\n')) {

@@ -13,7 +13,7 @@ constexpr double kCharacter = 7.2;    // mean width of a character of kFontSize
 constexpr double kLegendSample = 44;  // width of a legend's piece of line
 constexpr double kTitleHeight = 28;
 
-/// Characters in UTF-8 text: all bytes but those that continue one.
+/// Number of characters in UTF-8 text: all bytes but continuation bytes.
 double Characters(std::string_view text) {
   return static_cast<double>(std::ranges::count_if(
       text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; }));
@@ -25,7 +25,7 @@ double LegendWidth(const Panel& panel) {
   return kLegendSample + kCharacter * longest;
 }
 
-/// What a panel needs around its axes, pixels.
+/// Space that a panel needs around its axes, pixels.
 struct Margins {
   double left = 0, right = 0, top = 0, bottom = 0;
 
@@ -103,7 +103,7 @@ std::vector<Box> Layout(const Figure& figure) {
   width /= static_cast<double>(columns);
   height /= static_cast<double>(rows);
   if (width < 20 || height < 20) {
-    throw BadInput(Concat("figure: expected more room for ", rows, " × ", columns, " panels than ",
+    throw BadInput(Concat("figure: expected more space for ", rows, " × ", columns, " panels than ",
                           figure.width, " × ", figure.height, " pixels"));
   }
 

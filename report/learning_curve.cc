@@ -104,7 +104,7 @@ Line LearningCurve(const RunGroup& group, const EvaluationFigure& x, const Evalu
     const Estimate iqm = EstimateIqm({values}, kCurveResamples);
     line.y.push_back(iqm.value);
     if (group.runs.size() < 2) continue;
-    // Where all runs agree there is nothing to see of a band.
+    // Where all runs agree the band has no width.
     line.low.push_back(iqm.interval ? iqm.interval->low : iqm.value);
     line.high.push_back(iqm.interval ? iqm.interval->high : iqm.value);
   }

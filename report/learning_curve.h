@@ -13,18 +13,18 @@ using EvaluationFigure = std::function<double(const EvaluationRow&)>;
 
 /// The interquartile mean of `y` over the runs at each x of the grid, as a curve with its pointwise
 /// 95% interval as a band (none for a single run). Between two evaluations of a run y is
-/// interpolated; behind its last one it keeps the last value.
+/// interpolated; after the last one it keeps its value.
 Line LearningCurve(const RunGroup& group, const EvaluationFigure& x, const EvaluationFigure& y,
                    const std::vector<double>& grid);
 
-/// From where every run of the group has been evaluated to `end`, in equal intervals.
+/// Equally spaced x from the first at which every run of the group has been evaluated to `end`.
 std::vector<double> CurveGrid(const RunGroup& group, const EvaluationFigure& x, double end);
 
 inline constexpr size_t kMostCurves = 5;  // in one panel
 
-/// Success and return over steps and over training time: four panels with a curve for each group;
-/// of more groups than kMostCurves four panels for each so many, all with the same axes. A curve is
-/// dashed from where the first of its runs has ended and keeps its last value.
+/// Success and return over steps and over training time: four panels with a curve for each group.
+/// More than kMostCurves groups are split into parts with four panels each, all with the same axes.
+/// A curve is dashed from where the first of its runs has ended and keeps its last value.
 Figure LearningCurves(const std::vector<RunGroup>& groups);
 
 }  // namespace upswing

@@ -20,7 +20,7 @@ std::vector<EvaluationRow> ParseEvaluations(std::string text, const std::string&
   if (!text.empty() && !text.ends_with('\n')) {
     if (!may_be_cut) {
       throw BadInput(Concat(where, ": its last line is half-written: expected a run that ",
-                            "has finished (train --resume mends it)"));
+                            "has finished (train --resume repairs it)"));
     }
     text.erase(text.rfind('\n') + 1);  // everything if there is no whole line
   }
@@ -49,8 +49,8 @@ std::optional<size_t> SolvedAt(const RunRecord& run) {
   std::optional<size_t> first;  // of a streak
   for (size_t i = 0; i < run.evaluations.size(); ++i) {
     const EvaluationRow& row = run.evaluations[i];
-    const bool in_turn = row.step / plan.eval_every != (row.step - plan.envs) / plan.eval_every;
-    if (!in_turn) continue;
+    const bool scheduled = row.step / plan.eval_every != (row.step - plan.envs) / plan.eval_every;
+    if (!scheduled) continue;
     if (row.success_rate != 1) {
       first.reset();
     } else if (first) {

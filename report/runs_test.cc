@@ -17,16 +17,16 @@ TEST(Runs, SolvedAtTheFirstOfTwoPerfectEvaluationsInARow) {
   EXPECT_FALSE(SolvedAt(MadeRun(1, {})));
 }
 
-TEST(Runs, AnEvaluationOutOfTurnDoesNotCount) {
+TEST(Runs, AnUnscheduledFinalEvaluationDoesNotCount) {
   RunRecord run = MadeRun(1, {{0, 0}, {1, 0}, {1, 0}}, 2504);
   EXPECT_EQ(SolvedAt(run), 1U);
-  run.evaluations.back().step = 2504;  // the end of the budget, between two turns
+  run.evaluations.back().step = 2504;  // the end of the budget, between two multiples
   EXPECT_FALSE(SolvedAt(run));
   EXPECT_TRUE(Finished(run));
-  run.evaluations.back().step = 3000 + 4;  // the first multiple of 8 after the turn
+  run.evaluations.back().step = 3000 + 4;  // the first multiple of 8 after 3,000
   EXPECT_EQ(SolvedAt(run), 1U);
 
-  // A run that ended at step 2,504 and was gone on with: neither counted nor in the way.
+  // A run that ended at step 2,504 and was resumed: that evaluation changes nothing.
   RunRecord resumed = MadeRun(1, {{0, 0}, {1, 0}, {0.5, 0}, {1, 0}}, 4000);
   resumed.evaluations[2].step = 2504;
   resumed.evaluations[3].step = 3000;
@@ -68,14 +68,14 @@ TEST_F(ReadEvaluationsTest, RowsAndNone) {
   EXPECT_EQ(rows[1].seconds, 3);
 }
 
-TEST_F(ReadEvaluationsTest, HalfALineIsToldOrLeftOut) {
+TEST_F(ReadEvaluationsTest, AnIncompleteLineIsAnErrorOrLeftOut) {
   EXPECT_NE(Complaint(head_ + "1000,0,20,1\n2000,1,26").find("half-written"), std::string::npos);
   EXPECT_EQ(ReadEvaluations(folder_.path(), true).size(), 1U);
   EXPECT_NE(Complaint("step,succ").find("half-written"), std::string::npos);
   EXPECT_TRUE(ReadEvaluations(folder_.path(), true).empty());
 }
 
-TEST_F(ReadEvaluationsTest, TablesThatCannotBe) {
+TEST_F(ReadEvaluationsTest, ImpossibleTablesAreRefused) {
   EXPECT_NE(Complaint(head_ + "1000,0,x,1\n").find("evals.csv:2: mean_return"), std::string::npos);
   EXPECT_NE(Complaint("step,seconds\n1,2\n").find("\"success_rate\""), std::string::npos);
   EXPECT_NE(Complaint(head_ + "1000,0,20,1\n1000,0,20,2\n").find("rise"), std::string::npos);

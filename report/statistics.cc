@@ -34,7 +34,7 @@ double ImprovementVariance(double p, const Strata& x, const Strata& y) {
   return sum / (tasks * tasks);
 }
 
-/// A figure of two agents, who are resampled independently: the strata of one, then of the other.
+/// A figure of two agents, which are resampled independently: the strata of one, then of the other.
 Estimate EstimateOfTwo(const Strata& x, const Strata& y,
                        const std::function<double(std::span<const std::vector<double>>,
                                                   std::span<const std::vector<double>>)>& figure,

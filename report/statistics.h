@@ -20,15 +20,15 @@ inline constexpr int64_t kResamples = 10000;  // of a bootstrap interval, unless
 /// Scores of one agent: for each task, which is a stratum, the scores of its runs.
 using Strata = std::vector<std::vector<double>>;
 
-/// A figure with its 95% interval; none where a stratum has less than two runs, or where all
-/// resamples agree, as then the runs do not tell how far off the figure may be.
+/// A figure with its 95% interval; none if a stratum has less than two runs, or if all resamples
+/// agree, as the runs then give no information about the error.
 struct Estimate {
   double value = 0;
   std::optional<Interval> interval = {};
 };
 
-/// Mean of the middle half: what is left without the floor(n/4) smallest and largest of n values.
-/// Infinite once an infinite value is among them. `values` is not empty.
+/// Mean of the middle half: of n values without the floor(n/4) smallest and largest ones. Infinite
+/// if an infinite value is among them. `values` is not empty.
 double InterquartileMean(std::vector<double> values);
 
 /// Share of the pairs with x > y, ties as half (Mann and Whitney's U over the number of pairs).
@@ -38,8 +38,8 @@ double ProbabilityOfImprovement(std::span<const double> x, std::span<const doubl
 /// 95% interval of a statistic by the stratified percentile bootstrap (Efron, 1979): each resample
 /// draws as many scores from each stratum as it has, with replacement, and the interval reaches
 /// from the 2.5% to the 97.5% quantile of the statistic over the resamples. The same scores give
-/// the same interval, in whatever order a stratum has them. Nothing if a stratum has less than two,
-/// or if the interval would have no width.
+/// the same interval, regardless of their order within a stratum. Nothing if a stratum has less
+/// than two, or if the interval would have no width.
 std::optional<Interval> BootstrapInterval(Strata strata,
                                           const std::function<double(const Strata&)>& statistic,
                                           int64_t resamples = kResamples);
@@ -53,7 +53,7 @@ Interval ImprovementScoreInterval(double estimate, const Strata& x, const Strata
 /// Interquartile mean over the runs of all tasks.
 Estimate EstimateIqm(const Strata& scores, int64_t resamples = kResamples);
 
-/// Interquartile mean of `x` less that of `y`; scores are finite.
+/// Interquartile mean of `x` minus that of `y`; scores are finite.
 Estimate EstimateIqmDifference(const Strata& x, const Strata& y, int64_t resamples = kResamples);
 
 /// Probability that a run of `x` has the higher score than one of `y` on the same task, as a mean

@@ -95,14 +95,14 @@ TEST(Statistics, AProbabilityHasAnIntervalWhereAllPairsAgreeToo) {
   const Estimate none = EstimateImprovement({{1, 2, 3, 4, 5}}, {{6, 7, 8, 9, 10}});
   EXPECT_EQ(none.interval->low, 0);
   EXPECT_NEAR(none.interval->high, 1 - p, 1e-12);
-  // Runs that never solve tell little of which would be sooner.
+  // Runs that never solve give little information on which would be sooner.
   const Estimate ties = EstimateImprovement({{-kInf, -kInf, -kInf}}, {{-kInf, -kInf, -kInf}});
   EXPECT_NEAR(ties.interval->low, 0.153, 0.001);
   EXPECT_NEAR(ties.interval->high, 0.847, 0.001);
 }
 
 TEST(Statistics, TheScoreIntervalOfAProbabilityHoldsItInAbout95PercentOfCases) {
-  // Normal scores x = y + √2 Φ⁻¹(p). 2,000 samples tell the coverage to ±0.005.
+  // Normal scores x = y + √2 Φ⁻¹(p). 2,000 samples give the coverage to ±0.005.
   const double shifts[] = {0, 0.7416143, 1.1902334, 2.3261744};  // p = 0.5, 0.7, 0.8, 0.95
   const double ps[] = {0.5, 0.7, 0.8, 0.95};
   Rng rng(1, "coverage of the score interval");
@@ -144,7 +144,7 @@ double Coverage(size_t runs) {
 }
 
 TEST(Statistics, IntervalsOfFewRunsAreTooNarrowAndOfManyRight) {
-  // 1,000 samples tell the coverage to ±0.01 (one standard deviation at 0.85). docs/statistics.md
+  // 1,000 samples give the coverage to ±0.01 (one standard deviation at 0.85). docs/statistics.md
   // has these figures.
   const double five = Coverage(5), ten = Coverage(10), thirty = Coverage(30);
   RecordProperty("five", std::to_string(five));

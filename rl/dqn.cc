@@ -75,7 +75,7 @@ Dqn::Dqn(const DqnConfig& config, int num_envs, int obs_size, std::vector<double
       act_q_(static_cast<size_t>(num_envs) * torques_.size()),
       act_action_(static_cast<size_t>(num_envs)) {
   if (config.mirror && mirror_signs_.empty()) {
-    throw BadInput("--mirror: expected a task that is the same in a mirror");
+    throw BadInput("--mirror: expected a task with mirror symmetry");
   }
   Rng init_rng(seed, "initial parameters");
   network_.Initialize(init_rng, theta_);
@@ -156,8 +156,8 @@ void Dqn::Learn() {
 }
 
 void Dqn::Update(const Minibatch& batch) {
-  // Gradient of the mean Huber loss. Threads share weights (to bring them into the forms that the
-  // products want), then slices of the batch, then weights again.
+  // Gradient of the mean Huber loss. Threads share the weights (to copy them into the layouts that
+  // the products read), then slices of the batch, then the weights again.
   const int B = static_cast<int>(config_.batch);
   const int slice_rows = SliceRows(B);
   const int slices = (B + slice_rows - 1) / slice_rows;
@@ -177,7 +177,7 @@ void Dqn::Update(const Minibatch& batch) {
   });
   const double norm = std::sqrt(std::accumulate(squares_.begin(), squares_.end(), 0.0));
 
-  // θ moves against it, and θ⁻ follows θ.
+  // θ moves against the gradient, and θ⁻ follows θ.
   const bool polyak = config_.target_period == 0;
   adam_.Step({learning_rate(), norm, config_.max_gradient_norm, polyak ? config_.tau : 0.0},
              gradient_, theta_, theta_target_, pool_);
@@ -189,7 +189,7 @@ void Dqn::Update(const Minibatch& batch) {
 }
 
 void Dqn::AveragePolicy() {
-  // The longer the slower learning is: Polyak and Juditsky (1992) average over a growing window.
+  // The slower learning is, the longer the window: Polyak and Juditsky (1992) let it grow.
   const double initial = config_.learning_rate;
   const double tau_now = initial > 0 ? config_.policy_tau * learning_rate() / initial : 1;
   const auto tau = static_cast<float>(std::min(config_.policy_tau, tau_now));
@@ -255,7 +255,7 @@ void Dqn::CountErrors(const Minibatch& batch) {
 
 AgentReport Dqn::Report() const {
   const double n = static_cast<double>(std::max<int64_t>(1, report_updates_));
-  constexpr int64_t kMostRows = 256;  // which tell enough of a large minibatch
+  constexpr int64_t kMostRows = 256;  // enough of a large minibatch
   const Matrix<const float> features(activations_.feature.back().data(),
                                      static_cast<int>(std::min(config_.batch, kMostRows)),
                                      static_cast<int>(config_.hidden.back()));
@@ -289,11 +289,11 @@ void Dqn::State(const Archive& archive) {
   sample_rng_.State(archive.In("sample_rng"));
   archive.Scalar("steps", steps_, {0, kMostSteps});
   archive.Check(replay_.size() == std::min(replay_.capacity(), steps_ - n_step_.waiting()),
-                "replay/rows", "a transition for each step, or as many as there is room for");
+                "replay/rows", "one transition for each step, or a full memory");
   archive.Scalar("episodes", episodes_, {0, steps_});
   archive.Scalar("updates", updates_, {0, kMostUpdates});
   archive.Check(updates_ == updates_due() && adam_.steps() == updates_, "updates",
-                Concat(updates_due(), " as the steps ask for, and as many of Adam"));
+                Concat(updates_due(), ", which the steps imply, and as many of Adam"));
   archive.Scalar("report_updates", report_updates_, {0, updates_});
   archive.Scalar("loss_sum", loss_sum_, kSum);
   archive.Scalar("q_sum", q_sum_, kAnyNumber<double>);

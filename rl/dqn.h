@@ -38,9 +38,9 @@ float HuberGradient(float delta);
 /// A DQN agent for N environments.
 class Dqn : public Agent {
  public:
-  /// `torques` (A) belong to the actions, in rising order, and symmetric about 0 to learn in a
-  /// mirror. `mirror_signs` (D) are as VectorEnv has them; throws BadInput if they are empty but
-  /// asked for.
+  /// `torques` (A), N·m: one for each action, rising, and symmetric about 0 if minibatches are
+  /// mirrored. `mirror_signs` (D): those of the VectorEnv; throws BadInput if they are empty but
+  /// needed.
   Dqn(const DqnConfig& config, int num_envs, int obs_size, std::vector<double> torques,
       std::vector<float> mirror_signs, uint64_t seed, ThreadPool& pool);
 
@@ -60,19 +60,19 @@ class Dqn : public Agent {
   double learning_rate() const;
   /// β of prioritised replay, which rises to 1 over learning_rate_steps (Schaul et al., 2016).
   double importance_exponent() const;
-  /// One gradient step on a given minibatch; Report tells of it.
+  /// One gradient step on a given minibatch, which counts in Report.
   void Update(const Minibatch& batch);
 
  private:
-  /// TD errors of some rows of a minibatch, and their gradient's way back to the activations.
+  /// TD errors of some rows of a minibatch, and the backward pass to the activations.
   void BackwardRows(const Minibatch& batch, RowRange rows);
-  /// Adds a minibatch to the sums of the report; throws Failure if the loss is not finite.
+  /// Adds a minibatch to the sums of the report. Throws Failure if the loss is not finite.
   void CountErrors(const Minibatch& batch);
-  /// Lets theta_policy_ follow θ.
+  /// Moves theta_policy_ towards θ by Polyak averaging.
   void AveragePolicy();
-  /// Updates that the steps so far ask for.
+  /// Number of updates that are due after the steps so far.
   int64_t updates_due() const;
-  /// Share of the way from the first to the last learning rate, 0 to 1.
+  /// Progress of the learning-rate schedule, 0 to 1.
   double schedule() const;
 
   DqnConfig config_;
@@ -84,7 +84,7 @@ class Dqn : public Agent {
 
   QNetwork<float> network_;
   AlignedVector<float> theta_, theta_target_;  // (num_parameters)
-  AlignedVector<float> theta_policy_;  // the same, of the policy that is kept; see policy_tau
+  AlignedVector<float> theta_policy_;  // Polyak average of θ that is evaluated; see policy_tau
   Adam adam_;
   // Of an update: B rows.
   QNetwork<float>::Activations activations_;

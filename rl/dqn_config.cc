@@ -7,7 +7,6 @@ void DqnConfig::Describe(Options& o) {
   o.Add(&hidden, "hidden", {256, 256}, {1, 4096}, "widths of the feature layers");
   o.Add(&head, "head", 128, {1, 4096}, "", "width of each dueling stream's hidden layer");
   o.Add(&layer_norm, "layer_norm", true, "layer normalisation after each feature layer");
-
   o.AddChoice(&precision, "precision", {"float32", "bfloat16"},
               "of the products while learning; bfloat16 needs AVX512_BF16");
 
@@ -27,7 +26,7 @@ void DqnConfig::Describe(Options& o) {
   o.Add(&importance_exponent, "importance_exponent", 0.4, kUnit, "",
         "beta of prioritised replay at the beginning; it rises to 1 over learning_rate_steps");
   o.Add(&mirror, "mirror", true,
-        "learn from a random half of each minibatch as a mirror would show it");
+        "mirror a random half of each minibatch, observations and actions");
   o.Add(&learning_starts, "learning_starts", 2000, kNotNegative, "steps",
         "before the first update");
   o.Add(&updates_per_step, "updates_per_step", 0.0625, {0, 100}, "", "gradient steps per step");

@@ -35,7 +35,7 @@ struct DqnConfig {
   /// One line per setting: name, default, range, unit, help.
   void Describe(Options& options);
 
-  /// The network that it asks for.
+  /// The shape of the network, for observations of `obs_size` numbers and so many actions.
   QNetworkShape Shape(int obs_size, int actions) const;
 };
 

@@ -67,7 +67,7 @@ TEST(Huber, TheGradientIsClippedAndBelongsToTheLoss) {
   }
 }
 
-TEST(Torques, AreTheNineOfThePost) {
+TEST(Torques, AreNineFromLimitToLimit) {
   EXPECT_EQ(TorqueLevels(5), (std::vector<double>{-5, -3.75, -2.5, -1.25, 0, 1.25, 2.5, 3.75, 5}));
 }
 
@@ -119,7 +119,7 @@ TEST_P(DqnVariants, LossIsThatOfThePapersAndFalls) {
 INSTANTIATE_TEST_SUITE_P(Flags, DqnVariants,
                          ::testing::Combine(::testing::Bool(), ::testing::Bool()));
 
-/// Trains on the toy environment for a number of lock-steps.
+/// Trains on the toy environment for a number of steps of all environments.
 void Walk(Dqn& agent, ToyEnv& env, int steps) {
   StepResult result = env.MakeResult();
   std::vector<double> torque(static_cast<size_t>(env.num_envs()));
@@ -132,7 +132,7 @@ void Walk(Dqn& agent, ToyEnv& env, int steps) {
 }
 
 TEST(Dqn, WeightsMultiplyTheGradientOfTheirTransition) {
-  // A transition of weight 1/2, twice, is one of weight 1; one of weight 0 is as if it were not.
+  // A transition of weight 1/2, twice, equals one of weight 1; one of weight 0 changes nothing.
   DqnConfig config = SmallConfig();
   config.batch = 4;
   config.max_gradient_norm = 1e9;
@@ -154,7 +154,7 @@ TEST(Dqn, WeightsMultiplyTheGradientOfTheirTransition) {
   EXPECT_NEAR(a.Report().gradient_norm, b.Report().gradient_norm, 1e-5);
 }
 
-TEST(Dqn, AMirrorTurnsObservationsAndTorquesAround) {
+TEST(Dqn, MirroringNegatesTorquesAndSomeObservations) {
   const Minibatch before = RandomBatch(64);
   Minibatch batch = before;
   Rng rng(1, "mirror");
@@ -177,12 +177,12 @@ TEST(Dqn, AMirrorTurnsObservationsAndTorquesAround) {
   EXPECT_THROW(Dqn(config, 1, 1, kTorques, {}, 1, pool), Error);
 }
 
-TEST(Dqn, TheKeptPolicyIsAnAverageOfThoseLearned) {
+TEST(Dqn, TheExportedPolicyIsAnAverageOfTheLearnedOnes) {
   DqnConfig config = SmallConfig();
   config.policy_tau = 0.25;
   ThreadPool pool(1);
   Dqn agent(config, 1, 1, kTorques, {-1}, 1, pool);
-  // The first network is what the average begins with.
+  // The average begins with the first network.
   std::vector<float> average(agent.online().begin(), agent.online().end());
   for (int update = 0; update < 3; ++update) {
     agent.Update(RandomBatch(16));
@@ -213,7 +213,7 @@ TEST(Dqn, TheAverageGrowsLongerAsTheLearningRateFalls) {
   Walk(agent, env, 200);
   EXPECT_DOUBLE_EQ(agent.learning_rate(), 1e-3);
   EXPECT_DOUBLE_EQ(agent.importance_exponent(), 1);
-  // At a tenth of the rate the average moves a tenth as fast: by 0.05 of the way.
+  // At a tenth of the rate the average moves a tenth as fast: by 0.05 of the difference.
   const std::vector<float> first(agent.online().begin(), agent.online().end());
   agent.Update(RandomBatch(16));
   std::vector<float> average(first);
@@ -276,7 +276,7 @@ TEST(Dqn, ATruncationBootstrapsFromItsOwnLastObservationAndATerminationFromNothi
   EXPECT_GT(terminated, 0);
 }
 
-TEST(Dqn, UpdatesFollowTheStepsWhateverTheNumberOfEnvironments) {
+TEST(Dqn, UpdatesFollowTheStepsForAnyNumberOfEnvironments) {
   for (const int envs : {1, 4}) {
     ThreadPool pool(1);
     Dqn agent(SmallConfig(), envs, 1, kTorques, {-1}, 1, pool);
@@ -335,7 +335,7 @@ TEST(Dqn, TheNumberOfThreadsChangesNoBit) {
   EXPECT_EQ(parameters[0], parameters[1]);
 }
 
-TEST(Dqn, LoadedGoesOnToTheBit) {
+TEST(Dqn, LoadedStateContinuesWithTheSameBits) {
   DqnConfig config = SmallConfig();
   config.n_step = 3;
   config.prioritized = config.mirror = true;
@@ -344,7 +344,7 @@ TEST(Dqn, LoadedGoesOnToTheBit) {
   Dqn saved(config, 2, 1, kTorques, {-1}, 1, pool);
   ToyEnv env(2);
   Walk(saved, env, 101);
-  Dqn loaded(config, 2, 1, kTorques, {-1}, 99, pool);  // another seed, which loading must undo
+  Dqn loaded(config, 2, 1, kTorques, {-1}, 99, pool);  // another seed, which loading must replace
   ToyEnv loaded_env(2, 99);
   const auto state = [](Dqn& agent, ToyEnv& walk) {
     return [&](const Archive& archive) {
@@ -361,7 +361,7 @@ TEST(Dqn, LoadedGoesOnToTheBit) {
   EXPECT_EQ(saved.learning_rate(), loaded.learning_rate());
 }
 
-TEST(Dqn, NumbersThatAreNotFiniteStopIt) {
+TEST(Dqn, NumbersThatAreNotFiniteAreFailures) {
   ThreadPool pool(1);
   Dqn agent(SmallConfig(), 1, 1, kTorques, {-1}, 1, pool);
   ToyEnv env(1);

@@ -10,7 +10,7 @@ int64_t StepsIn(double seconds, const VectorEnv& env) {
   return std::llround(seconds / env.step_seconds());
 }
 
-/// Adds up one episode, step by step.
+/// Accumulates the results of one episode, step by step.
 class EpisodeTally {
  public:
   EpisodeTally(const Policy& policy, const VectorEnv& env)
@@ -28,7 +28,7 @@ class EpisodeTally {
 
   void SetValue(double value) { episode_.value = value; }
 
-  /// Takes in how the bodies of environment `env_index` lean before the next step.
+  /// Adds the lean of environment `env_index` before its next step.
   void SeeLean(const VectorEnv& env, int env_index) {
     if (ended_ || lean_.empty()) return;
     env.Lean(env_index, lean_);
@@ -42,7 +42,7 @@ class EpisodeTally {
     }
   }
 
-  /// Takes in environment `i` of the next step's result.
+  /// Adds environment `i` of the next step's result.
   void Add(const StepResult& result, size_t i) {
     if (ended_) return;
     ++step_;
@@ -67,7 +67,7 @@ class EpisodeTally {
     ended_ = result.terminated[i];
   }
 
-  /// What it came to; call once, in the end.
+  /// The results; call once, at the end.
   EvaluationEpisode Finish() {
     const bool at_goal = goal_since_ >= 0 && !ended_;
     const bool settled = settled_since_ >= 0 && at_goal;
@@ -97,17 +97,17 @@ class EpisodeTally {
   int64_t steps_, return_steps_, hold_steps_, tilt_steps_;
   double gamma_, discount_;   // γ, γᵏ
   std::vector<double> lean_;  // (bodies) rad, now
-  int64_t step_ = 0;          // so many are done
+  int64_t step_ = 0;          // steps so far
   int64_t goal_since_ = -1;   // first state of the present stretch at the goal
   int64_t settled_since_ = -1;
-  bool ended_ = false;  // blown up: what follows is another episode
+  bool ended_ = false;  // by a numerical blow-up: further steps belong to another episode
   double last_torque_ = 0, squares_ = 0, variation_ = 0;
   double goal_variation_ = 0;  // in the present stretch at the goal
   int64_t goal_changes_ = 0;
   EvaluationEpisode episode_;
 };
 
-/// What the policy expects of where the environments stand, if it says in which units.
+/// Sets the policy's value of each environment's present state, if its units are known.
 void EstimateValues(const Policy& policy, const VectorEnv& env, std::span<EpisodeTally> tallies) {
   const ValueUnits units = ValueUnitsOf(policy);
   if (units.gamma == 0) return;
@@ -220,7 +220,7 @@ std::vector<EvaluationEpisode> EvaluateEpisodes(const Policy& policy, VectorEnv&
 
   const int64_t steps = StepsIn(kEvaluationSeconds, env);
   for (int64_t k = 1; k <= steps; ++k) {
-    // Before the step, as an environment whose time is up begins anew after the last.
+    // Before the step: after the last one an environment that timed out has been reset.
     for (int i = 0; i < n; ++i) tallies[static_cast<size_t>(i)].SeeLean(env, i);
     act(env.obs(), torque);
     env.Step(torque, result);

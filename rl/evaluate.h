@@ -14,13 +14,13 @@
 namespace upswing {
 
 inline constexpr double kEvaluationSeconds = 20;  // length of an evaluation episode
-inline constexpr double kHoldSeconds = 10;  // success: every state of the last so many at the goal
-inline constexpr double kReturnSeconds = 10;     // the return counts the first so many
-inline constexpr double kSteadyTiltSeconds = 1;  // the steady tilt is that of the last so many
+inline constexpr double kHoldSeconds = 10;        // success: at the goal throughout the last 10 s
+inline constexpr double kReturnSeconds = 10;      // the return is the reward of the first 10 s
+inline constexpr double kSteadyTiltSeconds = 1;   // the steady tilt is the mean of the last 1 s
 /// Settled: every body leans less than this, rad: 5% of the half turn from hanging to upright.
 inline constexpr double kSettledTilt = 0.05 * std::numbers::pi;
 
-/// What one evaluation episode came to.
+/// Results of one evaluation episode.
 struct EvaluationEpisode {
   bool success = false;
   double swing_up_seconds = 0;  // start of the last stretch at the goal that lasts to the end;
@@ -36,24 +36,24 @@ struct EvaluationEpisode {
   double goal_variation = 0;     // the torque's total variation a second, N·m/s
   double goal_changes = 0;       // how often a second the torque changes
   double value = 0;              // largest Q-value of the first observation, in units of reward
-  double discounted_return = 0;  // Σ γᵏ r over the whole episode: what that estimates, if the
-                                 // policy learned from the reward that is judged
-  std::vector<double> terms;     // (K) sum of each reward term over the first kReturnSeconds
-  std::vector<double> tilt;      // (bodies) mean lean over the last kSteadyTiltSeconds, rad
+  double discounted_return = 0;  // Σ γᵏ r over the whole episode: what `value` estimates, if the
+                                 // policy was trained with the same reward
+  std::vector<double> terms;  // (K) sum of each reward term over the first kReturnSeconds
+  std::vector<double> tilt;   // (bodies) mean lean over the last kSteadyTiltSeconds, rad
 };
 
-/// An evaluation in figures.
+/// Summary of an evaluation.
 struct Evaluation {
   int64_t episodes = 0, successes = 0;
   Interval success_interval;
   Quartiles swing_up_seconds;  // of the successful episodes
-  int64_t settled = 0;         // how many of the successful ones are settled at the end
-  Quartiles settling_seconds;  // of those
+  int64_t settled = 0;         // successful episodes that are settled at the end
+  Quartiles settling_seconds;  // of those episodes
   Moments reward_sum, work, rms_torque, torque_variation;
   Moments goal_variation, goal_changes;  // of the successful episodes
   std::vector<Moments> tilt;  // (bodies) |mean lean| at the end of the successful episodes, rad
   double peak_torque = 0;
-  double value = 0, discounted_return = 0;  // means; 0 for a policy that does not say its γ
+  double value = 0, discounted_return = 0;  // means; 0 for a policy without γ in its file
   std::vector<double> term_means;           // (K) of the episodes' sums of each reward term
 
   double success_rate() const {
@@ -62,23 +62,24 @@ struct Evaluation {
   bool all_succeeded() const { return episodes > 0 && successes == episodes; }
 };
 
-/// What Q-values estimate: the sum of γᵏ · reward_scale · r, as a policy's metadata say.
+/// What Q-values estimate: the sum of γᵏ · reward_scale · r, by the policy's metadata.
 struct ValueUnits {
-  double gamma = 0, reward_scale = 1;  // γ = 0: it does not say
+  double gamma = 0, reward_scale = 1;  // γ = 0: the metadata have none
 };
+/// The units in a policy's metadata.
 ValueUnits ValueUnitsOf(const Policy& policy);
 
-/// Lets `policy` control every environment for kEvaluationSeconds from where it stands, and says
-/// what each episode came to. The environments must not end before that. Acting is shared by the
-/// pool, which changes no bit. `progress` (may be empty) is told the share done.
+/// Lets `policy` control every environment for kEvaluationSeconds from its present state, and
+/// returns one result for each. Episodes must not time out earlier. The pool shares the forward
+/// passes, which changes no bit. `progress` (may be empty) is called with the share done, 0 to 1.
 std::vector<EvaluationEpisode> EvaluateEpisodes(const Policy& policy, VectorEnv& env,
                                                 ThreadPool* pool = nullptr,
                                                 const std::function<void(double)>& progress = {});
 
-/// The episodes in figures.
+/// Summarises episodes.
 Evaluation Summarize(std::span<const EvaluationEpisode> episodes);
 
-/// Both in one.
+/// EvaluateEpisodes, then Summarize.
 Evaluation Evaluate(const Policy& policy, VectorEnv& env, ThreadPool* pool = nullptr,
                     const std::function<void(double)>& progress = {});
 

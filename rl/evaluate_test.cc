@@ -41,8 +41,8 @@ class ScriptedEnv : public ToyEnv {
   int k_ = 0;
 };
 
-TEST(Evaluate, SuccessAsksForTheWholeOfTheLastTenSeconds) {
-  // State 500 is at t = 10 s: from there on is a success, one later is not.
+TEST(Evaluate, SuccessNeedsAllOfTheLastTenSeconds) {
+  // State 500 is at t = 10 s: at the goal from there on is a success, from the next one on is not.
   ScriptedEnv env({500, 501, 100, 2000});
   const Evaluation e = Evaluate(Constant(-2), env);
   EXPECT_EQ(e.episodes, 4);
@@ -55,7 +55,7 @@ TEST(Evaluate, SuccessAsksForTheWholeOfTheLastTenSeconds) {
   EXPECT_DOUBLE_EQ(e.rms_torque.mean, 2);
 }
 
-/// What a policy's file says whose Q-values estimate the sum of gamma^k · reward_scale · r.
+/// Metadata of a policy whose Q-values estimate the sum of gamma^k · reward_scale · r.
 PolicyInfo Units(double gamma, double reward_scale) {
   PolicyInfo info;
   info.gamma = gamma;
@@ -63,7 +63,7 @@ PolicyInfo Units(double gamma, double reward_scale) {
   return info;
 }
 
-TEST(Evaluate, AValueStandsBesideWhatItEstimates) {
+TEST(Evaluate, ReportsTheValueAndTheReturnThatItEstimates) {
   const QNetworkShape shape{1, 1, {1}, 0, false, false};
   std::vector<float> parameters(QNetwork<float>(shape).num_parameters());
   parameters.back() = 3;  // the output's bias: Q = 3 everywhere
@@ -78,20 +78,20 @@ TEST(Evaluate, AValueStandsBesideWhatItEstimates) {
   EXPECT_EQ(silent.discounted_return, 0);
 }
 
-TEST(Evaluate, OneStateElsewhereUndoesAStretch) {
+TEST(Evaluate, OneStateOffTheGoalEndsAStretch) {
   ScriptedEnv early({100}, 499), late({100}, 501);
   EXPECT_EQ(Evaluate(Constant(0), early).successes, 1);
   EXPECT_EQ(Evaluate(Constant(0), late).successes, 0);
 }
 
-TEST(Evaluate, ABlownUpEpisodeFailsWhateverFollows) {
+TEST(Evaluate, ABlownUpEpisodeFailsEvenIfLaterStatesAreAtTheGoal) {
   ScriptedEnv env({100, 100});
   env.blow_up = 1;
   const Evaluation e = Evaluate(Constant(0), env);
   EXPECT_EQ(e.successes, 1);
 }
 
-TEST(Evaluate, EpisodesAreThoseOfTheSummary) {
+TEST(Evaluate, TheSummaryIsThatOfTheEpisodes) {
   ScriptedEnv env({500, 501, 100, 2000}), again({500, 501, 100, 2000});
   const std::vector<EvaluationEpisode> episodes = EvaluateEpisodes(Constant(-2), env);
   ASSERT_EQ(episodes.size(), 4U);
@@ -126,7 +126,7 @@ class LeaningEnv : public ScriptedEnv {
   int k = 0;
 };
 
-TEST(Evaluate, FiguresOfAControlEngineer) {
+TEST(Evaluate, SettlingTimeTorqueVariationAndTilt) {
   LeaningEnv env;
   const std::vector<EvaluationEpisode> episodes = EvaluateEpisodes(Constant(0), env);
   EXPECT_TRUE(episodes[0].success && episodes[1].success);

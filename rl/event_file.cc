@@ -1,6 +1,6 @@
 #include "rl/event_file.h"
 
-#include <event.pb.h>  // made from rl/event.proto
+#include <event.pb.h>  // generated from rl/event.proto
 
 #include <array>
 #include <chrono>
@@ -19,7 +19,7 @@ constexpr std::array<uint32_t, 256> kCrcTable = [] {
   return table;
 }();
 
-/// TFRecord stores checksums turned and shifted, so that one of data that hold a checksum is safe.
+/// TFRecord rotates checksums and adds a constant, so that data may themselves hold checksums.
 uint32_t MaskedCrc(std::string_view bytes) {
   const uint32_t crc = Crc32c(bytes);
   return ((crc >> 15) | (crc << 17)) + 0xa282ead8U;

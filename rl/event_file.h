@@ -16,11 +16,11 @@ class EventFile {
   /// Opens or makes the file; CutTo must follow. Throws as AppendFile does.
   explicit EventFile(const std::filesystem::path& path) : file_(path) {}
 
-  /// Cuts it back to `size` bytes, at most its size; where nothing is left the version record comes
-  /// first. Throws Failure.
+  /// Cuts it back to `size` bytes, at most its size; if that is 0, the version record is written.
+  /// Throws Failure.
   void CutTo(int64_t size);
 
-  /// Appends scalars at a step.
+  /// Appends scalars (tag, value) at a step. Throws Failure.
   void Append(int64_t step, const std::vector<std::pair<std::string, double>>& scalars);
 
   int64_t size() const { return file_.size(); }
@@ -34,7 +34,7 @@ class EventFile {
   AppendFile file_;
 };
 
-/// CRC-32C (Castagnoli), as RFC 3720 Appendix B.4 tests it.
+/// CRC-32C (Castagnoli), see the examples in RFC 3720, Appendix B.4.
 uint32_t Crc32c(std::string_view bytes);
 
 }  // namespace upswing

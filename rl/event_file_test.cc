@@ -17,7 +17,7 @@ TEST(EventFile, Crc32cMatchesRfc3720) {
   EXPECT_EQ(Crc32c("123456789"), 0xe3069283U);
 }
 
-TEST(EventFile, CutBackItHoldsWhatItHeldThen) {
+TEST(EventFile, CutToRestoresEarlierContents) {
   const TempFolder folder;
   const auto path = folder / "events";
   int64_t size = 0;

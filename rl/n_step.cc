@@ -41,7 +41,7 @@ void NStep::Push(int env, std::span<const float> obs, int action, double reward,
           static_cast<float>(discount)});
   }
 
-  // What still waits moves to the front.
+  // The steps that still wait move to the front.
   count_[e] = static_cast<int64_t>(k);
   if (first == 0) return;
   std::ranges::copy(waiting_obs.subspan(first * obs_size_), waiting_obs.begin());

@@ -10,8 +10,8 @@
 namespace upswing {
 
 /// Joins the steps of each environment into transitions over n steps (Sutton, 1988; Mnih et al.,
-/// 2016, Section 4). At the end of an episode the shorter tails are emitted too, each with the
-/// γᵏ of its true length k.
+/// 2016, Section 4). At the end of an episode the shorter rest is emitted too, each transition
+/// with the γᵏ of its true length k.
 class NStep {
  public:
   NStep(int num_envs, int n, double gamma, int obs_size);
@@ -21,10 +21,10 @@ class NStep {
             std::span<const float> next_obs, bool terminated, bool truncated,
             const std::function<void(const Transition&)>& emit);
 
-  /// Steps of all environments that wait for their successors.
+  /// Number of steps, over all environments, that are not yet part of a transition.
   int64_t waiting() const;
 
-  /// Saves or loads the steps that wait; actions are below num_actions.
+  /// Saves or loads the waiting steps; actions are below num_actions.
   void State(const Archive& archive, int num_actions);
 
  private:

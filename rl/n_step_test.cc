@@ -7,7 +7,7 @@
 namespace upswing {
 namespace {
 
-/// What was emitted, copied.
+/// A copy of an emitted transition.
 struct Emitted {
   float obs, next_obs;
   int action;
@@ -35,7 +35,7 @@ TEST(NStep, OneStepPassesThrough) {
   EXPECT_EQ(out, (std::vector<Emitted>{{0, 1, 0, 1, 0.5F}, {1, 2, 1, 2, 0.5F}, {2, 3, 2, 4, 0}}));
 }
 
-TEST(NStep, ThreeStepsWithTheirTailsAtATruncation) {
+TEST(NStep, ThreeStepsAndTheShorterRestAtATruncation) {
   // γ = 0.5, rewards 1, 2, 4, 8. Full windows: 1 + 2/2 + 4/4 = 3 and 2 + 4/2 + 8/4 = 6, both with
   // γ³. Tails: 4 + 8/2 = 8 with γ², 8 with γ; all bootstrap from the last observation.
   NStep n_step(1, 3, 0.5, 1);
@@ -71,7 +71,7 @@ TEST(NStep, EpisodesAndEnvironmentsDoNotMix) {
   EXPECT_EQ(out.back(), (Emitted{10, 12, 0, 2, 0.25F}));
 }
 
-TEST(NStep, LoadedGoesOnLikeSaved) {
+TEST(NStep, LoadedStateContinuesAsTheSavedOne) {
   NStep saved(2, 3, 0.9, 1), loaded(2, 3, 0.9, 1);
   std::vector<Emitted> a, b;
   for (int i = 0; i < 4; ++i) PushStep(saved, i % 2, i, false, false, a);

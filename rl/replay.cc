@@ -8,7 +8,7 @@
 namespace upswing {
 namespace {
 
-// (|TD error| + 1e-6)^α with α up to 1 and a TD error that is a float, and some room for rounding.
+// (|TD error| + 1e-6)^α with α up to 1 and a TD error that is a float, with a margin for rounding.
 constexpr Bounds<double> kPriorities{1e-7, 1e39};
 
 }  // namespace
@@ -59,7 +59,7 @@ Transition Replay::at(int64_t index) const {
 }
 
 void Replay::Gather(Minibatch& batch) const {
-  // The memory is larger than any cache: fetch all rows at once, instead of waiting for each.
+  // The memory is larger than any cache: prefetch all rows instead of waiting for each.
   for (const int64_t index : batch.index) {
     const float* row = rows_.data() + static_cast<size_t>(index) * row_size();
     constexpr size_t kLine = 16;  // floats in a line of the cache
@@ -94,7 +94,7 @@ void Replay::SamplePrioritized(Rng& rng, double beta, Minibatch& batch) const {
     smallest = std::min(smallest, priority(batch.index[i]));
   }
   Gather(batch);
-  // N and Σ p fall out of the ratio to the largest weight, that of the smallest priority.
+  // N and Σ p cancel in the ratio to the largest weight, that of the smallest priority.
   for (size_t i = 0; i < B; ++i) {
     batch.weight[i] = static_cast<float>(std::pow(smallest / priority(batch.index[i]), beta));
   }
@@ -112,9 +112,9 @@ void Replay::State(const Archive& archive, int num_actions) {
   archive.Scalar("next", next_, {0, capacity_ - 1});
   archive.Vector("rows", rows_, static_cast<size_t>(capacity_) * row_size());
   archive.Check(rows_.size() % row_size() == 0, "rows", "whole transitions");
-  // Until the memory is full, the next place is behind the last.
+  // Until the memory is full, the next place follows the last transition.
   const bool full = size() == capacity_;
-  archive.Check(full || next_ == size(), "next", "the place behind the last");
+  archive.Check(full || next_ == size(), "next", "the place after the last transition");
   if (priorities_) {
     archive.Scalar("largest_priority", largest_priority_, {1, kPriorities.highest});
     priorities_->State(archive.In("priorities"), size(), {kPriorities.lowest, largest_priority_});

@@ -54,7 +54,7 @@ TEST(Replay, SamplesWholeTransitionsEvenly) {
 }
 
 TEST(Replay, AMillionTransitionsOfThePendulumFitIn100Megabytes) {
-  // What a full memory writes to the checkpoint is what it holds.
+  // A full memory writes all of its numbers to the checkpoint.
   constexpr size_t kRow = (2 * 8 + 3) * sizeof(float);
   Replay replay(1000, 8);
   const std::array<float, 8> obs{};
@@ -68,7 +68,7 @@ TEST(Replay, AMillionTransitionsOfThePendulumFitIn100Megabytes) {
 TEST(Replay, DrawsByPriorityAndWeighsAsThePaperDoes) {
   Replay replay(4, 2, true);
   for (int i = 0; i < 4; ++i) replay.Add(Numbered(i).transition);
-  // Nothing learned yet: all are drawn alike, and weigh 1.
+  // Before any update all are drawn with the same probability, and have weight 1.
   Rng rng(1, "replay test");
   Minibatch batch(4, 2);
   replay.SamplePrioritized(rng, 0.5, batch);
@@ -128,7 +128,7 @@ TEST(Replay, LoadedPrioritiesDrawTheSame) {
   }
 }
 
-TEST(Replay, LoadedGoesOnLikeSaved) {
+TEST(Replay, LoadedStateContinuesAsTheSavedOne) {
   Replay saved(5, 2), loaded(5, 2);
   for (int i = 0; i < 7; ++i) saved.Add(Numbered(i).transition);
   SaveAndLoad([&](const Archive& archive) { saved.State(archive, 9); },

@@ -7,7 +7,7 @@
 namespace upswing {
 
 double FeatureRank(Matrix<const float> features) {
-  // XXᵀ has the same eigenvalues that are not 0; its trace is Σ λ, the sum of its squares Σ λ².
+  // XXᵀ has the same nonzero eigenvalues; its trace is Σ λ, the sum of its squared entries Σ λ².
   double trace = 0, squares = 0;
   for (int i = 0; i < features.rows(); ++i) {
     const auto x = features.row(i);

@@ -2,7 +2,7 @@
 
 #include "core/matrix.h"
 
-/// How much of itself a network still uses: two figures that fall when value learning decays.
+/// How much of its capacity a network uses: two measures that show when its features degenerate.
 namespace upswing {
 
 /// Participation ratio (Σ λ)² / Σ λ² of the eigenvalues λ of XᵀX, for features X (B × W): 1 if all

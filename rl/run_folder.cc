@@ -17,10 +17,10 @@ namespace fs = std::filesystem;
 constexpr std::string_view kEventsName = "events.out.tfevents.0.upswing";
 constexpr int64_t kMostBytes = int64_t{1} << 60;
 
-// What grows while the run goes on, and whose size the checkpoint knows.
+// The files that grow during a run, whose sizes are in the checkpoint.
 constexpr std::array kTables{"metrics", "episodes", "evals", "events"};
 
-/// Under which name a table's size stands in the checkpoint.
+/// The name of a table's size in the checkpoint.
 std::string SizeName(std::string_view table) { return Concat("run/size/", table); }
 
 /// Adds the sizes of kTables.
@@ -30,15 +30,15 @@ void AddSizes(TensorFile& checkpoint, const std::array<int64_t, kTables.size()>&
   }
 }
 
-/// The size of a table that the checkpoint knows of, which has `size` bytes now. Throws BadInput
-/// unless it can be cut back to that.
+/// The size of a table by the checkpoint; it has `size` bytes now. Throws BadInput if it is
+/// shorter than that.
 int64_t KnownSize(const TensorFile& checkpoint, std::string_view table, const fs::path& path,
                   int64_t size) {
   int64_t known = 0;
   Archive::Loader(checkpoint).Scalar(SizeName(table), known, {0, kMostBytes});
   if (size >= known) return known;
   throw BadInput(Concat(path.string(), ": expected at least the ", known,
-                        " bytes that the checkpoint knows of, got ", size));
+                        " bytes that its checkpoint records, got ", size));
 }
 
 /// `path` without slashes at its end.
@@ -47,8 +47,8 @@ fs::path WithoutSlash(fs::path path) {
   return path;
 }
 
-/// Where the folder of a run is to be made: what `path` says, after links in it. Throws BadInput if
-/// there is something already, or if it could not be put there in one piece.
+/// Where a run folder is to be made: `path` with its links resolved. Throws BadInput if something
+/// is there already, or if the folder could not be put there in one piece.
 fs::path PlaceOf(const fs::path& path) {
   std::error_code error;
   const bool is_run = fs::exists(path / "config.toml", error);
@@ -130,7 +130,7 @@ void RunFolder::Log(std::string_view line) {
 }
 
 void RunFolder::SaveCheckpoint(TensorFile& checkpoint) const {
-  // On disk before the checkpoint that knows of them.
+  // The tables must be on disk before the checkpoint that records their sizes.
   for (const Table* table : {&metrics_, &episodes_, &evals_}) table->file.Sync();
   events_.Sync();
   AddSizes(checkpoint,

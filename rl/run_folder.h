@@ -23,24 +23,24 @@ using Row = std::vector<std::pair<std::string, double>>;
 ///   episodes.csv            a row for each training episode
 ///   evals.csv               a row for each evaluation
 ///   events.out.tfevents.*   metrics and evaluations for TensorBoard
-///   checkpoint.safetensors  the whole state
+///   checkpoint.safetensors  the whole state of the training
 ///   policy.safetensors      the best policy at evaluation
-///   log.txt                 what happened when
+///   log.txt                 events with date and time
 /// The sizes of the tables are part of the checkpoint; opening a run cuts the tables back to them,
 /// so that what a killed run wrote after its checkpoint is not there twice.
 class RunFolder {
  public:
-  /// Makes the folder with these files in it (name, text); `first_checkpoint` adds to the first
-  /// checkpoint what the run itself does not know. Folders above it that are missing are made, as
-  /// mkdir -p does; it itself appears under its name whole or not at all (see Making). Throws
-  /// BadInput if something is there already, and as PathError does.
+  /// Makes the folder with these files in it (name, text); `first_checkpoint` adds the state of the
+  /// training to the first checkpoint. Missing parent folders are made, as mkdir -p does; the
+  /// folder itself appears under its name whole or not at all (see Making). Throws BadInput if
+  /// something is there already, and as PathError does.
   static void Create(const std::filesystem::path& path,
                      const std::vector<std::pair<std::string, std::string>>& files,
                      const std::function<void(TensorFile&)>& first_checkpoint);
 
   /// Opens a run whose checkpoint has been loaded; the caller holds its FolderLock. Throws
-  /// BadInput, with nothing changed, if a table is shorter than the checkpoint knows or no file of
-  /// this folder alone (see AppendFile).
+  /// BadInput, with nothing changed, if a table is shorter than its size in the checkpoint, or is
+  /// shared with another folder by a link (see AppendFile).
   RunFolder(std::filesystem::path path, const TensorFile& checkpoint);
 
   const std::filesystem::path& path() const { return path_; }
@@ -60,7 +60,7 @@ class RunFolder {
 
  private:
   struct Table {
-    std::string tag;  // prefix of its columns in TensorBoard; empty: not there
+    std::string tag;  // prefix of its columns in TensorBoard; empty: not shown there
     AppendFile file;
   };
   void AppendRow(Table& table, const Row& row);

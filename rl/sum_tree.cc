@@ -21,7 +21,8 @@ int64_t SumTree::Find(double mass) const {
   size_t node = 1;
   while (node < leaves_) {
     node *= 2;
-    // To the right, unless rounding alone leads there. No branch: which way is for nobody to guess.
+    // To the right, unless rounding alone leads there. Without a branch, as it could not be
+    // predicted.
     const double left = nodes_[node];
     const bool right = (mass >= left) & (nodes_[node + 1] > 0);
     mass -= right ? left : 0;

@@ -10,11 +10,11 @@ namespace upswing {
 /// Numbers that are not negative, with a binary tree of their sums: setting one and finding where a
 /// partial sum is reached take O(log n) (Schaul et al., 2016, Appendix B.2.1).
 ///
-/// Each sum is that of its two children, so that the same numbers give the same bits, in whatever
-/// order they were set.
+/// Each sum is that of its two children, so that the same numbers give the same bits, regardless of
+/// the order in which they were set.
 class SumTree {
  public:
-  /// Room for `capacity` numbers, all 0.
+  /// A tree of `capacity` numbers, all 0.
   explicit SumTree(int64_t capacity);
 
   void Set(int64_t index, double value);

@@ -9,7 +9,7 @@
 namespace upswing {
 namespace {
 
-/// The index at which the running sum exceeds `mass`, by going along all numbers.
+/// The index at which the running sum exceeds `mass`, by a scan over all numbers.
 int64_t FindSlowly(const std::vector<double>& values, double mass) {
   for (size_t i = 0; i < values.size(); ++i) {
     if (mass < values[i]) return static_cast<int64_t>(i);

@@ -49,7 +49,7 @@ class ToyEnv : public VectorEnv {
   }
 
   int64_t episode_steps = 10;
-  bool poison = false;  // observations that are not numbers
+  bool poison = false;  // observations are NaN
 
  private:
   float Start() { return static_cast<float>(noise_ * rng_.Normal()); }

@@ -27,7 +27,7 @@ class Stopwatch {
   Clock::time_point last_ = Clock::now();
 };
 
-/// Adds a lock-step to the running episodes and logs those that it finished.
+/// Adds one step of all environments to their episodes and logs the episodes that it finished.
 void CountEpisodes(const StepResult& result, const std::vector<std::string>& term_names,
                    TrainState& s, RunFolder& run) {
   const size_t terms = term_names.size();
@@ -90,7 +90,7 @@ void KeepIfBest(Training& t, TrainState& s, const Evaluation& e) {
   s.best_step = s.steps;
 }
 
-/// Solved: nothing but successes in two evaluations in a row.
+/// Solved: all episodes of two evaluations in a row succeed.
 void CountStreak(TrainState& s, const Evaluation& e) {
   if (s.solved) return;
   if (!e.all_succeeded()) {
@@ -121,12 +121,12 @@ void LogEvaluation(Training& t, const TrainState& s, const Evaluation& e) {
   if (t.on_evaluation) t.on_evaluation(s, e);
 }
 
-/// Judges the present policy. An evaluation out of turn, at the end, does not count for `solved`.
-void JudgePolicy(Training& t, TrainState& s, bool in_turn) {
+/// Evaluates the present policy. An unscheduled final evaluation does not count towards `solved`.
+void JudgePolicy(Training& t, TrainState& s, bool scheduled) {
   const Evaluation e = t.evaluate(t.agent.ExportPolicy({}), s.steps);
   s.last_success_rate = e.success_rate();
   KeepIfBest(t, s, e);
-  if (in_turn) CountStreak(s, e);
+  if (scheduled) CountStreak(s, e);
   LogEvaluation(t, s, e);
 }
 
@@ -147,7 +147,7 @@ bool RunLoop(Training& t, TrainState& s) {
   Stopwatch watch;
 
   while (s.steps < config.steps && !(s.solved && config.stop_when_solved)) {
-    // One lock-step of all environments, and what can be learned from it.
+    // One step of all environments, then the updates that are due.
     t.env.SetStartNoise(config.StartNoise(s.steps));
     t.agent.Act(t.env.obs(), torque);
     t.env.Step(torque, result);
@@ -157,7 +157,8 @@ bool RunLoop(Training& t, TrainState& s) {
     s.steps += t.env.num_envs();
     s.seconds += watch.Lap();
 
-    // Whatever falls due: a multiple of its interval has been reached or passed.
+    // What is due at this step, as a multiple of its interval has been reached or passed: logging,
+    // evaluation, checkpoint.
     const auto due = [&](int64_t every) { return s.steps / every != before / every; };
     CountEpisodes(result, term_names, s, t.run);
     if (due(config.log_every)) LogMetrics(t, s);
@@ -182,7 +183,7 @@ void TrainConfig::Describe(Options& o) {
   o.Add(&seed, "seed", 1, {0, 9e15}, "", "seed of every random stream");
   o.Add(&steps, "steps", 1000000, kCount, "steps", "train for at most this many in all").identity =
       false;
-  o.Add(&envs, "envs", 32, {1, 4096}, "", "environments in lock-step");
+  o.Add(&envs, "envs", 32, {1, 4096}, "", "parallel environments");
   o.Add(&stop_when_solved, "stop_when_solved", true,
         "stop once all episodes of two evaluations in a row succeed")
       .identity = false;

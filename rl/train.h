@@ -36,10 +36,10 @@ struct TrainState {
   int64_t steps = 0, episodes = 0;
   double seconds = 0;         // of training, evaluations excluded
   int64_t checkpoint_at = 0;  // step of the last checkpoint
-  int64_t streak = 0;         // evaluations in a row with nothing but successes, until solved
+  int64_t streak = 0;         // evaluations in a row in which all episodes succeed, until solved
   int64_t streak_step = 0;    // step of the streak's first
   double streak_seconds = 0;  // training time then: the time to solve, once solved
-  bool solved = false;        // two such in a row
+  bool solved = false;        // two such evaluations in a row
   double last_success_rate = 0;
   double best_success_rate = -1, best_return = 0;
   int64_t best_step = 0;
@@ -52,7 +52,7 @@ struct TrainState {
   void State(const Archive& archive);
 };
 
-/// What a user may ask for while it runs.
+/// What a user may request during a training.
 enum class TrainRequest { kGoOn, kCheckpoint, kStop };
 
 /// All that a training needs; the loop owns none of it.
@@ -61,14 +61,14 @@ struct Training {
   Agent& agent;
   VectorEnv& env;
   RunFolder& run;
-  /// Judges the policy of a step by fresh starts, other ones at each step.
+  /// Evaluates the policy of a step from new start states, different ones at each step.
   std::function<Evaluation(const Policy&, int64_t step)> evaluate = {};
-  /// What the policy file says of its origin, besides the run's own figures.
+  /// Origin of the policy for its file, to which the step and the evaluation's results are added.
   PolicyInfo policy_info = {};
   /// What the checkpoint's metadata hold: version and configuration.
   std::map<std::string, std::string> checkpoint_metadata = {};
 
-  // Told as it goes on; any may be empty.
+  // Called during the training; any may be empty.
   std::function<void(const TrainState&, const AgentReport&)> on_metrics = {};
   std::function<void(const TrainState&, const Evaluation&)> on_evaluation = {};
   std::function<void(const TrainState&)> on_step = {};
@@ -78,9 +78,9 @@ struct Training {
 /// Saves or loads the whole state of a training; see Archive.
 void CheckpointState(const Archive& archive, Agent& agent, VectorEnv& env, TrainState& state);
 
-/// Trains until the task is solved, the steps are done or a request to stop; writes tables,
-/// evaluations, the best policy and checkpoints into the run folder. Throws Failure, which names
-/// the step and the last whole checkpoint. Returns false if it was asked to stop.
+/// Trains until the task is solved, the steps are done or `poll` asks to stop; writes tables,
+/// evaluations, the best policy and checkpoints into the run folder. Throws Failure that names the
+/// step and the last complete checkpoint. Returns false if it was asked to stop.
 bool Train(Training& training, TrainState& state);
 
 }  // namespace upswing

@@ -45,7 +45,7 @@ class TrainTest : public ::testing::Test {
     });
   }
 
-  /// Goes on with a run until `stop_at`; returns the state at the end.
+  /// Continues a run until `stop_at`; returns the state at the end.
   TrainState Run(const std::string& name, int64_t stop_at = 1000000) {
     Parts parts(dqn_);
     const TensorFile checkpoint = TensorFile::Load(RunFolder::CheckpointPath(folder_ / name));
@@ -88,7 +88,7 @@ TEST_F(TrainTest, StopsWhenTwoEvaluationsInARowAreFull) {
   EXPECT_EQ(state.streak_step, 300);  // the first of the two
 }
 
-TEST_F(TrainTest, AnEvaluationOutOfTurnDoesNotCount) {
+TEST_F(TrainTest, AnUnscheduledFinalEvaluationDoesNotCount) {
   scripted_ = {0, 0, 4, 4};
   config_.steps = 304;
   Create("run");
@@ -96,7 +96,7 @@ TEST_F(TrainTest, AnEvaluationOutOfTurnDoesNotCount) {
   EXPECT_EQ(evaluations_, 4);
 }
 
-TEST_F(TrainTest, GoesOnBeyondSolvedIfToldSo) {
+TEST_F(TrainTest, ContinuesAfterSolvingIfNotToStop) {
   scripted_ = {4, 4, 0, 4, 4, 4};
   config_.stop_when_solved = false;
   Create("run");
@@ -137,7 +137,7 @@ TEST_F(TrainTest, TheCurriculumRaisesTheNoiseLinearly) {
   EXPECT_DOUBLE_EQ(config.StartNoise(5000), 0.3);
 }
 
-TEST_F(TrainTest, NumbersThatAreNotFiniteStopItAndTheCheckpointStays) {
+TEST_F(TrainTest, ANumberThatIsNotFiniteStopsTheTrainingAndKeepsTheCheckpoint) {
   Create("run");
   Run("run", 200);
   const auto checkpoint = ReadFile(folder_ / "run" / "checkpoint.safetensors");
@@ -154,7 +154,7 @@ TEST_F(TrainTest, NumbersThatAreNotFiniteStopItAndTheCheckpointStays) {
   EXPECT_EQ(ReadFile(folder_ / "run" / "checkpoint.safetensors"), checkpoint);
 }
 
-TEST_F(TrainTest, ALineOfTheLogIsOneLine) {
+TEST_F(TrainTest, LogEscapesLineBreaks) {
   Create("run");
   const TensorFile checkpoint = TensorFile::Load(RunFolder::CheckpointPath(folder_ / "run"));
   RunFolder(folder_ / "run", checkpoint).Log("failed: x\n2026-01-01 finished\x1b[2J");

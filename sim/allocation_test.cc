@@ -1,4 +1,4 @@
-// Counts the allocations of the whole program, MuJoCo's included, by standing in for malloc.
+// Counts the allocations of the whole program, including MuJoCo's, by replacing malloc.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -6,7 +6,7 @@
 
 #include "sim/pendulum_env.h"
 
-// Sanitizers have their own malloc, and other C libraries no way past it.
+// Sanitizers have their own malloc, and other C libraries do not export the original one.
 #if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define UPSWING_COUNTS_ALLOCATIONS 1
 #if defined(__has_feature)
@@ -49,7 +49,7 @@ void* aligned_alloc(size_t alignment, size_t size) noexcept {
 namespace upswing {
 namespace {
 
-/// How much memory is asked for in so many control steps of 40 environments, over resets.
+/// Number of allocations in so many control steps of 40 environments, with resets.
 int64_t Allocations(PhysicsEngine physics, int steps) {
   PendulumEnvConfig config;
   config.physics = physics;
@@ -72,11 +72,11 @@ TEST(Allocation, IsCounted) {
   EXPECT_EQ(numbers.back(), 0);
 }
 
-TEST(Allocation, AStepInMuJoCoTakesNoMemory) {
+TEST(Allocation, AStepInMuJoCoAllocatesNothing) {
   EXPECT_EQ(Allocations(PhysicsEngine::kMuJoCo, 100), 0);
 }
 
-TEST(Allocation, AStepInClosedFormTakesNoMemory) {
+TEST(Allocation, AStepInClosedFormAllocatesNothing) {
   EXPECT_EQ(Allocations(PhysicsEngine::kClosedForm, 100), 0);
 }
 

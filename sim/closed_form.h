@@ -46,9 +46,9 @@ struct ClosedFormBatch {
   Array share1, share2;  // l1 / (l1 + l2), l2 / (l1 + l2)
 };
 
-/// Where the kernels may split a batch: multiples of this many environments.
+/// The kernels may split a batch at multiples of this many environments.
 inline constexpr size_t kClosedFormChunk = 64;
-/// How many such parts N environments make.
+/// Number of such chunks in N environments.
 inline int ClosedFormChunks(size_t num_envs) {
   return static_cast<int>((num_envs + kClosedFormChunk - 1) / kClosedFormChunk);
 }
@@ -57,9 +57,9 @@ inline int ClosedFormChunks(size_t num_envs) {
 /// multiple of kClosedFormChunk or N.
 void Advance(ClosedFormBatch& batch, int steps, size_t first, size_t last);
 
-/// Fills all of `result` but `truncated` from the states, as Observe, RewardTerms and Inverted
-/// do. A state that is not finite, or beyond MuJoCo's 1e10, has
-/// terminated; the rest is then without meaning.
+/// Fills all of `result` but `truncated` from the states, as Observe, RewardTerms and Inverted do.
+/// A state that is not finite, or beyond MuJoCo's limit of 1e10, has terminated; the rest is then
+/// without meaning.
 void Judge(const ClosedFormBatch& batch, const RewardWeights& weights, size_t first, size_t last,
            StepResult& result);
 

@@ -33,7 +33,7 @@ void ClosedFormPhysics::SetPlant(int env, const Plant& plant) {
 
 void ClosedFormPhysics::Step(std::span<const double> torque, StepResult& result) {
   batch_.SetTorque(torque);
-  // With two references the task fits into std::function without an allocation.
+  // Two captured references fit into std::function without an allocation.
   ParallelFor(pool_, ClosedFormChunks(num_envs_), [this, &result](int chunk) {
     const size_t first = static_cast<size_t>(chunk) * kClosedFormChunk;
     const size_t last = std::min(first + kClosedFormChunk, num_envs_);

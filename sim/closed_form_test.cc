@@ -61,7 +61,7 @@ std::array<double, 4> StateOf(const ClosedFormBatch& batch, size_t i) {
   return {batch.q1[i], batch.q2[i], batch.w1[i], batch.w2[i]};
 }
 
-/// What MuJoCo makes of a state in one of its steps.
+/// The state after one step of MuJoCo.
 std::array<double, 4> StepOfMuJoCo(const Plant& plant, const PendulumState& s, double tau) {
   const ModelPtr model = CompileModel(Mjcf(plant), "test");
   const DataPtr data(mj_makeData(model.get()));
@@ -256,7 +256,7 @@ TEST(ClosedForm, PlaceAndNumberOfEnvironmentsChangeNoBit) {
     }
     by_path.emplace(path, all);
   });
-  // Whatever the path: to the bit where multiply-adds are fused, closely where they are not.
+  // On every path: to the bit where multiply-adds are fused, closely where they are not.
   for (const auto& [path, result] : by_path) {
     const StepResult& best = by_path.at(SimdPaths().front());
     const bool fused = path.starts_with("avx") || path == "neon";
@@ -267,7 +267,7 @@ TEST(ClosedForm, PlaceAndNumberOfEnvironmentsChangeNoBit) {
   }
 }
 
-TEST(ClosedForm, WhatIsNoNumberOrBeyondMuJoCosLimitHasBlownUp) {
+TEST(ClosedForm, NaNAndNumbersBeyondMuJoCosLimitAreBlowUps) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   const std::vector<PendulumState> states{{0, 0, 0, 0},    {kNan, 0, 0, 0}, {0, kNan, 0, 0},

@@ -40,10 +40,10 @@ TEST(Disturbance, SettingsAreChecked) {
   EXPECT_FALSE(disturbance.any());
 }
 
-TEST(Disturber, TorquesArriveWhenTheirTimeHasComeAndNoneComesFromAnEpisodeBefore) {
+TEST(Disturber, TorquesArriveAfterTheDelayAndNoneFromAnEarlierEpisode) {
   Disturber motors({{0, 0}, {0, 0.02}, {0, 0.06}}, 3, 3, 1, "test");
-  // What three motors hold at each step, of the torques 1, 2, 3, … of all; the episode of the last
-  // two begins anew before the step at which 5 is chosen.
+  // Torques that three motors apply when 1, 2, 3, … are chosen for all; the last two begin a new
+  // episode before the step at which 5 is chosen.
   const double expected[7][3] = {{1, 0, 0}, {2, 1, 0}, {3, 2, 0}, {4, 3, 1},
                                  {5, 0, 0}, {6, 5, 0}, {7, 6, 0}};
   std::vector<int64_t> steps{0, 0, 0};
@@ -87,7 +87,7 @@ TEST(Disturber, NoiseIsNormalAndIndependentOnAllFour) {
   EXPECT_NEAR(lag / kCount, 0, error);
 }
 
-TEST(Disturber, EnvironmentsHaveStreamsOfTheirOwn) {
+TEST(Disturber, EachEnvironmentHasItsOwnStream) {
   Disturber two({{1, 0}}, 2, 0, 7, "test");
   Disturber second({{0, 0}, {1, 0}}, 2, 0, 7, "test"), other({{1, 0}}, 2, 0, 7, "other");
   (void)two.Measure(0, {});  // takes nothing from the second's stream
@@ -97,7 +97,7 @@ TEST(Disturber, EnvironmentsHaveStreamsOfTheirOwn) {
   EXPECT_NE(noise, Disturber({{1, 0}}, 1, 0, 7, "test").Measure(0, {}).q1);
 }
 
-TEST(DisturbedEnv, OnlyWhatTheSensorsSayHasNoise) {
+TEST(DisturbedEnv, OnlyMeasurementsHaveNoise) {
   PendulumEnvConfig config = FourKinds();
   config.disturbances = {{0, 0}, {0.02, 0}};
   config.num_envs = 2;
@@ -105,29 +105,29 @@ TEST(DisturbedEnv, OnlyWhatTheSensorsSayHasNoise) {
   StepResult result = env.MakeResult();
   double largest = 0;
   for (int step = 0; step < 6; ++step) {
-    // Both from the same state under the same torque: what happens is the same, but not what is
-    // seen.
+    // Both from the same state under the same torque: the motion is the same, the measurements are
+    // not.
     env.SetState(0, {0.3, 0.1, 0, 0});
     env.SetState(1, {0.3, 0.1, 0, 0});
     env.Step(std::vector<double>{2, 2}, result);
     EXPECT_EQ(env.state(0).w1, env.state(1).w1);
     EXPECT_EQ(result.reward[0], result.reward[1]);
     const auto seen = std::span(result.next_obs).subspan(kObservationSize, kObservationSize);
-    // One angle, seen as sine and cosine, and height and energy of what is seen.
+    // Sine and cosine of one measured angle; height and energy of the measured state.
     EXPECT_NEAR(std::hypot(seen[0], seen[1]), 1, 1e-6);
     const PendulumState said{std::atan2(seen[1], seen[0]), std::atan2(seen[4], seen[3]),
                              seen[2] * kMaxVelocity1, seen[5] * kMaxVelocity2};
     const auto expected = Observe(env.plant(1), said);
     for (size_t k = 0; k < kObservationSize; ++k) EXPECT_NEAR(seen[k], expected[k], 1e-6);
     largest = std::max(largest, std::abs(said.w1 - env.state(1).w1));
-    // What to act on next is the same measurement.
+    // The next observation is the same measurement.
     EXPECT_TRUE(std::ranges::equal(env.obs().row(1), seen));
   }
   EXPECT_GT(largest, 0.005);
   EXPECT_LT(largest, 0.2);
 }
 
-TEST(DisturbedEnv, ADelayedMotorIsOneThatWasToldLater) {
+TEST(DisturbedEnv, ADelayedMotorActsAsOneThatIsCommandedLater) {
   PendulumEnv env(FourKinds());
   PendulumEnvConfig perfect = FourKinds();
   perfect.disturbances = {Disturbance()};
@@ -154,7 +154,7 @@ TEST(DisturbedEnv, ADelayedMotorIsOneThatWasToldLater) {
   }
 }
 
-TEST(DisturbedEnv, LoadedStateGoesOnToTheBit) {
+TEST(DisturbedEnv, LoadedStateContinuesWithTheSameBits) {
   ExpectLoadedGoesOn(FourKinds(), 5);  // with torques under way
 }
 

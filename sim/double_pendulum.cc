@@ -1,6 +1,6 @@
 // The double pendulum as formulas. Symbols: q1, q2 joint angles (rad; 0 hanging, q2 relative to
 // link 1), w1, w2 their velocities (rad/s), m mass (kg), l length (m), g gravity (m/s²), tau torque
-// (N·m). Every constant is that of the post, "Balancing a Double Pendulum with DQN and MuJoCo".
+// (N·m). Every constant is that of the post "Balancing a Double Pendulum with DQN and MuJoCo".
 #include "sim/double_pendulum.h"
 
 #include <algorithm>
@@ -39,7 +39,7 @@ void RewardWeights::Describe(Options& o) {
 }
 
 CapsuleInertia::CapsuleInertia(double m, double r, double l) {
-  // The mass is shared out by volume between the cylinder and the two half spheres.
+  // The cylinder and the two half spheres have their shares of the mass by volume.
   const double cylinder = std::numbers::pi * r * r * l;
   const double sphere = 4.0 / 3.0 * std::numbers::pi * r * r * r;
   const double mc = m * cylinder / (cylinder + sphere);
@@ -115,8 +115,8 @@ std::array<double, kRewardTerms> RewardTerms(const Plant& plant, const PendulumS
 }
 
 std::string Mjcf(const Plant& plant) {
-  // Nothing touches and nothing is constrained: without these stages a step takes less time and
-  // the trajectory is the same.
+  // There are no contacts and no constraints: disabling these stages saves time and leaves the
+  // trajectory as it is.
   std::string mjcf = R"(<mujoco model="double_pendulum">
   <option gravity="0 0 -@gravity" timestep="0.005" integrator="RK4">
     <flag contact="disable" constraint="disable"/>

@@ -14,15 +14,15 @@ namespace upswing {
 /// Time between two actions (s); the physics makes several steps in it.
 inline constexpr double kControlPeriod = 0.02;
 
-/// Of every plant, as Mjcf has them.
+/// Constants of every plant, the same as in Mjcf.
 inline constexpr double kPhysicsTimestep = 0.005;  // s
 inline constexpr int kPhysicsSteps = 4;            // in a control period
 static_assert(kPhysicsSteps * kPhysicsTimestep == kControlPeriod);
 inline constexpr double kArmature = 0.01;       // of both joints, kg·m²
 inline constexpr double kCapsuleRadius = 0.04;  // of both links, m
 
-/// What can be set at run time. The capsules keep their radius; inertia and centre of mass follow
-/// mass and length.
+/// The parameters that can be set at run time. The radius of the capsules is fixed; inertia and
+/// centre of mass follow from mass and length.
 struct Plant {
   double mass1, mass2;        // kg
   double length1, length2;    // m
@@ -68,8 +68,8 @@ bool Inverted(const PendulumState& s);
 std::array<double, 2> Lean(const PendulumState& s);
 
 inline constexpr int kObservationSize = 8;
-/// Heuristic largest velocities (rad/s), by which the observation divides: swinging up from
-/// hanging stays well within them, so that all inputs are of a size.
+/// Largest velocities (rad/s), a heuristic, by which the observation is divided: swinging up from
+/// hanging stays well within them, so that all inputs are of similar size.
 inline constexpr double kMaxVelocity1 = 10.0;
 inline constexpr double kMaxVelocity2 = 20.0;
 
@@ -77,18 +77,19 @@ inline constexpr double kMaxVelocity2 = 20.0;
 /// NormalizedEnergy and ĥ = TipHeight over l1 + l2, in [-1, 1].
 std::array<float, kObservationSize> Observe(const Plant& plant, const PendulumState& s);
 
-/// What an observation may remember of each past control step, from the last one backwards: [Δw1,
-/// Δw2, tau], the change of the velocities in it over kMemoryVelocity, and the torque that was
-/// chosen for it over kMemoryTorque. How the plant answered tells what the state alone does not:
-/// how heavy and how long it is, and which torques are still under way.
+/// Memory that an observation may have of each past control step, the latest first: [Δw1, Δw2,
+/// tau], the change of the velocities over kMemoryVelocity, and the chosen torque over
+/// kMemoryTorque. The plant's response carries information that the state lacks: its masses and
+/// lengths, and the torques that are still delayed.
 inline constexpr int kMemorySize = 3;
-/// How many steps an observation of so many numbers remembers.
+/// Number of past steps in an observation of `obs_size` numbers.
 constexpr int MemorySteps(int obs_size) { return (obs_size - kObservationSize) / kMemorySize; }
-/// About what the motor can do in a control period (rad/s), and its usual limit (N·m).
+/// About the velocity that the motor can add in a control period (rad/s), and its usual limit
+/// (N·m).
 inline constexpr double kMemoryVelocity = 1.0, kMemoryTorque = 5.0;
 
-/// How an observation's signs change in a mirror, which turns angles, velocities and torque around;
-/// what it remembers changes all signs.
+/// Sign of each observation under the mirror symmetry, which negates angles, velocities and torque;
+/// those of its memory are all negated.
 inline constexpr std::array<float, kObservationSize> kMirrorSigns{1, -1, -1, 1, -1, -1, 1, 1};
 
 inline constexpr int kRewardTerms = 5;
@@ -110,6 +111,7 @@ struct RewardWeights {
   std::array<double, kRewardTerms> weight;
 
   RewardWeights() { SetDefaults(*this); }
+  /// One line per setting: name, default, range, unit, help.
   void Describe(Options& options);
 };
 

@@ -35,7 +35,7 @@ TEST(Energy, HangingAndInvertedAreMinusAndPlusTheTarget) {
 
 TEST(Energy, MatchesRodsCutIntoPieces) {
   // A second derivation: each rod as many point masses, whose positions and velocities come from
-  // the geometry. Midpoint pieces of a rod miss its inertia by the share 1/n².
+  // the geometry. Midpoint pieces of a rod underestimate its inertia by the share 1/n².
   Rng rng(1, "energy");
   constexpr int n = 2000;
   for (int trial = 0; trial < 20; ++trial) {

@@ -40,7 +40,7 @@ TEST_P(RememberingEnvs, ObservationsEndWithTorquesAndChangesOfVelocities) {
 
     for (int i = 0; i < 3; ++i) {
       const size_t row = static_cast<size_t>(i) * (kObservationSize + 6);
-      // What the task has always shown comes first and is the same to the bit.
+      // The observation without memory comes first, with the same bits.
       EXPECT_TRUE(std::ranges::equal(
           std::span(result.next_obs).subspan(row, kObservationSize),
           std::span(expected.next_obs)
@@ -48,12 +48,12 @@ TEST_P(RememberingEnvs, ObservationsEndWithTorquesAndChangesOfVelocities) {
       EXPECT_TRUE(std::ranges::equal(env.obs().row(i).first(kObservationSize), plain.obs().row(i)));
     }
 
-    // The memory of what to act on next; torques over 5 N·m.
+    // The memory of the next observation; torques over 5 N·m.
     const auto memory = env.obs().row(1).subspan(kObservationSize);
     if (done) {
       states = {env.state(1)};
       torques.clear();
-      // Of a finished episode the last observation remembers too.
+      // The last observation of a finished episode has a memory too.
       EXPECT_NEAR(result.next_obs[2 * kObservationSize + 6 + 2], torque / 5, 1e-7);
     }
     for (size_t j = 0; j < 2; ++j) {
@@ -68,7 +68,7 @@ TEST_P(RememberingEnvs, ObservationsEndWithTorquesAndChangesOfVelocities) {
   }
 }
 
-TEST_P(RememberingEnvs, WithADelayTheTorquesUnderWayAreSeen) {
+TEST_P(RememberingEnvs, WithADelayTheMemoryHasTheWaitingTorques) {
   PendulumEnvConfig config = Config(2);
   config.disturbances = {Disturbance(0, 0.04)};
   PendulumEnv env(config);
@@ -80,7 +80,7 @@ TEST_P(RememberingEnvs, WithADelayTheTorquesUnderWayAreSeen) {
   EXPECT_EQ(result.torque[0], 1);
 }
 
-TEST_P(RememberingEnvs, AMirrorTurnsMemoriesAround) {
+TEST_P(RememberingEnvs, MirroringNegatesTheMemory) {
   PendulumEnv env(Config(2));
   StepResult result = env.MakeResult();
   env.SetState(0, {0.3, -0.5, 1, -2});
@@ -94,7 +94,7 @@ TEST_P(RememberingEnvs, AMirrorTurnsMemoriesAround) {
   }
 }
 
-TEST_P(RememberingEnvs, LoadedStateGoesOnToTheBit) { ExpectLoadedGoesOn(Config(3), 7); }
+TEST_P(RememberingEnvs, LoadedStateContinuesWithTheSameBits) { ExpectLoadedGoesOn(Config(3), 7); }
 
 }  // namespace
 }  // namespace upswing

@@ -14,19 +14,19 @@
 namespace upswing {
 namespace {
 
-constexpr int kMostElements = 200;  // a model like ours has some 15
-constexpr int kMostLevels = 10;     // of elements in one another; ours has 5
+constexpr int kMostElements = 200;  // the built-in model has 15
+constexpr int kMostLevels = 10;     // of nesting; the built-in model has 5
 constexpr size_t kMostName = 100;   // bytes
 
-/// What an attribute may be: numbers, or one of some words, or a name.
+/// What an attribute may hold: numbers, one of some words, or a name.
 struct Attribute {
   std::string_view name;
-  size_t least = 0, most = 0;   // how many numbers; 0: it is a text
+  size_t least = 0, most = 0;   // count of numbers; 0: words or a name
   double low = 0, high = 0;     // of each number
-  std::string_view words = {};  // of which it is one; empty: any name
+  std::string_view words = {};  // the allowed words; empty: any name
 };
 
-/// An element, wherever it stands.
+/// An element, its attributes and the elements that it may contain.
 struct Element {
   std::string_view name;
   std::vector<Attribute> attributes;
@@ -34,7 +34,7 @@ struct Element {
 };
 
 constexpr std::string_view kBool = "false true";
-constexpr double kAny = 1e6;  // a bound for numbers of which it does not matter what they are
+constexpr double kAny = 1e6;  // bound of numbers without a narrower range
 
 constexpr Attribute Name(std::string_view name) { return {name}; }
 constexpr Attribute Word(std::string_view name, std::string_view words) {
@@ -53,7 +53,7 @@ std::vector<Attribute> operator+(std::vector<Attribute> a, const std::vector<Att
   return a;
 }
 
-/// All that a model may be made of.
+/// The elements that a model may contain.
 std::vector<Element> MakeElements() {
   constexpr std::string_view kSwitch = "enable disable";
   const std::vector<Attribute> named{Name("name"), Name("class")};
@@ -81,7 +81,7 @@ std::vector<Element> MakeElements() {
         Word("solver", "PGS CG Newton"), Word("jacobian", "dense sparse auto"),
         Word("cone", "pyramidal elliptic"), Number("density", 0), Number("viscosity", 0)},
        "flag"},
-      // None that takes gravity, springs, damping, the motor or its limit away.
+      // Without the flags that switch off gravity, springs, damping, the motor or its limit.
       {"flag",
        {Word("contact", kSwitch), Word("constraint", kSwitch), Word("equality", kSwitch),
         Word("frictionloss", kSwitch), Word("limit", kSwitch), Word("warmstart", kSwitch),
@@ -139,7 +139,7 @@ std::vector<Element> MakeElements() {
   };
 }
 
-/// The pieces of `text` between blanks, of which there may be several in a row.
+/// The words of `text`, between any number of blanks.
 std::vector<std::string> Words(std::string_view text) {
   constexpr std::string_view kBlanks = " \t\n\r";
   std::vector<std::string> words;
@@ -151,14 +151,14 @@ std::vector<std::string> Words(std::string_view text) {
   return words;
 }
 
-/// `text` in quotes, or its beginning.
+/// `text` in quotes; of a long text its beginning.
 std::string Quoted(std::string_view text) {
   constexpr size_t kMostShown = 40;
   if (text.size() <= kMostShown) return Concat("\"", Printable(text), "\"");
   return Concat("\"", Printable(text.substr(0, kMostShown)), "…\"");
 }
 
-/// Checks one document; `where` begins what it throws.
+/// Checks one document; messages begin with `where`.
 class Checker {
  public:
   explicit Checker(const std::string& where) : where_(where), elements_(MakeElements()) {}
@@ -192,17 +192,17 @@ class Checker {
     return text;
   }
 
-  /// Checks an element with all that is in it; others than elements and comments are refused.
+  /// Checks an element and its contents; only elements and comments are allowed.
   void CheckNode(const tinyxml2::XMLNode& node, const Element* parent, int level) {
     if (node.ToComment() != nullptr) return;
     const int line = node.GetLineNum();
     const tinyxml2::XMLElement* element = node.ToElement();
     if (element == nullptr) {
-      Refuse(line, Concat("expected elements and comments alone, got ", Quoted(node.Value())));
+      Refuse(line, Concat("expected only elements and comments, got ", Quoted(node.Value())));
     }
     if (++count_ > kMostElements || level > kMostLevels) {
-      Refuse(line, Concat("expected at most ", kMostElements, " elements, at most ", kMostLevels,
-                          " of them in one another"));
+      Refuse(line, Concat("expected at most ", kMostElements, " elements, nested at most ",
+                          kMostLevels, " deep"));
     }
     const Element& known = Find(*element, parent);
     for (const auto* a = element->FirstAttribute(); a != nullptr; a = a->Next()) {
@@ -244,7 +244,7 @@ class Checker {
            Concat("<", element.name, "> ", name, ": expected ", expected, ", got ", Quoted(text)));
   }
 
-  /// What was expected; empty if the text is that.
+  /// What was expected; empty if the text is valid.
   static std::string Expected(const Attribute& attribute, std::string_view text) {
     if (attribute.most > 0) return ExpectedNumbers(attribute, text);
     const bool fits = text.size() <= kMostName && Printable(text) == text;

@@ -20,7 +20,7 @@ std::string Changed(const std::string& from, const std::string& to) {
   return mjcf.replace(mjcf.find(from), from.size(), to);
 }
 
-/// What is thrown; empty if nothing is.
+/// The message that is thrown; empty if nothing is.
 std::string ErrorOf(const std::string& mjcf) {
   try {
     CheckMjcf(mjcf, "m.xml");
@@ -128,7 +128,7 @@ TEST(MjcfCheck, SaysWhichAttributeWasNotExpectedAndWhere) {
                 "m.xml:7: <joint> takes no \"actuatorfrcrange\" here");
   ExpectRefused(Changed("damping=", "dampng="), "did you mean damping?");
   for (const auto& [from, to] : std::vector<std::pair<std::string, std::string>>{
-           {"<motor ", "<motor forcerange=\"-1 1\" "},    // a limit that the plant does not tell
+           {"<motor ", "<motor forcerange=\"-1 1\" "},  // a limit that is no parameter of the plant
            {"<motor ", "<motor nsample=\"200000000\" "},  // a buffer of that size
            {"<motor ", "<motor delay=\"0.1\" "},
            {"<motor ", "<motor user=\"1 2\" "},
@@ -178,13 +178,13 @@ TEST(MjcfCheck, RefusesWhatIsNoPlainXml) {
   ExpectRefused("<mujoco>\n<option></mujoco>", "m.xml:2: not well-formed XML: mismatched element");
   ExpectRefused("<mujoco a='1' a='2'/>", "not well-formed XML");
   ExpectRefused("<!-- nothing -->", "expected <mujoco>");
-  ExpectRefused("<mujoco>\ntext</mujoco>", "expected elements and comments alone, got");
-  ExpectRefused("<mujoco><![CDATA[text]]></mujoco>", "expected elements and comments alone");
-  // Entities that stand for ten of the last: nobody expands them.
+  ExpectRefused("<mujoco>\ntext</mujoco>", "expected only elements and comments, got");
+  ExpectRefused("<mujoco><![CDATA[text]]></mujoco>", "expected only elements and comments");
+  // Nested entities, each ten of the one before: they are not expanded.
   ExpectRefused(
       "<!DOCTYPE m [<!ENTITY a \"aaaaaaaaaa\"><!ENTITY b \"&a;&a;&a;&a;&a;\">]>\n"
       "<mujoco model=\"&b;\"/>",
-      "m.xml:1: expected elements and comments alone");
+      "m.xml:1: expected only elements and comments");
   ExpectRefused(Mjcf(Plant()) + std::string(1, '\0'), "UTF-8 text without control characters");
   ExpectRefused("<mujoco model=\"\x1b[2J\"/>", "without control characters");
   ExpectRefused("<mujoco model=\"&#27;[2J\"/>", "model: expected a name");
@@ -207,7 +207,7 @@ TEST(MjcfCheck, BoundsTextNamesElementsAndNesting) {
   ExpectRefused(many + "</worldbody></mujoco>", "at most 200 elements");
   for (int i = 0; i < 50; ++i) nested += "<body>";
   for (int i = 0; i < 50; ++i) nested += "</body>";
-  ExpectRefused(nested + "</worldbody></mujoco>", "at most 10 of them in one another");
+  ExpectRefused(nested + "</worldbody></mujoco>", "nested at most 10 deep");
   for (int i = 0; i < 20000; ++i) deep += "<a>";
   ExpectRefused(deep, "not well-formed XML");
 }

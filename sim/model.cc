@@ -11,8 +11,8 @@
 namespace upswing {
 namespace {
 
-/// MuJoCo would print its warnings and log them to a file in the current folder, and end the
-/// program on an error.
+/// Replaces MuJoCo's handlers, which print warnings and log them to a file in the current folder,
+/// and end the program on an error.
 void TakeOverMessages() {
   mju_user_warning = [](const char*) {};
   mju_user_error = [](const char* message) { throw Failure(Concat("MuJoCo: ", message)); };
@@ -20,7 +20,7 @@ void TakeOverMessages() {
 
 constexpr int kLinkBodies[2] = {1, 2};  // body 0 is the world
 
-/// Compiles somebody's MJCF: whatever MuJoCo cannot do with it is bad input.
+/// Compiles untrusted MJCF: every error of MuJoCo's is bad input.
 ModelPtr CompileGiven(const std::string& mjcf, const std::string& where) {
   try {
     return CompileModel(mjcf, where);
@@ -30,7 +30,7 @@ ModelPtr CompileGiven(const std::string& mjcf, const std::string& where) {
   }
 }
 
-/// Throws BadInput unless each parameter is what its setting may be.
+/// Throws BadInput unless each parameter is within the range of its setting.
 void CheckRanges(Plant plant, const std::string& where) {
   const Options options = OptionsOf(plant);
   for (const Option& option : options.all()) {

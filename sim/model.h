@@ -9,7 +9,7 @@
 
 #include "sim/double_pendulum.h"
 
-/// Handles of MuJoCo that free themselves, and the plant's numbers within a compiled model.
+/// Owning handles of MuJoCo objects, and the plant's numbers within a compiled model.
 namespace upswing {
 
 struct MuJoCoDeleter {
@@ -28,22 +28,22 @@ std::string MuJoCoVersion();
 /// Compiles MJCF. Throws BadInput with MuJoCo's own message, after `where` (a file's name).
 ModelPtr CompileModel(const std::string& mjcf, const std::string& where);
 
-/// Compiles somebody's MJCF once CheckMjcf has passed it. Throws BadInput, too, unless it is built
-/// like ours: two solid capsules hanging on hinges about +y, a motor of the same limit both ways at
-/// the first, gravity along -z, springs at rest hanging, limits of the joints the same both ways, a
-/// timestep that divides the control period, and a plant within the ranges of its settings.
+/// Compiles untrusted MJCF after CheckMjcf. Throws BadInput, too, unless the model is built like
+/// the built-in one: two solid capsules hanging on hinges about +y, a motor of the same limit both
+/// ways at the first, gravity along -z, springs at rest hanging, limits of the joints the same both
+/// ways, a timestep that divides the control period, and a plant within the ranges of its settings.
 /// Armature, friction, stiffness, the capsules' radius and the integrator may differ.
 ModelPtr LoadModel(const std::string& mjcf, const std::string& where);
 
-/// In what a model like ours differs from the built-in one, the plant's parameters aside, such as
-/// "armature1 0.02 kg·m²"; none if only in what the motion does not show.
+/// Differences of a loaded model from the built-in one that affect the motion, apart from the
+/// plant's parameters; such as "armature1 0.02 kg·m²".
 std::vector<std::string> DifferencesFromBuiltIn(const mjModel& model);
 
-/// The plant that a model like ours describes.
+/// The plant that a loaded model describes.
 Plant PlantOf(const mjModel& model);
 
-/// Where the numbers of one simulation's model live: in an mjModel, or in rows that a batch has
-/// expanded. The comments give sizes.
+/// Pointers to the plant's numbers: in an mjModel, or in rows that a batch has expanded. The
+/// comments give sizes.
 struct ModelFields {
   mjtNum* body_mass;           // (3)
   mjtNum* body_inertia;        // (3 × 3)
@@ -57,7 +57,7 @@ struct ModelFields {
 };
 ModelFields FieldsOf(mjModel& model);
 
-/// Writes a plant into a model like ours, as if its MJCF had been written with it. mj_setConst or
+/// Writes a plant into a loaded model, as if its MJCF had these numbers. mj_setConst or
 /// mjb_setConst must follow.
 void WritePlant(const Plant& plant, const ModelFields& fields);
 

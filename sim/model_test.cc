@@ -160,7 +160,7 @@ TEST(Model, MuJoCoStepsLikeTheClosedFormAt100RandomStatesAndPlants) {
   }
 }
 
-TEST(Model, LeavingContactsAndConstraintsOutChangesNoBit) {
+TEST(Model, DisablingContactsAndConstraintsChangesNoBit) {
   const ModelPtr without = CompileModel(Mjcf(Plant()), "test");
   const ModelPtr with = CompileModel(Mjcf(Plant()), "test");
   with->opt.disableflags = 0;
@@ -174,7 +174,7 @@ TEST(Model, LeavingContactsAndConstraintsOutChangesNoBit) {
   }
 }
 
-TEST(Model, BrokenMjcfPassesOnWhatMuJoCoSays) {
+TEST(Model, BrokenMjcfGivesMuJoCosMessage) {
   const auto error_of = [](const std::string& mjcf) -> std::string {
     try {
       LoadModel(mjcf, "file.xml");

@@ -11,7 +11,7 @@
 namespace upswing {
 namespace {
 
-constexpr int kSmallestSlice = 4;  // environments; fewer are not worth a task
+constexpr int kSmallestSlice = 4;  // environments; fewer do not repay a task of their own
 constexpr int kMostSlices = 32;
 
 /// Gives every simulation of the batch its own row of a model field.
@@ -35,7 +35,7 @@ ModelFields ExpandedFields(mjBatch* batch, int env) {
 MuJoCoPhysics::MuJoCoPhysics(const PhysicsConfig& config)
     : config_(config),
       slice_size_(std::max(kSmallestSlice, (config.num_envs + kMostSlices - 1) / kMostSlices)) {
-  // The model, with the one plant that all environments share or as the base of many.
+  // The model, with the plant that all environments share, or the first of many.
   const ModelPtr model = config_.mjcf.empty() ? CompileModel(Mjcf(Plant()), "model")
                                               : LoadModel(config_.mjcf, "model");
   WritePlant(config_.plant(0), FieldsOf(*model));
@@ -87,7 +87,7 @@ void MuJoCoPhysics::SetState(int env, const PendulumState& s) {
 }
 
 void MuJoCoPhysics::SetPlant(int env, const Plant& plant) {
-  // Environments that shared one plant get a plant each.
+  // From now on each environment has its own plant.
   config_.plants.resize(static_cast<size_t>(config_.num_envs), config_.plants.front());
   config_.plants[static_cast<size_t>(env)] = plant;
   const Slice& slice = SliceOf(env);

@@ -8,8 +8,8 @@
 namespace upswing {
 
 /// N double pendulums in MuJoCo, by its batch interface: one batch for each slice of a few
-/// environments, so that our thread pool distributes them and MuJoCo needs no pool of its own. A
-/// warning of MuJoCo counts as a blow-up too.
+/// environments, which our thread pool distributes, so that MuJoCo needs no pool of its own. A
+/// warning of MuJoCo also counts as a blow-up.
 class MuJoCoPhysics : public Physics {
  public:
   /// Throws BadInput on a model that does not compile or is no double pendulum.

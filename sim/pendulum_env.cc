@@ -7,10 +7,9 @@
 #include "core/text.h"
 
 namespace upswing {
-
 namespace {
 
-/// Sensors and motors as these settings have them; nothing if all are perfect.
+/// The sensors and motors of these settings; nothing if there is neither noise nor delay.
 std::optional<Disturber> MakeDisturber(const PendulumEnvConfig& config) {
   const Randomization& random = config.randomization;
   int max_delay = 0;
@@ -77,7 +76,7 @@ std::array<float, kObservationSize> PendulumEnv::Observation(int env) {
 }
 
 void PendulumEnv::SpreadRows(std::vector<float>& table) const {
-  // From the last one backwards, so that none is overwritten before it was moved.
+  // From the last one backwards, so that no row is overwritten before it is moved.
   for (int env = config_.num_envs - 1; env > 0; --env) {
     const auto from = table.begin() + static_cast<ptrdiff_t>(env) * kObservationSize;
     std::copy_backward(from, from + kObservationSize, Row(table, env).begin() + kObservationSize);
@@ -134,7 +133,7 @@ void PendulumEnv::StandIn(int env, StepResult& result) const {
 
 void PendulumEnv::Step(std::span<const double> torque, StepResult& result) {
   physics_->Step(disturber_ ? disturber_->Apply(torque, step_counts_) : torque, result);
-  if (config_.memory > 0) SpreadRows(result.next_obs);  // physics write them without a memory
+  if (config_.memory > 0) SpreadRows(result.next_obs);  // the physics writes them without memory
   for (int env = 0; env < config_.num_envs; ++env) {
     const auto i = static_cast<size_t>(env);
     ++step_counts_[i];
@@ -146,7 +145,7 @@ void PendulumEnv::Step(std::span<const double> torque, StepResult& result) {
     if (result.terminated[i]) StandIn(env, result);
     result.truncated[i] = step_counts_[i] >= episode_steps_ && !result.terminated[i] ? 1 : 0;
   }
-  // What to act on next is the successor, or a new start.
+  // The next observation is the successor, or that of a new start.
   std::ranges::copy(result.next_obs, obs_.begin());
   for (int env = 0; env < config_.num_envs; ++env) {
     if (result.done(static_cast<size_t>(env))) Reset(env);
@@ -155,7 +154,7 @@ void PendulumEnv::Step(std::span<const double> torque, StepResult& result) {
 
 void PendulumEnv::State(const Archive& archive) {
   for (size_t i = 0; i < plants_.size(); ++i) {
-    // A plant is kept as the stream that it was drawn from, and drawn again.
+    // A plant is saved as the random stream from which it was drawn, and drawn again on loading.
     plant_seeds_[i].State(archive.In(Concat("plant_seed.", i)));
     if (!archive.loading()) continue;
     plant_rngs_[i] = plant_seeds_[i];

@@ -17,15 +17,15 @@
 
 namespace upswing {
 
-/// Where episodes begin: a share of them anywhere, the others hanging with normal noise on all
-/// four state variables.
+/// Start states: a share of the episodes begins at random angles and velocities, the others hanging
+/// with normal noise on all four state variables.
 struct StartStates {
   double noise = 0.1;          // standard deviation, rad and rad/s
-  double random_share = 0;     // of episodes that begin anywhere
-  double random_velocity = 5;  // |velocity| of those is uniform up to this, rad/s
+  double random_share = 0;     // of the episodes that begin at random angles in [-π, π]
+  double random_velocity = 5;  // whose velocities are uniform within ± this, rad/s
 };
 
-/// What a PendulumEnv is made of.
+/// Settings of a PendulumEnv.
 struct PendulumEnvConfig : PhysicsConfig {
   double episode_seconds = 10;
   int memory = 0;  // past control steps in an observation
@@ -35,8 +35,8 @@ struct PendulumEnvConfig : PhysicsConfig {
   uint64_t first_index = 0;
   std::vector<Disturbance> disturbances{Disturbance()};  // one for all, or one for each
   Randomization randomization;  // around plants and disturbances, at each reset
-  // The plant whose numbers energy and height in observations are reckoned with, such as that of
-  // a training, so that they tell nothing of the true one; none: each environment's own.
+  // The plant by which energy and height in observations are computed, such as that of a training,
+  // so that they reveal nothing of the true one; none: each environment's own.
   std::optional<Plant> assumed_plant = {};
 
   const Disturbance& disturbance(int env) const {
@@ -47,9 +47,9 @@ struct PendulumEnvConfig : PhysicsConfig {
 /// N double pendulums and their episodes. Reaching the time limit truncates; only a numerical
 /// blow-up (see Physics::Step) terminates. The starts do not depend on the physics.
 ///
-/// Of randomised plants, observation and reward are those of the episode's own plant.
-/// Of a disturbance observations know what the sensors say and motors what arrives; state, reward
-/// and goal are the true ones.
+/// With randomised plants, observation and reward are those of the episode's own plant. With
+/// disturbances, observations hold what the sensors measure, and motors apply the delayed torque;
+/// state, reward and goal are the true ones.
 class PendulumEnv : public VectorEnv {
  public:
   /// Throws BadInput as MakePhysics does.
@@ -77,20 +77,21 @@ class PendulumEnv : public VectorEnv {
     return disturber_ ? disturber_->disturbance(env) : Disturbance();
   }
   PendulumState state(int env) const { return physics_->state(env); }
-  /// Puts an environment into a state, at the beginning of an episode.
+  /// Begins an episode of an environment in a state.
   void SetState(int env, const PendulumState& state);
 
  private:
   void Reset(int env);
   /// Gives a new episode its own plant and disturbance.
   void Randomize(int env);
-  /// What the environment's sensors say now.
+  /// The observation of what the environment's sensors measure now; draws their noise.
   std::array<float, kObservationSize> Observation(int env);
   /// Moves rows of kObservationSize numbers to where those of an observation with memory begin.
   void SpreadRows(std::vector<float>& table) const;
-  /// Adds to a new observation (D) what is remembered under the torque chosen for the last step.
+  /// Fills the memory of a new observation (D), given the torque chosen for the last step, N·m.
   void Remember(int env, double torque, std::span<float> obs) const;
-  /// There is no successor of a state that blew up; the last that had numbers stands in for it.
+  /// Replaces the result of a step that blew up: the successor by the last observation, the rest by
+  /// zeros.
   void StandIn(int env, StepResult& result) const;
 
   /// One environment's observation (D) within a table of them.
@@ -103,11 +104,11 @@ class PendulumEnv : public VectorEnv {
   PendulumEnvConfig config_;
   std::unique_ptr<Physics> physics_;
   int64_t episode_steps_;
-  std::optional<Disturber> disturber_;  // where there is something to disturb
+  std::optional<Disturber> disturber_;  // none without noise and delay
   std::vector<Rng> rngs_;               // (N)
-  // Where plants are random; else empty.
+  // With randomised plants; else empty.
   std::vector<Plant> plants_;     // (N) of the running episodes
-  std::vector<Rng> plant_rngs_;   // (N) for the next episodes'
+  std::vector<Rng> plant_rngs_;   // (N) for those of the next episodes
   std::vector<Rng> plant_seeds_;  // (N) the streams as they were before the running episodes' draws
   std::vector<int64_t> step_counts_;  // (N) control steps since the episode began
   std::vector<float> obs_;            // (N, D)

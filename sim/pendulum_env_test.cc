@@ -13,7 +13,7 @@
 namespace upswing {
 namespace {
 
-/// What holds of the environment whatever its physics.
+/// Properties of the environment with each physics.
 class PendulumEnvs : public testing::TestWithParam<PhysicsEngine> {
  protected:
   static PendulumEnvConfig Config() {
@@ -36,7 +36,7 @@ PendulumEnvConfig PendulumEnvs::SmallConfig() {
 
 TEST_P(PendulumEnvs, TruncatesWithTheTrueSuccessorAndThenResets) {
   PendulumEnv env(SmallConfig());
-  // Another environment with the same start, which goes on beyond the fifth step.
+  // Another environment with the same start, which continues after the fifth step.
   PendulumEnvConfig longer = SmallConfig();
   longer.episode_seconds = 1;
   PendulumEnv reference(longer);
@@ -52,7 +52,7 @@ TEST_P(PendulumEnvs, TruncatesWithTheTrueSuccessorAndThenResets) {
       EXPECT_EQ(result.terminated[i], 0);
     }
   }
-  // What to act on next is a fresh start, not the successor.
+  // The next observation is that of a new start, not the successor.
   const auto next = std::span<const float>(result.next_obs);
   EXPECT_FALSE(std::ranges::equal(env.obs().values(), next));
   EXPECT_TRUE(std::ranges::equal(reference.obs().values(), next));
@@ -78,7 +78,7 @@ TEST_P(PendulumEnvs, APartOfTheEnvironmentsIsAsThoseOfTheWhole) {
   }
 }
 
-TEST_P(PendulumEnvs, AnAssumedPlantIsAllThatObservationsKnow) {
+TEST_P(PendulumEnvs, ObservationsUseTheAssumedPlantOnly) {
   PendulumEnvConfig config = SmallConfig();
   config.randomization.plant.fill(0.3);
   PendulumEnvConfig blind = config;
@@ -98,7 +98,7 @@ TEST_P(PendulumEnvs, AnAssumedPlantIsAllThatObservationsKnow) {
   }
 }
 
-TEST_P(PendulumEnvs, TellsTheDisturbanceOfTheRunningEpisode) {
+TEST_P(PendulumEnvs, ReturnsTheDisturbanceOfTheRunningEpisode) {
   PendulumEnvConfig config = SmallConfig();
   EXPECT_EQ(PendulumEnv(config).disturbance(0).delay, 0);
   config.disturbances = {{0.01, 0.02}};
@@ -210,7 +210,7 @@ TEST_P(PendulumEnvs, TheNumberOfThreadsChangesNoBit) {
   }
 }
 
-TEST_P(PendulumEnvs, LoadedStateGoesOnToTheBit) { ExpectLoadedGoesOn(SmallConfig(), 7); }
+TEST_P(PendulumEnvs, LoadedStateContinuesWithTheSameBits) { ExpectLoadedGoesOn(SmallConfig(), 7); }
 
 TEST_P(PendulumEnvs, StartsAreHangingWithNoiseOrAnywhere) {
   PendulumEnvConfig config = Config();
@@ -241,7 +241,7 @@ TEST_P(PendulumEnvs, TheCurriculumsNoiseHoldsFromTheNextStartOn) {
   for (int i = 0; i < 500; ++i) ASSERT_EQ(env.state(i).q1, 0);
 }
 
-TEST(PendulumEnv, BothPhysicsGoTheSameWayFromTheSameStarts) {
+TEST(PendulumEnv, BothPhysicsAgreeFromTheSameStarts) {
   constexpr int kEnvs = 37;
   PendulumEnvConfig config;
   config.num_envs = kEnvs;
@@ -279,7 +279,7 @@ TEST(PendulumEnv, BothPhysicsGoTheSameWayFromTheSameStarts) {
   }
 }
 
-TEST_P(PendulumEnvs, GoesTheSameWayInAMirror) {
+TEST_P(PendulumEnvs, MirroredStatesAndTorquesGiveTheMirroredMotion) {
   PendulumEnvConfig config = Config();
   config.num_envs = 2;
   PendulumEnv env(config);

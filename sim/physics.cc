@@ -6,7 +6,6 @@
 #include "sim/mujoco_physics.h"
 
 namespace upswing {
-
 namespace {
 
 struct Engine {

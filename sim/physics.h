@@ -43,6 +43,7 @@ class Physics {
  public:
   virtual ~Physics() = default;
 
+  /// The present state of an environment.
   virtual PendulumState state(int env) const = 0;
   /// Puts an environment into a state, also after a blow-up.
   virtual void SetState(int env, const PendulumState& state) = 0;
@@ -50,10 +51,10 @@ class Physics {
   /// Gives an environment another plant; SetState or loading a state must follow.
   virtual void SetPlant(int env, const Plant& plant) = 0;
 
-  /// Holds `torque` (N), N·m, for one control period and fills `result`, all but `truncated`; of
-  /// `next_obs` N packed rows of kObservationSize, whatever the table's width. Of an
+  /// Holds `torque` (N), N·m, for one control period and fills `result`, all but `truncated`;
+  /// `next_obs` with N packed rows of kObservationSize, even if its rows are wider. Of an
   /// environment whose state has blown up (numbers that are not finite or beyond 1e10, or a warning
-  /// of MuJoCo's) only `terminated` has a meaning.
+  /// of MuJoCo's) only `terminated` is meaningful.
   virtual void Step(std::span<const double> torque, StepResult& result) = 0;
 
   /// Saves or loads the state; plants are not part of it.

@@ -174,11 +174,11 @@ TEST_P(RandomizedEnvs, StartsAreThoseOfOnePlantAndStreamsAreNamed) {
   EXPECT_EQ(random.torque_limit(), 5);
 }
 
-TEST_P(RandomizedEnvs, LoadedStateGoesOnToTheBit) {
+TEST_P(RandomizedEnvs, LoadedStateContinuesWithTheSameBits) {
   ExpectLoadedGoesOn(Config(3), 8);  // in the second episode
 }
 
-TEST(RandomizedEnv, BothPhysicsGoTheSameWayOverManyResets) {
+TEST(RandomizedEnv, BothPhysicsAgreeOverManyResets) {
   constexpr int kEnvs = 9;  // more than one of MuJoCo's batches
   PendulumEnvConfig config;
   config.num_envs = kEnvs;

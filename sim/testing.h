@@ -20,8 +20,8 @@ inline std::string EngineName(const testing::TestParamInfo<PhysicsEngine>& info)
   return info.param == PhysicsEngine::kMuJoCo ? "MuJoCo" : "ClosedForm";
 }
 
-/// Expects environments that were saved after so many steps and loaded by others to go on to the
-/// bit, for twelve steps more; episodes should be shorter, so that there are resets among them.
+/// Expects environments that were saved after so many steps and loaded by others to continue with
+/// the same bits for twelve more steps. Episodes should be shorter, so that some of them end.
 inline void ExpectLoadedGoesOn(const PendulumEnvConfig& config, int steps_before) {
   PendulumEnv saved(config), loaded(config);
   StepResult a = saved.MakeResult(), b = saved.MakeResult();

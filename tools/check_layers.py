@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Proves that folders are layers: an include may only point down, and there is no cycle.
+"""Checks that folders are layers: includes point only to lower layers, and there is no cycle.
 
     tools/check_layers.py [ROOT]
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""tools/fetch_wheel: what it refuses before it asks the network, and what is there already."""
+"""tools/fetch_wheel: bad arguments are refused before any download, and existing files are kept."""
 
 import subprocess
 import tempfile

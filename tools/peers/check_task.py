@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Proves that pendulum.py is the task of the program.
+"""Checks that pendulum.py is the same task as that of the program.
 
   build/peers-venv/bin/python tools/peers/check_task.py
 

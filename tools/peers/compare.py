@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Measures Upswing and its peers side by side on this machine, in turns, and prints a table.
+"""Measures Upswing and other libraries on this machine, alternating, and prints a table.
 
 Examples:
   tools/peers/compare.py                                   everything, about six minutes
@@ -47,7 +47,7 @@ def say(text):
 
 
 def install_peers():
-    """Makes the virtual environment anew unless it holds what requirements.txt asks for."""
+    """Makes the virtual environment again unless it already holds requirements.txt."""
     wanted = REQUIREMENTS.read_text(encoding="utf-8")
     done = VENV / "installed.txt"
     if done.is_file() and done.read_text(encoding="utf-8") == wanted:
@@ -73,7 +73,7 @@ def measure(side, what, threads, a):
 
 
 def measure_in_turns(a):
-    """All rounds; the order of the sides is turned round from one round to the next. Returns
+    """All rounds; the order of the sides alternates from one round to the next. Returns
     {(what, threads, side): list of measurements}."""
     results = {}
     for number in range(a.rounds):
@@ -90,8 +90,8 @@ def measure_in_turns(a):
 
 def summarize(results):
     """One row for each measurement, with medians and our rate and CPU time over theirs. A ratio is
-    the median over the rounds, so that a load that hits both sides of a round cancels out; that of
-    the fastest rounds tells of a machine without other load."""
+    the median over the rounds, so that load on both sides of a round cancels out; the ratio of the
+    fastest rounds estimates that of a machine without other load."""
     rows = []
     for (what, threads, side), rounds in results.items():
         row = {"measure": what, "threads": threads, "side": side, "rounds": rounds}
@@ -127,7 +127,7 @@ def print_table(rows):
 
 
 def processor():
-    """The processor's name, as far as Linux tells it."""
+    """The processor's name by /proc/cpuinfo, else the machine's architecture."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:

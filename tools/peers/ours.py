@@ -1,4 +1,4 @@
-"""Our side of the comparison: what the program is told, and what is read from its files."""
+"""Our side of the comparison: the program's settings, and the figures read from its files."""
 
 import csv
 import json
@@ -25,11 +25,11 @@ LOG_EVERY = 200  # steps from one row of metrics.csv to the next; learning begin
 
 
 class Failed(Exception):
-    """Something that a user should read, in one line."""
+    """An error whose message, one line, is for the user."""
 
 
 def run(command, **more):
-    """Runs a command to its end and returns its output; throws Failed with its last words."""
+    """Runs a command to its end and returns its output; raises Failed with the last line of its output."""
     done = subprocess.run(list(map(str, command)), stdin=subprocess.DEVNULL, capture_output=True,
                           encoding="utf-8", check=False, **more)
     if done.returncode != 0:
