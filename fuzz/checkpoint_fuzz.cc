@@ -8,23 +8,40 @@
 
 namespace upswing {
 
+namespace {
+
+/// Two trainings with the same settings, kept from one input to the next: loading overwrites the
+/// whole state, and making a training takes far longer than loading one.
+struct Trainings {
+  explicit Trainings(const std::string& physics)
+      : first(TinyConfig(physics), pool), second(TinyConfig(physics), pool) {}
+  ThreadPool pool{1};
+  TinyTraining first, second;
+};
+
+Trainings& TrainingsIn(bool mujoco) {
+  static Trainings in_mujoco("mujoco");
+  static Trainings in_closed_form("closed-form");
+  return mujoco ? in_mujoco : in_closed_form;
+}
+
+}  // namespace
+
 bool TryInput(std::string_view input) {
-  static ThreadPool pool(1);
   const auto bytes = BytesOf(input);
   TensorFile file;
   if (!Accepts([&] { file = TensorFile::Parse({bytes.begin(), bytes.end()}, kInputName); })) {
     return false;
   }
   // The settings stand in another file; here the metadata say which of two trainings this is.
-  const bool mujoco = file.metadata.contains("mujoco");
-  const Config config = TinyConfig(mujoco ? "mujoco" : "closed-form");
-  TinyTraining training(config, pool);
+  Trainings& trainings = TrainingsIn(file.metadata.contains("mujoco"));
+  TinyTraining& training = trainings.first;
+  TinyTraining& again = trainings.second;
   if (!Accepts([&] { training.State(Archive::Loader(file)); })) return false;
 
   // What was loaded can be saved, loaded again, and resumed.
   TensorFile saved;
   training.State(Archive::Saver(saved));
-  TinyTraining again(config, pool);
   Expect(Accepts([&] { again.State(Archive::Loader(saved)); }), "to load what was saved");
   try {
     again.Step();
