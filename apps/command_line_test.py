@@ -49,6 +49,15 @@ class HelpTest(ProgramTest):
         self.assertRegex(self.help_of("--randomize", "train"), r"share.* ± .*\(0 to 0.99\)")
         self.assertIn("(0.01 to 100)", self.help_of("--mass", "train"))
 
+    def test_lines_end_only_where_the_width_asks_for_it(self):
+        for command in COMMANDS:
+            lines = self.succeed(command, "--help").split("\n\nExamples")[0].splitlines()
+            for line, after in zip(lines, lines[1:]):
+                if not re.match(r" {30}\S", line) or not re.match(r" {30}\S", after):
+                    continue
+                with self.subTest(command=command, line=line, after=after):
+                    self.assertGreater(len(line) + 1 + len(after.split()[0]), 100)
+
     def test_agents_are_described_to_the_end(self):
         text = " ".join(self.succeed("train", "--help").split())
         self.assertIn("with a memory: many plants, and few updates for each d3qn-small", text)
@@ -167,6 +176,11 @@ class SettingsTest(ProgramTest):
         self.assertNotIn("Warning", self.succeed(*small(steps=400, out="good")))
         self.assertNotIn("Warning", self.succeed(*small(steps=400, out="copied", tau=0,
                                                         target_period=10)))
+        # 32 environments end at step 416.
+        rounded = {"envs": 32, "steps": 400, "learning_starts": 400, "eval_episodes": 1}
+        self.assertNotIn("Warning", self.succeed(*small(**rounded, out="rounded")))
+        none = rounded | {"learning_starts": 416}
+        self.assertIn("there are 416 steps: nothing", self.succeed(*small(**none, out="none")))
 
     def test_a_network_that_does_not_fit_into_memory_leaves_nothing(self):
         script = 'ulimit -v 4000000; exec "$@"'

@@ -119,13 +119,28 @@ Found ReadRuns(const CompareRequest& request) {
   return found;
 }
 
-/// Takes out trainings that were found before.
+/// How many steps were trained up to the last evaluation.
+int64_t LastStep(const RunRecord& run) {
+  return run.evaluations.empty() ? 0 : run.evaluations.back().step;
+}
+
+/// Of runs that are the same training, keeps the one that went furthest, of equals the first.
 void LeaveOutTwins(Found& found) {
-  std::map<std::pair<int64_t, std::vector<Setting>>, fs::path> seen;
+  const auto key = [](const FoundRun& f) { return std::pair(f.run.plan.seed, f.settings); };
+  struct Furthest {
+    fs::path path;
+    int64_t step;
+  };
+  std::map<std::pair<int64_t, std::vector<Setting>>, Furthest> furthest;
+  for (const FoundRun& f : found.runs) {
+    const int64_t step = LastStep(f.run);
+    const auto [at, is_new] = furthest.try_emplace(key(f), Furthest{f.run.path, step});
+    if (!is_new && step > at->second.step) at->second = {f.run.path, step};
+  }
   std::erase_if(found.runs, [&](const FoundRun& f) {
-    const auto [before, is_new] = seen.try_emplace({f.run.plan.seed, f.settings}, f.run.path);
-    if (is_new) return false;
-    found.LeaveOut(f.run.path, Concat("the same training as ", before->second.string(),
+    const fs::path& kept = furthest.at(key(f)).path;
+    if (f.run.path == kept) return false;
+    found.LeaveOut(f.run.path, Concat("the same training as ", kept.string(),
                                       " (all settings and seed ", f.run.plan.seed, ")"));
     return true;
   });

@@ -210,6 +210,16 @@ class CompareTest(ProgramTest):
                 self.assertEqual(sum(note.startswith(words) for note in left_out), 1, words)
         self.assertIn("Note: file: expected a run folder", self.succeed("compare", "r", "file"))
 
+    def test_of_the_same_training_the_one_that_went_furthest_is_kept(self):
+        self.make_run("r/begun", 1, [(0, 1)], steps=1000)
+        self.make_run("r/long", 1, [(0, 1), (1, 1), (1, 1)])
+        self.make_run("r/short", 1, [(0, 1), (1, 1)], steps=2000)
+        answer = self.compare("r")
+        self.assertEqual([note for note in answer["notes"] if "left out" in note],
+                         [f"r/{name}: the same training as r/long (all settings and seed 1): "
+                          "left out" for name in ("begun", "short")])
+        self.assertEqual(answer["groups"][0]["solved"], 1)
+
     def test_an_evaluation_interval_is_no_task(self):
         self.make_group("a", [1, 1, 2])
         self.make_group("b", [3, 3, 2], more="gamma = 0.9\neval_physics = \"mujoco\"\n")

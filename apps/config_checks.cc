@@ -31,10 +31,13 @@ double NumParameters(const Config& config) {
 std::vector<std::string> Warnings(const Config& config) {
   const DqnConfig& d = config.dqn;
   std::vector<std::string> warnings;
-  if (d.learning_starts >= config.train.steps) {
+  // Environments step together: a training ends with the lock-step that reaches its last step.
+  const int64_t envs = config.train.envs;
+  const int64_t steps = (config.train.steps + envs - 1) / envs * envs;
+  if (d.learning_starts >= steps) {
     warnings.push_back(fmt::format(
         "learning starts after step {}, and there are {} steps: nothing will be learned",
-        FormatCount(d.learning_starts), FormatCount(config.train.steps)));
+        FormatCount(d.learning_starts), FormatCount(steps)));
   }
   if (d.updates_per_step == 0) {
     warnings.emplace_back("updates_per_step is 0: nothing will be learned");

@@ -50,11 +50,16 @@ EvalReport Judge(const EvalArguments& a, const LoadedPolicy& loaded) {
 }
 
 int RunEval(const EvalArguments& a) {
+  const bool to_output = IsStandardStream(a.episodes_csv);
+  if (to_output && a.as_json) {
+    throw BadInput("--json: expected a file of its own for --episodes-csv, got - for it");
+  }
   if (!a.episodes_csv.empty()) CheckWritable("--episodes-csv", a.episodes_csv);
   const EvalReport report = Judge(a, LoadPolicy(a.policy));
   if (!a.episodes_csv.empty()) WriteOutput(a.episodes_csv, EpisodesCsv(report));
+  if (to_output) return 0;  // the rows alone, for a reader
   a.as_json ? PrintEvalJson(report) : PrintEvalTable(report);
-  if (!a.episodes_csv.empty() && !IsStandardStream(a.episodes_csv) && !a.as_json) {
+  if (!a.episodes_csv.empty() && !a.as_json) {
     fmt::print("  written        {}\n", Printable(a.episodes_csv));
   }
   return 0;
@@ -70,8 +75,8 @@ void AddEval(CLI::App& program, Command& command) {
   own.Add(&a->episodes, "episodes", 100, {1, 1000000}, "", "how many");
   AddArguments(*app, own);
   app->add_option("--episodes-csv", a->episodes_csv,
-                  "table to write, a row for each episode: start, plant and figures;\n"
-                  "-: standard output")
+                  "table to write, a row for each episode: start, plant and figures; "
+                  "-: standard output, instead of the table of figures")
       ->type_name("FILE")
       ->check(NotEmpty());
   AddTrialOptions(*app, a->trial, "start states, noise and random plants");

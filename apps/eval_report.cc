@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <numbers>
 
 #include "apps/trial.h"
@@ -15,8 +17,14 @@ using nlohmann::ordered_json;
 
 constexpr double kDegrees = 180 / std::numbers::pi;
 
+/// Such as `34.18 ± 0.57`: two digits of the deviation, or its whole part, and the mean to as many
+/// decimals.
 std::string MomentsText(const Moments& m, double scale = 1) {
-  return fmt::format("{:.4g} ± {:.2g}", scale * m.mean, scale * m.deviation);
+  constexpr double kLeast = 1e-6;  // below it a deviation is rounding
+  const double mean = scale * m.mean, deviation = scale * m.deviation;
+  if (deviation < kLeast) return fmt::format("{:.4g} ± 0", mean);
+  const int decimals = std::max(0, 1 - static_cast<int>(std::floor(std::log10(deviation))));
+  return fmt::format("{:.{}f} ± {:.{}f}", mean, decimals, deviation, decimals);
 }
 
 std::string QuartilesText(const Quartiles& q) {

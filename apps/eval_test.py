@@ -22,6 +22,12 @@ def wilson(successes, trials):
     return max(0, center - half), min(1, center + half)
 
 
+def moments_text(moments):
+    """As the table has them: two digits of the deviation, or its whole part."""
+    decimals = max(0, 1 - math.floor(math.log10(moments["deviation"])))
+    return f"{moments['mean']:.{decimals}f} ± {moments['deviation']:.{decimals}f}"
+
+
 class EvalTest(ProgramTest):
     @classmethod
     def setUpClass(cls):
@@ -122,10 +128,9 @@ class EvalTest(ProgramTest):
         for name, words in (("torque_variation", "its variation  {} N·m/s; once upright"),
                             ("torque_variation_upright", "once upright {} N·m/s\n"),
                             ("torque_changes_upright", "chatter        {} changes of the torque")):
-            moments = f"{result[name]['mean']:.4g} ± {result[name]['deviation']:.2g}"
-            self.assertIn(words.format(moments), table)
+            self.assertIn(words.format(moments_text(result[name])), table)
         tilt = result["steady_tilt_degrees"]["link1"]
-        self.assertIn(f"link 1 {tilt['mean']:.4g} ± {tilt['deviation']:.2g}°", table)
+        self.assertIn(f"link 1 {moments_text(tilt)}°", table)
         self.assertIn(f"{result['value']:.4g} expected, {result['discounted_return']:.4g} attained",
                       table)
 
@@ -226,6 +231,23 @@ class EvalTest(ProgramTest):
         self.refuse(["plot", self.policy, "--episode", -1], "--episode")
         self.refuse(["simulate", "--unknown-plant"], "--unknown-plant: expected a policy")
         self.refuse(["eval", self.policy, "--episodes-csv", ""], "--episodes-csv")
+        self.refuse(["eval", self.policy, "--episodes-csv", "-", "--json"], "--json",
+                    "--episodes-csv")
+
+    def test_episodes_on_standard_output_are_a_table_alone(self):
+        rows = self.episodes()
+        text = self.succeed("eval", self.policy, "--episodes", 6, "--episodes-csv", "-")
+        self.assertEqual(list(csv.DictReader(text.splitlines())), rows)
+
+    def test_means_and_deviations_have_the_same_decimals(self):
+        # Random plants: the return differs by hundreds, the tilt by fractions of a degree.
+        text = self.succeed("eval", self.policy, "--episodes", 6, "--randomize", 0.4)
+        pairs = re.findall(r"(\S+) ± ([^\s°]+)", text)
+        self.assertGreater(len(pairs), 3)
+        for mean, deviation in pairs:
+            with self.subTest(mean=mean, deviation=deviation):
+                self.assertRegex(deviation, r"^\d+(\.\d+)?$")
+                self.assertEqual(*(len(number.partition(".")[2]) for number in (mean, deviation)))
 
     def test_random_plants_are_said_and_change_the_result(self):
         usual = self.evaluate()

@@ -86,7 +86,9 @@ std::string HelpFormatter::make_option_name(const CLI::Option* option, bool is_p
 }
 
 std::string HelpFormatter::make_option_desc(const CLI::Option* option) const {
-  return WrapText(option->get_description(), kHelpColumns - get_column_width());
+  std::string description = option->get_description();
+  std::ranges::replace(description, '\n', ' ');  // lines end where the width asks for it
+  return WrapText(description, kHelpColumns - get_column_width());
 }
 
 std::string Explain(const CLI::App& program, const CLI::ParseError& error) {

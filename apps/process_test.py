@@ -39,9 +39,14 @@ class OutputTest(ProgramTest):
 
     def test_output_that_is_lost_is_a_failure(self):
         for redirection in NO_OUTPUT:
-            for arguments in (["info"], ["simulate"], ["--help"], ["train", "--help"]):
+            for arguments in (["info"], ["simulate"], ["--help"], ["train", "--help"],
+                              ["train", "--print-config"]):
                 with self.subTest(redirection=redirection, arguments=arguments):
                     self.assertEqual(self.shell(redirection, *arguments), 1)
+        done = subprocess.run(["sh", "-c", 'exec "$@" >/dev/full', "sh", UPSWING, "train",
+                               "--print-config"], check=False, capture_output=True,
+                              encoding="utf-8")
+        self.assertIn("cannot write the output: No space left", done.stderr)
 
     def test_training_goes_on_without_a_place_for_what_it_says(self):
         # More lines than a buffer holds.

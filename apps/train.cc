@@ -18,6 +18,7 @@
 #include "apps/run_log.h"
 #include "apps/seeds.h"
 #include "apps/signals.h"
+#include "apps/streams.h"
 #include "apps/train_view.h"
 #include "core/error.h"
 #include "core/file.h"
@@ -203,7 +204,7 @@ int RunSeeds(const TrainArguments& arguments) {
 int PrintConfig(const TrainArguments& arguments) {
   const Config config = arguments.resume.empty() ? BuildConfig(arguments.config, arguments.flags)
                                                  : ReadRunConfig(arguments.resume, arguments.flags);
-  fmt::print("{}", CompleteToml(config));
+  WriteOutput("-", CompleteToml(config));
   return 0;
 }
 

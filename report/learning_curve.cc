@@ -147,7 +147,7 @@ Figure LearningCurves(const std::vector<RunGroup>& groups) {
     if (panel.y_label == kReturn) returns.push_back(&panel);
     for (const Line& line : panel.lines) dashed = dashed || line.dashed_from;
   }
-  if (dashed) figure.caption += " Dashed: a run has ended and keeps its last value.";
+  if (dashed) figure.caption += " Dotted: a run has ended and keeps its last value.";
   const auto return_range = RangeFromZero(returns);
   for (Panel& panel : figure.panels) {
     panel.y_range = panel.y_label == kReturn ? return_range : std::pair(0.0, 102.0);

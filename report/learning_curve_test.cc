@@ -66,7 +66,7 @@ TEST(LearningCurve, CurvesAreDashedFromWhereARunHasEndedOverStepsAndOverTime) {
   const Figure apart = LearningCurves({slow});
   EXPECT_FALSE(apart.panels[0].lines[0].dashed_from);
   EXPECT_TRUE(apart.panels[1].lines[0].dashed_from);
-  EXPECT_NE(apart.caption.find("Dashed"), std::string::npos);
+  EXPECT_NE(apart.caption.find("Dotted"), std::string::npos);
 }
 
 TEST(LearningCurve, TheFigureSaysHowManyRunsAndWhatTheBandIs) {
