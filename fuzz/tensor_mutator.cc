@@ -176,7 +176,8 @@ void MutateNumber(LooseTensor& tensor, Random& random) {
 void MutateShape(LooseTensor& tensor, Random& random) {
   if (tensor.shape.empty()) tensor.shape.push_back(1);
   int64_t& extent = tensor.shape[Below(random, tensor.shape.size())];
-  const auto near = static_cast<int64_t>(static_cast<uint64_t>(extent) + random() % 3 - 1);  // may wrap
+  const auto near =
+      static_cast<int64_t>(static_cast<uint64_t>(extent) + random() % 3 - 1);  // may wrap
   extent = random() % 2 == 0 ? OddInteger(random) : near;
   size_t count = SizeOf(tensor);
   for (const int64_t n : tensor.shape) {
