@@ -204,7 +204,7 @@ Config ReadRunConfig(const fs::path& run, const std::vector<FlagValue>& flags) {
                           ", the copy in the run folder, got \"", Printable(model), "\""));
   }
   std::vector<std::string> missing = MissingSettings(text, file.string(), false);
-  if (missing.empty()) return BuildConfig(file, flags);
+  if (missing.empty()) return ParseConfig(text, file, flags);
   constexpr size_t kMostNames = 6;  // that make a line which can still be read
   const size_t more = missing.size() - std::min(missing.size(), kMostNames);
   missing.resize(missing.size() - more);

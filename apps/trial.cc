@@ -56,7 +56,7 @@ PendulumEnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy*
   }
   if (loaded != nullptr) {
     env.mjcf = loaded->mjcf;
-    env.memory = MemorySteps(loaded->policy.shape().inputs);
+    env.memory = loaded->memory();
     if (a.unknown_plant) env.assumed_plant = loaded->plant;
   }
   env.plants = {
