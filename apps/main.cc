@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <exception>
 #include <filesystem>
@@ -17,6 +18,7 @@
 #include "apps/signals.h"
 #include "core/error.h"
 #include "core/file.h"
+#include "core/simd.h"
 #include "core/text.h"
 
 namespace upswing {
@@ -54,6 +56,13 @@ int Finish(int exit_code) {
   return 1;
 }
 
+/// Uses the vector instructions that the environment variable UPSWING_VECTORS names, if there is one:
+/// for results of another processor, to the bit.
+void ChooseVectors() {
+  const char* path = std::getenv("UPSWING_VECTORS");
+  if (path != nullptr && *path != '\0') UseSimdPath(path);
+}
+
 int Main(int argc, char** argv) {
   CLI::App program(
       "Upswing trains, tests and explains controllers that swing up and balance a double\n"
@@ -82,6 +91,7 @@ int Main(int argc, char** argv) {
 
   try {
     try {
+      ChooseVectors();
       program.parse(argc, argv);
       return Finish(command());
     } catch (const CLI::Success& request) {
