@@ -9,14 +9,14 @@
 
 #include "apps/bench_report.h"
 #include "apps/commands.h"
-#include "apps/machine.h"
 #include "apps/say.h"
 #include "apps/signals.h"
-#include "apps/streams.h"
 #include "core/error.h"
 #include "core/simd.h"
 #include "core/text.h"
 #include "core/thread_pool.h"
+#include "io/machine.h"
+#include "io/streams.h"
 
 namespace upswing {
 namespace {

@@ -5,9 +5,12 @@
 #include <memory>
 
 #include "apps/bench.h"
-#include "apps/config.h"
 #include "core/rng.h"
 #include "core/thread_pool.h"
+#include "lab/config.h"
+#include "lab/training.h"
+#include "mujoco/engines.h"
+#include "nn/q_policy.h"
 #include "rl/dqn.h"
 #include "rl/replay.h"
 
@@ -16,8 +19,8 @@ namespace {
 
 constexpr int kActions = 9;
 
-/// Of the nine actions, N·m.
-std::vector<double> Torques() { return TorqueLevels(Plant().torque_limit); }
+/// What the agent of a case learns.
+EnvSpec OneEnvironment() { return PendulumSpec(PendulumEnvConfig()); }
 
 /// A replay memory filled with random transitions, 2% of which terminate.
 std::shared_ptr<Replay> FilledReplay(int64_t size) {
@@ -91,8 +94,7 @@ BenchCase GradientCase(const DqnConfig& config, int threads,
               Rng rng{1, "replay sampling"};
               Parts(const DqnConfig& c, int pool_threads)
                   : pool(pool_threads),
-                    agent(c, 1, kObservationSize, Torques(),
-                          {kMirrorSigns.begin(), kMirrorSigns.end()}, 1, pool),
+                    agent(c, OneEnvironment(), 1, pool),
                     batch(static_cast<int>(c.batch), kObservationSize) {}
             };
             const auto parts = std::make_shared<Parts>(config, threads);
@@ -109,55 +111,37 @@ BenchCase ActCase(int batch) {
   // The value stream is left out: half of the streams' hidden layer, and the value.
   const std::vector<double> layers = LayerMultiplyAdds(shape);
   const double multiply_adds = layers[0] + layers[1] + layers[2] / 2 + layers[4];
-  return {fmt::format("act/256-256/batch:{}", batch),
-          "actions",
-          static_cast<double>(batch),
-          2.0 * multiply_adds * batch,
-          0,
-          1,
-          [=]() -> BenchWork {
-            Rng rng(1, "benchmark");
-            const QNetwork<float> network(shape);
-            std::vector<float> parameters(network.num_parameters());
-            network.Initialize(rng, parameters);
-            const auto policy =
-                std::make_shared<Policy>(shape, parameters, Torques(), PolicyInfo());
-            const auto n = static_cast<size_t>(batch);
-            const auto obs = std::make_shared<AlignedVector<float>>(n * kObservationSize);
-            for (float& x : *obs) x = static_cast<float>(rng.Uniform(-1, 1));
-            const auto torque = std::make_shared<std::vector<double>>(n);
-            return [=] {
-              policy->Act(Matrix<const float>(obs->data(), batch, kObservationSize), *torque);
-            };
-          }};
+  return {
+      fmt::format("act/256-256/batch:{}", batch),
+      "actions",
+      static_cast<double>(batch),
+      2.0 * multiply_adds * batch,
+      0,
+      1,
+      [=]() -> BenchWork {
+        Rng rng(1, "benchmark");
+        const QNetwork<float> network(shape);
+        std::vector<float> parameters(network.num_parameters());
+        network.Initialize(rng, parameters);
+        const auto policy = std::make_shared<QPolicy>(
+            shape, parameters, TorqueLevels(Plant().torque_limit, kActions), PolicyInfo());
+        const auto n = static_cast<size_t>(batch);
+        const auto obs = std::make_shared<AlignedVector<float>>(n * kObservationSize);
+        for (float& x : *obs) x = static_cast<float>(rng.Uniform(-1, 1));
+        const auto torque = std::make_shared<std::vector<double>>(n);
+        const std::shared_ptr<Policy::Memory> memory = policy->Start(batch);
+        return [=] {
+          policy->Act({obs->data(), batch, kObservationSize}, {torque->data(), batch, 1}, *memory);
+        };
+      }};
 }
 
-/// A training as `upswing train --agent NAME` has it, without files and evaluations.
-struct LearningLoop {
-  LearningLoop(const Config& config, int threads)
-      : pool(threads),
-        env(config.Environments(pool)),
-        agent(config.Agent(env, pool)),
-        result(env.MakeResult()),
-        torque(static_cast<size_t>(env.num_envs())) {}
-
-  /// One lock-step of all environments and the gradient steps that are due.
-  void Step() {
-    agent.Act(env.obs(), torque);
-    env.Step(torque, result);
-    agent.Observe(result);
-    agent.Learn();
-  }
-
-  ThreadPool pool;
-  PendulumEnv env;
-  Dqn agent;
-  StepResult result;
-  std::vector<double> torque;  // (N)
-};
-
 BenchCase TrainCase(const std::string& agent, const std::string& physics, int threads) {
-  const Config config = BuildConfig({}, {{"agent", agent}, {"physics", physics}});
+  // Without evaluations.
+  const Config config = BuildConfig({}, {{"agent", agent},
+                                         {"physics", physics},
+                                         {"steps", "1000000000"},
+                                         {"eval_every", "1000000000"}});
   return {fmt::format("train/{}/{}/threads:{}", agent, physics, threads),
           "steps",
           static_cast<double>(config.train.envs),
@@ -165,9 +149,9 @@ BenchCase TrainCase(const std::string& agent, const std::string& physics, int th
           0,
           threads,
           [=]() -> BenchWork {
-            const auto loop = std::make_shared<LearningLoop>(config, threads);
-            while (loop->agent.Report().updates == 0) loop->Step();
-            return [loop] { loop->Step(); };
+            const auto training = std::make_shared<Training>(config, threads);
+            while (training->agent().updates() == 0) training->Step();
+            return [training] { training->Step(); };
           }};
 }
 
@@ -223,7 +207,7 @@ BenchCases ReplayCases(const BenchOptions& /*options*/) {
 BenchCases TrainCases(const BenchOptions& options) {
   BenchCases cases;
   for (const std::string agent : {"d3qn", "d3qn-small"}) {
-    for (const std::string& physics : PhysicsNames()) {
+    for (const std::string& physics : EngineNames()) {
       for (const int64_t threads : options.threads) {
         cases.push_back(TrainCase(agent, physics, threads));
       }

@@ -8,6 +8,7 @@
 #include "apps/bench.h"
 #include "core/rng.h"
 #include "core/thread_pool.h"
+#include "mujoco/engines.h"
 #include "rl/dqn.h"
 #include "sim/closed_form.h"
 #include "sim/pendulum_env.h"
@@ -20,7 +21,7 @@ namespace {
 class Torques {
  public:
   explicit Torques(int num_envs) : num_envs_(static_cast<size_t>(num_envs)) {
-    const std::vector<double> levels = TorqueLevels(Plant().torque_limit);
+    const std::vector<double> levels = TorqueLevels(Plant().torque_limit, 9);
     Rng rng(1, "benchmark");
     for (size_t i = 0; i < kSteps * num_envs_; ++i) {
       values_.push_back(levels[rng.Below(levels.size())]);
@@ -43,12 +44,12 @@ class Torques {
 /// percent of the time.
 BenchWork PhysicsInMuJoCo(int num_envs, int threads) {
   const auto pool = std::make_shared<ThreadPool>(threads);
-  PhysicsConfig config;
+  PendulumEnvConfig config;
   config.num_envs = num_envs;
   config.pool = pool.get();
-  const std::shared_ptr<Physics> physics = MakePhysics(config);
+  const std::shared_ptr<Physics> physics = kMuJoCo.make(config);
   const auto torques = std::make_shared<Torques>(num_envs);
-  const auto result = std::make_shared<StepResult>(num_envs, kObservationSize, kRewardTerms);
+  const auto result = std::make_shared<StepResult>(PendulumSpec(config));
   return [=, keep = pool] { physics->Step(torques->Next(), *result); };
 }
 
@@ -70,7 +71,7 @@ BenchWork PhysicsInClosedForm(int num_envs, int threads) {
 
 /// Runge-Kutta steps, four to a control period.
 BenchCase PhysicsCase(const std::string& physics, int num_envs, int threads) {
-  const bool closed_form = ParsePhysics(physics, "physics") == PhysicsEngine::kClosedForm;
+  const bool closed_form = &FindEngine(physics, "physics") == &kClosedForm;
   return {fmt::format("physics/{}/envs:{}/threads:{}", physics, num_envs, threads),
           "steps",
           static_cast<double>(kPhysicsSteps) * num_envs,
@@ -94,7 +95,7 @@ BenchCase EnvCase(const std::string& physics, int num_envs, int threads) {
           [=]() -> BenchWork {
             const auto pool = std::make_shared<ThreadPool>(threads);
             PendulumEnvConfig config;
-            config.physics = ParsePhysics(physics, "physics");
+            config.engine = &FindEngine(physics, "physics");
             config.num_envs = num_envs;
             config.pool = pool.get();
             const auto env = std::make_shared<PendulumEnv>(config);
@@ -108,7 +109,7 @@ BenchCase EnvCase(const std::string& physics, int num_envs, int threads) {
 template <typename MakeCase>
 BenchCases CasesOf(const BenchOptions& options, const MakeCase& make) {
   BenchCases cases;
-  for (const std::string& physics : PhysicsNames()) {
+  for (const std::string& physics : EngineNames()) {
     for (const int num_envs : {8, 128, 1024}) {
       for (const int64_t threads : options.threads)
         cases.push_back(make(physics, num_envs, threads));

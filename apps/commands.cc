@@ -4,6 +4,7 @@
 #include <array>
 
 #include "core/text.h"
+#include "mujoco/engines.h"
 
 namespace upswing {
 namespace {
@@ -70,7 +71,7 @@ void AddThreads(CLI::App& app, int64_t& threads) {
 }
 
 void AddPhysics(CLI::App& app, std::string& physics, const std::string& usual) {
-  std::vector<std::string> engines = PhysicsNames();
+  std::vector<std::string> engines = EngineNames();
   std::stable_partition(engines.begin(), engines.end(),  // clang 14 cannot compile ranges::
                         [&](const std::string& name) { return name == usual; });
   Options options;

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/config.h"
+#include "lab/config.h"
 
 namespace upswing {
 

@@ -1,11 +1,13 @@
+#include "apps/compare_report.h"
+
 #include <fmt/format.h>
 
 #include <cmath>
 
-#include "apps/compare.h"
 #include "apps/progress.h"
 #include "core/json.h"
 #include "core/text.h"
+#include "lab/format.h"
 
 namespace upswing {
 namespace {

@@ -3,15 +3,16 @@
 #include <memory>
 
 #include "apps/commands.h"
-#include "apps/config.h"
 #include "apps/eval_report.h"
-#include "apps/loaded_policy.h"
 #include "apps/progress.h"
-#include "apps/streams.h"
 #include "apps/trial.h"
 #include "core/error.h"
 #include "core/text.h"
 #include "core/thread_pool.h"
+#include "io/machine.h"
+#include "io/streams.h"
+#include "lab/config.h"
+#include "lab/loaded_policy.h"
 #include "rl/evaluate.h"
 
 namespace upswing {
@@ -32,8 +33,7 @@ EvalReport Judge(const EvalArguments& a, const LoadedPolicy& loaded) {
   report.env = TrialEnvironments(a.trial, &loaded);
   report.model = InfoOfModel(report.env.mjcf, a.trial.model);
   report.env.num_envs = static_cast<int>(a.episodes);
-  report.env.episode_seconds = kEvaluationSeconds;
-  report.knows_values = ValueUnitsOf(loaded.policy).gamma > 0;
+  report.knows_values = ValueUnitsOf(*loaded.policy).gamma > 0;
   ThreadPool pool(ResolveThreads(a.threads));
   PendulumEnvConfig config = report.env;
   config.pool = &pool;
@@ -43,8 +43,8 @@ EvalReport Judge(const EvalArguments& a, const LoadedPolicy& loaded) {
   }
   EpisodeProgress progress(a.episodes, a.as_json);
   std::vector<EvaluationEpisode> results =
-      EvaluateEpisodes(loaded.policy, env, &pool, [&](double share) { progress.Show(share); });
-  report.figures = Summarize(results);
+      EvaluateEpisodes(*loaded.policy, env, &pool, [&](double share) { progress.Show(share); });
+  report.figures = Summarize(results, env.spec().evaluation);
   for (size_t i = 0; i < results.size(); ++i) report.episodes[i].result = std::move(results[i]);
   return report;
 }

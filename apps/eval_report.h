@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "apps/config.h"
-#include "apps/model_info.h"
+#include "lab/config.h"
+#include "lab/model_info.h"
 #include "rl/evaluate.h"
 #include "sim/pendulum_env.h"
 

@@ -1,13 +1,13 @@
-#include "apps/export.h"
+#include "lab/export.h"
 
 #include <fmt/format.h>
 
 #include <memory>
 
 #include "apps/commands.h"
-#include "apps/streams.h"
 #include "core/error.h"
 #include "core/text.h"
+#include "io/streams.h"
 
 namespace upswing {
 namespace {

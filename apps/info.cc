@@ -5,16 +5,20 @@
 #include <optional>
 
 #include "apps/commands.h"
-#include "apps/config.h"
-#include "apps/loaded_policy.h"
-#include "apps/model_info.h"
 #include "apps/progress.h"
 #include "core/error.h"
 #include "core/simd.h"
 #include "core/text.h"
-#include "core/thread_pool.h"
+#include "io/machine.h"
+#include "io/run_folder.h"
+#include "io/tensor_file.h"
+#include "lab/config.h"
+#include "lab/format.h"
+#include "lab/loaded_policy.h"
+#include "lab/model_info.h"
+#include "mujoco/model.h"
 #include "nn/bfloat16.h"
-#include "sim/model.h"
+#include "nn/q_policy.h"
 
 namespace upswing {
 namespace {
@@ -34,7 +38,7 @@ std::string EvaluationText(const PolicyInfo& info) {
                      *info.mean_return);
 }
 
-void PrintSelfCheck(const Policy::SelfCheck& check) {
+void PrintSelfCheck(const QPolicy::SelfCheck& check) {
   fmt::print("  self-check  passed, largest difference {:.1e} of at most {:.1e}\n", check.error,
              check.tolerance);
   if (check.has_checksum) {
@@ -49,30 +53,30 @@ void PrintSelfCheck(const Policy::SelfCheck& check) {
 
 void PrintPolicy(const fs::path& path) {
   const LoadedPolicy loaded = LoadPolicy(path);
-  const Policy& policy = loaded.policy;
+  const Policy& policy = *loaded.policy;
   const PolicyInfo& info = policy.info();
-  const QNetworkShape& shape = policy.shape();
   fmt::print("{}\n", Printable(loaded.path.string()));
-  fmt::print("  what        greedy policy of a {} Q-network {}-{}-{}{}, {} parameters\n",
-             shape.dueling ? "dueling" : "plain", shape.inputs, fmt::join(shape.hidden, "-"),
-             shape.dueling ? fmt::format("({0}→1, {0}→{1})", shape.head, shape.actions)
-                           : std::to_string(shape.actions),
-             shape.layer_norm ? ", layer normalisation" : "", FormatCount(policy.num_parameters()));
-  fmt::print("  torques     {} N·m, every {} s\n", fmt::join(policy.torques(), ", "),
+  fmt::print("  what        {}, {} parameters\n", policy.description(),
+             FormatCount(policy.num_parameters()));
+  if (loaded.task != kDoublePendulum) fmt::print("  task        {}\n", loaded.task);
+  fmt::print("  torques     {} N·m, every {} s\n", fmt::join(policy.value_actions().values(), ", "),
              *info.control_period);
   fmt::print("  made by     agent {}, seed {}, step {}, upswing {}\n", Known(info.agent),
              Known(info.seed), Known(info.step), Known(info.upswing_version));
   fmt::print("  evaluated   {}\n", EvaluationText(info));
-  fmt::print("  plant       {}\n", PlantText(loaded.plant));
+  if (loaded.task == kDoublePendulum) {
+    fmt::print("  plant       {}\n", PlantText(loaded.plant));
+  }
   const std::optional<ModelInfo> model = InfoOfModel(loaded.mjcf, "");
   if (model) fmt::print("  model       {}\n", model->Text());
-  PrintSelfCheck(policy.self_check());
+  if (const auto* q = dynamic_cast<const QPolicy*>(&policy)) PrintSelfCheck(q->self_check());
 }
 
 void PrintRun(const fs::path& path, bool has_policy) {
-  const TensorFile checkpoint = TensorFile::Load(RunFolder::CheckpointPath(path));
+  const Tensors checkpoint = LoadTensors(RunFolder::CheckpointPath(path));
   const Config config = ReadRunConfig(path);
-  TrainState state(static_cast<int>(config.train.envs), kRewardTerms);
+  const EnvSpec spec = SpecOf(config.Environments());
+  TrainState state(spec.num_envs, static_cast<int>(spec.term_names.size()));
   state.State(Archive::Loader(checkpoint).In("train"));
   fmt::print("{}\n", Printable(path.string()));
   fmt::print("  agent       {}, seed {}, upswing {}\n", config.agent, config.train.seed,
@@ -111,8 +115,8 @@ int RunInfo(const std::string& path) {
     PrintProgram();
     return 0;
   }
-  const bool is_run = fs::exists(fs::path(path) / "config.toml");
-  const fs::path run_policy = fs::path(path) / "policy.safetensors";
+  const bool is_run = fs::exists(fs::path(path) / RunFolder::kConfig);
+  const fs::path run_policy = fs::path(path) / RunFolder::kPolicy;
   try {
     if (is_run) PrintRun(path, fs::exists(run_policy));
   } catch (const Error& error) {

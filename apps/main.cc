@@ -17,9 +17,9 @@
 #include "apps/say.h"
 #include "apps/signals.h"
 #include "core/error.h"
-#include "core/file.h"
 #include "core/simd.h"
 #include "core/text.h"
+#include "io/file.h"
 
 namespace upswing {
 namespace {
@@ -56,8 +56,8 @@ int Finish(int exit_code) {
   return 1;
 }
 
-/// Uses the vector instructions that the environment variable UPSWING_VECTORS names, if there is one:
-/// for results of another processor, to the bit.
+/// Uses the vector instructions that the environment variable UPSWING_VECTORS names, if there is
+/// one: for results of another processor, to the bit.
 void ChooseVectors() {
   const char* path = std::getenv("UPSWING_VECTORS");
   if (path != nullptr && *path != '\0') UseSimdPath(path);

@@ -6,11 +6,12 @@
 #include <cmath>
 #include <limits>
 
-#include "apps/config_checks.h"
 #include "apps/say.h"
-#include "apps/seeds.h"
 #include "core/sample.h"
 #include "core/text.h"
+#include "lab/config_checks.h"
+#include "lab/format.h"
+#include "lab/seeds.h"
 
 namespace upswing {
 namespace {
@@ -30,9 +31,11 @@ void PrintRow(const std::string& name, double step, double seconds, double succe
 
 }  // namespace
 
-ManyRunsView::ManyRunsView(const ManyRuns& plan, const std::vector<SeedRun>& runs)
-    : plan_(plan), runs_(runs), steps_before_(0) {
+void ManyRunsView::Begin(const std::vector<SeedRun>& runs) {
+  InstallSignalHandlers(kStoppingTraining);  // what is begun from here on ends in order
+  runs_ = &runs;
   steps_before_ = Measure().steps;
+  Announce();
 }
 
 void ManyRunsView::Announce() const {
@@ -40,20 +43,20 @@ void ManyRunsView::Announce() const {
   Say("Training {} in {}\n", Printable(plan_.what), Printable(plan_.folder.string()));
   Say("  {}seed{} {}: {} run{}, {} at a time\n",
       variants == 1 ? "" : fmt::format("{} variants, ", variants),
-      plan_.seeds.size() == 1 ? "" : "s", SeedsText(plan_.seeds), runs_.size(),
-      runs_.size() == 1 ? "" : "s", plan_.jobs);
+      plan_.seeds.size() == 1 ? "" : "s", SeedsText(plan_.seeds), runs_->size(),
+      runs_->size() == 1 ? "" : "s", plan_.jobs);
   for (const Variant& variant : plan_.variants) {
     for (const std::string& warning : Warnings(variant.config)) {
       Say("  Warning: {}{}{}\n", Printable(variant.name), variant.name.empty() ? "" : ": ",
           warning);
     }
   }
-  const auto begun = std::ranges::count_if(runs_, [](const SeedRun& run) { return !!run.state; });
+  const auto begun = std::ranges::count_if(*runs_, [](const SeedRun& run) { return !!run.state; });
   if (begun > 0) {
     const size_t done = Measure().done;
     Say("  {} done before, resuming {}\n", done, static_cast<size_t>(begun) - done);
   }
-  for (const SeedRun& run : runs_) {
+  for (const SeedRun& run : *runs_) {
     if (!run.problem.empty()) Say("  {:<20} failed: {}\n", run.name, Printable(run.problem));
   }
   std::fflush(stdout);
@@ -61,7 +64,7 @@ void ManyRunsView::Announce() const {
 
 ManyRunsView::Progress ManyRunsView::Measure() const {
   Progress progress;
-  for (const SeedRun& run : runs_) {
+  for (const SeedRun& run : *runs_) {
     const auto steps = static_cast<double>(run.Steps());
     progress.steps += steps;
     progress.done += run.finished() ? 1 : 0;
@@ -73,7 +76,7 @@ ManyRunsView::Progress ManyRunsView::Measure() const {
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin_;
   progress.steps_per_second = (progress.steps - steps_before_) / std::max(1e-3, elapsed.count());
   const bool may_end_early = std::ranges::any_of(
-      runs_, [](const SeedRun& run) { return run.variant->config.train.stop_when_solved; });
+      *runs_, [](const SeedRun& run) { return run.variant->config.train.stop_when_solved; });
   progress.time_left = fmt::format("{} {} left", may_end_early ? "at most" : "about",
                                    progress.steps_per_second > 0
                                        ? FormatDuration(progress.left / progress.steps_per_second)
@@ -81,10 +84,11 @@ ManyRunsView::Progress ManyRunsView::Measure() const {
   return progress;
 }
 
-void ManyRunsView::ShowProgress(const std::vector<const SeedRun*>& running) {
+void ManyRunsView::Watch(const std::vector<const SeedRun*>& running) {
+  if (!line_.due()) return;
   const Progress progress = Measure();
   std::vector<std::string> fields{
-      fmt::format("{} of {} runs", progress.done, runs_.size()), progress.time_left,
+      fmt::format("{} of {} runs", progress.done, runs_->size()), progress.time_left,
       fmt::format("{} steps/s", FormatCount(std::max(0.0, progress.steps_per_second)))};
   for (const SeedRun* run : running) {
     const auto all = static_cast<double>(run->variant->config.train.steps);
@@ -94,7 +98,7 @@ void ManyRunsView::ShowProgress(const std::vector<const SeedRun*>& running) {
   line_.Show(progress.share, fields);
 }
 
-void ManyRunsView::PrintEnd(const SeedRun& run) {
+void ManyRunsView::End(const SeedRun& run) {
   if (!run.problem.empty()) {
     return line_.Print(fmt::format("  {:<20} failed: {} (log: {})", run.name,
                                    Printable(run.problem), Printable(run.log().string())));
@@ -107,7 +111,7 @@ void ManyRunsView::PrintEnd(const SeedRun& run) {
                           s.solved         ? "solved at " + FormatCount(s.streak_step)
                           : run.finished() ? "done, not solved"
                                            : "stopped",
-                          progress.done, runs_.size(),
+                          progress.done, runs_->size(),
                           progress.left > 0 ? ", " + progress.time_left : ""));
 }
 
@@ -116,7 +120,7 @@ void ManyRunsView::PrintTable(const Variant& variant) const {
   std::vector<double> steps, seconds, success, reward;
   size_t solved = 0;
   size_t not_judged = 0, failed = 0;
-  for (const SeedRun& run : runs_) {
+  for (const SeedRun& run : *runs_) {
     if (run.variant != &variant) continue;
     if (!run.state || run.state->best_step == 0) {
       ++(run.problem.empty() ? not_judged : failed);
@@ -148,18 +152,19 @@ void ManyRunsView::PrintTable(const Variant& variant) const {
   if (failed > 0) Say("  {} run{} failed\n", failed, failed == 1 ? "" : "s");
 }
 
-void ManyRunsView::Summarize(bool stopped) {
+void ManyRunsView::Finish() {
+  const bool stopped = StopSignal() != 0;
   line_.Clear();
   for (const Variant& variant : plan_.variants) PrintTable(variant);
   const size_t done = Measure().done;
   Say("\nSuccess and return are those of each run's best policy at evaluation.\n");
   if (stopped) {
-    Say("Stopped, {} of {} runs done; the same command resumes them.\n", done, runs_.size());
+    Say("Stopped, {} of {} runs done; the same command resumes them.\n", done, runs_->size());
   }
   const bool can_be_typed = Printable(plan_.folder.string()) == plan_.folder.string();
-  if (can_be_typed && (done < runs_.size() || !plan_.compared)) {
+  if (can_be_typed && (done < runs_->size() || !plan_.compared)) {
     Say("Next:\n  ./upswing compare {}{}\n", ShellQuoted(plan_.folder.string()),
-        done < runs_.size() ? " --unfinished" : "");
+        done < runs_->size() ? " --unfinished" : "");
   }
   std::fflush(stdout);
 }

@@ -4,29 +4,27 @@
 #include <string>
 #include <vector>
 
-#include "apps/many_runs.h"
 #include "apps/progress.h"
+#include "apps/signals.h"
+#include "lab/many_runs.h"
 
 namespace upswing {
 
-/// What people see of many runs: a progress line, a line for each that has ended, a table.
-class ManyRunsView {
+/// What people see of many runs: a progress line, a line for each that has ended, a table. Signals
+/// stop them.
+class ManyRunsView : public ManyRunsObserver {
  public:
-  /// Both must outlive it. The rate counts the steps made from now on.
-  ManyRunsView(const ManyRuns& plan, const std::vector<SeedRun>& runs);
+  /// The plan must outlive it.
+  explicit ManyRunsView(const ManyRuns& plan) : plan_(plan) {}
 
-  /// Prints what is trained and where.
-  void Announce() const;
-
-  /// Whether the progress line should be updated now; false without a terminal.
-  bool due() const { return line_.due(); }
-  void ShowProgress(const std::vector<const SeedRun*>& running);
-
-  /// A line on a run that has ended in any way.
-  void PrintEnd(const SeedRun& run);
-
+  /// Prints what is trained and where. The rate counts the steps made from now on.
+  void Begin(const std::vector<SeedRun>& runs) override;
+  void Watch(const std::vector<const SeedRun*>& running) override;
+  void End(const SeedRun& run) override;
   /// Prints all results and the next command to type.
-  void Summarize(bool stopped);
+  void Finish() override;
+  TrainRequest Poll() override { return PollSignals(); }
+  int stop_signal() const override { return StopSignal(); }
 
  private:
   /// How far all runs are together.
@@ -38,12 +36,13 @@ class ManyRunsView {
     std::string time_left;  // such as `at most 3 min 20 s left`
   };
   Progress Measure() const;
+  void Announce() const;
   void PrintTable(const Variant& variant) const;
 
   const ManyRuns& plan_;
-  const std::vector<SeedRun>& runs_;
+  const std::vector<SeedRun>* runs_ = nullptr;
   ProgressLine line_;
-  double steps_before_;  // made before this process
+  double steps_before_ = 0;  // made before this process
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };
 

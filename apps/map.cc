@@ -8,15 +8,19 @@
 #include <optional>
 
 #include "apps/commands.h"
-#include "apps/config.h"
-#include "apps/loaded_policy.h"
-#include "apps/map_grid.h"
 #include "apps/map_output.h"
 #include "apps/progress.h"
 #include "apps/trial.h"
 #include "core/error.h"
-#include "core/file.h"
 #include "core/text.h"
+#include "core/thread_pool.h"
+#include "io/file.h"
+#include "io/machine.h"
+#include "lab/config.h"
+#include "lab/format.h"
+#include "lab/loaded_policy.h"
+#include "lab/map_grid.h"
+#include "mujoco/engines.h"
 #include "report/figure.h"
 
 namespace upswing {
@@ -46,7 +50,7 @@ struct Training {
 Training TrainingOf(const LoadedPolicy& loaded) {
   Training training;
   training.point.plant = loaded.plant;
-  const std::string& settings = loaded.policy.info().config;
+  const std::string& settings = loaded.policy->info().config;
   if (settings.empty()) return training;
   Config config;
   try {
@@ -124,7 +128,7 @@ MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded, const Trai
   // From one start each episode is the same, unless there is noise.
   const int usual = config.start_given ? 1 : 10;
   config.episodes = a.episodes > 0 ? static_cast<int>(a.episodes) : usual;
-  config.physics = ParsePhysics(a.physics, "--physics");
+  config.engine = &FindEngine(a.physics, "--physics");
   config.seed = static_cast<uint64_t>(a.seed);
   if (config.cells() * config.episodes > kMostEpisodes) {
     throw BadInput(Concat("map: expected at most ", FormatCount(kMostEpisodes), " episodes, got ",
@@ -160,13 +164,13 @@ int RunMapCommand(const MapArguments& a) {
   std::vector<int64_t> all(static_cast<size_t>(map.config.cells()));
   std::iota(all.begin(), all.end(), int64_t{0});
   const auto begin = Clock::now();
-  map.cells = RunCells(map.config, loaded.policy, all, pool, a.as_json);
+  map.cells = RunCells(map.config, *loaded.policy, all, pool, a.as_json);
   map.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
-  if (map.config.physics != PhysicsEngine::kMuJoCo) {
+  if (map.config.engine != &kMuJoCo) {
     map.checked = DrawCells(map.config, a.check);
     MapConfig mujoco = map.config;
-    mujoco.physics = PhysicsEngine::kMuJoCo;
-    map.in_mujoco = RunCells(mujoco, loaded.policy, map.checked, pool, a.as_json);
+    mujoco.engine = &kMuJoCo;
+    map.in_mujoco = RunCells(mujoco, *loaded.policy, map.checked, pool, a.as_json);
   }
 
   MakeNewFolder(folder);

@@ -7,11 +7,12 @@
 #include <limits>
 #include <numeric>
 
-#include "apps/config.h"
 #include "apps/progress.h"
-#include "core/file.h"
 #include "core/json.h"
 #include "core/text.h"
+#include "io/file.h"
+#include "lab/config.h"
+#include "lab/format.h"
 #include "report/figure.h"
 #include "rl/evaluate.h"
 

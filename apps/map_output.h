@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "apps/map_grid.h"
-#include "apps/model_info.h"
+#include "lab/map_grid.h"
+#include "lab/model_info.h"
 
 namespace upswing {
 

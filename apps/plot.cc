@@ -5,14 +5,14 @@
 #include <optional>
 
 #include "apps/commands.h"
-#include "apps/config.h"
-#include "apps/loaded_policy.h"
-#include "apps/model_info.h"
-#include "apps/plot_figures.h"
-#include "apps/rollout.h"
 #include "apps/trial.h"
-#include "core/file.h"
 #include "core/text.h"
+#include "io/file.h"
+#include "lab/config.h"
+#include "lab/loaded_policy.h"
+#include "lab/model_info.h"
+#include "lab/plot_figures.h"
+#include "lab/rollout.h"
 #include "report/figure.h"
 
 namespace upswing {
@@ -55,12 +55,12 @@ std::string Caption(const PlotArguments& a, const RolloutConfig& config, const R
 int RunPlot(const PlotArguments& a) {
   const LoadedPolicy loaded = LoadPolicy(a.policy);
   RolloutConfig config;
-  config.policy = &loaded.policy;
+  config.policy = loaded.policy.get();
   config.env = TrialEnvironments(a.trial, &loaded);
   config.start = ChooseEpisode(a.episode, config.env);
   const double usual = a.episode.given() ? kEvaluationSeconds : 10;
   config.seconds = a.seconds < 0 ? usual : a.seconds;
-  config.q_values = true;
+  config.q_values = loaded.policy->num_values() > 0;
   const std::optional<ModelInfo> model = InfoOfModel(config.env.mjcf, a.trial.model);
   const fs::path folder = a.out.empty() ? DefaultOut(loaded, "plot") : fs::path(a.out);
   CheckFree(folder);
@@ -68,7 +68,7 @@ int RunPlot(const PlotArguments& a) {
   const Rollout rollout = RunRollout(config);
 
   MakeNewFolder(folder);
-  Figure episode = EpisodeFigure(rollout, loaded.policy);
+  Figure episode = EpisodeFigure(rollout, *loaded.policy);
   Figure phase = PhaseFigure(rollout);
   std::vector<std::string> files;
   for (auto [name, figure] : {std::pair("episode", &episode), std::pair("phase", &phase)}) {
@@ -88,7 +88,7 @@ int RunPlot(const PlotArguments& a) {
              since < 0 ? "not at the end" : fmt::format("from {:.2f} s to the end", since));
   if (a.episode.given()) {
     fmt::print("  episode    {} of eval: {}\n", a.episode.number,
-               JudgementText(JudgeEpisode(loaded.policy, config.env)));
+               JudgementText(JudgeEpisode(*loaded.policy, config.env)));
   }
   fmt::print("  written    {}\n", Join(files, ", "));
   return 0;

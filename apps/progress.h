@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <chrono>
-#include <concepts>
 #include <cstdio>
 #include <string>
 #include <vector>
@@ -55,15 +54,5 @@ class EpisodeProgress {
   ProgressLine line_;
   Clock::time_point begin_ = Clock::now();
 };
-
-/// Seconds as people read them: `8.3 s`, `2 min 05 s`, `1 h 04 min`.
-std::string FormatDuration(double seconds);
-
-/// A whole number with commas between groups of three digits: `1,250,000`.
-std::string FormatCount(double number);
-template <std::integral T>
-std::string FormatCount(T number) {
-  return FormatCount(static_cast<double>(number));
-}
 
 }  // namespace upswing

@@ -2,7 +2,7 @@
 
 #include <string_view>
 
-#include "rl/train.h"
+#include "lab/training_run.h"
 
 namespace upswing {
 

@@ -5,14 +5,14 @@
 #include <optional>
 
 #include "apps/commands.h"
-#include "apps/config.h"
-#include "apps/loaded_policy.h"
-#include "apps/rollout.h"
-#include "apps/streams.h"
 #include "apps/trial.h"
 #include "core/csv.h"
 #include "core/error.h"
 #include "core/text.h"
+#include "io/streams.h"
+#include "lab/config.h"
+#include "lab/loaded_policy.h"
+#include "lab/rollout.h"
 
 namespace upswing {
 namespace {
@@ -61,7 +61,7 @@ int RunSimulate(const SimulateArguments& a) {
                           InputName(a.torque), " has torques, got ", FormatNumber(config.seconds)));
   }
 
-  if (loaded) config.policy = &loaded->policy;
+  if (loaded) config.policy = loaded->policy.get();
   config.env = TrialEnvironments(a.trial, loaded ? &*loaded : nullptr);
   config.start = ChooseEpisode(a.episode, config.env);
   const Rollout rollout = RunRollout(config);
@@ -76,7 +76,7 @@ int RunSimulate(const SimulateArguments& a) {
   fmt::print("  plant      {}\n", EpisodeText(rollout));
   if (loaded && a.episode.given()) {
     fmt::print("  episode    {} of eval: {}\n", a.episode.number,
-               JudgementText(JudgeEpisode(loaded->policy, config.env)));
+               JudgementText(JudgeEpisode(*loaded->policy, config.env)));
   }
   return 0;
 }

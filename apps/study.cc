@@ -3,14 +3,15 @@
 #include <memory>
 
 #include "apps/commands.h"
-#include "apps/compare.h"
-#include "apps/config_checks.h"
-#include "apps/many_runs.h"
-#include "apps/seeds.h"
-#include "apps/study_file.h"
+#include "apps/compare_report.h"
+#include "apps/many_runs_view.h"
 #include "core/error.h"
-#include "core/file.h"
 #include "core/text.h"
+#include "io/file.h"
+#include "lab/config_checks.h"
+#include "lab/many_runs.h"
+#include "lab/seeds.h"
+#include "lab/study_file.h"
 #include "report/figure.h"
 
 namespace upswing {
@@ -69,7 +70,8 @@ ManyRuns ReadStudy(const StudyArguments& arguments) {
 int RunStudy(const StudyArguments& arguments) {
   const ManyRuns plan = ReadStudy(arguments);
   CheckCanDraw();  // before hours of training, not after
-  const int exit_code = TrainMany(plan);
+  ManyRunsView view(plan);
+  const int exit_code = TrainMany(plan, view);
   if (exit_code != 0) return exit_code;
   // All runs are done: compare them.
   CompareRequest request;

@@ -6,29 +6,35 @@
 #include <cstdio>
 #include <optional>
 
-#include "apps/config_checks.h"
-#include "apps/model_info.h"
 #include "apps/say.h"
+#include "apps/signals.h"
 #include "core/text.h"
+#include "io/run_folder.h"
+#include "lab/config_checks.h"
+#include "lab/format.h"
+#include "lab/model_info.h"
+#include "mujoco/engines.h"
 
 namespace upswing {
 
-TrainView::TrainView(const TrainState& state, const AgentReport& report)
-    : begin_step_(state.steps),
-      report_(report),
-      since_step_(state.steps),
-      since_updates_(report.updates),
-      since_seconds_(state.seconds) {}
+TrainView::TrainView(const Training& training)
+    : training_(training),
+      begin_step_(training.state().steps),
+      since_step_(training.state().steps),
+      since_updates_(training.agent().updates()),
+      since_seconds_(training.state().seconds) {}
 
-void TrainView::Announce(const Config& config, int threads, size_t num_parameters,
-                         const std::filesystem::path& run) const {
+void TrainView::Announce(const std::filesystem::path& run) const {
+  const Config& config = training_.config();
+  const int threads = training_.threads();
   const DqnConfig& d = config.dqn;
   Say("Training {} (seed {}) in {}\n", config.agent, config.train.seed, Printable(run.string()));
   Say("  {}{} network {}{}, {} parameters; {} environments, {} thread{}\n",
       d.double_q ? "double, " : "", d.dueling ? "dueling" : "plain", fmt::join(d.hidden, "-"),
-      d.dueling ? fmt::format(" with heads of {}", d.head) : "", FormatCount(num_parameters),
-      config.train.envs, threads, threads == 1 ? "" : "s");
-  if (config.physics != PhysicsNames().front() || d.precision != "float32") {
+      d.dueling ? fmt::format(" with heads of {}", d.head) : "",
+      FormatCount(training_.policy()->num_parameters()), config.train.envs, threads,
+      threads == 1 ? "" : "s");
+  if (config.physics != kMuJoCo.name || d.precision != "float32") {
     Say("  physics {}, products in {}\n", config.physics, d.precision);
   }
   const std::optional<ModelInfo> model = InfoOfModel(config.mjcf, config.model);
@@ -44,34 +50,34 @@ void TrainView::Announce(const Config& config, int threads, size_t num_parameter
   std::fflush(stdout);
 }
 
-void TrainView::Follow(Training& training) {
-  const int64_t steps_in_all = training.config.steps;
-  training.on_metrics = [this](const TrainState& s, const AgentReport& report) {
-    UpdateRates(s, report);
-  };
-  training.on_step = [this, steps_in_all](const TrainState& s) {
-    if (line_.due()) ShowProgress(s, steps_in_all);
-  };
-  training.on_evaluation = [this](const TrainState& s, const Evaluation& e) {
-    line_.Print(
-        fmt::format("{:>9} steps  {:>11}  {:>6} updates/s  eps {:.2f}  loss {:>6}  return {:6.0f}  "
-                    "success {:3}/{}",
-                    FormatCount(s.steps), FormatDuration(s.seconds), UpdatesText(), report_.epsilon,
-                    LossText(), e.reward_sum.mean, e.successes, e.episodes));
-  };
+void TrainView::OnMetrics(const TrainState& s, const Metrics& metrics) {
+  metrics_ = metrics;
+  UpdateRates(s);
 }
 
-void TrainView::UpdateRates(const TrainState& s, const AgentReport& report) {
-  report_ = report;
+TrainRequest TrainView::AfterStep(const TrainState& s) {
+  if (line_.due()) ShowProgress(s);
+  return PollSignals();
+}
+
+void TrainView::OnEvaluation(const TrainState& s, const Evaluation& e) {
+  line_.Print(
+      fmt::format("{:>9} steps  {:>11}  {:>6} updates/s  {}  return {:6.0f}  success {:3}/{}",
+                  FormatCount(s.steps), FormatDuration(s.seconds), UpdatesText(),
+                  Join(AgentTexts(), "  "), e.reward_sum.mean, e.successes, e.episodes));
+}
+
+void TrainView::UpdateRates(const TrainState& s) {
   const double elapsed = s.seconds - since_seconds_;
   const bool is_long = elapsed >= 0.5;
   if (elapsed <= 0 || (rates_settled_ && !is_long)) return;
+  const int64_t updates = training_.agent().updates();
   steps_per_second_ = static_cast<double>(s.steps - since_step_) / elapsed;
-  updates_per_second_ = static_cast<double>(report.updates - since_updates_) / elapsed;
+  updates_per_second_ = static_cast<double>(updates - since_updates_) / elapsed;
   if (!is_long) return;
   rates_settled_ = true;
   since_step_ = s.steps;
-  since_updates_ = report.updates;
+  since_updates_ = updates;
   since_seconds_ = s.seconds;
 }
 
@@ -79,7 +85,8 @@ std::string TrainView::UpdatesText() const {
   return steps_per_second_ > 0 ? FormatCount(updates_per_second_) : "-";
 }
 
-void TrainView::ShowProgress(const TrainState& s, int64_t steps_in_all) {
+void TrainView::ShowProgress(const TrainState& s) {
+  const int64_t steps_in_all = training_.config().train.steps;
   const auto steps_left = static_cast<double>(steps_in_all - s.steps);
   std::vector<std::string> fields{fmt::format("success {:.0f}%", 100 * s.last_success_rate),
                                   fmt::format("return {:.0f}", s.mean_return())};
@@ -89,16 +96,25 @@ void TrainView::ShowProgress(const TrainState& s, int64_t steps_in_all) {
     fields.push_back(fmt::format("{} steps/s", FormatCount(steps_per_second_)));
     fields.push_back(fmt::format("{} updates/s", UpdatesText()));
   }
-  fields.push_back(fmt::format("eps {:.2f}", report_.epsilon));
-  fields.push_back("loss " + LossText());
+  for (const std::string& text : AgentTexts()) fields.push_back(text);
   line_.Show(static_cast<double>(s.steps) / static_cast<double>(steps_in_all), fields);
 }
 
-std::string TrainView::LossText() const {
-  return report_.updates == 0 ? "-" : fmt::format("{:.4f}", report_.loss);
+std::vector<std::string> TrainView::AgentTexts() const {
+  const bool learned = training_.agent().updates() > 0;
+  std::vector<std::string> texts;
+  for (const auto& [name, value] : metrics_) {
+    if (name == "epsilon") texts.push_back(fmt::format("eps {:.2f}", value));
+    if (name == "loss") {
+      texts.push_back(learned ? fmt::format("loss {:.4f}", value) : "loss      -");
+    }
+  }
+  return texts;
 }
 
-void TrainView::PrintOutcome(const TrainState& s, const TrainConfig& config, bool finished) const {
+void TrainView::PrintOutcome(bool finished) const {
+  const TrainState& s = training_.state();
+  const TrainConfig& config = training_.config().train;
   const bool did_nothing = begin_step_ > 0 && s.steps == begin_step_ && finished;
   const bool all_steps_done = s.steps >= config.steps;
   if (did_nothing && all_steps_done) {
@@ -118,11 +134,12 @@ void TrainView::PrintOutcome(const TrainState& s, const TrainConfig& config, boo
   }
 }
 
-void TrainView::Summarize(const TrainState& s, const TrainConfig& config,
-                          const std::filesystem::path& run, bool finished) {
+void TrainView::Summarize(const std::filesystem::path& run, bool finished) {
+  const TrainState& s = training_.state();
+  const TrainConfig& config = training_.config().train;
   line_.Clear();
-  PrintOutcome(s, config, finished);
-  const std::filesystem::path policy = run / "policy.safetensors";
+  PrintOutcome(finished);
+  const std::filesystem::path policy = run / RunFolder::kPolicy;
   std::error_code error;
   const bool has_policy = s.best_step > 0 && std::filesystem::exists(policy, error);
   if (has_policy) {

@@ -2,42 +2,43 @@
 
 #include <filesystem>
 
-#include "apps/config.h"
 #include "apps/progress.h"
-#include "rl/train.h"
+#include "lab/training_run.h"
 
 namespace upswing {
 
 /// What people see of a training: a progress line, a line for each evaluation, a summary.
-class TrainView {
+class TrainView : public TrainingRun::Driver {
  public:
-  /// A training that stands at `state`, whose agent reports `report`.
-  TrainView(const TrainState& state, const AgentReport& report);
+  /// A training, which must outlive this, from where it stands.
+  explicit TrainView(const Training& training);
 
   /// Prints what is trained and where.
-  void Announce(const Config& config, int threads, size_t num_parameters,
-                const std::filesystem::path& run) const;
+  void Announce(const std::filesystem::path& run) const;
 
-  /// Connects this view to the training's callbacks.
-  void Follow(Training& training);
+  void OnMetrics(const TrainState& s, const Metrics& metrics) override;
+  void OnEvaluation(const TrainState& s, const Evaluation& e) override;
+  /// Shows progress; signals stop the training.
+  TrainRequest AfterStep(const TrainState& s) override;
 
   /// Prints the result and the next commands to type. `finished`: the training was not stopped.
-  void Summarize(const TrainState& state, const TrainConfig& config,
-                 const std::filesystem::path& run, bool finished);
+  void Summarize(const std::filesystem::path& run, bool finished);
 
  private:
-  void UpdateRates(const TrainState& state, const AgentReport& report);
-  /// The rate of updates and the loss as the lines show them.
+  void UpdateRates(const TrainState& state);
+  /// The rate of updates as the lines show it.
   std::string UpdatesText() const;
-  std::string LossText() const;
-  void ShowProgress(const TrainState& state, int64_t steps_in_all);
+  /// What the agent has to tell, such as `eps 0.05` and `loss 0.0012`.
+  std::vector<std::string> AgentTexts() const;
+  void ShowProgress(const TrainState& state);
 
   /// Prints in one sentence how far the training is.
-  void PrintOutcome(const TrainState& state, const TrainConfig& config, bool finished) const;
+  void PrintOutcome(bool finished) const;
 
+  const Training& training_;
   ProgressLine line_;
   int64_t begin_step_;  // where this view's training began
-  AgentReport report_;  // the last one
+  Metrics metrics_;     // the last ones
 
   // Rates of training, between two reports at least half a second apart; before there are such, of
   // all that was reported; 0 before the first report.

@@ -5,9 +5,11 @@
 #include <algorithm>
 
 #include "apps/commands.h"
-#include "apps/rollout.h"
 #include "core/error.h"
 #include "core/text.h"
+#include "io/run_folder.h"
+#include "lab/rollout.h"
+#include "mujoco/engines.h"
 
 namespace upswing {
 namespace {
@@ -47,7 +49,7 @@ void AddTrialOptions(CLI::App& app, TrialArguments& a, const std::string& seed_o
 
 PendulumEnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded) {
   PendulumEnvConfig env;
-  env.physics = ParsePhysics(a.physics, "--physics");
+  env.engine = &FindEngine(a.physics, "--physics");
   const Conditions conditions = ConditionsOf(a);
   env.disturbances = {conditions.disturbance};
   env.randomization = conditions.randomization;
@@ -96,7 +98,7 @@ std::string PlantChangesText(Plant plant, Plant training) {
 
 fs::path DefaultOut(const LoadedPolicy& loaded, const std::string& name) {
   const fs::path run = loaded.path.parent_path();
-  const fs::path first = fs::exists(run / "config.toml")
+  const fs::path first = fs::exists(run / RunFolder::kConfig)
                              ? run / name
                              : fs::path("runs") / Concat(name, "-", loaded.path.stem().string());
   fs::path out = first;

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "apps/config.h"
-#include "apps/loaded_policy.h"
+#include "lab/config.h"
+#include "lab/loaded_policy.h"
 #include "sim/pendulum_env.h"
 
 /// The plant, sensors and motor on which `eval`, `simulate` and `plot` try a policy out. With

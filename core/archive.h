@@ -13,7 +13,7 @@
 
 #include "core/error.h"
 #include "core/finite.h"
-#include "core/tensor_file.h"
+#include "core/tensors.h"
 #include "core/text.h"
 
 namespace upswing {
@@ -39,9 +39,9 @@ inline constexpr Bounds<T> kAnyNumber{std::numeric_limits<T>::lowest(),
 class Archive {
  public:
   /// An archive that adds to `file`. Arrays are viewed, not copied: save before they change.
-  static Archive Saver(TensorFile& file) { return {&file, nullptr, ""}; }
+  static Archive Saver(Tensors& file) { return {&file, nullptr, ""}; }
   /// An archive that reads from `file`.
-  static Archive Loader(const TensorFile& file) { return {nullptr, &file, ""}; }
+  static Archive Loader(const Tensors& file) { return {nullptr, &file, ""}; }
 
   bool loading() const { return source_ != nullptr; }
 
@@ -68,7 +68,7 @@ class Archive {
     if (loading()) {
       const size_t count = source_->Count<T>(Concat(prefix_, name));
       if (count > max_size) {
-        throw BadInput(Concat(source_->path(), ": tensor \"", prefix_, name,
+        throw BadInput(Concat(source_->where(), ": tensor \"", prefix_, name,
                               "\": expected at most ", max_size, " numbers, got ", count));
       }
       values.resize(count);
@@ -80,7 +80,7 @@ class Archive {
   void Check(bool valid, std::string_view name, std::string_view expected) const {
     if (loading() && !valid) {
       throw BadInput(
-          Concat(source_->path(), ": tensor \"", prefix_, name, "\": expected ", expected));
+          Concat(source_->where(), ": tensor \"", prefix_, name, "\": expected ", expected));
     }
   }
 
@@ -113,14 +113,14 @@ class Archive {
     }
     if (problem.empty()) return;
     const std::string what = Concat("tensor \"", path, "\": ", problem);
-    throw loading() ? BadInput(Concat(source_->path(), ": ", what)) : Failure(what);
+    throw loading() ? BadInput(Concat(source_->where(), ": ", what)) : Failure(what);
   }
 
-  Archive(TensorFile* target, const TensorFile* source, std::string prefix)
+  Archive(Tensors* target, const Tensors* source, std::string prefix)
       : target_(target), source_(source), prefix_(std::move(prefix)) {}
 
-  TensorFile* target_;
-  const TensorFile* source_;
+  Tensors* target_;
+  const Tensors* source_;
   std::string prefix_;
 };
 

@@ -35,6 +35,8 @@ struct Option {
   bool identity;                          // whether runs that differ in it are different runs
   std::vector<std::string> choices = {};  // texts only: allowed values; empty: any
   double step = 0;                        // numbers only: must be a multiple of it; 0: any number
+  // Whether a file that lacks it was made with the default, as all were before there was a choice.
+  bool implied = false;
   std::string usual = {};  // describes the default instead of the value; may be empty
 
   /// Such as `--eval-every`.

@@ -1,40 +1,40 @@
 #pragma once
 
-#include <cstdlib>
-#include <filesystem>
-#include <string>
+#include <gtest/gtest.h>
+#include <sched.h>
 
 #include "core/archive.h"
+#include "core/safetensors.h"
 
 /// Helpers of tests.
 namespace upswing {
 
-/// A new folder for a test, removed with its contents at the end. Tests may run in parallel.
-class TempFolder {
+/// Limits this thread, and any that it starts, to one processor during its lifetime.
+class OnOneProcessor {
  public:
-  TempFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "upswing.XXXXXX").string();
-    path_ = mkdtemp(name.data());
+  OnOneProcessor() {
+    EXPECT_EQ(sched_getaffinity(0, sizeof(before_), &before_), 0);
+    int processor = 0;
+    while (processor < CPU_SETSIZE && !CPU_ISSET(processor, &before_)) ++processor;
+    cpu_set_t one;
+    CPU_ZERO(&one);
+    CPU_SET(processor, &one);
+    EXPECT_EQ(sched_setaffinity(0, sizeof(one), &one), 0);
   }
-  ~TempFolder() { std::filesystem::remove_all(path_); }
-  TempFolder(const TempFolder&) = delete;
-  TempFolder& operator=(const TempFolder&) = delete;
-
-  const std::filesystem::path& path() const { return path_; }
-  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
+  ~OnOneProcessor() { EXPECT_EQ(sched_setaffinity(0, sizeof(before_), &before_), 0); }
+  OnOneProcessor(const OnOneProcessor&) = delete;
+  OnOneProcessor& operator=(const OnOneProcessor&) = delete;
 
  private:
-  std::filesystem::path path_;
+  cpu_set_t before_;
 };
 
-/// Saves by `save(archive)` and loads by `load(archive)`, through a file.
+/// Saves by `save(archive)` and loads by `load(archive)`, through the bytes of a file.
 template <typename Save, typename Load>
 void SaveAndLoad(const Save& save, const Load& load) {
-  const TempFolder folder;
-  TensorFile saved;
+  Tensors saved;
   save(Archive::Saver(saved));
-  saved.Save(folder / "state.safetensors");
-  const TensorFile loaded = TensorFile::Load(folder / "state.safetensors");
+  const Tensors loaded = ReadSafetensors(WriteSafetensors(saved).Joined(), "saved");
   load(Archive::Loader(loaded));
 }
 

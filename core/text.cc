@@ -178,4 +178,8 @@ std::string DidYouMean(std::string_view word, const std::vector<std::string>& na
   return Concat(" (did you mean ", *nearest, "?)");
 }
 
+std::span<const std::byte> BytesOf(std::string_view text) {
+  return std::as_bytes(std::span(text.data(), text.size()));
+}
+
 }  // namespace upswing

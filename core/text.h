@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -17,6 +18,9 @@ std::string Concat(const Parts&... parts) {
   (out << ... << parts);
   return out.str();
 }
+
+/// The bytes of a string.
+std::span<const std::byte> BytesOf(std::string_view text);
 
 /// The shortest text that reads back as the same double, such as `0.1` or `1e-05`.
 std::string FormatNumber(double value);

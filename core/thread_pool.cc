@@ -1,27 +1,10 @@
 #include "core/thread_pool.h"
 
-#include <sched.h>
-
-#include <algorithm>
 #include <cassert>
-#include <fstream>
 #include <utility>
 
 namespace upswing {
 namespace {
-
-/// More threads hardly help where work is cut into a few slices, and idle ones cost time.
-constexpr int kMostThreads = 8;
-
-/// How many of `present` processors a container's CPU quota amounts to (Linux, control groups 2:
-/// "QUOTA PERIOD" in microseconds, or "max PERIOD").
-int WithinQuota(int present) {
-  std::ifstream file("/sys/fs/cgroup/cpu.max");
-  double quota = 0;
-  double period = 0;
-  if (!(file >> quota >> period) || !(period > 0)) return present;
-  return static_cast<int>(std::clamp(quota / period, 1.0, static_cast<double>(present)));
-}
 
 /// Waits until `value` differs from `old`: first spinning, as pieces of work of well under a
 /// millisecond follow each other closely, then asleep, so that an idle pool costs nothing.
@@ -42,20 +25,6 @@ void WaitWhile(const std::atomic<T>& value, T old) {
 constexpr int kTaskBits = 32;
 
 }  // namespace
-
-int UsableProcessors() {
-  cpu_set_t usable;
-  // It fails on systems with more processors than a cpu_set_t can hold.
-  const bool known = sched_getaffinity(0, sizeof(usable), &usable) == 0;
-  const int present =
-      known ? CPU_COUNT(&usable) : static_cast<int>(std::thread::hardware_concurrency());
-  return WithinQuota(std::max(1, present));
-}
-
-int ResolveThreads(int64_t wanted) {
-  if (wanted > 0) return static_cast<int>(wanted);
-  return std::min(UsableProcessors(), kMostThreads);
-}
 
 ThreadPool::ThreadPool(int threads) {
   try {

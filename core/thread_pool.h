@@ -10,13 +10,6 @@
 
 namespace upswing {
 
-/// Number of processors that this process may use, by its affinity and its container's limit; at
-/// least 1.
-int UsableProcessors();
-
-/// `wanted`, or if that is 0 as many as UsableProcessors, but no more than 8.
-int ResolveThreads(int64_t wanted);
-
 /// Threads that wait for work. The caller counts as one, so a pool of one starts no thread.
 class ThreadPool {
  public:

@@ -1,49 +1,14 @@
 #include "core/thread_pool.h"
 
 #include <gtest/gtest.h>
-#include <sched.h>
 
 #include <numeric>
 #include <stdexcept>
 
+#include "core/testing.h"
+
 namespace upswing {
 namespace {
-
-/// Limits this thread, and any that it starts, to one processor during its lifetime.
-class OnOneProcessor {
- public:
-  OnOneProcessor() {
-    EXPECT_EQ(sched_getaffinity(0, sizeof(before_), &before_), 0);
-    int processor = 0;
-    while (processor < CPU_SETSIZE && !CPU_ISSET(processor, &before_)) ++processor;
-    cpu_set_t one;
-    CPU_ZERO(&one);
-    CPU_SET(processor, &one);
-    EXPECT_EQ(sched_setaffinity(0, sizeof(one), &one), 0);
-  }
-  ~OnOneProcessor() { EXPECT_EQ(sched_setaffinity(0, sizeof(before_), &before_), 0); }
-  OnOneProcessor(const OnOneProcessor&) = delete;
-  OnOneProcessor& operator=(const OnOneProcessor&) = delete;
-
- private:
-  cpu_set_t before_;
-};
-
-TEST(ResolveThreads, TakesANumberAsItIs) {
-  EXPECT_EQ(ResolveThreads(1), 1);
-  EXPECT_EQ(ResolveThreads(3), 3);
-  EXPECT_EQ(ResolveThreads(12), 12);  // more than it would choose itself
-}
-
-TEST(ResolveThreads, ChoosesAsManyAsItMayUseUpToEight) {
-  EXPECT_GE(ResolveThreads(0), 1);
-  EXPECT_LE(ResolveThreads(0), 8);
-  EXPECT_GE(UsableProcessors(), ResolveThreads(0));
-  const OnOneProcessor one;
-  EXPECT_EQ(UsableProcessors(), 1);
-  EXPECT_EQ(ResolveThreads(0), 1);
-  EXPECT_EQ(ResolveThreads(2), 2);
-}
 
 TEST(ThreadPool, RunsEveryTaskOnceForAnyNumberOfThreads) {
   for (const int threads : {1, 2, 3, 8}) {

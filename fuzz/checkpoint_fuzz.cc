@@ -2,7 +2,7 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "core/file.h"
+#include "core/safetensors.h"
 #include "fuzz/target.h"
 #include "fuzz/tiny_training.h"
 
@@ -14,9 +14,8 @@ namespace {
 /// whole state, and making a training takes far longer than loading one.
 struct Trainings {
   explicit Trainings(const std::string& physics)
-      : first(TinyConfig(physics), pool), second(TinyConfig(physics), pool) {}
-  ThreadPool pool{1};
-  TinyTraining first, second;
+      : first(TinyConfig(physics), 1), second(TinyConfig(physics), 1) {}
+  Training first, second;
 };
 
 Trainings& TrainingsIn(bool mujoco) {
@@ -29,18 +28,18 @@ Trainings& TrainingsIn(bool mujoco) {
 
 bool TryInput(std::string_view input) {
   const auto bytes = BytesOf(input);
-  TensorFile file;
-  if (!Accepts([&] { file = TensorFile::Parse({bytes.begin(), bytes.end()}, kInputName); })) {
+  Tensors file;
+  if (!Accepts([&] { file = ReadSafetensors({bytes.begin(), bytes.end()}, kInputName); })) {
     return false;
   }
   // The settings stand in another file; here the metadata say which of two trainings this is.
   Trainings& trainings = TrainingsIn(file.metadata.contains("mujoco"));
-  TinyTraining& training = trainings.first;
-  TinyTraining& again = trainings.second;
+  Training& training = trainings.first;
+  Training& again = trainings.second;
   if (!Accepts([&] { training.State(Archive::Loader(file)); })) return false;
 
   // What was loaded can be saved, loaded again, and resumed.
-  TensorFile saved;
+  Tensors saved;
   training.State(Archive::Saver(saved));
   Expect(Accepts([&] { again.State(Archive::Loader(saved)); }), "to load what was saved");
   try {

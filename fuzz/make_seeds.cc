@@ -4,9 +4,11 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "apps/loaded_policy.h"
 #include "core/error.h"
 #include "fuzz/tiny_training.h"
+#include "io/tensor_file.h"
+#include "lab/loaded_policy.h"
+#include "nn/q_policy.h"
 
 namespace upswing {
 namespace {
@@ -14,18 +16,17 @@ namespace {
 namespace fs = std::filesystem;
 
 /// A checkpoint after a few steps, when the replay memory is full.
-void SaveCheckpoint(TinyTraining& training, const std::string& physics, const fs::path& file) {
-  TensorFile checkpoint;
+void SaveCheckpoint(Training& training, const std::string& physics, const fs::path& file) {
+  Tensors checkpoint;
   if (physics == "mujoco") checkpoint.metadata["mujoco"] = "";
   training.State(Archive::Saver(checkpoint));
-  checkpoint.Save(file);
+  SaveTensors(checkpoint, file);
 }
 
 void MakeSeeds(const fs::path& corpus) {
-  ThreadPool pool(1);
   for (const std::string physics : {"closed-form", "mujoco"}) {
     const Config config = TinyConfig(physics);
-    TinyTraining training(config, pool);
+    Training training(config, 1);
     SaveCheckpoint(training, physics,
                    corpus / "checkpoint/accepted" / (physics + "-new.safetensors"));
     for (int step = 0; step < 9; ++step) training.Step();
@@ -36,7 +37,7 @@ void MakeSeeds(const fs::path& corpus) {
     info.success_rate = 0.5;
     info.mean_return = -12.5;
     const fs::path file = corpus / "policy/accepted" / ("dueling-" + physics + ".safetensors");
-    training.agent.ExportPolicy(info).Save(file);
+    SaveTensors(training.agent().ExportPolicy(info)->ToTensors(), file);
   }
   // The other kind of network, as short as can be.
   const Plant plant;
@@ -47,8 +48,8 @@ void MakeSeeds(const fs::path& corpus) {
   info.plant = all.plant;
   info.control_period = all.control_period;
   info.observation = all.observation;
-  Policy(shape, std::vector<float>(network.num_parameters(), 0.25F), {-1, 1}, info)
-      .Save(corpus / "policy/accepted/plain-of-another-writer.safetensors");
+  const QPolicy policy(shape, std::vector<float>(network.num_parameters(), 0.25F), {-1, 1}, info);
+  SaveTensors(policy.ToTensors(), corpus / "policy/accepted/plain-of-another-writer.safetensors");
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // A model in MJCF, as it comes with --model, in a run folder or in a policy.
 #include "fuzz/target.h"
-#include "sim/model.h"
+#include "mujoco/engines.h"
+#include "mujoco/model.h"
 #include "sim/pendulum_env.h"
 
 namespace upswing {
@@ -10,6 +11,7 @@ bool TryInput(std::string_view input) {
   PendulumEnvConfig config;
   config.num_envs = 1;
   config.mjcf = mjcf;
+  config.engine = &kMuJoCo;
   if (!Accepts([&] { config.plants = {PlantOf(*LoadModel(mjcf, kInputName))}; })) return false;
   // It can be simulated.
   PendulumEnv env(config);

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "core/file.h"
 #include "fuzz/target.h"
+#include "io/file.h"
 
 namespace {
 

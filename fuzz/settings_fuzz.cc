@@ -1,6 +1,6 @@
 // A configuration file, as `train --config` reads it and a run folder holds it.
-#include "apps/config.h"
 #include "fuzz/target.h"
+#include "lab/config.h"
 
 namespace upswing {
 

@@ -20,7 +20,7 @@
 #include <vector>
 
 #include "core/checksum.h"
-#include "core/file.h"
+#include "io/file.h"
 
 extern "C" size_t LLVMFuzzerMutate(uint8_t* data, size_t size, size_t max_size);
 

@@ -2,11 +2,8 @@
 
 #include <string_view>
 
-#include "apps/config.h"
-#include "core/thread_pool.h"
-#include "rl/dqn.h"
-#include "rl/train.h"
-#include "sim/pendulum_env.h"
+#include "lab/config.h"
+#include "lab/training.h"
 
 namespace upswing {
 
@@ -26,35 +23,10 @@ inline Config TinyConfig(const std::string& physics) {
                                {"replay", "6"},
                                {"n_step", "2"},
                                {"learning_starts", "4"},
-                               {"updates_per_step", "0.5"}});
+                               {"updates_per_step", "0.5"},
+                               {"steps", "1e12"},
+                               {"eval_every", "1e12"}});
   return config;
 }
-
-/// All that a checkpoint holds.
-struct TinyTraining {
-  explicit TinyTraining(const Config& config, ThreadPool& pool)
-      : env(config.Environments(pool)),
-        agent(config.Agent(env, pool)),
-        state(env.num_envs(), kRewardTerms) {}
-
-  void State(const Archive& archive) { CheckpointState(archive, agent, env, state); }
-
-  /// A lock-step of the environments, and what is learned from it.
-  void Step() {
-    StepResult result = env.MakeResult();
-    std::vector<double> torque(static_cast<size_t>(env.num_envs()));
-    agent.Act(env.obs(), torque);
-    env.Step(torque, result);
-    agent.Observe(result);
-    state.steps = agent.steps();
-    agent.Learn();
-    (void)agent.Report();
-    (void)state.mean_return();
-  }
-
-  PendulumEnv env;
-  Dqn agent;
-  TrainState state;
-};
 
 }  // namespace upswing

@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "core/file.h"
 #include "core/text.h"
+#include "io/file.h"
 #include "report/gnuplot.h"
 #include "report/layout.h"
 

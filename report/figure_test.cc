@@ -7,8 +7,8 @@
 #include <cstdlib>
 
 #include "core/error.h"
-#include "core/file.h"
-#include "core/testing.h"
+#include "io/file.h"
+#include "io/testing.h"
 #include "report/layout.h"
 
 namespace upswing {

@@ -2,15 +2,16 @@
 
 #include "core/csv.h"
 #include "core/error.h"
-#include "core/file.h"
 #include "core/text.h"
+#include "io/file.h"
+#include "io/run_folder.h"
 
 namespace upswing {
 
 namespace fs = std::filesystem;
 
 std::vector<EvaluationRow> ReadEvaluations(const fs::path& run, bool may_be_cut) {
-  const fs::path path = run / "evals.csv";
+  const fs::path path = run / RunFolder::kEvaluations;
   if (!fs::exists(path)) return {};
   return ParseEvaluations(ReadOwnFile(path), path.string(), may_be_cut);
 }
@@ -49,9 +50,8 @@ std::optional<size_t> SolvedAt(const RunRecord& run) {
   std::optional<size_t> first;  // of a streak
   for (size_t i = 0; i < run.evaluations.size(); ++i) {
     const EvaluationRow& row = run.evaluations[i];
-    const bool scheduled = row.step / plan.eval_every != (row.step - plan.envs) / plan.eval_every;
-    if (!scheduled) continue;
-    if (row.success_rate != 1) {
+    if (!IsDue(row.step - plan.envs, row.step, plan.eval_every)) continue;
+    if (!plan.rule.Passed(row.success_rate, row.mean_return)) {
       first.reset();
     } else if (first) {
       return first;

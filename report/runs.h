@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "core/evaluation_rule.h"
+
 namespace upswing {
 
 /// An evaluation during a training: a row of evals.csv.
@@ -21,6 +23,7 @@ struct RunPlan {
   int64_t seed, steps;       // steps: the budget
   int64_t envs, eval_every;  // parallel environments; steps between two evaluations
   bool stop_when_solved;
+  EvaluationRule rule;  // of the task
 };
 
 /// A training, read from its folder.
@@ -39,8 +42,8 @@ std::vector<EvaluationRow> ReadEvaluations(const std::filesystem::path& run, boo
 std::vector<EvaluationRow> ParseEvaluations(std::string text, const std::string& where,
                                             bool may_be_cut);
 
-/// Where a run has solved its task: index of the first of the first two evaluations in a row whose
-/// episodes all succeed; an unscheduled final evaluation does not count. Nothing if it has not
+/// Where a run has solved its task: index of the first of the first two passed evaluations in a
+/// row; an unscheduled final evaluation does not count. Nothing if it has not
 /// solved it.
 std::optional<size_t> SolvedAt(const RunRecord& run);
 

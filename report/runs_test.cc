@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "core/error.h"
-#include "core/file.h"
-#include "core/testing.h"
+#include "io/file.h"
+#include "io/testing.h"
 #include "report/testing.h"
 
 namespace upswing {

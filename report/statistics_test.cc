@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
-#include "core/file.h"
 #include "core/rng.h"
+#include "io/file.h"
 
 namespace upswing {
 namespace {

@@ -10,6 +10,7 @@
 
 #include "core/error.h"
 #include "core/text.h"
+#include "nn/q_policy.h"
 #include "rl/representation.h"
 
 namespace upswing {
@@ -19,11 +20,21 @@ namespace {
 /// kernels. From B alone, so that the number of threads changes no bit.
 int SliceRows(int B) { return std::clamp(B / 4, 8, 32); }
 
+/// The actions of an agent for this task. Throws BadInput.
+std::vector<double> TorquesOf(const DqnConfig& config, const EnvSpec& spec) {
+  if (spec.action_size() == 1) return TorqueLevels(spec.action_limit.front(), config.levels);
+  throw BadInput(
+      Concat("dqn: expected a task with one torque, got ", spec.action_size(), " in ", spec.task));
+}
+
 }  // namespace
 
-std::vector<double> TorqueLevels(double torque_limit) {
+std::vector<double> TorqueLevels(double torque_limit, int64_t count) {
   std::vector<double> levels;
-  for (int quarter = -4; quarter <= 4; ++quarter) levels.push_back(torque_limit * quarter / 4);
+  const auto intervals = static_cast<double>(count - 1);
+  for (int64_t i = 0; i < count; ++i) {
+    levels.push_back(torque_limit * (2 * static_cast<double>(i) - intervals) / intervals);
+  }
   return levels;
 }
 
@@ -42,16 +53,15 @@ float HuberLoss(float delta) {
 
 float HuberGradient(float delta) { return std::clamp(delta, -1.0F, 1.0F); }
 
-Dqn::Dqn(const DqnConfig& config, int num_envs, int obs_size, std::vector<double> torques,
-         std::vector<float> mirror_signs, uint64_t seed, ThreadPool& pool)
+Dqn::Dqn(const DqnConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool& pool)
     : config_(config),
-      obs_size_(static_cast<size_t>(obs_size)),
-      torques_(std::move(torques)),
-      mirror_signs_(std::move(mirror_signs)),
+      obs_size_(static_cast<size_t>(spec.obs_size)),
+      torques_(TorquesOf(config, spec)),
+      mirror_signs_(spec.mirror_signs),
       pool_(pool),
       explore_rng_(seed, "exploration"),
       sample_rng_(seed, "replay sampling"),
-      network_(config.Shape(obs_size, static_cast<int>(torques_.size())),
+      network_(config.Shape(spec.obs_size, static_cast<int>(torques_.size())),
                config.precision == "bfloat16"),
       theta_(network_.num_parameters()),
       adam_(network_.num_parameters()),
@@ -67,15 +77,15 @@ Dqn::Dqn(const DqnConfig& config, int num_envs, int obs_size, std::vector<double
       prepared_target_(network_.MakePrepared(false)),
       gradient_(network_.num_parameters()),
       squares_(static_cast<size_t>(network_.num_tasks())),
-      replay_(config.replay, obs_size, config.prioritized),
-      n_step_(num_envs, static_cast<int>(config.n_step), config.gamma, obs_size),
-      batch_(static_cast<int>(config.batch), obs_size),
-      act_activations_(network_.MakeActivations(num_envs, false)),
-      act_obs_(static_cast<size_t>(num_envs) * obs_size_),
-      act_q_(static_cast<size_t>(num_envs) * torques_.size()),
-      act_action_(static_cast<size_t>(num_envs)) {
+      replay_(config.replay, spec.obs_size, config.prioritized),
+      n_step_(spec.num_envs, static_cast<int>(config.n_step), config.gamma, spec.obs_size),
+      batch_(static_cast<int>(config.batch), spec.obs_size),
+      act_activations_(network_.MakeActivations(spec.num_envs, false)),
+      act_obs_(static_cast<size_t>(spec.num_envs) * obs_size_),
+      act_q_(static_cast<size_t>(spec.num_envs) * torques_.size()),
+      act_action_(static_cast<size_t>(spec.num_envs)) {
   if (config.mirror && mirror_signs_.empty()) {
-    throw BadInput("--mirror: expected a task with mirror symmetry");
+    throw BadInput(Concat("mirror: expected a task with mirror symmetry, got ", spec.task));
   }
   Rng init_rng(seed, "initial parameters");
   network_.Initialize(init_rng, theta_);
@@ -101,7 +111,7 @@ double Dqn::importance_exponent() const {
   return std::lerp(config_.importance_exponent, 1.0, schedule());
 }
 
-void Dqn::Act(Matrix<const float> obs, std::span<double> torque) {
+void Dqn::Act(Matrix<const float> obs, Matrix<double> action) {
   const Matrix<float> q(act_q_, obs.rows(), static_cast<int>(torques_.size()));
   network_.ForwardPreferences(theta_, obs, {0, obs.rows()}, act_activations_, q);
   std::ranges::copy(obs.values(), act_obs_.begin());
@@ -109,10 +119,10 @@ void Dqn::Act(Matrix<const float> obs, std::span<double> torque) {
   // ε-greedy.
   for (int env = 0; env < obs.rows(); ++env) {
     const bool random = explore_rng_.Uniform() < epsilon();
-    const int action =
+    const int chosen =
         random ? static_cast<int>(explore_rng_.Below(torques_.size())) : ArgMax(q.row(env));
-    act_action_[static_cast<size_t>(env)] = action;
-    torque[static_cast<size_t>(env)] = torques_[static_cast<size_t>(action)];
+    act_action_[static_cast<size_t>(env)] = chosen;
+    action(env, 0) = torques_[static_cast<size_t>(chosen)];
   }
 }
 
@@ -253,26 +263,32 @@ void Dqn::CountErrors(const Minibatch& batch) {
   td_sum_ += td / B;
 }
 
-AgentReport Dqn::Report() const {
+Metrics Dqn::TakeMetrics() {
   const double n = static_cast<double>(std::max<int64_t>(1, report_updates_));
   constexpr int64_t kMostRows = 256;  // enough of a large minibatch
   const Matrix<const float> features(activations_.feature.back().data(),
                                      static_cast<int>(std::min(config_.batch, kMostRows)),
                                      static_cast<int>(config_.hidden.back()));
-  return {updates_,    epsilon(),     learning_rate(),       loss_sum_ / n,         q_sum_ / n,
-          td_sum_ / n, norm_sum_ / n, FeatureRank(features), DormantShare(features)};
-}
-
-void Dqn::BeginReport() {
+  Metrics metrics{{"updates", static_cast<double>(updates_)},
+                  {"epsilon", epsilon()},
+                  {"learning_rate", learning_rate()},
+                  {"loss", loss_sum_ / n},
+                  {"q", q_sum_ / n},
+                  {"td_error", td_sum_ / n},
+                  {"gradient_norm", norm_sum_ / n},
+                  {"feature_rank", FeatureRank(features)},
+                  {"dormant_share", DormantShare(features)}};
   loss_sum_ = q_sum_ = td_sum_ = norm_sum_ = 0;
   report_updates_ = 0;
+  return metrics;
 }
 
-Policy Dqn::ExportPolicy(PolicyInfo info) const {
+std::unique_ptr<Policy> Dqn::ExportPolicy(PolicyInfo info) const {
   info.gamma = config_.gamma;
   info.reward_scale = config_.reward_scale;
   const auto& theta = config_.policy_tau < 1 ? theta_policy_ : theta_;
-  return {network_.shape(), {theta.begin(), theta.end()}, torques_, std::move(info)};
+  return std::make_unique<QPolicy>(network_.shape(), std::vector<float>(theta.begin(), theta.end()),
+                                   torques_, std::move(info));
 }
 
 void Dqn::State(const Archive& archive) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -19,8 +20,8 @@
 /// parameters, y target, B batch size, A number of actions, D observation size.
 namespace upswing {
 
-/// The torque levels of the nine actions (N·m): -limit to limit in steps of a quarter.
-std::vector<double> TorqueLevels(double torque_limit);
+/// So many torques, evenly spaced from -limit to limit (N·m): a discrete agent's actions.
+std::vector<double> TorqueLevels(double torque_limit, int64_t count);
 
 /// TD targets y (B). `select` chooses a* = argmax_a select(s', a), and y = r + discount ·
 /// evaluate(s', a*):
@@ -38,35 +39,33 @@ float HuberGradient(float delta);
 /// A DQN agent for N environments.
 class Dqn : public Agent {
  public:
-  /// `torques` (A), N·m: one for each action, rising, and symmetric about 0 if minibatches are
-  /// mirrored. `mirror_signs` (D): those of the VectorEnv; throws BadInput if they are empty but
-  /// needed.
-  Dqn(const DqnConfig& config, int num_envs, int obs_size, std::vector<double> torques,
-      std::vector<float> mirror_signs, uint64_t seed, ThreadPool& pool);
+  /// Of a task with one torque. Throws BadInput if it has more, and if minibatches are to be
+  /// mirrored but the task has no mirror symmetry.
+  Dqn(const DqnConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool& pool);
 
-  void Act(Matrix<const float> obs, std::span<double> torque) override;
+  void Act(Matrix<const float> obs, Matrix<double> action) override;
   void Observe(const StepResult& result) override;
   void Learn() override;
-  AgentReport Report() const override;
-  void BeginReport() override;
-  Policy ExportPolicy(PolicyInfo info) const override;
+  Metrics TakeMetrics() override;
+  std::unique_ptr<Policy> ExportPolicy(PolicyInfo info) const override;
   void State(const Archive& archive) override;
 
   std::span<const float> online() const { return theta_; }
   std::span<const float> target() const { return theta_target_; }
   const Replay& replay() const { return replay_; }
   int64_t steps() const override { return steps_; }
+  int64_t updates() const override { return updates_; }
   double epsilon() const;
   double learning_rate() const;
   /// β of prioritised replay, which rises to 1 over learning_rate_steps (Schaul et al., 2016).
   double importance_exponent() const;
-  /// One gradient step on a given minibatch, which counts in Report.
+  /// One gradient step on a given minibatch, which counts in the metrics.
   void Update(const Minibatch& batch);
 
  private:
   /// TD errors of some rows of a minibatch, and the backward pass to the activations.
   void BackwardRows(const Minibatch& batch, RowRange rows);
-  /// Adds a minibatch to the sums of the report. Throws Failure if the loss is not finite.
+  /// Adds a minibatch to the sums of the metrics. Throws Failure if the loss is not finite.
   void CountErrors(const Minibatch& batch);
   /// Moves theta_policy_ towards θ by Polyak averaging.
   void AveragePolicy();
@@ -102,7 +101,7 @@ class Dqn : public Agent {
   std::vector<int> act_action_;           // (N)
 
   int64_t steps_ = 0, episodes_ = 0, updates_ = 0;
-  // Sums since BeginReport.
+  // Sums since TakeMetrics.
   double loss_sum_ = 0, q_sum_ = 0, td_sum_ = 0, norm_sum_ = 0;
   int64_t report_updates_ = 0;
 };

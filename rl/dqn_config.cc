@@ -13,6 +13,8 @@ void DqnConfig::Describe(Options& o) {
   o.Section("agent");
   o.Add(&double_q, "double", true, "Double DQN: choose online, evaluate with the target");
   o.Add(&dueling, "dueling", true, "Dueling: Q = V + A - mean(A)");
+  o.Add(&levels, "levels", 9, {2, 1001}, "torques", "that the agent chooses from, evenly spaced")
+      .implied = true;
   o.Add(&gamma, "gamma", 0.99, kUnit, "", "discount per control step");
   o.Add(&n_step, "n_step", 3, {1, 100}, "steps", "length of the returns in the targets");
   o.Add(&reward_scale, "reward_scale", 0.1, kPositive, "",

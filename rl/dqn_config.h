@@ -14,6 +14,7 @@ struct DqnConfig {
   std::vector<int64_t> hidden;
   int64_t head;
   bool layer_norm, double_q, dueling;
+  int64_t levels;
   std::string precision;
   double gamma;
   int64_t n_step;

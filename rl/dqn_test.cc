@@ -2,11 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "core/error.h"
 #include "core/testing.h"
+#include "nn/q_policy.h"
 #include "rl/toy_env.h"
 
 namespace upswing {
@@ -22,6 +24,7 @@ DqnConfig SmallConfig() {
   config.updates_per_step = 0.5;
   config.n_step = 1;
   config.reward_scale = 1;
+  config.levels = 3;
   return config;
 }
 
@@ -67,8 +70,9 @@ TEST(Huber, TheGradientIsClippedAndBelongsToTheLoss) {
   }
 }
 
-TEST(Torques, AreNineFromLimitToLimit) {
-  EXPECT_EQ(TorqueLevels(5), (std::vector<double>{-5, -3.75, -2.5, -1.25, 0, 1.25, 2.5, 3.75, 5}));
+TEST(Torques, AreEvenlySpacedFromLimitToLimit) {
+  EXPECT_EQ(TorqueLevels(5, 9),
+            (std::vector<double>{-5, -3.75, -2.5, -1.25, 0, 1.25, 2.5, 3.75, 5}));
 }
 
 /// Loss of a minibatch as the papers write it, in plain code from the exported networks.
@@ -96,6 +100,13 @@ double LossByHand(const DqnConfig& config, std::span<const float> online,
   return loss / static_cast<double>(batch.action.size());
 }
 
+/// One of an agent's metrics.
+double Metric(const Metrics& metrics, const std::string& name) {
+  const auto found = std::ranges::find(metrics, name, &Metrics::value_type::first);
+  EXPECT_NE(found, metrics.end()) << name;
+  return found->second;
+}
+
 class DqnVariants : public ::testing::TestWithParam<std::tuple<bool, bool>> {};
 
 TEST_P(DqnVariants, LossIsThatOfThePapersAndFalls) {
@@ -103,15 +114,15 @@ TEST_P(DqnVariants, LossIsThatOfThePapersAndFalls) {
   std::tie(config.double_q, config.dueling) = GetParam();
   config.learning_rate = config.learning_rate_end = 1e-2;
   ThreadPool pool(1);
-  Dqn agent(config, 1, 1, kTorques, {-1}, 1, pool);
+  Dqn agent(config, ToyEnv::Spec(1), 1, pool);
   const Minibatch batch = RandomBatch(16);
   const double first = LossByHand(config, agent.online(), agent.target(), batch);
   // Apart from the first update online and target differ.
   for (int update = 0; update < 60; ++update) {
-    agent.BeginReport();
+    agent.TakeMetrics();
     const double expected = LossByHand(config, agent.online(), agent.target(), batch);
     agent.Update(batch);
-    ASSERT_NEAR(agent.Report().loss, expected, 1e-5);
+    ASSERT_NEAR(Metric(agent.TakeMetrics(), "loss"), expected, 1e-5);
   }
   EXPECT_LT(LossByHand(config, agent.online(), agent.target(), batch), first / 2);
 }
@@ -121,11 +132,12 @@ INSTANTIATE_TEST_SUITE_P(Flags, DqnVariants,
 
 /// Trains on the toy environment for a number of steps of all environments.
 void Walk(Dqn& agent, ToyEnv& env, int steps) {
-  StepResult result = env.MakeResult();
-  std::vector<double> torque(static_cast<size_t>(env.num_envs()));
+  StepResult result(env.spec());
+  std::vector<double> torques(static_cast<size_t>(env.num_envs()));
+  const Matrix<double> action(torques.data(), env.num_envs(), 1);
   for (int i = 0; i < steps; ++i) {
-    agent.Act(env.obs(), torque);
-    env.Step(torque, result);
+    agent.Act(env.obs(), action);
+    env.Step(action, result);
     agent.Observe(result);
     agent.Learn();
   }
@@ -147,11 +159,12 @@ TEST(Dqn, WeightsMultiplyTheGradientOfTheirTransition) {
     parts.reward[copy] = parts.reward[copy - 1];
     parts.discount[copy] = parts.discount[copy - 1];
   }
-  Dqn a(config, 1, 1, kTorques, {-1}, 1, pool), b(config, 1, 1, kTorques, {-1}, 1, pool);
+  Dqn a(config, ToyEnv::Spec(1), 1, pool), b(config, ToyEnv::Spec(1), 1, pool);
   a.Update(whole);
   b.Update(parts);
-  EXPECT_NEAR(a.Report().loss, b.Report().loss, 1e-6);
-  EXPECT_NEAR(a.Report().gradient_norm, b.Report().gradient_norm, 1e-5);
+  const Metrics of_a = a.TakeMetrics(), of_b = b.TakeMetrics();
+  EXPECT_NEAR(Metric(of_a, "loss"), Metric(of_b, "loss"), 1e-6);
+  EXPECT_NEAR(Metric(of_a, "gradient_norm"), Metric(of_b, "gradient_norm"), 1e-5);
 }
 
 TEST(Dqn, MirroringNegatesTorquesAndSomeObservations) {
@@ -174,14 +187,20 @@ TEST(Dqn, MirroringNegatesTorquesAndSomeObservations) {
   DqnConfig config = SmallConfig();
   config.mirror = true;
   ThreadPool pool(1);
-  EXPECT_THROW(Dqn(config, 1, 1, kTorques, {}, 1, pool), Error);
+  EnvSpec spec = ToyEnv::Spec(1);
+  spec.mirror_signs.clear();
+  EXPECT_THROW(Dqn(config, spec, 1, pool), Error);
+  config.mirror = false;
+  EXPECT_NO_THROW(Dqn(config, spec, 1, pool));
+  spec.action_limit = {1, 1};
+  EXPECT_THROW(Dqn(config, spec, 1, pool), Error);
 }
 
 TEST(Dqn, TheExportedPolicyIsAnAverageOfTheLearnedOnes) {
   DqnConfig config = SmallConfig();
   config.policy_tau = 0.25;
   ThreadPool pool(1);
-  Dqn agent(config, 1, 1, kTorques, {-1}, 1, pool);
+  Dqn agent(config, ToyEnv::Spec(1), 1, pool);
   // The average begins with the first network.
   std::vector<float> average(agent.online().begin(), agent.online().end());
   for (int update = 0; update < 3; ++update) {
@@ -195,7 +214,8 @@ TEST(Dqn, TheExportedPolicyIsAnAverageOfTheLearnedOnes) {
   const float x = 0.7F;
   std::vector<float> expected(3), got(3);
   network.Forward({average}, {&x, 1, 1}, {0, 1}, activations, {expected.data(), 1, 3});
-  agent.ExportPolicy({}).QValues({&x, 1, 1}, {got.data(), 1, 3});
+  const auto policy = agent.ExportPolicy({});
+  policy->Values({&x, 1, 1}, {got.data(), 1, 3}, *policy->Start(1));
   for (size_t a = 0; a < 3; ++a) EXPECT_NEAR(got[a], expected[a], 1e-5);
 }
 
@@ -208,7 +228,7 @@ TEST(Dqn, TheAverageGrowsLongerAsTheLearningRateFalls) {
   config.updates_per_step = 0;
   config.importance_exponent = 0.4;
   ThreadPool pool(1);
-  Dqn agent(config, 1, 1, kTorques, {-1}, 1, pool);
+  Dqn agent(config, ToyEnv::Spec(1), 1, pool);
   ToyEnv env(1);
   Walk(agent, env, 200);
   EXPECT_DOUBLE_EQ(agent.learning_rate(), 1e-3);
@@ -224,7 +244,8 @@ TEST(Dqn, TheAverageGrowsLongerAsTheLearningRateFalls) {
   std::vector<float> expected(3), got(3), fast(3);
   network.Forward({average}, {&x, 1, 1}, {0, 1}, activations, {expected.data(), 1, 3});
   network.Forward({agent.online()}, {&x, 1, 1}, {0, 1}, activations, {fast.data(), 1, 3});
-  agent.ExportPolicy({}).QValues({&x, 1, 1}, {got.data(), 1, 3});
+  const auto policy = agent.ExportPolicy({});
+  policy->Values({&x, 1, 1}, {got.data(), 1, 3}, *policy->Start(1));
   for (size_t a = 0; a < 3; ++a) EXPECT_NEAR(got[a], expected[a], 1e-5);
   EXPECT_GT(std::abs(fast[0] - got[0]), 1e-4);
 }
@@ -233,7 +254,7 @@ TEST(Dqn, TargetFollowsByPolyakAveragingAtEachUpdate) {
   DqnConfig config = SmallConfig();
   config.tau = 0.25;
   ThreadPool pool(1);
-  Dqn agent(config, 1, 1, kTorques, {-1}, 1, pool);
+  Dqn agent(config, ToyEnv::Spec(1), 1, pool);
   const std::vector<float> before(agent.target().begin(), agent.target().end());
   agent.Update(RandomBatch(16));
   for (size_t i = 0; i < before.size(); ++i) {
@@ -245,7 +266,7 @@ TEST(Dqn, TargetCanBeCopiedPeriodically) {
   DqnConfig config = SmallConfig();
   config.target_period = 3;
   ThreadPool pool(1);
-  Dqn agent(config, 1, 1, kTorques, {-1}, 1, pool);
+  Dqn agent(config, ToyEnv::Spec(1), 1, pool);
   const std::vector<float> first(agent.target().begin(), agent.target().end());
   for (int update = 1; update <= 3; ++update) {
     agent.Update(RandomBatch(16));
@@ -260,7 +281,7 @@ TEST(Dqn, ATruncationBootstrapsFromItsOwnLastObservationAndATerminationFromNothi
   DqnConfig config = SmallConfig();
   config.updates_per_step = 0;
   ThreadPool pool(1);
-  Dqn agent(config, 2, 1, kTorques, {-1}, 1, pool);
+  Dqn agent(config, ToyEnv::Spec(2), 1, pool);
   ToyEnv env(2);
   Walk(agent, env, 400);
   int terminated = 0;
@@ -279,10 +300,10 @@ TEST(Dqn, ATruncationBootstrapsFromItsOwnLastObservationAndATerminationFromNothi
 TEST(Dqn, UpdatesFollowTheStepsForAnyNumberOfEnvironments) {
   for (const int envs : {1, 4}) {
     ThreadPool pool(1);
-    Dqn agent(SmallConfig(), envs, 1, kTorques, {-1}, 1, pool);
+    Dqn agent(SmallConfig(), ToyEnv::Spec(envs), 1, pool);
     ToyEnv env(envs);
     Walk(agent, env, 400 / envs);
-    EXPECT_EQ(agent.Report().updates, (400 - 32) / 2);
+    EXPECT_EQ(agent.updates(), (400 - 32) / 2);
   }
 }
 
@@ -291,7 +312,7 @@ TEST(Dqn, EpsilonDecaysWithEachEpisodeToItsEnd) {
   config.epsilon_decay = 0.5;
   config.epsilon_end = 0.2;
   ThreadPool pool(1);
-  Dqn agent(config, 1, 1, kTorques, {-1}, 1, pool);
+  Dqn agent(config, ToyEnv::Spec(1), 1, pool);
   ToyEnv env(1);
   env.episode_steps = 4;
   EXPECT_EQ(agent.epsilon(), 1);
@@ -306,13 +327,13 @@ TEST(Dqn, EpsilonDecaysWithEachEpisodeToItsEnd) {
 TEST(Dqn, LearnsToStayNearZero) {
   for (const uint64_t seed : {1, 2, 3}) {
     ThreadPool pool(1);
-    Dqn agent(SmallConfig(), 4, 1, kTorques, {-1}, seed, pool);
+    Dqn agent(SmallConfig(), ToyEnv::Spec(4), seed, pool);
     ToyEnv env(4, seed);
     Walk(agent, env, 1500);
-    const Policy policy = agent.ExportPolicy({});
+    const auto policy = agent.ExportPolicy({});
     for (const float x : {-2.0F, 0.0F, 2.0F}) {
       double torque = 9;
-      policy.Act(Matrix<const float>(&x, 1, 1), std::span(&torque, 1));
+      policy->Act({&x, 1, 1}, {&torque, 1, 1}, *policy->Start(1));
       EXPECT_EQ(torque, x == 0 ? 0 : -x / 2) << "seed " << seed << ", x = " << x;
     }
   }
@@ -327,7 +348,7 @@ TEST(Dqn, TheNumberOfThreadsChangesNoBit) {
   std::vector<float> parameters[2];
   for (const int threads : {1, 3}) {
     ThreadPool pool(threads);
-    Dqn agent(config, 4, 1, kTorques, {-1}, 1, pool);
+    Dqn agent(config, ToyEnv::Spec(4), 1, pool);
     ToyEnv env(4);
     Walk(agent, env, 100);
     parameters[threads == 1 ? 0 : 1].assign(agent.online().begin(), agent.online().end());
@@ -341,10 +362,10 @@ TEST(Dqn, LoadedStateContinuesWithTheSameBits) {
   config.prioritized = config.mirror = true;
   config.policy_tau = 0.1;
   ThreadPool pool(1);
-  Dqn saved(config, 2, 1, kTorques, {-1}, 1, pool);
+  Dqn saved(config, ToyEnv::Spec(2), 1, pool);
   ToyEnv env(2);
   Walk(saved, env, 101);
-  Dqn loaded(config, 2, 1, kTorques, {-1}, 99, pool);  // another seed, which loading must replace
+  Dqn loaded(config, ToyEnv::Spec(2), 99, pool);  // another seed, which loading must replace
   ToyEnv loaded_env(2, 99);
   const auto state = [](Dqn& agent, ToyEnv& walk) {
     return [&](const Archive& archive) {
@@ -363,12 +384,12 @@ TEST(Dqn, LoadedStateContinuesWithTheSameBits) {
 
 TEST(Dqn, NumbersThatAreNotFiniteAreFailures) {
   ThreadPool pool(1);
-  Dqn agent(SmallConfig(), 1, 1, kTorques, {-1}, 1, pool);
+  Dqn agent(SmallConfig(), ToyEnv::Spec(1), 1, pool);
   ToyEnv env(1);
   env.poison = true;
   EXPECT_THROW(Walk(agent, env, 1), Error);
 
-  Dqn other(SmallConfig(), 1, 1, kTorques, {-1}, 1, pool);
+  Dqn other(SmallConfig(), ToyEnv::Spec(1), 1, pool);
   const std::vector<float> before(other.online().begin(), other.online().end());
   Minibatch batch = RandomBatch(16);
   batch.reward[3] = std::numeric_limits<float>::infinity();

@@ -2,30 +2,36 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
+
+#include "core/aligned.h"
 
 namespace upswing {
 namespace {
 
-int64_t StepsIn(double seconds, const VectorEnv& env) {
-  return std::llround(seconds / env.step_seconds());
+int64_t StepsIn(double seconds, const EnvSpec& spec) {
+  return std::llround(seconds / spec.step_seconds);
 }
 
 /// Accumulates the results of one episode, step by step.
 class EpisodeTally {
  public:
-  EpisodeTally(const Policy& policy, const VectorEnv& env)
-      : seconds_(env.step_seconds()),
-        steps_(StepsIn(kEvaluationSeconds, env)),
-        return_steps_(StepsIn(kReturnSeconds, env)),
-        hold_steps_(StepsIn(kHoldSeconds, env)),
-        tilt_steps_(StepsIn(kSteadyTiltSeconds, env)),
+  EpisodeTally(const Policy& policy, const EnvSpec& spec)
+      : rule_(spec.evaluation),
+        seconds_(spec.step_seconds),
+        steps_(StepsIn(rule_.seconds, spec)),
+        return_steps_(StepsIn(rule_.return_seconds, spec)),
+        hold_steps_(StepsIn(rule_.hold_seconds, spec)),
+        tilt_steps_(StepsIn(kSteadyTiltSeconds, spec)),
         gamma_(ValueUnitsOf(policy).gamma),
         discount_(gamma_ > 0 ? 1 : 0),
-        lean_(static_cast<size_t>(env.bodies())) {
-    episode_.terms.resize(env.reward_term_names().size());
+        lean_(static_cast<size_t>(spec.bodies)),
+        last_torque_(spec.action_limit.size()) {
+    episode_.terms.resize(spec.term_names.size());
     episode_.tilt.resize(lean_.size());
   }
 
+  bool ended() const { return ended_; }
   void SetValue(double value) { episode_.value = value; }
 
   /// Adds the lean of environment `env_index` before its next step.
@@ -46,12 +52,9 @@ class EpisodeTally {
   void Add(const StepResult& result, size_t i) {
     if (ended_) return;
     ++step_;
-    const double torque = result.torque[i];
     episode_.work += result.work[i];
-    episode_.peak_torque = std::max(episode_.peak_torque, std::abs(torque));
-    squares_ += torque * torque;
-    AddChange(step_ == 1 ? 0 : std::abs(torque - last_torque_));
-    last_torque_ = torque;
+    const size_t A = last_torque_.size();
+    AddTorque(std::span(result.torque).subspan(i * A, A));
     episode_.discounted_return += discount_ * result.reward[i];
     discount_ *= gamma_;
     const size_t terms = episode_.terms.size();
@@ -69,15 +72,17 @@ class EpisodeTally {
 
   /// The results; call once, at the end.
   EvaluationEpisode Finish() {
-    const bool at_goal = goal_since_ >= 0 && !ended_;
+    // Where the goal ends an episode, it is reached; else an end is a numerical blow-up.
+    const bool at_goal = goal_since_ >= 0 && (!ended_ || rule_.by_return());
     const bool settled = settled_since_ >= 0 && at_goal;
     const auto seconds = [&](int64_t steps) { return static_cast<double>(steps) * seconds_; };
     EvaluationEpisode& e = episode_;
-    e.swing_up_seconds = at_goal ? seconds(goal_since_) : kEvaluationSeconds;
-    e.settling_seconds = settled ? seconds(settled_since_) : kEvaluationSeconds;
-    e.success = at_goal && goal_since_ <= steps_ - hold_steps_;
-    e.rms_torque = std::sqrt(squares_ / static_cast<double>(steps_));
-    e.torque_variation = variation_ / kEvaluationSeconds;
+    e.swing_up_seconds = at_goal ? seconds(goal_since_) : rule_.seconds;
+    e.settling_seconds = settled ? seconds(settled_since_) : rule_.seconds;
+    e.success = rule_.by_return() ? e.reward_sum >= rule_.solved_return
+                                  : at_goal && goal_since_ <= steps_ - hold_steps_;
+    e.rms_torque = std::sqrt(squares_ / static_cast<double>(step_));
+    e.torque_variation = variation_ / seconds(step_);
     if (at_goal && goal_since_ < steps_) {
       e.goal_variation = goal_variation_ / seconds(steps_ - goal_since_);
       e.goal_changes = static_cast<double>(goal_changes_) / seconds(steps_ - goal_since_);
@@ -86,13 +91,21 @@ class EpisodeTally {
   }
 
  private:
-  /// |change| of the torque from the last step to this one, N·m.
-  void AddChange(double change) {
+  /// Adds the torques (A) of a step, N·m.
+  void AddTorque(std::span<const double> torque) {
+    double change = 0;
+    for (size_t a = 0; a < torque.size(); ++a) {
+      episode_.peak_torque = std::max(episode_.peak_torque, std::abs(torque[a]));
+      squares_ += torque[a] * torque[a];
+      if (step_ > 1) change += std::abs(torque[a] - last_torque_[a]);
+      last_torque_[a] = torque[a];
+    }
     variation_ += change;
     goal_variation_ += change;
     goal_changes_ += change > 0 ? 1 : 0;
   }
 
+  EvaluationRule rule_;
   double seconds_;  // of a step
   int64_t steps_, return_steps_, hold_steps_, tilt_steps_;
   double gamma_, discount_;   // γ, γᵏ
@@ -100,24 +113,24 @@ class EpisodeTally {
   int64_t step_ = 0;          // steps so far
   int64_t goal_since_ = -1;   // first state of the present stretch at the goal
   int64_t settled_since_ = -1;
-  bool ended_ = false;  // by a numerical blow-up: further steps belong to another episode
-  double last_torque_ = 0, squares_ = 0, variation_ = 0;
+  bool ended_ = false;               // terminated: further steps belong to another episode
+  std::vector<double> last_torque_;  // (A)
+  double squares_ = 0, variation_ = 0;
   double goal_variation_ = 0;  // in the present stretch at the goal
   int64_t goal_changes_ = 0;
   EvaluationEpisode episode_;
 };
 
-/// Sets the policy's value of each environment's present state, if its units are known.
+/// Sets the policy's value of each environment's present state, if it estimates one and its units
+/// are known.
 void EstimateValues(const Policy& policy, const VectorEnv& env, std::span<EpisodeTally> tallies) {
   const ValueUnits units = ValueUnitsOf(policy);
-  if (units.gamma == 0) return;
-  // A workspace of its own: evaluations in other threads may share the policy.
-  Policy::Workspace workspace = policy.MakeWorkspace();
-  AlignedVector<float> values(tallies.size() * policy.torques().size());
-  const Matrix<float> q(values, env.num_envs(), static_cast<int>(policy.torques().size()));
-  policy.QValues(env.obs(), q, workspace);
+  if (units.gamma == 0 || policy.num_values() == 0) return;
+  AlignedVector<float> numbers(tallies.size() * static_cast<size_t>(policy.num_values()));
+  const Matrix<float> values(numbers, env.num_envs(), policy.num_values());
+  policy.Values(env.obs(), values, *policy.Start(env.num_envs()));
   for (int i = 0; i < env.num_envs(); ++i) {
-    tallies[static_cast<size_t>(i)].SetValue(std::ranges::max(q.row(i)) / units.reward_scale);
+    tallies[static_cast<size_t>(i)].SetValue(std::ranges::max(values.row(i)) / units.reward_scale);
   }
 }
 
@@ -140,25 +153,24 @@ class SharedActing {
     const int slices = std::clamp(num_envs / kSmallestSlice, 1, most);
     size_ = (num_envs + slices - 1) / slices;
     for (int first = 0; first < num_envs; first += size_) {
-      workspaces_.push_back(policy.MakeWorkspace());
+      memories_.push_back(policy.Start(std::min(size_, num_envs - first)));
     }
   }
 
-  void operator()(Matrix<const float> obs, std::span<double> torque) {
-    ParallelFor(pool_, static_cast<int>(workspaces_.size()), [&](int slice) {
+  void operator()(Matrix<const float> obs, Matrix<double> action) {
+    ParallelFor(pool_, static_cast<int>(memories_.size()), [&](int slice) {
       const int first = slice * size_;
       const int count = std::min(size_, obs.rows() - first);
-      policy_.Act(obs.Rows(first, count),
-                  torque.subspan(static_cast<size_t>(first), static_cast<size_t>(count)),
-                  workspaces_[static_cast<size_t>(slice)]);
+      policy_.Act(obs.Rows(first, count), action.Rows(first, count),
+                  *memories_[static_cast<size_t>(slice)]);
     });
   }
 
  private:
   const Policy& policy_;
   ThreadPool* pool_;
-  int size_;                                   // rows in a slice
-  std::vector<Policy::Workspace> workspaces_;  // one for each slice
+  int size_;                                               // rows in a slice
+  std::vector<std::unique_ptr<Policy::Memory>> memories_;  // one for each slice
 };
 
 }  // namespace
@@ -169,14 +181,14 @@ ValueUnits ValueUnitsOf(const Policy& policy) {
   return {*info.gamma, *info.reward_scale};
 }
 
-Evaluation Summarize(std::span<const EvaluationEpisode> episodes) {
+Evaluation Summarize(std::span<const EvaluationEpisode> episodes, const EvaluationRule& rule) {
   std::vector<const EvaluationEpisode*> all, successful, settled;
   Evaluation e;
   for (const EvaluationEpisode& episode : episodes) {
     all.push_back(&episode);
     if (!episode.success) continue;
     successful.push_back(&episode);
-    if (episode.settling_seconds < kEvaluationSeconds) settled.push_back(&episode);
+    if (episode.settling_seconds < rule.seconds) settled.push_back(&episode);
   }
   e.episodes = static_cast<int64_t>(all.size());
   e.successes = static_cast<int64_t>(successful.size());
@@ -205,27 +217,31 @@ Evaluation Summarize(std::span<const EvaluationEpisode> episodes) {
       e.term_means[j] += share * episode.terms[j];
     }
   }
+  e.passed = e.episodes > 0 && rule.Passed(e.success_rate(), e.reward_sum.mean);
   return e;
 }
 
 std::vector<EvaluationEpisode> EvaluateEpisodes(const Policy& policy, VectorEnv& env,
                                                 ThreadPool* pool,
                                                 const std::function<void(double)>& progress) {
-  const int n = env.num_envs();
+  const EnvSpec& spec = env.spec();
+  const int n = spec.num_envs;
   SharedActing act(policy, n, pool);
-  StepResult result = env.MakeResult();
-  std::vector<double> torque(static_cast<size_t>(n));
-  std::vector<EpisodeTally> tallies(static_cast<size_t>(n), EpisodeTally(policy, env));
+  StepResult result(spec);
+  std::vector<double> actions(static_cast<size_t>(n) * spec.action_limit.size());
+  const Matrix<double> action(actions, n, spec.action_size());
+  std::vector<EpisodeTally> tallies(static_cast<size_t>(n), EpisodeTally(policy, spec));
   EstimateValues(policy, env, tallies);
 
-  const int64_t steps = StepsIn(kEvaluationSeconds, env);
+  const int64_t steps = StepsIn(spec.evaluation.seconds, spec);
   for (int64_t k = 1; k <= steps; ++k) {
     // Before the step: after the last one an environment that timed out has been reset.
     for (int i = 0; i < n; ++i) tallies[static_cast<size_t>(i)].SeeLean(env, i);
-    act(env.obs(), torque);
-    env.Step(torque, result);
+    act(env.obs(), action);
+    env.Step(action, result);
     for (int i = 0; i < n; ++i) tallies[static_cast<size_t>(i)].Add(result, static_cast<size_t>(i));
     if (progress) progress(static_cast<double>(k) / static_cast<double>(steps));
+    if (std::ranges::all_of(tallies, &EpisodeTally::ended)) break;
   }
 
   std::vector<EvaluationEpisode> episodes;
@@ -235,7 +251,7 @@ std::vector<EvaluationEpisode> EvaluateEpisodes(const Policy& policy, VectorEnv&
 
 Evaluation Evaluate(const Policy& policy, VectorEnv& env, ThreadPool* pool,
                     const std::function<void(double)>& progress) {
-  return Summarize(EvaluateEpisodes(policy, env, pool, progress));
+  return Summarize(EvaluateEpisodes(policy, env, pool, progress), env.spec().evaluation);
 }
 
 }  // namespace upswing

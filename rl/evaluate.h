@@ -6,17 +6,14 @@
 #include <string>
 #include <vector>
 
+#include "core/env.h"
+#include "core/policy.h"
 #include "core/sample.h"
 #include "core/thread_pool.h"
-#include "core/vector_env.h"
-#include "nn/policy.h"
 
 namespace upswing {
 
-inline constexpr double kEvaluationSeconds = 20;  // length of an evaluation episode
-inline constexpr double kHoldSeconds = 10;        // success: at the goal throughout the last 10 s
-inline constexpr double kReturnSeconds = 10;      // the return is the reward of the first 10 s
-inline constexpr double kSteadyTiltSeconds = 1;   // the steady tilt is the mean of the last 1 s
+inline constexpr double kSteadyTiltSeconds = 1;  // the steady tilt is the mean of the last 1 s
 /// Settled: every body leans less than this, rad: 5% of the half turn from hanging to upright.
 inline constexpr double kSettledTilt = 0.05 * std::numbers::pi;
 
@@ -24,10 +21,10 @@ inline constexpr double kSettledTilt = 0.05 * std::numbers::pi;
 struct EvaluationEpisode {
   bool success = false;
   double swing_up_seconds = 0;  // start of the last stretch at the goal that lasts to the end;
-                                // kEvaluationSeconds if the end is not at the goal
+                                // its whole length if the end is not at the goal
   double settling_seconds = 0;  // start of the last stretch settled that lasts to the end;
-                                // kEvaluationSeconds if the end is not settled
-  double reward_sum = 0;        // return: undiscounted, over the first kReturnSeconds
+                                // its whole length if the end is not settled
+  double reward_sum = 0;        // return: undiscounted, over the first return_seconds
   double work = 0;              // Σ |mechanical work of the motor|, J
   double peak_torque = 0;       // largest |torque|, N·m
   double rms_torque = 0;        // root mean square, N·m
@@ -35,10 +32,10 @@ struct EvaluationEpisode {
   // Of the last stretch at the goal; 0 if the end is not at the goal.
   double goal_variation = 0;     // the torque's total variation a second, N·m/s
   double goal_changes = 0;       // how often a second the torque changes
-  double value = 0;              // largest Q-value of the first observation, in units of reward
+  double value = 0;              // largest value of the first observation, in units of reward
   double discounted_return = 0;  // Σ γᵏ r over the whole episode: what `value` estimates, if the
                                  // policy was trained with the same reward
-  std::vector<double> terms;  // (K) sum of each reward term over the first kReturnSeconds
+  std::vector<double> terms;  // (K) sum of each reward term over the first return_seconds
   std::vector<double> tilt;   // (bodies) mean lean over the last kSteadyTiltSeconds, rad
 };
 
@@ -59,25 +56,27 @@ struct Evaluation {
   double success_rate() const {
     return episodes == 0 ? 0 : static_cast<double>(successes) / static_cast<double>(episodes);
   }
-  bool all_succeeded() const { return episodes > 0 && successes == episodes; }
+  /// Whether it is passed, by the rule of the task.
+  bool passed = false;
 };
 
-/// What Q-values estimate: the sum of γᵏ · reward_scale · r, by the policy's metadata.
+/// What values estimate: the sum of γᵏ · reward_scale · r, by the policy's metadata.
 struct ValueUnits {
   double gamma = 0, reward_scale = 1;  // γ = 0: the metadata have none
 };
 /// The units in a policy's metadata.
 ValueUnits ValueUnitsOf(const Policy& policy);
 
-/// Lets `policy` control every environment for kEvaluationSeconds from its present state, and
-/// returns one result for each. Episodes must not time out earlier. The pool shares the forward
-/// passes, which changes no bit. `progress` (may be empty) is called with the share done, 0 to 1.
+/// Lets `policy` control every environment from its present state for as long as the task's rule
+/// says, and returns one result for each. Episodes must not time out earlier. The pool shares the
+/// forward passes, which changes no bit. `progress` (may be empty) is called with the share done, 0
+/// to 1.
 std::vector<EvaluationEpisode> EvaluateEpisodes(const Policy& policy, VectorEnv& env,
                                                 ThreadPool* pool = nullptr,
                                                 const std::function<void(double)>& progress = {});
 
-/// Summarises episodes.
-Evaluation Summarize(std::span<const EvaluationEpisode> episodes);
+/// Summarises episodes of a task with this rule.
+Evaluation Summarize(std::span<const EvaluationEpisode> episodes, const EvaluationRule& rule);
 
 /// EvaluateEpisodes, then Summarize.
 Evaluation Evaluate(const Policy& policy, VectorEnv& env, ThreadPool* pool = nullptr,

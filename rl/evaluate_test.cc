@@ -4,13 +4,14 @@
 
 #include <numbers>
 
+#include "nn/q_policy.h"
 #include "rl/toy_env.h"
 
 namespace upswing {
 namespace {
 
 /// A policy on one observation x that always chooses the same torque.
-Policy Constant(double torque) {
+QPolicy Constant(double torque) {
   const QNetworkShape shape{1, 1, {1}, 0, false, false};
   return {shape, std::vector<float>(QNetwork<float>(shape).num_parameters()), {torque}, {}};
 }
@@ -19,9 +20,11 @@ Policy Constant(double torque) {
 class ScriptedEnv : public ToyEnv {
  public:
   explicit ScriptedEnv(std::vector<int> goal_from, int gap = -1)
-      : ToyEnv(static_cast<int>(goal_from.size())), goal_from_(std::move(goal_from)), gap_(gap) {}
-  double step_seconds() const override { return 0.02; }
-  void Step(std::span<const double> torque, StepResult& r) override {
+      : ToyEnv(static_cast<int>(goal_from.size())), goal_from_(std::move(goal_from)), gap_(gap) {
+    spec_.step_seconds = 0.02;
+  }
+  void Step(Matrix<const double> action, StepResult& r) override {
+    const std::span<const double> torque = action.values();
     ++k_;
     for (size_t i = 0; i < goal_from_.size(); ++i) {
       r.at_goal[i] = k_ >= goal_from_[i] && k_ != gap_ ? 1 : 0;
@@ -67,7 +70,7 @@ TEST(Evaluate, ReportsTheValueAndTheReturnThatItEstimates) {
   const QNetworkShape shape{1, 1, {1}, 0, false, false};
   std::vector<float> parameters(QNetwork<float>(shape).num_parameters());
   parameters.back() = 3;  // the output's bias: Q = 3 everywhere
-  const Policy policy(shape, parameters, {1}, Units(0.5, 2));
+  const QPolicy policy(shape, parameters, {1}, Units(0.5, 2));
   ScriptedEnv env({500, 501});
   const Evaluation e = Evaluate(policy, env);
   EXPECT_DOUBLE_EQ(e.value, 1.5);
@@ -95,13 +98,13 @@ TEST(Evaluate, TheSummaryIsThatOfTheEpisodes) {
   ScriptedEnv env({500, 501, 100, 2000}), again({500, 501, 100, 2000});
   const std::vector<EvaluationEpisode> episodes = EvaluateEpisodes(Constant(-2), env);
   ASSERT_EQ(episodes.size(), 4U);
-  const double seconds[] = {10, 10.02, 2, kEvaluationSeconds};
+  const double seconds[] = {10, 10.02, 2, 20};
   for (size_t i = 0; i < 4; ++i) {
     EXPECT_EQ(episodes[i].success, i % 2 == 0);
     EXPECT_DOUBLE_EQ(episodes[i].swing_up_seconds, seconds[i]);
     EXPECT_DOUBLE_EQ(episodes[i].terms[0], 500 * 501 / 2.0);
   }
-  const Evaluation summary = Summarize(episodes);
+  const Evaluation summary = Summarize(episodes, env.spec().evaluation);
   EXPECT_EQ(summary.successes, Evaluate(Constant(-2), again).successes);
   EXPECT_EQ(summary.swing_up_seconds.median, 6);
 }
@@ -109,15 +112,14 @@ TEST(Evaluate, TheSummaryIsThatOfTheEpisodes) {
 /// Environment 0 leans 1° and -2° from its state 150 on, environment 1 always 10°; torque as given.
 class LeaningEnv : public ScriptedEnv {
  public:
-  LeaningEnv() : ScriptedEnv({100, 100}) {}
-  int bodies() const override { return 2; }
+  LeaningEnv() : ScriptedEnv({100, 100}) { spec_.bodies = 2; }
   void Lean(int env, std::span<double> lean) const override {
     const bool upright = env == 0 && k >= 150;
     lean[0] = upright ? kDegree : 10 * kDegree;
     lean[1] = upright ? -2 * kDegree : 0;
   }
-  void Step(std::span<const double> torque, StepResult& r) override {
-    ScriptedEnv::Step(torque, r);
+  void Step(Matrix<const double> action, StepResult& r) override {
+    ScriptedEnv::Step(action, r);
     ++k;
     // Until state 100 a change of 1 N·m at each step, from then on one of 0.5 every fifth.
     for (double& x : r.torque) x = k <= 100 ? k % 2 : 0.5 * (k / 5 % 2);
@@ -131,7 +133,7 @@ TEST(Evaluate, SettlingTimeTorqueVariationAndTilt) {
   const std::vector<EvaluationEpisode> episodes = EvaluateEpisodes(Constant(0), env);
   EXPECT_TRUE(episodes[0].success && episodes[1].success);
   EXPECT_DOUBLE_EQ(episodes[0].settling_seconds, 3);
-  EXPECT_EQ(episodes[1].settling_seconds, kEvaluationSeconds);  // more than 9° off
+  EXPECT_EQ(episodes[1].settling_seconds, 20);  // more than 9° off
   EXPECT_NEAR(episodes[0].tilt[0], env.kDegree, 1e-12);
   EXPECT_NEAR(episodes[0].tilt[1], -2 * env.kDegree, 1e-12);
   // 99 changes of 1 N·m, then one of 0.5 at each of 105, 110, …, 1000: 180 of them in 18 s.
@@ -139,7 +141,7 @@ TEST(Evaluate, SettlingTimeTorqueVariationAndTilt) {
   EXPECT_DOUBLE_EQ(episodes[0].goal_variation, 180 * 0.5 / 18);
   EXPECT_DOUBLE_EQ(episodes[0].goal_changes, 10);
 
-  const Evaluation e = Summarize(episodes);
+  const Evaluation e = Summarize(episodes, env.spec().evaluation);
   EXPECT_EQ(e.settled, 1);
   EXPECT_DOUBLE_EQ(e.settling_seconds.median, 3);
   ASSERT_EQ(e.tilt.size(), 2U);
@@ -155,7 +157,7 @@ TEST(Evaluate, AStretchAtTheGoalCountsItsOwnChangesOnly) {
 }
 
 /// A dueling policy on one observation whose torque changes often with it.
-Policy Fickle() {
+QPolicy Fickle() {
   const QNetworkShape shape{1, 9, {32, 32}, 16, true, true};
   const QNetwork<float> network(shape);
   std::vector<float> parameters(network.num_parameters());
@@ -186,7 +188,7 @@ TEST(Evaluate, ThreadsChangeNoBit) {
 }
 
 TEST(Evaluate, ThreadsMayShareAPolicy) {
-  const Policy policy = Fickle();
+  const QPolicy policy = Fickle();
   const auto value = [&](int seed) {
     ToyEnv env(203, static_cast<uint64_t>(seed));
     return Evaluate(policy, env).value;

@@ -59,9 +59,9 @@ TEST(Replay, AMillionTransitionsOfThePendulumFitIn100Megabytes) {
   Replay replay(1000, 8);
   const std::array<float, 8> obs{};
   for (int i = 0; i < 1000; ++i) replay.Add({obs, obs, 0, 0, 0});
-  TensorFile file;
+  Tensors file;
   replay.State(Archive::Saver(file), 9);
-  EXPECT_EQ(file.tensors().at("rows").bytes.size(), 1000 * kRow);
+  EXPECT_EQ(file.all().at("rows").bytes.size(), 1000 * kRow);
   EXPECT_LE(1000000 * kRow, 100000000U);
 }
 

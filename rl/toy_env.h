@@ -2,8 +2,8 @@
 
 #include <vector>
 
+#include "core/env.h"
 #include "core/rng.h"
-#include "core/vector_env.h"
 
 namespace upswing {
 
@@ -14,18 +14,36 @@ class ToyEnv : public VectorEnv {
  public:
   explicit ToyEnv(int num_envs, uint64_t seed = 0)
       : rng_(seed, "toy"), x_(static_cast<size_t>(num_envs)), steps_(x_.size()) {
+    spec_ = Spec(num_envs);
     for (float& x : x_) x = Start();
   }
-  int num_envs() const override { return static_cast<int>(x_.size()); }
-  int obs_size() const override { return 1; }
-  std::vector<std::string> reward_term_names() const override { return {"near"}; }
-  double step_seconds() const override { return 1; }
-  double torque_limit() const override { return 1; }
-  std::vector<float> mirror_signs() const override { return {-1}; }
+  /// What such environments are.
+  static EnvSpec Spec(int num_envs) {
+    EnvSpec spec;
+    spec.task = "toy";
+    spec.num_envs = num_envs;
+    spec.obs_size = 1;
+    spec.action_limit = {1};
+    spec.step_seconds = 1;
+    spec.term_names = {"near"};
+    spec.state_names = {"x"};
+    spec.state_units = {""};
+    spec.mirror_signs = {-1};
+    spec.evaluation = {20, 10, 10, 0};
+    return spec;
+  }
+  const EnvSpec& spec() const override { return spec_; }
   Matrix<const float> obs() const override { return {x_.data(), num_envs(), 1}; }
   void SetStartNoise(double sigma) override { noise_ = sigma; }
+  void GetState(int env, std::span<double> state) const override {
+    state[0] = x_[static_cast<size_t>(env)];
+  }
+  void SetState(int env, std::span<const double> state) override {
+    x_[static_cast<size_t>(env)] = static_cast<float>(state[0]);
+  }
 
-  void Step(std::span<const double> torque, StepResult& r) override {
+  void Step(Matrix<const double> action, StepResult& r) override {
+    const std::span<const double> torque = action.values();
     for (size_t i = 0; i < x_.size(); ++i) {
       x_[i] += static_cast<float>(torque[i]);
       r.next_obs[i] = poison ? std::numeric_limits<float>::quiet_NaN() : x_[i];
@@ -50,6 +68,9 @@ class ToyEnv : public VectorEnv {
 
   int64_t episode_steps = 10;
   bool poison = false;  // observations are NaN
+
+ protected:
+  EnvSpec spec_;
 
  private:
   float Start() { return static_cast<float>(noise_ * rng_.Normal()); }

@@ -3,7 +3,7 @@
 #include <span>
 
 #include "core/aligned.h"
-#include "core/vector_env.h"
+#include "core/env.h"
 #include "sim/double_pendulum.h"
 
 /// The double pendulum in closed form, equivalent to the built-in MJCF: equations of motion,

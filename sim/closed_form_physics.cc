@@ -2,7 +2,17 @@
 
 #include <algorithm>
 
+#include "core/error.h"
+
 namespace upswing {
+
+const Engine kClosedForm{
+    "closed-form", [](const PhysicsConfig& config) -> std::unique_ptr<Physics> {
+      if (!config.mjcf.empty()) {
+        throw BadInput("physics closed-form: expected the built-in model, got another MJCF model");
+      }
+      return std::make_unique<ClosedFormPhysics>(config);
+    }};
 
 ClosedFormPhysics::ClosedFormPhysics(const PhysicsConfig& config)
     : num_envs_(static_cast<size_t>(config.num_envs)),

@@ -11,6 +11,13 @@
 /// velocities (rad/s), m mass (kg), l length (m), g gravity (m/s²), tau torque at joint 1 (N·m).
 namespace upswing {
 
+/// The task's name.
+inline constexpr const char* kDoublePendulum = "double-pendulum";
+
+/// An evaluation episode (s), its part that counts for the return, and the part at its end
+/// throughout which both links must be inverted.
+inline constexpr double kEvaluationSeconds = 20, kReturnSeconds = 10, kHoldSeconds = 10;
+
 /// Time between two actions (s); the physics makes several steps in it.
 inline constexpr double kControlPeriod = 0.02;
 

@@ -25,14 +25,32 @@ std::optional<Disturber> MakeDisturber(const PendulumEnvConfig& config) {
 
 }  // namespace
 
+EnvSpec PendulumSpec(const PendulumEnvConfig& config) {
+  EnvSpec spec;
+  spec.task = kDoublePendulum;
+  spec.num_envs = config.num_envs;
+  spec.obs_size = kObservationSize + config.memory * kMemorySize;
+  spec.action_limit = {config.plant(0).torque_limit};
+  spec.step_seconds = kControlPeriod;
+  spec.term_names = {kRewardTermNames.begin(), kRewardTermNames.end()};
+  spec.state_names = {"q1", "q2", "w1", "w2"};
+  spec.state_units = {"rad", "rad", "rad/s", "rad/s"};
+  spec.mirror_signs = {kMirrorSigns.begin(), kMirrorSigns.end()};
+  spec.mirror_signs.resize(static_cast<size_t>(spec.obs_size), -1.0F);
+  spec.bodies = 2;
+  spec.evaluation = {kEvaluationSeconds, kReturnSeconds, kHoldSeconds, 0};
+  return spec;
+}
+
 PendulumEnv::PendulumEnv(const PendulumEnvConfig& config)
     : config_(config),
-      physics_(MakePhysics(config)),
+      spec_(PendulumSpec(config)),
+      physics_(config.engine->make(config)),
       episode_steps_(std::max<int64_t>(1, std::llround(config_.episode_seconds / kControlPeriod))),
       disturber_(MakeDisturber(config)) {
   const auto n = static_cast<size_t>(config_.num_envs);
   step_counts_.resize(n);
-  obs_.resize(n * static_cast<size_t>(obs_size()));
+  obs_.resize(n * static_cast<size_t>(spec_.obs_size));
   if (config_.randomization.any()) plants_.resize(n);
   for (int i = 0; i < config_.num_envs; ++i) {
     const uint64_t index = config_.first_index + static_cast<uint64_t>(i);
@@ -45,21 +63,22 @@ PendulumEnv::PendulumEnv(const PendulumEnvConfig& config)
   for (int i = 0; i < config_.num_envs; ++i) Reset(i);
 }
 
-std::vector<std::string> PendulumEnv::reward_term_names() const {
-  return {kRewardTermNames.begin(), kRewardTermNames.end()};
-}
-
-std::vector<float> PendulumEnv::mirror_signs() const {
-  std::vector<float> signs(kMirrorSigns.begin(), kMirrorSigns.end());
-  signs.resize(static_cast<size_t>(obs_size()), -1.0F);
-  return signs;
-}
-
 void PendulumEnv::Lean(int env, std::span<double> lean) const {
   std::ranges::copy(upswing::Lean(state(env)), lean.begin());
 }
 
-Matrix<const float> PendulumEnv::obs() const { return {obs_.data(), config_.num_envs, obs_size()}; }
+Matrix<const float> PendulumEnv::obs() const {
+  return {obs_.data(), config_.num_envs, spec_.obs_size};
+}
+
+void PendulumEnv::GetState(int env, std::span<double> s) const {
+  const PendulumState now = state(env);
+  std::ranges::copy(std::array{now.q1, now.q2, now.w1, now.w2}, s.begin());
+}
+
+void PendulumEnv::SetState(int env, std::span<const double> s) {
+  SetState(env, PendulumState{s[0], s[1], s[2], s[3]});
+}
 
 void PendulumEnv::SetState(int env, const PendulumState& s) {
   physics_->SetState(env, s);

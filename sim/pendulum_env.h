@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "core/env.h"
 #include "core/rng.h"
-#include "core/vector_env.h"
 #include "sim/disturbance.h"
 #include "sim/double_pendulum.h"
 #include "sim/physics.h"
@@ -27,7 +27,7 @@ struct StartStates {
 
 /// Settings of a PendulumEnv.
 struct PendulumEnvConfig : PhysicsConfig {
-  double episode_seconds = 10;
+  double episode_seconds = kEvaluationSeconds;
   int memory = 0;  // past control steps in an observation
   StartStates start;
   uint64_t seed = 0;
@@ -44,6 +44,11 @@ struct PendulumEnvConfig : PhysicsConfig {
   }
 };
 
+/// What environments of these settings are: the task "double-pendulum". An evaluation episode lasts
+/// 20 s, its return is that of the first 10 s, and it succeeds if both links are inverted
+/// throughout the last 10 s.
+EnvSpec PendulumSpec(const PendulumEnvConfig& config);
+
 /// N double pendulums and their episodes. Reaching the time limit truncates; only a numerical
 /// blow-up (see Physics::Step) terminates. The starts do not depend on the physics.
 ///
@@ -52,19 +57,19 @@ struct PendulumEnvConfig : PhysicsConfig {
 /// state, reward and goal are the true ones.
 class PendulumEnv : public VectorEnv {
  public:
-  /// Throws BadInput as MakePhysics does.
+  /// Throws BadInput as the engine does.
   explicit PendulumEnv(const PendulumEnvConfig& config);
 
-  int num_envs() const override { return config_.num_envs; }
-  int obs_size() const override { return kObservationSize + config_.memory * kMemorySize; }
-  std::vector<std::string> reward_term_names() const override;
-  double step_seconds() const override { return kControlPeriod; }
-  double torque_limit() const override { return config_.plant(0).torque_limit; }
-  std::vector<float> mirror_signs() const override;
-  int bodies() const override { return 2; }
+  const EnvSpec& spec() const override { return spec_; }
   void Lean(int env, std::span<double> lean) const override;
   Matrix<const float> obs() const override;
-  void Step(std::span<const double> torque, StepResult& result) override;
+  void Step(Matrix<const double> action, StepResult& result) override {
+    Step(action.values(), result);
+  }
+  /// The same with the torque (N), N·m.
+  void Step(std::span<const double> torque, StepResult& result);
+  void GetState(int env, std::span<double> state) const override;
+  void SetState(int env, std::span<const double> state) override;
   void SetStartNoise(double sigma) override { config_.start.noise = sigma; }
   void State(const Archive& archive) override;
 
@@ -97,11 +102,12 @@ class PendulumEnv : public VectorEnv {
   /// One environment's observation (D) within a table of them.
   template <typename Table>
   auto Row(Table& table, int env) const {
-    const auto size = static_cast<size_t>(obs_size());
+    const auto size = static_cast<size_t>(spec_.obs_size);
     return std::span(table).subspan(static_cast<size_t>(env) * size, size);
   }
 
   PendulumEnvConfig config_;
+  EnvSpec spec_;
   std::unique_ptr<Physics> physics_;
   int64_t episode_steps_;
   std::optional<Disturber> disturber_;  // none without noise and delay

@@ -3,30 +3,32 @@
 #include <memory>
 #include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "core/archive.h"
+#include "core/env.h"
 #include "core/thread_pool.h"
-#include "core/vector_env.h"
 #include "sim/double_pendulum.h"
 
 namespace upswing {
 
-enum class PhysicsEngine {
-  kMuJoCo,
-  kClosedForm,  // the built-in model only: many times faster, equal to 12 digits a step
+class Physics;
+struct PhysicsConfig;
+
+/// A way to compute the motion; each is a constant.
+struct Engine {
+  const char* name;
+  /// Throws BadInput if the model does not compile, is no double pendulum, or is not for this
+  /// engine.
+  std::unique_ptr<Physics> (*make)(const PhysicsConfig& config);
 };
 
-/// The engines' names, the default first: "mujoco", "closed-form".
-std::vector<std::string> PhysicsNames();
-
-/// The engine with this name. Throws BadInput whose message begins with `where`.
-PhysicsEngine ParsePhysics(std::string_view name, const std::string& where);
+/// Closed form: the built-in model only; many times faster than MuJoCo, equal to 12 digits a step.
+extern const Engine kClosedForm;
 
 /// Settings of the physics.
 struct PhysicsConfig {
-  PhysicsEngine physics = PhysicsEngine::kMuJoCo;
+  const Engine* engine = &kClosedForm;
   std::vector<Plant> plants{Plant()};  // one for all environments, or one for each
   int num_envs = 1;
   RewardWeights weights;
@@ -60,8 +62,5 @@ class Physics {
   /// Saves or loads the state; plants are not part of it.
   virtual void State(const Archive& archive) = 0;
 };
-
-/// Throws BadInput if the model does not compile, is no double pendulum, or is not for this engine.
-std::unique_ptr<Physics> MakePhysics(const PhysicsConfig& config);
 
 }  // namespace upswing

@@ -10,6 +10,8 @@ import re
 import sys
 from pathlib import Path
 
+LIBRARIES = {"core", "nn", "sim", "rl", "control", "io", "mujoco", "report"}
+
 # What each folder may include besides itself.
 LAYERS = {
     "core": set(),
@@ -17,19 +19,29 @@ LAYERS = {
     "sim": {"core"},
     "rl": {"nn", "core"},
     "control": {"sim", "core"},
-    "report": {"core"},
-    "apps": {"core", "nn", "sim", "rl", "control", "report", "python"},
-    "python": {"core", "nn", "sim", "rl", "control", "report", "apps"},
-    "fuzz": {"core", "nn", "sim", "rl", "control", "report", "apps"},
+    "io": {"core"},
+    "mujoco": {"sim", "io", "core"},
+    "report": {"io", "core"},
+    "lab": LIBRARIES,
+    "apps": LIBRARIES | {"lab"},
+    "fuzz": LIBRARIES | {"lab"},
 }
 
 # The files that may include each foreign library.
 ALLOWED_FILES = {
-    "mujoco": re.compile(r"sim/"),
+    "mujoco": re.compile(r"mujoco/"),
+    "google": re.compile(r"io/"),
     "hwy": re.compile(r"(core/simd(_test)?|nn/(linear|bfloat16|roofline)|"
                       r"sim/(closed_form|sine_cosine-inl))\.(h|cc)$"),
     "Eigen": re.compile(r"nn/[^/]*_(test|bench)\.cc$"),
 }
+
+# Layers that need no operating system, the headers that would bring one, and the files that may
+# have them: tests, and what asks Linux for AMX where that is compiled.
+PORTABLE = {"core", "nn", "sim", "rl", "control"}
+MAY_ASK_SYSTEM = re.compile(r"(_test|_bench)\.cc$|/testing\.h$|nn/bfloat16\.cc$")
+SYSTEM = re.compile(r"(unistd|fcntl|poll|sched|signal|csignal|filesystem|fstream|cstdio|stdio)(\.h)?$|"
+                    r"sys/")
 
 SOURCE_ENDINGS = (".h", ".cc", ".cc.in")
 INCLUDE = re.compile(r'\s*#\s*include\s*(["<])([^">]+)[">]')
@@ -50,10 +62,13 @@ def offence(root, file, quote, included):
     """What is wrong with one include, or None."""
     folder = file.split("/")[0]
     target = included.split("/")[0]
-    if target in ALLOWED_FILES:
+    foreign = quote == "<" and not (root / included).is_file()
+    if foreign and target in ALLOWED_FILES:
         files = ALLOWED_FILES[target]
         return None if files.match(file) else f"{included} is not for this file ({files.pattern})"
-    if quote == "<" and target not in LAYERS:
+    if foreign and folder in PORTABLE and SYSTEM.match(included) and not MAY_ASK_SYSTEM.search(file):
+        return f"<{included}>: {folder}/ must not need an operating system"
+    if foreign:
         return None  # the standard library, another library or a generated header
     if target not in LAYERS:
         return f'"{included}": expected "folder/file.h" with one of our folders'

@@ -13,6 +13,7 @@ test('Get Inverted swings up and balances, while one watches', async ({ page }) 
 });
 
 test('every agent is up within 10 s and holds for 20 s', async ({ page }) => {
+  test.slow(); // minutes of physics, on a machine that may have other work
   await open(page);
   const ids = await page.evaluate(() => upswing.agents.list.map(({ id }) => id));
   expect(ids.length).toBeGreaterThan(3);

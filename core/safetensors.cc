@@ -1,0 +1,231 @@
+#include "core/safetensors.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <optional>
+
+#include "core/checksum.h"
+#include "core/json.h"
+#include "core/text.h"
+
+namespace upswing {
+namespace {
+
+using nlohmann::json;
+
+static_assert(std::endian::native == std::endian::little, "safetensors are little-endian");
+
+constexpr uint64_t kMaxHeader = 1 << 20;  // bytes
+constexpr size_t kMaxRank = 8;            // numbers in a shape
+constexpr std::string_view kChecksumKey = "\"checksum\":\"";
+constexpr std::string_view kNoChecksum = "0000000000000000";
+
+/// Where the checksum's digits stand in the header; npos if the file has none.
+size_t FindChecksum(std::string_view header) {
+  const size_t key = header.find(kChecksumKey);
+  return key == std::string_view::npos ? key : key + kChecksumKey.size();
+}
+
+/// Bytes of a tensor of this shape; nothing on a negative size or overflow.
+std::optional<size_t> ByteCount(const std::vector<int64_t>& shape, Dtype dtype) {
+  size_t count = SizeOf(dtype);
+  for (const int64_t extent : shape) {
+    if (extent < 0) return std::nullopt;
+    if (__builtin_mul_overflow(count, static_cast<size_t>(extent), &count)) return std::nullopt;
+  }
+  return count;
+}
+
+/// The integers of a list in an entry. Throws BadInput.
+std::vector<int64_t> Integers(const json& entry, const std::string& name, size_t max_size) {
+  std::vector<int64_t> integers;
+  for (const json& item : JsonList(entry, name, max_size)) {
+    const std::optional<int64_t> integer = JsonInteger(item);
+    if (!integer) throw BadInput(Concat("\"", name, "\": expected integers, got ", item.dump()));
+    integers.push_back(*integer);
+  }
+  return integers;
+}
+
+/// One entry of the header, checked against the size of the file's data. Throws BadInput.
+SafetensorsEntry ParseEntry(const json& entry, size_t data_size) {
+  if (!entry.is_object()) throw BadInput("expected dtype, shape and data_offsets");
+  const std::string& dtype_name = JsonText(entry, "dtype");
+  const std::optional<Dtype> dtype = DtypeCalled(dtype_name);
+  if (!dtype) throw BadInput(Concat("type ", dtype_name, " is not ours"));
+  Tensor tensor{*dtype, Integers(entry, "shape", kMaxRank), {}};
+  const std::vector<int64_t> offsets = Integers(entry, "data_offsets", 2);
+  if (offsets.size() != 2 || offsets[0] < 0 || offsets[0] > offsets[1]) {
+    throw BadInput("\"data_offsets\": expected where its data begin and end");
+  }
+  const auto begin = static_cast<uint64_t>(offsets[0]);
+  const auto end = static_cast<uint64_t>(offsets[1]);
+  if (end > data_size) throw BadInput(Concat("data end at byte ", end, " of ", data_size));
+  if (ByteCount(tensor.shape, tensor.dtype) != end - begin) {
+    throw BadInput(Concat("expected the bytes of ", tensor.Describe(), ", got ", end - begin));
+  }
+  return {std::move(tensor), begin, end - begin};
+}
+
+/// Throws BadInput unless the tensors cover the data without gap or overlap, so that what is read
+/// of a file is never more than the file.
+void CheckCovered(const std::map<std::string, SafetensorsEntry>& entries, size_t data_size) {
+  std::vector<std::pair<size_t, size_t>> pieces;  // begin and size
+  pieces.reserve(entries.size());
+  for (const auto& [name, entry] : entries) pieces.emplace_back(entry.begin, entry.size);
+  std::ranges::sort(pieces);
+  size_t end = 0;
+  for (const auto& [begin, size] : pieces) {
+    if (size > 0 && begin != end) throw BadInput("tensors overlap");
+    end += size;
+  }
+  if (end != data_size) throw BadInput(Concat(data_size - end, " bytes too many"));
+}
+
+/// The text of a header, padded to whole words. Throws Failure if it would be too long to load or
+/// is not UTF-8.
+std::string HeaderText(const json& header) {
+  try {
+    std::string text = header.dump();
+    text.resize((text.size() + 7) / 8 * 8, ' ');
+    if (text.size() <= kMaxHeader) return text;
+    throw Failure(Concat("cannot write tensors: expected names and metadata of at most ",
+                         kMaxHeader, " bytes, got ", text.size()));
+  } catch (const json::exception&) {
+    throw Failure("cannot write tensors: expected metadata in UTF-8");
+  }
+}
+
+/// Throws BadInput unless `header`, the text of a file's header, holds the checksum of itself (with
+/// zeros in place of the checksum) and of `tensors`.
+void VerifyChecksum(std::string header, const std::map<std::string, Tensor>& tensors) {
+  const size_t at = FindChecksum(header);
+  if (at == std::string::npos) throw BadInput("its checksum is not where Upswing writes it");
+  const std::string expected = header.substr(at, kNoChecksum.size());
+  header.replace(at, kNoChecksum.size(), kNoChecksum);
+  Checksum checksum;
+  checksum.Update(BytesOf(header));
+  // Tensor by tensor, as Save did: a tensor's last word is padded.
+  std::vector<const Tensor*> order;
+  for (const auto& [name, tensor] : tensors) order.push_back(&tensor);
+  std::sort(order.begin(), order.end(),
+            [](const Tensor* a, const Tensor* b) { return a->bytes.data() < b->bytes.data(); });
+  for (const Tensor* tensor : order) checksum.Update(tensor->bytes);
+  if (checksum.Hex() == expected) return;
+  throw BadInput(Concat("its checksum is ", checksum.Hex(), ", expected ", expected));
+}
+
+}  // namespace
+
+Error BrokenSafetensors(const std::string& where, std::string_view why) {
+  return BadInput(Concat(where, ": not a whole safetensors file: ", why));
+}
+
+uint64_t ReadSafetensorsLength(std::span<const std::byte> first_bytes, uint64_t file_size) {
+  uint64_t length = 0;
+  if (first_bytes.size() < sizeof(length)) throw BadInput(Concat("it has ", file_size, " bytes"));
+  std::memcpy(&length, first_bytes.data(), sizeof(length));
+  if (length > file_size - sizeof(length)) {
+    throw BadInput(Concat("its header should have ", length, " bytes, the file has ", file_size));
+  }
+  if (length > kMaxHeader) {
+    throw BadInput(Concat("its header has ", length, " bytes, expected at most ", kMaxHeader));
+  }
+  return length;
+}
+
+SafetensorsHeader ReadSafetensorsHeader(std::string_view text, size_t data_size) {
+  json object;
+  try {
+    object = ParseJsonObject(text);
+  } catch (const Error& error) {
+    throw BadInput(Concat("its header: ", error.what()));
+  }
+  SafetensorsHeader header;
+  for (const auto& [name, entry] : object.items()) {
+    try {
+      if (name != "__metadata__") {
+        header.entries.emplace(name, ParseEntry(entry, data_size));
+        continue;
+      }
+      if (!entry.is_object()) throw BadInput("expected a JSON object");
+      for (const auto& [key, value] : entry.items()) header.metadata[key] = JsonText(entry, key);
+    } catch (const Error& error) {
+      throw BadInput(Concat(name == "__metadata__" ? name : Concat("tensor \"", name, "\""), ": ",
+                            error.what()));
+    }
+  }
+  CheckCovered(header.entries, data_size);
+  return header;
+}
+
+std::vector<std::byte> Safetensors::Joined() const {
+  std::vector<std::byte> bytes = head;
+  for (const auto body : bodies) bytes.insert(bytes.end(), body.begin(), body.end());
+  return bytes;
+}
+
+Safetensors WriteSafetensors(const Tensors& tensors) {
+  // Wide types first, so that each tensor is aligned to its own size.
+  std::vector<std::pair<std::string, const Tensor*>> order;
+  for (const auto& [name, tensor] : tensors.all()) order.emplace_back(name, &tensor);
+  std::stable_sort(order.begin(), order.end(), [](const auto& a, const auto& b) {
+    return SizeOf(a.second->dtype) > SizeOf(b.second->dtype);
+  });
+
+  json header;
+  header["__metadata__"] = tensors.metadata;
+  header["__metadata__"]["checksum"] = kNoChecksum;
+  size_t offset = 0;
+  for (const auto& [name, tensor] : order) {
+    const size_t end = offset + tensor->bytes.size();
+    header[name] = {{"dtype", NameOf(tensor->dtype)},
+                    {"shape", tensor->shape},
+                    {"data_offsets", {offset, end}}};
+    offset = end;
+  }
+  std::string text = HeaderText(header);
+
+  // The checksum covers everything after the length, with zeros in its own place.
+  Checksum checksum;
+  checksum.Update(BytesOf(text));
+  for (const auto& [name, tensor] : order) checksum.Update(tensor->bytes);
+  text.replace(FindChecksum(text), kNoChecksum.size(), checksum.Hex());
+
+  const uint64_t length = text.size();
+  const auto length_bytes = std::as_bytes(std::span(&length, 1));
+  Safetensors written;
+  written.head.assign(length_bytes.begin(), length_bytes.end());
+  const auto text_bytes = BytesOf(text);
+  written.head.insert(written.head.end(), text_bytes.begin(), text_bytes.end());
+  for (const auto& [name, tensor] : order) written.bodies.push_back(tensor->bytes);
+  return written;
+}
+
+Tensors ReadSafetensors(std::vector<std::byte> content, std::string where) {
+  Tensors tensors(std::move(where));
+  const auto bytes = tensors.Keep(std::move(content));
+  try {
+    const uint64_t length = ReadSafetensorsLength(bytes, bytes.size());
+    const std::string text(reinterpret_cast<const char*>(bytes.data()) + sizeof(length), length);
+    const auto data = bytes.subspan(sizeof(length) + length);
+    SafetensorsHeader header = ReadSafetensorsHeader(text, data.size());
+    tensors.metadata = std::move(header.metadata);
+    for (auto& [name, entry] : header.entries) {
+      entry.tensor.bytes = data.subspan(entry.begin, entry.size);
+      tensors.Add(name, std::move(entry.tensor));
+    }
+    tensors.has_checksum = tensors.metadata.contains("checksum");
+    if (tensors.has_checksum) VerifyChecksum(text, tensors.all());
+    if (!tensors.has_checksum && tensors.metadata.contains("upswing_version")) {
+      throw BadInput("it has an upswing_version, but no checksum, which Upswing always writes");
+    }
+  } catch (const Error& error) {
+    throw BrokenSafetensors(tensors.where(), error.what());
+  }
+  tensors.metadata.erase("checksum");
+  return tensors;
+}
+
+}  // namespace upswing

@@ -1,0 +1,139 @@
+#include "io/making.h"
+
+#include <dirent.h>
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/random.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <memory>
+#include <utility>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "io/file.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kMark = ".making-";
+constexpr size_t kDigits = 16;
+constexpr int kMostTries = 100;  // one suffices unless another process interferes
+
+std::string RandomDigits() {
+  uint64_t number = 0;
+  if (getrandom(&number, sizeof(number), 0) != sizeof(number)) {
+    throw Failure("the system gives no random numbers");
+  }
+  std::string digits;
+  for (size_t i = 0; i < kDigits; ++i, number >>= 4) digits += "0123456789abcdef"[number & 15];
+  return digits;
+}
+
+/// Tries to lock an open file or folder; false if another process holds the lock.
+bool Lock(const Descriptor& fd) { return flock(fd.get(), LOCK_EX | LOCK_NB) == 0; }
+
+/// Whether an open file or folder still has a name.
+bool HasName(const Descriptor& fd) {
+  struct stat info {};
+  return fstat(fd.get(), &info) == 0 && info.st_nlink > 0;
+}
+
+}  // namespace
+
+Descriptor::~Descriptor() {
+  if (fd_ >= 0) close(fd_);
+}
+
+Descriptor::Descriptor(Descriptor&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
+
+Descriptor& Descriptor::operator=(Descriptor&& other) noexcept {
+  std::swap(fd_, other.fd_);
+  return *this;
+}
+
+bool IsMakingName(std::string_view name) {
+  if (name.size() < 1 + kMark.size() + kDigits || name.front() != '.') return false;
+  const std::string_view end = name.substr(name.size() - kMark.size() - kDigits);
+  const auto is_digit = [](char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f'); };
+  return end.starts_with(kMark) && std::ranges::all_of(end.substr(kMark.size()), is_digit);
+}
+
+Making::Making(const fs::path& path, Kind kind)
+    : target_(path),
+      folder_(open(path.has_parent_path() ? path.parent_path().c_str() : ".",
+                   O_PATH | O_DIRECTORY | O_CLOEXEC)),
+      descriptor_(-1) {
+  if (folder_.get() < 0) throw PathError("cannot write", target_, errno);
+  RemoveAbandoned();
+  for (int tries = 1; !TryOpen(kind); ++tries) {
+    if (tries == kMostTries) throw PathError("cannot write", target_, EEXIST);
+  }
+}
+
+bool Making::TryOpen(Kind kind) {
+  descriptor_ = Descriptor(-1);
+  constexpr size_t kLongest = 200;  // bytes of NAME, so that the rest fits into 255
+  name_ = Concat('.', target_.filename().string().substr(0, kLongest), kMark, RandomDigits());
+  path_ = target_.parent_path() / name_;
+  constexpr int kCommon = O_NOFOLLOW | O_CLOEXEC;
+  if (kind == Kind::kFile) {
+    descriptor_ = Descriptor(
+        openat(folder_.get(), name_.c_str(), O_WRONLY | O_CREAT | O_EXCL | kCommon, 0666));
+  } else if (mkdirat(folder_.get(), name_.c_str(), 0777) == 0) {
+    descriptor_ =
+        Descriptor(openat(folder_.get(), name_.c_str(), O_RDONLY | O_DIRECTORY | kCommon));
+    // Another process removed it before it was locked.
+    if (descriptor_.get() < 0 && errno == ENOENT) return false;
+  }
+  if (descriptor_.get() < 0) {
+    if (errno == EEXIST) return false;
+    throw PathError("cannot write", target_, errno);
+  }
+  // On a file system without locks, nothing is removed either.
+  const bool is_ours = Lock(descriptor_) || errno != EWOULDBLOCK;
+  return is_ours && HasName(descriptor_);
+}
+
+Making::~Making() {
+  if (published_) return;
+  std::error_code error;
+  fs::remove_all(path_, error);
+}
+
+void Making::Publish() {
+  const std::string name = target_.filename();
+  if (renameat(folder_.get(), name_.c_str(), folder_.get(), name.c_str()) != 0) {
+    throw PathError("cannot write", target_, errno);
+  }
+  published_ = true;
+  // Synchronises the new name to disk. Some file systems cannot; the change is atomic anyway.
+  const Descriptor folder(openat(folder_.get(), ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (folder.get() >= 0) fsync(folder.get());
+}
+
+void Making::RemoveAbandoned() const {
+  const int fd = openat(folder_.get(), ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (fd < 0) return;  // a folder that is writable but not readable
+  const std::unique_ptr<DIR, int (*)(DIR*)> entries(fdopendir(fd), &closedir);
+  if (!entries) {
+    close(fd);
+    return;
+  }
+  while (const dirent* entry = readdir(entries.get())) {
+    if (!IsMakingName(entry->d_name)) continue;
+    const Descriptor left(
+        openat(folder_.get(), entry->d_name, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+    if (left.get() < 0 || !Lock(left)) continue;
+    std::error_code error;
+    fs::remove_all(target_.parent_path() / entry->d_name, error);
+  }
+}
+
+}  // namespace upswing

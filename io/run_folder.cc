@@ -1,0 +1,140 @@
+#include "io/run_folder.h"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <array>
+
+#include "core/archive.h"
+#include "core/error.h"
+#include "core/text.h"
+#include "io/tensor_file.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kEventsName = "events.out.tfevents.0.upswing";
+constexpr int64_t kMostBytes = int64_t{1} << 60;
+
+// The files that grow during a run, whose sizes are in the checkpoint.
+constexpr std::array kTables{"metrics", "episodes", "evals", "events"};
+
+/// The name of a table's size in the checkpoint.
+std::string SizeName(std::string_view table) { return Concat("run/size/", table); }
+
+/// Adds the sizes of kTables.
+void AddSizes(Tensors& checkpoint, const std::array<int64_t, kTables.size()>& sizes) {
+  for (size_t i = 0; i < sizes.size(); ++i) {
+    checkpoint.AddScalar(SizeName(kTables.at(i)), sizes.at(i));
+  }
+}
+
+/// The size of a table by the checkpoint; it has `size` bytes now. Throws BadInput if it is
+/// shorter than that.
+int64_t KnownSize(const Tensors& checkpoint, std::string_view table, const fs::path& path,
+                  int64_t size) {
+  int64_t known = 0;
+  Archive::Loader(checkpoint).Scalar(SizeName(table), known, {0, kMostBytes});
+  if (size >= known) return known;
+  throw BadInput(Concat(path.string(), ": expected at least the ", known,
+                        " bytes that its checkpoint records, got ", size));
+}
+
+/// `path` without slashes at its end.
+fs::path WithoutSlash(fs::path path) {
+  while (!path.has_filename() && path.has_relative_path()) path = path.parent_path();
+  return path;
+}
+
+/// Where a run folder is to be made: `path` with its links resolved. Throws BadInput if something
+/// is there already, or if the folder could not be put there in one piece.
+fs::path PlaceOf(const fs::path& path) {
+  std::error_code error;
+  const bool is_run = fs::exists(path / RunFolder::kConfig, error);
+  CheckFree(path, Concat(is_run ? Concat("resume it with --resume ", path.string(), ", or ") : "",
+                         "choose another --out"));
+  if (!fs::exists(path, error)) return path;
+  // An empty folder is replaced, which a process that works in it would not notice.
+  if (fs::equivalent(path, fs::current_path(error), error)) {
+    throw BadInput(Concat(path.string(), ": expected a new folder, got the current one (choose ",
+                          "another --out)"));
+  }
+  return fs::canonical(path);
+}
+
+}  // namespace
+
+void RunFolder::Create(const fs::path& given,
+                       const std::vector<std::pair<std::string, std::string>>& files,
+                       Tensors checkpoint) {
+  const fs::path path = WithoutSlash(given);
+  const fs::path place = PlaceOf(path);
+  try {
+    if (place.has_parent_path()) MakeFolder(place.parent_path());
+    Making folder(place, Making::Kind::kFolder);
+    for (const auto& [name, text] : files) WriteFileAtomically(folder.path() / name, text);
+    AddSizes(checkpoint, {0, 0, 0, 0});
+    SaveTensors(checkpoint, CheckpointPath(folder.path()));
+    folder.Publish();
+  } catch (const Error& failure) {
+    throw Error(failure.exit_code(),
+                Concat("cannot make the run folder ", path.string(), ": ", failure.what()));
+  }
+}
+
+RunFolder::RunFolder(fs::path path, const Tensors& checkpoint)
+    : path_(std::move(path)),
+      metrics_{"train/", AppendFile(path_ / kMetrics)},
+      episodes_{"", AppendFile(path_ / kEpisodes)},
+      evals_{"evaluation/", AppendFile(path_ / kEvaluations)},
+      events_(path_ / kEventsName),
+      log_(path_ / kLog) {
+  // All are checked before one is cut.
+  const auto known = [&](std::string_view name, const auto& file) {
+    return KnownSize(checkpoint, name, file.path(), file.size());
+  };
+  const int64_t metrics = known("metrics", metrics_.file);
+  const int64_t episodes = known("episodes", episodes_.file);
+  const int64_t evals = known("evals", evals_.file);
+  const int64_t events = known("events", events_);
+  metrics_.file.CutTo(metrics);
+  episodes_.file.CutTo(episodes);
+  evals_.file.CutTo(evals);
+  events_.CutTo(events);
+}
+
+void RunFolder::AppendRow(Table& table, const Row& row) {
+  std::string text;
+  if (table.file.size() == 0) {
+    for (const auto& [name, value] : row) text += (text.empty() ? "" : ",") + name;
+    text += '\n';
+  }
+  for (size_t i = 0; i < row.size(); ++i) {
+    text += Concat(i == 0 ? "" : ",", FormatNumber(row[i].second));
+  }
+  table.file.Append(text + '\n');
+
+  if (table.tag.empty()) return;
+  Row scalars(row.begin() + 1, row.end());
+  for (auto& [name, value] : scalars) name.insert(0, table.tag);
+  events_.Append(static_cast<int64_t>(row.front().second), scalars);
+}
+
+void RunFolder::Log(std::string_view line) {
+  const auto now = std::chrono::system_clock::now();
+  log_.Append(fmt::format("{:%F %T}Z {}\n", fmt::gmtime(std::chrono::system_clock::to_time_t(now)),
+                          Printable(line)));
+}
+
+void RunFolder::SaveCheckpoint(Tensors& checkpoint) const {
+  // The tables must be on disk before the checkpoint that records their sizes.
+  for (const Table* table : {&metrics_, &episodes_, &evals_}) table->file.Sync();
+  events_.Sync();
+  AddSizes(checkpoint,
+           {metrics_.file.size(), episodes_.file.size(), evals_.file.size(), events_.size()});
+  SaveTensors(checkpoint, CheckpointPath(path_));
+}
+
+}  // namespace upswing

@@ -1,0 +1,81 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "core/tensors.h"
+#include "io/event_file.h"
+#include "io/file.h"
+
+namespace upswing {
+
+/// A row of a table: column names and values in their order. The first column is the step.
+using Row = std::vector<std::pair<std::string, double>>;
+
+/// A run on disk:
+///   config.toml             every setting; `train --config` runs it again
+///   metrics.csv             a row for each log interval
+///   episodes.csv            a row for each training episode
+///   evals.csv               a row for each evaluation
+///   events.out.tfevents.*   metrics and evaluations for TensorBoard
+///   checkpoint.safetensors  the whole state of the training
+///   policy.safetensors      the best policy at evaluation
+///   log.txt                 events with date and time
+/// The sizes of the tables are part of the checkpoint; opening a run cuts the tables back to them,
+/// so that what a killed run wrote after its checkpoint is not there twice.
+class RunFolder {
+ public:
+  // The files' names.
+  static constexpr const char* kConfig = "config.toml";
+  static constexpr const char* kMetrics = "metrics.csv";
+  static constexpr const char* kEpisodes = "episodes.csv";
+  static constexpr const char* kEvaluations = "evals.csv";
+  static constexpr const char* kCheckpoint = "checkpoint.safetensors";
+  static constexpr const char* kPolicy = "policy.safetensors";
+  static constexpr const char* kLog = "log.txt";
+  static constexpr const char* kModel = "model.xml";  // where it is not the built-in one
+
+  /// Makes the folder with these files in it (name, text) and the first checkpoint. Missing parent
+  /// folders are made, as mkdir -p does; the folder itself appears under its name whole or not at
+  /// all (see Making). Throws BadInput if something is there already, and as PathError does.
+  static void Create(const std::filesystem::path& path,
+                     const std::vector<std::pair<std::string, std::string>>& files,
+                     Tensors checkpoint);
+
+  /// Opens a run whose checkpoint has been loaded; the caller holds its FolderLock. Throws
+  /// BadInput, with nothing changed, if a table is shorter than its size in the checkpoint, or is
+  /// shared with another folder by a link (see AppendFile).
+  RunFolder(std::filesystem::path path, const Tensors& checkpoint);
+
+  const std::filesystem::path& path() const { return path_; }
+  static std::filesystem::path CheckpointPath(const std::filesystem::path& run) {
+    return run / kCheckpoint;
+  }
+
+  void LogMetrics(const Row& row) { AppendRow(metrics_, row); }
+  void LogEpisode(const Row& row) { AppendRow(episodes_, row); }
+  void LogEvaluation(const Row& row) { AppendRow(evals_, row); }
+  /// A line with date and time in log.txt.
+  void Log(std::string_view line);
+
+  /// Adds the tables' sizes to a checkpoint and writes it in place of the last one.
+  void SaveCheckpoint(Tensors& checkpoint) const;
+
+ private:
+  struct Table {
+    std::string tag;  // prefix of its columns in TensorBoard; empty: not shown there
+    AppendFile file;
+  };
+  void AppendRow(Table& table, const Row& row);
+
+  std::filesystem::path path_;
+  Table metrics_, episodes_, evals_;
+  EventFile events_;
+  AppendFile log_;
+};
+
+}  // namespace upswing

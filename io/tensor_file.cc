@@ -1,0 +1,72 @@
+#include "io/tensor_file.h"
+
+#include <algorithm>
+#include <fstream>
+
+#include "core/error.h"
+#include "core/safetensors.h"
+#include "core/text.h"
+#include "io/file.h"
+
+namespace upswing {
+namespace {
+
+/// Throws BadInput for anything but a regular file: a pipe might never end. (That a file is missing
+/// is reported by the reader.)
+void CheckRegular(const std::filesystem::path& path) {
+  std::error_code error;
+  if (!std::filesystem::exists(path, error) || std::filesystem::is_regular_file(path, error))
+    return;
+  throw BadInput(Concat("cannot read ", path.string(), ": expected a regular file"));
+}
+
+}  // namespace
+
+void SaveTensors(const Tensors& tensors, const std::filesystem::path& path) {
+  const Safetensors written = WriteSafetensors(tensors);
+  std::vector<std::span<const std::byte>> parts{written.head};
+  parts.insert(parts.end(), written.bodies.begin(), written.bodies.end());
+  WriteFileAtomically(path, parts);
+}
+
+Tensors LoadTensors(const std::filesystem::path& path) {
+  CheckRegular(path);
+  return ReadSafetensors(ReadFile(path), path.string());
+}
+
+Tensors LoadPartOfTensors(const std::filesystem::path& path, std::string_view prefix) {
+  Tensors part(path.string());
+  CheckRegular(path);
+  std::ifstream file(path, std::ios::binary);
+  std::error_code error;
+  const uint64_t file_size = std::filesystem::file_size(path, error);
+  if (!file || error) throw BadInput(Concat("cannot read ", part.where()));
+  const auto read = [&](uint64_t from, std::span<std::byte> bytes) {
+    file.seekg(static_cast<std::streamoff>(from));
+    file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    if (!file) throw BadInput("it became shorter while it was read");
+  };
+  try {
+    std::vector<std::byte> first(std::min<uint64_t>(sizeof(uint64_t), file_size));
+    read(0, first);
+    const uint64_t length = ReadSafetensorsLength(first, file_size);
+    std::string text(length, '\0');
+    read(first.size(), std::as_writable_bytes(std::span(text)));
+    const uint64_t data_begin = first.size() + length;
+    SafetensorsHeader header = ReadSafetensorsHeader(text, file_size - data_begin);
+    part.metadata = std::move(header.metadata);
+    for (auto& [name, entry] : header.entries) {
+      if (!name.starts_with(prefix)) continue;
+      std::vector<std::byte> bytes(entry.size);
+      read(data_begin + entry.begin, bytes);
+      entry.tensor.bytes = part.Keep(std::move(bytes));
+      part.Add(name, std::move(entry.tensor));
+    }
+  } catch (const Error& problem) {
+    throw BrokenSafetensors(part.where(), problem.what());
+  }
+  part.metadata.erase("checksum");
+  return part;
+}
+
+}  // namespace upswing

@@ -1,0 +1,187 @@
+#include "lab/compare_runs.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "io/making.h"
+#include "io/run_folder.h"
+#include "lab/config.h"
+#include "lab/format.h"
+#include "lab/model_info.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool IsRun(const fs::path& folder) {
+  std::error_code error;
+  const auto has = [&](const char* name) { return fs::exists(folder / name, error); };
+  return has(RunFolder::kConfig) && (has(RunFolder::kEvaluations) || has(RunFolder::kCheckpoint));
+}
+
+/// Adds the run folders in a folder, at any depth; links are not followed.
+void AddRuns(const fs::path& folder, Found& found, std::vector<fs::path>& paths) {
+  if (IsRun(folder)) {
+    paths.push_back(folder);
+    return;
+  }
+  std::error_code error;
+  fs::directory_iterator entries(folder, error);
+  if (error) return found.LeaveOut(folder, Concat("cannot be read: ", error.message()));
+  for (const fs::directory_entry& entry : entries) {
+    if (IsMakingName(entry.path().filename().string())) continue;  // left by a killed process
+    const bool is_folder = fs::is_directory(entry.symlink_status(error));
+    const bool is_run = fs::is_directory(entry.path(), error) && IsRun(entry.path());
+    if (is_folder || is_run) AddRuns(entry.path(), found, paths);
+  }
+}
+
+/// The run folders in a folder, in alphabetical order.
+std::vector<fs::path> RunsIn(const fs::path& folder, Found& found) {
+  std::error_code error;
+  if (!fs::exists(folder, error)) {
+    throw BadInput(Concat(folder.string(), ": expected a run folder or one that holds some, got ",
+                          "nothing of that name"));
+  }
+  std::vector<fs::path> paths;
+  if (!fs::is_directory(folder, error)) {
+    found.LeaveOut(folder, "expected a run folder or one that holds some, got a file");
+    return paths;
+  }
+  const size_t problems = found.left_out.size();
+  AddRuns(folder, found, paths);
+  std::ranges::sort(paths);
+  if (paths.empty() && found.left_out.size() == problems) {
+    found.LeaveOut(folder,
+                   "expected a run folder (config.toml beside evals.csv or "
+                   "checkpoint.safetensors) or one that holds some, got none");
+  }
+  return paths;
+}
+
+std::vector<Setting> SettingsOf(Config config) {
+  std::vector<Setting> settings;
+  config.model.clear();  // a model is what is in its file, not where that lies: see below
+  for (const Option& option : TrainingSettings(config)) {
+    const auto* text = std::get_if<std::string*>(&option.target);
+    settings.emplace_back(Concat(option.section, ".", option.name),
+                          text != nullptr ? **text : option.text());
+  }
+  settings.emplace_back(kModelContent, ModelContent(config.mjcf));  // the last one, for ModelOf
+  return settings;
+}
+
+FoundRun ReadRun(const fs::path& path, const fs::path& root, bool unfinished) {
+  const Config config = ReadRunConfig(path);
+  const TrainConfig& t = config.train;
+  const EvaluationRule rule = SpecOf(config.Environments()).evaluation;
+  FoundRun found{{path, {t.seed, t.steps, t.envs, t.eval_every, t.stop_when_solved, rule}, {}},
+                 config.agent,
+                 "",
+                 SettingsOf(config),
+                 ReadConditions(path)};
+  found.run.evaluations = ReadEvaluations(path, unfinished);
+  // STUDY/VARIANT/seed1: the variant has a name of its own.
+  const fs::path below = path.lexically_relative(root);
+  if (std::distance(below.begin(), below.end()) > 1) {
+    found.variant = path.parent_path().filename().string();
+  }
+  return found;
+}
+
+/// Reads all runs; what cannot be read is left out.
+Found ReadRuns(const CompareRequest& request) {
+  Found found;
+  std::set<fs::path> seen;
+  for (const fs::path& argument : request.paths) {
+    for (const fs::path& path : RunsIn(argument, found)) {
+      if (!seen.insert(fs::weakly_canonical(path)).second) {
+        throw BadInput(Concat(path.string(), ": given twice; expected each run once"));
+      }
+      try {
+        found.runs.push_back(
+            ReadRun(path, request.root.empty() ? argument : request.root, request.unfinished));
+      } catch (const Error& error) {
+        // Most messages begin with the file.
+        const std::string what = error.what();
+        if (what.starts_with(path.string())) {
+          found.left_out.push_back(what);
+        } else {
+          found.LeaveOut(path, what);
+        }
+      }
+    }
+  }
+  return found;
+}
+
+/// How many steps were trained up to the last evaluation.
+int64_t LastStep(const RunRecord& run) {
+  return run.evaluations.empty() ? 0 : run.evaluations.back().step;
+}
+
+/// Of runs that are the same training, keeps the one that went furthest, of equals the first.
+void LeaveOutTwins(Found& found) {
+  const auto key = [](const FoundRun& f) { return std::pair(f.run.plan.seed, f.settings); };
+  struct Furthest {
+    fs::path path;
+    int64_t step;
+  };
+  std::map<std::pair<int64_t, std::vector<Setting>>, Furthest> furthest;
+  for (const FoundRun& f : found.runs) {
+    const int64_t step = LastStep(f.run);
+    const auto [at, is_new] = furthest.try_emplace(key(f), Furthest{f.run.path, step});
+    if (!is_new && step > at->second.step) at->second = {f.run.path, step};
+  }
+  std::erase_if(found.runs, [&](const FoundRun& f) {
+    const fs::path& kept = furthest.at(key(f)).path;
+    if (f.run.path == kept) return false;
+    found.LeaveOut(f.run.path, Concat("the same training as ", kept.string(),
+                                      " (all settings and seed ", f.run.plan.seed, ")"));
+    return true;
+  });
+}
+
+/// Takes out runs without an evaluation, and unfinished ones unless they are asked for; then they
+/// are noted.
+void LeaveOutUnfinished(Found& found, bool unfinished) {
+  std::erase_if(found.runs, [&](const FoundRun& f) {
+    const RunRecord& run = f.run;
+    if (Finished(run)) return false;
+    if (run.evaluations.empty()) {
+      found.LeaveOut(run.path, "has no evaluation yet");
+      return true;
+    }
+    const std::string how_far =
+        fmt::format("is unfinished, evaluated up to step {} of {}",
+                    FormatCount(run.evaluations.back().step), FormatCount(run.plan.steps));
+    if (unfinished) {
+      found.notes.push_back(Concat(run.path.string(), ": ", how_far));
+    } else {
+      found.LeaveOut(run.path, Concat(how_far, " (train --resume continues it, --unfinished ",
+                                      "compares it as it is)"));
+    }
+    return !unfinished;
+  });
+}
+
+}  // namespace
+
+void Found::LeaveOut(const fs::path& path, std::string_view why) {
+  left_out.push_back(Concat(path.string(), ": ", why));
+}
+
+Found FindRuns(const CompareRequest& request) {
+  Found found = ReadRuns(request);
+  LeaveOutTwins(found);
+  LeaveOutUnfinished(found, request.unfinished);
+  return found;
+}
+
+}  // namespace upswing

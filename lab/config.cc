@@ -1,0 +1,295 @@
+#include "lab/config.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "io/file.h"
+#include "io/run_folder.h"
+#include "io/streams.h"
+#include "lab/named_agents.h"
+#include "lab/toml_settings.h"
+#include "mujoco/engines.h"
+#include "mujoco/mjcf_check.h"
+#include "mujoco/model.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+const NamedAgent& FindAgent(const std::string& name, const std::string& where) {
+  const auto agents = EmbeddedAgents();
+  const auto found = std::ranges::find_if(agents, [&](const auto& a) { return a.name == name; });
+  if (found != agents.end()) return *found;
+  std::vector<std::string> names;
+  for (const NamedAgent& agent : agents) names.emplace_back(agent.name);
+  throw BadInput(Concat(where, ": no agent is called \"", name, "\"", DidYouMean(name, names),
+                        "; there are ", Join(names, ", ")));
+}
+
+/// A text setting that other settings depend on: its value in the last layer that has it, and
+/// where that is, for messages.
+struct EarlySetting {
+  std::string value, where;
+  bool in_file = false;
+};
+
+EarlySetting FindEarly(std::string_view section, std::string_view key, const toml::table& file,
+                       const std::string& file_name, const std::vector<FlagValue>& flags) {
+  EarlySetting setting;
+  if (const auto* node = file[section][key].as_string()) {
+    setting = {node->get(), Concat(PlaceOf(*node, file_name), ": ", key), true};
+  }
+  for (const auto& [name, text, where] : flags) {
+    if (name == key) setting = {text, where.empty() ? FlagOf(name) : where};
+  }
+  return setting;
+}
+
+/// Throws BadInput that begins with `where` (may be empty) if settings, each of which is
+/// allowed, contradict each other, so that nothing could be learned.
+void CheckTogether(const DqnConfig& d, const std::string& where) {
+  const std::string place = where.empty() ? "" : where + ": ";
+  if (d.batch > d.replay) {
+    throw BadInput(Concat(place,
+                          "batch: expected at most as many transitions as the replay memory holds "
+                          "(replay ",
+                          d.replay, "), got ", d.batch));
+  }
+  if (d.learning_starts > d.replay) {
+    throw BadInput(Concat(place,
+                          "learning_starts: expected at most as many steps as the replay memory "
+                          "holds transitions (replay ",
+                          d.replay, "), got ", d.learning_starts));
+  }
+}
+
+}  // namespace
+
+void Config::Describe(Options& o) {
+  o.Section("train");
+  o.Add(&agent, "agent", "d3qn", "named agent whose settings the others begin with");
+  train.Describe(o);
+  o.Section("task");
+  o.AddChoice(&task, "task", TaskNames(), "what is to be learned").implied = true;
+  o.Add(&episode_seconds, "episode_seconds", 4, {0.02, 1e6}, "s", "length of a training episode")
+      .step = kControlPeriod;
+  o.Add(&random_start_share, "random_start_share", 0.5, kUnit, "",
+        "share of the episodes that begin in a random state instead of hanging");
+  o.Add(&random_start_velocity, "random_start_velocity", 5, {0, 50}, "rad/s",
+        "largest velocity of these random states");
+  o.Add(&memory, "memory", 0, {0, kMostMemory}, "steps",
+        "past steps whose torque and change of velocities the agent sees too");
+  o.AddChoice(&physics, "physics", EngineNames(),
+              "engine to train in; closed-form computes the same physics faster than mujoco");
+  std::vector<std::string> judges = EngineNames();
+  judges.insert(judges.begin(), std::string(kScreened));
+  o.AddChoice(&eval_physics, "eval_physics", judges,
+              "engine of the evaluations; screened: in mujoco what succeeds in closed-form");
+  o.Section("plant");
+  o.Add(&model, "model", "", "MJCF file to use instead of the built-in model");
+  plant.Describe(o);
+  disturbance.Describe(o);
+  randomization.Describe(o);
+  reward.Describe(o);
+  dqn.Describe(o);
+}
+
+EnvConfig Config::Environments() const {
+  EnvConfig env;
+  env.task = task;
+  env.engine = &FindEngine(physics, "--physics");
+  env.plants = {plant};
+  env.disturbances = {disturbance};
+  env.randomization = randomization;
+  env.num_envs = static_cast<int>(train.envs);
+  env.episode_seconds = episode_seconds;
+  env.memory = static_cast<int>(memory);
+  env.start = {train.start_noise, random_start_share, random_start_velocity};
+  env.weights = reward;
+  env.seed = static_cast<uint64_t>(train.seed);
+  env.stream = "training environment";
+  env.mjcf = mjcf;
+  return env;
+}
+
+std::unique_ptr<Agent> Config::MakeAgent(const EnvSpec& spec, ThreadPool& pool) const {
+  return std::make_unique<Dqn>(dqn, spec, static_cast<uint64_t>(train.seed), pool);
+}
+
+void ApplyToml(const Options& options, std::string_view text, const std::string& where) {
+  ApplyTable(options, ParseToml(text, where), where, false);
+}
+
+void ExpectSameSettings(const Options& before, const Options& now, const std::string& where,
+                        const std::function<bool(const Option&)>& counts) {
+  for (size_t i = 0; i < now.all().size(); ++i) {
+    const Option& old_one = before.all()[i];
+    const Option& new_one = now.all()[i];
+    if (counts(new_one) && old_one.text() != new_one.text()) {
+      throw BadInput(Concat(where, ": made with ", old_one.section, ".", old_one.name, " = ",
+                            old_one.text(), ", but the configuration says ", new_one.text()));
+    }
+  }
+}
+
+void SetFlags(const Options& options, const std::vector<FlagValue>& flags) {
+  for (const auto& [name, value, place] : flags) {
+    options.Set(name, value, place.empty() ? FlagOf(name) : place);
+  }
+}
+
+Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
+  return ParseConfig(file.empty() ? "" : ReadInput(file.string()), file, flags);
+}
+
+Config ParseConfig(std::string_view text, const fs::path& file,
+                   const std::vector<FlagValue>& flags) {
+  const std::string where = file.empty() ? "" : InputName(file.string());
+  const toml::table table = ParseToml(text, where);
+  Config config;
+  const Options options = OptionsOf(config);
+
+  // A model file has a plant of its own, which other settings may change.
+  const EarlySetting model = FindEarly("plant", "model", table, where, flags);
+  std::string model_path = model.value;
+  if (!model_path.empty() && model.in_file) {
+    model_path = (file.parent_path() / model.value).string();  // counts from its file
+  }
+  if (!model_path.empty()) config.plant = ChangedPlant(config.plant, model_path, {}, config.mjcf);
+
+  EarlySetting agent_setting = FindEarly("train", "agent", table, where, flags);
+  if (agent_setting.where.empty()) agent_setting.value = config.agent;
+  const NamedAgent& agent = FindAgent(agent_setting.value, agent_setting.where);
+  ApplyToml(options, agent.toml, Concat("agent ", agent.name));
+  ApplyTable(options, table, where, false);
+  SetFlags(options, flags);
+  config.agent = agent.name;
+  config.model = model_path;
+  CheckTogether(config.dqn, where);
+  return config;
+}
+
+void MakeReadyForMany(Config& config) {
+  if (config.train.threads == 0) config.train.threads = 1;
+  if (!config.mjcf.empty()) config.model = RunFolder::kModel;
+}
+
+std::vector<std::string> MissingSettings(const std::string& text, const std::string& where,
+                                         bool identity_only) {
+  const toml::table table = ParseToml(text, where);
+  Config scratch;
+  const Options options = OptionsOf(scratch);
+  std::vector<std::string> missing;
+  for (const Option& option : options.all()) {
+    const bool needed = !option.implied && (option.identity || !identity_only);
+    if (!needed || table[option.section][option.name]) continue;
+    missing.push_back(Concat(option.section, ".", option.name));
+  }
+  return missing;
+}
+
+std::string CompleteToml(Config config) {
+  if (!config.model.empty()) config.model = fs::absolute(config.model).string();
+  return ConfigToml(std::move(config), false);
+}
+
+Config ReadRunConfig(const fs::path& run, const std::vector<FlagValue>& flags) {
+  const fs::path file = run / RunFolder::kConfig;
+  const std::string text = ReadOwnFile(file);
+  const toml::table table = ParseToml(text, file.string());
+  const std::string model = table["plant"]["model"].value_or("");
+  if (!model.empty() && model != RunFolder::kModel) {  // a run is whole wherever it lies
+    throw BadInput(Concat(file.string(), ": model: expected ", RunFolder::kModel,
+                          ", the copy in the run folder, got \"", Printable(model), "\""));
+  }
+  std::vector<std::string> missing = MissingSettings(text, file.string(), false);
+  if (missing.empty()) return ParseConfig(text, file, flags);
+  constexpr size_t kMostNames = 6;  // that make a line which can still be read
+  const size_t more = missing.size() - std::min(missing.size(), kMostNames);
+  missing.resize(missing.size() - more);
+  throw BadInput(Concat(file.string(), ": expected every setting, as this version writes a run; ",
+                        "got none of ", Join(missing, ", "),
+                        more > 0 ? Concat(" and ", more, " more") : "",
+                        ": another version wrote it"));
+}
+
+std::vector<Option> TrainingSettings(Config& config) {
+  std::vector<Option> settings;
+  const Options options = OptionsOf(config);
+  for (const Option& option : options.all()) {
+    const bool is_seed = option.target == Option::Target(&config.train.seed);
+    if (option.identity && !is_seed) settings.push_back(option);
+  }
+  return settings;
+}
+
+std::string ConfigToml(Config config, bool identity_only) {
+  return OptionsOf(config).Toml(
+      !identity_only, [&](const Option& option) { return !identity_only || option.identity; });
+}
+
+std::vector<std::pair<std::string, double>> PlantValues(Plant plant) {
+  std::vector<std::pair<std::string, double>> values;
+  const Options options = OptionsOf(plant);
+  for (const Option& option : options.all()) {
+    values.emplace_back(option.name, *std::get<double*>(option.target));
+  }
+  return values;
+}
+
+std::string PlantText(const Plant& plant) {
+  std::vector<std::string> texts;
+  for (const auto& [name, value] : PlantValues(plant)) {
+    texts.push_back(Concat(name, " ", FormatNumber(value)));
+  }
+  return Join(texts, ", ");
+}
+
+std::vector<std::pair<std::string, std::string>> NamedAgents() {
+  std::vector<std::pair<std::string, std::string>> names;
+  for (const NamedAgent& agent : EmbeddedAgents()) {
+    // The file begins with a comment that says what it is.
+    std::vector<std::string> comment;
+    for (const std::string_view line : Split(agent.toml, '\n')) {
+      if (!line.starts_with('#')) break;
+      comment.emplace_back(Trim(line.substr(1)));
+    }
+    names.emplace_back(agent.name, Join(comment, " "));
+  }
+  return names;
+}
+
+std::vector<const Option*> ApplyChanges(const Options& options,
+                                        const std::vector<std::string>& set) {
+  std::vector<const Option*> changed;
+  for (const std::string& change : set) {
+    const size_t equals = change.find('=');
+    if (equals == std::string::npos) {
+      throw BadInput(Concat("--set: expected NAME=VALUE, got \"", change, "\""));
+    }
+    const std::string name(Trim(std::string_view(change).substr(0, equals)));
+    for (const Option* option : options.Find(name, "--set " + name)) {
+      option->Set(Trim(std::string_view(change).substr(equals + 1)), "--set " + name);
+      changed.push_back(option);
+    }
+  }
+  return changed;
+}
+
+Plant ChangedPlant(const Plant& base, const std::string& model, const std::vector<std::string>& set,
+                   std::string& mjcf) {
+  Plant plant = base;
+  const Options options = OptionsOf(plant);
+  if (!model.empty()) {
+    mjcf = ReadOwnFile(model, kMostMjcfBytes);
+    plant = PlantOf(*LoadModel(mjcf, model));
+  }
+  ApplyChanges(options, set);
+  return plant;
+}
+
+}  // namespace upswing

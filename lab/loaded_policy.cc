@@ -1,0 +1,144 @@
+#include "lab/loaded_policy.h"
+
+#include <algorithm>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "io/run_folder.h"
+#include "io/tensor_file.h"
+#include "mujoco/model.h"
+#include "nn/q_policy.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The observations of policies that remember so many steps.
+ObservationInfo ObservationOf(int64_t memory) {
+  ObservationInfo observation{
+      {"cos q1", "sin q1", "w1", "cos q2", "sin q2", "w2", "energy", "height"},
+      {kMaxVelocity1, kMaxVelocity2},
+      {}};
+  if (memory > 0) {
+    observation.memory = {
+        memory, {"change of w1", "change of w2", "torque"}, kMemoryVelocity, kMemoryTorque};
+  }
+  return observation;
+}
+
+/// Throws BadInput unless its observations are those that this program makes of the double
+/// pendulum. Names are for people.
+void CheckObservation(const LoadedPolicy& loaded, const std::string& where) {
+  const int inputs = loaded.policy->obs_size();
+  const int remembered = inputs - kObservationSize;
+  if (remembered < 0 || remembered % kMemorySize != 0 || loaded.memory() > kMostMemory) {
+    throw BadInput(Concat(where, ": expected a policy of ", kObservationSize, " observations and ",
+                          kMemorySize, " for each of at most ", kMostMemory,
+                          " steps of memory, got ", inputs));
+  }
+  const auto& given = loaded.policy->info().observation;
+  if (!given) throw BadInput(Concat(where, ": no metadata \"observation\""));
+  const ObservationInfo expected = ObservationOf(loaded.memory());
+  const auto same_memory = [&] {
+    if (!given->memory || !expected.memory) return !given->memory && !expected.memory;
+    return given->memory->steps == expected.memory->steps &&
+           given->memory->velocity == expected.memory->velocity &&
+           given->memory->torque == expected.memory->torque;
+  };
+  if (given->max_velocity != expected.max_velocity || !same_memory()) {
+    throw BadInput(Concat(where,
+                          ": metadata \"observation\": expected the scales of "
+                          "docs/policy-format.md and a memory of ",
+                          loaded.memory(), " steps, as the network has inputs"));
+  }
+}
+
+/// Throws BadInput unless the policy is for a task of this program.
+void CheckTask(const LoadedPolicy& loaded, const std::string& where) {
+  const std::vector<std::string> names = TaskNames();
+  if (std::ranges::find(names, loaded.task) == names.end()) {
+    throw BadInput(Concat(where, ": metadata \"task\": expected one of ", Join(names, ", "),
+                          ", got \"", loaded.task, "\""));
+  }
+  EnvConfig config;
+  config.task = loaded.task;
+  const EnvSpec spec = SpecOf(config);
+  const auto& period = loaded.policy->info().control_period;
+  if (period != spec.step_seconds) {
+    throw BadInput(Concat(where, ": metadata \"control_period\": expected ",
+                          FormatNumber(spec.step_seconds),
+                          " s, for which this program holds a torque, got ",
+                          period ? FormatNumber(*period) : "none"));
+  }
+  if (loaded.task == kDoublePendulum) return CheckObservation(loaded, where);
+  if (loaded.policy->obs_size() != spec.obs_size) {
+    throw BadInput(Concat(where, ": expected a policy of ", spec.obs_size, " observations, as ",
+                          loaded.task, " has, got ", loaded.policy->obs_size()));
+  }
+}
+
+/// The plant of a policy's training. Throws BadInput.
+Plant TrainingPlant(const PolicyInfo& info, const std::string& where) {
+  Plant plant;
+  const std::string place = Concat(where, ": metadata \"plant\"");
+  const Options options = OptionsOf(plant);
+  for (const Option& option : options.all()) {
+    const auto found = info.plant.find(option.name);
+    if (found == info.plant.end()) throw BadInput(Concat(place, ": no ", option.name));
+    option.Set(FormatNumber(found->second), Concat(place, ": ", option.name));
+  }
+  return plant;
+}
+
+}  // namespace
+
+LoadedPolicy LoadPolicy(const fs::path& path) {
+  fs::path file = path;
+  if (fs::is_directory(path)) {
+    file = path / RunFolder::kPolicy;
+    if (fs::exists(path / RunFolder::kConfig) && !fs::exists(file)) {
+      throw BadInput(Concat(path.string(), ": this run has no policy: expected ",
+                            "policy.safetensors, which its first evaluation writes"));
+    }
+  }
+  if (!fs::exists(file)) {
+    throw BadInput(
+        Concat(file.string(), ": no such file; expected a policy.safetensors or a run ", "folder"));
+  }
+  return ReadPolicy(LoadTensors(file));
+}
+
+LoadedPolicy ReadPolicy(const Tensors& file) {
+  const std::string& where = file.where();
+  auto policy = std::make_shared<QPolicy>(QPolicy::From(file));
+  const PolicyInfo& info = policy->info();
+  LoadedPolicy loaded{where, policy, info.task.empty() ? kDoublePendulum : info.task, Plant(), ""};
+  CheckTask(loaded, where);
+  if (loaded.task != kDoublePendulum) return loaded;
+  loaded.plant = TrainingPlant(info, where);
+  loaded.mjcf = info.model;
+  if (!loaded.mjcf.empty()) LoadModel(loaded.mjcf, Concat(where, ": metadata \"model\""));
+  return loaded;
+}
+
+int LoadedPolicy::memory() const {
+  return task == kDoublePendulum ? MemorySteps(policy->obs_size()) : 0;
+}
+
+PolicyInfo InfoOf(const Config& config) {
+  PolicyInfo info;
+  info.agent = config.agent;
+  info.seed = config.train.seed;
+  info.upswing_version = UPSWING_VERSION;
+  info.config = ConfigToml(config, true);
+  info.task = config.task;
+  info.control_period = SpecOf(config.Environments()).step_seconds;
+  if (config.task != kDoublePendulum) return info;
+  for (const auto& [name, value] : PlantValues(config.plant)) info.plant[name] = value;
+  info.observation = ObservationOf(config.memory);
+  info.model = config.mjcf;
+  return info;
+}
+
+}  // namespace upswing

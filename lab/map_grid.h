@@ -1,0 +1,91 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/policy.h"
+#include "core/thread_pool.h"
+#include "sim/pendulum_env.h"
+
+/// Maps of how a policy does over two quantities: a grid of cells, some episodes in each.
+namespace upswing {
+
+/// All that a cell can set: plant, disturbance, and the start of every episode.
+struct MapPoint {
+  Plant plant;
+  Disturbance disturbance;
+  double q1, q2;  // degrees
+  double w1, w2;  // rad/s
+
+  MapPoint() { SetDefaults(*this); }
+  void Describe(Options& options);
+  PendulumState start() const;
+};
+
+/// One side of the grid.
+struct MapAxis {
+  std::string name;                   // of a setting of MapPoint, or of an alias
+  std::string unit;                   // such as "kg"
+  std::vector<double> values;         // (n) one for each cell, rising
+  std::optional<double> at_training;  // where the training was, if that is one number
+  bool start = false;                 // it says where episodes begin
+
+  /// Such as "mass2 (kg)".
+  std::string label() const;
+};
+
+/// Reads NAME=FROM:TO[:CELLS] ([:CELLS] is 31, or one for each step of what goes in steps), where
+/// both ends may be percentages on top of what `training` has. `where` begins the message of the
+/// BadInput that it throws.
+MapAxis ParseMapAxis(const std::string& text, const MapPoint& training, const std::string& where);
+
+/// Throws BadInput if both axes set the same.
+void CheckDifferent(const MapAxis& x, const MapAxis& y);
+
+/// What a map is made of.
+struct MapConfig {
+  MapPoint point;            // what is on neither axis
+  MapAxis x, y;              // (nx), (ny)
+  bool start_given = false;  // episodes begin at the point's start, else hanging with usual noise
+  int episodes = 1;          // in a cell
+  const Engine* engine = &kClosedForm;
+  std::string mjcf;                    // another model; empty: the built-in one
+  std::optional<Plant> assumed_plant;  // see PendulumEnvConfig
+  uint64_t seed = 0;                   // of starts, sensor noise, and the choice of cells to check
+
+  int64_t cells() const { return static_cast<int64_t>(x.values.size() * y.values.size()); }
+  /// What cell `i` sets; cells go along x first.
+  MapPoint PointOf(int64_t cell) const;
+};
+
+/// Result of a cell's episodes.
+struct MapCell {
+  int64_t successes = 0;
+  double swing_up_seconds = 0;  // median over the successful ones; NaN if there are none
+};
+
+/// Results of the listed cells, in the order of the list. The pool shares the work, which changes
+/// no bit; a cell does not depend on which others there are. `progress` (may be empty) is called
+/// with the share done (0 to 1), from any thread, one call at a time.
+std::vector<MapCell> RunMap(const MapConfig& config, const Policy& policy,
+                            std::span<const int64_t> cells, ThreadPool& pool,
+                            const std::function<void(double)>& progress);
+
+/// `share` of the cells (at least one if it is not 0), drawn by the seed, in rising order.
+std::vector<int64_t> DrawCells(const MapConfig& config, double share);
+
+/// How far two runs of some cells agree.
+struct MapAgreement {
+  int64_t cells = 0, same_successes = 0;   // cells, and those with as many successes
+  double largest_success_difference = 0;   // of the rates
+  int64_t both_succeed = 0;                // cells where both have successes
+  double largest_swing_up_difference = 0;  // of the medians of these, s
+};
+MapAgreement Compare(std::span<const MapCell> a, std::span<const MapCell> b, int episodes);
+
+}  // namespace upswing

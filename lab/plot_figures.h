@@ -1,0 +1,16 @@
+#pragma once
+
+#include "lab/rollout.h"
+#include "report/figure.h"
+
+/// What `plot` draws of one episode.
+namespace upswing {
+
+/// Angles, velocities, energy, torque, the reward's terms and, where the policy estimates them and
+/// the rollout has them, the values over time.
+Figure EpisodeFigure(const Rollout& rollout, const Policy& policy);
+
+/// Velocity over angle of both joints.
+Figure PhaseFigure(const Rollout& rollout);
+
+}  // namespace upswing

@@ -1,0 +1,97 @@
+#include "lab/training.h"
+
+#include <utility>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "lab/config_checks.h"
+#include "lab/loaded_policy.h"
+#include "mujoco/engines.h"
+
+namespace upswing {
+namespace {
+
+constexpr std::string_view kCheckpointFormat = "upswing-checkpoint-1";
+
+/// Environments as the settings have them, whose work the pool shares.
+std::unique_ptr<VectorEnv> MakeTrainingEnv(const Config& config, ThreadPool& pool) {
+  EnvConfig env = config.Environments();
+  env.pool = &pool;
+  return MakeEnv(env);
+}
+
+}  // namespace
+
+Training::Training(Config config, int threads, std::vector<TrainObserver*> observers)
+    : config_(std::move(config)),
+      pool_(threads),
+      env_(MakeTrainingEnv(config_, pool_)),
+      agent_(config_.MakeAgent(env_->spec(), pool_)),
+      trainer_({config_.train,
+                [this](const Policy& policy, int64_t step) { return Evaluate(policy, step); },
+                InfoOf(config_), std::move(observers)},
+               *agent_, *env_) {}
+
+std::unique_ptr<Policy> Training::policy() const {
+  PolicyInfo info = InfoOf(config_);
+  info.step = state().steps;
+  return agent_->ExportPolicy(std::move(info));
+}
+
+Evaluation Training::Evaluate(const Policy& policy, int64_t step) {
+  // The closed form finds a failing policy quickly; one that passes is evaluated in MuJoCo.
+  if (config_.eval_physics != kScreened) {
+    return EvaluateIn(FindEngine(config_.eval_physics, "--eval-physics"), policy, step);
+  }
+  if (config_.mjcf.empty()) {
+    Evaluation screening = EvaluateIn(kClosedForm, policy, step);
+    if (!screening.passed || config_.task != kDoublePendulum) return screening;
+  }
+  return EvaluateIn(kMuJoCo, policy, step);
+}
+
+Evaluation Training::EvaluateIn(const Engine& engine, const Policy& policy, int64_t step) {
+  EnvConfig config = config_.Environments();
+  config.pool = &pool_;
+  config.engine = &engine;
+  config.num_envs = static_cast<int>(config_.train.eval_episodes);
+  config.episode_seconds = spec().evaluation.seconds;
+  config.start = StartStates();
+  config.weights = RewardWeights();
+  config.stream = Concat("evaluation at step ", step);
+  const std::unique_ptr<VectorEnv> env = MakeEnv(config);
+  return upswing::Evaluate(policy, *env, &pool_);
+}
+
+Tensors Training::Checkpoint() {
+  Tensors checkpoint;
+  checkpoint.metadata = {{"format", std::string(kCheckpointFormat)},
+                         {"upswing_version", UPSWING_VERSION},
+                         {"config", ConfigToml(config_, true)},
+                         {"model", config_.mjcf}};
+  trainer_.State(Archive::Saver(checkpoint));
+  return checkpoint;
+}
+
+void Training::Load(const Tensors& checkpoint) {
+  const auto expect = [&](const std::string& key, std::string_view expected) {
+    const std::string& got = checkpoint.Metadata(key);
+    if (got != expected) {
+      throw BadInput(Concat(checkpoint.where(), ": ", key, ": expected \"", expected, "\", got \"",
+                            got, "\""));
+    }
+  };
+  expect("format", kCheckpointFormat);
+  expect("upswing_version", UPSWING_VERSION);
+  Config old_config;
+  const Options old_options = OptionsOf(old_config);
+  ApplyToml(old_options, checkpoint.Metadata("config"), checkpoint.where());
+  ExpectSameSettings(old_options, OptionsOf(config_), checkpoint.where(),
+                     [](const Option& option) { return option.identity; });
+  if (checkpoint.Metadata("model") != config_.mjcf) {
+    throw BadInput(Concat(checkpoint.where(), ": made with another model than ", config_.model));
+  }
+  trainer_.State(Archive::Loader(checkpoint));
+}
+
+}  // namespace upswing

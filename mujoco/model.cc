@@ -1,0 +1,201 @@
+#include "mujoco/model.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "mujoco/mjcf_check.h"
+
+namespace upswing {
+namespace {
+
+/// Replaces MuJoCo's handlers, which print warnings and log them to a file in the current folder,
+/// and end the program on an error.
+void TakeOverMessages() {
+  mju_user_warning = [](const char*) {};
+  mju_user_error = [](const char* message) { throw Failure(Concat("MuJoCo: ", message)); };
+}
+
+constexpr int kLinkBodies[2] = {1, 2};  // body 0 is the world
+
+/// Compiles untrusted MJCF: every error of MuJoCo's is bad input.
+ModelPtr CompileGiven(const std::string& mjcf, const std::string& where) {
+  try {
+    return CompileModel(mjcf, where);
+  } catch (const Error& error) {
+    if (error.exit_code() == 2) throw;
+    throw BadInput(Concat(where, ": ", Printable(error.what())));
+  }
+}
+
+/// Throws BadInput unless each parameter is within the range of its setting.
+void CheckRanges(Plant plant, const std::string& where) {
+  const Options options = OptionsOf(plant);
+  for (const Option& option : options.all()) {
+    option.Set(FormatNumber(*std::get<double*>(option.target)), Concat(where, ": ", option.name));
+  }
+}
+
+}  // namespace
+
+std::string MuJoCoVersion() { return mj_versionString(); }
+
+ModelPtr CompileModel(const std::string& mjcf, const std::string& where) {
+  TakeOverMessages();
+  std::array<char, 1000> message{};
+  const std::unique_ptr<mjSpec, MuJoCoDeleter> spec(
+      mj_parseXMLString(mjcf.c_str(), nullptr, message.data(), message.size()));
+  const auto complaint = [&](std::string text) {
+    std::ranges::replace(text, '\n', ' ');  // an error is one line
+    return BadInput(Concat(where, ": ", Printable(Trim(text))));
+  };
+  if (spec == nullptr) throw complaint(message.data());
+  ModelPtr model(mj_compile(spec.get(), nullptr));
+  if (model == nullptr) throw complaint(mjs_getError(spec.get()));
+  return model;
+}
+
+ModelPtr LoadModel(const std::string& mjcf, const std::string& where) {
+  CheckMjcf(mjcf, where);
+  ModelPtr compiled = CompileGiven(mjcf, where);
+  const mjModel& model = *compiled;
+  const auto expect = [&](bool valid, std::string_view expected) {
+    if (!valid) throw BadInput(Concat(where, ": not a double pendulum: expected ", expected));
+  };
+  expect(model.nbody == 3 && model.body_parentid[2] == 1, "two bodies, the second on the first");
+  expect(model.njnt == 2 && model.jnt_type[0] == mjJNT_HINGE && model.jnt_type[1] == mjJNT_HINGE &&
+             model.jnt_bodyid[0] == 1 && model.jnt_bodyid[1] == 2,
+         "a hinge for each body");
+  expect(std::abs(model.jnt_axis[1] - 1) < 1e-9 && std::abs(model.jnt_axis[4] - 1) < 1e-9,
+         "hinges about +y");
+  expect(model.ngeom == 2 && model.geom_type[0] == mjGEOM_CAPSULE &&
+             model.geom_type[1] == mjGEOM_CAPSULE && model.geom_bodyid[0] == 1 &&
+             model.geom_bodyid[1] == 2,
+         "one capsule for each body");
+  expect(model.nu == 1 && model.actuator_trnid[0] == 0 && model.na == 0 &&
+             model.actuator_ctrllimited[0] != 0,
+         "one motor with a control range, on the first hinge");
+  expect(model.actuator_gear[0] == 1 && model.actuator_gainprm[0] == 1 &&
+             model.actuator_biastype[0] == mjBIAS_NONE,
+         "a motor whose control is its torque");
+  const double substeps = kControlPeriod / model.opt.timestep;
+  expect(substeps > 0.5 && std::abs(substeps - std::round(substeps)) < 1e-6,
+         Concat("a timestep that divides ", kControlPeriod, " s, got ", model.opt.timestep));
+
+  for (const int joint : {0, 1}) {
+    const auto not_negative = [&](const mjtNum* numbers, std::string_view what) {
+      expect(std::isfinite(numbers[joint]) && numbers[joint] >= 0,
+             Concat(what, " that is not negative, got ", FormatNumber(numbers[joint])));
+    };
+    not_negative(model.dof_armature, "armature");
+    not_negative(model.dof_damping, "damping");
+    not_negative(model.dof_frictionloss, "frictionloss");
+    not_negative(model.jnt_stiffness, "stiffness");
+  }
+  CheckRanges(PlantOf(model), where);
+
+  // Where the links are must follow from the plant, and writing the plant must change nothing that
+  // the file says. Armature, friction, stiffness, radius and integrator are the file's own affair.
+  const ModelPtr ours = CompileModel(Mjcf(PlantOf(model)), where);
+  const ModelPtr written(mj_copyModel(nullptr, &model));
+  WritePlant(PlantOf(model), FieldsOf(*written));
+  const auto same = [&](const mjtNum* a, const mjtNum* b, int n, std::string_view what) {
+    for (int i = 0; i < n; ++i) expect(std::abs(a[i] - b[i]) < 1e-9, what);
+  };
+  same(model.qpos0, ours->qpos0, 2, "joint angles that are 0 hanging");
+  for (const int joint : {0, 1}) {
+    // A mirrored motion is a motion, which learning in a mirror relies on.
+    const mjtNum* more = model.jnt_stiffnesspoly + mjNPOLY * joint;
+    const bool is_spring = model.jnt_stiffness[joint] != 0 ||
+                           std::any_of(more, more + mjNPOLY, [](mjtNum k) { return k != 0; });
+    expect(!is_spring || model.qpos_spring[joint] == 0,
+           Concat("springs at rest where the links hang (springref 0), got ",
+                  FormatNumber(model.qpos_spring[joint]), " rad"));
+    const mjtNum* range = model.jnt_range + 2 * joint;
+    expect(model.jnt_limited[joint] == 0 || std::abs(range[0] + range[1]) < 1e-9,
+           "limits of a joint that are the same both ways");
+  }
+  same(model.jnt_pos, ours->jnt_pos, 6, "hinges at the ends of their links");
+  same(model.body_quat, ours->body_quat, 12, "links that hang along -z");
+  same(model.body_pos, ours->body_pos, 9, "the second link at the end of the first");
+  same(model.geom_pos, ours->geom_pos, 6, "capsules along -z from their hinge");
+  same(model.body_ipos, ours->body_ipos, 9, "the mass of each link to be that of its capsule");
+  same(model.body_inertia, written->body_inertia, 9, "the inertia of solid capsules");
+  same(model.actuator_ctrlrange, ours->actuator_ctrlrange, 2, "a symmetric control range");
+  same(model.opt.gravity, ours->opt.gravity, 3, "gravity along -z");
+  return compiled;
+}
+
+std::vector<std::string> DifferencesFromBuiltIn(const mjModel& model) {
+  const ModelPtr ours = CompileModel(Mjcf(PlantOf(model)), "built-in model");
+  std::vector<std::string> differences;
+  const auto compare = [&](const std::string& what, double a, double b, std::string_view unit) {
+    if (a != b) differences.push_back(Concat(what, " ", FormatNumber(a), " ", unit));
+  };
+  compare("timestep", model.opt.timestep, ours->opt.timestep, "s");
+  if (model.opt.integrator != ours->opt.integrator) {
+    constexpr std::array kNames{"Euler", "RK4", "implicit", "implicitfast"};
+    const auto index = static_cast<size_t>(model.opt.integrator);
+    differences.push_back(Concat("integrator ", index < kNames.size() ? kNames.at(index) : "new"));
+  }
+  compare("density", model.opt.density, ours->opt.density, "kg/m³");
+  compare("viscosity", model.opt.viscosity, ours->opt.viscosity, "Pa·s");
+  for (const int i : {0, 1}) {
+    const std::string number = std::to_string(i + 1);
+    compare("radius" + number, model.geom_size[3 * i], ours->geom_size[3 * i], "m");
+    compare("armature" + number, model.dof_armature[i], ours->dof_armature[i], "kg·m²");
+    compare("frictionloss" + number, model.dof_frictionloss[i], ours->dof_frictionloss[i], "N·m");
+    compare("stiffness" + number, model.jnt_stiffness[i], ours->jnt_stiffness[i], "N·m/rad");
+    const double limit = model.jnt_limited[i] != 0 ? model.jnt_range[2 * i + 1] : 0;
+    compare("limit" + number, limit, 0, "rad");
+  }
+  return differences;
+}
+
+Plant PlantOf(const mjModel& model) {
+  Plant plant;
+  plant.mass1 = model.body_mass[1];
+  plant.mass2 = model.body_mass[2];
+  plant.length1 = 2 * model.geom_size[1];
+  plant.length2 = 2 * model.geom_size[4];
+  plant.damping1 = model.dof_damping[0];
+  plant.damping2 = model.dof_damping[1];
+  plant.gravity = -model.opt.gravity[2];
+  plant.torque_limit = model.actuator_ctrlrange[1];
+  return plant;
+}
+
+ModelFields FieldsOf(mjModel& model) {
+  return {model.body_mass,   model.body_inertia,       model.body_ipos,
+          model.body_pos,    model.geom_pos,           model.geom_size,
+          model.dof_damping, model.actuator_ctrlrange, model.opt.gravity};
+}
+
+void WritePlant(const Plant& plant, const ModelFields& fields) {
+  const std::array<double, 2> masses{plant.mass1, plant.mass2};
+  const std::array<double, 2> lengths{plant.length1, plant.length2};
+  for (const int body : kLinkBodies) {
+    const int geom = body - 1;
+    const double length = lengths[static_cast<size_t>(geom)];
+    const double mass = masses[static_cast<size_t>(geom)];
+    const CapsuleInertia inertia(mass, fields.geom_size[3 * geom], length);
+    fields.body_mass[body] = mass;
+    fields.body_inertia[3 * body] = inertia.across;
+    fields.body_inertia[3 * body + 1] = inertia.across;
+    fields.body_inertia[3 * body + 2] = inertia.along;
+    fields.body_ipos[3 * body + 2] = -length / 2;
+    fields.geom_pos[3 * geom + 2] = -length / 2;
+    fields.geom_size[3 * geom + 1] = length / 2;
+  }
+  fields.body_pos[3 * 2 + 2] = -plant.length1;
+  fields.dof_damping[0] = plant.damping1;
+  fields.dof_damping[1] = plant.damping2;
+  fields.actuator_ctrlrange[0] = -plant.torque_limit;
+  fields.actuator_ctrlrange[1] = plant.torque_limit;
+  fields.gravity[0] = fields.gravity[1] = 0;
+  fields.gravity[2] = -plant.gravity;
+}
+
+}  // namespace upswing

@@ -1,0 +1,161 @@
+#include "mujoco/mujoco_physics.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "core/error.h"
+#include "core/text.h"
+
+namespace upswing {
+namespace {
+
+constexpr int kSmallestSlice = 4;  // environments; fewer do not repay a task of their own
+constexpr int kMostSlices = 32;
+
+/// Gives every simulation of the batch its own row of a model field.
+mjtNum* Expand(mjBatch* batch, const char* field, int env) {
+  int size = 0;
+  auto* rows = static_cast<mjtNum*>(mjb_expand(batch, field, &size, nullptr));
+  if (rows == nullptr) throw Failure(Concat("MuJoCo cannot expand ", field));
+  return rows + env * size;
+}
+
+ModelFields ExpandedFields(mjBatch* batch, int env) {
+  return {Expand(batch, "body_mass", env),   Expand(batch, "body_inertia", env),
+          Expand(batch, "body_ipos", env),   Expand(batch, "body_pos", env),
+          Expand(batch, "geom_pos", env),    Expand(batch, "geom_size", env),
+          Expand(batch, "dof_damping", env), Expand(batch, "actuator_ctrlrange", env),
+          Expand(batch, "opt.gravity", env)};
+}
+
+}  // namespace
+
+MuJoCoPhysics::MuJoCoPhysics(const PhysicsConfig& config)
+    : config_(config),
+      slice_size_(std::max(kSmallestSlice, (config.num_envs + kMostSlices - 1) / kMostSlices)) {
+  // The model, with the plant that all environments share, or the first of many.
+  const ModelPtr model = config_.mjcf.empty() ? CompileModel(Mjcf(Plant()), "model")
+                                              : LoadModel(config_.mjcf, "model");
+  WritePlant(config_.plant(0), FieldsOf(*model));
+  const DataPtr data(mj_makeData(model.get()));
+  mj_setConst(model.get(), data.get());
+  substeps_ = static_cast<int>(std::round(kControlPeriod / model->opt.timestep));
+
+  for (int first = 0; first < config_.num_envs; first += slice_size_) {
+    slices_.push_back(MakeSlice(*model, first, std::min(slice_size_, config_.num_envs - first)));
+  }
+  state_size_ = mjb_nstate(slices_.front().batch.get());
+  previous_q1_.resize(static_cast<size_t>(config_.num_envs));
+}
+
+MuJoCoPhysics::Slice MuJoCoPhysics::MakeSlice(const mjModel& model, int first, int count) const {
+  std::array<char, 1000> message{};
+  mjBatchConfig batch_config;
+  mjb_defaultConfig(&batch_config);
+  batch_config.nthread = 1;
+  BatchPtr batch(mjb_makeBatch(&model, count, &batch_config, message.data(), message.size()));
+  if (batch == nullptr) throw Failure(Concat("MuJoCo: ", message.data()));
+  if (config_.plants.size() > 1) {
+    for (int i = 0; i < count; ++i) {
+      WritePlant(config_.plant(first + i), ExpandedFields(batch.get(), i));
+    }
+    mjb_setConst(batch.get(), nullptr, 0);
+  }
+  mjb_reset(batch.get(), nullptr, 0, nullptr, mjSTAGE_NONE);
+  const auto component = [&](int what) { return mjb_stateComponent(batch.get(), what, nullptr); };
+  mjtNum* qpos = component(mjSTATE_QPOS);
+  mjtNum* qvel = component(mjSTATE_QVEL);
+  mjtNum* ctrl = component(mjSTATE_CTRL);
+  return {first, count, std::move(batch), qpos, qvel, ctrl};
+}
+
+PendulumState MuJoCoPhysics::state(int env) const {
+  const mjtNum* q = Component(SliceOf(env).qpos, env);
+  const mjtNum* w = Component(SliceOf(env).qvel, env);
+  return {q[0], q[1], w[0], w[1]};
+}
+
+void MuJoCoPhysics::SetState(int env, const PendulumState& s) {
+  const Slice& slice = SliceOf(env);
+  // MuJoCo's own reset also clears time, control, warm start and warnings.
+  const int row = env - slice.first;
+  mjb_reset(slice.batch.get(), &row, 1, nullptr, mjSTAGE_NONE);
+  std::copy_n(std::array{s.q1, s.q2}.data(), 2, Component(slice.qpos, env));
+  std::copy_n(std::array{s.w1, s.w2}.data(), 2, Component(slice.qvel, env));
+}
+
+void MuJoCoPhysics::SetPlant(int env, const Plant& plant) {
+  // From now on each environment has its own plant.
+  config_.plants.resize(static_cast<size_t>(config_.num_envs), config_.plants.front());
+  config_.plants[static_cast<size_t>(env)] = plant;
+  const Slice& slice = SliceOf(env);
+  const int row = env - slice.first;
+  WritePlant(plant, ExpandedFields(slice.batch.get(), row));
+  mjb_setConst(slice.batch.get(), &row, 1);
+}
+
+bool MuJoCoPhysics::BlewUp(int env) const {
+  const PendulumState s = state(env);
+  const Slice& slice = SliceOf(env);
+  const int row = env - slice.first;
+  const mjWarningStat* warnings = mjb_warning(slice.batch.get()) + row * mjNWARNING;
+  return mjb_status(slice.batch.get())[row] != 0 || warnings[mjWARN_BADQPOS].number > 0 ||
+         warnings[mjWARN_BADQVEL].number > 0 || warnings[mjWARN_BADQACC].number > 0 ||
+         !std::isfinite(s.q1 + s.q2 + s.w1 + s.w2);
+}
+
+void MuJoCoPhysics::Judge(int env, double torque, StepResult& result) const {
+  const auto i = static_cast<size_t>(env);
+  const PendulumState s = state(env);
+  const Plant& plant = config_.plant(env);
+  const double tau = std::clamp(torque, -plant.torque_limit, plant.torque_limit);
+  std::ranges::copy(Observe(plant, s),
+                    std::span(result.next_obs).subspan(i * kObservationSize).begin());
+  const auto terms = std::span(result.reward_terms).subspan(i * kRewardTerms, kRewardTerms);
+  std::ranges::copy(RewardTerms(plant, s, tau), terms.begin());
+  result.reward[i] = 0;
+  for (size_t k = 0; k < kRewardTerms; ++k) {
+    terms[k] *= config_.weights.weight[k];
+    result.reward[i] += terms[k];
+  }
+  result.at_goal[i] = Inverted(s) ? 1 : 0;
+  result.torque[i] = tau;
+  result.work[i] = std::abs(tau * (s.q1 - previous_q1_[i]));
+}
+
+void MuJoCoPhysics::Step(std::span<const double> torque, StepResult& result) {
+  // One captured reference, so that the task fits into std::function without an allocation.
+  const struct {
+    std::span<const double> torque;
+    StepResult& result;
+  } step{torque, result};
+  ParallelFor(config_.pool, static_cast<int>(slices_.size()), [this, &step](int slice) {
+    StepSlice(slices_[static_cast<size_t>(slice)], step.torque, step.result);
+  });
+}
+
+void MuJoCoPhysics::StepSlice(const Slice& slice, std::span<const double> torque,
+                              StepResult& result) {
+  const int end = slice.first + slice.count;
+  for (int env = slice.first; env < end; ++env) {
+    previous_q1_[static_cast<size_t>(env)] = state(env).q1;
+    Component(slice.ctrl, env)[0] = torque[static_cast<size_t>(env)];
+  }
+  mjb_step(slice.batch.get(), nullptr, 0, substeps_, mjSTAGE_NONE);
+  for (int env = slice.first; env < end; ++env) {
+    const auto i = static_cast<size_t>(env);
+    result.terminated[i] = BlewUp(env) ? 1 : 0;
+    if (!result.terminated[i]) Judge(env, torque[i], result);
+  }
+}
+
+void MuJoCoPhysics::State(const Archive& archive) {
+  for (const Slice& slice : slices_) {
+    const size_t size = static_cast<size_t>(slice.count) * static_cast<size_t>(state_size_);
+    archive.Array(Concat("state.", slice.first), std::span(mjb_state(slice.batch.get()), size));
+  }
+}
+
+}  // namespace upswing

@@ -1,0 +1,203 @@
+// The training loop. N environments, K reward terms; steps are control steps over all environments.
+#include "rl/trainer.h"
+
+#include <algorithm>
+#include <chrono>
+#include <numeric>
+
+#include "core/error.h"
+#include "core/text.h"
+
+namespace upswing {
+namespace {
+
+constexpr size_t kRecentEpisodes = 100;  // in the mean return that the progress line shows
+constexpr double kMostSeconds = 1e12;    // more than any training lasts
+
+using Clock = std::chrono::steady_clock;
+
+double SecondsSince(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+}  // namespace
+
+Trainer::Trainer(TrainSetup setup, Agent& agent, VectorEnv& env)
+    : setup_(std::move(setup)),
+      agent_(agent),
+      env_(env),
+      state_(env.num_envs(), static_cast<int>(env.spec().term_names.size())),
+      result_(env.spec()),
+      action_(result_.torque.size()) {}
+
+bool Trainer::finished() const {
+  return state_.steps >= setup_.config.steps || (state_.solved && setup_.config.stop_when_solved);
+}
+
+bool Trainer::Step() {
+  if (finished()) return false;
+  const TrainConfig& config = setup_.config;
+  TrainState& s = state_;
+  const auto begin = Clock::now();
+
+  // One step of all environments, then the updates that are due.
+  const Matrix<double> action(action_, env_.num_envs(), env_.spec().action_size());
+  env_.SetStartNoise(config.StartNoise(s.steps));
+  agent_.Act(env_.obs(), action);
+  env_.Step(action, result_);
+  agent_.Observe(result_);
+  agent_.Learn();
+  before_ = s.steps;
+  s.steps += env_.num_envs();
+  s.seconds += SecondsSince(begin);
+
+  // What is due at this step, as a multiple of its interval has been reached or passed.
+  CountEpisodes();
+  if (IsDue(config.log_every)) {
+    const Metrics metrics = agent_.TakeMetrics();
+    for (TrainObserver* observer : setup_.observers) observer->OnMetrics(s, metrics);
+  }
+  if (IsDue(config.eval_every) || s.steps >= config.steps) Judge(IsDue(config.eval_every));
+  return true;
+}
+
+void Trainer::CountEpisodes() {
+  TrainState& s = state_;
+  const size_t K = env_.spec().term_names.size();
+  for (size_t env = 0; env < s.episode_return.size(); ++env) {
+    const auto sums = std::span(s.episode_terms).subspan(env * K, K);
+    s.episode_return[env] += result_.reward[env];
+    ++s.episode_length[env];
+    for (size_t k = 0; k < K; ++k) sums[k] += result_.reward_terms[env * K + k];
+    if (!result_.done(env)) continue;
+
+    ++s.episodes;
+    const FinishedEpisode episode{s.episode_return[env], s.episode_length[env],
+                                  result_.terminated[env] != 0, sums};
+    for (TrainObserver* observer : setup_.observers) observer->OnEpisode(s, episode);
+    if (s.recent_returns.size() == kRecentEpisodes) {
+      s.recent_returns.erase(s.recent_returns.begin());
+    }
+    s.recent_returns.push_back(s.episode_return[env]);
+    s.episode_return[env] = 0;
+    s.episode_length[env] = 0;
+    std::ranges::fill(sums, 0.0);
+  }
+}
+
+void Trainer::Judge(bool scheduled) {
+  const Evaluation e = setup_.evaluate(*agent_.ExportPolicy({}), state_.steps);
+  state_.last_success_rate = e.success_rate();
+  KeepIfBest(e);
+  if (scheduled) CountStreak(e);
+  for (TrainObserver* observer : setup_.observers) observer->OnEvaluation(state_, e);
+}
+
+void Trainer::KeepIfBest(const Evaluation& e) {
+  TrainState& s = state_;
+  const EvaluationRule& rule = env_.spec().evaluation;
+  const double rate = e.success_rate(), mean_return = e.reward_sum.mean;
+  const bool first = s.best_step == 0;
+  if (!first && rule.Score(rate, mean_return) <= rule.Score(s.best_success_rate, s.best_return)) {
+    return;
+  }
+  PolicyInfo info = setup_.policy_info;
+  info.step = s.steps;
+  info.success_rate = rate;
+  info.mean_return = mean_return;
+  const std::unique_ptr<Policy> policy = agent_.ExportPolicy(info);
+  for (TrainObserver* observer : setup_.observers) observer->OnBest(s, *policy);
+  s.best_success_rate = rate;
+  s.best_return = mean_return;
+  s.best_step = s.steps;
+}
+
+void Trainer::CountStreak(const Evaluation& e) {
+  TrainState& s = state_;
+  if (s.solved) return;
+  if (!e.passed) {
+    s.streak = 0;
+    return;
+  }
+  if (++s.streak == 1) {
+    s.streak_step = s.steps;
+    s.streak_seconds = s.seconds;
+  }
+  s.solved = s.streak == 2;
+}
+
+void Trainer::State(const Archive& archive) {
+  agent_.State(archive.In("agent"));
+  env_.State(archive.In("env"));
+  state_.State(archive.In("train"));
+  archive.Check(agent_.steps() == state_.steps, "agent/steps",
+                Concat(state_.steps, ", the steps of the training"));
+}
+
+void TrainConfig::Describe(Options& o) {
+  constexpr Range kCount{1, 1e12};
+  o.Section("train");
+  o.Add(&seed, "seed", 1, {0, 9e15}, "", "seed of every random stream");
+  o.Add(&steps, "steps", 1000000, kCount, "steps", "train for at most this many in all").identity =
+      false;
+  o.Add(&envs, "envs", 32, {1, 4096}, "", "parallel environments");
+  o.Add(&stop_when_solved, "stop_when_solved", true,
+        "stop once all episodes of two evaluations in a row succeed")
+      .identity = false;
+  o.Add(&eval_every, "eval_every", 10000, kCount, "steps", "from one evaluation to the next");
+  o.Add(&eval_episodes, "eval_episodes", 100, {1, 100000}, "", "episodes of an evaluation");
+  o.Add(&log_every, "log_every", 2000, kCount, "steps", "from one row of metrics.csv to the next");
+  o.Add(&checkpoint_every, "checkpoint_every", 50000, kCount, "steps",
+        "from one checkpoint to the next")
+      .identity = false;
+  o.Add(&threads, "threads", 0, {0, 256}, "",
+        "threads to use; 0: one for each processor, at most 8")
+      .identity = false;
+  o.Add(&start_noise, "start_noise", 0.1, {0, 10}, "rad, rad/s",
+        "standard deviation of the start states around hanging");
+  o.Add(&start_noise_end, "start_noise_end", 0.1, {0, 10}, "rad, rad/s", "at the curriculum's end");
+  o.Add(&curriculum_steps, "curriculum_steps", 200000, kCount, "steps",
+        "over which the noise changes linearly");
+}
+
+double TrainConfig::StartNoise(int64_t step) const {
+  const double progress =
+      std::min(1.0, static_cast<double>(step) / static_cast<double>(curriculum_steps));
+  return start_noise + progress * (start_noise_end - start_noise);
+}
+
+TrainState::TrainState(int num_envs, int num_terms)
+    : episode_return(static_cast<size_t>(num_envs)),
+      episode_terms(static_cast<size_t>(num_envs) * static_cast<size_t>(num_terms)),
+      episode_length(static_cast<size_t>(num_envs)) {}
+
+double TrainState::mean_return() const {
+  if (recent_returns.empty()) return 0;
+  return std::accumulate(recent_returns.begin(), recent_returns.end(), 0.0) /
+         static_cast<double>(recent_returns.size());
+}
+
+void TrainState::State(const Archive& archive) {
+  const auto envs = static_cast<int64_t>(episode_length.size());
+  archive.Scalar("steps", steps, {0, kMostSteps});
+  archive.Check(steps % envs == 0, "steps", Concat("a multiple of ", envs, " environments"));
+  archive.Scalar("episodes", episodes, {0, steps});
+  archive.Scalar("seconds", seconds, {0, kMostSeconds});
+  archive.Scalar("streak", streak, {0, 2});
+  archive.Scalar("streak_step", streak_step, {0, steps});
+  archive.Scalar("streak_seconds", streak_seconds, {0, seconds});
+  archive.Scalar("solved", solved);
+  archive.Check(solved == (streak == 2), "solved", "1 after a streak of 2 evaluations, else 0");
+  archive.Scalar("last_success_rate", last_success_rate, {0, 1});
+  archive.Scalar("best_success_rate", best_success_rate, {-1, 1});
+  archive.Scalar("best_return", best_return, kAnyNumber<double>);
+  archive.Scalar("best_step", best_step, {0, steps});
+  archive.Check(best_step > 0 ? best_success_rate >= 0 : best_success_rate == -1,
+                "best_success_rate", "0 to 1 where there is a best step, else -1");
+  archive.Array("episode_return", std::span(episode_return));
+  archive.Array("episode_terms", std::span(episode_terms));
+  archive.Array("episode_length", std::span(episode_length), {0, steps / envs});
+  archive.Vector("recent_returns", recent_returns, kRecentEpisodes);
+}
+
+}  // namespace upswing
