@@ -1,0 +1,319 @@
+// Properties of both tasks of Gymnasium.
+#include "sim/gym_task.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <numbers>
+
+#include "core/csv.h"
+#include "core/error.h"
+#include "core/testing.h"
+#include "core/text.h"
+#include "sim/acrobot_v1.h"
+#include "sim/pendulum_v1.h"
+
+namespace upswing {
+namespace {
+
+struct TaskCase {
+  std::string name;  // as a file's
+  std::unique_ptr<VectorEnv> (*make)(const GymTaskConfig&);
+  std::vector<double> start_bound, state_bound;  // (S)
+  int episode_steps;
+};
+
+void PrintTo(const TaskCase& task, std::ostream* out) { *out << task.name; }
+
+template <typename Task>
+std::unique_ptr<VectorEnv> Make(const GymTaskConfig& config) {
+  return std::make_unique<Task>(config);
+}
+
+constexpr double kPi = std::numbers::pi;
+
+class GymTasks : public testing::TestWithParam<TaskCase> {
+ protected:
+  static std::unique_ptr<VectorEnv> MakeEnv(const GymTaskConfig& config) {
+    return GetParam().make(config);
+  }
+  static std::unique_ptr<VectorEnv> MakeEnv(int num_envs) {
+    GymTaskConfig config;
+    config.num_envs = num_envs;
+    config.seed = 3;
+    return MakeEnv(config);
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(
+    Tasks, GymTasks,
+    testing::Values(TaskCase{"pendulum_v1", Make<PendulumV1>, {kPi, 1}, {kPi, 8}, 200},
+                    TaskCase{"acrobot_v1",
+                             Make<AcrobotV1>,
+                             {0.1, 0.1, 0.1, 0.1},
+                             {kPi, kPi, 4 * kPi, 9 * kPi},
+                             500}),
+    [](const auto& info) { return info.param.name; });
+
+/// The state of an environment.
+std::vector<double> StateOf(const VectorEnv& env, int i) {
+  std::vector<double> state(env.spec().state_names.size());
+  env.GetState(i, state);
+  return state;
+}
+
+/// One step under a torque for each environment.
+void Step(VectorEnv& env, std::vector<double> torque, StepResult& result) {
+  env.Step({torque.data(), env.num_envs(), 1}, result);
+}
+
+TEST_P(GymTasks, SpecIsComplete) {
+  const EnvSpec spec = MakeEnv(2)->spec();
+  EXPECT_EQ(spec.num_envs, 2);
+  EXPECT_EQ(spec.action_size(), 1);
+  EXPECT_EQ(spec.mirror_signs.size(), static_cast<size_t>(spec.obs_size));
+  EXPECT_EQ(spec.state_names.size(), GetParam().state_bound.size());
+  EXPECT_EQ(spec.state_units.size(), spec.state_names.size());
+  EXPECT_TRUE(spec.evaluation.by_return());
+  EXPECT_DOUBLE_EQ(spec.evaluation.seconds, GetParam().episode_steps * spec.step_seconds);
+  EXPECT_EQ(spec.evaluation.return_seconds, spec.evaluation.seconds);
+}
+
+// Each row of the file is one step, compared on its own, as differences grow along a trajectory.
+// State and reward: a step is up to some hundred roundings of 1e-16 of numbers up to 1e3, weighted
+// by the step's 0.2 s; NumPy's sines differ from the C library's in the last digit; and Gymnasium's
+// theta of Pendulum-v1 grows to 60 rad, whose last digit is 7e-15. The largest difference so far is
+// 2e-14. Observations are floats, which such a difference can round to the neighbour: 1.2e-7 of
+// them.
+TEST_P(GymTasks, StepsAreThoseOfGymnasium) {
+  const std::vector<std::string> variables = MakeEnv(1)->spec().state_names;
+  const size_t S = variables.size();
+  std::vector<std::string> names{"torque", "reward", "terminated"};
+  names.insert(names.end(), variables.begin(), variables.end());
+  for (const std::string& variable : variables) names.push_back(Concat("next_", variable));
+  const int D = MakeEnv(1)->spec().obs_size;
+  for (int j = 0; j < D; ++j) names.push_back(Concat("obs", j));
+  const auto path = std::filesystem::path(__FILE__).parent_path() / "testdata" /
+                    Concat("gymnasium_", GetParam().name, ".csv");
+  std::ifstream file(path);
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  const auto columns = ReadCsv(text, names, path.string());
+  const size_t rows = columns[0].values.size();
+  ASSERT_GE(rows, 600);
+
+  // All rows in one step, an environment for each; angles of any size are wrapped.
+  const auto env = MakeEnv(static_cast<int>(rows));
+  for (size_t i = 0; i < rows; ++i) {
+    std::vector<double> state;
+    for (size_t k = 0; k < S; ++k) state.push_back(columns[3 + k].values[i]);
+    if (S == 2) state[0] = std::remainder(state[0], 2 * kPi);
+    env->SetState(static_cast<int>(i), state);
+  }
+  StepResult result(env->spec());
+  Step(*env, columns[0].values, result);
+  for (size_t i = 0; i < rows; ++i) {
+    ASSERT_NEAR(result.reward[i], columns[1].values[i], 1e-12) << i;
+    ASSERT_EQ(result.terminated[i], columns[2].values[i]) << i;
+    for (size_t j = 0; j < static_cast<size_t>(D); ++j) {
+      const double expected = columns[3 + 2 * S + j].values[i];
+      const double tolerance = 1.2e-7 * std::max(1.0, std::abs(expected));
+      ASSERT_NEAR(result.next_obs[i * static_cast<size_t>(D) + j], expected, tolerance) << i;
+    }
+    if (result.done(i)) continue;  // has a new state by now
+    const std::vector<double> state = StateOf(*env, static_cast<int>(i));
+    for (size_t k = 0; k < S; ++k) {
+      double difference = state[k] - columns[3 + S + k].values[i];
+      if (S == 2 && k == 0) difference = std::remainder(difference, 2 * kPi);
+      ASSERT_NEAR(difference, 0, 1e-12) << i << ", " << variables[k];
+    }
+  }
+}
+
+TEST_P(GymTasks, MirroredStatesAndTorquesStayMirroredBitForBit) {
+  constexpr int kEnvs = 200;
+  const auto env = MakeEnv(kEnvs), mirrored = MakeEnv(kEnvs);
+  const EnvSpec spec = env->spec();
+  Rng rng(1, "mirror");
+  std::vector<double> torque;
+  for (int i = 0; i < kEnvs; ++i) {
+    std::vector<double> state;
+    for (const double bound : GetParam().state_bound) state.push_back(rng.Uniform(-bound, bound));
+    env->SetState(i, state);
+    for (double& x : state) x = -x;
+    mirrored->SetState(i, state);
+    torque.push_back(rng.Uniform(-3, 3));
+  }
+  StepResult a(spec), b(spec);
+  Step(*env, torque, a);
+  for (double& u : torque) u = -u;
+  Step(*mirrored, torque, b);
+  EXPECT_EQ(a.reward_terms, b.reward_terms);
+  EXPECT_EQ(a.work, b.work);
+  EXPECT_EQ(a.at_goal, b.at_goal);
+  EXPECT_EQ(a.terminated, b.terminated);
+  for (size_t i = 0; i < a.next_obs.size(); ++i) {
+    const float sign = spec.mirror_signs[i % spec.mirror_signs.size()];
+    ASSERT_EQ(a.next_obs[i], sign * b.next_obs[i]) << i;
+  }
+  for (int i = 0; i < kEnvs; ++i) {
+    if (a.done(static_cast<size_t>(i))) continue;
+    ASSERT_EQ(a.torque[static_cast<size_t>(i)], -b.torque[static_cast<size_t>(i)]);
+    const std::vector<double> s = StateOf(*env, i), t = StateOf(*mirrored, i);
+    for (size_t k = 0; k < s.size(); ++k) ASSERT_EQ(s[k], -t[k]);
+  }
+}
+
+TEST_P(GymTasks, StartsAreUniformWithinTheirBounds) {
+  constexpr int kEnvs = 2000;
+  const auto env = MakeEnv(kEnvs);
+  for (size_t k = 0; k < GetParam().start_bound.size(); ++k) {
+    const double bound = GetParam().start_bound[k];
+    double mean = 0, square = 0;
+    for (int i = 0; i < kEnvs; ++i) {
+      const double x = StateOf(*env, i)[k] / bound;
+      ASSERT_LE(std::abs(x), 1);
+      mean += x / kEnvs;
+      square += x * x / kEnvs;
+    }
+    // Uniform in ±1: mean 0 ± 0.58/√N, mean square 1/3 ± 0.30/√N; five deviations each.
+    EXPECT_NEAR(mean, 0, 5 * 0.58 / std::sqrt(kEnvs));
+    EXPECT_NEAR(square, 1.0 / 3, 5 * 0.30 / std::sqrt(kEnvs));
+  }
+}
+
+TEST_P(GymTasks, TruncatesAtTheTimeLimitWithTheTrueSuccessorAndThenResets) {
+  const auto env = MakeEnv(2), reference = MakeEnv(2);
+  StepResult result(env->spec()), expected(env->spec());
+  for (int step = 1; step < GetParam().episode_steps; ++step) {
+    Step(*env, {0, 0.01}, result);
+    ASSERT_FALSE(result.done(0) || result.done(1)) << step;
+  }
+  // Another environment in the same state, whose episode has just begun.
+  for (int i = 0; i < 2; ++i) reference->SetState(i, StateOf(*env, i));
+  Step(*env, {0, 0.01}, result);
+  Step(*reference, {0, 0.01}, expected);
+  EXPECT_EQ(result.next_obs, expected.next_obs);
+  EXPECT_EQ(result.truncated, (std::vector<uint8_t>{1, 1}));
+  EXPECT_EQ(result.terminated, (std::vector<uint8_t>{0, 0}));
+  EXPECT_EQ(expected.truncated, (std::vector<uint8_t>{0, 0}));
+  EXPECT_FALSE(std::ranges::equal(env->obs().values(), std::span<const float>(result.next_obs)));
+  for (size_t k = 0; k < GetParam().start_bound.size(); ++k) {
+    EXPECT_LE(std::abs(StateOf(*env, 0)[k]), GetParam().start_bound[k]);
+  }
+  Step(*env, {0, 0.01}, result);
+  EXPECT_EQ(result.truncated, (std::vector<uint8_t>{0, 0}));
+}
+
+TEST_P(GymTasks, APartOfTheEnvironmentsIsAsThoseOfTheWhole) {
+  GymTaskConfig config;
+  config.num_envs = 5;
+  const auto whole = MakeEnv(config);
+  config.num_envs = 2;
+  config.first_index = 2;
+  const auto part = MakeEnv(config);
+  StepResult expected(whole->spec()), result(part->spec());
+  for (int step = 0; step < GetParam().episode_steps + 10; ++step) {  // over a reset
+    const double u = std::sin(step);
+    Step(*whole, {0, 1, u, -u, 2}, expected);
+    Step(*part, {u, -u}, result);
+    for (int i = 0; i < 2; ++i) {
+      ASSERT_TRUE(std::ranges::equal(whole->obs().row(i + 2), part->obs().row(i)));
+      ASSERT_EQ(StateOf(*whole, i + 2), StateOf(*part, i));
+      ASSERT_EQ(expected.reward[static_cast<size_t>(i) + 2], result.reward[static_cast<size_t>(i)]);
+    }
+  }
+}
+
+TEST_P(GymTasks, SavedAndLoadedGoesOnWithTheSameBits) {
+  const auto saved = MakeEnv(3);
+  GymTaskConfig other;
+  other.num_envs = 3;
+  other.seed = 9;
+  const auto loaded = MakeEnv(other);
+  StepResult a(saved->spec()), b(saved->spec());
+  for (int step = 0; step < 100; ++step) Step(*saved, {1, -1, 0.5}, a);
+  SaveAndLoad([&](const Archive& archive) { saved->State(archive); },
+              [&](const Archive& archive) { loaded->State(archive); });
+  EXPECT_TRUE(std::ranges::equal(saved->obs().values(), loaded->obs().values()));
+  for (int step = 0; step < GetParam().episode_steps; ++step) {  // over a reset
+    Step(*saved, {1, -1, 0.5}, a);
+    Step(*loaded, {1, -1, 0.5}, b);
+    ASSERT_EQ(a.next_obs, b.next_obs);
+    ASSERT_EQ(a.reward, b.reward);
+    ASSERT_EQ(a.truncated, b.truncated);
+    ASSERT_TRUE(std::ranges::equal(saved->obs().values(), loaded->obs().values()));
+  }
+}
+
+/// Whether an environment takes its own state with one array replaced.
+template <typename T>
+bool Takes(std::unique_ptr<VectorEnv> env, const std::string& name, std::vector<T> values) {
+  try {
+    SaveAndLoad(
+        [&](const Archive& archive) {
+          env->State(archive);
+          archive.Array(name, std::span(values), kAnyNumber<T>);
+        },
+        [&](const Archive& archive) { env->State(archive); });
+  } catch (const Error& error) {
+    EXPECT_EQ(error.exit_code(), 2) << error.what();
+    EXPECT_NE(std::string(error.what()).find(name), std::string::npos) << error.what();
+    return false;
+  }
+  return true;
+}
+
+TEST_P(GymTasks, StatesThatNoTrainingReachesAreNotLoaded) {
+  for (size_t k = 0; k < GetParam().state_bound.size(); ++k) {
+    const std::string name = MakeEnv(2)->spec().state_names[k];
+    const double bound = GetParam().state_bound[k];
+    EXPECT_TRUE(Takes<double>(MakeEnv(2), name, {-bound, bound}));
+    EXPECT_FALSE(Takes<double>(MakeEnv(2), name, {0, std::nextafter(bound, 100)}));
+    EXPECT_FALSE(Takes<double>(MakeEnv(2), name, {0}));
+  }
+  const int64_t steps = GetParam().episode_steps;
+  EXPECT_TRUE(Takes<int64_t>(MakeEnv(2), "step_counts", {0, steps - 1}));
+  EXPECT_FALSE(Takes<int64_t>(MakeEnv(2), "step_counts", {0, steps}));
+  EXPECT_FALSE(Takes<int64_t>(MakeEnv(2), "step_counts", {-1, 0}));
+}
+
+TEST_P(GymTasks, StatesBeyondTheirBoundsCannotBeSet) {
+  const auto env = MakeEnv(1);
+  const std::vector<double>& bound = GetParam().state_bound;
+  for (size_t k = 0; k < bound.size(); ++k) {
+    std::vector<double> state = bound;
+    env->SetState(0, state);
+    EXPECT_EQ(StateOf(*env, 0), bound);
+    for (const double bad : {std::nextafter(bound[k], 100), -1e300, std::nan("")}) {
+      state[k] = bad;
+      EXPECT_THROW(env->SetState(0, state), Error);
+      EXPECT_EQ(StateOf(*env, 0), bound);  // as it was
+    }
+  }
+}
+
+TEST_P(GymTasks, TheFastestStatesStayWithinTheirBounds) {
+  const auto env = MakeEnv(1);
+  const std::vector<double>& bound = GetParam().state_bound;
+  StepResult result(env->spec());
+  Rng rng(2, "corners");
+  for (int trial = 0; trial < 1000; ++trial) {
+    std::vector<double> state = bound;
+    for (double& x : state) x = rng.Below(2) == 0 ? x : -x;
+    state[0] = rng.Uniform(-kPi, kPi);
+    env->SetState(0, state);
+    Step(*env, {rng.Uniform(-9, 9)}, result);
+    for (size_t k = 0; k < bound.size(); ++k) {
+      ASSERT_LE(std::abs(StateOf(*env, 0)[k]), bound[k]);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace upswing
