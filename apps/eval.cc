@@ -35,16 +35,23 @@ EvalReport Judge(const EvalArguments& a, const LoadedPolicy& loaded) {
   report.env.num_envs = static_cast<int>(a.episodes);
   report.knows_values = ValueUnitsOf(*loaded.policy).gamma > 0;
   ThreadPool pool(ResolveThreads(a.threads));
-  PendulumEnvConfig config = report.env;
+  EnvConfig config = report.env;
   config.pool = &pool;
-  PendulumEnv env(config);
+  const std::unique_ptr<VectorEnv> env = MakeEnv(config);
+  report.spec = env->spec();
+  const auto* pendulum = dynamic_cast<const PendulumEnv*>(env.get());
   for (int i = 0; i < config.num_envs; ++i) {
-    report.episodes.push_back({env.state(i), env.plant(i), env.disturbance(i), {}});
+    JudgedEpisode& episode = report.episodes.emplace_back();
+    episode.start.resize(report.spec.state_names.size());
+    env->GetState(i, episode.start);
+    if (pendulum == nullptr) continue;
+    episode.plant = pendulum->plant(i);
+    episode.disturbance = pendulum->disturbance(i);
   }
   EpisodeProgress progress(a.episodes, a.as_json);
   std::vector<EvaluationEpisode> results =
-      EvaluateEpisodes(*loaded.policy, env, &pool, [&](double share) { progress.Show(share); });
-  report.figures = Summarize(results, env.spec().evaluation);
+      EvaluateEpisodes(*loaded.policy, *env, &pool, [&](double share) { progress.Show(share); });
+  report.figures = Summarize(results, report.spec.evaluation);
   for (size_t i = 0; i < results.size(); ++i) report.episodes[i].result = std::move(results[i]);
   return report;
 }

@@ -14,7 +14,8 @@ namespace upswing {
 
 /// One episode: its conditions and its result.
 struct JudgedEpisode {
-  PendulumState start;
+  std::vector<double> start;  // (S)
+  // Of the double pendulum:
   Plant plant;
   Disturbance disturbance;
   EvaluationEpisode result;
@@ -25,7 +26,8 @@ struct EvalReport {
   std::string policy;              // path
   std::string physics;             // name of the engine
   std::optional<ModelInfo> model;  // none: the built-in one
-  PendulumEnvConfig env;           // what all episodes have in common
+  EnvConfig env;                   // what all episodes have in common
+  EnvSpec spec;
   std::vector<JudgedEpisode> episodes;
   Evaluation figures;
   bool knows_values = false;  // the policy says what its Q-values estimate

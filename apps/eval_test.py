@@ -42,7 +42,7 @@ class EvalTest(ProgramTest):
     def test_json_has_all_fields(self):
         result = self.evaluate()
         self.assertEqual(list(result), [
-            "policy", "seed", "physics", "plant", "model", "unknown_plant", "disturbance",
+            "policy", "seed", "physics", "task", "plant", "model", "unknown_plant", "disturbance",
             "randomize", "episodes", "successes", "success_rate", "success_interval_95", "swing_up_seconds",
             "settled", "settling_seconds", "steady_tilt_degrees", "return", "reward_terms", "value",
             "discounted_return", "energy_used", "peak_torque", "rms_torque", "torque_variation",

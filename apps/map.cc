@@ -146,6 +146,11 @@ std::vector<MapCell> RunCells(const MapConfig& config, const Policy& policy,
 
 int RunMapCommand(const MapArguments& a) {
   const LoadedPolicy loaded = LoadPolicy(a.policy);
+  if (loaded.task != kDoublePendulum) {
+    throw BadInput(
+        Concat("map: expected a policy of the double pendulum, whose plant and start are ",
+               "the axes, got one of ", loaded.task));
+  }
   MapResult map;
   const Training training = TrainingOf(loaded);
   map.config = ConfigOf(a, loaded, training);

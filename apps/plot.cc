@@ -31,8 +31,8 @@ struct PlotArguments {
 double UprightSince(const std::vector<RolloutRow>& rows) {
   double since = -1;
   for (const RolloutRow& row : rows) {
-    if (!row.inverted) since = -1;
-    if (row.inverted && since < 0) since = row.t;
+    if (!row.at_goal) since = -1;
+    if (row.at_goal && since < 0) since = row.t;
   }
   return since;
 }
@@ -42,8 +42,11 @@ std::string Caption(const PlotArguments& a, const RolloutConfig& config, const R
                     const Plant& training) {
   std::vector<std::string> parts;
   if (a.episode.given()) parts.push_back(Concat("episode ", a.episode.number, " of eval"));
-  if (!a.episode.given()) parts.push_back(Concat("start ", a.episode.start.value_or("0,0,0,0")));
+  const bool pendulum = config.env.task == kDoublePendulum;
+  const std::string usual = pendulum ? "0,0,0,0" : "of its own";
+  if (!a.episode.given()) parts.push_back(Concat("start ", a.episode.start.value_or(usual)));
   parts.push_back(Concat("seed ", a.trial.seed));
+  if (!pendulum) return Join(parts, "; ");
   parts.push_back(a.trial.physics);
   for (const std::string& text :
        {PlantChangesText(rollout.plant, training), ChangesText(config.env)}) {
@@ -58,7 +61,9 @@ int RunPlot(const PlotArguments& a) {
   config.policy = loaded.policy.get();
   config.env = TrialEnvironments(a.trial, &loaded);
   config.start = ChooseEpisode(a.episode, config.env);
-  const double usual = a.episode.given() ? kEvaluationSeconds : 10;
+  const EnvSpec spec = SpecOf(config.env);
+  const bool pendulum = spec.task == kDoublePendulum;
+  const double usual = a.episode.given() || !pendulum ? spec.evaluation.seconds : 10;
   config.seconds = a.seconds < 0 ? usual : a.seconds;
   config.q_values = loaded.policy->num_values() > 0;
   const std::optional<ModelInfo> model = InfoOfModel(config.env.mjcf, a.trial.model);
@@ -69,9 +74,14 @@ int RunPlot(const PlotArguments& a) {
 
   MakeNewFolder(folder);
   Figure episode = EpisodeFigure(rollout, *loaded.policy);
-  Figure phase = PhaseFigure(rollout);
+  std::vector<std::pair<std::string, Figure*>> figures{{"episode", &episode}};
+  Figure phase;
+  if (pendulum) {
+    phase = PhaseFigure(rollout);
+    figures.emplace_back("phase", &phase);
+  }
   std::vector<std::string> files;
-  for (auto [name, figure] : {std::pair("episode", &episode), std::pair("phase", &phase)}) {
+  for (const auto& [name, figure] : figures) {
     figure->title = WithModel(loaded.path.string(), model);
     figure->caption = Caption(a, config, rollout, loaded.plant);
     for (const char* ending : {".svg", ".png"}) {
@@ -81,14 +91,18 @@ int RunPlot(const PlotArguments& a) {
     }
   }
   fmt::print("{}\n", Printable(loaded.path.string()));
-  fmt::print("  plant      {}, physics {}\n", EpisodeText(rollout), a.trial.physics);
+  if (pendulum) {
+    fmt::print("  plant      {}, physics {}\n", EpisodeText(rollout), a.trial.physics);
+  } else {
+    fmt::print("  task       {}\n", spec.task);
+  }
   if (model) fmt::print("  model      {}\n", model->Text());
   const double since = UprightSince(rollout.rows);
-  fmt::print("  upright    {}\n",
+  fmt::print("  {}    {}\n", pendulum ? "upright" : "at goal",
              since < 0 ? "not at the end" : fmt::format("from {:.2f} s to the end", since));
   if (a.episode.given()) {
     fmt::print("  episode    {} of eval: {}\n", a.episode.number,
-               JudgementText(JudgeEpisode(*loaded.policy, config.env)));
+               JudgementText(JudgeEpisode(*loaded.policy, config.env), spec.evaluation));
   }
   fmt::print("  written    {}\n", Join(files, ", "));
   return 0;

@@ -32,16 +32,6 @@ std::vector<double> ReadTorqueFile(const std::string& path) {
   return torques;
 }
 
-std::string CsvRow(const RolloutRow& row) {
-  std::string text = FormatNumber(row.t);
-  for (const double x : {row.state.q1, row.state.q2, row.state.w1, row.state.w2, row.torque,
-                         row.energy, row.height, row.inverted ? 1.0 : 0.0, row.reward}) {
-    text += ',' + FormatNumber(x);
-  }
-  for (const double term : row.terms) text += ',' + FormatNumber(term + 0.0);  // no -0
-  return text + '\n';
-}
-
 int RunSimulate(const SimulateArguments& a) {
   if (!a.policy.empty() && !a.torque.empty()) {
     throw BadInput("simulate: expected a policy or --torque, got both");
@@ -51,32 +41,29 @@ int RunSimulate(const SimulateArguments& a) {
   RolloutConfig config;
   if (!a.torque.empty()) config.schedule = ReadTorqueFile(a.torque);
 
+  if (loaded) config.policy = loaded->policy.get();
+  config.env = TrialEnvironments(a.trial, loaded ? &*loaded : nullptr);
+  const EnvSpec spec = SpecOf(config.env);
+
   // As many steps as were asked for, or as the schedule has rows.
-  const double scheduled = static_cast<double>(config.schedule.size()) * kControlPeriod;
-  const double usual = config.schedule.empty() ? 20 : scheduled;
+  const double scheduled = static_cast<double>(config.schedule.size()) * spec.step_seconds;
+  const double usual = config.schedule.empty() ? spec.evaluation.seconds : scheduled;
   config.seconds = a.seconds < 0 ? usual : a.seconds;
   if (!config.schedule.empty() &&
-      RolloutSteps(config.seconds) > static_cast<int64_t>(config.schedule.size())) {
+      RolloutSteps(spec, config.seconds) > static_cast<int64_t>(config.schedule.size())) {
     throw BadInput(Concat("--seconds: expected at most ", FormatNumber(scheduled), ", for which ",
                           InputName(a.torque), " has torques, got ", FormatNumber(config.seconds)));
   }
-
-  if (loaded) config.policy = loaded->policy.get();
-  config.env = TrialEnvironments(a.trial, loaded ? &*loaded : nullptr);
   config.start = ChooseEpisode(a.episode, config.env);
   const Rollout rollout = RunRollout(config);
 
-  std::string csv =
-      "t,qpos0,qpos1,qvel0,qvel1,torque,energy,height,inverted,reward,energy_reward,height_reward,"
-      "balance_reward,velocity_penalty,torque_penalty\n";
-  for (const RolloutRow& row : rollout.rows) csv += CsvRow(row);
-  WriteOutput(a.csv, csv);
+  WriteOutput(a.csv, RolloutCsv(rollout));
   if (IsStandardStream(a.csv)) return 0;
   fmt::print("{}: {} rows\n", Printable(a.csv), rollout.rows.size());
-  fmt::print("  plant      {}\n", EpisodeText(rollout));
+  if (spec.task == kDoublePendulum) fmt::print("  plant      {}\n", EpisodeText(rollout));
   if (loaded && a.episode.given()) {
     fmt::print("  episode    {} of eval: {}\n", a.episode.number,
-               JudgementText(JudgeEpisode(*loaded->policy, config.env)));
+               JudgementText(JudgeEpisode(*loaded->policy, config.env), spec.evaluation));
   }
   return 0;
 }

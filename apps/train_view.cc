@@ -34,6 +34,7 @@ void TrainView::Announce(const std::filesystem::path& run) const {
       d.dueling ? fmt::format(" with heads of {}", d.head) : "",
       FormatCount(training_.policy()->num_parameters()), config.train.envs, threads,
       threads == 1 ? "" : "s");
+  if (config.task != kDoublePendulum) Say("  task {}\n", config.task);
   if (config.physics != kMuJoCo.name || d.precision != "float32") {
     Say("  physics {}, products in {}\n", config.physics, d.precision);
   }
@@ -153,7 +154,8 @@ void TrainView::Summarize(const std::filesystem::path& run, bool finished) {
   const std::string folder = ShellQuoted(run.string());
   Say("Next:\n");
   if (has_policy) {
-    Say("  ./upswing demo {0}\n  ./upswing eval {0}\n  ./upswing info {0}\n", folder);
+    if (training_.config().task == kDoublePendulum) Say("  ./upswing demo {}\n", folder);
+    Say("  ./upswing eval {0}\n  ./upswing info {0}\n", folder);
   }
   std::string how;
   if (finished && s.solved && config.stop_when_solved) how += " --no-stop-when-solved";

@@ -34,6 +34,23 @@ Conditions ConditionsOf(const TrialArguments& a) {
   return conditions;
 }
 
+/// The environments of a policy for a task without plant, sensors and engines. Throws BadInput if
+/// the arguments set one of these.
+EnvConfig OtherTask(const TrialArguments& a, const LoadedPolicy& loaded) {
+  const auto refuse = [&](const std::string& flag) {
+    throw BadInput(Concat(flag, ": expected none, as ", loaded.task, " has no such setting"));
+  };
+  if (!a.set.empty()) refuse("--set");
+  if (!a.model.empty()) refuse("--model");
+  if (a.unknown_plant) refuse("--unknown-plant");
+  if (!a.flags.empty()) refuse(FlagOf(a.flags.front().name));
+  EnvConfig env;
+  env.task = loaded.task;
+  env.seed = static_cast<uint64_t>(a.seed);
+  env.stream = "evaluation";
+  return env;
+}
+
 }  // namespace
 
 void AddTrialOptions(CLI::App& app, TrialArguments& a, const std::string& seed_of) {
@@ -47,8 +64,9 @@ void AddTrialOptions(CLI::App& app, TrialArguments& a, const std::string& seed_o
   app.parse_complete_callback([&a] { (void)ConditionsOf(a); });
 }
 
-PendulumEnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded) {
-  PendulumEnvConfig env;
+EnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded) {
+  EnvConfig env;
+  if (loaded != nullptr && loaded->task != kDoublePendulum) return OtherTask(a, *loaded);
   env.engine = &FindEngine(a.physics, "--physics");
   const Conditions conditions = ConditionsOf(a);
   env.disturbances = {conditions.disturbance};
@@ -68,7 +86,8 @@ PendulumEnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy*
   return env;
 }
 
-std::string ChangesText(const PendulumEnvConfig& env) {
+std::string ChangesText(const EnvConfig& env) {
+  if (env.task != kDoublePendulum) return "";
   Conditions conditions, defaults;
   conditions.disturbance = env.disturbance(0);
   conditions.randomization = env.randomization;
@@ -116,13 +135,14 @@ void AddEpisodeOptions(CLI::App& app, EpisodeArguments& a) {
   AddArguments(app, own);
 }
 
-std::optional<PendulumState> ChooseEpisode(const EpisodeArguments& a, PendulumEnvConfig& env) {
+std::optional<std::vector<double>> ChooseEpisode(const EpisodeArguments& a, EnvConfig& env) {
   if (a.start && a.given()) {
     throw BadInput("--start: expected none beside --episode, which has a start of its own");
   }
   env.first_index = static_cast<uint64_t>(std::max<int64_t>(0, a.number));
-  if (a.given()) return std::nullopt;
-  return ParseStart(a.start.value_or("0,0,0,0"));
+  // The double pendulum begins hanging at rest, other tasks in a start of their own.
+  if (a.given() || (!a.start && env.task != kDoublePendulum)) return std::nullopt;
+  return ParseStart(a.start.value_or("0,0,0,0"), SpecOf(env));
 }
 
 }  // namespace upswing

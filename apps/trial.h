@@ -31,10 +31,10 @@ void AddTrialOptions(CLI::App& app, TrialArguments& a, const std::string& seed_o
 /// The environments that the arguments ask for: those of the policy's training with the given
 /// changes; without a policy (null) those of the built-in plant. Environment i has episode i.
 /// Throws BadInput.
-PendulumEnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded);
+EnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded);
 
 /// What is not at its default, as text: `delay 0.02, …`; empty if nothing is.
-std::string ChangesText(const PendulumEnvConfig& env);
+std::string ChangesText(const EnvConfig& env);
 
 /// How a plant differs from that of the training: `mass2 1.3 kg (training: 1), …`; empty: not at
 /// all.
@@ -58,6 +58,6 @@ void AddEpisodeOptions(CLI::App& app, EpisodeArguments& a);
 
 /// Sets the episode of `env`, which has one environment. Returns where it starts; nothing: in the
 /// episode's own start. Throws BadInput.
-std::optional<PendulumState> ChooseEpisode(const EpisodeArguments& a, PendulumEnvConfig& env);
+std::optional<std::vector<double>> ChooseEpisode(const EpisodeArguments& a, EnvConfig& env);
 
 }  // namespace upswing

@@ -33,7 +33,7 @@ std::string LabelOf(const FoundRun& f) {
 /// many episodes have to succeed.
 bool IsTask(const std::string& name) {
   constexpr std::array<std::string_view, 3> kBeginnings{"plant.", "disturbance.", "randomize."};
-  return name == kModelContent || name == "train.eval_episodes" ||
+  return name == kModelContent || name == "train.eval_episodes" || name == "task.task" ||
          std::ranges::any_of(
              kBeginnings, [&](std::string_view beginning) { return name.starts_with(beginning); });
 }

@@ -67,6 +67,25 @@ void CheckTogether(const DqnConfig& d, const std::string& where) {
   }
 }
 
+/// Throws BadInput if a setting of the double pendulum is not at its default in another task, which
+/// has no such setting.
+void CheckTask(Config& config, const std::string& where) {
+  if (config.task == kDoublePendulum) return;
+  Config defaults;
+  const Options now = OptionsOf(config), usual = OptionsOf(defaults);
+  for (size_t i = 0; i < now.all().size(); ++i) {
+    const Option& option = now.all()[i];
+    static const std::vector<std::string> kSections{"task", "plant", "disturbance", "randomize",
+                                                    "reward"};
+    const bool of_pendulum =
+        option.name != "task" && std::ranges::find(kSections, option.section) != kSections.end();
+    if (!of_pendulum || option.text() == usual.all()[i].text()) continue;
+    throw BadInput(Concat(
+        where.empty() ? "" : where + ": ", option.name, ": expected none, as the task ",
+        config.task, " has no such setting, got ", option.text(), " (agent ", config.agent, ")"));
+  }
+}
+
 }  // namespace
 
 void Config::Describe(Options& o) {
@@ -170,6 +189,7 @@ Config ParseConfig(std::string_view text, const fs::path& file,
   config.agent = agent.name;
   config.model = model_path;
   CheckTogether(config.dqn, where);
+  CheckTask(config, where);
   return config;
 }
 

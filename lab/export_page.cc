@@ -86,6 +86,11 @@ ordered_json CurveJson(const std::vector<EvaluationRow>& evaluations) {
 PageAgent ReadAgent(const fs::path& path, const std::string& given_id) {
   const LoadedPolicy loaded = LoadPolicy(path);
   const std::string where = loaded.path.string();
+  if (loaded.task != kDoublePendulum) {
+    throw BadInput(Concat(where,
+                          ": expected a policy of the double pendulum, which is what the page ",
+                          "shows, got one of ", loaded.task));
+  }
   if (!loaded.mjcf.empty()) {
     throw BadInput(Concat(where,
                           ": was made with a model of its own, and the page shows the "

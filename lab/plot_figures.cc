@@ -6,6 +6,8 @@
 #include <numbers>
 #include <numeric>
 
+#include "core/text.h"
+
 namespace upswing {
 namespace {
 
@@ -39,8 +41,8 @@ std::vector<Moment> MotionOf(const Rows& rows) {
   constexpr int kPieces = 4;
   std::vector<Moment> motion;
   for (size_t i = 0; i + 1 < rows.size(); ++i) {
-    const PendulumState& a = rows[i].state;
-    const PendulumState& b = rows[i + 1].state;
+    const PendulumState a = StateOf(rows[i]);
+    const PendulumState b = StateOf(rows[i + 1]);
     const double h = rows[i + 1].t - rows[i].t;
     for (int k = 0; k < kPieces; ++k) {
       const double share = static_cast<double>(k) / kPieces;
@@ -49,7 +51,7 @@ std::vector<Moment> MotionOf(const Rows& rows) {
       motion.push_back({rows[i].t + share * h, {q1, q2, w1, w2}});
     }
   }
-  motion.push_back({rows.back().t, rows.back().state});
+  motion.push_back({rows.back().t, StateOf(rows.back())});
   return motion;
 }
 
@@ -169,10 +171,11 @@ Panel Torques(const Rows& rows) {
                  {Held("", rows, [](const RolloutRow& row) { return row.torque; })});
 }
 
-Panel Rewards(const Rows& rows) {
+Panel Rewards(const Rollout& rollout) {
+  const Rows& rows = rollout.rows;
   std::vector<Line> lines;
-  for (size_t k = 0; k < kRewardTerms; ++k) {
-    std::string name = kRewardTermNames[k];
+  for (size_t k = 0; k < rollout.spec.term_names.size(); ++k) {
+    std::string name = rollout.spec.term_names[k];
     std::ranges::replace(name, '_', ' ');
     lines.push_back(Held(name, rows, [k](const RolloutRow& row) { return row.terms[k]; }));
   }
@@ -222,6 +225,26 @@ Panel QValues(const Rows& rows, std::span<const double> torques) {
   return panel;
 }
 
+/// The motion over time: of the double pendulum with its energy, of other tasks each state
+/// variable.
+std::vector<Panel> StatePanels(const Rollout& rollout) {
+  if (rollout.spec.task == kDoublePendulum) {
+    const std::vector<Moment> motion = MotionOf(rollout.rows);
+    return {Angles(motion), Velocities(motion), Energies(motion, rollout.plant)};
+  }
+  std::vector<Panel> panels;
+  for (size_t i = 0; i < rollout.spec.state_names.size(); ++i) {
+    Line line;
+    for (const RolloutRow& row : rollout.rows) {
+      line.x.push_back(row.t);
+      line.y.push_back(row.state[i]);
+    }
+    panels.push_back(PanelOf(
+        Concat(rollout.spec.state_names[i], " (", rollout.spec.state_units[i], ")"), {line}));
+  }
+  return panels;
+}
+
 /// What the axes of a phase portrait are.
 struct PhaseAxes {
   const char *angle_label, *velocity_label;
@@ -263,12 +286,12 @@ Panel Portrait(const std::vector<Moment>& motion, const PhaseAxes& axes) {
 
 Figure EpisodeFigure(const Rollout& rollout, const Policy& policy) {
   const Rows& rows = rollout.rows;
-  const std::vector<Moment> motion = MotionOf(rows);
   Figure figure;
   figure.width = 1000;
+  figure.panels = StatePanels(rollout);
+  figure.panels.push_back(Torques(rows));
+  figure.panels.push_back(Rewards(rollout));
   constexpr int kPanelHeight = 170;
-  figure.panels = {Angles(motion), Velocities(motion), Energies(motion, rollout.plant),
-                   Torques(rows), Rewards(rows)};
   if (!rows.front().q.empty()) figure.panels.push_back(LargestQ(rows));
   if (!policy.value_actions().empty()) {
     figure.panels.push_back(QValues(rows, policy.value_actions().values()));

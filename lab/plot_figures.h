@@ -6,11 +6,11 @@
 /// What `plot` draws of one episode.
 namespace upswing {
 
-/// Angles, velocities, energy, torque, the reward's terms and, where the policy estimates them and
+/// The motion, torque, the reward's terms and, where the policy estimates them and
 /// the rollout has them, the values over time.
 Figure EpisodeFigure(const Rollout& rollout, const Policy& policy);
 
-/// Velocity over angle of both joints.
+/// Velocity over angle of both joints of the double pendulum.
 Figure PhaseFigure(const Rollout& rollout);
 
 }  // namespace upswing

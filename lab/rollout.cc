@@ -2,8 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
+#include <array>
 #include <cmath>
+#include <memory>
 
 #include "core/error.h"
 #include "core/text.h"
@@ -12,21 +13,8 @@
 namespace upswing {
 namespace {
 
-constexpr double kStepsPerSecond = 50;  // 1 / kControlPeriod, exactly
-static_assert(kStepsPerSecond * kControlPeriod == 1);
-
-RolloutRow RowOf(double t, const PendulumState& s, double torque, const Plant& plant) {
-  RolloutRow row;
-  row.t = t;
-  row.state = s;
-  row.torque = torque;
-  row.energy = Energy(plant, s);
-  row.height = TipHeight(plant, s);
-  row.inverted = Inverted(s);
-  row.terms = RewardTerms(plant, s, torque);
-  for (const double term : row.terms) row.reward += term;
-  return row;
-}
+/// Control steps in a second, a whole number in all tasks.
+double StepsPerSecond(const EnvSpec& spec) { return std::round(1 / spec.step_seconds); }
 
 /// (Q) in units of reward.
 std::vector<double> ValuesOf(const Policy& policy, Matrix<const float> obs,
@@ -39,57 +27,115 @@ std::vector<double> ValuesOf(const Policy& policy, Matrix<const float> obs,
   return values;
 }
 
+/// The double pendulum's reward for the state and the torque of a row.
+void RewardRow(const Plant& plant, RolloutRow& row) {
+  const auto terms = RewardTerms(plant, StateOf(row), row.torque);
+  row.terms.assign(terms.begin(), terms.end());
+  row.reward = 0;
+  for (const double term : row.terms) row.reward += term;
+  row.at_goal = Inverted(StateOf(row));
+}
+
 }  // namespace
 
-int64_t RolloutSteps(double seconds) { return std::llround(seconds * kStepsPerSecond); }
+int64_t RolloutSteps(const EnvSpec& spec, double seconds) {
+  return std::llround(seconds * StepsPerSecond(spec));
+}
+
+PendulumState StateOf(const RolloutRow& row) {
+  return {row.state[0], row.state[1], row.state[2], row.state[3]};
+}
 
 Rollout RunRollout(const RolloutConfig& config) {
-  PendulumEnvConfig env_config = config.env;
+  EnvConfig env_config = config.env;
   env_config.episode_seconds = config.seconds + 1;
-  PendulumEnv env(env_config);
-  if (config.start) env.SetState(0, *config.start);
+  const std::unique_ptr<VectorEnv> env = MakeEnv(env_config);
+  if (config.start) env->SetState(0, *config.start);
 
-  Rollout rollout{{}, env.plant(0), env.disturbance(0)};
-  const int64_t steps = RolloutSteps(config.seconds);
-  StepResult result = env.MakeResult();
+  Rollout rollout{env->spec(), {}, Plant(), Disturbance()};
+  const auto* pendulum = dynamic_cast<const PendulumEnv*>(env.get());
+  if (pendulum != nullptr) {
+    rollout.plant = pendulum->plant(0);
+    rollout.disturbance = pendulum->disturbance(0);
+  }
+  const int64_t steps = RolloutSteps(rollout.spec, config.seconds);
+  StepResult result = env->MakeResult();
   std::unique_ptr<Policy::Memory> memory;
   if (config.policy != nullptr) memory = config.policy->Start(1);
   for (int64_t k = 0; k <= steps; ++k) {
     // Behind the end of a schedule there is one more state, which no torque follows.
     double torque = 0;
-    if (config.policy != nullptr) config.policy->Act(env.obs(), {&torque, 1, 1}, *memory);
+    if (config.policy != nullptr) config.policy->Act(env->obs(), {&torque, 1, 1}, *memory);
     const auto step = static_cast<size_t>(k);
     if (step < config.schedule.size()) torque = config.schedule[step];
-    const double t = static_cast<double>(k) / kStepsPerSecond;
-    const PendulumState state = env.state(0);
-    std::vector<double> q;
-    if (config.q_values) q = ValuesOf(*config.policy, env.obs(), *memory);
+    RolloutRow row;
+    row.t = static_cast<double>(k) / StepsPerSecond(rollout.spec);
+    row.state.resize(rollout.spec.state_names.size());
+    env->GetState(0, row.state);
+    if (config.q_values) row.q = ValuesOf(*config.policy, env->obs(), *memory);
     // One step more than there are rows: it gives the motor's torque in the last state.
-    env.Step(std::span(&torque, 1), result);
-    if (result.terminated[0] && k < steps) {
-      throw Failure(Concat("the state blew up numerically after t = ", FormatNumber(t), " s"));
+    env->Step({&torque, 1, 1}, result);
+    row.torque = result.torque[0];
+    row.at_goal = result.at_goal[0] != 0;
+    row.reward = result.reward[0];
+    row.terms = result.reward_terms;
+    const bool ended = result.terminated[0] != 0;
+    if (pendulum != nullptr && ended && k < steps) {
+      throw Failure(Concat("the state blew up numerically after t = ", FormatNumber(row.t), " s"));
     }
-    rollout.rows.push_back(RowOf(t, state, result.torque[0], rollout.plant));
-    rollout.rows.back().q = std::move(q);
+    if (pendulum != nullptr) RewardRow(rollout.plant, row);
+    rollout.rows.push_back(std::move(row));
+    if (ended || result.truncated[0] != 0) break;
   }
   return rollout;
 }
 
-EvaluationEpisode JudgeEpisode(const Policy& policy, const PendulumEnvConfig& config) {
-  PendulumEnv env(config);
-  return EvaluateEpisodes(policy, env).front();
+std::string RolloutCsv(const Rollout& rollout) {
+  const bool pendulum = rollout.spec.task == kDoublePendulum;
+  std::string csv;
+  if (pendulum) {
+    csv =
+        "t,qpos0,qpos1,qvel0,qvel1,torque,energy,height,inverted,reward,energy_reward,"
+        "height_reward,balance_reward,velocity_penalty,torque_penalty\n";
+  } else {
+    csv = Concat("t,", Join(rollout.spec.state_names, ","), ",torque,reward,",
+                 Join(rollout.spec.term_names, ","), '\n');
+  }
+  for (const RolloutRow& row : rollout.rows) {
+    std::vector<double> cells{row.t};
+    cells.insert(cells.end(), row.state.begin(), row.state.end());
+    cells.push_back(row.torque);
+    if (pendulum) {
+      const PendulumState s = StateOf(row);
+      const double inverted = row.at_goal ? 1 : 0;
+      cells.insert(cells.end(), {Energy(rollout.plant, s), TipHeight(rollout.plant, s), inverted});
+    }
+    cells.push_back(row.reward);
+    for (const double term : row.terms) cells.push_back(term + 0.0);  // no -0
+    std::vector<std::string> texts;
+    for (const double cell : cells) texts.push_back(FormatNumber(cell));
+    csv += Join(texts, ",") + '\n';
+  }
+  return csv;
 }
 
-std::string JudgementText(const EvaluationEpisode& episode) {
-  const std::string upright =
-      episode.swing_up_seconds < kEvaluationSeconds
-          ? fmt::format("upright from {:.2f} s to the end", episode.swing_up_seconds)
-          : "not upright at the end";
-  return fmt::format("{}, {}, return {:.6g}", episode.success ? "success" : "failure", upright,
+EvaluationEpisode JudgeEpisode(const Policy& policy, const EnvConfig& config) {
+  return EvaluateEpisodes(policy, *MakeEnv(config)).front();
+}
+
+std::string JudgementText(const EvaluationEpisode& episode, const EvaluationRule& rule) {
+  std::string upright;
+  if (!rule.by_return()) {
+    upright = episode.swing_up_seconds < rule.seconds
+                  ? fmt::format("upright from {:.2f} s to the end, ", episode.swing_up_seconds)
+                  : "not upright at the end, ";
+  }
+  return fmt::format("{}, {}return {:.6g}", episode.success ? "success" : "failure", upright,
                      episode.reward_sum);
 }
 
 std::string EpisodeText(const Rollout& rollout) {
+  if (rollout.spec.task != kDoublePendulum) return "";
   std::string text = PlantText(rollout.plant);
   const auto& [noise, delay] = rollout.disturbance;
   if (noise > 0) text += Concat(", sensor_noise ", FormatNumber(noise));
@@ -97,17 +143,20 @@ std::string EpisodeText(const Rollout& rollout) {
   return text;
 }
 
-PendulumState ParseStart(const std::string& text) {
+std::vector<double> ParseStart(const std::string& text, const EnvSpec& spec) {
   const std::vector<std::string_view> pieces = Split(text, ',');
+  const size_t S = spec.state_names.size();
   std::vector<double> numbers;
   for (const std::string_view piece : pieces) {
     const auto number = ParseNumber(piece);
     if (number && std::isfinite(*number)) numbers.push_back(*number);
   }
-  if (pieces.size() != 4 || numbers.size() != 4) {
-    throw BadInput(Concat("--start: expected four numbers q1,q2,w1,w2, got \"", text, "\""));
+  if (pieces.size() != S || numbers.size() != S) {
+    constexpr std::array kCounts{"no", "one", "two", "three", "four", "five", "six"};
+    throw BadInput(Concat("--start: expected ", kCounts.at(S), " numbers ",
+                          Join(spec.state_names, ","), ", got \"", text, "\""));
   }
-  return {numbers[0], numbers[1], numbers[2], numbers[3]};
+  return numbers;
 }
 
 }  // namespace upswing

@@ -1,63 +1,72 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "core/policy.h"
+#include "lab/task.h"
 #include "rl/evaluate.h"
-#include "sim/pendulum_env.h"
 
 /// One episode, step by step, as `simulate` writes and `plot` draws it.
 namespace upswing {
 
 /// One moment and the torque that acts from then on.
 struct RolloutRow {
-  double t = 0;  // s
-  PendulumState state;
-  double torque = 0;  // N·m, what the motor gives: after its delay, within its limit
-  double energy = 0;  // J
-  double height = 0;  // of the tip, m
-  bool inverted = false;
-  double reward = 0;  // for the state and the torque, the sum of the terms
-  std::array<double, kRewardTerms> terms{};
-  std::vector<double> q;  // (A) Q-values of the policy's actions, in units of reward, if asked for
+  double t = 0;               // s
+  std::vector<double> state;  // (S)
+  double torque = 0;          // N·m, what the motor gives: after its delay, within its limit
+  bool at_goal = false;
+  // Of the double pendulum for the state and the torque of this row, of other tasks for the step
+  // that begins here.
+  double reward = 0;          // the sum of the terms
+  std::vector<double> terms;  // (K)
+  std::vector<double> q;  // (Q) values of the policy's actions, in units of reward, if asked for
 };
 
 struct RolloutConfig {
-  const Policy* policy = nullptr;      // who chooses torques; none: the schedule
-  std::vector<double> schedule;        // N·m, a torque for each step; 0 behind its end
-  PendulumEnvConfig env;               // of one environment
-  std::optional<PendulumState> start;  // none: that of the environment's own episode
-  double seconds = 20;                 // to the nearest step
+  const Policy* policy = nullptr;            // who chooses torques; none: the schedule
+  std::vector<double> schedule;              // N·m, a torque for each step; 0 behind its end
+  EnvConfig env;                             // of one environment
+  std::optional<std::vector<double>> start;  // (S); none: that of the environment's own episode
+  double seconds = 20;                       // to the nearest step; less if it terminates
   bool q_values = false;
 };
 
 struct Rollout {
-  std::vector<RolloutRow> rows;  // at 0, 0.02, … s, the last state included
-  Plant plant;                   // of this episode
-  Disturbance disturbance;       // of this episode
+  EnvSpec spec;
+  std::vector<RolloutRow> rows;  // at each control step, the last state included
+  // Of this episode of the double pendulum:
+  Plant plant;
+  Disturbance disturbance;
 };
 
 /// How many control steps so many seconds are, to the nearest.
-int64_t RolloutSteps(double seconds);
+int64_t RolloutSteps(const EnvSpec& spec, double seconds);
 
 /// Throws Failure if the state blows up.
 Rollout RunRollout(const RolloutConfig& config);
 
+/// A table with a row for each state: t, state, torque, for the double pendulum energy, height and
+/// whether it is inverted, reward and its terms.
+std::string RolloutCsv(const Rollout& rollout);
+
+/// The double pendulum's state in a row.
+PendulumState StateOf(const RolloutRow& row);
+
 /// What `eval` says of the environment's own episode.
-EvaluationEpisode JudgeEpisode(const Policy& policy, const PendulumEnvConfig& env);
+EvaluationEpisode JudgeEpisode(const Policy& policy, const EnvConfig& env);
 
 /// The same in words: `success, upright from 2.34 s to the end, return 2345`.
-std::string JudgementText(const EvaluationEpisode& episode);
+std::string JudgementText(const EvaluationEpisode& episode, const EvaluationRule& rule);
 
 /// What distinguishes an episode from others with the same flags: its plant, `mass1 0.93, …`, and
-/// its sensor noise (rad, rad/s) and delay (s) where there are any.
+/// its sensor noise (rad, rad/s) and delay (s) where there are any; empty for other tasks.
 std::string EpisodeText(const Rollout& rollout);
 
-/// Four numbers q1,q2,w1,w2 (rad, rad/s) as --start gives them. Throws BadInput.
-PendulumState ParseStart(const std::string& text);
+/// A state as --start gives it: a number for each state variable, such as q1,q2,w1,w2 (rad, rad/s).
+/// Throws BadInput.
+std::vector<double> ParseStart(const std::string& text, const EnvSpec& spec);
 
 }  // namespace upswing
