@@ -82,6 +82,7 @@ void TellGroupsApart(GroupedRuns& grouped, const std::vector<const FoundRun*>& f
 /// What a reader of the figures should know.
 void NotePlans(const GroupedRuns& grouped, std::vector<std::string>& notes) {
   std::set<std::pair<int64_t, bool>> of_all;
+  std::map<size_t, std::vector<std::string>> few;  // labels by their number of seeds
   for (const RunGroup& group : grouped.groups) {
     std::set<int64_t> budgets;
     std::set<bool> stops;
@@ -101,9 +102,12 @@ void NotePlans(const GroupedRuns& grouped, std::vector<std::string>& notes) {
     if (group.runs.size() == 1) {
       notes.push_back(group.label + ": no intervals, there is one seed only");
     } else if (group.runs.size() < 5) {
-      notes.push_back(fmt::format("{}: {} seeds are few, intervals are too narrow", group.label,
-                                  group.runs.size()));
+      few[group.runs.size()].push_back(group.label);
     }
+  }
+  for (const auto& [seeds, labels] : few) {
+    notes.push_back(
+        fmt::format("{}: {} seeds are few, intervals are too narrow", Join(labels, ", "), seeds));
   }
   if (notes.empty() && of_all.size() > 1) {
     notes.emplace_back("the groups differ in their budgets of steps or in stopping when solved");

@@ -86,6 +86,47 @@ void CheckTask(Config& config, const std::string& where) {
   }
 }
 
+/// The settings of a parsed configuration file; see ParseConfig.
+Config ConfigOf(const toml::table& table, const fs::path& file,
+                const std::vector<FlagValue>& flags) {
+  const std::string where = file.empty() ? "" : InputName(file.string());
+  Config config;
+  const Options options = OptionsOf(config);
+
+  // A model file has a plant of its own, which other settings may change.
+  const EarlySetting model = FindEarly("plant", "model", table, where, flags);
+  std::string model_path = model.value;
+  if (!model_path.empty() && model.in_file) {
+    model_path = (file.parent_path() / model.value).string();  // counts from its file
+  }
+  if (!model_path.empty()) config.plant = ChangedPlant(config.plant, model_path, {}, config.mjcf);
+
+  EarlySetting agent_setting = FindEarly("train", "agent", table, where, flags);
+  if (agent_setting.where.empty()) agent_setting.value = config.agent;
+  const NamedAgent& agent = FindAgent(agent_setting.value, agent_setting.where);
+  ApplyToml(options, agent.toml, Concat("agent ", agent.name));
+  ApplyTable(options, table, where, false);
+  SetFlags(options, flags);
+  config.agent = agent.name;
+  config.model = model_path;
+  CheckTogether(config.dqn, where);
+  CheckTask(config, where);
+  return config;
+}
+
+/// The settings that a configuration file lacks; see MissingSettings.
+std::vector<std::string> MissingIn(const toml::table& table, bool identity_only) {
+  Config scratch;
+  const Options options = OptionsOf(scratch);
+  std::vector<std::string> missing;
+  for (const Option& option : options.all()) {
+    const bool needed = !option.implied && (option.identity || !identity_only);
+    if (!needed || table[option.section][option.name]) continue;
+    missing.push_back(Concat(option.section, ".", option.name));
+  }
+  return missing;
+}
+
 }  // namespace
 
 void Config::Describe(Options& o) {
@@ -167,30 +208,7 @@ Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
 
 Config ParseConfig(std::string_view text, const fs::path& file,
                    const std::vector<FlagValue>& flags) {
-  const std::string where = file.empty() ? "" : InputName(file.string());
-  const toml::table table = ParseToml(text, where);
-  Config config;
-  const Options options = OptionsOf(config);
-
-  // A model file has a plant of its own, which other settings may change.
-  const EarlySetting model = FindEarly("plant", "model", table, where, flags);
-  std::string model_path = model.value;
-  if (!model_path.empty() && model.in_file) {
-    model_path = (file.parent_path() / model.value).string();  // counts from its file
-  }
-  if (!model_path.empty()) config.plant = ChangedPlant(config.plant, model_path, {}, config.mjcf);
-
-  EarlySetting agent_setting = FindEarly("train", "agent", table, where, flags);
-  if (agent_setting.where.empty()) agent_setting.value = config.agent;
-  const NamedAgent& agent = FindAgent(agent_setting.value, agent_setting.where);
-  ApplyToml(options, agent.toml, Concat("agent ", agent.name));
-  ApplyTable(options, table, where, false);
-  SetFlags(options, flags);
-  config.agent = agent.name;
-  config.model = model_path;
-  CheckTogether(config.dqn, where);
-  CheckTask(config, where);
-  return config;
+  return ConfigOf(ParseToml(text, file.empty() ? "" : InputName(file.string())), file, flags);
 }
 
 void MakeReadyForMany(Config& config) {
@@ -200,16 +218,7 @@ void MakeReadyForMany(Config& config) {
 
 std::vector<std::string> MissingSettings(const std::string& text, const std::string& where,
                                          bool identity_only) {
-  const toml::table table = ParseToml(text, where);
-  Config scratch;
-  const Options options = OptionsOf(scratch);
-  std::vector<std::string> missing;
-  for (const Option& option : options.all()) {
-    const bool needed = !option.implied && (option.identity || !identity_only);
-    if (!needed || table[option.section][option.name]) continue;
-    missing.push_back(Concat(option.section, ".", option.name));
-  }
-  return missing;
+  return MissingIn(ParseToml(text, where), identity_only);
 }
 
 std::string CompleteToml(Config config) {
@@ -219,15 +228,14 @@ std::string CompleteToml(Config config) {
 
 Config ReadRunConfig(const fs::path& run, const std::vector<FlagValue>& flags) {
   const fs::path file = run / RunFolder::kConfig;
-  const std::string text = ReadOwnFile(file);
-  const toml::table table = ParseToml(text, file.string());
+  const toml::table table = ParseToml(ReadOwnFile(file), file.string());
   const std::string model = table["plant"]["model"].value_or("");
   if (!model.empty() && model != RunFolder::kModel) {  // a run is whole wherever it lies
     throw BadInput(Concat(file.string(), ": model: expected ", RunFolder::kModel,
                           ", the copy in the run folder, got \"", Printable(model), "\""));
   }
-  std::vector<std::string> missing = MissingSettings(text, file.string(), false);
-  if (missing.empty()) return ParseConfig(text, file, flags);
+  std::vector<std::string> missing = MissingIn(table, false);
+  if (missing.empty()) return ConfigOf(table, file, flags);
   constexpr size_t kMostNames = 6;  // that make a line which can still be read
   const size_t more = missing.size() - std::min(missing.size(), kMostNames);
   missing.resize(missing.size() - more);

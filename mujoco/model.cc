@@ -38,6 +38,85 @@ void CheckRanges(Plant plant, const std::string& where) {
   }
 }
 
+/// Throws BadInput about a model from `where` unless `valid`.
+class Expectation {
+ public:
+  explicit Expectation(const std::string& where) : where_(where) {}
+  void operator()(bool valid, std::string_view expected) const {
+    if (!valid) throw BadInput(Concat(where_, ": not a double pendulum: expected ", expected));
+  }
+
+ private:
+  const std::string& where_;
+};
+
+/// Two bodies, two hinges, two capsules, a motor, a timestep.
+void CheckStructure(const mjModel& model, const Expectation& expect) {
+  expect(model.nbody == 3 && model.body_parentid[2] == 1, "two bodies, the second on the first");
+  expect(model.njnt == 2 && model.jnt_type[0] == mjJNT_HINGE && model.jnt_type[1] == mjJNT_HINGE &&
+             model.jnt_bodyid[0] == 1 && model.jnt_bodyid[1] == 2,
+         "a hinge for each body");
+  expect(std::abs(model.jnt_axis[1] - 1) < 1e-9 && std::abs(model.jnt_axis[4] - 1) < 1e-9,
+         "hinges about +y");
+  expect(model.ngeom == 2 && model.geom_type[0] == mjGEOM_CAPSULE &&
+             model.geom_type[1] == mjGEOM_CAPSULE && model.geom_bodyid[0] == 1 &&
+             model.geom_bodyid[1] == 2,
+         "one capsule for each body");
+  expect(model.nu == 1 && model.actuator_trnid[0] == 0 && model.na == 0 &&
+             model.actuator_ctrllimited[0] != 0,
+         "one motor with a control range, on the first hinge");
+  expect(model.actuator_gear[0] == 1 && model.actuator_gainprm[0] == 1 &&
+             model.actuator_biastype[0] == mjBIAS_NONE,
+         "a motor whose control is its torque");
+  const double substeps = kControlPeriod / model.opt.timestep;
+  expect(substeps > 0.5 && std::abs(substeps - std::round(substeps)) < 1e-6,
+         Concat("a timestep that divides ", kControlPeriod, " s, got ", model.opt.timestep));
+}
+
+/// Numbers of each joint that are not part of the plant.
+void CheckJoints(const mjModel& model, const Expectation& expect) {
+  for (const int joint : {0, 1}) {
+    const auto not_negative = [&](const mjtNum* numbers, std::string_view what) {
+      expect(std::isfinite(numbers[joint]) && numbers[joint] >= 0,
+             Concat(what, " that is not negative, got ", FormatNumber(numbers[joint])));
+    };
+    not_negative(model.dof_armature, "armature");
+    not_negative(model.dof_damping, "damping");
+    not_negative(model.dof_frictionloss, "frictionloss");
+    not_negative(model.jnt_stiffness, "stiffness");
+    // A mirrored motion is a motion, which learning in a mirror relies on.
+    const mjtNum* more = model.jnt_stiffnesspoly + mjNPOLY * joint;
+    const bool is_spring = model.jnt_stiffness[joint] != 0 ||
+                           std::any_of(more, more + mjNPOLY, [](mjtNum k) { return k != 0; });
+    expect(!is_spring || model.qpos_spring[joint] == 0,
+           Concat("springs at rest where the links hang (springref 0), got ",
+                  FormatNumber(model.qpos_spring[joint]), " rad"));
+    const mjtNum* range = model.jnt_range + 2 * joint;
+    expect(model.jnt_limited[joint] == 0 || std::abs(range[0] + range[1]) < 1e-9,
+           "limits of a joint that are the same both ways");
+  }
+}
+
+/// Where the links are must follow from the plant, and writing the plant must change nothing that
+/// the file says. Armature, friction, stiffness, radius and integrator are the file's own affair.
+void CheckGeometry(const mjModel& model, const std::string& where, const Expectation& expect) {
+  const ModelPtr ours = CompileModel(Mjcf(PlantOf(model)), where);
+  const ModelPtr written(mj_copyModel(nullptr, &model));
+  WritePlant(PlantOf(model), FieldsOf(*written));
+  const auto same = [&](const mjtNum* a, const mjtNum* b, int n, std::string_view what) {
+    for (int i = 0; i < n; ++i) expect(std::abs(a[i] - b[i]) < 1e-9, what);
+  };
+  same(model.qpos0, ours->qpos0, 2, "joint angles that are 0 hanging");
+  same(model.jnt_pos, ours->jnt_pos, 6, "hinges at the ends of their links");
+  same(model.body_quat, ours->body_quat, 12, "links that hang along -z");
+  same(model.body_pos, ours->body_pos, 9, "the second link at the end of the first");
+  same(model.geom_pos, ours->geom_pos, 6, "capsules along -z from their hinge");
+  same(model.body_ipos, ours->body_ipos, 9, "the mass of each link to be that of its capsule");
+  same(model.body_inertia, written->body_inertia, 9, "the inertia of solid capsules");
+  same(model.actuator_ctrlrange, ours->actuator_ctrlrange, 2, "a symmetric control range");
+  same(model.opt.gravity, ours->opt.gravity, 3, "gravity along -z");
+}
+
 }  // namespace
 
 std::string MuJoCoVersion() { return mj_versionString(); }
@@ -60,71 +139,11 @@ ModelPtr CompileModel(const std::string& mjcf, const std::string& where) {
 ModelPtr LoadModel(const std::string& mjcf, const std::string& where) {
   CheckMjcf(mjcf, where);
   ModelPtr compiled = CompileGiven(mjcf, where);
-  const mjModel& model = *compiled;
-  const auto expect = [&](bool valid, std::string_view expected) {
-    if (!valid) throw BadInput(Concat(where, ": not a double pendulum: expected ", expected));
-  };
-  expect(model.nbody == 3 && model.body_parentid[2] == 1, "two bodies, the second on the first");
-  expect(model.njnt == 2 && model.jnt_type[0] == mjJNT_HINGE && model.jnt_type[1] == mjJNT_HINGE &&
-             model.jnt_bodyid[0] == 1 && model.jnt_bodyid[1] == 2,
-         "a hinge for each body");
-  expect(std::abs(model.jnt_axis[1] - 1) < 1e-9 && std::abs(model.jnt_axis[4] - 1) < 1e-9,
-         "hinges about +y");
-  expect(model.ngeom == 2 && model.geom_type[0] == mjGEOM_CAPSULE &&
-             model.geom_type[1] == mjGEOM_CAPSULE && model.geom_bodyid[0] == 1 &&
-             model.geom_bodyid[1] == 2,
-         "one capsule for each body");
-  expect(model.nu == 1 && model.actuator_trnid[0] == 0 && model.na == 0 &&
-             model.actuator_ctrllimited[0] != 0,
-         "one motor with a control range, on the first hinge");
-  expect(model.actuator_gear[0] == 1 && model.actuator_gainprm[0] == 1 &&
-             model.actuator_biastype[0] == mjBIAS_NONE,
-         "a motor whose control is its torque");
-  const double substeps = kControlPeriod / model.opt.timestep;
-  expect(substeps > 0.5 && std::abs(substeps - std::round(substeps)) < 1e-6,
-         Concat("a timestep that divides ", kControlPeriod, " s, got ", model.opt.timestep));
-
-  for (const int joint : {0, 1}) {
-    const auto not_negative = [&](const mjtNum* numbers, std::string_view what) {
-      expect(std::isfinite(numbers[joint]) && numbers[joint] >= 0,
-             Concat(what, " that is not negative, got ", FormatNumber(numbers[joint])));
-    };
-    not_negative(model.dof_armature, "armature");
-    not_negative(model.dof_damping, "damping");
-    not_negative(model.dof_frictionloss, "frictionloss");
-    not_negative(model.jnt_stiffness, "stiffness");
-  }
-  CheckRanges(PlantOf(model), where);
-
-  // Where the links are must follow from the plant, and writing the plant must change nothing that
-  // the file says. Armature, friction, stiffness, radius and integrator are the file's own affair.
-  const ModelPtr ours = CompileModel(Mjcf(PlantOf(model)), where);
-  const ModelPtr written(mj_copyModel(nullptr, &model));
-  WritePlant(PlantOf(model), FieldsOf(*written));
-  const auto same = [&](const mjtNum* a, const mjtNum* b, int n, std::string_view what) {
-    for (int i = 0; i < n; ++i) expect(std::abs(a[i] - b[i]) < 1e-9, what);
-  };
-  same(model.qpos0, ours->qpos0, 2, "joint angles that are 0 hanging");
-  for (const int joint : {0, 1}) {
-    // A mirrored motion is a motion, which learning in a mirror relies on.
-    const mjtNum* more = model.jnt_stiffnesspoly + mjNPOLY * joint;
-    const bool is_spring = model.jnt_stiffness[joint] != 0 ||
-                           std::any_of(more, more + mjNPOLY, [](mjtNum k) { return k != 0; });
-    expect(!is_spring || model.qpos_spring[joint] == 0,
-           Concat("springs at rest where the links hang (springref 0), got ",
-                  FormatNumber(model.qpos_spring[joint]), " rad"));
-    const mjtNum* range = model.jnt_range + 2 * joint;
-    expect(model.jnt_limited[joint] == 0 || std::abs(range[0] + range[1]) < 1e-9,
-           "limits of a joint that are the same both ways");
-  }
-  same(model.jnt_pos, ours->jnt_pos, 6, "hinges at the ends of their links");
-  same(model.body_quat, ours->body_quat, 12, "links that hang along -z");
-  same(model.body_pos, ours->body_pos, 9, "the second link at the end of the first");
-  same(model.geom_pos, ours->geom_pos, 6, "capsules along -z from their hinge");
-  same(model.body_ipos, ours->body_ipos, 9, "the mass of each link to be that of its capsule");
-  same(model.body_inertia, written->body_inertia, 9, "the inertia of solid capsules");
-  same(model.actuator_ctrlrange, ours->actuator_ctrlrange, 2, "a symmetric control range");
-  same(model.opt.gravity, ours->opt.gravity, 3, "gravity along -z");
+  const Expectation expect(where);
+  CheckStructure(*compiled, expect);
+  CheckJoints(*compiled, expect);
+  CheckRanges(PlantOf(*compiled), where);
+  CheckGeometry(*compiled, where, expect);
   return compiled;
 }
 
