@@ -25,6 +25,7 @@ LAYERS = {
     "lab": LIBRARIES,
     "apps": LIBRARIES | {"lab"},
     "fuzz": LIBRARIES | {"lab"},
+    "examples": LIBRARIES | {"lab"},
 }
 
 # The files that may include each foreign library.

@@ -1,0 +1,34 @@
+# `cmake --install`: the headers and static libraries of the layers, the program, and the package by
+# which find_package(upswing) finds them. The folder can be moved: nothing in it is an absolute path.
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+set(UPSWING_LAYERS core nn sim rl io mujoco report lab)
+set(UPSWING_PACKAGE ${CMAKE_INSTALL_LIBDIR}/cmake/upswing)
+set(UPSWING_INSTALLED_MUJOCO ${CMAKE_INSTALL_LIBDIR}/upswing/mujoco)
+
+foreach(LAYER IN LISTS UPSWING_LAYERS)
+  install(TARGETS upswing_${LAYER} EXPORT upswing)
+  # Not what tests share, nor what one kernel includes into another.
+  install(DIRECTORY ${LAYER} DESTINATION include/upswing FILES_MATCHING PATTERN "*.h"
+          PATTERN "testing.h" EXCLUDE PATTERN "*-inl.h" EXCLUDE PATTERN "testdata" EXCLUDE)
+endforeach()
+set_target_properties(upswing_event PROPERTIES EXPORT_NAME event)
+install(TARGETS upswing_event EXPORT upswing)
+install(EXPORT upswing NAMESPACE upswing:: FILE upswing-targets.cmake DESTINATION ${UPSWING_PACKAGE})
+
+configure_package_config_file(cmake/upswing-config.cmake.in upswing-config.cmake
+  INSTALL_DESTINATION ${UPSWING_PACKAGE} PATH_VARS UPSWING_INSTALLED_MUJOCO)
+# Before 1.0, a minor version may change anything.
+write_basic_package_version_file(upswing-config-version.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${CMAKE_CURRENT_BINARY_DIR}/upswing-config.cmake
+              ${CMAKE_CURRENT_BINARY_DIR}/upswing-config-version.cmake cmake/mujoco.cmake
+        DESTINATION ${UPSWING_PACKAGE})
+
+# The wheel's MuJoCo comes along, with its headers and licences.
+if(NOT mujoco_FOUND)
+  install(DIRECTORY ${UPSWING_MUJOCO}/ DESTINATION ${UPSWING_INSTALLED_MUJOCO})
+  file(RELATIVE_PATH FROM_BIN /${CMAKE_INSTALL_BINDIR} /${UPSWING_INSTALLED_MUJOCO}/lib)
+  set_target_properties(upswing PROPERTIES INSTALL_RPATH "$ORIGIN/${FROM_BIN}")
+endif()
+install(TARGETS upswing)
+install(FILES LICENSE README.md DESTINATION ${CMAKE_INSTALL_DOCDIR})

@@ -1,0 +1,38 @@
+// Trains the agent `fast` on the double pendulum, in memory, and judges it on 200 new starts.
+#include <cstdio>
+
+#include "core/error.h"
+#include "lab/config.h"
+#include "lab/task.h"
+#include "lab/training.h"
+#include "mujoco/engines.h"
+
+using namespace upswing;
+
+/// Prints a line for each evaluation of the training.
+class Printer : public TrainObserver {
+  void OnEvaluation(const TrainState& s, const Evaluation& e) override {
+    std::printf("%7d steps  success %3.0f%%  return %4.0f\n", static_cast<int>(s.steps),
+                100 * e.success_rate(), e.reward_sum.mean);
+  }
+};
+
+int main() try {
+  // Settings have the names of the program's flags: `upswing train --help`.
+  Printer printer;
+  Training training(BuildConfig("", {{"agent", "fast"}, {"seed", "1"}}), /*threads=*/2, {&printer});
+  while (training.Step()) continue;
+  std::printf("%s\n", training.state().solved ? "solved" : "not solved");
+
+  EnvConfig test;  // the double pendulum, hanging with a little noise
+  test.engine = &kMuJoCo;
+  test.num_envs = 200;
+  test.seed = 2;
+  const Evaluation e = Evaluate(*training.policy(), *MakeEnv(test));
+  std::printf("judged in MuJoCo: %d of %d episodes succeed; swing-up in %.2f s (median)\n",
+              static_cast<int>(e.successes), static_cast<int>(e.episodes),
+              e.swing_up_seconds.median);
+} catch (const Error& error) {
+  std::fprintf(stderr, "%s\n", error.what());
+  return error.exit_code();
+}

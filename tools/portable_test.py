@@ -1,0 +1,81 @@
+#!/usr/bin/env python3
+"""The layers core, nn, sim and rl need no operating system: a program linked with all of them trains
+in memory, and asks for nothing but what is allowed here.
+
+The program is portable_test in the build folder of the program in UPSWING (see apps/testing.py).
+"""
+
+import os
+import re
+import subprocess
+import unittest
+from pathlib import Path
+
+ROOT = Path(os.environ.get("UPSWING_ROOT", Path(__file__).resolve().parent.parent))
+UPSWING = Path(os.environ.get("UPSWING", ROOT / "build/release/apps/upswing"))
+PROGRAM = UPSWING.parent.parent / "portable_test"
+
+# What may be undefined, as nm shows it, and why. Everything else is refused: files (open, fopen,
+# stat, std::filesystem, std::ofstream), processes, sockets, MuJoCo (mj_…), protobuf, tinyxml2.
+ALLOWED = {
+    "what a compiled C++ program needs to begin, to throw and to allocate":
+        r"_ITM_\w+|__gmon_start__|__libc_start_main|__cxa_\w+|__gxx_personality_v0|_Unwind_Resume|"
+        r"(typeinfo|vtable) for (std|__cxxabiv1)::.*|operator (new|delete)\b.*|"
+        r"__stack_chk_fail|__errno_location",
+    "the C++ library: containers, text in memory, exceptions, threads, the steady clock":
+        r"std::.*",
+    "memory and text in memory":
+        r"mem(chr|cmp|cpy|move|set)|str(cmp|len)|snprintf|strto(d|ll|ull)|localeconv|malloc|free",
+    "numbers":
+        r"(a?(sin|cos|tan)|sincos|atan2|exp|log|pow|fmod|floor|ceil|round|nearbyint|trunc|sqrt|"
+        r"l?lround|hypot)f?",
+    "threads: std::mutex, and the waiting of std::atomic (on Linux the system call futex; that for "
+    "AMX is another, where the compiler has AMX)":
+        r"pthread_\w+|sched_yield|syscall",
+    "Highway: which vector instructions the processor has, and how it reports its own errors":
+        r"hwy::.*",
+    "printf of the test's own result":
+        r"printf|puts|putchar|__printf_chk",
+}
+# In the C++ library, what would open files or write to a terminal all the same.
+REFUSED = r"filesystem|basic_\w*file|fstream|std::(cout|cerr|clog|cin)\b|random_device"
+
+
+def undefined():
+    """The symbols that the program takes from shared libraries, demangled, without versions."""
+    lines = subprocess.run(["nm", "-D", "-C", "--undefined-only", PROGRAM], check=True,
+                           encoding="utf-8", stdout=subprocess.PIPE).stdout.splitlines()
+    return [re.sub(r"@.*", "", re.sub(r"^\s*[Uw] ", "", line)) for line in lines]
+
+
+def offenders(symbols):
+    """Those that are not allowed."""
+    allowed = "|".join(f"(?:{pattern})" for pattern in ALLOWED.values())
+    return [symbol for symbol in symbols
+            if not re.fullmatch(allowed, symbol) or re.search(REFUSED, symbol)]
+
+
+class Portable(unittest.TestCase):
+    def test_it_trains_in_memory(self):
+        done = subprocess.run([PROGRAM], check=False, encoding="utf-8", stdout=subprocess.PIPE)
+        self.assertEqual(done.returncode, 0, done.stdout)
+        updates = int(re.match(r"(\d+) updates", done.stdout)[1])
+        self.assertGreater(updates, 100)
+
+    @unittest.skipIf("UPSWING_SANITIZED" in os.environ, "sanitizers bring their own")
+    def test_it_needs_nothing_of_the_system(self):
+        symbols = undefined()
+        self.assertIn("memcpy", symbols)
+        self.assertEqual(offenders(symbols), [])
+
+    def test_the_check_finds_what_is_not_allowed(self):
+        bad = ["open", "fopen", "fopen64", "stat", "getenv", "mj_step", "mjb_step", "socket", "fork",
+               "google::protobuf::MessageLite::SerializeToString() const", "tinyxml2::XMLUtil::X()",
+               "std::filesystem::status(std::filesystem::__cxx11::path const&)", "std::cout",
+               "std::basic_ofstream<char, std::char_traits<char> >::close()"]
+        self.assertEqual(offenders(bad), bad)
+        self.assertEqual(offenders(["memcpy", "std::terminate()", "pthread_mutex_lock"]), [])
+
+
+if __name__ == "__main__":
+    unittest.main()
