@@ -27,8 +27,8 @@ ALLOWED = {
     "memory and text in memory":
         r"mem(chr|cmp|cpy|move|set)|str(cmp|len)|snprintf|strto(d|ll|ull)|localeconv|malloc|free",
     "numbers":
-        r"(a?(sin|cos|tan)|sincos|atan2|exp|log|pow|fmod|floor|ceil|round|nearbyint|trunc|sqrt|"
-        r"l?lround|hypot)f?",
+        r"(a?(sin|cos|tan)h?|sincos|atan2|exp(2|m1)?|log(2|10|1p)?|pow|sqrt|cbrt|hypot|erf|fmod|"
+        r"remainder|floor|ceil|l?l?round|nearbyint|rint|trunc|fmin|fmax|copysign|lgamma)f?",
     "threads: std::mutex, and the waiting of std::atomic (on Linux the system call futex; that for "
     "AMX is another, where the compiler has AMX)":
         r"pthread_\w+|sched_yield|syscall",
