@@ -10,7 +10,7 @@ import { quoted } from './text';
 
 const MAX_SAMPLES = 64; // that are checked while the visitor waits
 /// Up to which share of the largest Q-value programs differ that sum in other orders; measured where
-/// nn/policy.cc has the same number.
+/// nn/q_policy.cc has the same number.
 const TOLERANCE = 1e-5;
 
 /// Index of the largest number, the first of equals.
