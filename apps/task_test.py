@@ -1,0 +1,116 @@
+#!/usr/bin/env python3
+"""Other tasks than the double pendulum: every command works with them, or says why it does not."""
+
+import csv
+import json
+import tempfile
+import unittest
+from pathlib import Path
+
+from testing import read_csv, run
+
+TASKS = {"pendulum-v1": (2, 200, ["angle", "velocity", "torque"]),
+         "acrobot-v1": (4, 500, ["time"])}  # state variables, longest episode, reward terms
+
+
+class TaskTest(unittest.TestCase):
+    """A short training of each task, shared by the tests."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.root = Path(cls.folder.name)
+        for task in TASKS:
+            result = run("train", "--task", task, "--levels", 3, "--hidden", "16", "--head", 8,
+                         "--steps", 2500, "--envs", 4, "--eval-every", 1000, "--eval-episodes", 5,
+                         "--learning-starts", 200, "--threads", 1, "--out", cls.root / task)
+            assert result.returncode == 0, result.stderr
+            assert f"task {task}" in result.stdout and "demo" not in result.stdout, result.stdout
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder.cleanup()
+
+    def test_the_tables_have_the_tasks_terms(self):
+        for task, (_, longest, terms) in TASKS.items():
+            episodes = read_csv(self.root / task / "episodes.csv")
+            self.assertEqual(list(episodes[0])[5:], terms)
+            for row in episodes:
+                self.assertLessEqual(row["length"], longest)
+                self.assertAlmostEqual(row["return"], sum(row[term] for term in terms), places=9)
+
+    def test_an_evaluation_is_judged_by_the_return(self):
+        for task, (states, _, terms) in TASKS.items():
+            table = self.root / f"{task}.csv"
+            result = run("eval", self.root / task, "--episodes", 20, "--json", "--episodes-csv", table)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            report = json.loads(result.stdout)
+            self.assertEqual(report["task"], task)
+            self.assertEqual(list(report["reward_terms"]), terms)
+            with open(table, encoding="utf-8", newline="") as file:
+                rows = list(csv.DictReader(file))
+            self.assertEqual(len(rows), 20)
+            self.assertEqual(list(rows[0]).index("success"), 1 + states)
+            threshold = {"pendulum-v1": -160, "acrobot-v1": -100}[task]
+            for row in rows:
+                self.assertEqual(int(row["success"]), int(float(row["return"]) >= threshold))
+            returns = [float(row["return"]) for row in rows]
+            self.assertAlmostEqual(report["return"]["mean"], sum(returns) / len(returns), places=9)
+
+    def test_simulate_makes_the_episode_of_eval(self):
+        for task, (states, _, _) in TASKS.items():
+            table = self.root / f"{task}-episodes.csv"
+            run("eval", self.root / task, "--episodes", 3, "--episodes-csv", table)
+            with open(table, encoding="utf-8", newline="") as file:
+                episode = list(csv.DictReader(file))[2]
+            out = self.root / f"{task}-rollout.csv"
+            result = run("simulate", self.root / task, "--episode", 2, "--csv", out)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            rows = read_csv(out)
+            for name in list(episode)[1:1 + states]:
+                self.assertEqual(rows[0][name], float(episode[name]))
+            # The row behind the last step has no step of its own, unless the goal ended it.
+            rewards = [row["reward"] for row in rows]
+            self.assertIn(True, [abs(sum(rewards[:n]) - float(episode["return"])) < 1e-9
+                                 for n in (len(rewards) - 1, len(rewards))])
+
+    def test_plot_info_and_compare_work(self):
+        for task in TASKS:
+            result = run("plot", self.root / task, "--out", self.root / f"{task}-plot")
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertTrue((self.root / f"{task}-plot" / "episode.svg").is_file())
+            self.assertFalse((self.root / f"{task}-plot" / "phase.svg").exists())
+            info = run("info", self.root / task)
+            self.assertIn(task, info.stdout)
+            self.assertNotIn("plant", info.stdout)
+        both = run("compare", *(self.root / task for task in TASKS))
+        self.assertEqual(both.returncode, 0, both.stderr)
+        self.assertIn("2 different tasks", both.stdout + both.stderr)
+
+    def test_what_does_not_apply_is_refused(self):
+        policy = self.root / "acrobot-v1"
+        for arguments, words in (
+                (["map", policy], "acrobot-v1"),
+                (["export", policy, "--page", self.root / "page"], "acrobot-v1"),
+                (["eval", policy, "--set", "mass1=2"], "--set: expected none"),
+                (["eval", policy, "--randomize", "0.2"], "--randomize: expected none"),
+                (["eval", policy, "--unknown-plant"], "--unknown-plant: expected none"),
+                (["simulate", policy, "--start", "1,2"], "four numbers theta1"),
+                (["train", "--task", "acrobot-v1", "--mass1", "2"], "mass1: expected none"),
+                (["train", "--task", "acrobot-v1", "--agent", "fast"], "agent fast"),
+                (["train", "--task", "acrobot"], "expected one of")):
+            with self.subTest(words):
+                result = run(*arguments)
+                self.assertEqual(result.returncode, 2)
+                self.assertEqual(result.stderr.count("\n"), 1)
+                self.assertIn(words, result.stderr)
+
+    def test_a_resumed_run_keeps_its_task(self):
+        policy = self.root / "pendulum-v1"
+        result = run("train", "--resume", policy, "--steps", 3000)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("task pendulum-v1", result.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()
