@@ -14,19 +14,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The observations of policies that remember so many steps.
-ObservationInfo ObservationOf(int64_t memory) {
-  ObservationInfo observation{
-      {"cos q1", "sin q1", "w1", "cos q2", "sin q2", "w2", "energy", "height"},
-      {kMaxVelocity1, kMaxVelocity2},
-      {}};
-  if (memory > 0) {
-    observation.memory = {
-        memory, {"change of w1", "change of w2", "torque"}, kMemoryVelocity, kMemoryTorque};
-  }
-  return observation;
-}
-
 /// Throws BadInput unless its observations are those that this program makes of the double
 /// pendulum. Names are for people.
 void CheckObservation(const LoadedPolicy& loaded, const std::string& where) {
@@ -39,7 +26,7 @@ void CheckObservation(const LoadedPolicy& loaded, const std::string& where) {
   }
   const auto& given = loaded.policy->info().observation;
   if (!given) throw BadInput(Concat(where, ": no metadata \"observation\""));
-  const ObservationInfo expected = ObservationOf(loaded.memory());
+  const ObservationInfo expected = ObservationInfoOf(loaded.memory());
   const auto same_memory = [&] {
     if (!given->memory || !expected.memory) return !given->memory && !expected.memory;
     return given->memory->steps == expected.memory->steps &&
@@ -136,7 +123,7 @@ PolicyInfo InfoOf(const Config& config) {
   info.control_period = SpecOf(config.Environments()).step_seconds;
   if (config.task != kDoublePendulum) return info;
   for (const auto& [name, value] : PlantValues(config.plant)) info.plant[name] = value;
-  info.observation = ObservationOf(config.memory);
+  info.observation = ObservationInfoOf(config.memory);
   info.model = config.mjcf;
   return info;
 }

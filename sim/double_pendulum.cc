@@ -101,6 +101,18 @@ std::array<float, kObservationSize> Observe(const Plant& plant, const PendulumSt
   return result;
 }
 
+ObservationInfo ObservationInfoOf(int64_t memory) {
+  ObservationInfo observation{
+      {"cos q1", "sin q1", "w1", "cos q2", "sin q2", "w2", "energy", "height"},
+      {kMaxVelocity1, kMaxVelocity2},
+      {}};
+  if (memory > 0) {
+    observation.memory = {
+        memory, {"change of w1", "change of w2", "torque"}, kMemoryVelocity, kMemoryTorque};
+  }
+  return observation;
+}
+
 std::array<double, kRewardTerms> RewardTerms(const Plant& plant, const PendulumState& s,
                                              double tau) {
   const bool inverted = Inverted(s);

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "core/options.h"
+#include "core/policy_info.h"
 
 /// The double pendulum and its task as formulas, without a simulator.
 ///
@@ -94,6 +95,9 @@ constexpr int MemorySteps(int obs_size) { return (obs_size - kObservationSize) /
 /// About the velocity that the motor can add in a control period (rad/s), and its usual limit
 /// (N·m).
 inline constexpr double kMemoryVelocity = 1.0, kMemoryTorque = 5.0;
+
+/// What a policy file says of observations that remember so many steps.
+ObservationInfo ObservationInfoOf(int64_t memory);
 
 /// Sign of each observation under the mirror symmetry, which negates angles, velocities and torque;
 /// those of its memory are all negated.
