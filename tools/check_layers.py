@@ -34,7 +34,7 @@ ALLOWED_FILES = {
     "google": re.compile(r"io/"),
     "hwy": re.compile(r"(core/simd(_test)?|nn/(linear|bfloat16|roofline)|"
                       r"sim/(closed_form|sine_cosine-inl))\.(h|cc)$"),
-    "Eigen": re.compile(r"nn/[^/]*_(test|bench)\.cc$"),
+    "Eigen": re.compile(r"control/|nn/[^/]*_(test|bench)\.cc$"),
 }
 
 # Layers that need no operating system, the headers that would bring one, and the files that may

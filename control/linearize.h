@@ -1,0 +1,39 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "sim/double_pendulum.h"
+
+/// The double pendulum as a linear system about upright at rest.
+namespace upswing {
+
+/// ẋ = A x + B u, or x⁺ = A x + B u over one control period.
+/// x = [q1 - π, q2, w1, w2]: deviation from upright at rest, rad and rad/s. u: torque at joint 1,
+/// N·m, which is not limited here.
+struct LinearModel {
+  Eigen::Matrix4d A;
+  Eigen::Vector4d B;
+};
+
+/// The equations of motion of sim/closed_form.h, linearised about upright at rest: continuous time.
+LinearModel LinearizeUpright(const Plant& plant);
+
+/// A continuous model over `steps` Runge-Kutta steps of `h` seconds with the torque held: the
+/// Jacobian, at upright, of the steps that the simulation makes (both engines). This is what a
+/// controller meets there; the exact zero-order hold differs by 6e-8 with the standard plant.
+LinearModel Discretize(const LinearModel& continuous, double h, int steps);
+
+/// What decides whether one motor can hold both links upright.
+struct UprightModes {
+  double faster, slower;  // rates of growth of the two unstable modes, 1/s
+  double decay;           // rate of the mode that decays fastest, 1/s
+  double pole;            // at which link 2 alone falls, its joint held still, 1/s
+  // (z - pole) / (z + pole) with the zero z of link 2's answer to the motion of link 1. At 0
+  // damping of joint 2 cancels the inertial coupling of the links just for that mode, which then
+  // cannot be controlled; the gain grows as 1/|delta|. The standard plant has -0.40.
+  double delta;
+};
+
+UprightModes ModesOf(const Plant& plant);
+
+}  // namespace upswing

@@ -1,0 +1,106 @@
+#include "control/linearize.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <array>
+#include <numbers>
+
+#include "control/testing.h"
+#include "core/rng.h"
+#include "sim/closed_form.h"
+
+namespace upswing {
+namespace {
+
+/// The standard plant's masses, lengths, dampings and gravity, each times 0.5 to 1.5.
+Plant DrawPlant(Rng& rng) {
+  Plant plant;
+  const Options options = OptionsOf(plant);
+  for (const Option& option : options.all()) {
+    *std::get<double*>(option.target) *= rng.Uniform(0.5, 1.5);
+  }
+  return plant;
+}
+
+/// Where the closed form is after one control period of a deviation x from upright and a torque.
+Eigen::Vector4d AfterOnePeriod(const Plant& plant, const Eigen::Vector4d& x, double tau) {
+  ClosedFormBatch batch(1);
+  batch.SetPlant(0, plant);
+  batch.q1[0] = std::numbers::pi + x[0];
+  batch.q2[0] = x[1];
+  batch.w1[0] = x[2];
+  batch.w2[0] = x[3];
+  batch.tau[0] = tau;
+  Advance(batch, kPhysicsSteps, 0, 1);
+  return {batch.q1[0] - std::numbers::pi, batch.q2[0], batch.w1[0], batch.w2[0]};
+}
+
+LinearModel OverOnePeriod(const Plant& plant) {
+  return Discretize(LinearizeUpright(plant), kPhysicsTimestep, kPhysicsSteps);
+}
+
+TEST(Linearize, IsTheJacobianOfTheClosedForm) {
+  Rng rng(1, "plants");
+  for (int trial = 0; trial < 200; ++trial) {
+    const Plant plant = DrawPlant(rng);
+    const LinearModel model = OverOnePeriod(plant);
+    // Central differences: of third order in e, and rounding of 4e-16 over e.
+    constexpr double e = 1e-5;
+    for (int k = 0; k < 4; ++k) {
+      const Eigen::Vector4d dx = e * Eigen::Vector4d::Unit(k);
+      const Eigen::Vector4d column =
+          (AfterOnePeriod(plant, dx, 0) - AfterOnePeriod(plant, -dx, 0)) / (2 * e);
+      EXPECT_LT((column - model.A.col(k)).norm(), 1e-9) << "column " << k;
+    }
+    const Eigen::Vector4d none = Eigen::Vector4d::Zero();
+    const Eigen::Vector4d column =
+        (AfterOnePeriod(plant, none, e) - AfterOnePeriod(plant, none, -e)) / (2 * e);
+    EXPECT_LT((column - model.B).norm(), 1e-9);
+  }
+}
+
+TEST(Linearize, EqualsAnotherDerivationHeldExactly) {
+  // testdata/make_riccati.py has the equations in absolute angles and the matrix exponential. Four
+  // Runge-Kutta steps of 0.005 s leave out (0.005 A)⁵/120 and what follows.
+  const RiccatiCase standard = SciPyCases().front();
+  const LinearModel model = OverOnePeriod(Plant());
+  EXPECT_NEAR((model.A - standard.A).cwiseAbs().maxCoeff(), 6.16e-8, 1e-10);
+  EXPECT_NEAR((model.B - standard.B).cwiseAbs().maxCoeff(), 1.22e-8, 1e-10);
+}
+
+TEST(Linearize, ModesOfTheStandardPlant) {
+  const UprightModes modes = ModesOf(Plant());
+  EXPECT_NEAR(modes.faster, 4.97298, 1e-5);
+  EXPECT_NEAR(modes.slower, 3.59606, 1e-5);
+  EXPECT_NEAR(modes.delta, -0.40195, 1e-5);
+}
+
+TEST(Linearize, TheModeThatCannotBeControlledIsThePoleOfLinkTwo) {
+  // Damping of joint 2 at which delta is 0, by bisection.
+  Plant plant;
+  double low = 0.2, high = 1;
+  for (int i = 0; i < 60; ++i) {
+    plant.damping2 = (low + high) / 2;
+    (ModesOf(plant).delta < 0 ? low : high) = plant.damping2;
+  }
+  EXPECT_NEAR(plant.damping2, 0.38976969, 1e-8);
+  const LinearModel model = LinearizeUpright(plant);
+  // A left eigenvector of A for that mode, of which the torque moves nothing.
+  const Eigen::EigenSolver<Eigen::Matrix4d> solver(model.A.transpose());
+  const double pole = ModesOf(plant).pole;
+  int found = 0;
+  for (int k = 0; k < 4; ++k) {
+    const double moved = std::abs(solver.eigenvectors().col(k).cwiseProduct(model.B).sum());
+    if (std::abs(solver.eigenvalues()[k] - pole) > 1e-6) {
+      EXPECT_GT(moved, 0.1);
+      continue;
+    }
+    EXPECT_LT(moved, 1e-10);
+    ++found;
+  }
+  EXPECT_EQ(found, 1);
+}
+
+}  // namespace
+}  // namespace upswing

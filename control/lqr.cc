@@ -1,0 +1,123 @@
+#include "control/lqr.h"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+
+#include "control/linearize.h"
+#include "control/riccati.h"
+#include "core/error.h"
+#include "core/text.h"
+
+namespace upswing {
+namespace {
+
+/// Such as 3.389.
+std::string Rounded(double x) {
+  std::array<char, 32> text;
+  const auto end = std::to_chars(text.begin(), text.end(), x, std::chars_format::general, 4).ptr;
+  return {text.begin(), end};
+}
+
+/// Why there is no solution, for the user.
+Error NoGain(const LqrConfig& config, const Plant& plant) {
+  const UprightModes modes = ModesOf(plant);
+  if (std::max({config.q1, config.q2, config.w1, config.w2}) == 0) {
+    return BadInput("lqr: expected a weight above 0 of q1, q2, w1 or w2, got none");
+  }
+  // Where a Runge-Kutta step no longer decays: Hairer, Wanner, "Solving Ordinary Differential
+  // Equations II" (1996), section IV.2.
+  constexpr double kLargestDecay = 2.785 / kPhysicsTimestep;
+  if (modes.decay > kLargestDecay) {
+    return BadInput(Concat("lqr: expected a plant that steps of ", kPhysicsTimestep,
+                           " s can follow, whose damping acts at up to ", Rounded(kLargestDecay),
+                           "/s, got ", Rounded(modes.decay), "/s"));
+  }
+  return BadInput(Concat(
+      "lqr: no gain was found that holds this plant upright: its unstable modes grow at ",
+      Rounded(modes.faster), "/s and ", Rounded(modes.slower), "/s (ratio ",
+      Rounded(modes.slower / modes.faster), "), and delta is ", Rounded(modes.delta),
+      "; where that is 0, damping of joint 2 cancels the coupling of the links, and no torque "
+      "reaches a mode"));
+}
+
+PolicyInfo InfoOf(LqrConfig config, Plant plant) {
+  PolicyInfo info;
+  info.agent = "lqr";
+  info.task = kDoublePendulum;
+  info.config = OptionsOf(config).Toml(false, [](const Option&) { return true; });
+  const Options options = OptionsOf(plant);
+  for (const Option& option : options.all()) {
+    info.plant[option.name] = *std::get<double*>(option.target);
+  }
+  info.control_period = kControlPeriod;
+  info.observation = ObservationInfoOf(0);
+  return info;
+}
+
+}  // namespace
+
+void LqrConfig::Describe(Options& o) {
+  constexpr Range kWeight{0, 1e9};
+  o.Section("lqr");
+  // Those of Tedrake's Acrobot.
+  o.Add(&q1, "lqr_q1", 10, kWeight, "1/rad²", "weight of the angle of link 1 from upright");
+  o.Add(&q2, "lqr_q2", 10, kWeight, "1/rad²", "weight of the angle of link 2 to link 1");
+  o.Add(&w1, "lqr_w1", 1, kWeight, "s²/rad²", "weight of the velocity of q1");
+  o.Add(&w2, "lqr_w2", 1, kWeight, "s²/rad²", "weight of the velocity of q2");
+  o.Add(&torque, "lqr_torque", 1, kPositive, "1/(N·m)²", "weight of the torque");
+}
+
+Lqr SolveLqr(const LqrConfig& config, const Plant& plant) {
+  const LinearModel model = Discretize(LinearizeUpright(plant), kPhysicsTimestep, kPhysicsSteps);
+  const Eigen::MatrixXd Q =
+      Eigen::Vector4d(config.q1, config.q2, config.w1, config.w2).asDiagonal();
+  const Eigen::MatrixXd R = Eigen::MatrixXd::Constant(1, 1, config.torque);
+  const auto P = SolveRiccati(model.A, model.B, Q, R);
+  if (!P) throw NoGain(config, plant);
+  const Eigen::MatrixXd K = GainOf(*P, model.A, model.B, R);
+  Lqr lqr;
+  for (int i = 0; i < 4; ++i) {
+    lqr.K[static_cast<size_t>(i)] = K(0, i);
+    for (int j = 0; j < 4; ++j) lqr.P[static_cast<size_t>(i)][static_cast<size_t>(j)] = (*P)(i, j);
+  }
+  return lqr;
+}
+
+std::array<double, 4> UprightDeviation(std::span<const float> obs) {
+  // Of q1 - π both sine and cosine are the negatives of those of q1.
+  const auto angle = [](double sine, double cosine) { return std::atan2(sine, cosine); };
+  return {angle(-obs[1], -obs[0]), angle(obs[4], obs[3]), kMaxVelocity1 * obs[2],
+          kMaxVelocity2 * obs[5]};
+}
+
+LqrPolicy::LqrPolicy(const LqrConfig& config, const Plant& plant)
+    : lqr_(SolveLqr(config, plant)),
+      torque_limit_(plant.torque_limit),
+      info_(InfoOf(config, plant)) {}
+
+std::string LqrPolicy::description() const {
+  std::vector<std::string> gain;
+  for (const double k : lqr_.K) gain.push_back(Rounded(k));
+  return Concat("linear-quadratic regulator about upright, gain ", Join(gain, ", "));
+}
+
+Tensors LqrPolicy::ToTensors() const {
+  throw BadInput(
+      "lqr: expected a policy that is kept in a file, got one that is made anew each time");
+}
+
+std::unique_ptr<Policy::Memory> LqrPolicy::Start(int /*num_envs*/) const {
+  return std::make_unique<Memory>();
+}
+
+void LqrPolicy::Act(Matrix<const float> obs, Matrix<double> action, Memory& /*memory*/) const {
+  for (int i = 0; i < obs.rows(); ++i) {
+    const double u = lqr_.Torque(UprightDeviation(obs.row(i)));
+    action(i, 0) = std::clamp(u, -torque_limit_, torque_limit_);
+  }
+}
+
+}  // namespace upswing

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "core/json.h"
+
+/// What tests of controllers share.
+namespace upswing {
+
+/// An equation of control/riccati.h, and what SciPy says of it (testdata/make_riccati.py).
+struct RiccatiCase {
+  std::string name;
+  Eigen::MatrixXd A, B, Q, R, P;
+  double spectral_radius;  // of A - B K
+};
+
+inline Eigen::MatrixXd MatrixOf(const nlohmann::json& rows) {
+  Eigen::MatrixXd matrix(rows.size(), rows.at(0).size());
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
+    for (Eigen::Index j = 0; j < matrix.cols(); ++j) {
+      matrix(i, j) = rows.at(static_cast<size_t>(i)).at(static_cast<size_t>(j)).get<double>();
+    }
+  }
+  return matrix;
+}
+
+/// All cases; those of the pendulum first, and the standard one first of all.
+inline std::vector<RiccatiCase> SciPyCases() {
+  const auto folder = std::filesystem::path(__FILE__).parent_path();
+  const auto file = nlohmann::json::parse(std::ifstream(folder / "testdata/riccati.json"));
+  std::vector<RiccatiCase> cases;
+  for (const auto& c : file.at("cases")) {
+    cases.push_back({c.at("name"), MatrixOf(c.at("A")), MatrixOf(c.at("B")), MatrixOf(c.at("Q")),
+                     MatrixOf(c.at("R")), MatrixOf(c.at("P")), c.at("spectral_radius")});
+  }
+  return cases;
+}
+
+}  // namespace upswing
