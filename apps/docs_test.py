@@ -9,7 +9,7 @@ import unittest
 
 from testing import ROOT, ProgramTest, read_csv, train_once
 
-DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md")),
+DOCUMENTS = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md")),
              ROOT / "tools/peers/README.md"]
 
 
@@ -108,6 +108,19 @@ class Documents(ProgramTest):
         code_map = text_of("CONTRIBUTING.md").split("## The map")[1].split("\n## ")[0]
         for folder in sorted(folders):
             self.assertIn(f"`{folder}/`", code_map)
+
+    def test_one_version(self):
+        version = re.search(r"project\(upswing VERSION (\S+)", text_of("CMakeLists.txt"))[1]
+        self.assertIn(f"\nversion: {version}\n", text_of("CITATION.cff"))
+        self.assertEqual(re.search(r"^## \[(\S+)\]", text_of("CHANGELOG.md"), re.MULTILINE)[1],
+                         version)
+
+    def test_security_names_every_fuzzing_target_and_tests_that_exist(self):
+        text = text_of("SECURITY.md")
+        self.assertEqual(set(re.findall(r"(\w+_fuzz)`", text)),
+                         {path.stem for path in (ROOT / "fuzz").glob("*_fuzz.cc")})
+        for name in re.findall(r"`(\w+/\w+_test\.\w+)`", text):
+            self.assertTrue((ROOT / name).exists(), name)
 
     def test_launcher_and_readme_name_the_same_systems(self):
         for name in ("README.md", "upswing"):

@@ -88,6 +88,27 @@ class Library(unittest.TestCase):
         self.assertEqual((bad.returncode, bad.stdout), (2, ""))
         self.assertIn("four numbers", bad.stderr)
 
+    def test_blocks_of_the_documentation_are_one_program(self):
+        text = (ROOT / "docs/library.md").read_text(encoding="utf-8")
+        blocks = re.findall(r"^```cpp\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+        self.assertEqual(len(blocks), 4)
+        program = self.build_text(
+            "docs", "find_package(upswing REQUIRED COMPONENTS sim rl)\n"
+            "add_executable(docs docs.cc)\n"
+            "target_link_libraries(docs PRIVATE upswing::sim upswing::rl)\n",
+            docs="\n".join(blocks)) / "docs"
+        lines = run(program).splitlines()
+        self.assertRegex(lines[-1], r"20000 steps, a checkpoint of \d{6,} bytes")
+        for begin in ("reward of random torques: ", "return of a brake: ", "loss "):
+            self.assertEqual(sum(line.startswith(begin) for line in lines), 1, begin)
+
+    def test_every_target_and_example_is_documented(self):
+        text = (ROOT / "docs/library.md").read_text(encoding="utf-8")
+        self.assertEqual(re.findall(r"^\| `upswing::(\w+)`", text, re.MULTILINE), LAYERS)
+        for path in (ROOT / "examples").glob("*/CMakeLists.txt"):
+            name = path.parent.name
+            self.assertIn(f"(../examples/{name}/{name}.cc)", text)
+
     def test_every_header_can_be_included(self):
         include = self.prefix / "include/upswing"
         self.assertEqual({path.name for path in include.iterdir()}, set(LAYERS))
