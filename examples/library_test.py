@@ -112,11 +112,11 @@ class Library(unittest.TestCase):
     def test_every_header_can_be_included(self):
         include = self.prefix / "include/upswing"
         self.assertEqual({path.name for path in include.iterdir()}, set(LAYERS))
-        sources = {"portable": ["core", "nn", "sim", "rl"], "all": LAYERS}
+        sources = {"portable": ["core", "nn", "sim", "rl", "control"], "all": LAYERS}
         cmake = ("find_package(upswing REQUIRED)\n"
                  "add_library(portable OBJECT portable.cc)\nadd_library(all_of_them OBJECT all.cc)\n"
-                 "target_link_libraries(portable PRIVATE upswing::sim upswing::rl)\n"
-                 "target_link_libraries(all_of_them PRIVATE upswing::lab)\n")
+                 "target_link_libraries(portable PRIVATE upswing::control upswing::rl)\n"
+                 "target_link_libraries(all_of_them PRIVATE upswing::lab upswing::control)\n")
         for name, layers in sources.items():
             headers = [path.relative_to(include) for layer in layers
                        for path in sorted((include / layer).glob("*.h"), reverse=True)]

@@ -1,6 +1,6 @@
-// A training by the portable layers alone (core, nn, sim, rl): in memory, in the closed form, its
-// checkpoint through the safetensors format. Linked with all of these libraries and nothing else of
-// ours; portable_test.py checks what it asks the system for.
+// A training by the portable layers alone (core, nn, sim, rl, control): in memory, in the closed
+// form, its checkpoint through the safetensors format. Linked with all of these libraries and
+// nothing else of ours; portable_test.py checks what it asks the system for.
 #include <algorithm>
 #include <cstdio>
 #include <vector>

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""The layers core, nn, sim and rl need no operating system: a program linked with all of them trains
-in memory, and asks for nothing but what is allowed here.
+"""The layers core, nn, sim, rl and control need no operating system: a program linked with all of
+them trains in memory, and asks for nothing but what is allowed here.
 
 The program is portable_test in the build folder of the program in UPSWING (see apps/testing.py).
 """
@@ -25,15 +25,19 @@ ALLOWED = {
     "the C++ library: containers, text in memory, exceptions, threads, the steady clock":
         r"std::.*",
     "memory and text in memory":
-        r"mem(chr|cmp|cpy|move|set)|str(cmp|len)|snprintf|strto(d|ll|ull)|localeconv|malloc|free",
+        r"mem(chr|cmp|cpy|move|set)|str(cmp|len)|snprintf|strto(d|ll|ull)|localeconv|[cm]alloc|realloc|"
+        r"free",
     "numbers":
         r"(a?(sin|cos|tan)h?|sincos|atan2|exp(2|m1)?|log(2|10|1p)?|pow|sqrt|cbrt|hypot|erf|fmod|"
-        r"remainder|floor|ceil|l?l?round|nearbyint|rint|trunc|fmin|fmax|copysign|lgamma)f?",
+        r"remainder|floor|ceil|l?l?round|nearbyint|rint|trunc|fmin|fmax|copysign|lgamma)f?|"
+        r"__(mul|div)[sd]c3|c(abs|exp|log|sqrt)f?",
     "threads: std::mutex, and the waiting of std::atomic (on Linux the system call futex; that for "
     "AMX is another, where the compiler has AMX)":
         r"pthread_\w+|sched_yield|syscall",
     "Highway: which vector instructions the processor has, and how it reports its own errors":
         r"hwy::.*",
+    "assertions, in a build that has them":
+        r"__assert_fail|abort",
     "printf of the test's own result":
         r"printf|puts|putchar|__printf_chk",
 }
