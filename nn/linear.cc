@@ -10,6 +10,8 @@
 #include <hwy/foreach_target.h>  // includes this file once for each target
 // must come after foreach_target
 #include <hwy/highway.h>
+// its functions, for each target
+#include <hwy/contrib/math/math-inl.h>
 
 #ifndef UPSWING_NN_LINEAR_ONCE  // what all targets share
 #define UPSWING_NN_LINEAR_ONCE
@@ -25,9 +27,11 @@ struct KernelTable {
   void (*multiply)(const Product<T>&);
   decltype(&Transpose<T>) transpose;
   decltype(&SumRows<T>) sum_rows;
-  decltype(&LayerNormReluForward<T>) layer_norm_relu_forward;
+  decltype(&LayerNormForward<T>) layer_norm_forward;
   decltype(&LayerNormBackwardInput<T>) layer_norm_backward_input;
   decltype(&LayerNormBackwardGain<T>) layer_norm_backward_gain;
+  decltype(&Tanh<T>) tanh;
+  decltype(&TanhBackward<T>) tanh_backward;
   decltype(&SquaredNorm<T>) squared_norm;
   decltype(&AdamPolyakStep<T>) adam_polyak_step;
 };
@@ -242,8 +246,8 @@ void SumRows(Matrix<const T> x, std::span<T> sum) {
 }
 
 template <typename T>
-void LayerNormReluForward(Matrix<T> x, std::span<const T> gain, std::span<const T> bias,
-                          std::span<T> inv_std, Matrix<T> y) {
+void LayerNormForward(Matrix<T> x, std::span<const T> gain, std::span<const T> bias,
+                      std::span<T> inv_std, bool relu, Matrix<T> y) {
   constexpr T kEpsilon = T(1e-5);
   const Tag<T> d;
   const auto n = static_cast<size_t>(x.cols());
@@ -267,7 +271,7 @@ void LayerNormReluForward(Matrix<T> x, std::span<const T> gain, std::span<const 
       Store<partial.value>(x_hat, row + i, count);
       const Vec<T> normal = hn::MulAdd(Load<partial.value>(gain.data() + i, count), x_hat,
                                        Load<partial.value>(bias.data() + i, count));
-      Store<partial.value>(hn::Max(normal, hn::Zero(d)), out + i, count);
+      Store<partial.value>(relu ? hn::Max(normal, hn::Zero(d)) : normal, out + i, count);
     });
   }
 }
@@ -311,6 +315,25 @@ void LayerNormBackwardGain(Matrix<const T> x_hat, Matrix<const T> dy, std::span<
                        Load<partial.value>(x_hat.row(r).data() + i, count), sum);
     }
     Store<partial.value>(sum, dgain.data() + i, count);
+  });
+}
+
+template <typename T>
+void Tanh(std::span<T> x) {
+  ForVectors<T>(x.size(), [&](size_t i, size_t count, auto partial) HWY_ATTR {
+    const Vec<T> value = Load<partial.value>(x.data() + i, count);
+    Store<partial.value>(hn::Tanh(Tag<T>(), value), x.data() + i, count);
+  });
+}
+
+template <typename T>
+void TanhBackward(std::span<const T> y, std::span<T> dy) {
+  const Vec<T> one = hn::Set(Tag<T>(), T{1});
+  ForVectors<T>(y.size(), [&](size_t i, size_t count, auto partial) HWY_ATTR {
+    const Vec<T> value = Load<partial.value>(y.data() + i, count);
+    const Vec<T> slope = hn::NegMulAdd(value, value, one);
+    const Vec<T> gradient = Load<partial.value>(dy.data() + i, count);
+    Store<partial.value>(hn::Mul(gradient, slope), dy.data() + i, count);
   });
 }
 
@@ -360,9 +383,11 @@ constexpr KernelTable<T> kKernels{
     &Multiply<T>,
     &Transpose<T>,
     &SumRows<T>,
-    &LayerNormReluForward<T>,
+    &LayerNormForward<T>,
     &LayerNormBackwardInput<T>,
     &LayerNormBackwardGain<T>,
+    &Tanh<T>,
+    &TanhBackward<T>,
     &SquaredNorm<T>,
     &AdamPolyakStep<T>,
 };
@@ -443,9 +468,9 @@ void SumRows(Matrix<const T> x, std::span<T> sum) {
 }
 
 template <typename T>
-void LayerNormReluForward(Matrix<T> x, std::span<const T> gain, std::span<const T> bias,
-                          std::span<T> inv_std, Matrix<T> y) {
-  Kernels<T>().layer_norm_relu_forward(x, gain, bias, inv_std, y);
+void LayerNormForward(Matrix<T> x, std::span<const T> gain, std::span<const T> bias,
+                      std::span<T> inv_std, bool relu, Matrix<T> y) {
+  Kernels<T>().layer_norm_forward(x, gain, bias, inv_std, relu, y);
 }
 
 template <typename T>
@@ -457,6 +482,16 @@ void LayerNormBackwardInput(Matrix<const T> x_hat, std::span<const T> gain,
 template <typename T>
 void LayerNormBackwardGain(Matrix<const T> x_hat, Matrix<const T> dy, std::span<T> dgain) {
   Kernels<T>().layer_norm_backward_gain(x_hat, dy, dgain);
+}
+
+template <typename T>
+void Tanh(std::span<T> x) {
+  Kernels<T>().tanh(x);
+}
+
+template <typename T>
+void TanhBackward(std::span<const T> y, std::span<T> dy) {
+  Kernels<T>().tanh_backward(y, dy);
 }
 
 template <typename T>
@@ -478,11 +513,13 @@ void AdamPolyakStep(const AdamConstants<T>& constants, std::span<const T> g, std
   template void LinearBackwardWeight(Matrix<const T>, Matrix<const T>, Matrix<T>);                 \
   template void Transpose(Matrix<const T>, Matrix<T>);                                             \
   template void SumRows(Matrix<const T>, std::span<T>);                                            \
-  template void LayerNormReluForward(Matrix<T>, std::span<const T>, std::span<const T>,            \
-                                     std::span<T>, Matrix<T>);                                     \
+  template void LayerNormForward(Matrix<T>, std::span<const T>, std::span<const T>, std::span<T>,  \
+                                 bool, Matrix<T>);                                                 \
   template void LayerNormBackwardInput(Matrix<const T>, std::span<const T>, std::span<const T>,    \
                                        Matrix<const T>, Matrix<T>);                                \
   template void LayerNormBackwardGain(Matrix<const T>, Matrix<const T>, std::span<T>);             \
+  template void Tanh(std::span<T>);                                                                \
+  template void TanhBackward(std::span<const T>, std::span<T>);                                    \
   template T SquaredNorm(std::span<const T>);                                                      \
   template void AdamPolyakStep(const AdamConstants<T>&, std::span<const T>, std::span<T>,          \
                                std::span<T>, std::span<T>, std::span<T>);

@@ -37,12 +37,12 @@ void SumRows(Matrix<const T> x, std::span<T> sum);
 template <typename T>
 void Transpose(Matrix<const T> x, Matrix<T> y);
 
-/// y = max(gain · x̂ + bias, 0) with x̂ = (x - mean) / sqrt(var + 1e-5) over each row (Ba et al.,
-/// 2016, Eq 3). x (B × n) is replaced by x̂, and inv_std (B) = 1 / sqrt(var + 1e-5), both for the
-/// backward pass.
+/// y = gain · x̂ + bias with x̂ = (x - mean) / sqrt(var + 1e-5) over each row (Ba et al., 2016,
+/// Eq 3); y = max(y, 0) if `relu`. x (B × n) is replaced by x̂, and inv_std (B) = 1 / sqrt(var +
+/// 1e-5), both for the backward pass.
 template <typename T>
-void LayerNormReluForward(Matrix<T> x, std::span<const T> gain, std::span<const T> bias,
-                          std::span<T> inv_std, Matrix<T> y);
+void LayerNormForward(Matrix<T> x, std::span<const T> gain, std::span<const T> bias,
+                      std::span<T> inv_std, bool relu, Matrix<T> y);
 
 /// dx (B × n) of the layer normalisation, given dy (B × n) before the ReLU, x̂ and inv_std.
 template <typename T>
@@ -52,6 +52,14 @@ void LayerNormBackwardInput(Matrix<const T> x_hat, std::span<const T> gain,
 /// dgain (n) = Σ dy · x̂ over the rows; the gradient of the bias is SumRows(dy).
 template <typename T>
 void LayerNormBackwardGain(Matrix<const T> x_hat, Matrix<const T> dy, std::span<T> dgain);
+
+/// x = tanh(x), up to 4 units in the last place.
+template <typename T>
+void Tanh(std::span<T> x);
+
+/// Its backward pass: dy = dy · (1 - y²), where y = tanh(x).
+template <typename T>
+void TanhBackward(std::span<const T> y, std::span<T> dy);
 
 /// Sum of squares.
 template <typename T>

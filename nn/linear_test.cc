@@ -195,10 +195,11 @@ TEST_P(KernelTest, SumsMatchTheirDefinitions) {
 TEST_P(KernelTest, LayerNormRowsGetMeanZeroAndVarianceOneBeforeGainAndBias) {
   for (const int n : {1, 5, 37, 256}) {
     const int B = 3;
+    const bool relu = n != 37;
     Table<double> x(B, n, "layer norm"), y(B, n, "");
     const Input<double> raw(B, n, "layer norm"), gain(1, n, "gain"), bias(1, n, "bias");
     Table<double> inv_std(1, B, "");
-    LayerNormReluForward<double>(x.view, gain.row(), bias.row(), inv_std.row(), y.view);
+    LayerNormForward<double>(x.view, gain.row(), bias.row(), inv_std.row(), relu, y.view);
     for (int i = 0; i < B; ++i) {
       double mean = 0, square = 0;
       for (int k = 0; k < n; ++k) mean += raw.view(i, k) / n;
@@ -206,33 +207,59 @@ TEST_P(KernelTest, LayerNormRowsGetMeanZeroAndVarianceOneBeforeGainAndBias) {
       for (int k = 0; k < n; ++k) {
         const double normal = (raw.view(i, k) - mean) / std::sqrt(square + 1e-5);
         ASSERT_NEAR(x.view(i, k), normal, 1e-12);
-        ASSERT_NEAR(y.view(i, k), std::max(0.0, gain.view(0, k) * normal + bias.view(0, k)), 1e-12);
+        const double expected = gain.view(0, k) * normal + bias.view(0, k);
+        ASSERT_NEAR(y.view(i, k), relu ? std::max(0.0, expected) : expected, 1e-12);
       }
     }
   }
 }
 
 TEST_P(KernelTest, LayerNormGradientMatchesFiniteDifferences) {
-  // f = Σ dy · (gain · x̂ + bias): the ReLU is kept out by a large bias.
+  // f = Σ dy · (gain · x̂ + bias)
   const int n = 21;
   const double h = 1e-5;
-  const Input<double> x(1, n, "x"), gain(1, n, "gain"), dy(1, n, "dy");
-  const AlignedVector<double> bias(static_cast<size_t>(n), 100.0);
+  const Input<double> x(1, n, "x"), gain(1, n, "gain"), bias(1, n, "bias"), dy(1, n, "dy");
   AlignedVector<double> inv_std(1);
   const auto f = [&](int k, double step) {
     Table<double> moved(1, n, "x"), y(1, n, "");
     moved.view(0, k) += step;
-    LayerNormReluForward<double>(moved.view, gain.row(), bias, inv_std, y.view);
+    LayerNormForward<double>(moved.view, gain.row(), bias.row(), inv_std, false, y.view);
     double sum = 0;
-    for (int i = 0; i < n; ++i) sum += dy.view(0, i) * (y.view(0, i) - 100);
+    for (int i = 0; i < n; ++i) sum += dy.view(0, i) * y.view(0, i);
     return sum;
   };
   Table<double> x_hat(1, n, "x"), y(1, n, ""), dx(1, n, "");
-  LayerNormReluForward<double>(x_hat.view, gain.row(), bias, inv_std, y.view);
+  LayerNormForward<double>(x_hat.view, gain.row(), bias.row(), inv_std, false, y.view);
   LayerNormBackwardInput<double>(x_hat, gain.row(), inv_std, dy, dx.view);
   for (int k = 0; k < n; ++k) {
-    EXPECT_NEAR(dx.view(0, k), (f(k, h) - f(k, -h)) / (2 * h), 1e-8);  // 1e-13 · 100 / h, and h²
+    EXPECT_NEAR(dx.view(0, k), (f(k, h) - f(k, -h)) / (2 * h), 1e-9);  // 1e-15 · 10 / h, and h²
   }
+}
+
+template <typename T>
+void ExpectTanh(T tolerance) {
+  const T infinity = std::numeric_limits<T>::infinity();
+  // Alone and among others, near 0, where it bends, and where it is ±1.
+  std::vector<T> x{T(1e-30),  T(-1e-5), T(0.3),  T(-0.5), T(1),    T(-4),  T(9),  T(-19), T(1e30),
+                   -infinity, 0,        T(0.02), T(-0.9), T(0.55), T(7.5), T(-2), T(0.1)};
+  for (size_t n = 1; n <= x.size(); ++n) {
+    std::vector<T> y(x.begin(), x.begin() + static_cast<ptrdiff_t>(n)), dy(n, T{3});
+    Tanh<T>(y);
+    TanhBackward<T>(y, dy);
+    for (size_t i = 0; i < n; ++i) {
+      const T expected = std::tanh(x[i]);
+      ASSERT_NEAR(y[i], expected, tolerance * std::abs(expected)) << x[i];
+      ASSERT_NEAR(dy[i], 3 * (1 - y[i] * y[i]), 6 * tolerance) << x[i];
+    }
+  }
+  std::vector<T> nan{std::numeric_limits<T>::quiet_NaN()};
+  Tanh<T>(nan);
+  EXPECT_TRUE(std::isnan(nan[0]));
+}
+
+TEST_P(KernelTest, TanhAndItsBackwardPass) {
+  ExpectTanh<float>(4 * std::numeric_limits<float>::epsilon());
+  ExpectTanh<double>(4 * std::numeric_limits<double>::epsilon());
 }
 
 TEST_P(KernelTest, AdamAndPolyakInOnePass) {

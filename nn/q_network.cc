@@ -254,9 +254,9 @@ Matrix<const T> QNetwork<T>::ForwardFeatures(Weights weights, Matrix<const T> x,
     if (shape_.layer_norm) {
       const Matrix<T> normal = RowsOf(a.normal[i], rows, width);
       Apply(weights, layers_[i], input, false, normal);
-      LayerNormReluForward(normal, Vector(weights.parameters, norms_[i].weight),
-                           Vector(weights.parameters, norms_[i].bias),
-                           PartOf(std::span(a.inv_std[i]), rows), y);
+      LayerNormForward(normal, Vector(weights.parameters, norms_[i].weight),
+                       Vector(weights.parameters, norms_[i].bias),
+                       PartOf(std::span(a.inv_std[i]), rows), true, y);
     } else {
       Apply(weights, layers_[i], input, true, y);
     }
