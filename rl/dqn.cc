@@ -266,7 +266,7 @@ void Dqn::CountErrors(const Minibatch& batch) {
 Metrics Dqn::TakeMetrics() {
   const double n = static_cast<double>(std::max<int64_t>(1, report_updates_));
   constexpr int64_t kMostRows = 256;  // enough of a large minibatch
-  const Matrix<const float> features(activations_.feature.back().data(),
+  const Matrix<const float> features(activations_.trunk.back().output.data(),
                                      static_cast<int>(std::min(config_.batch, kMostRows)),
                                      static_cast<int>(config_.hidden.back()));
   Metrics metrics{{"updates", static_cast<double>(updates_)},
@@ -315,7 +315,7 @@ void Dqn::State(const Archive& archive) {
   archive.Scalar("q_sum", q_sum_, kAnyNumber<double>);
   archive.Scalar("td_sum", td_sum_, kSum);
   archive.Scalar("norm_sum", norm_sum_, kSum);
-  archive.Array("last_features", std::span(activations_.feature.back()));
+  archive.Array("last_features", std::span(activations_.trunk.back().output));
 }
 
 }  // namespace upswing
