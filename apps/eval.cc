@@ -3,9 +3,9 @@
 #include <memory>
 
 #include "apps/commands.h"
-#include "apps/eval_report.h"
+#include "apps/eval_table.h"
 #include "apps/progress.h"
-#include "apps/trial.h"
+#include "apps/trial_options.h"
 #include "core/error.h"
 #include "core/text.h"
 #include "core/thread_pool.h"
@@ -25,47 +25,24 @@ struct EvalArguments {
   bool as_json = false;
 };
 
-/// Runs the episodes behind a progress line.
-EvalReport Judge(const EvalArguments& a, const LoadedPolicy& loaded) {
-  EvalReport report;
-  report.policy = loaded.path.string();
-  report.physics = a.trial.physics;
-  report.env = TrialEnvironments(a.trial, &loaded);
-  report.model = InfoOfModel(report.env.mjcf, a.trial.model);
-  report.env.num_envs = static_cast<int>(a.episodes);
-  report.knows_values = ValueUnitsOf(*loaded.policy).gamma > 0;
-  ThreadPool pool(ResolveThreads(a.threads));
-  EnvConfig config = report.env;
-  config.pool = &pool;
-  const std::unique_ptr<VectorEnv> env = MakeEnv(config);
-  report.spec = env->spec();
-  const auto* pendulum = dynamic_cast<const PendulumEnv*>(env.get());
-  for (int i = 0; i < config.num_envs; ++i) {
-    JudgedEpisode& episode = report.episodes.emplace_back();
-    episode.start.resize(report.spec.state_names.size());
-    env->GetState(i, episode.start);
-    if (pendulum == nullptr) continue;
-    episode.plant = pendulum->plant(i);
-    episode.disturbance = pendulum->disturbance(i);
-  }
-  EpisodeProgress progress(a.episodes, a.as_json);
-  std::vector<EvaluationEpisode> results =
-      EvaluateEpisodes(*loaded.policy, *env, &pool, [&](double share) { progress.Show(share); });
-  report.figures = Summarize(results, report.spec.evaluation);
-  for (size_t i = 0; i < results.size(); ++i) report.episodes[i].result = std::move(results[i]);
-  return report;
-}
-
 int RunEval(const EvalArguments& a) {
   const bool to_output = IsStandardStream(a.episodes_csv);
   if (to_output && a.as_json) {
     throw BadInput("--json: expected a file of its own for --episodes-csv, got - for it");
   }
   if (!a.episodes_csv.empty()) CheckWritable("--episodes-csv", a.episodes_csv);
-  const EvalReport report = Judge(a, LoadPolicy(a.policy));
+  const LoadedPolicy loaded = LoadPolicy(a.policy);
+  ThreadPool pool(ResolveThreads(a.threads));
+  EpisodeProgress progress(a.episodes, a.as_json);
+  const EvalReport report = EvaluatePolicy(loaded, a.trial, a.episodes, pool,
+                                           [&](double share) { progress.Show(share); });
   if (!a.episodes_csv.empty()) WriteOutput(a.episodes_csv, EpisodesCsv(report));
   if (to_output) return 0;  // the rows alone, for a reader
-  a.as_json ? PrintEvalJson(report) : PrintEvalTable(report);
+  if (a.as_json) {
+    fmt::print("{}\n", EvalJson(report));
+  } else {
+    PrintEvalTable(report);
+  }
   if (!a.episodes_csv.empty() && !a.as_json) {
     fmt::print("  written        {}\n", Printable(a.episodes_csv));
   }

@@ -8,9 +8,8 @@
 #include <optional>
 
 #include "apps/commands.h"
-#include "apps/map_output.h"
+#include "apps/map_table.h"
 #include "apps/progress.h"
-#include "apps/trial.h"
 #include "core/error.h"
 #include "core/text.h"
 #include "core/thread_pool.h"
@@ -20,6 +19,7 @@
 #include "lab/format.h"
 #include "lab/loaded_policy.h"
 #include "lab/map_grid.h"
+#include "lab/trial.h"
 #include "mujoco/engines.h"
 #include "report/figure.h"
 
@@ -180,7 +180,11 @@ int RunMapCommand(const MapArguments& a) {
 
   MakeNewFolder(folder);
   WriteMap(map, folder);
-  a.as_json ? PrintMapJson(map) : PrintMapTable(map);
+  if (a.as_json) {
+    fmt::print("{}\n", MapJson(map));
+  } else {
+    PrintMapTable(map);
+  }
   return 0;
 }
 

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "apps/commands.h"
-#include "apps/trial.h"
+#include "apps/trial_options.h"
 #include "core/text.h"
 #include "io/file.h"
 #include "lab/config.h"

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "apps/commands.h"
-#include "apps/trial.h"
+#include "apps/trial_options.h"
 #include "core/csv.h"
 #include "core/error.h"
 #include "core/text.h"

@@ -1,10 +1,9 @@
-#include "apps/trial.h"
+#include "lab/trial.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "apps/commands.h"
 #include "core/error.h"
 #include "core/text.h"
 #include "io/run_folder.h"
@@ -15,24 +14,6 @@ namespace upswing {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// The settings of sensors, motors and what is random.
-struct Conditions {
-  Disturbance disturbance;
-  Randomization randomization;
-
-  void Describe(Options& o) {
-    disturbance.Describe(o);
-    randomization.Describe(o);
-  }
-};
-
-/// Throws BadInput.
-Conditions ConditionsOf(const TrialArguments& a) {
-  Conditions conditions;
-  SetFlags(OptionsOf(conditions), a.flags);
-  return conditions;
-}
 
 /// The environments of a policy for a task without plant, sensors and engines. Throws BadInput if
 /// the arguments set one of these.
@@ -53,22 +34,17 @@ EnvConfig OtherTask(const TrialArguments& a, const LoadedPolicy& loaded) {
 
 }  // namespace
 
-void AddTrialOptions(CLI::App& app, TrialArguments& a, const std::string& seed_of) {
-  AddSeed(app, a.seed, seed_of);
-  AddPlantOptions(app, a.set, a.model);
-  AddPhysics(app, a.physics, "mujoco");
-  AddUnknownPlant(app, a.unknown_plant);
-  Conditions defaults;
-  AddSettings(app, OptionsOf(defaults), a.flags);
-  // Mistakes on the command line are reported before any file is read.
-  app.parse_complete_callback([&a] { (void)ConditionsOf(a); });
+TrialConditions ConditionsOf(const TrialArguments& a) {
+  TrialConditions conditions;
+  SetFlags(OptionsOf(conditions), a.flags);
+  return conditions;
 }
 
 EnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded) {
   EnvConfig env;
   if (loaded != nullptr && loaded->task != kDoublePendulum) return OtherTask(a, *loaded);
   env.engine = &FindEngine(a.physics, "--physics");
-  const Conditions conditions = ConditionsOf(a);
+  const TrialConditions conditions = ConditionsOf(a);
   env.disturbances = {conditions.disturbance};
   env.randomization = conditions.randomization;
   if (a.unknown_plant && loaded == nullptr) {
@@ -88,7 +64,7 @@ EnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded)
 
 std::string ChangesText(const EnvConfig& env) {
   if (env.task != kDoublePendulum) return "";
-  Conditions conditions, defaults;
+  TrialConditions conditions, defaults;
   conditions.disturbance = env.disturbance(0);
   conditions.randomization = env.randomization;
   const Options options = OptionsOf(conditions), usual = OptionsOf(defaults);
@@ -125,14 +101,6 @@ fs::path DefaultOut(const LoadedPolicy& loaded, const std::string& name) {
     out = Concat(first.string(), "-", number);
   }
   return out;
-}
-
-void AddEpisodeOptions(CLI::App& app, EpisodeArguments& a) {
-  AddStart(app, a.start);
-  Options own;
-  own.Add(&a.number, "episode", -1, {0, 999999}, "", "that of `eval` with the same flags, from 0")
-      .usual = "none";
-  AddArguments(app, own);
 }
 
 std::optional<std::vector<double>> ChooseEpisode(const EpisodeArguments& a, EnvConfig& env) {

@@ -1,4 +1,4 @@
-#include "apps/map_output.h"
+#include "lab/map_result.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,6 @@
 #include <limits>
 #include <numeric>
 
-#include "apps/progress.h"
 #include "core/json.h"
 #include "core/text.h"
 #include "io/file.h"
@@ -24,12 +23,6 @@ std::string Cell(double number) { return std::isfinite(number) ? FormatNumber(nu
 
 double RateOf(const MapResult& map, const MapCell& cell) {
   return static_cast<double>(cell.successes) / map.config.episodes;
-}
-
-/// "mass2 0.5 to 1.5 kg".
-std::string RangeText(const MapAxis& axis) {
-  return fmt::format("{} {:.4g} to {:.4g} {}", axis.name, axis.values.front(), axis.values.back(),
-                     axis.unit);
 }
 
 Panel MapPanel(const MapResult& map, const std::string& title, HeatMap heat_map) {
@@ -83,21 +76,6 @@ Figure MapFigure(const MapResult& map) {
       MapPanel(map, map.config.episodes > 1 ? "Swing-up time, median" : "Swing-up time",
                std::move(swing_up))};
   return figure;
-}
-
-std::string CheckText(const MapResult& map) {
-  const MapAgreement a = map.agreement();
-  std::string text =
-      fmt::format("{} of {} cells again in MuJoCo: {} with as many successes", FormatCount(a.cells),
-                  FormatCount(map.config.cells()),
-                  a.same_successes == a.cells ? "all" : FormatCount(a.same_successes));
-  if (a.same_successes < a.cells) {
-    text += fmt::format(", the others differ by up to {:.0f}%", 100 * a.largest_success_difference);
-  }
-  if (a.both_succeed == 0) return text + ", no successes to compare";
-  if (a.largest_swing_up_difference == 0) return text + ", swing-up times the same";
-  return text +
-         fmt::format(", swing-up times differ by up to {:.2f} s", a.largest_swing_up_difference);
 }
 
 }  // namespace
@@ -174,32 +152,7 @@ void WriteMap(MapResult& map, const std::filesystem::path& folder) {
   Draw(figure, note("map.png"));
 }
 
-void PrintMapTable(const MapResult& map) {
-  const MapConfig& config = map.config;
-  fmt::print("{}\n", Printable(map.policy));
-  fmt::print("  plant      {}, physics {}\n", PlantText(config.point.plant), map.physics);
-  if (map.model) fmt::print("  model      {}\n", map.model->Text());
-  fmt::print("  map        {} × {}: {} × {} cells, {} episode{} each\n", RangeText(config.x),
-             RangeText(config.y), config.x.values.size(), config.y.values.size(), config.episodes,
-             config.episodes == 1 ? "" : "s");
-  if (!map.changes.empty()) fmt::print("  with       {}\n", map.changes);
-  const std::string interval = map.success_interval();
-  fmt::print("  success    {:.1f}% of all episodes; {:.1f}% of the cells without a failure{}\n",
-             100 * map.mean_success(), 100 * map.always_success(),
-             interval.empty() ? "" : Concat(" (", interval, ")"));
-  if (std::isfinite(map.median_swing_up())) {
-    fmt::print("  swing-up   {:.2f} s, median of the cells' medians\n", map.median_swing_up());
-  } else {
-    fmt::print("  swing-up   no episode stays upright\n");
-  }
-  fmt::print("  rate       {} episodes in {}: {} a second\n", FormatCount(map.episodes()),
-             FormatDuration(map.seconds),
-             FormatCount(static_cast<double>(map.episodes()) / map.seconds));
-  if (!map.checked.empty()) fmt::print("  check      {}\n", CheckText(map));
-  fmt::print("  written    {}\n", Printable(Join(map.files, ", ")));
-}
-
-void PrintMapJson(const MapResult& map) {
+std::string MapJson(const MapResult& map) {
   using nlohmann::ordered_json;
   const auto number = [](double x) { return std::isfinite(x) ? ordered_json(x) : nullptr; };
   const auto axis = [](const MapAxis& a) -> ordered_json {
@@ -238,7 +191,7 @@ void PrintMapJson(const MapResult& map) {
   j["seconds"] = map.seconds;
   j["episodes_per_second"] = static_cast<double>(map.episodes()) / map.seconds;
   j["files"] = map.files;
-  fmt::print("{}\n", PrintableJson(j));
+  return PrintableJson(j);
 }
 
 }  // namespace upswing

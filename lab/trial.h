@@ -1,6 +1,5 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -15,7 +14,7 @@
 /// the same flags they make the same episodes.
 namespace upswing {
 
-/// The flags of AddTrialOptions.
+/// How a trial differs from the training.
 struct TrialArguments {
   std::string model, physics;
   std::vector<std::string> set;
@@ -24,9 +23,19 @@ struct TrialArguments {
   bool unknown_plant = false;
 };
 
-/// Adds --set, --model, --physics, --seed (of `seed_of`), --unknown-plant, and the settings of
-/// Disturbance and Randomization.
-void AddTrialOptions(CLI::App& app, TrialArguments& a, const std::string& seed_of);
+/// Sensors, motors and what is random.
+struct TrialConditions {
+  Disturbance disturbance;
+  Randomization randomization;
+
+  void Describe(Options& o) {
+    disturbance.Describe(o);
+    randomization.Describe(o);
+  }
+};
+
+/// Those of the arguments. Throws BadInput.
+TrialConditions ConditionsOf(const TrialArguments& a);
 
 /// The environments that the arguments ask for: those of the policy's training with the given
 /// changes; without a policy (null) those of the built-in plant. Environment i has episode i.
@@ -52,9 +61,6 @@ struct EpisodeArguments {
   /// Whether it is an episode of `eval`.
   bool given() const { return number >= 0; }
 };
-
-/// Adds --start and --episode.
-void AddEpisodeOptions(CLI::App& app, EpisodeArguments& a);
 
 /// Sets the episode of `env`, which has one environment. Returns where it starts; nothing: in the
 /// episode's own start. Throws BadInput.

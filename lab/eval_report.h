@@ -1,15 +1,18 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "lab/config.h"
+#include "lab/loaded_policy.h"
 #include "lab/model_info.h"
+#include "lab/trial.h"
 #include "rl/evaluate.h"
 #include "sim/pendulum_env.h"
 
-/// What `eval` says of its episodes.
+/// Evaluations of a policy over many episodes, and what is said of them.
 namespace upswing {
 
 /// One episode: its conditions and its result.
@@ -33,9 +36,13 @@ struct EvalReport {
   bool knows_values = false;  // the policy says what its Q-values estimate
 };
 
-/// Print the report on standard output, for people and for programs.
-void PrintEvalTable(const EvalReport& report);
-void PrintEvalJson(const EvalReport& report);
+/// Lets a policy control `episodes` episodes of the environments that a trial makes, and says how
+/// it did. `progress` (may be empty) is called with the share done, 0 to 1. Throws BadInput.
+EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& trial, int64_t episodes,
+                          ThreadPool& pool, const std::function<void(double)>& progress);
+
+/// The report as a JSON document.
+std::string EvalJson(const EvalReport& report);
 
 /// A row for each episode, counted from 0; a figure that it does not have (such as the swing-up
 /// time of one that is not upright at the end) is empty.

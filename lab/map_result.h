@@ -39,8 +39,7 @@ std::string MapCsv(const MapResult& map);
 /// Writes map.csv, map.svg and map.png into a folder and notes them in `files`.
 void WriteMap(MapResult& map, const std::filesystem::path& folder);
 
-/// Print the map's figures on standard output, for people and for programs.
-void PrintMapTable(const MapResult& map);
-void PrintMapJson(const MapResult& map);
+/// The map as a JSON document.
+std::string MapJson(const MapResult& map);
 
 }  // namespace upswing

@@ -1,0 +1,96 @@
+#include "apps/eval_table.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/text.h"
+
+namespace upswing {
+namespace {
+
+constexpr double kDegrees = 180 / std::numbers::pi;
+
+/// Such as `34.18 ± 0.57`: two digits of the deviation, or its whole part, and the mean to as many
+/// decimals.
+std::string MomentsText(const Moments& m, double scale = 1) {
+  constexpr double kLeast = 1e-6;  // below it a deviation is rounding
+  const double mean = scale * m.mean, deviation = scale * m.deviation;
+  if (deviation < kLeast) return fmt::format("{:.4g} ± 0", mean);
+  const int decimals = std::max(0, 1 - static_cast<int>(std::floor(std::log10(deviation))));
+  return fmt::format("{:.{}f} ± {:.{}f}", mean, decimals, deviation, decimals);
+}
+
+std::string QuartilesText(const Quartiles& q) {
+  return fmt::format("{:.2f} s   (median; middle half {:.2f} to {:.2f} s)", q.median, q.low,
+                     q.high);
+}
+
+/// Figures of the successful episodes alone, of a task whose goal is to be held.
+void PrintSuccesses(const Evaluation& e) {
+  if (e.successes == 0) {
+    fmt::print("  swing-up time  no episode stays upright\n");
+    return;
+  }
+  fmt::print("  swing-up time  {}\n", QuartilesText(e.swing_up_seconds));
+  const std::string within = fmt::format("{:.0f}° of upright", kSettledTilt * kDegrees);
+  if (e.settled > 0) {
+    fmt::print("  settling time  {}, within {}: {} of {}\n", QuartilesText(e.settling_seconds),
+               within, e.settled, e.successes);
+  } else {
+    fmt::print("  settling time  none stays within {}\n", within);
+  }
+  fmt::print("  steady tilt    link 1 {}°, link 2 {}°   of the last {} s\n",
+             MomentsText(e.tilt[0], kDegrees), MomentsText(e.tilt[1], kDegrees),
+             kSteadyTiltSeconds);
+}
+
+void PrintTorques(const Evaluation& e, bool has_goal) {
+  fmt::print("  torque         peak {:.4g} N·m, rms {} N·m\n", e.peak_torque,
+             MomentsText(e.rms_torque));
+  fmt::print("  its variation  {} N·m/s", MomentsText(e.torque_variation));
+  const bool upright = has_goal && e.successes > 0;
+  if (upright) fmt::print("; once upright {} N·m/s", MomentsText(e.goal_variation));
+  fmt::print("\n");
+  if (upright) {
+    fmt::print("  chatter        {} changes of the torque a second, once upright\n",
+               MomentsText(e.goal_changes));
+  }
+}
+
+}  // namespace
+
+void PrintEvalTable(const EvalReport& report) {
+  const Evaluation& e = report.figures;
+  fmt::print("{}\n", Printable(report.policy));
+  const EvaluationRule& rule = report.spec.evaluation;
+  if (report.spec.task == kDoublePendulum) {
+    fmt::print("  plant          {}, physics {}\n", PlantText(report.env.plant(0)), report.physics);
+  } else {
+    fmt::print("  task           {}, success is a return of {:.6g} or more\n", report.spec.task,
+               rule.solved_return);
+  }
+  if (report.model) fmt::print("  {:<15}{}\n", "model", report.model->Text());
+  const std::string changes = ChangesText(report.env);
+  if (!changes.empty()) fmt::print("  {:<15}{}\n", "with", changes);
+  fmt::print("  success        {} of {} = {:.1f}%   (95% interval {:.1f}% to {:.1f}%)\n",
+             e.successes, e.episodes, 100 * e.success_rate(), 100 * e.success_interval.low,
+             100 * e.success_interval.high);
+  if (!rule.by_return()) PrintSuccesses(e);
+  fmt::print("  return         {}   in the first {} s\n", MomentsText(e.reward_sum),
+             rule.return_seconds);
+  for (size_t k = 0; k < e.term_means.size(); ++k) {
+    fmt::print("    {:<18}{:8.2f}\n", report.spec.term_names[k], e.term_means[k]);
+  }
+  if (report.knows_values) {
+    fmt::print("  Q at the start {:.4g} expected, {:.4g} attained (discounted reward)\n", e.value,
+               e.discounted_return);
+  }
+  fmt::print("  energy used    {} J   in {} s\n", MomentsText(e.work), rule.seconds);
+  PrintTorques(e, !rule.by_return());
+  fmt::print("  ± is the standard deviation over the episodes\n");
+}
+
+}  // namespace upswing

@@ -1,0 +1,10 @@
+#pragma once
+
+#include "lab/map_result.h"
+
+namespace upswing {
+
+/// Prints the map's figures on standard output.
+void PrintMapTable(const MapResult& map);
+
+}  // namespace upswing
