@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <string>
+#include <vector>
 
 #include "core/text.h"
 
@@ -28,6 +30,13 @@ std::string QuartilesText(const Quartiles& q) {
                      q.high);
 }
 
+/// What makes an episode a success, such as `a return of -100 or more`.
+std::string SuccessText(const EvaluationRule& rule) {
+  if (rule.by_return()) return fmt::format("a return of {:.6g} or more", rule.solved_return);
+  return fmt::format("to be at the goal throughout the last {} of {} s", rule.hold_seconds,
+                     rule.seconds);
+}
+
 /// Figures of the successful episodes alone, of a task whose goal is to be held.
 void PrintSuccesses(const Evaluation& e) {
   if (e.successes == 0) {
@@ -35,6 +44,7 @@ void PrintSuccesses(const Evaluation& e) {
     return;
   }
   fmt::print("  swing-up time  {}\n", QuartilesText(e.swing_up_seconds));
+  if (e.tilt.empty()) return;  // the task has no bodies that lean
   const std::string within = fmt::format("{:.0f}° of upright", kSettledTilt * kDegrees);
   if (e.settled > 0) {
     fmt::print("  settling time  {}, within {}: {} of {}\n", QuartilesText(e.settling_seconds),
@@ -42,9 +52,11 @@ void PrintSuccesses(const Evaluation& e) {
   } else {
     fmt::print("  settling time  none stays within {}\n", within);
   }
-  fmt::print("  steady tilt    link 1 {}°, link 2 {}°   of the last {} s\n",
-             MomentsText(e.tilt[0], kDegrees), MomentsText(e.tilt[1], kDegrees),
-             kSteadyTiltSeconds);
+  std::vector<std::string> tilts;
+  for (const Moments& tilt : e.tilt) {
+    tilts.push_back(fmt::format("link {} {}°", tilts.size() + 1, MomentsText(tilt, kDegrees)));
+  }
+  fmt::print("  steady tilt    {}   of the last {} s\n", Join(tilts, ", "), kSteadyTiltSeconds);
 }
 
 void PrintTorques(const Evaluation& e, bool has_goal) {
@@ -69,8 +81,7 @@ void PrintEvalTable(const EvalReport& report) {
   if (report.spec.task == kDoublePendulum) {
     fmt::print("  plant          {}, physics {}\n", PlantText(report.env.plant(0)), report.physics);
   } else {
-    fmt::print("  task           {}, success is a return of {:.6g} or more\n", report.spec.task,
-               rule.solved_return);
+    fmt::print("  task           {}, success is {}\n", report.spec.task, SuccessText(rule));
   }
   if (report.model) fmt::print("  {:<15}{}\n", "model", report.model->Text());
   const std::string changes = ChangesText(report.env);
