@@ -59,8 +59,11 @@ void PrintPolicy(const fs::path& path) {
   fmt::print("  what        {}, {} parameters\n", policy.description(),
              FormatCount(policy.num_parameters()));
   if (loaded.task != kDoublePendulum) fmt::print("  task        {}\n", loaded.task);
-  fmt::print("  torques     {} N·m, every {} s\n", fmt::join(policy.value_actions().values(), ", "),
-             *info.control_period);
+  const auto levels = policy.value_actions().values();
+  fmt::print(
+      "  torques     {}, every {} s\n",
+      levels.empty() ? "any within the limit" : fmt::format("{} N·m", fmt::join(levels, ", ")),
+      *info.control_period);
   fmt::print("  made by     agent {}, seed {}, step {}, upswing {}\n", Known(info.agent),
              Known(info.seed), Known(info.step), Known(info.upswing_version));
   fmt::print("  evaluated   {}\n", EvaluationText(info));
