@@ -2,12 +2,15 @@
 """Measures Upswing and other libraries on this machine, alternating, and prints a table.
 
 Examples:
-  tools/peers/compare.py                                   everything, about six minutes
+  tools/peers/compare.py                                   gradient and training, about six minutes
   tools/peers/compare.py --measure training --threads 1 --rounds 3
   tools/peers/compare.py --width 64 --json peers.json
+  tools/peers/compare.py --measure acrobot --threads 1 --rounds 10
 
 gradient: gradient steps alone, on a filled replay memory. training: steps of a training with one
-environment and one update a step. The peers are installed into build/peers-venv first (once).
+environment and one update a step. acrobot: our agent of that name from its first step to its last,
+and the return that it reaches; the number of the round is the seed. The peers are installed into
+build/peers-venv first (once).
 """
 
 import argparse
@@ -41,6 +44,11 @@ SAME = (
     f"{ours.EPSILON}.")
 
 
+SAME_ON_ACROBOT = (
+    "acrobot: Gymnasium's Acrobot-v1 and the settings of our agent `acrobot`, as far as both sides "
+    "have them (tools/peers/README.md); one round for each seed.")
+
+
 def say(text):
     """Progress goes to standard error, so that the table can be piped."""
     print(text, file=sys.stderr, flush=True)
@@ -63,13 +71,16 @@ def install_peers():
     done.write_text(wanted, encoding="utf-8")
 
 
-def measure(side, what, threads, a):
-    """One measurement of one side: steps_per_second, cpu_seconds_per_step."""
+def measure(side, what, threads, seed, a):
+    """One measurement of one side: steps_per_second, cpu_seconds_per_step; on Acrobot-v1 also
+    seconds, mean_return."""
+    values = {"width": a.width, "batch": a.batch, "threads": threads, "seconds": a.seconds,
+              "seed": seed}
+    arguments = {name: values[name] for name in ours.ARGUMENTS[what]}
     if side == "upswing":
-        return ours.MEASURES[what](a.width, a.batch, threads, a.seconds)
-    output = ours.run([PYTHON, "-B", PEERS[side], what, "--width", a.width, "--batch", a.batch,
-                       "--threads", threads, "--seconds", a.seconds])
-    return json.loads(output.splitlines()[-1])
+        return ours.MEASURES[what](**arguments)
+    flags = [f"--{name}={value}" for name, value in arguments.items()]
+    return json.loads(ours.run([PYTHON, "-B", PEERS[side], what, *flags]).splitlines()[-1])
 
 
 def measure_in_turns(a):
@@ -80,11 +91,13 @@ def measure_in_turns(a):
         for what in a.measure:
             for threads in a.threads:
                 for side in SIDES if number % 2 == 0 else SIDES[::-1]:
-                    result = measure(side, what, threads, a)
+                    result = measure(side, what, threads, number + 1, a)
                     results.setdefault((what, threads, side), []).append(result)
                     say(f"round {number + 1} of {a.rounds}, {what}, threads {threads}, {side}: "
                         f"{result['steps_per_second']:,.0f} steps/s, "
-                        f"{1000 * result['cpu_seconds_per_step']:.2f} ms of CPU a step")
+                        f"{1000 * result['cpu_seconds_per_step']:.2f} ms of CPU a step"
+                        + ("" if "mean_return" not in result else
+                           f", return {result['mean_return']:.1f}"))
     return results
 
 
@@ -104,6 +117,10 @@ def summarize(results):
                 mine / theirs for mine, theirs in zip(our_values, values, strict=True))
             if figure == "steps_per_second":
                 row["fastest_upswing_ratio"] = max(our_values) / max(values)
+        returns = [result["mean_return"] for result in rounds if "mean_return" in result]
+        if returns:
+            row["mean_return"] = statistics.median(returns)
+            row["mean_return_range"] = [min(returns), max(returns)]
         rows.append(row)
     return sorted(rows, key=lambda row: (row["measure"], row["threads"], SIDES.index(row["side"])))
 
@@ -124,6 +141,17 @@ def print_table(rows):
         print(line.format(row["measure"], row["threads"], row["side"],
                           f"{row['steps_per_second']:,.0f}", f"({low:,.0f}-{high:,.0f})",
                           f"{1000 * row['cpu_seconds_per_step']:.2f}", *ratios).rstrip())
+
+
+def print_returns(rows):
+    """What was reached on Acrobot-v1, and in how long."""
+    line = "{:<10}{:>7}  {:<18}{:>10}{:>14}  {}"
+    print("\n" + line.format("measure", "threads", "side", "seconds", "mean return", "(range)"))
+    for row in rows:
+        seconds = statistics.median(result["seconds"] for result in row["rounds"])
+        low, high = row["mean_return_range"]
+        print(line.format(row["measure"], row["threads"], row["side"], f"{seconds:.1f}",
+                          f"{row['mean_return']:.1f}", f"({low:.1f} to {high:.1f})"))
 
 
 def processor():
@@ -166,16 +194,16 @@ def several(kind):
 def one_measure(text):
     """A type for argparse: the name of a measure."""
     if text not in ours.MEASURES:
-        names = " or ".join(ours.MEASURES)
-        raise argparse.ArgumentTypeError(f"expected {names}, got '{text}'")
+        names = ", ".join(ours.MEASURES)
+        raise argparse.ArgumentTypeError(f"expected one of {names}, got '{text}'")
     return text
 
 
 def parse_arguments():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--measure", type=several(one_measure), default=list(ours.MEASURES),
-                        metavar="LIST", help="of gradient, training [gradient,training]")
+    parser.add_argument("--measure", type=several(one_measure), default=["gradient", "training"],
+                        metavar="LIST", help="of gradient, training, acrobot [gradient,training]")
     parser.add_argument("--width", type=number(1, 4096), default=256, metavar="W",
                         help="of both hidden layers [256]")
     parser.add_argument("--batch", type=number(1, 65536), default=128, metavar="B",
@@ -201,8 +229,9 @@ def compare(a):
         raise ours.Failed(f"the program is not built: expected {ours.PROGRAM}, "
                           "which ./upswing train --help makes")
     install_peers()
-    say("checking that both sides have the same task")
-    say(ours.run([PYTHON, "-B", HERE / "check_task.py"]).strip())
+    if set(a.measure) != {"acrobot"}:
+        say("checking that both sides have the same task")
+        say(ours.run([PYTHON, "-B", HERE / "check_task.py"]).strip())
 
     context = describe(a)
     rows = summarize(measure_in_turns(a))
@@ -212,10 +241,16 @@ def compare(a):
     load, load_after = context["load_average"][0], context["load_average_after"][0]
     print(f"{context['processor']}, {context['processors']} processors, "
           f"load average {load:.1f} before and {load_after:.1f} after")
-    print(f"{'; '.join(context['versions'])}; W = {a.width}, B = {a.batch}; "
-          f"medians of {a.rounds} rounds of {a.seconds:g} s")
-    print(textwrap.fill(SAME, 96) + "\n")
+    print(f"{'; '.join(context['versions'])}; medians of {a.rounds} rounds")
+    if set(a.measure) != {"acrobot"}:
+        print(f"W = {a.width}, B = {a.batch}, {a.seconds:g} s a round")
+        print(textwrap.fill(SAME, 96))
+    if "acrobot" in a.measure:
+        print(textwrap.fill(SAME_ON_ACROBOT, 96))
+    print()
     print_table(rows)
+    if "acrobot" in a.measure:
+        print_returns([row for row in rows if row["measure"] == "acrobot"])
     if a.json:
         text = json.dumps({"context": context, "results": rows}, indent=1)
         a.json.write_text(text + "\n", encoding="utf-8")

@@ -7,6 +7,7 @@ import os
 import statistics
 import subprocess
 import tempfile
+import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -21,6 +22,7 @@ EPSILON = 0.05
 REPLAY = 100_000
 LEARNING_STARTS = 256  # steps before the first update
 
+EPISODES = 100  # of an evaluation on Acrobot-v1
 LOG_EVERY = 200  # steps from one row of metrics.csv to the next; learning begins before the second
 
 
@@ -63,6 +65,12 @@ def children_cpu_seconds():
     return times.children_user + times.children_system
 
 
+def read_rows(path):
+    """The rows of a table, each a dictionary of numbers by the columns' names."""
+    with open(path, encoding="utf-8", newline="") as file:
+        return [{name: float(text) for name, text in row.items()} for row in csv.DictReader(file)]
+
+
 def train(width, batch, threads, steps):
     """Trains for so many steps; the rate is that of the log's rows after learning began, the CPU
     time that of the whole process."""
@@ -71,9 +79,8 @@ def train(width, batch, threads, steps):
         cpu = children_cpu_seconds()
         run([PROGRAM, "train", *train_flags(width, batch, threads, steps, out)])
         cpu = children_cpu_seconds() - cpu
-        with open(out / "metrics.csv", encoding="utf-8", newline="") as file:
-            rows = [row for row in csv.DictReader(file) if float(row["updates"]) > 0]
-    first, last = ({name: float(text) for name, text in row.items()} for row in (rows[0], rows[-1]))
+        rows = [row for row in read_rows(out / "metrics.csv") if row["updates"] > 0]
+    first, last = rows[0], rows[-1]
     return {"steps_per_second": (last["updates"] - first["updates"]) /
                                 (last["seconds"] - first["seconds"]),
             "cpu_seconds_per_step": cpu / last["updates"]}
@@ -108,4 +115,30 @@ def gradient(width, batch, threads, seconds):
         return read_bench(file.read_text(encoding="utf-8"))
 
 
-MEASURES = {"gradient": gradient, "training": training}
+def acrobot_settings():
+    """The settings of the named agent `acrobot`, as a dictionary of TOML's tables."""
+    return tomllib.loads(run([PROGRAM, "train", "--agent", "acrobot", "--print-config"]))
+
+
+def acrobot(threads, seed):
+    """A training of the named agent `acrobot` to its last step, and the mean return of its last
+    policy over EPISODES episodes. The rate is that of training alone, the CPU time that of the
+    whole process."""
+    steps = acrobot_settings()["train"]["steps"]
+    with tempfile.TemporaryDirectory(prefix="upswing-peers-") as folder:
+        out = Path(folder, "run")
+        cpu = children_cpu_seconds()
+        run([PROGRAM, "train", "--agent", "acrobot", "--seed", seed, "--threads", threads, "--out",
+             out, "--no-stop-when-solved", "--eval-every", steps + 1, "--eval-episodes", EPISODES])
+        cpu = children_cpu_seconds() - cpu
+        seconds = read_rows(out / "metrics.csv")[-1]["seconds"]
+        mean_return = read_rows(out / "evals.csv")[-1]["mean_return"]
+    return {"steps_per_second": steps / seconds, "cpu_seconds_per_step": cpu / steps,
+            "seconds": seconds, "mean_return": mean_return}
+
+
+MEASURES = {"gradient": gradient, "training": training, "acrobot": acrobot}
+# What each measure takes.
+ARGUMENTS = {"gradient": ["width", "batch", "threads", "seconds"],
+             "training": ["width", "batch", "threads", "seconds"],
+             "acrobot": ["threads", "seed"]}

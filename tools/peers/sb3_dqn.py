@@ -1,20 +1,25 @@
 #!/usr/bin/env python3
-"""Stable-Baselines3's DQN on the double pendulum: one measurement, printed as one JSON line.
+"""Stable-Baselines3's DQN: one measurement, printed as one JSON line.
 
   build/peers-venv/bin/python tools/peers/sb3_dqn.py gradient --threads 2
   build/peers-venv/bin/python tools/peers/sb3_dqn.py training --width 64 --seconds 5
+  build/peers-venv/bin/python tools/peers/sb3_dqn.py acrobot --seed 3
 
 gradient: model.train alone, on a replay memory that is filled. training: model.learn with one
-update a step, once learning has begun.
+update a step, once learning has begun. Both are on the double pendulum. acrobot: Gymnasium's
+Acrobot-v1 with the settings of our agent `acrobot`, learned to the last step and then evaluated.
 """
 
 import argparse
 import json
+import math
 import time
 
 import stable_baselines3
 import torch
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.env_util import make_vec_env
+from stable_baselines3.common.evaluation import evaluate_policy
 
 import ours
 from pendulum import DoublePendulum
@@ -85,19 +90,65 @@ def training(width, batch, seconds):
     return timed.result
 
 
+def make_for_acrobot(settings, seed):
+    """The agent with the settings of ours that it has, too. It has neither dueling heads, Double
+    DQN, layer normalisation, prioritised replay, mirrored minibatches, scaled rewards nor an
+    averaged policy."""
+    train, network, agent = settings["train"], settings["network"], settings["agent"]
+    envs = train["envs"]
+    updates = max(1, round(envs * agent["updates_per_step"]))  # after each step of all environments
+    # Ours decays by a factor at each episode, of about 130 steps; theirs linearly.
+    decay_episodes = math.log(agent["epsilon_end"]) / math.log(agent["epsilon_decay"])
+
+    def learning_rate(remaining):
+        """From the share of the steps that remain."""
+        done = min(1.0, (1 - remaining) * train["steps"] / agent["learning_rate_steps"])
+        return agent["learning_rate"] + done * (agent["learning_rate_end"] - agent["learning_rate"])
+
+    return stable_baselines3.DQN(
+        "MlpPolicy", make_vec_env("Acrobot-v1", envs, seed=seed),
+        policy_kwargs={"net_arch": network["hidden"]}, batch_size=agent["batch"],
+        learning_rate=learning_rate, gamma=agent["gamma"], n_steps=agent["n_step"],
+        # Their target moves once for all the updates of a step.
+        tau=1 - (1 - agent["tau"])**updates, target_update_interval=1,
+        train_freq=1, gradient_steps=updates, max_grad_norm=agent["max_gradient_norm"],
+        buffer_size=agent["replay"], learning_starts=agent["learning_starts"],
+        exploration_fraction=min(1.0, 130 * decay_episodes / train["steps"]),
+        exploration_initial_eps=agent["epsilon_start"],
+        exploration_final_eps=agent["epsilon_end"], seed=seed, device="cpu")
+
+
+def acrobot(seed):
+    """Times model.learn on Acrobot-v1, then evaluates the greedy policy."""
+    settings = ours.acrobot_settings()
+    model = make_for_acrobot(settings, seed)
+    clock = Clock()
+    model.learn(settings["train"]["steps"])
+    result = clock.result(settings["train"]["steps"])
+    result["seconds"] = settings["train"]["steps"] / result["steps_per_second"]
+    result["mean_return"], _ = evaluate_policy(
+        model, make_vec_env("Acrobot-v1", 10, seed=1000 + seed), ours.EPISODES, deterministic=True)
+    return result
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("measure", choices=["gradient", "training"])
+    parser.add_argument("measure", choices=["gradient", "training", "acrobot"])
     parser.add_argument("--width", type=int, default=256, help="of both hidden layers [256]")
     parser.add_argument("--batch", type=int, default=128, help="transitions in a minibatch [128]")
     parser.add_argument("--threads", type=int, default=1, help="threads of PyTorch [1]")
     parser.add_argument("--seconds", type=float, default=3.0, help="to measure for [3]")
+    parser.add_argument("--seed", type=int, default=1, help="of the training on Acrobot-v1 [1]")
     a = parser.parse_args()
     torch.set_num_threads(a.threads)
-    measure = {"gradient": gradient, "training": training}[a.measure]
+    if a.measure == "acrobot":
+        result = acrobot(a.seed)
+    else:
+        measure = {"gradient": gradient, "training": training}[a.measure]
+        result = measure(a.width, a.batch, a.seconds)
     version = f"stable-baselines3 {stable_baselines3.__version__}, torch {torch.__version__}"
-    print(json.dumps(measure(a.width, a.batch, a.seconds) | {"version": version}))
+    print(json.dumps(result | {"version": version}))
 
 
 if __name__ == "__main__":
