@@ -4,6 +4,7 @@
 #include <array>
 
 #include "core/text.h"
+#include "lab/controllers.h"
 #include "mujoco/engines.h"
 
 namespace upswing {
@@ -47,10 +48,20 @@ CLI::Validator NotEmpty() {
           ""};
 }
 
-CLI::Option* AddPolicy(CLI::App& app, std::string& policy) {
-  return app.add_option("policy", policy, "policy.safetensors or run folder")
-      ->type_name("POLICY|RUN")
-      ->check(NotEmpty());
+CLI::Option* AddPolicy(CLI::App& app, PolicyArguments& a) {
+  CLI::Option* policy = app.add_option(
+      "policy", a.name,
+      Concat("policy.safetensors, run folder or controller: ", Join(ControllerNames(), ", ")));
+  policy->type_name("POLICY|RUN")->check(NotEmpty());
+  ControllerConfig defaults;
+  AddSettings(app, OptionsOf(defaults), a.flags);
+  app.add_option("--made-for", a.made_for,
+                 "plant that a controller is made for, such as mass2=1.2 (repeat for more)")
+      ->group("controller")
+      ->type_name("NAME=VALUE")
+      ->take_all()
+      ->allow_extra_args(false);
+  return policy;
 }
 
 void AddStart(CLI::App& app, std::optional<std::string>& start) {

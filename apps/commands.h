@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "lab/config.h"
+#include "lab/loaded_policy.h"
 
 namespace upswing {
 
@@ -39,8 +40,9 @@ void AddSettings(CLI::App& app, const Options& options, std::vector<FlagValue>& 
 /// Lets --help show the values that these settings have now as their defaults.
 void ShowDefaults(CLI::App& app, const Options& options);
 
-/// Adds the policy to try, a file or a run folder; not required unless the caller says so.
-CLI::Option* AddPolicy(CLI::App& app, std::string& policy);
+/// Adds the policy to try, a file, a run folder or a controller, and the controllers' settings; not
+/// required unless the caller says so.
+CLI::Option* AddPolicy(CLI::App& app, PolicyArguments& a);
 
 /// Adds --start, which ParseStart reads.
 void AddStart(CLI::App& app, std::optional<std::string>& start);

@@ -19,7 +19,8 @@ namespace upswing {
 namespace {
 
 struct EvalArguments {
-  std::string policy, episodes_csv;
+  PolicyArguments policy;
+  std::string episodes_csv;
   TrialArguments trial;
   int64_t episodes, threads;
   bool as_json = false;
@@ -31,7 +32,7 @@ int RunEval(const EvalArguments& a) {
     throw BadInput("--json: expected a file of its own for --episodes-csv, got - for it");
   }
   if (!a.episodes_csv.empty()) CheckWritable("--episodes-csv", a.episodes_csv);
-  const LoadedPolicy loaded = LoadPolicy(a.policy);
+  const LoadedPolicy loaded = GetPolicy(a.policy);
   ThreadPool pool(ResolveThreads(a.threads));
   EpisodeProgress progress(a.episodes, a.as_json);
   const EvalReport report = EvaluatePolicy(loaded, a.trial, a.episodes, pool,

@@ -6,6 +6,7 @@
 
 #include "apps/commands.h"
 #include "apps/progress.h"
+#include "control/upright_modes.h"
 #include "core/error.h"
 #include "core/simd.h"
 #include "core/text.h"
@@ -13,6 +14,7 @@
 #include "io/run_folder.h"
 #include "io/tensor_file.h"
 #include "lab/config.h"
+#include "lab/controllers.h"
 #include "lab/format.h"
 #include "lab/loaded_policy.h"
 #include "lab/model_info.h"
@@ -51,11 +53,23 @@ void PrintSelfCheck(const QPolicy::SelfCheck& check) {
       "              samples by more than that\n");
 }
 
-void PrintPolicy(const fs::path& path) {
-  const LoadedPolicy loaded = LoadPolicy(path);
+/// What is known of a controller, which has no file and no training.
+void PrintController(const LoadedPolicy& loaded) {
+  const Policy& policy = *loaded.policy;
+  fmt::print("{}\n", Printable(loaded.name));
+  fmt::print("  what        {}\n", policy.description());
+  fmt::print("  torques     up to ±{} N·m, every {} s\n", loaded.plant.torque_limit,
+             *policy.info().control_period);
+  fmt::print("  plant       {}\n", PlantText(loaded.plant));
+  const UprightModes modes = ModesOf(loaded.plant);
+  fmt::print("  modes       upright, grow at {:.3g}/s and {:.3g}/s (ratio {:.3g}), delta {:.2f}\n",
+             modes.faster, modes.slower, modes.slower / modes.faster, modes.delta);
+}
+
+void PrintPolicy(const LoadedPolicy& loaded) {
   const Policy& policy = *loaded.policy;
   const PolicyInfo& info = policy.info();
-  fmt::print("{}\n", Printable(loaded.path.string()));
+  fmt::print("{}\n", Printable(loaded.name));
   fmt::print("  what        {}, {} parameters\n", policy.description(),
              FormatCount(policy.num_parameters()));
   if (loaded.task != kDoublePendulum) fmt::print("  task        {}\n", loaded.task);
@@ -113,11 +127,16 @@ void PrintProgram() {
   fmt::print("  bfloat16    {}\n", bfloat16.empty() ? "none" : bfloat16.front());
 }
 
-int RunInfo(const std::string& path) {
-  if (path.empty()) {
+int RunInfo(const PolicyArguments& a) {
+  if (a.empty()) {
     PrintProgram();
     return 0;
   }
+  if (IsController(a.name) || a.has_settings()) {
+    PrintController(GetPolicy(a));
+    return 0;
+  }
+  const std::string& path = a.name;
   const bool is_run = fs::exists(fs::path(path) / RunFolder::kConfig);
   const fs::path run_policy = fs::path(path) / RunFolder::kPolicy;
   try {
@@ -128,7 +147,7 @@ int RunInfo(const std::string& path) {
         error.exit_code(),
         Concat(error.what(), " (its policy is a file of its own: ", run_policy.string(), ")"));
   }
-  if (!is_run || fs::exists(run_policy)) PrintPolicy(path);
+  if (!is_run || fs::exists(run_policy)) PrintPolicy(GetPolicy(a));
   return 0;
 }
 
@@ -137,16 +156,15 @@ int RunInfo(const std::string& path) {
 void AddInfo(CLI::App& program, Command& command) {
   CLI::App* app = program.add_subcommand(
       "info", "Describe and check a policy or a run, or describe this machine");
-  auto path = std::make_shared<std::string>();
-  app->add_option("policy", *path, "policy.safetensors or run folder; none: about this machine")
-      ->type_name("POLICY|RUN")
-      ->check(NotEmpty());
+  auto a = std::make_shared<PolicyArguments>();
+  AddPolicy(*app, *a);
   app->footer(
       "Examples:\n"
       "  ./upswing info runs/d3qn-seed1\n"
       "  ./upswing info policy.safetensors\n"
+      "  ./upswing info lqr --made-for mass2=1.2\n"
       "  ./upswing info                      which instructions the kernels use here\n");
-  app->callback([path, &command] { command = [path] { return RunInfo(*path); }; });
+  app->callback([a, &command] { command = [a] { return RunInfo(*a); }; });
 }
 
 }  // namespace upswing

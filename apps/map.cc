@@ -32,7 +32,8 @@ using Clock = std::chrono::steady_clock;
 constexpr int64_t kMostEpisodes = 10000000;
 
 struct MapArguments {
-  std::string policy, x = "mass2=-50%:+50%", y = "length2=-50%:+50%", physics, out;
+  PolicyArguments policy;
+  std::string x = "mass2=-50%:+50%", y = "length2=-50%:+50%", physics, out;
   std::vector<std::string> set;
   int64_t episodes;  // 0: not given
   int64_t threads, seed;
@@ -40,16 +41,22 @@ struct MapArguments {
   bool unknown_plant = false, as_json = false;
 };
 
-/// What a policy was trained on.
+/// What a policy was trained on, or a controller made for.
 struct Training {
   MapPoint point;               // plant and disturbance; hanging
   Randomization randomization;  // around them
   bool known = false;           // the file says more than the plant
+  std::string word;             // "training" or "design"
 };
 
 Training TrainingOf(const LoadedPolicy& loaded) {
   Training training;
   training.point.plant = loaded.plant;
+  training.word = loaded.origin();
+  if (loaded.path.empty()) {
+    training.known = true;  // for no noise, no delay, nothing random
+    return training;
+  }
   const std::string& settings = loaded.policy->info().config;
   if (settings.empty()) return training;
   Config config;
@@ -84,7 +91,8 @@ std::string ChangesOf(const MapConfig& config, const Training& training) {
     const double then = *std::get<double*>(usual.all()[k].target);
     if (value == then || OnAxis(config, option)) continue;
     texts.push_back(fmt::format("{} {:.4g} {}", option.name, value, option.unit));
-    if (option.section != "start") texts.back() += fmt::format(" (training: {:.4g})", then);
+    if (option.section == "start") continue;
+    texts.back() += fmt::format(" ({}: {:.4g})", training.word, then);
   }
   if (config.assumed_plant) texts.emplace_back("the plant unknown to the policy");
   return Join(texts, ", ");
@@ -95,9 +103,11 @@ std::string DotOf(const MapConfig& config, const Training& training, bool change
   const MapAxis &x = config.x, &y = config.y;
   if (x.start && y.start && !changed) return "hanging";
   if (training.randomization.any()) return "middle of the training's range";
-  if (!changed && !config.start_given && training.known) return "as in training";
-  const auto piece = [](const MapAxis& axis) {
-    return Concat(axis.name, axis.start ? " hanging" : " as in training");
+  if (!changed && !config.start_given && training.known) {
+    return Concat("as in ", training.word);
+  }
+  const auto piece = [&](const MapAxis& axis) {
+    return Concat(axis.name, axis.start ? " hanging" : Concat(" as in ", training.word));
   };
   return Concat(piece(x), ", ", piece(y));
 }
@@ -145,7 +155,7 @@ std::vector<MapCell> RunCells(const MapConfig& config, const Policy& policy,
 }
 
 int RunMapCommand(const MapArguments& a) {
-  const LoadedPolicy loaded = LoadPolicy(a.policy);
+  const LoadedPolicy loaded = GetPolicy(a.policy);
   if (loaded.task != kDoublePendulum) {
     throw BadInput(
         Concat("map: expected a policy of the double pendulum, whose plant and start are ",
@@ -156,7 +166,7 @@ int RunMapCommand(const MapArguments& a) {
   map.config = ConfigOf(a, loaded, training);
   map.changes = ChangesOf(map.config, training);
   map.dot = DotOf(map.config, training, !map.changes.empty());
-  map.policy = loaded.path.string();
+  map.policy = loaded.name;
   map.physics = a.physics;
   map.model = InfoOfModel(loaded.mjcf, "");
   const fs::path folder =

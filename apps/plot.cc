@@ -21,7 +21,8 @@ namespace {
 namespace fs = std::filesystem;
 
 struct PlotArguments {
-  std::string policy, out;
+  PolicyArguments policy;
+  std::string out;
   TrialArguments trial;
   EpisodeArguments episode;
   double seconds;  // negative: not given
@@ -39,7 +40,7 @@ double UprightSince(const std::vector<RolloutRow>& rows) {
 
 /// What stands below the title: which episode, and what is not as in the training.
 std::string Caption(const PlotArguments& a, const RolloutConfig& config, const Rollout& rollout,
-                    const Plant& training) {
+                    const LoadedPolicy& loaded) {
   std::vector<std::string> parts;
   if (a.episode.given()) parts.push_back(Concat("episode ", a.episode.number, " of eval"));
   const bool pendulum = config.env.task == kDoublePendulum;
@@ -49,14 +50,14 @@ std::string Caption(const PlotArguments& a, const RolloutConfig& config, const R
   if (!pendulum) return Join(parts, "; ");
   parts.push_back(a.trial.physics);
   for (const std::string& text :
-       {PlantChangesText(rollout.plant, training), ChangesText(config.env)}) {
+       {PlantChangesText(rollout.plant, loaded), ChangesText(config.env)}) {
     if (!text.empty()) parts.push_back(text);
   }
   return Join(parts, "; ");
 }
 
 int RunPlot(const PlotArguments& a) {
-  const LoadedPolicy loaded = LoadPolicy(a.policy);
+  const LoadedPolicy loaded = GetPolicy(a.policy);
   RolloutConfig config;
   config.policy = loaded.policy.get();
   config.env = TrialEnvironments(a.trial, &loaded);
@@ -82,15 +83,15 @@ int RunPlot(const PlotArguments& a) {
   }
   std::vector<std::string> files;
   for (const auto& [name, figure] : figures) {
-    figure->title = WithModel(loaded.path.string(), model);
-    figure->caption = Caption(a, config, rollout, loaded.plant);
+    figure->title = WithModel(loaded.name, model);
+    figure->caption = Caption(a, config, rollout, loaded);
     for (const char* ending : {".svg", ".png"}) {
       const fs::path file = folder / Concat(name, ending);
       Draw(*figure, file);
       files.push_back(Printable(file.string()));
     }
   }
-  fmt::print("{}\n", Printable(loaded.path.string()));
+  fmt::print("{}\n", Printable(loaded.name));
   if (pendulum) {
     fmt::print("  plant      {}, physics {}\n", EpisodeText(rollout), a.trial.physics);
   } else {

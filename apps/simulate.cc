@@ -18,7 +18,8 @@ namespace upswing {
 namespace {
 
 struct SimulateArguments {
-  std::string policy, torque, csv = "-";
+  PolicyArguments policy;
+  std::string torque, csv = "-";
   TrialArguments trial;
   EpisodeArguments episode;
   double seconds;  // negative: not given
@@ -37,7 +38,7 @@ int RunSimulate(const SimulateArguments& a) {
     throw BadInput("simulate: expected a policy or --torque, got both");
   }
   std::optional<LoadedPolicy> loaded;
-  if (!a.policy.empty()) loaded.emplace(LoadPolicy(a.policy));
+  if (!a.policy.empty()) loaded.emplace(GetPolicy(a.policy));
   RolloutConfig config;
   if (!a.torque.empty()) config.schedule = ReadTorqueFile(a.torque);
 

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "control/testing.h"
+#include "control/upright_modes.h"
 #include "core/rng.h"
 #include "sim/closed_form.h"
 

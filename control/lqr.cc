@@ -8,6 +8,7 @@
 
 #include "control/linearize.h"
 #include "control/riccati.h"
+#include "control/upright_modes.h"
 #include "core/error.h"
 #include "core/text.h"
 
@@ -94,14 +95,20 @@ std::array<double, 4> UprightDeviation(std::span<const float> obs) {
 }
 
 LqrPolicy::LqrPolicy(const LqrConfig& config, const Plant& plant)
-    : lqr_(SolveLqr(config, plant)),
+    : config_(config),
+      lqr_(SolveLqr(config, plant)),
       torque_limit_(plant.torque_limit),
       info_(InfoOf(config, plant)) {}
 
 std::string LqrPolicy::description() const {
-  std::vector<std::string> gain;
-  for (const double k : lqr_.K) gain.push_back(Rounded(k));
-  return Concat("linear-quadratic regulator about upright, gain ", Join(gain, ", "));
+  const auto list = [](const auto& numbers) {
+    std::vector<std::string> texts(numbers.size());
+    std::ranges::transform(numbers, texts.begin(), Rounded);
+    return Join(texts, ", ");
+  };
+  const std::array weights{config_.q1, config_.q2, config_.w1, config_.w2};
+  return Concat("linear-quadratic regulator about upright, weights ", list(weights), " and ",
+                Rounded(config_.torque), ", gain ", list(lqr_.K));
 }
 
 Tensors LqrPolicy::ToTensors() const {

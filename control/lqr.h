@@ -64,6 +64,7 @@ class LqrPolicy : public Policy {
   const Lqr& lqr() const { return lqr_; }
 
  private:
+  LqrConfig config_;
   Lqr lqr_;
   double torque_limit_;  // N·m
   PolicyInfo info_;

@@ -196,7 +196,8 @@ TEST(Lqr, InfoSaysWhatItIsFor) {
   const LqrPolicy policy(config, plant);
   EXPECT_EQ(policy.kind(), "lqr");
   EXPECT_EQ(policy.description(),
-            "linear-quadratic regulator about upright, gain -100.7, -100.9, -30.51, -16.05");
+            "linear-quadratic regulator about upright, weights 10, 10, 1, 1 and 0.5, gain -100.7, "
+            "-100.9, -30.51, -16.05");
   EXPECT_EQ(policy.info().agent, "lqr");
   EXPECT_EQ(policy.info().task, kDoublePendulum);
   EXPECT_EQ(policy.info().plant.at("mass2"), 1.25);

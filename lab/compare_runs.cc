@@ -11,6 +11,7 @@
 #include "io/making.h"
 #include "io/run_folder.h"
 #include "lab/config.h"
+#include "lab/controllers.h"
 #include "lab/format.h"
 #include "lab/model_info.h"
 
@@ -46,8 +47,10 @@ void AddRuns(const fs::path& folder, Found& found, std::vector<fs::path>& paths)
 std::vector<fs::path> RunsIn(const fs::path& folder, Found& found) {
   std::error_code error;
   if (!fs::exists(folder, error)) {
+    const bool is_controller = IsController(folder.string());
     throw BadInput(Concat(folder.string(), ": expected a run folder or one that holds some, got ",
-                          "nothing of that name"));
+                          is_controller ? "a controller, of which there is no training to compare"
+                                        : "nothing of that name"));
   }
   std::vector<fs::path> paths;
   if (!fs::is_directory(folder, error)) {

@@ -291,17 +291,18 @@ std::vector<std::pair<std::string, std::string>> NamedAgents() {
   return names;
 }
 
-std::vector<const Option*> ApplyChanges(const Options& options,
-                                        const std::vector<std::string>& set) {
+std::vector<const Option*> ApplyChanges(const Options& options, const std::vector<std::string>& set,
+                                        const std::string& flag) {
   std::vector<const Option*> changed;
   for (const std::string& change : set) {
     const size_t equals = change.find('=');
     if (equals == std::string::npos) {
-      throw BadInput(Concat("--set: expected NAME=VALUE, got \"", change, "\""));
+      throw BadInput(Concat(flag, ": expected NAME=VALUE, got \"", change, "\""));
     }
     const std::string name(Trim(std::string_view(change).substr(0, equals)));
-    for (const Option* option : options.Find(name, "--set " + name)) {
-      option->Set(Trim(std::string_view(change).substr(equals + 1)), "--set " + name);
+    const std::string where = Concat(flag, " ", name);
+    for (const Option* option : options.Find(name, where)) {
+      option->Set(Trim(std::string_view(change).substr(equals + 1)), where);
       changed.push_back(option);
     }
   }

@@ -110,9 +110,9 @@ std::string PlantText(const Plant& plant);
 /// Names of the agents in configs/, in alphabetical order, and what each is.
 std::vector<std::pair<std::string, std::string>> NamedAgents();
 
-/// Sets what --set gives ("mass2=1.2") and returns it. Throws BadInput.
-std::vector<const Option*> ApplyChanges(const Options& options,
-                                        const std::vector<std::string>& set);
+/// Sets what --set, or another flag like it, gives ("mass2=1.2") and returns it. Throws BadInput.
+std::vector<const Option*> ApplyChanges(const Options& options, const std::vector<std::string>& set,
+                                        const std::string& flag = "--set");
 
 /// The plant to try something on: `base`, or that of the model file if there is one, with the
 /// given changes ("mass2=1.2"). Reads the model into `mjcf`. Throws BadInput.

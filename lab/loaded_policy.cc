@@ -6,6 +6,7 @@
 #include "core/text.h"
 #include "io/run_folder.h"
 #include "io/tensor_file.h"
+#include "lab/controllers.h"
 #include "mujoco/model.h"
 #include "nn/q_policy.h"
 
@@ -80,6 +81,33 @@ Plant TrainingPlant(const PolicyInfo& info, const std::string& where) {
 
 }  // namespace
 
+LoadedPolicy GetPolicy(const PolicyArguments& a) {
+  ControllerConfig config;
+  SetFlags(OptionsOf(config), a.flags);
+  ApplyChanges(OptionsOf(config.plant), a.made_for, "--made-for");
+  const bool is_controller = IsController(a.name), is_path = fs::exists(a.name);
+  if (is_controller && is_path) {
+    throw BadInput(Concat(a.name, ": expected the controller or a file, and there are both: ./",
+                          a.name, " is the file; for the controller, rename that"));
+  }
+  if (is_controller) {
+    return {TitleOf(a.name, config), "",           MakeController(a.name, config),
+            kDoublePendulum,         config.plant, ""};
+  }
+  const std::string controllers = Join(ControllerNames(), ", ");
+  if (a.has_settings()) {
+    const std::string flag = a.flags.empty() ? "--made-for" : FlagOf(a.flags.front().name);
+    throw BadInput(Concat(flag, ": expected a controller (", controllers, ") to set, got ",
+                          a.name.empty() ? "none" : a.name));
+  }
+  if (!is_path) {
+    throw BadInput(Concat(
+        a.name, ": no such file; expected a policy.safetensors, a run folder or a controller (",
+        controllers, ")", DidYouMean(a.name, ControllerNames())));
+  }
+  return LoadPolicy(a.name);
+}
+
 LoadedPolicy LoadPolicy(const fs::path& path) {
   fs::path file = path;
   if (fs::is_directory(path)) {
@@ -90,8 +118,10 @@ LoadedPolicy LoadPolicy(const fs::path& path) {
     }
   }
   if (!fs::exists(file)) {
-    throw BadInput(
-        Concat(file.string(), ": no such file; expected a policy.safetensors or a run ", "folder"));
+    const bool is_controller = IsController(path.string());
+    throw BadInput(Concat(file.string(),
+                          ": no such file; expected a policy.safetensors or a run folder",
+                          is_controller ? " here, where no controller will do" : ""));
   }
   return ReadPolicy(LoadTensors(file));
 }
@@ -100,7 +130,8 @@ LoadedPolicy ReadPolicy(const Tensors& file) {
   const std::string& where = file.where();
   auto policy = std::make_shared<QPolicy>(QPolicy::From(file));
   const PolicyInfo& info = policy->info();
-  LoadedPolicy loaded{where, policy, info.task.empty() ? kDoublePendulum : info.task, Plant(), ""};
+  const std::string task = info.task.empty() ? kDoublePendulum : info.task;
+  LoadedPolicy loaded{where, where, policy, task, Plant(), ""};
   CheckTask(loaded, where);
   if (loaded.task != kDoublePendulum) return loaded;
   loaded.plant = TrainingPlant(info, where);

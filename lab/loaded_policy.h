@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "core/policy.h"
 #include "core/tensors.h"
@@ -13,16 +14,33 @@ namespace upswing {
 
 /// A policy and what it needs to be tried out.
 struct LoadedPolicy {
-  std::filesystem::path path;
+  std::string name;            // for people
+  std::filesystem::path path;  // of its file; empty: a controller, which has none
   std::shared_ptr<const Policy> policy;
   std::string task;  // see TaskNames
   // Of the double pendulum:
-  Plant plant;       // at training
+  Plant plant;       // what it was made for
   std::string mjcf;  // empty: the built-in model
 
   /// How many past steps its observations remember.
   int memory() const;
+  /// Where it is from: "training", or "design" of a controller.
+  const char* origin() const { return path.empty() ? "design" : "training"; }
 };
+
+/// A policy as a command line names it.
+struct PolicyArguments {
+  std::string name;                   // of a controller (lab/controllers.h), a file or a run folder
+  std::vector<FlagValue> flags;       // settings of the controller
+  std::vector<std::string> made_for;  // and its plant, such as mass2=1.2
+
+  bool has_settings() const { return !flags.empty() || !made_for.empty(); }
+  bool empty() const { return name.empty() && !has_settings(); }
+};
+
+/// Makes the controller of that name, or loads the policy from the path. Throws BadInput, too, if
+/// the name can mean both, or if settings of a controller are given for what is none.
+LoadedPolicy GetPolicy(const PolicyArguments& a);
 
 /// Loads a policy file, or the best policy of a run folder. Throws BadInput, too, where the file
 /// says of its task what this program cannot do: another control period, other observations.

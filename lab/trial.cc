@@ -78,24 +78,27 @@ std::string ChangesText(const EnvConfig& env) {
   return Join(texts, ", ");
 }
 
-std::string PlantChangesText(Plant plant, Plant training) {
-  const Options now = OptionsOf(plant), before = OptionsOf(training);
+std::string PlantChangesText(Plant plant, const LoadedPolicy& loaded) {
+  Plant made_for = loaded.plant;
+  const Options now = OptionsOf(plant), before = OptionsOf(made_for);
   std::vector<std::string> texts;
   for (size_t k = 0; k < now.all().size(); ++k) {
     const double value = *std::get<double*>(now.all()[k].target);
     const double usual = *std::get<double*>(before.all()[k].target);
     if (value == usual) continue;
-    texts.push_back(fmt::format("{} {:.4g} {} (training: {:.4g})", now.all()[k].name, value,
-                                now.all()[k].unit, usual));
+    texts.push_back(fmt::format("{} {:.4g} {} ({}: {:.4g})", now.all()[k].name, value,
+                                now.all()[k].unit, loaded.origin(), usual));
   }
   return Join(texts, ", ");
 }
 
 fs::path DefaultOut(const LoadedPolicy& loaded, const std::string& name) {
+  const bool has_file = !loaded.path.empty();
   const fs::path run = loaded.path.parent_path();
-  const fs::path first = fs::exists(run / RunFolder::kConfig)
+  const std::string stem = has_file ? loaded.path.stem().string() : loaded.policy->kind();
+  const fs::path first = has_file && fs::exists(run / RunFolder::kConfig)
                              ? run / name
-                             : fs::path("runs") / Concat(name, "-", loaded.path.stem().string());
+                             : fs::path("runs") / Concat(name, "-", stem);
   fs::path out = first;
   for (int number = 2; fs::exists(fs::symlink_status(out)); ++number) {
     out = Concat(first.string(), "-", number);

@@ -45,12 +45,13 @@ EnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded)
 /// What is not at its default, as text: `delay 0.02, …`; empty if nothing is.
 std::string ChangesText(const EnvConfig& env);
 
-/// How a plant differs from that of the training: `mass2 1.3 kg (training: 1), …`; empty: not at
-/// all.
-std::string PlantChangesText(Plant plant, Plant training);
+/// How a plant differs from what a policy was made for: `mass2 1.3 kg (training: 1), …`; empty: not
+/// at all.
+std::string PlantChangesText(Plant plant, const LoadedPolicy& loaded);
 
 /// Where figures of a policy go unless the user says: in its run's folder under this name, or, for
-/// a policy file elsewhere, in runs/NAME-FILE; with -2, -3, … where that is taken.
+/// a policy file elsewhere, in runs/NAME-FILE, for a controller in runs/NAME-CONTROLLER; with -2,
+/// -3, … where that is taken.
 std::filesystem::path DefaultOut(const LoadedPolicy& loaded, const std::string& name);
 
 /// Which episode `simulate` and `plot` make: episode K of `eval`, or one from a given start.
