@@ -236,7 +236,8 @@ void AddMap(CLI::App& program, Command& command) {
       "  ./upswing map runs/d3qn-seed1\n"
       "  ./upswing map runs/d3qn-seed1 --x mass=0.8:1.2 --y damping=0:0.4:21 --episodes 20\n"
       "  ./upswing map runs/d3qn-seed1 --x sensor_noise=0:0.1 --y delay=0:0.1:6\n"
-      "  ./upswing map runs/d3qn-seed1 --x q1=-180:180:73 --y q2=-180:180:73    from any angle\n");
+      "  ./upswing map runs/d3qn-seed1 --x q1=-180:180:73 --y q2=-180:180:73    from any angle\n"
+      "  ./upswing map lqr --x q1=150:210:121 --y q2=-30:30:121    from where does it catch?\n");
   app->callback([a, &command] { command = [a] { return RunMapCommand(*a); }; });
 }
 

@@ -95,7 +95,7 @@ std::vector<std::pair<std::string, std::string>> Cells(const EvalReport& report,
 EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& trial, int64_t episodes,
                           ThreadPool& pool, const std::function<void(double)>& progress) {
   EvalReport report;
-  report.policy = loaded.path.string();
+  report.policy = loaded.name;
   report.physics = trial.physics;
   report.env = TrialEnvironments(trial, &loaded);
   report.model = InfoOfModel(report.env.mjcf, trial.model);

@@ -58,13 +58,17 @@ std::string CaptionOf(const MapResult& map) {
 
 Figure MapFigure(const MapResult& map) {
   HeatMap success, swing_up;
+  double longest = 0;  // swing-up time, s
   success.label = "successful episodes (%)";
   success.high = 100;
   swing_up.label = "swing-up time (s)";
   for (const MapCell& cell : map.cells) {
     success.z.push_back(100 * RateOf(map, cell));
     swing_up.z.push_back(cell.swing_up_seconds);
+    longest = std::max(longest, cell.successes > 0 ? cell.swing_up_seconds : 0);
   }
+  // Where nothing has to swing up, the times differ by nothing that colours could show.
+  if (longest < 0.1) swing_up.high = 1;
   Figure figure;
   figure.title = WithModel(map.policy, map.model);
   figure.caption = CaptionOf(map);
