@@ -68,11 +68,13 @@ void AddEval(CLI::App& program, Command& command) {
   AddThreads(*app, a->threads);
   app->add_flag("--json", a->as_json, "print JSON instead of a table")->disable_flag_override();
   app->footer(fmt::format(
-      "An episode lasts {} s from hanging with normal noise of 0.1 (rad, rad/s). It succeeds if "
-      "both\nlinks are within 30° of upright for the whole of the last {} s. The return is the "
-      "undiscounted\nsum of the reward, standard weights, over the first {} s. Settled is a link "
-      "within 9° of upright.\nSteady tilt, chatter and torque once upright are over successful "
-      "episodes.\n\n"
+      "An episode of the double pendulum lasts {} s from hanging with normal noise of 0.1 (rad,\n"
+      "rad/s). It succeeds if both links are within 30° of upright for the whole of the last {} "
+      "s.\n"
+      "The return is the undiscounted sum of the reward, standard weights, over the first {} s.\n"
+      "Settled is a link within 9° of upright. Steady tilt, chatter and torque once upright are "
+      "over\n"
+      "successful episodes. docs/task.md has the other tasks.\n\n"
       "Examples:\n"
       "  ./upswing eval runs/d3qn-seed1\n"
       "  ./upswing eval policy.safetensors --episodes 1000 --seed 7 --json\n"

@@ -98,9 +98,11 @@ int RunPlot(const PlotArguments& a) {
     fmt::print("  task       {}\n", spec.task);
   }
   if (model) fmt::print("  model      {}\n", model->Text());
+  // Of other tasks a row tells of the state that its step leads to.
+  const double later = pendulum ? 0 : spec.step_seconds;
   const double since = UprightSince(rollout.rows);
   fmt::print("  {}    {}\n", pendulum ? "upright" : "at goal",
-             since < 0 ? "not at the end" : fmt::format("from {:.2f} s to the end", since));
+             since < 0 ? "not at the end" : fmt::format("from {:.2f} s to the end", since + later));
   if (a.episode.given()) {
     fmt::print("  episode    {} of eval: {}\n", a.episode.number,
                JudgementText(JudgeEpisode(*loaded.policy, config.env), spec.evaluation));

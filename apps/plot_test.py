@@ -116,7 +116,7 @@ class PlotTest(ProgramTest):
     def test_bad_input(self):
         self.refuse(["plot"], "policy")
         self.refuse(["plot", "nowhere"], "no such file")
-        self.refuse(["plot", self.policy, "--start", "1,2"], "--start", "four numbers")
+        self.refuse(["plot", self.policy, "--start", "1,2"], "--start", "4 numbers")
         self.refuse(["plot", self.policy, "--seconds", "0"], "--seconds")
         self.refuse(["plot", self.policy, "--set", "gravty=2"], "did you mean gravity?")
         self.refuse(["plot", self.policy, "--physics", "own"], "closed-form")

@@ -95,7 +95,7 @@ class TaskTest(unittest.TestCase):
                 (["eval", policy, "--set", "mass1=2"], "--set: expected none"),
                 (["eval", policy, "--randomize", "0.2"], "--randomize: expected none"),
                 (["eval", policy, "--unknown-plant"], "--unknown-plant: expected none"),
-                (["simulate", policy, "--start", "1,2"], "four numbers theta1"),
+                (["simulate", policy, "--start", "1,2"], "4 numbers theta1"),
                 (["train", "--task", "acrobot-v1", "--mass1", "2"], "mass1: expected none"),
                 (["train", "--task", "acrobot-v1", "--agent", "fast"], "agent fast"),
                 (["train", "--task", "acrobot"], "expected one of")):

@@ -106,7 +106,7 @@ void VerifyChecksum(std::string header, const std::map<std::string, Tensor>& ten
   header.replace(at, kNoChecksum.size(), kNoChecksum);
   Checksum checksum;
   checksum.Update(BytesOf(header));
-  // Tensor by tensor, as Save did: a tensor's last word is padded.
+  // Tensor by tensor, as WriteSafetensors did: a tensor's last word is padded.
   std::vector<const Tensor*> order;
   for (const auto& [name, tensor] : tensors) order.push_back(&tensor);
   std::sort(order.begin(), order.end(),

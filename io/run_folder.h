@@ -25,6 +25,7 @@ using Row = std::vector<std::pair<std::string, double>>;
 ///   checkpoint.safetensors  the whole state of the training
 ///   policy.safetensors      the best policy at evaluation
 ///   log.txt                 events with date and time
+///   model.xml               the MJCF, where it is not the built-in model
 /// The sizes of the tables are part of the checkpoint; opening a run cuts the tables back to them,
 /// so that what a killed run wrote after its checkpoint is not there twice.
 class RunFolder {

@@ -1,7 +1,7 @@
 #include "lab/config.h"
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
+#include <array>
 
 #include "core/error.h"
 #include "core/text.h"
@@ -18,7 +18,6 @@ namespace upswing {
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::json;
 
 const NamedAgent& FindAgent(const std::string& name, const std::string& where) {
   const auto agents = EmbeddedAgents();
@@ -71,14 +70,17 @@ void CheckTogether(const DqnConfig& d, const std::string& where) {
 /// has no such setting.
 void CheckTask(Config& config, const std::string& where) {
   if (config.task == kDoublePendulum) return;
+  constexpr std::array<std::string_view, 5> kSections{"task", "plant", "disturbance", "randomize",
+                                                      "reward"};
+  constexpr std::array<std::string_view, 3> kCurriculum{"start_noise", "start_noise_end",
+                                                        "curriculum_steps"};
   Config defaults;
   const Options now = OptionsOf(config), usual = OptionsOf(defaults);
   for (size_t i = 0; i < now.all().size(); ++i) {
     const Option& option = now.all()[i];
-    static const std::vector<std::string> kSections{"task", "plant", "disturbance", "randomize",
-                                                    "reward"};
-    const bool of_pendulum =
-        option.name != "task" && std::ranges::find(kSections, option.section) != kSections.end();
+    const bool of_pendulum = (option.name != "task" &&
+                              std::ranges::find(kSections, option.section) != kSections.end()) ||
+                             std::ranges::find(kCurriculum, option.name) != kCurriculum.end();
     if (!of_pendulum || option.text() == usual.all()[i].text()) continue;
     throw BadInput(Concat(
         where.empty() ? "" : where + ": ", option.name, ": expected none, as the task ",

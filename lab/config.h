@@ -20,7 +20,7 @@ namespace upswing {
 /// How many past steps an observation may remember.
 inline constexpr int kMostMemory = 100;
 
-/// Evaluations in the closed form, and once more in MuJoCo if all of its episodes succeed there.
+/// Evaluations in the closed form, and once more in MuJoCo where they are passed there.
 inline constexpr std::string_view kScreened = "screened";
 
 /// All settings of a training.

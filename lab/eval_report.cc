@@ -33,8 +33,8 @@ void AddFigures(const Evaluation& e, const EnvSpec& spec, bool knows_values, ord
   j["success_rate"] = e.success_rate();
   j["success_interval_95"] = {e.success_interval.low, e.success_interval.high};
   j["swing_up_seconds"] = QuartilesJson(e.swing_up_seconds, any ? e.successes : 0);
-  j["settled"] = e.settled;
-  j["settling_seconds"] = QuartilesJson(e.settling_seconds, e.settled);
+  j["settled"] = any ? e.settled : 0;
+  j["settling_seconds"] = QuartilesJson(e.settling_seconds, any ? e.settled : 0);
   j["steady_tilt_degrees"] = nullptr;
   if (any && e.tilt.size() == 2) {
     j["steady_tilt_degrees"] = {{"link1", MomentsJson(e.tilt[0], kDegrees)},
@@ -71,9 +71,10 @@ std::vector<std::pair<std::string, std::string>> Cells(const EvalReport& report,
     add("delay", episode.disturbance.delay);
   }
   add("success", e.success ? 1 : 0);
-  const bool upright = e.swing_up_seconds < rule.seconds;
+  const bool held = !rule.by_return();  // the goal is to be held
+  const bool upright = held && e.swing_up_seconds < rule.seconds;
   add("swing_up_seconds", e.swing_up_seconds, upright);
-  add("settling_seconds", e.settling_seconds, e.settling_seconds < rule.seconds);
+  add("settling_seconds", e.settling_seconds, held && e.settling_seconds < rule.seconds);
   for (size_t body = 0; body < e.tilt.size(); ++body) {
     add(Concat("tilt", body + 1, "_degrees"), e.tilt[body] * kDegrees);
   }
@@ -124,7 +125,8 @@ std::string EvalJson(const EvalReport& report) {
   ordered_json j;
   j["policy"] = report.policy;
   j["seed"] = report.env.seed;
-  j["physics"] = report.physics;
+  j["physics"] = nullptr;
+  if (report.spec.task == kDoublePendulum) j["physics"] = report.physics;
   j["task"] = report.spec.task;
   if (report.spec.task != kDoublePendulum) {
     AddFigures(report.figures, report.spec, report.knows_values, j);

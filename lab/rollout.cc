@@ -152,9 +152,8 @@ std::vector<double> ParseStart(const std::string& text, const EnvSpec& spec) {
     if (number && std::isfinite(*number)) numbers.push_back(*number);
   }
   if (pieces.size() != S || numbers.size() != S) {
-    constexpr std::array kCounts{"no", "one", "two", "three", "four", "five", "six"};
-    throw BadInput(Concat("--start: expected ", kCounts.at(S), " numbers ",
-                          Join(spec.state_names, ","), ", got \"", text, "\""));
+    throw BadInput(Concat("--start: expected ", S, " numbers ", Join(spec.state_names, ","),
+                          ", got \"", text, "\""));
   }
   return numbers;
 }

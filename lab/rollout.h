@@ -17,9 +17,9 @@ struct RolloutRow {
   double t = 0;               // s
   std::vector<double> state;  // (S)
   double torque = 0;          // N·m, what the motor gives: after its delay, within its limit
-  bool at_goal = false;
   // Of the double pendulum for the state and the torque of this row, of other tasks for the step
   // that begins here.
+  bool at_goal = false;
   double reward = 0;          // the sum of the terms
   std::vector<double> terms;  // (K)
   std::vector<double> q;  // (Q) values of the policy's actions, in units of reward, if asked for
@@ -36,7 +36,9 @@ struct RolloutConfig {
 
 struct Rollout {
   EnvSpec spec;
-  std::vector<RolloutRow> rows;  // at each control step, the last state included
+  // At each control step; of the double pendulum the last state included, of other tasks up to the
+  // last step.
+  std::vector<RolloutRow> rows;
   // Of this episode of the double pendulum:
   Plant plant;
   Disturbance disturbance;

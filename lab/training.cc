@@ -13,6 +13,12 @@ namespace {
 
 constexpr std::string_view kCheckpointFormat = "upswing-checkpoint-1";
 
+/// The settings, if there is memory for such a training. Throws BadInput.
+Config Checked(Config config) {
+  CheckMemory(config);
+  return config;
+}
+
 /// Environments as the settings have them, whose work the pool shares.
 std::unique_ptr<VectorEnv> MakeTrainingEnv(const Config& config, ThreadPool& pool) {
   EnvConfig env = config.Environments();
@@ -23,7 +29,7 @@ std::unique_ptr<VectorEnv> MakeTrainingEnv(const Config& config, ThreadPool& poo
 }  // namespace
 
 Training::Training(Config config, int threads, std::vector<TrainObserver*> observers)
-    : config_(std::move(config)),
+    : config_(Checked(std::move(config))),
       pool_(threads),
       env_(MakeTrainingEnv(config_, pool_)),
       agent_(config_.MakeAgent(env_->spec(), pool_)),

@@ -37,7 +37,8 @@ class Training {
   /// Saves or loads the whole state.
   void State(const Archive& archive) { trainer_.State(archive); }
 
-  /// The whole state, with the settings that it belongs to.
+  /// The whole state, with the settings that it belongs to. Views the arrays: to be saved before
+  /// the next Step.
   Tensors Checkpoint();
   /// Throws BadInput unless the checkpoint is one of this version and of these settings.
   void Load(const Tensors& checkpoint);

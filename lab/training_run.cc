@@ -8,7 +8,6 @@
 #include "io/file.h"
 #include "io/machine.h"
 #include "io/tensor_file.h"
-#include "lab/config_checks.h"
 #include "lab/run_log.h"
 
 namespace upswing {
@@ -37,7 +36,6 @@ bool StepsGiven(const std::vector<FlagValue>& flags) {
 }  // namespace
 
 std::unique_ptr<TrainingRun> TrainingRun::Make(const fs::path& out, Config config) {
-  CheckMemory(config);
   NameModelCopy(config);
   std::unique_ptr<TrainingRun> run(new TrainingRun(out.empty() ? FreeRunFolder(config) : out));
   const int threads = ResolveThreads(config.train.threads);
@@ -62,7 +60,6 @@ std::unique_ptr<TrainingRun> TrainingRun::Resume(const fs::path& path,
   std::unique_ptr<TrainingRun> run(new TrainingRun(path));
   run->lock_.emplace(path);  // before anything of it is read
   Config config = ReadRunConfig(path, flags);
-  CheckMemory(config);
   NameModelCopy(config);
   const int64_t steps = config.train.steps;
   const int threads = ResolveThreads(config.train.threads);
@@ -109,7 +106,7 @@ bool TrainingRun::Loop(Driver& driver) {
   while (training_->Step()) {
     const TrainRequest request = driver.AfterStep(training_->state());
     if (training_->trainer().IsDue(every) || request != TrainRequest::kGoOn) SaveCheckpoint();
-    if (request == TrainRequest::kStop) return false;
+    if (request == TrainRequest::kStop) return training_->trainer().finished();
   }
   if (checkpoint_at_ != training_->state().steps) SaveCheckpoint();
   return true;

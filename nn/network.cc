@@ -20,9 +20,12 @@ void CheckSizes(const MlpShape& trunk, const HeadShape& head) {
       (head.streams == 0 || valid(head.streams))) {
     return;
   }
+  std::vector<std::string> widths;
+  for (const int64_t width : trunk.hidden) widths.push_back(std::to_string(width));
   throw BadInput(Concat("network: expected 1 to ", MlpShape::kMaxLayers, " layers of 1 to ", kMax,
                         " units, got inputs ", trunk.inputs, ", outputs ", head.outputs, ", ",
-                        trunk.hidden.size(), " hidden layers, head ", head.streams));
+                        trunk.hidden.size(), " hidden layers (", Join(widths, ", "), "), head ",
+                        head.streams));
 }
 
 /// The layout of a network that has no layers yet. Throws BadInput as Network does.

@@ -142,7 +142,7 @@ void TrainConfig::Describe(Options& o) {
       false;
   o.Add(&envs, "envs", 32, {1, 4096}, "", "parallel environments");
   o.Add(&stop_when_solved, "stop_when_solved", true,
-        "stop once all episodes of two evaluations in a row succeed")
+        "stop once two evaluations in a row are passed")
       .identity = false;
   o.Add(&eval_every, "eval_every", 10000, kCount, "steps", "from one evaluation to the next");
   o.Add(&eval_episodes, "eval_episodes", 100, {1, 100000}, "", "episodes of an evaluation");
