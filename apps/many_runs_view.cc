@@ -32,7 +32,6 @@ void PrintRow(const std::string& name, double step, double seconds, double succe
 }  // namespace
 
 void ManyRunsView::Begin(const std::vector<SeedRun>& runs) {
-  InstallSignalHandlers(kStoppingTraining);  // what is begun from here on ends in order
   runs_ = &runs;
   steps_before_ = Measure().steps;
   Announce();

@@ -17,6 +17,7 @@ class ManyRunsView : public ManyRunsObserver {
   /// The plan must outlive it.
   explicit ManyRunsView(const ManyRuns& plan) : plan_(plan) {}
 
+  void Prepare() override { InstallSignalHandlers(kStoppingTraining); }
   /// Prints what is trained and where. The rate counts the steps made from now on.
   void Begin(const std::vector<SeedRun>& runs) override;
   void Watch(const std::vector<const SeedRun*>& running) override;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <optional>
+#include <utility>
 
 #include "apps/commands.h"
 #include "apps/help.h"
@@ -64,11 +66,13 @@ int PrintConfig(const TrainArguments& arguments) {
 int RunTrain(const TrainArguments& arguments) {
   if (arguments.print_config) return PrintConfig(arguments);
   if (!arguments.seeds.empty()) return RunSeeds(arguments);
-  InstallSignalHandlers(kStoppingTraining);  // what is begun from here on ends in order
+  // What is read before anything is begun may be interrupted; what is begun ends in order.
+  std::optional<Config> config;
+  if (arguments.resume.empty()) config = BuildConfig(arguments.config, arguments.flags);
+  InstallSignalHandlers(kStoppingTraining);
   const std::unique_ptr<TrainingRun> run =
-      arguments.resume.empty()
-          ? TrainingRun::Make(arguments.out, BuildConfig(arguments.config, arguments.flags))
-          : TrainingRun::Resume(arguments.resume, arguments.flags);
+      config ? TrainingRun::Make(arguments.out, std::move(*config))
+             : TrainingRun::Resume(arguments.resume, arguments.flags);
   TrainView view(run->training());
   view.Announce(run->path());
   const bool finished = run->Train(view);

@@ -265,10 +265,12 @@ int TrainMany(const ManyRuns& plan, ManyRunsObserver& observer) {
     if (!variant.name.empty()) CheckNoLink(plan.folder / variant.name);
     CheckRuns(plan.folder / variant.name, variant.config, plan.more_steps);
   }
-  std::vector<SeedRun> runs = ListRuns(plan);
-  observer.Begin(runs);
+  observer.Prepare();
   WriteSettings(plan);
   if (!lock) lock.emplace(plan.folder);
+
+  std::vector<SeedRun> runs = ListRuns(plan);
+  observer.Begin(runs);
   Scheduler(runs, plan.jobs, observer).Run();
   observer.Finish();
 

@@ -55,7 +55,9 @@ class ManyRunsObserver {
  public:
   virtual ~ManyRunsObserver() = default;
 
-  /// All is checked and nothing touched; these runs follow, and outlive the observer's last call.
+  /// All is checked and nothing touched; what is begun from here on should end in order.
+  virtual void Prepare() {}
+  /// These runs follow, and outlive the observer's last call.
   virtual void Begin(const std::vector<SeedRun>& runs) = 0;
   /// Called again and again, with those that run now.
   virtual void Watch(const std::vector<const SeedRun*>& running) = 0;
