@@ -19,7 +19,6 @@
 #include "lab/many_runs.h"
 #include "lab/seeds.h"
 #include "lab/training_run.h"
-#include "mujoco/engines.h"
 
 namespace upswing {
 namespace {
@@ -34,11 +33,6 @@ struct TrainArguments {
   std::vector<FlagValue> flags;
 };
 
-bool StepsGiven(const TrainArguments& arguments) {
-  return std::ranges::any_of(arguments.flags,
-                             [](const FlagValue& flag) { return flag.name == "steps"; });
-}
-
 /// The same settings with many seeds.
 int RunSeeds(const TrainArguments& arguments) {
   ManyRuns plan;
@@ -49,7 +43,7 @@ int RunSeeds(const TrainArguments& arguments) {
   plan.folder = arguments.out.empty() ? fs::path("runs") / config.agent : fs::path(arguments.out);
   plan.seeds = ParseSeeds(arguments.seeds, "--seeds");
   plan.jobs = arguments.jobs > 0 ? arguments.jobs : DefaultJobs(config.train.threads);
-  plan.more_steps = StepsGiven(arguments);
+  plan.more_steps = StepsGiven(arguments.flags);
   CheckMemory(config, plan.jobs);
   ManyRunsView view(plan);
   return TrainMany(plan, view);

@@ -28,12 +28,11 @@ void NameModelCopy(Config& config) {
   if (!config.mjcf.empty()) config.model = RunFolder::kModel;
 }
 
-/// Whether one of the flags sets the number of steps.
+}  // namespace
+
 bool StepsGiven(const std::vector<FlagValue>& flags) {
   return std::ranges::any_of(flags, [](const FlagValue& flag) { return flag.name == "steps"; });
 }
-
-}  // namespace
 
 std::unique_ptr<TrainingRun> TrainingRun::Make(const fs::path& out, Config config) {
   NameModelCopy(config);
@@ -76,7 +75,7 @@ std::unique_ptr<TrainingRun> TrainingRun::Resume(const fs::path& path,
 }
 
 void TrainingRun::Open() {
-  const Tensors checkpoint = LoadTensors(path_ / RunFolder::kCheckpoint);
+  const Tensors checkpoint = LoadTensors(RunFolder::CheckpointPath(path_));
   training_->Load(checkpoint);
   checkpoint_at_ = training_->state().steps;
   folder_.emplace(path_, checkpoint);

@@ -14,6 +14,9 @@ namespace upswing {
 /// What a user may request during a training.
 enum class TrainRequest { kGoOn, kCheckpoint, kStop };
 
+/// Whether one of the flags sets the number of steps.
+bool StepsGiven(const std::vector<FlagValue>& flags);
+
 /// A training in a run folder, into which it writes tables, log, checkpoints and the best policy.
 class TrainingRun : private TrainObserver {
  public:
