@@ -1,6 +1,7 @@
 import { expect, test } from 'vitest';
 import { HANGING } from './pendulum';
 import { History } from './history';
+import { STEPS_PER_SECOND } from './world';
 
 const moment = (t: number) => ({ t, state: { ...HANGING }, torque: 1.25, energy: 0, height: -1 });
 
@@ -12,6 +13,18 @@ test('keeps the last seconds, oldest first', () => {
   expect([shown[0]!.t, shown.at(-1)!.t]).toEqual([95, 100]);
   expect(history.from(0).length).toBeLessThanOrEqual(2 * 501);
   expect(history.from(101)).toEqual([]);
+});
+
+test('the oldest of a window counts, whenever it began', () => {
+  for (let start = 0; start < 1000; ++start) {
+    const history = new History(60);
+    const time = (k: number) => (start + 4 * k) / STEPS_PER_SECOND; // as World.time
+    for (let k = 0; k <= 4000; ++k) history.add(moment(time(k)));
+    // Control steps 0.02 s apart: 65 in 1.3 s, and the one at its beginning.
+    expect(history.from(time(4000) - 1.3).length, `${start}`).toBe(66);
+    expect(history.from(time(4000) - 10).length, `${start}`).toBe(501);
+    expect(history.from(0).length, `${start}`).toBe(3001);
+  }
 });
 
 test('as CSV, with time from its start', () => {

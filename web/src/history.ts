@@ -1,4 +1,9 @@
+import { STEPS_PER_SECOND } from './world';
 import type { Moment } from './world';
+
+// Times lie whole physics steps apart. Half a step of margin decides about the one on the edge, not how
+// a difference of two times is rounded.
+const MARGIN = 0.5 / STEPS_PER_SECOND; // s
 
 /// The last moments, oldest first.
 export class History {
@@ -12,17 +17,17 @@ export class History {
 
   add(moment: Moment): void {
     this.moments.push(moment);
-    while (this.moments[this.first]!.t < moment.t - this.seconds) ++this.first;
+    while (this.moments[this.first]!.t < moment.t - this.seconds - MARGIN) ++this.first;
     // Cut from time to time, not at each step.
     if (this.first < 1000) return;
     this.moments = this.moments.slice(this.first);
     this.first = 0;
   }
 
-  /// The moments from time t (s) on.
+  /// The moments from time t (s) on; one exactly at t counts.
   from(t: number): Moment[] {
     let first = this.moments.length;
-    while (first > this.first && this.moments[first - 1]!.t >= t) --first;
+    while (first > this.first && this.moments[first - 1]!.t >= t - MARGIN) --first;
     return this.moments.slice(first);
   }
 

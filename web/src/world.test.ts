@@ -66,13 +66,16 @@ test('it falls as in `upswing simulate`', () => {
 test('a pull throws the balanced pendulum down, and the agent brings it back', () => {
   agentOn('d3qn');
   run(10);
-  expect(world.uprightSince).not.toBeNull();
+  const before = world.uprightFor!;
+  expect(before).toBeGreaterThan(0);
+  run(1);
+  expect(world.uprightFor).toBeCloseTo(before + 1, 9);
   world.drag = { link: 2, along: 0.5, target: { x: 1, z: 0 } };
   run(1);
-  expect(world.uprightSince).toBeNull();
+  expect(world.uprightFor).toBeNull();
   world.drag = null;
   run(15);
-  expect(world.uprightSince).not.toBeNull();
+  expect(world.uprightFor).not.toBeNull();
 });
 
 test('a hand pulls no harder than it may, and its damper calms', () => {

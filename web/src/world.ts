@@ -46,8 +46,6 @@ export class World {
   push: Push | null = null; // that acts now
   /// The agent's decision at the last control step, whether it is on or not; see also look().
   decision: Decision | null = null;
-  /// Time (s) since when both links are upright without a break; null if they are not.
-  uprightSince: number | null = null;
 
   private _plant: Plant = { ...NOMINAL };
   private _policy: Policy | null = null;
@@ -55,6 +53,7 @@ export class World {
   private chosen = 0; // N·m, at that step
   private readonly motor = new DelayLine();
   private steps = 0; // of physics, in all
+  private uprightSince: number | null = null; // physics step; null if the links are not upright
   private untilControl = 0; // steps until the agent chooses again
   private shove = { force: 0, steps: 0 };
 
@@ -89,6 +88,12 @@ export class World {
     return this.steps / STEPS_PER_SECOND;
   }
 
+  /// How long (s) both links have been upright without a break; null if they are not. A count of
+  /// steps, so that 1 s is 1 s whenever it began.
+  get uprightFor(): number | null {
+    return this.uprightSince === null ? null : (this.steps - this.uprightSince) / STEPS_PER_SECOND;
+  }
+
   /// Starts again from `state`, without forces or delayed torques.
   reset(state: State = HANGING): void {
     this.simulator.state = state;
@@ -98,7 +103,7 @@ export class World {
     this.torque = 0;
     this.push = null;
     this.shove.steps = 0;
-    this.uprightSince = inverted(state) ? this.time : null;
+    this.uprightSince = inverted(state) ? this.steps : null;
     this.look();
   }
 
@@ -154,7 +159,7 @@ export class World {
     this.torque = Math.min(Math.max(arriving, -limit), limit);
 
     if (!inverted(state)) this.uprightSince = null;
-    else this.uprightSince ??= this.time;
+    else this.uprightSince ??= this.steps;
     this.onMoment({
       t: this.time,
       state,

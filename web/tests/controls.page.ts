@@ -137,7 +137,7 @@ test('the trail is that of the last 1.3 s, at any rate of frames and any speed',
   await run(page, 5);
   const long = await ages();
   expect(long.length).toBe(65);
-  expect(Math.max(...long)).toBeLessThanOrEqual(1.3 + 1e-9);
+  expect(Math.max(...long)).toBeCloseTo(1.3, 9);
 });
 
 test("a policy of one's own", async ({ page }) => {

@@ -37,7 +37,8 @@ export function run(page: Page, seconds: number): Promise<number[][]> {
       rows.push([moment.t, q1, q2, w1, w2, moment.torque]);
       onMoment(moment);
     };
-    for (let k = 0; k < duration * 200; ++k) world.advance();
+    const steps = Math.round(duration * 200);
+    for (let k = 0; k < steps; ++k) world.advance();
     world.onMoment = onMoment;
     return rows;
   }, seconds);
@@ -52,10 +53,7 @@ export async function startFrom(page: Page, q1: number, q2 = 0, w1 = 0, w2 = 0):
 
 /// How long (s) both links have been upright; 0 if they are not.
 export function balanced(page: Page): Promise<number> {
-  return page.evaluate(() => {
-    const { world } = upswing;
-    return world.uprightSince === null ? 0 : world.time - world.uprightSince;
-  });
+  return page.evaluate(() => upswing.world.uprightFor ?? 0);
 }
 
 /// The largest difference in q1, q2, w1, w2 over two trajectories' common rows.

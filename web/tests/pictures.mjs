@@ -27,9 +27,7 @@ async function swingUp(page) {
 async function pull(page) {
   await page.goto(`${server.address}#agent=d3qn-randomized&mass2=1.2&length1=0.55&on=1`);
   await ready(page);
-  await page.waitForFunction(
-    () => upswing.world.time - (upswing.world.uprightSince ?? Infinity) > 3,
-  );
+  await page.waitForFunction(() => (upswing.world.uprightFor ?? 0) > 3);
   await page.evaluate(() => {
     const target = { x: 0.45, z: 0.95 };
     upswing.world.drag = { link: 2, along: 0.5, target };

@@ -103,10 +103,10 @@ const BALANCED = 1; // s upright, after which it is more than a swing through th
 
 /// What the pendulum is doing, in words.
 export function situation(world: World): { state: string; text: string } {
-  const upright = world.time - (world.uprightSince ?? world.time);
-  if (upright >= BALANCED)
+  const upright = world.uprightFor;
+  if (upright !== null && upright >= BALANCED)
     return { state: 'balanced', text: `balanced for ${upright.toFixed(1)} s` };
-  if (world.uprightSince !== null) return { state: 'upright', text: 'upright' };
+  if (upright !== null) return { state: 'upright', text: 'upright' };
   if (world.agentOn) return { state: 'swinging', text: 'swinging up' };
   return isAtRest(world.state)
     ? { state: 'hanging', text: 'hanging' }
