@@ -44,15 +44,12 @@ Error NoGain(const LqrConfig& config, const Plant& plant) {
       "reaches a mode"));
 }
 
-PolicyInfo InfoOf(LqrConfig config, Plant plant) {
+PolicyInfo InfoOf(LqrConfig config, const Plant& plant) {
   PolicyInfo info;
   info.agent = "lqr";
   info.task = kDoublePendulum;
   info.config = OptionsOf(config).Toml(false, [](const Option&) { return true; });
-  const Options options = OptionsOf(plant);
-  for (const Option& option : options.all()) {
-    info.plant[option.name] = *std::get<double*>(option.target);
-  }
+  for (const auto& [name, value] : PlantValues(plant)) info.plant[name] = value;
   info.control_period = kControlPeriod;
   info.observation = ObservationInfoOf(0);
   return info;

@@ -262,15 +262,6 @@ std::string ConfigToml(Config config, bool identity_only) {
       !identity_only, [&](const Option& option) { return !identity_only || option.identity; });
 }
 
-std::vector<std::pair<std::string, double>> PlantValues(Plant plant) {
-  std::vector<std::pair<std::string, double>> values;
-  const Options options = OptionsOf(plant);
-  for (const Option& option : options.all()) {
-    values.emplace_back(option.name, *std::get<double*>(option.target));
-  }
-  return values;
-}
-
 std::string PlantText(const Plant& plant) {
   std::vector<std::string> texts;
   for (const auto& [name, value] : PlantValues(plant)) {

@@ -101,10 +101,7 @@ std::string ConfigToml(Config config, bool identity_only);
 /// The same with comments, for a file that may lie anywhere: the model's path is absolute.
 std::string CompleteToml(Config config);
 
-/// Name and value of each parameter of a plant.
-std::vector<std::pair<std::string, double>> PlantValues(Plant plant);
-
-/// The same as text: `mass1 1, mass2 1, …`.
+/// A plant's values as text: `mass1 1, mass2 1, …`.
 std::string PlantText(const Plant& plant);
 
 /// Names of the agents in configs/, in alphabetical order, and what each is.

@@ -27,6 +27,15 @@ void Plant::Describe(Options& o) {
   o.Alias("damping", {"damping1", "damping2"});
 }
 
+std::vector<std::pair<std::string, double>> PlantValues(Plant plant) {
+  std::vector<std::pair<std::string, double>> values;
+  const Options options = OptionsOf(plant);
+  for (const Option& option : options.all()) {
+    values.emplace_back(option.name, *std::get<double*>(option.target));
+  }
+  return values;
+}
+
 void RewardWeights::Describe(Options& o) {
   constexpr Range kWeight{0, 1000};
   auto& [energy, height, balance, velocity, torque] = weight;

@@ -2,6 +2,8 @@
 
 #include <array>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "core/options.h"
 #include "core/policy_info.h"
@@ -42,6 +44,9 @@ struct Plant {
   /// One line per setting: name, default, range, unit, help.
   void Describe(Options& options);
 };
+
+/// Name and value of each of its parameters.
+std::vector<std::pair<std::string, double>> PlantValues(Plant plant);
 
 /// Principal moments of inertia (kg·m²) of a solid capsule, across and along its axis: mass m (kg),
 /// radius r (m), length l of its cylinder (m).
