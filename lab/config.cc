@@ -213,9 +213,13 @@ Config ParseConfig(std::string_view text, const fs::path& file,
   return ConfigOf(ParseToml(text, file.empty() ? "" : InputName(file.string())), file, flags);
 }
 
+void NameModelCopy(Config& config) {
+  if (!config.mjcf.empty()) config.model = RunFolder::kModel;
+}
+
 void MakeReadyForMany(Config& config) {
   if (config.train.threads == 0) config.train.threads = 1;
-  if (!config.mjcf.empty()) config.model = RunFolder::kModel;
+  NameModelCopy(config);
 }
 
 std::vector<std::string> MissingSettings(const std::string& text, const std::string& where,

@@ -70,6 +70,9 @@ Config BuildConfig(const std::filesystem::path& file, const std::vector<FlagValu
 Config ParseConfig(std::string_view text, const std::filesystem::path& file,
                    const std::vector<FlagValue>& flags);
 
+/// Names the copy of a model file in the run's folder, wherever that lies, in place of the file.
+void NameModelCopy(Config& config);
+
 /// Sets what differs in a run among many: it has one thread unless more are asked for, and its
 /// model lies beside it.
 void MakeReadyForMany(Config& config);

@@ -23,11 +23,6 @@ fs::path FreeRunFolder(const Config& config) {
   return path;
 }
 
-/// A run's model is the copy in its folder, wherever that lies.
-void NameModelCopy(Config& config) {
-  if (!config.mjcf.empty()) config.model = RunFolder::kModel;
-}
-
 }  // namespace
 
 bool StepsGiven(const std::vector<FlagValue>& flags) {
