@@ -14,6 +14,7 @@
 #include "core/error.h"
 #include "core/rng.h"
 #include "sim/closed_form.h"
+#include "sim/testing.h"
 
 namespace upswing {
 namespace {
@@ -255,14 +256,7 @@ TEST(Lqr, EveryPlantIsHeldOrRefused) {
   Rng rng(5, "plants");
   int held = 0;
   for (int trial = 0; trial < 2000; ++trial) {
-    Plant plant;
-    const Options options = OptionsOf(plant);
-    for (const Option& option : options.all()) {
-      const auto& [low, high] = option.range;
-      *std::get<double*>(option.target) = low > 0
-                                              ? std::exp(rng.Uniform(std::log(low), std::log(high)))
-                                              : high * std::pow(rng.Uniform(), 3);
-    }
+    const Plant plant = RandomPlant(rng);
     if (!MessageOf(LqrConfig(), plant).empty()) continue;
     ++held;
     const LinearModel model = Discretize(LinearizeUpright(plant), kPhysicsTimestep, kPhysicsSteps);

@@ -16,6 +16,7 @@
 #include "io/file.h"
 #include "mujoco/model.h"
 #include "sim/pendulum_env.h"
+#include "sim/testing.h"
 
 namespace upswing {
 namespace {
@@ -38,20 +39,6 @@ void OnEachPath(const Test& test) {
     test(path);
   }
   UseSimdPath(SimdPaths().front());
-}
-
-/// Parameters from the whole of their ranges, evenly on a logarithmic scale (or in the cube root,
-/// where a range begins at 0).
-Plant RandomPlant(Rng& rng) {
-  Plant plant;
-  const Options options = OptionsOf(plant);
-  for (const Option& option : options.all()) {
-    const auto& [low, high] = option.range;
-    *std::get<double*>(option.target) = low > 0
-                                            ? std::exp(rng.Uniform(std::log(low), std::log(high)))
-                                            : high * std::pow(rng.Uniform(), 3);
-  }
-  return plant;
 }
 
 PendulumState RandomState(Rng& rng) {
