@@ -228,10 +228,7 @@ fs::path ManyRuns::NameOf(const Variant& variant, int64_t seed) {
   return fs::path(variant.name) / Concat("seed", seed);
 }
 
-bool SeedRun::finished() const {
-  const TrainConfig& train = variant->config.train;
-  return state && (state->steps >= train.steps || (state->solved && train.stop_when_solved));
-}
+bool SeedRun::finished() const { return state && state->Finished(variant->config.train); }
 
 int64_t SeedRun::Steps() const {
   if (finished()) return state->steps;

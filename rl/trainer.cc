@@ -30,10 +30,6 @@ Trainer::Trainer(TrainSetup setup, Agent& agent, VectorEnv& env)
       result_(env.spec()),
       action_(result_.torque.size()) {}
 
-bool Trainer::finished() const {
-  return state_.steps >= setup_.config.steps || (state_.solved && setup_.config.stop_when_solved);
-}
-
 bool Trainer::Step() {
   if (finished()) return false;
   const TrainConfig& config = setup_.config;
@@ -175,6 +171,10 @@ double TrainState::mean_return() const {
   if (recent_returns.empty()) return 0;
   return std::accumulate(recent_returns.begin(), recent_returns.end(), 0.0) /
          static_cast<double>(recent_returns.size());
+}
+
+bool TrainState::Finished(const TrainConfig& config) const {
+  return steps >= config.steps || (solved && config.stop_when_solved);
 }
 
 void TrainState::State(const Archive& archive) {

@@ -46,6 +46,9 @@ struct TrainState {
 
   TrainState(int num_envs, int num_terms);
   double mean_return() const;
+  /// Whether a training with these settings ends here: the task is solved, unless it is to go on
+  /// then, or the steps are done.
+  bool Finished(const TrainConfig& config) const;
   void State(const Archive& archive);
 };
 
@@ -91,8 +94,7 @@ class Trainer {
   /// nothing done, once the training is finished. Throws Failure if a number is not finite.
   bool Step();
 
-  /// Whether the task is solved (unless it is to go on then) or the steps are done.
-  bool finished() const;
+  bool finished() const { return state_.Finished(setup_.config); }
   /// Whether what is due at each multiple of `every` steps is due after the last Step.
   bool IsDue(int64_t every) const { return upswing::IsDue(before_, state_.steps, every); }
 
