@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstdint>
 #include <utility>
 
 namespace upswing {
@@ -27,11 +26,5 @@ struct EvaluationRule {
     return {by_return() ? 0 : success_rate, mean_return};
   }
 };
-
-/// Whether something that is due at each multiple of `every` is due after the step that leads from
-/// `before` to `now`.
-inline bool IsDue(int64_t before, int64_t now, int64_t every) {
-  return now / every != before / every;
-}
 
 }  // namespace upswing

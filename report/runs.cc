@@ -2,6 +2,7 @@
 
 #include "core/csv.h"
 #include "core/error.h"
+#include "core/steps.h"
 #include "core/text.h"
 #include "io/file.h"
 #include "io/run_folder.h"

@@ -10,11 +10,9 @@
 #include "core/env.h"
 #include "core/matrix.h"
 #include "core/policy.h"
+#include "core/steps.h"
 
 namespace upswing {
-
-/// More control steps, over all environments, than any training makes.
-inline constexpr int64_t kMostSteps = 2'000'000'000'000;
 
 /// Names and values, in a fixed order.
 using Metrics = std::vector<std::pair<std::string, double>>;

@@ -7,6 +7,7 @@
 
 #include "core/env.h"
 #include "core/options.h"
+#include "core/steps.h"
 #include "rl/agent.h"
 #include "rl/evaluate.h"
 
