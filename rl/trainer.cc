@@ -53,7 +53,7 @@ bool Trainer::Step() {
     const Metrics metrics = agent_.TakeMetrics();
     for (TrainObserver* observer : setup_.observers) observer->OnMetrics(s, metrics);
   }
-  if (IsDue(config.eval_every) || s.steps >= config.steps) Judge(IsDue(config.eval_every));
+  if (IsDue(config.eval_every) || s.steps >= config.steps) Evaluate(IsDue(config.eval_every));
   return true;
 }
 
@@ -81,7 +81,7 @@ void Trainer::CountEpisodes() {
   }
 }
 
-void Trainer::Judge(bool scheduled) {
+void Trainer::Evaluate(bool scheduled) {
   const Evaluation e = setup_.evaluate(*agent_.ExportPolicy({}), state_.steps);
   state_.last_success_rate = e.success_rate();
   KeepIfBest(e);

@@ -109,7 +109,7 @@ class Trainer {
   /// Adds the step's result to the running episodes and tells of those that it finished.
   void CountEpisodes();
   /// Evaluates the present policy. An unscheduled final evaluation does not count towards `solved`.
-  void Judge(bool scheduled);
+  void Evaluate(bool scheduled);
   void KeepIfBest(const Evaluation& e);
   /// Solved: two passed evaluations in a row.
   void CountStreak(const Evaluation& e);
