@@ -31,7 +31,7 @@ struct RolloutConfig {
   EnvConfig env;                             // of one environment
   std::optional<std::vector<double>> start;  // (S); none: that of the environment's own episode
   double seconds = 20;                       // to the nearest step; less if it terminates
-  bool q_values = false;
+  bool q_values = false;  // whether rows have q; the policy must have values then
 };
 
 struct Rollout {

@@ -20,7 +20,8 @@
 /// parameters, y target, B batch size, A number of actions, D observation size.
 namespace upswing {
 
-/// So many torques, evenly spaced from -limit to limit (N·m): a discrete agent's actions.
+/// So many torques, at least 2, evenly spaced from -limit to limit (N·m): a discrete agent's
+/// actions.
 std::vector<double> TorqueLevels(double torque_limit, int64_t count);
 
 /// TD targets y (B). `select` chooses a* = argmax_a select(s', a), and y = r + discount ·
