@@ -3,9 +3,10 @@
 
   build/peers-venv/bin/python tools/peers/check_task.py
 
-Two rollouts of `upswing simulate` are compared row by row: state, observation, reward. Then the
-transitions that `upswing train` has put into its replay memory are made again one by one: torque,
-successor, reward and the end of the episode. Prints one line, or what differs, with exit code 1.
+Two rollouts of `upswing simulate`, one with the nine torques and one with any, are compared row by
+row: state, observation, reward. Then the transitions that `upswing train` has put into its replay
+memory are made again one by one: torque, successor, reward and the end of the episode. Prints one
+line, or what differs, with exit code 1.
 """
 
 import csv
@@ -40,10 +41,8 @@ def expect_close(what, expected, got, tolerance):
                           f"(tolerance {tolerance:g})")
 
 
-def check_rollout(start, folder):
-    """Compares ten seconds from a start under torques drawn at random."""
-    draw = random.Random(1)
-    torques = [draw.choice(pendulum.TORQUES) for _ in range(pendulum.EPISODE_STEPS)]
+def check_rollout(start, torques, folder):
+    """Compares a rollout from a start under such torques."""
     schedule, table = Path(folder, "torques.csv"), Path(folder, "rollout.csv")
     schedule.write_text("torque\n" + "".join(f"{tau}\n" for tau in torques), encoding="utf-8")
     ours.run([ours.PROGRAM, "simulate", "--torque", schedule,
@@ -51,7 +50,7 @@ def check_rollout(start, folder):
     with open(table, encoding="utf-8", newline="") as file:
         rows = [{name: float(text) for name, text in row.items()} for row in csv.DictReader(file)]
 
-    env = pendulum.DoublePendulum()
+    env = pendulum.TorquePendulum()
     env.set_state(start)
     for row, tau in zip(rows, [*torques, 0.0], strict=True):
         where = f"upswing simulate --start={start}, t = {row['t']} s"
@@ -63,7 +62,7 @@ def check_rollout(start, folder):
         expect_close(f"{where}, observation", obs, pendulum.observe(*env.state()), 1e-6)
         expect_close(f"{where}, reward", row["reward"], pendulum.reward(*env.state(), tau),
                      ROLLOUT_TOLERANCE)
-        env.apply(tau)
+        env.apply(env.torque([tau]))
     return sum(row["inverted"] for row in rows)
 
 
@@ -103,8 +102,12 @@ def check_replay(folder):
 def main():
     try:
         with tempfile.TemporaryDirectory(prefix="upswing-peers-") as folder:
-            inverted = check_rollout((0.1, -0.05, 0.2, -0.1), folder)
-            inverted += check_rollout((3.0, 0.1, 0.0, 0.0), folder)
+            draw, steps = random.Random(1), range(pendulum.EPISODE_STEPS)
+            nine = [draw.choice(pendulum.TORQUES) for _ in steps]
+            limit = pendulum.TORQUE_LIMIT
+            any_torque = [draw.uniform(-limit, limit) for _ in steps]
+            inverted = check_rollout((0.1, -0.05, 0.2, -0.1), any_torque, folder)
+            inverted += check_rollout((3.0, 0.1, 0.0, 0.0), nine, folder)
             expect_close("rows of the rollouts that are inverted, some", True, inverted > 0, 0)
             check_replay(folder)
     except ours.Failed as failed:

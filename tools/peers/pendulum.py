@@ -33,7 +33,8 @@ MJCF = """<mujoco model="double_pendulum">
 </mujoco>
 """
 
-TORQUES = [5 * quarter / 4 for quarter in range(-4, 5)]  # N·m, one for each action
+TORQUE_LIMIT = 5.0  # N·m
+TORQUES = [TORQUE_LIMIT * quarter / 4 for quarter in range(-4, 5)]  # N·m, one for each action
 PHYSICS_STEPS = 4  # in a control period of 0.02 s
 EPISODE_STEPS = 500  # control steps: 10 s
 START_NOISE = 0.1  # standard deviation of all four state variables, rad and rad/s
@@ -111,9 +112,22 @@ class DoublePendulum(gymnasium.Env):
         self.set_state(START_NOISE * self.np_random.standard_normal(4))
         return observe(*self.state()), {}
 
+    def torque(self, action):
+        """The torque that an action stands for (N·m)."""
+        return TORQUES[action]
+
     def step(self, action):
-        tau = TORQUES[action]
+        tau = self.torque(action)
         self.apply(tau)
         self.steps += 1
         state = self.state()
         return observe(*state), reward(*state, tau), False, self.steps >= EPISODE_STEPS, {}
+
+
+class TorquePendulum(DoublePendulum):
+    """The same with any torque up to the limit as its action (N·m)."""
+
+    action_space = gymnasium.spaces.Box(-TORQUE_LIMIT, TORQUE_LIMIT, (1,), np.float32)
+
+    def torque(self, action):
+        return min(max(float(action[0]), -TORQUE_LIMIT), TORQUE_LIMIT)
