@@ -6,11 +6,14 @@ Examples:
   tools/peers/compare.py --measure training --threads 1 --rounds 3
   tools/peers/compare.py --width 64 --json peers.json
   tools/peers/compare.py --measure acrobot --threads 1 --rounds 10
+  tools/peers/compare.py --measure sac,ppo --threads 1
+  tools/peers/compare.py --measure sac --task double-pendulum --width 256 --batch 256 --steps 2000
+  tools/peers/compare.py --measure ppo --threads 1 --sides rltools,stable-baselines3
 
-gradient: gradient steps alone, on a filled replay memory. training: steps of a training with one
-environment and one update a step. acrobot: our agent of that name from its first step to its last,
-and the return that it reaches; the number of the round is the seed. The peers are installed into
-build/peers-venv first (once).
+gradient: gradient steps of DQN alone, on a filled replay memory. training: steps of a training with
+DQN, one environment and one update a step. acrobot: our agent of that name from its first step to
+its last, and the return that it reaches. sac, ppo: such trainings with SAC and PPO. The number of
+the round is the seed. The peers are installed into build/ first (once).
 """
 
 import argparse
@@ -18,69 +21,92 @@ import json
 import os
 import platform
 import shutil
-import statistics
 import sys
-import textwrap
 import time
 from pathlib import Path
 
+import actors
 import ours
+import tables
 
 HERE = Path(__file__).resolve().parent
-VENV = ours.ROOT / "build/peers-venv"
-PYTHON = VENV / "bin/python"
-REQUIREMENTS = HERE / "requirements.txt"
 
-# Each peer is a script that is called as sb3_dqn.py is, and prints the same JSON line.
-PEERS = {"stable-baselines3": HERE / "sb3_dqn.py"}
+
+class Peer:
+    """A library: its virtual environment, what goes into it, and the script of each measure, which
+    is called as sb3_dqn.py is and prints the same JSON line."""
+
+    def __init__(self, venv, requirements, pip_flags, scripts):
+        self.venv, self.pip_flags = ours.ROOT / "build" / venv, pip_flags
+        self.python = self.venv / "bin/python"
+        self.requirements = HERE / requirements
+        self.scripts = {what: HERE / script for what, script in scripts.items()}
+
+
+PEERS = {
+    "rltools": Peer("rltools-venv", "requirements-rltools.txt", ["--require-hashes", "--no-deps"],
+                    {"sac": "rltools_actor.py", "ppo": "rltools_actor.py"}),
+    "stable-baselines3": Peer("peers-venv", "requirements.txt", [],
+                              {"gradient": "sb3_dqn.py", "training": "sb3_dqn.py",
+                               "acrobot": "sb3_dqn.py", "sac": "sb3_actor.py",
+                               "ppo": "sb3_actor.py"})}
 SIDES = ["upswing", *PEERS]
-
-SAME = (
-    "Both sides: plain network 8-W-W-9 with ReLU, batch of B transitions, single precision; no "
-    "double, dueling or layer normalisation; one-step targets, Huber loss (smooth L1), Adam, "
-    f"gradient norm clipped to {ours.MAX_GRADIENT_NORM}, discount {ours.GAMMA}, replay memory of "
-    f"{ours.REPLAY:,}. In training: one environment, one update a step from step "
-    f"{ours.LEARNING_STARTS} on, Polyak target at each with tau {ours.TAU}, epsilon "
-    f"{ours.EPSILON}.")
-
-
-SAME_ON_ACROBOT = (
-    "acrobot: Gymnasium's Acrobot-v1 and the settings of our agent `acrobot`, as far as both sides "
-    "have them (tools/peers/README.md); one round for each seed.")
-
+MEASURES = ours.MEASURES | {"sac": actors.sac, "ppo": actors.ppo}
+# What each measure takes, and what it is where nothing else is asked for.
+ARGUMENTS = ours.ARGUMENTS | {what: ["task", "width", "batch", "threads", "steps", "seed"]
+                              for what in actors.DEFAULTS}
+DEFAULTS = {"gradient": {"width": 256, "batch": 128}, "training": {"width": 256, "batch": 128},
+            "acrobot": {}} | actors.DEFAULTS
 
 def say(text):
     """Progress goes to standard error, so that the table can be piped."""
     print(text, file=sys.stderr, flush=True)
 
 
-def install_peers():
-    """Makes the virtual environment again unless it already holds requirements.txt."""
-    wanted = REQUIREMENTS.read_text(encoding="utf-8")
-    done = VENV / "installed.txt"
+def install(peer):
+    """Makes a peer's virtual environment again unless it already holds its requirements."""
+    wanted = peer.requirements.read_text(encoding="utf-8")
+    done = peer.venv / "installed.txt"
     if done.is_file() and done.read_text(encoding="utf-8") == wanted:
         return
-    say(f"installing the peers into {VENV}: up to 3 GB to fetch, see tools/peers/README.md")
+    say(f"installing {peer.requirements.name} into {peer.venv}, see tools/peers/README.md")
     try:
-        ours.run([sys.executable, "-m", "venv", "--clear", VENV])
-        ours.run([PYTHON, "-m", "pip", "--disable-pip-version-check", "install", "--quiet",
-                  "--only-binary=:all:", "-r", REQUIREMENTS])
+        ours.run([sys.executable, "-m", "venv", "--clear", peer.venv])
+        ours.run([peer.python, "-m", "pip", "--disable-pip-version-check", "install", "--quiet",
+                  "--only-binary=:all:", *peer.pip_flags, "-r", peer.requirements])
     except ours.Failed as failed:
         raise ours.Failed(f"the peers cannot be installed (no network, no python3-venv, no space "
                           f"on the disk?): {failed}") from None
     done.write_text(wanted, encoding="utf-8")
 
 
+def takes_part(side, what, threads, a):
+    """Whether a side has what is to be measured. RLtools has one thread and its own Pendulum-v1."""
+    if side not in a.sides:
+        return False
+    if side == "rltools":
+        return what in PEERS[side].scripts and threads == 1 and a.task == "pendulum-v1"
+    return side == "upswing" or what in PEERS[side].scripts
+
+
+def settings(a):
+    """{measure: {name: value}} of what can be chosen, but for threads and seeds."""
+    values = {"seconds": a.seconds, "task": a.task} | a.given
+    return {what: {name: (DEFAULTS[what] | values)[name] for name in ARGUMENTS[what]
+                   if name not in ("threads", "seed")} for what in a.measure}
+
+
 def measure(side, what, threads, seed, a):
-    """One measurement of one side: steps_per_second, cpu_seconds_per_step; on Acrobot-v1 also
-    seconds, mean_return."""
-    values = {"width": a.width, "batch": a.batch, "threads": threads, "seconds": a.seconds,
-              "seed": seed}
-    arguments = {name: values[name] for name in ours.ARGUMENTS[what]}
+    """One measurement of one side: steps_per_second, cpu_seconds_per_step; of a whole training
+    also seconds, mean_return."""
+    arguments = settings(a)[what] | {"threads": threads}
+    if "seed" in ARGUMENTS[what]:
+        arguments["seed"] = seed
     if side == "upswing":
-        return ours.MEASURES[what](**arguments)
+        return MEASURES[what](**arguments)
     flags = [f"--{name}={value}" for name, value in arguments.items()]
-    return json.loads(ours.run([PYTHON, "-B", PEERS[side], what, *flags]).splitlines()[-1])
+    output = ours.run([PEERS[side].python, "-B", PEERS[side].scripts[what], what, *flags])
+    return json.loads(output.splitlines()[-1])
 
 
 def measure_in_turns(a):
@@ -90,68 +116,16 @@ def measure_in_turns(a):
     for number in range(a.rounds):
         for what in a.measure:
             for threads in a.threads:
-                for side in SIDES if number % 2 == 0 else SIDES[::-1]:
+                sides = [side for side in SIDES if takes_part(side, what, threads, a)]
+                for side in sides if number % 2 == 0 else sides[::-1]:
                     result = measure(side, what, threads, number + 1, a)
                     results.setdefault((what, threads, side), []).append(result)
                     say(f"round {number + 1} of {a.rounds}, {what}, threads {threads}, {side}: "
                         f"{result['steps_per_second']:,.0f} steps/s, "
-                        f"{1000 * result['cpu_seconds_per_step']:.2f} ms of CPU a step"
+                        f"{1e6 * result['cpu_seconds_per_step']:,.2f} µs of CPU a step"
                         + ("" if "mean_return" not in result else
                            f", return {result['mean_return']:.1f}"))
     return results
-
-
-def summarize(results):
-    """One row for each measurement, with medians and our rate and CPU time over theirs. A ratio is
-    the median over the rounds, so that load on both sides of a round cancels out; the ratio of the
-    fastest rounds estimates that of a machine without other load."""
-    rows = []
-    for (what, threads, side), rounds in results.items():
-        row = {"measure": what, "threads": threads, "side": side, "rounds": rounds}
-        for figure in ("steps_per_second", "cpu_seconds_per_step"):
-            values = [result[figure] for result in rounds]
-            our_values = [result[figure] for result in results[what, threads, "upswing"]]
-            row[figure] = statistics.median(values)
-            row[f"{figure}_range"] = [min(values), max(values)]
-            row[f"{figure}_upswing_ratio"] = statistics.median(
-                mine / theirs for mine, theirs in zip(our_values, values, strict=True))
-            if figure == "steps_per_second":
-                row["fastest_upswing_ratio"] = max(our_values) / max(values)
-        returns = [result["mean_return"] for result in rounds if "mean_return" in result]
-        if returns:
-            row["mean_return"] = statistics.median(returns)
-            row["mean_return_range"] = [min(returns), max(returns)]
-        rows.append(row)
-    return sorted(rows, key=lambda row: (row["measure"], row["threads"], SIDES.index(row["side"])))
-
-
-def print_table(rows):
-    """Medians, ranges and ratios."""
-    line = "{:<10}{:>7}  {:<18}{:>8}{:>16}{:>8}{:>10}{:>10}{:>10}"
-    print(line.format("measure", "threads", "side", "steps/s", "(range)", "CPU ms", "our rate",
-                      "fastest", "our CPU"))
-    print(line.format("", "", "", "", "", "a step", "/ theirs", "/ fastest", "/ theirs"))
-    for row in rows:
-        low, high = row["steps_per_second_range"]
-        ratios = ("", "", "")
-        if row["side"] != "upswing":
-            ratios = [f"{row[name]:.2f}" for name in
-                      ("steps_per_second_upswing_ratio", "fastest_upswing_ratio",
-                       "cpu_seconds_per_step_upswing_ratio")]
-        print(line.format(row["measure"], row["threads"], row["side"],
-                          f"{row['steps_per_second']:,.0f}", f"({low:,.0f}-{high:,.0f})",
-                          f"{1000 * row['cpu_seconds_per_step']:.2f}", *ratios).rstrip())
-
-
-def print_returns(rows):
-    """What was reached on Acrobot-v1, and in how long."""
-    line = "{:<10}{:>7}  {:<18}{:>10}{:>14}  {}"
-    print("\n" + line.format("measure", "threads", "side", "seconds", "mean return", "(range)"))
-    for row in rows:
-        seconds = statistics.median(result["seconds"] for result in row["rounds"])
-        low, high = row["mean_return_range"]
-        print(line.format(row["measure"], row["threads"], row["side"], f"{seconds:.1f}",
-                          f"{row['mean_return']:.1f}", f"({low:.1f} to {high:.1f})"))
 
 
 def processor():
@@ -167,8 +141,8 @@ def processor():
 def describe(a):
     """What the figures are of."""
     return {"date": time.strftime("%Y-%m-%dT%H:%M:%S%z"), "processor": processor(),
-            "processors": os.cpu_count(), "load_average": os.getloadavg(), "width": a.width,
-            "batch": a.batch, "seconds": a.seconds, "rounds": a.rounds}
+            "processors": os.cpu_count(), "load_average": os.getloadavg(), "task": a.task,
+            "settings": settings(a), "rounds": a.rounds}
 
 
 def number(least, most, kind=int):
@@ -191,31 +165,40 @@ def several(kind):
     return lambda text: list(dict.fromkeys(kind(piece) for piece in text.split(",")))
 
 
-def one_measure(text):
-    """A type for argparse: the name of a measure."""
-    if text not in ours.MEASURES:
-        names = ", ".join(ours.MEASURES)
-        raise argparse.ArgumentTypeError(f"expected one of {names}, got '{text}'")
-    return text
+def one_of(names):
+    """A type for argparse: a name."""
+    def parse(text):
+        if text not in names:
+            raise argparse.ArgumentTypeError(f"expected one of {', '.join(names)}, got '{text}'")
+        return text
+    return parse
 
 
 def parse_arguments():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--measure", type=several(one_measure), default=["gradient", "training"],
-                        metavar="LIST", help="of gradient, training, acrobot [gradient,training]")
-    parser.add_argument("--width", type=number(1, 4096), default=256, metavar="W",
-                        help="of both hidden layers [256]")
-    parser.add_argument("--batch", type=number(1, 65536), default=128, metavar="B",
-                        help="transitions in a minibatch [128]")
+    parser.add_argument("--measure", type=several(one_of(MEASURES)),
+                        default=["gradient", "training"], metavar="LIST",
+                        help=f"of {', '.join(MEASURES)} [gradient,training]")
+    parser.add_argument("--sides", type=several(one_of(SIDES)), default=SIDES, metavar="LIST",
+                        help=f"of {', '.join(SIDES)} [all]")
+    parser.add_argument("--task", type=one_of(actors.TASKS), default="pendulum-v1", metavar="TASK",
+                        help=f"of sac and ppo: {' or '.join(actors.TASKS)} [pendulum-v1]")
+    parser.add_argument("--width", type=number(1, 4096), metavar="W",
+                        help="of both hidden layers [256; sac, ppo: 64]")
+    parser.add_argument("--batch", type=number(1, 65536), metavar="B",
+                        help="transitions in a minibatch [128; sac: 100; ppo: 256]")
+    parser.add_argument("--steps", type=number(1, 10**9), metavar="N",
+                        help="of a training with sac or ppo [20000, 300000]")
     parser.add_argument("--threads", type=several(number(1, 256)), default=[1, 2], metavar="LIST",
                         help="how many threads, one measurement for each [1,2]")
     parser.add_argument("--rounds", type=number(1, 1000), default=5, metavar="N",
                         help="measurements of each side [5]")
     parser.add_argument("--seconds", type=number(0.1, 3600, float), default=3.0, metavar="S",
-                        help="length of a measurement, about [3]")
+                        help="length of a measurement of gradient or training, about [3]")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there, too")
     a = parser.parse_args()
+    a.given = {name: getattr(a, name) for name in ("width", "batch", "steps") if getattr(a, name)}
     if a.json and a.json.is_dir():
         parser.error(f"--json {a.json}: expected a file, got a folder")
     if a.json and not a.json.resolve().parent.is_dir():
@@ -223,18 +206,30 @@ def parse_arguments():
     return a
 
 
-def compare(a):
-    """Installs, checks, measures, prints."""
-    if not shutil.which(ours.PROGRAM):
+def prepare(a):
+    """Installs the peers, and checks that the double pendulum is the same task on both sides."""
+    if "upswing" in a.sides and not shutil.which(ours.PROGRAM):
         raise ours.Failed(f"the program is not built: expected {ours.PROGRAM}, "
                           "which ./upswing train --help makes")
-    install_peers()
-    if set(a.measure) != {"acrobot"}:
+    for side, peer in PEERS.items():
+        if any(takes_part(side, what, threads, a) for what in a.measure for threads in a.threads):
+            install(peer)
+    on_double_pendulum = [what for what in a.measure if what in ("gradient", "training") or
+                          what in actors.DEFAULTS and a.task == "double-pendulum"]
+    if on_double_pendulum and {"upswing", "stable-baselines3"} <= set(a.sides):
         say("checking that both sides have the same task")
-        say(ours.run([PYTHON, "-B", HERE / "check_task.py"]).strip())
+        python = PEERS["stable-baselines3"].python
+        say(ours.run([python, "-B", HERE / "check_task.py"]).strip())
 
+
+def compare(a):
+    """Prepares, measures, prints."""
+    prepare(a)
     context = describe(a)
-    rows = summarize(measure_in_turns(a))
+    rows = tables.summarize(measure_in_turns(a), SIDES)
+    if not rows:
+        raise ours.Failed("none of these sides has what is to be measured "
+                          "(tools/peers/README.md)")
     context["load_average_after"] = os.getloadavg()
     context["versions"] = sorted({result["version"] for row in rows for result in row["rounds"]
                                   if "version" in result})
@@ -242,15 +237,12 @@ def compare(a):
     print(f"{context['processor']}, {context['processors']} processors, "
           f"load average {load:.1f} before and {load_after:.1f} after")
     print(f"{'; '.join(context['versions'])}; medians of {a.rounds} rounds")
-    if set(a.measure) != {"acrobot"}:
-        print(f"W = {a.width}, B = {a.batch}, {a.seconds:g} s a round")
-        print(textwrap.fill(SAME, 96))
-    if "acrobot" in a.measure:
-        print(textwrap.fill(SAME_ON_ACROBOT, 96))
+    tables.print_heading(a.measure, context["settings"])
     print()
-    print_table(rows)
-    if "acrobot" in a.measure:
-        print_returns([row for row in rows if row["measure"] == "acrobot"])
+    tables.print_table(rows)
+    whole_trainings = [row for row in rows if "mean_return" in row]
+    if whole_trainings:
+        tables.print_returns(whole_trainings)
     if a.json:
         text = json.dumps({"context": context, "results": rows}, indent=1)
         a.json.write_text(text + "\n", encoding="utf-8")

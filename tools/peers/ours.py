@@ -4,6 +4,7 @@ import csv
 import json
 import math
 import os
+import resource
 import statistics
 import subprocess
 import tempfile
@@ -61,8 +62,8 @@ def train_flags(width, batch, threads, steps, out):
 
 def children_cpu_seconds():
     """CPU time of all child processes that have ended."""
-    times = os.times()
-    return times.children_user + times.children_system
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
 
 
 def read_rows(path):
