@@ -71,9 +71,9 @@ std::vector<std::pair<std::string, std::string>> Cells(const EvalReport& report,
   }
   add("success", e.success ? 1 : 0);
   const bool held = !rule.by_return();  // the goal is to be held
-  const bool upright = held && e.swing_up_seconds < rule.seconds;
-  add("swing_up_seconds", e.swing_up_seconds, upright);
-  add("settling_seconds", e.settling_seconds, held && e.settling_seconds < rule.seconds);
+  const bool upright = held && e.swing_up_seconds.has_value();
+  add("swing_up_seconds", e.swing_up_seconds.value_or(0), upright);
+  add("settling_seconds", e.settling_seconds.value_or(0), held && e.settling_seconds.has_value());
   for (size_t body = 0; body < e.tilt.size(); ++body) {
     add(Concat("tilt", body + 1, "_degrees"), e.tilt[body] * kDegrees);
   }

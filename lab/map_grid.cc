@@ -25,10 +25,8 @@ struct EpisodeRange {
   int count;
 };
 
-struct EpisodeResult {
-  bool success;
-  double swing_up_seconds;
-};
+/// Swing-up time (s) of an episode that succeeds.
+using EpisodeResult = std::optional<double>;
 
 /// An end of an axis: a number, or a percentage on top of the training's value.
 struct AxisEnd {
@@ -101,7 +99,7 @@ std::vector<EpisodeResult> RunRange(const MapConfig& config, const Policy& polic
 
   std::vector<EpisodeResult> results;
   for (const EvaluationEpisode& episode : EvaluateEpisodes(policy, env)) {
-    results.push_back({episode.success, episode.swing_up_seconds});
+    results.push_back(episode.success ? episode.swing_up_seconds : std::nullopt);
   }
   return results;
 }
@@ -127,7 +125,7 @@ std::vector<EpisodeRange> RangesOf(std::span<const int64_t> cells, int64_t episo
 MapCell CellOf(std::span<const EpisodeResult> episodes) {
   std::vector<double> seconds;
   for (const EpisodeResult& episode : episodes) {
-    if (episode.success) seconds.push_back(episode.swing_up_seconds);
+    if (episode) seconds.push_back(*episode);
   }
   const auto successes = static_cast<int64_t>(seconds.size());
   const double none = std::numeric_limits<double>::quiet_NaN();

@@ -126,8 +126,8 @@ EvaluationEpisode JudgeEpisode(const Policy& policy, const EnvConfig& config) {
 std::string JudgementText(const EvaluationEpisode& episode, const EvaluationRule& rule) {
   std::string upright;
   if (!rule.by_return()) {
-    upright = episode.swing_up_seconds < rule.seconds
-                  ? fmt::format("upright from {:.2f} s to the end, ", episode.swing_up_seconds)
+    upright = episode.swing_up_seconds
+                  ? fmt::format("upright from {:.2f} s to the end, ", *episode.swing_up_seconds)
                   : "not upright at the end, ";
   }
   return fmt::format("{}, {}return {:.6g}", episode.success ? "success" : "failure", upright,

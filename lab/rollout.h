@@ -16,7 +16,8 @@ namespace upswing {
 struct RolloutRow {
   double t = 0;               // s
   std::vector<double> state;  // (S)
-  double torque = 0;          // N·m, what the motor gives: after its delay, within its limit
+  double torque = 0;          // what the motor gives: after its delay, within its limit; N·m
+                              // or the task's unit of actions
   // Of the double pendulum for the state and the torque of this row, of other tasks for the step
   // that begins here.
   bool at_goal = false;
@@ -27,7 +28,7 @@ struct RolloutRow {
 
 struct RolloutConfig {
   const Policy* policy = nullptr;            // who chooses torques; none: the schedule
-  std::vector<double> schedule;              // N·m, a torque for each step; 0 behind its end
+  std::vector<double> schedule;              // a torque for each step; 0 behind its end
   EnvConfig env;                             // of one environment
   std::optional<std::vector<double>> start;  // (S); none: that of the environment's own episode
   double seconds = 20;                       // to the nearest step; less if it terminates

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <utility>
 
 #include "core/aligned.h"
 
@@ -77,15 +78,16 @@ class EpisodeTally {
     const bool settled = settled_since_ >= 0 && at_goal;
     const auto seconds = [&](int64_t steps) { return static_cast<double>(steps) * seconds_; };
     EvaluationEpisode& e = episode_;
-    e.swing_up_seconds = at_goal ? seconds(goal_since_) : rule_.seconds;
-    e.settling_seconds = settled ? seconds(settled_since_) : rule_.seconds;
+    e.seconds = seconds(step_);
+    if (at_goal) e.swing_up_seconds = seconds(goal_since_);
+    if (settled) e.settling_seconds = seconds(settled_since_);
     e.success = rule_.by_return() ? e.reward_sum >= rule_.solved_return
                                   : at_goal && goal_since_ <= steps_ - hold_steps_;
     e.rms_torque = std::sqrt(squares_ / static_cast<double>(step_));
     e.torque_variation = variation_ / seconds(step_);
-    if (at_goal && goal_since_ < steps_) {
-      e.goal_variation = goal_variation_ / seconds(steps_ - goal_since_);
-      e.goal_changes = static_cast<double>(goal_changes_) / seconds(steps_ - goal_since_);
+    if (at_goal && goal_since_ < step_) {
+      e.goal_variation = goal_variation_ / seconds(step_ - goal_since_);
+      e.goal_changes = static_cast<double>(goal_changes_) / seconds(step_ - goal_since_);
     }
     return std::move(e);
   }
@@ -142,6 +144,16 @@ std::vector<double> Figures(const std::vector<const EvaluationEpisode*>& episode
   return values;
 }
 
+/// The same of those episodes that have it.
+std::vector<double> Figures(const std::vector<const EvaluationEpisode*>& episodes,
+                            std::optional<double> EvaluationEpisode::*figure) {
+  std::vector<double> values;
+  for (const EvaluationEpisode* episode : episodes) {
+    if (const std::optional<double>& value = episode->*figure) values.push_back(*value);
+  }
+  return values;
+}
+
 /// Acts for all environments, in slices that a pool can share.
 class SharedActing {
  public:
@@ -182,20 +194,20 @@ ValueUnits ValueUnitsOf(const Policy& policy) {
 }
 
 Evaluation Summarize(std::span<const EvaluationEpisode> episodes, const EvaluationRule& rule) {
-  std::vector<const EvaluationEpisode*> all, successful, settled;
+  std::vector<const EvaluationEpisode*> all, successful;
   Evaluation e;
   for (const EvaluationEpisode& episode : episodes) {
     all.push_back(&episode);
-    if (!episode.success) continue;
-    successful.push_back(&episode);
-    if (episode.settling_seconds < rule.seconds) settled.push_back(&episode);
+    if (episode.success) successful.push_back(&episode);
   }
   e.episodes = static_cast<int64_t>(all.size());
   e.successes = static_cast<int64_t>(successful.size());
   e.success_interval = WilsonInterval(e.successes, e.episodes);
   e.swing_up_seconds = QuartilesOf(Figures(successful, &EvaluationEpisode::swing_up_seconds));
-  e.settled = static_cast<int64_t>(settled.size());
-  e.settling_seconds = QuartilesOf(Figures(settled, &EvaluationEpisode::settling_seconds));
+  std::vector<double> settling = Figures(successful, &EvaluationEpisode::settling_seconds);
+  e.settled = static_cast<int64_t>(settling.size());
+  e.settling_seconds = QuartilesOf(std::move(settling));
+  e.seconds = MomentsOf(Figures(all, &EvaluationEpisode::seconds));
   e.reward_sum = MomentsOf(Figures(all, &EvaluationEpisode::reward_sum));
   e.work = MomentsOf(Figures(all, &EvaluationEpisode::work));
   e.rms_torque = MomentsOf(Figures(all, &EvaluationEpisode::rms_torque));

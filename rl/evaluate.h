@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <numbers>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -20,17 +21,18 @@ inline constexpr double kSettledTilt = 0.05 * std::numbers::pi;
 /// Results of one evaluation episode.
 struct EvaluationEpisode {
   bool success = false;
-  double swing_up_seconds = 0;  // start of the last stretch at the goal that lasts to the end;
-                                // its whole length if the end is not at the goal
-  double settling_seconds = 0;  // start of the last stretch settled that lasts to the end;
-                                // its whole length if the end is not settled
-  double reward_sum = 0;        // return: undiscounted, over the first return_seconds
-  double work = 0;              // Σ |mechanical work of the motor|, J
-  double peak_torque = 0;       // largest |torque|, N·m
-  double rms_torque = 0;        // root mean square, N·m
-  double torque_variation = 0;  // total variation Σ |τₖ - τₖ₋₁| a second, N·m/s
-  // Of the last stretch at the goal; 0 if the end is not at the goal.
-  double goal_variation = 0;     // the torque's total variation a second, N·m/s
+  double seconds = 0;  // its length; it may terminate before the time that the rule gives it
+  // Start of the last stretch at the goal, and of the last one settled, that lasts to the end; none
+  // if the end is not.
+  std::optional<double> swing_up_seconds, settling_seconds;
+  double reward_sum = 0;  // return: undiscounted, over the first return_seconds
+  double work = 0;        // Σ |mechanical work of the motor|, J
+  // Of the torques, in the task's unit of actions, such as N·m:
+  double peak_torque = 0;       // largest |torque|
+  double rms_torque = 0;        // root mean square
+  double torque_variation = 0;  // total variation Σ |τₖ - τₖ₋₁| a second
+  // Of the last stretch at the goal; 0 if there is none or it has no length.
+  double goal_variation = 0;     // the torque's total variation a second
   double goal_changes = 0;       // how often a second the torque changes
   double value = 0;              // largest value of the first observation, in units of reward
   double discounted_return = 0;  // Σ γᵏ r over the whole episode: what `value` estimates, if the
@@ -46,7 +48,7 @@ struct Evaluation {
   Quartiles swing_up_seconds;  // of the successful episodes
   int64_t settled = 0;         // successful episodes that are settled at the end
   Quartiles settling_seconds;  // of those episodes
-  Moments reward_sum, work, rms_torque, torque_variation;
+  Moments seconds, reward_sum, work, rms_torque, torque_variation;
   Moments goal_variation, goal_changes;  // of the successful episodes
   std::vector<Moments> tilt;  // (bodies) |mean lean| at the end of the successful episodes, rad
   double peak_torque = 0;

@@ -90,18 +90,33 @@ TEST(Evaluate, OneStateOffTheGoalEndsAStretch) {
 TEST(Evaluate, ABlownUpEpisodeFailsEvenIfLaterStatesAreAtTheGoal) {
   ScriptedEnv env({100, 100});
   env.blow_up = 1;
-  const Evaluation e = Evaluate(Constant(0), env);
+  const std::vector<EvaluationEpisode> episodes = EvaluateEpisodes(Constant(0), env);
+  EXPECT_DOUBLE_EQ(episodes[1].seconds, 18);
+  EXPECT_DOUBLE_EQ(episodes[1].work, 450);  // 900 steps of half a joule
+  EXPECT_FALSE(episodes[1].swing_up_seconds);
+  const Evaluation e = Summarize(episodes, env.spec().evaluation);
   EXPECT_EQ(e.successes, 1);
+  EXPECT_DOUBLE_EQ(e.seconds.mean, 19);
+}
+
+TEST(Evaluate, TheVeryLastStateAtTheGoalIsAnEndAtTheGoal) {
+  ScriptedEnv env({1000, 1001});
+  const std::vector<EvaluationEpisode> episodes = EvaluateEpisodes(Constant(0), env);
+  EXPECT_FALSE(episodes[0].success);
+  EXPECT_DOUBLE_EQ(episodes[0].swing_up_seconds.value(), 20);
+  EXPECT_FALSE(episodes[1].swing_up_seconds);
 }
 
 TEST(Evaluate, TheSummaryIsThatOfTheEpisodes) {
   ScriptedEnv env({500, 501, 100, 2000}), again({500, 501, 100, 2000});
   const std::vector<EvaluationEpisode> episodes = EvaluateEpisodes(Constant(-2), env);
   ASSERT_EQ(episodes.size(), 4U);
-  const double seconds[] = {10, 10.02, 2, 20};
+  const double seconds[] = {10, 10.02, 2, -1};
   for (size_t i = 0; i < 4; ++i) {
     EXPECT_EQ(episodes[i].success, i % 2 == 0);
-    EXPECT_DOUBLE_EQ(episodes[i].swing_up_seconds, seconds[i]);
+    ASSERT_EQ(episodes[i].swing_up_seconds.has_value(), i < 3);
+    EXPECT_DOUBLE_EQ(episodes[i].swing_up_seconds.value_or(-1), seconds[i]);
+    EXPECT_DOUBLE_EQ(episodes[i].seconds, 20);
     EXPECT_DOUBLE_EQ(episodes[i].terms[0], 500 * 501 / 2.0);
   }
   const Evaluation summary = Summarize(episodes, env.spec().evaluation);
@@ -132,8 +147,8 @@ TEST(Evaluate, SettlingTimeTorqueVariationAndTilt) {
   LeaningEnv env;
   const std::vector<EvaluationEpisode> episodes = EvaluateEpisodes(Constant(0), env);
   EXPECT_TRUE(episodes[0].success && episodes[1].success);
-  EXPECT_DOUBLE_EQ(episodes[0].settling_seconds, 3);
-  EXPECT_EQ(episodes[1].settling_seconds, 20);  // more than 9° off
+  EXPECT_DOUBLE_EQ(episodes[0].settling_seconds.value(), 3);
+  EXPECT_FALSE(episodes[1].settling_seconds);  // more than 9° off
   EXPECT_NEAR(episodes[0].tilt[0], env.kDegree, 1e-12);
   EXPECT_NEAR(episodes[0].tilt[1], -2 * env.kDegree, 1e-12);
   // 99 changes of 1 N·m, then one of 0.5 at each of 105, 110, …, 1000: 180 of them in 18 s.
