@@ -30,6 +30,13 @@ std::string QuartilesText(const Quartiles& q) {
                      q.high);
 }
 
+/// How long the episodes are: one length, or, where some end earlier than others, their mean.
+std::string LengthText(const Moments& seconds) {
+  constexpr double kSame = 1e-6;  // s
+  if (seconds.deviation < kSame) return fmt::format("{:.6g} s", seconds.mean);
+  return fmt::format("the {} s of an episode", MomentsText(seconds));
+}
+
 /// What makes an episode a success, such as `a return of -100 or more`.
 std::string SuccessText(const EvaluationRule& rule) {
   if (rule.by_return()) return fmt::format("a return of {:.6g} or more", rule.solved_return);
@@ -59,12 +66,13 @@ void PrintSuccesses(const Evaluation& e) {
   fmt::print("  steady tilt    {}   of the last {} s\n", Join(tilts, ", "), kSteadyTiltSeconds);
 }
 
-void PrintTorques(const Evaluation& e, bool has_goal) {
-  fmt::print("  torque         peak {:.4g} N·m, rms {} N·m\n", e.peak_torque,
-             MomentsText(e.rms_torque));
-  fmt::print("  its variation  {} N·m/s", MomentsText(e.torque_variation));
-  const bool upright = has_goal && e.successes > 0;
-  if (upright) fmt::print("; once upright {} N·m/s", MomentsText(e.goal_variation));
+void PrintTorques(const Evaluation& e, const EnvSpec& spec) {
+  const std::string& unit = spec.action_unit;
+  fmt::print("  torque         peak {:.4g} {}, rms {} {}\n", e.peak_torque, unit,
+             MomentsText(e.rms_torque), unit);
+  fmt::print("  its variation  {} {}/s", MomentsText(e.torque_variation), unit);
+  const bool upright = !spec.evaluation.by_return() && e.successes > 0;
+  if (upright) fmt::print("; once upright {} {}/s", MomentsText(e.goal_variation), unit);
   fmt::print("\n");
   if (upright) {
     fmt::print("  chatter        {} changes of the torque a second, once upright\n",
@@ -99,8 +107,8 @@ void PrintEvalTable(const EvalReport& report) {
     fmt::print("  Q at the start {:.4g} expected, {:.4g} attained (discounted reward)\n", e.value,
                e.discounted_return);
   }
-  fmt::print("  energy used    {} J   in {} s\n", MomentsText(e.work), rule.seconds);
-  PrintTorques(e, !rule.by_return());
+  fmt::print("  energy used    {} J   in {}\n", MomentsText(e.work), LengthText(e.seconds));
+  PrintTorques(e, report.spec);
   fmt::print("  ± is the standard deviation over the episodes\n");
 }
 

@@ -73,11 +73,14 @@ void PrintPolicy(const LoadedPolicy& loaded) {
   fmt::print("  what        {}, {} parameters\n", policy.description(),
              FormatCount(policy.num_parameters()));
   if (loaded.task != kDoublePendulum) fmt::print("  task        {}\n", loaded.task);
+  EnvConfig env;
+  env.task = loaded.task;
   const auto levels = policy.value_actions().values();
-  fmt::print(
-      "  torques     {}, every {} s\n",
-      levels.empty() ? "any within the limit" : fmt::format("{} N·m", fmt::join(levels, ", ")),
-      *info.control_period);
+  fmt::print("  torques     {}, every {} s\n",
+             levels.empty()
+                 ? "any within the limit"
+                 : fmt::format("{} {}", fmt::join(levels, ", "), SpecOf(env).action_unit),
+             *info.control_period);
   fmt::print("  made by     agent {}, seed {}, step {}, upswing {}\n", Known(info.agent),
              Known(info.seed), Known(info.step), Known(info.upswing_version));
   fmt::print("  evaluated   {}\n", EvaluationText(info));

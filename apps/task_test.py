@@ -3,6 +3,8 @@
 
 import csv
 import json
+import re
+import statistics
 import tempfile
 import unittest
 from pathlib import Path
@@ -56,6 +58,27 @@ class TaskTest(unittest.TestCase):
                 self.assertEqual(int(row["success"]), int(float(row["return"]) >= threshold))
             returns = [float(row["return"]) for row in rows]
             self.assertAlmostEqual(report["return"]["mean"], sum(returns) / len(returns), places=9)
+
+    def test_the_energy_is_that_of_the_length_of_the_episodes(self):
+        def energy_line(policy, *flags):
+            table = run("eval", self.root / policy, "--episodes", 20, *flags)
+            self.assertEqual(table.returncode, 0, table.stderr)
+            return next(line for line in table.stdout.splitlines() if "energy used" in line)
+        self.assertTrue(energy_line("pendulum-v1").endswith(" J   in 10 s"))  # always as long
+        # Long enough to reach the goal. A step costs 1, but not the one that reaches it and ends
+        # the episode.
+        trained = run("train", "--task", "acrobot-v1", "--levels", 3, "--hidden", "16", "--head", 8,
+                      "--steps", 20000, "--envs", 4, "--eval-every", 5000, "--eval-episodes", 5,
+                      "--learning-starts", 200, "--threads", 1, "--out", self.root / "reaches")
+        self.assertEqual(trained.returncode, 0, trained.stderr)
+        table = self.root / "lengths.csv"
+        line = energy_line("reaches", "--episodes-csv", table)
+        with open(table, encoding="utf-8", newline="") as file:
+            steps = [min(500, 1 - float(row["return"])) for row in csv.DictReader(file)]
+        self.assertLess(min(steps), 500)
+        mean, deviation = map(float, re.search(r" J   in the (\S+) ± (\S+) s of an", line).groups())
+        self.assertAlmostEqual(mean, 0.2 * statistics.mean(steps), delta=0.51)
+        self.assertAlmostEqual(deviation, 0.2 * statistics.stdev(steps), delta=0.51)
 
     def test_simulate_makes_the_episode_of_eval(self):
         for task, (states, _, _) in TASKS.items():

@@ -17,7 +17,8 @@ struct EnvSpec {
   std::string task;                      // its name, such as "double-pendulum"
   int num_envs = 1;                      // N
   int obs_size = 0;                      // D
-  std::vector<double> action_limit;      // (A) N·m: component i of an action is within ± this
+  std::vector<double> action_limit;      // (A) component i of an action is within ± this
+  std::string action_unit = "N·m";       // of an action's components, such as torques
   double step_seconds = 0;               // control period, s
   std::vector<std::string> term_names;   // (K) of the reward's terms
   std::vector<std::string> state_names;  // (S) such as "q1"

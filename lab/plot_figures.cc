@@ -166,9 +166,11 @@ Panel Energies(const std::vector<Moment>& motion, const Plant& plant) {
        OverTime("target", motion, [&](const PendulumState&) { return target; })});
 }
 
-Panel Torques(const Rows& rows) {
-  return PanelOf("torque (N·m)",
-                 {Held("", rows, [](const RolloutRow& row) { return row.torque; })});
+std::string TorqueLabel(const EnvSpec& spec) { return Concat("torque (", spec.action_unit, ")"); }
+
+Panel Torques(const Rollout& rollout) {
+  return PanelOf(TorqueLabel(rollout.spec),
+                 {Held("", rollout.rows, [](const RolloutRow& row) { return row.torque; })});
 }
 
 Panel Rewards(const Rollout& rollout) {
@@ -194,7 +196,8 @@ Panel LargestQ(const Rows& rows) {
 
 /// How far below the best action's each action's Q-value is; of long episodes the mean over some
 /// steps, or the cells would make a large file.
-Panel QValues(const Rows& rows, std::span<const double> torques) {
+Panel QValues(const Rollout& rollout, std::span<const double> torques) {
+  const Rows& rows = rollout.rows;
   constexpr size_t kMostColumns = 250;
   const size_t steps = std::max<size_t>(1, rows.size() - 1);  // the last row lasts no time
   const size_t width = (steps + kMostColumns - 1) / kMostColumns;
@@ -220,7 +223,7 @@ Panel QValues(const Rows& rows, std::span<const double> torques) {
   const Line greedy = Held("greedy action", rows, [&](const RolloutRow& row) {
     return torques[static_cast<size_t>(std::ranges::max_element(row.q) - row.q.begin())];
   });
-  Panel panel = PanelOf("torque (N·m)", {greedy});
+  Panel panel = PanelOf(TorqueLabel(rollout.spec), {greedy});
   panel.heat_map = std::move(map);
   return panel;
 }
@@ -289,12 +292,12 @@ Figure EpisodeFigure(const Rollout& rollout, const Policy& policy) {
   Figure figure;
   figure.width = 1000;
   figure.panels = StatePanels(rollout);
-  figure.panels.push_back(Torques(rows));
+  figure.panels.push_back(Torques(rollout));
   figure.panels.push_back(Rewards(rollout));
   constexpr int kPanelHeight = 170;
   if (!rows.front().q.empty()) figure.panels.push_back(LargestQ(rows));
   if (!policy.value_actions().empty()) {
-    figure.panels.push_back(QValues(rows, policy.value_actions().values()));
+    figure.panels.push_back(QValues(rollout, policy.value_actions().values()));
   }
   figure.height = kPanelHeight * static_cast<int>(figure.panels.size());
   for (Panel& panel : figure.panels) panel.x_range = {0, rows.back().t};

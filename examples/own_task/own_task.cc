@@ -27,8 +27,9 @@ class CartEnv : public VectorEnv {
   CartEnv(int num_envs, uint64_t seed) : rng_(seed, "cart"), carts_(size_t(num_envs)) {
     spec_.task = "cart";
     spec_.num_envs = num_envs;
-    spec_.obs_size = 2;        // x, v
-    spec_.action_limit = {1};  // N
+    spec_.obs_size = 2;  // x, v
+    spec_.action_limit = {1};
+    spec_.action_unit = std::string("N");  // g++ 12 warns of a bare "N"
     spec_.step_seconds = kStep;
     spec_.term_names = {"position", "velocity", "crash"};
     spec_.state_names = {"x", "v"};
