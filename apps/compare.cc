@@ -4,7 +4,6 @@
 
 #include "apps/commands.h"
 #include "apps/compare_report.h"
-#include "core/text.h"
 #include "io/file.h"
 #include "report/figure.h"
 

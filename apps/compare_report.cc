@@ -4,7 +4,6 @@
 
 #include <cmath>
 
-#include "apps/progress.h"
 #include "core/json.h"
 #include "core/text.h"
 #include "lab/format.h"

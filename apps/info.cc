@@ -5,7 +5,6 @@
 #include <optional>
 
 #include "apps/commands.h"
-#include "apps/progress.h"
 #include "control/upright_modes.h"
 #include "core/error.h"
 #include "core/simd.h"

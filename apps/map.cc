@@ -5,7 +5,6 @@
 #include <chrono>
 #include <memory>
 #include <numeric>
-#include <optional>
 
 #include "apps/commands.h"
 #include "apps/map_table.h"

@@ -1,9 +1,6 @@
 #pragma once
 
-#include <fmt/format.h>
-
 #include <chrono>
-#include <cstdio>
 #include <string>
 #include <vector>
 

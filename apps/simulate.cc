@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <cmath>
 #include <memory>
 #include <optional>
 
@@ -10,7 +9,6 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "io/streams.h"
-#include "lab/config.h"
 #include "lab/loaded_policy.h"
 #include "lab/rollout.h"
 

@@ -1,9 +1,7 @@
 #pragma once
 
 #include <memory>
-#include <span>
 #include <string>
-#include <vector>
 
 #include "core/matrix.h"
 #include "core/policy_info.h"
@@ -51,7 +49,8 @@ class Policy {
   /// The actions (num_values × A) that the values belong to; empty for V.
   virtual Matrix<const double> value_actions() const { return {}; }
 
-  /// What its file holds (docs/policy-format.md). Throws BadInput if this kind is not kept in files.
+  /// What its file holds (docs/policy-format.md). Throws BadInput if this kind is not kept in
+  /// files.
   virtual Tensors ToTensors() const = 0;
 };
 

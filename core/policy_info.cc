@@ -1,7 +1,5 @@
 #include "core/policy_info.h"
 
-#include <cmath>
-
 #include "core/error.h"
 #include "core/json.h"
 #include "core/options.h"

@@ -1,5 +1,4 @@
 // The checkpoint: the whole state of a training, which is then resumed.
-#include <cmath>
 
 #include "core/error.h"
 #include "core/safetensors.h"

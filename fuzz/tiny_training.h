@@ -1,7 +1,5 @@
 #pragma once
 
-#include <string_view>
-
 #include "lab/config.h"
 #include "lab/training.h"
 

@@ -10,7 +10,6 @@
 #include "core/archive.h"
 #include "core/error.h"
 #include "core/rng.h"
-#include "core/safetensors.h"
 #include "core/text.h"
 #include "io/file.h"
 #include "io/testing.h"

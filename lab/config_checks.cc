@@ -5,7 +5,6 @@
 #include <algorithm>
 
 #include "core/error.h"
-#include "core/text.h"
 #include "io/machine.h"
 #include "lab/format.h"
 #include "nn/q_network.h"

@@ -1,8 +1,5 @@
 #include "lab/eval_report.h"
 
-#include <fmt/format.h>
-
-#include <cmath>
 #include <numbers>
 
 #include "core/json.h"

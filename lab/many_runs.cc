@@ -14,7 +14,6 @@
 #include "io/machine.h"
 #include "io/run_folder.h"
 #include "io/tensor_file.h"
-#include "sim/double_pendulum.h"
 
 namespace upswing {
 namespace {

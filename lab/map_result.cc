@@ -5,13 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 #include "core/json.h"
 #include "core/text.h"
 #include "io/file.h"
 #include "lab/config.h"
-#include "lab/format.h"
 #include "report/figure.h"
 #include "rl/evaluate.h"
 

@@ -3,7 +3,6 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "lab/config.h"
-#include "lab/toml_settings.h"
 
 namespace upswing {
 

@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "mujoco/testing.h"
 #include "sim/pendulum_env.h"

@@ -3,7 +3,6 @@
 #include <tinyxml2.h>
 
 #include <algorithm>
-#include <cmath>
 #include <string_view>
 #include <vector>
 

@@ -5,7 +5,6 @@
 // Arguments: number of environments; for the closed form also the path's place in SimdPaths().
 #include <benchmark/benchmark.h>
 
-#include <algorithm>
 #include <cmath>
 
 #include "core/rng.h"

@@ -3,7 +3,6 @@
 #include <hwy/base.h>
 
 #include <algorithm>
-#include <utility>
 
 #include "core/aligned.h"
 #include "core/error.h"

@@ -1,10 +1,9 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <utility>
 #include <vector>
-
-#include "report/comparison.h"
 
 /// What tests of comparisons share.
 namespace upswing {

@@ -4,7 +4,6 @@
 #include <numbers>
 #include <optional>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "core/env.h"

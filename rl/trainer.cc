@@ -5,7 +5,6 @@
 #include <chrono>
 #include <numeric>
 
-#include "core/error.h"
 #include "core/text.h"
 
 namespace upswing {

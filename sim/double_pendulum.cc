@@ -7,8 +7,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/text.h"
-
 namespace upswing {
 
 void Plant::Describe(Options& o) {
