@@ -25,14 +25,15 @@ EnvSpec OneEnvironment() { return PendulumSpec(PendulumEnvConfig()); }
 /// A replay memory filled with random transitions, 2% of which terminate.
 std::shared_ptr<Replay> FilledReplay(int64_t size) {
   Rng rng(1, "benchmark");
-  auto replay = std::make_shared<Replay>(size, kObservationSize);
+  auto replay = std::make_shared<Replay>(size, kObservationSize, ActionSpace::Discrete(kActions));
   std::vector<float> obs(kObservationSize);
   std::vector<float> next_obs(kObservationSize);
   for (int64_t i = 0; i < size; ++i) {
     for (float& x : obs) x = static_cast<float>(rng.Uniform(-1, 1));
     for (float& x : next_obs) x = static_cast<float>(rng.Uniform(-1, 1));
-    replay->Add({obs, next_obs, static_cast<int>(rng.Below(kActions)),
-                 static_cast<float>(rng.Uniform(-1, 1)), rng.Uniform() < 0.02 ? 0.0F : 0.99F});
+    const auto action = static_cast<float>(rng.Below(kActions));
+    replay->Add({obs, next_obs, std::span(&action, 1), static_cast<float>(rng.Uniform(-1, 1)),
+                 rng.Uniform() < 0.02 ? 0.0F : 0.99F});
   }
   return replay;
 }
@@ -195,9 +196,9 @@ BenchCases ReplayCases(const BenchOptions& /*options*/) {
   };
   const auto add = [=]() -> BenchWork {
     const std::shared_ptr<Replay> replay = FilledReplay(kStored);
-    const std::vector<float> obs(kObservationSize, 0.5F);
+    const std::vector<float> obs(kObservationSize, 0.5F), action{1};
     return [=] {
-      for (int i = 0; i < kBatch; ++i) replay->Add({obs, obs, 1, 0.5F, 0.99F});
+      for (int i = 0; i < kBatch; ++i) replay->Add({obs, obs, action, 0.5F, 0.99F});
     };
   };
   return {{fmt::format("replay/sample/batch:{}", kBatch), "transitions", kBatch, 0, 0, 1, sample},

@@ -152,9 +152,12 @@ void AddSettings(CLI::App& app, const Options& options, std::vector<FlagValue>& 
   }
 }
 
-void ShowDefaults(CLI::App& app, const Options& options) {
-  for (const Option& option : options.all()) {
-    app.get_option(option.flag())->description(option.about_with_default());
+void ShowDefaults(CLI::App& app, const Options& every, const Options& options) {
+  for (const Option& option : every.all()) {
+    CLI::Option* flag = app.get_option(option.flag());
+    const Option* shown = options.Get(option.name);
+    flag->group(shown == nullptr ? "" : shown->section);
+    if (shown != nullptr) flag->description(shown->about_with_default());
   }
 }
 

@@ -37,8 +37,8 @@ void AddArguments(CLI::App& app, const Options& options);
 /// is added to `flags`.
 void AddSettings(CLI::App& app, const Options& options, std::vector<FlagValue>& flags);
 
-/// Lets --help show the values that these settings have now as their defaults.
-void ShowDefaults(CLI::App& app, const Options& options);
+/// Lets --help show of `every` setting those of `options`, with their values now as defaults.
+void ShowDefaults(CLI::App& app, const Options& every, const Options& options);
 
 /// Adds the policy to try, a file, a run folder or a controller, and the controllers' settings; not
 /// required unless the caller says so.

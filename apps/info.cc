@@ -18,6 +18,7 @@
 #include "lab/loaded_policy.h"
 #include "lab/model_info.h"
 #include "mujoco/model.h"
+#include "nn/actor_policy.h"
 #include "nn/bfloat16.h"
 #include "nn/q_policy.h"
 
@@ -39,7 +40,7 @@ std::string EvaluationText(const PolicyInfo& info) {
                      *info.mean_return);
 }
 
-void PrintSelfCheck(const QPolicy::SelfCheck& check) {
+void PrintSelfCheck(const SelfCheck& check) {
   fmt::print("  self-check  passed, largest difference {:.1e} of at most {:.1e}\n", check.error,
              check.tolerance);
   if (check.has_checksum) {
@@ -48,7 +49,7 @@ void PrintSelfCheck(const QPolicy::SelfCheck& check) {
   }
   fmt::print(
       "  checksum    none: the self-check cannot notice a changed weight that moves no "
-      "Q-value of the\n"
+      "output of the\n"
       "              samples by more than that\n");
 }
 
@@ -89,6 +90,9 @@ void PrintPolicy(const LoadedPolicy& loaded) {
   const std::optional<ModelInfo> model = InfoOfModel(loaded.mjcf, "");
   if (model) fmt::print("  model       {}\n", model->Text());
   if (const auto* q = dynamic_cast<const QPolicy*>(&policy)) PrintSelfCheck(q->self_check());
+  if (const auto* actor = dynamic_cast<const ActorPolicy*>(&policy)) {
+    PrintSelfCheck(actor->self_check());
+  }
 }
 
 void PrintRun(const fs::path& path, bool has_policy) {

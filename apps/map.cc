@@ -58,9 +58,8 @@ Training TrainingOf(const LoadedPolicy& loaded) {
   }
   const std::string& settings = loaded.policy->info().config;
   if (settings.empty()) return training;
-  Config config;
   try {
-    ApplyToml(OptionsOf(config), settings, "config");
+    const Config config = ConfigIn(settings, "config");
     training.point.disturbance = config.disturbance;
     training.randomization = config.randomization;
     training.known = true;

@@ -94,13 +94,14 @@ void ShowDefaultsOfWhatIsChosen(CLI::App& app) {
   std::vector<FlagValue> flags;
   if (const std::string agent = last_of("--agent"); !agent.empty()) flags = {{"agent", agent}};
   Config config = BuildConfig(last_of("--config"), flags);
-  ShowDefaults(app, OptionsOf(config));
+  Config scratch;
+  ShowDefaults(app, EverySetting(scratch), OptionsOf(config));
 }
 
 /// The named agents, a paragraph each.
 std::string AgentsText() {
   std::string text =
-      "Defaults are those of the agent (and file) given: train --agent fast --help.\n\n"
+      "Settings and defaults are those of the agent (and file) given: train --agent sac --help.\n\n"
       "Named agents:\n";
   constexpr size_t kIndent = 20;
   for (const auto& [name, what] : NamedAgents()) {
@@ -134,7 +135,7 @@ void AddTrain(CLI::App& program, Command& command) {
       ->disable_flag_override();
   AddManyOptions(*app, arguments->seeds, arguments->jobs);
   Config defaults;
-  AddSettings(*app, OptionsOf(defaults), arguments->flags);
+  AddSettings(*app, EverySetting(defaults), arguments->flags);
   app->formatter(std::make_shared<HelpFormatter>([app] { ShowDefaultsOfWhatIsChosen(*app); }));
   app->footer(
       AgentsText() +

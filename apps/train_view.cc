@@ -16,6 +16,23 @@
 
 namespace upswing {
 
+namespace {
+
+/// What learns, such as `double, dueling network 64-64 with heads of 32`.
+std::string LearnerText(const Config& config) {
+  if (config.algorithm == "sac") {
+    const SacConfig& s = config.sac;
+    return fmt::format("soft actor-critic, {} of {}", s.twin ? "networks" : "one critic, networks",
+                       fmt::join(s.hidden, "-"));
+  }
+  const DqnConfig& d = config.dqn;
+  return fmt::format("{}{} network {}{}", d.double_q ? "double, " : "",
+                     d.dueling ? "dueling" : "plain", fmt::join(d.hidden, "-"),
+                     d.dueling ? fmt::format(" with heads of {}", d.head) : "");
+}
+
+}  // namespace
+
 TrainView::TrainView(const Training& training)
     : training_(training),
       begin_step_(training.state().steps),
@@ -26,16 +43,15 @@ TrainView::TrainView(const Training& training)
 void TrainView::Announce(const std::filesystem::path& run) const {
   const Config& config = training_.config();
   const int threads = training_.threads();
-  const DqnConfig& d = config.dqn;
   Say("Training {} (seed {}) in {}\n", config.agent, config.train.seed, Printable(run.string()));
-  Say("  {}{} network {}{}, {} parameters; {} environments, {} thread{}\n",
-      d.double_q ? "double, " : "", d.dueling ? "dueling" : "plain", fmt::join(d.hidden, "-"),
-      d.dueling ? fmt::format(" with heads of {}", d.head) : "",
+  Say("  {}, {} parameters; {} environments, {} thread{}\n", LearnerText(config),
       FormatCount(training_.policy()->num_parameters()), config.train.envs, threads,
       threads == 1 ? "" : "s");
   if (config.task != kDoublePendulum) Say("  task {}\n", config.task);
-  if (config.physics != kMuJoCo.name || d.precision != "float32") {
-    Say("  physics {}, products in {}\n", config.physics, d.precision);
+  const bool rounded = config.algorithm == "dqn" && config.dqn.precision != "float32";
+  if (config.physics != kMuJoCo.name || rounded) {
+    Say("  physics {}, products in {}\n", config.physics,
+        rounded ? config.dqn.precision : "float32");
   }
   const std::optional<ModelInfo> model = InfoOfModel(config.mjcf, config.model);
   if (model) Say("  model {}\n", model->Text());
@@ -104,6 +120,7 @@ std::vector<std::string> TrainView::AgentTexts() const {
   const bool learned = training_.agent().updates() > 0;
   std::vector<std::string> texts;
   for (const auto& [name, value] : metrics_) {
+    if (name == "alpha") texts.push_back(fmt::format("alpha {:.3f}", value));
     if (name == "epsilon") texts.push_back(fmt::format("eps {:.2f}", value));
     if (name == "loss") {
       texts.push_back(learned ? fmt::format("loss {:.4f}", value) : "loss      -");

@@ -248,6 +248,26 @@ void Options::Alias(std::string_view name, std::vector<std::string> members,
   aliases_.push_back({section_, std::string(name), std::move(members), std::move(text)});
 }
 
+void Options::AddMissing(const Options& others) {
+  for (const Option& option : others.options_) {
+    if (Get(option.name) == nullptr) options_.push_back(option);
+  }
+  for (const AliasEntry& alias : others.aliases_) {
+    const auto same = [&](const AliasEntry& own) { return own.name == alias.name; };
+    if (std::ranges::none_of(aliases_, same)) aliases_.push_back(alias);
+  }
+}
+
+void Options::Explain(std::string_view name, std::string_view why) {
+  missing_[std::string(name)] = why;
+}
+
+const Option* Options::Get(std::string_view name) const {
+  const auto found =
+      std::ranges::find_if(options_, [&](const Option& option) { return option.name == name; });
+  return found == options_.end() ? nullptr : &*found;
+}
+
 std::vector<const Option*> Options::Find(std::string_view name, const std::string& where) const {
   std::vector<std::string> names{std::string(name)};
   std::vector<std::string> known;
@@ -259,6 +279,9 @@ std::vector<const Option*> Options::Find(std::string_view name, const std::strin
   for (const Option& option : options_) {
     known.push_back(option.name);
     if (std::count(names.begin(), names.end(), option.name) != 0) found.push_back(&option);
+  }
+  if (const auto why = missing_.find(name); found.empty() && why != missing_.end()) {
+    throw BadInput(Concat(where, ": ", why->second));
   }
   if (found.empty()) {
     std::string hint = DidYouMean(name, known);

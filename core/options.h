@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <map>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -83,7 +84,15 @@ class Options {
   /// the text is "both … and …".
   void Alias(std::string_view name, std::vector<std::string> members, std::string_view help = "");
 
+  /// Adds those of `others` whose names are not among these.
+  void AddMissing(const Options& others);
+
+  /// Says why there is no setting of this name, for the message of Find.
+  void Explain(std::string_view name, std::string_view why);
+
   const std::vector<Option>& all() const { return options_; }
+  /// The setting of this name; nullptr if there is none.
+  const Option* Get(std::string_view name) const;
   struct AliasEntry {
     std::string section, name;
     std::vector<std::string> members;
@@ -109,6 +118,7 @@ class Options {
   std::string section_;
   std::vector<Option> options_;
   std::vector<AliasEntry> aliases_;
+  std::map<std::string, std::string, std::less<>> missing_;  // name → why there is none
 };
 
 /// Gives a configuration struct the defaults of its Describe.

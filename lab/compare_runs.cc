@@ -71,10 +71,20 @@ std::vector<fs::path> RunsIn(const fs::path& folder, Found& found) {
 std::vector<Setting> SettingsOf(Config config) {
   std::vector<Setting> settings;
   config.model.clear();  // a model is what is in its file, not where that lies: see below
-  for (const Option& option : TrainingSettings(config)) {
-    const auto* text = std::get_if<std::string*>(&option.target);
-    settings.emplace_back(Concat(option.section, ".", option.name),
-                          text != nullptr ? **text : option.text());
+  // Those of all algorithms in one order, so that any two runs can be compared.
+  Config scratch;
+  const std::vector<Option> own = TrainingSettings(config);
+  const Options all = EverySetting(scratch);
+  for (const Option& every : all.all()) {
+    const auto found =
+        std::ranges::find_if(own, [&](const Option& option) { return option.name == every.name; });
+    const std::string name = Concat(every.section, ".", every.name);
+    if (found == own.end()) {
+      settings.emplace_back(name, "none");
+      continue;
+    }
+    const auto* text = std::get_if<std::string*>(&found->target);
+    settings.emplace_back(name, text != nullptr ? **text : found->text());
   }
   settings.emplace_back(kModelContent, ModelContent(config.mjcf));  // the last one, for ModelOf
   return settings;

@@ -13,11 +13,16 @@
 #include "mujoco/engines.h"
 #include "mujoco/mjcf_check.h"
 #include "mujoco/model.h"
+#include "rl/dqn.h"
+#include "rl/sac.h"
 
 namespace upswing {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr const char* kDqn = "dqn";
+constexpr const char* kSac = "sac";
 
 const NamedAgent& FindAgent(const std::string& name, const std::string& where) {
   const auto agents = EmbeddedAgents();
@@ -48,10 +53,10 @@ EarlySetting FindEarly(std::string_view section, std::string_view key, const tom
   return setting;
 }
 
-/// Throws BadInput that begins with `where` (may be empty) if settings, each of which is
-/// allowed, contradict each other, so that nothing could be learned.
-void CheckTogether(const DqnConfig& d, const std::string& where) {
-  const std::string place = where.empty() ? "" : where + ": ";
+/// Throws BadInput that begins with `place` if settings of an agent with a replay memory, each of
+/// which is allowed, contradict each other, so that nothing could be learned.
+template <typename OffPolicyConfig>
+void CheckTogether(const OffPolicyConfig& d, const std::string& place) {
   if (d.batch > d.replay) {
     throw BadInput(Concat(place,
                           "batch: expected at most as many transitions as the replay memory holds "
@@ -74,7 +79,7 @@ void CheckTask(Config& config, const std::string& where) {
                                                       "reward"};
   constexpr std::array<std::string_view, 3> kCurriculum{"start_noise", "start_noise_end",
                                                         "curriculum_steps"};
-  Config defaults;
+  Config defaults(config.algorithm);
   const Options now = OptionsOf(config), usual = OptionsOf(defaults);
   for (size_t i = 0; i < now.all().size(); ++i) {
     const Option& option = now.all()[i];
@@ -88,12 +93,52 @@ void CheckTask(Config& config, const std::string& where) {
   }
 }
 
+/// Throws BadInput that begins with `where` unless there is an algorithm of this name.
+void CheckAlgorithm(const std::string& name, const std::string& where) {
+  const std::vector<std::string>& names = AlgorithmNames();
+  if (std::ranges::find(names, name) != names.end()) return;
+  throw BadInput(Concat(where, ": expected one of ", Join(names, ", "), ", got \"", Printable(name),
+                        "\"", DidYouMean(name, names)));
+}
+
+/// The algorithm of a parsed configuration. Throws BadInput.
+std::string AlgorithmIn(const toml::table& table, const std::string& where) {
+  const EarlySetting found = FindEarly("train", "algorithm", table, where, {});
+  if (found.where.empty()) return AlgorithmNames().front();
+  CheckAlgorithm(found.value, found.where);
+  return found.value;
+}
+
+/// The settings of a configuration, which say of those that other algorithms have whose they are.
+Options KnownOptions(Config& config, std::string_view agent) {
+  Options options = OptionsOf(config);
+  for (const std::string& algorithm : AlgorithmNames()) {
+    Config other(algorithm);
+    const Options of_other = OptionsOf(other);
+    for (const Option& option : of_other.all()) {
+      if (options.Get(option.name) != nullptr) continue;
+      options.Explain(option.name,
+                      Concat(option.name, " is a setting of ", algorithm, "; expected one of ",
+                             config.algorithm, ", by which agent ", agent, " learns"));
+    }
+  }
+  return options;
+}
+
 /// The settings of a parsed configuration file; see ParseConfig.
 Config ConfigOf(const toml::table& table, const fs::path& file,
                 const std::vector<FlagValue>& flags) {
   const std::string where = file.empty() ? "" : InputName(file.string());
-  Config config;
-  const Options options = OptionsOf(config);
+  EarlySetting agent_setting = FindEarly("train", "agent", table, where, flags);
+  if (agent_setting.where.empty()) agent_setting.value = Config().agent;
+  const NamedAgent& agent = FindAgent(agent_setting.value, agent_setting.where);
+  const std::string agent_place = Concat("agent ", agent.name);
+  const toml::table of_agent = ParseToml(agent.toml, agent_place);
+  EarlySetting algorithm = FindEarly("train", "algorithm", table, where, flags);
+  if (algorithm.where.empty()) algorithm.value = AlgorithmIn(of_agent, agent_place);
+  CheckAlgorithm(algorithm.value, algorithm.where);
+  Config config(algorithm.value);
+  const Options options = KnownOptions(config, agent.name);
 
   // A model file has a plant of its own, which other settings may change.
   const EarlySetting model = FindEarly("plant", "model", table, where, flags);
@@ -103,22 +148,25 @@ Config ConfigOf(const toml::table& table, const fs::path& file,
   }
   if (!model_path.empty()) config.plant = ChangedPlant(config.plant, model_path, {}, config.mjcf);
 
-  EarlySetting agent_setting = FindEarly("train", "agent", table, where, flags);
-  if (agent_setting.where.empty()) agent_setting.value = config.agent;
-  const NamedAgent& agent = FindAgent(agent_setting.value, agent_setting.where);
-  ApplyToml(options, agent.toml, Concat("agent ", agent.name));
+  ApplyTable(options, of_agent, agent_place, false);
   ApplyTable(options, table, where, false);
   SetFlags(options, flags);
   config.agent = agent.name;
   config.model = model_path;
-  CheckTogether(config.dqn, where);
+  const std::string place = where.empty() ? "" : where + ": ";
+  if (config.algorithm == kSac) {
+    CheckTogether(config.sac, place);
+  } else {
+    CheckTogether(config.dqn, place);
+  }
   CheckTask(config, where);
   return config;
 }
 
 /// The settings that a configuration file lacks; see MissingSettings.
-std::vector<std::string> MissingIn(const toml::table& table, bool identity_only) {
-  Config scratch;
+std::vector<std::string> MissingIn(const toml::table& table, const std::string& where,
+                                   bool identity_only) {
+  Config scratch(AlgorithmIn(table, where));
   const Options options = OptionsOf(scratch);
   std::vector<std::string> missing;
   for (const Option& option : options.all()) {
@@ -131,9 +179,19 @@ std::vector<std::string> MissingIn(const toml::table& table, bool identity_only)
 
 }  // namespace
 
+const std::vector<std::string>& AlgorithmNames() {
+  static const std::vector<std::string> kNames{kDqn, kSac};
+  return kNames;
+}
+
 void Config::Describe(Options& o) {
+  const std::string chosen = algorithm;
   o.Section("train");
   o.Add(&agent, "agent", "d3qn", "named agent whose settings the others begin with");
+  o.AddChoice(&algorithm, "algorithm", AlgorithmNames(),
+              "what learns; each algorithm has settings of its own")
+      .implied = true;
+  algorithm = chosen;
   train.Describe(o);
   o.Section("task");
   o.AddChoice(&task, "task", TaskNames(), "what is to be learned").implied = true;
@@ -157,7 +215,20 @@ void Config::Describe(Options& o) {
   disturbance.Describe(o);
   randomization.Describe(o);
   reward.Describe(o);
-  dqn.Describe(o);
+  if (algorithm == kSac) {
+    sac.Describe(o);
+  } else {
+    dqn.Describe(o);
+  }
+}
+
+Options EverySetting(Config& scratch) {
+  Options options;
+  for (const std::string& name : AlgorithmNames()) {
+    scratch.algorithm = name;
+    options.AddMissing(OptionsOf(scratch));
+  }
+  return options;
 }
 
 EnvConfig Config::Environments() const {
@@ -179,7 +250,16 @@ EnvConfig Config::Environments() const {
 }
 
 std::unique_ptr<Agent> Config::MakeAgent(const EnvSpec& spec, ThreadPool& pool) const {
-  return std::make_unique<Dqn>(dqn, spec, static_cast<uint64_t>(train.seed), pool);
+  const auto seed = static_cast<uint64_t>(train.seed);
+  if (algorithm == kSac) return std::make_unique<Sac>(sac, spec, seed, pool);
+  return std::make_unique<Dqn>(dqn, spec, seed, pool);
+}
+
+Config ConfigIn(std::string_view text, const std::string& where) {
+  const toml::table table = ParseToml(text, where);
+  Config config(AlgorithmIn(table, where));
+  ApplyTable(OptionsOf(config), table, where, false);
+  return config;
 }
 
 void ApplyToml(const Options& options, std::string_view text, const std::string& where) {
@@ -188,12 +268,12 @@ void ApplyToml(const Options& options, std::string_view text, const std::string&
 
 void ExpectSameSettings(const Options& before, const Options& now, const std::string& where,
                         const std::function<bool(const Option&)>& counts) {
-  for (size_t i = 0; i < now.all().size(); ++i) {
-    const Option& old_one = before.all()[i];
-    const Option& new_one = now.all()[i];
-    if (counts(new_one) && old_one.text() != new_one.text()) {
-      throw BadInput(Concat(where, ": made with ", old_one.section, ".", old_one.name, " = ",
-                            old_one.text(), ", but the configuration says ", new_one.text()));
+  for (const Option& new_one : now.all()) {
+    const Option* old_one = before.Get(new_one.name);
+    const std::string old_text = old_one == nullptr ? "none" : old_one->text();
+    if (counts(new_one) && old_text != new_one.text()) {
+      throw BadInput(Concat(where, ": made with ", new_one.section, ".", new_one.name, " = ",
+                            old_text, ", but the configuration says ", new_one.text()));
     }
   }
 }
@@ -224,7 +304,7 @@ void MakeReadyForMany(Config& config) {
 
 std::vector<std::string> MissingSettings(const std::string& text, const std::string& where,
                                          bool identity_only) {
-  return MissingIn(ParseToml(text, where), identity_only);
+  return MissingIn(ParseToml(text, where), where, identity_only);
 }
 
 std::string CompleteToml(Config config) {
@@ -240,7 +320,7 @@ Config ReadRunConfig(const fs::path& run, const std::vector<FlagValue>& flags) {
     throw BadInput(Concat(file.string(), ": model: expected ", RunFolder::kModel,
                           ", the copy in the run folder, got \"", Printable(model), "\""));
   }
-  std::vector<std::string> missing = MissingIn(table, false);
+  std::vector<std::string> missing = MissingIn(table, file.string(), false);
   if (missing.empty()) return ConfigOf(table, file, flags);
   constexpr size_t kMostNames = 6;  // that make a line which can still be read
   const size_t more = missing.size() - std::min(missing.size(), kMostNames);

@@ -11,7 +11,8 @@
 
 #include "core/options.h"
 #include "lab/task.h"
-#include "rl/dqn.h"
+#include "rl/dqn_config.h"
+#include "rl/sac_config.h"
 #include "rl/trainer.h"
 #include "sim/double_pendulum.h"
 
@@ -23,10 +24,15 @@ inline constexpr int kMostMemory = 100;
 /// Evaluations in the closed form, and once more in MuJoCo where they are passed there.
 inline constexpr std::string_view kScreened = "screened";
 
-/// All settings of a training.
+/// Names of the learning algorithms; the first is the usual one.
+const std::vector<std::string>& AlgorithmNames();
+
+/// All settings of a training. Those of an agent exist for its algorithm alone: the same name may
+/// mean another number, with another default, in another algorithm.
 struct Config {
-  std::string agent;  // the named agent that the other settings began with
-  std::string model;  // path of an MJCF file instead of the built-in model; empty: built-in
+  std::string agent;      // the named agent that the other settings began with
+  std::string algorithm;  // of AlgorithmNames
+  std::string model;      // path of an MJCF file instead of the built-in model; empty: built-in
   TrainConfig train;
   std::string task;  // see TaskNames
   double episode_seconds, random_start_share, random_start_velocity;
@@ -37,10 +43,16 @@ struct Config {
   Randomization randomization;
   RewardWeights reward;
   DqnConfig dqn;
+  SacConfig sac;
 
   std::string mjcf;  // the text of `model`; not a setting
 
-  Config() { SetDefaults(*this); }
+  /// The defaults of an algorithm, by default the usual one.
+  explicit Config(std::string_view algorithm_name = AlgorithmNames().front())
+      : algorithm(algorithm_name) {
+    SetDefaults(*this);
+  }
+  /// Those of the algorithm.
   void Describe(Options& options);
 
   /// Training environments as these settings have them.
@@ -49,6 +61,9 @@ struct Config {
   /// A new agent for such environments, whose work the pool shares.
   std::unique_ptr<Agent> MakeAgent(const EnvSpec& spec, ThreadPool& pool) const;
 };
+
+/// The settings of all algorithms, each name once; they point into `scratch`.
+Options EverySetting(Config& scratch);
 
 /// A setting given on the command line or in a study: name (or that of an alias), text, and where,
 /// which begins messages; an empty place stands for the flag of that name.
@@ -86,7 +101,11 @@ std::vector<std::string> MissingSettings(const std::string& text, const std::str
 /// lacks one: that run is of another version, and today's default is not what it was made with.
 Config ReadRunConfig(const std::filesystem::path& run, const std::vector<FlagValue>& flags = {});
 
-/// Applies a TOML document. `where` names it in messages, which give the line too.
+/// The settings in a TOML document, over the defaults of its algorithm. `where` names it in
+/// messages, which give the line too. Throws BadInput.
+Config ConfigIn(std::string_view toml, const std::string& where);
+
+/// Applies a TOML document, as ConfigIn does.
 void ApplyToml(const Options& options, std::string_view toml, const std::string& where);
 
 /// Throws BadInput that names the first of the settings for which `counts` is true that two

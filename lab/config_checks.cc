@@ -17,20 +17,46 @@ std::string Gigabytes(double bytes) { return fmt::format("{:.1f} GB", 1e-9 * byt
 
 int ObservationSize(const Config& config) { return SpecOf(config.Environments()).obs_size; }
 
-double NumParameters(const Config& config) {
-  const QNetwork<float> network(
-      config.dqn.Shape(ObservationSize(config), static_cast<int>(config.dqn.levels)));
-  return static_cast<double>(network.num_parameters());
+/// What the size of a training follows from.
+struct LearnerSize {
+  double parameters;     // of the networks that learn
+  double arrays;         // of so many numbers each that there are
+  double saved_arrays;   // and in the checkpoint
+  double transition;     // numbers of one in the replay memory
+  double capacity;       // transitions that it holds
+  double batch, widest;  // rows of a minibatch, units of the widest layer…
+  double layers;         // …and how many layers' activations and gradients are kept
+};
+
+LearnerSize SizeOfLearner(const Config& config) {
+  const int D = ObservationSize(config);
+  const auto widest = [](const std::vector<int64_t>& hidden) {
+    return static_cast<double>(*std::ranges::max_element(hidden));
+  };
+  if (config.algorithm == "sac") {
+    const SacConfig& s = config.sac;
+    const int A = SpecOf(config.Environments()).action_size();
+    const double critics = s.twin ? 2 : 1;
+    const Network<float> actor(s.Trunk(D), {2 * A});
+    const Network<float> critic(s.Trunk(D + A), {static_cast<int>(std::max<int64_t>(1, s.bins))});
+    return {static_cast<double>(actor.num_parameters()) +
+                critics * static_cast<double>(critic.num_parameters()),
+            // Online, target or kept, gradient, Adam's two moments, and what products want.
+            6, 4, 2.0 * D + A + 2, static_cast<double>(s.replay), static_cast<double>(s.batch),
+            widest(s.hidden), (1 + critics) * 3 * static_cast<double>(s.hidden.size())};
+  }
+  const DqnConfig& d = config.dqn;
+  const QNetwork<float> network(d.Shape(D, static_cast<int>(d.levels)));
+  return {static_cast<double>(network.num_parameters()),
+          // Online, target and kept parameters, gradient, Adam's two moments, and the forms that
+          // products want of online and target weights.
+          8, 5, 2.0 * D + 3, static_cast<double>(d.replay), static_cast<double>(d.batch),
+          widest(d.hidden), 3 * static_cast<double>(d.hidden.size())};
 }
 
-}  // namespace
-
-std::vector<std::string> Warnings(const Config& config) {
-  const DqnConfig& d = config.dqn;
-  std::vector<std::string> warnings;
-  // Environments step together: a training ends with the lock-step that reaches its last step.
-  const int64_t envs = config.train.envs;
-  const int64_t steps = (config.train.steps + envs - 1) / envs * envs;
+/// What would keep an agent with a replay memory from learning, in `steps` of training.
+template <typename OffPolicyConfig>
+void AddWarnings(const OffPolicyConfig& d, int64_t steps, std::vector<std::string>& warnings) {
   if (d.learning_starts >= steps) {
     warnings.push_back(fmt::format(
         "learning starts after step {}, and there are {} steps: nothing will be learned",
@@ -42,8 +68,23 @@ std::vector<std::string> Warnings(const Config& config) {
   if (d.learning_rate == 0 && d.learning_rate_end == 0) {
     warnings.emplace_back("learning_rate is 0 to the end: nothing will be learned");
   }
-  if (d.tau == 0 && d.target_period == 0) {
-    warnings.emplace_back("tau is 0: the target network will stay as it began");
+}
+
+}  // namespace
+
+std::vector<std::string> Warnings(const Config& config) {
+  std::vector<std::string> warnings;
+  // Environments step together: a training ends with the lock-step that reaches its last step.
+  const int64_t envs = config.train.envs;
+  const int64_t steps = (config.train.steps + envs - 1) / envs * envs;
+  if (config.algorithm == "sac") {
+    AddWarnings(config.sac, steps, warnings);
+    if (config.sac.tau == 0) warnings.emplace_back("tau is 0: the targets will stay as they began");
+  } else {
+    AddWarnings(config.dqn, steps, warnings);
+    if (config.dqn.tau == 0 && config.dqn.target_period == 0) {
+      warnings.emplace_back("tau is 0: the target network will stay as it began");
+    }
   }
   if (std::ranges::all_of(config.reward.weight, [](double weight) { return weight == 0; })) {
     warnings.emplace_back("every weight of the reward is 0: there is nothing to learn");
@@ -52,32 +93,27 @@ std::vector<std::string> Warnings(const Config& config) {
 }
 
 TrainingSize SizeOf(const Config& config) {
-  // Online, target and kept parameters, gradient, Adam's two moments, and the forms that products
-  // want of online and target weights. The checkpoint holds five of these.
-  constexpr double kArrays = 8, kSavedArrays = 5;
   constexpr double kFloat = sizeof(float);
-  const double parameters = kFloat * NumParameters(config);
-  const double row = 2.0 * ObservationSize(config) + 3;  // of a transition
-  const double replay = kFloat * row * static_cast<double>(config.dqn.replay);
-  const double activations = kFloat * static_cast<double>(config.dqn.batch) *
-                             static_cast<double>(*std::ranges::max_element(config.dqn.hidden)) *
-                             static_cast<double>(3 * config.dqn.hidden.size());
-  const double checkpoint = kSavedArrays * parameters + replay;
+  const LearnerSize l = SizeOfLearner(config);
+  const double replay = kFloat * l.transition * l.capacity;
+  const double saved = kFloat * l.saved_arrays * l.parameters;
   // The first checkpoint, without a replay memory, lies beside what it is loaded into.
-  return {kArrays * parameters + activations + std::max(kSavedArrays * parameters, replay),
-          checkpoint};
+  return {
+      kFloat * (l.arrays * l.parameters + l.batch * l.widest * l.layers) + std::max(saved, replay),
+      saved + replay};
 }
 
 void CheckMemory(const Config& config, int64_t runs) {
   const double needed = static_cast<double>(runs) * SizeOf(config).memory;
   const auto available = static_cast<double>(AvailableMemory());
   if (needed <= available) return;
+  const LearnerSize learner = SizeOfLearner(config);
   throw BadInput(fmt::format(
       "train: expected to fit into the {} of memory that are free, but {}network of {} parameters "
       "and a replay memory of {} transitions take up to {} (smaller: --hidden, --replay{})",
       Gigabytes(available),
       runs > 1 ? fmt::format("{} trainings at a time, each with a ", runs) : "a ",
-      FormatCount(NumParameters(config)), FormatCount(config.dqn.replay), Gigabytes(needed),
+      FormatCount(learner.parameters), FormatCount(learner.capacity), Gigabytes(needed),
       runs > 1 ? ", --jobs" : ""));
 }
 

@@ -8,6 +8,7 @@
 #include "io/tensor_file.h"
 #include "lab/controllers.h"
 #include "mujoco/model.h"
+#include "nn/actor_policy.h"
 #include "nn/q_policy.h"
 
 namespace upswing {
@@ -128,7 +129,12 @@ LoadedPolicy LoadPolicy(const fs::path& path) {
 
 LoadedPolicy ReadPolicy(const Tensors& file) {
   const std::string& where = file.where();
-  auto policy = std::make_shared<QPolicy>(QPolicy::From(file));
+  std::shared_ptr<const Policy> policy;
+  if (ActorPolicy::IsOutput(PolicyOutput(file))) {
+    policy = std::make_shared<ActorPolicy>(ActorPolicy::From(file));
+  } else {
+    policy = std::make_shared<QPolicy>(QPolicy::From(file));
+  }
   const PolicyInfo& info = policy->info();
   const std::string task = info.task.empty() ? kDoublePendulum : info.task;
   LoadedPolicy loaded{where, where, policy, task, Plant(), ""};

@@ -23,7 +23,7 @@ std::vector<FlagValue> ReadSettings(const toml::node& node, const std::string& n
   const std::string place = PlaceOf(node, where);
   if (table == nullptr) throw BadInput(Concat(place, ": ", name, ": expected a table of settings"));
   Config scratch;  // takes the values, which shows whether they can be
-  std::vector<FlagValue> settings = ApplyTable(OptionsOf(scratch), *table, where, true);
+  std::vector<FlagValue> settings = ApplyTable(EverySetting(scratch), *table, where, true);
   for (FlagValue& setting : settings) {
     if (setting.name == "seed") {
       throw BadInput(Concat(setting.where, ": expected no seed among the settings, but \"seeds = ",
@@ -91,7 +91,7 @@ void CheckKeys(const toml::table& study, const std::string& where) {
     if (std::ranges::find(known, name) != known.end()) continue;
     Config scratch;
     const bool is_setting = std::ranges::any_of(
-        OptionsOf(scratch).all(), [&](const Option& option) { return option.name == name; });
+        EverySetting(scratch).all(), [&](const Option& option) { return option.name == name; });
     if (is_setting && name != "seed") {
       throw BadInput(Concat(PlaceOf(node, where), ": ", name, ": belongs in [settings] or in a ",
                             "[variants.NAME]: expected it below such a line"));

@@ -7,6 +7,7 @@
 #include "core/matrix.h"
 #include "core/policy.h"
 #include "core/tensors.h"
+#include "nn/policy_file.h"
 #include "nn/q_network.h"
 
 namespace upswing {
@@ -45,12 +46,7 @@ class QPolicy : public Policy {
     return {std::span<const double>(torques_), shape().actions, 1};
   }
 
-  /// Result of the checks on loading.
-  struct SelfCheck {
-    bool has_checksum = false;  // a right one: no bit has changed
-    double error = 0;           // largest |difference| of the samples' Q-values when recomputed
-    double tolerance = 0;       // largest error that counts as rounding
-  };
+  /// The checks on loading.
   const SelfCheck& self_check() const { return self_check_; }
 
   /// What its file holds. Throws Failure if a parameter is not finite.
@@ -65,9 +61,6 @@ class QPolicy : public Policy {
  private:
   /// Recomputes the stored outputs from the stored inputs. Throws BadInput.
   void CheckSamples(const Tensors& file);
-  /// Whether `torque` belongs to the largest of the Q-values (Q), or to one that equals it up to
-  /// rounding.
-  bool MayChoose(double torque, std::span<const float> q) const;
 
   QNetwork<float> network_;
   AlignedVector<float> parameters_;
@@ -75,8 +68,5 @@ class QPolicy : public Policy {
   PolicyInfo info_;
   SelfCheck self_check_;
 };
-
-/// Index of the largest number, the first of equals.
-int ArgMax(std::span<const float> values);
 
 }  // namespace upswing

@@ -48,4 +48,7 @@ class Agent {
   virtual void State(const Archive& archive) = 0;
 };
 
+/// Throws Failure unless this environment's reward and observation are finite.
+void ExpectFinite(const StepResult& result, size_t env);
+
 }  // namespace upswing

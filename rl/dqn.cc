@@ -8,17 +8,15 @@
 #include <limits>
 #include <numeric>
 
+#include "core/argmax.h"
 #include "core/error.h"
 #include "core/text.h"
 #include "nn/q_policy.h"
 #include "rl/representation.h"
+#include "rl/trained_network.h"
 
 namespace upswing {
 namespace {
-
-/// Rows in a slice of a minibatch of B: enough slices for some threads, enough rows for the
-/// kernels. From B alone, so that the number of threads changes no bit.
-int SliceRows(int B) { return std::clamp(B / 4, 8, 32); }
 
 /// The actions of an agent for this task. Throws BadInput.
 std::vector<double> TorquesOf(const DqnConfig& config, const EnvSpec& spec) {
@@ -57,6 +55,7 @@ Dqn::Dqn(const DqnConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
     : config_(config),
       obs_size_(static_cast<size_t>(spec.obs_size)),
       torques_(TorquesOf(config, spec)),
+      action_space_(ActionSpace::Discrete(torques_.size())),
       mirror_signs_(spec.mirror_signs),
       pool_(pool),
       explore_rng_(seed, "exploration"),
@@ -77,8 +76,9 @@ Dqn::Dqn(const DqnConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
       prepared_target_(network_.MakePrepared(false)),
       gradient_(network_.num_parameters()),
       squares_(static_cast<size_t>(network_.num_tasks())),
-      replay_(config.replay, spec.obs_size, config.prioritized),
-      n_step_(spec.num_envs, static_cast<int>(config.n_step), config.gamma, spec.obs_size),
+      replay_(config.replay, spec.obs_size, action_space_, config.prioritized),
+      n_step_(spec.num_envs, static_cast<int>(config.n_step), config.gamma, spec.obs_size,
+              action_space_),
       batch_(static_cast<int>(config.batch), spec.obs_size),
       act_activations_(network_.MakeActivations(spec.num_envs, false)),
       act_obs_(static_cast<size_t>(spec.num_envs) * obs_size_),
@@ -121,7 +121,7 @@ void Dqn::Act(Matrix<const float> obs, Matrix<double> action) {
     const bool random = explore_rng_.Uniform() < epsilon();
     const int chosen =
         random ? static_cast<int>(explore_rng_.Below(torques_.size())) : ArgMax(q.row(env));
-    act_action_[static_cast<size_t>(env)] = chosen;
+    act_action_[static_cast<size_t>(env)] = static_cast<float>(chosen);
     action(env, 0) = torques_[static_cast<size_t>(chosen)];
   }
 }
@@ -130,13 +130,8 @@ void Dqn::Observe(const StepResult& result) {
   for (size_t env = 0; env < act_action_.size(); ++env) {
     const auto obs = std::span(act_obs_).subspan(env * obs_size_, obs_size_);
     const auto next_obs = std::span(result.next_obs).subspan(env * obs_size_, obs_size_);
-    const bool finite = std::isfinite(result.reward[env]) &&
-                        std::ranges::all_of(next_obs, [](float x) { return std::isfinite(x); });
-    if (!finite) {
-      throw Failure(Concat("environment ", env, " gave a reward or an observation that is not a ",
-                           "finite number"));
-    }
-    n_step_.Push(static_cast<int>(env), obs, act_action_[env],
+    ExpectFinite(result, env);
+    n_step_.Push(static_cast<int>(env), obs, std::span(act_action_).subspan(env, 1),
                  config_.reward_scale * result.reward[env], next_obs, result.terminated[env] != 0,
                  result.truncated[env] != 0, [&](const Transition& t) { replay_.Add(t); });
     if (result.done(env)) ++episodes_;
@@ -158,7 +153,7 @@ void Dqn::Learn() {
       replay_.Sample(sample_rng_, batch_);
     }
     if (config_.mirror) {
-      MirrorHalf(sample_rng_, mirror_signs_, static_cast<int>(torques_.size()), batch_);
+      MirrorHalf(sample_rng_, mirror_signs_, action_space_, batch_);
     }
     Update(batch_);
     if (config_.prioritized) replay_.Prioritize(batch_, td_error_, config_.priority_exponent);
@@ -169,16 +164,11 @@ void Dqn::Update(const Minibatch& batch) {
   // Gradient of the mean Huber loss. Threads share the weights (to copy them into the layouts that
   // the products read), then slices of the batch, then the weights again.
   const int B = static_cast<int>(config_.batch);
-  const int slice_rows = SliceRows(B);
-  const int slices = (B + slice_rows - 1) / slice_rows;
   pool_.ParallelFor(network_.num_tasks(), [&](int task) {
     network_.Prepare(task, theta_, prepared_);
     network_.Prepare(task, theta_target_, prepared_target_);
   });
-  pool_.ParallelFor(slices, [&](int slice) {
-    const int first = slice * slice_rows;
-    BackwardRows(batch, {first, std::min(slice_rows, B - first)});
-  });
+  ForSlices(pool_, B, [&](RowRange rows) { BackwardRows(batch, rows); });
   CountErrors(batch);
   const Matrix<const float> s(batch.obs.data(), B, static_cast<int>(obs_size_));
   pool_.ParallelFor(network_.num_tasks(), [&](int task) {
@@ -237,7 +227,7 @@ void Dqn::BackwardRows(const Minibatch& batch, RowRange rows) {
   std::ranges::fill(dq.Rows(rows.first, rows.count).values(), 0.0F);
   for (int i = rows.first; i < rows.first + rows.count; ++i) {
     const auto row = static_cast<size_t>(i);
-    const int a = batch.action[row];
+    const int a = static_cast<int>(batch.action[row]);
     q_taken_[row] = q(i, a);
     td_error_[row] = q(i, a) - y_[row];
     dq(i, a) = batch.weight[row] * HuberGradient(td_error_[row]) / static_cast<float>(B);
@@ -298,9 +288,8 @@ void Dqn::State(const Archive& archive) {
   archive.Array("theta_target", std::span(theta_target_));
   if (config_.policy_tau < 1) archive.Array("theta_policy", std::span(theta_policy_));
   adam_.State(archive.In("adam"));
-  const int actions = static_cast<int>(torques_.size());
-  replay_.State(archive.In("replay"), actions);
-  n_step_.State(archive.In("n_step"), actions);
+  replay_.State(archive.In("replay"));
+  n_step_.State(archive.In("n_step"));
   explore_rng_.State(archive.In("explore_rng"));
   sample_rng_.State(archive.In("sample_rng"));
   archive.Scalar("steps", steps_, {0, kMostSteps});

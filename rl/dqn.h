@@ -76,7 +76,8 @@ class Dqn : public Agent {
 
   DqnConfig config_;
   size_t obs_size_;
-  std::vector<double> torques_;      // (A)
+  std::vector<double> torques_;  // (A)
+  ActionSpace action_space_;
   std::vector<float> mirror_signs_;  // (D)
   ThreadPool& pool_;
   Rng explore_rng_, sample_rng_;
@@ -98,7 +99,7 @@ class Dqn : public Agent {
 
   QNetwork<float>::Activations act_activations_;
   AlignedVector<float> act_obs_, act_q_;  // (N × D), (N × A) of the last Act
-  std::vector<int> act_action_;           // (N)
+  std::vector<float> act_action_;         // (N) number of the action
 
   int64_t steps_ = 0, episodes_ = 0, updates_ = 0;
   // Sums since TakeMetrics.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/argmax.h"
 #include "core/error.h"
 #include "core/testing.h"
 #include "nn/q_policy.h"
@@ -36,7 +37,7 @@ Minibatch RandomBatch(int size) {
   for (size_t i = 0; i < batch.action.size(); ++i) {
     batch.obs[i] = static_cast<float>(rng.Normal());
     batch.next_obs[i] = static_cast<float>(rng.Normal());
-    batch.action[i] = static_cast<int>(rng.Below(3));
+    batch.action[i] = static_cast<float>(rng.Below(3));
     batch.reward[i] = static_cast<float>(rng.Normal());
     batch.discount[i] = i % 3 == 0 ? 0.0F : 0.9F;
   }
@@ -171,7 +172,7 @@ TEST(Dqn, MirroringNegatesTorquesAndSomeObservations) {
   const Minibatch before = RandomBatch(64);
   Minibatch batch = before;
   Rng rng(1, "mirror");
-  MirrorHalf(rng, std::vector<float>{-1}, 3, batch);
+  MirrorHalf(rng, std::vector<float>{-1}, ActionSpace::Discrete(3), batch);
   int mirrored = 0;
   for (size_t i = 0; i < 64; ++i) {
     const bool turned = batch.obs[i] != before.obs[i];
@@ -288,7 +289,7 @@ TEST(Dqn, ATruncationBootstrapsFromItsOwnLastObservationAndATerminationFromNothi
   for (int64_t i = 0; i < agent.replay().size(); ++i) {
     const Transition t = agent.replay().at(i);
     const float moved = t.next_obs[0] - t.obs[0];
-    ASSERT_NEAR(moved, kTorques[static_cast<size_t>(t.action)], 1e-5);
+    ASSERT_NEAR(moved, kTorques[static_cast<size_t>(t.action[0])], 1e-5);
     const bool left = std::abs(t.next_obs[0]) > 5;
     ASSERT_EQ(t.discount, left ? 0.0F : static_cast<float>(config.gamma));
     terminated += left ? 1 : 0;

@@ -6,26 +6,28 @@
 
 namespace upswing {
 
-NStep::NStep(int num_envs, int n, double gamma, int obs_size)
+NStep::NStep(int num_envs, int n, double gamma, int obs_size, ActionSpace actions)
     : n_(static_cast<size_t>(n)),
       obs_size_(static_cast<size_t>(obs_size)),
+      action_size_(static_cast<size_t>(actions.size)),
       gamma_(gamma),
+      actions_(actions),
       count_(static_cast<size_t>(num_envs)),
       obs_(count_.size() * n_ * obs_size_),
-      action_(count_.size() * n_),
+      action_(count_.size() * n_ * action_size_),
       reward_(count_.size() * n_) {}
 
-void NStep::Push(int env, std::span<const float> obs, int action, double reward,
+void NStep::Push(int env, std::span<const float> obs, std::span<const float> action, double reward,
                  std::span<const float> next_obs, bool terminated, bool truncated,
                  const std::function<void(const Transition&)>& emit) {
   const auto e = static_cast<size_t>(env);
   const auto waiting_obs = std::span(obs_).subspan(e * n_ * obs_size_, n_ * obs_size_);
-  const auto waiting_action = std::span(action_).subspan(e * n_, n_);
+  const auto waiting_action = std::span(action_).subspan(e * n_ * action_size_, n_ * action_size_);
   const auto waiting_reward = std::span(reward_).subspan(e * n_, n_);
 
   const auto last = static_cast<size_t>(count_[e]++);
   std::ranges::copy(obs, waiting_obs.begin() + static_cast<ptrdiff_t>(last * obs_size_));
-  waiting_action[last] = action;
+  std::ranges::copy(action, waiting_action.begin() + static_cast<ptrdiff_t>(last * action_size_));
   waiting_reward[last] = reward;
 
   // A full window emits its oldest step; the end of an episode emits all that wait.
@@ -37,7 +39,7 @@ void NStep::Push(int env, std::span<const float> obs, int action, double reward,
     for (size_t i = k; i-- > 0;) sum = waiting_reward[first + i] + gamma_ * sum;
     const double discount = terminated ? 0.0 : std::pow(gamma_, static_cast<double>(k));
     emit({waiting_obs.subspan(first * obs_size_, obs_size_), next_obs,
-          static_cast<int>(waiting_action[first]), static_cast<float>(sum),
+          waiting_action.subspan(first * action_size_, action_size_), static_cast<float>(sum),
           static_cast<float>(discount)});
   }
 
@@ -45,16 +47,17 @@ void NStep::Push(int env, std::span<const float> obs, int action, double reward,
   count_[e] = static_cast<int64_t>(k);
   if (first == 0) return;
   std::ranges::copy(waiting_obs.subspan(first * obs_size_), waiting_obs.begin());
-  std::ranges::copy(waiting_action.subspan(first), waiting_action.begin());
+  std::ranges::copy(waiting_action.subspan(first * action_size_), waiting_action.begin());
   std::ranges::copy(waiting_reward.subspan(first), waiting_reward.begin());
 }
 
 int64_t NStep::waiting() const { return std::accumulate(count_.begin(), count_.end(), int64_t{0}); }
 
-void NStep::State(const Archive& archive, int num_actions) {
+void NStep::State(const Archive& archive) {
   archive.Array("count", std::span(count_), {0, static_cast<int64_t>(n_) - 1});
   archive.Array("obs", std::span(obs_));
-  archive.Array("action", std::span(action_), {0, int64_t{num_actions} - 1});
+  archive.Array("action", std::span(action_));
+  actions_.Check(archive, "action", action_);
   archive.Array("reward", std::span(reward_));
 }
 

@@ -14,27 +14,28 @@ namespace upswing {
 /// with the γᵏ of its true length k.
 class NStep {
  public:
-  NStep(int num_envs, int n, double gamma, int obs_size);
+  NStep(int num_envs, int n, double gamma, int obs_size, ActionSpace actions);
 
   /// Adds one step of environment `env` and hands every transition that it completes to `emit`.
-  void Push(int env, std::span<const float> obs, int action, double reward,
+  void Push(int env, std::span<const float> obs, std::span<const float> action, double reward,
             std::span<const float> next_obs, bool terminated, bool truncated,
             const std::function<void(const Transition&)>& emit);
 
   /// Number of steps, over all environments, that are not yet part of a transition.
   int64_t waiting() const;
 
-  /// Saves or loads the waiting steps; actions are below num_actions.
-  void State(const Archive& archive, int num_actions);
+  /// Saves or loads the waiting steps.
+  void State(const Archive& archive);
 
  private:
-  size_t n_, obs_size_;
+  size_t n_, obs_size_, action_size_;
   double gamma_;
+  ActionSpace actions_;
   // The waiting steps of each environment, oldest first.
-  std::vector<int64_t> count_;   // (N)
-  std::vector<float> obs_;       // (N × n × D)
-  std::vector<int64_t> action_;  // (N × n)
-  std::vector<double> reward_;   // (N × n)
+  std::vector<int64_t> count_;  // (N)
+  std::vector<float> obs_;      // (N × n × D)
+  std::vector<float> action_;   // (N × n × A)
+  std::vector<double> reward_;  // (N × n)
 };
 
 }  // namespace upswing

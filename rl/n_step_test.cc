@@ -7,10 +7,12 @@
 namespace upswing {
 namespace {
 
+const ActionSpace kNine = ActionSpace::Discrete(9);
+
 /// A copy of an emitted transition.
 struct Emitted {
   float obs, next_obs;
-  int action;
+  float action;
   float reward, discount;
   bool operator==(const Emitted&) const = default;
 };
@@ -19,15 +21,15 @@ struct Emitted {
 void PushStep(NStep& n_step, int env, int i, bool terminated, bool truncated,
               std::vector<Emitted>& out) {
   const float obs = static_cast<float>(10 * env + i);
-  const float next = obs + 1;
-  n_step.Push(env, std::span(&obs, 1), i, static_cast<double>(1 << i), std::span(&next, 1),
-              terminated, truncated, [&](const Transition& t) {
-                out.push_back({t.obs[0], t.next_obs[0], t.action, t.reward, t.discount});
+  const float next = obs + 1, action = static_cast<float>(i);
+  n_step.Push(env, std::span(&obs, 1), std::span(&action, 1), static_cast<double>(1 << i),
+              std::span(&next, 1), terminated, truncated, [&](const Transition& t) {
+                out.push_back({t.obs[0], t.next_obs[0], t.action[0], t.reward, t.discount});
               });
 }
 
 TEST(NStep, OneStepPassesThrough) {
-  NStep n_step(1, 1, 0.5, 1);
+  NStep n_step(1, 1, 0.5, 1, kNine);
   std::vector<Emitted> out;
   PushStep(n_step, 0, 0, false, false, out);
   PushStep(n_step, 0, 1, false, true, out);
@@ -38,7 +40,7 @@ TEST(NStep, OneStepPassesThrough) {
 TEST(NStep, ThreeStepsAndTheShorterRestAtATruncation) {
   // γ = 0.5, rewards 1, 2, 4, 8. Full windows: 1 + 2/2 + 4/4 = 3 and 2 + 4/2 + 8/4 = 6, both with
   // γ³. Tails: 4 + 8/2 = 8 with γ², 8 with γ; all bootstrap from the last observation.
-  NStep n_step(1, 3, 0.5, 1);
+  NStep n_step(1, 3, 0.5, 1, kNine);
   std::vector<Emitted> out;
   for (int i = 0; i < 3; ++i) PushStep(n_step, 0, i, false, false, out);
   EXPECT_EQ(out, (std::vector<Emitted>{{0, 3, 0, 3, 0.125F}}));
@@ -50,7 +52,7 @@ TEST(NStep, ThreeStepsAndTheShorterRestAtATruncation) {
 }
 
 TEST(NStep, ATerminationBootstrapsFromNothing) {
-  NStep n_step(1, 3, 0.5, 1);
+  NStep n_step(1, 3, 0.5, 1, kNine);
   std::vector<Emitted> out;
   PushStep(n_step, 0, 0, false, false, out);
   PushStep(n_step, 0, 1, true, false, out);
@@ -58,7 +60,7 @@ TEST(NStep, ATerminationBootstrapsFromNothing) {
 }
 
 TEST(NStep, EpisodesAndEnvironmentsDoNotMix) {
-  NStep n_step(2, 2, 0.5, 1);
+  NStep n_step(2, 2, 0.5, 1, kNine);
   std::vector<Emitted> out;
   PushStep(n_step, 0, 0, false, false, out);
   PushStep(n_step, 1, 0, false, false, out);
@@ -72,11 +74,11 @@ TEST(NStep, EpisodesAndEnvironmentsDoNotMix) {
 }
 
 TEST(NStep, LoadedStateContinuesAsTheSavedOne) {
-  NStep saved(2, 3, 0.9, 1), loaded(2, 3, 0.9, 1);
+  NStep saved(2, 3, 0.9, 1, kNine), loaded(2, 3, 0.9, 1, kNine);
   std::vector<Emitted> a, b;
   for (int i = 0; i < 4; ++i) PushStep(saved, i % 2, i, false, false, a);
-  SaveAndLoad([&](const Archive& archive) { saved.State(archive, 9); },
-              [&](const Archive& archive) { loaded.State(archive, 9); });
+  SaveAndLoad([&](const Archive& archive) { saved.State(archive); },
+              [&](const Archive& archive) { loaded.State(archive); });
   a.clear();
   PushStep(saved, 1, 5, false, true, a);
   PushStep(loaded, 1, 5, false, true, b);

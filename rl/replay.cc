@@ -13,29 +13,43 @@ constexpr Bounds<double> kPriorities{1e-7, 1e39};
 
 }  // namespace
 
-Minibatch::Minibatch(int size, int obs_size)
+void ActionSpace::Check(const Archive& archive, std::string_view name,
+                        std::span<const float> actions) const {
+  const bool valid = std::ranges::all_of(actions, [&](float a) {
+    return a >= bounds.lowest && a <= bounds.highest && (!whole || a == std::trunc(a));
+  });
+  if (valid) return;
+  archive.Check(false, name,
+                Concat(whole ? "whole numbers" : "actions", " from ", bounds.lowest, " to ",
+                       bounds.highest, " as actions"));
+}
+
+Minibatch::Minibatch(int size, int obs_size, int action_size)
     : obs(static_cast<size_t>(size) * static_cast<size_t>(obs_size)),
       next_obs(obs.size()),
-      action(static_cast<size_t>(size)),
-      reward(action.size()),
-      discount(action.size()),
-      index(action.size()),
-      weight(action.size(), 1.0F) {}
+      action(static_cast<size_t>(size) * static_cast<size_t>(action_size)),
+      reward(static_cast<size_t>(size)),
+      discount(reward.size()),
+      index(reward.size()),
+      weight(reward.size(), 1.0F) {}
 
-void MirrorHalf(Rng& rng, std::span<const float> signs, int actions, Minibatch& batch) {
+void MirrorHalf(Rng& rng, std::span<const float> signs, const ActionSpace& actions,
+                Minibatch& batch) {
   const size_t D = signs.size();
-  for (size_t i = 0; i < batch.action.size(); ++i) {
+  const auto A = static_cast<size_t>(actions.size);
+  const float sum = actions.bounds.lowest + actions.bounds.highest;
+  for (size_t i = 0; i < batch.reward.size(); ++i) {
     if (rng.Below(2) == 0) continue;
     for (size_t j = 0; j < D; ++j) {
       batch.obs[i * D + j] *= signs[j];
       batch.next_obs[i * D + j] *= signs[j];
     }
-    batch.action[i] = actions - 1 - batch.action[i];
+    for (float& a : std::span(batch.action).subspan(i * A, A)) a = sum - a;
   }
 }
 
-Replay::Replay(int64_t capacity, int obs_size, bool prioritized)
-    : capacity_(capacity), obs_size_(static_cast<size_t>(obs_size)) {
+Replay::Replay(int64_t capacity, int obs_size, ActionSpace actions, bool prioritized)
+    : capacity_(capacity), obs_size_(static_cast<size_t>(obs_size)), actions_(actions) {
   if (prioritized) priorities_.emplace(capacity);
 }
 
@@ -44,18 +58,18 @@ void Replay::Add(const Transition& t) {
   float* row = rows_.data() + static_cast<size_t>(next_) * row_size();
   row = std::ranges::copy(t.obs, row).out;
   row = std::ranges::copy(t.next_obs, row).out;
-  row[0] = static_cast<float>(t.action);
-  row[1] = t.reward;
-  row[2] = t.discount;
+  row = std::ranges::copy(t.action, row).out;
+  row[0] = t.reward;
+  row[1] = t.discount;
   if (priorities_) priorities_->Set(next_, largest_priority_);
   next_ = (next_ + 1) % capacity_;
 }
 
 Transition Replay::at(int64_t index) const {
   const auto row = std::span(rows_).subspan(static_cast<size_t>(index) * row_size(), row_size());
-  const auto scalars = row.subspan(2 * obs_size_);
-  return {row.first(obs_size_), row.subspan(obs_size_, obs_size_), static_cast<int>(scalars[0]),
-          scalars[1], scalars[2]};
+  const auto rest = row.subspan(2 * obs_size_);
+  return {row.first(obs_size_), row.subspan(obs_size_, obs_size_), rest.first(action_size()),
+          rest[action_size()], rest[action_size() + 1]};
 }
 
 void Replay::Gather(Minibatch& batch) const {
@@ -71,7 +85,7 @@ void Replay::Gather(Minibatch& batch) const {
     const Transition t = at(batch.index[i]);
     std::ranges::copy(t.obs, batch.obs.data() + i * obs_size_);
     std::ranges::copy(t.next_obs, batch.next_obs.data() + i * obs_size_);
-    batch.action[i] = t.action;
+    std::ranges::copy(t.action, batch.action.data() + i * action_size());
     batch.reward[i] = t.reward;
     batch.discount[i] = t.discount;
   }
@@ -86,7 +100,7 @@ void Replay::Sample(Rng& rng, Minibatch& batch) const {
 }
 
 void Replay::SamplePrioritized(Rng& rng, double beta, Minibatch& batch) const {
-  const size_t B = batch.action.size();
+  const size_t B = batch.reward.size();
   const double part = priorities_->total() / static_cast<double>(B);
   double smallest = largest_priority_;
   for (size_t i = 0; i < B; ++i) {
@@ -108,7 +122,7 @@ void Replay::Prioritize(const Minibatch& batch, std::span<const float> td_error,
   }
 }
 
-void Replay::State(const Archive& archive, int num_actions) {
+void Replay::State(const Archive& archive) {
   archive.Scalar("next", next_, {0, capacity_ - 1});
   archive.Vector("rows", rows_, static_cast<size_t>(capacity_) * row_size());
   archive.Check(rows_.size() % row_size() == 0, "rows", "whole transitions");
@@ -121,9 +135,8 @@ void Replay::State(const Archive& archive, int num_actions) {
   }
   if (!archive.loading()) return;
   for (size_t at = 2 * obs_size_; at < rows_.size(); at += row_size()) {
-    const float action = rows_[at], discount = rows_[at + 2];
-    archive.Check(action >= 0 && action < num_actions && action == std::trunc(action), "rows",
-                  Concat("actions from 0 to ", num_actions - 1));
+    actions_.Check(archive, "rows", std::span(rows_).subspan(at, action_size()));
+    const float discount = rows_[at + action_size() + 1];
     archive.Check(discount >= 0 && discount <= 1, "rows", "discounts from 0 to 1");
   }
 }

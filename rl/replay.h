@@ -13,38 +13,55 @@
 
 namespace upswing {
 
+/// What an agent's actions are: so many numbers within bounds. A discrete agent has one, the number
+/// of the action.
+struct ActionSpace {
+  int size = 1;  // A
+  Bounds<float> bounds{-1, 1};
+  bool whole = false;  // integers alone
+
+  /// The actions 0 … count - 1.
+  static ActionSpace Discrete(size_t count) {
+    return {1, {0, static_cast<float>(count - 1)}, true};
+  }
+  /// Throws BadInput about the tensor `name` unless these (… × A) are such actions.
+  void Check(const Archive& archive, std::string_view name, std::span<const float> actions) const;
+};
+
 /// A transition over one or more steps, whose target is y = reward + discount · V(next_obs).
 struct Transition {
   std::span<const float> obs;       // (D)
   std::span<const float> next_obs;  // (D)
-  int action = 0;
-  float reward = 0;    // Σ γᵏ r over its steps
-  float discount = 0;  // γ to the number of steps; 0 if the last one terminated
+  std::span<const float> action;    // (A)
+  float reward = 0;                 // Σ γᵏ r over its steps
+  float discount = 0;               // γ to the number of steps; 0 if the last one terminated
 };
 
 /// A minibatch, gathered: row i of each array is one transition.
 struct Minibatch {
   AlignedVector<float> obs, next_obs;     // (B × D)
-  std::vector<int> action;                // (B)
+  AlignedVector<float> action;            // (B × A)
   AlignedVector<float> reward, discount;  // (B)
   std::vector<int64_t> index;             // (B) places in the replay memory
   AlignedVector<float> weight;            // (B) importance-sampling weights, at most 1
 
-  Minibatch(int size, int obs_size);
+  Minibatch(int size, int obs_size, int action_size = 1);
+  int size() const { return static_cast<int>(reward.size()); }  // B
 };
 
-/// Mirrors a random half of a minibatch: observations are multiplied by `signs` (D), and action a
-/// becomes A - 1 - a, whose torque has the opposite sign.
-void MirrorHalf(Rng& rng, std::span<const float> signs, int actions, Minibatch& batch);
+/// Mirrors a random half of a minibatch: observations are multiplied by `signs` (D), and an action
+/// moves to the other side of the middle of its bounds, where its torque has the opposite sign.
+void MirrorHalf(Rng& rng, std::span<const float> signs, const ActionSpace& actions,
+                Minibatch& batch);
 
-/// Replay memory of the newest `capacity` transitions (Lin, 1992). One row of 2 D + 3 floats holds
-/// a whole transition, so that sampling one touches one place in memory; a million with
-/// D = 8 take 76 MB. Memory is allocated as it fills.
+/// Replay memory of the newest `capacity` transitions (Lin, 1992). One row of 2 D + A + 2 floats
+/// holds a whole transition, so that sampling one touches one place in memory; a million with D = 8
+/// and A = 1 take 76 MB. Memory is allocated as it fills.
 ///
 /// It draws uniformly, or by priorities (proportional prioritisation; Schaul et al., 2016).
 class Replay {
  public:
-  Replay(int64_t capacity, int obs_size, bool prioritized = false);
+  Replay(int64_t capacity, int obs_size, ActionSpace actions, bool prioritized = false);
 
   int64_t size() const { return static_cast<int64_t>(rows_.size() / row_size()); }
   int64_t capacity() const { return capacity_; }
@@ -69,16 +86,18 @@ class Replay {
   /// The transition at a place below size().
   Transition at(int64_t index) const;
 
-  /// Saves or loads the memory; actions are below num_actions.
-  void State(const Archive& archive, int num_actions);
+  /// Saves or loads the memory.
+  void State(const Archive& archive);
 
  private:
-  size_t row_size() const { return 2 * obs_size_ + 3; }
+  size_t row_size() const { return 2 * obs_size_ + action_size() + 2; }
+  size_t action_size() const { return static_cast<size_t>(actions_.size); }  // A
   /// Copies the transitions of batch.index into the minibatch.
   void Gather(Minibatch& batch) const;
 
   int64_t capacity_;
   size_t obs_size_;
+  ActionSpace actions_;
   int64_t next_ = 0;         // place of the next transition
   std::vector<float> rows_;  // (size × row_size): obs, next_obs, action, reward, discount
   std::optional<SumTree> priorities_;

@@ -14,15 +14,19 @@ namespace {
 /// Transition number i of two observations each.
 struct Numbered {
   std::array<float, 2> obs, next_obs;
+  float action;
   Transition transition;
   explicit Numbered(int i)
       : obs{static_cast<float>(i), 1},
         next_obs{static_cast<float>(i), 2},
-        transition{obs, next_obs, i % 9, static_cast<float>(10 * i), 0.5F} {}
+        action(static_cast<float>(i % 9)),
+        transition{obs, next_obs, std::span(&action, 1), static_cast<float>(10 * i), 0.5F} {}
 };
 
+const ActionSpace kNine = ActionSpace::Discrete(9);
+
 TEST(Replay, KeepsTheNewest) {
-  Replay replay(5, 2);
+  Replay replay(5, 2, kNine);
   for (int i = 0; i < 12; ++i) replay.Add(Numbered(i).transition);
   EXPECT_EQ(replay.size(), 5);
   std::set<float> kept;
@@ -31,7 +35,7 @@ TEST(Replay, KeepsTheNewest) {
 }
 
 TEST(Replay, SamplesWholeTransitionsEvenly) {
-  Replay replay(10, 2);
+  Replay replay(10, 2, kNine);
   for (int i = 0; i < 10; ++i) replay.Add(Numbered(i).transition);
   Rng rng(1, "replay test");
   Minibatch batch(64, 2);
@@ -45,7 +49,7 @@ TEST(Replay, SamplesWholeTransitionsEvenly) {
       EXPECT_EQ(batch.obs[2 * i + 1], 1);
       EXPECT_EQ(batch.next_obs[2 * i], static_cast<float>(number));
       EXPECT_EQ(batch.next_obs[2 * i + 1], 2);
-      EXPECT_EQ(batch.action[i], number % 9);
+      EXPECT_EQ(batch.action[i], static_cast<float>(number % 9));
       EXPECT_EQ(batch.reward[i], static_cast<float>(10 * number));
       EXPECT_EQ(batch.discount[i], 0.5F);
     }
@@ -56,17 +60,17 @@ TEST(Replay, SamplesWholeTransitionsEvenly) {
 TEST(Replay, AMillionTransitionsOfThePendulumFitIn100Megabytes) {
   // A full memory writes all of its numbers to the checkpoint.
   constexpr size_t kRow = (2 * 8 + 3) * sizeof(float);
-  Replay replay(1000, 8);
+  Replay replay(1000, 8, kNine);
   const std::array<float, 8> obs{};
-  for (int i = 0; i < 1000; ++i) replay.Add({obs, obs, 0, 0, 0});
+  for (int i = 0; i < 1000; ++i) replay.Add({obs, obs, std::span(obs).first(1), 0, 0});
   Tensors file;
-  replay.State(Archive::Saver(file), 9);
+  replay.State(Archive::Saver(file));
   EXPECT_EQ(file.all().at("rows").bytes.size(), 1000 * kRow);
   EXPECT_LE(1000000 * kRow, 100000000U);
 }
 
 TEST(Replay, DrawsByPriorityAndWeighsAsThePaperDoes) {
-  Replay replay(4, 2, true);
+  Replay replay(4, 2, kNine, true);
   for (int i = 0; i < 4; ++i) replay.Add(Numbered(i).transition);
   // Before any update all are drawn with the same probability, and have weight 1.
   Rng rng(1, "replay test");
@@ -99,7 +103,7 @@ TEST(Replay, DrawsByPriorityAndWeighsAsThePaperDoes) {
 }
 
 TEST(Replay, ANewTransitionHasTheLargestPrioritySoFar) {
-  Replay replay(3, 2, true);
+  Replay replay(3, 2, kNine, true);
   for (int i = 0; i < 3; ++i) replay.Add(Numbered(i).transition);
   Minibatch batch(3, 2);
   batch.index = {0, 1, 2};
@@ -111,13 +115,13 @@ TEST(Replay, ANewTransitionHasTheLargestPrioritySoFar) {
 }
 
 TEST(Replay, LoadedPrioritiesDrawTheSame) {
-  Replay saved(5, 2, true), loaded(5, 2, true);
+  Replay saved(5, 2, kNine, true), loaded(5, 2, kNine, true);
   for (int i = 0; i < 7; ++i) saved.Add(Numbered(i).transition);
   Minibatch batch(3, 2), other(3, 2);
   batch.index = {0, 2, 4};
   saved.Prioritize(batch, std::vector<float>{3, 0.5F, 0.01F}, 0.6);
-  SaveAndLoad([&](const Archive& archive) { saved.State(archive, 9); },
-              [&](const Archive& archive) { loaded.State(archive, 9); });
+  SaveAndLoad([&](const Archive& archive) { saved.State(archive); },
+              [&](const Archive& archive) { loaded.State(archive); });
   for (Replay* replay : {&saved, &loaded}) replay->Add(Numbered(7).transition);
   Rng rng(1, "replay test"), other_rng(1, "replay test");
   for (int round = 0; round < 100; ++round) {
@@ -129,13 +133,50 @@ TEST(Replay, LoadedPrioritiesDrawTheSame) {
 }
 
 TEST(Replay, LoadedStateContinuesAsTheSavedOne) {
-  Replay saved(5, 2), loaded(5, 2);
+  Replay saved(5, 2, kNine), loaded(5, 2, kNine);
   for (int i = 0; i < 7; ++i) saved.Add(Numbered(i).transition);
-  SaveAndLoad([&](const Archive& archive) { saved.State(archive, 9); },
-              [&](const Archive& archive) { loaded.State(archive, 9); });
+  SaveAndLoad([&](const Archive& archive) { saved.State(archive); },
+              [&](const Archive& archive) { loaded.State(archive); });
   saved.Add(Numbered(7).transition);
   loaded.Add(Numbered(7).transition);
   for (int i = 0; i < 5; ++i) EXPECT_EQ(saved.at(i).reward, loaded.at(i).reward);
+}
+
+TEST(Replay, KeepsActionsOfSeveralNumbersAndMirrorsThem) {
+  const ActionSpace torques{2};
+  Replay replay(3, 1, torques);
+  const float obs = 7, next_obs = 8;
+  const std::array<float, 2> action{0.25F, -1};
+  replay.Add({std::span(&obs, 1), std::span(&next_obs, 1), action, 9, 0.5F});
+  Rng rng(1, "replay test");
+  Minibatch batch(16, 1, 2);
+  replay.Sample(rng, batch);
+  const Minibatch before = batch;
+  MirrorHalf(rng, std::vector<float>{-1}, torques, batch);
+  int turned = 0;
+  for (size_t i = 0; i < 16; ++i) {
+    EXPECT_EQ(before.action[2 * i], 0.25F);
+    EXPECT_EQ(before.action[2 * i + 1], -1);
+    EXPECT_EQ(batch.reward[i], 9);
+    const float side = batch.obs[i] / before.obs[i];
+    EXPECT_EQ(std::abs(side), 1);
+    EXPECT_EQ(batch.next_obs[i], side * 8);
+    EXPECT_EQ(batch.action[2 * i], side * 0.25F);
+    EXPECT_EQ(batch.action[2 * i + 1], -side);
+    if (side < 0) ++turned;
+  }
+  EXPECT_GT(turned, 0);
+  EXPECT_LT(turned, 16);
+}
+
+TEST(Replay, RefusesActionsThatTheAgentDoesNotHave) {
+  Replay saved(5, 2, kNine), loaded(5, 2, ActionSpace::Discrete(3)), torque(5, 2, ActionSpace{1});
+  for (int i = 0; i < 4; ++i) saved.Add(Numbered(i).transition);
+  for (Replay* other : {&loaded, &torque}) {
+    EXPECT_THROW(SaveAndLoad([&](const Archive& archive) { saved.State(archive); },
+                             [&](const Archive& archive) { other->State(archive); }),
+                 BadInput);
+  }
 }
 
 }  // namespace

@@ -1,0 +1,13 @@
+#pragma once
+
+#include <algorithm>
+#include <span>
+
+namespace upswing {
+
+/// Index of the largest number, the first of equals.
+inline int ArgMax(std::span<const float> values) {
+  return static_cast<int>(std::ranges::max_element(values) - values.begin());
+}
+
+}  // namespace upswing

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+/// Diagonal Gaussian policies, one action component at a time; of several, log-probabilities add
+/// up. u = μ + σ ε with ε ~ N(0, 1) is the unbounded action; a squashed policy's action is
+/// a = tanh(u), within ±1 (Haarnoja et al., 2018, Appendix C). What the environment gets is a times
+/// its limit, to which no probability here refers. T = float to work, double to check gradients.
+namespace upswing {
+
+inline constexpr double kLogStdLow = -5, kLogStdHigh = 2;  // ln σ is clamped to this range
+
+/// The policy at one observation.
+template <typename T>
+struct Gaussian {
+  T mean = 0;            // μ
+  T log_std = 0;         // ln σ
+  T std = 1;             // σ
+  bool clamped = false;  // whether ln σ is at an end of its range, where it has no gradient
+
+  /// From a network's outputs.
+  static Gaussian From(T mean, T log_std) {
+    constexpr T kLow = kLogStdLow, kHigh = kLogStdHigh;
+    const T clamped = std::clamp(log_std, kLow, kHigh);
+    return {mean, clamped, std::exp(clamped), clamped != log_std};
+  }
+};
+
+/// ln N(u; μ, σ²) of the sample that `epsilon` = (u - μ)/σ makes.
+template <typename T>
+T LogDensity(T epsilon, T log_std) {
+  static const T kHalfLogTwoPi = std::log(2 * std::numbers::pi_v<T>) / 2;
+  return -epsilon * epsilon / 2 - log_std - kHalfLogTwoPi;
+}
+
+/// ln(1 - tanh²(u)), the logarithm of the slope of tanh, in its stable form
+/// 2 (ln 2 - u - softplus(-2u)); exact for any u, as |u| replaces u by symmetry.
+template <typename T>
+T LogTanhSlope(T u) {
+  const T size = std::abs(u);
+  return 2 * (std::numbers::ln2_v<T> - size - std::log1p(std::exp(-2 * size)));
+}
+
+/// A sample of a squashed policy.
+template <typename T>
+struct Squashed {
+  T epsilon = 0, action = 0;  // ε, a = tanh(u)
+  T log_prob = 0;             // ln π(a) = ln N(u) - ln(1 - a²)
+};
+
+template <typename T>
+Squashed<T> Squash(const Gaussian<T>& policy, T epsilon) {
+  const T u = policy.mean + policy.std * epsilon;
+  return {epsilon, std::tanh(u), LogDensity(epsilon, policy.log_std) - LogTanhSlope(u)};
+}
+
+/// Gradient with respect to μ and ln σ.
+template <typename T>
+struct GaussianGradient {
+  T mean = 0, log_std = 0;
+};
+
+/// Of α ln π(a) - Q(a) through the sample a = tanh(μ + σ ε), given dQ/da (Haarnoja et al., 2018,
+/// Eq 7):
+///   d/dμ = 2 α a - Q_a (1 - a²),  d/dlnσ = α (2 a σ ε - 1) - Q_a (1 - a²) σ ε.
+template <typename T>
+GaussianGradient<T> SquashedGradient(const Gaussian<T>& policy, const Squashed<T>& sample, T alpha,
+                                     T dq_da) {
+  const T du = 2 * alpha * sample.action - dq_da * (1 - sample.action * sample.action);
+  const T scale = policy.std * sample.epsilon;
+  return {du, policy.clamped ? 0 : du * scale - alpha};
+}
+
+}  // namespace upswing

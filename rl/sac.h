@@ -1,0 +1,128 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/thread_pool.h"
+#include "nn/adam.h"
+#include "nn/gaussian.h"
+#include "rl/agent.h"
+#include "rl/n_step.h"
+#include "rl/replay.h"
+#include "rl/sac_config.h"
+#include "rl/trained_network.h"
+#include "rl/value_bins.h"
+
+/// Soft Actor-Critic (Haarnoja et al., 2018, "Algorithms and Applications") and its extensions,
+/// each a flag.
+///
+/// Symbols: s observation, a action in units of its limit, r reward, γ discount, α temperature,
+/// π policy, Q1 and Q2 critics, Q' their targets, y target, B batch size, D observation size, A
+/// action size, N environments.
+namespace upswing {
+
+/// Soft targets y (B) = r + discount · (min(Q1', Q2') - α ln π(a'|s')) with a' ~ π(s') (Eq 3 and
+/// 5, over n steps). discount is γⁿ, or 0 after a termination. All are (B).
+void SoftTargets(std::span<const float> q1, std::span<const float> q2,
+                 std::span<const float> log_prob, double alpha, std::span<const float> reward,
+                 std::span<const float> discount, std::span<float> y);
+
+/// The gradient with respect to ln α of -ln α · (ln π + H), H the target entropy (Eq 18, with ln α
+/// for α): below 0, so that α rises, while the policy's entropy -ln π is below its target.
+inline double TemperatureGradient(double mean_log_prob, double target_entropy) {
+  return -(mean_log_prob + target_entropy);
+}
+
+/// An SAC agent for N environments.
+class Sac : public Agent {
+ public:
+  /// Throws BadInput if minibatches are to be mirrored but the task has no mirror symmetry.
+  Sac(const SacConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool& pool);
+
+  void Act(Matrix<const float> obs, Matrix<double> action) override;
+  void Observe(const StepResult& result) override;
+  void Learn() override;
+  Metrics TakeMetrics() override;
+  std::unique_ptr<Policy> ExportPolicy(PolicyInfo info) const override;
+  void State(const Archive& archive) override;
+
+  int64_t steps() const override { return steps_; }
+  int64_t updates() const override { return updates_; }
+  double alpha() const;
+  double learning_rate() const;
+  std::span<const float> actor() const { return actor_.theta(); }
+  std::span<const float> critic(size_t i) const { return critics_.at(i).network.theta(); }
+  const Replay& replay() const { return replay_; }
+  /// One round on a given minibatch: a step of the critics and, each actor_period, of actor and
+  /// temperature.
+  void Update(const Minibatch& batch);
+
+ private:
+  struct Critic {
+    TrainedNetwork network;
+    AlignedVector<float> target;       // its parameters' Polyak average, (num_parameters)
+    AlignedVector<float> outputs, dy;  // (B × outputs) and the loss's gradient
+    AlignedVector<float> value;        // (B)
+    AlignedVector<float> dinputs;      // (B × (D + A)) dQ/d(s, a), for the actor
+  };
+
+  /// Samples a ~ π(s) of some rows: fills samples_, and behind `inputs`' (B × (D + A))
+  /// observations the actions.
+  void SampleRows(Matrix<const float> obs, RowRange rows, Matrix<float> inputs);
+  void CriticRows(const Minibatch& batch, RowRange rows);
+  void ActorRows(const Minibatch& batch, RowRange rows);
+  void UpdateCritics(const Minibatch& batch);
+  void UpdateActor(const Minibatch& batch);
+  void UpdateTemperature();
+  /// Q of some rows after their outputs: the output itself, or the mean of a categorical one.
+  void ValueRows(Critic& critic, RowRange rows) const;
+  /// Adds a minibatch to the sums of the metrics. Throws Failure if the loss is not finite.
+  void CountErrors();
+  /// Fills samples_' noise.
+  void DrawNoise();
+  int64_t updates_due() const;
+  double schedule() const;
+  size_t num_critics() const { return config_.twin ? 2 : 1; }
+
+  SacConfig config_;
+  int D_, A_, B_;
+  ActionSpace action_space_;
+  std::vector<double> action_limit_;  // (A)
+  std::vector<float> mirror_signs_;   // (D)
+  ValueBins bins_;
+  ThreadPool& pool_;
+  Rng explore_rng_, sample_rng_, noise_rng_;
+
+  TrainedNetwork actor_;
+  AlignedVector<float> theta_policy_;  // Polyak average of the actor that is judged; see policy_tau
+  std::vector<Critic> critics_;        // one or two
+  AlignedVector<float> log_alpha_;     // (1)
+  Adam alpha_adam_;
+
+  // Of an update: B rows.
+  AlignedVector<float> actor_outputs_, actor_dy_;  // (B × 2 A)
+  std::vector<Gaussian<float>> gaussians_;         // (B × A)
+  std::vector<Squashed<float>> samples_;           // (B × A)
+  AlignedVector<float> log_prob_;                  // (B)
+  AlignedVector<float> inputs_, policy_inputs_;    // (B × (D + A)): s, a; s, a ~ π
+  AlignedVector<float> y_;                         // (B)
+  Replay replay_;
+  NStep n_step_;
+  Minibatch batch_;
+
+  Network<float>::Activations act_activations_;
+  AlignedVector<float> act_obs_, act_outputs_;  // (N × D), (N × 2 A) of the last Act
+  std::vector<float> act_action_;               // (N × A)
+  std::vector<float> mean_, last_mean_;         // (N × A) mean actions of this step and the last
+  std::vector<int64_t> episode_steps_;          // (N) since the episode's beginning
+
+  int64_t steps_ = 0, updates_ = 0;
+  // Sums since TakeMetrics.
+  double loss_sum_ = 0, q_sum_ = 0, td_sum_ = 0, norm_sum_ = 0, entropy_sum_ = 0;
+  int64_t report_updates_ = 0, report_actor_updates_ = 0;
+};
+
+}  // namespace upswing

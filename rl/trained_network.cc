@@ -1,0 +1,41 @@
+#include "rl/trained_network.h"
+
+#include <cmath>
+#include <numeric>
+
+namespace upswing {
+
+TrainedNetwork::TrainedNetwork(const MlpShape& trunk, const HeadShape& head, int batch, Rng& rng)
+    : network_(trunk, head),
+      theta_(network_.num_parameters()),
+      gradient_(theta_.size()),
+      adam_(theta_.size()),
+      activations_(network_.MakeActivations(batch, true)),
+      prepared_(network_.MakePrepared(true)),
+      squares_(static_cast<size_t>(network_.num_tasks())) {
+  network_.Initialize(rng, theta_);
+}
+
+void TrainedNetwork::Prepare(ThreadPool& pool) {
+  pool.ParallelFor(network_.num_tasks(),
+                   [&](int task) { network_.Prepare(task, theta_, prepared_); });
+}
+
+double TrainedNetwork::Step(Matrix<const float> x, double learning_rate, double max_norm,
+                            std::span<float> target, double tau, ThreadPool& pool) {
+  pool.ParallelFor(network_.num_tasks(), [&](int task) {
+    squares_[static_cast<size_t>(task)] =
+        network_.BackwardWeights(task, x, activations_, gradient_);
+  });
+  const double norm = std::sqrt(std::accumulate(squares_.begin(), squares_.end(), 0.0));
+  adam_.Step({learning_rate, norm, max_norm, tau}, gradient_, theta_, target, pool);
+  return norm;
+}
+
+void TrainedNetwork::State(const Archive& archive) {
+  archive.Array("theta", std::span(theta_));
+  adam_.State(archive.In("adam"));
+  archive.Array("last_features", std::span(activations_.trunk.back().output));
+}
+
+}  // namespace upswing

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <algorithm>
+#include <span>
+#include <vector>
+
+#include "core/aligned.h"
+#include "core/archive.h"
+#include "core/matrix.h"
+#include "core/thread_pool.h"
+#include "nn/adam.h"
+#include "nn/network.h"
+
+namespace upswing {
+
+/// Rows in a slice of a minibatch of B: enough slices for some threads, enough rows for the
+/// kernels. From B alone, so that the number of threads changes no bit.
+inline int SliceRows(int B) { return std::clamp(B / 4, 8, 32); }
+
+/// Calls `work(RowRange)` for each slice of B rows, shared by the pool's threads.
+template <typename Work>
+void ForSlices(ThreadPool& pool, int B, const Work& work) {
+  const int rows = SliceRows(B);
+  pool.ParallelFor((B + rows - 1) / rows, [&](int slice) {
+    const int first = slice * rows;
+    work(RowRange{first, std::min(rows, B - first)});
+  });
+}
+
+/// A network with its parameters θ and all that moves them: gradient, Adam's moments, buffers of a
+/// minibatch of B rows.
+class TrainedNetwork {
+ public:
+  TrainedNetwork(const MlpShape& trunk, const HeadShape& head, int batch, Rng& rng);
+
+  const Network<float>& network() const { return network_; }
+  std::span<float> theta() { return theta_; }
+  std::span<const float> theta() const { return theta_; }
+  const Network<float>::Activations& activations() const { return activations_; }
+
+  /// Makes the copies of θ that Backward reads; to be called after θ has moved.
+  void Prepare(ThreadPool& pool);
+  /// y = network(x) of the given rows, at these parameters or at θ.
+  void Forward(std::span<const float> parameters, Matrix<const float> x, RowRange rows,
+               Matrix<float> y) {
+    network_.Forward({parameters}, x, rows, activations_, y);
+  }
+  void Forward(Matrix<const float> x, RowRange rows, Matrix<float> y) {
+    Forward(theta_, x, rows, y);
+  }
+  /// The backward pass of the given rows after Forward at θ; see Network::BackwardInputs.
+  void Backward(Matrix<const float> dy, RowRange rows, Matrix<float> dx = {}) {
+    network_.BackwardInputs({theta_, &prepared_}, dy, rows, activations_, dx);
+  }
+  /// One step of Adam along the gradient that Backward has left for the inputs x (B × D): θ moves,
+  /// and `target` follows it with tau. Returns the gradient's norm before it is clipped to
+  /// max_norm. Throws Failure if that is not finite.
+  double Step(Matrix<const float> x, double learning_rate, double max_norm, std::span<float> target,
+              double tau, ThreadPool& pool);
+
+  /// Saves or loads θ, Adam's moments and, for metrics, the features of the last minibatch.
+  void State(const Archive& archive);
+  int64_t steps() const { return adam_.steps(); }
+
+ private:
+  Network<float> network_;
+  AlignedVector<float> theta_, gradient_;  // (num_parameters)
+  Adam adam_;
+  Network<float>::Activations activations_;
+  Network<float>::Prepared prepared_;
+  std::vector<float> squares_;  // of the gradient, by task
+};
+
+}  // namespace upswing
