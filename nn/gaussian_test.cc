@@ -1,0 +1,79 @@
+#include "nn/gaussian.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+
+namespace upswing {
+namespace {
+
+TEST(Gaussian, SquashedDensityIntegratesToOne) {
+  for (const double log_std : {-3.0, -1.0, 0.0, 0.7}) {
+    const auto policy = Gaussian<double>::From(0.4, log_std);
+    // ∫ π(a) da over a = tanh(u), by the midpoint rule in u: da = (1 - a²) du.
+    double integral = 0;
+    constexpr double kStep = 1e-3;
+    for (double u = -20; u < 20; u += kStep) {
+      const double epsilon = (u + kStep / 2 - policy.mean) / policy.std;
+      const Squashed<double> sample = Squash(policy, epsilon);
+      integral += std::exp(sample.log_prob) * (1 - sample.action * sample.action) * kStep;
+    }
+    EXPECT_NEAR(integral, 1, 1e-6) << log_std;
+  }
+}
+
+TEST(Gaussian, LogTanhSlopeIsRightWhereTanhHasNoDigitsLeft) {
+  // ln(1 - tanh²(u)) = -2 ln cosh(u): by hand at 8, where 1 - tanh² is 4.5e-7, and in floats at 40,
+  // where tanh is 1.
+  EXPECT_NEAR(LogTanhSlope(8.0), 2 * std::log(2.0) - 16, 1e-6);
+  EXPECT_NEAR(LogTanhSlope(8.0), -2 * std::log(std::cosh(8.0)), 1e-12);
+  EXPECT_NEAR(LogTanhSlope(-40.0F), 2 * std::log(2.0F) - 80, 1e-4F);
+  EXPECT_NEAR(LogTanhSlope(0.0), 0, 1e-15);
+}
+
+/// α ln π(a) - Q(a) with Q(a) = sin(3 a), of the action that ε makes.
+double Loss(double mean, double log_std, double epsilon, double alpha) {
+  const Squashed<double> sample = Squash(Gaussian<double>::From(mean, log_std), epsilon);
+  return alpha * sample.log_prob - std::sin(3 * sample.action);
+}
+
+TEST(Gaussian, GradientIsThatOfFiniteDifferences) {
+  constexpr double kStep = 1e-5;
+  for (const double mean : {-1.5, 0.2, 0.9}) {
+    for (const double log_std : {-2.0, 0.3}) {
+      for (const double epsilon : {-1.3, 0.1, 2.0}) {
+        constexpr double kAlpha = 0.2;
+        const auto policy = Gaussian<double>::From(mean, log_std);
+        const Squashed<double> sample = Squash(policy, epsilon);
+        const auto g = SquashedGradient(policy, sample, kAlpha, 3 * std::cos(3 * sample.action));
+        EXPECT_NEAR(g.mean,
+                    (Loss(mean + kStep, log_std, epsilon, kAlpha) -
+                     Loss(mean - kStep, log_std, epsilon, kAlpha)) /
+                        (2 * kStep),
+                    1e-8);
+        EXPECT_NEAR(g.log_std,
+                    (Loss(mean, log_std + kStep, epsilon, kAlpha) -
+                     Loss(mean, log_std - kStep, epsilon, kAlpha)) /
+                        (2 * kStep),
+                    1e-8);
+      }
+    }
+  }
+}
+
+TEST(Gaussian, AClampedSpreadHasNoGradient) {
+  for (const double log_std : {-7.0, 3.0}) {
+    const auto policy = Gaussian<double>::From(0.1, log_std);
+    EXPECT_EQ(policy.log_std, std::clamp(log_std, kLogStdLow, kLogStdHigh));
+    const auto g = SquashedGradient(policy, Squash(policy, 0.5), 0.2, 1.0);
+    EXPECT_EQ(g.log_std, 0);
+    EXPECT_NE(g.mean, 0);
+  }
+  EXPECT_NE(SquashedGradient(Gaussian<double>::From(0.1, -1.0),
+                             Squash(Gaussian<double>::From(0.1, -1.0), 0.5), 0.2, 1.0)
+                .log_std,
+            0);
+}
+
+}  // namespace
+}  // namespace upswing

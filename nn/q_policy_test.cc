@@ -4,6 +4,7 @@
 
 #include <limits>
 
+#include "core/argmax.h"
 #include "core/error.h"
 #include "core/safetensors.h"
 #include "core/testing.h"

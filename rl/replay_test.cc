@@ -6,6 +6,7 @@
 #include <cmath>
 #include <set>
 
+#include "core/error.h"
 #include "core/testing.h"
 
 namespace upswing {
@@ -175,7 +176,7 @@ TEST(Replay, RefusesActionsThatTheAgentDoesNotHave) {
   for (Replay* other : {&loaded, &torque}) {
     EXPECT_THROW(SaveAndLoad([&](const Archive& archive) { saved.State(archive); },
                              [&](const Archive& archive) { other->State(archive); }),
-                 BadInput);
+                 Error);
   }
 }
 
