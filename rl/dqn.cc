@@ -52,14 +52,11 @@ float HuberLoss(float delta) {
 float HuberGradient(float delta) { return std::clamp(delta, -1.0F, 1.0F); }
 
 Dqn::Dqn(const DqnConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool& pool)
-    : config_(config),
+    : OffPolicyAgent(config, spec, ActionSpace::Discrete(static_cast<size_t>(config.levels)), seed),
+      config_(config),
       obs_size_(static_cast<size_t>(spec.obs_size)),
       torques_(TorquesOf(config, spec)),
-      action_space_(ActionSpace::Discrete(torques_.size())),
-      mirror_signs_(spec.mirror_signs),
       pool_(pool),
-      explore_rng_(seed, "exploration"),
-      sample_rng_(seed, "replay sampling"),
       network_(config.Shape(spec.obs_size, static_cast<int>(torques_.size())),
                config.precision == "bfloat16"),
       theta_(network_.num_parameters()),
@@ -71,22 +68,12 @@ Dqn::Dqn(const DqnConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
       dq_(q_.size()),
       y_(static_cast<size_t>(config.batch)),
       q_taken_(y_.size()),
-      td_error_(y_.size()),
       prepared_(network_.MakePrepared(true)),
       prepared_target_(network_.MakePrepared(false)),
       gradient_(network_.num_parameters()),
       squares_(static_cast<size_t>(network_.num_tasks())),
-      replay_(config.replay, spec.obs_size, action_space_, config.prioritized),
-      n_step_(spec.num_envs, static_cast<int>(config.n_step), config.gamma, spec.obs_size,
-              action_space_),
-      batch_(static_cast<int>(config.batch), spec.obs_size),
       act_activations_(network_.MakeActivations(spec.num_envs, false)),
-      act_obs_(static_cast<size_t>(spec.num_envs) * obs_size_),
-      act_q_(static_cast<size_t>(spec.num_envs) * torques_.size()),
-      act_action_(static_cast<size_t>(spec.num_envs)) {
-  if (config.mirror && mirror_signs_.empty()) {
-    throw BadInput(Concat("mirror: expected a task with mirror symmetry, got ", spec.task));
-  }
+      act_q_(static_cast<size_t>(spec.num_envs) * torques_.size()) {
   Rng init_rng(seed, "initial parameters");
   network_.Initialize(init_rng, theta_);
   theta_target_ = theta_policy_ = theta_;
@@ -98,23 +85,10 @@ double Dqn::epsilon() const {
   return std::max(decayed, config_.epsilon_end);
 }
 
-double Dqn::schedule() const {
-  return std::min(1.0,
-                  static_cast<double>(steps_) / static_cast<double>(config_.learning_rate_steps));
-}
-
-double Dqn::learning_rate() const {
-  return std::lerp(config_.learning_rate, config_.learning_rate_end, schedule());
-}
-
-double Dqn::importance_exponent() const {
-  return std::lerp(config_.importance_exponent, 1.0, schedule());
-}
-
 void Dqn::Act(Matrix<const float> obs, Matrix<double> action) {
   const Matrix<float> q(act_q_, obs.rows(), static_cast<int>(torques_.size()));
   network_.ForwardPreferences(theta_, obs, {0, obs.rows()}, act_activations_, q);
-  std::ranges::copy(obs.values(), act_obs_.begin());
+  Remember(obs);
 
   // ε-greedy.
   for (int env = 0; env < obs.rows(); ++env) {
@@ -123,40 +97,6 @@ void Dqn::Act(Matrix<const float> obs, Matrix<double> action) {
         random ? static_cast<int>(explore_rng_.Below(torques_.size())) : ArgMax(q.row(env));
     act_action_[static_cast<size_t>(env)] = static_cast<float>(chosen);
     action(env, 0) = torques_[static_cast<size_t>(chosen)];
-  }
-}
-
-void Dqn::Observe(const StepResult& result) {
-  for (size_t env = 0; env < act_action_.size(); ++env) {
-    const auto obs = std::span(act_obs_).subspan(env * obs_size_, obs_size_);
-    const auto next_obs = std::span(result.next_obs).subspan(env * obs_size_, obs_size_);
-    ExpectFinite(result, env);
-    n_step_.Push(static_cast<int>(env), obs, std::span(act_action_).subspan(env, 1),
-                 config_.reward_scale * result.reward[env], next_obs, result.terminated[env] != 0,
-                 result.truncated[env] != 0, [&](const Transition& t) { replay_.Add(t); });
-    if (result.done(env)) ++episodes_;
-  }
-  steps_ += static_cast<int64_t>(act_action_.size());
-}
-
-int64_t Dqn::updates_due() const {
-  const int64_t learning_steps = steps_ - config_.learning_starts;
-  if (learning_steps <= 0 || replay_.size() == 0) return 0;
-  return static_cast<int64_t>(static_cast<double>(learning_steps) * config_.updates_per_step);
-}
-
-void Dqn::Learn() {
-  while (updates_ < updates_due()) {
-    if (config_.prioritized) {
-      replay_.SamplePrioritized(sample_rng_, importance_exponent(), batch_);
-    } else {
-      replay_.Sample(sample_rng_, batch_);
-    }
-    if (config_.mirror) {
-      MirrorHalf(sample_rng_, mirror_signs_, action_space_, batch_);
-    }
-    Update(batch_);
-    if (config_.prioritized) replay_.Prioritize(batch_, td_error_, config_.priority_exponent);
   }
 }
 
@@ -189,10 +129,7 @@ void Dqn::Update(const Minibatch& batch) {
 }
 
 void Dqn::AveragePolicy() {
-  // The slower learning is, the longer the window: Polyak and Juditsky (1992) let it grow.
-  const double initial = config_.learning_rate;
-  const double tau_now = initial > 0 ? config_.policy_tau * learning_rate() / initial : 1;
-  const auto tau = static_cast<float>(std::min(config_.policy_tau, tau_now));
+  const auto tau = static_cast<float>(AveragingTau(config_.policy_tau));
   for (size_t i = 0; i < theta_.size(); ++i) {
     theta_policy_[i] += tau * (theta_[i] - theta_policy_[i]);
   }
@@ -282,23 +219,13 @@ std::unique_ptr<Policy> Dqn::ExportPolicy(PolicyInfo info) const {
 }
 
 void Dqn::State(const Archive& archive) {
-  constexpr int64_t kMostUpdates = 100 * kMostSteps;  // updates_per_step is at most 100
   constexpr Bounds<double> kSum{0, std::numeric_limits<double>::max()};
   archive.Array("theta", std::span(theta_));
   archive.Array("theta_target", std::span(theta_target_));
   if (config_.policy_tau < 1) archive.Array("theta_policy", std::span(theta_policy_));
   adam_.State(archive.In("adam"));
-  replay_.State(archive.In("replay"));
-  n_step_.State(archive.In("n_step"));
-  explore_rng_.State(archive.In("explore_rng"));
-  sample_rng_.State(archive.In("sample_rng"));
-  archive.Scalar("steps", steps_, {0, kMostSteps});
-  archive.Check(replay_.size() == std::min(replay_.capacity(), steps_ - n_step_.waiting()),
-                "replay/rows", "one transition for each step, or a full memory");
-  archive.Scalar("episodes", episodes_, {0, steps_});
-  archive.Scalar("updates", updates_, {0, kMostUpdates});
-  archive.Check(updates_ == updates_due() && adam_.steps() == updates_, "updates",
-                Concat(updates_due(), ", which the steps imply, and as many of Adam"));
+  SharedState(archive);
+  archive.Check(adam_.steps() == updates_, "adam/steps", "one for each update");
   archive.Scalar("report_updates", report_updates_, {0, updates_});
   archive.Scalar("loss_sum", loss_sum_, kSum);
   archive.Scalar("q_sum", q_sum_, kAnyNumber<double>);

@@ -8,10 +8,8 @@
 #include "core/thread_pool.h"
 #include "nn/adam.h"
 #include "nn/q_network.h"
-#include "rl/agent.h"
 #include "rl/dqn_config.h"
-#include "rl/n_step.h"
-#include "rl/replay.h"
+#include "rl/off_policy.h"
 
 /// Deep Q-Network (Mnih et al., 2015) and its extensions, each a flag.
 ///
@@ -37,30 +35,21 @@ float HuberLoss(float delta);
 float HuberGradient(float delta);
 
 /// A DQN agent for N environments.
-class Dqn : public Agent {
+class Dqn : public OffPolicyAgent {
  public:
   /// Of a task with one torque. Throws BadInput if it has more, and if minibatches are to be
   /// mirrored but the task has no mirror symmetry.
   Dqn(const DqnConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool& pool);
 
   void Act(Matrix<const float> obs, Matrix<double> action) override;
-  void Observe(const StepResult& result) override;
-  void Learn() override;
   Metrics TakeMetrics() override;
   std::unique_ptr<Policy> ExportPolicy(PolicyInfo info) const override;
   void State(const Archive& archive) override;
 
   std::span<const float> online() const { return theta_; }
   std::span<const float> target() const { return theta_target_; }
-  const Replay& replay() const { return replay_; }
-  int64_t steps() const override { return steps_; }
-  int64_t updates() const override { return updates_; }
   double epsilon() const;
-  double learning_rate() const;
-  /// β of prioritised replay, which rises to 1 over learning_rate_steps (Schaul et al., 2016).
-  double importance_exponent() const;
-  /// One gradient step on a given minibatch, which counts in the metrics.
-  void Update(const Minibatch& batch);
+  void Update(const Minibatch& batch) override;
 
  private:
   /// TD errors of some rows of a minibatch, and the backward pass to the activations.
@@ -69,18 +58,11 @@ class Dqn : public Agent {
   void CountErrors(const Minibatch& batch);
   /// Moves theta_policy_ towards θ by Polyak averaging.
   void AveragePolicy();
-  /// Number of updates that are due after the steps so far.
-  int64_t updates_due() const;
-  /// Progress of the learning-rate schedule, 0 to 1.
-  double schedule() const;
 
   DqnConfig config_;
   size_t obs_size_;
   std::vector<double> torques_;  // (A)
-  ActionSpace action_space_;
-  std::vector<float> mirror_signs_;  // (D)
   ThreadPool& pool_;
-  Rng explore_rng_, sample_rng_;
 
   QNetwork<float> network_;
   AlignedVector<float> theta_, theta_target_;  // (num_parameters)
@@ -89,19 +71,13 @@ class Dqn : public Agent {
   // Of an update: B rows.
   QNetwork<float>::Activations activations_;
   AlignedVector<float> q_, q_select_, q_target_, dq_;  // (B × A)
-  AlignedVector<float> y_, q_taken_, td_error_;        // (B) targets, Q(s, a), Q(s, a) - y
+  AlignedVector<float> y_, q_taken_;                   // (B) targets, Q(s, a)
   QNetwork<float>::Prepared prepared_, prepared_target_;
   AlignedVector<float> gradient_;  // (num_parameters)
   std::vector<float> squares_;     // of the gradient, by task
-  Replay replay_;
-  NStep n_step_;
-  Minibatch batch_;
-
   QNetwork<float>::Activations act_activations_;
-  AlignedVector<float> act_obs_, act_q_;  // (N × D), (N × A) of the last Act
-  std::vector<float> act_action_;         // (N) number of the action
+  AlignedVector<float> act_q_;  // (N × A) of the last Act
 
-  int64_t steps_ = 0, episodes_ = 0, updates_ = 0;
   // Sums since TakeMetrics.
   double loss_sum_ = 0, q_sum_ = 0, td_sum_ = 0, norm_sum_ = 0;
   int64_t report_updates_ = 0;

@@ -43,17 +43,14 @@ void SoftTargets(std::span<const float> q1, std::span<const float> q2,
 }
 
 Sac::Sac(const SacConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool& pool)
-    : config_(config),
+    : OffPolicyAgent(config, spec, ActionSpace{spec.action_size()}, seed),
+      config_(config),
       D_(spec.obs_size),
       A_(spec.action_size()),
       B_(static_cast<int>(config.batch)),
-      action_space_{A_},
       action_limit_(spec.action_limit),
-      mirror_signs_(spec.mirror_signs),
       bins_(static_cast<int>(config.bins), config.value_low, config.value_high),
       pool_(pool),
-      explore_rng_(seed, "exploration"),
-      sample_rng_(seed, "replay sampling"),
       noise_rng_(seed, "policy noise"),
       actor_([&] {
         Rng rng(seed, "initial actor");
@@ -70,19 +67,11 @@ Sac::Sac(const SacConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
       inputs_(Size(B_, D_ + A_)),
       policy_inputs_(inputs_.size()),
       y_(log_prob_.size()),
-      replay_(config.replay, D_, action_space_),
-      n_step_(spec.num_envs, static_cast<int>(config.n_step), config.gamma, D_, action_space_),
-      batch_(B_, D_, A_),
       act_activations_(actor_.network().MakeActivations(spec.num_envs, false)),
-      act_obs_(Size(spec.num_envs, D_)),
       act_outputs_(Size(spec.num_envs, 2 * A_)),
-      act_action_(Size(spec.num_envs, A_)),
       mean_(act_action_.size()),
       last_mean_(act_action_.size()),
-      episode_steps_(static_cast<size_t>(spec.num_envs)) {
-  if (config.mirror && mirror_signs_.empty()) {
-    throw BadInput(Concat("mirror: expected a task with mirror symmetry, got ", spec.task));
-  }
+      begins_(static_cast<size_t>(spec.num_envs), 1) {
   for (size_t i = 0; i < num_critics(); ++i) {
     Rng rng(seed, "initial critic", i);
     TrainedNetwork network(config.Trunk(D_ + A_), {bins_.outputs()}, B_, rng);
@@ -94,21 +83,12 @@ Sac::Sac(const SacConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
 
 double Sac::alpha() const { return std::exp(double{log_alpha_[0]}); }
 
-double Sac::schedule() const {
-  return std::min(1.0,
-                  static_cast<double>(steps_) / static_cast<double>(config_.learning_rate_steps));
-}
-
-double Sac::learning_rate() const {
-  return std::lerp(config_.learning_rate, config_.learning_rate_end, schedule());
-}
-
 void Sac::Act(Matrix<const float> obs, Matrix<double> action) {
   const Matrix<float> outputs(act_outputs_, obs.rows(), 2 * A_);
   ForSlices(pool_, obs.rows(), [&](RowRange rows) {
     actor_.network().Forward({actor_.theta()}, obs, rows, act_activations_, outputs);
   });
-  std::ranges::copy(obs.values(), act_obs_.begin());
+  Remember(obs);
   const bool random = steps_ < config_.learning_starts;
   for (int env = 0; env < obs.rows(); ++env) {
     for (int k = 0; k < A_; ++k) {
@@ -123,38 +103,17 @@ void Sac::Act(Matrix<const float> obs, Matrix<double> action) {
   }
 }
 
-void Sac::Observe(const StepResult& result) {
-  const auto D = static_cast<size_t>(D_), A = static_cast<size_t>(A_);
-  for (size_t env = 0; env < episode_steps_.size(); ++env) {
-    const auto obs = std::span(act_obs_).subspan(env * D, D);
-    const auto next_obs = std::span(result.next_obs).subspan(env * D, D);
-    ExpectFinite(result, env);
-    double reward = config_.reward_scale * result.reward[env];
-    for (size_t i = env * A; config_.smoothness > 0 && i < (env + 1) * A; ++i) {
-      const double change = double{mean_[i]} - last_mean_[i];
-      if (episode_steps_[env] > 0) reward -= config_.smoothness * change * change;
-      last_mean_[i] = mean_[i];
-    }
-    n_step_.Push(static_cast<int>(env), obs, std::span(act_action_).subspan(env * A, A), reward,
-                 next_obs, result.terminated[env] != 0, result.truncated[env] != 0,
-                 [&](const Transition& t) { replay_.Add(t); });
-    episode_steps_[env] = result.done(env) ? 0 : episode_steps_[env] + 1;
+double Sac::RewardOf(const StepResult& result, size_t env) {
+  double reward = OffPolicyAgent::RewardOf(result, env);
+  if (config_.smoothness == 0) return reward;
+  const auto A = static_cast<size_t>(A_);
+  for (size_t i = env * A; i < (env + 1) * A; ++i) {
+    const double change = double{mean_[i]} - last_mean_[i];
+    if (begins_[env] == 0) reward -= config_.smoothness * change * change;
+    last_mean_[i] = mean_[i];
   }
-  steps_ += static_cast<int64_t>(episode_steps_.size());
-}
-
-int64_t Sac::updates_due() const {
-  const int64_t learning_steps = steps_ - config_.learning_starts;
-  if (learning_steps <= 0 || replay_.size() == 0) return 0;
-  return static_cast<int64_t>(static_cast<double>(learning_steps) * config_.updates_per_step);
-}
-
-void Sac::Learn() {
-  while (updates_ < updates_due()) {
-    replay_.Sample(sample_rng_, batch_);
-    if (config_.mirror) MirrorHalf(sample_rng_, mirror_signs_, action_space_, batch_);
-    Update(batch_);
-  }
+  begins_[env] = result.done(env) ? 1 : 0;
+  return reward;
 }
 
 void Sac::Update(const Minibatch& batch) {
@@ -215,8 +174,10 @@ void Sac::CriticRows(const Minibatch& batch, RowRange rows) {
     critic.network.Forward(sa, rows, outputs);
     ValueRows(critic, rows);
     for (int i = rows.first; i < rows.first + rows.count; ++i) {
-      bins_.Loss(outputs.row(i), y_[static_cast<size_t>(i)], dy.row(i));
-      for (float& gradient : dy.row(i)) gradient /= static_cast<float>(B_);
+      const auto row = static_cast<size_t>(i);
+      bins_.Loss(outputs.row(i), y_[row], dy.row(i));
+      const float weight = batch.weight[row] / static_cast<float>(B_);
+      for (float& gradient : dy.row(i)) gradient *= weight;
     }
     critic.network.Backward(dy, rows);
   }
@@ -279,12 +240,8 @@ void Sac::UpdateActor(const Minibatch& batch) {
   for (Critic& critic : critics_) critic.network.Prepare(pool_);
   actor_.Prepare(pool_);
   ForSlices(pool_, B_, [&](RowRange rows) { ActorRows(batch, rows); });
-  // The policy that is judged follows. The slower learning is, the longer its window (Polyak and
-  // Juditsky, 1992).
-  const double initial = config_.learning_rate;
-  const double tau = initial > 0 ? config_.policy_tau * learning_rate() / initial : 1;
-  actor_.Step({batch.obs.data(), B_, D_}, learning_rate(), config_.max_gradient_norm, theta_policy_,
-              std::min(config_.policy_tau, tau), pool_);
+  actor_.Step({batch.obs.data(), B_, D_}, config_.actor_rate * learning_rate(),
+              config_.max_gradient_norm, theta_policy_, AveragingTau(config_.policy_tau), pool_);
   UpdateTemperature();
 }
 
@@ -303,12 +260,15 @@ void Sac::UpdateTemperature() {
 
 void Sac::CountErrors() {
   double loss = 0, q = 0, td = 0;
+  std::ranges::fill(td_error_, 0.0F);
   for (const Critic& critic : critics_) {
     for (size_t i = 0; i < y_.size(); ++i) {
       const double error = double{critic.value[i]} - y_[i];
       loss += error * error / 2;
       td += std::abs(error);
       q += critic.value[i];
+      // A transition's priority is the mean of both.
+      td_error_[i] += static_cast<float>(std::abs(error) / static_cast<double>(critics_.size()));
     }
   }
   const double n = static_cast<double>(critics_.size() * y_.size());
@@ -359,7 +319,6 @@ std::unique_ptr<Policy> Sac::ExportPolicy(PolicyInfo info) const {
 }
 
 void Sac::State(const Archive& archive) {
-  constexpr int64_t kMostUpdates = 100 * kMostSteps;  // updates_per_step is at most 100
   constexpr Bounds<double> kSum{0, std::numeric_limits<double>::max()};
   constexpr Bounds<float> kUnitRange{-1, 1};
   actor_.State(archive.In("actor"));
@@ -371,22 +330,15 @@ void Sac::State(const Archive& archive) {
   }
   archive.Array("log_alpha", std::span(log_alpha_), {-100, 100});
   alpha_adam_.State(archive.In("alpha_adam"));
-  replay_.State(archive.In("replay"));
-  n_step_.State(archive.In("n_step"));
-  explore_rng_.State(archive.In("explore_rng"));
-  sample_rng_.State(archive.In("sample_rng"));
   noise_rng_.State(archive.In("noise_rng"));
   archive.Array("last_mean", std::span(last_mean_), kUnitRange);
-  archive.Array("episode_steps", std::span(episode_steps_), {0, kMostSteps});
-  archive.Scalar("steps", steps_, {0, kMostSteps});
-  archive.Check(replay_.size() == std::min(replay_.capacity(), steps_ - n_step_.waiting()),
-                "replay/rows", "one transition for each step, or a full memory");
-  archive.Scalar("updates", updates_, {0, kMostUpdates});
+  archive.Array("begins", std::span(begins_), {0, 1});
+  SharedState(archive);
   const int64_t of_actor = updates_ / config_.actor_period;
-  archive.Check(updates_ == updates_due() && critics_.front().network.steps() == updates_ &&
+  archive.Check(critics_.front().network.steps() == updates_ &&
                     critics_.back().network.steps() == updates_ && actor_.steps() == of_actor &&
                     alpha_adam_.steps() == (config_.tune_alpha ? of_actor : 0),
-                "updates", Concat(updates_due(), ", which the steps imply, and as many of Adam"));
+                "updates", "as many steps of Adam");
   archive.Scalar("report_updates", report_updates_, {0, updates_});
   archive.Scalar("report_actor_updates", report_actor_updates_, {0, of_actor});
   archive.Scalar("loss_sum", loss_sum_, kSum);

@@ -9,9 +9,7 @@
 #include "core/thread_pool.h"
 #include "nn/adam.h"
 #include "nn/gaussian.h"
-#include "rl/agent.h"
-#include "rl/n_step.h"
-#include "rl/replay.h"
+#include "rl/off_policy.h"
 #include "rl/sac_config.h"
 #include "rl/trained_network.h"
 #include "rl/value_bins.h"
@@ -37,28 +35,22 @@ inline double TemperatureGradient(double mean_log_prob, double target_entropy) {
 }
 
 /// An SAC agent for N environments.
-class Sac : public Agent {
+class Sac : public OffPolicyAgent {
  public:
   /// Throws BadInput if minibatches are to be mirrored but the task has no mirror symmetry.
   Sac(const SacConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool& pool);
 
   void Act(Matrix<const float> obs, Matrix<double> action) override;
-  void Observe(const StepResult& result) override;
-  void Learn() override;
   Metrics TakeMetrics() override;
   std::unique_ptr<Policy> ExportPolicy(PolicyInfo info) const override;
   void State(const Archive& archive) override;
 
-  int64_t steps() const override { return steps_; }
-  int64_t updates() const override { return updates_; }
   double alpha() const;
-  double learning_rate() const;
   std::span<const float> actor() const { return actor_.theta(); }
   std::span<const float> critic(size_t i) const { return critics_.at(i).network.theta(); }
-  const Replay& replay() const { return replay_; }
   /// One round on a given minibatch: a step of the critics and, each actor_period, of actor and
   /// temperature.
-  void Update(const Minibatch& batch);
+  void Update(const Minibatch& batch) override;
 
  private:
   struct Critic {
@@ -69,6 +61,8 @@ class Sac : public Agent {
     AlignedVector<float> dinputs;      // (B × (D + A)) dQ/d(s, a), for the actor
   };
 
+  /// Less what a change of the mean action costs; see smoothness.
+  double RewardOf(const StepResult& result, size_t env) override;
   /// Samples a ~ π(s) of some rows: fills samples_, and behind `inputs`' (B × (D + A))
   /// observations the actions.
   void SampleRows(Matrix<const float> obs, RowRange rows, Matrix<float> inputs);
@@ -83,18 +77,14 @@ class Sac : public Agent {
   void CountErrors();
   /// Fills samples_' noise.
   void DrawNoise();
-  int64_t updates_due() const;
-  double schedule() const;
   size_t num_critics() const { return config_.twin ? 2 : 1; }
 
   SacConfig config_;
   int D_, A_, B_;
-  ActionSpace action_space_;
   std::vector<double> action_limit_;  // (A)
-  std::vector<float> mirror_signs_;   // (D)
   ValueBins bins_;
   ThreadPool& pool_;
-  Rng explore_rng_, sample_rng_, noise_rng_;
+  Rng noise_rng_;
 
   TrainedNetwork actor_;
   AlignedVector<float> theta_policy_;  // Polyak average of the actor that is judged; see policy_tau
@@ -109,17 +99,12 @@ class Sac : public Agent {
   AlignedVector<float> log_prob_;                  // (B)
   AlignedVector<float> inputs_, policy_inputs_;    // (B × (D + A)): s, a; s, a ~ π
   AlignedVector<float> y_;                         // (B)
-  Replay replay_;
-  NStep n_step_;
-  Minibatch batch_;
 
   Network<float>::Activations act_activations_;
-  AlignedVector<float> act_obs_, act_outputs_;  // (N × D), (N × 2 A) of the last Act
-  std::vector<float> act_action_;               // (N × A)
-  std::vector<float> mean_, last_mean_;         // (N × A) mean actions of this step and the last
-  std::vector<int64_t> episode_steps_;          // (N) since the episode's beginning
+  AlignedVector<float> act_outputs_;     // (N × 2 A) of the last Act
+  std::vector<float> mean_, last_mean_;  // (N × A) mean actions of this step and the last
+  std::vector<int64_t> begins_;          // (N) 1 in the first step of an episode
 
-  int64_t steps_ = 0, updates_ = 0;
   // Sums since TakeMetrics.
   double loss_sum_ = 0, q_sum_ = 0, td_sum_ = 0, norm_sum_ = 0, entropy_sum_ = 0;
   int64_t report_updates_ = 0, report_actor_updates_ = 0;

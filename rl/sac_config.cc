@@ -13,29 +13,13 @@ void SacConfig::Describe(Options& o) {
 
   o.Section("agent");
   o.Add(&twin, "twin", true, "two critics, of which the smaller value counts");
-  o.Add(&gamma, "gamma", 0.99, kUnit, "", "discount per control step");
-  o.Add(&n_step, "n_step", 3, {1, 100}, "steps", "length of the returns in the targets");
-  o.Add(&reward_scale, "reward_scale", 0.1, kPositive, "",
-        "the agent learns from reward times this");
+  OffPolicyConfig::Describe(o);
   o.Add(&smoothness, "smoothness", 0, {0, 1e6}, "",
         "the agent's reward falls by this times the squared change of its mean action, in units of "
         "the limit");
-  o.Add(&batch, "batch", 128, {1, 65536}, "", "transitions in a minibatch");
-  o.Add(&replay, "replay", 300000, {1, 10000000}, "", "transitions that the replay memory holds");
-  o.Add(&mirror, "mirror", true,
-        "mirror a random half of each minibatch, observations and actions");
-  o.Add(&learning_starts, "learning_starts", 2000, kNotNegative, "steps",
-        "before the first update; until then actions are uniform");
-  o.Add(&updates_per_step, "updates_per_step", 0.0625, {0, 100}, "", "gradient steps per step");
   o.Add(&actor_period, "actor_period", 2, {1, 1e9}, "updates",
         "of the critics for one of actor and temperature");
-  o.Add(&learning_rate, "learning_rate", 1e-3, {0, 10}, "",
-        "learning rate of Adam at the beginning");
-  o.Add(&learning_rate_end, "learning_rate_end", 2e-5, {0, 10}, "", "and at the end");
-  o.Add(&learning_rate_steps, "learning_rate_steps", 250000, {1, 1e12}, "steps",
-        "over which it falls linearly");
-  o.Add(&max_gradient_norm, "max_gradient_norm", 10, kPositive, "",
-        "clip the global norm of each network's gradient to this");
+  o.Add(&actor_rate, "actor_rate", 1, {0, 1000}, "", "the actor's learning rate over the critics'");
   o.Add(&tau, "tau", 0.02, kUnit, "", "Polyak averaging of the target critics, per update");
   o.Add(&policy_tau, "policy_tau", 0.01, {1e-9, 1}, "",
         "Polyak averaging of the policy that is judged and kept, per update of the actor, which "

@@ -13,9 +13,12 @@
 
 namespace upswing {
 
-/// Rows in a slice of a minibatch of B: enough slices for some threads, enough rows for the
+/// Rows in a slice of a minibatch of B: enough slices for some threads, and whole tiles of the
 /// kernels. From B alone, so that the number of threads changes no bit.
-inline int SliceRows(int B) { return std::clamp(B / 4, 8, 32); }
+inline int SliceRows(int B) {
+  constexpr int kTile = 8;
+  return std::clamp((B / 4 + kTile - 1) / kTile * kTile, kTile, 32);
+}
 
 /// Calls `work(RowRange)` for each slice of B rows, shared by the pool's threads.
 template <typename Work>

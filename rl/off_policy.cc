@@ -1,0 +1,131 @@
+#include "rl/off_policy.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "core/text.h"
+
+namespace upswing {
+
+void OffPolicyConfig::Describe(Options& o) {
+  o.Add(&gamma, "gamma", 0.99, kUnit, "", "discount per control step");
+  o.Add(&n_step, "n_step", 3, {1, 100}, "steps", "length of the returns in the targets");
+  o.Add(&reward_scale, "reward_scale", 0.1, kPositive, "",
+        "the agent learns from reward times this");
+  o.Add(&batch, "batch", 128, {1, 65536}, "", "transitions in a minibatch");
+  o.Add(&replay, "replay", 300000, {1, 10000000}, "", "transitions that the replay memory holds");
+  o.Add(&prioritized, "prioritized", true,
+        "prioritised replay: draw transitions by their last |TD error|");
+  o.Add(&priority_exponent, "priority_exponent", 0.6, kUnit, "",
+        "alpha of prioritised replay; 0: uniform");
+  o.Add(&importance_exponent, "importance_exponent", 0.4, kUnit, "",
+        "beta of prioritised replay at the beginning; it rises to 1 over learning_rate_steps");
+  o.Add(&mirror, "mirror", true,
+        "mirror a random half of each minibatch, observations and actions");
+  o.Add(&learning_starts, "learning_starts", 2000, kNotNegative, "steps",
+        "before the first update");
+  o.Add(&updates_per_step, "updates_per_step", 0.0625, {0, 100}, "", "gradient steps per step");
+  o.Add(&learning_rate, "learning_rate", 1e-3, {0, 10}, "",
+        "learning rate of Adam at the beginning");
+  o.Add(&learning_rate_end, "learning_rate_end", 2e-5, {0, 10}, "", "and at the end");
+  o.Add(&learning_rate_steps, "learning_rate_steps", 250000, {1, 1e12}, "steps",
+        "over which it falls linearly");
+  o.Add(&max_gradient_norm, "max_gradient_norm", 10, kPositive, "", "clip the global norm to this");
+}
+
+OffPolicyAgent::OffPolicyAgent(const OffPolicyConfig& config, const EnvSpec& spec,
+                               const ActionSpace& actions, uint64_t seed)
+    : explore_rng_(seed, "exploration"),
+      act_action_(static_cast<size_t>(spec.num_envs) * static_cast<size_t>(actions.size)),
+      td_error_(static_cast<size_t>(config.batch)),
+      settings_(config),
+      obs_size_(static_cast<size_t>(spec.obs_size)),
+      action_size_(static_cast<size_t>(actions.size)),
+      action_space_(actions),
+      mirror_signs_(spec.mirror_signs),
+      sample_rng_(seed, "replay sampling"),
+      replay_(config.replay, spec.obs_size, actions, config.prioritized),
+      n_step_(spec.num_envs, static_cast<int>(config.n_step), config.gamma, spec.obs_size, actions),
+      batch_(static_cast<int>(config.batch), spec.obs_size, actions.size),
+      act_obs_(static_cast<size_t>(spec.num_envs) * obs_size_) {
+  if (config.mirror && mirror_signs_.empty()) {
+    throw BadInput(Concat("mirror: expected a task with mirror symmetry, got ", spec.task));
+  }
+}
+
+double OffPolicyAgent::schedule() const {
+  return std::min(1.0,
+                  static_cast<double>(steps_) / static_cast<double>(settings_.learning_rate_steps));
+}
+
+double OffPolicyAgent::learning_rate() const {
+  return std::lerp(settings_.learning_rate, settings_.learning_rate_end, schedule());
+}
+
+double OffPolicyAgent::importance_exponent() const {
+  return std::lerp(settings_.importance_exponent, 1.0, schedule());
+}
+
+double OffPolicyAgent::AveragingTau(double tau) const {
+  const double initial = settings_.learning_rate;
+  return initial > 0 ? std::min(tau, tau * learning_rate() / initial) : tau;
+}
+
+void OffPolicyAgent::Remember(Matrix<const float> obs) {
+  std::ranges::copy(obs.values(), act_obs_.begin());
+}
+
+double OffPolicyAgent::RewardOf(const StepResult& result, size_t env) {
+  return settings_.reward_scale * result.reward[env];
+}
+
+void OffPolicyAgent::Observe(const StepResult& result) {
+  const size_t D = obs_size_, A = action_size_;
+  const size_t envs = result.reward.size();
+  for (size_t env = 0; env < envs; ++env) {
+    ExpectFinite(result, env);
+    n_step_.Push(static_cast<int>(env), std::span(act_obs_).subspan(env * D, D),
+                 std::span(act_action_).subspan(env * A, A), RewardOf(result, env),
+                 std::span(result.next_obs).subspan(env * D, D), result.terminated[env] != 0,
+                 result.truncated[env] != 0, [&](const Transition& t) { replay_.Add(t); });
+    if (result.done(env)) ++episodes_;
+  }
+  steps_ += static_cast<int64_t>(envs);
+}
+
+int64_t OffPolicyAgent::updates_due() const {
+  const int64_t learning_steps = steps_ - settings_.learning_starts;
+  if (learning_steps <= 0 || replay_.size() == 0) return 0;
+  return static_cast<int64_t>(static_cast<double>(learning_steps) * settings_.updates_per_step);
+}
+
+void OffPolicyAgent::Learn() {
+  while (updates_ < updates_due()) {
+    if (settings_.prioritized) {
+      replay_.SamplePrioritized(sample_rng_, importance_exponent(), batch_);
+    } else {
+      replay_.Sample(sample_rng_, batch_);
+    }
+    if (settings_.mirror) MirrorHalf(sample_rng_, mirror_signs_, action_space_, batch_);
+    Update(batch_);
+    if (settings_.prioritized) replay_.Prioritize(batch_, td_error_, settings_.priority_exponent);
+  }
+}
+
+void OffPolicyAgent::SharedState(const Archive& archive) {
+  constexpr int64_t kMostUpdates = 100 * kMostSteps;  // updates_per_step is at most 100
+  replay_.State(archive.In("replay"));
+  n_step_.State(archive.In("n_step"));
+  explore_rng_.State(archive.In("explore_rng"));
+  sample_rng_.State(archive.In("sample_rng"));
+  archive.Scalar("steps", steps_, {0, kMostSteps});
+  archive.Check(replay_.size() == std::min(replay_.capacity(), steps_ - n_step_.waiting()),
+                "replay/rows", "one transition for each step, or a full memory");
+  archive.Scalar("episodes", episodes_, {0, steps_});
+  archive.Scalar("updates", updates_, {0, kMostUpdates});
+  archive.Check(updates_ == updates_due(), "updates",
+                Concat(updates_due(), ", which the steps imply"));
+}
+
+}  // namespace upswing

@@ -1,0 +1,89 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/options.h"
+#include "rl/agent.h"
+#include "rl/n_step.h"
+#include "rl/replay.h"
+
+namespace upswing {
+
+/// Settings that all agents with a replay memory have.
+struct OffPolicyConfig {
+  double gamma;
+  int64_t n_step;
+  double reward_scale;
+  int64_t batch, replay;
+  bool prioritized;
+  double priority_exponent, importance_exponent;
+  bool mirror;
+  int64_t learning_starts;
+  double updates_per_step;
+  double learning_rate, learning_rate_end;
+  int64_t learning_rate_steps;
+  double max_gradient_norm;
+
+  /// One line per setting: name, default, range, unit, help.
+  void Describe(Options& options);
+};
+
+/// An agent that learns from a replay memory: what DQN and SAC have in common. A derived agent acts
+/// and makes one gradient step from a minibatch.
+///
+/// Letters: N environments, D observation size, A numbers of an action, B batch size.
+class OffPolicyAgent : public Agent {
+ public:
+  void Observe(const StepResult& result) override;
+  void Learn() override;
+  int64_t steps() const override { return steps_; }
+  int64_t updates() const override { return updates_; }
+
+  const Replay& replay() const { return replay_; }
+  double learning_rate() const;
+  /// β of prioritised replay, which rises to 1 over learning_rate_steps (Schaul et al., 2016).
+  double importance_exponent() const;
+  /// One gradient step on a given minibatch, which counts in the metrics. Leaves td_error_ and
+  /// counts updates_.
+  virtual void Update(const Minibatch& batch) = 0;
+
+ protected:
+  /// Throws BadInput if minibatches are to be mirrored but the task has no mirror symmetry.
+  OffPolicyAgent(const OffPolicyConfig& config, const EnvSpec& spec, const ActionSpace& actions,
+                 uint64_t seed);
+
+  /// What is learned from an environment's step: its reward times reward_scale.
+  virtual double RewardOf(const StepResult& result, size_t env);
+  /// The observations (N × D) that actions are now chosen for.
+  void Remember(Matrix<const float> obs);
+  /// The window of an average that follows the learned policy, given that at the beginning: the
+  /// slower learning is, the longer (Polyak and Juditsky, 1992, let it grow).
+  double AveragingTau(double tau) const;
+  /// Saves or loads memory, streams of random numbers and counters. Throws BadInput, too, if they
+  /// contradict each other.
+  void SharedState(const Archive& archive);
+
+  Rng explore_rng_;
+  std::vector<float> act_action_;  // (N × A) of the last Act
+  std::vector<float> td_error_;    // (B) of the last Update: Q(s, a) - y
+  int64_t steps_ = 0, episodes_ = 0, updates_ = 0;
+
+ private:
+  int64_t updates_due() const;
+  /// Progress of the learning-rate schedule, 0 to 1.
+  double schedule() const;
+
+  OffPolicyConfig settings_;
+  size_t obs_size_, action_size_;
+  ActionSpace action_space_;
+  std::vector<float> mirror_signs_;  // (D)
+  Rng sample_rng_;
+  Replay replay_;
+  NStep n_step_;
+  Minibatch batch_;
+  std::vector<float> act_obs_;  // (N × D) of the last Act
+};
+
+}  // namespace upswing
