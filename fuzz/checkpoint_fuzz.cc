@@ -12,15 +12,18 @@ namespace {
 /// Two trainings with the same settings, kept from one input to the next: loading overwrites the
 /// whole state, and making a training takes far longer than loading one.
 struct Trainings {
-  explicit Trainings(const std::string& physics)
-      : first(TinyConfig(physics), 1), second(TinyConfig(physics), 1) {}
+  explicit Trainings(const Config& config) : first(config, 1), second(config, 1) {}
   Training first, second;
 };
 
-Trainings& TrainingsIn(bool mujoco) {
-  static Trainings in_mujoco("mujoco");
-  static Trainings in_closed_form("closed-form");
-  return mujoco ? in_mujoco : in_closed_form;
+/// Those that a checkpoint belongs to: its settings stand in another file; here its metadata have
+/// a key that says which they are.
+Trainings& TrainingsOf(const Tensors& file) {
+  static Trainings in_mujoco(TinyConfig("mujoco"));
+  static Trainings sac(TinyConfig("closed-form", "sac"));
+  static Trainings in_closed_form(TinyConfig("closed-form"));
+  if (file.metadata.contains("sac")) return sac;
+  return file.metadata.contains("mujoco") ? in_mujoco : in_closed_form;
 }
 
 }  // namespace
@@ -31,8 +34,7 @@ bool TryInput(std::string_view input) {
   if (!Accepts([&] { file = ReadSafetensors({bytes.begin(), bytes.end()}, kInputName); })) {
     return false;
   }
-  // The settings stand in another file; here the metadata say which of two trainings this is.
-  Trainings& trainings = TrainingsIn(file.metadata.contains("mujoco"));
+  Trainings& trainings = TrainingsOf(file);
   Training& training = trainings.first;
   Training& again = trainings.second;
   if (!Accepts([&] { training.State(Archive::Loader(file)); })) return false;

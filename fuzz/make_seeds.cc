@@ -8,6 +8,7 @@
 #include "fuzz/tiny_training.h"
 #include "io/tensor_file.h"
 #include "lab/loaded_policy.h"
+#include "nn/actor_policy.h"
 #include "nn/q_policy.h"
 
 namespace upswing {
@@ -15,28 +16,30 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A checkpoint after a few steps, when the replay memory is full.
-void SaveCheckpoint(Training& training, const std::string& physics, const fs::path& file) {
+/// A checkpoint of the training that is called `kind` in the fuzz target.
+void SaveCheckpoint(Training& training, const std::string& kind, const fs::path& file) {
   Tensors checkpoint;
-  if (physics == "mujoco") checkpoint.metadata["mujoco"] = "";
+  if (kind != "closed-form") checkpoint.metadata[kind] = "";
   training.State(Archive::Saver(checkpoint));
   SaveTensors(checkpoint, file);
 }
 
 void MakeSeeds(const fs::path& corpus) {
-  for (const std::string physics : {"closed-form", "mujoco"}) {
-    const Config config = TinyConfig(physics);
+  for (const std::string kind : {"closed-form", "mujoco", "sac"}) {
+    const bool sac = kind == "sac";
+    const Config config = TinyConfig(sac ? "closed-form" : kind, sac ? "sac" : "dqn");
     Training training(config, 1);
-    SaveCheckpoint(training, physics,
-                   corpus / "checkpoint/accepted" / (physics + "-new.safetensors"));
+    SaveCheckpoint(training, kind, corpus / "checkpoint/accepted" / (kind + "-new.safetensors"));
+    // Until the replay memory is full.
     for (int step = 0; step < 9; ++step) training.Step();
-    SaveCheckpoint(training, physics, corpus / "checkpoint/accepted" / (physics + ".safetensors"));
+    SaveCheckpoint(training, kind, corpus / "checkpoint/accepted" / (kind + ".safetensors"));
 
     PolicyInfo info = InfoOf(config);
     info.step = 18;
     info.success_rate = 0.5;
     info.mean_return = -12.5;
-    const fs::path file = corpus / "policy/accepted" / ("dueling-" + physics + ".safetensors");
+    const fs::path file =
+        corpus / "policy/accepted" / (sac ? "sac.safetensors" : "dueling-" + kind + ".safetensors");
     SaveTensors(training.agent().ExportPolicy(info)->ToTensors(), file);
   }
   // The other kind of network, as short as can be.
@@ -48,6 +51,20 @@ void MakeSeeds(const fs::path& corpus) {
   info.plant = all.plant;
   info.control_period = all.control_period;
   info.observation = all.observation;
+  for (const ActorOutput output : {ActorOutput::kClippedGaussian, ActorOutput::kCategorical}) {
+    const bool categorical = output == ActorOutput::kCategorical;
+    ActorParts parts;
+    parts.output = output;
+    parts.actor = {kObservationSize, {2}, false, Activation::kTanh};
+    parts.parameters.assign(categorical ? 27 : 24, 0.25F);
+    parts.action_limit = {plant.torque_limit};
+    if (categorical) parts.torques = {-1, 0, 1};
+    parts.critic = {kObservationSize, {2}, false, Activation::kTanh};
+    parts.critic_parameters.assign(21, 0.5F);
+    SaveTensors(ActorPolicy(parts, info).ToTensors(),
+                corpus / "policy/accepted" /
+                    (categorical ? "categorical.safetensors" : "clipped-gaussian.safetensors"));
+  }
   const QPolicy policy(shape, std::vector<float>(network.num_parameters(), 0.25F), {-1, 1}, info);
   SaveTensors(policy.ToTensors(), corpus / "policy/accepted/plain-of-another-writer.safetensors");
 }

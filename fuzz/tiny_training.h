@@ -6,8 +6,8 @@
 namespace upswing {
 
 /// A training of a few hundred parameters with nearly everything switched on, in `physics`.
-inline Config TinyConfig(const std::string& physics) {
-  Config config;
+inline Config TinyConfig(const std::string& physics, const std::string& algorithm = "dqn") {
+  Config config(algorithm);
   SetFlags(OptionsOf(config), {{"physics", physics},
                                {"envs", "2"},
                                {"episode_seconds", "0.1"},
@@ -16,7 +16,6 @@ inline Config TinyConfig(const std::string& physics) {
                                {"delay", "0.04"},
                                {"randomize", "0.1"},
                                {"hidden", "3,2"},
-                               {"head", "2"},
                                {"batch", "4"},
                                {"replay", "6"},
                                {"n_step", "2"},
@@ -24,6 +23,8 @@ inline Config TinyConfig(const std::string& physics) {
                                {"updates_per_step", "0.5"},
                                {"steps", "1e12"},
                                {"eval_every", "1e12"}});
+  if (algorithm == "dqn") SetFlags(OptionsOf(config), {{"head", "2"}});
+  if (algorithm == "sac") SetFlags(OptionsOf(config), {{"smoothness", "0.1"}, {"bins", "3"}});
   return config;
 }
 

@@ -60,6 +60,10 @@ void CheckTask(const LoadedPolicy& loaded, const std::string& where) {
                           " s, for which this program holds a torque, got ",
                           period ? FormatNumber(*period) : "none"));
   }
+  if (loaded.policy->action_size() != spec.action_size()) {
+    throw BadInput(Concat(where, ": expected actions of ", spec.action_size(), " number, as ",
+                          loaded.task, " has, got ", loaded.policy->action_size()));
+  }
   if (loaded.task == kDoublePendulum) return CheckObservation(loaded, where);
   if (loaded.policy->obs_size() != spec.obs_size) {
     throw BadInput(Concat(where, ": expected a policy of ", spec.obs_size, " observations, as ",

@@ -28,7 +28,7 @@ ALLOWED = {
         r"mem(chr|cmp|cpy|move|set)|str(cmp|len)|snprintf|strto(d|ll|ull)|localeconv|[cm]alloc|realloc|"
         r"free",
     "numbers":
-        r"(a?(sin|cos|tan)h?|sincos|atan2|exp(2|m1)?|log(2|10|1p)?|pow|sqrt|cbrt|hypot|erf|fmod|"
+        r"(a?(sin|cos|tan)h?|sincos|atan2|exp(2|m1)?|log(2|10|1p)?|pow|sqrt|cbrt|hypot|erfc?|fmod|"
         r"remainder|floor|ceil|l?l?round|nearbyint|rint|trunc|fmin|fmax|copysign|lgamma)f?|"
         r"__(mul|div)[sd]c3|c(abs|exp|log|sqrt)f?",
     "threads: std::mutex, and the waiting of std::atomic (on Linux the system call futex; that for "
