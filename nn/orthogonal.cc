@@ -1,0 +1,69 @@
+#include "nn/orthogonal.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+namespace upswing {
+namespace {
+
+/// `count` orthonormal vectors of `size` numbers, one after another; count ≤ size.
+std::vector<double> OrthonormalVectors(Rng& rng, int count, int size) {
+  std::vector<double> values(static_cast<size_t>(count) * static_cast<size_t>(size));
+  const Matrix<double> vectors(values.data(), count, size);
+  for (int i = 0; i < count; ++i) {
+    const std::span<double> v = vectors.row(i);
+    for (double& x : v) x = rng.Normal();
+    // Twice: the second pass removes what rounding left of the first.
+    for (int pass = 0; pass < 2; ++pass) {
+      for (int j = 0; j < i; ++j) {
+        double along = 0;
+        for (int k = 0; k < size; ++k) along += vectors(i, k) * vectors(j, k);
+        for (int k = 0; k < size; ++k) vectors(i, k) -= along * vectors(j, k);
+      }
+    }
+    double squares = 0;
+    for (const double x : v) squares += x * x;
+    for (double& x : v) x /= std::sqrt(squares);
+  }
+  return values;
+}
+
+}  // namespace
+
+template <typename T>
+void OrthogonalWeights(Rng& rng, double gain, Matrix<T> w) {
+  const bool rows = w.rows() <= w.cols();
+  const int count = std::min(w.rows(), w.cols());
+  const int size = std::max(w.rows(), w.cols());
+  const std::vector<double> values = OrthonormalVectors(rng, count, size);
+  const Matrix<const double> vectors(values.data(), count, size);
+  for (int i = 0; i < w.rows(); ++i) {
+    for (int j = 0; j < w.cols(); ++j) {
+      w(i, j) = static_cast<T>(gain * (rows ? vectors(i, j) : vectors(j, i)));
+    }
+  }
+}
+
+template <typename T>
+void InitializeOrthogonal(const Network<T>& network, double output_gain, Rng& rng,
+                          std::span<T> parameters) {
+  for (const ParameterBlock& block : network.blocks()) {
+    const std::span<T> values = parameters.subspan(block.offset, block.size());
+    if (block.in > 0) {
+      const bool output = block.name == "output.weight";
+      OrthogonalWeights(rng, output ? output_gain : std::numbers::sqrt2,
+                        Matrix<T>(values, block.in, block.out));
+    } else {
+      std::ranges::fill(values, block.name.ends_with("norm.weight") ? T{1} : T{0});
+    }
+  }
+}
+
+template void OrthogonalWeights(Rng&, double, Matrix<float>);
+template void OrthogonalWeights(Rng&, double, Matrix<double>);
+template void InitializeOrthogonal(const Network<float>&, double, Rng&, std::span<float>);
+template void InitializeOrthogonal(const Network<double>&, double, Rng&, std::span<double>);
+
+}  // namespace upswing
