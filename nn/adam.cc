@@ -15,13 +15,13 @@ constexpr int64_t kMostSteps = 1'000'000'000'000'000;  // more than any training
 
 }  // namespace
 
-Adam::Adam(size_t num_parameters) : m_(num_parameters), v_(num_parameters) {}
+Adam::Adam(size_t num_parameters, double epsilon)
+    : epsilon_(epsilon), m_(num_parameters), v_(num_parameters) {}
 
 void Adam::Step(const Size& size, std::span<const float> gradient, std::span<float> parameters,
                 std::span<float> target, ThreadPool& pool) {
   constexpr double kBeta1 = 0.9;
   constexpr double kBeta2 = 0.999;
-  constexpr double kEpsilon = 1e-8;
   constexpr size_t kChunk = 8192;  // numbers in a task
 
   if (!std::isfinite(size.gradient_norm)) {
@@ -41,7 +41,7 @@ void Adam::Step(const Size& size, std::span<const float> gradient, std::span<flo
       kBeta1,
       kBeta2,
       static_cast<float>(size.learning_rate * correction2 / correction1),
-      static_cast<float>(kEpsilon * correction2),
+      static_cast<float>(epsilon_ * correction2),
       static_cast<float>(size.tau)};
 
   const size_t chunks = (parameters.size() + kChunk - 1) / kChunk;
@@ -50,7 +50,7 @@ void Adam::Step(const Size& size, std::span<const float> gradient, std::span<flo
     const size_t count = std::min(kChunk, parameters.size() - first);
     const auto part = [&](auto values) { return values.subspan(first, count); };
     AdamPolyakStep<float>(constants, part(gradient), part(std::span(m_)), part(std::span(v_)),
-                          part(parameters), part(target));
+                          part(parameters), target.empty() ? target : part(target));
   });
 }
 

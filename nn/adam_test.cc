@@ -20,6 +20,16 @@ void Step(Adam& adam, const AlignedVector<float>& gradient, double learning_rate
   adam.Step({learning_rate, std::sqrt(squares), max_norm, 0.0}, gradient, p, target, pool);
 }
 
+TEST(Adam, TakesAnotherEpsilonAndNeedsNoTarget) {
+  // The first step is learning rate · g / (|g| + ε), by both bias corrections.
+  Adam adam(1, 0.5);
+  AlignedVector<float> p{1.0F};
+  const AlignedVector<float> gradient{2.0F};
+  ThreadPool pool(1);
+  adam.Step({0.1, 2.0, 1e9, 0.0}, gradient, p, {}, pool);
+  EXPECT_NEAR(p[0], 1 - 0.1 * 2 / 2.5, 1e-6);
+}
+
 TEST(Adam, FollowsTheAlgorithmAsThePaperWritesIt) {
   // Kingma and Ba, Algorithm 1, in double, with m̂ and v̂ written out.
   Adam adam(1);

@@ -367,10 +367,11 @@ void AdamPolyakStep(const AdamConstants<T>& constants, std::span<const T> g, std
     const Vec<T> v_new = hn::MulAdd(beta2, load(v), hn::Mul(rest2, hn::Mul(gradient, gradient)));
     const Vec<T> move = hn::Div(hn::Mul(step, m_new), hn::Add(hn::Sqrt(v_new), epsilon));
     const Vec<T> p_new = hn::Sub(load(p), move);
-    const Vec<T> old_target = load(target);
     store(m_new, m);
     store(v_new, v);
     store(p_new, p);
+    if (target.empty()) return;
+    const Vec<T> old_target = load(target);
     store(hn::MulAdd(tau, hn::Sub(p_new, old_target), old_target), target);
   });
 }

@@ -75,7 +75,7 @@ struct AdamConstants {
 };
 
 /// In one pass, with g scaled: m ← β1 m + (1-β1) g, v ← β2 v + (1-β2) g²,
-/// p ← p - step · m / (sqrt(v) + ε), target ← target + tau · (p - target).
+/// p ← p - step · m / (sqrt(v) + ε), target ← target + tau · (p - target) unless `target` is empty.
 template <typename T>
 void AdamPolyakStep(const AdamConstants<T>& constants, std::span<const T> g, std::span<T> m,
                     std::span<T> v, std::span<T> p, std::span<T> target);

@@ -1,0 +1,127 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/thread_pool.h"
+#include "nn/adam.h"
+#include "nn/network.h"
+#include "rl/agent.h"
+#include "rl/normalizer.h"
+#include "rl/ppo_config.h"
+#include "rl/rollout.h"
+
+/// Proximal policy optimisation (Schulman et al., 2017) with generalised advantages (Schulman et
+/// al., 2016).
+///
+/// Symbols: s observation, a action, r ratio π(a|s)/π_old(a|s), A advantage, V value, R its target,
+/// N environments, T steps of a rollout, B batch size, D observation size.
+namespace upswing {
+
+/// A PPO agent for N environments: rollouts of T steps each, from each of which it learns in a few
+/// epochs of shuffled minibatches.
+class Ppo : public Agent {
+ public:
+  /// Throws BadInput if minibatches do not divide a rollout, if minibatches are to be mirrored but
+  /// the task has no mirror symmetry, and if actions are levels but the task has several torques.
+  Ppo(const PpoConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool& pool);
+
+  void Act(Matrix<const float> obs, Matrix<double> action) override;
+  void Observe(const StepResult& result) override;
+  void Learn() override;
+  Metrics TakeMetrics() override;
+  std::unique_ptr<Policy> ExportPolicy(PolicyInfo info) const override;
+  void State(const Archive& archive) override;
+
+  int64_t steps() const override { return steps_; }
+  int64_t updates() const override { return updates_; }
+  /// Of the actor: as scheduled, times what the KL target made of it.
+  double learning_rate() const { return scheduled_rate() * rate_factor_; }
+  /// θ: the actor network, then ln σ of each component.
+  std::span<const float> actor() const { return actor_.theta; }
+  std::span<const float> critic() const { return critic_.theta; }
+  const Normalizer& normalizer() const { return normalizer_; }
+
+ private:
+  /// A network and what it takes to learn.
+  struct Learner {
+    Network<float> network;
+    AlignedVector<float> theta;  // (num_parameters, + `more` numbers that it does not know)
+    Adam adam;
+    Network<float>::Activations activations;  // of B rows
+    Network<float>::Prepared prepared;
+    AlignedVector<float> y, dy;     // (B × outputs)
+    AlignedVector<float> gradient;  // like theta
+    std::vector<float> squares;     // of the gradient, by task
+
+    Learner(const MlpShape& shape, int outputs, size_t more, int batch);
+    std::span<const float> weights() const;
+  };
+  /// Sums over some rows of a minibatch.
+  struct Sums {
+    double policy_loss = 0, value_loss = 0, entropy = 0, kl = 0, clipped = 0;
+    std::vector<float> dlog_std;  // (A) gradient
+    void Add(const Sums& other);
+  };
+
+  /// Draws the actions of some environments, whose outputs the actor has written.
+  void Sample(RowRange rows, Matrix<const float> outputs, Rng& rng, Matrix<double> action);
+  /// V (n) of observations (n × D).
+  void Values(Matrix<const float> obs, std::span<float> values);
+  /// Advantages and targets of the rollout.
+  void Estimate();
+  /// A gradient step on the rows of the rollout that `rows` (B) names.
+  void Update(std::span<const int64_t> rows);
+  /// Copies some rows of the minibatch from the rollout, with normalised observations.
+  void Gather(std::span<const int64_t> from, RowRange rows);
+  void BackwardActor(RowRange rows, Sums& sums);
+  void BackwardCritic(RowRange rows, Sums& sums);
+  /// A step of Adam, after clipping. Returns the gradient's norm.
+  double Step(Learner& learner, double learning_rate, double squares);
+  void CountUpdate(const Sums& sums);
+  void AdaptRate(double kl);
+  double scheduled_rate() const;
+  int64_t updates_due() const;
+  int slices() const;
+  RowRange Slice(int slice) const;
+  std::span<const float> log_std() const;
+  void SetStd();
+
+  PpoConfig config_;
+  int D_, B_;
+  std::vector<double> limit_;        // (A) N·m
+  std::vector<double> torques_;      // (K) N·m, of levels; else empty
+  std::vector<float> mirror_signs_;  // (D)
+  ThreadPool& pool_;
+  std::vector<Rng> explore_rngs_;  // of each block of environments
+  Rng shuffle_rng_, mirror_rng_;
+
+  Learner actor_, critic_;
+  std::vector<float> std_;  // (A) σ
+  Normalizer normalizer_;
+  double rate_factor_ = 1;
+
+  Rollout rollout_;
+  std::vector<int64_t> order_;                                    // (T·N) rows, shuffled
+  AlignedVector<float> value_, next_value_, advantage_, target_;  // (T·N)
+  Network<float>::Activations act_activations_;                   // of N rows
+  AlignedVector<float> act_obs_, act_outputs_;                    // (N × D), (N × outputs)
+
+  // Of a minibatch.
+  AlignedVector<float> obs_, action_;  // (B × D), (B × A)
+  AlignedVector<float> old_log_prob_, old_value_, batch_advantage_, batch_target_;  // (B)
+  std::vector<uint8_t> mirrored_;                                                   // (B)
+  std::vector<Sums> sums_;                                                          // by slice
+
+  int64_t steps_ = 0, updates_ = 0;
+  // Sums since TakeMetrics.
+  double policy_loss_sum_ = 0, value_loss_sum_ = 0, entropy_sum_ = 0, kl_sum_ = 0;
+  double clipped_sum_ = 0, norm_sum_ = 0;
+  double explained_variance_ = 0;
+  int64_t report_updates_ = 0;
+};
+
+}  // namespace upswing

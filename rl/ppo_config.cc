@@ -1,0 +1,67 @@
+#include "rl/ppo_config.h"
+
+#include "core/error.h"
+#include "core/text.h"
+
+namespace upswing {
+
+void PpoConfig::Describe(Options& o) {
+  o.Section("network");
+  o.Add(&hidden, "hidden", {64, 64}, {1, 4096}, "widths of the hidden layers of actor and critic");
+  o.AddChoice(&activation, "activation", {"tanh", "relu"}, "of the hidden layers");
+  o.Add(&layer_norm, "layer_norm", false, "layer normalisation in each hidden layer");
+
+  o.Section("agent");
+  o.AddChoice(&actions, "actions", {"continuous", "levels"},
+              "continuous: torques drawn from a normal distribution; levels: from a few torques");
+  o.Add(&levels, "levels", 9, {2, 1001}, "torques", "of actions = levels, evenly spaced");
+  o.Add(&gamma, "gamma", 0.99, kUnit, "", "discount per control step");
+  o.Add(&lambda, "lambda", 0.95, kUnit, "", "decay of generalised advantages");
+  o.Add(&reward_scale, "reward_scale", 0.1, kPositive, "",
+        "the agent learns from reward times this");
+  o.Add(&horizon, "horizon", 32, {1, 1000000}, "steps",
+        "of each environment between updates: a rollout");
+  o.Add(&epochs, "epochs", 4, {1, 1000}, "", "passes over a rollout");
+  o.Add(&batch, "batch", 256, {1, 1000000}, "steps",
+        "in a minibatch; divides horizon times environments");
+  o.Add(&clip, "clip", 0.2, {1e-6, 1}, "",
+        "the ratio of new to old probability is clipped to 1 by this");
+  o.Add(&value_clip, "value_clip", 0, kNotNegative, "",
+        "values are clipped to what they were by this; 0: not clipped");
+  o.Add(&entropy_bonus, "entropy_bonus", 0, {0, 10}, "", "weight of the policy's entropy");
+  o.Add(&initial_std, "initial_std", 1, {0.01, 5}, "",
+        "standard deviation of continuous actions at the beginning, in units of the limit");
+  o.Add(&normalize, "normalize", true,
+        "normalise observations by their running mean and standard deviation");
+  o.Add(&mirror, "mirror", false, "mirror a random half of each minibatch");
+  o.Add(&learning_rate, "learning_rate", 1e-3, {0, 10}, "",
+        "learning rate of Adam at the beginning");
+  o.Add(&learning_rate_end, "learning_rate_end", 1e-4, {0, 10}, "", "and at the end");
+  o.Add(&learning_rate_steps, "learning_rate_steps", 1000000, {1, 1e12}, "steps",
+        "over which it falls linearly");
+  o.Add(&kl_target, "kl_target", 0.01, {0, 10}, "nats",
+        "policy change of an update that the actor's learning rate is adapted to; 0: it is not");
+  o.Add(&max_gradient_norm, "max_gradient_norm", 0.5, kPositive, "",
+        "clip the global norm, of actor and critic each, to this");
+}
+
+MlpShape PpoConfig::Shape(int obs_size) const {
+  return {obs_size, hidden, layer_norm,
+          activation == "tanh" ? Activation::kTanh : Activation::kRelu};
+}
+
+void PpoConfig::CheckBatch(int64_t num_envs) const {
+  const int64_t rollout = horizon * num_envs;
+  if (rollout % batch == 0) return;
+  int64_t below = batch, above = batch;
+  while (below > 1 && rollout % below != 0) --below;
+  while (above < rollout && rollout % above != 0) ++above;
+  const std::string fits = below < batch && above <= rollout && rollout % above == 0
+                               ? Concat(below, " or ", above)
+                               : Concat(rollout);
+  throw BadInput(Concat("batch: expected a size that divides the ", rollout,
+                        " steps of a rollout (horizon ", horizon, ", ", num_envs,
+                        " environments), such as ", fits, ", got ", batch));
+}
+
+}  // namespace upswing

@@ -1,0 +1,129 @@
+// What of a PPO agent outlives it: its state and its policy.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/text.h"
+#include "nn/actor_policy.h"
+#include "nn/gaussian.h"
+#include "rl/ppo.h"
+
+namespace upswing {
+namespace {
+
+/// Parameters that do to raw observations what `weights` do to normalised ones, in double:
+/// x̂ W + b = x (W / σ) + (b - (μ / σ) W), in the first layer.
+std::vector<float> WithNormalizer(const Network<float>& network, std::span<const float> weights,
+                                  const Normalizer& normalizer) {
+  std::vector<float> folded(weights.begin(),
+                            weights.begin() + static_cast<ptrdiff_t>(network.num_parameters()));
+  const ParameterBlock& W_block = network.blocks()[0];
+  const ParameterBlock& b_block = network.blocks()[1];
+  const Matrix<float> W(folded.data() + W_block.offset, W_block.in, W_block.out);
+  const std::vector<double> deviation = normalizer.deviation();
+  for (int j = 0; j < W.cols(); ++j) {
+    float& b = folded[b_block.offset + static_cast<size_t>(j)];
+    double shifted = b;
+    for (int k = 0; k < W.rows(); ++k) {
+      const auto input = static_cast<size_t>(k);
+      const double scaled = W(k, j) / deviation[input];
+      shifted -= scaled * normalizer.mean()[input];
+      W(k, j) = static_cast<float>(scaled);
+    }
+    b = static_cast<float>(shifted);
+  }
+  return folded;
+}
+
+/// Parameters of an actor with outputs (μ, ln σ), whose ln σ are constants: no weights, and they
+/// are the biases. The output layer is the last one.
+std::vector<float> WithLogStd(const Network<float>& network, const std::vector<float>& weights,
+                              std::span<const float> log_std) {
+  const ParameterBlock& W_block = network.blocks()[network.blocks().size() - 2];
+  const Matrix<const float> W(weights.data() + W_block.offset, W_block.in, W_block.out);
+  std::vector<float> both(weights.begin(),
+                          weights.begin() + static_cast<ptrdiff_t>(W_block.offset));
+  for (int k = 0; k < W.rows(); ++k) {
+    both.insert(both.end(), W.row(k).begin(), W.row(k).end());
+    both.insert(both.end(), log_std.size(), 0.0F);
+  }
+  both.insert(both.end(), weights.end() - W_block.out, weights.end());
+  both.insert(both.end(), log_std.begin(), log_std.end());
+  return both;
+}
+
+}  // namespace
+
+std::unique_ptr<Policy> Ppo::ExportPolicy(PolicyInfo info) const {
+  info.gamma = config_.gamma;
+  info.reward_scale = config_.reward_scale;
+  ActorParts parts;
+  parts.output = config_.discrete() ? ActorOutput::kCategorical : ActorOutput::kClippedGaussian;
+  parts.actor = parts.critic = config_.Shape(D_);
+  parts.parameters = WithNormalizer(actor_.network, actor_.theta, normalizer_);
+  if (!config_.discrete()) {
+    parts.parameters = WithLogStd(actor_.network, parts.parameters, log_std());
+  }
+  parts.critic_parameters = WithNormalizer(critic_.network, critic_.theta, normalizer_);
+  parts.action_limit = limit_;
+  parts.torques = torques_;
+  return std::make_unique<ActorPolicy>(std::move(parts), std::move(info));
+}
+
+int64_t Ppo::updates_due() const {
+  const int64_t updates = config_.epochs * rollout_.size() / config_.batch;
+  return steps_ / rollout_.size() * updates;
+}
+
+void Ppo::State(const Archive& archive) {
+  constexpr double kLargest = std::numeric_limits<double>::max();
+  archive.Array("actor", std::span(actor_.theta));
+  archive.Array("critic", std::span(critic_.theta));
+  const std::span<float> log_std = std::span(actor_.theta).last(std_.size());
+  archive.Check(std::ranges::all_of(log_std,
+                                    [](float x) {
+                                      return x >= static_cast<float>(kLogStdLow) &&
+                                             x <= static_cast<float>(kLogStdHigh);
+                                    }),
+                "actor", Concat("ln std from ", kLogStdLow, " to ", kLogStdHigh, " at its end"));
+  SetStd();
+  actor_.adam.State(archive.In("actor_adam"));
+  critic_.adam.State(archive.In("critic_adam"));
+  normalizer_.State(archive.In("normalizer"));
+  archive.Scalar("rate_factor", rate_factor_, {1e-3, 10});
+  for (size_t i = 0; i < explore_rngs_.size(); ++i) {
+    explore_rngs_[i].State(archive.In(Concat("explore_rng.", i)));
+  }
+  shuffle_rng_.State(archive.In("shuffle_rng"));
+  mirror_rng_.State(archive.In("mirror_rng"));
+  const float most = std::numeric_limits<float>::max();
+  const float last_level = static_cast<float>(config_.levels - 1);
+  rollout_.State(archive.In("rollout"),
+                 config_.discrete() ? Bounds<float>{0, last_level} : Bounds<float>{-most, most},
+                 config_.discrete());
+
+  // The order of one epoch is where the next begins to shuffle.
+  archive.Array("order", std::span(order_), {0, rollout_.size() - 1});
+  std::vector<int64_t> sorted(order_);
+  std::ranges::sort(sorted);
+  archive.Check(std::ranges::adjacent_find(sorted) == sorted.end(), "order",
+                "each row of a rollout once");
+
+  archive.Scalar("steps", steps_, {0, kMostSteps});
+  archive.Check(steps_ % rollout_.size() == rollout_.filled() * rollout_.num_envs(), "steps",
+                "whole rollouts and the steps of the running one");
+  archive.Scalar("updates", updates_, {0, std::numeric_limits<int64_t>::max()});
+  archive.Check(updates_ == updates_due() && actor_.adam.steps() == updates_ &&
+                    critic_.adam.steps() == updates_,
+                "updates", Concat(updates_due(), ", which the steps imply, and as many of Adam"));
+  archive.Scalar("report_updates", report_updates_, {0, updates_});
+  archive.Scalar("policy_loss_sum", policy_loss_sum_, kAnyNumber<double>);
+  archive.Scalar("value_loss_sum", value_loss_sum_, {0, kLargest});
+  archive.Scalar("entropy_sum", entropy_sum_, kAnyNumber<double>);
+  archive.Scalar("kl_sum", kl_sum_, kAnyNumber<double>);
+  archive.Scalar("clipped_sum", clipped_sum_, {0, kLargest});
+  archive.Scalar("norm_sum", norm_sum_, {0, kLargest});
+  archive.Scalar("explained_variance", explained_variance_, {-kLargest, 1});
+}
+
+}  // namespace upswing

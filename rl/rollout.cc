@@ -1,0 +1,61 @@
+#include "rl/rollout.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "core/text.h"
+
+namespace upswing {
+
+Rollout::Rollout(int64_t steps, int num_envs, int obs_size, int action_size)
+    : steps_(steps),
+      num_envs_(num_envs),
+      obs_size_(obs_size),
+      action_size_(action_size),
+      obs_(static_cast<size_t>(steps * num_envs * obs_size)),
+      next_obs_(obs_.size()),
+      action_(static_cast<size_t>(steps * num_envs * action_size)),
+      log_prob_(static_cast<size_t>(steps * num_envs)),
+      reward_(log_prob_.size()),
+      terminated_(log_prob_.size()),
+      truncated_(log_prob_.size()) {}
+
+void Rollout::Add(const StepResult& result, double reward_scale) {
+  const Matrix<float> next_obs = Rows(next_obs_, obs_size_);
+  std::ranges::copy(result.next_obs, next_obs.values().begin());
+  const auto first = static_cast<size_t>(filled_ * num_envs_);
+  for (int env = 0; env < num_envs_; ++env) {
+    const auto i = static_cast<size_t>(env);
+    const std::span<const float> obs = next_obs.row(env);
+    if (!std::isfinite(result.reward[i]) ||
+        !std::ranges::all_of(obs, [](float x) { return std::isfinite(x); })) {
+      throw Failure(Concat("environment ", env, " gave a reward or an observation that is not a ",
+                           "finite number"));
+    }
+    reward_[first + i] = static_cast<float>(reward_scale * result.reward[i]);
+    terminated_[first + i] = result.terminated[i];
+    truncated_[first + i] = result.truncated[i];
+  }
+  ++filled_;
+}
+
+void Rollout::State(const Archive& archive, Bounds<float> action_bounds, bool whole) {
+  archive.Scalar("filled", filled_, {0, steps_ - 1});
+  const auto rows = static_cast<size_t>(filled_ * num_envs_);
+  const auto part = [&](auto& values, int cols) {
+    return std::span(values).first(rows * static_cast<size_t>(cols));
+  };
+  archive.Array("obs", part(obs_, obs_size_));
+  archive.Array("next_obs", part(next_obs_, obs_size_));
+  archive.Array("action", part(action_, action_size_), action_bounds);
+  archive.Check(!whole || std::ranges::all_of(part(action_, action_size_),
+                                              [](float x) { return x == std::floor(x); }),
+                "action", "whole numbers");
+  archive.Array("log_prob", part(log_prob_, 1));
+  archive.Array("reward", part(reward_, 1));
+  archive.Array("terminated", part(terminated_, 1), {0, 1});
+  archive.Array("truncated", part(truncated_, 1), {0, 1});
+}
+
+}  // namespace upswing
