@@ -318,11 +318,34 @@ void LayerNormBackwardGain(Matrix<const T> x_hat, Matrix<const T> dy, std::span<
   });
 }
 
+/// tanh(x) = x P(x²) / Q(x²), a rational approximation with the coefficients of Eigen 3.4
+/// (generic_fast_tanh_float). Beyond ±7.9 the result is that of ±7.9, which is ±1 up to rounding.
+HWY_INLINE Vec<float> TanhOf(Vec<float> x) {
+  constexpr float kLargest = 7.90531110763549805F;
+  constexpr float kP[] = {4.89352455891786e-03F, 6.37261928875436e-04F,  1.48572235717979e-05F,
+                          5.12229709037114e-08F, -8.60467152213735e-11F, 2.00018790482477e-13F,
+                          -2.76076847742355e-16F};
+  constexpr float kQ[] = {4.89352518554385e-03F, 2.26843463243900e-03F, 1.18534705686654e-04F,
+                          1.19825839466702e-06F};
+  const Tag<float> d;
+  const Vec<float> largest = hn::Set(d, kLargest);
+  const Vec<float> near = hn::IfThenElse(hn::Gt(hn::Abs(x), largest), hn::CopySign(largest, x), x);
+  const Vec<float> square = hn::Mul(near, near);
+  Vec<float> p = hn::Set(d, kP[6]);
+  HWY_UNROLL(6)
+  for (int i = 5; i >= 0; --i) p = hn::MulAdd(p, square, hn::Set(d, kP[i]));
+  Vec<float> q = hn::Set(d, kQ[3]);
+  HWY_UNROLL(3)
+  for (int i = 2; i >= 0; --i) q = hn::MulAdd(q, square, hn::Set(d, kQ[i]));
+  return hn::Mul(near, hn::Div(p, q));
+}
+HWY_INLINE Vec<double> TanhOf(Vec<double> x) { return hn::Tanh(Tag<double>(), x); }
+
 template <typename T>
 void Tanh(std::span<T> x) {
   ForVectors<T>(x.size(), [&](size_t i, size_t count, auto partial) HWY_ATTR {
     const Vec<T> value = Load<partial.value>(x.data() + i, count);
-    Store<partial.value>(hn::Tanh(Tag<T>(), value), x.data() + i, count);
+    Store<partial.value>(TanhOf(value), x.data() + i, count);
   });
 }
 
