@@ -471,6 +471,17 @@ void LinearBackwardInput(Matrix<const T> dy, Matrix<const T> w_transposed, Matri
 
 template <typename T>
 void LinearBackwardWeight(Matrix<const T> x, Matrix<const T> dy, Matrix<T> dw) {
+  if (dw.cols() == 1 && dw.stride() == 1) {
+    // One column is computed as its transpose, a row that fills registers: the same sums.
+    return Kernels<T>().multiply({.M = 1,
+                                  .N = dw.rows(),
+                                  .K = x.rows(),
+                                  .a = dy.data(),
+                                  .a_m = 0,
+                                  .a_k = dy.stride(),
+                                  .b = x,
+                                  .c = {dw.data(), 1, dw.rows()}});
+  }
   Kernels<T>().multiply({.M = dw.rows(),
                          .N = dw.cols(),
                          .K = x.rows(),

@@ -359,12 +359,13 @@ void Ppo::BackwardActor(RowRange rows, Sums& sums) {
     const auto row = static_cast<size_t>(i);
     const auto backward = [&](float log_prob, float entropy, const auto& gradient) {
       const float log_ratio = log_prob - old_log_prob_[row];
-      const LossTerm<float> term = ClippedLoss(log_ratio, batch_advantage_[row], clip);
+      const float ratio = std::exp(log_ratio);
+      const LossTerm<float> term = ClippedLoss(ratio, batch_advantage_[row], clip);
       gradient(term.gradient / B);
       sums.policy_loss += term.loss;
       sums.entropy += entropy;
-      sums.kl += KlEstimate(log_ratio);
-      sums.clipped += std::abs(std::expm1(log_ratio)) > clip ? 1 : 0;
+      sums.kl += KlEstimate(ratio, log_ratio);
+      sums.clipped += std::abs(ratio - 1) > clip ? 1 : 0;
     };
     if (config_.discrete()) {
       const Categorical<float> policy(y.row(i), p);

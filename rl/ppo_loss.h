@@ -1,7 +1,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 
 /// The losses of proximal policy optimisation for one step of a rollout. r = π(a|s)/π_old(a|s), A
 /// advantage, V value, R its target. T = float to work, double to check gradients.
@@ -13,12 +12,11 @@ struct LossTerm {
   T gradient;  // with respect to ln π(a|s), or to V
 };
 
-/// -min(r A, clip(r, 1 - ε, 1 + ε) A), which is to be small, given ln r (Schulman et al., 2017,
-/// Eq 7). There is no gradient where the clipped product is the smaller one: at r > 1 + ε with
-/// A > 0, at r < 1 - ε with A < 0.
+/// -min(r A, clip(r, 1 - ε, 1 + ε) A), which is to be small (Schulman et al., 2017, Eq 7). There is
+/// no gradient where the clipped product is the smaller one: at r > 1 + ε with A > 0, at r < 1 - ε
+/// with A < 0.
 template <typename T>
-LossTerm<T> ClippedLoss(T log_ratio, T advantage, T epsilon) {
-  const T ratio = std::exp(log_ratio);
+LossTerm<T> ClippedLoss(T ratio, T advantage, T epsilon) {
   const T whole = ratio * advantage;
   const T clipped = std::clamp(ratio, 1 - epsilon, 1 + epsilon) * advantage;
   if (clipped < whole) return {-clipped, 0};
@@ -41,8 +39,8 @@ LossTerm<T> ValueLoss(T value, T old_value, T target, T epsilon) {
 /// (r - 1) - ln r: an estimate of KL(π_old ‖ π) from actions of π_old, never below 0 (Schulman,
 /// "Approximating KL Divergence", 2020).
 template <typename T>
-T KlEstimate(T log_ratio) {
-  return std::expm1(log_ratio) - log_ratio;
+T KlEstimate(T ratio, T log_ratio) {
+  return (ratio - 1) - log_ratio;
 }
 
 }  // namespace upswing

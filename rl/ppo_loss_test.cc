@@ -29,17 +29,17 @@ TEST(ClippedLoss, IsTheSmallerOfBothProductsAndHasItsGradient) {
     for (double log_ratio : {-0.5, -0.15, 0.0, 0.15, 0.5}) {
       const double r = std::exp(log_ratio);
       const double clipped = std::min(std::max(r, 0.8), 1.2);
-      const LossTerm<double> term = ClippedLoss(log_ratio, advantage, 0.2);
+      const LossTerm<double> term = ClippedLoss(r, advantage, 0.2);
       EXPECT_NEAR(term.loss, -std::min(r * advantage, clipped * advantage), 1e-12);
       const double numeric =
-          Numeric(log_ratio, [&] { return ClippedLoss(log_ratio, advantage, 0.2).loss; });
+          Numeric(log_ratio, [&] { return ClippedLoss(std::exp(log_ratio), advantage, 0.2).loss; });
       EXPECT_NEAR(term.gradient, numeric, 1e-8) << advantage << ' ' << r;
     }
   }
 }
 
 TEST(ClippedLoss, HasNoGradientWhereTheRatioHasGoneFarEnough) {
-  const double far_up = std::log(1.21), far_down = std::log(0.79);
+  const double far_up = 1.21, far_down = 0.79;
   EXPECT_EQ(ClippedLoss(far_up, 1.0, 0.2).gradient, 0);
   EXPECT_EQ(ClippedLoss(far_down, -1.0, 0.2).gradient, 0);
   // A step back is never hindered.
@@ -65,16 +65,17 @@ TEST(ValueLoss, OfBothKindsAndItsGradient) {
 }
 
 TEST(KlEstimate, IsZeroAtNoChangeAndElseAboveAndRightOnAverage) {
-  EXPECT_EQ(KlEstimate(0.0), 0);
-  EXPECT_GT(KlEstimate(0.3), 0);
-  EXPECT_GT(KlEstimate(-0.3), 0);
+  EXPECT_EQ(KlEstimate(1.0, 0.0), 0);
+  EXPECT_GT(KlEstimate(1.3, std::log(1.3)), 0);
+  EXPECT_GT(KlEstimate(0.7, std::log(0.7)), 0);
   // KL(N(0, 1) ‖ N(d, 1)) = d²/2.
   Rng rng(1, "samples");
   const double d = 0.3;
   double sum = 0;
   for (int i = 0; i < 100000; ++i) {
     const double x = rng.Normal();
-    sum += KlEstimate((x * x - (x - d) * (x - d)) / 2);
+    const double log_ratio = (x * x - (x - d) * (x - d)) / 2;
+    sum += KlEstimate(std::exp(log_ratio), log_ratio);
   }
   EXPECT_NEAR(sum / 100000, d * d / 2, 0.0015);  // about 4 standard errors
 }
@@ -110,7 +111,8 @@ TEST(DiagonalGaussian, GradientsOfTheLossAreThoseOfFiniteDifferences) {
     const auto loss = [&](LossTerm<double>* term) {
       const std::vector<double> std{std::exp(log_std[0]), std::exp(log_std[1])};
       const DiagonalGaussian<double> policy{mean, log_std, std};
-      const LossTerm<double> clipped = ClippedLoss(policy.LogProb(u) + 2.3, advantage, 0.9);
+      const LossTerm<double> clipped =
+          ClippedLoss(std::exp(policy.LogProb(u) + 2.3), advantage, 0.9);
       if (term != nullptr) *term = clipped;
       return clipped.loss - 0.05 * policy.Entropy();
     };
@@ -151,12 +153,13 @@ TEST(Categorical, GradientsOfTheLossAreThoseOfFiniteDifferences) {
     std::vector<double> logits{0.2, -0.5, 1.1, 0.4}, p(4), dlogits(4);
     const auto loss = [&] {
       const Categorical<double> policy(logits, p);
-      return ClippedLoss(policy.LogProb(2) + 1, advantage, 0.9).loss - 0.05 * policy.Entropy();
+      return ClippedLoss(std::exp(policy.LogProb(2) + 1), advantage, 0.9).loss -
+             0.05 * policy.Entropy();
     };
     std::vector<double> numeric;
     for (double& x : logits) numeric.push_back(Numeric(x, loss));
     const Categorical<double> policy(logits, p);
-    const LossTerm<double> term = ClippedLoss(policy.LogProb(2) + 1, advantage, 0.9);
+    const LossTerm<double> term = ClippedLoss(std::exp(policy.LogProb(2) + 1), advantage, 0.9);
     ASSERT_NE(term.gradient, 0);
     policy.Backward(2, term.gradient, -0.05, dlogits);
     for (size_t k = 0; k < 4; ++k) EXPECT_NEAR(dlogits[k], numeric[k], 1e-7);
