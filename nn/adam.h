@@ -9,12 +9,14 @@
 
 namespace upswing {
 
-/// Adam (Kingma and Ba, 2015, Algorithm 1) with β1 = 0.9, β2 = 0.999, ε = 1e-8 unless another
-/// is given, after clipping by global norm (Pascanu et al., 2013, Algorithm 1). The same pass over
-/// memory moves the target parameters by Polyak averaging, where there are any.
+/// Adam (Kingma and Ba, 2015, Algorithm 1) with β1 = 0.9, β2 = 0.999, after clipping by
+/// global norm (Pascanu et al., 2013, Algorithm 1). The same pass over memory moves the target
+/// parameters by Polyak averaging, where there are any.
 class Adam {
  public:
-  explicit Adam(size_t num_parameters, double epsilon = 1e-8);
+  static constexpr double kEpsilon = 1e-8;  // the paper's ε
+
+  explicit Adam(size_t num_parameters, double epsilon = kEpsilon);
 
   /// The size of one step.
   struct Size {
@@ -24,8 +26,8 @@ class Adam {
     double tau;            // target ← target + tau · (parameters - target), after the step
   };
 
-  /// Moves `parameters` against `gradient`, then `target` towards them (num_parameters each;
-  /// an empty `target`: there is none). Throws Failure, with nothing changed, if the norm is not finite.
+  /// Moves `parameters` against `gradient`, then `target` towards them (num_parameters each; an
+  /// empty target: there is none). Throws Failure, with nothing changed, if the norm is not finite.
   void Step(const Size& size, std::span<const float> gradient, std::span<float> parameters,
             std::span<float> target, ThreadPool& pool);
 

@@ -5,17 +5,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
 #include "core/error.h"
 #include "core/text.h"
-#include "nn/actor_policy.h"
 #include "nn/orthogonal.h"
 #include "rl/action_distribution.h"
 #include "rl/advantages.h"
 #include "rl/dqn.h"
-#include "rl/ppo_loss.h"
 
 namespace upswing {
 namespace {
@@ -43,30 +40,6 @@ PpoConfig Checked(const PpoConfig& config, const EnvSpec& spec) {
 
 }  // namespace
 
-Ppo::Learner::Learner(const MlpShape& shape, int outputs, size_t more, int batch)
-    : network(shape, {outputs}),
-      theta(network.num_parameters() + more),
-      adam(theta.size(), kAdamEpsilon),
-      activations(network.MakeActivations(batch, true)),
-      prepared(network.MakePrepared(true)),
-      y(static_cast<size_t>(batch) * static_cast<size_t>(outputs)),
-      dy(y.size()),
-      gradient(theta.size()),
-      squares(static_cast<size_t>(network.num_tasks())) {}
-
-std::span<const float> Ppo::Learner::weights() const {
-  return std::span(theta).first(network.num_parameters());
-}
-
-void Ppo::Sums::Add(const Sums& other) {
-  policy_loss += other.policy_loss;
-  value_loss += other.value_loss;
-  entropy += other.entropy;
-  kl += other.kl;
-  clipped += other.clipped;
-  for (size_t k = 0; k < dlog_std.size(); ++k) dlog_std[k] += other.dlog_std[k];
-}
-
 Ppo::Ppo(const PpoConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool& pool)
     : config_(Checked(config, spec)),
       D_(spec.obs_size),
@@ -77,11 +50,12 @@ Ppo::Ppo(const PpoConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
       pool_(pool),
       shuffle_rng_(seed, "minibatches"),
       mirror_rng_(seed, "mirror"),
-      actor_(config.Shape(D_),
-             config.discrete() ? static_cast<int>(config.levels) : spec.action_size(),
-             config.discrete() ? 0 : limit_.size(), B_),
-      critic_(config.Shape(D_), 1, 0, B_),
-      std_(config.discrete() ? 0 : limit_.size()),
+      actor_(config.Shape(D_), {outputs()}, B_, kAdamEpsilon),
+      critic_(config.Shape(D_), {1}, B_, kAdamEpsilon),
+      log_std_(config.discrete() ? 0 : limit_.size(),
+               static_cast<float>(std::log(config.initial_std))),
+      std_(log_std_.size()),
+      log_std_adam_(log_std_.size(), kAdamEpsilon),
       normalizer_(D_),
       rollout_(config.horizon, spec.num_envs, D_, spec.action_size()),
       order_(static_cast<size_t>(rollout_.size())),
@@ -89,39 +63,41 @@ Ppo::Ppo(const PpoConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
       next_value_(order_.size()),
       advantage_(order_.size()),
       target_(order_.size()),
-      act_activations_(actor_.network.MakeActivations(spec.num_envs, false)),
+      act_activations_(actor_.network().MakeActivations(spec.num_envs, false)),
       act_obs_(static_cast<size_t>(spec.num_envs * D_)),
-      act_outputs_(static_cast<size_t>(spec.num_envs) * actor_.y.size() / config.batch),
+      act_outputs_(static_cast<size_t>(spec.num_envs * outputs())),
       obs_(static_cast<size_t>(B_ * D_)),
       action_(static_cast<size_t>(B_) * limit_.size()),
-      old_log_prob_(static_cast<size_t>(B_)),
+      y_(static_cast<size_t>(B_ * outputs())),
+      dy_(y_.size()),
+      V_(static_cast<size_t>(B_)),
+      dV_(V_.size()),
+      old_log_prob_(V_.size()),
       old_value_(old_log_prob_.size()),
       batch_advantage_(old_log_prob_.size()),
       batch_target_(old_log_prob_.size()),
       mirrored_(old_log_prob_.size()),
-      sums_(static_cast<size_t>(slices())) {
+      sums_((V_.size() + static_cast<size_t>(SliceRows(B_)) - 1) /
+            static_cast<size_t>(SliceRows(B_))) {
   for (int block = 0; block < Blocks(spec.num_envs); ++block) {
     explore_rngs_.emplace_back(seed, "exploration", static_cast<uint64_t>(block));
   }
   std::iota(order_.begin(), order_.end(), 0);
   Rng init_rng(seed, "initial parameters");
-  const auto weights = [](Learner& learner) {
-    return std::span(learner.theta).first(learner.network.num_parameters());
-  };
-  InitializeOrthogonal(actor_.network, kOutputGain, init_rng, weights(actor_));
-  InitializeOrthogonal(critic_.network, 1, init_rng, weights(critic_));
-  std::fill(actor_.theta.end() - static_cast<ptrdiff_t>(std_.size()), actor_.theta.end(),
-            static_cast<float>(std::log(config.initial_std)));
+  InitializeOrthogonal(actor_.network(), kOutputGain, init_rng, actor_.theta());
+  InitializeOrthogonal(critic_.network(), 1, init_rng, critic_.theta());
   SetStd();
 }
 
-std::span<const float> Ppo::log_std() const { return std::span(actor_.theta).last(std_.size()); }
+int Ppo::outputs() const {
+  return static_cast<int>(config_.discrete() ? torques_.size() : limit_.size());
+}
 
 void Ppo::SetStd() {
-  for (float& x : std::span(actor_.theta).last(std_.size())) {
-    x = std::clamp(x, static_cast<float>(kLogStdLow), static_cast<float>(kLogStdHigh));
+  for (size_t k = 0; k < std_.size(); ++k) {
+    log_std_[k] = std::clamp(log_std_[k], float{kLogStdLow}, float{kLogStdHigh});
+    std_[k] = std::exp(log_std_[k]);
   }
-  for (size_t k = 0; k < std_.size(); ++k) std_[k] = std::exp(log_std()[k]);
 }
 
 double Ppo::scheduled_rate() const {
@@ -133,22 +109,22 @@ double Ppo::scheduled_rate() const {
 void Ppo::Act(Matrix<const float> obs, Matrix<double> action) {
   const int N = obs.rows();
   const Matrix<float> normal(act_obs_, N, D_);
-  const Matrix<float> outputs(act_outputs_.data(), N, static_cast<int>(act_outputs_.size()) / N);
+  const Matrix<float> y(act_outputs_, N, outputs());
   std::ranges::copy(obs.values(), rollout_.obs().values().begin());
   pool_.ParallelFor(Blocks(N), [&](int block) {
     const RowRange rows{block * kActRows, std::min(kActRows, N - block * kActRows)};
     for (int i = rows.first; i < rows.first + rows.count; ++i) {
       normalizer_.Apply(obs.row(i), normal.row(i));
     }
-    actor_.network.Forward({actor_.weights()}, normal, rows, act_activations_, outputs);
-    Sample(rows, outputs, explore_rngs_[static_cast<size_t>(block)], action);
+    actor_.network().Forward({actor_.theta()}, normal, rows, act_activations_, y);
+    Sample(rows, y, explore_rngs_[static_cast<size_t>(block)], action);
   });
 }
 
 void Ppo::Sample(RowRange rows, Matrix<const float> outputs, Rng& rng, Matrix<double> action) {
   const Matrix<float> stored = rollout_.action();
   const std::span<float> log_prob = rollout_.log_prob();
-  std::vector<float> p(torques_.size());
+  AlignedVector<float> p(torques_.size());
   for (int i = rows.first; i < rows.first + rows.count; ++i) {
     const auto row = static_cast<size_t>(i);
     if (config_.discrete()) {
@@ -158,7 +134,7 @@ void Ppo::Sample(RowRange rows, Matrix<const float> outputs, Rng& rng, Matrix<do
       log_prob[row] = policy.LogProb(level);
       action(i, 0) = torques_[level];
     } else {
-      const DiagonalGaussian<float> policy{outputs.row(i), log_std(), std_};
+      const DiagonalGaussian<float> policy{outputs.row(i), log_std_, std_};
       policy.Sample(rng, stored.row(i));
       log_prob[row] = policy.LogProb(stored.row(i));
       // The environment gets what is within the limit; π speaks of what was drawn.
@@ -174,30 +150,16 @@ void Ppo::Observe(const StepResult& result) {
   steps_ += rollout_.num_envs();
 }
 
-int Ppo::slices() const {
-  const int rows = Slice(0).count;
-  return (B_ + rows - 1) / rows;
-}
-
-RowRange Ppo::Slice(int slice) const {
-  // Enough slices for some threads, enough rows for the kernels; from B alone, so that the number
-  // of threads changes no bit.
-  const int rows = std::min(B_, std::clamp(B_ / 8, 8, 64));
-  return {slice * rows, std::min(rows, B_ - slice * rows)};
-}
-
 void Ppo::Values(Matrix<const float> obs, std::span<float> values) {
   for (int first = 0; first < obs.rows(); first += B_) {
     const int count = std::min(B_, obs.rows() - first);
-    const Matrix<float> normal(obs_.data(), count, D_);
-    const Matrix<float> y(values.data() + first, count, 1);
-    const int rows = Slice(0).count;
-    pool_.ParallelFor((count + rows - 1) / rows, [&](int slice) {
-      const RowRange part{slice * rows, std::min(rows, count - slice * rows)};
-      for (int i = part.first; i < part.first + part.count; ++i) {
-        normalizer_.Apply(obs.row(first + i), normal.row(i));
+    const Matrix<float> s = BatchObs();
+    const Matrix<float> V(values.data() + first, count, 1);
+    ForSlices(pool_, count, [&](RowRange rows) {
+      for (int i = rows.first; i < rows.first + rows.count; ++i) {
+        normalizer_.Apply(obs.row(first + i), s.row(i));
       }
-      critic_.network.Forward({critic_.weights()}, normal, part, critic_.activations, y);
+      critic_.Forward(s, rows, V);
     });
   }
 }
@@ -262,173 +224,6 @@ void Ppo::AdaptRate(double kl) {
   if (kl > 2 * config_.kl_target) rate_factor_ /= kRateStep;
   if (kl < config_.kl_target / 2) rate_factor_ *= kRateStep;
   rate_factor_ = std::clamp(rate_factor_, kRateFactor.lowest, kRateFactor.highest);
-}
-
-void Ppo::Update(std::span<const int64_t> rows) {
-  for (size_t i = 0; i < rows.size(); ++i) {
-    batch_advantage_[i] = advantage_[static_cast<size_t>(rows[i])];
-  }
-  Standardize(batch_advantage_);
-  if (config_.mirror) {
-    for (uint8_t& mirrored : mirrored_) mirrored = mirror_rng_.Next() >> 63;
-  }
-
-  // Threads share the weights (to copy them into the layouts that the products read), then slices
-  // of the batch, then the weights again.
-  const int actor_tasks = actor_.network.num_tasks();
-  const int tasks = actor_tasks + critic_.network.num_tasks();
-  pool_.ParallelFor(tasks, [&](int task) {
-    Learner& learner = task < actor_tasks ? actor_ : critic_;
-    learner.network.Prepare(task < actor_tasks ? task : task - actor_tasks, learner.weights(),
-                            learner.prepared);
-  });
-  pool_.ParallelFor(slices(), [&](int slice) {
-    Sums& sums = sums_[static_cast<size_t>(slice)];
-    sums = {.dlog_std = std::vector<float>(std_.size())};
-    Gather(rows, Slice(slice));
-    BackwardActor(Slice(slice), sums);
-    BackwardCritic(Slice(slice), sums);
-  });
-  const Matrix<const float> s(obs_.data(), B_, D_);
-  pool_.ParallelFor(tasks, [&](int task) {
-    Learner& learner = task < actor_tasks ? actor_ : critic_;
-    const int part = task < actor_tasks ? task : task - actor_tasks;
-    learner.squares[static_cast<size_t>(part)] =
-        learner.network.BackwardWeights(part, s, learner.activations, learner.gradient);
-  });
-  Sums sums{.dlog_std = std::vector<float>(std_.size())};
-  for (const Sums& part : sums_) sums.Add(part);
-  CountUpdate(sums);
-
-  double squares = 0;  // of the gradient with respect to ln σ
-  for (const float g : sums.dlog_std) squares += double{g} * g;
-  std::ranges::copy(sums.dlog_std, actor_.gradient.end() - static_cast<ptrdiff_t>(std_.size()));
-  norm_sum_ += Step(actor_, learning_rate(), squares);
-  Step(critic_, scheduled_rate(), 0);
-  SetStd();
-  ++updates_;
-  ++report_updates_;
-}
-
-double Ppo::Step(Learner& learner, double learning_rate, double squares) {
-  const double norm =
-      std::sqrt(std::accumulate(learner.squares.begin(), learner.squares.end(), squares));
-  learner.adam.Step({learning_rate, norm, config_.max_gradient_norm, 0}, learner.gradient,
-                    learner.theta, {}, pool_);
-  return norm;
-}
-
-void Ppo::Gather(std::span<const int64_t> from, RowRange rows) {
-  const Matrix<float> s(obs_.data(), B_, D_);
-  const Matrix<float> a(action_.data(), B_, static_cast<int>(limit_.size()));
-  const auto last_level = static_cast<float>(config_.levels - 1);
-  std::vector<float> raw(static_cast<size_t>(D_));
-  for (int i = rows.first; i < rows.first + rows.count; ++i) {
-    const auto row = static_cast<size_t>(i);
-    const auto source = static_cast<int>(from[row]);
-    const auto place = static_cast<size_t>(from[row]);
-    const bool mirror = mirrored_[row] != 0;
-    std::ranges::copy(rollout_.all_obs().row(source), raw.begin());
-    std::ranges::copy(rollout_.all_actions().row(source), a.row(i).begin());
-    if (mirror) {
-      // The mirrored step was drawn as often as the step itself: it has the same π_old.
-      for (size_t k = 0; k < raw.size(); ++k) raw[k] *= mirror_signs_[k];
-      for (float& x : a.row(i)) x = config_.discrete() ? last_level - x : -x;
-    }
-    normalizer_.Apply(raw, s.row(i));
-    old_log_prob_[row] = rollout_.log_probs().data()[place];
-    old_value_[row] = value_[place];
-    batch_target_[row] = target_[place];
-  }
-}
-
-void Ppo::BackwardActor(RowRange rows, Sums& sums) {
-  const Matrix<const float> s(obs_.data(), B_, D_);
-  const Matrix<const float> a(action_.data(), B_, static_cast<int>(limit_.size()));
-  const int outputs = static_cast<int>(actor_.y.size()) / B_;
-  const Matrix<float> y(actor_.y.data(), B_, outputs), dy(actor_.dy.data(), B_, outputs);
-  const Network<float>::Weights weights{actor_.weights(), &actor_.prepared};
-  actor_.network.Forward(weights, s, rows, actor_.activations, y);
-
-  // L = mean of -min(r A, clip(r) A) - c H
-  const auto B = static_cast<float>(B_);
-  const auto clip = static_cast<float>(config_.clip);
-  const float dentropy = -static_cast<float>(config_.entropy_bonus) / B;
-  std::vector<float> p(torques_.size());
-  for (int i = rows.first; i < rows.first + rows.count; ++i) {
-    const auto row = static_cast<size_t>(i);
-    const auto backward = [&](float log_prob, float entropy, const auto& gradient) {
-      const float log_ratio = log_prob - old_log_prob_[row];
-      const float ratio = std::exp(log_ratio);
-      const LossTerm<float> term = ClippedLoss(ratio, batch_advantage_[row], clip);
-      gradient(term.gradient / B);
-      sums.policy_loss += term.loss;
-      sums.entropy += entropy;
-      sums.kl += KlEstimate(ratio, log_ratio);
-      sums.clipped += std::abs(ratio - 1) > clip ? 1 : 0;
-    };
-    if (config_.discrete()) {
-      const Categorical<float> policy(y.row(i), p);
-      const auto level = static_cast<size_t>(a(i, 0));
-      backward(policy.LogProb(level), policy.Entropy(),
-               [&](float dlog_prob) { policy.Backward(level, dlog_prob, dentropy, dy.row(i)); });
-    } else {
-      const DiagonalGaussian<float> policy{y.row(i), log_std(), std_};
-      backward(policy.LogProb(a.row(i)), policy.Entropy(), [&](float dlog_prob) {
-        policy.Backward(a.row(i), dlog_prob, dentropy, dy.row(i), sums.dlog_std);
-      });
-    }
-  }
-  actor_.network.BackwardInputs(weights, dy, rows, actor_.activations);
-}
-
-void Ppo::BackwardCritic(RowRange rows, Sums& sums) {
-  const Matrix<const float> s(obs_.data(), B_, D_);
-  const Matrix<float> V(critic_.y.data(), B_, 1), dV(critic_.dy.data(), B_, 1);
-  const Network<float>::Weights weights{critic_.weights(), &critic_.prepared};
-  critic_.network.Forward(weights, s, rows, critic_.activations, V);
-  const auto clip = static_cast<float>(config_.value_clip);
-  for (int i = rows.first; i < rows.first + rows.count; ++i) {
-    const auto row = static_cast<size_t>(i);
-    const LossTerm<float> term = ValueLoss(V(i, 0), old_value_[row], batch_target_[row], clip);
-    dV(i, 0) = term.gradient / static_cast<float>(B_);
-    sums.value_loss += term.loss;
-  }
-  critic_.network.BackwardInputs(weights, dV, rows, critic_.activations);
-}
-
-void Ppo::CountUpdate(const Sums& sums) {
-  const double B = B_;
-  if (!std::isfinite(sums.policy_loss + sums.value_loss + sums.kl)) {
-    throw Failure(Concat("the losses are ", sums.policy_loss / B, " and ", sums.value_loss / B,
-                         ", the KL divergence ", sums.kl / B, " in update ", updates_ + 1,
-                         ", expected finite numbers"));
-  }
-  policy_loss_sum_ += sums.policy_loss / B;
-  value_loss_sum_ += sums.value_loss / B;
-  entropy_sum_ += sums.entropy / B;
-  kl_sum_ += sums.kl / B;
-  clipped_sum_ += sums.clipped / B;
-}
-
-Metrics Ppo::TakeMetrics() {
-  const double n = static_cast<double>(std::max<int64_t>(1, report_updates_));
-  Metrics metrics{{"updates", static_cast<double>(updates_)},
-                  {"learning_rate", learning_rate()},
-                  {"policy_loss", policy_loss_sum_ / n},
-                  {"value_loss", value_loss_sum_ / n},
-                  {"entropy", entropy_sum_ / n},
-                  {"kl", kl_sum_ / n},
-                  {"clip_share", clipped_sum_ / n},
-                  {"explained_variance", explained_variance_},
-                  {"gradient_norm", norm_sum_ / n}};
-  if (!std_.empty()) {
-    const double sum = std::accumulate(std_.begin(), std_.end(), 0.0);
-    metrics.emplace_back("std", sum / static_cast<double>(std_.size()));
-  }
-  policy_loss_sum_ = value_loss_sum_ = entropy_sum_ = kl_sum_ = clipped_sum_ = norm_sum_ = 0;
-  report_updates_ = 0;
-  return metrics;
 }
 
 }  // namespace upswing

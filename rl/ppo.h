@@ -8,11 +8,11 @@
 
 #include "core/thread_pool.h"
 #include "nn/adam.h"
-#include "nn/network.h"
 #include "rl/agent.h"
 #include "rl/normalizer.h"
 #include "rl/ppo_config.h"
 #include "rl/rollout.h"
+#include "rl/trained_network.h"
 
 /// Proximal policy optimisation (Schulman et al., 2017) with generalised advantages (Schulman et
 /// al., 2016).
@@ -40,30 +40,16 @@ class Ppo : public Agent {
   int64_t updates() const override { return updates_; }
   /// Of the actor: as scheduled, times what the KL target made of it.
   double learning_rate() const { return scheduled_rate() * rate_factor_; }
-  /// θ: the actor network, then ln σ of each component.
-  std::span<const float> actor() const { return actor_.theta; }
-  std::span<const float> critic() const { return critic_.theta; }
+  std::span<const float> actor() const { return actor_.theta(); }
+  std::span<const float> critic() const { return critic_.theta(); }
+  std::span<const float> log_std() const { return log_std_; }
   const Normalizer& normalizer() const { return normalizer_; }
 
  private:
-  /// A network and what it takes to learn.
-  struct Learner {
-    Network<float> network;
-    AlignedVector<float> theta;  // (num_parameters, + `more` numbers that it does not know)
-    Adam adam;
-    Network<float>::Activations activations;  // of B rows
-    Network<float>::Prepared prepared;
-    AlignedVector<float> y, dy;     // (B × outputs)
-    AlignedVector<float> gradient;  // like theta
-    std::vector<float> squares;     // of the gradient, by task
-
-    Learner(const MlpShape& shape, int outputs, size_t more, int batch);
-    std::span<const float> weights() const;
-  };
   /// Sums over some rows of a minibatch.
   struct Sums {
     double policy_loss = 0, value_loss = 0, entropy = 0, kl = 0, clipped = 0;
-    std::vector<float> dlog_std;  // (A) gradient
+    AlignedVector<float> dlog_std;  // (A) gradient with respect to ln σ
     void Add(const Sums& other);
   };
 
@@ -79,16 +65,18 @@ class Ppo : public Agent {
   void Gather(std::span<const int64_t> from, RowRange rows);
   void BackwardActor(RowRange rows, Sums& sums);
   void BackwardCritic(RowRange rows, Sums& sums);
-  /// A step of Adam, after clipping. Returns the gradient's norm.
-  double Step(Learner& learner, double learning_rate, double squares);
+  /// Steps of actor, ln σ and critic along their gradients.
+  void Step(const Sums& sums);
   void CountUpdate(const Sums& sums);
+  /// The KL-adaptive learning rate, given KL(π_old ‖ π) of the last epoch.
   void AdaptRate(double kl);
   double scheduled_rate() const;
   int64_t updates_due() const;
-  int slices() const;
-  RowRange Slice(int slice) const;
-  std::span<const float> log_std() const;
+  /// ln σ within its range, and σ.
   void SetStd();
+  int outputs() const;  // of the actor
+  Matrix<float> BatchObs() { return {obs_.data(), B_, D_}; }
+  Matrix<float> BatchActions() { return {action_.data(), B_, static_cast<int>(limit_.size())}; }
 
   PpoConfig config_;
   int D_, B_;
@@ -99,8 +87,9 @@ class Ppo : public Agent {
   std::vector<Rng> explore_rngs_;  // of each block of environments
   Rng shuffle_rng_, mirror_rng_;
 
-  Learner actor_, critic_;
-  std::vector<float> std_;  // (A) σ
+  TrainedNetwork actor_, critic_;
+  AlignedVector<float> log_std_, std_;  // (A) ln σ, σ, of continuous actions
+  Adam log_std_adam_;
   Normalizer normalizer_;
   double rate_factor_ = 1;
 
@@ -111,7 +100,8 @@ class Ppo : public Agent {
   AlignedVector<float> act_obs_, act_outputs_;                    // (N × D), (N × outputs)
 
   // Of a minibatch.
-  AlignedVector<float> obs_, action_;  // (B × D), (B × A)
+  AlignedVector<float> obs_, action_;     // (B × D) normalised, (B × A)
+  AlignedVector<float> y_, dy_, V_, dV_;  // (B × outputs), (B), and the gradients
   AlignedVector<float> old_log_prob_, old_value_, batch_advantage_, batch_target_;  // (B)
   std::vector<uint8_t> mirrored_;                                                   // (B)
   std::vector<Sums> sums_;                                                          // by slice

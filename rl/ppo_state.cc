@@ -1,7 +1,7 @@
-// What of a PPO agent outlives it: its state and its policy.
+// What a PPO agent gives away: metrics, its policy, its state.
 #include <algorithm>
-#include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "core/text.h"
 #include "nn/actor_policy.h"
@@ -54,17 +54,37 @@ std::vector<float> WithLogStd(const Network<float>& network, const std::vector<f
 
 }  // namespace
 
+Metrics Ppo::TakeMetrics() {
+  const double n = static_cast<double>(std::max<int64_t>(1, report_updates_));
+  Metrics metrics{{"updates", static_cast<double>(updates_)},
+                  {"learning_rate", learning_rate()},
+                  {"policy_loss", policy_loss_sum_ / n},
+                  {"value_loss", value_loss_sum_ / n},
+                  {"entropy", entropy_sum_ / n},
+                  {"kl", kl_sum_ / n},
+                  {"clip_share", clipped_sum_ / n},
+                  {"explained_variance", explained_variance_},
+                  {"gradient_norm", norm_sum_ / n}};
+  if (!std_.empty()) {
+    const double sum = std::accumulate(std_.begin(), std_.end(), 0.0);
+    metrics.emplace_back("std", sum / static_cast<double>(std_.size()));
+  }
+  policy_loss_sum_ = value_loss_sum_ = entropy_sum_ = kl_sum_ = clipped_sum_ = norm_sum_ = 0;
+  report_updates_ = 0;
+  return metrics;
+}
+
 std::unique_ptr<Policy> Ppo::ExportPolicy(PolicyInfo info) const {
   info.gamma = config_.gamma;
   info.reward_scale = config_.reward_scale;
   ActorParts parts;
   parts.output = config_.discrete() ? ActorOutput::kCategorical : ActorOutput::kClippedGaussian;
   parts.actor = parts.critic = config_.Shape(D_);
-  parts.parameters = WithNormalizer(actor_.network, actor_.theta, normalizer_);
+  parts.parameters = WithNormalizer(actor_.network(), actor_.theta(), normalizer_);
   if (!config_.discrete()) {
-    parts.parameters = WithLogStd(actor_.network, parts.parameters, log_std());
+    parts.parameters = WithLogStd(actor_.network(), parts.parameters, log_std_);
   }
-  parts.critic_parameters = WithNormalizer(critic_.network, critic_.theta, normalizer_);
+  parts.critic_parameters = WithNormalizer(critic_.network(), critic_.theta(), normalizer_);
   parts.action_limit = limit_;
   parts.torques = torques_;
   return std::make_unique<ActorPolicy>(std::move(parts), std::move(info));
@@ -77,18 +97,11 @@ int64_t Ppo::updates_due() const {
 
 void Ppo::State(const Archive& archive) {
   constexpr double kLargest = std::numeric_limits<double>::max();
-  archive.Array("actor", std::span(actor_.theta));
-  archive.Array("critic", std::span(critic_.theta));
-  const std::span<float> log_std = std::span(actor_.theta).last(std_.size());
-  archive.Check(std::ranges::all_of(log_std,
-                                    [](float x) {
-                                      return x >= static_cast<float>(kLogStdLow) &&
-                                             x <= static_cast<float>(kLogStdHigh);
-                                    }),
-                "actor", Concat("ln std from ", kLogStdLow, " to ", kLogStdHigh, " at its end"));
+  actor_.State(archive.In("actor"));
+  critic_.State(archive.In("critic"));
+  archive.Array("log_std", std::span(log_std_), {kLogStdLow, kLogStdHigh});
+  log_std_adam_.State(archive.In("log_std_adam"));
   SetStd();
-  actor_.adam.State(archive.In("actor_adam"));
-  critic_.adam.State(archive.In("critic_adam"));
   normalizer_.State(archive.In("normalizer"));
   archive.Scalar("rate_factor", rate_factor_, {1e-3, 10});
   for (size_t i = 0; i < explore_rngs_.size(); ++i) {
@@ -113,8 +126,8 @@ void Ppo::State(const Archive& archive) {
   archive.Check(steps_ % rollout_.size() == rollout_.filled() * rollout_.num_envs(), "steps",
                 "whole rollouts and the steps of the running one");
   archive.Scalar("updates", updates_, {0, std::numeric_limits<int64_t>::max()});
-  archive.Check(updates_ == updates_due() && actor_.adam.steps() == updates_ &&
-                    critic_.adam.steps() == updates_,
+  archive.Check(updates_ == updates_due() && actor_.steps() == updates_ &&
+                    critic_.steps() == updates_ && log_std_adam_.steps() == updates_,
                 "updates", Concat(updates_due(), ", which the steps imply, and as many of Adam"));
   archive.Scalar("report_updates", report_updates_, {0, updates_});
   archive.Scalar("policy_loss_sum", policy_loss_sum_, kAnyNumber<double>);

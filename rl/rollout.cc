@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/error.h"
-#include "core/text.h"
+#include "rl/agent.h"
 
 namespace upswing {
 
@@ -22,17 +21,11 @@ Rollout::Rollout(int64_t steps, int num_envs, int obs_size, int action_size)
       truncated_(log_prob_.size()) {}
 
 void Rollout::Add(const StepResult& result, double reward_scale) {
-  const Matrix<float> next_obs = Rows(next_obs_, obs_size_);
-  std::ranges::copy(result.next_obs, next_obs.values().begin());
+  std::ranges::copy(result.next_obs, Rows(next_obs_, obs_size_).values().begin());
   const auto first = static_cast<size_t>(filled_ * num_envs_);
   for (int env = 0; env < num_envs_; ++env) {
     const auto i = static_cast<size_t>(env);
-    const std::span<const float> obs = next_obs.row(env);
-    if (!std::isfinite(result.reward[i]) ||
-        !std::ranges::all_of(obs, [](float x) { return std::isfinite(x); })) {
-      throw Failure(Concat("environment ", env, " gave a reward or an observation that is not a ",
-                           "finite number"));
-    }
+    ExpectFinite(result, i);
     reward_[first + i] = static_cast<float>(reward_scale * result.reward[i]);
     terminated_[first + i] = result.terminated[i];
     truncated_[first + i] = result.truncated[i];

@@ -6,15 +6,19 @@
 namespace upswing {
 
 TrainedNetwork::TrainedNetwork(const MlpShape& trunk, const HeadShape& head, int batch, Rng& rng)
+    : TrainedNetwork(trunk, head, batch, Adam::kEpsilon) {
+  network_.Initialize(rng, theta_);
+}
+
+TrainedNetwork::TrainedNetwork(const MlpShape& trunk, const HeadShape& head, int batch,
+                               double adam_epsilon)
     : network_(trunk, head),
       theta_(network_.num_parameters()),
       gradient_(theta_.size()),
-      adam_(theta_.size()),
+      adam_(theta_.size(), adam_epsilon),
       activations_(network_.MakeActivations(batch, true)),
       prepared_(network_.MakePrepared(true)),
-      squares_(static_cast<size_t>(network_.num_tasks())) {
-  network_.Initialize(rng, theta_);
-}
+      squares_(static_cast<size_t>(network_.num_tasks())) {}
 
 void TrainedNetwork::Prepare(ThreadPool& pool) {
   pool.ParallelFor(network_.num_tasks(),

@@ -34,7 +34,10 @@ void ForSlices(ThreadPool& pool, int B, const Work& work) {
 /// minibatch of B rows.
 class TrainedNetwork {
  public:
+  /// With PyTorch's initial parameters.
   TrainedNetwork(const MlpShape& trunk, const HeadShape& head, int batch, Rng& rng);
+  /// With parameters of 0, which the caller fills, and this ε of Adam.
+  TrainedNetwork(const MlpShape& trunk, const HeadShape& head, int batch, double adam_epsilon);
 
   const Network<float>& network() const { return network_; }
   std::span<float> theta() { return theta_; }
