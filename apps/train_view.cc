@@ -25,6 +25,12 @@ std::string LearnerText(const Config& config) {
     return fmt::format("soft actor-critic, {} of {}", s.twin ? "networks" : "one critic, networks",
                        fmt::join(s.hidden, "-"));
   }
+  if (config.algorithm == "ppo") {
+    const PpoConfig& p = config.ppo;
+    return fmt::format("proximal policy optimisation, {}, networks of {}",
+                       p.discrete() ? fmt::format("{} torques", p.levels) : "any torque",
+                       fmt::join(p.hidden, "-"));
+  }
   const DqnConfig& d = config.dqn;
   return fmt::format("{}{} network {}{}", d.double_q ? "double, " : "",
                      d.dueling ? "dueling" : "plain", fmt::join(d.hidden, "-"),
@@ -122,6 +128,7 @@ std::vector<std::string> TrainView::AgentTexts() const {
   for (const auto& [name, value] : metrics_) {
     if (name == "alpha") texts.push_back(fmt::format("alpha {:.3f}", value));
     if (name == "epsilon") texts.push_back(fmt::format("eps {:.2f}", value));
+    if (name == "std") texts.push_back(fmt::format("std {:.2f}", value));
     if (name == "loss") {
       texts.push_back(learned ? fmt::format("loss {:.4f}", value) : "loss      -");
     }

@@ -14,6 +14,7 @@
 #include "mujoco/mjcf_check.h"
 #include "mujoco/model.h"
 #include "rl/dqn.h"
+#include "rl/ppo.h"
 #include "rl/sac.h"
 
 namespace upswing {
@@ -23,6 +24,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kDqn = "dqn";
 constexpr const char* kSac = "sac";
+constexpr const char* kPpo = "ppo";
 
 const NamedAgent& FindAgent(const std::string& name, const std::string& where) {
   const auto agents = EmbeddedAgents();
@@ -68,6 +70,25 @@ void CheckTogether(const OffPolicyConfig& d, const std::string& place) {
                           "learning_starts: expected at most as many steps as the replay memory "
                           "holds transitions (replay ",
                           d.replay, "), got ", d.learning_starts));
+  }
+}
+
+/// Throws BadInput that begins with `place` if minibatches do not divide a rollout, or if there is
+/// a setting of the other kind of actions that is not at its default.
+void CheckPpo(const PpoConfig& p, int64_t num_envs, const std::string& place) {
+  try {
+    p.CheckBatch(num_envs);
+  } catch (const Error& error) {
+    throw BadInput(place + error.what());
+  }
+  const PpoConfig usual;
+  if (!p.discrete() && p.levels != usual.levels) {
+    throw BadInput(Concat(place, "levels: expected none with continuous actions, got ", p.levels,
+                          " (or actions = levels)"));
+  }
+  if (p.discrete() && p.initial_std != usual.initial_std) {
+    throw BadInput(
+        Concat(place, "initial_std: expected none with actions = levels, got ", p.initial_std));
   }
 }
 
@@ -156,6 +177,8 @@ Config ConfigOf(const toml::table& table, const fs::path& file,
   const std::string place = where.empty() ? "" : where + ": ";
   if (config.algorithm == kSac) {
     CheckTogether(config.sac, place);
+  } else if (config.algorithm == kPpo) {
+    CheckPpo(config.ppo, config.train.envs, place);
   } else {
     CheckTogether(config.dqn, place);
   }
@@ -180,7 +203,7 @@ std::vector<std::string> MissingIn(const toml::table& table, const std::string& 
 }  // namespace
 
 const std::vector<std::string>& AlgorithmNames() {
-  static const std::vector<std::string> kNames{kDqn, kSac};
+  static const std::vector<std::string> kNames{kDqn, kSac, kPpo};
   return kNames;
 }
 
@@ -217,6 +240,8 @@ void Config::Describe(Options& o) {
   reward.Describe(o);
   if (algorithm == kSac) {
     sac.Describe(o);
+  } else if (algorithm == kPpo) {
+    ppo.Describe(o);
   } else {
     dqn.Describe(o);
   }
@@ -252,6 +277,7 @@ EnvConfig Config::Environments() const {
 std::unique_ptr<Agent> Config::MakeAgent(const EnvSpec& spec, ThreadPool& pool) const {
   const auto seed = static_cast<uint64_t>(train.seed);
   if (algorithm == kSac) return std::make_unique<Sac>(sac, spec, seed, pool);
+  if (algorithm == kPpo) return std::make_unique<Ppo>(ppo, spec, seed, pool);
   return std::make_unique<Dqn>(dqn, spec, seed, pool);
 }
 

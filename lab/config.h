@@ -12,6 +12,7 @@
 #include "core/options.h"
 #include "lab/task.h"
 #include "rl/dqn_config.h"
+#include "rl/ppo_config.h"
 #include "rl/sac_config.h"
 #include "rl/trainer.h"
 #include "sim/double_pendulum.h"
@@ -44,6 +45,7 @@ struct Config {
   RewardWeights reward;
   DqnConfig dqn;
   SacConfig sac;
+  PpoConfig ppo;
 
   std::string mjcf;  // the text of `model`; not a setting
 

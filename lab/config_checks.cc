@@ -22,7 +22,7 @@ struct LearnerSize {
   double parameters;     // of the networks that learn
   double arrays;         // of so many numbers each that there are
   double saved_arrays;   // and in the checkpoint
-  double transition;     // numbers of one in the replay memory
+  double transition;     // numbers of one in the replay memory or rollout
   double capacity;       // transitions that it holds
   double batch, widest;  // rows of a minibatch, units of the widest layer…
   double layers;         // …and how many layers' activations and gradients are kept
@@ -45,6 +45,20 @@ LearnerSize SizeOfLearner(const Config& config) {
             6, 4, 2.0 * D + A + 2, static_cast<double>(s.replay), static_cast<double>(s.batch),
             widest(s.hidden), (1 + critics) * 3 * static_cast<double>(s.hidden.size())};
   }
+  if (config.algorithm == "ppo") {
+    const PpoConfig& p = config.ppo;
+    const int A = SpecOf(config.Environments()).action_size();
+    const Network<float> actor(p.Shape(D), {p.discrete() ? static_cast<int>(p.levels) : A});
+    const Network<float> critic(p.Shape(D), {1});
+    return {
+        static_cast<double>(actor.num_parameters() + critic.num_parameters()),
+        // Parameters, gradient, Adam's two moments, and what products want.
+        5, 3,
+        // Observation and successor, action, ln π, reward, V, V', advantage, target, order, ends.
+        2.0 * D + A + 9, static_cast<double>(p.horizon * config.train.envs),
+        static_cast<double>(p.batch), widest(p.hidden),
+        2 * 3 * static_cast<double>(p.hidden.size())};
+  }
   const DqnConfig& d = config.dqn;
   const QNetwork<float> network(d.Shape(D, static_cast<int>(d.levels)));
   return {static_cast<double>(network.num_parameters()),
@@ -52,6 +66,13 @@ LearnerSize SizeOfLearner(const Config& config) {
           // products want of online and target weights.
           8, 5, 2.0 * D + 3, static_cast<double>(d.replay), static_cast<double>(d.batch),
           widest(d.hidden), 3 * static_cast<double>(d.hidden.size())};
+}
+
+template <typename AgentConfig>
+void WarnOfNoRate(const AgentConfig& c, std::vector<std::string>& warnings) {
+  if (c.learning_rate == 0 && c.learning_rate_end == 0) {
+    warnings.emplace_back("learning_rate is 0 to the end: nothing will be learned");
+  }
 }
 
 /// What would keep an agent with a replay memory from learning, in `steps` of training.
@@ -65,9 +86,18 @@ void AddWarnings(const OffPolicyConfig& d, int64_t steps, std::vector<std::strin
   if (d.updates_per_step == 0) {
     warnings.emplace_back("updates_per_step is 0: nothing will be learned");
   }
-  if (d.learning_rate == 0 && d.learning_rate_end == 0) {
-    warnings.emplace_back("learning_rate is 0 to the end: nothing will be learned");
+  WarnOfNoRate(d, warnings);
+}
+
+/// The same for PPO.
+void AddWarnings(const PpoConfig& p, int64_t envs, int64_t steps,
+                 std::vector<std::string>& warnings) {
+  if (p.horizon * envs > steps) {
+    warnings.push_back(
+        fmt::format("a rollout is {} steps, and there are {}: nothing will be learned",
+                    FormatCount(p.horizon * envs), FormatCount(steps)));
   }
+  WarnOfNoRate(p, warnings);
 }
 
 }  // namespace
@@ -80,6 +110,8 @@ std::vector<std::string> Warnings(const Config& config) {
   if (config.algorithm == "sac") {
     AddWarnings(config.sac, steps, warnings);
     if (config.sac.tau == 0) warnings.emplace_back("tau is 0: the targets will stay as they began");
+  } else if (config.algorithm == "ppo") {
+    AddWarnings(config.ppo, envs, steps, warnings);
   } else {
     AddWarnings(config.dqn, steps, warnings);
     if (config.dqn.tau == 0 && config.dqn.target_period == 0) {
@@ -108,12 +140,14 @@ void CheckMemory(const Config& config, int64_t runs) {
   const auto available = static_cast<double>(AvailableMemory());
   if (needed <= available) return;
   const LearnerSize learner = SizeOfLearner(config);
+  const bool on_policy = config.algorithm == "ppo";
   throw BadInput(fmt::format(
       "train: expected to fit into the {} of memory that are free, but {}network of {} parameters "
-      "and a replay memory of {} transitions take up to {} (smaller: --hidden, --replay{})",
+      "and a {} of {} transitions take up to {} (smaller: --hidden, {}{})",
       Gigabytes(available),
       runs > 1 ? fmt::format("{} trainings at a time, each with a ", runs) : "a ",
-      FormatCount(learner.parameters), FormatCount(learner.capacity), Gigabytes(needed),
+      FormatCount(learner.parameters), on_policy ? "rollout" : "replay memory",
+      FormatCount(learner.capacity), Gigabytes(needed), on_policy ? "--horizon" : "--replay",
       runs > 1 ? ", --jobs" : ""));
 }
 

@@ -51,7 +51,12 @@ MlpShape PpoConfig::Shape(int obs_size) const {
 }
 
 void PpoConfig::CheckBatch(int64_t num_envs) const {
+  constexpr int64_t kMostRollout = 10'000'000;
   const int64_t rollout = horizon * num_envs;
+  if (rollout > kMostRollout) {
+    throw BadInput(Concat("horizon: expected at most ", kMostRollout / num_envs, " steps of ",
+                          num_envs, " environments, got ", horizon));
+  }
   if (rollout % batch == 0) return;
   int64_t below = batch, above = batch;
   while (below > 1 && rollout % below != 0) --below;

@@ -35,7 +35,8 @@ struct PpoConfig {
   bool discrete() const { return actions == "levels"; }
   /// The shape of actor and critic, for observations of `obs_size` numbers.
   MlpShape Shape(int obs_size) const;
-  /// Throws BadInput unless minibatches divide a rollout of so many environments.
+  /// Throws BadInput unless minibatches divide a rollout of so many environments, of at most
+  /// 10,000,000 steps.
   void CheckBatch(int64_t num_envs) const;
 };
 
