@@ -95,15 +95,15 @@ int Ppo::outputs() const {
 
 void Ppo::SetStd() {
   for (size_t k = 0; k < std_.size(); ++k) {
-    log_std_[k] = std::clamp(log_std_[k], float{kLogStdLow}, float{kLogStdHigh});
+    log_std_[k] =
+        std::clamp(log_std_[k], float{kLogStdLow}, static_cast<float>(std::log(config_.max_std)));
     std_[k] = std::exp(log_std_[k]);
   }
 }
 
-double Ppo::scheduled_rate() const {
-  const double progress =
-      static_cast<double>(steps_) / static_cast<double>(config_.learning_rate_steps);
-  return std::lerp(config_.learning_rate, config_.learning_rate_end, std::min(1.0, progress));
+double Ppo::schedule() const {
+  return std::min(1.0,
+                  static_cast<double>(steps_) / static_cast<double>(config_.learning_rate_steps));
 }
 
 void Ppo::Act(Matrix<const float> obs, Matrix<double> action) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -70,7 +71,11 @@ class Ppo : public Agent {
   void CountUpdate(const Sums& sums);
   /// The KL-adaptive learning rate, given KL(π_old ‖ π) of the last epoch.
   void AdaptRate(double kl);
-  double scheduled_rate() const;
+  /// Progress of the schedules, 0 to 1.
+  double schedule() const;
+  double scheduled_rate() const {
+    return std::lerp(config_.learning_rate, config_.learning_rate_end, schedule());
+  }
   int64_t updates_due() const;
   /// ln σ within its range, and σ.
   void SetStd();

@@ -28,7 +28,12 @@ void PpoConfig::Describe(Options& o) {
         "the ratio of new to old probability is clipped to 1 by this");
   o.Add(&value_clip, "value_clip", 0, kNotNegative, "",
         "values are clipped to what they were by this; 0: not clipped");
-  o.Add(&entropy_bonus, "entropy_bonus", 0, {0, 10}, "", "weight of the policy's entropy");
+  o.Add(&entropy_bonus, "entropy_bonus", 0, {0, 10}, "",
+        "weight of the policy's entropy at the beginning");
+  o.Add(&entropy_bonus_end, "entropy_bonus_end", 0, {0, 10}, "",
+        "and at the end of learning_rate_steps");
+  o.Add(&max_std, "max_std", 5, {0.01, 7}, "",
+        "largest standard deviation of continuous actions, in units of the limit");
   o.Add(&initial_std, "initial_std", 1, {0.01, 5}, "",
         "standard deviation of continuous actions at the beginning, in units of the limit");
   o.Add(&normalize, "normalize", true,

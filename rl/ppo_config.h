@@ -20,7 +20,8 @@ struct PpoConfig {
   double reward_scale;
   int64_t horizon, epochs, batch;
   double clip, value_clip;
-  double entropy_bonus, initial_std;
+  double entropy_bonus, entropy_bonus_end;
+  double initial_std, max_std;
   bool normalize, mirror;
   double learning_rate, learning_rate_end;
   int64_t learning_rate_steps;

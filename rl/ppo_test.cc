@@ -257,6 +257,23 @@ TEST(Ppo, TheLearningRateFollowsTheKlTarget) {
   }
 }
 
+TEST(Ppo, TheEntropyBonusRaisesTheDeviationToItsBoundAndEndsWithTheSchedule) {
+  PpoConfig config = SmallConfig();
+  config.kl_target = 0;
+  config.learning_rate = config.learning_rate_end = 1e-2;
+  config.entropy_bonus = 10;
+  config.initial_std = 0.4;
+  config.max_std = 0.5;
+  config.learning_rate_steps = 8 * 16 * 40;
+  ThreadPool pool(1);
+  Ppo agent(config, ToyEnv::Spec(8), 1, pool);
+  Bandit env(8);
+  Walk(agent, env, 16 * 10);
+  EXPECT_NEAR(Metric(agent.TakeMetrics(), "std"), 0.5, 1e-6);
+  Walk(agent, env, 16 * 130);  // 100 rollouts without a bonus: the best action is not drawn around
+  EXPECT_LT(Metric(agent.TakeMetrics(), "std"), 0.2);
+}
+
 TEST_P(PpoActions, TheNumberOfThreadsChangesNoBit) {
   PpoConfig config = SmallConfig(GetParam());
   config.hidden = {130, 70};  // several tasks a layer, three chunks of Adam

@@ -87,7 +87,8 @@ void Ppo::BackwardActor(RowRange rows, Sums& sums) {
   // L = mean of -min(r A, clip(r) A) - c H
   const auto B = static_cast<float>(B_);
   const auto clip = static_cast<float>(config_.clip);
-  const float dentropy = -static_cast<float>(config_.entropy_bonus) / B;
+  const double bonus = std::lerp(config_.entropy_bonus, config_.entropy_bonus_end, schedule());
+  const float dentropy = -static_cast<float>(bonus) / B;
   AlignedVector<float> p(torques_.size());
   for (int i = rows.first; i < rows.first + rows.count; ++i) {
     const auto row = static_cast<size_t>(i);
