@@ -62,6 +62,12 @@ double Rng::Normal() {
   return radius * std::cos(2.0 * std::numbers::pi * Uniform());
 }
 
+std::array<double, 2> Rng::NormalPair() {
+  const double radius = std::sqrt(-2.0 * std::log(1.0 - Uniform()));
+  const double angle = 2.0 * std::numbers::pi * Uniform();
+  return {radius * std::cos(angle), radius * std::sin(angle)};
+}
+
 void Rng::State(const Archive& archive) {
   archive.Array("state", std::span<uint64_t>(state_), kAnyNumber<uint64_t>);
   const bool lives = std::ranges::any_of(state_, [](uint64_t word) { return word != 0; });

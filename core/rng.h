@@ -29,6 +29,8 @@ class Rng {
 
   /// Standard normal (Box and Muller, 1958; the cosine branch alone, so that no value is kept).
   double Normal();
+  /// Two independent standard normals, of which the first is what Normal would give.
+  std::array<double, 2> NormalPair();
 
   /// Saves or loads the stream's state.
   void State(const Archive& archive);

@@ -35,6 +35,26 @@ TEST(Rng, StreamsDifferInSeedNameAndIndex) {
   EXPECT_EQ(Rng(5, "x", 3).Next(), Rng(5, "x", 3).Next());
 }
 
+TEST(Rng, APairOfNormalsBeginsWithTheNormalAndItsNumbersAreIndependent) {
+  Rng rng(3, "pair"), other(3, "pair");
+  double sum[2]{}, square[2]{}, product = 0;
+  constexpr int kPairs = 100000;
+  for (int i = 0; i < kPairs; ++i) {
+    const auto [a, b] = rng.NormalPair();
+    ASSERT_EQ(a, other.Normal());
+    sum[0] += a;
+    sum[1] += b;
+    square[0] += a * a;
+    square[1] += b * b;
+    product += a * b;
+  }
+  for (const int i : {0, 1}) {
+    EXPECT_NEAR(sum[i] / kPairs, 0, 0.02);
+    EXPECT_NEAR(square[i] / kPairs, 1, 0.03);
+  }
+  EXPECT_NEAR(product / kPairs, 0, 0.02);
+}
+
 TEST(Rng, UniformAndNormalHaveTheirMoments) {
   // Tolerances: five standard errors of the mean and of the mean square.
   constexpr int n = 200000;

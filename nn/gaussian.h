@@ -52,8 +52,11 @@ struct Squashed {
 
 template <typename T>
 Squashed<T> Squash(const Gaussian<T>& policy, T epsilon) {
-  const T u = policy.mean + policy.std * epsilon;
-  return {epsilon, std::tanh(u), LogDensity(epsilon, policy.log_std) - LogTanhSlope(u)};
+  // One e = exp(-2 |u|) serves tanh(|u|) = (1 - e) / (1 + e) and ln(1 - a²); see LogTanhSlope.
+  const T u = policy.mean + policy.std * epsilon, size = std::abs(u), e = std::exp(-2 * size);
+  const T slope = 2 * (std::numbers::ln2_v<T> - size - std::log1p(e));
+  return {epsilon, std::copysign((1 - e) / (1 + e), u),
+          LogDensity(epsilon, policy.log_std) - slope};
 }
 
 /// Gradient with respect to μ and ln σ.

@@ -124,8 +124,11 @@ void Sac::Update(const Minibatch& batch) {
 }
 
 void Sac::DrawNoise() {
-  for (Squashed<float>& sample : samples_) {
-    sample.epsilon = static_cast<float>(noise_rng_.Normal());
+  // Both numbers of Box and Muller (1958) for two samples.
+  for (size_t i = 0; i < samples_.size(); i += 2) {
+    const std::array<double, 2> pair = noise_rng_.NormalPair();
+    samples_[i].epsilon = static_cast<float>(pair[0]);
+    if (i + 1 < samples_.size()) samples_[i + 1].epsilon = static_cast<float>(pair[1]);
   }
 }
 
