@@ -196,7 +196,7 @@ class StudyTest(ProgramTest):
 
     def test_the_studies_of_the_project_can_be_run(self):
         studies = sorted((ROOT / "configs/studies").glob("*.toml"))
-        self.assertEqual(len(studies), 5)
+        self.assertEqual(len(studies), 6)
         for path in studies:
             with self.subTest(study=path.stem):
                 process = self.start("study", path, "--seeds", "1-1", "--jobs", 1)

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 
 #include "core/error.h"
 #include "core/text.h"
@@ -133,15 +134,17 @@ std::string AlgorithmIn(const toml::table& table, const std::string& where) {
 /// The settings of a configuration, which say of those that other algorithms have whose they are.
 Options KnownOptions(Config& config, std::string_view agent) {
   Options options = OptionsOf(config);
+  std::map<std::string, std::vector<std::string>> owners;
   for (const std::string& algorithm : AlgorithmNames()) {
     Config other(algorithm);
     const Options of_other = OptionsOf(other);
-    for (const Option& option : of_other.all()) {
-      if (options.Get(option.name) != nullptr) continue;
-      options.Explain(option.name,
-                      Concat(option.name, " is a setting of ", algorithm, "; expected one of ",
-                             config.algorithm, ", by which agent ", agent, " learns"));
-    }
+    for (const Option& option : of_other.all()) owners[option.name].push_back(algorithm);
+  }
+  for (const auto& [name, algorithms] : owners) {
+    if (options.Get(name) != nullptr) continue;
+    options.Explain(
+        name, Concat(name, " is a setting of ", Join(algorithms, " and "), "; expected one of ",
+                     config.algorithm, ", by which agent ", agent, " learns"));
   }
   return options;
 }

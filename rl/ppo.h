@@ -12,7 +12,7 @@
 #include "rl/agent.h"
 #include "rl/normalizer.h"
 #include "rl/ppo_config.h"
-#include "rl/rollout.h"
+#include "rl/rollout_buffer.h"
 #include "rl/trained_network.h"
 
 /// Proximal policy optimisation (Schulman et al., 2017) with generalised advantages (Schulman et
@@ -98,7 +98,7 @@ class Ppo : public Agent {
   Normalizer normalizer_;
   double rate_factor_ = 1;
 
-  Rollout rollout_;
+  RolloutBuffer rollout_;
   std::vector<int64_t> order_;                                    // (T·N) rows, shuffled
   AlignedVector<float> value_, next_value_, advantage_, target_;  // (T·N)
   Network<float>::Activations act_activations_;                   // of N rows

@@ -12,9 +12,9 @@ namespace upswing {
 
 /// What N environments do in T steps: row t · N + i is step t of environment i. D: observation
 /// size, A: numbers of an action.
-class Rollout {
+class RolloutBuffer {
  public:
-  Rollout(int64_t steps, int num_envs, int obs_size, int action_size);
+  RolloutBuffer(int64_t steps, int num_envs, int obs_size, int action_size);
 
   int num_envs() const { return num_envs_; }  // N
   int64_t filled() const { return filled_; }  // steps so far

@@ -1,4 +1,4 @@
-#include "rl/rollout.h"
+#include "rl/rollout_buffer.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 
 namespace upswing {
 
-Rollout::Rollout(int64_t steps, int num_envs, int obs_size, int action_size)
+RolloutBuffer::RolloutBuffer(int64_t steps, int num_envs, int obs_size, int action_size)
     : steps_(steps),
       num_envs_(num_envs),
       obs_size_(obs_size),
@@ -20,7 +20,7 @@ Rollout::Rollout(int64_t steps, int num_envs, int obs_size, int action_size)
       terminated_(log_prob_.size()),
       truncated_(log_prob_.size()) {}
 
-void Rollout::Add(const StepResult& result, double reward_scale) {
+void RolloutBuffer::Add(const StepResult& result, double reward_scale) {
   std::ranges::copy(result.next_obs, Rows(next_obs_, obs_size_).values().begin());
   const auto first = static_cast<size_t>(filled_ * num_envs_);
   for (int env = 0; env < num_envs_; ++env) {
@@ -33,7 +33,7 @@ void Rollout::Add(const StepResult& result, double reward_scale) {
   ++filled_;
 }
 
-void Rollout::State(const Archive& archive, Bounds<float> action_bounds, bool whole) {
+void RolloutBuffer::State(const Archive& archive, Bounds<float> action_bounds, bool whole) {
   archive.Scalar("filled", filled_, {0, steps_ - 1});
   const auto rows = static_cast<size_t>(filled_ * num_envs_);
   const auto part = [&](auto& values, int cols) {
