@@ -32,6 +32,7 @@ std::vector<BenchPart> Parts() {
       {"kernels", "products of a layer, Adam, transposition, memory bandwidth", KernelCases},
       {"gradient", "gradient steps: a minibatch sampled and learned from", GradientCases},
       {"sac", "rounds of SAC: a minibatch sampled, two critics, actor and temperature", SacCases},
+      {"ppo", "steps of PPO: Pendulum-v1, and two epochs of learning", PpoCases},
       {"act", "actions of a policy", ActCases},
       {"replay", "sampling from and adding to a replay memory of 300,000", ReplayCases},
       {"physics", "Runge-Kutta steps of MuJoCo and of the closed form", PhysicsCases},
@@ -128,14 +129,14 @@ void CheckOptions(const BenchOptions& options) {
     }
   }
   const auto runs = [&](const char* part) {
-    return options.parts.empty() ||
-           std::ranges::find(options.parts, part) != options.parts.end();
+    return options.parts.empty() || std::ranges::find(options.parts, part) != options.parts.end();
   };
   if ((!options.network.empty() || !options.precision.empty()) && !runs("gradient")) {
     throw BadInput("bench: --network and --precision are for the part gradient");
   }
-  if ((!options.hidden.empty() || options.batch > 0) && !runs("gradient") && !runs("sac")) {
-    throw BadInput("bench: --hidden and --batch are for the parts gradient and sac");
+  if ((!options.hidden.empty() || options.batch > 0) && !runs("gradient") && !runs("sac") &&
+      !runs("ppo")) {
+    throw BadInput("bench: --hidden and --batch are for the parts gradient, sac and ppo");
   }
   if (options.precision == "bfloat16" && !options.simd.empty()) {
     throw BadInput(
@@ -211,10 +212,10 @@ void AddBench(CLI::App& program, Command& command) {
   own.Add(&o->repetitions, "repetitions", 3, {1, 1000}, "", "of a case; the median is printed");
   AddChoice(own, o->network, "network", {"plain", "dueling"}, "gradient: DQN or Dueling Double DQN",
             "both");
-  own.Add(&o->hidden, "hidden", {}, {1, 4096}, "gradient, sac: widths of the feature layers").usual =
-      "several";
-  own.Add(&o->batch, "batch", 0, {1, 65536}, "", "gradient, sac: size of the minibatches").usual =
-      "several";
+  own.Add(&o->hidden, "hidden", {}, {1, 4096}, "gradient, sac, ppo: widths of the feature layers")
+      .usual = "several";
+  own.Add(&o->batch, "batch", 0, {1, 65536}, "", "gradient, sac, ppo: size of the minibatches")
+      .usual = "several";
   AddChoice(own, o->precision, "precision", {"float32", "bfloat16"}, "gradient: of the products",
             "float32");
   AddArguments(*app, own);

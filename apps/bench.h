@@ -15,9 +15,9 @@ struct BenchOptions {
   std::vector<std::string> parts;   // empty: all
   std::vector<int64_t> threads;     // each case that can use threads runs with each of these
   std::string network;              // of gradient: "plain", "dueling" or "" for both
-  std::vector<int64_t> hidden;      // of gradient and sac: widths of the feature layers; empty: several
+  std::vector<int64_t> hidden;      // of gradient, sac and ppo: widths of layers; empty: several
   std::string precision;            // of gradient, as DqnConfig has it
-  int64_t batch;                    // of gradient and sac; 0: several
+  int64_t batch;                    // of gradient, sac and ppo; 0: several
   std::string simd;                 // vector instructions; empty: the best
   std::optional<std::string> json;  // file to write
   double seconds;                   // for each repetition, at least
@@ -45,6 +45,7 @@ using BenchCases = std::vector<BenchCase>;
 BenchCases KernelCases(const BenchOptions& options);
 BenchCases GradientCases(const BenchOptions& options);
 BenchCases SacCases(const BenchOptions& options);
+BenchCases PpoCases(const BenchOptions& options);
 BenchCases ActCases(const BenchOptions& options);
 BenchCases ReplayCases(const BenchOptions& options);
 BenchCases PhysicsCases(const BenchOptions& options);

@@ -20,6 +20,7 @@ GRADIENT = [f"gradient/{network}/{width}-{width}/batch:{batch}/threads:1"
             for network in ("plain", "dueling") for width in (64, 128, 256)
             for batch in (32, 64, 128, 256)]
 SAC = ["sac/64-64/batch:100/threads:1", "sac/256-256/batch:256/threads:1"]
+PPO = ["ppo/64-64/batch:256/threads:1"]
 ACT = [f"act/256-256/batch:{batch}" for batch in (1, 8, 100)]
 REPLAY = ["replay/sample/batch:128", "replay/add/batch:128"]
 PHYSICS = [f"physics/{engine}/envs:{envs}/threads:1" for engine in ("mujoco", "closed-form")
@@ -62,12 +63,12 @@ class BenchTest(ProgramTest):
         self.assertIn("%", row)
 
     def test_every_part(self):
-        parts = {"kernels": KERNELS, "gradient": GRADIENT, "sac": SAC, "act": ACT, "replay": REPLAY,
+        parts = {"kernels": KERNELS, "gradient": GRADIENT, "sac": SAC, "ppo": PPO, "act": ACT, "replay": REPLAY,
                  "physics": PHYSICS, "env": ENV, "train": TRAIN}
         rows, written = self.bench("--threads", 1)
         self.check([name for names in parts.values() for name in names], rows, written)
         with_flops = {entry["name"] for entry in written["benchmarks"] if "gflops" in entry}
-        self.assertLessEqual({*KERNELS[:38], *GRADIENT, *SAC, *ACT}, with_flops)
+        self.assertLessEqual({*KERNELS[:38], *GRADIENT, *SAC, *PPO, *ACT}, with_flops)
         with_bytes = {entry["name"] for entry in written["benchmarks"]
                       if entry.get("bytes_per_second", 0) > 0}
         self.assertEqual(with_bytes, {*KERNELS[36:]})
@@ -121,7 +122,7 @@ class BenchTest(ProgramTest):
 
     def test_bad_input(self):
         for arguments, words in (
-                (["kernel"], ["kernel", "did you mean kernels?", "gradient, sac, act"]),
+                (["kernel"], ["kernel", "did you mean kernels?", "gradient, sac, ppo, act"]),
                 (["--threads", "0"], ["--threads"]), (["--threads", "1,x"], ["--threads"]),
                 (["--threads", ""], ["--threads"]), (["--seconds", "0"], ["--seconds"]),
                 (["--seconds", "nan"], ["--seconds"]), (["--repetitions", "0"], ["--repetitions"]),

@@ -58,24 +58,27 @@ void Ppo::Step(const Sums& sums) {
 
 void Ppo::Gather(std::span<const int64_t> from, RowRange rows) {
   const Matrix<float> s = BatchObs(), a = BatchActions();
+  const Matrix<const float> all_obs = rollout_.all_obs(), all_actions = rollout_.all_actions();
+  const float* log_prob = rollout_.log_probs().data();
   const auto last_level = static_cast<float>(config_.levels - 1);
-  std::vector<float> raw(static_cast<size_t>(D_));
+  std::vector<float> mirror_obs(static_cast<size_t>(D_));
   for (int i = rows.first; i < rows.first + rows.count; ++i) {
     const auto row = static_cast<size_t>(i);
-    const auto source = static_cast<int>(from[row]);
     const auto place = static_cast<size_t>(from[row]);
-    const bool mirror = mirrored_[row] != 0;
-    std::ranges::copy(rollout_.all_obs().row(source), raw.begin());
-    std::ranges::copy(rollout_.all_actions().row(source), a.row(i).begin());
-    if (mirror) {
-      // The mirrored step was drawn as often as the step itself: it has the same π_old.
-      for (size_t k = 0; k < raw.size(); ++k) raw[k] *= mirror_signs_[k];
-      for (float& x : a.row(i)) x = config_.discrete() ? last_level - x : -x;
-    }
-    normalizer_.Apply(raw, s.row(i));
-    old_log_prob_[row] = rollout_.log_probs().data()[place];
+    const auto source = static_cast<int>(place);
+    normalizer_.Apply(all_obs.row(source), s.row(i));
+    for (int k = 0; k < a.cols(); ++k) a(i, k) = all_actions(source, k);
+    old_log_prob_[row] = log_prob[place];
     old_value_[row] = value_[place];
     batch_target_[row] = target_[place];
+    if (mirrored_[row] == 0) continue;
+    // The mirrored step was drawn as often as the step itself: it has the same π_old.
+    for (int k = 0; k < s.cols(); ++k) {
+      mirror_obs[static_cast<size_t>(k)] =
+          mirror_signs_[static_cast<size_t>(k)] * all_obs(source, k);
+    }
+    normalizer_.Apply(mirror_obs, s.row(i));
+    for (float& x : a.row(i)) x = config_.discrete() ? last_level - x : -x;
   }
 }
 

@@ -67,7 +67,8 @@ def ppo_settings(task):
     """Our PPO without what the others lack."""
     return {"agent": "ppo", "envs": ENVS, "horizon": HORIZON, "epochs": EPOCHS,
             "gamma": TASKS[task]["ppo_gamma"], "lambda": LAMBDA, "clip": CLIP,
-            "initial-std": INITIAL_STD, "entropy-bonus": 0, "value-clip": 0, "kl-target": 0,
+            "initial-std": INITIAL_STD, "max-std": 5, "entropy-bonus": 0,
+            "entropy-bonus-end": 0, "value-clip": 0, "kl-target": 0,
             "activation": "relu", "max-gradient-norm": MAX_GRADIENT_NORM}
 
 
