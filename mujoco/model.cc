@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <mutex>
 
 #include "core/error.h"
 #include "core/text.h"
@@ -12,10 +13,13 @@ namespace upswing {
 namespace {
 
 /// Replaces MuJoCo's handlers, which print warnings and log them to a file in the current folder,
-/// and end the program on an error.
+/// and end the program on an error. Once, as they are global and threads compile models.
 void TakeOverMessages() {
-  mju_user_warning = [](const char*) {};
-  mju_user_error = [](const char* message) { throw Failure(Concat("MuJoCo: ", message)); };
+  static std::once_flag once;
+  std::call_once(once, [] {
+    mju_user_warning = [](const char*) {};
+    mju_user_error = [](const char* message) { throw Failure(Concat("MuJoCo: ", message)); };
+  });
 }
 
 constexpr int kLinkBodies[2] = {1, 2};  // body 0 is the world

@@ -4,9 +4,11 @@
 
 #include <array>
 #include <cmath>
+#include <vector>
 
 #include "core/error.h"
 #include "core/rng.h"
+#include "core/thread_pool.h"
 
 namespace upswing {
 namespace {
@@ -170,6 +172,20 @@ TEST(Model, DisablingContactsAndConstraintsChangesNoBit) {
     mj_step(with.get(), b.get());
     ASSERT_EQ(a->qpos[0], b->qpos[0]);
     ASSERT_EQ(a->qpos[1], b->qpos[1]);
+  }
+}
+
+TEST(Model, ThreadsMayCompileAtTheSameTime) {  // which the thread sanitizer watches
+  constexpr int kModels = 16;
+  std::vector<ModelPtr> models(kModels);
+  ThreadPool pool(4);
+  pool.ParallelFor(kModels, [&](int i) {
+    Plant plant;
+    plant.mass1 = 1 + i;
+    models[static_cast<size_t>(i)] = CompileModel(Mjcf(plant), "test");
+  });
+  for (int i = 0; i < kModels; ++i) {
+    EXPECT_EQ(models[static_cast<size_t>(i)]->body_mass[1], 1 + i);
   }
 }
 
