@@ -183,6 +183,7 @@ class SettingsTest(ProgramTest):
         none = rounded | {"learning_starts": 416}
         self.assertIn("there are 416 steps: nothing", self.succeed(*small(**none, out="none")))
 
+    @unittest.skipIf("UPSWING_SANITIZED" in os.environ, "a sanitizer reserves the address space")
     def test_a_network_that_does_not_fit_into_memory_leaves_nothing(self):
         script = 'ulimit -v 4000000; exec "$@"'
         command = [UPSWING, *small(hidden=",".join(["4096"] * 8))]
