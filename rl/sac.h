@@ -77,6 +77,9 @@ class Sac : public OffPolicyAgent {
   void CountErrors();
   /// Fills samples_' noise.
   void DrawNoise();
+  static size_t Size(int rows, int cols) {
+    return static_cast<size_t>(rows) * static_cast<size_t>(cols);
+  }
   size_t num_critics() const { return config_.twin ? 2 : 1; }
 
   SacConfig config_;

@@ -1,0 +1,208 @@
+// The gradient steps of Soft Actor-Critic. Symbols: see rl/sac.h.
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "rl/sac.h"
+
+namespace upswing {
+namespace {
+
+/// The part of some numbers (B) that belongs to these rows.
+template <typename Values>
+auto Part(Values& values, RowRange rows) {
+  return std::span(values).subspan(static_cast<size_t>(rows.first),
+                                   static_cast<size_t>(rows.count));
+}
+
+/// Writes the observations (B × D) of some rows and, behind each, A numbers.
+void JoinRows(Matrix<const float> obs, Matrix<const float> action, RowRange rows,
+              Matrix<float> joined) {
+  for (int i = rows.first; i < rows.first + rows.count; ++i) {
+    float* row = std::ranges::copy(obs.row(i), joined.row(i).data()).out;
+    std::ranges::copy(action.row(i), row);
+  }
+}
+
+}  // namespace
+
+void SoftTargets(std::span<const float> q1, std::span<const float> q2,
+                 std::span<const float> log_prob, double alpha, std::span<const float> reward,
+                 std::span<const float> discount, std::span<float> y) {
+  for (size_t i = 0; i < y.size(); ++i) {
+    const float value = std::min(q1[i], q2[i]) - static_cast<float>(alpha) * log_prob[i];
+    y[i] = reward[i] + discount[i] * value;
+  }
+}
+
+void Sac::Update(const Minibatch& batch) {
+  UpdateCritics(batch);
+  ++updates_;
+  ++report_updates_;
+  if (updates_ % config_.actor_period == 0) UpdateActor(batch);
+}
+
+void Sac::DrawNoise() {
+  // Both numbers of Box and Muller (1958) for two samples.
+  for (size_t i = 0; i < samples_.size(); i += 2) {
+    const std::array<double, 2> pair = noise_rng_.NormalPair();
+    samples_[i].epsilon = static_cast<float>(pair[0]);
+    if (i + 1 < samples_.size()) samples_[i + 1].epsilon = static_cast<float>(pair[1]);
+  }
+}
+
+void Sac::SampleRows(Matrix<const float> obs, RowRange rows, Matrix<float> inputs) {
+  const Matrix<float> outputs(actor_outputs_, B_, 2 * A_);
+  actor_.Forward(obs, rows, outputs);
+  for (int i = rows.first; i < rows.first + rows.count; ++i) {
+    float log_prob = 0;
+    float* action = std::ranges::copy(obs.row(i), inputs.row(i).data()).out;
+    for (int k = 0; k < A_; ++k) {
+      const size_t at = Size(i, A_) + static_cast<size_t>(k);
+      gaussians_[at] = Gaussian<float>::From(outputs(i, k), outputs(i, A_ + k));
+      samples_[at] = Squash(gaussians_[at], samples_[at].epsilon);
+      action[k] = samples_[at].action;
+      log_prob += samples_[at].log_prob;
+    }
+    log_prob_[static_cast<size_t>(i)] = log_prob;
+  }
+}
+
+void Sac::ValueRows(Critic& critic, RowRange rows) const {
+  const Matrix<const float> outputs(critic.outputs.data(), B_, bins_.outputs());
+  for (int i = rows.first; i < rows.first + rows.count; ++i) {
+    critic.value[static_cast<size_t>(i)] = bins_.Value(outputs.row(i));
+  }
+}
+
+void Sac::CriticRows(const Minibatch& batch, RowRange rows) {
+  const Matrix<const float> s(batch.obs.data(), B_, D_), s_next(batch.next_obs.data(), B_, D_);
+  const Matrix<float> sa(inputs_, B_, D_ + A_), next_sa(policy_inputs_, B_, D_ + A_);
+  // y = r + γⁿ (min Q'(s', a') - α ln π(a'|s')), a' ~ π(s')
+  SampleRows(s_next, rows, next_sa);
+  for (Critic& critic : critics_) {
+    critic.network.Forward(critic.target, next_sa, rows, {critic.outputs, B_, bins_.outputs()});
+    ValueRows(critic, rows);
+  }
+  SoftTargets(Part(critics_.front().value, rows), Part(critics_.back().value, rows),
+              Part(log_prob_, rows), alpha(), Part(batch.reward, rows), Part(batch.discount, rows),
+              Part(y_, rows));
+
+  // The gradient of the mean loss between Q(s, a) and y.
+  JoinRows(s, {batch.action.data(), B_, A_}, rows, sa);
+  for (Critic& critic : critics_) {
+    const Matrix<float> outputs(critic.outputs, B_, bins_.outputs());
+    const Matrix<float> dy(critic.dy, B_, bins_.outputs());
+    critic.network.Forward(sa, rows, outputs);
+    ValueRows(critic, rows);
+    for (int i = rows.first; i < rows.first + rows.count; ++i) {
+      const auto row = static_cast<size_t>(i);
+      bins_.Loss(outputs.row(i), y_[row], dy.row(i));
+      const float weight = batch.weight[row] / static_cast<float>(B_);
+      for (float& gradient : dy.row(i)) gradient *= weight;
+    }
+    critic.network.Backward(dy, rows);
+  }
+}
+
+void Sac::UpdateCritics(const Minibatch& batch) {
+  DrawNoise();
+  for (Critic& critic : critics_) critic.network.Prepare(pool_);
+  ForSlices(pool_, B_, [&](RowRange rows) { CriticRows(batch, rows); });
+  CountErrors();
+  for (Critic& critic : critics_) {
+    norm_sum_ += critic.network.Step({inputs_.data(), B_, D_ + A_}, learning_rate(),
+                                     config_.max_gradient_norm, critic.target, config_.tau, pool_) /
+                 static_cast<double>(critics_.size());
+  }
+}
+
+void Sac::ActorRows(const Minibatch& batch, RowRange rows) {
+  const Matrix<const float> s(batch.obs.data(), B_, D_);
+  const Matrix<float> sa(policy_inputs_, B_, D_ + A_);
+  SampleRows(s, rows, sa);
+  for (Critic& critic : critics_) {
+    critic.network.Forward(sa, rows, {critic.outputs, B_, bins_.outputs()});
+    ValueRows(critic, rows);
+  }
+  // dQ/da of the critic whose value is smaller; nothing of the other one.
+  for (Critic& critic : critics_) {
+    const Critic& other = &critic == &critics_.front() ? critics_.back() : critics_.front();
+    const Matrix<float> outputs(critic.outputs, B_, bins_.outputs());
+    const Matrix<float> dy(critic.dy, B_, bins_.outputs());
+    for (int i = rows.first; i < rows.first + rows.count; ++i) {
+      const auto row = static_cast<size_t>(i);
+      const bool counts = critic.value[row] < other.value[row] ||
+                          (critic.value[row] == other.value[row] && &critic == &critics_.front());
+      bins_.ValueGradient(outputs.row(i), counts ? 1.0F : 0.0F, dy.row(i));
+    }
+    critic.network.Backward(dy, rows, {critic.dinputs, B_, D_ + A_});
+  }
+  // The gradient of the mean of α ln π(a|s) - min Q(s, a).
+  const auto temperature = static_cast<float>(alpha());
+  const Matrix<float> dy(actor_dy_, B_, 2 * A_);
+  for (int i = rows.first; i < rows.first + rows.count; ++i) {
+    for (int k = 0; k < A_; ++k) {
+      const size_t at = Size(i, A_) + static_cast<size_t>(k);
+      float dq_da = 0;
+      for (Critic& critic : critics_) {
+        dq_da += Matrix<float>(critic.dinputs, B_, D_ + A_)(i, D_ + k);
+      }
+      const GaussianGradient<float> g =
+          SquashedGradient(gaussians_[at], samples_[at], temperature, dq_da);
+      dy(i, k) = g.mean / static_cast<float>(B_);
+      dy(i, A_ + k) = g.log_std / static_cast<float>(B_);
+    }
+  }
+  actor_.Backward(dy, rows);
+}
+
+void Sac::UpdateActor(const Minibatch& batch) {
+  DrawNoise();
+  for (Critic& critic : critics_) critic.network.Prepare(pool_);
+  actor_.Prepare(pool_);
+  ForSlices(pool_, B_, [&](RowRange rows) { ActorRows(batch, rows); });
+  actor_.Step({batch.obs.data(), B_, D_}, config_.actor_rate * learning_rate(),
+              config_.max_gradient_norm, theta_policy_, AveragingTau(config_.policy_tau), pool_);
+  UpdateTemperature();
+}
+
+void Sac::UpdateTemperature() {
+  double mean_log_prob = 0;
+  for (const float log_prob : log_prob_) mean_log_prob += log_prob / static_cast<double>(B_);
+  entropy_sum_ -= mean_log_prob;
+  ++report_actor_updates_;
+  if (!config_.tune_alpha) return;
+  const AlignedVector<float> gradient(
+      1, static_cast<float>(TemperatureGradient(mean_log_prob, A_ * config_.target_entropy)));
+  AlignedVector<float> unused(1);
+  alpha_adam_.Step({config_.alpha_rate, std::abs(gradient[0]), 1e9, 0}, gradient, log_alpha_,
+                   unused, pool_);
+}
+
+void Sac::CountErrors() {
+  double loss = 0, q = 0, td = 0;
+  std::ranges::fill(td_error_, 0.0F);
+  for (const Critic& critic : critics_) {
+    for (size_t i = 0; i < y_.size(); ++i) {
+      const double error = double{critic.value[i]} - y_[i];
+      loss += error * error / 2;
+      td += std::abs(error);
+      q += critic.value[i];
+      // A transition's priority is the mean of both.
+      td_error_[i] += static_cast<float>(std::abs(error) / static_cast<double>(critics_.size()));
+    }
+  }
+  const double n = static_cast<double>(critics_.size() * y_.size());
+  if (!std::isfinite(loss)) {
+    throw Failure(
+        Concat("the loss is ", loss, " in update ", updates_ + 1, ", expected a finite number"));
+  }
+  loss_sum_ += loss / n;
+  q_sum_ += q / n;
+  td_sum_ += td / n;
+}
+
+}  // namespace upswing
