@@ -164,6 +164,23 @@ class EvalTest(ProgramTest):
         # More episodes go on where fewer end.
         self.assertEqual(self.episodes(*flags, count=8)[:6], rows)
 
+    def test_simulate_and_plot_say_the_torque_of_the_episode(self):
+        flags = ("--seed", 5)
+        judged = self.episodes(*flags)
+        for number in (0, 3):
+            row = judged[number]
+            text = self.succeed("simulate", self.policy, *flags, "--episode", number, "--csv",
+                                f"{number}.csv")
+            figures = [f"peak {float(row['peak_torque']):.4g} N·m",
+                       f"rms {float(row['rms_torque']):.4g} N·m",
+                       f"variation {float(row['torque_variation']):.4g} N·m/s"]
+            if row["torque_variation_upright"]:
+                figures.append(f"once upright {float(row['torque_variation_upright']):.4g} N·m/s")
+            line = "  torque     " + ", ".join(figures) + "\n"
+            self.assertIn(line, text)
+            self.assertIn(line, self.succeed("plot", self.policy, *flags, "--episode", number,
+                                             "--out", f"plot{number}"))
+
     def test_an_episode_can_be_made_again_to_the_last_digit(self):
         for flags in (("--randomize", 0.5, "--sensor-noise", 0.02, "--randomize-delay", 0.06),
                       ("--delay", 0.04, "--seed", 7, "--set", "mass2=1.2", "--unknown-plant"),

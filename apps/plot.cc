@@ -65,7 +65,7 @@ int RunPlot(const PlotArguments& a) {
   const bool pendulum = spec.task == kDoublePendulum;
   const double usual = a.episode.given() || !pendulum ? spec.evaluation.seconds : 10;
   config.seconds = a.seconds < 0 ? usual : a.seconds;
-  config.q_values = loaded.policy->num_values() > 0;
+  config.estimates = true;
   const std::optional<ModelInfo> model = InfoOfModel(config.env.mjcf, a.trial.model);
   const fs::path folder = a.out.empty() ? DefaultOut(loaded, "plot") : fs::path(a.out);
   CheckFree(folder);
@@ -102,6 +102,7 @@ int RunPlot(const PlotArguments& a) {
   const double since = UprightSince(rollout.rows);
   fmt::print("  {}    {}\n", pendulum ? "upright" : "at goal",
              since < 0 ? "not at the end" : fmt::format("from {:.2f} s to the end", since + later));
+  fmt::print("  torque     {}\n", TorqueText(rollout));
   if (a.episode.given()) {
     fmt::print("  episode    {} of eval: {}\n", a.episode.number,
                JudgementText(JudgeEpisode(*loaded.policy, config.env), spec.evaluation));
@@ -127,9 +128,13 @@ void AddPlot(CLI::App& program, Command& command) {
       ->type_name("FOLDER")
       ->check(NotEmpty());
   app->footer(
-      "episode.svg and .png: angles, velocities, energy, torque, the reward's terms and the\n"
-      "Q-values (in units of reward) over time. phase.svg and .png: velocity over angle of both\n"
-      "joints. `upswing simulate` writes the same episode as a table. Without --out they go into\n"
+      "episode.svg and .png: angles, velocities, energy, torque, the reward's terms and what the\n"
+      "policy estimates over time: Q-values, or of an actor its mean torque with the central 68% "
+      "of\n"
+      "those that it would draw, and V. phase.svg and .png: velocity over angle of both joints.\n"
+      "Printed of the torque: its largest, its root mean square, and its total variation a "
+      "second.\n"
+      "`upswing simulate` writes the same episode as a table. Without --out they go into\n"
       "plot in the run's folder, or into runs/plot-NAME for a policy file elsewhere; then plot-2,\n"
       "and so on.\n\n"
       "Examples:\n"

@@ -43,6 +43,20 @@ class PlotTest(ProgramTest):
             self.assertEqual(png[:8], b"\x89PNG\r\n\x1a\n")
             self.assertEqual(struct.unpack(">II", png[16:24]), size)
 
+    def test_figures_of_an_actor(self):
+        actor = train_once(type(self), agent="sac", hidden="16,16", head=None, steps=2000)
+        self.succeed("plot", actor, "--seconds", 2, "--out", "out")
+        episode, _ = self.svg("out/episode.svg")
+        for word in ("torque (N·m)", "central 68%", "value (reward)"):
+            self.assertIn(word, episode)
+        for word in ("Q-value", "greedy"):
+            self.assertNotIn(word, episode)
+        # A torque of any size, and a band about it.
+        self.assertRegex(self.succeed("simulate", actor, "--seconds", 2, "--csv", "a.csv"),
+                         r"  torque     peak [\d.e-]+ N·m, rms [\d.e-]+ N·m, variation")
+        png = (self.folder / "out/episode.png").read_bytes()
+        self.assertEqual(struct.unpack(">II", png[16:24]), (1000, 7 * 170))
+
     def test_summary_says_when_it_is_upright(self):
         start = ("--start", "3.14159265,0,0,0", "--seconds", 0.1)
         text = self.succeed("plot", self.policy, *start)

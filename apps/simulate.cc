@@ -60,6 +60,7 @@ int RunSimulate(const SimulateArguments& a) {
   if (IsStandardStream(a.csv)) return 0;
   fmt::print("{}: {} rows\n", Printable(a.csv), rollout.rows.size());
   if (spec.task == kDoublePendulum) fmt::print("  plant      {}\n", EpisodeText(rollout));
+  fmt::print("  torque     {}\n", TorqueText(rollout));
   if (loaded && a.episode.given()) {
     fmt::print("  episode    {} of eval: {}\n", a.episode.number,
                JudgementText(JudgeEpisode(*loaded->policy, config.env), spec.evaluation));

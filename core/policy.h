@@ -49,6 +49,13 @@ class Policy {
   /// The actions (num_values × A) that the values belong to; empty for V.
   virtual Matrix<const double> value_actions() const { return {}; }
 
+  /// Whether it was learned as a distribution of actions, of which Act takes the middle.
+  virtual bool has_spread() const { return false; }
+  /// The ends (N × A each) of the central 68% of that distribution; of a Gaussian they are one
+  /// standard deviation below and above its mean.
+  virtual void Spread(Matrix<const float> /*obs*/, Matrix<double> /*low*/, Matrix<double> /*high*/,
+                      Memory&) const {}
+
   /// What its file holds (docs/policy-format.md). Throws BadInput if this kind is not kept in
   /// files.
   virtual Tensors ToTensors() const = 0;

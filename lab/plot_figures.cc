@@ -187,11 +187,23 @@ Panel Rewards(const Rollout& rollout) {
 double Largest(const RolloutRow& row) { return *std::ranges::max_element(row.q); }
 double Smallest(const RolloutRow& row) { return *std::ranges::min_element(row.q); }
 
-Panel LargestQ(const Rows& rows) {
+/// V, or the largest Q-value in the span of all.
+Panel Values(const Rows& rows) {
+  if (rows.front().q.size() == 1) return PanelOf("value (reward)", {Held("", rows, Largest)});
   Line line = Held("greedy (band: all)", rows, Largest);
   line.low = Held("", rows, Smallest).y;
   line.high = line.y;
   return PanelOf("Q-value (reward)", {line});
+}
+
+/// The chosen torque within the central 68% of those that the policy would draw.
+Panel Spread(const Rollout& rollout) {
+  const Rows& rows = rollout.rows;
+  Line line = Held("chosen (band: central 68%)", rows,
+                   [](const RolloutRow& row) { return row.chosen; });
+  line.low = Held("", rows, [](const RolloutRow& row) { return row.spread->low; }).y;
+  line.high = Held("", rows, [](const RolloutRow& row) { return row.spread->high; }).y;
+  return PanelOf(TorqueLabel(rollout.spec), {line});
 }
 
 /// How far below the best action's each action's Q-value is; of long episodes the mean over some
@@ -295,7 +307,8 @@ Figure EpisodeFigure(const Rollout& rollout, const Policy& policy) {
   figure.panels.push_back(Torques(rollout));
   figure.panels.push_back(Rewards(rollout));
   constexpr int kPanelHeight = 170;
-  if (!rows.front().q.empty()) figure.panels.push_back(LargestQ(rows));
+  if (rows.front().spread) figure.panels.push_back(Spread(rollout));
+  if (!rows.front().q.empty()) figure.panels.push_back(Values(rows));
   if (!policy.value_actions().empty()) {
     figure.panels.push_back(QValues(rollout, policy.value_actions().values()));
   }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 
@@ -24,6 +25,15 @@ std::vector<double> ValuesOf(const Policy& policy, Matrix<const float> obs,
   std::vector<double> values;
   for (const float value : numbers) values.push_back(value / scale);
   return values;
+}
+
+/// What the policy estimates in a row, as far as it does.
+void Estimate(const Policy& policy, Matrix<const float> obs, Policy::Memory& memory,
+              RolloutRow& row) {
+  if (policy.num_values() > 0) row.q = ValuesOf(policy, obs, memory);
+  if (!policy.has_spread()) return;
+  row.spread.emplace();
+  policy.Spread(obs, {&row.spread->low, 1, 1}, {&row.spread->high, 1, 1}, memory);
 }
 
 /// The double pendulum's reward for the state and the torque of a row.
@@ -71,7 +81,8 @@ Rollout RunRollout(const RolloutConfig& config) {
     row.t = static_cast<double>(k) / StepsPerSecond(rollout.spec);
     row.state.resize(rollout.spec.state_names.size());
     env->GetState(0, row.state);
-    if (config.q_values) row.q = ValuesOf(*config.policy, env->obs(), *memory);
+    row.chosen = torque;
+    if (config.estimates) Estimate(*config.policy, env->obs(), *memory, row);
     // One step more than there are rows: it gives the motor's torque in the last state.
     env->Step({&torque, 1, 1}, result);
     row.torque = result.torque[0];
@@ -87,6 +98,49 @@ Rollout RunRollout(const RolloutConfig& config) {
     if (ended || result.truncated[0] != 0) break;
   }
   return rollout;
+}
+
+TorqueFigures TorquesOf(const Rollout& rollout) {
+  const bool pendulum = rollout.spec.task == kDoublePendulum;
+  const std::vector<RolloutRow>& rows = rollout.rows;
+  // The torque of the double pendulum's last state leads nowhere.
+  const size_t steps = rows.size() - (pendulum && rows.size() > 1 ? 1 : 0);
+  TorqueFigures figures;
+  double squares = 0, sum = 0, goal_sum = 0;
+  int64_t goal_since = -1;  // first state of the present stretch at the goal; -1: there is none
+  for (size_t k = 0; k < steps; ++k) {
+    const double torque = rows[k].torque;
+    const double change = k == 0 ? 0 : std::abs(torque - rows[k - 1].torque);
+    figures.peak = std::max(figures.peak, std::abs(torque));
+    squares += torque * torque;
+    sum += change;
+    goal_sum += change;
+    const bool at_goal = rows[std::min(pendulum ? k + 1 : k, rows.size() - 1)].at_goal;
+    if (!at_goal) goal_since = -1;
+    if (!at_goal || goal_since >= 0) continue;
+    goal_since = static_cast<int64_t>(k) + 1;
+    goal_sum = 0;
+  }
+  const auto seconds = [&](int64_t n) {
+    return static_cast<double>(n) * rollout.spec.step_seconds;
+  };
+  const auto count = static_cast<int64_t>(steps);
+  figures.rms = std::sqrt(squares / static_cast<double>(count));
+  figures.variation = sum / seconds(count);
+  const bool held = !rollout.spec.evaluation.by_return();
+  if (held && goal_since >= 0 && goal_since < count) {
+    figures.goal_variation = goal_sum / seconds(count - goal_since);
+  }
+  return figures;
+}
+
+std::string TorqueText(const Rollout& rollout) {
+  const TorqueFigures f = TorquesOf(rollout);
+  const std::string& unit = rollout.spec.action_unit;
+  std::string text = fmt::format("peak {:.4g} {}, rms {:.4g} {}, variation {:.4g} {}/s", f.peak,
+                                 unit, f.rms, unit, f.variation, unit);
+  if (f.goal_variation) text += fmt::format(", once upright {:.4g} {}/s", *f.goal_variation, unit);
+  return text;
 }
 
 std::string RolloutCsv(const Rollout& rollout) {

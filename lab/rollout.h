@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/policy.h"
+#include "core/sample.h"
 #include "lab/task.h"
 #include "rl/evaluate.h"
 
@@ -23,7 +24,10 @@ struct RolloutRow {
   bool at_goal = false;
   double reward = 0;          // the sum of the terms
   std::vector<double> terms;  // (K)
-  std::vector<double> q;  // (Q) values of the policy's actions, in units of reward, if asked for
+  // If asked for, and if the policy has them:
+  std::vector<double> q;           // (Q) values of its actions, or V alone, in units of reward
+  std::optional<Interval> spread;  // the central 68% of the torques that it learned to draw
+  double chosen = 0;               // the torque that was chosen, before delay and limit
 };
 
 struct RolloutConfig {
@@ -32,7 +36,7 @@ struct RolloutConfig {
   EnvConfig env;                             // of one environment
   std::optional<std::vector<double>> start;  // (S); none: that of the environment's own episode
   double seconds = 20;                       // to the nearest step; less if it terminates
-  bool q_values = false;  // whether rows have q; the policy must have values then
+  bool estimates = false;  // whether rows have what the policy estimates: q and spread
 };
 
 struct Rollout {
@@ -50,6 +54,18 @@ int64_t RolloutSteps(const EnvSpec& spec, double seconds);
 
 /// Throws Failure if the state blows up.
 Rollout RunRollout(const RolloutConfig& config);
+
+/// The motor's torques over a rollout, as `eval` has them of an episode.
+struct TorqueFigures {
+  double peak = 0, rms = 0;  // N·m or the task's unit of actions
+  double variation = 0;      // Σ |τₖ - τₖ₋₁| a second
+  // The same over the last stretch at the goal, if it lasts to the end; of tasks whose goal is
+  // held.
+  std::optional<double> goal_variation;
+};
+TorqueFigures TorquesOf(const Rollout& rollout);
+/// The same in words: `peak 5 N·m, rms 1.2 N·m, variation 34 N·m/s, once upright 2 N·m/s`.
+std::string TorqueText(const Rollout& rollout);
 
 /// A table with a row for each state: t, state, torque, for the double pendulum energy, height and
 /// whether it is inverted, reward and its terms.

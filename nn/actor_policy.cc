@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <utility>
 
 #include "core/argmax.h"
 #include "core/error.h"
 #include "core/json.h"
 #include "core/text.h"
+#include "nn/gaussian.h"
 
 namespace upswing {
 namespace {
@@ -19,6 +21,8 @@ constexpr int kBlock = 128;  // rows in one forward pass: the activations stay i
 constexpr std::array<std::string_view, 3> kOutputNames{"squashed-gaussian", "clipped-gaussian",
                                                        "categorical"};  // as ActorOutput has them
 constexpr const char* kCriticPrefix = "critic.";
+// Share of a normal distribution that is more than one standard deviation below its mean.
+constexpr double kLowTail = 0.15865525393145707;
 
 /// Buffers of a forward pass of a block of rows.
 struct Workspace : Policy::Memory {
@@ -47,6 +51,25 @@ void CheckParts(const ActorParts& parts) {
     throw BadInput(
         Concat("policy: expected a critic of ", D, " or ", D + A, " inputs, got ", inputs));
   }
+}
+
+/// The smallest torque up to which these logits (Q) put at least `share` of their probability.
+double CategoricalQuantile(std::span<const double> torques, std::span<const float> logits,
+                           double share) {
+  const double largest = *std::ranges::max_element(logits);
+  std::map<double, double> weights;  // e^logit by torque, from the lowest on
+  double sum = 0;
+  for (size_t i = 0; i < torques.size(); ++i) {
+    const double weight = std::exp(logits[i] - largest);
+    weights[torques[i]] += weight;
+    sum += weight;
+  }
+  double below = 0;
+  for (const auto& [torque, weight] : weights) {
+    below += weight;
+    if (below >= share * sum) return torque;
+  }
+  return weights.rbegin()->first;
 }
 
 std::string ShapeToJson(const MlpShape& shape) {
@@ -157,11 +180,33 @@ void ActorPolicy::Choose(std::span<const float> outputs, std::span<double> actio
     action[0] = parts_.torques[static_cast<size_t>(ArgMax(outputs))];
     return;
   }
-  for (size_t i = 0; i < action.size(); ++i) {
-    const double mean = outputs[i];
-    const bool squashed = parts_.output == ActorOutput::kSquashedGaussian;
-    const double share = squashed ? std::tanh(mean) : std::clamp(mean, -1.0, 1.0);
-    action[i] = parts_.action_limit[i] * share;
+  for (size_t k = 0; k < action.size(); ++k) action[k] = Bounded(outputs[k], k);
+}
+
+double ActorPolicy::Bounded(double u, size_t k) const {
+  const bool squashed = parts_.output == ActorOutput::kSquashedGaussian;
+  return parts_.action_limit[k] * (squashed ? std::tanh(u) : std::clamp(u, -1.0, 1.0));
+}
+
+void ActorPolicy::Spread(Matrix<const float> obs, Matrix<double> low, Matrix<double> high,
+                         Memory& memory) const {
+  AlignedVector<float> outputs(static_cast<size_t>(obs.rows()) *
+                               static_cast<size_t>(num_outputs()));
+  const Matrix<float> rows(outputs, obs.rows(), num_outputs());
+  Outputs(obs, rows, memory);
+  const auto A = static_cast<size_t>(action_size());
+  for (int i = 0; i < obs.rows(); ++i) {
+    const std::span<const float> row = rows.row(i);
+    if (parts_.output == ActorOutput::kCategorical) {
+      low(i, 0) = CategoricalQuantile(parts_.torques, row, kLowTail);
+      high(i, 0) = CategoricalQuantile(parts_.torques, row, 1 - kLowTail);
+      continue;
+    }
+    for (size_t k = 0; k < A; ++k) {
+      const auto u = Gaussian<double>::From(row[k], row[A + k]);
+      low(i, static_cast<int>(k)) = Bounded(u.mean - u.std, k);
+      high(i, static_cast<int>(k)) = Bounded(u.mean + u.std, k);
+    }
   }
 }
 

@@ -55,6 +55,10 @@ class ActorPolicy : public Policy {
   int num_values() const override { return critic_ ? 1 : 0; }
   void Values(Matrix<const float> obs, Matrix<float> values, Memory& memory) const override;
 
+  bool has_spread() const override { return true; }
+  void Spread(Matrix<const float> obs, Matrix<double> low, Matrix<double> high,
+              Memory& memory) const override;
+
   const ActorParts& parts() const { return parts_; }
   /// How many numbers the actor network puts out for an observation: 2 A or Q.
   int num_outputs() const;
@@ -74,6 +78,8 @@ class ActorPolicy : public Policy {
  private:
   /// The action (A) that these outputs choose.
   void Choose(std::span<const float> outputs, std::span<double> action) const;
+  /// Component k of the action that a Gaussian's u (nn/gaussian.h) stands for.
+  double Bounded(double u, size_t k) const;
   void CheckFile(const Tensors& file);
 
   ActorParts parts_;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/error.h"
@@ -86,6 +87,48 @@ TEST_P(ActorPolicyTest, ChoosesTheMiddleOfItsDistribution) {
       }
       ASSERT_EQ(action[static_cast<size_t>(i * A + k)], expected);
     }
+  }
+}
+
+TEST_P(ActorPolicyTest, SpreadHasTheCentral68PercentOfItsDraws) {
+  const std::vector<float> obs = Random(D, 6);
+  const Matrix<const float> row(obs.data(), 1, D);
+  const auto A = static_cast<size_t>(policy.action_size());
+  const auto memory = policy.Start(1);
+  std::vector<float> outputs(static_cast<size_t>(policy.num_outputs()));
+  std::vector<double> low(A), high(A);
+  policy.Outputs(row, {outputs.data(), 1, policy.num_outputs()}, *memory);
+  policy.Spread(row, {low.data(), 1, policy.action_size()}, {high.data(), 1, policy.action_size()},
+                *memory);
+  constexpr int kDraws = 40000;
+  Rng rng(7, "actor policy test: draws");
+  for (size_t k = 0; k < A; ++k) {
+    int below = 0, above = 0;
+    for (int draw = 0; draw < kDraws; ++draw) {
+      double action = 0;
+      if (GetParam().output == ActorOutput::kCategorical) {
+        // The largest of the logits with Gumbel noise.
+        double best = -1e9;
+        for (size_t i = 0; i < outputs.size(); ++i) {
+          const double noisy = outputs[i] - std::log(-std::log(1 - rng.Uniform()));
+          if (noisy > best) action = parts.torques[i];
+          best = std::max(best, noisy);
+        }
+      } else {
+        const double u = outputs[k] + std::exp(double{outputs[A + k]}) * rng.Normal();
+        const bool squashed = GetParam().output == ActorOutput::kSquashedGaussian;
+        action = parts.action_limit[k] * (squashed ? std::tanh(u) : std::clamp(u, -1.0, 1.0));
+      }
+      below += action < low[k] ? 1 : 0;
+      above += action > high[k] ? 1 : 0;
+    }
+    // 16% at either end, or less where many draws are equal to that end; 5 standard errors.
+    constexpr double kTail = 0.1587, kError = 0.0092;
+    EXPECT_LT(below, kDraws * (kTail + kError));
+    EXPECT_LT(above, kDraws * (kTail + kError));
+    if (GetParam().output != ActorOutput::kSquashedGaussian) continue;
+    EXPECT_GT(below, kDraws * (kTail - kError));
+    EXPECT_GT(above, kDraws * (kTail - kError));
   }
 }
 
