@@ -18,6 +18,7 @@ using Formatter = std::string (*)(double);
 
 std::string Seconds(double x) { return std::isfinite(x) ? FormatDuration(x) : "not solved"; }
 std::string Steps(double x) { return std::isfinite(x) ? FormatCount(x) : "not solved"; }
+std::string Torque(double x) { return std::isfinite(x) ? fmt::format("{:.3g}", x) : "not known"; }
 std::string Whole(double x) { return FormatCount(x); }
 std::string Percent(double x) { return fmt::format("{:.1f}%", 100 * x); }
 std::string Share(double x) { return fmt::format("{:.2f}", x); }
@@ -38,13 +39,15 @@ std::string PairsText(const Estimate& e) {
   return Concat("with probability ", EstimateText(e, Share), e.interval ? agreement : "");
 }
 
-void PrintScores(const char* name, const Scores& s, Formatter format) {
+void PrintScores(const char* name, const Scores& s, Formatter format,
+                 const std::string& unit = "") {
   if (s.low == s.high) {
-    fmt::print("  {:<16}{}{}\n", name, format(s.low), s.values.size() > 1 ? " in every run" : "");
+    fmt::print("  {:<16}{}{}{}\n", name, format(s.low), unit,
+               s.values.size() > 1 ? " in every run" : "");
     return;
   }
-  fmt::print("  {:<16}median {}, IQM {}, range {} to {}\n", name, format(s.median),
-             EstimateText(s.iqm, format), format(s.low), format(s.high));
+  fmt::print("  {:<16}median {}, IQM {}, range {} to {}{}\n", name, format(s.median),
+             EstimateText(s.iqm, format), format(s.low), format(s.high), unit);
 }
 
 void PrintStability(const GroupSummary& summary) {
@@ -60,6 +63,17 @@ void PrintStability(const GroupSummary& summary) {
       "{} evaluations, lowest {}\n",
       "once solved", s.steady_runs, s.runs, 100 * kSteadyRate, s.steady_evaluations, s.evaluations,
       Percent(s.lowest));
+}
+
+/// How strong and how smooth the best policies' torques are, as far as that is known.
+void PrintTorques(const GroupSummary& s, const RunPlan& plan) {
+  const auto print = [&](const char* name, const Scores& scores, const std::string& unit) {
+    if (std::isfinite(scores.low)) PrintScores(name, scores, Torque, unit);
+  };
+  print("rms torque", s.rms_torque, Concat(" ", plan.action_unit));
+  print("its variation", s.torque_variation, Concat(" ", plan.action_unit, "/s"));
+  if (plan.rule.by_return()) return;
+  print("  once upright", s.upright_variation, Concat(" ", plan.action_unit, "/s"));
 }
 
 void PrintGroup(const RunGroup& group, const GroupSummary& s, const std::string& differences,
@@ -82,6 +96,7 @@ void PrintGroup(const RunGroup& group, const GroupSummary& s, const std::string&
   PrintScores("final success", s.final_success, Percent);
   PrintScores("best return", s.best_return, Whole);
   PrintScores("best success", s.best_success, Percent);
+  PrintTorques(s, group.runs.front().plan);
   PrintStability(s);
   fmt::print("\n");
 }

@@ -43,8 +43,10 @@ class CompareTest(ProgramTest):
             self.assertEqual(count, 1, line)
         (folder / "config.toml").write_text(settings, encoding="utf-8")
         (folder / "evals.csv").write_text(
-            "step,success_rate,success_low,mean_return,seconds\n"
-            + "".join(f"{1000 * k},{rate},0,{value},{2.5 * k}\n"
+            "step,success_rate,success_low,mean_return,rms_torque,torque_variation,"
+            "torque_variation_upright,seconds\n"
+            + "".join(f"{1000 * k},{rate},0,{value},{value / 1000},{value / 100},"
+                      f"{value / 500 * rate},{2.5 * k}\n"
                       for k, (rate, value) in enumerate(rows, 1)))
         return path
 
@@ -95,6 +97,35 @@ class CompareTest(ProgramTest):
         text = self.succeed("compare", "runs")
         for words in ("4 of 5", "not solved", "seeds           5 (1, 2, 3, 4, 5)", "no later"):
             self.assertIn(words, text)
+
+    def test_torques(self):
+        self.make_group("runs", [1, 2, 3, 1, None])
+        (group,) = self.compare("runs")["groups"]
+        best = [2601, 2602, 2603, 2604, 905]
+        self.assertEqual(group["best_rms_torque"]["values"], [value / 1000 for value in best])
+        self.assertEqual(group["best_torque_variation"]["values"],
+                         [value / 100 for value in best])
+        upright = group["best_torque_variation_upright"]["values"]
+        self.assertEqual(upright[:4], [value / 500 for value in best[:4]])
+        self.assertEqual(upright[4], 905 / 1000)
+        text = self.succeed("compare", "runs", "--out", "out")
+        self.assertRegex(text, r"  rms torque +median 2\.6, .* range 0\.905 to 2\.6 N·m\n")
+        self.assertRegex(text, r"  its variation +median 26, .* N·m/s\n")
+        self.assertRegex(text, r"    once upright +median 5\.2, .* N·m/s\n")
+        with open(self.folder / "out/runs.csv", encoding="utf-8", newline="") as file:
+            rows = list(csv.DictReader(file))
+        self.assertEqual([float(row["best_torque_variation"]) for row in rows],
+                         [value / 100 for value in best])
+
+    def test_runs_whose_tables_do_not_tell_torques(self):
+        self.make_group("runs", [1, 2])
+        for seed in (1, 2):
+            path = self.folder / f"runs/seed{seed}/evals.csv"
+            table = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()]
+            path.write_text("".join(",".join(row[:4] + row[7:]) + "\n" for row in table))
+        (group,) = self.compare("runs")["groups"]
+        self.assertEqual(group["best_rms_torque"]["values"], [None, None])
+        self.assertNotIn("torque", self.succeed("compare", "runs"))
 
     def test_the_median_of_runs_half_of_which_never_solve_is_not_reached(self):
         self.make_group("runs", [1, 2, None, None])

@@ -14,7 +14,7 @@ METRICS = ["step", "episodes", "updates", "epsilon", "learning_rate", "loss", "q
            "seconds"]
 EPISODES = ["step", "episode", "return", "length", "terminated", *REWARD_TERMS]
 EVALS = ["step", "success_rate", "success_low", "success_high", "mean_return", "swing_up_seconds",
-         "work", "rms_torque", "value", "discounted_return", "seconds"]
+         "work", "rms_torque", "torque_variation", "torque_variation_upright", "value", "discounted_return", "seconds"]
 
 
 class TrainTest(ProgramTest):
@@ -117,6 +117,8 @@ class TrainTest(ProgramTest):
             self.assertTrue(0 <= row["success_low"] <= row["success_rate"] <= row["success_high"]
                             <= 1, row)
             self.assertTrue(row["work"] > 0 and 0 < row["rms_torque"] <= 5, row)
+            self.assertTrue(0 < row["torque_variation"] <= 500, row)
+            self.assertLessEqual(row["torque_variation_upright"], 500 * row["success_rate"] or 0)
 
     def test_best_evaluation_is_kept(self):
         self.succeed(*small(steps=20000))

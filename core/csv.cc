@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "core/error.h"
 #include "core/text.h"
@@ -40,11 +41,12 @@ std::vector<std::string> CellsOf(std::string_view line, const std::string& place
 }  // namespace
 
 std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::string>& names,
-                               const std::string& where) {
+                               const std::string& where, const std::vector<std::string>& optional) {
   std::vector<CsvColumn> columns;
   for (const std::string& name : names) columns.push_back({name, {}});
-  std::vector<size_t> places;  // indices of the wanted columns in a row
-  size_t width = 0;            // cells of a row; 0 before the line of names
+  for (const std::string& name : optional) columns.push_back({name, {}});
+  std::vector<std::optional<size_t>> places;  // indices of the wanted columns in a row
+  size_t width = 0;                           // cells of a row; 0 before the line of names
   int line_number = 0;
   constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
@@ -54,12 +56,15 @@ std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::str
     const std::string place = Concat(where, ":", line_number, ": ");
     const std::vector<std::string> cells = CellsOf(line, place);
     if (width == 0) {
-      for (const std::string& name : names) {
-        const auto found = std::ranges::find(cells, name);
-        if (found == cells.end()) {
-          throw BadInput(Concat(place, "expected a column \"", name, "\", got \"", line, "\""));
+      for (const CsvColumn& column : columns) {
+        const auto found = std::ranges::find(cells, column.name);
+        const bool there = found != cells.end();
+        if (!there && places.size() < names.size()) {
+          throw BadInput(
+              Concat(place, "expected a column \"", column.name, "\", got \"", line, "\""));
         }
-        places.push_back(static_cast<size_t>(found - cells.begin()));
+        places.emplace_back();
+        if (there) places.back() = static_cast<size_t>(found - cells.begin());
       }
       width = cells.size();
       continue;
@@ -68,10 +73,12 @@ std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::str
       throw BadInput(Concat(place, "expected ", width, " columns, got ", cells.size()));
     }
     for (size_t i = 0; i < places.size(); ++i) {
-      const std::string& cell = cells[places[i]];
+      if (!places[i]) continue;
+      const std::string& cell = cells[*places[i]];
       const auto number = ParseNumber(cell);
       if (!number || !std::isfinite(*number)) {
-        throw BadInput(Concat(place, names[i], ": expected a finite number, got \"", cell, "\""));
+        throw BadInput(
+            Concat(place, columns[i].name, ": expected a finite number, got \"", cell, "\""));
       }
       columns[i].values.push_back(*number);
     }

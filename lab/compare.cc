@@ -77,13 +77,16 @@ size_t NumTasks(const Comparison& comparison) {
 std::string CurvesName(size_t task) { return task == 0 ? "curves" : Concat("curves-", task + 1); }
 
 std::span<const std::pair<const char*, Scores GroupSummary::*>> NamedScores() {
-  static constexpr std::array<std::pair<const char*, Scores GroupSummary::*>, 6> kScores{{
+  static constexpr std::array<std::pair<const char*, Scores GroupSummary::*>, 9> kScores{{
       {"solve_seconds", &GroupSummary::solve_seconds},
       {"solve_steps", &GroupSummary::solve_steps},
       {"final_return", &GroupSummary::final_return},
       {"final_success", &GroupSummary::final_success},
       {"best_return", &GroupSummary::best_return},
       {"best_success", &GroupSummary::best_success},
+      {"best_rms_torque", &GroupSummary::rms_torque},
+      {"best_torque_variation", &GroupSummary::torque_variation},
+      {"best_torque_variation_upright", &GroupSummary::upright_variation},
   }};
   return kScores;
 }

@@ -93,8 +93,11 @@ std::vector<Setting> SettingsOf(Config config) {
 FoundRun ReadRun(const fs::path& path, const fs::path& root, bool unfinished) {
   const Config config = ReadRunConfig(path);
   const TrainConfig& t = config.train;
-  const EvaluationRule rule = SpecOf(config.Environments()).evaluation;
-  FoundRun found{{path, {t.seed, t.steps, t.envs, t.eval_every, t.stop_when_solved, rule}, {}},
+  const EnvSpec spec = SpecOf(config.Environments());
+  FoundRun found{{path,
+                  {t.seed, t.steps, t.envs, t.eval_every, t.stop_when_solved, spec.evaluation,
+                   spec.action_unit},
+                  {}},
                  config.agent,
                  "",
                  SettingsOf(config),

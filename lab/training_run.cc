@@ -150,6 +150,8 @@ void TrainingRun::OnEvaluation(const TrainState& s, const Evaluation& e) {
                           {"swing_up_seconds", e.swing_up_seconds.median},
                           {"work", e.work.mean},
                           {"rms_torque", e.rms_torque.mean},
+                          {"torque_variation", e.torque_variation.mean},
+                          {"torque_variation_upright", e.goal_variation.mean},
                           {"value", e.value},
                           {"discounted_return", e.discounted_return},
                           {"seconds", s.seconds}});

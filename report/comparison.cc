@@ -80,6 +80,12 @@ GroupSummary Summarize(const RunGroup& group) {
       ScoresOf(group, [](const RunRecord& r) { return r.evaluations.back().success_rate; });
   s.best_return = ScoresOf(group, [](const RunRecord& run) { return Best(run).mean_return; });
   s.best_success = ScoresOf(group, [](const RunRecord& run) { return Best(run).success_rate; });
+  const auto of_best = [&](double EvaluationRow::*figure) {
+    return ScoresOf(group, [&](const RunRecord& run) { return Best(run).*figure; });
+  };
+  s.rms_torque = of_best(&EvaluationRow::rms_torque);
+  s.torque_variation = of_best(&EvaluationRow::torque_variation);
+  s.upright_variation = of_best(&EvaluationRow::upright_variation);
   s.stability = StabilityOf(group);
   return s;
 }

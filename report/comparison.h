@@ -40,6 +40,8 @@ struct GroupSummary {
   Scores solve_seconds, solve_steps;   // to the first of the two evaluations that solve
   Scores final_return, final_success;  // at the last evaluation
   Scores best_return, best_success;    // at the best one: by success, then by return
+  // Of the torques at the best one (EvaluationRow); infinite where they are not known.
+  Scores rms_torque, torque_variation, upright_variation;
   Stability stability;
 };
 GroupSummary Summarize(const RunGroup& group);

@@ -44,6 +44,22 @@ TEST(Comparison, FinalAndBestEvaluation) {
   EXPECT_EQ(s.final_return.iqm.value, 2525);
 }
 
+TEST(Comparison, TorquesAreThoseOfTheBestEvaluation) {
+  RunGroup group{"a", {MadeRun(1, {{1, 2600}, {1, 2500}}), MadeRun(2, {{0, 0}, {1, 9}})}};
+  EXPECT_EQ(Summarize(group).rms_torque.values, (std::vector<double>{kInf, kInf}));
+  for (RunRecord& run : group.runs) {
+    for (EvaluationRow& row : run.evaluations) {
+      row.rms_torque = row.mean_return / 1000;
+      row.torque_variation = row.mean_return / 100;
+    }
+  }
+  group.runs[0].evaluations[0].upright_variation = 1.5;
+  const GroupSummary s = Summarize(group);
+  EXPECT_EQ(s.rms_torque.values, (std::vector<double>{2.6, 0.009}));
+  EXPECT_EQ(s.torque_variation.values, (std::vector<double>{26, 0.09}));
+  EXPECT_EQ(s.upright_variation.values, (std::vector<double>{1.5, kInf}));
+}
+
 TEST(Comparison, StabilityCountsEvaluationsAfterTheTwoThatSolve) {
   EXPECT_EQ(Summarize(kGroup).stability.runs, 0);  // they stopped
   RunGroup group;

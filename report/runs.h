@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,6 +17,13 @@ struct EvaluationRow {
   double seconds;       // of training so far, evaluations excluded
   double success_rate;  // share of the episodes
   double mean_return;
+  // Means over the episodes, in the task's unit of actions and that a second; infinite where they
+  // are not known, as in tables of older versions.
+  double rms_torque = kUnknown;
+  double torque_variation = kUnknown;
+  double upright_variation = kUnknown;  // of the episodes that succeed, from upright to their end
+
+  static constexpr double kUnknown = std::numeric_limits<double>::infinity();
 };
 
 /// The settings of a run that a comparison needs.
@@ -23,7 +31,8 @@ struct RunPlan {
   int64_t seed, steps;       // steps: the budget
   int64_t envs, eval_every;  // parallel environments; steps between two evaluations
   bool stop_when_solved;
-  EvaluationRule rule;  // of the task
+  EvaluationRule rule;              // of the task
+  std::string action_unit = "N·m";  // of its torques
 };
 
 /// A training, read from its folder.

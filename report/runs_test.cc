@@ -57,6 +57,20 @@ class ReadEvaluationsTest : public testing::Test {
   TempFolder folder_;
 };
 
+TEST_F(ReadEvaluationsTest, TorquesAreKnownWhereTheTableHasThem) {
+  constexpr double kUnknown = EvaluationRow::kUnknown;
+  WriteFileAtomically(folder_ / "evals.csv", head_ + "1,1,2,3\n");
+  EXPECT_EQ(ReadEvaluations(folder_.path(), false).front().rms_torque, kUnknown);
+  WriteFileAtomically(folder_ / "evals.csv",
+                      "step,success_rate,mean_return,rms_torque,torque_variation,"
+                      "torque_variation_upright,seconds\n1,0,2,3,4,0,5\n2,0.5,2,1,2,0.25,6\n");
+  const auto rows = ReadEvaluations(folder_.path(), false);
+  EXPECT_EQ(rows[0].rms_torque, 3);
+  EXPECT_EQ(rows[0].torque_variation, 4);
+  EXPECT_EQ(rows[0].upright_variation, kUnknown);  // it never is
+  EXPECT_EQ(rows[1].upright_variation, 0.25);
+}
+
 TEST_F(ReadEvaluationsTest, RowsAndNone) {
   EXPECT_TRUE(ReadEvaluations(folder_.path(), false).empty());
   EXPECT_EQ(Complaint(head_ + "1000,0.5,20,1.5\n2000,1,2600,3\n"), "none");
