@@ -65,25 +65,41 @@ from safetensors import safe_open
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 
-def forward(network, weights, obs):
-    """Q-values (B × A) of observations (B × D), in double precision."""
+def linear(weights, name, x):
+    return x @ weights[name + ".weight"].T.astype(np.float64) + weights[name + ".bias"]
+
+
+def features(network, weights, obs, prefix=""):
+    """Features (B × H) of inputs (B × D), in double precision."""
     x = obs.astype(np.float64)
-
-    def linear(name, x):
-        return x @ weights[name + ".weight"].T.astype(np.float64) + weights[name + ".bias"]
-
     for i in range(len(network["hidden"])):
-        x = linear(f"feature.{i}", x)
+        name = f"{prefix}feature.{i}"
+        x = linear(weights, name, x)
         if network["layer_norm"]:
             x = (x - x.mean(axis=1, keepdims=True)) / np.sqrt(x.var(axis=1, keepdims=True) + 1e-5)
-            x = x * weights[f"feature.{i}.norm.weight"] + weights[f"feature.{i}.norm.bias"]
-        x = np.maximum(x, 0)
+            x = x * weights[name + ".norm.weight"] + weights[name + ".norm.bias"]
+        x = np.tanh(x) if network.get("activation") == "tanh" else np.maximum(x, 0)
+    return x
+
+
+def forward(network, weights, obs):
+    """Q-values (B × A) of observations (B × D)."""
+    x = features(network, weights, obs)
     if not network["dueling"]:
-        return linear("output", x)
-    streams = np.maximum(linear("streams", x), 0)
-    value = linear("value", streams[:, :network["head"]])
-    advantage = linear("advantage", streams[:, network["head"]:])
+        return linear(weights, "output", x)
+    streams = np.maximum(linear(weights, "streams", x), 0)
+    value = linear(weights, "value", streams[:, :network["head"]])
+    advantage = linear(weights, "advantage", streams[:, network["head"]:])
     return value + advantage - advantage.mean(axis=1, keepdims=True)
+
+
+def act(output, weights, outputs):
+    """Torques (B) of what an actor network puts out (B × outputs)."""
+    if output == "categorical":
+        return weights["torques"][outputs.argmax(axis=1)]
+    mean = outputs[:, 0]
+    bounded = np.tanh(mean) if output == "squashed-gaussian" else np.clip(mean, -1, 1)
+    return weights["action_limit"][0] * bounded
 
 
 def load(path):
@@ -143,6 +159,80 @@ class ReadersTest(ProgramTest):
                                       tensors["torques"][tensors["sample.q"].argmax(axis=1)])
         self.assertGreater(np.ptp(tensors["sample.q"]), 0)
 
+    def check_actor(self, path, output):
+        """The package reads the actor's and the critic's arrays, and both reproduce the samples."""
+        about, tensors = load(path)
+        self.assertEqual(about["output"], output)
+        network, critic = json.loads(about["network"]), json.loads(about["critic"])
+        outputs = len(tensors["torques"]) if output == "categorical" else 2
+        shapes = actor_shapes(network, outputs) | actor_shapes(critic, 1, "critic.")
+        for name, shape in shapes.items():
+            self.assertEqual(list(tensors[name].shape), shape, name)
+        self.assertEqual(tensors.keys() - shapes.keys(),
+                         {"action_limit", "sample.obs", "sample.output", "sample.action",
+                          "sample.value"} | ({"torques"} if output == "categorical" else set()))
+
+        obs = tensors["sample.obs"]
+        got = linear(tensors, "output", features(network, tensors, obs))
+        np.testing.assert_allclose(tensors["sample.output"], got, rtol=0,
+                                   atol=2e-5 * np.abs(got).max())
+        torque = act(output, tensors, got)
+        np.testing.assert_allclose(tensors["sample.action"][:, 0], torque, rtol=0, atol=1e-4)
+        self.assertGreater(np.ptp(got), 0)
+        if critic["inputs"] > network["inputs"]:
+            share = torque / tensors["action_limit"][0]
+            obs = np.concatenate([obs, share[:, np.newaxis]], axis=1)
+        value = linear(tensors, "critic.output", features(critic, tensors, obs, "critic."))
+        np.testing.assert_allclose(tensors["sample.value"], value, rtol=0,
+                                   atol=2e-5 * np.abs(value).max())
+
+    def test_actor_of_a_training(self):
+        self.succeed(*small(agent="sac", hidden="24,16", head=None, steps=4000))
+        self.check_actor(self.folder / "run/policy.safetensors", "squashed-gaussian")
+
+    def test_actors_of_other_kinds(self):
+        for output in ("clipped-gaussian", "categorical"):
+            self.check_actor(ROOT / f"fuzz/corpus/policy/accepted/{output}.safetensors", output)
+
+    def test_actors_of_the_test_vectors(self):
+        """What is written for readers in other languages, read by one."""
+        vectors = json.loads(self.succeed("export", "--test-vectors", "-"))
+        self.assertEqual(len(vectors["actors"]), 4)
+        for actor in vectors["actors"]:
+            path = self.folder / "actor.safetensors"
+            path.write_bytes(bytes.fromhex(actor["file"]))
+            about, tensors = load(path)
+            output, network = about["output"], json.loads(about["network"])
+            cases = actor["cases"]
+            obs = np.array([case["observation"] for case in cases], np.float32)
+            outputs = linear(tensors, "output", features(network, tensors, obs))
+            np.testing.assert_allclose([case["outputs"] for case in cases], outputs, atol=1e-5)
+            np.testing.assert_allclose([case["torque"] for case in cases],
+                                       act(output, tensors, outputs), atol=1e-4)
+            sums = [sum(case["probabilities"]) for case in cases]
+            np.testing.assert_allclose(sums, 1, atol=1e-12)
+            if output == "categorical":
+                weights = np.exp(outputs)
+                np.testing.assert_allclose([case["probabilities"] for case in cases],
+                                           weights / weights.sum(axis=1, keepdims=True), atol=1e-5)
+                continue
+            self.check_draws(output, outputs, cases)
+
+    def check_draws(self, output, outputs, cases):
+        """Tenths of the range of torques, and the central 68%, by drawing."""
+        rng = np.random.default_rng(0)
+        draws = 200_000
+        for (mean, log_std), case in zip(outputs, cases, strict=True):
+            u = mean + np.exp(np.clip(log_std, -5, 2)) * rng.standard_normal(draws)
+            torque = 5 * (np.tanh(u) if output == "squashed-gaussian" else np.clip(u, -1, 1))
+            share = np.histogram(torque, bins=np.linspace(-5, 5, 11))[0] / draws
+            np.testing.assert_allclose(case["probabilities"], share, atol=0.006)
+            within = np.mean((torque >= case["low"]) & (torque <= case["high"]))
+            # What is cut off lies at an end, and with it more than 68%.
+            self.assertGreater(within, 0.677)
+            if max(abs(case["low"]), abs(case["high"])) < 5:
+                self.assertLess(within, 0.688)
+
     def test_dueling_policy(self):
         self.check_policy(hidden="32,24")
 
@@ -172,6 +262,19 @@ class ReadersTest(ProgramTest):
             self.assertTrue(np.isfinite(tensors[name]).all(), name)
         self.assertEqual(tensors["run/size/metrics"],
                          (self.folder / "run/metrics.csv").stat().st_size)
+
+
+def actor_shapes(network, outputs, prefix=""):
+    """Names and shapes of the arrays of an actor's network, or of its critic's."""
+    shapes = {}
+    width = network["inputs"]
+    for i, out in enumerate(network["hidden"]):
+        name = f"{prefix}feature.{i}"
+        shapes |= {name + ".weight": [out, width], name + ".bias": [out]}
+        if network["layer_norm"]:
+            shapes |= {name + ".norm.weight": [out], name + ".norm.bias": [out]}
+        width = out
+    return shapes | {prefix + "output.weight": [outputs, width], prefix + "output.bias": [outputs]}
 
 
 def expected_shapes(network):

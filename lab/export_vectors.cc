@@ -5,6 +5,7 @@
 #include "core/rng.h"
 #include "lab/config.h"
 #include "lab/export.h"
+#include "lab/export_actors.h"
 #include "sim/disturbance.h"
 #include "sim/double_pendulum.h"
 #include "sim/pendulum_env.h"
@@ -188,6 +189,7 @@ std::string TestVectorsJson() {
   j["models"] = Models();
   j["observation_memory"] = ObservationMemory();
   j["delays"] = Delays();
+  j["actors"] = ActorVectors();
   return j.dump(1) + '\n';
 }
 

@@ -1,0 +1,138 @@
+#include "lab/export_actors.h"
+
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "core/rng.h"
+#include "core/safetensors.h"
+#include "core/text.h"
+#include "lab/config.h"
+#include "lab/loaded_policy.h"
+#include "nn/actor_policy.h"
+#include "nn/gaussian.h"
+
+namespace upswing {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr int D = kObservationSize;
+constexpr int kCases = 12;
+constexpr int kPieces = 10;  // of the range of torques
+
+/// Parameters of an untrained network. Those of its output are larger than usual, so that not all
+/// actions are near 0.
+std::vector<float> DrawParameters(const MlpShape& shape, int outputs, Rng& rng) {
+  const Network<float> network(shape, {outputs});
+  std::vector<float> parameters(network.num_parameters());
+  network.Initialize(rng, parameters);
+  for (const ParameterBlock& block : network.blocks()) {
+    if (!block.name.starts_with("output")) continue;
+    for (size_t i = 0; i < block.size(); ++i) parameters[block.offset + i] *= 4;
+  }
+  return parameters;
+}
+
+/// A policy of this kind whose critic takes `critic_inputs` numbers; 0: there is none.
+ActorPolicy DrawPolicy(ActorOutput output, const MlpShape& actor, int critic_inputs, Rng& rng) {
+  ActorParts parts;
+  parts.output = output;
+  parts.actor = actor;
+  parts.action_limit = {Plant().torque_limit};
+  if (output == ActorOutput::kCategorical) parts.torques = {-5, -2.5, 0, 2.5, 5};
+  const int outputs = parts.torques.empty() ? 2 : static_cast<int>(parts.torques.size());
+  parts.parameters = DrawParameters(actor, outputs, rng);
+  if (critic_inputs > 0) {
+    parts.critic = {critic_inputs, {10}, !actor.layer_norm, actor.activation};
+    parts.critic_parameters = DrawParameters(parts.critic, 1, rng);
+  }
+  return {std::move(parts), InfoOf(Config())};
+}
+
+/// The bytes of a policy's file, two hexadecimal digits each.
+std::string FileAsHex(const ActorPolicy& policy) {
+  std::string hex;
+  for (const std::byte byte : WriteSafetensors(policy.ToTensors()).Joined()) {
+    for (const int shift : {4, 0}) {
+      hex += "0123456789abcdef"[(std::to_integer<int>(byte) >> shift) & 15];
+    }
+  }
+  return hex;
+}
+
+/// The probability with which it draws a torque of at most `share` of its limit, -1 < share < 1.
+double ProbabilityUpTo(double share, ActorOutput output, std::span<const float> outputs) {
+  const auto u = Gaussian<double>::From(outputs[0], outputs[1]);
+  const double at = output == ActorOutput::kSquashedGaussian ? std::atanh(share) : share;
+  return std::erfc((u.mean - at) / (u.std * std::numbers::sqrt2)) / 2;
+}
+
+/// A Gaussian's probabilities of equal pieces of the range of torques, a categorical's of its
+/// torques.
+std::vector<double> Probabilities(ActorOutput output, std::span<const float> outputs) {
+  std::vector<double> probabilities;
+  if (output == ActorOutput::kCategorical) {
+    double sum = 0;
+    for (const float logit : outputs) sum += std::exp(double{logit});
+    for (const float logit : outputs) probabilities.push_back(std::exp(double{logit}) / sum);
+    return probabilities;
+  }
+  double below = 0;
+  for (int i = 1; i <= kPieces; ++i) {
+    const double up_to = i == kPieces ? 1 : ProbabilityUpTo(2.0 * i / kPieces - 1, output, outputs);
+    probabilities.push_back(up_to - below);
+    below = up_to;
+  }
+  return probabilities;
+}
+
+ordered_json CaseJson(const ActorPolicy& policy, std::vector<float>& obs) {
+  const auto memory = policy.Start(1);
+  const Matrix<const float> row(obs.data(), 1, D);
+  std::vector<float> outputs(static_cast<size_t>(policy.num_outputs()));
+  double torque = 0, low = 0, high = 0;
+  policy.Outputs(row, {outputs.data(), 1, policy.num_outputs()}, *memory);
+  policy.Act(row, {&torque, 1, 1}, *memory);
+  policy.Spread(row, {&low, 1, 1}, {&high, 1, 1}, *memory);
+  ordered_json j{
+      {"observation", obs}, {"outputs", outputs},
+      {"torque", torque},   {"low", low},
+      {"high", high},       {"probabilities", Probabilities(policy.parts().output, outputs)},
+      {"value", nullptr}};
+  if (policy.num_values() == 0) return j;
+  float value = 0;
+  policy.Values(row, {&value, 1, 1}, *memory);
+  j["value"] = value;
+  return j;
+}
+
+}  // namespace
+
+ordered_json ActorVectors() {
+  struct Kind {
+    ActorOutput output;
+    MlpShape actor;
+    int critic_inputs;
+  };
+  const std::array<Kind, 4> kinds{
+      {{ActorOutput::kSquashedGaussian, {D, {12, 10}, true, Activation::kRelu}, D + 1},
+       {ActorOutput::kSquashedGaussian, {D, {8}, false, Activation::kTanh}, 0},
+       {ActorOutput::kClippedGaussian, {D, {10, 8}, false, Activation::kTanh}, D},
+       {ActorOutput::kCategorical, {D, {12}, true, Activation::kRelu}, D}}};
+  ordered_json actors;
+  Rng rng(0, "test vectors: actors");
+  for (const Kind& kind : kinds) {
+    const ActorPolicy policy = DrawPolicy(kind.output, kind.actor, kind.critic_inputs, rng);
+    ordered_json cases;
+    for (int i = 0; i < kCases; ++i) {
+      std::vector<float> obs(D);
+      for (float& x : obs) x = static_cast<float>(rng.Uniform(-2, 2));
+      cases.push_back(CaseJson(policy, obs));
+    }
+    actors.push_back({{"file", FileAsHex(policy)}, {"cases", cases}});
+  }
+  return actors;
+}
+
+}  // namespace upswing
