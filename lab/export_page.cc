@@ -91,10 +91,6 @@ PageAgent ReadAgent(const fs::path& path, const std::string& given_id) {
                           ": expected a policy of the double pendulum, which is what the page ",
                           "shows, got one of ", loaded.task));
   }
-  if (loaded.policy->kind() != "q-network") {
-    throw BadInput(Concat(where, ": expected a policy of kind q-network, which is what the page ",
-                          "reads, got ", loaded.policy->kind()));
-  }
   if (!loaded.mjcf.empty()) {
     throw BadInput(Concat(where,
                           ": was made with a model of its own, and the page shows the "

@@ -1,31 +1,12 @@
 import { describe, expect, test } from 'vitest';
+import { changed as changedFile, fileOf, withMetadata } from '../tests/file';
+import type { Parts } from '../tests/file';
 import { readPolicy } from '../tests/program';
 import { NOMINAL } from './pendulum';
 import { Policy } from './policy';
 import { BadInput, MAX_FILE_BYTES, parseSafetensors, read } from './safetensors';
 
 /// What comes from a stranger is refused with a reason, whatever it is.
-
-type Header = Record<string, unknown>;
-
-function fileOf(header: Header | string, data: Uint8Array = new Uint8Array()): ArrayBuffer {
-  const text = typeof header === 'string' ? header : JSON.stringify(header);
-  const json = new TextEncoder().encode(text);
-  const file = new Uint8Array(8 + json.length + data.length);
-  new DataView(file.buffer).setBigUint64(0, BigInt(json.length), true);
-  file.set(json, 8);
-  file.set(data, 8 + json.length);
-  return file.buffer;
-}
-
-function partsOf(file: ArrayBuffer): {
-  header: Record<string, Record<string, unknown>>;
-  data: Uint8Array;
-} {
-  const size = Number(new DataView(file).getBigUint64(0, true));
-  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(file, 8, size)));
-  return { header, data: new Uint8Array(file.slice(8 + size)) };
-}
 
 const DATA = new Uint8Array(new Float32Array([1, 2, 3, 4]).buffer);
 const tensor = (shape: unknown, offsets: unknown, dtype: unknown = 'F32') => ({
@@ -40,7 +21,7 @@ test('reads what it was given', () => {
   expect([...read(file, 'x', 'F32', [2, 2])]).toEqual([1, 2, 3, 4]);
 });
 
-test.each<[string, Header | string]>([
+test.each<[string, Record<string, unknown> | string]>([
   ['not JSON', 'hello'],
   ['a header that is a list', '[1]'],
   ['metadata that are no text', { __metadata__: { a: 1 } }],
@@ -86,24 +67,13 @@ test('refuses tensors of another shape or type, and numbers that are none', () =
 
 describe('a policy', () => {
   const original = readPolicy('fast');
-  const changed = (change: (parts: ReturnType<typeof partsOf>) => void) => {
-    const parts = partsOf(original);
-    // As another program writes it, without a checksum.
-    delete parts.header.__metadata__!.upswing_version;
-    delete parts.header.__metadata__!.checksum;
-    change(parts);
-    return fileOf(parts.header, parts.data);
-  };
-  const metadata = (key: string, text: string | undefined) =>
-    changed(({ header }) => {
-      if (text === undefined) delete header.__metadata__![key];
-      else header.__metadata__![key] = text;
-    });
+  const changed = (change: (parts: Parts) => void) => changedFile(original, change);
+  const metadata = (key: string, text: string | undefined) => withMetadata(original, key, text);
 
   test('is read, and computes what the C++ program did', () => {
     const policy = new Policy(changed(() => {}));
-    expect(policy.selfCheckError).toBeLessThan(1e-4);
-    expect(policy.torques.length).toBe(9);
+    expect(policy.controller.selfCheckError).toBeLessThan(1e-4);
+    expect(policy.controller.text).toContain('9 torques');
     expect(policy.trainedRange('mass1')).toEqual([1, 1]);
   });
 
@@ -199,9 +169,8 @@ describe('a policy', () => {
   });
 
   test('without a checksum is refused if its values differ by more than rounding', () => {
-    const { data, header } = partsOf(original);
-    const [begin, end] = header['sample.q']!.data_offsets as [number, number];
-    const values = new Float32Array(data.slice(begin, end).buffer);
+    const { tensors } = parseSafetensors(original);
+    const values = new Float32Array(tensors.get('sample.q')!.bytes.slice().buffer);
     const largest = Math.max(...values.map(Math.abs));
     const moved = (share: number) =>
       changed(({ header: { 'value.bias': bias }, data: bytes }) => {
@@ -211,7 +180,7 @@ describe('a policy', () => {
       });
     expect(() => new Policy(moved(3e-5))).toThrow('self-check');
     expect(() => new Policy(moved(-3e-5))).toThrow('self-check');
-    expect(new Policy(moved(3e-6)).torques.length).toBe(9);
+    expect(new Policy(moved(3e-6)).controller.strongest).toBe(5);
   });
 
   test('is refused at every place where it may be cut off', () => {

@@ -12,7 +12,8 @@ import {
   relativeHeight,
 } from './pendulum';
 import type { Plant, State } from './pendulum';
-import type { Decision, Policy } from './policy';
+import type { Decision } from './decision';
+import type { Policy } from './policy';
 import type { Push, Simulator, Vec } from './simulator';
 
 export const STEPS_PER_SECOND = PHYSICS_STEPS / CONTROL_PERIOD; // of physics

@@ -1,4 +1,5 @@
 import { expect } from '@playwright/test';
+import type { QDecision } from '../src/decision';
 import { balanced, largestDifference, open, run, startFrom, test } from './page';
 import { policyPath, simulate } from './program';
 
@@ -60,13 +61,13 @@ test('of two agents that are asked for, the last one counts', async ({ page }) =
   await (await slow).finished();
   await page.waitForTimeout(200);
   await expect(page.locator('#agent')).toHaveValue('fast');
-  expect(await page.evaluate(() => upswing.world.policy!.network.shape.hidden)).toEqual([64, 64]);
+  expect(await page.evaluate(() => upswing.world.policy!.controller.text)).toContain('8-64-64');
 });
 
 test('a pendulum that is posed is judged at once', async ({ page }) => {
   await open(page, '#agent=d3qn');
   await startFrom(page, 0);
-  const best = () => page.evaluate(() => Math.max(...upswing.world.decision!.q));
+  const best = () => page.evaluate(() => Math.max(...(upswing.world.decision as QDecision).q));
   const hanging = await best();
   await expect(page.locator('#height-value')).toHaveText('−1.00 m of 1.00 m');
   await startFrom(page, Math.PI);

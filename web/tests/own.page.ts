@@ -1,25 +1,17 @@
 import { expect } from '@playwright/test';
 import type { Page } from '@playwright/test';
+import type { QDecision } from '../src/decision';
+import { changed as changedFile } from './file';
 import { open, slide, test } from './page';
 import { policyPath, readPolicy } from './program';
 
 /// A visitor's own policy: kept over a reload, removed when asked, and never more than text.
 
 /// The policy `fast` with some of its metadata changed.
-function changed(metadata: Record<string, string>): Buffer {
-  const file = Buffer.from(readPolicy('fast'));
-  const size = Number(file.readBigUInt64LE());
-  const header = JSON.parse(file.toString('utf8', 8, 8 + size)) as Record<string, object>;
-  // As another program writes it, without a checksum.
-  const about = { ...header.__metadata__ } as Record<string, string>;
-  delete about.checksum;
-  delete about.upswing_version;
-  header.__metadata__ = { ...about, ...metadata };
-  const text = Buffer.from(JSON.stringify(header));
-  const length = Buffer.alloc(8);
-  length.writeBigUInt64LE(BigInt(text.length));
-  return Buffer.concat([length, text, file.subarray(8 + size)]);
-}
+const changed = (metadata: Record<string, string>) =>
+  Buffer.from(
+    changedFile(readPolicy('fast'), ({ header }) => Object.assign(header.__metadata__!, metadata)),
+  );
 
 const NOMINAL = {
   ...{ mass1: 1, mass2: 1, length1: 0.5, length2: 0.5 },
@@ -114,7 +106,7 @@ test.describe('on a canvas that is read back', () => {
     const before = await painted();
     await page.evaluate(() => {
       const { world } = upswing;
-      const good = world.decision!;
+      const good = world.decision as QDecision;
       world.decision = { ...good, q: good.q.map(() => NaN) };
     });
     const during = await painted();

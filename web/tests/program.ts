@@ -33,3 +33,11 @@ export function policyPath(id: string): string {
 export function readPolicy(id: string): ArrayBuffer {
   return new Uint8Array(readFileSync(policyPath(id))).buffer;
 }
+
+/// The files of the untrained actor policies that `upswing export --test-vectors` has.
+export function actorFiles(): ArrayBuffer[] {
+  const { actors } = JSON.parse(runProgram('export', '--test-vectors', '-')) as {
+    actors: { file: string }[];
+  };
+  return actors.map(({ file }) => new Uint8Array(Buffer.from(file, 'hex')).buffer);
+}

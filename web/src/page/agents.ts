@@ -40,6 +40,10 @@ const TITLES = new Map([
   ['dueling-dqn', 'Dueling DQN'],
   ['fast', 'Fast: a small network'],
   ['d3qn-randomized', 'Randomised Dueling Double DQN'],
+  ['sac', 'SAC: any torque'],
+  ['sac-fast', 'SAC: a small network'],
+  ['ppo', 'PPO: any torque'],
+  ['ppo-discrete', 'PPO: one of some torques'],
 ]);
 
 /// A title for an entry: that of its agent, and its ID if that says more.
@@ -49,16 +53,12 @@ function titleOf({ id, agent }: Entry): string {
 }
 
 function describe(policy: Policy): string {
-  const { inputs, hidden, dueling, head, layer_norm } = policy.network.shape;
   const randomized = (Object.keys(NOMINAL) as Parameter[]).some((name) => {
     const [low, high] = policy.trainedRange(name);
     return low < high;
   });
   return [
-    `${dueling ? 'Dueling' : 'Plain'} network ${[inputs, ...hidden].join('-')}`,
-    dueling ? ` with heads of ${head}` : '',
-    layer_norm ? ', layer normalisation' : '',
-    `, ${policy.torques.length} torques`,
+    policy.controller.text,
     policy.memory > 0 ? `, remembers ${policy.memory} steps` : '',
     randomized ? ', trained on random pendulums' : '',
     '.',

@@ -1,8 +1,9 @@
 import type { History } from '../history';
 import { energy, energyTarget, rewardTerms, tipHeight } from '../pendulum';
 import type { State } from '../pendulum';
-import type { Decision, Policy } from '../policy';
-import { PhasePortrait, QBars, SECONDS_SHOWN, signed, Strip, withMinus } from '../view/charts';
+import type { Decision } from '../decision';
+import { PhasePortrait, SECONDS_SHOWN, signed, Strip, withMinus } from '../view/charts';
+import { DecisionChart } from '../view/decision';
 import type { World } from '../world';
 import { element } from './dom';
 
@@ -14,11 +15,11 @@ export class Dashboard {
   private readonly height = new Strip('height', 'link2', (m) => m.height);
   private readonly torque = new Strip('torque', 'torque', (m) => m.torque);
   private readonly phase = new PhasePortrait();
-  private readonly bars = new QBars();
+  private readonly decision = new DecisionChart();
   private frame = 0;
 
   get canvases() {
-    return [this.energy, this.height, this.torque, this.phase, this.bars].map((c) => c.canvas);
+    return [this.energy, this.height, this.torque, this.phase, this.decision].map((c) => c.canvas);
   }
 
   draw(world: World, history: History): void {
@@ -56,7 +57,7 @@ export class Dashboard {
       ],
     });
     this.phase.draw(moments);
-    this.bars.draw(world.policy, world.decision);
+    this.decision.draw(world.decision);
     if (this.frame % (5 * FRAMES) === 1) this.showNumbers(world);
   }
 
@@ -68,7 +69,10 @@ export class Dashboard {
     tell('energy', `${fixed(energy(plant, state))} J of ${fixed(target)} J`);
     tell('height', `${fixed(tipHeight(plant, state))} m of ${fixed(reach)} m`);
     tell('torque', `${fixed(world.torque)} N·m`);
-    tell('q', policy && decision ? qText(policy, decision) : '');
+    const name = decision?.kind === 'q' ? 'Q-values' : 'Policy';
+    element('q-name').textContent = name;
+    element('q').dataset.name = name;
+    tell('q', policy && decision ? decisionText(decision, policy.rewardScale) : '');
     element('reward').textContent = rewardText(rewardTerms(plant, state, world.torque));
   }
 }
@@ -92,11 +96,22 @@ function rewardText(terms: number[]): string {
   return `${text.join(' ')} = ${sum.toFixed(2)}`;
 }
 
-/// In units of the reward.
-function qText(policy: Policy, { q, action, value }: Decision): string {
-  const reward = (x: number) => withMinus((x / policy.rewardScale).toFixed(1));
-  const text = `best ${reward(q[action]!)}`;
-  return Number.isNaN(value) ? text : `${text}, state ${reward(value)}`;
+/// What it would do, and what it expects in units of the reward.
+export function decisionText(decision: Decision, rewardScale: number): string {
+  const reward = (x: number) => withMinus((x / rewardScale).toFixed(1));
+  const value = Number.isNaN(decision.value) ? '' : reward(decision.value);
+  switch (decision.kind) {
+    case 'q':
+      return `best ${reward(decision.q[decision.action]!)}${value && `, state ${value}`}`;
+    case 'gaussian': {
+      const { mean, low, high } = decision.distribution;
+      return `${fixed(mean)} N·m, σ ${fixed((high - low) / 2)}${value && `, V ${value}`}`;
+    }
+    case 'categorical': {
+      const percent = (100 * decision.probabilities[decision.action]!).toFixed(0);
+      return `likeliest ${percent}%${value && `, V ${value}`}`;
+    }
+  }
 }
 
 const BALANCED = 1; // s upright, after which it is more than a swing through the top

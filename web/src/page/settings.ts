@@ -108,7 +108,7 @@ export class Settings {
   /// Marks on each slider what this policy was trained on.
   mark(policy: Policy): void {
     for (const [name, slider] of this.plant) slider.trained = policy.trainedRange(name);
-    const strongest = Math.max(...policy.torques);
+    const { strongest } = policy.controller;
     this.plant.get('torque_limit')!.label = `Limit of the motor (agent: ±${strongest})`;
     this.disturbance.sensor_noise.trained = policy.trainedDisturbance('sensor_noise');
     this.disturbance.delay.trained = policy.trainedDisturbance('delay');

@@ -51,6 +51,17 @@ export class Canvas {
     context.stroke();
   }
 
+  /// What is between a line and the height `bottom`.
+  area(points: readonly (readonly [number, number])[], bottom: number, color: string): void {
+    const { context } = this;
+    context.beginPath();
+    context.moveTo(points[0]![0], bottom);
+    for (const [x, y] of points) context.lineTo(x, y);
+    context.lineTo(points.at(-1)![0], bottom);
+    context.fillStyle = this.color(color);
+    context.fill();
+  }
+
   rectangle(x: number, y: number, width: number, height: number, color: string): void {
     this.context.fillStyle = this.color(color);
     this.context.fillRect(x, y, width, height);

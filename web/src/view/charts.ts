@@ -1,4 +1,3 @@
-import type { Decision, Policy } from '../policy';
 import type { Moment } from '../world';
 import { Canvas } from './canvas';
 
@@ -122,41 +121,6 @@ const LINKS: readonly [string, Of, Of][] = [
 function fromUpright(angle: number): number {
   const turns = (angle + Math.PI) / (2 * Math.PI);
   return (turns - Math.round(turns)) * 2 * Math.PI;
-}
-
-const LABEL_WIDTH = 30; // pixels, of a torque under its bar
-
-/// What the agent expects of each torque. Q-values differ by little beside what they all have in
-/// common, so the bars hang from the largest.
-export class QBars {
-  readonly canvas = new Canvas('q');
-  private room = 1; // from the bottom of the chart to the largest
-
-  draw(policy: Policy | null, decision: Decision | null): void {
-    const { canvas } = this;
-    canvas.clear();
-    if (!policy || !decision) return;
-    const { q, action } = decision;
-    const best = q[action]!;
-    if (!q.every(Number.isFinite)) {
-      canvas.text('not finite', canvas.width / 2, canvas.height / 2, 'center');
-      return; // and keep the scale
-    }
-    // The scale grows at once and shrinks slowly.
-    const spread = Math.max(0.05, 1.1 * (best - Math.min(...q)));
-    this.room = Math.max(spread, 0.95 * this.room);
-    const width = canvas.width / q.length;
-    const bottom = canvas.height - 16;
-    const labelled = Math.ceil(LABEL_WIDTH / width); // each, or each second, …
-    q.forEach((value, i) => {
-      const height = (bottom - 4) * (1 - (best - value) / this.room);
-      const color = i === action ? 'torque' : 'bar';
-      canvas.rectangle(i * width + 2, bottom - height, width - 4, height, color);
-      if (i % labelled === 0) {
-        canvas.text(signed(policy.torques[i]!), (i + 0.5) * width, canvas.height - 7, 'center');
-      }
-    });
-  }
 }
 
 /// A number's text with a minus sign as wide as a digit.

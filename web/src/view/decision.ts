@@ -1,0 +1,113 @@
+import type { CategoricalDecision, Decision, GaussianDecision, QDecision } from '../decision';
+import type { GaussianTorque } from '../gaussian';
+import { Canvas } from './canvas';
+import { signed } from './charts';
+
+const LABEL_WIDTH = 30; // pixels, of a torque under its bar
+const BOTTOM = 16; // pixels, for the torques below a chart
+const TOP = 4;
+const CUT_OFF = 0.005; // share of a distribution that is worth a number
+
+/// What the agent makes of what it sees: its Q-values, or how likely it finds each torque.
+export class DecisionChart {
+  readonly canvas = new Canvas('q');
+  private room = 1; // of Q-values: from the bottom of the chart to the largest
+
+  draw(decision: Decision | null): void {
+    this.canvas.clear();
+    if (!decision) return;
+    if (!isFinite(decision)) {
+      this.canvas.text('not finite', this.canvas.width / 2, this.canvas.height / 2, 'center');
+      return; // and keep the scale
+    }
+    if (decision.kind === 'q') this.drawQ(decision);
+    else if (decision.kind === 'gaussian') this.drawGaussian(decision);
+    else this.drawProbabilities(decision);
+  }
+
+  private get bottom(): number {
+    return this.canvas.height - BOTTOM;
+  }
+
+  /// Q-values differ by little beside what they all have in common, so the bars hang from the largest.
+  private drawQ({ q, action, torques }: QDecision): void {
+    const best = q[action]!;
+    // The scale grows at once and shrinks slowly.
+    const spread = Math.max(0.05, 1.1 * (best - Math.min(...q)));
+    this.room = Math.max(spread, 0.95 * this.room);
+    this.drawBars(torques, action, (i) => 1 - (best - q[i]!) / this.room);
+  }
+
+  /// Bars from 0 to 1.
+  private drawProbabilities({ probabilities, action, torques }: CategoricalDecision): void {
+    this.drawBars(torques, action, (i) => probabilities[i]!);
+  }
+
+  private drawBars(torques: Float64Array, action: number, share: (i: number) => number): void {
+    const { canvas, bottom } = this;
+    const width = canvas.width / torques.length;
+    const labelled = Math.ceil(LABEL_WIDTH / width); // each, or each second, …
+    torques.forEach((torque, i) => {
+      const height = (bottom - TOP) * share(i);
+      const color = i === action ? 'torque' : 'bar';
+      canvas.rectangle(i * width + 2, bottom - height, width - 4, height, color);
+      if (i % labelled === 0) {
+        canvas.text(signed(torque), (i + 0.5) * width, canvas.height - 7, 'center');
+      }
+    });
+  }
+
+  /// The density over the torques, as high as the chart; its central 68% in colour, and a line at
+  /// the mean, which is applied.
+  private drawGaussian({ distribution }: GaussianDecision): void {
+    const { canvas, bottom } = this;
+    const { limit, low, high, mean } = distribution;
+    const [left, right] = [10, canvas.width - 10];
+    const x = (torque: number) => left + ((torque + limit) / (2 * limit)) * (right - left);
+    const pieces = Math.max(1, Math.round((right - left) / 2));
+    const density = distribution.density(pieces);
+    const top = Math.max(...density);
+    const points = Array.from(density, (value, i): [number, number] => [
+      left + ((i + 0.5) / pieces) * (right - left),
+      bottom - (top > 0 ? value / top : 0) * (bottom - TOP),
+    ]);
+    canvas.line(
+      [
+        [left, bottom],
+        [right, bottom],
+      ],
+      'faint',
+      1,
+    );
+    const within = points.filter(([at]) => at >= x(low) - 1 && at <= x(high) + 1);
+    if (within.length > 1) canvas.area(within, bottom, 'spread');
+    canvas.line(points, 'bar');
+    canvas.line(
+      [
+        [x(mean), TOP],
+        [x(mean), bottom],
+      ],
+      'torque',
+      2.5,
+    );
+    for (const torque of [-limit, 0, limit]) {
+      canvas.text(signed(torque), x(torque), canvas.height - 7, 'center');
+    }
+    this.writeCutOff(distribution, left, right);
+  }
+
+  /// How likely it is that more than the limit is asked for, at either end.
+  private writeCutOff(distribution: GaussianTorque, left: number, right: number): void {
+    const { limit } = distribution;
+    const [low, high] = [distribution.upTo(-limit), 1 - distribution.upTo(limit)];
+    const percent = (share: number) => `${Math.round(100 * share)}%`;
+    if (low >= CUT_OFF) this.canvas.text(percent(low), left - 8, 10, 'left');
+    if (high >= CUT_OFF) this.canvas.text(percent(high), right + 8, 10, 'right');
+  }
+}
+
+function isFinite(decision: Decision): boolean {
+  if (decision.kind === 'q') return decision.q.every(Number.isFinite);
+  if (decision.kind === 'categorical') return decision.probabilities.every(Number.isFinite);
+  return Number.isFinite(decision.distribution.mean + decision.distribution.high);
+}

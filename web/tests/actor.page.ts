@@ -1,0 +1,154 @@
+import { writeFileSync } from 'node:fs';
+import { expect } from '@playwright/test';
+import type { Page } from '@playwright/test';
+import { open, run, startFrom, test } from './page';
+import { actorFiles, simulate } from './program';
+
+/// Actor policies, brought by a visitor: a Gaussian with a critic that takes its action, one without
+/// a critic, a clipped one, a categorical one.
+
+const bring = (page: Page, file: ArrayBuffer) =>
+  page
+    .locator('#file')
+    .setInputFiles({ name: 'actor.safetensors', mimeType: '', buffer: Buffer.from(file) });
+
+const CHARTS = [
+  /^−?\d\.\d\d N·m, σ \d\.\d\d, V −?\d+\.\d$/,
+  /^−?\d\.\d\d N·m, σ \d\.\d\d$/,
+  /^−?\d\.\d\d N·m, σ \d\.\d\d, V −?\d+\.\d$/,
+  /^likeliest \d+%, V −?\d+\.\d$/,
+];
+
+test('the chart is that of the policy, and Q-values come back with a Q-network', async ({
+  page,
+}) => {
+  await open(page);
+  await expect(page.locator('#q-name')).toHaveText('Q-values');
+  for (const [i, file] of actorFiles().entries()) {
+    await bring(page, file);
+    await expect(page.locator('#message')).toBeHidden();
+    await expect(page.locator('#q-value')).toHaveText(CHARTS[i]!);
+    await expect(page.locator('#q-name')).toHaveText('Policy');
+    await expect(page.locator('#q')).toHaveAccessibleName(/^Policy: /);
+    await expect(page.locator('#agent-text')).toContainText('Actor 8-');
+    await expect(page.locator('label[for=torque_limit]')).toContainText('agent: ±5');
+    await page.locator('#agent').selectOption('d3qn');
+    await expect(page.locator('#q-name')).toHaveText('Q-values');
+    await expect(page.locator('#q-value')).toHaveText(/^best /);
+  }
+});
+
+test.describe('on a canvas that is read back', () => {
+  test.use({ complains: true }); // that it could be faster
+
+  test('the curve is in the middle of its mean, and moves with what is seen', async ({ page }) => {
+    await open(page);
+    await page.locator('#pause').click();
+    /// Where the line at the mean is (0 left, 1 right), and the share of the chart that is painted.
+    const chart = () =>
+      page.evaluate(async () => {
+        for (let k = 0; k < 4; ++k) await new Promise(requestAnimationFrame);
+        const canvas = document.getElementById('q') as HTMLCanvasElement;
+        const { width, height } = canvas;
+        const { data } = canvas.getContext('2d')!.getImageData(0, 0, width, height);
+        // In its top rows nothing else stands but the curve's own peak.
+        const alpha = (x: number, y: number) => data[4 * (y * width + x) + 3]!;
+        let painted = 0;
+        for (let at = 3; at < data.length; at += 4) painted += data[at]! > 0 ? 1 : 0;
+        const ratio = canvas.width / canvas.clientWidth;
+        const { distribution } = upswing.world.decision as { distribution: { mean: number } };
+        const at = 10 + ((distribution.mean + 5) / 10) * (canvas.clientWidth - 20);
+        const column = Math.floor(at * ratio);
+        let line = 0;
+        const rows = Math.round((canvas.clientHeight - 24) * ratio);
+        for (let y = Math.round(6 * ratio); y < rows; ++y) line += alpha(column, y) > 200 ? 1 : 0;
+        return { painted: painted / (width * height), line: line / rows, mean: distribution.mean };
+      });
+    const means = new Set<number>();
+    for (const file of actorFiles().slice(0, 3)) {
+      await bring(page, file);
+      await expect(page.locator('#agent')).toHaveValue('own');
+      for (const q1 of [0, 1, -2]) {
+        await startFrom(page, q1);
+        const { painted, line, mean } = await chart();
+        expect(painted).toBeGreaterThan(0.03);
+        expect(line).toBeGreaterThan(0.85);
+        means.add(Math.round(100 * mean));
+      }
+      await page.locator('#agent').selectOption('d3qn');
+      await expect(page.locator('#agent')).toHaveValue('d3qn');
+    }
+    expect(means.size).toBeGreaterThan(6);
+  });
+});
+
+test('its torque is that of `upswing simulate`', async ({ page }, info) => {
+  await open(page);
+  for (const [i, file] of actorFiles().entries()) {
+    const path = info.outputPath(`actor${i}.safetensors`);
+    writeFileSync(path, Buffer.from(file));
+    await bring(page, file);
+    await expect(page.locator('#agent')).toHaveValue('own');
+    await page.evaluate(() => (upswing.world.agentOn = true));
+    await startFrom(page, 1);
+    const rows = await run(page, 2);
+    const expected = simulate(path, '--start', '1,0,0,0', '--seconds', '2');
+    expect(rows.length).toBe(100);
+    rows.forEach((row, k) => {
+      for (const column of [1, 2, 3, 4, 5]) {
+        expect(Math.abs(row[column]! - expected[k]![column]!)).toBeLessThan(1e-3);
+      }
+    });
+    expect(new Set(rows.map((row) => row[5])).size).toBeGreaterThan(i === 3 ? 1 : 40);
+  }
+});
+
+for (const [width, height] of [
+  [320, 568],
+  [390, 844],
+  [844, 390],
+  [768, 1024],
+  [1024, 768],
+  [1440, 900],
+] as const) {
+  test(`${width} × ${height}: the chart is seen with the pendulum, and its numbers in full`, async ({
+    page,
+  }) => {
+    await page.setViewportSize({ width, height });
+    await open(page);
+    for (const file of actorFiles()) {
+      await bring(page, file);
+      await expect(page.locator('#q-name')).toHaveText('Policy');
+      const seen = await page.evaluate(() => {
+        document.getElementById('stage')!.scrollIntoView({ behavior: 'instant' });
+        const caption = document.querySelector('#q-figure figcaption')!;
+        const figure = document.getElementById('q-figure')!.getBoundingClientRect();
+        return {
+          scrolls: document.documentElement.scrollWidth > innerWidth,
+          cut: caption.scrollWidth > caption.clientWidth,
+          inside: figure.left >= 0 && figure.right <= innerWidth,
+          lines: Math.round(
+            caption.clientHeight / parseFloat(getComputedStyle(caption).lineHeight),
+          ),
+        };
+      });
+      expect(seen).toEqual({ scrolls: false, cut: false, inside: true, lines: 1 });
+      await page.locator('#agent').selectOption('d3qn');
+    }
+  });
+}
+
+test('further down it is explained, and the chart goes on', async ({ page }) => {
+  await page.setViewportSize({ width: 390, height: 844 });
+  await open(page);
+  await bring(page, actorFiles()[0]!);
+  await expect(page.locator('#q-name')).toHaveText('Policy');
+  const summary = page.getByText('Actors: SAC and PPO');
+  await summary.click();
+  await expect(page.getByText('the central 68% of them')).toBeInViewport();
+  await page.locator('#stage').scrollIntoViewIfNeeded();
+  await page.locator('#agent-on').click();
+  const text = () => page.locator('#q-value').textContent();
+  const before = await text();
+  await expect.poll(text).not.toBe(before);
+});
