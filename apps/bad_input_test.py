@@ -100,6 +100,24 @@ class CommandLineTest(ProgramTest):
         self.refuse([*TRAIN, "--physics", "closed-form", "--model", "m.xml"],
                     "physics closed-form: expected the built-in model")
 
+    def test_settings_of_another_algorithm(self):
+        for flags, words in (
+                (["--alpha", "0.1"], ["--alpha", "sac", "agent d3qn learns by dqn"]),
+                (["--agent", "sac", "--epsilon-start", "1"],
+                 ["--epsilon-start", "of dqn", "agent sac learns by sac"]),
+                (["--agent", "ppo", "--n-step", "1"], ["n_step", "dqn and sac", "learns by ppo"]),
+                (["--algorithm", "sac"], ["--algorithm", "d3qn learns by dqn", "got sac"]),
+                (["--algorithm", "sarsa"], ["--algorithm", "dqn, sac, ppo", "sarsa"]),
+                (["--agent", "sac", "--bins", "1"], ["bins", "at least 2", "got 1"]),
+                (["--agent", "sac", "--bins", "9", "--value-low", "3", "--value-high", "3"],
+                 ["value_low", "less than value_high (3)", "got 3"]),
+                (["--agent", "sac", "--target-entropy", "1"], ["--target-entropy", "0.69"]),
+                (["--agent", "ppo", "--batch", "300"], ["batch", "256 or 512", "300"]),
+                (["--agent", "ppo", "--initial-std", "3"], ["initial_std", "max_std (1)", "3"]),
+                (["--agent", "ppo", "--levels", "5"], ["levels", "continuous", "5"])):
+            with self.subTest(flags=flags):
+                self.refuse(["train", *flags], *words)
+
     def test_no_layers(self):
         self.refuse([*TRAIN, "--hidden", "[]"], "expected", "--hidden")
 

@@ -104,7 +104,7 @@ void PrintEvalTable(const EvalReport& report) {
     fmt::print("    {:<18}{:8.2f}\n", report.spec.term_names[k], e.term_means[k]);
   }
   if (report.knows_values) {
-    fmt::print("  Q at the start {:.4g} expected, {:.4g} attained (discounted reward)\n", e.value,
+    fmt::print("  value at start {:.4g} expected, {:.4g} attained (discounted reward)\n", e.value,
                e.discounted_return);
   }
   fmt::print("  energy used    {} J   in {}\n", MomentsText(e.work), LengthText(e.seconds));

@@ -21,7 +21,8 @@ from pathlib import Path
 
 from testing import run
 
-# In MuJoCo and in closed form, on random plants with a memory, and without any extension.
+# In MuJoCo and in closed form, on random plants with a memory, without any extension, and by each
+# algorithm.
 CASES = {
     "d3qn": ["--steps", "6000", "--eval-every", "3000", "--eval-episodes", "10"],
     "d3qn-bare": ["--steps", "3000", "--eval-every", "1000", "--eval-episodes", "5"],
@@ -29,25 +30,37 @@ CASES = {
     "d3qn-small": ["--steps", "6000", "--eval-every", "3000", "--eval-episodes", "10"],
     "dqn": ["--steps", "4000", "--eval-every", "2000", "--eval-episodes", "10"],
     "fast": ["--steps", "20000", "--eval-episodes", "20"],
+    "ppo": ["--steps", "20480", "--eval-every", "10240", "--eval-episodes", "10"],
+    "ppo-discrete": ["--steps", "20480", "--eval-every", "10240", "--eval-episodes", "10"],
+    "sac-fast": ["--steps", "10000", "--eval-every", "5000", "--eval-episodes", "10"],
 }
 SLOW = {"d3qn", "d3qn-bare", "dqn"}  # without vector instructions
 
 PINNED = {
-    ("d3qn", "avx512"): ("b7d2ed954e38f454", "1baa6bd6623d9581"),
-    ("d3qn-bare", "avx512"): ("49a53614a224402d", "4d755dbe405890e9"),
-    ("d3qn-randomized", "avx512"): ("edad694eea358b41", "ef3c69f61176f1d3"),
-    ("d3qn-small", "avx512"): ("c6b1ee08204cbb1a", "ee063382a9e510a7"),
-    ("dqn", "avx512"): ("e97e22afdab380bc", "ffe47bf354b056b2"),
-    ("fast", "avx512"): ("a0b995bb1800dcd5", "6654e0b1837e7f24"),
-    ("d3qn", "avx2"): ("f3292dc9bcd871bd", "025861e620767bd3"),
-    ("d3qn-bare", "avx2"): ("49a53614a224402d", "4d755dbe405890e9"),
-    ("d3qn-randomized", "avx2"): ("01533d70da9b6363", "f7dd557349870f1c"),
-    ("d3qn-small", "avx2"): ("275e7b74c0c046ca", "48669f8ad255af44"),
-    ("dqn", "avx2"): ("e7e873751d5bb77e", "2b563b64e03c17b8"),
-    ("fast", "avx2"): ("87beb79ed39b5680", "dd803663c86d3a95"),
-    ("d3qn-randomized", "portable"): ("0a0fb5e05949f407", "baf5de38df843a06"),
-    ("d3qn-small", "portable"): ("55acee64b0902ba5", "be0de932f626f39f"),
-    ("fast", "portable"): ("ff5ea96eb3a62dd8", "1f90dd27882b5431"),
+    ("d3qn", "avx512"): ("b7d2ed954e38f454", "ea55070ca4518b59"),
+    ("d3qn-bare", "avx512"): ("49a53614a224402d", "7354f565dc255071"),
+    ("d3qn-randomized", "avx512"): ("edad694eea358b41", "8f76695aea02db40"),
+    ("d3qn-small", "avx512"): ("c6b1ee08204cbb1a", "c87e39bea4cd38bd"),
+    ("dqn", "avx512"): ("e97e22afdab380bc", "caa7df9d25f8707f"),
+    ("fast", "avx512"): ("a0b995bb1800dcd5", "6b1adc0b33342d1f"),
+    ("ppo", "avx512"): ("ce863a10c4591c03", "e8803b492af66f64"),
+    ("ppo-discrete", "avx512"): ("77bb72242c932e1e", "68d047a7df5d6572"),
+    ("sac-fast", "avx512"): ("7e19dc7fa514aabf", "271f2f0f07d703db"),
+    ("d3qn", "avx2"): ("f3292dc9bcd871bd", "f001e0850ae9bfc4"),
+    ("d3qn-bare", "avx2"): ("49a53614a224402d", "7354f565dc255071"),
+    ("d3qn-randomized", "avx2"): ("01533d70da9b6363", "ac86aa966475f94b"),
+    ("d3qn-small", "avx2"): ("275e7b74c0c046ca", "c8e73fc63d4f4acc"),
+    ("dqn", "avx2"): ("e7e873751d5bb77e", "30925e0c6ec1e61a"),
+    ("fast", "avx2"): ("87beb79ed39b5680", "6229176dbee34982"),
+    ("ppo", "avx2"): ("ce863a10c4591c03", "371d901e12c0797b"),
+    ("ppo-discrete", "avx2"): ("2bc534143160ffe1", "3d44fc670ecf1bed"),
+    ("sac-fast", "avx2"): ("b453af68aa54c04a", "b8ba3e3b8d9c1b31"),
+    ("d3qn-randomized", "portable"): ("0a0fb5e05949f407", "a1f87f7dce46f0cb"),
+    ("d3qn-small", "portable"): ("55acee64b0902ba5", "8cf868245d197a1e"),
+    ("fast", "portable"): ("ff5ea96eb3a62dd8", "4f2c17f391b14013"),
+    ("ppo", "portable"): ("ebda7e5f8c50a8db", "acb72f435ecb33b1"),
+    ("ppo-discrete", "portable"): ("52694e6fd553c6fd", "2ce24c4e1c4d7b5d"),
+    ("sac-fast", "portable"): ("ac8358c8ff693a7d", "d2a31af0bf59891b"),
 }
 
 

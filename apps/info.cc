@@ -75,7 +75,9 @@ void PrintPolicy(const LoadedPolicy& loaded) {
   if (loaded.task != kDoublePendulum) fmt::print("  task        {}\n", loaded.task);
   EnvConfig env;
   env.task = loaded.task;
-  const auto levels = policy.value_actions().values();
+  std::span<const double> levels = policy.value_actions().values();
+  const auto* of_actor = dynamic_cast<const ActorPolicy*>(&policy);
+  if (of_actor != nullptr) levels = of_actor->parts().torques;
   fmt::print("  torques     {}, every {} s\n",
              levels.empty()
                  ? "any within the limit"

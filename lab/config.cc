@@ -87,9 +87,23 @@ void CheckPpo(const PpoConfig& p, int64_t num_envs, const std::string& place) {
     throw BadInput(Concat(place, "levels: expected none with continuous actions, got ", p.levels,
                           " (or actions = levels)"));
   }
+  if (!p.discrete() && p.initial_std > p.max_std && p.initial_std != usual.initial_std) {
+    throw BadInput(Concat(place, "initial_std: expected at most max_std (", p.max_std, "), got ",
+                          p.initial_std));
+  }
   if (p.discrete() && p.initial_std != usual.initial_std) {
     throw BadInput(
         Concat(place, "initial_std: expected none with actions = levels, got ", p.initial_std));
+  }
+}
+
+/// Throws BadInput that begins with `place` unless the bins of a categorical critic can stand for
+/// different values.
+void CheckBins(const SacConfig& s, const std::string& place) {
+  if (s.bins == 1) throw BadInput(Concat(place, "bins: expected 0 or at least 2, got 1"));
+  if (s.bins > 0 && s.value_low >= s.value_high) {
+    throw BadInput(Concat(place, "value_low: expected less than value_high (", s.value_high,
+                          "), got ", s.value_low));
   }
 }
 
@@ -142,26 +156,47 @@ Options KnownOptions(Config& config, std::string_view agent) {
   }
   for (const auto& [name, algorithms] : owners) {
     if (options.Get(name) != nullptr) continue;
-    options.Explain(
-        name, Concat(name, " is a setting of ", Join(algorithms, " and "), "; expected one of ",
-                     config.algorithm, ", by which agent ", agent, " learns"));
+    options.Explain(name, Concat(name, " is a setting of ", Join(algorithms, " and "),
+                                 ", but agent ", agent, " learns by ", config.algorithm));
   }
   return options;
+}
+
+/// The named agent of a configuration, its settings and its algorithm.
+struct ChosenAgent {
+  std::string_view name;
+  std::string place;  // for messages
+  toml::table settings;
+  std::string algorithm;
+};
+
+/// Throws BadInput if there is no such agent, or if it does not learn by the algorithm that is
+/// asked for.
+ChosenAgent ChooseAgent(const toml::table& table, const std::string& where,
+                        const std::vector<FlagValue>& flags) {
+  EarlySetting setting = FindEarly("train", "agent", table, where, flags);
+  if (setting.where.empty()) setting.value = Config().agent;
+  const NamedAgent& agent = FindAgent(setting.value, setting.where);
+  const std::string place = Concat("agent ", agent.name);
+  toml::table settings = ParseToml(agent.toml, place);
+  const std::string algorithm = AlgorithmIn(settings, place);
+  const EarlySetting asked = FindEarly("train", "algorithm", table, where, flags);
+  if (!asked.where.empty()) {
+    CheckAlgorithm(asked.value, asked.where);
+    if (asked.value != algorithm) {
+      throw BadInput(Concat(asked.where, ": agent ", agent.name, " learns by ", algorithm, ", got ",
+                            asked.value, "; expected another agent, such as ", asked.value));
+    }
+  }
+  return {agent.name, place, std::move(settings), algorithm};
 }
 
 /// The settings of a parsed configuration file; see ParseConfig.
 Config ConfigOf(const toml::table& table, const fs::path& file,
                 const std::vector<FlagValue>& flags) {
   const std::string where = file.empty() ? "" : InputName(file.string());
-  EarlySetting agent_setting = FindEarly("train", "agent", table, where, flags);
-  if (agent_setting.where.empty()) agent_setting.value = Config().agent;
-  const NamedAgent& agent = FindAgent(agent_setting.value, agent_setting.where);
-  const std::string agent_place = Concat("agent ", agent.name);
-  const toml::table of_agent = ParseToml(agent.toml, agent_place);
-  EarlySetting algorithm = FindEarly("train", "algorithm", table, where, flags);
-  if (algorithm.where.empty()) algorithm.value = AlgorithmIn(of_agent, agent_place);
-  CheckAlgorithm(algorithm.value, algorithm.where);
-  Config config(algorithm.value);
+  const ChosenAgent agent = ChooseAgent(table, where, flags);
+  Config config(agent.algorithm);
   const Options options = KnownOptions(config, agent.name);
 
   // A model file has a plant of its own, which other settings may change.
@@ -172,7 +207,7 @@ Config ConfigOf(const toml::table& table, const fs::path& file,
   }
   if (!model_path.empty()) config.plant = ChangedPlant(config.plant, model_path, {}, config.mjcf);
 
-  ApplyTable(options, of_agent, agent_place, false);
+  ApplyTable(options, agent.settings, agent.place, false);
   ApplyTable(options, table, where, false);
   SetFlags(options, flags);
   config.agent = agent.name;
@@ -180,6 +215,7 @@ Config ConfigOf(const toml::table& table, const fs::path& file,
   const std::string place = where.empty() ? "" : where + ": ";
   if (config.algorithm == kSac) {
     CheckTogether(config.sac, place);
+    CheckBins(config.sac, place);
   } else if (config.algorithm == kPpo) {
     CheckPpo(config.ppo, config.train.envs, place);
   } else {
@@ -349,6 +385,7 @@ Config ReadRunConfig(const fs::path& run, const std::vector<FlagValue>& flags) {
     throw BadInput(Concat(file.string(), ": model: expected ", RunFolder::kModel,
                           ", the copy in the run folder, got \"", Printable(model), "\""));
   }
+  ChooseAgent(table, file.string(), flags);  // whose algorithm says which settings there are
   std::vector<std::string> missing = MissingIn(table, file.string(), false);
   if (missing.empty()) return ConfigOf(table, file, flags);
   constexpr size_t kMostNames = 6;  // that make a line which can still be read

@@ -43,7 +43,8 @@ LearnerSize SizeOfLearner(const Config& config) {
                 critics * static_cast<double>(critic.num_parameters()),
             // Online, target or kept, gradient, Adam's two moments, and what products want.
             6, 4, 2.0 * D + A + 2, static_cast<double>(s.replay), static_cast<double>(s.batch),
-            widest(s.hidden), (1 + critics) * 3 * static_cast<double>(s.hidden.size())};
+            std::max(widest(s.hidden), static_cast<double>(s.bins)),
+            (1 + critics) * 3 * static_cast<double>(s.hidden.size())};
   }
   if (config.algorithm == "ppo") {
     const PpoConfig& p = config.ppo;

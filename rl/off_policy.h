@@ -58,8 +58,8 @@ class OffPolicyAgent : public Agent {
   virtual double RewardOf(const StepResult& result, size_t env);
   /// The observations (N × D) that actions are now chosen for.
   void Remember(Matrix<const float> obs);
-  /// The window of an average that follows the learned policy, given that at the beginning: the
-  /// slower learning is, the longer (Polyak and Juditsky, 1992, let it grow).
+  /// Polyak rate of the policy that is judged: `tau` times the learning rate over that at the
+  /// beginning. As learning slows, the average lengthens (Polyak and Juditsky, 1992).
   double AveragingTau(double tau) const;
   /// Saves or loads memory, streams of random numbers and counters. Throws BadInput, too, if they
   /// contradict each other.
@@ -67,7 +67,7 @@ class OffPolicyAgent : public Agent {
 
   Rng explore_rng_;
   std::vector<float> act_action_;  // (N × A) of the last Act
-  std::vector<float> td_error_;    // (B) of the last Update: Q(s, a) - y
+  std::vector<float> td_error_;    // (B) of the last Update: Q(s, a) - y, or its size
   int64_t steps_ = 0, episodes_ = 0, updates_ = 0;
 
  private:

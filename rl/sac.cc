@@ -11,6 +11,7 @@
 #include "rl/representation.h"
 
 namespace upswing {
+
 Sac::Sac(const SacConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool& pool)
     : OffPolicyAgent(config, spec, ActionSpace{spec.action_size()}, seed),
       config_(config),
@@ -26,7 +27,7 @@ Sac::Sac(const SacConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
         return TrainedNetwork(config.Trunk(D_), {2 * A_}, B_, rng);
       }()),
       theta_policy_(actor_.theta().begin(), actor_.theta().end()),
-      log_alpha_(1, static_cast<float>(std::log(std::max(1e-30, config.alpha)))),
+      log_alpha_(1, static_cast<float>(std::max(double{-kMostLogAlpha}, std::log(config.alpha)))),
       alpha_adam_(1),
       actor_outputs_(Size(B_, 2 * A_)),
       actor_dy_(actor_outputs_.size()),
@@ -46,7 +47,8 @@ Sac::Sac(const SacConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
     TrainedNetwork network(config.Trunk(D_ + A_), {bins_.outputs()}, B_, rng);
     AlignedVector<float> target(network.theta().begin(), network.theta().end());
     const AlignedVector<float> outputs(Size(B_, bins_.outputs())), value(y_.size());
-    critics_.push_back({std::move(network), std::move(target), outputs, outputs, value, inputs_});
+    critics_.push_back(
+        {std::move(network), std::move(target), outputs, outputs, value, value, inputs_});
   }
 }
 
@@ -132,7 +134,7 @@ void Sac::State(const Archive& archive) {
     critics_[i].network.State(in);
     in.Array("theta_target", std::span(critics_[i].target));
   }
-  archive.Array("log_alpha", std::span(log_alpha_), {-100, 100});
+  archive.Array("log_alpha", std::span(log_alpha_), {-kMostLogAlpha, kMostLogAlpha});
   alpha_adam_.State(archive.In("alpha_adam"));
   noise_rng_.State(archive.In("noise_rng"));
   archive.Array("last_mean", std::span(last_mean_), kUnitRange);

@@ -23,16 +23,20 @@
 namespace upswing {
 
 /// Soft targets y (B) = r + discount · (min(Q1', Q2') - α ln π(a'|s')) with a' ~ π(s') (Eq 3 and
-/// 5, over n steps). discount is γⁿ, or 0 after a termination. All are (B).
+/// 5). Over n steps the entropy enters at the last one only, and rewards in between are those of
+/// the policy that acted. discount is γⁿ, or 0 after a termination. All are (B).
 void SoftTargets(std::span<const float> q1, std::span<const float> q2,
                  std::span<const float> log_prob, double alpha, std::span<const float> reward,
                  std::span<const float> discount, std::span<float> y);
 
 /// The gradient with respect to ln α of -ln α · (ln π + H), H the target entropy (Eq 18, with ln α
 /// for α): below 0, so that α rises, while the policy's entropy -ln π is below its target.
+/// ln α is kept within ±kMostLogAlpha.
 inline double TemperatureGradient(double mean_log_prob, double target_entropy) {
   return -(mean_log_prob + target_entropy);
 }
+
+inline constexpr float kMostLogAlpha = 20;
 
 /// An SAC agent for N environments.
 class Sac : public OffPolicyAgent {
@@ -57,7 +61,7 @@ class Sac : public OffPolicyAgent {
     TrainedNetwork network;
     AlignedVector<float> target;       // its parameters' Polyak average, (num_parameters)
     AlignedVector<float> outputs, dy;  // (B × outputs) and the loss's gradient
-    AlignedVector<float> value;        // (B)
+    AlignedVector<float> value, loss;  // (B), the loss times the transition's weight
     AlignedVector<float> dinputs;      // (B × (D + A)) dQ/d(s, a), for the actor
   };
 

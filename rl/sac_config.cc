@@ -18,7 +18,7 @@ void SacConfig::Describe(Options& o) {
         "the agent's reward falls by this times the squared change of its mean action, in units of "
         "the limit");
   o.Add(&actor_period, "actor_period", 2, {1, 1e9}, "updates",
-        "of the critics for one of actor and temperature");
+        "critic updates for each update of actor and temperature");
   o.Add(&actor_rate, "actor_rate", 1, {0, 1000}, "", "the actor's learning rate over the critics'");
   o.Add(&tau, "tau", 0.02, kUnit, "", "Polyak averaging of the target critics, per update");
   o.Add(&policy_tau, "policy_tau", 0.01, {1e-9, 1}, "",
@@ -27,8 +27,9 @@ void SacConfig::Describe(Options& o) {
   o.Add(&tune_alpha, "tune_alpha", true, "learn the temperature, so that entropy meets its target");
   o.Add(&alpha, "alpha", 0.1, {0, 1e6}, "", "temperature, or what it begins with");
   o.Add(&alpha_rate, "alpha_rate", 3e-3, {0, 10}, "", "learning rate of its logarithm");
-  o.Add(&target_entropy, "target_entropy", -1, {-100, 100}, "",
-        "of each component of the action, in units of its limit");
+  o.Add(
+      &target_entropy, "target_entropy", -1, {-100, 0.69}, "nats",
+      "entropy of each component of the action, in units of its limit; uniform actions have 0.69");
 }
 
 MlpShape SacConfig::Trunk(int inputs) const { return {inputs, hidden, layer_norm}; }

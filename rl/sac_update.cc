@@ -99,8 +99,8 @@ void Sac::CriticRows(const Minibatch& batch, RowRange rows) {
     ValueRows(critic, rows);
     for (int i = rows.first; i < rows.first + rows.count; ++i) {
       const auto row = static_cast<size_t>(i);
-      bins_.Loss(outputs.row(i), y_[row], dy.row(i));
       const float weight = batch.weight[row] / static_cast<float>(B_);
+      critic.loss[row] = batch.weight[row] * bins_.Loss(outputs.row(i), y_[row], dy.row(i));
       for (float& gradient : dy.row(i)) gradient *= weight;
     }
     critic.network.Backward(dy, rows);
@@ -178,8 +178,9 @@ void Sac::UpdateTemperature() {
   const AlignedVector<float> gradient(
       1, static_cast<float>(TemperatureGradient(mean_log_prob, A_ * config_.target_entropy)));
   AlignedVector<float> unused(1);
-  alpha_adam_.Step({config_.alpha_rate, std::abs(gradient[0]), 1e9, 0}, gradient, log_alpha_,
-                   unused, pool_);
+  const double norm = std::abs(gradient[0]);
+  alpha_adam_.Step({config_.alpha_rate, norm, norm, 0}, gradient, log_alpha_, unused, pool_);
+  log_alpha_[0] = std::clamp(log_alpha_[0], -kMostLogAlpha, kMostLogAlpha);
 }
 
 void Sac::CountErrors() {
@@ -188,7 +189,7 @@ void Sac::CountErrors() {
   for (const Critic& critic : critics_) {
     for (size_t i = 0; i < y_.size(); ++i) {
       const double error = double{critic.value[i]} - y_[i];
-      loss += error * error / 2;
+      loss += critic.loss[i];
       td += std::abs(error);
       q += critic.value[i];
       // A transition's priority is the mean of both.
