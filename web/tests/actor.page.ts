@@ -100,6 +100,9 @@ test('its torque is that of `upswing simulate`', async ({ page }, info) => {
       }
     });
     expect(new Set(rows.map((row) => row[5])).size).toBeGreaterThan(i === 3 ? 1 : 40);
+    // So that the next one's arrival can be seen.
+    await page.locator('#agent').selectOption('d3qn');
+    await expect(page.locator('#agent')).toHaveValue('d3qn');
   }
 });
 
