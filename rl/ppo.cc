@@ -200,6 +200,7 @@ void Ppo::Estimate() {
 
 void Ppo::Learn() {
   if (!rollout_.full()) return;
+  BeginSums();
   Estimate();
   double kl = 0;
   for (int64_t epoch = 0; epoch < config_.epochs; ++epoch) {

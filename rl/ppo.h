@@ -68,6 +68,9 @@ class Ppo : public Agent {
   void BackwardCritic(RowRange rows, Sums& sums);
   /// Steps of actor, ln σ and critic along their gradients.
   void Step(const Sums& sums);
+  /// Begins the metrics' sums anew if they have been reported. Until the next rollout has been
+  /// learned from, the last one's stand.
+  void BeginSums();
   void CountUpdate(const Sums& sums);
   /// The KL-adaptive learning rate, given KL(π_old ‖ π) of the last epoch.
   void AdaptRate(double kl);
@@ -112,7 +115,8 @@ class Ppo : public Agent {
   std::vector<Sums> sums_;                                                          // by slice
 
   int64_t steps_ = 0, updates_ = 0;
-  // Sums since TakeMetrics.
+  // Sums since the first update after TakeMetrics.
+  bool reported_ = false;
   double policy_loss_sum_ = 0, value_loss_sum_ = 0, entropy_sum_ = 0, kl_sum_ = 0;
   double clipped_sum_ = 0, norm_sum_ = 0;
   double explained_variance_ = 0;

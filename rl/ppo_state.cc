@@ -69,9 +69,15 @@ Metrics Ppo::TakeMetrics() {
     const double sum = std::accumulate(std_.begin(), std_.end(), 0.0);
     metrics.emplace_back("std", sum / static_cast<double>(std_.size()));
   }
+  reported_ = true;
+  return metrics;
+}
+
+void Ppo::BeginSums() {
+  if (!reported_) return;
   policy_loss_sum_ = value_loss_sum_ = entropy_sum_ = kl_sum_ = clipped_sum_ = norm_sum_ = 0;
   report_updates_ = 0;
-  return metrics;
+  reported_ = false;
 }
 
 std::unique_ptr<Policy> Ppo::ExportPolicy(PolicyInfo info) const {
@@ -130,6 +136,7 @@ void Ppo::State(const Archive& archive) {
                     critic_.steps() == updates_ && log_std_adam_.steps() == updates_,
                 "updates", Concat(updates_due(), ", which the steps imply, and as many of Adam"));
   archive.Scalar("report_updates", report_updates_, {0, updates_});
+  archive.Scalar("reported", reported_);
   archive.Scalar("policy_loss_sum", policy_loss_sum_, kAnyNumber<double>);
   archive.Scalar("value_loss_sum", value_loss_sum_, {0, kLargest});
   archive.Scalar("entropy_sum", entropy_sum_, kAnyNumber<double>);

@@ -245,6 +245,20 @@ TEST(Ppo, TheEnvironmentGetsTheClippedActionAndTheBufferTheRawOne) {
   EXPECT_EQ(Metric(agent.TakeMetrics(), "kl"), 0);
 }
 
+TEST(Ppo, MetricsAreThoseOfTheLastRolloutUntilThereIsAnother) {
+  PpoConfig config = SmallConfig();
+  ThreadPool pool(1);
+  Ppo agent(config, ToyEnv::Spec(4), 1, pool);
+  ToyEnv env(4);
+  Walk(agent, env, 16);
+  const Metrics first = agent.TakeMetrics();
+  EXPECT_GT(Metric(first, "value_loss"), 0);
+  Walk(agent, env, 8);  // half a rollout
+  EXPECT_EQ(Metric(agent.TakeMetrics(), "value_loss"), Metric(first, "value_loss"));
+  Walk(agent, env, 8);
+  EXPECT_NE(Metric(agent.TakeMetrics(), "value_loss"), Metric(first, "value_loss"));
+}
+
 TEST(Ppo, TheLearningRateFollowsTheKlTarget) {
   for (const bool large : {false, true}) {
     PpoConfig config = SmallConfig();
