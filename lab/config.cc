@@ -58,7 +58,6 @@ EarlySetting FindEarly(std::string_view section, std::string_view key, const tom
 
 /// Throws BadInput that begins with `place` if settings of an agent with a replay memory, each of
 /// which is allowed, contradict each other, so that nothing could be learned.
-template <typename OffPolicyConfig>
 void CheckTogether(const OffPolicyConfig& d, const std::string& place) {
   if (d.batch > d.replay) {
     throw BadInput(Concat(place,

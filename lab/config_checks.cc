@@ -77,7 +77,6 @@ void WarnOfNoRate(const AgentConfig& c, std::vector<std::string>& warnings) {
 }
 
 /// What would keep an agent with a replay memory from learning, in `steps` of training.
-template <typename OffPolicyConfig>
 void AddWarnings(const OffPolicyConfig& d, int64_t steps, std::vector<std::string>& warnings) {
   if (d.learning_starts >= steps) {
     warnings.push_back(fmt::format(

@@ -20,8 +20,7 @@ namespace {
 constexpr int kActRows = 32;           // environments that act in one task
 constexpr double kAdamEpsilon = 1e-5;  // Andrychowicz et al. (2021)
 constexpr double kOutputGain = 0.01;   // of the actor's output layer: it begins near 0
-constexpr double kRateStep = 1.5;      // by which the KL target changes the learning rate…
-constexpr Bounds<double> kRateFactor{1e-3, 10};  // …within this
+constexpr double kRateStep = 1.5;      // by which the KL target changes the learning rate
 
 int Blocks(int num_envs) { return (num_envs + kActRows - 1) / kActRows; }
 

@@ -72,6 +72,8 @@ class Ppo : public Agent {
   /// learned from, the last one's stand.
   void BeginSums();
   void CountUpdate(const Sums& sums);
+  /// What the KL target may make of the scheduled learning rate.
+  static constexpr Bounds<double> kRateFactor{1e-3, 10};
   /// The KL-adaptive learning rate, given KL(π_old ‖ π) of the last epoch.
   void AdaptRate(double kl);
   /// Progress of the schedules, 0 to 1.

@@ -109,7 +109,7 @@ void Ppo::State(const Archive& archive) {
   log_std_adam_.State(archive.In("log_std_adam"));
   SetStd();
   normalizer_.State(archive.In("normalizer"));
-  archive.Scalar("rate_factor", rate_factor_, {1e-3, 10});
+  archive.Scalar("rate_factor", rate_factor_, kRateFactor);
   for (size_t i = 0; i < explore_rngs_.size(); ++i) {
     explore_rngs_[i].State(archive.In(Concat("explore_rng.", i)));
   }
