@@ -28,7 +28,7 @@ using PairProduct = Product<uint32_t, float>;
 #if HWY_ARCH_X86_64
 
 // ------------------------------------------------------------------------------------------------
-// AVX512_BF16: tiles of C in registers, as in linear.cc.
+// AVX512_BF16: tiles of C in registers, as in product.cc.
 
 HWY_PUSH_ATTRIBUTES("avx512f,avx512bw,avx512vl,avx512dq,avx512bf16")
 namespace {

@@ -1,6 +1,5 @@
 // The kernels of small networks, written once with Highway and compiled for each kind of vector
-// instructions. The three matrix products of a linear layer are one kernel, C = A · B, whose A is
-// read along its rows or its columns.
+// instructions; the matrix products are product.cc.
 #include "nn/linear.h"
 
 #include "nn/product.h"
@@ -13,6 +12,8 @@
 // its functions, for each target
 #include <hwy/contrib/math/math-inl.h>
 
+#include "nn/registers-inl.h"
+
 #ifndef UPSWING_NN_LINEAR_ONCE  // what all targets share
 #define UPSWING_NN_LINEAR_ONCE
 #include <algorithm>
@@ -24,7 +25,6 @@ namespace upswing {
 /// The kernels of one target.
 template <typename T>
 struct KernelTable {
-  void (*multiply)(const Product<T>&);
   decltype(&Transpose<T>) transpose;
   decltype(&SumRows<T>) sum_rows;
   decltype(&LayerNormForward<T>) layer_norm_forward;
@@ -41,135 +41,6 @@ struct KernelTable {
 
 HWY_BEFORE_NAMESPACE();
 namespace upswing::HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
-
-template <typename T>
-using Tag = hn::ScalableTag<T>;
-template <typename T>
-using Vec = hn::Vec<Tag<T>>;
-
-// ------------------------------------------------------------------------------------------------
-// Matrix products. A tile of C, kRows × kVectors registers, stays in registers over the whole of K;
-// weights of these sizes stay in the L2 cache, and packing them would gain nothing.
-
-/// Tile shapes: registers for C, besides those for a row of B and a number of A. Tiles of
-/// fewer rows, for what remains of M and for single rows, are wider, because a multiply-add takes
-/// several cycles and as many must be in flight.
-#if HWY_TARGET == HWY_AVX3 || HWY_ARCH_ARM_A64  // of 32 registers
-constexpr int kTileRows = 8;
-constexpr int kRegisters = 16;
-#else  // of 16
-constexpr int kTileRows = 6;
-constexpr int kRegisters = 12;
-#endif
-
-/// Whether masked stores leave the other numbers untouched, which threads that write next to each
-/// other need; on other targets Highway reads and rewrites the whole register.
-constexpr bool kMasked = HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3;
-
-/// Up to `count` numbers, or a whole register of them.
-template <bool kPartial, typename T>
-HWY_INLINE Vec<T> Load(const T* from, size_t count) {
-  const Tag<T> d;
-  if constexpr (!kPartial) return hn::LoadU(d, from);
-  if constexpr (kMasked) return hn::MaskedLoad(hn::FirstN(d, count), d, from);
-  HWY_ALIGN T lanes[HWY_LANES(T)] = {};
-  std::copy_n(from, count, lanes);
-  return hn::Load(d, lanes);
-}
-template <bool kPartial, typename T>
-HWY_INLINE void Store(Vec<T> value, T* to, size_t count) {
-  const Tag<T> d;
-  if constexpr (!kPartial) {
-    hn::StoreU(value, d, to);
-  } else if constexpr (kMasked) {
-    hn::BlendedStore(value, hn::FirstN(d, count), d, to);
-  } else {
-    HWY_ALIGN T lanes[HWY_LANES(T)];
-    hn::Store(value, d, lanes);
-    std::copy_n(lanes, count, to);
-  }
-}
-
-/// The tile of C at (m, n); if kPartial it has one register in a row, of which `count` numbers.
-template <int kRows, int kVectors, bool kPartial, typename T>
-HWY_INLINE void MultiplyTile(const Product<T>& p, int m, int n, size_t count) {
-  const Tag<T> d;
-  const int lanes = static_cast<int>(hn::Lanes(d));
-  Vec<T> c[kRows][kVectors];
-  HWY_UNROLL(16)
-  for (int v = 0; v < kVectors; ++v) {
-    const Vec<T> start =
-        p.bias == nullptr ? hn::Zero(d) : Load<kPartial>(p.bias + n + v * lanes, count);
-    HWY_UNROLL(16)
-    for (int i = 0; i < kRows; ++i) c[i][v] = start;
-  }
-
-  const T* a = p.a + m * p.a_m;
-  const T* b = p.b.data() + n;
-  for (int k = 0; k < p.K; ++k) {
-    Vec<T> b_row[kVectors];
-    HWY_UNROLL(16)
-    for (int v = 0; v < kVectors; ++v) b_row[v] = Load<kPartial>(b + v * lanes, count);
-    HWY_UNROLL(16)
-    for (int i = 0; i < kRows; ++i) {
-      const Vec<T> a_ik = hn::Set(d, a[i * p.a_m]);
-      HWY_UNROLL(16)
-      for (int v = 0; v < kVectors; ++v) c[i][v] = hn::MulAdd(a_ik, b_row[v], c[i][v]);
-    }
-    a += p.a_k;
-    b += p.b.stride();
-  }
-
-  HWY_UNROLL(16)
-  for (int i = 0; i < kRows; ++i) {
-    HWY_UNROLL(16)
-    for (int v = 0; v < kVectors; ++v) {
-      const int col = n + v * lanes;
-      if (p.relu) c[i][v] = hn::Max(c[i][v], hn::Zero(d));
-      if (!p.gate.empty()) {
-        const Vec<T> gate = Load<kPartial>(&p.gate(m + i, col), count);
-        c[i][v] = hn::IfThenElseZero(hn::Gt(gate, hn::Zero(d)), c[i][v]);
-      }
-      Store<kPartial>(c[i][v], &p.c(m + i, col), count);
-    }
-  }
-}
-
-/// Rows m to `end` of C, from column n on as far as tiles of kRows × kVectors registers go; returns
-/// the first column after them.
-template <int kRows, int kVectors, typename T>
-int MultiplyColumns(const Product<T>& p, int m, int end, int n) {
-  const int step = kVectors * static_cast<int>(hn::Lanes(Tag<T>()));
-  for (; n + step <= p.N; n += step) {
-    for (int i = m; i < end; i += kRows) MultiplyTile<kRows, kVectors, false>(p, i, n, 0);
-  }
-  return n;
-}
-
-/// All of C from row m on that can be cut into tiles of kRows rows; returns the first row after.
-template <int kRows, typename T>
-int MultiplyRows(const Product<T>& p, int m) {
-  constexpr int kVectors = kRegisters / kRows;
-  const int end = m + (p.M - m) / kRows * kRows;
-  int n = MultiplyColumns<kRows, kVectors>(p, m, end, 0);
-  if constexpr (kVectors > 4) n = MultiplyColumns<kRows, 4>(p, m, end, n);
-  n = MultiplyColumns<kRows, 1>(p, m, end, n);
-  if (n < p.N) {
-    const auto count = static_cast<size_t>(p.N - n);
-    for (int i = m; i < end; i += kRows) MultiplyTile<kRows, 1, true>(p, i, n, count);
-  }
-  return end;
-}
-
-template <typename T>
-void Multiply(const Product<T>& p) {
-  int m = MultiplyRows<kTileRows>(p, 0);
-  m = MultiplyRows<4>(p, m);
-  m = MultiplyRows<2>(p, m);
-  MultiplyRows<1>(p, m);
-}
-
 /// y = xᵀ. Floats go by blocks of 4 × 4 in registers of four.
 template <typename T>
 void Transpose(Matrix<const T> x, Matrix<T> y) {
@@ -178,23 +49,16 @@ void Transpose(Matrix<const T> x, Matrix<T> y) {
 #if HWY_TARGET != HWY_SCALAR
   if constexpr (sizeof(T) == 4) {
     const hn::Full128<T> d;
-    const hn::Repartition<double, decltype(d)> pairs;
     rows = x.rows() / 4 * 4;
     cols = x.cols() / 4 * 4;
     for (int c = 0; c < cols; c += 4) {
       for (int r = 0; r < rows; r += 4) {
-        const auto r0 = hn::LoadU(d, &x(r, c));
-        const auto r1 = hn::LoadU(d, &x(r + 1, c));
-        const auto r2 = hn::LoadU(d, &x(r + 2, c));
-        const auto r3 = hn::LoadU(d, &x(r + 3, c));
-        const auto low01 = hn::BitCast(pairs, hn::InterleaveLower(d, r0, r1));
-        const auto low23 = hn::BitCast(pairs, hn::InterleaveLower(d, r2, r3));
-        const auto high01 = hn::BitCast(pairs, hn::InterleaveUpper(d, r0, r1));
-        const auto high23 = hn::BitCast(pairs, hn::InterleaveUpper(d, r2, r3));
-        hn::StoreU(hn::BitCast(d, hn::InterleaveLower(pairs, low01, low23)), d, &y(c, r));
-        hn::StoreU(hn::BitCast(d, hn::InterleaveUpper(pairs, low01, low23)), d, &y(c + 1, r));
-        hn::StoreU(hn::BitCast(d, hn::InterleaveLower(pairs, high01, high23)), d, &y(c + 2, r));
-        hn::StoreU(hn::BitCast(d, hn::InterleaveUpper(pairs, high01, high23)), d, &y(c + 3, r));
+        hn::Vec<decltype(d)> block[4];
+        HWY_UNROLL(4)
+        for (int i = 0; i < 4; ++i) block[i] = hn::LoadU(d, &x(r + i, c));
+        TransposeBlocks(d, block);
+        HWY_UNROLL(4)
+        for (int i = 0; i < 4; ++i) hn::StoreU(block[i], d, &y(c + i, r));
       }
     }
   }
@@ -202,36 +66,6 @@ void Transpose(Matrix<const T> x, Matrix<T> y) {
   for (int r = 0; r < x.rows(); ++r) {
     for (int c = r < rows ? cols : 0; c < x.cols(); ++c) y(c, r) = x(r, c);
   }
-}
-
-// ------------------------------------------------------------------------------------------------
-// Passes over vectors. Each applies `f(i, count, partial)` to whole registers and then, with
-// partial = true, to the `count` numbers that remain.
-
-template <typename T, typename F>
-HWY_INLINE void ForVectors(size_t n, const F& f) {
-  const size_t lanes = hn::Lanes(Tag<T>());
-  size_t i = 0;
-  for (; i + lanes <= n; i += lanes) f(i, lanes, std::false_type());
-  if (i < n) f(i, n - i, std::true_type());
-}
-
-/// Σ term(i, count, partial) over all vectors, with four independent sums.
-template <typename T, typename F>
-HWY_INLINE T SumVectors(size_t n, const F& term) {
-  const Tag<T> d;
-  Vec<T> sum[4] = {hn::Zero(d), hn::Zero(d), hn::Zero(d), hn::Zero(d)};
-  const size_t lanes = hn::Lanes(d);
-  size_t i = 0;
-  for (; i + 4 * lanes <= n; i += 4 * lanes) {
-    for (size_t k = 0; k < 4; ++k) {
-      sum[k] = hn::Add(sum[k], term(i + k * lanes, lanes, std::false_type()));
-    }
-  }
-  for (; i + lanes <= n; i += lanes) sum[0] = hn::Add(sum[0], term(i, lanes, std::false_type()));
-  if (i < n) sum[1] = hn::Add(sum[1], term(i, n - i, std::true_type()));
-  const Vec<T> all = hn::Add(hn::Add(sum[0], sum[1]), hn::Add(sum[2], sum[3]));
-  return hn::GetLane(hn::SumOfLanes(d, all));
 }
 
 template <typename T>
@@ -404,7 +238,6 @@ void AdamPolyakStep(const AdamConstants<T>& constants, std::span<const T> g, std
 
 template <typename T>
 constexpr KernelTable<T> kKernels{
-    &Multiply<T>,
     &Transpose<T>,
     &SumRows<T>,
     &LayerNormForward<T>,
@@ -443,53 +276,53 @@ const KernelTable<T>& Kernels() {
 template <typename T>
 void LinearForward(Matrix<const T> x, Matrix<const T> w, std::span<const T> b, bool relu,
                    Matrix<T> y) {
-  Kernels<T>().multiply({.M = y.rows(),
-                         .N = y.cols(),
-                         .K = x.cols(),
-                         .a = x.data(),
-                         .a_m = x.stride(),
-                         .a_k = 1,
-                         .b = w,
-                         .c = y,
-                         .bias = b.data(),
-                         .relu = relu});
+  Multiply({.M = y.rows(),
+            .N = y.cols(),
+            .K = x.cols(),
+            .a = x.data(),
+            .a_m = x.stride(),
+            .a_k = 1,
+            .b = w,
+            .c = y,
+            .bias = b.data(),
+            .relu = relu});
 }
 
 template <typename T>
 void LinearBackwardInput(Matrix<const T> dy, Matrix<const T> w_transposed, Matrix<const T> gate,
                          Matrix<T> dx) {
-  Kernels<T>().multiply({.M = dx.rows(),
-                         .N = dx.cols(),
-                         .K = dy.cols(),
-                         .a = dy.data(),
-                         .a_m = dy.stride(),
-                         .a_k = 1,
-                         .b = w_transposed,
-                         .c = dx,
-                         .gate = gate});
+  Multiply({.M = dx.rows(),
+            .N = dx.cols(),
+            .K = dy.cols(),
+            .a = dy.data(),
+            .a_m = dy.stride(),
+            .a_k = 1,
+            .b = w_transposed,
+            .c = dx,
+            .gate = gate});
 }
 
 template <typename T>
 void LinearBackwardWeight(Matrix<const T> x, Matrix<const T> dy, Matrix<T> dw) {
   if (dw.cols() == 1 && dw.stride() == 1) {
     // One column is computed as its transpose, a row that fills registers: the same sums.
-    return Kernels<T>().multiply({.M = 1,
-                                  .N = dw.rows(),
-                                  .K = x.rows(),
-                                  .a = dy.data(),
-                                  .a_m = 0,
-                                  .a_k = dy.stride(),
-                                  .b = x,
-                                  .c = {dw.data(), 1, dw.rows()}});
+    return Multiply({.M = 1,
+                     .N = dw.rows(),
+                     .K = x.rows(),
+                     .a = dy.data(),
+                     .a_m = 0,
+                     .a_k = dy.stride(),
+                     .b = x,
+                     .c = {dw.data(), 1, dw.rows()}});
   }
-  Kernels<T>().multiply({.M = dw.rows(),
-                         .N = dw.cols(),
-                         .K = x.rows(),
-                         .a = x.data(),
-                         .a_m = 1,
-                         .a_k = x.stride(),
-                         .b = dy,
-                         .c = dw});
+  Multiply({.M = dw.rows(),
+            .N = dw.cols(),
+            .K = x.rows(),
+            .a = x.data(),
+            .a_m = 1,
+            .a_k = x.stride(),
+            .b = dy,
+            .c = dw});
 }
 
 template <typename T>

@@ -36,4 +36,8 @@ struct Product {
   }
 };
 
+/// Computes C on vectors. The order of each sum depends on the sizes alone.
+void Multiply(const Product<float>& product);
+void Multiply(const Product<double>& product);
+
 }  // namespace upswing

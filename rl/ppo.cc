@@ -83,8 +83,8 @@ Ppo::Ppo(const PpoConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
   }
   std::iota(order_.begin(), order_.end(), 0);
   Rng init_rng(seed, "initial parameters");
-  InitializeOrthogonal(actor_.network(), kOutputGain, init_rng, actor_.theta());
-  InitializeOrthogonal(critic_.network(), 1, init_rng, critic_.theta());
+  InitializeOrthogonal(actor_.network(), kOutputGain, init_rng, actor_.mutable_theta());
+  InitializeOrthogonal(critic_.network(), 1, init_rng, critic_.mutable_theta());
   SetStd();
 }
 

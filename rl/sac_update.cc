@@ -17,12 +17,10 @@ auto Part(Values& values, RowRange rows) {
                                    static_cast<size_t>(rows.count));
 }
 
-/// Writes the observations (B × D) of some rows and, behind each, A numbers.
-void JoinRows(Matrix<const float> obs, Matrix<const float> action, RowRange rows,
-              Matrix<float> joined) {
+/// Writes some rows of x into y, from this column on.
+void CopyRows(Matrix<const float> x, RowRange rows, int column, Matrix<float> y) {
   for (int i = rows.first; i < rows.first + rows.count; ++i) {
-    float* row = std::ranges::copy(obs.row(i), joined.row(i).data()).out;
-    std::ranges::copy(action.row(i), row);
+    for (int k = 0; k < x.cols(); ++k) y(i, column + k) = x(i, k);  // few: no call is worth it
   }
 }
 
@@ -56,14 +54,14 @@ void Sac::DrawNoise() {
 void Sac::SampleRows(Matrix<const float> obs, RowRange rows, Matrix<float> inputs) {
   const Matrix<float> outputs(actor_outputs_, B_, 2 * A_);
   actor_.Forward(obs, rows, outputs);
+  CopyRows(obs, rows, 0, inputs);
   for (int i = rows.first; i < rows.first + rows.count; ++i) {
     float log_prob = 0;
-    float* action = std::ranges::copy(obs.row(i), inputs.row(i).data()).out;
     for (int k = 0; k < A_; ++k) {
       const size_t at = Size(i, A_) + static_cast<size_t>(k);
       gaussians_[at] = Gaussian<float>::From(outputs(i, k), outputs(i, A_ + k));
       samples_[at] = Squash(gaussians_[at], samples_[at].epsilon);
-      action[k] = samples_[at].action;
+      inputs(i, D_ + k) = samples_[at].action;
       log_prob += samples_[at].log_prob;
     }
     log_prob_[static_cast<size_t>(i)] = log_prob;
@@ -91,7 +89,8 @@ void Sac::CriticRows(const Minibatch& batch, RowRange rows) {
               Part(y_, rows));
 
   // The gradient of the mean loss between Q(s, a) and y.
-  JoinRows(s, {batch.action.data(), B_, A_}, rows, sa);
+  CopyRows(s, rows, 0, sa);
+  CopyRows({batch.action.data(), B_, A_}, rows, D_, sa);
   for (Critic& critic : critics_) {
     const Matrix<float> outputs(critic.outputs, B_, bins_.outputs());
     const Matrix<float> dy(critic.dy, B_, bins_.outputs());

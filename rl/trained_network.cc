@@ -21,6 +21,8 @@ TrainedNetwork::TrainedNetwork(const MlpShape& trunk, const HeadShape& head, int
       squares_(static_cast<size_t>(network_.num_tasks())) {}
 
 void TrainedNetwork::Prepare(ThreadPool& pool) {
+  if (!moved_) return;
+  moved_ = false;
   pool.ParallelFor(network_.num_tasks(),
                    [&](int task) { network_.Prepare(task, theta_, prepared_); });
 }
@@ -32,11 +34,13 @@ double TrainedNetwork::Step(Matrix<const float> x, double learning_rate, double 
         network_.BackwardWeights(task, x, activations_, gradient_);
   });
   const double norm = std::sqrt(std::accumulate(squares_.begin(), squares_.end(), 0.0));
+  moved_ = true;
   adam_.Step({learning_rate, norm, max_norm, tau}, gradient_, theta_, target, pool);
   return norm;
 }
 
 void TrainedNetwork::State(const Archive& archive) {
+  moved_ = true;
   archive.Array("theta", std::span(theta_));
   adam_.State(archive.In("adam"));
   archive.Array("last_features", std::span(activations_.trunk.back().output));

@@ -40,11 +40,14 @@ class TrainedNetwork {
   TrainedNetwork(const MlpShape& trunk, const HeadShape& head, int batch, double adam_epsilon);
 
   const Network<float>& network() const { return network_; }
-  std::span<float> theta() { return theta_; }
   std::span<const float> theta() const { return theta_; }
+  std::span<float> mutable_theta() {
+    moved_ = true;
+    return theta_;
+  }
   const Network<float>::Activations& activations() const { return activations_; }
 
-  /// Makes the copies of θ that Backward reads; to be called after θ has moved.
+  /// Makes the copies of θ that Backward reads, if θ has moved; to be called before.
   void Prepare(ThreadPool& pool);
   /// y = network(x) of the given rows, at these parameters or at θ.
   void Forward(std::span<const float> parameters, Matrix<const float> x, RowRange rows,
@@ -74,6 +77,7 @@ class TrainedNetwork {
   Adam adam_;
   Network<float>::Activations activations_;
   Network<float>::Prepared prepared_;
+  bool moved_ = true;           // whether θ has moved since prepared_ was made
   std::vector<float> squares_;  // of the gradient, by task
 };
 

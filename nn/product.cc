@@ -1,0 +1,237 @@
+// The matrix products of the kernels, written once with Highway and compiled for each kind of
+// vector instructions. The three products of a linear layer are one kernel, C = A · B, whose A is
+// read along its rows or its columns.
+#include "nn/product.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "nn/product.cc"
+#include <hwy/foreach_target.h>  // includes this file once for each target
+// must come after foreach_target
+#include <hwy/highway.h>
+
+#include "nn/registers-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace upswing::HWY_NAMESPACE {
+
+// A tile of C, kRows × kVectors registers, stays in registers over the whole of K; weights of these
+// sizes stay in the L2 cache, and packing them would gain nothing.
+
+/// Tile shapes: registers for C, besides those for a row of B and a number of A. Tiles of
+/// fewer rows, for what remains of M and for single rows, are wider, because a multiply-add takes
+/// several cycles and as many must be in flight.
+#if HWY_TARGET == HWY_AVX3 || HWY_ARCH_ARM_A64  // of 32 registers
+constexpr int kTileRows = 8;
+constexpr int kRegisters = 16;
+#else  // of 16
+constexpr int kTileRows = 6;
+constexpr int kRegisters = 12;
+#endif
+
+/// The tile of C at (m, n); if kPartial it has one register in a row, of which `count` numbers.
+template <int kRows, int kVectors, bool kPartial, typename T>
+HWY_INLINE void MultiplyTile(const Product<T>& p, int m, int n, size_t count) {
+  const Tag<T> d;
+  const int lanes = static_cast<int>(hn::Lanes(d));
+  Vec<T> c[kRows][kVectors];
+  HWY_UNROLL(16)
+  for (int v = 0; v < kVectors; ++v) {
+    const Vec<T> start =
+        p.bias == nullptr ? hn::Zero(d) : Load<kPartial>(p.bias + n + v * lanes, count);
+    HWY_UNROLL(16)
+    for (int i = 0; i < kRows; ++i) c[i][v] = start;
+  }
+
+  const T* a = p.a + m * p.a_m;
+  const T* b = p.b.data() + n;
+  for (int k = 0; k < p.K; ++k) {
+    Vec<T> b_row[kVectors];
+    HWY_UNROLL(16)
+    for (int v = 0; v < kVectors; ++v) b_row[v] = Load<kPartial>(b + v * lanes, count);
+    HWY_UNROLL(16)
+    for (int i = 0; i < kRows; ++i) {
+      const Vec<T> a_ik = hn::Set(d, a[i * p.a_m]);
+      HWY_UNROLL(16)
+      for (int v = 0; v < kVectors; ++v) c[i][v] = hn::MulAdd(a_ik, b_row[v], c[i][v]);
+    }
+    a += p.a_k;
+    b += p.b.stride();
+  }
+
+  HWY_UNROLL(16)
+  for (int i = 0; i < kRows; ++i) {
+    HWY_UNROLL(16)
+    for (int v = 0; v < kVectors; ++v) {
+      const int col = n + v * lanes;
+      if (p.relu) c[i][v] = hn::Max(c[i][v], hn::Zero(d));
+      if (!p.gate.empty()) {
+        const Vec<T> gate = Load<kPartial>(&p.gate(m + i, col), count);
+        c[i][v] = hn::IfThenElseZero(hn::Gt(gate, hn::Zero(d)), c[i][v]);
+      }
+      Store<kPartial>(c[i][v], &p.c(m + i, col), count);
+    }
+  }
+}
+
+/// Rows m to `end` of C, from column n on as far as tiles of kRows × kVectors registers go; returns
+/// the first column after them.
+template <int kRows, int kVectors, typename T>
+int MultiplyColumns(const Product<T>& p, int m, int end, int n) {
+  const int step = kVectors * static_cast<int>(hn::Lanes(Tag<T>()));
+  for (; n + step <= p.N; n += step) {
+    for (int i = m; i < end; i += kRows) MultiplyTile<kRows, kVectors, false>(p, i, n, 0);
+  }
+  return n;
+}
+
+/// All of C from row m on that can be cut into tiles of kRows rows; returns the first row after.
+template <int kRows, typename T>
+int MultiplyRows(const Product<T>& p, int m) {
+  constexpr int kVectors = kRegisters / kRows;
+  const int end = m + (p.M - m) / kRows * kRows;
+  int n = MultiplyColumns<kRows, kVectors>(p, m, end, 0);
+  if constexpr (kVectors > 4) n = MultiplyColumns<kRows, 4>(p, m, end, n);
+  n = MultiplyColumns<kRows, 1>(p, m, end, n);
+  if (n < p.N) {
+    const auto count = static_cast<size_t>(p.N - n);
+    for (int i = m; i < end; i += kRows) MultiplyTile<kRows, 1, true>(p, i, n, count);
+  }
+  return end;
+}
+
+// ------------------------------------------------------------------------------------------------
+// Few columns fill no register. There each register holds one column of as many rows as it has
+// lanes: A's numbers are transposed on the way in where its rows lie along K, and B's broadcast.
+// Every sum runs over K in the order that it has in a tile.
+
+#if HWY_TARGET != HWY_SCALAR
+constexpr int kMostNarrow = 4;  // columns
+
+/// Four numbers of every fourth row from `from` on, one row behind the other in a register.
+template <class D>
+HWY_INLINE hn::Vec<D> LoadFourthRows(D d, const float* from, ptrdiff_t row) {
+  if constexpr (hn::MaxLanes(D()) == 4) {
+    return hn::LoadU(d, from);
+  } else {
+    const hn::Half<D> half;
+    const auto blocks = static_cast<ptrdiff_t>(hn::Lanes(half) / 4);
+    return hn::Combine(d, LoadFourthRows(half, from + 4 * blocks * row, row),
+                       LoadFourthRows(half, from, row));
+  }
+}
+
+/// A(m, k) of the rows from `a` on, one in a lane, for four k in turn; kAlongK: a_k = 1, else
+/// a_m = 1.
+template <bool kAlongK>
+HWY_INLINE void LoadRows(const Product<float>& p, const float* a, Vec<float> (&rows)[4]) {
+  const Tag<float> d;
+  HWY_UNROLL(4)
+  for (int i = 0; i < 4; ++i) {
+    rows[i] = kAlongK ? LoadFourthRows(d, a + i * p.a_m, p.a_m) : hn::LoadU(d, a + i * p.a_k);
+  }
+  if constexpr (kAlongK) TransposeBlocks(d, rows);
+}
+
+/// kBlocks registers of rows from m on, of all kColumns columns. K is a multiple of four.
+template <int kBlocks, int kColumns, bool kAlongK>
+HWY_INLINE void MultiplyNarrowBlocks(const Product<float>& p, int m) {
+  const Tag<float> d;
+  const int lanes = static_cast<int>(hn::Lanes(d));
+  Vec<float> c[kBlocks][kColumns];
+  HWY_UNROLL(4)
+  for (int n = 0; n < kColumns; ++n) {
+    const Vec<float> start = p.bias == nullptr ? hn::Zero(d) : hn::Set(d, p.bias[n]);
+    HWY_UNROLL(2)
+    for (int block = 0; block < kBlocks; ++block) c[block][n] = start;
+  }
+
+  const float* a = p.a + m * p.a_m;
+  for (int k = 0; k < p.K; k += 4) {
+    HWY_UNROLL(2)
+    for (int block = 0; block < kBlocks; ++block) {
+      Vec<float> rows[4];
+      LoadRows<kAlongK>(p, a + block * lanes * p.a_m, rows);
+      HWY_UNROLL(4)
+      for (int i = 0; i < 4; ++i) {
+        HWY_UNROLL(4)
+        for (int n = 0; n < kColumns; ++n) {
+          c[block][n] = hn::MulAdd(rows[i], hn::Set(d, p.b(k + i, n)), c[block][n]);
+        }
+      }
+    }
+    a += 4 * p.a_k;
+  }
+
+  HWY_ALIGN float column[HWY_LANES(float)];
+  for (int block = 0; block < kBlocks; ++block) {
+    for (int n = 0; n < kColumns; ++n) {
+      if (p.relu) c[block][n] = hn::Max(c[block][n], hn::Zero(d));
+      hn::Store(c[block][n], d, column);
+      for (int i = 0; i < lanes; ++i) {
+        const int row = m + block * lanes + i;
+        p.c(row, n) = p.gate.empty() || p.gate(row, n) > 0 ? column[i] : 0;
+      }
+    }
+  }
+}
+
+/// As many whole registers of rows as there are; returns the first row after them.
+template <int kColumns, bool kAlongK>
+int MultiplyNarrowRows(const Product<float>& p) {
+  const int lanes = static_cast<int>(hn::Lanes(Tag<float>()));
+  int m = 0;
+  for (; m + 2 * lanes <= p.M; m += 2 * lanes) MultiplyNarrowBlocks<2, kColumns, kAlongK>(p, m);
+  for (; m + lanes <= p.M; m += lanes) MultiplyNarrowBlocks<1, kColumns, kAlongK>(p, m);
+  return m;
+}
+
+template <int kColumns>
+int MultiplyNarrow(const Product<float>& p) {
+  if constexpr (kColumns > kMostNarrow) {
+    return 0;
+  } else {
+    if (p.N != kColumns) return MultiplyNarrow<kColumns + 1>(p);
+    if (p.a_k == 1) return MultiplyNarrowRows<kColumns, true>(p);
+    if (p.a_m == 1) return MultiplyNarrowRows<kColumns, false>(p);
+    return 0;
+  }
+}
+#endif
+
+/// The rows of C that can be computed so, from the first on; returns how many.
+template <typename T>
+int MultiplyFewColumns([[maybe_unused]] const Product<T>& p) {
+#if HWY_TARGET != HWY_SCALAR
+  if constexpr (sizeof(T) == 4) {
+    if (p.K % 4 == 0) return MultiplyNarrow<1>(p);
+  }
+#endif
+  return 0;
+}
+
+template <typename T>
+void MultiplyAll(const Product<T>& p) {
+  int m = MultiplyFewColumns(p);
+  m = MultiplyRows<kTileRows>(p, m);
+  m = MultiplyRows<4>(p, m);
+  m = MultiplyRows<2>(p, m);
+  MultiplyRows<1>(p, m);
+}
+
+void MultiplyFloat(const Product<float>& p) { MultiplyAll(p); }
+void MultiplyDouble(const Product<double>& p) { MultiplyAll(p); }
+
+}  // namespace upswing::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace upswing {
+
+HWY_EXPORT(MultiplyFloat);
+HWY_EXPORT(MultiplyDouble);
+
+void Multiply(const Product<float>& product) { HWY_DYNAMIC_DISPATCH(MultiplyFloat)(product); }
+void Multiply(const Product<double>& product) { HWY_DYNAMIC_DISPATCH(MultiplyDouble)(product); }
+
+}  // namespace upswing
+#endif  // HWY_ONCE

@@ -1,0 +1,101 @@
+// Registers full of numbers, for the kernels of each kind of vector instructions.
+
+#if defined(UPSWING_NN_REGISTERS_INL_H_) == defined(HWY_TARGET_TOGGLE)  // once for each target
+#ifdef UPSWING_NN_REGISTERS_INL_H_
+#undef UPSWING_NN_REGISTERS_INL_H_
+#else
+#define UPSWING_NN_REGISTERS_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <type_traits>
+
+HWY_BEFORE_NAMESPACE();
+namespace upswing::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+template <typename T>
+using Tag = hn::ScalableTag<T>;
+template <typename T>
+using Vec = hn::Vec<Tag<T>>;
+
+/// Whether masked stores leave the other numbers untouched, which threads that write next to each
+/// other need; on other targets Highway reads and rewrites the whole register.
+constexpr bool kMasked = HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3;
+
+/// Up to `count` numbers, or a whole register of them.
+template <bool kPartial, typename T>
+HWY_INLINE Vec<T> Load(const T* from, size_t count) {
+  const Tag<T> d;
+  if constexpr (!kPartial) return hn::LoadU(d, from);
+  if constexpr (kMasked) return hn::MaskedLoad(hn::FirstN(d, count), d, from);
+  HWY_ALIGN T lanes[HWY_LANES(T)] = {};
+  std::copy_n(from, count, lanes);
+  return hn::Load(d, lanes);
+}
+template <bool kPartial, typename T>
+HWY_INLINE void Store(Vec<T> value, T* to, size_t count) {
+  const Tag<T> d;
+  if constexpr (!kPartial) {
+    hn::StoreU(value, d, to);
+  } else if constexpr (kMasked) {
+    hn::BlendedStore(value, hn::FirstN(d, count), d, to);
+  } else {
+    HWY_ALIGN T lanes[HWY_LANES(T)];
+    hn::Store(value, d, lanes);
+    std::copy_n(lanes, count, to);
+  }
+}
+
+#if HWY_TARGET != HWY_SCALAR
+/// Transposes 4 × 4 floats: each register holds one row of four, or of several blocks side by side.
+template <class D>
+HWY_INLINE void TransposeBlocks(D d, hn::Vec<D> (&rows)[4]) {
+  const hn::Repartition<double, D> pairs;
+  const auto low01 = hn::BitCast(pairs, hn::InterleaveLower(d, rows[0], rows[1]));
+  const auto low23 = hn::BitCast(pairs, hn::InterleaveLower(d, rows[2], rows[3]));
+  const auto high01 = hn::BitCast(pairs, hn::InterleaveUpper(d, rows[0], rows[1]));
+  const auto high23 = hn::BitCast(pairs, hn::InterleaveUpper(d, rows[2], rows[3]));
+  rows[0] = hn::BitCast(d, hn::InterleaveLower(pairs, low01, low23));
+  rows[1] = hn::BitCast(d, hn::InterleaveUpper(pairs, low01, low23));
+  rows[2] = hn::BitCast(d, hn::InterleaveLower(pairs, high01, high23));
+  rows[3] = hn::BitCast(d, hn::InterleaveUpper(pairs, high01, high23));
+}
+#endif
+
+// Passes over vectors: each applies `f(i, count, partial)` to whole registers and then, with
+// partial = true, to the `count` numbers that remain.
+
+template <typename T, typename F>
+HWY_INLINE void ForVectors(size_t n, const F& f) {
+  const size_t lanes = hn::Lanes(Tag<T>());
+  size_t i = 0;
+  for (; i + lanes <= n; i += lanes) f(i, lanes, std::false_type());
+  if (i < n) f(i, n - i, std::true_type());
+}
+
+/// Σ term(i, count, partial) over all vectors, with four independent sums.
+template <typename T, typename F>
+HWY_INLINE T SumVectors(size_t n, const F& term) {
+  const Tag<T> d;
+  Vec<T> sum[4] = {hn::Zero(d), hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+  const size_t lanes = hn::Lanes(d);
+  size_t i = 0;
+  for (; i + 4 * lanes <= n; i += 4 * lanes) {
+    for (size_t k = 0; k < 4; ++k) {
+      sum[k] = hn::Add(sum[k], term(i + k * lanes, lanes, std::false_type()));
+    }
+  }
+  for (; i + lanes <= n; i += lanes) sum[0] = hn::Add(sum[0], term(i, lanes, std::false_type()));
+  if (i < n) sum[1] = hn::Add(sum[1], term(i, n - i, std::true_type()));
+  const Vec<T> all = hn::Add(hn::Add(sum[0], sum[1]), hn::Add(sum[2], sum[3]));
+  return hn::GetLane(hn::SumOfLanes(d, all));
+}
+
+}  // namespace upswing::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif
