@@ -1,0 +1,84 @@
+#include "mujoco/offscreen.h"
+
+#include <algorithm>
+#include <optional>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "mujoco/egl.h"
+#include "mujoco/painter.h"
+
+namespace upswing {
+namespace {
+
+PictureSize Checked(PictureSize size) {
+  for (const int pixels : {size.width, size.height}) {
+    if (pixels < kLeastPixels || pixels > kMostPixels) {
+      throw BadInput(Concat("picture: expected a width and a height of ", kLeastPixels, " to ",
+                            kMostPixels, " pixels, got ", size.width, "x", size.height));
+    }
+  }
+  return size;
+}
+
+}  // namespace
+
+struct Offscreen::Graphics {
+  EglContext context;
+  std::optional<Painter> painter;
+
+  explicit Graphics(PictureSize size) {
+    // Rendering needs of its model what all scenes have in common: floor, sky and light.
+    PendulumScene room{Plant(), ""};
+    const EglContext::Use use(context);
+    painter.emplace(room.model(), mjFB_OFFSCREEN, size.width, size.height);
+  }
+  ~Graphics() {
+    const EglContext::Use use(context);
+    painter.reset();
+  }
+};
+
+Offscreen::Offscreen(PictureSize size)
+    : size_(Checked(size)), graphics_(std::make_unique<Graphics>(size)) {
+  rows_.resize(static_cast<size_t>(size_.width) * static_cast<size_t>(size_.height) * 3);
+  pixels_.resize(rows_.size());
+}
+
+Offscreen::Offscreen(const Plant& plant, const std::string& mjcf, PictureSize size,
+                     const Camera& camera)
+    : Offscreen(size) {
+  scene_ = std::make_unique<PendulumScene>(plant, mjcf);
+  scene_->SetCamera(camera, static_cast<double>(size.width) / size.height);
+}
+
+Offscreen::~Offscreen() = default;
+
+std::span<const uint8_t> Offscreen::Render(std::span<const double> qpos, double torque) {
+  if (scene_ == nullptr || qpos.size() != 2) {
+    throw BadInput(Concat("picture: expected two angles, got ", qpos.size()));
+  }
+  Marks marks;
+  marks.torque = torque;
+  scene_->Update({qpos[0], qpos[1], 0, 0}, marks);
+  const Panel panel{scene_.get(), "", {}};
+  return Render(std::span(&panel, 1));
+}
+
+std::span<const uint8_t> Offscreen::Render(std::span<const Panel> panels) {
+  {
+    const EglContext::Use use(graphics_->context);
+    const Painter& painter = *graphics_->painter;
+    painter.Draw(panels, size_.width, size_.height);
+    const mjrRect whole{0, 0, size_.width, size_.height};
+    mjr_readPixels(rows_.data(), nullptr, whole, &painter.context());
+  }
+  const auto row_bytes = static_cast<ptrdiff_t>(size_.width) * 3;
+  for (ptrdiff_t row = 0; row < size_.height; ++row) {
+    std::copy_n(rows_.begin() + row * row_bytes, row_bytes,
+                pixels_.begin() + (size_.height - 1 - row) * row_bytes);
+  }
+  return pixels_;
+}
+
+}  // namespace upswing

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "mujoco/pendulum_scene.h"
+
+namespace upswing {
+
+struct Panel;
+
+/// Smallest and largest width and height of a picture, pixels.
+inline constexpr int kLeastPixels = 16, kMostPixels = 8192;
+
+/// Size of a picture, pixels.
+struct PictureSize {
+  int width = 640, height = 480;
+};
+
+/// Pictures without a window: MuJoCo's own rendering over EGL, which is loaded at run time. Any
+/// thread may use it, one at a time; several of these do not disturb each other.
+class Offscreen {
+ public:
+  /// Pictures of one pendulum: this plant, of the built-in model or of a file's (`mjcf` if it is
+  /// not empty). Throws BadInput as LoadModel does and if a size is out of range, and Failure with
+  /// what to install where there is no EGL or no device for it.
+  Offscreen(const Plant& plant, const std::string& mjcf, PictureSize size,
+            const Camera& camera = {});
+  /// Pictures of any panels.
+  explicit Offscreen(PictureSize size);
+  ~Offscreen();
+
+  /// The picture of that pendulum: pixels (height × width × 3), red, green, blue, the top row
+  /// first, until the next call. `qpos` (2) has the joints' angles, rad; `torque`, N·m, is drawn.
+  std::span<const uint8_t> Render(std::span<const double> qpos, double torque = 0);
+
+  /// The picture of these panels side by side.
+  std::span<const uint8_t> Render(std::span<const Panel> panels);
+
+  PictureSize size() const { return size_; }
+  /// What draws, such as "llvmpipe (LLVM 15.0.6, 256 bits)".
+  const std::string& device() const { return device_; }
+
+ private:
+  struct Graphics;
+
+  PictureSize size_;
+  std::unique_ptr<PendulumScene> scene_;  // of one pendulum; else null
+  std::unique_ptr<Graphics> graphics_;
+  std::vector<uint8_t> pixels_, rows_;  // top row first, and as OpenGL has them
+  std::string device_;
+};
+
+}  // namespace upswing

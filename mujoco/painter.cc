@@ -1,0 +1,98 @@
+#include "mujoco/painter.h"
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+
+#include "core/error.h"
+#include "core/text.h"
+
+namespace upswing {
+namespace {
+
+/// MuJoCo's fonts have no other characters, and a line must fit into a picture.
+std::string Ascii(std::string_view text) {
+  constexpr size_t kMost = 60;
+  std::string out;
+  for (const char c : text.substr(0, kMost)) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte >= 0x80 && byte < 0xC0) continue;  // within a character of several bytes
+    out += byte >= 0x20 && byte < 0x7F ? c : '?';
+  }
+  return out;
+}
+
+/// The font's size for pictures of so many pixels.
+mjtFontScale FontFor(int height) {
+  if (height < 380) return mjFONTSCALE_50;
+  if (height < 900) return mjFONTSCALE_100;
+  return height < 1600 ? mjFONTSCALE_150 : mjFONTSCALE_200;
+}
+
+}  // namespace
+
+int PanelColumns(int count, int width, int height) {
+  // The grid whose panels are largest, each counted as a square.
+  int best = 1;
+  double largest = 0;
+  for (int columns = 1; columns <= count; ++columns) {
+    const int rows = (count + columns - 1) / columns;
+    const double side =
+        std::min(static_cast<double>(width) / columns, static_cast<double>(height) / rows);
+    if (side <= largest) continue;
+    largest = side;
+    best = columns;
+  }
+  return best;
+}
+
+mjrRect PanelPlace(int index, int count, int width, int height) {
+  const int columns = PanelColumns(count, width, height);
+  const int rows = (count + columns - 1) / columns;
+  const int column = index % columns, row = index / columns;
+  // From edge to edge, so that no pixel is left out; a last row that is not full is stretched.
+  const int in_row = row == rows - 1 ? count - row * columns : columns;
+  const int left = width * column / in_row, right = width * (column + 1) / in_row;
+  const int top = height * row / rows, bottom = height * (row + 1) / rows;
+  return {left, height - bottom, right - left, bottom - top};
+}
+
+Painter::Painter(const mjModel& model, mjtFramebuffer buffer, int width, int height)
+    : context_(std::make_unique<mjrContext>()) {
+  // MuJoCo keeps the functions of OpenGL in global variables.
+  static std::mutex making;
+  const std::lock_guard lock(making);
+  mjr_defaultContext(context_.get());
+  mjr_makeContext(&model, context_.get(), FontFor(height));
+  mjr_setBuffer(buffer, context_.get());
+  if (context_->currentBuffer != buffer) {
+    throw Failure("OpenGL has no buffer to draw a picture into");
+  }
+  if (buffer == mjFB_OFFSCREEN) mjr_resizeOffscreen(width, height, context_.get());
+}
+
+Painter::~Painter() { mjr_freeContext(context_.get()); }
+
+void Painter::Draw(std::span<const Panel> panels, int width, int height) const {
+  const auto count = static_cast<int>(panels.size());
+  for (int i = 0; i < count; ++i) {
+    const Panel& panel = panels[static_cast<size_t>(i)];
+    const mjrRect place = PanelPlace(i, count, width, height);
+    mjr_render(place, &panel.scene->scene(), context_.get());
+    if (!panel.title.empty()) {
+      mjr_overlay(mjFONT_NORMAL, mjGRID_TOPLEFT, place, Ascii(panel.title).c_str(), nullptr,
+                  context_.get());
+    }
+    std::vector<std::string> names, values;
+    for (const auto& [name, value] : panel.status) {
+      names.push_back(Ascii(name));
+      values.push_back(Ascii(value));
+    }
+    if (!names.empty()) {
+      mjr_overlay(mjFONT_NORMAL, mjGRID_BOTTOMLEFT, place, Join(names, "\n").c_str(),
+                  Join(values, "\n").c_str(), context_.get());
+    }
+  }
+}
+
+}  // namespace upswing
