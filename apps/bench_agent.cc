@@ -13,6 +13,7 @@
 #include "nn/q_policy.h"
 #include "rl/dqn.h"
 #include "rl/replay.h"
+#include "rl/torque_levels.h"
 
 namespace upswing {
 namespace {

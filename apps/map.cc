@@ -168,9 +168,7 @@ int RunMapCommand(const MapArguments& a) {
   map.physics = a.physics;
   map.model = InfoOfModel(loaded.mjcf, "");
   const fs::path folder =
-      a.out.empty() ? DefaultOut(loaded, Concat("map-", map.config.x.name, "-", map.config.y.name))
-                    : fs::path(a.out);
-  CheckFree(folder);
+      FigureFolder(a.out, loaded, Concat("map-", map.config.x.name, "-", map.config.y.name));
   CheckCanDraw();
 
   ThreadPool pool(ResolveThreads(a.threads));

@@ -44,7 +44,7 @@ void PrintMapTable(const MapResult& map) {
              config.episodes == 1 ? "" : "s");
   if (!map.changes.empty()) fmt::print("  with       {}\n", map.changes);
   const std::string interval = map.success_interval();
-  fmt::print("  success    {:.1f}% of all episodes; {:.1f}% of the cells without a failure{}\n",
+  fmt::print("  success    {:.1f}% of all episodes; no failure in {:.1f}% of the cells{}\n",
              100 * map.mean_success(), 100 * map.always_success(),
              interval.empty() ? "" : Concat(" (", interval, ")"));
   if (std::isfinite(map.median_swing_up())) {

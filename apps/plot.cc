@@ -67,8 +67,7 @@ int RunPlot(const PlotArguments& a) {
   config.seconds = a.seconds < 0 ? usual : a.seconds;
   config.estimates = true;
   const std::optional<ModelInfo> model = InfoOfModel(config.env.mjcf, a.trial.model);
-  const fs::path folder = a.out.empty() ? DefaultOut(loaded, "plot") : fs::path(a.out);
-  CheckFree(folder);
+  const fs::path folder = FigureFolder(a.out, loaded, "plot");
   CheckCanDraw();
   const Rollout rollout = RunRollout(config);
 

@@ -134,6 +134,7 @@ class PlotTest(ProgramTest):
         self.refuse(["plot", self.policy, "--seconds", "0"], "--seconds")
         self.refuse(["plot", self.policy, "--set", "gravty=2"], "did you mean gravity?")
         self.refuse(["plot", self.policy, "--physics", "own"], "closed-form")
+        self.refuse(["plot", self.policy, "--out", "x.svg"], "--out: expected a folder", "x.svg")
         self.write("taken", "")
         self.refuse(["plot", self.policy, "--out", "taken"],
                     "taken: expected a new or empty folder, got a file")

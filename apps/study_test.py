@@ -188,6 +188,8 @@ class StudyTest(ProgramTest):
                 ("seeds = 2\nvariants.a = 3\n", [":2: a: expected a table"]),
                 ('seeds = 2\n[variants."../x"]\n', [":2:", "letters"]),
                 ('seeds = 2\n[variants.""]\n', [":2:", "letters"]),
+                ('seeds = 2\n[settings]\nagent = "ppo"\n[variants.a]\nbatch = 77\n',
+                 [':4: variant "a": batch: expected a size that divides', "got 77"]),
                 ("seeds = \n" + one, [":1:"])):
             with self.subTest(text=text):
                 self.refuse_study(text, *words)
@@ -196,7 +198,7 @@ class StudyTest(ProgramTest):
 
     def test_the_studies_of_the_project_can_be_run(self):
         studies = sorted((ROOT / "configs/studies").glob("*.toml"))
-        self.assertEqual(len(studies), 6)
+        self.assertEqual(len(studies), 7)
         for path in studies:
             with self.subTest(study=path.stem):
                 process = self.start("study", path, "--seeds", "1-1", "--jobs", 1)

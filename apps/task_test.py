@@ -11,7 +11,7 @@ from pathlib import Path
 
 from testing import read_csv, run
 
-TASKS = {"pendulum-v1": (2, 200, ["angle", "velocity", "torque"]),
+TASKS = {"pendulum-v1": (2, 200, ["angle", "velocity", "effort"]),
          "acrobot-v1": (4, 500, ["time"])}  # state variables, longest episode, reward terms
 
 
@@ -40,6 +40,13 @@ class TaskTest(unittest.TestCase):
             for row in episodes:
                 self.assertLessEqual(row["length"], longest)
                 self.assertAlmostEqual(row["return"], sum(row[term] for term in terms), places=9)
+
+    def test_no_column_of_an_episode_stands_twice(self):
+        for task in TASKS:
+            result = run("simulate", self.root / task, "--csv", "-")
+            names = result.stdout.split("\n", 1)[0].split(",")
+            self.assertIn("torque", names, result.stderr)
+            self.assertEqual(len(names), len(set(names)), names)
 
     def test_an_evaluation_is_judged_by_the_return(self):
         for task, (states, _, terms) in TASKS.items():

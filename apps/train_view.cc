@@ -20,12 +20,12 @@ namespace {
 
 /// What learns, such as `double, dueling network 64-64 with heads of 32`.
 std::string LearnerText(const Config& config) {
-  if (config.algorithm == "sac") {
+  if (config.algorithm == kSac) {
     const SacConfig& s = config.sac;
     return fmt::format("soft actor-critic, {} of {}", s.twin ? "networks" : "one critic, networks",
                        fmt::join(s.hidden, "-"));
   }
-  if (config.algorithm == "ppo") {
+  if (config.algorithm == kPpo) {
     const PpoConfig& p = config.ppo;
     return fmt::format("proximal policy optimisation, {}, networks of {}",
                        p.discrete() ? fmt::format("{} torques", p.levels) : "any torque",
@@ -54,7 +54,7 @@ void TrainView::Announce(const std::filesystem::path& run) const {
       FormatCount(training_.policy()->num_parameters()), config.train.envs, threads,
       threads == 1 ? "" : "s");
   if (config.task != kDoublePendulum) Say("  task {}\n", config.task);
-  const bool rounded = config.algorithm == "dqn" && config.dqn.precision != "float32";
+  const bool rounded = config.algorithm == kDqn && config.dqn.precision != "float32";
   if (config.physics != kMuJoCo.name || rounded) {
     Say("  physics {}, products in {}\n", config.physics,
         rounded ? config.dqn.precision : "float32");

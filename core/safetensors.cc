@@ -113,7 +113,8 @@ void VerifyChecksum(std::string header, const std::map<std::string, Tensor>& ten
             [](const Tensor* a, const Tensor* b) { return a->bytes.data() < b->bytes.data(); });
   for (const Tensor* tensor : order) checksum.Update(tensor->bytes);
   if (checksum.Hex() == expected) return;
-  throw BadInput(Concat("its checksum is ", checksum.Hex(), ", expected ", expected));
+  throw BadInput(Concat("it is damaged or was changed: expected the checksum ", expected, ", got ",
+                        checksum.Hex()));
 }
 
 }  // namespace

@@ -3,7 +3,10 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
+#include <fstream>
+#include <limits>
 
 #include "core/archive.h"
 #include "core/error.h"
@@ -40,6 +43,16 @@ int64_t KnownSize(const Tensors& checkpoint, std::string_view table, const fs::p
   if (size >= known) return known;
   throw BadInput(Concat(path.string(), ": expected at least the ", known,
                         " bytes that its checkpoint records, got ", size));
+}
+
+/// The names in a table's first line; none if it is empty.
+std::vector<std::string> ColumnsOf(const AppendFile& file) {
+  if (file.size() == 0) return {};
+  std::string line;
+  std::getline(std::ifstream(file.path()), line);
+  std::vector<std::string> columns;
+  for (const std::string_view name : Split(line, ',')) columns.emplace_back(name);
+  return columns;
 }
 
 /// `path` without slashes at its end.
@@ -86,9 +99,9 @@ void RunFolder::Create(const fs::path& given,
 
 RunFolder::RunFolder(fs::path path, const Tensors& checkpoint)
     : path_(std::move(path)),
-      metrics_{"train/", AppendFile(path_ / kMetrics)},
-      episodes_{"", AppendFile(path_ / kEpisodes)},
-      evals_{"evaluation/", AppendFile(path_ / kEvaluations)},
+      metrics_{"train/", AppendFile(path_ / kMetrics), {}},
+      episodes_{"", AppendFile(path_ / kEpisodes), {}},
+      evals_{"evaluation/", AppendFile(path_ / kEvaluations), {}},
       events_(path_ / kEventsName),
       log_(path_ / kLog) {
   // All are checked before one is cut.
@@ -103,16 +116,20 @@ RunFolder::RunFolder(fs::path path, const Tensors& checkpoint)
   episodes_.file.CutTo(episodes);
   evals_.file.CutTo(evals);
   events_.CutTo(events);
+  for (Table* table : {&metrics_, &episodes_, &evals_}) table->columns = ColumnsOf(table->file);
 }
 
 void RunFolder::AppendRow(Table& table, const Row& row) {
   std::string text;
-  if (table.file.size() == 0) {
-    for (const auto& [name, value] : row) text += (text.empty() ? "" : ",") + name;
-    text += '\n';
+  if (table.columns.empty()) {
+    for (const auto& [name, value] : row) table.columns.push_back(name);
+    text = Join(table.columns, ",") + '\n';
   }
-  for (size_t i = 0; i < row.size(); ++i) {
-    text += Concat(i == 0 ? "" : ",", FormatNumber(row[i].second));
+  for (const std::string& column : table.columns) {
+    const auto cell = std::ranges::find(row, column, &Row::value_type::first);
+    const double value =
+        cell == row.end() ? std::numeric_limits<double>::quiet_NaN() : cell->second;
+    text += Concat(&column == &table.columns.front() ? "" : ",", FormatNumber(value));
   }
   table.file.Append(text + '\n');
 

@@ -69,7 +69,9 @@ class RunFolder {
   struct Table {
     std::string tag;  // prefix of its columns in TensorBoard; empty: not shown there
     AppendFile file;
+    std::vector<std::string> columns;  // in the first line; empty: no line yet
   };
+  /// Under the columns that the table has, whatever version began it.
   void AppendRow(Table& table, const Row& row);
 
   std::filesystem::path path_;

@@ -23,10 +23,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kDqn = "dqn";
-constexpr const char* kSac = "sac";
-constexpr const char* kPpo = "ppo";
-
 const NamedAgent& FindAgent(const std::string& name, const std::string& where) {
   const auto agents = EmbeddedAgents();
   const auto found = std::ranges::find_if(agents, [&](const auto& a) { return a.name == name; });

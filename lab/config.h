@@ -25,6 +25,9 @@ inline constexpr int kMostMemory = 100;
 /// Evaluations in the closed form, and once more in MuJoCo where they are passed there.
 inline constexpr std::string_view kScreened = "screened";
 
+inline constexpr const char* kDqn = "dqn";
+inline constexpr const char* kSac = "sac";
+inline constexpr const char* kPpo = "ppo";
 /// Names of the learning algorithms; the first is the usual one.
 const std::vector<std::string>& AlgorithmNames();
 

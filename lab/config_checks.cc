@@ -33,7 +33,7 @@ LearnerSize SizeOfLearner(const Config& config) {
   const auto widest = [](const std::vector<int64_t>& hidden) {
     return static_cast<double>(*std::ranges::max_element(hidden));
   };
-  if (config.algorithm == "sac") {
+  if (config.algorithm == kSac) {
     const SacConfig& s = config.sac;
     const int A = SpecOf(config.Environments()).action_size();
     const double critics = s.twin ? 2 : 1;
@@ -46,7 +46,7 @@ LearnerSize SizeOfLearner(const Config& config) {
             std::max(widest(s.hidden), static_cast<double>(s.bins)),
             (1 + critics) * 3 * static_cast<double>(s.hidden.size())};
   }
-  if (config.algorithm == "ppo") {
+  if (config.algorithm == kPpo) {
     const PpoConfig& p = config.ppo;
     const int A = SpecOf(config.Environments()).action_size();
     const Network<float> actor(p.Shape(D), {p.discrete() ? static_cast<int>(p.levels) : A});
@@ -107,10 +107,13 @@ std::vector<std::string> Warnings(const Config& config) {
   // Environments step together: a training ends with the lock-step that reaches its last step.
   const int64_t envs = config.train.envs;
   const int64_t steps = (config.train.steps + envs - 1) / envs * envs;
-  if (config.algorithm == "sac") {
+  if (config.algorithm == kSac) {
     AddWarnings(config.sac, steps, warnings);
+    if (config.sac.actor_rate == 0) {
+      warnings.emplace_back("actor_rate is 0: the policy will stay as it began");
+    }
     if (config.sac.tau == 0) warnings.emplace_back("tau is 0: the targets will stay as they began");
-  } else if (config.algorithm == "ppo") {
+  } else if (config.algorithm == kPpo) {
     AddWarnings(config.ppo, envs, steps, warnings);
   } else {
     AddWarnings(config.dqn, steps, warnings);
@@ -140,7 +143,7 @@ void CheckMemory(const Config& config, int64_t runs) {
   const auto available = static_cast<double>(AvailableMemory());
   if (needed <= available) return;
   const LearnerSize learner = SizeOfLearner(config);
-  const bool on_policy = config.algorithm == "ppo";
+  const bool on_policy = config.algorithm == kPpo;
   throw BadInput(fmt::format(
       "train: expected to fit into the {} of memory that are free, but {}network of {} parameters "
       "and a {} of {} transitions take up to {} (smaller: --hidden, {}{})",

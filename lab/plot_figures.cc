@@ -199,8 +199,8 @@ Panel Values(const Rows& rows) {
 /// The chosen torque within the central 68% of those that the policy would draw.
 Panel Spread(const Rollout& rollout) {
   const Rows& rows = rollout.rows;
-  Line line = Held("chosen (band: central 68%)", rows,
-                   [](const RolloutRow& row) { return row.chosen; });
+  Line line =
+      Held("chosen (band: central 68%)", rows, [](const RolloutRow& row) { return row.chosen; });
   line.low = Held("", rows, [](const RolloutRow& row) { return row.spread->low; }).y;
   line.high = Held("", rows, [](const RolloutRow& row) { return row.spread->high; }).y;
   return PanelOf(TorqueLabel(rollout.spec), {line});

@@ -48,6 +48,18 @@ void CheckName(const std::string& name, const std::string& place) {
   }
 }
 
+/// The settings of a variant, checked together. Throws BadInput.
+Config BuildVariant(const std::string& name, const std::vector<FlagValue>& settings,
+                    const std::string& place, const std::string& where) {
+  try {
+    return BuildConfig("", settings);
+  } catch (const Error& error) {
+    const std::string_view what = error.what();
+    if (what.starts_with(where)) throw;  // it says the line
+    throw BadInput(Concat(place, ": variant \"", name, "\": ", what));
+  }
+}
+
 /// The variants in the order in which they stand in the file.
 std::vector<Variant> ReadVariants(const toml::table& study, const std::string& where) {
   std::vector<FlagValue> common;
@@ -65,7 +77,7 @@ std::vector<Variant> ReadVariants(const toml::table& study, const std::string& w
     std::vector<FlagValue> settings = common;
     const std::vector<FlagValue> own = ReadSettings(node, name, where);
     settings.insert(settings.end(), own.begin(), own.end());
-    Variant variant{name, BuildConfig("", settings)};
+    Variant variant{name, BuildVariant(name, settings, PlaceOf(node, where), where)};
     MakeReadyForMany(variant.config);
     for (const auto& [line, other] : placed) {
       if (ConfigToml(other.config, true) == ConfigToml(variant.config, true) &&

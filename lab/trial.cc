@@ -32,6 +32,21 @@ EnvConfig OtherTask(const TrialArguments& a, const LoadedPolicy& loaded) {
   return env;
 }
 
+/// Where figures go unless the user says.
+fs::path DefaultOut(const LoadedPolicy& loaded, const std::string& name) {
+  const bool has_file = !loaded.path.empty();
+  const fs::path run = loaded.path.parent_path();
+  const std::string stem = has_file ? loaded.path.stem().string() : loaded.policy->kind();
+  const fs::path first = has_file && fs::exists(run / RunFolder::kConfig)
+                             ? run / name
+                             : fs::path("runs") / Concat(name, "-", stem);
+  fs::path out = first;
+  for (int number = 2; fs::exists(fs::symlink_status(out)); ++number) {
+    out = Concat(first.string(), "-", number);
+  }
+  return out;
+}
+
 }  // namespace
 
 TrialConditions ConditionsOf(const TrialArguments& a) {
@@ -92,18 +107,19 @@ std::string PlantChangesText(Plant plant, const LoadedPolicy& loaded) {
   return Join(texts, ", ");
 }
 
-fs::path DefaultOut(const LoadedPolicy& loaded, const std::string& name) {
-  const bool has_file = !loaded.path.empty();
-  const fs::path run = loaded.path.parent_path();
-  const std::string stem = has_file ? loaded.path.stem().string() : loaded.policy->kind();
-  const fs::path first = has_file && fs::exists(run / RunFolder::kConfig)
-                             ? run / name
-                             : fs::path("runs") / Concat(name, "-", stem);
-  fs::path out = first;
-  for (int number = 2; fs::exists(fs::symlink_status(out)); ++number) {
-    out = Concat(first.string(), "-", number);
+fs::path FigureFolder(const std::string& out, const LoadedPolicy& loaded, const std::string& name) {
+  if (out.empty()) return DefaultOut(loaded, name);
+  const fs::path folder = out;
+  for (const char* extension : {".svg", ".png", ".csv"}) {
+    if (folder.extension() == extension) {
+      throw BadInput(
+          Concat("--out: expected a folder, in which several files are made, got the name "
+                 "of a file: ",
+                 out));
+    }
   }
-  return out;
+  CheckFree(folder);
+  return folder;
 }
 
 std::optional<std::vector<double>> ChooseEpisode(const EpisodeArguments& a, EnvConfig& env) {

@@ -49,10 +49,12 @@ std::string ChangesText(const EnvConfig& env);
 /// at all.
 std::string PlantChangesText(Plant plant, const LoadedPolicy& loaded);
 
-/// Where figures of a policy go unless the user says: in its run's folder under this name, or, for
-/// a policy file elsewhere, in runs/NAME-FILE, for a controller in runs/NAME-CONTROLLER; with -2,
-/// -3, … where that is taken.
-std::filesystem::path DefaultOut(const LoadedPolicy& loaded, const std::string& name);
+/// The folder that figures of a policy go to: `out` or, where that is empty, this name in its run's
+/// folder, runs/NAME-FILE for a policy file elsewhere, runs/NAME-CONTROLLER for a controller; with
+/// -2, -3, … where that is taken. Throws BadInput if something is in it, or if it is called as a
+/// figure is.
+std::filesystem::path FigureFolder(const std::string& out, const LoadedPolicy& loaded,
+                                   const std::string& name);
 
 /// Which episode `simulate` and `plot` make: episode K of `eval`, or one from a given start.
 struct EpisodeArguments {

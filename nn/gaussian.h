@@ -35,12 +35,16 @@ T LogDensity(T epsilon, T log_std) {
   return -epsilon * epsilon / 2 - log_std - kHalfLogTwoPi;
 }
 
-/// ln(1 - tanh²(u)), the logarithm of the slope of tanh, in its stable form
-/// 2 (ln 2 - u - softplus(-2u)); exact for any u, as |u| replaces u by symmetry.
+/// ln(1 - tanh²(u)), the logarithm of the slope of tanh, of size = |u| and e = exp(-2 |u|), in its
+/// stable form 2 (ln 2 - u - softplus(-2u)); exact for any u, as |u| replaces u by symmetry.
+template <typename T>
+T LogTanhSlope(T size, T e) {
+  return 2 * (std::numbers::ln2_v<T> - size - std::log1p(e));
+}
+/// The same of u.
 template <typename T>
 T LogTanhSlope(T u) {
-  const T size = std::abs(u);
-  return 2 * (std::numbers::ln2_v<T> - size - std::log1p(std::exp(-2 * size)));
+  return LogTanhSlope(std::abs(u), std::exp(-2 * std::abs(u)));
 }
 
 /// A sample of a squashed policy.
@@ -52,11 +56,10 @@ struct Squashed {
 
 template <typename T>
 Squashed<T> Squash(const Gaussian<T>& policy, T epsilon) {
-  // One e = exp(-2 |u|) serves tanh(|u|) = (1 - e) / (1 + e) and ln(1 - a²); see LogTanhSlope.
+  // One e = exp(-2 |u|) serves tanh(|u|) = (1 - e) / (1 + e) and ln(1 - a²).
   const T u = policy.mean + policy.std * epsilon, size = std::abs(u), e = std::exp(-2 * size);
-  const T slope = 2 * (std::numbers::ln2_v<T> - size - std::log1p(e));
   return {epsilon, std::copysign((1 - e) / (1 + e), u),
-          LogDensity(epsilon, policy.log_std) - slope};
+          LogDensity(epsilon, policy.log_std) - LogTanhSlope(size, e)};
 }
 
 /// Gradient with respect to μ and ln σ.

@@ -7,6 +7,7 @@
 
 #include "core/rng.h"
 #include "nn/gaussian.h"
+#include "rl/softmax.h"
 
 /// The distributions that a policy gradient draws actions from, at one observation. T = float to
 /// work, double to check gradients.
@@ -56,13 +57,8 @@ template <typename T>
 class Categorical {
  public:
   /// Writes p (K), which must stay as it is.
-  Categorical(std::span<const T> logits, std::span<T> p) : logits_(logits), p_(p) {
-    const T largest = *std::ranges::max_element(logits);
-    T sum = 0;
-    for (size_t k = 0; k < p.size(); ++k) sum += p[k] = std::exp(logits[k] - largest);
-    for (T& x : p) x /= sum;
-    log_sum_ = largest + std::log(sum);
-  }
+  Categorical(std::span<const T> logits, std::span<T> p)
+      : logits_(logits), p_(p), log_sum_(Softmax<T>(logits, p)) {}
 
   size_t Sample(Rng& rng) const {
     T left = static_cast<T>(rng.Uniform());

@@ -13,6 +13,7 @@
 #include "core/text.h"
 #include "nn/q_policy.h"
 #include "rl/representation.h"
+#include "rl/torque_levels.h"
 #include "rl/trained_network.h"
 
 namespace upswing {
@@ -26,15 +27,6 @@ std::vector<double> TorquesOf(const DqnConfig& config, const EnvSpec& spec) {
 }
 
 }  // namespace
-
-std::vector<double> TorqueLevels(double torque_limit, int64_t count) {
-  std::vector<double> levels;
-  const auto intervals = static_cast<double>(count - 1);
-  for (int64_t i = 0; i < count; ++i) {
-    levels.push_back(torque_limit * (2 * static_cast<double>(i) - intervals) / intervals);
-  }
-  return levels;
-}
 
 void TdTargets(Matrix<const float> select, Matrix<const float> evaluate,
                std::span<const float> reward, std::span<const float> discount, std::span<float> y) {
@@ -192,19 +184,15 @@ void Dqn::CountErrors(const Minibatch& batch) {
 
 Metrics Dqn::TakeMetrics() {
   const double n = static_cast<double>(std::max<int64_t>(1, report_updates_));
-  constexpr int64_t kMostRows = 256;  // enough of a large minibatch
-  const Matrix<const float> features(activations_.trunk.back().output.data(),
-                                     static_cast<int>(std::min(config_.batch, kMostRows)),
-                                     static_cast<int>(config_.hidden.back()));
   Metrics metrics{{"updates", static_cast<double>(updates_)},
                   {"epsilon", epsilon()},
                   {"learning_rate", learning_rate()},
                   {"loss", loss_sum_ / n},
                   {"q", q_sum_ / n},
                   {"td_error", td_sum_ / n},
-                  {"gradient_norm", norm_sum_ / n},
-                  {"feature_rank", FeatureRank(features)},
-                  {"dormant_share", DormantShare(features)}};
+                  {"gradient_norm", norm_sum_ / n}};
+  AddFeatureMetrics(activations_.trunk.back().output, config_.batch, config_.hidden.back(),
+                    metrics);
   loss_sum_ = q_sum_ = td_sum_ = norm_sum_ = 0;
   report_updates_ = 0;
   return metrics;

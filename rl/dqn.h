@@ -17,10 +17,6 @@
 /// parameters, y target, B batch size, A number of actions, D observation size.
 namespace upswing {
 
-/// So many torques, at least 2, evenly spaced from -limit to limit (N·m): a discrete agent's
-/// actions.
-std::vector<double> TorqueLevels(double torque_limit, int64_t count);
-
 /// TD targets y (B). `select` chooses a* = argmax_a select(s', a), and y = r + discount ·
 /// evaluate(s', a*):
 /// - DQN: both are Q(s', ·; θ⁻), so that y = r + γ max_a Q(s', a; θ⁻) (Mnih et al., 2015);

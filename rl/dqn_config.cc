@@ -24,7 +24,7 @@ void DqnConfig::Describe(Options& o) {
         "learning rate; 1: as learned last");
   o.Add(&epsilon_start, "epsilon_start", 1.0, kUnit, "",
         "share of random actions at the beginning");
-  o.Add(&epsilon_end, "epsilon_end", 0.05, kUnit, "", "and at least");
+  o.Add(&epsilon_end, "epsilon_end", 0.05, kUnit, "", "what epsilon falls to");
   o.Add(&epsilon_decay, "epsilon_decay", 0.97, kUnit, "", "factor per episode");
 }
 

@@ -10,6 +10,7 @@
 #include "core/error.h"
 #include "core/testing.h"
 #include "nn/q_policy.h"
+#include "rl/torque_levels.h"
 #include "rl/toy_env.h"
 
 namespace upswing {

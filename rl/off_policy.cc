@@ -24,13 +24,13 @@ void OffPolicyConfig::Describe(Options& o) {
   o.Add(&mirror, "mirror", true,
         "mirror a random half of each minibatch, observations and actions");
   o.Add(&learning_starts, "learning_starts", 2000, kNotNegative, "steps",
-        "before the first update");
+        "what is seen before the first update");
   o.Add(&updates_per_step, "updates_per_step", 0.0625, {0, 100}, "", "gradient steps per step");
   o.Add(&learning_rate, "learning_rate", 1e-3, {0, 10}, "",
         "learning rate of Adam at the beginning");
-  o.Add(&learning_rate_end, "learning_rate_end", 2e-5, {0, 10}, "", "and at the end");
+  o.Add(&learning_rate_end, "learning_rate_end", 2e-5, {0, 10}, "", "learning rate at the end");
   o.Add(&learning_rate_steps, "learning_rate_steps", 250000, {1, 1e12}, "steps",
-        "over which it falls linearly");
+        "over which the learning rate falls linearly");
   o.Add(&max_gradient_norm, "max_gradient_norm", 10, kPositive, "", "clip the global norm to this");
 }
 

@@ -12,7 +12,7 @@
 #include "nn/orthogonal.h"
 #include "rl/action_distribution.h"
 #include "rl/advantages.h"
-#include "rl/dqn.h"
+#include "rl/torque_levels.h"
 
 namespace upswing {
 namespace {

@@ -8,19 +8,19 @@ namespace upswing {
 void PpoConfig::Describe(Options& o) {
   o.Section("network");
   o.Add(&hidden, "hidden", {64, 64}, {1, 4096}, "widths of the hidden layers of actor and critic");
-  o.AddChoice(&activation, "activation", {"tanh", "relu"}, "of the hidden layers");
+  o.AddChoice(&activation, "activation", {"tanh", "relu"}, "of the hidden units");
   o.Add(&layer_norm, "layer_norm", false, "layer normalisation in each hidden layer");
 
   o.Section("agent");
   o.AddChoice(&actions, "actions", {"continuous", "levels"},
               "continuous: torques drawn from a normal distribution; levels: from a few torques");
-  o.Add(&levels, "levels", 9, {2, 1001}, "torques", "of actions = levels, evenly spaced");
+  o.Add(&levels, "levels", 9, {2, 1001}, "torques", "how many actions = levels has, evenly spaced");
   o.Add(&gamma, "gamma", 0.99, kUnit, "", "discount per control step");
   o.Add(&lambda, "lambda", 0.95, kUnit, "", "decay of generalised advantages");
   o.Add(&reward_scale, "reward_scale", 0.1, kPositive, "",
         "the agent learns from reward times this");
   o.Add(&horizon, "horizon", 32, {1, 1000000}, "steps",
-        "of each environment between updates: a rollout");
+        "length of a rollout: what each environment does between updates");
   o.Add(&epochs, "epochs", 4, {1, 1000}, "", "passes over a rollout");
   o.Add(&batch, "batch", 256, {1, 1000000}, "steps",
         "in a minibatch; divides horizon times environments");
@@ -31,7 +31,7 @@ void PpoConfig::Describe(Options& o) {
   o.Add(&entropy_bonus, "entropy_bonus", 0, {0, 10}, "",
         "weight of the policy's entropy at the beginning");
   o.Add(&entropy_bonus_end, "entropy_bonus_end", 0, {0, 10}, "",
-        "and at the end of learning_rate_steps");
+        "the same at the end of learning_rate_steps");
   o.Add(&max_std, "max_std", 5, {0.01, 7}, "",
         "largest standard deviation of continuous actions, in units of the limit");
   o.Add(&initial_std, "initial_std", 1, {0.01, 5}, "",
@@ -41,9 +41,9 @@ void PpoConfig::Describe(Options& o) {
   o.Add(&mirror, "mirror", false, "mirror a random half of each minibatch");
   o.Add(&learning_rate, "learning_rate", 1e-3, {0, 10}, "",
         "learning rate of Adam at the beginning");
-  o.Add(&learning_rate_end, "learning_rate_end", 1e-4, {0, 10}, "", "and at the end");
+  o.Add(&learning_rate_end, "learning_rate_end", 1e-4, {0, 10}, "", "learning rate at the end");
   o.Add(&learning_rate_steps, "learning_rate_steps", 1000000, {1, 1e12}, "steps",
-        "over which it falls linearly");
+        "over which the learning rate falls linearly");
   o.Add(&kl_target, "kl_target", 0.01, {0, 10}, "nats",
         "policy change of an update that the actor's learning rate is adapted to; 0: it is not");
   o.Add(&max_gradient_norm, "max_gradient_norm", 0.5, kPositive, "",

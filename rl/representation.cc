@@ -32,4 +32,13 @@ double DormantShare(Matrix<const float> features) {
   return static_cast<double>(dormant) / units;
 }
 
+void AddFeatureMetrics(std::span<const float> features, int64_t batch, int64_t width,
+                       Metrics& metrics) {
+  constexpr int64_t kMostRows = 256;  // enough of a large minibatch
+  const Matrix<const float> rows(features.data(), static_cast<int>(std::min(batch, kMostRows)),
+                                 static_cast<int>(width));
+  metrics.emplace_back("feature_rank", FeatureRank(rows));
+  metrics.emplace_back("dormant_share", DormantShare(rows));
+}
+
 }  // namespace upswing

@@ -90,10 +90,6 @@ double Sac::RewardOf(const StepResult& result, size_t env) {
 Metrics Sac::TakeMetrics() {
   const double n = static_cast<double>(std::max<int64_t>(1, report_updates_));
   const double actor_n = static_cast<double>(std::max<int64_t>(1, report_actor_updates_));
-  constexpr int kMostRows = 256;  // enough of a large minibatch
-  const Matrix<const float> features(
-      critics_.front().network.activations().trunk.back().output.data(), std::min(B_, kMostRows),
-      static_cast<int>(config_.hidden.back()));
   Metrics metrics{{"updates", static_cast<double>(updates_)},
                   {"alpha", alpha()},
                   {"entropy", entropy_sum_ / actor_n},
@@ -101,9 +97,9 @@ Metrics Sac::TakeMetrics() {
                   {"loss", loss_sum_ / n},
                   {"q", q_sum_ / n},
                   {"td_error", td_sum_ / n},
-                  {"gradient_norm", norm_sum_ / n},
-                  {"feature_rank", FeatureRank(features)},
-                  {"dormant_share", DormantShare(features)}};
+                  {"gradient_norm", norm_sum_ / n}};
+  AddFeatureMetrics(critics_.front().network.activations().trunk.back().output, B_,
+                    config_.hidden.back(), metrics);
   loss_sum_ = q_sum_ = td_sum_ = norm_sum_ = entropy_sum_ = 0;
   report_updates_ = report_actor_updates_ = 0;
   return metrics;

@@ -9,7 +9,7 @@ void SacConfig::Describe(Options& o) {
   o.Add(&bins, "bins", 0, {0, 1001}, "",
         "values of a categorical critic (HL-Gauss); 0: the critic puts out one number");
   o.Add(&value_low, "value_low", -10, {-1e9, 1e9}, "", "least value of a categorical critic");
-  o.Add(&value_high, "value_high", 60, {-1e9, 1e9}, "", "and the largest");
+  o.Add(&value_high, "value_high", 60, {-1e9, 1e9}, "", "largest value of a categorical critic");
 
   o.Section("agent");
   o.Add(&twin, "twin", true, "two critics, of which the smaller value counts");

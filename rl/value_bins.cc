@@ -4,18 +4,12 @@
 #include <cmath>
 #include <numbers>
 
+#include "rl/softmax.h"
+
 namespace upswing {
 namespace {
 
 constexpr double kStdInBins = 0.75;
-
-/// p = softmax(x).
-void Softmax(std::span<const float> x, std::span<float> p) {
-  const float largest = *std::ranges::max_element(x);
-  float sum = 0;
-  for (size_t k = 0; k < x.size(); ++k) sum += p[k] = std::exp(x[k] - largest);
-  for (float& share : p) share /= sum;
-}
 
 /// The distribution function of a standard normal.
 double NormalCdf(double x) { return std::erfc(-x / std::numbers::sqrt2) / 2; }
@@ -54,7 +48,7 @@ float ValueBins::Loss(std::span<const float> outputs, float target,
     return NormalCdf((static_cast<double>(edge) - at) / kStdInBins);
   };
   const double total = cdf(last) - cdf(first);
-  Softmax(outputs, gradient);
+  Softmax<float>(outputs, gradient);
   double loss = 0;
   for (size_t k = first; k < last; ++k) {
     const double share = (cdf(k + 1) - cdf(k)) / total;
@@ -71,7 +65,7 @@ void ValueBins::ValueGradient(std::span<const float> outputs, float scale,
     return;
   }
   const float value = Value(outputs);
-  Softmax(outputs, gradient);
+  Softmax<float>(outputs, gradient);
   for (size_t k = 0; k < outputs.size(); ++k) {
     gradient[k] *= scale * (static_cast<float>(Centre(k)) - value);
   }

@@ -25,7 +25,7 @@ EnvSpec Spec() {
   spec.obs_size = 3;
   spec.action_limit = {kMaxTorque};
   spec.step_seconds = kStepSeconds;
-  spec.term_names = {"angle", "velocity", "torque"};
+  spec.term_names = {"angle", "velocity", "effort"};
   spec.state_names = {"theta", "omega"};
   spec.state_units = {"rad", "rad/s"};
   spec.mirror_signs = {1, -1, -1};

@@ -32,7 +32,7 @@ LAYERS = {
 ALLOWED_FILES = {
     "mujoco": re.compile(r"mujoco/"),
     "google": re.compile(r"io/"),
-    "hwy": re.compile(r"(core/simd(_test)?|nn/(linear|bfloat16|roofline)|"
+    "hwy": re.compile(r"(core/simd(_test)?|nn/(linear|product|bfloat16|roofline|registers-inl)|"
                       r"sim/(closed_form|sine_cosine-inl))\.(h|cc)$"),
     "Eigen": re.compile(r"control/|nn/[^/]*_(test|bench)\.cc$"),
 }
