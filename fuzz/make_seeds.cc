@@ -25,12 +25,12 @@ void SaveCheckpoint(Training& training, const std::string& kind, const fs::path&
 }
 
 void MakeSeeds(const fs::path& corpus) {
-  for (const std::string kind : {"closed-form", "mujoco", "sac"}) {
-    const bool sac = kind == "sac";
-    const Config config = TinyConfig(sac ? "closed-form" : kind, sac ? "sac" : "dqn");
+  for (const std::string kind : {"closed-form", "mujoco", kSac, kPpo}) {
+    const bool actor = kind == kSac || kind == kPpo;
+    const Config config = actor ? TinyConfig("closed-form", kind) : TinyConfig(kind);
     Training training(config, 1);
     SaveCheckpoint(training, kind, corpus / "checkpoint/accepted" / (kind + "-new.safetensors"));
-    // Until the replay memory is full.
+    // Until the replay memory is full, and in the middle of a rollout.
     for (int step = 0; step < 9; ++step) training.Step();
     SaveCheckpoint(training, kind, corpus / "checkpoint/accepted" / (kind + ".safetensors"));
 
@@ -39,7 +39,7 @@ void MakeSeeds(const fs::path& corpus) {
     info.success_rate = 0.5;
     info.mean_return = -12.5;
     const fs::path file =
-        corpus / "policy/accepted" / (sac ? "sac.safetensors" : "dueling-" + kind + ".safetensors");
+        corpus / "policy/accepted" / ((actor ? kind : "dueling-" + kind) + ".safetensors");
     SaveTensors(training.agent().ExportPolicy(info)->ToTensors(), file);
   }
   // The other kind of network, as short as can be.

@@ -6,7 +6,7 @@
 namespace upswing {
 
 /// A training of a few hundred parameters with nearly everything switched on, in `physics`.
-inline Config TinyConfig(const std::string& physics, const std::string& algorithm = "dqn") {
+inline Config TinyConfig(const std::string& physics, const std::string& algorithm = kDqn) {
   Config config(algorithm);
   SetFlags(OptionsOf(config), {{"physics", physics},
                                {"envs", "2"},
@@ -17,14 +17,20 @@ inline Config TinyConfig(const std::string& physics, const std::string& algorith
                                {"randomize", "0.1"},
                                {"hidden", "3,2"},
                                {"batch", "4"},
-                               {"replay", "6"},
-                               {"n_step", "2"},
-                               {"learning_starts", "4"},
-                               {"updates_per_step", "0.5"},
+                               {"mirror", "true"},
                                {"steps", "1e12"},
                                {"eval_every", "1e12"}});
-  if (algorithm == "dqn") SetFlags(OptionsOf(config), {{"head", "2"}});
-  if (algorithm == "sac") SetFlags(OptionsOf(config), {{"smoothness", "0.1"}, {"bins", "3"}});
+  const std::vector<FlagValue> off_policy{
+      {"replay", "6"}, {"n_step", "2"}, {"learning_starts", "4"}, {"updates_per_step", "0.5"}};
+  if (algorithm == kPpo) {
+    SetFlags(OptionsOf(config), {{"horizon", "4"}, {"epochs", "2"}, {"value_clip", "0.2"}});
+  } else if (algorithm == kSac) {
+    SetFlags(OptionsOf(config), off_policy);
+    SetFlags(OptionsOf(config), {{"smoothness", "0.1"}, {"bins", "3"}});
+  } else {
+    SetFlags(OptionsOf(config), off_policy);
+    SetFlags(OptionsOf(config), {{"head", "2"}});
+  }
   return config;
 }
 
