@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "io/machine.h"
 #include "lab/format.h"
 #include "nn/q_network.h"
@@ -100,7 +102,92 @@ void AddWarnings(const PpoConfig& p, int64_t envs, int64_t steps,
   WarnOfNoRate(p, warnings);
 }
 
+/// Throws BadInput that begins with `place` if settings of an agent with a replay memory, each of
+/// which is allowed, contradict each other, so that nothing could be learned.
+void CheckTogether(const OffPolicyConfig& d, const std::string& place) {
+  if (d.batch > d.replay) {
+    throw BadInput(Concat(place,
+                          "batch: expected at most as many transitions as the replay memory holds "
+                          "(replay ",
+                          d.replay, "), got ", d.batch));
+  }
+  if (d.learning_starts > d.replay) {
+    throw BadInput(Concat(place,
+                          "learning_starts: expected at most as many steps as the replay memory "
+                          "holds transitions (replay ",
+                          d.replay, "), got ", d.learning_starts));
+  }
+}
+
+/// Throws BadInput that begins with `place` if minibatches do not divide a rollout, or if there is
+/// a setting of the other kind of actions that is not at its default.
+void CheckPpo(const PpoConfig& p, int64_t num_envs, const std::string& place) {
+  try {
+    p.CheckBatch(num_envs);
+  } catch (const Error& error) {
+    throw BadInput(place + error.what());
+  }
+  const PpoConfig usual;
+  if (!p.discrete() && p.levels != usual.levels) {
+    throw BadInput(Concat(place, "levels: expected none with continuous actions, got ", p.levels,
+                          " (or actions = levels)"));
+  }
+  if (!p.discrete() && p.initial_std > p.max_std && p.initial_std != usual.initial_std) {
+    throw BadInput(Concat(place, "initial_std: expected at most max_std (", p.max_std, "), got ",
+                          p.initial_std));
+  }
+  if (p.discrete() && p.initial_std != usual.initial_std) {
+    throw BadInput(
+        Concat(place, "initial_std: expected none with actions = levels, got ", p.initial_std));
+  }
+}
+
+/// Throws BadInput that begins with `place` unless the bins of a categorical critic can stand for
+/// different values.
+void CheckBins(const SacConfig& s, const std::string& place) {
+  if (s.bins == 1) throw BadInput(Concat(place, "bins: expected 0 or at least 2, got 1"));
+  if (s.bins > 0 && s.value_low >= s.value_high) {
+    throw BadInput(Concat(place, "value_low: expected less than value_high (", s.value_high,
+                          "), got ", s.value_low));
+  }
+}
+
+/// Throws BadInput if a setting of the double pendulum is not at its default in another task, which
+/// has no such setting.
+void CheckTask(Config& config, const std::string& where) {
+  if (config.task == kDoublePendulum) return;
+  constexpr std::array<std::string_view, 5> kSections{"task", "plant", "disturbance", "randomize",
+                                                      "reward"};
+  constexpr std::array<std::string_view, 3> kCurriculum{"start_noise", "start_noise_end",
+                                                        "curriculum_steps"};
+  Config defaults(config.algorithm);
+  const Options now = OptionsOf(config), usual = OptionsOf(defaults);
+  for (size_t i = 0; i < now.all().size(); ++i) {
+    const Option& option = now.all()[i];
+    const bool of_pendulum = (option.name != "task" &&
+                              std::ranges::find(kSections, option.section) != kSections.end()) ||
+                             std::ranges::find(kCurriculum, option.name) != kCurriculum.end();
+    if (!of_pendulum || option.text() == usual.all()[i].text()) continue;
+    throw BadInput(Concat(
+        where.empty() ? "" : where + ": ", option.name, ": expected none, as the task ",
+        config.task, " has no such setting, got ", option.text(), " (agent ", config.agent, ")"));
+  }
+}
+
 }  // namespace
+
+void CheckSettings(Config& config, const std::string& where) {
+  const std::string place = where.empty() ? "" : where + ": ";
+  if (config.algorithm == kSac) {
+    CheckTogether(config.sac, place);
+    CheckBins(config.sac, place);
+  } else if (config.algorithm == kPpo) {
+    CheckPpo(config.ppo, config.train.envs, place);
+  } else {
+    CheckTogether(config.dqn, place);
+  }
+  CheckTask(config, where);
+}
 
 std::vector<std::string> Warnings(const Config& config) {
   std::vector<std::string> warnings;

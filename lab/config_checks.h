@@ -8,6 +8,10 @@
 
 namespace upswing {
 
+/// Throws BadInput that begins with `where` if settings, each of which is allowed, contradict each
+/// other, or do not exist in the task.
+void CheckSettings(Config& config, const std::string& where);
+
 /// Settings that are allowed but hardly intended, because nothing would be learned: a line each.
 std::vector<std::string> Warnings(const Config& config);
 
