@@ -2,12 +2,18 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <memory>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "apps/commands.h"
 #include "core/error.h"
 #include "core/text.h"
 #include "io/streams.h"
+#include "lab/controllers.h"
+#include "lab/format.h"
 
 namespace upswing {
 namespace {
@@ -16,21 +22,61 @@ namespace fs = std::filesystem;
 
 struct ExportArguments {
   std::vector<std::string> policies;
-  std::string page, id, test_vectors;
+  std::string page, id, test_vectors, onnx, c, prefix;
 };
 
-int RunExport(const ExportArguments& a) {
-  if (a.page.empty() == a.test_vectors.empty()) {
-    throw BadInput(a.page.empty() ? "export: expected --page or --test-vectors"
-                                  : "export: expected --page or --test-vectors, got both");
+/// Throws BadInput unless exactly one of the things to write was named.
+void CheckOne(const ExportArguments& a) {
+  std::vector<std::string> given;
+  for (const auto& [flag, value] : {std::pair("--page", &a.page),
+                                    {"--onnx", &a.onnx},
+                                    {"--c", &a.c},
+                                    {"--test-vectors", &a.test_vectors}}) {
+    if (!value->empty()) given.emplace_back(flag);
   }
-  if (a.page.empty()) {
-    if (!a.policies.empty() || !a.id.empty()) {
-      throw BadInput("--test-vectors: expected no policy and no --id, for it is of the task alone");
-    }
-    WriteOutput(a.test_vectors, TestVectorsJson());
-    return 0;
+  if (given.size() == 1) return;
+  throw BadInput(Concat("export: expected one of --page, --onnx, --c and --test-vectors, got ",
+                        given.empty() ? "none" : Join(given, " and ")));
+}
+
+/// The one policy that `flag` writes in another form.
+LoadedPolicy SinglePolicy(const ExportArguments& a, const char* flag) {
+  if (!a.id.empty()) throw BadInput(Concat("--id: expected --page, got ", flag));
+  if (a.policies.size() != 1) {
+    throw BadInput(Concat(flag, ": expected a policy or a run folder, got ",
+                          a.policies.empty() ? "none" : std::to_string(a.policies.size())));
   }
+  const std::string& name = a.policies.front();
+  if (IsController(name) && !fs::exists(name)) {
+    throw BadInput(Concat(name, ": expected a learned policy (policy.safetensors or a run folder) ",
+                          "to write as a network, got a controller, which has none"));
+  }
+  return LoadPolicy(name);
+}
+
+int ExportOnnx(const ExportArguments& a) {
+  const LoadedPolicy loaded = SinglePolicy(a, "--onnx");
+  WriteOutput(a.onnx, OnnxModelOf(loaded));
+  return 0;
+}
+
+int ExportC(const ExportArguments& a) {
+  const LoadedPolicy loaded = SinglePolicy(a, "--c");
+  const CHeader header = CHeaderOf(loaded, a.prefix.empty() ? CPrefixOf(a.c, loaded) : a.prefix);
+  WriteOutput(a.c, header.text);
+  if (IsStandardStream(a.c)) return 0;
+  fmt::print("{} ({} KB), names begin with {}_\n", Printable(a.c), header.text.size() / 1024,
+             header.prefix);
+  fmt::print("  flash       {} bytes of constants\n", FormatCount(header.constant_bytes));
+  fmt::print("  RAM         {} bytes of state, {} on the stack in a call\n",
+             FormatCount(header.state_bytes), FormatCount(header.stack_bytes));
+  fmt::print("  work        {} multiply-adds a call, every {} s\n",
+             FormatCount(header.multiply_adds),
+             FormatNumber(*loaded.policy->info().control_period));
+  return 0;
+}
+
+int ExportPage(const ExportArguments& a) {
   if (a.policies.empty()) throw BadInput("--page: expected policies or run folders, got none");
   const std::vector<fs::path> paths(a.policies.begin(), a.policies.end());
   for (const std::string& id : ExportToPage(paths, a.id, a.page)) {
@@ -39,14 +85,45 @@ int RunExport(const ExportArguments& a) {
   return 0;
 }
 
+int RunExport(const ExportArguments& a) {
+  CheckOne(a);
+  if (!a.prefix.empty() && a.c.empty())
+    throw BadInput("--prefix: expected --c, whose names it begins");
+  if (!a.onnx.empty()) return ExportOnnx(a);
+  if (!a.c.empty()) return ExportC(a);
+  if (!a.page.empty()) return ExportPage(a);
+  if (!a.policies.empty() || !a.id.empty()) {
+    throw BadInput("--test-vectors: expected no policy and no --id, for it is of the task alone");
+  }
+  WriteOutput(a.test_vectors, TestVectorsJson());
+  return 0;
+}
+
 }  // namespace
 
 void AddExport(CLI::App& program, Command& command) {
   CLI::App* app = program.add_subcommand(
-      "export", "Put policies into the page, or write numbers to test other readers by");
+      "export",
+      "Write a policy as ONNX or C, put policies into the page, or write numbers to test "
+      "other readers by");
   auto a = std::make_shared<ExportArguments>();
   app->add_option("policies", a->policies, "policy.safetensors or run folders")
       ->type_name("POLICY|RUN")
+      ->check(NotEmpty());
+  app->add_option(
+         "--onnx", a->onnx,
+         "ONNX file to write: from observations to torques and values, for any runtime; -: "
+         "standard output")
+      ->type_name("FILE")
+      ->check(NotEmpty());
+  app->add_option("--c", a->c,
+                  "C99 header to write: from angles and velocities to torques, for a "
+                  "microcontroller; -: standard output")
+      ->type_name("FILE.h")
+      ->check(NotEmpty());
+  app->add_option("--prefix", a->prefix,
+                  "with which all names in the C header begin [name of the file]")
+      ->type_name("NAME")
       ->check(NotEmpty());
   app->add_option("--page", a->page,
                   "the page's folder of agents; one of the same ID is replaced there")
@@ -62,6 +139,8 @@ void AddExport(CLI::App& program, Command& command) {
       ->check(NotEmpty());
   app->footer(
       "Examples:\n"
+      "  ./upswing export runs/d3qn-seed1 --onnx policy.onnx           for onnxruntime and others\n"
+      "  ./upswing export runs/fast-seed1 --c policy.h                 for a microcontroller\n"
       "  ./upswing export runs/d3qn-seed1 --page web/public/agents     for every visitor\n"
       "  ./upswing export runs/* --page build/web/agents               in the page built here\n"
       "  ./upswing export policy.safetensors --id mine --page build/web/agents\n"

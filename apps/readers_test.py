@@ -2,62 +2,17 @@
 """Independent readers agree with what the program writes: TensorBoard's own reader of event files,
 the safetensors package, and the forward pass of the network in numpy.
 
-These packages live in a virtual environment in build/readers-venv, which is made when it is missing
-or when tools/readers-requirements.txt has changed; the test then continues in its Python.
+The packages live in a virtual environment of their own (readers_environment.py).
 """
 
-import fcntl
 import json
-import os
-import shutil
-import subprocess
-import sys
 import time
 import unittest
 
+import readers_environment
 from testing import ROOT, ProgramTest, read_csv, read_tensors, small
 
-VENV = ROOT / "build/readers-venv"
-REQUIREMENTS = ROOT / "tools/readers-requirements.txt"
-
-
-def wanted():
-    """What the environment has to be made of."""
-    return f"{sys.version}\n{sys.base_exec_prefix}\n{REQUIREMENTS.read_text(encoding='utf-8')}"
-
-
-def make_environment():
-    """Makes the virtual environment unless it is there; its mark is written last."""
-    mark = VENV / "made-of.txt"
-    VENV.parent.mkdir(exist_ok=True)
-    with open(f"{VENV}.lock", "w", encoding="utf-8") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        if mark.exists() and mark.read_text(encoding="utf-8") == wanted():
-            return
-        shutil.rmtree(VENV, ignore_errors=True)
-        command("cannot make a virtual environment (is python3-venv installed?)",
-                sys.executable, "-m", "venv", VENV)
-        command("cannot install the readers (is there a network?)", VENV / "bin/python", "-m",
-                "pip", "--disable-pip-version-check", "install", "--quiet", "--only-binary=:all:",
-                "--requirement", REQUIREMENTS)
-        mark.write_text(wanted(), encoding="utf-8")
-
-
-def command(problem, *arguments):
-    """Runs a command to its end; if it fails, so does the test."""
-    done = subprocess.run(arguments, check=False, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                          encoding="utf-8")
-    if done.returncode != 0:
-        sys.exit(f"readers_test: {problem}:\n{done.stdout}")
-
-
-def inside_environment():
-    return VENV.exists() and os.path.samefile(sys.prefix, VENV)
-
-
-if __name__ == "__main__" and not inside_environment():
-    make_environment()
-    os.execv(VENV / "bin/python", [str(VENV / "bin/python"), "-B", *sys.argv])
+readers_environment.enter(__file__)
 
 # pylint: disable=wrong-import-position
 import numpy as np

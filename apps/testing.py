@@ -16,6 +16,7 @@ import subprocess
 import tempfile
 import time
 import unittest
+from array import array
 from pathlib import Path
 
 ROOT = Path(os.environ.get("UPSWING_ROOT", Path(__file__).resolve().parent.parent))
@@ -67,6 +68,16 @@ def run(*arguments, cwd=None, **more):
     return subprocess.run([UPSWING, *map(str, arguments)], cwd=cwd, check=False,
                           stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                           stderr=subprocess.PIPE, encoding="utf-8", **more)
+
+
+def probe(policy, what, numbers):
+    """What the library's policy makes of rows of observations or states (lab/policy_probe.cc), as one
+    array of doubles."""
+    done = subprocess.run([UPSWING.parent.parent / "lab/policy_probe", policy, what], check=False,
+                          input=array("d", numbers).tobytes(), stdout=subprocess.PIPE,
+                          stderr=subprocess.PIPE)
+    assert done.returncode == 0, done.stderr
+    return array("d", done.stdout)
 
 
 def read_csv(path):

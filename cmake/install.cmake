@@ -12,8 +12,8 @@ foreach(LAYER IN LISTS UPSWING_LAYERS)
   install(DIRECTORY ${LAYER} DESTINATION include/upswing FILES_MATCHING PATTERN "*.h"
           PATTERN "testing.h" EXCLUDE PATTERN "*-inl.h" EXCLUDE PATTERN "testdata" EXCLUDE)
 endforeach()
-set_target_properties(upswing_event PROPERTIES EXPORT_NAME event)
-install(TARGETS upswing_event EXPORT upswing)
+set_target_properties(upswing_proto PROPERTIES EXPORT_NAME proto)
+install(TARGETS upswing_proto EXPORT upswing)
 install(EXPORT upswing NAMESPACE upswing:: FILE upswing-targets.cmake DESTINATION ${UPSWING_PACKAGE})
 
 configure_package_config_file(cmake/upswing-config.cmake.in upswing-config.cmake

@@ -1,6 +1,6 @@
 #include "io/event_file.h"
 
-#include <event.pb.h>  // generated from rl/event.proto
+#include <event.pb.h>  // generated from io/event.proto
 
 #include <array>
 #include <chrono>

@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "lab/loaded_policy.h"
+
 /// What `export` writes for programs in other languages.
 namespace upswing {
 
@@ -17,5 +19,28 @@ std::string TestVectorsJson();
 /// is written. Returns their IDs. Throws BadInput; Failure if the folder cannot be written.
 std::vector<std::string> ExportToPage(const std::vector<std::filesystem::path>& paths,
                                       const std::string& id, const std::filesystem::path& folder);
+
+/// A learned policy as a file in ONNX's format: `observation` (batch × D) in; `torque` and, by
+/// kind, `q_values`, `mean` and `log_std`, `probabilities`, `value` out; what they mean as metadata
+/// (docs/export.md). Throws BadInput if it is none that was learned.
+std::string OnnxModelOf(const LoadedPolicy& loaded);
+
+/// A learned policy as a C99 header without dependencies (docs/export.md).
+struct CHeader {
+  std::string prefix;  // with which all of its names begin
+  std::string text;
+  size_t constant_bytes = 0;  // of flash
+  size_t state_bytes = 0;     // of RAM, between calls
+  size_t stack_bytes = 0;     // of RAM, in a call: its arrays
+  size_t multiply_adds = 0;   // of a call, in the network's layers
+};
+
+/// `prefix`: small letters, digits and _, a letter first; see CPrefixOf. Throws BadInput if it is
+/// something else, or if the policy is none that was learned.
+CHeader CHeaderOf(const LoadedPolicy& loaded, const std::string& prefix);
+
+/// A prefix for the header of this name, such as "my_policy" for my-policy.h; of standard output
+/// (-) from the policy's agent.
+std::string CPrefixOf(const std::string& file, const LoadedPolicy& loaded);
 
 }  // namespace upswing

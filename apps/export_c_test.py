@@ -1,0 +1,378 @@
+#!/usr/bin/env python3
+"""`upswing export --c`: the header compiles without a warning as C99 and C++, and gives the torques that
+the program gives, for every kind of policy; it knows when it is damaged, and what is no number.
+"""
+
+import array
+import json
+import math
+import random
+import re
+import shutil
+import subprocess
+import unittest
+
+from testing import ROOT, ProgramTest, probe, read_csv, read_tensors, small, write_tensors
+
+AGENTS = ROOT / "web/public/agents"
+COUNT = 10_000
+STRICT = ["-pedantic", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion", "-Wshadow"]
+SANITIZE = ["-fsanitize=undefined,address", "-fno-sanitize-recover=all"]
+# Those that are here: (command, language options).
+COMPILERS = [(compiler, standard)
+             for compiler, standard in (("gcc", "-std=c99"), ("clang", "-std=c99"),
+                                        ("clang-14", "-std=c99"), ("g++", "-std=c++98"),
+                                        ("g++", "-std=c++20"))
+             if shutil.which(compiler)]
+TASKS = {"double-pendulum": 4, "pendulum-v1": 2, "acrobot-v1": 4}  # numbers of a state
+
+# Reads rows of float: whether an episode begins, the state, the torque that then acted. Writes status,
+# torque and outputs of each.
+DRIVER = r"""
+#include "policy.h"
+#include <stdio.h>
+
+int main(void)
+{
+  float in[STATES + 2];
+  policy_state state;
+  policy_init(&state);
+  while (fread(in, sizeof(in), 1, stdin) == 1) {
+    float out[2 + POLICY_OUTPUT_SIZE], observation[POLICY_OBSERVATION_SIZE];
+    policy_state copy;
+    if (in[0] > 0.0f) policy_init(&state);
+    copy = state;
+    out[0] = (float)policy_control(&state, CALL, &out[1]);
+    policy_observe(&copy, CALL, observation);
+    policy_outputs(observation, out + 2);
+    fwrite(out, sizeof(out), 1, stdout);
+    if (in[0] >= 0.0f) state.torque = in[STATES + 1];
+  }
+  return policy_selftest() == POLICY_OK ? 0 : 1;
+}
+"""
+
+
+def compile_c(folder, source, *options, compiler="gcc", standard="-std=c99"):
+    """Compiles a file of the folder; returns what the compiler says of it."""
+    language = ["-x", "c++"] if compiler == "g++" else []
+    return subprocess.run([compiler, standard, *STRICT, *options, *language, source, "-x", "none",
+                           "-o", "program", "-lm"], cwd=folder, check=False,
+                          stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                          stderr=subprocess.STDOUT, encoding="utf-8")
+
+
+def rows_of(numbers, count):
+    """An array cut into `count` rows."""
+    width = len(numbers) // count
+    return [numbers[i * width:(i + 1) * width] for i in range(count)]
+
+
+def random_states(size, turns=3):
+    """States of all kinds, as float has them: angles of some turns, then velocities."""
+    rng = random.Random(0)
+    bounds = [turns * 3.14] * (size // 2) + [8] * (size // 2)
+    return array.array("f", (rng.uniform(-bound, bound) for _ in range(COUNT) for bound in bounds))
+
+
+class HeaderTest(ProgramTest):
+    def build(self, policy, *options, compiler="gcc", standard="-std=c99", task="double-pendulum"):
+        """Exports policy.h and compiles the driver with it."""
+        self.succeed("export", policy, "--c", "policy.h")
+        call = ", ".join(f"in[{i + 1}]" for i in range(TASKS[task]))
+        driver = DRIVER.replace("STATES", str(TASKS[task])).replace("CALL", call)
+        self.write("driver.c", driver)
+        self.compile("driver.c", "-O2", *options, compiler=compiler, standard=standard)
+
+    def compile(self, *arguments, **more):
+        done = compile_c(self.folder, *arguments, **more)
+        self.assertEqual((done.returncode, done.stdout), (0, ""))
+
+    def drive(self, states, size, begins=None, torques=None, code=0):
+        """(status, torque, outputs) of each state."""
+        count = len(states) // size
+        numbers = array.array("f")
+        for i, row in enumerate(rows_of(states, count)):
+            numbers.append(1 if begins is None else begins[i])
+            numbers.extend(row)
+            numbers.append(0 if torques is None else torques[i])
+        done = subprocess.run([self.folder / "program"], check=False, input=numbers.tobytes(),
+                              stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        self.assertEqual((done.returncode, done.stderr), (code, b""))
+        return [(row[0], row[1], row[2:])
+                for row in rows_of(array.array("f", done.stdout), count)]
+
+    def assert_same(self, got, torques):
+        """The program's torques, except where two outputs are as good as equal."""
+        limit = float(re.search(r"POLICY_TORQUE_LIMIT (\S+)f", self.header())[1])
+        scale = max(abs(x) for _, _, outputs in got for x in outputs)
+        others = 0
+        for (status, torque, outputs), expected in zip(got, torques, strict=True):
+            self.assertEqual(status, 0)
+            self.assertLessEqual(abs(torque), limit)
+            if abs(torque - expected) <= 1e-4 * limit:
+                continue
+            others += 1
+            best = sorted(outputs)[-2:]
+            self.assertEqual(len(best), 2, (torque, expected))
+            self.assertLessEqual(best[1] - best[0], 1e-4 * scale, (torque, expected))
+        self.assertLessEqual(others, len(got) // 1000)
+        self.assertGreater(len({torque for _, torque, _ in got}), 1)
+
+    def header(self):
+        return (self.folder / "policy.h").read_text(encoding="ascii")
+
+    def check(self, policy, task="double-pendulum", **more):
+        """10,000 random states, each the beginning of an episode."""
+        self.build(policy, task=task, **more)
+        size = TASKS[task]
+        states = random_states(size, 3 if task == "double-pendulum" else 1)
+        expected = rows_of(probe(policy, "states", states), COUNT)
+        self.assert_same(self.drive(states, size), [row[0] for row in expected])
+
+    def test_agents_of_the_page(self):
+        for name in ("fast", "dqn", "d3qn", "sac", "ppo", "d3qn-randomized"):
+            with self.subTest(name):
+                self.check(AGENTS / f"{name}.safetensors")
+
+    def test_every_compiler(self):
+        self.assertIn(("gcc", "-std=c99"), COMPILERS)
+        self.assertIn(("g++", "-std=c++20"), COMPILERS)
+        for compiler, standard in COMPILERS:
+            for name in ("fast", "sac", "ppo", "d3qn-randomized"):
+                with self.subTest(f"{compiler} {standard} {name}"):
+                    self.build(AGENTS / f"{name}.safetensors", "-Wconversion", compiler=compiler,
+                               standard=standard)
+                    self.drive(random_states(4)[:40], 4)
+
+    def test_q_network_without_layer_normalisation(self):
+        self.succeed(*small(agent="dqn", layer_norm=False, hidden="24,33"))
+        self.check(self.folder / "run")
+        self.check_outputs_of_the_plain_network()
+
+    def check_outputs_of_the_plain_network(self):
+        """Of a plain network they are the Q-values."""
+        states = random_states(4)
+        expected = rows_of(probe(self.folder / "run", "states", states), COUNT)
+        scale = max(abs(q) for row in expected for q in row[1:])
+        for (_, _, outputs), row in zip(self.drive(states, 4), expected, strict=True):
+            for got, q in zip(outputs, row[1:], strict=True):
+                self.assertLessEqual(abs(got - q), 1e-4 * scale)
+
+    def test_actors_of_the_test_vectors(self):
+        vectors = json.loads(self.succeed("export", "--test-vectors", "-"))
+        for i, actor in enumerate(vectors["actors"]):
+            with self.subTest(i):
+                path = self.folder / f"actor-{i}.safetensors"
+                path.write_bytes(bytes.fromhex(actor["file"]))
+                self.check(path)
+
+    def test_other_tasks(self):
+        for agent, task in (("pendulum-v1", "pendulum-v1"), ("acrobot", "acrobot-v1"),
+                            ("sac-pendulum-v1", "pendulum-v1")):
+            with self.subTest(agent):
+                self.succeed("train", "--agent", agent, "--steps", 3000, "--out", agent,
+                             "--eval-every", 3000, "--eval-episodes", 2, "--threads", 1)
+                self.check(self.folder / agent, task)
+
+    def test_another_plant(self):
+        self.succeed(*small(mass1=1.5, length2=0.4, gravity=3, damping2=0.1))
+        self.check(self.folder / "run")
+
+    def test_memory_over_rollouts(self):
+        policy = AGENTS / "d3qn-randomized.safetensors"
+        self.build(policy)
+        rng = random.Random(1)
+        states, begins, torques = array.array("f"), [], []
+        while len(begins) < COUNT:
+            start = ",".join(str(rng.uniform(-3, 3)) for _ in range(4))
+            self.succeed("simulate", policy, "--start", start, "--physics", "closed-form",
+                         "--set", f"mass2={rng.uniform(0.8, 1.2)}", "--unknown-plant",
+                         "--csv", "rollout.csv")
+            rows = read_csv(self.folder / "rollout.csv")
+            for i, row in enumerate(rows):
+                states.extend(row[name] for name in ("qpos0", "qpos1", "qvel0", "qvel1"))
+                begins.append(i == 0)
+                torques.append(row["torque"])
+        self.assert_same(self.drive(states, 4, begins, torques), torques)
+
+    def test_sanitizers(self):
+        for name in ("fast", "sac", "d3qn-randomized"):
+            with self.subTest(name):
+                self.build(AGENTS / f"{name}.safetensors", *SANITIZE)
+                far = [x * 10.0 ** random.Random(i).uniform(0, 37)
+                       for i, x in enumerate(random_states(4)[:400])]
+                got = self.drive(array.array("f", far) + random_states(4)[:2000], 4,
+                                 begins=[0] * 600)
+                self.assertEqual({status for status, _, _ in got}, {0, 1})
+
+    def test_no_number_is_told(self):
+        bad = [math.nan, -math.nan, math.inf, -math.inf, 3.4e38, -3.4e38]
+        for options in ([], ["-O3", "-ffast-math"]):
+            for name in ("fast", "ppo", "d3qn-randomized"):
+                with self.subTest(f"{name} {options}"):
+                    self.build(AGENTS / f"{name}.safetensors", *options)
+                    good = [0.1, 0.2, 0.3, 0.4]
+                    states, wrong = array.array("f"), []
+                    for place in range(4):
+                        for x in bad:
+                            # An angle may be of any size.
+                            wrong.append(place > 1 or not abs(x) < math.inf)
+                            states.extend([*good[:place], x, *good[place + 1:]])
+                            states.extend(good)
+                    got = self.drive(states, 4, begins=[-1] * (len(states) // 4))
+                    for i, is_wrong in enumerate(wrong):
+                        status, torque, _ = got[2 * i]
+                        self.assertEqual(status, is_wrong, (i, got[2 * i]))
+                        self.assertTrue(not is_wrong or torque == 0)
+                        self.assertEqual(got[2 * i + 1][0], 0)
+                    # What was remembered is forgotten: the next is as the first of an episode.
+                    first = self.drive(array.array("f", good), 4)[0]
+                    for i, is_wrong in enumerate(wrong):
+                        if is_wrong:
+                            self.assertEqual(got[2 * i + 1][1], first[1])
+
+    def test_null_pointers(self):
+        self.succeed("export", AGENTS / "fast.safetensors", "--c", "policy.h")
+        self.write("null.c", """#include "policy.h"
+            int main(void) {
+              policy_state state; float torque = 1.0f;
+              policy_init(&state); policy_init(0);
+              return policy_control(0, 0, 0, 0, 0, &torque) == POLICY_NULL_POINTER
+                && torque == 0.0f
+                && policy_control(&state, 0, 0, 0, 0, 0) == POLICY_NULL_POINTER
+                && policy_control_observation(0, &torque) == POLICY_NULL_POINTER
+                && policy_control_observation(&torque, 0) == POLICY_NULL_POINTER ? 0 : 1;
+            }""")
+        self.compile("null.c", "-O1")
+        self.assertEqual(subprocess.run([self.folder / "program"], check=False).returncode, 0)
+
+    def self_test(self):
+        """The exit code of a program that tests the header at hand."""
+        self.write("test.c", '#include "policy.h"\nint main(void) { return (int)policy_selftest(); }')
+        self.compile("test.c", "-O1")
+        return subprocess.run([self.folder / "program"], check=False).returncode
+
+    def test_self_test_finds_any_changed_number(self):
+        self.succeed(*small(hidden="8,8", head=4))
+        self.succeed("export", "run", "--c", "policy.h")
+        whole = self.header()
+        self.assertEqual(self.self_test(), 0)
+        numbers = [match for array_ in re.finditer(r"static const float policy_\w+\[\d+\] = "
+                                                   r"\{(.*?)\};", whole, re.DOTALL)
+                   for match in re.finditer(r"-?\d[\d.e+-]*(?=f)", whole[array_.start(1):array_.end(1)])
+                   for match in [(array_.start(1) + match.start(), array_.start(1) + match.end())]]
+        self.assertGreater(len(numbers), 300)
+        rng = random.Random(0)
+        for begin, end in [numbers[0], numbers[-1], *rng.sample(numbers, 20)]:
+            number = float(whole[begin:end])
+            other = repr(number + 0.01 * max(1, abs(number)))
+            self.write("policy.h", whole[:begin] + other + whole[end:])
+            self.assertEqual(self.self_test(), 3, whole[begin:end])
+        # The last bit of a weight.
+        begin, end = numbers[len(numbers) // 3]
+        bits = array.array("I", array.array("f", [float(whole[begin:end])]).tobytes())
+        bits[0] ^= 1
+        other = repr(array.array("f", bits.tobytes())[0])
+        self.write("policy.h", whole[:begin] + other + whole[end:])
+        self.assertEqual(self.self_test(), 3)
+
+    def test_self_test_finds_wrong_arithmetic(self):
+        self.succeed("export", AGENTS / "sac.safetensors", "--c", "policy.h")
+        whole = self.header()
+        for right, wrong in (("sinf(q1)", "cosf(q1)"), ("c12 = c1 * c2 - s1", "c12 = c1 * c2 + s1"),
+                             ("w1 / 10", "w1 / 11"), ("tanhf(outputs", "sinf(outputs"),
+                             ("mean /= (float)size", "mean /= 2.0f * (float)size"),
+                             ("POLICY_TORQUE_LIMIT 5.0f", "POLICY_TORQUE_LIMIT 4.9f")):
+            self.assertEqual(whole.count(right), 1, right)
+            self.write("policy.h", whole.replace(right, wrong))
+            self.assertEqual(self.self_test(), 3, right)
+
+    def test_two_policies_in_one_program(self):
+        for name in ("fast", "sac"):
+            self.succeed("export", AGENTS / f"{name}.safetensors", "--c", f"{name}.h")
+        self.write("two.c", """#include "fast.h"
+            #include "sac.h"
+            int main(void) {
+              static fast_state one; static sac_state two; float a, b;
+              return fast_control(&one, 1, 0, 0, 0, &a) == FAST_OK
+                && sac_control(&two, 1, 0, 0, 0, &b) == SAC_OK && fast_selftest() == FAST_OK
+                && sac_selftest() == SAC_OK ? 0 : 1;
+            }""")
+        self.compile("two.c", "-O1")
+        self.assertEqual(subprocess.run([self.folder / "program"], check=False).returncode, 0)
+
+    def test_names_follow_the_file_or_the_flag(self):
+        policy = AGENTS / "fast.safetensors"
+        for arguments, prefix in ((["--c", "My Policy-2.h"], "my_policy_2"),
+                                  (["--c", "3x.h"], "policy_3x"), (["--c", "..h"], "fast"),
+                                  (["--c", "x.h", "--prefix", "left_arm"], "left_arm"),
+                                  (["--c", "y" * 99 + ".h"], "y" * 32)):
+            printed = self.succeed("export", policy, *arguments)
+            self.assertIn(f"names begin with {prefix}_\n", printed)
+            text = (self.folder / arguments[1]).read_text(encoding="ascii")
+            self.assertIn(f"{prefix}_control(", text)
+            self.assertEqual(set(re.findall(r"static (?:inline|const) \w+ (?!float\b)(\w+?)_control\(",
+                                            text)), {prefix})
+            self.assertNotRegex(text, "NAME_|CAPS_")
+        piped = self.succeed("export", policy, "--c", "-")
+        self.assertIn("fast_control(", piped)
+        for prefix in ("Fast", "3x", "a b", "a/*", "é", "_a", "a" * 33):
+            self.refuse(["export", policy, "--c", "x.h", "--prefix", prefix], "prefix", "expected")
+
+    def test_hostile_texts_stay_in_their_comment(self):
+        metadata, tensors = read_tensors(AGENTS / "fast.safetensors")
+        agent = '*/ int x = 1; /* ??/ \\ " %s // é #define q1 2'
+        for key in ("agent", "upswing_version"):
+            write_tensors(self.folder / "hostile.safetensors", metadata | {key: agent}, tensors)
+            self.build("hostile.safetensors", "-Wtrigraphs")
+            self.assertEqual(self.header().count("*/ int x"), 0)
+            self.drive(random_states(4)[:40], 4)
+            self.succeed("export", "hostile.safetensors", "--onnx", "policy.onnx")
+            self.assertIn(agent.encode(), (self.folder / "policy.onnx").read_bytes())
+        self.succeed("export", "hostile.safetensors", "--c", "-")
+
+    def test_what_it_says_of_itself(self):
+        printed = self.succeed("export", AGENTS / "fast.safetensors", "--c", "policy.h")
+        # 8-64-64, the advantage stream alone: 64-32-9, and layer normalisation.
+        weights = 8 * 64 + 64 * 64 + 64 * 32 + 32 * 9
+        constants = 4 * (weights + 3 * 2 * 64 + 32 + 9 + 9 + 7)
+        self.assertIn(f"{weights:,} multiply-adds", printed)
+        self.assertIn(f"{constants:,} bytes of constants", printed)
+        header = self.header()
+        for words in (f"Flash: {constants} bytes", f"{weights} multiply-adds",
+                      f"POLICY_MULTIPLY_ADDS {weights}L",
+                      "#define POLICY_PERIOD 0.02f", "#define POLICY_TORQUE_LIMIT 5.0f",
+                      "agent fast, seed 1", "mass2 1, length1 0.5", "rad/s  velocity of q2"):
+            self.assertTrue(words in header, words)
+        self.assertEqual([line for line in header.splitlines() if len(line) > 100], [])
+        sizes = [int(size) for name, size in re.findall(r"static const float (\w+)\[(\d+)\]", header)
+                 if "sample" not in name]
+        self.assertEqual(4 * sum(sizes), constants)
+        self.write("size.c", '#include "policy.h"\n#include <stdio.h>\nint main(void) '
+                             '{ printf("%d", (int)sizeof(policy_state)); return 0; }')
+        for name, state in (("fast", 4), ("d3qn-randomized", 4 + 8 + 4 + 48)):
+            printed = self.succeed("export", AGENTS / f"{name}.safetensors", "--c", "policy.h")
+            self.compile("size.c")
+            size = subprocess.run([self.folder / "program"], check=True, stdout=subprocess.PIPE)
+            self.assertEqual(int(size.stdout), state)
+            self.assertIn(f"{state} bytes of state", printed)
+
+    def test_bad_usage(self):
+        policy = AGENTS / "fast.safetensors"
+        self.refuse(["export", "lqr", "--c", "x.h"], "lqr", "learned policy", "controller")
+        self.refuse(["export", "lqr", "--onnx", "x.onnx"], "lqr", "learned policy", "controller")
+        self.refuse(["export", "--c", "x.h"], "--c", "none")
+        self.refuse(["export", policy, policy, "--onnx", "x.onnx"], "--onnx", "got 2")
+        self.refuse(["export", policy, "--onnx", "a", "--c", "b"], "--onnx and --c")
+        self.refuse(["export", policy, "--onnx", "a", "--prefix", "b"], "--prefix", "--c")
+        self.refuse(["export", policy, "--c", "a", "--id", "b"], "--id", "--page")
+        self.refuse(["export", policy, "--c", "nowhere/x.h"], "nowhere")
+        self.refuse(["export", "nothing", "--c", "x.h"], "nothing: no such file")
+        self.write("wrong.safetensors", "no policy")
+        self.refuse(["export", "wrong.safetensors", "--c", "x.h"], "wrong.safetensors")
+        self.refuse(["export", "wrong.safetensors", "--onnx", "x.onnx"], "wrong.safetensors")
+
+
+if __name__ == "__main__":
+    unittest.main()

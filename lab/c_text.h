@@ -1,0 +1,35 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+/// Pieces of C source code.
+namespace upswing {
+
+/// `text`, which may come from an untrusted file, for a comment: nothing in it ends the comment or
+/// the line, or begins a trigraph.
+std::string CommentText(std::string_view text);
+
+/// The shortest literal that reads back as the same finite float, such as `0.1f`.
+std::string CLiteral(float value);
+
+/// `text` with each `from` replaced by `to`.
+std::string Replaced(std::string text, std::string_view from, std::string_view to);
+
+/// `text` with each @word@ replaced by what that stands for.
+std::string Filled(std::string text,
+                   const std::vector<std::pair<std::string, std::string>>& values);
+
+std::string UpperCase(std::string text);
+
+/// `words` on lines of at most 100 characters, each line after the first behind `indent`; the first
+/// has `column` characters already.
+std::string Wrapped(const std::vector<std::string>& words, const std::string& indent,
+                    size_t column = 0);
+
+/// A paragraph of a comment: `text` on such lines, each behind " * ".
+std::string Paragraph(std::string_view text);
+
+}  // namespace upswing
