@@ -103,9 +103,7 @@ int RunExport(const ExportArguments& a) {
 
 void AddExport(CLI::App& program, Command& command) {
   CLI::App* app = program.add_subcommand(
-      "export",
-      "Write a policy as ONNX or C, put policies into the page, or write numbers to test "
-      "other readers by");
+      "export", "Policies as ONNX or C or in the page; numbers to test other readers by");
   auto a = std::make_shared<ExportArguments>();
   app->add_option("policies", a->policies, "policy.safetensors or run folders")
       ->type_name("POLICY|RUN")

@@ -15,6 +15,7 @@ import unittest
 from testing import ROOT, ProgramTest, probe, read_csv, read_tensors, small, write_tensors
 
 AGENTS = ROOT / "web/public/agents"
+EXAMPLE = ROOT / "examples/c"
 COUNT = 10_000
 STRICT = ["-pedantic", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion", "-Wshadow"]
 SANITIZE = ["-fsanitize=undefined,address", "-fno-sanitize-recover=all"]
@@ -372,6 +373,112 @@ class HeaderTest(ProgramTest):
         self.write("wrong.safetensors", "no policy")
         self.refuse(["export", "wrong.safetensors", "--c", "x.h"], "wrong.safetensors")
         self.refuse(["export", "wrong.safetensors", "--onnx", "x.onnx"], "wrong.safetensors")
+
+
+class SwingUpTest(ProgramTest):
+    """The closed loop in plain C of examples/c."""
+
+    def build(self, agent):
+        self.succeed("export", AGENTS / f"{agent}.safetensors", "--c", "policy.h")
+        done = compile_c(self.folder, EXAMPLE / "swing_up.c", "-O2", "-I.")
+        self.assertEqual((done.returncode, done.stdout), (0, ""))
+
+    def run_example(self, *start):
+        done = subprocess.run([self.folder / "program", *map(str, start)], check=False,
+                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, encoding="utf-8")
+        return done.returncode, done.stdout, done.stderr
+
+    def test_policies_swing_up(self):
+        for agent in ("fast", "sac", "ppo", "d3qn-randomized"):
+            with self.subTest(agent):
+                self.build(agent)
+                code, rows, said = self.run_example()
+                self.assertEqual(code, 0, said)
+                since = re.fullmatch(r"upright from (\S+) s to the end\n", said)
+                self.assertLess(float(since[1]), 6)
+                self.assertEqual(len(rows.splitlines()), 1001)
+
+    def test_the_motion_is_that_of_the_program(self):
+        self.build("fast")
+        start = [0.3, -0.2, 0.5, 1]
+        _, text, _ = self.run_example(*start)
+        self.write("in_c.csv", text)
+        self.succeed("simulate", AGENTS / "fast.safetensors", "--start", ",".join(map(str, start)),
+                     "--physics", "closed-form", "--csv", "ours.csv")
+        names = {"q1": "qpos0", "q2": "qpos1", "w1": "qvel0", "w2": "qvel1", "torque": "torque"}
+        for got, ours in zip(read_csv(self.folder / "in_c.csv")[:100],
+                             read_csv(self.folder / "ours.csv")):
+            for name, column in names.items():
+                self.assertAlmostEqual(got[name], ours[column], delta=1e-9)
+
+    def test_a_failure_is_told(self):
+        self.build("fast")
+        header = (self.folder / "policy.h").read_text(encoding="ascii")
+        lazy = header.replace("*torque = policy_choose(outputs);", "*torque = 0.0f;")
+        self.assertNotEqual(lazy, header)
+        self.write("policy.h", lazy)
+        self.assertEqual(compile_c(self.folder, EXAMPLE / "swing_up.c", "-I.").returncode, 0)
+        self.assertEqual(self.run_example()[::2], (1, "not upright for the last 10 s\n"))
+        self.assertEqual(self.run_example("nan", 0, 0, 0)[::2],
+                         (1, "swing_up: the state is no longer finite\n"))
+        self.assertEqual(self.run_example(1)[0], 2)
+
+
+@unittest.skipUnless(shutil.which("arm-none-eabi-gcc") and shutil.which("qemu-system-arm"),
+                     "no gcc-arm-none-eabi and qemu-system-arm here")
+class CortexM4Test(ProgramTest):
+    """The same on a Cortex-M4 with its own arithmetic and newlib's math, in QEMU."""
+
+    PROCESSOR = ["-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"]
+
+    def run_there(self, source, *qemu, optimize="-O2"):
+        """Builds a program for it and runs it."""
+        folder = EXAMPLE / "cortex_m4"
+        done = subprocess.run(
+            ["arm-none-eabi-gcc", "-std=c99", optimize, *STRICT, *self.PROCESSOR, "-I.", source,
+             folder / "startup.c", "--specs=rdimon.specs", "-T", folder / "mps2_an386.ld",
+             "-Wl,--gc-sections", "-o", "program.elf", "-lm"], cwd=self.folder, check=False,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8")
+        if "rdimon.specs" in done.stdout:
+            self.skipTest("no libnewlib-arm-none-eabi here")
+        self.assertEqual((done.returncode, done.stdout), (0, ""))
+        return subprocess.run(
+            ["qemu-system-arm", "-M", "mps2-an386", "-semihosting", "-nographic", *qemu, "-kernel",
+             "program.elf"], cwd=self.folder, check=False, stdin=subprocess.DEVNULL, timeout=300,
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, encoding="utf-8")
+
+    def test_self_test_and_work(self):
+        # (agent, instructions for each multiply-add at most: load, multiply, add, and loops)
+        for agent, most in (("fast", 6), ("d3qn-randomized", 6), ("sac", 6)):
+            for optimize in ("-O2", "-Os"):
+                with self.subTest(f"{agent} {optimize}"):
+                    self.succeed("export", AGENTS / f"{agent}.safetensors", "--c", "policy.h")
+                    done = self.run_there(EXAMPLE / "cortex_m4/count.c", "-icount", "shift=8",
+                                          optimize=optimize)
+                    self.assertEqual(done.returncode, 0, done)
+                    header = (self.folder / "policy.h").read_text(encoding="ascii")
+                    work = int(re.search(r"POLICY_MULTIPLY_ADDS (\d+)L", header)[1])
+                    lines = re.findall(r"status 0, torque (\S+), (\d+) instructions", done.stdout)
+                    self.assertEqual(len(lines), 4, done.stdout)
+                    for _, instructions in lines:
+                        self.assertLess(2 * work, int(instructions))
+                        self.assertLess(int(instructions), most * work + 4000)
+
+    def test_it_swings_up(self):
+        self.succeed("export", AGENTS / "fast.safetensors", "--c", "policy.h")
+        done = self.run_there(EXAMPLE / "swing_up.c")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("upright from", done.stderr)
+
+    def test_a_damaged_one_is_told(self):
+        self.succeed("export", AGENTS / "fast.safetensors", "--c", "policy.h")
+        header = (self.folder / "policy.h").read_text(encoding="ascii")
+        begin = header.index("{", header.index("policy_feature_1_weight["))
+        number = re.search(r"-?\d+\.\d+", header[begin:])
+        begin += number.start()
+        self.write("policy.h", header[:begin] + "0.5" + header[begin + len(number[0]):])
+        done = self.run_there(EXAMPLE / "cortex_m4/count.c", "-icount", "shift=8")
+        self.assertEqual((done.returncode, done.stdout), (1, "damaged\n"))
 
 
 if __name__ == "__main__":

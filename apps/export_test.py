@@ -175,8 +175,8 @@ class TestVectorsTest(ProgramTest):
         self.assertNotIn("-0.0,", text)
 
     def test_bad_usage(self):
-        self.refuse(["export"], "--page", "--test-vectors")
-        self.refuse(["export", "--test-vectors", "a", "--page", "b"], "both")
+        self.refuse(["export"], "--page", "--onnx", "--c", "--test-vectors", "none")
+        self.refuse(["export", "--test-vectors", "a", "--page", "b"], "--page and --test-vectors")
         self.refuse(["export", "x", "--test-vectors", "a"], "no policy")
         self.refuse(["export", "--test-vectors", "nowhere/a"], "nowhere")
 

@@ -100,8 +100,9 @@ inline constexpr const char* kLinear = R"c(
 static inline void NAME_linear(const float *w, const float *b, int in, int out, const float *x,
                                float *y)
 {
-  int o = 0, i;
-  for (; o + 8 <= out; o += 8) {
+  const int in_blocks = out - out % 8;
+  int o, i;
+  for (o = 0; o < in_blocks; o += 8) {
     float y0 = b[o], y1 = b[o + 1], y2 = b[o + 2], y3 = b[o + 3];
     float y4 = b[o + 4], y5 = b[o + 5], y6 = b[o + 6], y7 = b[o + 7];
     for (i = 0; i < in; i++, w += 8) {
@@ -124,7 +125,7 @@ static inline void NAME_linear(const float *w, const float *b, int in, int out, 
     y[o + 6] = y6;
     y[o + 7] = y7;
   }
-  for (; o < out; o++) {
+  for (o = in_blocks; o < out; o++) {
     float sum = b[o];
     for (i = 0; i < in; i++) sum += w[i] * x[i];
     w += in;

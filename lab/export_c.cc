@@ -227,7 +227,7 @@ std::string HeaderWriter::HeadComment() const {
        {"plant", plant},
        {"needs",
         Paragraph(Concat("Flash: ", header_.constant_bytes,
-                         " bytes of constants, some KB of code, and 1 or 2 KB of "
+                         " bytes of constants, 1 to 2 KB of code, and 1 KB of "
                          "samples where the self test is used. RAM: ",
                          header_.state_bytes, " bytes of state, and in a call some ",
                          header_.stack_bytes, " of stack. Work of a call: ", header_.multiply_adds,
