@@ -79,7 +79,7 @@ def flags(what, task, width, batch, threads, seed):
                  "seed": seed, "reward-scale": 1, "learning-rate": LEARNING_RATE,
                  "learning-rate-end": LEARNING_RATE, "log-every": unclocked_steps(what)}
     switches = ["--no-mirror", "--no-layer-norm", "--no-stop-when-solved"]
-    switches += ["--no-normalize"] if what == "ppo" else []
+    switches += ["--no-normalize"] if what == "ppo" else ["--twin", "--no-prioritized"]
     settings |= OUR_TASK[task]
     return switches + [f"--{name}={value}" for name, value in settings.items()]
 
