@@ -45,7 +45,7 @@ PINNED = {
     ("fast", "avx512"): ("a0b995bb1800dcd5", "6b1adc0b33342d1f"),
     ("ppo", "avx512"): ("ce863a10c4591c03", "b83fd75bcb1f6108"),
     ("ppo-discrete", "avx512"): ("77bb72242c932e1e", "28ba5f0b80c29322"),
-    ("sac-fast", "avx512"): ("7e19dc7fa514aabf", "271f2f0f07d703db"),
+    ("sac-fast", "avx512"): ("78cc21007713adca", "e05c8e8d44483c3b"),
     ("d3qn", "avx2"): ("f3292dc9bcd871bd", "f001e0850ae9bfc4"),
     ("d3qn-bare", "avx2"): ("49a53614a224402d", "7354f565dc255071"),
     ("d3qn-randomized", "avx2"): ("01533d70da9b6363", "ac86aa966475f94b"),
@@ -54,13 +54,13 @@ PINNED = {
     ("fast", "avx2"): ("87beb79ed39b5680", "6229176dbee34982"),
     ("ppo", "avx2"): ("ce863a10c4591c03", "ffcafd666cc4a3bd"),
     ("ppo-discrete", "avx2"): ("2bc534143160ffe1", "ded4fe6412d2b8cd"),
-    ("sac-fast", "avx2"): ("b453af68aa54c04a", "b8ba3e3b8d9c1b31"),
+    ("sac-fast", "avx2"): ("eea8d9483ce97703", "9381935c11a69779"),
     ("d3qn-randomized", "portable"): ("0a0fb5e05949f407", "a1f87f7dce46f0cb"),
     ("d3qn-small", "portable"): ("55acee64b0902ba5", "8cf868245d197a1e"),
     ("fast", "portable"): ("ff5ea96eb3a62dd8", "4f2c17f391b14013"),
     ("ppo", "portable"): ("ebda7e5f8c50a8db", "6f0087929cae8b04"),
     ("ppo-discrete", "portable"): ("52694e6fd553c6fd", "fed33d50d51c7d08"),
-    ("sac-fast", "portable"): ("ac8358c8ff693a7d", "d2a31af0bf59891b"),
+    ("sac-fast", "portable"): ("fc3a7ded716622ca", "e81540cb781d91a7"),
 }
 
 

@@ -18,6 +18,7 @@
 #define UPSWING_NN_LINEAR_ONCE
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <type_traits>
 
 namespace upswing {
@@ -32,6 +33,7 @@ struct KernelTable {
   decltype(&LayerNormBackwardGain<T>) layer_norm_backward_gain;
   decltype(&Tanh<T>) tanh;
   decltype(&TanhBackward<T>) tanh_backward;
+  decltype(&SquashSamples<T>) squash_samples;
   decltype(&SquaredNorm<T>) squared_norm;
   decltype(&AdamPolyakStep<T>) adam_polyak_step;
 };
@@ -70,7 +72,22 @@ void Transpose(Matrix<const T> x, Matrix<T> y) {
 
 template <typename T>
 void SumRows(Matrix<const T> x, std::span<T> sum) {
-  ForVectors<T>(sum.size(), [&](size_t i, size_t count, auto partial) HWY_ATTR {
+  // Four registers at a time: each addition waits for the one before it.
+  const Tag<T> d;
+  const size_t lanes = hn::Lanes(d);
+  size_t done = 0;
+  for (; done + 4 * lanes <= sum.size(); done += 4 * lanes) {
+    Vec<T> column[4] = {hn::Zero(d), hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+    for (int r = 0; r < x.rows(); ++r) {
+      const T* row = x.row(r).data() + done;
+      HWY_UNROLL(4)
+      for (size_t v = 0; v < 4; ++v) column[v] = hn::Add(column[v], hn::LoadU(d, row + v * lanes));
+    }
+    HWY_UNROLL(4)
+    for (size_t v = 0; v < 4; ++v) hn::StoreU(column[v], d, sum.data() + done + v * lanes);
+  }
+  ForVectors<T>(sum.size() - done, [&](size_t first, size_t count, auto partial) HWY_ATTR {
+    const size_t i = done + first;
     Vec<T> column = hn::Zero(Tag<T>());
     for (int r = 0; r < x.rows(); ++r) {
       column = hn::Add(column, Load<partial.value>(x.row(r).data() + i, count));
@@ -195,6 +212,32 @@ void TanhBackward(std::span<const T> y, std::span<T> dy) {
 }
 
 template <typename T>
+void SquashSamples(std::span<const T> mean, std::span<const T> log_std, std::span<const T> epsilon,
+                   std::span<T> deviation, std::span<T> action, std::span<T> log_prob) {
+  constexpr T kLogTwo = std::numbers::ln2_v<T>;
+  constexpr T kHalfLogTwoPi = T(0.91893853320467274178);
+  const Tag<T> d;
+  const auto one = hn::Set(d, T{1}), two = hn::Set(d, T{2});
+  ForVectors<T>(mean.size(), [&](size_t i, size_t count, auto partial) HWY_ATTR {
+    const auto load = [&](auto values)
+                          HWY_ATTR { return Load<partial.value>(values.data() + i, count); };
+    const auto store = [&](Vec<T> value, std::span<T> to)
+                           HWY_ATTR { Store<partial.value>(value, to.data() + i, count); };
+    const Vec<T> noise = load(epsilon), log_sigma = load(log_std), sigma = hn::Exp(d, log_sigma);
+    const Vec<T> u = hn::MulAdd(sigma, noise, load(mean)), size = hn::Abs(u);
+    // e = exp(-2 |u|) serves tanh and ln(1 - tanh²).
+    const Vec<T> e = hn::Exp(d, hn::Neg(hn::Add(size, size)));
+    const Vec<T> rest = hn::Add(size, hn::Log1p(d, e));
+    const Vec<T> slope = hn::Mul(two, hn::Sub(hn::Set(d, kLogTwo), rest));
+    const Vec<T> density = hn::NegMulAdd(hn::Mul(noise, noise), hn::Set(d, T(0.5)),
+                                         hn::Neg(hn::Add(log_sigma, hn::Set(d, kHalfLogTwoPi))));
+    store(sigma, deviation);
+    store(hn::CopySign(hn::Div(hn::Sub(one, e), hn::Add(one, e)), u), action);
+    store(hn::Sub(density, slope), log_prob);
+  });
+}
+
+template <typename T>
 T SquaredNorm(std::span<const T> x) {
   return SumVectors<T>(x.size(), [&](size_t i, size_t count, auto partial) HWY_ATTR {
     const Vec<T> value = Load<partial.value>(x.data() + i, count);
@@ -245,6 +288,7 @@ constexpr KernelTable<T> kKernels{
     &LayerNormBackwardGain<T>,
     &Tanh<T>,
     &TanhBackward<T>,
+    &SquashSamples<T>,
     &SquaredNorm<T>,
     &AdamPolyakStep<T>,
 };
@@ -363,6 +407,12 @@ void TanhBackward(std::span<const T> y, std::span<T> dy) {
 }
 
 template <typename T>
+void SquashSamples(std::span<const T> mean, std::span<const T> log_std, std::span<const T> epsilon,
+                   std::span<T> deviation, std::span<T> action, std::span<T> log_prob) {
+  Kernels<T>().squash_samples(mean, log_std, epsilon, deviation, action, log_prob);
+}
+
+template <typename T>
 T SquaredNorm(std::span<const T> x) {
   return Kernels<T>().squared_norm(x);
 }
@@ -388,6 +438,8 @@ void AdamPolyakStep(const AdamConstants<T>& constants, std::span<const T> g, std
   template void LayerNormBackwardGain(Matrix<const T>, Matrix<const T>, std::span<T>);             \
   template void Tanh(std::span<T>);                                                                \
   template void TanhBackward(std::span<const T>, std::span<T>);                                    \
+  template void SquashSamples(std::span<const T>, std::span<const T>, std::span<const T>,          \
+                              std::span<T>, std::span<T>, std::span<T>);                           \
   template T SquaredNorm(std::span<const T>);                                                      \
   template void AdamPolyakStep(const AdamConstants<T>&, std::span<const T>, std::span<T>,          \
                                std::span<T>, std::span<T>, std::span<T>);

@@ -60,6 +60,13 @@ void Tanh(std::span<T> x);
 template <typename T>
 void TanhBackward(std::span<const T> y, std::span<T> dy);
 
+/// Samples of squashed Gaussians (nn/gaussian.h), n components: of mean, log_std (in range) and
+/// epsilon, deviation = exp(log_std), action = tanh(mean + deviation · epsilon), and the
+/// log-probability of each, up to some units in the last place of Squash.
+template <typename T>
+void SquashSamples(std::span<const T> mean, std::span<const T> log_std, std::span<const T> epsilon,
+                   std::span<T> deviation, std::span<T> action, std::span<T> log_prob);
+
 /// Sum of squares.
 template <typename T>
 T SquaredNorm(std::span<const T> x);

@@ -12,6 +12,7 @@
 #include "core/aligned.h"
 #include "core/rng.h"
 #include "core/simd.h"
+#include "nn/gaussian.h"
 
 namespace upswing {
 namespace {
@@ -260,6 +261,38 @@ void ExpectTanh(T tolerance) {
 TEST_P(KernelTest, TanhAndItsBackwardPass) {
   ExpectTanh<float>(4 * std::numeric_limits<float>::epsilon());
   ExpectTanh<double>(4 * std::numeric_limits<double>::epsilon());
+}
+
+template <typename T>
+void ExpectSquashedSamples(T tolerance) {
+  constexpr size_t kMost = 37;
+  Rng rng(3, "samples");
+  std::vector<T> mean, log_std, epsilon;
+  for (size_t i = 0; i < kMost; ++i) {
+    mean.push_back(static_cast<T>(i % 3 == 0 ? 20 * rng.Normal() : rng.Normal()));
+    log_std.push_back(static_cast<T>(rng.Uniform(kLogStdLow, kLogStdHigh)));
+    epsilon.push_back(static_cast<T>(rng.Normal()));
+  }
+  mean[5] = epsilon[5] = 0;
+  for (size_t n = 1; n <= kMost; ++n) {
+    std::vector<T> deviation(n), action(n), log_prob(n);
+    const auto part = [&](const std::vector<T>& x) { return std::span<const T>(x).first(n); };
+    SquashSamples<T>(part(mean), part(log_std), part(epsilon), deviation, action, log_prob);
+    for (size_t i = 0; i < n; ++i) {
+      const auto policy = Gaussian<T>::From(mean[i], log_std[i]);
+      const Squashed<T> expected = Squash(policy, epsilon[i]);
+      ASSERT_NEAR(deviation[i], policy.std, tolerance * policy.std);
+      ASSERT_NEAR(action[i], expected.action, tolerance) << mean[i];
+      // ln π has terms as large as 2 |u|.
+      ASSERT_NEAR(log_prob[i], expected.log_prob,
+                  tolerance * (4 + 4 * std::abs(mean[i]) + 4 * policy.std * std::abs(epsilon[i])));
+    }
+  }
+}
+
+TEST_P(KernelTest, SquashedSamplesAreThoseOfTheirDefinition) {
+  ExpectSquashedSamples<float>(4 * std::numeric_limits<float>::epsilon());
+  ExpectSquashedSamples<double>(4 * std::numeric_limits<double>::epsilon());
 }
 
 TEST_P(KernelTest, AdamAndPolyakInOnePass) {

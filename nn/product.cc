@@ -214,6 +214,7 @@ void MultiplyAll(const Product<T>& p) {
   int m = MultiplyFewColumns(p);
   m = MultiplyRows<kTileRows>(p, m);
   m = MultiplyRows<4>(p, m);
+  m = MultiplyRows<3>(p, m);
   m = MultiplyRows<2>(p, m);
   MultiplyRows<1>(p, m);
 }

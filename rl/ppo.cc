@@ -76,8 +76,8 @@ Ppo::Ppo(const PpoConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
       batch_advantage_(old_log_prob_.size()),
       batch_target_(old_log_prob_.size()),
       mirrored_(old_log_prob_.size()),
-      sums_((V_.size() + static_cast<size_t>(SliceRows(B_)) - 1) /
-            static_cast<size_t>(SliceRows(B_))) {
+      sums_(static_cast<size_t>(NumSlices(B_)),
+            Sums{.dlog_std = AlignedVector<float>(std_.size())}) {
   for (int block = 0; block < Blocks(spec.num_envs); ++block) {
     explore_rngs_.emplace_back(seed, "exploration", static_cast<uint64_t>(block));
   }

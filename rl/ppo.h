@@ -51,6 +51,7 @@ class Ppo : public Agent {
   struct Sums {
     double policy_loss = 0, value_loss = 0, entropy = 0, kl = 0, clipped = 0;
     AlignedVector<float> dlog_std;  // (A) gradient with respect to ln σ
+    void Clear();
     void Add(const Sums& other);
   };
 

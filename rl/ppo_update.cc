@@ -12,6 +12,11 @@
 
 namespace upswing {
 
+void Ppo::Sums::Clear() {
+  policy_loss = value_loss = entropy = kl = clipped = 0;
+  std::ranges::fill(dlog_std, 0.0F);
+}
+
 void Ppo::Sums::Add(const Sums& other) {
   policy_loss += other.policy_loss;
   value_loss += other.value_loss;
@@ -34,7 +39,7 @@ void Ppo::Update(std::span<const int64_t> rows) {
   critic_.Prepare(pool_);
   ForSlices(pool_, B_, [&](RowRange slice) {
     Sums& sums = sums_[static_cast<size_t>(slice.first / SliceRows(B_))];
-    sums = {.dlog_std = AlignedVector<float>(std_.size())};
+    sums.Clear();
     Gather(rows, slice);
     BackwardActor(slice, sums);
     BackwardCritic(slice, sums);
@@ -61,23 +66,22 @@ void Ppo::Gather(std::span<const int64_t> from, RowRange rows) {
   const Matrix<const float> all_obs = rollout_.all_obs(), all_actions = rollout_.all_actions();
   const float* log_prob = rollout_.log_probs().data();
   const auto last_level = static_cast<float>(config_.levels - 1);
-  std::vector<float> mirror_obs(static_cast<size_t>(D_));
   for (int i = rows.first; i < rows.first + rows.count; ++i) {
     const auto row = static_cast<size_t>(i);
     const auto place = static_cast<size_t>(from[row]);
     const auto source = static_cast<int>(place);
-    normalizer_.Apply(all_obs.row(source), s.row(i));
+    const bool mirror = mirrored_[row] != 0;
+    for (int k = 0; k < D_; ++k) {
+      const float sign = mirror ? mirror_signs_[static_cast<size_t>(k)] : 1;
+      s(i, k) = sign * all_obs(source, k);
+    }
+    normalizer_.Apply(s.row(i), s.row(i));
     for (int k = 0; k < a.cols(); ++k) a(i, k) = all_actions(source, k);
     old_log_prob_[row] = log_prob[place];
     old_value_[row] = value_[place];
     batch_target_[row] = target_[place];
-    if (mirrored_[row] == 0) continue;
+    if (!mirror) continue;
     // The mirrored step was drawn as often as the step itself: it has the same π_old.
-    for (int k = 0; k < s.cols(); ++k) {
-      mirror_obs[static_cast<size_t>(k)] =
-          mirror_signs_[static_cast<size_t>(k)] * all_obs(source, k);
-    }
-    normalizer_.Apply(mirror_obs, s.row(i));
     for (float& x : a.row(i)) x = config_.discrete() ? last_level - x : -x;
   }
 }

@@ -31,8 +31,10 @@ Sac::Sac(const SacConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
       alpha_adam_(1),
       actor_outputs_(Size(B_, 2 * A_)),
       actor_dy_(actor_outputs_.size()),
-      gaussians_(Size(B_, A_)),
-      samples_(gaussians_.size()),
+      samples_([&] {
+        const AlignedVector<float> zeros(Size(B_, A_));
+        return Samples{zeros, zeros, zeros, zeros, zeros, zeros};
+      }()),
       log_prob_(static_cast<size_t>(B_)),
       inputs_(Size(B_, D_ + A_)),
       policy_inputs_(inputs_.size()),

@@ -65,6 +65,11 @@ class Sac : public OffPolicyAgent {
     AlignedVector<float> dinputs;      // (B × (D + A)) dQ/d(s, a), for the actor
   };
 
+  /// Components of actions that were drawn; see SquashSamples.
+  struct Samples {
+    AlignedVector<float> mean, log_std, epsilon, deviation, action, log_prob;
+  };
+
   /// Less what a change of the mean action costs; see smoothness.
   double RewardOf(const StepResult& result, size_t env) override;
   /// Samples a ~ π(s) of some rows: fills samples_, and behind `inputs`' (B × (D + A))
@@ -101,9 +106,8 @@ class Sac : public OffPolicyAgent {
 
   // Of an update: B rows.
   AlignedVector<float> actor_outputs_, actor_dy_;  // (B × 2 A)
-  std::vector<Gaussian<float>> gaussians_;         // (B × A)
-  std::vector<Squashed<float>> samples_;           // (B × A)
-  AlignedVector<float> log_prob_;                  // (B)
+  Samples samples_;                                // (B × A)
+  AlignedVector<float> log_prob_;                  // (B) ln π(a|s)
   AlignedVector<float> inputs_, policy_inputs_;    // (B × (D + A)): s, a; s, a ~ π
   AlignedVector<float> y_;                         // (B)
 

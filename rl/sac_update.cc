@@ -2,9 +2,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include "core/error.h"
 #include "core/text.h"
+#include "nn/linear.h"
 #include "rl/sac.h"
 
 namespace upswing {
@@ -44,27 +46,34 @@ void Sac::Update(const Minibatch& batch) {
 
 void Sac::DrawNoise() {
   // Both numbers of Box and Muller (1958) for two samples.
-  for (size_t i = 0; i < samples_.size(); i += 2) {
+  AlignedVector<float>& epsilon = samples_.epsilon;
+  for (size_t i = 0; i < epsilon.size(); i += 2) {
     const std::array<double, 2> pair = noise_rng_.NormalPair();
-    samples_[i].epsilon = static_cast<float>(pair[0]);
-    if (i + 1 < samples_.size()) samples_[i + 1].epsilon = static_cast<float>(pair[1]);
+    epsilon[i] = static_cast<float>(pair[0]);
+    if (i + 1 < epsilon.size()) epsilon[i + 1] = static_cast<float>(pair[1]);
   }
 }
 
 void Sac::SampleRows(Matrix<const float> obs, RowRange rows, Matrix<float> inputs) {
+  constexpr float kLow = kLogStdLow, kHigh = kLogStdHigh;
   const Matrix<float> outputs(actor_outputs_, B_, 2 * A_);
   actor_.Forward(obs, rows, outputs);
-  CopyRows(obs, rows, 0, inputs);
+  Samples& x = samples_;
   for (int i = rows.first; i < rows.first + rows.count; ++i) {
-    float log_prob = 0;
     for (int k = 0; k < A_; ++k) {
       const size_t at = Size(i, A_) + static_cast<size_t>(k);
-      gaussians_[at] = Gaussian<float>::From(outputs(i, k), outputs(i, A_ + k));
-      samples_[at] = Squash(gaussians_[at], samples_[at].epsilon);
-      inputs(i, D_ + k) = samples_[at].action;
-      log_prob += samples_[at].log_prob;
+      x.mean[at] = outputs(i, k);
+      x.log_std[at] = std::clamp(outputs(i, A_ + k), kLow, kHigh);
     }
-    log_prob_[static_cast<size_t>(i)] = log_prob;
+  }
+  const RowRange parts{rows.first * A_, rows.count * A_};
+  SquashSamples<float>(Part(x.mean, parts), Part(x.log_std, parts), Part(x.epsilon, parts),
+                       Part(x.deviation, parts), Part(x.action, parts), Part(x.log_prob, parts));
+  CopyRows(obs, rows, 0, inputs);
+  CopyRows({x.action.data(), B_, A_}, rows, D_, inputs);
+  for (int i = rows.first; i < rows.first + rows.count; ++i) {
+    const std::span<const float> each = Matrix<const float>(x.log_prob.data(), B_, A_).row(i);
+    log_prob_[static_cast<size_t>(i)] = std::accumulate(each.begin(), each.end(), 0.0F);
   }
 }
 
@@ -149,8 +158,11 @@ void Sac::ActorRows(const Minibatch& batch, RowRange rows) {
       for (Critic& critic : critics_) {
         dq_da += Matrix<float>(critic.dinputs, B_, D_ + A_)(i, D_ + k);
       }
-      const GaussianGradient<float> g =
-          SquashedGradient(gaussians_[at], samples_[at], temperature, dq_da);
+      const float log_std = samples_.log_std[at];
+      const bool clamped = actor_outputs_[Size(i, 2 * A_) + static_cast<size_t>(A_ + k)] != log_std;
+      const GaussianGradient<float> g = SquashedGradient<float>(
+          {samples_.mean[at], log_std, samples_.deviation[at], clamped},
+          {samples_.epsilon[at], samples_.action[at], samples_.log_prob[at]}, temperature, dq_da);
       dy(i, k) = g.mean / static_cast<float>(B_);
       dy(i, A_ + k) = g.log_std / static_cast<float>(B_);
     }

@@ -64,7 +64,8 @@ void PendulumV1::Move(Matrix<double> states, std::span<const double> torque,
     const double acceleration = kGravityTerm * std::sin(theta) + kTorqueTerm * u;
     omega = std::clamp(omega + acceleration * kStepSeconds, -kMaxVelocity, kMaxVelocity);
     const double turn = omega * kStepSeconds;
-    theta = std::remainder(theta + turn, 2 * kPi);
+    theta += turn;
+    if (std::abs(theta) > kPi) theta = std::remainder(theta, 2 * kPi);
     result.work[i] = std::abs(u * turn);
     result.at_goal[i] = std::abs(theta) <= kGoalAngle ? 1 : 0;
     result.terminated[i] = 0;
