@@ -99,9 +99,9 @@ void RunFolder::Create(const fs::path& given,
 
 RunFolder::RunFolder(fs::path path, const Tensors& checkpoint)
     : path_(std::move(path)),
-      metrics_{"train/", AppendFile(path_ / kMetrics), {}},
-      episodes_{"", AppendFile(path_ / kEpisodes), {}},
-      evals_{"evaluation/", AppendFile(path_ / kEvaluations), {}},
+      metrics_{"train/", AppendFile(path_ / kMetrics), {}, {}},
+      episodes_{"", AppendFile(path_ / kEpisodes), {}, {}},
+      evals_{"evaluation/", AppendFile(path_ / kEvaluations), {}, {}},
       events_(path_ / kEventsName),
       log_(path_ / kLog) {
   // All are checked before one is cut.
@@ -119,6 +119,36 @@ RunFolder::RunFolder(fs::path path, const Tensors& checkpoint)
   for (Table* table : {&metrics_, &episodes_, &evals_}) table->columns = ColumnsOf(table->file);
 }
 
+RunFolder::~RunFolder() {
+  try {
+    episodes_.Flush();
+  } catch (const Error&) {  // a full disk: the training has said so
+  }
+}
+
+void RunFolder::Table::Flush() {
+  if (pending.empty()) return;
+  file.Append(pending);
+  pending.clear();
+}
+
+void RunFolder::LogMetrics(const Row& row) {
+  episodes_.Flush();
+  AppendRow(metrics_, row);
+  metrics_.Flush();
+}
+
+void RunFolder::LogEpisode(const Row& row) {
+  constexpr size_t kMany = 1 << 16;  // bytes
+  AppendRow(episodes_, row);
+  if (episodes_.pending.size() >= kMany) episodes_.Flush();
+}
+
+void RunFolder::LogEvaluation(const Row& row) {
+  AppendRow(evals_, row);
+  evals_.Flush();
+}
+
 void RunFolder::AppendRow(Table& table, const Row& row) {
   std::string text;
   if (table.columns.empty()) {
@@ -131,7 +161,7 @@ void RunFolder::AppendRow(Table& table, const Row& row) {
         cell == row.end() ? std::numeric_limits<double>::quiet_NaN() : cell->second;
     text += Concat(&column == &table.columns.front() ? "" : ",", FormatNumber(value));
   }
-  table.file.Append(text + '\n');
+  table.pending += text + '\n';
 
   if (table.tag.empty()) return;
   Row scalars(row.begin() + 1, row.end());
@@ -145,7 +175,8 @@ void RunFolder::Log(std::string_view line) {
                           Printable(line)));
 }
 
-void RunFolder::SaveCheckpoint(Tensors& checkpoint) const {
+void RunFolder::SaveCheckpoint(Tensors& checkpoint) {
+  episodes_.Flush();
   // The tables must be on disk before the checkpoint that records their sizes.
   for (const Table* table : {&metrics_, &episodes_, &evals_}) table->file.Sync();
   events_.Sync();

@@ -50,26 +50,34 @@ class RunFolder {
   /// BadInput, with nothing changed, if a table is shorter than its size in the checkpoint, or is
   /// shared with another folder by a link (see AppendFile).
   RunFolder(std::filesystem::path path, const Tensors& checkpoint);
+  /// Writes the rows that are not in the files yet; of a training that fails, too.
+  ~RunFolder();
+  RunFolder(const RunFolder&) = delete;
+  RunFolder& operator=(const RunFolder&) = delete;
 
   const std::filesystem::path& path() const { return path_; }
   static std::filesystem::path CheckpointPath(const std::filesystem::path& run) {
     return run / kCheckpoint;
   }
 
-  void LogMetrics(const Row& row) { AppendRow(metrics_, row); }
-  void LogEpisode(const Row& row) { AppendRow(episodes_, row); }
-  void LogEvaluation(const Row& row) { AppendRow(evals_, row); }
+  /// Rows of the tables. Those of episodes, thousands a second, are in the file with the next row
+  /// of metrics or checkpoint, or when there are many.
+  void LogMetrics(const Row& row);
+  void LogEpisode(const Row& row);
+  void LogEvaluation(const Row& row);
   /// A line with date and time in log.txt.
   void Log(std::string_view line);
 
   /// Adds the tables' sizes to a checkpoint and writes it in place of the last one.
-  void SaveCheckpoint(Tensors& checkpoint) const;
+  void SaveCheckpoint(Tensors& checkpoint);
 
  private:
   struct Table {
     std::string tag;  // prefix of its columns in TensorBoard; empty: not shown there
     AppendFile file;
     std::vector<std::string> columns;  // in the first line; empty: no line yet
+    std::string pending;               // rows that are not in the file yet
+    void Flush();
   };
   /// Under the columns that the table has, whatever version began it.
   void AppendRow(Table& table, const Row& row);

@@ -28,6 +28,16 @@ constexpr int kTileRows = 6;
 constexpr int kRegisters = 12;
 #endif
 
+/// Calls `f(row, register)` for each register of a tile.
+template <int kRows, int kVectors, typename F>
+HWY_INLINE void ForTile(const F& f) {
+  HWY_UNROLL(16)
+  for (int i = 0; i < kRows; ++i) {
+    HWY_UNROLL(16)
+    for (int v = 0; v < kVectors; ++v) f(i, v);
+  }
+}
+
 /// The tile of C at (m, n); if kPartial it has one register in a row, of which `count` numbers.
 template <int kRows, int kVectors, bool kPartial, typename T>
 HWY_INLINE void MultiplyTile(const Product<T>& p, int m, int n, size_t count) {
@@ -58,19 +68,23 @@ HWY_INLINE void MultiplyTile(const Product<T>& p, int m, int n, size_t count) {
     b += p.b.stride();
   }
 
-  HWY_UNROLL(16)
-  for (int i = 0; i < kRows; ++i) {
-    HWY_UNROLL(16)
-    for (int v = 0; v < kVectors; ++v) {
-      const int col = n + v * lanes;
-      if (p.relu) c[i][v] = hn::Max(c[i][v], hn::Zero(d));
-      if (!p.gate.empty()) {
-        const Vec<T> gate = Load<kPartial>(&p.gate(m + i, col), count);
-        c[i][v] = hn::IfThenElseZero(hn::Gt(gate, hn::Zero(d)), c[i][v]);
-      }
-      Store<kPartial>(c[i][v], &p.c(m + i, col), count);
-    }
+  // Asked once a tile, not for each register.
+  if (p.relu) {
+    ForTile<kRows, kVectors>([&](int i, int v)
+                                 HWY_ATTR { c[i][v] = hn::Max(c[i][v], hn::Zero(d)); });
   }
+  if (!p.gate.empty()) {
+    const T* gate = &p.gate(m, n);
+    const ptrdiff_t stride = p.gate.stride();
+    ForTile<kRows, kVectors>([&](int i, int v) HWY_ATTR {
+      const Vec<T> open = Load<kPartial>(gate + i * stride + v * lanes, count);
+      c[i][v] = hn::IfThenElseZero(hn::Gt(open, hn::Zero(d)), c[i][v]);
+    });
+  }
+  T* to = &p.c(m, n);
+  const ptrdiff_t stride = p.c.stride();
+  ForTile<kRows, kVectors>(
+      [&](int i, int v) HWY_ATTR { Store<kPartial>(c[i][v], to + i * stride + v * lanes, count); });
 }
 
 /// Rows m to `end` of C, from column n on as far as tiles of kRows × kVectors registers go; returns
