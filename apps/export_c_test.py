@@ -12,7 +12,7 @@ import shutil
 import subprocess
 import unittest
 
-from testing import ROOT, ProgramTest, probe, read_csv, read_tensors, small, write_tensors
+from testing import ROOT, UPSWING, ProgramTest, probe, read_csv, read_tensors, small, write_tensors
 
 AGENTS = ROOT / "web/public/agents"
 EXAMPLE = ROOT / "examples/c"
@@ -359,6 +359,22 @@ class HeaderTest(ProgramTest):
             self.assertEqual(int(size.stdout), state)
             self.assertIn(f"{state} bytes of state", printed)
 
+    def test_every_policy_that_is_accepted(self):
+        for path in sorted((ROOT / "fuzz/corpus/policy/accepted").iterdir()):
+            with self.subTest(path.name):
+                self.succeed("export", path, "--c", "policy.h")
+                self.assertEqual(self.self_test(), 0)
+
+    def test_torques_that_are_no_floats(self):
+        metadata, tensors = read_tensors(AGENTS / "fast.safetensors")
+        for name in ("torques", "sample.torque"):
+            kind, shape, data = tensors[name]
+            numbers = [1e300 if x == 5 else x for x in array.array("d", data)]
+            tensors[name] = kind, shape, array.array("d", numbers).tobytes()
+        write_tensors(self.folder / "far.safetensors", metadata, tensors)
+        for flag in ("--c", "--onnx"):
+            self.refuse(["export", "far.safetensors", flag, "x"], "far.safetensors", "float", "1e+300")
+
     def test_bad_usage(self):
         policy = AGENTS / "fast.safetensors"
         self.refuse(["export", "lqr", "--c", "x.h"], "lqr", "learned policy", "controller")
@@ -373,6 +389,66 @@ class HeaderTest(ProgramTest):
         self.write("wrong.safetensors", "no policy")
         self.refuse(["export", "wrong.safetensors", "--c", "x.h"], "wrong.safetensors")
         self.refuse(["export", "wrong.safetensors", "--onnx", "x.onnx"], "wrong.safetensors")
+
+
+def block_of_documentation(section):
+    """The lines that a section of docs/export.md tells to type."""
+    text = (ROOT / "docs/export.md").read_text(encoding="utf-8").split(f"### {section}\n")[1]
+    return "".join(line[4:] + "\n" for line in text.split("\n### ")[0].splitlines()
+                   if line.startswith("    "))
+
+
+class DocumentedTest(ProgramTest):
+    """What docs/export.md says can be typed."""
+
+    def type(self, lines):
+        """Types lines in a folder that has the examples; returns all that they say."""
+        if not (self.folder / "examples").exists():
+            (self.folder / "examples").symlink_to(ROOT / "examples")
+        done = subprocess.run(["sh", "-euc", lines.replace("./upswing ", f"'{UPSWING}' ")],
+                              cwd=self.folder, check=False, stdin=subprocess.DEVNULL,
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8")
+        self.assertEqual(done.returncode, 0, done.stdout)
+        return done.stdout
+
+    def test_train_export_compile_swing_up(self):
+        said = self.type(block_of_documentation("A closed loop in plain C"))
+        self.assertRegex(said, r"upright from \d\.\d\d s to the end\n$")
+
+    @unittest.skipUnless(shutil.which("arm-none-eabi-gcc") and shutil.which("qemu-system-arm"),
+                         "no gcc-arm-none-eabi and qemu-system-arm here")
+    def test_on_a_cortex_m4(self):
+        self.succeed("export", AGENTS / "fast.safetensors", "--c", "policy.h")
+        said = self.type(block_of_documentation("On a Cortex-M4"))
+        self.assertRegex(said, r"upright from 2\.\d\d s to the end\n")
+        self.assertEqual(said.count("instructions"), 4)
+
+    def test_the_loop_of_the_controller(self):
+        text = (ROOT / "docs/export.md").read_text(encoding="utf-8")
+        (code,) = re.findall(r"^```c\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+        self.succeed("export", AGENTS / "fast.safetensors", "--c", "policy.h")
+        include, loop = code.split("\n", maxsplit=1)
+        self.write("loop.c", f"""{include}
+            static void stop_motor(void); static void set_motor(float);
+            static float q1, q2, w1, w2, motor;
+            void begin(void); void every_20_ms(void);
+            {loop}
+            static void stop_motor(void) {{ motor = 9.0f; }}
+            static void set_motor(float torque) {{ motor = torque; }}
+            int main(void) {{
+              begin(); every_20_ms();
+              return motor == 5.0f || motor == -5.0f ? 0 : 1;
+            }}""")
+        done = compile_c(self.folder, "loop.c")
+        self.assertEqual((done.returncode, done.stdout), (0, ""))
+        self.assertEqual(subprocess.run([self.folder / "program"], check=False).returncode, 0)
+
+    def test_every_name_is_explained(self):
+        text = (ROOT / "docs/export.md").read_text(encoding="utf-8")
+        self.succeed("export", AGENTS / "fast.safetensors", "--c", "policy.h")
+        header = (self.folder / "policy.h").read_text(encoding="ascii")
+        for name in re.findall(r"^#define (POLICY_\w+) ", header, re.MULTILINE):
+            self.assertIn(f"`{name}`", text)
 
 
 class SwingUpTest(ProgramTest):

@@ -4,8 +4,10 @@ program does, for every kind of policy.
 """
 
 import json
+import re
 import shutil
 import subprocess
+import sys
 import unittest
 
 import readers_environment
@@ -162,6 +164,19 @@ class OnnxTest(ProgramTest):
         self.assertIn("rad/s", observation[2]["meaning"])
         self.assertEqual(observation[-1]["name"], "torque, 4 steps ago")
         self.assertEqual(model.producer_name, "upswing")
+
+    def test_the_documentation(self):
+        """Its Python runs, and it names every output and every metadata."""
+        text = (ROOT / "docs/export.md").read_text(encoding="utf-8")
+        (code,) = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+        named = set(re.findall(r"`(\w+)`", text))
+        for name in ("d3qn-randomized", "sac", "fast"):
+            model, _, got = self.export(AGENTS / f"{name}.safetensors")
+            self.assertLessEqual(got.keys() | {entry.key for entry in model.metadata_props}, named)
+        done = subprocess.run([sys.executable, "-c", code], cwd=self.folder, check=True,
+                              stdout=subprocess.PIPE, encoding="utf-8")
+        self.assertRegex(done.stdout, r"w1 - velocity of q1 over 10 rad/s\n[^$]*"
+                                      r"\n-?\d\S* N·m for 0.02 s\n$")
 
     def test_standard_output(self):
         path = AGENTS / "fast.safetensors"

@@ -152,17 +152,8 @@ class HeaderWriter {
 
 void HeaderWriter::AddConstants() {
   arrays_ = task_.arrays;
-  const std::string where = policy_.loaded->path.string();
-  const auto checked = [&](double torque) {
-    const auto rounded = static_cast<float>(torque);
-    if (std::isfinite(rounded)) return rounded;
-    throw BadInput(Concat(where, ": expected torques within the range of float, got ", torque));
-  };
-  checked(policy_.limit);
   if (policy_.is_discrete()) {
-    CArray torques{"torques", "N m", {}};
-    for (const double torque : policy_.torques) torques.values.push_back(checked(torque));
-    arrays_.push_back(std::move(torques));
+    arrays_.push_back({"torques", "N m", {policy_.torques.begin(), policy_.torques.end()}});
   }
   for (const PlainLayer& layer : layers_) {
     const std::string name = CName(layer.name);

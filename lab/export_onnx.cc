@@ -14,12 +14,6 @@ using nlohmann::ordered_json;
 constexpr const char* kInput = "observation";
 constexpr const char* kTorque = "torque";
 
-std::vector<float> Floats(std::span<const double> values) {
-  std::vector<float> floats;
-  for (const double value : values) floats.push_back(static_cast<float>(value));
-  return floats;
-}
-
 /// Adds y = activation(norm(W x + b)) of some rows of the layer; returns the name of y, `name`.
 std::string AddLayer(OnnxModel& model, const PlainLayer& layer, const std::string& x,
                      const std::string& name, RowRange rows) {
@@ -57,7 +51,7 @@ std::string AddLayers(OnnxModel& model, const std::vector<PlainLayer>& layers, s
 
 /// Adds the output `torque`: that of the largest preference.
 void AddChoice(OnnxModel& model, const ExportedPolicy& policy, const std::string& preferences) {
-  const std::vector<float> torques = Floats(policy.torques);
+  const std::vector<float> torques(policy.torques.begin(), policy.torques.end());
   const std::string table =
       model.AddConstant("torques", torques, {static_cast<int64_t>(torques.size())});
   const std::string index = model.AddNode("choice", "ArgMax", {preferences},

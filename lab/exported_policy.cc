@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <span>
 
 #include "core/error.h"
 #include "core/text.h"
@@ -81,6 +83,14 @@ PlainNetwork NetworkOf(const Tensors& file, const std::string& prefix, const Mlp
   return network;
 }
 
+/// Throws BadInput unless these torques can be told as float.
+void CheckTorques(std::span<const double> torques, const std::string& where) {
+  for (const double torque : torques) {
+    if (std::abs(torque) <= std::numeric_limits<float>::max()) continue;
+    throw BadInput(Concat(where, ": expected torques within the range of float, got ", torque));
+  }
+}
+
 double LargestSize(std::span<const double> values) {
   double largest = 0;
   for (const double value : values) largest = std::max(largest, std::abs(value));
@@ -152,28 +162,32 @@ bool ExportedPolicy::critic_takes_action() const {
 ExportedPolicy TakeApart(const LoadedPolicy& loaded) {
   EnvConfig env;
   env.task = loaded.task;
+  const std::string where = loaded.path.string();
   ExportedPolicy exported;
   exported.loaded = &loaded;
   exported.spec = SpecOf(env);
   exported.observation = InputsOf(loaded);
   if (const auto* q = dynamic_cast<const QPolicy*>(loaded.policy.get())) {
     const std::span<const double> torques = q->value_actions().values();
+    CheckTorques(torques, where);
     exported.torques.assign(torques.begin(), torques.end());
+    exported.limit = LargestSize(exported.torques);
     exported.network = NetworkOf(q->ToTensors(), q->shape());
-    exported.limit = LargestSize(torques);
     return exported;
   }
   const auto* actor = dynamic_cast<const ActorPolicy*>(loaded.policy.get());
   if (actor == nullptr || actor->action_size() != 1) {
-    throw BadInput(Concat(loaded.path.string(), ": expected a learned policy of one motor, got ",
+    throw BadInput(Concat(where, ": expected a learned policy of one motor, got ",
                           loaded.policy->description()));
   }
   const ActorParts& parts = actor->parts();
   const Tensors file = actor->ToTensors();
   exported.kind = KindOf(parts.output);
+  CheckTorques(parts.torques, where);
+  CheckTorques(parts.action_limit, where);
   exported.torques = parts.torques;
   exported.action_limit = parts.action_limit[0];
-  exported.limit = parts.torques.empty() ? parts.action_limit[0] : LargestSize(parts.torques);
+  exported.limit = exported.is_discrete() ? LargestSize(exported.torques) : exported.action_limit;
   exported.network = NetworkOf(file, "", parts.actor, actor->num_outputs());
   if (parts.critic.inputs > 0) exported.critic = NetworkOf(file, "critic.", parts.critic, 1);
   return exported;

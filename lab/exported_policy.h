@@ -60,7 +60,7 @@ struct ExportedPolicy {
 };
 
 /// Takes a policy apart, which has to outlive the result. Throws BadInput, with the path, if it is
-/// none that was learned.
+/// none that was learned, or if its torques are beyond float.
 ExportedPolicy TakeApart(const LoadedPolicy& loaded);
 
 }  // namespace upswing
