@@ -43,6 +43,7 @@ std::vector<std::string> CellsOf(std::string_view line, const std::string& place
 std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::string>& names,
                                const std::string& where, const std::vector<std::string>& optional) {
   std::vector<CsvColumn> columns;
+  columns.reserve(names.size() + optional.size());
   for (const std::string& name : names) columns.push_back({name, {}});
   for (const std::string& name : optional) columns.push_back({name, {}});
   std::vector<std::optional<size_t>> places;  // indices of the wanted columns in a row

@@ -23,6 +23,7 @@ std::vector<double> ValuesOf(const Policy& policy, Matrix<const float> obs,
   policy.Values(obs, Matrix<float>(numbers.data(), 1, policy.num_values()), memory);
   const double scale = ValueUnitsOf(policy).reward_scale;
   std::vector<double> values;
+  values.reserve(numbers.size());
   for (const float value : numbers) values.push_back(value / scale);
   return values;
 }
@@ -166,6 +167,7 @@ std::string RolloutCsv(const Rollout& rollout) {
     cells.push_back(row.reward);
     for (const double term : row.terms) cells.push_back(term + 0.0);  // no -0
     std::vector<std::string> texts;
+    texts.reserve(cells.size());
     for (const double cell : cells) texts.push_back(FormatNumber(cell));
     csv += Join(texts, ",") + '\n';
   }

@@ -1,10 +1,10 @@
 // Registers full of numbers, for the kernels of each kind of vector instructions.
 
-#if defined(UPSWING_NN_REGISTERS_INL_H_) == defined(HWY_TARGET_TOGGLE)  // once for each target
-#ifdef UPSWING_NN_REGISTERS_INL_H_
-#undef UPSWING_NN_REGISTERS_INL_H_
+#if defined(UPSWING_NN_REGISTERS_INL_H) == defined(HWY_TARGET_TOGGLE)  // once for each target
+#ifdef UPSWING_NN_REGISTERS_INL_H
+#undef UPSWING_NN_REGISTERS_INL_H
 #else
-#define UPSWING_NN_REGISTERS_INL_H_
+#define UPSWING_NN_REGISTERS_INL_H
 #endif
 
 #include <hwy/highway.h>

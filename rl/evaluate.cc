@@ -140,6 +140,7 @@ void EstimateValues(const Policy& policy, const VectorEnv& env, std::span<Episod
 std::vector<double> Figures(const std::vector<const EvaluationEpisode*>& episodes,
                             double EvaluationEpisode::*figure) {
   std::vector<double> values;
+  values.reserve(episodes.size());
   for (const EvaluationEpisode* episode : episodes) values.push_back(episode->*figure);
   return values;
 }
@@ -216,6 +217,7 @@ Evaluation Summarize(std::span<const EvaluationEpisode> episodes, const Evaluati
   e.goal_changes = MomentsOf(Figures(successful, &EvaluationEpisode::goal_changes));
   for (size_t body = 0; !successful.empty() && body < episodes.front().tilt.size(); ++body) {
     std::vector<double> tilts;
+    tilts.reserve(successful.size());
     for (const auto* episode : successful) tilts.push_back(std::abs(episode->tilt[body]));
     e.tilt.push_back(MomentsOf(tilts));
   }
@@ -257,6 +259,7 @@ std::vector<EvaluationEpisode> EvaluateEpisodes(const Policy& policy, VectorEnv&
   }
 
   std::vector<EvaluationEpisode> episodes;
+  episodes.reserve(tallies.size());
   for (EpisodeTally& tally : tallies) episodes.push_back(tally.Finish());
   return episodes;
 }

@@ -189,6 +189,7 @@ TEST(Evaluate, ThreadsChangeNoBit) {
   };
   const std::vector<EvaluationEpisode> alone = episodes(nullptr);
   std::vector<double> rms;
+  rms.reserve(alone.size());
   for (const EvaluationEpisode& episode : alone) rms.push_back(episode.rms_torque);
   EXPECT_GT(MomentsOf(rms).deviation, 0);  // the episodes differ
   for (const int threads : {1, 2, 5}) {
