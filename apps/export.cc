@@ -143,7 +143,7 @@ void AddExport(CLI::App& program, Command& command) {
       "  ./upswing export runs/* --page build/web/agents               in the page built here\n"
       "  ./upswing export policy.safetensors --id mine --page build/web/agents\n"
       "  ./upswing export --test-vectors vectors.json\n\n"
-      "`./upswing demo runs/d3qn-seed1` does the second and serves the page.\n");
+      "`./upswing demo runs/d3qn-seed1` puts it into the page and serves that.\n");
   app->callback([a, &command] { command = [a] { return RunExport(*a); }; });
 }
 

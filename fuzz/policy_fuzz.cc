@@ -1,10 +1,13 @@
 // The policy file, which `eval`, `info`, `export` and others read from untrusted sources.
+#include <algorithm>
 #include <cmath>
 #include <optional>
+#include <string>
 
 #include "core/safetensors.h"
 #include "core/text.h"
 #include "fuzz/target.h"
+#include "lab/export.h"
 #include "lab/loaded_policy.h"
 #include "lab/train_command.h"
 
@@ -28,6 +31,15 @@ bool TryInput(std::string_view input) {
   if (Accepts([&] { command = TrainCommand(policy.info(), kInputName); }) && command) {
     Expect(Printable(*command) == *command, "a command on one line");
   }
+
+  // What leaves as C is ASCII, and no text of the file ends the comment that it stands in.
+  Accepts([&] { OnnxModelOf(*loaded); });
+  Accepts([&] {
+    const std::string c = CHeaderOf(*loaded, "policy").text;
+    Expect(std::ranges::all_of(c, [](char x) { return x == '\n' || (x >= ' ' && x <= '~'); }),
+           "a C header in ASCII");
+    Expect(c.substr(c.find("*/"), 12) == "*/\n#ifndef U", "a C header's comment");
+  });
   return true;
 }
 

@@ -207,23 +207,23 @@ std::string HeaderWriter::HeadComment() const {
   return Filled(
       c_code::kHead,
       {{"goal", task_.goal},
-       {"origin",
-        Paragraph(Concat("Upswing ", UPSWING_VERSION, " wrote it of a ", CommentText(description),
-                         "; ", OriginOf(loaded.policy->info()), '.'))},
+       {"origin", Paragraph(Concat("It is the ", CommentText(description), "; ",
+                                   OriginOf(loaded.policy->info()), ". Written by Upswing ",
+                                   UPSWING_VERSION, '.'))},
        {"names", StateNames("")},
        {"states", states},
        {"motor", task_.motor},
        {"limit", FormatNumber(policy_.limit)},
        {"period", FormatNumber(policy_.spec.step_seconds)},
        {"plant", plant},
-       {"needs",
-        Paragraph(Concat("Flash: ", header_.constant_bytes,
-                         " bytes of constants, 1 to 2 KB of code, and 1 KB of "
-                         "samples where the self test is used. RAM: ",
-                         header_.state_bytes, " bytes of state, and in a call some ",
-                         header_.stack_bytes, " of stack. Work of a call: ", header_.multiply_adds,
-                         " multiply-adds, ", task_.sines, " sines and cosines",
-                         tanhs > 0 ? Concat(", ", tanhs, " hyperbolic tangents") : "", '.'))}});
+       {"needs", Paragraph(Concat(
+                     "Flash: ", header_.constant_bytes,
+                     " bytes of constants, 1 to 2 KB of code, and 1 KB of "
+                     "samples where the self test is used. RAM: ",
+                     header_.state_bytes, " bytes of state, and arrays of ", header_.stack_bytes,
+                     " bytes on the stack in a call. Work of a call: ", header_.multiply_adds,
+                     " multiply-adds, ", task_.sines, " sines and cosines",
+                     tanhs > 0 ? Concat(", ", tanhs, " of tanh") : "", '.'))}});
 }
 
 std::string HeaderWriter::Declarations() const {
