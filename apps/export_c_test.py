@@ -454,9 +454,9 @@ class DocumentedTest(ProgramTest):
 class SwingUpTest(ProgramTest):
     """The closed loop in plain C of examples/c."""
 
-    def build(self, agent):
+    def build(self, agent, source="swing_up.c"):
         self.succeed("export", AGENTS / f"{agent}.safetensors", "--c", "policy.h")
-        done = compile_c(self.folder, EXAMPLE / "swing_up.c", "-O2", "-I.")
+        done = compile_c(self.folder, EXAMPLE / source, "-O2", "-I.")
         self.assertEqual((done.returncode, done.stdout), (0, ""))
 
     def run_example(self, *start):
@@ -486,6 +486,12 @@ class SwingUpTest(ProgramTest):
                              read_csv(self.folder / "ours.csv")):
             for name, column in names.items():
                 self.assertAlmostEqual(got[name], ours[column], delta=1e-9)
+
+    def test_the_time_of_a_call_is_measured(self):
+        self.build("fast", "time.c")
+        code, text, said = self.run_example()
+        self.assertEqual((code, said), (0, ""))
+        self.assertRegex(text, r"^[1-9]\d* ns a call \(sum of torques \S+\)\n$")
 
     def test_a_failure_is_told(self):
         self.build("fast")
