@@ -25,6 +25,7 @@ void AddInfo(CLI::App& program, Command& command);
 void AddCompare(CLI::App& program, Command& command);
 void AddStudy(CLI::App& program, Command& command);
 void AddExport(CLI::App& program, Command& command);
+void AddView(CLI::App& program, Command& command);
 void AddBench(CLI::App& program, Command& command);
 
 /// Refuses an empty path, such as that of a shell variable that is not set.

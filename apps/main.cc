@@ -82,6 +82,7 @@ int Main(int argc, char** argv) {
   AddSimulate(program, command);
   AddMap(program, command);
   AddPlot(program, command);
+  AddView(program, command);
   AddInfo(program, command);
   AddCompare(program, command);
   AddStudy(program, command);

@@ -56,47 +56,62 @@ PendulumState StateOf(const RolloutRow& row) {
   return {row.state[0], row.state[1], row.state[2], row.state[3]};
 }
 
-Rollout RunRollout(const RolloutConfig& config) {
-  EnvConfig env_config = config.env;
-  env_config.episode_seconds = config.seconds + 1;
-  const std::unique_ptr<VectorEnv> env = MakeEnv(env_config);
-  if (config.start) env->SetState(0, *config.start);
+Episode::Episode(RolloutConfig config)
+    : config_(std::move(config)),
+      env_([&] {
+        EnvConfig env = config_.env;
+        env.episode_seconds = config_.seconds + 1;
+        return MakeEnv(env);
+      }()),
+      result_(env_->spec()) {
+  if (config_.start) env_->SetState(0, *config_.start);
+  if (config_.policy != nullptr) memory_ = config_.policy->Start(1);
+}
 
-  Rollout rollout{env->spec(), {}, Plant(), Disturbance()};
-  const auto* pendulum = dynamic_cast<const PendulumEnv*>(env.get());
-  if (pendulum != nullptr) {
+std::vector<double> Episode::state() const {
+  std::vector<double> state(spec().state_names.size());
+  env_->GetState(0, state);
+  return state;
+}
+
+RolloutRow Episode::Step(bool motor) {
+  double torque = 0;
+  if (config_.policy != nullptr) config_.policy->Act(env_->obs(), {&torque, 1, 1}, *memory_);
+  if (step_ < config_.schedule.size()) torque = config_.schedule[step_];
+  if (!motor) torque = 0;
+  RolloutRow row;
+  row.t = static_cast<double>(step_++) / StepsPerSecond(spec());
+  row.state = state();
+  row.chosen = torque;
+  if (config_.estimates) Estimate(*config_.policy, env_->obs(), *memory_, row);
+  // Of the double pendulum, whose episode may begin anew at the end of this step.
+  const auto* env = pendulum();
+  const Plant plant = env != nullptr ? env->plant(0) : Plant();
+  env_->Step({&torque, 1, 1}, result_);
+  row.torque = result_.torque[0];
+  row.at_goal = result_.at_goal[0] != 0;
+  row.reward = result_.reward[0];
+  row.terms = result_.reward_terms;
+  if (env != nullptr) RewardRow(plant, row);
+  return row;
+}
+
+Rollout RunRollout(const RolloutConfig& config) {
+  Episode episode(config);
+  Rollout rollout{episode.spec(), {}, Plant(), Disturbance()};
+  if (const auto* pendulum = episode.pendulum(); pendulum != nullptr) {
     rollout.plant = pendulum->plant(0);
     rollout.disturbance = pendulum->disturbance(0);
   }
+  // Behind the last step there is one more state: its row's step gives the motor's torque there.
   const int64_t steps = RolloutSteps(rollout.spec, config.seconds);
-  StepResult result = env->MakeResult();
-  std::unique_ptr<Policy::Memory> memory;
-  if (config.policy != nullptr) memory = config.policy->Start(1);
   for (int64_t k = 0; k <= steps; ++k) {
-    // Behind the end of a schedule there is one more state, which no torque follows.
-    double torque = 0;
-    if (config.policy != nullptr) config.policy->Act(env->obs(), {&torque, 1, 1}, *memory);
-    const auto step = static_cast<size_t>(k);
-    if (step < config.schedule.size()) torque = config.schedule[step];
-    RolloutRow row;
-    row.t = static_cast<double>(k) / StepsPerSecond(rollout.spec);
-    row.state.resize(rollout.spec.state_names.size());
-    env->GetState(0, row.state);
-    row.chosen = torque;
-    if (config.estimates) Estimate(*config.policy, env->obs(), *memory, row);
-    // One step more than there are rows: it gives the motor's torque in the last state.
-    env->Step({&torque, 1, 1}, result);
-    row.torque = result.torque[0];
-    row.at_goal = result.at_goal[0] != 0;
-    row.reward = result.reward[0];
-    row.terms = result.reward_terms;
-    const bool ended = result.terminated[0] != 0;
-    if (pendulum != nullptr && ended && k < steps) {
-      throw Failure(Concat("the state blew up numerically after t = ", FormatNumber(row.t), " s"));
+    rollout.rows.push_back(episode.Step());
+    if (episode.pendulum() != nullptr && episode.terminated() && k < steps) {
+      throw Failure(Concat(
+          "the state blew up numerically after t = ", FormatNumber(rollout.rows.back().t), " s"));
     }
-    if (pendulum != nullptr) RewardRow(rollout.plant, row);
-    rollout.rows.push_back(std::move(row));
-    if (ended || result.truncated[0] != 0) break;
+    if (episode.terminated() || episode.truncated()) break;
   }
   return rollout;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -47,6 +48,34 @@ struct Rollout {
   // Of this episode of the double pendulum:
   Plant plant;
   Disturbance disturbance;
+};
+
+/// An episode in the making, for RunRollout and for those who watch.
+class Episode {
+ public:
+  /// The policy must outlive it. Throws BadInput as MakeEnv does.
+  explicit Episode(RolloutConfig config);
+
+  /// The row of the present state, with which the environment steps on. Without `motor` the torque
+  /// is 0 instead of what policy or schedule choose.
+  RolloutRow Step(bool motor = true);
+
+  const EnvSpec& spec() const { return env_->spec(); }
+  /// The present state (S).
+  std::vector<double> state() const;
+  /// Whether the last step ended it; the environment is then in another one.
+  bool terminated() const { return result_.terminated[0] != 0; }
+  bool truncated() const { return result_.truncated[0] != 0; }
+  /// Of the double pendulum; null for other tasks.
+  PendulumEnv* pendulum() { return dynamic_cast<PendulumEnv*>(env_.get()); }
+  const PendulumEnv* pendulum() const { return dynamic_cast<const PendulumEnv*>(env_.get()); }
+
+ private:
+  RolloutConfig config_;
+  std::unique_ptr<VectorEnv> env_;
+  StepResult result_;
+  std::unique_ptr<Policy::Memory> memory_;
+  size_t step_ = 0;
 };
 
 /// How many control steps so many seconds are, to the nearest.

@@ -68,7 +68,8 @@ MuJoCoPhysics::Slice MuJoCoPhysics::MakeSlice(const mjModel& model, int first, i
   mjtNum* qpos = component(mjSTATE_QPOS);
   mjtNum* qvel = component(mjSTATE_QVEL);
   mjtNum* ctrl = component(mjSTATE_CTRL);
-  return {first, count, std::move(batch), qpos, qvel, ctrl};
+  mjtNum* push = component(mjSTATE_QFRC_APPLIED);
+  return {first, count, std::move(batch), qpos, qvel, ctrl, push};
 }
 
 PendulumState MuJoCoPhysics::state(int env) const {
@@ -94,6 +95,10 @@ void MuJoCoPhysics::SetPlant(int env, const Plant& plant) {
   const int row = env - slice.first;
   WritePlant(plant, ExpandedFields(slice.batch.get(), row));
   mjb_setConst(slice.batch.get(), &row, 1);
+}
+
+void MuJoCoPhysics::Push(int env, const std::array<double, 2>& torque) {
+  std::ranges::copy(torque, Component(SliceOf(env).push, env));
 }
 
 bool MuJoCoPhysics::BlewUp(int env) const {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "mujoco/model.h"
@@ -18,6 +19,7 @@ class MuJoCoPhysics : public Physics {
   PendulumState state(int env) const override;
   void SetState(int env, const PendulumState& state) override;
   void SetPlant(int env, const Plant& plant) override;
+  void Push(int env, const std::array<double, 2>& torque) override;
   void Step(std::span<const double> torque, StepResult& result) override;
   void State(const Archive& archive) override;
 
@@ -26,7 +28,7 @@ class MuJoCoPhysics : public Physics {
   struct Slice {
     int first, count;
     BatchPtr batch;
-    mjtNum *qpos, *qvel, *ctrl;  // in row 0 of the state table
+    mjtNum *qpos, *qvel, *ctrl, *push;  // in row 0 of the state table
   };
   Slice MakeSlice(const mjModel& model, int first, int count) const;
   const Slice& SliceOf(int env) const { return slices_[static_cast<size_t>(env / slice_size_)]; }

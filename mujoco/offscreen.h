@@ -41,8 +41,6 @@ class Offscreen {
   std::span<const uint8_t> Render(std::span<const Panel> panels);
 
   PictureSize size() const { return size_; }
-  /// What draws, such as "llvmpipe (LLVM 15.0.6, 256 bits)".
-  const std::string& device() const { return device_; }
 
  private:
   struct Graphics;
@@ -51,7 +49,6 @@ class Offscreen {
   std::unique_ptr<PendulumScene> scene_;  // of one pendulum; else null
   std::unique_ptr<Graphics> graphics_;
   std::vector<uint8_t> pixels_, rows_;  // top row first, and as OpenGL has them
-  std::string device_;
 };
 
 }  // namespace upswing

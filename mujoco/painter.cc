@@ -80,19 +80,26 @@ void Painter::Draw(std::span<const Panel> panels, int width, int height) const {
     const mjrRect place = PanelPlace(i, count, width, height);
     mjr_render(place, &panel.scene->scene(), context_.get());
     if (!panel.title.empty()) {
-      mjr_overlay(mjFONT_NORMAL, mjGRID_TOPLEFT, place, Ascii(panel.title).c_str(), nullptr,
-                  context_.get());
+      const std::array<std::string, 2> line{panel.title, ""};
+      Write(mjGRID_TOPLEFT, std::span(&line, 1), place);
     }
-    std::vector<std::string> names, values;
-    for (const auto& [name, value] : panel.status) {
-      names.push_back(Ascii(name));
-      values.push_back(Ascii(value));
-    }
-    if (!names.empty()) {
-      mjr_overlay(mjFONT_NORMAL, mjGRID_BOTTOMLEFT, place, Join(names, "\n").c_str(),
-                  Join(values, "\n").c_str(), context_.get());
-    }
+    Write(mjGRID_BOTTOMLEFT, panel.status, place);
   }
+}
+
+void Painter::Write(mjtGridPos corner, std::span<const std::array<std::string, 2>> lines,
+                    mjrRect place) const {
+  if (lines.empty()) return;
+  std::vector<std::string> names, values;
+  bool any_value = false;
+  for (const auto& [name, value] : lines) {
+    names.push_back(Ascii(name));
+    values.push_back(Ascii(value));
+    any_value = any_value || !value.empty();
+  }
+  const std::string right = Join(values, "\n");
+  mjr_overlay(mjFONT_NORMAL, corner, place, Join(names, "\n").c_str(),
+              any_value ? right.c_str() : nullptr, context_.get());
 }
 
 }  // namespace upswing

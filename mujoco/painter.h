@@ -31,6 +31,10 @@ class Painter {
   /// Draws the panels in a grid over the whole of width × height pixels.
   void Draw(std::span<const Panel> panels, int width, int height) const;
 
+  /// Writes lines of name and value into a corner of a rectangle.
+  void Write(mjtGridPos corner, std::span<const std::array<std::string, 2>> lines,
+             mjrRect place) const;
+
   const mjrContext& context() const { return *context_; }
 
  private:

@@ -184,6 +184,17 @@ void PendulumScene::Update(const PendulumState& state, const Marks& marks) {
   AddTorque(marks.torque);
 }
 
+std::array<double, 2> PendulumScene::PullTorques() {
+  std::array<double, 2> torques{};
+  if (perturb_.active == 0 || perturb_.select <= 0) return torques;
+  mjtNum* pull = data_->xfrc_applied + ptrdiff_t{6} * perturb_.select;  // force, then torque
+  std::fill_n(pull, 6, 0);
+  mjv_applyPerturbForce(model_.get(), data_.get(), &perturb_);
+  mj_applyFT(model_.get(), data_.get(), pull, pull + 3,
+             data_->xipos + ptrdiff_t{3} * perturb_.select, perturb_.select, torques.data());
+  return torques;
+}
+
 void PendulumScene::AddGoal(const PendulumState& state) {
   const double top = plant_.length1 + plant_.length2, radius = 0.075 * reach_;
   const bool reached = Inverted(state);
@@ -230,7 +241,7 @@ void PendulumScene::AddTrail(std::span<const std::array<double, 2>> trail) {
     color[3] *= static_cast<float>(age * age);
     const Point from{trail[k - 1][0], 0, trail[k - 1][1]}, to{trail[k][0], 0, trail[k][1]};
     if (from == to) continue;
-    Add(scene_, mjGEOM_CAPSULE, 0.006 * reach_ * (0.4 + 0.6 * age), from, to, color, 0.5F);
+    Add(scene_, mjGEOM_CAPSULE, 0.010 * reach_ * (0.4 + 0.6 * age), from, to, color, 0.5F);
   }
 }
 

@@ -44,6 +44,9 @@ class PendulumScene {
   /// Puts the links into a state and draws the marks.
   void Update(const PendulumState& state, const Marks& marks);
 
+  /// The torques about the joints (N·m) of a hand that pulls at a link as perturb() says.
+  std::array<double, 2> PullTorques();
+
   /// Sets where it is seen from, in pictures of this ratio of width to height.
   void SetCamera(const Camera& camera, double aspect);
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/error.h"
 #include "core/text.h"
 
 namespace upswing {
@@ -24,6 +25,10 @@ std::optional<Disturber> MakeDisturber(const PendulumEnvConfig& config) {
 }
 
 }  // namespace
+
+void Physics::Push(int /*env*/, const std::array<double, 2>& /*torque*/) {
+  throw Failure("this engine knows no pushes; mujoco does");
+}
 
 EnvSpec PendulumSpec(const PendulumEnvConfig& config) {
   EnvSpec spec;

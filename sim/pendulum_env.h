@@ -82,6 +82,8 @@ class PendulumEnv : public VectorEnv {
     return disturber_ ? disturber_->disturbance(env) : Disturbance();
   }
   PendulumState state(int env) const { return physics_->state(env); }
+  /// See Physics::Push.
+  void Push(int env, const std::array<double, 2>& torque) { physics_->Push(env, torque); }
   /// Begins an episode of an environment in a state.
   void SetState(int env, const PendulumState& state);
 

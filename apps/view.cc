@@ -1,0 +1,245 @@
+#include "lab/view.h"
+
+#include <fmt/format.h>
+
+#include <memory>
+#include <optional>
+
+#include "apps/commands.h"
+#include "apps/progress.h"
+#include "apps/signals.h"
+#include "apps/trial_options.h"
+#include "core/error.h"
+#include "core/text.h"
+#include "io/frames.h"
+#include "io/streams.h"
+#include "lab/controllers.h"
+
+#ifdef UPSWING_VIEWER
+#include "lab/view_window.h"
+#endif
+
+namespace upswing {
+namespace {
+
+constexpr size_t kMostPolicies = 16;
+
+struct ViewArguments {
+  std::vector<std::string> names;
+  PolicyArguments controller;  // settings of those that are controllers
+  TrialArguments trial;
+  EpisodeArguments episode;
+  std::string record, csv;
+  ViewLook look;
+  double seconds, fps, speed;  // negative: not given
+  int64_t width, height;
+  bool headless = false;
+};
+
+/// The policies that were named, in their order. Throws BadInput.
+std::vector<LoadedPolicy> PoliciesOf(const ViewArguments& a) {
+  if (a.names.size() > kMostPolicies) {
+    throw BadInput(
+        Concat("view: expected at most ", kMostPolicies, " policies, got ", a.names.size()));
+  }
+  std::vector<LoadedPolicy> policies;
+  bool any_controller = false;
+  for (const std::string& name : a.names) {
+    PolicyArguments one{name, {}, {}};
+    // Settings of a controller are for the controllers among them.
+    if (IsController(name)) one = {name, a.controller.flags, a.controller.made_for};
+    any_controller = any_controller || IsController(name);
+    policies.push_back(GetPolicy(one));
+    if (policies.back().task != kDoublePendulum) {
+      throw BadInput(Concat(name, ": expected a policy of ", kDoublePendulum,
+                            ", which alone can be viewed, got one of ", policies.back().task));
+    }
+  }
+  if (!any_controller && a.controller.has_settings()) {
+    (void)GetPolicy({a.names.empty() ? "" : a.names.front(), a.controller.flags,
+                     a.controller.made_for});  // says what is wrong
+  }
+  return policies;
+}
+
+/// What is shown, in its order; `policies` must outlive it.
+std::vector<ViewEntry> EntriesOf(const ViewArguments& a,
+                                 const std::vector<LoadedPolicy>& policies) {
+  std::vector<ViewEntry> entries;
+  const auto add = [&](const LoadedPolicy* loaded) {
+    ViewEntry entry;
+    entry.title = loaded != nullptr ? TitleOf(*loaded) : "no policy";
+    if (loaded != nullptr) entry.policy = loaded->policy.get();
+    entry.env = TrialEnvironments(a.trial, loaded);
+    entry.start = ChooseEpisode(a.episode, entry.env);
+    entries.push_back(std::move(entry));
+  };
+  for (const LoadedPolicy& loaded : policies) add(&loaded);
+  if (policies.empty()) add(nullptr);
+  return entries;
+}
+
+#ifdef UPSWING_VIEWER
+/// The plants to switch to: the one that was asked for, those of the policies' trainings, and the
+/// usual one; each once.
+std::vector<std::pair<std::string, Plant>> PlantsOf(const std::vector<ViewEntry>& entries,
+                                                    const std::vector<LoadedPolicy>& policies) {
+  std::vector<std::pair<std::string, Plant>> plants;
+  const auto add = [&](const std::string& name, const Plant& plant) {
+    for (const auto& [_, other] : plants) {
+      if (PlantValues(other) == PlantValues(plant)) return;
+    }
+    plants.emplace_back(name, plant);
+  };
+  add("as at the beginning", entries.front().env.plant(0));
+  for (const LoadedPolicy& loaded : policies) {
+    add(Concat(loaded.origin(), " of ", TitleOf(loaded)), loaded.plant);
+  }
+  add("the usual one", Plant());
+  return plants;
+}
+#endif
+
+/// Writes the table of `simulate`, up to `seconds`.
+void WriteCsv(const std::string& path, ViewEpisode& episode, double seconds) {
+  const int64_t steps = RolloutSteps(episode.rollout().spec, seconds);
+  while (episode.steps() <= steps) episode.Step();
+  Rollout rollout = episode.rollout();
+  rollout.rows.resize(static_cast<size_t>(steps) + 1);
+  WriteOutput(path, RolloutCsv(rollout));
+}
+
+/// Without a window.
+int RunHeadless(const ViewArguments& a, View& view, double seconds) {
+  InstallSignalHandlers("");
+  if (!a.record.empty()) {
+    RecordConfig config{a.record,
+                        seconds,
+                        a.fps < 0 ? UsualFps(a.record) : a.fps,
+                        a.speed,
+                        {static_cast<int>(a.width), static_cast<int>(a.height)}};
+    EpisodeProgress progress(1, IsStandardStream(a.csv));
+    const int64_t frames = Record(
+        view, config, [] { return StopSignal() != 0; },
+        [&](int64_t done, int64_t all) {
+          progress.Show(static_cast<double>(done) / static_cast<double>(all));
+        });
+    if (frames == 0) return 128 + StopSignal();
+    if (!IsStandardStream(a.csv)) {
+      fmt::print("{}: {} {} of {}x{}\n", Printable(a.record), frames,
+                 frames == 1 ? "picture" : "pictures", a.width, a.height);
+    }
+  }
+  if (!a.csv.empty()) WriteCsv(a.csv, view.episodes().front(), seconds);
+  return 0;
+}
+
+int RunView(const ViewArguments& a) {
+  const bool headless = a.headless || !a.record.empty();
+  if (!a.record.empty()) (void)RecordingKindOf("--record", a.record);
+  if (a.headless && a.record.empty() && a.csv.empty()) {
+    throw BadInput("--headless: expected --record FILE or --csv FILE to write, got none");
+  }
+  if (!a.csv.empty() && a.names.size() > 1) {
+    throw BadInput(Concat("--csv: expected one policy, got ", a.names.size()));
+  }
+  if (!a.csv.empty()) CheckWritable("--csv", a.csv);
+  const std::vector<LoadedPolicy> policies = PoliciesOf(a);
+  const std::vector<ViewEntry> entries = EntriesOf(a, policies);
+  const PictureSize size{static_cast<int>(a.width), static_cast<int>(a.height)};
+  const double usual = a.episode.given() ? kEvaluationSeconds : 10;
+  if (headless) {
+    View view(entries, a.look, size);
+    return RunHeadless(a, view, a.seconds < 0 ? usual : a.seconds);
+  }
+#ifdef UPSWING_VIEWER
+  InstallSignalHandlers("");
+  const WindowConfig config{entries,
+                            PlantsOf(entries, policies),
+                            a.look,
+                            size,
+                            a.speed,
+                            a.seconds,
+                            static_cast<uint64_t>(a.trial.seed),
+                            [] { return StopSignal() != 0; }};
+  const Rollout seen = ShowWindow(config);
+  if (!a.csv.empty()) WriteOutput(a.csv, RolloutCsv(seen));
+  return StopSignal() == 0 ? 0 : 128 + StopSignal();
+#else
+  throw Failure(
+      "view: this program was built without the window: ./upswing view builds it (by hand: cmake "
+      "--preset release -DUPSWING_VIEWER=ON, with GLFW 3.3); --record FILE and --headless need "
+      "none");
+#endif
+}
+
+/// Adds the policies to look at, and the settings of the controllers among them.
+void AddPolicies(CLI::App& app, ViewArguments& a) {
+  AddPolicy(app, a.controller);
+  app.remove_option(app.get_option("policy"));
+  app.add_option(
+         "policies", a.names,
+         Concat("policy.safetensors, run folder or controller (", Join(ControllerNames(), ", "),
+                "), several side by side; none: nothing turns the motor"))
+      ->type_name("POLICY|RUN...")
+      ->check(NotEmpty());
+}
+
+/// Adds what a picture is like.
+void AddPicture(CLI::App& app, ViewArguments& a) {
+  Options own;
+  own.Add(&a.seconds, "seconds", -1, {0, 1000}, "s", "how long a recording is").usual =
+      "10; with --episode 20";
+  own.Add(&a.fps, "fps", -1, {1, 200}, "", "frames a second of a recording").usual =
+      "50; of a GIF 25";
+  own.Add(&a.speed, "speed", 1, {0.01, 100}, "", "1: real time; 0.1: ten times slower");
+  own.Add(&a.width, "width", 960, {kLeastPixels, kMostPixels}, "", "of the picture, pixels");
+  own.Add(&a.height, "height", 640, {kLeastPixels, kMostPixels}, "", "of the picture, pixels");
+  own.Add(&a.look.camera.azimuth, "azimuth", 80, {-360, 360}, "deg",
+          "of the camera; 90: across the pendulum's plane");
+  own.Add(&a.look.camera.elevation, "elevation", -8, {-90, 90}, "deg", "of the camera");
+  own.Add(&a.look.camera.distance, "distance", 0, {0, 1000}, "m",
+          "of the camera; 0: as far as shows all");
+  own.Add(&a.look.text, "text", true, "name, time and torque in the picture");
+  own.Add(&a.look.marks, "marks", true, "torque, goal and the tip's path in the picture");
+  AddArguments(app, own);
+}
+
+}  // namespace
+
+void AddView(CLI::App& program, Command& command) {
+  CLI::App* app =
+      program.add_subcommand("view", "Show policies at work in a window, or record them as a film");
+  auto a = std::make_shared<ViewArguments>();
+  AddPolicies(*app, *a);
+  app->add_option(
+         "--record", a->record,
+         "write FILE.mp4 or FILE.gif (with the program ffmpeg), FILE.png (the last moment) "
+         "or FOLDER/ (each frame as PNG) instead of opening a window")
+      ->type_name("FILE")
+      ->check(NotEmpty());
+  app->add_flag("--headless", a->headless, "open no window, as --record does")
+      ->disable_flag_override();
+  app->add_option("--csv", a->csv, "write the episode as `simulate` does; -: standard output")
+      ->type_name("FILE")
+      ->check(NotEmpty());
+  AddPicture(*app, *a);
+  AddEpisodeOptions(*app, a->episode);
+  AddTrialOptions(*app, a->trial, "noise, random plants and the start of --episode");
+  app->footer(
+      "In the window: space pauses, right and left arrow step, backspace begins again, enter "
+      "turns\n"
+      "the policy off and on, tab changes the policy, P the plant, - and = the speed; double "
+      "click\n"
+      "selects a link and ctrl-drag pulls at it; F1 shows all keys.\n\n"
+      "Examples:\n"
+      "  ./upswing view runs/d3qn-seed1\n"
+      "  ./upswing view runs/d3qn-seed1 lqr --start 3.1,0,0,0     side by side\n"
+      "  ./upswing view runs/d3qn-seed1 --set mass2=1.3 --delay 0.02\n"
+      "  ./upswing view runs/d3qn-seed1 --record swing-up.mp4 --seconds 5 --speed 0.5\n"
+      "  ./upswing view runs/d3qn-seed1 --record frames/          PNG files, no ffmpeg\n"
+      "  ./upswing view --start 3,0,0,0                           let it fall\n");
+  app->callback([a, &command] { command = [a] { return RunView(*a); }; });
+}
+
+}  // namespace upswing
