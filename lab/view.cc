@@ -32,10 +32,15 @@ std::array<double, 2> Between(double a, double va, double b, double vb, double x
   return {value, slope};
 }
 
-/// The lines below a picture.
-std::vector<std::array<std::string, 2>> StatusOf(const ViewEpisode& episode, double steps) {
+/// The lines below a picture; one alone where it is small.
+std::vector<std::array<std::string, 2>> StatusOf(const ViewEpisode& episode, double steps,
+                                                 bool small) {
   const PendulumState s = episode.StateAt(steps);
   const Plant plant = episode.plant();
+  if (small) {
+    return {{fmt::format("{:.2f} s", steps * kControlPeriod),
+             fmt::format("{:+.2f} N m", episode.TorqueAt(steps) + 0.0)}};
+  }
   return {
       {"time", fmt::format("{:6.2f} s", steps * kControlPeriod)},
       {"torque", fmt::format("{:+6.2f} N m", episode.TorqueAt(steps) + 0.0)},
@@ -123,6 +128,8 @@ View::View(const std::vector<ViewEntry>& entries, const ViewLook& look, PictureS
 void View::Show(int index, PictureSize size) {
   shown_ = index;
   const mjrRect place = PanelPlace(0, panels(), size.width, size.height);
+  constexpr int kSmall = 400;  // pixels
+  small_ = std::min(place.width, place.height) < kSmall;
   for (const auto& scene : scenes_) {
     scene->SetCamera(look_.camera, static_cast<double>(place.width) / place.height);
   }
@@ -161,7 +168,7 @@ std::span<const Panel> View::At(double steps) {
     Panel panel{scenes_[i].get(), "", {}};
     if (look_.text) {
       panel.title = episode.entry().title;
-      panel.status = StatusOf(episode, steps);
+      panel.status = StatusOf(episode, steps, small_);
     }
     panels_.push_back(std::move(panel));
   }

@@ -109,6 +109,7 @@ class View {
   std::vector<Panel> panels_;
   double reach_ = 0;  // m
   int shown_ = -1;
+  bool small_ = false;
 };
 
 /// How a recording is made.

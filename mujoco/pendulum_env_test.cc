@@ -127,6 +127,41 @@ TEST_P(PendulumEnvs, LinksLeanFromStraightUp) {
   EXPECT_NEAR(std::abs(of(0, 0)[1]), kPi, 1e-12);      // hanging
 }
 
+TEST(PendulumEnv, APushAddsToTheMotorUntilTheNextState) {
+  PendulumEnvConfig config;
+  config.engine = &kMuJoCo;
+  PendulumEnv pushed(config), driven(config);
+  StepResult result = pushed.MakeResult();
+  const PendulumState start{0.3, -0.2, 1, 0};
+  pushed.SetState(0, start);
+  driven.SetState(0, start);
+  const auto difference = [&] {
+    const PendulumState a = pushed.state(0), b = driven.state(0);
+    return std::hypot(a.q1 - b.q1, a.q2 - b.q2, a.w1 - b.w1) + std::abs(a.w2 - b.w2);
+  };
+  // About the first joint it is as the motor.
+  pushed.Push(0, {1.5, 0});
+  for (int step = 0; step < 10; ++step) {
+    pushed.Step(std::array{0.5}, result);
+    driven.Step(std::array{2.0}, result);
+  }
+  EXPECT_LT(difference(), 1e-12);
+  // Nothing of it is left in a new state.
+  pushed.SetState(0, start);
+  driven.SetState(0, start);
+  pushed.Step(std::array{2.0}, result);
+  driven.Step(std::array{2.0}, result);
+  EXPECT_EQ(difference(), 0);
+  // About the second it is what no motor can do.
+  pushed.Push(0, {0, 1});
+  pushed.Step(std::array{2.0}, result);
+  driven.Step(std::array{2.0}, result);
+  EXPECT_GT(pushed.state(0).w2 - driven.state(0).w2, 0.1);
+
+  config.engine = &kClosedForm;
+  EXPECT_THROW(PendulumEnv(config).Push(0, {1, 0}), Error);
+}
+
 TEST_P(PendulumEnvs, ABlowUpTerminatesWithFiniteNumbersAndStartsAnew) {
   PendulumEnv env(SmallConfig());
   StepResult result = env.MakeResult();

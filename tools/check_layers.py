@@ -31,6 +31,8 @@ LAYERS = {
 # The files that may include each foreign library.
 ALLOWED_FILES = {
     "mujoco": re.compile(r"mujoco/"),
+    "GLFW": re.compile(r"mujoco/window\.cc$"),
+    "zlib.h": re.compile(r"io/png\.cc$"),
     "google": re.compile(r"io/"),
     "hwy": re.compile(r"(core/simd(_test)?|nn/(linear|product|bfloat16|roofline|registers-inl)|"
                       r"sim/(closed_form|sine_cosine-inl))\.(h|cc)$"),
