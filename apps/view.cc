@@ -118,14 +118,18 @@ int RunHeadless(const ViewArguments& a, View& view, double seconds) {
                         a.fps < 0 ? UsualFps(a.record) : a.fps,
                         a.speed,
                         {static_cast<int>(a.width), static_cast<int>(a.height)}};
-    EpisodeProgress progress(1, IsStandardStream(a.csv));
+    ProgressLine progress;
+    const bool quiet = IsStandardStream(a.csv);
     const int64_t frames = Record(
         view, config, [] { return StopSignal() != 0; },
         [&](int64_t done, int64_t all) {
-          progress.Show(static_cast<double>(done) / static_cast<double>(all));
+          if (quiet || !progress.due()) return;
+          progress.Show(static_cast<double>(done) / static_cast<double>(all),
+                        {fmt::format("picture {} of {}", done, all)});
         });
+    progress.Clear();
     if (frames == 0) return 128 + StopSignal();
-    if (!IsStandardStream(a.csv)) {
+    if (!quiet) {
       fmt::print("{}: {} {} of {}x{}\n", Printable(a.record), frames,
                  frames == 1 ? "picture" : "pictures", a.width, a.height);
     }
@@ -188,8 +192,8 @@ void AddPolicies(CLI::App& app, ViewArguments& a) {
 /// Adds what a picture is like.
 void AddPicture(CLI::App& app, ViewArguments& a) {
   Options own;
-  own.Add(&a.seconds, "seconds", -1, {0, 1000}, "s", "how long a recording is").usual =
-      "10; with --episode 20";
+  own.Add(&a.seconds, "seconds", -1, {0, 1000}, "s", "how long a recording is, or a window is open")
+      .usual = "10, with --episode 20; a window: until it is closed";
   own.Add(&a.fps, "fps", -1, {1, 200}, "", "frames a second of a recording").usual =
       "50; of a GIF 25";
   own.Add(&a.speed, "speed", 1, {0.01, 100}, "", "1: real time; 0.1: ten times slower");
