@@ -60,9 +60,9 @@ class Physics {
   /// of MuJoCo's) only `terminated` is meaningful.
   virtual void Step(std::span<const double> torque, StepResult& result) = 0;
 
-  /// Turns the joints of an environment by these torques, N·m, beside the motor's, from the next step
-  /// on until it is told others or gets a state: somebody pushes. Throws Failure if the engine knows
-  /// no pushes.
+  /// Turns the joints of an environment by these torques, N·m, beside the motor's, from the next
+  /// step on until it is told others or gets a state: somebody pushes. Throws Failure if the engine
+  /// knows no pushes.
   virtual void Push(int env, const std::array<double, 2>& torque);
 
   /// Saves or loads the state; plants are not part of it.
