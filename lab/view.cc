@@ -146,7 +146,7 @@ void View::Replace(size_t index, ViewEntry entry) {
   scenes_[index] = std::move(scene);
 }
 
-std::span<const Panel> View::At(double steps) {
+std::span<const ScenePanel> View::At(double steps) {
   panels_.clear();
   for (size_t i = 0; i < episodes_.size(); ++i) {
     if (shown_ >= 0 && static_cast<int>(i) != shown_) continue;
@@ -165,7 +165,7 @@ std::span<const Panel> View::At(double steps) {
     }
     marks.trail = trail;
     scenes_[i]->Update(episode.StateAt(steps), marks);
-    Panel panel{scenes_[i].get(), "", {}};
+    ScenePanel panel{scenes_[i].get(), "", {}};
     if (look_.text) {
       panel.title = episode.entry().title;
       panel.status = StatusOf(episode, steps, small_);

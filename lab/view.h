@@ -88,7 +88,7 @@ class View {
 
   /// What the picture shows after so many control steps, which were made before. The panels refer
   /// to this object's scenes.
-  std::span<const Panel> At(double steps);
+  std::span<const ScenePanel> At(double steps);
 
   /// Shows this episode alone; -1: all. Moves the cameras back to where they began.
   void Show(int index, PictureSize size);
@@ -106,7 +106,7 @@ class View {
   ViewLook look_;
   std::vector<ViewEpisode> episodes_;
   std::vector<std::unique_ptr<PendulumScene>> scenes_;
-  std::vector<Panel> panels_;
+  std::vector<ScenePanel> panels_;
   double reach_ = 0;  // m
   int shown_ = -1;
   bool small_ = false;

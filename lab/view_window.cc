@@ -256,7 +256,7 @@ class Session {
 
   void Draw() {
     view_.look().text = config_.look.text && !overlays_[0];  // help stands in their place
-    const std::span<const Panel> panels = view_.At(shown_);
+    const std::span<const ScenePanel> panels = view_.At(shown_);
     std::vector<Overlay> overlays;
     if (overlays_[0]) overlays.push_back({mjGRID_TOPLEFT, Help()});
     if (overlays_[1]) overlays.push_back({mjGRID_TOPRIGHT, Information()});

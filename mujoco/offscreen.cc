@@ -61,11 +61,11 @@ std::span<const uint8_t> Offscreen::Render(std::span<const double> qpos, double 
   Marks marks;
   marks.torque = torque;
   scene_->Update({qpos[0], qpos[1], 0, 0}, marks);
-  const Panel panel{scene_.get(), "", {}};
+  const ScenePanel panel{scene_.get(), "", {}};
   return Render(std::span(&panel, 1));
 }
 
-std::span<const uint8_t> Offscreen::Render(std::span<const Panel> panels) {
+std::span<const uint8_t> Offscreen::Render(std::span<const ScenePanel> panels) {
   {
     const EglContext::Use use(graphics_->context);
     const Painter& painter = *graphics_->painter;

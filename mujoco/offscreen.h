@@ -10,7 +10,7 @@
 
 namespace upswing {
 
-struct Panel;
+struct ScenePanel;
 
 /// Smallest and largest width and height of a picture, pixels.
 inline constexpr int kLeastPixels = 16, kMostPixels = 8192;
@@ -38,7 +38,7 @@ class Offscreen {
   std::span<const uint8_t> Render(std::span<const double> qpos, double torque = 0);
 
   /// The picture of these panels side by side.
-  std::span<const uint8_t> Render(std::span<const Panel> panels);
+  std::span<const uint8_t> Render(std::span<const ScenePanel> panels);
 
   PictureSize size() const { return size_; }
 

@@ -73,10 +73,10 @@ Painter::Painter(const mjModel& model, mjtFramebuffer buffer, int width, int hei
 
 Painter::~Painter() { mjr_freeContext(context_.get()); }
 
-void Painter::Draw(std::span<const Panel> panels, int width, int height) const {
+void Painter::Draw(std::span<const ScenePanel> panels, int width, int height) const {
   const auto count = static_cast<int>(panels.size());
   for (int i = 0; i < count; ++i) {
-    const Panel& panel = panels[static_cast<size_t>(i)];
+    const ScenePanel& panel = panels[static_cast<size_t>(i)];
     const mjrRect place = PanelPlace(i, count, width, height);
     mjr_render(place, &panel.scene->scene(), context_.get());
     if (!panel.title.empty()) {

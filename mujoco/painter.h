@@ -12,7 +12,7 @@ namespace upswing {
 
 /// One of the pictures that stand side by side, and what is written into it. Texts are ASCII, as
 /// MuJoCo's fonts are; anything else becomes `?`.
-struct Panel {
+struct ScenePanel {
   PendulumScene* scene = nullptr;
   std::string title;                               // at the top
   std::vector<std::array<std::string, 2>> status;  // at the bottom: lines of name and value
@@ -29,7 +29,7 @@ class Painter {
   Painter& operator=(const Painter&) = delete;
 
   /// Draws the panels in a grid over the whole of width × height pixels.
-  void Draw(std::span<const Panel> panels, int width, int height) const;
+  void Draw(std::span<const ScenePanel> panels, int width, int height) const;
 
   /// Writes lines of name and value into a corner of a rectangle.
   void Write(mjtGridPos corner, std::span<const std::array<std::string, 2>> lines,

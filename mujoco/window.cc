@@ -62,7 +62,7 @@ struct Window::Impl {
   Library library;
   GLFWwindow* window = nullptr;
   std::optional<Painter> painter;
-  std::vector<Panel> panels;  // as drawn last
+  std::vector<ScenePanel> panels;  // as drawn last
   std::vector<Key> keys;
   double x = 0, y = 0;  // of the mouse, from the top left, in units of the window
   int dragged = -1;     // panel whose link is pulled at; -1: none
@@ -159,7 +159,7 @@ struct Window::Impl {
   }
 
   void MoveCameras(mjtMouse action, double dx, double dy) const {
-    for (const Panel& panel : panels) {
+    for (const ScenePanel& panel : panels) {
       PendulumScene& scene = *panel.scene;
       mjv_moveCamera(&scene.model(), action, dx, dy, &scene.camera());
     }
@@ -218,7 +218,7 @@ struct Window::Impl {
 
   void LetGo() {
     dragged = -1;
-    for (const Panel& panel : panels) panel.scene->perturb().active = 0;
+    for (const ScenePanel& panel : panels) panel.scene->perturb().active = 0;
   }
 };
 
@@ -246,7 +246,7 @@ void Window::ToggleFullScreen() {
   glfwSwapInterval(1);
 }
 
-void Window::Draw(std::span<const Panel> panels, std::span<const Overlay> overlays,
+void Window::Draw(std::span<const ScenePanel> panels, std::span<const Overlay> overlays,
                   mjvFigure* chart) {
   impl_->panels.assign(panels.begin(), panels.end());
   const auto [width, height] = impl_->Pixels();

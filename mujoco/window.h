@@ -58,7 +58,8 @@ class Window {
   PictureSize size() const;
 
   /// Draws the panels and what is written over them; `chart` may be null.
-  void Draw(std::span<const Panel> panels, std::span<const Overlay> overlays, mjvFigure* chart);
+  void Draw(std::span<const ScenePanel> panels, std::span<const Overlay> overlays,
+            mjvFigure* chart);
 
   /// The keys that were pressed since the last call. The mouse has moved the scenes of the panels
   /// that were drawn last, which must still be there.
