@@ -174,6 +174,71 @@ TEST_P(RandomizedEnvs, StartsAreThoseOfOnePlantAndStreamsAreNamed) {
   EXPECT_EQ(random.spec().action_limit.front(), 5);
 }
 
+TEST_P(RandomizedEnvs, ARestartWithASeedGivesTheEpisodesOfANewEnvironment) {
+  PendulumEnvConfig config = Config(3);
+  PendulumEnv env(config);
+  StepResult result = env.MakeResult();
+  const std::vector<double> torque{1, -2, 3};
+  for (int step = 0; step < 7; ++step) env.Step(torque, result);
+  env.Restart(1, 99);
+  config.seed = 99;
+  config.num_envs = 1;
+  PendulumEnv fresh(config);
+  StepResult expected = fresh.MakeResult();
+  for (int step = 0; step < 12; ++step) {  // three episodes
+    ASSERT_TRUE(std::ranges::equal(env.obs().row(1), fresh.obs().row(0)));
+    ASSERT_EQ(env.plant(1).gravity, fresh.plant(0).gravity);
+    env.Step(torque, result);
+    fresh.Step(std::vector<double>{-2}, expected);
+    ASSERT_EQ(result.reward[1], expected.reward[0]);
+    ASSERT_EQ(result.truncated[1], expected.truncated[0]);
+  }
+}
+
+TEST_P(RandomizedEnvs, ARestartWithoutASeedIsAnotherEpisodeOfItsOwn) {
+  PendulumEnv env(Config(2)), same(Config(2));
+  const double before = env.state(0).w1;
+  env.Restart(0, std::nullopt);
+  EXPECT_NE(env.state(0).w1, before);
+  EXPECT_NE(env.plant(0).mass1, same.plant(0).mass1);
+  // The other environment is as it was.
+  EXPECT_EQ(env.state(1).w1, same.state(1).w1);
+  // It is the episode that follows by itself, too.
+  StepResult result = same.MakeResult();
+  for (int step = 0; step < 5; ++step) same.Step(std::vector<double>{0, 0}, result);
+  EXPECT_EQ(env.state(0).w1, same.state(0).w1);
+  EXPECT_EQ(env.plant(0).mass1, same.plant(0).mass1);
+}
+
+TEST_P(RandomizedEnvs, AStepLeavesWhatIsHeldAsItIs) {
+  PendulumEnvConfig config = Config(3);
+  config.memory = 2;
+  config.disturbances = {Disturbance(0, 0.02)};
+  PendulumEnv env(config), reference(config);
+  StepResult result = env.MakeResult(), expected = reference.MakeResult();
+  const std::vector<double> torque{1, -2, 3};
+  env.Step(torque, result);
+  reference.Step(torque, expected);
+  env.Hold(1);
+  env.Step(torque, result);
+  const auto D = static_cast<size_t>(env.spec().obs_size);
+  EXPECT_TRUE(std::ranges::equal(std::span(result.next_obs).subspan(D, D),
+                                 std::span(expected.next_obs).subspan(D, D)));
+  EXPECT_EQ(env.state(1).w1, reference.state(1).w1);
+  EXPECT_NE(env.state(0).w1, reference.state(0).w1);
+  EXPECT_EQ(result.reward[1], 0);
+  EXPECT_EQ(result.torque[1], 0);
+  EXPECT_NE(result.reward[0], 0);
+  // From then on it lags behind by a step, and is else the same, noise and delay included.
+  for (int step = 0; step < 9; ++step) {
+    env.Step(torque, result);
+    reference.Step(torque, expected);
+    ASSERT_EQ(result.reward[1], expected.reward[1]);
+    ASSERT_EQ(result.truncated[1], expected.truncated[1]);
+    ASSERT_TRUE(std::ranges::equal(env.obs().row(1), reference.obs().row(1)));
+  }
+}
+
 TEST_P(RandomizedEnvs, LoadedStateContinuesWithTheSameBits) {
   ExpectLoadedGoesOn(Config(3), 8);  // in the second episode
 }

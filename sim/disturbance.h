@@ -49,11 +49,17 @@ class Disturber {
     disturbances_[static_cast<size_t>(env)] = disturbance;
   }
 
+  /// Lets an environment draw its noise from this stream from now on.
+  void Seed(int env, const Rng& rng) { rngs_[static_cast<size_t>(env)] = rng; }
+
   const Disturbance& disturbance(int env) const { return disturbances_[static_cast<size_t>(env)]; }
 
   /// Takes the torques (N), N·m, chosen at step `steps[i]` of each episode (N), counted from 0, and
   /// returns those that the motors apply now (N).
   std::span<const double> Apply(std::span<const double> torque, std::span<const int64_t> steps);
+
+  /// Takes back what Apply did to an environment at this step of its episode.
+  void TakeBack(int env, int64_t step);
 
   /// The state as the sensors measure it.
   PendulumState Measure(int env, PendulumState state);

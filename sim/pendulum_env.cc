@@ -10,6 +10,10 @@
 namespace upswing {
 namespace {
 
+/// The random streams beside that of the start states, for (seed, stream of the environments).
+std::string PlantStream(const std::string& stream) { return Concat(stream, ": plant"); }
+std::string NoiseStream(const std::string& stream) { return Concat(stream, ": sensor noise"); }
+
 /// The sensors and motors of these settings; nothing if there is neither noise nor delay.
 std::optional<Disturber> MakeDisturber(const PendulumEnvConfig& config) {
   const Randomization& random = config.randomization;
@@ -21,7 +25,7 @@ std::optional<Disturber> MakeDisturber(const PendulumEnvConfig& config) {
   }
   if (!any) return std::nullopt;
   return Disturber(config.disturbances, config.num_envs, max_delay, config.seed,
-                   Concat(config.stream, ": sensor noise"), config.first_index);
+                   NoiseStream(config.stream), config.first_index);
 }
 
 }  // namespace
@@ -60,7 +64,7 @@ PendulumEnv::PendulumEnv(const PendulumEnvConfig& config)
   for (int i = 0; i < config_.num_envs; ++i) {
     const uint64_t index = config_.first_index + static_cast<uint64_t>(i);
     if (!plants_.empty()) {
-      plant_rngs_.emplace_back(config_.seed, Concat(config_.stream, ": plant"), index);
+      plant_rngs_.emplace_back(config_.seed, PlantStream(config_.stream), index);
     }
     rngs_.emplace_back(config_.seed, config_.stream, index);
   }
@@ -145,6 +149,29 @@ void PendulumEnv::Reset(int env) {
   SetState(env, s);
 }
 
+void PendulumEnv::Restart(int env, std::optional<uint64_t> seed) {
+  if (seed) {
+    const auto i = static_cast<size_t>(env);
+    rngs_[i] = Rng(*seed, config_.stream);
+    if (!plants_.empty()) plant_rngs_[i] = Rng(*seed, PlantStream(config_.stream));
+    if (disturber_) disturber_->Seed(env, Rng(*seed, NoiseStream(config_.stream)));
+  }
+  Reset(env);
+}
+
+void PendulumEnv::Hold(int env) {
+  held_.resize(static_cast<size_t>(config_.num_envs));
+  held_[static_cast<size_t>(env)] = state(env);
+}
+
+void PendulumEnv::RestoreHeld() {
+  for (size_t i = 0; i < held_.size(); ++i) {
+    if (!held_[i]) continue;
+    physics_->SetState(static_cast<int>(i), *held_[i]);
+    if (disturber_) disturber_->TakeBack(static_cast<int>(i), step_counts_[i]);
+  }
+}
+
 void PendulumEnv::StandIn(int env, StepResult& result) const {
   const auto i = static_cast<size_t>(env);
   std::ranges::copy(Row(obs_, env), Row(result.next_obs, env).begin());
@@ -158,8 +185,14 @@ void PendulumEnv::StandIn(int env, StepResult& result) const {
 void PendulumEnv::Step(std::span<const double> torque, StepResult& result) {
   physics_->Step(disturber_ ? disturber_->Apply(torque, step_counts_) : torque, result);
   if (config_.memory > 0) SpreadRows(result.next_obs);  // the physics writes them without memory
+  RestoreHeld();
   for (int env = 0; env < config_.num_envs; ++env) {
     const auto i = static_cast<size_t>(env);
+    if (!held_.empty() && held_[i]) {
+      StandIn(env, result);
+      result.terminated[i] = result.truncated[i] = 0;
+      continue;
+    }
     ++step_counts_[i];
     const auto next_obs = Row(result.next_obs, env);
     if (disturber_ || config_.assumed_plant) {
@@ -174,6 +207,7 @@ void PendulumEnv::Step(std::span<const double> torque, StepResult& result) {
   for (int env = 0; env < config_.num_envs; ++env) {
     if (result.done(static_cast<size_t>(env))) Reset(env);
   }
+  held_.clear();
 }
 
 void PendulumEnv::State(const Archive& archive) {

@@ -14,6 +14,7 @@
 #include "sim/double_pendulum.h"
 #include "sim/physics.h"
 #include "sim/randomization.h"
+#include "sim/seeded_env.h"
 
 namespace upswing {
 
@@ -55,7 +56,7 @@ EnvSpec PendulumSpec(const PendulumEnvConfig& config);
 /// With randomised plants, observation and reward are those of the episode's own plant. With
 /// disturbances, observations hold what the sensors measure, and motors apply the delayed torque;
 /// state, reward and goal are the true ones.
-class PendulumEnv : public VectorEnv {
+class PendulumEnv : public SeededEnv {
  public:
   /// Throws BadInput as the engine does.
   explicit PendulumEnv(const PendulumEnvConfig& config);
@@ -71,6 +72,8 @@ class PendulumEnv : public VectorEnv {
   void GetState(int env, std::span<double> state) const override;
   void SetState(int env, std::span<const double> state) override;
   void SetStartNoise(double sigma) override { config_.start.noise = sigma; }
+  void Restart(int env, std::optional<uint64_t> seed) override;
+  void Hold(int env) override;
   void State(const Archive& archive) override;
 
   /// The plant of the running episode.
@@ -97,8 +100,10 @@ class PendulumEnv : public VectorEnv {
   void SpreadRows(std::vector<float>& table) const;
   /// Fills the memory of a new observation (D), given the torque chosen for the last step, N·m.
   void Remember(int env, double torque, std::span<float> obs) const;
-  /// Replaces the result of a step that blew up: the successor by the last observation, the rest by
-  /// zeros.
+  /// Puts the environments that are held back into their states.
+  void RestoreHeld();
+  /// Replaces the result of a step that blew up, or that was not made: the successor by the last
+  /// observation, the rest by zeros.
   void StandIn(int env, StepResult& result) const;
 
   /// One environment's observation (D) within a table of them.
@@ -118,8 +123,9 @@ class PendulumEnv : public VectorEnv {
   std::vector<Plant> plants_;     // (N) of the running episodes
   std::vector<Rng> plant_rngs_;   // (N) for those of the next episodes
   std::vector<Rng> plant_seeds_;  // (N) the streams as they were before the running episodes' draws
-  std::vector<int64_t> step_counts_;  // (N) control steps since the episode began
-  std::vector<float> obs_;            // (N, D)
+  std::vector<int64_t> step_counts_;                // (N) control steps since the episode began
+  std::vector<std::optional<PendulumState>> held_;  // (N) states that the next Step keeps; or empty
+  std::vector<float> obs_;                          // (N, D)
 };
 
 }  // namespace upswing
