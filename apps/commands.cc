@@ -1,17 +1,13 @@
 #include "apps/commands.h"
 
-#include <algorithm>
 #include <array>
 
 #include "core/text.h"
+#include "lab/arguments.h"
 #include "lab/controllers.h"
-#include "mujoco/engines.h"
 
 namespace upswing {
 namespace {
-
-constexpr Range kSeeds{0, 9e15};
-constexpr Range kThreads{0, 256};
 
 /// What --help shows for a flag's value.
 std::string TypeName(const Option& option) {
@@ -71,23 +67,19 @@ void AddStart(CLI::App& app, std::optional<std::string>& start) {
 
 void AddSeed(CLI::App& app, int64_t& seed, const std::string& what) {
   Options options;
-  options.Add(&seed, "seed", 0, kSeeds, "", Concat("of ", what));
+  DescribeSeed(options, &seed, what);
   AddArguments(app, options);
 }
 
 void AddThreads(CLI::App& app, int64_t& threads) {
   Options options;
-  options.Add(&threads, "threads", 0, kThreads, "", "0: one for each processor, at most 8");
+  DescribeThreads(options, &threads);
   AddArguments(app, options);
 }
 
 void AddPhysics(CLI::App& app, std::string& physics, const std::string& usual) {
-  std::vector<std::string> engines = EngineNames();
-  std::stable_partition(engines.begin(), engines.end(),  // clang 14 cannot compile ranges::
-                        [&](const std::string& name) { return name == usual; });
   Options options;
-  options.AddChoice(&physics, "physics", std::move(engines),
-                    "engine; closed-form computes the same physics faster than mujoco");
+  DescribePhysics(options, &physics, usual);
   AddArguments(app, options);
 }
 

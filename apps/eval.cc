@@ -11,6 +11,7 @@
 #include "core/thread_pool.h"
 #include "io/machine.h"
 #include "io/streams.h"
+#include "lab/arguments.h"
 #include "lab/config.h"
 #include "lab/loaded_policy.h"
 #include "rl/evaluate.h"
@@ -57,7 +58,7 @@ void AddEval(CLI::App& program, Command& command) {
   auto a = std::make_shared<EvalArguments>();
   AddPolicy(*app, a->policy)->required();
   Options own;
-  own.Add(&a->episodes, "episodes", 100, {1, 1000000}, "", "how many");
+  DescribeEvalEpisodes(own, &a->episodes);
   AddArguments(*app, own);
   app->add_option("--episodes-csv", a->episodes_csv,
                   "table to write, a row for each episode: start, plant and figures; "

@@ -1,6 +1,7 @@
 #include "lab/map_grid.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <mutex>
@@ -228,12 +229,19 @@ std::vector<MapCell> RunMap(const MapConfig& config, const Policy& policy,
   std::vector<std::vector<EpisodeResult>> results(ranges.size());
   std::mutex mutex;
   size_t done = 0;
+  std::atomic<bool> failed = false;  // then the other ranges are not run
   pool.ParallelFor(static_cast<int>(ranges.size()), [&](int range) {
+    if (failed) return;
     const auto i = static_cast<size_t>(range);
-    results[i] = RunRange(config, policy, ranges[i]);
-    const std::lock_guard lock(mutex);
-    ++done;
-    if (progress) progress(static_cast<double>(done) / static_cast<double>(ranges.size()));
+    try {
+      results[i] = RunRange(config, policy, ranges[i]);
+      const std::lock_guard lock(mutex);
+      ++done;
+      if (progress) progress(static_cast<double>(done) / static_cast<double>(ranges.size()));
+    } catch (...) {
+      failed = true;
+      throw;
+    }
   });
 
   // The ranges follow one another as the cells do.

@@ -9,6 +9,7 @@
 #include "io/machine.h"
 #include "io/tensor_file.h"
 #include "lab/run_log.h"
+#include "lab/run_rows.h"
 
 namespace upswing {
 namespace {
@@ -120,41 +121,17 @@ void TrainingRun::LogIfPossible(const std::string& line) {
 }
 
 void TrainingRun::OnEpisode(const TrainState& s, const FinishedEpisode& episode) {
-  Row row{{"step", s.steps},
-          {"episode", s.episodes},
-          {"return", episode.reward_sum},
-          {"length", episode.length},
-          {"terminated", episode.terminated ? 1 : 0}};
-  const std::vector<std::string>& names = training_->spec().term_names;
-  for (size_t k = 0; k < names.size(); ++k) row.emplace_back(names[k], episode.terms[k]);
-  folder_->LogEpisode(row);
+  folder_->LogEpisode(EpisodeRow(s, episode, training_->spec()));
   view_->OnEpisode(s, episode);
 }
 
 void TrainingRun::OnMetrics(const TrainState& s, const Metrics& metrics) {
-  Row row{{"step", s.steps}, {"episodes", s.episodes}};
-  row.insert(row.end(), metrics.begin(), metrics.end());
-  row.emplace_back("mean_return", s.mean_return());
-  row.emplace_back("success_rate", s.last_success_rate);
-  row.emplace_back("seconds", s.seconds);
-  folder_->LogMetrics(row);
+  folder_->LogMetrics(MetricsRow(s, metrics));
   view_->OnMetrics(s, metrics);
 }
 
 void TrainingRun::OnEvaluation(const TrainState& s, const Evaluation& e) {
-  folder_->LogEvaluation({{"step", s.steps},
-                          {"success_rate", e.success_rate()},
-                          {"success_low", e.success_interval.low},
-                          {"success_high", e.success_interval.high},
-                          {"mean_return", e.reward_sum.mean},
-                          {"swing_up_seconds", e.swing_up_seconds.median},
-                          {"work", e.work.mean},
-                          {"rms_torque", e.rms_torque.mean},
-                          {"torque_variation", e.torque_variation.mean},
-                          {"torque_variation_upright", e.goal_variation.mean},
-                          {"value", e.value},
-                          {"discounted_return", e.discounted_return},
-                          {"seconds", s.seconds}});
+  folder_->LogEvaluation(EvaluationRow(s, e));
   folder_->Log(Concat("step ", s.steps, ": ", e.successes, " of ", e.episodes,
                       " episodes succeed, mean return ", FormatNumber(e.reward_sum.mean)));
   view_->OnEvaluation(s, e);
