@@ -24,6 +24,7 @@ LAYERS = {
     "report": {"io", "core"},
     "lab": LIBRARIES,
     "apps": LIBRARIES | {"lab"},
+    "python": LIBRARIES | {"lab"},
     "fuzz": LIBRARIES | {"lab"},
     "examples": LIBRARIES | {"lab"},
 }
@@ -34,6 +35,7 @@ ALLOWED_FILES = {
     "GLFW": re.compile(r"mujoco/window\.cc$"),
     "zlib.h": re.compile(r"io/png\.cc$"),
     "google": re.compile(r"io/"),
+    "nanobind": re.compile(r"python/"),
     "hwy": re.compile(r"(core/simd(_test)?|nn/(linear|product|bfloat16|roofline|registers-inl)|"
                       r"sim/(closed_form|sine_cosine-inl))\.(h|cc)$"),
     "Eigen": re.compile(r"control/|nn/[^/]*_(test|bench)\.cc$"),

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/shared_ptr.h>
+
+#include <chrono>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "lab/loaded_policy.h"
+
+/// What the parts of the extension module share. The package's Python (python/upswing) wraps these
+/// classes and functions; nobody else calls them.
+namespace upswing {
+
+/// Settings as Python gives them: name and text of each.
+using SettingTexts = std::vector<std::pair<std::string, std::string>>;
+
+/// The same as flags: aliases first, so that what is more specific wins; messages begin with the
+/// name.
+std::vector<FlagValue> FlagsOf(const SettingTexts& settings);
+
+/// A policy and memories to act with, one for each call that runs at a time.
+class PolicyHandle {
+ public:
+  explicit PolicyHandle(LoadedPolicy loaded) : loaded_(std::move(loaded)) {}
+
+  const LoadedPolicy& loaded() const { return loaded_; }
+  const Policy& policy() const { return *loaded_.policy; }
+
+  /// Calls `work` with a memory for `n` environments.
+  template <typename Work>
+  void WithMemory(int n, const Work& work) {
+    std::unique_ptr<Policy::Memory> memory = Take(n);
+    work(*memory);
+    const std::lock_guard lock(mutex_);
+    free_[n].push_back(std::move(memory));
+  }
+
+ private:
+  std::unique_ptr<Policy::Memory> Take(int n);
+
+  LoadedPolicy loaded_;
+  std::mutex mutex_;
+  std::map<int, std::vector<std::unique_ptr<Policy::Memory>>> free_;
+};
+
+/// Lets Python's signals, such as that of Ctrl-C, end long work: to be called now and then without
+/// the interpreter's lock. Acts in the thread that made it alone.
+class Interrupts {
+ public:
+  /// Throws the Python exception of a signal that has come.
+  void Check();
+  /// Whether this is the thread that made it, and its last turn is a while ago.
+  bool due();
+
+ private:
+  std::thread::id thread_ = std::this_thread::get_id();
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+// The parts, each with its classes and functions.
+void BindErrors(nanobind::module_& m);
+void BindSettings(nanobind::module_& m);
+void BindEnvironments(nanobind::module_& m);
+void BindPolicies(nanobind::module_& m);
+void BindTraining(nanobind::module_& m);
+void BindEvaluation(nanobind::module_& m);
+
+}  // namespace upswing

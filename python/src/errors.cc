@@ -1,0 +1,74 @@
+// Errors of the library as Python exceptions, and signals during long work.
+#include <algorithm>
+#include <regex>
+
+#include "core/error.h"
+#include "python/src/bindings.h"
+
+namespace upswing {
+namespace {
+
+namespace nb = nanobind;
+
+/// The exceptions' classes, which live as long as the interpreter.
+PyObject* error_class = nullptr;
+PyObject* input_error_class = nullptr;
+PyObject* failure_class = nullptr;
+
+PyObject* MakeClass(nb::module_& m, const char* name, const char* doc, PyObject* bases) {
+  PyObject* made =
+      PyErr_NewExceptionWithDoc((std::string("upswing.") + name).c_str(), doc, bases, nullptr);
+  if (made == nullptr) throw nb::python_error();
+  m.attr(name) = nb::handle(made);
+  return made;
+}
+
+/// The message with Python's names: a flag at its beginning is an argument here.
+std::string PythonMessage(const std::string& message) {
+  static const std::regex kFlag("^--(set )?([a-z0-9-]+)");
+  std::smatch match;
+  if (!std::regex_search(message, match, kFlag)) return message;
+  std::string name = match[2];
+  std::ranges::replace(name, '-', '_');
+  return name + match.suffix().str();
+}
+
+void Translate(const std::exception_ptr& exception, void* /*unused*/) {
+  try {
+    std::rethrow_exception(exception);
+  } catch (const Error& error) {
+    PyErr_SetString(error.exit_code() == 2 ? input_error_class : failure_class,
+                    PythonMessage(error.what()).c_str());
+  }
+}
+
+}  // namespace
+
+bool Interrupts::due() {
+  constexpr std::chrono::milliseconds kBetween(50);
+  if (std::this_thread::get_id() != thread_) return false;
+  const auto now = std::chrono::steady_clock::now();
+  if (now - last_ < kBetween) return false;
+  last_ = now;
+  return true;
+}
+
+void Interrupts::Check() {
+  if (!due()) return;
+  const nb::gil_scoped_acquire lock;
+  if (PyErr_CheckSignals() != 0) throw nb::python_error();
+}
+
+void BindErrors(nb::module_& m) {
+  error_class = MakeClass(m, "Error", "What Upswing could not do; the base of its exceptions.",
+                          PyExc_Exception);
+  input_error_class =
+      MakeClass(m, "InputError", "Bad input: what was expected, what came, where.",
+                nb::make_tuple(nb::handle(error_class), nb::handle(PyExc_ValueError)).ptr());
+  failure_class =
+      MakeClass(m, "Failure", "The work itself failed: a full disk, a number that is not finite.",
+                nb::make_tuple(nb::handle(error_class), nb::handle(PyExc_RuntimeError)).ptr());
+  nb::register_exception_translator(Translate);
+}
+
+}  // namespace upswing

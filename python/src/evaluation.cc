@@ -1,0 +1,133 @@
+// Evaluations and maps for Python.
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <mutex>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "io/file.h"
+#include "io/machine.h"
+#include "lab/arguments.h"
+#include "lab/eval_report.h"
+#include "lab/map_command.h"
+#include "python/src/bindings.h"
+#include "python/src/environment_settings.h"
+
+namespace upswing {
+namespace {
+
+namespace nb = nanobind;
+
+/// What a function of the package is told besides settings: name and text of each.
+void SetArguments(const Options& options, const SettingTexts& arguments) {
+  for (const auto& [name, text] : arguments) options.Set(name, text, name);
+}
+
+/// Tells a Python function, or nobody if it is None, the share that is done; Ctrl-C ends the work.
+class Told {
+ public:
+  explicit Told(nb::object function) : function_(std::move(function)) {}
+
+  /// Calls come from any thread, one at a time; Python hears of those in the caller's.
+  void operator()(double share) {
+    if (!interrupts_.due()) return;
+    const nb::gil_scoped_acquire lock;
+    if (PyErr_CheckSignals() != 0) throw nb::python_error();
+    if (!function_.is_none()) function_(share);
+  }
+
+ private:
+  nb::object function_;
+  Interrupts interrupts_;
+};
+
+/// Figures as JSON, and a table of the episodes as CSV.
+std::pair<std::string, std::string> EvaluateHandle(const PolicyHandle& policy,
+                                                   const SettingTexts& settings,
+                                                   const SettingTexts& arguments,
+                                                   const std::string& model, bool unknown_plant,
+                                                   const nb::object& progress) {
+  TrialArguments trial;
+  int64_t episodes = 0, threads = 0;
+  Options own;
+  DescribeEvalEpisodes(own, &episodes);
+  DescribeSeed(own, &trial.seed, "start states, noise and random plants");
+  DescribeThreads(own, &threads);
+  DescribePhysics(own, &trial.physics, "mujoco");
+  SetArguments(own, arguments);
+  if (policy.loaded().task != kDoublePendulum && !settings.empty()) {
+    throw BadInput(Concat(Printable(settings.front().first), ": expected none, as ",
+                          policy.loaded().task, " has no such setting"));
+  }
+  SetSurroundings(FlagsOf(settings), trial);
+  trial.model = model;
+  trial.unknown_plant = unknown_plant;
+  Told told(progress);
+  const nb::gil_scoped_release unlocked;
+  ThreadPool pool(ResolveThreads(threads));
+  const EvalReport report =
+      EvaluatePolicy(policy.loaded(), trial, episodes, pool, [&](double share) { told(share); });
+  return {EvalJson(report), EpisodesCsv(report)};
+}
+
+/// The numbers of a map as a new array (ny × nx).
+template <typename T, typename Get>
+nb::ndarray<nb::numpy, T> Grid(const MapResult& map, const Get& get) {
+  auto* numbers = new T[map.cells.size()];
+  const nb::capsule owner(numbers, [](void* p) noexcept { delete[] static_cast<T*>(p); });
+  for (size_t i = 0; i < map.cells.size(); ++i) numbers[i] = get(map.cells[i]);
+  return {numbers, {map.config.y.values.size(), map.config.x.values.size()}, owner};
+}
+
+nb::tuple MapHandle(const PolicyHandle& policy, const SettingTexts& settings,
+                    const SettingTexts& arguments, const std::string& x, const std::string& y,
+                    bool unknown_plant, const std::string& out, const nb::object& progress) {
+  MapArguments a;
+  int64_t threads = 0;
+  Options own;
+  a.Describe(own);
+  DescribeSeed(own, &a.seed, "starts and noise");
+  DescribeThreads(own, &threads);
+  DescribePhysics(own, &a.physics, "closed-form");
+  SetArguments(own, arguments);
+  if (!x.empty()) a.x = x;
+  if (!y.empty()) a.y = y;
+  for (const FlagValue& flag : FlagsOf(settings)) a.set.push_back(flag.name + "=" + flag.text);
+  a.unknown_plant = unknown_plant;
+  a.out = out;
+  Told told(progress);
+  MapResult map;
+  std::string json;
+  {
+    const nb::gil_scoped_release unlocked;
+    map = PlanMap(a, policy.loaded());
+    const std::filesystem::path folder =
+        out.empty() ? std::filesystem::path() : MapFolder(a, policy.loaded(), map);
+    ThreadPool pool(ResolveThreads(threads));
+    FillMap(
+        a, policy.loaded(), pool, [&](double /*episodes*/, double share) { told(share); }, map);
+    if (!out.empty()) {
+      MakeNewFolder(folder);
+      WriteMap(map, folder);
+    }
+    json = MapJson(map);
+  }
+  return nb::make_tuple(
+      json, Grid<int64_t>(map, [](const MapCell& cell) { return cell.successes; }),
+      Grid<double>(map, [](const MapCell& cell) { return cell.swing_up_seconds; }));
+}
+
+}  // namespace
+
+void BindEvaluation(nb::module_& m) {
+  m.def("evaluate", &EvaluateHandle, nb::arg("policy"), nb::arg("settings"), nb::arg("arguments"),
+        nb::arg("model"), nb::arg("unknown_plant"), nb::arg("progress").none());
+  m.def("map", &MapHandle, nb::arg("policy"), nb::arg("settings"), nb::arg("arguments"),
+        nb::arg("x"), nb::arg("y"), nb::arg("unknown_plant"), nb::arg("out"),
+        nb::arg("progress").none());
+}
+
+}  // namespace upswing

@@ -1,0 +1,164 @@
+// Policies for Python: of files, of controllers, and of Python functions.
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/map.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <cmath>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "io/tensor_file.h"
+#include "lab/controllers.h"
+#include "python/src/bindings.h"
+#include "python/src/function_policy.h"
+
+namespace upswing {
+namespace {
+
+namespace nb = nanobind;
+
+using Observations = nb::ndarray<const float, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+template <typename T>
+using Numbers = nb::ndarray<T, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+
+/// Observations (N × D) for a policy. Throws BadInput.
+Matrix<const float> Checked(const Observations& obs, const Policy& policy) {
+  const auto D = static_cast<size_t>(policy.obs_size());
+  if (obs.shape(1) != D) {
+    throw BadInput(
+        Concat("obs: expected ", D, " numbers for each observation, got ", obs.shape(1)));
+  }
+  for (size_t i = 0; i < obs.size(); ++i) {
+    if (std::isfinite(obs.data()[i])) continue;
+    throw BadInput(
+        Concat("obs: expected finite numbers, got ", obs.data()[i], " in observation ", i / D));
+  }
+  return {obs.data(), static_cast<int>(obs.shape(0)), static_cast<int>(D)};
+}
+
+template <typename T>
+Matrix<T> Result(const Numbers<T>& out) {
+  return {out.data(), static_cast<int>(out.shape(0)), static_cast<int>(out.shape(1))};
+}
+
+void Act(PolicyHandle& self, const Observations& obs, const Numbers<double>& out) {
+  const Matrix<const float> rows = Checked(obs, self.policy());
+  const nb::gil_scoped_release unlocked;
+  self.WithMemory(rows.rows(),
+                  [&](Policy::Memory& memory) { self.policy().Act(rows, Result(out), memory); });
+}
+
+void Values(PolicyHandle& self, const Observations& obs, const Numbers<float>& out) {
+  const Matrix<const float> rows = Checked(obs, self.policy());
+  const nb::gil_scoped_release unlocked;
+  self.WithMemory(rows.rows(),
+                  [&](Policy::Memory& memory) { self.policy().Values(rows, Result(out), memory); });
+}
+
+void Spread(PolicyHandle& self, const Observations& obs, const Numbers<double>& low,
+            const Numbers<double>& high) {
+  const Matrix<const float> rows = Checked(obs, self.policy());
+  const nb::gil_scoped_release unlocked;
+  self.WithMemory(rows.rows(), [&](Policy::Memory& memory) {
+    self.policy().Spread(rows, Result(low), Result(high), memory);
+  });
+}
+
+std::vector<double> ValueActions(const PolicyHandle& self) {
+  const Matrix<const double> actions = self.policy().value_actions();
+  return {actions.data(), actions.data() + actions.size()};
+}
+
+/// What its file says of it; None where it says nothing.
+nb::dict DescribeInfo(const PolicyHandle& self) {
+  const PolicyInfo& info = self.policy().info();
+  nb::dict d;
+  d["agent"] = info.agent;
+  d["upswing_version"] = info.upswing_version;
+  d["config"] = info.config;
+  d["seed"] = info.seed;
+  d["step"] = info.step;
+  d["success_rate"] = info.success_rate;
+  d["mean_return"] = info.mean_return;
+  d["control_period"] = info.control_period;
+  d["gamma"] = info.gamma;
+  d["reward_scale"] = info.reward_scale;
+  nb::dict plant;
+  if (self.loaded().task == kDoublePendulum) {
+    for (const auto& [name, value] : PlantValues(self.loaded().plant)) plant[name.c_str()] = value;
+  }
+  d["plant"] = plant;
+  return d;
+}
+
+std::shared_ptr<PolicyHandle> Load(const std::string& name, const SettingTexts& settings,
+                                   const std::vector<std::string>& made_for) {
+  PolicyArguments arguments;
+  arguments.name = name;
+  for (const auto& [key, text] : settings) {
+    arguments.flags.push_back({key, text, Printable(key)});
+  }
+  arguments.made_for = made_for;
+  const nb::gil_scoped_release unlocked;
+  return std::make_shared<PolicyHandle>(GetPolicy(arguments));
+}
+
+}  // namespace
+
+std::unique_ptr<Policy::Memory> PolicyHandle::Take(int n) {
+  {
+    const std::lock_guard lock(mutex_);
+    std::vector<std::unique_ptr<Policy::Memory>>& free = free_[n];
+    if (!free.empty()) {
+      std::unique_ptr<Policy::Memory> memory = std::move(free.back());
+      free.pop_back();
+      return memory;
+    }
+  }
+  return policy().Start(n);
+}
+
+void BindPolicies(nb::module_& m) {
+  nb::class_<PolicyHandle>(m, "PolicyHandle")
+      .def("act", &Act, nb::arg("obs"), nb::arg("out"))
+      .def("values", &Values, nb::arg("obs"), nb::arg("out"))
+      .def("spread", &Spread, nb::arg("obs"), nb::arg("low"), nb::arg("high"))
+      .def(
+          "save",
+          [](const PolicyHandle& self, const std::filesystem::path& path) {
+            const nb::gil_scoped_release unlocked;
+            SaveTensors(self.policy().ToTensors(), path);
+          },
+          nb::arg("path"))
+      .def_prop_ro("name", [](const PolicyHandle& self) { return self.loaded().name; })
+      .def_prop_ro("kind", [](const PolicyHandle& self) { return self.policy().kind(); })
+      .def_prop_ro("description",
+                   [](const PolicyHandle& self) { return self.policy().description(); })
+      .def_prop_ro("task", [](const PolicyHandle& self) { return self.loaded().task; })
+      .def_prop_ro("memory", [](const PolicyHandle& self) { return self.loaded().memory(); })
+      .def_prop_ro("obs_size", [](const PolicyHandle& self) { return self.policy().obs_size(); })
+      .def_prop_ro("action_size",
+                   [](const PolicyHandle& self) { return self.policy().action_size(); })
+      .def_prop_ro("num_parameters",
+                   [](const PolicyHandle& self) { return self.policy().num_parameters(); })
+      .def_prop_ro("num_values",
+                   [](const PolicyHandle& self) { return self.policy().num_values(); })
+      .def_prop_ro("has_spread",
+                   [](const PolicyHandle& self) { return self.policy().has_spread(); })
+      .def("value_actions", &ValueActions)
+      .def("info", &DescribeInfo);
+  m.def("load_policy", &Load, nb::arg("name"), nb::arg("settings"), nb::arg("made_for"));
+  m.def("controllers", &ControllerNames);
+  m.def(
+      "function_policy",
+      [](nb::callable function, int memory) {
+        return std::make_shared<PolicyHandle>(MakeFunctionPolicy(std::move(function), memory));
+      },
+      nb::arg("function"), nb::arg("memory"));
+}
+
+}  // namespace upswing

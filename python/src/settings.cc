@@ -1,0 +1,111 @@
+// Settings: the same names, ranges and messages as everywhere.
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/text.h"
+#include "lab/config.h"
+#include "lab/config_checks.h"
+#include "lab/trial.h"
+#include "python/src/bindings.h"
+#include "python/src/environment_settings.h"
+
+namespace upswing {
+namespace {
+
+namespace nb = nanobind;
+
+nb::object ValueOf(const Option& option) {
+  return std::visit([](const auto* target) -> nb::object { return nb::cast(*target); },
+                    option.target);
+}
+
+/// One setting as a dictionary.
+nb::dict Describe(const Option& option) {
+  constexpr std::array kTypes{"bool", "int", "float", "str", "list[int]"};  // in Target's order
+  nb::dict d;
+  d["name"] = option.name;
+  d["section"] = option.section;
+  d["type"] = kTypes.at(option.target.index());
+  d["default"] = ValueOf(option);
+  const bool number = option.target.index() == 1 || option.target.index() == 2;
+  d["low"] = number && std::isfinite(option.range.low) ? nb::cast(option.range.low) : nb::none();
+  d["high"] = number && std::isfinite(option.range.high) ? nb::cast(option.range.high) : nb::none();
+  d["step"] = option.step > 0 ? nb::cast(option.step) : nb::none();
+  d["choices"] = option.choices;
+  d["unit"] = option.unit;
+  d["help"] = option.help;
+  d["environment"] = IsEnvironmentSetting(option);
+  return d;
+}
+
+nb::list Describe(const Options& options) {
+  nb::list list;
+  for (const Option& option : options.all()) list.append(Describe(option));
+  return list;
+}
+
+/// Names that stand for several settings.
+nb::list Aliases(const Options& options) {
+  nb::list list;
+  for (const auto& alias : options.aliases()) {
+    nb::dict d;
+    d["name"] = alias.name;
+    d["section"] = alias.section;
+    d["members"] = alias.members;
+    d["help"] = alias.help;
+    list.append(d);
+  }
+  return list;
+}
+
+/// Settings and aliases of a training by this agent.
+nb::tuple SettingsOfTraining(const std::string& agent) {
+  Config config = BuildConfig("", {{"agent", agent, "agent"}});
+  const Options options = OptionsOf(config);
+  return nb::make_tuple(Describe(options), Aliases(options));
+}
+
+/// Settings and aliases of what a policy is tried on.
+nb::tuple SettingsOfTrial() {
+  TrialSurroundings surroundings;
+  const Options options = OptionsOf(surroundings);
+  return nb::make_tuple(Describe(options), Aliases(options));
+}
+
+}  // namespace
+
+std::vector<FlagValue> FlagsOf(const SettingTexts& settings) {
+  Config scratch;
+  const Options every = EverySetting(scratch);
+  const auto is_alias = [&](const auto& setting) {
+    return std::ranges::any_of(every.aliases(),
+                               [&](const auto& alias) { return alias.name == setting.first; });
+  };
+  std::vector<FlagValue> flags;
+  for (const bool aliases : {true, false}) {
+    for (const auto& setting : settings) {
+      if (is_alias(setting) != aliases) continue;
+      flags.push_back({setting.first, setting.second, Printable(setting.first)});
+    }
+  }
+  return flags;
+}
+
+void BindSettings(nb::module_& m) {
+  m.def("training_settings", &SettingsOfTraining, nb::arg("agent"));
+  m.def("trial_settings", &SettingsOfTrial);
+  m.def("agents", &NamedAgents);
+  m.def(
+      "config_toml",
+      [](const SettingTexts& settings, const std::string& config) {
+        return CompleteToml(BuildConfig(config, FlagsOf(settings)));
+      },
+      nb::arg("settings"), nb::arg("config"));
+}
+
+}  // namespace upswing

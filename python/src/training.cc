@@ -1,0 +1,216 @@
+// Trainings driven from Python, in a run folder or in memory.
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <optional>
+#include <string_view>
+
+#include "core/safetensors.h"
+#include "io/machine.h"
+#include "io/run_folder.h"
+#include "lab/config_checks.h"
+#include "lab/run_rows.h"
+#include "lab/training_run.h"
+#include "python/src/bindings.h"
+
+namespace upswing {
+namespace {
+
+namespace nb = nanobind;
+
+using PolicyPointer = std::shared_ptr<PolicyHandle>;
+
+/// A row of a table as a dictionary; what counts is an int, and `terminated` a bool.
+nb::dict ToDict(const Row& row) {
+  constexpr std::array<std::string_view, 4> kCounts{"step", "episode", "episodes", "length"};
+  nb::dict d;
+  for (const auto& [name, value] : row) {
+    if (name == "terminated") {
+      d[name.c_str()] = value != 0;
+    } else if (std::ranges::find(kCounts, name) != kCounts.end()) {
+      d[name.c_str()] = static_cast<int64_t>(value);
+    } else {
+      d[name.c_str()] = value;
+    }
+  }
+  return d;
+}
+
+/// A policy of its own with the contents of another one, as its file would have it.
+PolicyPointer CopyOf(const Policy& policy, const std::string& name) {
+  LoadedPolicy loaded =
+      ReadPolicy(ReadSafetensors(WriteSafetensors(policy.ToTensors()).Joined(), name));
+  return std::make_shared<PolicyHandle>(std::move(loaded));
+}
+
+/// Tells Python's `tick` of a training: after a step at which something was due, and every tenth of
+/// a second. It returns False to stop the training.
+class PythonDriver final : public TrainingRun::Driver {
+ public:
+  explicit PythonDriver(nb::callable tick) : tick_(std::move(tick)) {}
+
+  void Begin(const Training& training) { training_ = &training; }
+  /// What an exception in Python stopped the training.
+  std::exception_ptr error() const { return error_; }
+  const PolicyPointer& best() const { return best_; }
+
+  void OnEpisode(const TrainState& s, const FinishedEpisode& episode) override {
+    events_.emplace_back("episode", EpisodeRow(s, episode, training_->spec()));
+  }
+  void OnMetrics(const TrainState& s, const Metrics& metrics) override {
+    events_.emplace_back("metrics", MetricsRow(s, metrics));
+  }
+  void OnEvaluation(const TrainState& s, const Evaluation& e) override {
+    events_.emplace_back("evaluation", EvaluationRow(s, e));
+  }
+  void OnBest(const TrainState& s, const Policy& policy) override {
+    best_ = CopyOf(policy, "the best policy of this training");
+    events_.emplace_back("best", Row{{"step", s.steps}});
+  }
+
+  TrainRequest AfterStep(const TrainState& s) override {
+    constexpr std::chrono::milliseconds kBetween(100);
+    const auto now = std::chrono::steady_clock::now();
+    if (events_.empty() && now - last_ < kBetween) return TrainRequest::kGoOn;
+    last_ = now;
+    try {
+      return Tell(s) ? TrainRequest::kGoOn : TrainRequest::kStop;
+    } catch (...) {  // the training is to end in order, with its checkpoint
+      error_ = std::current_exception();
+      return TrainRequest::kStop;
+    }
+  }
+
+ private:
+  bool Tell(const TrainState& s) {
+    const nb::gil_scoped_acquire lock;
+    if (PyErr_CheckSignals() != 0) throw nb::python_error();
+    nb::list events;
+    for (const auto& [kind, row] : events_) {
+      events.append(nb::make_tuple(kind, kind == "best" ? nb::cast(best_) : ToDict(row)));
+    }
+    events_.clear();
+    nb::dict state;
+    state["steps"] = s.steps;
+    state["total_steps"] = training_->config().train.steps;
+    state["episodes"] = s.episodes;
+    state["updates"] = training_->agent().updates();
+    state["seconds"] = s.seconds;
+    state["mean_return"] = s.mean_return();
+    state["success_rate"] = s.last_success_rate;
+    return nb::cast<bool>(tick_(events, state));
+  }
+
+  nb::callable tick_;
+  const Training* training_ = nullptr;
+  std::vector<std::pair<std::string, Row>> events_;
+  PolicyPointer best_;
+  std::exception_ptr error_;
+  std::chrono::steady_clock::time_point last_{};
+};
+
+/// What is left of a training.
+nb::dict ResultOf(const Training& training, bool finished, const std::string& path,
+                  const PolicyPointer& last, const PolicyPointer& best) {
+  const TrainState& s = training.state();
+  nb::dict d;
+  d["finished"] = finished;
+  d["solved"] = s.solved;
+  d["solved_step"] = s.solved ? nb::cast(s.streak_step) : nb::none();
+  d["solved_seconds"] = s.solved ? nb::cast(s.streak_seconds) : nb::none();
+  d["steps"] = s.steps;
+  d["episodes"] = s.episodes;
+  d["updates"] = training.agent().updates();
+  d["seconds"] = s.seconds;
+  d["best_step"] = s.best_step > 0 ? nb::cast(s.best_step) : nb::none();
+  d["best_success_rate"] = s.best_step > 0 ? nb::cast(s.best_success_rate) : nb::none();
+  d["best_return"] = s.best_step > 0 ? nb::cast(s.best_return) : nb::none();
+  d["agent"] = training.config().agent;
+  d["seed"] = training.config().train.seed;
+  d["threads"] = training.threads();
+  d["path"] = path.empty() ? nb::none() : nb::cast(path);
+  d["config"] = ConfigToml(training.config(), false);
+  d["last"] = last;
+  d["best"] = best;
+  return d;
+}
+
+/// A training that begins or is resumed, without Python.
+struct Driven {
+  std::unique_ptr<TrainingRun> run;    // in a folder, or
+  std::unique_ptr<Training> training;  // in memory
+  bool finished = false;
+
+  const Training& its() const { return run ? run->training() : *training; }
+
+  void Train(PythonDriver& driver) {
+    driver.Begin(its());
+    if (run) {
+      finished = run->Train(driver);
+      return;
+    }
+    finished = true;
+    while (training->Step()) {
+      if (driver.AfterStep(training->state()) != TrainRequest::kStop) continue;
+      finished = training->trainer().finished();
+      return;
+    }
+  }
+};
+
+Driven Make(const std::vector<FlagValue>& flags, const std::string& config_file,
+            const std::string& out, const std::string& resume, PythonDriver& driver) {
+  Driven driven;
+  if (!resume.empty()) {
+    driven.run = TrainingRun::Resume(resume, flags);
+    return driven;
+  }
+  Config config = BuildConfig(config_file, flags);
+  if (!out.empty()) {
+    driven.run = TrainingRun::Make(out, std::move(config));
+    return driven;
+  }
+  const int threads = ResolveThreads(config.train.threads);
+  driven.training =
+      std::make_unique<Training>(std::move(config), threads, std::vector<TrainObserver*>{&driver});
+  return driven;
+}
+
+nb::dict Train(const SettingTexts& settings, const std::string& config, const std::string& out,
+               const std::string& resume, const nb::callable& tick, const nb::callable& warn) {
+  const std::vector<FlagValue> flags = FlagsOf(settings);
+  PythonDriver driver(tick);
+  Driven driven;
+  {
+    const nb::gil_scoped_release unlocked;
+    driven = Make(flags, config, out, resume, driver);
+  }
+  for (const std::string& line : Warnings(driven.its().config())) warn(line);
+  PolicyPointer last, best;
+  {
+    const nb::gil_scoped_release unlocked;
+    driven.Train(driver);
+    last = CopyOf(*driven.its().policy(), "the last policy of this training");
+    best = driver.best();
+    // A run that was resumed may have its best policy from before.
+    if (!best && driven.run && driven.its().state().best_step > 0) {
+      best = std::make_shared<PolicyHandle>(LoadPolicy(driven.run->path()));
+    }
+  }
+  if (driver.error()) std::rethrow_exception(driver.error());
+  return ResultOf(driven.its(), driven.finished, driven.run ? driven.run->path().string() : "",
+                  last, best);
+}
+
+}  // namespace
+
+void BindTraining(nb::module_& m) {
+  m.def("train", &Train, nb::arg("settings"), nb::arg("config"), nb::arg("out"), nb::arg("resume"),
+        nb::arg("tick"), nb::arg("warn"));
+}
+
+}  // namespace upswing

@@ -1,0 +1,255 @@
+#!/usr/bin/env python3
+"""One environment: Gymnasium's own checks, the task as the program has it, bad input."""
+
+import csv
+import io
+import os
+import subprocess
+import threading
+import unittest
+import warnings
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.utils.env_checker import check_env
+
+import upswing
+
+ID = "upswing/DoublePendulum-v0"
+
+
+def play(env, actions, **reset):
+    """Observations, rewards and torques of an episode under these actions."""
+    rows = [env.reset(**reset)[0]]
+    rewards, torques = [], []
+    for action in actions:
+        obs, reward, terminated, truncated, info = env.step(action)
+        rows.append(obs)
+        rewards.append(reward)
+        torques.append(info["torque"])
+        if terminated or truncated:
+            break
+    return np.array(rows), np.array(rewards), np.array(torques)
+
+
+class Environments(unittest.TestCase):
+    def test_gymnasium_finds_nothing_wrong(self):
+        for settings in ({}, {"physics": "closed-form"}, {"actions": "levels"},
+                         {"sensor_noise": 0.1, "delay": 0.04, "randomize": 0.25, "memory": 4},
+                         {"actions": "levels", "levels": 3, "physics": "closed-form"}):
+            with self.subTest(settings), warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always")
+                check_env(gym.make(ID, **settings).unwrapped, skip_render_check=True)
+                # What is said of spaces is so on purpose: torques in N·m, velocities without bound.
+                said = [str(warning.message) for warning in caught]
+                self.assertEqual([text for text in said if "Box" not in text], [])
+
+    def test_spaces_are_of_the_settings(self):
+        env = gym.make(ID, torque_limit=3, memory=2)
+        self.assertEqual(env.observation_space.shape, (14,))
+        self.assertEqual(env.observation_space.dtype, np.float32)
+        self.assertEqual(env.action_space, gym.spaces.Box(-3, 3, (1,), np.float32))
+        env = gym.make(ID, actions="levels", levels=5)
+        self.assertEqual(env.action_space, gym.spaces.Discrete(5))
+        np.testing.assert_array_equal(env.unwrapped.torques, [-5, -2.5, 0, 2.5, 5])
+
+    def test_levels_and_torques_are_the_same_environment(self):
+        rng = np.random.default_rng(0)
+        levels = rng.integers(9, size=150)
+        a = gym.make(ID, actions="levels").unwrapped
+        b = gym.make(ID).unwrapped
+        torques = a.torques[levels]
+        for x, y in zip(play(a, levels, seed=5), play(b, torques[:, None], seed=5)):
+            np.testing.assert_array_equal(x, y)
+        np.testing.assert_array_equal(play(a, levels, seed=5)[2], torques)
+
+    def test_a_motion_is_that_of_the_programs_simulate(self):
+        rng = np.random.default_rng(1)
+        schedule = np.round(rng.uniform(-5, 5, 100), 3)
+        table = "torque\n" + "\n".join(map(str, schedule)) + "\n"
+        start = [0.1, -0.2, 0.3, -0.4]
+        for physics in ("mujoco", "closed-form"):
+            done = subprocess.run(
+                [os.environ["UPSWING"], "simulate", "--torque", "-", "--seconds", "2",
+                 "--physics", physics, "--set", "mass2=1.2", "--delay", "0.04",
+                 "--start", ",".join(map(str, start))],
+                input=table, capture_output=True, encoding="utf-8", check=False)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            rows = list(csv.DictReader(io.StringIO(done.stdout)))
+            env = gym.make(ID, physics=physics, mass2=1.2, delay=0.04).unwrapped
+            env.reset(seed=0, options={"state": start})
+            for k, torque in enumerate(schedule):
+                wanted = [float(rows[k][name]) for name in ("qpos0", "qpos1", "qvel0", "qvel1")]
+                np.testing.assert_array_equal(env.state, wanted)
+                _, _, _, _, info = env.step(np.array([torque]))
+                self.assertEqual(info["torque"], float(rows[k]["torque"]))
+            self.assertEqual(env.plant["mass2"], 1.2)
+
+    def test_the_reward_is_the_sum_of_its_terms(self):
+        env = gym.make(ID, energy_weight=0.5, random_start_share=1)
+        env.reset(seed=2)
+        for _ in range(50):
+            _, reward, _, _, info = env.step(env.action_space.sample())
+            self.assertAlmostEqual(reward, sum(info["reward_terms"].values()), delta=1e-12)
+
+    def test_an_episode_is_truncated_after_its_time(self):
+        env = gym.make(ID, episode_seconds=0.1, physics="closed-form")
+        env.reset(seed=1)
+        ends = [env.step(np.zeros(1))[2:4] for _ in range(5)]
+        self.assertEqual(ends, [(False, False)] * 4 + [(False, True)])
+        with self.assertRaises(gym.error.ResetNeeded):
+            env.step(np.zeros(1))
+        env.reset()
+        self.assertEqual(env.step(np.zeros(1))[2:4], (False, False))
+
+    def test_seeds_and_streams(self):
+        env = gym.make(ID, physics="closed-form", random_start_share=1).unwrapped
+        first = env.reset(seed=7)[0]
+        second = env.reset()[0]
+        self.assertFalse(np.array_equal(first, second))
+        np.testing.assert_array_equal(env.reset(seed=7)[0], first)
+        np.testing.assert_array_equal(env.reset()[0], second)
+        unseeded = [gym.make(ID, physics="closed-form").reset()[0] for _ in range(2)]
+        self.assertFalse(np.array_equal(*unseeded))
+
+    def test_an_agents_environment_is_that_of_its_training(self):
+        fast, usual = (gym.make(ID, agent=agent).unwrapped for agent in ("fast", "d3qn"))
+        self.assertIn('physics = "closed-form"', fast._core.settings)
+        self.assertIn('physics = "mujoco"', usual._core.settings)
+
+    def test_noise_is_seen_and_the_state_is_true(self):
+        quiet, noisy = (gym.make(ID, sensor_noise=noise).unwrapped for noise in (0, 0.1))
+        quiet_obs, noisy_obs = quiet.reset(seed=3)[0], noisy.reset(seed=3)[0]
+        np.testing.assert_array_equal(quiet.state, noisy.state)
+        self.assertFalse(np.array_equal(quiet_obs, noisy_obs))
+
+    def test_a_closed_environment_refuses(self):
+        env = gym.make(ID).unwrapped
+        env.reset(seed=0)
+        env.close()
+        env.close()
+        for call in (env.reset, lambda: env.step(np.zeros(1))):
+            with self.assertRaises(gym.error.ClosedEnvironmentError):
+                call()
+
+    def test_a_step_before_reset_is_refused(self):
+        with self.assertRaises(gym.error.ResetNeeded):
+            gym.make(ID).unwrapped.step(np.zeros(1))
+
+    def test_environments_in_threads_do_not_disturb_each_other(self):
+        actions = np.random.default_rng(3).uniform(-5, 5, (100, 1))
+        expected = play(gym.make(ID), actions, seed=1)
+        results = [None] * 4
+
+        def work(k):
+            results[k] = play(gym.make(ID), actions, seed=1)
+
+        threads = [threading.Thread(target=work, args=(k,)) for k in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        for result in results:
+            for x, y in zip(expected, result):
+                np.testing.assert_array_equal(x, y)
+
+
+class Rendering(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        env = gym.make(ID, render_mode="rgb_array").unwrapped
+        env.reset(seed=0)
+        try:
+            env.render()
+        except upswing.Failure as failure:
+            if os.environ.get("UPSWING_REQUIRE_PICTURES"):
+                raise
+            raise unittest.SkipTest(f"nothing can be drawn here: {failure}") from failure
+
+    def draw(self, state, **settings):
+        env = gym.make(ID, render_mode="rgb_array", **settings).unwrapped
+        env.reset(seed=0, options={"state": state})
+        return env.render()
+
+    def test_pictures(self):
+        hanging, upright = self.draw([0, 0, 0, 0]), self.draw([np.pi, 0, 0, 0])
+        self.assertEqual((hanging.shape, hanging.dtype), ((480, 640, 3), np.uint8))
+        np.testing.assert_array_equal(hanging, self.draw([0, 0, 0, 0]))
+        # The links are in the lower half when hanging and in the upper one when upright.
+        changed = (hanging.astype(int) - upright).any(axis=2)
+        self.assertGreater(changed[:240].sum(), 500)
+        self.assertGreater(changed[240:].sum(), 500)
+        self.assertLess(changed[:, :200].sum() + changed[:, 440:].sum(), 200)
+        self.assertEqual(self.draw([0] * 4, width=100, height=50).shape, (50, 100, 3))
+        self.assertFalse(np.array_equal(hanging, self.draw([0] * 4, length2=1)))
+
+    def test_gymnasium_finds_nothing_wrong_with_pictures(self):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            check_env(gym.make(ID, render_mode="rgb_array").unwrapped)
+        self.assertEqual([str(w.message) for w in caught if "Box" not in str(w.message)], [])
+
+    def test_many_environments(self):
+        envs = gym.make_vec(ID, num_envs=3, render_mode="rgb_array", width=64, height=48,
+                            randomize_length=0.5)
+        envs.reset(seed=1)
+        pictures = envs.render()
+        self.assertEqual([picture.shape for picture in pictures], [(48, 64, 3)] * 3)
+        self.assertFalse(np.array_equal(pictures[0], pictures[1]))
+
+    def test_sizes_that_cannot_be(self):
+        with self.assertRaises(upswing.InputError):
+            self.draw([0] * 4, width=1)
+
+
+class BadInput(unittest.TestCase):
+    def refuse(self, what, call):
+        with self.assertRaises(upswing.InputError) as caught:
+            call()
+        self.assertIn(what, str(caught.exception))
+        self.assertNotIn("\n", str(caught.exception))
+
+    def test_actions(self):
+        env = gym.make(ID).unwrapped
+        env.reset(seed=0)
+        for what, action in {"got int64": 3, "got nan": [np.nan], "got inf": [np.inf],
+                             "got (2,)": [1.0, 2.0], "got <U1": "x", "got object": None,
+                             "got (1, 1)": [[1.0]]}.items():
+            self.refuse(what, lambda action=action: env.step(action))
+        env = gym.make(ID, actions="levels").unwrapped
+        env.reset(seed=0)
+        for what, action in {"0 to 8, got 9": 9, "0 to 8, got -1": -1, "got float64": 2.0,
+                             "got (1,)": [3]}.items():
+            self.refuse(what, lambda action=action: env.step(action))
+        env.step(np.int8(8))  # of any integer type
+
+    def test_settings_as_the_program_has_them(self):
+        for text, settings in {
+                'mass2: expected a number in [0.01, 100], got "-1"': {"mass2": -1},
+                'gravty: no setting is called "gravty" (did you mean gravity?)': {"gravty": 1},
+                "gamma: expected a setting of an environment": {"gamma": 0.9},
+                "num_envs: expected": None,
+                'levels: expected an integer in [2, 1001], got "1"': {"levels": 1},
+                "actions: expected one of continuous, levels": {"actions": "discrete"},
+                "delay: expected a multiple of 0.02": {"delay": 0.03},
+                'mass1: expected a number in [0.01, 100], got "nan"': {"mass1": np.nan},
+                "agent: expected one of the task double-pendulum": {"agent": "acrobot"},
+                'agent: no agent is called "fsat"': {"agent": "fsat"},
+                "render_mode: expected": {"render_mode": "human"},
+                "/nothing/here.xml": {"model": "/nothing/here.xml"}}.items():
+            if settings is not None:
+                self.refuse(text, lambda settings=settings: upswing.DoublePendulumEnv(**settings))
+        for number in (0, 4097, "x", -1):
+            self.refuse("num_envs: expected an integer in [1, 4096]",
+                        lambda number=number: upswing.DoublePendulumVectorEnv(number))
+
+    def test_resets(self):
+        env = upswing.DoublePendulumEnv()
+        self.refuse("options: expected state", lambda: env.reset(options={"low": 1}))
+        self.refuse("state: expected q1, q2, w1, w2",
+                    lambda: env.reset(options={"state": [1, 2, 3]}))
+        self.refuse("state: expected finite", lambda: env.reset(options={"state": [np.nan] * 4}))
+
+
+if __name__ == "__main__":
+    unittest.main()

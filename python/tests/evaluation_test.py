@@ -1,0 +1,158 @@
+#!/usr/bin/env python3
+"""Evaluations and maps: the program's numbers, functions as policies, Ctrl-C, bad input."""
+
+import _thread
+import csv
+import json
+import os
+import subprocess
+import tempfile
+import threading
+import unittest
+from pathlib import Path
+
+import numpy as np
+
+import upswing
+
+ROOT = Path(os.environ["UPSWING_ROOT"])
+POLICY = ROOT / "web/public/agents/d3qn.safetensors"
+
+
+def program(*arguments):
+    return subprocess.run([os.environ["UPSWING"], *map(str, arguments)], capture_output=True,
+                          encoding="utf-8", check=True).stdout
+
+
+class Evaluations(unittest.TestCase):
+    def test_figures_are_the_programs(self):
+        words = ["--episodes", 20, "--seed", 4, "--physics", "closed-form", "--set", "mass2=1.1",
+                 "--sensor-noise", 0.01, "--delay", 0.02, "--randomize", 0.05]
+        settings = {"episodes": 20, "seed": 4, "physics": "closed-form", "mass2": 1.1,
+                    "sensor_noise": 0.01, "delay": 0.02, "randomize": 0.05}
+        theirs = json.loads(program("eval", POLICY, *words, "--json"))
+        ours = upswing.evaluate(POLICY, **settings)
+        self.assertEqual(ours, theirs)
+        rows = list(csv.DictReader(program("eval", POLICY, *words, "--episodes-csv", "-")
+                                   .splitlines()))
+        self.assertEqual(list(ours.per_episode), list(rows[0]))
+        for name, column in ours.per_episode.items():
+            expected = [float(row[name]) if row[name] else np.nan for row in rows]
+            np.testing.assert_array_equal(column, expected)
+        self.assertIn("of 20 episodes succeed", repr(ours))
+
+    def test_mujoco_is_usual_and_a_policy_will_do(self):
+        policy = upswing.load_policy(POLICY)
+        result = upswing.evaluate(policy, episodes=3)
+        self.assertEqual((result["physics"], result["success_rate"]), ("mujoco", 1))
+
+    def test_a_function_is_judged_as_the_policy_that_it_asks(self):
+        policy = upswing.load_policy(POLICY)
+        shapes = set()
+
+        def flat(obs):
+            shapes.add((obs.shape[1:], obs.dtype))
+            return policy.act(obs)[:, 0]
+
+        arguments = {"episodes": 60, "physics": "closed-form", "threads": 2}
+        direct = upswing.evaluate(policy, **arguments)
+        for function in (flat, policy.act, lambda obs: policy.act(obs).astype(np.float32)):
+            result = upswing.evaluate(function, **arguments)
+            np.testing.assert_array_equal(result.per_episode["return"],
+                                          direct.per_episode["return"])
+        self.assertEqual(shapes, {((8,), np.dtype(np.float32))})
+        remembering = upswing.load_policy(POLICY.with_name("d3qn-randomized.safetensors"))
+        result = upswing.evaluate(remembering.act, memory=4, episodes=3, physics="closed-form")
+        self.assertEqual(result["success_rate"], 1)
+
+    def test_progress_and_exceptions(self):
+        shares = []
+        upswing.evaluate(POLICY, episodes=2000, physics="closed-form", progress=shares.append)
+        self.assertEqual(shares, sorted(shares))
+        self.assertTrue(shares and 0 < shares[0] <= 1)
+
+        def broken(obs):
+            raise KeyError("mine")
+
+        with self.assertRaises(KeyError):
+            upswing.evaluate(broken, episodes=100, threads=2)
+
+    def test_ctrl_c_ends_it(self):
+        for work in (lambda: upswing.evaluate(POLICY, episodes=100000, physics="closed-form"),
+                     lambda: upswing.map(POLICY, "mass2=0.5:2:300", "mass1=0.5:2:300")):
+            timer = threading.Timer(0.7, _thread.interrupt_main)
+            timer.start()
+            with self.assertRaises(KeyboardInterrupt):
+                work()
+            timer.join()
+
+    def test_bad_input(self):
+        policy = upswing.load_policy(POLICY)
+        for what, settings in {
+                "episodes: expected an integer in [1, 1000000]": {"episodes": 0},
+                "seed: expected": {"seed": -1},
+                "threads: expected": {"threads": 1000},
+                'physics: expected one of mujoco, closed-form, got "x"': {"physics": "x"},
+                'mas: no setting is called "mas" (did you mean mass?)': {"mas": 1},
+                "mass2: expected a number in [0.01, 100]": {"mass2": "heavy"},
+                "delay: expected a multiple of 0.02": {"delay": 0.01},
+                "/nothing.xml": {"model": "/nothing.xml"}}.items():
+            with self.assertRaises(upswing.InputError) as caught:
+                upswing.evaluate(policy, **settings)
+            self.assertIn(what, str(caught.exception))
+        for what, function in {"for each of 1 observations, got 2": lambda obs: [1, 2],
+                               "finite torques": lambda obs: [np.nan] * len(obs)}.items():
+            with self.assertRaises(upswing.InputError) as caught:
+                upswing.evaluate(function, episodes=1)
+            self.assertIn(what, str(caught.exception))
+        with self.assertRaises(upswing.InputError):
+            upswing.evaluate(3)
+
+
+class Maps(unittest.TestCase):
+    def test_cells_are_the_programs(self):
+        with tempfile.TemporaryDirectory() as folder:
+            theirs = json.loads(program(
+                "map", POLICY, "--x", "mass2=-30%:+30%:5", "--y", "delay=0:0.04", "--episodes", 4,
+                "--set", "gravity=9.7", "--seed", 2, "--out", f"{folder}/a", "--json"))
+            ours = upswing.map(POLICY, "mass2=-30%:+30%:5", "delay=0:0.04", episodes=4,
+                               gravity=9.7, seed=2, out=f"{folder}/b")
+            self.assertEqual(Path(folder, "b/map.csv").read_text(),
+                             Path(folder, "a/map.csv").read_text())
+            self.assertTrue(Path(folder, "b/map.png").stat().st_size > 1000)
+        for timing in ("seconds", "episodes_per_second", "files"):
+            theirs.pop(timing)
+        self.assertEqual({key: ours[key] for key in theirs}, theirs)
+        self.assertEqual(ours.successes.shape, (3, 5))
+        np.testing.assert_array_equal(ours.success_rate, theirs["success_rate"])
+        np.testing.assert_array_equal(ours.x, theirs["x"]["values"])
+        self.assertEqual((ours.x_label, ours.y_label), ("mass2 (kg)", "delay (s)"))
+        seconds = np.array(theirs["swing_up_seconds"], float)
+        np.testing.assert_array_equal(ours.swing_up_seconds, seconds)
+
+    def test_nothing_is_written_unless_asked_for(self):
+        with tempfile.TemporaryDirectory() as folder:
+            before = os.getcwd()
+            os.chdir(folder)
+            try:
+                upswing.map("lqr", "q1=170:190:3", "q2=-10:10:3")
+            finally:
+                os.chdir(before)
+            self.assertEqual(os.listdir(folder), [])
+
+    def test_bad_input(self):
+        for what, arguments in {
+                'x: expected NAME=FROM:TO': {"x": "mass2"},
+                "y: no setting is called": {"y": "mas=1:2"},
+                "x and --y: expected two different": {"x": "mass=1:2", "y": "mass1=1:2"},
+                "mass2: expected another name": {"mass2": 1},
+                "gravity: expected a number": {"gravity": -1},
+                "check: expected a number in [0, 1]": {"check": 2},
+                "episodes: expected": {"episodes": 0}}.items():
+            with self.assertRaises(upswing.InputError) as caught:
+                upswing.map("lqr", **arguments)
+            self.assertIn(what, str(caught.exception))
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,188 @@
+#!/usr/bin/env python3
+"""Policies: those of files act as the program does; broken and foreign files are refused."""
+
+import csv
+import hashlib
+import io
+import os
+import subprocess
+import tempfile
+import threading
+import unittest
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+
+import upswing
+
+ROOT = Path(os.environ["UPSWING_ROOT"])
+AGENTS = ROOT / "web/public/agents"
+ID = "upswing/DoublePendulum-v0"
+
+
+def simulate(policy, *arguments):
+    """The rows of the program's `simulate`."""
+    done = subprocess.run([os.environ["UPSWING"], "simulate", policy, *arguments],
+                          capture_output=True, encoding="utf-8", check=True)
+    return [{name: float(text) for name, text in row.items()}
+            for row in csv.DictReader(io.StringIO(done.stdout))]
+
+
+class Policies(unittest.TestCase):
+    def test_closed_loops_are_the_programs(self):
+        """Acting on the environment's observations gives the motion of `simulate`, bit for bit."""
+        start = [0.3, -0.1, 0.2, 0]
+        for name in ("d3qn", "d3qn-randomized", "sac", "ppo"):
+            path = AGENTS / f"{name}.safetensors"
+            with self.subTest(name):
+                policy = upswing.load_policy(path)
+                rows = simulate(path, "--seconds", "4", "--start", ",".join(map(str, start)))
+                env = gym.make(ID, memory=policy.memory, episode_seconds=10).unwrapped
+                obs, _ = env.reset(seed=0, options={"state": start})
+                for row in rows[:-1]:
+                    np.testing.assert_array_equal(
+                        env.state, [row[key] for key in ("qpos0", "qpos1", "qvel0", "qvel1")])
+                    obs, _, _, _, info = env.step(policy.act(obs))
+                    self.assertEqual(info["torque"], row["torque"])
+
+    def test_one_and_many_observations(self):
+        obs = np.random.default_rng(0).normal(size=(70, 8)).astype(np.float32)
+        for name in ("d3qn", "sac"):
+            policy = upswing.load_policy(AGENTS / f"{name}.safetensors")
+            actions = policy.act(obs)
+            self.assertEqual((actions.shape, actions.dtype), ((70, 1), np.float64))
+            for k in (0, 33, 69):
+                np.testing.assert_array_equal(policy(obs[k]), actions[k])
+            np.testing.assert_array_equal(policy.act(obs.astype(np.float64)), actions)
+            np.testing.assert_array_equal(policy.act(obs[::2]), actions[::2])
+            np.testing.assert_array_equal(policy.act(obs.tolist()), actions)
+            self.assertEqual(policy.act(np.empty((0, 8))).shape, (0, 1))
+
+    def test_values(self):
+        obs = np.random.default_rng(1).normal(size=(50, 8))
+        policy = upswing.load_policy(AGENTS / "d3qn.safetensors")
+        values = policy.values(obs)
+        self.assertEqual((values.shape, values.dtype), ((50, 9), np.float32))
+        np.testing.assert_array_equal(policy.value_actions, np.linspace(-5, 5, 9))
+        np.testing.assert_array_equal(policy.value_actions[values.argmax(axis=1)],
+                                      policy.act(obs)[:, 0])
+        np.testing.assert_array_equal(policy.values(obs[3]), values[3])
+        self.assertIsNone(policy.spread(obs))
+
+    def test_spread_of_an_actor(self):
+        obs = np.random.default_rng(1).normal(size=(50, 8))
+        policy = upswing.load_policy(AGENTS / "sac.safetensors")
+        low, high = policy.spread(obs)
+        self.assertEqual(low.shape, (50, 1))
+        middle = policy.act(obs)
+        self.assertTrue(((low <= middle) & (middle <= high)).all())
+        self.assertTrue((low < high).any())
+
+    def test_what_a_file_says(self):
+        policy = upswing.load_policy(AGENTS / "d3qn-randomized.safetensors")
+        self.assertEqual((policy.task, policy.memory, policy.obs_size), ("double-pendulum", 4, 20))
+        self.assertEqual(policy.info["agent"], "d3qn-randomized")
+        self.assertEqual(policy.info["plant"]["mass1"], 1)
+        self.assertGreater(policy.num_parameters, 10000)
+        self.assertIn("d3qn-randomized", repr(policy))
+        said = subprocess.run([os.environ["UPSWING"], "info", AGENTS / "d3qn-randomized.safetensors"],
+                              capture_output=True, check=True, encoding="utf-8").stdout
+        self.assertIn(f"step {policy.info['step']},", said)
+        self.assertIn(f"{policy.num_parameters:,}", said)
+
+    def test_saved_is_the_same_file(self):
+        for path in sorted(AGENTS.glob("*.safetensors")):
+            policy = upswing.load_policy(path)
+            with tempfile.TemporaryDirectory() as folder:
+                copy, again = Path(folder, "a.safetensors"), Path(folder, "b.safetensors")
+                policy.save(copy)
+                upswing.load_policy(copy).save(again)
+                self.assertEqual(*(hashlib.sha256(file.read_bytes()).hexdigest()
+                                   for file in (copy, again)))
+
+    def test_controllers(self):
+        policy = upswing.load_policy("lqr", lqr_torque=0.1, made_for={"mass2": 1.2})
+        self.assertEqual((policy.kind, policy.info["plant"]["mass2"]), ("lqr", 1.2))
+        env = gym.make(ID, mass2=1.2, episode_seconds=5).unwrapped
+        obs, _ = env.reset(seed=0, options={"state": [np.pi + 0.05, -0.05, 0, 0]})
+        for _ in range(200):
+            obs, _, _, _, info = env.step(policy.act(obs))
+        self.assertTrue(info["at_goal"])
+        self.assertLess(abs(env.state[0] - np.pi), 1e-3)
+
+    def test_threads_share_a_policy(self):
+        policy = upswing.load_policy(AGENTS / "d3qn.safetensors")
+        obs = np.random.default_rng(0).normal(size=(500, 8))
+        expected = policy.act(obs)
+        wrong = []
+
+        def work():
+            for _ in range(20):
+                if not np.array_equal(policy.act(obs), expected):
+                    wrong.append(1)
+
+        threads = [threading.Thread(target=work) for _ in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertEqual(wrong, [])
+
+
+class BadInput(unittest.TestCase):
+    def refuse(self, what, call):
+        with self.assertRaises(upswing.InputError) as caught:
+            call()
+        self.assertIn(what, str(caught.exception))
+        self.assertNotIn("\n", str(caught.exception))
+
+    def test_files(self):
+        self.refuse("no such file", lambda: upswing.load_policy("nothing.safetensors"))
+        self.refuse("did you mean lqr?", lambda: upswing.load_policy("lqrr"))
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder, "x.safetensors")
+            content = (AGENTS / "d3qn.safetensors").read_bytes()
+            for broken in (b"", b"hello", content[:-1], content[:5000], bytes([255] * 100),
+                           content[:-1] + bytes([content[-1] ^ 1])):
+                file.write_bytes(broken)
+                self.refuse(str(file), lambda: upswing.load_policy(file))
+            self.refuse(folder, lambda: upswing.load_policy(folder))
+
+    def test_a_policy_of_another_task(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder, "acrobot.safetensors")
+            training = upswing.train("acrobot", steps=1000, learning_starts=500, eval_every=1000,
+                                     eval_episodes=2, threads=1)
+            training.best.save(path)
+            policy = upswing.load_policy(path)
+            self.assertEqual(policy.task, "acrobot-v1")
+            obs = np.zeros(8)
+            self.refuse("expected 6 numbers for each observation, got 8", lambda: policy.act(obs))
+            self.refuse("mass2: expected none", lambda: upswing.evaluate(policy, mass2=2))
+            self.refuse("expected a policy of the double pendulum", lambda: upswing.map(policy))
+            self.assertIn("success_rate", upswing.evaluate(policy, episodes=2))
+
+    def test_observations(self):
+        policy = upswing.load_policy(AGENTS / "d3qn.safetensors")
+        self.refuse("expected 8 numbers", lambda: policy.act(np.zeros((3, 9))))
+        self.refuse("got nan in observation 1", lambda: policy.act([[0] * 8, [np.nan] * 8]))
+        self.refuse("expected shape (N, 8)", lambda: policy.act(np.zeros((1, 1, 8))))
+        self.refuse("expected shape (N, 8)", lambda: policy.act(0))
+
+    def test_settings_of_controllers(self):
+        self.refuse("lqr_torq: no setting", lambda: upswing.load_policy("lqr", lqr_torq=1))
+        self.refuse("made_for mass2: expected",
+                    lambda: upswing.load_policy("lqr", made_for={"mass2": -1}))
+        self.refuse("expected a controller", lambda: upswing.load_policy(
+            AGENTS / "d3qn.safetensors", lqr_torque=1))
+
+    def test_places_that_cannot_be_written(self):
+        policy = upswing.load_policy(AGENTS / "d3qn.safetensors")
+        with self.assertRaises(upswing.Error):
+            policy.save("/nowhere/at/all.safetensors")
+        self.refuse("kept in a file", lambda: upswing.load_policy("lqr").save("/tmp/x.safetensors"))
+
+
+if __name__ == "__main__":
+    unittest.main()

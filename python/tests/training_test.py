@@ -1,0 +1,249 @@
+#!/usr/bin/env python3
+"""Trainings: the program's bits, callbacks, stopping, Ctrl-C, folders, bad input."""
+
+import _thread
+import csv
+import hashlib
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import tomllib
+import unittest
+import warnings
+from pathlib import Path
+
+import upswing
+
+# A training of a fraction of a second that evaluates twice.
+SMALL = {"hidden": [32], "head": 16, "steps": 4000, "eval_every": 2000, "eval_episodes": 4,
+         "log_every": 500, "learning_starts": 200, "threads": 1, "envs": 8,
+         "updates_per_step": 0.25, "checkpoint_every": 500}
+
+
+def sha(path):
+    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+
+
+def program(*arguments, **more):
+    return subprocess.run([os.environ["UPSWING"], *map(str, arguments)], capture_output=True,
+                          encoding="utf-8", check=True, **more)
+
+
+def flags(settings):
+    words = []
+    for name, value in settings.items():
+        text = ",".join(map(str, value)) if isinstance(value, list) else str(value)
+        words += ["--" + name.replace("_", "-"), text]
+    return words
+
+
+class InFolder(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+        self.path = Path(self.folder.name)
+
+
+class SameBits(InFolder):
+    def test_policies_and_tables_are_the_programs(self):
+        for agent, settings in (("fast", SMALL), ("sac-fast", {"steps": 2000, "eval_every": 1000,
+                                                               "eval_episodes": 2, "threads": 1}),
+                                ("ppo", {"steps": 20000, "eval_every": 10000, "eval_episodes": 2,
+                                         "threads": 2})):
+            with self.subTest(agent):
+                theirs, ours = self.path / f"{agent}-a", self.path / f"{agent}-b"
+                program("train", "--agent", agent, "--seed", 3, "--out", theirs, *flags(settings))
+                training = upswing.train(agent, seed=3, out=ours, **settings)
+                in_memory = upswing.train(agent, seed=3, **settings)
+                in_memory.best.save(self.path / "memory.safetensors")
+                expected = sha(theirs / "policy.safetensors")
+                self.assertEqual(sha(ours / "policy.safetensors"), expected)
+                self.assertEqual(sha(self.path / "memory.safetensors"), expected)
+                for table in ("episodes.csv",):
+                    self.assertEqual((ours / table).read_text(), (theirs / table).read_text())
+                with open(theirs / "evals.csv", encoding="utf-8") as file:
+                    rows = [{k: float(v) for k, v in row.items()} for row in csv.DictReader(file)]
+                for result in (training, in_memory):
+                    self.assertEqual(self.without_seconds(result.evaluations),
+                                     self.without_seconds(rows))
+                self.assertEqual(training.path, str(ours))
+                self.assertIsNone(in_memory.path)
+
+    def without_seconds(self, rows):
+        return [{key: value for key, value in row.items() if key != "seconds"} for row in rows]
+
+    def test_its_config_trains_again(self):
+        first = upswing.train("fast", **SMALL)
+        (self.path / "my.toml").write_text(first.config)
+        again = upswing.train(config=self.path / "my.toml", threads=1)
+        for name, training in (("a", first), ("b", again)):
+            training.best.save(self.path / name)
+        self.assertEqual(sha(self.path / "a"), sha(self.path / "b"))
+
+    def test_a_run_goes_on_where_the_program_stopped(self):
+        for name, steps in (("whole", 4000), ("part", 2000)):
+            program("train", "--agent", "fast", "--out", self.path / name,
+                    *flags(SMALL | {"steps": steps}))
+        training = upswing.train(resume=self.path / "part", steps=4000)
+        self.assertTrue(training.finished)
+        self.assertEqual(training.steps, 4000)
+        self.assertEqual(sha(self.path / "part/policy.safetensors"),
+                         sha(self.path / "whole/policy.safetensors"))
+        # Nothing is left to do; its best policy is from before.
+        again = upswing.train(resume=self.path / "part")
+        again.best.save(self.path / "best")
+        self.assertEqual(sha(self.path / "best"), sha(self.path / "whole/policy.safetensors"))
+
+
+class Callbacks(InFolder):
+    def test_rows_are_those_of_the_tables(self):
+        heard = {"episode": [], "metrics": [], "evaluation": []}
+        best = []
+        training = upswing.train("fast", out=self.path / "run", **SMALL,
+                                 on_best=best.append,
+                                 **{f"on_{kind}": rows.append for kind, rows in heard.items()})
+        for kind, table in (("episode", "episodes"), ("metrics", "metrics"),
+                            ("evaluation", "evals")):
+            with open(self.path / f"run/{table}.csv", encoding="utf-8") as file:
+                rows = [{k: float(v) for k, v in row.items()} for row in csv.DictReader(file)]
+            self.assertEqual(heard[kind], rows)
+            self.assertIsInstance(rows[0] and heard[kind][0]["step"], int)
+        self.assertEqual(training.evaluations, heard["evaluation"])
+        self.assertEqual(training.metrics, heard["metrics"])
+        best[-1].save(self.path / "best")
+        self.assertEqual(sha(self.path / "best"), sha(self.path / "run/policy.safetensors"))
+
+    def test_false_stops(self):
+        for settings in ({}, {"out": self.path / "run"}):
+            training = upswing.train("fast", **SMALL, **settings,
+                                     on_metrics=lambda row: row["step"] < 1000)
+            self.assertFalse(training.finished)
+            self.assertEqual(training.steps, 1000)
+            self.assertIsNone(training.best)
+        # A folder has a checkpoint of that step.
+        self.assertEqual(upswing.train(resume=self.path / "run").steps, 4000)
+
+    def test_exceptions_come_through(self):
+        class Pruned(Exception):
+            pass
+
+        def prune(row):
+            raise Pruned(row["step"])
+
+        for settings in ({}, {"out": self.path / "run"}):
+            with self.assertRaises(Pruned) as caught:
+                upswing.train("fast", **SMALL, **settings, on_evaluation=prune)
+            self.assertEqual(caught.exception.args, (2000,))
+        self.assertEqual(upswing.train(resume=self.path / "run").steps, 4000)
+
+    def test_ctrl_c_stops_in_order(self):
+        run = self.path / "run"
+        script = ("import sys, upswing\n"
+                  "try:\n"
+                  f"    upswing.train('fast', out={str(run)!r}, stop_when_solved=False,\n"
+                  "                  steps=100000000, threads=1, eval_every=100000000)\n"
+                  "except KeyboardInterrupt:\n"
+                  "    print('interrupted')\n")
+        with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE,
+                              encoding="utf-8") as process:
+            deadline = time.monotonic() + 30
+            while time.monotonic() < deadline and not (run / "metrics.csv").exists():
+                time.sleep(0.05)
+            time.sleep(0.3)
+            process.send_signal(signal.SIGINT)
+            output, _ = process.communicate(timeout=30)
+        self.assertEqual((output, process.returncode), ("interrupted\n", 0))
+        steps = program("info", run).stdout
+        self.assertIn("step", steps)
+        self.assertTrue(any(run.glob("checkpoint*.safetensors")))
+
+    def test_signals_reach_a_training_in_memory(self):
+        threading.Timer(0.5, _thread.interrupt_main).start()
+        with self.assertRaises(KeyboardInterrupt):
+            upswing.train("fast", stop_when_solved=False, steps=10**9, threads=1,
+                          eval_every=10**9)
+
+    def test_the_interpreter_runs_meanwhile_and_trainings_run_side_by_side(self):
+        results = {}
+
+        def work(seed):
+            results[seed] = upswing.train("fast", seed=seed, **SMALL)
+
+        threads = [threading.Thread(target=work, args=(seed,)) for seed in (1, 2, 1001)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        alone = upswing.train("fast", seed=2, **SMALL)
+        self.assertEqual(results[2].metrics[-1]["mean_return"], alone.metrics[-1]["mean_return"])
+        self.assertNotEqual(results[1].metrics[-1]["mean_return"],
+                            alone.metrics[-1]["mean_return"])
+
+    def test_progress_is_said_where_it_is_asked_for(self):
+        code = "import upswing; upswing.train('fast', progress={}, **{})"
+        for progress, shown in (("None", False), ("True", True), ("False", False)):
+            done = subprocess.run([sys.executable, "-c", code.format(progress, SMALL)], check=True,
+                                  capture_output=True, encoding="utf-8")
+            self.assertEqual("2,000 steps" in done.stderr, shown, done.stderr)
+            self.assertEqual(done.stdout, "")
+
+
+class BadInput(InFolder):
+    def refuse(self, what, *agent, **settings):
+        with self.assertRaises(upswing.InputError) as caught:
+            upswing.train(*agent, **settings)
+        self.assertIn(what, str(caught.exception))
+        self.assertNotIn("\n", str(caught.exception))
+
+    def test_settings(self):
+        self.refuse('gamma: expected a number in [0, 1], got "2"', gamma=2)
+        self.refuse('gama: no setting is called "gama" (did you mean gamma?)', gama=1)
+        self.refuse('agent: no agent is called "fsat" (did you mean fast?)', "fsat")
+        self.refuse('seed: expected an integer in [0, 9000000000000000], got "x"', seed="x")
+        self.refuse('hidden: expected a list of integers', hidden=[64, "x"])
+        self.refuse('double: expected', double=3)
+        self.refuse("batch: expected at most", "fast", replay=10)
+        self.refuse("epsilon", "sac", epsilon_end=0.1)
+        self.refuse("nothing.toml", config="nothing.toml")
+        self.refuse('steps: expected', steps=None)
+
+    def test_folders(self):
+        (self.path / "full").mkdir()
+        (self.path / "full/file").write_text("mine")
+        self.refuse(str(self.path / "full"), out=self.path / "full", **SMALL)
+        self.assertEqual(os.listdir(self.path / "full"), ["file"])
+        self.refuse("resume", resume=self.path / "nothing")
+        self.refuse("resume: takes settings and folder", resume="x", out="y")
+        self.refuse("out: expected a path, got an empty text", out="")
+
+    def test_what_makes_no_sense_is_warned_of(self):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            upswing.train("fast", **SMALL | {"learning_starts": 5000})
+        self.assertEqual(len(caught), 1)
+        self.assertIn("nothing will be learned", str(caught[0].message))
+        self.assertEqual(caught[0].filename, __file__)
+
+
+class Settings(unittest.TestCase):
+    def test_names_defaults_and_ranges_are_the_programs(self):
+        toml = tomllib.loads(program("train", "--agent", "sac", "--print-config").stdout)
+        settings = upswing.settings("sac")
+        for section, values in toml.items():
+            for name, value in values.items():
+                self.assertEqual((settings[name].section, settings[name].default),
+                                 (section, value))
+        self.assertEqual((settings["gamma"].low, settings["gamma"].high), (0, 1))
+        self.assertTrue(settings["mass2"].environment)
+        self.assertFalse(settings["gamma"].environment)
+        self.assertEqual(settings["mass"].members, ["mass1", "mass2"])
+        self.assertEqual(settings["physics"].choices, ["mujoco", "closed-form"])
+        self.assertIn("fast", upswing.agents())
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,52 @@
+"""Upswing: controllers that swing up and balance a double pendulum with one motor.
+
+The C++ program's environments, agents, evaluations and maps, from the same code:
+
+>>> import gymnasium as gym, upswing
+>>> envs = gym.make_vec("upswing/DoublePendulum-v0", num_envs=1024, physics="closed-form")
+>>> training = upswing.train(agent="fast", seed=1)
+>>> upswing.evaluate(training.best)["success_rate"]
+1.0
+
+Settings are keyword arguments with the names, units, ranges and defaults of the program's flags
+(`upswing.settings()` lists them). What is wrong with an argument is said by an `InputError`, which
+is a `ValueError`; what fails by itself, such as writing to a full disk, by a `Failure`, which is a
+`RuntimeError`.
+"""
+
+from gymnasium.envs.registration import register as _register
+
+from . import _mujoco as _mujoco  # loads MuJoCo's library, before the module that needs it
+from ._upswing import Error, Failure, InputError
+from ._upswing import version as __version__
+from .envs import DoublePendulumEnv, DoublePendulumVectorEnv
+from .evaluation import Evaluation, Map, evaluate, map  # pylint: disable=redefined-builtin
+from .policy import Policy, load_policy
+from ._settings import Setting, agents, settings
+from .training import Training, train
+
+__all__ = [
+    "DoublePendulumEnv",
+    "DoublePendulumVectorEnv",
+    "Error",
+    "Evaluation",
+    "Failure",
+    "InputError",
+    "Map",
+    "Policy",
+    "Setting",
+    "Training",
+    "__version__",
+    "agents",
+    "evaluate",
+    "load_policy",
+    "map",
+    "settings",
+    "train",
+]
+
+_register(
+    id="upswing/DoublePendulum-v0",
+    entry_point="upswing.envs:DoublePendulumEnv",
+    vector_entry_point="upswing.envs:DoublePendulumVectorEnv",
+)

@@ -1,0 +1,94 @@
+"""Settings: what there is to set, and Python values as the texts that the C++ code checks."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from typing import Any
+
+import numpy as np
+
+from . import _upswing
+
+
+@dataclasses.dataclass(frozen=True)
+class Setting:
+    """One setting.
+
+    Attributes:
+        name: the keyword argument; the program's flag is the same with - for _
+        section: of the configuration file, such as "plant"
+        type: "bool", "int", "float", "str" or "list[int]"
+        default: its value unless it is given
+        low, high: the ends of the numbers that are allowed; None: there is no end
+        step: numbers must be a multiple of it; None: any number
+        choices: the texts that are allowed; empty: any
+        unit: such as "s"; may be empty
+        help: what it is
+        environment: whether environments have it, not trainings alone
+        members: the settings that this name stands for, such as mass1 and mass2; empty: itself
+    """
+
+    name: str
+    section: str
+    type: str
+    default: Any
+    low: float | None
+    high: float | None
+    step: float | None
+    choices: list[str]
+    unit: str
+    help: str
+    environment: bool
+    members: list[str] = dataclasses.field(default_factory=list)
+
+
+def settings(agent: str = "d3qn") -> dict[str, Setting]:
+    """The settings of a training by a named agent, with its defaults, by their names.
+
+    Those with `environment` are keyword arguments of the environments too.
+
+    >>> upswing.settings("fast")["learning_rate"].default
+    0.002
+    """
+    return _by_name(*_upswing.training_settings(agent))
+
+
+def trial_settings() -> dict[str, Setting]:
+    """The settings that `evaluate` takes: plant, sensors, motor, and what is random."""
+    return _by_name(*_upswing.trial_settings())
+
+
+def agents() -> dict[str, str]:
+    """The named agents, and what each is."""
+    return dict(_upswing.agents())
+
+
+def _by_name(options: list[dict[str, Any]], aliases: list[dict[str, Any]]) -> dict[str, Setting]:
+    found = {option["name"]: Setting(**option) for option in options}
+    for alias in aliases:
+        first = found[alias["members"][0]]
+        found[alias["name"]] = dataclasses.replace(
+            first, name=alias["name"], section=alias["section"], help=alias["help"],
+            members=alias["members"])
+    return found
+
+
+def text_of(value: Any) -> str:
+    """A value as the text of a flag."""
+    if isinstance(value, (bool, np.bool_)):
+        return "true" if value else "false"
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float):
+        return repr(value)
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return ",".join(text_of(item) for item in value)
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    return str(value)
+
+
+def texts_of(values: dict[str, Any]) -> list[tuple[str, str]]:
+    """Name and text of each setting."""
+    return [(name, text_of(value)) for name, value in values.items()]

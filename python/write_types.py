@@ -1,0 +1,82 @@
+#!/usr/bin/env python3
+"""write_types.py FILE: writes the settings as TypedDicts, for type checkers and editors.
+
+Run by the build with the extension module's folder on the PYTHONPATH.
+"""
+
+import sys
+from pathlib import Path
+
+import _upswing  # pylint: disable=import-error
+
+PYTHON_TYPES = {"bool": "bool", "int": "int", "float": "float", "str": "str",
+                "list[int]": "Sequence[int]"}
+
+
+def every_setting():
+    """The settings and aliases of all agents, each name once."""
+    options, aliases = {}, {}
+    for agent, _ in _upswing.agents():
+        described = _upswing.training_settings(agent)
+        options = {option["name"]: option for option in described[0]} | options
+        aliases = {alias["name"]: alias for alias in described[1]} | aliases
+    return list(options.values()), list(aliases.values())
+
+
+def python_type(option):
+    if option["choices"]:
+        return f"Literal[{', '.join(map(repr, option['choices']))}]"
+    if option["name"] == "model":
+        return "Union[str, os.PathLike[str]]"
+    return PYTHON_TYPES[option["type"]]
+
+
+def about(option):
+    """Help, unit and range of a setting, on one line."""
+    text = option["help"] + (f", {option['unit']}" if option["unit"] else "")
+    if option["low"] is not None and option["high"] is not None:
+        text += f" ({option['low']:g} to {option['high']:g})"
+    return text
+
+
+def typed_dict(name, what, options, aliases):
+    """The lines of one class."""
+    known = {option["name"]: option for option in options}
+    lines = ["", "", f"class {name}(TypedDict, total=False):", f'    """{what}"""', ""]
+    for option in options:
+        lines += [f"    {option['name']}: {python_type(option)}", f'    """{about(option)}"""']
+    for alias in aliases:
+        members = [known[member] for member in alias["members"] if member in known]
+        if members:
+            lines += [f"    {alias['name']}: {python_type(members[0])}",
+                      f'    """{alias["help"]}"""']
+    return lines
+
+
+def main():
+    options, aliases = every_setting()
+    environment = [option for option in options
+                   if option["environment"] and option["name"] != "envs"]
+    # These are arguments of their own.
+    training = [option for option in options if option["name"] not in ("agent", "seed")]
+    start = [{"name": name, "type": "float", "choices": [], "help": help_text, "unit": unit,
+              "low": None, "high": None}
+             for name, help_text, unit in (("q1", "start", "degrees"), ("q2", "start", "degrees"),
+                                           ("w1", "start", "rad/s"), ("w2", "start", "rad/s"))]
+    trial = _upswing.trial_settings()
+    on_map = [option for option in trial[0] if option["section"] in ("plant", "disturbance")]
+    lines = ['"""Settings as keyword arguments; written by write_types.py from the C++ code."""', "",
+             "from __future__ import annotations", "", "import os",
+             "from collections.abc import Sequence",
+             "from typing import Literal, TypedDict, Union"]
+    lines += typed_dict("TrainingSettings", "Settings of trainings, of all algorithms.", training,
+                        aliases)
+    lines += typed_dict("EnvironmentSettings", "Settings of environments.", environment, aliases)
+    lines += typed_dict("TrialSettings", "Settings of evaluations.", *trial)
+    lines += typed_dict("MapSettings", "Settings of maps.", on_map + start,
+                        [alias for alias in trial[1] if alias["section"] == "plant"])
+    Path(sys.argv[1]).write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,94 @@
+# shellcheck shell=sh
+# ./upswing python: a virtual environment with the package upswing. Read by ./upswing, whose functions
+# it uses.
+: "${root:?}" "${setup:?}"
+
+python_venv=$root/build/python-venv
+
+python_usage() {
+  cat <<'END_OF_USAGE'
+Usage: ./upswing python [ARGUMENTS]
+
+Runs Python with the package upswing (docs/python.md), in a virtual environment in build/python-venv.
+Makes it, and builds the package's module, if that has not been done. ARGUMENTS go to Python.
+
+Examples:
+  ./upswing python                                             a prompt: import upswing
+  ./upswing python -c 'import upswing; print(upswing.train(agent="fast", seed=1))'
+  ./upswing python -m pip install stable-baselines3            more packages beside it
+  ./upswing python examples/python/sb3_sac.py
+END_OF_USAGE
+}
+
+# Prints a Python that modules can be built for: 3.10 or newer, with its headers.
+find_base_python() {
+  for base in python3 /usr/bin/python3; do
+    "$base" - 2>/dev/null <<'END' || continue
+import pathlib, sys, sysconfig, venv, ensurepip
+header = pathlib.Path(sysconfig.get_path("include"), "Python.h")
+sys.exit(not (sys.version_info >= (3, 10) and header.exists()))
+END
+    "$base" -c 'import sys; print(sys.executable)'
+    return
+  done
+  return 1
+}
+
+# What the environment has to be made of.
+python_stamp() {
+  "$1" -c 'import sys; print(sys.version, sys.base_exec_prefix)'
+  cat "$root"/tools/python-requirements.txt
+}
+
+# Makes the virtual environment unless it is there; its mark is written last.
+make_python_venv() {
+  base=$(find_base_python) || fail "no Python 3.10 or newer with its headers (Debian's python3-dev)"
+  stamp=$(python_stamp "$base")
+  mark=$python_venv/made-of.txt
+  [ ! -f "$mark" ] || [ "$(cat "$mark")" != "$stamp" ] || return 0
+  say "making a virtual environment for Python (build/python-venv)"
+  rm -rf "$python_venv"
+  "$base" -m venv "$python_venv" || fail "could not make a virtual environment (see above)"
+  "$python_venv/bin/python" -m pip --disable-pip-version-check install --quiet \
+    --only-binary=:all: --requirement "$root/tools/python-requirements.txt" >&2 ||
+    fail "pip could not install what the package needs (see above). Is there a network?"
+  # The package as it is built.
+  echo "$root/build/release/python" >"$("$python_venv/bin/python" -c \
+    'import sysconfig; print(sysconfig.get_path("purelib"))')/upswing-build.pth"
+  echo "$stamp" >"$mark"
+}
+
+# Lets the release build have the package too.
+configure_python() {
+  cache=build/release/CMakeCache.txt
+  grep -q '^UPSWING_PYTHON:BOOL=ON$' "$cache" 2>/dev/null &&
+    grep -qF "Python_EXECUTABLE:UNINITIALIZED=$python_venv/bin/python" "$cache" && return
+  say "configuring build/release with the Python package"
+  cmake --preset release -DUPSWING_PYTHON=ON -DPython_EXECUTABLE="$python_venv/bin/python" \
+    >build/configure-release.log || fail "could not configure (see above, and" \
+    "build/configure-release.log)"
+}
+
+# Installs what the package needs and readies the build for it.
+set_up_python() {
+  find_base_python >/dev/null || packages="$packages python3-dev"
+  # shellcheck disable=SC2086  # a list of words
+  (install_packages $packages && lock && make_python_venv && configure_python) </dev/null || exit 1
+}
+
+run_python() {
+  case ${1:-} in
+    -h | --help)
+      python_usage
+      exit 0
+      ;;
+  esac
+  if [ "$setup" = yes ]; then
+    set_up_python
+    set_up release upswing_package
+  fi
+  [ -x "$python_venv/bin/python" ] && [ -f "$root/build/release/python/upswing/__init__.py" ] ||
+    fail "the Python package is not built: run ./upswing python once without --no-setup, as a user" \
+      "who may write to $root"
+  exec "$python_venv/bin/python" "$@"
+}
