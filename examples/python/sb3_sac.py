@@ -1,0 +1,79 @@
+#!/usr/bin/env python3
+"""Stable-Baselines3's SAC learns to swing up and balance on Upswing's vector environment.
+
+    ./upswing python examples/python/sb3_sac.py --threads 1
+
+Every so many steps our `evaluate` judges its mean action as it judges our own agents: 100 episodes of
+20 s, in the closed form first and in MuJoCo once they all succeed. Two passed evaluations in a row
+solve the task. Its settings are those of our agent sac-fast, as far as it has them.
+"""
+
+import argparse
+import time
+
+import torch
+from stable_baselines3 import SAC
+from stable_baselines3.common.callbacks import BaseCallback
+
+import upswing
+from sb3_env import UpswingVecEnv
+
+
+class Judge(BaseCallback):
+    """Evaluates now and then, and ends the training once the task is solved."""
+
+    def __init__(self, every):
+        super().__init__()
+        self.every, self.due = every, every
+        self.streak = 0
+        self.began, self.judging = time.perf_counter(), 0.0
+        self.cpu_began, self.cpu_judging = time.process_time(), 0.0
+
+    def _on_step(self):
+        if self.num_timesteps < self.due:
+            return True
+        self.due += self.every
+        begin, cpu_begin = time.perf_counter(), time.process_time()
+        seconds = begin - self.began - self.judging
+        cpu = cpu_begin - self.cpu_began - self.cpu_judging
+
+        def act(obs):
+            return self.model.predict(obs, deterministic=True)[0]
+
+        result = upswing.evaluate(act, physics="closed-form", seed=self.num_timesteps)
+        if result["success_rate"] == 1:
+            result = upswing.evaluate(act, seed=self.num_timesteps)
+        self.streak = self.streak + 1 if result["success_rate"] == 1 else 0
+        print(f"{self.num_timesteps:9,} steps  {seconds:7.1f} s  {cpu:7.1f} s of CPU  "
+              f"return {result['return']['mean']:6.0f}  success {result['successes']}/100  "
+              f"({result['physics']})", flush=True)
+        self.judging += time.perf_counter() - begin
+        self.cpu_judging += time.process_time() - cpu_begin
+        return self.streak < 2
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--threads", type=int, default=1, help="of PyTorch and the environments")
+    parser.add_argument("--envs", type=int, default=32)
+    parser.add_argument("--updates", type=int, default=2, help="gradient steps for each lock-step")
+    parser.add_argument("--steps", type=int, default=1_000_000, help="at most")
+    parser.add_argument("--eval-every", type=int, default=10_000, help="steps")
+    parser.add_argument("--save", help="file for Stable-Baselines3's model")
+    a = parser.parse_args()
+    torch.set_num_threads(a.threads)
+    envs = UpswingVecEnv(a.envs, agent="sac-fast", threads=a.threads)
+    model = SAC("MlpPolicy", envs, seed=a.seed, device="cpu", gamma=0.98, tau=0.01,
+                learning_rate=1e-3, batch_size=256, buffer_size=100_000, learning_starts=2_000,
+                train_freq=1, gradient_steps=a.updates,
+                policy_kwargs={"net_arch": [64, 64]})
+    judge = Judge(a.eval_every)
+    model.learn(a.steps, callback=judge)
+    print("solved" if judge.streak == 2 else "not solved")
+    if a.save:
+        model.save(a.save)
+
+
+if __name__ == "__main__":
+    main()
