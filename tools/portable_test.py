@@ -20,8 +20,8 @@ PROGRAM = UPSWING.parent.parent / "portable_test"
 ALLOWED = {
     "what a compiled C++ program needs to begin, to throw and to allocate":
         r"_ITM_\w+|__gmon_start__|__libc_start_main|__cxa_\w+|__gxx_personality_v0|_Unwind_Resume|"
-        r"(typeinfo|vtable) for (std|__cxxabiv1)::.*|operator (new|delete)\b.*|"
-        r"__stack_chk_fail|__errno_location",
+        r"(typeinfo|vtable|VTT) for (std|__cxxabiv1)::.*|operator (new|delete)\b.*|"
+        r"__stack_chk_fail|__errno_location|__tls_get_addr|__libc_single_threaded",
     "the C++ library: containers, text in memory, exceptions, threads, the steady clock":
         r"std::.*",
     "memory and text in memory":
