@@ -147,6 +147,9 @@ int RunView(const ViewArguments& a) {
   if (!a.csv.empty() && a.names.size() > 1) {
     throw BadInput(Concat("--csv: expected one policy, got ", a.names.size()));
   }
+  if (!a.csv.empty() && a.csv == a.record) {
+    throw BadInput(Concat("--csv: expected another file than that of --record, got ", a.csv));
+  }
   if (!a.csv.empty()) CheckWritable("--csv", a.csv);
   const std::vector<LoadedPolicy> policies = PoliciesOf(a);
   const std::vector<ViewEntry> entries = EntriesOf(a, policies);

@@ -230,6 +230,7 @@ class BadInput(ViewTest):
                 ([FAST, "--record", "no/x.mp4"], "--record no/x.mp4", "No such file"),
                 ([FAST, "--record", "no/no/"], "cannot write", "No such file"),
                 ([FAST, "--headless"], "--headless", "--record FILE"),
+                ([FAST, "--record", "a.png", "--csv", "a.png"], "--csv", "another file"),
                 ([FAST, FAST, "--headless", "--csv", "a.csv"], "--csv", "expected one policy, got 2"),
                 ([FAST, "--record", "x.png", "--width", 0], "--width", "[16, 8192]"),
                 ([FAST, "--record", "x.png", "--height", 100000], "--height", "[16, 8192]"),

@@ -18,6 +18,7 @@ namespace {
 constexpr int kSamples = 16;
 constexpr int kMostDraws = 200;      // of them all
 constexpr double kTolerance = 1e-4;  // of the largest output
+constexpr double kMostFloat = std::numeric_limits<float>::max();
 
 /// What the layers make of an observation, in double precision.
 std::vector<double> Evaluate(const std::vector<PlainLayer>& layers, std::span<const float> obs) {
@@ -129,10 +130,10 @@ CSamples DrawSamples(const ExportedPolicy& policy, const std::vector<PlainLayer>
       obs = observer.Observe(state);
       outputs = Evaluate(layers, obs);
     } while (!IsClear(outputs) && ++draws < kMostDraws);
-    if (!(LargestSize(outputs) < std::numeric_limits<float>::max())) {
+    for (const double output : outputs) {
+      if (std::abs(output) < kMostFloat) continue;
       throw BadInput(Concat(policy.loaded->path.string(),
-                            ": expected outputs within the range of float, got ",
-                            LargestSize(outputs)));
+                            ": expected outputs within the range of float, got ", output));
     }
     all_clear = all_clear && IsClear(outputs);
     double torque = 0;
@@ -145,8 +146,11 @@ CSamples DrawSamples(const ExportedPolicy& policy, const std::vector<PlainLayer>
   }
   // A policy whose outputs are all nearly equal may choose any of its torques.
   const double of_limit = all_clear ? kTolerance * std::max(1.0, largest) : 2;
-  samples.output_tolerance = static_cast<float>(kTolerance * largest + 1e-30);
-  samples.torque_tolerance = static_cast<float>(policy.limit * of_limit + 1e-30);
+  const auto tolerance = [](double size) {
+    return static_cast<float>(std::min(size + 1e-30, kMostFloat));
+  };
+  samples.output_tolerance = tolerance(kTolerance * largest);
+  samples.torque_tolerance = tolerance(policy.limit * of_limit);
   return samples;
 }
 

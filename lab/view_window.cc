@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "core/text.h"
+#include "mujoco/engines.h"
 #include "mujoco/window.h"
 
 namespace upswing {
@@ -78,6 +79,11 @@ class Session {
   }
 
  private:
+  static constexpr std::array<double, 2> kNoPush{};
+
+  /// Whether its physics know of pushes.
+  static bool CanPush(const ViewEpisode& episode) { return episode.entry().env.engine == &kMuJoCo; }
+
   /// Moves the shown time on by so many control steps.
   void Advance(double steps) {
     double most = 1e18;
@@ -87,7 +93,7 @@ class Session {
       for (size_t i = 0; i < view_.episodes().size(); ++i) {
         ViewEpisode& episode = view_.episodes()[i];
         while (static_cast<double>(episode.steps()) < shown_) {
-          episode.Step(motor_, view_.PullTorques(i));
+          episode.Step(motor_, CanPush(episode) ? view_.PullTorques(i) : kNoPush);
         }
       }
     } catch (const Error& error) {

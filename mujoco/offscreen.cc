@@ -34,8 +34,11 @@ struct Offscreen::Graphics {
     painter.emplace(room.model(), mjFB_OFFSCREEN, size.width, size.height);
   }
   ~Graphics() {
-    const EglContext::Use use(context);
-    painter.reset();
+    try {
+      const EglContext::Use use(context);
+      painter.reset();
+    } catch (const Error&) {  // the driver is gone, and what it held with it
+    }
   }
 };
 

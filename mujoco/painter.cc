@@ -66,6 +66,7 @@ Painter::Painter(const mjModel& model, mjtFramebuffer buffer, int width, int hei
   mjr_makeContext(&model, context_.get(), FontFor(height));
   mjr_setBuffer(buffer, context_.get());
   if (context_->currentBuffer != buffer) {
+    mjr_freeContext(context_.get());
     throw Failure("OpenGL has no buffer to draw a picture into");
   }
   if (buffer == mjFB_OFFSCREEN) mjr_resizeOffscreen(width, height, context_.get());

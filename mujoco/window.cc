@@ -80,7 +80,8 @@ struct Window::Impl {
     glfwSwapInterval(1);
     glfwSetWindowUserPointer(window, this);
     glfwSetKeyCallback(window, [](GLFWwindow* w, int key, int, int action, int mods) {
-      if (action == GLFW_RELEASE) return;
+      const bool is_step = key == GLFW_KEY_LEFT || key == GLFW_KEY_RIGHT;
+      if (action == GLFW_RELEASE || (action == GLFW_REPEAT && !is_step)) return;
       Of(w).keys.push_back({key, (mods & GLFW_MOD_SHIFT) != 0, (mods & GLFW_MOD_CONTROL) != 0});
     });
     glfwSetCursorPosCallback(window, [](GLFWwindow* w, double x, double y) { Of(w).Move(x, y); });

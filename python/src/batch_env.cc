@@ -62,6 +62,7 @@ void BatchEnv::Reset(std::span<const std::optional<uint64_t>> seeds,
     // Of one that has ended, another episode has begun and nobody has seen it.
     const bool begun = std::erase(ended_, env) > 0;
     if (!begun || seeds[i]) env_->Restart(env, seeds[i]);
+    result_.torque[i] = 0;  // none acts yet
     std::ranges::copy(obs.row(env),
                       Matrix<float>(result_.next_obs, obs.rows(), obs.cols()).row(env).begin());
   }

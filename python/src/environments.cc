@@ -98,6 +98,24 @@ class Environments {
     return {pixels.release(), shape.size(), shape.data(), owner};
   }
 
+  std::vector<double> State(int env) {
+    std::vector<double> state(env_.spec().state_names.size());
+    const nb::gil_scoped_release unlocked;
+    const std::lock_guard lock(mutex_);
+    env_.GetState(env, state);
+    return state;
+  }
+  void SetState(int env, const std::vector<double>& state) {
+    const nb::gil_scoped_release unlocked;
+    const std::lock_guard lock(mutex_);
+    env_.SetState(env, state);
+  }
+  Plant PlantOf(int env) {
+    const nb::gil_scoped_release unlocked;
+    const std::lock_guard lock(mutex_);
+    return env_.plant(env);
+  }
+
   BatchEnv& env() { return env_; }
 
  private:
@@ -156,12 +174,6 @@ nb::dict DescribeTask(Environments& self) {
   return d;
 }
 
-std::vector<double> GetState(Environments& self, int env) {
-  std::vector<double> state(self.env().spec().state_names.size());
-  self.env().GetState(env, state);
-  return state;
-}
-
 }  // namespace
 
 void BindEnvironments(nb::module_& m) {
@@ -174,18 +186,13 @@ void BindEnvironments(nb::module_& m) {
       .def("reset", &Environments::Reset, nb::arg("seeds"), nb::arg("mask"))
       .def("draw", &Environments::Draw, nb::arg("env"), nb::arg("width"), nb::arg("height"))
       .def("spec", &DescribeTask)
-      .def("get_state", &GetState, nb::arg("env"))
-      .def(
-          "set_state",
-          [](Environments& self, int env, const std::vector<double>& state) {
-            self.env().SetState(env, state);
-          },
-          nb::arg("env"), nb::arg("state"))
+      .def("get_state", &Environments::State, nb::arg("env"))
+      .def("set_state", &Environments::SetState, nb::arg("env"), nb::arg("state"))
       .def(
           "plant",
           [](Environments& self, int env) {
             nb::dict d;
-            for (const auto& [name, value] : PlantValues(self.env().plant(env))) {
+            for (const auto& [name, value] : PlantValues(self.PlantOf(env))) {
               d[name.c_str()] = value;
             }
             return d;

@@ -3,6 +3,7 @@
 #include <regex>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "python/src/bindings.h"
 
 namespace upswing {
@@ -38,7 +39,7 @@ void Translate(const std::exception_ptr& exception, void* /*unused*/) {
     std::rethrow_exception(exception);
   } catch (const Error& error) {
     PyErr_SetString(error.exit_code() == 2 ? input_error_class : failure_class,
-                    PythonMessage(error.what()).c_str());
+                    PythonMessage(Printable(error.what())).c_str());
   }
 }
 

@@ -12,6 +12,7 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "io/tensor_file.h"
+#include "lab/config.h"
 #include "lab/controllers.h"
 #include "python/src/bindings.h"
 #include "python/src/function_policy.h"
@@ -156,6 +157,9 @@ void BindPolicies(nb::module_& m) {
   m.def(
       "function_policy",
       [](nb::callable function, int memory) {
+        if (memory < 0 || memory > kMostMemory) {
+          throw BadInput(Concat("memory: expected 0 to ", kMostMemory, " steps, got ", memory));
+        }
         return std::make_shared<PolicyHandle>(MakeFunctionPolicy(std::move(function), memory));
       },
       nb::arg("function"), nb::arg("memory"));

@@ -194,6 +194,7 @@ nb::dict Train(const SettingTexts& settings, const std::string& config, const st
   {
     const nb::gil_scoped_release unlocked;
     driven.Train(driver);
+    if (driver.error()) std::rethrow_exception(driver.error());
     last = CopyOf(*driven.its().policy(), "the last policy of this training");
     best = driver.best();
     // A run that was resumed may have its best policy from before.
@@ -201,7 +202,6 @@ nb::dict Train(const SettingTexts& settings, const std::string& config, const st
       best = std::make_shared<PolicyHandle>(LoadPolicy(driven.run->path()));
     }
   }
-  if (driver.error()) std::rethrow_exception(driver.error());
   return ResultOf(driven.its(), driven.finished, driven.run ? driven.run->path().string() : "",
                   last, best);
 }

@@ -64,6 +64,9 @@ class Evaluations(unittest.TestCase):
         remembering = upswing.load_policy(POLICY.with_name("d3qn-randomized.safetensors"))
         result = upswing.evaluate(remembering.act, memory=4, episodes=3, physics="closed-form")
         self.assertEqual(result["success_rate"], 1)
+        for memory in (-1, 101, 2**31 - 1):
+            with self.assertRaisesRegex(upswing.InputError, "memory: expected 0 to 100 steps"):
+                upswing.evaluate(remembering.act, memory=memory, episodes=3)
 
     def test_progress_and_exceptions(self):
         shares = []

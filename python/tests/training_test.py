@@ -16,6 +16,8 @@ import unittest
 import warnings
 from pathlib import Path
 
+import numpy as np
+
 import upswing
 
 # A training of a fraction of a second that evaluates twice.
@@ -120,12 +122,17 @@ class Callbacks(InFolder):
     def test_false_stops(self):
         for settings in ({}, {"out": self.path / "run"}):
             training = upswing.train("fast", **SMALL, **settings,
-                                     on_metrics=lambda row: row["step"] < 1000)
+                                     on_metrics=lambda row: np.bool_(row["step"] < 1000))
             self.assertFalse(training.finished)
             self.assertEqual(training.steps, 1000)
             self.assertIsNone(training.best)
         # A folder has a checkpoint of that step.
         self.assertEqual(upswing.train(resume=self.path / "run").steps, 4000)
+
+    def test_what_is_no_function_is_refused_at_once(self):
+        with self.assertRaisesRegex(upswing.InputError, "on_best: expected a function, got 3"):
+            upswing.train("fast", **SMALL, out=self.path / "run", on_best=3)
+        self.assertFalse((self.path / "run").exists())
 
     def test_exceptions_come_through(self):
         class Pruned(Exception):

@@ -159,6 +159,15 @@ class Vector(unittest.TestCase):
         for bad in ([True] * 2, np.array([1, 0, 1]), np.zeros(3, bool)):
             with self.assertRaises(upswing.InputError):
                 envs.reset(options={"reset_mask": bad})
+        for bad in (3.0, [3.0], [[1.0]] * 3, [1.0, 2.0, 3.0], np.zeros((4, 3))):
+            with self.assertRaisesRegex(upswing.InputError, "state: expected"):
+                envs.reset(options={"state": bad})
+
+    def test_a_seed_is_drawn_where_none_was_ever_given(self):
+        first, second = make(), make()
+        obs = [envs.reset(seed=[1, None, None])[0] for envs in (first, second)]
+        np.testing.assert_array_equal(obs[0][0], obs[1][0])
+        self.assertFalse(np.array_equal(obs[0][1:], obs[1][1:]))
 
     def test_copies_are_the_callers_and_views_are_not(self):
         for mode in AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP:

@@ -88,7 +88,8 @@ class _Core:
         if isinstance(seed, (Sequence, np.ndarray)) and not isinstance(seed, str):
             if len(seed) != n:
                 raise _upswing.InputError(f"seed: expected {n} seeds, got {len(seed)}")
-            return [None if one is None else _seed(one) for one in seed]
+            fresh = iter([] if self.is_reset else generator.integers(2**53, size=n).tolist())
+            return [next(fresh, None) if one is None else _seed(one) for one in seed]
         first = _seed(seed)
         return [(first + i) % 2**64 for i in range(n)]
 
@@ -114,7 +115,10 @@ class _Core:
         if states is not None:
             size = len(self.state_names)
             try:
-                states = np.broadcast_to(np.asarray(states, np.float64), (n, size))
+                states = np.asarray(states, np.float64)
+                if states.shape not in ((size,), (n, size)):
+                    raise ValueError
+                states = np.broadcast_to(states, (n, size))
             except (ValueError, TypeError):
                 raise _upswing.InputError(
                     f"state: expected {', '.join(self.state_names)} (rad, rad/s) of shape "
@@ -155,7 +159,7 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any]):
     actions="levels" the number of one of `levels` torques, evenly spaced, the largest negative
     first.
 
-    Reward: docs/task.md; about 1.9 a step hanging still up to 7 upright at rest. An episode is
+    Reward: docs/task.md; from 0 a step hanging still to 7 upright at rest. An episode is
     truncated after `episode_seconds`; it terminates only if its numbers blow up.
 
     Info: "torque" that acted, N·m; "at_goal", whether both links are within 30° of upright;
@@ -210,7 +214,7 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any]):
         """
         if self._closed:
             raise gym.error.ClosedEnvironmentError("reset: the environment is closed")
-        super().reset(seed=seed)
+        super().reset(seed=None if seed is None else _seed(seed))
         self._core.begin(self._core.seeds_of(seed, self.np_random), options)
         self._ended = False
         return self._core.env.obs[0].copy(), {}
@@ -361,7 +365,7 @@ class DoublePendulumVectorEnv(VectorEnv[npt.NDArray[np.float32], Any, npt.NDArra
         """
         if self.closed:
             raise gym.error.ClosedEnvironmentError("reset: the environments are closed")
-        super().reset(seed=int(seed) if isinstance(seed, (int, np.integer)) else None)
+        super().reset(seed=_seed(seed) if isinstance(seed, (int, np.integer)) else None)
         self._core.begin(self._core.seeds_of(seed, self.np_random), options)
         return (self._obs.copy() if self._copy else self._obs), {}
 

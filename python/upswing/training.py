@@ -10,6 +10,8 @@ import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TextIO
 
+import numpy as np
+
 from . import _upswing
 from .policy import Policy
 from ._settings import text_of, texts_of
@@ -38,7 +40,7 @@ class Training:
         best_step, best_success_rate, best_return: of the evaluation of `best`
         agent, seed, threads: what trained
         path: its run folder; None if it wrote none
-        config: all settings, as a TOML file that `train(config=...)` takes
+        config: all settings as TOML; in a file, `train(config=...)` takes them
         evaluations, metrics: rows of evals.csv and metrics.csv (docs/run-folder.md)
     """
 
@@ -116,6 +118,10 @@ def train(
     for name, path in (("out", out), ("config", config), ("resume", resume)):
         if path is not None and not text_of(path):
             raise _upswing.InputError(f"{name}: expected a path, got an empty text")
+    for name, function in (("on_episode", on_episode), ("on_metrics", on_metrics),
+                           ("on_evaluation", on_evaluation), ("on_best", on_best)):
+        if function is not None and not callable(function):
+            raise _upswing.InputError(f"{name}: expected a function, got {function!r}")
     line = _ProgressLine(sys.stderr) if progress or progress is None else None
     if line is not None and progress is None and not line.terminal:
         line = None
@@ -133,8 +139,10 @@ def train(
                 listener = listeners[kind]
             if kind in rows:
                 rows[kind].append(what)
-            if listener is not None and listener(what) is False:
-                wanted = False
+            if listener is not None:
+                answer = listener(what)
+                if isinstance(answer, (bool, np.bool_)) and not answer:
+                    wanted = False
         if line is not None:
             line.show(events, state)
         return wanted
