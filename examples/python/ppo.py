@@ -19,7 +19,7 @@ from torch.distributions import Normal
 import upswing
 
 GAMMA, LAMBDA, CLIP, EPOCHS, MINIBATCH = 0.98, 0.95, 0.2, 4, 1024
-HORIZON, ENTROPY, LEARNING_RATE = 32, 0.003, 3e-3
+HORIZON, ENTROPY, LEARNING_RATE = 32, 0.05, 3e-3
 REWARD_SCALE = 0.1
 
 
@@ -38,7 +38,7 @@ class Agent(nn.Module):
 
         self.critic = network(1, 1.0)
         self.mean = network(action_size, 0.01)
-        self.log_std = nn.Parameter(torch.full((action_size,), -0.5))
+        self.log_std = nn.Parameter(torch.zeros(action_size))
 
     def policy(self, obs):
         return Normal(self.mean(obs), self.log_std.exp().clamp(0.05, 1))

@@ -14,12 +14,14 @@ class UpswingVecEnv(VecEnv):
 
     Args:
         num_envs: N
+        reward_scale: factor of the rewards that the agent sees
         **settings: of upswing/DoublePendulum-v0
     """
 
-    def __init__(self, num_envs, **settings):
+    def __init__(self, num_envs, reward_scale=1.0, **settings):
         self.envs = gym.make_vec("upswing/DoublePendulum-v0", num_envs=num_envs,
                                  autoreset_mode=AutoresetMode.SAME_STEP, **settings)
+        self.reward_scale = reward_scale
         self._actions = None
         self.returns = np.zeros(num_envs)
         self.lengths = np.zeros(num_envs, int)
@@ -48,7 +50,7 @@ class UpswingVecEnv(VecEnv):
                        "TimeLimit.truncated": bool(truncated[i]),
                        "episode": {"r": self.returns[i], "l": self.lengths[i]}}
         self.returns[dones] = self.lengths[dones] = 0
-        return obs, rewards.astype(np.float32), dones, each
+        return obs, (self.reward_scale * rewards).astype(np.float32), dones, each
 
     def close(self):
         self.envs.close()

@@ -57,13 +57,13 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--threads", type=int, default=1, help="of PyTorch and the environments")
     parser.add_argument("--envs", type=int, default=32)
-    parser.add_argument("--updates", type=int, default=2, help="gradient steps for each lock-step")
+    parser.add_argument("--updates", type=int, default=8, help="gradient steps for each lock-step")
     parser.add_argument("--steps", type=int, default=1_000_000, help="at most")
     parser.add_argument("--eval-every", type=int, default=10_000, help="steps")
     parser.add_argument("--save", help="file for Stable-Baselines3's model")
     a = parser.parse_args()
     torch.set_num_threads(a.threads)
-    envs = UpswingVecEnv(a.envs, agent="sac-fast", threads=a.threads)
+    envs = UpswingVecEnv(a.envs, reward_scale=0.1, agent="sac-fast", threads=a.threads)
     model = SAC("MlpPolicy", envs, seed=a.seed, device="cpu", gamma=0.98, tau=0.01,
                 learning_rate=1e-3, batch_size=256, buffer_size=100_000, learning_starts=2_000,
                 train_freq=1, gradient_steps=a.updates,

@@ -45,6 +45,7 @@ def worth(trial, agent, steps):
 
 
 def study_of(a):
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
     storage = JournalStorage(JournalFileBackend(a.journal))
     return optuna.create_study(
         study_name=f"upswing-{a.agent}", storage=storage, load_if_exists=True,
@@ -54,7 +55,6 @@ def study_of(a):
 
 def search(a):
     """One process of the search."""
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
     study_of(a).optimize(lambda trial: worth(trial, a.agent, a.steps),
                          n_trials=-(-a.trials // a.processes))
 
