@@ -8,7 +8,6 @@
 #include "core/rng.h"
 #include "core/thread_pool.h"
 #include "mujoco/engines.h"
-#include "rl/dqn.h"
 #include "rl/torque_levels.h"
 #include "sim/closed_form.h"
 #include "sim/pendulum_env.h"

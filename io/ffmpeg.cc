@@ -98,9 +98,7 @@ int Ffmpeg::Wait() {
   return status;
 }
 
-void Ffmpeg::Fail() {
-  input_ = Descriptor(-1);
-  const int status = child_ < 0 ? 0 : Wait();
+void Ffmpeg::Fail(int status) {
   if (WIFSIGNALED(status)) {
     throw Failure(Concat("film: ffmpeg was ended by signal ", WTERMSIG(status)));
   }
@@ -111,7 +109,10 @@ void Ffmpeg::Write(std::span<const uint8_t> bytes) {
   while (!bytes.empty()) {
     const ssize_t written = write(input_.get(), bytes.data(), bytes.size());
     if (written < 0 && errno == EINTR) continue;
-    if (written < 0 && errno == EPIPE) Fail();
+    if (written < 0 && errno == EPIPE) {
+      input_ = Descriptor(-1);
+      Fail(Wait());
+    }
     if (written < 0) throw SystemFailure("write to ffmpeg");
     bytes = bytes.subspan(static_cast<size_t>(written));
   }
@@ -120,12 +121,7 @@ void Ffmpeg::Write(std::span<const uint8_t> bytes) {
 void Ffmpeg::Finish() {
   input_ = Descriptor(-1);  // the end of its input
   const int status = Wait();
-  if (WIFSIGNALED(status)) {
-    throw Failure(Concat("film: ffmpeg was ended by signal ", WTERMSIG(status)));
-  }
-  if (WEXITSTATUS(status) != 0) {
-    throw Failure(Concat("film: ffmpeg failed: ", Printable(LastLine(errors_.get()))));
-  }
+  if (status != 0) Fail(status);
 }
 
 }  // namespace upswing

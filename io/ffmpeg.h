@@ -28,7 +28,8 @@ class Ffmpeg {
   void Finish();
 
  private:
-  [[noreturn]] void Fail();
+  /// Throws what it said; `status` is that of its end.
+  [[noreturn]] void Fail(int status);
   int Wait();
 
   pid_t child_ = -1;

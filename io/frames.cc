@@ -40,8 +40,10 @@ class FolderWriter : public FrameWriter {
   FolderWriter(const fs::path& path, const FrameFormat& format)
       : making_(path, Making::Kind::kFolder), format_(format) {}
   void Write(std::span<const uint8_t> rgb) override {
-    WriteFileAtomically(making_.path() / fmt::format("frame-{:05}.png", count_++),
-                        EncodePng(rgb, format_.width, format_.height));
+    // The folder has its name when all are there, so none needs another name until then.
+    AppendFile frame(making_.path() / fmt::format("frame-{:05}.png", count_++));
+    frame.Append(EncodePng(rgb, format_.width, format_.height));
+    frame.Sync();
   }
   void Finish() override { making_.Publish(); }
 

@@ -94,12 +94,6 @@ class Observer {
   double torque_ = 0;               // chosen there
 };
 
-double LargestSize(std::span<const double> values) {
-  double largest = 0;
-  for (const double value : values) largest = std::max(largest, std::abs(value));
-  return largest;
-}
-
 /// Whether rounding does not change which of the outputs is the largest.
 bool IsClear(std::vector<double> outputs) {
   std::ranges::sort(outputs, std::greater());

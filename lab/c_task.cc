@@ -111,8 +111,7 @@ CTask CTaskOf(const LoadedPolicy& loaded) {
 )c",
             4};
   }
-  throw BadInput(Concat(loaded.path.string(), ": the observations of the task ", loaded.task,
-                        " are not known to export"));
+  throw UnknownObservations(loaded);
 }
 
 }  // namespace upswing

@@ -1,6 +1,5 @@
 #include "lab/config.h"
 
-
 #include "core/error.h"
 #include "core/text.h"
 #include "io/file.h"

@@ -156,16 +156,13 @@ void CheckBins(const SacConfig& s, const std::string& place) {
 /// has no such setting.
 void CheckTask(Config& config, const std::string& where) {
   if (config.task == kDoublePendulum) return;
-  constexpr std::array<std::string_view, 5> kSections{"task", "plant", "disturbance", "randomize",
-                                                      "reward"};
   constexpr std::array<std::string_view, 3> kCurriculum{"start_noise", "start_noise_end",
                                                         "curriculum_steps"};
   Config defaults(config.algorithm);
   const Options now = OptionsOf(config), usual = OptionsOf(defaults);
   for (size_t i = 0; i < now.all().size(); ++i) {
     const Option& option = now.all()[i];
-    const bool of_pendulum = (option.name != "task" &&
-                              std::ranges::find(kSections, option.section) != kSections.end()) ||
+    const bool of_pendulum = (option.name != "task" && IsInEnvironmentSection(option)) ||
                              std::ranges::find(kCurriculum, option.name) != kCurriculum.end();
     if (!of_pendulum || option.text() == usual.all()[i].text()) continue;
     throw BadInput(Concat(
@@ -175,6 +172,12 @@ void CheckTask(Config& config, const std::string& where) {
 }
 
 }  // namespace
+
+bool IsInEnvironmentSection(const Option& option) {
+  constexpr std::array<std::string_view, 5> kSections{"task", "plant", "disturbance", "randomize",
+                                                      "reward"};
+  return std::ranges::find(kSections, option.section) != kSections.end();
+}
 
 void CheckSettings(Config& config, const std::string& where) {
   const std::string place = where.empty() ? "" : where + ": ";

@@ -91,12 +91,6 @@ void CheckTorques(std::span<const double> torques, const std::string& where) {
   }
 }
 
-double LargestSize(std::span<const double> values) {
-  double largest = 0;
-  for (const double value : values) largest = std::max(largest, std::abs(value));
-  return largest;
-}
-
 /// The observation of the double pendulum (Observe of sim/double_pendulum.h).
 std::vector<NamedInput> PendulumInputs(int memory) {
   const auto over = [](double scale, const char* unit) {
@@ -138,8 +132,7 @@ std::vector<NamedInput> InputsOf(const LoadedPolicy& loaded) {
             {"omega1", "velocity of theta1, rad/s"},
             {"omega2", "velocity of theta2, rad/s"}};
   }
-  throw BadInput(Concat(loaded.path.string(), ": the observations of the task ", loaded.task,
-                        " are not known to export"));
+  throw UnknownObservations(loaded);
 }
 
 PolicyOutputKind KindOf(ActorOutput output) {
@@ -154,6 +147,17 @@ PolicyOutputKind KindOf(ActorOutput output) {
 }
 
 }  // namespace
+
+double LargestSize(std::span<const double> values) {
+  double largest = 0;
+  for (const double value : values) largest = std::max(largest, std::abs(value));
+  return largest;
+}
+
+Error UnknownObservations(const LoadedPolicy& loaded) {
+  return BadInput(Concat(loaded.path.string(), ": the observations of the task ", loaded.task,
+                         " are not known to export"));
+}
 
 bool ExportedPolicy::critic_takes_action() const {
   return has_critic() && critic.features.front().in > obs_size();

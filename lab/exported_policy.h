@@ -1,9 +1,11 @@
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
 #include "core/env.h"
+#include "core/error.h"
 #include "lab/loaded_policy.h"
 #include "nn/layer.h"
 
@@ -58,6 +60,12 @@ struct ExportedPolicy {
   bool critic_takes_action() const;
   int obs_size() const { return network.features.front().in; }
 };
+
+/// The largest size of some numbers; 0 of none.
+double LargestSize(std::span<const double> values);
+
+/// That the observations of a policy's task cannot be told elsewhere.
+Error UnknownObservations(const LoadedPolicy& loaded);
 
 /// Takes a policy apart, which has to outlive the result. Throws BadInput, with the path, if it is
 /// none that was learned, or if its torques are beyond float.

@@ -96,6 +96,10 @@ RolloutRow Episode::Step(bool motor) {
   return row;
 }
 
+Error StateBlewUp(const RolloutRow& row) {
+  return Failure(Concat("the state blew up numerically after t = ", FormatNumber(row.t), " s"));
+}
+
 Rollout RunRollout(const RolloutConfig& config) {
   Episode episode(config);
   Rollout rollout{episode.spec(), {}, Plant(), Disturbance()};
@@ -108,8 +112,7 @@ Rollout RunRollout(const RolloutConfig& config) {
   for (int64_t k = 0; k <= steps; ++k) {
     rollout.rows.push_back(episode.Step());
     if (episode.pendulum() != nullptr && episode.terminated() && k < steps) {
-      throw Failure(Concat(
-          "the state blew up numerically after t = ", FormatNumber(rollout.rows.back().t), " s"));
+      throw StateBlewUp(rollout.rows.back());
     }
     if (episode.terminated() || episode.truncated()) break;
   }

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/error.h"
 #include "core/policy.h"
 #include "core/sample.h"
 #include "lab/task.h"
@@ -77,6 +78,9 @@ class Episode {
   std::unique_ptr<Policy::Memory> memory_;
   size_t step_ = 0;
 };
+
+/// That a state is no longer finite after the step of this row.
+Error StateBlewUp(const RolloutRow& row);
 
 /// How many control steps so many seconds are, to the nearest.
 int64_t RolloutSteps(const EnvSpec& spec, double seconds);

@@ -73,10 +73,7 @@ void ViewEpisode::Step(bool motor, const std::array<double, 2>& push) {
   if (push != before) env().Push(0, push);
   rows_.push_back(episode_->Step(motor));
   inputs_.push_back({motor, push});
-  if (episode_->terminated()) {
-    throw Failure(
-        Concat("the state blew up numerically after t = ", FormatNumber(rows_.back().t), " s"));
-  }
+  if (episode_->terminated()) throw StateBlewUp(rows_.back());
 }
 
 void ViewEpisode::GoBack(int64_t steps) {

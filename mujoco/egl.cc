@@ -35,7 +35,6 @@ class Egl {
   decltype(static_cast<Handle (*)(const char*)>(nullptr)) eglGetProcAddress;
   uint32_t (*eglInitialize)(Handle display, Int* major, Int* minor);
   uint32_t (*eglBindAPI)(uint32_t api);
-  uint32_t (*eglQueryAPI)();
   uint32_t (*eglChooseConfig)(Handle display, const Int* wanted, Handle* configs, Int size,
                               Int* count);
   Handle (*eglCreateContext)(Handle display, Handle config, Handle share, const Int* wanted);
@@ -66,7 +65,6 @@ class Egl {
     Load(eglGetProcAddress, "eglGetProcAddress");
     Load(eglInitialize, "eglInitialize");
     Load(eglBindAPI, "eglBindAPI");
-    Load(eglQueryAPI, "eglQueryAPI");
     Load(eglChooseConfig, "eglChooseConfig");
     Load(eglCreateContext, "eglCreateContext");
     Load(eglDestroyContext, "eglDestroyContext");

@@ -54,6 +54,7 @@ struct Squashed {
   T log_prob = 0;             // ln π(a) = ln N(u) - ln(1 - a²)
 };
 
+/// Its definition; SquashSamples of linear.h is the same for many at once.
 template <typename T>
 Squashed<T> Squash(const Gaussian<T>& policy, T epsilon) {
   // One e = exp(-2 |u|) serves tanh(|u|) = (1 - e) / (1 + e) and ln(1 - a²).

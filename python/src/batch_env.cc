@@ -51,11 +51,16 @@ std::span<const float> BatchEnv::obs() const {
 
 std::span<const float> BatchEnv::final_obs() const { return result_.next_obs; }
 
+void BatchEnv::ShowStart(int env) {
+  const auto obs = env_->obs();
+  std::ranges::copy(obs.row(env),
+                    Matrix<float>(result_.next_obs, obs.rows(), obs.cols()).row(env).begin());
+}
+
 void BatchEnv::ShowStarts() { std::ranges::copy(env_->obs().values(), result_.next_obs.begin()); }
 
 void BatchEnv::Reset(std::span<const std::optional<uint64_t>> seeds,
                      std::span<const uint8_t> mask) {
-  const auto obs = env_->obs();
   for (size_t i = 0; i < mask.size(); ++i) {
     if (mask[i] == 0) continue;
     const int env = static_cast<int>(i);
@@ -63,8 +68,7 @@ void BatchEnv::Reset(std::span<const std::optional<uint64_t>> seeds,
     const bool begun = std::erase(ended_, env) > 0;
     if (!begun || seeds[i]) env_->Restart(env, seeds[i]);
     result_.torque[i] = 0;  // none acts yet
-    std::ranges::copy(obs.row(env),
-                      Matrix<float>(result_.next_obs, obs.rows(), obs.cols()).row(env).begin());
+    ShowStart(env);
   }
 }
 
@@ -75,9 +79,7 @@ void BatchEnv::SetState(int env, std::span<const double> state) {
     throw BadInput(Concat("state: expected a finite ", names[k], ", got ", state[k]));
   }
   env_->SetState(env, state);
-  const auto obs = env_->obs();
-  std::ranges::copy(obs.row(env),
-                    Matrix<float>(result_.next_obs, obs.rows(), obs.cols()).row(env).begin());
+  ShowStart(env);
 }
 
 template <typename Number>

@@ -61,6 +61,8 @@ class BatchEnv {
   void Step();
   /// Lets the present observations be those of the last step.
   void ShowStarts();
+  /// The same of one environment.
+  void ShowStart(int env);
 
   Config config_;
   Autoreset autoreset_;

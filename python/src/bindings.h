@@ -25,6 +25,9 @@ using SettingTexts = std::vector<std::pair<std::string, std::string>>;
 /// name.
 std::vector<FlagValue> FlagsOf(const SettingTexts& settings);
 
+/// A plant's values by name.
+nanobind::dict PlantDict(const Plant& plant);
+
 /// A policy and memories to act with, one for each call that runs at a time.
 class PolicyHandle {
  public:
@@ -50,13 +53,14 @@ class PolicyHandle {
   std::map<int, std::vector<std::unique_ptr<Policy::Memory>>> free_;
 };
 
-/// Lets Python's signals, such as that of Ctrl-C, end long work: to be called now and then without
-/// the interpreter's lock. Acts in the thread that made it alone.
+/// Throws the Python exception of a signal that has come, such as that of Ctrl-C. Needs the
+/// interpreter's lock.
+void CheckSignals();
+
+/// When long work is to let Python in: now and then, in the thread that made this alone.
 class Interrupts {
  public:
-  /// Throws the Python exception of a signal that has come.
-  void Check();
-  /// Whether this is the thread that made it, and its last turn is a while ago.
+  /// Whether this is that thread, and its last turn is a while ago.
   bool due();
 
  private:

@@ -6,16 +6,14 @@
 
 #include "core/error.h"
 #include "core/text.h"
+#include "lab/config_checks.h"
 
 namespace upswing {
 
 bool IsEnvironmentSetting(const Option& option) {
-  constexpr std::array<std::string_view, 5> kSections{"task", "plant", "disturbance", "randomize",
-                                                      "reward"};
   constexpr std::array<std::string_view, 4> kMore{"agent", "envs", "threads", "start_noise"};
   if (option.name == "task" || option.name == "eval_physics") return false;
-  return std::ranges::find(kSections, option.section) != kSections.end() ||
-         std::ranges::find(kMore, option.name) != kMore.end();
+  return IsInEnvironmentSection(option) || std::ranges::find(kMore, option.name) != kMore.end();
 }
 
 Config EnvironmentConfig(const std::vector<FlagValue>& flags) {

@@ -189,14 +189,7 @@ void BindEnvironments(nb::module_& m) {
       .def("get_state", &Environments::State, nb::arg("env"))
       .def("set_state", &Environments::SetState, nb::arg("env"), nb::arg("state"))
       .def(
-          "plant",
-          [](Environments& self, int env) {
-            nb::dict d;
-            for (const auto& [name, value] : PlantValues(self.PlantOf(env))) {
-              d[name.c_str()] = value;
-            }
-            return d;
-          },
+          "plant", [](Environments& self, int env) { return PlantDict(self.PlantOf(env)); },
           nb::arg("env"));
   AddView<float>(c, "obs", true, [](const BatchEnv& e) { return e.obs(); });
   AddView<float>(c, "final_obs", true, [](const BatchEnv& e) { return e.final_obs(); });

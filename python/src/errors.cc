@@ -54,9 +54,7 @@ bool Interrupts::due() {
   return true;
 }
 
-void Interrupts::Check() {
-  if (!due()) return;
-  const nb::gil_scoped_acquire lock;
+void CheckSignals() {
   if (PyErr_CheckSignals() != 0) throw nb::python_error();
 }
 

@@ -4,8 +4,6 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
-#include <mutex>
-
 #include "core/error.h"
 #include "core/text.h"
 #include "io/file.h"
@@ -35,7 +33,7 @@ class Told {
   void operator()(double share) {
     if (!interrupts_.due()) return;
     const nb::gil_scoped_acquire lock;
-    if (PyErr_CheckSignals() != 0) throw nb::python_error();
+    CheckSignals();
     if (!function_.is_none()) function_(share);
   }
 

@@ -88,11 +88,7 @@ nb::dict DescribeInfo(const PolicyHandle& self) {
   d["control_period"] = info.control_period;
   d["gamma"] = info.gamma;
   d["reward_scale"] = info.reward_scale;
-  nb::dict plant;
-  if (self.loaded().task == kDoublePendulum) {
-    for (const auto& [name, value] : PlantValues(self.loaded().plant)) plant[name.c_str()] = value;
-  }
-  d["plant"] = plant;
+  d["plant"] = self.loaded().task == kDoublePendulum ? PlantDict(self.loaded().plant) : nb::dict();
   return d;
 }
 
@@ -100,9 +96,7 @@ std::shared_ptr<PolicyHandle> Load(const std::string& name, const SettingTexts& 
                                    const std::vector<std::string>& made_for) {
   PolicyArguments arguments;
   arguments.name = name;
-  for (const auto& [key, text] : settings) {
-    arguments.flags.push_back({key, text, Printable(key)});
-  }
+  arguments.flags = FlagsOf(settings);
   arguments.made_for = made_for;
   const nb::gil_scoped_release unlocked;
   return std::make_shared<PolicyHandle>(GetPolicy(arguments));

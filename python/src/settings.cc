@@ -79,6 +79,12 @@ nb::tuple SettingsOfTrial() {
 
 }  // namespace
 
+nb::dict PlantDict(const Plant& plant) {
+  nb::dict d;
+  for (const auto& [name, value] : PlantValues(plant)) d[name.c_str()] = value;
+  return d;
+}
+
 std::vector<FlagValue> FlagsOf(const SettingTexts& settings) {
   Config scratch;
   const Options every = EverySetting(scratch);

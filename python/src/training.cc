@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <memory>
-#include <optional>
 #include <string_view>
 
 #include "core/safetensors.h"
@@ -88,7 +87,7 @@ class PythonDriver final : public TrainingRun::Driver {
  private:
   bool Tell(const TrainState& s) {
     const nb::gil_scoped_acquire lock;
-    if (PyErr_CheckSignals() != 0) throw nb::python_error();
+    CheckSignals();
     nb::list events;
     for (const auto& [kind, row] : events_) {
       events.append(nb::make_tuple(kind, kind == "best" ? nb::cast(best_) : ToDict(row)));

@@ -14,6 +14,7 @@ import numpy as np
 from gymnasium.utils.env_checker import check_env
 
 import upswing
+from testing import BadInputTest
 
 ID = "upswing/DoublePendulum-v0"
 
@@ -202,13 +203,7 @@ class Rendering(unittest.TestCase):
             self.draw([0] * 4, width=1)
 
 
-class BadInput(unittest.TestCase):
-    def refuse(self, what, call):
-        with self.assertRaises(upswing.InputError) as caught:
-            call()
-        self.assertIn(what, str(caught.exception))
-        self.assertNotIn("\n", str(caught.exception))
-
+class BadInput(BadInputTest):
     def test_actions(self):
         env = gym.make(ID).unwrapped
         env.reset(seed=0)

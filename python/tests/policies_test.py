@@ -15,6 +15,7 @@ import gymnasium as gym
 import numpy as np
 
 import upswing
+from testing import BadInputTest
 
 ROOT = Path(os.environ["UPSWING_ROOT"])
 AGENTS = ROOT / "web/public/agents"
@@ -130,13 +131,7 @@ class Policies(unittest.TestCase):
         self.assertEqual(wrong, [])
 
 
-class BadInput(unittest.TestCase):
-    def refuse(self, what, call):
-        with self.assertRaises(upswing.InputError) as caught:
-            call()
-        self.assertIn(what, str(caught.exception))
-        self.assertNotIn("\n", str(caught.exception))
-
+class BadInput(BadInputTest):
     def test_files(self):
         self.refuse("no such file", lambda: upswing.load_policy("nothing.safetensors"))
         self.refuse("did you mean lqr?", lambda: upswing.load_policy("lqrr"))
