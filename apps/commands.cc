@@ -37,9 +37,9 @@ void AddFlag(CLI::App& app, const Option& option, const std::string& group, cons
 
 }  // namespace
 
-CLI::Validator NotEmpty() {
-  return {[](const std::string& path) -> std::string {
-            return path.empty() ? "expected a path, got an empty text" : "";
+CLI::Validator NotEmpty(const std::string& what) {
+  return {[what](const std::string& text) -> std::string {
+            return text.empty() ? Concat("expected ", what, ", got an empty text") : "";
           },
           ""};
 }

@@ -28,8 +28,8 @@ void AddExport(CLI::App& program, Command& command);
 void AddView(CLI::App& program, Command& command);
 void AddBench(CLI::App& program, Command& command);
 
-/// Refuses an empty path, such as that of a shell variable that is not set.
-CLI::Validator NotEmpty();
+/// Refuses an empty text, such as that of a shell variable that is not set, for `what` is expected.
+CLI::Validator NotEmpty(const std::string& what = "a path");
 
 /// Adds a flag for each of a command's own arguments, which sets it at once; see Option::Set.
 void AddArguments(CLI::App& app, const Options& options);

@@ -56,7 +56,12 @@ LoadedPolicy SinglePolicy(const ExportArguments& a, const char* flag) {
 
 int ExportOnnx(const ExportArguments& a) {
   const LoadedPolicy loaded = SinglePolicy(a, "--onnx");
-  WriteOutput(a.onnx, OnnxModelOf(loaded));
+  const std::string model = OnnxModelOf(loaded);
+  WriteOutput(a.onnx, model);
+  if (!IsStandardStream(a.onnx)) {
+    fmt::print("{} ({} KB), {}\n", Printable(a.onnx), model.size() / 1024,
+               loaded.policy->description());
+  }
   return 0;
 }
 
@@ -122,14 +127,14 @@ void AddExport(CLI::App& program, Command& command) {
   app->add_option("--prefix", a->prefix,
                   "with which all names in the C header begin [name of the file]")
       ->type_name("NAME")
-      ->check(NotEmpty());
+      ->check(NotEmpty("a name"));
   app->add_option("--page", a->page,
                   "the page's folder of agents; one of the same ID is replaced there")
       ->type_name("FOLDER")
       ->check(NotEmpty());
   app->add_option("--id", a->id, "ID in the page, of a single policy [name of the run, or agent]")
       ->type_name("ID")
-      ->check(NotEmpty());
+      ->check(NotEmpty("an ID"));
   app->add_option("--test-vectors", a->test_vectors,
                   "JSON file to write: states, and what the task's formulas make of them; -: "
                   "standard output")

@@ -53,7 +53,7 @@ def what_the_program_says(policy, obs):
 class OnnxTest(ProgramTest):
     def export(self, policy):
         """Exports and checks; returns the model and the outputs for the observations."""
-        self.assertEqual(self.succeed("export", policy, "--onnx", "policy.onnx"), "")
+        self.assertIn("policy.onnx (", self.succeed("export", policy, "--onnx", "policy.onnx"))
         model = onnx.load(self.folder / "policy.onnx")
         onnx.checker.check_model(model, full_check=True)
         self.assertEqual([(opset.domain, opset.version) for opset in model.opset_import],

@@ -25,6 +25,15 @@ size_t EditDistance(std::string_view a, std::string_view b) {
   return row.back();
 }
 
+/// How many characters two words have in common at the beginning and at the end.
+size_t CommonEnds(std::string_view a, std::string_view b) {
+  const size_t shorter = std::min(a.size(), b.size());
+  const auto front = static_cast<size_t>(std::ranges::mismatch(a, b).in1 - a.begin());
+  size_t back = 0;
+  while (back < shorter - front && a[a.size() - 1 - back] == b[b.size() - 1 - back]) ++back;
+  return front + back;
+}
+
 template <typename T>
 std::optional<T> ParseWhole(std::string_view text) {
   T value{};
@@ -170,7 +179,8 @@ std::string ShellQuoted(std::string_view text) {
 std::string DidYouMean(std::string_view word, const std::vector<std::string>& names) {
   const auto nearest =
       std::min_element(names.begin(), names.end(), [&](const std::string& a, const std::string& b) {
-        return EditDistance(word, a) < EditDistance(word, b);
+        const size_t to_a = EditDistance(word, a), to_b = EditDistance(word, b);
+        return to_a != to_b ? to_a < to_b : CommonEnds(word, a) > CommonEnds(word, b);
       });
   if (nearest == names.end()) return "";
   const size_t tolerance = std::max<size_t>(2, word.size() / 3);

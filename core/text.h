@@ -49,7 +49,8 @@ std::string Printable(std::string_view text);
 /// quotes. Control characters are kept, so a command with them is not fit to be printed.
 std::string ShellQuoted(std::string_view text);
 
-/// " (did you mean NAME?)" for the name nearest to `word` in edit distance, "" if none is near.
+/// " (did you mean NAME?)" for the name nearest to `word` in edit distance, among equals the
+/// one that begins and ends most as it does; "" if none is near.
 std::string DidYouMean(std::string_view word, const std::vector<std::string>& names);
 
 }  // namespace upswing

@@ -1,5 +1,6 @@
 #include "lab/eval_report.h"
 
+#include <algorithm>
 #include <numbers>
 
 #include "core/json.h"
@@ -87,6 +88,26 @@ std::vector<std::pair<std::string, std::string>> Cells(const EvalReport& report,
   return cells;
 }
 
+/// Judges the episodes first, first + 1, … of the environments of `config`, which says how many.
+void JudgeEpisodes(const Policy& policy, const EnvConfig& config,
+                   const std::function<void(double)>& progress, EvalReport& report) {
+  const std::unique_ptr<VectorEnv> env = MakeEnv(config);
+  const auto first = report.episodes.size();
+  const auto* pendulum = dynamic_cast<const PendulumEnv*>(env.get());
+  for (int i = 0; i < config.num_envs; ++i) {
+    JudgedEpisode& episode = report.episodes.emplace_back();
+    episode.start.resize(report.spec.state_names.size());
+    env->GetState(i, episode.start);
+    if (pendulum == nullptr) continue;
+    episode.plant = pendulum->plant(i);
+    episode.disturbance = pendulum->disturbance(i);
+  }
+  std::vector<EvaluationEpisode> results = EvaluateEpisodes(policy, *env, config.pool, progress);
+  for (size_t i = 0; i < results.size(); ++i) {
+    report.episodes[first + i].result = std::move(results[i]);
+  }
+}
+
 }  // namespace
 
 EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& trial, int64_t episodes,
@@ -97,23 +118,26 @@ EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& tria
   report.env = TrialEnvironments(trial, &loaded);
   report.model = InfoOfModel(report.env.mjcf, trial.model);
   report.env.num_envs = static_cast<int>(episodes);
+  report.spec = SpecOf(report.env);
   report.knows_values = ValueUnitsOf(*loaded.policy).gamma > 0;
-  EnvConfig config = report.env;
-  config.pool = &pool;
-  const std::unique_ptr<VectorEnv> env = MakeEnv(config);
-  report.spec = env->spec();
-  const auto* pendulum = dynamic_cast<const PendulumEnv*>(env.get());
-  for (int i = 0; i < config.num_envs; ++i) {
-    JudgedEpisode& episode = report.episodes.emplace_back();
-    episode.start.resize(report.spec.state_names.size());
-    env->GetState(i, episode.start);
-    if (pendulum == nullptr) continue;
-    episode.plant = pendulum->plant(i);
-    episode.disturbance = pendulum->disturbance(i);
+  constexpr int64_t kAtOnce = 4096;
+  for (int64_t done = 0; done < episodes; done += kAtOnce) {
+    EnvConfig config = report.env;
+    config.pool = &pool;
+    config.first_index += static_cast<uint64_t>(done);
+    config.num_envs = static_cast<int>(std::min(kAtOnce, episodes - done));
+    JudgeEpisodes(
+        *loaded.policy, config,
+        [&](double share) {
+          if (!progress) return;
+          progress((static_cast<double>(done) + share * config.num_envs) /
+                   static_cast<double>(episodes));
+        },
+        report);
   }
-  std::vector<EvaluationEpisode> results = EvaluateEpisodes(*loaded.policy, *env, &pool, progress);
+  std::vector<EvaluationEpisode> results;
+  for (const JudgedEpisode& episode : report.episodes) results.push_back(episode.result);
   report.figures = Summarize(results, report.spec.evaluation);
-  for (size_t i = 0; i < results.size(); ++i) report.episodes[i].result = std::move(results[i]);
   return report;
 }
 

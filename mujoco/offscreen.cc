@@ -9,9 +9,7 @@
 #include "mujoco/painter.h"
 
 namespace upswing {
-namespace {
-
-PictureSize Checked(PictureSize size) {
+PictureSize CheckedSize(PictureSize size) {
   for (const int pixels : {size.width, size.height}) {
     if (pixels < kLeastPixels || pixels > kMostPixels) {
       throw BadInput(Concat("picture: expected a width and a height of ", kLeastPixels, " to ",
@@ -20,8 +18,6 @@ PictureSize Checked(PictureSize size) {
   }
   return size;
 }
-
-}  // namespace
 
 struct Offscreen::Graphics {
   EglContext context;
@@ -43,7 +39,7 @@ struct Offscreen::Graphics {
 };
 
 Offscreen::Offscreen(PictureSize size)
-    : size_(Checked(size)), graphics_(std::make_unique<Graphics>(size)) {
+    : size_(CheckedSize(size)), graphics_(std::make_unique<Graphics>(size)) {
   rows_.resize(static_cast<size_t>(size_.width) * static_cast<size_t>(size_.height) * 3);
   pixels_.resize(rows_.size());
 }

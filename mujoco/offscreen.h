@@ -20,6 +20,9 @@ struct PictureSize {
   int width = 640, height = 480;
 };
 
+/// The size; throws BadInput if it is out of range.
+PictureSize CheckedSize(PictureSize size);
+
 /// Pictures without a window: MuJoCo's own rendering over EGL, which is loaded at run time. Any
 /// thread may use it, one at a time; several of these do not disturb each other.
 class Offscreen {

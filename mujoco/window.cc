@@ -105,7 +105,7 @@ struct Window::Impl {
 
   void Open(const std::string& title, PictureSize size, int samples) {
     glfwWindowHint(GLFW_SAMPLES, samples);
-    window = glfwCreateWindow(size.width, size.height, title.c_str(), nullptr, nullptr);
+    window = glfwCreateWindow(size.width, size.height, Printable(title).c_str(), nullptr, nullptr);
     if (window == nullptr) throw NoWindow();
     glfwMakeContextCurrent(window);
   }
@@ -229,7 +229,7 @@ Window::~Window() = default;
 
 bool Window::closed() const { return glfwWindowShouldClose(impl_->window) != 0; }
 void Window::SetTitle(const std::string& title) {
-  glfwSetWindowTitle(impl_->window, title.c_str());
+  glfwSetWindowTitle(impl_->window, Printable(title).c_str());
 }
 PictureSize Window::size() const { return impl_->Pixels(); }
 

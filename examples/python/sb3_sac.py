@@ -3,9 +3,12 @@
 
     ./upswing python examples/python/sb3_sac.py --threads 1
 
+Its settings are those of our agent sac-fast as far as it has them: one critic, three-step targets,
+layer normalisation, a learning rate that falls.
+
 Every so many steps our `evaluate` judges its mean action as it judges our own agents: 100 episodes of
 20 s, in the closed form first and in MuJoCo once they all succeed. Two passed evaluations in a row
-solve the task. Its settings are those of our agent sac-fast, as far as it has them.
+solve the task.
 """
 
 import argparse
@@ -17,6 +20,13 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 import upswing
 from sb3_env import UpswingVecEnv
+
+
+class NormedReLU(torch.nn.Module):
+    """A layer's outputs scaled to mean 0 and variance 1 over its units, then ReLU."""
+
+    def forward(self, x):
+        return torch.relu(torch.nn.functional.layer_norm(x, x.shape[-1:]))
 
 
 class Judge(BaseCallback):
@@ -57,17 +67,19 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--threads", type=int, default=1, help="of PyTorch and the environments")
     parser.add_argument("--envs", type=int, default=32)
-    parser.add_argument("--updates", type=int, default=8, help="gradient steps for each lock-step")
-    parser.add_argument("--steps", type=int, default=1_000_000, help="at most")
+    parser.add_argument("--updates", type=int, default=4, help="gradient steps for each lock-step")
+    parser.add_argument("--steps", type=int, default=250_000, help="at most; the learning rate falls until then")
     parser.add_argument("--eval-every", type=int, default=10_000, help="steps")
     parser.add_argument("--save", help="file for Stable-Baselines3's model")
     a = parser.parse_args()
     torch.set_num_threads(a.threads)
     envs = UpswingVecEnv(a.envs, reward_scale=0.1, agent="sac-fast", threads=a.threads)
     model = SAC("MlpPolicy", envs, seed=a.seed, device="cpu", gamma=0.98, tau=0.01,
-                learning_rate=1e-3, batch_size=256, buffer_size=100_000, learning_starts=2_000,
-                train_freq=1, gradient_steps=a.updates,
-                policy_kwargs={"net_arch": [64, 64]})
+                learning_rate=lambda left: 2e-5 * 150 ** left,  # 3e-3 at first
+                batch_size=128, buffer_size=100_000, learning_starts=2_000, train_freq=1,
+                gradient_steps=a.updates, n_steps=3,
+                policy_kwargs={"net_arch": [64, 64], "n_critics": 1,
+                               "activation_fn": NormedReLU})
     judge = Judge(a.eval_every)
     model.learn(a.steps, callback=judge)
     print("solved" if judge.streak == 2 else "not solved")

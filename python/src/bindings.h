@@ -4,7 +4,6 @@
 #include <nanobind/stl/shared_ptr.h>
 
 #include <chrono>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -39,18 +38,23 @@ class PolicyHandle {
   /// Calls `work` with a memory for `n` environments.
   template <typename Work>
   void WithMemory(int n, const Work& work) {
-    std::unique_ptr<Policy::Memory> memory = Take(n);
-    work(*memory);
-    const std::lock_guard lock(mutex_);
-    free_[n].push_back(std::move(memory));
+    SizedMemory memory = Take(n);
+    work(*memory.memory);
+    Keep(std::move(memory));
   }
 
  private:
-  std::unique_ptr<Policy::Memory> Take(int n);
+  struct SizedMemory {
+    int num_envs;
+    std::unique_ptr<Policy::Memory> memory;
+  };
+  SizedMemory Take(int n);
+  /// For later calls, unless there are many.
+  void Keep(SizedMemory memory);
 
   LoadedPolicy loaded_;
   std::mutex mutex_;
-  std::map<int, std::vector<std::unique_ptr<Policy::Memory>>> free_;
+  std::vector<SizedMemory> free_;  // the longest unused first
 };
 
 /// Throws the Python exception of a signal that has come, such as that of Ctrl-C. Needs the

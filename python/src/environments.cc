@@ -191,6 +191,15 @@ void BindEnvironments(nb::module_& m) {
       .def(
           "plant", [](Environments& self, int env) { return PlantDict(self.PlantOf(env)); },
           nb::arg("env"));
+  m.def(
+      "check_picture_size",
+      [](int64_t width, int64_t height) {
+        const auto clamp = [](int64_t n) {
+          return static_cast<int>(std::clamp<int64_t>(n, 0, 1000000));
+        };
+        CheckedSize({clamp(width), clamp(height)});
+      },
+      nb::arg("width"), nb::arg("height"));
   AddView<float>(c, "obs", true, [](const BatchEnv& e) { return e.obs(); });
   AddView<float>(c, "final_obs", true, [](const BatchEnv& e) { return e.final_obs(); });
   AddView<double>(c, "reward", false,

@@ -7,9 +7,11 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/error.h"
+#include "core/safetensors.h"
 #include "core/text.h"
 #include "io/tensor_file.h"
 #include "lab/config.h"
@@ -104,17 +106,24 @@ std::shared_ptr<PolicyHandle> Load(const std::string& name, const SettingTexts& 
 
 }  // namespace
 
-std::unique_ptr<Policy::Memory> PolicyHandle::Take(int n) {
+PolicyHandle::SizedMemory PolicyHandle::Take(int n) {
   {
     const std::lock_guard lock(mutex_);
-    std::vector<std::unique_ptr<Policy::Memory>>& free = free_[n];
-    if (!free.empty()) {
-      std::unique_ptr<Policy::Memory> memory = std::move(free.back());
-      free.pop_back();
+    const auto found = std::ranges::find(free_, n, &SizedMemory::num_envs);
+    if (found != free_.end()) {
+      SizedMemory memory = std::move(*found);
+      free_.erase(found);
       return memory;
     }
   }
-  return policy().Start(n);
+  return {n, policy().Start(n)};
+}
+
+void PolicyHandle::Keep(SizedMemory memory) {
+  constexpr size_t kMost = 8;
+  const std::lock_guard lock(mutex_);
+  free_.push_back(std::move(memory));
+  if (free_.size() > kMost) free_.erase(free_.begin());
 }
 
 void BindPolicies(nb::module_& m) {
@@ -129,6 +138,12 @@ void BindPolicies(nb::module_& m) {
             SaveTensors(self.policy().ToTensors(), path);
           },
           nb::arg("path"))
+      .def("to_bytes",
+           [](const PolicyHandle& self) {
+             const std::vector<std::byte> file =
+                 WriteSafetensors(self.policy().ToTensors()).Joined();
+             return nb::bytes(file.data(), file.size());
+           })
       .def_prop_ro("name", [](const PolicyHandle& self) { return self.loaded().name; })
       .def_prop_ro("kind", [](const PolicyHandle& self) { return self.policy().kind(); })
       .def_prop_ro("description",
@@ -147,6 +162,14 @@ void BindPolicies(nb::module_& m) {
       .def("value_actions", &ValueActions)
       .def("info", &DescribeInfo);
   m.def("load_policy", &Load, nb::arg("name"), nb::arg("settings"), nb::arg("made_for"));
+  m.def(
+      "policy_of_bytes",
+      [](const nb::bytes& file, const std::string& name) {
+        const auto* bytes = static_cast<const std::byte*>(file.data());
+        return std::make_shared<PolicyHandle>(
+            ReadPolicy(ReadSafetensors({bytes, bytes + file.size()}, name)));
+      },
+      nb::arg("file"), nb::arg("name"));
   m.def("controllers", &ControllerNames);
   m.def(
       "function_policy",

@@ -24,6 +24,12 @@ nb::object ValueOf(const Option& option) {
                     option.target);
 }
 
+std::vector<std::string> NamesOfAgents() {
+  std::vector<std::string> names;
+  for (const auto& [name, about] : NamedAgents()) names.push_back(name);
+  return names;
+}
+
 /// One setting as a dictionary.
 nb::dict Describe(const Option& option) {
   constexpr std::array kTypes{"bool", "int", "float", "str", "list[int]"};  // in Target's order
@@ -32,11 +38,16 @@ nb::dict Describe(const Option& option) {
   d["section"] = option.section;
   d["type"] = kTypes.at(option.target.index());
   d["default"] = ValueOf(option);
-  const bool number = option.target.index() == 1 || option.target.index() == 2;
-  d["low"] = number && std::isfinite(option.range.low) ? nb::cast(option.range.low) : nb::none();
-  d["high"] = number && std::isfinite(option.range.high) ? nb::cast(option.range.high) : nb::none();
+  const bool integer = option.target.index() == 1;
+  const bool number = integer || option.target.index() == 2;
+  const auto end = [&](double value) -> nb::object {
+    if (!number || !std::isfinite(value)) return nb::none();
+    return integer ? nb::cast(static_cast<int64_t>(value)) : nb::cast(value);
+  };
+  d["low"] = end(option.range.low);
+  d["high"] = end(option.range.high);
   d["step"] = option.step > 0 ? nb::cast(option.step) : nb::none();
-  d["choices"] = option.choices;
+  d["choices"] = option.name == "agent" ? NamesOfAgents() : option.choices;
   d["unit"] = option.unit;
   d["help"] = option.help;
   d["environment"] = IsEnvironmentSetting(option);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <memory>
 #include <string_view>
 
@@ -161,14 +162,18 @@ struct Driven {
   }
 };
 
+/// `about` hears of the settings before anything is written.
 Driven Make(const std::vector<FlagValue>& flags, const std::string& config_file,
-            const std::string& out, const std::string& resume, PythonDriver& driver) {
+            const std::string& out, const std::string& resume, PythonDriver& driver,
+            const std::function<void(const Config&)>& about) {
   Driven driven;
   if (!resume.empty()) {
     driven.run = TrainingRun::Resume(resume, flags);
+    about(driven.its().config());
     return driven;
   }
   Config config = BuildConfig(config_file, flags);
+  about(config);
   if (!out.empty()) {
     driven.run = TrainingRun::Make(out, std::move(config));
     return driven;
@@ -183,15 +188,16 @@ nb::dict Train(const SettingTexts& settings, const std::string& config, const st
                const std::string& resume, const nb::callable& tick, const nb::callable& warn) {
   const std::vector<FlagValue> flags = FlagsOf(settings);
   PythonDriver driver(tick);
+  const auto warn_about = [&](const Config& settings_now) {
+    const std::vector<std::string> lines = Warnings(settings_now);
+    const nb::gil_scoped_acquire lock;
+    for (const std::string& line : lines) warn(line);
+  };
   Driven driven;
-  {
-    const nb::gil_scoped_release unlocked;
-    driven = Make(flags, config, out, resume, driver);
-  }
-  for (const std::string& line : Warnings(driven.its().config())) warn(line);
   PolicyPointer last, best;
   {
     const nb::gil_scoped_release unlocked;
+    driven = Make(flags, config, out, resume, driver, warn_about);
     driven.Train(driver);
     if (driver.error()) std::rethrow_exception(driver.error());
     last = CopyOf(*driven.its().policy(), "the last policy of this training");

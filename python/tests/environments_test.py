@@ -4,6 +4,7 @@
 import csv
 import io
 import os
+import pickle
 import subprocess
 import threading
 import unittest
@@ -203,6 +204,17 @@ class Rendering(unittest.TestCase):
             self.draw([0] * 4, width=1)
 
 
+class Copies(unittest.TestCase):
+    def test_pickled_environments_are_made_again(self):
+        env = pickle.loads(pickle.dumps(upswing.DoublePendulumEnv(mass2=1.2, actions="levels")))
+        env.reset(seed=1)
+        self.assertEqual(env.plant["mass2"], 1.2)
+        self.assertEqual(len(env.torques), 9)
+        envs = pickle.loads(pickle.dumps(upswing.DoublePendulumVectorEnv(3, gravity=9)))
+        envs.reset(seed=1)
+        self.assertEqual([plant["gravity"] for plant in envs.plants], [9] * 3)
+
+
 class BadInput(BadInputTest):
     def test_actions(self):
         env = gym.make(ID).unwrapped
@@ -224,7 +236,12 @@ class BadInput(BadInputTest):
                 'gravty: no setting is called "gravty" (did you mean gravity?)': {"gravty": 1},
                 "gamma: expected a setting of an environment": {"gamma": 0.9},
                 "num_envs: expected": None,
-                'levels: expected an integer in [2, 1001], got "1"': {"levels": 1},
+                'levels: expected an integer in [2, 1001], got "1"':
+                    {"actions": "levels", "levels": 1},
+                "levels: expected actions=": {"levels": 5},
+                "threads: expected several environments": {"threads": 2},
+                "expected a width and a height": {"width": 1},
+                "height: expected an integer": {"height": 4.5},
                 "actions: expected one of continuous, levels": {"actions": "discrete"},
                 "delay: expected a multiple of 0.02": {"delay": 0.03},
                 'mass1: expected a number in [0.01, 100], got "nan"': {"mass1": np.nan},
@@ -241,6 +258,7 @@ class BadInput(BadInputTest):
     def test_resets(self):
         env = upswing.DoublePendulumEnv()
         self.refuse("options: expected state", lambda: env.reset(options={"low": 1}))
+        self.refuse("options: expected state", lambda: env.reset(options={"reset_mask": [True]}))
         self.refuse("state: expected q1, q2, w1, w2",
                     lambda: env.reset(options={"state": [1, 2, 3]}))
         self.refuse("state: expected finite", lambda: env.reset(options={"state": [np.nan] * 4}))

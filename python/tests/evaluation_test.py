@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 import upswing
+from testing import BadInputTest
 
 ROOT = Path(os.environ["UPSWING_ROOT"])
 POLICY = ROOT / "web/public/agents/d3qn.safetensors"
@@ -24,7 +25,7 @@ def program(*arguments):
                           encoding="utf-8", check=True).stdout
 
 
-class Evaluations(unittest.TestCase):
+class Evaluations(BadInputTest):
     def test_figures_are_the_programs(self):
         words = ["--episodes", 20, "--seed", 4, "--physics", "closed-form", "--set", "mass2=1.1",
                  "--sensor-noise", 0.01, "--delay", 0.02, "--randomize", 0.05]
@@ -68,6 +69,13 @@ class Evaluations(unittest.TestCase):
             with self.assertRaisesRegex(upswing.InputError, "memory: expected 0 to 100 steps"):
                 upswing.evaluate(remembering.act, memory=memory, episodes=3)
 
+    def test_an_episode_does_not_depend_on_how_many_there_are(self):
+        arguments = {"physics": "closed-form", "randomize": 0.1, "sensor_noise": 0.01}
+        many = upswing.evaluate("lqr", episodes=4100, **arguments).per_episode
+        for name, column in upswing.evaluate("lqr", episodes=20, **arguments).per_episode.items():
+            np.testing.assert_array_equal(many[name][:20], column)
+        self.assertEqual(len(set(many["q1"])), 4100)  # each has a start of its own
+
     def test_progress_and_exceptions(self):
         shares = []
         upswing.evaluate(POLICY, episodes=2000, physics="closed-form", progress=shares.append)
@@ -81,7 +89,7 @@ class Evaluations(unittest.TestCase):
             upswing.evaluate(broken, episodes=100, threads=2)
 
     def test_ctrl_c_ends_it(self):
-        for work in (lambda: upswing.evaluate(POLICY, episodes=100000, physics="closed-form"),
+        for work in (lambda: upswing.evaluate(POLICY, episodes=1000000, physics="closed-form"),
                      lambda: upswing.map(POLICY, "mass2=0.5:2:300", "mass1=0.5:2:300")):
             timer = threading.Timer(0.7, _thread.interrupt_main)
             timer.start()
@@ -100,16 +108,13 @@ class Evaluations(unittest.TestCase):
                 "mass2: expected a number in [0.01, 100]": {"mass2": "heavy"},
                 "delay: expected a multiple of 0.02": {"delay": 0.01},
                 "/nothing.xml": {"model": "/nothing.xml"}}.items():
-            with self.assertRaises(upswing.InputError) as caught:
-                upswing.evaluate(policy, **settings)
-            self.assertIn(what, str(caught.exception))
+            self.refuse(what, upswing.evaluate, policy, **settings)
         for what, function in {"for each of 1 observations, got 2": lambda obs: [1, 2],
                                "finite torques": lambda obs: [np.nan] * len(obs)}.items():
-            with self.assertRaises(upswing.InputError) as caught:
-                upswing.evaluate(function, episodes=1)
-            self.assertIn(what, str(caught.exception))
-        with self.assertRaises(upswing.InputError):
-            upswing.evaluate(3)
+            self.refuse(what, upswing.evaluate, function, episodes=1)
+        self.refuse("got int", upswing.evaluate, 3)
+        self.refuse("memory: expected it beside a function", upswing.evaluate, policy, memory=2)
+        self.refuse("memory: expected an integer", upswing.evaluate, policy, memory="2")
 
 
 class Maps(unittest.TestCase):

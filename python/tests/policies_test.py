@@ -5,6 +5,7 @@ import csv
 import hashlib
 import io
 import os
+import pickle
 import subprocess
 import tempfile
 import threading
@@ -129,6 +130,16 @@ class Policies(unittest.TestCase):
         for thread in threads:
             thread.join()
         self.assertEqual(wrong, [])
+
+
+class Copies(unittest.TestCase):
+    def test_pickled_policies_act_alike(self):
+        obs = np.random.default_rng(1).normal(size=(50, 8)).astype(np.float32)
+        for policy in (upswing.load_policy(AGENTS / "sac.safetensors"),
+                       upswing.load_policy("lqr", made_for={"mass2": 1.2}, lqr_torque=2)):
+            copy = pickle.loads(pickle.dumps(policy))
+            np.testing.assert_array_equal(copy.act(obs), policy.act(obs))
+            self.assertEqual(copy.info, policy.info)
 
 
 class BadInput(BadInputTest):

@@ -12,6 +12,7 @@ import tempfile
 import threading
 import time
 import tomllib
+import typing
 import unittest
 import warnings
 from pathlib import Path
@@ -19,6 +20,7 @@ from pathlib import Path
 import numpy as np
 
 import upswing
+from testing import BadInputTest
 
 # A training of a fraction of a second that evaluates twice.
 SMALL = {"hidden": [32], "head": 16, "steps": 4000, "eval_every": 2000, "eval_episodes": 4,
@@ -199,38 +201,39 @@ class Callbacks(InFolder):
             self.assertEqual(done.stdout, "")
 
 
-class BadInput(InFolder):
-    def refuse(self, what, *agent, **settings):
-        with self.assertRaises(upswing.InputError) as caught:
-            upswing.train(*agent, **settings)
-        self.assertIn(what, str(caught.exception))
-        self.assertNotIn("\n", str(caught.exception))
+class BadInput(InFolder, BadInputTest):
+    def refuse_training(self, what, *agent, **settings):
+        self.refuse(what, upswing.train, *agent, **settings)
 
     def test_settings(self):
-        self.refuse('gamma: expected a number in [0, 1], got "2"', gamma=2)
-        self.refuse('gama: no setting is called "gama" (did you mean gamma?)', gama=1)
-        self.refuse('agent: no agent is called "fsat" (did you mean fast?)', "fsat")
-        self.refuse('seed: expected an integer in [0, 9000000000000000], got "x"', seed="x")
-        self.refuse('hidden: expected a list of integers', hidden=[64, "x"])
-        self.refuse('double: expected', double=3)
-        self.refuse("batch: expected at most", "fast", replay=10)
-        self.refuse("epsilon", "sac", epsilon_end=0.1)
-        self.refuse("nothing.toml", config="nothing.toml")
-        self.refuse('steps: expected', steps=None)
+        self.refuse_training('gamma: expected a number in [0, 1], got "2"', gamma=2)
+        self.refuse_training('gama: no setting is called "gama" (did you mean gamma?)', gama=1)
+        self.refuse_training('agent: no agent is called "fsat" (did you mean fast?)', "fsat")
+        self.refuse_training('seed: expected an integer in [0, 9000000000000000], got "x"', seed="x")
+        self.refuse_training('hidden: expected a list of integers', hidden=[64, "x"])
+        self.refuse_training('double: expected', double=3)
+        self.refuse_training("batch: expected at most", "fast", replay=10)
+        self.refuse_training("epsilon", "sac", epsilon_end=0.1)
+        self.refuse_training("nothing.toml", config="nothing.toml")
+        self.refuse_training('steps: expected', steps=None)
 
     def test_folders(self):
         (self.path / "full").mkdir()
         (self.path / "full/file").write_text("mine")
-        self.refuse(str(self.path / "full"), out=self.path / "full", **SMALL)
+        self.refuse_training(str(self.path / "full"), out=self.path / "full", **SMALL)
         self.assertEqual(os.listdir(self.path / "full"), ["file"])
-        self.refuse("resume", resume=self.path / "nothing")
-        self.refuse("resume: takes settings and folder", resume="x", out="y")
-        self.refuse("out: expected a path, got an empty text", out="")
+        self.refuse_training("resume", resume=self.path / "nothing")
+        self.refuse_training("resume: takes settings and folder", resume="x", out="y")
+        self.refuse_training("out: expected a path, got an empty text", out="")
 
     def test_what_makes_no_sense_is_warned_of(self):
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             upswing.train("fast", **SMALL | {"learning_starts": 5000})
+            warnings.simplefilter("error")
+            with self.assertRaises(UserWarning):  # before anything is written
+                upswing.train("fast", out=self.path / "run", **SMALL | {"learning_starts": 5000})
+        self.assertFalse((self.path / "run").exists())
         self.assertEqual(len(caught), 1)
         self.assertIn("nothing will be learned", str(caught[0].message))
         self.assertEqual(caught[0].filename, __file__)
@@ -249,7 +252,9 @@ class Settings(unittest.TestCase):
         self.assertFalse(settings["gamma"].environment)
         self.assertEqual(settings["mass"].members, ["mass1", "mass2"])
         self.assertEqual(settings["physics"].choices, ["mujoco", "closed-form"])
-        self.assertIn("fast", upswing.agents())
+        self.assertEqual(settings["agent"].choices, list(upswing.agents()))
+        self.assertIsInstance(settings["batch"].high, int)
+        self.assertIn("seed", typing.get_type_hints(upswing.train))
 
 
 if __name__ == "__main__":

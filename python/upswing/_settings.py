@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import operator
 import os
 from typing import Any
 
@@ -72,6 +73,14 @@ def _by_name(options: list[dict[str, Any]], aliases: list[dict[str, Any]]) -> di
             first, name=alias["name"], section=alias["section"], help=alias["help"],
             members=alias["members"])
     return found
+
+
+def whole_number(name: str, value: Any) -> int:
+    """The value of an argument that is to be an integer."""
+    try:
+        return operator.index(value)
+    except TypeError:
+        raise _upswing.InputError(f"{name}: expected an integer, got {value!r}") from None
 
 
 def text_of(value: Any) -> str:

@@ -2,150 +2,23 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
-from gymnasium import spaces
+from gymnasium.utils import EzPickle
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
+from typing_extensions import Unpack
 
 from . import _upswing
-from ._settings import text_of, texts_of
-
-if TYPE_CHECKING:
-    from typing_extensions import Unpack
-
-    from ._types import EnvironmentSettings
-
-Floats = npt.NDArray[np.floating[Any]]
-Integers = npt.NDArray[np.integer[Any]]
+from ._environments import Core, check_render_mode, picture_size, seed_of
+from ._types import EnvironmentSettings
 
 
-class _Core:
-    """What one and many environments have in common."""
-
-    def __init__(self, num_envs: int, settings: dict[str, Any], actions: str, levels: int,
-                 same_step: bool) -> None:
-        if "envs" in settings:
-            raise _upswing.InputError("envs: expected num_envs instead")
-        self.env = _upswing.Environments(text_of(num_envs), texts_of(settings), actions,
-                                         text_of(levels), same_step)
-        spec = self.env.spec()
-        self.num_envs: int = spec["num_envs"]
-        self.step_seconds: float = spec["step_seconds"]
-        self.reward_terms: list[str] = spec["reward_terms"]
-        self.state_names: list[str] = spec["state_names"]
-        self.levels = np.array(spec["levels"])
-        self.settings: str = spec["settings"]
-        self.threads: int = spec["threads"]
-        self.is_reset = False
-        # cos, sin, w, cos, sin, w, energy, height; what a memory adds has no bounds either.
-        high = np.full(spec["obs_size"], np.inf, np.float32)
-        high[[0, 1, 3, 4, 7]] = 1
-        self.observation_space = spaces.Box(-high, high, dtype=np.float32)
-        limit = np.array(spec["action_limit"], np.float32)
-        self.action_space: spaces.Box | spaces.Discrete = (
-            spaces.Discrete(len(self.levels)) if len(self.levels) > 0
-            else spaces.Box(-limit, limit, dtype=np.float32))
-
-    def actions_of(self, actions: Any) -> npt.NDArray[Any]:
-        """An array as the C++ code takes it: float32 or float64 torques, int32 or int64 levels."""
-        array = np.asarray(actions)
-        kind = array.dtype.kind
-        if len(self.levels) > 0:
-            if kind not in "iu":
-                raise _upswing.InputError(
-                    f"action: expected whole numbers, torque levels from 0 to "
-                    f"{len(self.levels) - 1}, got {array.dtype}")
-            if array.dtype not in (np.int32, np.int64):
-                array = array.astype(np.int64)
-        elif array.dtype not in (np.float32, np.float64):
-            if kind != "f":
-                raise _upswing.InputError(
-                    f"action: expected torques in N·m as floating-point numbers, got {array.dtype} "
-                    "(or actions=\"levels\")")
-            array = array.astype(np.float32)
-        return np.ascontiguousarray(array) if array.ndim > 0 else array
-
-    def check(self, closed: bool) -> None:
-        """Raises unless a step can be made."""
-        if closed:
-            raise gym.error.ClosedEnvironmentError("step: the environment is closed")
-        if not self.is_reset:
-            raise gym.error.ResetNeeded("step: expected a call of reset before it")
-
-    def seeds_of(self, seed: Any, generator: np.random.Generator) -> list[int | None]:
-        """A seed for each environment: None goes on with its random stream."""
-        n = self.num_envs
-        if seed is None:
-            if self.is_reset:
-                return [None] * n
-            seed = int(generator.integers(2**53))
-        if isinstance(seed, (Sequence, np.ndarray)) and not isinstance(seed, str):
-            if len(seed) != n:
-                raise _upswing.InputError(f"seed: expected {n} seeds, got {len(seed)}")
-            fresh = iter([] if self.is_reset else generator.integers(2**53, size=n).tolist())
-            return [next(fresh, None) if one is None else _seed(one) for one in seed]
-        first = _seed(seed)
-        return [(first + i) % 2**64 for i in range(n)]
-
-    def begin(self, seeds: list[int | None], options: dict[str, Any] | None) -> None:
-        """Begins episodes."""
-        options = dict(options or {})
-        mask = options.pop("reset_mask", None)
-        states = options.pop("state", None)
-        if options:
-            raise _upswing.InputError(
-                f"options: expected state or reset_mask, got {', '.join(map(repr, options))}")
-        n = self.num_envs
-        if mask is None:
-            mask = np.ones(n, np.bool_)
-        else:
-            mask = np.asarray(mask)
-            if mask.shape != (n,) or mask.dtype != np.bool_ or not mask.any():
-                raise _upswing.InputError(
-                    f"reset_mask: expected {n} bools, one of them true at least, got {mask.dtype} "
-                    f"of shape {mask.shape}")
-            if not self.is_reset and not mask.all():
-                raise gym.error.ResetNeeded("reset_mask: expected a reset of all before it")
-        if states is not None:
-            size = len(self.state_names)
-            try:
-                states = np.asarray(states, np.float64)
-                if states.shape not in ((size,), (n, size)):
-                    raise ValueError
-                states = np.broadcast_to(states, (n, size))
-            except (ValueError, TypeError):
-                raise _upswing.InputError(
-                    f"state: expected {', '.join(self.state_names)} (rad, rad/s) of shape "
-                    f"({size},) or ({n}, {size}), got shape {np.shape(states)}") from None
-            if not np.isfinite(states[mask]).all():
-                raise _upswing.InputError("state: expected finite numbers")
-        self.env.reset(seeds, mask.astype(np.uint8).tolist())
-        if states is not None:
-            for i in np.flatnonzero(mask):
-                self.env.set_state(int(i), states[i].tolist())
-        self.is_reset = True
-
-    def states(self) -> npt.NDArray[np.float64]:
-        return np.array([self.env.get_state(i) for i in range(self.num_envs)])
-
-
-def _seed(seed: Any) -> int:
-    try:
-        number = operator.index(seed)
-    except TypeError:
-        raise _upswing.InputError(f"seed: expected an integer, got {seed!r}") from None
-    if not 0 <= number < 2**64:
-        raise _upswing.InputError(f"seed: expected an integer from 0 to 2^64 - 1, got {number}")
-    return number
-
-
-class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any]):
+class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
     """A double pendulum with a motor at its first joint, to be swung up and balanced.
 
     `gym.make("upswing/DoublePendulum-v0")` makes it. docs/task.md has it as formulas.
@@ -167,7 +40,7 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any]):
 
     Args:
         actions: "continuous" or "levels"
-        levels: how many torques there are with actions="levels"
+        levels: how many torques there are with actions="levels", 9 by default
         render_mode: "rgb_array" or None
         width, height: of pictures, pixels
         **settings: as those of trainings, with the same defaults (`upswing.settings()`, those with
@@ -185,15 +58,19 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any]):
         self,
         *,
         actions: str = "continuous",
-        levels: int = 9,
+        levels: int | None = None,
         render_mode: str | None = None,
         width: int = 640,
         height: int = 480,
         **settings: Unpack[EnvironmentSettings],
     ) -> None:
-        _check_render_mode(render_mode, self.metadata)
-        self._size = (int(width), int(height))
-        self._core = _Core(1, {"threads": 1, **settings}, actions, levels, False)
+        EzPickle.__init__(self, actions=actions, levels=levels, render_mode=render_mode,
+                          width=width, height=height, **settings)
+        check_render_mode(render_mode, self.metadata)
+        self._size = picture_size(width, height)
+        if "threads" in settings:
+            raise _upswing.InputError("threads: expected several environments (gym.make_vec)")
+        self._core = Core(1, {"threads": 1, **settings}, actions, levels, False)
         self.observation_space = self._core.observation_space
         self.action_space = self._core.action_space
         self.render_mode = render_mode
@@ -214,7 +91,9 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any]):
         """
         if self._closed:
             raise gym.error.ClosedEnvironmentError("reset: the environment is closed")
-        super().reset(seed=None if seed is None else _seed(seed))
+        if options and "reset_mask" in options:
+            raise _upswing.InputError("options: expected state, got 'reset_mask'")
+        super().reset(seed=None if seed is None else seed_of(seed))
         self._core.begin(self._core.seeds_of(seed, self.np_random), options)
         self._ended = False
         return self._core.env.obs[0].copy(), {}
@@ -287,7 +166,7 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any]):
         self._closed = True
 
 
-class DoublePendulumVectorEnv(VectorEnv[npt.NDArray[np.float32], Any, npt.NDArray[Any]]):
+class DoublePendulumVectorEnv(VectorEnv[npt.NDArray[np.float32], Any, npt.NDArray[Any]], EzPickle):
     """Many double pendulums (see `DoublePendulumEnv`), stepped together by the C++ code's threads.
 
     `gym.make_vec("upswing/DoublePendulum-v0", num_envs=1024)` makes it. Letters: N environments, D
@@ -319,7 +198,7 @@ class DoublePendulumVectorEnv(VectorEnv[npt.NDArray[np.float32], Any, npt.NDArra
         num_envs: int = 1,
         *,
         actions: str = "continuous",
-        levels: int = 9,
+        levels: int | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         copy: bool = True,
         render_mode: str | None = None,
@@ -327,12 +206,15 @@ class DoublePendulumVectorEnv(VectorEnv[npt.NDArray[np.float32], Any, npt.NDArra
         height: int = 480,
         **settings: Unpack[EnvironmentSettings],
     ) -> None:
-        _check_render_mode(render_mode, self.metadata)
-        self._size = (int(width), int(height))
+        EzPickle.__init__(self, num_envs, actions=actions, levels=levels,
+                          autoreset_mode=autoreset_mode, copy=copy, render_mode=render_mode,
+                          width=width, height=height, **settings)
+        check_render_mode(render_mode, self.metadata)
+        self._size = picture_size(width, height)
         mode = _autoreset_mode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": mode}
         self._same_step = mode == AutoresetMode.SAME_STEP
-        self._core = _Core(num_envs, dict(settings), actions, levels, self._same_step)
+        self._core = Core(num_envs, dict(settings), actions, levels, self._same_step)
         self.num_envs = self._core.num_envs
         self.render_mode = render_mode
         self._copy = copy
@@ -365,7 +247,7 @@ class DoublePendulumVectorEnv(VectorEnv[npt.NDArray[np.float32], Any, npt.NDArra
         """
         if self.closed:
             raise gym.error.ClosedEnvironmentError("reset: the environments are closed")
-        super().reset(seed=_seed(seed) if isinstance(seed, (int, np.integer)) else None)
+        super().reset(seed=seed_of(seed) if isinstance(seed, (int, np.integer)) else None)
         self._core.begin(self._core.seeds_of(seed, self.np_random), options)
         return (self._obs.copy() if self._copy else self._obs), {}
 
@@ -459,9 +341,3 @@ def _autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:
         raise _upswing.InputError(
             f"autoreset_mode: expected AutoresetMode.NEXT_STEP or SAME_STEP, got {mode!r}")
     return mode
-
-
-def _check_render_mode(mode: str | None, metadata: dict[str, Any]) -> None:
-    if mode is not None and mode not in metadata["render_modes"]:
-        raise _upswing.InputError(
-            f"render_mode: expected None or one of {metadata['render_modes']}, got {mode!r}")

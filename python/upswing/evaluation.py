@@ -7,19 +7,16 @@ import io
 import json
 import os
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import Unpack
 
 from . import _upswing
 from .policy import PolicyLike, handle_of
 from ._settings import texts_of
-
-if TYPE_CHECKING:
-    from typing_extensions import Unpack
-
-    from ._types import MapSettings, TrialSettings
+from ._types import MapSettings, TrialSettings
 
 
 class Evaluation(dict[str, Any]):
@@ -65,7 +62,7 @@ def evaluate(
     Args:
         policy: a `Policy`, the path of a file or a run folder, a controller's name, or a function:
             observations (N, D), float32 → torques (N,) or (N, 1), N·m, such as that of another
-            library's agent
+            library's agent; it may be called in any thread, one call at a time
         episodes: how many
         seed: of start states, noise and random plants
         physics: "mujoco" or "closed-form"
@@ -82,7 +79,7 @@ def evaluate(
     arguments = {"episodes": episodes, "seed": seed, "threads": threads, "physics": physics}
     figures, table = _upswing.evaluate(
         handle_of(policy, memory), texts_of(dict(settings)), texts_of(arguments),
-        "" if model is None else os.fspath(model), unknown_plant, progress)
+        "" if model is None else os.fspath(model), bool(unknown_plant), progress)
     return Evaluation(json.loads(figures), _columns(table))
 
 
@@ -162,5 +159,5 @@ def map(  # pylint: disable=redefined-builtin
         arguments["episodes"] = episodes
     figures, successes, swing_up_seconds = _upswing.map(
         handle_of(policy, memory), texts_of(dict(settings)), texts_of(arguments), x or "", y or "",
-        unknown_plant, "" if out is None else os.fspath(out), progress)
+        bool(unknown_plant), "" if out is None else os.fspath(out), progress)
     return Map(json.loads(figures), successes, swing_up_seconds)

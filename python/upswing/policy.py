@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _upswing
-from ._settings import text_of, texts_of
+from ._settings import text_of, texts_of, whole_number
 
 
 class Policy:
@@ -30,9 +30,10 @@ class Policy:
         info: what its file says of how it was made and for which plant; None where it says nothing
     """
 
-    def __init__(self, handle: _upswing.PolicyHandle) -> None:
+    def __init__(self, handle: _upswing.PolicyHandle, made_by: tuple[Any, ...] = ()) -> None:
         """Policies come from `load_policy` and `train`."""
         self._handle = handle
+        self._made_by = made_by  # of a controller: name, settings and plant
         self.name: str = handle.name
         self.kind: str = handle.kind
         self.description: str = handle.description
@@ -104,6 +105,11 @@ class Policy:
         """Writes it to a file as the program does (docs/policy-format.md)."""
         self._handle.save(os.fspath(path))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        if self._made_by:
+            return _load, self._made_by
+        return _of_bytes, (self._handle.to_bytes(), self.name)
+
     def _rows(self, obs: npt.ArrayLike) -> tuple[npt.NDArray[np.float32], bool]:
         """Observations (N, D), and whether there was one alone."""
         rows = np.ascontiguousarray(obs, np.float32)
@@ -135,15 +141,29 @@ def load_policy(
         InputError: there is no such policy, or the file is broken or for something else
     """
     changes = [f"{name}={text_of(value)}" for name, value in (made_for or {}).items()]
-    return Policy(_upswing.load_policy(os.fspath(path), texts_of(settings), changes))
+    return _load(os.fspath(path), texts_of(settings), changes)
+
+
+def _load(name: str, settings: list[tuple[str, str]], made_for: list[str]) -> Policy:
+    handle = _upswing.load_policy(name, settings, made_for)
+    return Policy(handle, () if handle.num_parameters > 0 else (name, settings, made_for))
+
+
+def _of_bytes(file: bytes, name: str) -> Policy:
+    return Policy(_upswing.policy_of_bytes(file, name))
 
 
 def handle_of(policy: PolicyLike, memory: int = 0) -> _upswing.PolicyHandle:
     """What the C++ code takes for a policy, a path, a controller's name, or a function."""
-    if isinstance(policy, Policy):
-        return policy._handle  # pylint: disable=protected-access
+    memory = whole_number("memory", memory)
     if isinstance(policy, (str, os.PathLike)):
-        return load_policy(policy)._handle  # pylint: disable=protected-access
+        policy = load_policy(policy)
+    if isinstance(policy, Policy):
+        if memory != 0:
+            raise _upswing.InputError(
+                f"memory: expected it beside a function, got a policy whose memory is "
+                f"{policy.memory} steps")
+        return policy._handle  # pylint: disable=protected-access
     if callable(policy):
         return _upswing.function_policy(policy, memory)
     raise _upswing.InputError(

@@ -8,18 +8,15 @@ import sys
 import time
 import warnings
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import Any, TextIO
 
 import numpy as np
+from typing_extensions import Unpack
 
 from . import _upswing
 from .policy import Policy
 from ._settings import text_of, texts_of
-
-if TYPE_CHECKING:
-    from typing_extensions import Unpack
-
-    from ._types import TrainingSettings
+from ._types import TrainingSettings
 
 Row = dict[str, Any]
 

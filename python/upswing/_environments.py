@@ -1,0 +1,148 @@
+"""What one environment and many have in common: settings, spaces, seeds, starts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import numpy.typing as npt
+from gymnasium import spaces
+
+from . import _upswing
+from ._settings import text_of, texts_of, whole_number
+
+
+class Core:
+    """What one and many environments have in common."""
+
+    def __init__(self, num_envs: int, settings: dict[str, Any], actions: str,
+                 levels: int | None, same_step: bool) -> None:
+        if "envs" in settings:
+            raise _upswing.InputError("envs: expected num_envs instead")
+        if levels is not None and actions == "continuous":
+            raise _upswing.InputError("levels: expected actions=\"levels\" beside it")
+        self.env = _upswing.Environments(text_of(num_envs), texts_of(settings), text_of(actions),
+                                         text_of(9 if levels is None else levels), same_step)
+        spec = self.env.spec()
+        self.num_envs: int = spec["num_envs"]
+        self.step_seconds: float = spec["step_seconds"]
+        self.reward_terms: list[str] = spec["reward_terms"]
+        self.state_names: list[str] = spec["state_names"]
+        self.levels = np.array(spec["levels"])
+        self.settings: str = spec["settings"]
+        self.threads: int = spec["threads"]
+        self.is_reset = False
+        # cos, sin, w, cos, sin, w, energy, height; what a memory adds has no bounds either.
+        high = np.full(spec["obs_size"], np.inf, np.float32)
+        high[[0, 1, 3, 4, 7]] = 1
+        self.observation_space = spaces.Box(-high, high, dtype=np.float32)
+        limit = np.array(spec["action_limit"], np.float32)
+        self.action_space: spaces.Box | spaces.Discrete = (
+            spaces.Discrete(len(self.levels)) if len(self.levels) > 0
+            else spaces.Box(-limit, limit, dtype=np.float32))
+
+    def actions_of(self, actions: Any) -> npt.NDArray[Any]:
+        """An array as the C++ code takes it: float32 or float64 torques, int32 or int64 levels."""
+        array = np.asarray(actions)
+        kind = array.dtype.kind
+        if len(self.levels) > 0:
+            if kind not in "iu":
+                raise _upswing.InputError(
+                    f"action: expected whole numbers, torque levels from 0 to "
+                    f"{len(self.levels) - 1}, got {array.dtype}")
+            if array.dtype not in (np.int32, np.int64):
+                array = array.astype(np.int64)
+        elif array.dtype not in (np.float32, np.float64):
+            if kind != "f":
+                raise _upswing.InputError(
+                    f"action: expected torques in N·m as floating-point numbers, got {array.dtype} "
+                    "(or actions=\"levels\")")
+            array = array.astype(np.float32)
+        return np.ascontiguousarray(array) if array.ndim > 0 else array
+
+    def check(self, closed: bool) -> None:
+        """Raises unless a step can be made."""
+        if closed:
+            raise gym.error.ClosedEnvironmentError("step: the environment is closed")
+        if not self.is_reset:
+            raise gym.error.ResetNeeded("step: expected a call of reset before it")
+
+    def seeds_of(self, seed: Any, generator: np.random.Generator) -> list[int | None]:
+        """A seed for each environment: None goes on with its random stream."""
+        n = self.num_envs
+        if seed is None:
+            if self.is_reset:
+                return [None] * n
+            seed = int(generator.integers(2**53))
+        if isinstance(seed, (Sequence, np.ndarray)) and not isinstance(seed, str):
+            if len(seed) != n:
+                raise _upswing.InputError(f"seed: expected {n} seeds, got {len(seed)}")
+            fresh = iter([] if self.is_reset else generator.integers(2**53, size=n).tolist())
+            return [next(fresh, None) if one is None else seed_of(one) for one in seed]
+        first = seed_of(seed)
+        return [(first + i) % 2**64 for i in range(n)]
+
+    def begin(self, seeds: list[int | None], options: dict[str, Any] | None) -> None:
+        """Begins episodes."""
+        options = dict(options or {})
+        mask = options.pop("reset_mask", None)
+        states = options.pop("state", None)
+        if options:
+            raise _upswing.InputError(
+                f"options: expected state or reset_mask, got {', '.join(map(repr, options))}")
+        n = self.num_envs
+        if mask is None:
+            mask = np.ones(n, np.bool_)
+        else:
+            mask = np.asarray(mask)
+            if mask.shape != (n,) or mask.dtype != np.bool_ or not mask.any():
+                raise _upswing.InputError(
+                    f"reset_mask: expected {n} bools, one of them true at least, got {mask.dtype} "
+                    f"of shape {mask.shape}")
+            if not self.is_reset and not mask.all():
+                raise gym.error.ResetNeeded("reset_mask: expected a reset of all before it")
+        if states is not None:
+            size = len(self.state_names)
+            try:
+                states = np.asarray(states, np.float64)
+                if states.shape not in ((size,), (n, size)):
+                    raise ValueError
+                states = np.broadcast_to(states, (n, size))
+            except (ValueError, TypeError):
+                raise _upswing.InputError(
+                    f"state: expected {', '.join(self.state_names)} (rad, rad/s) of shape "
+                    f"({size},) or ({n}, {size}), got shape {np.shape(states)}") from None
+            if not np.isfinite(states[mask]).all():
+                raise _upswing.InputError("state: expected finite numbers")
+        self.env.reset(seeds, mask.astype(np.uint8).tolist())
+        if states is not None:
+            for i in np.flatnonzero(mask):
+                self.env.set_state(int(i), states[i].tolist())
+        self.is_reset = True
+
+    def states(self) -> npt.NDArray[np.float64]:
+        return np.array([self.env.get_state(i) for i in range(self.num_envs)])
+
+
+def seed_of(seed: Any) -> int:
+    """A seed from 0 to 2^64 - 1. Raises InputError."""
+    number = whole_number("seed", seed)
+    if not 0 <= number < 2**64:
+        raise _upswing.InputError(f"seed: expected an integer from 0 to 2^64 - 1, got {number}")
+    return number
+
+
+def picture_size(width: int, height: int) -> tuple[int, int]:
+    """Width and height of pictures, pixels. Raises InputError."""
+    size = whole_number("width", width), whole_number("height", height)
+    _upswing.check_picture_size(*size)
+    return size
+
+
+def check_render_mode(mode: str | None, metadata: dict[str, Any]) -> None:
+    """Raises InputError unless there is such a mode."""
+    if mode is not None and mode not in metadata["render_modes"]:
+        raise _upswing.InputError(
+            f"render_mode: expected None or one of {metadata['render_modes']}, got {mode!r}")
