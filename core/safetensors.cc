@@ -28,11 +28,11 @@ size_t FindChecksum(std::string_view header) {
 }
 
 /// Bytes of a tensor of this shape; nothing on a negative size or overflow.
-std::optional<size_t> ByteCount(const std::vector<int64_t>& shape, Dtype dtype) {
-  size_t count = SizeOf(dtype);
+std::optional<uint64_t> ByteCount(const std::vector<int64_t>& shape, Dtype dtype) {
+  uint64_t count = SizeOf(dtype);
   for (const int64_t extent : shape) {
     if (extent < 0) return std::nullopt;
-    if (__builtin_mul_overflow(count, static_cast<size_t>(extent), &count)) return std::nullopt;
+    if (__builtin_mul_overflow(count, static_cast<uint64_t>(extent), &count)) return std::nullopt;
   }
   return count;
 }
@@ -59,9 +59,10 @@ SafetensorsEntry ParseEntry(const json& entry, size_t data_size) {
   if (offsets.size() != 2 || offsets[0] < 0 || offsets[0] > offsets[1]) {
     throw BadInput("\"data_offsets\": expected where its data begin and end");
   }
-  const auto begin = static_cast<uint64_t>(offsets[0]);
-  const auto end = static_cast<uint64_t>(offsets[1]);
-  if (end > data_size) throw BadInput(Concat("data end at byte ", end, " of ", data_size));
+  if (static_cast<uint64_t>(offsets[1]) > data_size) {
+    throw BadInput(Concat("data end at byte ", offsets[1], " of ", data_size));
+  }
+  const auto begin = static_cast<size_t>(offsets[0]), end = static_cast<size_t>(offsets[1]);
   if (ByteCount(tensor.shape, tensor.dtype) != end - begin) {
     throw BadInput(Concat("expected the bytes of ", tensor.Describe(), ", got ", end - begin));
   }

@@ -1,7 +1,14 @@
 #include "core/thread_pool.h"
 
+#include <algorithm>
+#include <atomic>
 #include <cassert>
+#include <cstdint>
+#include <exception>
+#include <mutex>
+#include <thread>
 #include <utility>
+#include <vector>
 
 namespace upswing {
 namespace {
@@ -26,29 +33,45 @@ constexpr int kTaskBits = 32;
 
 }  // namespace
 
-ThreadPool::ThreadPool(int threads) {
+/// The threads besides the caller's.
+struct ThreadPool::Workers {
+  explicit Workers(int count);
+  ~Workers() { Stop(); }
+  Workers(const Workers&) = delete;
+  Workers& operator=(const Workers&) = delete;
+
+  void ParallelFor(int n, const std::function<void(int)>& task);
+  void Stop();
+  void Work();
+  void RunTasks();
+
+  const std::function<void(int)>* task_ = nullptr;
+  std::atomic<uint64_t> ticket_{0};      // the next task to take
+  std::atomic<uint32_t> round_{0};       // increases at each ParallelFor; idle threads wait for it
+  std::atomic<uint32_t> unfinished_{0};  // tasks of this round
+  std::atomic<bool> stopping_{false};
+  std::mutex error_mutex_;
+  std::exception_ptr error_;
+  std::vector<std::thread> threads_;
+};
+
+ThreadPool::Workers::Workers(int count) {
   try {
-    for (int thread = 1; thread < threads; ++thread) workers_.emplace_back([this] { Work(); });
+    for (int thread = 0; thread < count; ++thread) threads_.emplace_back([this] { Work(); });
   } catch (...) {
     Stop();
     throw;
   }
 }
 
-ThreadPool::~ThreadPool() { Stop(); }
-
-void ThreadPool::Stop() {
+void ThreadPool::Workers::Stop() {
   stopping_ = true;
   ++round_;
   round_.notify_all();
-  for (std::thread& worker : workers_) worker.join();
+  for (std::thread& thread : threads_) thread.join();
 }
 
-void ThreadPool::ParallelFor(int n, const std::function<void(int)>& task) {
-  if (workers_.empty() || n <= 1) {  // no thread needs to be woken
-    for (int i = 0; i < n; ++i) task(i);
-    return;
-  }
+void ThreadPool::Workers::ParallelFor(int n, const std::function<void(int)>& task) {
   assert(unfinished_ == 0);  // not from within a task
   task_ = &task;
   unfinished_ = static_cast<uint32_t>(n);
@@ -60,7 +83,7 @@ void ThreadPool::ParallelFor(int n, const std::function<void(int)>& task) {
   if (error_) std::rethrow_exception(std::exchange(error_, nullptr));
 }
 
-void ThreadPool::Work() {
+void ThreadPool::Workers::Work() {
   uint32_t seen = 0;
   while (true) {
     WaitWhile(round_, seen);
@@ -70,7 +93,7 @@ void ThreadPool::Work() {
   }
 }
 
-void ThreadPool::RunTasks() {
+void ThreadPool::Workers::RunTasks() {
   uint64_t ticket = ticket_;
   while (true) {
     const uint64_t tasks = ticket >> kTaskBits;
@@ -86,6 +109,17 @@ void ThreadPool::RunTasks() {
     if (--unfinished_ == 0) unfinished_.notify_one();
     ticket = ticket_;
   }
+}
+
+ThreadPool::ThreadPool(int threads) : threads_(std::max(threads, 1)) {
+  if (threads_ > 1) workers_ = std::make_unique<Workers>(threads_ - 1);
+}
+
+ThreadPool::~ThreadPool() = default;
+
+void ThreadPool::ParallelFor(int n, const std::function<void(int)>& task) {
+  if (workers_ != nullptr && n > 1) return workers_->ParallelFor(n, task);
+  for (int i = 0; i < n; ++i) task(i);  // no thread needs to be woken
 }
 
 void ParallelFor(ThreadPool* pool, int n, const std::function<void(int)>& task) {

@@ -1,12 +1,7 @@
 #pragma once
 
-#include <atomic>
-#include <cstdint>
-#include <exception>
 #include <functional>
-#include <mutex>
-#include <thread>
-#include <vector>
+#include <memory>
 
 namespace upswing {
 
@@ -18,7 +13,7 @@ class ThreadPool {
   ThreadPool(const ThreadPool&) = delete;
   ThreadPool& operator=(const ThreadPool&) = delete;
 
-  int threads() const { return static_cast<int>(workers_.size()) + 1; }
+  int threads() const { return threads_; }
 
   /// Calls task(0) … task(n-1), each on the next free thread, and returns when all are done,
   /// without waiting for threads that woke too late to take one. What a task computes must depend
@@ -28,18 +23,10 @@ class ThreadPool {
   void ParallelFor(int n, const std::function<void(int)>& task);
 
  private:
-  void Stop();
-  void Work();
-  void RunTasks();
+  struct Workers;  // in thread_pool.cc: where there are no threads, as in a browser, no header asks
 
-  const std::function<void(int)>* task_ = nullptr;
-  std::atomic<uint64_t> ticket_{0};      // the next task to take; see thread_pool.cc
-  std::atomic<uint32_t> round_{0};       // increases at each ParallelFor; idle threads wait for it
-  std::atomic<uint32_t> unfinished_{0};  // tasks of this round
-  std::atomic<bool> stopping_{false};
-  std::mutex error_mutex_;
-  std::exception_ptr error_;
-  std::vector<std::thread> workers_;  // (threads - 1)
+  int threads_;
+  std::unique_ptr<Workers> workers_;  // none in a pool of one
 };
 
 /// ParallelFor on an optional pool: without one the caller runs all tasks.

@@ -30,7 +30,7 @@ class FetchWheel(unittest.TestCase):
     def test_arguments(self):
         self.assert_refused([], "got 0 arguments")
         self.assert_refused(["mujoco", self.folder, "aarch64", "more"], "got 4 arguments")
-        self.assert_refused(["eigen", self.folder], "expected mujoco or node, got 'eigen'")
+        self.assert_refused(["eigen", self.folder], "expected mujoco, node, zig or highway, got 'eigen'")
 
     def test_machine_without_a_wheel(self):
         self.assert_refused(["mujoco", self.folder, "riscv64"],

@@ -82,3 +82,11 @@ set_up_chromium() {
   (cd "$root/web" && npx playwright install --with-deps chromium-headless-shell) </dev/null >&2 ||
     fail "no Chromium could be installed (see above); set UPSWING_CHROMIUM to one"
 }
+
+# What compiles web/wasm, for the test that its module is that of the sources.
+set_up_wasm() {
+  for name in zig highway; do
+    version=$(sed -n 's/^[a-z]*==\([0-9.]*\).*/\1/p' "$root/tools/$name-requirements.txt")
+    "$root/tools/fetch_wheel" $name "$root/build/deps/$name-$version" </dev/null || exit 1
+  done
+}

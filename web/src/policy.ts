@@ -1,13 +1,12 @@
-import { Actor, isActorOutput } from './actor';
+import { CoreController } from './controller';
 import type { Controller, Decision } from './decision';
-import { Greedy } from './greedy';
-import { MEMORY_SIZE } from './observation';
 import { DISTURBANCE_LIMITS } from './disturbance';
-import { CONTROL_PERIOD, MAX_VELOCITY, NOMINAL, OBSERVATION_SIZE, PLANT_LIMITS } from './pendulum';
+import { CONTROL_PERIOD, PLANT_LIMITS } from './pendulum';
 import type { Parameter, Plant, Range } from './pendulum';
-import { BadInput, parseSafetensors } from './safetensors';
-import type { TensorFile } from './safetensors';
-import { quoted } from './text';
+import { BadInput } from './safetensors';
+import { printable } from './text';
+
+const LONGEST_REASON = 200; // characters; a file's own text may be part of it
 
 /// A learned policy: observation → torque, nothing else needed (docs/policy-format.md).
 export class Policy {
@@ -20,31 +19,19 @@ export class Policy {
   /// Factor by which rewards, and so its values, were multiplied during training.
   readonly rewardScale: number;
 
-  /// Reads and checks the file: format, shapes, finite numbers, samples. Throws BadInput.
+  /// Reads and checks the file, as the program does. Throws BadInput.
   constructor(bytes: ArrayBuffer) {
-    const file = parseSafetensors(bytes);
-    this.metadata = file.metadata;
-    this.expect('format', 'upswing-policy');
-    this.expect('format_version', '1');
-    if (Number(this.about('control_period')) !== CONTROL_PERIOD) {
-      this.expect('control_period', String(CONTROL_PERIOD));
+    try {
+      const controller = new CoreController(bytes);
+      this.controller = controller;
+      this.memory = controller.about.memory;
+      this.metadata = new Map(Object.entries(controller.about.metadata));
+    } catch (error) {
+      if (!(error instanceof BadInput)) throw error;
+      throw new BadInput(printable(error.message, LONGEST_REASON));
     }
-    if (file.metadata.has('model')) {
-      throw new BadInput('it was trained on a model of its own, which this page does not have');
-    }
-
-    this.controller = this.readController(file);
-    const { inputs } = this.controller;
-    this.memory = (inputs - OBSERVATION_SIZE) / MEMORY_SIZE;
-    if (!Number.isInteger(this.memory) || this.memory < 0) {
-      throw new BadInput(`expected 8 inputs and 3 for each step remembered, got ${inputs}`);
-    }
-    this.checkObservation();
-    this.plant = parsePlant(this.about('plant'));
+    this.plant = JSON.parse(this.about('plant')) as Plant;
     this.rewardScale = Number(this.metadata.get('reward_scale') ?? 1);
-    if (!(this.rewardScale > 0 && this.rewardScale < Infinity)) {
-      throw new BadInput('metadata "reward_scale": expected a positive number');
-    }
   }
 
   about(key: string): string {
@@ -78,64 +65,10 @@ export class Policy {
     const value = Number(line.exec(this.metadata.get('config') ?? '')?.[1] ?? 0);
     return value > 0 && value < Infinity ? value : 0;
   }
-
-  private readController(file: TensorFile): Controller {
-    const output = this.about('output');
-    const network = this.about('network');
-    if (isActorOutput(output)) {
-      return new Actor(file, output, network, this.metadata.get('critic'));
-    }
-    this.expect('output', 'levels');
-    return new Greedy(file, network);
-  }
-
-  private expect(key: string, expected: string): void {
-    const got = this.about(key);
-    if (got !== expected) {
-      throw new BadInput(`${key}: expected ${quoted(expected)}, got ${quoted(got)}`);
-    }
-  }
-
-  /// Throws BadInput unless observations are scaled as here.
-  private checkObservation(): void {
-    const text = this.about('observation');
-    let given: { max_velocity?: unknown; memory?: { steps?: unknown } } | null;
-    try {
-      given = JSON.parse(text) as typeof given;
-    } catch {
-      throw new BadInput('metadata "observation" is not JSON');
-    }
-    const scaled = JSON.stringify(given?.max_velocity) === JSON.stringify(MAX_VELOCITY);
-    if (!scaled || (given?.memory?.steps ?? 0) !== this.memory) {
-      throw new BadInput(
-        'metadata "observation": expected the scales and memory of docs/policy-format.md',
-      );
-    }
-  }
 }
 
 /// The part of a range that is within limits.
 function within([least, most]: Range, low: number, high: number): Range {
   const clamp = (x: number) => Math.min(Math.max(x, least), most);
   return [clamp(low), clamp(high)];
-}
-
-function parsePlant(text: string): Plant {
-  let given: Partial<Record<Parameter, unknown>>;
-  try {
-    given = JSON.parse(text) as typeof given;
-  } catch {
-    throw new BadInput('metadata "plant" is not JSON');
-  }
-  const plant = { ...NOMINAL };
-  for (const name of Object.keys(NOMINAL) as Parameter[]) {
-    const value = given?.[name];
-    const [low, high] = PLANT_LIMITS[name];
-    if (typeof value !== 'number' || !(value >= low && value <= high)) {
-      const got = value === undefined ? 'none' : quoted(String(value));
-      throw new BadInput(`metadata "plant": expected a ${name} of ${low} to ${high}, got ${got}`);
-    }
-    plant[name] = value;
-  }
-  return plant;
 }

@@ -26,6 +26,17 @@ function partsOf(file: ArrayBuffer): Parts {
   return { header, data: new Uint8Array(file.slice(8 + size)) };
 }
 
+export function tensorNames(file: ArrayBuffer): string[] {
+  return Object.keys(partsOf(file).header).filter((name) => name !== '__metadata__');
+}
+
+/// The numbers of a tensor of F32.
+export function float32Of(file: ArrayBuffer, tensor: string): Float32Array {
+  const { header, data } = partsOf(file);
+  const [begin, end] = header[tensor]!.data_offsets as [number, number];
+  return new Float32Array(data.slice(begin, end).buffer);
+}
+
 /// The file as another program writes it, without a checksum, and with a change.
 export function changed(file: ArrayBuffer, change: (parts: Parts) => void): ArrayBuffer {
   const parts = partsOf(file);

@@ -1,24 +1,16 @@
 import { describe, expect, test } from 'vitest';
-import { changed as changedFile, fileOf, withMetadata } from '../tests/file';
+import { changed as changedFile, fileOf, float32Of, withMetadata } from '../tests/file';
 import type { Parts } from '../tests/file';
 import { readPolicy } from '../tests/program';
 import { NOMINAL } from './pendulum';
 import { Policy } from './policy';
-import { BadInput, MAX_FILE_BYTES, parseSafetensors, read } from './safetensors';
+import { BadInput } from './safetensors';
 
 /// What comes from a stranger is refused with a reason, whatever it is.
 
 const DATA = new Uint8Array(new Float32Array([1, 2, 3, 4]).buffer);
 const tensor = (shape: unknown, offsets: unknown, dtype: unknown = 'F32') => ({
   x: { dtype, shape, data_offsets: offsets },
-});
-
-test('reads what it was given', () => {
-  const file = parseSafetensors(
-    fileOf({ __metadata__: { a: 'b' }, ...tensor([2, 2], [0, 16]) }, DATA),
-  );
-  expect(file.metadata.get('a')).toBe('b');
-  expect([...read(file, 'x', 'F32', [2, 2])]).toEqual([1, 2, 3, 4]);
 });
 
 test.each<[string, Record<string, unknown> | string]>([
@@ -44,25 +36,16 @@ test.each<[string, Record<string, unknown> | string]>([
     { ...tensor([4], [0, 16]), y: { dtype: 'F32', shape: [2], data_offsets: [8, 16] } },
   ],
 ])('refuses %s', (_, header) => {
-  expect(() => parseSafetensors(fileOf(header, DATA))).toThrow(BadInput);
+  const read = () => new Policy(fileOf(header, DATA));
+  expect(read).toThrow(BadInput);
+  expect(read).toThrow('not a whole safetensors file');
 });
 
-test('refuses what is cut off, too long, or says so', () => {
-  expect(() => parseSafetensors(new ArrayBuffer(0))).toThrow('too short');
-  expect(() => parseSafetensors(new ArrayBuffer(MAX_FILE_BYTES + 1))).toThrow('larger than 16 MB');
+test('refuses what is cut off, or says so', () => {
+  expect(() => new Policy(new ArrayBuffer(0))).toThrow('it has 0 bytes');
   const long = fileOf({});
   new DataView(long).setBigUint64(0, 2n ** 63n, true);
-  expect(() => parseSafetensors(long)).toThrow('cut off');
-});
-
-test('refuses tensors of another shape or type, and numbers that are none', () => {
-  const file = parseSafetensors(fileOf(tensor([2, 2], [0, 16]), DATA));
-  expect(() => read(file, 'y', 'F32', [4])).toThrow('found none');
-  expect(() => read(file, 'x', 'F32', [4])).toThrow('expected F32 (4), got F32 (2, 2)');
-  expect(() => read(file, 'x', 'F64', [2, 2])).toThrow('expected F64');
-  const infinite = new Uint8Array(new Float32Array([1, Infinity, 3, 4]).buffer);
-  const broken = parseSafetensors(fileOf(tensor([4], [0, 16]), infinite));
-  expect(() => read(broken, 'x', 'F32', [4])).toThrow('not finite');
+  expect(() => new Policy(long)).toThrow('its header should have');
 });
 
 describe('a policy', () => {
@@ -138,7 +121,7 @@ describe('a policy', () => {
         line = (error as Error).message;
       }
       expect(line).toContain('expected');
-      expect(line.length).toBeLessThan(120);
+      expect(line.length).toBeLessThanOrEqual(200);
       expect(line).not.toMatch(/[\n\u001b]/);
     }
   });
@@ -169,9 +152,7 @@ describe('a policy', () => {
   });
 
   test('without a checksum is refused if its values differ by more than rounding', () => {
-    const { tensors } = parseSafetensors(original);
-    const values = new Float32Array(tensors.get('sample.q')!.bytes.slice().buffer);
-    const largest = Math.max(...values.map(Math.abs));
+    const largest = Math.max(...float32Of(original, 'sample.q').map(Math.abs));
     const moved = (share: number) =>
       changed(({ header: { 'value.bias': bias }, data: bytes }) => {
         const [at] = bias!.data_offsets as [number];

@@ -1,0 +1,129 @@
+import { core } from './core';
+import type { Controller, Decision } from './decision';
+import { argMax } from './decision';
+import { GaussianTorque } from './gaussian';
+
+/// What the core says of a policy file (web/wasm/api.cc).
+interface About {
+  kind: 'q' | 'squashed-gaussian' | 'clipped-gaussian' | 'categorical';
+  inputs: number;
+  outputs: number; // of an actor
+  values: number; // Q-values, or 1: V
+  torques: number[]; // N·m
+  limit: number; // N·m, of an actor
+  memory: number; // steps
+  selfCheckError: number;
+  metadata: Record<string, string>;
+}
+
+const forgotten = new FinalizationRegistry<() => void>((close) => close());
+
+/// A policy in the core, and what its decisions are made of.
+export class CoreController implements Controller {
+  readonly about: Readonly<About>;
+  private readonly policy: number;
+  private readonly observations: number; // where one is put
+  private readonly row: number; // where what is made of it lies
+  private readonly torques: Float64Array;
+  private readonly shape: Shape;
+
+  /// Reads and checks a policy file. Throws BadInput.
+  constructor(file: ArrayBuffer) {
+    const { exports } = core();
+    this.policy = core().withBytes(new Uint8Array(file), (at, size) =>
+      core().expect(exports.policy_open(at, size)),
+    );
+    this.about = JSON.parse(core().text) as About;
+    this.torques = Float64Array.from(this.about.torques);
+    this.shape = JSON.parse(this.about.metadata.network!) as Shape;
+    this.observations = exports.reserve(4 * this.inputs);
+    this.row = exports.reserve(8 * this.columns);
+    const { policy, observations, row } = this;
+    forgotten.register(this, () => {
+      exports.policy_close(policy);
+      exports.release(observations);
+      exports.release(row);
+    });
+  }
+
+  get inputs(): number {
+    return this.about.inputs;
+  }
+  get selfCheckError(): number {
+    return this.about.selfCheckError;
+  }
+  get strongest(): number {
+    return this.torques.length > 0 ? Math.max(...this.torques) : this.about.limit;
+  }
+
+  get text(): string {
+    const { shape } = this;
+    const { kind, metadata } = this.about;
+    const normalised = shape.layer_norm ? ', layer normalisation' : '';
+    const critic = metadata.critic ? (JSON.parse(metadata.critic) as Shape) : null;
+    if (kind === 'q') {
+      const heads = shape.dueling ? ` with heads of ${shape.head}` : '';
+      const name = `${shape.dueling ? 'Dueling' : 'Plain'} network ${widths(shape)}`;
+      return `${name}${heads}${normalised}, ${this.torques.length} torques`;
+    }
+    const how = {
+      'squashed-gaussian': 'a Gaussian squashed by tanh',
+      'clipped-gaussian': 'a Gaussian, clipped',
+      categorical: `one of ${this.torques.length} torques`,
+    }[kind];
+    return `Actor ${widths(shape)}: ${how}${normalised}${critic ? `; critic ${widths(critic)}` : ''}`;
+  }
+
+  decide(observation: Float32Array): Decision {
+    const { exports } = core();
+    new Float32Array(exports.memory.buffer, this.observations, this.inputs).set(observation);
+    core().expect(exports.policy_decide(this.policy, this.observations, 1, this.row));
+    return this.decision(new Float64Array(exports.memory.buffer, this.row, this.columns).slice());
+  }
+
+  private get columns(): number {
+    return 3 + this.about.outputs + this.about.values;
+  }
+
+  /// From a row of torque, ends of the distribution, outputs and values.
+  private decision(row: Float64Array): Decision {
+    const { kind, outputs: count, values: valueCount, limit } = this.about;
+    const { torques } = this;
+    // Numbers that overflowed on the way move nothing.
+    const torque = Number.isFinite(row[0]!) ? row[0]! : 0;
+    const outputs = row.subarray(3, 3 + count);
+    const values = row.subarray(3 + count);
+    if (kind === 'q') {
+      const q = Float32Array.from(values);
+      // Q = V + A - mean(A), so that V is their mean; a plain network has none.
+      const value = this.shape.dueling
+        ? values.reduce((sum, x) => sum + x, 0) / values.length
+        : NaN;
+      return { kind, torques, q, action: torques.indexOf(torque), torque, value };
+    }
+    const value = valueCount > 0 ? values[0]! : NaN;
+    if (kind === 'categorical') {
+      const action = argMax(outputs);
+      const weights = outputs.map((logit) => Math.exp(logit - outputs[action]!));
+      const sum = weights.reduce((total, weight) => total + weight, 0);
+      const probabilities = weights.map((weight) => weight / sum);
+      return { kind, torques, action, torque, probabilities, value };
+    }
+    const squashed = kind === 'squashed-gaussian';
+    const distribution = new GaussianTorque(limit, squashed, outputs[0]!, outputs[1]!);
+    return { kind: 'gaussian', distribution, torque, value };
+  }
+}
+
+/// Of a network, from a file's metadata, which the core has checked.
+interface Shape {
+  inputs: number;
+  hidden: number[];
+  layer_norm: boolean;
+  dueling?: boolean;
+  head?: number;
+}
+
+function widths({ inputs, hidden }: Shape): string {
+  return [inputs, ...hidden].join('-');
+}

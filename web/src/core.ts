@@ -1,0 +1,127 @@
+import { BadInput } from './safetensors';
+
+/// Our own core in C++ (web/wasm/api.cc), compiled to WebAssembly: what the page computes of policies,
+/// formulas and learning. Only this file knows its memory.
+
+/// What the module exports. Objects and memory are addresses; 0 is failure.
+interface Exports {
+  memory: WebAssembly.Memory;
+  _initialize(): void;
+  reserve(bytes: number): number;
+  release(at: number): void;
+  text_at(): number;
+  text_size(): number;
+  bytes_at(): number;
+  bytes_size(): number;
+  policy_open(file: number, bytes: number): number;
+  policy_close(policy: number): void;
+  policy_decide(policy: number, observations: number, count: number, rows: number): number;
+  numbers(): number;
+  pendulum_at(): void;
+  capsule_inertia(): void;
+  pendulum_mjcf(): void;
+  learner_open(settings: number, bytes: number): number;
+  learner_close(learner: number): void;
+  learner_run(learner: number, steps: number): number;
+  learner_report(learner: number): number;
+  learner_policy(learner: number, best: number): number;
+  agent_settings(agent: number, bytes: number): number;
+}
+
+export class Core {
+  readonly exports: Exports;
+  private readonly decoder = new TextDecoder();
+
+  private constructor(exports: Exports) {
+    this.exports = exports;
+  }
+
+  static async start(module: WebAssembly.Module): Promise<Core> {
+    let memory: WebAssembly.Memory;
+    const EBADF = 8; // there are no files
+    const system = {
+      clock_time_get: (_clock: number, _precision: bigint, at: number): number => {
+        const nanoseconds = BigInt(Math.round(1e6 * performance.now()));
+        new DataView(memory.buffer).setBigUint64(at, nanoseconds, true);
+        return 0;
+      },
+      environ_get: () => 0,
+      environ_sizes_get: (count: number, bytes: number): number => {
+        const view = new DataView(memory.buffer);
+        view.setUint32(count, 0, true);
+        view.setUint32(bytes, 0, true);
+        return 0;
+      },
+      fd_close: () => EBADF,
+      fd_seek: () => EBADF,
+      fd_write: () => EBADF,
+      proc_exit: (code: number) => {
+        throw new Error(`the core has stopped with ${code}`);
+      },
+    };
+    const imports = { wasi_snapshot_preview1: system };
+    const instance = await WebAssembly.instantiate(module, imports);
+    const exports = instance.exports as unknown as Exports;
+    memory = exports.memory;
+    exports._initialize();
+    return new Core(exports);
+  }
+
+  /// The text that the last call left.
+  get text(): string {
+    const { memory, text_at, text_size } = this.exports;
+    return this.decoder.decode(new Uint8Array(memory.buffer, text_at(), text_size()));
+  }
+
+  /// A copy of the file that the last call left.
+  get file(): ArrayBuffer {
+    const { memory, bytes_at, bytes_size } = this.exports;
+    return memory.buffer.slice(bytes_at(), bytes_at() + bytes_size()) as ArrayBuffer;
+  }
+
+  /// `result`, unless it is 0. Throws BadInput, with the reason.
+  expect(result: number): number {
+    if (result === 0) throw new BadInput(this.text);
+    return result;
+  }
+
+  /// Calls `use` with the address and size of `bytes` in the module's memory.
+  withBytes<T>(bytes: Uint8Array, use: (at: number, size: number) => T): T {
+    const at = this.exports.reserve(Math.max(1, bytes.length));
+    if (at === 0) throw new BadInput('it does not fit into the memory that a page has');
+    try {
+      new Uint8Array(this.exports.memory.buffer).set(bytes, at);
+      return use(at, bytes.length);
+    } finally {
+      this.exports.release(at);
+    }
+  }
+
+  /// The formulas' numbers: what `work` makes of `input`.
+  formula(input: readonly number[], work: () => void): Float64Array {
+    const numbers = () => new Float64Array(this.exports.memory.buffer, this.exports.numbers(), 32);
+    numbers().set(input);
+    work();
+    return numbers();
+  }
+}
+
+let started: Core | null = null;
+let compiled: WebAssembly.Module | null = null;
+
+/// Starts the page's core, before anything else is computed.
+export async function startCore(module: WebAssembly.Module): Promise<void> {
+  started = await Core.start(module);
+  compiled = module;
+}
+
+/// Its module, for workers to start their own.
+export function coreModule(): WebAssembly.Module {
+  if (!compiled) throw new Error('the core has not been started');
+  return compiled;
+}
+
+export function core(): Core {
+  if (!started) throw new Error('the core has not been started');
+  return started;
+}

@@ -1,0 +1,130 @@
+import { createHash } from 'node:crypto';
+import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { expect, test } from 'vitest';
+import { coreModule } from '../../tests/core';
+import { runProgram } from '../../tests/program';
+import { Core, core } from '../core';
+import { Policy } from '../policy';
+import { BadInput } from '../safetensors';
+import { agentSettings, Learner } from './learner';
+
+const newCore = async () => Core.start(await coreModule());
+const hash = (file: ArrayBuffer) =>
+  createHash('sha256').update(new Uint8Array(file)).digest('hex').slice(0, 16);
+
+/// The policy after so many steps of 32 environments, made `slice` at a time.
+function learned(host: Core, seed: number, steps: number, slice: number): ArrayBuffer {
+  const learner = new Learner(host, 'fast', seed);
+  for (let done = 0; done < steps; done += slice) expect(learner.run(slice)).toBe(true);
+  expect(learner.report().steps).toBe(32 * steps);
+  const file = learner.policy();
+  learner.close();
+  return file;
+}
+
+// That of this module, in any browser and in Node. A change of how agents learn, or of the compiler,
+// changes it, as it changes the fingerprints of the program.
+const FINGERPRINT = 'f4cbc6c2625c5ec6';
+
+test('the same seed gives the same bits: in another core, in other slices', async () => {
+  const one = await newCore();
+  const file = learned(one, 1, 300, 10);
+  expect(hash(file)).toBe(FINGERPRINT);
+  expect(hash(learned(one, 1, 300, 100))).toBe(FINGERPRINT);
+  expect(hash(learned(await newCore(), 1, 300, 1))).toBe(FINGERPRINT);
+  expect(hash(learned(one, 2, 300, 10))).not.toBe(FINGERPRINT);
+});
+
+test('a training: what it reports, and that the program judges its policy in MuJoCo', async () => {
+  const learner = new Learner(await newCore(), 'fast', 1);
+  const first = learner.report();
+  expect(first).toMatchObject({ steps: 0, updates: 0, solved: false, episodes: [] });
+  expect(learner.best()).toBeNull();
+  const evaluations = [];
+  while (learner.run(250)) {
+    const report = learner.report();
+    evaluations.push(...report.evaluations);
+    expect(report.episodes.every((episode) => Number.isFinite(episode.return))).toBe(true);
+  }
+  const last = learner.report();
+  evaluations.push(...last.evaluations);
+  expect(last).toMatchObject({ solved: true, finished: true, bestSuccess: 1 });
+  expect(evaluations[0]!.success).toBe(0);
+  expect(evaluations.slice(-2).map(({ success }) => success > 0.9)).toEqual([true, true]);
+
+  const file = learner.best()!;
+  expect(new Policy(file).about('agent')).toBe('fast');
+  const folder = mkdtempSync(join(tmpdir(), 'upswing-'));
+  try {
+    const path = join(folder, 'policy.safetensors');
+    writeFileSync(path, new Uint8Array(file));
+    const result = JSON.parse(runProgram('eval', path, '--episodes', '20', '--json')) as object;
+    expect(result).toMatchObject({ success_rate: 1 });
+  } finally {
+    rmSync(folder, { recursive: true });
+  }
+}, 120_000);
+
+test('SAC learns too, with settings of its own', async () => {
+  const learner = new Learner(await newCore(), 'sac-fast', 1, { learning_starts: '64' });
+  learner.run(10);
+  const { steps, updates } = learner.report();
+  expect(steps).toBe(320);
+  expect(updates).toBeGreaterThan(0);
+  expect(new Policy(learner.policy()).about('output')).toBe('squashed-gaussian');
+});
+
+test('settings are checked as the program checks them, in one line', async () => {
+  const host = await newCore();
+  for (const [settings, words] of [
+    [{ learning_rate: '-1' }, 'learning_rate: expected a number in [0, 10], got "-1"'],
+    [{ learning_rat: '1' }, 'learning_rate'],
+    [{ batch: '1000', replay: '100' }, 'batch: expected at most as many transitions'],
+    [{ hidden: '4096,4096', replay: '10000000' }, 'memory'],
+    [{ model: 'x.xml' }, 'a page has no files'],
+    [{ seed: '1\nepsilon_end' }, 'NAME=VALUE'],
+  ] as [Record<string, string>, string][]) {
+    const open = () => new Learner(host, 'fast', 1, settings);
+    expect(open).toThrow(BadInput);
+    expect(open).toThrow(words);
+  }
+  expect(() => new Learner(host, 'nobody', 1)).toThrow('no agent is called "nobody"');
+});
+
+test('a training that diverges ends with a reason, and its core goes on', async () => {
+  const host = await newCore();
+  const learner = new Learner(host, 'fast', 1, {
+    ...{ layer_norm: 'false', dueling: 'false', hidden: '64,64,64,64,64,64,64,64', gamma: '1' },
+    ...{ reward_scale: '1e9', balance_weight: '1000', learning_rate: '10', tau: '1' },
+    ...{ max_gradient_norm: '1e9', learning_starts: '128', updates_per_step: '1', batch: '32' },
+  });
+  expect(() => {
+    for (let k = 0; k < 20; ++k) learner.run(50);
+  }).toThrow("the gradient's norm is inf, expected a finite number");
+  learner.close();
+  expect(new Learner(host, 'fast', 1).run(1)).toBe(true);
+});
+
+test('the settings of an agent, with what the program says of them', () => {
+  const settings = agentSettings(core(), 'fast');
+  expect(settings.get('learning_rate')).toMatchObject({ value: '0.002', low: 0, high: 10 });
+  expect(settings.get('hidden')).toMatchObject({ value: '64,64' });
+  expect(settings.get('epsilon_end')!.help).toBe('what epsilon falls to');
+});
+
+test('trainings one after another take no more memory', async () => {
+  const host = await newCore();
+  const train = () => {
+    const learner = new Learner(host, 'fast', 1);
+    learner.run(100);
+    learner.policy();
+    learner.report();
+    learner.close();
+  };
+  for (let k = 0; k < 2; ++k) train();
+  const before = host.exports.memory.buffer.byteLength;
+  for (let k = 0; k < 10; ++k) train();
+  expect(host.exports.memory.buffer.byteLength).toBe(before);
+});

@@ -1,0 +1,86 @@
+import type { Core } from '../core';
+
+/// What the core says of a training, since the last report (web/wasm/learner.cc).
+export interface Report {
+  steps: number; // control steps, over all environments
+  updates: number; // gradient steps
+  episodeCount: number;
+  seconds: number; // of training, without evaluations
+  solved: boolean; // two passed evaluations in a row
+  solvedStep: number; // of the first of them
+  solvedSeconds: number;
+  finished: boolean;
+  bestStep: number; // of the best evaluation; 0: none
+  bestSuccess: number;
+  episodes: { step: number; return: number }[];
+  metrics: ({ step: number } & Record<string, number>)[];
+  evaluations: { step: number; success: number; return: number }[];
+}
+
+/// Settings by their names in the program, such as { learning_rate: '1e-3' }.
+export type LearnSettings = Readonly<Record<string, string>>;
+
+/// A training in the core.
+export class Learner {
+  private readonly core: Core;
+  private readonly learner: number;
+
+  /// `agent` names the settings that the others change. Throws BadInput.
+  constructor(core: Core, agent: string, seed: number, settings: LearnSettings = {}) {
+    this.core = core;
+    const all = { agent, seed: String(seed), ...settings };
+    const lines = Object.entries(all).map(([name, value]) => `${name}=${value}`);
+    this.learner = core.withBytes(new TextEncoder().encode(lines.join('\n')), (at, size) =>
+      core.expect(core.exports.learner_open(at, size)),
+    );
+  }
+
+  /// At most so many steps of all environments; false once it is finished. Throws BadInput if
+  /// numbers are no longer finite.
+  run(steps: number): boolean {
+    return this.core.expect(this.core.exports.learner_run(this.learner, steps)) === 1;
+  }
+
+  report(): Report {
+    this.core.expect(this.core.exports.learner_report(this.learner));
+    return JSON.parse(this.core.text) as Report;
+  }
+
+  /// The policy as it stands, as a file.
+  policy(): ArrayBuffer {
+    return this.fileOf(0);
+  }
+
+  /// The best policy at an evaluation; null until there is one.
+  best(): ArrayBuffer | null {
+    const file = this.fileOf(1);
+    return file.byteLength > 0 ? file : null;
+  }
+
+  close(): void {
+    this.core.exports.learner_close(this.learner);
+  }
+
+  private fileOf(best: 0 | 1): ArrayBuffer {
+    this.core.expect(this.core.exports.learner_policy(this.learner, best));
+    return this.core.file;
+  }
+}
+
+/// A setting of a named agent, as the program describes it.
+export interface Setting {
+  name: string;
+  value: string;
+  low: number | null; // null: any number, or none
+  high: number | null;
+  unit: string;
+  help: string;
+}
+
+export function agentSettings(core: Core, agent: string): Map<string, Setting> {
+  core.withBytes(new TextEncoder().encode(agent), (at, size) =>
+    core.expect(core.exports.agent_settings(at, size)),
+  );
+  const settings = JSON.parse(core.text) as Setting[];
+  return new Map(settings.map((setting) => [setting.name, setting]));
+}

@@ -1,0 +1,90 @@
+import { Core } from '../core';
+import { BadInput } from '../safetensors';
+import { Learner } from './learner';
+import type { LearnSettings, Report } from './learner';
+
+/// Learns in a thread of its own, in slices, and tells of each.
+
+const SLICE = 30; // ms, after which messages are heard
+const TELL = 200; // ms between snapshots of the policy
+
+export type Order =
+  | {
+      kind: 'start';
+      module: WebAssembly.Module;
+      agent: string;
+      seed: number;
+      settings: LearnSettings;
+    }
+  | { kind: 'pause' | 'resume' };
+
+export type News =
+  | { kind: 'report'; report: Report; policy: ArrayBuffer; best: ArrayBuffer | null }
+  | { kind: 'failed'; reason: string };
+
+let learner: Learner | null = null;
+let paused = false;
+let scheduled = false;
+let told = 0;
+let bestStep = 0;
+
+function tell(): void {
+  const report = learner!.report();
+  const policy = learner!.policy();
+  // The best one only when there is a new one.
+  const best = report.bestStep > bestStep ? learner!.best() : null;
+  bestStep = report.bestStep;
+  told = performance.now();
+  send({ kind: 'report', report, policy, best }, best ? [policy, best] : [policy]);
+}
+
+function send(news: News, transfer: Transferable[] = []): void {
+  postMessage(news, { transfer });
+}
+
+/// A slice, and then the next, until the training ends or is paused.
+function work(): void {
+  scheduled = false;
+  if (!learner || paused) return;
+  try {
+    const begin = performance.now();
+    let more = true;
+    while (more && performance.now() - begin < SLICE) more = learner.run(4);
+    if (!more || performance.now() - told >= TELL) tell();
+    if (more) schedule();
+    else learner.close();
+  } catch (error) {
+    fail(error);
+  }
+}
+
+function fail(error: unknown): void {
+  if (!(error instanceof BadInput)) throw error;
+  learner = null;
+  send({ kind: 'failed', reason: error.message });
+}
+
+// Sooner than setTimeout, which waits for 4 ms.
+const next = new MessageChannel();
+next.port1.onmessage = work;
+
+function schedule(): void {
+  if (!scheduled) next.port2.postMessage(null);
+  scheduled = true;
+}
+
+onmessage = async ({ data }: MessageEvent<Order>): Promise<void> => {
+  if (data.kind !== 'start') {
+    paused = data.kind === 'pause';
+    return schedule();
+  }
+  const { module, agent, seed, settings } = data;
+  const core = await Core.start(module);
+  try {
+    learner = new Learner(core, agent, seed, settings);
+    tell();
+  } catch (error) {
+    return fail(error);
+  }
+  schedule();
+};

@@ -1,0 +1,241 @@
+// What the page calls: policies, formulas, learners. Objects are pointers, which the page deletes;
+// texts are UTF-8, most of them JSON. A call that fails returns 0 and leaves a line of text.
+#include <cmath>
+#include <limits>
+
+#include "core/argmax.h"
+#include "core/safetensors.h"
+#include "lab/loaded_policy.h"
+#include "nn/actor_policy.h"
+#include "nn/q_policy.h"
+#include "web/wasm/learner.h"
+
+#define UPSWING_EXPORT(name) extern "C" __attribute__((export_name(#name)))
+
+using namespace upswing;
+using nlohmann::json;
+
+namespace {
+
+std::string text;               // of the last call that gives one
+std::vector<std::byte> bytes;   // the same of files
+std::array<double, 32> number;  // into and out of the formulas
+
+/// Runs `work` and returns what it does; 0 if it throws, with the reason as the text.
+template <typename Work>
+auto Guarded(const Work& work) -> decltype(work()) {
+  try {
+    return work();
+  } catch (const std::bad_alloc&) {
+    text = "it does not fit into the memory that a page has";
+  } catch (const std::exception& error) {
+    text = error.what();
+  }
+  return {};
+}
+
+/// A text for JavaScript; bytes of a file that are not UTF-8 are replaced.
+int SetText(const json& value) {
+  text = value.dump(-1, ' ', false, json::error_handler_t::replace);
+  return 1;
+}
+
+/// A policy and what deciding needs.
+struct Controller {
+  explicit Controller(LoadedPolicy policy)
+      : loaded(std::move(policy)), memory(loaded.policy->Start(1)) {
+    if (const auto* found = dynamic_cast<const ActorPolicy*>(&*loaded.policy)) actor = found;
+  }
+
+  int outputs() const { return actor == nullptr ? 0 : actor->num_outputs(); }
+
+  LoadedPolicy loaded;
+  const ActorPolicy* actor = nullptr;
+  std::unique_ptr<Policy::Memory> memory;
+};
+
+const char* KindOf(const Controller& c) {
+  if (c.actor == nullptr) return "q";
+  switch (c.actor->parts().output) {
+    case ActorOutput::kSquashedGaussian:
+      return "squashed-gaussian";
+    case ActorOutput::kClippedGaussian:
+      return "clipped-gaussian";
+    case ActorOutput::kCategorical:
+      return "categorical";
+  }
+  return "";
+}
+
+json About(const Controller& c, const std::map<std::string, std::string>& metadata) {
+  const Policy& policy = *c.loaded.policy;
+  std::vector<double> torques;
+  if (c.actor != nullptr) {
+    torques = c.actor->parts().torques;
+  } else {
+    const Matrix<const double> actions = policy.value_actions();
+    torques.assign(actions.values().begin(), actions.values().end());
+  }
+  const auto* q = dynamic_cast<const QPolicy*>(&policy);
+  return {{"kind", KindOf(c)},
+          {"text", policy.description()},
+          {"inputs", policy.obs_size()},
+          {"outputs", c.outputs()},
+          {"values", policy.num_values()},
+          {"torques", torques},
+          {"limit", c.actor == nullptr ? 0 : c.actor->parts().action_limit.front()},
+          {"memory", c.loaded.memory()},
+          {"selfCheckError", (q != nullptr ? q->self_check() : c.actor->self_check()).error},
+          {"metadata", metadata}};
+}
+
+Plant PlantAt(const double* values) {
+  Plant plant;
+  for (double* field : {&plant.mass1, &plant.mass2, &plant.length1, &plant.length2, &plant.damping1,
+                        &plant.damping2, &plant.gravity, &plant.torque_limit}) {
+    *field = *values++;
+  }
+  return plant;
+}
+
+}  // namespace
+
+// Memory that the page fills, such as with a file; texts and files that a call has left.
+UPSWING_EXPORT(reserve) void* Reserve(size_t size) { return std::malloc(size); }
+UPSWING_EXPORT(release) void Release(void* block) { std::free(block); }
+UPSWING_EXPORT(text_at) const char* TextAt() { return text.data(); }
+UPSWING_EXPORT(text_size) size_t TextSize() { return text.size(); }
+UPSWING_EXPORT(bytes_at) const std::byte* BytesAt() { return bytes.data(); }
+UPSWING_EXPORT(bytes_size) size_t BytesSize() { return bytes.size(); }
+
+// ----------------------------------------------------------------------------------------------
+// Policies.
+
+/// Reads and checks a policy file. Leaves what it is as JSON.
+UPSWING_EXPORT(policy_open) Controller* PolicyOpen(const std::byte* file, size_t size) {
+  return Guarded([&]() -> Controller* {
+    const Tensors tensors = ReadSafetensors({file, file + size}, "the file");
+    auto controller = std::make_unique<Controller>(ReadPolicy(tensors));
+    if (controller->loaded.task != kDoublePendulum) {
+      throw BadInput(
+          Concat("expected a policy of the double pendulum, got one of ", controller->loaded.task));
+    }
+    SetText(About(*controller, tensors.metadata));
+    return controller.release();
+  });
+}
+
+UPSWING_EXPORT(policy_close) void PolicyClose(Controller* controller) { delete controller; }
+
+/// What the policy makes of n observations (n × D): for each a row of its torque and the ends of
+/// the central 68% of an actor's distribution (3; NaN where there are none), then the outputs of an
+/// actor, then the values.
+UPSWING_EXPORT(policy_decide)
+int PolicyDecide(Controller* controller, const float* obs, int n, double* rows) {
+  return Guarded([&] {
+    const Policy& policy = *controller->loaded.policy;
+    const int O = controller->outputs(), V = policy.num_values(), D = policy.obs_size();
+    std::vector<double> ends(3 * static_cast<size_t>(n), NAN);
+    std::vector<float> outputs(static_cast<size_t>(n) * O), values(static_cast<size_t>(n) * V);
+    const std::span all(ends);
+    const Matrix<const float> observations(obs, n, D);
+    Policy::Memory& memory = *controller->memory;
+    policy.Act(observations, {all.data(), n, 1}, memory);
+    if (policy.has_spread()) {
+      policy.Spread(observations, {all.data() + n, n, 1}, {all.data() + 2 * n, n, 1}, memory);
+    }
+    if (O > 0) controller->actor->Outputs(observations, {outputs.data(), n, O}, memory);
+    if (V > 0) policy.Values(observations, {values.data(), n, V}, memory);
+    for (int i = 0; i < n; ++i) {
+      for (int k = 0; k < 3; ++k) *rows++ = ends[static_cast<size_t>(k * n + i)];
+      for (int k = 0; k < O; ++k) *rows++ = outputs[static_cast<size_t>(i * O + k)];
+      for (int k = 0; k < V; ++k) *rows++ = values[static_cast<size_t>(i * V + k)];
+    }
+    return 1;
+  });
+}
+
+// ----------------------------------------------------------------------------------------------
+// The pendulum's formulas, from and to these numbers.
+
+UPSWING_EXPORT(numbers) double* Numbers() { return number.data(); }
+
+/// Of a plant (8), a state (4) and a torque: the observation (8), the energy, that upright, the
+/// normalised one, the tip's height, whether both links are inverted, the reward's terms (5).
+UPSWING_EXPORT(pendulum_at) void PendulumAt() {
+  const Plant plant = PlantAt(number.data());
+  const PendulumState s{number[8], number[9], number[10], number[11]};
+  const double torque = number[12];
+  double* to = number.data();
+  for (const float x : Observe(plant, s)) *to++ = x;
+  for (const double x : {Energy(plant, s), EnergyTarget(plant), NormalizedEnergy(plant, s),
+                         TipHeight(plant, s), Inverted(s) ? 1.0 : 0.0}) {
+    *to++ = x;
+  }
+  for (const double x : RewardTerms(plant, s, torque)) *to++ = x;
+}
+
+/// Of a capsule's mass, radius and length: its inertia across and along.
+UPSWING_EXPORT(capsule_inertia) void CapsuleInertiaOf() {
+  const CapsuleInertia inertia(number[0], number[1], number[2]);
+  number[0] = inertia.across;
+  number[1] = inertia.along;
+}
+
+/// The model of a plant (8) as MJCF.
+UPSWING_EXPORT(pendulum_mjcf) void PendulumMjcf() { text = Mjcf(PlantAt(number.data())); }
+
+// ----------------------------------------------------------------------------------------------
+// Learners.
+
+/// The settings, lines NAME=VALUE, are those of the program; see docs/learning.md.
+UPSWING_EXPORT(learner_open) Learner* LearnerOpen(const char* settings, size_t size) {
+  return Guarded([&] {
+    std::vector<FlagValue> flags;
+    for (const std::string_view line : Split({settings, size}, '\n')) {
+      const size_t equals = line.find('=');
+      if (equals == std::string_view::npos) throw BadInput("settings: expected NAME=VALUE");
+      const std::string name(line.substr(0, equals));
+      flags.push_back({name, std::string(line.substr(equals + 1)), name});
+    }
+    return std::make_unique<Learner>(flags).release();
+  });
+}
+
+UPSWING_EXPORT(learner_close) void LearnerClose(Learner* learner) { delete learner; }
+
+/// At most so many steps of all environments. 1: there is more; 2: finished; 0: it failed.
+UPSWING_EXPORT(learner_run) int LearnerRun(Learner* learner, int most) {
+  return Guarded([&] { return learner->Run(most) ? 1 : 2; });
+}
+
+/// Leaves as JSON where the training stands, and what has happened since the last report.
+UPSWING_EXPORT(learner_report) int LearnerReport(Learner* learner) {
+  return Guarded([&] { return SetText(learner->Report()); });
+}
+
+/// Leaves the policy as it stands, or the best at an evaluation (empty: there was none), as a file.
+UPSWING_EXPORT(learner_policy) int LearnerPolicy(Learner* learner, int best) {
+  return Guarded([&] {
+    bytes = best != 0 ? learner->best() : learner->policy();
+    return 1;
+  });
+}
+
+/// Leaves the settings of a named agent as JSON: name, value, range, unit and help of each.
+UPSWING_EXPORT(agent_settings) int AgentSettings(const char* agent, size_t size) {
+  return Guarded([&] {
+    Config config = ParseConfig("", {}, {{"agent", {agent, size}, "agent"}});
+    json settings = json::array();
+    const Options options = OptionsOf(config);
+    for (const Option& option : options.all()) {
+      settings.push_back({{"name", option.name},
+                          {"value", option.plain_text()},
+                          {"low", option.range.low},
+                          {"high", option.range.high},
+                          {"unit", option.unit},
+                          {"help", option.help}});
+    }
+    return SetText(settings);
+  });
+}

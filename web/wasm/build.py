@@ -1,0 +1,179 @@
+#!/usr/bin/env python3
+"""Compiles core, nn, sim, rl and what a training needs of lab to WebAssembly, for the page.
+
+    build.py [MODULE]     writes MODULE, by default core.wasm beside this file
+    build.py --versions   of what its bytes depend on, besides our sources
+
+The compiler is Zig's clang, the C++ library that which comes with it as source, compiled here with
+exceptions, as files from strangers are refused by one. ./upswing test installs what it needs in
+build/deps. The same versions give the same bytes on any machine.
+"""
+
+import os
+import re
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+DEPS = ROOT / "build/deps"
+WORK = ROOT / "build/wasm"
+
+
+def pinned(name):
+    """The version in tools/NAME-requirements.txt."""
+    text = (ROOT / f"tools/{name}-requirements.txt").read_text(encoding="utf-8")
+    return re.search(r"==([0-9.]+)", text)[1]
+
+
+ZIG = DEPS / f"zig-{pinned('zig')}"
+HIGHWAY = DEPS / f"highway-{pinned('highway')}"  # the version of NumPy that it comes with
+MUJOCO = DEPS / f"mujoco-{pinned('mujoco')}"  # its headers alone
+
+# Vectors of 128 bits, exceptions, and what every browser with those has.
+TARGET = ["-target", "wasm32-wasi", "-mcpu=generic+simd128+exception_handling+bulk_memory"
+          "+nontrapping_fptoint+sign_ext", "-fwasm-exceptions", "-fvisibility=hidden", "-DNDEBUG"]
+MEMORY = 512 << 20  # bytes at most; see browser.cc
+STACK = 1 << 20
+
+LAYERS = ["core", "nn", "sim", "rl"]
+# Where the time of a training goes is made fast, everything else small.
+FAST = ["nn/linear", "nn/product", "sim/closed_form", "rl/replay", "rl/sum_tree", "rl/n_step",
+        "rl/sac_update"]
+LAB = ["config", "config_checks", "config_layers", "format", "loaded_policy", "task",
+       "toml_settings", "training"]
+
+# Of LLVM's libraries, what the module asks for.
+CXXABI = ["abort_message", "cxa_aux_runtime", "cxa_default_handlers", "cxa_exception",
+          "cxa_exception_storage", "cxa_guard", "cxa_handlers", "cxa_personality", "cxa_virtual",
+          "fallback_malloc", "private_typeinfo", "stdlib_exception", "stdlib_new_delete",
+          "stdlib_stdexcept", "stdlib_typeinfo"]
+CXX = ["algorithm", "call_once", "charconv", "chrono", "error_category", "exception", "functional",
+       "hash", "ios", "ios.instantiations", "locale", "memory", "new", "new_handler", "new_helpers",
+       "stdexcept", "string", "system_error", "variant", "vector", "verbose_abort", "ryu/d2fixed",
+       "ryu/d2s", "ryu/f2s", "filesystem/path"]
+
+# The tag by which throw and catch find each other, which clang expects of its run-time library.
+EXCEPTION_TAG = ".globl __cpp_exception\n.tagtype __cpp_exception i32\n__cpp_exception:\n"
+
+
+def include(*folders):
+    return [f"-I{folder}" for folder in folders]
+
+
+def own_sources():
+    sources = [path for layer in LAYERS for path in sorted((ROOT / layer).glob("*.cc"))
+               if not path.stem.endswith(("_test", "_bench")) and path.name != "thread_pool.cc"]
+    sources += [ROOT / f"lab/{name}.cc" for name in LAB]
+    return sources + sorted(HERE.glob("*.cc"))
+
+
+def named_agents():
+    """What CMake makes of configs/*.toml."""
+    entries = "".join(f'    {{"{path.stem}", R"toml({path.read_text(encoding="utf-8")})toml"}},\n'
+                      for path in sorted((ROOT / "configs").glob("*.toml")))
+    template = (ROOT / "lab/named_agents.cc.in").read_text(encoding="utf-8")
+    return template.replace("@AGENT_ENTRIES@", entries)
+
+
+def versions():
+    """Name and version of what is compiled with our sources."""
+    def of(header, *names):
+        text = (Path("/usr/include") / header).read_text(encoding="utf-8")
+        found = [re.search(rf"#\s*define {name}\s+(\d+)", text) for name in names]
+        return ".".join(match[1] for match in found if match)
+    json = [f"NLOHMANN_JSON_VERSION_{part}" for part in ("MAJOR", "MINOR", "PATCH")]
+    toml = [f"TOML_LIB_{part}" for part in ("MAJOR", "MINOR", "PATCH")]
+    abi = Path("/usr/include/nlohmann/detail/abi_macros.hpp")
+    found = {"zig": pinned("zig"), "highway of numpy": pinned("highway"),
+             "nlohmann-json": of("nlohmann/detail/abi_macros.hpp" if abi.exists()
+                                 else "nlohmann/json.hpp", *json),
+             "toml++": of("toml++/impl/version.h", *toml), "fmt": of("fmt/core.h", "FMT_VERSION")}
+    return ", ".join(f"{name} {version}" for name, version in found.items())
+
+
+def run(program, *arguments):
+    """Zig, whose cache makes repeated compilations short."""
+    environment = os.environ | {"ZIG_LOCAL_CACHE_DIR": str(WORK / "cache"),
+                                "ZIG_GLOBAL_CACHE_DIR": str(WORK / "cache")}
+    done = subprocess.run([ZIG / "zig", program, *map(str, arguments)], check=False, cwd=ROOT,
+                          env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                          encoding="utf-8")
+    if done.returncode != 0 or done.stdout:
+        sys.exit(f"build.py: {done.stdout}")
+
+
+def compile_one(source, flags):
+    """Compiles to an object file, whose path is returned."""
+    relative = source.relative_to(ROOT) if source.is_relative_to(ROOT) else source
+    name = str(relative).replace("/", "_")
+    target = WORK / f"{name}.o"
+    program = "c++" if source.suffix in (".cc", ".cpp") else "cc"
+    if source.suffix == ".s":
+        run(program, *TARGET[:3], "-c", relative, "-o", target)
+        return target
+    # Paths within the module, such as those of failed assertions, are the same anywhere.
+    maps = [f"-ffile-prefix-map={folder}={name}" for folder, name in
+            ((ROOT, "."), (DEPS.resolve(), "deps"))]
+    run(program, *TARGET, *maps, *flags, "-c", relative, "-o", target)
+    return target
+
+
+def jobs():
+    """Each source with its flags."""
+    headers = WORK / "include"
+    for name in ("nlohmann", "toml++", "fmt", "eigen3/Eigen"):
+        link = headers / Path(name).name
+        link.parent.mkdir(parents=True, exist_ok=True)
+        if not link.is_symlink():
+            link.symlink_to(Path("/usr/include") / name)
+    agents = WORK / "named_agents.cc"
+    agents.write_text(named_agents(), encoding="utf-8")
+    tag = WORK / "exception_tag.s"
+    tag.write_text(EXCEPTION_TAG, encoding="utf-8")
+    version = re.search(r"project\(upswing VERSION ([0-9.]+)",
+                        (ROOT / "CMakeLists.txt").read_text(encoding="utf-8"))[1]
+    # Zig leaves files out of the C++ library's headers; what mentions them compiles with them, and
+    # is not linked.
+    own = ["-std=c++20", "-Wall", "-Wextra", "-Wpedantic", "-ffp-contract=off",
+           "-DHWY_DISABLED_TARGETS=0x0f0018fc", "-DFMT_HEADER_ONLY",
+           f'-DUPSWING_VERSION="{version}"', "-U_LIBCPP_HAS_FILESYSTEM",
+           "-D_LIBCPP_HAS_FILESYSTEM=1", *include(ROOT),
+           *(f"-isystem{folder}" for folder in (headers, HIGHWAY, MUJOCO / "include"))]
+    for source in [*own_sources(), agents]:
+        yield source, [*own, "-O3" if f"{source.parent.name}/{source.stem}" in FAST else "-Oz"]
+    cxx = ["-std=c++23", "-Oz", "-w", "-D_LIBCPP_BUILDING_LIBRARY", "-D_LIBCXXABI_BUILDING_LIBRARY",
+           "-DLIBCXX_BUILDING_LIBCXXABI", "-DLIBCXXABI_SILENT_TERMINATE",
+           "-D_LIBCXXABI_HAS_NO_THREADS",
+           *include(*(ZIG / f"lib/{folder}" for folder in
+                      ("libcxxabi/include", "libcxx/src", "libcxx/libc", "libunwind/include")))]
+    for library, names in (("libcxxabi", CXXABI), ("libcxx", CXX)):
+        for name in names:
+            yield ZIG / f"lib/{library}/src/{name}.cpp", cxx
+    unwind = ZIG / "lib/libunwind"
+    yield unwind / "src/Unwind-wasm.c", ["-Oz", "-w", "-D_LIBUNWIND_HAS_NO_THREADS",
+                                         "-D_LIBUNWIND_HIDE_SYMBOLS", *include(unwind / "include")]
+    yield tag, []
+
+
+def make(module):
+    """Writes the module, and beside it what it was made with."""
+    for folder in (ZIG, HIGHWAY, MUJOCO):
+        if not folder.exists():
+            sys.exit(f"build.py: {folder} is missing: ./upswing test installs it")
+    WORK.mkdir(parents=True, exist_ok=True)
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        objects = list(pool.map(lambda job: compile_one(*job), jobs()))
+    run("cc", *TARGET, "-mexec-model=reactor", "-s", f"-Wl,--max-memory={MEMORY}",
+        f"-Wl,-z,stack-size={STACK}", *objects, "-o", module.resolve())
+    module.chmod(0o644)
+    module.with_suffix(".txt").write_text(f"{versions()}\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    if sys.argv[1:] == ["--versions"]:
+        print(versions())
+    else:
+        make(Path(sys.argv[1]) if len(sys.argv) > 1 else HERE / "core.wasm")

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "lab/training.h"
+
+namespace upswing {
+
+/// A training that a page drives step by step and looks at in between.
+class Learner : private TrainObserver {
+ public:
+  /// With these settings, which begin with a named agent ("agent", "fast"). Physics are the closed
+  /// form, in training and evaluation. Throws BadInput as the program does.
+  explicit Learner(const std::vector<FlagValue>& flags);
+
+  /// At most this many steps of all environments. False once the training is finished.
+  bool Run(int most);
+
+  /// Where the training stands, and what has happened since the last call.
+  nlohmann::json Report();
+
+  /// The policy as it stands; the best at an evaluation, empty until there is one. As files.
+  std::vector<std::byte> policy() const;
+  const std::vector<std::byte>& best() const { return best_; }
+
+ private:
+  void OnEpisode(const TrainState& state, const FinishedEpisode& episode) override;
+  void OnMetrics(const TrainState& state, const Metrics& metrics) override;
+  void OnEvaluation(const TrainState& state, const Evaluation& evaluation) override;
+  void OnBest(const TrainState& state, const Policy& policy) override;
+
+  Training training_;
+  std::vector<std::byte> best_;
+  nlohmann::json episodes_, metrics_, evaluations_;  // since the last report
+};
+
+}  // namespace upswing

@@ -1,0 +1,20 @@
+// The thread pool where there is one thread: a page's workers share nothing.
+#include "core/thread_pool.h"
+
+namespace upswing {
+
+struct ThreadPool::Workers {};
+
+ThreadPool::ThreadPool(int) : threads_(1) {}
+
+ThreadPool::~ThreadPool() = default;
+
+void ThreadPool::ParallelFor(int n, const std::function<void(int)>& task) {
+  for (int i = 0; i < n; ++i) task(i);
+}
+
+void ParallelFor(ThreadPool* /*pool*/, int n, const std::function<void(int)>& task) {
+  for (int i = 0; i < n; ++i) task(i);
+}
+
+}  // namespace upswing
