@@ -80,7 +80,7 @@ for (const name of ['gravity', 'mass1', 'mass2', 'length1', 'length2', 'torque_l
   test(`a plant with a ${name} of 0 is refused, and the charts go on`, async ({ page }) => {
     await open(page);
     await bring(page, ofPlant({ [name]: 0 }));
-    await expect(page.locator('#message')).toContainText(`expected a ${name} of 0.`);
+    await expect(page.locator('#message')).toContainText(`${name}: expected a number in [0.`);
     await expect(page.locator('#agent')).toHaveValue('d3qn');
     await expect(page.locator('#q-value')).toHaveText(/best \d/);
   });
@@ -159,9 +159,10 @@ test('what a policy file says is text, of bounded length', async ({ page }) => {
   const message = page.locator('#message-text');
   await expect(message).toContainText('<img src=x');
   expect((await message.textContent())!.length).toBeLessThan(300);
-  await bring(page, changed({ agent: evil, step: '1e999' }), `${evil.slice(0, 200)}.safetensors`);
+  // The agent's name has a length that no file may exceed.
+  const agent = evil.slice(0, 64);
+  await bring(page, changed({ agent }), `${evil.slice(0, 200)}.safetensors`);
   await expect(page.locator('#agent')).toHaveValue('own');
-  await expect(page.locator('#curve-value')).toHaveText('');
   const title = (await page.locator('#agent option:checked').textContent())!;
   expect(title).toContain('<img src=x');
   expect(title.length).toBeLessThan(80);
