@@ -1,15 +1,17 @@
 import { Agents } from './page/agents';
 import { startSimulator } from './page/boot';
 import { element } from './page/dom';
-import { focusWideFormulas, placeQValues } from './page/layout';
+import { focusWideFormulas, placeCharts } from './page/layout';
 import { Page } from './page/page';
+import { showView, viewOf } from './page/views';
 import { printable } from './text';
 import { World } from './world';
 
 document.documentElement.dataset.script = 'running'; // for public/watch.js and style.css
 
 try {
-  placeQValues();
+  showView(viewOf(location.hash));
+  placeCharts();
   focusWideFormulas();
   const progress = element<HTMLProgressElement>('progress');
   const [simulator, agents] = await Promise.all([

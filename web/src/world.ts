@@ -39,6 +39,8 @@ export class World {
   readonly simulator: Simulator;
   readonly disturbance: Disturbance = { sensor_noise: 0, delay: 0 };
   agentOn = false;
+  /// N·m, that a visitor asks of the motor while the agent is off.
+  byHand = 0;
   /// Where on the pendulum a hand holds it, and where the hand is.
   drag: { link: 1 | 2; along: number; target: Vec } | null = null;
   onMoment: (moment: Moment) => void = () => {};
@@ -143,6 +145,16 @@ export class World {
     this.decision = this.policy?.act(this.observe()) ?? null;
   }
 
+  /// What the agent would decide in another state, with the memory that it has now.
+  decisionAt(state: State): Decision | null {
+    const { plant, policy } = this;
+    if (!policy) return null;
+    const now = observe(plant, state);
+    const observation = withMemory(now, policy.memory, null, 0);
+    if (this.observation) observation.set(this.observation.subarray(now.length), now.length);
+    return policy.act(observation);
+  }
+
   /// The observation at this moment.
   private observe(): Float32Array {
     const { plant, policy, observation, chosen } = this;
@@ -154,7 +166,7 @@ export class World {
     const { plant, policy, state } = this;
     this.observation = this.observe();
     this.decision = policy?.act(this.observation) ?? null;
-    this.chosen = this.agentOn ? (this.decision?.torque ?? 0) : 0;
+    this.chosen = this.agentOn ? (this.decision?.torque ?? 0) : this.byHand;
     const limit = plant.torque_limit;
     const arriving = this.motor.apply(this.chosen, this.disturbance.delay);
     this.torque = Math.min(Math.max(arriving, -limit), limit);

@@ -97,7 +97,7 @@ test('while paused, the keyboard sets the start', async ({ page }) => {
   await page.keyboard.press('End');
   const state = () => page.evaluate(() => upswing.world.state);
   let posed = await state();
-  expect(posed).toEqual({ q1: Math.PI, q2: -1, w1: 0, w2: 0 });
+  expect(posed).toEqual({ q1: Math.PI, q2: -1, w1: 2, w2: 1 }); // the others as they were
   await page.keyboard.press('ArrowLeft');
   const lower = page.getByLabel('Angle of the lower link to it', { exact: true });
   await expect(lower).toHaveAttribute('aria-valuetext', '-57°');

@@ -43,7 +43,7 @@ for (const width of WIDTHS) {
         const hidden = '[hidden], .visually-hidden, #live, #loading, noscript';
         const wrong: string[] = [];
         for (const one of document.querySelectorAll(wanted)) {
-          if (one.closest(hidden)) continue;
+          if (one.closest(hidden) || !one.checkVisibility()) continue;
           for (const block of ['nearest', 'start', 'end'] as const) {
             one.scrollIntoView({ block, behavior: 'instant' });
             const { x, y, width: w, height: h } = one.getClientRects()[0]!; // the first line

@@ -63,7 +63,7 @@ test.describe('what is missing or broken is told', () => {
 
   test('a browser without WebAssembly is told so', async ({ page }) => {
     await page.addInitScript(() => Reflect.deleteProperty(globalThis, 'WebAssembly'));
-    await page.goto('./');
+    await page.goto('./#everything');
     await expectProblem(page, 'no WebAssembly');
   });
 
@@ -73,7 +73,7 @@ test.describe('what is missing or broken is told', () => {
   ] as const) {
     test(what, async ({ page }) => {
       await page.route(pattern, (route) => route.fulfill({ status: 200, body: 'broken' }));
-      await page.goto('./');
+      await page.goto('./#everything');
       await expectProblem(page, 'could not start');
       for (const [answer, words] of [
         [{ status: 404 }, 'is missing'],
@@ -100,7 +100,7 @@ test.describe('what is missing or broken is told', () => {
         answer ? route.fulfill(answer) : route.abort(),
       );
       await page.goto('about:blank');
-      await page.goto('./');
+      await page.goto('./#everything');
       await expect(page.locator('#message')).toContainText('Agent "d3qn" cannot be used');
       await expect(page.locator('#message')).toContainText(words);
       await expect(page.locator('#agent-text')).toContainText('could not be loaded');
@@ -117,7 +117,7 @@ test.describe('what is missing or broken is told', () => {
       await page.route(/assets\/index-.*\.js$/, (route) =>
         what === 'missing' ? route.fulfill({ status: 404 }) : route.abort(),
       );
-      await page.goto('./');
+      await page.goto('./#everything');
       await expectProblem(page, /its script .*index-.*\.js, or a part of it, is missing/);
     });
   }
@@ -126,13 +126,13 @@ test.describe('what is missing or broken is told', () => {
     await page.route(/assets\/index-.*\.js$/, (route) =>
       route.fulfill({ contentType: 'text/javascript', body: 'let let = ?;' }),
     );
-    await page.goto('./');
+    await page.goto('./#everything');
     await expectProblem(page, 'does not understand its script');
   });
 
   test('without any script a sentence appears after a while', async ({ page }) => {
     await page.route(/\.js$/, (route) => route.abort());
-    await page.goto('./');
+    await page.goto('./#everything');
     const slow = page.locator('#slow');
     await expect(slow).toBeHidden();
     await page.evaluate(() => {
@@ -158,7 +158,7 @@ test.describe('what is missing or broken is told', () => {
   test('JavaScript is switched off', async ({ browser }) => {
     const context = await browser.newContext({ javaScriptEnabled: false });
     const page = await context.newPage();
-    await page.goto('./');
+    await page.goto('./#everything');
     await expect(page.locator('noscript p')).toBeVisible();
     for (const id of ['loading', 'badge', 'buttons', 'agent']) {
       await expect(page.locator(`#${id}`)).toBeHidden();

@@ -12,7 +12,7 @@ const median = (values) => values.toSorted((a, b) => a - b)[Math.floor(values.le
 async function measure(page) {
   const bodies = [];
   page.on('response', (response) => bodies.push(response.body()));
-  await page.goto(server.address);
+  await page.goto(`${server.address}#everything`);
   await ready(page);
   const start = await page.evaluate(() => ({
     ready: performance.now(),

@@ -19,8 +19,8 @@ export const test = base.extend<{ complains: boolean; silent: void }>({
   ],
 });
 
-/// Opens the page and waits until the pendulum hangs in it.
-export async function open(page: Page, hash = ''): Promise<void> {
+/// Opens the page, everything that it has, and waits until the pendulum hangs in it.
+export async function open(page: Page, hash = '#everything'): Promise<void> {
   await page.goto(`./${hash}`);
   await expect(page.locator('#agent-on')).toBeEnabled();
 }

@@ -13,7 +13,7 @@ async function stop() {
 
 /// The agent swings up from hanging; stopped on the way.
 async function swingUp(page) {
-  await page.goto(server.address);
+  await page.goto(`${server.address}#everything`);
   await ready(page);
   await page.click('#agent-on');
   await page.waitForFunction(() => {

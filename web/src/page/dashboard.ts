@@ -8,6 +8,7 @@ import type { World } from '../world';
 import { element } from './dom';
 
 const FRAMES = 2; // the charts are drawn at every second frame
+const TORQUE_MEAN = 15; // control steps: a balancing agent changes its torque at each of them
 
 /// The charts and the numbers beside them.
 export class Dashboard {
@@ -48,6 +49,7 @@ export class Dashboard {
     });
     this.torque.draw(moments, now, {
       timed: true,
+      mean: TORQUE_MEAN,
       low: -1.1 * limit,
       high: 1.1 * limit,
       labels: [

@@ -3,15 +3,19 @@ import { element } from './dom';
 /// Where there is room for three columns; the same width as in style.css.
 const wide = matchMedia('(min-width: 75em)');
 
-/// Keeps the Q-values on one screen with the pendulum: among the charts where these stand beside it,
-/// below the pendulum where they do not.
-export function placeQValues(): void {
-  const figure = element('q-figure');
-  const place = () =>
-    wide.matches ? element('phase-figure').before(figure) : element('beside').append(figure);
-  wide.addEventListener('change', place);
-  place();
+/// Keeps the Q-values on one screen with the pendulum: the first chart where these stand beside it,
+/// below the pendulum where they do not. In the tour the map stands there too.
+export function placeCharts(): void {
+  const tour = document.documentElement.dataset.view === 'tour';
+  const [charts, beside] = [element('charts'), element('beside')];
+  const q = element('q-figure');
+  const map = element('map-figure');
+  const place = wide.matches && !tour ? charts : beside;
+  if (q.parentElement !== place) place.prepend(q);
+  if (tour) beside.append(map);
+  else if (map.parentElement !== charts) element('phase-figure').before(map);
 }
+wide.addEventListener('change', placeCharts);
 
 /// A formula that is wider than its place can be scrolled by keyboard, and only then takes the focus.
 export function focusWideFormulas(): void {

@@ -1,4 +1,5 @@
 import { History } from '../history';
+import type { State } from '../pendulum';
 import { BadInput } from '../safetensors';
 import { quoted } from '../text';
 import { LearningCurve } from '../view/charts';
@@ -10,13 +11,16 @@ import { Dashboard, situation } from './dashboard';
 import { button, element } from './dom';
 import { Hand } from './hand';
 import { listenToKeys } from './keys';
-import { showStage } from './layout';
+import { placeCharts, showStage } from './layout';
+import { MapPanel } from './map';
 import { hideMessage, note, warn } from './message';
 import { Pose } from './pose';
 import { RANGES, Settings } from './settings';
 import { BEGINNING, decode, encode, OWN } from './share';
 import type { Shared } from './share';
 import { changeTheme, onThemeChange } from './theme';
+import { Tour } from './tour';
+import { showView, viewOf } from './views';
 
 const REMEMBERED = 60; // s of history
 const ADDRESS_DELAY = 300; // ms: browsers refuse an address that changes with each pixel of a slider
@@ -32,9 +36,12 @@ export class Page {
   private readonly pose: Pose;
   private readonly dashboard = new Dashboard();
   private readonly curve = new LearningCurve();
+  private readonly map = new MapPanel((where) => this.start(where));
+  private readonly tour: Tour;
   private readonly still = matchMedia('(prefers-reduced-motion: reduce)');
   private agent: Agent | null = null;
   private requests = 0; // for agents; the last one counts
+  private takes = 0; // likewise
   private paused = false;
   private announced = ''; // the last situation that was read out
   private addressTimer = 0;
@@ -45,11 +52,22 @@ export class Page {
     this.clock = new Clock(world);
     this.settings = new Settings(world, () => this.changed());
     this.pose = new Pose(world, () => this.restarted());
+    this.tour = new Tour(
+      this,
+      (id) => agents.has(id),
+      () => this.changed(),
+    );
     world.onMoment = (moment) => this.history.add(moment);
   }
 
-  /// Starts again with the settings of the address.
+  /// Starts again with the view and the settings of the address.
   async open(): Promise<void> {
+    const view = viewOf(location.hash);
+    showView(view);
+    placeCharts();
+    this.setPaused(false);
+    if (view.name === 'tour') return this.tour.go(view.step);
+    this.tour.leave();
     const { shared, problems } = decode(location.hash, RANGES);
     if (shared.agent !== null && !this.agents.has(shared.agent)) {
       problems.push(
@@ -60,14 +78,19 @@ export class Page {
       shared.agent = null;
     }
     this.world.agentOn = false;
-    await this.choose(shared.agent ?? this.agents.list[0]!.id);
-    this.setPaused(false);
-    this.apply(shared);
-    this.world.reset();
-    this.restarted();
+    await this.take(shared);
+    this.reset();
     if (problems.length === 0) return;
     const more = problems.length > 3 ? `; and ${problems.length - 3} more` : '';
     warn(`Not all of the link could be used: ${problems.slice(0, 3).join('; ')}${more}.`);
+  }
+
+  /// Takes agent and settings, all others as at the beginning; the pendulum moves on.
+  async take(shared: Partial<Shared>): Promise<void> {
+    const all = { ...BEGINNING, ...shared };
+    const taking = ++this.takes;
+    await this.choose(all.agent ?? this.agents.list[0]!.id);
+    if (taking === this.takes) this.apply(all);
   }
 
   /// Handles input, then advances and draws at every frame.
@@ -89,17 +112,17 @@ export class Page {
 
   /// Changes to another agent; if it cannot be loaded, says why, keeps the old one and returns false.
   choose(id: string): Promise<boolean> {
-    return this.take(() => this.agents.get(id), `Agent ${quoted(id)}`);
+    return this.load(() => this.agents.get(id), `Agent ${quoted(id)}`);
   }
 
   /// Changes to a visitor's own policy and to the plant that it was trained on.
   async openFile(file: File): Promise<void> {
-    if (!(await this.take(() => this.agents.open(file), quoted(file.name)))) return;
+    if (!(await this.load(() => this.agents.open(file), quoted(file.name)))) return;
     this.settings.setPlant(this.agent!.policy.plant);
     this.changed();
   }
 
-  private async take(get: () => Promise<Agent>, name: string): Promise<boolean> {
+  private async load(get: () => Promise<Agent>, name: string): Promise<boolean> {
     const request = ++this.requests;
     element('agent-text').textContent = 'Loading …';
     try {
@@ -212,7 +235,7 @@ export class Page {
     element('agent').focus(); // the button is gone
   }
 
-  private setAgentOn(on: boolean): void {
+  setAgentOn(on: boolean): void {
     if (!this.agent) return;
     this.world.agentOn = on;
     element('agent-on').ariaPressed = String(on);
@@ -227,7 +250,7 @@ export class Page {
     this.pose.shown = paused;
   }
 
-  private setSpeed(speed: number): void {
+  setSpeed(speed: number): void {
     this.clock.speed = speed;
     element<HTMLInputElement>('speed').value = String(speed);
     element('speed-value').textContent = `${speed}×`;
@@ -243,8 +266,26 @@ export class Page {
     this.clock.settle();
   }
 
-  private reset(): void {
+  /// Of the lower link (kg).
+  setMass(mass2: number): void {
+    this.settings.setPlant({ ...this.world.plant, mass2 });
+    this.changed();
+  }
+
+  /// From hanging.
+  reset(): void {
     this.world.reset();
+    this.restarted();
+  }
+
+  /// What the map shows at first.
+  resetMap(): void {
+    this.map.reset();
+  }
+
+  /// From a state with these variables, the others as they are.
+  start(where: Partial<State>): void {
+    this.world.reset({ ...this.world.state, ...where });
     this.restarted();
   }
 
@@ -276,14 +317,18 @@ export class Page {
 
   private writeAddress(): void {
     clearTimeout(this.addressTimer);
-    const hash = encode({
+    const hash = this.tour.number > 0 ? `tour=${this.tour.number}` : this.settingsHash();
+    history.replaceState(null, '', `#${hash}`);
+  }
+
+  private settingsHash(): string {
+    return encode({
       agent: this.agent?.id ?? null,
       on: this.world.agentOn,
       speed: this.clock.speed,
       plant: this.world.plant,
       ...this.world.disturbance,
     });
-    history.replaceState(null, '', `#${hash}`);
   }
 
   private async share(): Promise<void> {
@@ -311,6 +356,7 @@ export class Page {
     for (const canvas of [this.scene.canvas, this.curve.canvas, ...this.dashboard.canvases]) {
       canvas.forgetColors();
     }
+    this.map.canvas.forgetColors();
     this.drawCurve();
   }
 
@@ -322,13 +368,16 @@ export class Page {
     const { world } = this;
     const trail = this.still.matches ? [] : this.history.from(world.time - TRAIL_SECONDS);
     this.scene.draw(world, this.clock.state, trail);
+    this.tour.follow(world, this.scene);
     if (this.paused) this.pose.follow(world.state);
     this.dashboard.draw(world, this.history);
+    this.map.draw(world, this.history);
     const { state, text } = situation(world);
     const badge = element('badge');
     badge.textContent = this.paused ? `paused, ${text}` : text;
     badge.dataset.state = state;
     if (state === this.announced) return;
+    if (state === 'balanced' && !this.still.matches) this.scene.sparks.light();
     // Read out when it changes, not at each tenth of a second.
     this.announced = state;
     const words = state === 'balanced' ? 'balanced' : text;

@@ -1,4 +1,4 @@
-import type { State } from '../pendulum';
+import type { Range, State } from '../pendulum';
 import type { World } from '../world';
 import { element } from './dom';
 import { Slider } from './sliders';
@@ -18,25 +18,38 @@ const ANGLE = {
   format: (value: number) => `${Math.round(value)}°`,
 } as const;
 
-/// Sliders for the angles of a pendulum that is paused, for those who cannot drag it.
+const velocity = (fastest: number) => {
+  const limits: Range = [-150, 150];
+  return { unit: 'rad/s', min: -fastest, max: fastest, limits, step: 0.1, initial: 0 };
+};
+
+const VELOCITY = { w1: velocity(10), w2: velocity(20) } as const;
+
+type Variable = keyof State;
+
+/// Sliders for the state of a pendulum that is paused, for those who cannot drag it or click on the map.
 export class Pose {
   private readonly world: World;
-  private readonly q1: Slider;
-  private readonly q2: Slider;
+  private readonly sliders: readonly (readonly [Variable, Slider])[];
 
   constructor(world: World, onPose: () => void) {
     this.world = world;
-    const slider = (name: 'q1' | 'q2', label: string) => {
-      const made = new Slider({ ...ANGLE, name: `pose-${name}`, label }, (value) => {
-        const { q1, q2 } = world.state;
-        world.reset({ q1, q2, w1: 0, w2: 0, [name]: (Math.PI / 180) * value });
+    const slider = (name: Variable, label: string) => {
+      const spec = name === 'q1' || name === 'q2' ? ANGLE : VELOCITY[name];
+      const made = new Slider({ ...spec, name: `pose-${name}`, label }, (value) => {
+        const scale = spec === ANGLE ? Math.PI / 180 : 1;
+        world.reset({ ...world.state, [name]: scale * value });
         onPose();
       });
       element('pose').append(made.element);
-      return made;
+      return [name, made] as const;
     };
-    this.q1 = slider('q1', 'Angle of the upper link');
-    this.q2 = slider('q2', 'Angle of the lower link to it');
+    this.sliders = [
+      slider('q1', 'Angle of the upper link'),
+      slider('q2', 'Angle of the lower link to it'),
+      slider('w1', 'Velocity of the upper joint'),
+      slider('w2', 'Velocity of the lower joint'),
+    ];
   }
 
   /// Shows the sliders instead of the hint while the pendulum is paused.
@@ -46,14 +59,15 @@ export class Pose {
     if (shown) this.follow(this.world.state);
   }
 
-  /// Shows the angles of a state. (180° and -180° are one place, at both ends of a slider.)
-  follow({ q1, q2 }: State): void {
-    for (const [slider, angle] of [
-      [this.q1, q1],
-      [this.q2, q2],
-    ] as const) {
-      const apart = degrees(angle - (Math.PI / 180) * slider.value);
-      if (Math.abs(apart) > 1e-6) slider.value = degrees(angle);
+  /// Shows a state. (180° and -180° are one place, at both ends of a slider.)
+  follow(state: State): void {
+    for (const [name, slider] of this.sliders) {
+      if (name === 'q1' || name === 'q2') {
+        const apart = degrees(state[name] - (Math.PI / 180) * slider.value);
+        if (Math.abs(apart) > 1e-6) slider.value = degrees(state[name]);
+      } else if (Math.abs(state[name] - slider.value) > 0.05) {
+        slider.value = Math.round(10 * state[name]) / 10;
+      }
     }
   }
 }

@@ -56,6 +56,8 @@ export function decode(
       shared.agent = text;
     } else if (name === 'on') {
       shared.on = text === '1';
+    } else if (name === 'everything') {
+      // the view; it has no value
     } else if (!range) {
       problems.push(`unknown ${quoted(name)}`);
     } else if (text.trim() === '' || !(value >= range[0] && value <= range[1])) {

@@ -34,9 +34,9 @@ export class Canvas {
     this.context.clearRect(0, 0, this.width, this.height);
   }
 
-  text(text: string, x: number, y: number, align: CanvasTextAlign = 'left'): void {
-    this.context.font = '11px system-ui, sans-serif';
-    this.context.fillStyle = this.color('quiet');
+  text(text: string, x: number, y: number, align: CanvasTextAlign = 'left', color = 'quiet'): void {
+    this.context.font = '12px system-ui, sans-serif';
+    this.context.fillStyle = this.color(color);
     this.context.textAlign = align;
     this.context.textBaseline = 'middle';
     this.context.fillText(text, x, y);

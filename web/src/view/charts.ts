@@ -8,6 +8,7 @@ interface StripScale {
   high: number;
   target?: number; // a line to reach
   timed?: boolean; // says how long ago its left edge is
+  mean?: number; // moments, over which a mean is drawn in front of what changes faster
   labels: readonly (readonly [number, string])[];
 }
 
@@ -38,7 +39,7 @@ export class Strip {
           [left, y(v)],
           [canvas.width, y(v)],
         ],
-        'faint',
+        'grid',
         1,
       );
     }
@@ -55,11 +56,28 @@ export class Strip {
       canvas.context.setLineDash([]);
     }
     if (scale.timed) canvas.text(`−${SECONDS_SHOWN} s`, left + 2, canvas.height - 6);
-    canvas.line(
-      moments.map((m) => [x(m.t), y(Math.min(Math.max(value(m), scale.low), scale.high))]),
-      this.color,
-    );
+    const values = moments.map((m) => Math.min(Math.max(value(m), scale.low), scale.high));
+    const draw = (of: number[], width: number) =>
+      canvas.line(
+        of.map((v, i) => [x(moments[i]!.t), y(v)]),
+        this.color,
+        width,
+      );
+    if (scale.mean === undefined) return draw(values, 2);
+    canvas.context.globalAlpha = 0.35;
+    draw(values, 1);
+    canvas.context.globalAlpha = 1;
+    draw(runningMean(values, scale.mean), 2.5);
   }
+}
+
+/// Of each value and those before it, `count` in all.
+function runningMean(values: number[], count: number): number[] {
+  let sum = 0;
+  return values.map((value, i) => {
+    sum += value - (i >= count ? values[i - count]! : 0);
+    return sum / Math.min(i + 1, count);
+  });
 }
 
 /// Velocity over angle of both links; upright in the middle.
@@ -78,7 +96,7 @@ export class PhasePortrait {
         [0, cy],
         [canvas.width, cy],
       ],
-      'faint',
+      'grid',
       1,
     );
     canvas.line(
@@ -86,7 +104,7 @@ export class PhasePortrait {
         [cx, 0],
         [cx, canvas.height - 14],
       ],
-      'faint',
+      'grid',
       1,
     );
     canvas.text('−180°', 2, canvas.height - 6);
@@ -162,7 +180,7 @@ export class LearningCurve {
           [left, y(share)],
           [canvas.width, y(share)],
         ],
-        'faint',
+        'grid',
         1,
       );
     }

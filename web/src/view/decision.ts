@@ -7,11 +7,13 @@ const LABEL_WIDTH = 30; // pixels, of a torque under its bar
 const BOTTOM = 16; // pixels, for the torques below a chart
 const TOP = 4;
 const CUT_OFF = 0.005; // share of a distribution that is worth a number
+const EASE = 0.2; // of the way to a bar's new height and colour, at each drawing
 
 /// What the agent makes of what it sees: its Q-values, or how likely it finds each torque.
 export class DecisionChart {
   readonly canvas = new Canvas('q');
   private room = 1; // of Q-values: from the bottom of the chart to the largest
+  private bars: { height: number; chosen: number }[] = []; // as they are drawn; shares of 1
 
   draw(decision: Decision | null): void {
     this.canvas.clear();
@@ -47,10 +49,23 @@ export class DecisionChart {
     const { canvas, bottom } = this;
     const width = canvas.width / torques.length;
     const labelled = Math.ceil(LABEL_WIDTH / width); // each, or each second, …
+    if (this.bars.length !== torques.length) {
+      this.bars = Array.from(torques, (_, i) => ({ height: share(i), chosen: 0 }));
+    }
     torques.forEach((torque, i) => {
-      const height = (bottom - TOP) * share(i);
-      const color = i === action ? 'torque' : 'bar';
-      canvas.rectangle(i * width + 2, bottom - height, width - 4, height, color);
+      // Eased: the agent chooses 50 times a second, and the colour is how often it chose this one lately.
+      const bar = this.bars[i]!;
+      bar.height += EASE * (share(i) - bar.height);
+      bar.chosen += EASE * (Number(i === action) - bar.chosen);
+      const height = (bottom - TOP) * bar.height;
+      const box = [i * width + 2.5, bottom - height, width - 5, height] as const;
+      canvas.rectangle(...box, 'bar');
+      canvas.context.globalAlpha = bar.chosen;
+      canvas.rectangle(...box, 'torque');
+      canvas.context.globalAlpha = 1;
+      canvas.context.strokeStyle = canvas.color('grid');
+      canvas.context.lineWidth = 1;
+      canvas.context.strokeRect(...box);
       if (i % labelled === 0) {
         canvas.text(signed(torque), (i + 0.5) * width, canvas.height - 7, 'center');
       }
@@ -76,12 +91,12 @@ export class DecisionChart {
         [left, bottom],
         [right, bottom],
       ],
-      'faint',
+      'grid',
       1,
     );
     const within = points.filter(([at]) => at >= x(low) - 1 && at <= x(high) + 1);
     if (within.length > 1) canvas.area(within, bottom, 'spread');
-    canvas.line(points, 'bar');
+    canvas.line(points, 'edge');
     canvas.line(
       [
         [x(mean), TOP],

@@ -1,16 +1,24 @@
-import type { State } from '../pendulum';
+import { CONTROL_PERIOD } from '../pendulum';
+import type { Plant, State } from '../pendulum';
 import type { Vec } from '../simulator';
 import { pointOn } from '../world';
 import type { Moment, World } from '../world';
 import { Canvas } from './canvas';
+import { drawLabel } from './labels';
+import type { Label } from './labels';
+import { Sparks } from './sparks';
 
 export const TRAIL_SECONDS = 1.3; // of the pendulum's time
 const TRAIL_SHADES = 13;
+const GHOST_STEPS = 5; // control steps between two ghosts
+const PIVOT: Vec = { x: 0, z: 0 };
 const LARGEST_ARC = (150 / 180) * Math.PI; // at the motor's limit
 
 /// The pendulum in its plane, seen so that positive angles and torques are clockwise.
 export class Scene {
   readonly canvas = new Canvas('scene');
+  readonly sparks = new Sparks();
+  labels: readonly Label[] = [];
 
   /// Pixels per metre.
   private scale = 1;
@@ -39,36 +47,85 @@ export class Scene {
     const reach = Math.max(1, plant.length1 + plant.length2);
     this.scale = (0.44 * Math.min(canvas.width, canvas.height)) / reach;
     canvas.clear();
-    this.drawGuides(plant.length1 + plant.length2);
+    this.drawGuides(plant.length1 + plant.length2, world.uprightFor !== null);
+    this.drawGhosts(plant, trail);
     this.drawTrail(world, state, trail);
 
     const elbow = pointOn(plant, state, 1, plant.length1).position;
     const tip = pointOn(plant, state, 2, plant.length2).position;
-    this.drawLink({ x: 0, z: 0 }, elbow, 'link1', plant.mass1);
+    this.drawLink(PIVOT, elbow, 'link1', plant.mass1);
     this.drawLink(elbow, tip, 'link2', plant.mass2);
-    canvas.disc(...this.at({ x: 0, z: 0 }), 7, 'ink');
-    canvas.disc(...this.at(elbow), 4, 'panel');
+    this.drawMotor();
+    canvas.disc(...this.at(elbow), 4.5, 'panel');
     this.drawTorque(world.torque / plant.torque_limit);
     this.drawPush(world, state);
+    this.sparks.draw(canvas, ...this.at(tip), 0.5 * this.scale);
+    for (const { at, text } of this.labels) {
+      const [x, y] = this.place(at, elbow, tip);
+      drawLabel(canvas, text, x, y);
+    }
   }
 
-  /// How far the tip reaches, and the cone within which a link is upright.
-  private drawGuides(reach: number): void {
+  /// Where the label of something is written.
+  private place(what: Label['at'], elbow: Vec, tip: Vec): [number, number] {
+    const aside = 0.12 * this.scale;
+    if (what === 'motor') {
+      const [x, y] = this.at(PIVOT);
+      return [x + 1.6 * aside, y + 0.2 * aside];
+    }
+    if (what === 'goal') {
+      const [x, y] = this.at({ x: 0.5, z: 0.87 });
+      return [x + 0.2 * aside, y - 0.3 * aside];
+    }
+    const [x, y] = this.at({ x: (elbow.x + tip.x) / 2, z: (elbow.z + tip.z) / 2 });
+    return [x + aside, y];
+  }
+
+  /// How far the tip reaches, and the cone within which a link is upright, like the light of a lamp that
+  /// is on (`lit`) while both are.
+  private drawGuides(reach: number, lit: boolean): void {
     const { context } = this.canvas;
-    const [x, y] = this.at({ x: 0, z: 0 });
+    const [x, y] = this.at(PIVOT);
     const radius = this.scale * reach;
     context.beginPath();
     context.arc(x, y, radius, 0, 2 * Math.PI);
-    context.strokeStyle = this.canvas.color('edge');
-    context.lineWidth = 0.5;
+    context.strokeStyle = this.canvas.color('grid');
+    context.lineWidth = 1;
     context.stroke();
     context.beginPath();
     context.moveTo(x, y);
     context.arc(x, y, radius, (-120 / 180) * Math.PI, (-60 / 180) * Math.PI);
+    context.closePath();
     context.fillStyle = this.canvas.color('cone');
     context.fill();
-    context.closePath();
+    if (lit) context.fill();
+    context.strokeStyle = this.canvas.color('cone-edge');
+    context.lineWidth = lit ? 3 : 1.5;
     context.stroke();
+  }
+
+  /// Where both links were, at equal times, as in a photograph by flashes.
+  private drawGhosts(plant: Plant, moments: readonly Moment[]): void {
+    const { context } = this.canvas;
+    const width = Math.max(4, 0.025 * this.scale);
+    context.lineCap = 'round';
+    moments.forEach(({ t, state }, i) => {
+      if (Math.round(t / CONTROL_PERIOD) % GHOST_STEPS !== 0) return;
+      context.globalAlpha = (0.22 * i) / moments.length;
+      const elbow = this.at(pointOn(plant, state, 1, plant.length1).position);
+      const tip = this.at(pointOn(plant, state, 2, plant.length2).position);
+      this.canvas.line([this.at(PIVOT), elbow], 'link1', width);
+      this.canvas.line([elbow, tip], 'link2', width);
+    });
+    context.globalAlpha = 1;
+    context.lineCap = 'butt';
+  }
+
+  private drawMotor(): void {
+    const place = this.at(PIVOT);
+    const radius = Math.max(9, 0.045 * this.scale);
+    this.canvas.disc(...place, radius, 'ink');
+    this.canvas.disc(...place, 0.45 * radius, 'stage');
   }
 
   /// Older parts are fainter.
@@ -91,13 +148,12 @@ export class Scene {
     context.globalAlpha = 1;
   }
 
-  /// A link is as thick as its capsule, or more so that a finger finds it; heavier is darker.
+  /// A link of 1 kg is as thick as its capsule, or more so that a finger finds it; a heavier one thicker.
   private drawLink(from: Vec, to: Vec, color: string, mass: number): void {
     const { context } = this.canvas;
+    const thickness = Math.max(10, 0.06 * this.scale) * Math.min(Math.max(mass, 0.25), 3) ** 0.5;
     context.lineCap = 'round';
-    context.globalAlpha = Math.min(1, 0.55 + 0.3 * mass);
-    this.canvas.line([this.at(from), this.at(to)], color, Math.max(10, 0.06 * this.scale));
-    context.globalAlpha = 1;
+    this.canvas.line([this.at(from), this.at(to)], color, thickness);
     context.lineCap = 'butt';
   }
 
@@ -106,13 +162,13 @@ export class Scene {
   private drawTorque(share: number): void {
     if (Math.abs(share) < 1e-9) return;
     const { context } = this.canvas;
-    const [x, y] = this.at({ x: 0, z: 0 });
+    const [x, y] = this.at(PIVOT);
     const radius = 0.17 * this.scale;
     const [start, end] = [-Math.PI / 2, -Math.PI / 2 + share * LARGEST_ARC];
     context.beginPath();
     context.arc(x, y, radius, start, end, share < 0);
     context.strokeStyle = this.canvas.color('torque');
-    context.lineWidth = 5;
+    context.lineWidth = 6;
     context.stroke();
     const direction = end + (share > 0 ? Math.PI / 2 : -Math.PI / 2);
     this.arrowHead(x + radius * Math.cos(end), y + radius * Math.sin(end), direction, 'torque');

@@ -1,0 +1,87 @@
+import loadMujoco from '@mujoco/mujoco';
+import { beforeAll, expect, test } from 'vitest';
+import { readPolicy } from '../tests/program';
+import { AXES, shareOf, ValueMap, valueAt, valueOf } from './map';
+import { NOMINAL } from './pendulum';
+import { Policy } from './policy';
+import { Simulator } from './simulator';
+import { World } from './world';
+
+let world: World;
+beforeAll(async () => {
+  world = new World(new Simulator(await loadMujoco()));
+});
+
+const STATE = { q1: 2.8, q2: 0.3, w1: -0.7, w2: 1.1 };
+
+test('a share of an axis is the value that is there, and angles come back after a turn', () => {
+  for (const axis of Object.values(AXES)) {
+    for (const share of [0, 0.25, 0.5, 0.99]) {
+      const state = { ...STATE, [axis.name]: valueAt(axis, share) };
+      expect(shareOf(axis, state)).toBeCloseTo(share, 12);
+      state[axis.name] += 2 * Math.PI;
+      expect(shareOf(axis, state) > 1).toBe(!axis.turns && share + Math.PI / axis.reach > 1);
+      if (axis.turns) expect(shareOf(axis, state)).toBeCloseTo(share, 12);
+    }
+  }
+});
+
+/// The same, asked of the agent as if it were there.
+function direct(map: ValueMap, column: number, row: number): number {
+  const there = {
+    ...STATE,
+    [map.x.name]: valueAt(map.x, (column + 0.5) / map.size),
+    [map.y.name]: valueAt(map.y, (row + 0.5) / map.size),
+  };
+  world.reset(there);
+  const { decision } = world;
+  world.reset(STATE);
+  return map.quantity === 'torque' ? decision!.torque : valueOf(decision!);
+}
+
+test.each(['d3qn', 'sac', 'd3qn-randomized'])('%s: the map is what it decides there', (agent) => {
+  world.policy = new Policy(readPolicy(agent));
+  world.plant = { ...NOMINAL, mass2: 1.1 };
+  world.reset(STATE);
+  const map = new ValueMap(6);
+  for (const [x, y, quantity] of [
+    ['q1', 'q2', 'value'],
+    ['w1', 'q1', 'value'],
+    ['w2', 'w1', 'torque'],
+  ] as const) {
+    Object.assign(map, { x: AXES[x], y: AXES[y], quantity });
+    map.clear();
+    expect(map.work(world, 1e9)).toBe(true);
+    for (const [column, row] of [
+      [0, 0],
+      [5, 0],
+      [2, 3],
+      [5, 5],
+    ] as const) {
+      expect(map.cells![row * 6 + column]).toBe(Math.fround(direct(map, column, row)));
+    }
+  }
+});
+
+test('it is computed in slices, all of the state at which it was begun', () => {
+  world.policy = new Policy(readPolicy('fast'));
+  world.reset(STATE);
+  const whole = new ValueMap(8);
+  whole.work(world, 1e9);
+  const sliced = new ValueMap(8);
+  let slices = 1;
+  while (!sliced.work(world, 0)) {
+    ++slices;
+    world.advance();
+    expect(sliced.cells).toBeNull();
+  }
+  expect(slices).toBe(64);
+  expect(sliced.cells).toEqual(whole.cells);
+});
+
+test('without a policy there is none', () => {
+  world.policy = null;
+  const map = new ValueMap(4);
+  expect(map.work(world, 1e9)).toBe(false);
+  expect(map.cells).toBeNull();
+});

@@ -1,0 +1,92 @@
+import type { Decision } from './decision';
+import type { State } from './pendulum';
+import type { World } from './world';
+
+/// What the agent expects, or does, over two of the four state variables, the others as they are now.
+
+export type Variable = keyof State;
+export type Quantity = 'value' | 'torque';
+
+/// A variable over a side of the map, from `middle` - `reach` to `middle` + `reach`.
+export interface Axis {
+  name: Variable;
+  middle: number; // rad, rad/s
+  reach: number;
+  turns: boolean; // comes back after a turn
+}
+
+/// Upright at rest is in the middle. (q2 is relative: 0 is straight.)
+export const AXES: Readonly<Record<Variable, Axis>> = {
+  q1: { name: 'q1', middle: Math.PI, reach: Math.PI, turns: true },
+  q2: { name: 'q2', middle: 0, reach: Math.PI, turns: true },
+  w1: { name: 'w1', middle: 0, reach: 10, turns: false },
+  w2: { name: 'w2', middle: 0, reach: 20, turns: false },
+};
+
+/// Where a state is on an axis, 0 to 1; beyond these for a velocity that is faster.
+export function shareOf({ name, middle, reach, turns }: Axis, state: State): number {
+  const share = (state[name] - middle + reach) / (2 * reach);
+  return turns ? share - Math.floor(share) : share;
+}
+
+export function valueAt({ middle, reach }: Axis, share: number): number {
+  return middle + (2 * share - 1) * reach;
+}
+
+/// V of a decision: of a Q-network the largest Q-value. NaN where nothing is estimated.
+export function valueOf(decision: Decision): number {
+  return decision.kind === 'q' ? decision.q[decision.action]! : decision.value;
+}
+
+/// A grid that is computed a little at each frame, so that the page stays smooth.
+export class ValueMap {
+  readonly size: number; // cells of a side
+  x = AXES.q1;
+  y = AXES.q2;
+  quantity: Quantity = 'value';
+  /// The last complete map (size × size), rows from below: V in units of the network, or torque (N·m).
+  /// Null before there is one.
+  cells: Float32Array | null = null;
+  private begun: Float32Array;
+  private next = 0; // cell of it
+  private around: State | null = null; // the other variables, of the map that is being computed
+
+  constructor(size: number) {
+    this.size = size;
+    this.begun = new Float32Array(size * size);
+  }
+
+  /// Forgets what is known: other axes, another quantity or another agent.
+  clear(): void {
+    this.cells = null;
+    this.around = null;
+    this.next = 0;
+  }
+
+  /// Computes for so long at most, one cell at least. True when a map has become complete; the next call
+  /// begins another one, of the state then.
+  work(world: World, milliseconds: number): boolean {
+    const end = performance.now() + milliseconds;
+    this.around ??= world.state;
+    do {
+      const [column, row] = [this.next % this.size, Math.floor(this.next / this.size)];
+      const decision = world.decisionAt(this.stateAt(column, row, this.around));
+      if (!decision) return false;
+      this.begun[this.next] = this.quantity === 'torque' ? decision.torque : valueOf(decision);
+    } while (++this.next < this.begun.length && performance.now() < end);
+    if (this.next < this.begun.length) return false;
+    [this.cells, this.begun] = [this.begun, this.cells ?? new Float32Array(this.begun.length)];
+    this.next = 0;
+    this.around = null;
+    return true;
+  }
+
+  /// The state in the middle of a cell.
+  private stateAt(column: number, row: number, around: State): State {
+    return {
+      ...around,
+      [this.x.name]: valueAt(this.x, (column + 0.5) / this.size),
+      [this.y.name]: valueAt(this.y, (row + 0.5) / this.size),
+    };
+  }
+}

@@ -1,0 +1,102 @@
+import type { History } from '../history';
+import { AXES, ValueMap, valueAt } from '../map';
+import type { Quantity, Variable } from '../map';
+import type { State } from '../pendulum';
+import type { Policy } from '../policy';
+import { signed } from '../view/charts';
+import { MapChart } from '../view/map';
+import type { World } from '../world';
+import { element } from './dom';
+
+const CELLS = 36; // of a side
+const MILLISECONDS = 4; // of a frame
+const WAY = 4; // s of the trajectory that are drawn
+
+/// The map of what the agent expects: what is chosen for it, and clicks on it.
+export class MapPanel {
+  private readonly map = new ValueMap(CELLS);
+  private readonly chart = new MapChart();
+  private readonly select = {
+    quantity: element<HTMLSelectElement>('map-quantity'),
+    x: element<HTMLSelectElement>('map-x'),
+    y: element<HTMLSelectElement>('map-y'),
+  };
+  private policy: Policy | null = null; // that the map is of
+  private key = ''; // what the complete map was computed from
+  private seen = false; // on the screen
+  private range: [number, number] = [0, 1];
+
+  /// `start` is told where a click wants the pendulum to be.
+  constructor(start: (where: Partial<State>) => void) {
+    const { element: canvas } = this.chart.canvas;
+    for (const list of Object.values(this.select)) {
+      list.addEventListener('change', () => this.choose(list));
+    }
+    canvas.addEventListener('click', ({ offsetX, offsetY }) => {
+      const [x, y] = this.chart.toShares(offsetX, offsetY);
+      const { map } = this;
+      start({ [map.x.name]: valueAt(map.x, x), [map.y.name]: valueAt(map.y, y) });
+    });
+    new IntersectionObserver(([entry]) => (this.seen = entry!.isIntersecting)).observe(canvas);
+  }
+
+  get canvas() {
+    return this.chart.canvas;
+  }
+
+  /// At each frame.
+  draw(world: World, history: History): void {
+    if (!this.seen) return;
+    if (this.policy !== world.policy) this.clear();
+    this.policy = world.policy;
+    this.work(world);
+    const way = history.from(world.time - WAY).map(({ state }) => state);
+    this.chart.draw(this.map, ...this.range, way, world.state);
+  }
+
+  /// Computes, unless the map is that of the present state already.
+  private work(world: World): void {
+    const { map } = this;
+    const others = { ...world.state, [map.x.name]: 0, [map.y.name]: 0 };
+    const key = JSON.stringify([others, world.plant]);
+    if (map.cells && key === this.key) return;
+    if (!map.work(world, MILLISECONDS)) return;
+    this.key = key;
+    this.range = this.rangeOf(map.cells!, world);
+    const unit = map.quantity === 'torque' ? ' N·m' : '';
+    const scale = map.quantity === 'torque' ? 1 : (world.policy?.rewardScale ?? 1);
+    const [low, high] = this.range.map((end) => signed(end / scale));
+    const known = this.range.every(Number.isFinite);
+    element('map-value').textContent = known ? `${low} to ${high}${unit}` : 'not estimated';
+  }
+
+  private rangeOf(cells: Float32Array, { plant }: World): [number, number] {
+    if (this.map.quantity === 'torque') return [-plant.torque_limit, plant.torque_limit];
+    return [cells.reduce((a, b) => Math.min(a, b)), cells.reduce((a, b) => Math.max(a, b))];
+  }
+
+  /// Both axes show different variables: the other one gives way.
+  private choose(changed: HTMLSelectElement): void {
+    const { x, y, quantity } = this.select;
+    if (x.value === y.value)
+      (changed === x ? y : x).value = this.map[changed === x ? 'x' : 'y'].name;
+    this.map.x = AXES[x.value as Variable];
+    this.map.y = AXES[y.value as Variable];
+    this.map.quantity = quantity.value as Quantity;
+    this.clear();
+  }
+
+  /// V over both angles.
+  reset(): void {
+    Object.assign(this.select.quantity, { value: 'value' });
+    Object.assign(this.select.x, { value: 'q1' });
+    Object.assign(this.select.y, { value: 'q2' });
+    this.choose(this.select.x);
+  }
+
+  private clear(): void {
+    this.map.clear();
+    this.chart.clear();
+    element('map-value').textContent = '';
+  }
+}

@@ -1,0 +1,250 @@
+import { NOMINAL, relativeHeight } from '../pendulum';
+import type { Label } from '../view/labels';
+import type { World } from '../world';
+import { button, element } from './dom';
+import { MotorKeys } from './motor';
+import type { Shared } from './share';
+import { Slider } from './sliders';
+
+/// The steps of the tour: what each does with the page, and what it says to what has happened. Their
+/// words and controls are in index.html.
+
+/// What a step does with the page.
+export interface Stage {
+  readonly world: World;
+  /// Chooses agent and settings, all others as at the beginning; the pendulum moves on.
+  take(shared: Partial<Shared>): Promise<void>;
+  setAgentOn(on: boolean): void;
+  setSpeed(speed: number): void;
+  setMass(kilograms: number): void; // of the lower link
+  /// From hanging.
+  reset(): void;
+  /// What the map shows at first.
+  resetMap(): void;
+}
+
+export interface Step {
+  readonly id: string; // "step-ID" is its element
+  readonly agents: readonly string[]; // without which it is left out
+  readonly labels?: (world: World) => Label[]; // on the stage
+  /// When it is shown.
+  begin(): Promise<void>;
+  /// When another is shown.
+  end?(): void;
+  /// Ten times a second. What to say to what the visitor did, empty for nothing.
+  answer?(world: World): string;
+}
+
+const NOMINAL_AGENT = 'd3qn';
+const RANDOMIZED_AGENT = 'd3qn-randomized';
+const LIGHT = 0.75; // kg
+const HELD = 2; // s upright that count as balanced
+
+const still = () => matchMedia('(prefers-reduced-motion: reduce)').matches;
+const heldFor = (world: World) => world.uprightFor ?? 0;
+
+function watch(stage: Stage): Step {
+  const swingUp = () => {
+    stage.setAgentOn(true);
+    stage.reset();
+  };
+  const again = button('watch-again', swingUp);
+  return {
+    id: 'watch',
+    agents: [NOMINAL_AGENT],
+    labels: () => [
+      { at: 'motor', text: 'the motor' },
+      { at: 'goal', text: 'both links in here' },
+    ],
+    async begin() {
+      again.textContent = still() ? 'Swing up' : 'Swing up again';
+      await stage.take({ agent: NOMINAL_AGENT, on: !still() });
+      stage.reset();
+    },
+    answer: (world) =>
+      heldFor(world) > HELD ? 'Balanced. How hard can it be? Go on and try it yourself.' : '',
+  };
+}
+
+function motor(stage: Stage): Step {
+  const keys = new MotorKeys(stage.world);
+  let best = 0; // share of the way up
+  let byHand = false;
+  return {
+    id: 'motor',
+    agents: [],
+    labels: ({ torque }) => (torque === 0 ? [] : [{ at: 'motor', text: 'your torque' }]),
+    async begin() {
+      best = 0;
+      byHand = false;
+      keys.enabled = true;
+      await stage.take({ agent: NOMINAL_AGENT, on: false });
+      stage.reset();
+    },
+    end() {
+      keys.enabled = false;
+    },
+    answer(world) {
+      best = Math.max(best, (relativeHeight(world.plant, world.state) + 1) / 2);
+      byHand ||= heldFor(world) > 1;
+      if (byHand) return 'You balanced it by hand! Hardly anybody does.';
+      if (best < 0.02) return '';
+      const hint = best < 0.6 ? 'Push in time with the swing.' : 'Now catch it at the top …';
+      return `Your best: ${Math.round(100 * best)}% of the way up. ${hint}`;
+    },
+  };
+}
+
+function agent(stage: Stage): Step {
+  const on = button('tour-agent', () => {
+    stage.setAgentOn(true);
+    on.ariaPressed = 'true';
+  });
+  return {
+    id: 'agent',
+    agents: [NOMINAL_AGENT],
+    labels: ({ torque }) => (torque === 0 ? [] : [{ at: 'motor', text: 'its torque' }]),
+    async begin() {
+      on.ariaPressed = 'false';
+      await stage.take({ agent: NOMINAL_AGENT, on: false });
+    },
+    answer: (world) =>
+      heldFor(world) > HELD
+        ? 'The same motor, no stronger than yours. It took the agent an hour of swinging to learn this.'
+        : '',
+  };
+}
+
+function shove(stage: Stage): Step {
+  let shoved = 0; // time of the last shove (s)
+  let fell = false;
+  const push = (direction: -1 | 1) => stage.world.shoveTo(direction);
+  button('tour-shove-left', () => push(-1));
+  button('tour-shove-right', () => push(1));
+  return {
+    id: 'shove',
+    agents: [NOMINAL_AGENT],
+    async begin() {
+      await stage.take({ agent: NOMINAL_AGENT, on: true });
+      shoved = 0;
+      fell = false;
+    },
+    answer(world) {
+      if (world.push) shoved = world.time;
+      if (shoved === 0) return heldFor(world) > HELD ? '' : 'Wait until it is up …';
+      if (heldFor(world) === 0) fell = true;
+      if (fell && heldFor(world) > HELD) return 'Down, and up again by itself.';
+      if (fell) return 'Down it goes …';
+      if (world.time - shoved < HELD) return 'It works to catch that …';
+      return 'It caught that one. Now several, quickly.';
+    },
+  };
+}
+
+function mass(stage: Stage): Step {
+  let changed = 0; // when (s); 0 if never
+  const slider = new Slider(
+    {
+      ...{ name: 'tour-mass', label: 'Mass of the lower link', unit: 'kg' },
+      ...{ min: 0.7, max: 1.3, limits: [0.7, 1.3], step: 0.05, initial: NOMINAL.mass2 },
+    },
+    (kilograms) => {
+      stage.setMass(kilograms);
+      stage.reset();
+      changed = stage.world.time;
+    },
+  );
+  slider.trained = [NOMINAL.mass2, NOMINAL.mass2];
+  element('tour-mass-slider').append(slider.element);
+  return {
+    id: 'mass',
+    agents: [NOMINAL_AGENT],
+    labels: ({ plant }) => [{ at: 'link2', text: `${plant.mass2} kg` }],
+    async begin() {
+      slider.value = NOMINAL.mass2;
+      changed = 0;
+      await stage.take({ agent: NOMINAL_AGENT, on: true });
+    },
+    answer(world) {
+      const seconds = world.time - changed;
+      if (changed === 0) return '';
+      if (heldFor(world) > HELD) return `It still holds ${slider.value} kg.`;
+      if (seconds < 12) return 'It starts over …';
+      return `It cannot hold ${slider.value} kg: it never met such a link while it learned.`;
+    },
+  };
+}
+
+function many(stage: Stage): Step {
+  const choice = element<HTMLFieldSetElement>('tour-agents');
+  const input = (id: string) => choice.querySelector<HTMLInputElement>(`[value=${id}]`)!;
+  const plant = { ...NOMINAL, mass2: LIGHT };
+  choice.addEventListener('change', () => {
+    const agent = input(RANDOMIZED_AGENT).checked ? RANDOMIZED_AGENT : NOMINAL_AGENT;
+    void stage.take({ agent, plant, on: true });
+  });
+  return {
+    id: 'many',
+    agents: [NOMINAL_AGENT, RANDOMIZED_AGENT],
+    labels: () => [{ at: 'link2', text: `${LIGHT} kg` }],
+    async begin() {
+      input(NOMINAL_AGENT).checked = true;
+      await stage.take({ agent: NOMINAL_AGENT, plant, on: true });
+      stage.reset();
+    },
+    answer(world) {
+      if (!input(RANDOMIZED_AGENT).checked) return 'The agent of before fails again and again.';
+      return heldFor(world) > HELD
+        ? 'It holds: it feels out which pendulum it has, and balances that one.'
+        : 'It takes over …';
+    },
+  };
+}
+
+function values(stage: Stage): Step {
+  const speed = element<HTMLInputElement>('tour-speed');
+  const show = () => {
+    element('tour-speed-value').textContent = `${speed.value}×`;
+    stage.setSpeed(Number(speed.value));
+  };
+  speed.addEventListener('input', show);
+  return {
+    id: 'values',
+    agents: [NOMINAL_AGENT],
+    async begin() {
+      await stage.take({ agent: NOMINAL_AGENT, on: !still() });
+      stage.reset();
+      speed.value = '1';
+      show();
+    },
+    answer: (world) =>
+      heldFor(world) > HELD
+        ? 'At the top it expects most, and small pushes are the highest bars.'
+        : '',
+  };
+}
+
+function map(stage: Stage): Step {
+  let clicked = 0; // when (s); 0 if never
+  element('map').addEventListener('click', () => (clicked = stage.world.time));
+  return {
+    id: 'map',
+    agents: [NOMINAL_AGENT],
+    async begin() {
+      clicked = 0;
+      stage.resetMap();
+      await stage.take({ agent: NOMINAL_AGENT, on: !still() });
+    },
+    answer(world) {
+      if (clicked === 0) return '';
+      if (heldFor(world) > HELD)
+        return 'From there it found its way to the bright middle: upright.';
+      stage.setAgentOn(true);
+      return 'Follow the dot …';
+    },
+  };
+}
+
+export function makeSteps(stage: Stage): Step[] {
+  return [watch, motor, agent, shove, mass, many, values, map].map((make) => make(stage));
+}

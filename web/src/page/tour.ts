@@ -1,0 +1,82 @@
+import type { World } from '../world';
+import { button, element } from './dom';
+import { makeSteps } from './steps';
+import type { Stage, Step } from './steps';
+import type { Scene } from '../view/scene';
+
+const FRAMES = 6; // between two looks at what has happened
+
+/// The guided tour: one step at a time, each with one sentence, one control, and one thing that is marked.
+export class Tour {
+  private readonly steps: readonly Step[];
+  private readonly dots: HTMLButtonElement[];
+  private readonly onStep: () => void;
+  private now: Step | null = null;
+  private frame = 0;
+
+  /// `has` says which agents there are; `onStep` hears when another step is shown.
+  constructor(stage: Stage, has: (agent: string) => boolean, onStep: () => void) {
+    this.onStep = onStep;
+    this.steps = makeSteps(stage).filter(({ agents }) => agents.every(has));
+    this.dots = this.steps.map((step, i) => {
+      const dot = document.createElement('button');
+      dot.type = 'button';
+      dot.textContent = String(i + 1);
+      dot.ariaLabel = `Step ${i + 1}: ${heading(step).textContent}`;
+      dot.addEventListener('click', () => void this.go(i + 1, true));
+      return dot;
+    });
+    element('dots').append(...this.dots);
+    button('tour-back', () => void this.go(this.number - 1, true));
+    button('tour-next', () => void this.go(this.number + 1, true));
+  }
+
+  /// The step that is shown, from 1 on; 0 outside of the tour.
+  get number(): number {
+    return this.now ? this.steps.indexOf(this.now) + 1 : 0;
+  }
+
+  /// Shows a step, the nearest that there is; perhaps with the focus on it.
+  async go(number: number, focus = false): Promise<void> {
+    this.leave();
+    const i = Math.min(Math.max(Math.round(number) || 1, 1), this.steps.length) - 1;
+    const now = this.steps[i]!;
+    this.now = now;
+    for (const step of this.steps) section(step).inert = step !== now;
+    this.dots.forEach((dot, k) => (dot.ariaCurrent = k === i ? 'step' : null));
+    element<HTMLButtonElement>('tour-back').disabled = i === 0;
+    const last = i === this.steps.length - 1;
+    element('tour-next').hidden = last;
+    element('tour-end').hidden = !last;
+    document.documentElement.dataset.step = now.id;
+    this.say('');
+    if (focus) heading(now).focus({ preventScroll: true });
+    this.onStep();
+    await now.begin();
+  }
+
+  leave(): void {
+    this.now?.end?.();
+    this.now = null;
+    delete document.documentElement.dataset.step;
+  }
+
+  /// At each frame.
+  follow(world: World, scene: Scene): void {
+    scene.labels = this.now?.labels?.(world) ?? [];
+    if (this.now && this.frame++ % FRAMES === 0) this.say(this.now.answer?.(world) ?? '');
+  }
+
+  private say(text: string): void {
+    const answer = this.now && section(this.now).querySelector('.answer');
+    if (answer && answer.textContent !== text) answer.textContent = text;
+  }
+}
+
+function section({ id }: Step): HTMLElement {
+  return element(`step-${id}`);
+}
+
+function heading(step: Step): HTMLElement {
+  return section(step).querySelector('h2')!;
+}

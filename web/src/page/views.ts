@@ -1,0 +1,30 @@
+import { recall, remember } from './storage';
+
+/// The page has two views, the guided tour and everything.
+
+const KEY = 'view';
+
+export interface View {
+  name: 'tour' | 'everything';
+  step: number; // of the tour
+  chosen: boolean; // by its name, so that the next visit begins with it too
+}
+
+/// Which view an address asks for. One with settings shows everything; one without leaves it to what the
+/// visitor chose last, and a new visitor gets the tour.
+export function viewOf(hash: string): View {
+  const fields = new URLSearchParams(hash.replace(/^#/, ''));
+  const step = fields.get('tour');
+  if (step !== null) return { name: 'tour', step: Number(step), chosen: true };
+  const everything = fields.size > 0 || recall(KEY) === 'everything';
+  const name = everything ? 'everything' : 'tour';
+  return { name, step: 1, chosen: fields.has('everything') };
+}
+
+export function showView({ name, chosen }: View): void {
+  document.documentElement.dataset.view = name;
+  if (chosen) remember(KEY, name);
+  for (const link of document.querySelectorAll('header nav a')) {
+    link.ariaCurrent = link.getAttribute('href') === `#${name}` ? 'page' : null;
+  }
+}

@@ -1,0 +1,142 @@
+import { shareOf } from '../map';
+import type { Axis, ValueMap } from '../map';
+import type { State } from '../pendulum';
+import { Canvas } from './canvas';
+import { signed } from './charts';
+
+type Color = readonly [number, number, number];
+
+// From little to much, light throughout growing; and from left over none to right.
+const VALUES: readonly Color[] = [
+  [20, 14, 54],
+  [83, 36, 122],
+  [180, 54, 114],
+  [241, 120, 70],
+  [252, 233, 160],
+];
+const TORQUES: readonly Color[] = [
+  [190, 72, 8],
+  [240, 190, 150],
+  [246, 243, 235],
+  [140, 208, 198],
+  [4, 110, 100],
+];
+const EASE = 0.12; // of the way to a new map, at each drawing
+const ROOMY = 180; // pixels, from which on the ends of an axis are named too
+const [LEFT, BOTTOM] = [16, 18]; // pixels, for the names of the axes
+
+/// A map of V or torque as colours, with the way of the pendulum through it.
+export class MapChart {
+  readonly canvas = new Canvas('map');
+  private readonly image: HTMLCanvasElement = document.createElement('canvas');
+  private shown: Float32Array | null = null; // 0 to 1, on its way to the map
+
+  /// Another map, which the old one does not turn into.
+  clear(): void {
+    this.shown = null;
+  }
+
+  /// A place on the canvas as shares of both axes, in [0, 1]².
+  toShares(px: number, py: number): [number, number] {
+    const clamp = (x: number) => Math.min(Math.max(x, 0), 1);
+    const { width, height } = this.canvas;
+    return [clamp((px - LEFT) / (width - LEFT)), clamp(1 - py / (height - BOTTOM))];
+  }
+
+  /// `low` and `high` are the ends of the colours; `way` is where the pendulum was, oldest first.
+  draw(map: ValueMap, low: number, high: number, way: readonly State[], now: State): void {
+    const { canvas } = this;
+    canvas.clear();
+    const { width, height } = canvas;
+    this.nameAxes(map.x, map.y);
+    if (!map.cells) return canvas.text('computing …', width / 2, height / 2, 'center');
+    this.shown ??= map.cells.map((cell) => (cell - low) / (high - low));
+    const { shown } = this;
+    map.cells.forEach((cell, i) => {
+      shown[i]! += EASE * ((cell - low) / (high - low) - shown[i]!);
+    });
+    this.paint(map.size, map.quantity === 'torque' ? TORQUES : VALUES);
+    canvas.context.imageSmoothingQuality = 'high';
+    canvas.context.drawImage(this.image, LEFT, 0, width - LEFT, height - BOTTOM);
+    this.drawWay(map, way, now);
+  }
+
+  private paint(size: number, colors: readonly Color[]): void {
+    const { image, shown } = this;
+    image.width = image.height = size;
+    const brush = image.getContext('2d')!;
+    const pixels = brush.createImageData(size, size);
+    shown!.forEach((share, i) => {
+      const at = 4 * ((size - 1 - Math.floor(i / size)) * size + (i % size));
+      pixels.data.set(between(colors, share), at);
+      pixels.data[at + 3] = 255;
+    });
+    brush.putImageData(pixels, 0, 0);
+  }
+
+  /// White with a dark rim, so that it is seen on every colour.
+  private drawWay(map: ValueMap, way: readonly State[], now: State): void {
+    const { canvas } = this;
+    const place = (state: State): [number, number] => [
+      LEFT + shareOf(map.x, state) * (canvas.width - LEFT),
+      (1 - shareOf(map.y, state)) * (canvas.height - BOTTOM),
+    ];
+    const pieces: [number, number][][] = [[]];
+    for (const state of [...way, now]) {
+      const point = place(state);
+      const before = pieces.at(-1)!.at(-1);
+      // Over an edge: continue at the other side.
+      const jumps =
+        before &&
+        (Math.abs(point[0] - before[0]) > canvas.width / 2 ||
+          Math.abs(point[1] - before[1]) > canvas.height / 2);
+      if (jumps) pieces.push([]);
+      pieces.at(-1)!.push(point);
+    }
+    canvas.context.save();
+    canvas.context.beginPath();
+    canvas.context.rect(LEFT, 0, canvas.width - LEFT, canvas.height - BOTTOM);
+    canvas.context.clip();
+    canvas.context.lineJoin = 'round';
+    for (const [color, line, dot] of [
+      ['map-rim', 4, 7],
+      ['map-way', 2, 5],
+    ] as const) {
+      for (const piece of pieces) canvas.line(piece, color, line);
+      canvas.disc(...place(now), dot, color);
+    }
+    canvas.context.restore();
+  }
+
+  private nameAxes(x: Axis, y: Axis): void {
+    const { canvas } = this;
+    const { width, height } = canvas;
+    const [from, middle, to] = width < ROOMY ? ['', ends(x)[1], ''] : ends(x);
+    canvas.text(from, LEFT, height - 8);
+    canvas.text(middle, (LEFT + width) / 2, height - 8, 'center');
+    canvas.text(to, width, height - 8, 'right');
+    const [low, centre, high] = height < ROOMY ? ['', ends(y)[1], ''] : ends(y);
+    canvas.context.save();
+    canvas.context.rotate(-Math.PI / 2);
+    canvas.text(low, BOTTOM - height, 7);
+    canvas.text(centre, (BOTTOM - height) / 2, 7, 'center');
+    canvas.text(high, 0, 7, 'right');
+    canvas.context.restore();
+  }
+}
+
+/// The colour at a share of a scale.
+function between(colors: readonly Color[], share: number): Color {
+  const at = Math.min(Math.max(share, 0), 1) * (colors.length - 1) || 0;
+  const i = Math.min(Math.floor(at), colors.length - 2);
+  const [a, b] = [colors[i]!, colors[i + 1]!];
+  const mix = (k: 0 | 1 | 2) => a[k] + (at - i) * (b[k] - a[k]);
+  return [mix(0), mix(1), mix(2)];
+}
+
+/// What stands at the ends and in the middle of an axis.
+function ends({ name, reach }: Axis): [string, string, string] {
+  if (name === 'q1') return ['hanging', 'upright', 'hanging'];
+  if (name === 'q2') return ['folded', 'straight', 'folded'];
+  return [signed(-reach), '0', `${reach} rad/s`];
+}

@@ -1,0 +1,263 @@
+import { expect } from '@playwright/test';
+import type { Page } from '@playwright/test';
+import { balanced, run, test } from './page';
+import { readPolicy } from './program';
+
+/// The guided tour: how a visitor comes to it and leaves it, and that what it says is so.
+
+/// Opens the page as a new visitor does, or at a step of the tour.
+async function visit(page: Page, hash = ''): Promise<void> {
+  await page.goto(`./${hash}`);
+  await expect(page.locator('fieldset:disabled')).toHaveCount(0);
+}
+
+const heading = (page: Page) => page.locator('.step:not([inert]) h2');
+const answer = (page: Page) => page.locator('.step:not([inert]) .answer');
+
+/// At a step, with time standing still, so that only run() advances it.
+async function stopAt(page: Page, step: number): Promise<void> {
+  await visit(page, `#tour=${step}`);
+  await page.evaluate(() => {
+    upswing.clock.advance = () => true;
+  });
+}
+
+/// From hanging or from where it is, so many seconds; how long it was upright at the end without a break.
+async function held(page: Page, seconds: number): Promise<number> {
+  await run(page, seconds);
+  return balanced(page);
+}
+
+test('a new visitor gets the tour, which begins by itself with a swing-up', async ({ page }) => {
+  await visit(page);
+  await expect(heading(page)).toHaveText('Two links, one motor');
+  await expect(page.locator('#charts')).toBeHidden();
+  await expect(page.locator('#badge')).toHaveText(/balanced/, { timeout: 20_000 });
+  await expect(answer(page)).toContainText('Balanced', { timeout: 20_000 });
+});
+
+test('nothing moves by itself where motion is not wanted', async ({ page }) => {
+  await page.emulateMedia({ reducedMotion: 'reduce' });
+  await visit(page);
+  await run(page, 1);
+  expect(await page.evaluate(() => upswing.world.state)).toEqual({ q1: 0, q2: 0, w1: 0, w2: 0 });
+  await page.getByRole('button', { name: 'Swing up' }).click();
+  await expect(page.locator('#badge')).toHaveText('swinging up');
+});
+
+test('from step to step, by buttons, numbers and address, and back', async ({ page }) => {
+  await visit(page);
+  const steps = await page.locator('.step h2').allTextContents();
+  for (const title of steps.slice(1)) {
+    await page.getByRole('button', { name: 'Next' }).click();
+    await expect(heading(page)).toHaveText(title);
+    await expect(heading(page)).toBeFocused();
+  }
+  await expect(page).toHaveURL(new RegExp(`#tour=${steps.length}$`));
+  await page.reload();
+  await expect(heading(page)).toHaveText(steps.at(-1)!);
+  await page.getByRole('button', { name: 'Back' }).click();
+  await expect(heading(page)).toHaveText(steps.at(-2)!);
+  await page.getByRole('button', { name: 'Step 1:' }).click();
+  await expect(heading(page)).toHaveText(steps[0]!);
+  for (const hash of ['#tour', '#tour=-3', '#tour=none', '#tour=1e9', '#tour=2.4']) {
+    await page.goto('about:blank');
+    await visit(page, hash);
+    await expect(heading(page)).toHaveCount(1);
+    await expect(page.locator('#message')).toBeHidden();
+  }
+});
+
+test('a link with settings shows everything, and who chose a view finds it again', async ({
+  page,
+}) => {
+  await page.goto('./#agent=fast&mass2=1.2');
+  await expect(page.locator('#agent')).toHaveValue('fast');
+  await expect(page.locator('#tour')).toBeHidden();
+  const comeBack = async () => {
+    await page.goto('about:blank');
+    await page.goto('./');
+    await expect(page.locator('fieldset:disabled')).toHaveCount(0);
+  };
+  await comeBack(); // a link of somebody else's is no choice
+  await expect(page.locator('#tour')).toBeVisible();
+  await page.getByRole('link', { name: 'Everything', exact: true }).click();
+  await expect(page.locator('#charts')).toBeVisible();
+  await expect(page.locator('#tour')).toBeHidden();
+  await comeBack();
+  await expect(page.locator('#tour')).toBeHidden();
+  await page.getByRole('link', { name: 'Tour', exact: true }).click();
+  await expect(heading(page)).toHaveText('Two links, one motor');
+  await comeBack();
+  await expect(page.locator('#tour')).toBeVisible();
+});
+
+test('you are the motor: an arrow is its whole torque, and holding one lifts nothing', async ({
+  page,
+}) => {
+  await stopAt(page, 2);
+  for (const [key, button, torque] of [
+    ['ArrowLeft', 'Turn to the left', 5],
+    ['ArrowRight', 'Turn to the right', -5],
+  ] as const) {
+    await page.keyboard.down(key);
+    const rows = await run(page, 20);
+    expect(rows.every((row) => row[5] === torque)).toBe(true);
+    const highest = rows.map((row) => -Math.cos(row[1]!) - Math.cos(row[1]! + row[2]!));
+    expect(Math.max(...highest)).toBeLessThan(1); // of 2 upright
+    await page.keyboard.up(key);
+    await page.getByRole('button', { name: button }).hover();
+    await page.mouse.down();
+    expect((await run(page, 0.02)).at(-1)![5]).toBe(torque);
+    await page.mouse.up();
+    expect((await run(page, 0.02)).at(-1)![5]).toBe(0);
+    await page.evaluate(() => upswing.reset());
+  }
+  await expect(answer(page)).toContainText(/Your best: \d+% of the way up/);
+  await page.getByRole('button', { name: 'Next' }).click();
+  await page.keyboard.down('ArrowLeft'); // a shove again
+  expect(await page.evaluate(() => upswing.world.byHand)).toBe(0);
+});
+
+test('the agent has the same motor, and learned for an hour', async ({ page }) => {
+  await stopAt(page, 2);
+  await page.keyboard.down('ArrowRight');
+  await run(page, 1.3);
+  await page.keyboard.up('ArrowRight');
+  await page.getByRole('button', { name: 'Next' }).click(); // it takes over in the middle of a swing
+  await expect(page.locator('#agent')).toHaveValue('d3qn');
+  await page.getByRole('button', { name: 'Give it the motor' }).click();
+  const rows = await run(page, 15);
+  expect(Math.max(...rows.map((row) => Math.abs(row[5]!)))).toBe(5);
+  expect(await balanced(page)).toBeGreaterThan(5);
+  await expect(answer(page)).toContainText('an hour of swinging');
+  const text = Buffer.from(readPolicy('d3qn')).toString('latin1');
+  const steps = Number(/"step":"(\d+)"/.exec(text)![1]);
+  expect(Math.abs((steps * 0.02) / 3600 - 1)).toBeLessThan(0.1);
+});
+
+test('it catches one shove, falls of a few, and gets up again', async ({ page }) => {
+  await stopAt(page, 4);
+  for (const name of ['Shove to the left', 'Shove to the right']) {
+    for (const [count, falls] of [
+      [1, false],
+      [3, true],
+    ] as const) {
+      await page.evaluate(() => upswing.reset());
+      expect(await held(page, 15)).toBeGreaterThan(5);
+      for (let k = 0; k < count; ++k) {
+        await page.locator('#step-shove').getByRole('button', { name }).click();
+        await run(page, 0.2);
+      }
+      expect((await held(page, 4)) < 4, `${count} of ${name}`).toBe(falls);
+      expect(await held(page, 16)).toBeGreaterThan(5);
+    }
+  }
+});
+
+test('the agent fails below 0.85 kg, the one that learned on many does not', async ({ page }) => {
+  test.slow();
+  await stopAt(page, 5);
+  const mass = page.locator('#tour-mass');
+  const [low, high] = await Promise.all(['min', 'max'].map((end) => mass.getAttribute(end)));
+  expect([low, high]).toEqual(['0.7', '1.3']);
+  const fails = [0.7, 0.75, 0.8];
+  for (const kilograms of [...fails, 0.85, 0.9, 1.1, 1.2, 1.3]) {
+    await mass.fill(String(kilograms)); // and it starts over
+    expect(await page.evaluate(() => upswing.world.state.q1)).toBe(0);
+    const failed = (await held(page, 20)) < 5;
+    expect(failed, `${kilograms} kg`).toBe(fails.includes(kilograms));
+  }
+  await page.getByRole('button', { name: 'Next' }).click();
+  expect(await held(page, 20)).toBeLessThan(5);
+  await page.getByRole('radio', { name: 'on many' }).check();
+  await expect(page.locator('#agent')).toHaveValue('d3qn-randomized');
+  expect(await page.evaluate(() => upswing.world.plant.mass2)).toBe(0.75);
+  expect(await held(page, 20)).toBeGreaterThan(10); // from where the other one left it
+  await expect(answer(page)).toContainText('It holds');
+});
+
+test('the bars are what it expects, and the highest is taken', async ({ page }) => {
+  await stopAt(page, 7);
+  await expect(page.locator('#q')).toBeVisible();
+  await page.evaluate(() => upswing.reset());
+  const best: number[] = [];
+  for (let k = 0; k < 40; ++k) {
+    const [q, torques, applied] = await page.evaluate(() => {
+      upswing.world.advanceToControl();
+      for (let i = 0; i < 40; ++i) upswing.world.advance();
+      upswing.world.look();
+      const decision = upswing.world.decision;
+      if (decision?.kind !== 'q') throw new Error('no Q-values');
+      const taken = upswing.world;
+      taken.advance();
+      return [[...decision.q], [...decision.torques], taken.torque] as const;
+    });
+    expect(torques[q.indexOf(Math.max(...q))]).toBe(applied);
+    best.push(Math.max(...q));
+  }
+  expect(await balanced(page)).toBeGreaterThan(2);
+  expect(best.at(-1)!).toBeGreaterThan(1.5 * best[0]!); // at the top it expects most
+  expect(best.at(-1)!).toBeGreaterThan(0.95 * Math.max(...best));
+});
+
+test('every pose at once: the brightest is upright, and a click starts there', async ({ page }) => {
+  await visit(page, '#tour=8');
+  await expect(page.locator('#map-value')).toHaveText(/^\d+ to \d+$/);
+  await stopAt(page, 8);
+  /// Of a grid of poses at rest, the one of which the agent expects most, and least.
+  const [most, least] = await page.evaluate(() => {
+    const poses: [number, number, number][] = [];
+    for (let i = -12; i <= 12; ++i) {
+      for (let k = -12; k <= 12; ++k) {
+        const [q1, q2] = [Math.PI + (i * Math.PI) / 12, (k * Math.PI) / 12];
+        const decision = upswing.world.decisionAt({ q1, q2, w1: 0, w2: 0 });
+        if (decision?.kind === 'q') poses.push([i, k, Math.max(...decision.q)]);
+      }
+    }
+    poses.sort((a, b) => b[2] - a[2]);
+    return [poses[0]!, poses.at(-1)!];
+  });
+  expect([most[0], most[1]]).toEqual([0, 0]);
+  expect(most[2]).toBeGreaterThan(1.5 * least[2]);
+  // A click a quarter of the way in: both links half a turn back.
+  const box = (await page.locator('#map').boundingBox())!;
+  await page.locator('#map').click({
+    position: { x: 16 + (box.width - 16) / 4, y: (3 * (box.height - 18)) / 4 },
+  });
+  const { q1, q2 } = await page.evaluate(() => upswing.world.state);
+  expect(q1).toBeCloseTo(Math.PI / 2, 1);
+  expect(q2).toBeCloseTo(-Math.PI / 2, 1);
+  expect(await held(page, 20)).toBeGreaterThan(5);
+});
+
+for (const [width, height] of [
+  [360, 640],
+  [390, 844],
+  [820, 1180],
+  [1440, 900],
+  [2560, 1300],
+] as const) {
+  test(`${width} × ${height}: pendulum, words, control and buttons on one screen`, async ({
+    page,
+  }) => {
+    await page.setViewportSize({ width, height });
+    await visit(page);
+    const count = await page.locator('.step').count();
+    for (let step = 1; step <= count; ++step) {
+      if (step > 1) await page.locator('#tour-next').click();
+      await page.evaluate(() => scrollTo({ top: 0, behavior: 'instant' }));
+      const now = page.locator('.step:not([inert])');
+      const seen = ['#scene', '#tour-next:visible, #tour-end:visible'].map((one) =>
+        page.locator(one),
+      );
+      const control = now.locator('fieldset').or(page.locator('#map:visible'));
+      for (const one of [...seen, heading(page), control]) {
+        await expect(one, `step ${step}`).toBeInViewport({ ratio: 1 });
+      }
+      if (step === 7) await expect(page.locator('#q')).toBeInViewport({ ratio: 1 });
+      const wide = await page.evaluate(() => document.documentElement.scrollWidth > innerWidth);
+      expect(wide).toBe(false);
+    }
+  });
+}
