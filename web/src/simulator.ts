@@ -31,6 +31,11 @@ export class Simulator {
     mujoco.mj_forward(this.model, this.data);
   }
 
+  /// Another pendulum.
+  another(): Simulator {
+    return new Simulator(this.mujoco);
+  }
+
   get state(): State {
     const { qpos, qvel } = this.data;
     return { q1: qpos[0], q2: qpos[1], w1: qvel[0], w2: qvel[1] };

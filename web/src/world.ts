@@ -44,6 +44,9 @@ export class World {
   /// Where on the pendulum a hand holds it, and where the hand is.
   drag: { link: 1 | 2; along: number; target: Vec } | null = null;
   onMoment: (moment: Moment) => void = () => {};
+  /// Another pendulum, to which happens what happens to this one: start, plant, hand, shoves, errors of
+  /// sensors and motor. Its policy is its own.
+  twin: World | null = null;
 
   torque = 0; // N·m, that the motor holds now
   push: Push | null = null; // that acts now
@@ -71,6 +74,7 @@ export class World {
   set plant(plant: Plant) {
     this._plant = { ...plant };
     this.simulator.plant = plant;
+    if (this.twin) this.twin.plant = plant;
   }
 
   get policy(): Policy | null {
@@ -108,6 +112,7 @@ export class World {
     this.shove.steps = 0;
     this.uprightSince = inverted(state) ? this.steps : null;
     this.look();
+    this.twin?.reset(state);
   }
 
   shoveTo(direction: -1 | 1): void {
@@ -115,6 +120,7 @@ export class World {
     const force = before + SHOVE * direction;
     const limited = Math.min(Math.max(force, -STRONGEST_SHOVE), STRONGEST_SHOVE);
     this.shove = { force: limited, steps: SHOVE_STEPS };
+    this.twin?.shoveTo(direction);
   }
 
   /// One physics step. The agent chooses a torque before each fourth. False if the state blew up and
@@ -130,7 +136,16 @@ export class World {
     ++this.steps;
     --this.untilControl;
     if (!valid) this.reset();
+    this.advanceTwin();
     return valid;
+  }
+
+  private advanceTwin(): void {
+    const { twin, agentOn, byHand, drag } = this;
+    if (!twin) return;
+    Object.assign(twin, { agentOn, byHand, drag });
+    Object.assign(twin.disturbance, this.disturbance);
+    twin.advance();
   }
 
   /// To the next moment at which the agent chooses.

@@ -10,6 +10,7 @@ export class Clock {
   private readonly world: World;
   private due = 0; // physics steps that should have been made, with a fraction
   private before: State;
+  private twinBefore: State | null = null;
 
   constructor(world: World) {
     this.world = world;
@@ -21,7 +22,7 @@ export class Clock {
     this.due += Math.min(seconds, LONGEST_FRAME) * this.speed * STEPS_PER_SECOND;
     let sound = true;
     for (; this.due >= 1; --this.due) {
-      this.before = this.world.state;
+      this.remember();
       sound = this.world.advance() && sound;
     }
     return sound;
@@ -30,12 +31,26 @@ export class Clock {
   /// Drops the fraction of a step, after the state was set or advanced step by step.
   settle(): void {
     this.due = 0;
+    this.remember();
+  }
+
+  private remember(): void {
     this.before = this.world.state;
+    this.twinBefore = this.world.twin?.state ?? null;
   }
 
   /// Where the pendulum is between two physics steps, so that slow motion is smooth.
   get state(): State {
-    const [from, to] = [this.before, this.world.state];
+    return this.between(this.before, this.world.state);
+  }
+
+  /// The same of its twin, if it has one.
+  get twinState(): State | null {
+    const { twin } = this.world;
+    return twin && this.between(this.twinBefore ?? twin.state, twin.state);
+  }
+
+  private between(from: State, to: State): State {
     const between = (a: number, b: number) => a + this.due * (b - a);
     return {
       q1: between(from.q1, to.q1),

@@ -20,6 +20,7 @@ import { BEGINNING, decode, encode, OWN } from './share';
 import type { Shared } from './share';
 import { changeTheme, onThemeChange } from './theme';
 import { Tour } from './tour';
+import { Twin } from './twin';
 import { showView, viewOf } from './views';
 
 const REMEMBERED = 60; // s of history
@@ -30,7 +31,7 @@ export class Page {
   readonly world: World;
   readonly clock: Clock;
   readonly agents: Agents;
-  readonly scene = new Scene();
+  readonly scene = new Scene('scene');
   private readonly history = new History(REMEMBERED);
   private readonly settings: Settings;
   private readonly pose: Pose;
@@ -38,6 +39,7 @@ export class Page {
   private readonly curve = new LearningCurve();
   private readonly map = new MapPanel((where) => this.start(where));
   private readonly tour: Tour;
+  private readonly twin: Twin;
   private readonly still = matchMedia('(prefers-reduced-motion: reduce)');
   private agent: Agent | null = null;
   private requests = 0; // for agents; the last one counts
@@ -52,6 +54,10 @@ export class Page {
     this.clock = new Clock(world);
     this.settings = new Settings(world, () => this.changed());
     this.pose = new Pose(world, () => this.restarted());
+    this.twin = new Twin(world, agents, () => {
+      this.reset();
+      this.changed();
+    });
     this.tour = new Tour(
       this,
       (id) => agents.has(id),
@@ -77,6 +83,10 @@ export class Page {
       );
       shared.agent = null;
     }
+    if (shared.twin !== null && !this.agents.has(shared.twin)) {
+      problems.push(`unknown agent ${quoted(shared.twin)}`);
+      shared.twin = null;
+    }
     this.world.agentOn = false;
     await this.take(shared);
     this.reset();
@@ -89,7 +99,10 @@ export class Page {
   async take(shared: Partial<Shared>): Promise<void> {
     const all = { ...BEGINNING, ...shared };
     const taking = ++this.takes;
-    await this.choose(all.agent ?? this.agents.list[0]!.id);
+    await Promise.all([
+      this.choose(all.agent ?? this.agents.list[0]!.id),
+      this.twin.choose(all.twin),
+    ]);
     if (taking === this.takes) this.apply(all);
   }
 
@@ -148,6 +161,7 @@ export class Page {
     const options = this.agents.list.map(({ id, title }) => new Option(title, id));
     const select = element<HTMLSelectElement>('agent');
     select.replaceChildren(...options);
+    this.twin.list();
     element<HTMLButtonElement>('agent-on').disabled = this.agent === null;
     element('own').hidden = this.agents.ownName === null;
     element('own-name').textContent = this.agents.ownName;
@@ -157,6 +171,7 @@ export class Page {
       return;
     }
     select.value = this.agent.id;
+    element('first-name').textContent = this.agent.title;
     element('agent-text').textContent = this.agent.text;
     element('agent-command').hidden = this.agent.command === null;
     element('agent-command').firstElementChild!.textContent = this.agent.command;
@@ -293,6 +308,7 @@ export class Page {
   private restarted(): void {
     this.clock.settle();
     this.history.clear();
+    this.twin.restarted();
   }
 
   /// Pendulum, sensors and motor with their initial settings.
@@ -323,6 +339,7 @@ export class Page {
 
   private settingsHash(): string {
     return encode({
+      twin: this.twin.id === OWN ? null : this.twin.id,
       agent: this.agent?.id ?? null,
       on: this.world.agentOn,
       speed: this.clock.speed,
@@ -353,7 +370,8 @@ export class Page {
   }
 
   private repaint(): void {
-    for (const canvas of [this.scene.canvas, this.curve.canvas, ...this.dashboard.canvases]) {
+    const scenes = [this.scene.canvas, this.twin.scene.canvas];
+    for (const canvas of [...scenes, this.curve.canvas, ...this.dashboard.canvases]) {
       canvas.forgetColors();
     }
     this.map.canvas.forgetColors();
@@ -368,6 +386,7 @@ export class Page {
     const { world } = this;
     const trail = this.still.matches ? [] : this.history.from(world.time - TRAIL_SECONDS);
     this.scene.draw(world, this.clock.state, trail);
+    this.twin.draw(this.clock, this.still.matches);
     this.tour.follow(world, this.scene);
     if (this.paused) this.pose.follow(world.state);
     this.dashboard.draw(world, this.history);

@@ -18,6 +18,7 @@ test('what is as at the beginning needs no link', () => {
 
 test('a link brings back what it was made from', () => {
   const shared: Shared = {
+    twin: 'sac',
     agent: 'a b&c',
     on: true,
     speed: 0.3,

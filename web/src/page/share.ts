@@ -8,6 +8,7 @@ export const OWN = 'own';
 /// What a link contains: the agent, whether it is on, and every setting that was changed.
 export interface Shared {
   agent: string | null;
+  twin: string | null; // the agent beside it
   on: boolean;
   speed: number;
   plant: Plant;
@@ -18,6 +19,7 @@ export interface Shared {
 /// The state in which the page begins.
 export const BEGINNING: Readonly<Shared> = {
   agent: null,
+  twin: null,
   on: false,
   speed: 1,
   plant: NOMINAL,
@@ -34,6 +36,7 @@ function numbersOf({ speed, plant, sensor_noise, delay }: Shared): Record<string
 export function encode(shared: Shared): string {
   const fields = new URLSearchParams();
   if (shared.agent) fields.set('agent', shared.agent);
+  if (shared.twin) fields.set('twin', shared.twin);
   if (shared.on) fields.set('on', '1');
   const beginning = numbersOf(BEGINNING);
   for (const [name, value] of Object.entries(numbersOf(shared))) {
@@ -52,8 +55,8 @@ export function decode(
   for (const [name, text] of new URLSearchParams(hash.replace(/^#/, ''))) {
     const range = ranges.get(name);
     const value = Number(text);
-    if (name === 'agent') {
-      shared.agent = text;
+    if (name === 'agent' || name === 'twin') {
+      shared[name] = text;
     } else if (name === 'on') {
       shared.on = text === '1';
     } else if (name === 'everything') {

@@ -16,12 +16,16 @@ const LARGEST_ARC = (150 / 180) * Math.PI; // at the motor's limit
 
 /// The pendulum in its plane, seen so that positive angles and torques are clockwise.
 export class Scene {
-  readonly canvas = new Canvas('scene');
+  readonly canvas: Canvas;
   readonly sparks = new Sparks();
   labels: readonly Label[] = [];
 
   /// Pixels per metre.
   private scale = 1;
+
+  constructor(id: string) {
+    this.canvas = new Canvas(id);
+  }
 
   /// A place on the canvas as a point of the pendulum's plane (m).
   toPlane(px: number, py: number): Vec {

@@ -1,0 +1,81 @@
+import { History } from '../history';
+import { BadInput } from '../safetensors';
+import { quoted } from '../text';
+import { Scene, TRAIL_SECONDS } from '../view/scene';
+import { World } from '../world';
+import type { Agents } from './agents';
+import type { Clock } from './clock';
+import { situation } from './dashboard';
+import { element } from './dom';
+import { warn } from './message';
+
+/// A second pendulum beside the first, with an agent of its own, to which happens what happens to that.
+export class Twin {
+  id: string | null = null; // of its agent; null while there is none
+  readonly scene = new Scene('twin-scene');
+  private readonly first: World;
+  private readonly agents: Agents;
+  private readonly world: World;
+  private readonly history = new History(TRAIL_SECONDS);
+  private readonly select = element<HTMLSelectElement>('twin');
+  private requests = 0; // the last one counts
+
+  /// `onChange` hears when a visitor has chosen its agent.
+  constructor(first: World, agents: Agents, onChange: () => void) {
+    this.first = first;
+    this.agents = agents;
+    this.world = new World(first.simulator.another());
+    this.world.onMoment = (moment) => this.history.add(moment);
+    this.select.addEventListener('change', () => {
+      void this.choose(this.select.value || null).then(onChange);
+    });
+    this.list();
+  }
+
+  /// The agents that can be chosen.
+  list(): void {
+    const options = this.agents.list.map(({ id, title }) => new Option(title, id));
+    this.select.replaceChildren(new Option('nobody', ''), ...options);
+    this.select.value = this.id ?? '';
+  }
+
+  /// Takes an agent, or none; if it cannot be loaded, says why.
+  async choose(id: string | null): Promise<void> {
+    const request = ++this.requests;
+    try {
+      const agent = id === null ? null : await this.agents.get(id);
+      if (request !== this.requests) return;
+      this.id = id;
+      this.world.policy = agent?.policy ?? null;
+    } catch (error) {
+      if (!(error instanceof BadInput)) throw error;
+      if (request !== this.requests) return;
+      warn(`Agent ${quoted(id!)} cannot be used: ${error.message}.`);
+    }
+    this.select.value = this.id ?? '';
+    this.first.twin = this.id === null ? null : this.world;
+    this.world.plant = this.first.plant;
+    this.world.reset(this.first.state);
+    this.restarted();
+    element('twin-box').hidden = this.id === null;
+    const title = this.agents.list.find((one) => one.id === this.id)?.title ?? '';
+    element('twin-name').textContent = title;
+  }
+
+  /// After a new start: what happened before is dropped.
+  restarted(): void {
+    this.history.clear();
+  }
+
+  draw(clock: Clock, still: boolean): void {
+    const state = clock.twinState;
+    if (!state) return;
+    const { world, history, scene } = this;
+    scene.draw(world, state, still ? [] : history.from(world.time - TRAIL_SECONDS));
+    const { state: what, text } = situation(world);
+    const badge = element('twin-badge');
+    badge.textContent = text;
+    badge.dataset.state = what;
+    scene.canvas.element.ariaLabel = `The other pendulum: ${what === 'balanced' ? what : text}`;
+  }
+}
