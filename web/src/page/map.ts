@@ -9,7 +9,8 @@ import type { World } from '../world';
 import { element } from './dom';
 
 const CELLS = 36; // of a side
-const MILLISECONDS = 4; // of a frame
+const MILLISECONDS = 3; // of a frame
+const FRAMES = 3; // it is drawn at each third, and computed at the others
 const WAY = 4; // s of the trajectory that are drawn
 
 /// The map of what the agent expects: what is chosen for it, and clicks on it.
@@ -25,6 +26,7 @@ export class MapPanel {
   private key = ''; // what the complete map was computed from
   private seen = false; // on the screen
   private range: [number, number] = [0, 1];
+  private frame = 0;
 
   /// `start` is told where a click wants the pendulum to be.
   constructor(start: (where: Partial<State>) => void) {
@@ -49,7 +51,7 @@ export class MapPanel {
     if (!this.seen) return;
     if (this.policy !== world.policy) this.clear();
     this.policy = world.policy;
-    this.work(world);
+    if (++this.frame % FRAMES !== 0) return this.work(world);
     const way = history.from(world.time - WAY).map(({ state }) => state);
     this.chart.draw(this.map, ...this.range, way, world.state);
   }

@@ -21,7 +21,7 @@ const TORQUES: readonly Color[] = [
   [140, 208, 198],
   [4, 110, 100],
 ];
-const EASE = 0.12; // of the way to a new map, at each drawing
+const EASE = 0.25; // of the way to a new map, at each drawing
 const ROOMY = 180; // pixels, from which on the ends of an axis are named too
 const [LEFT, BOTTOM] = [16, 18]; // pixels, for the names of the axes
 
@@ -56,7 +56,6 @@ export class MapChart {
       shown[i]! += EASE * ((cell - low) / (high - low) - shown[i]!);
     });
     this.paint(map.size, map.quantity === 'torque' ? TORQUES : VALUES);
-    canvas.context.imageSmoothingQuality = 'high';
     canvas.context.drawImage(this.image, LEFT, 0, width - LEFT, height - BOTTOM);
     this.drawWay(map, way, now);
   }
