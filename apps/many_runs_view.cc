@@ -39,18 +39,19 @@ void ManyRunsView::Begin(const std::vector<SeedRun>& runs) {
 
 void ManyRunsView::Announce() const {
   const size_t variants = plan_.variants.size();
-  Say("Training {} in {}\n", Printable(plan_.what), Printable(plan_.folder.string()));
+  Say("Training {} in {}\n", Printable(many_.what), Printable(plan_.folder.string()));
   Say("  {}seed{} {}: {} run{}, {} at a time\n",
       variants == 1 ? "" : fmt::format("{} variants, ", variants),
       plan_.seeds.size() == 1 ? "" : "s", SeedsText(plan_.seeds), runs_->size(),
-      runs_->size() == 1 ? "" : "s", plan_.jobs);
+      runs_->size() == 1 ? "" : "s", many_.jobs);
   for (const Variant& variant : plan_.variants) {
     for (const std::string& warning : Warnings(variant.config)) {
       Say("  Warning: {}{}{}\n", Printable(variant.name), variant.name.empty() ? "" : ": ",
           warning);
     }
   }
-  const auto begun = std::ranges::count_if(*runs_, [](const SeedRun& run) { return !!run.state; });
+  const auto begun =
+      std::ranges::count_if(*runs_, [](const SeedRun& run) { return run.result.has_value(); });
   if (begun > 0) {
     const size_t done = Measure().done;
     Say("  {} done before, resuming {}\n", done, static_cast<size_t>(begun) - done);
@@ -102,12 +103,12 @@ void ManyRunsView::End(const SeedRun& run) {
     return line_.Print(fmt::format("  {:<20} failed: {} (log: {})", run.name,
                                    Printable(run.problem), Printable(run.log().string())));
   }
-  if (!run.state) return line_.Print(fmt::format("  {:<20} stopped before it began", run.name));
-  const TrainState& s = *run.state;
+  if (!run.result) return line_.Print(fmt::format("  {:<20} stopped before it began", run.name));
+  const RunResult& s = *run.result;
   const Progress progress = Measure();
   line_.Print(fmt::format("  {:<20} {:>11} steps  {:>12}  {:<22}  {} of {} runs done{}", run.name,
                           FormatCount(s.steps), FormatDuration(s.seconds),
-                          s.solved         ? "solved at " + FormatCount(s.streak_step)
+                          s.solved         ? "solved at " + FormatCount(s.solved_step)
                           : run.finished() ? "done, not solved"
                                            : "stopped",
                           progress.done, runs_->size(),
@@ -115,23 +116,23 @@ void ManyRunsView::End(const SeedRun& run) {
 }
 
 void ManyRunsView::PrintTable(const Variant& variant) const {
-  Say("\n{}\n", Printable(variant.name.empty() ? plan_.what : variant.name));
+  Say("\n{}\n", Printable(variant.name.empty() ? many_.what : variant.name));
   std::vector<double> steps, seconds, success, reward;
   size_t solved = 0;
   size_t not_judged = 0, failed = 0;
   for (const SeedRun& run : *runs_) {
     if (run.variant != &variant) continue;
-    if (!run.state || run.state->best_step == 0) {
+    if (!run.result || run.result->best_step == 0) {
       ++(run.problem.empty() ? not_judged : failed);
       continue;
     }
     if (steps.empty()) {
       Say("  {:<12} {:>11}  {:>12}  {:>7}  {:>8}\n", "", "solved at", "after", "success", "return");
     }
-    const TrainState& s = *run.state;
+    const RunResult& s = *run.result;
     solved += s.solved ? 1 : 0;
-    steps.push_back(s.solved ? static_cast<double>(s.streak_step) : kNever);
-    seconds.push_back(s.solved ? s.streak_seconds : kNever);
+    steps.push_back(s.solved ? static_cast<double>(s.solved_step) : kNever);
+    seconds.push_back(s.solved ? s.solved_seconds : kNever);
     success.push_back(s.best_success_rate);
     reward.push_back(s.best_return);
     PrintRow(fmt::format("seed {}", run.seed), steps.back(), seconds.back(), success.back(),
@@ -161,7 +162,7 @@ void ManyRunsView::Finish() {
     Say("Stopped, {} of {} runs done; the same command resumes them.\n", done, runs_->size());
   }
   const bool can_be_typed = Printable(plan_.folder.string()) == plan_.folder.string();
-  if (can_be_typed && (done < runs_->size() || !plan_.compared)) {
+  if (can_be_typed && (done < runs_->size() || !many_.compared)) {
     Say("Next:\n  ./upswing compare {}{}\n", ShellQuoted(plan_.folder.string()),
         done < runs_->size() ? " --unfinished" : "");
   }

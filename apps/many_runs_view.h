@@ -15,7 +15,7 @@ namespace upswing {
 class ManyRunsView : public ManyRunsObserver {
  public:
   /// The plan must outlive it.
-  explicit ManyRunsView(const ManyRuns& plan) : plan_(plan) {}
+  explicit ManyRunsView(const ManyRuns& many) : many_(many), plan_(many.plan) {}
 
   void Prepare() override { InstallSignalHandlers(kStoppingTraining); }
   /// Prints what is trained and where. The rate counts the steps made from now on.
@@ -40,7 +40,8 @@ class ManyRunsView : public ManyRunsObserver {
   void Announce() const;
   void PrintTable(const Variant& variant) const;
 
-  const ManyRuns& plan_;
+  const ManyRuns& many_;
+  const StudyPlan& plan_;
   const std::vector<SeedRun>* runs_ = nullptr;
   ProgressLine line_;
   double steps_before_ = 0;  // made before this process

@@ -41,8 +41,8 @@ class SeedsTest(ProgramTest):
                         output)
         self.assertNotIn("\x1b", output)
         self.assertEqual({path.name for path in (self.folder / "many").iterdir()},
-                         {"settings.toml"} | {f"seed{seed}{end}" for seed in (2, 5, 6)
-                                              for end in ("", ".log")})
+                         {"settings.toml", "plan.json"} | {f"seed{seed}{end}" for seed in (2, 5, 6)
+                                                           for end in ("", ".log", ".done")})
         for seed in (2, 5, 6):
             self.succeed(*small(**TINY | {"seed": seed, "out": f"alone/seed{seed}", "threads": 2}))
             files = {path.name for path in (self.folder / f"many/seed{seed}").iterdir()}
@@ -54,7 +54,8 @@ class SeedsTest(ProgramTest):
     def test_a_number_of_seeds_counts_from_one_in_a_folder_of_the_agent(self):
         output = self.succeed(*small(**TINY | {"out": None}), "--seeds", 2, "--jobs", 1)
         self.assertEqual(sorted(path.name for path in (self.folder / "runs/d3qn-small").iterdir()),
-                         ["seed1", "seed1.log", "seed2", "seed2.log", "settings.toml"])
+                         ["plan.json", "seed1", "seed1.done", "seed1.log", "seed2", "seed2.done",
+                          "seed2.log", "settings.toml"])
         self.assertIn("./upswing compare runs/d3qn-small\n", output)
 
     def test_the_table_tells_what_the_runs_say(self):
@@ -87,6 +88,7 @@ class SeedsTest(ProgramTest):
         self.succeed(*small(**TINY), "--seeds", 3)
         after = snapshot(self.folder)
         self.assertIn("many/seed3", after)
+        before.pop("many/plan.json")
         self.assertEqual({name: after[name] for name in before}, before)
 
     def test_more_steps_equal_as_many_at_once(self):

@@ -14,6 +14,20 @@ std::atomic<bool> g_checkpoint_wanted{false};
 std::string_view g_notice;  // set before the handlers are installed
 static_assert(std::atomic<int>::is_always_lock_free);
 
+/// Notes the first of these signals; a second one ends the program at once.
+void StopAt(int number) {
+  struct sigaction stop {};
+  stop.sa_handler = [](int signal) {
+    g_stop_signal = signal;
+    if (g_notice.empty()) return;
+    const int interrupted_errno = errno;
+    (void)!write(STDERR_FILENO, g_notice.data(), g_notice.size());
+    errno = interrupted_errno;
+  };
+  stop.sa_flags = SA_RESETHAND | SA_RESTART;
+  sigaction(number, &stop, nullptr);
+}
+
 }  // namespace
 
 void ListenToSignals() {
@@ -26,17 +40,13 @@ void ListenToSignals() {
 
 void InstallSignalHandlers(std::string_view notice) {
   g_notice = isatty(STDERR_FILENO) == 1 ? notice : "";
-  struct sigaction stop {};
-  stop.sa_handler = [](int signal) {
-    g_stop_signal = signal;
-    if (g_notice.empty()) return;
-    const int interrupted_errno = errno;
-    (void)!write(STDERR_FILENO, g_notice.data(), g_notice.size());
-    errno = interrupted_errno;
-  };
-  stop.sa_flags = SA_RESETHAND | SA_RESTART;  // a second one ends the program at once
-  sigaction(SIGINT, &stop, nullptr);
-  sigaction(SIGTERM, &stop, nullptr);
+  StopAt(SIGINT);
+  StopAt(SIGTERM);
+}
+
+void StopAtUserSignals() {
+  StopAt(SIGUSR1);
+  StopAt(SIGUSR2);
 }
 
 TrainRequest PollSignals() {

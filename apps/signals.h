@@ -21,6 +21,9 @@ inline constexpr std::string_view kStoppingTraining =
 /// `notice`, which must outlive the program's handlers (a literal); empty: nothing.
 void InstallSignalHandlers(std::string_view notice);
 
+/// The same for SIGUSR1 and SIGUSR2, with which clusters announce the end of a job's time.
+void StopAtUserSignals();
+
 /// What has been requested; kCheckpoint is returned once for each request.
 TrainRequest PollSignals();
 

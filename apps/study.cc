@@ -5,6 +5,7 @@
 #include "apps/commands.h"
 #include "apps/compare_report.h"
 #include "apps/many_runs_view.h"
+#include "apps/study_work.h"
 #include "core/error.h"
 #include "core/text.h"
 #include "io/file.h"
@@ -19,16 +20,23 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* kStudyName = "study.toml";  // in the folder of a study
+
 /// What was typed.
 struct StudyArguments {
-  std::string file, out, seeds;
+  std::string file, out, seeds, keep, work;
   int64_t jobs = 0;  // 0: as many as there are processors
+  bool status = false;
+
+  fs::path folder() const {
+    return out.empty() ? fs::path("runs") / fs::path(file).stem() : fs::path(out);
+  }
 };
 
 /// Throws if the folder belongs to another study, which this one would replace: one with another
 /// title, or with a variant that this one does not have. (TrainMany compares the settings.)
-void CheckSameStudy(const ManyRuns& plan, const std::string& title) {
-  const fs::path file = plan.folder / plan.mark.first;
+void CheckSameStudy(const StudyPlan& plan, const std::string& title) {
+  const fs::path file = plan.folder / kStudyName;
   const std::string where = file.string();
   std::error_code error;
   if (!fs::is_regular_file(file, error)) return;
@@ -49,43 +57,60 @@ ManyRuns ReadStudy(const StudyArguments& arguments) {
   const std::string text = ReadTextFile(file);
   StudyFile study = ParseStudy(text, file.string());
 
-  ManyRuns plan;
-  plan.what = study.title.empty() ? file.stem().string() : Concat("\"", study.title, "\"");
-  plan.folder = arguments.out.empty() ? fs::path("runs") / file.stem() : fs::path(arguments.out);
-  plan.mark = {"study.toml", text};
+  ManyRuns many;
+  many.what = study.title.empty() ? file.stem().string() : Concat("\"", study.title, "\"");
+  many.mark = {kStudyName, text};
+  many.more_steps = many.compared = true;
+  StudyPlan& plan = many.plan;
+  plan.folder = arguments.folder();
   plan.variants = std::move(study.variants);
-  plan.more_steps = plan.compared = true;
+  plan.keep = arguments.keep.empty() ? study.keep : ParseKeep(arguments.keep, "--keep");
   CheckSameStudy(plan, study.title);
   plan.seeds =
       arguments.seeds.empty() ? std::move(study.seeds) : ParseSeeds(arguments.seeds, "--seeds");
   if (plan.seeds.empty()) {
     throw BadInput(Concat(file.string(), ": expected \"seeds = 10\" or the like, or --seeds"));
   }
-  plan.jobs = arguments.jobs;
-  if (plan.jobs == 0) plan.jobs = DefaultJobs(plan.variants.front().config.train.threads);
-  for (const Variant& variant : plan.variants) CheckMemory(variant.config, plan.jobs);
-  return plan;
+  many.jobs = arguments.jobs;
+  if (many.jobs == 0) many.jobs = DefaultJobs(plan.variants.front().config.train.threads);
+  for (const Variant& variant : plan.variants) CheckMemory(variant.config, many.jobs);
+  return many;
 }
 
-int RunStudy(const StudyArguments& arguments) {
-  const ManyRuns plan = ReadStudy(arguments);
-  CheckCanDraw();  // before hours of training, not after
-  ManyRunsView view(plan);
-  const int exit_code = TrainMany(plan, view);
-  if (exit_code != 0) return exit_code;
-  // All runs are done: compare them.
+/// Compares the finished runs of a study.
+int CompareStudy(const StudyPlan& plan) {
   CompareRequest request;
   request.root = plan.folder;
   request.different_tasks = true;
-  for (const Variant& variant : plan.variants) {
-    for (const int64_t seed : plan.seeds) {
-      request.paths.push_back(plan.folder / ManyRuns::NameOf(variant, seed));
-    }
-  }
+  for (const SeedRun& run : RunsOf(plan)) request.paths.push_back(run.path);
   const Comparison comparison = Compare(request);
   WriteComparison(comparison, plan.folder);
   PrintComparison(comparison, plan.folder);
   return 0;
+}
+
+int RunStudy(const StudyArguments& arguments) {
+  if (!arguments.work.empty()) return WorkOnStudy(arguments.work);
+  if (arguments.status) return PrintStudyStatus(arguments.folder());
+  const ManyRuns many = ReadStudy(arguments);
+  CheckCanDraw();  // before hours of training, not after
+  ManyRunsView view(many);
+  const int exit_code = TrainMany(many, view);
+  return exit_code != 0 ? exit_code : CompareStudy(many.plan);
+}
+
+/// Throws unless the arguments go together.
+void CheckArguments(const CLI::App& app, const StudyArguments& arguments) {
+  if (arguments.work.empty() == arguments.file.empty()) {
+    throw BadInput(arguments.file.empty()
+                       ? "study: expected FILE.toml or --work FOLDER, got neither"
+                       : "--work: expected no FILE.toml beside it");
+  }
+  for (const std::string flag : {"--out", "--seeds", "--jobs", "--keep", "--status"}) {
+    if (!arguments.work.empty() && app.count(flag) > 0) {
+      throw BadInput(Concat("--work: expected no ", flag, " beside it, as the plan says all"));
+    }
+  }
 }
 
 }  // namespace
@@ -96,12 +121,24 @@ void AddStudy(CLI::App& program, Command& command) {
   auto arguments = std::make_shared<StudyArguments>();
   app->add_option("file", arguments->file, "what to train: variants, settings, seeds")
       ->type_name("FILE.toml")
-      ->required()
       ->check(NotEmpty());
   app->add_option("--out", arguments->out, "folder of the study [runs/FILE]")
       ->type_name("FOLDER")
       ->check(NotEmpty());
   AddManyOptions(*app, arguments->seeds, arguments->jobs);
+  app->add_option("--keep", arguments->keep,
+                  "of a finished run: all, policy (and settings, evaluations, log) or tables (its\n"
+                  "rows in the study's tables alone) [all, or what FILE says]")
+      ->type_name("WHAT")
+      ->check(NotEmpty("all, policy or tables"));
+  app->add_flag("--status", arguments->status, "print what is done, running and lost, and end")
+      ->disable_flag_override();
+  app->add_option(
+         "--work", arguments->work,
+         "be a worker of the study in this folder, on any host that shares it: train what\n"
+         "no other worker has, until nothing is left")
+      ->type_name("FOLDER")
+      ->check(NotEmpty());
   app->footer(
       "A study file:\n"
       "  title = \"What does layer normalisation do?\"\n"
@@ -115,10 +152,16 @@ void AddStudy(CLI::App& program, Command& command) {
       "\nExamples:\n"
       "  ./upswing study configs/studies/post.toml\n"
       "  ./upswing study configs/studies/post.toml --seeds 3 --out runs/short\n"
+      "  ./upswing study configs/studies/post.toml --status\n"
+      "  ./upswing study --work runs/post          one more worker, here or on another host\n"
       "\nEach run lies in FOLDER/VARIANT/seedN, what it prints in FOLDER/VARIANT/seedN.log. The\n"
       "same command resumes what was stopped or killed; finished runs are left as they are.\n"
-      "Exit code 0: done; 1: a run failed; 2: bad usage or input; 130, 143: stopped.\n");
-  app->callback([arguments, &command] { command = [arguments] { return RunStudy(*arguments); }; });
+      "Exit code 0: done; 1: a run failed; 2: bad usage or input; 130, 143: stopped; of a worker\n"
+      "75: stopped by a signal, its run can be resumed by any other.\n");
+  app->callback([app, arguments, &command] {
+    CheckArguments(*app, *arguments);
+    command = [arguments] { return RunStudy(*arguments); };
+  });
 }
 
 }  // namespace upswing

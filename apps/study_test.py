@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/ usr / bin / env python3
 """`upswing study`: variants and seeds of a file, in their folders, stopped and resumed."""
 
 import re
@@ -33,7 +33,7 @@ gamma = 0.9
 [variants.plain]
 agent = "dqn"
 """
-# The same settings as flags.
+#The same settings as flags.
 FLAGS = {"hidden": 8, "head": 8, "steps": 400, "eval_every": 200, "eval_episodes": 2,
          "log_every": 200, "learning_starts": 50, "checkpoint_every": None, "threads": None,
          "envs": None, "updates_per_step": None}
@@ -62,7 +62,7 @@ class StudyTest(ProgramTest):
         self.assertIn("Written: summary.csv", output)
         self.assertNotIn("Next:", output)  # it has compared them itself
         study = self.folder / "runs/little"
-        self.assertEqual({path.name for path in study.iterdir()}, {"study.toml", *VARIANTS, *SUMMARY})
+        self.assertEqual({path.name for path in study.iterdir()}, {"study.toml", "plan.json", *VARIANTS, *SUMMARY})
         self.assertEqual((study / "study.toml").read_text(encoding="utf-8"), STUDY)
         for name, changes in VARIANTS.items():
             for seed in (1, 2):
@@ -78,8 +78,12 @@ class StudyTest(ProgramTest):
                           "with/seed2", "but/seed2", "plain/seed2"])
 
     def test_seeds_in_the_file_and_on_the_command_line(self):
-        for text, flags, seeds in (('"2,7-8"', [], {2, 7, 8}), ("[3]", [], {3}),
-                                   ("[1, 4]", [], {1, 4}), ("9", ["--seeds", "5,6"], {5, 6})):
+        for text, flags, seeds in (('"2,7-8"', [], {
+  2, 7, 8}), ("[3]", [], {
+  3}),
+                                   ("[1, 4]", [], {
+  1, 4}), ("9", ["--seeds", "5,6"], {
+  5, 6})):
             with self.subTest(seeds=text):
                 self.write("s.toml", HEAD.replace("seeds = 2", f"seeds = {text}")
                            + "[variants.a]\n")
@@ -98,9 +102,10 @@ class StudyTest(ProgramTest):
         self.succeed("study", "little.toml")
         after = snapshot(self.folder / "runs/little")
         self.assertIn("new/seed2/policy.safetensors", after)
-        for name in ("study.toml", *SUMMARY):
+        for name in ("study.toml", "plan.json", *SUMMARY):
             before.pop(name)
-        self.assertEqual({name: after[name] for name in before}, before)
+        self.assertEqual({
+name: after[name] for name in before}, before)
 
     def test_killed_and_gone_on_with_equals_never_stopped(self):
         longer = STUDY.replace("steps = 400", "steps = 6000").replace("= 200\n", "= 1000\n")

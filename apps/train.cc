@@ -34,18 +34,19 @@ struct TrainArguments {
 
 /// The same settings with many seeds.
 int RunSeeds(const TrainArguments& arguments) {
-  ManyRuns plan;
+  ManyRuns many;
+  StudyPlan& plan = many.plan;
   plan.variants = {{"", BuildConfig(arguments.config, arguments.flags)}};
   Config& config = plan.variants.front().config;
   MakeReadyForMany(config);
-  plan.what = config.agent;
+  many.what = config.agent;
   plan.folder = arguments.out.empty() ? fs::path("runs") / config.agent : fs::path(arguments.out);
   plan.seeds = ParseSeeds(arguments.seeds, "--seeds");
-  plan.jobs = arguments.jobs > 0 ? arguments.jobs : DefaultJobs(config.train.threads);
-  plan.more_steps = StepsGiven(arguments.flags);
-  CheckMemory(config, plan.jobs);
-  ManyRunsView view(plan);
-  return TrainMany(plan, view);
+  many.jobs = arguments.jobs > 0 ? arguments.jobs : DefaultJobs(config.train.threads);
+  many.more_steps = StepsGiven(arguments.flags);
+  CheckMemory(config, many.jobs);
+  ManyRunsView view(many);
+  return TrainMany(many, view);
 }
 
 /// Prints the settings that the training would have.

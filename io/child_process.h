@@ -22,6 +22,8 @@ class ChildProcess {
   ChildProcess& operator=(ChildProcess&&) = delete;
 
   void Signal(int signal) const;
+  /// Its number; -1 once it has ended.
+  pid_t pid() const { return pid_; }
 
   /// How it ended: the exit code, or 128 and the signal that ended it; nothing while it runs.
   std::optional<int> Poll();

@@ -114,6 +114,18 @@ void WriteFileAtomically(const fs::path& path, std::string_view text) {
   WriteFileAtomically(path, std::array{BytesOf(text)});
 }
 
+void WriteIfOther(const fs::path& path, const std::string& text) {
+  std::error_code error;
+  const bool is_own = fs::is_regular_file(fs::symlink_status(path, error));
+  if (!is_own || ReadOwnFile(path) != text) WriteFileAtomically(path, text);
+}
+
+void CheckNoLink(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::is_symlink(folder, error)) return;
+  throw BadInput(Concat(folder.string(), ": expected a folder, got a link"));
+}
+
 void WriteNamedFile(const fs::path& path, std::string_view text) {
   struct stat info {};
   if (stat(path.c_str(), &info) != 0) {

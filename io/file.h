@@ -39,6 +39,12 @@ void WriteFileAtomically(const std::filesystem::path& path,
                          std::span<const std::span<const std::byte>> parts);
 void WriteFileAtomically(const std::filesystem::path& path, std::string_view text);
 
+/// The same, unless there is a file of this text already.
+void WriteIfOther(const std::filesystem::path& path, const std::string& text);
+
+/// Throws BadInput if a folder is a link: what is written there would land elsewhere.
+void CheckNoLink(const std::filesystem::path& folder);
+
 /// Writes a file that the user named. Like WriteFileAtomically, except that a link is followed and
 /// its target replaced, and that something else than a regular file (a pipe, a device) is written
 /// in place.

@@ -26,16 +26,6 @@ constexpr std::string_view kMark = ".making-";
 constexpr size_t kDigits = 16;
 constexpr int kMostTries = 100;  // one suffices unless another process interferes
 
-std::string RandomDigits() {
-  uint64_t number = 0;
-  if (getrandom(&number, sizeof(number), 0) != sizeof(number)) {
-    throw Failure("the system gives no random numbers");
-  }
-  std::string digits;
-  for (size_t i = 0; i < kDigits; ++i, number >>= 4) digits += "0123456789abcdef"[number & 15];
-  return digits;
-}
-
 /// Tries to lock an open file or folder; false if another process holds the lock.
 bool Lock(const Descriptor& fd) { return flock(fd.get(), LOCK_EX | LOCK_NB) == 0; }
 
@@ -46,6 +36,16 @@ bool HasName(const Descriptor& fd) {
 }
 
 }  // namespace
+
+std::string RandomDigits() {
+  uint64_t number = 0;
+  if (getrandom(&number, sizeof(number), 0) != sizeof(number)) {
+    throw Failure("the system gives no random numbers");
+  }
+  std::string digits;
+  for (size_t i = 0; i < kDigits; ++i, number >>= 4) digits += "0123456789abcdef"[number & 15];
+  return digits;
+}
 
 Descriptor::~Descriptor() {
   if (fd_ >= 0) close(fd_);

@@ -19,6 +19,9 @@ class Descriptor {
   int fd_;
 };
 
+/// 16 random hexadecimal digits, for a name that no other process takes.
+std::string RandomDigits();
+
 /// A file or folder that is being made. It appears under its name complete or not at all: until it
 /// is complete it is called `.NAME.making-` and 16 random hexadecimal digits, in the same folder,
 /// and is locked. One without a lock was left behind by a process that was killed; the next Making

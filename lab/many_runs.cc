@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <csignal>
-#include <fstream>
 #include <list>
 #include <thread>
 
@@ -11,31 +10,23 @@
 #include "core/text.h"
 #include "io/child_process.h"
 #include "io/file.h"
+#include "io/lease.h"
 #include "io/machine.h"
 #include "io/run_folder.h"
-#include "io/tensor_file.h"
+#include "lab/study_worker.h"
 
 namespace upswing {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view kSettingsName = "settings.toml";  // of a variant, without seed
-
-/// The end of a file, at most so many bytes.
-std::string TailOf(const fs::path& path, std::streamoff bytes) {
-  std::ifstream file(path, std::ios::binary | std::ios::ate);
-  if (!file) return "";
-  const std::streamoff size = file.tellg();
-  file.seekg(std::max<std::streamoff>(0, size - bytes));
-  return {std::istreambuf_iterator<char>(file), {}};
-}
+constexpr const char* kWorkersLog = "workers.log";
 
 /// The last line that is not empty.
 std::string LastLine(const fs::path& path) {
-  const std::string tail = TailOf(path, 4096);
   std::string last = "its log is empty";
-  for (const std::string_view line : Split(tail, '\n')) {
+  const std::string text = ReadOwnFile(path);
+  for (const std::string_view line : Split(text, '\n')) {
     if (!line.empty()) last = line;
   }
   constexpr std::string_view kProgram = "upswing: ";  // the caller's message begins with it, too
@@ -66,58 +57,37 @@ void CheckSame(Config before, Config now, bool more_steps, const std::string& wh
   }
 }
 
-/// Throws if it is a link: what is written there would land elsewhere.
-void CheckNoLink(const fs::path& folder) {
-  std::error_code error;
-  if (!fs::is_symlink(folder, error)) return;
-  throw BadInput(Concat(folder.string(), ": expected a folder, got a link"));
-}
-
 /// Throws if what is in a variant's folder was made with other settings: one of its runs, or, where
 /// none has begun, the settings themselves.
 void CheckRuns(const fs::path& folder, const Config& config, bool more_steps) {
   std::error_code error;
+  const std::string mark = SettingsMark(config);
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     if (IsMakingName(entry.path().filename().string())) continue;
     if (!fs::is_regular_file(entry.path() / RunFolder::kConfig, error)) continue;
-    CheckSame(ReadRunConfig(entry.path()), config, more_steps, entry.path().string());
+    const auto done = ReadDone(entry.path().string() + ".done");
+    const bool same = done && done->settings == mark && done->version == UPSWING_VERSION &&
+                      done->planned_steps == config.train.steps &&
+                      done->stop_when_solved == config.train.stop_when_solved;
+    if (!same) CheckSame(ReadRunConfig(entry.path()), config, more_steps, entry.path().string());
   }
   const fs::path settings = folder / kSettingsName;
   if (!fs::is_regular_file(settings, error)) return;
   CheckSame(BuildConfig(settings, {}), config, more_steps, settings.string());
 }
 
-void WriteIfOther(const fs::path& path, const std::string& text) {
-  std::error_code error;
-  const bool is_own = fs::is_regular_file(fs::symlink_status(path, error));
-  if (!is_own || ReadOwnFile(path) != text) WriteFileAtomically(path, text);
-}
-
-/// Writes what the runs begin with.
-void WriteSettings(const ManyRuns& plan) {
-  for (const Variant& variant : plan.variants) {
-    const fs::path folder = plan.folder / variant.name;
-    MakeFolder(folder);
-    if (!variant.config.mjcf.empty()) WriteIfOther(folder / RunFolder::kModel, variant.config.mjcf);
-    Config config = variant.config;
-    const auto wanted = [](const Option& option) { return option.name != "seed"; };
-    WriteIfOther(folder / kSettingsName, OptionsOf(config).Toml(true, wanted));
-  }
-  if (!plan.mark.first.empty()) WriteIfOther(plan.folder / plan.mark.first, plan.mark.second);
-}
-
-/// All runs, the first seed of each variant first.
-std::vector<SeedRun> ListRuns(const ManyRuns& plan) {
-  std::vector<SeedRun> runs;
-  for (const int64_t seed : plan.seeds) {
-    for (const Variant& variant : plan.variants) {
-      const fs::path name = ManyRuns::NameOf(variant, seed);
-      runs.push_back({&variant, seed, name.string(), plan.folder / name, {}, ""});
-      try {
-        runs.back().ReadState();
-      } catch (const Error& error) {
-        runs.back().problem = error.what();
-      }
+/// All runs as they stand. Those that failed before are tried again, unless they cannot even be
+/// read.
+std::vector<SeedRun> ListRuns(const StudyPlan& plan) {
+  std::vector<SeedRun> runs = RunsOf(plan);
+  for (SeedRun& run : runs) {
+    std::error_code error;
+    fs::remove(run.failed(), error);
+    try {
+      run.Read();
+    } catch (const Error& broken) {
+      run.problem = broken.what();
+      WriteFailed(run, run.problem);
     }
   }
   return runs;
@@ -125,149 +95,170 @@ std::vector<SeedRun> ListRuns(const ManyRuns& plan) {
 
 // ---- While they run.
 
-/// The program's arguments that begin a run or resume it.
-std::vector<std::string> ArgumentsOf(const SeedRun& run) {
-  const TrainConfig& train = run.variant->config.train;
-  if (!run.state) {
-    const fs::path settings = run.path.parent_path() / kSettingsName;
-    return {"train", Concat("--config=", settings.string()), Concat("--seed=", run.seed),
-            Concat("--out=", run.path.string())};
-  }
-  return {"train",
-          Concat("--resume=", run.path.string()),
-          Concat("--steps=", train.steps),
-          Concat("--threads=", train.threads),
-          Concat("--checkpoint-every=", train.checkpoint_every),
-          train.stop_when_solved ? "--stop-when-solved" : "--no-stop-when-solved"};
-}
-
-/// The processes, as many at a time as there are jobs.
-class Scheduler {
+/// The worker processes of this machine, and what is to be seen of all runs.
+class LocalWorkers {
  public:
-  Scheduler(std::vector<SeedRun>& runs, int64_t jobs, ManyRunsObserver& observer)
-      : jobs_(static_cast<size_t>(jobs)), observer_(observer) {
+  LocalWorkers(const ManyRuns& many, std::vector<SeedRun>& runs, ManyRunsObserver& observer)
+      : many_(many), observer_(observer), log_(many.plan.folder / kWorkersLog) {
     for (SeedRun& run : runs) {
-      if (!run.finished() && run.problem.empty()) waiting_.push_back(&run);
+      if (!run.finished() && run.problem.empty()) open_.push_back(&run);
     }
   }
 
-  /// Returns when all have ended; after a request to stop, those that run are stopped in order.
+  /// Returns when all runs have ended; after a request to stop, when the workers have.
   void Run() {
-    while (!running_.empty() || !waiting_.empty()) {
+    while (true) {
       const TrainRequest request = observer_.Poll();
       if (request == TrainRequest::kCheckpoint) SignalAll(SIGUSR1);
-      if (request == TrainRequest::kStop && !stopping_) Stop();
-      while (running_.size() < jobs_ && !waiting_.empty()) Start();
-      std::this_thread::sleep_for(std::chrono::milliseconds(20));
-      for (auto it = running_.begin(); it != running_.end();) {
-        const auto code = it->process.Poll();
-        if (code) End(*it->run, *code);
-        it = code ? running_.erase(it) : std::next(it);
+      if (request == TrainRequest::kStop && !stopping_) {
+        stopping_ = true;
+        SignalAll(observer_.stop_signal());
       }
-      observer_.Watch(RunningNow());
+      Reap();
+      if (const auto now = Clock::now(); now >= look_at_) {
+        Look();
+        look_at_ = now + (open_.size() < 1000 ? kOften : kSeldom);
+        if (!stopping_) StartWorkers(now);
+      }
+      if (workers_.empty() && (stopping_ || open_.empty())) break;
+      observer_.Watch(running_);
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
+    Look();
+    for (const SeedRun* run : running_) {  // they were stopped
+      auto* stopped = *std::ranges::find(open_, run);
+      stopped->Read();
+      observer_.End(*stopped);
+    }
+    std::error_code error;
+    if (fs::is_empty(log_, error)) fs::remove(log_, error);
   }
 
  private:
-  struct Running {
-    SeedRun* run;
-    ChildProcess process;
-  };
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::chrono::milliseconds kOften{60}, kSeldom{500};
 
-  void Start() {
-    SeedRun& run = *waiting_.front();
-    waiting_.pop_front();
-    try {
-      running_.push_back({&run, ChildProcess(ArgumentsOf(run), run.log())});
-    } catch (const Error& error) {
-      run.problem = error.what();
-      observer_.End(run);
+  /// Takes note of the workers that have ended.
+  void Reap() {
+    for (auto it = workers_.begin(); it != workers_.end();) {
+      const pid_t pid = it->pid();
+      const auto code = it->Poll();
+      const bool as_asked = stopping_ && code == 128 + observer_.stop_signal();
+      if (code && *code != 0 && *code != 1 && *code != kTryAgain && !as_asked) {
+        EndedBadly(pid, *code);
+      }
+      it = code ? workers_.erase(it) : std::next(it);
     }
   }
 
-  void Stop() {
-    stopping_ = true;
-    waiting_.clear();
-    SignalAll(observer_.stop_signal());
+  /// The run on which a worker ended has failed.
+  void EndedBadly(pid_t pid, int code) {
+    const std::string holder = Concat(ThisHost(), " ", pid, " ");
+    for (const SeedRun* run : open_) {
+      const auto lease = ReadLease(run->claim());
+      if (!lease || !lease->holder.starts_with(holder)) continue;
+      if (const auto own = Lease::Take(run->claim(), "reports its end")) {
+        WriteFailed(*run,
+                    code > 128 ? Concat("ended by signal ", code - 128) : LastLine(run->log()));
+      }
+      return;
+    }
+    SignalAll(SIGTERM);
+    throw Failure(
+        Concat("a worker ended: ", code > 128 ? Concat("by signal ", code - 128) : LastLine(log_)));
+  }
+
+  /// Sees which runs have ended, run now, or wait. They are begun in their order, so beyond many
+  /// that wait none has begun.
+  void Look() {
+    constexpr int kEnough = 64;
+    std::vector<const SeedRun*> before = std::move(running_);
+    running_.clear();
+    waiting_ = 0;
+    for (auto it = open_.begin(); it != open_.end() && waiting_ < kEnough;) {
+      SeedRun& run = **it;
+      std::error_code error;
+      if (fs::exists(run.done(), error) || fs::exists(run.failed(), error)) ReadAgain(run);
+      if (run.finished() || !run.problem.empty()) {
+        it = open_.erase(it);
+        observer_.End(run);
+        continue;
+      }
+      if (fs::exists(run.claim(), error)) {
+        running_.push_back(&run);
+      } else if (stopping_ && std::ranges::find(before, &run) != before.end()) {
+        running_.push_back(&run);  // until now
+      } else {
+        ++waiting_;
+      }
+      ++it;
+    }
+  }
+
+  static void ReadAgain(SeedRun& run) {
+    try {
+      run.Read();
+    } catch (const Error& error) {
+      run.problem = error.what();
+    }
+  }
+
+  /// Starts workers while there are runs for them: that wait, or whose worker has died.
+  void StartWorkers(Clock::time_point now) {
+    const auto jobs = static_cast<size_t>(many_.jobs);
+    if (workers_.size() >= jobs || open_.empty() || now < start_at_) return;
+    size_t runs = waiting_;
+    for (const SeedRun* run : running_) {
+      if (runs >= jobs) break;
+      const auto lease = ReadLease(run->claim());
+      if (!lease || lease->lost) ++runs;
+    }
+    const size_t wanted = std::min(jobs - workers_.size(), runs);
+    for (size_t i = 0; i < wanted; ++i) {
+      workers_.emplace_back(std::vector<std::string>{"study", "--work", many_.plan.folder.string()},
+                            log_);
+    }
+    start_at_ = now + std::chrono::seconds(1);  // they need a while to claim their runs
   }
 
   void SignalAll(int signal) {
-    for (const Running& running : running_) running.process.Signal(signal);
+    for (const ChildProcess& worker : workers_) worker.Signal(signal);
   }
 
-  void End(SeedRun& run, int code) {
-    const bool asked_to_stop = stopping_ && code == 128 + observer_.stop_signal();
-    try {
-      run.ReadState();
-      if (code != 0 && !asked_to_stop) {
-        run.problem = code > 128 ? Concat("ended by signal ", code - 128) : LastLine(run.log());
-      }
-    } catch (const Error& error) {
-      run.problem = error.what();
-    }
-    observer_.End(run);
-  }
-
-  std::vector<const SeedRun*> RunningNow() const {
-    std::vector<const SeedRun*> runs;
-    for (const Running& running : running_) runs.push_back(running.run);
-    return runs;
-  }
-
-  size_t jobs_;
+  const ManyRuns& many_;
   ManyRunsObserver& observer_;
+  fs::path log_;
+  std::list<SeedRun*> open_;  // neither done nor failed
+  std::vector<const SeedRun*> running_;
+  size_t waiting_ = 0;  // that nobody has claimed
+  std::list<ChildProcess> workers_;
+  Clock::time_point look_at_{}, start_at_{};
   bool stopping_ = false;
-  std::list<SeedRun*> waiting_;
-  std::list<Running> running_;
 };
 
 }  // namespace
 
-fs::path ManyRuns::NameOf(const Variant& variant, int64_t seed) {
-  return fs::path(variant.name) / Concat("seed", seed);
-}
-
-bool SeedRun::finished() const { return state && state->Finished(variant->config.train); }
-
-int64_t SeedRun::Steps() const {
-  if (finished()) return state->steps;
-  const int64_t at_checkpoint = state ? state->steps : 0;
-  // A row begins with its step; the last one may be half written.
-  const std::string tail = TailOf(path / RunFolder::kMetrics, 1024);
-  const std::vector<std::string_view> rows = Split(tail, '\n');
-  if (rows.size() < 3) return at_checkpoint;
-  const auto at_metrics = ParseInteger(Split(rows[rows.size() - 2], ',').front());
-  return std::max(at_checkpoint, at_metrics.value_or(0));
-}
-
-void SeedRun::ReadState() {
-  CheckNoLink(path);
-  if (!fs::exists(path / RunFolder::kConfig)) return;
-  const Tensors checkpoint = LoadPartOfTensors(RunFolder::CheckpointPath(path), "train/");
-  const EnvSpec spec = SpecOf(variant->config.Environments());
-  TrainState read(spec.num_envs, static_cast<int>(spec.term_names.size()));
-  read.State(Archive::Loader(checkpoint).In("train"));
-  state = std::move(read);
-}
-
-int TrainMany(const ManyRuns& plan, ManyRunsObserver& observer) {
+int TrainMany(const ManyRuns& many, ManyRunsObserver& observer) {
   // Nothing is touched before all is checked, nor while another process is at work there.
-  const bool is_study = !plan.mark.first.empty();
-  CheckFolder(plan.folder, is_study ? fs::path(plan.mark.first) : fs::path(kSettingsName));
+  const StudyPlan& plan = many.plan;
+  const bool is_study = !many.mark.first.empty();
+  CheckFolder(plan.folder, is_study ? fs::path(many.mark.first) : fs::path(kSettingsName));
   std::error_code error;
   std::optional<FolderLock> lock;
   if (fs::exists(plan.folder, error)) lock.emplace(plan.folder);
   for (const Variant& variant : plan.variants) {
-    if (!variant.name.empty()) CheckNoLink(plan.folder / variant.name);
-    CheckRuns(plan.folder / variant.name, variant.config, plan.more_steps);
+    const fs::path folder = plan.folder / variant.name;
+    if (!variant.name.empty()) CheckNoLink(folder);
+    CheckRuns(folder, variant.config, many.more_steps);
   }
   observer.Prepare();
-  WriteSettings(plan);
+  WritePlan(plan);
+  if (is_study) WriteIfOther(plan.folder / many.mark.first, many.mark.second);
   if (!lock) lock.emplace(plan.folder);
 
   std::vector<SeedRun> runs = ListRuns(plan);
   observer.Begin(runs);
-  Scheduler(runs, plan.jobs, observer).Run();
+  LocalWorkers(many, runs, observer).Run();
   observer.Finish();
 
   if (observer.stop_signal() != 0) return 128 + observer.stop_signal();

@@ -36,18 +36,6 @@ std::vector<FlagValue> ReadSettings(const toml::node& node, const std::string& n
   return settings;
 }
 
-/// A folder is called after the variant, so its name is made of letters, digits, - and _.
-void CheckName(const std::string& name, const std::string& place) {
-  const auto fits = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
-           c == '_';
-  };
-  if (name.empty() || !std::ranges::all_of(name, fits)) {
-    throw BadInput(
-        Concat(place, ": expected a name of letters, digits, - and _, got \"", name, "\""));
-  }
-}
-
 /// The settings of a variant, checked together. Throws BadInput.
 Config BuildVariant(const std::string& name, const std::vector<FlagValue>& settings,
                     const std::string& place, const std::string& where) {
@@ -73,7 +61,7 @@ std::vector<Variant> ReadVariants(const toml::table& study, const std::string& w
   std::vector<std::pair<uint32_t, Variant>> placed;
   for (const auto& [key, node] : *variants) {
     const std::string name(key.str());
-    CheckName(name, PlaceOf(node, where));
+    CheckVariantName(name, PlaceOf(node, where));
     std::vector<FlagValue> settings = common;
     const std::vector<FlagValue> own = ReadSettings(node, name, where);
     settings.insert(settings.end(), own.begin(), own.end());
@@ -97,7 +85,7 @@ std::vector<Variant> ReadVariants(const toml::table& study, const std::string& w
 }
 
 void CheckKeys(const toml::table& study, const std::string& where) {
-  const std::vector<std::string> known{"title", "seeds", "settings", "variants"};
+  const std::vector<std::string> known{"title", "seeds", "keep", "settings", "variants"};
   for (const auto& [key, node] : study) {
     const std::string name(key.str());
     if (std::ranges::find(known, name) != known.end()) continue;
@@ -118,9 +106,9 @@ std::string ReadText(const toml::table& study, const std::string& key, const std
   const toml::node* node = study.get(key);
   if (node == nullptr) return "";
   const auto text = TextOf(*node);
-  if (!text || (key == "title" && !node->is_string())) {
+  if (!text || (key != "seeds" && !node->is_string())) {
     throw BadInput(Concat(PlaceOf(*node, where), ": ", key, ": expected a text",
-                          key == "title" ? "" : ", a number or a list of numbers"));
+                          key == "seeds" ? ", a number or a list of numbers" : ""));
   }
   return *text;
 }
@@ -130,7 +118,10 @@ std::string ReadText(const toml::table& study, const std::string& key, const std
 StudyFile ParseStudy(std::string_view text, const std::string& where) {
   const toml::table table = ParseToml(text, where);
   CheckKeys(table, where);
-  StudyFile study{ReadText(table, "title", where), ReadVariants(table, where), {}};
+  StudyFile study{ReadText(table, "title", where), ReadVariants(table, where), {}, Keep::kAll};
+  if (const toml::node* keep = table.get("keep")) {
+    study.keep = ParseKeep(ReadText(table, "keep", where), Concat(PlaceOf(*keep, where), ": keep"));
+  }
   const std::string seeds = ReadText(table, "seeds", where);
   if (!seeds.empty()) {
     study.seeds = ParseSeeds(seeds, Concat(PlaceOf(*table.get("seeds"), where), ": seeds"));

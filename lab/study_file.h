@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "lab/many_runs.h"
+#include "lab/study_plan.h"
 
 namespace upswing {
 
@@ -14,6 +14,7 @@ struct StudyFile {
   std::string title;              // may be empty
   std::vector<Variant> variants;  // in the order in which they stand in the file; at least one
   std::vector<int64_t> seeds;     // empty: the file names none
+  Keep keep = Keep::kAll;
 };
 
 /// Reads the text of a study file; the path of a model is relative to its folder. `where` is its

@@ -1,0 +1,122 @@
+#include "apps/study_work.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <map>
+
+#include "apps/say.h"
+#include "apps/signals.h"
+#include "apps/train_view.h"
+#include "core/error.h"
+#include "core/text.h"
+#include "io/file.h"
+#include "io/lease.h"
+#include "lab/format.h"
+#include "lab/study_worker.h"
+
+namespace upswing {
+namespace {
+
+/// During its lifetime all that is printed goes to the end of a file.
+class PrintedTo {
+ public:
+  explicit PrintedTo(const std::filesystem::path& path)
+      : file_(path), output_(dup(STDOUT_FILENO)), error_(dup(STDERR_FILENO)) {
+    std::fflush(stdout);
+    dup2(file_.descriptor(), STDOUT_FILENO);
+    dup2(file_.descriptor(), STDERR_FILENO);
+  }
+  ~PrintedTo() {
+    std::fflush(stdout);
+    dup2(output_.get(), STDOUT_FILENO);
+    dup2(error_.get(), STDERR_FILENO);
+  }
+  PrintedTo(const PrintedTo&) = delete;
+  PrintedTo& operator=(const PrintedTo&) = delete;
+
+ private:
+  AppendFile file_;
+  Descriptor output_, error_;
+};
+
+/// Each run in its log, as `train` would print it.
+class LoggedRuns : public WorkerHost {
+ public:
+  bool Train(const SeedRun& run,
+             const std::function<std::unique_ptr<TrainingRun>()>& make) override {
+    const PrintedTo log(run.log());
+    try {
+      const std::unique_ptr<TrainingRun> training = make();
+      TrainView view(training->training());
+      view.Announce(training->path());
+      const bool finished = training->Train(view);
+      view.Summarize(training->path(), finished);
+      return finished;
+    } catch (const std::exception& error) {
+      SayError(Printable(error.what()));
+      throw;
+    }
+  }
+  bool stopped() override { return StopSignal() != 0; }
+};
+
+}  // namespace
+
+int WorkOnStudy(const std::filesystem::path& folder) {
+  InstallSignalHandlers(kStoppingTraining);
+  // A job of Slurm hears so that its time is up.
+  if (std::getenv("SLURM_JOB_ID") != nullptr) StopAtUserSignals();
+  const StudyPlan plan = ReadPlan(folder);
+  LoggedRuns host;
+  const WorkerOutcome outcome = WorkOn(plan, host);
+  if (outcome.stopped) return kTryAgain;
+  return outcome.failed > 0 ? 1 : 0;
+}
+
+int PrintStudyStatus(const std::filesystem::path& folder) {
+  struct Counts {
+    int64_t done = 0, solved = 0, running = 0, lost = 0, failed = 0, stopped = 0, waiting = 0;
+  };
+  const StudyPlan plan = ReadPlan(folder);
+  std::map<const Variant*, Counts> counts;
+  std::vector<std::string> lines;
+  for (SeedRun& run : RunsOf(plan)) {
+    Counts& c = counts[run.variant];
+    try {
+      run.Read();
+    } catch (const Error& error) {
+      run.problem = error.what();
+    }
+    const auto lease = ReadLease(run.claim());
+    if (run.finished()) {
+      ++c.done;
+      c.solved += run.result->solved ? 1 : 0;
+    } else if (lease) {
+      ++(lease->lost ? c.lost : c.running);
+      lines.push_back(fmt::format("  {:<20} {:>11} steps  {} by {}, seen {} ago", run.name,
+                                  FormatCount(run.Steps()), lease->lost ? "lost" : "claimed",
+                                  Printable(lease->holder), FormatDuration(lease->seconds)));
+    } else if (!run.problem.empty()) {
+      ++c.failed;
+      lines.push_back(fmt::format("  {:<20} failed: {}", run.name, Printable(run.problem)));
+    } else {
+      ++(run.result ? c.stopped : c.waiting);
+    }
+  }
+  Say("{}\n", Printable(folder.string()));
+  Say("  {:<20} {:>7} {:>7} {:>8} {:>7} {:>7} {:>8} {:>8}\n", "", "done", "solved", "running",
+      "lost", "failed", "stopped", "waiting");
+  for (const Variant& variant : plan.variants) {
+    const Counts& c = counts[&variant];
+    Say("  {:<20} {:>7} {:>7} {:>8} {:>7} {:>7} {:>8} {:>8}\n", variant.name, c.done, c.solved,
+        c.running, c.lost, c.failed, c.stopped, c.waiting);
+  }
+  if (!lines.empty()) Say("\n");
+  for (const std::string& line : lines) Say("{}\n", line);
+  return 0;
+}
+
+}  // namespace upswing

@@ -1,0 +1,197 @@
+#include "io/lease.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "io/file.h"
+#include "io/making.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr size_t kMostBytes = 1000;  // of the file
+
+/// A file that is open, and what it is.
+struct Opened {
+  Descriptor descriptor;
+  struct stat info {};
+};
+
+/// Opens a regular file to read, without following a link; nothing if there is none.
+std::optional<Opened> Open(const fs::path& path) {
+  Opened file{Descriptor(open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC)), {}};
+  if (file.descriptor.get() < 0) {
+    if (errno == ENOENT) return std::nullopt;
+    throw PathError("cannot read", path, errno);
+  }
+  if (fstat(file.descriptor.get(), &file.info) != 0) throw PathError("cannot read", path, errno);
+  if (!S_ISREG(file.info.st_mode)) {
+    throw BadInput(Concat(path.string(), ": expected a regular file"));
+  }
+  return file;
+}
+
+bool SameFile(const struct stat& a, const struct stat& b) {
+  return a.st_dev == b.st_dev && a.st_ino == b.st_ino;
+}
+
+double SecondsOf(const timespec& time) {
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+/// A new file beside `path` under a name that no other process takes.
+struct UniqueFile {
+  fs::path path;
+  Descriptor descriptor;
+
+  UniqueFile(const fs::path& beside, std::string_view what)
+      : path(Concat(beside.string(), ".", what, "-", RandomDigits())),
+        descriptor(open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644)) {
+    if (descriptor.get() < 0) throw PathError("cannot write", path, errno);
+  }
+  ~UniqueFile() { unlink(path.c_str()); }
+  UniqueFile(const UniqueFile&) = delete;
+  UniqueFile& operator=(const UniqueFile&) = delete;
+
+  struct stat info() const {
+    struct stat now {};
+    if (fstat(descriptor.get(), &now) != 0) throw PathError("cannot read", path, errno);
+    return now;
+  }
+  /// The file server's clock.
+  double Now() const {
+    if (futimens(descriptor.get(), nullptr) != 0) throw PathError("cannot write", path, errno);
+    return SecondsOf(info().st_mtim);
+  }
+};
+
+/// The text of a lease: host, process, and who that is.
+std::string TextOf(std::string_view holder) {
+  return Concat(ThisHost(), " ", getpid(), " ", holder, "\n").substr(0, kMostBytes);
+}
+
+std::string ReadText(const Opened& file) {
+  std::array<char, kMostBytes> text{};
+  const ssize_t size = pread(file.descriptor.get(), text.data(), text.size(), 0);
+  return {text.data(), static_cast<size_t>(std::max<ssize_t>(0, size))};
+}
+
+/// Whether the holder of a lease that was read has given it up.
+bool IsLost(const Opened& file, const std::string& text, double now, std::chrono::seconds lasts) {
+  if (now - SecondsOf(file.info.st_mtim) > static_cast<double>(lasts.count())) return true;
+  // A process of this host that lives has it locked.
+  return text.starts_with(ThisHost() + " ") && flock(file.descriptor.get(), LOCK_EX | LOCK_NB) == 0;
+}
+
+}  // namespace
+
+std::string ThisHost() {
+  static const std::string host = [] {
+    std::array<char, 256> name{};
+    gethostname(name.data(), name.size() - 1);
+    std::string boot;
+    try {
+      boot = ReadTextFile("/proc/sys/kernel/random/boot_id");
+    } catch (const Error&) {  // NOLINT(bugprone-empty-catch): then the name has to do
+    }
+    return Concat(Printable(name.data()), "/", Trim(boot).substr(0, 8));
+  }();
+  return host;
+}
+
+struct Lease::State {
+  fs::path path;
+  Descriptor descriptor;  // locked as long as this process lives
+  struct stat info;
+  std::jthread renewing;
+
+  State(fs::path of, Descriptor opened, const struct stat& what)
+      : path(std::move(of)), descriptor(std::move(opened)), info(what) {}
+
+  bool held() const {
+    struct stat now {};
+    return lstat(path.c_str(), &now) == 0 && SameFile(now, info);
+  }
+};
+
+Lease::Lease(std::unique_ptr<State> state) : state_(std::move(state)) {}
+Lease::Lease(Lease&& other) noexcept = default;
+
+Lease::~Lease() {
+  if (state_ == nullptr) return;
+  state_->renewing.request_stop();
+  if (state_->renewing.joinable()) state_->renewing.join();
+  if (held()) unlink(state_->path.c_str());
+}
+
+bool Lease::held() const { return state_->held(); }
+
+std::optional<Lease> Lease::Take(const fs::path& path, std::string_view holder,
+                                 std::chrono::seconds lasts) {
+  UniqueFile own(path, "claim");
+  const std::string text = TextOf(holder);
+  if (write(own.descriptor.get(), text.data(), text.size()) != std::ssize(text)) {
+    throw PathError("cannot write", own.path, errno);
+  }
+  flock(own.descriptor.get(), LOCK_EX | LOCK_NB);
+  // Some servers make the link and lose the answer.
+  const auto take = [&] {
+    return link(own.path.c_str(), path.c_str()) == 0 || own.info().st_nlink == 2;
+  };
+  bool taken = take();
+  if (!taken && errno != EEXIST) throw PathError("cannot write", path, errno);
+  if (!taken) {
+    const std::optional<Opened> other = Open(path);
+    if (other && !IsLost(*other, ReadText(*other), own.Now(), lasts)) return std::nullopt;
+    if (other) {
+      // Of several that find it lost one takes it away; who takes away another one's new lease
+      // gives it back.
+      const fs::path gone = own.path.string() + "-lost";
+      if (rename(path.c_str(), gone.c_str()) != 0) return std::nullopt;
+      struct stat moved {};
+      const bool same = lstat(gone.c_str(), &moved) == 0 && SameFile(moved, other->info);
+      if (!same) (void)!link(gone.c_str(), path.c_str());
+      unlink(gone.c_str());
+      if (!same) return std::nullopt;
+    }
+    taken = take();
+  }
+  if (!taken) return std::nullopt;
+  const struct stat own_info = own.info();
+  auto state = std::make_unique<State>(path, std::move(own.descriptor), own_info);
+  state->renewing = std::jthread([fd = state->descriptor.get(), lasts](std::stop_token stop) {
+    std::mutex mutex;
+    std::condition_variable_any asked;
+    std::unique_lock lock(mutex);
+    while (!asked.wait_for(lock, stop, lasts / 4, [&] { return stop.stop_requested(); })) {
+      futimens(fd, nullptr);
+    }
+  });
+  return Lease(std::move(state));
+}
+
+std::optional<LeaseInfo> ReadLease(const fs::path& path, std::chrono::seconds lasts) {
+  const std::optional<Opened> file = Open(path);
+  if (!file) return std::nullopt;
+  const std::string text = ReadText(*file);
+  const double now = UniqueFile(path, "look").Now();
+  LeaseInfo info{std::string(Trim(text)), IsLost(*file, text, now, lasts),
+                 now - SecondsOf(file->info.st_mtim)};
+  return info;
+}
+
+}  // namespace upswing

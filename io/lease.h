@@ -1,0 +1,55 @@
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace upswing {
+
+/// This machine as leases name it: its host name and the mark of its last boot.
+std::string ThisHost();
+
+/// A claim on a piece of work in a folder that any number of processes and hosts share: a file that
+/// one of them has at a time. It is made under a name of its own and given its final one by `link`,
+/// which is atomic on NFS too. Its modification time, by the file server's clock, says that the
+/// holder lives: a thread renews it. A lease runs out a while after the last renewal, or at once if
+/// its holder was a process of this host that has ended.
+class Lease {
+ public:
+  /// How long one lasts without renewal. Renewed four times as often, as NFS may show a time that
+  /// is a minute old.
+  static constexpr std::chrono::seconds kUsual{180};
+
+  /// Claims `path`, or nothing if another process holds it. The file says `holder`, one line.
+  /// Throws as PathError does.
+  static std::optional<Lease> Take(const std::filesystem::path& path, std::string_view holder,
+                                   std::chrono::seconds lasts = kUsual);
+  /// Gives it back.
+  ~Lease();
+  Lease(Lease&& other) noexcept;
+  Lease& operator=(Lease&&) = delete;
+
+  /// Whether it is still this process's: another one may have taken it while this one was halted.
+  bool held() const;
+
+ private:
+  struct State;
+  explicit Lease(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+/// What is known of a lease without taking it.
+struct LeaseInfo {
+  std::string holder;
+  bool lost = false;   // it has run out, or its holder has ended
+  double seconds = 0;  // since its last renewal
+};
+
+/// Looks at a lease; nothing if there is none.
+std::optional<LeaseInfo> ReadLease(const std::filesystem::path& path,
+                                   std::chrono::seconds lasts = Lease::kUsual);
+
+}  // namespace upswing

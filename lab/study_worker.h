@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+
+#include "lab/study_plan.h"
+#include "lab/training_run.h"
+
+namespace upswing {
+
+/// What a worker that was told to stop ends with, as sysexits.h has it: try again later.
+inline constexpr int kTryAgain = 75;
+
+/// Who lets a worker's runs be seen, and may stop it.
+class WorkerHost {
+ public:
+  virtual ~WorkerHost() = default;
+
+  /// Makes or resumes a run and trains it to its end, or until it is to stop. Returns whether it
+  /// has ended by itself.
+  virtual bool Train(const SeedRun& run,
+                     const std::function<std::unique_ptr<TrainingRun>()>& make) = 0;
+  virtual bool stopped() = 0;
+};
+
+/// How a worker ended.
+struct WorkerOutcome {
+  int64_t done = 0, failed = 0;  // runs
+  bool stopped = false;
+};
+
+/// Trains the runs of a plan that are not done, one after the other, beside any number of other
+/// workers on this host and others: each claims a run before it works on it. Ends when there is
+/// none that it could claim. A run that another worker left is resumed from its checkpoint. Of a
+/// run that fails the reason is written beside it, and no worker tries it again until the study is
+/// begun anew. A run that was done twice does no harm: its bits are the same.
+WorkerOutcome WorkOn(const StudyPlan& plan, WorkerHost& host);
+
+/// Writes that a run has failed, and why.
+void WriteFailed(const SeedRun& run, const std::string& why);
+
+/// Writes that a run is done, and removes what is not to be kept of it. To be called with its
+/// claim.
+void Finish(const SeedRun& run, Keep keep);
+
+}  // namespace upswing
