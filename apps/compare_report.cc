@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/json.h"
 #include "core/text.h"
 #include "lab/format.h"
+#include "lab/seeds.h"
 
 namespace upswing {
 namespace {
@@ -78,14 +80,12 @@ void PrintTorques(const GroupSummary& s, const RunPlan& plan) {
 
 void PrintGroup(const RunGroup& group, const GroupSummary& s, const std::string& differences,
                 const std::string& task) {
-  std::string seeds;
-  for (const RunRecord& run : group.runs) {
-    seeds += fmt::format("{}{}", seeds.empty() ? "" : ", ", run.plan.seed);
-  }
+  std::vector<int64_t> seeds;
+  for (const RunRecord& run : group.runs) seeds.push_back(run.plan.seed);
   fmt::print("{}\n", Printable(group.label));
   if (!task.empty()) fmt::print("  {:<16}{}\n", "task", Printable(task));
   if (!differences.empty()) fmt::print("  {:<16}{}\n", "settings", Printable(differences));
-  fmt::print("  {:<16}{} ({})\n", "seeds", group.runs.size(), seeds);
+  fmt::print("  {:<16}{} ({})\n", "seeds", group.runs.size(), SeedsText(seeds));
   fmt::print("  {:<16}{} of {} (95% {} to {})\n", "solved", s.solved, group.runs.size(),
              Percent(s.solved_interval.low), Percent(s.solved_interval.high));
   if (s.solved > 0) {
@@ -165,10 +165,13 @@ void PrintComparison(const Comparison& comparison, const std::filesystem::path& 
   }
   for (const PairSummary& pair : comparison.pairs) PrintPair(comparison, pair);
   for (const std::string& note : runs.notes) fmt::print("Note: {}\n", Printable(note));
+  const bool fewer = std::ranges::any_of(runs.groups, [](const RunGroup& group) {
+    return ResamplesOf({std::vector<double>(group.runs.size())}) < kResamples;
+  });
   fmt::print(
-      "Intervals: Wilson for shares, else percentile bootstrap of {} resamples of the runs, or "
+      "Intervals: Wilson for shares, else percentile bootstrap of {}{} resamples of the runs, or "
       "Newcombe's\nwhere all pairs of runs agree.\n",
-      FormatCount(kResamples));
+      fewer ? "at most " : "", FormatCount(kResamples));
   if (written_to.empty()) return;
   std::string curves;
   for (size_t task = 0; task < NumTasks(comparison); ++task) {

@@ -16,6 +16,7 @@
 namespace upswing {
 namespace {
 
+constexpr size_t kMostRows = 50;  // of a variant in the table
 constexpr double kNever = std::numeric_limits<double>::infinity();
 
 std::string CountOrDash(double value) { return std::isfinite(value) ? FormatCount(value) : "-"; }
@@ -135,12 +136,14 @@ void ManyRunsView::PrintTable(const Variant& variant) const {
     seconds.push_back(s.solved ? s.solved_seconds : kNever);
     success.push_back(s.best_success_rate);
     reward.push_back(s.best_return);
+    if (steps.size() > kMostRows) continue;
     PrintRow(fmt::format("seed {}", run.seed), steps.back(), seconds.back(), success.back(),
              reward.back(),
              !run.problem.empty() ? "failed"
              : run.finished()     ? ""
                                   : fmt::format("at step {}", FormatCount(s.steps)));
   }
+  if (steps.size() > kMostRows) Say("  and {} more\n", steps.size() - kMostRows);
   if (!steps.empty()) {
     PrintRow("median", QuartilesOf(steps).median, QuartilesOf(seconds).median,
              QuartilesOf(success).median, QuartilesOf(reward).median,

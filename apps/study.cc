@@ -5,6 +5,7 @@
 #include "apps/commands.h"
 #include "apps/compare_report.h"
 #include "apps/many_runs_view.h"
+#include "apps/say.h"
 #include "apps/study_work.h"
 #include "core/error.h"
 #include "core/text.h"
@@ -13,6 +14,7 @@
 #include "lab/many_runs.h"
 #include "lab/seeds.h"
 #include "lab/study_file.h"
+#include "lab/study_worker.h"
 #include "report/figure.h"
 
 namespace upswing {
@@ -26,7 +28,7 @@ constexpr const char* kStudyName = "study.toml";  // in the folder of a study
 struct StudyArguments {
   std::string file, out, seeds, keep, work;
   int64_t jobs = 0;  // 0: as many as there are processors
-  bool status = false;
+  bool status = false, prepare = false;
 
   fs::path folder() const {
     return out.empty() ? fs::path("runs") / fs::path(file).stem() : fs::path(out);
@@ -85,6 +87,7 @@ int CompareStudy(const StudyPlan& plan) {
   for (const SeedRun& run : RunsOf(plan)) request.paths.push_back(run.path);
   const Comparison comparison = Compare(request);
   WriteComparison(comparison, plan.folder);
+  WriteEvaluations(plan);
   PrintComparison(comparison, plan.folder);
   return 0;
 }
@@ -93,6 +96,12 @@ int RunStudy(const StudyArguments& arguments) {
   if (!arguments.work.empty()) return WorkOnStudy(arguments.work);
   if (arguments.status) return PrintStudyStatus(arguments.folder());
   const ManyRuns many = ReadStudy(arguments);
+  if (arguments.prepare) {
+    Prepare(many);
+    Say("Prepared {}. On any host that shares it:\n  ./upswing study --work {}\n",
+        Printable(many.plan.folder.string()), ShellQuoted(Printable(many.plan.folder.string())));
+    return 0;
+  }
   CheckCanDraw();  // before hours of training, not after
   ManyRunsView view(many);
   const int exit_code = TrainMany(many, view);
@@ -106,7 +115,7 @@ void CheckArguments(const CLI::App& app, const StudyArguments& arguments) {
                        ? "study: expected FILE.toml or --work FOLDER, got neither"
                        : "--work: expected no FILE.toml beside it");
   }
-  for (const std::string flag : {"--out", "--seeds", "--jobs", "--keep", "--status"}) {
+  for (const std::string flag : {"--out", "--seeds", "--jobs", "--keep", "--status", "--prepare"}) {
     if (!arguments.work.empty() && app.count(flag) > 0) {
       throw BadInput(Concat("--work: expected no ", flag, " beside it, as the plan says all"));
     }
@@ -132,6 +141,8 @@ void AddStudy(CLI::App& program, Command& command) {
       ->type_name("WHAT")
       ->check(NotEmpty("all, policy or tables"));
   app->add_flag("--status", arguments->status, "print what is done, running and lost, and end")
+      ->disable_flag_override();
+  app->add_flag("--prepare", arguments->prepare, "make the folder ready for workers, and end")
       ->disable_flag_override();
   app->add_option(
          "--work", arguments->work,

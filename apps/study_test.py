@@ -37,7 +37,7 @@ agent = "dqn"
 FLAGS = {"hidden": 8, "head": 8, "steps": 400, "eval_every": 200, "eval_episodes": 2,
          "log_every": 200, "learning_starts": 50, "checkpoint_every": None, "threads": None,
          "envs": None, "updates_per_step": None}
-SUMMARY = {"summary.csv", "runs.csv", "curves.svg", "curves.png"}
+SUMMARY = {"summary.csv", "runs.csv", "evaluations.csv", "curves.svg", "curves.png"}
 VARIANTS = {"with": {}, "but": {"layer_norm": False, "gamma": 0.9}, "plain": {"agent": "dqn"}}
 
 

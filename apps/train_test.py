@@ -75,7 +75,7 @@ class TrainTest(ProgramTest):
     def test_log_tells_what_times_depend_on(self):
         self.succeed(*small())
         log = (self.folder / "run/log.txt").read_text(encoding="utf-8")
-        self.assertRegex(log, r"Z started at step 0, vector instructions \S+, threads 1, "
+        self.assertRegex(log, r"Z started at step 0, host \S+, vector instructions \S+, threads 1, "
                               r"processor \S.*\n")
         self.assertRegex(log, r"Z finished at step 4000, threads busy \d+% of \d+\.\d s\n$")
 

@@ -16,6 +16,7 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "io/file.h"
+#include "io/machine.h"
 #include "io/making.h"
 
 namespace upswing {
@@ -101,14 +102,12 @@ bool IsLost(const Opened& file, const std::string& text, double now, std::chrono
 
 std::string ThisHost() {
   static const std::string host = [] {
-    std::array<char, 256> name{};
-    gethostname(name.data(), name.size() - 1);
     std::string boot;
     try {
       boot = ReadTextFile("/proc/sys/kernel/random/boot_id");
     } catch (const Error&) {  // NOLINT(bugprone-empty-catch): then the name has to do
     }
-    return Concat(Printable(name.data()), "/", Trim(boot).substr(0, 8));
+    return Concat(HostName(), "/", Trim(boot).substr(0, 8));
   }();
   return host;
 }

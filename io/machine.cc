@@ -2,8 +2,10 @@
 
 #include <sched.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <fstream>
 #include <limits>
 #include <optional>
@@ -64,6 +66,12 @@ int UsableProcessors() {
 int ResolveThreads(int64_t wanted) {
   if (wanted > 0) return static_cast<int>(wanted);
   return std::min(UsableProcessors(), kMostThreads);
+}
+
+std::string HostName() {
+  std::array<char, 256> name{};
+  gethostname(name.data(), name.size() - 1);
+  return Printable(name.data());
 }
 
 std::string CpuModel() { return ReadEntry("/proc/cpuinfo", "model name").value_or("unknown"); }

@@ -5,6 +5,9 @@
 
 namespace upswing {
 
+/// The name of this machine in its network.
+std::string HostName();
+
 /// "AMD EPYC 9454P", as the system has it; "unknown" where it does not say.
 std::string CpuModel();
 

@@ -52,7 +52,7 @@ std::string SummaryCsv(const Comparison& comparison) {
 std::string RunsCsv(const Comparison& comparison) {
   std::string csv = "group,run,seed,steps,seconds";
   for (const auto& [name, scores] : NamedScores()) csv += Concat(',', name);
-  csv += '\n';
+  csv += ",host,processor,vectors\n";
   for (size_t i = 0; i < comparison.summaries.size(); ++i) {
     const RunGroup& group = comparison.runs.groups[i];
     for (size_t k = 0; k < group.runs.size(); ++k) {
@@ -62,7 +62,7 @@ std::string RunsCsv(const Comparison& comparison) {
       for (const auto& [name, scores] : NamedScores()) {
         csv += Concat(',', FormatNumber((comparison.summaries[i].*scores).values[k]));
       }
-      csv += '\n';
+      csv += Concat(',', Cell(run.host), ',', Cell(run.processor), ',', Cell(run.vectors), '\n');
     }
   }
   return csv;

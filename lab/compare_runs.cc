@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <set>
 
 #include "core/error.h"
@@ -14,6 +15,7 @@
 #include "lab/controllers.h"
 #include "lab/format.h"
 #include "lab/model_info.h"
+#include "lab/study_plan.h"
 
 namespace upswing {
 namespace {
@@ -24,6 +26,15 @@ bool IsRun(const fs::path& folder) {
   std::error_code error;
   const auto has = [&](const char* name) { return fs::exists(folder / name, error); };
   return has(RunFolder::kConfig) && (has(RunFolder::kEvaluations) || has(RunFolder::kCheckpoint));
+}
+
+/// The file beside a run of a study that says that it is done.
+fs::path DoneOf(const fs::path& run) { return run.string() + ".done"; }
+
+/// Whether it is a run, or a study's of which no more than its result was kept.
+bool IsKept(const fs::path& run) {
+  std::error_code error;
+  return IsRun(run) || fs::is_regular_file(fs::symlink_status(DoneOf(run), error));
 }
 
 /// Adds the run folders in a folder, at any depth; links are not followed.
@@ -37,6 +48,11 @@ void AddRuns(const fs::path& folder, Found& found, std::vector<fs::path>& paths)
   if (error) return found.LeaveOut(folder, Concat("cannot be read: ", error.message()));
   for (const fs::directory_entry& entry : entries) {
     if (IsMakingName(entry.path().filename().string())) continue;  // left by a killed process
+    if (entry.path().extension() == ".done") {
+      const fs::path run = fs::path(entry.path()).replace_extension();
+      if (!IsRun(run) && IsKept(run)) paths.push_back(run);
+      continue;
+    }
     const bool is_folder = fs::is_directory(entry.symlink_status(error));
     const bool is_run = fs::is_directory(entry.path(), error) && IsRun(entry.path());
     if (is_folder || is_run) AddRuns(entry.path(), found, paths);
@@ -46,6 +62,7 @@ void AddRuns(const fs::path& folder, Found& found, std::vector<fs::path>& paths)
 /// The run folders in a folder, in alphabetical order.
 std::vector<fs::path> RunsIn(const fs::path& folder, Found& found) {
   std::error_code error;
+  if (IsKept(folder)) return {folder};
   if (!fs::exists(folder, error)) {
     const bool is_controller = IsController(folder.string());
     throw BadInput(Concat(folder.string(), ": expected a run folder or one that holds some, got ",
@@ -90,19 +107,90 @@ std::vector<Setting> SettingsOf(Config config) {
   return settings;
 }
 
-FoundRun ReadRun(const fs::path& path, const fs::path& root, bool unfinished) {
-  const Config config = ReadRunConfig(path);
+/// What a configuration says of a run, which has no evaluations yet.
+FoundRun Describe(const fs::path& path, const Config& config) {
   const TrainConfig& t = config.train;
   const EnvSpec spec = SpecOf(config.Environments());
-  FoundRun found{{path,
-                  {t.seed, t.steps, t.envs, t.eval_every, t.stop_when_solved, spec.evaluation,
-                   spec.action_unit},
-                  {}},
-                 config.agent,
-                 "",
-                 SettingsOf(config),
-                 ReadConditions(path)};
-  found.run.evaluations = ReadEvaluations(path, unfinished);
+  return {{path,
+           {t.seed, t.steps, t.envs, t.eval_every, t.stop_when_solved, spec.evaluation,
+            spec.action_unit},
+           {}},
+          config.agent,
+          "",
+          SettingsOf(config),
+          {}};
+}
+
+/// The runs of studies that are done, whose settings stand once for all seeds.
+class StudyRuns {
+ public:
+  /// Nothing if it is no such run, or if it went on since.
+  std::optional<FoundRun> Read(const fs::path& path) {
+    const auto seed = SeedOf(path);
+    if (!seed) return std::nullopt;
+    const auto result = ReadDone(DoneOf(path));
+    if (!result) return std::nullopt;
+    std::error_code error;
+    const fs::path table = path / RunFolder::kEvaluations;
+    if (fs::exists(table, error) && fs::file_size(table, error) != result->evaluations.size()) {
+      return std::nullopt;
+    }
+    const OfVariant& variant = Of(path.parent_path());
+    if (variant.mark != result->settings) return std::nullopt;
+    FoundRun found = variant.run;
+    found.run.path = path;
+    found.run.plan.seed = *seed;
+    found.run.plan.steps = result->planned_steps;
+    found.run.plan.stop_when_solved = result->stop_when_solved;
+    found.conditions = result->conditions;
+    found.run.evaluations = ParseEvaluations(result->evaluations, DoneOf(path).string(), false);
+    return found;
+  }
+
+ private:
+  struct OfVariant {
+    FoundRun run;
+    std::string mark;
+  };
+
+  static std::optional<int64_t> SeedOf(const fs::path& path) {
+    constexpr std::string_view kSeed = "seed";
+    const std::string name = path.filename().string();
+    if (!name.starts_with(kSeed)) return std::nullopt;
+    return ParseInteger(std::string_view(name).substr(kSeed.size()));
+  }
+
+  const OfVariant& Of(const fs::path& folder) {
+    const auto found = variants_.find(folder);
+    if (found != variants_.end()) return found->second;
+    Config config = BuildConfig(folder / kSettingsName, {});
+    MakeReadyForMany(config);
+    return variants_.emplace(folder, OfVariant{Describe(folder, config), SettingsMark(config)})
+        .first->second;
+  }
+
+  std::map<fs::path, OfVariant> variants_;
+};
+
+FoundRun ReadRun(const fs::path& path, const fs::path& root, bool unfinished, StudyRuns& studies) {
+  FoundRun found;
+  if (auto done = studies.Read(path)) {
+    found = std::move(*done);
+  } else if (!IsRun(path)) {
+    throw BadInput(Concat(DoneOf(path).string(),
+                          ": made with other settings than those beside it, ",
+                          (path.parent_path() / kSettingsName).string()));
+  } else {
+    found = Describe(path, ReadRunConfig(path));
+    found.conditions = ReadConditions(path);
+    found.run.evaluations = ReadEvaluations(path, unfinished);
+  }
+  const auto joined = [](const std::set<std::string>& names) {
+    return Join({names.begin(), names.end()}, " + ");
+  };
+  found.run.host = joined(found.conditions.hosts);
+  found.run.processor = joined(found.conditions.processors);
+  found.run.vectors = joined(found.conditions.vectors);
   // STUDY/VARIANT/seed1: the variant has a name of its own.
   const fs::path below = path.lexically_relative(root);
   if (std::distance(below.begin(), below.end()) > 1) {
@@ -114,6 +202,7 @@ FoundRun ReadRun(const fs::path& path, const fs::path& root, bool unfinished) {
 /// Reads all runs; what cannot be read is left out.
 Found ReadRuns(const CompareRequest& request) {
   Found found;
+  StudyRuns studies;
   std::set<fs::path> seen;
   for (const fs::path& argument : request.paths) {
     for (const fs::path& path : RunsIn(argument, found)) {
@@ -121,8 +210,8 @@ Found ReadRuns(const CompareRequest& request) {
         throw BadInput(Concat(path.string(), ": given twice; expected each run once"));
       }
       try {
-        found.runs.push_back(
-            ReadRun(path, request.root.empty() ? argument : request.root, request.unfinished));
+        found.runs.push_back(ReadRun(path, request.root.empty() ? argument : request.root,
+                                     request.unfinished, studies));
       } catch (const Error& error) {
         // Most messages begin with the file.
         const std::string what = error.what();

@@ -76,13 +76,10 @@ void CheckRuns(const fs::path& folder, const Config& config, bool more_steps) {
   CheckSame(BuildConfig(settings, {}), config, more_steps, settings.string());
 }
 
-/// All runs as they stand. Those that failed before are tried again, unless they cannot even be
-/// read.
+/// All runs as they stand.
 std::vector<SeedRun> ListRuns(const StudyPlan& plan) {
   std::vector<SeedRun> runs = RunsOf(plan);
   for (SeedRun& run : runs) {
-    std::error_code error;
-    fs::remove(run.failed(), error);
     try {
       run.Read();
     } catch (const Error& broken) {
@@ -238,7 +235,7 @@ class LocalWorkers {
 
 }  // namespace
 
-int TrainMany(const ManyRuns& many, ManyRunsObserver& observer) {
+FolderLock Prepare(const ManyRuns& many, const std::function<void()>& checked) {
   // Nothing is touched before all is checked, nor while another process is at work there.
   const StudyPlan& plan = many.plan;
   const bool is_study = !many.mark.first.empty();
@@ -251,12 +248,16 @@ int TrainMany(const ManyRuns& many, ManyRunsObserver& observer) {
     if (!variant.name.empty()) CheckNoLink(folder);
     CheckRuns(folder, variant.config, many.more_steps);
   }
-  observer.Prepare();
+  checked();
   WritePlan(plan);
   if (is_study) WriteIfOther(plan.folder / many.mark.first, many.mark.second);
-  if (!lock) lock.emplace(plan.folder);
+  for (const SeedRun& run : RunsOf(plan)) fs::remove(run.failed(), error);  // to be tried again
+  return lock ? std::move(*lock) : FolderLock(plan.folder);
+}
 
-  std::vector<SeedRun> runs = ListRuns(plan);
+int TrainMany(const ManyRuns& many, ManyRunsObserver& observer) {
+  const FolderLock lock = Prepare(many, [&] { observer.Prepare(); });
+  std::vector<SeedRun> runs = ListRuns(many.plan);
   observer.Begin(runs);
   LocalWorkers(many, runs, observer).Run();
   observer.Finish();
@@ -265,7 +266,7 @@ int TrainMany(const ManyRuns& many, ManyRunsObserver& observer) {
   const size_t all = runs.size();
   std::erase_if(runs, [](const SeedRun& run) { return run.problem.empty(); });
   if (runs.empty()) return 0;
-  throw Failure(Concat(runs.size(), " of ", all, " runs in ", plan.folder.string(),
+  throw Failure(Concat(runs.size(), " of ", all, " runs in ", many.plan.folder.string(),
                        " failed, the first of them ", runs.front().name, ": ",
                        runs.front().problem));
 }

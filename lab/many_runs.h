@@ -1,10 +1,12 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "io/file.h"
 #include "lab/study_plan.h"
 #include "lab/training_run.h"
 
@@ -41,11 +43,16 @@ class ManyRunsObserver {
   virtual int stop_signal() const = 0;
 };
 
-/// Trains all that is not finished, the first seed of each variant first, in `jobs` worker
-/// processes (this program's `study --work`), beside those of other hosts if there are any. A
-/// folder of the same runs is resumed; finished runs are left as they are. Returns the exit code:
-/// 0, or 128 and a stop signal. Throws BadInput before anything is touched if the folder holds
-/// something else or runs of other settings; Failure at the end if a run failed.
+/// Makes the folder of a plan ready for workers, or that of the same runs, some of which may be
+/// done. Those that failed are tried again. Returns the lock that keeps other calls from it. Throws
+/// BadInput before anything is touched if the folder holds something else or runs of other
+/// settings. `checked` is called when all is checked.
+FolderLock Prepare(
+    const ManyRuns& many, const std::function<void()>& checked = [] {});
+
+/// Prepares, then trains all that is not finished, the first seed of each variant first, in `jobs`
+/// worker processes (this program's `study --work`), beside those of other hosts if there are any.
+/// Returns the exit code: 0, or 128 and a stop signal. Throws Failure at the end if a run failed.
 int TrainMany(const ManyRuns& many, ManyRunsObserver& observer);
 
 /// How many runs at a time are best, if each has so many threads.

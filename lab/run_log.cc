@@ -17,6 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 
 // What the lines are made of, in their order; the processor's name ends its line.
+constexpr std::string_view kHost = ", host ";
 constexpr std::string_view kVectors = ", vector instructions ";
 constexpr std::string_view kThreads = ", threads ";
 constexpr std::string_view kProcessor = ", processor ";
@@ -35,6 +36,7 @@ std::optional<std::string> Between(std::string_view line, std::string_view befor
 }
 
 void AddLine(std::string_view line, RunConditions& conditions) {
+  if (const auto host = Between(line, kHost, kVectors)) conditions.hosts.insert(*host);
   if (const auto vectors = Between(line, kVectors, kThreads)) conditions.vectors.insert(*vectors);
   if (const auto name = Between(line, kProcessor, "")) conditions.processors.insert(*name);
   const auto threads = ParseInteger(Between(line, kThreads, kProcessor).value_or(""));
@@ -59,8 +61,8 @@ double WorkClock::busy(int threads) const {
 }
 
 std::string BeginLine(bool resumed, int64_t step, int threads) {
-  return Concat(resumed ? "resumed" : "started", " at step ", step, kVectors, SimdPath(), kThreads,
-                threads, kProcessor, CpuModel());
+  return Concat(resumed ? "resumed" : "started", " at step ", step, kHost, HostName(), kVectors,
+                SimdPath(), kThreads, threads, kProcessor, CpuModel());
 }
 
 std::string EndLine(bool finished, int64_t step, int threads, const WorkClock& clock) {

@@ -14,7 +14,7 @@ namespace upswing {
 /// Sets, because a run may have been resumed on another machine.
 struct RunConditions {
   std::set<int64_t> threads;
-  std::set<std::string> vectors, processors;  // instructions in use; model of the processor
+  std::set<std::string> hosts, vectors, processors;  // vectors: instructions in use
   std::optional<double> busy;  // the least share of the time that its threads were at work
 };
 

@@ -33,12 +33,12 @@ RunResult Parse(const json& j) {
   r.planned_steps = JsonInteger(j, "planned_steps", 0, kMost);
   r.stop_when_solved = JsonBool(j, "stop_when_solved");
   r.version = JsonText(j, "version");
-  r.host = JsonText(j, "host");
   for (const json& value : JsonList(j, "threads", kMostConditions)) {
     if (const auto threads = JsonInteger(value)) r.conditions.threads.insert(*threads);
   }
-  for (const auto& [name, set] :
-       {std::pair("vectors", &r.conditions.vectors), {"processors", &r.conditions.processors}}) {
+  for (const auto& [name, set] : {std::pair("hosts", &r.conditions.hosts),
+                                  {"vectors", &r.conditions.vectors},
+                                  {"processors", &r.conditions.processors}}) {
     for (const json& value : JsonList(j, name, kMostConditions)) {
       if (value.is_string()) set->insert(value.get<std::string>());
     }
@@ -85,7 +85,7 @@ void WriteDone(const fs::path& path, const RunResult& r) {
                  {"planned_steps", r.planned_steps},
                  {"stop_when_solved", r.stop_when_solved},
                  {"version", r.version},
-                 {"host", r.host},
+                 {"hosts", r.conditions.hosts},
                  {"processors", r.conditions.processors},
                  {"vectors", r.conditions.vectors},
                  {"threads", r.conditions.threads},

@@ -24,7 +24,7 @@ struct RunResult {
   std::string settings;  // SettingsMark of what it was trained with
   int64_t planned_steps = 0;
   bool stop_when_solved = false;
-  std::string version, host;
+  std::string version;
   RunConditions conditions;
   std::string evaluations;  // evals.csv
 

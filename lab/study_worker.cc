@@ -77,8 +77,10 @@ class Worker {
     outcome_.stopped = host_.stopped();
     if (outcome_.stopped) return Turn::kNothingToDo;
     try {
-      if (HasEnded(run)) return Turn::kNothingToDo;
+      const bool ended = HasEnded(run);
+      if (ended && !fs::exists(run.claim())) return Turn::kNothingToDo;
       const std::optional<Lease> lease = Lease::Take(run.claim(), "trains it");
+      if (ended) return Turn::kNothingToDo;  // its worker died before it gave the claim back
       if (!lease) return Turn::kAnothers;
       if (HasEnded(run)) return Turn::kNothingToDo;  // meanwhile
       Train(run, *lease);
@@ -117,6 +119,29 @@ class Worker {
 
 }  // namespace
 
+void WriteEvaluations(const StudyPlan& plan) {
+  std::string columns, table;
+  for (const SeedRun& run : RunsOf(plan)) {
+    const auto result = ReadDone(run.done());
+    if (!result) continue;
+    bool is_first = true;
+    for (const std::string_view line : Split(result->evaluations, '\n')) {
+      if (line.empty()) continue;
+      if (!is_first) {
+        table += Concat(run.variant->name, ',', run.seed, ',', line, '\n');
+      } else if (columns.empty()) {
+        columns = line;
+      } else if (columns != line) {
+        throw Failure(Concat(run.done().string(),
+                             ": its evaluations have other columns than those ", "of other runs"));
+      }
+      is_first = false;
+    }
+  }
+  WriteFileAtomically(plan.folder / "evaluations.csv",
+                      Concat("variant,seed,", columns, "\n", table));
+}
+
 void WriteFailed(const SeedRun& run, const std::string& why) {
   WriteFileAtomically(run.failed(), Concat(Printable(why), "\n"));
 }
@@ -131,7 +156,6 @@ void Finish(const SeedRun& run, Keep keep) {
   result.planned_steps = run.variant->config.train.steps;
   result.stop_when_solved = run.variant->config.train.stop_when_solved;
   result.version = UPSWING_VERSION;
-  result.host = ThisHost();
   result.conditions = ReadConditions(run.path);
   result.evaluations = ReadOwnFile(run.path / RunFolder::kEvaluations);
   WriteDone(run.done(), result);

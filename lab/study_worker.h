@@ -37,6 +37,10 @@ struct WorkerOutcome {
 /// begun anew. A run that was done twice does no harm: its bits are the same.
 WorkerOutcome WorkOn(const StudyPlan& plan, WorkerHost& host);
 
+/// Writes evaluations.csv into the folder of a plan: the rows of evals.csv of all runs that are
+/// done, with their variant and seed.
+void WriteEvaluations(const StudyPlan& plan);
+
 /// Writes that a run has failed, and why.
 void WriteFailed(const SeedRun& run, const std::string& why);
 

@@ -40,6 +40,9 @@ struct RunRecord {
   std::filesystem::path path;
   RunPlan plan;
   std::vector<EvaluationRow> evaluations;  // in the order of their steps
+  // Where it was trained, with what instructions; several after each other joined by " + ", empty
+  // where that is not known.
+  std::string host = {}, processor = {}, vectors = {};
 };
 
 /// Reads evals.csv of a run folder; a file that does not exist yet is an empty table. Throws

@@ -48,19 +48,48 @@ Estimate EstimateOfTwo(const Strata& x, const Strata& y,
   return {statistic(both), BootstrapInterval(both, statistic, resamples)};
 }
 
+/// Draws as many scores as there are from sorted ones, with replacement, in their order.
+void Resample(const std::vector<double>& sorted, Rng& rng, std::vector<double>& drawn) {
+  std::vector<uint32_t> times(sorted.size());
+  for (size_t k = 0; k < sorted.size(); ++k) ++times[rng.Below(sorted.size())];
+  auto next = drawn.begin();
+  for (size_t i = 0; i < sorted.size(); ++i) next = std::fill_n(next, times[i], sorted[i]);
+}
+
+void SortUnlessSorted(std::vector<double>& values) {
+  if (!std::ranges::is_sorted(values)) std::ranges::sort(values);
+}
+
+std::vector<double> Sorted(std::span<const double> values) {
+  std::vector<double> sorted(values.begin(), values.end());
+  SortUnlessSorted(sorted);
+  return sorted;
+}
+
 }  // namespace
 
+int64_t ResamplesOf(const Strata& strata, int64_t most) {
+  constexpr int64_t kDraws = 20'000'000, kLeast = 1000;
+  int64_t scores = 0;
+  for (const std::vector<double>& stratum : strata) scores += std::ssize(stratum);
+  return std::min(most, std::max(kLeast, kDraws / std::max<int64_t>(1, scores)));
+}
+
 double InterquartileMean(std::vector<double> values) {
-  std::ranges::sort(values);
+  SortUnlessSorted(values);
   const size_t cut = values.size() / 4;
   const std::span middle = std::span(values).subspan(cut, values.size() - 2 * cut);
   return std::accumulate(middle.begin(), middle.end(), 0.0) / static_cast<double>(middle.size());
 }
 
 double ProbabilityOfImprovement(std::span<const double> x, std::span<const double> y) {
+  const std::vector<double> as = Sorted(x), bs = Sorted(y);
   double u = 0;
-  for (const double a : x) {
-    for (const double b : y) u += a > b ? 1.0 : a == b ? 0.5 : 0.0;
+  auto lower = bs.begin(), not_higher = bs.begin();  // the ends of those below a, and not above it
+  for (const double a : as) {
+    while (lower != bs.end() && *lower < a) ++lower;
+    while (not_higher != bs.end() && *not_higher <= a) ++not_higher;
+    u += static_cast<double>(lower - bs.begin()) + 0.5 * static_cast<double>(not_higher - lower);
   }
   return u / (static_cast<double>(x.size()) * static_cast<double>(y.size()));
 }
@@ -74,11 +103,9 @@ std::optional<Interval> BootstrapInterval(Strata strata,
   }
   Rng rng(0, "bootstrap");
   Strata resample = strata;
-  std::vector<double> values(static_cast<size_t>(resamples));
+  std::vector<double> values(static_cast<size_t>(ResamplesOf(strata, resamples)));
   for (double& value : values) {
-    for (size_t s = 0; s < strata.size(); ++s) {
-      for (double& score : resample[s]) score = strata[s][rng.Below(strata[s].size())];
-    }
+    for (size_t s = 0; s < strata.size(); ++s) Resample(strata[s], rng, resample[s]);
     value = statistic(resample);
   }
   std::ranges::sort(values);

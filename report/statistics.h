@@ -14,10 +14,14 @@
 /// but not NaN.
 namespace upswing {
 
-inline constexpr int64_t kResamples = 10000;  // of a bootstrap interval, unless said otherwise
+inline constexpr int64_t kResamples = 10000;  // of a bootstrap interval, at most
 
 /// Scores of one agent: for each task, which is a stratum, the scores of its runs.
 using Strata = std::vector<std::vector<double>>;
+
+/// How many resamples a bootstrap takes: `most`, or fewer, but 1,000 at least, where there are more
+/// than 2,000 scores, whose intervals are narrow.
+int64_t ResamplesOf(const Strata& strata, int64_t most = kResamples);
 
 /// A figure with its 95% interval; none if a stratum has less than two runs, or if all resamples
 /// agree, as the runs then give no information about the error.
@@ -36,7 +40,8 @@ double ProbabilityOfImprovement(std::span<const double> x, std::span<const doubl
 
 /// 95% interval of a statistic by the stratified percentile bootstrap (Efron, 1979): each resample
 /// draws as many scores from each stratum as it has, with replacement, and the interval reaches
-/// from the 2.5% to the 97.5% quantile of the statistic over the resamples. The same scores give
+/// from the 2.5% to the 97.5% quantile of the statistic over ResamplesOf resamples, which it gets
+/// sorted. The same scores give
 /// the same interval, regardless of their order within a stratum. Nothing if a stratum has less
 /// than two, or if the interval would have no width.
 std::optional<Interval> BootstrapInterval(Strata strata,

@@ -1,0 +1,231 @@
+#!/usr/bin/env python3
+"""Workers of a study: any number, on any hosts, killed at any moment; reduced runs; bad folders."""
+
+import json
+import os
+import random
+import re
+import signal
+import subprocess
+import time
+import unittest
+
+from testing import ProgramTest, snapshot
+
+STUDY = """title = "Little"
+seeds = 4
+[settings]
+agent = "d3qn-small"
+hidden = [8]
+head = 8
+steps = 400
+eval_every = 200
+eval_episodes = 2
+log_every = 200
+learning_starts = 50
+[variants.one]
+[variants.two]
+gamma = 0.9
+"""
+ENDLESS = STUDY.replace("steps = 400", "steps = 1000000000")
+FOREIGN = "elsewhere/0123abcd 17 trains it\n"
+
+
+def without_clocks(done):
+    """A finished run's result without what depends on the clock or the machine."""
+    result = json.loads(done.read_text(encoding="utf-8"))
+    for name in ("busy", "seconds", "solved_seconds"):
+        result.pop(name)
+    rows = [line.split(",") for line in result.pop("evaluations").splitlines()]
+    clock = rows[0].index("seconds")
+    return result, [row[:clock] + row[clock + 1:] for row in rows]
+
+
+class WorkersTest(ProgramTest):
+    def prepare(self, text=STUDY, out="study", *more):
+        self.write("little.toml", text)
+        self.succeed("study", "little.toml", "--out", out, "--prepare", *more)
+        return self.folder / out
+
+    def work(self, out="study", code=0, **options):
+        done = self.run_here("study", "--work", out, **options)
+        self.assertEqual(done.returncode, code, done.stderr)
+        return done
+
+    def start_worker(self, **env):
+        worker = subprocess.Popen([os.environ["UPSWING"], "study", "--work", "study"],
+                                  cwd=self.folder, env=os.environ | env)
+        self.addCleanup(worker.wait)
+        self.addCleanup(worker.kill)
+        return worker
+
+    def runs(self, out):
+        return [f"{out}/{variant}/seed{seed}" for seed in range(1, 5) for variant in ("one", "two")]
+
+    def assert_same_study(self, a, b, seeds=range(1, 5)):
+        for variant in ("one", "two"):
+            for seed in seeds:
+                done = [self.folder / out / variant / f"seed{seed}.done" for out in (a, b)]
+                self.assertEqual(*map(without_clocks, done))
+
+    # ---- Workers.
+
+    def test_a_worker_does_all_that_a_plan_says(self):
+        study = self.prepare()
+        self.assertEqual({path.name for path in study.iterdir()},
+                         {"study.toml", "plan.json", "one", "two"})
+        self.work()
+        self.succeed("study", "little.toml", "--out", "whole")
+        self.assert_same_study("study", "whole")
+        for a, b in zip(self.runs("study"), self.runs("whole")):
+            self.assert_same_run(a, b)
+        self.assertFalse(list(study.rglob("*.claim*")))
+        before = snapshot(study)
+        self.work()
+        self.assertEqual(snapshot(study), before)
+        # The command itself has nothing left to train, and compares.
+        self.assertIn("8 done before, resuming 0",
+                      self.succeed("study", "little.toml", "--out", "study"))
+
+    def test_workers_that_are_killed_lose_no_run_and_change_no_bit(self):
+        text = STUDY.replace("seeds = 4", "seeds = 20").replace("400", "2000")
+        study = self.prepare(text, "study", "--keep", "tables")
+        rng = random.Random(1)
+        workers = []
+        kills = 0
+        deadline = time.monotonic() + 120
+        while len(list(study.rglob("*.done"))) < 40:
+            self.assertLess(time.monotonic(), deadline)
+            workers = [worker for worker in workers if worker.poll() is None]
+            while len(workers) < 4:
+                workers.append(self.start_worker())
+            time.sleep(0.05 * rng.random())
+            if kills < 30:
+                rng.choice(workers).kill()
+                kills += 1
+        for worker in workers:
+            self.assertEqual(worker.wait(60), 0)
+        self.assertFalse(list(study.rglob("*.claim")) + list(study.rglob("*.failed")))
+        self.succeed("study", "little.toml", "--out", "whole", "--keep", "tables")
+        self.assert_same_study("study", "whole", range(1, 21))
+
+    def test_what_another_host_works_on_is_left_until_its_lease_runs_out(self):
+        study = self.prepare()
+        claims = [study / "one/seed1.claim", study / "two/seed2.claim"]
+        for claim in claims:
+            claim.write_text(FOREIGN, encoding="utf-8")
+        os.utime(claims[1], (time.time() - 1000,) * 2)
+        status = self.succeed("study", "little.toml", "--out", "study", "--status")
+        self.assertRegex(status, r"one +0 +0 +1 +0 +0 +0 +3\n")
+        self.assertRegex(status, r"two +0 +0 +0 +1 +0 +0 +3\n")
+        self.assertRegex(status, r"two/seed2 .* lost by elsewhere/0123abcd 17 trains it")
+        self.work()
+        self.assertFalse((study / "one/seed1").exists())
+        self.assertEqual(claims[0].read_text(encoding="utf-8"), FOREIGN)
+        self.assertEqual(len(list(study.rglob("*.done"))), 7)
+        os.utime(claims[0], (time.time() - 1000,) * 2)
+        self.work()
+        self.assertEqual(len(list(study.rglob("*.done"))), 8)
+
+    def test_a_worker_that_is_told_to_stop_leaves_its_run_to_be_resumed(self):
+        study = self.prepare(ENDLESS)
+        for number, env in ((signal.SIGTERM, {}), (signal.SIGINT, {}),
+                            (signal.SIGUSR1, {"SLURM_JOB_ID": "1"}),
+                            (signal.SIGUSR2, {"SLURM_JOB_ID": "1"})):
+            with self.subTest(signal=number):
+                worker = self.start_worker(**env)
+                log = study / "one/seed1/log.txt"
+                before = log.read_text(encoding="utf-8").count("\n") if log.exists() else 0
+                self.wait_for(lambda: log.exists() and
+                              log.read_text(encoding="utf-8").count("\n") > before)
+                worker.send_signal(number)
+                self.assertEqual(worker.wait(60), 75)
+                self.assertFalse(list(study.rglob("*.claim")))
+                self.assertIn("stopped at step", log.read_text(encoding="utf-8"))
+        self.assertIn("resumed at step", (study / "one/seed1/log.txt").read_text(encoding="utf-8"))
+
+    def test_a_run_that_fails_is_left_until_the_study_is_begun_anew(self):
+        study = self.prepare()
+        (study / "one/seed2").mkdir()
+        self.write("study/one/seed2/precious", "mine")
+        self.work(code=1)
+        failed = study / "one/seed2.failed"
+        self.assertIn("expected a new or empty folder", failed.read_text(encoding="utf-8"))
+        self.assertEqual(len(list(study.rglob("*.done"))), 7)
+        self.work()  # nothing is left that it could do
+        status = self.succeed("study", "little.toml", "--out", "study", "--status")
+        self.assertRegex(status, r"one/seed2 +failed: .*expected a new or empty folder")
+        (study / "one/seed2/precious").unlink()
+        self.prepare()
+        self.assertFalse(failed.exists())
+        self.work()
+        self.assertEqual(len(list(study.rglob("*.done"))), 8)
+
+    # ---- What is kept.
+
+    def test_reduced_studies_say_the_same(self):
+        self.write("little.toml", STUDY.replace("seeds = 4", 'seeds = 4\nkeep = "policy"'))
+        self.succeed("study", "little.toml", "--out", "policy")
+        self.succeed("study", "little.toml", "--out", "tables", "--keep", "tables")
+        self.succeed("study", "little.toml", "--out", "all", "--keep", "all")
+        for out in ("policy", "tables"):
+            self.assert_same_study(out, "all")
+        kept = {path.name for path in (self.folder / "policy/one/seed1").iterdir()}
+        self.assertEqual(kept, {"config.toml", "evals.csv", "log.txt", "policy.safetensors"})
+        self.assertEqual({path.name for path in (self.folder / "tables/one").iterdir()},
+                         {"settings.toml", *(f"seed{seed}.done" for seed in range(1, 5))})
+        self.succeed("eval", "policy/one/seed1", "--episodes", 2)
+        seen = {out: self.succeed("compare", out, "--json") for out in ("all", "policy", "tables")}
+        clock = re.compile(r'"[a-z_]*seconds[a-z_]*": (\{[^}]*\}|[^,\n]*)|"(run|path)": "[^"]*"|'
+                           r'(all|policy|tables)/')
+        for out in ("policy", "tables"):
+            self.assertEqual(clock.sub("", seen[out]), clock.sub("", seen["all"]))
+        rows = (self.folder / "tables/evaluations.csv").read_text(encoding="utf-8").splitlines()
+        self.assertTrue(rows[0].startswith("variant,seed,step,success_rate,"))
+        self.assertEqual(len(rows), 1 + 8 * 2)
+        # More steps: what was not kept is trained once more.
+        longer = STUDY.replace("= 400", "= 800")
+        self.write("little.toml", longer)
+        for out in ("tables", "all"):
+            self.succeed("study", "little.toml", "--out", out, "--keep", out)
+        self.assert_same_study("tables", "all")
+
+    # ---- Bad input.
+
+    def test_folders_of_strangers(self):
+        study = self.prepare()
+        plan = json.loads((study / "plan.json").read_text(encoding="utf-8"))
+        for changes, words in (({"version": "0.0.1"}, "made by Upswing 0.0.1"),
+                               ({"keep": "none"}, "keep: expected all, policy or tables"),
+                               ({"seeds": "1-9999999"}, "1 to 10000 seeds"),
+                               ({"seeds": 3}, "seeds"),
+                               ({"variants": [{"name": "../x", "settings": "0"}]}, "letters"),
+                               ({"variants": [{"name": "one", "settings": "0"}]}, "not that of the plan"),
+                               ({"variants": [3]}, "variants: expected objects")):
+            with self.subTest(changes=changes):
+                self.write("study/plan.json", json.dumps(plan | changes))
+                self.refuse(["study", "--work", "study"], words)
+        self.write("study/plan.json", "{")
+        self.refuse(["study", "--work", "study"], "study/plan.json")
+        self.refuse(["study", "--work", "none"], "none: expected the folder of a study")
+        self.refuse(["study", "--work", "study", "--jobs", "2"], "--work: expected no --jobs")
+        self.refuse(["study", "--work", "study", "x.toml"], "--work: expected no FILE.toml")
+        self.refuse(["study", "--work", ""], "--work: expected a path")
+        self.refuse(["study", "x.toml", "--keep", "none"], "x.toml")
+        self.refuse(["study", "little.toml", "--keep", "none"], "--keep: expected all, policy")
+
+    def test_broken_results(self):
+        study = self.prepare()
+        self.write("study/one/seed1.done", "{")
+        self.work(code=1)
+        self.assertIn("seed1.done", (study / "one/seed1.failed").read_text(encoding="utf-8"))
+        target = self.write("elsewhere.done", "{}")
+        (study / "one/seed1.done").unlink()
+        (study / "one/seed1.done").symlink_to(target)
+        self.prepare()
+        self.work(code=1)
+        self.assertEqual((self.folder / "elsewhere.done").read_text(encoding="utf-8"), "{}")
+
+
+if __name__ == "__main__":
+    unittest.main()
