@@ -251,7 +251,10 @@ FolderLock Prepare(const ManyRuns& many, const std::function<void()>& checked) {
   checked();
   WritePlan(plan);
   if (is_study) WriteIfOther(plan.folder / many.mark.first, many.mark.second);
-  for (const SeedRun& run : RunsOf(plan)) fs::remove(run.failed(), error);  // to be tried again
+  for (const SeedRun& run : RunsOf(plan)) {
+    fs::remove(run.failed(), error);  // it is tried again
+    if (fs::exists(run.claim(), error)) (void)Lease::Take(run.claim(), "tidies up");  // if it is lost
+  }
   return lock ? std::move(*lock) : FolderLock(plan.folder);
 }
 
