@@ -203,7 +203,7 @@ name: after[name] for name in before}, before)
 
     def test_the_studies_of_the_project_can_be_run(self):
         studies = sorted((ROOT / "configs/studies").glob("*.toml"))
-        self.assertEqual(len(studies), 7)
+        self.assertEqual(len(studies), 9)
         for path in studies:
             with self.subTest(study=path.stem):
                 process = self.start("study", path, "--seeds", "1-1", "--jobs", 1)
