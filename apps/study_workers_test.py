@@ -220,6 +220,13 @@ class WorkersTest(ProgramTest):
         self.write("study/one/seed1.done", "{")
         self.work(code=1)
         self.assertIn("seed1.done", (study / "one/seed1.failed").read_text(encoding="utf-8"))
+        self.prepare()
+        self.work("study", 1)
+        done = study / "two/seed1.done"
+        result = json.loads(done.read_text(encoding="utf-8"))
+        self.write("study/two/seed1.done", json.dumps(result | {"settings": "0"}))
+        self.work(code=1)
+        self.assertIn("made with other settings than", (study / "two/seed1.failed").read_text("utf-8"))
         target = self.write("elsewhere.done", "{}")
         (study / "one/seed1.done").unlink()
         (study / "one/seed1.done").symlink_to(target)

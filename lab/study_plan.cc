@@ -52,6 +52,16 @@ int64_t SeedRun::Steps() const {
   return std::max(at_checkpoint, at_metrics.value_or(0));
 }
 
+bool SeedRun::ReadDoneResult() {
+  result = ReadDone(done());
+  if (result && result->settings != settings) {
+    throw BadInput(Concat(done().string(), ": made with other settings than ",
+                          (path.parent_path() / kSettingsName).string(), " has"));
+  }
+  if (!finished()) result.reset();  // that of fewer steps
+  return result.has_value();
+}
+
 void SeedRun::Read() {
   CheckNoLink(path);
   std::error_code error;
@@ -59,10 +69,7 @@ void SeedRun::Read() {
     problem = std::string(Trim(ReadOwnFile(failed(), 1 << 16)));
     if (problem.empty()) problem = "failed";
   }
-  result = ReadDone(done());
-  if (finished()) return;
-  result.reset();  // that of fewer steps
-  if (!IsReduced()) {
+  if (!ReadDoneResult() && !IsReduced()) {
     result = ReadCheckpointResult(path, SpecOf(variant->config.Environments()));
   }
 }
@@ -72,12 +79,15 @@ bool SeedRun::IsReduced() const {
 }
 
 std::vector<SeedRun> RunsOf(const StudyPlan& plan) {
+  std::vector<std::string> settings;
+  for (const Variant& variant : plan.variants) settings.push_back(SettingsMark(variant.config));
   std::vector<SeedRun> runs;
   runs.reserve(plan.seeds.size() * plan.variants.size());
   for (const int64_t seed : plan.seeds) {
-    for (const Variant& variant : plan.variants) {
+    for (size_t v = 0; v < plan.variants.size(); ++v) {
+      const Variant& variant = plan.variants[v];
       const fs::path name = fs::path(variant.name) / Concat("seed", seed);
-      runs.push_back({&variant, seed, name.string(), plan.folder / name, {}, ""});
+      runs.push_back({&variant, settings[v], seed, name.string(), plan.folder / name, {}, ""});
     }
   }
   return runs;

@@ -41,6 +41,7 @@ struct StudyPlan {
 /// host that has the folder can go on with it.
 struct SeedRun {
   const Variant* variant;
+  std::string settings;  // the variant's SettingsMark
   int64_t seed;
   std::string name;                 // such as `seed3` or `dqn/seed3`
   std::filesystem::path path;       // of its folder
@@ -56,6 +57,8 @@ struct SeedRun {
   bool IsReduced() const;
   /// Steps made, of its checkpoint or, where that is further, of its metrics.
   int64_t Steps() const;
+  /// Reads `result` again if it is done, and says whether it is. Throws BadInput.
+  bool ReadDoneResult();
   /// Reads result and problem again. Throws BadInput.
   void Read();
 

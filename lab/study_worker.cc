@@ -94,10 +94,7 @@ class Worker {
   /// Whether it is done or has failed.
   static bool HasEnded(SeedRun& run) {
     std::error_code error;
-    if (fs::exists(fs::symlink_status(run.failed(), error))) return true;
-    if (!fs::exists(fs::symlink_status(run.done(), error))) return false;
-    run.result = ReadDone(run.done());
-    return run.finished();
+    return fs::exists(fs::symlink_status(run.failed(), error)) || run.ReadDoneResult();
   }
 
   void Train(SeedRun& run, const Lease& lease) {
@@ -152,7 +149,7 @@ void Finish(const SeedRun& run, Keep keep) {
   const auto at_end = ReadCheckpointResult(run.path, SpecOf(run.variant->config.Environments()));
   if (!at_end) throw Failure(Concat(run.path.string(), ": it was removed while it was trained"));
   RunResult result = *at_end;
-  result.settings = SettingsMark(run.variant->config);
+  result.settings = run.settings;
   result.planned_steps = run.variant->config.train.steps;
   result.stop_when_solved = run.variant->config.train.stop_when_solved;
   result.version = UPSWING_VERSION;
