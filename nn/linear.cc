@@ -100,30 +100,45 @@ template <typename T>
 void LayerNormForward(Matrix<T> x, std::span<const T> gain, std::span<const T> bias,
                       std::span<T> inv_std, bool relu, Matrix<T> y) {
   constexpr T kEpsilon = T(1e-5);
+  // Some rows at a time, each step for all of them: within a row each waits for the one before it.
+  constexpr int kRows = 8;
   const Tag<T> d;
   const auto n = static_cast<size_t>(x.cols());
-  for (int r = 0; r < x.rows(); ++r) {
-    T* row = x.row(r).data();
-    T* out = y.row(r).data();
-    const T mean = SumVectors<T>(n, [&](size_t i, size_t count, auto partial)
-                                        HWY_ATTR { return Load<partial.value>(row + i, count); }) /
-                   static_cast<T>(n);
-    const Vec<T> center = hn::Set(d, mean);
-    const T square = SumVectors<T>(n, [&](size_t i, size_t count, auto partial) HWY_ATTR {
-      Vec<T> e = hn::Sub(Load<partial.value>(row + i, count), center);
-      if constexpr (partial.value) e = hn::IfThenElseZero(hn::FirstN(d, count), e);
-      return hn::Mul(e, e);
-    });
-    const T scale = T{1} / std::sqrt(square / static_cast<T>(n) + kEpsilon);
-    inv_std[static_cast<size_t>(r)] = scale;
-    ForVectors<T>(n, [&](size_t i, size_t count, auto partial) HWY_ATTR {
-      const Vec<T> e = hn::Sub(Load<partial.value>(row + i, count), center);
-      const Vec<T> x_hat = hn::Mul(e, hn::Set(d, scale));
-      Store<partial.value>(x_hat, row + i, count);
-      const Vec<T> normal = hn::MulAdd(Load<partial.value>(gain.data() + i, count), x_hat,
-                                       Load<partial.value>(bias.data() + i, count));
-      Store<partial.value>(relu ? hn::Max(normal, hn::Zero(d)) : normal, out + i, count);
-    });
+  for (int first = 0; first < x.rows(); first += kRows) {
+    const int rows = std::min(kRows, x.rows() - first);
+    T mean[kRows], square[kRows];
+    for (int k = 0; k < rows; ++k) {
+      const T* row = x.row(first + k).data();
+      mean[k] = SumVectors<T>(n, [&](size_t i, size_t count, auto partial)
+                                     HWY_ATTR { return Load<partial.value>(row + i, count); }) /
+                static_cast<T>(n);
+    }
+    for (int k = 0; k < rows; ++k) {
+      const T* row = x.row(first + k).data();
+      const Vec<T> center = hn::Set(d, mean[k]);
+      square[k] = SumVectors<T>(n, [&](size_t i, size_t count, auto partial) HWY_ATTR {
+        Vec<T> e = hn::Sub(Load<partial.value>(row + i, count), center);
+        if constexpr (partial.value) e = hn::IfThenElseZero(hn::FirstN(d, count), e);
+        return hn::Mul(e, e);
+      });
+    }
+    for (int k = 0; k < rows; ++k) {
+      inv_std[static_cast<size_t>(first + k)] =
+          T{1} / std::sqrt(square[k] / static_cast<T>(n) + kEpsilon);
+    }
+    for (int k = 0; k < rows; ++k) {
+      T* row = x.row(first + k).data();
+      T* out = y.row(first + k).data();
+      const Vec<T> center = hn::Set(d, mean[k]);
+      const Vec<T> scale = hn::Set(d, inv_std[static_cast<size_t>(first + k)]);
+      ForVectors<T>(n, [&](size_t i, size_t count, auto partial) HWY_ATTR {
+        const Vec<T> x_hat = hn::Mul(hn::Sub(Load<partial.value>(row + i, count), center), scale);
+        Store<partial.value>(x_hat, row + i, count);
+        const Vec<T> normal = hn::MulAdd(Load<partial.value>(gain.data() + i, count), x_hat,
+                                         Load<partial.value>(bias.data() + i, count));
+        Store<partial.value>(relu ? hn::Max(normal, hn::Zero(d)) : normal, out + i, count);
+      });
+    }
   }
 }
 

@@ -103,10 +103,10 @@ void Replay::SamplePrioritized(Rng& rng, double beta, Minibatch& batch) const {
   const size_t B = batch.reward.size();
   const double part = priorities_->total() / static_cast<double>(B);
   double smallest = largest_priority_;
-  for (size_t i = 0; i < B; ++i) {
-    batch.index[i] = priorities_->Find(part * (static_cast<double>(i) + rng.Uniform()));
-    smallest = std::min(smallest, priority(batch.index[i]));
-  }
+  std::vector<double> masses(B);
+  for (size_t i = 0; i < B; ++i) masses[i] = part * (static_cast<double>(i) + rng.Uniform());
+  priorities_->Find(masses, batch.index);
+  for (const int64_t index : batch.index) smallest = std::min(smallest, priority(index));
   Gather(batch);
   // N and Σ p cancel in the ratio to the largest weight, that of the smallest priority.
   for (size_t i = 0; i < B; ++i) {

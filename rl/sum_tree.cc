@@ -1,5 +1,7 @@
 #include "rl/sum_tree.h"
 
+#include <algorithm>
+#include <array>
 #include <bit>
 #include <span>
 
@@ -17,18 +19,30 @@ void SumTree::Set(int64_t index, double value) {
   }
 }
 
-int64_t SumTree::Find(double mass) const {
-  size_t node = 1;
-  while (node < leaves_) {
-    node *= 2;
-    // To the right, unless rounding alone leads there. Without a branch, as it could not be
-    // predicted.
-    const double left = nodes_[node];
-    const bool right = (mass >= left) & (nodes_[node + 1] > 0);
-    mass -= right ? left : 0;
-    node += right ? 1 : 0;
+void SumTree::Find(std::span<const double> masses, std::span<int64_t> indices) const {
+  // Some at a time, level by level: each step waits for memory, those of others do not.
+  constexpr size_t kTogether = 16;
+  for (size_t first = 0; first < masses.size(); first += kTogether) {
+    const size_t count = std::min(kTogether, masses.size() - first);
+    std::array<double, kTogether> mass{};
+    std::array<size_t, kTogether> node{};
+    std::copy_n(masses.begin() + static_cast<ptrdiff_t>(first), count, mass.begin());
+    node.fill(1);
+    for (size_t level = 1; level < leaves_; level *= 2) {
+      for (size_t k = 0; k < kTogether; ++k) {
+        node[k] *= 2;
+        // To the right, unless rounding alone leads there. Without a branch, as it could not be
+        // predicted.
+        const double left = nodes_[node[k]];
+        const bool right = (mass[k] >= left) & (nodes_[node[k] + 1] > 0);
+        mass[k] -= right ? left : 0;
+        node[k] += right ? 1 : 0;
+      }
+    }
+    for (size_t k = 0; k < count; ++k) {
+      indices[first + k] = static_cast<int64_t>(node[k] - leaves_);
+    }
   }
-  return static_cast<int64_t>(node - leaves_);
 }
 
 void SumTree::State(const Archive& archive, int64_t count, Bounds<double> bounds) {

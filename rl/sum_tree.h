@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/archive.h"
@@ -21,9 +22,9 @@ class SumTree {
   double at(int64_t index) const { return nodes_[leaves_ + static_cast<size_t>(index)]; }
   double total() const { return nodes_[1]; }
 
-  /// The index at which the running sum of the numbers first exceeds `mass`, for mass below
-  /// total(). Never one whose number is 0.
-  int64_t Find(double mass) const;
+  /// For each mass, below total(), the index at which the running sum of the numbers first exceeds
+  /// it. Never one whose number is 0.
+  void Find(std::span<const double> masses, std::span<int64_t> indices) const;
 
   /// Saves or loads the first `count` numbers.
   void State(const Archive& archive, int64_t count, Bounds<double> bounds);

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <numeric>
+#include <span>
+#include <vector>
 
 #include "core/rng.h"
 
@@ -16,6 +18,25 @@ int64_t FindSlowly(const std::vector<double>& values, double mass) {
     mass -= values[i];
   }
   return -1;
+}
+
+int64_t FindOne(const SumTree& tree, double mass) {
+  int64_t index = -1;
+  tree.Find(std::span(&mass, 1), std::span(&index, 1));
+  return index;
+}
+
+TEST(SumTree, FindsManyAsItFindsEach) {
+  Rng rng(2, "test");
+  SumTree tree(1000);
+  for (int i = 0; i < 1000; ++i) tree.Set(i, rng.Uniform());
+  for (const size_t count : {0, 1, 15, 16, 17, 100}) {
+    std::vector<double> masses(count);
+    for (double& mass : masses) mass = tree.total() * rng.Uniform();
+    std::vector<int64_t> indices(count);
+    tree.Find(masses, indices);
+    for (size_t k = 0; k < count; ++k) EXPECT_EQ(indices[k], FindOne(tree, masses[k]));
+  }
 }
 
 TEST(SumTree, FindsWhatAScanFinds) {
@@ -32,7 +53,7 @@ TEST(SumTree, FindsWhatAScanFinds) {
       ASSERT_EQ(tree.total(), total);
       if (total == 0) continue;
       const double mass = rng.Uniform(0, total);
-      ASSERT_EQ(tree.Find(mass), FindSlowly(values, mass));
+      ASSERT_EQ(FindOne(tree, mass), FindSlowly(values, mass));
     }
   }
 }
@@ -42,7 +63,7 @@ TEST(SumTree, FindsEachNumberAsOftenAsItIsLarge) {
   const std::vector<double> values{0, 1, 3, 0, 4};
   for (size_t i = 0; i < values.size(); ++i) tree.Set(static_cast<int64_t>(i), values[i]);
   std::vector<int> count(5);
-  for (int k = 0; k < 800; ++k) ++count[static_cast<size_t>(tree.Find(k / 100.0))];
+  for (int k = 0; k < 800; ++k) ++count[static_cast<size_t>(FindOne(tree, k / 100.0))];
   EXPECT_EQ(count, (std::vector<int>{0, 100, 300, 0, 400}));
 }
 
@@ -50,8 +71,8 @@ TEST(SumTree, RoundingNeverLeadsToAZero) {
   SumTree tree(8);
   for (int i = 0; i < 5; ++i) tree.Set(i, 0.1);
   // A mass that is the total, which a product of random number and total may round to.
-  EXPECT_EQ(tree.Find(tree.total()), 4);
-  EXPECT_EQ(tree.Find(2 * tree.total()), 4);
+  EXPECT_EQ(FindOne(tree, tree.total()), 4);
+  EXPECT_EQ(FindOne(tree, 2 * tree.total()), 4);
 }
 
 }  // namespace
