@@ -36,12 +36,22 @@ async function pull(page) {
   await page.evaluate(stop);
 }
 
+/// The last step of the tour, a moment after a click on the map.
+async function everyPose(page) {
+  await page.goto(`${server.address}#tour=8`);
+  await ready(page);
+  await page.waitForSelector('#map-value:not(:empty)', { state: 'attached' });
+  await page.click('#map', { position: { x: 220, y: 30 } });
+  await page.waitForFunction(() => (upswing.world.uprightFor ?? 0) > 0.3);
+  await page.evaluate(stop);
+}
+
 const desktop = { viewport: { width: 1400, height: 860 } };
 const phone = { viewport: { width: 390, height: 844 }, deviceScaleFactor: 2, isMobile: true };
 for (const [name, options, scene] of [
   ['page', desktop, swingUp],
   ['page-dark', { ...desktop, colorScheme: 'dark' }, pull],
-  ['page-phone', phone, swingUp],
+  ['page-phone', phone, everyPose],
 ]) {
   await visit(options, async (page) => {
     await scene(page);

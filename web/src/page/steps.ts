@@ -110,7 +110,7 @@ function agent(stage: Stage): Step {
     },
     answer: (world) =>
       heldFor(world) > HELD
-        ? 'The same motor, no stronger than yours. It took the agent an hour of swinging to learn this.'
+        ? 'The same motor as yours. Learning this took it an hour of swinging.'
         : '',
   };
 }

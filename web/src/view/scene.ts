@@ -63,7 +63,7 @@ export class Scene {
     canvas.disc(...this.at(elbow), 4.5, 'panel');
     this.drawTorque(world.torque / plant.torque_limit);
     this.drawPush(world, state);
-    this.sparks.draw(canvas, ...this.at(tip), 0.5 * this.scale);
+    this.sparks.draw(canvas, ...this.at(elbow), 0.75 * this.scale);
     for (const { at, text } of this.labels) {
       const [x, y] = this.place(at, elbow, tip);
       drawLabel(canvas, text, x, y);
@@ -78,8 +78,8 @@ export class Scene {
       return [x + 1.6 * aside, y + 0.2 * aside];
     }
     if (what === 'goal') {
-      const [x, y] = this.at({ x: 0.5, z: 0.87 });
-      return [x + 0.2 * aside, y - 0.3 * aside];
+      const [x, y] = this.at({ x: 0.3, z: 1 });
+      return [x, Math.max(12, y - 14)];
     }
     const [x, y] = this.at({ x: (elbow.x + tip.x) / 2, z: (elbow.z + tip.z) / 2 });
     return [x + aside, y];
