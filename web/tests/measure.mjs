@@ -21,6 +21,7 @@ async function measure(page) {
   const sizes = (await Promise.all(bodies)).map((body) => gzipSync(body).length);
 
   await page.click('#agent-on');
+  await page.evaluate(() => document.getElementById('map').scrollIntoView({ block: 'end' }));
   const devtools = await page.context().newCDPSession(page);
   await devtools.send('Performance.enable');
   const metrics = async () => {

@@ -48,7 +48,7 @@ export class MapPanel {
 
   /// At each frame.
   draw(world: World, history: History): void {
-    if (!this.seen) return;
+    if (!this.seen || !world.policy) return;
     if (this.policy !== world.policy) this.clear();
     this.policy = world.policy;
     if (++this.frame % FRAMES !== 0) return this.work(world);

@@ -245,6 +245,7 @@ export class Page {
 
   private async forgetOwn(): Promise<void> {
     await this.agents.forgetOwn();
+    if (this.twin.id === OWN) await this.twin.choose(null);
     if (this.agent?.id === OWN) await this.choose(this.agents.list[0]!.id);
     else this.showAgent();
     element('agent').focus(); // the button is gone

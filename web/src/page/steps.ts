@@ -96,22 +96,18 @@ function motor(stage: Stage): Step {
 }
 
 function agent(stage: Stage): Step {
-  const on = button('tour-agent', () => {
-    stage.setAgentOn(true);
-    on.ariaPressed = 'true';
-  });
+  const on = button('tour-agent', () => stage.setAgentOn(!stage.world.agentOn));
   return {
     id: 'agent',
     agents: [NOMINAL_AGENT],
     labels: ({ torque }) => (torque === 0 ? [] : [{ at: 'motor', text: 'its torque' }]),
-    async begin() {
-      on.ariaPressed = 'false';
-      await stage.take({ agent: NOMINAL_AGENT, on: false });
-    },
-    answer: (world) =>
-      heldFor(world) > HELD
+    begin: () => stage.take({ agent: NOMINAL_AGENT, on: false }),
+    answer(world) {
+      on.ariaPressed = String(world.agentOn);
+      return world.agentOn && heldFor(world) > HELD
         ? 'The same motor as yours. Learning this took it an hour of swinging.'
-        : '',
+        : '';
+    },
   };
 }
 
@@ -130,7 +126,10 @@ function shove(stage: Stage): Step {
       fell = false;
     },
     answer(world) {
-      if (world.push) shoved = world.time;
+      if (world.push) {
+        shoved = world.time;
+        if (heldFor(world) > HELD) fell = false; // it begins anew
+      }
       if (shoved === 0) return heldFor(world) > HELD ? '' : 'Wait until it is up …';
       if (heldFor(world) === 0) fell = true;
       if (fell && heldFor(world) > HELD) return 'Down, and up again by itself.';
@@ -225,22 +224,30 @@ function values(stage: Stage): Step {
 }
 
 function map(stage: Stage): Step {
-  let clicked = 0; // when (s); 0 if never
-  element('map').addEventListener('click', () => (clicked = stage.world.time));
+  let shown = false;
+  let clicked = false;
+  element('map').addEventListener('click', () => {
+    if (!shown) return;
+    clicked = true;
+    stage.setAgentOn(true);
+  });
   return {
     id: 'map',
     agents: [NOMINAL_AGENT],
     async begin() {
-      clicked = 0;
+      shown = true;
+      clicked = false;
       stage.resetMap();
       await stage.take({ agent: NOMINAL_AGENT, on: !still() });
     },
+    end() {
+      shown = false;
+    },
     answer(world) {
-      if (clicked === 0) return '';
-      if (heldFor(world) > HELD)
-        return 'From there it found its way to the bright middle: upright.';
-      stage.setAgentOn(true);
-      return 'Follow the dot …';
+      if (!clicked) return '';
+      return heldFor(world) > HELD
+        ? 'From there it found its way to the bright middle: upright.'
+        : 'Follow the dot …';
     },
   };
 }
