@@ -163,7 +163,7 @@ test('a broken policy is refused with a reason, and the agent stays', async ({ p
   await open(page, '#agent=d3qn');
   const whole = Buffer.from(readPolicy('fast'));
   const files = [
-    ['cut.safetensors', whole.subarray(0, whole.length - 100), 'within the file'],
+    ['cut.safetensors', whole.subarray(0, whole.length - 100), 'not a whole safetensors file'],
     ['text.safetensors', Buffer.from('<script>alert(1)</script>'), 'not a safetensors file'],
     ['empty.safetensors', Buffer.alloc(0), 'too short'],
     ['huge.safetensors', Buffer.alloc(17 * 1024 * 1024), 'larger than 16 MB'],

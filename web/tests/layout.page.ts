@@ -83,6 +83,7 @@ test('while one scrolls, the pendulum covers nothing else', async ({ page }) => 
 });
 
 test('the pendulum keeps its size, and the badge stays beside it', async ({ page }) => {
+  test.slow(); // many sizes
   await open(page);
   await page.locator('#pause').click(); // the longest badge
   for (const size of [...SMALL, ...SIZES]) {
@@ -116,6 +117,7 @@ test('on phones and tablets pendulum and Q-values are on one screen', async ({ p
   ] as const) {
     await page.setViewportSize({ width, height });
     await page.evaluate(() => {
+      scrollTo({ top: 0, behavior: 'instant' });
       document.getElementById('stage')!.scrollIntoView({ behavior: 'instant' });
     });
     const boxes = [page.locator('#scene'), page.locator('#q')];

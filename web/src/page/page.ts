@@ -5,6 +5,7 @@ import { quoted } from '../text';
 import { LearningCurve } from '../view/charts';
 import { Scene, TRAIL_SECONDS } from '../view/scene';
 import type { World } from '../world';
+import { Address } from './address';
 import type { Agent, Agents } from './agents';
 import { Clock } from './clock';
 import { Dashboard, situation } from './dashboard';
@@ -13,8 +14,9 @@ import { Hand } from './hand';
 import { listenToKeys } from './keys';
 import { placeCharts, showStage } from './layout';
 import { MapPanel } from './map';
-import { hideMessage, note, warn } from './message';
+import { hideMessage, warn } from './message';
 import { Pose } from './pose';
+import { save } from './save';
 import { RANGES, Settings } from './settings';
 import { BEGINNING, decode, encode, OWN } from './share';
 import type { Shared } from './share';
@@ -24,7 +26,6 @@ import { Twin } from './twin';
 import { showView, viewOf } from './views';
 
 const REMEMBERED = 60; // s of history
-const ADDRESS_DELAY = 300; // ms: browsers refuse an address that changes with each pixel of a slider
 
 /// The parts of the page and what its buttons do.
 export class Page {
@@ -40,13 +41,13 @@ export class Page {
   private readonly map = new MapPanel((where) => this.start(where));
   private readonly tour: Tour;
   private readonly twin: Twin;
+  private readonly address = new Address(() => this.hash());
   private readonly still = matchMedia('(prefers-reduced-motion: reduce)');
   private agent: Agent | null = null;
   private requests = 0; // for agents; the last one counts
   private takes = 0; // likewise
   private paused = false;
   private announced = ''; // the last situation that was read out
-  private addressTimer = 0;
 
   constructor(world: World, agents: Agents) {
     this.world = world;
@@ -203,8 +204,11 @@ export class Page {
     button('shove-left', shoveLeft);
     button('shove-right', shoveRight);
     button('plant-reset', () => this.resetSettings());
-    button('share', () => void this.share());
-    button('save', () => this.save());
+    button('share', () => {
+      const own = this.agent?.id === OWN ? ' (without your policy, which stays with you)' : '';
+      void this.address.share(own);
+    });
+    button('save', () => save(this.history));
     button('own-remove', () => void this.forgetOwn());
     button('theme', changeTheme);
     const speed = element<HTMLInputElement>('speed');
@@ -328,46 +332,20 @@ export class Page {
   /// After a setting changed: updates the address, so that it can be shared at any time.
   private changed(): void {
     if (this.paused) this.world.look();
-    clearTimeout(this.addressTimer);
-    this.addressTimer = window.setTimeout(() => this.writeAddress(), ADDRESS_DELAY);
+    this.address.changed();
   }
 
-  private writeAddress(): void {
-    clearTimeout(this.addressTimer);
-    const hash = this.tour.number > 0 ? `tour=${this.tour.number}` : this.settingsHash();
-    history.replaceState(null, '', `#${hash}`);
-  }
-
-  private settingsHash(): string {
+  /// What belongs into the address.
+  private hash(): string {
+    if (this.tour.number > 0) return `tour=${this.tour.number}`;
     return encode({
-      twin: this.twin.id === OWN ? null : this.twin.id,
       agent: this.agent?.id ?? null,
+      twin: this.twin.id === OWN ? null : this.twin.id,
       on: this.world.agentOn,
       speed: this.clock.speed,
       plant: this.world.plant,
       ...this.world.disturbance,
     });
-  }
-
-  private async share(): Promise<void> {
-    this.writeAddress();
-    const own = this.agent?.id === OWN ? ' (without your policy, which stays with you)' : '';
-    try {
-      await navigator.clipboard.writeText(location.href);
-      note(`The link is in the clipboard${own}.`);
-    } catch {
-      note(`The link${own}: ${location.href}`);
-    }
-  }
-
-  /// Saves the last minute as CSV.
-  private save(): void {
-    if (!this.history.last) return note('There is no trajectory yet.');
-    const link = document.createElement('a');
-    link.href = URL.createObjectURL(new Blob([this.history.csv()], { type: 'text/csv' }));
-    link.download = 'trajectory.csv';
-    link.click();
-    URL.revokeObjectURL(link.href);
   }
 
   private repaint(): void {
