@@ -1,0 +1,186 @@
+#!/usr/bin/env python3
+"""How often would a study of few seeds have come to the wrong conclusion?
+
+    ./upswing study configs/studies/how-many-seeds.toml
+    ./upswing python tools/seeds/how_many.py runs/how-many-seeds --out docs/seeds
+
+Takes the runs of a study with very many seeds for the truth, draws small studies from them again and
+again, and counts what each would have said: that the better agent is better, that the worse one is, or
+that nothing can be said. Writes seeds.csv and, by gnuplot, seeds.svg and seeds.png.
+"""
+
+import argparse
+import csv
+import math
+import subprocess
+import sys
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+
+# Each statistic says of two samples x and y (draws × n): -1, 0, 1 for x smaller, undecided, larger.
+LEVEL = 0.05
+
+
+def interquartile_mean(x):
+    """Over the last axis, as docs/statistics.md defines it."""
+    cut = x.shape[-1] // 4
+    return np.sort(x, axis=-1)[..., cut:x.shape[-1] - cut].mean(axis=-1)
+
+
+def by(figure):
+    """The sign of a figure's difference, as a paper with bare numbers is read."""
+    return lambda x, y, rng: np.sign(figure(x) - figure(y))
+
+
+def welch(x, y, _rng):
+    """Welch's t test at 5%, two-sided."""
+    n = x.shape[-1]
+    vx, vy = x.var(axis=-1, ddof=1) / n, y.var(axis=-1, ddof=1) / n
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = (x.mean(axis=-1) - y.mean(axis=-1)) / np.sqrt(vx + vy)
+        freedom = (vx + vy) ** 2 / ((vx ** 2 + vy ** 2) / (n - 1))
+    return np.sign(t) * (two_sided_t(np.nan_to_num(np.abs(t)), np.nan_to_num(freedom, nan=1)) < LEVEL)
+
+
+def two_sided_t(t, freedom):
+    """P(|T| > t) by Simpson's rule over the angle θ = atan(t / √ν), where T's density is cos^(ν-1) θ."""
+    steps = 400
+    theta = np.arctan(t / np.sqrt(freedom))[..., None] * np.linspace(0, 1, steps + 1)
+    weights = np.ones(steps + 1)
+    weights[1:-1:2], weights[2:-1:2] = 4, 2
+    inside = (np.cos(theta) ** (freedom[..., None] - 1) * weights).sum(-1) * theta[..., -1] / steps / 3
+    whole = np.vectorize(
+        lambda v: math.sqrt(math.pi) / 2 * math.exp(math.lgamma(v / 2) - math.lgamma((v + 1) / 2)))
+    return 1 - inside / whole(freedom)
+
+
+def mann_whitney(x, y, _rng):
+    """Mann and Whitney's U test at 5%, two-sided: normal approximation, corrected for ties."""
+    n, m = x.shape[-1], y.shape[-1]
+    greater = (x[:, :, None] > y[:, None, :]).sum((1, 2)) + (x[:, :, None] == y[:, None, :]).sum((1, 2)) / 2
+    both = np.sort(np.concatenate([x, y], axis=-1), axis=-1)
+    ties = np.array([sum(k ** 3 - k for k in np.unique(row, return_counts=True)[1]) for row in both])
+    total = n + m
+    variance = n * m / 12 * (total + 1 - ties / (total * (total - 1)))
+    off = greater - n * m / 2
+    z = np.maximum(np.abs(off) - 0.5, 0) / np.sqrt(np.maximum(variance, 1e-12))
+    return np.sign(off) * (z > 1.959963984540054)
+
+
+def bootstrap(x, y, rng, resamples=1000):
+    """Whether the 95% interval of the difference of IQMs, a percentile bootstrap, is without 0."""
+    low, high = np.empty(len(x)), np.empty(len(x))
+    for k, (a, b) in enumerate(zip(x, y)):
+        drawn = (interquartile_mean(a[rng.integers(len(a), size=(resamples, len(a)))])
+                 - interquartile_mean(b[rng.integers(len(b), size=(resamples, len(b)))]))
+        low[k], high[k] = np.quantile(drawn, [0.025, 0.975])
+    return np.where(low > 0, 1, np.where(high < 0, -1, 0))
+
+
+STATISTICS = {
+    "mean": by(lambda x: x.mean(axis=-1)),
+    "median": by(lambda x: np.median(x, axis=-1)),
+    "IQM": by(interquartile_mean),
+    "Welch's t, 5%": welch,
+    "Mann-Whitney, 5%": mann_whitney,
+    "bootstrap of IQM, 95%": bootstrap,
+}
+
+
+def read(folder, column):
+    """The scores of each group. A run that never solved its task counts with all its steps."""
+    groups = defaultdict(list)
+    try:
+        with open(folder / "runs.csv", newline="", encoding="utf-8") as file:
+            for row in csv.DictReader(file):
+                score = float(row[column])
+                groups[row["group"]].append(score if math.isfinite(score) else float(row["steps"]))
+    except (OSError, KeyError, ValueError) as error:
+        sys.exit(f"how_many: {folder}/runs.csv: expected the table of a study with a column {column}: "
+                 f"{error}")
+    return {name: np.array(scores) for name, scores in groups.items()}
+
+
+def samples(scores, n, draws, rng):
+    """Studies of n seeds, each seed once (draws × n)."""
+    return np.array([scores[rng.choice(len(scores), n, replace=False)] for _ in range(draws)])
+
+
+def count(x, y, truth, a):
+    """A row for each size and statistic: shares of right, undecided and wrong conclusions."""
+    for n in a.sizes:
+        rng = np.random.default_rng(1)
+        if truth == 0:  # the same agent twice: both samples from one, without a common seed
+            both = samples(x, 2 * n, a.draws, rng)
+            left, right = both[:, :n], both[:, n:]
+        else:
+            left, right = samples(x, n, a.draws, rng), samples(y, n, a.draws, rng)
+        for name, statistic in STATISTICS.items():
+            said = statistic(left, right, rng)
+            yield n, name, (said == truth).mean() if truth else 0.0, (said == 0).mean(), (
+                (said == -truth).mean() if truth else (said != 0).mean())
+
+
+def plot(rows, groups, sizes, file):
+    """The share of wrong conclusions over the number of seeds, a panel for each comparison."""
+    columns = 2
+    lines = [f"set terminal {'svg' if file.suffix == '.svg' else 'pngcairo'} size 900,"
+             f"{300 * math.ceil(len(groups) / columns)} font 'sans,11'",
+             f"set output '{file}'", f"set multiplot layout {math.ceil(len(groups) / columns)},{columns}",
+             "set logscale x", f"set xtics ({', '.join(map(str, sizes))})", "set yrange [0:50]",
+             "set xlabel 'seeds'", "set ylabel 'wrong (%)'", "set grid lc rgb '#d8d8d8'",
+             "set key top right samplen 2 spacing 0.9"]
+    colors = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"]
+    for index, group in enumerate(groups):
+        lines += [f"set title {group!r}", "unset key" if index else ""]
+        curves = []
+        for color, name in zip(colors, STATISTICS):
+            points = "\n".join(f"{r[1]} {100 * r[5]}" for r in rows if r[0] == group and r[2] == name)
+            lines.append(f"$d{len(curves)} << EOD\n{points}\nEOD")
+            curves.append(f"$d{len(curves)} with linespoints pt 7 ps 0.5 lw 2 lc rgb '{color}' "
+                          f"title \"{name}\"")
+        lines.append("plot " + ", ".join(curves))
+    subprocess.run(["gnuplot"], input="\n".join(lines) + "\n", text=True, check=True)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path, help="a study's, with runs.csv")
+    parser.add_argument("--baseline", default="fast", help="what the others are compared with")
+    parser.add_argument("--score", default="solve_steps", help="a column of runs.csv")
+    parser.add_argument("--sizes", default="3,5,10,30", help="seeds of the small studies")
+    parser.add_argument("--draws", type=int, default=2000, help="small studies of each size")
+    parser.add_argument("--out", type=Path, help="folder for seeds.csv, seeds.svg and seeds.png")
+    a = parser.parse_args()
+    a.sizes = [int(n) for n in a.sizes.split(",")]
+    groups = read(a.folder, a.score)
+    if a.baseline not in groups:
+        sys.exit(f"how_many: --baseline: expected one of {', '.join(groups)}, got {a.baseline}")
+    for name, scores in groups.items():
+        if len(scores) < 2 * max(a.sizes):
+            sys.exit(f"how_many: {name}: expected at least {2 * max(a.sizes)} runs, got {len(scores)}")
+    base = groups.pop(a.baseline)
+    rows = []
+    print(f"{a.baseline}: IQM of {a.score} {interquartile_mean(base):,.6g} over {len(base)} seeds")
+    for name, scores in [(f"{a.baseline} against itself", base), *groups.items()]:
+        difference = interquartile_mean(base) - interquartile_mean(scores)
+        truth = np.sign(difference)
+        print(f"\n{name}: IQM {interquartile_mean(scores):,.6g}, {-difference:+,.6g}")
+        print(f"  {'seeds':>5}  {'statistic':<24}{'right':>8}{'undecided':>11}{'wrong':>8}")
+        for n, statistic, right, undecided, wrong in count(base, scores, truth, a):
+            rows.append((name, n, statistic, right, undecided, wrong))
+            print(f"  {n:>5}  {statistic:<24}{right:>8.1%}{undecided:>11.1%}{wrong:>8.1%}")
+    if a.out:
+        a.out.mkdir(parents=True, exist_ok=True)
+        with open(a.out / "seeds.csv", "w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(["comparison", "seeds", "statistic", "right", "undecided", "wrong"])
+            writer.writerows(rows)
+        for ending in (".svg", ".png"):
+            plot(rows, list(dict.fromkeys(row[0] for row in rows)), a.sizes, a.out / f"seeds{ending}")
+
+
+if __name__ == "__main__":
+    main()
