@@ -101,7 +101,7 @@ bool IsLost(const Opened& file, const std::string& text, double now, std::chrono
 }  // namespace
 
 std::string ThisHost() {
-  static const std::string host = [] {
+  static const std::string kHost = [] {
     std::string boot;
     try {
       boot = ReadTextFile("/proc/sys/kernel/random/boot_id");
@@ -109,7 +109,7 @@ std::string ThisHost() {
     }
     return Concat(HostName(), "/", Trim(boot).substr(0, 8));
   }();
-  return host;
+  return kHost;
 }
 
 struct Lease::State {

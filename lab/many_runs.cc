@@ -181,10 +181,9 @@ class LocalWorkers {
         observer_.End(run);
         continue;
       }
-      if (fs::exists(run.claim(), error)) {
+      const bool until_now = stopping_ && std::ranges::find(before, &run) != before.end();
+      if (until_now || fs::exists(run.claim(), error)) {
         running_.push_back(&run);
-      } else if (stopping_ && std::ranges::find(before, &run) != before.end()) {
-        running_.push_back(&run);  // until now
       } else {
         ++waiting_;
       }
