@@ -66,7 +66,11 @@ void ManyRunsView::Announce() const {
 ManyRunsView::Progress ManyRunsView::Measure() const {
   Progress progress;
   for (const SeedRun& run : *runs_) {
-    const auto steps = static_cast<double>(run.Steps());
+    // Files are read for those that run alone: there may be thousands of others.
+    const bool runs_now = std::ranges::find(running_, &run) != running_.end();
+    const auto steps = static_cast<double>(runs_now     ? run.Steps()
+                                           : run.result ? run.result->steps
+                                                        : 0);
     progress.steps += steps;
     progress.done += run.finished() ? 1 : 0;
     if (run.finished() || !run.problem.empty()) continue;
@@ -86,6 +90,7 @@ ManyRunsView::Progress ManyRunsView::Measure() const {
 }
 
 void ManyRunsView::Watch(const std::vector<const SeedRun*>& running) {
+  running_ = running;
   if (!line_.due()) return;
   const Progress progress = Measure();
   std::vector<std::string> fields{

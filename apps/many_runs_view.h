@@ -43,6 +43,7 @@ class ManyRunsView : public ManyRunsObserver {
   const ManyRuns& many_;
   const StudyPlan& plan_;
   const std::vector<SeedRun>* runs_ = nullptr;
+  std::vector<const SeedRun*> running_;
   ProgressLine line_;
   double steps_before_ = 0;  // made before this process
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();

@@ -52,8 +52,17 @@ Estimate EstimateOfTwo(const Strata& x, const Strata& y,
 void Resample(const std::vector<double>& sorted, Rng& rng, std::vector<double>& drawn) {
   std::vector<uint32_t> times(sorted.size());
   for (size_t k = 0; k < sorted.size(); ++k) ++times[rng.Below(sorted.size())];
-  auto next = drawn.begin();
-  for (size_t i = 0; i < sorted.size(); ++i) next = std::fill_n(next, times[i], sorted[i]);
+  // Most are drawn at most four times: four are written whatever the number, as a branch could not
+  // be predicted. What is written too much is overwritten, or cut off at the end.
+  constexpr size_t kUsual = 4;
+  drawn.resize(sorted.size() + kUsual);
+  size_t next = 0;
+  for (size_t i = 0; i < sorted.size(); ++i) {
+    std::fill_n(drawn.begin() + static_cast<ptrdiff_t>(next), kUsual, sorted[i]);
+    for (size_t k = kUsual; k < times[i]; ++k) drawn[next + k] = sorted[i];
+    next += times[i];
+  }
+  drawn.resize(sorted.size());
 }
 
 void SortUnlessSorted(std::vector<double>& values) {
@@ -69,10 +78,10 @@ std::vector<double> Sorted(std::span<const double> values) {
 }  // namespace
 
 int64_t ResamplesOf(const Strata& strata, int64_t most) {
-  constexpr int64_t kDraws = 20'000'000, kLeast = 1000;
+  constexpr int64_t kMany = 1000;
   int64_t scores = 0;
   for (const std::vector<double>& stratum : strata) scores += std::ssize(stratum);
-  return std::min(most, std::max(kLeast, kDraws / std::max<int64_t>(1, scores)));
+  return most * kMany / std::max(kMany, scores);
 }
 
 double InterquartileMean(std::vector<double> values) {
