@@ -21,6 +21,8 @@ const forgotten = new FinalizationRegistry<() => void>((close) => close());
 /// A policy in the core, and what its decisions are made of.
 export class CoreController implements Controller {
   readonly about: Readonly<About>;
+  /// Frees its memory now; else that happens some time after nobody holds it any more.
+  readonly close: () => void;
   private readonly policy: number;
   private readonly observations: number; // where one is put
   private readonly row: number; // where what is made of it lies
@@ -39,11 +41,16 @@ export class CoreController implements Controller {
     this.observations = exports.reserve(4 * this.inputs);
     this.row = exports.reserve(8 * this.columns);
     const { policy, observations, row } = this;
-    forgotten.register(this, () => {
+    const close = () => {
       exports.policy_close(policy);
       exports.release(observations);
       exports.release(row);
-    });
+    };
+    forgotten.register(this, close, this);
+    this.close = () => {
+      forgotten.unregister(this);
+      close();
+    };
   }
 
   get inputs(): number {

@@ -39,6 +39,8 @@ export interface Controller {
   /// Largest |difference| between the outputs in the file and those computed here.
   readonly selfCheckError: number;
   decide(observation: Float32Array): Decision;
+  /// Frees what it holds; nothing may be asked of it after.
+  close(): void;
 }
 
 /// Index of the largest number, the first of equals.

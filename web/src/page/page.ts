@@ -1,4 +1,5 @@
 import { History } from '../history';
+import { LearnPanel } from '../learn/panel';
 import type { State } from '../pendulum';
 import { BadInput } from '../safetensors';
 import { quoted } from '../text';
@@ -39,8 +40,9 @@ export class Page {
   private readonly dashboard = new Dashboard();
   private readonly curve = new LearningCurve();
   private readonly map = new MapPanel((where) => this.start(where));
+  readonly learn: LearnPanel;
   private readonly tour: Tour;
-  private readonly twin: Twin;
+  readonly twin: Twin;
   private readonly address = new Address(() => this.hash());
   private readonly still = matchMedia('(prefers-reduced-motion: reduce)');
   private agent: Agent | null = null;
@@ -59,6 +61,7 @@ export class Page {
       this.reset();
       this.changed();
     });
+    this.learn = new LearnPanel(this);
     this.tour = new Tour(
       this,
       (id) => agents.has(id),
@@ -338,6 +341,7 @@ export class Page {
   /// What belongs into the address.
   private hash(): string {
     if (this.tour.number > 0) return `tour=${this.tour.number}`;
+    if (document.documentElement.dataset.view === 'learn') return 'learn';
     return encode({
       agent: this.agent?.id ?? null,
       twin: this.twin.id === OWN ? null : this.twin.id,
@@ -367,6 +371,7 @@ export class Page {
     this.scene.draw(world, this.clock.state, trail);
     this.twin.draw(this.clock, this.still.matches);
     this.tour.follow(world, this.scene);
+    this.learn.follow();
     if (this.paused) this.pose.follow(world.state);
     this.dashboard.draw(world, this.history);
     this.map.draw(world, this.history);

@@ -59,7 +59,7 @@ export function decode(
       shared[name] = text;
     } else if (name === 'on') {
       shared.on = text === '1';
-    } else if (name === 'everything') {
+    } else if (name === 'everything' || name === 'learn') {
       // the view; it has no value
     } else if (!range) {
       problems.push(`unknown ${quoted(name)}`);

@@ -21,6 +21,7 @@ export interface Stage {
   reset(): void;
   /// What the map shows at first.
   resetMap(): void;
+  readonly learn: { start(): void; stop(): void; readonly story: string };
 }
 
 export interface Step {
@@ -252,6 +253,20 @@ function map(stage: Stage): Step {
   };
 }
 
+function learn(stage: Stage): Step {
+  button('tour-learn', () => stage.learn.start());
+  return {
+    id: 'learn',
+    agents: [NOMINAL_AGENT],
+    async begin() {
+      await stage.take({ agent: NOMINAL_AGENT, on: false });
+      stage.reset();
+    },
+    end: () => stage.learn.stop(),
+    answer: () => stage.learn.story,
+  };
+}
+
 export function makeSteps(stage: Stage): Step[] {
-  return [watch, motor, agent, shove, mass, many, values, map].map((make) => make(stage));
+  return [watch, motor, agent, shove, mass, many, values, map, learn].map((make) => make(stage));
 }

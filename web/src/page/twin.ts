@@ -1,5 +1,6 @@
 import { History } from '../history';
 import { BadInput } from '../safetensors';
+import type { Policy } from '../policy';
 import { quoted } from '../text';
 import { Scene, TRAIL_SECONDS } from '../view/scene';
 import { World } from '../world';
@@ -53,13 +54,27 @@ export class Twin {
       warn(`Agent ${quoted(id!)} cannot be used: ${error.message}.`);
     }
     this.select.value = this.id ?? '';
-    this.first.twin = this.id === null ? null : this.world;
+    this.place(this.agents.list.find((one) => one.id === this.id)?.title ?? '');
+  }
+
+  /// Takes a policy that is none of the agents, or none.
+  show(policy: Policy | null, name: string): void {
+    ++this.requests;
+    this.id = null;
+    this.select.value = '';
+    this.world.policy = policy;
+    this.place(name);
+  }
+
+  /// Begins where the first one is, if there is a policy.
+  private place(name: string): void {
+    const absent = this.world.policy === null;
+    this.first.twin = absent ? null : this.world;
     this.world.plant = this.first.plant;
     this.world.reset(this.first.state);
     this.restarted();
-    element('twin-box').hidden = this.id === null;
-    const title = this.agents.list.find((one) => one.id === this.id)?.title ?? '';
-    element('twin-name').textContent = title;
+    element('twin-box').hidden = absent;
+    element('twin-name').textContent = name;
   }
 
   /// After a new start: what happened before is dropped.

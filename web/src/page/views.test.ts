@@ -10,6 +10,7 @@ test('an address without settings is a new visitor', () => {
 test('each view has an address of its own', () => {
   expect(viewOf('#tour')).toMatchObject({ name: 'tour', chosen: true });
   expect(viewOf('#tour=3')).toMatchObject({ name: 'tour', step: 3, chosen: true });
+  expect(viewOf('#learn')).toMatchObject({ name: 'learn' });
   expect(viewOf('#everything')).toMatchObject({ name: 'everything', chosen: true });
   expect(decode('#everything', new Map()).problems).toEqual([]);
 });

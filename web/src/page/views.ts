@@ -1,11 +1,11 @@
 import { recall, remember } from './storage';
 
-/// The page has two views, the guided tour and everything.
+/// The page has three views: the guided tour, an agent that learns, and everything.
 
 const KEY = 'view';
 
 export interface View {
-  name: 'tour' | 'everything';
+  name: 'tour' | 'learn' | 'everything';
   step: number; // of the tour
   chosen: boolean; // by its name, so that the next visit begins with it too
 }
@@ -16,6 +16,7 @@ export function viewOf(hash: string): View {
   const fields = new URLSearchParams(hash.replace(/^#/, ''));
   const step = fields.get('tour');
   if (step !== null) return { name: 'tour', step: Number(step), chosen: true };
+  if (fields.has('learn')) return { name: 'learn', step: 1, chosen: false };
   const everything = fields.size > 0 || recall(KEY) === 'everything';
   const name = everything ? 'everything' : 'tour';
   return { name, step: 1, chosen: fields.has('everything') };

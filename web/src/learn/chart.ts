@@ -1,0 +1,69 @@
+import { Canvas } from '../view/canvas';
+import type { Session } from './session';
+
+const LEFT = 42; // px
+const RIGHT = 42;
+const BOTTOM = 16;
+
+/// Return of the trials and success at evaluations over the steps of trainings, the chosen one in
+/// front, and where along it the stage is.
+export class LearnChart {
+  readonly canvas = new Canvas('learn-curve');
+
+  draw(sessions: readonly Session[], chosen: Session | null, at: number | null): void {
+    const { canvas } = this;
+    canvas.clear();
+    const bottom = canvas.height - BOTTOM;
+    const width = canvas.width - LEFT - RIGHT;
+    const steps = stepsOf(sessions);
+    const means = new Map(sessions.map((session) => [session, meansOf(session)]));
+    const highest = Math.max(1000, ...[...means.values()].flat().map(({ value }) => value));
+    const x = (step: number) => LEFT + (step / steps) * width;
+    const ofReturn = (value: number) => 6 + (bottom - 6) * (1 - Math.max(0, value) / highest);
+    const ofSuccess = (share: number) => 6 + (bottom - 6) * (1 - share);
+
+    for (const share of [0, 0.5, 1]) {
+      const y = ofSuccess(share);
+      const line = [LEFT, canvas.width - RIGHT].map((end) => [end, y] as [number, number]);
+      canvas.line(line, 'grid', 1);
+      const value = share * highest;
+      canvas.text(value.toFixed(0), LEFT - 5, y, 'right', 'torque');
+      canvas.text(`${100 * share}%`, canvas.width - RIGHT + 5, y, 'left', 'energy');
+    }
+    canvas.text('0', LEFT, canvas.height - 6);
+    const end = `${steps.toLocaleString('en')} steps`;
+    canvas.text(end, canvas.width - RIGHT, canvas.height - 6, 'right');
+
+    for (const session of [...sessions.filter((other) => other !== chosen), chosen]) {
+      if (!session) continue;
+      const front = session === chosen;
+      const returns = means
+        .get(session)!
+        .map(({ step, value }) => [x(step), ofReturn(value)] as const);
+      if (returns.length > 1) canvas.line(returns, front ? 'torque' : 'edge', front ? 2 : 1);
+      const success = session.evaluations.map(
+        ({ step, success: share }) => [x(step), ofSuccess(share)] as const,
+      );
+      if (success.length > 1) canvas.line(success, front ? 'energy' : 'edge', front ? 2 : 1);
+      if (front) for (const [px, py] of success) canvas.disc(px, py, 3, 'energy');
+    }
+    if (at === null) return;
+    canvas.line([[x(at), 2] as const, [x(at), bottom] as const], 'ink', 1.5);
+    canvas.disc(x(at), bottom, 4, 'ink');
+  }
+}
+
+/// How many steps the chart shows.
+export function stepsOf(sessions: readonly Session[]): number {
+  return Math.max(20_000, ...sessions.map(({ last }) => last?.steps ?? 0));
+}
+
+/// The mean return of the trials that ended at each step: environments that begin together end so.
+function meansOf({ episodes }: Session): { step: number; value: number }[] {
+  const ended = new Map<number, number[]>();
+  for (const { step, return: value } of episodes)
+    ended.set(step, [...(ended.get(step) ?? []), value]);
+  return [...ended].map(([step, values]) => {
+    return { step, value: values.reduce((sum, x) => sum + x, 0) / values.length };
+  });
+}

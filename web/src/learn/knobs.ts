@@ -1,0 +1,89 @@
+import { core } from '../core';
+import { agentSettings } from './learner';
+import type { LearnSettings, Setting } from './learner';
+
+/// What can be changed of a training: some of the program's own settings, by their names there, with its
+/// ranges and its words.
+
+const REWARD = [
+  'energy_weight',
+  'height_weight',
+  'balance_weight',
+  'velocity_weight',
+  'torque_weight',
+];
+const KNOBS: Readonly<Record<string, readonly string[]>> = {
+  fast: [
+    ...['learning_rate', 'gamma', 'n_step', 'epsilon_start', 'epsilon_decay', 'epsilon_end'],
+    ...['double', 'dueling', 'layer_norm', 'prioritized', 'mirror'],
+    ...REWARD,
+  ],
+  'sac-fast': [
+    ...['learning_rate', 'gamma', 'n_step', 'updates_per_step'],
+    ...['layer_norm', 'twin', 'mirror'],
+    ...REWARD,
+  ],
+};
+
+export class Knobs {
+  private readonly place: HTMLElement;
+  private inputs: { input: HTMLInputElement; setting: Setting }[] = [];
+
+  constructor(place: HTMLElement) {
+    this.place = place;
+  }
+
+  /// Shows those of a named agent, at its own values.
+  show(agent: string): void {
+    const settings = agentSettings(core(), agent);
+    const found = KNOBS[agent]!.map((name) => settings.get(name)!);
+    this.inputs = found.map((setting) => ({ setting, input: inputOf(setting) }));
+    this.place.replaceChildren(
+      ...this.inputs.map(({ input, setting }) => {
+        const label = document.createElement('label');
+        label.title = setting.help;
+        label.append(`${setting.name.replaceAll('_', ' ')} `, input);
+        return label;
+      }),
+    );
+  }
+
+  /// Back to the agent's own values.
+  reset(): void {
+    for (const { input } of this.inputs) {
+      input.checked = input.defaultChecked;
+      input.value = input.defaultValue;
+    }
+  }
+
+  /// Those that differ from the agent's own.
+  get changed(): LearnSettings {
+    const values = this.inputs.map(({ input, setting }) => {
+      const value = input.type === 'checkbox' ? String(input.checked) : input.value;
+      return [setting, value] as const;
+    });
+    const differ = ([{ value: usual }, value]: readonly [Setting, string]) =>
+      value !== usual && (isSwitch(usual) || Number(value) !== Number(usual));
+    return Object.fromEntries(values.filter(differ).map(([{ name }, value]) => [name, value]));
+  }
+}
+
+function isSwitch(value: string): boolean {
+  return value === 'true' || value === 'false';
+}
+
+function inputOf({ name, value, low, high }: Setting): HTMLInputElement {
+  const input = document.createElement('input');
+  input.name = name;
+  if (isSwitch(value)) {
+    input.type = 'checkbox';
+    input.defaultChecked = value === 'true';
+    return input;
+  }
+  input.type = 'number';
+  input.step = 'any';
+  if (low !== null) input.min = String(low);
+  if (high !== null) input.max = String(high);
+  input.defaultValue = value;
+  return input;
+}

@@ -1,0 +1,173 @@
+import { expect } from '@playwright/test';
+import type { Page } from '@playwright/test';
+import { createHash } from 'node:crypto';
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { Core } from '../src/core';
+import { Learner } from '../src/learn/learner';
+import { coreModule } from './core';
+import { balanced, open, run, startFrom, test } from './page';
+import { policyPath, runProgram } from './program';
+
+const status = (page: Page) => page.locator('#learn-status');
+const hash = (file: Uint8Array) => createHash('sha256').update(file).digest('hex');
+
+async function openLearn(page: Page): Promise<void> {
+  await open(page, '#learn');
+  await expect(page.locator('#learn-start')).toBeEnabled();
+}
+
+/// What is saved by a click.
+async function saved(page: Page): Promise<Uint8Array> {
+  const download = page.waitForEvent('download');
+  await page.getByRole('button', { name: 'Save policy.safetensors' }).click();
+  expect((await download).suggestedFilename()).toBe('policy.safetensors');
+  return readFileSync(await (await download).path());
+}
+
+/// Whether the agent on the stage is up 15 s after it hung.
+async function swingsUp(page: Page): Promise<boolean> {
+  await startFrom(page, 0);
+  await run(page, 15);
+  return (await balanced(page)) > 5;
+}
+
+test('an agent learns from nothing, takes the stage, stays, and is what Node and the program say', async ({
+  page,
+}) => {
+  test.slow(); // a training, on a machine that may have other work
+  await openLearn(page);
+  await page.getByRole('button', { name: 'Learn', exact: true }).click();
+  await expect(status(page)).toHaveText('Learning …');
+  await expect(page.locator('#agent-on')).toHaveAttribute('aria-pressed', 'true');
+  await expect(status(page)).toContainText('Solved: two evaluations in a row', {
+    timeout: 120_000,
+  });
+  await expect(page.locator('#learn-success')).toHaveText('100%');
+  await expect(page.locator('#agent')).toHaveValue('own');
+
+  // The same seed, in Node.
+  const learner = new Learner(await Core.start(await coreModule()), 'fast', 1);
+  while (learner.run(1000));
+  const file = await saved(page);
+  expect(hash(file)).toBe(hash(new Uint8Array(learner.best()!)));
+  const folder = mkdtempSync(join(tmpdir(), 'upswing-'));
+  try {
+    const path = join(folder, 'policy.safetensors');
+    writeFileSync(path, file);
+    const result = JSON.parse(runProgram('eval', path, '--episodes', '20', '--json')) as object;
+    expect(result).toMatchObject({ success_rate: 1 });
+  } finally {
+    rmSync(folder, { recursive: true });
+  }
+
+  // Along the curve: from flailing to balance, the untrained one beside it.
+  expect(await swingsUp(page)).toBe(true);
+  const scrub = page.locator('#learn-scrub');
+  await page.getByLabel('beside it, the untrained one').check();
+  await expect(page.locator('#twin-name')).toHaveText('untrained');
+  await scrub.fill('0');
+  await expect(page.locator('#learn-where')).toHaveText('on the stage: after 0 steps');
+  expect(await swingsUp(page)).toBe(false);
+  await scrub.press('End');
+  await expect(page.locator('#learn-where')).toHaveText('on the stage: as it is now');
+  expect(await swingsUp(page)).toBe(true);
+
+  // At the next visit it is still there.
+  await page.goto('./#agent=own&on=1');
+  await page.reload();
+  await expect(page.locator('#agent')).toHaveValue('own');
+  await expect(page.locator('#agent option:checked')).toHaveText(
+    'learned here, fast, seed 1 (yours)',
+  );
+  expect(await swingsUp(page)).toBe(true);
+});
+
+test('pause, go on, another seed, start over', async ({ page }) => {
+  await openLearn(page);
+  await page.getByLabel('Seed', { exact: true }).fill('7');
+  await page.getByRole('button', { name: 'Learn', exact: true }).click();
+  await expect(page.locator('#learn-updates')).not.toHaveText('0');
+  await page.locator('#learn-start').click();
+  await expect(status(page)).toHaveText('Paused.');
+  await expect(page.locator('#learn-start')).toHaveText('Go on');
+  const steps = async () =>
+    Number((await page.locator('#learn-steps').innerText()).replace(',', ''));
+  // What was under way when it was told arrives, and then nothing.
+  let before = -1;
+  const rests = async () => before === (before = await steps());
+  await expect.poll(rests, { intervals: [1000] }).toBe(true);
+  await page.getByRole('button', { name: 'Go on' }).click();
+  await expect.poll(steps).toBeGreaterThan(before);
+  await page.getByRole('button', { name: 'Start over' }).click();
+  await expect.poll(steps).toBeLessThan(before);
+  await page.locator('#learn-start').click();
+});
+
+test('four seeds at once, each of which can be watched', async ({ page }) => {
+  await openLearn(page);
+  await page.getByLabel('four seeds at once').check();
+  await page.getByRole('button', { name: 'Learn', exact: true }).click();
+  const seeds = page.getByRole('radio', { name: /seed/ });
+  await expect(seeds).toHaveCount(4);
+  for (const seed of [4, 2]) {
+    await page.getByRole('radio', { name: `seed ${seed}` }).check();
+    await expect(page.locator('#learn-updates')).not.toHaveText('0');
+    const name = await page.evaluate(() => upswing.world.policy!.metadata.get('seed'));
+    expect(name).toBe(String(seed));
+  }
+  await page.locator('#learn-start').click();
+  await expect(status(page)).toHaveText('Paused.');
+});
+
+test('settings are those of the program, which says what is wrong with them', async ({ page }) => {
+  await openLearn(page);
+  await page.locator('#learn summary').click();
+  const rate = page.getByLabel('learning rate');
+  await expect(rate).toHaveValue('0.002');
+  await rate.fill('-1');
+  await page.getByRole('button', { name: 'Learn', exact: true }).click();
+  await expect(status(page)).toHaveText(
+    'It cannot learn so: learning_rate: expected a number in [0, 10], got "-1".',
+  );
+  await page.getByRole('button', { name: 'As they were' }).click();
+  await expect(rate).toHaveValue('0.002');
+  await page.getByLabel('layer norm').uncheck();
+  await page.getByRole('button', { name: 'Start over' }).click();
+  await expect(page.locator('#learn-updates')).not.toHaveText('0');
+  const network = await page.evaluate(() => upswing.world.policy!.metadata.get('network'));
+  expect(network).toContain('"layer_norm":false');
+  await page.getByLabel('What learns').selectOption('sac-fast');
+  await expect(page.getByLabel('twin', { exact: true })).not.toBeChecked();
+  await page.getByRole('button', { name: 'Start over' }).click();
+  await expect(page.locator('#q-name')).toHaveText(/Policy/);
+  await page.locator('#learn-start').click();
+});
+
+test("the visitor's own file is not replaced, and another agent keeps the stage", async ({
+  page,
+}) => {
+  await openLearn(page);
+  await page.locator('#file').setInputFiles(policyPath('dqn'));
+  await expect(page.locator('#agent')).toHaveValue('own');
+  await page.getByRole('button', { name: 'Learn', exact: true }).click();
+  await expect(page.locator('#learn-updates')).not.toHaveText('0');
+  await page.evaluate(() => upswing.choose('d3qn'));
+  const steps = page.locator('#learn-steps');
+  const before = await steps.innerText();
+  await expect(steps).not.toHaveText(before);
+  expect(await page.evaluate(() => upswing.world.policy!.metadata.get('agent'))).toBe('d3qn');
+  expect(await page.evaluate(() => upswing.agents.ownName)).toBe('dqn.safetensors');
+  await page.locator('#learn-start').click();
+});
+
+test.describe('what is missing', () => {
+  test.use({ complains: true });
+  test('a worker that does not start is told', async ({ page }) => {
+    await page.route(/worker-.*\.js$/, (route) => route.abort());
+    await openLearn(page);
+    await page.getByRole('button', { name: 'Learn', exact: true }).click();
+    await expect(status(page)).toContainText('its worker could not start');
+  });
+});
