@@ -36,13 +36,13 @@ async function swingsUp(page: Page): Promise<boolean> {
 test('an agent learns from nothing, takes the stage, stays, and is what Node and the program say', async ({
   page,
 }) => {
-  test.slow(); // a training, on a machine that may have other work
+  test.setTimeout(300_000); // trainings, on a machine that may have other work
   await openLearn(page);
   await page.getByRole('button', { name: 'Learn', exact: true }).click();
   await expect(status(page)).toHaveText('Learning …');
   await expect(page.locator('#agent-on')).toHaveAttribute('aria-pressed', 'true');
-  await expect(status(page)).toContainText('Solved: two evaluations in a row', {
-    timeout: 120_000,
+  await expect(status(page)).toContainText('Solved after ', {
+    timeout: 200_000,
   });
   await expect(page.locator('#learn-success')).toHaveText('100%');
   await expect(page.locator('#agent')).toHaveValue('own');

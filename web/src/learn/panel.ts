@@ -301,7 +301,6 @@ function sentence(session: Session): string {
   if (state !== 'finished' || !last) return 'Learning …';
   const steps = last.steps.toLocaleString('en');
   if (!last.solved) return `Not solved within ${steps} steps.`;
-  // Two evaluations in a row, each of 100 starts.
   const own = Object.keys(settings).length > 0 ? ', with your settings' : '';
-  return `Solved: two evaluations in a row passed, after ${steps} steps and ${seconds.toFixed(1)} s${own}.`;
+  return `Solved after ${steps} steps and ${seconds.toFixed(1)} s${own}.`;
 }

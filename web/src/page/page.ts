@@ -1,3 +1,4 @@
+import { core } from '../core';
 import { History } from '../history';
 import { LearnPanel } from '../learn/panel';
 import type { State } from '../pendulum';
@@ -70,15 +71,20 @@ export class Page {
     world.onMoment = (moment) => this.history.add(moment);
   }
 
+  /// Memory that the core has taken (bytes), which it never gives back.
+  get coreBytes(): number {
+    return core().exports.memory.buffer.byteLength;
+  }
+
   /// Starts again with the view and the settings of the address.
-  async open(): Promise<void> {
-    const view = viewOf(location.hash);
+  async open(hash = location.hash): Promise<void> {
+    const view = viewOf(hash);
     showView(view);
     placeCharts();
     this.setPaused(false);
     if (view.name === 'tour') return this.tour.go(view.step);
     this.tour.leave();
-    const { shared, problems } = decode(location.hash, RANGES);
+    const { shared, problems } = decode(hash, RANGES);
     if (shared.agent !== null && !this.agents.has(shared.agent)) {
       problems.push(
         shared.agent === OWN
@@ -217,7 +223,8 @@ export class Page {
     const speed = element<HTMLInputElement>('speed');
     speed.addEventListener('input', () => this.setSpeed(Number(speed.value)));
     this.listenToAgents();
-    addEventListener('hashchange', () => void this.open());
+    // By its own address: meanwhile that of the settings before may have been written.
+    addEventListener('hashchange', ({ newURL }) => void this.open(new URL(newURL).hash));
     this.listenToExamples();
     onThemeChange(() => this.repaint());
     new ResizeObserver(() => this.drawCurve()).observe(this.curve.canvas.element);

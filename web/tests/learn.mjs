@@ -1,0 +1,110 @@
+// npm run measure:learn: how long an agent takes to learn in the built page, seed by seed, how smoothly
+// the page runs meanwhile, and whether trainings one after another leave anything behind. Measurements of
+// this machine for docs/page.md, not a test. UPSWING names the program, whose time stands beside.
+import { execFileSync } from 'node:child_process';
+import { mkdtempSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { ready, serve, visit } from './visit.mjs';
+
+const SEEDS = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10];
+const PATIENCE = 300_000; // ms
+const median = (values) => values.toSorted((a, b) => a - b)[Math.floor(values.length / 2)];
+
+/// The program with one thread, as the page learns: steps, and seconds of all of it.
+function program(seed) {
+  const folder = mkdtempSync(join(tmpdir(), 'upswing-'));
+  const began = performance.now();
+  const text = execFileSync(
+    process.env.UPSWING ?? '../build/release/apps/upswing',
+    ['train', '--agent', 'fast', '--seed', String(seed), '--threads', '1'].concat([
+      '--eval-physics',
+      'closed-form',
+      '--out',
+      join(folder, 'run'),
+    ]),
+    { encoding: 'utf8', stdio: ['ignore', 'pipe', 'pipe'] },
+  );
+  const seconds = (performance.now() - began) / 1000;
+  rmSync(folder, { recursive: true });
+  return { seconds, text };
+}
+
+/// Learns with a seed in the page: steps and seconds from the click to the end, frames a second.
+async function learn(page, seed) {
+  await page.fill('#learn-seed', String(seed));
+  return page.evaluate(
+    ({ patience }) =>
+      new Promise((resolve, reject) => {
+        const began = performance.now();
+        let frames = 0;
+        upswing.learn.start();
+        const frame = () => {
+          ++frames;
+          const session = upswing.learn.chosen;
+          const seconds = (performance.now() - began) / 1000;
+          if (session.state === 'finished' || session.state === 'failed') {
+            resolve({ seconds, frames: frames / seconds, ...session.last });
+          } else if (1000 * seconds > patience) {
+            reject(new Error('not solved'));
+          } else {
+            requestAnimationFrame(frame);
+          }
+        };
+        requestAnimationFrame(frame);
+      }),
+    { patience: PATIENCE },
+  );
+}
+
+const server = await serve();
+await visit({ viewport: { width: 1300, height: 860 } }, async (page) => {
+  await page.goto(`${server.address}#learn`);
+  await ready(page);
+  const devtools = await page.context().newCDPSession(page);
+  await devtools.send('Performance.enable');
+  /// What the page holds, once what nobody holds is gone.
+  const held = async () => {
+    await devtools.send('HeapProfiler.collectGarbage');
+    const { metrics } = await devtools.send('Performance.getMetrics');
+    const all = Object.fromEntries(metrics.map(({ name, value }) => [name, value]));
+    const core = await page.evaluate(() => upswing.coreBytes);
+    return {
+      heap: all.JSHeapUsedSize,
+      listeners: all.JSEventListeners,
+      nodes: all.Nodes,
+      core,
+      workers: page.workers().length,
+    };
+  };
+
+  console.log('seed   page: s    steps  updates/s  frames/s   program, one thread: s');
+  const rows = [];
+  let before = null;
+  for (const seed of SEEDS) {
+    const here = await learn(page, seed);
+    const there = program(seed);
+    rows.push({ here, there });
+    before ??= await held(); // after the first, which brings what is kept
+    console.log(
+      [
+        String(seed).padStart(4),
+        here.seconds.toFixed(1).padStart(9),
+        String(here.steps).padStart(8),
+        (here.updates / here.seconds).toFixed(0).padStart(10),
+        here.frames.toFixed(1).padStart(9),
+        there.seconds.toFixed(2).padStart(24),
+        here.solved ? '' : '  not solved',
+      ].join(' '),
+    );
+  }
+  const of = (get) => median(rows.map(get));
+  console.log(
+    `median ${of(({ here }) => here.seconds).toFixed(1)} s in the page,`,
+    `${of(({ there }) => there.seconds).toFixed(2)} s of the program;`,
+    `frames ${of(({ here }) => here.frames).toFixed(1)} a second`,
+  );
+  console.log('after the first training', JSON.stringify(before));
+  console.log(`after ${SEEDS.length} trainings   `, JSON.stringify(await held()));
+});
+await server.close();
