@@ -34,7 +34,7 @@ void SumTree::Find(std::span<const double> masses, std::span<int64_t> indices) c
         // To the right, unless rounding alone leads there. Without a branch, as it could not be
         // predicted.
         const double left = nodes_[node[k]];
-        const bool right = (mass[k] >= left) & (nodes_[node[k] + 1] > 0);
+        const bool right = (int{mass[k] >= left} & int{nodes_[node[k] + 1] > 0}) != 0;
         mass[k] -= right ? left : 0;
         node[k] += right ? 1 : 0;
       }
