@@ -3,7 +3,7 @@ import { tensorNames, withMetadata, withNumber } from '../tests/file';
 import { runProgram } from '../tests/program';
 import { decisionText } from './page/dashboard';
 import { Policy } from './policy';
-import { BadInput } from './safetensors';
+import { BadInput } from './bad_input';
 
 /// Actor policies, against what the C++ program makes of the same files and observations.
 

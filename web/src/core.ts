@@ -1,4 +1,4 @@
-import { BadInput } from './safetensors';
+import { BadInput } from './bad_input';
 
 /// Our own core in C++ (web/wasm/api.cc), compiled to WebAssembly: what the page computes of policies,
 /// formulas and learning. Only this file knows its memory.

@@ -4,7 +4,7 @@ import type { Parts } from '../tests/file';
 import { readPolicy } from '../tests/program';
 import { NOMINAL } from './pendulum';
 import { Policy } from './policy';
-import { BadInput } from './safetensors';
+import { BadInput } from './bad_input';
 
 /// What comes from a stranger is refused with a reason, whatever it is.
 

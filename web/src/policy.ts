@@ -3,7 +3,7 @@ import type { Controller, Decision } from './decision';
 import { DISTURBANCE_LIMITS } from './disturbance';
 import { CONTROL_PERIOD, PLANT_LIMITS } from './pendulum';
 import type { Parameter, Plant, Range } from './pendulum';
-import { BadInput } from './safetensors';
+import { BadInput } from './bad_input';
 import { printable } from './text';
 
 const LONGEST_REASON = 200; // characters; a file's own text may be part of it

@@ -42,7 +42,13 @@ for (const [name, media] of [
       if (step > 1) await page.locator('#tour-next').click();
       expect(await violations(page), `step ${step}`).toEqual([]);
     }
-    await page.locator('#tour-end').click();
+    await page.goto('./#learn');
+    await page.getByLabel('four seeds at once').check();
+    await page.getByRole('button', { name: 'Learn', exact: true }).click();
+    await expect(page.locator('#learn-updates')).not.toHaveText('0');
+    await page.locator('#learn-start').click();
+    expect(await violations(page), 'learn').toEqual([]);
+    await page.getByRole('link', { name: 'Everything', exact: true }).click();
     await page.evaluate(async () => {
       for (const details of document.querySelectorAll('details')) details.open = true;
       // Formulas that are too wide can then be focused, a frame later.

@@ -65,7 +65,7 @@ test('an agent learns from nothing, takes the stage, stays, and is what Node and
   // Along the curve: from flailing to balance, the untrained one beside it.
   expect(await swingsUp(page)).toBe(true);
   const scrub = page.locator('#learn-scrub');
-  await page.getByLabel('beside it, the untrained one').check();
+  await page.getByLabel('show the untrained one too').check();
   await expect(page.locator('#twin-name')).toHaveText('untrained');
   await scrub.fill('0');
   await expect(page.locator('#learn-where')).toHaveText('on the stage: after 0 steps');
@@ -103,6 +103,20 @@ test('pause, go on, another seed, start over', async ({ page }) => {
   await page.getByRole('button', { name: 'Start over' }).click();
   await expect.poll(steps).toBeLessThan(before);
   await page.locator('#learn-start').click();
+});
+
+test('the last step of the tour: one learns, and ends when one goes on', async ({ page }) => {
+  await page.goto('./#tour=9');
+  await expect(page.locator('fieldset:disabled')).toHaveCount(0);
+  const step = page.locator('#step-learn');
+  await step.getByRole('button', { name: 'Learn' }).click();
+  await expect(step.locator('.answer')).toContainText(/After [\d,]+ steps in \d+ trials/);
+  expect(page.workers().length).toBe(1);
+  const learned = () => page.evaluate(() => upswing.world.policy!.metadata.get('agent'));
+  await expect.poll(learned).toBe('fast');
+  await page.locator('#tour-back').click();
+  await expect.poll(() => page.workers().length).toBe(0);
+  await expect.poll(learned).toBe('d3qn');
 });
 
 test('four seeds at once, each of which can be watched', async ({ page }) => {

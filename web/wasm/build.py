@@ -81,7 +81,8 @@ def named_agents():
 def versions():
     """Name and version of what is compiled with our sources."""
     def of(header, *names):
-        text = (Path("/usr/include") / header).read_text(encoding="utf-8")
+        path = Path("/usr/include") / header
+        text = path.read_text(encoding="utf-8") if path.exists() else ""
         found = [re.search(rf"#\s*define {name}\s+(\d+)", text) for name in names]
         return ".".join(match[1] for match in found if match)
     json = [f"NLOHMANN_JSON_VERSION_{part}" for part in ("MAJOR", "MINOR", "PATCH")]

@@ -7,7 +7,7 @@ import { coreModule } from '../../tests/core';
 import { runProgram } from '../../tests/program';
 import { Core, core } from '../core';
 import { Policy } from '../policy';
-import { BadInput } from '../safetensors';
+import { BadInput } from '../bad_input';
 import { agentSettings, Learner } from './learner';
 
 const newCore = async () => Core.start(await coreModule());

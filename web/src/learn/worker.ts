@@ -1,5 +1,5 @@
 import { Core } from '../core';
-import { BadInput } from '../safetensors';
+import { BadInput } from '../bad_input';
 import { Learner } from './learner';
 import type { LearnSettings, Report } from './learner';
 

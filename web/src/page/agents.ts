@@ -1,7 +1,7 @@
 import { NOMINAL } from '../pendulum';
 import type { Parameter } from '../pendulum';
 import { Policy } from '../policy';
-import { BadInput, MAX_FILE_BYTES } from '../safetensors';
+import { BadInput, MAX_FILE_BYTES } from '../bad_input';
 import { isCommand, printable, quoted } from '../text';
 import type { Curve } from '../view/charts';
 import { fetchBytes } from './fetch';

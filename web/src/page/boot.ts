@@ -2,7 +2,7 @@ import loadMujoco from '@mujoco/mujoco';
 import wasmUrl from '@mujoco/mujoco/mujoco.wasm?url';
 import coreUrl from '../../wasm/core.wasm?url';
 import { startCore } from '../core';
-import { BadInput } from '../safetensors';
+import { BadInput } from '../bad_input';
 import { Simulator } from '../simulator';
 import { fetchBytes } from './fetch';
 

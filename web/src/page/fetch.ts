@@ -1,4 +1,4 @@
-import { BadInput } from '../safetensors';
+import { BadInput } from '../bad_input';
 
 const PATIENCE = 30; // s without a byte, after which a server counts as silent
 

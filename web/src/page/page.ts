@@ -2,7 +2,7 @@ import { core } from '../core';
 import { History } from '../history';
 import { LearnPanel } from '../learn/panel';
 import type { State } from '../pendulum';
-import { BadInput } from '../safetensors';
+import { BadInput } from '../bad_input';
 import { quoted } from '../text';
 import { LearningCurve } from '../view/charts';
 import { Scene, TRAIL_SECONDS } from '../view/scene';

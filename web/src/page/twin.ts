@@ -1,5 +1,5 @@
 import { History } from '../history';
-import { BadInput } from '../safetensors';
+import { BadInput } from '../bad_input';
 import type { Policy } from '../policy';
 import { quoted } from '../text';
 import { Scene, TRAIL_SECONDS } from '../view/scene';
