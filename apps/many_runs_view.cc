@@ -41,10 +41,10 @@ void ManyRunsView::Begin(const std::vector<SeedRun>& runs) {
 void ManyRunsView::Announce() const {
   const size_t variants = plan_.variants.size();
   Say("Training {} in {}\n", Printable(many_.what), Printable(plan_.folder.string()));
-  Say("  {}seed{} {}: {} run{}, {} at a time\n",
-      variants == 1 ? "" : fmt::format("{} variants, ", variants),
+  Say("  {}seed{} {}: {} run{}{}\n", variants == 1 ? "" : fmt::format("{} variants, ", variants),
       plan_.seeds.size() == 1 ? "" : "s", SeedsText(plan_.seeds), runs_->size(),
-      runs_->size() == 1 ? "" : "s", many_.jobs);
+      runs_->size() == 1 ? "" : "s",
+      many_.jobs == 0 ? "" : fmt::format(", {} at a time", many_.jobs));
   for (const Variant& variant : plan_.variants) {
     for (const std::string& warning : Warnings(variant.config)) {
       Say("  Warning: {}{}{}\n", Printable(variant.name), variant.name.empty() ? "" : ": ",
@@ -160,15 +160,22 @@ void ManyRunsView::PrintTable(const Variant& variant) const {
   if (failed > 0) Say("  {} run{} failed\n", failed, failed == 1 ? "" : "s");
 }
 
+size_t ManyRunsView::Left() const {
+  return static_cast<size_t>(std::ranges::count_if(
+      *runs_, [](const SeedRun& run) { return !run.finished() && run.problem.empty(); }));
+}
+
+void ManyRunsView::SayStopped(size_t done) const {
+  Say("Stopped, {} of {} runs done; the same command resumes them.\n", done, runs_->size());
+}
+
 void ManyRunsView::Finish() {
   const bool stopped = StopSignal() != 0;
   line_.Clear();
   for (const Variant& variant : plan_.variants) PrintTable(variant);
   const size_t done = Measure().done;
   Say("\nSuccess and return are those of each run's best policy at evaluation.\n");
-  if (stopped) {
-    Say("Stopped, {} of {} runs done; the same command resumes them.\n", done, runs_->size());
-  }
+  if (stopped) SayStopped(done);
   const bool can_be_typed = Printable(plan_.folder.string()) == plan_.folder.string();
   if (can_be_typed && (done < runs_->size() || !many_.compared)) {
     Say("Next:\n  ./upswing compare {}{}\n", ShellQuoted(plan_.folder.string()),

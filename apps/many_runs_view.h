@@ -27,6 +27,13 @@ class ManyRunsView : public ManyRunsObserver {
   TrainRequest Poll() override { return PollSignals(); }
   int stop_signal() const override { return StopSignal(); }
 
+ protected:
+  /// Says how it goes on after a signal to stop.
+  virtual void SayStopped(size_t done) const;
+  /// Runs that are neither done nor failed.
+  size_t Left() const;
+  void ClearLine() { line_.Clear(); }
+
  private:
   /// How far all runs are together.
   struct Progress {

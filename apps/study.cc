@@ -6,6 +6,7 @@
 #include "apps/compare_report.h"
 #include "apps/many_runs_view.h"
 #include "apps/say.h"
+#include "apps/slurm_view.h"
 #include "apps/study_work.h"
 #include "core/error.h"
 #include "core/text.h"
@@ -29,6 +30,8 @@ struct StudyArguments {
   std::string file, out, seeds, keep, work;
   int64_t jobs = 0;  // 0: as many as there are processors
   bool status = false, prepare = false;
+  SlurmRequest slurm;
+  bool on_slurm = false, print = false;
 
   fs::path folder() const {
     return out.empty() ? fs::path("runs") / fs::path(file).stem() : fs::path(out);
@@ -74,6 +77,7 @@ ManyRuns ReadStudy(const StudyArguments& arguments) {
     throw BadInput(Concat(file.string(), ": expected \"seeds = 10\" or the like, or --seeds"));
   }
   many.jobs = arguments.jobs;
+  if (arguments.on_slurm) return many;
   if (many.jobs == 0) many.jobs = DefaultJobs(plan.variants.front().config.train.threads);
   for (const Variant& variant : plan.variants) CheckMemory(variant.config, many.jobs);
   return many;
@@ -92,6 +96,14 @@ int CompareStudy(const StudyPlan& plan) {
   return 0;
 }
 
+/// Prints what --slurm would submit.
+int PrintSlurmScript(const StudyPlan& plan, const SlurmRequest& request) {
+  std::vector<SeedRun> runs = RunsOf(plan);
+  for (SeedRun& run : runs) run.Read();
+  Say("{}", SlurmScriptFor(plan, runs, request));
+  return 0;
+}
+
 int RunStudy(const StudyArguments& arguments) {
   if (!arguments.work.empty()) return WorkOnStudy(arguments.work);
   if (arguments.status) return PrintStudyStatus(arguments.folder());
@@ -102,9 +114,16 @@ int RunStudy(const StudyArguments& arguments) {
         Printable(many.plan.folder.string()), ShellQuoted(Printable(many.plan.folder.string())));
     return 0;
   }
+  if (arguments.print) return PrintSlurmScript(many.plan, arguments.slurm);
   CheckCanDraw();  // before hours of training, not after
-  ManyRunsView view(many);
-  const int exit_code = TrainMany(many, view);
+  std::unique_ptr<ManyRunsView> view;
+  if (arguments.on_slurm) {
+    CheckSlurm();
+    view = std::make_unique<SlurmView>(many, arguments.slurm);
+  } else {
+    view = std::make_unique<ManyRunsView>(many);
+  }
+  const int exit_code = TrainMany(many, *view);
   return exit_code != 0 ? exit_code : CompareStudy(many.plan);
 }
 
@@ -115,11 +134,23 @@ void CheckArguments(const CLI::App& app, const StudyArguments& arguments) {
                        ? "study: expected FILE.toml or --work FOLDER, got neither"
                        : "--work: expected no FILE.toml beside it");
   }
-  for (const std::string flag : {"--out", "--seeds", "--jobs", "--keep", "--status", "--prepare"}) {
+  for (const std::string flag :
+       {"--out", "--seeds", "--jobs", "--keep", "--status", "--prepare", "--slurm"}) {
     if (!arguments.work.empty() && app.count(flag) > 0) {
       throw BadInput(Concat("--work: expected no ", flag, " beside it, as the plan says all"));
     }
   }
+  for (const std::string flag : {"--tasks", "--print"}) {
+    if (!arguments.on_slurm && app.count(flag) > 0) {
+      throw BadInput(Concat(flag, ": expected --slurm beside it"));
+    }
+  }
+  for (const std::string flag : {"--jobs", "--status", "--prepare"}) {
+    if (arguments.on_slurm && app.count(flag) > 0) {
+      throw BadInput(Concat("--slurm: expected no ", flag, " beside it"));
+    }
+  }
+  CheckSlurmOptions(arguments.slurm.options);
 }
 
 }  // namespace
@@ -145,6 +176,17 @@ void AddStudy(CLI::App& program, Command& command) {
   app->add_flag("--prepare", arguments->prepare, "make the folder ready for workers, and end")
       ->disable_flag_override();
   app->add_option(
+         "--slurm", arguments->slurm.options,
+         "have the runs done by a cluster: queue a job array of workers with these options\n"
+         "of sbatch ('' for none), follow it, and compare at the end")
+      ->type_name("OPTIONS");
+  Options slurm;
+  slurm.Add(&arguments->slurm.tasks, "tasks", 0, {1, 100'000}, "", "of the job array: workers")
+      .usual = Concat("one for each run, at most ", kMostSlurmTasks);
+  AddArguments(*app, slurm);
+  app->add_flag("--print", arguments->print, "print the script for sbatch, and end")
+      ->disable_flag_override();
+  app->add_option(
          "--work", arguments->work,
          "be a worker of the study in this folder, on any host that shares it: train what\n"
          "no other worker has, until nothing is left")
@@ -165,11 +207,13 @@ void AddStudy(CLI::App& program, Command& command) {
       "  ./upswing study configs/studies/post.toml --seeds 3 --out runs/short\n"
       "  ./upswing study configs/studies/post.toml --status\n"
       "  ./upswing study --work runs/post          one more worker, here or on another host\n"
+      "  ./upswing study configs/studies/post.toml --slurm '--partition=short --time=2:00:00'\n"
       "\nEach run lies in FOLDER/VARIANT/seedN, what it prints in FOLDER/VARIANT/seedN.log. The\n"
       "same command resumes what was stopped or killed; finished runs are left as they are.\n"
       "Exit code 0: done; 1: a run failed; 2: bad usage or input; 130, 143: stopped; of a worker\n"
       "75: stopped by a signal, its run can be resumed by any other.\n");
   app->callback([app, arguments, &command] {
+    arguments->on_slurm = app->count("--slurm") > 0;
     CheckArguments(*app, *arguments);
     command = [arguments] { return RunStudy(*arguments); };
   });

@@ -5,6 +5,7 @@ import json
 import os
 import random
 import re
+import shutil
 import signal
 import subprocess
 import time
@@ -235,6 +236,53 @@ class WorkersTest(ProgramTest):
         self.prepare()
         self.work(code=1)
         self.assertEqual((self.folder / "elsewhere.done").read_text(encoding="utf-8"), "{}")
+
+
+class SlurmTest(ProgramTest):
+    """What needs no Slurm; `cluster_test.py` has one."""
+
+    def test_the_script_is_printed_and_nothing_is_written(self):
+        self.write("little.toml", STUDY)
+        before = snapshot(self.folder)
+        script = self.succeed("study", "little.toml", "--slurm", "--partition=short -t 2:00:00",
+                              "--out", "a b's", "--print")
+        self.assertEqual(snapshot(self.folder), before)
+        lines = script.splitlines()
+        for line in ("#!/bin/sh", "#SBATCH --array=1-8", "#SBATCH --partition=short -t 2:00:00",
+                     "#SBATCH --signal=B:USR2@120"):
+            self.assertIn(line, lines)
+        self.assertIn(f" study --work '{self.folder}/a b'\\''s' &\n", script)
+        checked = subprocess.run(["sh", "-n"], input=script, encoding="utf-8", check=False,
+                                 stderr=subprocess.PIPE)
+        self.assertEqual((checked.returncode, checked.stderr), (0, ""))
+        few = self.succeed("study", "little.toml", "--slurm", "", "--tasks", 3, "--print")
+        self.assertIn("#SBATCH --array=1-3", few.splitlines())
+
+    def test_runs_that_are_done_need_no_task(self):
+        self.write("little.toml", STUDY)
+        self.succeed("study", "little.toml", "--seeds", "1-3")
+        script = self.succeed("study", "little.toml", "--slurm", "", "--print")
+        self.assertIn("#SBATCH --array=1-2", script.splitlines())
+
+    def test_what_makes_no_sense_is_refused(self):
+        self.write("little.toml", STUDY)
+        study = ["study", "little.toml"]
+        self.refuse([*study, "--slurm", "partition=x"], "expected options of sbatch", "partition=x")
+        self.refuse([*study, "--slurm", "-p x\nrm -r /"], "on one line")
+        self.refuse([*study, "--slurm", "", "--out", "a\\b", "--print"], "without \\")
+        self.refuse([*study, "--slurm", "", "--jobs", "2"], "--slurm: expected no --jobs")
+        self.refuse([*study, "--slurm", "", "--status"], "--slurm: expected no --status")
+        self.refuse([*study, "--slurm", "", "--tasks", "0"], "--tasks")
+        self.refuse([*study, "--tasks", "2"], "--tasks: expected --slurm beside it")
+        self.refuse([*study, "--print"], "--print: expected --slurm beside it")
+        self.refuse(["study", "--work", "x", "--slurm", ""], "--work: expected no --slurm")
+
+    def test_without_slurm_it_does_not_begin(self):
+        self.write("little.toml", STUDY)
+        (self.folder / "bin").mkdir()
+        (self.folder / "bin/gnuplot").symlink_to(shutil.which("gnuplot"))
+        self.refuse(["study", "little.toml", "--slurm", ""], "sbatch", "none in PATH", code=1,
+                    env=os.environ | {"PATH": str(self.folder / "bin")})
 
 
 if __name__ == "__main__":

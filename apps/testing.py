@@ -180,7 +180,7 @@ class ProgramTest(unittest.TestCase):
         self.folder = Path(temporary.name)
 
     def run_here(self, *arguments, **more):
-        return run(*arguments, cwd=self.folder, **more)
+        return run(*arguments, **{"cwd": self.folder} | more)
 
     def succeed(self, *arguments, **more):
         """Runs the program, which has to succeed with an empty stderr; returns stdout."""

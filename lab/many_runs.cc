@@ -122,7 +122,8 @@ class LocalWorkers {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
     Look();
-    for (const SeedRun* run : running_) {  // they were stopped
+    if (many_.jobs == 0) running_.clear();  // others' go on
+    for (const SeedRun* run : running_) {   // they were stopped
       auto* stopped = *std::ranges::find(open_, run);
       stopped->Read();
       observer_.End(*stopped);

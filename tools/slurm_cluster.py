@@ -179,13 +179,19 @@ class Cluster:
         return dict(field.split("=", 1) for field in told.split() if "=" in field)
 
     def hurry(self, number):
-        """Waits until a job that is queued again runs; Slurm would let it wait for two minutes."""
-        def runs():
-            # Refused as long as its last end is being worked on.
+        """Lets a job begin that is queued again; Slurm would let it wait for two minutes."""
+        def may_begin():
+            # Refused or forgotten as long as its last end is being worked on.
             subprocess.run(["scontrol", "update", f"JobId={number}", "StartTime=now"], check=False,
                            stderr=subprocess.DEVNULL)
-            return self.job(number)["JobState"] == "RUNNING"
-        self.wait(runs)
+            job = self.job(number)
+            return job["JobState"] != "PENDING" or job["Reason"] in ("Resources", "Priority")
+        self.wait(may_begin)
+
+    def cancel_all(self):
+        """Ends all jobs, and waits until they have."""
+        self.ask("scancel", "--user=root")
+        self.wait(lambda: self.ask("squeue", "--noheader") == "")
 
     def wait_for_nodes(self):
         """Until both nodes answer."""

@@ -29,7 +29,7 @@ class SlurmClusterTest(unittest.TestCase):
     def setUp(self):
         self.folder = Path(tempfile.mkdtemp(prefix="upswing-"))
         self.addCleanup(shutil.rmtree, self.folder)
-        self.addCleanup(self.cluster.ask, "scancel", "--user=root")
+        self.addCleanup(self.cluster.cancel_all)
 
     def submit(self, *options, seconds=600):
         """Queues a job that makes notes; returns its number."""
