@@ -40,6 +40,8 @@ const NOMINAL_AGENT = 'd3qn';
 const RANDOMIZED_AGENT = 'd3qn-randomized';
 const LIGHT = 0.75; // kg
 const HELD = 2; // s upright that count as balanced
+const FAILED = 10; // s without, that count as failed
+const GOAL: Label = { at: 'goal', text: 'both links in here' };
 
 const still = () => matchMedia('(prefers-reduced-motion: reduce)').matches;
 const heldFor = (world: World) => world.uprightFor ?? 0;
@@ -53,10 +55,7 @@ function watch(stage: Stage): Step {
   return {
     id: 'watch',
     agents: [NOMINAL_AGENT],
-    labels: () => [
-      { at: 'motor', text: 'the motor' },
-      { at: 'goal', text: 'both links in here' },
-    ],
+    labels: () => [GOAL, { at: 'motor', text: 'the motor' }],
     async begin() {
       again.textContent = still() ? 'Swing up' : 'Swing up again';
       await stage.take({ agent: NOMINAL_AGENT, on: !still() });
@@ -74,7 +73,7 @@ function motor(stage: Stage): Step {
   return {
     id: 'motor',
     agents: [],
-    labels: ({ torque }) => (torque === 0 ? [] : [{ at: 'motor', text: 'your torque' }]),
+    labels: ({ torque }) => (torque === 0 ? [GOAL] : [GOAL, { at: 'motor', text: 'your torque' }]),
     async begin() {
       best = 0;
       byHand = false;
@@ -169,7 +168,7 @@ function mass(stage: Stage): Step {
       const seconds = world.time - changed;
       if (changed === 0) return '';
       if (heldFor(world) > HELD) return `It still holds ${slider.value} kg.`;
-      if (seconds < 12) return 'It starts over …';
+      if (seconds < FAILED) return 'It starts over …';
       return `It cannot hold ${slider.value} kg: it never met such a link while it learned.`;
     },
   };
@@ -212,7 +211,7 @@ function values(stage: Stage): Step {
     id: 'values',
     agents: [NOMINAL_AGENT],
     async begin() {
-      await stage.take({ agent: NOMINAL_AGENT, on: !still() });
+      await stage.take({ agent: NOMINAL_AGENT, on: true });
       stage.reset();
       speed.value = '1';
       show();
@@ -239,7 +238,7 @@ function map(stage: Stage): Step {
       shown = true;
       clicked = false;
       stage.resetMap();
-      await stage.take({ agent: NOMINAL_AGENT, on: !still() });
+      await stage.take({ agent: NOMINAL_AGENT, on: true });
     },
     end() {
       shown = false;
