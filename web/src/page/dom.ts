@@ -8,3 +8,8 @@ export function button(id: string, onClick: () => void): HTMLButtonElement {
   found.addEventListener('click', onClick);
   return found;
 }
+
+/// Writes what has changed: the browser lays out anew whatever is written to.
+export function write(place: Element, text: string): void {
+  if (place.textContent !== text) place.textContent = text;
+}

@@ -9,7 +9,7 @@ import type { World } from '../world';
 import { element } from './dom';
 
 const CELLS = 36; // of a side
-const MILLISECONDS = 3; // of a frame
+const MILLISECONDS = 2; // of a frame
 const FRAMES = 3; // it is drawn at each third, and computed at the others
 const WAY = 4; // s of the trajectory that are drawn
 

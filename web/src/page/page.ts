@@ -11,7 +11,7 @@ import { Address } from './address';
 import type { Agent, Agents } from './agents';
 import { Clock } from './clock';
 import { Dashboard, situation } from './dashboard';
-import { button, element } from './dom';
+import { button, element, write } from './dom';
 import { Hand } from './hand';
 import { listenToKeys } from './keys';
 import { placeCharts, showStage } from './layout';
@@ -384,7 +384,7 @@ export class Page {
     this.map.draw(world, this.history);
     const { state, text } = situation(world);
     const badge = element('badge');
-    badge.textContent = this.paused ? `paused, ${text}` : text;
+    write(badge, this.paused ? `paused, ${text}` : text);
     badge.dataset.state = state;
     if (state === this.announced) return;
     if (state === 'balanced' && !this.still.matches) this.scene.sparks.light();

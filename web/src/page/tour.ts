@@ -1,5 +1,5 @@
 import type { World } from '../world';
-import { button, element } from './dom';
+import { button, element, write } from './dom';
 import { makeSteps } from './steps';
 import type { Stage, Step } from './steps';
 import type { Scene } from '../view/scene';
@@ -69,7 +69,7 @@ export class Tour {
 
   private say(text: string): void {
     const answer = this.now && section(this.now).querySelector('.answer');
-    if (answer && answer.textContent !== text) answer.textContent = text;
+    if (answer) write(answer, text);
   }
 }
 

@@ -7,7 +7,7 @@ import { World } from '../world';
 import type { Agents } from './agents';
 import type { Clock } from './clock';
 import { situation } from './dashboard';
-import { element } from './dom';
+import { element, write } from './dom';
 import { warn } from './message';
 
 /// A second pendulum beside the first, with an agent of its own, to which happens what happens to that.
@@ -89,7 +89,7 @@ export class Twin {
     scene.draw(world, state, still ? [] : history.from(world.time - TRAIL_SECONDS));
     const { state: what, text } = situation(world);
     const badge = element('twin-badge');
-    badge.textContent = text;
+    write(badge, text);
     badge.dataset.state = what;
     scene.canvas.element.ariaLabel = `The other pendulum: ${what === 'balanced' ? what : text}`;
   }

@@ -29,6 +29,7 @@ const [LEFT, BOTTOM] = [16, 18]; // pixels, for the names of the axes
 export class MapChart {
   readonly canvas = new Canvas('map');
   private readonly image: HTMLCanvasElement = document.createElement('canvas');
+  private pixels: ImageData | null = null; // of it
   private shown: Float32Array | null = null; // 0 to 1, on its way to the map
 
   /// Another map, which the old one does not turn into.
@@ -62,15 +63,16 @@ export class MapChart {
 
   private paint(size: number, colors: readonly Color[]): void {
     const { image, shown } = this;
-    image.width = image.height = size;
+    if (!this.pixels) image.width = image.height = size;
     const brush = image.getContext('2d')!;
-    const pixels = brush.createImageData(size, size);
+    this.pixels ??= brush.createImageData(size, size);
+    const { data } = this.pixels;
     shown!.forEach((share, i) => {
       const at = 4 * ((size - 1 - Math.floor(i / size)) * size + (i % size));
-      pixels.data.set(between(colors, share), at);
-      pixels.data[at + 3] = 255;
+      [data[at], data[at + 1], data[at + 2]] = between(colors, share);
+      data[at + 3] = 255;
     });
-    brush.putImageData(pixels, 0, 0);
+    brush.putImageData(this.pixels, 0, 0);
   }
 
   /// White with a dark rim, so that it is seen on every colour.
