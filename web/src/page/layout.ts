@@ -1,6 +1,6 @@
 import { element } from './dom';
 
-/// Where there is room for three columns; the same width as in style.css.
+/// Where there is room for three columns; the same width as in style/page.css.
 const wide = matchMedia('(min-width: 75em)');
 
 /// Keeps the Q-values on one screen with the pendulum: the first chart where these stand beside it,
