@@ -57,6 +57,12 @@ void ManyRunsView::Announce() const {
     const size_t done = Measure().done;
     Say("  {} done before, resuming {}\n", done, static_cast<size_t>(begun) - done);
   }
+  const auto reduced = std::ranges::count_if(
+      *runs_, [](const SeedRun& run) { return !run.finished && run.IsReduced(); });
+  if (reduced > 0) {
+    Say("  {} that were done with fewer steps are trained from the beginning: no more was kept\n",
+        reduced);
+  }
   for (const SeedRun& run : *runs_) {
     if (!run.problem.empty()) Say("  {:<20} failed: {}\n", run.name, Printable(run.problem));
   }
@@ -72,8 +78,8 @@ ManyRunsView::Progress ManyRunsView::Measure() const {
                                            : run.result ? run.result->steps
                                                         : 0);
     progress.steps += steps;
-    progress.done += run.finished() ? 1 : 0;
-    if (run.finished() || !run.problem.empty()) continue;
+    progress.done += run.finished ? 1 : 0;
+    if (run.finished || !run.problem.empty()) continue;
     progress.left += std::max(0.0, static_cast<double>(run.variant->config.train.steps) - steps);
   }
   const double all = progress.steps + progress.left;
@@ -114,9 +120,9 @@ void ManyRunsView::End(const SeedRun& run) {
   const Progress progress = Measure();
   line_.Print(fmt::format("  {:<20} {:>11} steps  {:>12}  {:<22}  {} of {} runs done{}", run.name,
                           FormatCount(s.steps), FormatDuration(s.seconds),
-                          s.solved         ? "solved at " + FormatCount(s.solved_step)
-                          : run.finished() ? "done, not solved"
-                                           : "stopped",
+                          s.solved       ? "solved at " + FormatCount(s.solved_step)
+                          : run.finished ? "done, not solved"
+                                         : "stopped",
                           progress.done, runs_->size(),
                           progress.left > 0 ? ", " + progress.time_left : ""));
 }
@@ -145,7 +151,7 @@ void ManyRunsView::PrintTable(const Variant& variant) const {
     PrintRow(fmt::format("seed {}", run.seed), steps.back(), seconds.back(), success.back(),
              reward.back(),
              !run.problem.empty() ? "failed"
-             : run.finished()     ? ""
+             : run.finished       ? ""
                                   : fmt::format("at step {}", FormatCount(s.steps)));
   }
   if (steps.size() > kMostRows) Say("  and {} more\n", steps.size() - kMostRows);
@@ -162,7 +168,7 @@ void ManyRunsView::PrintTable(const Variant& variant) const {
 
 size_t ManyRunsView::Left() const {
   return static_cast<size_t>(std::ranges::count_if(
-      *runs_, [](const SeedRun& run) { return !run.finished() && run.problem.empty(); }));
+      *runs_, [](const SeedRun& run) { return !run.finished && run.problem.empty(); }));
 }
 
 void ManyRunsView::SayStopped(size_t done) const {

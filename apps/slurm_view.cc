@@ -22,7 +22,7 @@ std::string SlurmScriptFor(const StudyPlan& plan, const std::vector<SeedRun>& ru
   int64_t tasks = request.tasks;
   if (tasks == 0) {
     const int64_t left =
-        std::ranges::count_if(runs, [](const SeedRun& run) { return !run.finished(); });
+        std::ranges::count_if(runs, [](const SeedRun& run) { return !run.finished; });
     tasks = std::clamp<int64_t>(left, 1, kMostSlurmTasks);
   }
   return SlurmScript(plan, request.options, tasks);

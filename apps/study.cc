@@ -64,12 +64,15 @@ ManyRuns ReadStudy(const StudyArguments& arguments) {
 
   ManyRuns many;
   many.what = study.title.empty() ? file.stem().string() : Concat("\"", study.title, "\"");
-  many.mark = {kStudyName, text};
+  many.mark_file = kStudyName;
+  many.mark_text = text;
   many.more_steps = many.compared = true;
   StudyPlan& plan = many.plan;
   plan.folder = arguments.folder();
   plan.variants = std::move(study.variants);
-  plan.keep = arguments.keep.empty() ? study.keep : ParseKeep(arguments.keep, "--keep");
+  plan.keep = !arguments.keep.empty() ? ParseKeep(arguments.keep, "--keep")
+              : study.keep            ? *study.keep
+                                      : KeepOf(plan.folder);
   CheckSameStudy(plan, study.title);
   plan.seeds =
       arguments.seeds.empty() ? std::move(study.seeds) : ParseSeeds(arguments.seeds, "--seeds");
@@ -92,6 +95,7 @@ int CompareStudy(const StudyPlan& plan) {
   const Comparison comparison = Compare(request);
   WriteComparison(comparison, plan.folder);
   WriteEvaluations(plan);
+  Say("Every evaluation of every run: evaluations.csv\n");
   PrintComparison(comparison, plan.folder);
   return 0;
 }
@@ -106,7 +110,10 @@ int PrintSlurmScript(const StudyPlan& plan, const SlurmRequest& request) {
 
 int RunStudy(const StudyArguments& arguments) {
   if (!arguments.work.empty()) return WorkOnStudy(arguments.work);
-  if (arguments.status) return PrintStudyStatus(arguments.folder());
+  if (arguments.status) {
+    const bool is_folder = fs::is_directory(arguments.file);
+    return PrintStudyStatus(is_folder ? fs::path(arguments.file) : arguments.folder());
+  }
   const ManyRuns many = ReadStudy(arguments);
   if (arguments.prepare) {
     Prepare(many);
@@ -137,7 +144,12 @@ void CheckArguments(const CLI::App& app, const StudyArguments& arguments) {
   for (const std::string flag :
        {"--out", "--seeds", "--jobs", "--keep", "--status", "--prepare", "--slurm"}) {
     if (!arguments.work.empty() && app.count(flag) > 0) {
-      throw BadInput(Concat("--work: expected no ", flag, " beside it, as the plan says all"));
+      throw BadInput(Concat("--work: expected no ", flag, " beside it"));
+    }
+  }
+  for (const std::string flag : {"--seeds", "--jobs", "--keep", "--prepare"}) {
+    if (arguments.status && app.count(flag) > 0) {
+      throw BadInput(Concat("--status: expected no ", flag, " beside it"));
     }
   }
   for (const std::string flag : {"--tasks", "--print"}) {
@@ -171,7 +183,8 @@ void AddStudy(CLI::App& program, Command& command) {
                   "rows in the study's tables alone) [all, or what FILE says]")
       ->type_name("WHAT")
       ->check(NotEmpty("all, policy or tables"));
-  app->add_flag("--status", arguments->status, "print what is done, running and lost, and end")
+  app->add_flag("--status", arguments->status,
+                "print what is done, running and lost, and end; FILE may be the study's folder")
       ->disable_flag_override();
   app->add_flag("--prepare", arguments->prepare, "make the folder ready for workers, and end")
       ->disable_flag_override();

@@ -42,15 +42,30 @@ class PrintedTo {
   Descriptor output_, error_;
 };
 
+/// Stops a run that another worker has taken.
+class ClaimedView : public TrainView {
+ public:
+  ClaimedView(const Training& training, const std::function<bool()>& ours)
+      : TrainView(training), ours_(ours) {}
+
+  TrainRequest AfterStep(const TrainState& s) override {
+    if (!ours_()) throw Failure("another worker may have it, as this one was halted");
+    return TrainView::AfterStep(s);
+  }
+
+ private:
+  const std::function<bool()>& ours_;
+};
+
 /// Each run in its log, as `train` would print it.
 class LoggedRuns : public WorkerHost {
  public:
-  bool Train(const SeedRun& run,
-             const std::function<std::unique_ptr<TrainingRun>()>& make) override {
+  bool Train(const SeedRun& run, const std::function<std::unique_ptr<TrainingRun>()>& make,
+             const std::function<bool()>& ours) override {
     const PrintedTo log(run.log());
     try {
       const std::unique_ptr<TrainingRun> training = make();
-      TrainView view(training->training());
+      ClaimedView view(training->training(), ours);
       view.Announce(training->path());
       const bool finished = training->Train(view);
       view.Summarize(training->path(), finished);
@@ -72,6 +87,9 @@ int WorkOnStudy(const std::filesystem::path& folder) {
   const StudyPlan plan = ReadPlan(folder);
   LoggedRuns host;
   const WorkerOutcome outcome = WorkOn(plan, host);
+  Say("{}: {} done here, {} failed{}{}\n", Printable(folder.string()), outcome.done, outcome.failed,
+      outcome.anothers > 0 ? fmt::format(", {} with other workers", outcome.anothers) : "",
+      outcome.stopped ? ", stopped" : "");
   if (outcome.stopped) return kTryAgain;
   return outcome.failed > 0 ? 1 : 0;
 }
@@ -91,7 +109,7 @@ int PrintStudyStatus(const std::filesystem::path& folder) {
       run.problem = error.what();
     }
     const auto lease = ReadLease(run.claim());
-    if (run.finished()) {
+    if (run.finished) {
       ++c.done;
       c.solved += run.result->solved ? 1 : 0;
     } else if (lease) {

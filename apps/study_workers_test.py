@@ -165,6 +165,67 @@ class WorkersTest(ProgramTest):
         self.work()
         self.assertEqual(len(list(study.rglob("*.done"))), 8)
 
+    def test_a_run_at_its_end_that_does_not_say_so_is_finished_by_the_study(self):
+        study = self.prepare(STUDY, "study", "--keep", "tables")
+        self.work()
+        self.prepare(STUDY, "all", "--keep", "all")
+        self.work("all")
+        shutil.copytree(self.folder / "all/one/seed1", study / "one/seed1")
+        (study / "one/seed1.done").unlink()  # as if its worker was killed in between
+        self.succeed("study", "little.toml", "--out", "study")  # it still keeps the tables alone
+        self.assertTrue((study / "one/seed1.done").exists())
+        self.assertFalse((study / "one/seed1").exists())
+        self.assert_same_study("study", "all")
+
+    def test_a_worker_that_dies_is_replaced_and_what_kills_twice_fails(self):
+        self.write("little.toml", ENDLESS)
+        process = self.start("study", "little.toml", "--out", "study", "--seeds", "1-1", "--jobs", 1)
+        log = self.folder / "study/one/seed1/log.txt"
+
+        def kill_worker(number):
+            self.wait_for(lambda: log.exists() and len(re.findall("at step", log.read_text("utf-8")))
+                          == number)
+            children = f"/proc/{process.pid}/task/{process.pid}/children"
+            with open(children, encoding="ascii") as file:
+                os.kill(int(file.read().split()[0]), signal.SIGKILL)
+        kill_worker(1)
+        kill_worker(2)
+        failed = self.folder / "study/one/seed1.failed"
+        self.wait_for(failed.exists)
+        self.assertEqual(failed.read_text(encoding="utf-8"), "ended by signal 9\n")
+        self.assertEqual(self.end(process, signal.SIGINT)[0], 130)
+
+    def test_a_worker_that_was_halted_does_not_write_beside_another(self):
+        study = self.prepare(ENDLESS)
+        worker = self.start_worker()
+        log = study / "one/seed1/log.txt"
+        self.wait_for(log.exists)
+        claim = study / "one/seed1.claim"
+        # Another worker of this host leaves it alone, however old its claim is.
+        os.utime(claim, (time.time() - 1000,) * 2)
+        other = self.start_worker()
+        self.wait_for((study / "two/seed1/log.txt").exists)
+        self.assertIsNone(worker.poll())
+        for process in (worker, other):
+            process.terminate()
+            self.assertEqual(process.wait(60), 75)
+        self.assertFalse(list(study.rglob("*.failed")))
+
+    def test_odd_things_in_place_of_files(self):
+        study = self.prepare()
+        (study / "one/seed1.claim").mkdir()
+        (study / "one/seed2.failed").mkdir()
+        self.write("study/one/seed2.failed/precious", "mine")
+        status = self.succeed("study", "study", "--status")
+        self.assertRegex(status, r"one/seed1 .*expected a regular file")
+        self.work(code=1)
+        self.assertEqual(len(list(study.rglob("*.done"))), 6)
+        again = ["study", "little.toml", "--out", "study"]
+        self.assertIn("seed1.claim: expected a regular file", self.run_here(*again).stderr)
+        (study / "one/seed1.claim").rmdir()
+        self.assertIn("seed2.failed", self.run_here(*again).stderr)
+        self.refuse(["study", "study", "--status", "--keep", "all"], "--status: expected no --keep")
+
     # ---- What is kept.
 
     def test_reduced_studies_say_the_same(self):

@@ -170,9 +170,8 @@ FolderLock::FolderLock(const fs::path& folder)
     : descriptor_(open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
   if (descriptor_.get() < 0) throw PathError("cannot read", folder, errno);
   if (flock(descriptor_.get(), LOCK_EX | LOCK_NB) == 0) return;
-  throw errno == EWOULDBLOCK
-      ? BadInput(Concat(folder.string(), ": another process is at work here"))
-      : PathError("cannot lock", folder, errno);
+  if (errno != EWOULDBLOCK) throw PathError("cannot lock", folder, errno);
+  throw FolderBusy(Concat(folder.string(), ": another process is at work here"));
 }
 
 AppendFile::AppendFile(fs::path path)

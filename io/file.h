@@ -61,10 +61,16 @@ void MakeFolder(const std::filesystem::path& folder);
 /// Makes a folder, which may exist if it is empty. Throws as CheckFree and MakeFolder do.
 void MakeNewFolder(const std::filesystem::path& folder);
 
+/// That another process works in a folder.
+class FolderBusy : public Error {
+ public:
+  explicit FolderBusy(const std::string& message) : Error(2, message) {}
+};
+
 /// Keeps other processes from working in a folder during its lifetime.
 class FolderLock {
  public:
-  /// Throws BadInput if another process holds the lock, else as PathError does.
+  /// Throws FolderBusy if another process holds the lock, else as PathError does.
   explicit FolderLock(const std::filesystem::path& folder);
 
  private:

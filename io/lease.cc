@@ -7,8 +7,10 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cerrno>
 #include <condition_variable>
+#include <ctime>
 #include <mutex>
 #include <thread>
 #include <utility>
@@ -80,9 +82,11 @@ struct UniqueFile {
   }
 };
 
-/// The text of a lease: host, process, and who that is.
-std::string TextOf(std::string_view holder) {
-  return Concat(ThisHost(), " ", getpid(), " ", holder, "\n").substr(0, kMostBytes);
+/// The text of a lease: host, process, and who that is. Where the file could not be locked, no
+/// lock says whether that process lives.
+std::string TextOf(std::string_view holder, bool locked) {
+  return Concat(locked ? "" : "unlocked ", ThisHost(), " ", getpid(), " ", holder, "\n")
+      .substr(0, kMostBytes);
 }
 
 std::string ReadText(const Opened& file) {
@@ -93,9 +97,29 @@ std::string ReadText(const Opened& file) {
 
 /// Whether the holder of a lease that was read has given it up.
 bool IsLost(const Opened& file, const std::string& text, double now, std::chrono::seconds lasts) {
-  if (now - SecondsOf(file.info.st_mtim) > static_cast<double>(lasts.count())) return true;
-  // A process of this host that lives has it locked.
-  return text.starts_with(ThisHost() + " ") && flock(file.descriptor.get(), LOCK_EX | LOCK_NB) == 0;
+  // A shared lock, as NFS gives an exclusive one to those alone who may write.
+  if (text.starts_with(ThisHost() + " ")) {
+    return flock(file.descriptor.get(), LOCK_SH | LOCK_NB) == 0;
+  }
+  return now - SecondsOf(file.info.st_mtim) > static_cast<double>(lasts.count());
+}
+
+/// Seconds since the last boot, of which a machine that slept was not awake for all.
+double SecondsSinceBoot() {
+  timespec now{};
+  clock_gettime(CLOCK_BOOTTIME, &now);
+  return SecondsOf(now);
+}
+
+/// The file server's clock, or this machine's where nothing can be written.
+double NowBeside(const fs::path& path) {
+  try {
+    return UniqueFile(path, "look").Now();
+  } catch (const Error&) {
+    timespec now{};
+    clock_gettime(CLOCK_REALTIME, &now);
+    return SecondsOf(now);
+  }
 }
 
 }  // namespace
@@ -116,15 +140,29 @@ struct Lease::State {
   fs::path path;
   Descriptor descriptor;  // locked as long as this process lives
   struct stat info;
+  double lasts;  // s
+  std::atomic<double> renewed_at{SecondsSinceBoot()};
   std::jthread renewing;
 
-  State(fs::path of, Descriptor opened, const struct stat& what)
-      : path(std::move(of)), descriptor(std::move(opened)), info(what) {}
+  State(fs::path of, Descriptor opened, const struct stat& what, std::chrono::seconds seconds)
+      : path(std::move(of)),
+        descriptor(std::move(opened)),
+        info(what),
+        lasts(static_cast<double>(seconds.count())) {}
 
-  bool held() const {
+  /// Whether the name still stands for our file.
+  bool IsOurs() const {
     struct stat now {};
     return lstat(path.c_str(), &now) == 0 && SameFile(now, info);
   }
+  void Renew() {
+    if (held() && IsOurs() && futimens(descriptor.get(), nullptr) == 0) {
+      renewed_at = SecondsSinceBoot();
+    } else if (!IsOurs()) {
+      renewed_at = -lasts;  // it is another's
+    }
+  }
+  bool held() const { return SecondsSinceBoot() - renewed_at < lasts; }
 };
 
 Lease::Lease(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -134,7 +172,7 @@ Lease::~Lease() {
   if (state_ == nullptr) return;
   state_->renewing.request_stop();
   if (state_->renewing.joinable()) state_->renewing.join();
-  if (held()) unlink(state_->path.c_str());
+  if (state_->IsOurs()) unlink(state_->path.c_str());
 }
 
 bool Lease::held() const { return state_->held(); }
@@ -142,11 +180,11 @@ bool Lease::held() const { return state_->held(); }
 std::optional<Lease> Lease::Take(const fs::path& path, std::string_view holder,
                                  std::chrono::seconds lasts) {
   UniqueFile own(path, "claim");
-  const std::string text = TextOf(holder);
+  const bool locked = flock(own.descriptor.get(), LOCK_EX | LOCK_NB) == 0;
+  const std::string text = TextOf(holder, locked);
   if (write(own.descriptor.get(), text.data(), text.size()) != std::ssize(text)) {
     throw PathError("cannot write", own.path, errno);
   }
-  flock(own.descriptor.get(), LOCK_EX | LOCK_NB);
   // Some servers make the link and lose the answer.
   const auto take = [&] {
     return link(own.path.c_str(), path.c_str()) == 0 || own.info().st_nlink == 2;
@@ -171,26 +209,29 @@ std::optional<Lease> Lease::Take(const fs::path& path, std::string_view holder,
   }
   if (!taken) return std::nullopt;
   const struct stat own_info = own.info();
-  auto state = std::make_unique<State>(path, std::move(own.descriptor), own_info);
-  state->renewing = std::jthread([fd = state->descriptor.get(), lasts](std::stop_token stop) {
+  auto state = std::make_unique<State>(path, std::move(own.descriptor), own_info, lasts);
+  state->renewing = std::jthread([state = state.get(), lasts](std::stop_token stop) {
     std::mutex mutex;
     std::condition_variable_any asked;
     std::unique_lock lock(mutex);
     while (!asked.wait_for(lock, stop, lasts / 4, [&] { return stop.stop_requested(); })) {
-      futimens(fd, nullptr);
+      state->Renew();
     }
   });
   return Lease(std::move(state));
 }
 
 std::optional<LeaseInfo> ReadLease(const fs::path& path, std::chrono::seconds lasts) {
-  const std::optional<Opened> file = Open(path);
-  if (!file) return std::nullopt;
-  const std::string text = ReadText(*file);
-  const double now = UniqueFile(path, "look").Now();
-  LeaseInfo info{std::string(Trim(text)), IsLost(*file, text, now, lasts),
-                 now - SecondsOf(file->info.st_mtim)};
-  return info;
+  try {
+    const std::optional<Opened> file = Open(path);
+    if (!file) return std::nullopt;
+    const std::string text = ReadText(*file);
+    const double now = NowBeside(path);
+    return LeaseInfo{std::string(Trim(text)), IsLost(*file, text, now, lasts),
+                     now - SecondsOf(file->info.st_mtim)};
+  } catch (const Error& error) {
+    return LeaseInfo{error.what(), false, 0};
+  }
 }
 
 }  // namespace upswing

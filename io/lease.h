@@ -15,8 +15,8 @@ std::string ThisHost();
 /// A claim on a piece of work in a folder that any number of processes and hosts share: a file that
 /// one of them has at a time. It is made under a name of its own and given its final one by `link`,
 /// which is atomic on NFS too. Its modification time, by the file server's clock, says that the
-/// holder lives: a thread renews it. A lease runs out a while after the last renewal, or at once if
-/// its holder was a process of this host that has ended.
+/// holder lives: a thread renews it. A lease runs out a while after the last renewal; that of a
+/// process of this host, where locks tell, when that process ends and not before.
 class Lease {
  public:
   /// How long one lasts without renewal. Renewed four times as often, as NFS may show a time that
@@ -32,7 +32,8 @@ class Lease {
   Lease(Lease&& other) noexcept;
   Lease& operator=(Lease&&) = delete;
 
-  /// Whether it is still this process's: another one may have taken it while this one was halted.
+  /// Whether it is certainly still this process's. If this one was halted for long, or the file
+  /// server did not answer, another one may have taken it. Takes no time.
   bool held() const;
 
  private:
@@ -43,7 +44,7 @@ class Lease {
 
 /// What is known of a lease without taking it.
 struct LeaseInfo {
-  std::string holder;
+  std::string holder;  // or what is wrong with the file
   bool lost = false;   // it has run out, or its holder has ended
   double seconds = 0;  // since its last renewal
 };

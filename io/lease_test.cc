@@ -99,13 +99,27 @@ TEST(Lease, WhoWasHaltedSeesThatItsLeaseIsAnothersAndLeavesThat) {
   const TempFolder folder;
   const fs::path path = folder.path() / "seed1.claim";
   {
-    const auto lease = Lease::Take(path, "halted");
+    const auto lease = Lease::Take(path, "halted", seconds(1));
     ASSERT_TRUE(lease);
     fs::remove(path);
     WriteForeign(path);
+    const auto deadline = std::chrono::steady_clock::now() + seconds(30);
+    while (lease->held() && std::chrono::steady_clock::now() < deadline) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
     EXPECT_FALSE(lease->held());
   }
   EXPECT_TRUE(fs::exists(path));
+}
+
+TEST(Lease, ThatOfALivingProcessOfThisHostDoesNotRunOut) {
+  const TempFolder folder;
+  const fs::path path = folder.path() / "seed1.claim";
+  const auto lease = Lease::Take(path, "here");
+  ASSERT_TRUE(lease);
+  Age(path, 1000);  // as after a night asleep
+  EXPECT_FALSE(ReadLease(path)->lost);
+  EXPECT_FALSE(Lease::Take(path, "another one"));
 }
 
 TEST(Lease, OneOfManyThatFindItLostGetsIt) {
@@ -143,6 +157,7 @@ TEST(Lease, LinksAndOtherThingsAreNotFollowed) {
   fs::remove(path);
   ASSERT_EQ(mkfifo(path.c_str(), 0600), 0);
   EXPECT_THROW((void)Lease::Take(path, "here"), Error);
+  EXPECT_FALSE(ReadLease(path)->lost);
   EXPECT_THROW((void)Lease::Take(folder.path() / "none/seed1.claim", "here"), Error);
 }
 

@@ -65,6 +65,19 @@ bool IsMakingName(std::string_view name) {
   return end.starts_with(kMark) && std::ranges::all_of(end.substr(kMark.size()), is_digit);
 }
 
+void RemoveFolder(const fs::path& folder) {
+  // Under the name of something that is being made: what a killed process leaves is removed.
+  const fs::path gone =
+      folder.parent_path() / Concat('.', folder.filename().string(), kMark, RandomDigits());
+  if (rename(folder.c_str(), gone.c_str()) != 0) throw PathError("cannot remove", folder, errno);
+  // Another process may be about the same, as with all that is left unfinished.
+  std::error_code error, ignored;
+  for (int tries = 0; tries < kMostTries && fs::exists(gone, ignored); ++tries) {
+    fs::remove_all(gone, error);
+  }
+  if (fs::exists(gone, ignored)) throw PathError("cannot remove", gone, error.value());
+}
+
 Making::Making(const fs::path& path, Kind kind)
     : target_(path),
       folder_(open(path.has_parent_path() ? path.parent_path().c_str() : ".",

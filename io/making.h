@@ -59,6 +59,9 @@ class Making {
   bool published_ = false;
 };
 
+/// Removes a folder with its contents, in one step as others see it. Throws as PathError does.
+void RemoveFolder(const std::filesystem::path& folder);
+
 /// Whether this is the temporary name of a Making.
 bool IsMakingName(std::string_view name);
 

@@ -31,6 +31,14 @@ bool IsRun(const fs::path& folder) {
 /// The file beside a run of a study that says that it is done.
 fs::path DoneOf(const fs::path& run) { return run.string() + ".done"; }
 
+/// The seed of a run of a study, by its name; nothing if it has none.
+std::optional<int64_t> SeedOf(const fs::path& path) {
+  constexpr std::string_view kSeed = "seed";
+  const std::string name = path.filename().string();
+  if (!name.starts_with(kSeed)) return std::nullopt;
+  return ParseInteger(std::string_view(name).substr(kSeed.size()));
+}
+
 /// Whether it is a run, or a study's of which no more than its result was kept.
 bool IsKept(const fs::path& run) {
   std::error_code error;
@@ -50,7 +58,7 @@ void AddRuns(const fs::path& folder, Found& found, std::vector<fs::path>& paths)
     if (IsMakingName(entry.path().filename().string())) continue;  // left by a killed process
     if (entry.path().extension() == ".done") {
       const fs::path run = fs::path(entry.path()).replace_extension();
-      if (!IsRun(run) && IsKept(run)) paths.push_back(run);
+      if (SeedOf(run) && !IsRun(run) && IsKept(run)) paths.push_back(run);
       continue;
     }
     const bool is_folder = fs::is_directory(entry.symlink_status(error));
@@ -153,13 +161,6 @@ class StudyRuns {
     std::string mark;
   };
 
-  static std::optional<int64_t> SeedOf(const fs::path& path) {
-    constexpr std::string_view kSeed = "seed";
-    const std::string name = path.filename().string();
-    if (!name.starts_with(kSeed)) return std::nullopt;
-    return ParseInteger(std::string_view(name).substr(kSeed.size()));
-  }
-
   const OfVariant& Of(const fs::path& folder) {
     const auto found = variants_.find(folder);
     if (found != variants_.end()) return found->second;
@@ -174,9 +175,16 @@ class StudyRuns {
 
 FoundRun ReadRun(const fs::path& path, const fs::path& root, bool unfinished, StudyRuns& studies) {
   FoundRun found;
-  if (auto done = studies.Read(path)) {
+  const bool is_run = IsRun(path);
+  std::optional<FoundRun> done;
+  try {
+    done = studies.Read(path);
+  } catch (const Error&) {
+    if (!is_run) throw;  // its folder says all, too
+  }
+  if (done) {
     found = std::move(*done);
-  } else if (!IsRun(path)) {
+  } else if (!is_run) {
     throw BadInput(Concat(DoneOf(path).string(),
                           ": made with other settings than those beside it, ",
                           (path.parent_path() / kSettingsName).string()));

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <csignal>
 #include <list>
+#include <map>
 #include <thread>
 
 #include "core/error.h"
@@ -25,7 +26,8 @@ constexpr const char* kWorkersLog = "workers.log";
 /// The last line that is not empty.
 std::string LastLine(const fs::path& path) {
   std::string last = "its log is empty";
-  const std::string text = ReadOwnFile(path);
+  std::error_code error;
+  const std::string text = fs::is_regular_file(path, error) ? ReadOwnFile(path) : "";
   for (const std::string_view line : Split(text, '\n')) {
     if (!line.empty()) last = line;
   }
@@ -76,6 +78,16 @@ void CheckRuns(const fs::path& folder, const Config& config, bool more_steps) {
   CheckSame(BuildConfig(settings, {}), config, more_steps, settings.string());
 }
 
+/// Removes what processes that were killed left of their claims' other names.
+void RemoveStrays(const fs::path& folder) {
+  const auto old = fs::file_time_type::clock::now() - 2 * Lease::kUsual;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    std::error_code error;
+    const bool is_stray = entry.path().filename().string().find(".claim.") != std::string::npos;
+    if (is_stray && entry.last_write_time(error) < old && !error) fs::remove(entry.path(), error);
+  }
+}
+
 /// All runs as they stand.
 std::vector<SeedRun> ListRuns(const StudyPlan& plan) {
   std::vector<SeedRun> runs = RunsOf(plan);
@@ -98,7 +110,7 @@ class LocalWorkers {
   LocalWorkers(const ManyRuns& many, std::vector<SeedRun>& runs, ManyRunsObserver& observer)
       : many_(many), observer_(observer), log_(many.plan.folder / kWorkersLog) {
     for (SeedRun& run : runs) {
-      if (!run.finished() && run.problem.empty()) open_.push_back(&run);
+      if (!run.finished && run.problem.empty()) open_.push_back(&run);
     }
   }
 
@@ -122,14 +134,15 @@ class LocalWorkers {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
     Look();
-    if (many_.jobs == 0) running_.clear();  // others' go on
-    for (const SeedRun* run : running_) {   // they were stopped
+    if (many_.jobs == 0) running_.clear();     // others' go on
+    for (const SeedRun* run : running_) {      // they were stopped
+      if (fs::exists(run->claim())) continue;  // it goes on on another host
       auto* stopped = *std::ranges::find(open_, run);
       stopped->Read();
       observer_.End(*stopped);
     }
     std::error_code error;
-    if (fs::is_empty(log_, error)) fs::remove(log_, error);
+    if (deaths_.empty()) fs::remove(log_, error);  // else it may say why
   }
 
  private:
@@ -149,21 +162,22 @@ class LocalWorkers {
     }
   }
 
-  /// The run on which a worker ended has failed.
+  /// What a worker that died was at is left to another one, unless it is what kills them.
   void EndedBadly(pid_t pid, int code) {
+    constexpr int kMostDeaths = 2;
+    const auto how = [code](const fs::path& log) {
+      return code > 128 ? Concat("ended by signal ", code - 128) : LastLine(log);
+    };
     const std::string holder = Concat(ThisHost(), " ", pid, " ");
     for (const SeedRun* run : open_) {
       const auto lease = ReadLease(run->claim());
       if (!lease || !lease->holder.starts_with(holder)) continue;
-      if (const auto own = Lease::Take(run->claim(), "reports its end")) {
-        WriteFailed(*run,
-                    code > 128 ? Concat("ended by signal ", code - 128) : LastLine(run->log()));
-      }
+      if (++deaths_[run] < kMostDeaths) return;
+      if (Lease::Take(run->claim(), "reports its end")) WriteFailed(*run, how(run->log()));
       return;
     }
-    SignalAll(SIGTERM);
-    throw Failure(
-        Concat("a worker ended: ", code > 128 ? Concat("by signal ", code - 128) : LastLine(log_)));
+    if (++deaths_[nullptr] < kMostDeaths) return;  // between two runs
+    throw Failure(Concat("a worker ended: ", how(log_)));
   }
 
   /// Sees which runs have ended, run now, or wait. They are begun in their order, so beyond many
@@ -176,8 +190,8 @@ class LocalWorkers {
     for (auto it = open_.begin(); it != open_.end() && waiting_ < kEnough;) {
       SeedRun& run = **it;
       std::error_code error;
-      if (fs::exists(run.done(), error) || fs::exists(run.failed(), error)) ReadAgain(run);
-      if (run.finished() || !run.problem.empty()) {
+      if (fs::exists(run.done(), error) || run.HasFailed()) ReadAgain(run);
+      if (run.finished || !run.problem.empty()) {
         it = open_.erase(it);
         observer_.End(run);
         continue;
@@ -229,6 +243,7 @@ class LocalWorkers {
   std::vector<const SeedRun*> running_;
   size_t waiting_ = 0;  // that nobody has claimed
   std::list<ChildProcess> workers_;
+  std::map<const SeedRun*, int> deaths_;  // of workers on a run; under null on none
   Clock::time_point look_at_{}, start_at_{};
   bool stopping_ = false;
 };
@@ -238,8 +253,8 @@ class LocalWorkers {
 FolderLock Prepare(const ManyRuns& many, const std::function<void()>& checked) {
   // Nothing is touched before all is checked, nor while another process is at work there.
   const StudyPlan& plan = many.plan;
-  const bool is_study = !many.mark.first.empty();
-  CheckFolder(plan.folder, is_study ? fs::path(many.mark.first) : fs::path(kSettingsName));
+  const bool is_study = !many.mark_file.empty();
+  CheckFolder(plan.folder, is_study ? fs::path(many.mark_file) : fs::path(kSettingsName));
   std::error_code error;
   std::optional<FolderLock> lock;
   if (fs::exists(plan.folder, error)) lock.emplace(plan.folder);
@@ -250,11 +265,12 @@ FolderLock Prepare(const ManyRuns& many, const std::function<void()>& checked) {
   }
   checked();
   WritePlan(plan);
-  if (is_study) WriteIfOther(plan.folder / many.mark.first, many.mark.second);
+  if (is_study) WriteIfOther(plan.folder / many.mark_file, many.mark_text);
   for (const SeedRun& run : RunsOf(plan)) {
-    fs::remove(run.failed(), error);  // it is tried again
-    if (fs::exists(run.claim(), error)) (void)Lease::Take(run.claim(), "tidies up");  // if it is lost
+    fs::remove(run.failed());                                                  // it is tried again
+    if (fs::exists(run.claim())) (void)Lease::Take(run.claim(), "tidies up");  // if it is lost
   }
+  for (const Variant& variant : plan.variants) RemoveStrays(plan.folder / variant.name);
   return lock ? std::move(*lock) : FolderLock(plan.folder);
 }
 

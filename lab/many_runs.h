@@ -15,11 +15,11 @@ namespace upswing {
 /// A plan that is carried out on this machine.
 struct ManyRuns {
   StudyPlan plan;
-  std::string what;                          // such as `d3qn` or a study's title
-  std::pair<std::string, std::string> mark;  // name and text of the file that says what it is
-  int64_t jobs = 1;         // runs at a time; 0: none here, other workers have them
-  bool more_steps = false;  // runs with fewer steps may be resumed
-  bool compared = false;    // a comparison follows when all are done
+  std::string what;                  // such as `d3qn` or a study's title
+  std::string mark_file, mark_text;  // the file by which its folder is known; empty: settings.toml
+  int64_t jobs = 1;                  // runs at a time; 0: none here, other workers have them
+  bool more_steps = false;           // runs with fewer steps may be resumed
+  bool compared = false;             // a comparison follows when all are done
 };
 
 /// Who is told how many runs go on, and asked whether to stop.

@@ -118,7 +118,7 @@ std::string ReadText(const toml::table& study, const std::string& key, const std
 StudyFile ParseStudy(std::string_view text, const std::string& where) {
   const toml::table table = ParseToml(text, where);
   CheckKeys(table, where);
-  StudyFile study{ReadText(table, "title", where), ReadVariants(table, where), {}, Keep::kAll};
+  StudyFile study{ReadText(table, "title", where), ReadVariants(table, where), {}, {}};
   if (const toml::node* keep = table.get("keep")) {
     study.keep = ParseKeep(ReadText(table, "keep", where), Concat(PlaceOf(*keep, where), ": keep"));
   }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -14,7 +15,7 @@ struct StudyFile {
   std::string title;              // may be empty
   std::vector<Variant> variants;  // in the order in which they stand in the file; at least one
   std::vector<int64_t> seeds;     // empty: the file names none
-  Keep keep = Keep::kAll;
+  std::optional<Keep> keep;       // nothing: the file does not say
 };
 
 /// Reads the text of a study file; the path of a model is relative to its folder. `where` is its

@@ -20,10 +20,12 @@ using nlohmann::json;
 using nlohmann::ordered_json;
 
 constexpr std::array kKeeps{"all", "policy", "tables"};  // in the order of Keep
-constexpr size_t kMostVariants = 10'000;
+constexpr size_t kMostVariants = 10'000, kMostPlanBytes = 1 << 24;
 
-/// The end of a file, at most so many bytes.
+/// The end of a file, at most so many bytes; empty if it is no regular file.
 std::string TailOf(const fs::path& path, std::streamoff bytes) {
+  std::error_code error;
+  if (!fs::is_regular_file(fs::symlink_status(path, error))) return "";
   std::ifstream file(path, std::ios::binary | std::ios::ate);
   if (!file) return "";
   const std::streamoff size = file.tellg();
@@ -42,7 +44,7 @@ Keep ParseKeep(std::string_view text, const std::string& where) {
 }
 
 int64_t SeedRun::Steps() const {
-  if (finished()) return result->steps;
+  if (finished) return result->steps;
   const int64_t at_checkpoint = result ? result->steps : 0;
   // A row begins with its step; the last one may be half written.
   const std::string tail = TailOf(path / RunFolder::kMetrics, 1024);
@@ -52,24 +54,30 @@ int64_t SeedRun::Steps() const {
   return std::max(at_checkpoint, at_metrics.value_or(0));
 }
 
-bool SeedRun::ReadDoneResult() {
+bool SeedRun::HasFailed() const {
+  std::error_code error;
+  return fs::exists(fs::symlink_status(failed(), error));
+}
+
+bool SeedRun::ReadIfFinished() {
   result = ReadDone(done());
   if (result && result->settings != settings) {
     throw BadInput(Concat(done().string(), ": made with other settings than ",
                           (path.parent_path() / kSettingsName).string(), " has"));
   }
-  if (!finished()) result.reset();  // that of fewer steps
-  return result.has_value();
+  finished = AtEnd();
+  if (!finished) result.reset();  // that of fewer steps
+  return finished;
 }
 
 void SeedRun::Read() {
   CheckNoLink(path);
-  std::error_code error;
-  if (fs::is_regular_file(fs::symlink_status(failed(), error))) {
+  problem.clear();
+  if (HasFailed()) {
     problem = std::string(Trim(ReadOwnFile(failed(), 1 << 16)));
     if (problem.empty()) problem = "failed";
   }
-  if (!ReadDoneResult() && !IsReduced()) {
+  if (!ReadIfFinished() && !IsReduced()) {
     result = ReadCheckpointResult(path, SpecOf(variant->config.Environments()));
   }
 }
@@ -134,7 +142,7 @@ StudyPlan ReadPlan(const fs::path& folder) {
   StudyPlan plan;
   plan.folder = folder;
   try {
-    const json j = ParseJsonObject(ReadOwnFile(path, 1 << 24), 4);
+    const json j = ParseJsonObject(ReadOwnFile(path, kMostPlanBytes), 4);
     if (JsonText(j, "version") != UPSWING_VERSION) {
       throw BadInput(Concat("made by Upswing ", JsonText(j, "version"), ", this is ",
                             UPSWING_VERSION, ", which may train otherwise"));
@@ -146,6 +154,9 @@ StudyPlan ReadPlan(const fs::path& folder) {
       Variant variant;
       variant.name = JsonText(one, "name");
       if (!variant.name.empty()) CheckVariantName(variant.name, "variants");
+      if (std::ranges::find(plan.variants, variant.name, &Variant::name) != plan.variants.end()) {
+        throw BadInput(Concat("variants: expected each once, but ", variant.name, " is twice"));
+      }
       CheckNoLink(folder / variant.name);
       const fs::path settings = folder / variant.name / kSettingsName;
       variant.config = BuildConfig(settings, {});
@@ -161,6 +172,15 @@ StudyPlan ReadPlan(const fs::path& folder) {
     throw BadInput(Concat(where, ": ", what));
   }
   return plan;
+}
+
+Keep KeepOf(const fs::path& folder) {
+  try {
+    const json j = ParseJsonObject(ReadOwnFile(folder / kPlanName, kMostPlanBytes), 4);
+    return ParseKeep(JsonText(j, "keep"), "keep");
+  } catch (const Error&) {
+    return Keep::kAll;
+  }
 }
 
 void CheckVariantName(const std::string& name, const std::string& place) {

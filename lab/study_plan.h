@@ -47,18 +47,22 @@ struct SeedRun {
   std::filesystem::path path;       // of its folder
   std::optional<RunResult> result;  // where it stands; nothing: it has not begun
   std::string problem;              // why it failed; empty if it did not
+  bool finished = false;            // it says so itself: its result is in done()
 
   std::filesystem::path log() const { return With(".log"); }        // what it printed
   std::filesystem::path claim() const { return With(".claim"); }    // the Lease of who trains it
   std::filesystem::path done() const { return With(".done"); }      // its result
   std::filesystem::path failed() const { return With(".failed"); }  // why it failed, one line
-  bool finished() const { return result && result->Finished(variant->config.train); }
+  /// Whether it stands at its end, though perhaps it does not say so yet.
+  bool AtEnd() const { return result && result->Finished(variant->config.train); }
+  /// Whether it is said that it failed.
+  bool HasFailed() const;
   /// Whether it was done, and what resuming it takes was not kept.
   bool IsReduced() const;
   /// Steps made, of its checkpoint or, where that is further, of its metrics.
   int64_t Steps() const;
-  /// Reads `result` again if it is done, and says whether it is. Throws BadInput.
-  bool ReadDoneResult();
+  /// Reads again whether it is finished, and its result then. Throws BadInput.
+  bool ReadIfFinished();
   /// Reads result and problem again. Throws BadInput.
   void Read();
 
@@ -81,6 +85,9 @@ void WritePlan(const StudyPlan& plan);
 /// The plan in a folder. Throws BadInput if there is none, if it is another version's, or if
 /// settings are no longer those of the plan.
 StudyPlan ReadPlan(const std::filesystem::path& folder);
+
+/// What the plan in a folder keeps; everything if there is none that can be read.
+Keep KeepOf(const std::filesystem::path& folder);
 
 /// The names of the files.
 inline constexpr const char* kPlanName = "plan.json";

@@ -17,25 +17,21 @@ namespace fs = std::filesystem;
 /// Removes the files of a finished run but those that are to be kept.
 void Reduce(const SeedRun& run, Keep keep) {
   if (keep == Keep::kAll) return;
-  std::error_code error;
-  fs::remove(run.log(), error);
-  if (keep == Keep::kTables) {
-    fs::remove_all(run.path, error);
-    return;
-  }
-  for (const auto& entry : fs::directory_iterator(run.path, error)) {
+  fs::remove(run.log());
+  if (keep == Keep::kTables) return RemoveFolder(run.path);
+  for (const auto& entry : fs::directory_iterator(run.path)) {
     const std::string name = entry.path().filename().string();
     const bool kept = name == RunFolder::kConfig || name == RunFolder::kPolicy ||
                       name == RunFolder::kEvaluations || name == RunFolder::kLog ||
                       name == RunFolder::kModel;
-    if (!kept) fs::remove(entry.path(), error);
+    if (!kept) fs::remove(entry.path());
   }
 }
 
 /// Begins a run, or resumes what a worker left of it.
 std::unique_ptr<TrainingRun> MakeOrResume(const SeedRun& run) {
   const TrainConfig& train = run.variant->config.train;
-  if (run.IsReduced()) fs::remove_all(run.path);  // the same bits come again
+  if (run.IsReduced() && fs::exists(run.path)) RemoveFolder(run.path);  // the same bits come again
   if (fs::exists(run.path / RunFolder::kConfig)) {
     return TrainingRun::Resume(
         run.path,
@@ -59,59 +55,74 @@ class Worker {
     std::list<SeedRun*> open;
     for (SeedRun& run : runs) open.push_back(&run);
     // Again, as long as that brings any: another worker may have lost one meanwhile.
-    for (bool claimed = true; claimed && !open.empty() && !outcome_.stopped;) {
-      claimed = false;
+    for (bool tried = true; tried && !open.empty() && !outcome_.stopped;) {
+      tried = false;
       for (auto it = open.begin(); it != open.end() && !outcome_.stopped;) {
         const Turn turn = Try(**it);
-        claimed = claimed || turn == Turn::kClaimed;
+        tried = tried || turn == Turn::kTried;
         it = turn == Turn::kAnothers ? std::next(it) : open.erase(it);
       }
     }
+    outcome_.anothers = std::ssize(open);
     return outcome_;
   }
 
  private:
-  enum class Turn { kNothingToDo, kAnothers, kClaimed };
+  enum class Turn { kNothingToDo, kAnothers, kTried };
 
   Turn Try(SeedRun& run) {
     outcome_.stopped = host_.stopped();
     if (outcome_.stopped) return Turn::kNothingToDo;
+    std::optional<Lease> lease;
     try {
-      const bool ended = HasEnded(run);
+      const bool ended = run.HasFailed() || run.ReadIfFinished();
       if (ended && !fs::exists(run.claim())) return Turn::kNothingToDo;
-      const std::optional<Lease> lease = Lease::Take(run.claim(), "trains it");
+      if (auto taken = Lease::Take(run.claim(), "trains it")) lease.emplace(std::move(*taken));
       if (ended) return Turn::kNothingToDo;  // its worker died before it gave the claim back
       if (!lease) return Turn::kAnothers;
-      if (HasEnded(run)) return Turn::kNothingToDo;  // meanwhile
+      if (run.HasFailed() || run.ReadIfFinished()) return Turn::kNothingToDo;  // meanwhile
       Train(run, *lease);
+    } catch (const FolderBusy&) {  // whoever lost the claim is still at work there
+      return Turn::kAnothers;
     } catch (const std::exception& error) {
-      ++outcome_.failed;
-      WriteFailed(run, error.what());
+      if (lease && !lease->held()) return Turn::kAnothers;
+      CountFailure(run, error);
     }
-    return Turn::kClaimed;
+    return Turn::kTried;
   }
 
-  /// Whether it is done or has failed.
-  static bool HasEnded(SeedRun& run) {
-    std::error_code error;
-    return fs::exists(fs::symlink_status(run.failed(), error)) || run.ReadDoneResult();
+  /// Says why a run failed. Throws the error if even that cannot be written, or if nothing works
+  /// here, as on a broken host, which is not to fail all other runs too.
+  void CountFailure(const SeedRun& run, const std::exception& error) {
+    constexpr int kMostInARow = 3;
+    try {
+      WriteFailed(run, error.what());
+    } catch (const Error&) {
+      throw Failure(Concat(run.name, ": ", error.what()));
+    }
+    ++outcome_.failed;
+    if (++failed_in_a_row_ < kMostInARow) return;
+    throw Failure(Concat(kMostInARow, " runs in a row failed here, the last of them ", run.name,
+                         ": ", error.what()));
   }
 
   void Train(SeedRun& run, const Lease& lease) {
     run.Read();
-    if (!run.finished() && !host_.Train(run, [&] { return MakeOrResume(run); })) {
+    const auto make = [&] { return MakeOrResume(run); };
+    if (!run.AtEnd() && !host_.Train(run, make, [&] { return lease.held(); })) {
       outcome_.stopped = true;
       return;
     }
-    // Halted for long, it may have lost the run to another worker, who goes on with it.
-    if (!lease.held()) return;
+    if (!lease.held()) throw Failure("another worker has it");
     Finish(run, plan_.keep);
     ++outcome_.done;
+    failed_in_a_row_ = 0;
   }
 
   const StudyPlan& plan_;
   WorkerHost& host_;
   WorkerOutcome outcome_;
+  int failed_in_a_row_ = 0;
 };
 
 }  // namespace

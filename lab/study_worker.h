@@ -18,15 +18,17 @@ class WorkerHost {
   virtual ~WorkerHost() = default;
 
   /// Makes or resumes a run and trains it to its end, or until it is to stop. Returns whether it
-  /// has ended by itself.
-  virtual bool Train(const SeedRun& run,
-                     const std::function<std::unique_ptr<TrainingRun>()>& make) = 0;
+  /// has ended by itself. Throws, and writes nothing more, once it is no longer `ours`, which is to
+  /// be asked after each step.
+  virtual bool Train(const SeedRun& run, const std::function<std::unique_ptr<TrainingRun>()>& make,
+                     const std::function<bool()>& ours) = 0;
   virtual bool stopped() = 0;
 };
 
 /// How a worker ended.
 struct WorkerOutcome {
   int64_t done = 0, failed = 0;  // runs
+  int64_t anothers = 0;          // that others work on
   bool stopped = false;
 };
 
@@ -34,7 +36,8 @@ struct WorkerOutcome {
 /// workers on this host and others: each claims a run before it works on it. Ends when there is
 /// none that it could claim. A run that another worker left is resumed from its checkpoint. Of a
 /// run that fails the reason is written beside it, and no worker tries it again until the study is
-/// begun anew. A run that was done twice does no harm: its bits are the same.
+/// begun anew. A run that was done twice does no harm: its bits are the same. Throws Failure if
+/// several runs in a row failed here, or if nothing can be written.
 WorkerOutcome WorkOn(const StudyPlan& plan, WorkerHost& host);
 
 /// Writes evaluations.csv into the folder of a plan: the rows of evals.csv of all runs that are
