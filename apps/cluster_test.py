@@ -6,7 +6,6 @@ import os
 import re
 import signal
 import sys
-import time
 import unittest
 from pathlib import Path
 
@@ -146,19 +145,20 @@ class ClusterTest(ProgramTest):
         self.assertEqual(follower.returncode, 0, output)
         self.assert_as_on_one_machine()
 
-    def test_runs_that_are_longer_than_the_time_limit_are_resumed(self):
-        self.write_study(1, 4000000)
-        # Slurm warns up to half a minute earlier than asked.
-        follower, array, _ = self.follow(2, "--time=1 --signal=B:USR2@5")
+    def test_a_task_that_is_warned_of_its_end_queues_itself_again(self):
+        self.write_study(1, 300000)
+        follower, array, _ = self.follow(2)
+        self.wait_for(lambda: sum(len(self.claims(node)) for node in NODES) == 2)
         tasks = [f"{array}_1", f"{array}_2"]
+        for task in tasks:  # as Slurm does before the time limit: slurm_cluster_test.py
+            self.cluster.ask("scancel", "--batch", "--signal=USR2", task)
         for task in tasks:
-            self.cluster.wait(lambda of=task: self.cluster.job(of)["Restarts"] != "0", 120)
-        while follower.poll() is None:
-            for task in tasks:
-                if self.cluster.job(task)["JobState"] == "PENDING":
-                    self.cluster.hurry(task)
-            time.sleep(1)
-        output = follower.stdout.read()
+            self.cluster.wait(lambda of=task: self.cluster.job(of)["Restarts"] == "1")
+        self.assertEqual(self.count_in_status("stopped"), 2)
+        for task in tasks:
+            self.wait_for_state(task, "PENDING")
+            self.cluster.hurry(task)
+        output = follower.communicate()[0]
         self.assertEqual(follower.returncode, 0, output)
         self.assert_as_on_one_machine()
 

@@ -26,23 +26,28 @@ constexpr std::string_view kSignals = R"sh(
 # up: the worker then writes a checkpoint and ends with 75.
 stop() {
   trap '' TERM USR1 USR2
+  warned=$1
   kill -USR2 "$worker"
   wait "$worker"
   finish $?
 }
 
-# Asks to be queued again, unless it is Slurm that ends the task and knows what comes next.
+# Asks to be queued again, unless it is Slurm that ends the task, which then knows what comes next.
 finish() {
   task=${SLURM_ARRAY_JOB_ID}_$SLURM_ARRAY_TASK_ID
-  if [ "$1" = 75 ] && [ "$(squeue --noheader --jobs="$task" --format=%T)" = RUNNING ]; then
-    scontrol requeue "$task"
+  if [ "$1" = 75 ]; then
+    if [ -n "$warned" ] || [ "$(squeue --noheader --jobs="$task" --format=%T)" = RUNNING ]; then
+      scontrol requeue "$task"
+    fi
   fi
   exit "$1"
 }
 )sh";
 constexpr std::string_view kWork = R"sh( &
 worker=$!
-trap stop TERM USR1 USR2
+warned=
+trap 'stop ""' TERM
+trap 'stop yes' USR1 USR2
 wait "$worker"
 finish $?
 )sh";

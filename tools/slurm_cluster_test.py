@@ -80,6 +80,7 @@ class SlurmClusterTest(unittest.TestCase):
         self.cluster.wait(lambda: self.state(job) == "FAILED")
         self.assertEqual(self.cluster.job(job)["ExitCode"], "4:0")
         self.cluster.ask("scontrol", "requeue", job)
+        self.cluster.wait(lambda: self.state(job) == "PENDING")
         self.cluster.hurry(job)
         self.cluster.wait(lambda: sum(note.startswith("begin") for note in self.notes()) == 2)
 
