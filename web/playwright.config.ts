@@ -12,6 +12,9 @@ export default defineConfig({
   workers: 1,
   forbidOnly: process.env.UPSWING_REQUIRE_WEB === '1',
   reporter: 'list',
+  // For busy machines; what passes does not wait.
+  timeout: 120_000,
+  expect: { timeout: 30_000 },
   use: {
     baseURL: `http://127.0.0.1:${port}/`,
     launchOptions,

@@ -1,4 +1,5 @@
 import { core } from './core';
+import type { Core } from './core';
 import type { Controller, Decision } from './decision';
 import { argMax } from './decision';
 import { GaussianTorque } from './gaussian';
@@ -18,6 +19,14 @@ interface About {
 
 const forgotten = new FinalizationRegistry<() => void>((close) => close());
 
+/// Frees what a policy has in the core. Made here, where it cannot hold the policy itself.
+function closer({ exports }: Core, policy: number, ...places: readonly number[]): () => void {
+  return () => {
+    exports.policy_close(policy);
+    for (const place of places) exports.release(place);
+  };
+}
+
 /// A policy in the core, and what its decisions are made of.
 export class CoreController implements Controller {
   readonly about: Readonly<About>;
@@ -31,21 +40,15 @@ export class CoreController implements Controller {
 
   /// Reads and checks a policy file. Throws BadInput.
   constructor(file: ArrayBuffer) {
-    const { exports } = core();
     this.policy = core().withBytes(new Uint8Array(file), (at, size) =>
-      core().expect(exports.policy_open(at, size)),
+      core().expect(core().exports.policy_open(at, size)),
     );
     this.about = JSON.parse(core().text) as About;
     this.torques = Float64Array.from(this.about.torques);
     this.shape = JSON.parse(this.about.metadata.network!) as Shape;
-    this.observations = exports.reserve(4 * this.inputs);
-    this.row = exports.reserve(8 * this.columns);
-    const { policy, observations, row } = this;
-    const close = () => {
-      exports.policy_close(policy);
-      exports.release(observations);
-      exports.release(row);
-    };
+    this.observations = core().reserve(4 * this.inputs);
+    this.row = core().reserve(8 * this.columns);
+    const close = closer(core(), this.policy, this.observations, this.row);
     forgotten.register(this, close, this);
     this.close = () => {
       forgotten.unregister(this);
@@ -67,12 +70,12 @@ export class CoreController implements Controller {
     const { shape } = this;
     const { kind, metadata } = this.about;
     const normalised = shape.layer_norm ? ', layer normalisation' : '';
-    const critic = metadata.critic ? (JSON.parse(metadata.critic) as Shape) : null;
     if (kind === 'q') {
       const heads = shape.dueling ? ` with heads of ${shape.head}` : '';
       const name = `${shape.dueling ? 'Dueling' : 'Plain'} network ${widths(shape)}`;
       return `${name}${heads}${normalised}, ${this.torques.length} torques`;
     }
+    const critic = metadata.critic ? (JSON.parse(metadata.critic) as Shape) : null;
     const how = {
       'squashed-gaussian': 'a Gaussian squashed by tanh',
       'clipped-gaussian': 'a Gaussian, clipped',

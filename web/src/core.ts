@@ -85,10 +85,16 @@ export class Core {
     return result;
   }
 
+  /// Space for so many bytes in the module's memory. Throws BadInput.
+  reserve(size: number): number {
+    const at = this.exports.reserve(Math.max(1, size));
+    if (at === 0) throw new BadInput('it does not fit into the memory that a page has');
+    return at;
+  }
+
   /// Calls `use` with the address and size of `bytes` in the module's memory.
   withBytes<T>(bytes: Uint8Array, use: (at: number, size: number) => T): T {
-    const at = this.exports.reserve(Math.max(1, bytes.length));
-    if (at === 0) throw new BadInput('it does not fit into the memory that a page has');
+    const at = this.reserve(bytes.length);
     try {
       new Uint8Array(this.exports.memory.buffer).set(bytes, at);
       return use(at, bytes.length);

@@ -135,8 +135,8 @@ export class World {
     this.shove.steps = Math.max(0, this.shove.steps - 1);
     ++this.steps;
     --this.untilControl;
-    if (!valid) this.reset();
-    this.advanceTwin();
+    if (valid) this.advanceTwin();
+    else this.reset();
     return valid;
   }
 

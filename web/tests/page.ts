@@ -74,7 +74,9 @@ export async function slide(page: Page, id: string, value: number): Promise<void
 /// Where a point of the pendulum's plane (m) is on the screen.
 export function onScreen(page: Page, x: number, z: number): Promise<{ x: number; y: number }> {
   return page.evaluate(
-    (point) => {
+    async (point) => {
+      // What was asked for before is laid out and drawn.
+      for (let k = 0; k < 3; ++k) await new Promise(requestAnimationFrame);
       const { left, top } = document.getElementById('scene')!.getBoundingClientRect();
       const [px, py] = upswing.scene.at(point);
       return { x: left + px, y: top + py };

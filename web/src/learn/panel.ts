@@ -97,6 +97,7 @@ export class LearnPanel {
   /// How it goes, in a sentence.
   get story(): string {
     const session = this.chosen;
+    if (session?.state === 'failed') return sentence(session);
     if (!session?.last) return '';
     const steps = session.last.steps.toLocaleString('en');
     const success = session.evaluations.at(-1)?.success ?? 0;

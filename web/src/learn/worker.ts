@@ -1,5 +1,4 @@
 import { Core } from '../core';
-import { BadInput } from '../bad_input';
 import { Learner } from './learner';
 import type { LearnSettings, Report } from './learner';
 
@@ -52,16 +51,20 @@ function work(): void {
     while (more && performance.now() - begin < SLICE) more = learner.run(4);
     if (!more || performance.now() - told >= TELL) tell();
     if (more) schedule();
-    else learner.close();
+    else end();
   } catch (error) {
     fail(error);
   }
 }
 
-function fail(error: unknown): void {
-  if (!(error instanceof BadInput)) throw error;
+function end(): void {
+  learner?.close();
   learner = null;
-  send({ kind: 'failed', reason: error.message });
+}
+
+function fail(error: unknown): void {
+  learner = null;
+  send({ kind: 'failed', reason: error instanceof Error ? error.message : String(error) });
 }
 
 // Sooner than setTimeout, which waits for 4 ms.
@@ -79,9 +82,8 @@ onmessage = async ({ data }: MessageEvent<Order>): Promise<void> => {
     return schedule();
   }
   const { module, agent, seed, settings } = data;
-  const core = await Core.start(module);
   try {
-    learner = new Learner(core, agent, seed, settings);
+    learner = new Learner(await Core.start(module), agent, seed, settings);
     tell();
   } catch (error) {
     return fail(error);

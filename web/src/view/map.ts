@@ -51,10 +51,12 @@ export class MapChart {
     const { width, height } = canvas;
     this.nameAxes(map.x, map.y);
     if (!map.cells) return canvas.text('computing …', width / 2, height / 2, 'center');
-    this.shown ??= map.cells.map((cell) => (cell - low) / (high - low));
+    // All the same are in the middle.
+    const shareOf = (cell: number) => (high > low ? (cell - low) / (high - low) : 0.5);
+    this.shown ??= map.cells.map(shareOf);
     const { shown } = this;
     map.cells.forEach((cell, i) => {
-      shown[i]! += EASE * ((cell - low) / (high - low) - shown[i]!);
+      shown[i]! += EASE * (shareOf(cell) - shown[i]!);
     });
     this.paint(map.size, map.quantity === 'torque' ? TORQUES : VALUES);
     canvas.context.drawImage(this.image, LEFT, 0, width - LEFT, height - BOTTOM);
