@@ -141,27 +141,22 @@ void CheckArguments(const CLI::App& app, const StudyArguments& arguments) {
                        ? "study: expected FILE.toml or --work FOLDER, got neither"
                        : "--work: expected no FILE.toml beside it");
   }
-  for (const std::string flag :
-       {"--out", "--seeds", "--jobs", "--keep", "--status", "--prepare", "--slurm"}) {
-    if (!arguments.work.empty() && app.count(flag) > 0) {
-      throw BadInput(Concat("--work: expected no ", flag, " beside it"));
+  const auto alone = [&](bool given, const char* what, std::initializer_list<const char*> others) {
+    for (const std::string other : others) {
+      if (given && app.count(other) > 0) {
+        throw BadInput(Concat(what, ": expected no ", other, " beside it"));
+      }
     }
-  }
-  for (const std::string flag : {"--seeds", "--jobs", "--keep", "--prepare"}) {
-    if (arguments.status && app.count(flag) > 0) {
-      throw BadInput(Concat("--status: expected no ", flag, " beside it"));
-    }
-  }
+  };
+  alone(!arguments.work.empty(), "--work",
+        {"--out", "--seeds", "--jobs", "--keep", "--status", "--prepare", "--slurm"});
+  alone(arguments.status, "--status", {"--seeds", "--jobs", "--keep", "--prepare"});
   for (const std::string flag : {"--tasks", "--print"}) {
     if (!arguments.on_slurm && app.count(flag) > 0) {
       throw BadInput(Concat(flag, ": expected --slurm beside it"));
     }
   }
-  for (const std::string flag : {"--jobs", "--status", "--prepare"}) {
-    if (arguments.on_slurm && app.count(flag) > 0) {
-      throw BadInput(Concat("--slurm: expected no ", flag, " beside it"));
-    }
-  }
+  alone(arguments.on_slurm, "--slurm", {"--jobs", "--status", "--prepare"});
   CheckSlurmOptions(arguments.slurm.options);
 }
 

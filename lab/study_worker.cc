@@ -1,6 +1,5 @@
 #include "lab/study_worker.h"
 
-#include <algorithm>
 #include <list>
 
 #include "core/error.h"
