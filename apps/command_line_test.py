@@ -99,8 +99,8 @@ class NumberTest(ProgramTest):
     def test_what_is_missing_or_too_much(self):
         self.refuse_numbers(
             ([], "expected a command, one of train, eval, "),
-            (["eval"], "eval: expected POLICY|RUN (policy.safetensors, run folder or controller: lqr), "
-                       "got none"),
+            (["eval"], "eval: expected POLICY|RUN (policy.safetensors, run folder or controller: "
+                       "energy, hybrid, lqr, mpc, pfl, tvlqr), got none"),
             (["compare"], "compare: expected RUN|FOLDER"),
             (["study"], "study: expected FILE.toml"),
             (["train", "--gamma"], "--gamma: expected a value, got none"),

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Controllers made from the equations of motion, where a policy's file could stand: `lqr`."""
+"""Controllers made from the equations of motion, where a policy's file could stand."""
 
 import csv
 import io
@@ -15,6 +15,7 @@ POLICY = ROOT / "web/public/agents/fast.safetensors"
 GAIN = [-107.58763, -107.94453, -32.48366, -16.87634]
 # Damping of joint 2 at which no gain exists.
 LOST = "damping2=0.3897696914"
+ALL = "energy, hybrid, lqr, mpc, pfl, tvlqr"
 
 
 def deviation(row):
@@ -106,11 +107,11 @@ class Lqr(ProgramTest):
         self.refuse(["eval", "lqr", "--made-for", "mas2=1"], "--made-for mas2", "did you mean mass")
         self.refuse(["eval", "lqr", "--made-for", "mass2"], "--made-for: expected NAME=VALUE")
         for command in ("eval", "simulate", "plot", "map", "info"):
-            self.refuse([command, POLICY, "--lqr-q1", "3"], "--lqr-q1: expected a controller (lqr)",
+            self.refuse([command, POLICY, "--lqr-q1", "3"], f"--lqr-q1: expected a controller ({ALL})",
                         POLICY)
             self.refuse([command, POLICY, "--made-for", "mass1=2"], "--made-for: expected a controller")
         for command in ("simulate", "info"):  # without a policy
-            self.refuse([command, "--lqr-q1", "3"], "expected a controller (lqr) to set, got none")
+            self.refuse([command, "--lqr-q1", "3"], f"expected a controller ({ALL}) to set, got none")
 
     def test_bad_names(self):
         for command in ("eval", "simulate", "plot", "map", "info"):
@@ -124,6 +125,46 @@ class Lqr(ProgramTest):
         for command in ("eval", "simulate", "plot", "map", "info"):
             self.refuse([command, "lqr"], "expected the controller or a file", "./lqr")
         self.refuse(["eval", "./lqr"], "safetensors")
+
+
+class SwingUp(ProgramTest):
+    def eval(self, *arguments):
+        return json.loads(self.succeed("eval", *arguments, "--json"))
+
+    def test_plans_and_laws_swing_up_and_hold(self):
+        for controller, episodes in (("tvlqr", 20), ("mpc", 5), ("pfl", 20)):
+            for physics in ("mujoco", "closed-form"):
+                result = self.eval(controller, "--episodes", episodes, "--physics", physics)
+                self.assertGreaterEqual(result["successes"], 0.9 * episodes, controller)
+        energy = self.eval("energy", "--episodes", 40)  # its law asks for more than the motor has
+        self.assertGreater(energy["successes"], 15)
+        self.assertLess(energy["successes"], 40)
+
+    def test_plans_know_their_plant(self):
+        heavy = ("--made-for", "mass2=1.2", "--made-for", "length1=0.45")
+        self.assertEqual(self.eval("tvlqr", *heavy, "--episodes", 10)["successes"], 10)
+        self.assertEqual(self.eval("mpc", *heavy, "--episodes", 4)["successes"], 4)
+        other = self.eval("tvlqr", "--set", "mass2=3", "--episodes", 10)  # not what it is for
+        self.assertLess(other["successes"], 10)
+
+    def test_hybrid_catches_what_a_network_brings_up(self):
+        alone = self.eval(POLICY, "--episodes", 20)
+        caught = self.eval("hybrid", "--swing-up", POLICY, "--episodes", 20)
+        self.assertEqual(caught["successes"], 20)
+        self.assertLess(caught["steady_tilt_degrees"]["link1"]["mean"], 1e-3)
+        self.assertLess(caught["steady_tilt_degrees"]["link1"]["mean"], alone["steady_tilt_degrees"]["link1"]["mean"])
+        self.assertIn("and lqr upright, region of attraction x'Px < ",
+                      self.succeed("info", "hybrid", "--swing-up", POLICY))
+        self.refuse(["eval", "hybrid"], "hybrid: expected a policy that swings up, by --swing-up")
+        self.refuse(["eval", "hybrid", "--swing-up", "none"], "none: no such file")
+        self.refuse(["eval", POLICY, "--swing-up", POLICY], "--swing-up: expected a controller")
+
+    def test_what_cannot_be_planned(self):
+        self.refuse(["eval", "tvlqr", "--tvlqr-seconds", "1"], "tvlqr: found no swing-up of 1 s with 4 N")
+        self.refuse(["eval", "tvlqr", "--tvlqr-seconds", "1.01"], "--tvlqr-seconds", "multiple of 0.02")
+        self.refuse(["eval", "mpc", "--mpc-iterations", "0"], "--mpc-iterations")
+        for controller in ("energy", "mpc", "pfl", "tvlqr"):
+            self.refuse(["eval", controller, "--made-for", LOST], "lqr: no gain was found", "delta")
 
 
 if __name__ == "__main__":

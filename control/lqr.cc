@@ -1,10 +1,7 @@
 #include "control/lqr.h"
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <array>
-#include <charconv>
-#include <cmath>
 
 #include "control/linearize.h"
 #include "control/riccati.h"
@@ -14,13 +11,6 @@
 
 namespace upswing {
 namespace {
-
-/// Such as 3.389.
-std::string Rounded(double x) {
-  std::array<char, 32> text;
-  const auto end = std::to_chars(text.begin(), text.end(), x, std::chars_format::general, 4).ptr;
-  return {text.begin(), end};
-}
 
 /// Why there is no solution, for the user.
 Error NoGain(const LqrConfig& config, const Plant& plant) {
@@ -44,17 +34,6 @@ Error NoGain(const LqrConfig& config, const Plant& plant) {
       "reaches a mode"));
 }
 
-PolicyInfo InfoOf(LqrConfig config, const Plant& plant) {
-  PolicyInfo info;
-  info.agent = "lqr";
-  info.task = kDoublePendulum;
-  info.config = OptionsOf(config).Toml(false, [](const Option&) { return true; });
-  for (const auto& [name, value] : PlantValues(plant)) info.plant[name] = value;
-  info.control_period = kControlPeriod;
-  info.observation = ObservationInfoOf(0);
-  return info;
-}
-
 }  // namespace
 
 void LqrConfig::Describe(Options& o) {
@@ -70,32 +49,16 @@ void LqrConfig::Describe(Options& o) {
 
 Lqr SolveLqr(const LqrConfig& config, const Plant& plant) {
   const LinearModel model = Discretize(LinearizeUpright(plant), kPhysicsTimestep, kPhysicsSteps);
-  const Eigen::MatrixXd Q =
-      Eigen::Vector4d(config.q1, config.q2, config.w1, config.w2).asDiagonal();
   const Eigen::MatrixXd R = Eigen::MatrixXd::Constant(1, 1, config.torque);
-  const auto P = SolveRiccati(model.A, model.B, Q, R);
+  const auto P = SolveRiccati(model.A, model.B, config.Q(), R);
   if (!P) throw NoGain(config, plant);
-  const Eigen::MatrixXd K = GainOf(*P, model.A, model.B, R);
-  Lqr lqr;
-  for (int i = 0; i < 4; ++i) {
-    lqr.K[static_cast<size_t>(i)] = K(0, i);
-    for (int j = 0; j < 4; ++j) lqr.P[static_cast<size_t>(i)][static_cast<size_t>(j)] = (*P)(i, j);
-  }
-  return lqr;
+  return {GainOf(*P, model.A, model.B, R), *P};
 }
 
-std::array<double, 4> UprightDeviation(std::span<const float> obs) {
-  // Of q1 - π both sine and cosine are the negatives of those of q1.
-  const auto angle = [](double sine, double cosine) { return std::atan2(sine, cosine); };
-  return {angle(-obs[1], -obs[0]), angle(obs[4], obs[3]), kMaxVelocity1 * obs[2],
-          kMaxVelocity2 * obs[5]};
-}
-
-LqrPolicy::LqrPolicy(const LqrConfig& config, const Plant& plant)
-    : config_(config),
-      lqr_(SolveLqr(config, plant)),
-      torque_limit_(plant.torque_limit),
-      info_(InfoOf(config, plant)) {}
+LqrPolicy::LqrPolicy(LqrConfig config, const Plant& plant)
+    : PendulumController("lqr", OptionsOf(config), plant),
+      config_(config),
+      lqr_(SolveLqr(config, plant)) {}
 
 std::string LqrPolicy::description() const {
   const auto list = [](const auto& numbers) {
@@ -108,20 +71,8 @@ std::string LqrPolicy::description() const {
                 Rounded(config_.torque), ", gain ", list(lqr_.K));
 }
 
-Tensors LqrPolicy::ToTensors() const {
-  throw BadInput(
-      "lqr: expected a policy that is kept in a file, got one that is made anew each time");
-}
-
-std::unique_ptr<Policy::Memory> LqrPolicy::Start(int /*num_envs*/) const {
-  return std::make_unique<Memory>();
-}
-
-void LqrPolicy::Act(Matrix<const float> obs, Matrix<double> action, Memory& /*memory*/) const {
-  for (int i = 0; i < obs.rows(); ++i) {
-    const double u = lqr_.Torque(UprightDeviation(obs.row(i)));
-    action(i, 0) = std::clamp(u, -torque_limit_, torque_limit_);
-  }
+double LqrPolicy::Torque(const StateVector& deviation, size_t /*env*/, Memory& /*memory*/) const {
+  return lqr_.Torque(deviation);
 }
 
 }  // namespace upswing

@@ -90,7 +90,7 @@ TEST(Lqr, OtherGainsDoNotHoldIt) {
 }
 
 TEST(Lqr, TorqueByHand) {
-  const Lqr lqr{{1, 2, 3, 4}, {}};
+  const Lqr lqr{{1, 2, 3, 4}, Eigen::Matrix4d::Zero()};
   EXPECT_EQ(lqr.Torque({0.5, -1, 2, 0.25}), -(0.5 - 2 + 6 + 1));
 }
 
@@ -111,7 +111,7 @@ TEST(Lqr, ActsByItsGainWithinTheLimit) {
   Plant plant;
   plant.torque_limit = 3;
   const LqrPolicy policy(LqrConfig(), plant);
-  const std::array<double, 4>& K = policy.lqr().K;
+  const Eigen::RowVector4d& K = policy.lqr().K;
   for (const Deviation& x : {Deviation{0.01, 0, 0, 0}, Deviation{0, -0.01, 0.02, 0},
                              Deviation{0.002, 0.003, -0.04, 0.05}}) {
     const double expected = -(K[0] * x[0] + K[1] * x[1] + K[2] * x[2] + K[3] * x[3]);
@@ -155,7 +155,9 @@ TEST(Lqr, ValueIsTheCostOfARollout) {
     const Deviation start = Draw(rng, 1);
     double value = 0, cost = 0;
     for (size_t i = 0; i < 4; ++i) {
-      for (size_t j = 0; j < 4; ++j) value += start[i] * lqr.P[i][j] * start[j];
+      for (size_t j = 0; j < 4; ++j)
+        value +=
+            start[i] * lqr.P(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) * start[j];
     }
     Eigen::Vector4d x(start.data());
     for (int step = 0; step < 1000; ++step) {
@@ -174,11 +176,13 @@ TEST(Lqr, GainOfTheStandardPlant) {
   for (size_t i = 0; i < 4; ++i) {
     for (size_t j = 0; j < 4; ++j) {
       const double P = scipy.P(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
-      EXPECT_NEAR(lqr.P[i][j], P, 1e-5 * std::abs(P));
+      EXPECT_NEAR(lqr.P(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)), P,
+                  1e-5 * std::abs(P));
     }
   }
   const std::array<double, 4> expected{-107.588, -107.944, -32.4837, -16.8763};
-  for (size_t k = 0; k < 4; ++k) EXPECT_NEAR(lqr.K[k], expected[k], 1e-3);
+  for (size_t k = 0; k < 4; ++k)
+    EXPECT_NEAR(lqr.K[static_cast<Eigen::Index>(k)], expected[k], 1e-3);
 }
 
 TEST(Lqr, DearTorqueAsksForLess) {
@@ -260,7 +264,7 @@ TEST(Lqr, EveryPlantIsHeldOrRefused) {
     ++held;
     const LinearModel model = Discretize(LinearizeUpright(plant), kPhysicsTimestep, kPhysicsSteps);
     const Lqr lqr = SolveLqr(LqrConfig(), plant);
-    const Eigen::RowVector4d K(lqr.K.data());
+    const Eigen::RowVector4d& K = lqr.K;
     EXPECT_LT(SpectralRadius(model.A - model.B * K), 1);
   }
   EXPECT_GT(held, 1000);

@@ -28,11 +28,15 @@ inline Eigen::MatrixXd MatrixOf(const nlohmann::json& rows) {
   return matrix;
 }
 
+inline nlohmann::json TestData(const char* name) {
+  const auto folder = std::filesystem::path(__FILE__).parent_path();
+  return nlohmann::json::parse(std::ifstream(folder / "testdata" / name));
+}
+
 /// All cases; those of the pendulum first, and the standard one first of all.
 inline std::vector<RiccatiCase> SciPyCases() {
-  const auto folder = std::filesystem::path(__FILE__).parent_path();
-  const auto file = nlohmann::json::parse(std::ifstream(folder / "testdata/riccati.json"));
   std::vector<RiccatiCase> cases;
+  const nlohmann::json file = TestData("riccati.json");
   for (const auto& c : file.at("cases")) {
     cases.push_back({c.at("name"), MatrixOf(c.at("A")), MatrixOf(c.at("B")), MatrixOf(c.at("Q")),
                      MatrixOf(c.at("R")), MatrixOf(c.at("P")), c.at("spectral_radius")});

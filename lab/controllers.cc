@@ -1,9 +1,12 @@
 #include "lab/controllers.h"
 
 #include <algorithm>
+#include <tuple>
 
+#include "control/hybrid.h"
 #include "core/error.h"
 #include "core/text.h"
+#include "lab/loaded_policy.h"
 
 namespace upswing {
 namespace {
@@ -14,10 +17,60 @@ struct Controller {
   std::shared_ptr<const Policy> (*make)(const ControllerConfig& config);
 };
 
+using Made = std::shared_ptr<const Policy>;
+
+/// A swing-up by a law, which LQR catches.
+Made WithCatch(const ControllerConfig& config, const std::string& kind, const std::string& what,
+               const Options& settings, LawPolicy::Law law) {
+  return std::make_shared<HybridPolicy>(
+      kind, settings, config.lqr,
+      std::make_shared<LawPolicy>(kind, what, settings, config.plant, std::move(law)),
+      config.plant);
+}
+
+Made MakeEnergyShaping(const ControllerConfig& config) {
+  auto [lqr, energy] = std::tuple(config.lqr, config.energy);
+  return WithCatch(config, "energy", "energy shaping", OptionsOfAll(lqr, energy),
+                   [energy, plant = Manipulator(config.plant)](const StateVector& d) {
+                     return EnergyShapingTorque(energy, plant, d);
+                   });
+}
+
+Made MakePartialFeedback(const ControllerConfig& config) {
+  auto [lqr, pfl] = std::tuple(config.lqr, config.pfl);
+  return WithCatch(config, "pfl", "collocated partial feedback linearisation",
+                   OptionsOfAll(lqr, pfl),
+                   [pfl, plant = Manipulator(config.plant)](const StateVector& d) {
+                     return PartialFeedbackTorque(pfl, plant, d);
+                   });
+}
+
+Made MakeHybrid(const ControllerConfig& config) {
+  if (config.swing_up.empty()) {
+    throw BadInput("hybrid: expected a policy that swings up, by --swing-up POLICY, got none");
+  }
+  LqrConfig lqr = config.lqr;
+  return std::make_shared<HybridPolicy>("hybrid", OptionsOf(lqr), lqr,
+                                        LoadPolicy(config.swing_up).policy, config.plant);
+}
+
 constexpr Controller kControllers[] = {
-    {"lqr", [](const ControllerConfig& config) -> std::shared_ptr<const Policy> {
+    {"energy", MakeEnergyShaping},
+    {"hybrid", MakeHybrid},
+    {"lqr",
+     [](const ControllerConfig& config) -> Made {
        return std::make_shared<LqrPolicy>(config.lqr, config.plant);
-     }}};
+     }},
+    {"mpc",
+     [](const ControllerConfig& config) -> Made {
+       return std::make_shared<MpcPolicy>(config.lqr, config.mpc, config.plant);
+     }},
+    {"pfl", MakePartialFeedback},
+    {"tvlqr",
+     [](const ControllerConfig& config) -> Made {
+       return std::make_shared<TvlqrPolicy>(config.lqr, config.tvlqr, config.plant);
+     }},
+};
 
 /// The settings that differ, each as name and value.
 std::vector<std::string> Differences(const Options& now, const Options& usual) {
@@ -31,6 +84,16 @@ std::vector<std::string> Differences(const Options& now, const Options& usual) {
 }
 
 }  // namespace
+
+void ControllerConfig::Describe(Options& o) {
+  lqr.Describe(o);
+  tvlqr.Describe(o);
+  mpc.Describe(o);
+  energy.Describe(o);
+  pfl.Describe(o);
+  o.Section("hybrid");
+  o.Add(&swing_up, "swing_up", "", "policy that swings up, a file or run folder").usual = "none";
+}
 
 std::vector<std::string> ControllerNames() {
   std::vector<std::string> names;

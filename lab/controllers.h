@@ -5,6 +5,9 @@
 #include <vector>
 
 #include "control/lqr.h"
+#include "control/mpc.h"
+#include "control/swing_up.h"
+#include "control/tvlqr.h"
 #include "core/policy.h"
 #include "sim/double_pendulum.h"
 
@@ -16,9 +19,14 @@ namespace upswing {
 struct ControllerConfig {
   Plant plant;  // what for
   LqrConfig lqr;
+  SwingUpConfig tvlqr;
+  MpcConfig mpc;
+  EnergyShapingConfig energy;
+  PartialFeedbackConfig pfl;
+  std::string swing_up;  // of `hybrid`: a policy's file or run folder
 
   /// The settings but the plant, which has flags of its own.
-  void Describe(Options& options) { lqr.Describe(options); }
+  void Describe(Options& options);
 };
 
 /// Their names, in alphabetical order.

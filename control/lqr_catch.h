@@ -1,0 +1,34 @@
+#pragma once
+
+#include "control/lqr.h"
+#include "control/pendulum_model.h"
+
+/// From where the linear-quadratic regulator catches the pendulum with the torque that its motor
+/// has: what a swing-up has to reach.
+namespace upswing {
+
+class LqrCatch {
+ public:
+  /// Throws as SolveLqr. Takes some hundredths of a second.
+  LqrCatch(const LqrConfig& config, const Plant& plant);
+
+  const Lqr& lqr() const { return lqr_; }
+
+  /// A level of the cost x' P x within which all is caught: each of 512 states spread over the
+  /// ellipsoid x' P x = region() is held by the limited torque, and so is each of 512 of some
+  /// smaller ones. By simulation, as Reist, Preiswerk, Tedrake, "Feedback-motion-planning with
+  /// simulation-based LQR-trees" (2016), section 3; no proof, as states in between are not tried.
+  double region() const { return region_; }
+
+  /// Whether the regulator, from this deviation from upright on, brings the plant into the region
+  /// within 2 s without either link leaning further than 60°: by simulating just that. `model` is
+  /// one of the plant.
+  bool Holds(const StateVector& deviation, PendulumModel& model) const;
+
+ private:
+  Lqr lqr_;
+  double region_;
+  double limit_;  // of the torque, N·m
+};
+
+}  // namespace upswing

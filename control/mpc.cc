@@ -1,0 +1,86 @@
+#include "control/mpc.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "core/text.h"
+
+namespace upswing {
+namespace {
+
+/// Iterations of an episode's first plan, which has none to begin with.
+constexpr int kFirstIterations = 100;
+constexpr double kTolerance = 1e-6;  // of the cost, in an iteration
+
+}  // namespace
+
+void MpcConfig::Describe(Options& o) {
+  o.Section("mpc");
+  o.Add(&seconds, "mpc_seconds", 2.5, {0.1, 10}, "s", "how far ahead it plans").step =
+      kControlPeriod;
+  o.Add(&iterations, "mpc_iterations", 2, {1, 1000}, "",
+        "improvements of the plan at each decision");
+}
+
+/// The plans of some environments, and what improves one after the other.
+struct MpcPolicy::Plans : Memory {
+  Plans(int num_envs, const Plant& plant)
+      : plans(static_cast<size_t>(num_envs)), optimizer(plant) {}
+
+  struct Plan {
+    Trajectory trajectory;
+    std::vector<Eigen::RowVector4d> K;  // (T)
+  };
+  std::vector<Plan> plans;  // (N)
+  TrajectoryOptimizer optimizer;
+};
+
+MpcPolicy::MpcPolicy(LqrConfig lqr, MpcConfig config, const Plant& plant)
+    : PendulumController("mpc", OptionsOfAll(lqr, config), plant),
+      config_(config),
+      lqr_(SolveLqr(lqr, plant)),
+      cost_(lqr.Q(), lqr.torque, lqr_.P) {}
+
+std::string MpcPolicy::description() const {
+  return Concat("model predictive control, ", Rounded(config_.seconds), " s ahead, ",
+                config_.iterations, " iterations a decision");
+}
+
+std::unique_ptr<Policy::Memory> MpcPolicy::Start(int num_envs) const {
+  return std::make_unique<Plans>(num_envs, plant());
+}
+
+double MpcPolicy::Torque(const StateVector& deviation, size_t env, Memory& memory) const {
+  auto& plans = static_cast<Plans&>(memory);
+  auto& [trajectory, K] = plans.plans[env];
+  TrajectoryOptimizer& optimizer = plans.optimizer;
+  const auto T = static_cast<size_t>(std::lround(config_.seconds / kControlPeriod));
+  const StateVector x = FromUpright(deviation);
+  if (trajectory.u.empty()) {
+    // The better beginning of two: no torque at all, or the regulator.
+    trajectory = optimizer.Follow(cost_, x, std::vector<double>(T, 0.0));
+    const Trajectory upright{std::vector(T + 1, FromUpright(StateVector::Zero())),
+                             std::vector<double>(T, 0.0), 0};
+    Trajectory regulated =
+        optimizer.Follow(cost_, x, upright, std::vector<Eigen::RowVector4d>(T, -lqr_.K));
+    if (regulated.cost < trajectory.cost) trajectory = std::move(regulated);
+    optimizer.Improve(cost_, kTolerance, kFirstIterations, trajectory);
+  } else {
+    // The rest of the plan, and a last torque as the regulator would choose it.
+    const StateVector last = UprightDeviation(trajectory.x.back());
+    trajectory.x.erase(trajectory.x.begin());
+    trajectory.u.erase(trajectory.u.begin());
+    K.erase(K.begin());
+    trajectory.u.push_back(lqr_.Torque(last));
+    K.push_back(-lqr_.K);
+    // Angles count from where the plan has them.
+    const StateVector now = trajectory.x[0] + UprightDeviation(FromUpright(x - trajectory.x[0]));
+    trajectory = optimizer.Follow(cost_, now, trajectory, K);
+    optimizer.Improve(cost_, 0, static_cast<int>(config_.iterations), trajectory);
+  }
+  K = optimizer.gains();
+  return trajectory.u[0];
+}
+
+}  // namespace upswing

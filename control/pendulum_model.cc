@@ -1,0 +1,61 @@
+#include "control/pendulum_model.h"
+
+namespace upswing {
+namespace {
+
+/// Steps of the differences, rad, rad/s and N·m: the error of a central difference, of the order of
+/// its square, and that of rounding, of the order of 1e-16 over it, are about equal.
+constexpr double kDifference = 1e-5;
+/// A point is perturbed in either direction of four states and a torque.
+constexpr size_t kPerturbed = 10;
+
+void Set(ClosedFormBatch& batch, size_t i, const StateVector& x, double u) {
+  batch.q1[i] = x[0];
+  batch.q2[i] = x[1];
+  batch.w1[i] = x[2];
+  batch.w2[i] = x[3];
+  batch.tau[i] = u;
+}
+
+StateVector Get(const ClosedFormBatch& batch, size_t i) {
+  return {batch.q1[i], batch.q2[i], batch.w1[i], batch.w2[i]};
+}
+
+}  // namespace
+
+void PendulumModel::Reserve(ClosedFormBatch& batch, size_t n) const {
+  if (batch.padded() >= n) return;
+  batch = ClosedFormBatch(n);
+  for (size_t i = 0; i < batch.padded(); ++i) batch.SetPlant(i, plant_);
+}
+
+void PendulumModel::Step(std::span<StateVector> x, std::span<const double> u) {
+  Reserve(few_, x.size());
+  for (size_t i = 0; i < x.size(); ++i) Set(few_, i, x[i], u[i]);
+  Advance(few_, kPhysicsSteps, 0, x.size());
+  for (size_t i = 0; i < x.size(); ++i) x[i] = Get(few_, i);
+}
+
+void PendulumModel::Linearize(std::span<const StateVector> x, std::span<const double> u,
+                              std::span<LinearModel> models) {
+  Reserve(many_, kPerturbed * x.size());
+  for (size_t i = 0; i < x.size(); ++i) {
+    for (size_t k = 0; k < kPerturbed; ++k) Set(many_, kPerturbed * i + k, x[i], u[i]);
+    ClosedFormBatch::Array* const varied[] = {&many_.q1, &many_.q2, &many_.w1, &many_.w2,
+                                              &many_.tau};
+    for (size_t k = 0; k < kPerturbed; ++k) {
+      (*varied[k / 2])[kPerturbed * i + k] += k % 2 == 0 ? kDifference : -kDifference;
+    }
+  }
+  Advance(many_, kPhysicsSteps, 0, kPerturbed * x.size());
+  for (size_t i = 0; i < x.size(); ++i) {
+    const auto derivative = [&](size_t variable) -> StateVector {
+      const size_t at = kPerturbed * i + 2 * variable;
+      return (Get(many_, at) - Get(many_, at + 1)) / (2 * kDifference);
+    };
+    for (size_t k = 0; k < 4; ++k) models[i].A.col(static_cast<Eigen::Index>(k)) = derivative(k);
+    models[i].B = derivative(4);
+  }
+}
+
+}  // namespace upswing

@@ -1,0 +1,161 @@
+// Symbols as in the paper: l cost, V least cost to come, Q cost of a step and what comes after; a
+// subscript is a derivative. k and K change the torque: u + k + K (x̂ - x).
+#include "control/trajectory.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "control/controller.h"
+
+namespace upswing {
+namespace {
+
+/// Regularisation: least, first and largest, and by how much it changes at a time.
+constexpr double kLeast = 1e-6, kFirst = 1e-3, kLargest = 1e10, kFactor = 4;
+
+double Form(const Eigen::Matrix4d& Q, const StateVector& x) { return x.dot(Q * x); }
+
+}  // namespace
+
+double QuadraticCost::Running(const StateVector& x, double u) const {
+  return Form(Q_, UprightDeviation(x)) + R_ * u * u;
+}
+
+double QuadraticCost::Final(const StateVector& x) const { return Form(P_, UprightDeviation(x)); }
+
+CostExpansion QuadraticCost::ExpandRunning(const StateVector& x, double u) const {
+  CostExpansion l;
+  l.x = 2 * Q_ * UprightDeviation(x);
+  l.u = 2 * R_ * u;
+  l.xx = 2 * Q_;
+  l.uu = 2 * R_;
+  return l;
+}
+
+CostExpansion QuadraticCost::ExpandFinal(const StateVector& x) const {
+  CostExpansion l;
+  l.x = 2 * P_ * UprightDeviation(x);
+  l.xx = 2 * P_;
+  return l;
+}
+
+Trajectory TrajectoryOptimizer::Follow(const TrajectoryCost& cost, const StateVector& start,
+                                       const std::vector<double>& torques) {
+  return Follow(cost, start, torques.size(),
+                [&](size_t t, const StateVector&) { return torques[t]; });
+}
+
+Trajectory TrajectoryOptimizer::Follow(const TrajectoryCost& cost, const StateVector& start,
+                                       const Trajectory& planned,
+                                       std::span<const Eigen::RowVector4d> K) {
+  return Follow(cost, start, planned.u.size(), [&](size_t t, const StateVector& x) {
+    return planned.u[t] + K[t].dot(x - planned.x[t]);
+  });
+}
+
+template <typename Torque>
+Trajectory TrajectoryOptimizer::Follow(const TrajectoryCost& cost, const StateVector& start,
+                                       size_t steps, const Torque& torque) {
+  const double limit = model_.plant().torque_limit;
+  Trajectory result;
+  result.x.reserve(steps + 1);
+  result.u.reserve(steps);
+  result.x.push_back(start);
+  for (size_t t = 0; t < steps; ++t) {
+    StateVector x = result.x.back();
+    const double u = std::clamp(torque(t, x), -limit, limit);
+    result.cost += cost.Running(x, u);
+    model_.Step({&x, 1}, {&u, 1});
+    result.x.push_back(x);
+    result.u.push_back(u);
+  }
+  result.cost += cost.Final(result.x.back());
+  return result;
+}
+
+int TrajectoryOptimizer::Improve(const TrajectoryCost& cost, double tolerance, int iterations,
+                                 Trajectory& trajectory) {
+  models_.resize(trajectory.u.size());
+  double regularization = kFirst;
+  bool moved = true;
+  int iteration = 0;
+  while (iteration < iterations && regularization < kLargest) {
+    ++iteration;
+    if (moved) {
+      model_.Linearize({trajectory.x.data(), trajectory.u.size()}, trajectory.u, models_);
+    }
+    const double before = trajectory.cost;
+    moved = Backward(cost, trajectory, regularization) && Forward(cost, trajectory);
+    regularization = moved ? std::max(kLeast, regularization / kFactor) : regularization * kFactor;
+    if (moved && before - trajectory.cost < tolerance * std::abs(before)) break;
+  }
+  return iteration;
+}
+
+bool TrajectoryOptimizer::Backward(const TrajectoryCost& cost, const Trajectory& trajectory,
+                                   double regularization) {
+  const size_t steps = trajectory.u.size();
+  const double limit = model_.plant().torque_limit;
+  k_.assign(steps, 0);
+  K_.assign(steps, Eigen::RowVector4d::Zero());
+  CostExpansion last = cost.ExpandFinal(trajectory.x[steps]);
+  StateVector Vx = last.x;
+  Eigen::Matrix4d Vxx = last.xx;
+  for (size_t t = steps; t-- > 0;) {
+    const auto& [A, B] = models_[t];
+    const double u = trajectory.u[t];
+    const CostExpansion l = cost.ExpandRunning(trajectory.x[t], u);
+    const StateVector Qx = l.x + A.transpose() * Vx;
+    const double Qu = l.u + B.dot(Vx);
+    const Eigen::Matrix4d VA = Vxx * A;
+    const Eigen::Matrix4d Qxx = l.xx + A.transpose() * VA;
+    const Eigen::RowVector4d Qux = l.ux.transpose() + B.transpose() * VA;
+    const double Quu = l.uu + B.dot(Vxx * B);
+    const double curvature = Quu + regularization * (1 + B.squaredNorm());
+    if (!(curvature > 0)) return false;
+
+    const double low = -limit - u, high = limit - u, best = -Qu / curvature;
+    k_[t] = std::clamp(best, low, high);
+    if (best > low && best < high) K_[t] = -Qux / curvature;
+    Vx = Qx + K_[t].transpose() * (Quu * k_[t] + Qu) + Qux.transpose() * k_[t];
+    const Eigen::Matrix4d KQ = K_[t].transpose() * Qux;
+    Vxx = Qxx + Quu * K_[t].transpose() * K_[t] + KQ + KQ.transpose();
+  }
+  return true;
+}
+
+bool TrajectoryOptimizer::Forward(const TrajectoryCost& cost, Trajectory& trajectory) {
+  const size_t steps = trajectory.u.size();
+  const double limit = model_.plant().torque_limit;
+  trial_x_.resize((steps + 1) * kTrials);
+  trial_u_.resize(steps * kTrials);
+  std::array<double, kTrials> costs{};
+  std::fill_n(trial_x_.begin(), kTrials, trajectory.x[0]);
+  for (size_t t = 0; t < steps; ++t) {
+    StateVector* const x = trial_x_.data() + t * kTrials;
+    double* const u = trial_u_.data() + t * kTrials;
+    for (int trial = 0; trial < kTrials; ++trial) {
+      const double share = std::pow(1.1, -trial * trial);  // 1 to 5e-10
+      const double change = share * k_[t] + K_[t].dot(x[trial] - trajectory.x[t]);
+      u[trial] = std::clamp(trajectory.u[t] + change, -limit, limit);
+      costs[static_cast<size_t>(trial)] += cost.Running(x[trial], u[trial]);
+    }
+    std::copy_n(x, kTrials, x + kTrials);
+    model_.Step({x + kTrials, kTrials}, {u, kTrials});
+  }
+  for (size_t trial = 0; trial < kTrials; ++trial) {
+    costs[trial] += cost.Final(trial_x_[steps * kTrials + trial]);
+    if (!std::isfinite(costs[trial])) costs[trial] = std::numeric_limits<double>::infinity();
+  }
+  const auto best = std::ranges::min_element(costs);
+  if (!(*best < trajectory.cost)) return false;
+  const auto trial = static_cast<size_t>(best - costs.begin());
+  for (size_t t = 0; t <= steps; ++t) trajectory.x[t] = trial_x_[t * kTrials + trial];
+  for (size_t t = 0; t < steps; ++t) trajectory.u[t] = trial_u_[t * kTrials + trial];
+  trajectory.cost = *best;
+  return true;
+}
+
+}  // namespace upswing

@@ -1,0 +1,86 @@
+#include "control/trajectory.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "control/lqr.h"
+#include "control/testing.h"
+
+namespace upswing {
+namespace {
+
+QuadraticCost StandardCost(const LqrConfig& config, const Plant& plant) {
+  return {config.Q(), config.torque, SolveLqr(config, plant).P};
+}
+
+TEST(Trajectory, EqualsSciPyWhereThePendulumIsLinear) {
+  const nlohmann::json file = TestData("boxed.json");
+  for (const auto& c : file.at("cases")) {
+    Plant plant;
+    plant.torque_limit = c.at("limit");
+    const QuadraticCost cost = StandardCost(LqrConfig(), plant);
+    const auto start = c.at("start").get<std::vector<double>>();
+    const auto expected = c.at("torques").get<std::vector<double>>();
+    TrajectoryOptimizer optimizer(plant);
+    Trajectory trajectory = optimizer.Follow(cost, FromUpright(StateVector(start.data())),
+                                             std::vector<double>(expected.size(), 0.0));
+    optimizer.Improve(cost, 0, 200, trajectory);
+    EXPECT_NEAR(trajectory.cost, c.at("cost"), 1e-5 * c.at("cost").get<double>());
+    for (size_t t = 0; t < expected.size(); ++t) {
+      EXPECT_NEAR(trajectory.u[t], expected[t], 1e-3 * 1e-3) << "step " << t;
+    }
+  }
+}
+
+TEST(Trajectory, NoChangeOfATorqueIsBetter) {
+  // Pontryagin's condition in discrete time: the derivative of the cost by each torque is 0 within
+  // the limits, and points outwards at them. By differences of whole simulations, which know
+  // nothing of the method.
+  const Plant plant;
+  LqrConfig config;
+  const QuadraticCost cost = StandardCost(config, plant);
+  TrajectoryOptimizer optimizer(plant);
+  std::vector<double> guess(180);
+  for (size_t t = 0; t < guess.size(); ++t) guess[t] = 3 * std::sin(0.08 * static_cast<double>(t));
+  Trajectory best = optimizer.Follow(cost, StateVector::Zero(), guess);
+  optimizer.Improve(cost, 1e-12, 1000, best);
+
+  int at_limit = 0;
+  for (size_t t = 0; t < best.u.size(); t += 3) {
+    const auto cost_with = [&](double change) {
+      Trajectory other = best;
+      other.u[t] += change;
+      double sum = 0;
+      for (size_t k = 0; k < other.u.size(); ++k) {
+        sum += cost.Running(other.x[k], other.u[k]);
+        other.x[k + 1] = other.x[k];
+        optimizer.model().Step({&other.x[k + 1], 1}, {&other.u[k], 1});
+      }
+      return sum + cost.Final(other.x.back());
+    };
+    constexpr double e = 1e-4;
+    const double slope = (cost_with(e) - cost_with(-e)) / (2 * e);
+    if (std::abs(best.u[t]) > plant.torque_limit - 1e-9) {
+      ++at_limit;
+      EXPECT_LT(slope * best.u[t], 1e-3 * best.cost) << "step " << t;
+    } else {
+      EXPECT_LT(std::abs(slope), 1e-3 * best.cost) << "step " << t;
+    }
+  }
+  EXPECT_GT(at_limit, 5);  // it uses the whole motor
+  EXPECT_LT(UprightDeviation(best.x.back()).norm(), 0.1);
+}
+
+TEST(Trajectory, FollowsWithinTheLimitAndCountsTheCost) {
+  const Plant plant;
+  const QuadraticCost cost(Eigen::Matrix4d::Zero(), 2, Eigen::Matrix4d::Identity());
+  TrajectoryOptimizer optimizer(plant);
+  const Trajectory t = optimizer.Follow(cost, StateVector::Zero(), {1, -3, 9});
+  EXPECT_EQ(t.u, (std::vector<double>{1, -3, 5}));
+  EXPECT_NEAR(t.cost, 2 * (1 + 9 + 25) + UprightDeviation(t.x[3]).squaredNorm(), 1e-12);
+}
+
+}  // namespace
+}  // namespace upswing

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "control/lqr_catch.h"
+#include "control/trajectory.h"
+
+namespace upswing {
+
+/// How the swing-up is planned. The cost is that of the regulator, over the plan's time, and its
+/// x' P x at the end.
+struct SwingUpConfig {
+  double seconds;  // length of the plan
+  double reserve;  // share of the motor's torque that the plan leaves to the feedback
+
+  SwingUpConfig() { SetDefaults(*this); }
+  /// One line per setting: name, default, range, unit, help.
+  void Describe(Options& options);
+};
+
+/// A swing-up from hanging at rest, and how to stay near it.
+struct SwingUp {
+  Trajectory trajectory;
+  std::vector<Eigen::RowVector4d> K;  // (T) feedback: u = u_t - K_t (x - x_t)
+  std::vector<Eigen::Matrix4d> P;  // (T + 1) what leaving the plan costs: (x - x_t)' P_t (x - x_t)
+};
+
+/// The best of the plans that trajectory optimisation finds from eight first guesses (sine waves of
+/// torque), and the time-varying linear-quadratic regulator about it: Tedrake, "Underactuated
+/// Robotics", chapter 8. Throws as SolveLqr, and BadInput if no plan ends where `upright` catches.
+SwingUp PlanSwingUp(const LqrConfig& lqr, const SwingUpConfig& config, const LqrCatch& upright,
+                    const Plant& plant);
+
+/// Follows a planned swing-up, or its mirror image, with feedback, then holds upright with the
+/// regulator. Where it begins, and whenever it is pushed off, it enters the plan where that costs
+/// least.
+class TvlqrPolicy : public PendulumController {
+ public:
+  /// Throws as PlanSwingUp. Takes about half a second.
+  TvlqrPolicy(LqrConfig lqr, SwingUpConfig config, const Plant& plant);
+
+  std::string description() const override;
+  std::unique_ptr<Memory> Start(int num_envs) const override;
+
+  const SwingUp& plan() const { return plan_; }
+
+ private:
+  /// Where an environment is on the plan.
+  struct Place {
+    int step = -1;    // of the plan; T: at its end, upright; -1: not begun
+    double sign = 1;  // -1: on its mirror image
+  };
+
+  double Torque(const StateVector& deviation, size_t env, Memory& memory) const override;
+  /// What it costs to be at a deviation from upright instead of that place.
+  double Cost(const StateVector& deviation, const Place& place) const;
+
+  LqrCatch upright_;
+  SwingUp plan_;
+};
+
+}  // namespace upswing
