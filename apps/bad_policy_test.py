@@ -139,6 +139,7 @@ class PolicyFileTest(SmallRunTest):
         for change in ({"format": "other"}, {"format_version": "2"}, {"output": "gaussian"},
                        {"network": "{}"}, {"network": "nonsense"}, {"plant": "nonsense"},
                        {"plant": "{}"}, {"plant": metadata["plant"].replace("9.81", "-9.81")},
+                       {"plant": json.dumps(json.loads(metadata["plant"]) | {"actuated_joint": 3})},
                        {"network": json.dumps(network | {"hidden": [64]})},
                        {"network": json.dumps(network | {"hidden": []})},
                        {"network": json.dumps(network | {"hidden": [-1]})},

@@ -60,6 +60,25 @@ class Lqr(ProgramTest):
         self.assertIn("grow at 4.97/s and 3.6/s (ratio 0.723), delta -0.40\n", text)
         self.assertIn("delta -0.50\n", self.succeed("info", "lqr", "--made-for", "mass2=1.2"))
 
+    def test_a_motor_at_joint_2(self):
+        text = self.succeed("info", "lqr", "--made-for", "actuated_joint=2")
+        self.assertIn("actuated_joint 2", text)
+        self.assertIn("delta -0.04\n", text)
+        for physics in ("mujoco", "closed-form"):
+            rows = self.simulate("--made-for", "actuated_joint=2", "--start", "3.131,0.02,0,0",
+                                 "--seconds", 8, "--physics", physics)
+            self.assertLess(max(map(abs, deviation(rows[-1]))), 1e-3)
+        # Made for the other joint, it does not hold this one.
+        self.assertEqual(self.simulate("--set", "actuated_joint=2", "--start", "3.131,0.02,0,0",
+                                       "--seconds", 3)[-1]["inverted"], 0)
+        self.refuse(["eval", "lqr", "--made-for", "actuated_joint=2", "--made-for",
+                     "damping1=0.5659823434"], "lqr: no gain was found", "damping of joint 1 cancels")
+        for law in ("energy", "pfl"):
+            self.refuse(["eval", law, "--made-for", "actuated_joint=2"], f"{law}: ", "motor is at joint 1")
+        for joint in ("0", "1.5", "3"):
+            self.refuse(["eval", "lqr", "--set", f"actuated_joint={joint}"], "actuated_joint",
+                        "a multiple of 1 in [1, 2]")
+
     def test_map_of_where_it_catches(self):
         result = json.loads(self.succeed("map", "lqr", "--x", "q1=150:210:61", "--y", "q2=-30:30:61",
                                          "--check", 0.01, "--json", "--out", "map"))

@@ -252,6 +252,13 @@ class PageTest(ProgramTest):
         self.assertEqual({path.name for path in (self.folder / "page").iterdir()},
                          {"agents.json", "one.safetensors", "two.safetensors", "dqn.safetensors"})
 
+    def test_the_page_has_its_motor_at_joint_1(self):
+        self.succeed(*small(actuated_joint=2, out="acrobot"))
+        self.assertIn("actuated_joint 2", self.succeed("info", "acrobot"))
+        self.assertEqual(json.loads(self.succeed("eval", "acrobot", "--episodes", 2, "--json"))
+                         ["plant"]["actuated_joint"], 2)
+        self.refuse(["export", "acrobot", "--page", "page"], "a motor at joint 1", "joint 2")
+
     def test_bad_input_changes_nothing(self):
         self.succeed(*small())
         for folder in ("a", "b"):

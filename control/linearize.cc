@@ -14,8 +14,8 @@ LinearModel LinearizeUpright(const Plant& plant) {
   const double J1 = batch.J1[0], J2 = batch.J2[0], b = batch.b[0];
   const double G1 = batch.G1[0], G2 = batch.G2[0], d1 = batch.d1[0], d2 = batch.d2[0];
 
-  // M q̈ = [u, 0]' + G q - D q̇. With cos q2 = 1 nothing of M is lost; gravity, which pulls back
-  // hanging, pushes away; what is quadratic in the velocities has no part.
+  // M q̈ = e u + G q - D q̇, e the motor's joint. With cos q2 = 1 nothing of M is lost; gravity,
+  // which pulls back hanging, pushes away; what is quadratic in the velocities has no part.
   Eigen::Matrix2d M, G, D;
   M << J1 + J2 + 2 * b, J2 + b, J2 + b, J2 + kArmature;
   G << G1 + G2, G2, G2, G2;
@@ -24,7 +24,7 @@ LinearModel LinearizeUpright(const Plant& plant) {
 
   LinearModel model;
   model.A << Eigen::Matrix2d::Zero(), Eigen::Matrix2d::Identity(), inverse * G, -inverse * D;
-  model.B << 0, 0, inverse.col(0);
+  model.B << 0, 0, inverse.col(plant.actuated_joint == 1 ? 0 : 1);
   return model;
 }
 

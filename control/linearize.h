@@ -8,8 +8,8 @@
 namespace upswing {
 
 /// ẋ = A x + B u, or x⁺ = A x + B u over one control period.
-/// x = [q1 - π, q2, w1, w2]: deviation from upright at rest, rad and rad/s. u: torque at joint 1,
-/// N·m, which is not limited here.
+/// x = [q1 - π, q2, w1, w2]: deviation from upright at rest, rad and rad/s. u: torque of the
+/// motor, N·m, which is not limited here.
 struct LinearModel {
   Eigen::Matrix4d A;
   Eigen::Vector4d B;

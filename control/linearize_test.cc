@@ -13,13 +13,15 @@
 namespace upswing {
 namespace {
 
-/// The standard plant's masses, lengths, dampings and gravity, each times 0.5 to 1.5.
+/// The standard plant's masses, lengths, dampings and gravity, each times 0.5 to 1.5; either joint
+/// has the motor.
 Plant DrawPlant(Rng& rng) {
   Plant plant;
   const Options options = OptionsOf(plant);
   for (const Option& option : options.all()) {
     *std::get<double*>(option.target) *= rng.Uniform(0.5, 1.5);
   }
+  plant.actuated_joint = rng.Uniform() < 0.5 ? 1 : 2;
   return plant;
 }
 
@@ -76,15 +78,24 @@ TEST(Linearize, ModesOfTheStandardPlant) {
   EXPECT_NEAR(modes.delta, -0.40195, 1e-5);
 }
 
-TEST(Linearize, TheModeThatCannotBeControlledIsThePoleOfLinkTwo) {
-  // Damping of joint 2 at which delta is 0, by bisection.
+/// The standard plant with its motor at a joint, and the damping of the other one at which delta is
+/// 0, by bisection.
+Plant UncontrollablePlant(int joint) {
   Plant plant;
-  double low = 0.2, high = 1;
+  plant.actuated_joint = joint;
+  double& damping = joint == 1 ? plant.damping2 : plant.damping1;
+  double low = 0.1, high = 10;
   for (int i = 0; i < 60; ++i) {
-    plant.damping2 = (low + high) / 2;
-    (ModesOf(plant).delta < 0 ? low : high) = plant.damping2;
+    damping = (low + high) / 2;
+    (ModesOf(plant).delta < 0 ? low : high) = damping;
   }
-  EXPECT_NEAR(plant.damping2, 0.38976969, 1e-8);
+  return plant;
+}
+
+class Uncontrollable : public testing::TestWithParam<int> {};
+
+TEST_P(Uncontrollable, WhereDeltaIsZeroTheTorqueMovesNothingOfOneMode) {
+  const Plant plant = UncontrollablePlant(GetParam());
   const LinearModel model = LinearizeUpright(plant);
   // A left eigenvector of A for that mode, of which the torque moves nothing.
   const Eigen::EigenSolver<Eigen::Matrix4d> solver(model.A.transpose());
@@ -100,6 +111,14 @@ TEST(Linearize, TheModeThatCannotBeControlledIsThePoleOfLinkTwo) {
     ++found;
   }
   EXPECT_EQ(found, 1);
+}
+
+INSTANTIATE_TEST_SUITE_P(MotorAtJoint, Uncontrollable, testing::Values(1, 2));
+
+TEST(Linearize, DampingAtWhichTheStandardPlantCannotBeControlled) {
+  EXPECT_NEAR(UncontrollablePlant(1).damping2, 0.38976969, 1e-8);
+  // For the motor at joint 2: M11 z² + d1 z = G1 + G2 with z² = G2/M12.
+  EXPECT_NEAR(UncontrollablePlant(2).damping1, 0.56598234, 1e-8);
 }
 
 }  // namespace

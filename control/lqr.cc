@@ -26,12 +26,12 @@ Error NoGain(const LqrConfig& config, const Plant& plant) {
                            " s can follow, whose damping acts at up to ", Rounded(kLargestDecay),
                            "/s, got ", Rounded(modes.decay), "/s"));
   }
-  return BadInput(Concat(
-      "lqr: no gain was found that holds this plant upright: its unstable modes grow at ",
-      Rounded(modes.faster), "/s and ", Rounded(modes.slower), "/s (ratio ",
-      Rounded(modes.slower / modes.faster), "), and delta is ", Rounded(modes.delta),
-      "; where that is 0, damping of joint 2 cancels the coupling of the links, and no torque "
-      "reaches a mode"));
+  return BadInput(
+      Concat("lqr: no gain was found that holds this plant upright: its unstable modes grow at ",
+             Rounded(modes.faster), "/s and ", Rounded(modes.slower), "/s (ratio ",
+             Rounded(modes.slower / modes.faster), "), and delta is ", Rounded(modes.delta),
+             "; where that is 0, damping of joint ", plant.actuated_joint == 1 ? 2 : 1,
+             " cancels the coupling of the links, and no torque reaches a mode"));
 }
 
 }  // namespace

@@ -36,7 +36,7 @@ CTask PendulumCode(const LoadedPolicy& loaded) {
               {"q2", "rad    angle of link 2 relative to link 1, 0 in line with it"},
               {"w1", "rad/s  velocity of q1"},
               {"w2", "rad/s  velocity of q2"}},
-             "at joint 1",
+             loaded.plant.actuated_joint == 1 ? "at joint 1" : "at joint 2",
              {{"energy", "of the observed energy and height", EnergyConstants(loaded.plant)}},
              "",
              4};

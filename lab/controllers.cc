@@ -28,7 +28,15 @@ Made WithCatch(const ControllerConfig& config, const std::string& kind, const st
       config.plant);
 }
 
+/// Throws BadInput unless the motor is where these laws have it.
+void ExpectPendubot(const char* kind, const Plant& plant) {
+  if (plant.actuated_joint == 1) return;
+  throw BadInput(
+      Concat(kind, ": expected a plant whose motor is at joint 1 (actuated_joint), got joint 2"));
+}
+
 Made MakeEnergyShaping(const ControllerConfig& config) {
+  ExpectPendubot("energy", config.plant);
   auto [lqr, energy] = std::tuple(config.lqr, config.energy);
   return WithCatch(config, "energy", "energy shaping", OptionsOfAll(lqr, energy),
                    [energy, plant = Manipulator(config.plant)](const StateVector& d) {
@@ -37,6 +45,7 @@ Made MakeEnergyShaping(const ControllerConfig& config) {
 }
 
 Made MakePartialFeedback(const ControllerConfig& config) {
+  ExpectPendubot("pfl", config.plant);
   auto [lqr, pfl] = std::tuple(config.lqr, config.pfl);
   return WithCatch(config, "pfl", "collocated partial feedback linearisation",
                    OptionsOfAll(lqr, pfl),

@@ -96,6 +96,11 @@ PageAgent ReadAgent(const fs::path& path, const std::string& given_id) {
                           ": was made with a model of its own, and the page shows the "
                           "built-in one alone"));
   }
+  if (loaded.plant.actuated_joint != 1) {
+    throw BadInput(Concat(where,
+                          ": expected a policy for a motor at joint 1, as the page's pendulum has "
+                          "it, got one for joint 2"));
+  }
   const fs::path run = RunOf(loaded.path);
   std::string id = CleanId(run.filename().string());
   if (id.empty()) id = CleanId(loaded.policy->info().agent);

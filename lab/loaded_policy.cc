@@ -78,6 +78,7 @@ Plant TrainingPlant(const PolicyInfo& info, const std::string& where) {
   const Options options = OptionsOf(plant);
   for (const Option& option : options.all()) {
     const auto found = info.plant.find(option.name);
+    if (found == info.plant.end() && option.implied) continue;
     if (found == info.plant.end()) throw BadInput(Concat(place, ": no ", option.name));
     option.Set(FormatNumber(found->second), Concat(place, ": ", option.name));
   }

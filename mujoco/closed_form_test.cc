@@ -174,7 +174,7 @@ TEST(ClosedForm, JudgesAsTheFormulasDo) {
     if (i % 4 == 0) s.q2 = rng.Uniform(0.8, 1.2) * kPi - s.q1;  // more of them inverted
     if (i % 4 == 0) s.q1 = rng.Uniform(0.8, 1.2) * kPi;
     SetState(batch, i, s);
-    batch.q1_before[i] = s.q1 - rng.Uniform(-0.1, 0.1);
+    batch.angle_before[i] = MotorAngle(plants[i], s) - rng.Uniform(-0.1, 0.1);
   }
   batch.SetTorque(torque);
   RewardWeights weights;
@@ -201,7 +201,7 @@ TEST(ClosedForm, JudgesAsTheFormulasDo) {
       }
       EXPECT_EQ(result.reward[i], sum);
       EXPECT_EQ(result.torque[i], tau);
-      EXPECT_EQ(result.work[i], std::abs(tau * (q1 - batch.q1_before[i])));
+      EXPECT_EQ(result.work[i], std::abs(tau * (MotorAngle(plants[i], s) - batch.angle_before[i])));
       EXPECT_EQ(result.at_goal[i], Inverted(s));
       EXPECT_EQ(result.terminated[i], 0);
     }

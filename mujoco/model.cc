@@ -66,9 +66,9 @@ void CheckStructure(const mjModel& model, const Expectation& expect) {
              model.geom_type[1] == mjGEOM_CAPSULE && model.geom_bodyid[0] == 1 &&
              model.geom_bodyid[1] == 2,
          "one capsule for each body");
-  expect(model.nu == 1 && model.actuator_trnid[0] == 0 && model.na == 0 &&
+  expect(model.nu == 1 && model.actuator_trntype[0] == mjTRN_JOINT && model.na == 0 &&
              model.actuator_ctrllimited[0] != 0,
-         "one motor with a control range, on the first hinge");
+         "one motor with a control range, on a hinge");
   expect(model.actuator_gear[0] == 1 && model.actuator_gainprm[0] == 1 &&
              model.actuator_biastype[0] == mjBIAS_NONE,
          "a motor whose control is its torque");
@@ -190,13 +190,14 @@ Plant PlantOf(const mjModel& model) {
   plant.damping2 = model.dof_damping[1];
   plant.gravity = -model.opt.gravity[2];
   plant.torque_limit = model.actuator_ctrlrange[1];
+  plant.actuated_joint = model.actuator_trnid[0] + 1;
   return plant;
 }
 
 ModelFields FieldsOf(mjModel& model) {
-  return {model.body_mass,   model.body_inertia,       model.body_ipos,
-          model.body_pos,    model.geom_pos,           model.geom_size,
-          model.dof_damping, model.actuator_ctrlrange, model.opt.gravity};
+  return {model.body_mass,      model.body_inertia, model.body_ipos,   model.body_pos,
+          model.geom_pos,       model.geom_size,    model.dof_damping, model.actuator_ctrlrange,
+          model.actuator_trnid, model.opt.gravity};
 }
 
 void WritePlant(const Plant& plant, const ModelFields& fields) {
@@ -220,6 +221,7 @@ void WritePlant(const Plant& plant, const ModelFields& fields) {
   fields.dof_damping[1] = plant.damping2;
   fields.actuator_ctrlrange[0] = -plant.torque_limit;
   fields.actuator_ctrlrange[1] = plant.torque_limit;
+  fields.actuator_trnid[0] = static_cast<int>(plant.actuated_joint) - 1;
   fields.gravity[0] = fields.gravity[1] = 0;
   fields.gravity[2] = -plant.gravity;
 }

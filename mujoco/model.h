@@ -30,9 +30,9 @@ ModelPtr CompileModel(const std::string& mjcf, const std::string& where);
 
 /// Compiles untrusted MJCF after CheckMjcf. Throws BadInput, too, unless the model is built like
 /// the built-in one: two solid capsules hanging on hinges about +y, a motor of the same limit both
-/// ways at the first, gravity along -z, springs at rest hanging, limits of the joints the same both
-/// ways, a timestep that divides the control period, and a plant within the ranges of its settings.
-/// Armature, friction, stiffness, the capsules' radius and the integrator may differ.
+/// ways at one of them, gravity along -z, springs at rest hanging, limits of the joints the same
+/// both ways, a timestep that divides the control period, and a plant within the ranges of its
+/// settings. Armature, friction, stiffness, the capsules' radius and the integrator may differ.
 ModelPtr LoadModel(const std::string& mjcf, const std::string& where);
 
 /// Differences of a loaded model from the built-in one that affect the motion, apart from the
@@ -53,6 +53,7 @@ struct ModelFields {
   mjtNum* geom_size;           // (2 × 3)
   mjtNum* dof_damping;         // (2)
   mjtNum* actuator_ctrlrange;  // (1 × 2)
+  int* actuator_trnid;         // (1 × 2)
   mjtNum* gravity;             // (3)
 };
 ModelFields FieldsOf(mjModel& model);

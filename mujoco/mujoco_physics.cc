@@ -15,18 +15,24 @@ constexpr int kSmallestSlice = 4;  // environments; fewer do not repay a task of
 constexpr int kMostSlices = 32;
 
 /// Gives every simulation of the batch its own row of a model field.
-mjtNum* Expand(mjBatch* batch, const char* field, int env) {
+template <typename T = mjtNum>
+T* Expand(mjBatch* batch, const char* field, int env) {
   int size = 0;
-  auto* rows = static_cast<mjtNum*>(mjb_expand(batch, field, &size, nullptr));
+  auto* rows = static_cast<T*>(mjb_expand(batch, field, &size, nullptr));
   if (rows == nullptr) throw Failure(Concat("MuJoCo cannot expand ", field));
   return rows + env * size;
 }
 
 ModelFields ExpandedFields(mjBatch* batch, int env) {
-  return {Expand(batch, "body_mass", env),   Expand(batch, "body_inertia", env),
-          Expand(batch, "body_ipos", env),   Expand(batch, "body_pos", env),
-          Expand(batch, "geom_pos", env),    Expand(batch, "geom_size", env),
-          Expand(batch, "dof_damping", env), Expand(batch, "actuator_ctrlrange", env),
+  return {Expand(batch, "body_mass", env),
+          Expand(batch, "body_inertia", env),
+          Expand(batch, "body_ipos", env),
+          Expand(batch, "body_pos", env),
+          Expand(batch, "geom_pos", env),
+          Expand(batch, "geom_size", env),
+          Expand(batch, "dof_damping", env),
+          Expand(batch, "actuator_ctrlrange", env),
+          Expand<int>(batch, "actuator_trnid", env),
           Expand(batch, "opt.gravity", env)};
 }
 
@@ -47,7 +53,7 @@ MuJoCoPhysics::MuJoCoPhysics(const PhysicsConfig& config)
     slices_.push_back(MakeSlice(*model, first, std::min(slice_size_, config_.num_envs - first)));
   }
   state_size_ = mjb_nstate(slices_.front().batch.get());
-  previous_q1_.resize(static_cast<size_t>(config_.num_envs));
+  previous_angle_.resize(static_cast<size_t>(config_.num_envs));
 }
 
 MuJoCoPhysics::Slice MuJoCoPhysics::MakeSlice(const mjModel& model, int first, int count) const {
@@ -127,7 +133,7 @@ void MuJoCoPhysics::Judge(int env, double torque, StepResult& result) const {
   }
   result.at_goal[i] = Inverted(s) ? 1 : 0;
   result.torque[i] = tau;
-  result.work[i] = std::abs(tau * (s.q1 - previous_q1_[i]));
+  result.work[i] = std::abs(tau * (MotorAngle(plant, s) - previous_angle_[i]));
 }
 
 void MuJoCoPhysics::Step(std::span<const double> torque, StepResult& result) {
@@ -145,7 +151,7 @@ void MuJoCoPhysics::StepSlice(const Slice& slice, std::span<const double> torque
                               StepResult& result) {
   const int end = slice.first + slice.count;
   for (int env = slice.first; env < end; ++env) {
-    previous_q1_[static_cast<size_t>(env)] = state(env).q1;
+    previous_angle_[static_cast<size_t>(env)] = MotorAngle(config_.plant(env), state(env));
     Component(slice.ctrl, env)[0] = torque[static_cast<size_t>(env)];
   }
   mjb_step(slice.batch.get(), nullptr, 0, substeps_, mjSTAGE_NONE);

@@ -181,7 +181,7 @@ void PendulumScene::Update(const PendulumState& state, const Marks& marks) {
   }
   AddTrail(marks.trail);
   if (marks.goal) AddGoal(state);
-  AddTorque(marks.torque);
+  AddTorque(marks.torque, state);
 }
 
 std::array<double, 2> PendulumScene::PullTorques() {
@@ -210,27 +210,31 @@ void PendulumScene::AddGoal(const PendulumState& state) {
   }
 }
 
-void PendulumScene::AddTorque(double torque) {
-  // An arc before the pivot, from its top, of a quarter turn and a half at the motor's limit.
+void PendulumScene::AddTorque(double torque, const PendulumState& state) {
+  // An arc before the motor, from its top, of a quarter turn and a half at the motor's limit.
   const double share = std::clamp(torque / plant_.torque_limit, -1.0, 1.0);
   if (std::abs(share) < 0.01) return;
   const double radius = 0.2 * reach_, width = 0.014 * reach_, depth = -0.10 * reach_;
   const double begin = kPi, head = 0.5 * (share > 0 ? 1 : -1);
   const double end = begin + share * 0.75 * kPi;
   const int pieces = 2 + static_cast<int>(std::abs(share) * 24);
+  const double arm = plant_.actuated_joint == 1 ? 0 : plant_.length1;
+  const auto around = [&](double angle) {
+    Point point = OnCircle(radius, angle, depth);
+    const Point centre = OnCircle(arm, state.q1, 0);
+    for (const size_t axis : {0, 2}) point.at(axis) += centre.at(axis);
+    return point;
+  };
   for (int k = 0; k < pieces; ++k) {
-    const auto at = [&](int i) {
-      return OnCircle(radius, begin + (end - begin) * i / pieces, depth);
-    };
+    const auto at = [&](int i) { return around(begin + (end - begin) * i / pieces); };
     Add(scene_, mjGEOM_CAPSULE, width, at(k), at(k + 1), kTorqueColor, 0.4F);
   }
   // The head, a cone along the same arc.
   constexpr int kSlices = 12;
   for (int k = 0; k < kSlices; ++k) {
     const double slice = head / kSlices, angle = end + slice * k;
-    Add(scene_, mjGEOM_CYLINDER, 3.0 * width * (1 - (k + 0.5) / kSlices),
-        OnCircle(radius, angle, depth), OnCircle(radius, angle + 1.05 * slice, depth), kTorqueColor,
-        0.4F);
+    Add(scene_, mjGEOM_CYLINDER, 3.0 * width * (1 - (k + 0.5) / kSlices), around(angle),
+        around(angle + 1.05 * slice), kTorqueColor, 0.4F);
   }
 }
 

@@ -60,7 +60,7 @@ class PendulumScene {
 
  private:
   void AddGoal(const PendulumState& state);
-  void AddTorque(double torque);
+  void AddTorque(double torque, const PendulumState& state);
   void AddTrail(std::span<const std::array<double, 2>> trail);
 
   Plant plant_;

@@ -1,5 +1,5 @@
 // Symbols: q1, q2 joint angles (rad; 0 hanging, q2 relative to link 1), w1, w2 their velocities
-// (rad/s), tau torque at joint 1 (N·m), s and c sine and cosine, 12 of the sum of both angles.
+// (rad/s), tau torque of the motor (N·m), s and c sine and cosine, 12 of the sum of both angles.
 // The plant's constants J1, J2, b, G1, G2, … are those of closed_form.h.
 #include "sim/closed_form.h"
 
@@ -24,12 +24,18 @@ HWY_INLINE V LoadFrom(const AlignedVector<double>& x, size_t i) {
   return hn::Load(kDoubles, x.data() + i);
 }
 
+/// Whether the motor is at joint 1, else it is at joint 2.
+HWY_INLINE hn::Mask<D> DrivesJoint1(const ClosedFormBatch& batch, size_t i) {
+  return hn::Lt(LoadFrom(batch.joint, i), Constant(1.5));
+}
+
 /// The constants of the equations of motion.
 struct Dynamics {
-  V J2, b, G1, G2, d1, d2, tau;
-  V J12;  // J1 + J2
-  V M22;  // J2 + armature
-  V det;  // the part of det M that does not depend on q2
+  V J2, b, G1, G2, d1, d2;
+  V tau1, tau2;  // at each joint; one of them is the motor's, the other 0
+  V J12;         // J1 + J2
+  V M22;         // J2 + armature
+  V det;         // the part of det M that does not depend on q2
 };
 
 HWY_INLINE Dynamics LoadDynamics(const ClosedFormBatch& batch, size_t i) {
@@ -41,7 +47,10 @@ HWY_INLINE Dynamics LoadDynamics(const ClosedFormBatch& batch, size_t i) {
   p.G2 = LoadFrom(batch.G2, i);
   p.d1 = LoadFrom(batch.d1, i);
   p.d2 = LoadFrom(batch.d2, i);
-  p.tau = LoadFrom(batch.tau, i);
+  const V tau = LoadFrom(batch.tau, i);
+  const auto at1 = DrivesJoint1(batch, i);
+  p.tau1 = hn::IfThenElseZero(at1, tau);
+  p.tau2 = hn::IfThenZeroElse(at1, tau);
   p.J12 = J1 + p.J2;
   p.M22 = p.J2 + Constant(kArmature);
   p.det = MulAdd(J1, p.J2, Constant(kArmature) * p.J12);
@@ -77,6 +86,11 @@ HWY_INLINE void StoreState(const State& x, size_t i, ClosedFormBatch& batch) {
   hn::Store(x.w.two, kDoubles, batch.w2.data() + i);
 }
 
+/// The angle of the motor's joint.
+HWY_INLINE V MotorAngleOf(const ClosedFormBatch& batch, size_t i, const State& x) {
+  return hn::IfThenElse(DrivesJoint1(batch, i), x.q.one, x.q.two);
+}
+
 /// M(q) q̈ = f = τ - c(q, q̇) - g(q) - d q̇, solved for q̈.
 HWY_INLINE Joints Acceleration(const Dynamics& p, const State& x) {
   const auto [s1, c1] = SineCosineOf(x.q.one);
@@ -91,12 +105,13 @@ HWY_INLINE Joints Acceleration(const Dynamics& p, const State& x) {
   const V M12 = p.J2 + bc;
   const V det = MulAdd(bc, Constant(2 * kArmature) - bc, p.det);
 
-  // f1 = τ + b s2 (2 w1 + w2) w2 - G1 s1 - G2 s12 - d1 w1;  f2 = -b s2 w1² - G2 s12 - d2 w2
+  // f1 = τ1 + b s2 (2 w1 + w2) w2 - G1 s1 - G2 s12 - d1 w1
+  // f2 = τ2 - b s2 w1² - G2 s12 - d2 w2
   const V bs = p.b * s2;
   const V g2 = p.G2 * s12;
   const V f1 = MulAdd(bs, MulAdd(Constant(2), w1, w2) * w2,
-                      NegMulAdd(p.G1, s1, NegMulAdd(p.d1, w1, p.tau)) - g2);
-  const V minus_f2 = MulAdd(bs, w1 * w1, MulAdd(p.d2, w2, g2));
+                      NegMulAdd(p.G1, s1, NegMulAdd(p.d1, w1, p.tau1)) - g2);
+  const V minus_f2 = MulAdd(bs, w1 * w1, MulAdd(p.d2, w2, g2)) - p.tau2;
 
   const V inverse = Constant(1) / det;
   return {MulAdd(p.M22, f1, M12 * minus_f2) * inverse,
@@ -146,7 +161,8 @@ HWY_INLINE void AdvanceVectors(ClosedFormBatch& batch, int steps, size_t first) 
   for (size_t k = 0; k < K; ++k) {
     p[k] = LoadDynamics(batch, first + k * lanes);
     x[k] = LoadState(batch, first + k * lanes);
-    hn::Store(x[k].q.one, kDoubles, batch.q1_before.data() + first + k * lanes);
+    hn::Store(MotorAngleOf(batch, first + k * lanes, x[k]), kDoubles,
+              batch.angle_before.data() + first + k * lanes);
   }
   for (int step = 0; step < steps; ++step) RungeKuttaStep(p, x);
   HWY_UNROLL(2)
@@ -245,7 +261,8 @@ HWY_INLINE void JudgeVector(const ClosedFormBatch& batch, const RewardWeights& w
   const Pose pose = PoseOf(batch, i, x);
   JudgeObservation(pose, x, verdict);
   JudgeReward(pose, x, tau, weights, verdict);
-  hn::Store(hn::Abs(tau * (x.q.one - LoadFrom(batch.q1_before, i))), kDoubles, verdict.work);
+  const V turned = MotorAngleOf(batch, i, x) - LoadFrom(batch.angle_before, i);
+  hn::Store(hn::Abs(tau * turned), kDoubles, verdict.work);
   hn::Store(hn::IfThenElse(IsSound(x), Constant(0), Constant(1)), kDoubles, verdict.blew_up);
 }
 
@@ -300,15 +317,16 @@ HWY_EXPORT(SineCosineRange);
 ClosedFormBatch::ClosedFormBatch(size_t num_envs) {
   constexpr size_t kWidest = HWY_NAMESPACE::kWidest;
   const size_t padded = (num_envs + kWidest - 1) / kWidest * kWidest;
-  for (Array* array : {&q1, &q2, &w1, &w2, &tau, &q1_before, &J1, &J2, &b, &G1, &G2, &d1, &d2,
-                       &limit, &T1, &T2, &energy_scale, &share1, &share2}) {
+  for (Array* array :
+       {&q1, &q2, &w1, &w2,    &tau,   &angle_before, &J1, &J2,           &b,      &G1,
+        &G2, &d1, &d2, &limit, &joint, &T1,           &T2, &energy_scale, &share1, &share2}) {
     array->resize(padded);
   }
   for (size_t i = 0; i < padded; ++i) SetPlant(i, Plant());
 }
 
 void ClosedFormBatch::SetPlant(size_t env, const Plant& plant) {
-  const auto& [m1, m2, l1, l2, damping1, damping2, g, torque_limit] = plant;
+  const auto& [m1, m2, l1, l2, damping1, damping2, g, torque_limit, actuated_joint] = plant;
   const double c1 = l1 / 2, c2 = l2 / 2;  // from the joint to the centre
   const double I1 = CapsuleInertia(m1, kCapsuleRadius, l1).across;
   const double I2 = CapsuleInertia(m2, kCapsuleRadius, l2).across;
@@ -320,6 +338,7 @@ void ClosedFormBatch::SetPlant(size_t env, const Plant& plant) {
   d1[env] = damping1;
   d2[env] = damping2;
   limit[env] = torque_limit;
+  joint[env] = actuated_joint;
 
   T1[env] = m1 * l1 * l1 / 12 + m1 * c1 * c1 + m2 * l1 * l1;
   T2[env] = m2 * l2 * l2 / 12 + m2 * c2 * c2;

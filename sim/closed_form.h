@@ -29,7 +29,7 @@ struct ClosedFormBatch {
   // State.
   Array q1, q2, w1, w2;  // rad, rad/s
   Array tau;             // N·m, held until it is set again
-  Array q1_before;       // rad, before the last Advance
+  Array angle_before;    // of the motor's joint before the last Advance, rad
 
   // Equations of motion, with c = l/2 and MuJoCo's capsules of inertia I about their centres.
   Array J1;  // I1 + m1 c1² + m2 l1² + armature: inertia about joint 1, link 2 as a point, kg·m²
@@ -39,6 +39,7 @@ struct ClosedFormBatch {
   Array G2;  // m2 c2 g: the same of link 2 about joint 2, N·m
   Array d1, d2;  // damping, N·m·s/rad
   Array limit;   // of the torque, N·m
+  Array joint;   // that the motor drives: 1 or 2
 
   // Task, whose energy is that of thin rods.
   Array T1, T2;          // inertias like J1 and J2, kg·m²

@@ -1,6 +1,7 @@
 // The double pendulum as formulas. Symbols: q1, q2 joint angles (rad; 0 hanging, q2 relative to
 // link 1), w1, w2 their velocities (rad/s), m mass (kg), l length (m), g gravity (m/s²), tau torque
-// (N·m). Every constant is that of the post "Balancing a Double Pendulum with DQN and MuJoCo".
+// of the motor (N·m). Every constant is that of the post "Balancing a Double Pendulum with DQN and
+// MuJoCo".
 #include "sim/double_pendulum.h"
 
 #include <algorithm>
@@ -20,6 +21,10 @@ void Plant::Describe(Options& o) {
   o.Add(&damping2, "damping2", 0.2, kDamping, "N·m·s/rad", "damping of joint 2");
   o.Add(&gravity, "gravity", 9.81, {0.01, 100}, "m/s²", "gravity, downwards");
   o.Add(&torque_limit, "torque_limit", 5.0, {0.01, 1000}, "N·m", "largest torque of the motor");
+  Option& joint = o.Add(&actuated_joint, "actuated_joint", 1, {1, 2}, "",
+                        "joint that the motor drives: 1 makes a pendubot, 2 an acrobot");
+  joint.step = 1;
+  joint.implied = true;
   o.Alias("mass", {"mass1", "mass2"});
   o.Alias("length", {"length1", "length2"});
   o.Alias("damping", {"damping1", "damping2"});
@@ -29,6 +34,7 @@ std::vector<std::pair<std::string, double>> PlantValues(Plant plant) {
   std::vector<std::pair<std::string, double>> values;
   const Options options = OptionsOf(plant);
   for (const Option& option : options.all()) {
+    if (option.name == "actuated_joint" && plant.actuated_joint == 1) continue;
     values.emplace_back(option.name, *std::get<double*>(option.target));
   }
   return values;
@@ -56,7 +62,7 @@ CapsuleInertia::CapsuleInertia(double m, double r, double l) {
 }
 
 double Energy(const Plant& plant, const PendulumState& s) {
-  const auto& [m1, m2, l1, l2, d1, d2, g, limit] = plant;
+  const auto& [m1, m2, l1, l2, d1, d2, g, limit, joint] = plant;
   const double I1 = m1 * l1 * l1 / 12;
   const double I2 = m2 * l2 * l2 / 12;
   const double w12 = s.w1 + s.w2;  // absolute velocity of link 2
@@ -87,6 +93,10 @@ double TipHeight(const Plant& plant, const PendulumState& s) {
 bool Inverted(const PendulumState& s) {
   constexpr double kCos30 = std::numbers::sqrt3 / 2;
   return -std::cos(s.q1) >= kCos30 && -std::cos(s.q1 + s.q2) >= kCos30;
+}
+
+double MotorAngle(const Plant& plant, const PendulumState& s) {
+  return plant.actuated_joint == 1 ? s.q1 : s.q2;
 }
 
 std::array<double, 2> Lean(const PendulumState& s) {
@@ -151,7 +161,7 @@ std::string Mjcf(const Plant& plant) {
     </body>
   </worldbody>
   <actuator>
-    <motor name="torque1" joint="joint1" ctrllimited="true" ctrlrange="-@torque_limit @torque_limit"/>
+    <motor name="torque@actuated_joint" joint="joint@actuated_joint" ctrllimited="true" ctrlrange="-@torque_limit @torque_limit"/>
   </actuator>
 </mujoco>
 )";

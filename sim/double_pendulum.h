@@ -11,7 +11,7 @@
 /// The double pendulum and its task as formulas, without a simulator.
 ///
 /// Symbols: q1, q2 joint angles (rad; both 0 hanging, q2 relative to link 1), w1, w2 their
-/// velocities (rad/s), m mass (kg), l length (m), g gravity (m/s²), tau torque at joint 1 (N·m).
+/// velocities (rad/s), m mass (kg), l length (m), g gravity (m/s²), tau the motor's torque (N·m).
 namespace upswing {
 
 /// The task's name.
@@ -39,13 +39,15 @@ struct Plant {
   double damping1, damping2;  // N·m·s/rad
   double gravity;             // m/s², along -z
   double torque_limit;        // N·m
+  double actuated_joint;      // which the motor drives: 1 (a pendubot) or 2 (an acrobot)
 
   Plant() { SetDefaults(*this); }
   /// One line per setting: name, default, range, unit, help.
   void Describe(Options& options);
 };
 
-/// Name and value of each of its parameters.
+/// Name and value of each of its parameters; of actuated_joint where it is not 1, so that what
+/// names none, as all before there was a choice, is of joint 1.
 std::vector<std::pair<std::string, double>> PlantValues(Plant plant);
 
 /// Principal moments of inertia (kg·m²) of a solid capsule, across and along its axis: mass m (kg),
@@ -76,6 +78,9 @@ double TipHeight(const Plant& plant, const PendulumState& s);
 
 /// Both links within 30° of straight up; the second by its absolute angle q1 + q2.
 bool Inverted(const PendulumState& s);
+
+/// The angle of the joint that the motor drives (rad).
+double MotorAngle(const Plant& plant, const PendulumState& s);
 
 /// How far both links lean from straight up, rad, in [-π, π]; the second by its absolute angle.
 std::array<double, 2> Lean(const PendulumState& s);

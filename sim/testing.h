@@ -20,6 +20,8 @@ inline Plant RandomPlant(Rng& rng) {
     *std::get<double*>(option.target) = low > 0
                                             ? std::exp(rng.Uniform(std::log(low), std::log(high)))
                                             : high * std::pow(rng.Uniform(), 3);
+    if (option.step > 0)
+      *std::get<double*>(option.target) = std::round(*std::get<double*>(option.target));
   }
   return plant;
 }

@@ -87,6 +87,16 @@ class Environments(unittest.TestCase):
                 self.assertEqual(info["torque"], float(rows[k]["torque"]))
             self.assertEqual(env.plant["mass2"], 1.2)
 
+    def test_the_motor_is_at_either_joint(self):
+        # From hanging the torque moves most the joint that it acts on, and not both the same way.
+        for joint, signs in ((1, [1, -1]), (2, [-1, 1])):
+            env = gym.make(ID, actuated_joint=joint).unwrapped
+            env.reset(seed=0, options={"state": [0, 0, 0, 0]})
+            env.step(np.array([1.0]))
+            np.testing.assert_array_equal(np.sign(env.state[2:]), signs)
+        with self.assertRaisesRegex(ValueError, "actuated_joint: expected a multiple of 1"):
+            gym.make(ID, actuated_joint=1.5)
+
     def test_the_reward_is_the_sum_of_its_terms(self):
         env = gym.make(ID, energy_weight=0.5, random_start_share=1)
         env.reset(seed=2)

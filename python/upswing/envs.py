@@ -19,7 +19,7 @@ from ._types import EnvironmentSettings
 
 
 class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
-    """A double pendulum with a motor at its first joint, to be swung up and balanced.
+    """A double pendulum with a motor at one of its joints, to be swung up and balanced.
 
     `gym.make("upswing/DoublePendulum-v0")` makes it. docs/task.md has it as formulas.
 
@@ -46,7 +46,7 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
         **settings: as those of trainings, with the same defaults (`upswing.settings()`, those with
             `environment`): agent, whose environment it is; physics ("mujoco" or "closed-form"),
             episode_seconds, random_start_share, start_noise, memory; the plant (mass1, …,
-            torque_limit, model); sensor_noise, delay; randomize, …; the reward's weights
+            torque_limit, actuated_joint, model); sensor_noise, delay; randomize, …; the reward's weights
 
     >>> env = gym.make("upswing/DoublePendulum-v0", physics="closed-form", mass2=1.2, delay=0.02)
     >>> obs, info = env.reset(seed=1, options={"state": [3.14, 0, 0, 0]})

@@ -120,6 +120,11 @@ UPSWING_EXPORT(policy_open) Controller* PolicyOpen(const std::byte* file, size_t
       throw BadInput(
           Concat("expected a policy of the double pendulum, got one of ", controller->loaded.task));
     }
+    if (controller->loaded.plant.actuated_joint != 1) {
+      throw BadInput(
+          "expected a policy for a motor at joint 1, as the page's pendulum has it, got one for "
+          "joint 2");
+    }
     SetText(About(*controller, tensors.metadata));
     return controller.release();
   });
