@@ -17,6 +17,7 @@ using Command = std::function<int()>;
 
 /// Each adds its subcommand to the program and sets `command` when it is the one that was typed.
 void AddTrain(CLI::App& program, Command& command);
+void AddBounds(CLI::App& program, Command& command);
 void AddEval(CLI::App& program, Command& command);
 void AddSimulate(CLI::App& program, Command& command);
 void AddMap(CLI::App& program, Command& command);

@@ -79,6 +79,7 @@ int Main(int argc, char** argv) {
   Command command;
   AddTrain(program, command);
   AddEval(program, command);
+  AddBounds(program, command);
   AddSimulate(program, command);
   AddMap(program, command);
   AddPlot(program, command);

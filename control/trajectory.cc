@@ -66,13 +66,19 @@ Trajectory TrajectoryOptimizer::Follow(const TrajectoryCost& cost, const StateVe
   for (size_t t = 0; t < steps; ++t) {
     StateVector x = result.x.back();
     const double u = std::clamp(torque(t, x), -limit, limit);
-    result.cost += cost.Running(x, u);
     model_.Step({&x, 1}, {&u, 1});
     result.x.push_back(x);
     result.u.push_back(u);
   }
-  result.cost += cost.Final(result.x.back());
-  return result;
+  return Priced(cost, std::move(result));
+}
+
+Trajectory TrajectoryOptimizer::Priced(const TrajectoryCost& cost, Trajectory trajectory) {
+  trajectory.cost = cost.Final(trajectory.x.back());
+  for (size_t t = 0; t < trajectory.u.size(); ++t) {
+    trajectory.cost += cost.Running(trajectory.x[t], trajectory.u[t]);
+  }
+  return trajectory;
 }
 
 int TrajectoryOptimizer::Improve(const TrajectoryCost& cost, double tolerance, int iterations,

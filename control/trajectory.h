@@ -74,7 +74,10 @@ class TrajectoryOptimizer {
   Trajectory Follow(const TrajectoryCost& cost, const StateVector& start, const Trajectory& planned,
                     std::span<const Eigen::RowVector4d> K);
 
-  /// Improves a trajectory that Follow made until an iteration gains less than `tolerance` times
+  /// The same trajectory with what it costs.
+  static Trajectory Priced(const TrajectoryCost& cost, Trajectory trajectory);
+
+  /// Improves a trajectory with its cost until an iteration gains less than `tolerance` times
   /// the cost, at most so many times. Returns the number of iterations.
   int Improve(const TrajectoryCost& cost, double tolerance, int iterations, Trajectory& trajectory);
 

@@ -66,13 +66,17 @@ SwingUp PlanSwingUp(const LqrConfig& lqr, const SwingUpConfig& config, const Lqr
     throw BadInput(Concat("tvlqr: found no swing-up of ", Rounded(config.seconds), " s with ",
                           Rounded(weaker.torque_limit), " N·m that ends where lqr catches"));
   }
-  SwingUp plan{std::move(*best), {}, {}};
-  const auto T = static_cast<size_t>(plan.trajectory.steps());
+  return Tracking(std::move(*best), lqr, upright.lqr().P, model);
+}
+
+SwingUp Tracking(Trajectory trajectory, const LqrConfig& lqr, const Eigen::Matrix4d& P,
+                 PendulumModel& model) {
+  const size_t T = trajectory.u.size();
   std::vector<LinearModel> models(T);
-  model.Linearize({plan.trajectory.x.data(), T}, plan.trajectory.u, models);
-  plan.K.resize(T);
-  plan.P.resize(T + 1);
-  plan.P[T] = upright.lqr().P;
+  model.Linearize({trajectory.x.data(), T}, trajectory.u, models);
+  SwingUp plan{std::move(trajectory), std::vector<Eigen::RowVector4d>(T),
+               std::vector<Eigen::Matrix4d>(T + 1)};
+  plan.P[T] = P;
   for (size_t t = T; t-- > 0;) {
     const auto& [A, B] = models[t];
     const Eigen::Matrix4d PA = plan.P[t + 1] * A;

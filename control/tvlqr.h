@@ -26,9 +26,14 @@ struct SwingUp {
   std::vector<Eigen::Matrix4d> P;  // (T + 1) what leaving the plan costs: (x - x_t)' P_t (x - x_t)
 };
 
+/// The time-varying linear-quadratic regulator about a trajectory, whose end costs x' P x: Tedrake,
+/// "Underactuated Robotics", chapter 8. `model` is one of the plant.
+SwingUp Tracking(Trajectory trajectory, const LqrConfig& lqr, const Eigen::Matrix4d& P,
+                 PendulumModel& model);
+
 /// The best of the plans that trajectory optimisation finds from eight first guesses (sine waves of
-/// torque), and the time-varying linear-quadratic regulator about it: Tedrake, "Underactuated
-/// Robotics", chapter 8. Throws as SolveLqr, and BadInput if no plan ends where `upright` catches.
+/// torque), and the regulator about it. Throws as SolveLqr, and BadInput if no plan ends where
+/// `upright` catches.
 SwingUp PlanSwingUp(const LqrConfig& lqr, const SwingUpConfig& config, const LqrCatch& upright,
                     const Plant& plant);
 

@@ -1,0 +1,126 @@
+#include "lab/bounds.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "apps/commands.h"
+#include "apps/progress.h"
+#include "core/error.h"
+#include "core/json.h"
+#include "core/text.h"
+#include "io/machine.h"
+#include "io/streams.h"
+#include "lab/arguments.h"
+
+namespace upswing {
+namespace {
+
+struct BoundsArguments {
+  BoundsConfig config;
+  std::vector<std::string> policies;
+  std::string csv;
+  int64_t threads;
+  bool as_json = false;
+};
+
+/// A line of the table: what was found, or how a policy did.
+struct Row {
+  std::string name;
+  Evaluation figures;  // of the episodes with the best return
+  Quartiles swing_up_seconds;
+};
+
+/// `width`: columns of the longest name.
+std::string RowText(const Row& row, const Row& best, size_t width) {
+  const double mean = row.figures.reward_sum.mean;
+  std::string text =
+      fmt::format("  {:<{}}  {:6.1f} ± {:5.1f} {:7.1f}%", Printable(row.name), width, mean,
+                  row.figures.reward_sum.deviation, 100 * mean / best.figures.reward_sum.mean);
+  if (row.figures.successes == 0) return text + "   none stays upright";
+  return text + fmt::format("   {:.2f} s (+{:.2f} s)", row.swing_up_seconds.median,
+                            row.swing_up_seconds.median - best.swing_up_seconds.median);
+}
+
+nlohmann::ordered_json RowJson(const Row& row, const Row& best) {
+  const double mean = row.figures.reward_sum.mean;
+  return {{"name", row.name},
+          {"success_rate", row.figures.success_rate()},
+          {"return", {{"mean", mean}, {"deviation", row.figures.reward_sum.deviation}}},
+          {"share", mean / best.figures.reward_sum.mean},
+          {"swing_up_seconds", row.swing_up_seconds.median}};
+}
+
+int RunBounds(const BoundsArguments& a) {
+  if (!a.csv.empty()) CheckWritable("--csv", a.csv);
+  std::vector<LoadedPolicy> policies;
+  for (const std::string& name : a.policies) policies.push_back(GetPolicy({name, {}, {}}));
+  ThreadPool pool(ResolveThreads(a.threads));
+  EpisodeProgress progress(static_cast<double>(a.config.episodes), a.as_json);
+  const EpisodeBounds bounds =
+      FindBounds(a.config, pool, [&](double share) { progress.Show(share); });
+
+  std::vector<Row> rows;
+  const auto add = [&](const std::string& name, const BestEpisodes& best) {
+    rows.push_back({name, Summarize(best.of_return, bounds.rule),
+                    Summarize(best.of_time, bounds.rule).swing_up_seconds});
+  };
+  add("any torque", bounds.any);
+  add(fmt::format("{} torques", a.config.torques), bounds.table);
+  for (const LoadedPolicy& loaded : policies) {
+    const Evaluation figures =
+        EvaluatePolicy(loaded, a.config.trial, a.config.episodes, pool, {}).figures;
+    rows.push_back({loaded.name, figures, figures.swing_up_seconds});
+  }
+  if (!a.csv.empty()) WriteOutput(a.csv, BoundsCsv(bounds));
+  if (a.as_json) {
+    nlohmann::ordered_json j;
+    for (const Row& row : rows) j["rows"].push_back(RowJson(row, rows.front()));
+    fmt::print("{}\n", PrintableJson(j));
+    return 0;
+  }
+  fmt::print("Best found of {} episodes, judged in {}\n", a.config.episodes,
+             a.config.trial.physics);
+  size_t width = 0;
+  for (const Row& row : rows) width = std::max(width, Printable(row.name).size());
+  fmt::print("  {:<{}}  {:<14} {:>8}   median swing-up time\n", "", width, "return", "share");
+  for (const Row& row : rows) fmt::print("{}\n", RowText(row, rows.front(), width));
+  fmt::print("  Nothing proves that there is no better.\n");
+  return 0;
+}
+
+}  // namespace
+
+void AddBounds(CLI::App& program, Command& command) {
+  CLI::App* app = program.add_subcommand(
+      "bounds", "Search for the best return and swing-up time, and compare policies with them");
+  auto a = std::make_shared<BoundsArguments>();
+  app->add_option("policy", a->policies, "policy files, run folders or controllers to compare")
+      ->type_name("POLICY|RUN");
+  Options own;
+  a->config.Describe(own);
+  AddArguments(*app, own);
+  AddSet(*app, a->config.trial.set, "change the plant, such as mass2=1.2 (repeat for more)");
+  AddSeed(*app, a->config.trial.seed, "start states");
+  AddPhysics(*app, a->config.trial.physics, "mujoco");
+  AddThreads(*app, a->threads);
+  app->add_option("--csv", a->csv, "table to write, a row for each episode")
+      ->type_name("FILE")
+      ->check(NotEmpty());
+  app->add_flag("--json", a->as_json, "print JSON instead of a table")->disable_flag_override();
+  app->footer(
+      "The search knows the plant and each start: box-constrained differential dynamic "
+      "programming\n"
+      "from many first guesses, on the reward itself, smooth at first; for a table of torques "
+      "rounded,\n"
+      "then changed one by one (docs/control.md). What it finds is a bound from below of the best\n"
+      "return, and one from above of the least time. Episodes are those of eval.\n\n"
+      "Examples:\n"
+      "  ./upswing bounds\n"
+      "  ./upswing bounds runs/d3qn-seed1 runs/sac-seed1 mpc\n"
+      "  ./upswing bounds --episodes 10 --set torque_limit=4 --csv bounds.csv\n");
+  app->callback([a, &command] { command = [a] { return RunBounds(*a); }; });
+}
+
+}  // namespace upswing

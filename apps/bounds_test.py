@@ -1,0 +1,51 @@
+#!/usr/bin/env python3
+"""The best that is found of an episode, and how near policies come to it: `bounds`."""
+
+import csv
+import json
+import unittest
+
+from testing import ROOT, ProgramTest
+
+POLICY = ROOT / "web/public/agents/fast.safetensors"
+
+
+class Bounds(ProgramTest):
+    def test_nothing_is_better_than_the_best(self):
+        found = json.loads(self.succeed("bounds", POLICY, "tvlqr", "--episodes", 4, "--guesses", 8,
+                                        "--csv", "bounds.csv", "--json"))
+        rows = {row["name"]: row for row in found["rows"]}
+        self.assertEqual(list(rows), ["any torque", "9 torques", str(POLICY), "tvlqr"])
+        best = rows["any torque"]
+        self.assertEqual((best["share"], best["success_rate"]), (1, 1))
+        for row in rows.values():
+            self.assertLessEqual(row["return"]["mean"], best["return"]["mean"])
+            self.assertGreaterEqual(row["swing_up_seconds"], best["swing_up_seconds"])
+        # Policies are judged on the episodes of eval, and as eval judges them.
+        judged = json.loads(self.succeed("eval", "tvlqr", "--episodes", 4, "--json"))
+        self.assertEqual(rows["tvlqr"]["return"], judged["return"])
+        self.succeed("eval", "tvlqr", "--episodes", 4, "--episodes-csv", "eval.csv")
+        read = lambda name: list(csv.DictReader((self.folder / name).open(encoding="utf-8")))
+        self.assertEqual([row["q1"] for row in read("bounds.csv")], [row["q1"] for row in read("eval.csv")])
+        for row in read("bounds.csv"):
+            self.assertGreaterEqual(float(row["return"]), float(row["return_table"]))
+            self.assertLessEqual(float(row["swing_up_seconds"]), float(row["swing_up_seconds_table"]))
+
+    def test_threads_change_nothing(self):
+        one, two = (self.succeed("bounds", "--episodes", 2, "--guesses", 4, "--physics", "closed-form",
+                                 "--threads", threads) for threads in (1, 2))
+        self.assertEqual(one, two)
+        self.assertIn("Nothing proves that there is no better.", one)
+
+    def test_bad_input(self):
+        self.refuse(["bounds", "--set", "damping2=0.3897696914"], "lqr: no gain was found", "delta")
+        self.refuse(["bounds", "--set", "torque_limit=0.1", "--guesses", 2],
+                    "found no swing-up of this plant with 0.1 N·m from 2 guesses")
+        self.refuse(["bounds", "none"], "none: no such file")
+        self.refuse(["bounds", "--episodes", "0"], "--episodes")
+        self.refuse(["bounds", "--torques", "2"], "--torques")
+        self.refuse(["bounds", "--csv", "missing/bounds.csv"], "missing/bounds.csv")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,200 @@
+#include "control/best_episode.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <tuple>
+
+#include "control/reward_cost.h"
+#include "core/error.h"
+#include "core/rng.h"
+#include "core/text.h"
+
+namespace upswing {
+namespace {
+
+constexpr int kReturnSteps = 500;
+static_assert(kReturnSteps * kControlPeriod == kReturnSeconds);
+/// Steps that are optimised: 6 s; upright is reached in less than half of it.
+constexpr size_t kPlannedSteps = 300;
+/// How smooth the reward is taken, one after the other.
+constexpr double kWidths[] = {0.3, 0.1, 0.05, 0.02, 0.01};
+constexpr double kTolerance = 1e-6;
+constexpr int kIterations = 150;
+constexpr int kRounds = 40;  // of changes to all torques
+
+/// Weights with which the return grows with the time that is spent upright. A little energy and
+/// height tell the way there.
+RewardWeights WeightsOf(Aim aim) {
+  RewardWeights weights;
+  if (aim == Aim::kTime) weights.weight = {0.02, 0.02, 1, 0, 0};
+  return weights;
+}
+
+/// Whether one episode is better than another.
+bool IsBetter(const BestEpisode& one, const BestEpisode& other, Aim aim) {
+  const auto score = [&](const BestEpisode& e) {
+    return aim == Aim::kTime ? std::pair(-e.swing_up_seconds, e.reward_sum)
+                             : std::pair(e.reward_sum, 0.0);
+  };
+  return score(one) > score(other);
+}
+
+}  // namespace
+
+BestEpisodeSearch::BestEpisodeSearch(const Plant& plant, std::vector<double> levels, int guesses)
+    : plant_(plant), levels_(std::move(levels)), upright_(LqrConfig(), plant), optimizer_(plant) {
+  const LqrConfig lqr;
+  Rng rng(1, "guesses");
+  std::optional<Trajectory> best;
+  double most = 0;
+  for (int guess = 0; guess < guesses; ++guess) {
+    // A wave of any amplitude, once in 1 to 2 s, and any price of the way against that of its end.
+    const auto steps = static_cast<size_t>(rng.Uniform(80, 250));
+    const double amplitude = rng.Uniform(0, plant.torque_limit), rate = rng.Uniform(3, 6);
+    const double phase = rng.Uniform(0, 2 * std::numbers::pi);
+    const double price = std::pow(10, rng.Uniform(-2.5, 0));
+    std::vector<double> torques;
+    for (size_t t = 0; t < steps; ++t) {
+      torques.push_back(amplitude *
+                        std::sin(rate * kControlPeriod * static_cast<double>(t) + phase));
+    }
+    const QuadraticCost cost(price * lqr.Q(), price * lqr.torque, upright_.lqr().P);
+    Trajectory trajectory = optimizer_.Follow(cost, StateVector::Zero(), torques);
+    optimizer_.Improve(cost, kTolerance, kIterations, trajectory);
+    if (!upright_.Holds(UprightDeviation(trajectory.x.back()), optimizer_.model())) continue;
+    trajectory = Sharpen(Extend(trajectory), WeightsOf(Aim::kReturn));
+    const double reward_sum = Judge(StateVector::Zero(), trajectory.u).reward_sum;
+    if (best && reward_sum <= most) continue;
+    most = reward_sum;
+    best = std::move(trajectory);
+  }
+  if (!best) {
+    throw BadInput(Concat("found no swing-up of this plant with ", Rounded(plant.torque_limit),
+                          " N·m from ", guesses, " guesses"));
+  }
+  from_hanging_ = *std::move(best);
+}
+
+double BestEpisodeSearch::Nearest(double torque) const {
+  if (levels_.empty()) return std::clamp(torque, -plant_.torque_limit, plant_.torque_limit);
+  return *std::ranges::min_element(levels_, {}, [&](double u) { return std::abs(u - torque); });
+}
+
+double BestEpisodeSearch::Hold(const StateVector& deviation) const {
+  return Nearest(upright_.lqr().Torque(deviation));
+}
+
+Trajectory BestEpisodeSearch::Extend(const Trajectory& trajectory) {
+  Trajectory longer{{trajectory.x[0]}, {}, 0};
+  for (size_t t = 0; t < kPlannedSteps; ++t) {
+    StateVector x = longer.x.back();
+    const double u = t < trajectory.u.size()
+                         ? trajectory.u[t]
+                         : std::clamp(upright_.lqr().Torque(UprightDeviation(x)),
+                                      -plant_.torque_limit, plant_.torque_limit);
+    optimizer_.model().Step({&x, 1}, {&u, 1});
+    longer.x.push_back(x);
+    longer.u.push_back(u);
+  }
+  return longer;
+}
+
+Trajectory BestEpisodeSearch::Sharpen(const Trajectory& trajectory, const RewardWeights& weights) {
+  Trajectory now = trajectory, best = trajectory;
+  double most = Judge(trajectory.x[0], trajectory.u, weights).reward_sum;
+  for (const double width : kWidths) {
+    const RewardCost cost(plant_, weights, width);
+    now = TrajectoryOptimizer::Priced(cost, std::move(now));
+    optimizer_.Improve(cost, kTolerance, kIterations, now);
+    const double reward_sum = Judge(now.x[0], now.u, weights).reward_sum;
+    if (reward_sum > most) std::tie(most, best) = std::tuple(reward_sum, now);
+  }
+  return best;
+}
+
+std::vector<BestEpisode> BestEpisodeSearch::Judge(const StateVector& start,
+                                                  std::span<const std::vector<double>> torques,
+                                                  const RewardWeights& weights) {
+  std::vector<BestEpisode> episodes;
+  for (const auto& sequence : torques) episodes.push_back({start, sequence});
+  std::vector<StateVector> x(torques.size(), start);
+  std::vector<double> u(torques.size());
+  for (size_t t = 0; t < kReturnSteps; ++t) {
+    for (size_t i = 0; i < x.size(); ++i) {
+      u[i] = t < torques[i].size() ? torques[i][t] : Hold(UprightDeviation(x[i]));
+    }
+    optimizer_.model().Step(x, u);
+    for (size_t i = 0; i < x.size(); ++i) {
+      const PendulumState s{x[i][0], x[i][1], x[i][2], x[i][3]};
+      const auto terms = RewardTerms(plant_, s, u[i]);
+      for (size_t k = 0; k < terms.size(); ++k) {
+        episodes[i].reward_sum += weights.weight[k] * terms[k];
+      }
+      if (!Inverted(s)) episodes[i].swing_up_seconds = static_cast<double>(t + 2) * kControlPeriod;
+    }
+  }
+  return episodes;
+}
+
+std::vector<double> BestEpisodeSearch::Round(const Trajectory& trajectory) {
+  const LqrConfig lqr;
+  const std::vector<Eigen::RowVector4d> K =
+      Tracking(trajectory, lqr, upright_.lqr().P, optimizer_.model()).K;
+  std::vector<double> torques;
+  StateVector x = trajectory.x[0];
+  for (size_t t = 0; t < K.size(); ++t) {
+    const StateVector deviation = UprightDeviation(x);
+    if (upright_.lqr().Cost(deviation) < upright_.region()) break;
+    torques.push_back(Nearest(trajectory.u[t] - K[t].dot(x - trajectory.x[t])));
+    optimizer_.model().Step({&x, 1}, {&torques.back(), 1});
+  }
+  return torques;
+}
+
+BestEpisode BestEpisodeSearch::Polish(BestEpisode episode, Aim aim) {
+  for (int round = 0; round < kRounds; ++round) {
+    std::vector<std::vector<double>> changed;
+    for (size_t t = 0; t < episode.torques.size(); ++t) {
+      for (const double level : levels_) {
+        if (level == episode.torques[t]) continue;
+        changed.push_back(episode.torques);
+        changed.back()[t] = level;
+      }
+    }
+    bool better = false;
+    for (BestEpisode& other : Judge(episode.start, changed, RewardWeights())) {
+      if (!IsBetter(other, episode, aim)) continue;
+      episode = std::move(other);
+      better = true;
+    }
+    if (!better) break;
+  }
+  return episode;
+}
+
+BestEpisode BestEpisodeSearch::From(const StateVector& start, Aim aim) {
+  // From here the same torques, and those of the mirror image, under feedback.
+  const LqrConfig lqr;
+  const QuadraticCost cost(lqr.Q(), lqr.torque, upright_.lqr().P);
+  std::optional<BestEpisode> best;
+  for (const double sign : {1.0, -1.0}) {
+    Trajectory planned = from_hanging_;
+    for (StateVector& x : planned.x) x *= sign;
+    for (double& u : planned.u) u *= sign;
+    std::vector<Eigen::RowVector4d> K =
+        Tracking(planned, lqr, upright_.lqr().P, optimizer_.model()).K;
+    for (Eigen::RowVector4d& gain : K) gain = -gain;
+    Trajectory trajectory = optimizer_.Follow(cost, start, planned, K);
+    optimizer_.Improve(cost, kTolerance, kIterations, trajectory);
+    trajectory = Sharpen(trajectory, WeightsOf(Aim::kReturn));
+    if (aim == Aim::kTime) trajectory = Sharpen(trajectory, WeightsOf(aim));
+    BestEpisode episode =
+        levels_.empty() ? Judge(start, trajectory.u) : Polish(Judge(start, Round(trajectory)), aim);
+    if (!best || IsBetter(episode, *best, aim)) best = std::move(episode);
+  }
+  return *std::move(best);
+}
+
+}  // namespace upswing

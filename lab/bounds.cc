@@ -1,0 +1,104 @@
+#include "lab/bounds.h"
+
+#include <algorithm>
+#include <memory>
+#include <mutex>
+
+#include "control/best_episode.h"
+#include "core/error.h"
+#include "core/text.h"
+#include "lab/format.h"
+#include "rl/torque_levels.h"
+
+namespace upswing {
+namespace {
+
+/// An environment whose one episode is number `index`.
+std::unique_ptr<VectorEnv> OneEpisode(EnvConfig config, int index) {
+  config.num_envs = 1;
+  config.first_index += static_cast<uint64_t>(index);
+  return MakeEnv(config);
+}
+
+EvaluationEpisode Judged(const EnvConfig& config, int index, const BestEpisode& episode,
+                         const BestEpisodeSearch& search) {
+  return EvaluateEpisodes(EpisodePolicy(episode, search), *OneEpisode(config, index)).front();
+}
+
+double SwingUpSeconds(const EvaluationEpisode& e, const EvaluationRule& rule) {
+  return e.swing_up_seconds.value_or(rule.seconds);
+}
+
+}  // namespace
+
+void BoundsConfig::Describe(Options& o) {
+  o.Add(&episodes, "episodes", 100, {1, 100000}, "", "how many of those of eval");
+  o.Add(&torques, "torques", 9, {3, 101}, "", "size of the table of torques");
+  o.Add(&guesses, "guesses", 24, {1, 10000}, "",
+        "swing-ups from hanging that the search begins with");
+}
+
+EpisodeBounds FindBounds(const BoundsConfig& config, ThreadPool& pool,
+                         const std::function<void(double)>& progress) {
+  const EnvConfig env = TrialEnvironments(config.trial, nullptr);
+  if (!env.mjcf.empty())
+    throw BadInput("--model: expected none, as the search knows the built-in model");
+  const Plant& plant = env.plants.front();
+  const EvaluationRule rule = SpecOf(env).evaluation;
+  const auto n = static_cast<size_t>(config.episodes);
+
+  // Two searches share the work of the pool; the rest is an episode at a time.
+  std::vector<std::unique_ptr<BestEpisodeSearch>> searches(2);
+  pool.ParallelFor(2, [&](int i) {
+    const auto levels =
+        i == 0 ? std::vector<double>() : TorqueLevels(plant.torque_limit, config.torques);
+    searches[static_cast<size_t>(i)] =
+        std::make_unique<BestEpisodeSearch>(plant, levels, static_cast<int>(config.guesses));
+  });
+  const BestEpisodes none{std::vector<EvaluationEpisode>(n), std::vector<EvaluationEpisode>(n)};
+  EpisodeBounds bounds{rule, std::vector<std::vector<double>>(n), none, none};
+  std::mutex mutex;
+  size_t done = 0;
+  pool.ParallelFor(static_cast<int>(n), [&](int index) {
+    const auto i = static_cast<size_t>(index);
+    std::vector<double>& start = bounds.starts[i];
+    start.resize(4);
+    OneEpisode(env, index)->GetState(0, start);
+    for (const bool table : {true, false}) {
+      BestEpisodeSearch search = *searches[table ? 1 : 0];  // its buffers are not for two threads
+      const StateVector x(start.data());
+      BestEpisodes& best = table ? bounds.table : bounds.any;
+      best.of_return[i] = Judged(env, index, search.From(x, Aim::kReturn), search);
+      best.of_time[i] = Judged(env, index, search.From(x, Aim::kTime), search);
+    }
+    // Torques of the table are torques.
+    EvaluationEpisode& most = bounds.any.of_return[i];
+    EvaluationEpisode& fastest = bounds.any.of_time[i];
+    if (bounds.table.of_return[i].reward_sum > most.reward_sum) most = bounds.table.of_return[i];
+    if (SwingUpSeconds(bounds.table.of_time[i], rule) < SwingUpSeconds(fastest, rule)) {
+      fastest = bounds.table.of_time[i];
+    }
+    const std::lock_guard lock(mutex);
+    ++done;
+    if (progress) progress(static_cast<double>(done) / static_cast<double>(n));
+  });
+  return bounds;
+}
+
+std::string BoundsCsv(const EpisodeBounds& bounds) {
+  std::string csv =
+      "episode,q1,q2,w1,w2,return,swing_up_seconds,return_table,swing_up_seconds_table\n";
+  for (size_t i = 0; i < bounds.starts.size(); ++i) {
+    csv += std::to_string(i);
+    const auto add = [&](double number) { csv += ',' + FormatNumber(number); };
+    for (const double number : bounds.starts[i]) add(number);
+    for (const BestEpisodes* best : {&bounds.any, &bounds.table}) {
+      add(best->of_return[i].reward_sum);
+      add(SwingUpSeconds(best->of_time[i], bounds.rule));
+    }
+    csv += '\n';
+  }
+  return csv;
+}
+
+}  // namespace upswing
