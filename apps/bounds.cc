@@ -94,7 +94,7 @@ int RunBounds(const BoundsArguments& a) {
 
 void AddBounds(CLI::App& program, Command& command) {
   CLI::App* app = program.add_subcommand(
-      "bounds", "Search for the best return and swing-up time, and compare policies with them");
+      "bounds", "Search for the best episodes, and compare policies with them");
   auto a = std::make_shared<BoundsArguments>();
   app->add_option("policy", a->policies, "policy files, run folders or controllers to compare")
       ->type_name("POLICY|RUN");
