@@ -23,6 +23,7 @@ namespace fs = std::filesystem;
 struct ExportArguments {
   std::vector<std::string> policies;
   std::string page, id, test_vectors, onnx, c, prefix;
+  int64_t checkpoints = 0;
 };
 
 /// Throws BadInput unless exactly one of the things to write was named.
@@ -84,8 +85,8 @@ int ExportC(const ExportArguments& a) {
 int ExportPage(const ExportArguments& a) {
   if (a.policies.empty()) throw BadInput("--page: expected policies or run folders, got none");
   const std::vector<fs::path> paths(a.policies.begin(), a.policies.end());
-  for (const std::string& id : ExportToPage(paths, a.id, a.page)) {
-    fmt::print("{}\n", Printable((fs::path(a.page) / (id + ".safetensors")).string()));
+  for (const std::string& name : ExportToPage(paths, a.id, a.checkpoints, a.page)) {
+    fmt::print("{}\n", Printable((fs::path(a.page) / name).string()));
   }
   return 0;
 }
@@ -94,6 +95,9 @@ int RunExport(const ExportArguments& a) {
   CheckOne(a);
   if (!a.prefix.empty() && a.c.empty())
     throw BadInput("--prefix: expected --c, whose names it begins");
+  if (a.checkpoints > 0 && a.page.empty()) {
+    throw BadInput("--checkpoints: expected --page, which shows them");
+  }
   if (!a.onnx.empty()) return ExportOnnx(a);
   if (!a.c.empty()) return ExportC(a);
   if (!a.page.empty()) return ExportPage(a);
@@ -135,6 +139,12 @@ void AddExport(CLI::App& program, Command& command) {
   app->add_option("--id", a->id, "ID in the page, of a single policy [name of the run, or agent]")
       ->type_name("ID")
       ->check(NotEmpty("an ID"));
+  Options own;
+  own.Add(&a->checkpoints, "checkpoints", 0, {2, 100}, "",
+          "for the page, so many policies from the untrained one to each, which is trained again "
+          "for that; of Q-networks")
+      .usual = "none";
+  AddArguments(*app, own);
   app->add_option("--test-vectors", a->test_vectors,
                   "JSON file to write: states, and what the task's formulas make of them; -: "
                   "standard output")
@@ -147,6 +157,7 @@ void AddExport(CLI::App& program, Command& command) {
       "  ./upswing export runs/d3qn-seed1 --page web/public/agents     for every visitor\n"
       "  ./upswing export runs/* --page build/web/agents               in the page built here\n"
       "  ./upswing export policy.safetensors --id mine --page build/web/agents\n"
+      "  ./upswing export runs/d3qn-seed1 --page web/public/agents --checkpoints 10\n"
       "  ./upswing export --test-vectors vectors.json\n\n"
       "`./upswing demo runs/d3qn-seed1` puts it into the page and serves that.\n");
   app->callback([a, &command] { command = [a] { return RunExport(*a); }; });

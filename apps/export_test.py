@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """`upswing export`: test vectors against a second derivation, and policies in the page's folder."""
 
+import array
 import json
 import math
 import shlex
@@ -222,6 +223,60 @@ class PageTest(ProgramTest):
         self.assertEqual((self.folder / "again/policy.safetensors").read_bytes(),
                          (self.folder / "page/run.safetensors").read_bytes())
 
+    def test_the_way_to_a_policy(self):
+        self.succeed(*small(seed=7, steps=8000, eval_every=2000, **self.SETTINGS))
+        about, tensors = read_tensors(self.folder / "run/policy.safetensors")
+        end = int(about["step"])
+        steps = [0, *(int(row["step"]) for row in read_csv(self.folder / "run/evals.csv")
+                      if row["step"] <= end)]
+        count = str(len(steps))
+        printed = self.succeed("export", "run", "--page", "page", "--checkpoints", count)
+        checkpoints = self.index()[0]["checkpoints"]
+        self.assertEqual([one["step"] for one in checkpoints], steps)
+        *files, last = [one["file"] for one in checkpoints]
+        self.assertEqual(last, "run.safetensors")
+        self.assertEqual(printed, "".join(f"page/{name}\n" for name in ("run.safetensors", *files)))
+        bytes_of = {name: (self.folder / "page" / name).read_bytes() for name in files}
+        self.assertEqual(len(set(bytes_of.values())), len(steps) - 1)
+
+        # The training up to there, its parameters rounded to bfloat16.
+        self.succeed(*small(seed=7, steps=steps[1], eval_every=2000, out="short", **self.SETTINGS))
+        _, exact = read_tensors(self.folder / "short/policy.safetensors")
+        rounded_about, rounded = read_tensors(self.folder / "page" / files[1])
+        self.assertEqual(rounded_about["step"], str(steps[1]))
+        self.assertEqual(set(rounded), set(tensors))
+        for name, (kind, shape, data) in rounded.items():
+            if not name.endswith((".weight", ".bias")):
+                self.assertNotEqual(kind, "BF16", name)
+                continue
+            self.assertEqual((kind, shape), ("BF16", exact[name][1]), name)
+            wide = b"".join(bytes(2) + data[i:i + 2] for i in range(0, len(data), 2))
+            for got, expected in zip(array.array("f", wide), array.array("f", exact[name][2]),
+                                     strict=True):
+                self.assertLessEqual(abs(got - expected), 2**-8 * abs(expected))
+        self.succeed("eval", "page/" + files[1], "--episodes", "2")
+
+        # Again, and by the policy alone: the same bytes.
+        self.succeed("export", "run/policy.safetensors", "--id", "run", "--page", "page",
+                     "--checkpoints", count)
+        self.assertEqual({name: (self.folder / "page" / name).read_bytes() for name in files},
+                         bytes_of)
+        before = (self.folder / "page/agents.json").read_text()
+        self.refuse(["export", "run", "--page", "page", "--checkpoints", len(steps) + 1],
+                    "--checkpoints", f"at most {count}")
+        _, untrained = read_tensors(self.folder / "page" / files[0])
+        write_tensors(self.folder / "other.safetensors", about, untrained)
+        self.refuse(["export", "other.safetensors", "--page", "page", "--checkpoints", "2"],
+                    "comes to another policy")
+        self.assertEqual((self.folder / "page/agents.json").read_text(), before)
+
+    def test_the_way_is_that_of_a_q_network_in_the_page(self):
+        self.succeed("train", "--agent", "sac-fast", "--steps", 2000, "--eval-every", 1000,
+                     "--eval-episodes", 1, "--threads", 1, "--out", "run")
+        self.refuse(["export", "run", "--page", "page", "--checkpoints", "2"], "Q-network")
+        self.refuse(["export", "run", "--c", "a.h", "--checkpoints", "2"], "--page")
+        self.refuse(["export", "run", "--page", "page", "--checkpoints", "1"], "--checkpoints")
+
     def test_a_named_agent_as_it_is_needs_no_more_words(self):
         self.succeed("train", "--agent", "fast", "--seed", 3, "--steps", 10000, "--threads", 1,
                      "--out", "run")
@@ -354,7 +409,8 @@ class ShippedTest(ProgramTest):
         folder = ROOT / "web/public/agents"
         entries = json.loads((folder / "agents.json").read_text())["agents"]
         self.assertEqual({path.name for path in folder.iterdir()},
-                         {entry["file"] for entry in entries} | {"agents.json"})
+                         {one["file"] for entry in entries
+                          for one in (entry, *entry.get("checkpoints", []))} | {"agents.json"})
         for entry in entries:
             with self.subTest(agent=entry["id"]):
                 # One that masters a box of plants need not master every plant of it.
@@ -365,6 +421,7 @@ class ShippedTest(ProgramTest):
                              "--page", entry["id"])
                 text = (self.folder / entry["id"] / "agents.json").read_text()
                 del entry["curve"]  # that of the run, which is not here
+                entry.pop("checkpoints", None)
                 self.assertEqual(json.loads(text)["agents"], [entry])
 
 

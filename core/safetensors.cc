@@ -227,6 +227,7 @@ Tensors ReadSafetensors(std::vector<std::byte> content, std::string where) {
     throw BrokenSafetensors(tensors.where(), error.what());
   }
   tensors.metadata.erase("checksum");
+  tensors.Widen();
   return tensors;
 }
 

@@ -14,7 +14,8 @@
 /// The safetensors format (https://huggingface.co/docs/safetensors, "Format"), in memory. In
 /// addition, the metadata hold a checksum of the whole, which reading verifies. What has an
 /// `upswing_version` must have one; what other programs wrote need not. The bytes are not trusted:
-/// reading takes no more memory than their size, and a header has at most 1 MiB.
+/// reading takes no more memory than three times their size (numbers of bfloat16 become float), and
+/// a header has at most 1 MiB.
 namespace upswing {
 
 /// Tensors as a file's bytes: `head`, then the tensors' own.

@@ -16,14 +16,28 @@ struct DtypeFacts {
   size_t size;
 };
 constexpr std::array kDtypes{
-    DtypeFacts{Dtype::kU8, "U8", 1},   DtypeFacts{Dtype::kF32, "F32", 4},
-    DtypeFacts{Dtype::kF64, "F64", 8}, DtypeFacts{Dtype::kI64, "I64", 8},
-    DtypeFacts{Dtype::kU64, "U64", 8},
+    DtypeFacts{Dtype::kU8, "U8", 1},   DtypeFacts{Dtype::kBF16, "BF16", 2},
+    DtypeFacts{Dtype::kF32, "F32", 4}, DtypeFacts{Dtype::kF64, "F64", 8},
+    DtypeFacts{Dtype::kI64, "I64", 8}, DtypeFacts{Dtype::kU64, "U64", 8},
 };
 
 const DtypeFacts& FactsOf(Dtype dtype) {
   return *std::find_if(kDtypes.begin(), kDtypes.end(),
                        [&](const DtypeFacts& facts) { return facts.dtype == dtype; });
+}
+
+/// The numbers of a tensor, whose bytes need not be aligned.
+template <typename T>
+std::vector<T> NumbersOf(const Tensor& tensor) {
+  std::vector<T> numbers(tensor.bytes.size() / sizeof(T));
+  if (!numbers.empty()) std::memcpy(numbers.data(), tensor.bytes.data(), tensor.bytes.size());
+  return numbers;
+}
+
+template <typename T>
+std::vector<std::byte> BytesOfNumbers(const std::vector<T>& numbers) {
+  const auto bytes = std::as_bytes(std::span(numbers));
+  return {bytes.begin(), bytes.end()};
 }
 
 }  // namespace
@@ -47,6 +61,27 @@ const std::string& Tensors::Metadata(const std::string& key) const {
   const auto found = metadata.find(key);
   if (found == metadata.end()) throw BadInput(Concat(where_, ": no metadata \"", key, "\""));
   return found->second;
+}
+
+void Tensors::Narrow() {
+  for (auto& [name, tensor] : tensors_) {
+    if (tensor.dtype != Dtype::kF32) continue;
+    const std::vector<uint32_t> wide = NumbersOf<uint32_t>(tensor);
+    if (std::ranges::any_of(wide, [](uint32_t bits) { return (bits & 0xffff) != 0; })) continue;
+    std::vector<uint16_t> narrow(wide.size());
+    std::ranges::transform(wide, narrow.begin(), [](uint32_t bits) { return bits >> 16; });
+    tensor = {Dtype::kBF16, tensor.shape, Keep(BytesOfNumbers(narrow))};
+  }
+}
+
+void Tensors::Widen() {
+  for (auto& [name, tensor] : tensors_) {
+    if (tensor.dtype != Dtype::kBF16) continue;
+    const std::vector<uint16_t> narrow = NumbersOf<uint16_t>(tensor);
+    std::vector<uint32_t> wide(narrow.size());
+    std::ranges::transform(narrow, wide.begin(), [](uint32_t bits) { return bits << 16; });
+    tensor = {Dtype::kF32, tensor.shape, Keep(BytesOfNumbers(wide))};
+  }
 }
 
 void Tensors::Expect(const std::string& name, Dtype dtype,

@@ -12,8 +12,9 @@
 
 namespace upswing {
 
-/// Number types of tensors, with the names that safetensors gives them.
-enum class Dtype { kU8, kF32, kF64, kI64, kU64 };
+/// Number types of tensors, with the names that safetensors gives them. BF16 (bfloat16, the upper
+/// half of F32's bits) is one of files alone: what is read of it is F32.
+enum class Dtype { kU8, kBF16, kF32, kF64, kI64, kU64 };
 
 std::string_view NameOf(Dtype dtype);
 size_t SizeOf(Dtype dtype);
@@ -90,6 +91,11 @@ class Tensors {
   }
 
   const std::map<std::string, Tensor>& all() const { return tensors_; }
+
+  /// F32 whose numbers are all ones of bfloat16 becomes BF16: half the size, and nothing is lost.
+  void Narrow();
+  /// BF16 becomes F32.
+  void Widen();
 
   /// Copies a tensor into `values`. Throws BadInput, which says where, which tensor, what was
   /// expected and what was found, unless it has this type and number of elements, and the shape if

@@ -67,6 +67,9 @@ void MakeSeeds(const fs::path& corpus) {
   }
   const QPolicy policy(shape, std::vector<float>(network.num_parameters(), 0.25F), {-1, 1}, info);
   SaveTensors(policy.ToTensors(), corpus / "policy/accepted/plain-of-another-writer.safetensors");
+  Tensors narrow = policy.Rounded().ToTensors();
+  narrow.Narrow();
+  SaveTensors(narrow, corpus / "policy/accepted/bfloat16.safetensors");
 }
 
 }  // namespace

@@ -79,6 +79,30 @@ TEST_F(TensorFileTest, RoundTrip) {
   EXPECT_EQ(file.Count<uint8_t>("bytes"), 3U);
 }
 
+TEST_F(TensorFileTest, NumbersOfBfloat16TakeHalfTheBytesAndAreReadAsFloat) {
+  const std::vector<float> exact{1, -2.5F, 0, 0x1.fep127F, -0.0F, 0x1p-133F, 7};
+  const std::vector<float> others{1, 0.1F};
+  Tensors file;
+  file.Add<float>("exact", exact, {7, 1});
+  file.Add<float>("others", others);
+  file.Add<float>("empty", std::span<const float>(), {0, 5});
+  file.metadata["upswing_version"] = "0";
+  SaveTensors(file, path_);
+  const auto before = fs::file_size(path_);
+  file.Narrow();
+  EXPECT_EQ(file.all().at("exact").Describe(), "BF16 [7, 1]");
+  EXPECT_EQ(file.all().at("others").dtype, Dtype::kF32);
+  SaveTensors(file, path_);
+  EXPECT_LT(fs::file_size(path_), before);
+
+  const Tensors loaded = LoadTensors(path_);
+  EXPECT_EQ(loaded.all().at("exact").Describe(), "F32 [7, 1]");
+  EXPECT_EQ(loaded.Count<float>("empty"), 0U);
+  std::vector<float> read(7);
+  loaded.Read("exact", std::span(read), {7, 1});
+  EXPECT_EQ(std::memcmp(read.data(), exact.data(), sizeof(float) * 7), 0);
+}
+
 TEST_F(TensorFileTest, WrongNameTypeShapeAndSizeAreNamed) {
   SaveSample();
   const Tensors file = LoadTensors(path_);

@@ -15,10 +15,26 @@ std::string TestVectorsJson();
 
 /// Copies policies (files or run folders) into a page's folder of agents as ID.safetensors and
 /// adds them to its agents.json, or replaces those of the same ID there. `id` names a single one;
-/// empty: by its run's folder, else by its agent. Everything is read and checked before anything
-/// is written. Returns their IDs. Throws BadInput; Failure if the folder cannot be written.
+/// empty: by its run's folder, else by its agent. With `checkpoints` (0: without) as many policies
+/// along the way of each, from the untrained one to itself. Everything is read and checked before
+/// anything is written. Returns the names of the files. Throws BadInput; Failure if the folder
+/// cannot be written.
 std::vector<std::string> ExportToPage(const std::vector<std::filesystem::path>& paths,
-                                      const std::string& id, const std::filesystem::path& folder);
+                                      const std::string& id, int64_t checkpoints,
+                                      const std::filesystem::path& folder);
+
+/// A policy as it was on the way to another one, as a file.
+struct Checkpoint {
+  int64_t step = 0;
+  std::vector<std::byte> bytes;
+};
+
+/// Trains a policy that was learned again, with the settings in its file, and returns it as it was
+/// at `count` - 1 steps before: untrained, and at evaluations that lie evenly on the way to it. The
+/// parameters are rounded to bfloat16, so that a file has half the size. Throws BadInput if it is
+/// no Q-network, if there are fewer evaluations, or if the training has another end, as on a
+/// processor with other vector instructions.
+std::vector<Checkpoint> CheckpointsOf(const LoadedPolicy& loaded, int64_t count);
 
 /// A learned policy as a file in ONNX's format: `observation` (batch × D) in; `torque` and, by
 /// kind, `q_values`, `mean` and `log_std`, `probabilities`, `value` out; what they mean as metadata

@@ -23,6 +23,11 @@ struct PageAgent {
   fs::path from;
   std::vector<std::byte> bytes;  // of the policy file
   ordered_json entry;            // in agents.json
+  std::vector<Checkpoint> checkpoints;
+
+  std::string FileOf(const Checkpoint& checkpoint) const {
+    return Concat(id, "-at-", checkpoint.step, ".safetensors");
+  }
 };
 
 /// `name` in small letters and digits, with a - in place of anything else between them.
@@ -83,7 +88,16 @@ ordered_json CurveJson(const std::vector<EvaluationRow>& evaluations) {
   return curve;
 }
 
-PageAgent ReadAgent(const fs::path& path, const std::string& given_id) {
+void AddCheckpoints(PageAgent& agent, const LoadedPolicy& loaded, int64_t count) {
+  agent.checkpoints = CheckpointsOf(loaded, count);
+  ordered_json& list = agent.entry["checkpoints"];
+  for (const Checkpoint& checkpoint : agent.checkpoints) {
+    list.push_back({{"step", checkpoint.step}, {"file", agent.FileOf(checkpoint)}});
+  }
+  list.push_back({{"step", agent.entry["step"]}, {"file", agent.entry["file"]}});
+}
+
+PageAgent ReadAgent(const fs::path& path, const std::string& given_id, int64_t checkpoints) {
   const LoadedPolicy loaded = LoadPolicy(path);
   const std::string where = loaded.path.string();
   if (loaded.task != kDoublePendulum) {
@@ -107,16 +121,18 @@ PageAgent ReadAgent(const fs::path& path, const std::string& given_id) {
   if (!given_id.empty()) id = given_id;
   if (id.empty()) throw BadInput(Concat(where, ": names no agent; expected --id"));
 
-  PageAgent agent{id, path, ReadFile(loaded.path), EntryOf(loaded, id)};
+  PageAgent agent{id, path, ReadFile(loaded.path), EntryOf(loaded, id), {}};
   const std::optional<std::string> command = TrainCommand(loaded.policy->info(), where);
   if (command) agent.entry["command"] = *command;
+  if (checkpoints > 0) AddCheckpoints(agent, loaded, checkpoints);
   if (run.empty()) return agent;
   const std::vector<EvaluationRow> evaluations = ReadEvaluations(run, true);
   if (!evaluations.empty()) agent.entry["curve"] = CurveJson(evaluations);
   return agent;
 }
 
-std::vector<PageAgent> ReadAgents(const std::vector<fs::path>& paths, const std::string& id) {
+std::vector<PageAgent> ReadAgents(const std::vector<fs::path>& paths, const std::string& id,
+                                  int64_t checkpoints) {
   if (!id.empty() && paths.size() > 1) {
     throw BadInput(Concat("--id: expected a single policy, got ", paths.size()));
   }
@@ -126,7 +142,7 @@ std::vector<PageAgent> ReadAgents(const std::vector<fs::path>& paths, const std:
   }
   std::vector<PageAgent> agents;
   for (const fs::path& path : paths) {
-    PageAgent agent = ReadAgent(path, id);
+    PageAgent agent = ReadAgent(path, id, checkpoints);
     const auto same = std::ranges::find(agents, agent.id, &PageAgent::id);
     if (same != agents.end()) {
       throw BadInput(Concat(path.string(), ": would be \"", agent.id, "\" in the page, as ",
@@ -167,8 +183,8 @@ void AddEntry(ordered_json& index, const PageAgent& agent) {
 }  // namespace
 
 std::vector<std::string> ExportToPage(const std::vector<fs::path>& paths, const std::string& id,
-                                      const fs::path& folder) {
-  const std::vector<PageAgent> agents = ReadAgents(paths, id);
+                                      int64_t checkpoints, const fs::path& folder) {
+  const std::vector<PageAgent> agents = ReadAgents(paths, id, checkpoints);
   if (fs::exists(folder) && !fs::is_directory(folder)) {
     throw BadInput(Concat(folder.string(), ": expected a folder, got a file"));
   }
@@ -178,15 +194,18 @@ std::vector<std::string> ExportToPage(const std::vector<fs::path>& paths, const 
 
   const FolderLock lock(folder);  // two at a time would lose entries of each other
   ordered_json index = ReadIndex(index_file);
-  std::vector<std::string> ids;
+  std::vector<std::string> names;
+  const auto write = [&](const std::string& name, std::span<const std::byte> bytes) {
+    WriteFileAtomically(folder / name, {&bytes, 1});
+    names.push_back(name);
+  };
   for (const PageAgent& agent : agents) {
-    const std::span<const std::byte> bytes(agent.bytes);
-    WriteFileAtomically(folder / (agent.id + ".safetensors"), {&bytes, 1});
+    write(agent.id + ".safetensors", agent.bytes);
+    for (const Checkpoint& one : agent.checkpoints) write(agent.FileOf(one), one.bytes);
     AddEntry(index, agent);
-    ids.push_back(agent.id);
   }
   WriteFileAtomically(index_file, index.dump(1) + '\n');
-  return ids;
+  return names;
 }
 
 }  // namespace upswing

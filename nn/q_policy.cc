@@ -1,6 +1,7 @@
 #include "nn/q_policy.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "core/argmax.h"
@@ -115,6 +116,16 @@ void QPolicy::Act(Matrix<const float> obs, Matrix<double> action, Memory& memory
       action(first + i, 0) = torques_[static_cast<size_t>(ArgMax(preferences.row(i)))];
     }
   }
+}
+
+QPolicy QPolicy::Rounded() const {
+  std::vector<float> parameters(parameters_.begin(), parameters_.end());
+  for (float& x : parameters) {
+    // To nearest, ties to even; what is not finite is refused when it is written.
+    const auto bits = std::bit_cast<uint32_t>(x);
+    x = std::bit_cast<float>((bits + 0x7fff + (bits >> 16 & 1)) & 0xffff0000);
+  }
+  return QPolicy(shape(), std::move(parameters), torques_, info_);
 }
 
 Tensors QPolicy::ToTensors() const {

@@ -49,6 +49,9 @@ class QPolicy : public Policy {
   /// The checks on loading.
   const SelfCheck& self_check() const { return self_check_; }
 
+  /// The same with its parameters rounded to bfloat16, for a file of half the size.
+  QPolicy Rounded() const;
+
   /// What its file holds. Throws Failure if a parameter is not finite.
   Tensors ToTensors() const override;
 

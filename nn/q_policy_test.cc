@@ -83,6 +83,29 @@ TEST_F(QPolicyTest, LoadsWhatItSavedToTheBit) {
   }
 }
 
+TEST_F(QPolicyTest, RoundedItsFileHasAboutHalfTheSizeAndTheValuesAreNearlyTheSame) {
+  const QPolicy policy = MakePolicy();
+  Tensors file = policy.Rounded().ToTensors();
+  const size_t before = WriteSafetensors(file).Joined().size();
+  file.Narrow();
+  for (const auto& [name, tensor] : file.all()) {
+    const bool is_parameter = name.ends_with(".weight") || name.ends_with(".bias");
+    EXPECT_EQ(tensor.dtype == Dtype::kBF16, is_parameter) << name;
+  }
+  const std::vector<std::byte> bytes = WriteSafetensors(file).Joined();
+  // But for the header, which says it.
+  EXPECT_NEAR(before - bytes.size(), 2 * policy.num_parameters(), 64);
+
+  const QPolicy loaded = QPolicy::From(ReadSafetensors(bytes, "saved"));
+  EXPECT_EQ(loaded.self_check().error, 0);
+  const std::vector<float> obs(8, 0.5F);
+  std::vector<float> q(3), rounded(3);
+  policy.Values({obs.data(), 1, 8}, {q.data(), 1, 3}, *policy.Start(1));
+  loaded.Values({obs.data(), 1, 8}, {rounded.data(), 1, 3}, *loaded.Start(1));
+  EXPECT_NE(q, rounded);
+  for (size_t i = 0; i < 3; ++i) EXPECT_NEAR(q[i], rounded[i], 0.03);
+}
+
 TEST_F(QPolicyTest, AnUnchangedCopyLoads) {
   EXPECT_EQ(ErrorAfter([](auto&, auto&, auto&) {}), "");
 }

@@ -33,7 +33,7 @@ export class CoreController implements Controller {
   /// Frees its memory now; else that happens some time after nobody holds it any more.
   readonly close: () => void;
   private readonly policy: number;
-  private readonly observations: number; // where one is put
+  private readonly observation: number; // where one is put
   private readonly row: number; // where what is made of it lies
   private readonly torques: Float64Array;
   private readonly shape: Shape;
@@ -46,9 +46,9 @@ export class CoreController implements Controller {
     this.about = JSON.parse(core().text) as About;
     this.torques = Float64Array.from(this.about.torques);
     this.shape = JSON.parse(this.about.metadata.network!) as Shape;
-    this.observations = core().reserve(4 * this.inputs);
+    this.observation = core().reserve(4 * this.inputs);
     this.row = core().reserve(8 * this.columns);
-    const close = closer(core(), this.policy, this.observations, this.row);
+    const close = closer(core(), this.policy, this.observation, this.row);
     forgotten.register(this, close, this);
     this.close = () => {
       forgotten.unregister(this);
@@ -86,23 +86,23 @@ export class CoreController implements Controller {
 
   decide(observation: Float32Array): Decision {
     const { exports } = core();
-    new Float32Array(exports.memory.buffer, this.observations, this.inputs).set(observation);
-    core().expect(exports.policy_decide(this.policy, this.observations, 1, this.row));
+    new Float32Array(exports.memory.buffer, this.observation, this.inputs).set(observation);
+    core().expect(exports.policy_decide(this.policy, this.observation, this.row));
     return this.decision(new Float64Array(exports.memory.buffer, this.row, this.columns).slice());
   }
 
   private get columns(): number {
-    return 3 + this.about.outputs + this.about.values;
+    return 1 + this.about.outputs + this.about.values;
   }
 
-  /// From a row of torque, ends of the distribution, outputs and values.
+  /// From a row of torque, outputs and values.
   private decision(row: Float64Array): Decision {
     const { kind, outputs: count, values: valueCount, limit } = this.about;
     const { torques } = this;
     // Numbers that overflowed on the way move nothing.
     const torque = Number.isFinite(row[0]!) ? row[0]! : 0;
-    const outputs = row.subarray(3, 3 + count);
-    const values = row.subarray(3 + count);
+    const outputs = row.subarray(1, 1 + count);
+    const values = row.subarray(1 + count);
     if (kind === 'q') {
       const q = Float32Array.from(values);
       // Q = V + A - mean(A), so that V is their mean; a plain network has none.

@@ -15,7 +15,7 @@ interface Exports {
   bytes_size(): number;
   policy_open(file: number, bytes: number): number;
   policy_close(policy: number): void;
-  policy_decide(policy: number, observations: number, count: number, rows: number): number;
+  policy_decide(policy: number, observation: number, row: number): number;
   numbers(): number;
   pendulum_at(): void;
   capsule_inertia(): void;
@@ -103,7 +103,8 @@ export class Core {
     }
   }
 
-  /// The formulas' numbers: what `work` makes of `input`.
+  /// The formulas' numbers: what `work` makes of `input`. A view of the core's memory, so good until the
+  /// next call.
   formula(input: readonly number[], work: () => void): Float64Array {
     const numbers = () => new Float64Array(this.exports.memory.buffer, this.exports.numbers(), 32);
     numbers().set(input);

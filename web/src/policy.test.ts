@@ -19,7 +19,7 @@ test.each<[string, Record<string, unknown> | string]>([
   ['metadata that are no text', { __metadata__: { a: 1 } }],
   ['metadata that are a list', { __metadata__: [] }],
   ['a tensor that is null', { x: null }],
-  ['an unknown type', tensor([4], [0, 16], 'BF16')],
+  ['an unknown type', tensor([4], [0, 16], 'F16')],
   ['a type that every object has', tensor([4], [0, 16], 'constructor')],
   ['a negative size', tensor([-4], [0, 16])],
   ['a size that is no whole number', tensor([0.5], [0, 2])],

@@ -84,6 +84,69 @@ test('an agent learns from nothing, takes the stage, stays, and is what Node and
   expect(await swingsUp(page)).toBe(true);
 });
 
+test('the default agent: from an untrained policy to the one of the page, fetched when asked for', async ({
+  page,
+}) => {
+  const fetched: string[] = [];
+  page.on('request', (request) => fetched.push(new URL(request.url()).pathname));
+  const checkpoints = () => fetched.filter((path) => /-at-\d+\.safetensors$/.test(path));
+  await openLearn(page);
+  await page.waitForLoadState('networkidle');
+  expect(checkpoints()).toEqual([]);
+  await page.getByRole('button', { name: 'How the default agent learned' }).click();
+  const where = page.locator('#learn-where');
+  await expect(where).toHaveText('on the stage: after 170,016 steps');
+  await expect(page.locator('#learn-success')).toHaveText('100%');
+  expect(checkpoints()).toEqual([]);
+
+  /// Of swing-ups from hanging and from other poses, how many end upright.
+  const successes = () =>
+    page.evaluate(() => {
+      const { world } = upswing;
+      const starts = [0, 0.3, -0.6, 1.2, -2];
+      const upright = starts.filter((q1) => {
+        world.reset({ q1, q2: -q1, w1: 0, w2: 0 });
+        for (let k = 0; k < 200 * 15; ++k) world.advance();
+        return (world.uprightFor ?? 0) > 5;
+      });
+      return upright.length;
+    });
+  await startFrom(page, 0);
+  expect(await successes()).toBe(5);
+  const scrub = page.locator('#learn-scrub');
+  await scrub.press('Home');
+  await expect(where).toHaveText('on the stage: after 0 steps');
+  await expect(page.locator('#learn-success')).toHaveText('–');
+  expect(await successes()).toBe(0);
+  expect(checkpoints().length).toBe(1);
+  await scrub.fill('92000');
+  await expect(where).toHaveText('on the stage: after 90,016 steps');
+  await expect(page.locator('#learn-success')).toHaveText('0%');
+  expect(await successes()).toBe(0);
+  await scrub.press('End');
+  await expect(where).toHaveText('on the stage: after 170,016 steps');
+  expect(await successes()).toBe(5);
+  expect(checkpoints().length).toBe(2);
+
+  await page.getByLabel('show the untrained one too').check();
+  await expect(page.locator('#twin-name')).toHaveText('untrained');
+  const step = await page.evaluate(() => upswing.world.twin!.policy!.metadata.get('step'));
+  expect(step).toBe('0');
+});
+
+test('a policy on the way that is not there is told, and the one before stays', async ({
+  page,
+}) => {
+  await page.route(/-at-0\.safetensors$/, (route) => route.fulfill({ status: 200, body: 'no' }));
+  await openLearn(page);
+  await page.getByRole('button', { name: 'How the default agent learned' }).click();
+  const where = page.locator('#learn-where');
+  await expect(where).toHaveText('on the stage: after 170,016 steps');
+  await page.locator('#learn-scrub').press('Home');
+  await expect(page.locator('#message')).toContainText('The agent after 0 steps cannot be shown');
+  expect(await page.evaluate(() => upswing.world.policy!.metadata.get('step'))).toBe('170016');
+});
+
 test('pause, go on, another seed, start over', async ({ page }) => {
   await openLearn(page);
   await page.getByLabel('Seed', { exact: true }).fill('7');

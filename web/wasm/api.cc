@@ -1,9 +1,7 @@
 // What the page calls: policies, formulas, learners. Objects are pointers, which the page deletes;
 // texts are UTF-8, most of them JSON. A call that fails returns 0 and leaves a line of text.
-#include <cmath>
-#include <limits>
+#include <algorithm>
 
-#include "core/argmax.h"
 #include "core/safetensors.h"
 #include "lab/loaded_policy.h"
 #include "nn/actor_policy.h"
@@ -132,30 +130,20 @@ UPSWING_EXPORT(policy_open) Controller* PolicyOpen(const std::byte* file, size_t
 
 UPSWING_EXPORT(policy_close) void PolicyClose(Controller* controller) { delete controller; }
 
-/// What the policy makes of n observations (n × D): for each a row of its torque and the ends of
-/// the central 68% of an actor's distribution (3; NaN where there are none), then the outputs of an
-/// actor, then the values.
+/// What the policy makes of an observation (D): its torque, then the outputs of an actor, then the
+/// values.
 UPSWING_EXPORT(policy_decide)
-int PolicyDecide(Controller* controller, const float* obs, int n, double* rows) {
+int PolicyDecide(Controller* controller, const float* obs, double* row) {
   return Guarded([&] {
     const Policy& policy = *controller->loaded.policy;
     const int O = controller->outputs(), V = policy.num_values(), D = policy.obs_size();
-    std::vector<double> ends(3 * static_cast<size_t>(n), NAN);
-    std::vector<float> outputs(static_cast<size_t>(n) * O), values(static_cast<size_t>(n) * V);
-    const std::span all(ends);
-    const Matrix<const float> observations(obs, n, D);
+    std::vector<float> outputs(static_cast<size_t>(O)), values(static_cast<size_t>(V));
+    const Matrix<const float> observations(obs, 1, D);
     Policy::Memory& memory = *controller->memory;
-    policy.Act(observations, {all.data(), n, 1}, memory);
-    if (policy.has_spread()) {
-      policy.Spread(observations, {all.data() + n, n, 1}, {all.data() + 2 * n, n, 1}, memory);
-    }
-    if (O > 0) controller->actor->Outputs(observations, {outputs.data(), n, O}, memory);
-    if (V > 0) policy.Values(observations, {values.data(), n, V}, memory);
-    for (int i = 0; i < n; ++i) {
-      for (int k = 0; k < 3; ++k) *rows++ = ends[static_cast<size_t>(k * n + i)];
-      for (int k = 0; k < O; ++k) *rows++ = outputs[static_cast<size_t>(i * O + k)];
-      for (int k = 0; k < V; ++k) *rows++ = values[static_cast<size_t>(i * V + k)];
-    }
+    policy.Act(observations, {row, 1, 1}, memory);
+    if (O > 0) controller->actor->Outputs(observations, {outputs.data(), 1, O}, memory);
+    if (V > 0) policy.Values(observations, {values.data(), 1, V}, memory);
+    std::ranges::copy(values, std::ranges::copy(outputs, row + 1).out);
     return 1;
   });
 }

@@ -39,15 +39,12 @@ json Learner::Report() {
               {"episodeCount", s.episodes},
               {"seconds", s.seconds},
               {"solved", s.solved},
-              {"solvedStep", s.solved ? s.streak_step : 0},
-              {"solvedSeconds", s.solved ? s.streak_seconds : 0},
               {"finished", training_.trainer().finished()},
               {"bestStep", s.best_step},
               {"bestSuccess", s.best_success_rate},
               {"episodes", std::move(episodes_)},
-              {"metrics", std::move(metrics_)},
               {"evaluations", std::move(evaluations_)}};
-  episodes_ = metrics_ = evaluations_ = json::array();
+  episodes_ = evaluations_ = json::array();
   return report;
 }
 
@@ -55,12 +52,6 @@ std::vector<std::byte> Learner::policy() const { return FileOf(*training_.policy
 
 void Learner::OnEpisode(const TrainState& state, const FinishedEpisode& episode) {
   episodes_.push_back({{"step", state.steps}, {"return", episode.reward_sum}});
-}
-
-void Learner::OnMetrics(const TrainState& state, const Metrics& metrics) {
-  json row{{"step", state.steps}};
-  for (const auto& [name, value] : metrics) row[name] = value;
-  metrics_.push_back(std::move(row));
 }
 
 void Learner::OnEvaluation(const TrainState& state, const Evaluation& evaluation) {

@@ -27,13 +27,12 @@ class Learner : private TrainObserver {
 
  private:
   void OnEpisode(const TrainState& state, const FinishedEpisode& episode) override;
-  void OnMetrics(const TrainState& state, const Metrics& metrics) override;
   void OnEvaluation(const TrainState& state, const Evaluation& evaluation) override;
   void OnBest(const TrainState& state, const Policy& policy) override;
 
-  Training training_;
   std::vector<std::byte> best_;
-  nlohmann::json episodes_, metrics_, evaluations_;  // since the last report
+  nlohmann::json episodes_, evaluations_;  // since the last report
+  Training training_;                      // last, as it tells of itself
 };
 
 }  // namespace upswing

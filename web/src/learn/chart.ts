@@ -1,5 +1,5 @@
 import { Canvas } from '../view/canvas';
-import type { Session } from './session';
+import type { Course } from './course';
 
 const LEFT = 42; // px
 const RIGHT = 42;
@@ -10,13 +10,13 @@ const BOTTOM = 16;
 export class LearnChart {
   readonly canvas = new Canvas('learn-curve');
 
-  draw(sessions: readonly Session[], chosen: Session | null, at: number | null): void {
+  draw(courses: readonly Course[], chosen: Course | null, at: number | null): void {
     const { canvas } = this;
     canvas.clear();
     const bottom = canvas.height - BOTTOM;
     const width = canvas.width - LEFT - RIGHT;
-    const steps = stepsOf(sessions);
-    const means = new Map(sessions.map((session) => [session, meansOf(session)]));
+    const steps = stepsOf(courses);
+    const means = new Map(courses.map((course) => [course, meansOf(course)]));
     const highest = Math.max(1000, ...[...means.values()].flat().map(({ value }) => value));
     const x = (step: number) => LEFT + (step / steps) * width;
     const ofReturn = (value: number) => 6 + (bottom - 6) * (1 - Math.max(0, value) / highest);
@@ -34,14 +34,14 @@ export class LearnChart {
     const end = `${steps.toLocaleString('en')} steps`;
     canvas.text(end, canvas.width - RIGHT, canvas.height - 6, 'right');
 
-    for (const session of [...sessions.filter((other) => other !== chosen), chosen]) {
-      if (!session) continue;
-      const front = session === chosen;
+    for (const course of [...courses.filter((other) => other !== chosen), chosen]) {
+      if (!course) continue;
+      const front = course === chosen;
       const returns = means
-        .get(session)!
+        .get(course)!
         .map(({ step, value }) => [x(step), ofReturn(value)] as const);
       if (returns.length > 1) canvas.line(returns, front ? 'torque' : 'edge', front ? 2 : 1);
-      const success = session.evaluations.map(
+      const success = course.evaluations.map(
         ({ step, success: share }) => [x(step), ofSuccess(share)] as const,
       );
       if (success.length > 1) canvas.line(success, front ? 'energy' : 'edge', front ? 2 : 1);
@@ -54,12 +54,12 @@ export class LearnChart {
 }
 
 /// How many steps the chart shows.
-export function stepsOf(sessions: readonly Session[]): number {
-  return Math.max(20_000, ...sessions.map(({ last }) => last?.steps ?? 0));
+export function stepsOf(courses: readonly Course[]): number {
+  return Math.max(20_000, ...courses.map(({ steps }) => steps));
 }
 
 /// The mean return of the trials that ended at each step: environments that begin together end so.
-function meansOf({ episodes }: Session): { step: number; value: number }[] {
+function meansOf({ episodes }: Course): { step: number; value: number }[] {
   const ended = new Map<number, number[]>();
   for (const { step, return: value } of episodes)
     ended.set(step, [...(ended.get(step) ?? []), value]);

@@ -7,13 +7,10 @@ export interface Report {
   episodeCount: number;
   seconds: number; // of training, without evaluations
   solved: boolean; // two passed evaluations in a row
-  solvedStep: number; // of the first of them
-  solvedSeconds: number;
   finished: boolean;
   bestStep: number; // of the best evaluation; 0: none
   bestSuccess: number;
   episodes: { step: number; return: number }[];
-  metrics: ({ step: number } & Record<string, number>)[];
   evaluations: { step: number; success: number; return: number }[];
 }
 

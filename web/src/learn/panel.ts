@@ -1,63 +1,65 @@
 import { button, element } from '../page/dom';
+import { saveFile } from '../page/save';
 import { onThemeChange } from '../page/theme';
-import { Policy } from '../policy';
-import type { World } from '../world';
 import { LearnChart, stepsOf } from './chart';
+import type { Course, Recording } from './course';
 import { Knobs } from './knobs';
 import './learn.css';
+import { Scrubber } from './scrubber';
+import type { LearnStage } from './scrubber';
 import { Session } from './session';
-import type { Checkpoint } from './session';
 
-/// An agent learns in this page, and the stage shows its attempts.
+/// An agent learns in this page, and the stage shows its attempts; or one goes through the training of the
+/// default agent, as it was recorded.
 
-const ATTEMPT = 8; // s, after which the next begins
-const HELD = 4; // s balanced, after which it does
 const SEEDS_AT_ONCE = 4;
-const LEARNED = 'learned here'; // how files are named that the page made
 
 /// What the panel does with the page.
-export interface LearnStage {
-  readonly world: World;
-  readonly agents: { readonly ownName: string | null };
-  setAgentOn(on: boolean): void;
-  /// From hanging.
-  reset(): void;
-  openFile(file: File): Promise<void>;
-  readonly twin: { show(policy: Policy | null, name: string): void };
+export interface LearnPage extends LearnStage {
+  readonly agents: {
+    readonly ownName: string | null;
+    readonly ownIsLearned: boolean;
+    recording(id: string): Recording | null;
+  };
+  /// Keeps a policy that was learned here as the visitor's own.
+  keepLearned(file: File): Promise<void>;
 }
 
 export class LearnPanel {
-  private readonly stage: LearnStage;
+  private readonly page: LearnPage;
   private readonly chart = new LearnChart();
   private readonly knobs = new Knobs(element('learn-knobs'));
   private readonly scrub = element<HTMLInputElement>('learn-scrub');
   private readonly seed = element<HTMLInputElement>('learn-seed');
   private readonly four = element<HTMLInputElement>('learn-four');
-  private readonly ghost = element<HTMLInputElement>('learn-ghost');
   private readonly agent = element<HTMLSelectElement>('learn-agent');
+  private readonly scrubber: Scrubber;
   private sessions: Session[] = [];
-  private chosen: Session | null = null;
-  private follows = true; // the stage shows the newest policy, not an earlier one
-  private shown: Policy | null = null; // on the stage, by this panel
-  private shownFile: ArrayBuffer | null = null;
-  private shownStep = 0;
-  private attemptBegan = 0; // s, in the world's time
-  private untrained: Policy | null = null; // beside it
+  private recording: Recording | null = null; // if it was asked for
+  private readonly taken = new WeakSet<Session>(); // whose best policy has taken over
   private said = '';
   private scheduled = false;
 
-  constructor(stage: LearnStage) {
-    this.stage = stage;
+  /// `recorded` is the agent whose training can be gone through.
+  constructor(page: LearnPage, recorded: string) {
+    this.page = page;
+    this.scrubber = new Scrubber(page, () => this.draw());
     button('learn-start', () => this.toggle());
     button('learn-again', () => this.start());
     button('learn-save', () => this.save());
     button('learn-keep', () => void this.keep());
     button('learn-reset', () => this.knobs.reset());
+    button('learn-recorded', () => this.showRecording(recorded));
+    element('learn-recorded').hidden = page.agents.recording(recorded) === null;
     this.agent.addEventListener('change', () => this.knobs.show(this.agent.value));
-    this.ghost.addEventListener('change', () => this.showGhost());
-    this.scrub.addEventListener('input', () => this.scrubTo(Number(this.scrub.value)));
-    element('learn-seeds').addEventListener('change', (event) => {
-      this.choose(Number((event.target as HTMLInputElement).value));
+    const untrained = element<HTMLInputElement>('learn-untrained');
+    untrained.addEventListener('change', () => void this.scrubber.showUntrained(untrained.checked));
+    this.scrub.addEventListener('input', () => {
+      this.scrubber.to(Number(this.scrub.value));
+      this.draw();
+    });
+    element('learn-courses').addEventListener('change', (event) => {
+      this.choose(this.courses[Number((event.target as HTMLInputElement).value)]!);
     });
     this.knobs.show(this.agent.value);
     onThemeChange(() => {
@@ -77,15 +79,7 @@ export class LearnPanel {
       { length: count },
       (_, i) => new Session(this.agent.value, first + i, this.knobs.changed, () => this.news()),
     );
-    this.chosen = this.sessions[0]!;
-    this.follows = true;
-    this.shownFile = null;
-    this.showGhost();
-    this.listSeeds();
-    this.stage.setAgentOn(true);
-    this.stage.reset();
-    this.attemptBegan = this.stage.world.time;
-    this.draw();
+    this.choose(this.sessions[0]!);
   }
 
   /// Ends what still learns.
@@ -94,23 +88,44 @@ export class LearnPanel {
     this.draw();
   }
 
+  /// Lets what learns wait, as nobody sees it.
+  pause(): void {
+    for (const session of this.sessions) session.pause();
+    this.draw();
+  }
+
   /// How it goes, in a sentence.
   get story(): string {
-    const session = this.chosen;
+    const { session } = this;
     if (session?.state === 'failed') return sentence(session);
-    if (!session?.last) return '';
-    const steps = session.last.steps.toLocaleString('en');
-    const success = session.evaluations.at(-1)?.success ?? 0;
-    if (session.state === 'stopped') return '';
+    if (!session?.last || session.state === 'stopped') return '';
     if (session.state !== 'learning') return sentence(session);
+    const steps = session.steps.toLocaleString('en');
+    const success = session.evaluations.at(-1)?.success ?? 0;
     const tested =
       success > 0 ? `, it succeeds in ${(100 * success).toFixed(0)}% of its tests` : '';
     return `After ${steps} steps in ${session.last.episodeCount} trials${tested} …`;
   }
 
+  /// At each frame.
+  follow(): void {
+    this.scrubber.attempt();
+  }
+
+  /// What can be shown.
+  private get courses(): readonly Course[] {
+    return this.recording ? [...this.sessions, this.recording] : this.sessions;
+  }
+
+  /// The training that is shown, if it is one of this page.
+  private get session(): Session | null {
+    const { course } = this.scrubber;
+    return course instanceof Session ? course : null;
+  }
+
   /// Learns, pauses, resumes.
-  toggle(): void {
-    const active = this.sessions.filter(({ running, state }) => running || state === 'paused');
+  private toggle(): void {
+    const active = this.sessions.filter((session) => session.active);
     if (active.length === 0) return this.start();
     const resume = active.every(({ state }) => state === 'paused');
     for (const session of active) {
@@ -120,16 +135,15 @@ export class LearnPanel {
     this.draw();
   }
 
-  /// At each frame: the next attempt begins when one has ended.
-  follow(): void {
-    const { world } = this.stage;
-    if (!this.chosen || this.shown === null || world.policy !== this.shown) return;
-    if (!this.chosen.running && this.follows) return;
-    const held = (world.uprightFor ?? 0) > HELD;
-    if (!held && world.time - this.attemptBegan < ATTEMPT) return;
-    if (held && !this.chosen.running) return;
-    this.attemptBegan = world.time;
-    this.stage.reset();
+  private showRecording(agent: string): void {
+    this.recording ??= this.page.agents.recording(agent);
+    if (this.recording) this.choose(this.recording);
+  }
+
+  private choose(course: Course): void {
+    this.scrubber.take(course);
+    this.listCourses();
+    this.draw();
   }
 
   /// A training had news: drawn once a frame, however many there are.
@@ -138,112 +152,67 @@ export class LearnPanel {
     this.scheduled = true;
     requestAnimationFrame(() => {
       this.scheduled = false;
-      this.showNewest();
+      this.scrubber.update();
       this.draw();
       void this.takeOver();
     });
   }
 
-  private showNewest(): void {
-    if (!this.follows || !this.chosen?.policy || this.chosen.policy === this.shownFile) return;
-    // Somebody chose another agent meanwhile: that stays.
-    if (this.shownFile && this.stage.world.policy !== this.shown) return;
-    this.show({ step: this.chosen.last!.steps, file: this.chosen.policy });
-  }
-
-  private show({ step, file }: Checkpoint): void {
-    const before = this.shown;
-    this.shown = new Policy(file);
-    this.shownFile = file;
-    this.shownStep = step;
-    this.stage.world.policy = this.shown;
-    before?.controller.close();
-    if (this.ghost.checked && !this.untrained) this.showGhost();
-  }
-
-  /// The policy that knew nothing, beside the other; or nobody.
-  private showGhost(): void {
-    const untrained = this.ghost.checked && this.chosen?.checkpoints[0];
-    const before = this.untrained;
-    this.untrained = untrained ? new Policy(untrained.file) : null;
-    if (before || this.untrained) this.stage.twin.show(this.untrained, 'untrained');
-    before?.controller.close();
-  }
-
-  private choose(seed: number): void {
-    this.chosen = this.sessions.find((session) => session.seed === seed) ?? null;
-    this.scrubTo(Infinity);
-  }
-
-  /// Puts the checkpoint that is nearest to a step on the stage; the last one is the policy as it is.
-  private scrubTo(step: number): void {
-    const session = this.chosen;
-    const last = session?.checkpoints.at(-1);
-    if (!session || !last) return;
-    const away = (one: Checkpoint) => Math.abs(one.step - step);
-    const nearest = session.checkpoints.reduce((a, b) => (away(b) < away(a) ? b : a));
-    this.follows = step >= last.step || nearest === last;
-    this.show(this.follows ? { step: session.last!.steps, file: session.policy! } : nearest);
-    this.stage.setAgentOn(true);
-    this.stage.reset();
-    this.attemptBegan = this.stage.world.time;
-    this.draw();
-  }
-
   /// The best policy of a training that has solved the task stays on the stage and in this browser,
   /// unless that would replace a file that the visitor brought.
   private async takeOver(): Promise<void> {
-    const solved = this.chosen?.state === 'finished' && this.chosen.last!.solved;
-    if (!solved || !this.follows || this.stage.world.policy !== this.shown) return;
-    const { ownName } = this.stage.agents;
-    if (ownName === null || ownName.startsWith(LEARNED)) await this.keep();
+    const { session, scrubber } = this;
+    if (!session?.last?.solved || session.state !== 'finished' || this.taken.has(session)) return;
+    if (!scrubber.follows || !scrubber.onStage) return;
+    this.taken.add(session);
+    const { ownName, ownIsLearned } = this.page.agents;
+    if (ownName === null || ownIsLearned) await this.keep();
   }
 
   /// Keeps the best policy as the visitor's own.
   private async keep(): Promise<void> {
     const file = this.file();
-    if (file) await this.stage.openFile(file);
+    if (file) await this.page.keepLearned(file);
   }
 
   private save(): void {
     const file = this.file();
-    if (!file) return;
-    const link = document.createElement('a');
-    link.href = URL.createObjectURL(file);
-    link.download = 'policy.safetensors';
-    link.click();
-    URL.revokeObjectURL(link.href);
+    if (file) saveFile(file, 'policy.safetensors');
   }
 
   private file(): File | null {
-    const session = this.chosen;
-    const bytes = session?.best?.file ?? session?.policy;
+    const { session } = this;
+    const bytes = session?.best ?? session?.policy;
     if (!session || !bytes) return null;
-    return new File([bytes], `${LEARNED}, ${session.agent}, seed ${session.seed}`);
+    return new File([bytes], `learned here, ${session.agent}, seed ${session.seed}`);
   }
 
-  private listSeeds(): void {
-    const place = element('learn-seeds');
-    place.hidden = this.sessions.length < 2;
+  private listCourses(): void {
+    const place = element('learn-courses');
+    place.hidden = this.courses.length < 2;
     place.replaceChildren(
-      ...this.sessions.map(({ seed }, i) => {
+      ...this.courses.map((course, i) => {
         const label = document.createElement('label');
         const input = document.createElement('input');
         input.type = 'radio';
         input.name = 'learn-which';
-        input.value = String(seed);
-        input.checked = i === 0;
-        label.append(input, ` seed ${seed} `, document.createElement('output'));
+        input.value = String(i);
+        input.checked = course === this.scrubber.course;
+        label.append(input, ` ${course.name} `, document.createElement('output'));
         return label;
       }),
     );
   }
 
   private draw(): void {
-    const session = this.chosen;
-    const at = session && this.shown ? this.shownStep : null;
-    this.chart.draw(this.sessions, session, at);
-    const active = this.sessions.filter(({ running, state }) => running || state === 'paused');
+    const { session, scrubber } = this;
+    const { course } = scrubber;
+    this.chart.draw(
+      course && !session ? [course] : this.sessions,
+      course,
+      scrubber.shows ? scrubber.step : null,
+    );
+    const active = this.sessions.filter((one) => one.active);
     const paused = active.length > 0 && active.every(({ state }) => state === 'paused');
     const label = active.length === 0 ? 'Learn' : paused ? 'Go on' : 'Pause';
     element('learn-start').textContent = label;
@@ -251,32 +220,37 @@ export class LearnPanel {
     const has = session !== null && session.policy !== null;
     element<HTMLButtonElement>('learn-save').disabled = !has;
     element<HTMLButtonElement>('learn-keep').disabled = !has;
-    this.scrub.disabled = !session || session.checkpoints.length < 2;
-    if (!session) return;
-    const outputs = [...element('learn-seeds').querySelectorAll('output')];
+    this.scrub.disabled = !course || course.checkpoints.length < 2;
+    if (!course) return;
+    const outputs = [...element('learn-courses').querySelectorAll('output')];
     this.sessions.forEach((other, i) => {
       if (outputs[i]) outputs[i].textContent = brief(other);
     });
-    this.scrub.max = String(stepsOf(this.sessions));
-    this.scrub.value = String(this.follows ? (session.last?.steps ?? 0) : this.shownStep);
-    this.scrub.ariaValueText = `after ${this.shownStep.toLocaleString('en')} steps`;
-    const { last } = session;
-    if (last) this.drawNumbers(session, last.steps, last.updates, last.episodeCount);
-    this.say(sentence(session));
+    // Not under the finger that moves it.
+    if (!this.scrub.matches(':active')) {
+      this.scrub.max = String(stepsOf(session ? this.sessions : [course]));
+      this.scrub.value = String(scrubber.follows ? course.steps : scrubber.step);
+    }
+    this.scrub.ariaValueText = `after ${scrubber.step.toLocaleString('en')} steps`;
+    this.drawNumbers(course);
+    this.say(session ? sentence(session) : OF_RECORDING);
   }
 
-  private drawNumbers(session: Session, steps: number, updates: number, trials: number): void {
+  /// Of a training in this page as it is, of a recorded one as it was at that step.
+  private drawNumbers(course: Course): void {
     const write = (id: string, text: string) => (element(`learn-${id}`).textContent = text);
-    const success = session.evaluations.at(-1)?.success;
-    write('steps', steps.toLocaleString('en'));
-    write('trials', trials.toLocaleString('en'));
-    write('updates', updates.toLocaleString('en'));
-    write('rate', session.updatesPerSecond.toFixed(0));
-    write('time', `${session.seconds.toFixed(1)} s`);
+    const { session, scrubber } = this;
+    const at = session ? Infinity : scrubber.step;
+    const success = course.evaluations.findLast(({ step }) => step <= at)?.success;
+    const count = (number: number | undefined) => number?.toLocaleString('en') ?? '–';
+    write('steps', count(session ? session.steps : scrubber.step));
+    write('trials', count(session?.last?.episodeCount));
+    write('updates', count(session?.last?.updates));
+    write('rate', session ? session.updatesPerSecond.toFixed(0) : '–');
+    write('time', session ? `${session.seconds.toFixed(1)} s` : '–');
     write('success', success === undefined ? '–' : `${(100 * success).toFixed(0)}%`);
-    const where = this.follows
-      ? 'as it is now'
-      : `after ${this.shownStep.toLocaleString('en')} steps`;
+    const where =
+      scrubber.follows && session ? 'as it is now' : `after ${count(scrubber.step)} steps`;
     write('where', `on the stage: ${where}`);
   }
 
@@ -287,6 +261,9 @@ export class LearnPanel {
     element('learn-status').textContent = text;
   }
 }
+
+const OF_RECORDING =
+  'This is how the default agent learned, before it came here: drag the line under the chart.';
 
 function brief({ state, last, seconds }: Session): string {
   if (state === 'failed') return 'failed';

@@ -1,18 +1,14 @@
 import { coreModule } from '../core';
 import type { LearnSettings, Report } from './learner';
+import type { Checkpoint, Course } from './course';
 import type { News, Order } from './worker';
-
-/// A policy along the way.
-export interface Checkpoint {
-  step: number;
-  file: ArrayBuffer;
-}
 
 const APART = 1500; // steps between checkpoints, at first
 const MOST = 64; // checkpoints; beyond that every other one goes
 
 /// A training in a worker of its own, and what has become known of it.
-export class Session {
+export class Session implements Course {
+  readonly name: string;
   readonly agent: string;
   readonly seed: number;
   readonly settings: LearnSettings;
@@ -23,16 +19,16 @@ export class Session {
   readonly evaluations: { step: number; success: number; return: number }[] = [];
   checkpoints: Checkpoint[] = [];
   policy: ArrayBuffer | null = null; // as it stands
-  best: Checkpoint | null = null; // at an evaluation
+  best: ArrayBuffer | null = null; // at an evaluation
   updatesPerSecond = 0; // lately, evaluations included
-  seconds = 0; // since it began, without pauses
+  seconds = 0; // of the worker, since it began, without pauses
   private apart = APART;
   private readonly worker: Worker;
   private readonly onNews: () => void;
-  private heard = performance.now(); // ms, when it last ran
 
   /// `onNews` is called whenever something has changed.
   constructor(agent: string, seed: number, settings: LearnSettings, onNews: () => void) {
+    this.name = `seed ${seed}`;
     this.agent = agent;
     this.seed = seed;
     this.settings = settings;
@@ -50,6 +46,19 @@ export class Session {
     return this.state === 'starting' || this.state === 'learning';
   }
 
+  /// Whether it learns, or will when it is resumed.
+  get active(): boolean {
+    return this.running || this.state === 'paused';
+  }
+
+  get steps(): number {
+    return this.last?.steps ?? 0;
+  }
+
+  get newest(): Checkpoint | null {
+    return this.policy && { step: this.steps, file: this.policy };
+  }
+
   pause(): void {
     if (!this.running) return;
     this.state = 'paused';
@@ -59,13 +68,12 @@ export class Session {
   resume(): void {
     if (this.state !== 'paused') return;
     this.state = 'learning';
-    this.heard = performance.now();
     this.tell({ kind: 'resume' });
   }
 
   /// Ends it; what is known stays.
   stop(): void {
-    if (this.running || this.state === 'paused') this.state = 'stopped';
+    if (this.active) this.state = 'stopped';
     this.worker.terminate();
   }
 
@@ -82,20 +90,17 @@ export class Session {
 
   private hear(news: News): void {
     if (news.kind === 'failed') return this.fail(news.reason);
-    const { report, policy, best } = news;
-    const now = performance.now();
-    const passed = (now - this.heard) / 1000;
-    this.heard = now;
-    if (this.last) {
-      this.seconds += passed;
-      const rate = (report.updates - this.last.updates) / passed;
+    const { report, policy, best, seconds } = news;
+    if (this.last && seconds > this.seconds) {
+      const rate = (report.updates - this.last.updates) / (seconds - this.seconds);
       this.updatesPerSecond += 0.3 * (rate - this.updatesPerSecond);
     }
+    this.seconds = seconds;
     this.last = report;
     this.policy = policy;
     this.episodes.push(...report.episodes);
     this.evaluations.push(...report.evaluations);
-    if (best) this.best = { step: report.bestStep, file: best };
+    if (best) this.best = best;
     this.keep({ step: report.steps, file: policy }, report.finished);
     if (report.finished) {
       this.state = 'finished';

@@ -18,13 +18,21 @@ export type Order =
   | { kind: 'pause' | 'resume' };
 
 export type News =
-  | { kind: 'report'; report: Report; policy: ArrayBuffer; best: ArrayBuffer | null }
+  | {
+      kind: 'report';
+      report: Report;
+      policy: ArrayBuffer;
+      best: ArrayBuffer | null;
+      seconds: number; // since it began, evaluations included, pauses not
+    }
   | { kind: 'failed'; reason: string };
 
 let learner: Learner | null = null;
 let paused = false;
 let scheduled = false;
-let told = 0;
+let told = 0; // ms, when it last told
+let ran = 0; // ms, before it was last paused
+let resumed = 0; // ms, when it last began or was resumed
 let bestStep = 0;
 
 function tell(): void {
@@ -34,7 +42,8 @@ function tell(): void {
   const best = report.bestStep > bestStep ? learner!.best() : null;
   bestStep = report.bestStep;
   told = performance.now();
-  send({ kind: 'report', report, policy, best }, best ? [policy, best] : [policy]);
+  const seconds = (ran + told - resumed) / 1000;
+  send({ kind: 'report', report, policy, best, seconds }, best ? [policy, best] : [policy]);
 }
 
 function send(news: News, transfer: Transferable[] = []): void {
@@ -79,11 +88,14 @@ function schedule(): void {
 onmessage = async ({ data }: MessageEvent<Order>): Promise<void> => {
   if (data.kind !== 'start') {
     paused = data.kind === 'pause';
+    if (paused) ran += performance.now() - resumed;
+    else resumed = performance.now();
     return schedule();
   }
   const { module, agent, seed, settings } = data;
   try {
     learner = new Learner(await Core.start(module), agent, seed, settings);
+    resumed = performance.now();
     tell();
   } catch (error) {
     return fail(error);

@@ -5,7 +5,7 @@ const ENTRY = { id: 'a', file: 'a.safetensors', agent: 'd3qn' };
 const CURVE = { step: [10, 20], success_rate: [0, 1], mean_return: [-1, 2600] };
 
 test('an entry needs ID, file and agent', () => {
-  expect(parseEntry(ENTRY)).toEqual({ ...ENTRY, command: null, curve: null });
+  expect(parseEntry(ENTRY)).toEqual({ ...ENTRY, command: null, curve: null, checkpoints: [] });
   for (const entry of [
     null,
     1,
@@ -27,6 +27,27 @@ test('a command is shown only where a shell takes it for one', () => {
   expect(commandOf('./upswing train --seed 1')).toBe('./upswing train --seed 1');
   expect(commandOf('./upswing train; id')).toBeNull();
   expect(commandOf(7)).toBeNull();
+});
+
+test('policies along the way are there only if they can be', () => {
+  const way = [
+    { step: 0, file: 'a-at-0.safetensors' },
+    { step: 20, file: 'a.safetensors' },
+  ];
+  const checkpointsOf = (checkpoints: unknown) =>
+    parseEntry({ ...ENTRY, checkpoints })!.checkpoints;
+  expect(checkpointsOf(way)).toEqual(way);
+  for (const checkpoints of [
+    'x',
+    [null],
+    [...way].reverse(),
+    [{ ...way[0], step: -1 }],
+    [{ ...way[0], step: 0.5 }],
+    [{ ...way[0], file: '' }],
+    Array.from({ length: 1000 }, (_, step) => ({ ...way[0], step })),
+  ]) {
+    expect(checkpointsOf(checkpoints)).toEqual([]);
+  }
 });
 
 test('a learning curve is drawn only if it is one', () => {

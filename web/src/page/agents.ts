@@ -1,7 +1,8 @@
 import { NOMINAL } from '../pendulum';
 import type { Parameter } from '../pendulum';
+import { Recording } from '../learn/course';
 import { Policy } from '../policy';
-import { BadInput, MAX_FILE_BYTES } from '../bad_input';
+import { BadInput, largerThan, MAX_FILE_BYTES } from '../bad_input';
 import { isCommand, printable, quoted } from '../text';
 import type { Curve } from '../view/charts';
 import { fetchBytes } from './fetch';
@@ -14,6 +15,7 @@ import type { KeptFile } from './storage';
 const LIST = 'agents/agents.json';
 const MAX_NAME = 200; // characters, of an ID, a file, an agent
 const MAX_ROWS = 100_000; // of a learning curve
+const MAX_CHECKPOINTS = 100;
 
 /// An entry of the list, which `upswing export --page` writes.
 interface Entry {
@@ -22,6 +24,12 @@ interface Entry {
   agent: string;
   command: string | null;
   curve: Curve | null;
+  checkpoints: CheckpointFile[]; // policies on the way to it, and it
+}
+
+interface CheckpointFile {
+  step: number;
+  file: string;
 }
 
 export interface Agent {
@@ -80,16 +88,39 @@ export function parseCurve(value: unknown): Curve | null {
   return rises && shares ? { step, success_rate, mean_return } : null;
 }
 
+/// Policies along a training's way; none if they are not what they should be.
+function parseCheckpoints(value: unknown): CheckpointFile[] {
+  if (!Array.isArray(value) || value.length > MAX_CHECKPOINTS) return [];
+  const list = value.map((one) => (one ?? {}) as Partial<Record<keyof CheckpointFile, unknown>>);
+  const valid = list.every(
+    ({ step, file }, i) =>
+      Number.isSafeInteger(step) &&
+      (step as number) > Number(list[i - 1]?.step ?? -1) &&
+      isName(file),
+  );
+  return valid ? (list as CheckpointFile[]) : [];
+}
+
+function isName(text: unknown): text is string {
+  return typeof text === 'string' && text !== '' && text.length <= MAX_NAME;
+}
+
 /// An entry of the list, of which nothing but ID, file and agent must be there; null if it is none.
 export function parseEntry(value: unknown): Entry | null {
   const given = (value ?? {}) as Partial<Record<keyof Entry, unknown>>;
-  const isName = (text: unknown): text is string =>
-    typeof text === 'string' && text !== '' && text.length <= MAX_NAME;
   const { id, file, agent, command } = given;
   if (!isName(id) || !isName(file) || !isName(agent) || id === OWN) return null;
   // A line that a shell would take for more than one command is not shown for pasting.
   const shown = typeof command === 'string' && isCommand(command) ? command : null;
-  return { id, file, agent, command: shown, curve: parseCurve(given.curve) };
+  const curve = parseCurve(given.curve);
+  return {
+    id,
+    file,
+    agent,
+    command: shown,
+    curve,
+    checkpoints: parseCheckpoints(given.checkpoints),
+  };
 }
 
 export class Agents {
@@ -141,21 +172,31 @@ export class Agents {
     if (id === OWN && this.own) return this.addOwn(this.own);
     const entry = this.entries.get(id);
     if (!entry) throw new BadInput(`there is no agent ${quoted(id)}`);
-    const address = `agents/${encodeURIComponent(entry.file)}`;
-    const { buffer } = await fetchBytes(address, MAX_FILE_BYTES);
-    const policy = new Policy(buffer);
+    const policy = new Policy(await fetchPolicy(entry.file));
     const { command, curve } = entry;
     return this.add({ id, title: titleOf(entry), text: describe(policy), command, curve, policy });
   }
 
-  /// Reads and checks a visitor's file, and keeps it in this browser for the next visit, if that is
-  /// allowed. Throws BadInput.
-  async open(file: File): Promise<Agent> {
-    if (file.size > MAX_FILE_BYTES) throw new BadInput('it is larger than 16 MB');
+  /// How an agent that comes with the page became what it is; null where that is not known.
+  recording(id: string): Recording | null {
+    const entry = this.entries.get(id);
+    if (!entry?.curve || entry.checkpoints.length === 0) return null;
+    return new Recording(titleOf(entry), entry.curve, entry.checkpoints, fetchPolicy);
+  }
+
+  /// Whether the page itself has learned it.
+  get ownIsLearned(): boolean {
+    return this.own?.learned ?? false;
+  }
+
+  /// Reads and checks a visitor's file, or one that the page has `learned`, and keeps it in this browser
+  /// for the next visit, if that is allowed. Throws BadInput.
+  async open(file: File, learned = false): Promise<Agent> {
+    if (file.size > MAX_FILE_BYTES) throw new BadInput(`it is ${largerThan(MAX_FILE_BYTES)}`);
     const bytes = await file.arrayBuffer().catch(() => {
       throw new BadInput('it cannot be read');
     });
-    const own = { name: file.name, bytes };
+    const own = { name: file.name, bytes, learned };
     const agent = this.addOwn(own);
     this.own = own;
     await rememberFile(OWN, own);
@@ -179,6 +220,10 @@ export class Agents {
     this.loaded.set(agent.id, agent);
     return agent;
   }
+}
+
+async function fetchPolicy(file: string): Promise<ArrayBuffer> {
+  return (await fetchBytes(`agents/${encodeURIComponent(file)}`, MAX_FILE_BYTES)).buffer;
 }
 
 function ownTitle({ name }: KeptFile): string {

@@ -1,4 +1,4 @@
-import { BadInput } from '../bad_input';
+import { BadInput, largerThan } from '../bad_input';
 
 const PATIENCE = 30; // s without a byte, after which a server counts as silent
 
@@ -39,7 +39,7 @@ export async function fetchBytes(
       pieces.push(piece.value);
       bytes += piece.value.length;
       onProgress(bytes);
-      if (bytes > limit) throw new BadInput(`${address} is larger than ${limit / 1024 / 1024} MB`);
+      if (bytes > limit) throw new BadInput(`${address} is ${largerThan(limit)}`);
     }
     return new Uint8Array(await new Blob(pieces).arrayBuffer());
   } finally {

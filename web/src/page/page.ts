@@ -62,7 +62,7 @@ export class Page {
       this.reset();
       this.changed();
     });
-    this.learn = new LearnPanel(this);
+    this.learn = new LearnPanel(this, agents.list[0]!.id);
     this.tour = new Tour(
       this,
       (id) => agents.has(id),
@@ -82,7 +82,10 @@ export class Page {
     showView(view);
     placeCharts();
     this.setPaused(false);
-    if (view.name === 'tour') return this.tour.go(view.step);
+    if (view.name === 'tour') {
+      this.learn.pause();
+      return this.tour.go(view.step);
+    }
     this.tour.leave();
     const { shared, problems } = decode(hash, RANGES);
     if (shared.agent !== null && !this.agents.has(shared.agent)) {
@@ -139,10 +142,15 @@ export class Page {
   }
 
   /// Changes to a visitor's own policy and to the plant that it was trained on.
-  async openFile(file: File): Promise<void> {
-    if (!(await this.load(() => this.agents.open(file), quoted(file.name)))) return;
+  async openFile(file: File, learned = false): Promise<void> {
+    if (!(await this.load(() => this.agents.open(file, learned), quoted(file.name)))) return;
     this.settings.setPlant(this.agent!.policy.plant);
     this.changed();
+  }
+
+  /// Keeps a policy that was learned here as the visitor's own.
+  keepLearned(file: File): Promise<void> {
+    return this.openFile(file, true);
   }
 
   private async load(get: () => Promise<Agent>, name: string): Promise<boolean> {

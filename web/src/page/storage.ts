@@ -1,3 +1,5 @@
+import { MAX_FILE_BYTES } from '../bad_input';
+
 /// What this browser keeps between visits. Browsers may forbid a page to keep anything (private
 /// windows, settings): then nothing is kept, and nothing fails.
 
@@ -25,6 +27,7 @@ export function remember(key: string, value: string): void {
 export interface KeptFile {
   name: string;
   bytes: ArrayBuffer;
+  learned: boolean; // by the page, so that it may be replaced by what the page learns next
 }
 
 function openDatabase(): Promise<IDBDatabase> {
@@ -60,14 +63,15 @@ function tolerant<T>(work: () => Promise<T>): Promise<T | null> {
   return Promise.race([Promise.resolve().then(work), patience]).catch(() => null);
 }
 
-function isKeptFile(value: unknown): value is KeptFile {
-  const { name, bytes } = (value ?? {}) as Partial<KeptFile>;
-  return typeof name === 'string' && bytes instanceof ArrayBuffer;
+/// What was kept, perhaps by an earlier version of the page; null if that is no file of ours.
+function asKeptFile(value: unknown): KeptFile | null {
+  const { name, bytes, learned } = (value ?? {}) as Partial<Record<keyof KeptFile, unknown>>;
+  if (typeof name !== 'string' || !(bytes instanceof ArrayBuffer)) return null;
+  return bytes.byteLength > MAX_FILE_BYTES ? null : { name, bytes, learned: learned === true };
 }
 
 export async function recallFile(key: string): Promise<KeptFile | null> {
-  const kept = await tolerant(() => transact('readonly', (files) => files.get(key)));
-  return isKeptFile(kept) ? kept : null;
+  return asKeptFile(await tolerant(() => transact('readonly', (files) => files.get(key))));
 }
 
 /// Whether it is kept.

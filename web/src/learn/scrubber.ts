@@ -1,0 +1,153 @@
+import { BadInput } from '../bad_input';
+import { element } from '../page/dom';
+import { warn } from '../page/message';
+import { Policy } from '../policy';
+import type { World } from '../world';
+import type { Checkpoint, Course } from './course';
+
+const ATTEMPT = 8; // s, after which the next begins
+const HELD = 4; // s balanced, after which it does
+
+/// What learning does with the page.
+export interface LearnStage {
+  readonly world: World;
+  setAgentOn(on: boolean): void;
+  /// From hanging.
+  reset(): void;
+  readonly twin: { show(policy: Policy | null, name: string): void };
+}
+
+/// Which policy of a training is on the stage, where it makes one attempt after another: the newest, or an
+/// earlier one. Beside it, if one likes, the untrained one.
+export class Scrubber {
+  course: Course | null = null;
+  follows = true; // the newest
+  step = 0; // of the policy on the stage
+  private readonly stage: LearnStage;
+  private readonly onShown: () => void;
+  private shown: Policy | null = null;
+  private given: Checkpoint['file'] | null = null; // what was last to be shown
+  private replaceable: Policy | null = null; // if that is on the stage, a newer one takes its place
+  private untrained: Policy | null = null;
+  private withUntrained = false;
+  private attemptBegan = 0; // s, in the world's time
+  private requests = 0; // for policies; the last one counts
+  private untrainedRequests = 0; // likewise
+
+  /// `onShown` hears when another policy is on the stage.
+  constructor(stage: LearnStage, onShown: () => void) {
+    this.stage = stage;
+    this.onShown = onShown;
+  }
+
+  /// Whether one of its policies is or was on the stage, or is on its way there.
+  get shows(): boolean {
+    return this.given !== null;
+  }
+
+  /// Whether the agent on the stage is one of this training.
+  get onStage(): boolean {
+    return this.shown !== null && this.stage.world.policy === this.shown;
+  }
+
+  /// Takes another training, and follows it from now on.
+  take(course: Course): void {
+    this.course = course;
+    this.given = null;
+    this.replaceable = this.stage.world.policy;
+    this.follow();
+    void this.showUntrained(this.withUntrained);
+  }
+
+  /// Shows the policy that is newest, now and later.
+  follow(): void {
+    this.follows = true;
+    const newest = this.course?.newest;
+    if (newest) void this.show(newest);
+    this.restart();
+  }
+
+  /// After news. If somebody has chosen another agent meanwhile, that stays.
+  update(): void {
+    const newest = this.course?.newest;
+    if (this.untrained === null && this.withUntrained) void this.showUntrained(true);
+    if (!newest || !this.follows || newest.file === this.given) return;
+    if (this.stage.world.policy === this.replaceable) void this.show(newest);
+  }
+
+  /// Puts the checkpoint that is nearest to a step on the stage; the last one is followed.
+  to(step: number): void {
+    const checkpoints = this.course?.checkpoints ?? [];
+    const last = checkpoints.at(-1);
+    if (!last) return;
+    const away = (one: Checkpoint) => Math.abs(one.step - step);
+    const nearest = checkpoints.reduce((a, b) => (away(b) < away(a) ? b : a));
+    if (step >= last.step || nearest === last) return this.follow();
+    this.follows = false;
+    void this.show(nearest);
+    this.restart();
+  }
+
+  /// At each frame: the next attempt begins when one has ended.
+  attempt(): void {
+    const { world } = this.stage;
+    if (!this.course || !this.onStage) return;
+    const { running } = this.course;
+    if (!running && this.follows) return;
+    const held = (world.uprightFor ?? 0) > HELD;
+    if (held ? !running : world.time - this.attemptBegan < ATTEMPT) return;
+    this.attemptBegan = world.time;
+    this.stage.reset();
+  }
+
+  /// Whether the policy that knew nothing is shown beside the other.
+  async showUntrained(wanted: boolean): Promise<void> {
+    this.withUntrained = wanted;
+    const request = ++this.untrainedRequests;
+    const first = wanted ? this.course?.checkpoints[0] : undefined;
+    const policy = first ? await policyOf(first) : null;
+    if (request !== this.untrainedRequests) return policy?.controller.close();
+    const before = this.untrained;
+    this.untrained = policy;
+    if (before || this.untrained) this.stage.twin.show(this.untrained, 'untrained');
+    before?.controller.close();
+  }
+
+  private async show({ step, file }: Checkpoint): Promise<void> {
+    const request = ++this.requests;
+    const { world } = this.stage;
+    this.given = file;
+    if (file instanceof ArrayBuffer) return this.put(new Policy(file), step);
+    const { policy: before } = world;
+    const policy = await policyOf({ step, file });
+    // Unless another one was asked for meanwhile.
+    if (policy && request === this.requests && world.policy === before) this.put(policy, step);
+    else policy?.controller.close();
+  }
+
+  private put(policy: Policy, step: number): void {
+    const before = this.shown;
+    this.stage.world.policy = this.shown = this.replaceable = policy;
+    this.step = step;
+    element('first-name').textContent = `after ${step.toLocaleString('en')} steps`;
+    before?.controller.close();
+    this.onShown();
+  }
+
+  private restart(): void {
+    this.stage.setAgentOn(true);
+    this.stage.reset();
+    this.attemptBegan = this.stage.world.time;
+  }
+}
+
+/// Null, and a message, if it is not there or is none.
+async function policyOf({ step, file }: Checkpoint): Promise<Policy | null> {
+  try {
+    return new Policy(file instanceof ArrayBuffer ? file : await file());
+  } catch (error) {
+    if (!(error instanceof BadInput)) throw error;
+    warn(`The agent after ${step.toLocaleString('en')} steps cannot be shown: ${error.message}.`);
+    return null;
+  }
+}
