@@ -15,6 +15,7 @@ POLICY = ROOT / "web/public/agents/fast.safetensors"
 GAIN = [-107.58763, -107.94453, -32.48366, -16.87634]
 # Damping of joint 2 at which no gain exists.
 LOST = "damping2=0.3897696914"
+REGION = 62.95  # x'Px of the ellipsoid of attraction, by simulation
 ALL = "energy, hybrid, lqr, mpc, pfl, tvlqr"
 
 
@@ -58,6 +59,8 @@ class Lqr(ProgramTest):
         text = self.succeed("info", "lqr")
         self.assertIn("weights 10, 10, 1, 1 and 1, gain -107.6, -107.9, -32.48, -16.88\n", text)
         self.assertIn("grow at 4.97/s and 3.6/s (ratio 0.723), delta -0.40\n", text)
+        region = float(text.rsplit("x'Px < ", 1)[1])
+        self.assertAlmostEqual(region, REGION, delta=0.01 * REGION)
         self.assertIn("delta -0.50\n", self.succeed("info", "lqr", "--made-for", "mass2=1.2"))
 
     def test_a_motor_at_joint_2(self):

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "apps/commands.h"
+#include "control/lqr_catch.h"
 #include "control/upright_modes.h"
 #include "core/error.h"
 #include "core/simd.h"
@@ -64,6 +65,10 @@ void PrintController(const LoadedPolicy& loaded) {
   const UprightModes modes = ModesOf(loaded.plant);
   fmt::print("  modes       upright, grow at {:.3g}/s and {:.3g}/s (ratio {:.3g}), delta {:.2f}\n",
              modes.faster, modes.slower, modes.slower / modes.faster, modes.delta);
+  if (const auto* regulator = dynamic_cast<const LqrPolicy*>(&policy)) {
+    fmt::print("  region      of attraction, by simulation: x'Px < {:.4g}\n",
+               RegionOfAttraction(regulator->lqr(), loaded.plant));
+  }
 }
 
 void PrintPolicy(const LoadedPolicy& loaded) {

@@ -46,8 +46,7 @@ std::string Rounded(double x) {
   return {text.begin(), end};
 }
 
-PendulumController::PendulumController(const std::string& kind, const Options& settings,
-                                       const Plant& plant)
+ComputedPolicy::ComputedPolicy(const std::string& kind, const Options& settings, const Plant& plant)
     : plant_(plant), info_(InfoOf(kind, settings, plant)) {}
 
 std::unique_ptr<Policy::Memory> PendulumController::Start(int /*num_envs*/) const {
@@ -60,7 +59,7 @@ void PendulumController::Act(Matrix<const float> obs, Matrix<double> action, Mem
   }
 }
 
-Tensors PendulumController::ToTensors() const {
+Tensors ComputedPolicy::ToTensors() const {
   throw BadInput(Concat(kind(),
                         ": expected a policy that is kept in a file, got one that is made "
                         "anew each time"));

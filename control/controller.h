@@ -26,22 +26,19 @@ inline StateVector FromUpright(const StateVector& d) {
 /// Such as 3.389.
 std::string Rounded(double x);
 
-/// A policy of the double pendulum that is computed from the equations of motion of one plant. It
-/// sees the angles and velocities of an observation; energy and height do not matter to it.
-class PendulumController : public Policy {
+/// A policy of the double pendulum that is computed from the equations of motion of one plant.
+class ComputedPolicy : public Policy {
  public:
   std::string kind() const override { return info_.agent; }
   int obs_size() const override { return kObservationSize; }
   int action_size() const override { return 1; }
   const PolicyInfo& info() const override { return info_; }
-  std::unique_ptr<Memory> Start(int num_envs) const override;
-  void Act(Matrix<const float> obs, Matrix<double> action, Memory& memory) const override;
   /// Throws BadInput: it is made anew each time.
   Tensors ToTensors() const override;
 
  protected:
   /// `settings`: how it was made.
-  PendulumController(const std::string& kind, const Options& settings, const Plant& plant);
+  ComputedPolicy(const std::string& kind, const Options& settings, const Plant& plant);
 
   const Plant& plant() const { return plant_; }
   /// A torque (N·m) within the motor's limit.
@@ -50,12 +47,23 @@ class PendulumController : public Policy {
   }
 
  private:
+  Plant plant_;
+  PolicyInfo info_;
+};
+
+/// One that sees the angles and velocities of an observation; energy and height do not matter to
+/// it.
+class PendulumController : public ComputedPolicy {
+ public:
+  using ComputedPolicy::ComputedPolicy;
+
+  std::unique_ptr<Memory> Start(int num_envs) const override;
+  void Act(Matrix<const float> obs, Matrix<double> action, Memory& memory) const override;
+
+ private:
   /// The torque (N·m) at a deviation from upright of environment `env` of those of `memory`; what
   /// is beyond the motor's limit is cut.
   virtual double Torque(const StateVector& deviation, size_t env, Memory& memory) const = 0;
-
-  Plant plant_;
-  PolicyInfo info_;
 };
 
 /// The settings of several structs together.

@@ -11,7 +11,7 @@ namespace upswing {
 
 /// Swings up by one means, and holds upright with the linear-quadratic regulator wherever that
 /// catches (LqrCatch::Holds, asked anew at each decision).
-class HybridPolicy : public PendulumController {
+class HybridPolicy : public ComputedPolicy {
  public:
   /// `swing_up`: any policy of the double pendulum with one torque. `kind`, `settings`: what it is
   /// called and how it was made. Throws as SolveLqr, and BadInput if it is none.
@@ -25,8 +25,6 @@ class HybridPolicy : public PendulumController {
 
  private:
   struct Parts;
-
-  double Torque(const StateVector&, size_t, Memory&) const override { return 0; }  // see Act
 
   std::shared_ptr<const Policy> swing_up_;
   LqrCatch upright_;

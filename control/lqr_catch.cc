@@ -51,7 +51,9 @@ bool AllSettle(const Lqr& lqr, double level, const std::vector<Eigen::Vector4d>&
   });
 }
 
-double LargestLevel(const Lqr& lqr, const Plant& plant) {
+}  // namespace
+
+double RegionOfAttraction(const Lqr& lqr, const Plant& plant) {
   const Eigen::Matrix4d shape =
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d>(lqr.P).operatorInverseSqrt();
   std::vector<Eigen::Vector4d> directions = Directions();
@@ -74,11 +76,9 @@ double LargestLevel(const Lqr& lqr, const Plant& plant) {
   return low;
 }
 
-}  // namespace
-
 LqrCatch::LqrCatch(const LqrConfig& config, const Plant& plant)
     : lqr_(SolveLqr(config, plant)),
-      region_(LargestLevel(lqr_, plant)),
+      region_(RegionOfAttraction(lqr_, plant)),
       limit_(plant.torque_limit) {}
 
 bool LqrCatch::Holds(const StateVector& deviation, PendulumModel& model) const {

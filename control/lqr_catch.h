@@ -7,17 +7,21 @@
 /// has: what a swing-up has to reach.
 namespace upswing {
 
+/// A level of the cost x' P x within which all is caught: each of 512 states spread over the
+/// ellipsoid of that level is held by the limited torque, and so are those of the smaller ones that
+/// were tried. By simulation, as Reist, Preiswerk, Tedrake, "Feedback-motion-planning with
+/// simulation-based LQR-trees" (2016), section 3; no proof, as states in between are not tried.
+/// Takes some hundredths of a second.
+double RegionOfAttraction(const Lqr& lqr, const Plant& plant);
+
 class LqrCatch {
  public:
-  /// Throws as SolveLqr. Takes some hundredths of a second.
+  /// Throws as SolveLqr.
   LqrCatch(const LqrConfig& config, const Plant& plant);
 
   const Lqr& lqr() const { return lqr_; }
 
-  /// A level of the cost x' P x within which all is caught: each of 512 states spread over the
-  /// ellipsoid x' P x = region() is held by the limited torque, and so is each of 512 of some
-  /// smaller ones. By simulation, as Reist, Preiswerk, Tedrake, "Feedback-motion-planning with
-  /// simulation-based LQR-trees" (2016), section 3; no proof, as states in between are not tried.
+  /// RegionOfAttraction of the regulator.
   double region() const { return region_; }
 
   /// Whether the regulator, from this deviation from upright on, brings the plant into the region
