@@ -11,7 +11,7 @@ import unittest
 from testing import ROOT, UPSWING, ProgramTest, small, train_once
 
 COMMANDS = ("train", "eval", "simulate", "map", "plot", "info", "compare", "study", "export",
-            "bench")
+            "realaigym", "bench")
 # Words that only the library of the command line would choose.
 FOREIGN = ("not in range", "Could not convert", "is required", "required but received", "missing",
            "Value ", "RequiredError", "At Most", "The following argument")

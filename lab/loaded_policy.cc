@@ -134,6 +134,11 @@ LoadedPolicy LoadPolicy(const fs::path& path) {
 
 LoadedPolicy ReadPolicy(const Tensors& file) {
   const std::string& where = file.where();
+  const auto format = file.metadata.find("format");
+  if (format != file.metadata.end() && format->second == "upswing-realaigym") {
+    throw BadInput(
+        Concat(where, ": is a policy for RealAIGym's boards, which `upswing realaigym` takes"));
+  }
   std::shared_ptr<const Policy> policy;
   if (ActorPolicy::IsOutput(PolicyOutput(file))) {
     policy = std::make_shared<ActorPolicy>(ActorPolicy::From(file));

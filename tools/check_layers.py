@@ -10,7 +10,7 @@ import re
 import sys
 from pathlib import Path
 
-LIBRARIES = {"core", "nn", "sim", "rl", "control", "io", "mujoco", "report"}
+LIBRARIES = {"core", "nn", "sim", "rl", "control", "io", "mujoco", "realaigym", "report"}
 
 # What each folder may include besides itself.
 LAYERS = {
@@ -19,6 +19,7 @@ LAYERS = {
     "sim": {"core"},
     "rl": {"nn", "core"},
     "control": {"sim", "core"},
+    "realaigym": {"sim", "core"},
     "io": {"core"},
     "mujoco": {"sim", "io", "core"},
     "report": {"io", "core"},
@@ -38,8 +39,8 @@ ALLOWED_FILES = {
     "google": re.compile(r"io/"),
     "nanobind": re.compile(r"python/"),
     "hwy": re.compile(r"(core/simd(_test)?|nn/(linear|product|bfloat16|roofline|registers-inl)|"
-                      r"sim/(closed_form|sine_cosine-inl))\.(h|cc)$"),
-    "Eigen": re.compile(r"control/|nn/[^/]*_(test|bench)\.cc$"),
+                      r"sim/(closed_form|sine_cosine-inl)|realaigym/(plant|swing_net))\.(h|cc)$"),
+    "Eigen": re.compile(r"(control|realaigym)/|nn/[^/]*_(test|bench)\.cc$"),
 }
 
 # Layers that need no operating system, the headers that would bring one, and the files that may

@@ -1,0 +1,182 @@
+#include "lab/realaigym.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+#include <memory>
+
+#include "apps/commands.h"
+#include "apps/progress.h"
+#include "apps/say.h"
+#include "core/error.h"
+#include "core/text.h"
+#include "io/file.h"
+#include "io/machine.h"
+#include "io/streams.h"
+#include "io/tensor_file.h"
+#include "lab/format.h"
+#include "report/figure.h"
+
+namespace upswing {
+namespace {
+
+struct GymArguments {
+  PolicyArguments policy;
+  std::string figure, csv, search_out;
+  std::vector<FlagValue> search;
+  int64_t threads, case_seed;
+  bool as_json = false;
+};
+
+/// A number of a table, or a dash for one that is not known.
+std::string Cell(double x, int decimals, double factor = 1) {
+  return std::isfinite(x) ? fmt::format("{:.{}f}", factor * x, decimals) : "–";
+}
+
+void PrintEntry(const GymEntry& e) {
+  fmt::print(
+      "  {:<22.22} {:>6} {:>7} {:>6} {:>7} {:>7} {:>6}  {:>5} {:>5} {:>5} {:>5} {:>5} {:>5} "
+      "{:>6}\n",
+      e.name, Cell(e.seconds, 2), Cell(e.energy, 2), Cell(e.torque_cost, 2), Cell(e.smoothness, 4),
+      Cell(e.velocity_cost, 1), Cell(e.performance, 3), Cell(e.rows[0], 1, 100),
+      Cell(e.rows[1], 1, 100), Cell(e.rows[2], 1, 100), Cell(e.rows[3], 1, 100),
+      Cell(e.rows[4], 1, 100), Cell(e.rows[5], 1, 100), Cell(e.robustness, 3));
+}
+
+void PrintReport(const GymReport& report) {
+  const GymRobot robot = report.competitor.robot;
+  fmt::print("{} on RealAIGym's {}, simulation, version 2\n", Printable(report.competitor.name),
+             NameOf(robot));
+  fmt::print(
+      "  {:<22} {:>6} {:>7} {:>6} {:>7} {:>7} {:>6}  {:>5} {:>5} {:>5} {:>5} {:>5} {:>5} {:>6}\n",
+      "", "time", "energy", "cost", "smooth", "speed", "score", "model", "noise", "motor", "resp.",
+      "delay", "push", "score");
+  fmt::print("  {:<22} {:>6} {:>7} {:>6} {:>7} {:>7} {:>6}  {:>5} {:>5} {:>5} {:>5} {:>5} {:>5}\n",
+             "", "s", "J", "N²m²s", "N·m", "rad²/s", "S", "%", "%", "%", "%", "%", "%");
+  GymEntry ours = report.Entry();
+  ours.name = Printable(ours.name);
+  PrintEntry(ours);
+  fmt::print("  published\n");
+  for (const GymEntry& entry : PublishedGymEntries(robot)) PrintEntry(entry);
+  fmt::print("  723 simulations of 10 s in {:.2f} s; largest torque {:.2f} N·m\n", report.seconds,
+             report.nominal.max_torque);
+  if (!report.nominal.above_line) {
+    fmt::print("  it does not swing up: the tip is not above 0.45 m at the end\n");
+  }
+}
+
+GymCompetitor Search(const GymArguments& a, ThreadPool& pool) {
+  GymSearchConfig config;
+  SetFlags(OptionsOf(config), a.search);
+  GymSearch search(config);
+  const auto begin = std::chrono::steady_clock::now();
+  GymSearch::Report report;
+  {
+    ProgressLine line;
+    while (search.Step(&pool, report)) {
+      const std::string text =
+          fmt::format("generation {:4}  S {:.3f}  random simulations {:5.1f}%", report.generation,
+                      PerformanceScore(report.nominal), 100 * report.reached);
+      if (line.due())
+        line.Show(static_cast<double>(report.generation) / search.generations(), {text});
+      constexpr int kEvery = 50;
+      if (!a.as_json && (report.generation % kEvery == 0)) line.Print(text);
+    }
+  }
+  const double seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  SaveTensors(search.net().ToTensors(search.numbers()), a.search_out);
+  if (!a.as_json) {
+    Say("searched in {}: {}\n", FormatDuration(seconds), Printable(a.search_out));
+  }
+  return CompetitorOf(search, a.search_out);
+}
+
+int RunGym(const GymArguments& a) {
+  const bool searches = !a.search_out.empty();
+  if (searches == !a.policy.empty()) {
+    throw BadInput(searches ? "--search: expected no policy beside it"
+                            : "realaigym: expected a policy to score, or --search FILE");
+  }
+  std::string robot;
+  for (const FlagValue& flag : a.search) {
+    if (flag.name == "robot") robot = flag.text;
+    if (searches || flag.name == "robot") continue;
+    throw BadInput(Concat(FlagOf(flag.name), ": expected --search FILE with it"));
+  }
+  for (const auto& [flag, path] : {std::pair{"--search", &a.search_out}, {"--csv", &a.csv}}) {
+    if (!path->empty()) CheckWritable(flag, *path);
+  }
+  const bool to_output = IsStandardStream(a.csv);
+  if (to_output && a.as_json) {
+    throw BadInput("--json: expected a file of its own for --csv, got - for it");
+  }
+  if (!a.figure.empty()) CheckCanDraw();
+  ThreadPool pool(ResolveThreads(a.threads));
+  const GymCompetitor competitor = searches ? Search(a, pool) : GetGymCompetitor(a.policy, robot);
+  GymReport report;
+  {
+    EpisodeProgress progress(723, a.as_json);
+    report = ScoreGym(competitor, static_cast<uint64_t>(a.case_seed), pool,
+                      [&](double share) { progress.Show(share); });
+  }
+  if (!a.csv.empty()) WriteOutput(a.csv, GymCsv(report));
+  if (!a.figure.empty()) DrawGym(report, a.figure);
+  if (to_output) return 0;
+  if (a.as_json) {
+    fmt::print("{}\n", GymJson(report));
+    return 0;
+  }
+  PrintReport(report);
+  for (const std::string& file : {a.csv, a.figure}) {
+    if (!file.empty()) fmt::print("  written {}\n", Printable(file));
+  }
+  return 0;
+}
+
+}  // namespace
+
+void AddGym(CLI::App& program, Command& command) {
+  CLI::App* app = program.add_subcommand(
+      "realaigym", "Score a policy by the rules of the benchmark RealAIGym, or search one");
+  auto a = std::make_shared<GymArguments>();
+  AddPolicy(*app, a->policy);
+  app->add_option("--search", a->search_out, "search a policy, write it here, then score it")
+      ->type_name("FILE")
+      ->check(NotEmpty());
+  app->add_option("--figure", a->figure, "draw the rows of robustness, .svg or .png")
+      ->type_name("FILE")
+      ->check(NotEmpty());
+  app->add_option("--csv", a->csv,
+                  "write the motion in the boards' own format; -: standard output, alone")
+      ->type_name("FILE")
+      ->check(NotEmpty());
+  app->add_flag("--json", a->as_json, "print JSON instead of a table")->disable_flag_override();
+  Options own;
+  own.Section("cases");
+  own.Add(&a->case_seed, "case_seed", 1, {0, 1e15}, "",
+          "of the noise and pushes that it is judged by");
+  AddArguments(*app, own);
+  GymSearchConfig config;
+  AddSettings(*app, OptionsOf(config), a->search);
+  AddThreads(*app, a->threads);
+  app->footer(
+      "Performance: one simulation of 10 s from hanging, on the boards' plant C.1 without "
+      "friction,\n"
+      "500 Hz. Robustness: 722 simulations with errors of the model, noise of the velocities and "
+      "of\n"
+      "the torque, a motor that responds too little or too much, delay, and pushes; a share of "
+      "each\n"
+      "row ends upright. A policy that holds a torque for longer is called at its own period.\n"
+      "docs/realaigym.md has the formulas. All of this is simulated.\n\n"
+      "Examples:\n"
+      "  ./upswing realaigym --search pendubot.safetensors          search one, some minutes\n"
+      "  ./upswing realaigym pendubot.safetensors --figure rows.svg\n"
+      "  ./upswing realaigym --search acrobot.safetensors --robot acrobot --seed 2\n"
+      "  ./upswing realaigym pendubot.safetensors --csv sim_swingup.csv --json\n"
+      "  ./upswing realaigym lqr                                    the baselines' regulator\n");
+  app->callback([a, &command] { command = [a] { return RunGym(*a); }; });
+}
+
+}  // namespace upswing

@@ -1,0 +1,121 @@
+#!/usr/bin/env python3
+"""`upswing realaigym`: scores by the rules of RealAIGym, and the search of a policy."""
+
+import csv
+import io
+import json
+import math
+import unittest
+
+from testing import ROOT, ProgramTest, read_tensors, write_tensors
+
+SMALL = ["--alone", 8, "--generations", 2, "--first-population", 64, "--population", 4,
+         "--episodes", 8, "--hidden", 8]
+POLICY = ROOT / "web/public/agents/fast.safetensors"
+
+
+def score(rows):
+    """Performance, version 2, of a motion in the boards' format."""
+    l1, l2 = 0.2, 0.3
+    t = [row["time"] for row in rows]
+    q = [(row["pos_meas1"], row["pos_meas2"]) for row in rows]
+    v = [(row["vel_meas1"], row["vel_meas2"]) for row in rows]
+    u = [(row["tau_con1"], row["tau_con2"]) for row in rows]
+    n = len(rows)
+    low = [k for k in range(n - 1) if -l1 * math.cos(q[k][0]) - l2 * math.cos(sum(q[k])) <= 0.45]
+    swing_up = t[low[-1] + 1] if low else t[0]
+    steps = range(n - 1)
+    energy = sum(abs((q[k + 1][j] - q[k][j]) * u[k][j]) for k in steps for j in (0, 1))
+    cost = sum((u[k][0] ** 2 + u[k][1] ** 2) * (t[k + 1] - t[k]) for k in steps)
+    velocity = sum((v[k][0] ** 2 + v[k][1] ** 2) * (t[k + 1] - t[k]) for k in steps)
+    smooth = 0
+    for j in (0, 1):
+        changes = [u[k + 1][j] - u[k][j] for k in steps]
+        mean = sum(changes) / len(changes)
+        smooth += math.sqrt(sum((x - mean) ** 2 for x in changes) / len(changes))
+    penalties = [math.tanh(math.pi * x / scale) for x, scale in
+                 ((swing_up, 20), (energy, 60), (cost, 20), (smooth, 0.1), (velocity, 400))]
+    return 1 - sum(penalties) / 5 if swing_up < t[-1] else 0
+
+
+class RealAIGym(ProgramTest):
+    def search(self, *arguments):
+        return json.loads(self.succeed("realaigym", "--search", "p.safetensors", *SMALL, "--json",
+                                       *arguments))
+
+    def test_a_search_and_its_scores(self):
+        found = self.search("--csv", "motion.csv")
+        with open(self.folder / "motion.csv", encoding="utf-8") as file:
+            rows = [{k: float(x) for k, x in row.items()} for row in csv.DictReader(file)]
+        self.assertEqual(len(rows), 5000)
+        self.assertEqual([rows[0][k] for k in ("time", "pos_meas1", "vel_meas2")], [0, 0, 0])
+        self.assertAlmostEqual(rows[-1]["time"], 9.998, places=9)
+        self.assertAlmostEqual(found["performance"]["score"], score(rows), delta=1e-9)
+        self.assertEqual(len(found["curves"]), 14)
+        rows = [found["robustness"][name] for name in
+                ("model", "velocity noise", "torque noise", "response", "delay", "pushes")]
+        self.assertAlmostEqual(found["robustness"]["score"], sum(rows) / 6, delta=1e-12)
+        # Read again, by any number of threads, it has the same scores.
+        again = json.loads(self.succeed("realaigym", "p.safetensors", "--json", "--threads", 3))
+        for each in (found, again):
+            del each["seconds"]
+        self.assertEqual(found, again)
+        text = self.succeed("realaigym", "p.safetensors")
+        for word in ("AR-EAPO", "0.913", "History SAC", "723 simulations"):
+            self.assertIn(word, text)
+
+    def test_another_seed_is_another_policy(self):
+        one, two = self.search("--seed", 1), self.search("--seed", 2)
+        self.assertNotEqual(one["performance"], two["performance"])
+        self.assertEqual(self.search("--seed", 1)["performance"], one["performance"])
+
+    def test_the_acrobot(self):
+        found = self.search("--robot", "acrobot", "--csv", "motion.csv")
+        self.assertEqual(found["robot"], "acrobot")
+        with open(self.folder / "motion.csv", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+        self.assertEqual({row["tau_con1"] for row in rows}, {"0"})
+        self.refuse(["realaigym", "p.safetensors", "--robot", "pendubot"], "--robot", "acrobot")
+
+    def test_figure(self):
+        self.search("--figure", "rows.svg")
+        self.assertIn("delay", (self.folder / "rows.svg").read_text(encoding="utf-8"))
+
+    def test_policies_of_the_double_pendulum(self):
+        # Their own plant is another: that they act is what counts.
+        found = json.loads(self.succeed("realaigym", POLICY, "--json"))
+        self.assertEqual(found["robot"], "pendubot")
+        self.assertGreater(found["performance"]["max_torque"], 1)
+        motion = self.succeed("realaigym", POLICY, "--csv", "-")
+        torques = [float(row["tau_con1"]) for row in csv.DictReader(io.StringIO(motion))]
+        for k in range(0, 5000, 10):  # held for 20 ms
+            self.assertEqual(len(set(torques[k:k + 10])), 1)
+        self.refuse(["realaigym", POLICY, "--robot", "acrobot"], "--robot", "joint 1")
+
+    def test_the_baselines_regulator_does_not_swing_up(self):
+        found = json.loads(self.succeed("realaigym", "lqr", "--json"))
+        self.assertEqual((found["performance"]["score"], found["robustness"]["score"]), (0, 0))
+        self.assertIn("does not swing up", self.succeed("realaigym", "lqr", "--robot", "acrobot"))
+
+    def test_bad_input(self):
+        self.search()
+        refuse = self.refuse
+        refuse(["realaigym"], "expected a policy to score, or --search")
+        refuse(["realaigym", "p.safetensors", "--search", "q.safetensors"], "--search")
+        refuse(["realaigym", "p.safetensors", "--hidden", 8], "--hidden", "--search")
+        refuse(["realaigym", "nothing.safetensors"], "nothing.safetensors: no such file")
+        refuse(["realaigym", "--search", "no/where"], "--search", "no")
+        refuse(["realaigym", "lqr", "--robot", "cartpole"], "--robot", "pendubot or acrobot")
+        refuse(["realaigym", "--search", "x", "--hidden", 7], "--hidden")
+        refuse(["realaigym", "--search", "x", "--population", 5], "--population")
+        refuse(["realaigym", "lqr", "--csv", "-", "--json"], "--json")
+        refuse(["realaigym", "lqr", "--figure", "rows.txt"], "rows.txt")
+        metadata, tensors = read_tensors(self.folder / "p.safetensors")
+        write_tensors(self.folder / "wrong.safetensors", metadata | {"hidden": "16"}, tensors)
+        refuse(["realaigym", "wrong.safetensors"], "wrong.safetensors", "numbers")
+        for command in ("eval", "info", "simulate"):
+            refuse([command, "p.safetensors"], "upswing realaigym")
+
+
+if __name__ == "__main__":
+    unittest.main()

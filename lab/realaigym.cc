@@ -1,0 +1,328 @@
+#include "lab/realaigym.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <mutex>
+#include <nlohmann/json.hpp>
+
+#include "core/error.h"
+#include "core/json.h"
+#include "core/text.h"
+#include "io/tensor_file.h"
+#include "lab/controllers.h"
+#include "realaigym/linear.h"
+#include "report/figure.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+/// A policy of the double pendulum on the boards' plant: it sees the observations that it was
+/// trained with, energy and height those of its own plant, and holds a torque for its own period.
+class PolicyController : public GymController {
+ public:
+  PolicyController(const LoadedPolicy& loaded, size_t count)
+      : loaded_(loaded),
+        period_(static_cast<int>(std::lround(kControlPeriod / kGymTimestep))),
+        size_(static_cast<size_t>(loaded.policy->obs_size())),
+        obs_(count * size_),
+        action_(count),
+        memory_(loaded.policy->Start(static_cast<int>(count))) {}
+
+  void Act(int step, const GymMeasurement& measured, size_t count, Lanes& torque) override {
+    if (step % period_ != 0) return;
+    for (size_t lane = 0; lane < count; ++lane) Observe(step, measured, lane);
+    const int rows = static_cast<int>(count);
+    loaded_.policy->Act({obs_.data(), rows, loaded_.policy->obs_size()}, {action_.data(), rows, 1},
+                        *memory_);
+    const double limit = loaded_.plant.torque_limit;
+    for (size_t lane = 0; lane < count; ++lane) {
+      torque[lane] = action_[lane] = std::clamp(action_[lane], -limit, limit);
+    }
+  }
+
+ private:
+  void Observe(int step, const GymMeasurement& m, size_t lane) {
+    const auto row = std::span(obs_).subspan(lane * size_, size_);
+    const std::vector<float> before(row.begin(), row.end());
+    std::ranges::copy(
+        upswing::Observe(loaded_.plant, {m.q1[lane], m.q2[lane], m.w1[lane], m.w2[lane]}),
+        row.begin());
+    if (size_ == kObservationSize || step == 0) return;
+    // As PendulumEnv remembers.
+    const auto entry = row.subspan(kObservationSize, kMemorySize);
+    entry[0] = (row[2] - before[2]) * static_cast<float>(kMaxVelocity1 / kMemoryVelocity);
+    entry[1] = (row[5] - before[5]) * static_cast<float>(kMaxVelocity2 / kMemoryVelocity);
+    entry[2] = static_cast<float>(action_[lane] / kMemoryTorque);
+    std::ranges::copy(
+        std::span(before).subspan(kObservationSize, size_ - kObservationSize - kMemorySize),
+        row.subspan(kObservationSize + kMemorySize).begin());
+  }
+
+  const LoadedPolicy& loaded_;
+  int period_;  // steps
+  size_t size_;
+  std::vector<float> obs_;
+  std::vector<double> action_;
+  std::unique_ptr<Policy::Memory> memory_;
+};
+
+/// The boards' own regulator of the linear model, with the weights of its baselines.
+class RegulatorController : public GymController {
+ public:
+  explicit RegulatorController(GymRobot robot)
+      : K_(SolveGymRegulator(LinearizeUpright(GymPlant(), robot), {0.97, 0.93, 0.39, 0.26}, 0.11)
+               .K) {}
+
+  void Act(int /*step*/, const GymMeasurement& m, size_t count, Lanes& torque) override {
+    for (size_t lane = 0; lane < count; ++lane) {
+      const auto [e1, e2] = Lean({m.q1[lane], m.q2[lane], 0, 0});
+      // Lean has the second link's absolute angle.
+      const double q2 = std::remainder(e2 - e1, 2 * std::acos(-1.0));
+      torque[lane] = -(K_[0] * e1 + K_[1] * q2 + K_[2] * m.w1[lane] + K_[3] * m.w2[lane]);
+    }
+  }
+
+ private:
+  Eigen::RowVector4d K_;
+};
+
+GymRobot ParseRobot(const std::string& name, GymRobot usual) {
+  if (name.empty()) return usual;
+  for (const GymRobot robot : {GymRobot::kPendubot, GymRobot::kAcrobot}) {
+    if (name == NameOf(robot)) return robot;
+  }
+  throw BadInput(Concat("--robot: expected pendubot or acrobot, got \"", Printable(name), "\""));
+}
+
+/// Throws BadInput where a policy is of the other robot.
+void ExpectRobot(const std::string& name, GymRobot own, GymRobot asked) {
+  if (own == asked) return;
+  throw BadInput(Concat("--robot: ", Printable(name), " is of the ", NameOf(own),
+                        ", whose motor is at joint ", static_cast<int>(own), ", not of the ",
+                        NameOf(asked)));
+}
+
+GymCompetitor OfSearch(const std::string& name, SwingPolicy policy) {
+  const auto kept = std::make_shared<SwingPolicy>(std::move(policy));
+  return {name, kept->net.robot(),
+          [kept](size_t) { return kept->net.Control({std::span<const double>(kept->numbers)}); }};
+}
+
+}  // namespace
+
+std::string NameOf(GymRobot robot) { return robot == GymRobot::kPendubot ? "pendubot" : "acrobot"; }
+
+GymCompetitor CompetitorOf(const GymSearch& search, const std::string& name) {
+  return OfSearch(name, {search.net(), search.numbers()});
+}
+
+GymCompetitor GetGymCompetitor(const PolicyArguments& a, const std::string& robot) {
+  if (a.name == kGymRegulator && !a.has_settings()) {
+    const GymRobot asked = ParseRobot(robot, GymRobot::kPendubot);
+    return {"lqr", asked, [asked](size_t) { return std::make_unique<RegulatorController>(asked); }};
+  }
+  if (!IsController(a.name) && fs::is_regular_file(a.name)) {
+    const Tensors tensors = LoadTensors(a.name);
+    if (IsSwingPolicy(tensors)) {
+      GymCompetitor found = OfSearch(a.name, ReadSwingPolicy(tensors));
+      ExpectRobot(a.name, found.robot, ParseRobot(robot, found.robot));
+      return found;
+    }
+  }
+  const auto loaded = std::make_shared<const LoadedPolicy>(GetPolicy(a));
+  if (loaded->task != kDoublePendulum) {
+    throw BadInput(Concat(Printable(loaded->name),
+                          ": expected a policy of the double pendulum, got "
+                          "one of ",
+                          loaded->task));
+  }
+  const auto own = static_cast<GymRobot>(static_cast<int>(loaded->plant.actuated_joint));
+  ExpectRobot(loaded->name, own, ParseRobot(robot, own));
+  return {loaded->name, own,
+          [loaded](size_t) { return std::make_unique<PolicyController>(*loaded, kGymBlock); }};
+}
+
+std::vector<GymEntry> PublishedGymEntries(GymRobot robot) {
+  constexpr double kNone = kUnknown;
+  if (robot == GymRobot::kAcrobot) {
+    return {{"History SAC",
+             kNone,
+             kNone,
+             kNone,
+             kNone,
+             kNone,
+             0.655,
+             {kNone, kNone, kNone, kNone, kNone, kNone},
+             0.751},
+            {"AR-EAPO",
+             kNone,
+             kNone,
+             kNone,
+             kNone,
+             kNone,
+             0.633,
+             {kNone, kNone, kNone, kNone, kNone, kNone},
+             0.727},
+            {"TVLQR",
+             kNone,
+             kNone,
+             kNone,
+             kNone,
+             kNone,
+             0.504,
+             {kNone, kNone, kNone, kNone, kNone, kNone},
+             0.607}};
+  }
+  return {
+      {"History SAC", 1.15, 7.67, 2.36, .007, 62.07, .682, {.681, .476, 1, 1, 1, .46}, .770},
+      {"AR-EAPO", 1.15, 7.72, 2.43, .010, 64.33, .659, {.876, .81, 1, 1, .81, .98}, .913},
+      {"EvolSAC", .71, 9.83, 4.37, .014, 58.15, .596, {.752, .571, 1, 1, .714, .68}, .786},
+      {"iLQR Riccati",
+       4.13,
+       9.53,
+       1.25,
+       .005,
+       211.34,
+       .536,
+       {.052, .381, .095, .857, .143, 0},
+       .255},
+      {"TVLQR", 4.13, 9.53, 1.26, .007, 211.12, .526, {.629, .905, 1, 1, .429, .64}, .767},
+      {"MC-PILCO+LQR",
+       1.14,
+       8.35,
+       2.42,
+       .054,
+       114.26,
+       .480,
+       {.248, .762, .619, .952, .286, .82},
+       .614},
+      {"iLQR MPC stab.", 4.12, 9.91, 1.77, .083, 211.98, .353, {.319, .905, 1, 1, .381, .44}, .674},
+  };
+}
+
+GymEntry GymReport::Entry() const {
+  return {competitor.name,           nominal.swing_up_seconds, nominal.energy,
+          nominal.torque_cost,       nominal.smoothness,       nominal.velocity_cost,
+          PerformanceScore(nominal), robustness.rows,          robustness.score()};
+}
+
+GymReport ScoreGym(const GymCompetitor& competitor, uint64_t seed, ThreadPool& pool,
+                   const std::function<void(double)>& progress) {
+  const auto begin = std::chrono::steady_clock::now();
+  GymReport report{competitor, {}, {}, {}, 0};
+  const std::array<GymEpisode, 1> nominal;
+  report.nominal =
+      SimulateGym(competitor.robot, nominal, competitor.make, nullptr, &report.trace).front();
+  const std::vector<GymCase> cases = RobustnessCases(seed);
+  std::vector<GymEpisode> episodes;
+  for (const GymCase& each : cases) episodes.push_back(each.episode);
+  std::mutex mutex;
+  size_t done = 0;
+  const auto outcomes =
+      SimulateGym(competitor.robot, episodes, competitor.make, &pool, nullptr, [&](size_t count) {
+        const std::lock_guard lock(mutex);
+        done += count;
+        progress(static_cast<double>(done) / static_cast<double>(episodes.size()));
+      });
+  report.robustness = JudgeRobustness(cases, outcomes);
+  report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return report;
+}
+
+std::string GymJson(const GymReport& report) {
+  const GymOutcome& o = report.nominal;
+  ordered_json j;
+  j["policy"] = report.competitor.name;
+  j["robot"] = NameOf(report.competitor.robot);
+  j["performance"] = {{"score", PerformanceScore(o)},           {"swung_up", o.above_line},
+                      {"swing_up_seconds", o.swing_up_seconds}, {"energy", o.energy},
+                      {"torque_cost", o.torque_cost},           {"smoothness", o.smoothness},
+                      {"velocity_cost", o.velocity_cost},       {"max_torque", o.max_torque},
+                      {"penalties", PerformancePenalties(o)}};
+  j["robustness"] = {{"score", report.robustness.score()}};
+  for (size_t row = 0; row < kGymRows; ++row) {
+    j["robustness"][kGymRowNames.at(row)] = report.robustness.rows.at(row);
+  }
+  for (const GymCurve& curve : report.robustness.curves) {
+    j["curves"].push_back({{"name", curve.name}, {"values", curve.values}, {"share", curve.share}});
+  }
+  j["simulations"] = 723;
+  j["seconds"] = report.seconds;
+  return PrintableJson(j);
+}
+
+std::string GymCsv(const GymReport& report) {
+  std::string csv = "time,pos_meas1,pos_meas2,vel_meas1,vel_meas2,tau_con1,tau_con2\n";
+  const bool first = report.competitor.robot == GymRobot::kPendubot;
+  for (const GymSample& sample : report.trace) {
+    csv += FormatNumber(std::round(sample.time * 1e6) / 1e6);
+    for (const double x : sample.state) csv += Concat(",", FormatNumber(x));
+    csv += Concat(",", FormatNumber(first ? sample.torque : 0), ",",
+                  FormatNumber(first ? 0 : sample.torque), "\n");
+  }
+  return csv;
+}
+
+void DrawGym(const GymReport& report, const fs::path& file) {
+  Figure figure;
+  figure.title = Concat(Printable(report.competitor.name), " on RealAIGym's ",
+                        NameOf(report.competitor.robot));
+  figure.caption = fmt::format(
+      "simulation, version 2: performance {:.3f}, robustness {:.3f}. Shares of simulations that "
+      "end "
+      "upright; a level passes above one half",
+      PerformanceScore(report.nominal), report.robustness.score());
+  figure.columns = 3;
+  figure.width = 1200;
+  figure.height = 720;
+  const auto title = [&](size_t row) {
+    return fmt::format("{}: {:.1f}%", kGymRowNames.at(row), 100 * report.robustness.rows.at(row));
+  };
+  Panel model;
+  model.x_label = "level of the error";
+  model.y_label = "Ir, m1r1, I1, m2r2, m2, I2, b1, b2, cf1, cf2";
+  model.heat_map.emplace();
+  model.heat_map->label = "ends upright";
+  model.heat_map->high = 1;
+  for (int i = 1; i <= kGymLevels; ++i) model.heat_map->x.push_back(i);
+  const size_t parameters = kGymModelNames.size();
+  for (size_t k = 0; k < parameters; ++k) {
+    model.heat_map->y.push_back(static_cast<double>(k + 1));
+    const auto& share = report.robustness.curves[k].share;
+    model.heat_map->z.insert(model.heat_map->z.end(), share.begin(), share.end());
+  }
+  model.title = title(0);
+  figure.panels.push_back(std::move(model));
+  constexpr const char* kLabels[] = {"noise of the velocities (rad/s)", "noise of the torque (N·m)",
+                                     "response k", "delay (s)"};
+  for (size_t row = 1; row + 1 < kGymRows; ++row) {
+    const GymCurve& curve = report.robustness.curves[parameters + row - 1];
+    Panel panel;
+    panel.title = title(row);
+    panel.x_label = kLabels[row - 1];
+    panel.y_label = "share that ends upright";
+    panel.lines = {{"", curve.values, curve.share, {}, {}, true}};
+    panel.y_range = {-0.05, 1.05};
+    figure.panels.push_back(std::move(panel));
+  }
+  const double share = report.robustness.rows.back();
+  Panel pushes;
+  pushes.title = title(kGymRows - 1);
+  pushes.x_label = "50 profiles of pushes";
+  pushes.y_label = "share that ends upright";
+  pushes.lines = {{"", {0, kGymPushCases}, {share, share}, {}, {}}};
+  pushes.y_range = {-0.05, 1.05};
+  figure.panels.push_back(std::move(pushes));
+  Draw(figure, file);
+}
+
+}  // namespace upswing

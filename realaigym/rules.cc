@@ -1,0 +1,196 @@
+#include "realaigym/rules.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include "core/rng.h"
+
+namespace upswing {
+namespace {
+
+double Between(double low, double high, double level) { return low + (high - low) * level; }
+
+/// The plant with one parameter at `level` of its range.
+GymPlant Varied(int parameter, double level, double& value) {
+  GymPlant plant;
+  const double factor = Between(0.75, 1.25, level);
+  value = factor;
+  switch (parameter) {
+    case 0:
+      plant.rotor_inertia = value = Between(0, 1e-4, level);
+      break;
+    case 1:
+      plant.center1 *= factor;
+      break;
+    case 2:
+      plant.inertia1 *= factor;
+      break;
+    case 3:
+      plant.center2 *= factor;
+      break;
+    case 4:
+      plant.mass2 *= factor;
+      break;
+    case 5:
+      plant.inertia2 *= factor;
+      break;
+    case 6:
+      plant.damping1 = value = Between(-0.1, 0.1, level);
+      break;
+    case 7:
+      plant.damping2 = value = Between(-0.1, 0.1, level);
+      break;
+    case 8:
+      plant.friction1 = value = Between(-0.2, 0.2, level);
+      break;
+    default:
+      plant.friction2 = value = Between(-0.2, 0.2, level);
+  }
+  return plant;
+}
+
+/// Six pushes with growing times, three of them, at random, about the joint with the motor. Those
+/// about the other one do nothing there (docs/realaigym.md).
+std::array<GymPush, 3> RandomPushes(Rng& rng) {
+  std::array<int, 6> order;
+  std::iota(order.begin(), order.end(), 0);
+  for (size_t i = order.size() - 1; i > 0; --i) std::swap(order[i], order[rng.Below(i + 1)]);
+  std::array<GymPush, 6> all;
+  double time = 0;
+  for (GymPush& push : all) {
+    time += 1 + rng.Uniform(0, 0.5);
+    push.time = time;
+    push.width = rng.Uniform(0.05, 0.1);
+    push.amplitude = rng.Uniform(0.5, 5) * (rng.Uniform() < 0.5 ? -1 : 1);
+  }
+  std::array<GymPush, 3> ours;
+  for (size_t k = 0; k < 3; ++k) ours[k] = all[static_cast<size_t>(order[k])];
+  return ours;
+}
+
+GymCase MakeCase(GymRow row, int parameter, double level, uint64_t seed) {
+  GymCase made{row, parameter, level, {}};
+  GymEpisode& episode = made.episode;
+  episode.seed = seed;
+  switch (row) {
+    case GymRow::kModel:
+      episode.plant = Varied(parameter, level, made.value);
+      break;
+    case GymRow::kVelocityNoise:
+      episode.velocity_noise = made.value = Between(0, 0.5, level);
+      break;
+    case GymRow::kTorqueNoise:
+      episode.torque_noise = made.value = Between(0, 1.1, level);
+      break;
+    case GymRow::kResponse:
+      episode.response = made.value = Between(0.1, 2, level);
+      break;
+    case GymRow::kDelay:
+      episode.delay = static_cast<int>(std::lround(level * (kGymLevels - 1)));
+      made.value = episode.delay * kGymTimestep;
+      break;
+    case GymRow::kPush: {
+      Rng rng(seed, "realaigym: pushes");
+      episode.pushes = RandomPushes(rng);
+    }
+  }
+  return made;
+}
+
+}  // namespace
+
+std::array<double, 5> PerformancePenalties(const GymOutcome& o) {
+  constexpr std::array<double, 5> kScale{20, 60, 20, 0.1, 400};
+  const std::array<double, 5> costs{o.swing_up_seconds, o.energy, o.torque_cost, o.smoothness,
+                                    o.velocity_cost};
+  std::array<double, 5> penalties;
+  for (size_t i = 0; i < 5; ++i) {
+    penalties[i] = std::tanh(std::numbers::pi * costs[i] / kScale[i]);
+  }
+  return penalties;
+}
+
+double PerformanceScore(const GymOutcome& outcome) {
+  if (!outcome.above_line) return 0;
+  const auto penalties = PerformancePenalties(outcome);
+  return 1 - std::accumulate(penalties.begin(), penalties.end(), 0.0) / 5;
+}
+
+GymEpisode EpisodeOf(GymRow row, int parameter, double level, uint64_t seed) {
+  return MakeCase(row, parameter, level, seed).episode;
+}
+
+std::vector<GymCase> RobustnessCases(uint64_t seed) {
+  std::vector<GymCase> cases;
+  Rng rng(seed, "realaigym: cases");
+  const auto add = [&](GymRow row, int parameter, int level) {
+    const double share = static_cast<double>(level) / (kGymLevels - 1);
+    cases.push_back(MakeCase(row, parameter, share, rng.Next()));
+  };
+  for (int parameter = 0; parameter < static_cast<int>(kGymModelNames.size()); ++parameter) {
+    for (int level = 0; level < kGymLevels; ++level) add(GymRow::kModel, parameter, level);
+  }
+  for (const GymRow row : {GymRow::kVelocityNoise, GymRow::kTorqueNoise}) {
+    for (int i = 0; i < kGymLevels * kGymRepeats; ++i) add(row, 0, i / kGymRepeats);
+  }
+  for (const GymRow row : {GymRow::kResponse, GymRow::kDelay}) {
+    for (int level = 0; level < kGymLevels; ++level) add(row, 0, level);
+  }
+  for (int i = 0; i < kGymPushCases; ++i) add(GymRow::kPush, 0, 0);
+  return cases;
+}
+
+double GymRobustness::score() const {
+  return std::accumulate(rows.begin(), rows.end(), 0.0) / kGymRows;
+}
+
+GymRobustness JudgeRobustness(const std::vector<GymCase>& cases,
+                              const std::vector<GymOutcome>& outcomes) {
+  GymRobustness result;
+  std::vector<int> rows;    // of each curve
+  std::vector<int> counts;  // of simulations at the curve's last value
+  double pushed = 0;
+  for (size_t i = 0; i < cases.size(); ++i) {
+    const GymCase& each = cases[i];
+    const double reached = outcomes[i].at_goal ? 1 : 0;
+    if (each.row == GymRow::kPush) {
+      pushed += reached / kGymPushCases;
+      continue;
+    }
+    const auto row = static_cast<int>(each.row);
+    const bool model = each.row == GymRow::kModel;
+    const std::string name = model ? kGymModelNames.at(static_cast<size_t>(each.parameter))
+                                   : kGymRowNames.at(static_cast<size_t>(row));
+    if (result.curves.empty() || result.curves.back().name != name) {
+      result.curves.push_back({name, {}, {}});
+      rows.push_back(row);
+      counts.push_back(0);
+    }
+    GymCurve& curve = result.curves.back();
+    if (curve.values.empty() || curve.values.back() != each.value) {
+      curve.values.push_back(each.value);
+      curve.share.push_back(0);
+      counts.back() = 0;
+    }
+    double& share = curve.share.back();
+    share += (reached - share) / ++counts.back();
+  }
+  // A level of noise passes where more than half of its repeats do.
+  std::array<int, kGymRows> levels{};
+  for (size_t k = 0; k < rows.size(); ++k) {
+    const auto row = static_cast<size_t>(rows[k]);
+    for (const double share : result.curves[k].share) {
+      result.rows.at(row) += share > 0.5 ? 1 : 0;
+      ++levels.at(row);
+    }
+  }
+  for (size_t row = 0; row < kGymRows; ++row) {
+    if (levels.at(row) > 0) result.rows.at(row) /= levels.at(row);
+  }
+  result.rows.back() = pushed;
+  return result;
+}
+
+}  // namespace upswing

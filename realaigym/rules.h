@@ -1,0 +1,98 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "realaigym/plant.h"
+
+/// The rules of RealAIGym's simulation boards, version 2 (docs/realaigym.md): what is simulated,
+/// and the scores of performance and robustness.
+namespace upswing {
+
+/// Which joint has the motor.
+enum class GymRobot { kPendubot = 1, kAcrobot = 2 };
+
+/// A torque (N·m) about the motor's joint, beyond its limit too, for a moment: amplitude ·
+/// exp(-(t - time)²/(2 width²)).
+struct GymPush {
+  double amplitude = 0;        // N·m
+  double time = 0, width = 0;  // s
+};
+
+/// What is simulated: 10 s from hanging at rest.
+struct GymEpisode {
+  GymPlant plant;
+  double velocity_noise = 0;        // of the measured velocities, rad/s
+  double torque_noise = 0;          // N·m
+  double response = 1;              // k of u = u_before + k (u_wanted - u_before)
+  int delay = 0;                    // of the measured state, steps
+  std::array<GymPush, 3> pushes{};  //
+  uint64_t seed = 0;                // of the noise
+};
+
+/// What came of it.
+struct GymOutcome {
+  double swing_up_seconds =
+      0;                     // start of the last stretch above the line; the end if there is none
+  double energy = 0;         // J
+  double max_torque = 0;     // N·m
+  double torque_cost = 0;    // N²m²s
+  double smoothness = 0;     // N·m
+  double velocity_cost = 0;  // rad²/s
+  bool above_line = false;   // swung up at the end: what performance asks
+  bool at_goal = false;      // near upright and slow at the end: what robustness asks
+  double held = 0;           // how near to the goal it was over the last 2 s, 0 to 1
+  double nearest = 0;        // how near to it at best, 0 to 1
+};
+
+/// The performance score, version 2, from 0 to 1.
+double PerformanceScore(const GymOutcome& outcome);
+/// Its five penalties, each from 0 to 1: time, energy, torque cost, smoothness, velocity cost.
+std::array<double, 5> PerformancePenalties(const GymOutcome& outcome);
+
+/// The rows of the robustness score.
+enum class GymRow { kModel, kVelocityNoise, kTorqueNoise, kResponse, kDelay, kPush };
+inline constexpr int kGymRows = 6;
+inline constexpr std::array<const char*, kGymRows> kGymRowNames{
+    "model", "velocity noise", "torque noise", "response", "delay", "pushes"};
+/// The parameters of the model that are varied, one at a time.
+inline constexpr std::array<const char*, 10> kGymModelNames{"Ir", "m1 r1", "I1", "m2 r2", "m2",
+                                                            "I2", "b1",    "b2", "cf1",   "cf2"};
+inline constexpr int kGymLevels = 21;     // of what a row varies
+inline constexpr int kGymRepeats = 10;    // of a level of noise
+inline constexpr int kGymPushCases = 50;  // profiles
+
+/// A simulation of the robustness score and its place there.
+struct GymCase {
+  GymRow row;
+  int parameter;  // of the model
+  double value;   // what is varied
+  GymEpisode episode;
+};
+
+/// All 722, in the order of the rows. The seed is that of noise and pushes.
+std::vector<GymCase> RobustnessCases(uint64_t seed);
+
+/// A case of a row at `level` from 0 to 1 of its range.
+GymEpisode EpisodeOf(GymRow row, int parameter, double level, uint64_t seed);
+
+/// What a row shows: a share for each level, of a parameter of the model or of the repeats.
+struct GymCurve {
+  std::string name;
+  std::vector<double> values;  // what is varied
+  std::vector<double> share;   // of the simulations that ended at the goal
+};
+
+struct GymRobustness {
+  std::array<double, kGymRows> rows{};  // shares that pass
+  std::vector<GymCurve> curves;         // ten of the model, then the other rows but the pushes
+  double score() const;
+};
+
+/// Judges the outcomes of these cases.
+GymRobustness JudgeRobustness(const std::vector<GymCase>& cases,
+                              const std::vector<GymOutcome>& outcomes);
+
+}  // namespace upswing

@@ -1,0 +1,81 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "core/options.h"
+#include "core/rng.h"
+#include "core/thread_pool.h"
+#include "realaigym/swing_policy.h"
+
+namespace upswing {
+
+/// Separable natural evolution strategies: Schaul, Glasmachers, Schmidhuber, "High dimensions and
+/// heavy tails for natural evolution strategies" (GECCO 2011). Candidates are normal about a mean,
+/// each number with its own deviation; both follow the natural gradient of the ranks.
+class Snes {
+ public:
+  Snes(std::vector<double> mean, std::vector<double> deviation, double mean_rate, uint64_t seed);
+
+  /// Draws so many candidates, an even number: in pairs, mirrored at the mean.
+  const std::vector<std::vector<double>>& Ask(int population);
+  /// The candidates' fitness, larger is better.
+  void Tell(const std::vector<double>& fitness);
+
+  const std::vector<double>& mean() const { return mean_; }
+  const std::vector<double>& deviation() const { return deviation_; }
+
+ private:
+  std::vector<double> mean_, deviation_;
+  double mean_rate_;
+  Rng rng_;
+  std::vector<std::vector<double>> z_, candidates_;
+};
+
+/// How a policy for the boards is searched.
+struct GymSearchConfig {
+  std::string robot;
+  int64_t seed, hidden, alone, generations, population, first_population, episodes, interleaved;
+  double deviation, mean_rate, performance_weight, robustness_weight;
+
+  GymSearchConfig() { SetDefaults(*this); }
+  /// One line per setting: name, default, range, unit, help.
+  void Describe(Options& options);
+};
+
+/// Searches a policy on the rules themselves: first on the nominal plant alone, then also on
+/// random plants, delays, noise and pushes, drawn anew in each generation from the ranges of the
+/// robustness score, but never the cases that it is judged by.
+class GymSearch {
+ public:
+  explicit GymSearch(const GymSearchConfig& config);
+
+  struct Report {
+    int generation;
+    double best_fitness;
+    GymOutcome nominal;  // of the mean
+    double reached;      // share of the best candidate's random simulations that ended at the goal
+  };
+
+  /// One generation; false after the last one.
+  bool Step(ThreadPool* pool, Report& report);
+
+  const SwingNet& net() const { return net_; }
+  const std::vector<double>& numbers() const { return snes_.mean(); }
+  int generation() const { return generation_; }
+  int generations() const;
+
+ private:
+  /// Whether this generation sees the nominal plant alone.
+  bool IsAlone() const;
+  std::vector<GymEpisode> DrawEpisodes();
+
+  GymSearchConfig config_;
+  SwingNet net_;
+  Snes snes_;
+  Rng rng_;
+  int generation_ = 0;
+};
+
+}  // namespace upswing

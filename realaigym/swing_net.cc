@@ -1,0 +1,158 @@
+#include "realaigym/swing_net.h"
+
+#include <algorithm>
+#include <numbers>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "realaigym/swing_net.cc"
+#include <hwy/foreach_target.h>
+// After foreach_target.h, which includes this file once for every target:
+#include "sim/sine_cosine-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace upswing::HWY_NAMESPACE {
+namespace {
+
+using F = hn::CappedTag<float, 16>;
+using VF = hn::Vec<F>;
+inline constexpr F kFloats;
+
+/// The network's inputs (kSwingInputs × kGymBlock) and outputs (kGymBlock).
+struct Activations {
+  alignas(64) float in[kSwingInputs][kGymBlock];
+  alignas(64) float out[kGymBlock];
+};
+
+HWY_INLINE V From(const Lanes& x, size_t i) { return hn::LoadU(kDoubles, x.data() + i); }
+HWY_INLINE void To(V x, Lanes& lanes, size_t i) { hn::StoreU(x, kDoubles, lanes.data() + i); }
+
+/// x/√(1 + x²): as tanh, of arithmetic alone.
+HWY_INLINE VF Squash(VF x) { return x / hn::Sqrt(hn::MulAdd(x, x, hn::Set(kFloats, 1.0F))); }
+
+/// The velocity that the last three angles tell, to second order, rad/s.
+HWY_INLINE V Velocity(const std::array<Lanes, 2>& past, V now, size_t i) {
+  const V sum =
+      MulAdd(Constant(3), now, NegMulAdd(Constant(4), From(past[0], i), From(past[1], i)));
+  return sum * Constant(1 / (2 * kGymTimestep));
+}
+
+/// An angle in [-π, π].
+HWY_INLINE V Wrap(V x) {
+  const V turns = hn::Round(x * Constant(1 / (2 * std::numbers::pi)));
+  return NegMulAdd(turns, Constant(2 * std::numbers::pi), x);
+}
+
+/// Weights one after the other.
+template <bool kShared>
+class Reader {
+ public:
+  HWY_INLINE Reader(const float* weights, size_t lane)
+      : next_(kShared ? weights : weights + lane) {}
+  HWY_INLINE VF operator()() {
+    const float* here = next_;
+    next_ += kShared ? 1 : kGymBlock;
+    return kShared ? hn::Set(kFloats, *here) : hn::Load(kFloats, here);
+  }
+
+ private:
+  const float* next_;
+};
+
+/// A unit of n inputs: bias and weights.
+template <bool kShared>
+HWY_INLINE VF Unit(Reader<kShared>& weight, const VF* in, int n) {
+  VF even = weight() * in[0], odd = weight() * in[1];
+  for (int j = 2; j < n; j += 2) {
+    even = hn::MulAdd(weight(), in[j], even);
+    odd = hn::MulAdd(weight(), in[j + 1], odd);
+  }
+  return even + odd + weight();
+}
+
+template <bool kShared>
+void Network(const SwingBlock& block, Activations& a) {
+  const int hidden = block.hidden;
+  for (size_t lane = 0; lane < kGymBlock; lane += hn::Lanes(kFloats)) {
+    Reader<kShared> weight(block.weights.data(), lane);
+    VF in[kSwingInputs], first[kSwingMostHidden], second[kSwingMostHidden];
+    for (int j = 0; j < kSwingInputs; ++j) in[j] = hn::Load(kFloats, a.in[j] + lane);
+    for (int j = 0; j < hidden; ++j) first[j] = Squash(Unit(weight, in, kSwingInputs));
+    for (int j = 0; j < hidden; ++j) second[j] = Squash(Unit(weight, first, hidden));
+    const VF out = Squash(Unit(weight, second, hidden) * hn::Set(kFloats, 0.5F));
+    hn::Store(out * hn::Set(kFloats, static_cast<float>(kSwingTorque)), kFloats, a.out + lane);
+  }
+}
+
+/// The share of the linear torque, and that torque.
+struct Linear {
+  V share, torque;
+};
+
+HWY_INLINE Linear LinearTorque(const SwingBlock& block, size_t i, const V (&x)[4]) {
+  V cost = Constant(0), torque = Constant(0);
+  for (size_t r = 0; r < 4; ++r) {
+    V row = Constant(0);
+    for (size_t c = 0; c < 4; ++c) row = MulAdd(Constant(block.P[4 * r + c]), x[c], row);
+    cost = MulAdd(row, x[r], cost);
+    torque = NegMulAdd(From(block.K[r], i), x[r], torque);
+  }
+  // A smooth step from 0 to 1.
+  const V inside = NegMulAdd(cost, From(block.inverse_rho, i), Constant(1));
+  const V z = hn::Min(hn::Max(MulAdd(From(block.sharpness, i), inside, Constant(0.5)), Constant(0)),
+                      Constant(1));
+  return {z * z * NegMulAdd(Constant(2), z, Constant(3)), torque};
+}
+
+void ActOnBlock(SwingBlock& block, const GymMeasurement& measured, Lanes& torque) {
+  Activations a;
+  Lanes w1, w2;
+  const hn::Rebind<float, D> halves;
+  for (size_t i = 0; i < kGymBlock; i += hn::Lanes(kDoubles)) {
+    const V q1 = From(measured.q1, i), q2 = From(measured.q2, i);
+    const V v1 = Velocity(block.q1, q1, i), v2 = Velocity(block.q2, q2, i);
+    const auto [s1, c1] = SineCosineOf(q1);
+    const auto [s2, c2] = SineCosineOf(q2);
+    const V in[kSwingInputs] = {s1, c1, MulAdd(s1, c2, c1 * s2), NegMulAdd(s1, s2, c1 * c2),
+                                s2, c2, v1 * Constant(0.1),      v2 * Constant(0.1)};
+    for (int j = 0; j < kSwingInputs; ++j) {
+      hn::Store(hn::DemoteTo(halves, in[j]), halves, a.in[j] + i);
+    }
+    To(v1, w1, i);
+    To(v2, w2, i);
+    To(From(block.q1[0], i), block.q1[1], i);
+    To(From(block.q2[0], i), block.q2[1], i);
+    To(q1, block.q1[0], i);
+    To(q2, block.q2[0], i);
+  }
+  if (block.shared) {
+    Network<true>(block, a);
+  } else {
+    Network<false>(block, a);
+  }
+  for (size_t i = 0; i < kGymBlock; i += hn::Lanes(kDoubles)) {
+    const V x[4] = {Wrap(From(measured.q1, i) - Constant(std::numbers::pi)),
+                    Wrap(From(measured.q2, i)), From(w1, i), From(w2, i)};
+    const Linear linear = LinearTorque(block, i, x);
+    const V net = hn::PromoteTo(kDoubles, hn::Load(halves, a.out + i));
+    // Where it has no share the linear torque may be large: it is cut first.
+    const V limit = Constant(kGymTorqueLimit);
+    const V cut = hn::Min(hn::Max(linear.torque, hn::Neg(limit)), limit);
+    To(MulAdd(linear.share, cut - net, net), torque, i);
+  }
+}
+
+}  // namespace
+}  // namespace upswing::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace upswing {
+
+HWY_EXPORT(ActOnBlock);
+
+void SwingTorques(SwingBlock& block, const GymMeasurement& measured, Lanes& torque) {
+  HWY_DYNAMIC_DISPATCH(ActOnBlock)(block, measured, torque);
+}
+
+}  // namespace upswing
+#endif  // HWY_ONCE

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "core/aligned.h"
+#include "realaigym/simulation.h"
+
+/// The arithmetic of SwingNet (swing_policy.h) for a block of simulations.
+namespace upswing {
+
+/// Largest number of units in each of its two layers, and their inputs: sine and cosine of q1, of
+/// q1 + q2 and of q2, w1/10 and w2/10.
+inline constexpr int kSwingMostHidden = 32, kSwingInputs = 8;
+/// Limit of the network's torque, N·m.
+inline constexpr double kSwingTorque = 4;
+
+/// What a block is controlled by.
+struct SwingBlock {
+  int hidden;
+  bool shared;                   // whether all simulations have the same weights
+  AlignedVector<float> weights;  // (W) if shared, else (W × kGymBlock): see SwingNet
+  std::array<Lanes, 4> K;        // N·m/rad, N·m·s/rad
+  Lanes inverse_rho, sharpness;  //
+  std::array<double, 16> P;      // (4 × 4)
+  std::array<Lanes, 2> q1, q2;   // angles one and two steps ago, rad
+};
+
+/// Numbers of a network with so many units: each unit has its weights, then its bias.
+constexpr size_t SwingWeights(int hidden) {
+  return static_cast<size_t>((kSwingInputs + 1) * hidden + (hidden + 1) * hidden + hidden + 1);
+}
+
+/// The torques for these angles, which then are those of one step ago.
+void SwingTorques(SwingBlock& block, const GymMeasurement& measured, Lanes& torque);
+
+}  // namespace upswing

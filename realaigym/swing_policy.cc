@@ -1,0 +1,122 @@
+#include "realaigym/swing_policy.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "core/rng.h"
+#include "core/text.h"
+#include "realaigym/linear.h"
+#include "realaigym/swing_net.h"
+
+namespace upswing {
+namespace {
+
+constexpr const char* kFormat = "upswing-realaigym";
+constexpr const char* kRobotNames[] = {"pendubot", "acrobot"};
+constexpr int kVersion = 1;
+constexpr int kLeastHidden = 4;
+
+class SwingController : public GymController {
+ public:
+  explicit SwingController(SwingBlock block) : block_(std::move(block)) {}
+
+  void Act(int step, const GymMeasurement& measured, size_t /*count*/, Lanes& torque) override {
+    if (step == 0) {  // at rest
+      block_.q1.fill(measured.q1);
+      block_.q2.fill(measured.q2);
+    }
+    SwingTorques(block_, measured, torque);
+  }
+
+ private:
+  SwingBlock block_;
+};
+
+}  // namespace
+
+SwingNet::SwingNet(GymRobot robot, int hidden) : robot_(robot), hidden_(hidden) {
+  const GymRegulator regulator =
+      SolveGymRegulator(LinearizeUpright(GymPlant(), robot), {1, 1, 0.1, 0.1}, 1);
+  for (size_t i = 0; i < 4; ++i) {
+    K_[i] = regulator.K[static_cast<Eigen::Index>(i)];
+    for (size_t j = 0; j < 4; ++j) {
+      P_[4 * i + j] = regulator.P(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+    }
+  }
+}
+
+size_t SwingNet::size() const { return kLinear + SwingWeights(hidden_); }
+
+std::vector<double> SwingNet::Initial(uint64_t seed) const {
+  std::vector<double> numbers(size(), 0.0);
+  numbers[4] = std::log(20);
+  numbers[5] = std::log(2);
+  Rng rng(seed, "realaigym: network");
+  for (size_t i = kLinear; i < numbers.size(); ++i) numbers[i] = 0.3 * rng.Normal();
+  return numbers;
+}
+
+std::unique_ptr<GymController> SwingNet::Control(
+    std::vector<std::span<const double>> numbers) const {
+  SwingBlock block;
+  block.hidden = hidden_;
+  block.shared = numbers.size() == 1;
+  block.P = P_;
+  const size_t W = SwingWeights(hidden_);
+  block.weights.resize(block.shared ? W : W * kGymBlock);
+  for (size_t lane = 0; lane < kGymBlock; ++lane) {
+    const auto& own = numbers[std::min(lane, numbers.size() - 1)];
+    for (size_t i = 0; i < 4; ++i) block.K[i][lane] = K_[i] * std::exp(0.3 * own[i]);
+    block.inverse_rho[lane] = std::exp(-own[4]);
+    block.sharpness[lane] = std::exp(own[5]);
+    if (block.shared && lane > 0) continue;
+    for (size_t i = 0; i < W; ++i) {
+      block.weights[block.shared ? i : i * kGymBlock + lane] = static_cast<float>(own[kLinear + i]);
+    }
+  }
+  return std::make_unique<SwingController>(std::move(block));
+}
+
+Tensors SwingNet::ToTensors(std::span<const double> numbers) const {
+  Tensors tensors;
+  tensors.metadata["format"] = kFormat;
+  tensors.metadata["format_version"] = std::to_string(kVersion);
+  tensors.metadata["robot"] = kRobotNames[static_cast<size_t>(robot_) - 1];
+  tensors.metadata["hidden"] = std::to_string(hidden_);
+  tensors.AddCopy("numbers", numbers);
+  return tensors;
+}
+
+bool IsSwingPolicy(const Tensors& tensors) {
+  const auto found = tensors.metadata.find("format");
+  return found != tensors.metadata.end() && found->second == kFormat;
+}
+
+SwingPolicy ReadSwingPolicy(const Tensors& tensors) {
+  const auto expect = [&](const char* key, const std::string& expected) {
+    return BadInput(Concat(tensors.where(), ": metadata \"", key, "\": expected ", expected,
+                           ", got \"", Printable(tensors.Metadata(key)), "\""));
+  };
+  if (tensors.Metadata("format_version") != std::to_string(kVersion)) {
+    throw expect("format_version", std::to_string(kVersion));
+  }
+  const std::string& name = tensors.Metadata("robot");
+  const auto* robot = std::ranges::find(kRobotNames, name);
+  if (robot == std::end(kRobotNames)) throw expect("robot", "pendubot or acrobot");
+  const auto hidden = ParseInteger(tensors.Metadata("hidden"));
+  if (!hidden || *hidden < kLeastHidden || *hidden > kSwingMostHidden || *hidden % 2 != 0) {
+    throw expect("hidden",
+                 Concat("an even number in [", kLeastHidden, ", ", kSwingMostHidden, "]"));
+  }
+  SwingPolicy policy{{static_cast<GymRobot>(robot - kRobotNames + 1), static_cast<int>(*hidden)},
+                     {}};
+  policy.numbers.resize(policy.net.size());
+  tensors.Read("numbers", std::span(policy.numbers), {static_cast<int64_t>(policy.net.size())});
+  if (!std::ranges::all_of(policy.numbers, [](double x) { return std::abs(x) < 1e6; })) {
+    throw BadInput(Concat(tensors.where(), ": tensor \"numbers\": expected numbers within 1e6"));
+  }
+  return policy;
+}
+
+}  // namespace upswing

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <array>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/tensors.h"
+#include "realaigym/simulation.h"
+
+namespace upswing {
+
+/// A small network that swings up, blended with a linear regulator that holds:
+///   u = (1 - s) u_net(x) + s u_lin(x),   u_lin = -K x,   s = smooth step of (1 - x' P x / ρ)
+/// x is the deviation from upright. It computes the velocities itself, from the last measured
+/// angles, which have no noise on the board: w = (3 q - 4 q' + q'')/(2 h).
+///
+/// All of it are numbers in one vector, so that it can be searched (search.h).
+class SwingNet {
+ public:
+  static constexpr int kInputs = 8;
+  /// Numbers before the network's: of K (4), log ρ, sharpness of the blend.
+  static constexpr int kLinear = 6;
+
+  SwingNet(GymRobot robot, int hidden);
+
+  int hidden() const { return hidden_; }
+  GymRobot robot() const { return robot_; }
+  /// How many numbers there are.
+  size_t size() const;
+  /// Where a search begins: the regulator of the nominal plant, a random network.
+  std::vector<double> Initial(uint64_t seed) const;
+
+  /// A controller of simulations, by one vector for all of them, or one for each.
+  std::unique_ptr<GymController> Control(std::vector<std::span<const double>> numbers) const;
+
+  // In files; see docs/realaigym.md.
+  Tensors ToTensors(std::span<const double> numbers) const;
+
+ private:
+  GymRobot robot_;
+  int hidden_;
+  std::array<double, 4> K_;   // where the search begins
+  std::array<double, 16> P_;  // (4 × 4), of the same regulator
+};
+
+/// A SwingNet with its numbers, as a file has it.
+struct SwingPolicy {
+  SwingNet net;
+  std::vector<double> numbers;
+};
+
+/// Whether a file's tensors are such a policy; reads it. Throws BadInput.
+bool IsSwingPolicy(const Tensors& tensors);
+SwingPolicy ReadSwingPolicy(const Tensors& tensors);
+
+}  // namespace upswing
