@@ -116,7 +116,8 @@ GymSearch::GymSearch(const GymSearchConfig& config)
       snes_(net_.Initial(static_cast<uint64_t>(config.seed)),
             Deviations(net_, config.deviation, 0.1), config.mean_rate,
             static_cast<uint64_t>(config.seed)),
-      rng_(static_cast<uint64_t>(config.seed), "realaigym: search") {}
+      rng_(static_cast<uint64_t>(config.seed), "realaigym: search"),
+      average_(snes_.mean()) {}
 
 int GymSearch::generations() const { return static_cast<int>(config_.alone + config_.generations); }
 
@@ -180,13 +181,19 @@ bool GymSearch::Step(ThreadPool* pool, Report& report) {
   }
   snes_.Tell(fitness);
   ++generation_;
+  // The average of the last means: they wander about a good place.
+  constexpr double kKept = 0.97;
+  const bool first = generation_ <= config_.alone;
+  for (size_t i = 0; i < average_.size(); ++i) {
+    average_[i] = first ? snes_.mean()[i] : kKept * average_[i] + (1 - kKept) * snes_.mean()[i];
+  }
 
   const auto best = static_cast<size_t>(std::ranges::max_element(fitness) - fitness.begin());
   const std::array<GymEpisode, 1> nominal;
   report = {
       generation_, fitness[best],
       SimulateGym(
-          net_.robot(), nominal, [&](size_t) { return net_.Control({snes_.mean()}); }, nullptr)
+          net_.robot(), nominal, [&](size_t) { return net_.Control({average_}); }, nullptr)
           .front(),
       reached[best]};
   return true;

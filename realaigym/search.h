@@ -54,7 +54,7 @@ class GymSearch {
   struct Report {
     int generation;
     double best_fitness;
-    GymOutcome nominal;  // of the mean
+    GymOutcome nominal;  // of the policy so far
     double reached;      // share of the best candidate's random simulations that ended at the goal
   };
 
@@ -62,7 +62,8 @@ class GymSearch {
   bool Step(ThreadPool* pool, Report& report);
 
   const SwingNet& net() const { return net_; }
-  const std::vector<double>& numbers() const { return snes_.mean(); }
+  /// The policy so far: the means of the last generations, averaged.
+  const std::vector<double>& numbers() const { return average_; }
   int generation() const { return generation_; }
   int generations() const;
 
@@ -75,6 +76,7 @@ class GymSearch {
   SwingNet net_;
   Snes snes_;
   Rng rng_;
+  std::vector<double> average_;
   int generation_ = 0;
 };
 
