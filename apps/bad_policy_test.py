@@ -171,7 +171,8 @@ class PolicyFileTest(SmallRunTest):
             "upswing_version": ("0.3.0\n", "\u202e"),
             "observation": ("{}", "nonsense", json.dumps(observation | {"max_velocity": [10, 10]}),
                             json.dumps(observation | {"memory": {"steps": 2, "names": [],
-                                                                 "velocity": 1, "torque": 5}})),
+                                                                 "velocity": 1, "torque": 5}}),
+                            json.dumps(observation | {"identified": 13})),
         }.items() for text in texts]
         for key, text in changes:
             with self.subTest(key=key, text=text):

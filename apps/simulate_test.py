@@ -2,11 +2,12 @@
 """`upswing simulate`: physics against a reference, the reward recomputed, CSV in and out."""
 
 import csv
+import json
 import math
 import unittest
 from pathlib import Path
 
-from testing import ProgramTest, read_tensors, small
+from testing import ProgramTest, read_tensors, small, write_tensors
 
 REFERENCE = Path(__file__).resolve().parent / "testdata/mujoco_trajectory.csv"
 COLUMNS = ["t", "qpos0", "qpos1", "qvel0", "qvel1", "torque", "energy", "height", "inverted",
@@ -261,6 +262,32 @@ class PolicyRolloutTest(ProgramTest):
                       ["observation"])
         self.succeed("eval", "remembering", "--episodes", 2)
         self.succeed("info", "remembering")
+
+    def test_a_policy_that_identifies_the_plant_is_told_nothing_of_it(self):
+        self.succeed(*small(memory=1, out="identifying"), "--identify", "--randomize", 0.1)
+        metadata, _ = read_tensors(self.folder / "identifying/policy.safetensors")
+        observation = json.loads(metadata["observation"])
+        self.assertEqual(len(observation["identified"]["names"]), 13)
+        self.assertEqual(json.loads(metadata["network"])["inputs"], 8 + 13 + 3)
+        light = ("--set", "mass2=0.8", "--set", "gravity=8")
+        first = [parse(self.succeed("simulate", "identifying", "--seconds", 0.1, *more))[0]
+                 for more in ((), light)]
+        self.assertEqual(first[0]["torque"], first[1]["torque"])
+        for words in (("eval", "--episodes", 2, *light), ("eval", "--episodes", 2, "--unknown-plant"),
+                      ("map", "--x", "mass1=-10%:10%:2", "--y", "mass2=-10%:10%:2", "--check", 0,
+                       "--episodes", 1, "--out", "map"),
+                      ("info",)):
+            with self.subTest(words[0]):
+                self.succeed(words[0], "identifying", *words[1:])
+        for flag in ("--c", "--onnx"):
+            with self.subTest(flag):
+                self.refuse(["export", "identifying", flag, "out"], "needs no identification")
+        # A network without the inputs that its metadata claim.
+        metadata, tensors = read_tensors(self.folder / "identifying/policy.safetensors")
+        metadata["observation"] = json.dumps(observation | {"identified": {
+            "names": observation["identified"]["names"], "scale": 2}})
+        write_tensors(self.folder / "scaled.safetensors", metadata, tensors)
+        self.refuse(["eval", "scaled.safetensors"], "observation")
 
 
 if __name__ == "__main__":

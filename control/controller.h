@@ -41,6 +41,8 @@ class ComputedPolicy : public Policy {
   ComputedPolicy(const std::string& kind, const Options& settings, const Plant& plant);
 
   const Plant& plant() const { return plant_; }
+  /// Of other observations than those without memory, for parts that see more of them.
+  void SetObservation(const ObservationInfo& observation) { info_.observation = observation; }
   /// A torque (N·m) within the motor's limit.
   double Limited(double u) const {
     return std::clamp(u, -plant_.torque_limit, plant_.torque_limit);

@@ -17,6 +17,7 @@ struct HybridPolicy::Parts : Memory {
 HybridPolicy::HybridPolicy(const std::string& kind, const Options& settings, const LqrConfig& lqr,
                            std::shared_ptr<const Policy> swing_up, const Plant& plant)
     : ComputedPolicy(kind, settings, plant), swing_up_(std::move(swing_up)), upright_(lqr, plant) {
+  if (swing_up_->info().observation) SetObservation(*swing_up_->info().observation);
   const std::string& task = swing_up_->info().task;
   if ((task.empty() || task == kDoublePendulum) && swing_up_->action_size() == 1) return;
   throw BadInput(

@@ -37,10 +37,15 @@ std::map<std::string, double> ParsePlant(const std::string& text) {
 
 ObservationInfo ParseObservation(const std::string& text) {
   const json object = ParseJsonObject(text);
-  ObservationInfo observation{Texts(object, "names"), {}, {}};
+  ObservationInfo observation{Texts(object, "names"), {}, {}, {}};
   for (const json& item : JsonList(object, "max_velocity", 2)) {
     if (!item.is_number()) throw BadInput("\"max_velocity\": expected a list of numbers");
     observation.max_velocity.push_back(item.get<double>());
+  }
+  if (object.contains("identified")) {
+    const json& identified = JsonMember(object, "identified");
+    if (!identified.is_object()) throw BadInput("\"identified\": expected an object");
+    observation.identified = {Texts(identified, "names"), JsonNumber(identified, "scale")};
   }
   if (!object.contains("memory")) return observation;
   const json& memory = JsonMember(object, "memory");
@@ -52,6 +57,9 @@ ObservationInfo ParseObservation(const std::string& text) {
 
 std::string ObservationText(const ObservationInfo& observation) {
   json object{{"names", observation.names}, {"max_velocity", observation.max_velocity}};
+  if (const auto& identified = observation.identified) {
+    object["identified"] = {{"names", identified->names}, {"scale", identified->scale}};
+  }
   if (const auto& memory = observation.memory) {
     object["memory"] = {{"steps", memory->steps},
                         {"names", memory->names},

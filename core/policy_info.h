@@ -13,6 +13,14 @@ struct ObservationInfo {
   std::vector<std::string> names;    // of the inputs, without those of the memory
   std::vector<double> max_velocity;  // rad/s, by which w1 and w2 are divided
 
+  /// What identification of the plant adds to the inputs.
+  struct Identified {
+    std::vector<std::string> names;
+    double scale = 0;  // by which the deviations of the constants are divided
+    bool operator==(const Identified&) const = default;
+  };
+  std::optional<Identified> identified = {};
+
   /// Past steps that are part of an observation.
   struct Memory {
     int64_t steps = 0;

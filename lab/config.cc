@@ -39,6 +39,9 @@ void Config::Describe(Options& o) {
         "largest velocity of these random states");
   o.Add(&memory, "memory", 0, {0, kMostMemory}, "steps",
         "past steps whose torque and change of velocities the agent sees too");
+  o.Add(&identify, "identify", false,
+        "the agent sees what the motion tells of the plant: an estimate of its constants")
+      .implied = true;
   o.AddChoice(&physics, "physics", EngineNames(),
               "engine to train in; closed-form computes the same physics faster than mujoco");
   std::vector<std::string> judges = EngineNames();
@@ -79,6 +82,7 @@ EnvConfig Config::Environments() const {
   env.num_envs = static_cast<int>(train.envs);
   env.episode_seconds = episode_seconds;
   env.memory = static_cast<int>(memory);
+  if (identify) env.identified_from = plant;
   env.start = {train.start_noise, random_start_share, random_start_velocity};
   env.weights = reward;
   env.seed = static_cast<uint64_t>(train.seed);

@@ -41,6 +41,7 @@ struct Config {
   std::string task;  // see TaskNames
   double episode_seconds, random_start_share, random_start_velocity;
   int64_t memory;
+  bool identify;
   std::string physics, eval_physics;  // engines, see FindEngine, of training and evaluation
   Plant plant;
   Disturbance disturbance;

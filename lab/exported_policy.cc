@@ -164,6 +164,11 @@ bool ExportedPolicy::critic_takes_action() const {
 }
 
 ExportedPolicy TakeApart(const LoadedPolicy& loaded) {
+  if (loaded.identifies()) {
+    throw BadInput(Concat(loaded.path.string(),
+                          ": expected a policy that needs no identification of the plant: export "
+                          "does not hold its estimator"));
+  }
   EnvConfig env;
   env.task = loaded.task;
   const std::string where = loaded.path.string();

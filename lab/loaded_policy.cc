@@ -20,22 +20,25 @@ namespace fs = std::filesystem;
 /// pendulum. Names are for people.
 void CheckObservation(const LoadedPolicy& loaded, const std::string& where) {
   const int inputs = loaded.policy->obs_size();
-  const int remembered = inputs - kObservationSize;
+  const int remembered = inputs - kObservationSize - (loaded.identifies() ? kIdentifiedSize : 0);
   if (remembered < 0 || remembered % kMemorySize != 0 || loaded.memory() > kMostMemory) {
-    throw BadInput(Concat(where, ": expected a policy of ", kObservationSize, " observations and ",
-                          kMemorySize, " for each of at most ", kMostMemory,
-                          " steps of memory, got ", inputs));
+    throw BadInput(Concat(
+        where, ": expected a policy of ", kObservationSize, " observations, ",
+        loaded.identifies() ? Concat(kIdentifiedSize, " of identification, ") : "", "and ",
+        kMemorySize, " for each of at most ", kMostMemory, " steps of memory, got ", inputs));
   }
   const auto& given = loaded.policy->info().observation;
   if (!given) throw BadInput(Concat(where, ": no metadata \"observation\""));
-  const ObservationInfo expected = ObservationInfoOf(loaded.memory());
+  const ObservationInfo expected = ObservationInfoOf(loaded.memory(), loaded.identifies());
   const auto same_memory = [&] {
     if (!given->memory || !expected.memory) return !given->memory && !expected.memory;
     return given->memory->steps == expected.memory->steps &&
            given->memory->velocity == expected.memory->velocity &&
            given->memory->torque == expected.memory->torque;
   };
-  if (given->max_velocity != expected.max_velocity || !same_memory()) {
+  const bool same_scale =
+      !given->identified || given->identified->scale == expected.identified->scale;
+  if (given->max_velocity != expected.max_velocity || !same_scale || !same_memory()) {
     throw BadInput(Concat(where,
                           ": metadata \"observation\": expected the scales of "
                           "docs/policy-format.md and a memory of ",
@@ -157,7 +160,12 @@ LoadedPolicy ReadPolicy(const Tensors& file) {
 }
 
 int LoadedPolicy::memory() const {
-  return task == kDoublePendulum ? MemorySteps(policy->obs_size()) : 0;
+  return task == kDoublePendulum ? MemorySteps(policy->obs_size(), identifies()) : 0;
+}
+
+bool LoadedPolicy::identifies() const {
+  const auto& observation = policy->info().observation;
+  return task == kDoublePendulum && observation && observation->identified;
 }
 
 PolicyInfo InfoOf(const Config& config) {
@@ -170,7 +178,7 @@ PolicyInfo InfoOf(const Config& config) {
   info.control_period = SpecOf(config.Environments()).step_seconds;
   if (config.task != kDoublePendulum) return info;
   for (const auto& [name, value] : PlantValues(config.plant)) info.plant[name] = value;
-  info.observation = ObservationInfoOf(config.memory);
+  info.observation = ObservationInfoOf(config.memory, config.identify);
   info.model = config.mjcf;
   return info;
 }

@@ -24,6 +24,8 @@ struct LoadedPolicy {
 
   /// How many past steps its observations remember.
   int memory() const;
+  /// Whether they hold an estimate of the plant.
+  bool identifies() const;
   /// Where it is from: "training", or "design" of a controller.
   const char* origin() const { return path.empty() ? "design" : "training"; }
 };

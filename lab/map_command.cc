@@ -100,6 +100,7 @@ MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded, const Trai
   config.point.plant = loaded.plant;
   config.mjcf = loaded.mjcf;
   if (a.unknown_plant) config.assumed_plant = loaded.plant;
+  if (loaded.identifies()) config.identified_from = loaded.plant;
   config.x = ParseMapAxis(a.x, training.point, "--x");
   config.y = ParseMapAxis(a.y, training.point, "--y");
   CheckDifferent(config.x, config.y);

@@ -79,7 +79,8 @@ std::vector<EpisodeResult> RunRange(const MapConfig& config, const Policy& polic
   env_config.engine = config.engine;
   env_config.mjcf = config.mjcf;
   env_config.assumed_plant = config.assumed_plant;
-  env_config.memory = MemorySteps(policy.obs_size());
+  env_config.identified_from = config.identified_from;
+  env_config.memory = MemorySteps(policy.obs_size(), config.identified_from.has_value());
   env_config.num_envs = range.count;
   env_config.seed = config.seed;
   env_config.stream = "map";

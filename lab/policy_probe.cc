@@ -35,6 +35,7 @@ std::vector<double> Observe(const LoadedPolicy& loaded) {
   config.task = loaded.task;
   config.plants = {loaded.plant};
   config.memory = loaded.memory();
+  if (loaded.identifies()) config.identified_from = loaded.plant;
   const std::unique_ptr<VectorEnv> env = MakeEnv(config);
   const auto S = static_cast<int>(env->spec().state_names.size());
   const std::vector<double> states = ReadRows(S);

@@ -68,6 +68,7 @@ EnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded)
   if (loaded != nullptr) {
     env.mjcf = loaded->mjcf;
     env.memory = loaded->memory();
+    if (loaded->identifies()) env.identified_from = loaded->plant;
     if (a.unknown_plant) env.assumed_plant = loaded->plant;
   }
   env.plants = {

@@ -148,6 +148,7 @@ class Session {
       entry.policy = other.policy;
       entry.env.memory = other.env.memory;
       entry.env.assumed_plant = other.env.assumed_plant;
+      entry.env.identified_from = other.env.identified_from;
     });
     Notice(Concat("policy: ", config_.entries[number].title));
   }

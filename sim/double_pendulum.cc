@@ -118,11 +118,18 @@ std::array<float, kObservationSize> Observe(const Plant& plant, const PendulumSt
   return result;
 }
 
-ObservationInfo ObservationInfoOf(int64_t memory) {
+ObservationInfo ObservationInfoOf(int64_t memory, bool identified) {
   ObservationInfo observation{
       {"cos q1", "sin q1", "w1", "cos q2", "sin q2", "w2", "energy", "height"},
       {kMaxVelocity1, kMaxVelocity2},
+      {},
       {}};
+  if (identified) {
+    observation.identified = {
+        {"J1", "J2", "b", "G1", "G2", "d1", "d2", "delta", "tanh(0.1 / delta)", "identified energy",
+         "faster fall", "slower fall", "torque against the falls"},
+        kConstantScale};
+  }
   if (memory > 0) {
     observation.memory = {
         memory, {"change of w1", "change of w2", "torque"}, kMemoryVelocity, kMemoryTorque};

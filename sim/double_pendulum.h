@@ -100,14 +100,20 @@ std::array<float, kObservationSize> Observe(const Plant& plant, const PendulumSt
 /// kMemoryTorque. The plant's response carries information that the state lacks: its masses and
 /// lengths, and the torques that are still delayed.
 inline constexpr int kMemorySize = 3;
+/// How many numbers identification adds to an observation; see sim/identification.h.
+inline constexpr int kIdentifiedSize = 13;
+inline constexpr double kConstantScale = 0.5;  // by which the constants' deviations are divided
 /// Number of past steps in an observation of `obs_size` numbers.
-constexpr int MemorySteps(int obs_size) { return (obs_size - kObservationSize) / kMemorySize; }
+constexpr int MemorySteps(int obs_size, bool identified = false) {
+  return (obs_size - kObservationSize - (identified ? kIdentifiedSize : 0)) / kMemorySize;
+}
 /// About the velocity that the motor can add in a control period (rad/s), and its usual limit
 /// (N·m).
 inline constexpr double kMemoryVelocity = 1.0, kMemoryTorque = 5.0;
 
-/// What a policy file says of observations that remember so many steps.
-ObservationInfo ObservationInfoOf(int64_t memory);
+/// What a policy file says of observations that remember so many steps, and of whose plants are
+/// identified.
+ObservationInfo ObservationInfoOf(int64_t memory, bool identified = false);
 
 /// Sign of each observation under the mirror symmetry, which negates angles, velocities and torque;
 /// those of its memory are all negated.

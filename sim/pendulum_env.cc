@@ -38,13 +38,18 @@ EnvSpec PendulumSpec(const PendulumEnvConfig& config) {
   EnvSpec spec;
   spec.task = kDoublePendulum;
   spec.num_envs = config.num_envs;
-  spec.obs_size = kObservationSize + config.memory * kMemorySize;
+  spec.obs_size = kObservationSize + (config.identified_from ? kIdentifiedSize : 0) +
+                  config.memory * kMemorySize;
   spec.action_limit = {config.plant(0).torque_limit};
   spec.step_seconds = kControlPeriod;
   spec.term_names = {kRewardTermNames.begin(), kRewardTermNames.end()};
   spec.state_names = {"q1", "q2", "w1", "w2"};
   spec.state_units = {"rad", "rad", "rad/s", "rad/s"};
   spec.mirror_signs = {kMirrorSigns.begin(), kMirrorSigns.end()};
+  if (config.identified_from) {
+    spec.mirror_signs.insert(spec.mirror_signs.end(), kIdentifiedMirrorSigns.begin(),
+                             kIdentifiedMirrorSigns.end());
+  }
   spec.mirror_signs.resize(static_cast<size_t>(spec.obs_size), -1.0F);
   spec.bodies = 2;
   spec.evaluation = {kEvaluationSeconds, kReturnSeconds, kHoldSeconds, 0};
@@ -69,6 +74,9 @@ PendulumEnv::PendulumEnv(const PendulumEnvConfig& config)
     rngs_.emplace_back(config_.seed, config_.stream, index);
   }
   plant_seeds_ = plant_rngs_;
+  if (config_.identified_from) {
+    identifier_.emplace(*config_.identified_from, config_.num_envs);
+  }
   for (int i = 0; i < config_.num_envs; ++i) Reset(i);
 }
 
@@ -94,13 +102,22 @@ void PendulumEnv::SetState(int env, const PendulumState& s) {
   step_counts_[static_cast<size_t>(env)] = 0;
   if (disturber_) disturber_->Begin(env);
   std::ranges::fill(Row(obs_, env), 0.0F);  // nothing to remember yet
-  std::ranges::copy(Observation(env), Row(obs_, env).begin());
+  const PendulumState measured = Measure(env);
+  std::ranges::copy(Observation(env, measured), Row(obs_, env).begin());
+  if (!identifier_) return;
+  identifier_->Begin(env, measured);
+  identifier_->Observe(env, measured, Row(obs_, env).subspan(kObservationSize, kIdentifiedSize));
 }
 
-std::array<float, kObservationSize> PendulumEnv::Observation(int env) {
+PendulumState PendulumEnv::Measure(int env) {
   const PendulumState s = state(env);
-  const Plant& assumed = config_.assumed_plant ? *config_.assumed_plant : plant(env);
-  return Observe(assumed, disturber_ ? disturber_->Measure(env, s) : s);
+  return disturber_ ? disturber_->Measure(env, s) : s;
+}
+
+std::array<float, kObservationSize> PendulumEnv::Observation(int env,
+                                                             const PendulumState& measured) const {
+  if (config_.identified_from) return Observe(*config_.identified_from, measured);
+  return Observe(config_.assumed_plant ? *config_.assumed_plant : plant(env), measured);
 }
 
 void PendulumEnv::SpreadRows(std::vector<float>& table) const {
@@ -113,13 +130,13 @@ void PendulumEnv::SpreadRows(std::vector<float>& table) const {
 
 void PendulumEnv::Remember(int env, double torque, std::span<float> obs) const {
   const auto before = Row(obs_, env);
-  const auto entry = obs.subspan(kObservationSize, kMemorySize);
+  const size_t first = obs.size() - static_cast<size_t>(config_.memory) * kMemorySize;
+  const auto entry = obs.subspan(first, kMemorySize);
   entry[0] = (obs[2] - before[2]) * static_cast<float>(kMaxVelocity1 / kMemoryVelocity);
   entry[1] = (obs[5] - before[5]) * static_cast<float>(kMaxVelocity2 / kMemoryVelocity);
   entry[2] = static_cast<float>(torque / kMemoryTorque);
-  const auto older =
-      before.subspan(kObservationSize).first(obs.size() - kObservationSize - kMemorySize);
-  std::ranges::copy(older, obs.subspan(kObservationSize + kMemorySize).begin());
+  const auto older = before.subspan(first).first(obs.size() - first - kMemorySize);
+  std::ranges::copy(older, obs.subspan(first + kMemorySize).begin());
 }
 
 void PendulumEnv::Randomize(int env) {
@@ -184,7 +201,7 @@ void PendulumEnv::StandIn(int env, StepResult& result) const {
 
 void PendulumEnv::Step(std::span<const double> torque, StepResult& result) {
   physics_->Step(disturber_ ? disturber_->Apply(torque, step_counts_) : torque, result);
-  if (config_.memory > 0) SpreadRows(result.next_obs);  // the physics writes them without memory
+  if (spec_.obs_size > kObservationSize) SpreadRows(result.next_obs);  // the physics packs them
   RestoreHeld();
   for (int env = 0; env < config_.num_envs; ++env) {
     const auto i = static_cast<size_t>(env);
@@ -195,8 +212,13 @@ void PendulumEnv::Step(std::span<const double> torque, StepResult& result) {
     }
     ++step_counts_[i];
     const auto next_obs = Row(result.next_obs, env);
-    if (disturber_ || config_.assumed_plant) {
-      std::ranges::copy(Observation(env), next_obs.begin());
+    if (disturber_ || config_.assumed_plant || identifier_) {
+      const PendulumState measured = Measure(env);
+      std::ranges::copy(Observation(env, measured), next_obs.begin());
+      if (identifier_ && !result.terminated[i]) {
+        identifier_->Update(env, result.torque[i], measured);
+        identifier_->Observe(env, measured, next_obs.subspan(kObservationSize, kIdentifiedSize));
+      }
     }
     if (config_.memory > 0) Remember(env, torque[i], next_obs);
     if (result.terminated[i]) StandIn(env, result);
@@ -223,6 +245,7 @@ void PendulumEnv::State(const Archive& archive) {
   archive.Array("obs", std::span(obs_));
   archive.Scalar("start_noise", config_.start.noise, {0, 10});
   if (disturber_) disturber_->State(archive.In("disturbance"));
+  if (identifier_) identifier_->State(archive.In("identification"));
   for (size_t i = 0; i < rngs_.size(); ++i) rngs_[i].State(archive.In(Concat("rng.", i)));
 }
 

@@ -12,6 +12,7 @@
 #include "core/rng.h"
 #include "sim/disturbance.h"
 #include "sim/double_pendulum.h"
+#include "sim/identification.h"
 #include "sim/physics.h"
 #include "sim/randomization.h"
 #include "sim/seeded_env.h"
@@ -39,6 +40,9 @@ struct PendulumEnvConfig : PhysicsConfig {
   // The plant by which energy and height in observations are computed, such as that of a training,
   // so that they reveal nothing of the true one; none: each environment's own.
   std::optional<Plant> assumed_plant = {};
+  // The nominal plant, such as that of a training, from which the plant is identified as it moves:
+  // the observation holds the estimate too, and energy and height are computed by the nominal one.
+  std::optional<Plant> identified_from = {};
 
   const Disturbance& disturbance(int env) const {
     return disturbances[disturbances.size() > 1 ? static_cast<size_t>(env) : 0];
@@ -94,8 +98,10 @@ class PendulumEnv : public SeededEnv {
   void Reset(int env);
   /// Gives a new episode its own plant and disturbance.
   void Randomize(int env);
-  /// The observation of what the environment's sensors measure now; draws their noise.
-  std::array<float, kObservationSize> Observation(int env);
+  /// What the environment's sensors measure now; draws their noise.
+  PendulumState Measure(int env);
+  /// The observation of what was measured, without memory and identification.
+  std::array<float, kObservationSize> Observation(int env, const PendulumState& measured) const;
   /// Moves rows of kObservationSize numbers to where those of an observation with memory begin.
   void SpreadRows(std::vector<float>& table) const;
   /// Fills the memory of a new observation (D), given the torque chosen for the last step, N·m.
@@ -126,6 +132,7 @@ class PendulumEnv : public SeededEnv {
   std::vector<int64_t> step_counts_;                // (N) control steps since the episode began
   std::vector<std::optional<PendulumState>> held_;  // (N) states that the next Step keeps; or empty
   std::vector<float> obs_;                          // (N, D)
+  std::optional<Identifier> identifier_;            // if plants are identified
 };
 
 }  // namespace upswing

@@ -1,80 +1,69 @@
 #!/usr/bin/env python3
-"""How well does a policy do on plants whose unstable modes are more or less alike?
+"""How well do policies do on plants that are harder or easier to hold upright?
 
-    tools/upright_modes.py POLICY|RUN [--plants 250] [--episodes 5] [--share 0.25] [--seed 5]
+    tools/upright_modes.py POLICY|RUN ... [--episodes 1000] [--share 0.25] [--seed 1] [--physics mujoco]
 
-Upright, the pendulum has two unstable modes, which grow as exp(a t) and exp(b t); the nearer b/a is to
-1, the less one motor can hold both. Plants are drawn from a box of ± SHARE, and evaluated in closed form.
-Needs numpy and a built program (./upswing --version).
+Where delta (docs/control.md) is 0, no torque of joint 1 reaches one of the two modes in which the upright
+pendulum falls. Each episode has a plant from a box of ± SHARE, as in `upswing eval --randomize`. Needs
+a built program (./upswing --version).
 """
 import argparse
-import json
+import csv
+import math
 import pathlib
 import subprocess
 
-import numpy as np
-
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-NOMINAL = {"mass1": 1, "mass2": 1, "length1": 0.5, "length2": 0.5, "damping1": 0.2, "damping2": 0.2,
-           "gravity": 9.81}
 ARMATURE, RADIUS = 0.01, 0.04  # kg·m², m; sim/double_pendulum.h
-EDGES = [0, 0.7, 0.75, 0.8, 0.85, 0.9, 1]
+EDGES = [0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, math.inf]
 
 
 def inertia_across(m, l):
     """Of a solid capsule (kg·m²); sim/double_pendulum.cc, CapsuleInertia."""
-    cylinder, sphere = np.pi * RADIUS**2 * l, 4 / 3 * np.pi * RADIUS**3
+    cylinder, sphere = math.pi * RADIUS**2 * l, 4 / 3 * math.pi * RADIUS**3
     mc = m * cylinder / (cylinder + sphere)
     ms = m - mc
     return (mc * (3 * RADIUS**2 + l**2) / 12
             + ms * (2 * RADIUS**2 / 5 + l**2 / 4 + 3 * l * RADIUS / 8))
 
 
-def ratio_of_modes(p):
-    """Slower over faster rate of growth upright, of M q'' = G q - D q' linearised there."""
-    m1, m2, l1, l2, g = p["mass1"], p["mass2"], p["length1"], p["length2"], p["gravity"]
-    I1, I2, c1, c2 = inertia_across(m1, l1), inertia_across(m2, l2), l1 / 2, l2 / 2
-    m22 = I2 + m2 * c2**2
-    m12 = m22 + m2 * l1 * c2
-    m11 = I1 + m1 * c1**2 + m22 + m2 * (l1**2 + 2 * l1 * c2)
-    M = np.array([[m11 + ARMATURE, m12], [m12, m22 + ARMATURE]])
-    G = g * np.array([[m1 * c1 + m2 * (l1 + c2), m2 * c2], [m2 * c2, m2 * c2]])
-    D = np.diag([p["damping1"], p["damping2"]])
-    A = np.block([[np.zeros((2, 2)), np.eye(2)],
-                  [np.linalg.solve(M, G), -np.linalg.solve(M, D)]])
-    slower, faster = sorted(w.real for w in np.linalg.eigvals(A) if w.real > 0)
-    return slower / faster
+def delta(plant):
+    """(z - p) / (z + p) of link 2 with its zero z and its pole p; control/upright_modes.cc."""
+    m, l1, l2, d = (plant[name] for name in ("mass2", "length1", "length2", "damping2"))
+    coupling = m * l1 * l2 / 2 - ARMATURE
+    inertia = inertia_across(m, l2) + m * l2**2 / 4 + ARMATURE
+    moment = m * plant["gravity"] * l2 / 2
+    pole = (math.sqrt(d**2 + 4 * inertia * moment) - d) / (2 * inertia)
+    return (d - pole * coupling) / (d + pole * coupling)
 
 
-def success(policy, plant, episodes):
-    plant_options = [word for name, x in plant.items() for word in ("--set", f"{name}={x}")]
-    out = subprocess.run([ROOT / "upswing", "--no-setup", "eval", policy, "--physics", "closed-form",
-                          "--episodes", str(episodes), "--threads", "1", "--json", *plant_options],
-                         check=True, capture_output=True, text=True).stdout
-    return json.loads(out)["success_rate"]
+def episodes(policy, a):
+    """|delta| and success of each."""
+    words = ["--randomize", a.share, "--episodes", a.episodes, "--seed", a.seed, "--physics", a.physics,
+             "--episodes-csv", "-"]
+    out = subprocess.run([ROOT / "upswing", "--no-setup", "eval", policy, *map(str, words)], check=True,
+                         stdout=subprocess.PIPE, text=True).stdout
+    rows = [{name: float(text or "nan") for name, text in row.items()}
+            for row in csv.DictReader(out.splitlines())]
+    return [(abs(delta(row)), row["success"]) for row in rows]
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("policy")
-    parser.add_argument("--plants", type=int, default=250)
-    parser.add_argument("--episodes", type=int, default=5)
+    parser.add_argument("policies", nargs="+", metavar="policy")
+    parser.add_argument("--episodes", type=int, default=1000)
     parser.add_argument("--share", type=float, default=0.25)
-    parser.add_argument("--seed", type=int, default=5)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--physics", default="mujoco")
     a = parser.parse_args()
-    rng = np.random.default_rng(a.seed)
-    rows = []
-    for _ in range(a.plants):
-        plant = {name: x * (1 + rng.uniform(-a.share, a.share)) for name, x in NOMINAL.items()}
-        rows.append((ratio_of_modes(plant), success(a.policy, plant, a.episodes)))
-    ratio, rate = np.array(rows).T
-    print("ratio of the modes  share of plants  success")
-    for low, high in zip(EDGES, EDGES[1:]):
-        chosen = (ratio >= low) & (ratio < high)
-        text = f"{100 * rate[chosen].mean():5.0f}%" if chosen.any() else "     -"
-        print(f"{low:8.2f} to {high:.2f}  {100 * chosen.mean():14.0f}%  {text}")
-    print(f"all                {100:14.0f}%  {100 * rate.mean():5.0f}%")
+    results = [episodes(policy, a) for policy in a.policies]
+    print("|delta|       plants  success")
+    for low, high in zip([*EDGES[:-1], 0], [*EDGES[1:], math.inf]):
+        chosen = [[success for size, success in result if low <= size < high] for result in results]
+        shares = "  ".join(f"{100 * sum(each) / len(each):6.1f}%" if each else "      -"
+                           for each in chosen)
+        print(f"{low:4.2f} to {high:4.2f}  {len(chosen[0]):6}  {shares}")
 
 
 if __name__ == "__main__":

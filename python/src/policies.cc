@@ -150,6 +150,8 @@ void BindPolicies(nb::module_& m) {
                    [](const PolicyHandle& self) { return self.policy().description(); })
       .def_prop_ro("task", [](const PolicyHandle& self) { return self.loaded().task; })
       .def_prop_ro("memory", [](const PolicyHandle& self) { return self.loaded().memory(); })
+      .def_prop_ro("identifies",
+                   [](const PolicyHandle& self) { return self.loaded().identifies(); })
       .def_prop_ro("obs_size", [](const PolicyHandle& self) { return self.policy().obs_size(); })
       .def_prop_ro("action_size",
                    [](const PolicyHandle& self) { return self.policy().action_size(); })

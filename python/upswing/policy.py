@@ -26,6 +26,7 @@ class Policy:
         obs_size: D; of the double pendulum 8, and 3 for each step of `memory`
         action_size: A
         memory: past control steps that its observations remember
+        identifies: whether they hold an estimate of the plant
         num_parameters: how many numbers were learned; 0: none
         info: what its file says of how it was made and for which plant; None where it says nothing
     """
@@ -41,6 +42,7 @@ class Policy:
         self.obs_size: int = handle.obs_size
         self.action_size: int = handle.action_size
         self.memory: int = handle.memory
+        self.identifies: bool = handle.identifies
         self.num_parameters: int = handle.num_parameters
         self.info: dict[str, Any] = handle.info()
 

@@ -13,6 +13,7 @@ interface About {
   torques: number[]; // N·m
   limit: number; // N·m, of an actor
   memory: number; // steps
+  identifies: boolean;
   selfCheckError: number;
   metadata: Record<string, string>;
 }

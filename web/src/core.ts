@@ -18,6 +18,11 @@ interface Exports {
   policy_decide(policy: number, observation: number, row: number): number;
   numbers(): number;
   pendulum_at(): void;
+  identifier_open(): number;
+  identifier_close(identifier: number): void;
+  identifier_begin(identifier: number): void;
+  identifier_update(identifier: number): void;
+  identifier_observe(identifier: number): void;
   capsule_inertia(): void;
   pendulum_mjcf(): void;
   learner_open(settings: number, bytes: number): number;

@@ -85,7 +85,8 @@ function at(plant: Plant, { q1, q2, w1, w2 }: State, torque = 0): Float64Array {
   return core().formula(numbers, core().exports.pendulum_at);
 }
 
-function plantNumbers(plant: Plant): number[] {
+/// As the core takes them.
+export function plantNumbers(plant: Plant): number[] {
   return PARAMETERS.map((name) => plant[name]);
 }
 

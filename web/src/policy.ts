@@ -14,6 +14,8 @@ export class Policy {
   readonly controller: Controller;
   /// How many past steps an observation remembers.
   readonly memory: number;
+  /// Whether an observation holds an estimate of the plant.
+  readonly identifies: boolean;
   /// The plant that it was trained on.
   readonly plant: Plant;
   /// Factor by which rewards, and so its values, were multiplied during training.
@@ -25,6 +27,7 @@ export class Policy {
       const controller = new CoreController(bytes);
       this.controller = controller;
       this.memory = controller.about.memory;
+      this.identifies = controller.about.identifies;
       this.metadata = new Map(Object.entries(controller.about.metadata));
     } catch (error) {
       if (!(error instanceof BadInput)) throw error;

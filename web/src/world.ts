@@ -1,5 +1,6 @@
 import { DelayLine, measure } from './disturbance';
 import type { Disturbance } from './disturbance';
+import { Identifier } from './identifier';
 import { withMemory } from './observation';
 import {
   CONTROL_PERIOD,
@@ -57,6 +58,9 @@ export class World {
   private _policy: Policy | null = null;
   private observation: Float32Array | null = null; // of the last control step; null at a start
   private chosen = 0; // N·m, at that step
+  /// What the policy knows of the plant, if it identifies it, and whether it has begun to.
+  private identifier: Identifier | null = null;
+  private identifies = false;
   private readonly motor = new DelayLine();
   private steps = 0; // of physics, in all
   private uprightSince: number | null = null; // physics step; null if the links are not upright
@@ -74,6 +78,7 @@ export class World {
   set plant(plant: Plant) {
     this._plant = { ...plant };
     this.simulator.plant = plant;
+    this.identifies = false;
     if (this.twin) this.twin.plant = plant;
   }
 
@@ -83,6 +88,8 @@ export class World {
   set policy(policy: Policy | null) {
     this._policy = policy;
     this.observation = null;
+    this.identifier = policy?.identifies ? new Identifier(policy.plant) : null;
+    this.identifies = false;
     this.look();
   }
 
@@ -106,6 +113,7 @@ export class World {
     this.simulator.state = state;
     this.motor.clear();
     this.observation = null;
+    this.identifies = false;
     this.untilControl = 0;
     this.torque = 0;
     this.push = null;
@@ -162,24 +170,44 @@ export class World {
 
   /// What the agent would decide in another state, with the memory that it has now.
   decisionAt(state: State): Decision | null {
-    const { plant, policy } = this;
+    const { policy } = this;
     if (!policy) return null;
-    const now = observe(plant, state);
+    const now = this.present(state);
     const observation = withMemory(now, policy.memory, null, 0);
     if (this.observation) observation.set(this.observation.subarray(now.length), now.length);
     return policy.act(observation);
   }
 
+  /// The observation of a measured state without memory. A policy that identifies the plant is not
+  /// told of it.
+  private present(measured: State): Float32Array {
+    const { plant, policy, identifier } = this;
+    if (!policy || !identifier) return observe(plant, measured);
+    return Float32Array.of(...observe(policy.plant, measured), ...identifier.observe(measured));
+  }
+
   /// The observation at this moment.
-  private observe(): Float32Array {
-    const { plant, policy, observation, chosen } = this;
-    const now = observe(plant, measure(this.state, this.disturbance.sensor_noise));
-    return withMemory(now, policy?.memory ?? 0, observation, chosen);
+  private observe(measured = this.measured()): Float32Array {
+    const { policy, observation, chosen } = this;
+    return withMemory(this.present(measured), policy?.memory ?? 0, observation, chosen);
+  }
+
+  private measured(): State {
+    return measure(this.state, this.disturbance.sensor_noise);
+  }
+
+  /// Learns of the plant from the last control period.
+  private identify(measured: State): void {
+    if (this.identifies) this.identifier?.update(this.torque, measured);
+    else this.identifier?.begin(measured);
+    this.identifies = true;
   }
 
   private control(): void {
     const { plant, policy, state } = this;
-    this.observation = this.observe();
+    const measured = this.measured();
+    this.identify(measured);
+    this.observation = this.observe(measured);
     this.decision = policy?.act(this.observation) ?? null;
     this.chosen = this.agentOn ? (this.decision?.torque ?? 0) : this.byHand;
     const limit = plant.torque_limit;

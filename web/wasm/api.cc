@@ -6,6 +6,7 @@
 #include "lab/loaded_policy.h"
 #include "nn/actor_policy.h"
 #include "nn/q_policy.h"
+#include "sim/identification.h"
 #include "web/wasm/learner.h"
 
 #define UPSWING_EXPORT(name) extern "C" __attribute__((export_name(#name)))
@@ -83,6 +84,7 @@ json About(const Controller& c, const std::map<std::string, std::string>& metada
           {"torques", torques},
           {"limit", c.actor == nullptr ? 0 : c.actor->parts().action_limit.front()},
           {"memory", c.loaded.memory()},
+          {"identifies", c.loaded.identifies()},
           {"selfCheckError", (q != nullptr ? q->self_check() : c.actor->self_check()).error},
           {"metadata", metadata}};
 }
@@ -166,6 +168,30 @@ UPSWING_EXPORT(pendulum_at) void PendulumAt() {
     *to++ = x;
   }
   for (const double x : RewardTerms(plant, s, torque)) *to++ = x;
+}
+
+/// An estimator of the plant of one pendulum, from its nominal plant (8).
+UPSWING_EXPORT(identifier_open) Identifier* IdentifierOpen() {
+  return std::make_unique<Identifier>(PlantAt(number.data()), 1).release();
+}
+
+UPSWING_EXPORT(identifier_close) void IdentifierClose(Identifier* identifier) { delete identifier; }
+
+/// Begins in a measured state (4).
+UPSWING_EXPORT(identifier_begin) void IdentifierBegin(Identifier* identifier) {
+  identifier->Begin(0, {number[0], number[1], number[2], number[3]});
+}
+
+/// Learns from a measured state (4), and the torque that acted in the control period before it.
+UPSWING_EXPORT(identifier_update) void IdentifierUpdate(Identifier* identifier) {
+  identifier->Update(0, number[4], {number[0], number[1], number[2], number[3]});
+}
+
+/// Of a state (4): what the estimate adds to its observation (kIdentifiedSize).
+UPSWING_EXPORT(identifier_observe) void IdentifierObserve(const Identifier* identifier) {
+  std::array<float, kIdentifiedSize> added;
+  identifier->Observe(0, {number[0], number[1], number[2], number[3]}, added);
+  std::ranges::copy(added, number.begin());
 }
 
 /// Of a capsule's mass, radius and length: its inertia across and along.

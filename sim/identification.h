@@ -1,0 +1,79 @@
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "core/archive.h"
+#include "sim/closed_form.h"
+#include "sim/double_pendulum.h"
+
+/// Identification of an unknown plant while it moves, from measured angles and velocities and the
+/// torque of its motor: a Kalman filter of its constants (Ljung, "System Identification", 1999,
+/// section 11.2), whose prediction is the physics itself.
+namespace upswing {
+
+/// The constants of the equations of motion, in the order J1, J2, b, G1, G2, d1, d2 of
+/// ClosedFormBatch. The accelerations are linear in them.
+inline constexpr int kConstants = 7;
+using Constants = std::array<double, kConstants>;
+
+Constants ConstantsOf(const Plant& plant);
+
+/// How the pendulum falls from upright with these constants. Each of the two unstable modes has a
+/// coordinate z, a weighted sum of the state, that moves by itself: ż = rate z + gain u. A motor
+/// of limit u* can return z as long as |rate z| < gain u*; zeta = rate z / (gain u*) has this
+/// limit at 1.
+struct Falling {
+  std::array<double, 2> rate;  // the faster one first, 1/s
+  std::array<double, 2> zeta;  // of the state
+  double torque;  // that ends both falls with the least effort ∫u² dt, over the limit u*
+  double delta;   // see UprightModes
+};
+
+/// `motor` gives the joint and the limit of the torque.
+Falling FallingOf(const Constants& constants, const Plant& motor, const PendulumState& s);
+
+/// What identification adds to an observation: each constant relative to the nominal plant's, over
+/// kConstantScale; δ and tanh(0.1 / δ); the energy, 0 hanging and 1 upright; of upright
+/// ζ / (1 + |ζ|) for both modes and the torque within ±1, see Falling.
+static_assert(kIdentifiedSize == kConstants + 6);
+extern const std::array<float, kIdentifiedSize> kIdentifiedMirrorSigns;
+
+/// The estimates of N environments.
+class Identifier {
+ public:
+  /// Begins with the nominal plant, whose masses, lengths, dampings and gravity may each be off by
+  /// a standard deviation of 15%.
+  Identifier(const Plant& nominal, int num_envs);
+
+  /// Begins an episode of an environment in a measured state: nothing is known of its plant.
+  void Begin(int env, const PendulumState& measured);
+  /// Learns from a control period: the torque (N·m) that acted, and the state measured at its end.
+  void Update(int env, double torque, const PendulumState& measured);
+
+  /// The constants as they are estimated.
+  Constants estimate(int env) const;
+  /// What is added to the observation of a state (kIdentifiedSize).
+  void Observe(int env, const PendulumState& s, std::span<float> numbers) const;
+
+  void State(const Archive& archive);
+
+ private:
+  static constexpr int kCovariance = kConstants * (kConstants + 1) / 2;
+
+  /// Keeps what was measured, and returns what was measured before.
+  PendulumState Replace(int env, const PendulumState& measured);
+  /// Where the plant of these constants moves within a control period.
+  PendulumState Predict(const Constants& constants, double torque, const PendulumState& from);
+
+  Plant plant_;  // the nominal one
+  Constants nominal_;
+  std::array<double, kCovariance> prior_;  // of the relative constants
+  std::vector<double> relative_;           // (N × kConstants)
+  std::vector<double> covariance_;         // (N × kCovariance) upper triangles
+  std::vector<double> last_;               // (N × 4) states measured last, as in PendulumState
+  ClosedFormBatch prediction_;             // of one plant
+};
+
+}  // namespace upswing

@@ -1,0 +1,43 @@
+import { core } from './core';
+import { plantNumbers } from './pendulum';
+import type { Plant, State } from './pendulum';
+
+const SIZE = 13; // numbers that identification adds to an observation
+
+function numbers({ q1, q2, w1, w2 }: State): number[] {
+  return [q1, q2, w1, w2];
+}
+
+const forgotten = new FinalizationRegistry<() => void>((close) => close());
+
+/// The estimate of an unknown plant while it moves, as in sim/identification.h.
+export class Identifier {
+  private readonly at: number;
+
+  constructor(nominal: Plant) {
+    const { exports } = core();
+    let at = 0;
+    core().formula(plantNumbers(nominal), () => {
+      at = exports.identifier_open();
+    });
+    this.at = at;
+    forgotten.register(this, () => exports.identifier_close(at));
+  }
+
+  /// Nothing is known of the plant.
+  begin(measured: State): void {
+    core().formula(numbers(measured), () => core().exports.identifier_begin(this.at));
+  }
+
+  /// After a control period in which `torque` (N·m) acted.
+  update(torque: number, measured: State): void {
+    core().formula([...numbers(measured), torque], () => core().exports.identifier_update(this.at));
+  }
+
+  /// What is added to the observation of a state.
+  observe(state: State): Float64Array {
+    return core()
+      .formula(numbers(state), () => core().exports.identifier_observe(this.at))
+      .slice(0, SIZE);
+  }
+}
