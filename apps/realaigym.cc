@@ -23,7 +23,7 @@ namespace {
 
 struct GymArguments {
   PolicyArguments policy;
-  std::string figure, csv, search_out;
+  std::string figure, csv, search_out, from;
   std::vector<FlagValue> search;
   int64_t threads, case_seed;
   bool as_json = false;
@@ -69,7 +69,8 @@ void PrintReport(const GymReport& report) {
 GymCompetitor Search(const GymArguments& a, ThreadPool& pool) {
   GymSearchConfig config;
   SetFlags(OptionsOf(config), a.search);
-  GymSearch search(config);
+  GymSearch search =
+      a.from.empty() ? GymSearch(config) : GymSearch(config, LoadSwingPolicy(a.from));
   const auto begin = std::chrono::steady_clock::now();
   GymSearch::Report report;
   {
@@ -99,8 +100,12 @@ int RunGym(const GymArguments& a) {
     throw BadInput(searches ? "--search: expected no policy beside it"
                             : "realaigym: expected a policy to score, or --search FILE");
   }
+  if (!searches && !a.from.empty()) throw BadInput("--from: expected --search FILE with it");
   std::string robot;
   for (const FlagValue& flag : a.search) {
+    if (!a.from.empty() && (flag.name == "robot" || flag.name == "hidden")) {
+      throw BadInput(Concat(FlagOf(flag.name), ": expected none, as --from has its own"));
+    }
     if (flag.name == "robot") robot = flag.text;
     if (searches || flag.name == "robot") continue;
     throw BadInput(Concat(FlagOf(flag.name), ": expected --search FILE with it"));
@@ -145,6 +150,9 @@ void AddGym(CLI::App& program, Command& command) {
   app->add_option("--search", a->search_out, "search a policy, write it here, then score it")
       ->type_name("FILE")
       ->check(NotEmpty());
+  app->add_option("--from", a->from, "policy to begin a search with [a random one]")
+      ->type_name("FILE")
+      ->check(NotEmpty());
   app->add_option("--figure", a->figure, "draw the rows of robustness, .svg or .png")
       ->type_name("FILE")
       ->check(NotEmpty());
@@ -173,6 +181,7 @@ void AddGym(CLI::App& program, Command& command) {
       "Examples:\n"
       "  ./upswing realaigym --search pendubot.safetensors          search one, some minutes\n"
       "  ./upswing realaigym pendubot.safetensors --figure rows.svg\n"
+      "  ./upswing realaigym --search better.safetensors --from pendubot.safetensors --alone 0\n"
       "  ./upswing realaigym --search acrobot.safetensors --robot acrobot --seed 2\n"
       "  ./upswing realaigym pendubot.safetensors --csv sim_swingup.csv --json\n"
       "  ./upswing realaigym lqr                                    the baselines' regulator\n");

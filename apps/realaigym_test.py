@@ -69,6 +69,16 @@ class RealAIGym(ProgramTest):
         self.assertNotEqual(one["performance"], two["performance"])
         self.assertEqual(self.search("--seed", 1)["performance"], one["performance"])
 
+    def test_a_search_goes_on_from_a_policy(self):
+        found = self.search()
+        again = json.loads(self.succeed(
+            "realaigym", "--search", "q.safetensors", "--from", "p.safetensors", "--alone", 0,
+            "--generations", 0, "--json"))
+        self.assertEqual(again["performance"], found["performance"])
+        self.refuse(["realaigym", "p.safetensors", "--from", "p.safetensors"], "--from", "--search")
+        self.refuse(["realaigym", "--search", "x", "--from", "p.safetensors", "--hidden", 8], "--hidden")
+        self.refuse(["realaigym", "--search", "x", "--from", POLICY], "fast.safetensors", "--search")
+
     def test_the_acrobot(self):
         found = self.search("--robot", "acrobot", "--csv", "motion.csv")
         self.assertEqual(found["robot"], "acrobot")

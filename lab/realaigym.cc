@@ -121,6 +121,14 @@ GymCompetitor OfSearch(const std::string& name, SwingPolicy policy) {
 
 std::string NameOf(GymRobot robot) { return robot == GymRobot::kPendubot ? "pendubot" : "acrobot"; }
 
+SwingPolicy LoadSwingPolicy(const fs::path& path) {
+  const Tensors tensors = LoadTensors(path);
+  if (!IsSwingPolicy(tensors)) {
+    throw BadInput(Concat(Printable(path.string()), ": expected a policy of `realaigym --search`"));
+  }
+  return ReadSwingPolicy(tensors);
+}
+
 GymCompetitor CompetitorOf(const GymSearch& search, const std::string& name) {
   return OfSearch(name, {search.net(), search.numbers()});
 }

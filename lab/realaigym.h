@@ -26,6 +26,9 @@ inline constexpr const char* kGymRegulator = "lqr";
 /// The competitor that the arguments name, for this robot ("" : the policy's own). Throws BadInput.
 GymCompetitor GetGymCompetitor(const PolicyArguments& a, const std::string& robot);
 
+/// A policy that a search wrote. Throws BadInput.
+SwingPolicy LoadSwingPolicy(const std::filesystem::path& path);
+
 /// The competitor of a search as it stands.
 GymCompetitor CompetitorOf(const GymSearch& search, const std::string& name);
 

@@ -94,27 +94,32 @@ void GymSearchConfig::Describe(Options& o) {
   o.AddChoice(&robot, "robot", {"pendubot", "acrobot"}, "which joint has the motor");
   o.Add(&seed, "seed", 1, {0, 1e15}, "", "of the search's random numbers");
   o.Add(&hidden, "hidden", 16, {4, 32}, "", "units in each of the network's two layers");
-  o.Add(&alone, "alone", 200, {0, 1e6}, "", "generations on the nominal plant alone");
-  o.Add(&generations, "generations", 400, {0, 1e6}, "", "generations after that");
+  o.Add(&alone, "alone", 60, {0, 1e6}, "", "generations on the nominal plant alone");
+  o.Add(&generations, "generations", 1500, {0, 1e6}, "", "generations after that");
   o.Add(&first_population, "first_population", 192, {4, 1e5}, "",
         "candidates of a generation on the nominal plant");
-  o.Add(&population, "population", 48, {4, 1e5}, "", "candidates of a generation after that");
-  o.Add(&episodes, "episodes", 64, {2, 64}, "", "simulations of a candidate after that");
-  o.Add(&deviation, "deviation", 0.3, kPositive, "", "of the network's numbers at first");
-  o.Add(&mean_rate, "mean_rate", 1, kPositive, "", "rate at which the mean follows the gradient");
-  o.Add(&performance_weight, "performance_weight", 4, {0, 100}, "",
+  o.Add(&population, "population", 64, {4, 1e5}, "", "candidates of a generation after that");
+  o.Add(&episodes, "episodes", 24, {2, 64}, "", "simulations of a candidate after that");
+  o.Add(&deviation, "deviation", 0.12, kPositive, "", "of the network's numbers at first");
+  o.Add(&mean_rate, "mean_rate", 2, kPositive, "", "rate at which the mean follows the gradient");
+  o.Add(&performance_weight, "performance_weight", 5, {0, 100}, "",
         "weight of the performance score after that");
-  o.Add(&interleaved, "interleaved", 2, {0, 100}, "",
+  o.Add(&interleaved, "interleaved", 0, {0, 100}, "",
         "generations on the nominal plant alone between two of the others");
   o.Add(&robustness_weight, "robustness_weight", 1, {0, 100}, "",
         "weight of the share of random simulations that end at the goal, to the performance score");
 }
 
 GymSearch::GymSearch(const GymSearchConfig& config)
+    : GymSearch(config, [&] {
+        const SwingNet net(RobotOf(config.robot), static_cast<int>(Checked(config).hidden));
+        return SwingPolicy{net, net.Initial(static_cast<uint64_t>(config.seed))};
+      }()) {}
+
+GymSearch::GymSearch(const GymSearchConfig& config, const SwingPolicy& first)
     : config_(Checked(config)),
-      net_(RobotOf(config.robot), static_cast<int>(config.hidden)),
-      snes_(net_.Initial(static_cast<uint64_t>(config.seed)),
-            Deviations(net_, config.deviation, 0.1), config.mean_rate,
+      net_(first.net),
+      snes_(first.numbers, Deviations(net_, config.deviation, 0.1), config.mean_rate,
             static_cast<uint64_t>(config.seed)),
       rng_(static_cast<uint64_t>(config.seed), "realaigym: search"),
       average_(snes_.mean()) {}
@@ -190,12 +195,11 @@ bool GymSearch::Step(ThreadPool* pool, Report& report) {
 
   const auto best = static_cast<size_t>(std::ranges::max_element(fitness) - fitness.begin());
   const std::array<GymEpisode, 1> nominal;
-  report = {
-      generation_, fitness[best],
-      SimulateGym(
-          net_.robot(), nominal, [&](size_t) { return net_.Control({average_}); }, nullptr)
-          .front(),
-      reached[best]};
+  report = {generation_, fitness[best],
+            SimulateGym(
+                net_.robot(), nominal, [&](size_t) { return net_.Control({average_}); }, nullptr)
+                .front(),
+            reached[best]};
   return true;
 }
 

@@ -50,6 +50,8 @@ struct GymSearchConfig {
 class GymSearch {
  public:
   explicit GymSearch(const GymSearchConfig& config);
+  /// Begins with a policy instead of a random network; its robot and size are then the search's.
+  GymSearch(const GymSearchConfig& config, const SwingPolicy& first);
 
   struct Report {
     int generation;
