@@ -64,6 +64,13 @@ class RealAIGym(ProgramTest):
         for word in ("AR-EAPO", "0.913", "History SAC", "723 simulations"):
             self.assertIn(word, text)
 
+    def test_the_policy_of_the_documentation(self):
+        found = json.loads(self.succeed("realaigym", ROOT / "docs/realaigym-pendubot.safetensors",
+                                        "--json"))
+        self.assertAlmostEqual(found["performance"]["score"], 0.686, delta=0.002)
+        # Cells at an edge depend on rounding.
+        self.assertAlmostEqual(found["robustness"]["score"], 0.957, delta=0.02)
+
     def test_another_seed_is_another_policy(self):
         one, two = self.search("--seed", 1), self.search("--seed", 2)
         self.assertNotEqual(one["performance"], two["performance"])
