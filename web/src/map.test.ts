@@ -51,7 +51,7 @@ test.each(['d3qn', 'sac', 'd3qn-randomized'])('%s: the map is what it decides th
   ] as const) {
     Object.assign(map, { x: AXES[x], y: AXES[y], quantity });
     map.clear();
-    expect(map.work(world, 1e9)).toBe(true);
+    expect(map.work(world, 1e9)).toEqual(STATE);
     for (const [column, row] of [
       [0, 0],
       [5, 0],
@@ -82,6 +82,33 @@ test('it is computed in slices, all of the state at which it was begun', () => {
 test('without a policy there is none', () => {
   world.policy = null;
   const map = new ValueMap(4);
-  expect(map.work(world, 1e9)).toBe(false);
+  expect(map.work(world, 1e9)).toBeNull();
   expect(map.cells).toBeNull();
+});
+
+test('a plant that changes meanwhile begins the map anew', () => {
+  world.policy = new Policy(readPolicy('d3qn'));
+  world.plant = NOMINAL;
+  world.reset(STATE);
+  const map = new ValueMap(6);
+  expect(map.work(world, 0)).toBeNull(); // one cell
+  world.plant = { ...NOMINAL, mass2: 1.3 };
+  expect(map.work(world, 1e9)).toEqual(STATE);
+  for (const [column, row] of [
+    [0, 0],
+    [1, 0],
+    [5, 5],
+  ] as const) {
+    expect(map.cells![6 * row + column]).toBeCloseTo(direct(map, column, row), 4);
+  }
+});
+
+test('a map is of the state that it was begun in', () => {
+  world.plant = NOMINAL;
+  world.reset(STATE);
+  const map = new ValueMap(6);
+  map.work(world, 0);
+  world.reset({ ...STATE, w1: 5 });
+  expect(map.work(world, 1e9)).toEqual(STATE);
+  expect(map.work(world, 1e9)!.w1).toBe(5);
 });

@@ -1,5 +1,5 @@
 import type { Decision } from './decision';
-import type { State } from './pendulum';
+import type { Plant, State } from './pendulum';
 import type { World } from './world';
 
 /// What the agent expects, or does, over two of the four state variables, the others as they are now.
@@ -50,6 +50,7 @@ export class ValueMap {
   private begun: Float32Array;
   private next = 0; // cell of it
   private around: State | null = null; // the other variables, of the map that is being computed
+  private plant: Readonly<Plant> | null = null; // of which it is
 
   constructor(size: number) {
     this.size = size;
@@ -59,26 +60,33 @@ export class ValueMap {
   /// Forgets what is known: other axes, another quantity or another agent.
   clear(): void {
     this.cells = null;
+    this.restart();
+  }
+
+  private restart(): void {
     this.around = null;
     this.next = 0;
   }
 
-  /// Computes for so long at most, one cell at least. True when a map has become complete; the next call
-  /// begins another one, of the state then.
-  work(world: World, milliseconds: number): boolean {
+  /// Computes for so long at most, one cell at least. When a map has become complete, the state that it
+  /// was begun in, else null; the next call begins another one, of the state then. A change of the plant
+  /// begins it anew.
+  work(world: World, milliseconds: number): State | null {
     const end = performance.now() + milliseconds;
+    if (this.plant !== world.plant) this.restart();
+    this.plant = world.plant;
     this.around ??= world.state;
     do {
       const [column, row] = [this.next % this.size, Math.floor(this.next / this.size)];
       const decision = world.decisionAt(this.stateAt(column, row, this.around));
-      if (!decision) return false;
+      if (!decision) return null;
       this.begun[this.next] = this.quantity === 'torque' ? decision.torque : valueOf(decision);
     } while (++this.next < this.begun.length && performance.now() < end);
-    if (this.next < this.begun.length) return false;
+    if (this.next < this.begun.length) return null;
     [this.cells, this.begun] = [this.begun, this.cells ?? new Float32Array(this.begun.length)];
-    this.next = 0;
-    this.around = null;
-    return true;
+    const { around } = this;
+    this.restart();
+    return around;
   }
 
   /// The state in the middle of a cell.

@@ -85,6 +85,11 @@ function at(plant: Plant, { q1, q2, w1, w2 }: State, torque = 0): Float64Array {
   return core().formula(numbers, core().exports.pendulum_at);
 }
 
+/// The plant in an object that may have other keys too.
+export function plantIn(given: Plant): Plant {
+  return Object.fromEntries(PARAMETERS.map((name) => [name, given[name]])) as unknown as Plant;
+}
+
 /// As the core takes them.
 export function plantNumbers(plant: Plant): number[] {
   return PARAMETERS.map((name) => plant[name]);

@@ -1,7 +1,7 @@
 import { CoreController } from './controller';
 import type { Controller, Decision } from './decision';
 import { DISTURBANCE_LIMITS } from './disturbance';
-import { CONTROL_PERIOD, PLANT_LIMITS } from './pendulum';
+import { CONTROL_PERIOD, PLANT_LIMITS, plantIn } from './pendulum';
 import type { Parameter, Plant, Range } from './pendulum';
 import { BadInput } from './bad_input';
 import { printable } from './text';
@@ -33,7 +33,7 @@ export class Policy {
       if (!(error instanceof BadInput)) throw error;
       throw new BadInput(printable(error.message, LONGEST_REASON));
     }
-    this.plant = JSON.parse(this.about('plant')) as Plant;
+    this.plant = plantIn(JSON.parse(this.about('plant')) as Plant);
     this.rewardScale = Number(this.metadata.get('reward_scale') ?? 1);
   }
 

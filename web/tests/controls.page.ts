@@ -20,6 +20,26 @@ test('pause stands still, step goes on by 0.02 s, reset hangs', async ({ page })
   await expect.poll(() => page.evaluate(time)).toBeGreaterThan(stopped + 0.1);
 });
 
+test('a link whose agent arrives late does not disturb the one that was opened after it', async ({
+  page,
+}) => {
+  await open(page);
+  let arrive = () => {};
+  const late = new Promise<void>((resolve) => (arrive = resolve));
+  await page.route(/sac\.safetensors$/, async (route) => {
+    await late;
+    await route.continue();
+  });
+  await page.evaluate(() => void upswing.open('#agent=sac'));
+  await page.evaluate(() => upswing.open('#agent=d3qn'));
+  await startFrom(page, 1.5);
+  const answer = page.waitForResponse(/sac\.safetensors$/);
+  arrive();
+  await (await answer).finished();
+  await page.evaluate(() => upswing.choose('sac')); // loaded by then
+  expect(await page.evaluate(() => upswing.world.state.q1)).toBe(1.5);
+});
+
 test('speed', async ({ page }) => {
   await open(page);
   const rate = async () => {

@@ -46,6 +46,7 @@ test('an agent learns from nothing, takes the stage, stays, and is what Node and
   });
   await expect(page.locator('#learn-success')).toHaveText('100%');
   await expect(page.locator('#agent')).toHaveValue('own');
+  expect(await page.evaluate(() => upswing.agents.ownIsLearned)).toBe(true);
 
   // The same seed, in Node.
   const learner = new Learner(await Core.start(await coreModule()), 'fast', 1);
@@ -82,6 +83,7 @@ test('an agent learns from nothing, takes the stage, stays, and is what Node and
     'learned here, fast, seed 1 (yours)',
   );
   expect(await swingsUp(page)).toBe(true);
+  expect(await page.evaluate(() => upswing.agents.ownIsLearned)).toBe(true);
 });
 
 test('the default agent: from an untrained policy to the one of the page, fetched when asked for', async ({
@@ -182,8 +184,22 @@ test('the last step of the tour: one learns, and ends when one goes on', async (
   await expect.poll(learned).toBe('d3qn');
 });
 
-test('four seeds at once, each of which can be watched', async ({ page }) => {
+test('four seeds at once, each of which can be watched, and one of them takes over once', async ({
+  page,
+}) => {
+  // What is kept never is, so that taking over takes its time, during which the others have news.
+  await page.addInitScript(() => {
+    IDBFactory.prototype.open = () => ({}) as IDBOpenDBRequest;
+  });
   await openLearn(page);
+  await page.evaluate(() => {
+    const keep = upswing.keepLearned.bind(upswing);
+    upswing.keepLearned = async (file) => {
+      document.body.dataset.kept = `${document.body.dataset.kept ?? ''}${file.name};`;
+      await keep(file);
+    };
+  });
+  await page.getByLabel('show the untrained one too').check();
   await page.getByLabel('four seeds at once').check();
   await page.getByRole('button', { name: 'Learn', exact: true }).click();
   const seeds = page.getByRole('radio', { name: /seed/ });
@@ -191,11 +207,69 @@ test('four seeds at once, each of which can be watched', async ({ page }) => {
   for (const seed of [4, 2]) {
     await page.getByRole('radio', { name: `seed ${seed}` }).check();
     await expect(page.locator('#learn-updates')).not.toHaveText('0');
-    const name = await page.evaluate(() => upswing.world.policy!.metadata.get('seed'));
-    expect(name).toBe(String(seed));
+    const seedOf = (which: 'policy' | 'twin') =>
+      page.evaluate((which) => {
+        const world = which === 'twin' ? upswing.world.twin : upswing.world;
+        return world?.policy?.metadata.get('seed');
+      }, which);
+    expect(await seedOf('policy')).toBe(String(seed));
+    await expect.poll(() => seedOf('twin')).toBe(String(seed));
   }
-  await page.locator('#learn-start').click();
+  await expect(status(page)).toContainText('Solved after ', { timeout: 100_000 });
+  await expect(page.locator('#agent')).toHaveValue('own');
+  expect(await page.evaluate(() => document.body.dataset.kept)).toBe('learned here, fast, seed 2;');
+});
+
+test('a finger on the line under the chart holds it, and numbers are those of the worker', async ({
+  page,
+}) => {
+  await openLearn(page);
+  await page.getByRole('button', { name: 'Learn', exact: true }).click();
+  const scrub = page.locator('#learn-scrub');
+  await expect(scrub).toBeEnabled();
+  const { x, y, width, height } = (await scrub.boundingBox())!;
+  await page.mouse.move(x + 0.02 * width, y + height / 2);
+  await page.mouse.down();
+  const steps = async () =>
+    Number((await page.locator('#learn-steps').innerText()).replaceAll(',', ''));
+  const [held, before] = [await scrub.inputValue(), await steps()];
+  await expect.poll(steps).toBeGreaterThan(before);
+  expect(await scrub.inputValue()).toBe(held);
+  await page.mouse.up();
+
+  // News that arrive all at once, as the page was busy, make no trainings faster.
+  const rates = await page.evaluate(async () => {
+    const rate = () => Number(document.getElementById('learn-rate')!.textContent);
+    const usual = rate();
+    const end = performance.now() + 1500;
+    while (performance.now() < end);
+    let highest = 0;
+    for (let k = 0; k < 5; ++k) {
+      await new Promise(requestAnimationFrame);
+      highest = Math.max(highest, rate());
+    }
+    return { usual, highest };
+  });
+  expect(rates.usual).toBeGreaterThan(0);
+  expect(rates.highest).toBeLessThan(20 * rates.usual);
+
+  // Nobody sees it in the tour: it waits.
+  await page.getByRole('link', { name: 'Tour' }).click();
+  await expect(page.locator('#step-watch h2')).toBeVisible();
+  await page.getByRole('link', { name: 'Learn', exact: true }).click();
   await expect(status(page)).toHaveText('Paused.');
+});
+
+test('an agent that is chosen before the first news stays', async ({ page }) => {
+  await openLearn(page);
+  await page.evaluate(async () => {
+    // Both are loaded, so that choosing one takes no time.
+    for (const id of ['fast', 'd3qn']) await upswing.choose(id);
+    document.getElementById('learn-start')!.click();
+    await upswing.choose('fast');
+  });
+  await expect(page.locator('#learn-updates')).not.toHaveText('0');
+  expect(await page.evaluate(() => upswing.world.policy!.metadata.get('step'))).toBe('90016');
 });
 
 test('settings are those of the program, which says what is wrong with them', async ({ page }) => {

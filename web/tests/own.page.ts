@@ -52,6 +52,45 @@ test('a reload keeps it, until it is removed', async ({ page }) => {
   await expect(page.locator('#agent option[value=own]')).toHaveCount(0);
 });
 
+test('a link for others has no agent of your own', async ({ page, context }) => {
+  await context.grantPermissions(['clipboard-read', 'clipboard-write']);
+  await open(page, '#mass2=1.2');
+  await page.locator('#file').setInputFiles(policyPath('fast'));
+  await expect(page).toHaveURL(/agent=own/);
+  await slide(page, 'mass2', 1.2);
+  await page.getByRole('button', { name: 'Copy link' }).click();
+  await expect(page.locator('#message')).toContainText('without your policy');
+  const link = new URL(await page.evaluate(() => navigator.clipboard.readText()));
+  expect(link.hash).toBe('#mass2=1.2');
+});
+
+test('what is kept in the browser and cannot be a policy is left alone', async ({ page }) => {
+  await open(page);
+  await page.locator('#file').setInputFiles({
+    ...{ name: 'learned here, mine', mimeType: '' },
+    buffer: Buffer.from(readPolicy('fast')),
+  });
+  await expect(page.locator('#own')).toContainText('learned here, mine');
+  // A visitor's file, whatever its name: what the page learns does not replace it.
+  expect(await page.evaluate(() => upswing.agents.ownIsLearned)).toBe(false);
+  await page.evaluate(
+    () =>
+      new Promise<void>((resolve, reject) => {
+        const request = indexedDB.open('upswing');
+        request.onsuccess = () => {
+          const transaction = request.result.transaction('files', 'readwrite');
+          const bytes = new ArrayBuffer((16 << 20) + 1);
+          transaction.objectStore('files').put({ name: 'large', bytes }, 'own');
+          transaction.oncomplete = () => resolve();
+          transaction.onerror = () => reject(transaction.error!);
+        };
+      }),
+  );
+  await page.goto('about:blank');
+  await open(page);
+  expect(await page.evaluate(() => upswing.agents.ownName)).toBeNull();
+});
+
 test('a browser that keeps nothing still runs it', async ({ page }) => {
   await page.addInitScript(() => {
     const refuse = () => {

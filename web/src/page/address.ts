@@ -18,14 +18,14 @@ export class Address {
     this.timer = window.setTimeout(() => this.write(), DELAY);
   }
 
-  /// To the clipboard, or on the screen; `without` says what the link leaves out.
-  async share(without: string): Promise<void> {
-    this.write();
+  /// A link with this behind the #, to the clipboard or on the screen; `without` says what it leaves out.
+  async share(hash: string, without: string): Promise<void> {
+    const link = new URL(`#${hash}`, location.href).href;
     try {
-      await navigator.clipboard.writeText(location.href);
+      await navigator.clipboard.writeText(link);
       note(`The link is in the clipboard${without}.`);
     } catch {
-      note(`The link${without}: ${location.href}`);
+      note(`The link${without}: ${link}`);
     }
   }
 

@@ -1,4 +1,5 @@
 import { element } from './dom';
+import { prefersStill } from './motion';
 
 /// Where there is room for three columns; the same width as in style/page.css.
 const wide = matchMedia('(min-width: 75em)');
@@ -31,8 +32,7 @@ export function focusWideFormulas(): void {
 
 /// Back to the pendulum, from a link to an example further down.
 export function showStage(): void {
-  const still = matchMedia('(prefers-reduced-motion: reduce)').matches;
   const stage = element('stage');
   stage.focus({ preventScroll: true });
-  stage.scrollIntoView({ block: 'start', behavior: still ? 'instant' : 'smooth' });
+  stage.scrollIntoView({ block: 'start', behavior: prefersStill() ? 'instant' : 'smooth' });
 }

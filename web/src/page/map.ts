@@ -59,11 +59,13 @@ export class MapPanel {
   /// Computes, unless the map is that of the present state already.
   private work(world: World): void {
     const { map } = this;
-    const others = { ...world.state, [map.x.name]: 0, [map.y.name]: 0 };
-    const key = JSON.stringify([others, world.plant]);
-    if (map.cells && key === this.key) return;
-    if (!map.work(world, MILLISECONDS)) return;
-    this.key = key;
+    const { plant } = world;
+    const keyOf = (state: State) =>
+      JSON.stringify([{ ...state, [map.x.name]: 0, [map.y.name]: 0 }, plant]);
+    if (map.cells && keyOf(world.state) === this.key) return;
+    const begunIn = map.work(world, MILLISECONDS);
+    if (!begunIn) return;
+    this.key = keyOf(begunIn);
     this.range = this.rangeOf(map.cells!, world);
     const unit = map.quantity === 'torque' ? ' N·m' : '';
     const scale = map.quantity === 'torque' ? 1 : (world.policy?.rewardScale ?? 1);

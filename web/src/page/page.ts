@@ -2,12 +2,11 @@ import { core } from '../core';
 import { History } from '../history';
 import { LearnPanel } from '../learn/panel';
 import type { State } from '../pendulum';
-import { BadInput } from '../bad_input';
 import { quoted } from '../text';
-import { LearningCurve } from '../view/charts';
 import { Scene, TRAIL_SECONDS } from '../view/scene';
 import type { World } from '../world';
 import { Address } from './address';
+import { AgentPanel } from './agent_panel';
 import type { Agent, Agents } from './agents';
 import { Clock } from './clock';
 import { Dashboard, situation } from './dashboard';
@@ -16,7 +15,8 @@ import { Hand } from './hand';
 import { listenToKeys } from './keys';
 import { placeCharts, showStage } from './layout';
 import { MapPanel } from './map';
-import { hideMessage, warn } from './message';
+import { warn } from './message';
+import { prefersStill } from './motion';
 import { Pose } from './pose';
 import { save } from './save';
 import { RANGES, Settings } from './settings';
@@ -39,16 +39,13 @@ export class Page {
   private readonly settings: Settings;
   private readonly pose: Pose;
   private readonly dashboard = new Dashboard();
-  private readonly curve = new LearningCurve();
   private readonly map = new MapPanel((where) => this.start(where));
   readonly learn: LearnPanel;
   private readonly tour: Tour;
   readonly twin: Twin;
   private readonly address = new Address(() => this.hash());
-  private readonly still = matchMedia('(prefers-reduced-motion: reduce)');
-  private agent: Agent | null = null;
-  private requests = 0; // for agents; the last one counts
-  private takes = 0; // likewise
+  private readonly agentPanel: AgentPanel;
+  private takes = 0; // of agents and settings; the last one counts
   private paused = false;
   private announced = ''; // the last situation that was read out
 
@@ -62,6 +59,15 @@ export class Page {
       this.reset();
       this.changed();
     });
+    this.agentPanel = new AgentPanel(agents, {
+      took: ({ policy }) => {
+        world.policy = policy;
+        this.settings.mark(policy);
+        this.changed();
+      },
+      listed: () => this.twin.list(),
+      brought: (file) => void this.openFile(file),
+    });
     this.learn = new LearnPanel(this, agents.list[0]!.id);
     this.tour = new Tour(
       this,
@@ -74,6 +80,10 @@ export class Page {
   /// Memory that the core has taken (bytes), which it never gives back.
   get coreBytes(): number {
     return core().exports.memory.buffer.byteLength;
+  }
+
+  private get agent(): Agent | null {
+    return this.agentPanel.agent;
   }
 
   /// Starts again with the view and the settings of the address.
@@ -101,22 +111,31 @@ export class Page {
       shared.twin = null;
     }
     this.world.agentOn = false;
-    await this.take(shared);
-    this.reset();
+    if (!(await this.begin(shared))) return;
     if (problems.length === 0) return;
     const more = problems.length > 3 ? `; and ${problems.length - 3} more` : '';
     warn(`Not all of the link could be used: ${problems.slice(0, 3).join('; ')}${more}.`);
   }
 
-  /// Takes agent and settings, all others as at the beginning; the pendulum moves on.
-  async take(shared: Partial<Shared>): Promise<void> {
+  /// Takes agent and settings, all others as at the beginning; the pendulum moves on. False if others
+  /// were asked for meanwhile.
+  async take(shared: Partial<Shared>): Promise<boolean> {
     const all = { ...BEGINNING, ...shared };
     const taking = ++this.takes;
     await Promise.all([
       this.choose(all.agent ?? this.agents.list[0]!.id),
       this.twin.choose(all.twin),
     ]);
-    if (taking === this.takes) this.apply(all);
+    if (taking !== this.takes) return false;
+    this.apply(all);
+    return true;
+  }
+
+  /// The same, from hanging.
+  async begin(shared: Partial<Shared>): Promise<boolean> {
+    const taken = await this.take(shared);
+    if (taken) this.reset();
+    return taken;
   }
 
   /// Handles input, then advances and draws at every frame.
@@ -138,12 +157,12 @@ export class Page {
 
   /// Changes to another agent; if it cannot be loaded, says why, keeps the old one and returns false.
   choose(id: string): Promise<boolean> {
-    return this.load(() => this.agents.get(id), `Agent ${quoted(id)}`);
+    return this.agentPanel.choose(id);
   }
 
   /// Changes to a visitor's own policy and to the plant that it was trained on.
   async openFile(file: File, learned = false): Promise<void> {
-    if (!(await this.load(() => this.agents.open(file, learned), quoted(file.name)))) return;
+    if (!(await this.agentPanel.open(file, learned))) return;
     this.settings.setPlant(this.agent!.policy.plant);
     this.changed();
   }
@@ -151,53 +170,6 @@ export class Page {
   /// Keeps a policy that was learned here as the visitor's own.
   keepLearned(file: File): Promise<void> {
     return this.openFile(file, true);
-  }
-
-  private async load(get: () => Promise<Agent>, name: string): Promise<boolean> {
-    const request = ++this.requests;
-    element('agent-text').textContent = 'Loading …';
-    try {
-      const agent = await get();
-      if (request !== this.requests) return false; // another was asked for meanwhile
-      this.agent = agent;
-      this.world.policy = agent.policy;
-      this.settings.mark(agent.policy);
-      hideMessage();
-    } catch (error) {
-      if (!(error instanceof BadInput)) throw error;
-      if (request !== this.requests) return false;
-      warn(`${name} cannot be used: ${error.message}.`);
-      this.showAgent();
-      return false;
-    }
-    this.showAgent();
-    this.changed();
-    return true;
-  }
-
-  private showAgent(): void {
-    const options = this.agents.list.map(({ id, title }) => new Option(title, id));
-    const select = element<HTMLSelectElement>('agent');
-    select.replaceChildren(...options);
-    this.twin.list();
-    element<HTMLButtonElement>('agent-on').disabled = this.agent === null;
-    element('own').hidden = this.agents.ownName === null;
-    element('own-name').textContent = this.agents.ownName;
-    if (!this.agent) {
-      select.prepend(new Option('Choose an agent', '', true, true));
-      element('agent-text').textContent = 'There is no agent: its policy could not be loaded.';
-      return;
-    }
-    select.value = this.agent.id;
-    element('first-name').textContent = this.agent.title;
-    element('agent-text').textContent = this.agent.text;
-    element('agent-command').hidden = this.agent.command === null;
-    element('agent-command').firstElementChild!.textContent = this.agent.command;
-    const step = Number(this.agent.policy.metadata.get('step') ?? NaN);
-    element('curve-value').textContent = Number.isFinite(step)
-      ? `best after ${step.toLocaleString('en')} steps`
-      : '';
-    this.drawCurve();
   }
 
   private listen(): void {
@@ -223,36 +195,18 @@ export class Page {
     button('plant-reset', () => this.resetSettings());
     button('share', () => {
       const own = this.agent?.id === OWN ? ' (without your policy, which stays with you)' : '';
-      void this.address.share(own);
+      void this.address.share(this.hash(true), own);
     });
     button('save', () => save(this.history));
     button('own-remove', () => void this.forgetOwn());
     button('theme', changeTheme);
     const speed = element<HTMLInputElement>('speed');
     speed.addEventListener('input', () => this.setSpeed(Number(speed.value)));
-    this.listenToAgents();
+    this.agentPanel.listen();
     // By its own address: meanwhile that of the settings before may have been written.
     addEventListener('hashchange', ({ newURL }) => void this.open(new URL(newURL).hash));
     this.listenToExamples();
     onThemeChange(() => this.repaint());
-    new ResizeObserver(() => this.drawCurve()).observe(this.curve.canvas.element);
-  }
-
-  private listenToAgents(): void {
-    const agent = element<HTMLSelectElement>('agent');
-    agent.addEventListener('change', () => void this.choose(agent.value));
-    const file = element<HTMLInputElement>('file');
-    file.addEventListener('change', () => {
-      if (file.files?.[0]) void this.openFile(file.files[0]);
-      file.value = '';
-    });
-    addEventListener('dragover', (event) => event.preventDefault());
-    addEventListener('drop', (event) => {
-      event.preventDefault();
-      const files = [...(event.dataTransfer?.files ?? [])];
-      const dropped = files.find(({ name }) => name.endsWith('.safetensors')) ?? files[0];
-      if (dropped) void this.openFile(dropped);
-    });
   }
 
   /// A link to an example scrolls back to the pendulum; the same link again restarts the example.
@@ -269,7 +223,7 @@ export class Page {
     await this.agents.forgetOwn();
     if (this.twin.id === OWN) await this.twin.choose(null);
     if (this.agent?.id === OWN) await this.choose(this.agents.list[0]!.id);
-    else this.showAgent();
+    else this.agentPanel.show();
     element('agent').focus(); // the button is gone
   }
 
@@ -353,12 +307,12 @@ export class Page {
     this.address.changed();
   }
 
-  /// What belongs into the address.
-  private hash(): string {
+  /// What belongs into the address, or into a link for others, who have not the visitor's own policy.
+  private hash(forOthers = false): string {
     if (this.tour.number > 0) return `tour=${this.tour.number}`;
     if (document.documentElement.dataset.view === 'learn') return 'learn';
     return encode({
-      agent: this.agent?.id ?? null,
+      agent: forOthers && this.agent?.id === OWN ? null : (this.agent?.id ?? null),
       twin: this.twin.id === OWN ? null : this.twin.id,
       on: this.world.agentOn,
       speed: this.clock.speed,
@@ -369,22 +323,16 @@ export class Page {
 
   private repaint(): void {
     const scenes = [this.scene.canvas, this.twin.scene.canvas];
-    for (const canvas of [...scenes, this.curve.canvas, ...this.dashboard.canvases]) {
+    for (const canvas of [...scenes, this.map.canvas, ...this.dashboard.canvases]) {
       canvas.forgetColors();
     }
-    this.map.canvas.forgetColors();
-    this.drawCurve();
-  }
-
-  private drawCurve(): void {
-    this.curve.draw(this.agent?.curve ?? null);
   }
 
   private draw(): void {
     const { world } = this;
-    const trail = this.still.matches ? [] : this.history.from(world.time - TRAIL_SECONDS);
+    const trail = prefersStill() ? [] : this.history.from(world.time - TRAIL_SECONDS);
     this.scene.draw(world, this.clock.state, trail);
-    this.twin.draw(this.clock, this.still.matches);
+    this.twin.draw(this.clock, prefersStill());
     this.tour.follow(world, this.scene);
     this.learn.follow();
     if (this.paused) this.pose.follow(world.state);
@@ -395,7 +343,7 @@ export class Page {
     write(badge, this.paused ? `paused, ${text}` : text);
     badge.dataset.state = state;
     if (state === this.announced) return;
-    if (state === 'balanced' && !this.still.matches) this.scene.sparks.light();
+    if (state === 'balanced' && !prefersStill()) this.scene.sparks.light();
     // Read out when it changes, not at each tenth of a second.
     this.announced = state;
     const words = state === 'balanced' ? 'balanced' : text;

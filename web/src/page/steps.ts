@@ -2,6 +2,7 @@ import { NOMINAL, relativeHeight } from '../pendulum';
 import type { Label } from '../view/labels';
 import type { World } from '../world';
 import { button, element } from './dom';
+import { prefersStill } from './motion';
 import { MotorKeys } from './motor';
 import type { Shared } from './share';
 import { Slider } from './sliders';
@@ -12,8 +13,11 @@ import { Slider } from './sliders';
 /// What a step does with the page.
 export interface Stage {
   readonly world: World;
-  /// Chooses agent and settings, all others as at the beginning; the pendulum moves on.
-  take(shared: Partial<Shared>): Promise<void>;
+  /// Chooses agent and settings, all others as at the beginning; the pendulum moves on. False if others
+  /// were asked for meanwhile.
+  take(shared: Partial<Shared>): Promise<boolean>;
+  /// The same, from hanging.
+  begin(shared: Partial<Shared>): Promise<boolean>;
   setAgentOn(on: boolean): void;
   setSpeed(speed: number): void;
   setMass(kilograms: number): void; // of the lower link
@@ -43,7 +47,6 @@ const HELD = 2; // s upright that count as balanced
 const FAILED = 10; // s without, that count as failed
 const GOAL: Label = { at: 'goal', text: 'both links in here' };
 
-const still = () => matchMedia('(prefers-reduced-motion: reduce)').matches;
 const heldFor = (world: World) => world.uprightFor ?? 0;
 
 function watch(stage: Stage): Step {
@@ -57,9 +60,8 @@ function watch(stage: Stage): Step {
     agents: [NOMINAL_AGENT],
     labels: () => [GOAL, { at: 'motor', text: 'the motor' }],
     async begin() {
-      again.textContent = still() ? 'Swing up' : 'Swing up again';
-      await stage.take({ agent: NOMINAL_AGENT, on: !still() });
-      stage.reset();
+      again.textContent = prefersStill() ? 'Swing up' : 'Swing up again';
+      await stage.begin({ agent: NOMINAL_AGENT, on: !prefersStill() });
     },
     answer: (world) =>
       heldFor(world) > HELD ? 'Balanced. How hard can it be? Go on and try it yourself.' : '',
@@ -78,8 +80,7 @@ function motor(stage: Stage): Step {
       best = 0;
       byHand = false;
       keys.enabled = true;
-      await stage.take({ agent: NOMINAL_AGENT, on: false });
-      stage.reset();
+      await stage.begin({ agent: NOMINAL_AGENT, on: false });
     },
     end() {
       keys.enabled = false;
@@ -101,7 +102,9 @@ function agent(stage: Stage): Step {
     id: 'agent',
     agents: [NOMINAL_AGENT],
     labels: ({ torque }) => (torque === 0 ? [] : [{ at: 'motor', text: 'its torque' }]),
-    begin: () => stage.take({ agent: NOMINAL_AGENT, on: false }),
+    async begin() {
+      await stage.take({ agent: NOMINAL_AGENT, on: false });
+    },
     answer(world) {
       on.ariaPressed = String(world.agentOn);
       return world.agentOn && heldFor(world) > HELD
@@ -188,8 +191,7 @@ function many(stage: Stage): Step {
     labels: () => [{ at: 'link2', text: `${LIGHT} kg` }],
     async begin() {
       input(NOMINAL_AGENT).checked = true;
-      await stage.take({ agent: NOMINAL_AGENT, plant, on: true });
-      stage.reset();
+      await stage.begin({ agent: NOMINAL_AGENT, plant, on: true });
     },
     answer(world) {
       if (!input(RANDOMIZED_AGENT).checked) return 'The agent of before fails again and again.';
@@ -211,10 +213,9 @@ function values(stage: Stage): Step {
     id: 'values',
     agents: [NOMINAL_AGENT],
     async begin() {
-      await stage.take({ agent: NOMINAL_AGENT, on: true });
-      stage.reset();
       speed.value = '1';
-      show();
+      element('tour-speed-value').textContent = '1×';
+      await stage.begin({ agent: NOMINAL_AGENT, on: true });
     },
     answer: (world) =>
       heldFor(world) > HELD
@@ -258,8 +259,7 @@ function learn(stage: Stage): Step {
     id: 'learn',
     agents: [NOMINAL_AGENT],
     async begin() {
-      await stage.take({ agent: NOMINAL_AGENT, on: false });
-      stage.reset();
+      await stage.begin({ agent: NOMINAL_AGENT, on: false });
     },
     end: () => stage.learn.stop(),
     answer: () => stage.learn.story,

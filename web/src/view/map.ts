@@ -6,7 +6,7 @@ import { signed } from './charts';
 
 type Color = readonly [number, number, number];
 
-// From little to much, light throughout growing; and from left over none to right.
+// Of V, from the least to the most, ever lighter; and of torques, from left over none to right.
 const VALUES: readonly Color[] = [
   [20, 14, 54],
   [83, 36, 122],
@@ -32,7 +32,7 @@ export class MapChart {
   private pixels: ImageData | null = null; // of it
   private shown: Float32Array | null = null; // 0 to 1, on its way to the map
 
-  /// Another map, which the old one does not turn into.
+  /// Forgets the map: the next one is shown at once, and not on the way from this one.
   clear(): void {
     this.shown = null;
   }

@@ -1,0 +1,114 @@
+import { BadInput } from '../bad_input';
+import { quoted } from '../text';
+import { LearningCurve } from '../view/charts';
+import type { Agent, Agents } from './agents';
+import { element } from './dom';
+import { hideMessage, warn } from './message';
+import { onThemeChange } from './theme';
+
+/// Who hears what happens in the panel.
+export interface AgentListener {
+  /// Another agent has been loaded.
+  took(agent: Agent): void;
+  /// The list of agents may be another one.
+  listed(): void;
+  /// The visitor has brought a file.
+  brought(file: File): void;
+}
+
+/// The agent on the stage: its choice, what is said of it, and a visitor's own file.
+export class AgentPanel {
+  agent: Agent | null = null;
+  private readonly agents: Agents;
+  private readonly listener: AgentListener;
+  private readonly curve = new LearningCurve();
+  private requests = 0; // the last one counts
+
+  constructor(agents: Agents, listener: AgentListener) {
+    this.agents = agents;
+    this.listener = listener;
+  }
+
+  /// Hears the visitor.
+  listen(): void {
+    const select = element<HTMLSelectElement>('agent');
+    select.addEventListener('change', () => void this.choose(select.value));
+    const file = element<HTMLInputElement>('file');
+    file.addEventListener('change', () => {
+      if (file.files?.[0]) this.listener.brought(file.files[0]);
+      file.value = '';
+    });
+    addEventListener('dragover', (event) => event.preventDefault());
+    addEventListener('drop', (event) => {
+      event.preventDefault();
+      const files = [...(event.dataTransfer?.files ?? [])];
+      const dropped = files.find(({ name }) => name.endsWith('.safetensors')) ?? files[0];
+      if (dropped) this.listener.brought(dropped);
+    });
+    onThemeChange(() => {
+      this.curve.canvas.forgetColors();
+      this.drawCurve();
+    });
+    new ResizeObserver(() => this.drawCurve()).observe(this.curve.canvas.element);
+  }
+
+  /// Changes to another agent; if it cannot be loaded, says why, keeps the old one and returns false.
+  choose(id: string): Promise<boolean> {
+    return this.load(() => this.agents.get(id), `Agent ${quoted(id)}`);
+  }
+
+  /// The same with a visitor's own file, or one that the page has `learned`.
+  open(file: File, learned: boolean): Promise<boolean> {
+    return this.load(() => this.agents.open(file, learned), quoted(file.name));
+  }
+
+  private async load(get: () => Promise<Agent>, name: string): Promise<boolean> {
+    const request = ++this.requests;
+    element('agent-text').textContent = 'Loading …';
+    try {
+      const agent = await get();
+      if (request !== this.requests) return false; // another was asked for meanwhile
+      this.agent = agent;
+      hideMessage();
+    } catch (error) {
+      if (!(error instanceof BadInput)) throw error;
+      if (request !== this.requests) return false;
+      warn(`${name} cannot be used: ${error.message}.`);
+      this.show();
+      return false;
+    }
+    this.listener.took(this.agent);
+    this.show();
+    return true;
+  }
+
+  /// Shows the list of agents, and what there is to say of the one on the stage.
+  show(): void {
+    const { agent, agents } = this;
+    const select = element<HTMLSelectElement>('agent');
+    select.replaceChildren(...agents.list.map(({ id, title }) => new Option(title, id)));
+    this.listener.listed();
+    element<HTMLButtonElement>('agent-on').disabled = agent === null;
+    element('own').hidden = agents.ownName === null;
+    element('own-name').textContent = agents.ownName;
+    if (!agent) {
+      select.prepend(new Option('Choose an agent', '', true, true));
+      element('agent-text').textContent = 'There is no agent: its policy could not be loaded.';
+      return;
+    }
+    select.value = agent.id;
+    element('first-name').textContent = agent.title;
+    element('agent-text').textContent = agent.text;
+    element('agent-command').hidden = agent.command === null;
+    element('agent-command').firstElementChild!.textContent = agent.command;
+    const step = Number(agent.policy.metadata.get('step') ?? NaN);
+    element('curve-value').textContent = Number.isFinite(step)
+      ? `best after ${step.toLocaleString('en')} steps`
+      : '';
+    this.drawCurve();
+  }
+
+  private drawCurve(): void {
+    this.curve.draw(this.agent?.curve ?? null);
+  }
+}

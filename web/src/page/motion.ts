@@ -1,0 +1,6 @@
+const reduced = matchMedia('(prefers-reduced-motion: reduce)');
+
+/// Whether the visitor's system asks for little motion.
+export function prefersStill(): boolean {
+  return reduced.matches;
+}
