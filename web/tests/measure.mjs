@@ -7,7 +7,7 @@ const SECONDS = 10;
 const VISITS = 5; // medians of them
 
 const server = await serve();
-const median = (values) => values.toSorted((a, b) => a - b)[Math.floor(values.length / 2)];
+const medianOf = (values) => values.toSorted((a, b) => a - b)[Math.floor(values.length / 2)];
 
 async function measure(page) {
   const bodies = [];
@@ -20,48 +20,61 @@ async function measure(page) {
   }));
   const sizes = (await Promise.all(bodies)).map((body) => gzipSync(body).length);
 
-  await page.click('#agent-on');
-  await page.evaluate(() => document.getElementById('map').scrollIntoView({ block: 'end' }));
   const devtools = await page.context().newCDPSession(page);
-  await devtools.send('Performance.enable');
+  // Of the thread's own time, as other programs may run on the processor meanwhile.
+  await devtools.send('Performance.enable', { timeDomain: 'threadTicks' });
   const metrics = async () => {
     const { metrics } = await devtools.send('Performance.getMetrics');
     return Object.fromEntries(metrics.map(({ name, value }) => [name, value]));
   };
-  const before = await metrics();
-  const frames = await page.evaluate(
-    (seconds) =>
-      new Promise((resolve) => {
-        const begin = performance.now();
-        let count = 0;
-        const frame = () => {
-          ++count;
-          if (performance.now() - begin < 1000 * seconds) requestAnimationFrame(frame);
-          else resolve((1000 * count) / (performance.now() - begin));
-        };
-        requestAnimationFrame(frame);
-      }),
-    SECONDS,
-  );
-  const after = await metrics();
-  return {
-    ...start,
-    kilobytes: sizes.reduce((sum, size) => sum + size) / 1000,
-    frames,
-    thread: (after.TaskDuration - before.TaskDuration) / SECONDS,
-    script: (after.ScriptDuration - before.ScriptDuration) / SECONDS,
+  // With the agent on and the map in sight: one pendulum, then two side by side.
+  const run = async () => {
+    await page.evaluate(() => document.getElementById('map').scrollIntoView({ block: 'end' }));
+    const before = await metrics();
+    const frames = await page.evaluate(framesIn, SECONDS);
+    const after = await metrics();
+    return {
+      frames,
+      thread: (after.TaskDuration - before.TaskDuration) / SECONDS,
+      script: (after.ScriptDuration - before.ScriptDuration) / SECONDS,
+    };
   };
+  await page.click('#agent-on');
+  const one = await run();
+  await page.selectOption('#twin', 'd3qn-randomized');
+  const two = await run();
+  return { ...start, kilobytes: sizes.reduce((sum, size) => sum + size) / 1000, one, two };
+}
+
+/// Frames a second, in the page.
+function framesIn(seconds) {
+  return new Promise((resolve) => {
+    const begin = performance.now();
+    let count = 0;
+    const frame = () => {
+      ++count;
+      if (performance.now() - begin < 1000 * seconds) requestAnimationFrame(frame);
+      else resolve((1000 * count) / (performance.now() - begin));
+    };
+    requestAnimationFrame(frame);
+  });
 }
 
 const visits = [];
 for (let k = 0; k < VISITS; ++k) visits.push(await visit({}, measure));
 await server.close();
-const of = (name) => median(visits.map((one) => one[name]));
+const of = (name) => medianOf(visits.map((one) => one[name]));
 const percent = (share) => `${(100 * share).toFixed(0)}%`;
 console.log(`first load     ${of('kilobytes').toFixed(0)} kB, compressed with gzip`);
 console.log(`first paint    ${of('paint').toFixed(0)} ms`);
 console.log(`ready          ${of('ready').toFixed(0)} ms`);
-console.log(`frames         ${of('frames').toFixed(1)} a second, with the agent on`);
-console.log(
-  `main thread    ${percent(of('thread'))} of one processor, of it ${percent(of('script'))} script`,
-);
+for (const [name, what] of [
+  ['one', 'one pendulum'],
+  ['two', 'two pendulums'],
+]) {
+  const median = (key) => medianOf(visits.map((visit) => visit[name][key]));
+  console.log(
+    `${what.padEnd(15)}${median('frames').toFixed(1)} frames a second; main thread ` +
+      `${percent(median('thread'))} of one processor, script ${percent(median('script'))}`,
+  );
+}

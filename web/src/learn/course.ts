@@ -11,6 +11,7 @@ export interface Course {
   readonly name: string; // among those that are shown together
   readonly steps: number; // so far
   readonly running: boolean;
+  /// Of training, which the page calls trials; an attempt is one on the stage.
   readonly episodes: readonly { step: number; return: number }[];
   readonly evaluations: readonly { step: number; success: number }[];
   readonly checkpoints: readonly Checkpoint[]; // the untrained policy first

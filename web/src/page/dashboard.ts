@@ -4,10 +4,10 @@ import type { State } from '../pendulum';
 import type { Decision } from '../decision';
 import { PhasePortrait, SECONDS_SHOWN, signed, Strip, withMinus } from '../view/charts';
 import { DecisionChart } from '../view/decision';
-import type { World } from '../world';
+import type { Moment, World } from '../world';
 import { element } from './dom';
 
-const FRAMES = 2; // the charts are drawn at every second frame
+const FRAMES = 2; // the charts take turns: each is drawn at every second frame
 const TORQUE_MEAN = 15; // control steps: a balancing agent changes its torque at each of them
 
 /// The charts and the numbers beside them.
@@ -24,10 +24,14 @@ export class Dashboard {
   }
 
   draw(world: World, history: History): void {
-    if (this.frame++ % FRAMES !== 0) return;
-    const now = world.time;
-    const moments = history.from(now - SECONDS_SHOWN);
-    const limit = world.plant.torque_limit;
+    const turn = this.frame++;
+    const moments = history.from(world.time - SECONDS_SHOWN);
+    if (turn % FRAMES === 0) this.drawWay(moments, world);
+    else this.drawTorque(moments, world);
+    if (turn % (5 * FRAMES) === 0) this.showNumbers(world);
+  }
+
+  private drawWay(moments: readonly Moment[], { time: now }: World): void {
     this.energy.draw(moments, now, {
       low: -0.1,
       high: 1.6,
@@ -47,6 +51,11 @@ export class Dashboard {
         [1, '1'],
       ],
     });
+    this.phase.draw(moments);
+  }
+
+  private drawTorque(moments: readonly Moment[], { time: now, plant, decision }: World): void {
+    const limit = plant.torque_limit;
     this.torque.draw(moments, now, {
       timed: true,
       mean: TORQUE_MEAN,
@@ -58,9 +67,7 @@ export class Dashboard {
         [limit, signed(limit)],
       ],
     });
-    this.phase.draw(moments);
-    this.decision.draw(world.decision);
-    if (this.frame % (5 * FRAMES) === 1) this.showNumbers(world);
+    this.decision.draw(decision);
   }
 
   /// The numbers change a few times a second, so that they can be read.

@@ -30,8 +30,17 @@ export function focusWideFormulas(): void {
   for (const formula of document.querySelectorAll('math[display]')) observer.observe(formula);
 }
 
-/// Back to the pendulum, from a link to an example further down.
-export function showStage(): void {
+/// A link to an example leads back to the pendulum; `again` hears of one that is open already.
+export function listenToExamples(again: () => void): void {
+  element('explain').addEventListener('click', (event) => {
+    const link = (event.target as HTMLElement).closest<HTMLAnchorElement>('a[href^="#"]');
+    if (!link) return;
+    showStage();
+    if (link.hash === location.hash) again();
+  });
+}
+
+function showStage(): void {
   const stage = element('stage');
   stage.focus({ preventScroll: true });
   stage.scrollIntoView({ block: 'start', behavior: prefersStill() ? 'instant' : 'smooth' });

@@ -2,25 +2,25 @@ import { core } from '../core';
 import { History } from '../history';
 import { LearnPanel } from '../learn/panel';
 import type { State } from '../pendulum';
-import { quoted } from '../text';
 import { Scene, TRAIL_SECONDS } from '../view/scene';
 import type { World } from '../world';
 import { Address } from './address';
 import { AgentPanel } from './agent_panel';
 import type { Agent, Agents } from './agents';
 import { Clock } from './clock';
-import { Dashboard, situation } from './dashboard';
-import { button, element, write } from './dom';
+import { Badge } from './badge';
+import { Dashboard } from './dashboard';
+import { button, element } from './dom';
 import { Hand } from './hand';
 import { listenToKeys } from './keys';
-import { placeCharts, showStage } from './layout';
+import { listenToExamples, placeCharts } from './layout';
 import { MapPanel } from './map';
 import { warn } from './message';
 import { prefersStill } from './motion';
 import { Pose } from './pose';
 import { save } from './save';
 import { RANGES, Settings } from './settings';
-import { BEGINNING, decode, encode, OWN } from './share';
+import { BEGINNING, decode, encode, OWN, problemText } from './share';
 import type { Shared } from './share';
 import { changeTheme, onThemeChange } from './theme';
 import { Tour } from './tour';
@@ -38,6 +38,7 @@ export class Page {
   private readonly history = new History(REMEMBERED);
   private readonly settings: Settings;
   private readonly pose: Pose;
+  private readonly badge = new Badge();
   private readonly dashboard = new Dashboard();
   private readonly map = new MapPanel((where) => this.start(where));
   readonly learn: LearnPanel;
@@ -47,7 +48,6 @@ export class Page {
   private readonly agentPanel: AgentPanel;
   private takes = 0; // of agents and settings; the last one counts
   private paused = false;
-  private announced = ''; // the last situation that was read out
 
   constructor(world: World, agents: Agents) {
     this.world = world;
@@ -97,24 +97,10 @@ export class Page {
       return this.tour.go(view.step);
     }
     this.tour.leave();
-    const { shared, problems } = decode(hash, RANGES);
-    if (shared.agent !== null && !this.agents.has(shared.agent)) {
-      problems.push(
-        shared.agent === OWN
-          ? "it was made with somebody's own policy, which is not in it"
-          : `unknown agent ${quoted(shared.agent)}`,
-      );
-      shared.agent = null;
-    }
-    if (shared.twin !== null && !this.agents.has(shared.twin)) {
-      problems.push(`unknown agent ${quoted(shared.twin)}`);
-      shared.twin = null;
-    }
+    const { shared, problems } = decode(hash, RANGES, (id) => this.agents.has(id));
     this.world.agentOn = false;
     if (!(await this.begin(shared))) return;
-    if (problems.length === 0) return;
-    const more = problems.length > 3 ? `; and ${problems.length - 3} more` : '';
-    warn(`Not all of the link could be used: ${problems.slice(0, 3).join('; ')}${more}.`);
+    if (problems.length > 0) warn(problemText(problems));
   }
 
   /// Takes agent and settings, all others as at the beginning; the pendulum moves on. False if others
@@ -205,18 +191,8 @@ export class Page {
     this.agentPanel.listen();
     // By its own address: meanwhile that of the settings before may have been written.
     addEventListener('hashchange', ({ newURL }) => void this.open(new URL(newURL).hash));
-    this.listenToExamples();
+    listenToExamples(() => void this.open());
     onThemeChange(() => this.repaint());
-  }
-
-  /// A link to an example scrolls back to the pendulum; the same link again restarts the example.
-  private listenToExamples(): void {
-    element('explain').addEventListener('click', (event) => {
-      const link = (event.target as HTMLElement).closest<HTMLAnchorElement>('a[href^="#"]');
-      if (!link) return;
-      showStage();
-      if (link.hash === location.hash) void this.open();
-    });
   }
 
   private async forgetOwn(): Promise<void> {
@@ -338,16 +314,7 @@ export class Page {
     if (this.paused) this.pose.follow(world.state);
     this.dashboard.draw(world, this.history);
     this.map.draw(world, this.history);
-    const { state, text } = situation(world);
-    const badge = element('badge');
-    write(badge, this.paused ? `paused, ${text}` : text);
-    badge.dataset.state = state;
-    if (state === this.announced) return;
-    if (state === 'balanced' && !prefersStill()) this.scene.sparks.light();
-    // Read out when it changes, not at each tenth of a second.
-    this.announced = state;
-    const words = state === 'balanced' ? 'balanced' : text;
-    element('live').textContent = words;
-    this.scene.canvas.element.ariaLabel = `The pendulum: ${words}`;
+    const caught = this.badge.draw(world, this.paused, this.scene.canvas.element);
+    if (caught && !prefersStill()) this.scene.sparks.light();
   }
 }

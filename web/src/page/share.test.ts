@@ -11,9 +11,11 @@ const RANGES: ReadonlyMap<string, Range> = new Map<string, Range>([
   ['sensor_noise', [0, 0.2]],
   ['delay', [0, 5]],
 ]);
+const has = (agent: string) => agent !== 'unknown' && agent !== 'own';
+
 test('what is as at the beginning needs no link', () => {
   expect(encode(BEGINNING)).toBe('');
-  expect(decode('', RANGES)).toEqual({ shared: BEGINNING, problems: [] });
+  expect(decode('', RANGES, has)).toEqual({ shared: BEGINNING, problems: [] });
 });
 
 test('a link brings back what it was made from', () => {
@@ -26,7 +28,7 @@ test('a link brings back what it was made from', () => {
     sensor_noise: 0.05,
     delay: 2,
   };
-  expect(decode(`#${encode(shared)}`, RANGES)).toEqual({ shared, problems: [] });
+  expect(decode(`#${encode(shared)}`, RANGES, has)).toEqual({ shared, problems: [] });
 });
 
 test.each([
@@ -40,5 +42,14 @@ test.each([
   ['a%0Ab=1', 'unknown "a\ufffdb"'],
   ['__proto__=1', 'unknown "__proto__"'],
 ])('%s is told and left out', (hash, problem) => {
-  expect(decode(hash, RANGES)).toEqual({ shared: BEGINNING, problems: [problem] });
+  expect(decode(hash, RANGES, has)).toEqual({ shared: BEGINNING, problems: [problem] });
+});
+
+test("an agent that is not there is left out, and a visitor's own is told apart", () => {
+  const { shared, problems } = decode('agent=unknown&twin=own', RANGES, has);
+  expect([shared.agent, shared.twin]).toEqual([null, null]);
+  expect(problems).toEqual([
+    'unknown agent "unknown"',
+    "it was made with somebody's own policy, which is not in it",
+  ]);
 });

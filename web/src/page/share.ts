@@ -5,6 +5,8 @@ import { quoted } from '../text';
 /// Stands for a visitor's own policy, which no link can contain.
 export const OWN = 'own';
 
+const NOT_IN_IT = "it was made with somebody's own policy, which is not in it";
+
 /// What a link contains: the agent, whether it is on, and every setting that was changed.
 export interface Shared {
   agent: string | null;
@@ -45,10 +47,12 @@ export function encode(shared: Shared): string {
   return fields.toString();
 }
 
-/// Reads such an address. What is not understood is left out and reported in `problems`, one line each.
+/// Reads such an address; `has` says which agents there are. What is not understood is left out and
+/// reported in `problems`, one line each.
 export function decode(
   hash: string,
   ranges: ReadonlyMap<string, Range>,
+  has: (agent: string) => boolean,
 ): { shared: Shared; problems: string[] } {
   const shared: Shared = { ...BEGINNING, plant: { ...NOMINAL } };
   const problems: string[] = [];
@@ -56,7 +60,8 @@ export function decode(
     const range = ranges.get(name);
     const value = Number(text);
     if (name === 'agent' || name === 'twin') {
-      shared[name] = text;
+      if (has(text)) shared[name] = text;
+      else problems.push(text === OWN ? NOT_IN_IT : `unknown agent ${quoted(text)}`);
     } else if (name === 'on') {
       shared.on = text === '1';
     } else if (name === 'everything' || name === 'learn') {
@@ -74,4 +79,10 @@ export function decode(
     }
   }
   return { shared, problems };
+}
+
+/// What to say of them.
+export function problemText(problems: readonly string[]): string {
+  const more = problems.length > 3 ? `; and ${problems.length - 3} more` : '';
+  return `Not all of the link could be used: ${problems.slice(0, 3).join('; ')}${more}.`;
 }

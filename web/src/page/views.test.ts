@@ -12,7 +12,7 @@ test('each view has an address of its own', () => {
   expect(viewOf('#tour=3')).toMatchObject({ name: 'tour', step: 3, chosen: true });
   expect(viewOf('#learn')).toMatchObject({ name: 'learn' });
   expect(viewOf('#everything')).toMatchObject({ name: 'everything', chosen: true });
-  expect(decode('#everything', new Map()).problems).toEqual([]);
+  expect(decode('#everything', new Map(), () => false).problems).toEqual([]);
 });
 
 test('settings show everything, without a choice for the next visit', () => {

@@ -1,16 +1,26 @@
+const NEAR = '100px'; // from the edge of the screen
+
 /// A canvas that is as sharp as the screen, in CSS pixels, with colours from the style sheet.
 export class Canvas {
   readonly element: HTMLCanvasElement;
   readonly context: CanvasRenderingContext2D;
   width = 0; // CSS pixels
   height = 0;
+  private seen = true; // on the screen, or near it
   private colors = new Map<string, string>();
 
   constructor(id: string) {
     this.element = document.getElementById(id) as HTMLCanvasElement;
     this.context = this.element.getContext('2d')!;
     new ResizeObserver(() => this.resize()).observe(this.element);
+    const look = ([entry]: IntersectionObserverEntry[]) => (this.seen = entry!.isIntersecting);
+    new IntersectionObserver(look, { rootMargin: NEAR }).observe(this.element);
     this.resize();
+  }
+
+  /// Whether anybody would see what is drawn now.
+  get shown(): boolean {
+    return this.seen && this.width > 0;
   }
 
   /// The colour with this name in the style sheet.

@@ -26,7 +26,7 @@ export class Strip {
 
   draw(moments: readonly Moment[], now: number, scale: StripScale): void {
     const { canvas, value } = this;
-    if (canvas.width === 0) return; // not shown
+    if (!canvas.shown) return;
     canvas.clear();
     const left = 34;
     const y = (v: number) =>
@@ -87,7 +87,7 @@ export class PhasePortrait {
 
   draw(moments: readonly Moment[]): void {
     const { canvas } = this;
-    if (canvas.width === 0) return; // not shown
+    if (!canvas.shown) return;
     canvas.clear();
     const [cx, cy] = [canvas.width / 2, canvas.height / 2];
     const x = (angle: number) => cx + (angle / Math.PI) * (cx - 4);

@@ -10,7 +10,7 @@ import { Sparks } from './sparks';
 
 export const TRAIL_SECONDS = 1.3; // of the pendulum's time
 const TRAIL_SHADES = 13;
-const GHOST_STEPS = 5; // control steps between two ghosts
+const FLASH_STEPS = 5; // control steps between two flashes
 const PIVOT: Vec = { x: 0, z: 0 };
 const LARGEST_ARC = (150 / 180) * Math.PI; // at the motor's limit
 
@@ -52,7 +52,7 @@ export class Scene {
     this.scale = (0.44 * Math.min(canvas.width, canvas.height)) / reach;
     canvas.clear();
     this.drawGuides(plant.length1 + plant.length2, world.uprightFor !== null);
-    this.drawGhosts(plant, trail);
+    this.drawFlashes(plant, trail);
     this.drawTrail(world, state, trail);
 
     const elbow = pointOn(plant, state, 1, plant.length1).position;
@@ -109,12 +109,12 @@ export class Scene {
   }
 
   /// Where both links were, at equal times, as in a photograph by flashes.
-  private drawGhosts(plant: Plant, moments: readonly Moment[]): void {
+  private drawFlashes(plant: Plant, moments: readonly Moment[]): void {
     const { context } = this.canvas;
     const width = Math.max(4, 0.025 * this.scale);
     context.lineCap = 'round';
     moments.forEach(({ t, state }, i) => {
-      if (Math.round(t / CONTROL_PERIOD) % GHOST_STEPS !== 0) return;
+      if (Math.round(t / CONTROL_PERIOD) % FLASH_STEPS !== 0) return;
       context.globalAlpha = (0.22 * i) / moments.length;
       const elbow = this.at(pointOn(plant, state, 1, plant.length1).position);
       const tip = this.at(pointOn(plant, state, 2, plant.length2).position);
