@@ -149,9 +149,9 @@ test.describe('what is missing or broken is told', () => {
     await page.goto('./', { waitUntil: 'commit' });
     await asked;
     await expect(page.locator('#loading')).toBeVisible();
-    await page.clock.fastForward(29_000);
+    await page.clock.fastForward(15_000);
     await expect(page.locator('#loading')).toBeVisible();
-    await page.clock.fastForward(2_000);
+    await page.clock.fastForward(16_000);
     await expectProblem(page, 'nothing arrived for 30 s');
   });
 
