@@ -13,6 +13,7 @@
 #include "io/machine.h"
 #include "io/streams.h"
 #include "lab/arguments.h"
+#include "lab/controllers.h"
 
 namespace upswing {
 namespace {
@@ -20,6 +21,7 @@ namespace {
 struct BoundsArguments {
   BoundsConfig config;
   std::vector<std::string> policies;
+  std::vector<FlagValue> flags;  // settings of controllers among them
   std::string csv;
   int64_t threads;
   bool as_json = false;
@@ -52,10 +54,17 @@ nlohmann::ordered_json RowJson(const Row& row, const Row& best) {
           {"swing_up_seconds", row.swing_up_seconds.median}};
 }
 
+/// What controllers among the policies are made for: nothing where there are none.
+std::vector<std::string> MadeFor(const BoundsArguments& a) {
+  return std::ranges::any_of(a.policies, IsController) ? a.config.trial.set
+                                                       : std::vector<std::string>();
+}
+
 int RunBounds(const BoundsArguments& a) {
   if (!a.csv.empty()) CheckWritable("--csv", a.csv);
-  std::vector<LoadedPolicy> policies;
-  for (const std::string& name : a.policies) policies.push_back(GetPolicy({name, {}, {}}));
+  // Controllers are made for the plant that the search knows.
+  const std::vector<LoadedPolicy> policies = GetPolicies(a.policies, {"", a.flags, MadeFor(a)});
+  for (const LoadedPolicy& loaded : policies) CheckComparable(loaded, a.config);
   ThreadPool pool(ResolveThreads(a.threads));
   EpisodeProgress progress(static_cast<double>(a.config.episodes), a.as_json);
   const EpisodeBounds bounds =
@@ -80,13 +89,15 @@ int RunBounds(const BoundsArguments& a) {
     fmt::print("{}\n", PrintableJson(j));
     return 0;
   }
-  fmt::print("Best found of {} episodes, judged in {}\n", a.config.episodes,
-             a.config.trial.physics);
+  fmt::print("Best found of {} episode{}, judged in {}\n", a.config.episodes,
+             a.config.episodes == 1 ? "" : "s", a.config.trial.physics);
   size_t width = 0;
   for (const Row& row : rows) width = std::max(width, Printable(row.name).size());
   fmt::print("  {:<{}}  {:<14} {:>8}   median swing-up time\n", "", width, "return", "share");
   for (const Row& row : rows) fmt::print("{}\n", RowText(row, rows.front(), width));
-  fmt::print("  Nothing proves that there is no better.\n");
+  fmt::print(
+      "  ± is the standard deviation over the episodes. Returns and times are searched for apart.\n"
+      "  Nothing proves that there is no better.\n");
   return 0;
 }
 
@@ -98,10 +109,12 @@ void AddBounds(CLI::App& program, Command& command) {
   auto a = std::make_shared<BoundsArguments>();
   app->add_option("policy", a->policies, "policy files, run folders or controllers to compare")
       ->type_name("POLICY|RUN");
+  ControllerConfig controllers;
+  AddSettings(*app, OptionsOf(controllers), a->flags);
   Options own;
   a->config.Describe(own);
   AddArguments(*app, own);
-  AddSet(*app, a->config.trial.set, "change the plant, such as mass2=1.2 (repeat for more)");
+  AddSet(*app, a->config.trial.set, "another plant, such as mass2=1.2");
   AddSeed(*app, a->config.trial.seed, "start states");
   AddPhysics(*app, a->config.trial.physics, "mujoco");
   AddThreads(*app, a->threads);

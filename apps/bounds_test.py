@@ -42,6 +42,11 @@ class Bounds(ProgramTest):
         self.refuse(["bounds", "--set", "torque_limit=0.1", "--guesses", 2],
                     "found no swing-up of this plant with 0.1 N·m from 2 guesses")
         self.refuse(["bounds", "none"], "none: no such file")
+        self.refuse(["bounds", POLICY, "--set", "mass2=1.2", "--mpc-seconds", 3],
+                    "--mpc-seconds: expected the controller mpc, got")
+        self.refuse(["bounds", "hybrid"], "--swing-up")
+        self.succeed("train", "--task", "pendulum-v1", "--steps", 400, "--out", "other")
+        self.refuse(["bounds", "other"], "expected policies of the built-in double pendulum, got other")
         self.refuse(["bounds", "--episodes", "0"], "--episodes")
         self.refuse(["bounds", "--torques", "2"], "--torques")
         self.refuse(["bounds", "--csv", "missing/bounds.csv"], "missing/bounds.csv")

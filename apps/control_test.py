@@ -178,10 +178,33 @@ class SwingUp(ProgramTest):
         self.assertIn("and lqr upright, region of attraction x'Px < ",
                       self.succeed("info", "hybrid", "--swing-up", POLICY))
         self.refuse(["eval", "hybrid"], "hybrid: expected a policy that swings up, by --swing-up")
-        self.refuse(["eval", "hybrid", "--swing-up", "none"], "none: no such file")
+        self.refuse(["eval", "hybrid", "--swing-up", "none"], "--swing-up: none: no such file")
+        self.refuse(["eval", "mpc", "--swing-up", POLICY], "--swing-up: expected the controller hybrid, got mpc")
+        self.refuse(["eval", "lqr", "--mpc-seconds", 3], "--mpc-seconds: expected the controller mpc, got lqr")
         self.refuse(["eval", POLICY, "--swing-up", POLICY], "--swing-up: expected a controller")
 
+    def test_upright_all_of_them_hold(self):
+        # From 1 degree off, and with noise; tvlqr once left the regulator to swing up again.
+        for controller in ("energy", "lqr", "pfl", "tvlqr"):
+            rows = list(csv.DictReader(io.StringIO(self.succeed(
+                "simulate", controller, "--start", "3.13,0,0,0", "--seconds", 3, "--sensor-noise", 0.005))))
+            self.assertEqual({row["inverted"] for row in rows}, {"1"}, controller)
+
+    def test_strong_motors_and_slow_plants_have_a_region(self):
+        for plant in ("torque_limit=200", "damping1=20", "gravity=0.1"):
+            text = self.succeed("info", "lqr", "--made-for", plant)
+            self.assertGreater(float(text.rsplit("x'Px < ", 1)[1]), 0, plant)
+        strong = self.eval("tvlqr", "--made-for", "torque_limit=100", "--episodes", 5)
+        self.assertEqual(strong["successes"], 5)
+
+    def test_plans_of_any_length(self):
+        for seconds in (3, 5, 10):
+            self.assertEqual(self.eval("tvlqr", "--tvlqr-seconds", seconds, "--episodes", 3)["successes"], 3)
+
     def test_what_cannot_be_planned(self):
+        self.refuse(["info", "lqr", "--lqr-q1", "1e9", "--lqr-torque", "1e-9"], "weights, which are too far")
+        self.succeed("simulate", "energy", "--energy-ke", 0, "--energy-kp", 0, "--seconds", 1)
+        self.refuse(["eval", "energy", "--energy-kd", "0"], "--energy-kd")
         self.refuse(["eval", "tvlqr", "--tvlqr-seconds", "1"], "tvlqr: found no swing-up of 1 s with 4 N")
         self.refuse(["eval", "tvlqr", "--tvlqr-seconds", "1.01"], "--tvlqr-seconds", "multiple of 0.02")
         self.refuse(["eval", "mpc", "--mpc-iterations", "0"], "--mpc-iterations")

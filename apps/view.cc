@@ -42,22 +42,11 @@ std::vector<LoadedPolicy> PoliciesOf(const ViewArguments& a) {
     throw BadInput(
         Concat("view: expected at most ", kMostPolicies, " policies, got ", a.names.size()));
   }
-  std::vector<LoadedPolicy> policies;
-  bool any_controller = false;
-  for (const std::string& name : a.names) {
-    PolicyArguments one{name, {}, {}};
-    // Settings of a controller are for the controllers among them.
-    if (IsController(name)) one = {name, a.controller.flags, a.controller.made_for};
-    any_controller = any_controller || IsController(name);
-    policies.push_back(GetPolicy(one));
-    if (policies.back().task != kDoublePendulum) {
-      throw BadInput(Concat(name, ": expected a policy of ", kDoublePendulum,
-                            ", which alone can be viewed, got one of ", policies.back().task));
-    }
-  }
-  if (!any_controller && a.controller.has_settings()) {
-    (void)GetPolicy({a.names.empty() ? "" : a.names.front(), a.controller.flags,
-                     a.controller.made_for});  // says what is wrong
+  std::vector<LoadedPolicy> policies = GetPolicies(a.names, a.controller);
+  for (const LoadedPolicy& loaded : policies) {
+    if (loaded.task == kDoublePendulum) continue;
+    throw BadInput(Concat(loaded.name, ": expected a policy of ", kDoublePendulum,
+                          ", which alone can be viewed, got one of ", loaded.task));
   }
   return policies;
 }

@@ -17,12 +17,12 @@ namespace {
 constexpr int kReturnSteps = 500;
 static_assert(kReturnSteps * kControlPeriod == kReturnSeconds);
 /// Steps that are optimised: 6 s; upright is reached in less than half of it.
-constexpr size_t kPlannedSteps = 300;
+constexpr int kPlannedSteps = 300;
 /// How smooth the reward is taken, one after the other.
 constexpr double kWidths[] = {0.3, 0.1, 0.05, 0.02, 0.01};
 constexpr double kTolerance = 1e-6;
 constexpr int kIterations = 150;
-constexpr int kRounds = 40;  // of changes to all torques
+constexpr int kChanges = 100;  // of single torques
 
 /// Weights with which the return grows with the time that is spent upright. A little energy and
 /// height tell the way there.
@@ -50,21 +50,9 @@ BestEpisodeSearch::BestEpisodeSearch(const Plant& plant, std::vector<double> lev
   std::optional<Trajectory> best;
   double most = 0;
   for (int guess = 0; guess < guesses; ++guess) {
-    // A wave of any amplitude, once in 1 to 2 s, and any price of the way against that of its end.
-    const auto steps = static_cast<size_t>(rng.Uniform(80, 250));
-    const double amplitude = rng.Uniform(0, plant.torque_limit), rate = rng.Uniform(3, 6);
-    const double phase = rng.Uniform(0, 2 * std::numbers::pi);
-    const double price = std::pow(10, rng.Uniform(-2.5, 0));
-    std::vector<double> torques;
-    for (size_t t = 0; t < steps; ++t) {
-      torques.push_back(amplitude *
-                        std::sin(rate * kControlPeriod * static_cast<double>(t) + phase));
-    }
-    const QuadraticCost cost(price * lqr.Q(), price * lqr.torque, upright_.lqr().P);
-    Trajectory trajectory = optimizer_.Follow(cost, StateVector::Zero(), torques);
-    optimizer_.Improve(cost, kTolerance, kIterations, trajectory);
-    if (!upright_.Holds(UprightDeviation(trajectory.x.back()), optimizer_.model())) continue;
-    trajectory = Sharpen(Extend(trajectory), WeightsOf(Aim::kReturn));
+    const auto found = GuessSwingUp(lqr, upright_, kPlannedSteps, rng, optimizer_);
+    if (!found) continue;
+    Trajectory trajectory = Sharpen(*found, WeightsOf(Aim::kReturn));
     const double reward_sum = Judge(StateVector::Zero(), trajectory.u).reward_sum;
     if (best && reward_sum <= most) continue;
     most = reward_sum;
@@ -84,21 +72,6 @@ double BestEpisodeSearch::Nearest(double torque) const {
 
 double BestEpisodeSearch::Hold(const StateVector& deviation) const {
   return Nearest(upright_.lqr().Torque(deviation));
-}
-
-Trajectory BestEpisodeSearch::Extend(const Trajectory& trajectory) {
-  Trajectory longer{{trajectory.x[0]}, {}, 0};
-  for (size_t t = 0; t < kPlannedSteps; ++t) {
-    StateVector x = longer.x.back();
-    const double u = t < trajectory.u.size()
-                         ? trajectory.u[t]
-                         : std::clamp(upright_.lqr().Torque(UprightDeviation(x)),
-                                      -plant_.torque_limit, plant_.torque_limit);
-    optimizer_.model().Step({&x, 1}, {&u, 1});
-    longer.x.push_back(x);
-    longer.u.push_back(u);
-  }
-  return longer;
 }
 
 Trajectory BestEpisodeSearch::Sharpen(const Trajectory& trajectory, const RewardWeights& weights) {
@@ -154,7 +127,7 @@ std::vector<double> BestEpisodeSearch::Round(const Trajectory& trajectory) {
 }
 
 BestEpisode BestEpisodeSearch::Polish(BestEpisode episode, Aim aim) {
-  for (int round = 0; round < kRounds; ++round) {
+  for (int change = 0; change < kChanges; ++change) {
     std::vector<std::vector<double>> changed;
     for (size_t t = 0; t < episode.torques.size(); ++t) {
       for (const double level : levels_) {

@@ -8,7 +8,8 @@
 #include "control/tvlqr.h"
 
 /// The best return and the least swing-up time of an episode that a search finds, knowing the plant
-/// and where it starts. Each is a bound from below only: nothing says that there is no better.
+/// and where it starts. Nothing says that there is no better: they bound the best return from below
+/// and the least time from above.
 namespace upswing {
 
 /// Torques from the start on; when they end, upright is near and the regulator holds.
@@ -42,8 +43,6 @@ class BestEpisodeSearch {
   const Plant& plant() const { return plant_; }
 
  private:
-  /// The trajectory, held upright by the regulator from its end on, as long as all that is planned.
-  Trajectory Extend(const Trajectory& trajectory);
   /// A trajectory with a better return by these weights, from one that swings up.
   Trajectory Sharpen(const Trajectory& trajectory, const RewardWeights& weights);
   /// The episodes of some sequences of torques from one start.
@@ -54,9 +53,11 @@ class BestEpisodeSearch {
                     const RewardWeights& weights = {}) {
     return Judge(start, {&torques, 1}, weights)[0];
   }
-  /// The nearest torques of the table, under feedback about the trajectory, up to where Hold holds.
+  /// The nearest torques of the table, under feedback about the trajectory, up to the regulator's
+  /// region of attraction.
   std::vector<double> Round(const Trajectory& trajectory);
-  /// Changes one torque of the table at a time while that makes a better episode.
+  /// Changes one torque of the table at a time, at most a hundred times, while that makes a better
+  /// episode.
   BestEpisode Polish(BestEpisode episode, Aim aim);
   double Nearest(double torque) const;
 

@@ -40,6 +40,11 @@ StateVector UprightDeviation(std::span<const float> obs) {
           kMaxVelocity2 * obs[5]};
 }
 
+StateVector Difference(const StateVector& x, const StateVector& y) {
+  const StateVector d = x - y;
+  return {Wrapped(d[0]), Wrapped(d[1]), d[2], d[3]};
+}
+
 std::string Rounded(double x) {
   std::array<char, 32> text;
   const auto end = std::to_chars(text.begin(), text.end(), x, std::chars_format::general, 4).ptr;

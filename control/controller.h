@@ -18,12 +18,15 @@ namespace upswing {
 StateVector UprightDeviation(const StateVector& x);
 StateVector UprightDeviation(std::span<const float> obs);
 
+/// x - y, the angles in [-π, π].
+StateVector Difference(const StateVector& x, const StateVector& y);
+
 /// The state of a deviation from upright.
 inline StateVector FromUpright(const StateVector& d) {
   return {std::numbers::pi + d[0], d[1], d[2], d[3]};
 }
 
-/// Such as 3.389.
+/// With four significant digits, such as 3.389.
 std::string Rounded(double x);
 
 /// A policy of the double pendulum that is computed from the equations of motion of one plant.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "control/linearize.h"
 #include "control/riccati.h"
@@ -25,6 +26,12 @@ Error NoGain(const LqrConfig& config, const Plant& plant) {
     return BadInput(Concat("lqr: expected a plant that steps of ", kPhysicsTimestep,
                            " s can follow, whose damping acts at up to ", Rounded(kLargestDecay),
                            "/s, got ", Rounded(modes.decay), "/s"));
+  }
+  if (std::abs(modes.delta) > 1e-3) {
+    return BadInput(Concat(
+        "lqr: no gain was found with these weights, which are too far apart: that of the torque "
+        "is ",
+        Rounded(config.torque), ", the largest of the state ", Rounded(config.Q().maxCoeff())));
   }
   return BadInput(
       Concat("lqr: no gain was found that holds this plant upright: its unstable modes grow at ",

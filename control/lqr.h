@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 
 #include "control/controller.h"
 #include "core/options.h"
@@ -33,6 +34,10 @@ struct Lqr {
 
   /// u (N·m) of a deviation x from upright.
   double Torque(const StateVector& x) const { return -K.dot(x); }
+  /// The same within ±limit.
+  double Torque(const StateVector& x, double limit) const {
+    return std::clamp(Torque(x), -limit, limit);
+  }
   /// The least cost from there.
   double Cost(const StateVector& x) const { return x.dot(P * x); }
 };

@@ -6,16 +6,25 @@
 #include <numbers>
 #include <vector>
 
+#include "control/riccati.h"
+#include "core/error.h"
 #include "core/rng.h"
 
 namespace upswing {
 namespace {
 
 constexpr int kSamples = 512;      // states of an ellipsoid
-constexpr int kSettleSteps = 250;  // control periods after which they have to be caught: 5 s
-constexpr double kSettled = 1e-3;  // by which share their cost has to have fallen then
-constexpr int kCatchSteps = 100;   // control periods of Holds: 2 s
+constexpr double kSettled = 1e-3;  // by which share of itself their cost has to have fallen
 constexpr double kLargestLean = std::numbers::pi / 3;
+
+/// Control periods in which the cost falls to kSettled with the slowest mode of the regulator, half
+/// as many again, and at least 5 s.
+int SettleSteps(const Lqr& lqr, const Plant& plant) {
+  const LinearModel model = Discretize(LinearizeUpright(plant), kPhysicsTimestep, kPhysicsSteps);
+  const double slowest = SpectralRadius(model.A - model.B * lqr.K);
+  return static_cast<int>(
+      std::clamp(1.5 * std::log(kSettled) / (2 * std::log(slowest)), 250.0, 2000.0));
+}
 
 /// Points of the unit sphere in four dimensions.
 std::vector<Eigen::Vector4d> Directions() {
@@ -28,22 +37,16 @@ std::vector<Eigen::Vector4d> Directions() {
   return directions;
 }
 
-/// The limited torques of the regulator at these states.
-void Torques(const Lqr& lqr, double limit, const std::vector<StateVector>& x,
-             std::vector<double>& u) {
-  for (size_t i = 0; i < x.size(); ++i) {
-    u[i] = std::clamp(lqr.Torque(UprightDeviation(x[i])), -limit, limit);
-  }
-}
-
 /// Whether all states x with x' P x = level, in these directions (rows of P^-1/2 d), settle.
 bool AllSettle(const Lqr& lqr, double level, const std::vector<Eigen::Vector4d>& directions,
-               PendulumModel& model) {
+               int steps, PendulumModel& model) {
   std::vector<StateVector> x;
   for (const auto& d : directions) x.push_back(FromUpright(std::sqrt(level) * d));
   std::vector<double> u(x.size());
-  for (int step = 0; step < kSettleSteps; ++step) {
-    Torques(lqr, model.plant().torque_limit, x, u);
+  for (int step = 0; step < steps; ++step) {
+    for (size_t i = 0; i < x.size(); ++i) {
+      u[i] = lqr.Torque(UprightDeviation(x[i]), model.plant().torque_limit);
+    }
     model.Step(x, u);
   }
   return std::ranges::all_of(x, [&](const StateVector& end) {
@@ -59,19 +62,26 @@ double RegionOfAttraction(const Lqr& lqr, const Plant& plant) {
   std::vector<Eigen::Vector4d> directions = Directions();
   for (Eigen::Vector4d& d : directions) d = shape * d;
 
-  // Inside this level the torque is within its limit: max |K x| over x' P x = level is
-  // sqrt(level K P⁻¹ K').
   PendulumModel model(plant);
-  const double linear = plant.torque_limit * plant.torque_limit /
-                        (lqr.K * lqr.P.inverse() * lqr.K.transpose()).value();
-  double low = 0, high = linear;
-  while (AllSettle(lqr, high, directions, model) && high < 1e6 * linear) {
-    low = high;
-    high *= 2;
+  const int steps = SettleSteps(lqr, plant);
+  const auto all_settle = [&](double level) {
+    return AllSettle(lqr, level, directions, steps, model);
+  };
+  // From the level up to which the torque is within its limit, max |K x| over x' P x = level being
+  // sqrt(level K P⁻¹ K'), by factors of 2 to where it changes, then by halves.
+  double low = plant.torque_limit * plant.torque_limit /
+               (lqr.K * lqr.P.inverse() * lqr.K.transpose()).value();
+  int factors = 0;
+  while (!all_settle(low)) {
+    if (++factors > 40) return 0;
+    low /= 2;
   }
-  for (int halving = 0; halving < 8; ++halving) {
+  double high = 2 * low;
+  while (factors == 0 && all_settle(high) && high < 1e6 * low) high *= 2;
+  if (factors == 0) low = high / 2;
+  for (int halving = 0; halving < 6; ++halving) {
     const double middle = (low + high) / 2;
-    (AllSettle(lqr, middle, directions, model) ? low : high) = middle;
+    (all_settle(middle) ? low : high) = middle;
   }
   return low;
 }
@@ -79,16 +89,23 @@ double RegionOfAttraction(const Lqr& lqr, const Plant& plant) {
 LqrCatch::LqrCatch(const LqrConfig& config, const Plant& plant)
     : lqr_(SolveLqr(config, plant)),
       region_(RegionOfAttraction(lqr_, plant)),
-      limit_(plant.torque_limit) {}
+      steps_(SettleSteps(lqr_, plant) / 2),
+      limit_(plant.torque_limit) {
+  if (region_ > 0) return;
+  throw BadInput(
+      "lqr: found no region of attraction: with these weights it holds the pendulum, if at all, "
+      "only "
+      "from too near to upright");
+}
 
 bool LqrCatch::Holds(const StateVector& deviation, PendulumModel& model) const {
   StateVector x = FromUpright(deviation);
-  for (int step = 0; step < kCatchSteps; ++step) {
+  for (int step = 0; step < steps_; ++step) {
     const StateVector d = UprightDeviation(x);
     const double lean2 = UprightDeviation({x[0] + x[1], 0, 0, 0})[0];
     if (std::abs(d[0]) > kLargestLean || std::abs(lean2) > kLargestLean) return false;
     if (lqr_.Cost(d) <= region_) return true;
-    const double u = std::clamp(lqr_.Torque(d), -limit_, limit_);
+    const double u = lqr_.Torque(d, limit_);
     model.Step({&x, 1}, {&u, 1});
   }
   return false;

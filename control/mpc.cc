@@ -56,16 +56,10 @@ double MpcPolicy::Torque(const StateVector& deviation, size_t env, Memory& memor
   auto& [trajectory, K] = plans.plans[env];
   TrajectoryOptimizer& optimizer = plans.optimizer;
   const auto T = static_cast<size_t>(std::lround(config_.seconds / kControlPeriod));
-  const StateVector x = FromUpright(deviation);
-  if (trajectory.u.empty()) {
-    // The better beginning of two: no torque at all, or the regulator.
+  StateVector x = FromUpright(deviation);
+  const bool first = trajectory.u.empty();
+  if (first) {
     trajectory = optimizer.Follow(cost_, x, std::vector<double>(T, 0.0));
-    const Trajectory upright{std::vector(T + 1, FromUpright(StateVector::Zero())),
-                             std::vector<double>(T, 0.0), 0};
-    Trajectory regulated =
-        optimizer.Follow(cost_, x, upright, std::vector<Eigen::RowVector4d>(T, -lqr_.K));
-    if (regulated.cost < trajectory.cost) trajectory = std::move(regulated);
-    optimizer.Improve(cost_, kTolerance, kFirstIterations, trajectory);
   } else {
     // The rest of the plan, and a last torque as the regulator would choose it.
     const StateVector last = UprightDeviation(trajectory.x.back());
@@ -75,10 +69,17 @@ double MpcPolicy::Torque(const StateVector& deviation, size_t env, Memory& memor
     trajectory.u.push_back(lqr_.Torque(last));
     K.push_back(-lqr_.K);
     // Angles count from where the plan has them.
-    const StateVector now = trajectory.x[0] + UprightDeviation(FromUpright(x - trajectory.x[0]));
-    trajectory = optimizer.Follow(cost_, now, trajectory, K);
-    optimizer.Improve(cost_, 0, static_cast<int>(config_.iterations), trajectory);
+    x = trajectory.x[0] + Difference(x, trajectory.x[0]);
+    trajectory = optimizer.Follow(cost_, x, trajectory, K);
   }
+  // What the regulator would do, where that is better.
+  const Trajectory upright{std::vector<StateVector>(T + 1, x - UprightDeviation(x)),
+                           std::vector<double>(T, 0.0), 0};
+  Trajectory regulated =
+      optimizer.Follow(cost_, x, upright, std::vector<Eigen::RowVector4d>(T, -lqr_.K));
+  if (regulated.cost < trajectory.cost) trajectory = std::move(regulated);
+  optimizer.Improve(cost_, first ? kTolerance : 0,
+                    first ? kFirstIterations : static_cast<int>(config_.iterations), trajectory);
   K = optimizer.gains();
   return trajectory.u[0];
 }

@@ -32,7 +32,7 @@ void PendulumModel::Reserve(ClosedFormBatch& batch, size_t n) const {
 void PendulumModel::Step(std::span<StateVector> x, std::span<const double> u) {
   Reserve(few_, x.size());
   for (size_t i = 0; i < x.size(); ++i) Set(few_, i, x[i], u[i]);
-  Advance(few_, kPhysicsSteps, 0, x.size());
+  Advance(few_, kPhysicsSteps, 0, x.size());  // and what else is in their last vector
   for (size_t i = 0; i < x.size(); ++i) x[i] = Get(few_, i);
 }
 

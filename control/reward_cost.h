@@ -5,11 +5,11 @@
 
 namespace upswing {
 
-/// The task's reward, smooth, as a cost: the most that a step can give (7 with the usual weights)
+/// The task's reward, smooth, as a cost: the most that a step can give (7.5 with the usual weights)
 /// minus what it gives. Where the task asks whether a link is within 30° of upright, a logistic
 /// function of its cosine rises over about `width` instead; the smaller, the truer and the harder
-/// to follow. Second derivatives that curve down are left out. A step's reward is that of the state
-/// that it begins in.
+/// to follow. Second derivatives that curve down are left out, and those by state and torque. A
+/// step's reward is that of the state that it begins in.
 class RewardCost : public TrajectoryCost {
  public:
   RewardCost(const Plant& plant, const RewardWeights& weights, double width)

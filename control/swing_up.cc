@@ -5,9 +5,10 @@ namespace upswing {
 void EnergyShapingConfig::Describe(Options& o) {
   // Of 1,900 tried at random these brought up most starts with the standard motor.
   o.Section("energy");
-  o.Add(&kE, "energy_ke", 0.0018, kNotNegative, "", "weight of the energy's square in V");
-  o.Add(&kD, "energy_kd", 0.00067, kNotNegative, "", "weight of the square of w1 in V");
-  o.Add(&kP, "energy_kp", 0.27, kNotNegative, "", "weight of the square of q1 from upright in V");
+  o.Add(&kE, "energy_ke", 0.0018, kNotNegative, "1/(J²·s)", "weight of the energy's square in V");
+  o.Add(&kD, "energy_kd", 0.00067, kPositive, "s", "weight of the square of w1 in V");
+  o.Add(&kP, "energy_kp", 0.27, kNotNegative, "1/s",
+        "weight of the square of q1 from upright in V");
 }
 
 void PartialFeedbackConfig::Describe(Options& o) {

@@ -9,7 +9,7 @@ namespace upswing {
 
 /// Weights of the energy law.
 struct EnergyShapingConfig {
-  double kE, kD, kP;  // of energy (1/J²), velocity (s²/rad²·J…) and angle of link 1
+  double kE, kD, kP;  // of energy (1/(J²·s)), velocity (s) and angle of link 1 (1/s)
 
   EnergyShapingConfig() { SetDefaults(*this); }
   void Describe(Options& options);
@@ -26,12 +26,15 @@ struct PartialFeedbackConfig {
 /// Drives energy E to that of rest upright and link 1 to upright, so that link 2 swings through
 /// upright again and again: Fantoni, Lozano, Spong, "Energy based control of the Pendubot", IEEE
 /// Transactions on Automatic Control 45 (2000). For V = kE E²/2 + kD w1²/2 + kP q̃1²/2, without
-/// damping, the torque makes dV/dt = -w1².
+/// damping, the torque makes dV/dt = -w1². Its denominator is never 0 only where kD is large
+/// against kE; the standard gains, for a weak motor, pass through 0 on the way up, where the torque
+/// is at its limit and changes sign.
 double EnergyShapingTorque(const EnergyShapingConfig& config, const Manipulator& plant,
                            const StateVector& deviation);
 
 /// Makes q̈1 = -kP q̃1 - kD w1 - kE E w1 by collocated partial feedback linearisation: Spong,
-/// "Partial feedback linearization of underactuated mechanical systems" (IROS 1994).
+/// "Partial feedback linearization of underactuated mechanical systems" (IROS 1994). The last term,
+/// ours, pumps energy.
 double PartialFeedbackTorque(const PartialFeedbackConfig& config, const Manipulator& plant,
                              const StateVector& deviation);
 

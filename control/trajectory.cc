@@ -119,12 +119,14 @@ bool TrajectoryOptimizer::Backward(const TrajectoryCost& cost, const Trajectory&
     const Eigen::Matrix4d Qxx = l.xx + A.transpose() * VA;
     const Eigen::RowVector4d Qux = l.ux.transpose() + B.transpose() * VA;
     const double Quu = l.uu + B.dot(Vxx * B);
+    // As if to change the torque, and the state that it leads to, cost a little more.
     const double curvature = Quu + regularization * (1 + B.squaredNorm());
+    const Eigen::RowVector4d change = Qux + regularization * B.transpose() * A;
     if (!(curvature > 0)) return false;
 
     const double low = -limit - u, high = limit - u, best = -Qu / curvature;
     k_[t] = std::clamp(best, low, high);
-    if (best > low && best < high) K_[t] = -Qux / curvature;
+    if (best > low && best < high) K_[t] = -change / curvature;
     Vx = Qx + K_[t].transpose() * (Quu * k_[t] + Qu) + Qux.transpose() * k_[t];
     const Eigen::Matrix4d KQ = K_[t].transpose() * Qux;
     Vxx = Qxx + Quu * K_[t].transpose() * K_[t] + KQ + KQ.transpose();

@@ -13,27 +13,13 @@
 namespace upswing {
 namespace {
 
-constexpr int kGuesses = 8;
+constexpr int kGuesses = 16;
+/// Control periods of the longest guess: 5 s. What is longer is held upright to its end at first.
+constexpr int kLongestGuess = 250;
 constexpr int kIterations = 300;
 constexpr double kTolerance = 1e-7;  // of the cost, in an iteration
 /// It moves to another place of the plan where that costs less than this share.
 constexpr double kCheaper = 0.25;
-
-/// A sine wave of torque: of any amplitude up to the limit, once in 1 to 2 s.
-std::vector<double> Guess(Rng& rng, int steps, double limit) {
-  const double amplitude = rng.Uniform(0, limit), rate = rng.Uniform(3, 6);
-  const double phase = rng.Uniform(0, 2 * std::numbers::pi);
-  std::vector<double> u;
-  for (int t = 0; t < steps; ++t) {
-    u.push_back(amplitude * std::sin(rate * kControlPeriod * t + phase));
-  }
-  return u;
-}
-
-/// Angles in [-π, π] of a difference of two states.
-StateVector Difference(const StateVector& x, const StateVector& y) {
-  return UprightDeviation(FromUpright(x - y));
-}
 
 }  // namespace
 
@@ -45,6 +31,31 @@ void SwingUpConfig::Describe(Options& o) {
         "share of the motor's torque that the plan leaves to the feedback");
 }
 
+std::optional<Trajectory> GuessSwingUp(const LqrConfig& lqr, const LqrCatch& upright, int steps,
+                                       Rng& rng, TrajectoryOptimizer& optimizer) {
+  const double limit = optimizer.model().plant().torque_limit;
+  const auto length = static_cast<size_t>(rng.Uniform(0.4, 1) * std::min(steps, kLongestGuess));
+  const double amplitude = rng.Uniform(0, limit), rate = rng.Uniform(3, 6);
+  const double phase = rng.Uniform(0, 2 * std::numbers::pi);
+  const double price = std::pow(10, rng.Uniform(-2.5, 0));
+  std::vector<double> torques;
+  for (size_t t = 0; t < length; ++t) {
+    torques.push_back(amplitude * std::sin(rate * kControlPeriod * static_cast<double>(t) + phase));
+  }
+  const QuadraticCost cost(price * lqr.Q(), price * lqr.torque, upright.lqr().P);
+  Trajectory trajectory = optimizer.Follow(cost, StateVector::Zero(), torques);
+  optimizer.Improve(cost, kTolerance, kIterations, trajectory);
+  if (!upright.Holds(UprightDeviation(trajectory.x.back()), optimizer.model())) return {};
+  while (trajectory.steps() < steps) {
+    StateVector x = trajectory.x.back();
+    const double u = upright.lqr().Torque(UprightDeviation(x), limit);
+    optimizer.model().Step({&x, 1}, {&u, 1});
+    trajectory.x.push_back(x);
+    trajectory.u.push_back(u);
+  }
+  return trajectory;
+}
+
 SwingUp PlanSwingUp(const LqrConfig& lqr, const SwingUpConfig& config, const LqrCatch& upright,
                     const Plant& plant) {
   const QuadraticCost cost(lqr.Q(), lqr.torque, upright.lqr().P);
@@ -52,21 +63,24 @@ SwingUp PlanSwingUp(const LqrConfig& lqr, const SwingUpConfig& config, const Lqr
   Plant weaker = plant;
   weaker.torque_limit *= 1 - config.reserve;
   TrajectoryOptimizer optimizer(weaker);
+  PendulumModel model(plant);
   Rng rng(1, "guesses");
   std::optional<Trajectory> best;
   for (int guess = 0; guess < kGuesses; ++guess) {
-    Trajectory trajectory =
-        optimizer.Follow(cost, StateVector::Zero(), Guess(rng, steps, weaker.torque_limit));
+    std::optional<Trajectory> found = GuessSwingUp(lqr, upright, steps, rng, optimizer);
+    if (!found) continue;
+    Trajectory trajectory = TrajectoryOptimizer::Priced(cost, *std::move(found));
     optimizer.Improve(cost, kTolerance, kIterations, trajectory);
-    if (!best || trajectory.cost < best->cost) best = std::move(trajectory);
+    const bool holds = upright.Holds(UprightDeviation(trajectory.x.back()), model);
+    if (holds && (!best || trajectory.cost < best->cost)) best = std::move(trajectory);
   }
-
-  PendulumModel model(plant);
-  if (!upright.Holds(UprightDeviation(best->x.back()), model)) {
+  if (!best) {
     throw BadInput(Concat("tvlqr: found no swing-up of ", Rounded(config.seconds), " s with ",
-                          Rounded(weaker.torque_limit), " N·m that ends where lqr catches"));
+                          Rounded(weaker.torque_limit),
+                          " N·m that ends where lqr catches; --tvlqr-seconds allows for a longer "
+                          "one, --tvlqr-reserve 0 for all of the motor"));
   }
-  return Tracking(std::move(*best), lqr, upright.lqr().P, model);
+  return Tracking(*std::move(best), lqr, upright.lqr().P, model);
 }
 
 SwingUp Tracking(Trajectory trajectory, const LqrConfig& lqr, const Eigen::Matrix4d& P,
@@ -97,40 +111,47 @@ std::string TvlqrPolicy::description() const {
                 " s, followed by a time-varying linear-quadratic regulator");
 }
 
+/// Where some environments are, and a plant to look ahead with.
+struct TvlqrPolicy::Places : MemoryOf<Place> {
+  Places(int num_envs, const Plant& plant) : MemoryOf<Place>(num_envs, Place()), model(plant) {}
+
+  PendulumModel model;
+};
+
 std::unique_ptr<Policy::Memory> TvlqrPolicy::Start(int num_envs) const {
-  return std::make_unique<MemoryOf<Place>>(num_envs, Place());
+  return std::make_unique<Places>(num_envs, plant());
 }
 
-double TvlqrPolicy::Cost(const StateVector& deviation, const Place& place) const {
+StateVector TvlqrPolicy::OffPlan(const StateVector& deviation, const Place& place) const {
   const auto t = static_cast<size_t>(place.step);
-  const StateVector planned = UprightDeviation(place.sign * plan_.trajectory.x[t]);
-  const StateVector d = Difference(deviation, planned);
-  return d.dot(plan_.P[t] * d);
+  return Difference(deviation, UprightDeviation(place.sign * plan_.trajectory.x[t]));
 }
 
 double TvlqrPolicy::Torque(const StateVector& deviation, size_t env, Memory& memory) const {
-  Place& place = static_cast<MemoryOf<Place>&>(memory).past[env];
+  auto& places = static_cast<Places&>(memory);
+  Place& place = places.past[env];
   const int T = plan_.trajectory.steps();
-  double cost = std::numeric_limits<double>::infinity();
-  if (place.step >= 0) {
-    place.step = std::min(place.step + 1, T);
-    cost = Cost(deviation, place);
+  if (upright_.Holds(deviation, places.model)) {
+    place = {T, 1};
+    return upright_.lqr().Torque(deviation);
   }
+  const auto cost = [&](const Place& there) {
+    const StateVector d = OffPlan(deviation, there);
+    return d.dot(plan_.P[static_cast<size_t>(there.step)] * d);
+  };
+  double now = std::numeric_limits<double>::infinity();
+  if (place.step >= 0 && ++place.step < T) now = cost(place);
   Place nearest;
   double least = std::numeric_limits<double>::infinity();
   for (const double sign : {1.0, -1.0}) {
-    for (int t = 0; t <= T; ++t) {
-      const Place other{t, sign};
-      const double there = Cost(deviation, other);
-      if (there < least) std::tie(nearest, least) = std::tuple(other, there);
+    for (int t = 0; t < T; ++t) {
+      const double there = cost({t, sign});
+      if (there < least) std::tie(nearest, least) = std::tuple(Place{t, sign}, there);
     }
   }
-  if (least < kCheaper * cost) place = nearest;
-  if (place.step == T) return upright_.lqr().Torque(deviation);
-
+  if (least < kCheaper * now) place = nearest;
   const auto t = static_cast<size_t>(place.step);
-  const StateVector planned = UprightDeviation(place.sign * plan_.trajectory.x[t]);
-  return place.sign * plan_.trajectory.u[t] - plan_.K[t].dot(Difference(deviation, planned));
+  return place.sign * plan_.trajectory.u[t] - plan_.K[t].dot(OffPlan(deviation, place));
 }
 
 }  // namespace upswing

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "control/lqr_catch.h"
 #include "control/trajectory.h"
+#include "core/rng.h"
 
 namespace upswing {
 
@@ -31,15 +33,21 @@ struct SwingUp {
 SwingUp Tracking(Trajectory trajectory, const LqrConfig& lqr, const Eigen::Matrix4d& P,
                  PendulumModel& model);
 
-/// The best of the plans that trajectory optimisation finds from eight first guesses (sine waves of
-/// torque), and the regulator about it. Throws as SolveLqr, and BadInput if no plan ends where
-/// `upright` catches.
+/// A swing-up from hanging of so many control periods, held upright from wherever it is, that
+/// trajectory optimisation finds from a random guess: a sine wave of torque of any amplitude, once
+/// in 1 to 2 s, of any length, and any price of the way against that of its end. Nothing if that
+/// does not end where `upright` catches.
+std::optional<Trajectory> GuessSwingUp(const LqrConfig& lqr, const LqrCatch& upright, int steps,
+                                       Rng& rng, TrajectoryOptimizer& optimizer);
+
+/// The best of the plans that GuessSwingUp finds in sixteen tries, improved, and the regulator
+/// about it. Throws as SolveLqr, and BadInput if no plan ends where `upright` catches.
 SwingUp PlanSwingUp(const LqrConfig& lqr, const SwingUpConfig& config, const LqrCatch& upright,
                     const Plant& plant);
 
-/// Follows a planned swing-up, or its mirror image, with feedback, then holds upright with the
-/// regulator. Where it begins, and whenever it is pushed off, it enters the plan where that costs
-/// least.
+/// Follows a planned swing-up, or its mirror image, with feedback, and holds upright with the
+/// regulator wherever that catches. Where it begins, and whenever it is pushed off, it enters the
+/// plan where that costs least.
 class TvlqrPolicy : public PendulumController {
  public:
   /// Throws as PlanSwingUp. Takes about half a second.
@@ -53,13 +61,14 @@ class TvlqrPolicy : public PendulumController {
  private:
   /// Where an environment is on the plan.
   struct Place {
-    int step = -1;    // of the plan; T: at its end, upright; -1: not begun
+    int step = -1;    // of the plan; T: upright; -1: not begun
     double sign = 1;  // -1: on its mirror image
   };
+  struct Places;
 
   double Torque(const StateVector& deviation, size_t env, Memory& memory) const override;
-  /// What it costs to be at a deviation from upright instead of that place.
-  double Cost(const StateVector& deviation, const Place& place) const;
+  /// From that place of the plan to a deviation from upright.
+  StateVector OffPlan(const StateVector& deviation, const Place& place) const;
 
   LqrCatch upright_;
   SwingUp plan_;

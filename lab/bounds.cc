@@ -38,11 +38,21 @@ void BoundsConfig::Describe(Options& o) {
         "swing-ups from hanging that the search begins with");
 }
 
+void CheckComparable(const LoadedPolicy& loaded, const BoundsConfig& config) {
+  if (loaded.task != kDoublePendulum || !loaded.mjcf.empty()) {
+    throw BadInput(
+        Concat("bounds: expected policies of the built-in double pendulum, got ", loaded.name));
+  }
+  const Plant searched = TrialEnvironments(config.trial, nullptr).plants.front();
+  const Plant judged = TrialEnvironments(config.trial, &loaded).plants.front();
+  if (PlantValues(searched) == PlantValues(judged)) return;
+  throw BadInput(Concat("bounds: expected a policy for ", PlantText(searched), ", got ",
+                        loaded.name, " for ", PlantText(judged), "; --set chooses the plant"));
+}
+
 EpisodeBounds FindBounds(const BoundsConfig& config, ThreadPool& pool,
                          const std::function<void(double)>& progress) {
   const EnvConfig env = TrialEnvironments(config.trial, nullptr);
-  if (!env.mjcf.empty())
-    throw BadInput("--model: expected none, as the search knows the built-in model");
   const Plant& plant = env.plants.front();
   const EvaluationRule rule = SpecOf(env).evaluation;
   const auto n = static_cast<size_t>(config.episodes);

@@ -38,6 +38,9 @@ struct EpisodeBounds {
 EpisodeBounds FindBounds(const BoundsConfig& config, ThreadPool& pool,
                          const std::function<void(double)>& progress);
 
+/// Throws BadInput unless the policy is judged on the plant that the search knows.
+void CheckComparable(const LoadedPolicy& loaded, const BoundsConfig& config);
+
 /// A row for each episode.
 std::string BoundsCsv(const EpisodeBounds& bounds);
 

@@ -114,6 +114,10 @@ bool IsController(const std::string& name) {
   return std::ranges::any_of(kControllers, [&](const Controller& c) { return name == c.name; });
 }
 
+bool HasSection(const std::string& controller, const std::string& section) {
+  return section == "lqr" || section == controller;
+}
+
 std::shared_ptr<const Policy> MakeController(const std::string& name,
                                              const ControllerConfig& config) {
   for (const Controller& controller : kControllers) {

@@ -34,6 +34,10 @@ std::vector<std::string> ControllerNames();
 
 bool IsController(const std::string& name);
 
+/// Whether a controller has the settings of this section: its own, and those of lqr, on which all
+/// build.
+bool HasSection(const std::string& controller, const std::string& section);
+
 /// Throws BadInput if there is no controller of this name, or none for this plant.
 std::shared_ptr<const Policy> MakeController(const std::string& name,
                                              const ControllerConfig& config);

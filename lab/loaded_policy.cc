@@ -88,11 +88,60 @@ Plant TrainingPlant(const PolicyInfo& info, const std::string& where) {
   return plant;
 }
 
+/// Which controller a setting is of.
+std::string SectionOf(const FlagValue& flag) {
+  ControllerConfig config;
+  return OptionsOf(config).Find(flag.name, FlagOf(flag.name)).front()->section;
+}
+
+/// What a policy that swings up was trained on. Throws BadInput that names the flag.
+Plant PlantOfSwingUp(const std::string& name) {
+  LoadedPolicy loaded;
+  try {
+    loaded = LoadPolicy(name);
+  } catch (const Error& error) {
+    throw Error(error.exit_code(), Concat("--swing-up: ", error.what()));
+  }
+  if (loaded.mjcf.empty()) return loaded.plant;
+  throw BadInput(Concat("--swing-up: expected a policy of the built-in model, got ", name,
+                        ", which was trained on another"));
+}
+
 }  // namespace
+
+std::vector<LoadedPolicy> GetPolicies(const std::vector<std::string>& names,
+                                      const PolicyArguments& controllers) {
+  for (const FlagValue& flag : controllers.flags) {
+    const auto has = [&](const std::string& name) {
+      return IsController(name) && HasSection(name, SectionOf(flag));
+    };
+    if (std::ranges::any_of(names, has)) continue;
+    const std::string got = names.empty() ? "none" : Join(names, ", ");
+    throw BadInput(
+        Concat(FlagOf(flag.name), ": expected the controller ", SectionOf(flag), ", got ", got));
+  }
+  if (!controllers.made_for.empty() && std::ranges::none_of(names, IsController)) {
+    throw BadInput(Concat("--made-for: expected a controller (", Join(ControllerNames(), ", "),
+                          ") to set, got ", names.empty() ? "none" : Join(names, ", ")));
+  }
+  std::vector<LoadedPolicy> policies;
+  for (const std::string& name : names) {
+    PolicyArguments one{name, {}, {}};
+    if (IsController(name)) {
+      one.made_for = controllers.made_for;
+      std::ranges::copy_if(controllers.flags, std::back_inserter(one.flags),
+                           [&](const auto& flag) { return HasSection(name, SectionOf(flag)); });
+    }
+    policies.push_back(GetPolicy(one));
+  }
+  return policies;
+}
 
 LoadedPolicy GetPolicy(const PolicyArguments& a) {
   ControllerConfig config;
   SetFlags(OptionsOf(config), a.flags);
+  if (a.name == "hybrid" && !config.swing_up.empty())
+    config.plant = PlantOfSwingUp(config.swing_up);
   ApplyChanges(OptionsOf(config.plant), a.made_for, "--made-for");
   const bool is_controller = IsController(a.name), is_path = fs::exists(a.name);
   if (is_controller && is_path) {
@@ -100,6 +149,12 @@ LoadedPolicy GetPolicy(const PolicyArguments& a) {
                           a.name, " is the file; for the controller, rename that"));
   }
   if (is_controller) {
+    for (const FlagValue& flag : a.flags) {
+      const std::string section = SectionOf(flag);
+      if (HasSection(a.name, section)) continue;
+      throw BadInput(
+          Concat(FlagOf(flag.name), ": expected the controller ", section, ", got ", a.name));
+    }
     return {TitleOf(a.name, config), "",           MakeController(a.name, config),
             kDoublePendulum,         config.plant, ""};
   }

@@ -44,6 +44,11 @@ struct PolicyArguments {
 /// the name can mean both, or if settings of a controller are given for what is none.
 LoadedPolicy GetPolicy(const PolicyArguments& a);
 
+/// The policies of these names, each a PolicyArguments::name. Settings of controllers go to those
+/// among them that have such; throws BadInput if none has.
+std::vector<LoadedPolicy> GetPolicies(const std::vector<std::string>& names,
+                                      const PolicyArguments& controllers);
+
 /// Loads a policy file, or the best policy of a run folder. Throws BadInput, too, where the file
 /// says of its task what this program cannot do: another control period, other observations.
 LoadedPolicy LoadPolicy(const std::filesystem::path& path);
