@@ -243,9 +243,11 @@ export class LearnPanel {
     const at = session ? Infinity : scrubber.step;
     const success = course.evaluations.findLast(({ step }) => step <= at)?.success;
     const count = (number: number | undefined) => number?.toLocaleString('en') ?? '–';
+    const counted = (of: 'episodeCount' | 'updates') =>
+      count(session ? (session.last?.[of] ?? 0) : undefined);
     write('steps', count(session ? session.steps : scrubber.step));
-    write('trials', count(session?.last?.episodeCount));
-    write('updates', count(session?.last?.updates));
+    write('trials', counted('episodeCount'));
+    write('updates', counted('updates'));
     write('rate', session ? session.updatesPerSecond.toFixed(0) : '–');
     write('time', session ? `${session.seconds.toFixed(1)} s` : '–');
     write('success', success === undefined ? '–' : `${(100 * success).toFixed(0)}%`);
