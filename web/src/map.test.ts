@@ -39,29 +39,32 @@ function direct(map: ValueMap, column: number, row: number): number {
   return map.quantity === 'torque' ? decision!.torque : valueOf(decision!);
 }
 
-test.each(['d3qn', 'sac', 'd3qn-randomized'])('%s: the map is what it decides there', (agent) => {
-  world.policy = new Policy(readPolicy(agent));
-  world.plant = { ...NOMINAL, mass2: 1.1 };
-  world.reset(STATE);
-  const map = new ValueMap(6);
-  for (const [x, y, quantity] of [
-    ['q1', 'q2', 'value'],
-    ['w1', 'q1', 'value'],
-    ['w2', 'w1', 'torque'],
-  ] as const) {
-    Object.assign(map, { x: AXES[x], y: AXES[y], quantity });
-    map.clear();
-    expect(map.work(world, 1e9)).toEqual(STATE);
-    for (const [column, row] of [
-      [0, 0],
-      [5, 0],
-      [2, 3],
-      [5, 5],
+test.each(['d3qn', 'sac', 'd3qn-adaptive', 'd3qn-randomized'])(
+  '%s: the map is what it decides there',
+  (agent) => {
+    world.policy = new Policy(readPolicy(agent));
+    world.plant = { ...NOMINAL, mass2: 1.1 };
+    world.reset(STATE);
+    const map = new ValueMap(6);
+    for (const [x, y, quantity] of [
+      ['q1', 'q2', 'value'],
+      ['w1', 'q1', 'value'],
+      ['w2', 'w1', 'torque'],
     ] as const) {
-      expect(map.cells![row * 6 + column]).toBe(Math.fround(direct(map, column, row)));
+      Object.assign(map, { x: AXES[x], y: AXES[y], quantity });
+      map.clear();
+      expect(map.work(world, 1e9)).toEqual(STATE);
+      for (const [column, row] of [
+        [0, 0],
+        [5, 0],
+        [2, 3],
+        [5, 5],
+      ] as const) {
+        expect(map.cells![row * 6 + column]).toBe(Math.fround(direct(map, column, row)));
+      }
     }
-  }
-});
+  },
+);
 
 test('it is computed in slices, all of the state at which it was begun', () => {
   world.policy = new Policy(readPolicy('fast'));

@@ -39,16 +39,28 @@ function expectTrajectory(moments: Moment[], rows: number[][], tolerance: number
   });
 }
 
-test.each(['d3qn', 'd3qn-randomized'])('%s acts as in `upswing simulate`', (id) => {
-  agentOn(id);
-  expectTrajectory(run(5), simulate(policyPath(id), '--seconds', '5'), 1e-6);
-});
+test.each(['d3qn', 'd3qn-adaptive', 'd3qn-randomized'])(
+  '%s acts as in `upswing simulate`',
+  (id) => {
+    agentOn(id);
+    expectTrajectory(run(5), simulate(policyPath(id), '--seconds', '5'), 1e-6);
+  },
+);
 
 test('another plant, too', () => {
   agentOn('d3qn');
   world.plant = { ...NOMINAL, mass2: 1.1, damping1: 0.15, torque_limit: 4 };
   const other = ['mass2=1.1', 'damping1=0.15', 'torque_limit=4'].flatMap((s) => ['--set', s]);
   expectTrajectory(run(5), simulate(policyPath('d3qn'), '--seconds', '5', ...other), 1e-6);
+});
+
+test('an agent identifies a plant of which it is not told, with a motor that is late', () => {
+  agentOn('d3qn-adaptive');
+  world.plant = { ...NOMINAL, mass2: 0.75, torque_limit: 4 };
+  world.disturbance.delay = 2;
+  world.reset();
+  const flags = ['--set', 'mass2=0.75', '--set', 'torque_limit=4', '--delay', '0.04'];
+  expectTrajectory(run(5), simulate(policyPath('d3qn-adaptive'), '--seconds', '5', ...flags), 1e-6);
 });
 
 test('what is remembered is what was chosen, also where the motor cannot give it', () => {

@@ -39,9 +39,11 @@ test('the first 5 s are those of `upswing simulate`: states and torques', async 
 
 test('another agent can be chosen, and has its own text, curve and mark', async ({ page }) => {
   await open(page);
-  await page.locator('#agent').selectOption('d3qn-randomized');
-  await expect(page.locator('#agent-text')).toContainText('random pendulums');
-  await expect(page.locator('#agent-command')).toContainText('--agent d3qn-randomized');
+  await page.locator('#agent').selectOption('d3qn-adaptive');
+  await expect(page.locator('#agent-text')).toContainText(
+    'identifies its pendulum, trained on random pendulums',
+  );
+  await expect(page.locator('#agent-command')).toContainText('--agent d3qn-adaptive');
   const width = () =>
     page.locator('.slider:has(#mass1) .trained').evaluate((mark) => mark.clientWidth);
   const wide = await width();

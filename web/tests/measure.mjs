@@ -41,7 +41,7 @@ async function measure(page) {
   };
   await page.click('#agent-on');
   const one = await run();
-  await page.selectOption('#twin', 'd3qn-randomized');
+  await page.selectOption('#twin', 'd3qn-adaptive');
   const two = await run();
   return { ...start, kilobytes: sizes.reduce((sum, size) => sum + size) / 1000, one, two };
 }

@@ -23,9 +23,9 @@ async function swingUp(page) {
   await page.evaluate(stop);
 }
 
-/// A heavier pendulum, held upright by the randomised agent, is pulled at its tip.
+/// A heavier pendulum, held upright by the adaptive agent, is pulled at its tip.
 async function pull(page) {
-  await page.goto(`${server.address}#agent=d3qn-randomized&mass2=1.2&length1=0.55&on=1`);
+  await page.goto(`${server.address}#agent=d3qn-adaptive&mass2=1.2&length1=0.55&on=1`);
   await ready(page);
   await page.waitForFunction(() => (upswing.world.uprightFor ?? 0) > 3);
   await page.evaluate(() => {

@@ -171,7 +171,7 @@ test('the agent fails below 0.85 kg, the one that learned on many does not', asy
   await page.getByRole('button', { name: 'Next' }).click();
   expect(await held(page, 20)).toBeLessThan(5);
   await page.getByRole('radio', { name: 'on many' }).check();
-  await expect(page.locator('#agent')).toHaveValue('d3qn-randomized');
+  await expect(page.locator('#agent')).toHaveValue('d3qn-adaptive');
   expect(await page.evaluate(() => upswing.world.plant.mass2)).toBe(0.75);
   expect(await held(page, 20)).toBeGreaterThan(10); // from where the other one left it
   await expect(answer(page)).toContainText('It holds');

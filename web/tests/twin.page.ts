@@ -51,14 +51,14 @@ test('with the same agent they stay together to the bit, whatever happens to the
   expect(await page.evaluate(() => upswing.world.twin)).toBeNull();
 });
 
-test('a link brings both agents, and the randomised one holds what the other cannot', async ({
+test('a link brings both agents, and the adaptive one holds what the other cannot', async ({
   page,
 }) => {
   await open(page, '#everything');
   await page.getByRole('link', { name: 'Both side by side' }).click();
-  await expect(page.locator('#twin-name')).toHaveText('Randomised Dueling Double DQN');
+  await expect(page.locator('#twin-name')).toHaveText('Adaptive Dueling Double DQN');
   await expect(page.locator('#first-name')).toHaveText('Dueling Double DQN');
-  await expect(page).toHaveURL(/twin=d3qn-randomized/);
+  await expect(page).toHaveURL(/twin=d3qn-adaptive/);
   await startFrom(page, 0);
   const { first, twin } = await run(page, 20);
   expect(first.upright).toBeLessThan(5);

@@ -47,6 +47,7 @@ const TITLES = new Map([
   ['double-dqn', 'Double DQN'],
   ['dueling-dqn', 'Dueling DQN'],
   ['fast', 'Fast: a small network'],
+  ['d3qn-adaptive', 'Adaptive Dueling Double DQN'],
   ['d3qn-randomized', 'Randomised Dueling Double DQN'],
   ['sac', 'SAC: any torque'],
   ['sac-fast', 'SAC: a small network'],
@@ -68,6 +69,7 @@ function describe(policy: Policy): string {
   return [
     policy.controller.text,
     policy.memory > 0 ? `, remembers ${policy.memory} steps` : '',
+    policy.identifies ? ', identifies its pendulum' : '',
     randomized ? ', trained on random pendulums' : '',
     '.',
   ].join('');

@@ -41,7 +41,7 @@ export interface Step {
 }
 
 const NOMINAL_AGENT = 'd3qn';
-const RANDOMIZED_AGENT = 'd3qn-randomized';
+const ADAPTIVE_AGENT = 'd3qn-adaptive';
 const LIGHT = 0.75; // kg
 const HELD = 2; // s upright that count as balanced
 const FAILED = 10; // s without, that count as failed
@@ -182,19 +182,19 @@ function many(stage: Stage): Step {
   const input = (id: string) => choice.querySelector<HTMLInputElement>(`[value=${id}]`)!;
   const plant = { ...NOMINAL, mass2: LIGHT };
   choice.addEventListener('change', () => {
-    const agent = input(RANDOMIZED_AGENT).checked ? RANDOMIZED_AGENT : NOMINAL_AGENT;
+    const agent = input(ADAPTIVE_AGENT).checked ? ADAPTIVE_AGENT : NOMINAL_AGENT;
     void stage.take({ agent, plant, on: true });
   });
   return {
     id: 'many',
-    agents: [NOMINAL_AGENT, RANDOMIZED_AGENT],
+    agents: [NOMINAL_AGENT, ADAPTIVE_AGENT],
     labels: () => [{ at: 'link2', text: `${LIGHT} kg` }],
     async begin() {
       input(NOMINAL_AGENT).checked = true;
       await stage.begin({ agent: NOMINAL_AGENT, plant, on: true });
     },
     answer(world) {
-      if (!input(RANDOMIZED_AGENT).checked) return 'The agent of before fails again and again.';
+      if (!input(ADAPTIVE_AGENT).checked) return 'The agent of before fails again and again.';
       return heldFor(world) > HELD
         ? 'It holds: it feels out which pendulum it has, and balances that one.'
         : 'It takes over …';
