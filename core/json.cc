@@ -10,7 +10,7 @@ namespace {
 
 using nlohmann::json;
 
-Error Unexpected(const std::string& name, const std::string& expected, const json& got) {
+Error Unexpected(std::string_view name, const std::string& expected, const json& got) {
   const std::string text = got.dump(-1, ' ', false, json::error_handler_t::replace);
   return BadInput(Concat("\"", name, "\": expected ", expected, ", got ", text));
 }
@@ -39,38 +39,38 @@ json ParseJsonObject(std::string_view text, int max_depth) {
   return object;
 }
 
-const json& JsonMember(const json& object, const std::string& name) {
+const json& JsonMember(const json& object, std::string_view name) {
   const auto found = object.find(name);
   if (found == object.end()) throw BadInput(Concat("expected \"", name, "\", found none"));
   return *found;
 }
 
-int64_t JsonInteger(const json& object, const std::string& name, int64_t low, int64_t high) {
+int64_t JsonInteger(const json& object, std::string_view name, int64_t low, int64_t high) {
   const json& member = JsonMember(object, name);
   const std::optional<int64_t> value = JsonInteger(member);
   if (value && *value >= low && *value <= high) return *value;
   throw Unexpected(name, Concat("an integer in [", low, ", ", high, "]"), member);
 }
 
-double JsonNumber(const json& object, const std::string& name) {
+double JsonNumber(const json& object, std::string_view name) {
   const json& member = JsonMember(object, name);
   if (!member.is_number()) throw Unexpected(name, "a number", member);
   return member.get<double>();
 }
 
-bool JsonBool(const json& object, const std::string& name) {
+bool JsonBool(const json& object, std::string_view name) {
   const json& member = JsonMember(object, name);
   if (!member.is_boolean()) throw Unexpected(name, "true or false", member);
   return member.get<bool>();
 }
 
-const std::string& JsonText(const json& object, const std::string& name) {
+const std::string& JsonText(const json& object, std::string_view name) {
   const json& member = JsonMember(object, name);
   if (!member.is_string()) throw Unexpected(name, "a text", member);
   return member.get_ref<const std::string&>();
 }
 
-const json& JsonList(const json& object, const std::string& name, size_t max_size) {
+const json& JsonList(const json& object, std::string_view name, size_t max_size) {
   const json& member = JsonMember(object, name);
   if (member.is_array() && member.size() <= max_size) return member;
   throw Unexpected(name, Concat("a list of at most ", max_size), member);

@@ -18,14 +18,13 @@ std::optional<int64_t> JsonInteger(const nlohmann::json& value);
 nlohmann::json ParseJsonObject(std::string_view text, int max_depth = 3);
 
 /// Members of an object that must exist; integers are in [low, high].
-const nlohmann::json& JsonMember(const nlohmann::json& object, const std::string& name);
-int64_t JsonInteger(const nlohmann::json& object, const std::string& name, int64_t low,
-                    int64_t high);
-double JsonNumber(const nlohmann::json& object, const std::string& name);
-bool JsonBool(const nlohmann::json& object, const std::string& name);
-const std::string& JsonText(const nlohmann::json& object, const std::string& name);
+const nlohmann::json& JsonMember(const nlohmann::json& object, std::string_view name);
+int64_t JsonInteger(const nlohmann::json& object, std::string_view name, int64_t low, int64_t high);
+double JsonNumber(const nlohmann::json& object, std::string_view name);
+bool JsonBool(const nlohmann::json& object, std::string_view name);
+const std::string& JsonText(const nlohmann::json& object, std::string_view name);
 /// A list of at most `max_size` values.
-const nlohmann::json& JsonList(const nlohmann::json& object, const std::string& name,
+const nlohmann::json& JsonList(const nlohmann::json& object, std::string_view name,
                                size_t max_size);
 
 /// A document as the program prints it: indented, ASCII alone, U+FFFD for bytes that are not UTF-8.
