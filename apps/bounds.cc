@@ -66,9 +66,11 @@ int RunBounds(const BoundsArguments& a) {
   const std::vector<LoadedPolicy> policies = GetPolicies(a.policies, {"", a.flags, MadeFor(a)});
   for (const LoadedPolicy& loaded : policies) CheckComparable(loaded, a.config);
   ThreadPool pool(ResolveThreads(a.threads));
-  EpisodeProgress progress(static_cast<double>(a.config.episodes), a.as_json);
-  const EpisodeBounds bounds =
-      FindBounds(a.config, pool, [&](double share) { progress.Show(share); });
+  const EpisodeBounds bounds = [&] {
+    // A guess is an episode from hanging.
+    EpisodeProgress progress(static_cast<double>(a.config.guesses + a.config.episodes), a.as_json);
+    return FindBounds(a.config, pool, [&](double share) { progress.Show(share); });
+  }();
 
   std::vector<Row> rows;
   const auto add = [&](const std::string& name, const BestEpisodes& best) {
@@ -78,8 +80,11 @@ int RunBounds(const BoundsArguments& a) {
   add("any torque", bounds.any);
   add(fmt::format("{} torques", a.config.torques), bounds.table);
   for (const LoadedPolicy& loaded : policies) {
+    EpisodeProgress judged(static_cast<double>(a.config.episodes), a.as_json);
     const Evaluation figures =
-        EvaluatePolicy(loaded, a.config.trial, a.config.episodes, pool, {}).figures;
+        EvaluatePolicy(loaded, a.config.trial, a.config.episodes, pool, [&](double share) {
+          judged.Show(share);
+        }).figures;
     rows.push_back({loaded.name, figures, figures.swing_up_seconds});
   }
   if (!a.csv.empty()) WriteOutput(a.csv, BoundsCsv(bounds));

@@ -35,9 +35,11 @@ int RunEval(const EvalArguments& a) {
   if (!a.episodes_csv.empty()) CheckWritable("--episodes-csv", a.episodes_csv);
   const LoadedPolicy loaded = GetPolicy(a.policy);
   ThreadPool pool(ResolveThreads(a.threads));
-  EpisodeProgress progress(a.episodes, a.as_json);
-  const EvalReport report = EvaluatePolicy(loaded, a.trial, a.episodes, pool,
-                                           [&](double share) { progress.Show(share); });
+  const EvalReport report = [&] {
+    EpisodeProgress progress(a.episodes, a.as_json);  // gone when the table is printed
+    return EvaluatePolicy(loaded, a.trial, a.episodes, pool,
+                          [&](double share) { progress.Show(share); });
+  }();
   if (!a.episodes_csv.empty()) WriteOutput(a.episodes_csv, EpisodesCsv(report));
   if (to_output) return 0;  // the rows alone, for a reader
   if (a.as_json) {

@@ -53,6 +53,11 @@ class EvalTest(ProgramTest):
         self.assertEqual(result["disturbance"], {"sensor_noise": 0, "delay": 0})
         self.assertEqual(set(result["randomize"].values()), {0})
 
+    def test_on_a_terminal_the_bar_is_gone_when_the_table_comes(self):
+        lines = self.screen("eval", self.policy, "--episodes", 40, "--threads", 1)
+        self.assertEqual([line for line in lines if "episodes/s" in line], [])
+        self.assertIn("success", lines[2])
+
     def test_numbers_are_plausible(self):
         result = self.evaluate()
         self.assertEqual(result["success_rate"], result["successes"] / 10)

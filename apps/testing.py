@@ -260,6 +260,19 @@ class ProgramTest(unittest.TestCase):
             self.assertRegex(shown, pattern)
         return shown
 
+    def screen(self, *arguments):
+        """Runs the program on a terminal; returns the lines that it left there, escapes obeyed."""
+        terminal, its_end = pty.openpty()
+        with subprocess.Popen([UPSWING, *map(str, arguments)], cwd=self.folder, stdin=its_end,
+                              stdout=its_end, stderr=its_end) as process:
+            os.close(its_end)
+            shown = ""
+            while piece := self.read_terminal(terminal):
+                shown += piece
+            os.close(terminal)
+        self.assertEqual(process.returncode, 0, shown)
+        return [line.rsplit("\x1b[K", 1)[-1] for line in shown.replace("\r\n", "\n").split("\n")]
+
     def read_terminal(self, terminal):
         """What comes next; nothing when its other end is closed."""
         try:

@@ -43,45 +43,49 @@ bool IsBetter(const BestEpisode& one, const BestEpisode& other, Aim aim) {
 
 }  // namespace
 
-BestEpisodeSearch::BestEpisodeSearch(const Plant& plant, std::vector<double> levels, int guesses)
-    : plant_(plant), levels_(std::move(levels)), upright_(LqrConfig(), plant), optimizer_(plant) {
+BestEpisodeSearch::BestEpisodeSearch(const Plant& plant, int guesses,
+                                     const std::function<void()>& progress)
+    : plant_(plant), upright_(LqrConfig(), plant), optimizer_(plant) {
   const LqrConfig lqr;
   Rng rng(1, "guesses");
   std::optional<Trajectory> best;
   double most = 0;
   for (int guess = 0; guess < guesses; ++guess) {
-    const auto found = GuessSwingUp(lqr, upright_, kPlannedSteps, rng, optimizer_);
-    if (!found) continue;
-    Trajectory trajectory = Sharpen(*found, WeightsOf(Aim::kReturn));
-    const double reward_sum = Judge(StateVector::Zero(), trajectory.u).reward_sum;
-    if (best && reward_sum <= most) continue;
-    most = reward_sum;
-    best = std::move(trajectory);
+    if (const auto found = GuessSwingUp(lqr, upright_, kPlannedSteps, rng, optimizer_)) {
+      Trajectory trajectory = Sharpen(*found, WeightsOf(Aim::kReturn));
+      const double reward_sum = Judge(StateVector::Zero(), trajectory.u).reward_sum;
+      if (!best || reward_sum > most) {
+        most = reward_sum;
+        best = std::move(trajectory);
+      }
+    }
+    if (progress) progress();
   }
   if (!best) {
     throw BadInput(Concat("found no swing-up of this plant with ", Rounded(plant.torque_limit),
                           " N·m from ", guesses, " guesses"));
   }
   from_hanging_ = *std::move(best);
+  gains_ = Tracking(from_hanging_, lqr, upright_.lqr().P, optimizer_.model()).K;
 }
 
-double BestEpisodeSearch::Nearest(double torque) const {
-  if (levels_.empty()) return std::clamp(torque, -plant_.torque_limit, plant_.torque_limit);
-  return *std::ranges::min_element(levels_, {}, [&](double u) { return std::abs(u - torque); });
+double BestEpisodeSearch::Nearest(double torque, const TorqueTable& table) const {
+  if (table.empty()) return std::clamp(torque, -plant_.torque_limit, plant_.torque_limit);
+  return *std::ranges::min_element(table, {}, [&](double u) { return std::abs(u - torque); });
 }
 
-double BestEpisodeSearch::Hold(const StateVector& deviation) const {
-  return Nearest(upright_.lqr().Torque(deviation));
+double BestEpisodeSearch::Hold(const StateVector& deviation, const TorqueTable& table) const {
+  return Nearest(upright_.lqr().Torque(deviation), table);
 }
 
 Trajectory BestEpisodeSearch::Sharpen(const Trajectory& trajectory, const RewardWeights& weights) {
   Trajectory now = trajectory, best = trajectory;
-  double most = Judge(trajectory.x[0], trajectory.u, weights).reward_sum;
+  double most = Judge(trajectory.x[0], trajectory.u, {}, weights).reward_sum;
   for (const double width : kWidths) {
     const RewardCost cost(plant_, weights, width);
     now = TrajectoryOptimizer::Priced(cost, std::move(now));
     optimizer_.Improve(cost, kTolerance, kIterations, now);
-    const double reward_sum = Judge(now.x[0], now.u, weights).reward_sum;
+    const double reward_sum = Judge(now.x[0], now.u, {}, weights).reward_sum;
     if (reward_sum > most) std::tie(most, best) = std::tuple(reward_sum, now);
   }
   return best;
@@ -89,6 +93,7 @@ Trajectory BestEpisodeSearch::Sharpen(const Trajectory& trajectory, const Reward
 
 std::vector<BestEpisode> BestEpisodeSearch::Judge(const StateVector& start,
                                                   std::span<const std::vector<double>> torques,
+                                                  const TorqueTable& table,
                                                   const RewardWeights& weights) {
   std::vector<BestEpisode> episodes;
   for (const auto& sequence : torques) episodes.push_back({start, sequence});
@@ -96,7 +101,7 @@ std::vector<BestEpisode> BestEpisodeSearch::Judge(const StateVector& start,
   std::vector<double> u(torques.size());
   for (size_t t = 0; t < kReturnSteps; ++t) {
     for (size_t i = 0; i < x.size(); ++i) {
-      u[i] = t < torques[i].size() ? torques[i][t] : Hold(UprightDeviation(x[i]));
+      u[i] = t < torques[i].size() ? torques[i][t] : Hold(UprightDeviation(x[i]), table);
     }
     optimizer_.model().Step(x, u);
     for (size_t i = 0; i < x.size(); ++i) {
@@ -111,7 +116,8 @@ std::vector<BestEpisode> BestEpisodeSearch::Judge(const StateVector& start,
   return episodes;
 }
 
-std::vector<double> BestEpisodeSearch::Round(const Trajectory& trajectory) {
+std::vector<double> BestEpisodeSearch::Round(const Trajectory& trajectory,
+                                             const TorqueTable& table) {
   const LqrConfig lqr;
   const std::vector<Eigen::RowVector4d> K =
       Tracking(trajectory, lqr, upright_.lqr().P, optimizer_.model()).K;
@@ -120,24 +126,24 @@ std::vector<double> BestEpisodeSearch::Round(const Trajectory& trajectory) {
   for (size_t t = 0; t < K.size(); ++t) {
     const StateVector deviation = UprightDeviation(x);
     if (upright_.lqr().Cost(deviation) < upright_.region()) break;
-    torques.push_back(Nearest(trajectory.u[t] - K[t].dot(x - trajectory.x[t])));
+    torques.push_back(Nearest(trajectory.u[t] - K[t].dot(x - trajectory.x[t]), table));
     optimizer_.model().Step({&x, 1}, {&torques.back(), 1});
   }
   return torques;
 }
 
-BestEpisode BestEpisodeSearch::Polish(BestEpisode episode, Aim aim) {
+BestEpisode BestEpisodeSearch::Polish(BestEpisode episode, const TorqueTable& table, Aim aim) {
   for (int change = 0; change < kChanges; ++change) {
     std::vector<std::vector<double>> changed;
     for (size_t t = 0; t < episode.torques.size(); ++t) {
-      for (const double level : levels_) {
+      for (const double level : table) {
         if (level == episode.torques[t]) continue;
         changed.push_back(episode.torques);
         changed.back()[t] = level;
       }
     }
     bool better = false;
-    for (BestEpisode& other : Judge(episode.start, changed, RewardWeights())) {
+    for (BestEpisode& other : Judge(episode.start, changed, table, RewardWeights())) {
       if (!IsBetter(other, episode, aim)) continue;
       episode = std::move(other);
       better = true;
@@ -147,27 +153,37 @@ BestEpisode BestEpisodeSearch::Polish(BestEpisode episode, Aim aim) {
   return episode;
 }
 
-BestEpisode BestEpisodeSearch::From(const StateVector& start, Aim aim) {
+BestEpisode BestEpisodeSearch::WithTable(const Trajectory& trajectory, const TorqueTable& table,
+                                         Aim aim) {
+  const StateVector& start = trajectory.x[0];
+  if (table.empty()) return Judge(start, trajectory.u);
+  return Polish(Judge(start, Round(trajectory, table), table), table, aim);
+}
+
+std::vector<BestEpisodeSearch::Found> BestEpisodeSearch::From(const StateVector& start,
+                                                              std::span<const TorqueTable> tables) {
   // From here the same torques, and those of the mirror image, under feedback.
   const LqrConfig lqr;
   const QuadraticCost cost(lqr.Q(), lqr.torque, upright_.lqr().P);
-  std::optional<BestEpisode> best;
+  std::vector<Eigen::RowVector4d> feedback;
+  for (const Eigen::RowVector4d& K : gains_) feedback.push_back(-K);
+  std::vector<Found> best(tables.size());
   for (const double sign : {1.0, -1.0}) {
     Trajectory planned = from_hanging_;
     for (StateVector& x : planned.x) x *= sign;
     for (double& u : planned.u) u *= sign;
-    std::vector<Eigen::RowVector4d> K =
-        Tracking(planned, lqr, upright_.lqr().P, optimizer_.model()).K;
-    for (Eigen::RowVector4d& gain : K) gain = -gain;
-    Trajectory trajectory = optimizer_.Follow(cost, start, planned, K);
+    Trajectory trajectory = optimizer_.Follow(cost, start, planned, feedback);
     optimizer_.Improve(cost, kTolerance, kIterations, trajectory);
-    trajectory = Sharpen(trajectory, WeightsOf(Aim::kReturn));
-    if (aim == Aim::kTime) trajectory = Sharpen(trajectory, WeightsOf(aim));
-    BestEpisode episode =
-        levels_.empty() ? Judge(start, trajectory.u) : Polish(Judge(start, Round(trajectory)), aim);
-    if (!best || IsBetter(episode, *best, aim)) best = std::move(episode);
+    for (const Aim aim : {Aim::kReturn, Aim::kTime}) {
+      trajectory = Sharpen(trajectory, WeightsOf(aim));
+      for (size_t i = 0; i < tables.size(); ++i) {
+        BestEpisode& most = aim == Aim::kReturn ? best[i].of_return : best[i].of_time;
+        BestEpisode episode = WithTable(trajectory, tables[i], aim);
+        if (sign == 1 || IsBetter(episode, most, aim)) most = std::move(episode);
+      }
+    }
   }
-  return *std::move(best);
+  return best;
 }
 
 }  // namespace upswing

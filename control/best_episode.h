@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -23,22 +24,29 @@ struct BestEpisode {
 /// What a search is after.
 enum class Aim { kReturn, kTime };
 
+/// The torques (N·m) that a motor has, ascending; empty: any within its limit.
+using TorqueTable = std::vector<double>;
+
 /// Finds episodes of one plant. By continuation: box-DDP on the regulator's cost from sine waves of
 /// many lengths, then on the reward itself, smooth at first and sharper each time (RewardCost). For
 /// a table of torques the result is rounded under feedback, and each step's torque is then changed
 /// as long as that helps.
 class BestEpisodeSearch {
  public:
-  /// `levels`: the torques that there are (N·m), ascending; empty: any within the limit. Searches
-  /// from hanging with `guesses` sine waves. Throws as SolveLqr, and BadInput if none swings up.
-  BestEpisodeSearch(const Plant& plant, std::vector<double> levels, int guesses);
+  /// Searches from hanging with `guesses` sine waves, and calls `progress` (may be empty) after
+  /// each. Throws as SolveLqr, and BadInput if none swings up.
+  BestEpisodeSearch(const Plant& plant, int guesses, const std::function<void()>& progress);
 
-  /// The best that is found of an episode from `start`, beginning with what is best from hanging
-  /// and its mirror image.
-  BestEpisode From(const StateVector& start, Aim aim);
+  /// Of an episode, the best for either aim.
+  struct Found {
+    BestEpisode of_return, of_time;
+  };
+  /// The best that is found of an episode from `start` with each of these tables, beginning with
+  /// what is best from hanging and its mirror image.
+  std::vector<Found> From(const StateVector& start, std::span<const TorqueTable> tables);
 
-  /// The torque (N·m) with which the regulator holds upright: limited, and one of the levels.
-  double Hold(const StateVector& deviation) const;
+  /// The torque (N·m) of the table with which the regulator holds upright.
+  double Hold(const StateVector& deviation, const TorqueTable& table) const;
 
   const Plant& plant() const { return plant_; }
 
@@ -48,33 +56,37 @@ class BestEpisodeSearch {
   /// The episodes of some sequences of torques from one start.
   std::vector<BestEpisode> Judge(const StateVector& start,
                                  std::span<const std::vector<double>> torques,
-                                 const RewardWeights& weights);
+                                 const TorqueTable& table, const RewardWeights& weights);
   BestEpisode Judge(const StateVector& start, const std::vector<double>& torques,
-                    const RewardWeights& weights = {}) {
-    return Judge(start, {&torques, 1}, weights)[0];
+                    const TorqueTable& table = {}, const RewardWeights& weights = {}) {
+    return Judge(start, {&torques, 1}, table, weights)[0];
   }
+  /// The trajectory's episode with the torques of the table.
+  BestEpisode WithTable(const Trajectory& trajectory, const TorqueTable& table, Aim aim);
   /// The nearest torques of the table, under feedback about the trajectory, up to the regulator's
   /// region of attraction.
-  std::vector<double> Round(const Trajectory& trajectory);
+  std::vector<double> Round(const Trajectory& trajectory, const TorqueTable& table);
   /// Changes one torque of the table at a time, at most a hundred times, while that makes a better
   /// episode.
-  BestEpisode Polish(BestEpisode episode, Aim aim);
-  double Nearest(double torque) const;
+  BestEpisode Polish(BestEpisode episode, const TorqueTable& table, Aim aim);
+  double Nearest(double torque, const TorqueTable& table) const;
 
   Plant plant_;
-  std::vector<double> levels_;
   LqrCatch upright_;
   TrajectoryOptimizer optimizer_;
-  Trajectory from_hanging_;  // with the best return
+  Trajectory from_hanging_;                // with the best return
+  std::vector<Eigen::RowVector4d> gains_;  // K about it: u - K (x - x_t)
 };
 
 /// Acts as an episode says, then holds upright; for one environment.
 class EpisodePolicy : public PendulumController {
  public:
-  EpisodePolicy(BestEpisode episode, const BestEpisodeSearch& search)
+  /// `search` and `table` outlive it.
+  EpisodePolicy(BestEpisode episode, const BestEpisodeSearch& search, const TorqueTable& table)
       : PendulumController("best-episode", Options(), search.plant()),
         episode_(std::move(episode)),
-        search_(search) {}
+        search_(search),
+        table_(table) {}
 
   std::string description() const override { return "the best episode that was found"; }
   std::unique_ptr<Memory> Start(int num_envs) const override {
@@ -84,11 +96,13 @@ class EpisodePolicy : public PendulumController {
  private:
   double Torque(const StateVector& deviation, size_t env, Memory& memory) const override {
     size_t& step = static_cast<MemoryOf<size_t>&>(memory).past[env];
-    return step < episode_.torques.size() ? episode_.torques[step++] : search_.Hold(deviation);
+    return step < episode_.torques.size() ? episode_.torques[step++]
+                                          : search_.Hold(deviation, table_);
   }
 
   BestEpisode episode_;
   const BestEpisodeSearch& search_;
+  const TorqueTable& table_;
 };
 
 }  // namespace upswing

@@ -20,11 +20,6 @@ std::unique_ptr<VectorEnv> OneEpisode(EnvConfig config, int index) {
   return MakeEnv(config);
 }
 
-EvaluationEpisode Judged(const EnvConfig& config, int index, const BestEpisode& episode,
-                         const BestEpisodeSearch& search) {
-  return EvaluateEpisodes(EpisodePolicy(episode, search), *OneEpisode(config, index)).front();
-}
-
 double SwingUpSeconds(const EvaluationEpisode& e, const EvaluationRule& rule) {
   return e.swing_up_seconds.value_or(rule.seconds);
 }
@@ -57,29 +52,34 @@ EpisodeBounds FindBounds(const BoundsConfig& config, ThreadPool& pool,
   const EvaluationRule rule = SpecOf(env).evaluation;
   const auto n = static_cast<size_t>(config.episodes);
 
-  // Two searches share the work of the pool; the rest is an episode at a time.
-  std::vector<std::unique_ptr<BestEpisodeSearch>> searches(2);
-  pool.ParallelFor(2, [&](int i) {
-    const auto levels =
-        i == 0 ? std::vector<double>() : TorqueLevels(plant.torque_limit, config.torques);
-    searches[static_cast<size_t>(i)] =
-        std::make_unique<BestEpisodeSearch>(plant, levels, static_cast<int>(config.guesses));
-  });
+  const std::vector<TorqueTable> tables{{}, TorqueLevels(plant.torque_limit, config.torques)};
+  // An episode takes about as long as a guess.
+  const double work = static_cast<double>(config.guesses + config.episodes);
+  double done = 0;
+  std::mutex mutex;
+  const auto show = [&] {
+    const std::lock_guard lock(mutex);
+    if (progress) progress(++done / work);
+  };
+  const BestEpisodeSearch search(plant, static_cast<int>(config.guesses), show);
+
   const BestEpisodes none{std::vector<EvaluationEpisode>(n), std::vector<EvaluationEpisode>(n)};
   EpisodeBounds bounds{rule, std::vector<std::vector<double>>(n), none, none};
-  std::mutex mutex;
-  size_t done = 0;
   pool.ParallelFor(static_cast<int>(n), [&](int index) {
     const auto i = static_cast<size_t>(index);
     std::vector<double>& start = bounds.starts[i];
     start.resize(4);
     OneEpisode(env, index)->GetState(0, start);
-    for (const bool table : {true, false}) {
-      BestEpisodeSearch search = *searches[table ? 1 : 0];  // its buffers are not for two threads
-      const StateVector x(start.data());
-      BestEpisodes& best = table ? bounds.table : bounds.any;
-      best.of_return[i] = Judged(env, index, search.From(x, Aim::kReturn), search);
-      best.of_time[i] = Judged(env, index, search.From(x, Aim::kTime), search);
+    BestEpisodeSearch own = search;  // its buffers are not for two threads
+    const auto found = own.From(StateVector(start.data()), tables);
+    for (size_t k = 0; k < tables.size(); ++k) {
+      const auto judged = [&](const BestEpisode& episode) {
+        return EvaluateEpisodes(EpisodePolicy(episode, own, tables[k]), *OneEpisode(env, index))
+            .front();
+      };
+      BestEpisodes& best = k == 0 ? bounds.any : bounds.table;
+      best.of_return[i] = judged(found[k].of_return);
+      best.of_time[i] = judged(found[k].of_time);
     }
     // Torques of the table are torques.
     EvaluationEpisode& most = bounds.any.of_return[i];
@@ -88,9 +88,7 @@ EpisodeBounds FindBounds(const BoundsConfig& config, ThreadPool& pool,
     if (SwingUpSeconds(bounds.table.of_time[i], rule) < SwingUpSeconds(fastest, rule)) {
       fastest = bounds.table.of_time[i];
     }
-    const std::lock_guard lock(mutex);
-    ++done;
-    if (progress) progress(static_cast<double>(done) / static_cast<double>(n));
+    show();
   });
   return bounds;
 }
