@@ -6,7 +6,7 @@
 
 Takes the runs of a study with very many seeds for the truth, draws small studies from them again and
 again, and counts what each would have said: that the better agent is better, that the worse one is, or
-that nothing can be said. Writes seeds.csv and, by gnuplot, seeds.svg and seeds.png.
+that nothing can be said. Writes seeds.csv and, by gnuplot, SCORE.svg and SCORE.png for each score.
 """
 
 import argparse
@@ -44,6 +44,16 @@ def welch(x, y, _rng):
     return np.sign(t) * (two_sided_t(np.nan_to_num(np.abs(t)), np.nan_to_num(freedom, nan=1)) < LEVEL)
 
 
+def effect(x, y):
+    """Cohen's d: the difference of the means over the standard deviation within the groups."""
+    return (x.mean() - y.mean()) / math.sqrt((x.var(ddof=1) + y.var(ddof=1)) / 2)
+
+
+def seeds_for(d):
+    """Seeds of each agent with which a test at 5% finds an effect of d in 80% of the studies."""
+    return math.ceil(2 * (1.959963984540054 + 0.8416212335729143) ** 2 / max(d * d, 1e-12)) + 1
+
+
 def two_sided_t(t, freedom):
     """P(|T| > t) by Simpson's rule over the angle θ = atan(t / √ν), where T's density is cos^(ν-1) θ."""
     steps = 400
@@ -69,13 +79,16 @@ def mann_whitney(x, y, _rng):
     return np.sign(off) * (z > 1.959963984540054)
 
 
-def bootstrap(x, y, rng, resamples=1000):
-    """Whether the 95% interval of the difference of IQMs, a percentile bootstrap, is without 0."""
-    low, high = np.empty(len(x)), np.empty(len(x))
-    for k, (a, b) in enumerate(zip(x, y)):
-        drawn = (interquartile_mean(a[rng.integers(len(a), size=(resamples, len(a)))])
-                 - interquartile_mean(b[rng.integers(len(b), size=(resamples, len(b)))]))
-        low[k], high[k] = np.quantile(drawn, [0.025, 0.975])
+def interval(a, b, rng, resamples=1000):
+    """The 95% interval of the difference of two groups' IQMs: a percentile bootstrap."""
+    drawn = (interquartile_mean(a[rng.integers(len(a), size=(resamples, len(a)))])
+             - interquartile_mean(b[rng.integers(len(b), size=(resamples, len(b)))]))
+    return np.quantile(drawn, [0.025, 0.975])
+
+
+def bootstrap(x, y, rng):
+    """Whether the 95% interval of the difference of IQMs is without 0."""
+    low, high = np.array([interval(a, b, rng) for a, b in zip(x, y)]).T
     return np.where(low > 0, 1, np.where(high < 0, -1, 0))
 
 
@@ -123,18 +136,21 @@ def count(x, y, truth, a):
                 (said == -truth).mean() if truth else (said != 0).mean())
 
 
-def plot(rows, groups, sizes, file):
+def plot(rows, groups, a, file):
     """The share of wrong conclusions over the number of seeds, a panel for each comparison."""
-    columns = 2
-    lines = [f"set terminal {'svg' if file.suffix == '.svg' else 'pngcairo'} size 900,"
-             f"{300 * math.ceil(len(groups) / columns)} font 'sans,11'",
-             f"set output '{file}'", f"set multiplot layout {math.ceil(len(groups) / columns)},{columns}",
-             "set logscale x", f"set xtics ({', '.join(map(str, sizes))})", "set yrange [0:50]",
-             "set xlabel 'seeds'", "set ylabel 'wrong (%)'", "set grid lc rgb '#d8d8d8'",
-             "set key top right samplen 2 spacing 0.9"]
+    columns = 3
+    layout = f"{math.ceil(len(groups) / columns)},{columns}"
+    lines = [f"set terminal {'svg' if file.suffix == '.svg' else 'pngcairo'} size 1200,"
+             f"{320 * math.ceil(len(groups) / columns)} font 'sans,12' background 'white'",
+             f"set output '{file}'", f"set multiplot layout {layout}", "set logscale x",
+             f"set xtics ({', '.join(map(str, a.sizes))})", "set yrange [0:50]",
+             f"set xrange [{0.8 * min(a.sizes)}:{1.25 * max(a.sizes)}]",
+             "set xlabel 'seeds of each agent'", "set ylabel 'wrong conclusions (%)'",
+             "set grid lt 1 lw 1 lc rgb '#d0d0d0'", "set key top right samplen 2 spacing 0.9"]
     colors = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"]
     for index, group in enumerate(groups):
-        lines += [f"set title {group!r}", "unset key" if index else ""]
+        title = group if index == 0 else f"{a.baseline} or {group}"
+        lines += [f"set title '{title}'", "unset key" if index else ""]
         curves = []
         for color, name in zip(colors, STATISTICS):
             points = "\n".join(f"{r[1]} {100 * r[5]}" for r in rows if r[0] == group and r[2] == name)
@@ -145,41 +161,55 @@ def plot(rows, groups, sizes, file):
     subprocess.run(["gnuplot"], input="\n".join(lines) + "\n", text=True, check=True)
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", type=Path, help="a study's, with runs.csv")
-    parser.add_argument("--baseline", default="fast", help="what the others are compared with")
-    parser.add_argument("--score", default="solve_steps", help="a column of runs.csv")
-    parser.add_argument("--sizes", default="3,5,10,30", help="seeds of the small studies")
-    parser.add_argument("--draws", type=int, default=2000, help="small studies of each size")
-    parser.add_argument("--out", type=Path, help="folder for seeds.csv, seeds.svg and seeds.png")
-    a = parser.parse_args()
-    a.sizes = [int(n) for n in a.sizes.split(",")]
-    groups = read(a.folder, a.score)
+def compare(groups, score, a):
+    """Prints and returns the rows of all comparisons with the baseline."""
     if a.baseline not in groups:
         sys.exit(f"how_many: --baseline: expected one of {', '.join(groups)}, got {a.baseline}")
     for name, scores in groups.items():
         if len(scores) < 2 * max(a.sizes):
             sys.exit(f"how_many: {name}: expected at least {2 * max(a.sizes)} runs, got {len(scores)}")
     base = groups.pop(a.baseline)
+    print(f"{score}: {a.baseline}: IQM {interquartile_mean(base):,.6g} over {len(base)} seeds, "
+          f"standard deviation {base.std(ddof=1):,.6g}\n")
     rows = []
-    print(f"{a.baseline}: IQM of {a.score} {interquartile_mean(base):,.6g} over {len(base)} seeds")
     for name, scores in [(f"{a.baseline} against itself", base), *groups.items()]:
-        difference = interquartile_mean(base) - interquartile_mean(scores)
-        truth = np.sign(difference)
-        print(f"\n{name}: IQM {interquartile_mean(scores):,.6g}, {-difference:+,.6g}")
-        print(f"  {'seeds':>5}  {'statistic':<24}{'right':>8}{'undecided':>11}{'wrong':>8}")
-        for n, statistic, right, undecided, wrong in count(base, scores, truth, a):
+        difference = interquartile_mean(scores) - interquartile_mean(base)
+        print(f"{name}: IQM {interquartile_mean(scores):,.6g}", end="")
+        if scores is not base:
+            low, high = interval(scores, base, np.random.default_rng(1))
+            d = effect(scores, base)
+            print(f", {difference:+,.6g} (95% interval {low:+,.6g} to {high:+,.6g}); d = {d:.2f}: for 80% "
+                  f"right Welch's t needs some {seeds_for(d):,} seeds", end="")
+        print(f"\n  {'seeds':>5}  {'statistic':<24}{'right':>8}{'undecided':>11}{'wrong':>8}")
+        for n, statistic, right, undecided, wrong in count(base, scores, -np.sign(difference), a):
             rows.append((name, n, statistic, right, undecided, wrong))
             print(f"  {n:>5}  {statistic:<24}{right:>8.1%}{undecided:>11.1%}{wrong:>8.1%}")
+        print()
+    return rows
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path, help="a study's, with runs.csv")
+    parser.add_argument("--baseline", default="fast", help="what the others are compared with")
+    parser.add_argument("--scores", default="solve_steps,best_return", help="columns of runs.csv")
+    parser.add_argument("--sizes", default="3,5,10,30,100", help="seeds of the small studies")
+    parser.add_argument("--draws", type=int, default=2000, help="small studies of each size")
+    parser.add_argument("--out", type=Path, help="folder for seeds.csv and the figures")
+    a = parser.parse_args()
+    a.sizes = [int(n) for n in a.sizes.split(",")]
+    a.scores = a.scores.split(",")
+    rows = {score: compare(read(a.folder, score), score, a) for score in a.scores}
     if a.out:
         a.out.mkdir(parents=True, exist_ok=True)
         with open(a.out / "seeds.csv", "w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
-            writer.writerow(["comparison", "seeds", "statistic", "right", "undecided", "wrong"])
-            writer.writerows(rows)
-        for ending in (".svg", ".png"):
-            plot(rows, list(dict.fromkeys(row[0] for row in rows)), a.sizes, a.out / f"seeds{ending}")
+            writer.writerow(["score", "comparison", "seeds", "statistic", "right", "undecided", "wrong"])
+            writer.writerows((score, *row) for score in a.scores for row in rows[score])
+        for score in a.scores:
+            groups = list(dict.fromkeys(row[0] for row in rows[score]))
+            for ending in ("svg", "png"):
+                plot(rows[score], groups, a, a.out / f"{score}.{ending}")
 
 
 if __name__ == "__main__":
