@@ -184,7 +184,7 @@ void AddGym(CLI::App& program, Command& command) {
       "  ./upswing realaigym --search better.safetensors --from pendubot.safetensors --alone 0\n"
       "  ./upswing realaigym --search acrobot.safetensors --robot acrobot --seed 2\n"
       "  ./upswing realaigym pendubot.safetensors --csv sim_swingup.csv --json\n"
-      "  ./upswing realaigym lqr                                    the baselines' regulator\n");
+      "  ./upswing realaigym baseline-lqr                           the baselines' regulator\n");
   app->callback([a, &command] { command = [a] { return RunGym(*a); }; });
 }
 

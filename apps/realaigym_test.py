@@ -110,9 +110,9 @@ class RealAIGym(ProgramTest):
         self.refuse(["realaigym", POLICY, "--robot", "acrobot"], "--robot", "joint 1")
 
     def test_the_baselines_regulator_does_not_swing_up(self):
-        found = json.loads(self.succeed("realaigym", "lqr", "--json"))
+        found = json.loads(self.succeed("realaigym", "baseline-lqr", "--json"))
         self.assertEqual((found["performance"]["score"], found["robustness"]["score"]), (0, 0))
-        self.assertIn("does not swing up", self.succeed("realaigym", "lqr", "--robot", "acrobot"))
+        self.assertIn("does not swing up", self.succeed("realaigym", "baseline-lqr", "--robot", "acrobot"))
 
     def test_bad_input(self):
         self.search()
@@ -122,11 +122,11 @@ class RealAIGym(ProgramTest):
         refuse(["realaigym", "p.safetensors", "--hidden", 8], "--hidden", "--search")
         refuse(["realaigym", "nothing.safetensors"], "nothing.safetensors: no such file")
         refuse(["realaigym", "--search", "no/where"], "--search", "no")
-        refuse(["realaigym", "lqr", "--robot", "cartpole"], "--robot", "pendubot or acrobot")
+        refuse(["realaigym", "baseline-lqr", "--robot", "cartpole"], "--robot", "pendubot or acrobot")
         refuse(["realaigym", "--search", "x", "--hidden", 7], "--hidden")
         refuse(["realaigym", "--search", "x", "--population", 5], "--population")
-        refuse(["realaigym", "lqr", "--csv", "-", "--json"], "--json")
-        refuse(["realaigym", "lqr", "--figure", "rows.txt"], "rows.txt")
+        refuse(["realaigym", "baseline-lqr", "--csv", "-", "--json"], "--json")
+        refuse(["realaigym", "baseline-lqr", "--figure", "rows.txt"], "rows.txt")
         metadata, tensors = read_tensors(self.folder / "p.safetensors")
         write_tensors(self.folder / "wrong.safetensors", metadata | {"hidden": "16"}, tensors)
         refuse(["realaigym", "wrong.safetensors"], "wrong.safetensors", "numbers")

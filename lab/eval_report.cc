@@ -1,10 +1,12 @@
 #include "lab/eval_report.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 
 #include "core/json.h"
 #include "core/text.h"
+#include "sim/identification.h"
 
 namespace upswing {
 namespace {
@@ -64,6 +66,9 @@ std::vector<std::pair<std::string, std::string>> Cells(const EvalReport& report,
   for (size_t i = 0; i < episode.start.size(); ++i) add(spec.state_names[i], episode.start[i]);
   if (spec.task == kDoublePendulum) {
     for (const auto& [name, value] : PlantValues(episode.plant)) add(name, value);
+    const auto joint = static_cast<int>(episode.plant.actuated_joint);
+    const double delta = PassiveJointOf(ConstantsOf(episode.plant), joint).delta;
+    add("delta", delta, std::isfinite(delta));
     add("sensor_noise", episode.disturbance.sensor_noise);
     add("delay", episode.disturbance.delay);
   }

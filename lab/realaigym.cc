@@ -8,6 +8,7 @@
 #include <limits>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "core/error.h"
 #include "core/json.h"
@@ -16,6 +17,7 @@
 #include "lab/controllers.h"
 #include "realaigym/linear.h"
 #include "report/figure.h"
+#include "sim/identification.h"
 
 namespace upswing {
 namespace {
@@ -25,8 +27,7 @@ using nlohmann::ordered_json;
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
-/// A policy of the double pendulum on the boards' plant: it sees the observations that it was
-/// trained with, energy and height those of its own plant, and holds a torque for its own period.
+/// See ControllerOf.
 class PolicyController : public GymController {
  public:
   PolicyController(const LoadedPolicy& loaded, size_t count)
@@ -35,7 +36,9 @@ class PolicyController : public GymController {
         size_(static_cast<size_t>(loaded.policy->obs_size())),
         obs_(count * size_),
         action_(count),
-        memory_(loaded.policy->Start(static_cast<int>(count))) {}
+        memory_(loaded.policy->Start(static_cast<int>(count))) {
+    if (loaded.identifies()) identifier_.emplace(loaded.plant, static_cast<int>(count));
+  }
 
   void Act(int step, const GymMeasurement& measured, size_t count, Lanes& torque) override {
     if (step % period_ != 0) return;
@@ -51,20 +54,19 @@ class PolicyController : public GymController {
 
  private:
   void Observe(int step, const GymMeasurement& m, size_t lane) {
+    // As PendulumEnv observes, from the plant of the policy.
     const auto row = std::span(obs_).subspan(lane * size_, size_);
     const std::vector<float> before(row.begin(), row.end());
-    std::ranges::copy(
-        upswing::Observe(loaded_.plant, {m.q1[lane], m.q2[lane], m.w1[lane], m.w2[lane]}),
-        row.begin());
-    if (size_ == kObservationSize || step == 0) return;
-    // As PendulumEnv remembers.
-    const auto entry = row.subspan(kObservationSize, kMemorySize);
-    entry[0] = (row[2] - before[2]) * static_cast<float>(kMaxVelocity1 / kMemoryVelocity);
-    entry[1] = (row[5] - before[5]) * static_cast<float>(kMaxVelocity2 / kMemoryVelocity);
-    entry[2] = static_cast<float>(action_[lane] / kMemoryTorque);
-    std::ranges::copy(
-        std::span(before).subspan(kObservationSize, size_ - kObservationSize - kMemorySize),
-        row.subspan(kObservationSize + kMemorySize).begin());
+    const PendulumState measured{m.q1[lane], m.q2[lane], m.w1[lane], m.w2[lane]};
+    std::ranges::copy(upswing::Observe(loaded_.plant, measured), row.begin());
+    if (identifier_) {
+      const int env = static_cast<int>(lane);
+      if (step == 0) identifier_->Begin(env, measured);
+      if (step > 0) identifier_->Update(env, action_[lane], measured);
+      identifier_->Observe(env, measured, row.subspan(kObservationSize, kIdentifiedSize));
+    }
+    const auto steps = static_cast<int>(loaded_.memory());
+    if (steps > 0 && step > 0) Remember(before, action_[lane], steps, row);
   }
 
   const LoadedPolicy& loaded_;
@@ -73,6 +75,7 @@ class PolicyController : public GymController {
   std::vector<float> obs_;
   std::vector<double> action_;
   std::unique_ptr<Policy::Memory> memory_;
+  std::optional<Identifier> identifier_;
 };
 
 /// The boards' own regulator of the linear model, with the weights of its baselines.
@@ -133,10 +136,15 @@ GymCompetitor CompetitorOf(const GymSearch& search, const std::string& name) {
   return OfSearch(name, {search.net(), search.numbers()});
 }
 
+std::unique_ptr<GymController> ControllerOf(const LoadedPolicy& loaded, size_t count) {
+  return std::make_unique<PolicyController>(loaded, count);
+}
+
 GymCompetitor GetGymCompetitor(const PolicyArguments& a, const std::string& robot) {
-  if (a.name == kGymRegulator && !a.has_settings()) {
+  if (a.name == kGymRegulator && !a.has_settings() && !fs::exists(a.name)) {
     const GymRobot asked = ParseRobot(robot, GymRobot::kPendubot);
-    return {"lqr", asked, [asked](size_t) { return std::make_unique<RegulatorController>(asked); }};
+    return {kGymRegulator, asked,
+            [asked](size_t) { return std::make_unique<RegulatorController>(asked); }};
   }
   if (!IsController(a.name) && fs::is_regular_file(a.name)) {
     const Tensors tensors = LoadTensors(a.name);
@@ -155,8 +163,7 @@ GymCompetitor GetGymCompetitor(const PolicyArguments& a, const std::string& robo
   }
   const auto own = static_cast<GymRobot>(static_cast<int>(loaded->plant.actuated_joint));
   ExpectRobot(loaded->name, own, ParseRobot(robot, own));
-  return {loaded->name, own,
-          [loaded](size_t) { return std::make_unique<PolicyController>(*loaded, kGymBlock); }};
+  return {loaded->name, own, [loaded](size_t) { return ControllerOf(*loaded, kGymBlock); }};
 }
 
 std::vector<GymEntry> PublishedGymEntries(GymRobot robot) {

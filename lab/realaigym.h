@@ -20,8 +20,12 @@ struct GymCompetitor {
   GymControllerMaker make;
 };
 
+/// Acts with a policy of the double pendulum in so many simulations: each 20 ms, on observations as
+/// PendulumEnv makes them of the plant that the policy was made for. `loaded` outlives it.
+std::unique_ptr<GymController> ControllerOf(const LoadedPolicy& loaded, size_t count);
+
 /// The name of the benchmark's regulator, which holds and does not swing up.
-inline constexpr const char* kGymRegulator = "lqr";
+inline constexpr const char* kGymRegulator = "baseline-lqr";
 
 /// The competitor that the arguments name, for this robot ("" : the policy's own). Throws BadInput.
 GymCompetitor GetGymCompetitor(const PolicyArguments& a, const std::string& robot);

@@ -118,6 +118,16 @@ std::array<float, kObservationSize> Observe(const Plant& plant, const PendulumSt
   return result;
 }
 
+void Remember(std::span<const float> before, double torque, int steps, std::span<float> obs) {
+  const size_t first = obs.size() - static_cast<size_t>(steps) * kMemorySize;
+  const auto entry = obs.subspan(first, kMemorySize);
+  entry[0] = (obs[2] - before[2]) * static_cast<float>(kMaxVelocity1 / kMemoryVelocity);
+  entry[1] = (obs[5] - before[5]) * static_cast<float>(kMaxVelocity2 / kMemoryVelocity);
+  entry[2] = static_cast<float>(torque / kMemoryTorque);
+  const auto older = before.subspan(first).first(obs.size() - first - kMemorySize);
+  std::ranges::copy(older, obs.subspan(first + kMemorySize).begin());
+}
+
 ObservationInfo ObservationInfoOf(int64_t memory, bool identified) {
   ObservationInfo observation{
       {"cos q1", "sin q1", "w1", "cos q2", "sin q2", "w2", "energy", "height"},

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -110,6 +111,10 @@ constexpr int MemorySteps(int obs_size, bool identified = false) {
 /// About the velocity that the motor can add in a control period (rad/s), and its usual limit
 /// (N·m).
 inline constexpr double kMemoryVelocity = 1.0, kMemoryTorque = 5.0;
+
+/// Writes the memory of an observation, its last 3 × `steps` numbers; the first ones are there.
+/// `before`: the observation before it, at which the torque (N·m) was chosen.
+void Remember(std::span<const float> before, double torque, int steps, std::span<float> obs);
 
 /// What a policy file says of observations that remember so many steps, and of whose plants are
 /// identified.

@@ -86,6 +86,23 @@ Constants ConstantsOf(const Plant& plant) {
   return constants;
 }
 
+PassiveJoint PassiveJointOf(const Constants& constants, int actuated_joint) {
+  const auto& [J1, J2, b, G1, G2, d1, d2] = constants;
+  const auto growth = [](double inertia, double damping, double gravity) {
+    return (std::sqrt(damping * damping + 4 * inertia * gravity) - damping) / (2 * inertia);
+  };
+  if (actuated_joint == 2) {
+    // Of joint 1, under no torque: M11 q̈1 + d1 q̇1 - (G1 + G2) q1 = -(M12 q̈2 - G2 q2). Both sides
+    // are 0 for one rate where pole and zero are the same: then no torque reaches that mode.
+    const double pole = growth(J1 + J2 + 2 * b, d1, G1 + G2), zero = std::sqrt(G2 / (J2 + b));
+    return {pole, (zero - pole) / (zero + pole)};
+  }
+  // Of link 2 in absolute angles φ1, φ2: n12 φ̈1 + n22 φ̈2 + d2 (φ̇2 - φ̇1) = G2 φ2. Its zero is
+  // z = d2 / n12, by which delta is widened: n12 may be 0.
+  const double n12 = b - kArmature, pole = growth(J2 + kArmature, d2, G2);
+  return {pole, (d2 - pole * n12) / (d2 + pole * n12)};
+}
+
 Falling FallingOf(const Constants& constants, const Plant& motor, const PendulumState& s) {
   const bool at_joint1 = motor.actuated_joint == 1;
   const auto& [J1, J2, b, G1, G2, d1, d2] = constants;
@@ -135,16 +152,7 @@ Falling FallingOf(const Constants& constants, const Plant& motor, const Pendulum
   // The gain that places both poles at their mirror images: Anderson, Moore, section 4.3.
   falling.torque = -2 * (fast + slow) / (fast - slow) * (falling.zeta[0] - falling.zeta[1]);
 
-  // As in control/upright_modes.cc.
-  if (at_joint1) {
-    const double n12 = b - kArmature;
-    const double pole = (std::sqrt(d2 * d2 + 4 * M22 * G2) - d2) / (2 * M22);
-    falling.delta = (d2 - pole * n12) / (d2 + pole * n12);
-  } else {
-    const double pole = (std::sqrt(d1 * d1 + 4 * M11 * G) - d1) / (2 * M11);
-    const double zero = std::sqrt(G2 / M12);
-    falling.delta = (zero - pole) / (zero + pole);
-  }
+  falling.delta = PassiveJointOf(constants, static_cast<int>(motor.actuated_joint)).delta;
   return falling;
 }
 
@@ -272,8 +280,13 @@ void Identifier::Observe(int env, const PendulumState& s, std::span<float> numbe
 }
 
 void Identifier::State(const Archive& archive) {
-  archive.Array("relative", std::span(relative_), {0, kMost});
+  archive.Array("relative", std::span(relative_), {kLeast, kMost});
   archive.Array("covariance", std::span(covariance_));
+  for (size_t first = 0; first < covariance_.size(); first += kCovariance) {
+    for (int k = 0; k < kConstants; ++k) {
+      archive.Check(covariance_[first + At(k, k)] >= 0, "covariance", "variances of at least 0");
+    }
+  }
   archive.Array("last", std::span(last_));
 }
 

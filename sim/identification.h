@@ -20,6 +20,12 @@ using Constants = std::array<double, kConstants>;
 
 Constants ConstantsOf(const Plant& plant);
 
+/// Of the joint without a motor, upright; see UprightModes.
+struct PassiveJoint {
+  double pole, delta;
+};
+PassiveJoint PassiveJointOf(const Constants& constants, int actuated_joint);
+
 /// How the pendulum falls from upright with these constants. Each of the two unstable modes has a
 /// coordinate z, a weighted sum of the state, that moves by itself: ż = rate z + gain u. A motor
 /// of limit u* can return z as long as |rate z| < gain u*; zeta = rate z / (gain u*) has this
@@ -34,9 +40,13 @@ struct Falling {
 /// `motor` gives the joint and the limit of the torque.
 Falling FallingOf(const Constants& constants, const Plant& motor, const PendulumState& s);
 
-/// What identification adds to an observation: each constant relative to the nominal plant's, over
-/// kConstantScale; δ and tanh(0.1 / δ); the energy, 0 hanging and 1 upright; of upright
-/// ζ / (1 + |ζ|) for both modes and the torque within ±1, see Falling.
+/// What identification adds to an observation, 13 numbers:
+///   7  each constant's deviation from the nominal plant's as a share of it, over kConstantScale;
+///      one that is nominally 0, as without damping, stays so
+///   2  δ, within ±1, and tanh(0.1 / δ)
+///   1  energy, 0 hanging at rest and 1 upright
+///   2  ζ / (1 + |ζ|) of the faster and of the slower mode, see Falling
+///   1  Falling::torque, within ±1
 static_assert(kIdentifiedSize == kConstants + 6);
 extern const std::array<float, kIdentifiedSize> kIdentifiedMirrorSigns;
 

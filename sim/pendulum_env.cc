@@ -128,17 +128,6 @@ void PendulumEnv::SpreadRows(std::vector<float>& table) const {
   }
 }
 
-void PendulumEnv::Remember(int env, double torque, std::span<float> obs) const {
-  const auto before = Row(obs_, env);
-  const size_t first = obs.size() - static_cast<size_t>(config_.memory) * kMemorySize;
-  const auto entry = obs.subspan(first, kMemorySize);
-  entry[0] = (obs[2] - before[2]) * static_cast<float>(kMaxVelocity1 / kMemoryVelocity);
-  entry[1] = (obs[5] - before[5]) * static_cast<float>(kMaxVelocity2 / kMemoryVelocity);
-  entry[2] = static_cast<float>(torque / kMemoryTorque);
-  const auto older = before.subspan(first).first(obs.size() - first - kMemorySize);
-  std::ranges::copy(older, obs.subspan(first + kMemorySize).begin());
-}
-
 void PendulumEnv::Randomize(int env) {
   const auto i = static_cast<size_t>(env);
   const Randomization& random = config_.randomization;
@@ -220,7 +209,7 @@ void PendulumEnv::Step(std::span<const double> torque, StepResult& result) {
         identifier_->Observe(env, measured, next_obs.subspan(kObservationSize, kIdentifiedSize));
       }
     }
-    if (config_.memory > 0) Remember(env, torque[i], next_obs);
+    if (config_.memory > 0) Remember(Row(obs_, env), torque[i], config_.memory, next_obs);
     if (result.terminated[i]) StandIn(env, result);
     result.truncated[i] = step_counts_[i] >= episode_steps_ && !result.terminated[i] ? 1 : 0;
   }

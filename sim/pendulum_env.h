@@ -104,8 +104,6 @@ class PendulumEnv : public SeededEnv {
   std::array<float, kObservationSize> Observation(int env, const PendulumState& measured) const;
   /// Moves rows of kObservationSize numbers to where those of an observation with memory begin.
   void SpreadRows(std::vector<float>& table) const;
-  /// Fills the memory of a new observation (D), given the torque chosen for the last step, N·m.
-  void Remember(int env, double torque, std::span<float> obs) const;
   /// Puts the environments that are held back into their states.
   void RestoreHeld();
   /// Replaces the result of a step that blew up, or that was not made: the successor by the last

@@ -3,8 +3,8 @@
 
     tools/upright_modes.py POLICY|RUN ... [--episodes 1000] [--share 0.25] [--seed 1] [--physics mujoco]
 
-Where delta (docs/control.md) is 0, no torque of joint 1 reaches one of the two modes in which the upright
-pendulum falls. Each episode has a plant from a box of ± SHARE, as in `upswing eval --randomize`. Needs
+Where delta (docs/control.md) is 0, no torque reaches one of the two modes in which the upright pendulum
+falls. Each episode has a plant from a box of ± SHARE, as in `upswing eval --randomize`. Needs
 a built program (./upswing --version).
 """
 import argparse
@@ -14,27 +14,7 @@ import pathlib
 import subprocess
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-ARMATURE, RADIUS = 0.01, 0.04  # kg·m², m; sim/double_pendulum.h
 EDGES = [0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, math.inf]
-
-
-def inertia_across(m, l):
-    """Of a solid capsule (kg·m²); sim/double_pendulum.cc, CapsuleInertia."""
-    cylinder, sphere = math.pi * RADIUS**2 * l, 4 / 3 * math.pi * RADIUS**3
-    mc = m * cylinder / (cylinder + sphere)
-    ms = m - mc
-    return (mc * (3 * RADIUS**2 + l**2) / 12
-            + ms * (2 * RADIUS**2 / 5 + l**2 / 4 + 3 * l * RADIUS / 8))
-
-
-def delta(plant):
-    """(z - p) / (z + p) of link 2 with its zero z and its pole p; control/upright_modes.cc."""
-    m, l1, l2, d = (plant[name] for name in ("mass2", "length1", "length2", "damping2"))
-    coupling = m * l1 * l2 / 2 - ARMATURE
-    inertia = inertia_across(m, l2) + m * l2**2 / 4 + ARMATURE
-    moment = m * plant["gravity"] * l2 / 2
-    pole = (math.sqrt(d**2 + 4 * inertia * moment) - d) / (2 * inertia)
-    return (d - pole * coupling) / (d + pole * coupling)
 
 
 def episodes(policy, a):
@@ -45,7 +25,7 @@ def episodes(policy, a):
                          stdout=subprocess.PIPE, text=True).stdout
     rows = [{name: float(text or "nan") for name, text in row.items()}
             for row in csv.DictReader(out.splitlines())]
-    return [(abs(delta(row)), row["success"]) for row in rows]
+    return [(abs(row["delta"]), row["success"]) for row in rows]
 
 
 def main():
