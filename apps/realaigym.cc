@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <memory>
@@ -76,13 +78,13 @@ GymCompetitor Search(const GymArguments& a, ThreadPool& pool) {
   {
     ProgressLine line;
     while (search.Step(&pool, report)) {
-      const std::string text =
-          fmt::format("generation {:4}  S {:.3f}  random simulations {:5.1f}%", report.generation,
-                      PerformanceScore(report.nominal), 100 * report.reached);
-      if (line.due())
-        line.Show(static_cast<double>(report.generation) / search.generations(), {text});
       constexpr int kEvery = 50;
-      if (!a.as_json && (report.generation % kEvery == 0)) line.Print(text);
+      const bool prints = !a.as_json && report.generation % kEvery == 0;
+      if (!prints && !line.due()) continue;
+      const std::string text = fmt::format("generation {:4}  S {:.3f}", report.generation,
+                                           PerformanceScore(search.Nominal()));
+      line.Show(static_cast<double>(report.generation) / search.generations(), {text});
+      if (prints) line.Print(text);
     }
   }
   const double seconds =
@@ -103,8 +105,9 @@ int RunGym(const GymArguments& a) {
   if (!searches && !a.from.empty()) throw BadInput("--from: expected --search FILE with it");
   std::string robot;
   for (const FlagValue& flag : a.search) {
-    if (!a.from.empty() && (flag.name == "robot" || flag.name == "hidden")) {
-      throw BadInput(Concat(FlagOf(flag.name), ": expected none, as --from has its own"));
+    constexpr std::array kOfFrom{"robot", "hidden", "starts", "alone", "first_population"};
+    if (!a.from.empty() && std::ranges::count(kOfFrom, flag.name) > 0) {
+      throw BadInput(Concat(FlagOf(flag.name), ": expected none, as --from begins with a policy"));
     }
     if (flag.name == "robot") robot = flag.text;
     if (searches || flag.name == "robot") continue;
@@ -181,7 +184,7 @@ void AddGym(CLI::App& program, Command& command) {
       "Examples:\n"
       "  ./upswing realaigym --search pendubot.safetensors          search one, some minutes\n"
       "  ./upswing realaigym pendubot.safetensors --figure rows.svg\n"
-      "  ./upswing realaigym --search better.safetensors --from pendubot.safetensors --alone 0\n"
+      "  ./upswing realaigym --search better.safetensors --from pendubot.safetensors\n"
       "  ./upswing realaigym --search acrobot.safetensors --robot acrobot --seed 2\n"
       "  ./upswing realaigym pendubot.safetensors --csv sim_swingup.csv --json\n"
       "  ./upswing realaigym baseline-lqr                           the baselines' regulator\n");

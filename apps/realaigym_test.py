@@ -9,8 +9,8 @@ import unittest
 
 from testing import ROOT, ProgramTest, read_tensors, write_tensors
 
-SMALL = ["--alone", 8, "--generations", 2, "--first-population", 64, "--population", 4,
-         "--episodes", 8, "--hidden", 8]
+SMALL = ["--starts", 2, "--alone", 8, "--generations", 2, "--first-population", 64, "--population", 4,
+         "--hidden", 8]
 POLICY = ROOT / "web/public/agents/fast.safetensors"
 
 
@@ -67,9 +67,9 @@ class RealAIGym(ProgramTest):
     def test_the_policy_of_the_documentation(self):
         found = json.loads(self.succeed("realaigym", ROOT / "docs/realaigym-pendubot.safetensors",
                                         "--json"))
-        self.assertAlmostEqual(found["performance"]["score"], 0.686, delta=0.002)
+        self.assertAlmostEqual(found["performance"]["score"], 0.690, delta=0.002)
         # Cells at an edge depend on rounding.
-        self.assertAlmostEqual(found["robustness"]["score"], 0.957, delta=0.02)
+        self.assertAlmostEqual(found["robustness"]["score"], 0.890, delta=0.02)
 
     def test_another_seed_is_another_policy(self):
         one, two = self.search("--seed", 1), self.search("--seed", 2)
@@ -79,11 +79,12 @@ class RealAIGym(ProgramTest):
     def test_a_search_goes_on_from_a_policy(self):
         found = self.search()
         again = json.loads(self.succeed(
-            "realaigym", "--search", "q.safetensors", "--from", "p.safetensors", "--alone", 0,
-            "--generations", 0, "--json"))
+            "realaigym", "--search", "q.safetensors", "--from", "p.safetensors", "--generations", 0,
+            "--json"))
         self.assertEqual(again["performance"], found["performance"])
         self.refuse(["realaigym", "p.safetensors", "--from", "p.safetensors"], "--from", "--search")
-        self.refuse(["realaigym", "--search", "x", "--from", "p.safetensors", "--hidden", 8], "--hidden")
+        for flag in ("--hidden", "--starts"):
+            self.refuse(["realaigym", "--search", "x", "--from", "p.safetensors", flag, 8], flag)
         self.refuse(["realaigym", "--search", "x", "--from", POLICY], "fast.safetensors", "--search")
 
     def test_the_acrobot(self):

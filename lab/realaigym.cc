@@ -117,7 +117,7 @@ void ExpectRobot(const std::string& name, GymRobot own, GymRobot asked) {
 GymCompetitor OfSearch(const std::string& name, SwingPolicy policy) {
   const auto kept = std::make_shared<SwingPolicy>(std::move(policy));
   return {name, kept->net.robot(),
-          [kept](size_t) { return kept->net.Control({std::span<const double>(kept->numbers)}); }};
+          [kept](size_t) { return kept->net.Control(kept->numbers); }};
 }
 
 }  // namespace

@@ -30,6 +30,7 @@ struct GymEpisode {
   int delay = 0;                    // of the measured state, steps
   std::array<GymPush, 3> pushes{};  //
   uint64_t seed = 0;                // of the noise
+  int steps = kGymSteps;            // fewer for a search; the same in a block
 };
 
 /// What came of it.

@@ -36,8 +36,8 @@ class Snes {
 /// How a policy for the boards is searched.
 struct GymSearchConfig {
   std::string robot;
-  int64_t seed, hidden, alone, generations, population, first_population, episodes, interleaved;
-  double deviation, mean_rate, performance_weight, robustness_weight;
+  int64_t seed, hidden, starts, alone, generations, population, first_population;
+  double deviation, restart, mean_rate, performance_weight, last_weight;
 
   GymSearchConfig() { SetDefaults(*this); }
   /// One line per setting: name, default, range, unit, help.
@@ -56,8 +56,6 @@ class GymSearch {
   struct Report {
     int generation;
     double best_fitness;
-    GymOutcome nominal;  // of the policy so far
-    double reached;      // share of the best candidate's random simulations that ended at the goal
   };
 
   /// One generation; false after the last one.
@@ -66,18 +64,25 @@ class GymSearch {
   const SwingNet& net() const { return net_; }
   /// The policy so far: the means of the last generations, averaged.
   const std::vector<double>& numbers() const { return average_; }
+  /// What it does on the nominal plant.
+  GymOutcome Nominal() const;
   int generation() const { return generation_; }
   int generations() const;
 
  private:
-  /// Whether this generation sees the nominal plant alone.
-  bool IsAlone() const;
-  std::vector<GymEpisode> DrawEpisodes();
+  /// Begins anew from a random network.
+  void Begin(int64_t start);
+  std::vector<double> NominalFitnesses(const std::vector<std::vector<double>>& candidates,
+                                       ThreadPool* pool) const;
+  std::vector<double> Fitnesses(const std::vector<std::vector<double>>& candidates,
+                                double performance_weight, ThreadPool* pool);
 
   GymSearchConfig config_;
   SwingNet net_;
   Snes snes_;
   Rng rng_;
+  double best_fitness_ = -1;
+  std::vector<double> best_;  // mean of the best start
   std::vector<double> average_;
   int generation_ = 0;
 };

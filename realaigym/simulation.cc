@@ -9,8 +9,9 @@
 namespace upswing {
 namespace {
 
-constexpr int kMostDelay = 32;  // steps, a power of two above that of the rules
-constexpr int kHeldFrom = kGymSteps - 1000;
+constexpr int kMostDelay = 32;    // steps, a power of two above that of the rules
+constexpr int kHeldSteps = 1000;  // the last 2 s
+constexpr int kNoted = 8;         // steps from one look at the nearness to the next
 
 double Wrapped(double angle) {
   constexpr double kTurn = 2 * std::numbers::pi;
@@ -23,66 +24,85 @@ double Nearness(double e1, double e2, double w1, double w2, double velocity) {
   return 1 / (1 + 0.5 * (angles + (w1 * w1 + w2 * w2) / (velocity * velocity)));
 }
 
-/// A block of simulations while it runs.
+/// Sums over a simulation, and what else its outcome is made of.
+struct Sums {
+  Lanes energy{}, torque_cost{}, velocity_cost{}, max_torque{};
+  Lanes change{}, changes_squared{};  // of the torque
+  Lanes last_below;                   // step below the line
+  Lanes nearest{}, held{};
+};
+
+/// A push of a simulation, after step `first` and not after `last`.
+struct LanePush {
+  int first, last;
+  size_t lane;
+  GymPush push;
+};
+
+/// A block of simulations while it runs. Loops over kGymBlock are written for the compiler's
+/// vectors; what few simulations have is listed.
 class Run {
  public:
   Run(GymRobot robot, std::span<const GymEpisode> episodes)
-      : robot_(robot), episodes_(episodes), past_(kMostDelay) {
+      : robot_(robot), episodes_(episodes), steps_(episodes.front().steps), past_(kMostDelay) {
+    sums_.last_below.fill(-1);
     for (size_t lane = 0; lane < episodes.size(); ++lane) {
       const GymEpisode& episode = episodes[lane];
       block_.SetPlant(lane, episode.plant);
       rngs_.emplace_back(episode.seed, "realaigym: noise");
-      noisy_ = noisy_ || episode.velocity_noise > 0;
-      delayed_ = delayed_ || episode.delay > 0;
+      if (episode.velocity_noise > 0) velocity_noise_.push_back(lane);
+      if (episode.torque_noise > 0) torque_noise_.push_back(lane);
+      if (episode.delay > 0) delayed_.push_back(lane);
+      if (episode.response != 1) responding_.push_back(lane);
+      for (const GymPush& push : episode.pushes) {
+        if (push.amplitude == 0) continue;
+        constexpr double kWidths = 6;  // it is nothing beyond
+        pushes_.push_back({static_cast<int>((push.time - kWidths * push.width) / kGymTimestep),
+                           static_cast<int>((push.time + kWidths * push.width) / kGymTimestep),
+                           lane, push});
+      }
     }
   }
 
   std::vector<GymOutcome> Go(GymController& controller, std::vector<GymSample>* trace) {
-    outcomes_.resize(episodes_.size());
-    sums_.resize(episodes_.size());
-    for (int step = 0; step < kGymSteps; ++step) {
+    const bool first_joint = robot_ == GymRobot::kPendubot;
+    const Lanes& angle = first_joint ? block_.q1 : block_.q2;
+    for (int step = 0; step < steps_; ++step) {
       controller.Act(step, Measure(step), episodes_.size(), wanted_);
-      Lanes& applied = robot_ == GymRobot::kPendubot ? block_.tau1 : block_.tau2;
-      Drive(step, applied);
+      Drive(step, first_joint ? block_.tau1 : block_.tau2);
       if (trace != nullptr) trace->push_back({step * kGymTimestep, block_.state(0), torque_[0]});
-      const Lanes before = robot_ == GymRobot::kPendubot ? block_.q1 : block_.q2;
-      if (step >= kHeldFrom || step % 8 == 0) NoteNearness(step);
-      if (step < kGymSteps - 1) NoteVelocities();
+      if (step % kNoted == 0) NoteNearness(step);
+      if (step < steps_ - 1) NoteVelocities();
+      std::ranges::copy(angle, before_.begin());
       Advance(block_);
-      Note(step, before, robot_ == GymRobot::kPendubot ? block_.q1 : block_.q2);
+      Note(step, angle);
     }
-    for (size_t lane = 0; lane < episodes_.size(); ++lane) Finish(lane);
-    return outcomes_;
+    std::vector<GymOutcome> outcomes;
+    for (size_t lane = 0; lane < episodes_.size(); ++lane) outcomes.push_back(OutcomeOf(lane));
+    return outcomes;
   }
 
  private:
-  /// What outcomes are made of.
-  struct Sums {
-    double change = 0, changes_squared = 0;  // of the torque
-    int last_below = -1;                     // step below the line
-  };
-
   const GymMeasurement& Measure(int step) {
-    if (!delayed_) {
-      seen_ = {block_.q1, block_.q2, block_.w1, block_.w2};
-    } else {
-      past_[static_cast<size_t>(step % kMostDelay)] = {block_.q1, block_.q2, block_.w1, block_.w2};
-      for (size_t lane = 0; lane < episodes_.size(); ++lane) {
-        const int then = std::max(0, step - episodes_[lane].delay);
-        const GymMeasurement& past = past_[static_cast<size_t>(then % kMostDelay)];
-        seen_.q1[lane] = past.q1[lane];
-        seen_.q2[lane] = past.q2[lane];
-        seen_.w1[lane] = past.w1[lane];
-        seen_.w2[lane] = past.w2[lane];
-      }
+    for (size_t i = 0; i < kGymBlock; ++i) {
+      seen_.q1[i] = block_.q1[i];
+      seen_.q2[i] = block_.q2[i];
+      seen_.w1[i] = block_.w1[i];
+      seen_.w2[i] = block_.w2[i];
     }
-    if (noisy_) {
-      for (size_t lane = 0; lane < episodes_.size(); ++lane) {
-        if (episodes_[lane].velocity_noise == 0) continue;
-        const auto [n1, n2] = rngs_[lane].NormalPair();
-        seen_.w1[lane] += episodes_[lane].velocity_noise * n1;
-        seen_.w2[lane] += episodes_[lane].velocity_noise * n2;
-      }
+    if (!delayed_.empty()) past_[static_cast<size_t>(step % kMostDelay)] = seen_;
+    for (const size_t lane : delayed_) {
+      const int then = std::max(0, step - episodes_[lane].delay);
+      const GymMeasurement& past = past_[static_cast<size_t>(then % kMostDelay)];
+      seen_.q1[lane] = past.q1[lane];
+      seen_.q2[lane] = past.q2[lane];
+      seen_.w1[lane] = past.w1[lane];
+      seen_.w2[lane] = past.w2[lane];
+    }
+    for (const size_t lane : velocity_noise_) {
+      const auto [n1, n2] = rngs_[lane].NormalPair();
+      seen_.w1[lane] += episodes_[lane].velocity_noise * n1;
+      seen_.w2[lane] += episodes_[lane].velocity_noise * n2;
     }
     return seen_;
   }
@@ -90,87 +110,100 @@ class Run {
   /// From the torques that the controller wants to those that act.
   void Drive(int step, Lanes& applied) {
     const double time = step * kGymTimestep;
-    previous_ = torque_;
-    for (size_t lane = 0; lane < episodes_.size(); ++lane) {
-      const GymEpisode& episode = episodes_[lane];
-      double torque = wanted_[lane];
-      if (episode.torque_noise > 0) torque += episode.torque_noise * rngs_[lane].Normal();
-      if (episode.response != 1) {
-        torque = previous_[lane] + episode.response * (torque - previous_[lane]);
-      }
-      torque_[lane] = std::clamp(torque, -kGymTorqueLimit, kGymTorqueLimit);
-      applied[lane] = torque_[lane];
-      for (const GymPush& push : episode.pushes) {
-        if (push.amplitude == 0) continue;
-        const double z = (time - push.time) / push.width;
-        if (std::abs(z) < 6) applied[lane] += push.amplitude * std::exp(-z * z / 2);
-      }
+    for (size_t i = 0; i < kGymBlock; ++i) {
+      previous_[i] = torque_[i];
+      torque_[i] = wanted_[i];
+    }
+    for (const size_t lane : torque_noise_) {
+      torque_[lane] += episodes_[lane].torque_noise * rngs_[lane].Normal();
+    }
+    for (const size_t lane : responding_) {
+      torque_[lane] =
+          previous_[lane] + episodes_[lane].response * (torque_[lane] - previous_[lane]);
+    }
+    for (size_t i = 0; i < kGymBlock; ++i) {
+      const double below = torque_[i] < kGymTorqueLimit ? torque_[i] : kGymTorqueLimit;
+      applied[i] = torque_[i] = below > -kGymTorqueLimit ? below : -kGymTorqueLimit;
+    }
+    for (const auto& [first, last, lane, push] : pushes_) {
+      if (step <= first || step > last) continue;
+      const double z = (time - push.time) / push.width;
+      applied[lane] += push.amplitude * std::exp(-z * z / 2);
     }
   }
 
   void NoteNearness(int step) {
+    const bool holds = step >= steps_ - kHeldSteps;
     for (size_t lane = 0; lane < episodes_.size(); ++lane) {
       const double e1 = Wrapped(block_.q1[lane] - std::numbers::pi), e2 = Wrapped(block_.q2[lane]);
       const double w1 = block_.w1[lane], w2 = block_.w2[lane];
-      GymOutcome& o = outcomes_[lane];
-      o.nearest = std::max(o.nearest, Nearness(e1, e2, w1, w2, 5));
-      if (step >= kHeldFrom) o.held += Nearness(e1, e2, w1, w2, 1) / (kGymSteps - kHeldFrom);
+      sums_.nearest[lane] = std::max(sums_.nearest[lane], Nearness(e1, e2, w1, w2, 5));
+      if (holds) sums_.held[lane] += Nearness(e1, e2, w1, w2, 1) / (kHeldSteps / kNoted);
     }
   }
 
   void NoteVelocities() {
-    for (size_t lane = 0; lane < episodes_.size(); ++lane) {
-      const double w1 = block_.w1[lane], w2 = block_.w2[lane];
-      outcomes_[lane].velocity_cost += (w1 * w1 + w2 * w2) * kGymTimestep;
+    for (size_t i = 0; i < kGymBlock; ++i) {
+      const double w1 = block_.w1[i], w2 = block_.w2[i];
+      sums_.velocity_cost[i] += (w1 * w1 + w2 * w2) * kGymTimestep;
     }
   }
 
   /// After a step: what its torque did to the motor's joint, and where the tip was before.
-  void Note(int step, const Lanes& before, const Lanes& after) {
-    const double line = 0.9 * (GymPlant().length1 + GymPlant().length2);
-    const bool last = step == kGymSteps - 1;
-    for (size_t lane = 0; lane < episodes_.size(); ++lane) {
-      GymOutcome& o = outcomes_[lane];
-      Sums& sums = sums_[lane];
-      const double torque = torque_[lane];
-      // Of N samples there are N - 1 differences.
-      if (!last) o.energy += std::abs((after[lane] - before[lane]) * torque);
-      if (!last) o.torque_cost += torque * torque * kGymTimestep;
-      o.max_torque = std::max(o.max_torque, std::abs(torque));
-      if (step > 0) {
-        const double change = torque - previous_[lane];
-        sums.change += change;
-        sums.changes_squared += change * change;
-      }
-      if (!last && !(block_.tip[lane] > line)) sums.last_below = step;
+  void Note(int step, const Lanes& angle) {
+    constexpr GymPlant kPlant;
+    constexpr double kLine = 0.9 * (kPlant.length1 + kPlant.length2);
+    for (size_t i = 0; i < kGymBlock; ++i) {
+      const double torque = torque_[i], size = std::abs(torque);
+      sums_.max_torque[i] = sums_.max_torque[i] > size ? sums_.max_torque[i] : size;
+      const double change = step > 0 ? torque - previous_[i] : 0;
+      sums_.change[i] += change;
+      sums_.changes_squared[i] += change * change;
+    }
+    if (step == steps_ - 1) return;  // of N samples there are N - 1 differences
+    for (size_t i = 0; i < kGymBlock; ++i) {
+      const double torque = torque_[i];
+      sums_.energy[i] += std::abs((angle[i] - before_[i]) * torque);
+      sums_.torque_cost[i] += torque * torque * kGymTimestep;
+      sums_.last_below[i] = block_.tip[i] > kLine ? sums_.last_below[i] : step;
     }
   }
 
-  void Finish(size_t lane) {
-    GymOutcome& o = outcomes_[lane];
-    const Sums& sums = sums_[lane];
-    const double mean = sums.change / (kGymSteps - 1);
-    o.smoothness = std::sqrt(std::max(0.0, sums.changes_squared / (kGymSteps - 1) - mean * mean));
-    const int first = sums.last_below + 1;
-    o.above_line = first < kGymSteps - 1;
-    o.swing_up_seconds = std::min(first, kGymSteps - 1) * kGymTimestep;
+  GymOutcome OutcomeOf(size_t lane) const {
+    GymOutcome o;
+    o.energy = sums_.energy[lane];
+    o.torque_cost = sums_.torque_cost[lane];
+    o.velocity_cost = sums_.velocity_cost[lane];
+    o.max_torque = sums_.max_torque[lane];
+    o.nearest = sums_.nearest[lane];
+    o.held = sums_.held[lane];
+    const double mean = sums_.change[lane] / (kGymSteps - 1);
+    o.smoothness =
+        std::sqrt(std::max(0.0, sums_.changes_squared[lane] / (kGymSteps - 1) - mean * mean));
+    const int first = static_cast<int>(sums_.last_below[lane]) + 1;
+    o.above_line = first < steps_ - 1;
+    o.swing_up_seconds = std::min(first, steps_ - 1) * kGymTimestep;
     const auto [q1, q2, w1, w2] = block_.state(lane);
     o.at_goal = std::abs(Wrapped(q1 - std::numbers::pi)) < 0.35 && std::abs(Wrapped(q2)) < 0.35 &&
                 std::abs(w1) < 1 && std::abs(w2) < 1;
     // A simulation that has blown up is nothing.
     if (!std::isfinite(q1 + q2 + w1 + w2 + o.energy + o.velocity_cost)) o = GymOutcome();
+    return o;
   }
 
   GymRobot robot_;
   std::span<const GymEpisode> episodes_;
+  int steps_;
   GymBlock block_;
   std::vector<Rng> rngs_;
-  bool noisy_ = false, delayed_ = false;
+  // Which have it.
+  std::vector<size_t> velocity_noise_, torque_noise_, delayed_, responding_;
+  std::vector<LanePush> pushes_;
   std::vector<GymMeasurement> past_;  // ring of the last kMostDelay states
   GymMeasurement seen_{};
+  Lanes before_{};                          // angle of the motor's joint before the step, rad
   Lanes wanted_{}, torque_{}, previous_{};  // N·m: asked for; that acts, without pushes; before it
-  std::vector<GymOutcome> outcomes_;
-  std::vector<Sums> sums_;
+  Sums sums_;
 };
 
 }  // namespace

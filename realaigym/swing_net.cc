@@ -26,8 +26,19 @@ struct Activations {
 HWY_INLINE V From(const Lanes& x, size_t i) { return hn::LoadU(kDoubles, x.data() + i); }
 HWY_INLINE void To(V x, Lanes& lanes, size_t i) { hn::StoreU(x, kDoubles, lanes.data() + i); }
 
-/// x/√(1 + x²): as tanh, of arithmetic alone.
-HWY_INLINE VF Squash(VF x) { return x / hn::Sqrt(hn::MulAdd(x, x, hn::Set(kFloats, 1.0F))); }
+/// x (27 + x²)/(27 + 9 x²) within ±3, ±1 beyond: near tanh, and its slope has no jump. Two at once,
+/// as a division takes longer than all else.
+HWY_INLINE void Squash(VF& a, VF& b) {
+  const VF limit = hn::Set(kFloats, 3.0F), c = hn::Set(kFloats, 27.0F),
+           nine = hn::Set(kFloats, 9.0F);
+  const VF x = hn::Max(hn::Min(a, limit), hn::Neg(limit));
+  const VF y = hn::Max(hn::Min(b, limit), hn::Neg(limit));
+  const VF xx = x * x, yy = y * y;
+  const VF below_a = hn::MulAdd(nine, xx, c), below_b = hn::MulAdd(nine, yy, c);
+  const VF inverse = hn::Set(kFloats, 1.0F) / (below_a * below_b);
+  a = x * (c + xx) * below_b * inverse;
+  b = y * (c + yy) * below_a * inverse;
+}
 
 /// The velocity that the last three angles tell, to second order, rad/s.
 HWY_INLINE V Velocity(const std::array<Lanes, 2>& past, V now, size_t i) {
@@ -42,25 +53,24 @@ HWY_INLINE V Wrap(V x) {
   return NegMulAdd(turns, Constant(2 * std::numbers::pi), x);
 }
 
-/// Weights one after the other.
-template <bool kShared>
+/// Weights one after the other: of one policy, or with kOwn of one for each lane.
+template <bool kOwn>
 class Reader {
  public:
-  HWY_INLINE Reader(const float* weights, size_t lane)
-      : next_(kShared ? weights : weights + lane) {}
+  HWY_INLINE explicit Reader(const float* weights) : next_(weights) {}
   HWY_INLINE VF operator()() {
     const float* here = next_;
-    next_ += kShared ? 1 : kGymBlock;
-    return kShared ? hn::Set(kFloats, *here) : hn::Load(kFloats, here);
+    next_ += kOwn ? kGymBlock : 1;
+    return kOwn ? hn::Load(kFloats, here) : hn::Set(kFloats, *here);
   }
 
  private:
   const float* next_;
 };
 
-/// A unit of n inputs: bias and weights.
-template <bool kShared>
-HWY_INLINE VF Unit(Reader<kShared>& weight, const VF* in, int n) {
+/// A unit of n inputs: weights and bias.
+template <bool kOwn>
+HWY_INLINE VF Unit(Reader<kOwn>& weight, const VF* in, int n) {
   VF even = weight() * in[0], odd = weight() * in[1];
   for (int j = 2; j < n; j += 2) {
     even = hn::MulAdd(weight(), in[j], even);
@@ -69,16 +79,29 @@ HWY_INLINE VF Unit(Reader<kShared>& weight, const VF* in, int n) {
   return even + odd + weight();
 }
 
-template <bool kShared>
+template <bool kOwn>
+HWY_INLINE void Layer(Reader<kOwn>& weight, const VF* in, int n, VF* out, int hidden) {
+  for (int j = 0; j < hidden; j += 2) {
+    out[j] = Unit(weight, in, n);
+    out[j + 1] = Unit(weight, in, n);
+    Squash(out[j], out[j + 1]);
+  }
+}
+
+/// kHidden: the units of a layer where the compiler is to know them, or 0.
+template <bool kOwn, int kHidden>
 void Network(const SwingBlock& block, Activations& a) {
-  const int hidden = block.hidden;
+  const int hidden = kHidden > 0 ? kHidden : block.hidden;
   for (size_t lane = 0; lane < kGymBlock; lane += hn::Lanes(kFloats)) {
-    Reader<kShared> weight(block.weights.data(), lane);
+    const size_t policy = lane / block.lanes_each;
+    const float* weights = block.weights.data();
+    Reader<kOwn> weight(kOwn ? weights + lane : weights + policy * SwingWeights(hidden));
     VF in[kSwingInputs], first[kSwingMostHidden], second[kSwingMostHidden];
     for (int j = 0; j < kSwingInputs; ++j) in[j] = hn::Load(kFloats, a.in[j] + lane);
-    for (int j = 0; j < hidden; ++j) first[j] = Squash(Unit(weight, in, kSwingInputs));
-    for (int j = 0; j < hidden; ++j) second[j] = Squash(Unit(weight, first, hidden));
-    const VF out = Squash(Unit(weight, second, hidden) * hn::Set(kFloats, 0.5F));
+    Layer(weight, in, kSwingInputs, first, hidden);
+    Layer(weight, first, hidden, second, hidden);
+    VF out = Unit(weight, second, hidden) * hn::Set(kFloats, 0.5F), unused = out;
+    Squash(out, unused);
     hn::Store(out * hn::Set(kFloats, static_cast<float>(kSwingTorque)), kFloats, a.out + lane);
   }
 }
@@ -124,10 +147,12 @@ void ActOnBlock(SwingBlock& block, const GymMeasurement& measured, Lanes& torque
     To(q1, block.q1[0], i);
     To(q2, block.q2[0], i);
   }
-  if (block.shared) {
-    Network<true>(block, a);
+  if (block.lanes_each == 1) {
+    Network<true, 0>(block, a);
+  } else if (block.hidden == 16) {
+    Network<false, 16>(block, a);
   } else {
-    Network<false>(block, a);
+    Network<false, 0>(block, a);
   }
   for (size_t i = 0; i < kGymBlock; i += hn::Lanes(kDoubles)) {
     const V x[4] = {Wrap(From(measured.q1, i) - Constant(std::numbers::pi)),

@@ -15,16 +15,19 @@ inline constexpr int kSwingMostHidden = 32, kSwingInputs = 8;
 /// Limit of the network's torque, N·m.
 inline constexpr double kSwingTorque = 4;
 
-/// What a block is controlled by.
+/// What a block is controlled by: `lanes_each` simulations, one after the other, have the same
+/// policy.
 struct SwingBlock {
   int hidden;
-  bool shared;                   // whether all simulations have the same weights
-  AlignedVector<float> weights;  // (W) if shared, else (W × kGymBlock): see SwingNet
+  size_t lanes_each;             // kGymBlock, kSwingGroup or 1
+  AlignedVector<float> weights;  // (kGymBlock / lanes_each × W), but (W × kGymBlock) if 1
   std::array<Lanes, 4> K;        // N·m/rad, N·m·s/rad
   Lanes inverse_rho, sharpness;  //
   std::array<double, 16> P;      // (4 × 4)
   std::array<Lanes, 2> q1, q2;   // angles one and two steps ago, rad
 };
+/// As many as a vector has floats.
+inline constexpr size_t kSwingGroup = 16;
 
 /// Numbers of a network with so many units: each unit has its weights, then its bias.
 constexpr size_t SwingWeights(int hidden) {

@@ -14,7 +14,7 @@ namespace {
 
 constexpr const char* kFormat = "upswing-realaigym";
 constexpr const char* kRobotNames[] = {"pendubot", "acrobot"};
-constexpr int kVersion = 1;
+constexpr int kVersion = 2;
 constexpr int kLeastHidden = 4;
 
 class SwingController : public GymController {
@@ -57,25 +57,32 @@ std::vector<double> SwingNet::Initial(uint64_t seed) const {
   return numbers;
 }
 
-std::unique_ptr<GymController> SwingNet::Control(
-    std::vector<std::span<const double>> numbers) const {
+std::unique_ptr<GymController> SwingNet::Control(std::span<const std::span<const double>> numbers,
+                                                 size_t lanes_each) const {
   SwingBlock block;
   block.hidden = hidden_;
-  block.shared = numbers.size() == 1;
+  block.lanes_each = lanes_each;
   block.P = P_;
-  const size_t W = SwingWeights(hidden_);
-  block.weights.resize(block.shared ? W : W * kGymBlock);
-  for (size_t lane = 0; lane < kGymBlock; ++lane) {
-    const auto& own = numbers[std::min(lane, numbers.size() - 1)];
-    for (size_t i = 0; i < 4; ++i) block.K[i][lane] = K_[i] * std::exp(0.3 * own[i]);
-    block.inverse_rho[lane] = std::exp(-own[4]);
-    block.sharpness[lane] = std::exp(own[5]);
-    if (block.shared && lane > 0) continue;
+  const size_t W = SwingWeights(hidden_), policies = kGymBlock / lanes_each;
+  block.weights.resize(W * policies);
+  for (size_t k = 0; k < policies; ++k) {
+    const auto& own = numbers[std::min(k, numbers.size() - 1)];
+    const auto fill = [&](Lanes& lanes, double x) {
+      std::fill_n(lanes.begin() + static_cast<std::ptrdiff_t>(k * lanes_each), lanes_each, x);
+    };
+    for (size_t i = 0; i < 4; ++i) fill(block.K[i], K_[i] * std::exp(0.3 * own[i]));
+    fill(block.inverse_rho, std::exp(-own[4]));
+    fill(block.sharpness, std::exp(own[5]));
     for (size_t i = 0; i < W; ++i) {
-      block.weights[block.shared ? i : i * kGymBlock + lane] = static_cast<float>(own[kLinear + i]);
+      block.weights[lanes_each == 1 ? i * kGymBlock + k : k * W + i] =
+          static_cast<float>(own[kLinear + i]);
     }
   }
   return std::make_unique<SwingController>(std::move(block));
+}
+
+std::unique_ptr<GymController> SwingNet::Control(std::span<const double> numbers) const {
+  return Control({&numbers, 1}, kGymBlock);
 }
 
 Tensors SwingNet::ToTensors(std::span<const double> numbers) const {

@@ -32,8 +32,12 @@ class SwingNet {
   /// Where a search begins: the regulator of the nominal plant, a random network.
   std::vector<double> Initial(uint64_t seed) const;
 
-  /// A controller of simulations, by one vector for all of them, or one for each.
-  std::unique_ptr<GymController> Control(std::vector<std::span<const double>> numbers) const;
+  /// A controller of a block of simulations, by one vector for all of them.
+  std::unique_ptr<GymController> Control(std::span<const double> numbers) const;
+  /// By several, each for `lanes_each` simulations one after the other: kSwingGroup (swing_net.h)
+  /// or 1. Where there are too few, the last one serves the rest.
+  std::unique_ptr<GymController> Control(std::span<const std::span<const double>> numbers,
+                                         size_t lanes_each) const;
 
   // In files; see docs/realaigym.md.
   Tensors ToTensors(std::span<const double> numbers) const;
