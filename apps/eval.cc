@@ -68,6 +68,9 @@ void AddEval(CLI::App& program, Command& command) {
       ->type_name("FILE")
       ->check(NotEmpty());
   AddTrialOptions(*app, a->trial, "start states, noise and random plants");
+  app->add_flag("--known-plant", a->trial.known_plant,
+                "a controller is made anew for the plant of each episode: what knowing it brings")
+      ->disable_flag_override();
   AddThreads(*app, a->threads);
   app->add_flag("--json", a->as_json, "print JSON instead of a table")->disable_flag_override();
   app->footer(fmt::format(
@@ -86,7 +89,8 @@ void AddEval(CLI::App& program, Command& command) {
       "  ./upswing eval runs/d3qn-seed1 --randomize 0.25 --episodes 1000   share of a box of "
       "plants\n"
       "  ./upswing eval runs/d3qn-seed1 --randomize 0.25 --episodes-csv episodes.csv\n"
-      "  ./upswing plot runs/d3qn-seed1 --randomize 0.25 --episode 17      look at one of them\n\n"
+      "  ./upswing plot runs/d3qn-seed1 --randomize 0.25 --episode 17      look at one of them\n"
+      "  ./upswing eval mpc --randomize 0.25 --known-plant                 told each plant\n\n"
       "Instead of a file, a controller's name will do (docs/control.md): lqr holds the pendulum "
       "upright\n"
       "and does not swing it up; tvlqr follows a planned swing-up, mpc plans anew at each "

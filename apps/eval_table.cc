@@ -94,6 +94,10 @@ void PrintEvalTable(const EvalReport& report) {
   if (report.model) fmt::print("  {:<15}{}\n", "model", report.model->Text());
   const std::string changes = ChangesText(report.env);
   if (!changes.empty()) fmt::print("  {:<15}{}\n", "with", changes);
+  if (report.known_plant) {
+    fmt::print("  made for       the plant of each episode; for {} of {} there is none\n",
+               e.episodes - NumMade(report), e.episodes);
+  }
   fmt::print("  success        {} of {} = {:.1f}%   (95% interval {:.1f}% to {:.1f}%)\n",
              e.successes, e.episodes, 100 * e.success_rate(), 100 * e.success_interval.low,
              100 * e.success_interval.high);

@@ -13,13 +13,6 @@
 namespace upswing {
 namespace {
 
-/// An environment whose one episode is number `index`.
-std::unique_ptr<VectorEnv> OneEpisode(EnvConfig config, int index) {
-  config.num_envs = 1;
-  config.first_index += static_cast<uint64_t>(index);
-  return MakeEnv(config);
-}
-
 double SwingUpSeconds(const EvaluationEpisode& e, const EvaluationRule& rule) {
   return e.swing_up_seconds.value_or(rule.seconds);
 }

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
 #include <numbers>
 
+#include "core/error.h"
 #include "core/json.h"
 #include "core/text.h"
 #include "sim/identification.h"
@@ -93,8 +95,32 @@ std::vector<std::pair<std::string, std::string>> Cells(const EvalReport& report,
   return cells;
 }
 
+using Remade = decltype(LoadedPolicy::remade);
+
+/// The results of the episodes of `config`, each with a controller made for its plant.
+void JudgeMade(const Policy& policy, const Remade& remade, const EnvConfig& config,
+               const std::function<void(double)>& progress, size_t first, EvalReport& report) {
+  std::mutex mutex;
+  int done = 0;
+  config.pool->ParallelFor(config.num_envs, [&](int i) {
+    JudgedEpisode& episode = report.episodes[first + static_cast<size_t>(i)];
+    std::shared_ptr<const Policy> made;
+    try {
+      made = remade(episode.plant);
+      episode.for_its_plant = true;
+    } catch (const Error&) {  // the plant cannot be held, or not be swung up
+    }
+    EnvConfig one = config;
+    one.pool = nullptr;
+    episode.result = EvaluateEpisodes(made ? *made : policy, *OneEpisode(one, i)).front();
+    const std::lock_guard lock(mutex);
+    progress(static_cast<double>(++done) / config.num_envs);
+  });
+}
+
 /// Judges the episodes first, first + 1, … of the environments of `config`, which says how many.
-void JudgeEpisodes(const Policy& policy, const EnvConfig& config,
+/// With `remade` each by a controller made for its plant.
+void JudgeEpisodes(const Policy& policy, const Remade* remade, const EnvConfig& config,
                    const std::function<void(double)>& progress, EvalReport& report) {
   const std::unique_ptr<VectorEnv> env = MakeEnv(config);
   const auto first = report.episodes.size();
@@ -107,6 +133,7 @@ void JudgeEpisodes(const Policy& policy, const EnvConfig& config,
     episode.plant = pendulum->plant(i);
     episode.disturbance = pendulum->disturbance(i);
   }
+  if (remade) return JudgeMade(policy, *remade, config, progress, first, report);
   std::vector<EvaluationEpisode> results = EvaluateEpisodes(policy, *env, config.pool, progress);
   for (size_t i = 0; i < results.size(); ++i) {
     report.episodes[first + i].result = std::move(results[i]);
@@ -117,8 +144,16 @@ void JudgeEpisodes(const Policy& policy, const EnvConfig& config,
 
 EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& trial, int64_t episodes,
                           ThreadPool& pool, const std::function<void(double)>& progress) {
+  if (trial.known_plant && !loaded.remade) {
+    throw BadInput(Concat(
+        "--known-plant: expected a controller, which can be made for a plant, got ", loaded.name));
+  }
+  if (trial.known_plant && trial.unknown_plant) {
+    throw BadInput("--known-plant: expected no --unknown-plant beside it");
+  }
   EvalReport report;
   report.policy = loaded.name;
+  report.known_plant = trial.known_plant;
   report.physics = trial.physics;
   report.env = TrialEnvironments(trial, &loaded);
   report.model = InfoOfModel(report.env.mjcf, trial.model);
@@ -132,7 +167,7 @@ EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& tria
     config.first_index += static_cast<uint64_t>(done);
     config.num_envs = static_cast<int>(std::min(kAtOnce, episodes - done));
     JudgeEpisodes(
-        *loaded.policy, config,
+        *loaded.policy, trial.known_plant ? &loaded.remade : nullptr, config,
         [&](double share) {
           if (!progress) return;
           progress((static_cast<double>(done) + share * config.num_envs) /
@@ -144,6 +179,10 @@ EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& tria
   for (const JudgedEpisode& episode : report.episodes) results.push_back(episode.result);
   report.figures = Summarize(results, report.spec.evaluation);
   return report;
+}
+
+int64_t NumMade(const EvalReport& report) {
+  return std::ranges::count(report.episodes, true, &JudgedEpisode::for_its_plant);
 }
 
 std::string EvalJson(const EvalReport& report) {
@@ -160,6 +199,7 @@ std::string EvalJson(const EvalReport& report) {
   for (const auto& [name, value] : PlantValues(report.env.plant(0))) j["plant"][name] = value;
   j["model"] = report.model ? report.model->Json() : kBuiltIn;
   j["unknown_plant"] = report.env.assumed_plant.has_value();
+  if (report.known_plant) j["known_plant"] = NumMade(report);
   Disturbance disturbance = report.env.disturbance(0);
   Randomization randomization = report.env.randomization;
   for (const Options& options : {OptionsOf(disturbance), OptionsOf(randomization)}) {

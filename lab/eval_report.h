@@ -21,6 +21,7 @@ struct JudgedEpisode {
   // Of the double pendulum:
   Plant plant;
   Disturbance disturbance;
+  bool for_its_plant = false;  // a controller was made for it, see TrialArguments::known_plant
   EvaluationEpisode result;
 };
 
@@ -33,13 +34,18 @@ struct EvalReport {
   EnvSpec spec;
   std::vector<JudgedEpisode> episodes;
   Evaluation figures;
+  bool known_plant = false;   // each episode had a controller made for its plant
   bool knows_values = false;  // the policy says what its Q-values estimate
 };
 
 /// Lets a policy control `episodes` episodes of the environments that a trial makes, and says how
-/// it did. `progress` (may be empty) is called with the share done, 0 to 1. Throws BadInput.
+/// it did; where the plant is known and no controller can be made for it, that of the policy's own
+/// plant. `progress` (may be empty) is called with the share done, 0 to 1. Throws BadInput.
 EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& trial, int64_t episodes,
                           ThreadPool& pool, const std::function<void(double)>& progress);
+
+/// In how many episodes a controller was made for the plant.
+int64_t NumMade(const EvalReport& report);
 
 /// The report as a JSON document.
 std::string EvalJson(const EvalReport& report);

@@ -155,8 +155,18 @@ LoadedPolicy GetPolicy(const PolicyArguments& a) {
       throw BadInput(
           Concat(FlagOf(flag.name), ": expected the controller ", section, ", got ", a.name));
     }
-    return {TitleOf(a.name, config), "",           MakeController(a.name, config),
-            kDoublePendulum,         config.plant, ""};
+    const auto remade = [name = a.name, config](const Plant& plant) {
+      ControllerConfig other = config;
+      other.plant = plant;
+      return MakeController(name, other);
+    };
+    return {TitleOf(a.name, config),
+            "",
+            remade(config.plant),
+            kDoublePendulum,
+            config.plant,
+            "",
+            remade};
   }
   const std::string controllers = Join(ControllerNames(), ", ");
   if (a.has_settings()) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -21,6 +22,8 @@ struct LoadedPolicy {
   // Of the double pendulum:
   Plant plant;       // what it was made for
   std::string mjcf;  // empty: the built-in model
+  // Of a controller: the same, made for another plant; throws BadInput if there is none for it.
+  std::function<std::shared_ptr<const Policy>(const Plant&)> remade = {};
 
   /// How many past steps its observations remember.
   int memory() const;

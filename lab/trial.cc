@@ -8,6 +8,7 @@
 #include "core/text.h"
 #include "io/run_folder.h"
 #include "lab/rollout.h"
+#include "lab/task.h"
 #include "mujoco/engines.h"
 
 namespace upswing {
@@ -76,6 +77,12 @@ EnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded)
   env.seed = static_cast<uint64_t>(a.seed);
   env.stream = "evaluation";
   return env;
+}
+
+std::unique_ptr<VectorEnv> OneEpisode(EnvConfig config, int index) {
+  config.num_envs = 1;
+  config.first_index += static_cast<uint64_t>(index);
+  return MakeEnv(config);
 }
 
 std::string ChangesText(const EnvConfig& env) {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -21,6 +22,7 @@ struct TrialArguments {
   std::vector<FlagValue> flags;  // of the disturbance and of what is random
   int64_t seed;
   bool unknown_plant = false;
+  bool known_plant = false;  // a controller is made anew for each episode's plant; eval alone
 };
 
 /// Sensors, motors and what is random.
@@ -41,6 +43,9 @@ TrialConditions ConditionsOf(const TrialArguments& a);
 /// changes; without a policy (null) those of the built-in plant. Environment i has episode i.
 /// Throws BadInput.
 EnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded);
+
+/// The environment whose one episode is number `index` of those of `config`.
+std::unique_ptr<VectorEnv> OneEpisode(EnvConfig config, int index);
 
 /// What is not at its default, as text: `delay 0.02, …`; empty if nothing is.
 std::string ChangesText(const EnvConfig& env);

@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 """How well do policies do on plants that are harder or easier to hold upright?
 
-    tools/upright_modes.py POLICY|RUN ... [--episodes 1000] [--share 0.25] [--seed 1] [--physics mujoco]
+    tools/upright_modes.py POLICY|RUN|'CONTROLLER FLAGS' ... [--episodes 1000] [--share 0.25] [--seed 1]
+        [--physics mujoco] [--figure FILE.svg|FILE.png]
+    tools/upright_modes.py runs/d3qn-adaptive-seed1 'mpc --known-plant' --figure delta.svg
 
 Where delta (docs/control.md) is 0, no torque reaches one of the two modes in which the upright pendulum
 falls. Each episode has a plant from a box of ± SHARE, as in `upswing eval --randomize`. Needs
@@ -11,6 +13,7 @@ import argparse
 import csv
 import math
 import pathlib
+import shlex
 import subprocess
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -21,11 +24,45 @@ def episodes(policy, a):
     """|delta| and success of each."""
     words = ["--randomize", a.share, "--episodes", a.episodes, "--seed", a.seed, "--physics", a.physics,
              "--episodes-csv", "-"]
-    out = subprocess.run([ROOT / "upswing", "--no-setup", "eval", policy, *map(str, words)], check=True,
-                         stdout=subprocess.PIPE, text=True).stdout
+    out = subprocess.run([ROOT / "upswing", "--no-setup", "eval", *shlex.split(policy), *map(str, words)],
+                         check=True, stdout=subprocess.PIPE, text=True).stdout
     rows = [{name: float(text or "nan") for name, text in row.items()}
             for row in csv.DictReader(out.splitlines())]
     return [(abs(row["delta"]), row["success"]) for row in rows]
+
+
+def name_of(policy):
+    """Such as d3qn-adaptive-seed1 or mpc --known-plant."""
+    return policy if " " in policy else pathlib.Path(policy.removesuffix("/policy.safetensors")).stem
+
+
+def plot(policies, results, file):
+    """Success over |delta|, with Wilson's 95% interval, by gnuplot."""
+    lines = [f"set terminal {'svg' if file.endswith('.svg') else 'pngcairo'} size 900,460 font 'sans,12' "
+             "background 'white'", f"set output '{file}'", "set yrange [0:103]", "set ylabel 'success (%)'",
+             "set xlabel '|δ| of the plant'", "set grid lt 1 lw 1 lc rgb '#d0d0d0'",
+             "set key bottom right samplen 2", f"set xrange [-0.5:{len(EDGES) - 1.5}]",
+             "set xtics (" + ", ".join(
+                 f"'{low:g} to {high:g}' {k}" if high < math.inf else f"'above {low:g}' {k}"
+                 for k, (low, high) in enumerate(zip(EDGES, EDGES[1:]))) + ")"]
+    curves = []
+    for k, (policy, result) in enumerate(zip(policies, results)):
+        points = []
+        for at, (low, high) in enumerate(zip(EDGES, EDGES[1:])):
+            chosen = [success for size, success in result if low <= size < high]
+            if not chosen:
+                continue
+            n, p, z = len(chosen), sum(chosen) / len(chosen), 1.959963984540054
+            middle = (p + z * z / (2 * n)) / (1 + z * z / n)
+            half = z / (1 + z * z / n) * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
+            x = at + 0.12 * (k - (len(policies) - 1) / 2)
+            points.append(f"{x} {100 * p} {100 * (middle - half)} {100 * (middle + half)}")
+        color = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00"][k % 5]
+        lines.append(f"$d{k} << EOD\n" + "\n".join(points) + "\nEOD")
+        curves.append(f"$d{k} with yerrorlines pt 7 ps 0.8 lw 2 lc rgb '{color}' "
+                      f"title \"{name_of(policy)}\"")
+    lines.append("plot " + ", ".join(curves))
+    subprocess.run(["gnuplot"], input="\n".join(lines) + "\n", text=True, check=True)
 
 
 def main():
@@ -36,6 +73,7 @@ def main():
     parser.add_argument("--share", type=float, default=0.25)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--physics", default="mujoco")
+    parser.add_argument("--figure", help="success over |delta|, with 95%% intervals, by gnuplot")
     a = parser.parse_args()
     results = [episodes(policy, a) for policy in a.policies]
     print("|delta|       plants  success")
@@ -44,6 +82,8 @@ def main():
         shares = "  ".join(f"{100 * sum(each) / len(each):6.1f}%" if each else "      -"
                            for each in chosen)
         print(f"{low:4.2f} to {high:4.2f}  {len(chosen[0]):6}  {shares}")
+    if a.figure:
+        plot(a.policies, results, a.figure)
 
 
 if __name__ == "__main__":
