@@ -58,6 +58,23 @@ class EvalTest(ProgramTest):
         self.assertEqual([line for line in lines if "episodes/s" in line], [])
         self.assertIn("success", lines[2])
 
+    def test_a_controller_that_knows_the_plant_is_made_for_it(self):
+        def rows(*more):
+            return self.succeed("eval", "tvlqr", "--episodes", 2, "--set", "mass2=1.3",
+                                "--episodes-csv", "-", *more)
+        known = rows("--known-plant")
+        self.assertEqual(known, rows("--made-for", "mass2=1.3"))
+        self.assertNotEqual(known, rows())
+        drawn = json.loads(self.succeed("eval", "tvlqr", "--known-plant", "--randomize", 0.1,
+                                        "--episodes", 3, "--json"))
+        self.assertEqual(drawn["known_plant"], 3)
+        # No motor holds this one, so none is made for it.
+        lost = json.loads(self.succeed("eval", "lqr", "--known-plant", "--set", "damping2=0.38977",
+                                       "--episodes", 2, "--json"))
+        self.assertEqual((lost["known_plant"], lost["successes"]), (0, 0))
+        self.refuse(["eval", self.policy, "--known-plant"], "--known-plant", "controller")
+        self.refuse(["eval", "lqr", "--known-plant", "--unknown-plant"], "--unknown-plant")
+
     def test_numbers_are_plausible(self):
         result = self.evaluate()
         self.assertEqual(result["success_rate"], result["successes"] / 10)
