@@ -101,6 +101,15 @@ GymCase MakeCase(GymRow row, int parameter, double level, uint64_t seed) {
 
 }  // namespace
 
+bool AtGoal(const GymState& state) {
+  const auto [q1, q2, w1, w2] = state;
+  const auto near = [](double angle, double goal) {
+    return std::abs(std::remainder(angle - goal, 2 * std::numbers::pi)) < kGymGoalAngle;
+  };
+  return near(q1, std::numbers::pi) && near(q2, 0) && std::abs(w1) < kGymGoalVelocity &&
+         std::abs(w2) < kGymGoalVelocity;
+}
+
 std::array<double, 5> PerformancePenalties(const GymOutcome& o) {
   constexpr std::array<double, 5> kScale{20, 60, 20, 0.1, 400};
   const std::array<double, 5> costs{o.swing_up_seconds, o.energy, o.torque_cost, o.smoothness,

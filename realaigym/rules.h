@@ -28,22 +28,26 @@ struct GymEpisode {
   double torque_noise = 0;          // N·m
   double response = 1;              // k of u = u_before + k (u_wanted - u_before)
   int delay = 0;                    // of the measured state, steps
-  std::array<GymPush, 3> pushes{};  //
+  std::array<GymPush, 3> pushes{};  // about the motor's joint
   uint64_t seed = 0;                // of the noise
   int steps = kGymSteps;            // fewer for a search; the same in a block
 };
 
-/// What came of it.
+/// Robustness asks an end with both angles this near to upright, and both velocities this slow.
+inline constexpr double kGymGoalAngle = 0.35, kGymGoalVelocity = 1;  // rad, rad/s
+bool AtGoal(const GymState& state);
+
+/// What came of it. One that blew up has infinite costs.
 struct GymOutcome {
-  double swing_up_seconds =
-      0;                     // start of the last stretch above the line; the end if there is none
+  // Start of the last stretch above the line; the end if there is none.
+  double swing_up_seconds = 0;
   double energy = 0;         // J
   double max_torque = 0;     // N·m
   double torque_cost = 0;    // N²m²s
   double smoothness = 0;     // N·m
   double velocity_cost = 0;  // rad²/s
   bool above_line = false;   // swung up at the end: what performance asks
-  bool at_goal = false;      // near upright and slow at the end: what robustness asks
+  bool at_goal = false;      // AtGoal at the end: what robustness asks
   double held = 0;           // how near to the goal it was over the last 2 s, 0 to 1
   double nearest = 0;        // how near to it at best, 0 to 1
 };

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -199,6 +200,57 @@ TEST(GymSimulation, APushActsBesideTheMotor) {
   // The torque of the tables is the motor's alone.
   const GymSample& now = pushed.trace[1000];
   EXPECT_EQ(now.torque, Script(1000, now.state[0]));
+}
+
+/// Asks for more than the motor has.
+class Strong : public GymController {
+ public:
+  void Act(int, const GymMeasurement&, size_t count, Lanes& torque) override {
+    std::fill_n(torque.begin(), count, 9.0);
+  }
+};
+
+TEST(GymSimulation, APushAddsToWhatTheMotorGivesAtItsLimit) {
+  for (const GymRobot robot : {GymRobot::kPendubot, GymRobot::kAcrobot}) {
+    GymEpisode episode;
+    episode.pushes[0] = {-5, 2, 0.05};
+    std::vector<GymSample> trace;
+    SimulateGym(
+        robot, {&episode, 1}, [](size_t) { return std::make_unique<Strong>(); }, nullptr, &trace);
+    for (const size_t k : {980, 1000, 1040}) {
+      const double z = (0.002 * static_cast<double>(k) - 2) / 0.05;
+      GymBlock block;
+      block.SetPlant(0, GymPlant());
+      block.SetState(0, trace[k].state);
+      (robot == GymRobot::kPendubot ? block.tau1 : block.tau2)[0] = 6 - 5 * std::exp(-z * z / 2);
+      Advance(block);
+      for (size_t i = 0; i < 4; ++i) EXPECT_NEAR(block.state(0)[i], trace[k + 1].state[i], 1e-12);
+    }
+  }
+}
+
+TEST(GymSimulation, WhatBlowsUpIsTheWorst) {
+  GymEpisode episode;
+  episode.plant.damping1 = -1e3;
+  const GymOutcome o = Play(episode).outcome;
+  EXPECT_FALSE(o.above_line || o.at_goal);
+  EXPECT_NEAR(o.swing_up_seconds, 9.998, 1e-12);
+  EXPECT_EQ(PerformanceScore(o), 0);
+  for (const double penalty : PerformancePenalties(o)) EXPECT_GT(penalty, 0.9);
+}
+
+TEST(GymRules, TheGoalIsAsNearAndAsSlowAsTheySay) {
+  const double pi = std::numbers::pi;
+  EXPECT_TRUE(AtGoal({pi, 0, 0, 0}));
+  EXPECT_TRUE(AtGoal({-5 * pi, 6 * pi, 0, 0}));  // after some turns
+  for (const double sign : {1, -1}) {
+    EXPECT_TRUE(AtGoal({pi + sign * 0.349, sign * 0.349, sign * 0.999, -sign * 0.999}));
+    EXPECT_FALSE(AtGoal({pi + sign * 0.351, 0, 0, 0}));
+    EXPECT_FALSE(AtGoal({pi, sign * 0.351, 0, 0}));
+    EXPECT_FALSE(AtGoal({pi, 0, sign * 1.001, 0}));
+    EXPECT_FALSE(AtGoal({pi, 0, 0, sign * 1.001}));
+  }
+  EXPECT_FALSE(AtGoal({std::nan(""), 0, 0, 0}));
 }
 
 TEST(GymSimulation, PlaceAndThreadsChangeNoBit) {

@@ -105,6 +105,14 @@ TEST(SwingNet, WhatIsNoPolicyIsRefused) {
   std::vector<double> numbers = net.Initial(1);
   numbers[3] = std::nan("");
   EXPECT_THROW(ReadSwingPolicy(net.ToTensors(numbers)), Error);
+  // Gains, rho and sharpness are exponents: e^1000 is no number.
+  for (const size_t i : {0, 4, 5}) {
+    numbers = net.Initial(1);
+    numbers[i] = -51;
+    EXPECT_THROW(ReadSwingPolicy(net.ToTensors(numbers)), Error);
+    numbers[i] = 50;
+    EXPECT_NO_THROW(ReadSwingPolicy(net.ToTensors(numbers)));
+  }
   EXPECT_FALSE(IsSwingPolicy(Tensors()));
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "core/rng.h"
@@ -9,18 +10,21 @@
 namespace upswing {
 namespace {
 
-constexpr int kMostDelay = 32;    // steps, a power of two above that of the rules
+constexpr int kMostDelay = 32;  // steps, more than the longest of the rules
+static_assert(kGymLevels - 1 < kMostDelay);
 constexpr int kHeldSteps = 1000;  // the last 2 s
 constexpr int kNoted = 8;         // steps from one look at the nearness to the next
 
+/// std::remainder, but fast.
 double Wrapped(double angle) {
   constexpr double kTurn = 2 * std::numbers::pi;
   return angle - kTurn * std::nearbyint(angle / kTurn);
 }
 
-/// 1 at the goal, smaller away from it: shape for a search.
+/// 1 upright at rest; 1/2 at an error of 0.35 rad, the goal's limit, in each angle, or of
+/// `velocity` in each velocity: what a search climbs.
 double Nearness(double e1, double e2, double w1, double w2, double velocity) {
-  const double angles = (e1 * e1 + e2 * e2) / 0.12;
+  const double angles = (e1 * e1 + e2 * e2) / (kGymGoalAngle * kGymGoalAngle);
   return 1 / (1 + 0.5 * (angles + (w1 * w1 + w2 * w2) / (velocity * velocity)));
 }
 
@@ -183,11 +187,14 @@ class Run {
     const int first = static_cast<int>(sums_.last_below[lane]) + 1;
     o.above_line = first < steps_ - 1;
     o.swing_up_seconds = std::min(first, steps_ - 1) * kGymTimestep;
-    const auto [q1, q2, w1, w2] = block_.state(lane);
-    o.at_goal = std::abs(Wrapped(q1 - std::numbers::pi)) < 0.35 && std::abs(Wrapped(q2)) < 0.35 &&
-                std::abs(w1) < 1 && std::abs(w2) < 1;
-    // A simulation that has blown up is nothing.
-    if (!std::isfinite(q1 + q2 + w1 + w2 + o.energy + o.velocity_cost)) o = GymOutcome();
+    const GymState end = block_.state(lane);
+    o.at_goal = AtGoal(end);
+    // A simulation that has blown up is the worst.
+    const auto [q1, q2, w1, w2] = end;
+    if (!std::isfinite(q1 + q2 + w1 + w2 + o.energy + o.velocity_cost)) {
+      constexpr double kWorst = std::numeric_limits<double>::infinity();
+      o = {(steps_ - 1) * kGymTimestep, kWorst, kWorst, kWorst, kWorst, kWorst};
+    }
     return o;
   }
 

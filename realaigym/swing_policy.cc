@@ -16,6 +16,7 @@ constexpr const char* kFormat = "upswing-realaigym";
 constexpr const char* kRobotNames[] = {"pendubot", "acrobot"};
 constexpr int kVersion = 2;
 constexpr int kLeastHidden = 4;
+constexpr double kMostExponent = 50, kMostWeight = 1e6;  // of numbers in files
 
 class SwingController : public GymController {
  public:
@@ -120,8 +121,11 @@ SwingPolicy ReadSwingPolicy(const Tensors& tensors) {
                      {}};
   policy.numbers.resize(policy.net.size());
   tensors.Read("numbers", std::span(policy.numbers), {static_cast<int64_t>(policy.net.size())});
-  if (!std::ranges::all_of(policy.numbers, [](double x) { return std::abs(x) < 1e6; })) {
-    throw BadInput(Concat(tensors.where(), ": tensor \"numbers\": expected numbers within 1e6"));
+  for (size_t i = 0; i < policy.numbers.size(); ++i) {
+    const double most = i < SwingNet::kLinear ? kMostExponent : kMostWeight;
+    if (std::abs(policy.numbers[i]) <= most) continue;
+    throw BadInput(Concat(tensors.where(), ": tensor \"numbers\": expected number ", i, " within ",
+                          most, ", got ", policy.numbers[i]));
   }
   return policy;
 }

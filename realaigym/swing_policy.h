@@ -19,7 +19,6 @@ namespace upswing {
 /// All of it are numbers in one vector, so that it can be searched (search.h).
 class SwingNet {
  public:
-  static constexpr int kInputs = 8;
   /// Numbers before the network's: of K (4), log ρ, sharpness of the blend.
   static constexpr int kLinear = 6;
 
@@ -39,7 +38,8 @@ class SwingNet {
   std::unique_ptr<GymController> Control(std::span<const std::span<const double>> numbers,
                                          size_t lanes_each) const;
 
-  // In files; see docs/realaigym.md.
+  /// Metadata `format` upswing-realaigym, `format_version`, `robot` and `hidden`; a tensor
+  /// `numbers`, F64 (size).
   Tensors ToTensors(std::span<const double> numbers) const;
 
  private:
@@ -55,8 +55,10 @@ struct SwingPolicy {
   std::vector<double> numbers;
 };
 
-/// Whether a file's tensors are such a policy; reads it. Throws BadInput.
+/// Whether a file's tensors are such a policy.
 bool IsSwingPolicy(const Tensors& tensors);
+/// Reads it. The first six numbers are exponents: they are within 50, the others within 1e6. Throws
+/// BadInput.
 SwingPolicy ReadSwingPolicy(const Tensors& tensors);
 
 }  // namespace upswing
