@@ -78,11 +78,12 @@ GymCompetitor Search(const GymArguments& a, ThreadPool& pool) {
   {
     ProgressLine line;
     while (search.Step(&pool, report)) {
-      constexpr int kEvery = 50;
-      const bool prints = !a.as_json && report.generation % kEvery == 0;
+      const bool prints = !a.as_json && report.milestone;
       if (!prints && !line.due()) continue;
-      const std::string text = fmt::format("generation {:4}  S {:.3f}", report.generation,
-                                           PerformanceScore(search.Nominal()));
+      const std::string stage = report.start > 0 ? fmt::format("start {}", report.start)
+                                                 : fmt::format("generation {}", report.generation);
+      const std::string text =
+          fmt::format("{:<16}  S {:.3f}", stage, PerformanceScore(search.Nominal()));
       line.Show(static_cast<double>(report.generation) / search.generations(), {text});
       if (prints) line.Print(text);
     }

@@ -129,16 +129,16 @@ void GymSearchConfig::Describe(Options& o) {
   o.Add(&hidden, "hidden", 16, {4, 32}, "", "units in each of the network's two layers");
   o.Add(&starts, "starts", 12, {1, 1000}, "", "random networks to begin with; the best goes on");
   o.Add(&alone, "alone", 250, {1, 1e5}, "", "generations of each, on the nominal plant alone");
-  o.Add(&generations, "generations", 1500, {0, 1e6}, "", "generations after that");
+  o.Add(&generations, "generations", 1200, {0, 1e6}, "", "generations after that");
   o.Add(&first_population, "first_population", 64, {4, 1e5}, "",
         "candidates of a generation on the nominal plant");
   o.Add(&population, "population", 64, {4, 1e5}, "", "candidates of a generation after that");
   o.Add(&deviation, "deviation", 0.12, kPositive, "", "of the network's numbers at first");
   o.Add(&restart, "restart", 0.05, kPositive, "", "deviation with which the second part begins");
   o.Add(&mean_rate, "mean_rate", 2, kPositive, "", "rate at which the mean follows the gradient");
-  o.Add(&performance_weight, "performance_weight", 5, kPositive, "",
+  o.Add(&performance_weight, "performance_weight", 3, kPositive, "",
         "weight of the performance score as the second part begins");
-  o.Add(&last_weight, "last_weight", 20, kPositive, "", "and as it ends");
+  o.Add(&last_weight, "last_weight", 10, kPositive, "", "and as it ends");
 }
 
 GymSearch::GymSearch(const GymSearchConfig& config)
@@ -226,7 +226,9 @@ bool GymSearch::Step(ThreadPool* pool, Report& report) {
       alone ? NominalFitnesses(candidates, pool) : Fitnesses(candidates, weight, pool);
   snes_.Tell(fitness);
   ++generation_;
-  report = {generation_, *std::ranges::max_element(fitness)};
+  const int64_t round = alone ? config_.alone : 50;
+  report = {generation_, alone ? static_cast<int>((generation_ - 1) / config_.alone + 1) : 0,
+            (generation_ - (alone ? 0 : first)) % round == 0, *std::ranges::max_element(fitness)};
   if (alone && generation_ % config_.alone == 0 && report.best_fitness > best_fitness_) {
     best_fitness_ = report.best_fitness;
     best_ = snes_.mean();

@@ -54,7 +54,9 @@ class GymSearch {
   GymSearch(const GymSearchConfig& config, const SwingPolicy& first);
 
   struct Report {
-    int generation;
+    int generation;  // from the first one on
+    int start;       // 1, 2, …; 0: random plants
+    bool milestone;  // the last of a start, or every fiftieth
     double best_fitness;
   };
 

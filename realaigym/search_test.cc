@@ -60,6 +60,22 @@ TEST(GymSearch, ThreadsChangeNoBitAndItClimbs) {
   EXPECT_GT(a.best_fitness, first);
 }
 
+TEST(GymSearch, TheBestStartGoesOn) {
+  const auto run = [](int64_t seed, int64_t starts) {
+    GymSearchConfig config = Small();
+    config.seed = seed;
+    config.starts = starts;
+    config.generations = 0;
+    GymSearch search(config);
+    GymSearch::Report report;
+    while (search.Step(nullptr, report)) continue;
+    return std::pair(report.best_fitness, search.numbers());
+  };
+  const auto first = run(1, 1), second = run(1 + 1'000'003, 1);  // as the second start is seeded
+  ASSERT_NE(first.first, second.first);
+  EXPECT_EQ(run(1, 2).second, std::max(first, second).second);
+}
+
 TEST(SwingNet, PoliciesSideBySideActAsEachAlone) {
   for (const int hidden : {8, 16}) {
     const SwingNet net(GymRobot::kPendubot, hidden);
