@@ -67,9 +67,9 @@ class RealAIGym(ProgramTest):
     def test_the_policy_of_the_documentation(self):
         found = json.loads(self.succeed("realaigym", ROOT / "docs/realaigym-pendubot.safetensors",
                                         "--json"))
-        self.assertAlmostEqual(found["performance"]["score"], 0.690, delta=0.002)
+        self.assertAlmostEqual(found["performance"]["score"], 0.694, delta=0.002)
         # Cells at an edge depend on rounding.
-        self.assertAlmostEqual(found["robustness"]["score"], 0.890, delta=0.02)
+        self.assertAlmostEqual(found["robustness"]["score"], 0.945, delta=0.02)
 
     def test_another_seed_is_another_policy(self):
         one, two = self.search("--seed", 1), self.search("--seed", 2)
