@@ -1,3 +1,4 @@
+import { CONTROL_PERIOD } from '../pendulum';
 import { button, element } from '../page/dom';
 import { saveFile } from '../page/save';
 import { onThemeChange } from '../page/theme';
@@ -104,7 +105,9 @@ export class LearnPanel {
     const success = session.evaluations.at(-1)?.success ?? 0;
     const tested =
       success > 0 ? `, it succeeds in ${(100 * success).toFixed(0)}% of its tests` : '';
-    return `After ${steps} steps in ${session.last.episodeCount} trials${tested} …`;
+    const { episodeCount } = session.last;
+    const trials = episodeCount > 0 ? ` in ${episodeCount} trials` : '';
+    return `After ${steps} steps${trials}, ${swinging(session.steps)}${tested} …`;
   }
 
   /// At each frame.
@@ -273,6 +276,12 @@ function brief({ state, last, seconds }: Session): string {
   return state === 'finished' ? 'not solved' : '';
 }
 
+/// How long a pendulum would have swung for so many steps of control.
+function swinging(steps: number): string {
+  const minutes = (steps * CONTROL_PERIOD) / 60;
+  return minutes < 1 ? 'less than a minute of swinging' : `${minutes.toFixed(0)} min of swinging`;
+}
+
 function sentence(session: Session): string {
   const { state, last, reason, seconds, settings } = session;
   if (state === 'failed') return `It cannot learn so: ${reason}.`;
@@ -282,5 +291,6 @@ function sentence(session: Session): string {
   const steps = last.steps.toLocaleString('en');
   if (!last.solved) return `Not solved within ${steps} steps.`;
   const own = Object.keys(settings).length > 0 ? ', with your settings' : '';
-  return `Solved after ${steps} steps and ${seconds.toFixed(1)} s${own}.`;
+  const took = `${swinging(last.steps)} computed in ${seconds.toFixed(1)} s`;
+  return `Solved after ${steps} steps${own}: ${took}.`;
 }

@@ -90,7 +90,8 @@ function motor(stage: Stage): Step {
       byHand ||= heldFor(world) > 1;
       if (byHand) return 'You balanced it by hand! Hardly anybody does.';
       if (best < 0.02) return '';
-      const hint = best < 0.6 ? 'Push in time with the swing.' : 'Now catch it at the top …';
+      const atTop = relativeHeight(world.plant, world.state) > 0.8;
+      const hint = atTop ? 'Now catch it at the top …' : 'Push in time with the swing.';
       return `Your best: ${Math.round(100 * best)}% of the way up. ${hint}`;
     },
   };
@@ -108,7 +109,7 @@ function agent(stage: Stage): Step {
     answer(world) {
       on.ariaPressed = String(world.agentOn);
       return world.agentOn && heldFor(world) > HELD
-        ? 'The same motor as yours. Learning this took it an hour of swinging.'
+        ? 'The same motor as yours. It learned this in an hour of swinging, computed within seconds.'
         : '';
     },
   };
@@ -147,7 +148,7 @@ function mass(stage: Stage): Step {
   let changed = 0; // when (s); 0 if never
   const slider = new Slider(
     {
-      ...{ name: 'tour-mass', label: 'Mass of the lower link', unit: 'kg' },
+      ...{ name: 'tour-mass', label: 'Mass of the orange link', unit: 'kg' },
       ...{ min: 0.7, max: 1.3, limits: [0.7, 1.3], step: 0.05, initial: NOMINAL.mass2 },
     },
     (kilograms) => {
@@ -172,18 +173,20 @@ function mass(stage: Stage): Step {
       if (changed === 0) return '';
       if (heldFor(world) > HELD) return `It still holds ${slider.value} kg.`;
       if (seconds < FAILED) return 'It starts over …';
-      return `It cannot hold ${slider.value} kg: it never met such a link while it learned.`;
+      return `It cannot hold ${slider.value} kg: too far from the 1 kg that it learned with.`;
     },
   };
 }
 
 function many(stage: Stage): Step {
+  let begun = 0; // s
   const choice = element<HTMLFieldSetElement>('tour-agents');
   const input = (id: string) => choice.querySelector<HTMLInputElement>(`[value=${id}]`)!;
   const plant = { ...NOMINAL, mass2: LIGHT };
   choice.addEventListener('change', () => {
     const agent = input(ADAPTIVE_AGENT).checked ? ADAPTIVE_AGENT : NOMINAL_AGENT;
-    void stage.take({ agent, plant, on: true });
+    begun = stage.world.time;
+    void stage.begin({ agent, plant, on: true });
   });
   return {
     id: 'many',
@@ -191,13 +194,19 @@ function many(stage: Stage): Step {
     labels: () => [{ at: 'link2', text: `${LIGHT} kg` }],
     async begin() {
       input(NOMINAL_AGENT).checked = true;
+      begun = 0;
       await stage.begin({ agent: NOMINAL_AGENT, plant, on: true });
     },
     answer(world) {
-      if (!input(ADAPTIVE_AGENT).checked) return 'The agent of before fails again and again.';
-      return heldFor(world) > HELD
+      const holds = heldFor(world) > HELD;
+      if (!input(ADAPTIVE_AGENT).checked) {
+        if (holds) return 'It holds, for now …';
+        const tried = world.time - begun > FAILED;
+        return tried ? 'This one fails again and again.' : 'It tries …';
+      }
+      return holds
         ? 'It holds: it feels out which pendulum it has, and balances that one.'
-        : 'It takes over …';
+        : 'It tries …';
     },
   };
 }
@@ -219,7 +228,7 @@ function values(stage: Stage): Step {
     },
     answer: (world) =>
       heldFor(world) > HELD
-        ? 'At the top it expects most, and small pushes are the highest bars.'
+        ? 'Upright, a small torque is the highest bar. Pull it down, and see the bars change.'
         : '',
   };
 }
@@ -254,7 +263,7 @@ function map(stage: Stage): Step {
 }
 
 function learn(stage: Stage): Step {
-  button('tour-learn', () => stage.learn.start());
+  const start = button('tour-learn', () => stage.learn.start());
   return {
     id: 'learn',
     agents: [NOMINAL_AGENT],
@@ -262,7 +271,11 @@ function learn(stage: Stage): Step {
       await stage.begin({ agent: NOMINAL_AGENT, on: false });
     },
     end: () => stage.learn.stop(),
-    answer: () => stage.learn.story,
+    answer() {
+      const { story } = stage.learn;
+      start.textContent = story === '' ? 'Learn' : 'Start over';
+      return story;
+    },
   };
 }
 

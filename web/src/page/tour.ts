@@ -36,7 +36,8 @@ export class Tour {
     return this.now ? this.steps.indexOf(this.now) + 1 : 0;
   }
 
-  /// Shows a step, the nearest that there is; perhaps with the focus on it.
+  /// Shows a step, the nearest that there is; where the visitor goes there, with the focus on it, and so
+  /// that the browser's Back returns.
   async go(number: number, focus = false): Promise<void> {
     this.leave();
     const i = Math.min(Math.max(Math.round(number) || 1, 1), this.steps.length) - 1;
@@ -50,7 +51,10 @@ export class Tour {
     element('tour-end').hidden = !last;
     document.documentElement.dataset.step = now.id;
     this.say('');
-    if (focus) heading(now).focus({ preventScroll: true });
+    if (focus) {
+      history.pushState(null, '', `#tour=${i + 1}`);
+      heading(now).focus({ preventScroll: true });
+    }
     this.onStep();
     await now.begin();
   }

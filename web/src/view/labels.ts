@@ -6,17 +6,18 @@ export interface Label {
   text: string;
 }
 
-/// Writes a label at a place on the canvas, its background kept free.
+/// Writes a label at a place on the canvas, an edge of the background around its letters.
 export function drawLabel(canvas: Canvas, text: string, x: number, y: number): void {
   const { context } = canvas;
   context.font = '600 14px system-ui, sans-serif';
   const width = context.measureText(text).width;
   const left = Math.min(Math.max(x, 4), canvas.width - width - 12);
-  context.globalAlpha = 0.85;
-  canvas.rectangle(left - 4, y - 11, width + 8, 22, 'stage');
-  context.globalAlpha = 1;
-  context.fillStyle = canvas.color('ink');
   context.textAlign = 'left';
   context.textBaseline = 'middle';
+  context.lineJoin = 'round';
+  context.lineWidth = 5;
+  context.strokeStyle = canvas.color('stage');
+  context.strokeText(text, left, y);
+  context.fillStyle = canvas.color('ink');
   context.fillText(text, left, y);
 }
