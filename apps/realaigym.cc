@@ -11,6 +11,7 @@
 #include "apps/commands.h"
 #include "apps/progress.h"
 #include "apps/say.h"
+#include "apps/signals.h"
 #include "core/error.h"
 #include "core/text.h"
 #include "io/file.h"
@@ -36,14 +37,24 @@ std::string Cell(double x, int decimals, double factor = 1) {
   return std::isfinite(x) ? fmt::format("{:.{}f}", factor * x, decimals) : "–";
 }
 
+/// The end of a long name, where a path says what it is.
+std::string Shortened(const std::string& name) {
+  constexpr size_t kMost = 22;
+  if (name.size() <= kMost) return name;
+  size_t begin = name.size() - (kMost - 1);
+  while ((name[begin] & 0xC0) == 0x80) ++begin;  // within a character of UTF-8
+  return "…" + name.substr(begin);
+}
+
 void PrintEntry(const GymEntry& e) {
   fmt::print(
-      "  {:<22.22} {:>6} {:>7} {:>6} {:>7} {:>7} {:>6}  {:>5} {:>5} {:>5} {:>5} {:>5} {:>5} "
+      "  {:<22} {:>6} {:>7} {:>6} {:>7} {:>7} {:>6}  {:>5} {:>5} {:>5} {:>5} {:>5} {:>5} "
       "{:>6}\n",
-      e.name, Cell(e.seconds, 2), Cell(e.energy, 2), Cell(e.torque_cost, 2), Cell(e.smoothness, 4),
-      Cell(e.velocity_cost, 1), Cell(e.performance, 3), Cell(e.rows[0], 1, 100),
-      Cell(e.rows[1], 1, 100), Cell(e.rows[2], 1, 100), Cell(e.rows[3], 1, 100),
-      Cell(e.rows[4], 1, 100), Cell(e.rows[5], 1, 100), Cell(e.robustness, 3));
+      Shortened(e.name), Cell(e.seconds, 2), Cell(e.energy, 2), Cell(e.torque_cost, 2),
+      Cell(e.smoothness, 4), Cell(e.velocity_cost, 1), Cell(e.performance, 3),
+      Cell(e.rows[0], 1, 100), Cell(e.rows[1], 1, 100), Cell(e.rows[2], 1, 100),
+      Cell(e.rows[3], 1, 100), Cell(e.rows[4], 1, 100), Cell(e.rows[5], 1, 100),
+      Cell(e.robustness, 3));
 }
 
 void PrintReport(const GymReport& report) {
@@ -52,7 +63,7 @@ void PrintReport(const GymReport& report) {
              NameOf(robot));
   fmt::print(
       "  {:<22} {:>6} {:>7} {:>6} {:>7} {:>7} {:>6}  {:>5} {:>5} {:>5} {:>5} {:>5} {:>5} {:>6}\n",
-      "", "time", "energy", "cost", "smooth", "speed", "score", "model", "noise", "motor", "resp.",
+      "", "time", "energy", "cost", "smooth", "speed", "score", "model", "veloc", "torq.", "resp.",
       "delay", "push", "score");
   fmt::print("  {:<22} {:>6} {:>7} {:>6} {:>7} {:>7} {:>6}  {:>5} {:>5} {:>5} {:>5} {:>5} {:>5}\n",
              "", "s", "J", "N²m²s", "N·m", "rad²/s", "S", "%", "%", "%", "%", "%", "%");
@@ -73,11 +84,12 @@ GymCompetitor Search(const GymArguments& a, ThreadPool& pool) {
   SetFlags(OptionsOf(config), a.search);
   GymSearch search =
       a.from.empty() ? GymSearch(config) : GymSearch(config, LoadSwingPolicy(a.from));
+  InstallSignalHandlers("\nwriting the policy so far\n");
   const auto begin = std::chrono::steady_clock::now();
   GymSearch::Report report;
   {
     ProgressLine line;
-    while (search.Step(&pool, report)) {
+    while (search.Step(&pool, report) && StopSignal() == 0) {
       const bool prints = !a.as_json && report.milestone;
       if (!prints && !line.due()) continue;
       const std::string stage = report.start > 0 ? fmt::format("start {}", report.start)
@@ -91,7 +103,10 @@ GymCompetitor Search(const GymArguments& a, ThreadPool& pool) {
   const double seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   SaveTensors(search.net().ToTensors(search.numbers()), a.search_out);
-  if (!a.as_json) {
+  if (StopSignal() != 0) {
+    Say("stopped at generation {} of {}: {}\n", search.generation(), search.generations(),
+        Printable(a.search_out));
+  } else if (!a.as_json) {
     Say("searched in {}: {}\n", FormatDuration(seconds), Printable(a.search_out));
   }
   return CompetitorOf(search, a.search_out);
@@ -103,6 +118,7 @@ int RunGym(const GymArguments& a) {
     throw BadInput(searches ? "--search: expected no policy beside it"
                             : "realaigym: expected a policy to score, or --search FILE");
   }
+  if (IsStandardStream(a.search_out)) throw BadInput("--search: expected a file, got -");
   if (!searches && !a.from.empty()) throw BadInput("--from: expected --search FILE with it");
   std::string robot;
   for (const FlagValue& flag : a.search) {
@@ -114,9 +130,11 @@ int RunGym(const GymArguments& a) {
     if (searches || flag.name == "robot") continue;
     throw BadInput(Concat(FlagOf(flag.name), ": expected --search FILE with it"));
   }
-  for (const auto& [flag, path] : {std::pair{"--search", &a.search_out}, {"--csv", &a.csv}}) {
+  for (const auto& [flag, path] :
+       {std::pair{"--search", &a.search_out}, {"--csv", &a.csv}, {"--figure", &a.figure}}) {
     if (!path->empty()) CheckWritable(flag, *path);
   }
+  if (!a.figure.empty()) CheckFigureName(a.figure);
   const bool to_output = IsStandardStream(a.csv);
   if (to_output && a.as_json) {
     throw BadInput("--json: expected a file of its own for --csv, got - for it");
@@ -124,6 +142,7 @@ int RunGym(const GymArguments& a) {
   if (!a.figure.empty()) CheckCanDraw();
   ThreadPool pool(ResolveThreads(a.threads));
   const GymCompetitor competitor = searches ? Search(a, pool) : GetGymCompetitor(a.policy, robot);
+  if (StopSignal() != 0) return 128 + StopSignal();
   GymReport report;
   {
     EpisodeProgress progress(723, a.as_json);
@@ -168,7 +187,7 @@ void AddGym(CLI::App& program, Command& command) {
   Options own;
   own.Section("cases");
   own.Add(&a->case_seed, "case_seed", 1, {0, 1e15}, "",
-          "of the noise and pushes that it is judged by");
+          "seed of the noise and the pushes of the robustness score");
   AddArguments(*app, own);
   GymSearchConfig config;
   AddSettings(*app, OptionsOf(config), a->search);

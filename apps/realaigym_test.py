@@ -5,9 +5,11 @@ import csv
 import io
 import json
 import math
+import signal
+import subprocess
 import unittest
 
-from testing import ROOT, ProgramTest, read_tensors, write_tensors
+from testing import ROOT, UPSWING, ProgramTest, read_tensors, write_tensors
 
 SMALL = ["--starts", 2, "--alone", 8, "--generations", 2, "--first-population", 64, "--population", 4,
          "--hidden", 8]
@@ -87,6 +89,20 @@ class RealAIGym(ProgramTest):
             self.refuse(["realaigym", "--search", "x", "--from", "p.safetensors", flag, 8], flag)
         self.refuse(["realaigym", "--search", "x", "--from", POLICY], "fast.safetensors", "--search")
 
+    def test_a_search_that_is_interrupted_keeps_what_it_has(self):
+        with subprocess.Popen([UPSWING, "realaigym", "--search", "kept.safetensors", *map(str, SMALL),
+                               "--generations", "100000"], cwd=self.folder, stdout=subprocess.PIPE,
+                              text=True) as search:
+            search.stdout.readline()  # it has begun
+            search.send_signal(signal.SIGINT)
+            rest = search.stdout.read()
+        self.assertEqual(search.returncode, 130)
+        self.assertRegex(rest, r"stopped at generation \d+ of 100016: kept.safetensors")
+        self.assertNotIn("AR-EAPO", rest)
+        self.succeed("realaigym", "kept.safetensors")
+        self.refuse(["realaigym", "--search", "x", "--figure", "rows.txt"], "rows.txt")
+        self.refuse(["realaigym", "--search", "x", "--figure", "no/rows.svg"], "--figure", "no")
+
     def test_the_acrobot(self):
         found = self.search("--robot", "acrobot", "--csv", "motion.csv")
         self.assertEqual(found["robot"], "acrobot")
@@ -123,6 +139,7 @@ class RealAIGym(ProgramTest):
         refuse(["realaigym", "p.safetensors", "--hidden", 8], "--hidden", "--search")
         refuse(["realaigym", "nothing.safetensors"], "nothing.safetensors: no such file")
         refuse(["realaigym", "--search", "no/where"], "--search", "no")
+        refuse(["realaigym", "--search", "-"], "--search", "file")
         refuse(["realaigym", "baseline-lqr", "--robot", "cartpole"], "--robot", "pendubot or acrobot")
         refuse(["realaigym", "--search", "x", "--hidden", 7], "--hidden")
         refuse(["realaigym", "--search", "x", "--population", 5], "--population")

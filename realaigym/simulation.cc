@@ -21,10 +21,10 @@ double Wrapped(double angle) {
   return angle - kTurn * std::nearbyint(angle / kTurn);
 }
 
-/// 1 upright at rest; 1/2 at an error of 0.35 rad, the goal's limit, in each angle, or of
+/// 1 upright at rest; 1/2 where the angles are off by 0.35 rad (their squares sum to 0.24), or by
 /// `velocity` in each velocity: what a search climbs.
 double Nearness(double e1, double e2, double w1, double w2, double velocity) {
-  const double angles = (e1 * e1 + e2 * e2) / (kGymGoalAngle * kGymGoalAngle);
+  const double angles = (e1 * e1 + e2 * e2) / 0.12;
   return 1 / (1 + 0.5 * (angles + (w1 * w1 + w2 * w2) / (velocity * velocity)));
 }
 

@@ -323,12 +323,14 @@ std::string Script(const Figure& figure, const Terminal& terminal) {
 
 void CheckCanDraw() { RunGnuplot(""); }
 
+void CheckFigureName(const std::filesystem::path& file) {
+  if (file.extension() == ".svg" || file.extension() == ".png") return;
+  throw BadInput(Concat(file.string(), ": expected a name that ends with .svg or .png"));
+}
+
 void Draw(const Figure& figure, const std::filesystem::path& file) {
-  const std::string ending = file.extension().string();
-  if (ending != ".svg" && ending != ".png") {
-    throw BadInput(Concat(file.string(), ": expected a name that ends with .svg or .png"));
-  }
-  WriteFileAtomically(file, RunGnuplot(Script(figure, ending == ".svg" ? kSvg : kPng)));
+  CheckFigureName(file);
+  WriteFileAtomically(file, RunGnuplot(Script(figure, file.extension() == ".svg" ? kSvg : kPng)));
 }
 
 }  // namespace upswing

@@ -50,6 +50,9 @@ struct Figure {
 /// long work whose result will be drawn.
 void CheckCanDraw();
 
+/// Throws BadInput unless the name ends with .svg or .png.
+void CheckFigureName(const std::filesystem::path& file);
+
 /// Writes .svg or .png, by the ending, atomically. Texts are drawn literally, unprintable
 /// characters as escapes (see Printable). Throws BadInput on another ending, Failure if gnuplot is
 /// missing or fails.
