@@ -5,7 +5,6 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/SVD>
-#include <complex>
 #include <limits>
 
 namespace upswing {
@@ -27,8 +26,11 @@ bool IsStabilizable(const MatrixXd& A, const MatrixXd& B) {
   const Eigen::VectorXcd modes = A.eigenvalues();
   for (Eigen::Index i = 0; i < n; ++i) {
     if (std::abs(modes[i]) < 1) continue;
-    Eigen::MatrixXcd pencil(n, n + B.cols());
-    pencil << modes[i] * Eigen::MatrixXcd::Identity(n, n) - A, B.cast<std::complex<double>>();
+    // a + bi as the real matrix [a, -b; b, a], which has its singular values, each twice.
+    const MatrixXd I = MatrixXd::Identity(n, n), zero = MatrixXd::Zero(n, B.cols());
+    MatrixXd pencil(2 * n, 2 * (n + B.cols()));
+    pencil << modes[i].real() * I - A, -modes[i].imag() * I, B, zero,  //
+        modes[i].imag() * I, modes[i].real() * I - A, zero, B;
     const Eigen::VectorXd sizes = pencil.jacobiSvd().singularValues();
     if (!(sizes.minCoeff() > kLeastControl * sizes.maxCoeff())) return false;
   }

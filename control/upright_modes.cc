@@ -13,7 +13,8 @@ namespace upswing {
 UprightModes ModesOf(const Plant& plant) {
   UprightModes modes;
   std::array<double, 4> rates;  // real: friction and gravity alone make no oscillation upright
-  const Eigen::Vector4cd eigenvalues = LinearizeUpright(plant).A.eigenvalues();
+  const Eigen::MatrixXd A = LinearizeUpright(plant).A;
+  const Eigen::VectorXcd eigenvalues = A.eigenvalues();
   for (int i = 0; i < 4; ++i) rates[static_cast<size_t>(i)] = eigenvalues[i].real();
   std::ranges::sort(rates, std::greater<>());
   modes.faster = rates[0];

@@ -94,6 +94,27 @@ std::string Escape(char kind, char32_t value, int digits) {
 
 }  // namespace
 
+std::string_view Piece::Write(int64_t number) {
+  return {digits_.data(), std::to_chars(digits_.begin(), digits_.end(), number).ptr};
+}
+
+std::string_view Piece::Write(uint64_t number) {
+  return {digits_.data(), std::to_chars(digits_.begin(), digits_.end(), number).ptr};
+}
+
+std::string_view Piece::Write(double number) {
+  constexpr int kDigits = 6;
+  const auto [end, error] = std::to_chars(digits_.data(), digits_.data() + digits_.size(), number,
+                                          std::chars_format::general, kDigits);
+  return {digits_.data(), end};
+}
+
+std::string ConcatPieces(std::initializer_list<Piece> pieces) {
+  std::string all;
+  for (const Piece& piece : pieces) all += piece.text();
+  return all;
+}
+
 std::string FormatNumber(double value) {
   std::array<char, 32> buffer;
   // Integers are written in full: 100000 rather than 1e+05.

@@ -1,22 +1,46 @@
 #pragma once
 
+#include <array>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <initializer_list>
 #include <optional>
 #include <span>
-#include <sstream>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace upswing {
 
-/// Joins its arguments, as `<<` prints them, into one string.
+/// A text or a number on its way into Concat.
+class Piece {
+ public:
+  explicit Piece(std::string_view text) : text_(text) {}
+  explicit Piece(char character) : digits_{character}, text_(digits_.data(), 1) {}
+  explicit Piece(std::signed_integral auto number) : text_(Write(int64_t{number})) {}
+  explicit Piece(std::unsigned_integral auto number) : text_(Write(uint64_t{number})) {}
+  explicit Piece(double number) : text_(Write(number)) {}
+  Piece(const Piece&) = delete;  // its text may be its own digits
+  Piece& operator=(const Piece&) = delete;
+
+  std::string_view text() const { return text_; }
+
+ private:
+  std::string_view Write(int64_t number);
+  std::string_view Write(uint64_t number);
+  std::string_view Write(double number);
+
+  std::array<char, 24> digits_;
+  std::string_view text_;
+};
+
+std::string ConcatPieces(std::initializer_list<Piece> pieces);
+
+/// Joins its arguments into one string, numbers with six digits.
 template <typename... Parts>
 std::string Concat(const Parts&... parts) {
-  std::ostringstream out;
-  (out << ... << parts);
-  return out.str();
+  return ConcatPieces({Piece(parts)...});
 }
 
 /// The bytes of a string.

@@ -8,6 +8,16 @@
 namespace upswing {
 namespace {
 
+TEST(Text, ConcatJoinsTextsAndNumbers) {
+  const std::string text = "a";
+  EXPECT_EQ(Concat(text, std::string_view("b"), "c", 'd', true), "abcd1");
+  EXPECT_EQ(Concat(-1, " ", int64_t{-9223372036854775807}, " ", ~uint64_t{0}),
+            "-1 -9223372036854775807 18446744073709551615");
+  EXPECT_EQ(Concat(1.0 / 3, " ", 0.1F, " ", 1e20, " ", -0.0, " ", 123456789.0),
+            "0.333333 0.1 1e+20 -0 1.23457e+08");
+  EXPECT_EQ(Concat(), "");
+}
+
 TEST(Text, NumbersRoundTripInTheirShortestForm) {
   for (const double x : {0.1, 1e-5, 1.0 / 3, -0.0, 5e-324, 1.7976931348623157e308, 2e22}) {
     const auto back = ParseNumber(FormatNumber(x));

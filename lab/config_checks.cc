@@ -1,9 +1,8 @@
 #include "lab/config_checks.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "core/error.h"
 #include "core/text.h"
@@ -15,7 +14,10 @@ namespace upswing {
 namespace {
 
 /// Such as `1.5 GB`.
-std::string Gigabytes(double bytes) { return fmt::format("{:.1f} GB", 1e-9 * bytes); }
+std::string Gigabytes(double bytes) {
+  const auto tenths = std::llround(1e-8 * bytes);
+  return Concat(tenths / 10, ".", tenths % 10, " GB");
+}
 
 int ObservationSize(const Config& config) { return SpecOf(config.Environments()).obs_size; }
 
@@ -81,9 +83,9 @@ void WarnOfNoRate(const AgentConfig& c, std::vector<std::string>& warnings) {
 /// What would keep an agent with a replay memory from learning, in `steps` of training.
 void AddWarnings(const OffPolicyConfig& d, int64_t steps, std::vector<std::string>& warnings) {
   if (d.learning_starts >= steps) {
-    warnings.push_back(fmt::format(
-        "learning starts after step {}, and there are {} steps: nothing will be learned",
-        FormatCount(d.learning_starts), FormatCount(steps)));
+    warnings.push_back(Concat("learning starts after step ", FormatCount(d.learning_starts),
+                              ", and there are ", FormatCount(steps),
+                              " steps: nothing will be learned"));
   }
   if (d.updates_per_step == 0) {
     warnings.emplace_back("updates_per_step is 0: nothing will be learned");
@@ -95,9 +97,9 @@ void AddWarnings(const OffPolicyConfig& d, int64_t steps, std::vector<std::strin
 void AddWarnings(const PpoConfig& p, int64_t envs, int64_t steps,
                  std::vector<std::string>& warnings) {
   if (p.horizon * envs > steps) {
-    warnings.push_back(
-        fmt::format("a rollout is {} steps, and there are {}: nothing will be learned",
-                    FormatCount(p.horizon * envs), FormatCount(steps)));
+    warnings.push_back(Concat("a rollout is ", FormatCount(p.horizon * envs),
+                              " steps, and there are ", FormatCount(steps),
+                              ": nothing will be learned"));
   }
   WarnOfNoRate(p, warnings);
 }
@@ -234,14 +236,13 @@ void CheckMemory(const Config& config, int64_t runs) {
   if (needed <= available) return;
   const LearnerSize learner = SizeOfLearner(config);
   const bool on_policy = config.algorithm == kPpo;
-  throw BadInput(fmt::format(
-      "train: expected to fit into the {} of memory that are free, but {}network of {} parameters "
-      "and a {} of {} transitions take up to {} (smaller: --hidden, {}{})",
-      Gigabytes(available),
-      runs > 1 ? fmt::format("{} trainings at a time, each with a ", runs) : "a ",
-      FormatCount(learner.parameters), on_policy ? "rollout" : "replay memory",
-      FormatCount(learner.capacity), Gigabytes(needed), on_policy ? "--horizon" : "--replay",
-      runs > 1 ? ", --jobs" : ""));
+  throw BadInput(Concat(
+      "train: expected to fit into the ", Gigabytes(available), " of memory that are free, but ",
+      runs > 1 ? Concat(runs, " trainings at a time, each with a ") : "a ", "network of ",
+      FormatCount(learner.parameters), " parameters and a ",
+      on_policy ? "rollout" : "replay memory", " of ", FormatCount(learner.capacity),
+      " transitions take up to ", Gigabytes(needed), " (smaller: --hidden, ",
+      on_policy ? "--horizon" : "--replay", runs > 1 ? ", --jobs" : "", ")"));
 }
 
 }  // namespace upswing

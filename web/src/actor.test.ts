@@ -128,6 +128,15 @@ describe('is refused', () => {
   });
 });
 
+test('a large number is told in full, as the program does', () => {
+  const { file } = actors[0]!;
+  const plant = JSON.parse(new Policy(file).about('plant')) as object;
+  for (const mass1 of [9007199254740994, 9999999999999998, 1234567890123456]) {
+    const changed = withMetadata(file, 'plant', JSON.stringify({ ...plant, mass1 }));
+    expect(() => new Policy(changed)).toThrow(`got "${mass1}"`);
+  }
+});
+
 test('numbers that overflow on the way move nothing', () => {
   for (const { file } of actors) {
     const decision = new Policy(file).act(new Float32Array(8).fill(3e38));

@@ -1,17 +1,18 @@
 import { core } from './core';
 import type { Core } from './core';
-import type { Controller, Decision } from './decision';
+import type { Controller, Decision, Memory } from './decision';
 import { argMax } from './decision';
 import { GaussianTorque } from './gaussian';
 
 /// What the core says of a policy file (web/wasm/api.cc).
 interface About {
-  kind: 'q' | 'squashed-gaussian' | 'clipped-gaussian' | 'categorical';
+  kind: 'q' | 'squashed-gaussian' | 'clipped-gaussian' | 'categorical' | 'computed';
+  text: string;
   inputs: number;
   outputs: number; // of an actor
   values: number; // Q-values, or 1: V
   torques: number[]; // N·m
-  limit: number; // N·m, of an actor
+  limit: number; // N·m, of what has no table of torques
   memory: number; // steps
   identifies: boolean;
   selfCheckError: number;
@@ -28,6 +29,18 @@ function closer({ exports }: Core, policy: number, ...places: readonly number[])
   };
 }
 
+class CoreMemory implements Memory {
+  readonly at: number;
+
+  constructor(at: number) {
+    this.at = at;
+  }
+
+  close(): void {
+    core().exports.memory_close(this.at);
+  }
+}
+
 /// A policy in the core, and what its decisions are made of.
 export class CoreController implements Controller {
   readonly about: Readonly<About>;
@@ -37,16 +50,20 @@ export class CoreController implements Controller {
   private readonly observation: number; // where one is put
   private readonly row: number; // where what is made of it lies
   private readonly torques: Float64Array;
-  private readonly shape: Shape;
+  private readonly shape: Shape | null; // null of a controller
 
-  /// Reads and checks a policy file. Throws BadInput.
-  constructor(file: ArrayBuffer) {
-    this.policy = core().withBytes(new Uint8Array(file), (at, size) =>
-      core().expect(core().exports.policy_open(at, size)),
-    );
+  /// Reads and checks a policy file, or makes the controller of a name. Throws BadInput.
+  constructor(from: ArrayBuffer | string) {
+    const { policy_open, policy_make } = core().exports;
+    const [bytes, open] =
+      typeof from === 'string'
+        ? [new TextEncoder().encode(from), policy_make]
+        : [new Uint8Array(from), policy_open];
+    this.policy = core().withBytes(bytes, (at, size) => core().expect(open(at, size)));
     this.about = JSON.parse(core().text) as About;
     this.torques = Float64Array.from(this.about.torques);
-    this.shape = JSON.parse(this.about.metadata.network!) as Shape;
+    const { network } = this.about.metadata;
+    this.shape = network === undefined ? null : (JSON.parse(network) as Shape);
     this.observation = core().reserve(4 * this.inputs);
     this.row = core().reserve(8 * this.columns);
     const close = closer(core(), this.policy, this.observation, this.row);
@@ -69,7 +86,8 @@ export class CoreController implements Controller {
 
   get text(): string {
     const { shape } = this;
-    const { kind, metadata } = this.about;
+    const { kind, metadata, text } = this.about;
+    if (kind === 'computed' || !shape) return text;
     const normalised = shape.layer_norm ? ', layer normalisation' : '';
     if (kind === 'q') {
       const heads = shape.dueling ? ` with heads of ${shape.head}` : '';
@@ -85,10 +103,16 @@ export class CoreController implements Controller {
     return `Actor ${widths(shape)}: ${how}${normalised}${critic ? `; critic ${widths(critic)}` : ''}`;
   }
 
-  decide(observation: Float32Array): Decision {
+  begin(): Memory | null {
+    const at = core().exports.memory_open(this.policy);
+    return at === 0 ? null : new CoreMemory(at);
+  }
+
+  decide(observation: Float32Array, memory: Memory | null): Decision {
     const { exports } = core();
     new Float32Array(exports.memory.buffer, this.observation, this.inputs).set(observation);
-    core().expect(exports.policy_decide(this.policy, this.observation, this.row));
+    const past = memory instanceof CoreMemory ? memory.at : 0;
+    core().expect(exports.policy_decide(this.policy, past, this.observation, this.row));
     return this.decision(new Float64Array(exports.memory.buffer, this.row, this.columns).slice());
   }
 
@@ -104,10 +128,11 @@ export class CoreController implements Controller {
     const torque = Number.isFinite(row[0]!) ? row[0]! : 0;
     const outputs = row.subarray(1, 1 + count);
     const values = row.subarray(1 + count);
+    if (kind === 'computed') return { kind, limit, torque, value: NaN };
     if (kind === 'q') {
       const q = Float32Array.from(values);
       // Q = V + A - mean(A), so that V is their mean; a plain network has none.
-      const value = this.shape.dueling
+      const value = this.shape?.dueling
         ? values.reduce((sum, x) => sum + x, 0) / values.length
         : NaN;
       return { kind, torques, q, action: torques.indexOf(torque), torque, value };

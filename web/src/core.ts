@@ -15,7 +15,10 @@ interface Exports {
   bytes_size(): number;
   policy_open(file: number, bytes: number): number;
   policy_close(policy: number): void;
-  policy_decide(policy: number, observation: number, row: number): number;
+  policy_make(name: number, bytes: number): number;
+  memory_open(policy: number): number;
+  memory_close(memory: number): void;
+  policy_decide(policy: number, memory: number, observation: number, row: number): number;
   numbers(): number;
   pendulum_at(): void;
   identifier_open(): number;

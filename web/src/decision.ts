@@ -29,7 +29,18 @@ export interface CategoricalDecision extends Choice {
   action: number; // which of them
 }
 
-export type Decision = QDecision | GaussianDecision | CategoricalDecision;
+/// Of a controller that is made from the equations of motion.
+export interface ComputedDecision extends Choice {
+  kind: 'computed';
+  limit: number; // N·m
+}
+
+export type Decision = QDecision | GaussianDecision | CategoricalDecision | ComputedDecision;
+
+/// What a policy remembers of an episode.
+export interface Memory {
+  close(): void;
+}
 
 /// The part of a policy that chooses torques.
 export interface Controller {
@@ -38,7 +49,10 @@ export interface Controller {
   readonly strongest: number; // N·m, the largest torque
   /// Largest |difference| between the outputs in the file and those computed here.
   readonly selfCheckError: number;
-  decide(observation: Float32Array): Decision;
+  /// Without a memory as at the beginning of an episode.
+  decide(observation: Float32Array, memory: Memory | null): Decision;
+  /// Begins an episode; null where nothing of it is remembered.
+  begin(): Memory | null;
   /// Frees what it holds; nothing may be asked of it after.
   close(): void;
 }

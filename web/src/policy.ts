@@ -1,5 +1,5 @@
 import { CoreController } from './controller';
-import type { Controller, Decision } from './decision';
+import type { Controller, Decision, Memory } from './decision';
 import { DISTURBANCE_LIMITS } from './disturbance';
 import { CONTROL_PERIOD, PLANT_LIMITS, plantIn } from './pendulum';
 import type { Parameter, Plant, Range } from './pendulum';
@@ -8,7 +8,7 @@ import { printable } from './text';
 
 const LONGEST_REASON = 200; // characters; a file's own text may be part of it
 
-/// A learned policy: observation → torque, nothing else needed (docs/policy-format.md).
+/// A learned policy (docs/policy-format.md) or a controller: observation → torque.
 export class Policy {
   readonly metadata: ReadonlyMap<string, string>;
   readonly controller: Controller;
@@ -16,15 +16,15 @@ export class Policy {
   readonly memory: number;
   /// Whether an observation holds an estimate of the plant.
   readonly identifies: boolean;
-  /// The plant that it was trained on.
+  /// The plant that it was trained on, or made for.
   readonly plant: Plant;
   /// Factor by which rewards, and so its values, were multiplied during training.
   readonly rewardScale: number;
 
-  /// Reads and checks the file, as the program does. Throws BadInput.
-  constructor(bytes: ArrayBuffer) {
+  /// Reads and checks the file, as the program does, or makes the controller of a name. Throws BadInput.
+  constructor(from: ArrayBuffer | string) {
     try {
-      const controller = new CoreController(bytes);
+      const controller = new CoreController(from);
       this.controller = controller;
       this.memory = controller.about.memory;
       this.identifies = controller.about.identifies;
@@ -37,14 +37,20 @@ export class Policy {
     this.rewardScale = Number(this.metadata.get('reward_scale') ?? 1);
   }
 
+  /// Whether hundreds of decisions from new states can be had while one watches.
+  get isQuick(): boolean {
+    return this.metadata.get('agent') !== 'mpc';
+  }
+
   about(key: string): string {
     const text = this.metadata.get(key);
     if (text === undefined) throw new BadInput(`expected metadata "${key}", found none`);
     return text;
   }
 
-  act(observation: Float32Array): Decision {
-    return this.controller.decide(observation);
+  /// Without a memory as at the beginning of an episode.
+  act(observation: Float32Array, memory: Memory | null = null): Decision {
+    return this.controller.decide(observation, memory);
   }
 
   /// The range [low, high] of a parameter during training.

@@ -13,7 +13,7 @@ import {
   relativeHeight,
 } from './pendulum';
 import type { Plant, State } from './pendulum';
-import type { Decision } from './decision';
+import type { Decision, Memory } from './decision';
 import type { Policy } from './policy';
 import type { Push, Simulator, Vec } from './simulator';
 
@@ -58,6 +58,7 @@ export class World {
   private _policy: Policy | null = null;
   private observation: Float32Array | null = null; // of the last control step; null at a start
   private chosen = 0; // N·m, at that step
+  private memory: Memory | null = null; // of the policy, since the start
   /// What the policy knows of the plant, if it identifies it, and whether it has begun to.
   private identifier: Identifier | null = null;
   private identifies = false;
@@ -90,7 +91,14 @@ export class World {
     this.observation = null;
     this.identifier = policy?.identifies ? new Identifier(policy.plant) : null;
     this.identifies = false;
+    this.forget();
     this.look();
+  }
+
+  /// The policy begins anew.
+  private forget(): void {
+    this.memory?.close();
+    this.memory = this._policy?.controller.begin() ?? null;
   }
 
   get state(): State {
@@ -114,6 +122,7 @@ export class World {
     this.motor.clear();
     this.observation = null;
     this.identifies = false;
+    this.forget();
     this.untilControl = 0;
     this.torque = 0;
     this.push = null;
@@ -208,7 +217,7 @@ export class World {
     const measured = this.measured();
     this.identify(measured);
     this.observation = this.observe(measured);
-    this.decision = policy?.act(this.observation) ?? null;
+    this.decision = policy?.act(this.observation, this.memory) ?? null;
     this.chosen = this.agentOn ? (this.decision?.torque ?? 0) : this.byHand;
     const limit = plant.torque_limit;
     const arriving = this.motor.apply(this.chosen, this.disturbance.delay);

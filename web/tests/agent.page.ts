@@ -16,7 +16,9 @@ test('Get Inverted swings up and balances, while one watches', async ({ page }) 
 test('every agent is up within 10 s and holds for 20 s', async ({ page }) => {
   test.slow(); // minutes of physics, on a machine that may have other work
   await open(page);
-  const ids = await page.evaluate(() => upswing.agents.list.map(({ id }) => id));
+  const ids = await page.evaluate(() =>
+    upswing.agents.list.map(({ id }) => id).filter((id) => id !== 'lqr'),
+  );
   expect(ids.length).toBeGreaterThan(3);
   for (const id of ids) {
     await page.evaluate((agent) => upswing.choose(agent), id);
@@ -49,6 +51,24 @@ test('another agent can be chosen, and has its own text, curve and mark', async 
   const wide = await width();
   await page.locator('#agent').selectOption('d3qn');
   await expect.poll(width).toBeLessThan(wide / 2);
+});
+
+test('a link brings controllers that were not learned', async ({ page }) => {
+  await open(page, '#agent=lqr&twin=mpc&on=1');
+  await expect(page.locator('#agent-text')).toContainText('cannot swing them up');
+  await expect(page.locator('#agent-command')).toHaveText('./upswing simulate lqr');
+  await expect(page.locator('#twin-name')).toHaveText('MPC: always plans');
+  await expect(page.locator('#q-name')).toHaveText('Decision');
+  await startFrom(page, 0);
+  await run(page, 15);
+  expect(await balanced(page)).toBe(0);
+  await expect(page.locator('#twin-badge')).toHaveText(/balanced for/);
+  await startFrom(page, 3.13);
+  await run(page, 5);
+  expect(await balanced(page)).toBe(5);
+  await page.locator('#agent').selectOption('mpc');
+  await expect(page.locator('#map-value')).toHaveText('not for one that plans');
+  await expect(page).toHaveURL(/agent=mpc&twin=mpc/);
 });
 
 test('of two agents that are asked for, the last one counts', async ({ page }) => {

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/safetensors.h"
+#include "lab/controllers.h"
 #include "lab/loaded_policy.h"
 #include "nn/actor_policy.h"
 #include "nn/q_policy.h"
@@ -42,18 +43,31 @@ int SetText(const json& value) {
 /// A policy and what deciding needs.
 struct Controller {
   explicit Controller(LoadedPolicy policy)
-      : loaded(std::move(policy)), memory(loaded.policy->Start(1)) {
-    if (const auto* found = dynamic_cast<const ActorPolicy*>(&*loaded.policy)) actor = found;
-  }
+      : loaded(std::move(policy)),
+        actor(dynamic_cast<const ActorPolicy*>(&*loaded.policy)),
+        q(dynamic_cast<const QPolicy*>(&*loaded.policy)),
+        memory(loaded.policy->Start(1)) {}
 
   int outputs() const { return actor == nullptr ? 0 : actor->num_outputs(); }
+  /// Whether it is made from the equations of motion, and may have plans.
+  bool computed() const { return actor == nullptr && q == nullptr; }
+  double self_check_error() const {
+    if (computed()) return 0;
+    return (q != nullptr ? q->self_check() : actor->self_check()).error;
+  }
+  double limit() const {
+    if (computed()) return loaded.plant.torque_limit;
+    return actor == nullptr ? 0 : actor->parts().action_limit.front();
+  }
 
   LoadedPolicy loaded;
-  const ActorPolicy* actor = nullptr;
-  std::unique_ptr<Policy::Memory> memory;
+  const ActorPolicy* actor;
+  const QPolicy* q;
+  std::unique_ptr<Policy::Memory> memory;  // of what has no plans
 };
 
 const char* KindOf(const Controller& c) {
+  if (c.computed()) return "computed";
   if (c.actor == nullptr) return "q";
   switch (c.actor->parts().output) {
     case ActorOutput::kSquashedGaussian:
@@ -75,17 +89,16 @@ json About(const Controller& c, const std::map<std::string, std::string>& metada
     const Matrix<const double> actions = policy.value_actions();
     torques.assign(actions.values().begin(), actions.values().end());
   }
-  const auto* q = dynamic_cast<const QPolicy*>(&policy);
   return {{"kind", KindOf(c)},
           {"text", policy.description()},
           {"inputs", policy.obs_size()},
           {"outputs", c.outputs()},
           {"values", policy.num_values()},
           {"torques", torques},
-          {"limit", c.actor == nullptr ? 0 : c.actor->parts().action_limit.front()},
+          {"limit", c.limit()},
           {"memory", c.loaded.memory()},
           {"identifies", c.loaded.identifies()},
-          {"selfCheckError", (q != nullptr ? q->self_check() : c.actor->self_check()).error},
+          {"selfCheckError", c.self_check_error()},
           {"metadata", metadata}};
 }
 
@@ -130,18 +143,40 @@ UPSWING_EXPORT(policy_open) Controller* PolicyOpen(const std::byte* file, size_t
   });
 }
 
+/// The controller of this name (lab/controllers.h), made for the nominal plant. Leaves what it is.
+UPSWING_EXPORT(policy_make) Controller* PolicyMake(const char* name, size_t size) {
+  return Guarded([&] {
+    const std::string called(name, size);
+    auto controller = std::make_unique<Controller>(
+        LoadedPolicy{called, "", MakeController(called, {}), kDoublePendulum, Plant(), ""});
+    SetText(About(*controller, PolicyMetadata(controller->loaded.policy->info())));
+    return controller.release();
+  });
+}
+
 UPSWING_EXPORT(policy_close) void PolicyClose(Controller* controller) { delete controller; }
 
+/// Begins an episode: what the policy remembers of it. 0 for one that was learned, which remembers
+/// nothing.
+UPSWING_EXPORT(memory_open) Policy::Memory* MemoryOpen(const Controller* controller) {
+  return Guarded([&]() -> Policy::Memory* {
+    return controller->computed() ? controller->loaded.policy->Start(1).release() : nullptr;
+  });
+}
+
+UPSWING_EXPORT(memory_close) void MemoryClose(Policy::Memory* memory) { delete memory; }
+
 /// What the policy makes of an observation (D): its torque, then the outputs of an actor, then the
-/// values.
+/// values. Without a memory, as at the beginning of an episode.
 UPSWING_EXPORT(policy_decide)
-int PolicyDecide(Controller* controller, const float* obs, double* row) {
+int PolicyDecide(Controller* controller, Policy::Memory* episode, const float* obs, double* row) {
   return Guarded([&] {
     const Policy& policy = *controller->loaded.policy;
     const int O = controller->outputs(), V = policy.num_values(), D = policy.obs_size();
     std::vector<float> outputs(static_cast<size_t>(O)), values(static_cast<size_t>(V));
     const Matrix<const float> observations(obs, 1, D);
-    Policy::Memory& memory = *controller->memory;
+    if (episode == nullptr && controller->computed()) controller->memory = policy.Start(1);
+    Policy::Memory& memory = episode != nullptr ? *episode : *controller->memory;
     policy.Act(observations, {row, 1, 1}, memory);
     if (O > 0) controller->actor->Outputs(observations, {outputs.data(), 1, O}, memory);
     if (V > 0) policy.Values(observations, {values.data(), 1, V}, memory);

@@ -5,25 +5,29 @@
 #include "io/file.h"
 #include "io/machine.h"
 #include "io/streams.h"
-#include "lab/controllers.h"
+#include "lab/loaded_policy.h"
 #include "mujoco/engines.h"
 #include "mujoco/model.h"
 
 namespace upswing {
 namespace {
 
-constexpr size_t kPage = 65536;             // bytes of WebAssembly's unit of memory
-constexpr size_t kMostMemory = 512u << 20;  // bytes, the same as in build.py
+constexpr size_t kPage = 65536;              // bytes of WebAssembly's unit of memory
+constexpr size_t kMemoryLimit = 512u << 20;  // bytes, the same as in build.py
 
 }  // namespace
 
 int64_t AvailableMemory() {
-  return static_cast<int64_t>(kMostMemory - kPage * __builtin_wasm_memory_size(0));
+  return static_cast<int64_t>(kMemoryLimit - kPage * __builtin_wasm_memory_size(0));
 }
 
 std::string InputName(const std::string& path) { return path; }
 
 std::string ReadOwnFile(const std::filesystem::path& path, size_t /*most_bytes*/) {
+  throw BadInput(Concat(path.string(), ": a page has no files"));
+}
+
+LoadedPolicy LoadPolicy(const std::filesystem::path& path) {
   throw BadInput(Concat(path.string(), ": a page has no files"));
 }
 

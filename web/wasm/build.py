@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Compiles core, nn, sim, rl and what a training needs of lab to WebAssembly, for the page.
+"""Compiles core, nn, sim, rl, control and what a training needs of lab to WebAssembly, for the page.
 
     build.py [MODULE]     writes MODULE, by default core.wasm beside this file
     build.py --versions   of what its bytes depend on, besides our sources
@@ -38,11 +38,11 @@ TARGET = ["-target", "wasm32-wasi", "-mcpu=generic+simd128+exception_handling+bu
 MEMORY = 512 << 20  # bytes at most; see browser.cc
 STACK = 1 << 20
 
-LAYERS = ["core", "nn", "sim", "rl"]
+LAYERS = ["core", "nn", "sim", "rl", "control"]
 # Where the time of a training goes is made fast, everything else small.
-FAST = ["nn/linear", "nn/product", "sim/closed_form", "rl/replay", "rl/sum_tree", "rl/n_step",
+FAST = ["nn/linear", "nn/product", "sim/closed_form", "control/trajectory", "control/pendulum_model", "rl/replay", "rl/sum_tree", "rl/n_step",
         "rl/sac_update"]
-LAB = ["config", "config_checks", "config_layers", "format", "loaded_policy", "task",
+LAB = ["config", "config_checks", "config_layers", "controllers", "format", "loaded_policy", "task",
        "toml_settings", "training"]
 
 # Of LLVM's libraries, what the module asks for.
@@ -51,8 +51,8 @@ CXXABI = ["abort_message", "cxa_aux_runtime", "cxa_default_handlers", "cxa_excep
           "fallback_malloc", "private_typeinfo", "stdlib_exception", "stdlib_new_delete",
           "stdlib_stdexcept", "stdlib_typeinfo"]
 CXX = ["algorithm", "call_once", "charconv", "chrono", "error_category", "exception", "functional",
-       "hash", "ios", "ios.instantiations", "locale", "memory", "new", "new_handler", "new_helpers",
-       "stdexcept", "string", "system_error", "variant", "vector", "verbose_abort", "ryu/d2fixed",
+       "hash", "memory", "new", "new_handler", "new_helpers",
+       "stdexcept", "string", "system_error", "variant", "vector", "verbose_abort",
        "ryu/d2s", "ryu/f2s", "filesystem/path"]
 
 # The tag by which throw and catch find each other, which clang expects of its run-time library.
@@ -126,7 +126,6 @@ def jobs():
     """Each source with its flags."""
     headers = WORK / "include"
     headers.mkdir(parents=True, exist_ok=True)
-    # Eigen's are included by what the page never calls; nothing of it is in the module.
     for name in ("nlohmann", "toml++", "fmt", "eigen3/Eigen"):
         link = headers / Path(name).name
         if not link.is_symlink():
@@ -140,7 +139,7 @@ def jobs():
     # Zig leaves files out of the C++ library's headers; what mentions them compiles with them, and
     # is not linked.
     own = ["-std=c++20", "-Wall", "-Wextra", "-Wpedantic", "-ffp-contract=off",
-           "-DFMT_HEADER_ONLY", f'-DUPSWING_VERSION="{version}"',
+           "-DFMT_HEADER_ONLY", "-DTOML_FLOAT_CHARCONV=1", f'-DUPSWING_VERSION="{version}"',
            "-U_LIBCPP_HAS_FILESYSTEM", "-D_LIBCPP_HAS_FILESYSTEM=1", *include(ROOT),
            *(f"-isystem{folder}" for folder in (headers, HIGHWAY, MUJOCO / "include"))]
     for source in [*own_sources(), agents]:

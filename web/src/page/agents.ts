@@ -55,6 +55,38 @@ const TITLES = new Map([
   ['ppo-discrete', 'PPO: one of some torques'],
 ]);
 
+/// Controllers that are made from the equations of motion (docs/control.md): title, and how they act.
+const COMPUTED: ReadonlyMap<string, readonly [string, string]> = new Map([
+  [
+    'lqr',
+    [
+      'LQR: only holds',
+      'A linear-quadratic regulator, which holds both links upright. It cannot swing them up: pause, and put them there.',
+    ],
+  ],
+  ['energy', ['Energy shaping', 'A formula pumps energy until the regulator (LQR) catches.']],
+  [
+    'pfl',
+    [
+      'Partial feedback linearisation',
+      'A formula swings the upper link until the regulator (LQR) catches.',
+    ],
+  ],
+  [
+    'tvlqr',
+    ['TVLQR: a planned swing-up', 'It planned one swing-up and corrects what departs from it.'],
+  ],
+  [
+    'mpc',
+    [
+      'MPC: always plans',
+      'Model predictive control: 50 times a second it plans the next 2.5 s and takes the plan’s first torque.',
+    ],
+  ],
+]);
+const NOT_LEARNED =
+  'Not learned, but computed from the equations of motion of the unchanged pendulum.';
+
 /// A title for an entry: that of its agent, and its ID if that says more.
 function titleOf({ id, agent }: Entry): string {
   const title = TITLES.get(agent) ?? printable(agent);
@@ -154,12 +186,13 @@ export class Agents {
       id: entry.id,
       title: titleOf(entry),
     }));
+    for (const [id, [title]] of COMPUTED) if (!this.entries.has(id)) list.push({ id, title });
     return this.own ? [...list, { id: OWN, title: ownTitle(this.own) }] : list;
   }
 
   /// Whether there is an agent of this id.
   has(id: string): boolean {
-    return this.entries.has(id) || (id === OWN && this.own !== null);
+    return this.entries.has(id) || COMPUTED.has(id) || (id === OWN && this.own !== null);
   }
 
   /// The name of the visitor's own file.
@@ -173,10 +206,20 @@ export class Agents {
     if (known) return known;
     if (id === OWN && this.own) return this.addOwn(this.own);
     const entry = this.entries.get(id);
-    if (!entry) throw new BadInput(`there is no agent ${quoted(id)}`);
+    if (!entry) return this.make(id);
     const policy = new Policy(await fetchPolicy(entry.file));
     const { command, curve } = entry;
     return this.add({ id, title: titleOf(entry), text: describe(policy), command, curve, policy });
+  }
+
+  /// One that is computed. Throws BadInput.
+  private make(id: string): Agent {
+    const computed = COMPUTED.get(id);
+    if (!computed) throw new BadInput(`there is no agent ${quoted(id)}`);
+    const [title, how] = computed;
+    const command = `./upswing simulate ${id}`;
+    const text = `${how} ${NOT_LEARNED}`;
+    return this.add({ id, title, text, command, curve: null, policy: new Policy(id) });
   }
 
   /// How an agent that comes with the page became what it is; null where that is not known.

@@ -8,6 +8,13 @@ import type { Moment, World } from '../world';
 import { element } from './dom';
 
 const FRAMES = 2; // the charts take turns: each is drawn at every second frame
+/// What the chart of a decision shows.
+const NAMES = {
+  q: 'Q-values',
+  gaussian: 'Policy',
+  categorical: 'Policy',
+  computed: 'Decision',
+} as const;
 const TORQUE_MEAN = 15; // control steps: a balancing agent changes its torque at each of them
 
 /// The charts and the numbers beside them.
@@ -78,7 +85,7 @@ export class Dashboard {
     tell('energy', `${fixed(energy(plant, state))} J of ${fixed(target)} J`);
     tell('height', `${fixed(tipHeight(plant, state))} m of ${fixed(reach)} m`);
     tell('torque', `${fixed(world.torque)} N·m`);
-    const name = decision?.kind === 'q' ? 'Q-values' : 'Policy';
+    const name = decision ? NAMES[decision.kind] : 'Policy';
     element('q-name').textContent = name;
     element('q').dataset.name = name;
     tell('q', policy && decision ? decisionText(decision, policy.rewardScale) : '');
@@ -116,6 +123,8 @@ export function decisionText(decision: Decision, rewardScale: number): string {
       const { mean, low, high } = decision.distribution;
       return `${fixed(mean)} N·m, σ ${fixed((high - low) / 2)}${value && `, V ${value}`}`;
     }
+    case 'computed':
+      return `${fixed(decision.torque)} N·m`;
     case 'categorical': {
       const percent = (100 * decision.probabilities[decision.action]!).toFixed(0);
       return `likeliest ${percent}%${value && `, V ${value}`}`;

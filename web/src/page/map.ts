@@ -51,6 +51,10 @@ export class MapPanel {
     if (!this.seen || !world.policy) return;
     if (this.policy !== world.policy) this.clear();
     this.policy = world.policy;
+    if (!world.policy.isQuick) {
+      element('map-value').textContent = 'not for one that plans';
+      return;
+    }
     if (++this.frame % FRAMES !== 0) return this.work(world);
     const way = history.from(world.time - WAY).map(({ state }) => state);
     this.chart.draw(this.map, ...this.range, way, world.state);

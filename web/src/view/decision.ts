@@ -1,4 +1,10 @@
-import type { CategoricalDecision, Decision, GaussianDecision, QDecision } from '../decision';
+import type {
+  CategoricalDecision,
+  ComputedDecision,
+  Decision,
+  GaussianDecision,
+  QDecision,
+} from '../decision';
 import type { GaussianTorque } from '../gaussian';
 import { Canvas } from './canvas';
 import { signed } from './charts';
@@ -24,7 +30,8 @@ export class DecisionChart {
     }
     if (decision.kind === 'q') this.drawQ(decision);
     else if (decision.kind === 'gaussian') this.drawGaussian(decision);
-    else this.drawProbabilities(decision);
+    else if (decision.kind === 'categorical') this.drawProbabilities(decision);
+    else this.drawComputed(decision);
   }
 
   private get bottom(): number {
@@ -77,8 +84,7 @@ export class DecisionChart {
   private drawGaussian({ distribution }: GaussianDecision): void {
     const { canvas, bottom } = this;
     const { limit, low, high, mean } = distribution;
-    const [left, right] = [10, canvas.width - 10];
-    const x = (torque: number) => left + ((torque + limit) / (2 * limit)) * (right - left);
+    const { left, right, x } = this.axis(limit);
     const pieces = Math.max(1, Math.round((right - left) / 2));
     const density = distribution.density(pieces);
     const top = Math.max(...density);
@@ -86,6 +92,26 @@ export class DecisionChart {
       left + ((i + 0.5) / pieces) * (right - left),
       bottom - (top > 0 ? value / top : 0) * (bottom - TOP),
     ]);
+    const within = points.filter(([at]) => at >= x(low) - 1 && at <= x(high) + 1);
+    if (within.length > 1) canvas.area(within, bottom, 'spread');
+    canvas.line(points, 'edge');
+    this.drawLine(x(mean));
+    this.writeCutOff(distribution, left, right);
+  }
+
+  /// A bar from 0 to the torque.
+  private drawComputed({ torque, limit }: ComputedDecision): void {
+    const { x } = this.axis(limit);
+    const [from, to] = [Math.min(x(0), x(torque)), Math.max(x(0), x(torque))];
+    this.canvas.rectangle(from, TOP, to - from, this.bottom - TOP, 'bar');
+    this.drawLine(x(torque));
+  }
+
+  /// The torques from -limit to limit, and where on the canvas each is.
+  private axis(limit: number) {
+    const { canvas, bottom } = this;
+    const [left, right] = [10, canvas.width - 10];
+    const x = (torque: number) => left + ((torque + limit) / (2 * limit)) * (right - left);
     canvas.line(
       [
         [left, bottom],
@@ -94,21 +120,22 @@ export class DecisionChart {
       'grid',
       1,
     );
-    const within = points.filter(([at]) => at >= x(low) - 1 && at <= x(high) + 1);
-    if (within.length > 1) canvas.area(within, bottom, 'spread');
-    canvas.line(points, 'edge');
-    canvas.line(
+    for (const torque of [-limit, 0, limit]) {
+      canvas.text(signed(torque), x(torque), canvas.height - 7, 'center');
+    }
+    return { left, right, x };
+  }
+
+  /// At the torque that is applied.
+  private drawLine(at: number): void {
+    this.canvas.line(
       [
-        [x(mean), TOP],
-        [x(mean), bottom],
+        [at, TOP],
+        [at, this.bottom],
       ],
       'torque',
       2.5,
     );
-    for (const torque of [-limit, 0, limit]) {
-      canvas.text(signed(torque), x(torque), canvas.height - 7, 'center');
-    }
-    this.writeCutOff(distribution, left, right);
   }
 
   /// How likely it is that more than the limit is asked for, at either end.
@@ -124,5 +151,6 @@ export class DecisionChart {
 function isFinite(decision: Decision): boolean {
   if (decision.kind === 'q') return decision.q.every(Number.isFinite);
   if (decision.kind === 'categorical') return decision.probabilities.every(Number.isFinite);
+  if (decision.kind === 'computed') return Number.isFinite(decision.torque);
   return Number.isFinite(decision.distribution.mean + decision.distribution.high);
 }
