@@ -4,7 +4,7 @@
     ./upswing study configs/studies/ten-thousand.toml
     ./upswing python tools/seeds/distribution.py runs/ten-thousand --out docs/seeds
 
-Prints the share that solves the task with its 95% interval and quantiles of steps, time and return.
+Prints the share that solves the task with its 95% interval and quantiles of steps and return.
 Writes GROUP.csv, a row for each seed, and histograms by gnuplot, GROUP.svg and GROUP.png.
 """
 
@@ -18,9 +18,8 @@ from pathlib import Path
 import numpy as np
 
 QUANTILES = [0, 0.001, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 0.999, 1]
-COLUMNS = {"solve_steps": "steps until solved", "solve_seconds": "seconds until solved",
-           "best_return": "return of the best policy", "final_return": "return at the end",
-           "final_success": "success at the end"}
+COLUMNS = {"solve_steps": "steps until solved", "best_return": "return of the best policy",
+           "final_return": "return at the end", "final_success": "success at the end"}
 
 
 def wilson(successes, trials):
