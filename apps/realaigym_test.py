@@ -73,6 +73,12 @@ class RealAIGym(ProgramTest):
         # Cells at an edge depend on rounding.
         self.assertAlmostEqual(found["robustness"]["score"], 0.945, delta=0.02)
 
+        found = json.loads(self.succeed("realaigym", ROOT / "docs/realaigym-acrobot.safetensors",
+                                        "--json"))
+        self.assertEqual(found["robot"], "acrobot")
+        self.assertAlmostEqual(found["performance"]["score"], 0.651, delta=0.002)
+        self.assertAlmostEqual(found["robustness"]["score"], 0.913, delta=0.02)
+
     def test_another_seed_is_another_policy(self):
         one, two = self.search("--seed", 1), self.search("--seed", 2)
         self.assertNotEqual(one["performance"], two["performance"])
