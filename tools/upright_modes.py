@@ -16,6 +16,8 @@ import pathlib
 import shlex
 import subprocess
 
+from seeds.wilson import wilson
+
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 EDGES = [0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, math.inf]
 
@@ -52,11 +54,9 @@ def plot(policies, results, file):
             chosen = [success for size, success in result if low <= size < high]
             if not chosen:
                 continue
-            n, p, z = len(chosen), sum(chosen) / len(chosen), 1.959963984540054
-            middle = (p + z * z / (2 * n)) / (1 + z * z / n)
-            half = z / (1 + z * z / n) * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
+            shares = sum(chosen) / len(chosen), *wilson(sum(chosen), len(chosen))
             x = at + 0.12 * (k - (len(policies) - 1) / 2)
-            points.append(f"{x} {100 * p} {100 * (middle - half)} {100 * (middle + half)}")
+            points.append(" ".join(str(number) for number in (x, *(100 * share for share in shares))))
         color = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00"][k % 5]
         lines.append(f"$d{k} << EOD\n" + "\n".join(points) + "\nEOD")
         curves.append(f"$d{k} with yerrorlines pt 7 ps 0.8 lw 2 lc rgb '{color}' "

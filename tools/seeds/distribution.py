@@ -17,18 +17,11 @@ from pathlib import Path
 
 import numpy as np
 
+from wilson import wilson
+
 QUANTILES = [0, 0.001, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 0.999, 1]
 COLUMNS = {"solve_steps": "steps until solved", "best_return": "return of the best policy",
            "final_return": "return at the end", "final_success": "success at the end"}
-
-
-def wilson(successes, trials):
-    """95% score interval of a share (Wilson, 1927)."""
-    z = 1.959963984540054
-    p = successes / trials
-    center = (p + z * z / (2 * trials)) / (1 + z * z / trials)
-    half = z / (1 + z * z / trials) * math.sqrt(p * (1 - p) / trials + z * z / (4 * trials**2))
-    return max(0, center - half), min(1, center + half)
 
 
 def read(folder, group):
