@@ -1,7 +1,6 @@
 #include "lab/c_samples.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -67,30 +66,22 @@ class Observer {
     }
     const auto now = upswing::Observe(policy_.loaded->plant, {s[0], s[1], s[2], s[3]});
     std::vector<float> obs(now.begin(), now.end());
-    std::vector<float> memory = memory_;
-    if (!before_.empty()) {
-      const std::array<double, kMemorySize> entry{(s[2] - before_[2]) / kMemoryVelocity,
-                                                  (s[3] - before_[3]) / kMemoryVelocity,
-                                                  torque_ / kMemoryTorque};
-      memory.insert(memory.begin(), entry.begin(), entry.end());
-    }
-    memory.resize(static_cast<size_t>(policy_.obs_size() - kObservationSize));
-    obs.insert(obs.end(), memory.begin(), memory.end());
+    obs.resize(static_cast<size_t>(policy_.obs_size()));
+    const int steps = MemorySteps(policy_.obs_size());
+    if (steps > 0 && !before_.empty()) upswing::Remember(before_, torque_, steps, obs);
     return obs;
   }
 
-  /// The policy has chosen a torque there, given its observation.
-  void Remember(std::span<const double> s, std::span<const float> obs, double torque) {
-    before_.assign(s.begin(), s.end());
-    if (!env_) memory_.assign(obs.begin() + kObservationSize, obs.end());
+  /// The policy has chosen a torque at this observation.
+  void Remember(std::span<const float> obs, double torque) {
+    before_.assign(obs.begin(), obs.end());
     torque_ = torque;
   }
 
  private:
   const ExportedPolicy& policy_;
   std::unique_ptr<VectorEnv> env_;  // of a task without memory
-  std::vector<double> before_;      // (S) the last state; empty: there is none
-  std::vector<float> memory_;       // what its observation remembered
+  std::vector<float> before_;       // (D) the last observation; empty: there is none
   double torque_ = 0;               // chosen there
 };
 
@@ -132,7 +123,7 @@ CSamples DrawSamples(const ExportedPolicy& policy, const std::vector<PlainLayer>
     all_clear = all_clear && IsClear(outputs);
     double torque = 0;
     policy.loaded->policy->Act({obs.data(), 1, policy.obs_size()}, {&torque, 1, 1}, *memory);
-    observer.Remember(state, obs, torque);
+    observer.Remember(obs, torque);
     samples.states.insert(samples.states.end(), state.begin(), state.end());
     samples.outputs.insert(samples.outputs.end(), outputs.begin(), outputs.end());
     samples.torques.push_back(static_cast<float>(torque));

@@ -1,8 +1,6 @@
 #include "lab/export_actors.h"
 
 #include <array>
-#include <cmath>
-#include <numbers>
 
 #include "core/rng.h"
 #include "core/safetensors.h"
@@ -11,6 +9,7 @@
 #include "lab/loaded_policy.h"
 #include "nn/actor_policy.h"
 #include "nn/gaussian.h"
+#include "rl/softmax.h"
 
 namespace upswing {
 namespace {
@@ -61,29 +60,21 @@ std::string FileAsHex(const ActorPolicy& policy) {
   return hex;
 }
 
-/// The probability with which it draws a torque of at most `share` of its limit, -1 < share < 1.
-double ProbabilityUpTo(double share, ActorOutput output, std::span<const float> outputs) {
-  const auto u = Gaussian<double>::From(outputs[0], outputs[1]);
-  const double at = output == ActorOutput::kSquashedGaussian ? std::atanh(share) : share;
-  return std::erfc((u.mean - at) / (u.std * std::numbers::sqrt2)) / 2;
-}
-
-/// A Gaussian's probabilities of equal pieces of the range of torques, a categorical's of its
-/// torques.
+/// A Gaussian's probabilities of equal pieces of the range of torques, the ends with what is cut
+/// off there; a categorical's of its torques.
 std::vector<double> Probabilities(ActorOutput output, std::span<const float> outputs) {
-  std::vector<double> probabilities;
   if (output == ActorOutput::kCategorical) {
-    double sum = 0;
-    for (const float logit : outputs) sum += std::exp(double{logit});
-    for (const float logit : outputs) probabilities.push_back(std::exp(double{logit}) / sum);
+    const std::vector<double> logits(outputs.begin(), outputs.end());
+    std::vector<double> probabilities(logits.size());
+    Softmax<double>(logits, probabilities);
     return probabilities;
   }
-  double below = 0;
-  for (int i = 1; i <= kPieces; ++i) {
-    const double up_to = i == kPieces ? 1 : ProbabilityUpTo(2.0 * i / kPieces - 1, output, outputs);
-    probabilities.push_back(up_to - below);
-    below = up_to;
-  }
+  std::vector<double> all(kPieces + 2);
+  ActionProbabilities(Gaussian<double>::From(outputs[0], outputs[1]),
+                      output == ActorOutput::kSquashedGaussian, all);
+  std::vector<double> probabilities(all.begin() + 1, all.end() - 1);
+  probabilities.front() += all.front();
+  probabilities.back() += all.back();
   return probabilities;
 }
 

@@ -194,19 +194,21 @@ void ActorPolicy::Spread(Matrix<const float> obs, Matrix<double> low, Matrix<dou
                                static_cast<size_t>(num_outputs()));
   const Matrix<float> rows(outputs, obs.rows(), num_outputs());
   Outputs(obs, rows, memory);
-  const auto A = static_cast<size_t>(action_size());
-  for (int i = 0; i < obs.rows(); ++i) {
-    const std::span<const float> row = rows.row(i);
-    if (parts_.output == ActorOutput::kCategorical) {
-      low(i, 0) = CategoricalQuantile(parts_.torques, row, kLowTail);
-      high(i, 0) = CategoricalQuantile(parts_.torques, row, 1 - kLowTail);
-      continue;
-    }
-    for (size_t k = 0; k < A; ++k) {
-      const auto u = Gaussian<double>::From(row[k], row[A + k]);
-      low(i, static_cast<int>(k)) = Bounded(u.mean - u.std, k);
-      high(i, static_cast<int>(k)) = Bounded(u.mean + u.std, k);
-    }
+  for (int i = 0; i < obs.rows(); ++i) Spread(rows.row(i), low.row(i), high.row(i));
+}
+
+void ActorPolicy::Spread(std::span<const float> outputs, std::span<double> low,
+                         std::span<double> high) const {
+  if (parts_.output == ActorOutput::kCategorical) {
+    low[0] = CategoricalQuantile(parts_.torques, outputs, kLowTail);
+    high[0] = CategoricalQuantile(parts_.torques, outputs, 1 - kLowTail);
+    return;
+  }
+  const auto A = parts_.action_limit.size();
+  for (size_t k = 0; k < A; ++k) {
+    const auto u = Gaussian<double>::From(outputs[k], outputs[A + k]);
+    low[k] = Bounded(u.mean - u.std, k);
+    high[k] = Bounded(u.mean + u.std, k);
   }
 }
 

@@ -65,6 +65,10 @@ class ActorPolicy : public Policy {
   /// These (N × num_outputs).
   void Outputs(Matrix<const float> obs, Matrix<float> outputs, Memory& memory) const;
 
+  /// The action (A) that these outputs choose, and the spread of those that they draw.
+  void Choose(std::span<const float> outputs, std::span<double> action) const;
+  void Spread(std::span<const float> outputs, std::span<double> low, std::span<double> high) const;
+
   /// The checks on loading.
   const SelfCheck& self_check() const { return self_check_; }
 
@@ -76,8 +80,6 @@ class ActorPolicy : public Policy {
   static bool IsOutput(const std::string& text);
 
  private:
-  /// The action (A) that these outputs choose.
-  void Choose(std::span<const float> outputs, std::span<double> action) const;
   /// Component k of the action that a Gaussian's u (nn/gaussian.h) stands for.
   double Bounded(double u, size_t k) const;
   void CheckFile(const Tensors& file);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 
 /// Diagonal Gaussian policies, one action component at a time; of several, log-probabilities add
 /// up. u = μ + σ ε with ε ~ N(0, 1) is the unbounded action; a squashed policy's action is
@@ -27,6 +28,25 @@ struct Gaussian {
     return {mean, clamped, std::exp(clamped), clamped != log_std};
   }
 };
+
+/// Φ(x), the distribution function of a standard normal.
+inline double NormalCdf(double x) { return std::erfc(-x / std::numbers::sqrt2) / 2; }
+
+/// How likely the actions are of a policy that is squashed, or cut off at ±1 (n + 2): -1 as what is
+/// cut off there, n equal pieces of the range between, and 1 as what is cut off there.
+inline void ActionProbabilities(const Gaussian<double>& policy, bool squashed,
+                                std::span<double> probabilities) {
+  const size_t pieces = probabilities.size() - 2;
+  double below = 0;
+  for (size_t i = 0; i <= pieces; ++i) {
+    const double end = 2 * static_cast<double>(i) / static_cast<double>(pieces) - 1;
+    const double u = squashed ? std::atanh(end) : end;
+    const double up_to = NormalCdf((u - policy.mean) / policy.std);
+    probabilities[i] = up_to - below;
+    below = up_to;
+  }
+  probabilities.back() = 1 - below;
+}
 
 /// ln N(u; μ, σ²) of the sample that `epsilon` = (u - μ)/σ makes.
 template <typename T>

@@ -2,17 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "nn/gaussian.h"
 #include "rl/softmax.h"
 
 namespace upswing {
 namespace {
 
 constexpr double kStdInBins = 0.75;
-
-/// The distribution function of a standard normal.
-double NormalCdf(double x) { return std::erfc(-x / std::numbers::sqrt2) / 2; }
 
 }  // namespace
 

@@ -35,10 +35,10 @@ test('of every kind of output', () => {
   const outputs = actors.map(({ file }) => new Policy(file).about('output'));
   expect(new Set(outputs).size).toBe(3);
   expect(actors.map(({ file }) => new Policy(file).controller.text)).toEqual([
-    'Actor 8-12-10: a Gaussian squashed by tanh, layer normalisation; critic 9-10',
-    'Actor 8-8: a Gaussian squashed by tanh',
-    'Actor 8-10-8: a Gaussian, clipped; critic 8-10',
-    'Actor 8-12: one of 5 torques, layer normalisation; critic 8-10',
+    'mean action of a Gaussian policy 8-12-10-2, layer normalisation, critic 9-10-1',
+    'mean action of a Gaussian policy 8-8-2',
+    'mean action of a Gaussian policy 8-10-8-2, critic 8-10-1',
+    'likeliest action of a categorical policy 8-12-5, layer normalisation, critic 8-10-1',
   ]);
 });
 
@@ -58,14 +58,12 @@ test.each([0, 1, 2, 3])('actor %i decides as the C++ program does', (which) => {
       continue;
     }
     if (decision.kind !== 'gaussian') throw new Error(`got a decision of kind ${decision.kind}`);
-    const { distribution } = decision;
-    near(distribution.mean, torque, 1e-5);
-    near(distribution.low, low, 1e-5);
-    near(distribution.high, high, 1e-5);
-    const width = 10 / probabilities.length;
-    const shares = distribution.density(probabilities.length).map((p) => p * width);
-    shares[0]! += distribution.upTo(-5);
-    shares[shares.length - 1]! += 1 - distribution.upTo(5);
+    near(decision.low, low, 1e-5);
+    near(decision.high, high, 1e-5);
+    const [below, ...shares] = decision.probabilities(probabilities.length);
+    const above = shares.pop()!;
+    shares[0]! += below!;
+    shares[shares.length - 1]! += above;
     probabilities.forEach((p, i) => near(shares[i]!, p, 1e-5));
   }
 });

@@ -19,6 +19,20 @@ interface Exports {
   memory_open(policy: number): number;
   memory_close(memory: number): void;
   policy_decide(policy: number, memory: number, observation: number, row: number): number;
+  gaussian_probabilities(
+    mean: number,
+    logStd: number,
+    squashed: number,
+    to: number,
+    count: number,
+  ): void;
+  observation_remember(
+    before: number,
+    torque: number,
+    steps: number,
+    observation: number,
+    size: number,
+  ): void;
   numbers(): number;
   pendulum_at(): void;
   identifier_open(): number;
@@ -98,6 +112,17 @@ export class Core {
     const at = this.exports.reserve(Math.max(1, size));
     if (at === 0) throw new BadInput('it does not fit into the memory that a page has');
     return at;
+  }
+
+  /// A copy of `count` numbers that `work` writes to an address.
+  numbers(count: number, work: (at: number) => void): Float64Array {
+    const at = this.reserve(8 * count);
+    try {
+      work(at);
+      return new Float64Array(this.exports.memory.buffer, at, count).slice();
+    } finally {
+      this.exports.release(at);
+    }
   }
 
   /// Calls `use` with the address and size of `bytes` in the module's memory.

@@ -1,5 +1,3 @@
-import type { GaussianTorque } from './gaussian';
-
 /// What a policy makes of an observation, for the motor and for who watches.
 
 interface Choice {
@@ -11,14 +9,19 @@ interface Choice {
 export interface QDecision extends Choice {
   kind: 'q';
   torques: Float64Array; // (A) N·m
-  q: Float32Array; // (A)
+  q: Float64Array; // (A)
   action: number; // which of them
 }
 
 /// Of an actor that draws from a Gaussian: its mean.
 export interface GaussianDecision extends Choice {
   kind: 'gaussian';
-  distribution: GaussianTorque;
+  limit: number; // N·m
+  low: number; // N·m, the ends of the central 68% of the torques that it would draw
+  high: number;
+  /// The probability of being cut off at -limit, of each of so many equal pieces of the range, and of
+  /// being cut off at limit.
+  probabilities(pieces: number): Float64Array;
 }
 
 /// Of an actor that draws one of some torques: the likeliest.
@@ -55,11 +58,4 @@ export interface Controller {
   begin(): Memory | null;
   /// Frees what it holds; nothing may be asked of it after.
   close(): void;
-}
-
-/// Index of the largest number, the first of equals.
-export function argMax(values: ArrayLike<number>): number {
-  let best = 0;
-  for (let i = 1; i < values.length; ++i) if (values[i]! > values[best]!) best = i;
-  return best;
 }

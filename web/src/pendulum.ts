@@ -116,9 +116,9 @@ export function tipHeight(plant: Plant, s: State): number {
   return at(plant, s)[11]!;
 }
 
-/// The same over l1 + l2: -1 hanging, 1 upright.
+/// The same over l1 + l2, as in the observation: -1 hanging, 1 upright.
 export function relativeHeight(plant: Plant, s: State): number {
-  return tipHeight(plant, s) / (plant.length1 + plant.length2);
+  return at(plant, s)[7]!;
 }
 
 /// Both links within 30° of straight up; the second by its absolute angle q1 + q2.
@@ -127,13 +127,29 @@ export function inverted(s: State): boolean {
 }
 
 export const OBSERVATION_SIZE = 8;
-/// Heuristic largest velocities (rad/s), by which the observation divides.
-export const MAX_VELOCITY: readonly [number, number] = [10, 20];
-
 /// [cos q1, sin q1, w1/10, cos q2, sin q2, w2/20, Ê, ĥ] with Ê = normalizedEnergy and ĥ =
 /// relativeHeight.
 export function observe(plant: Plant, s: State): Float32Array {
   return Float32Array.from(at(plant, s).subarray(0, OBSERVATION_SIZE));
+}
+
+/// The observation with what it remembers of so many control steps, its last numbers: `before` is that of a
+/// step earlier, at which `torque` (N·m) was chosen.
+export function remember(
+  before: Float32Array,
+  torque: number,
+  steps: number,
+  observation: Float32Array,
+): Float32Array {
+  const { length: size, byteLength } = observation;
+  const both = new Float32Array(2 * size);
+  both.set(before);
+  both.set(observation, size);
+  return core().withBytes(new Uint8Array(both.buffer), (at) => {
+    const { exports } = core();
+    exports.observation_remember(at, torque, steps, at + byteLength, size);
+    return new Float32Array(exports.memory.buffer, at + byteLength, size).slice();
+  });
 }
 
 /// The reward's five terms for being in state s under torque tau, signed, so that their sum is the

@@ -56,7 +56,7 @@ describe('a policy', () => {
   test('is read, and computes what the C++ program did', () => {
     const policy = new Policy(changed(() => {}));
     expect(policy.controller.selfCheckError).toBeLessThan(1e-4);
-    expect(policy.controller.text).toContain('9 torques');
+    expect(policy.controller.text).toContain('→9');
     expect(policy.trainedRange('mass1')).toEqual([1, 1]);
   });
 

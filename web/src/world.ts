@@ -1,7 +1,6 @@
 import { DelayLine, measure } from './disturbance';
 import type { Disturbance } from './disturbance';
 import { Identifier } from './identifier';
-import { withMemory } from './observation';
 import {
   CONTROL_PERIOD,
   HANGING,
@@ -11,6 +10,7 @@ import {
   observe,
   PHYSICS_STEPS,
   relativeHeight,
+  remember,
 } from './pendulum';
 import type { Plant, State } from './pendulum';
 import type { Decision, Memory } from './decision';
@@ -182,8 +182,8 @@ export class World {
     const { policy } = this;
     if (!policy) return null;
     const now = this.present(state);
-    const observation = withMemory(now, policy.memory, null, 0);
-    if (this.observation) observation.set(this.observation.subarray(now.length), now.length);
+    const observation = this.observation?.slice() ?? new Float32Array(policy.controller.inputs);
+    observation.set(now);
     return policy.act(observation);
   }
 
@@ -197,8 +197,14 @@ export class World {
 
   /// The observation at this moment.
   private observe(measured = this.measured()): Float32Array {
-    const { policy, observation, chosen } = this;
-    return withMemory(this.present(measured), policy?.memory ?? 0, observation, chosen);
+    const { policy, observation: before, chosen } = this;
+    const now = this.present(measured);
+    if (!policy) return now;
+    const observation = new Float32Array(policy.controller.inputs);
+    observation.set(now);
+    return before && policy.memory > 0
+      ? remember(before, chosen, policy.memory, observation)
+      : observation;
   }
 
   private measured(): State {

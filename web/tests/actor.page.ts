@@ -30,7 +30,7 @@ test('the chart is that of the policy, and Q-values come back with a Q-network',
     await expect(page.locator('#q-value')).toHaveText(CHARTS[i]!);
     await expect(page.locator('#q-name')).toHaveText('Policy');
     await expect(page.locator('#q')).toHaveAccessibleName(/^Policy: /);
-    await expect(page.locator('#agent-text')).toContainText('Actor 8-');
+    await expect(page.locator('#agent-text')).toContainText(' policy 8-');
     await expect(page.locator('label[for=torque_limit]')).toContainText('agent: ±5');
     await page.locator('#agent').selectOption('d3qn');
     await expect(page.locator('#q-name')).toHaveText('Q-values');
@@ -56,13 +56,13 @@ test.describe('on a canvas that is read back', () => {
         let painted = 0;
         for (let at = 3; at < data.length; at += 4) painted += data[at]! > 0 ? 1 : 0;
         const ratio = canvas.width / canvas.clientWidth;
-        const { distribution } = upswing.world.decision as { distribution: { mean: number } };
-        const at = 10 + ((distribution.mean + 5) / 10) * (canvas.clientWidth - 20);
+        const { torque } = upswing.world.decision!;
+        const at = 10 + ((torque + 5) / 10) * (canvas.clientWidth - 20);
         const column = Math.floor(at * ratio);
         let line = 0;
         const rows = Math.round((canvas.clientHeight - 24) * ratio);
         for (let y = Math.round(6 * ratio); y < rows; ++y) line += alpha(column, y) > 200 ? 1 : 0;
-        return { painted: painted / (width * height), line: line / rows, mean: distribution.mean };
+        return { painted: painted / (width * height), line: line / rows, mean: torque };
       });
     const means = new Set<number>();
     for (const file of actorFiles().slice(0, 3)) {

@@ -1,12 +1,17 @@
 // What the page calls: policies, formulas, learners. Objects are pointers, which the page deletes;
 // texts are UTF-8, most of them JSON. A call that fails returns 0 and leaves a line of text.
 #include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
 
 #include "core/safetensors.h"
 #include "lab/controllers.h"
 #include "lab/loaded_policy.h"
 #include "nn/actor_policy.h"
+#include "nn/gaussian.h"
 #include "nn/q_policy.h"
+#include "rl/softmax.h"
 #include "sim/identification.h"
 #include "web/wasm/learner.h"
 
@@ -48,7 +53,16 @@ struct Controller {
         q(dynamic_cast<const QPolicy*>(&*loaded.policy)),
         memory(loaded.policy->Start(1)) {}
 
-  int outputs() const { return actor == nullptr ? 0 : actor->num_outputs(); }
+  bool gaussian() const {
+    return actor != nullptr && actor->parts().output != ActorOutput::kCategorical;
+  }
+  /// The torques (A, N·m) of which it takes one; none if it may take any.
+  std::span<const double> torques() const {
+    if (actor != nullptr) return actor->parts().torques;
+    return loaded.policy->value_actions().values();
+  }
+  /// How many numbers a decision has; see PolicyDecide.
+  size_t columns() const { return 2 + (gaussian() ? 4 : torques().size()); }
   /// Whether it is made from the equations of motion, and may have plans.
   bool computed() const { return actor == nullptr && q == nullptr; }
   double self_check_error() const {
@@ -66,6 +80,8 @@ struct Controller {
   std::unique_ptr<Policy::Memory> memory;  // of what has no plans
 };
 
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
 const char* KindOf(const Controller& c) {
   if (c.computed()) return "computed";
   if (c.actor == nullptr) return "q";
@@ -82,19 +98,11 @@ const char* KindOf(const Controller& c) {
 
 json About(const Controller& c, const std::map<std::string, std::string>& metadata) {
   const Policy& policy = *c.loaded.policy;
-  std::vector<double> torques;
-  if (c.actor != nullptr) {
-    torques = c.actor->parts().torques;
-  } else {
-    const Matrix<const double> actions = policy.value_actions();
-    torques.assign(actions.values().begin(), actions.values().end());
-  }
   return {{"kind", KindOf(c)},
           {"text", policy.description()},
           {"inputs", policy.obs_size()},
-          {"outputs", c.outputs()},
-          {"values", policy.num_values()},
-          {"torques", torques},
+          {"columns", c.columns()},
+          {"torques", c.torques()},
           {"limit", c.limit()},
           {"memory", c.loaded.memory()},
           {"identifies", c.loaded.identifies()},
@@ -109,6 +117,36 @@ Plant PlantAt(const double* values) {
     *field = *values++;
   }
   return plant;
+}
+
+/// The torque of a Q-network, V and Q.
+void DecideByQ(const Controller& c, Matrix<const float> obs, Policy::Memory& memory,
+               std::span<double> row) {
+  std::vector<float> q(c.torques().size());
+  c.q->Act(obs, {row.data(), 1, 1}, memory);
+  c.q->Values(obs, {q.data(), 1, static_cast<int>(q.size())}, memory);
+  // Q = V + A - mean(A), so that V is their mean; a plain network has none.
+  const double sum = std::accumulate(q.begin(), q.end(), 0.0);
+  row[1] = c.q->shape().dueling ? sum / static_cast<double>(q.size()) : kNone;
+  std::ranges::copy(q, row.data() + 2);
+}
+
+/// The torque of an actor, V of its critic, and what it would draw while it learns.
+void DecideByActor(const Controller& c, Matrix<const float> obs, Policy::Memory& memory,
+                   std::span<double> row) {
+  std::vector<float> outputs(static_cast<size_t>(c.actor->num_outputs()));
+  float value = static_cast<float>(kNone);
+  c.actor->Outputs(obs, {outputs.data(), 1, c.actor->num_outputs()}, memory);
+  c.actor->Choose(outputs, row.first(1));
+  if (c.actor->num_values() > 0) c.actor->Values(obs, {&value, 1, 1}, memory);
+  row[1] = value;
+  if (c.gaussian()) {
+    c.actor->Spread(outputs, row.subspan(2, 1), row.subspan(3, 1));
+    std::ranges::copy(outputs, row.data() + 4);
+  } else {
+    const std::vector<double> logits(outputs.begin(), outputs.end());
+    Softmax<double>(logits, row.subspan(2));
+  }
 }
 
 }  // namespace
@@ -166,23 +204,42 @@ UPSWING_EXPORT(memory_open) Policy::Memory* MemoryOpen(const Controller* control
 
 UPSWING_EXPORT(memory_close) void MemoryClose(Policy::Memory* memory) { delete memory; }
 
-/// What the policy makes of an observation (D): its torque, then the outputs of an actor, then the
-/// values. Without a memory, as at the beginning of an episode.
+/// What the policy makes of an observation (D): its torque; V, NaN where it estimates none; and
+/// then Q of each torque, or of an actor the probability of each torque, or the ends of the central
+/// 68% of a Gaussian (N·m), μ and ln σ. Without a memory, as at the beginning of an episode.
 UPSWING_EXPORT(policy_decide)
-int PolicyDecide(Controller* controller, Policy::Memory* episode, const float* obs, double* row) {
+int PolicyDecide(Controller* controller, Policy::Memory* episode, const float* obs, double* to) {
   return Guarded([&] {
-    const Policy& policy = *controller->loaded.policy;
-    const int O = controller->outputs(), V = policy.num_values(), D = policy.obs_size();
-    std::vector<float> outputs(static_cast<size_t>(O)), values(static_cast<size_t>(V));
-    const Matrix<const float> observations(obs, 1, D);
-    if (episode == nullptr && controller->computed()) controller->memory = policy.Start(1);
-    Policy::Memory& memory = episode != nullptr ? *episode : *controller->memory;
-    policy.Act(observations, {row, 1, 1}, memory);
-    if (O > 0) controller->actor->Outputs(observations, {outputs.data(), 1, O}, memory);
-    if (V > 0) policy.Values(observations, {values.data(), 1, V}, memory);
-    std::ranges::copy(values, std::ranges::copy(outputs, row + 1).out);
+    Controller& c = *controller;
+    const Policy& policy = *c.loaded.policy;
+    const Matrix<const float> observation(obs, 1, policy.obs_size());
+    const std::span<double> row(to, c.columns());
+    if (episode == nullptr && c.computed()) c.memory = policy.Start(1);
+    Policy::Memory& memory = episode != nullptr ? *episode : *c.memory;
+    if (c.q != nullptr) {
+      DecideByQ(c, observation, memory, row);
+    } else if (c.actor != nullptr) {
+      DecideByActor(c, observation, memory, row);
+    } else {
+      policy.Act(observation, {to, 1, 1}, memory);
+      row[1] = kNone;
+    }
+    if (!std::isfinite(row[0])) row[0] = 0;  // numbers that overflowed on the way move nothing
     return 1;
   });
+}
+
+/// How likely a Gaussian's actions are; see nn/gaussian.h.
+UPSWING_EXPORT(gaussian_probabilities)
+void GaussianProbabilities(double mean, double log_std, int squashed, double* to, size_t count) {
+  ActionProbabilities(Gaussian<double>::From(mean, log_std), squashed != 0, {to, count});
+}
+
+/// Writes what an observation (D) remembers of so many steps: `before` is the one before it, at
+/// which the torque was chosen.
+UPSWING_EXPORT(observation_remember)
+void ObservationRemember(const float* before, double torque, int steps, float* obs, size_t size) {
+  Remember({before, size}, torque, steps, {obs, size});
 }
 
 // ----------------------------------------------------------------------------------------------

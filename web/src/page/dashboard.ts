@@ -120,8 +120,8 @@ export function decisionText(decision: Decision, rewardScale: number): string {
     case 'q':
       return `best ${reward(decision.q[decision.action]!)}${value && `, state ${value}`}`;
     case 'gaussian': {
-      const { mean, low, high } = decision.distribution;
-      return `${fixed(mean)} N·m, σ ${fixed((high - low) / 2)}${value && `, V ${value}`}`;
+      const { torque, low, high } = decision;
+      return `${fixed(torque)} N·m, σ ${fixed((high - low) / 2)}${value && `, V ${value}`}`;
     }
     case 'computed':
       return `${fixed(decision.torque)} N·m`;

@@ -5,7 +5,6 @@ import type {
   GaussianDecision,
   QDecision,
 } from '../decision';
-import type { GaussianTorque } from '../gaussian';
 import { Canvas } from './canvas';
 import { signed } from './charts';
 
@@ -81,12 +80,12 @@ export class DecisionChart {
 
   /// The density over the torques, as high as the chart; its central 68% in colour, and a line at
   /// the mean, which is applied.
-  private drawGaussian({ distribution }: GaussianDecision): void {
+  private drawGaussian({ limit, low, high, torque, probabilities }: GaussianDecision): void {
     const { canvas, bottom } = this;
-    const { limit, low, high, mean } = distribution;
     const { left, right, x } = this.axis(limit);
     const pieces = Math.max(1, Math.round((right - left) / 2));
-    const density = distribution.density(pieces);
+    const shares = probabilities(pieces);
+    const density = shares.subarray(1, -1);
     const top = Math.max(...density);
     const points = Array.from(density, (value, i): [number, number] => [
       left + ((i + 0.5) / pieces) * (right - left),
@@ -95,8 +94,8 @@ export class DecisionChart {
     const within = points.filter(([at]) => at >= x(low) - 1 && at <= x(high) + 1);
     if (within.length > 1) canvas.area(within, bottom, 'spread');
     canvas.line(points, 'edge');
-    this.drawLine(x(mean));
-    this.writeCutOff(distribution, left, right);
+    this.drawLine(x(torque));
+    this.writeCutOff(shares[0]!, shares.at(-1)!, left, right);
   }
 
   /// A bar from 0 to the torque.
@@ -139,9 +138,7 @@ export class DecisionChart {
   }
 
   /// How likely it is that more than the limit is asked for, at either end.
-  private writeCutOff(distribution: GaussianTorque, left: number, right: number): void {
-    const { limit } = distribution;
-    const [low, high] = [distribution.upTo(-limit), 1 - distribution.upTo(limit)];
+  private writeCutOff(low: number, high: number, left: number, right: number): void {
     const percent = (share: number) => `${Math.round(100 * share)}%`;
     if (low >= CUT_OFF) this.canvas.text(percent(low), left - 8, 10, 'left');
     if (high >= CUT_OFF) this.canvas.text(percent(high), right + 8, 10, 'right');
@@ -152,5 +149,5 @@ function isFinite(decision: Decision): boolean {
   if (decision.kind === 'q') return decision.q.every(Number.isFinite);
   if (decision.kind === 'categorical') return decision.probabilities.every(Number.isFinite);
   if (decision.kind === 'computed') return Number.isFinite(decision.torque);
-  return Number.isFinite(decision.distribution.mean + decision.distribution.high);
+  return Number.isFinite(decision.low + decision.high);
 }
