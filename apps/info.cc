@@ -22,6 +22,7 @@
 #include "nn/actor_policy.h"
 #include "nn/bfloat16.h"
 #include "nn/q_policy.h"
+#include "sim/double_pendulum.h"
 
 namespace upswing {
 namespace {
@@ -32,6 +33,21 @@ namespace fs = std::filesystem;
 std::string Known(const std::string& text) { return text.empty() ? "unknown" : Printable(text); }
 std::string Known(std::optional<int64_t> count) {
   return count ? std::to_string(*count) : "unknown";
+}
+
+/// What a policy of the double pendulum sees.
+std::string ObservationText(const LoadedPolicy& loaded) {
+  std::string text = fmt::format("{} numbers of the motion", kObservationSize);
+  if (loaded.identifies()) {
+    text += fmt::format(", {} of the plant as it identifies it", kIdentifiedSize);
+  }
+  const int steps = loaded.memory();
+  if (steps > 0) {
+    text +=
+        fmt::format(", {} of {}", kMemorySize,
+                    steps == 1 ? "the last step" : fmt::format("each of the last {} steps", steps));
+  }
+  return text;
 }
 
 /// How the policy did in the evaluation that it was kept for.
@@ -92,6 +108,7 @@ void PrintPolicy(const LoadedPolicy& loaded) {
              Known(info.seed), Known(info.step), Known(info.upswing_version));
   fmt::print("  evaluated   {}\n", EvaluationText(info));
   if (loaded.task == kDoublePendulum) {
+    fmt::print("  observes    {}\n", ObservationText(loaded));
     fmt::print("  plant       {}\n", PlantText(loaded.plant));
   }
   const std::optional<ModelInfo> model = InfoOfModel(loaded.mjcf, "");

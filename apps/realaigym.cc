@@ -72,8 +72,8 @@ void PrintReport(const GymReport& report) {
   PrintEntry(ours);
   fmt::print("  published\n");
   for (const GymEntry& entry : PublishedGymEntries(robot)) PrintEntry(entry);
-  fmt::print("  723 simulations of 10 s in {:.2f} s; largest torque {:.2f} N·m\n", report.seconds,
-             report.nominal.max_torque);
+  fmt::print("  {} simulations of 10 s in {:.2f} s; largest torque {:.2f} N·m\n", kGymSimulations,
+             report.seconds, report.nominal.max_torque);
   if (!report.nominal.above_line) {
     fmt::print("  it does not swing up: the tip is not above 0.45 m at the end\n");
   }
@@ -145,7 +145,7 @@ int RunGym(const GymArguments& a) {
   if (StopSignal() != 0) return 128 + StopSignal();
   GymReport report;
   {
-    EpisodeProgress progress(723, a.as_json);
+    EpisodeProgress progress(kGymSimulations, a.as_json);
     report = ScoreGym(competitor, static_cast<uint64_t>(a.case_seed), pool,
                       [&](double share) { progress.Show(share); });
   }

@@ -10,6 +10,7 @@
 #include "lab/loaded_policy.h"
 #include "nn/actor_policy.h"
 #include "nn/q_policy.h"
+#include "realaigym/swing_policy.h"
 
 namespace upswing {
 namespace {
@@ -70,6 +71,8 @@ void MakeSeeds(const fs::path& corpus) {
   Tensors narrow = policy.Rounded().ToTensors();
   narrow.Narrow();
   SaveTensors(narrow, corpus / "policy/accepted/bfloat16.safetensors");
+  const SwingNet net(GymRobot::kAcrobot, 4);
+  SaveTensors(net.ToTensors(net.Initial(1)), corpus / "policy/accepted/searched.safetensors");
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
-// The policy file, which `eval`, `info`, `export` and others read from untrusted sources.
+// The policy file, which `eval`, `info`, `export` and others read from untrusted sources, and that
+// of `realaigym --search`.
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -10,16 +11,34 @@
 #include "lab/export.h"
 #include "lab/loaded_policy.h"
 #include "lab/train_command.h"
+#include "realaigym/swing_policy.h"
 
 namespace upswing {
+namespace {
+
+/// A policy of the boards is written as it was read, and chooses torques.
+void TrySwingPolicy(const Tensors& tensors) {
+  const SwingPolicy policy = ReadSwingPolicy(tensors);
+  const Tensors again = policy.net.ToTensors(policy.numbers);
+  Expect(ReadSwingPolicy(again).numbers == policy.numbers, "the same numbers again");
+  GymMeasurement measured{};
+  measured.q1.fill(0.5);
+  Lanes torque{};
+  policy.net.Control(policy.numbers)->Act(0, measured, kGymBlock, torque);
+  Expect(std::ranges::all_of(torque, [](double x) { return std::isfinite(x); }), "finite torques");
+}
+
+}  // namespace
 
 bool TryInput(std::string_view input) {
   const auto bytes = BytesOf(input);
   std::optional<LoadedPolicy> loaded;
   const bool accepted = Accepts([&] {
-    loaded = ReadPolicy(ReadSafetensors({bytes.begin(), bytes.end()}, kInputName));
+    const Tensors tensors = ReadSafetensors({bytes.begin(), bytes.end()}, kInputName);
+    if (IsSwingPolicy(tensors)) return TrySwingPolicy(tensors);
+    loaded = ReadPolicy(tensors);
   });
-  if (!accepted) return false;
+  if (!loaded) return accepted;
 
   // It chooses torques, and the program can print the command that trained it.
   const Policy& policy = *loaded->policy;

@@ -100,9 +100,7 @@ class RegulatorController : public GymController {
 
 GymRobot ParseRobot(const std::string& name, GymRobot usual) {
   if (name.empty()) return usual;
-  for (const GymRobot robot : {GymRobot::kPendubot, GymRobot::kAcrobot}) {
-    if (name == NameOf(robot)) return robot;
-  }
+  if (const auto robot = RobotNamed(name)) return *robot;
   throw BadInput(Concat("--robot: expected pendubot or acrobot, got \"", Printable(name), "\""));
 }
 
@@ -116,13 +114,10 @@ void ExpectRobot(const std::string& name, GymRobot own, GymRobot asked) {
 
 GymCompetitor OfSearch(const std::string& name, SwingPolicy policy) {
   const auto kept = std::make_shared<SwingPolicy>(std::move(policy));
-  return {name, kept->net.robot(),
-          [kept](size_t) { return kept->net.Control(kept->numbers); }};
+  return {name, kept->net.robot(), [kept](size_t) { return kept->net.Control(kept->numbers); }};
 }
 
 }  // namespace
-
-std::string NameOf(GymRobot robot) { return robot == GymRobot::kPendubot ? "pendubot" : "acrobot"; }
 
 SwingPolicy LoadSwingPolicy(const fs::path& path) {
   const Tensors tensors = LoadTensors(path);
@@ -270,7 +265,7 @@ std::string GymJson(const GymReport& report) {
   for (const GymCurve& curve : report.robustness.curves) {
     j["curves"].push_back({{"name", curve.name}, {"values", curve.values}, {"share", curve.share}});
   }
-  j["simulations"] = 723;
+  j["simulations"] = kGymSimulations;
   j["seconds"] = report.seconds;
   return PrintableJson(j);
 }

@@ -57,7 +57,7 @@ struct GymReport {
   GymEntry Entry() const;
 };
 
-/// Makes the 1 + 722 simulations. `progress` is told the share that is done, from any thread.
+/// Makes all simulations. `progress` is told the share that is done, from any thread.
 GymReport ScoreGym(const GymCompetitor& competitor, uint64_t seed, ThreadPool& pool,
                    const std::function<void(double)>& progress);
 
@@ -66,8 +66,5 @@ std::string GymJson(const GymReport& report);
 std::string GymCsv(const GymReport& report);
 /// The six rows of robustness, as .svg or .png.
 void DrawGym(const GymReport& report, const std::filesystem::path& file);
-
-/// "pendubot" or "acrobot".
-std::string NameOf(GymRobot robot);
 
 }  // namespace upswing

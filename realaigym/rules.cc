@@ -101,6 +101,15 @@ GymCase MakeCase(GymRow row, int parameter, double level, uint64_t seed) {
 
 }  // namespace
 
+const char* NameOf(GymRobot robot) { return robot == GymRobot::kPendubot ? "pendubot" : "acrobot"; }
+
+std::optional<GymRobot> RobotNamed(std::string_view name) {
+  for (const GymRobot robot : {GymRobot::kPendubot, GymRobot::kAcrobot}) {
+    if (name == NameOf(robot)) return robot;
+  }
+  return std::nullopt;
+}
+
 bool AtGoal(const GymState& state) {
   const auto [q1, q2, w1, w2] = state;
   const auto near = [](double angle, double goal) {

@@ -2,7 +2,9 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "realaigym/plant.h"
@@ -13,6 +15,9 @@ namespace upswing {
 
 /// Which joint has the motor.
 enum class GymRobot { kPendubot = 1, kAcrobot = 2 };
+const char* NameOf(GymRobot robot);
+/// The one of this name; none if there is none.
+std::optional<GymRobot> RobotNamed(std::string_view name);
 
 /// A torque (N·m) about the motor's joint, beyond its limit too, for a moment: amplitude ·
 /// exp(-(t - time)²/(2 width²)).
@@ -69,6 +74,11 @@ inline constexpr int kGymLevels = 21;     // of what a row varies
 inline constexpr int kGymRepeats = 10;    // of a level of noise
 inline constexpr int kGymPushCases = 50;  // profiles
 
+/// Of a report: the nominal one, and those of the rows.
+inline constexpr int kGymSimulations =
+    1 + kGymLevels * (static_cast<int>(kGymModelNames.size()) + 2 * kGymRepeats + 1 + 1) +
+    kGymPushCases;
+
 /// A simulation of the robustness score and its place there.
 struct GymCase {
   GymRow row;
@@ -77,7 +87,7 @@ struct GymCase {
   GymEpisode episode;
 };
 
-/// All 722, in the order of the rows. The seed is that of noise and pushes.
+/// All of them, in the order of the rows. The seed is that of noise and pushes.
 std::vector<GymCase> RobustnessCases(uint64_t seed);
 
 /// A case of a row at `level` from 0 to 1 of its range.

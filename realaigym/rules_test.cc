@@ -38,6 +38,7 @@ TEST(GymRules, TheFormulaGivesThePublishedScores) {
 TEST(GymRules, ThereAre722Cases) {
   const std::vector<GymCase> cases = RobustnessCases(1);
   EXPECT_EQ(cases.size(), 722);
+  EXPECT_EQ(kGymSimulations, 723);
   std::map<GymRow, std::set<double>> values;
   std::set<uint64_t> seeds;
   for (const GymCase& each : cases) {

@@ -24,10 +24,6 @@ const GymSearchConfig& Checked(const GymSearchConfig& c) {
   return c;
 }
 
-GymRobot RobotOf(const std::string& name) {
-  return name == "acrobot" ? GymRobot::kAcrobot : GymRobot::kPendubot;
-}
-
 std::vector<double> Deviations(const SwingNet& net, double of_network, double of_linear) {
   std::vector<double> deviations(net.size(), of_network);
   std::fill_n(deviations.begin(), SwingNet::kLinear, of_linear);
@@ -124,26 +120,28 @@ void Snes::Tell(const std::vector<double>& fitness) {
 
 void GymSearchConfig::Describe(Options& o) {
   o.Section("search");
-  o.AddChoice(&robot, "robot", {"pendubot", "acrobot"}, "which joint has the motor");
+  o.AddChoice(&robot, "robot", {NameOf(GymRobot::kPendubot), NameOf(GymRobot::kAcrobot)},
+              "which joint has the motor");
   o.Add(&seed, "seed", 1, {0, 1e15}, "", "of the search's random numbers");
   o.Add(&hidden, "hidden", 16, {4, 32}, "", "units in each of the network's two layers");
   o.Add(&starts, "starts", 12, {1, 1000}, "", "random networks to begin with; the best goes on");
   o.Add(&alone, "alone", 250, {1, 1e5}, "", "generations of each, on the nominal plant alone");
   o.Add(&generations, "generations", 1200, {0, 1e6}, "", "generations after that");
-  o.Add(&first_population, "first_population", 64, {4, 1e5}, "",
+  o.Add(&first_population, "first_population", 64, {4, 1e4}, "",
         "candidates of a generation on the nominal plant");
-  o.Add(&population, "population", 64, {4, 1e5}, "", "candidates of a generation after that");
-  o.Add(&deviation, "deviation", 0.12, kPositive, "", "of the network's numbers at first");
-  o.Add(&restart, "restart", 0.05, kPositive, "", "deviation with which the second part begins");
-  o.Add(&mean_rate, "mean_rate", 2, kPositive, "", "rate at which the mean follows the gradient");
-  o.Add(&performance_weight, "performance_weight", 3, kPositive, "",
+  o.Add(&population, "population", 64, {4, 1e4}, "", "candidates of a generation after that");
+  o.Add(&deviation, "deviation", 0.12, {1e-6, 10}, "", "of the network's numbers at first");
+  o.Add(&restart, "restart", 0.05, {1e-6, 10}, "", "deviation with which the second part begins");
+  o.Add(&mean_rate, "mean_rate", 2, {1e-6, 100}, "", "rate at which the mean follows the gradient");
+  o.Add(&performance_weight, "performance_weight", 3, {1e-6, 1e6}, "",
         "weight of the performance score as the second part begins");
-  o.Add(&last_weight, "last_weight", 10, kPositive, "", "and as it ends");
+  o.Add(&last_weight, "last_weight", 10, {1e-6, 1e6}, "", "and as it ends");
 }
 
 GymSearch::GymSearch(const GymSearchConfig& config)
     : GymSearch(config, [&] {
-        const SwingNet net(RobotOf(config.robot), static_cast<int>(Checked(config).hidden));
+        const SwingNet net(RobotNamed(config.robot).value(),
+                           static_cast<int>(Checked(config).hidden));
         return SwingPolicy{net, net.Initial(static_cast<uint64_t>(config.seed))};
       }()) {
   config_.starts = config.starts;

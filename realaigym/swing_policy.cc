@@ -13,7 +13,6 @@ namespace upswing {
 namespace {
 
 constexpr const char* kFormat = "upswing-realaigym";
-constexpr const char* kRobotNames[] = {"pendubot", "acrobot"};
 constexpr int kVersion = 2;
 constexpr int kLeastHidden = 4;
 constexpr double kMostExponent = 50, kMostWeight = 1e6;  // of numbers in files
@@ -90,7 +89,7 @@ Tensors SwingNet::ToTensors(std::span<const double> numbers) const {
   Tensors tensors;
   tensors.metadata["format"] = kFormat;
   tensors.metadata["format_version"] = std::to_string(kVersion);
-  tensors.metadata["robot"] = kRobotNames[static_cast<size_t>(robot_) - 1];
+  tensors.metadata["robot"] = NameOf(robot_);
   tensors.metadata["hidden"] = std::to_string(hidden_);
   tensors.AddCopy("numbers", numbers);
   return tensors;
@@ -109,16 +108,14 @@ SwingPolicy ReadSwingPolicy(const Tensors& tensors) {
   if (tensors.Metadata("format_version") != std::to_string(kVersion)) {
     throw expect("format_version", std::to_string(kVersion));
   }
-  const std::string& name = tensors.Metadata("robot");
-  const auto* robot = std::ranges::find(kRobotNames, name);
-  if (robot == std::end(kRobotNames)) throw expect("robot", "pendubot or acrobot");
+  const auto robot = RobotNamed(tensors.Metadata("robot"));
+  if (!robot) throw expect("robot", "pendubot or acrobot");
   const auto hidden = ParseInteger(tensors.Metadata("hidden"));
   if (!hidden || *hidden < kLeastHidden || *hidden > kSwingMostHidden || *hidden % 2 != 0) {
     throw expect("hidden",
                  Concat("an even number in [", kLeastHidden, ", ", kSwingMostHidden, "]"));
   }
-  SwingPolicy policy{{static_cast<GymRobot>(robot - kRobotNames + 1), static_cast<int>(*hidden)},
-                     {}};
+  SwingPolicy policy{{*robot, static_cast<int>(*hidden)}, {}};
   policy.numbers.resize(policy.net.size());
   tensors.Read("numbers", std::span(policy.numbers), {static_cast<int64_t>(policy.net.size())});
   for (size_t i = 0; i < policy.numbers.size(); ++i) {

@@ -83,19 +83,24 @@ TEST(Falling, TheTorqueEndsBothFalls) {
 }
 
 TEST(Identifier, FindsTheConstants) {
-  Rng rng(2, "test");
-  const Plant plant = Near(0.2, rng);
-  Identifier identifier(Plant(), 1);
-  PendulumState s{0.1, -0.2, 0.3, 0};
-  identifier.Begin(0, s);
-  double torque = 0;
-  for (int step = 0; step < 300; ++step) {
-    if (step % 5 == 0) torque = rng.Uniform(-5, 5);
-    s = Move(plant, s, torque);
-    identifier.Update(0, torque, s);
+  for (const double joint : {1.0, 2.0}) {
+    Rng rng(2, "test");
+    Plant nominal, plant = Near(0.2, rng);
+    nominal.actuated_joint = plant.actuated_joint = joint;
+    Identifier identifier(nominal, 1);
+    PendulumState s{0.1, -0.2, 0.3, 0};
+    identifier.Begin(0, s);
+    double torque = 0;
+    for (int step = 0; step < 300; ++step) {
+      if (step % 5 == 0) torque = rng.Uniform(-5, 5);
+      s = Move(plant, s, torque);
+      identifier.Update(0, torque, s);
+    }
+    const Constants truth = ConstantsOf(plant), found = identifier.estimate(0);
+    for (size_t k = 0; k < truth.size(); ++k) {
+      EXPECT_NEAR(found[k] / truth[k], 1, 0.01) << k << ", motor at joint " << joint;
+    }
   }
-  const Constants truth = ConstantsOf(plant), found = identifier.estimate(0);
-  for (size_t k = 0; k < truth.size(); ++k) EXPECT_NEAR(found[k] / truth[k], 1, 0.01) << k;
 }
 
 TEST(Identifier, TheEnergyIsThatOfTheMotion) {
