@@ -5,6 +5,7 @@
 
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <limits>
 
 #include "core/archive.h"
@@ -40,7 +41,12 @@ class TensorFileTest : public ::testing::Test {
 
   /// The message of the error that loading these bytes gives.
   std::string LoadError(std::span<const std::byte> bytes) const {
-    WriteFileAtomically(path_, std::vector{bytes});
+    // Not as the program writes, which waits until the disk has it, as some file systems do also for
+    // a file that is written anew.
+    fs::remove(path_);
+    std::ofstream(path_, std::ios::binary)
+        .write(reinterpret_cast<const char*>(bytes.data()),
+               static_cast<std::streamsize>(bytes.size()));
     try {
       LoadTensors(path_);
     } catch (const Error& error) {
