@@ -49,6 +49,11 @@ CLI::Option* AddPolicy(CLI::App& app, PolicyArguments& a) {
       "policy", a.name,
       Concat("policy.safetensors, run folder or controller: ", Join(ControllerNames(), ", ")));
   policy->type_name("POLICY|RUN")->check(NotEmpty());
+  AddControllers(app, a);
+  return policy;
+}
+
+void AddControllers(CLI::App& app, PolicyArguments& a) {
   ControllerConfig defaults;
   AddSettings(app, OptionsOf(defaults), a.flags);
   app.add_option("--made-for", a.made_for,
@@ -57,7 +62,6 @@ CLI::Option* AddPolicy(CLI::App& app, PolicyArguments& a) {
       ->type_name("NAME=VALUE")
       ->take_all()
       ->allow_extra_args(false);
-  return policy;
 }
 
 void AddStart(CLI::App& app, std::optional<std::string>& start) {

@@ -47,6 +47,9 @@ void ShowDefaults(CLI::App& app, const Options& every, const Options& options);
 /// required unless the caller says so.
 CLI::Option* AddPolicy(CLI::App& app, PolicyArguments& a);
 
+/// Adds the settings of controllers and --made-for.
+void AddControllers(CLI::App& app, PolicyArguments& a);
+
 /// Adds --start, which ParseStart reads.
 void AddStart(CLI::App& app, std::optional<std::string>& start);
 

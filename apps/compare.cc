@@ -1,31 +1,85 @@
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <memory>
 
 #include "apps/commands.h"
 #include "apps/compare_report.h"
+#include "apps/progress.h"
+#include "core/error.h"
+#include "core/text.h"
+#include "core/thread_pool.h"
 #include "io/file.h"
+#include "io/machine.h"
+#include "lab/controllers.h"
 #include "report/figure.h"
 
 namespace upswing {
 namespace {
 
+namespace fs = std::filesystem;
+
 struct CompareArguments {
-  std::vector<std::string> runs;
+  std::vector<std::string> names;  // of runs and policies
+  PolicyArguments controllers;     // settings of those among them
   std::string out;
+  int64_t threads;
   bool unfinished = false, different_tasks = false, as_json = false;
 };
 
+/// A controller, or a policy's file; anything else is to be a run or to hold some.
+bool IsPolicy(const std::string& name) {
+  const fs::path path = name;
+  std::error_code error;
+  return IsController(name) ||
+         (path.extension() == ".safetensors" && !fs::is_directory(path, error));
+}
+
+/// Throws BadInput unless policies that are named have runs beside them, of one task each.
+void CheckPolicies(const CompareArguments& a, const std::vector<std::string>& policies) {
+  if (policies.empty()) return;
+  const std::string names = Join(policies, " ");
+  if (policies.size() == a.names.size()) {
+    throw BadInput(Concat("compare: expected trainings beside ", names,
+                          ", whose evaluations say on what to judge, got none (`upswing bounds ",
+                          names, "` compares policies alone)"));
+  }
+  if (a.different_tasks) {
+    throw BadInput(Concat("--different-tasks: expected no policy beside it, as each is judged on ",
+                          "the task of the runs, got ", names));
+  }
+}
+
 int RunCompare(const CompareArguments& arguments) {
   CompareRequest request;
-  request.paths.assign(arguments.runs.begin(), arguments.runs.end());
+  std::vector<std::string> policy_names;
+  for (const std::string& name : arguments.names) {
+    if (IsPolicy(name)) {
+      policy_names.push_back(name);
+    } else {
+      request.paths.emplace_back(name);
+    }
+  }
+  CheckPolicies(arguments, policy_names);
   request.unfinished = arguments.unfinished;
   request.different_tasks = arguments.different_tasks;
   if (!arguments.out.empty()) {
     CheckFree(arguments.out);
     CheckCanDraw();
   }
-  const Comparison comparison = Compare(request);
+  const std::vector<LoadedPolicy> policies = GetPolicies(policy_names, arguments.controllers);
+  Comparison comparison = Compare(request);
+  if (!policies.empty()) {
+    ThreadPool pool(ResolveThreads(arguments.threads));
+    ProgressLine progress;
+    const bool make_anew = arguments.controllers.made_for.empty();
+    AddPolicies(
+        policies, make_anew, pool,
+        [&](double share) {
+          if (!arguments.as_json && progress.due()) progress.Show(share, {"judging policies"});
+        },
+        comparison);
+  }
   if (!arguments.out.empty()) {
     MakeNewFolder(arguments.out);
     WriteComparison(comparison, arguments.out);
@@ -44,14 +98,16 @@ void AddCompare(CLI::App& program, Command& command) {
   CLI::App* app = program.add_subcommand(
       "compare", "Compare trainings over their seeds, with intervals and curves");
   auto a = std::make_shared<CompareArguments>();
-  app->add_option("runs", a->runs, "run folders, or folders that hold some")
-      ->type_name("RUN|FOLDER")
+  app->add_option("runs", a->names,
+                  Concat("run folders, or folders that hold some; beside them policy.safetensors ",
+                         "or controllers: ", Join(ControllerNames(), ", ")))
+      ->type_name("RUN|FOLDER|POLICY")
       ->required()
       ->check(NotEmpty());
-  app->add_option(
-         "--out", a->out,
-         "new folder for summary.csv, runs.csv, curves.svg and curves.png (curves-2 and so "
-         "on for further tasks)")
+  AddControllers(*app, a->controllers);
+  app->add_option("--out", a->out,
+                  "new folder for summary.csv, runs.csv, policies.csv, curves.svg and curves.png "
+                  "(curves-2 and so on for further tasks)")
       ->type_name("FOLDER")
       ->check(NotEmpty());
   app->add_flag("--unfinished", a->unfinished, "compare unfinished runs too, as they are")
@@ -61,6 +117,7 @@ void AddCompare(CLI::App& program, Command& command) {
          "compare groups that are evaluated on different tasks (plant, disturbance, number of "
          "episodes) with each other as well")
       ->disable_flag_override();
+  AddThreads(*app, a->threads);
   app->add_flag("--json", a->as_json, "print JSON")->disable_flag_override();
   app->footer(
       "Runs with the same settings but the seed are one group. Figures are over its runs: the\n"
@@ -68,10 +125,16 @@ void AddCompare(CLI::App& program, Command& command) {
       "A run that did not solve the task counts as one that needs more than its budget. Groups\n"
       "are compared with those that are evaluated on the same task. Broken and unfinished runs,\n"
       "and folders without a run, are left out with a note.\n\n"
+      "A policy's file or a controller has no seeds. It is judged on the episodes of the runs' "
+      "final\n"
+      "evaluations (of the first runs, up to 1,000 episodes), a controller made for their plant\n"
+      "unless --made-for says otherwise; its return stands beside the runs', without an "
+      "interval.\n\n"
       "Examples:\n"
       "  ./upswing compare runs/d3qn-seed*                  one agent over its seeds\n"
       "  ./upswing compare runs --out runs/comparison       all agents in runs, with figures\n"
-      "  ./upswing compare study --json                     STUDY/VARIANT/SEED, for a program\n");
+      "  ./upswing compare study --json                     STUDY/VARIANT/SEED, for a program\n"
+      "  ./upswing compare runs/d3qn-seed* mpc tvlqr        beside classical control\n");
   app->callback([a, &command] { command = [a] { return RunCompare(*a); }; });
 }
 

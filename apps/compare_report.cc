@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "apps/eval_table.h"
 #include "core/json.h"
 #include "core/text.h"
 #include "lab/format.h"
@@ -112,6 +113,37 @@ void PrintPair(const Comparison& comparison, const PairSummary& pair) {
              PairsText(pair.higher_return), EstimateText(pair.return_difference, Signed));
 }
 
+/// How a policy did, which has no seeds.
+void PrintPolicy(const JudgedPolicy& policy, const std::string& task) {
+  const Evaluation& e = policy.figures;
+  const auto print = [](const char* name, const std::string& text) {
+    fmt::print("  {:<16}{}\n", name, text);
+  };
+  fmt::print("{}\n", Printable(policy.name));
+  if (!task.empty()) print("task", Printable(task));
+  print("episodes", fmt::format("{}, of the final evaluations of {}", FormatCount(e.episodes),
+                                policy.runs == 1 ? "one run" : Concat(policy.runs, " runs")));
+  print("success", EstimateText({e.success_rate(), e.success_interval}, Percent));
+  const bool upright = !policy.spec.evaluation.by_return() && e.successes > 0;
+  if (upright) print("swing-up time", QuartilesText(e.swing_up_seconds));
+  print("return", MomentsText(e.reward_sum));
+  const std::string& unit = policy.spec.action_unit;
+  print("rms torque", Concat(Torque(e.rms_torque.mean), ' ', unit));
+  print("its variation", Concat(Torque(e.torque_variation.mean), ' ', unit, "/s"));
+  if (upright) print("  once upright", Concat(Torque(e.goal_variation.mean), ' ', unit, "/s"));
+  fmt::print("\n");
+}
+
+void PrintAgainst(const Comparison& comparison, const AgainstPolicy& against) {
+  const RunGroup& group = comparison.runs.groups[against.group];
+  fmt::print("{} against {}\n", Printable(group.label),
+             Printable(comparison.policies[against.policy].name));
+  fmt::print("  {:<16}in {} of {} (95% {} to {}); difference of the IQM to its return: {}\n\n",
+             "higher return", against.higher, group.runs.size(),
+             Percent(against.higher_interval.low), Percent(against.higher_interval.high),
+             EstimateText(against.difference, Signed));
+}
+
 /// A number, or null for one that is not reached.
 ordered_json Number(double x) { return std::isfinite(x) ? ordered_json(x) : ordered_json(); }
 
@@ -163,7 +195,14 @@ void PrintComparison(const Comparison& comparison, const std::filesystem::path& 
     PrintGroup(runs.groups[i], comparison.summaries[i], runs.differences[i],
                several ? fmt::format("{} ({})", task + 1, runs.task_texts[task]) : "");
   }
+  for (const JudgedPolicy& policy : comparison.policies) {
+    const auto task = static_cast<size_t>(policy.task);
+    PrintPolicy(policy, NumTasks(comparison) > 1
+                            ? fmt::format("{} ({})", task + 1, runs.task_texts[task])
+                            : "");
+  }
   for (const PairSummary& pair : comparison.pairs) PrintPair(comparison, pair);
+  for (const AgainstPolicy& against : comparison.against) PrintAgainst(comparison, against);
   for (const std::string& note : runs.notes) fmt::print("Note: {}\n", Printable(note));
   const bool fewer = std::ranges::any_of(runs.groups, [](const RunGroup& group) {
     return ResamplesOf({std::vector<double>(group.runs.size())}) < kResamples;
@@ -172,12 +211,19 @@ void PrintComparison(const Comparison& comparison, const std::filesystem::path& 
       "Intervals: Wilson for shares, else percentile bootstrap of {}{} resamples of the runs, or "
       "Newcombe's\nwhere all pairs of runs agree.\n",
       fewer ? "at most " : "", FormatCount(kResamples));
+  if (!comparison.policies.empty()) {
+    fmt::print(
+        "A policy has no seeds: its return is a mean, ± the standard deviation, over episodes. "
+        "Intervals of\ndifferences to it are of the runs alone.\n");
+  }
   if (written_to.empty()) return;
   std::string curves;
   for (size_t task = 0; task < NumTasks(comparison); ++task) {
     curves += fmt::format(", {0}.svg, {0}.png", CurvesName(task));
   }
-  fmt::print("Written: summary.csv, runs.csv{} in {}\n", curves, Printable(written_to.string()));
+  fmt::print("Written: summary.csv, runs.csv{}{} in {}\n",
+             comparison.policies.empty() ? "" : ", policies.csv", curves,
+             Printable(written_to.string()));
 }
 
 std::string ComparisonJson(const Comparison& comparison) {
@@ -200,6 +246,21 @@ std::string ComparisonJson(const Comparison& comparison) {
     p["higher_return"] = EstimateJson(pair.higher_return);
     p["return_difference"] = EstimateJson(pair.return_difference);
     j["pairs"].push_back(p);
+  }
+  j["policies"] = ordered_json::array();
+  for (const JudgedPolicy& policy : comparison.policies) {
+    ordered_json p{{"policy", policy.name}, {"task", policy.task + 1}, {"runs", policy.runs}};
+    AddFigures(policy.figures, policy.spec, false, p);
+    j["policies"].push_back(p);
+  }
+  j["against_policies"] = ordered_json::array();
+  for (const AgainstPolicy& against : comparison.against) {
+    j["against_policies"].push_back(
+        {{"group", comparison.runs.groups[against.group].label},
+         {"policy", comparison.policies[against.policy].name},
+         {"higher_return", against.higher},
+         {"higher_return_interval_95", {against.higher_interval.low, against.higher_interval.high}},
+         {"return_difference", EstimateJson(against.difference)}});
   }
   return PrintableJson(j);
 }

@@ -382,6 +382,48 @@ class CompareTest(ProgramTest):
         self.assertEqual(group["runs"][0]["steps"], 4000)
         self.assertEqual(group["runs"][0]["seconds"], rows[1]["seconds"])
 
+    def test_a_policy_is_judged_on_the_episodes_of_the_final_evaluation(self):
+        self.succeed(*small(eval_every=4000, eval_physics="closed-form", mass2=1.1))
+        (row,) = read_csv(self.folder / "run/evals.csv")
+        names = ["run", "run/policy.safetensors", "lqr"]
+        answer = self.compare(*names)
+        own, lqr = answer["policies"]
+        self.assertEqual(own["return"]["mean"], row["mean_return"])  # to the last bit
+        self.assertEqual(own["rms_torque"]["mean"], row["rms_torque"])
+        self.assertEqual((lqr["policy"], lqr["successes"], lqr["runs"]), ("lqr", 0, 1))
+        self.assertEqual(lqr["episodes"], own["episodes"])
+        against = answer["against_policies"]
+        self.assertEqual([a["policy"] for a in against], ["run/policy.safetensors", "lqr"])
+        self.assertEqual(against[0]["return_difference"], {"value": 0, "interval_95": None})
+        self.assertEqual(against[1]["return_difference"]["value"],
+                         row["mean_return"] - lqr["return"]["mean"])
+        # A controller is made for the plant of the runs, unless another one is named.
+        pfl = lambda *flags: self.compare("run", "pfl", *flags)["policies"][0]["return"]
+        self.assertEqual(pfl("--made-for", "mass2=1.1"), pfl())
+        self.assertNotEqual(pfl("--made-for", "mass2=1"), pfl())
+        text = self.succeed("compare", *names, "--out", "out")
+        self.assertRegex(text, r"lqr\n  episodes +4, of the final evaluations of one run\n"
+                               r"  success +0\.0% \(95% 0\.0% to 49\.0%\)\n  return ")
+        self.assertIn("d3qn-small against lqr\n", text)
+        with open(self.folder / "out/policies.csv", encoding="utf-8", newline="") as file:
+            rows = list(csv.DictReader(file))
+        self.assertEqual([r["policy"] for r in rows], names[1:])
+        self.assertEqual(float(rows[1]["return"]), lqr["return"]["mean"])
+        svg = (self.folder / "out/curves.svg").read_text(encoding="utf-8")
+        self.assertIn("lqr", svg)
+
+    def test_refuses_policies_without_runs_or_of_another_task(self):
+        self.make_group("r", [1, 2])
+        self.succeed(*small(agent="acrobot", steps=1000, eval_every=1000, eval_episodes=1,
+                            out="acrobot"))
+        refuse = lambda arguments, *words: self.refuse(["compare", *arguments], *words)
+        refuse(["lqr", "tvlqr"], "expected trainings beside lqr tvlqr", "bounds lqr tvlqr")
+        refuse(["r", "lqr", "--different-tasks"], "--different-tasks", "got lqr")
+        refuse(["r", "--lqr-torque", "2"], "--lqr-torque: expected the controller lqr, got none")
+        refuse(["r", "none.safetensors"], "none.safetensors: no such file")
+        refuse(["r", "acrobot/policy.safetensors"],
+               "expected a policy of double-pendulum, as the runs are, got one of acrobot-v1")
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -138,7 +138,6 @@ class Lqr(ProgramTest):
     def test_bad_names(self):
         for command in ("eval", "simulate", "plot", "map", "info"):
             self.refuse([command, "lqrr"], "lqrr: no such file", "did you mean lqr?")
-        self.refuse(["compare", "lqr"], "lqr", "no training to compare")
         self.refuse(["export", "lqr", "--page", "page"], "lqr: no such file", "no controller")
         self.refuse(["eval", "lqr", "--task", "acrobot-v1"], "unknown flag --task")
 

@@ -15,21 +15,6 @@ namespace {
 
 constexpr double kDegrees = 180 / std::numbers::pi;
 
-/// Such as `34.18 ± 0.57`: two digits of the deviation, or its whole part, and the mean to as many
-/// decimals.
-std::string MomentsText(const Moments& m, double scale = 1) {
-  constexpr double kLeast = 1e-6;  // below it a deviation is rounding
-  const double mean = scale * m.mean, deviation = scale * m.deviation;
-  if (deviation < kLeast) return fmt::format("{:.4g} ± 0", mean);
-  const int decimals = std::max(0, 1 - static_cast<int>(std::floor(std::log10(deviation))));
-  return fmt::format("{:.{}f} ± {:.{}f}", mean, decimals, deviation, decimals);
-}
-
-std::string QuartilesText(const Quartiles& q) {
-  return fmt::format("{:.2f} s   (median; middle half {:.2f} to {:.2f} s)", q.median, q.low,
-                     q.high);
-}
-
 /// How long the episodes are: one length, or, where some end earlier than others, their mean.
 std::string LengthText(const Moments& seconds) {
   constexpr double kSame = 1e-6;  // s
@@ -81,6 +66,19 @@ void PrintTorques(const Evaluation& e, const EnvSpec& spec) {
 }
 
 }  // namespace
+
+std::string MomentsText(const Moments& m, double scale) {
+  constexpr double kLeast = 1e-6;  // below it a deviation is rounding
+  const double mean = scale * m.mean, deviation = scale * m.deviation;
+  if (deviation < kLeast) return fmt::format("{:.4g} ± 0", mean);
+  const int decimals = std::max(0, 1 - static_cast<int>(std::floor(std::log10(deviation))));
+  return fmt::format("{:.{}f} ± {:.{}f}", mean, decimals, deviation, decimals);
+}
+
+std::string QuartilesText(const Quartiles& q) {
+  return fmt::format("{:.2f} s   (median; middle half {:.2f} to {:.2f} s)", q.median, q.low,
+                     q.high);
+}
 
 void PrintEvalTable(const EvalReport& report) {
   const Evaluation& e = report.figures;

@@ -4,6 +4,13 @@
 
 namespace upswing {
 
+/// Such as `34.18 ± 0.57`: two digits of the deviation, or its whole part, and the mean to as many
+/// decimals.
+std::string MomentsText(const Moments& m, double scale = 1);
+
+/// Such as `2.74 s   (median; middle half 2.70 to 2.78 s)`.
+std::string QuartilesText(const Quartiles& q);
+
 /// Prints the report on standard output.
 void PrintEvalTable(const EvalReport& report);
 

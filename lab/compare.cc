@@ -68,6 +68,24 @@ std::string RunsCsv(const Comparison& comparison) {
   return csv;
 }
 
+std::string PoliciesCsv(const std::vector<JudgedPolicy>& policies) {
+  std::string csv =
+      "policy,task,episodes,success_rate,success_low,success_high,swing_up_seconds_median,"
+      "return,return_deviation,rms_torque,torque_variation,torque_variation_upright\n";
+  for (const JudgedPolicy& policy : policies) {
+    const Evaluation& e = policy.figures;
+    const bool upright = !policy.spec.evaluation.by_return() && e.successes > 0;
+    csv += Concat(Cell(policy.name), ',', policy.task + 1, ',', e.episodes, ',',
+                  FormatNumber(e.success_rate()), ',', FormatNumber(e.success_interval.low), ',',
+                  FormatNumber(e.success_interval.high), ',',
+                  upright ? FormatNumber(e.swing_up_seconds.median) : "", ',',
+                  FormatNumber(e.reward_sum.mean), ',', FormatNumber(e.reward_sum.deviation), ',',
+                  FormatNumber(e.rms_torque.mean), ',', FormatNumber(e.torque_variation.mean), ',',
+                  upright ? FormatNumber(e.goal_variation.mean) : "", '\n');
+  }
+  return csv;
+}
+
 }  // namespace
 
 size_t NumTasks(const Comparison& comparison) {
@@ -92,7 +110,8 @@ std::span<const std::pair<const char*, Scores GroupSummary::*>> NamedScores() {
 }
 
 Comparison Compare(const CompareRequest& request) {
-  Comparison comparison{GroupRuns(request), {}, {}};
+  Comparison comparison;
+  comparison.runs = GroupRuns(request);
   for (const RunGroup& group : comparison.runs.groups) {
     comparison.summaries.push_back(Summarize(group));
   }
@@ -105,6 +124,21 @@ Comparison Compare(const CompareRequest& request) {
   return comparison;
 }
 
+void AddPolicies(const std::vector<LoadedPolicy>& policies, bool make_anew, ThreadPool& pool,
+                 const std::function<void(double)>& progress, Comparison& comparison) {
+  comparison.policies = JudgePolicies(policies, make_anew, pool, progress, comparison.runs);
+  for (size_t group = 0; group < comparison.summaries.size(); ++group) {
+    for (size_t policy = 0; policy < comparison.policies.size(); ++policy) {
+      if (comparison.runs.tasks[group] != comparison.policies[policy].task) continue;
+      AgainstPolicy against =
+          CompareWithPolicy(comparison.summaries[group], comparison.policies[policy]);
+      against.group = group;
+      against.policy = policy;
+      comparison.against.push_back(against);
+    }
+  }
+}
+
 void WriteComparison(const Comparison& comparison, const fs::path& folder) {
   for (size_t task = 0; task < NumTasks(comparison); ++task) {
     std::vector<RunGroup> groups;
@@ -112,12 +146,20 @@ void WriteComparison(const Comparison& comparison, const fs::path& folder) {
       if (static_cast<size_t>(comparison.runs.tasks[i]) != task) continue;
       groups.push_back(comparison.runs.groups[i]);
     }
-    const Figure curves = LearningCurves(groups);
+    std::vector<Level> levels;
+    for (const JudgedPolicy& policy : comparison.policies) {
+      if (static_cast<size_t>(policy.task) != task) continue;
+      levels.push_back(
+          {policy.name, policy.figures.success_rate(), policy.figures.reward_sum.mean});
+    }
+    const Figure curves = LearningCurves(groups, levels);
     Draw(curves, folder / Concat(CurvesName(task), ".svg"));
     Draw(curves, folder / Concat(CurvesName(task), ".png"));
   }
   WriteFileAtomically(folder / "summary.csv", SummaryCsv(comparison));
   WriteFileAtomically(folder / "runs.csv", RunsCsv(comparison));
+  if (comparison.policies.empty()) return;
+  WriteFileAtomically(folder / "policies.csv", PoliciesCsv(comparison.policies));
 }
 
 }  // namespace upswing

@@ -7,15 +7,18 @@
 #include <vector>
 
 #include "lab/compare_groups.h"
+#include "lab/compare_policies.h"
 #include "report/comparison.h"
 
 namespace upswing {
 
-/// Groups of runs in figures, and pairs of groups beside each other.
+/// Groups of runs in figures, and pairs of groups beside each other; policies beside them.
 struct Comparison {
   GroupedRuns runs;
   std::vector<GroupSummary> summaries;  // of each group
   std::vector<PairSummary> pairs;       // each group with each one before it
+  std::vector<JudgedPolicy> policies = {};
+  std::vector<AgainstPolicy> against = {};  // each group with each policy on its task
 };
 
 /// How many tasks groups are compared on.
@@ -30,9 +33,14 @@ std::span<const std::pair<const char*, Scores GroupSummary::*>> NamedScores();
 /// Compares runs; see GroupRuns. Throws BadInput.
 Comparison Compare(const CompareRequest& request);
 
-/// Writes summary.csv (a row for each group), runs.csv (a row for each run) and the learning curves
-/// of each task as CurvesName(task).svg and .png, in place of those that are there. Throws Failure
-/// if it cannot write or draw.
+/// Judges policies (JudgePolicies) and sets them beside the groups.
+void AddPolicies(const std::vector<LoadedPolicy>& policies, bool make_anew, ThreadPool& pool,
+                 const std::function<void(double)>& progress, Comparison& comparison);
+
+/// Writes summary.csv (a row for each group), runs.csv (a row for each run), policies.csv (a row
+/// for each policy and task, if there are any) and the learning curves of each task as
+/// CurvesName(task).svg and .png, in place of those that are there. Throws Failure if it cannot
+/// write or draw.
 void WriteComparison(const Comparison& comparison, const std::filesystem::path& folder);
 
 }  // namespace upswing

@@ -214,6 +214,7 @@ GroupedRuns GroupRuns(const CompareRequest& request) {
     if (at == first.size()) {
       first.push_back(&f);
       grouped.groups.push_back({LabelOf(f), {}});
+      grouped.configs.push_back(f.config);
     }
     grouped.groups[at].runs.push_back(f.run);
   }

@@ -16,6 +16,8 @@ struct GroupedRuns {
   std::vector<int> tasks;                // of each group: which task it is evaluated on, from 0
   std::vector<std::string> task_texts;   // of each task: the settings in which not all agree
   std::vector<std::string> notes;        // remarks on them, a line each
+  // Of each group: the settings, in which its runs differ by seed and by what makes no other run.
+  std::vector<std::shared_ptr<const Config>> configs;
 };
 
 /// Finds, reads and groups them. What is no run, cannot be read, is unfinished (unless asked for)

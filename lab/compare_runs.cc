@@ -72,10 +72,9 @@ std::vector<fs::path> RunsIn(const fs::path& folder, Found& found) {
   std::error_code error;
   if (IsKept(folder)) return {folder};
   if (!fs::exists(folder, error)) {
-    const bool is_controller = IsController(folder.string());
-    throw BadInput(Concat(folder.string(), ": expected a run folder or one that holds some, got ",
-                          is_controller ? "a controller, of which there is no training to compare"
-                                        : "nothing of that name"));
+    throw BadInput(Concat(
+        folder.string(), ": expected a run folder, one that holds some, a policy's ",
+        "file or a controller (", Join(ControllerNames(), ", "), "), got nothing of that name"));
   }
   std::vector<fs::path> paths;
   if (!fs::is_directory(folder, error)) {
@@ -126,7 +125,8 @@ FoundRun Describe(const fs::path& path, const Config& config) {
           config.agent,
           "",
           SettingsOf(config),
-          {}};
+          {},
+          std::make_shared<const Config>(config)};
 }
 
 /// The runs of studies that are done, whose settings stand once for all seeds.

@@ -1,11 +1,13 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "lab/config.h"
 #include "lab/run_log.h"
 #include "report/runs.h"
 
@@ -28,6 +30,7 @@ struct FoundRun {
   std::string agent, variant;     // its named agent; its folder's name within a study, or empty
   std::vector<Setting> settings;  // those that distinguish trainings, without the seed
   RunConditions conditions;       // what its times depend on
+  std::shared_ptr<const Config> config = {};  // that of a study's variant has another seed
 };
 
 /// The runs that are compared, and a line for each that is not.

@@ -6,7 +6,6 @@
 #include <numbers>
 
 #include "core/error.h"
-#include "core/json.h"
 #include "core/text.h"
 #include "sim/identification.h"
 
@@ -25,34 +24,6 @@ ordered_json MomentsJson(const Moments& m, double scale = 1) {
 ordered_json QuartilesJson(const Quartiles& q, int64_t episodes) {
   if (episodes == 0) return nullptr;
   return {{"median", q.median}, {"quartiles", {q.low, q.high}}};
-}
-
-void AddFigures(const Evaluation& e, const EnvSpec& spec, bool knows_values, ordered_json& j) {
-  const bool any = !spec.evaluation.by_return() && e.successes > 0;
-  j["episodes"] = e.episodes;
-  j["successes"] = e.successes;
-  j["success_rate"] = e.success_rate();
-  j["success_interval_95"] = {e.success_interval.low, e.success_interval.high};
-  j["swing_up_seconds"] = QuartilesJson(e.swing_up_seconds, any ? e.successes : 0);
-  j["settled"] = any ? e.settled : 0;
-  j["settling_seconds"] = QuartilesJson(e.settling_seconds, any ? e.settled : 0);
-  j["steady_tilt_degrees"] = nullptr;
-  if (any && e.tilt.size() == 2) {
-    j["steady_tilt_degrees"] = {{"link1", MomentsJson(e.tilt[0], kDegrees)},
-                                {"link2", MomentsJson(e.tilt[1], kDegrees)}};
-  }
-  j["return"] = MomentsJson(e.reward_sum);
-  for (size_t k = 0; k < e.term_means.size(); ++k) {
-    j["reward_terms"][spec.term_names[k]] = e.term_means[k];
-  }
-  j["value"] = knows_values ? ordered_json(e.value) : nullptr;
-  j["discounted_return"] = knows_values ? ordered_json(e.discounted_return) : nullptr;
-  j["energy_used"] = MomentsJson(e.work);
-  j["peak_torque"] = e.peak_torque;
-  j["rms_torque"] = MomentsJson(e.rms_torque);
-  j["torque_variation"] = MomentsJson(e.torque_variation);
-  j["torque_variation_upright"] = any ? MomentsJson(e.goal_variation) : nullptr;
-  j["torque_changes_upright"] = any ? MomentsJson(e.goal_changes) : nullptr;
 }
 
 /// Name and text of each figure of an episode, in the order of the columns.
@@ -141,6 +112,34 @@ void JudgeEpisodes(const Policy& policy, const Remade* remade, const EnvConfig& 
 }
 
 }  // namespace
+
+void AddFigures(const Evaluation& e, const EnvSpec& spec, bool knows_values, ordered_json& j) {
+  const bool any = !spec.evaluation.by_return() && e.successes > 0;
+  j["episodes"] = e.episodes;
+  j["successes"] = e.successes;
+  j["success_rate"] = e.success_rate();
+  j["success_interval_95"] = {e.success_interval.low, e.success_interval.high};
+  j["swing_up_seconds"] = QuartilesJson(e.swing_up_seconds, any ? e.successes : 0);
+  j["settled"] = any ? e.settled : 0;
+  j["settling_seconds"] = QuartilesJson(e.settling_seconds, any ? e.settled : 0);
+  j["steady_tilt_degrees"] = nullptr;
+  if (any && e.tilt.size() == 2) {
+    j["steady_tilt_degrees"] = {{"link1", MomentsJson(e.tilt[0], kDegrees)},
+                                {"link2", MomentsJson(e.tilt[1], kDegrees)}};
+  }
+  j["return"] = MomentsJson(e.reward_sum);
+  for (size_t k = 0; k < e.term_means.size(); ++k) {
+    j["reward_terms"][spec.term_names[k]] = e.term_means[k];
+  }
+  j["value"] = knows_values ? ordered_json(e.value) : nullptr;
+  j["discounted_return"] = knows_values ? ordered_json(e.discounted_return) : nullptr;
+  j["energy_used"] = MomentsJson(e.work);
+  j["peak_torque"] = e.peak_torque;
+  j["rms_torque"] = MomentsJson(e.rms_torque);
+  j["torque_variation"] = MomentsJson(e.torque_variation);
+  j["torque_variation_upright"] = any ? MomentsJson(e.goal_variation) : nullptr;
+  j["torque_changes_upright"] = any ? MomentsJson(e.goal_changes) : nullptr;
+}
 
 EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& trial, int64_t episodes,
                           ThreadPool& pool, const std::function<void(double)>& progress) {

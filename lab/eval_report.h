@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/json.h"
 #include "lab/config.h"
 #include "lab/loaded_policy.h"
 #include "lab/model_info.h"
@@ -46,6 +47,10 @@ EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& tria
 
 /// In how many episodes a controller was made for the plant.
 int64_t NumMade(const EvalReport& report);
+
+/// Adds the figures of an evaluation to a JSON document.
+void AddFigures(const Evaluation& e, const EnvSpec& spec, bool knows_values,
+                nlohmann::ordered_json& j);
 
 /// The report as a JSON document.
 std::string EvalJson(const EvalReport& report);

@@ -28,6 +28,16 @@ std::unique_ptr<VectorEnv> MakeTrainingEnv(const Config& config, ThreadPool& poo
 
 }  // namespace
 
+EnvConfig EvaluationEnvironments(const Config& config, int64_t step) {
+  EnvConfig env = config.Environments();
+  env.num_envs = static_cast<int>(config.train.eval_episodes);
+  env.episode_seconds = SpecOf(env).evaluation.seconds;
+  env.start = StartStates();
+  env.weights = RewardWeights();
+  env.stream = Concat("evaluation at step ", step);
+  return env;
+}
+
 Training::Training(Config config, int threads, std::vector<TrainObserver*> observers)
     : config_(Checked(std::move(config))),
       pool_(threads),
@@ -57,14 +67,9 @@ Evaluation Training::Evaluate(const Policy& policy, int64_t step) {
 }
 
 Evaluation Training::EvaluateIn(const Engine& engine, const Policy& policy, int64_t step) {
-  EnvConfig config = config_.Environments();
+  EnvConfig config = EvaluationEnvironments(config_, step);
   config.pool = &pool_;
   config.engine = &engine;
-  config.num_envs = static_cast<int>(config_.train.eval_episodes);
-  config.episode_seconds = spec().evaluation.seconds;
-  config.start = StartStates();
-  config.weights = RewardWeights();
-  config.stream = Concat("evaluation at step ", step);
   const std::unique_ptr<VectorEnv> env = MakeEnv(config);
   return upswing::Evaluate(policy, *env, &pool_);
 }

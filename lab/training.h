@@ -10,6 +10,10 @@
 
 namespace upswing {
 
+/// The environments of the evaluation at a step of a training with these settings: an episode in
+/// each. The engine is the training's.
+EnvConfig EvaluationEnvironments(const Config& config, int64_t step);
+
 /// A training made of its settings: environments, agent and training loop. It writes no file; see
 /// TrainingRun.
 class Training {

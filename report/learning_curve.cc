@@ -120,7 +120,7 @@ std::vector<double> CurveGrid(const RunGroup& group, const EvaluationFigure& x, 
   return grid;
 }
 
-Figure LearningCurves(const std::vector<RunGroup>& groups) {
+Figure LearningCurves(const std::vector<RunGroup>& groups, const std::vector<Level>& levels) {
   const auto parts = Parts(groups);
   Figure figure;
   figure.columns = 2;
@@ -138,7 +138,12 @@ Figure LearningCurves(const std::vector<RunGroup>& groups) {
   for (const std::vector<RunGroup>& part : parts) {
     for (size_t k = 0; k < std::size(axes); ++k) {
       // One legend, at the right of the upper row, is enough.
-      figure.panels.push_back(CurvesPanel(part, axes[k], LastOf(groups, axes[k].x), k == 1));
+      const double end = LastOf(groups, axes[k].x);
+      Panel& panel = figure.panels.emplace_back(CurvesPanel(part, axes[k], end, k == 1));
+      for (const Level& level : levels) {
+        const double y = axes[k].y_label == kSuccess ? 100 * level.success_rate : level.mean_return;
+        panel.lines.push_back({k == 1 ? level.name : "", {0, end}, {y, y}, {}, {}});
+      }
     }
   }
   std::vector<const Panel*> returns;

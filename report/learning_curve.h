@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <string>
 #include <vector>
 
 #include "report/comparison.h"
@@ -22,9 +23,16 @@ std::vector<double> CurveGrid(const RunGroup& group, const EvaluationFigure& x, 
 
 inline constexpr size_t kMostCurves = 5;  // in one panel
 
+/// What does not learn, beside learning curves.
+struct Level {
+  std::string name;
+  double success_rate, mean_return;
+};
+
 /// Success and return over steps and over training time: four panels with a curve for each group.
 /// More than kMostCurves groups are split into parts with four panels each, all with the same axes.
 /// A curve is dashed from where the first of its runs has ended and keeps its last value.
-Figure LearningCurves(const std::vector<RunGroup>& groups);
+/// Levels are lines from left to right.
+Figure LearningCurves(const std::vector<RunGroup>& groups, const std::vector<Level>& levels = {});
 
 }  // namespace upswing
