@@ -37,11 +37,11 @@ struct Opened {
 /// Opens a regular file to read, without following a link; nothing if there is none.
 std::optional<Opened> Open(const fs::path& path) {
   Opened file{Descriptor(open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC)), {}};
-  if (file.descriptor.get() < 0) {
-    if (errno == ENOENT) return std::nullopt;
+  if (file.descriptor.get() < 0 || fstat(file.descriptor.get(), &file.info) != 0) {
+    // Stale: another host has removed it since this one looked.
+    if (errno == ENOENT || errno == ESTALE) return std::nullopt;
     throw PathError("cannot read", path, errno);
   }
-  if (fstat(file.descriptor.get(), &file.info) != 0) throw PathError("cannot read", path, errno);
   if (!S_ISREG(file.info.st_mode)) {
     throw BadInput(Concat(path.string(), ": expected a regular file"));
   }
@@ -123,18 +123,6 @@ double NowBeside(const fs::path& path) {
 }
 
 }  // namespace
-
-std::string ThisHost() {
-  static const std::string kHost = [] {
-    std::string boot;
-    try {
-      boot = ReadTextFile("/proc/sys/kernel/random/boot_id");
-    } catch (const Error&) {  // NOLINT(bugprone-empty-catch): then the name has to do
-    }
-    return Concat(HostName(), "/", Trim(boot).substr(0, 8));
-  }();
-  return kHost;
-}
 
 struct Lease::State {
   fs::path path;

@@ -9,9 +9,6 @@
 
 namespace upswing {
 
-/// This machine as leases name it: its host name and the mark of its last boot.
-std::string ThisHost();
-
 /// A claim on a piece of work in a folder that any number of processes and hosts share: a file that
 /// one of them has at a time. It is made under a name of its own and given its final one by `link`,
 /// which is atomic on NFS too. Its modification time, by the file server's clock, says that the

@@ -14,6 +14,7 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "io/file.h"
+#include "io/machine.h"
 #include "io/testing.h"
 
 namespace upswing {

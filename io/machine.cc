@@ -11,7 +11,9 @@
 #include <optional>
 #include <thread>
 
+#include "core/error.h"
 #include "core/text.h"
+#include "io/file.h"
 
 namespace upswing {
 namespace {
@@ -72,6 +74,18 @@ std::string HostName() {
   std::array<char, 256> name{};
   gethostname(name.data(), name.size() - 1);
   return Printable(name.data());
+}
+
+std::string ThisHost() {
+  static const std::string kHost = [] {
+    std::string boot;
+    try {
+      boot = ReadTextFile("/proc/sys/kernel/random/boot_id");
+    } catch (const Error&) {  // NOLINT(bugprone-empty-catch): then the name has to do
+    }
+    return Concat(HostName(), "/", Trim(boot).substr(0, 8));
+  }();
+  return kHost;
 }
 
 std::string CpuModel() { return ReadEntry("/proc/cpuinfo", "model name").value_or("unknown"); }

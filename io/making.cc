@@ -10,12 +10,15 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
+#include <ctime>
 #include <memory>
 #include <utility>
 
+#include "core/checksum.h"
 #include "core/error.h"
 #include "core/text.h"
 #include "io/file.h"
+#include "io/machine.h"
 
 namespace upswing {
 namespace {
@@ -23,11 +26,38 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view kMark = ".making-";
-constexpr size_t kDigits = 16;
+constexpr size_t kDigits = 16, kHostDigits = 8;
 constexpr int kMostTries = 100;  // one suffices unless another process interferes
+// What another host is making may be unlocked here: on NFS and others, a folder's lock is known to
+// its own host alone. So long without a change says that nobody makes it any more.
+constexpr int64_t kAbandonedAfter = 3600;  // s
+
+/// Digits that stand for this host in names.
+std::string HostDigits() {
+  Checksum host;
+  host.Update(BytesOf(ThisHost()));
+  return host.Hex().substr(0, kHostDigits);
+}
+
+/// The temporary name of something.
+std::string MakingName(std::string_view name) {
+  return Concat('.', name, kMark, HostDigits(), RandomDigits().substr(kHostDigits));
+}
+
+/// Whether a temporary name is of this host.
+bool IsOfThisHost(std::string_view name) {
+  return name.substr(name.size() - kDigits, kHostDigits) == HostDigits();
+}
 
 /// Tries to lock an open file or folder; false if another process holds the lock.
 bool Lock(const Descriptor& fd) { return flock(fd.get(), LOCK_EX | LOCK_NB) == 0; }
+
+/// By this machine's clock, which may be off by some minutes.
+int64_t SecondsSinceChange(const Descriptor& fd) {
+  struct stat info {};
+  if (fstat(fd.get(), &info) != 0) return 0;
+  return std::time(nullptr) - info.st_mtime;
+}
 
 /// Whether an open file or folder still has a name.
 bool HasName(const Descriptor& fd) {
@@ -66,16 +96,15 @@ bool IsMakingName(std::string_view name) {
 }
 
 void RemoveFolder(const fs::path& folder) {
-  // Under the name of something that is being made: what a killed process leaves is removed.
-  const fs::path gone =
-      folder.parent_path() / Concat('.', folder.filename().string(), kMark, RandomDigits());
+  // Under the name of something that is being made: what a killed process leaves is removed, but
+  // not by others while we are about it, who find it locked.
+  const Descriptor held(open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  (void)Lock(held);
+  const fs::path gone = folder.parent_path() / MakingName(folder.filename().string());
   if (rename(folder.c_str(), gone.c_str()) != 0) throw PathError("cannot remove", folder, errno);
-  // Another process may be about the same, as with all that is left unfinished.
-  std::error_code error, ignored;
-  for (int tries = 0; tries < kMostTries && fs::exists(gone, ignored); ++tries) {
-    fs::remove_all(gone, error);
-  }
-  if (fs::exists(gone, ignored)) throw PathError("cannot remove", gone, error.value());
+  std::error_code error;
+  fs::remove_all(gone, error);
+  if (error) throw PathError("cannot remove", gone, error.value());
 }
 
 Making::Making(const fs::path& path, Kind kind)
@@ -93,7 +122,7 @@ Making::Making(const fs::path& path, Kind kind)
 bool Making::TryOpen(Kind kind) {
   descriptor_ = Descriptor(-1);
   constexpr size_t kLongest = 200;  // bytes of NAME, so that the rest fits into 255
-  name_ = Concat('.', target_.filename().string().substr(0, kLongest), kMark, RandomDigits());
+  name_ = MakingName(target_.filename().string().substr(0, kLongest));
   path_ = target_.parent_path() / name_;
   constexpr int kCommon = O_NOFOLLOW | O_CLOEXEC;
   if (kind == Kind::kFile) {
@@ -143,7 +172,10 @@ void Making::RemoveAbandoned() const {
     if (!IsMakingName(entry->d_name)) continue;
     const Descriptor left(
         openat(folder_.get(), entry->d_name, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
-    if (left.get() < 0 || !Lock(left)) continue;
+    if (left.get() < 0) continue;
+    const bool abandoned =
+        IsOfThisHost(entry->d_name) ? Lock(left) : SecondsSinceChange(left) > kAbandonedAfter;
+    if (!abandoned) continue;
     std::error_code error;
     fs::remove_all(target_.parent_path() / entry->d_name, error);
   }

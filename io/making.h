@@ -23,9 +23,10 @@ class Descriptor {
 std::string RandomDigits();
 
 /// A file or folder that is being made. It appears under its name complete or not at all: until it
-/// is complete it is called `.NAME.making-` and 16 random hexadecimal digits, in the same folder,
-/// and is locked. One without a lock was left behind by a process that was killed; the next Making
-/// in that folder removes it.
+/// is complete it is called `.NAME.making-` and 16 hexadecimal digits, 8 of this host and 8 random,
+/// in the same folder, and is locked. One of this host without a lock was left behind by a process
+/// that was killed; the next Making in that folder removes it. One of another host, whose locks may
+/// not be seen here, is removed an hour after its last change.
 class Making {
  public:
   enum class Kind { kFile, kFolder };

@@ -5,6 +5,8 @@
 #include <sys/file.h>
 #include <sys/stat.h>
 
+#include <chrono>
+
 #include "core/error.h"
 #include "io/file.h"
 #include "io/testing.h"
@@ -41,11 +43,18 @@ TEST(Making, WhatIsNotPublishedIsRemoved) {
   EXPECT_EQ(CountIn(temp.path()), 0);
 }
 
+/// The digits in a temporary name of this host.
+std::string OwnDigits() {
+  const TempFolder temp;
+  const std::string name = Making(temp / "a", Kind::kFile).path().filename();
+  return name.substr(name.size() - 16, 8) + "01234567";
+}
+
 TEST(Making, WhatAKilledProcessLeftIsRemovedByTheNextAndNothingElse) {
   const TempFolder temp;
-  const fs::path left = temp / ".run.making-0123456789abcdef";
+  const fs::path left = temp / (".run.making-" + OwnDigits());
   fs::create_directories(left / "below");
-  WriteFileAtomically(temp / ".b.making-0123456789abcdef", "half");
+  WriteFileAtomically(temp / (".b.making-" + OwnDigits()), "half");
   const fs::path others[] = {temp / ".run.making-0123456789abcde",
                              temp / "x.making-0123456789abcdef",
                              temp / ".run.making-0123456789ABCDEF"};
@@ -61,11 +70,30 @@ TEST(Making, WhatAKilledProcessLeftIsRemovedByTheNextAndNothingElse) {
   EXPECT_EQ(CountIn(temp.path()), 4);
 }
 
+TEST(Making, WhatAnotherHostMakesIsLeftAloneForAnHour) {
+  // Its locks may be unknown here.
+  const TempFolder temp;
+  const fs::path folder = temp / ".run.making-0123456789abcdef";
+  const fs::path file = temp / ".b.making-0123456789abcdef";
+  fs::create_directory(folder);
+  WriteFileAtomically(file, "half");
+  for (const fs::path& path : {folder, file}) {
+    fs::last_write_time(path, fs::file_time_type::clock::now() - std::chrono::minutes(55));
+  }
+  Making(temp / "a", Kind::kFile);
+  EXPECT_EQ(CountIn(temp.path()), 2);
+  for (const fs::path& path : {folder, file}) {
+    fs::last_write_time(path, fs::file_time_type::clock::now() - std::chrono::minutes(65));
+  }
+  Making(temp / "a", Kind::kFile);
+  EXPECT_EQ(CountIn(temp.path()), 0);
+}
+
 TEST(Making, ALinkInItsNameIsReplacedAndOneLeftBehindIsNotFollowed) {
   const TempFolder temp;
   fs::create_directory(temp / "precious");
   WriteFileAtomically(temp / "precious/file", "mine");
-  fs::create_symlink("precious", temp / ".x.making-0123456789abcdef");
+  fs::create_symlink("precious", temp / (".x.making-" + OwnDigits()));
   fs::create_symlink("precious/file", temp / "a");
   Making file(temp / "a", Kind::kFile);
   file.Publish();
