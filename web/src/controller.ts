@@ -71,6 +71,9 @@ export class CoreController implements Controller {
   get inputs(): number {
     return this.about.inputs;
   }
+  get isLearned(): boolean {
+    return this.about.kind !== 'computed';
+  }
   get selfCheckError(): number {
     return this.about.selfCheckError;
   }

@@ -48,6 +48,7 @@ export interface Memory {
 /// The part of a policy that chooses torques.
 export interface Controller {
   readonly inputs: number; // how many numbers an observation has
+  readonly isLearned: boolean; // or else made from the equations of motion
   readonly text: string; // what it is, for people
   readonly strongest: number; // N·m, the largest torque
   /// Largest |difference| between the outputs in the file and those computed here.

@@ -37,6 +37,10 @@ export class Policy {
     this.rewardScale = Number(this.metadata.get('reward_scale') ?? 1);
   }
 
+  get isLearned(): boolean {
+    return this.controller.isLearned;
+  }
+
   /// Whether hundreds of decisions from new states can be had while one watches.
   get isQuick(): boolean {
     return this.metadata.get('agent') !== 'mpc';

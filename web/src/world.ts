@@ -51,6 +51,8 @@ export class World {
 
   torque = 0; // N·m, that the motor holds now
   push: Push | null = null; // that acts now
+  /// The last shove, and when it ended (s).
+  shoved: { push: Push; at: number } | null = null;
   /// The agent's decision at the last control step, whether it is on or not; see also look().
   decision: Decision | null = null;
 
@@ -126,6 +128,7 @@ export class World {
     this.untilControl = 0;
     this.torque = 0;
     this.push = null;
+    this.shoved = null;
     this.shove.steps = 0;
     this.uprightSince = inverted(state) ? this.steps : null;
     this.look();
@@ -255,7 +258,10 @@ export class World {
 
   private shoving(): Push | null {
     if (this.shove.steps === 0) return null;
-    return { link: 2, along: this.plant.length2, force: { x: this.shove.force, z: 0 } };
+    const force = { x: this.shove.force, z: 0 };
+    const push: Push = { link: 2, along: this.plant.length2, force };
+    this.shoved = { push, at: this.time };
+    return push;
   }
 }
 

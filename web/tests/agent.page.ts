@@ -3,14 +3,14 @@ import type { QDecision } from '../src/decision';
 import { balanced, largestDifference, open, run, startFrom, test } from './page';
 import { policyPath, simulate } from './program';
 
-test('Get Inverted swings up and balances, while one watches', async ({ page }) => {
+test('the agent, when it may act, swings up and balances, while one watches', async ({ page }) => {
   await open(page);
   await expect(page.locator('#badge')).toHaveText('hanging');
-  await page.getByRole('button', { name: 'Get Inverted' }).click();
+  await page.getByRole('button', { name: 'Run the agent' }).click();
   await expect(page.locator('#badge')).toHaveText(/balanced for/, { timeout: 20_000 });
   await expect(page.locator('#live')).toHaveText('balanced');
-  await page.getByRole('button', { name: 'Get Inverted' }).click(); // off: it falls
-  await expect(page.locator('#badge')).toHaveText('free', { timeout: 20_000 });
+  await page.getByRole('button', { name: 'Run the agent' }).click(); // off: it falls
+  await expect(page.locator('#badge')).toHaveText('swinging freely', { timeout: 20_000 });
 });
 
 test('every agent is up within 10 s and holds for 20 s', async ({ page }) => {
@@ -41,7 +41,9 @@ test('the first 5 s are those of `upswing simulate`: states and torques', async 
 
 test('another agent can be chosen, and has its own text, curve and mark', async ({ page }) => {
   await open(page);
+  await expect(page.locator('#agent-what')).toContainText('the pendulum that it learned with');
   await page.locator('#agent').selectOption('d3qn-adaptive');
+  await expect(page.locator('#agent-what')).toContainText('It learned on many pendulums');
   await expect(page.locator('#agent-text')).toContainText(
     'identifies its pendulum, trained on random pendulums',
   );
@@ -55,7 +57,8 @@ test('another agent can be chosen, and has its own text, curve and mark', async 
 
 test('a link brings controllers that were not learned', async ({ page }) => {
   await open(page, '#agent=lqr&twin=mpc&on=1');
-  await expect(page.locator('#agent-text')).toContainText('cannot swing them up');
+  await expect(page.locator('#agent-what')).toContainText('cannot swing them up');
+  await expect(page.locator('#trained-on')).toHaveText('what the agent was made for');
   await expect(page.locator('#agent-command')).toHaveText('./upswing simulate lqr');
   await expect(page.locator('#twin-name')).toHaveText('MPC: always plans');
   await expect(page.locator('#q-name')).toHaveText('Decision');
@@ -102,6 +105,7 @@ test('a pendulum that is posed is judged at once', async ({ page }) => {
 test('what "Try this" promises is so', async ({ page }) => {
   test.setTimeout(120_000);
   await open(page);
+  await expect(page.locator('#try summary')).toBeInViewport();
   const tries = await page
     .locator('a[data-balances]')
     .evaluateAll((links) =>

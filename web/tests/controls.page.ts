@@ -127,7 +127,7 @@ test('while paused, the keyboard sets the start', async ({ page }) => {
   posed = await state();
   expect(posed.q1).toBeCloseTo((179 * Math.PI) / 180, 9);
   expect(posed.q2).toBeCloseTo((-179 * Math.PI) / 180, 9);
-  await expect(page.locator('#badge')).toHaveText('paused, free');
+  await expect(page.locator('#badge')).toHaveText('paused');
   await page.getByRole('button', { name: 'Resume' }).click();
   await expect(page.locator('#pose')).toBeHidden();
 });

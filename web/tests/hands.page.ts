@@ -18,23 +18,46 @@ test('a drag pulls the balanced pendulum down, and the agent brings it back', as
   await expect(page.locator('#badge')).toHaveText(/balanced for [1-9]/, { timeout: 30_000 });
 });
 
-test('a shove moves it, to the side of its arrow', async ({ page }) => {
-  await open(page);
-  for (const [name, key, side] of [
-    ['Shove to the right', 'ArrowRight', -1],
-    ['Shove to the left', 'ArrowLeft', 1],
-  ] as const) {
-    await startFrom(page, 0);
-    await page.getByRole('button', { name }).click();
-    await run(page, 0.3);
-    const shoved = await page.evaluate(state);
-    expect(Math.sign(shoved.q1 + shoved.q2)).toBe(side); // a positive angle is to the left
-    await startFrom(page, 0);
-    await page.keyboard.press(key);
-    await run(page, 0.3);
-    const pressed = await page.evaluate(state);
-    expect(pressed.q1).toBeCloseTo(shoved.q1, 9);
-  }
+test.describe('on a canvas that is read back', () => {
+  test.use({ complains: true }); // that it could be faster
+
+  test('a shove moves it, to the side of its arrow', async ({ page }) => {
+    await open(page);
+    for (const [name, key, side] of [
+      ['Shove to the right', 'ArrowRight', -1],
+      ['Shove to the left', 'ArrowLeft', 1],
+    ] as const) {
+      await startFrom(page, 0);
+      await page.getByRole('button', { name }).click();
+      await run(page, 0.3);
+      const shoved = await page.evaluate(state);
+      // The arrow is still there when the shove is over.
+      const [arrow, none] = await page.evaluate((side) => {
+        const { scene, world } = upswing;
+        const { context, element, width } = scene.canvas;
+        const { q1, q2 } = world.state;
+        const [x, y] = scene.at({
+          x: -(Math.sin(q1) + Math.sin(q1 + q2)) / 2,
+          z: -(Math.cos(q1) + Math.cos(q1 + q2)) / 2,
+        });
+        const ratio = element.width / width;
+        const pixel = () => {
+          scene.draw(world, world.state, []);
+          return context.getImageData((x - 30 * side) * ratio, y * ratio, 1, 1).data.join();
+        };
+        const drawn = pixel();
+        world.shoved = null;
+        return [drawn, pixel()];
+      }, side);
+      expect(arrow).not.toBe(none);
+      expect(Math.sign(shoved.q1 + shoved.q2)).toBe(side); // a positive angle is to the left
+      await startFrom(page, 0);
+      await page.keyboard.press(key);
+      await run(page, 0.3);
+      const pressed = await page.evaluate(state);
+      expect(pressed.q1).toBeCloseTo(shoved.q1, 9);
+    }
+  });
 });
 
 test('the agent holds against one shove, not against ten, and gets up again', async ({ page }) => {

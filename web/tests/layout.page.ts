@@ -129,10 +129,11 @@ test('an example leads back to the pendulum, also when it is chosen again', asyn
   await page.setViewportSize({ width: 390, height: 700 });
   await page.emulateMedia({ reducedMotion: 'reduce' });
   await open(page);
-  const example = page.locator('#explain a').first();
+  await page.locator('#try summary').click();
+  const example = page.locator('#try a').first();
   for (let k = 0; k < 2; ++k) {
     await page.locator('#pause').click();
-    await example.scrollIntoViewIfNeeded();
+    await example.evaluate((link) => link.scrollIntoView({ behavior: 'instant' }));
     await expect(page.locator('#scene')).not.toBeInViewport();
     if (k === 1) {
       // Whatever the address has become: the very same again.
@@ -220,7 +221,7 @@ test.describe('with forced colours', () => {
   }
 });
 
-test('"Get Inverted" looks pressed while it is on', async ({ page }) => {
+test('"Run the agent" looks pressed while it is on', async ({ page }) => {
   await open(page);
   const look = () =>
     page.locator('#agent-on').evaluate((button) => {

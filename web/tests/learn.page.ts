@@ -170,7 +170,9 @@ test('pause, go on, another seed, start over', async ({ page }) => {
   await page.locator('#learn-start').click();
 });
 
-test('the last step of the tour: one learns, and ends when one goes on', async ({ page }) => {
+test('the last step of the tour: one learns, ends when one goes back, and stays when it has learned', async ({
+  page,
+}) => {
   await page.goto('./#tour=9');
   await expect(page.locator('fieldset:disabled')).toHaveCount(0);
   const step = page.locator('#step-learn');
@@ -182,6 +184,18 @@ test('the last step of the tour: one learns, and ends when one goes on', async (
   await page.locator('#tour-back').click();
   await expect.poll(() => page.workers().length).toBe(0);
   await expect.poll(learned).toBe('d3qn');
+  await page.locator('#tour-next').click();
+  await step.getByRole('button', { name: 'Learn' }).click();
+  await expect(step.locator('.answer')).toContainText('Solved after', { timeout: 100_000 });
+  await expect(page.locator('#agent')).toHaveValue('own');
+  await page.locator('#tour-back').click();
+  await expect.poll(learned).toBe('d3qn');
+  await page.locator('#tour-next').click();
+  await expect.poll(learned).toBe('fast');
+  await page.locator('#tour-end').click();
+  await expect(page.locator('#charts')).toBeVisible();
+  await expect(page.locator('#agent')).toHaveValue('own');
+  await expect(page.locator('#agent-on')).toHaveAttribute('aria-pressed', 'true');
 });
 
 test('four seeds at once, each of which can be watched, and one of them takes over once', async ({

@@ -103,7 +103,7 @@ test.describe('what is missing or broken is told', () => {
       await page.goto('./#everything');
       await expect(page.locator('#message')).toContainText('Agent "d3qn" cannot be used');
       await expect(page.locator('#message')).toContainText(words);
-      await expect(page.locator('#agent-text')).toContainText('could not be loaded');
+      await expect(page.locator('#agent-what')).toContainText('could not be loaded');
       await expect(page.locator('#badge')).toHaveText('hanging');
       await expect(page.locator('#agent-on')).toBeDisabled();
     }

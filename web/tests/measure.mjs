@@ -27,7 +27,7 @@ async function measure(page) {
     const { metrics } = await devtools.send('Performance.getMetrics');
     return Object.fromEntries(metrics.map(({ name, value }) => [name, value]));
   };
-  // With the agent on and the map in sight: one pendulum, then two side by side.
+  // With the agent on and the map in sight: one pendulum, two side by side, one whose agent plans.
   const run = async () => {
     await page.evaluate(() => document.getElementById('map').scrollIntoView({ block: 'end' }));
     const before = await metrics();
@@ -43,7 +43,10 @@ async function measure(page) {
   const one = await run();
   await page.selectOption('#twin', 'd3qn-adaptive');
   const two = await run();
-  return { ...start, kilobytes: sizes.reduce((sum, size) => sum + size) / 1000, one, two };
+  await page.selectOption('#twin', '');
+  await page.selectOption('#agent', 'mpc');
+  const mpc = await run();
+  return { ...start, kilobytes: sizes.reduce((sum, size) => sum + size) / 1000, one, two, mpc };
 }
 
 /// Frames a second, in the page.
@@ -71,6 +74,7 @@ console.log(`ready          ${of('ready').toFixed(0)} ms`);
 for (const [name, what] of [
   ['one', 'one pendulum'],
   ['two', 'two pendulums'],
+  ['mpc', 'one with mpc'],
 ]) {
   const median = (key) => medianOf(visits.map((visit) => visit[name][key]));
   console.log(

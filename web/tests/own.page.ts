@@ -221,7 +221,7 @@ test('what the list of agents says is text, of bounded length', async ({ page })
   await page.route(/agents\.json$/, (route) => route.fulfill({ json: { agents } }));
   await open(page);
   await expect(page.locator('#agent option')).toHaveCount(2 + 5); // and what is not learned
-  await expect(page.locator('#agent-command')).toBeHidden();
+  await expect(page.locator('#agent-command')).toHaveAttribute('hidden');
   const title = (await page.locator('#agent option:checked').textContent())!;
   expect(title.length).toBeLessThan(130);
   expect(title).not.toMatch(/[\n\u202e]/);

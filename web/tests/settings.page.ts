@@ -79,7 +79,7 @@ test('the address holds what was set, and brings it back', async ({ page, contex
   await slide(page, 'mass2', 1.25);
   await slide(page, 'sensor_noise', 0.02);
   await slide(page, 'speed', 0.5);
-  await page.getByRole('button', { name: 'Get Inverted' }).click();
+  await page.getByRole('button', { name: 'Run the agent' }).click();
   await expect(page).toHaveURL(/on=1/); // the address follows a little later
   const other = await context.newPage();
   await open(other, new URL(page.url()).hash);

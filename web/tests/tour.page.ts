@@ -53,6 +53,10 @@ test('from step to step, by buttons, numbers and address, and back', async ({ pa
     await expect(heading(page)).toHaveText(title);
     await expect(heading(page)).toBeFocused();
   }
+  // On the keyboard's way the numbers come last.
+  await page.locator('#tour-end').focus();
+  await page.keyboard.press('Tab');
+  await expect(page.locator('#dots button').first()).toBeFocused();
   await expect(page).toHaveURL(new RegExp(`#tour=${steps.length}$`));
   await page.reload();
   await expect(heading(page)).toHaveText(steps.at(-1)!);
@@ -225,8 +229,13 @@ test('every pose at once: the brightest is upright, and a click starts there', a
   });
   expect([most[0], most[1]]).toEqual([0, 0]);
   expect(most[2]).toBeGreaterThan(1.5 * least[2]);
-  // A click a quarter of the way in: both links half a turn back.
   const box = (await page.locator('#map').boundingBox())!;
+  // Clicks on the names of the axes start nothing.
+  const before = await page.evaluate(() => upswing.world.state);
+  await page.locator('#map').click({ position: { x: 7, y: box.height / 2 } });
+  await page.locator('#map').click({ position: { x: box.width / 2, y: box.height - 7 } });
+  expect(await page.evaluate(() => upswing.world.state)).toEqual(before);
+  // A click a quarter of the way in: both links half a turn back.
   await page.locator('#map').click({
     position: { x: 16 + (box.width - 16) / 4, y: (3 * (box.height - 18)) / 4 },
   });

@@ -42,7 +42,7 @@ test('with the same agent they stay together to the bit, whatever happens to the
   const dragged = await together(0.5);
   expect(dragged.state).not.toEqual(shoved.state);
   await page.evaluate(() => (upswing.world.drag = null));
-  await page.getByRole('button', { name: 'Get Inverted' }).click();
+  await page.getByRole('button', { name: 'Run the agent' }).click();
   expect((await together(0.5)).torque).toBe(0);
   await page.getByRole('button', { name: 'Reset', exact: true }).click();
   expect((await together(0)).state).toEqual({ q1: 0, q2: 0, w1: 0, w2: 0 });

@@ -110,6 +110,12 @@ export class LearnPanel {
     return `After ${steps} steps${trials}, ${swinging(session.steps)}${tested} …`;
   }
 
+  /// Whether what was learned since the page was opened is the visitor's own policy now.
+  get keeps(): boolean {
+    const { session, page } = this;
+    return session !== null && this.taken.has(session) && page.agents.ownIsLearned;
+  }
+
   /// At each frame.
   follow(): void {
     this.scrubber.attempt();

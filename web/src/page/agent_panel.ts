@@ -64,7 +64,7 @@ export class AgentPanel {
 
   private async load(get: () => Promise<Agent>, name: string): Promise<boolean> {
     const request = ++this.requests;
-    element('agent-text').textContent = 'Loading …';
+    element('agent-what').textContent = 'Loading …';
     try {
       const agent = await get();
       if (request !== this.requests) return false; // another was asked for meanwhile
@@ -91,13 +91,15 @@ export class AgentPanel {
     element<HTMLButtonElement>('agent-on').disabled = agent === null;
     element('own').hidden = agents.ownName === null;
     element('own-name').textContent = agents.ownName;
+    element('agent-details').hidden = agent === null;
     if (!agent) {
       select.prepend(new Option('Choose an agent', '', true, true));
-      element('agent-text').textContent = 'There is no agent: its policy could not be loaded.';
+      element('agent-what').textContent = 'There is no agent: its policy could not be loaded.';
       return;
     }
     select.value = agent.id;
     element('first-name').textContent = agent.title;
+    element('agent-what').textContent = agent.what;
     element('agent-text').textContent = agent.text;
     element('agent-command').hidden = agent.command === null;
     element('agent-command').firstElementChild!.textContent = agent.command;

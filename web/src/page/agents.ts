@@ -4,6 +4,7 @@ import { Recording } from '../learn/course';
 import { Policy } from '../policy';
 import { BadInput, largerThan, MAX_FILE_BYTES } from '../bad_input';
 import { isCommand, printable, quoted } from '../text';
+import { signed } from '../view/charts';
 import type { Curve } from '../view/charts';
 import { fetchBytes } from './fetch';
 import { OWN } from './share';
@@ -35,7 +36,8 @@ interface CheckpointFile {
 export interface Agent {
   id: string;
   title: string;
-  text: string;
+  what: string; // it is and can, in plain words
+  text: string; // of its network
   command: string | null;
   curve: Curve | null;
   policy: Policy;
@@ -53,6 +55,35 @@ const TITLES = new Map([
   ['sac-fast', 'SAC: a small network'],
   ['ppo', 'PPO: any torque'],
   ['ppo-discrete', 'PPO: one of some torques'],
+]);
+
+/// What those that come with the page are, in plain words.
+const CAN = 'It swings up and balances the pendulum that it learned with.';
+const PLAIN: ReadonlyMap<string, string> = new Map([
+  [
+    'd3qn',
+    `It learned by trial how much reward each of nine torques brings, and takes the best. ${CAN}`,
+  ],
+  [
+    'dqn',
+    `The plain method: it learned by trial how much reward each of nine torques brings. ${CAN}`,
+  ],
+  [
+    'double-dqn',
+    `DQN that learned with two networks, as one alone promises itself too much. ${CAN}`,
+  ],
+  ['dueling-dqn', `DQN that learned apart how good a moment is and what each torque adds. ${CAN}`],
+  ['fast', `The same method with a small network, which learns within seconds. ${CAN}`],
+  [
+    'd3qn-adaptive',
+    'It learned on many pendulums and feels out which one it has: it balances other masses, lengths and gravity too.',
+  ],
+  [
+    'd3qn-randomized',
+    'It learned on many pendulums and remembers its last steps to tell them apart: it balances many others too.',
+  ],
+  ['sac', `It learned by trial, from all that it had tried, and may use any torque. ${CAN}`],
+  ['ppo', `It learned by trial, from its latest trials alone, and may use any torque. ${CAN}`],
 ]);
 
 /// Controllers that are made from the equations of motion (docs/control.md): title, and how they act.
@@ -93,13 +124,23 @@ function titleOf({ id, agent }: Entry): string {
   return id === agent ? title : `${title}, ${printable(id)}`;
 }
 
+/// The same of any policy, of which it is not known what it can.
+function plainly({ controller }: Policy, agent: string): string {
+  const { strongest } = controller;
+  return (
+    PLAIN.get(agent) ??
+    `A policy that chooses torques up to ${signed(strongest)} N·m; see what it can.`
+  );
+}
+
 function describe(policy: Policy): string {
   const randomized = (Object.keys(NOMINAL) as Parameter[]).some((name) => {
     const [low, high] = policy.trainedRange(name);
     return low < high;
   });
+  const { text } = policy.controller;
   return [
-    policy.controller.text,
+    text.charAt(0).toUpperCase() + text.slice(1),
     policy.memory > 0 ? `, remembers ${policy.memory} steps` : '',
     policy.identifies ? ', identifies its pendulum' : '',
     randomized ? ', trained on random pendulums' : '',
@@ -209,7 +250,11 @@ export class Agents {
     if (!entry) return this.make(id);
     const policy = new Policy(await fetchPolicy(entry.file));
     const { command, curve } = entry;
-    return this.add({ id, title: titleOf(entry), text: describe(policy), command, curve, policy });
+    const what = plainly(policy, id === entry.agent ? id : OWN);
+    return this.add({
+      ...{ id, title: titleOf(entry), what, text: describe(policy) },
+      ...{ command, curve, policy },
+    });
   }
 
   /// One that is computed. Throws BadInput.
@@ -218,8 +263,9 @@ export class Agents {
     if (!computed) throw new BadInput(`there is no agent ${quoted(id)}`);
     const [title, how] = computed;
     const command = `./upswing simulate ${id}`;
-    const text = `${how} ${NOT_LEARNED}`;
-    return this.add({ id, title, text, command, curve: null, policy: new Policy(id) });
+    const what = `${how} ${NOT_LEARNED}`;
+    const policy = new Policy(id);
+    return this.add({ id, title, what, text: describe(policy), command, curve: null, policy });
   }
 
   /// How an agent that comes with the page became what it is; null where that is not known.
@@ -257,8 +303,16 @@ export class Agents {
 
   private addOwn(own: KeptFile): Agent {
     const policy = new Policy(own.bytes);
-    const text = describe(policy);
-    return this.add({ id: OWN, title: ownTitle(own), text, command: null, curve: null, policy });
+    const [what, text] = [plainly(policy, OWN), describe(policy)];
+    return this.add({
+      id: OWN,
+      title: ownTitle(own),
+      what,
+      text,
+      command: null,
+      curve: null,
+      policy,
+    });
   }
 
   private add(agent: Agent): Agent {

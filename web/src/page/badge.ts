@@ -10,7 +10,8 @@ export class Badge {
   draw(world: World, paused: boolean, scene: HTMLElement): boolean {
     const { state, text } = situation(world);
     const badge = element('badge');
-    write(badge, paused ? `paused, ${text}` : text);
+    const moving = state === 'swinging' || state === 'free';
+    write(badge, !paused ? text : moving ? 'paused' : `paused, ${text}`);
     badge.dataset.state = state;
     if (state === this.announced) return false;
     // Not at each tenth of a second.

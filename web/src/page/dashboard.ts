@@ -53,9 +53,9 @@ export class Dashboard {
       high: 1.1,
       target: 1,
       labels: [
-        [-1, '−1'],
-        [0, '0'],
-        [1, '1'],
+        [-1, 'hang'],
+        [0, 'pivot'],
+        [1, 'up'],
       ],
     });
     this.phase.draw(moments);
@@ -64,7 +64,7 @@ export class Dashboard {
   private drawTorque(moments: readonly Moment[], { time: now, plant, decision }: World): void {
     const limit = plant.torque_limit;
     this.torque.draw(moments, now, {
-      timed: true,
+      unit: 'N·m',
       mean: TORQUE_MEAN,
       low: -1.1 * limit,
       high: 1.1 * limit,
@@ -143,7 +143,7 @@ export function situation(world: World): { state: string; text: string } {
   if (world.agentOn) return { state: 'swinging', text: 'swinging up' };
   return isAtRest(world.state)
     ? { state: 'hanging', text: 'hanging' }
-    : { state: 'free', text: 'free' };
+    : { state: 'free', text: 'swinging freely' };
 }
 
 function isAtRest({ q1, q2, w1, w2 }: State): boolean {

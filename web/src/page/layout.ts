@@ -32,7 +32,7 @@ export function focusWideFormulas(): void {
 
 /// A link to an example leads back to the pendulum; `again` hears of one that is open already.
 export function listenToExamples(again: () => void): void {
-  element('explain').addEventListener('click', (event) => {
+  element('try').addEventListener('click', (event) => {
     const link = (event.target as HTMLElement).closest<HTMLAnchorElement>('a[href^="#"]');
     if (!link) return;
     showStage();

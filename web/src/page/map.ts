@@ -35,7 +35,9 @@ export class MapPanel {
       list.addEventListener('change', () => this.choose(list));
     }
     canvas.addEventListener('click', ({ offsetX, offsetY }) => {
-      const [x, y] = this.chart.toShares(offsetX, offsetY);
+      const shares = this.chart.toShares(offsetX, offsetY);
+      if (!shares) return;
+      const [x, y] = shares;
       const { map } = this;
       start({ [map.x.name]: valueAt(map.x, x), [map.y.name]: valueAt(map.y, y) });
     });

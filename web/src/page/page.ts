@@ -96,8 +96,12 @@ export class Page {
       this.learn.pause();
       return this.tour.go(view.step);
     }
-    this.tour.leave();
     const { shared, problems } = decode(hash, RANGES, (id) => this.agents.has(id));
+    // What was learned at the end of the tour stays.
+    if (this.tour.learns && this.learn.keeps && !shared.agent) {
+      Object.assign(shared, { agent: OWN, on: true });
+    }
+    this.tour.leave();
     this.world.agentOn = false;
     if (!(await this.begin(shared))) return;
     if (problems.length > 0) warn(problemText(problems));
@@ -255,6 +259,7 @@ export class Page {
   start(where: Partial<State>): void {
     this.world.reset({ ...this.world.state, ...where });
     this.restarted();
+    this.tour.started();
   }
 
   /// After a new start: what happened before is dropped.

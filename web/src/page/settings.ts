@@ -110,6 +110,9 @@ export class Settings {
     for (const [name, slider] of this.plant) slider.trained = policy.trainedRange(name);
     const { strongest } = policy.controller;
     this.plant.get('torque_limit')!.label = `Limit of the motor (agent: ±${strongest})`;
+    element('trained-on').textContent = policy.isLearned
+      ? 'what the agent was trained on'
+      : 'what the agent was made for';
     this.disturbance.sensor_noise.trained = policy.trainedDisturbance('sensor_noise');
     this.disturbance.delay.trained = policy.trainedDisturbance('delay');
   }

@@ -4,6 +4,7 @@ import type { World } from '../world';
 import { button, element } from './dom';
 import { prefersStill } from './motion';
 import { MotorKeys } from './motor';
+import { OWN } from './share';
 import type { Shared } from './share';
 import { Slider } from './sliders';
 
@@ -25,7 +26,7 @@ export interface Stage {
   reset(): void;
   /// What the map shows at first.
   resetMap(): void;
-  readonly learn: { start(): void; stop(): void; readonly story: string };
+  readonly learn: { start(): void; stop(): void; readonly story: string; readonly keeps: boolean };
 }
 
 export interface Step {
@@ -36,6 +37,8 @@ export interface Step {
   begin(): Promise<void>;
   /// When another is shown.
   end?(): void;
+  /// When a click on the map has started it somewhere.
+  started?(): void;
   /// Ten times a second. What to say to what the visitor did, empty for nothing.
   answer?(world: World): string;
 }
@@ -234,24 +237,18 @@ function values(stage: Stage): Step {
 }
 
 function map(stage: Stage): Step {
-  let shown = false;
   let clicked = false;
-  element('map').addEventListener('click', () => {
-    if (!shown) return;
-    clicked = true;
-    stage.setAgentOn(true);
-  });
   return {
     id: 'map',
     agents: [NOMINAL_AGENT],
     async begin() {
-      shown = true;
       clicked = false;
       stage.resetMap();
       await stage.take({ agent: NOMINAL_AGENT, on: true });
     },
-    end() {
-      shown = false;
+    started() {
+      clicked = true;
+      stage.setAgentOn(true);
     },
     answer(world) {
       if (!clicked) return '';
@@ -268,7 +265,8 @@ function learn(stage: Stage): Step {
     id: 'learn',
     agents: [NOMINAL_AGENT],
     async begin() {
-      await stage.begin({ agent: NOMINAL_AGENT, on: false });
+      const learned = stage.learn.keeps;
+      await stage.begin({ agent: learned ? OWN : NOMINAL_AGENT, on: learned });
     },
     end: () => stage.learn.stop(),
     answer() {

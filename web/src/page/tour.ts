@@ -36,6 +36,11 @@ export class Tour {
     return this.now ? this.steps.indexOf(this.now) + 1 : 0;
   }
 
+  /// Whether the step is shown in which an agent learns.
+  get learns(): boolean {
+    return this.now?.id === 'learn';
+  }
+
   /// Shows a step, the nearest that there is; where the visitor goes there, with the focus on it, and so
   /// that the browser's Back returns.
   async go(number: number, focus = false): Promise<void> {
@@ -57,6 +62,11 @@ export class Tour {
     }
     this.onStep();
     await now.begin();
+  }
+
+  /// A click on the map has started the pendulum somewhere.
+  started(): void {
+    this.now?.started?.();
   }
 
   leave(): void {

@@ -2,12 +2,13 @@ import type { Moment } from '../world';
 import { Canvas } from './canvas';
 
 export const SECONDS_SHOWN = 10;
+const TIMES = 16; // pixels, for the ends of the axis of time
 
 interface StripScale {
   low: number;
   high: number;
   target?: number; // a line to reach
-  timed?: boolean; // says how long ago its left edge is
+  unit?: string; // of its numbers
   mean?: number; // moments, over which a mean is drawn in front of what changes faster
   labels: readonly (readonly [number, string])[];
 }
@@ -30,7 +31,7 @@ export class Strip {
     canvas.clear();
     const left = 34;
     const y = (v: number) =>
-      6 + ((canvas.height - 12) * (scale.high - v)) / (scale.high - scale.low);
+      6 + ((canvas.height - 6 - TIMES) * (scale.high - v)) / (scale.high - scale.low);
     const x = (t: number) =>
       canvas.width - ((now - t) / SECONDS_SHOWN) * (canvas.width - left - 2) - 2;
     for (const [v, label] of scale.labels) {
@@ -56,7 +57,9 @@ export class Strip {
       );
       canvas.context.setLineDash([]);
     }
-    if (scale.timed) canvas.text(`−${SECONDS_SHOWN} s`, left + 2, canvas.height - 6);
+    canvas.text(`${SECONDS_SHOWN} s ago`, left, canvas.height - 6);
+    canvas.text('now', canvas.width - 2, canvas.height - 6, 'right');
+    if (scale.unit) canvas.text(scale.unit, left - 5, y(scale.high / 2), 'right');
     const values = moments.map((m) => Math.min(Math.max(value(m), scale.low), scale.high));
     const draw = (of: number[], width: number) =>
       canvas.line(
@@ -109,10 +112,10 @@ export class PhasePortrait {
       'grid',
       1,
     );
-    canvas.text('−180°', 2, canvas.height - 6);
+    canvas.text('angle −180°', 2, canvas.height - 6);
     canvas.text('upright', cx, canvas.height - 6, 'center');
     canvas.text('180°', canvas.width - 2, canvas.height - 6, 'right');
-    canvas.text(`${fastest} rad/s`, cx + 4, 8);
+    canvas.text(`velocity ${fastest} rad/s`, cx + 4, 8);
     for (const [color, angleOf, rateOf] of LINKS) {
       let piece: [number, number][] = [];
       for (const { state } of moments) {

@@ -10,6 +10,8 @@ import { signed } from './charts';
 
 const LABEL_WIDTH = 30; // pixels, of a torque under its bar
 const BOTTOM = 16; // pixels, for the torques below a chart
+const NAME = 13; // pixels, for the name of their axis
+const ROOMY = 90; // pixels of height, from which on it is named
 const TOP = 4;
 const CUT_OFF = 0.005; // share of a distribution that is worth a number
 const EASE = 0.2; // of the way to a bar's new height and colour, at each drawing
@@ -17,12 +19,14 @@ const EASE = 0.2; // of the way to a bar's new height and colour, at each drawin
 /// What the agent makes of what it sees: its Q-values, or how likely it finds each torque.
 export class DecisionChart {
   readonly canvas = new Canvas('q');
+  private below = 0; // pixels, that the name of the axis takes
   private room = 1; // of Q-values: from the bottom of the chart to the largest
   private bars: { height: number; chosen: number }[] = []; // as they are drawn; shares of 1
 
   draw(decision: Decision | null): void {
     this.canvas.clear();
     if (!decision) return;
+    this.nameAxis();
     if (!isFinite(decision)) {
       this.canvas.text('not finite', this.canvas.width / 2, this.canvas.height / 2, 'center');
       return; // and keep the scale
@@ -33,8 +37,15 @@ export class DecisionChart {
     else this.drawComputed(decision);
   }
 
+  /// Names the axis of torques where there is room; what is above it has the rest of the canvas.
+  private nameAxis(): void {
+    const { canvas } = this;
+    this.below = canvas.height < ROOMY ? 0 : NAME;
+    if (this.below > 0) canvas.text('torque, N·m', canvas.width / 2, canvas.height - 6, 'center');
+  }
+
   private get bottom(): number {
-    return this.canvas.height - BOTTOM;
+    return this.canvas.height - BOTTOM - this.below;
   }
 
   /// Q-values differ by little beside what they all have in common, so the bars hang from the largest.
@@ -73,7 +84,7 @@ export class DecisionChart {
       canvas.context.lineWidth = 1;
       canvas.context.strokeRect(...box);
       if (i % labelled === 0) {
-        canvas.text(signed(torque), (i + 0.5) * width, canvas.height - 7, 'center');
+        canvas.text(signed(torque), (i + 0.5) * width, bottom + 9, 'center');
       }
     });
   }
@@ -120,7 +131,7 @@ export class DecisionChart {
       1,
     );
     for (const torque of [-limit, 0, limit]) {
-      canvas.text(signed(torque), x(torque), canvas.height - 7, 'center');
+      canvas.text(signed(torque), x(torque), bottom + 9, 'center');
     }
     return { left, right, x };
   }

@@ -37,11 +37,11 @@ export class MapChart {
     this.shown = null;
   }
 
-  /// A place on the canvas as shares of both axes, in [0, 1]².
-  toShares(px: number, py: number): [number, number] {
-    const clamp = (x: number) => Math.min(Math.max(x, 0), 1);
+  /// A place on the canvas as shares of both axes, in [0, 1]²; null on the names of the axes.
+  toShares(px: number, py: number): [number, number] | null {
     const { width, height } = this.canvas;
-    return [clamp((px - LEFT) / (width - LEFT)), clamp(1 - py / (height - BOTTOM))];
+    if (px < LEFT || py > height - BOTTOM) return null;
+    return [Math.min((px - LEFT) / (width - LEFT), 1), Math.min(1 - py / (height - BOTTOM), 1)];
   }
 
   /// `low` and `high` are the ends of the colours; `way` is where the pendulum was, oldest first.
@@ -51,6 +51,7 @@ export class MapChart {
     const { width, height } = canvas;
     this.nameAxes(map.x, map.y);
     if (!map.cells) return canvas.text('computing …', width / 2, height / 2, 'center');
+    if (Number.isNaN(low)) return canvas.text('not estimated', width / 2, height / 2, 'center');
     // All the same are in the middle.
     const shareOf = (cell: number) => (high > low ? (cell - low) / (high - low) : 0.5);
     this.shown ??= map.cells.map(shareOf);
@@ -139,7 +140,8 @@ function between(colors: readonly Color[], share: number): Color {
 
 /// What stands at the ends and in the middle of an axis.
 function ends({ name, reach }: Axis): [string, string, string] {
-  if (name === 'q1') return ['hanging', 'upright', 'hanging'];
-  if (name === 'q2') return ['folded', 'straight', 'folded'];
-  return [signed(-reach), '0', `${reach} rad/s`];
+  if (name === 'q1') return ['hanging', 'upper link upright', 'hanging'];
+  if (name === 'q2') return ['folded', 'lower link straight', 'folded'];
+  const link = name === 'w1' ? 'upper' : 'lower';
+  return [signed(-reach), `velocity of the ${link} joint`, `${reach} rad/s`];
 }

@@ -1,6 +1,6 @@
 import { CONTROL_PERIOD } from '../pendulum';
 import type { Plant, State } from '../pendulum';
-import type { Vec } from '../simulator';
+import type { Push, Vec } from '../simulator';
 import { pointOn } from '../world';
 import type { Moment, World } from '../world';
 import { Canvas } from './canvas';
@@ -10,6 +10,7 @@ import { Sparks } from './sparks';
 
 export const TRAIL_SECONDS = 1.3; // of the pendulum's time
 const TRAIL_SHADES = 13;
+const FADING = 0.8; // s, in which the arrow of a shove fades: it acts for 0.1 s
 const FLASH_STEPS = 5; // control steps between two flashes
 const PIVOT: Vec = { x: 0, z: 0 };
 const LARGEST_ARC = (150 / 180) * Math.PI; // at the motor's limit
@@ -187,12 +188,20 @@ export class Scene {
       this.canvas.line([this.at(held), this.at(drag.target)], 'quiet', 1.5);
       context.setLineDash([]);
     }
-    if (!push) return;
+    if (push) return this.drawForce(push, plant, state);
+    const age = world.shoved ? world.time - world.shoved.at : FADING;
+    if (age >= FADING) return;
+    context.globalAlpha = Math.min(1, 2 * (1 - age / FADING));
+    this.drawForce(world.shoved!.push, plant, state);
+    context.globalAlpha = 1;
+  }
+
+  private drawForce(push: Push, plant: Plant, state: State): void {
     const size = Math.hypot(push.force.x, push.force.z); // N
     if (size < 0.05) return;
     const [x, y] = this.at(pointOn(plant, state, push.link, push.along).position);
     const [dx, dy] = [push.force.x / size, -push.force.z / size];
-    const length = Math.min(14 + 5 * size, this.room(x, y, dx, dy)); // pixels
+    const length = Math.min(40 + 7 * size, this.room(x, y, dx, dy)); // pixels
     this.canvas.line(
       [
         [x, y],
