@@ -6,11 +6,15 @@
 #include "apps/commands.h"
 #include "apps/map_table.h"
 #include "apps/progress.h"
+#include "core/error.h"
+#include "core/text.h"
 #include "core/thread_pool.h"
 #include "io/file.h"
 #include "io/machine.h"
+#include "lab/controllers.h"
 #include "lab/loaded_policy.h"
 #include "lab/map_command.h"
+#include "lab/view.h"
 
 namespace upswing {
 namespace {
@@ -18,16 +22,14 @@ namespace {
 namespace fs = std::filesystem;
 /// What was typed.
 struct MapCommand : MapArguments {
-  PolicyArguments policy;
+  std::vector<std::string> policies;
+  PolicyArguments controllers;  // settings of those among them
   int64_t threads;
   bool as_json = false;
 };
 
-int RunMapCommand(const MapCommand& a) {
-  const LoadedPolicy loaded = GetPolicy(a.policy);
-  MapResult map = PlanMap(a, loaded);
-  const fs::path folder = MapFolder(a, loaded, map);
-  ThreadPool pool(ResolveThreads(a.threads));
+/// Fills a planned map, with a progress line.
+void FillShown(const MapCommand& a, const LoadedPolicy& loaded, ThreadPool& pool, MapResult& map) {
   std::optional<EpisodeProgress> line;
   double shown = 0;  // episodes that the line is of
   FillMap(
@@ -38,7 +40,41 @@ int RunMapCommand(const MapCommand& a) {
         line->Show(share);
       },
       map);
-  line.reset();
+}
+
+/// Maps of several policies, side by side.
+int RunMaps(const MapCommand& a) {
+  if (a.out.empty()) {
+    throw BadInput(Concat("--out: expected a folder for the maps of ", Join(a.policies, ", ")));
+  }
+  const std::vector<LoadedPolicy> policies = GetPolicies(a.policies, a.controllers);
+  std::vector<NamedMap> maps;
+  for (const LoadedPolicy& loaded : policies) {
+    maps.push_back({TitleOf(loaded), PlanMap(a, loaded)});
+  }
+  CheckSameAxes(maps);
+  const fs::path folder = MapFolder(a, policies.front(), maps.front().map);
+  ThreadPool pool(ResolveThreads(a.threads));
+  for (size_t i = 0; i < maps.size(); ++i) FillShown(a, policies[i], pool, maps[i].map);
+  MakeNewFolder(folder);
+  WriteMaps(maps, folder);
+  if (a.as_json) {
+    fmt::print("{}\n", MapsJson(maps));
+    return 0;
+  }
+  for (const NamedMap& one : maps) PrintMapTable(one.map);
+  return 0;
+}
+
+int RunMapCommand(const MapCommand& a) {
+  if (a.policies.size() > 1) return RunMaps(a);
+  PolicyArguments policy = a.controllers;
+  policy.name = a.policies.front();
+  const LoadedPolicy loaded = GetPolicy(policy);
+  MapResult map = PlanMap(a, loaded);
+  const fs::path folder = MapFolder(a, loaded, map);
+  ThreadPool pool(ResolveThreads(a.threads));
+  FillShown(a, loaded, pool, map);
   MakeNewFolder(folder);
   WriteMap(map, folder);
   if (a.as_json) {
@@ -53,9 +89,15 @@ int RunMapCommand(const MapCommand& a) {
 
 void AddMap(CLI::App& program, Command& command) {
   CLI::App* app =
-      program.add_subcommand("map", "Map how a policy does on other plants or from other starts");
+      program.add_subcommand("map", "Map how policies do on other plants or from other starts");
   auto a = std::make_shared<MapCommand>();
-  AddPolicy(*app, a->policy)->required();
+  app->add_option("policies", a->policies,
+                  Concat("policy.safetensors, run folder or controller: ",
+                         Join(ControllerNames(), ", "), "; several: side by side"))
+      ->type_name("POLICY|RUN")
+      ->required()
+      ->check(NotEmpty());
+  AddControllers(*app, a->controllers);
   constexpr const char* kAxis = "NAME=FROM:TO[:CELLS]";
   app->add_option("--x", a->x, "horizontal axis [mass2=-50%:+50%:31]")->type_name(kAxis);
   app->add_option("--y", a->y, "vertical axis [length2=-50%:+50%:31]")->type_name(kAxis);
@@ -80,13 +122,15 @@ void AddMap(CLI::App& program, Command& command) {
       "(hanging, at rest). Energy and height in the observation are scaled by the cell's own\n"
       "plant, which reveals it to the policy; with --unknown-plant by the plant of the training.\n"
       "Without --out a map goes into map-X-Y in the run's folder, or into runs/map-X-Y-NAME for a\n"
-      "policy file elsewhere; then map-X-Y-2, …\n\n"
+      "policy file elsewhere; then map-X-Y-2, …. Maps of several policies need --out, and are\n"
+      "map-1.csv, map-2.csv, … with maps.svg and maps.png of their success.\n\n"
       "Examples:\n"
       "  ./upswing map runs/d3qn-seed1\n"
       "  ./upswing map runs/d3qn-seed1 --x mass=0.8:1.2 --y damping=0:0.4:21 --episodes 20\n"
       "  ./upswing map runs/d3qn-seed1 --x sensor_noise=0:0.1 --y delay=0:0.1:6\n"
       "  ./upswing map runs/d3qn-seed1 --x q1=-180:180:73 --y q2=-180:180:73    from any angle\n"
-      "  ./upswing map lqr --x q1=150:210:121 --y q2=-30:30:121    from where does it catch?\n");
+      "  ./upswing map lqr --x q1=150:210:121 --y q2=-30:30:121    from where does it catch?\n"
+      "  ./upswing map runs/d3qn-seed1 mpc tvlqr --episodes 1 --out runs/maps    side by side\n");
   app->callback([a, &command] { command = [a] { return RunMapCommand(*a); }; });
 }
 

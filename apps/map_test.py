@@ -163,6 +163,26 @@ class MapTest(ProgramTest):
         self.assertIn("q1 20 °", text)
         self.assertNotIn("interval", text)
 
+    def test_several_policies_side_by_side(self):
+        grid = ("--x", "gravity=0.05:3:3", "--y", "mass2=0.9:1.1:2", "--episodes", 2, "--check", 0)
+        maps = json.loads(self.succeed("map", self.policy, "lqr", *grid, "--lqr-torque", 2, "--out",
+                                       "both", "--json"))
+        self.assertEqual([m["policy"] for m in maps][1], "lqr (lqr_torque 2)")
+        alone = self.map(*grid, out="alone")
+        self.assertEqual(maps[0]["success_rate"], alone["success_rate"])
+        self.assertEqual(maps[1]["mean_success_rate"], 0)  # it does not swing up
+        self.assertEqual(sorted(path.name for path in (self.folder / "both").iterdir()),
+                         ["map-1.csv", "map-2.csv", "maps.png", "maps.svg"])
+        self.assertEqual((self.folder / "both/map-1.csv").read_bytes(),
+                         (self.folder / "alone/map.csv").read_bytes())
+        svg = (self.folder / "both/maps.svg").read_text(encoding="utf-8")
+        for words in (">run<", ">lqr (lqr_torque 2)<", ">what it was made for<"):
+            self.assertIn(words, svg)
+        self.assertEqual(svg.count(">successful episodes (%)<"), 1)  # one scale
+        self.refuse(["map", self.policy, "lqr", *grid], "--out: expected a folder")
+        self.refuse(["map", self.policy, "lqr", "--x", "gravity=-20%:+20%", "--out", "other"],
+                    "lqr: expected a policy made for the same plant as run")
+
     def test_a_check_without_successes_has_nothing_to_compare(self):
         text = self.succeed("map", self.policy, "--x", "gravity=20:30:2", "--y", "mass2=5:6:2",
                             "--episodes", 1, "--check", 1, "--out", "none")

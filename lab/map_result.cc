@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/error.h"
 #include "core/json.h"
 #include "core/text.h"
 #include "io/file.h"
@@ -15,6 +16,9 @@
 
 namespace upswing {
 namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
 
 /// A number as a table has it: empty for none.
 std::string Cell(double number) { return std::isfinite(number) ? FormatNumber(number) : ""; }
@@ -54,14 +58,19 @@ std::string CaptionOf(const MapResult& map) {
   return map.changes.empty() ? text : Concat(text, "; ", map.changes);
 }
 
-Figure MapFigure(const MapResult& map) {
-  HeatMap success, swing_up;
-  double longest = 0;  // swing-up time, s
+HeatMap SuccessMap(const MapResult& map) {
+  HeatMap success;
   success.label = "successful episodes (%)";
   success.high = 100;
+  for (const MapCell& cell : map.cells) success.z.push_back(100 * RateOf(map, cell));
+  return success;
+}
+
+Figure MapFigure(const MapResult& map) {
+  HeatMap success = SuccessMap(map), swing_up;
+  double longest = 0;  // swing-up time, s
   swing_up.label = "swing-up time (s)";
   for (const MapCell& cell : map.cells) {
-    success.z.push_back(100 * RateOf(map, cell));
     swing_up.z.push_back(cell.swing_up_seconds);
     longest = std::max(longest, cell.successes > 0 ? cell.swing_up_seconds : 0);
   }
@@ -78,6 +87,48 @@ Figure MapFigure(const MapResult& map) {
       MapPanel(map, map.config.episodes > 1 ? "Swing-up time, median" : "Swing-up time",
                std::move(swing_up))};
   return figure;
+}
+
+/// The map as a JSON object.
+ordered_json JsonOf(const MapResult& map) {
+  const auto number = [](double x) { return std::isfinite(x) ? ordered_json(x) : nullptr; };
+  const auto axis = [](const MapAxis& a) -> ordered_json {
+    return {{"name", a.name}, {"unit", a.unit}, {"values", a.values}};
+  };
+  ordered_json j;
+  j["policy"] = map.policy;
+  j["seed"] = map.config.seed;
+  j["physics"] = map.physics;
+  for (const auto& [name, value] : PlantValues(map.config.point.plant)) j["plant"][name] = value;
+  j["model"] = map.model ? map.model->Json() : kBuiltIn;
+  j["unknown_plant"] = map.config.assumed_plant.has_value();
+  j["changes"] = map.changes;
+  j["x"] = axis(map.config.x);
+  j["y"] = axis(map.config.y);
+  j["episodes_per_cell"] = map.config.episodes;
+  j["mean_success_rate"] = map.mean_success();
+  j["cells_without_failure"] = map.always_success();
+  j["median_swing_up_seconds"] = number(map.median_swing_up());
+  const size_t columns = map.config.x.values.size();
+  for (size_t i = 0; i < map.cells.size(); ++i) {
+    j["success_rate"][i / columns].push_back(RateOf(map, map.cells[i]));
+    j["swing_up_seconds"][i / columns].push_back(number(map.cells[i].swing_up_seconds));
+  }
+  j["check"] = nullptr;
+  if (!map.checked.empty()) {
+    const MapAgreement a = map.agreement();
+    j["check"] = {
+        {"cells", a.cells},
+        {"same_successes", a.same_successes},
+        {"largest_success_difference", a.largest_success_difference},
+        {"both_succeed", a.both_succeed},
+        {"largest_swing_up_difference",
+         a.both_succeed > 0 ? ordered_json(a.largest_swing_up_difference) : ordered_json()}};
+  }
+  j["seconds"] = map.seconds;
+  j["episodes_per_second"] = static_cast<double>(map.episodes()) / map.seconds;
+  j["files"] = map.files;
+  return j;
 }
 
 }  // namespace
@@ -154,46 +205,46 @@ void WriteMap(MapResult& map, const std::filesystem::path& folder) {
   Draw(figure, note("map.png"));
 }
 
-std::string MapJson(const MapResult& map) {
-  using nlohmann::ordered_json;
-  const auto number = [](double x) { return std::isfinite(x) ? ordered_json(x) : nullptr; };
-  const auto axis = [](const MapAxis& a) -> ordered_json {
-    return {{"name", a.name}, {"unit", a.unit}, {"values", a.values}};
-  };
-  ordered_json j;
-  j["policy"] = map.policy;
-  j["seed"] = map.config.seed;
-  j["physics"] = map.physics;
-  for (const auto& [name, value] : PlantValues(map.config.point.plant)) j["plant"][name] = value;
-  j["model"] = map.model ? map.model->Json() : kBuiltIn;
-  j["unknown_plant"] = map.config.assumed_plant.has_value();
-  j["changes"] = map.changes;
-  j["x"] = axis(map.config.x);
-  j["y"] = axis(map.config.y);
-  j["episodes_per_cell"] = map.config.episodes;
-  j["mean_success_rate"] = map.mean_success();
-  j["cells_without_failure"] = map.always_success();
-  j["median_swing_up_seconds"] = number(map.median_swing_up());
-  const size_t columns = map.config.x.values.size();
-  for (size_t i = 0; i < map.cells.size(); ++i) {
-    j["success_rate"][i / columns].push_back(RateOf(map, map.cells[i]));
-    j["swing_up_seconds"][i / columns].push_back(number(map.cells[i].swing_up_seconds));
+std::string MapJson(const MapResult& map) { return PrintableJson(JsonOf(map)); }
+
+void CheckSameAxes(const std::vector<NamedMap>& maps) {
+  const MapConfig& first = maps.front().map.config;
+  for (const auto& [name, map] : maps) {
+    if (map.config.x.values == first.x.values && map.config.y.values == first.y.values) continue;
+    throw BadInput(Concat(name, ": expected a policy made for the same plant as ",
+                          maps.front().name, ", from which percentages on an axis are counted; ",
+                          "numbers (--x mass2=0.5:1.5) are the same for all"));
   }
-  j["check"] = nullptr;
-  if (!map.checked.empty()) {
-    const MapAgreement a = map.agreement();
-    j["check"] = {
-        {"cells", a.cells},
-        {"same_successes", a.same_successes},
-        {"largest_success_difference", a.largest_success_difference},
-        {"both_succeed", a.both_succeed},
-        {"largest_swing_up_difference",
-         a.both_succeed > 0 ? ordered_json(a.largest_swing_up_difference) : ordered_json()}};
+}
+
+void WriteMaps(std::vector<NamedMap>& maps, const fs::path& folder) {
+  Figure figure;
+  figure.columns = maps.size() == 4 ? 2 : static_cast<int>(std::min<size_t>(3, maps.size()));
+  const int columns = figure.columns;
+  const int count = static_cast<int>(maps.size()), rows = (count + columns - 1) / columns;
+  figure.width = 40 + 420 * columns;
+  figure.height = 60 + 430 * rows;
+  figure.caption = CaptionOf(maps.front().map);
+  for (int i = 0; i < count; ++i) {
+    auto& [name, map] = maps[static_cast<size_t>(i)];
+    HeatMap success = SuccessMap(map);
+    success.bar = i % columns == columns - 1 || i == count - 1;
+    Panel& panel = figure.panels.emplace_back(MapPanel(map, name, std::move(success)));
+    // One legend of all dots, at the bottom left.
+    for (Line& line : panel.lines)
+      line.name = i == (rows - 1) * columns ? "what it was made for" : "";
+    const fs::path table = folder / Concat("map-", i + 1, ".csv");
+    WriteFileAtomically(table, MapCsv(map));
+    map.files = {table.string(), (folder / "maps.svg").string(), (folder / "maps.png").string()};
   }
-  j["seconds"] = map.seconds;
-  j["episodes_per_second"] = static_cast<double>(map.episodes()) / map.seconds;
-  j["files"] = map.files;
-  return PrintableJson(j);
+  Draw(figure, folder / "maps.svg");
+  Draw(figure, folder / "maps.png");
+}
+
+std::string MapsJson(const std::vector<NamedMap>& maps) {
+  ordered_json list = ordered_json::array();
+  for (const NamedMap& one : maps) list.push_back(JsonOf(one.map));
+  return PrintableJson(list);
 }
 
 }  // namespace upswing

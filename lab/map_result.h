@@ -42,4 +42,20 @@ void WriteMap(MapResult& map, const std::filesystem::path& folder);
 /// The map as a JSON document.
 std::string MapJson(const MapResult& map);
 
+/// Maps of several policies, side by side.
+struct NamedMap {
+  std::string name;  // short
+  MapResult map;
+};
+
+/// Throws BadInput unless all have the same axes.
+void CheckSameAxes(const std::vector<NamedMap>& maps);
+
+/// Writes map-1.csv, map-2.csv, … and maps.svg and maps.png, where the success of each is a panel,
+/// all with one scale of colours, into a folder, and notes them in each map's `files`.
+void WriteMaps(std::vector<NamedMap>& maps, const std::filesystem::path& folder);
+
+/// A JSON list of the maps.
+std::string MapsJson(const std::vector<NamedMap>& maps);
+
 }  // namespace upswing

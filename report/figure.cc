@@ -87,7 +87,7 @@ class PanelScript {
     CheckSizes(panel);
     Data();
     Axes();
-    if (panel.heat_map) ColorBar();
+    ColorScale();
     Legend();
     Plot();
   }
@@ -184,10 +184,12 @@ class PanelScript {
     Say("set ", axis, "range [*:*]; set autoscale ", axis == "x" ? "xfix" : "y");
   }
 
-  void ColorBar() {
+  void ColorScale() {
+    if (!panel_.heat_map) return;
     const HeatMap& map = *panel_.heat_map;
     const bool fixed = map.low < map.high;
     Say("set cbrange [", fixed ? Number(map.low) : "*", ":", fixed ? Number(map.high) : "*", "]");
+    if (!map.bar) return Say("unset colorbox");
     Say("set colorbox user origin ", ScreenX(box_.right + 12), ',', ScreenY(box_.bottom), " size ",
         ScreenX(14), ',', ScreenY(box_.top - box_.bottom), " noborder");
     Say("set cbtics out nomirror scale 0.5");

@@ -26,6 +26,7 @@ struct HeatMap {
   std::vector<double> z;     // (ny × nx); NaN: an empty cell
   std::string label;         // of the colour bar
   double low = 0, high = 0;  // colour range; where low ≥ high, that of the numbers
+  bool bar = true;           // the colour bar; a row of panels with the same colours needs but one
 };
 
 /// One pair of axes. Lines lie above the heat map.

@@ -43,7 +43,8 @@ Margins MarginsOf(const Panel& panel) {
   if (!panel.x_label.empty()) m.bottom += 18;
   if (!panel.title.empty()) m.top += 18;
   if (panel.heat_map) {
-    m.right = panel.heat_map->label.empty() ? 76 : 98;
+    const double bar = panel.heat_map->label.empty() ? 76 : 98;
+    if (panel.heat_map->bar) m.right = bar;
     m.bottom += LegendBelow(panel);
   } else if (HasLegend(panel)) {
     m.right = 12 + LegendWidth(panel);
