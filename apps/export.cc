@@ -22,6 +22,7 @@ namespace fs = std::filesystem;
 
 struct ExportArguments {
   std::vector<std::string> policies;
+  PolicyArguments controller;  // its settings
   std::string page, id, test_vectors, onnx, c, prefix;
   int64_t checkpoints = 0;
 };
@@ -40,23 +41,26 @@ void CheckOne(const ExportArguments& a) {
                         given.empty() ? "none" : Join(given, " and ")));
 }
 
-/// The one policy that `flag` writes in another form.
-LoadedPolicy SinglePolicy(const ExportArguments& a, const char* flag) {
+/// The one policy that `flag` writes in another form; a controller only if it `takes` such.
+LoadedPolicy SinglePolicy(const ExportArguments& a, const char* flag, bool takes) {
   if (!a.id.empty()) throw BadInput(Concat("--id: expected --page, got ", flag));
   if (a.policies.size() != 1) {
     throw BadInput(Concat(flag, ": expected a policy or a run folder, got ",
                           a.policies.empty() ? "none" : std::to_string(a.policies.size())));
   }
-  const std::string& name = a.policies.front();
-  if (IsController(name) && !fs::exists(name)) {
+  PolicyArguments policy = a.controller;
+  policy.name = a.policies.front();
+  const std::string& name = policy.name;
+  if (!takes && IsController(name) && !fs::exists(name)) {
     throw BadInput(Concat(name, ": expected a learned policy (policy.safetensors or a run folder) ",
-                          "to write as a network, got a controller, which has none"));
+                          "to write as a network, got a controller, which has none; --c writes ",
+                          "lqr, energy, pfl and tvlqr"));
   }
-  return LoadPolicy(name);
+  return GetPolicy(policy);
 }
 
 int ExportOnnx(const ExportArguments& a) {
-  const LoadedPolicy loaded = SinglePolicy(a, "--onnx");
+  const LoadedPolicy loaded = SinglePolicy(a, "--onnx", false);
   const std::string model = OnnxModelOf(loaded);
   WriteOutput(a.onnx, model);
   if (!IsStandardStream(a.onnx)) {
@@ -67,7 +71,7 @@ int ExportOnnx(const ExportArguments& a) {
 }
 
 int ExportC(const ExportArguments& a) {
-  const LoadedPolicy loaded = SinglePolicy(a, "--c");
+  const LoadedPolicy loaded = SinglePolicy(a, "--c", true);
   const CHeader header = CHeaderOf(loaded, a.prefix.empty() ? CPrefixOf(a.c, loaded) : a.prefix);
   WriteOutput(a.c, header.text);
   if (IsStandardStream(a.c)) return 0;
@@ -76,9 +80,13 @@ int ExportC(const ExportArguments& a) {
   fmt::print("  flash       {} bytes of constants\n", FormatCount(header.constant_bytes));
   fmt::print("  RAM         {} bytes of state, {} on the stack in a call\n",
              FormatCount(header.state_bytes), FormatCount(header.stack_bytes));
-  fmt::print("  work        {} multiply-adds a call, every {} s\n",
-             FormatCount(header.multiply_adds),
-             FormatNumber(*loaded.policy->info().control_period));
+  const std::string period = FormatNumber(*loaded.policy->info().control_period);
+  if (header.multiply_adds > 0) {
+    fmt::print("  work        {} multiply-adds a call, every {} s\n",
+               FormatCount(header.multiply_adds), period);
+  } else {
+    fmt::print("  work        every {} s; the header says what\n", period);
+  }
   return 0;
 }
 
@@ -114,9 +122,11 @@ void AddExport(CLI::App& program, Command& command) {
   CLI::App* app = program.add_subcommand(
       "export", "Policies as ONNX or C or in the page; numbers to test other readers by");
   auto a = std::make_shared<ExportArguments>();
-  app->add_option("policies", a->policies, "policy.safetensors or run folders")
+  app->add_option("policies", a->policies,
+                  "policy.safetensors or run folders; for --c also lqr, energy, pfl or tvlqr")
       ->type_name("POLICY|RUN")
       ->check(NotEmpty());
+  AddControllers(*app, a->controller);
   app->add_option(
          "--onnx", a->onnx,
          "ONNX file to write: from observations to torques and values, for any runtime; -: "
@@ -154,6 +164,7 @@ void AddExport(CLI::App& program, Command& command) {
       "Examples:\n"
       "  ./upswing export runs/d3qn-seed1 --onnx policy.onnx           for onnxruntime and others\n"
       "  ./upswing export runs/fast-seed1 --c policy.h                 for a microcontroller\n"
+      "  ./upswing export tvlqr --c tvlqr.h                            a controller for one\n"
       "  ./upswing export runs/d3qn-seed1 --page web/public/agents     for every visitor\n"
       "  ./upswing export runs/* --page build/web/agents               in the page built here\n"
       "  ./upswing export policy.safetensors --id mine --page build/web/agents\n"

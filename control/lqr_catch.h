@@ -24,6 +24,9 @@ class LqrCatch {
   /// RegionOfAttraction of the regulator.
   double region() const { return region_; }
 
+  /// Control periods within which it has to come there.
+  int steps() const { return steps_; }
+
   /// Whether the regulator, from this deviation from upright on, brings the plant into the region
   /// within half of the time in which it settles, at least 2.5 s, without either link leaning
   /// further than 60°: by simulating just that. `model` is one of the plant.

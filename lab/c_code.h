@@ -30,7 +30,7 @@ inline constexpr const char* kHead = R"c(/* A policy that @goal@, as one C99 hea
  * All arithmetic is in float. Nothing is allocated, and nothing is static but constants. */
 )c";
 
-inline constexpr const char* kDeclarations = R"c(#ifndef UPSWING_CAPS_H
+inline constexpr const char* kOpening = R"c(#ifndef UPSWING_CAPS_H
 #define UPSWING_CAPS_H
 
 #include <math.h>
@@ -38,11 +38,14 @@ inline constexpr const char* kDeclarations = R"c(#ifndef UPSWING_CAPS_H
 
 #define CAPS_PERIOD @period@ /* s, between two calls */
 #define CAPS_TORQUE_LIMIT @limit@ /* N m, no torque is beyond it */
-#define CAPS_OBSERVATION_SIZE @inputs@
+#define CAPS_CONSTANT_BYTES @constant_bytes@L
+)c";
+inline constexpr const char* kSizes =
+    R"c(#define CAPS_OBSERVATION_SIZE @inputs@
 #define CAPS_OUTPUT_SIZE @outputs@ /* of the network */
 @memory@#define CAPS_MULTIPLY_ADDS @multiply_adds@L /* of a call */
-#define CAPS_CONSTANT_BYTES @constant_bytes@L
-
+)c";
+inline constexpr const char* kDeclarations = R"c(
 typedef enum {
   CAPS_OK = 0,
   CAPS_NOT_FINITE = 1,   /* a number that came in, or that followed from it */
@@ -53,7 +56,8 @@ typedef enum {
 typedef struct {
   float torque; /* N m, the last one; if another one acted, write that here */
 @state@} NAME_state;
-
+)c";
+inline constexpr const char* kObservation = R"c(
 /* The observation (CAPS_OBSERVATION_SIZE), which NAME_control computes:
 @observation@*/
 )c";
@@ -262,7 +266,7 @@ static inline NAME_status NAME_control(NAME_state *state,
 }
 )c";
 
-inline constexpr const char* kSelfTest = R"c(
+inline constexpr const char* kChecksum = R"c(
 /* Samples: states, one after the other, and what Upswing makes of them. */
 @tables@
 /* Continues a checksum (FNV-1a over words) with the bits of some numbers. */
@@ -278,7 +282,8 @@ static inline uint32_t NAME_checksum_of_all(void)
   uint32_t sum = 2166136261u;
 @sums@  return sum;
 }
-
+)c";
+inline constexpr const char* kSelfTest = R"c(
 /* Whether all constants are as they were written, and this machine computes what Upswing does. */
 static inline NAME_status NAME_selftest(void)
 {

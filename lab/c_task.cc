@@ -1,5 +1,6 @@
 #include "lab/c_task.h"
 
+#include <bit>
 #include <numbers>
 
 #include "core/error.h"
@@ -80,6 +81,37 @@ CTask PendulumCode(const LoadedPolicy& loaded) {
 }
 
 }  // namespace
+
+std::string ArrayText(const CArray& array) {
+  std::vector<std::string> words;
+  for (const float value : array.values) words.push_back(CLiteral(value) + ",");
+  words.back().back() = '}';
+  const std::string comment = array.comment.empty() ? "" : Concat(" /* ", array.comment, " */");
+  return Concat("static const float NAME_", array.name, '[', array.values.size(), "] = {", comment,
+                "\n  ", Wrapped(words, "  ", 2), ";\n");
+}
+
+CChecksum ChecksumOf(const std::vector<CArray>& arrays) {
+  CChecksum checksum{2166136261U, ""};
+  for (const CArray& array : arrays) {
+    for (const float value : array.values) {
+      checksum.sum = (checksum.sum ^ std::bit_cast<uint32_t>(value)) * 16777619U;
+    }
+    checksum.lines +=
+        Concat("  sum = NAME_checksum(sum, NAME_", array.name, ", ", array.values.size(), "L);\n");
+  }
+  return checksum;
+}
+
+std::string PlantParagraph(const Plant& plant, const std::string& what) {
+  std::vector<std::string> values;
+  for (const auto& [name, value] : PlantValues(plant)) {
+    values.push_back(Concat(name, ' ', FormatNumber(value)));
+  }
+  return Paragraph(Concat("Made for this plant (kg, m, N m s/rad, m/s2, N m), ", what, ": ",
+                          Join(values, ", "), '.')) +
+         "\n *\n";
+}
 
 CTask CTaskOf(const LoadedPolicy& loaded) {
   if (loaded.task == kDoublePendulum) return PendulumCode(loaded);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,19 @@ struct CArray {
   std::string name, comment;
   std::vector<float> values;
 };
+
+/// Its definition.
+std::string ArrayText(const CArray& array);
+
+/// What a header's NAME_checksum_of_all computes of these arrays, and the lines of it that do so.
+struct CChecksum {
+  uint32_t sum = 0;
+  std::string lines;
+};
+CChecksum ChecksumOf(const std::vector<CArray>& arrays);
+
+/// The plant's numbers in words, after `what`.
+std::string PlantParagraph(const Plant& plant, const std::string& what);
 
 struct CTask {
   std::string goal;               // what a policy does, for its first line

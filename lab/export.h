@@ -41,18 +41,19 @@ std::vector<Checkpoint> CheckpointsOf(const LoadedPolicy& loaded, int64_t count)
 /// (docs/export.md). Throws BadInput if it is none that was learned.
 std::string OnnxModelOf(const LoadedPolicy& loaded);
 
-/// A learned policy as a C99 header without dependencies (docs/export.md).
+/// A learned policy, or a controller whose law is small, as a C99 header without dependencies
+/// (docs/export.md).
 struct CHeader {
   std::string prefix;  // with which all of its names begin
   std::string text;
   size_t constant_bytes = 0;  // of flash
   size_t state_bytes = 0;     // of RAM, between calls
   size_t stack_bytes = 0;     // of RAM, in a call: its arrays
-  size_t multiply_adds = 0;   // of a call, in the network's layers
+  size_t multiply_adds = 0;   // of a call, in the network's layers; 0 of a controller
 };
 
 /// `prefix`: small letters, digits and _, a letter first; see CPrefixOf. Throws BadInput if it is
-/// something else, or if the policy is none that was learned.
+/// something else, or if the policy is neither.
 CHeader CHeaderOf(const LoadedPolicy& loaded, const std::string& prefix);
 
 /// A prefix for the header of this name, such as "my_policy" for my-policy.h; of standard output

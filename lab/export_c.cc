@@ -1,12 +1,12 @@
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 
 #include "core/error.h"
 #include "core/text.h"
 #include "io/streams.h"
 #include "lab/c_code.h"
+#include "lab/c_controller.h"
 #include "lab/c_samples.h"
 #include "lab/c_task.h"
 #include "lab/c_text.h"
@@ -55,15 +55,6 @@ std::vector<PlainLayer> LayersOf(const ExportedPolicy& policy) {
 std::string CName(std::string name) {
   for (char& c : name) c = c == '.' ? '_' : c;
   return name;
-}
-
-std::string ArrayText(const CArray& array) {
-  std::vector<std::string> words;
-  for (const float value : array.values) words.push_back(CLiteral(value) + ",");
-  words.back().back() = '}';
-  const std::string comment = array.comment.empty() ? "" : Concat(" /* ", array.comment, " */");
-  return Concat("static const float NAME_", array.name, '[', array.values.size(), "] = {", comment,
-                "\n  ", Wrapped(words, "  ", 2), ";\n");
 }
 
 /// `text` as the beginning of C's names: small letters and digits, a letter first, with a _ in
@@ -189,15 +180,7 @@ std::string HeaderWriter::HeadComment() const {
                      '\n');
   }
   if (loaded.task == kDoublePendulum) {
-    std::vector<std::string> values;
-    for (const auto& [name, value] : PlantValues(loaded.plant)) {
-      values.push_back(Concat(name, ' ', FormatNumber(value)));
-    }
-    plant =
-        Paragraph(Concat("Made for this plant (kg, m, N m s/rad, m/s2, N m), by which it computes "
-                         "energy and height: ",
-                         Join(values, ", "), '.')) +
-        "\n *\n";
+    plant = PlantParagraph(loaded.plant, "by which it computes energy and height");
   }
   size_t tanhs = policy_.kind == PolicyOutputKind::kSquashedGaussian ? 1 : 0;
   for (const PlainLayer& layer : layers_) {
@@ -236,16 +219,17 @@ std::string HeaderWriter::Declarations() const {
     memory_size = Concat("#define CAPS_MEMORY_SIZE ", kMemorySize * memory(),
                          " /* of the observation, for ", memory(), " past steps */\n");
   }
-  return Filled(c_code::kDeclarations,
-                {{"period", CLiteral(static_cast<float>(policy_.spec.step_seconds))},
-                 {"limit", CLiteral(static_cast<float>(policy_.limit))},
-                 {"inputs", Concat(policy_.obs_size())},
-                 {"outputs", Concat(num_outputs())},
-                 {"memory", memory_size},
-                 {"multiply_adds", Concat(header_.multiply_adds)},
-                 {"constant_bytes", Concat(header_.constant_bytes)},
-                 {"state", memory() > 0 ? c_code::kMemoryState : ""},
-                 {"observation", observation}});
+  return Filled(
+      Concat(c_code::kOpening, c_code::kSizes, c_code::kDeclarations, c_code::kObservation),
+      {{"period", CLiteral(static_cast<float>(policy_.spec.step_seconds))},
+       {"limit", CLiteral(static_cast<float>(policy_.limit))},
+       {"inputs", Concat(policy_.obs_size())},
+       {"outputs", Concat(num_outputs())},
+       {"memory", memory_size},
+       {"multiply_adds", Concat(header_.multiply_adds)},
+       {"constant_bytes", Concat(header_.constant_bytes)},
+       {"state", memory() > 0 ? c_code::kMemoryState : ""},
+       {"observation", observation}});
 }
 
 std::string HeaderWriter::Constants() const {
@@ -283,26 +267,21 @@ std::string HeaderWriter::OutputsFunction() const {
 }
 
 std::string HeaderWriter::SelfTest() const {
-  uint32_t sum = 2166136261U;  // as NAME_checksum_of_all computes it
-  std::string sums;
-  for (const CArray& array : arrays_) {
-    for (const float value : array.values) sum = (sum ^ std::bit_cast<uint32_t>(value)) * 16777619U;
-    sums +=
-        Concat("  sum = NAME_checksum(sum, NAME_", array.name, ", ", array.values.size(), "L);\n");
-  }
+  const CChecksum checksum = ChecksumOf(arrays_);
   const std::string tables = Concat(ArrayText({"sample_states", StateNames(""), samples_.states}),
                                     ArrayText({"sample_outputs", "", samples_.outputs}),
                                     ArrayText({"sample_torques", "N m", samples_.torques}));
   std::vector<std::string> state;
   for (size_t i = 0; i < task_.state.size(); ++i) state.push_back(Concat("x[", i, ']'));
-  return Filled(c_code::kSelfTest, {{"tables", tables},
-                                    {"state_size", Concat(task_.state.size())},
-                                    {"sums", sums},
-                                    {"checksum", Concat(sum, 'u')},
-                                    {"samples", Concat(samples_.count)},
-                                    {"sample", Join(state, ", ")},
-                                    {"output_tolerance", CLiteral(samples_.output_tolerance)},
-                                    {"torque_tolerance", CLiteral(samples_.torque_tolerance)}});
+  return Filled(Concat(c_code::kChecksum, c_code::kSelfTest),
+                {{"tables", tables},
+                 {"state_size", Concat(task_.state.size())},
+                 {"sums", checksum.lines},
+                 {"checksum", Concat(checksum.sum, 'u')},
+                 {"samples", Concat(samples_.count)},
+                 {"sample", Join(state, ", ")},
+                 {"output_tolerance", CLiteral(samples_.output_tolerance)},
+                 {"torque_tolerance", CLiteral(samples_.torque_tolerance)}});
 }
 
 std::string HeaderWriter::Functions() const {
@@ -344,6 +323,7 @@ CHeader CHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
                           " parameters, for a longer header takes compilers long, got ",
                           loaded.policy->num_parameters()));
   }
+  if (loaded.path.empty()) return ControllerHeaderOf(loaded, prefix);
   return HeaderWriter(loaded, prefix).Write();
 }
 
