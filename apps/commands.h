@@ -27,7 +27,7 @@ void AddCompare(CLI::App& program, Command& command);
 void AddStudy(CLI::App& program, Command& command);
 void AddExport(CLI::App& program, Command& command);
 void AddView(CLI::App& program, Command& command);
-void AddGym(CLI::App& program, Command& command);
+void AddRealAiGym(CLI::App& program, Command& command);
 void AddBench(CLI::App& program, Command& command);
 
 /// Refuses an empty text, such as that of a shell variable that is not set, for `what` is expected.

@@ -88,7 +88,7 @@ int Main(int argc, char** argv) {
   AddCompare(program, command);
   AddStudy(program, command);
   AddExport(program, command);
-  AddGym(program, command);
+  AddRealAiGym(program, command);
   AddBench(program, command);
 
   try {

@@ -24,7 +24,7 @@
 namespace upswing {
 namespace {
 
-struct GymArguments {
+struct RealAiGymArguments {
   PolicyArguments policy;
   std::string figure, csv, search_out, from;
   std::vector<FlagValue> search;
@@ -46,7 +46,7 @@ std::string Shortened(const std::string& name) {
   return "…" + name.substr(begin);
 }
 
-void PrintEntry(const GymEntry& e) {
+void PrintEntry(const BoardEntry& e) {
   fmt::print(
       "  {:<22} {:>6} {:>7} {:>6} {:>7} {:>7} {:>6}  {:>5} {:>5} {:>5} {:>5} {:>5} {:>5} "
       "{:>6}\n",
@@ -57,8 +57,8 @@ void PrintEntry(const GymEntry& e) {
       Cell(e.robustness, 3));
 }
 
-void PrintReport(const GymReport& report) {
-  const GymRobot robot = report.competitor.robot;
+void PrintReport(const BoardReport& report) {
+  const Robot robot = report.competitor.robot;
   fmt::print("{} on RealAIGym's {}, simulation, version 2\n", Printable(report.competitor.name),
              NameOf(robot));
   fmt::print(
@@ -67,26 +67,26 @@ void PrintReport(const GymReport& report) {
       "delay", "push", "score");
   fmt::print("  {:<22} {:>6} {:>7} {:>6} {:>7} {:>7} {:>6}  {:>5} {:>5} {:>5} {:>5} {:>5} {:>5}\n",
              "", "s", "J", "N²m²s", "N·m", "rad²/s", "S", "%", "%", "%", "%", "%", "%");
-  GymEntry ours = report.Entry();
+  BoardEntry ours = report.Entry();
   ours.name = Printable(ours.name);
   PrintEntry(ours);
   fmt::print("  published\n");
-  for (const GymEntry& entry : PublishedGymEntries(robot)) PrintEntry(entry);
-  fmt::print("  {} simulations of 10 s in {:.2f} s; largest torque {:.2f} N·m\n", kGymSimulations,
+  for (const BoardEntry& entry : PublishedEntries(robot)) PrintEntry(entry);
+  fmt::print("  {} simulations of 10 s in {:.2f} s; largest torque {:.2f} N·m\n", kBoardSimulations,
              report.seconds, report.nominal.max_torque);
   if (!report.nominal.above_line) {
     fmt::print("  it does not swing up: the tip is not above 0.45 m at the end\n");
   }
 }
 
-GymCompetitor Search(const GymArguments& a, ThreadPool& pool) {
-  GymSearchConfig config;
+Competitor Search(const RealAiGymArguments& a, ThreadPool& pool) {
+  BoardSearchConfig config;
   SetFlags(OptionsOf(config), a.search);
-  GymSearch search =
-      a.from.empty() ? GymSearch(config) : GymSearch(config, LoadSwingPolicy(a.from));
+  BoardSearch search =
+      a.from.empty() ? BoardSearch(config) : BoardSearch(config, LoadSwingPolicy(a.from));
   InstallSignalHandlers("\nwriting the policy so far\n");
   const auto begin = std::chrono::steady_clock::now();
-  GymSearch::Report report;
+  BoardSearch::Report report;
   {
     ProgressLine line;
     while (search.Step(&pool, report) && StopSignal() == 0) {
@@ -112,7 +112,7 @@ GymCompetitor Search(const GymArguments& a, ThreadPool& pool) {
   return CompetitorOf(search, a.search_out);
 }
 
-int RunGym(const GymArguments& a) {
+int RunRealAiGym(const RealAiGymArguments& a) {
   const bool searches = !a.search_out.empty();
   if (searches == !a.policy.empty()) {
     throw BadInput(searches ? "--search: expected no policy beside it"
@@ -141,19 +141,19 @@ int RunGym(const GymArguments& a) {
   }
   if (!a.figure.empty()) CheckCanDraw();
   ThreadPool pool(ResolveThreads(a.threads));
-  const GymCompetitor competitor = searches ? Search(a, pool) : GetGymCompetitor(a.policy, robot);
+  const Competitor competitor = searches ? Search(a, pool) : GetCompetitor(a.policy, robot);
   if (StopSignal() != 0) return 128 + StopSignal();
-  GymReport report;
+  BoardReport report;
   {
-    EpisodeProgress progress(kGymSimulations, a.as_json);
-    report = ScoreGym(competitor, static_cast<uint64_t>(a.case_seed), pool,
-                      [&](double share) { progress.Show(share); });
+    EpisodeProgress progress(kBoardSimulations, a.as_json);
+    report = ScoreOnBoard(competitor, static_cast<uint64_t>(a.case_seed), pool,
+                          [&](double share) { progress.Show(share); });
   }
-  if (!a.csv.empty()) WriteOutput(a.csv, GymCsv(report));
-  if (!a.figure.empty()) DrawGym(report, a.figure);
+  if (!a.csv.empty()) WriteOutput(a.csv, BoardCsv(report));
+  if (!a.figure.empty()) DrawBoard(report, a.figure);
   if (to_output) return 0;
   if (a.as_json) {
-    fmt::print("{}\n", GymJson(report));
+    fmt::print("{}\n", BoardJson(report));
     return 0;
   }
   PrintReport(report);
@@ -165,10 +165,10 @@ int RunGym(const GymArguments& a) {
 
 }  // namespace
 
-void AddGym(CLI::App& program, Command& command) {
+void AddRealAiGym(CLI::App& program, Command& command) {
   CLI::App* app = program.add_subcommand(
       "realaigym", "Score a policy by the rules of the benchmark RealAIGym, or search one");
-  auto a = std::make_shared<GymArguments>();
+  auto a = std::make_shared<RealAiGymArguments>();
   AddPolicy(*app, a->policy);
   app->add_option("--search", a->search_out, "search a policy, write it here, then score it")
       ->type_name("FILE")
@@ -189,7 +189,7 @@ void AddGym(CLI::App& program, Command& command) {
   own.Add(&a->case_seed, "case_seed", 1, {0, 1e15}, "",
           "seed of the noise and the pushes of the robustness score");
   AddArguments(*app, own);
-  GymSearchConfig config;
+  BoardSearchConfig config;
   AddSettings(*app, OptionsOf(config), a->search);
   AddThreads(*app, a->threads);
   app->footer(
@@ -208,7 +208,7 @@ void AddGym(CLI::App& program, Command& command) {
       "  ./upswing realaigym --search acrobot.safetensors --robot acrobot --seed 2\n"
       "  ./upswing realaigym pendubot.safetensors --csv sim_swingup.csv --json\n"
       "  ./upswing realaigym baseline-lqr                           the baselines' regulator\n");
-  app->callback([a, &command] { command = [a] { return RunGym(*a); }; });
+  app->callback([a, &command] { command = [a] { return RunRealAiGym(*a); }; });
 }
 
 }  // namespace upswing

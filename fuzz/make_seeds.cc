@@ -71,7 +71,7 @@ void MakeSeeds(const fs::path& corpus) {
   Tensors narrow = policy.Rounded().ToTensors();
   narrow.Narrow();
   SaveTensors(narrow, corpus / "policy/accepted/bfloat16.safetensors");
-  const SwingNet net(GymRobot::kAcrobot, 4);
+  const SwingNet net(Robot::kAcrobot, 4);
   SaveTensors(net.ToTensors(net.Initial(1)), corpus / "policy/accepted/searched.safetensors");
 }
 

@@ -21,10 +21,10 @@ void TrySwingPolicy(const Tensors& tensors) {
   const SwingPolicy policy = ReadSwingPolicy(tensors);
   const Tensors again = policy.net.ToTensors(policy.numbers);
   Expect(ReadSwingPolicy(again).numbers == policy.numbers, "the same numbers again");
-  GymMeasurement measured{};
+  BoardMeasurement measured{};
   measured.q1.fill(0.5);
   Lanes torque{};
-  policy.net.Control(policy.numbers)->Act(0, measured, kGymBlock, torque);
+  policy.net.Control(policy.numbers)->Act(0, measured, kBoardBlock, torque);
   Expect(std::ranges::all_of(torque, [](double x) { return std::isfinite(x); }), "finite torques");
 }
 

@@ -28,11 +28,11 @@ using nlohmann::ordered_json;
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 /// See ControllerOf.
-class PolicyController : public GymController {
+class PolicyController : public BoardController {
  public:
   PolicyController(const LoadedPolicy& loaded, size_t count)
       : loaded_(loaded),
-        period_(static_cast<int>(std::lround(kControlPeriod / kGymTimestep))),
+        period_(static_cast<int>(std::lround(kControlPeriod / kBoardTimestep))),
         size_(static_cast<size_t>(loaded.policy->obs_size())),
         obs_(count * size_),
         action_(count),
@@ -40,7 +40,7 @@ class PolicyController : public GymController {
     if (loaded.identifies()) identifier_.emplace(loaded.plant, static_cast<int>(count));
   }
 
-  void Act(int step, const GymMeasurement& measured, size_t count, Lanes& torque) override {
+  void Act(int step, const BoardMeasurement& measured, size_t count, Lanes& torque) override {
     if (step % period_ != 0) return;
     for (size_t lane = 0; lane < count; ++lane) Observe(step, measured, lane);
     const int rows = static_cast<int>(count);
@@ -53,7 +53,7 @@ class PolicyController : public GymController {
   }
 
  private:
-  void Observe(int step, const GymMeasurement& m, size_t lane) {
+  void Observe(int step, const BoardMeasurement& m, size_t lane) {
     // As PendulumEnv observes, from the plant of the policy.
     const auto row = std::span(obs_).subspan(lane * size_, size_);
     const std::vector<float> before(row.begin(), row.end());
@@ -79,13 +79,14 @@ class PolicyController : public GymController {
 };
 
 /// The boards' own regulator of the linear model, with the weights of its baselines.
-class RegulatorController : public GymController {
+class RegulatorController : public BoardController {
  public:
-  explicit RegulatorController(GymRobot robot)
-      : K_(SolveGymRegulator(LinearizeUpright(GymPlant(), robot), {0.97, 0.93, 0.39, 0.26}, 0.11)
+  explicit RegulatorController(Robot robot)
+      : K_(SolveBoardRegulator(LinearizeUpright(BoardPlant(), robot), {0.97, 0.93, 0.39, 0.26},
+                               0.11)
                .K) {}
 
-  void Act(int /*step*/, const GymMeasurement& m, size_t count, Lanes& torque) override {
+  void Act(int /*step*/, const BoardMeasurement& m, size_t count, Lanes& torque) override {
     for (size_t lane = 0; lane < count; ++lane) {
       const auto [e1, e2] = Lean({m.q1[lane], m.q2[lane], 0, 0});
       // Lean has the second link's absolute angle.
@@ -98,21 +99,21 @@ class RegulatorController : public GymController {
   Eigen::RowVector4d K_;
 };
 
-GymRobot ParseRobot(const std::string& name, GymRobot usual) {
+Robot ParseRobot(const std::string& name, Robot usual) {
   if (name.empty()) return usual;
   if (const auto robot = RobotNamed(name)) return *robot;
   throw BadInput(Concat("--robot: expected pendubot or acrobot, got \"", Printable(name), "\""));
 }
 
 /// Throws BadInput where a policy is of the other robot.
-void ExpectRobot(const std::string& name, GymRobot own, GymRobot asked) {
+void ExpectRobot(const std::string& name, Robot own, Robot asked) {
   if (own == asked) return;
   throw BadInput(Concat("--robot: ", Printable(name), " is of the ", NameOf(own),
                         ", whose motor is at joint ", static_cast<int>(own), ", not of the ",
                         NameOf(asked)));
 }
 
-GymCompetitor OfSearch(const std::string& name, SwingPolicy policy) {
+Competitor OfSearch(const std::string& name, SwingPolicy policy) {
   const auto kept = std::make_shared<SwingPolicy>(std::move(policy));
   return {name, kept->net.robot(), [kept](size_t) { return kept->net.Control(kept->numbers); }};
 }
@@ -127,24 +128,24 @@ SwingPolicy LoadSwingPolicy(const fs::path& path) {
   return ReadSwingPolicy(tensors);
 }
 
-GymCompetitor CompetitorOf(const GymSearch& search, const std::string& name) {
+Competitor CompetitorOf(const BoardSearch& search, const std::string& name) {
   return OfSearch(name, {search.net(), search.numbers()});
 }
 
-std::unique_ptr<GymController> ControllerOf(const LoadedPolicy& loaded, size_t count) {
+std::unique_ptr<BoardController> ControllerOf(const LoadedPolicy& loaded, size_t count) {
   return std::make_unique<PolicyController>(loaded, count);
 }
 
-GymCompetitor GetGymCompetitor(const PolicyArguments& a, const std::string& robot) {
-  if (a.name == kGymRegulator && !a.has_settings() && !fs::exists(a.name)) {
-    const GymRobot asked = ParseRobot(robot, GymRobot::kPendubot);
-    return {kGymRegulator, asked,
+Competitor GetCompetitor(const PolicyArguments& a, const std::string& robot) {
+  if (a.name == kBoardRegulator && !a.has_settings() && !fs::exists(a.name)) {
+    const Robot asked = ParseRobot(robot, Robot::kPendubot);
+    return {kBoardRegulator, asked,
             [asked](size_t) { return std::make_unique<RegulatorController>(asked); }};
   }
   if (!IsController(a.name) && fs::is_regular_file(a.name)) {
     const Tensors tensors = LoadTensors(a.name);
     if (IsSwingPolicy(tensors)) {
-      GymCompetitor found = OfSearch(a.name, ReadSwingPolicy(tensors));
+      Competitor found = OfSearch(a.name, ReadSwingPolicy(tensors));
       ExpectRobot(a.name, found.robot, ParseRobot(robot, found.robot));
       return found;
     }
@@ -156,41 +157,21 @@ GymCompetitor GetGymCompetitor(const PolicyArguments& a, const std::string& robo
                           "one of ",
                           loaded->task));
   }
-  const auto own = static_cast<GymRobot>(static_cast<int>(loaded->plant.actuated_joint));
+  const auto own = static_cast<Robot>(static_cast<int>(loaded->plant.actuated_joint));
   ExpectRobot(loaded->name, own, ParseRobot(robot, own));
-  return {loaded->name, own, [loaded](size_t) { return ControllerOf(*loaded, kGymBlock); }};
+  return {loaded->name, own, [loaded](size_t) { return ControllerOf(*loaded, kBoardBlock); }};
 }
 
-std::vector<GymEntry> PublishedGymEntries(GymRobot robot) {
-  constexpr double kNone = kUnknown;
-  if (robot == GymRobot::kAcrobot) {
-    return {{"History SAC",
-             kNone,
-             kNone,
-             kNone,
-             kNone,
-             kNone,
-             0.655,
-             {kNone, kNone, kNone, kNone, kNone, kNone},
-             0.751},
-            {"AR-EAPO",
-             kNone,
-             kNone,
-             kNone,
-             kNone,
-             kNone,
-             0.633,
-             {kNone, kNone, kNone, kNone, kNone, kNone},
-             0.727},
-            {"TVLQR",
-             kNone,
-             kNone,
-             kNone,
-             kNone,
-             kNone,
-             0.504,
-             {kNone, kNone, kNone, kNone, kNone, kNone},
-             0.607}};
+std::vector<BoardEntry> PublishedEntries(Robot robot) {
+  if (robot == Robot::kAcrobot) {
+    const auto scores = [](const char* name, double performance, double robustness) {
+      BoardEntry entry{name,     kUnknown,    kUnknown, kUnknown,  kUnknown,
+                       kUnknown, performance, {},       robustness};
+      entry.rows.fill(kUnknown);
+      return entry;
+    };
+    return {scores("History SAC", .655, .751), scores("AR-EAPO", .633, .727),
+            scores("TVLQR", .504, .607)};
   }
   return {
       {"History SAC", 1.15, 7.67, 2.36, .007, 62.07, .682, {.681, .476, 1, 1, 1, .46}, .770},
@@ -219,26 +200,26 @@ std::vector<GymEntry> PublishedGymEntries(GymRobot robot) {
   };
 }
 
-GymEntry GymReport::Entry() const {
+BoardEntry BoardReport::Entry() const {
   return {competitor.name,           nominal.swing_up_seconds, nominal.energy,
           nominal.torque_cost,       nominal.smoothness,       nominal.velocity_cost,
           PerformanceScore(nominal), robustness.rows,          robustness.score()};
 }
 
-GymReport ScoreGym(const GymCompetitor& competitor, uint64_t seed, ThreadPool& pool,
-                   const std::function<void(double)>& progress) {
+BoardReport ScoreOnBoard(const Competitor& competitor, uint64_t seed, ThreadPool& pool,
+                         const std::function<void(double)>& progress) {
   const auto begin = std::chrono::steady_clock::now();
-  GymReport report{competitor, {}, {}, {}, 0};
-  const std::array<GymEpisode, 1> nominal;
+  BoardReport report{competitor, {}, {}, {}, 0};
+  const std::array<BoardEpisode, 1> nominal;
   report.nominal =
-      SimulateGym(competitor.robot, nominal, competitor.make, nullptr, &report.trace).front();
-  const std::vector<GymCase> cases = RobustnessCases(seed);
-  std::vector<GymEpisode> episodes;
-  for (const GymCase& each : cases) episodes.push_back(each.episode);
+      SimulateOnBoard(competitor.robot, nominal, competitor.make, nullptr, &report.trace).front();
+  const std::vector<RobustnessCase> cases = RobustnessCases(seed);
+  std::vector<BoardEpisode> episodes;
+  for (const RobustnessCase& each : cases) episodes.push_back(each.episode);
   std::mutex mutex;
   size_t done = 0;
-  const auto outcomes =
-      SimulateGym(competitor.robot, episodes, competitor.make, &pool, nullptr, [&](size_t count) {
+  const auto outcomes = SimulateOnBoard(
+      competitor.robot, episodes, competitor.make, &pool, nullptr, [&](size_t count) {
         const std::lock_guard lock(mutex);
         done += count;
         progress(static_cast<double>(done) / static_cast<double>(episodes.size()));
@@ -248,8 +229,8 @@ GymReport ScoreGym(const GymCompetitor& competitor, uint64_t seed, ThreadPool& p
   return report;
 }
 
-std::string GymJson(const GymReport& report) {
-  const GymOutcome& o = report.nominal;
+std::string BoardJson(const BoardReport& report) {
+  const BoardOutcome& o = report.nominal;
   ordered_json j;
   j["policy"] = report.competitor.name;
   j["robot"] = NameOf(report.competitor.robot);
@@ -259,21 +240,21 @@ std::string GymJson(const GymReport& report) {
                       {"velocity_cost", o.velocity_cost},       {"max_torque", o.max_torque},
                       {"penalties", PerformancePenalties(o)}};
   j["robustness"] = {{"score", report.robustness.score()}};
-  for (size_t row = 0; row < kGymRows; ++row) {
-    j["robustness"][kGymRowNames.at(row)] = report.robustness.rows.at(row);
+  for (size_t row = 0; row < kRobustnessRows; ++row) {
+    j["robustness"][kRobustnessRowNames.at(row)] = report.robustness.rows.at(row);
   }
-  for (const GymCurve& curve : report.robustness.curves) {
+  for (const RobustnessCurve& curve : report.robustness.curves) {
     j["curves"].push_back({{"name", curve.name}, {"values", curve.values}, {"share", curve.share}});
   }
-  j["simulations"] = kGymSimulations;
+  j["simulations"] = kBoardSimulations;
   j["seconds"] = report.seconds;
   return PrintableJson(j);
 }
 
-std::string GymCsv(const GymReport& report) {
+std::string BoardCsv(const BoardReport& report) {
   std::string csv = "time,pos_meas1,pos_meas2,vel_meas1,vel_meas2,tau_con1,tau_con2\n";
-  const bool first = report.competitor.robot == GymRobot::kPendubot;
-  for (const GymSample& sample : report.trace) {
+  const bool first = report.competitor.robot == Robot::kPendubot;
+  for (const BoardSample& sample : report.trace) {
     csv += FormatNumber(std::round(sample.time * 1e6) / 1e6);
     for (const double x : sample.state) csv += Concat(",", FormatNumber(x));
     csv += Concat(",", FormatNumber(first ? sample.torque : 0), ",",
@@ -282,7 +263,7 @@ std::string GymCsv(const GymReport& report) {
   return csv;
 }
 
-void DrawGym(const GymReport& report, const fs::path& file) {
+void DrawBoard(const BoardReport& report, const fs::path& file) {
   Figure figure;
   figure.title = Concat(Printable(report.competitor.name), " on RealAIGym's ",
                         NameOf(report.competitor.robot));
@@ -295,7 +276,8 @@ void DrawGym(const GymReport& report, const fs::path& file) {
   figure.width = 1200;
   figure.height = 720;
   const auto title = [&](size_t row) {
-    return fmt::format("{}: {:.1f}%", kGymRowNames.at(row), 100 * report.robustness.rows.at(row));
+    return fmt::format("{}: {:.1f}%", kRobustnessRowNames.at(row),
+                       100 * report.robustness.rows.at(row));
   };
   Panel model;
   model.x_label = "level of the error";
@@ -303,8 +285,8 @@ void DrawGym(const GymReport& report, const fs::path& file) {
   model.heat_map.emplace();
   model.heat_map->label = "ends upright";
   model.heat_map->high = 1;
-  for (int i = 1; i <= kGymLevels; ++i) model.heat_map->x.push_back(i);
-  const size_t parameters = kGymModelNames.size();
+  for (int i = 1; i <= kBoardLevels; ++i) model.heat_map->x.push_back(i);
+  const size_t parameters = kBoardModelNames.size();
   for (size_t k = 0; k < parameters; ++k) {
     model.heat_map->y.push_back(static_cast<double>(k + 1));
     const auto& share = report.robustness.curves[k].share;
@@ -314,8 +296,8 @@ void DrawGym(const GymReport& report, const fs::path& file) {
   figure.panels.push_back(std::move(model));
   constexpr const char* kLabels[] = {"noise of the velocities (rad/s)", "noise of the torque (N·m)",
                                      "response k", "delay (s)"};
-  for (size_t row = 1; row + 1 < kGymRows; ++row) {
-    const GymCurve& curve = report.robustness.curves[parameters + row - 1];
+  for (size_t row = 1; row + 1 < kRobustnessRows; ++row) {
+    const RobustnessCurve& curve = report.robustness.curves[parameters + row - 1];
     Panel panel;
     panel.title = title(row);
     panel.x_label = kLabels[row - 1];
@@ -326,10 +308,10 @@ void DrawGym(const GymReport& report, const fs::path& file) {
   }
   const double share = report.robustness.rows.back();
   Panel pushes;
-  pushes.title = title(kGymRows - 1);
+  pushes.title = title(kRobustnessRows - 1);
   pushes.x_label = "50 profiles of pushes";
   pushes.y_label = "share that ends upright";
-  pushes.lines = {{"", {0, kGymPushCases}, {share, share}, {}, {}}};
+  pushes.lines = {{"", {0, kBoardPushCases}, {share, share}, {}, {}}};
   pushes.y_range = {-0.05, 1.05};
   figure.panels.push_back(std::move(pushes));
   Draw(figure, file);

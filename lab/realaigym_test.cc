@@ -46,15 +46,15 @@ TEST(RealAIGym, PoliciesObserveAsInTraining) {
   LoadedPolicy loaded;
   loaded.policy = recorder;
   loaded.task = kDoublePendulum;
-  const GymControllerMaker make = [&](size_t) { return ControllerOf(loaded, kGymBlock); };
-  const std::vector<GymEpisode> nominal(1);
-  std::vector<GymSample> trace;
-  SimulateGym(GymRobot::kPendubot, nominal, make, nullptr, &trace);
+  const BoardControllerMaker make = [&](size_t) { return ControllerOf(loaded, kBoardBlock); };
+  const std::vector<BoardEpisode> nominal(1);
+  std::vector<BoardSample> trace;
+  SimulateOnBoard(Robot::kPendubot, nominal, make, nullptr, &trace);
   ASSERT_EQ(recorder->seen.size(), 500);
 
   Identifier identifier(loaded.plant, 1);
   for (size_t k = 0; k < 100; ++k) {
-    const GymState& now = trace[10 * k].state;
+    const BoardState& now = trace[10 * k].state;
     const PendulumState measured{now[0], now[1], now[2], now[3]};
     std::vector<float> expected;
     for (const float x : Observe(loaded.plant, measured)) expected.push_back(x);

@@ -7,8 +7,8 @@
 
 namespace upswing {
 
-GymLinear LinearizeUpright(const GymPlant& p, GymRobot robot) {
-  GymBlock block;
+BoardLinear LinearizeUpright(const BoardPlant& p, Robot robot) {
+  BoardBlock block;
   block.SetPlant(0, p);
   const double A = block.A[0], b = block.b[0], C = block.C[0];
   const double G1 = block.G1[0], G2 = block.G2[0];
@@ -17,13 +17,13 @@ GymLinear LinearizeUpright(const GymPlant& p, GymRobot robot) {
   G << G1 + G2, G2, G2, G2;
   D << p.damping1, 0, 0, p.damping2;
   const Eigen::Matrix2d inverse = M.inverse();
-  GymLinear model;
+  BoardLinear model;
   model.A << Eigen::Matrix2d::Zero(), Eigen::Matrix2d::Identity(), inverse * G, -inverse * D;
-  model.B << 0, 0, inverse.col(robot == GymRobot::kPendubot ? 0 : 1);
+  model.B << 0, 0, inverse.col(robot == Robot::kPendubot ? 0 : 1);
   return model;
 }
 
-GymRegulator SolveGymRegulator(const GymLinear& model, const Eigen::Vector4d& Q, double R) {
+BoardRegulator SolveBoardRegulator(const BoardLinear& model, const Eigen::Vector4d& Q, double R) {
   // P = Y X⁻¹ of the stable eigenvectors [X; Y] of the Hamiltonian matrix: Laub, "A Schur method
   // for solving algebraic Riccati equations" (1979), with eigenvectors in place of Schur's.
   Eigen::Matrix<double, 8, 8> H;

@@ -30,13 +30,14 @@ struct State {
   Joints q, w;
 };
 
-HWY_INLINE State StateAt(const GymBlock& block, size_t i) {
+HWY_INLINE State StateAt(const BoardBlock& block, size_t i) {
   return {{From(block.q1, i), From(block.q2, i)}, {From(block.w1, i), From(block.w2, i)}};
 }
 
 /// M(q) q̈ = f(q, q̇, τ), solved for q̈; with kFriction also what depends on it.
 template <bool kFriction>
-HWY_INLINE Joints Acceleration(const GymBlock& block, size_t i, const State& x, V* tip = nullptr) {
+HWY_INLINE Joints Acceleration(const BoardBlock& block, size_t i, const State& x,
+                               V* tip = nullptr) {
   const auto [s1, c1] = SineCosineOf(x.q.one);
   const auto [s2, c2] = SineCosineOf(x.q.two);
   const auto& [w1, w2] = x.w;
@@ -57,7 +58,7 @@ HWY_INLINE Joints Acceleration(const GymBlock& block, size_t i, const State& x, 
                 NegMulAdd(From(block.G1, i), s1, From(block.tau1, i)) - g2);
   V f2 = From(block.tau2, i) - MulAdd(bs, w1 * w1, g2);
   if constexpr (kFriction) {
-    const V slope = Constant(kGymFrictionSlope);
+    const V slope = Constant(kBoardFrictionSlope);
     f1 = f1 - MulAdd(From(block.d1, i), w1, From(block.cf1, i) * hn::Atan(kDoubles, slope * w1));
     f2 = f2 - MulAdd(From(block.d2, i), w2, From(block.cf2, i) * hn::Atan(kDoubles, slope * w2));
   }
@@ -67,8 +68,8 @@ HWY_INLINE Joints Acceleration(const GymBlock& block, size_t i, const State& x, 
 
 /// One Runge-Kutta step; the slopes of q are the w of the stages, as in sim/closed_form.cc.
 template <bool kFriction>
-HWY_INLINE void StepVector(GymBlock& block, size_t i) {
-  constexpr double h = kGymTimestep;
+HWY_INLINE void StepVector(BoardBlock& block, size_t i) {
+  constexpr double h = kBoardTimestep;
   const State x = StateAt(block, i);
   V tip;
   const Joints a1 = Acceleration<kFriction>(block, i, x, &tip);
@@ -87,17 +88,17 @@ HWY_INLINE void StepVector(GymBlock& block, size_t i) {
   hn::Store(w.two, kDoubles, block.w2.data() + i);
 }
 
-void AdvanceBlock(GymBlock& block) {
+void AdvanceBlock(BoardBlock& block) {
   const size_t lanes = hn::Lanes(kDoubles);
   if (block.friction) {
-    for (size_t i = 0; i < kGymBlock; i += lanes) StepVector<true>(block, i);
+    for (size_t i = 0; i < kBoardBlock; i += lanes) StepVector<true>(block, i);
   } else {
-    for (size_t i = 0; i < kGymBlock; i += lanes) StepVector<false>(block, i);
+    for (size_t i = 0; i < kBoardBlock; i += lanes) StepVector<false>(block, i);
   }
 }
 
-void AccelerateBlock(const GymBlock& block, std::array<Lanes, 2>& result) {
-  for (size_t i = 0; i < kGymBlock; i += hn::Lanes(kDoubles)) {
+void AccelerateBlock(const BoardBlock& block, std::array<Lanes, 2>& result) {
+  for (size_t i = 0; i < kBoardBlock; i += hn::Lanes(kDoubles)) {
     const Joints a = Acceleration<true>(block, i, StateAt(block, i));
     hn::StoreU(a.one, kDoubles, result[0].data() + i);
     hn::StoreU(a.two, kDoubles, result[1].data() + i);
@@ -114,12 +115,12 @@ namespace upswing {
 HWY_EXPORT(AdvanceBlock);
 HWY_EXPORT(AccelerateBlock);
 
-GymBlock::GymBlock() {
-  for (size_t lane = 0; lane < kGymBlock; ++lane) SetPlant(lane, GymPlant());
+BoardBlock::BoardBlock() {
+  for (size_t lane = 0; lane < kBoardBlock; ++lane) SetPlant(lane, BoardPlant());
 }
 
-void GymBlock::SetPlant(size_t lane, const GymPlant& p) {
-  const double J = p.rotor_inertia, gear = kGymGearRatio;
+void BoardBlock::SetPlant(size_t lane, const BoardPlant& p) {
+  const double J = p.rotor_inertia, gear = kBoardGearRatio;
   A[lane] = p.inertia1 + p.inertia2 + p.mass2 * p.length1 * p.length1 + (gear * gear + 1) * J;
   b[lane] = p.mass2 * p.length1 * p.center2;
   C[lane] = p.inertia2 - gear * J;
@@ -135,22 +136,22 @@ void GymBlock::SetPlant(size_t lane, const GymPlant& p) {
   friction = friction || p.has_friction();
 }
 
-void GymBlock::SetState(size_t lane, const GymState& s) {
+void BoardBlock::SetState(size_t lane, const BoardState& s) {
   q1[lane] = s[0];
   q2[lane] = s[1];
   w1[lane] = s[2];
   w2[lane] = s[3];
 }
 
-void Advance(GymBlock& block) { HWY_DYNAMIC_DISPATCH(AdvanceBlock)(block); }
+void Advance(BoardBlock& block) { HWY_DYNAMIC_DISPATCH(AdvanceBlock)(block); }
 
-std::array<Lanes, 2> Accelerations(const GymBlock& block) {
+std::array<Lanes, 2> Accelerations(const BoardBlock& block) {
   std::array<Lanes, 2> result;
   HWY_DYNAMIC_DISPATCH(AccelerateBlock)(block, result);
   return result;
 }
 
-double Energy(const GymPlant& p, const GymState& s) {
+double Energy(const BoardPlant& p, const BoardState& s) {
   const auto& [q1, q2, w1, w2] = s;
   const double M12 = p.inertia2 + p.mass2 * p.length1 * p.center2 * std::cos(q2);
   const double M11 = p.inertia1 + p.mass2 * p.length1 * p.length1 + 2 * M12 - p.inertia2;

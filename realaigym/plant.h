@@ -11,14 +11,14 @@
 /// joints have dry friction cf·atan(100 w).
 namespace upswing {
 
-inline constexpr double kGymTimestep = 0.002;     // s, of a Runge-Kutta step and of control
-inline constexpr int kGymSteps = 5000;            // of a simulation, 10 s
-inline constexpr double kGymTorqueLimit = 6;      // of the motor, N·m
-inline constexpr double kGymGearRatio = 6;        // of the motors
-inline constexpr double kGymFrictionSlope = 100;  // s/rad
+inline constexpr double kBoardTimestep = 0.002;     // s, of a Runge-Kutta step and of control
+inline constexpr int kBoardSteps = 5000;            // of a simulation, 10 s
+inline constexpr double kBoardTorqueLimit = 6;      // of the motor, N·m
+inline constexpr double kBoardGearRatio = 6;        // of the motors
+inline constexpr double kBoardFrictionSlope = 100;  // s/rad
 
 /// A plant; the defaults are design C.1, model 1.1, that of the board.
-struct GymPlant {
+struct BoardPlant {
   double mass1 = 0.5234602302310271, mass2 = 0.6255677234177437;           // kg
   double length1 = 0.2, length2 = 0.3;                                     // m
   double center1 = 0.2, center2 = 0.25569305436052964;                     // m from the joint
@@ -34,35 +34,35 @@ struct GymPlant {
 };
 
 /// q1, q2, w1, w2.
-using GymState = std::array<double, 4>;
+using BoardState = std::array<double, 4>;
 
 /// Simulations that are stepped together.
-inline constexpr size_t kGymBlock = 64;
-using Lanes = std::array<double, kGymBlock>;
+inline constexpr size_t kBoardBlock = 64;
+using Lanes = std::array<double, kBoardBlock>;
 
-/// Up to kGymBlock pendulums, each number as an array over them; those that are not used hang.
-struct alignas(64) GymBlock {
+/// Up to kBoardBlock pendulums, each number as an array over them; those that are not used hang.
+struct alignas(64) BoardBlock {
   Lanes q1{}, q2{}, w1{}, w2{};  // state
   Lanes tau1{}, tau2{};          // held during a step
   Lanes tip{};                   // height of the tip before the last step, m
 
-  GymBlock();
-  void SetPlant(size_t lane, const GymPlant& plant);
-  void SetState(size_t lane, const GymState& s);
-  GymState state(size_t lane) const { return {q1[lane], q2[lane], w1[lane], w2[lane]}; }
+  BoardBlock();
+  void SetPlant(size_t lane, const BoardPlant& plant);
+  void SetState(size_t lane, const BoardState& s);
+  BoardState state(size_t lane) const { return {q1[lane], q2[lane], w1[lane], w2[lane]}; }
 
   // Of M q̈ = f: M = [[A + 2 b c2, C + b c2], [·, D]], moments of gravity G, friction d and cf.
   Lanes A, b, C, D, G1, G2, d1, d2, cf1, cf2, length1, length2;
   bool friction = false;  // whether any has it
 };
 
-/// Makes one classical Runge-Kutta step of kGymTimestep.
-void Advance(GymBlock& block);
+/// Makes one classical Runge-Kutta step of kBoardTimestep.
+void Advance(BoardBlock& block);
 
 /// q̈ of the states as they are, rad/s².
-std::array<Lanes, 2> Accelerations(const GymBlock& block);
+std::array<Lanes, 2> Accelerations(const BoardBlock& block);
 
 /// Kinetic and potential energy, the latter 0 at the height of the pivot (J).
-double Energy(const GymPlant& plant, const GymState& s);
+double Energy(const BoardPlant& plant, const BoardState& s);
 
 }  // namespace upswing

@@ -12,42 +12,42 @@ namespace {
 
 // Numbers of the benchmark's own plant, without friction (docs/realaigym.md).
 
-TEST(GymPlant, AccelerationAndEnergyAreTheBenchmarks) {
-  GymBlock block;
-  const GymState s{1, 0.5, 0.3, -0.7};
+TEST(BoardPlant, AccelerationAndEnergyAreTheBenchmarks) {
+  BoardBlock block;
+  const BoardState s{1, 0.5, 0.3, -0.7};
   block.SetState(3, s);
   block.tau1[3] = 2;
   const auto [a1, a2] = Accelerations(block);
   EXPECT_NEAR(a1[3], 23.421661493, 1e-9);
   EXPECT_NEAR(a2[3], -67.143867013, 1e-9);
-  EXPECT_NEAR(Energy(GymPlant(), s), -1.3257887730, 1e-10);
+  EXPECT_NEAR(Energy(BoardPlant(), s), -1.3257887730, 1e-10);
 }
 
 /// The state after so many seconds from (1, 0.5, 0, 0) under a constant torque.
-GymState After(double seconds, double torque) {
-  GymBlock block;
+BoardState After(double seconds, double torque) {
+  BoardBlock block;
   block.SetState(0, {1, 0.5, 0, 0});
   block.tau1[0] = torque;
-  for (int i = 0; i < std::lround(seconds / kGymTimestep); ++i) Advance(block);
+  for (int i = 0; i < std::lround(seconds / kBoardTimestep); ++i) Advance(block);
   return block.state(0);
 }
 
-void ExpectState(const GymState& got, const GymState& expected) {
+void ExpectState(const BoardState& got, const BoardState& expected) {
   for (size_t k = 0; k < 4; ++k) EXPECT_NEAR(got[k], expected[k], 2e-8) << k;
 }
 
-TEST(GymPlant, MotionsAreTheBenchmarks) {
+TEST(BoardPlant, MotionsAreTheBenchmarks) {
   ExpectState(After(0.5, 0), {-0.434944568, -0.428248473, -4.784121124, 0.441863385});
   ExpectState(After(1, 0), {-0.341916511, -0.434082669, 4.645649569, 0.330197003});
-  const GymState end = After(2, 0);
+  const BoardState end = After(2, 0);
   ExpectState(end, {-0.529998365, -0.408895796, -4.793176912, 1.031446267});
-  EXPECT_NEAR(Energy(GymPlant(), end), -1.32905037, 1e-8);
+  EXPECT_NEAR(Energy(BoardPlant(), end), -1.32905037, 1e-8);
   ExpectState(After(1, 1), {0.692529048, -1.140444454, 3.70580572, 2.034784789});
   ExpectState(After(2, 1), {-0.477500598, -0.10842366, -4.904724458, 6.464643867});
 }
 
-TEST(GymPlant, LinearModelAndRegulatorAreTheBenchmarks) {
-  const GymLinear model = LinearizeUpright(GymPlant(), GymRobot::kPendubot);
+TEST(BoardPlant, LinearModelAndRegulatorAreTheBenchmarks) {
+  const BoardLinear model = LinearizeUpright(BoardPlant(), Robot::kPendubot);
   const Eigen::Matrix2d gravity = model.A.bottomLeftCorner<2, 2>();
   EXPECT_NEAR(gravity(0, 0), 34.45333863, 1e-8);
   EXPECT_NEAR(gravity(0, 1), -26.820907594, 1e-8);
@@ -55,23 +55,23 @@ TEST(GymPlant, LinearModelAndRegulatorAreTheBenchmarks) {
   EXPECT_NEAR(gravity(1, 1), 74.534058517, 1e-8);
   EXPECT_NEAR(model.B[2], 27.179932885, 1e-8);
   EXPECT_NEAR(model.B[3], -44.272653678, 1e-8);
-  const Eigen::RowVector4d K = SolveGymRegulator(model, {0.97, 0.93, 0.39, 0.26}, 0.11).K;
+  const Eigen::RowVector4d K = SolveBoardRegulator(model, {0.97, 0.93, 0.39, 0.26}, 0.11).K;
   const Eigen::RowVector4d expected{-74.06251872, -71.588802601, -17.239516925, -12.792756538};
   EXPECT_LT((K - expected).cwiseAbs().maxCoeff(), 1e-7);
 }
 
-TEST(GymPlant, LinearModelIsTheDerivativeOfTheMotion) {
-  GymPlant plant;
+TEST(BoardPlant, LinearModelIsTheDerivativeOfTheMotion) {
+  BoardPlant plant;
   plant.rotor_inertia = 6e-5;
   plant.damping1 = 0.03;
   plant.damping2 = -0.02;
-  for (const GymRobot robot : {GymRobot::kPendubot, GymRobot::kAcrobot}) {
-    const GymLinear model = LinearizeUpright(plant, robot);
+  for (const Robot robot : {Robot::kPendubot, Robot::kAcrobot}) {
+    const BoardLinear model = LinearizeUpright(plant, robot);
     const auto acceleration = [&](const Eigen::Vector4d& x, double u) {
-      GymBlock block;
+      BoardBlock block;
       block.SetPlant(0, plant);
       block.SetState(0, {std::acos(-1.0) + x[0], x[1], x[2], x[3]});
-      (robot == GymRobot::kPendubot ? block.tau1 : block.tau2)[0] = u;
+      (robot == Robot::kPendubot ? block.tau1 : block.tau2)[0] = u;
       const auto [a1, a2] = Accelerations(block);
       return Eigen::Vector2d(a1[0], a2[0]);
     };
@@ -88,20 +88,20 @@ TEST(GymPlant, LinearModelIsTheDerivativeOfTheMotion) {
   }
 }
 
-TEST(GymPlant, FrictionIsThatOfTheFormula) {
+TEST(BoardPlant, FrictionIsThatOfTheFormula) {
   // Against the equations with rotors and friction, solved as they stand.
   Rng rng(1, "states");
-  GymPlant p;
+  BoardPlant p;
   p.rotor_inertia = 8e-5;
   p.damping1 = 0.05;
   p.damping2 = -0.08;
   p.friction1 = 0.15;
   p.friction2 = -0.12;
   for (int trial = 0; trial < 100; ++trial) {
-    const GymState s{rng.Uniform(-3, 3), rng.Uniform(-3, 3), rng.Uniform(-9, 9),
-                     rng.Uniform(-9, 9)};
+    const BoardState s{rng.Uniform(-3, 3), rng.Uniform(-3, 3), rng.Uniform(-9, 9),
+                       rng.Uniform(-9, 9)};
     const auto& [q1, q2, w1, w2] = s;
-    GymBlock block;
+    BoardBlock block;
     block.SetPlant(0, p);
     block.SetState(0, s);
     const auto [a1, a2] = Accelerations(block);

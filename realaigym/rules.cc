@@ -13,8 +13,8 @@ namespace {
 double Between(double low, double high, double level) { return low + (high - low) * level; }
 
 /// The plant with one parameter at `level` of its range.
-GymPlant Varied(int parameter, double level, double& value) {
-  GymPlant plant;
+BoardPlant Varied(int parameter, double level, double& value) {
+  BoardPlant plant;
   const double factor = Between(0.75, 1.25, level);
   value = factor;
   switch (parameter) {
@@ -53,45 +53,45 @@ GymPlant Varied(int parameter, double level, double& value) {
 
 /// Six pushes with growing times, three of them, at random, about the joint with the motor. Those
 /// about the other one do nothing there (docs/realaigym.md).
-std::array<GymPush, 3> RandomPushes(Rng& rng) {
+std::array<BoardPush, 3> RandomPushes(Rng& rng) {
   std::array<int, 6> order;
   std::iota(order.begin(), order.end(), 0);
   for (size_t i = order.size() - 1; i > 0; --i) std::swap(order[i], order[rng.Below(i + 1)]);
-  std::array<GymPush, 6> all;
+  std::array<BoardPush, 6> all;
   double time = 0;
-  for (GymPush& push : all) {
+  for (BoardPush& push : all) {
     time += 1 + rng.Uniform(0, 0.5);
     push.time = time;
     push.width = rng.Uniform(0.05, 0.1);
     push.amplitude = rng.Uniform(0.5, 5) * (rng.Uniform() < 0.5 ? -1 : 1);
   }
-  std::array<GymPush, 3> ours;
+  std::array<BoardPush, 3> ours;
   for (size_t k = 0; k < 3; ++k) ours[k] = all[static_cast<size_t>(order[k])];
   return ours;
 }
 
-GymCase MakeCase(GymRow row, int parameter, double level, uint64_t seed) {
-  GymCase made{row, parameter, level, {}};
-  GymEpisode& episode = made.episode;
+RobustnessCase MakeCase(RobustnessRow row, int parameter, double level, uint64_t seed) {
+  RobustnessCase made{row, parameter, level, {}};
+  BoardEpisode& episode = made.episode;
   episode.seed = seed;
   switch (row) {
-    case GymRow::kModel:
+    case RobustnessRow::kModel:
       episode.plant = Varied(parameter, level, made.value);
       break;
-    case GymRow::kVelocityNoise:
+    case RobustnessRow::kVelocityNoise:
       episode.velocity_noise = made.value = Between(0, 0.5, level);
       break;
-    case GymRow::kTorqueNoise:
+    case RobustnessRow::kTorqueNoise:
       episode.torque_noise = made.value = Between(0, 1.1, level);
       break;
-    case GymRow::kResponse:
+    case RobustnessRow::kResponse:
       episode.response = made.value = Between(0.1, 2, level);
       break;
-    case GymRow::kDelay:
-      episode.delay = static_cast<int>(std::lround(level * (kGymLevels - 1)));
-      made.value = episode.delay * kGymTimestep;
+    case RobustnessRow::kDelay:
+      episode.delay = static_cast<int>(std::lround(level * (kBoardLevels - 1)));
+      made.value = episode.delay * kBoardTimestep;
       break;
-    case GymRow::kPush: {
+    case RobustnessRow::kPush: {
       Rng rng(seed, "realaigym: pushes");
       episode.pushes = RandomPushes(rng);
     }
@@ -101,25 +101,25 @@ GymCase MakeCase(GymRow row, int parameter, double level, uint64_t seed) {
 
 }  // namespace
 
-const char* NameOf(GymRobot robot) { return robot == GymRobot::kPendubot ? "pendubot" : "acrobot"; }
+const char* NameOf(Robot robot) { return robot == Robot::kPendubot ? "pendubot" : "acrobot"; }
 
-std::optional<GymRobot> RobotNamed(std::string_view name) {
-  for (const GymRobot robot : {GymRobot::kPendubot, GymRobot::kAcrobot}) {
+std::optional<Robot> RobotNamed(std::string_view name) {
+  for (const Robot robot : {Robot::kPendubot, Robot::kAcrobot}) {
     if (name == NameOf(robot)) return robot;
   }
   return std::nullopt;
 }
 
-bool AtGoal(const GymState& state) {
+bool AtGoal(const BoardState& state) {
   const auto [q1, q2, w1, w2] = state;
   const auto near = [](double angle, double goal) {
-    return std::abs(std::remainder(angle - goal, 2 * std::numbers::pi)) < kGymGoalAngle;
+    return std::abs(std::remainder(angle - goal, 2 * std::numbers::pi)) < kBoardGoalAngle;
   };
-  return near(q1, std::numbers::pi) && near(q2, 0) && std::abs(w1) < kGymGoalVelocity &&
-         std::abs(w2) < kGymGoalVelocity;
+  return near(q1, std::numbers::pi) && near(q2, 0) && std::abs(w1) < kBoardGoalVelocity &&
+         std::abs(w2) < kBoardGoalVelocity;
 }
 
-std::array<double, 5> PerformancePenalties(const GymOutcome& o) {
+std::array<double, 5> PerformancePenalties(const BoardOutcome& o) {
   constexpr std::array<double, 5> kScale{20, 60, 20, 0.1, 400};
   const std::array<double, 5> costs{o.swing_up_seconds, o.energy, o.torque_cost, o.smoothness,
                                     o.velocity_cost};
@@ -130,63 +130,63 @@ std::array<double, 5> PerformancePenalties(const GymOutcome& o) {
   return penalties;
 }
 
-double PerformanceScore(const GymOutcome& outcome) {
+double PerformanceScore(const BoardOutcome& outcome) {
   if (!outcome.above_line) return 0;
   const auto penalties = PerformancePenalties(outcome);
   return 1 - std::accumulate(penalties.begin(), penalties.end(), 0.0) / 5;
 }
 
-GymEpisode EpisodeOf(GymRow row, int parameter, double level, uint64_t seed) {
+BoardEpisode EpisodeOf(RobustnessRow row, int parameter, double level, uint64_t seed) {
   return MakeCase(row, parameter, level, seed).episode;
 }
 
-std::vector<GymCase> RobustnessCases(uint64_t seed) {
-  std::vector<GymCase> cases;
+std::vector<RobustnessCase> RobustnessCases(uint64_t seed) {
+  std::vector<RobustnessCase> cases;
   Rng rng(seed, "realaigym: cases");
-  const auto add = [&](GymRow row, int parameter, int level) {
-    const double share = static_cast<double>(level) / (kGymLevels - 1);
+  const auto add = [&](RobustnessRow row, int parameter, int level) {
+    const double share = static_cast<double>(level) / (kBoardLevels - 1);
     cases.push_back(MakeCase(row, parameter, share, rng.Next()));
   };
-  for (int parameter = 0; parameter < static_cast<int>(kGymModelNames.size()); ++parameter) {
-    for (int level = 0; level < kGymLevels; ++level) add(GymRow::kModel, parameter, level);
+  for (int parameter = 0; parameter < static_cast<int>(kBoardModelNames.size()); ++parameter) {
+    for (int level = 0; level < kBoardLevels; ++level) add(RobustnessRow::kModel, parameter, level);
   }
-  for (const GymRow row : {GymRow::kVelocityNoise, GymRow::kTorqueNoise}) {
-    for (int i = 0; i < kGymLevels * kGymRepeats; ++i) add(row, 0, i / kGymRepeats);
+  for (const RobustnessRow row : {RobustnessRow::kVelocityNoise, RobustnessRow::kTorqueNoise}) {
+    for (int i = 0; i < kBoardLevels * kBoardRepeats; ++i) add(row, 0, i / kBoardRepeats);
   }
-  for (const GymRow row : {GymRow::kResponse, GymRow::kDelay}) {
-    for (int level = 0; level < kGymLevels; ++level) add(row, 0, level);
+  for (const RobustnessRow row : {RobustnessRow::kResponse, RobustnessRow::kDelay}) {
+    for (int level = 0; level < kBoardLevels; ++level) add(row, 0, level);
   }
-  for (int i = 0; i < kGymPushCases; ++i) add(GymRow::kPush, 0, 0);
+  for (int i = 0; i < kBoardPushCases; ++i) add(RobustnessRow::kPush, 0, 0);
   return cases;
 }
 
-double GymRobustness::score() const {
-  return std::accumulate(rows.begin(), rows.end(), 0.0) / kGymRows;
+double Robustness::score() const {
+  return std::accumulate(rows.begin(), rows.end(), 0.0) / kRobustnessRows;
 }
 
-GymRobustness JudgeRobustness(const std::vector<GymCase>& cases,
-                              const std::vector<GymOutcome>& outcomes) {
-  GymRobustness result;
+Robustness JudgeRobustness(const std::vector<RobustnessCase>& cases,
+                           const std::vector<BoardOutcome>& outcomes) {
+  Robustness result;
   std::vector<int> rows;    // of each curve
   std::vector<int> counts;  // of simulations at the curve's last value
   double pushed = 0;
   for (size_t i = 0; i < cases.size(); ++i) {
-    const GymCase& each = cases[i];
+    const RobustnessCase& each = cases[i];
     const double reached = outcomes[i].at_goal ? 1 : 0;
-    if (each.row == GymRow::kPush) {
-      pushed += reached / kGymPushCases;
+    if (each.row == RobustnessRow::kPush) {
+      pushed += reached / kBoardPushCases;
       continue;
     }
     const auto row = static_cast<int>(each.row);
-    const bool model = each.row == GymRow::kModel;
-    const std::string name = model ? kGymModelNames.at(static_cast<size_t>(each.parameter))
-                                   : kGymRowNames.at(static_cast<size_t>(row));
+    const bool model = each.row == RobustnessRow::kModel;
+    const std::string name = model ? kBoardModelNames.at(static_cast<size_t>(each.parameter))
+                                   : kRobustnessRowNames.at(static_cast<size_t>(row));
     if (result.curves.empty() || result.curves.back().name != name) {
       result.curves.push_back({name, {}, {}});
       rows.push_back(row);
       counts.push_back(0);
     }
-    GymCurve& curve = result.curves.back();
+    RobustnessCurve& curve = result.curves.back();
     if (curve.values.empty() || curve.values.back() != each.value) {
       curve.values.push_back(each.value);
       curve.share.push_back(0);
@@ -196,7 +196,7 @@ GymRobustness JudgeRobustness(const std::vector<GymCase>& cases,
     share += (reached - share) / ++counts.back();
   }
   // A level of noise passes where more than half of its repeats do.
-  std::array<int, kGymRows> levels{};
+  std::array<int, kRobustnessRows> levels{};
   for (size_t k = 0; k < rows.size(); ++k) {
     const auto row = static_cast<size_t>(rows[k]);
     for (const double share : result.curves[k].share) {
@@ -204,7 +204,7 @@ GymRobustness JudgeRobustness(const std::vector<GymCase>& cases,
       ++levels.at(row);
     }
   }
-  for (size_t row = 0; row < kGymRows; ++row) {
+  for (size_t row = 0; row < kRobustnessRows; ++row) {
     if (levels.at(row) > 0) result.rows.at(row) /= levels.at(row);
   }
   result.rows.back() = pushed;

@@ -14,36 +14,36 @@
 namespace upswing {
 
 /// Which joint has the motor.
-enum class GymRobot { kPendubot = 1, kAcrobot = 2 };
-const char* NameOf(GymRobot robot);
+enum class Robot { kPendubot = 1, kAcrobot = 2 };
+const char* NameOf(Robot robot);
 /// The one of this name; none if there is none.
-std::optional<GymRobot> RobotNamed(std::string_view name);
+std::optional<Robot> RobotNamed(std::string_view name);
 
 /// A torque (N·m) about the motor's joint, beyond its limit too, for a moment: amplitude ·
 /// exp(-(t - time)²/(2 width²)).
-struct GymPush {
+struct BoardPush {
   double amplitude = 0;        // N·m
   double time = 0, width = 0;  // s
 };
 
 /// What is simulated: 10 s from hanging at rest.
-struct GymEpisode {
-  GymPlant plant;
-  double velocity_noise = 0;        // of the measured velocities, rad/s
-  double torque_noise = 0;          // N·m
-  double response = 1;              // k of u = u_before + k (u_wanted - u_before)
-  int delay = 0;                    // of the measured state, steps
-  std::array<GymPush, 3> pushes{};  // about the motor's joint
-  uint64_t seed = 0;                // of the noise
-  int steps = kGymSteps;            // fewer for a search; the same in a block
+struct BoardEpisode {
+  BoardPlant plant;
+  double velocity_noise = 0;          // of the measured velocities, rad/s
+  double torque_noise = 0;            // N·m
+  double response = 1;                // k of u = u_before + k (u_wanted - u_before)
+  int delay = 0;                      // of the measured state, steps
+  std::array<BoardPush, 3> pushes{};  // about the motor's joint
+  uint64_t seed = 0;                  // of the noise
+  int steps = kBoardSteps;            // fewer for a search; the same in a block
 };
 
 /// Robustness asks an end with both angles this near to upright, and both velocities this slow.
-inline constexpr double kGymGoalAngle = 0.35, kGymGoalVelocity = 1;  // rad, rad/s
-bool AtGoal(const GymState& state);
+inline constexpr double kBoardGoalAngle = 0.35, kBoardGoalVelocity = 1;  // rad, rad/s
+bool AtGoal(const BoardState& state);
 
 /// What came of it. One that blew up has infinite costs.
-struct GymOutcome {
+struct BoardOutcome {
   // Start of the last stretch above the line; the end if there is none.
   double swing_up_seconds = 0;
   double energy = 0;         // J
@@ -58,56 +58,56 @@ struct GymOutcome {
 };
 
 /// The performance score, version 2, from 0 to 1.
-double PerformanceScore(const GymOutcome& outcome);
+double PerformanceScore(const BoardOutcome& outcome);
 /// Its five penalties, each from 0 to 1: time, energy, torque cost, smoothness, velocity cost.
-std::array<double, 5> PerformancePenalties(const GymOutcome& outcome);
+std::array<double, 5> PerformancePenalties(const BoardOutcome& outcome);
 
 /// The rows of the robustness score.
-enum class GymRow { kModel, kVelocityNoise, kTorqueNoise, kResponse, kDelay, kPush };
-inline constexpr int kGymRows = 6;
-inline constexpr std::array<const char*, kGymRows> kGymRowNames{
+enum class RobustnessRow { kModel, kVelocityNoise, kTorqueNoise, kResponse, kDelay, kPush };
+inline constexpr int kRobustnessRows = 6;
+inline constexpr std::array<const char*, kRobustnessRows> kRobustnessRowNames{
     "model", "velocity noise", "torque noise", "response", "delay", "pushes"};
 /// The parameters of the model that are varied, one at a time.
-inline constexpr std::array<const char*, 10> kGymModelNames{"Ir", "m1 r1", "I1", "m2 r2", "m2",
-                                                            "I2", "b1",    "b2", "cf1",   "cf2"};
-inline constexpr int kGymLevels = 21;     // of what a row varies
-inline constexpr int kGymRepeats = 10;    // of a level of noise
-inline constexpr int kGymPushCases = 50;  // profiles
+inline constexpr std::array<const char*, 10> kBoardModelNames{"Ir", "m1 r1", "I1", "m2 r2", "m2",
+                                                              "I2", "b1",    "b2", "cf1",   "cf2"};
+inline constexpr int kBoardLevels = 21;     // of what a row varies
+inline constexpr int kBoardRepeats = 10;    // of a level of noise
+inline constexpr int kBoardPushCases = 50;  // profiles
 
 /// Of a report: the nominal one, and those of the rows.
-inline constexpr int kGymSimulations =
-    1 + kGymLevels * (static_cast<int>(kGymModelNames.size()) + 2 * kGymRepeats + 1 + 1) +
-    kGymPushCases;
+inline constexpr int kBoardSimulations =
+    1 + kBoardLevels * (static_cast<int>(kBoardModelNames.size()) + 2 * kBoardRepeats + 1 + 1) +
+    kBoardPushCases;
 
 /// A simulation of the robustness score and its place there.
-struct GymCase {
-  GymRow row;
+struct RobustnessCase {
+  RobustnessRow row;
   int parameter;  // of the model
   double value;   // what is varied
-  GymEpisode episode;
+  BoardEpisode episode;
 };
 
 /// All of them, in the order of the rows. The seed is that of noise and pushes.
-std::vector<GymCase> RobustnessCases(uint64_t seed);
+std::vector<RobustnessCase> RobustnessCases(uint64_t seed);
 
 /// A case of a row at `level` from 0 to 1 of its range.
-GymEpisode EpisodeOf(GymRow row, int parameter, double level, uint64_t seed);
+BoardEpisode EpisodeOf(RobustnessRow row, int parameter, double level, uint64_t seed);
 
 /// What a row shows: a share for each level, of a parameter of the model or of the repeats.
-struct GymCurve {
+struct RobustnessCurve {
   std::string name;
   std::vector<double> values;  // what is varied
   std::vector<double> share;   // of the simulations that ended at the goal
 };
 
-struct GymRobustness {
-  std::array<double, kGymRows> rows{};  // shares that pass
-  std::vector<GymCurve> curves;         // ten of the model, then the other rows but the pushes
+struct Robustness {
+  std::array<double, kRobustnessRows> rows{};  // shares that pass
+  std::vector<RobustnessCurve> curves;  // ten of the model, then the other rows but the pushes
   double score() const;
 };
 
 /// Judges the outcomes of these cases.
-GymRobustness JudgeRobustness(const std::vector<GymCase>& cases,
-                              const std::vector<GymOutcome>& outcomes);
+Robustness JudgeRobustness(const std::vector<RobustnessCase>& cases,
+                           const std::vector<BoardOutcome>& outcomes);
 
 }  // namespace upswing

@@ -14,7 +14,7 @@
 namespace upswing {
 namespace {
 
-TEST(GymRules, TheFormulaGivesThePublishedScores) {
+TEST(RealAiGymRules, TheFormulaGivesThePublishedScores) {
   // Time, energy, torque cost, smoothness, velocity cost, and score of the pendubot's board. The
   // columns are rounded there, smoothness to 0.001.
   const std::vector<std::array<double, 6>> board{
@@ -23,7 +23,7 @@ TEST(GymRules, TheFormulaGivesThePublishedScores) {
       {4.13, 9.53, 1.26, .007, 211.12, .526}, {1.14, 8.35, 2.42, .054, 114.26, .480},
       {4.12, 9.91, 1.77, .083, 211.98, .353}};
   for (const auto& [t, energy, cost, smooth, velocity, score] : board) {
-    GymOutcome o;
+    BoardOutcome o;
     o.swing_up_seconds = t;
     o.energy = energy;
     o.torque_cost = cost;
@@ -35,23 +35,23 @@ TEST(GymRules, TheFormulaGivesThePublishedScores) {
   }
 }
 
-TEST(GymRules, ThereAre722Cases) {
-  const std::vector<GymCase> cases = RobustnessCases(1);
+TEST(RealAiGymRules, ThereAre722Cases) {
+  const std::vector<RobustnessCase> cases = RobustnessCases(1);
   EXPECT_EQ(cases.size(), 722);
-  EXPECT_EQ(kGymSimulations, 723);
-  std::map<GymRow, std::set<double>> values;
+  EXPECT_EQ(kBoardSimulations, 723);
+  std::map<RobustnessRow, std::set<double>> values;
   std::set<uint64_t> seeds;
-  for (const GymCase& each : cases) {
+  for (const RobustnessCase& each : cases) {
     values[each.row].insert(each.value);
     seeds.insert(each.episode.seed);
-    const GymEpisode& e = each.episode;
+    const BoardEpisode& e = each.episode;
     const bool pushed = e.pushes[0].amplitude != 0;
-    EXPECT_EQ(pushed, each.row == GymRow::kPush);
-    EXPECT_EQ(e.delay > 0, each.row == GymRow::kDelay && each.value > 0);
-    if (each.row != GymRow::kModel) {
-      EXPECT_EQ(e.plant.mass2, GymPlant().mass2);
+    EXPECT_EQ(pushed, each.row == RobustnessRow::kPush);
+    EXPECT_EQ(e.delay > 0, each.row == RobustnessRow::kDelay && each.value > 0);
+    if (each.row != RobustnessRow::kModel) {
+      EXPECT_EQ(e.plant.mass2, BoardPlant().mass2);
     }
-    for (const GymPush& push : e.pushes) {
+    for (const BoardPush& push : e.pushes) {
       if (!pushed) break;
       EXPECT_GE(std::abs(push.amplitude), 0.5);
       EXPECT_LE(std::abs(push.amplitude), 5);
@@ -60,19 +60,19 @@ TEST(GymRules, ThereAre722Cases) {
     }
   }
   EXPECT_EQ(seeds.size(), cases.size());
-  EXPECT_EQ(values[GymRow::kDelay].size(), 21);
-  EXPECT_NEAR(*values[GymRow::kDelay].rbegin(), 0.04, 1e-12);
-  EXPECT_EQ(*values[GymRow::kTorqueNoise].rbegin(), 1.1);
-  EXPECT_EQ(*values[GymRow::kResponse].begin(), 0.1);
-  EXPECT_EQ(cases[21].episode.plant.center1, 0.75 * GymPlant().center1);
+  EXPECT_EQ(values[RobustnessRow::kDelay].size(), 21);
+  EXPECT_NEAR(*values[RobustnessRow::kDelay].rbegin(), 0.04, 1e-12);
+  EXPECT_EQ(*values[RobustnessRow::kTorqueNoise].rbegin(), 1.1);
+  EXPECT_EQ(*values[RobustnessRow::kResponse].begin(), 0.1);
+  EXPECT_EQ(cases[21].episode.plant.center1, 0.75 * BoardPlant().center1);
   EXPECT_EQ(cases[209].episode.plant.friction2, 0.2);
 }
 
-TEST(GymRules, ALevelOfNoisePassesAboveOneHalf) {
-  const std::vector<GymCase> cases = RobustnessCases(1);
-  std::vector<GymOutcome> outcomes(cases.size());
+TEST(RealAiGymRules, ALevelOfNoisePassesAboveOneHalf) {
+  const std::vector<RobustnessCase> cases = RobustnessCases(1);
+  std::vector<BoardOutcome> outcomes(cases.size());
   EXPECT_EQ(JudgeRobustness(cases, outcomes).score(), 0);
-  for (GymOutcome& o : outcomes) o.at_goal = true;
+  for (BoardOutcome& o : outcomes) o.at_goal = true;
   EXPECT_NEAR(JudgeRobustness(cases, outcomes).score(), 1, 1e-12);
   // The first level of velocity noise: five of ten are not more than one half, six are.
   for (size_t i = 210; i < 215; ++i) outcomes[i].at_goal = false;
@@ -80,7 +80,7 @@ TEST(GymRules, ALevelOfNoisePassesAboveOneHalf) {
   outcomes[214].at_goal = true;
   EXPECT_EQ(JudgeRobustness(cases, outcomes).rows[1], 1);
   outcomes[0].at_goal = outcomes.back().at_goal = false;
-  const GymRobustness judged = JudgeRobustness(cases, outcomes);
+  const Robustness judged = JudgeRobustness(cases, outcomes);
   EXPECT_NEAR(judged.rows[0], 209.0 / 210, 1e-12);
   EXPECT_NEAR(judged.rows[5], 49.0 / 50, 1e-12);
   ASSERT_EQ(judged.curves.size(), 14);
@@ -92,41 +92,41 @@ TEST(GymRules, ALevelOfNoisePassesAboveOneHalf) {
 double Script(int step, double q1) { return 2 * std::sin(0.01 * step) + 0.5 * std::sin(q1); }
 
 /// Acts by the script and notes what it measured of the first simulation.
-class Scripted : public GymController {
+class Scripted : public BoardController {
  public:
-  explicit Scripted(std::vector<GymState>* seen) : seen_(seen) {}
-  void Act(int step, const GymMeasurement& m, size_t count, Lanes& torque) override {
+  explicit Scripted(std::vector<BoardState>* seen) : seen_(seen) {}
+  void Act(int step, const BoardMeasurement& m, size_t count, Lanes& torque) override {
     for (size_t i = 0; i < count; ++i) torque[i] = Script(step, m.q1[i]);
     if (seen_ != nullptr) seen_->push_back({m.q1[0], m.q2[0], m.w1[0], m.w2[0]});
   }
 
  private:
-  std::vector<GymState>* seen_;
+  std::vector<BoardState>* seen_;
 };
 
 struct Played {
-  GymOutcome outcome;
-  std::vector<GymSample> trace;
-  std::vector<GymState> seen;
+  BoardOutcome outcome;
+  std::vector<BoardSample> trace;
+  std::vector<BoardState> seen;
 };
 
-Played Play(const GymEpisode& episode, GymRobot robot = GymRobot::kPendubot) {
+Played Play(const BoardEpisode& episode, Robot robot = Robot::kPendubot) {
   Played played;
-  const std::array<GymEpisode, 1> one{episode};
-  played.outcome = SimulateGym(
+  const std::array<BoardEpisode, 1> one{episode};
+  played.outcome = SimulateOnBoard(
                        robot, one, [&](size_t) { return std::make_unique<Scripted>(&played.seen); },
                        nullptr, &played.trace)
                        .front();
   return played;
 }
 
-TEST(GymSimulation, OutcomesAreThoseOfTheMotion) {
-  for (const GymRobot robot : {GymRobot::kPendubot, GymRobot::kAcrobot}) {
-    const auto [o, trace, seen] = Play(GymEpisode(), robot);
+TEST(RealAiGymSimulation, OutcomesAreThoseOfTheMotion) {
+  for (const Robot robot : {Robot::kPendubot, Robot::kAcrobot}) {
+    const auto [o, trace, seen] = Play(BoardEpisode(), robot);
     ASSERT_EQ(trace.size(), 5000);
     EXPECT_NEAR(trace.back().time, 9.998, 1e-12);
     double energy = 0, cost = 0, velocity = 0, sum = 0, squares = 0;
-    const size_t joint = robot == GymRobot::kPendubot ? 0 : 1;
+    const size_t joint = robot == Robot::kPendubot ? 0 : 1;
     for (size_t k = 0; k + 1 < trace.size(); ++k) {
       const double u = trace[k].torque;
       const auto& x = trace[k].state;
@@ -145,8 +145,8 @@ TEST(GymSimulation, OutcomesAreThoseOfTheMotion) {
   }
 }
 
-TEST(GymSimulation, ADelayedStateIsTheOneOfThen) {
-  GymEpisode episode;
+TEST(RealAiGymSimulation, ADelayedStateIsTheOneOfThen) {
+  BoardEpisode episode;
   episode.delay = 7;
   const Played played = Play(episode);
   for (size_t k = 0; k < 5000; ++k) {
@@ -154,21 +154,21 @@ TEST(GymSimulation, ADelayedStateIsTheOneOfThen) {
   }
 }
 
-TEST(GymSimulation, TheMotorRespondsByItsShareWithinItsLimit) {
-  GymEpisode episode;
+TEST(RealAiGymSimulation, TheMotorRespondsByItsShareWithinItsLimit) {
+  BoardEpisode episode;
   episode.response = 1.7;
   const Played played = Play(episode);
   double before = 0;
   for (int k = 0; k < 5000; ++k) {
-    const GymSample& now = played.trace[static_cast<size_t>(k)];
+    const BoardSample& now = played.trace[static_cast<size_t>(k)];
     const double wanted = Script(k, now.state[0]);
     before = std::clamp(before + 1.7 * (wanted - before), -6.0, 6.0);
     ASSERT_NEAR(now.torque, before, 1e-12) << k;
   }
 }
 
-TEST(GymSimulation, NoiseIsOfItsSize) {
-  GymEpisode episode;
+TEST(RealAiGymSimulation, NoiseIsOfItsSize) {
+  BoardEpisode episode;
   episode.velocity_noise = 0.4;
   const Played noisy = Play(episode);
   double sum = 0, squares = 0;
@@ -185,62 +185,62 @@ TEST(GymSimulation, NoiseIsOfItsSize) {
   const Played pushed = Play(episode);
   squares = 0;
   for (int k = 0; k < 5000; ++k) {
-    const GymSample& now = pushed.trace[static_cast<size_t>(k)];
+    const BoardSample& now = pushed.trace[static_cast<size_t>(k)];
     const double n = now.torque - Script(k, now.state[0]);
     squares += n * n;
   }
   EXPECT_NEAR(std::sqrt(squares / 5000), 0.3, 0.02);
 }
 
-TEST(GymSimulation, APushActsBesideTheMotor) {
-  GymEpisode episode;
+TEST(RealAiGymSimulation, APushActsBesideTheMotor) {
+  BoardEpisode episode;
   episode.pushes[0] = {5, 2, 0.05};
-  const Played pushed = Play(episode), free = Play(GymEpisode());
+  const Played pushed = Play(episode), free = Play(BoardEpisode());
   EXPECT_EQ(pushed.trace[800].state, free.trace[800].state);
   EXPECT_NE(pushed.trace[1100].state, free.trace[1100].state);
   // The torque of the tables is the motor's alone.
-  const GymSample& now = pushed.trace[1000];
+  const BoardSample& now = pushed.trace[1000];
   EXPECT_EQ(now.torque, Script(1000, now.state[0]));
 }
 
 /// Asks for more than the motor has.
-class Strong : public GymController {
+class Strong : public BoardController {
  public:
-  void Act(int, const GymMeasurement&, size_t count, Lanes& torque) override {
+  void Act(int, const BoardMeasurement&, size_t count, Lanes& torque) override {
     std::fill_n(torque.begin(), count, 9.0);
   }
 };
 
-TEST(GymSimulation, APushAddsToWhatTheMotorGivesAtItsLimit) {
-  for (const GymRobot robot : {GymRobot::kPendubot, GymRobot::kAcrobot}) {
-    GymEpisode episode;
+TEST(RealAiGymSimulation, APushAddsToWhatTheMotorGivesAtItsLimit) {
+  for (const Robot robot : {Robot::kPendubot, Robot::kAcrobot}) {
+    BoardEpisode episode;
     episode.pushes[0] = {-5, 2, 0.05};
-    std::vector<GymSample> trace;
-    SimulateGym(
+    std::vector<BoardSample> trace;
+    SimulateOnBoard(
         robot, {&episode, 1}, [](size_t) { return std::make_unique<Strong>(); }, nullptr, &trace);
     for (const size_t k : {980, 1000, 1040}) {
       const double z = (0.002 * static_cast<double>(k) - 2) / 0.05;
-      GymBlock block;
-      block.SetPlant(0, GymPlant());
+      BoardBlock block;
+      block.SetPlant(0, BoardPlant());
       block.SetState(0, trace[k].state);
-      (robot == GymRobot::kPendubot ? block.tau1 : block.tau2)[0] = 6 - 5 * std::exp(-z * z / 2);
+      (robot == Robot::kPendubot ? block.tau1 : block.tau2)[0] = 6 - 5 * std::exp(-z * z / 2);
       Advance(block);
       for (size_t i = 0; i < 4; ++i) EXPECT_NEAR(block.state(0)[i], trace[k + 1].state[i], 1e-12);
     }
   }
 }
 
-TEST(GymSimulation, WhatBlowsUpIsTheWorst) {
-  GymEpisode episode;
+TEST(RealAiGymSimulation, WhatBlowsUpIsTheWorst) {
+  BoardEpisode episode;
   episode.plant.damping1 = -1e3;
-  const GymOutcome o = Play(episode).outcome;
+  const BoardOutcome o = Play(episode).outcome;
   EXPECT_FALSE(o.above_line || o.at_goal);
   EXPECT_NEAR(o.swing_up_seconds, 9.998, 1e-12);
   EXPECT_EQ(PerformanceScore(o), 0);
   for (const double penalty : PerformancePenalties(o)) EXPECT_GT(penalty, 0.9);
 }
 
-TEST(GymRules, TheGoalIsAsNearAndAsSlowAsTheySay) {
+TEST(RealAiGymRules, TheGoalIsAsNearAndAsSlowAsTheySay) {
   const double pi = std::numbers::pi;
   EXPECT_TRUE(AtGoal({pi, 0, 0, 0}));
   EXPECT_TRUE(AtGoal({-5 * pi, 6 * pi, 0, 0}));  // after some turns
@@ -254,19 +254,19 @@ TEST(GymRules, TheGoalIsAsNearAndAsSlowAsTheySay) {
   EXPECT_FALSE(AtGoal({std::nan(""), 0, 0, 0}));
 }
 
-TEST(GymSimulation, PlaceAndThreadsChangeNoBit) {
-  const std::vector<GymCase> cases = RobustnessCases(3);
-  std::vector<GymEpisode> episodes;
+TEST(RealAiGymSimulation, PlaceAndThreadsChangeNoBit) {
+  const std::vector<RobustnessCase> cases = RobustnessCases(3);
+  std::vector<BoardEpisode> episodes;
   for (size_t i = 0; i < cases.size(); i += 5) episodes.push_back(cases[i].episode);
   const auto make = [](size_t) { return std::make_unique<Scripted>(nullptr); };
   ThreadPool pool(3);
-  const auto alone = SimulateGym(GymRobot::kPendubot, episodes, make, nullptr);
-  const auto together = SimulateGym(GymRobot::kPendubot, episodes, make, &pool);
+  const auto alone = SimulateOnBoard(Robot::kPendubot, episodes, make, nullptr);
+  const auto together = SimulateOnBoard(Robot::kPendubot, episodes, make, &pool);
   for (size_t i = 0; i < episodes.size(); ++i) {
     EXPECT_EQ(alone[i].velocity_cost, together[i].velocity_cost);
     if (i % 9 != 0) continue;
-    const std::array<GymEpisode, 1> one{episodes[i]};
-    EXPECT_EQ(SimulateGym(GymRobot::kPendubot, one, make, nullptr)[0].energy, alone[i].energy);
+    const std::array<BoardEpisode, 1> one{episodes[i]};
+    EXPECT_EQ(SimulateOnBoard(Robot::kPendubot, one, make, nullptr)[0].energy, alone[i].energy);
   }
 }
 

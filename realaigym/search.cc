@@ -13,7 +13,7 @@ namespace upswing {
 namespace {
 
 /// Throws BadInput unless what has to be is even.
-const GymSearchConfig& Checked(const GymSearchConfig& c) {
+const BoardSearchConfig& Checked(const BoardSearchConfig& c) {
   for (const auto& [name, value] : {std::pair{"hidden", c.hidden},
                                     {"first_population", c.first_population},
                                     {"population", c.population}}) {
@@ -31,7 +31,7 @@ std::vector<double> Deviations(const SwingNet& net, double of_network, double of
 }
 
 /// The performance score, with something to climb where there is none yet.
-double NominalFitness(const GymOutcome& o, double weight) {
+double NominalFitness(const BoardOutcome& o, double weight) {
   const bool done = o.above_line && o.at_goal;
   const double idle = done ? 0 : 1e-4 * std::min(500.0, o.torque_cost);
   return (done ? weight * PerformanceScore(o) : 0) + 0.5 * o.held + 0.3 * o.nearest - idle;
@@ -40,7 +40,7 @@ double NominalFitness(const GymOutcome& o, double weight) {
 /// A simulation of a candidate.
 struct Drawn {
   double weight;  // in the robustness; 0: the nominal plant
-  GymEpisode episode;
+  BoardEpisode episode;
 };
 
 constexpr int kShortSteps = 3000;         // 6 s: enough for a swing-up and to see whether it holds
@@ -51,21 +51,22 @@ constexpr double kLinearDeviation = 0.1;  // of the regulator's numbers at first
 /// not see them. Of rows that are easy there is one simulation, with half the weight.
 std::vector<Drawn> DrawEpisodes(Rng& rng) {
   std::vector<Drawn> drawn{{0, {}}};
-  const auto draw = [&](GymRow row, int count, double weight) {
-    std::array<int, kGymModelNames.size()> parameters;
+  const auto draw = [&](RobustnessRow row, int count, double weight) {
+    std::array<int, kBoardModelNames.size()> parameters;
     std::iota(parameters.begin(), parameters.end(), 0);
     for (int k = 0; k < count; ++k) {
       const auto i = static_cast<size_t>(k);
       std::swap(parameters[i], parameters[i + rng.Below(parameters.size() - i)]);
-      const double level = row == GymRow::kModel ? rng.Uniform() : (k + rng.Uniform()) / count;
+      const double level =
+          row == RobustnessRow::kModel ? rng.Uniform() : (k + rng.Uniform()) / count;
       drawn.push_back({weight / count, EpisodeOf(row, parameters[i], level, rng.Next())});
     }
   };
-  draw(GymRow::kModel, 6, 0.25);
-  draw(GymRow::kTorqueNoise, 1, 0.125);
-  draw(GymRow::kResponse, 1, 0.125);
-  draw(GymRow::kDelay, 2, 0.25);
-  draw(GymRow::kPush, 5, 0.25);
+  draw(RobustnessRow::kModel, 6, 0.25);
+  draw(RobustnessRow::kTorqueNoise, 1, 0.125);
+  draw(RobustnessRow::kResponse, 1, 0.125);
+  draw(RobustnessRow::kDelay, 2, 0.25);
+  draw(RobustnessRow::kPush, 5, 0.25);
   return drawn;
 }
 
@@ -118,9 +119,9 @@ void Snes::Tell(const std::vector<double>& fitness) {
   }
 }
 
-void GymSearchConfig::Describe(Options& o) {
+void BoardSearchConfig::Describe(Options& o) {
   o.Section("search");
-  o.AddChoice(&robot, "robot", {NameOf(GymRobot::kPendubot), NameOf(GymRobot::kAcrobot)},
+  o.AddChoice(&robot, "robot", {NameOf(Robot::kPendubot), NameOf(Robot::kAcrobot)},
               "which joint has the motor");
   o.Add(&seed, "seed", 1, {0, 1e15}, "", "of the search's random numbers");
   o.Add(&hidden, "hidden", 16, {4, 32}, "", "units in each of the network's two layers");
@@ -138,8 +139,8 @@ void GymSearchConfig::Describe(Options& o) {
   o.Add(&last_weight, "last_weight", 10, {1e-6, 1e6}, "", "and as it ends");
 }
 
-GymSearch::GymSearch(const GymSearchConfig& config)
-    : GymSearch(config, [&] {
+BoardSearch::BoardSearch(const BoardSearchConfig& config)
+    : BoardSearch(config, [&] {
         const SwingNet net(RobotNamed(config.robot).value(),
                            static_cast<int>(Checked(config).hidden));
         return SwingPolicy{net, net.Initial(static_cast<uint64_t>(config.seed))};
@@ -147,7 +148,7 @@ GymSearch::GymSearch(const GymSearchConfig& config)
   config_.starts = config.starts;
 }
 
-GymSearch::GymSearch(const GymSearchConfig& config, const SwingPolicy& first)
+BoardSearch::BoardSearch(const BoardSearchConfig& config, const SwingPolicy& first)
     : config_(Checked(config)),
       net_(first.net),
       snes_(first.numbers, Deviations(net_, config.restart, kLinearDeviation), config.mean_rate,
@@ -158,32 +159,32 @@ GymSearch::GymSearch(const GymSearchConfig& config, const SwingPolicy& first)
   config_.starts = 0;
 }
 
-int GymSearch::generations() const {
+int BoardSearch::generations() const {
   return static_cast<int>(config_.starts * config_.alone + config_.generations);
 }
 
-std::vector<double> GymSearch::NominalFitnesses(const std::vector<std::vector<double>>& candidates,
-                                                ThreadPool* pool) const {
-  std::vector<GymEpisode> episodes(candidates.size());
-  for (GymEpisode& episode : episodes) episode.steps = kShortSteps;
+std::vector<double> BoardSearch::NominalFitnesses(
+    const std::vector<std::vector<double>>& candidates, ThreadPool* pool) const {
+  std::vector<BoardEpisode> episodes(candidates.size());
+  for (BoardEpisode& episode : episodes) episode.steps = kShortSteps;
   const auto make = [&](size_t first) {
     const std::vector<std::span<const double>> numbers(
         candidates.begin() + static_cast<std::ptrdiff_t>(first),
         candidates.begin() +
-            static_cast<std::ptrdiff_t>(std::min(first + kGymBlock, candidates.size())));
+            static_cast<std::ptrdiff_t>(std::min(first + kBoardBlock, candidates.size())));
     return net_.Control(numbers, 1);
   };
   std::vector<double> fitness;
-  for (const GymOutcome& outcome : SimulateGym(net_.robot(), episodes, make, pool)) {
+  for (const BoardOutcome& outcome : SimulateOnBoard(net_.robot(), episodes, make, pool)) {
     fitness.push_back(NominalFitness(outcome, 1));
   }
   return fitness;
 }
 
-std::vector<double> GymSearch::Fitnesses(const std::vector<std::vector<double>>& candidates,
-                                         double performance_weight, ThreadPool* pool) {
+std::vector<double> BoardSearch::Fitnesses(const std::vector<std::vector<double>>& candidates,
+                                           double performance_weight, ThreadPool* pool) {
   const std::vector<Drawn> drawn = DrawEpisodes(rng_);
-  std::vector<GymEpisode> all;
+  std::vector<BoardEpisode> all;
   for (size_t k = 0; k < candidates.size(); ++k) {
     for (const Drawn& each : drawn) all.push_back(each.episode);
   }
@@ -191,11 +192,11 @@ std::vector<double> GymSearch::Fitnesses(const std::vector<std::vector<double>>&
   const auto make = [&](size_t first) {
     return net_.Control(std::span(numbers).subspan(first / kSwingGroup), kSwingGroup);
   };
-  const std::vector<GymOutcome> outcomes = SimulateGym(net_.robot(), all, make, pool);
+  const std::vector<BoardOutcome> outcomes = SimulateOnBoard(net_.robot(), all, make, pool);
   std::vector<double> fitness(candidates.size(), 0.0);
   for (size_t i = 0; i < all.size(); ++i) {
     const Drawn& each = drawn[i % kSwingGroup];
-    const GymOutcome& o = outcomes[i];
+    const BoardOutcome& o = outcomes[i];
     fitness[i / kSwingGroup] += each.weight == 0
                                     ? NominalFitness(o, performance_weight)
                                     : each.weight * ((o.at_goal ? 0.6 : 0) + 0.4 * o.held);
@@ -203,13 +204,13 @@ std::vector<double> GymSearch::Fitnesses(const std::vector<std::vector<double>>&
   return fitness;
 }
 
-void GymSearch::Begin(int64_t start) {
+void BoardSearch::Begin(int64_t start) {
   const auto seed = static_cast<uint64_t>(config_.seed) + static_cast<uint64_t>(start) * 1'000'003;
   snes_ = Snes(net_.Initial(seed), Deviations(net_, config_.deviation, kLinearDeviation),
                config_.mean_rate, seed);
 }
 
-bool GymSearch::Step(ThreadPool* pool, Report& report) {
+bool BoardSearch::Step(ThreadPool* pool, Report& report) {
   if (generation_ >= generations()) return false;
   const int64_t first = config_.starts * config_.alone;
   const bool alone = generation_ < first;
@@ -244,9 +245,9 @@ bool GymSearch::Step(ThreadPool* pool, Report& report) {
   return true;
 }
 
-GymOutcome GymSearch::Nominal() const {
-  const std::array<GymEpisode, 1> nominal;
-  return SimulateGym(
+BoardOutcome BoardSearch::Nominal() const {
+  const std::array<BoardEpisode, 1> nominal;
+  return SimulateOnBoard(
              net_.robot(), nominal, [&](size_t) { return net_.Control(average_); }, nullptr)
       .front();
 }

@@ -34,12 +34,12 @@ class Snes {
 };
 
 /// How a policy for the boards is searched.
-struct GymSearchConfig {
+struct BoardSearchConfig {
   std::string robot;
   int64_t seed, hidden, starts, alone, generations, population, first_population;
   double deviation, restart, mean_rate, performance_weight, last_weight;
 
-  GymSearchConfig() { SetDefaults(*this); }
+  BoardSearchConfig() { SetDefaults(*this); }
   /// One line per setting: name, default, range, unit, help.
   void Describe(Options& options);
 };
@@ -47,11 +47,11 @@ struct GymSearchConfig {
 /// Searches a policy on the rules themselves: first on the nominal plant alone, then also on
 /// random plants, delays, noise and pushes, drawn anew in each generation from the ranges of the
 /// robustness score, but never the cases that it is judged by.
-class GymSearch {
+class BoardSearch {
  public:
-  explicit GymSearch(const GymSearchConfig& config);
+  explicit BoardSearch(const BoardSearchConfig& config);
   /// Begins with a policy instead of a random network; its robot and size are then the search's.
-  GymSearch(const GymSearchConfig& config, const SwingPolicy& first);
+  BoardSearch(const BoardSearchConfig& config, const SwingPolicy& first);
 
   struct Report {
     int generation;  // from the first one on
@@ -67,7 +67,7 @@ class GymSearch {
   /// The policy so far: the means of the last generations, averaged.
   const std::vector<double>& numbers() const { return average_; }
   /// What it does on the nominal plant.
-  GymOutcome Nominal() const;
+  BoardOutcome Nominal() const;
   int generation() const { return generation_; }
   int generations() const;
 
@@ -79,7 +79,7 @@ class GymSearch {
   std::vector<double> Fitnesses(const std::vector<std::vector<double>>& candidates,
                                 double performance_weight, ThreadPool* pool);
 
-  GymSearchConfig config_;
+  BoardSearchConfig config_;
   SwingNet net_;
   Snes snes_;
   Rng rng_;

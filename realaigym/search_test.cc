@@ -34,8 +34,8 @@ TEST(Snes, FindsTheBottomOfABowl) {
   EXPECT_LT(snes.deviation()[5], snes.deviation()[0]);
 }
 
-GymSearchConfig Small() {
-  GymSearchConfig config;
+BoardSearchConfig Small() {
+  BoardSearchConfig config;
   config.hidden = 8;
   config.starts = 2;
   config.alone = 4;
@@ -45,10 +45,10 @@ GymSearchConfig Small() {
   return config;
 }
 
-TEST(GymSearch, ThreadsChangeNoBitAndItClimbs) {
-  GymSearch alone(Small()), together(Small());
+TEST(BoardSearch, ThreadsChangeNoBitAndItClimbs) {
+  BoardSearch alone(Small()), together(Small());
   ThreadPool pool(3);
-  GymSearch::Report a, b;
+  BoardSearch::Report a, b;
   double first = 0;
   while (alone.Step(nullptr, a)) {
     ASSERT_TRUE(together.Step(&pool, b));
@@ -60,14 +60,14 @@ TEST(GymSearch, ThreadsChangeNoBitAndItClimbs) {
   EXPECT_GT(a.best_fitness, first);
 }
 
-TEST(GymSearch, TheBestStartGoesOn) {
+TEST(BoardSearch, TheBestStartGoesOn) {
   const auto run = [](int64_t seed, int64_t starts) {
-    GymSearchConfig config = Small();
+    BoardSearchConfig config = Small();
     config.seed = seed;
     config.starts = starts;
     config.generations = 0;
-    GymSearch search(config);
-    GymSearch::Report report;
+    BoardSearch search(config);
+    BoardSearch::Report report;
     while (search.Step(nullptr, report)) continue;
     return std::pair(report.best_fitness, search.numbers());
   };
@@ -78,17 +78,17 @@ TEST(GymSearch, TheBestStartGoesOn) {
 
 TEST(SwingNet, PoliciesSideBySideActAsEachAlone) {
   for (const int hidden : {8, 16}) {
-    const SwingNet net(GymRobot::kPendubot, hidden);
+    const SwingNet net(Robot::kPendubot, hidden);
     const std::vector<double> a = net.Initial(1), b = net.Initial(2);
-    const std::vector<GymEpisode> episodes(kSwingGroup + 2);
+    const std::vector<BoardEpisode> episodes(kSwingGroup + 2);
     const auto cost = [&](const std::vector<std::span<const double>>& numbers, size_t lanes_each) {
-      const auto outcomes = SimulateGym(
+      const auto outcomes = SimulateOnBoard(
           net.robot(), episodes, [&](size_t) { return net.Control(numbers, lanes_each); }, nullptr);
       std::vector<double> costs;
-      for (const GymOutcome& outcome : outcomes) costs.push_back(outcome.velocity_cost);
+      for (const BoardOutcome& outcome : outcomes) costs.push_back(outcome.velocity_cost);
       return costs;
     };
-    const double of_a = cost({a}, kGymBlock)[0], of_b = cost({b}, kGymBlock)[0];
+    const double of_a = cost({a}, kBoardBlock)[0], of_b = cost({b}, kBoardBlock)[0];
     EXPECT_NE(of_a, of_b);
     const auto lanes = cost({a, b, a}, 1), groups = cost({a, b}, kSwingGroup);
     EXPECT_EQ(lanes[0], of_a);
@@ -100,16 +100,16 @@ TEST(SwingNet, PoliciesSideBySideActAsEachAlone) {
 }
 
 TEST(SwingNet, ItIsReadAsItWasWritten) {
-  const SwingNet net(GymRobot::kAcrobot, 12);
+  const SwingNet net(Robot::kAcrobot, 12);
   const std::vector<double> numbers = net.Initial(5);
   const SwingPolicy read = ReadSwingPolicy(net.ToTensors(numbers));
   EXPECT_EQ(read.numbers, numbers);
   EXPECT_EQ(read.net.hidden(), 12);
-  EXPECT_EQ(read.net.robot(), GymRobot::kAcrobot);
+  EXPECT_EQ(read.net.robot(), Robot::kAcrobot);
 }
 
 TEST(SwingNet, WhatIsNoPolicyIsRefused) {
-  const SwingNet net(GymRobot::kPendubot, 8);
+  const SwingNet net(Robot::kPendubot, 8);
   const auto refuses = [&](const char* key, const std::string& value) {
     Tensors file = net.ToTensors(net.Initial(1));
     file.metadata[key] = value;

@@ -11,7 +11,7 @@ namespace upswing {
 namespace {
 
 constexpr int kMostDelay = 32;  // steps, more than the longest of the rules
-static_assert(kGymLevels - 1 < kMostDelay);
+static_assert(kBoardLevels - 1 < kMostDelay);
 constexpr int kHeldSteps = 1000;  // the last 2 s
 constexpr int kNoted = 8;         // steps from one look at the nearness to the next
 
@@ -40,55 +40,55 @@ struct Sums {
 struct LanePush {
   int first, last;
   size_t lane;
-  GymPush push;
+  BoardPush push;
 };
 
-/// A block of simulations while it runs. Loops over kGymBlock are written for the compiler's
+/// A block of simulations while it runs. Loops over kBoardBlock are written for the compiler's
 /// vectors; what few simulations have is listed.
 class Run {
  public:
-  Run(GymRobot robot, std::span<const GymEpisode> episodes)
+  Run(Robot robot, std::span<const BoardEpisode> episodes)
       : robot_(robot), episodes_(episodes), steps_(episodes.front().steps), past_(kMostDelay) {
     sums_.last_below.fill(-1);
     for (size_t lane = 0; lane < episodes.size(); ++lane) {
-      const GymEpisode& episode = episodes[lane];
+      const BoardEpisode& episode = episodes[lane];
       block_.SetPlant(lane, episode.plant);
       rngs_.emplace_back(episode.seed, "realaigym: noise");
       if (episode.velocity_noise > 0) velocity_noise_.push_back(lane);
       if (episode.torque_noise > 0) torque_noise_.push_back(lane);
       if (episode.delay > 0) delayed_.push_back(lane);
       if (episode.response != 1) responding_.push_back(lane);
-      for (const GymPush& push : episode.pushes) {
+      for (const BoardPush& push : episode.pushes) {
         if (push.amplitude == 0) continue;
         constexpr double kWidths = 6;  // it is nothing beyond
-        pushes_.push_back({static_cast<int>((push.time - kWidths * push.width) / kGymTimestep),
-                           static_cast<int>((push.time + kWidths * push.width) / kGymTimestep),
+        pushes_.push_back({static_cast<int>((push.time - kWidths * push.width) / kBoardTimestep),
+                           static_cast<int>((push.time + kWidths * push.width) / kBoardTimestep),
                            lane, push});
       }
     }
   }
 
-  std::vector<GymOutcome> Go(GymController& controller, std::vector<GymSample>* trace) {
-    const bool first_joint = robot_ == GymRobot::kPendubot;
+  std::vector<BoardOutcome> Go(BoardController& controller, std::vector<BoardSample>* trace) {
+    const bool first_joint = robot_ == Robot::kPendubot;
     const Lanes& angle = first_joint ? block_.q1 : block_.q2;
     for (int step = 0; step < steps_; ++step) {
       controller.Act(step, Measure(step), episodes_.size(), wanted_);
       Drive(step, first_joint ? block_.tau1 : block_.tau2);
-      if (trace != nullptr) trace->push_back({step * kGymTimestep, block_.state(0), torque_[0]});
+      if (trace != nullptr) trace->push_back({step * kBoardTimestep, block_.state(0), torque_[0]});
       if (step % kNoted == 0) NoteNearness(step);
       if (step < steps_ - 1) NoteVelocities();
       std::ranges::copy(angle, before_.begin());
       Advance(block_);
       Note(step, angle);
     }
-    std::vector<GymOutcome> outcomes;
+    std::vector<BoardOutcome> outcomes;
     for (size_t lane = 0; lane < episodes_.size(); ++lane) outcomes.push_back(OutcomeOf(lane));
     return outcomes;
   }
 
  private:
-  const GymMeasurement& Measure(int step) {
-    for (size_t i = 0; i < kGymBlock; ++i) {
+  const BoardMeasurement& Measure(int step) {
+    for (size_t i = 0; i < kBoardBlock; ++i) {
       seen_.q1[i] = block_.q1[i];
       seen_.q2[i] = block_.q2[i];
       seen_.w1[i] = block_.w1[i];
@@ -97,7 +97,7 @@ class Run {
     if (!delayed_.empty()) past_[static_cast<size_t>(step % kMostDelay)] = seen_;
     for (const size_t lane : delayed_) {
       const int then = std::max(0, step - episodes_[lane].delay);
-      const GymMeasurement& past = past_[static_cast<size_t>(then % kMostDelay)];
+      const BoardMeasurement& past = past_[static_cast<size_t>(then % kMostDelay)];
       seen_.q1[lane] = past.q1[lane];
       seen_.q2[lane] = past.q2[lane];
       seen_.w1[lane] = past.w1[lane];
@@ -113,8 +113,8 @@ class Run {
 
   /// From the torques that the controller wants to those that act.
   void Drive(int step, Lanes& applied) {
-    const double time = step * kGymTimestep;
-    for (size_t i = 0; i < kGymBlock; ++i) {
+    const double time = step * kBoardTimestep;
+    for (size_t i = 0; i < kBoardBlock; ++i) {
       previous_[i] = torque_[i];
       torque_[i] = wanted_[i];
     }
@@ -125,9 +125,9 @@ class Run {
       torque_[lane] =
           previous_[lane] + episodes_[lane].response * (torque_[lane] - previous_[lane]);
     }
-    for (size_t i = 0; i < kGymBlock; ++i) {
-      const double below = torque_[i] < kGymTorqueLimit ? torque_[i] : kGymTorqueLimit;
-      applied[i] = torque_[i] = below > -kGymTorqueLimit ? below : -kGymTorqueLimit;
+    for (size_t i = 0; i < kBoardBlock; ++i) {
+      const double below = torque_[i] < kBoardTorqueLimit ? torque_[i] : kBoardTorqueLimit;
+      applied[i] = torque_[i] = below > -kBoardTorqueLimit ? below : -kBoardTorqueLimit;
     }
     for (const auto& [first, last, lane, push] : pushes_) {
       if (step <= first || step > last) continue;
@@ -147,17 +147,17 @@ class Run {
   }
 
   void NoteVelocities() {
-    for (size_t i = 0; i < kGymBlock; ++i) {
+    for (size_t i = 0; i < kBoardBlock; ++i) {
       const double w1 = block_.w1[i], w2 = block_.w2[i];
-      sums_.velocity_cost[i] += (w1 * w1 + w2 * w2) * kGymTimestep;
+      sums_.velocity_cost[i] += (w1 * w1 + w2 * w2) * kBoardTimestep;
     }
   }
 
   /// After a step: what its torque did to the motor's joint, and where the tip was before.
   void Note(int step, const Lanes& angle) {
-    constexpr GymPlant kPlant;
+    constexpr BoardPlant kPlant;
     constexpr double kLine = 0.9 * (kPlant.length1 + kPlant.length2);
-    for (size_t i = 0; i < kGymBlock; ++i) {
+    for (size_t i = 0; i < kBoardBlock; ++i) {
       const double torque = torque_[i], size = std::abs(torque);
       sums_.max_torque[i] = sums_.max_torque[i] > size ? sums_.max_torque[i] : size;
       const double change = step > 0 ? torque - previous_[i] : 0;
@@ -165,49 +165,49 @@ class Run {
       sums_.changes_squared[i] += change * change;
     }
     if (step == steps_ - 1) return;  // of N samples there are N - 1 differences
-    for (size_t i = 0; i < kGymBlock; ++i) {
+    for (size_t i = 0; i < kBoardBlock; ++i) {
       const double torque = torque_[i];
       sums_.energy[i] += std::abs((angle[i] - before_[i]) * torque);
-      sums_.torque_cost[i] += torque * torque * kGymTimestep;
+      sums_.torque_cost[i] += torque * torque * kBoardTimestep;
       sums_.last_below[i] = block_.tip[i] > kLine ? sums_.last_below[i] : step;
     }
   }
 
-  GymOutcome OutcomeOf(size_t lane) const {
-    GymOutcome o;
+  BoardOutcome OutcomeOf(size_t lane) const {
+    BoardOutcome o;
     o.energy = sums_.energy[lane];
     o.torque_cost = sums_.torque_cost[lane];
     o.velocity_cost = sums_.velocity_cost[lane];
     o.max_torque = sums_.max_torque[lane];
     o.nearest = sums_.nearest[lane];
     o.held = sums_.held[lane];
-    const double mean = sums_.change[lane] / (kGymSteps - 1);
+    const double mean = sums_.change[lane] / (kBoardSteps - 1);
     o.smoothness =
-        std::sqrt(std::max(0.0, sums_.changes_squared[lane] / (kGymSteps - 1) - mean * mean));
+        std::sqrt(std::max(0.0, sums_.changes_squared[lane] / (kBoardSteps - 1) - mean * mean));
     const int first = static_cast<int>(sums_.last_below[lane]) + 1;
     o.above_line = first < steps_ - 1;
-    o.swing_up_seconds = std::min(first, steps_ - 1) * kGymTimestep;
-    const GymState end = block_.state(lane);
+    o.swing_up_seconds = std::min(first, steps_ - 1) * kBoardTimestep;
+    const BoardState end = block_.state(lane);
     o.at_goal = AtGoal(end);
     // A simulation that has blown up is the worst.
     const auto [q1, q2, w1, w2] = end;
     if (!std::isfinite(q1 + q2 + w1 + w2 + o.energy + o.velocity_cost)) {
       constexpr double kWorst = std::numeric_limits<double>::infinity();
-      o = {(steps_ - 1) * kGymTimestep, kWorst, kWorst, kWorst, kWorst, kWorst};
+      o = {(steps_ - 1) * kBoardTimestep, kWorst, kWorst, kWorst, kWorst, kWorst};
     }
     return o;
   }
 
-  GymRobot robot_;
-  std::span<const GymEpisode> episodes_;
+  Robot robot_;
+  std::span<const BoardEpisode> episodes_;
   int steps_;
-  GymBlock block_;
+  BoardBlock block_;
   std::vector<Rng> rngs_;
   // Which have it.
   std::vector<size_t> velocity_noise_, torque_noise_, delayed_, responding_;
   std::vector<LanePush> pushes_;
-  std::vector<GymMeasurement> past_;  // ring of the last kMostDelay states
-  GymMeasurement seen_{};
+  std::vector<BoardMeasurement> past_;  // ring of the last kMostDelay states
+  BoardMeasurement seen_{};
   Lanes before_{};                          // angle of the motor's joint before the step, rad
   Lanes wanted_{}, torque_{}, previous_{};  // N·m: asked for; that acts, without pushes; before it
   Sums sums_;
@@ -215,15 +215,15 @@ class Run {
 
 }  // namespace
 
-std::vector<GymOutcome> SimulateGym(GymRobot robot, std::span<const GymEpisode> episodes,
-                                    const GymControllerMaker& make, ThreadPool* pool,
-                                    std::vector<GymSample>* trace,
-                                    const std::function<void(size_t)>& done) {
-  std::vector<GymOutcome> outcomes(episodes.size());
-  const int blocks = static_cast<int>((episodes.size() + kGymBlock - 1) / kGymBlock);
+std::vector<BoardOutcome> SimulateOnBoard(Robot robot, std::span<const BoardEpisode> episodes,
+                                          const BoardControllerMaker& make, ThreadPool* pool,
+                                          std::vector<BoardSample>* trace,
+                                          const std::function<void(size_t)>& done) {
+  std::vector<BoardOutcome> outcomes(episodes.size());
+  const int blocks = static_cast<int>((episodes.size() + kBoardBlock - 1) / kBoardBlock);
   ParallelFor(pool, blocks, [&](int index) {
-    const size_t first = static_cast<size_t>(index) * kGymBlock;
-    const size_t count = std::min(kGymBlock, episodes.size() - first);
+    const size_t first = static_cast<size_t>(index) * kBoardBlock;
+    const size_t count = std::min(kBoardBlock, episodes.size() - first);
     const auto controller = make(first);
     auto run = std::make_unique<Run>(robot, episodes.subspan(first, count));
     std::ranges::copy(run->Go(*controller, first == 0 ? trace : nullptr),

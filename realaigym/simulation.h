@@ -11,34 +11,34 @@
 namespace upswing {
 
 /// What a controller is told of a block of simulations: the state with noise and delay.
-struct GymMeasurement {
+struct BoardMeasurement {
   Lanes q1, q2, w1, w2;  // rad, rad/s
 };
 
 /// Controls a block of simulations, each from its beginning on. It is called at every step of
-/// kGymTimestep, and may hold a torque for longer.
-class GymController {
+/// kBoardTimestep, and may hold a torque for longer.
+class BoardController {
  public:
-  virtual ~GymController() = default;
+  virtual ~BoardController() = default;
   /// Torques of the motor (N·m) for the first `count` simulations at step 0, 1, …
-  virtual void Act(int step, const GymMeasurement& measured, size_t count, Lanes& torque) = 0;
+  virtual void Act(int step, const BoardMeasurement& measured, size_t count, Lanes& torque) = 0;
 };
 
 /// Makes the controller of the block of simulations that begins with number `first`.
-using GymControllerMaker = std::function<std::unique_ptr<GymController>(size_t first)>;
+using BoardControllerMaker = std::function<std::unique_ptr<BoardController>(size_t first)>;
 
 /// One step of one simulation, for tables: the state, and the torque that then acts.
-struct GymSample {
+struct BoardSample {
   double time;
-  GymState state;
+  BoardState state;
   double torque;  // N·m
 };
 
 /// Simulates all episodes, in blocks on the pool's threads. With `trace`, it gets the steps of the
 /// first one. `done`, if any, is told how many are finished, from any thread.
-std::vector<GymOutcome> SimulateGym(GymRobot robot, std::span<const GymEpisode> episodes,
-                                    const GymControllerMaker& make, ThreadPool* pool,
-                                    std::vector<GymSample>* trace = nullptr,
-                                    const std::function<void(size_t)>& done = nullptr);
+std::vector<BoardOutcome> SimulateOnBoard(Robot robot, std::span<const BoardEpisode> episodes,
+                                          const BoardControllerMaker& make, ThreadPool* pool,
+                                          std::vector<BoardSample>* trace = nullptr,
+                                          const std::function<void(size_t)>& done = nullptr);
 
 }  // namespace upswing

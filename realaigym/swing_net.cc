@@ -17,10 +17,10 @@ using F = hn::CappedTag<float, 16>;
 using VF = hn::Vec<F>;
 inline constexpr F kFloats;
 
-/// The network's inputs (kSwingInputs × kGymBlock) and outputs (kGymBlock).
+/// The network's inputs (kSwingInputs × kBoardBlock) and outputs (kBoardBlock).
 struct Activations {
-  alignas(64) float in[kSwingInputs][kGymBlock];
-  alignas(64) float out[kGymBlock];
+  alignas(64) float in[kSwingInputs][kBoardBlock];
+  alignas(64) float out[kBoardBlock];
 };
 
 HWY_INLINE V From(const Lanes& x, size_t i) { return hn::LoadU(kDoubles, x.data() + i); }
@@ -44,7 +44,7 @@ HWY_INLINE void Squash(VF& a, VF& b) {
 HWY_INLINE V Velocity(const std::array<Lanes, 2>& past, V now, size_t i) {
   const V sum =
       MulAdd(Constant(3), now, NegMulAdd(Constant(4), From(past[0], i), From(past[1], i)));
-  return sum * Constant(1 / (2 * kGymTimestep));
+  return sum * Constant(1 / (2 * kBoardTimestep));
 }
 
 /// An angle in [-π, π].
@@ -60,7 +60,7 @@ class Reader {
   HWY_INLINE explicit Reader(const float* weights) : next_(weights) {}
   HWY_INLINE VF operator()() {
     const float* here = next_;
-    next_ += kOwn ? kGymBlock : 1;
+    next_ += kOwn ? kBoardBlock : 1;
     return kOwn ? hn::Load(kFloats, here) : hn::Set(kFloats, *here);
   }
 
@@ -92,7 +92,7 @@ HWY_INLINE void Layer(Reader<kOwn>& weight, const VF* in, int n, VF* out, int hi
 template <bool kOwn, int kHidden>
 void Network(const SwingBlock& block, Activations& a) {
   const int hidden = kHidden > 0 ? kHidden : block.hidden;
-  for (size_t lane = 0; lane < kGymBlock; lane += hn::Lanes(kFloats)) {
+  for (size_t lane = 0; lane < kBoardBlock; lane += hn::Lanes(kFloats)) {
     const size_t policy = lane / block.lanes_each;
     const float* weights = block.weights.data();
     Reader<kOwn> weight(kOwn ? weights + lane : weights + policy * SwingWeights(hidden));
@@ -126,11 +126,11 @@ HWY_INLINE Linear LinearTorque(const SwingBlock& block, size_t i, const V (&x)[4
   return {z * z * NegMulAdd(Constant(2), z, Constant(3)), torque};
 }
 
-void ActOnBlock(SwingBlock& block, const GymMeasurement& measured, Lanes& torque) {
+void ActOnBlock(SwingBlock& block, const BoardMeasurement& measured, Lanes& torque) {
   Activations a;
   Lanes w1, w2;
   const hn::Rebind<float, D> halves;
-  for (size_t i = 0; i < kGymBlock; i += hn::Lanes(kDoubles)) {
+  for (size_t i = 0; i < kBoardBlock; i += hn::Lanes(kDoubles)) {
     const V q1 = From(measured.q1, i), q2 = From(measured.q2, i);
     const V v1 = Velocity(block.q1, q1, i), v2 = Velocity(block.q2, q2, i);
     const auto [s1, c1] = SineCosineOf(q1);
@@ -154,13 +154,13 @@ void ActOnBlock(SwingBlock& block, const GymMeasurement& measured, Lanes& torque
   } else {
     Network<false, 0>(block, a);
   }
-  for (size_t i = 0; i < kGymBlock; i += hn::Lanes(kDoubles)) {
+  for (size_t i = 0; i < kBoardBlock; i += hn::Lanes(kDoubles)) {
     const V x[4] = {Wrap(From(measured.q1, i) - Constant(std::numbers::pi)),
                     Wrap(From(measured.q2, i)), From(w1, i), From(w2, i)};
     const Linear linear = LinearTorque(block, i, x);
     const V net = hn::PromoteTo(kDoubles, hn::Load(halves, a.out + i));
     // Where it has no share the linear torque may be large: it is cut first.
-    const V limit = Constant(kGymTorqueLimit);
+    const V limit = Constant(kBoardTorqueLimit);
     const V cut = hn::Min(hn::Max(linear.torque, hn::Neg(limit)), limit);
     To(MulAdd(linear.share, cut - net, net), torque, i);
   }
@@ -175,7 +175,7 @@ namespace upswing {
 
 HWY_EXPORT(ActOnBlock);
 
-void SwingTorques(SwingBlock& block, const GymMeasurement& measured, Lanes& torque) {
+void SwingTorques(SwingBlock& block, const BoardMeasurement& measured, Lanes& torque) {
   HWY_DYNAMIC_DISPATCH(ActOnBlock)(block, measured, torque);
 }
 

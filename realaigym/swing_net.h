@@ -19,8 +19,8 @@ inline constexpr double kSwingTorque = 4;
 /// policy.
 struct SwingBlock {
   int hidden;
-  size_t lanes_each;             // kGymBlock, kSwingGroup or 1
-  AlignedVector<float> weights;  // (kGymBlock / lanes_each × W), but (W × kGymBlock) if 1
+  size_t lanes_each;             // kBoardBlock, kSwingGroup or 1
+  AlignedVector<float> weights;  // (kBoardBlock / lanes_each × W), but (W × kBoardBlock) if 1
   std::array<Lanes, 4> K;        // N·m/rad, N·m·s/rad
   Lanes inverse_rho, sharpness;  //
   std::array<double, 16> P;      // (4 × 4)
@@ -35,6 +35,6 @@ constexpr size_t SwingWeights(int hidden) {
 }
 
 /// The torques for these angles, which then are those of one step ago.
-void SwingTorques(SwingBlock& block, const GymMeasurement& measured, Lanes& torque);
+void SwingTorques(SwingBlock& block, const BoardMeasurement& measured, Lanes& torque);
 
 }  // namespace upswing

@@ -17,11 +17,11 @@ constexpr int kVersion = 2;
 constexpr int kLeastHidden = 4;
 constexpr double kMostExponent = 50, kMostWeight = 1e6;  // of numbers in files
 
-class SwingController : public GymController {
+class SwingController : public BoardController {
  public:
   explicit SwingController(SwingBlock block) : block_(std::move(block)) {}
 
-  void Act(int step, const GymMeasurement& measured, size_t /*count*/, Lanes& torque) override {
+  void Act(int step, const BoardMeasurement& measured, size_t /*count*/, Lanes& torque) override {
     if (step == 0) {  // at rest
       block_.q1.fill(measured.q1);
       block_.q2.fill(measured.q2);
@@ -35,9 +35,9 @@ class SwingController : public GymController {
 
 }  // namespace
 
-SwingNet::SwingNet(GymRobot robot, int hidden) : robot_(robot), hidden_(hidden) {
-  const GymRegulator regulator =
-      SolveGymRegulator(LinearizeUpright(GymPlant(), robot), {1, 1, 0.1, 0.1}, 1);
+SwingNet::SwingNet(Robot robot, int hidden) : robot_(robot), hidden_(hidden) {
+  const BoardRegulator regulator =
+      SolveBoardRegulator(LinearizeUpright(BoardPlant(), robot), {1, 1, 0.1, 0.1}, 1);
   for (size_t i = 0; i < 4; ++i) {
     K_[i] = regulator.K[static_cast<Eigen::Index>(i)];
     for (size_t j = 0; j < 4; ++j) {
@@ -57,13 +57,13 @@ std::vector<double> SwingNet::Initial(uint64_t seed) const {
   return numbers;
 }
 
-std::unique_ptr<GymController> SwingNet::Control(std::span<const std::span<const double>> numbers,
-                                                 size_t lanes_each) const {
+std::unique_ptr<BoardController> SwingNet::Control(std::span<const std::span<const double>> numbers,
+                                                   size_t lanes_each) const {
   SwingBlock block;
   block.hidden = hidden_;
   block.lanes_each = lanes_each;
   block.P = P_;
-  const size_t W = SwingWeights(hidden_), policies = kGymBlock / lanes_each;
+  const size_t W = SwingWeights(hidden_), policies = kBoardBlock / lanes_each;
   block.weights.resize(W * policies);
   for (size_t k = 0; k < policies; ++k) {
     const auto& own = numbers[std::min(k, numbers.size() - 1)];
@@ -74,15 +74,15 @@ std::unique_ptr<GymController> SwingNet::Control(std::span<const std::span<const
     fill(block.inverse_rho, std::exp(-own[4]));
     fill(block.sharpness, std::exp(own[5]));
     for (size_t i = 0; i < W; ++i) {
-      block.weights[lanes_each == 1 ? i * kGymBlock + k : k * W + i] =
+      block.weights[lanes_each == 1 ? i * kBoardBlock + k : k * W + i] =
           static_cast<float>(own[kLinear + i]);
     }
   }
   return std::make_unique<SwingController>(std::move(block));
 }
 
-std::unique_ptr<GymController> SwingNet::Control(std::span<const double> numbers) const {
-  return Control({&numbers, 1}, kGymBlock);
+std::unique_ptr<BoardController> SwingNet::Control(std::span<const double> numbers) const {
+  return Control({&numbers, 1}, kBoardBlock);
 }
 
 Tensors SwingNet::ToTensors(std::span<const double> numbers) const {

@@ -22,28 +22,28 @@ class SwingNet {
   /// Numbers before the network's: of K (4), log ρ, sharpness of the blend.
   static constexpr int kLinear = 6;
 
-  SwingNet(GymRobot robot, int hidden);
+  SwingNet(Robot robot, int hidden);
 
   int hidden() const { return hidden_; }
-  GymRobot robot() const { return robot_; }
+  Robot robot() const { return robot_; }
   /// How many numbers there are.
   size_t size() const;
   /// Where a search begins: the regulator of the nominal plant, a random network.
   std::vector<double> Initial(uint64_t seed) const;
 
   /// A controller of a block of simulations, by one vector for all of them.
-  std::unique_ptr<GymController> Control(std::span<const double> numbers) const;
+  std::unique_ptr<BoardController> Control(std::span<const double> numbers) const;
   /// By several, each for `lanes_each` simulations one after the other: kSwingGroup (swing_net.h)
   /// or 1. Where there are too few, the last one serves the rest.
-  std::unique_ptr<GymController> Control(std::span<const std::span<const double>> numbers,
-                                         size_t lanes_each) const;
+  std::unique_ptr<BoardController> Control(std::span<const std::span<const double>> numbers,
+                                           size_t lanes_each) const;
 
   /// Metadata `format` upswing-realaigym, `format_version`, `robot` and `hidden`; a tensor
   /// `numbers`, F64 (size).
   Tensors ToTensors(std::span<const double> numbers) const;
 
  private:
-  GymRobot robot_;
+  Robot robot_;
   int hidden_;
   std::array<double, 4> K_;   // where the search begins
   std::array<double, 16> P_;  // (4 × 4), of the same regulator
