@@ -1,11 +1,9 @@
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <string>
 
 #include "control/lqr_catch.h"
-#include "control/swing_up.h"
 
 namespace upswing {
 
@@ -28,28 +26,6 @@ class HybridPolicy : public ComputedPolicy {
 
   std::shared_ptr<const Policy> swing_up_;
   LqrCatch upright_;
-};
-
-/// Swing-up by a law: a torque for each deviation from upright.
-class LawPolicy : public PendulumController {
- public:
-  using Law = std::function<double(const StateVector& deviation)>;
-
-  LawPolicy(const std::string& kind, const std::string& description, const Options& settings,
-            const Plant& plant, Law law)
-      : PendulumController(kind, settings, plant),
-        description_(description),
-        law_(std::move(law)) {}
-
-  std::string description() const override { return description_; }
-
- private:
-  double Torque(const StateVector& deviation, size_t /*env*/, Memory& /*memory*/) const override {
-    return law_(deviation);
-  }
-
-  std::string description_;
-  Law law_;
 };
 
 }  // namespace upswing

@@ -1,5 +1,9 @@
 #pragma once
 
+#include <functional>
+#include <string>
+#include <utility>
+
 #include "control/controller.h"
 #include "control/manipulator.h"
 
@@ -37,5 +41,27 @@ double EnergyShapingTorque(const EnergyShapingConfig& config, const Manipulator&
 /// ours, pumps energy.
 double PartialFeedbackTorque(const PartialFeedbackConfig& config, const Manipulator& plant,
                              const StateVector& deviation);
+
+/// Swing-up by a law: a torque for each deviation from upright.
+class LawPolicy : public PendulumController {
+ public:
+  using Law = std::function<double(const StateVector& deviation)>;
+
+  LawPolicy(const std::string& kind, const std::string& description, const Options& settings,
+            const Plant& plant, Law law)
+      : PendulumController(kind, settings, plant),
+        description_(description),
+        law_(std::move(law)) {}
+
+  std::string description() const override { return description_; }
+
+ private:
+  double Torque(const StateVector& deviation, size_t /*env*/, Memory& /*memory*/) const override {
+    return law_(deviation);
+  }
+
+  std::string description_;
+  Law law_;
+};
 
 }  // namespace upswing

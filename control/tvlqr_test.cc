@@ -4,6 +4,7 @@
 
 #include "control/hybrid.h"
 #include "control/mpc.h"
+#include "control/swing_up.h"
 #include "core/error.h"
 #include "core/rng.h"
 

@@ -38,7 +38,10 @@ void ExpectPendubot(const char* kind, const Plant& plant) {
 Made MakeEnergyShaping(const ControllerConfig& config) {
   ExpectPendubot("energy", config.plant);
   auto [lqr, energy] = std::tuple(config.lqr, config.energy);
-  return WithCatch(config, "energy", "energy shaping", OptionsOfAll(lqr, energy),
+  return WithCatch(config, "energy",
+                   Concat("energy shaping, weights ", Rounded(energy.kE), ", ", Rounded(energy.kD),
+                          " and ", Rounded(energy.kP)),
+                   OptionsOfAll(lqr, energy),
                    [energy, plant = Manipulator(config.plant)](const StateVector& d) {
                      return EnergyShapingTorque(energy, plant, d);
                    });
@@ -47,7 +50,9 @@ Made MakeEnergyShaping(const ControllerConfig& config) {
 Made MakePartialFeedback(const ControllerConfig& config) {
   ExpectPendubot("pfl", config.plant);
   auto [lqr, pfl] = std::tuple(config.lqr, config.pfl);
-  return WithCatch(config, "pfl", "collocated partial feedback linearisation",
+  return WithCatch(config, "pfl",
+                   Concat("collocated partial feedback linearisation, gains ", Rounded(pfl.kP),
+                          ", ", Rounded(pfl.kD), " and ", Rounded(pfl.kE)),
                    OptionsOfAll(lqr, pfl),
                    [pfl, plant = Manipulator(config.plant)](const StateVector& d) {
                      return PartialFeedbackTorque(pfl, plant, d);
