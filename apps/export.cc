@@ -85,7 +85,8 @@ int ExportC(const ExportArguments& a) {
     fmt::print("  work        {} multiply-adds a call, every {} s\n",
                FormatCount(header.multiply_adds), period);
   } else {
-    fmt::print("  work        every {} s; the header says what\n", period);
+    fmt::print("  work        a call every {} s; the header's first lines say what it does\n",
+               period);
   }
   return 0;
 }
@@ -105,6 +106,9 @@ int RunExport(const ExportArguments& a) {
     throw BadInput("--prefix: expected --c, whose names it begins");
   if (a.checkpoints > 0 && a.page.empty()) {
     throw BadInput("--checkpoints: expected --page, which shows them");
+  }
+  if (a.c.empty() && !(a.controller.flags.empty() && a.controller.made_for.empty())) {
+    throw BadInput("settings of a controller: expected --c, which alone writes controllers");
   }
   if (!a.onnx.empty()) return ExportOnnx(a);
   if (!a.c.empty()) return ExportC(a);

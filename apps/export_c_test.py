@@ -452,6 +452,8 @@ class HeaderTest(ProgramTest):
         self.refuse(["export", policy, "--onnx", "a", "--c", "b"], "--onnx and --c")
         self.refuse(["export", policy, "--onnx", "a", "--prefix", "b"], "--prefix", "--c")
         self.refuse(["export", policy, "--c", "a", "--id", "b"], "--id", "--page")
+        for flags in ([policy, "--page", "p"], ["--test-vectors", "v"], [policy, "--onnx", "a"]):
+            self.refuse(["export", *flags, "--made-for", "mass2=2"], "controller", "--c")
         self.refuse(["export", policy, "--c", "nowhere/x.h"], "nowhere")
         self.refuse(["export", "nothing", "--c", "x.h"], "nothing: no such file")
         self.write("wrong.safetensors", "no policy")

@@ -8,7 +8,7 @@ namespace upswing {
 /// The name of this machine in its network.
 std::string HostName();
 
-/// This machine until its next boot: its host name and the mark of its last one.
+/// This machine until its next boot: its host name and the ID of its last one.
 std::string ThisHost();
 
 /// "AMD EPYC 9454P", as the system has it; "unknown" where it does not say.

@@ -1,6 +1,8 @@
 #include "lab/c_controller.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <numbers>
 
 #include "core/error.h"
@@ -118,7 +120,8 @@ class ControllerWriter {
     for (const CArray& array : arrays_) header_.constant_bytes += 4 * array.values.size();
     header_.prefix = prefix;
     header_.state_bytes = plan_steps_ > 0 ? 12 : 4;
-    header_.stack_bytes = kind_ == "lqr" ? 16 : 112;
+    // The deviation; for others its copy that is simulated, too, and five arrays of a step.
+    header_.stack_bytes = 4 * sizeof(float) * (kind_ == "lqr" ? 1 : 7);
     std::string text = Concat(Head(), Declarations(), c_code::kNumbers, "\n");
     for (const CArray& array : arrays_) text += ArrayText(array);
     text += Concat(code_, Control(), SelfTest(), "\n#endif\n");
@@ -241,8 +244,8 @@ std::string ControllerWriter::Head() const {
        {"period", FormatNumber(kControlPeriod)},
        {"plant", PlantParagraph(config_.plant, "of which it knows all")},
        {"needs", Paragraph(Concat("Flash: ", header_.constant_bytes,
-                                  " bytes of constants, 1 to 3 KB of code, and 600 bytes of "
-                                  "samples where the self test is used. RAM: ",
+                                  " bytes of constants, 1 to 3 KB of code, and up to 600 bytes "
+                                  "of samples where the self test is used. RAM: ",
                                   header_.state_bytes, " bytes of state, and arrays of ",
                                   header_.stack_bytes, " bytes on the stack. ", work))}});
 }

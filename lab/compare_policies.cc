@@ -84,6 +84,7 @@ std::vector<JudgedPolicy> JudgePolicies(const std::vector<LoadedPolicy>& policie
       const std::string& name = evaluations.front().task;
       if (name != loaded.task) {
         others.push_back(name);
+        ++done;
         continue;
       }
       judged.push_back(Judge(loaded, make_anew, evaluations, pool, [&](double share) {

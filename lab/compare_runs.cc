@@ -72,13 +72,14 @@ std::vector<fs::path> RunsIn(const fs::path& folder, Found& found) {
   std::error_code error;
   if (IsKept(folder)) return {folder};
   if (!fs::exists(folder, error)) {
-    throw BadInput(Concat(
-        folder.string(), ": expected a run folder, one that holds some, a policy's ",
-        "file or a controller (", Join(ControllerNames(), ", "), "), got nothing of that name"));
+    throw BadInput(
+        Concat(folder.string(), ": expected a run folder, one that holds some, a policy's ",
+               "file or a controller (", Join(ControllerNames(), ", "),
+               "), got nothing of that name", DidYouMean(folder.string(), ControllerNames())));
   }
   std::vector<fs::path> paths;
   if (!fs::is_directory(folder, error)) {
-    found.LeaveOut(folder, "expected a run folder or one that holds some, got a file");
+    found.LeaveOut(folder, "expected runs or a policy.safetensors, got another file");
     return paths;
   }
   const size_t problems = found.left_out.size();

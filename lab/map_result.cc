@@ -231,8 +231,8 @@ void WriteMaps(std::vector<NamedMap>& maps, const fs::path& folder) {
     success.bar = i % columns == columns - 1 || i == count - 1;
     Panel& panel = figure.panels.emplace_back(MapPanel(map, name, std::move(success)));
     // One legend of all dots, at the bottom left.
-    for (Line& line : panel.lines)
-      line.name = i == (rows - 1) * columns ? "what it was made for" : "";
+    const bool names = i == (rows - 1) * columns;
+    for (Line& line : panel.lines) line.name = names ? "what it was made for" : "";
     const fs::path table = folder / Concat("map-", i + 1, ".csv");
     WriteFileAtomically(table, MapCsv(map));
     map.files = {table.string(), (folder / "maps.svg").string(), (folder / "maps.png").string()};

@@ -153,6 +153,7 @@ Figure LearningCurves(const std::vector<RunGroup>& groups, const std::vector<Lev
     for (const Line& line : panel.lines) dashed = dashed || line.dashed_from;
   }
   if (dashed) figure.caption += " Dotted: a run has ended and keeps its last value.";
+  if (!levels.empty()) figure.caption += " Level lines: policies that were not trained here.";
   const auto return_range = RangeFromZero(returns);
   for (Panel& panel : figure.panels) {
     panel.y_range = panel.y_label == kReturn ? return_range : std::pair(0.0, 102.0);

@@ -23,16 +23,16 @@ std::vector<double> CurveGrid(const RunGroup& group, const EvaluationFigure& x, 
 
 inline constexpr size_t kMostCurves = 5;  // in one panel
 
-/// What does not learn, beside learning curves.
+/// A policy that does not learn, beside learning curves.
 struct Level {
   std::string name;
-  double success_rate, mean_return;
+  double success_rate, mean_return;  // success_rate 0 to 1
 };
 
 /// Success and return over steps and over training time: four panels with a curve for each group.
 /// More than kMostCurves groups are split into parts with four panels each, all with the same axes.
 /// A curve is dashed from where the first of its runs has ended and keeps its last value.
-/// Levels are lines from left to right.
+/// Levels are horizontal lines.
 Figure LearningCurves(const std::vector<RunGroup>& groups, const std::vector<Level>& levels = {});
 
 }  // namespace upswing
