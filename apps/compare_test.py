@@ -411,6 +411,7 @@ class CompareTest(ProgramTest):
         self.assertEqual(float(rows[1]["return"]), lqr["return"]["mean"])
         svg = (self.folder / "out/curves.svg").read_text(encoding="utf-8")
         self.assertIn("lqr", svg)
+        self.assertNotIn("policy.safetensors", svg)  # a path would not fit
 
     def test_refuses_policies_without_runs_or_of_another_task(self):
         self.make_group("r", [1, 2])

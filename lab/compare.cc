@@ -150,7 +150,7 @@ void WriteComparison(const Comparison& comparison, const fs::path& folder) {
     for (const JudgedPolicy& policy : comparison.policies) {
       if (static_cast<size_t>(policy.task) != task) continue;
       levels.push_back(
-          {policy.name, policy.figures.success_rate(), policy.figures.reward_sum.mean});
+          {policy.title, policy.figures.success_rate(), policy.figures.reward_sum.mean});
     }
     const Figure curves = LearningCurves(groups, levels);
     Draw(curves, folder / Concat(CurvesName(task), ".svg"));

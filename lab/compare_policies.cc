@@ -7,6 +7,7 @@
 #include "core/text.h"
 #include "lab/task.h"
 #include "lab/training.h"
+#include "lab/view.h"
 #include "mujoco/engines.h"
 
 namespace upswing {
@@ -48,6 +49,7 @@ JudgedPolicy Judge(const LoadedPolicy& loaded, bool make_anew,
                    const std::function<void(double)>& progress) {
   JudgedPolicy judged;
   judged.name = loaded.name;
+  judged.title = TitleOf(loaded);
   judged.runs = std::ssize(evaluations);
   judged.spec = SpecOf(evaluations.front());
   const auto policy = PolicyFor(loaded, make_anew, evaluations.front());

@@ -16,9 +16,9 @@ namespace upswing {
 
 /// A policy on the task of some groups of runs.
 struct JudgedPolicy {
-  std::string name;
-  int task = 0;      // as GroupedRuns::tasks
-  int64_t runs = 0;  // over the episodes of the final evaluations of so many
+  std::string name, title;  // as it was typed; short, for a figure
+  int task = 0;             // as GroupedRuns::tasks
+  int64_t runs = 0;         // over the episodes of the final evaluations of so many
   EnvSpec spec;
   Evaluation figures;
 };
