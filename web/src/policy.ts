@@ -46,6 +46,11 @@ export class Policy {
     return this.metadata.get('agent') !== 'mpc';
   }
 
+  /// Whether it can do more than hold what is upright already.
+  get swingsUp(): boolean {
+    return this.isLearned || this.metadata.get('agent') !== 'lqr';
+  }
+
   about(key: string): string {
     const text = this.metadata.get(key);
     if (text === undefined) throw new BadInput(`expected metadata "${key}", found none`);

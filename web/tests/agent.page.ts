@@ -62,6 +62,7 @@ test('a link brings controllers that were not learned', async ({ page }) => {
   await expect(page.locator('#agent-command')).toHaveText('./upswing simulate lqr');
   await expect(page.locator('#twin-name')).toHaveText('MPC: always plans');
   await expect(page.locator('#q-name')).toHaveText('Decision');
+  await expect(page.locator('#badge')).toHaveText('cannot swing up');
   await startFrom(page, 0);
   await run(page, 15);
   expect(await balanced(page)).toBe(0);

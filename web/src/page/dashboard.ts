@@ -140,7 +140,11 @@ export function situation(world: World): { state: string; text: string } {
   if (upright !== null && upright >= BALANCED)
     return { state: 'balanced', text: `balanced for ${upright.toFixed(1)} s` };
   if (upright !== null) return { state: 'upright', text: 'upright' };
-  if (world.agentOn) return { state: 'swinging', text: 'swinging up' };
+  if (world.agentOn)
+    return {
+      state: 'swinging',
+      text: world.policy?.swingsUp === false ? 'cannot swing up' : 'swinging up',
+    };
   return isAtRest(world.state)
     ? { state: 'hanging', text: 'hanging' }
     : { state: 'free', text: 'swinging freely' };

@@ -175,7 +175,7 @@ function mass(stage: Stage): Step {
       const seconds = world.time - changed;
       if (changed === 0) return '';
       if (heldFor(world) > HELD) return `It still holds ${slider.value} kg.`;
-      if (seconds < FAILED) return 'It starts over …';
+      if (seconds < FAILED) return `It tries ${slider.value} kg …`;
       return `It cannot hold ${slider.value} kg: too far from the 1 kg that it learned with.`;
     },
   };
@@ -231,7 +231,7 @@ function values(stage: Stage): Step {
     },
     answer: (world) =>
       heldFor(world) > HELD
-        ? 'Upright, a small torque is the highest bar. Pull it down, and see the bars change.'
+        ? 'Upright, a small torque is the highest bar. Drag it down, and see the bars change.'
         : '',
   };
 }

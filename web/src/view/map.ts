@@ -115,11 +115,11 @@ export class MapChart {
   private nameAxes(x: Axis, y: Axis): void {
     const { canvas } = this;
     const { width, height } = canvas;
-    const [from, middle, to] = width < ROOMY ? ['', ends(x)[1], ''] : ends(x);
+    const [from, middle, to] = width < ROOMY ? ['', briefly(ends(x)[1]), ''] : ends(x);
     canvas.text(from, LEFT, height - 8);
     canvas.text(middle, (LEFT + width) / 2, height - 8, 'center');
     canvas.text(to, width, height - 8, 'right');
-    const [low, centre, high] = height < ROOMY ? ['', ends(y)[1], ''] : ends(y);
+    const [low, centre, high] = height < ROOMY ? ['', briefly(ends(y)[1]), ''] : ends(y);
     canvas.context.save();
     canvas.context.rotate(-Math.PI / 2);
     canvas.text(low, BOTTOM - height, 7);
@@ -136,6 +136,11 @@ function between(colors: readonly Color[], share: number): Color {
   const [a, b] = [colors[i]!, colors[i + 1]!];
   const mix = (k: 0 | 1 | 2) => a[k] + (at - i) * (b[k] - a[k]);
   return [mix(0), mix(1), mix(2)];
+}
+
+/// A name for an axis that is too short for all of it.
+function briefly(name: string): string {
+  return name.replace(' link', '');
 }
 
 /// What stands at the ends and in the middle of an axis.
