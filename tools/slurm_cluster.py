@@ -180,6 +180,9 @@ class Cluster:
 
     def hurry(self, number):
         """Lets a job begin that is queued again; Slurm would let it wait for two minutes."""
+        # Slurm kills one that begins in the second in which it was queued again: the credentials of
+        # that second are those that were revoked.
+        time.sleep(2)
         def may_begin():
             # Refused or forgotten as long as its last end is being worked on.
             subprocess.run(["scontrol", "update", f"JobId={number}", "StartTime=now"], check=False,
