@@ -97,7 +97,8 @@ bool IsMakingName(std::string_view name) {
 
 void RemoveFolder(const fs::path& folder) {
   // Under the name of something that is being made: what a killed process leaves is removed, but
-  // not by others while we are about it, who find it locked.
+  // not by others while we are about it, who find it locked. Where this lock fails, the folder is
+  // locked already, or nothing can be here and nobody removes what he cannot lock.
   const Descriptor held(open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   (void)Lock(held);
   const fs::path gone = folder.parent_path() / MakingName(folder.filename().string());

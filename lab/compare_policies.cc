@@ -44,6 +44,14 @@ std::shared_ptr<const Policy> PolicyFor(const LoadedPolicy& loaded, bool make_an
   return loaded.remade(env.plant(0));
 }
 
+/// Throws BadInput unless the motor is at the joint that the policy was made for.
+void ExpectJoint(const LoadedPolicy& loaded, bool make_anew, const Plant& plant) {
+  const double own = loaded.plant.actuated_joint, given = plant.actuated_joint;
+  if (own == given || (loaded.remade && make_anew)) return;
+  throw BadInput(Concat(loaded.name, ": was made for a motor at joint ", own,
+                        ", and that of the runs is at joint ", given));
+}
+
 JudgedPolicy Judge(const LoadedPolicy& loaded, bool make_anew,
                    const std::vector<EnvConfig>& evaluations, ThreadPool& pool,
                    const std::function<void(double)>& progress) {
@@ -89,6 +97,7 @@ std::vector<JudgedPolicy> JudgePolicies(const std::vector<LoadedPolicy>& policie
         ++done;
         continue;
       }
+      ExpectJoint(loaded, make_anew, evaluations.front().plant(0));
       judged.push_back(Judge(loaded, make_anew, evaluations, pool, [&](double share) {
         if (progress) progress((done + share) / static_cast<double>(policies.size() * tasks));
       }));
