@@ -422,7 +422,8 @@ class CompareTest(ProgramTest):
         refuse(["r", "lqr", "--different-tasks"], "--different-tasks", "got lqr")
         refuse(["r", "--lqr-torque", "2"], "--lqr-torque: expected the controller lqr, got none")
         refuse(["r", "lqr", "--made-for", "actuated_joint=2"],
-               "lqr: was made for a motor at joint 2, and that of the runs is at joint 1")
+               "lqr (for actuated_joint 2): was made for a motor at joint 2, and that of the "
+               "runs is at joint 1")
         refuse(["r", "none.safetensors"], "none.safetensors: no such file")
         refuse(["r", "acrobot/policy.safetensors"],
                "expected a policy of double-pendulum, as the runs are, got one of acrobot-v1")
