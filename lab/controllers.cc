@@ -1,7 +1,6 @@
 #include "lab/controllers.h"
 
 #include <algorithm>
-#include <tuple>
 
 #include "control/hybrid.h"
 #include "core/error.h"
@@ -37,7 +36,8 @@ void ExpectPendubot(const char* kind, const Plant& plant) {
 
 Made MakeEnergyShaping(const ControllerConfig& config) {
   ExpectPendubot("energy", config.plant);
-  auto [lqr, energy] = std::tuple(config.lqr, config.energy);
+  LqrConfig lqr = config.lqr;
+  EnergyShapingConfig energy = config.energy;
   return WithCatch(config, "energy",
                    Concat("energy shaping, weights ", Rounded(energy.kE), ", ", Rounded(energy.kD),
                           " and ", Rounded(energy.kP)),
@@ -49,7 +49,8 @@ Made MakeEnergyShaping(const ControllerConfig& config) {
 
 Made MakePartialFeedback(const ControllerConfig& config) {
   ExpectPendubot("pfl", config.plant);
-  auto [lqr, pfl] = std::tuple(config.lqr, config.pfl);
+  LqrConfig lqr = config.lqr;
+  PartialFeedbackConfig pfl = config.pfl;
   return WithCatch(config, "pfl",
                    Concat("collocated partial feedback linearisation, gains ", Rounded(pfl.kP),
                           ", ", Rounded(pfl.kD), " and ", Rounded(pfl.kE)),
