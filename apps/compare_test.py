@@ -208,7 +208,7 @@ class CompareTest(ProgramTest):
         refuse([], "compare: expected RUN|FOLDER")
         refuse(["none"], "none", "nothing of that name")
         refuse(["r", "none"], "none", "nothing of that name")
-        refuse(["file"], "file", "got a file")
+        refuse(["file"], "file: expected a run folder or a policy.safetensors, got another file")
         refuse(["empty"], "empty", "config.toml", "got none")
         refuse(["r", "r/seed2"], "r/seed2", "given twice")
         refuse(["begun"], "begun", "unfinished", "2,000 of 4,000", "--unfinished")

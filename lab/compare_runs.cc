@@ -79,7 +79,7 @@ std::vector<fs::path> RunsIn(const fs::path& folder, Found& found) {
   }
   std::vector<fs::path> paths;
   if (!fs::is_directory(folder, error)) {
-    found.LeaveOut(folder, "expected runs or a policy.safetensors, got another file");
+    found.LeaveOut(folder, "expected a run folder or a policy.safetensors, got another file");
     return paths;
   }
   const size_t problems = found.left_out.size();
