@@ -124,7 +124,7 @@ void PrintPolicy(const JudgedPolicy& policy, const std::string& task) {
   print("episodes", fmt::format("{}, of the final evaluations of {}", FormatCount(e.episodes),
                                 policy.runs == 1 ? "one run" : Concat(policy.runs, " runs")));
   print("success", EstimateText({e.success_rate(), e.success_interval}, Percent));
-  const bool upright = !policy.spec.evaluation.by_return() && e.successes > 0;
+  const bool upright = policy.upright();
   if (upright) print("swing-up time", QuartilesText(e.swing_up_seconds));
   print("return", MomentsText(e.reward_sum));
   const std::string& unit = policy.spec.action_unit;

@@ -5,21 +5,16 @@ import csv
 import json
 import math
 import re
+import sys
 import unittest
 
-from testing import REWARD_TERMS, ProgramTest, train_once
+from testing import REWARD_TERMS, ROOT, ProgramTest, train_once
+
+sys.path.insert(0, str(ROOT / "tools/seeds"))
+from wilson import wilson  # noqa: E402
 
 PLANT = {"mass1": 1, "mass2": 1, "length1": 0.5, "length2": 0.5, "damping1": 0.2, "damping2": 0.2,
          "gravity": 9.81, "torque_limit": 5}
-
-
-def wilson(successes, trials):
-    """95% score interval of a success rate (Wilson, 1927)."""
-    z = 1.959963984540054
-    p = successes / trials
-    center = (p + z * z / (2 * trials)) / (1 + z * z / trials)
-    half = z / (1 + z * z / trials) * math.sqrt(p * (1 - p) / trials + z * z / (4 * trials**2))
-    return max(0, center - half), min(1, center + half)
 
 
 def moments_text(moments):

@@ -74,7 +74,7 @@ std::string PoliciesCsv(const std::vector<JudgedPolicy>& policies) {
       "return,return_deviation,rms_torque,torque_variation,torque_variation_upright\n";
   for (const JudgedPolicy& policy : policies) {
     const Evaluation& e = policy.figures;
-    const bool upright = !policy.spec.evaluation.by_return() && e.successes > 0;
+    const bool upright = policy.upright();
     csv += Concat(Cell(policy.name), ',', policy.task + 1, ',', e.episodes, ',',
                   FormatNumber(e.success_rate()), ',', FormatNumber(e.success_interval.low), ',',
                   FormatNumber(e.success_interval.high), ',',

@@ -21,6 +21,9 @@ struct JudgedPolicy {
   int64_t runs = 0;         // over the episodes of the final evaluations of so many
   EnvSpec spec;
   Evaluation figures;
+
+  /// Whether it has figures of being upright.
+  bool upright() const { return !spec.evaluation.by_return() && figures.successes > 0; }
 };
 
 /// A group of runs beside a policy on the same task.
