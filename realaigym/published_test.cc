@@ -1,0 +1,199 @@
+// A published entry of the board, built anew from its own trajectory and scored by our rules.
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <numbers>
+
+#include "core/csv.h"
+#include "core/thread_pool.h"
+#include "realaigym/linear.h"
+#include "realaigym/simulation.h"
+
+namespace upswing {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+constexpr double kSpacing = 0.001;  // s, of what the entry fits its cubics to
+constexpr int kFileSpacing = 10;    // of these, from one row of the file to the next
+constexpr int kPiece = 150;         // of these, that a cubic is fitted to
+
+/// Samples every kSpacing from those of the file, by the cubic through the nearest four.
+std::vector<double> Refined(const std::vector<double>& rows) {
+  std::vector<double> samples;
+  for (size_t i = 0; i < kFileSpacing * rows.size(); ++i) {
+    const double place = static_cast<double>(i) / kFileSpacing;
+    const size_t first = std::clamp<size_t>(i / kFileSpacing, 1, rows.size() - 3) - 1;
+    const double x = place - static_cast<double>(first);
+    const double* y = &rows[first];
+    samples.push_back(-(x - 1) * (x - 2) * (x - 3) / 6 * y[0] + x * (x - 2) * (x - 3) / 2 * y[1] -
+                      x * (x - 1) * (x - 3) / 2 * y[2] + x * (x - 1) * (x - 2) / 6 * y[3]);
+  }
+  return samples;
+}
+
+/// A quantity over time as the entry keeps it: cubics fitted to pieces of its samples, one by one.
+class Cubics {
+ public:
+  explicit Cubics(const std::vector<double>& samples) {
+    Eigen::Matrix<double, kPiece, 4> powers;
+    for (int i = 0; i < kPiece; ++i) powers.row(i) = Powers(i);
+    const Eigen::ColPivHouseholderQR<decltype(powers)> qr(powers);
+    for (size_t first = 0; first < samples.size(); first += kPiece) {
+      pieces_.push_back(qr.solve(Eigen::Map<const Eigen::Vector<double, kPiece>>(&samples[first])));
+    }
+  }
+
+  double At(double t) const {
+    const double i = std::min(t / kSpacing, static_cast<double>(kPiece * pieces_.size() - 1));
+    const auto piece = static_cast<size_t>(i / kPiece + 1e-9);
+    return Powers(i - static_cast<double>(kPiece * piece)) * pieces_[piece];
+  }
+
+ private:
+  static Eigen::RowVector4d Powers(double i) {
+    const double x = i / kPiece;
+    return {1, x, x * x, x * x * x};
+  }
+
+  std::vector<Eigen::Vector4d> pieces_;
+};
+
+/// q̈ of the board's plant, rad/s².
+Eigen::Vector2d Acceleration(const Eigen::Vector4d& x, double torque) {
+  static BoardBlock block;
+  block.SetState(0, {x[0], x[1], x[2], x[3]});
+  block.tau1[0] = torque;
+  const auto a = Accelerations(block);
+  return {a[0][0], a[1][0]};
+}
+
+/// The swing-up that the entry follows: two angles, two velocities, the torque.
+std::vector<Cubics> ReadTrajectory() {
+  const auto path =
+      std::filesystem::path(__FILE__).parent_path() / "testdata/pendubot_tvlqr_trajectory.csv";
+  std::ifstream file(path);
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  std::vector<Cubics> trajectory;
+  for (const CsvColumn& column :
+       ReadCsv(text, {"pos1", "pos2", "vel1", "vel2", "tau1"}, path.string())) {
+    trajectory.emplace_back(Refined(column.values));
+  }
+  return trajectory;
+}
+
+Eigen::Vector4d StateAt(const std::vector<Cubics>& channels, double t) {
+  return {channels[0].At(t), channels[1].At(t), channels[2].At(t), channels[3].At(t)};
+}
+
+/// TVLQR, an entry of the pendubot's boards: follows a swing-up with a time-varying regulator, and
+/// once near to upright holds it with another for good.
+class PublishedTvlqr : public BoardController {
+ public:
+  /// What it computes beforehand, once.
+  struct Plan {
+    Plan();
+    std::vector<Cubics> trajectory, K;  // five, and the gain of each of four
+    BoardRegulator upright;
+  };
+
+  explicit PublishedTvlqr(const Plan& plan) : plan_(plan) {}
+
+  void Act(int step, const BoardMeasurement& m, size_t count, Lanes& torque) override {
+    const double t = step * kBoardTimestep;
+    const Eigen::Vector4d then = StateAt(plan_.trajectory, t), K = StateAt(plan_.K, t);
+    const double u = plan_.trajectory[4].At(t);
+    for (size_t lane = 0; lane < count; ++lane) {
+      const Eigen::Vector4d x(m.q1[lane], m.q2[lane], m.w1[lane], m.w2[lane]);
+      const Eigen::Vector4d off = Wrapped(x - Eigen::Vector4d(kPi, 0, 0, 0));
+      held_[lane] = held_[lane] || (std::abs(off[0]) <= 0.05 && std::abs(off[1]) <= 0.05 &&
+                                    std::abs(off[2]) <= 0.1 && std::abs(off[3]) <= 0.1);
+      const auto& [gain, cost] = plan_.upright;
+      if (!held_[lane]) {
+        torque[lane] = u - K.dot(Wrapped(x - then));
+      } else {
+        torque[lane] = off.dot(cost * off) > 1000 ? 0 : -gain.dot(off);
+      }
+    }
+  }
+
+ private:
+  static Eigen::Vector4d Wrapped(Eigen::Vector4d x) {
+    x[0] = std::remainder(x[0], 2 * kPi);
+    x[1] = std::remainder(x[1], 2 * kPi);
+    return x;
+  }
+
+  const Plan& plan_;
+  std::array<bool, kBoardBlock> held_{};
+};
+
+PublishedTvlqr::Plan::Plan()
+    : trajectory(ReadTrajectory()),
+      upright(SolveBoardRegulator(LinearizeUpright(BoardPlant(), Robot::kPendubot),
+                                  {0.97, 0.93, 0.39, 0.26}, 0.11)) {
+  const Eigen::Matrix4d Q = Eigen::Vector4d(0.64, 0.56, 0.13, 0.037).asDiagonal();
+  constexpr double kR = 0.82;
+  std::array<std::vector<double>, 4> gains;
+  for (auto& each : gains) each.resize(6000);  // the last is 0
+  Eigen::Matrix4d P = upright.P;
+  for (size_t i = gains[0].size() - 1; i-- > 0;) {
+    const double t = static_cast<double>(i) * kSpacing;
+    const Eigen::Vector4d x = StateAt(trajectory, t);
+    const double u = trajectory[4].At(t);
+    // Euler's step of the linear model about here.
+    Eigen::Matrix4d A = Eigen::Matrix4d::Identity();
+    A.topRightCorner<2, 2>() += kSpacing * Eigen::Matrix2d::Identity();
+    constexpr double kStep = 1e-5;
+    for (int j = 0; j < 4; ++j) {
+      const Eigen::Vector4d d = kStep * Eigen::Vector4d::Unit(j);
+      A.block<2, 1>(2, j) +=
+          kSpacing * (Acceleration(x + d, u) - Acceleration(x - d, u)) / (2 * kStep);
+    }
+    Eigen::Vector4d B = Eigen::Vector4d::Zero();
+    B.tail<2>() = kSpacing * (Acceleration(x, 1) - Acceleration(x, 0));
+    const Eigen::RowVector4d gain = B.transpose() * P * A / (kR + B.dot(P * B));
+    P = (Q + A.transpose() * P * (A - B * gain)).eval();
+    for (int j = 0; j < 4; ++j) gains[static_cast<size_t>(j)][i] = gain[j];
+  }
+  for (const auto& each : gains) K.emplace_back(each);
+}
+
+TEST(RealAiGymPublished, TvlqrHasItsPublishedScores) {
+  const PublishedTvlqr::Plan plan;
+  const auto make = [&](size_t) { return std::make_unique<PublishedTvlqr>(plan); };
+  const BoardOutcome o =
+      SimulateOnBoard(Robot::kPendubot, std::array<BoardEpisode, 1>(), make, nullptr).front();
+  // To the last digit that is published, and a little for what lies between the file's rows.
+  EXPECT_NEAR(o.swing_up_seconds, 4.13, 1e-9);
+  EXPECT_NEAR(o.energy, 9.53, 0.006);
+  EXPECT_NEAR(o.torque_cost, 1.26, 0.006);
+  EXPECT_NEAR(o.smoothness, 0.007, 0.0006);
+  EXPECT_NEAR(o.velocity_cost, 211.12, 0.006);
+  EXPECT_NEAR(o.max_torque, 1.77, 0.007);
+  EXPECT_NEAR(PerformanceScore(o), 0.526, 0.0006);
+
+  const std::vector<RobustnessCase> cases = RobustnessCases(1);
+  std::vector<BoardEpisode> episodes;
+  for (const RobustnessCase& each : cases) episodes.push_back(each.episode);
+  ThreadPool pool(2);
+  const Robustness judged =
+      JudgeRobustness(cases, SimulateOnBoard(Robot::kPendubot, episodes, make, &pool));
+  const auto& [model, velocity, torque, response, delay, pushes] = judged.rows;
+  // Where nothing is drawn, but for a cell of the model at an edge.
+  EXPECT_NEAR(model, 132.0 / 210, 1.1 / 210);
+  EXPECT_EQ(response, 1);
+  EXPECT_NEAR(delay, 9.0 / 21, 1e-12);
+  // Where noise and pushes are: two levels, two deviations of 50 draws, and what they make of R.
+  EXPECT_NEAR(velocity, 19.0 / 21, 2.1 / 21);
+  EXPECT_EQ(torque, 1);
+  EXPECT_NEAR(pushes, 0.64, 2 * std::sqrt(0.64 * 0.36 / 50));
+  EXPECT_NEAR(judged.score(), 0.767, 0.04);
+}
+
+}  // namespace
+}  // namespace upswing
