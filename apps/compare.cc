@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 
 #include "apps/commands.h"
 #include "apps/compare_report.h"
@@ -71,12 +72,13 @@ int RunCompare(const CompareArguments& arguments) {
   Comparison comparison = Compare(request);
   if (!policies.empty()) {
     ThreadPool pool(ResolveThreads(arguments.threads));
-    ProgressLine progress;
+    std::optional<EpisodeProgress> progress;
     const bool make_anew = arguments.controllers.made_for.empty();
     AddPolicies(
         policies, make_anew, pool,
-        [&](double share) {
-          if (!arguments.as_json && progress.due()) progress.Show(share, {"judging policies"});
+        [&](double episodes, double share) {
+          if (!progress) progress.emplace(episodes, arguments.as_json);
+          progress->Show(share);
         },
         comparison);
   }
@@ -129,7 +131,7 @@ void AddCompare(CLI::App& program, Command& command) {
       "final\n"
       "evaluations (of the first runs, up to 1,000 episodes), a controller made for their plant\n"
       "unless --made-for says otherwise; its return stands beside the runs', without an "
-      "interval.\n\n"
+      "interval. mpc needs half a second of the processor for an episode.\n\n"
       "Examples:\n"
       "  ./upswing compare runs/d3qn-seed*                  one agent over its seeds\n"
       "  ./upswing compare runs --out runs/comparison       all agents in runs, with figures\n"

@@ -3,7 +3,9 @@
 
 import csv
 import json
+import os
 import re
+import shutil
 import statistics
 import unittest
 import xml.etree.ElementTree as ET
@@ -407,11 +409,19 @@ class CompareTest(ProgramTest):
         self.assertIn("d3qn-small against lqr\n", text)
         with open(self.folder / "out/policies.csv", encoding="utf-8", newline="") as file:
             rows = list(csv.DictReader(file))
-        self.assertEqual([r["policy"] for r in rows], names[1:])
+        self.assertEqual([(r["policy"], r["runs"], r["episodes"]) for r in rows],
+                         [(name, "1", "4") for name in names[1:]])
         self.assertEqual(float(rows[1]["return"]), lqr["return"]["mean"])
         svg = (self.folder / "out/curves.svg").read_text(encoding="utf-8")
         self.assertIn("lqr", svg)
         self.assertNotIn("policy.safetensors", svg)  # a path would not fit
+        # Policies whose folders have the same name are told apart by their paths.
+        os.makedirs(self.folder / "copy/run")
+        shutil.copy(self.folder / "run/policy.safetensors", self.folder / "copy/run")
+        self.succeed("compare", *names[:2], "copy/run/policy.safetensors", "--out", "two")
+        svg = (self.folder / "two/curves.svg").read_text(encoding="utf-8")
+        for name in (names[1], "copy/run/policy.safetensors"):
+            self.assertIn(f">{name}<", svg)
 
     def test_refuses_policies_without_runs_or_of_another_task(self):
         self.make_group("r", [1, 2])
@@ -424,6 +434,7 @@ class CompareTest(ProgramTest):
         refuse(["r", "lqr", "--made-for", "actuated_joint=2"],
                "lqr (for actuated_joint 2): was made for a motor at joint 2, and that of the "
                "runs is at joint 1")
+        refuse(["r", "lqr", "lqr"], "lqr: expected a policy once, is there twice")
         refuse(["r", "none.safetensors"], "none.safetensors: no such file")
         refuse(["r", "acrobot/policy.safetensors"],
                "expected a policy of double-pendulum, as the runs are, got one of acrobot-v1")

@@ -49,8 +49,9 @@ int RunMaps(const MapCommand& a) {
   }
   const std::vector<LoadedPolicy> policies = GetPolicies(a.policies, a.controllers);
   std::vector<NamedMap> maps;
-  for (const LoadedPolicy& loaded : policies) {
-    maps.push_back({TitleOf(loaded), PlanMap(a, loaded)});
+  const std::vector<std::string> titles = TitlesOf(policies);
+  for (size_t i = 0; i < policies.size(); ++i) {
+    maps.push_back({titles[i], PlanMap(a, policies[i])});
   }
   CheckSameAxes(maps);
   const fs::path folder = MapFolder(a, policies.front(), maps.front().map);

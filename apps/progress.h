@@ -15,6 +15,8 @@ class ProgressLine {
   ProgressLine(const ProgressLine&) = delete;
   ProgressLine& operator=(const ProgressLine&) = delete;
 
+  bool terminal() const { return terminal_; }
+
   /// Whether a line would be shown now: there is a terminal, and the last one is old enough.
   bool due() const;
 
@@ -35,7 +37,8 @@ class ProgressLine {
   Clock::time_point last_{};
 };
 
-/// A progress line for work on so many episodes: their rate and the time left.
+/// A progress line for work on so many episodes: their rate and the time left. Where standard
+/// output is no terminal, a plain line on standard error every ten seconds.
 class EpisodeProgress {
  public:
   /// Shows nothing if `quiet`.
@@ -49,7 +52,7 @@ class EpisodeProgress {
   double episodes_;
   bool quiet_;
   ProgressLine line_;
-  Clock::time_point begin_ = Clock::now();
+  Clock::time_point begin_ = Clock::now(), told_ = begin_;  // told: the last plain line
 };
 
 }  // namespace upswing

@@ -70,12 +70,12 @@ std::string RunsCsv(const Comparison& comparison) {
 
 std::string PoliciesCsv(const std::vector<JudgedPolicy>& policies) {
   std::string csv =
-      "policy,task,episodes,success_rate,success_low,success_high,swing_up_seconds_median,"
+      "policy,task,runs,episodes,success_rate,success_low,success_high,swing_up_seconds_median,"
       "return,return_deviation,rms_torque,torque_variation,torque_variation_upright\n";
   for (const JudgedPolicy& policy : policies) {
     const Evaluation& e = policy.figures;
     const bool upright = policy.upright();
-    csv += Concat(Cell(policy.name), ',', policy.task + 1, ',', e.episodes, ',',
+    csv += Concat(Cell(policy.name), ',', policy.task + 1, ',', policy.runs, ',', e.episodes, ',',
                   FormatNumber(e.success_rate()), ',', FormatNumber(e.success_interval.low), ',',
                   FormatNumber(e.success_interval.high), ',',
                   upright ? FormatNumber(e.swing_up_seconds.median) : "", ',',
@@ -125,7 +125,7 @@ Comparison Compare(const CompareRequest& request) {
 }
 
 void AddPolicies(const std::vector<LoadedPolicy>& policies, bool make_anew, ThreadPool& pool,
-                 const std::function<void(double)>& progress, Comparison& comparison) {
+                 const JudgingProgress& progress, Comparison& comparison) {
   comparison.policies = JudgePolicies(policies, make_anew, pool, progress, comparison.runs);
   for (size_t group = 0; group < comparison.summaries.size(); ++group) {
     for (size_t policy = 0; policy < comparison.policies.size(); ++policy) {

@@ -52,57 +52,57 @@ void ExpectJoint(const LoadedPolicy& loaded, bool make_anew, const Plant& plant)
                         ", and that of the runs is at joint ", given));
 }
 
-JudgedPolicy Judge(const LoadedPolicy& loaded, bool make_anew,
-                   const std::vector<EnvConfig>& evaluations, ThreadPool& pool,
+/// A policy to judge on a task.
+struct Job {
+  size_t policy;
+  int task;
+  std::vector<EnvConfig> evaluations;
+  int64_t episodes = 0;
+};
+
+/// `progress` is told how many episodes are done.
+JudgedPolicy Judge(const LoadedPolicy& loaded, const Job& job, bool make_anew, ThreadPool& pool,
                    const std::function<void(double)>& progress) {
   JudgedPolicy judged;
   judged.name = loaded.name;
-  judged.title = TitleOf(loaded);
-  judged.runs = std::ssize(evaluations);
-  judged.spec = SpecOf(evaluations.front());
-  const auto policy = PolicyFor(loaded, make_anew, evaluations.front());
+  judged.task = job.task;
+  judged.runs = std::ssize(job.evaluations);
+  judged.spec = SpecOf(job.evaluations.front());
+  const auto policy = PolicyFor(loaded, make_anew, job.evaluations.front());
   std::vector<EvaluationEpisode> episodes;
-  double done = 0;
-  for (EnvConfig env : evaluations) {
+  for (EnvConfig env : job.evaluations) {
     env.pool = &pool;
     env.memory = loaded.memory();
     env.identified_from.reset();
     if (loaded.identifies()) env.identified_from = loaded.plant;
+    const auto done = static_cast<double>(episodes.size());
     const auto more = EvaluateEpisodes(*policy, *MakeEnv(env), &pool, [&](double share) {
-      if (progress) progress((done + share) / static_cast<double>(evaluations.size()));
+      progress(done + share * env.num_envs);
     });
     episodes.insert(episodes.end(), more.begin(), more.end());
-    ++done;
   }
   judged.figures = Summarize(episodes, judged.spec.evaluation);
   return judged;
 }
 
-}  // namespace
-
-std::vector<JudgedPolicy> JudgePolicies(const std::vector<LoadedPolicy>& policies, bool make_anew,
-                                        ThreadPool& pool,
-                                        const std::function<void(double)>& progress,
-                                        GroupedRuns& runs) {
+/// What is to be judged; what is not is noted.
+std::vector<Job> JobsOf(const std::vector<LoadedPolicy>& policies, bool make_anew,
+                        GroupedRuns& runs) {
   const int tasks = static_cast<int>(runs.task_texts.size());
-  std::vector<JudgedPolicy> judged;
-  double done = 0;
-  for (const LoadedPolicy& loaded : policies) {
+  std::vector<Job> jobs;
+  for (size_t policy = 0; policy < policies.size(); ++policy) {
+    const LoadedPolicy& loaded = policies[policy];
     std::vector<std::string> others;  // tasks that it is not of
     for (int task = 0; task < tasks; ++task) {
-      const std::vector<EnvConfig> evaluations = FinalEvaluations(runs, task);
-      const std::string& name = evaluations.front().task;
-      if (name != loaded.task) {
-        others.push_back(name);
-        ++done;
+      Job job{policy, task, FinalEvaluations(runs, task)};
+      const EnvConfig& first = job.evaluations.front();
+      if (first.task != loaded.task) {
+        others.push_back(first.task);
         continue;
       }
-      ExpectJoint(loaded, make_anew, evaluations.front().plant(0));
-      judged.push_back(Judge(loaded, make_anew, evaluations, pool, [&](double share) {
-        if (progress) progress((done + share) / static_cast<double>(policies.size() * tasks));
-      }));
-      judged.back().task = task;
-      ++done;
+      ExpectJoint(loaded, make_anew, first.plant(0));
+      for (const EnvConfig& env : job.evaluations) job.episodes += env.num_envs;
+      jobs.push_back(std::move(job));
     }
     if (std::ssize(others) == tasks) {
       throw BadInput(Concat(loaded.name, ": expected a policy of ", others.front(),
@@ -112,6 +112,25 @@ std::vector<JudgedPolicy> JudgePolicies(const std::vector<LoadedPolicy>& policie
       runs.notes.push_back(Concat(loaded.name, ": not judged on ", others.front(),
                                   ", as it is a policy of ", loaded.task));
     }
+  }
+  return jobs;
+}
+
+}  // namespace
+
+std::vector<JudgedPolicy> JudgePolicies(const std::vector<LoadedPolicy>& policies, bool make_anew,
+                                        ThreadPool& pool, const JudgingProgress& progress,
+                                        GroupedRuns& runs) {
+  const std::vector<std::string> titles = TitlesOf(policies);
+  double all = 0, before = 0;
+  const std::vector<Job> jobs = JobsOf(policies, make_anew, runs);
+  for (const Job& job : jobs) all += static_cast<double>(job.episodes);
+  std::vector<JudgedPolicy> judged;
+  for (const Job& job : jobs) {
+    judged.push_back(Judge(policies[job.policy], job, make_anew, pool,
+                           [&](double done) { progress(all, (before + done) / all); }));
+    judged.back().title = titles[job.policy];
+    before += static_cast<double>(job.episodes);
   }
   return judged;
 }

@@ -1,5 +1,6 @@
 // Policies by what a command line calls them: a controller's name, a file or a run folder.
 #include <algorithm>
+#include <set>
 
 #include "core/error.h"
 #include "core/text.h"
@@ -50,7 +51,11 @@ std::vector<LoadedPolicy> GetPolicies(const std::vector<std::string>& names,
                           ") to set, got ", names.empty() ? "none" : Join(names, ", ")));
   }
   std::vector<LoadedPolicy> policies;
+  std::set<std::string> seen;
   for (const std::string& name : names) {
+    if (!seen.insert(name).second) {
+      throw BadInput(Concat(Printable(name), ": expected a policy once, is there twice"));
+    }
     PolicyArguments one{name, {}, {}};
     if (IsController(name)) {
       one.made_for = controllers.made_for;

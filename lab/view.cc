@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "core/error.h"
 #include "core/text.h"
@@ -205,6 +206,17 @@ std::string TitleOf(const LoadedPolicy& loaded) {
   if (loaded.path.empty()) return loaded.name;
   const std::string stem = loaded.path.stem(), folder = loaded.path.parent_path().filename();
   return stem == "policy" && !folder.empty() ? folder : stem;
+}
+
+std::vector<std::string> TitlesOf(const std::vector<LoadedPolicy>& policies) {
+  std::map<std::string, int> count;
+  for (const LoadedPolicy& loaded : policies) ++count[TitleOf(loaded)];
+  std::vector<std::string> titles;
+  for (const LoadedPolicy& loaded : policies) {
+    const std::string title = TitleOf(loaded);
+    titles.push_back(count[title] == 1 ? title : loaded.name);
+  }
+  return titles;
 }
 
 }  // namespace upswing
