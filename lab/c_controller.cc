@@ -22,7 +22,9 @@ namespace {
 constexpr int kSamples = 16;
 constexpr int kMostDraws = 1000;       // of each
 constexpr double kTorqueShare = 5e-4;  // of the limit: tolerance of a sample's torque
-constexpr double kNearby = 2e-6;  // rad, rad/s: so far from a sample the torque is nearly the same
+constexpr double kNearby = 1e-3;       // rad, rad/s: so near to a sample the torque does not jump
+const StateVector kRange(3.14, 3.14, 4, 4);  // ±, of a sample: rad, rad/s
+constexpr double kUprightShare = 0.005;  // of that, about upright: the torque is within its limit
 
 /// The settings that it was made with.
 ControllerConfig ConfigOf(const LoadedPolicy& loaded) {
@@ -58,36 +60,42 @@ double TorqueAt(const LoadedPolicy& loaded, const StateVector& x) {
   return torque;
 }
 
-/// Near upright in every other sample, where the regulator's torque is within the limit; no place
-/// where roundings choose between two torques.
+/// Whether the torque jumps by so much around a state: then roundings may choose between two.
+bool Jumps(const LoadedPolicy& loaded, const StateVector& x, double torque) {
+  const double here = TorqueAt(loaded, x);
+  for (int k = 0; k < 4; ++k) {
+    const StateVector step = kNearby * StateVector::Unit(k);
+    // 0 for any linear law, however steep.
+    const double bend = TorqueAt(loaded, x - step) - 2 * here + TorqueAt(loaded, x + step);
+    if (std::abs(bend) >= torque) return true;
+  }
+  return false;
+}
+
+/// A state whose numbers are floats, anywhere or near upright.
+StateVector DrawState(Rng& rng, bool upright) {
+  StateVector x;
+  for (int k = 0; k < 4; ++k) x[k] = rng.Uniform(-1, 1) * kRange[k];
+  if (upright) x = FromUpright(kUprightShare * x);
+  return x.cast<float>().cast<double>();
+}
+
+/// States (every other one near upright) and their torques, none near a jump.
 void DrawSamples(const LoadedPolicy& loaded, double tolerance, std::vector<float>& states,
                  std::vector<float>& torques) {
   Rng rng(0, "samples of a controller's C header");
-  const StateVector wide(std::numbers::pi, std::numbers::pi, 4, 4);
   for (int i = 0; i < kSamples; ++i) {
-    for (int draw = 0;; ++draw) {
+    const bool upright = i % 2 == 0;
+    StateVector x = DrawState(rng, upright);
+    for (int draw = 1; Jumps(loaded, x, tolerance / 2); ++draw) {
       if (draw == kMostDraws) {
         throw BadInput(Concat(loaded.name, ": found no state where its torque does not hang on a ",
                               "rounding, by which a header could test itself"));
       }
-      StateVector x;
-      for (int k = 0; k < 4; ++k) x[k] = rng.Uniform(-1, 1) * 0.999 * wide[k];
-      if (i % 2 == 0) x = FromUpright(0.005 * x);
-      for (double& number : x) number = static_cast<float>(number);
-      const double torque = TorqueAt(loaded, x);
-      bool clear = true;
-      for (int k = 0; k < 4 && clear; ++k) {
-        for (const double sign : {-1.0, 1.0}) {
-          StateVector beside = x;
-          beside[k] += sign * kNearby;
-          clear = clear && std::abs(TorqueAt(loaded, beside) - torque) < tolerance / 2;
-        }
-      }
-      if (!clear) continue;
-      for (const double number : x) states.push_back(static_cast<float>(number));
-      torques.push_back(static_cast<float>(torque));
-      break;
+      x = DrawState(rng, upright);
     }
+    for (const double number : x) states.push_back(static_cast<float>(number));
+    torques.push_back(static_cast<float>(TorqueAt(loaded, x)));
   }
 }
 

@@ -242,11 +242,11 @@ class PanelScript {
       // Beyond the palette's colours lines are dashed.
       const std::string style = Concat(" with lines lw ", panel_.heat_map ? 1 : 2, color, " dt ");
       const size_t dash = 1 + i / kColors.size() % 4;
-      if (!line.dashed_from) {
+      if (!line.dotted_from) {
         layers.push_back(Concat("$L", i, " using 1:2", style, dash, title));
         return;
       }
-      const std::string end = Number(*line.dashed_from);
+      const std::string end = Number(*line.dotted_from);
       layers.push_back(Concat("$L", i, " using ($1<=", end, "?$1:NaN):2", style, dash, title));
       layers.push_back(Concat("$L", i, " using ($1>=", end, "?$1:NaN):2", style, 3, " notitle"));
       return;

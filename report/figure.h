@@ -17,7 +17,7 @@ struct Line {
   std::vector<double> low, high;  // (n) a band around the line, error bars of points; empty: none
   bool points = false;            // markers instead of a line
   Marker marker = Marker::kDot;
-  std::optional<double> dashed_from = {};  // the x from which the line is dashed
+  std::optional<double> dotted_from = {};  // the x from which the line is dotted
 };
 
 /// A table of numbers as colours, cell (i, j) around (x[j], y[i]); x and y rise.

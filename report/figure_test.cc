@@ -174,7 +174,7 @@ TEST_F(FigureTest, ALineIsDashedFromWhereItSays) {
   figure.panels.resize(1);
   figure.panels[0].lines = {{"", {0, 1, 2, 3, 4}, {0, 1, 2, 3, 4}, {}, {}}};
   EXPECT_EQ(Svg(figure).find("stroke-dasharray"), std::string::npos);
-  figure.panels[0].lines[0].dashed_from = 2;
+  figure.panels[0].lines[0].dotted_from = 2;
   EXPECT_NE(Svg(figure).find("stroke-dasharray"), std::string::npos);
 }
 

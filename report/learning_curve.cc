@@ -67,9 +67,9 @@ Panel CurvesPanel(const std::vector<RunGroup>& groups, const Axes& axes, double 
   for (const RunGroup& group : groups) {
     std::vector<double> grid = CurveGrid(group, axes.x, end);
     const double first_end = FirstEnd(group, axes.x);
-    const auto dashed_from = std::ranges::lower_bound(grid, first_end);
+    const auto dotted_from = std::ranges::lower_bound(grid, first_end);
     Line& line = panel.lines.emplace_back(LearningCurve(group, axes.x, axes.y, grid));
-    if (first_end < end && dashed_from != grid.end()) line.dashed_from = *dashed_from;
+    if (first_end < end && dotted_from != grid.end()) line.dotted_from = *dotted_from;
     line.name = legend ? Concat(group.label, " (n = ", group.runs.size(), ")") : "";
   }
   return panel;
@@ -147,12 +147,12 @@ Figure LearningCurves(const std::vector<RunGroup>& groups, const std::vector<Lev
     }
   }
   std::vector<const Panel*> returns;
-  bool dashed = false;
+  bool dotted = false;
   for (const Panel& panel : figure.panels) {
     if (panel.y_label == kReturn) returns.push_back(&panel);
-    for (const Line& line : panel.lines) dashed = dashed || line.dashed_from;
+    for (const Line& line : panel.lines) dotted = dotted || line.dotted_from;
   }
-  if (dashed) figure.caption += " Dotted: a run has ended and keeps its last value.";
+  if (dotted) figure.caption += " Dotted: a run has ended and keeps its last value.";
   if (!levels.empty()) figure.caption += " Level lines: policies that were not trained here.";
   const auto return_range = RangeFromZero(returns);
   for (Panel& panel : figure.panels) {

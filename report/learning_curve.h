@@ -31,7 +31,7 @@ struct Level {
 
 /// Success and return over steps and over training time: four panels with a curve for each group.
 /// More than kMostCurves groups are split into parts with four panels each, all with the same axes.
-/// A curve is dashed from where the first of its runs has ended and keeps its last value.
+/// A curve is dotted from where the first of its runs has ended and keeps its last value.
 /// Levels are horizontal lines.
 Figure LearningCurves(const std::vector<RunGroup>& groups, const std::vector<Level>& levels = {});
 

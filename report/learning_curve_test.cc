@@ -51,21 +51,21 @@ TEST(LearningCurve, CurvesAreDashedFromWhereARunHasEndedOverStepsAndOverTime) {
   EXPECT_EQ(even.caption.find("keeps"), std::string::npos);
   EXPECT_NE(uneven.caption.find("keeps its last value"), std::string::npos);
   ASSERT_EQ(uneven.panels.size(), 4U);
-  for (const Panel& panel : even.panels) EXPECT_FALSE(panel.lines[0].dashed_from);
+  for (const Panel& panel : even.panels) EXPECT_FALSE(panel.lines[0].dotted_from);
   for (const Panel& panel : uneven.panels) {
     ASSERT_EQ(panel.lines.size(), 2U);
-    ASSERT_TRUE(panel.lines[0].dashed_from);
-    EXPECT_FALSE(panel.lines[1].dashed_from);
+    ASSERT_TRUE(panel.lines[0].dotted_from);
+    EXPECT_FALSE(panel.lines[1].dotted_from);
     const double end = panel.x_label == "steps" ? 2000 : 2;
-    EXPECT_GE(*panel.lines[0].dashed_from, end);
-    EXPECT_LT(*panel.lines[0].dashed_from, 1.01 * end);
+    EXPECT_GE(*panel.lines[0].dotted_from, end);
+    EXPECT_LT(*panel.lines[0].dotted_from, 1.01 * end);
   }
   // Over time two runs of as many steps end apart.
   RunGroup slow = a;
   slow.runs[1].evaluations.back().seconds = 8;
   const Figure apart = LearningCurves({slow});
-  EXPECT_FALSE(apart.panels[0].lines[0].dashed_from);
-  EXPECT_TRUE(apart.panels[1].lines[0].dashed_from);
+  EXPECT_FALSE(apart.panels[0].lines[0].dotted_from);
+  EXPECT_TRUE(apart.panels[1].lines[0].dotted_from);
   EXPECT_NE(apart.caption.find("Dotted"), std::string::npos);
 }
 

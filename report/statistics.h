@@ -19,8 +19,8 @@ inline constexpr int64_t kResamples = 10000;  // of a bootstrap interval, at mos
 /// Scores of one agent: for each task, which is a stratum, the scores of its runs.
 using Strata = std::vector<std::vector<double>>;
 
-/// How many resamples a bootstrap takes: `most`, or fewer in inverse proportion where there are more
-/// than 1,000 scores, whose intervals are narrow.
+/// How many resamples a bootstrap takes: `most`, or fewer in inverse proportion where there are
+/// more than 1,000 scores, whose intervals are narrow.
 int64_t ResamplesOf(const Strata& strata, int64_t most = kResamples);
 
 /// A figure with its 95% interval; none if a stratum has less than two runs, or if all resamples
