@@ -82,15 +82,15 @@ int RunCompare(const CompareArguments& arguments) {
         },
         comparison);
   }
-  if (!arguments.out.empty()) {
-    MakeNewFolder(arguments.out);
-    WriteComparison(comparison, arguments.out);
-  }
   if (arguments.as_json) {
     fmt::print("{}\n", ComparisonJson(comparison));
   } else {
-    PrintComparison(comparison, arguments.out);
+    PrintComparison(comparison);
   }
+  if (arguments.out.empty()) return 0;
+  MakeNewFolder(arguments.out);
+  WriteComparison(comparison, arguments.out);
+  if (!arguments.as_json) PrintWritten(comparison, arguments.out);
   return 0;
 }
 

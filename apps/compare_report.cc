@@ -187,7 +187,7 @@ ordered_json GroupJson(const RunGroup& group, const GroupSummary& s) {
 
 }  // namespace
 
-void PrintComparison(const Comparison& comparison, const std::filesystem::path& written_to) {
+void PrintComparison(const Comparison& comparison) {
   const GroupedRuns& runs = comparison.runs;
   for (size_t i = 0; i < runs.groups.size(); ++i) {
     const auto task = static_cast<size_t>(runs.tasks[i]);
@@ -216,14 +216,16 @@ void PrintComparison(const Comparison& comparison, const std::filesystem::path& 
         "A policy has no seeds: its return is a mean, ± the standard deviation, over episodes. "
         "Intervals of\ndifferences to it are of the runs alone.\n");
   }
-  if (written_to.empty()) return;
+}
+
+void PrintWritten(const Comparison& comparison, const std::filesystem::path& folder) {
   std::string curves;
   for (size_t task = 0; task < NumTasks(comparison); ++task) {
     curves += fmt::format(", {0}.svg, {0}.png", CurvesName(task));
   }
   fmt::print("Written: summary.csv, runs.csv{}{} in {}\n",
              comparison.policies.empty() ? "" : ", policies.csv", curves,
-             Printable(written_to.string()));
+             Printable(folder.string()));
 }
 
 std::string ComparisonJson(const Comparison& comparison) {

@@ -7,8 +7,11 @@
 
 namespace upswing {
 
-/// Prints it as tables, and says that it was written to a folder, unless that is empty.
-void PrintComparison(const Comparison& comparison, const std::filesystem::path& written_to);
+/// Prints it as tables.
+void PrintComparison(const Comparison& comparison);
+
+/// Says what was written to a folder.
+void PrintWritten(const Comparison& comparison, const std::filesystem::path& folder);
 
 /// The same as JSON, with every run's figures. What is not reached (the time to solve of a run that
 /// never did) is null.

@@ -415,13 +415,14 @@ class CompareTest(ProgramTest):
         svg = (self.folder / "out/curves.svg").read_text(encoding="utf-8")
         self.assertIn("lqr", svg)
         self.assertNotIn("policy.safetensors", svg)  # a path would not fit
-        # Policies whose folders have the same name are told apart by their paths.
+        # Policies whose folders have the same name are told apart by the folders before them.
         os.makedirs(self.folder / "copy/run")
         shutil.copy(self.folder / "run/policy.safetensors", self.folder / "copy/run")
         self.succeed("compare", *names[:2], "copy/run/policy.safetensors", "--out", "two")
         svg = (self.folder / "two/curves.svg").read_text(encoding="utf-8")
-        for name in (names[1], "copy/run/policy.safetensors"):
-            self.assertIn(f">{name}<", svg)
+        for title in ("run", "copy/run"):
+            self.assertIn(f">{title}<", svg)
+        self.refuse(["compare", *names[:2], "./run/../run/policy.safetensors"], "given twice")
 
     def test_refuses_policies_without_runs_or_of_another_task(self):
         self.make_group("r", [1, 2])
@@ -434,7 +435,7 @@ class CompareTest(ProgramTest):
         refuse(["r", "lqr", "--made-for", "actuated_joint=2"],
                "lqr (for actuated_joint 2): was made for a motor at joint 2, and that of the "
                "runs is at joint 1")
-        refuse(["r", "lqr", "lqr"], "lqr: expected a policy once, is there twice")
+        refuse(["r", "lqr", "lqr"], "lqr: given twice; expected each policy once")
         refuse(["r", "none.safetensors"], "none.safetensors: no such file")
         refuse(["r", "acrobot/policy.safetensors"],
                "expected a policy of double-pendulum, as the runs are, got one of acrobot-v1")

@@ -60,15 +60,15 @@ void ProgressLine::Clear() {
 
 void EpisodeProgress::Show(double share) {
   const auto now = Clock::now();
-  const bool plain = !line_.terminal() && now - told_ >= std::chrono::seconds(10);
-  if (quiet_ || !(plain || line_.due())) return;
+  const bool plain = !line_.terminal() && now - last_plain_ >= std::chrono::seconds(10);
+  if (!plain && (quiet_ || !line_.due())) return;
   const double seconds = std::chrono::duration<double>(now - begin_).count();
   const double rate = share * episodes_ / seconds;
   const std::string episodes =
       Concat(rate < 10 ? fmt::format("{:.1f}", rate) : FormatCount(rate), " episodes/s");
   const std::string left = FormatDuration(seconds * (1 - share) / share) + " left";
   if (plain) {
-    told_ = now;
+    last_plain_ = now;
     SayError(fmt::format("{:.0f}%  {}  {}", 100 * share, episodes, left));
   } else {
     line_.Show(share, {episodes, left});

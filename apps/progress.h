@@ -41,7 +41,7 @@ class ProgressLine {
 /// output is no terminal, a plain line on standard error every ten seconds.
 class EpisodeProgress {
  public:
-  /// Shows nothing if `quiet`.
+  /// Shows no bar if `quiet`.
   EpisodeProgress(double episodes, bool quiet) : episodes_(episodes), quiet_(quiet) {}
 
   /// `share` of the work is done, above 0 and up to 1.
@@ -52,7 +52,8 @@ class EpisodeProgress {
   double episodes_;
   bool quiet_;
   ProgressLine line_;
-  Clock::time_point begin_ = Clock::now(), told_ = begin_;  // told: the last plain line
+  Clock::time_point begin_ = Clock::now();
+  Clock::time_point last_plain_ = begin_;
 };
 
 }  // namespace upswing

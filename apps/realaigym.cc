@@ -37,20 +37,11 @@ std::string Cell(double x, int decimals, double factor = 1) {
   return std::isfinite(x) ? fmt::format("{:.{}f}", factor * x, decimals) : "–";
 }
 
-/// The end of a long name, where a path says what it is.
-std::string Shortened(const std::string& name) {
-  constexpr size_t kMost = 22;
-  if (name.size() <= kMost) return name;
-  size_t begin = name.size() - (kMost - 1);
-  while ((name[begin] & 0xC0) == 0x80) ++begin;  // within a character of UTF-8
-  return "…" + name.substr(begin);
-}
-
 void PrintEntry(const BoardEntry& e) {
   fmt::print(
       "  {:<22} {:>6} {:>7} {:>6} {:>7} {:>7} {:>6}  {:>5} {:>5} {:>5} {:>5} {:>5} {:>5} "
       "{:>6}\n",
-      Shortened(e.name), Cell(e.seconds, 2), Cell(e.energy, 2), Cell(e.torque_cost, 2),
+      Shortened(e.name, 22), Cell(e.seconds, 2), Cell(e.energy, 2), Cell(e.torque_cost, 2),
       Cell(e.smoothness, 4), Cell(e.velocity_cost, 1), Cell(e.performance, 3),
       Cell(e.rows[0], 1, 100), Cell(e.rows[1], 1, 100), Cell(e.rows[2], 1, 100),
       Cell(e.rows[3], 1, 100), Cell(e.rows[4], 1, 100), Cell(e.rows[5], 1, 100),
@@ -72,6 +63,9 @@ void PrintReport(const BoardReport& report) {
   PrintEntry(ours);
   fmt::print("  published\n");
   for (const BoardEntry& entry : PublishedEntries(robot)) PrintEntry(entry);
+  if (!report.competitor.plant.empty()) {
+    fmt::print("  made for {}, not for the board's plant\n", report.competitor.plant);
+  }
   fmt::print("  {} simulations of 10 s in {:.2f} s; largest torque {:.2f} N·m\n", kBoardSimulations,
              report.seconds, report.nominal.max_torque);
   if (!report.nominal.above_line) {

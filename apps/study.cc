@@ -96,7 +96,8 @@ int CompareStudy(const StudyPlan& plan) {
   WriteComparison(comparison, plan.folder);
   WriteEvaluations(plan);
   Say("Every evaluation of every run: evaluations.csv\n");
-  PrintComparison(comparison, plan.folder);
+  PrintComparison(comparison);
+  PrintWritten(comparison, plan.folder);
   return 0;
 }
 

@@ -55,16 +55,17 @@ std::vector<LoadedPolicy> PoliciesOf(const ViewArguments& a) {
 std::vector<ViewEntry> EntriesOf(const ViewArguments& a,
                                  const std::vector<LoadedPolicy>& policies) {
   std::vector<ViewEntry> entries;
-  const auto add = [&](const LoadedPolicy* loaded) {
+  const auto add = [&](const LoadedPolicy* loaded, const std::string& title) {
     ViewEntry entry;
-    entry.title = loaded != nullptr ? TitleOf(*loaded) : "no policy";
+    entry.title = title;
     if (loaded != nullptr) entry.policy = loaded->policy.get();
     entry.env = TrialEnvironments(a.trial, loaded);
     entry.start = ChooseEpisode(a.episode, entry.env);
     entries.push_back(std::move(entry));
   };
-  for (const LoadedPolicy& loaded : policies) add(&loaded);
-  if (policies.empty()) add(nullptr);
+  const std::vector<std::string> titles = TitlesOf(policies);
+  for (size_t i = 0; i < policies.size(); ++i) add(&policies[i], titles[i]);
+  if (policies.empty()) add(nullptr, "no policy");
   return entries;
 }
 

@@ -54,7 +54,7 @@ typedef enum {
 } NAME_status;
 
 typedef struct {
-  float torque; /* N m, the last one; if another one acted, write that here */
+  float torque; /* N m, the last one@acted@ */
 @state@} NAME_state;
 )c";
 inline constexpr const char* kObservation = R"c(

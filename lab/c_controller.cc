@@ -24,7 +24,7 @@ constexpr int kMostDraws = 1000;       // of each
 constexpr double kTorqueShare = 5e-4;  // of the limit: tolerance of a sample's torque
 constexpr double kNearby = 1e-3;       // rad, rad/s: so near to a sample the torque does not jump
 const StateVector kRange(3.14, 3.14, 4, 4);  // ±, of a sample: rad, rad/s
-constexpr double kUprightShare = 0.005;  // of that, about upright: the torque is within its limit
+constexpr double kUprightShare = 0.005;      // of that, at most, about upright
 
 /// The settings that it was made with.
 ControllerConfig ConfigOf(const LoadedPolicy& loaded) {
@@ -60,24 +60,30 @@ double TorqueAt(const LoadedPolicy& loaded, const StateVector& x) {
   return torque;
 }
 
-/// Whether the torque jumps by so much around a state: then roundings may choose between two.
-bool Jumps(const LoadedPolicy& loaded, const StateVector& x, double torque) {
+/// Whether the torque jumps by `least` or more around a state: there roundings choose.
+bool Jumps(const LoadedPolicy& loaded, const StateVector& x, double least) {
   const double here = TorqueAt(loaded, x);
   for (int k = 0; k < 4; ++k) {
     const StateVector step = kNearby * StateVector::Unit(k);
     // 0 for any linear law, however steep.
     const double bend = TorqueAt(loaded, x - step) - 2 * here + TorqueAt(loaded, x + step);
-    if (std::abs(bend) >= torque) return true;
+    if (std::abs(bend) >= least) return true;
   }
   return false;
 }
 
-/// A state whose numbers are floats, anywhere or near upright.
-StateVector DrawState(Rng& rng, bool upright) {
+/// A state whose numbers are floats, anywhere or so near to upright that the torque is within its
+/// limit.
+StateVector DrawState(const LoadedPolicy& loaded, Rng& rng, bool upright) {
   StateVector x;
   for (int k = 0; k < 4; ++k) x[k] = rng.Uniform(-1, 1) * kRange[k];
-  if (upright) x = FromUpright(kUprightShare * x);
-  return x.cast<float>().cast<double>();
+  const auto rounded = [](const StateVector& exact) {
+    return StateVector(exact.cast<float>().cast<double>());
+  };
+  if (!upright) return rounded(x);
+  StateVector lean = kUprightShare * x;
+  while (std::abs(TorqueAt(loaded, FromUpright(lean))) >= loaded.plant.torque_limit) lean /= 2;
+  return rounded(FromUpright(lean));
 }
 
 /// States (every other one near upright) and their torques, none near a jump.
@@ -86,13 +92,13 @@ void DrawSamples(const LoadedPolicy& loaded, double tolerance, std::vector<float
   Rng rng(0, "samples of a controller's C header");
   for (int i = 0; i < kSamples; ++i) {
     const bool upright = i % 2 == 0;
-    StateVector x = DrawState(rng, upright);
+    StateVector x = DrawState(loaded, rng, upright);
     for (int draw = 1; Jumps(loaded, x, tolerance / 2); ++draw) {
       if (draw == kMostDraws) {
-        throw BadInput(Concat(loaded.name, ": found no state where its torque does not hang on a ",
-                              "rounding, by which a header could test itself"));
+        throw BadInput(Concat(loaded.name, ": found no states where the torque is smooth enough ",
+                              "for the header's self test"));
       }
-      x = DrawState(rng, upright);
+      x = DrawState(loaded, rng, upright);
     }
     for (const double number : x) states.push_back(static_cast<float>(number));
     torques.push_back(static_cast<float>(TorqueAt(loaded, x)));
@@ -270,6 +276,7 @@ std::string ControllerWriter::Declarations() const {
                 {{"period", CLiteral(static_cast<float>(kControlPeriod))},
                  {"limit", CLiteral(static_cast<float>(config_.plant.torque_limit))},
                  {"constant_bytes", Concat(header_.constant_bytes)},
+                 {"acted", ""},
                  {"state", plan_steps_ > 0 ? c_code::kPlace : ""}});
 }
 

@@ -140,7 +140,7 @@ static inline float NAME_cost_of_place(const float *d, int step, float sign)
 }
 
 /* The next place of the plan, or where it costs least to be off it, if that is less than a quarter.
- * Hanging, the plan is its own mirror image: that has to cost less by more than a rounding. */
+ * Of the mirror image the first place, hanging, is left out: it is the plan's own. */
 static inline float NAME_follow(NAME_state *state, const float *d)
 {
   const float *k;
@@ -151,9 +151,9 @@ static inline float NAME_follow(NAME_state *state, const float *d)
     now = NAME_cost_of_place(d, state->step, state->sign);
   }
   for (mirrored = 0; mirrored < 2; mirrored++) {
-    for (i = 0; i < CAPS_PLAN_STEPS; i++) {
+    for (i = mirrored; i < CAPS_PLAN_STEPS; i++) {
       const float there = NAME_cost_of_place(d, i, mirrored ? -1.0f : 1.0f);
-      if (least >= 0.0f && there >= (mirrored ? 0.9999f : 1.0f) * least) continue;
+      if (least >= 0.0f && there >= least) continue;
       least = there;
       step = i;
       sign = mirrored ? -1.0f : 1.0f;
@@ -224,7 +224,7 @@ static inline NAME_status NAME_selftest(void)
 )c";
 
 /// Of the self test, where there is a simulation. In floats its step is off by up to 5e-7 rad and
-/// rad/s in these samples, on x86-64; the rest is left to other processors' roundings.
+/// rad/s in these samples with the usual plant, and by 2e-5 with links of unlike lengths.
 inline constexpr const char* kStepTest = R"c(    {
       float d[4];
       int i;
@@ -232,7 +232,7 @@ inline constexpr const char* kStepTest = R"c(    {
       NAME_advance(d, NAME_sample_torques[sample]);
       for (i = 0; i < 4; i++) {
         d[i] -= NAME_sample_steps[4 * sample + i];
-        if (!(fabsf(d[i]) <= 1e-5f)) return CAPS_DAMAGED;
+        if (!(fabsf(d[i]) <= 1e-4f)) return CAPS_DAMAGED;
       }
     }
 )c";

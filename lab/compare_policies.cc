@@ -36,12 +36,18 @@ std::vector<EnvConfig> FinalEvaluations(const GroupedRuns& runs, int task) {
   return evaluations;
 }
 
-/// The policy, or the controller made for the plant of the episodes.
+/// The policy, or the controller made for the plant of the episodes. Throws BadInput where there is
+/// none for it.
 std::shared_ptr<const Policy> PolicyFor(const LoadedPolicy& loaded, bool make_anew,
                                         const EnvConfig& env) {
   const bool same = PlantValues(loaded.plant) == PlantValues(env.plant(0));
   if (!loaded.remade || !make_anew || same) return loaded.policy;
-  return loaded.remade(env.plant(0));
+  try {
+    return loaded.remade(env.plant(0));
+  } catch (const Error& error) {
+    throw Error(error.exit_code(),
+                Concat(error.what(), " (for the plant of the runs; --made-for names another)"));
+  }
 }
 
 /// Throws BadInput unless the motor is at the joint that the policy was made for.
@@ -54,21 +60,21 @@ void ExpectJoint(const LoadedPolicy& loaded, bool make_anew, const Plant& plant)
 
 /// A policy to judge on a task.
 struct Job {
-  size_t policy;
+  size_t index;  // of the policy
+  std::shared_ptr<const Policy> policy;
   int task;
   std::vector<EnvConfig> evaluations;
   int64_t episodes = 0;
 };
 
 /// `progress` is told how many episodes are done.
-JudgedPolicy Judge(const LoadedPolicy& loaded, const Job& job, bool make_anew, ThreadPool& pool,
+JudgedPolicy Judge(const LoadedPolicy& loaded, const Job& job, ThreadPool& pool,
                    const std::function<void(double)>& progress) {
   JudgedPolicy judged;
   judged.name = loaded.name;
   judged.task = job.task;
   judged.runs = std::ssize(job.evaluations);
   judged.spec = SpecOf(job.evaluations.front());
-  const auto policy = PolicyFor(loaded, make_anew, job.evaluations.front());
   std::vector<EvaluationEpisode> episodes;
   for (EnvConfig env : job.evaluations) {
     env.pool = &pool;
@@ -76,7 +82,7 @@ JudgedPolicy Judge(const LoadedPolicy& loaded, const Job& job, bool make_anew, T
     env.identified_from.reset();
     if (loaded.identifies()) env.identified_from = loaded.plant;
     const auto done = static_cast<double>(episodes.size());
-    const auto more = EvaluateEpisodes(*policy, *MakeEnv(env), &pool, [&](double share) {
+    const auto more = EvaluateEpisodes(*job.policy, *MakeEnv(env), &pool, [&](double share) {
       progress(done + share * env.num_envs);
     });
     episodes.insert(episodes.end(), more.begin(), more.end());
@@ -90,17 +96,18 @@ std::vector<Job> JobsOf(const std::vector<LoadedPolicy>& policies, bool make_ane
                         GroupedRuns& runs) {
   const int tasks = static_cast<int>(runs.task_texts.size());
   std::vector<Job> jobs;
-  for (size_t policy = 0; policy < policies.size(); ++policy) {
-    const LoadedPolicy& loaded = policies[policy];
+  for (size_t index = 0; index < policies.size(); ++index) {
+    const LoadedPolicy& loaded = policies[index];
     std::vector<std::string> others;  // tasks that it is not of
     for (int task = 0; task < tasks; ++task) {
-      Job job{policy, task, FinalEvaluations(runs, task)};
+      Job job{index, nullptr, task, FinalEvaluations(runs, task)};
       const EnvConfig& first = job.evaluations.front();
       if (first.task != loaded.task) {
         others.push_back(first.task);
         continue;
       }
       ExpectJoint(loaded, make_anew, first.plant(0));
+      job.policy = PolicyFor(loaded, make_anew, first);
       for (const EnvConfig& env : job.evaluations) job.episodes += env.num_envs;
       jobs.push_back(std::move(job));
     }
@@ -127,9 +134,9 @@ std::vector<JudgedPolicy> JudgePolicies(const std::vector<LoadedPolicy>& policie
   for (const Job& job : jobs) all += static_cast<double>(job.episodes);
   std::vector<JudgedPolicy> judged;
   for (const Job& job : jobs) {
-    judged.push_back(Judge(policies[job.policy], job, make_anew, pool,
+    judged.push_back(Judge(policies[job.index], job, pool,
                            [&](double done) { progress(all, (before + done) / all); }));
-    judged.back().title = titles[job.policy];
+    judged.back().title = titles[job.index];
     before += static_cast<double>(job.episodes);
   }
   return judged;

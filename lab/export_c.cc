@@ -228,6 +228,7 @@ std::string HeaderWriter::Declarations() const {
        {"memory", memory_size},
        {"multiply_adds", Concat(header_.multiply_adds)},
        {"constant_bytes", Concat(header_.constant_bytes)},
+       {"acted", memory() > 0 ? "; if another one acted, write that here" : ""},
        {"state", memory() > 0 ? c_code::kMemoryState : ""},
        {"observation", observation}});
 }

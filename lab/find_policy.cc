@@ -51,11 +51,8 @@ std::vector<LoadedPolicy> GetPolicies(const std::vector<std::string>& names,
                           ") to set, got ", names.empty() ? "none" : Join(names, ", ")));
   }
   std::vector<LoadedPolicy> policies;
-  std::set<std::string> seen;
+  std::set<std::filesystem::path> seen;  // files, and names of controllers
   for (const std::string& name : names) {
-    if (!seen.insert(name).second) {
-      throw BadInput(Concat(Printable(name), ": expected a policy once, is there twice"));
-    }
     PolicyArguments one{name, {}, {}};
     if (IsController(name)) {
       one.made_for = controllers.made_for;
@@ -63,6 +60,11 @@ std::vector<LoadedPolicy> GetPolicies(const std::vector<std::string>& names,
                            [&](const auto& flag) { return HasSection(name, SectionOf(flag)); });
     }
     policies.push_back(GetPolicy(one));
+    std::error_code none;
+    const auto file = std::filesystem::canonical(policies.back().path, none);
+    if (!seen.insert(none ? std::filesystem::path(name) : file).second) {
+      throw BadInput(Concat(Printable(name), ": given twice; expected each policy once"));
+    }
   }
   return policies;
 }

@@ -14,6 +14,13 @@ std::string FormatDuration(double seconds) {
   return fmt::format("{} h {:02} min", whole / 3600, whole / 60 % 60);
 }
 
+std::string Shortened(const std::string& text, size_t most) {
+  if (text.size() <= most) return text;
+  size_t begin = text.size() - (most - 1);
+  while ((text[begin] & 0xC0) == 0x80) ++begin;  // within a character of UTF-8
+  return "…" + text.substr(begin);
+}
+
 std::string FormatCount(double number) {
   const std::string digits = std::to_string(std::llround(number));
   std::string grouped;

@@ -9,6 +9,9 @@ namespace upswing {
 /// Seconds as people read them: `8.3 s`, `2 min 05 s`, `1 h 04 min`.
 std::string FormatDuration(double seconds);
 
+/// The end of a text of more than `most` bytes, after an ellipsis.
+std::string Shortened(const std::string& text, size_t most);
+
 /// A whole number with commas between groups of three digits: `1,250,000`.
 std::string FormatCount(double number);
 template <std::integral T>

@@ -151,7 +151,7 @@ PendulumState MapPoint::start() const {
   return {q1 * kDegree, q2 * kDegree, w1, w2};
 }
 
-std::string MapAxis::label() const { return Concat(name, " (", unit, ")"); }
+std::string MapAxis::label() const { return unit.empty() ? name : Concat(name, " (", unit, ")"); }
 
 MapAxis ParseMapAxis(const std::string& text, const MapPoint& training, const std::string& where) {
   const size_t equals = text.find('=');

@@ -159,7 +159,8 @@ Competitor GetCompetitor(const PolicyArguments& a, const std::string& robot) {
   }
   const auto own = static_cast<Robot>(static_cast<int>(loaded->plant.actuated_joint));
   ExpectRobot(loaded->name, own, ParseRobot(robot, own));
-  return {loaded->name, own, [loaded](size_t) { return ControllerOf(*loaded, kBoardBlock); }};
+  return {loaded->name, own, [loaded](size_t) { return ControllerOf(*loaded, kBoardBlock); },
+          PlantText(loaded->plant)};
 }
 
 std::vector<BoardEntry> PublishedEntries(Robot robot) {

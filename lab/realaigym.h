@@ -18,6 +18,7 @@ struct Competitor {
   std::string name;
   Robot robot = Robot::kPendubot;
   BoardControllerMaker make;
+  std::string plant = {};  // that it was made for; empty: the board's
 };
 
 /// Acts with a policy of the double pendulum in so many simulations: each 20 ms, on observations as

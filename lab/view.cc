@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "core/error.h"
 #include "core/text.h"
 #include "io/frames.h"
+#include "lab/format.h"
 
 namespace upswing {
 namespace {
@@ -202,19 +202,40 @@ int64_t Record(View& view, const RecordConfig& config, const std::function<bool(
   return frames;
 }
 
-std::string TitleOf(const LoadedPolicy& loaded) {
+namespace {
+
+/// The last `parts` of a policy's path, of a run without the file.
+std::string EndOfPath(const LoadedPolicy& loaded, int parts) {
   if (loaded.path.empty()) return loaded.name;
-  const std::string stem = loaded.path.stem(), folder = loaded.path.parent_path().filename();
-  return stem == "policy" && !folder.empty() ? folder : stem;
+  std::filesystem::path rest = loaded.path.parent_path(), end = loaded.path.stem();
+  if (end == "policy" && rest.has_filename()) {
+    end = rest.filename();
+    rest = rest.parent_path();
+  }
+  for (int part = 1; part < parts && rest.has_filename(); ++part) {
+    end = rest.filename() / end;
+    rest = rest.parent_path();
+  }
+  return end;
 }
 
+}  // namespace
+
+std::string TitleOf(const LoadedPolicy& loaded) { return EndOfPath(loaded, 1); }
+
 std::vector<std::string> TitlesOf(const std::vector<LoadedPolicy>& policies) {
-  std::map<std::string, int> count;
-  for (const LoadedPolicy& loaded : policies) ++count[TitleOf(loaded)];
+  constexpr int kMostParts = 20;
   std::vector<std::string> titles;
   for (const LoadedPolicy& loaded : policies) {
-    const std::string title = TitleOf(loaded);
-    titles.push_back(count[title] == 1 ? title : loaded.name);
+    const auto is_own = [&](int parts) {
+      return std::ranges::count(policies, EndOfPath(loaded, parts), [&](const LoadedPolicy& other) {
+               return EndOfPath(other, parts);
+             }) == 1;
+    };
+    int parts = 1;
+    while (parts < kMostParts && !is_own(parts)) ++parts;
+    constexpr size_t kLongest = 30;  // bytes
+    titles.push_back(Shortened(EndOfPath(loaded, parts), kLongest));
   }
   return titles;
 }

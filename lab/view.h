@@ -132,7 +132,8 @@ int64_t Record(View& view, const RecordConfig& config, const std::function<bool(
 
 /// A short title for a picture: of a run the folder's name, of another file its stem.
 std::string TitleOf(const LoadedPolicy& loaded);
-/// Those of several policies; in place of titles that agree, the names as they were typed.
+/// Those of several policies, with as many folders before them as tell them apart; of long ones the
+/// end.
 std::vector<std::string> TitlesOf(const std::vector<LoadedPolicy>& policies);
 
 }  // namespace upswing

@@ -3,11 +3,15 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <memory>
 #include <numbers>
+#include <vector>
 
 #include "core/csv.h"
 #include "core/thread_pool.h"
@@ -39,17 +43,21 @@ std::vector<double> Refined(const std::vector<double>& rows) {
 /// A quantity over time as the entry keeps it: cubics fitted to pieces of its samples, one by one.
 class Cubics {
  public:
+  /// Of whole pieces.
   explicit Cubics(const std::vector<double>& samples) {
+    EXPECT_EQ(samples.size() % kPiece, 0);
     Eigen::Matrix<double, kPiece, 4> powers;
     for (int i = 0; i < kPiece; ++i) powers.row(i) = Powers(i);
     const Eigen::ColPivHouseholderQR<decltype(powers)> qr(powers);
-    for (size_t first = 0; first < samples.size(); first += kPiece) {
+    for (size_t first = 0; first + kPiece <= samples.size(); first += kPiece) {
       pieces_.push_back(qr.solve(Eigen::Map<const Eigen::Vector<double, kPiece>>(&samples[first])));
     }
   }
 
+  size_t samples() const { return kPiece * pieces_.size(); }
+
   double At(double t) const {
-    const double i = std::min(t / kSpacing, static_cast<double>(kPiece * pieces_.size() - 1));
+    const double i = std::min(t / kSpacing, static_cast<double>(samples() - 1));
     const auto piece = static_cast<size_t>(i / kPiece + 1e-9);
     return Powers(i - static_cast<double>(kPiece * piece)) * pieces_[piece];
   }
@@ -65,14 +73,14 @@ class Cubics {
 
 /// q̈ of the board's plant, rad/s².
 Eigen::Vector2d Acceleration(const Eigen::Vector4d& x, double torque) {
-  static BoardBlock block;
+  BoardBlock block;
   block.SetState(0, {x[0], x[1], x[2], x[3]});
   block.tau1[0] = torque;
   const auto a = Accelerations(block);
   return {a[0][0], a[1][0]};
 }
 
-/// The swing-up that the entry follows: two angles, two velocities, the torque.
+/// The swing-up that the entry follows: two angles (rad), two velocities (rad/s), the torque (N·m).
 std::vector<Cubics> ReadTrajectory() {
   const auto path =
       std::filesystem::path(__FILE__).parent_path() / "testdata/pendubot_tvlqr_trajectory.csv";
@@ -86,18 +94,21 @@ std::vector<Cubics> ReadTrajectory() {
   return trajectory;
 }
 
-Eigen::Vector4d StateAt(const std::vector<Cubics>& channels, double t) {
+Eigen::Vector4d FirstFourAt(const std::vector<Cubics>& channels, double t) {
   return {channels[0].At(t), channels[1].At(t), channels[2].At(t), channels[3].At(t)};
 }
 
 /// TVLQR, an entry of the pendubot's boards: follows a swing-up with a time-varying regulator, and
-/// once near to upright holds it with another for good.
+/// once near to upright holds it with another for good. Its numbers are those of
+/// leaderboard/pendubot/simulation_v2/con_ilqr_tvlqr_lqr.py in the repository that the trajectory's
+/// file names, and of the classes that it uses (tvlqr_controller.py, pcw_polynomial.py).
 class PublishedTvlqr : public BoardController {
  public:
   /// What it computes beforehand, once.
   struct Plan {
     Plan();
-    std::vector<Cubics> trajectory, K;  // five, and the gain of each of four
+    std::vector<Cubics> trajectory;  // of ReadTrajectory
+    std::vector<Cubics> K;           // (4), N·m/rad and N·m·s/rad
     BoardRegulator upright;
   };
 
@@ -105,7 +116,7 @@ class PublishedTvlqr : public BoardController {
 
   void Act(int step, const BoardMeasurement& m, size_t count, Lanes& torque) override {
     const double t = step * kBoardTimestep;
-    const Eigen::Vector4d then = StateAt(plan_.trajectory, t), K = StateAt(plan_.K, t);
+    const Eigen::Vector4d then = FirstFourAt(plan_.trajectory, t), K = FirstFourAt(plan_.K, t);
     const double u = plan_.trajectory[4].At(t);
     for (size_t lane = 0; lane < count; ++lane) {
       const Eigen::Vector4d x(m.q1[lane], m.q2[lane], m.w1[lane], m.w2[lane]);
@@ -139,11 +150,11 @@ PublishedTvlqr::Plan::Plan()
   const Eigen::Matrix4d Q = Eigen::Vector4d(0.64, 0.56, 0.13, 0.037).asDiagonal();
   constexpr double kR = 0.82;
   std::array<std::vector<double>, 4> gains;
-  for (auto& each : gains) each.resize(6000);  // the last is 0
+  for (auto& each : gains) each.resize(trajectory.front().samples());  // the last is 0
   Eigen::Matrix4d P = upright.P;
   for (size_t i = gains[0].size() - 1; i-- > 0;) {
     const double t = static_cast<double>(i) * kSpacing;
-    const Eigen::Vector4d x = StateAt(trajectory, t);
+    const Eigen::Vector4d x = FirstFourAt(trajectory, t);
     const double u = trajectory[4].At(t);
     // Euler's step of the linear model about here.
     Eigen::Matrix4d A = Eigen::Matrix4d::Identity();
@@ -184,7 +195,7 @@ TEST(RealAiGymPublished, TvlqrHasItsPublishedScores) {
   const Robustness judged =
       JudgeRobustness(cases, SimulateOnBoard(Robot::kPendubot, episodes, make, &pool));
   const auto& [model, velocity, torque, response, delay, pushes] = judged.rows;
-  // Where nothing is drawn, but for a cell of the model at an edge.
+  // Where nothing is drawn; one cell of the model is at an edge that roundings can move.
   EXPECT_NEAR(model, 132.0 / 210, 1.1 / 210);
   EXPECT_EQ(response, 1);
   EXPECT_NEAR(delay, 9.0 / 21, 1e-12);

@@ -169,7 +169,7 @@ TEST_F(FigureTest, ACaptionTakesAsManyLinesAsItNeedsAndATitleIsCut) {
   EXPECT_NE(svg.find("policy.safetensors"), std::string::npos);
 }
 
-TEST_F(FigureTest, ALineIsDashedFromWhereItSays) {
+TEST_F(FigureTest, ALineIsDottedFromWhereItSays) {
   Figure figure;
   figure.panels.resize(1);
   figure.panels[0].lines = {{"", {0, 1, 2, 3, 4}, {0, 1, 2, 3, 4}, {}, {}}};

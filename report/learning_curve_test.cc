@@ -44,7 +44,7 @@ TEST(LearningCurve, TheGridBeginsWhereAllRunsHaveBeenEvaluated) {
   EXPECT_EQ(CurveGrid(group, Seconds, 1.5), std::vector<double>{1.5});
 }
 
-TEST(LearningCurve, CurvesAreDashedFromWhereARunHasEndedOverStepsAndOverTime) {
+TEST(LearningCurve, CurvesAreDottedFromWhereARunHasEndedOverStepsAndOverTime) {
   const RunGroup a{"a", {MadeRun(1, {{0, 0}, {0, 1}}), MadeRun(2, {{0, 0}, {0, 1}})}};
   const RunGroup b{"b", {MadeRun(1, {{0, 0}, {0, 1}, {0, 2}})}};
   const Figure even = LearningCurves({a}), uneven = LearningCurves({a, b});
