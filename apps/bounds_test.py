@@ -25,7 +25,11 @@ class Bounds(ProgramTest):
         judged = json.loads(self.succeed("eval", "tvlqr", "--episodes", 4, "--json"))
         self.assertEqual(rows["tvlqr"]["return"], judged["return"])
         self.succeed("eval", "tvlqr", "--episodes", 4, "--episodes-csv", "eval.csv")
-        read = lambda name: list(csv.DictReader((self.folder / name).open(encoding="utf-8")))
+
+        def read(name):
+            with open(self.folder / name, encoding="utf-8", newline="") as file:
+                return list(csv.DictReader(file))
+
         self.assertEqual([row["q1"] for row in read("bounds.csv")], [row["q1"] for row in read("eval.csv")])
         for row in read("bounds.csv"):
             self.assertGreaterEqual(float(row["return"]), float(row["return_table"]))

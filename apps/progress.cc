@@ -65,7 +65,7 @@ void EpisodeProgress::Show(double share) {
   const double seconds = std::chrono::duration<double>(now - begin_).count();
   const double rate = share * episodes_ / seconds;
   const std::string episodes =
-      Concat(rate < 10 ? fmt::format("{:.1f}", rate) : FormatCount(rate), " episodes/s");
+      Concat(rate < 10 ? fmt::format("{:.2g}", rate) : FormatCount(rate), " episodes/s");
   const std::string left = FormatDuration(seconds * (1 - share) / share) + " left";
   if (plain) {
     last_plain_ = now;

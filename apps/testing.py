@@ -64,10 +64,13 @@ def small(**changes):
 
 
 def run(*arguments, cwd=None, **more):
-    """Runs the program to its end; text comes back in stdout and stderr."""
-    return subprocess.run([UPSWING, *map(str, arguments)], cwd=cwd, check=False,
+    """Runs the program to its end; text comes back in stdout and stderr, there without the lines
+    that long work writes every ten seconds."""
+    done = subprocess.run([UPSWING, *map(str, arguments)], cwd=cwd, check=False,
                           stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                           stderr=subprocess.PIPE, encoding="utf-8", **more)
+    done.stderr = re.sub(r"(?m)^upswing: \d+%  \S+ episodes/s  .+ left\n", "", done.stderr)
+    return done
 
 
 def probe(policy, what, numbers):
