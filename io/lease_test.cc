@@ -131,6 +131,7 @@ TEST(Lease, OneOfManyThatFindItLostGetsIt) {
     Age(path, 1000);
     std::vector<std::optional<Lease>> leases(4);
     std::vector<std::thread> threads;
+    threads.reserve(leases.size());
     std::atomic<int> ready{0};
     for (auto& lease : leases) {
       threads.emplace_back([&] {
