@@ -69,9 +69,9 @@ class RealAIGym(ProgramTest):
     def test_the_policy_of_the_documentation(self):
         found = json.loads(self.succeed("realaigym", ROOT / "docs/realaigym-pendubot.safetensors",
                                         "--json"))
-        self.assertAlmostEqual(found["performance"]["score"], 0.694, delta=0.002)
+        self.assertAlmostEqual(found["performance"]["score"], 0.7001, delta=0.001)
         # Cells at an edge depend on rounding.
-        self.assertAlmostEqual(found["robustness"]["score"], 0.945, delta=0.02)
+        self.assertAlmostEqual(found["robustness"]["score"], 0.943, delta=0.02)
 
         found = json.loads(self.succeed("realaigym", ROOT / "docs/realaigym-acrobot.safetensors",
                                         "--json"))

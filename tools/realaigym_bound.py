@@ -53,7 +53,7 @@ class Problem:
         costs = ca.MX.sym("costs", 4)  # energy, torque cost, smoothness, velocity cost
         goal = ca.MX.sym("goal", 2)
         angle = x[joint - 1, :]
-        energy = ca.sum2(ca.sqrt(((angle[1:] - angle[:-1]) * u) ** 2 + 1e-8))
+        energy = ca.sum2(ca.sqrt(((angle[1:] - angle[:-1]) * u) ** 2 + 1e-11))
         change = ca.horzcat(u[1:] - u[:-1], -u[n - 1])
         # A change in 4 ms is two of half of it in 2 ms.
         variance = ca.sum2(change**2) / 2 / RULE_STEPS - (u[0] / RULE_STEPS) ** 2
