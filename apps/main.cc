@@ -122,7 +122,8 @@ int Main(int argc, char** argv) {
 }  // namespace
 }  // namespace upswing
 
-int main(int argc, char** argv) {
+// What is thrown while an exception is reported ends us.
+int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape)
   upswing::ListenToSignals();
   upswing::OpenStandardFiles();
   // A write that cannot be done fails where it is made, with a message, instead of ending us.

@@ -166,7 +166,7 @@ std::vector<BestEpisodeSearch::Found> BestEpisodeSearch::From(const StateVector&
   const LqrConfig lqr;
   const QuadraticCost cost(lqr.Q(), lqr.torque, upright_.lqr().P);
   std::vector<Eigen::RowVector4d> feedback;
-  for (const Eigen::RowVector4d& K : gains_) feedback.push_back(-K);
+  for (const Eigen::RowVector4d& K : gains_) feedback.emplace_back(-K);
   std::vector<Found> best(tables.size());
   for (const double sign : {1.0, -1.0}) {
     Trajectory planned = from_hanging_;

@@ -80,12 +80,12 @@ TEST(Making, WhatAnotherHostMakesIsLeftAloneForAnHour) {
   for (const fs::path& path : {folder, file}) {
     fs::last_write_time(path, fs::file_time_type::clock::now() - std::chrono::minutes(55));
   }
-  Making(temp / "a", Kind::kFile);
+  { const Making another(temp / "a", Kind::kFile); }
   EXPECT_EQ(CountIn(temp.path()), 2);
   for (const fs::path& path : {folder, file}) {
     fs::last_write_time(path, fs::file_time_type::clock::now() - std::chrono::minutes(65));
   }
-  Making(temp / "a", Kind::kFile);
+  { const Making another(temp / "a", Kind::kFile); }
   EXPECT_EQ(CountIn(temp.path()), 0);
 }
 
@@ -124,7 +124,7 @@ TEST(Making, WhereNothingCanBeMadeIsBadInput) {
   fs::create_symlink("loop", temp / "loop");
   for (const char* path : {"file/a", "none/a", "loop/a"}) {
     try {
-      Making(temp / path, Kind::kFile);
+      const Making making(temp / path, Kind::kFile);
       FAIL() << path;
     } catch (const Error& error) {
       EXPECT_EQ(error.exit_code(), 2) << error.what();

@@ -37,6 +37,7 @@ ControllerConfig ConfigOf(const LoadedPolicy& loaded) {
 
 std::vector<float> Floats(const auto& numbers) {
   std::vector<float> floats;
+  floats.reserve(static_cast<size_t>(numbers.size()));
   for (const double number : numbers) floats.push_back(static_cast<float>(number));
   return floats;
 }

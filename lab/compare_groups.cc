@@ -150,6 +150,7 @@ void NoteTimes(const std::vector<FoundRun>& runs, std::vector<std::string>& note
   };
   if (threads.size() > 1) {
     std::vector<std::string> counts;
+    counts.reserve(threads.size());
     for (const auto& [count, of_runs] : threads) {
       counts.push_back(fmt::format("{} ({} run{})", count, of_runs, of_runs == 1 ? "" : "s"));
     }
