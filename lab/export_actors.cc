@@ -16,7 +16,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr int D = kObservationSize;
+constexpr int kSize = kObservationSize;
 constexpr int kCases = 12;
 constexpr int kPieces = 10;  // of the range of torques
 
@@ -80,7 +80,7 @@ std::vector<double> Probabilities(ActorOutput output, std::span<const float> out
 
 ordered_json CaseJson(const ActorPolicy& policy, std::vector<float>& obs) {
   const auto memory = policy.Start(1);
-  const Matrix<const float> row(obs.data(), 1, D);
+  const Matrix<const float> row(obs.data(), 1, kSize);
   std::vector<float> outputs(static_cast<size_t>(policy.num_outputs()));
   double torque = 0, low = 0, high = 0;
   policy.Outputs(row, {outputs.data(), 1, policy.num_outputs()}, *memory);
@@ -107,17 +107,17 @@ ordered_json ActorVectors() {
     int critic_inputs;
   };
   const std::array<Kind, 4> kinds{
-      {{ActorOutput::kSquashedGaussian, {D, {12, 10}, true, Activation::kRelu}, D + 1},
-       {ActorOutput::kSquashedGaussian, {D, {8}, false, Activation::kTanh}, 0},
-       {ActorOutput::kClippedGaussian, {D, {10, 8}, false, Activation::kTanh}, D},
-       {ActorOutput::kCategorical, {D, {12}, true, Activation::kRelu}, D}}};
+      {{ActorOutput::kSquashedGaussian, {kSize, {12, 10}, true, Activation::kRelu}, kSize + 1},
+       {ActorOutput::kSquashedGaussian, {kSize, {8}, false, Activation::kTanh}, 0},
+       {ActorOutput::kClippedGaussian, {kSize, {10, 8}, false, Activation::kTanh}, kSize},
+       {ActorOutput::kCategorical, {kSize, {12}, true, Activation::kRelu}, kSize}}};
   ordered_json actors;
   Rng rng(0, "test vectors: actors");
   for (const Kind& kind : kinds) {
     const ActorPolicy policy = DrawPolicy(kind.output, kind.actor, kind.critic_inputs, rng);
     ordered_json cases;
     for (int i = 0; i < kCases; ++i) {
-      std::vector<float> obs(D);
+      std::vector<float> obs(kSize);
       for (float& x : obs) x = static_cast<float>(rng.Uniform(-2, 2));
       cases.push_back(CaseJson(policy, obs));
     }

@@ -216,6 +216,7 @@ BoardReport ScoreOnBoard(const Competitor& competitor, uint64_t seed, ThreadPool
       SimulateOnBoard(competitor.robot, nominal, competitor.make, nullptr, &report.trace).front();
   const std::vector<RobustnessCase> cases = RobustnessCases(seed);
   std::vector<BoardEpisode> episodes;
+  episodes.reserve(cases.size());
   for (const RobustnessCase& each : cases) episodes.push_back(each.episode);
   std::mutex mutex;
   size_t done = 0;

@@ -117,7 +117,7 @@ std::string PlantChangesText(Plant plant, const LoadedPolicy& loaded) {
 
 fs::path FigureFolder(const std::string& out, const LoadedPolicy& loaded, const std::string& name) {
   if (out.empty()) return DefaultOut(loaded, name);
-  const fs::path folder = out;
+  fs::path folder = out;
   for (const char* extension : {".svg", ".png", ".csv"}) {
     if (folder.extension() == extension) {
       throw BadInput(

@@ -105,13 +105,13 @@ TEST(BoardPlant, FrictionIsThatOfTheFormula) {
     block.SetPlant(0, p);
     block.SetState(0, s);
     const auto [a1, a2] = Accelerations(block);
-    const double gear = 6, Ir = p.rotor_inertia, c2 = std::cos(q2);
+    const double gear = 6, J = p.rotor_inertia, c2 = std::cos(q2);
     const double h = p.mass2 * p.length1 * p.center2;
     Eigen::Matrix2d M;
     M(0, 0) = p.inertia1 + p.inertia2 + p.mass2 * p.length1 * p.length1 + 2 * h * c2 +
-              (gear * gear + 1) * Ir;
-    M(0, 1) = M(1, 0) = p.inertia2 + h * c2 - gear * Ir;
-    M(1, 1) = p.inertia2 + gear * gear * Ir;
+              (gear * gear + 1) * J;
+    M(0, 1) = M(1, 0) = p.inertia2 + h * c2 - gear * J;
+    M(1, 1) = p.inertia2 + gear * gear * J;
     const double g2 = 9.81 * p.mass2 * p.center2 * std::sin(q1 + q2);
     const double g1 = 9.81 * (p.mass1 * p.center1 + p.mass2 * p.length1) * std::sin(q1) + g2;
     const Eigen::Vector2d f(

@@ -50,7 +50,8 @@ class Cubics {
     for (int i = 0; i < kPiece; ++i) powers.row(i) = Powers(i);
     const Eigen::ColPivHouseholderQR<decltype(powers)> qr(powers);
     for (size_t first = 0; first + kPiece <= samples.size(); first += kPiece) {
-      pieces_.push_back(qr.solve(Eigen::Map<const Eigen::Vector<double, kPiece>>(&samples[first])));
+      pieces_.emplace_back(
+          qr.solve(Eigen::Map<const Eigen::Vector<double, kPiece>>(&samples[first])));
     }
   }
 
@@ -190,6 +191,7 @@ TEST(RealAiGymPublished, TvlqrHasItsPublishedScores) {
 
   const std::vector<RobustnessCase> cases = RobustnessCases(1);
   std::vector<BoardEpisode> episodes;
+  episodes.reserve(cases.size());
   for (const RobustnessCase& each : cases) episodes.push_back(each.episode);
   ThreadPool pool(2);
   const Robustness judged =

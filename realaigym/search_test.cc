@@ -27,6 +27,7 @@ TEST(Snes, FindsTheBottomOfABowl) {
       ASSERT_NEAR(candidates[0][i] + candidates[1][i], 2 * snes.mean()[i], 1e-12);  // mirrored
     }
     std::vector<double> fitness;
+    fitness.reserve(candidates.size());
     for (const auto& candidate : candidates) fitness.push_back(-cost(candidate));
     snes.Tell(fitness);
   }
@@ -85,6 +86,7 @@ TEST(SwingNet, PoliciesSideBySideActAsEachAlone) {
       const auto outcomes = SimulateOnBoard(
           net.robot(), episodes, [&](size_t) { return net.Control(numbers, lanes_each); }, nullptr);
       std::vector<double> costs;
+      costs.reserve(outcomes.size());
       for (const BoardOutcome& outcome : outcomes) costs.push_back(outcome.velocity_cost);
       return costs;
     };

@@ -14,6 +14,7 @@ constexpr int kMostDelay = 32;  // steps, more than the longest of the rules
 static_assert(kBoardLevels - 1 < kMostDelay);
 constexpr int kHeldSteps = 1000;  // the last 2 s
 constexpr int kNoted = 8;         // steps from one look at the nearness to the next
+constexpr int kHeldLooks = kHeldSteps / kNoted;
 
 /// std::remainder, but fast.
 double Wrapped(double angle) {
@@ -142,7 +143,7 @@ class Run {
       const double e1 = Wrapped(block_.q1[lane] - std::numbers::pi), e2 = Wrapped(block_.q2[lane]);
       const double w1 = block_.w1[lane], w2 = block_.w2[lane];
       sums_.nearest[lane] = std::max(sums_.nearest[lane], Nearness(e1, e2, w1, w2, 5));
-      if (holds) sums_.held[lane] += Nearness(e1, e2, w1, w2, 1) / (kHeldSteps / kNoted);
+      if (holds) sums_.held[lane] += Nearness(e1, e2, w1, w2, 1) / kHeldLooks;
     }
   }
 

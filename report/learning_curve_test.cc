@@ -86,6 +86,7 @@ TEST(LearningCurve, TheFigureSaysHowManyRunsAndWhatTheBandIs) {
 
 TEST(LearningCurve, NoPanelHasMoreThanFiveCurves) {
   std::vector<RunGroup> groups;
+  groups.reserve(11);
   for (int i = 0; i < 11; ++i) {
     groups.push_back({std::to_string(i), {MadeRun(1, {{0, 0.0 + i}, {1, 10}})}});
   }

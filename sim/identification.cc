@@ -40,18 +40,18 @@ double Get(std::span<const double> P, int i, int j) { return P[i <= j ? At(i, j)
 /// Takes in an equation h·x = y of the relative constants x with covariance P: a Kalman filter's
 /// update.
 void Correct(const Row& h, double y, std::span<double> x, std::span<double> P) {
-  Row Ph{};
+  Row PH{};
   double innovation = y, spread = 0;
   for (int i = 0; i < kConstants; ++i) {
-    for (int j = 0; j < kConstants; ++j) Ph[i] += Get(P, i, j) * h[j];
+    for (int j = 0; j < kConstants; ++j) PH[i] += Get(P, i, j) * h[j];
     innovation -= h[i] * x[i];
-    spread += h[i] * Ph[i];
+    spread += h[i] * PH[i];
   }
   const double surprise = kSurprise * innovation;
   const double S = spread + kNoise * kNoise + surprise * surprise;
   for (int i = 0; i < kConstants; ++i) {
-    x[i] += Ph[i] / S * innovation;
-    for (int j = i; j < kConstants; ++j) P[At(i, j)] -= Ph[i] * Ph[j] / S;
+    x[i] += PH[i] / S * innovation;
+    for (int j = i; j < kConstants; ++j) P[At(i, j)] -= PH[i] * PH[j] / S;
   }
 }
 
