@@ -2,7 +2,6 @@
 
 #include <filesystem>
 #include <memory>
-#include <optional>
 
 #include "apps/commands.h"
 #include "apps/compare_report.h"
@@ -72,15 +71,11 @@ int RunCompare(const CompareArguments& arguments) {
   Comparison comparison = Compare(request);
   if (!policies.empty()) {
     ThreadPool pool(ResolveThreads(arguments.threads));
-    std::optional<EpisodeProgress> progress;
+    EpisodeProgress progress(arguments.as_json);
     const bool make_anew = arguments.controllers.made_for.empty();
     AddPolicies(
         policies, make_anew, pool,
-        [&](double episodes, double share) {
-          if (!progress) progress.emplace(episodes, arguments.as_json);
-          progress->Show(share);
-        },
-        comparison);
+        [&](double episodes, double share) { progress.Show(episodes, share); }, comparison);
   }
   if (arguments.as_json) {
     fmt::print("{}\n", ComparisonJson(comparison));

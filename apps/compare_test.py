@@ -3,7 +3,6 @@
 
 import csv
 import json
-import os
 import re
 import shutil
 import statistics
@@ -416,7 +415,7 @@ class CompareTest(ProgramTest):
         self.assertIn("lqr", svg)
         self.assertNotIn("policy.safetensors", svg)  # a path would not fit
         # Policies whose folders have the same name are told apart by the folders before them.
-        os.makedirs(self.folder / "copy/run")
+        (self.folder / "copy/run").mkdir(parents=True)
         shutil.copy(self.folder / "run/policy.safetensors", self.folder / "copy/run")
         self.succeed("compare", *names[:2], "copy/run/policy.safetensors", "--out", "two")
         svg = (self.folder / "two/curves.svg").read_text(encoding="utf-8")

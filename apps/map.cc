@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <memory>
-#include <optional>
 
 #include "apps/commands.h"
 #include "apps/map_table.h"
@@ -30,16 +29,9 @@ struct MapCommand : MapArguments {
 
 /// Fills a planned map, with a progress line.
 void FillShown(const MapCommand& a, const LoadedPolicy& loaded, ThreadPool& pool, MapResult& map) {
-  std::optional<EpisodeProgress> line;
-  double shown = 0;  // episodes that the line is of
+  EpisodeProgress line(a.as_json);
   FillMap(
-      a, loaded, pool,
-      [&](double episodes, double share) {
-        if (episodes != shown) line.emplace(episodes, a.as_json);
-        shown = episodes;
-        line->Show(share);
-      },
-      map);
+      a, loaded, pool, [&](double episodes, double share) { line.Show(episodes, share); }, map);
 }
 
 /// Maps of several policies, side by side.

@@ -58,6 +58,14 @@ void ProgressLine::Clear() {
   last_ = {};
 }
 
+void EpisodeProgress::Show(double episodes, double share) {
+  if (episodes != episodes_) {
+    episodes_ = episodes;
+    begin_ = last_plain_ = Clock::now();
+  }
+  Show(share);
+}
+
 void EpisodeProgress::Show(double share) {
   const auto now = Clock::now();
   const bool plain = !line_.terminal() && now - last_plain_ >= std::chrono::seconds(10);

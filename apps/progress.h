@@ -43,9 +43,13 @@ class EpisodeProgress {
  public:
   /// Shows no bar if `quiet`.
   EpisodeProgress(double episodes, bool quiet) : episodes_(episodes), quiet_(quiet) {}
+  /// Of work that says how much it is as it goes.
+  explicit EpisodeProgress(bool quiet) : EpisodeProgress(0, quiet) {}
 
   /// `share` of the work is done, above 0 and up to 1.
   void Show(double share);
+  /// The same of so many episodes; with another number of them it begins anew.
+  void Show(double episodes, double share);
 
  private:
   using Clock = std::chrono::steady_clock;
