@@ -60,9 +60,10 @@ void ProgressLine::Clear() {
 
 void EpisodeProgress::Show(double episodes, double share) {
   if (episodes != episodes_) {
+    begin_ = told_;
     episodes_ = episodes;
-    begin_ = last_plain_ = Clock::now();
   }
+  told_ = Clock::now();
   Show(share);
 }
 

@@ -48,7 +48,8 @@ class EpisodeProgress {
 
   /// `share` of the work is done, above 0 and up to 1.
   void Show(double share);
-  /// The same of so many episodes; with another number of them it begins anew.
+  /// The same of so many episodes. Another number of them is other work, which began when the last
+  /// one was told of.
   void Show(double episodes, double share);
 
  private:
@@ -57,6 +58,7 @@ class EpisodeProgress {
   bool quiet_;
   ProgressLine line_;
   Clock::time_point begin_ = Clock::now();
+  Clock::time_point told_ = begin_;
   Clock::time_point last_plain_ = begin_;
 };
 
