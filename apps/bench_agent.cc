@@ -7,13 +7,13 @@
 #include "apps/bench.h"
 #include "core/rng.h"
 #include "core/thread_pool.h"
-#include "lab/config.h"
-#include "lab/training.h"
 #include "mujoco/engines.h"
 #include "nn/q_policy.h"
 #include "rl/dqn.h"
 #include "rl/replay.h"
 #include "rl/torque_levels.h"
+#include "run/training.h"
+#include "setup/config.h"
 
 namespace upswing {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "core/sample.h"
 #include "core/text.h"
-#include "lab/format.h"
+#include "setup/format.h"
 
 namespace upswing {
 namespace {

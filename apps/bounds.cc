@@ -1,4 +1,4 @@
-#include "lab/bounds.h"
+#include "judge/bounds.h"
 
 #include <fmt/format.h>
 
@@ -12,8 +12,8 @@
 #include "core/text.h"
 #include "io/machine.h"
 #include "io/streams.h"
-#include "lab/arguments.h"
-#include "lab/controllers.h"
+#include "setup/arguments.h"
+#include "setup/controllers.h"
 
 namespace upswing {
 namespace {

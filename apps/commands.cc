@@ -3,8 +3,8 @@
 #include <array>
 
 #include "core/text.h"
-#include "lab/arguments.h"
-#include "lab/controllers.h"
+#include "setup/arguments.h"
+#include "setup/controllers.h"
 
 namespace upswing {
 namespace {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "lab/config.h"
-#include "lab/loaded_policy.h"
+#include "setup/config.h"
+#include "setup/loaded_policy.h"
 
 namespace upswing {
 

@@ -11,8 +11,8 @@
 #include "core/thread_pool.h"
 #include "io/file.h"
 #include "io/machine.h"
-#include "lab/controllers.h"
 #include "report/figure.h"
+#include "setup/controllers.h"
 
 namespace upswing {
 namespace {

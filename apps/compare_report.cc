@@ -8,8 +8,8 @@
 #include "apps/eval_table.h"
 #include "core/json.h"
 #include "core/text.h"
-#include "lab/format.h"
-#include "lab/seeds.h"
+#include "setup/format.h"
+#include "study/seeds.h"
 
 namespace upswing {
 namespace {

@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <string>
 
-#include "lab/compare.h"
+#include "judge/compare.h"
 
 namespace upswing {
 

@@ -11,10 +11,10 @@
 #include "core/thread_pool.h"
 #include "io/machine.h"
 #include "io/streams.h"
-#include "lab/arguments.h"
-#include "lab/config.h"
-#include "lab/loaded_policy.h"
 #include "rl/evaluate.h"
+#include "setup/arguments.h"
+#include "setup/config.h"
+#include "setup/loaded_policy.h"
 
 namespace upswing {
 namespace {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "lab/eval_report.h"
+#include "judge/eval_report.h"
 
 namespace upswing {
 

@@ -1,4 +1,4 @@
-#include "lab/export.h"
+#include "export/export.h"
 
 #include <fmt/format.h>
 
@@ -12,8 +12,8 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "io/streams.h"
-#include "lab/controllers.h"
-#include "lab/format.h"
+#include "setup/controllers.h"
+#include "setup/format.h"
 
 namespace upswing {
 namespace {

@@ -9,9 +9,9 @@
 #include "apps/say.h"
 #include "core/sample.h"
 #include "core/text.h"
-#include "lab/config_checks.h"
-#include "lab/format.h"
-#include "lab/seeds.h"
+#include "setup/config_checks.h"
+#include "setup/format.h"
+#include "study/seeds.h"
 
 namespace upswing {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "apps/progress.h"
 #include "apps/signals.h"
-#include "lab/many_runs.h"
+#include "study/many_runs.h"
 
 namespace upswing {
 

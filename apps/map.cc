@@ -10,10 +10,10 @@
 #include "core/thread_pool.h"
 #include "io/file.h"
 #include "io/machine.h"
-#include "lab/controllers.h"
-#include "lab/loaded_policy.h"
-#include "lab/map_command.h"
-#include "lab/view.h"
+#include "judge/map_command.h"
+#include "setup/controllers.h"
+#include "setup/loaded_policy.h"
+#include "view/view.h"
 
 namespace upswing {
 namespace {

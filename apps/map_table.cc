@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "core/text.h"
-#include "lab/config.h"
-#include "lab/format.h"
+#include "setup/config.h"
+#include "setup/format.h"
 
 namespace upswing {
 namespace {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "lab/map_result.h"
+#include "judge/map_result.h"
 
 namespace upswing {
 

@@ -7,12 +7,12 @@
 #include "apps/trial_options.h"
 #include "core/text.h"
 #include "io/file.h"
-#include "lab/config.h"
-#include "lab/loaded_policy.h"
-#include "lab/model_info.h"
-#include "lab/plot_figures.h"
-#include "lab/rollout.h"
+#include "judge/plot_figures.h"
+#include "judge/rollout.h"
 #include "report/figure.h"
+#include "run/model_info.h"
+#include "setup/config.h"
+#include "setup/loaded_policy.h"
 
 namespace upswing {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "apps/say.h"
 #include "core/text.h"
-#include "lab/format.h"
+#include "setup/format.h"
 
 namespace upswing {
 namespace {

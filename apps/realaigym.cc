@@ -1,5 +1,3 @@
-#include "lab/realaigym.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -18,8 +16,9 @@
 #include "io/machine.h"
 #include "io/streams.h"
 #include "io/tensor_file.h"
-#include "lab/format.h"
+#include "realaigym/boards.h"
 #include "report/figure.h"
+#include "setup/format.h"
 
 namespace upswing {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <string_view>
 
-#include "lab/training_run.h"
+#include "run/training_run.h"
 
 namespace upswing {
 

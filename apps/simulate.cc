@@ -9,8 +9,8 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "io/streams.h"
-#include "lab/loaded_policy.h"
-#include "lab/rollout.h"
+#include "judge/rollout.h"
+#include "setup/loaded_policy.h"
 
 namespace upswing {
 namespace {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "apps/many_runs_view.h"
-#include "lab/slurm.h"
+#include "study/slurm.h"
 
 namespace upswing {
 

@@ -11,12 +11,12 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "io/file.h"
-#include "lab/config_checks.h"
-#include "lab/many_runs.h"
-#include "lab/seeds.h"
-#include "lab/study_file.h"
-#include "lab/study_worker.h"
 #include "report/figure.h"
+#include "setup/config_checks.h"
+#include "study/many_runs.h"
+#include "study/seeds.h"
+#include "study/study_file.h"
+#include "study/study_worker.h"
 
 namespace upswing {
 namespace {

@@ -14,8 +14,8 @@
 #include "core/text.h"
 #include "io/file.h"
 #include "io/lease.h"
-#include "lab/format.h"
-#include "lab/study_worker.h"
+#include "setup/format.h"
+#include "study/study_worker.h"
 
 namespace upswing {
 namespace {

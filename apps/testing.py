@@ -74,9 +74,9 @@ def run(*arguments, cwd=None, **more):
 
 
 def probe(policy, what, numbers):
-    """What the library's policy makes of rows of observations or states (lab/policy_probe.cc), as one
+    """What the library's policy makes of rows of observations or states (export/policy_probe.cc), as one
     array of doubles."""
-    done = subprocess.run([UPSWING.parent.parent / "lab/policy_probe", policy, what], check=False,
+    done = subprocess.run([UPSWING.parent.parent / "policy_probe", policy, what], check=False,
                           input=array("d", numbers).tobytes(), stdout=subprocess.PIPE,
                           stderr=subprocess.PIPE)
     assert done.returncode == 0, done.stderr

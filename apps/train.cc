@@ -13,11 +13,11 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "io/streams.h"
-#include "lab/config.h"
-#include "lab/config_checks.h"
-#include "lab/many_runs.h"
-#include "lab/seeds.h"
-#include "lab/training_run.h"
+#include "run/training_run.h"
+#include "setup/config.h"
+#include "setup/config_checks.h"
+#include "study/many_runs.h"
+#include "study/seeds.h"
 
 namespace upswing {
 namespace {

@@ -9,10 +9,10 @@
 #include "apps/signals.h"
 #include "core/text.h"
 #include "io/run_folder.h"
-#include "lab/config_checks.h"
-#include "lab/format.h"
-#include "lab/model_info.h"
 #include "mujoco/engines.h"
+#include "run/model_info.h"
+#include "setup/config_checks.h"
+#include "setup/format.h"
 
 namespace upswing {
 

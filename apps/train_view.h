@@ -3,7 +3,7 @@
 #include <filesystem>
 
 #include "apps/progress.h"
-#include "lab/training_run.h"
+#include "run/training_run.h"
 
 namespace upswing {
 

@@ -3,7 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
-#include "lab/trial.h"
+#include "judge/trial.h"
 
 /// The flags with which `eval`, `simulate` and `plot` try a policy out.
 namespace upswing {

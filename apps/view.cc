@@ -1,4 +1,4 @@
-#include "lab/view.h"
+#include "view/view.h"
 
 #include <fmt/format.h>
 
@@ -13,10 +13,10 @@
 #include "core/text.h"
 #include "io/frames.h"
 #include "io/streams.h"
-#include "lab/controllers.h"
+#include "setup/controllers.h"
 
 #ifdef UPSWING_VIEWER
-#include "lab/view_window.h"
+#include "view/view_window.h"
 #endif
 
 namespace upswing {

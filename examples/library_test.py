@@ -116,7 +116,7 @@ class Library(unittest.TestCase):
         cmake = ("find_package(upswing REQUIRED)\n"
                  "add_library(portable OBJECT portable.cc)\nadd_library(all_of_them OBJECT all.cc)\n"
                  "target_link_libraries(portable PRIVATE upswing::control upswing::rl)\n"
-                 "target_link_libraries(all_of_them PRIVATE upswing::lab upswing::control)\n")
+                 "target_link_libraries(all_of_them PRIVATE upswing::judge upswing::control)\n")
         for name, layers in sources.items():
             headers = [path.relative_to(include) for layer in layers
                        for path in sorted((include / layer).glob("*.h"), reverse=True)]

@@ -7,10 +7,10 @@
 #include "core/error.h"
 #include "fuzz/tiny_training.h"
 #include "io/tensor_file.h"
-#include "lab/loaded_policy.h"
 #include "nn/actor_policy.h"
 #include "nn/q_policy.h"
 #include "realaigym/swing_policy.h"
+#include "setup/loaded_policy.h"
 
 namespace upswing {
 namespace {

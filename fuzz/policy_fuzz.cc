@@ -7,11 +7,11 @@
 
 #include "core/safetensors.h"
 #include "core/text.h"
+#include "export/export.h"
 #include "fuzz/target.h"
-#include "lab/export.h"
-#include "lab/loaded_policy.h"
-#include "lab/train_command.h"
 #include "realaigym/swing_policy.h"
+#include "run/train_command.h"
+#include "setup/loaded_policy.h"
 
 namespace upswing {
 namespace {

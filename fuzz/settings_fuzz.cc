@@ -1,6 +1,6 @@
 // A configuration file, as `train --config` reads it and a run folder holds it.
 #include "fuzz/target.h"
-#include "lab/config.h"
+#include "setup/config.h"
 
 namespace upswing {
 

@@ -1,6 +1,6 @@
 // A study file.
 #include "fuzz/target.h"
-#include "lab/study_file.h"
+#include "study/study_file.h"
 
 namespace upswing {
 

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "lab/config.h"
-#include "lab/training.h"
+#include "run/training.h"
+#include "setup/config.h"
 
 namespace upswing {
 

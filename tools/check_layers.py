@@ -10,7 +10,8 @@ import re
 import sys
 from pathlib import Path
 
-LIBRARIES = {"core", "nn", "sim", "rl", "control", "io", "mujoco", "realaigym", "report"}
+BELOW_SETUP = {"core", "nn", "sim", "rl", "control", "io", "mujoco"}
+LIBRARIES = BELOW_SETUP | {"report", "setup", "realaigym", "run", "study", "judge", "export", "view"}
 
 # What each folder may include besides itself.
 LAYERS = {
@@ -19,16 +20,21 @@ LAYERS = {
     "sim": {"core"},
     "rl": {"nn", "core"},
     "control": {"sim", "core"},
-    "realaigym": {"sim", "core"},
     "io": {"core"},
     "mujoco": {"sim", "io", "core"},
     "report": {"io", "core"},
-    "lab": LIBRARIES,
-    "apps": LIBRARIES | {"lab"},
-    "python": LIBRARIES | {"lab"},
-    "web": LIBRARIES | {"lab"},
-    "fuzz": LIBRARIES | {"lab"},
-    "examples": LIBRARIES | {"lab"},
+    "setup": BELOW_SETUP,
+    "realaigym": BELOW_SETUP | {"setup", "report"},
+    "run": BELOW_SETUP | {"setup"},
+    "study": BELOW_SETUP | {"setup", "run"},
+    "judge": BELOW_SETUP | {"setup", "run", "study", "report"},
+    "export": BELOW_SETUP | {"setup", "run", "report"},
+    "view": BELOW_SETUP | {"setup", "run", "judge"},
+    "apps": LIBRARIES,
+    "python": LIBRARIES,
+    "web": LIBRARIES,
+    "fuzz": LIBRARIES,
+    "examples": LIBRARIES,
 }
 
 # The files that may include each foreign library.

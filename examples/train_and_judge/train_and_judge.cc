@@ -2,10 +2,10 @@
 #include <cstdio>
 
 #include "core/error.h"
-#include "lab/config.h"
-#include "lab/task.h"
-#include "lab/training.h"
 #include "mujoco/engines.h"
+#include "run/training.h"
+#include "setup/config.h"
+#include "setup/task.h"
 
 using namespace upswing;
 

@@ -8,7 +8,7 @@
 
 #include "core/env.h"
 #include "core/thread_pool.h"
-#include "lab/config.h"
+#include "setup/config.h"
 #include "sim/seeded_env.h"
 
 namespace upswing {

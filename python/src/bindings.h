@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "lab/loaded_policy.h"
+#include "setup/loaded_policy.h"
 
 /// What the parts of the extension module share. The package's Python (python/upswing) wraps these
 /// classes and functions; nobody else calls them.

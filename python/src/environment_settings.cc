@@ -6,7 +6,7 @@
 
 #include "core/error.h"
 #include "core/text.h"
-#include "lab/config_checks.h"
+#include "setup/config_checks.h"
 
 namespace upswing {
 

@@ -2,8 +2,8 @@
 
 #include <vector>
 
-#include "lab/config.h"
-#include "lab/trial.h"
+#include "judge/trial.h"
+#include "setup/config.h"
 
 namespace upswing {
 

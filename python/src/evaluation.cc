@@ -8,11 +8,11 @@
 #include "core/text.h"
 #include "io/file.h"
 #include "io/machine.h"
-#include "lab/arguments.h"
-#include "lab/eval_report.h"
-#include "lab/map_command.h"
+#include "judge/eval_report.h"
+#include "judge/map_command.h"
 #include "python/src/bindings.h"
 #include "python/src/environment_settings.h"
+#include "setup/arguments.h"
 
 namespace upswing {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <nanobind/nanobind.h>
 
-#include "lab/loaded_policy.h"
+#include "setup/loaded_policy.h"
 
 namespace upswing {
 

@@ -14,10 +14,10 @@
 #include "core/safetensors.h"
 #include "core/text.h"
 #include "io/tensor_file.h"
-#include "lab/config.h"
-#include "lab/controllers.h"
 #include "python/src/bindings.h"
 #include "python/src/function_policy.h"
+#include "setup/config.h"
+#include "setup/controllers.h"
 
 namespace upswing {
 namespace {

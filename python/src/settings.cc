@@ -8,11 +8,11 @@
 #include <cmath>
 
 #include "core/text.h"
-#include "lab/config.h"
-#include "lab/config_checks.h"
-#include "lab/trial.h"
+#include "judge/trial.h"
 #include "python/src/bindings.h"
 #include "python/src/environment_settings.h"
+#include "setup/config.h"
+#include "setup/config_checks.h"
 
 namespace upswing {
 namespace {

@@ -12,10 +12,10 @@
 #include "core/safetensors.h"
 #include "io/machine.h"
 #include "io/run_folder.h"
-#include "lab/config_checks.h"
-#include "lab/run_rows.h"
-#include "lab/training_run.h"
 #include "python/src/bindings.h"
+#include "run/run_rows.h"
+#include "run/training_run.h"
+#include "setup/config_checks.h"
 
 namespace upswing {
 namespace {

@@ -6,12 +6,12 @@
 #include <numeric>
 
 #include "core/safetensors.h"
-#include "lab/controllers.h"
-#include "lab/loaded_policy.h"
 #include "nn/actor_policy.h"
 #include "nn/gaussian.h"
 #include "nn/q_policy.h"
 #include "rl/softmax.h"
+#include "setup/controllers.h"
+#include "setup/loaded_policy.h"
 #include "sim/identification.h"
 #include "web/wasm/learner.h"
 
@@ -181,7 +181,8 @@ UPSWING_EXPORT(policy_open) Controller* PolicyOpen(const std::byte* file, size_t
   });
 }
 
-/// The controller of this name (lab/controllers.h), made for the nominal plant. Leaves what it is.
+/// The controller of this name (setup/controllers.h), made for the nominal plant. Leaves what it
+/// is.
 UPSWING_EXPORT(policy_make) Controller* PolicyMake(const char* name, size_t size) {
   return Guarded([&] {
     const std::string called(name, size);

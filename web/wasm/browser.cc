@@ -1,13 +1,13 @@
-// What lab asks of io and mujoco, in a browser: there are no files, memory has a limit of its own,
-// and MuJoCo is another module, which this one does not know. Whatever needs them is refused.
+// What setup asks of io and mujoco, in a browser: there are no files, memory has a limit of its
+// own, and MuJoCo is another module, which this one does not know. Whatever needs them is refused.
 #include "core/error.h"
 #include "core/text.h"
 #include "io/file.h"
 #include "io/machine.h"
 #include "io/streams.h"
-#include "lab/loaded_policy.h"
 #include "mujoco/engines.h"
 #include "mujoco/model.h"
+#include "setup/loaded_policy.h"
 
 namespace upswing {
 namespace {

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Compiles core, nn, sim, rl, control and what a training needs of lab to WebAssembly, for the page.
+"""Compiles core, nn, sim, rl, control and what a training needs of setup and run to WebAssembly, for the page.
 
     build.py [MODULE]     writes MODULE, by default core.wasm beside this file
     build.py --versions   of what its bytes depend on, besides our sources
@@ -42,8 +42,9 @@ LAYERS = ["core", "nn", "sim", "rl", "control"]
 # Where the time of a training goes is made fast, everything else small.
 FAST = ["nn/linear", "nn/product", "sim/closed_form", "control/trajectory", "control/pendulum_model", "rl/replay", "rl/sum_tree", "rl/n_step",
         "rl/sac_update"]
-LAB = ["config", "config_checks", "config_layers", "controllers", "format", "loaded_policy", "task",
-       "toml_settings", "training"]
+SETUP = ["setup/config.cc", "setup/config_checks.cc", "setup/config_layers.cc", "setup/controllers.cc",
+         "setup/format.cc", "setup/loaded_policy.cc", "setup/task.cc", "setup/toml_settings.cc",
+         "run/training.cc"]
 
 # Of LLVM's libraries, what the module asks for.
 CXXABI = ["abort_message", "cxa_aux_runtime", "cxa_default_handlers", "cxa_exception",
@@ -66,7 +67,7 @@ def include(*folders):
 def own_sources():
     sources = [path for layer in LAYERS for path in sorted((ROOT / layer).glob("*.cc"))
                if not path.stem.endswith(("_test", "_bench")) and path.name != "thread_pool.cc"]
-    sources += [ROOT / f"lab/{name}.cc" for name in LAB]
+    sources += [ROOT / name for name in SETUP]
     return sources + sorted(HERE.glob("*.cc"))
 
 
@@ -74,7 +75,7 @@ def named_agents():
     """What CMake makes of configs/*.toml."""
     entries = "".join(f'    {{"{path.stem}", R"toml({path.read_text(encoding="utf-8")})toml"}},\n'
                       for path in sorted((ROOT / "configs").glob("*.toml")))
-    template = (ROOT / "lab/named_agents.cc.in").read_text(encoding="utf-8")
+    template = (ROOT / "setup/named_agents.cc.in").read_text(encoding="utf-8")
     return template.replace("@AGENT_ENTRIES@", entries)
 
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "lab/training.h"
+#include "run/training.h"
 
 namespace upswing {
 

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "setup/loaded_policy.h"
+
+/// What `export` writes for programs in other languages.
+namespace upswing {
+
+/// The task's formulas as numbers, by which a reader in another language tests its own: a JSON
+/// document of plants, states and what follows from them, the same with every call.
+std::string TestVectorsJson();
+
+/// Copies policies (files or run folders) into a page's folder of agents as ID.safetensors and
+/// adds them to its agents.json, or replaces those of the same ID there. `id` names a single one;
+/// empty: by its run's folder, else by its agent. With `checkpoints` (0: without) as many policies
+/// along the way of each, from the untrained one to itself. Everything is read and checked before
+/// anything is written. Returns the names of the files. Throws BadInput; Failure if the folder
+/// cannot be written.
+std::vector<std::string> ExportToPage(const std::vector<std::filesystem::path>& paths,
+                                      const std::string& id, int64_t checkpoints,
+                                      const std::filesystem::path& folder);
+
+/// A policy as it was on the way to another one, as a file.
+struct Checkpoint {
+  int64_t step = 0;
+  std::vector<std::byte> bytes;
+};
+
+/// Trains a policy that was learned again, with the settings in its file, and returns it as it was
+/// at `count` - 1 steps before: untrained, and at evaluations that lie evenly on the way to it. The
+/// parameters are rounded to bfloat16, so that a file has half the size. Throws BadInput if it is
+/// no Q-network, if there are fewer evaluations, or if the training has another end, as on a
+/// processor with other vector instructions.
+std::vector<Checkpoint> CheckpointsOf(const LoadedPolicy& loaded, int64_t count);
+
+/// A learned policy as a file in ONNX's format: `observation` (batch × D) in; `torque` and, by
+/// kind, `q_values`, `mean` and `log_std`, `probabilities`, `value` out; what they mean as metadata
+/// (docs/export.md). Throws BadInput if it is none that was learned.
+std::string OnnxModelOf(const LoadedPolicy& loaded);
+
+/// A learned policy, or a controller whose law is small, as a C99 header without dependencies
+/// (docs/export.md).
+struct CHeader {
+  std::string prefix;  // with which all of its names begin
+  std::string text;
+  size_t constant_bytes = 0;  // of flash
+  size_t state_bytes = 0;     // of RAM, between calls
+  size_t stack_bytes = 0;     // of RAM, in a call: its arrays
+  size_t multiply_adds = 0;   // of a call, in the network's layers; 0 of a controller
+};
+
+/// `prefix`: small letters, digits and _, a letter first; see CPrefixOf. Throws BadInput if it is
+/// something else, or if the policy is neither.
+CHeader CHeaderOf(const LoadedPolicy& loaded, const std::string& prefix);
+
+/// A prefix for the header of this name, such as "my_policy" for my-policy.h; of standard output
+/// (-) from the policy's agent.
+std::string CPrefixOf(const std::string& file, const LoadedPolicy& loaded);
+
+}  // namespace upswing

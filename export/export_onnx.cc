@@ -1,0 +1,184 @@
+#include <nlohmann/json.hpp>
+
+#include "core/text.h"
+#include "export/export.h"
+#include "export/exported_policy.h"
+#include "io/onnx.h"
+#include "nn/gaussian.h"
+
+namespace upswing {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr const char* kInput = "observation";
+constexpr const char* kTorque = "torque";
+
+/// Adds y = activation(norm(W x + b)) of some rows of the layer; returns the name of y, `name`.
+std::string AddLayer(OnnxModel& model, const PlainLayer& layer, const std::string& x,
+                     const std::string& name, RowRange rows) {
+  const auto first = static_cast<size_t>(rows.first), count = static_cast<size_t>(rows.count);
+  const auto in = static_cast<size_t>(layer.in);
+  const auto vector = [&](const char* what, const std::vector<float>& values) {
+    return model.AddConstant(name + what, std::span(values).subspan(first, count), {rows.count});
+  };
+  const std::string weight =
+      model.AddConstant(name + ".weight", std::span(layer.weight).subspan(first * in, count * in),
+                        {rows.count, layer.in});
+  const bool active = layer.activation != Activation::kNone;
+  std::string y = model.AddNode(active || layer.layer_norm() ? name + ".linear" : name, "Gemm",
+                                {x, weight, vector(".bias", layer.bias)}, {{"transB", int64_t{1}}});
+  if (layer.layer_norm()) {
+    y = model.AddNode(
+        active ? name + ".norm" : name, "LayerNormalization",
+        {y, vector(".norm.weight", layer.gain), vector(".norm.bias", layer.norm_bias)},
+        {{"axis", int64_t{-1}}, {"epsilon", kLayerNormEpsilon}});
+  }
+  if (!active) return y;
+  return model.AddNode(name, layer.activation == Activation::kTanh ? "Tanh" : "Relu", {y});
+}
+
+/// Adds layers one after the other; returns the name of what the last one makes: `last`, or, if
+/// that is empty, that of the layer.
+std::string AddLayers(OnnxModel& model, const std::vector<PlainLayer>& layers, std::string x,
+                      const std::string& last = "") {
+  for (const PlainLayer& layer : layers) {
+    const bool is_last = &layer == &layers.back() && !last.empty();
+    x = AddLayer(model, layer, x, is_last ? last : layer.name, {0, layer.out});
+  }
+  return x;
+}
+
+/// Adds the output `torque`: that of the largest preference.
+void AddChoice(OnnxModel& model, const ExportedPolicy& policy, const std::string& preferences) {
+  const std::vector<float> torques(policy.torques.begin(), policy.torques.end());
+  const std::string table =
+      model.AddConstant("torques", torques, {static_cast<int64_t>(torques.size())});
+  const std::string index = model.AddNode("choice", "ArgMax", {preferences},
+                                          {{"axis", int64_t{1}}, {"keepdims", int64_t{1}}});
+  model.AddNode(kTorque, "Gather", {table, index}, {{"axis", int64_t{0}}});
+}
+
+void AddQNetwork(OnnxModel& model, const ExportedPolicy& policy) {
+  const PlainNetwork& network = policy.network;
+  const std::string features = AddLayers(model, network.features, kInput);
+  const auto count = static_cast<int>(policy.torques.size());
+  model.AddOutput("q_values", count, "Q-value of each torque of the metadata `torques`");
+  if (network.value.empty()) {
+    AddChoice(model, policy, AddLayers(model, network.outputs, features, "q_values"));
+    return;
+  }
+  // Q = V + A - mean(A) (Wang et al., 2016, Eq 9); the argmax is that of A.
+  const std::string advantages = AddLayers(model, network.outputs, features);
+  const std::string value = AddLayers(model, network.value, features);
+  const std::string mean =
+      model.AddNode("advantage.mean", "ReduceMean", {advantages},
+                    {{"axes", std::vector<int64_t>{1}}, {"keepdims", int64_t{1}}});
+  const std::string above = model.AddNode("advantage.above_mean", "Sub", {advantages, mean});
+  model.AddNode("q_values", "Add", {above, value});
+  AddChoice(model, policy, advantages);
+}
+
+/// Adds the distribution's outputs and the torque; returns the name of the action in units of its
+/// limit, which a critic may take.
+std::string AddActor(OnnxModel& model, const ExportedPolicy& policy) {
+  const std::string features = AddLayers(model, policy.network.features, kInput);
+  const PlainLayer& last = policy.network.outputs.back();
+  const auto limit = static_cast<float>(policy.action_limit);
+  if (policy.is_discrete()) {
+    model.AddOutput("probabilities", last.out,
+                    "with which it drew each torque of the metadata `torques` as it learned");
+    const std::string logits = AddLayers(model, policy.network.outputs, features, "logits");
+    model.AddNode("probabilities", "Softmax", {logits}, {{"axis", int64_t{1}}});
+    AddChoice(model, policy, logits);
+    if (!policy.critic_takes_action()) return "";
+    const std::string whole = model.AddConstant("limit", {&limit, 1}, {1});
+    return model.AddNode("action", "Div", {kTorque, whole});
+  }
+  const bool squashed = policy.kind == PolicyOutputKind::kSquashedGaussian;
+  const char* bound = squashed ? "tanh(mean)" : "the mean, cut off at -1 and 1";
+  model.AddOutput("mean", 1,
+                  Concat("of the unbounded action; the torque is the limit times ", bound));
+  model.AddOutput("log_std", 1, "logarithm of its standard deviation as it learned");
+  AddLayer(model, last, features, "mean", {0, 1});
+  const std::string raw = AddLayer(model, last, features, "log_std.raw", {1, 1});
+  const auto low = static_cast<float>(kLogStdLow), high = static_cast<float>(kLogStdHigh);
+  const auto scalar = [&](const char* name, const float& value) {
+    return model.AddConstant(name, {&value, 1}, {});
+  };
+  model.AddNode("log_std", "Clip", {raw, scalar("log_std.low", low), scalar("log_std.high", high)});
+  const float minus_one = -1, one = 1;
+  const std::string action =
+      squashed
+          ? model.AddNode("action", "Tanh", {"mean"})
+          : model.AddNode("action", "Clip",
+                          {"mean", scalar("action.low", minus_one), scalar("action.high", one)});
+  model.AddNode(kTorque, "Mul", {action, model.AddConstant("limit", {&limit, 1}, {1})});
+  return action;
+}
+
+void AddCritic(OnnxModel& model, const ExportedPolicy& policy, const std::string& action) {
+  model.AddOutput("value", 1, "estimated sum of gamma^k reward_scale reward from here on");
+  std::string input = kInput;
+  if (policy.critic_takes_action()) {
+    input = model.AddNode("critic.input", "Concat", {kInput, action}, {{"axis", int64_t{1}}});
+  }
+  const std::string features = AddLayers(model, policy.critic.features, input);
+  AddLayers(model, policy.critic.outputs, features, "value");
+}
+
+void AddMetadata(OnnxModel& model, const ExportedPolicy& policy) {
+  const LoadedPolicy& loaded = *policy.loaded;
+  const PolicyInfo& info = loaded.policy->info();
+  const auto add = [&](const char* key, const ordered_json& value) {
+    model.AddMetadata(key, value.is_string() ? value.get<std::string>() : value.dump());
+  };
+  const auto add_known = [&](const char* key, const auto& value) {
+    if (value) add(key, *value);
+  };
+  ordered_json observation;
+  for (const auto& [name, meaning] : policy.observation) {
+    observation.push_back({{"name", name}, {"meaning", meaning}});
+  }
+  add("task", loaded.task);
+  add("policy", loaded.policy->description());
+  add("observation", observation);
+  add("control_period", policy.spec.step_seconds);
+  add("torque_limit", policy.limit);
+  if (policy.is_discrete()) add("torques", policy.torques);
+  if (loaded.task == kDoublePendulum) {
+    ordered_json plant;
+    for (const auto& [name, value] : PlantValues(loaded.plant)) plant[name] = value;
+    add("plant", plant);
+    add("memory_steps", loaded.memory());
+  }
+  add_known("gamma", info.gamma);
+  add_known("reward_scale", info.reward_scale);
+  if (!info.agent.empty()) add("agent", info.agent);
+  add_known("seed", info.seed);
+  add_known("step", info.step);
+  add_known("success_rate", info.success_rate);
+  add_known("mean_return", info.mean_return);
+  add("upswing_version", info.upswing_version.empty() ? UPSWING_VERSION : info.upswing_version);
+}
+
+}  // namespace
+
+std::string OnnxModelOf(const LoadedPolicy& loaded) {
+  const ExportedPolicy policy = TakeApart(loaded);
+  OnnxModel model("policy", UPSWING_VERSION,
+                  Concat("Upswing, ", loaded.task, ": ", loaded.policy->description()));
+  model.AddInput(kInput, policy.obs_size(),
+                 "as the task's environment gives it; order and units: metadata `observation`");
+  if (policy.kind == PolicyOutputKind::kLevels) {
+    AddQNetwork(model, policy);
+  } else {
+    const std::string action = AddActor(model, policy);
+    if (policy.has_critic()) AddCritic(model, policy, action);
+  }
+  model.AddOutput(kTorque, 1, "N m, to hold for the metadata `control_period`, s");
+  AddMetadata(model, policy);
+  return model.Bytes();
+}
+
+}  // namespace upswing

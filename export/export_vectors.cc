@@ -1,0 +1,196 @@
+#include <array>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "core/rng.h"
+#include "export/export.h"
+#include "export/export_actors.h"
+#include "setup/config.h"
+#include "sim/disturbance.h"
+#include "sim/double_pendulum.h"
+#include "sim/pendulum_env.h"
+#include "sim/randomization.h"
+
+namespace upswing {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr double kPi = std::numbers::pi;
+constexpr int kStatesOfAKind = 16;
+
+ordered_json PlantJson(const Plant& plant) {
+  ordered_json j;
+  for (const auto& [name, value] : PlantValues(plant)) j[name] = value;
+  return j;
+}
+
+ordered_json StateJson(const PendulumState& s) { return {s.q1, s.q2, s.w1, s.w2}; }
+
+/// The nominal plant, or one with each of its numbers within 50% of that.
+Plant DrawPlant(bool nominal, Rng& rng) {
+  Randomization half;
+  half.plant.fill(0.5);
+  return nominal ? Plant() : half.Draw(Plant(), rng);
+}
+
+PendulumState NearHanging(int /*i*/, Rng& rng) {
+  return {0.1 * rng.Normal(), 0.1 * rng.Normal(), 0.1 * rng.Normal(), 0.1 * rng.Normal()};
+}
+
+PendulumState NearUpright(int i, Rng& rng) {
+  PendulumState s = NearHanging(i, rng);
+  s.q1 += rng.Below(2) == 0 ? kPi : -kPi;
+  return s;
+}
+
+/// One link half a degree inside or outside of the 30° that count as inverted, to the left or to
+/// the right, the other upright.
+PendulumState AtTheEdge(int i, Rng& rng) {
+  const double degrees = (i % 2 == 0 ? 29.5 : 30.5) * (i / 2 % 2 == 0 ? 1 : -1);
+  const double lean = degrees * kPi / 180;
+  const bool first = i / 4 % 2 == 0;
+  return {first ? kPi + lean : kPi, first ? -lean : lean, rng.Normal(), rng.Normal()};
+}
+
+/// Angles of more than a turn too, and velocities beyond those that the observation divides by.
+PendulumState Anywhere(int /*i*/, Rng& rng) {
+  return {rng.Uniform(-3 * kPi, 3 * kPi), rng.Uniform(-3 * kPi, 3 * kPi), rng.Uniform(-20, 20),
+          rng.Uniform(-20, 20)};
+}
+
+ordered_json CaseJson(const Plant& plant, const PendulumState& s, double torque) {
+  std::array<double, kRewardTerms> terms = RewardTerms(plant, s, torque);
+  for (double& term : terms) term += 0.0;  // no -0
+  return {{"plant", PlantJson(plant)},
+          {"state", StateJson(s)},
+          {"torque", torque},
+          {"observation", Observe(plant, s)},
+          {"energy", Energy(plant, s)},
+          {"energy_target", EnergyTarget(plant)},
+          {"normalized_energy", NormalizedEnergy(plant, s)},
+          {"tip_height", TipHeight(plant, s)},
+          {"inverted", Inverted(s)},
+          {"reward_terms", terms}};
+}
+
+ordered_json Cases() {
+  ordered_json cases;
+  Rng rng(0, "test vectors");
+  for (const auto draw : {NearHanging, NearUpright, AtTheEdge, Anywhere}) {
+    for (int i = 0; i < kStatesOfAKind; ++i) {
+      const Plant plant = DrawPlant(i % 4 == 0, rng);
+      const PendulumState s = draw(i, rng);
+      cases.push_back(CaseJson(plant, s, rng.Uniform(-plant.torque_limit, plant.torque_limit)));
+    }
+  }
+  return cases;
+}
+
+ordered_json Capsules() {
+  ordered_json capsules;
+  Rng rng(0, "test vectors: capsules");
+  for (int i = 0; i < 8; ++i) {
+    const Plant plant = DrawPlant(i == 0, rng);
+    const CapsuleInertia inertia(plant.mass1, kCapsuleRadius, plant.length1);
+    capsules.push_back({{"mass", plant.mass1},
+                        {"radius", kCapsuleRadius},
+                        {"length", plant.length1},
+                        {"across", inertia.across},
+                        {"along", inertia.along}});
+  }
+  return capsules;
+}
+
+ordered_json Models() {
+  ordered_json models;
+  Rng rng(0, "test vectors: models");
+  for (const bool nominal : {true, false}) {
+    const Plant plant = DrawPlant(nominal, rng);
+    models.push_back({{"plant", PlantJson(plant)}, {"mjcf", Mjcf(plant)}});
+  }
+  return models;
+}
+
+/// N·m, one for each control step.
+std::vector<double> DrawTorques(int steps, const std::string& stream) {
+  Rng rng(0, stream);
+  std::vector<double> torques(static_cast<size_t>(steps));
+  for (double& torque : torques) torque = 1.25 * (static_cast<double>(rng.Below(9)) - 4);
+  return torques;
+}
+
+/// What an agent sees from a start on: (steps + 1) observations.
+ordered_json Observations(int memory, const PendulumState& start,
+                          const std::vector<double>& torques) {
+  PendulumEnvConfig config;
+  config.memory = memory;
+  PendulumEnv env(config);
+  env.SetState(0, start);
+  StepResult result = env.MakeResult();
+  ordered_json observations;
+  const auto add = [&] {
+    const auto row = env.obs().row(0);
+    observations.push_back(std::vector<float>(row.begin(), row.end()));
+  };
+  add();
+  for (const double torque : torques) {
+    env.Step({&torque, 1}, result);
+    add();
+  }
+  return observations;
+}
+
+ordered_json ObservationMemory() {
+  const PendulumState start{0.3, -0.2, 1.5, -0.7};
+  const std::vector<double> torques = DrawTorques(8, "test vectors: memory");
+  ordered_json j{{"plant", PlantJson(Plant())}, {"start", StateJson(start)}, {"torques", torques}};
+  j["observations"] = Observations(0, start, torques);
+  for (const int memory : {2, 4}) {
+    j["with_memory"].push_back(
+        {{"memory", memory}, {"observations", Observations(memory, start, torques)}});
+  }
+  return j;
+}
+
+ordered_json Delays() {
+  ordered_json delays;
+  const std::vector<double> chosen = DrawTorques(12, "test vectors: delay");
+  for (const double delay : {0.0, 0.02, 0.05, 0.1}) {
+    const Disturbance disturbance(0, delay);
+    Disturber disturber({disturbance}, 1, disturbance.delay_steps(), 0, "");
+    disturber.Begin(0);
+    std::vector<double> applied;
+    for (size_t i = 0; i < chosen.size(); ++i) {
+      const auto step = static_cast<int64_t>(i);
+      applied.push_back(disturber.Apply({&chosen[i], 1}, {&step, 1}).front());
+    }
+    delays.push_back({{"delay", delay},
+                      {"steps", disturbance.delay_steps()},
+                      {"chosen", chosen},
+                      {"applied", applied}});
+  }
+  return delays;
+}
+
+}  // namespace
+
+std::string TestVectorsJson() {
+  ordered_json j;
+  j["upswing_version"] = UPSWING_VERSION;
+  j["constants"] = {
+      {"control_period", kControlPeriod},   {"physics_timestep", kPhysicsTimestep},
+      {"physics_steps", kPhysicsSteps},     {"armature", kArmature},
+      {"capsule_radius", kCapsuleRadius},   {"max_velocity", {kMaxVelocity1, kMaxVelocity2}},
+      {"memory_velocity", kMemoryVelocity}, {"memory_torque", kMemoryTorque},
+      {"reward_terms", kRewardTermNames}};
+  j["cases"] = Cases();
+  j["capsules"] = Capsules();
+  j["models"] = Models();
+  j["observation_memory"] = ObservationMemory();
+  j["delays"] = Delays();
+  j["actors"] = ActorVectors();
+  return j.dump(1) + '\n';
+}
+
+}  // namespace upswing

@@ -1,0 +1,105 @@
+#include "judge/bounds.h"
+
+#include <algorithm>
+#include <memory>
+#include <mutex>
+
+#include "control/best_episode.h"
+#include "core/error.h"
+#include "core/text.h"
+#include "rl/torque_levels.h"
+#include "setup/format.h"
+
+namespace upswing {
+namespace {
+
+double SwingUpSeconds(const EvaluationEpisode& e, const EvaluationRule& rule) {
+  return e.swing_up_seconds.value_or(rule.seconds);
+}
+
+}  // namespace
+
+void BoundsConfig::Describe(Options& o) {
+  o.Add(&episodes, "episodes", 100, {1, 100000}, "", "how many of those of eval");
+  o.Add(&torques, "torques", 9, {3, 101}, "", "size of the table of torques");
+  o.Add(&guesses, "guesses", 24, {1, 10000}, "",
+        "swing-ups from hanging that the search begins with");
+}
+
+void CheckComparable(const LoadedPolicy& loaded, const BoundsConfig& config) {
+  if (loaded.task != kDoublePendulum || !loaded.mjcf.empty()) {
+    throw BadInput(
+        Concat("bounds: expected policies of the built-in double pendulum, got ", loaded.name));
+  }
+  const Plant searched = TrialEnvironments(config.trial, nullptr).plants.front();
+  const Plant judged = TrialEnvironments(config.trial, &loaded).plants.front();
+  if (PlantValues(searched) == PlantValues(judged)) return;
+  throw BadInput(Concat("bounds: expected a policy for ", PlantText(searched), ", got ",
+                        loaded.name, " for ", PlantText(judged), "; --set chooses the plant"));
+}
+
+EpisodeBounds FindBounds(const BoundsConfig& config, ThreadPool& pool,
+                         const std::function<void(double)>& progress) {
+  const EnvConfig env = TrialEnvironments(config.trial, nullptr);
+  const Plant& plant = env.plants.front();
+  const EvaluationRule rule = SpecOf(env).evaluation;
+  const auto n = static_cast<size_t>(config.episodes);
+
+  const std::vector<TorqueTable> tables{{}, TorqueLevels(plant.torque_limit, config.torques)};
+  // An episode takes about as long as a guess.
+  const double work = static_cast<double>(config.guesses + config.episodes);
+  double done = 0;
+  std::mutex mutex;
+  const auto show = [&] {
+    const std::lock_guard lock(mutex);
+    if (progress) progress(++done / work);
+  };
+  const BestEpisodeSearch search(plant, static_cast<int>(config.guesses), show);
+
+  const BestEpisodes none{std::vector<EvaluationEpisode>(n), std::vector<EvaluationEpisode>(n)};
+  EpisodeBounds bounds{rule, std::vector<std::vector<double>>(n), none, none};
+  pool.ParallelFor(static_cast<int>(n), [&](int index) {
+    const auto i = static_cast<size_t>(index);
+    std::vector<double>& start = bounds.starts[i];
+    start.resize(4);
+    OneEpisode(env, index)->GetState(0, start);
+    BestEpisodeSearch own = search;  // its buffers are not for two threads
+    const auto found = own.From(StateVector(start.data()), tables);
+    for (size_t k = 0; k < tables.size(); ++k) {
+      const auto judged = [&](const BestEpisode& episode) {
+        return EvaluateEpisodes(EpisodePolicy(episode, own, tables[k]), *OneEpisode(env, index))
+            .front();
+      };
+      BestEpisodes& best = k == 0 ? bounds.any : bounds.table;
+      best.of_return[i] = judged(found[k].of_return);
+      best.of_time[i] = judged(found[k].of_time);
+    }
+    // Torques of the table are torques.
+    EvaluationEpisode& most = bounds.any.of_return[i];
+    EvaluationEpisode& fastest = bounds.any.of_time[i];
+    if (bounds.table.of_return[i].reward_sum > most.reward_sum) most = bounds.table.of_return[i];
+    if (SwingUpSeconds(bounds.table.of_time[i], rule) < SwingUpSeconds(fastest, rule)) {
+      fastest = bounds.table.of_time[i];
+    }
+    show();
+  });
+  return bounds;
+}
+
+std::string BoundsCsv(const EpisodeBounds& bounds) {
+  std::string csv =
+      "episode,q1,q2,w1,w2,return,swing_up_seconds,return_table,swing_up_seconds_table\n";
+  for (size_t i = 0; i < bounds.starts.size(); ++i) {
+    csv += std::to_string(i);
+    const auto add = [&](double number) { csv += ',' + FormatNumber(number); };
+    for (const double number : bounds.starts[i]) add(number);
+    for (const BestEpisodes* best : {&bounds.any, &bounds.table}) {
+      add(best->of_return[i].reward_sum);
+      add(SwingUpSeconds(best->of_time[i], bounds.rule));
+    }
+    csv += '\n';
+  }
+  return csv;
+}
+
+}  // namespace upswing

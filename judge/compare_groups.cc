@@ -1,0 +1,241 @@
+#include "judge/compare_groups.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <set>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "run/model_info.h"
+#include "run/run_log.h"
+#include "setup/config.h"
+#include "setup/format.h"
+
+namespace upswing {
+namespace {
+
+constexpr size_t kLongText = 48;  // longer ones are not shown
+
+/// The content of the model of its training and evaluations; kBuiltIn for the built-in one.
+const std::string& ModelOf(const FoundRun& f) { return f.settings.back().second; }
+
+/// What its group is called.
+std::string LabelOf(const FoundRun& f) {
+  return Concat(f.variant.empty() ? f.agent : f.variant,
+                ModelOf(f) == kBuiltIn ? "" : ", other model");
+}
+
+/// Whether a setting belongs to the task that a policy is evaluated on, and not to its training or
+/// to when and in which engine it is evaluated: model, plant, disturbance, randomisation, and how
+/// many episodes have to succeed.
+bool IsTask(const std::string& name) {
+  constexpr std::array<std::string_view, 3> kBeginnings{"plant.", "disturbance.", "randomize."};
+  return name == kModelContent || name == "train.eval_episodes" || name == "task.task" ||
+         std::ranges::any_of(
+             kBeginnings, [&](std::string_view beginning) { return name.starts_with(beginning); });
+}
+
+/// Whether a setting counts.
+using Wanted = bool (*)(const std::string& name);
+
+/// The settings of a run in which not all of `others` agree with it, such as `hidden [64, 64], head
+/// 32`.
+std::string Differences(
+    const FoundRun& of, const std::vector<const FoundRun*>& others,
+    Wanted wanted = [](const std::string& name) { return name != "train.agent"; }) {
+  std::vector<std::string> parts;
+  for (size_t i = 0; i < of.settings.size(); ++i) {
+    const std::string& name = of.settings[i].first;
+    const std::string& value = of.settings[i].second;  // clang 14 captures no structured binding
+    const bool differs = std::ranges::any_of(
+        others, [&](const FoundRun* other) { return other->settings[i].second != value; });
+    if (!differs || !wanted(name)) continue;
+    const std::string key = name.substr(name.find('.') + 1);
+    parts.push_back(value.size() < kLongText ? Concat(key, " ", value) : key);
+  }
+  return Join(parts, ", ");
+}
+
+/// Says of each group (`first` has a run of each) how it differs from the others, and gives those
+/// of one name a second one: their differences among each other, or a number where these are many.
+void TellGroupsApart(GroupedRuns& grouped, const std::vector<const FoundRun*>& first) {
+  std::map<std::string, std::vector<const FoundRun*>> namesakes;
+  for (size_t i = 0; i < first.size(); ++i) {
+    grouped.differences.push_back(Differences(*first[i], first));
+    namesakes[grouped.groups[i].label].push_back(first[i]);
+  }
+  std::map<std::string, int> count;
+  for (size_t i = 0; i < first.size(); ++i) {
+    std::string& label = grouped.groups[i].label;
+    const auto& same_name = namesakes[label];
+    if (same_name.size() == 1) continue;
+    const int number = ++count[label];
+    const std::string differences = Differences(*first[i], same_name);
+    label += differences.empty() || differences.size() > kLongText ? Concat(" #", number)
+                                                                   : Concat(" (", differences, ")");
+  }
+}
+
+/// What a reader of the figures should know.
+void NotePlans(const GroupedRuns& grouped, std::vector<std::string>& notes) {
+  std::set<std::pair<int64_t, bool>> of_all;
+  std::map<size_t, std::vector<std::string>> few;  // labels by their number of seeds
+  for (const RunGroup& group : grouped.groups) {
+    std::set<int64_t> budgets;
+    std::set<bool> stops;
+    for (const RunRecord& run : group.runs) {
+      budgets.insert(run.plan.steps);
+      stops.insert(run.plan.stop_when_solved);
+      of_all.emplace(run.plan.steps, run.plan.stop_when_solved);
+    }
+    if (budgets.size() > 1) {
+      notes.push_back(fmt::format("{}: the runs have different budgets, {} to {} steps",
+                                  group.label, FormatCount(*budgets.begin()),
+                                  FormatCount(*budgets.rbegin())));
+    }
+    if (stops.size() > 1) {
+      notes.push_back(group.label + ": some runs stop when solved and some go on");
+    }
+    if (group.runs.size() == 1) {
+      notes.push_back(group.label + ": no intervals, there is one seed only");
+    } else if (group.runs.size() < 5) {
+      few[group.runs.size()].push_back(group.label);
+    }
+  }
+  for (const auto& [seeds, labels] : few) {
+    notes.push_back(
+        fmt::format("{}: {} seeds are few, intervals are too narrow", Join(labels, ", "), seeds));
+  }
+  if (notes.empty() && of_all.size() > 1) {
+    notes.emplace_back("the groups differ in their budgets of steps or in stopping when solved");
+  }
+}
+
+/// Whether runs that should take the same time had different shares of their processors.
+void NoteLoads(const std::vector<FoundRun>& runs, std::vector<std::string>& notes) {
+  std::map<std::pair<std::vector<Setting>, std::set<int64_t>>, std::vector<double>> busy;
+  for (const FoundRun& f : runs) {
+    const RunConditions& c = f.conditions;
+    if (c.busy) busy[{f.settings, c.threads}].push_back(*c.busy);
+  }
+  for (const auto& [same_work, shares] : busy) {
+    constexpr double kAlike = 0.75;
+    const auto [low, high] = std::ranges::minmax(shares);
+    if (low >= kAlike * high) continue;
+    notes.push_back(fmt::format(
+        "times were measured under different machine loads: of runs with the same settings and "
+        "threads, one had its threads at work {:.0f}% of the time, another {:.0f}%",
+        100 * low, 100 * high));
+    return;
+  }
+}
+
+/// What the times depend on besides the settings, where it is not the same for all.
+void NoteTimes(const std::vector<FoundRun>& runs, std::vector<std::string>& notes) {
+  std::map<int64_t, int> threads;  // how many runs had so many
+  std::set<std::string> processors, vectors;
+  std::set<int64_t> intervals;
+  for (const FoundRun& f : runs) {
+    const RunConditions& c = f.conditions;
+    intervals.insert(f.run.plan.eval_every);
+    for (const int64_t count : c.threads) ++threads[count];
+    for (const std::string& name : c.processors) processors.insert(Printable(name));
+    for (const std::string& name : c.vectors) vectors.insert(Printable(name));
+  }
+  const auto join = [](const std::set<std::string>& names) {
+    return Join({names.begin(), names.end()}, "; ");
+  };
+  if (threads.size() > 1) {
+    std::vector<std::string> counts;
+    counts.reserve(threads.size());
+    for (const auto& [count, of_runs] : threads) {
+      counts.push_back(fmt::format("{} ({} run{})", count, of_runs, of_runs == 1 ? "" : "s"));
+    }
+    notes.push_back(
+        Concat("times were measured with different numbers of threads: ", Join(counts, ", ")));
+  }
+  if (processors.size() > 1) {
+    notes.push_back(Concat("times were measured on different processors: ", join(processors)));
+  }
+  if (vectors.size() > 1) {
+    notes.push_back(
+        Concat("times were measured with different vector instructions: ", join(vectors)));
+  }
+  NoteLoads(runs, notes);
+  if (intervals.size() > 1) {
+    notes.push_back(fmt::format(
+        "evaluated every {} to {} steps: times and steps to solve are as coarse as that",
+        FormatCount(*intervals.begin()), FormatCount(*intervals.rbegin())));
+  }
+}
+
+/// Numbers the tasks that groups (`first` has a run of each) are evaluated on, in their order.
+void TellTasksApart(GroupedRuns& grouped, const std::vector<const FoundRun*>& first) {
+  std::vector<const FoundRun*> tasks;  // a run of each
+  for (const FoundRun* run : first) {
+    const auto same = [&](const FoundRun* other) {
+      return Differences(*run, {other}, IsTask).empty();
+    };
+    const auto at = std::ranges::find_if(tasks, same);
+    grouped.tasks.push_back(static_cast<int>(at - tasks.begin()));
+    if (at == tasks.end()) tasks.push_back(run);
+  }
+  for (const FoundRun* task : tasks) {
+    grouped.task_texts.push_back(Differences(*task, tasks, IsTask));
+  }
+}
+
+void NoteTasks(GroupedRuns& grouped, bool different_tasks) {
+  const size_t tasks = grouped.task_texts.size();
+  if (tasks == 1) return;
+  grouped.notes.push_back(fmt::format(
+      "the groups are evaluated on {} different tasks: {}", tasks,
+      different_tasks ? "figures of different tasks stand beside each other"
+                      : "groups are compared within each (--different-tasks: all with all)"));
+}
+
+}  // namespace
+
+GroupedRuns GroupRuns(const CompareRequest& request) {
+  const Found found = FindRuns(request);
+  if (found.runs.empty()) {
+    const size_t others = found.left_out.size() - 1;
+    throw BadInput(Concat(
+        found.left_out.front(),
+        others > 0 ? Concat("; no run is left to compare (", others, " more were left out)") : ""));
+  }
+  GroupedRuns grouped;
+  std::vector<const FoundRun*> first;  // of each group
+  for (const FoundRun& f : found.runs) {
+    const auto same = [&](const FoundRun* other) { return other->settings == f.settings; };
+    const auto at = static_cast<size_t>(std::ranges::find_if(first, same) - first.begin());
+    if (at == first.size()) {
+      first.push_back(&f);
+      grouped.groups.push_back({LabelOf(f), {}});
+      grouped.configs.push_back(f.config);
+    }
+    grouped.groups[at].runs.push_back(f.run);
+  }
+  for (RunGroup& group : grouped.groups) {
+    std::ranges::sort(group.runs, {}, [](const RunRecord& run) { return run.plan.seed; });
+  }
+  TellGroupsApart(grouped, first);
+  TellTasksApart(grouped, first);
+  grouped.notes = found.notes;
+  NotePlans(grouped, grouped.notes);
+  for (size_t i = 0; i < first.size(); ++i) {
+    if (ModelOf(*first[i]) == kBuiltIn) continue;
+    grouped.notes.push_back(Concat(grouped.groups[i].label, ": on a model that is not the ",
+                                   "built-in one (content ", ModelOf(*first[i]), ")"));
+  }
+  NoteTimes(found.runs, grouped.notes);
+  NoteTasks(grouped, request.different_tasks);
+  if (request.different_tasks) grouped.tasks.assign(first.size(), 0);
+  for (const std::string& line : found.left_out) grouped.notes.push_back(line + ": left out");
+  return grouped;
+}
+
+}  // namespace upswing

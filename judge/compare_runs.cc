@@ -1,0 +1,301 @@
+#include "judge/compare_runs.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <set>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "io/making.h"
+#include "io/run_folder.h"
+#include "run/model_info.h"
+#include "setup/config.h"
+#include "setup/controllers.h"
+#include "setup/format.h"
+#include "study/study_plan.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool IsRun(const fs::path& folder) {
+  std::error_code error;
+  const auto has = [&](const char* name) { return fs::exists(folder / name, error); };
+  return has(RunFolder::kConfig) && (has(RunFolder::kEvaluations) || has(RunFolder::kCheckpoint));
+}
+
+/// The file beside a run of a study that says that it is done.
+fs::path DoneOf(const fs::path& run) { return run.string() + ".done"; }
+
+/// The seed of a run of a study, by its name; nothing if it has none.
+std::optional<int64_t> SeedOf(const fs::path& path) {
+  constexpr std::string_view kSeed = "seed";
+  const std::string name = path.filename().string();
+  if (!name.starts_with(kSeed)) return std::nullopt;
+  return ParseInteger(std::string_view(name).substr(kSeed.size()));
+}
+
+/// Whether it is a run, or a study's of which no more than its result was kept.
+bool IsKept(const fs::path& run) {
+  std::error_code error;
+  return IsRun(run) || fs::is_regular_file(fs::symlink_status(DoneOf(run), error));
+}
+
+/// Adds the run folders in a folder, at any depth; links are not followed.
+void AddRuns(const fs::path& folder, Found& found, std::vector<fs::path>& paths) {
+  if (IsRun(folder)) {
+    paths.push_back(folder);
+    return;
+  }
+  std::error_code error;
+  fs::directory_iterator entries(folder, error);
+  if (error) return found.LeaveOut(folder, Concat("cannot be read: ", error.message()));
+  for (const fs::directory_entry& entry : entries) {
+    if (IsMakingName(entry.path().filename().string())) continue;  // left by a killed process
+    if (entry.path().extension() == ".done") {
+      const fs::path run = fs::path(entry.path()).replace_extension();
+      if (SeedOf(run) && !IsRun(run) && IsKept(run)) paths.push_back(run);
+      continue;
+    }
+    const bool is_folder = fs::is_directory(entry.symlink_status(error));
+    const bool is_run = fs::is_directory(entry.path(), error) && IsRun(entry.path());
+    if (is_folder || is_run) AddRuns(entry.path(), found, paths);
+  }
+}
+
+/// The run folders in a folder, in alphabetical order.
+std::vector<fs::path> RunsIn(const fs::path& folder, Found& found) {
+  std::error_code error;
+  if (IsKept(folder)) return {folder};
+  if (!fs::exists(folder, error)) {
+    throw BadInput(
+        Concat(folder.string(), ": expected a run folder, one that holds some, a policy's ",
+               "file or a controller (", Join(ControllerNames(), ", "),
+               "), got nothing of that name", DidYouMean(folder.string(), ControllerNames())));
+  }
+  std::vector<fs::path> paths;
+  if (!fs::is_directory(folder, error)) {
+    found.LeaveOut(folder, "expected a run folder or a policy.safetensors, got another file");
+    return paths;
+  }
+  const size_t problems = found.left_out.size();
+  AddRuns(folder, found, paths);
+  std::ranges::sort(paths);
+  if (paths.empty() && found.left_out.size() == problems) {
+    found.LeaveOut(folder,
+                   "expected a run folder (config.toml beside evals.csv or "
+                   "checkpoint.safetensors) or one that holds some, got none");
+  }
+  return paths;
+}
+
+std::vector<Setting> SettingsOf(Config config) {
+  std::vector<Setting> settings;
+  config.model.clear();  // a model is what is in its file, not where that lies: see below
+  // Those of all algorithms in one order, so that any two runs can be compared.
+  Config scratch;
+  const std::vector<Option> own = TrainingSettings(config);
+  const Options all = EverySetting(scratch);
+  for (const Option& every : all.all()) {
+    const auto found =
+        std::ranges::find_if(own, [&](const Option& option) { return option.name == every.name; });
+    const std::string name = Concat(every.section, ".", every.name);
+    if (found == own.end()) {
+      settings.emplace_back(name, "none");
+      continue;
+    }
+    const auto* text = std::get_if<std::string*>(&found->target);
+    settings.emplace_back(name, text != nullptr ? **text : found->text());
+  }
+  settings.emplace_back(kModelContent, ModelContent(config.mjcf));  // the last one, for ModelOf
+  return settings;
+}
+
+/// What a configuration says of a run, which has no evaluations yet.
+FoundRun Describe(const fs::path& path, const Config& config) {
+  const TrainConfig& t = config.train;
+  const EnvSpec spec = SpecOf(config.Environments());
+  return {{path,
+           {t.seed, t.steps, t.envs, t.eval_every, t.stop_when_solved, spec.evaluation,
+            spec.action_unit},
+           {}},
+          config.agent,
+          "",
+          SettingsOf(config),
+          {},
+          std::make_shared<const Config>(config)};
+}
+
+/// The runs of studies that are done, whose settings stand once for all seeds.
+class StudyRuns {
+ public:
+  /// Nothing if it is no such run, or if it went on since.
+  std::optional<FoundRun> Read(const fs::path& path) {
+    const auto seed = SeedOf(path);
+    if (!seed) return std::nullopt;
+    const auto result = ReadDone(DoneOf(path));
+    if (!result) return std::nullopt;
+    std::error_code error;
+    const fs::path table = path / RunFolder::kEvaluations;
+    if (fs::exists(table, error) && fs::file_size(table, error) != result->evaluations.size()) {
+      return std::nullopt;
+    }
+    const OfVariant& variant = Of(path.parent_path());
+    if (variant.mark != result->settings) return std::nullopt;
+    FoundRun found = variant.run;
+    found.run.path = path;
+    found.run.plan.seed = *seed;
+    found.run.plan.steps = result->planned_steps;
+    found.run.plan.stop_when_solved = result->stop_when_solved;
+    found.conditions = result->conditions;
+    found.run.evaluations = ParseEvaluations(result->evaluations, DoneOf(path).string(), false);
+    return found;
+  }
+
+ private:
+  struct OfVariant {
+    FoundRun run;
+    std::string mark;
+  };
+
+  const OfVariant& Of(const fs::path& folder) {
+    const auto found = variants_.find(folder);
+    if (found != variants_.end()) return found->second;
+    Config config = BuildConfig(folder / kSettingsName, {});
+    MakeReadyForMany(config);
+    return variants_.emplace(folder, OfVariant{Describe(folder, config), SettingsMark(config)})
+        .first->second;
+  }
+
+  std::map<fs::path, OfVariant> variants_;
+};
+
+FoundRun ReadRun(const fs::path& path, const fs::path& root, bool unfinished, StudyRuns& studies) {
+  FoundRun found;
+  const bool is_run = IsRun(path);
+  std::optional<FoundRun> done;
+  try {
+    done = studies.Read(path);
+  } catch (const Error&) {
+    if (!is_run) throw;  // its folder says all, too
+  }
+  if (done) {
+    found = std::move(*done);
+  } else if (!is_run) {
+    throw BadInput(Concat(DoneOf(path).string(),
+                          ": made with other settings than those beside it, ",
+                          (path.parent_path() / kSettingsName).string()));
+  } else {
+    found = Describe(path, ReadRunConfig(path));
+    found.conditions = ReadConditions(path);
+    found.run.evaluations = ReadEvaluations(path, unfinished);
+  }
+  const auto joined = [](const std::set<std::string>& names) {
+    return Join({names.begin(), names.end()}, " + ");
+  };
+  found.run.host = joined(found.conditions.hosts);
+  found.run.processor = joined(found.conditions.processors);
+  found.run.vectors = joined(found.conditions.vectors);
+  // STUDY/VARIANT/seed1: the variant has a name of its own.
+  const fs::path below = path.lexically_relative(root);
+  if (std::distance(below.begin(), below.end()) > 1) {
+    found.variant = path.parent_path().filename().string();
+  }
+  return found;
+}
+
+/// Reads all runs; what cannot be read is left out.
+Found ReadRuns(const CompareRequest& request) {
+  Found found;
+  StudyRuns studies;
+  std::set<fs::path> seen;
+  for (const fs::path& argument : request.paths) {
+    for (const fs::path& path : RunsIn(argument, found)) {
+      if (!seen.insert(fs::weakly_canonical(path)).second) {
+        throw BadInput(Concat(path.string(), ": given twice; expected each run once"));
+      }
+      try {
+        found.runs.push_back(ReadRun(path, request.root.empty() ? argument : request.root,
+                                     request.unfinished, studies));
+      } catch (const Error& error) {
+        // Most messages begin with the file.
+        const std::string what = error.what();
+        if (what.starts_with(path.string())) {
+          found.left_out.push_back(what);
+        } else {
+          found.LeaveOut(path, what);
+        }
+      }
+    }
+  }
+  return found;
+}
+
+/// How many steps were trained up to the last evaluation.
+int64_t LastStep(const RunRecord& run) {
+  return run.evaluations.empty() ? 0 : run.evaluations.back().step;
+}
+
+/// Of runs that are the same training, keeps the one that went furthest, of equals the first.
+void LeaveOutTwins(Found& found) {
+  const auto key = [](const FoundRun& f) { return std::pair(f.run.plan.seed, f.settings); };
+  struct Furthest {
+    fs::path path;
+    int64_t step;
+  };
+  std::map<std::pair<int64_t, std::vector<Setting>>, Furthest> furthest;
+  for (const FoundRun& f : found.runs) {
+    const int64_t step = LastStep(f.run);
+    const auto [at, is_new] = furthest.try_emplace(key(f), Furthest{f.run.path, step});
+    if (!is_new && step > at->second.step) at->second = {f.run.path, step};
+  }
+  std::erase_if(found.runs, [&](const FoundRun& f) {
+    const fs::path& kept = furthest.at(key(f)).path;
+    if (f.run.path == kept) return false;
+    found.LeaveOut(f.run.path, Concat("the same training as ", kept.string(),
+                                      " (all settings and seed ", f.run.plan.seed, ")"));
+    return true;
+  });
+}
+
+/// Takes out runs without an evaluation, and unfinished ones unless they are asked for; then they
+/// are noted.
+void LeaveOutUnfinished(Found& found, bool unfinished) {
+  std::erase_if(found.runs, [&](const FoundRun& f) {
+    const RunRecord& run = f.run;
+    if (Finished(run)) return false;
+    if (run.evaluations.empty()) {
+      found.LeaveOut(run.path, "has no evaluation yet");
+      return true;
+    }
+    const std::string how_far =
+        fmt::format("is unfinished, evaluated up to step {} of {}",
+                    FormatCount(run.evaluations.back().step), FormatCount(run.plan.steps));
+    if (unfinished) {
+      found.notes.push_back(Concat(run.path.string(), ": ", how_far));
+    } else {
+      found.LeaveOut(run.path, Concat(how_far, " (train --resume continues it, --unfinished ",
+                                      "compares it as it is)"));
+    }
+    return !unfinished;
+  });
+}
+
+}  // namespace
+
+void Found::LeaveOut(const fs::path& path, std::string_view why) {
+  left_out.push_back(Concat(path.string(), ": ", why));
+}
+
+Found FindRuns(const CompareRequest& request) {
+  Found found = ReadRuns(request);
+  LeaveOutTwins(found);
+  LeaveOutUnfinished(found, request.unfinished);
+  return found;
+}
+
+}  // namespace upswing

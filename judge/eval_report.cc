@@ -1,0 +1,227 @@
+#include "judge/eval_report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+#include <numbers>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "sim/identification.h"
+
+namespace upswing {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr double kDegrees = 180 / std::numbers::pi;
+
+ordered_json MomentsJson(const Moments& m, double scale = 1) {
+  return {{"mean", scale * m.mean}, {"deviation", scale * m.deviation}};
+}
+
+/// null if there is no such episode.
+ordered_json QuartilesJson(const Quartiles& q, int64_t episodes) {
+  if (episodes == 0) return nullptr;
+  return {{"median", q.median}, {"quartiles", {q.low, q.high}}};
+}
+
+/// Name and text of each figure of an episode, in the order of the columns.
+std::vector<std::pair<std::string, std::string>> Cells(const EvalReport& report,
+                                                       const JudgedEpisode& episode) {
+  const EnvSpec& spec = report.spec;
+  const EvaluationRule& rule = spec.evaluation;
+  const EvaluationEpisode& e = episode.result;
+  std::vector<std::pair<std::string, std::string>> cells;
+  const auto add = [&](const std::string& name, double value, bool known = true) {
+    cells.emplace_back(name, known ? FormatNumber(value) : "");
+  };
+  for (size_t i = 0; i < episode.start.size(); ++i) add(spec.state_names[i], episode.start[i]);
+  if (spec.task == kDoublePendulum) {
+    for (const auto& [name, value] : PlantValues(episode.plant)) add(name, value);
+    const auto joint = static_cast<int>(episode.plant.actuated_joint);
+    const double delta = PassiveJointOf(ConstantsOf(episode.plant), joint).delta;
+    add("delta", delta, std::isfinite(delta));
+    add("sensor_noise", episode.disturbance.sensor_noise);
+    add("delay", episode.disturbance.delay);
+  }
+  add("success", e.success ? 1 : 0);
+  const bool held = !rule.by_return();  // the goal is to be held
+  const bool upright = held && e.swing_up_seconds.has_value();
+  add("swing_up_seconds", e.swing_up_seconds.value_or(0), upright);
+  add("settling_seconds", e.settling_seconds.value_or(0), held && e.settling_seconds.has_value());
+  for (size_t body = 0; body < e.tilt.size(); ++body) {
+    add(Concat("tilt", body + 1, "_degrees"), e.tilt[body] * kDegrees);
+  }
+  add("return", e.reward_sum);
+  for (size_t k = 0; k < e.terms.size(); ++k) add(spec.term_names[k], e.terms[k] + 0.0);
+  add("value", e.value, report.knows_values);
+  add("discounted_return", e.discounted_return, report.knows_values);
+  add("energy_used", e.work);
+  add("peak_torque", e.peak_torque);
+  add("rms_torque", e.rms_torque);
+  add("torque_variation", e.torque_variation);
+  add("torque_variation_upright", e.goal_variation, upright);
+  add("torque_changes_upright", e.goal_changes, upright);
+  return cells;
+}
+
+using Remade = decltype(LoadedPolicy::remade);
+
+/// The results of the episodes of `config`, each with a controller made for its plant.
+void JudgeMade(const Policy& policy, const Remade& remade, const EnvConfig& config,
+               const std::function<void(double)>& progress, size_t first, EvalReport& report) {
+  std::mutex mutex;
+  int done = 0;
+  config.pool->ParallelFor(config.num_envs, [&](int i) {
+    JudgedEpisode& episode = report.episodes[first + static_cast<size_t>(i)];
+    std::shared_ptr<const Policy> made;
+    try {
+      made = remade(episode.plant);
+      episode.for_its_plant = true;
+    } catch (const Error&) {  // the plant cannot be held, or not be swung up
+    }
+    EnvConfig one = config;
+    one.pool = nullptr;
+    episode.result = EvaluateEpisodes(made ? *made : policy, *OneEpisode(one, i)).front();
+    const std::lock_guard lock(mutex);
+    progress(static_cast<double>(++done) / config.num_envs);
+  });
+}
+
+/// Judges the episodes first, first + 1, … of the environments of `config`, which says how many.
+/// With `remade` each by a controller made for its plant.
+void JudgeEpisodes(const Policy& policy, const Remade* remade, const EnvConfig& config,
+                   const std::function<void(double)>& progress, EvalReport& report) {
+  const std::unique_ptr<VectorEnv> env = MakeEnv(config);
+  const auto first = report.episodes.size();
+  const auto* pendulum = dynamic_cast<const PendulumEnv*>(env.get());
+  for (int i = 0; i < config.num_envs; ++i) {
+    JudgedEpisode& episode = report.episodes.emplace_back();
+    episode.start.resize(report.spec.state_names.size());
+    env->GetState(i, episode.start);
+    if (pendulum == nullptr) continue;
+    episode.plant = pendulum->plant(i);
+    episode.disturbance = pendulum->disturbance(i);
+  }
+  if (remade) return JudgeMade(policy, *remade, config, progress, first, report);
+  std::vector<EvaluationEpisode> results = EvaluateEpisodes(policy, *env, config.pool, progress);
+  for (size_t i = 0; i < results.size(); ++i) {
+    report.episodes[first + i].result = std::move(results[i]);
+  }
+}
+
+}  // namespace
+
+void AddFigures(const Evaluation& e, const EnvSpec& spec, bool knows_values, ordered_json& j) {
+  const bool any = !spec.evaluation.by_return() && e.successes > 0;
+  j["episodes"] = e.episodes;
+  j["successes"] = e.successes;
+  j["success_rate"] = e.success_rate();
+  j["success_interval_95"] = {e.success_interval.low, e.success_interval.high};
+  j["swing_up_seconds"] = QuartilesJson(e.swing_up_seconds, any ? e.successes : 0);
+  j["settled"] = any ? e.settled : 0;
+  j["settling_seconds"] = QuartilesJson(e.settling_seconds, any ? e.settled : 0);
+  j["steady_tilt_degrees"] = nullptr;
+  if (any && e.tilt.size() == 2) {
+    j["steady_tilt_degrees"] = {{"link1", MomentsJson(e.tilt[0], kDegrees)},
+                                {"link2", MomentsJson(e.tilt[1], kDegrees)}};
+  }
+  j["return"] = MomentsJson(e.reward_sum);
+  for (size_t k = 0; k < e.term_means.size(); ++k) {
+    j["reward_terms"][spec.term_names[k]] = e.term_means[k];
+  }
+  j["value"] = knows_values ? ordered_json(e.value) : nullptr;
+  j["discounted_return"] = knows_values ? ordered_json(e.discounted_return) : nullptr;
+  j["energy_used"] = MomentsJson(e.work);
+  j["peak_torque"] = e.peak_torque;
+  j["rms_torque"] = MomentsJson(e.rms_torque);
+  j["torque_variation"] = MomentsJson(e.torque_variation);
+  j["torque_variation_upright"] = any ? MomentsJson(e.goal_variation) : nullptr;
+  j["torque_changes_upright"] = any ? MomentsJson(e.goal_changes) : nullptr;
+}
+
+EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& trial, int64_t episodes,
+                          ThreadPool& pool, const std::function<void(double)>& progress) {
+  if (trial.known_plant && !loaded.remade) {
+    throw BadInput(Concat(
+        "--known-plant: expected a controller, which can be made for a plant, got ", loaded.name));
+  }
+  if (trial.known_plant && trial.unknown_plant) {
+    throw BadInput("--known-plant: expected no --unknown-plant beside it");
+  }
+  EvalReport report;
+  report.policy = loaded.name;
+  report.known_plant = trial.known_plant;
+  report.physics = trial.physics;
+  report.env = TrialEnvironments(trial, &loaded);
+  report.model = InfoOfModel(report.env.mjcf, trial.model);
+  report.env.num_envs = static_cast<int>(episodes);
+  report.spec = SpecOf(report.env);
+  report.knows_values = ValueUnitsOf(*loaded.policy).gamma > 0;
+  constexpr int64_t kAtOnce = 4096;
+  for (int64_t done = 0; done < episodes; done += kAtOnce) {
+    EnvConfig config = report.env;
+    config.pool = &pool;
+    config.first_index += static_cast<uint64_t>(done);
+    config.num_envs = static_cast<int>(std::min(kAtOnce, episodes - done));
+    JudgeEpisodes(
+        *loaded.policy, trial.known_plant ? &loaded.remade : nullptr, config,
+        [&](double share) {
+          if (!progress) return;
+          progress((static_cast<double>(done) + share * config.num_envs) /
+                   static_cast<double>(episodes));
+        },
+        report);
+  }
+  std::vector<EvaluationEpisode> results;
+  for (const JudgedEpisode& episode : report.episodes) results.push_back(episode.result);
+  report.figures = Summarize(results, report.spec.evaluation);
+  return report;
+}
+
+int64_t NumMade(const EvalReport& report) {
+  return std::ranges::count(report.episodes, true, &JudgedEpisode::for_its_plant);
+}
+
+std::string EvalJson(const EvalReport& report) {
+  ordered_json j;
+  j["policy"] = report.policy;
+  j["seed"] = report.env.seed;
+  j["physics"] = nullptr;
+  if (report.spec.task == kDoublePendulum) j["physics"] = report.physics;
+  j["task"] = report.spec.task;
+  if (report.spec.task != kDoublePendulum) {
+    AddFigures(report.figures, report.spec, report.knows_values, j);
+    return PrintableJson(j);
+  }
+  for (const auto& [name, value] : PlantValues(report.env.plant(0))) j["plant"][name] = value;
+  j["model"] = report.model ? report.model->Json() : kBuiltIn;
+  j["unknown_plant"] = report.env.assumed_plant.has_value();
+  if (report.known_plant) j["known_plant"] = NumMade(report);
+  Disturbance disturbance = report.env.disturbance(0);
+  Randomization randomization = report.env.randomization;
+  for (const Options& options : {OptionsOf(disturbance), OptionsOf(randomization)}) {
+    for (const Option& option : options.all()) {
+      j[option.section][option.name] = *std::get<double*>(option.target);
+    }
+  }
+  AddFigures(report.figures, report.spec, report.knows_values, j);
+  return PrintableJson(j);
+}
+
+std::string EpisodesCsv(const EvalReport& report) {
+  std::string csv = "episode";
+  for (const auto& [name, text] : Cells(report, report.episodes.front())) csv += ',' + name;
+  csv += '\n';
+  for (size_t i = 0; i < report.episodes.size(); ++i) {
+    csv += std::to_string(i);
+    for (const auto& [name, text] : Cells(report, report.episodes[i])) {
+      csv += ',' + text;
+    }
+    csv += '\n';
+  }
+  return csv;
+}
+
+}  // namespace upswing

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/json.h"
+#include "judge/trial.h"
+#include "rl/evaluate.h"
+#include "run/model_info.h"
+#include "setup/config.h"
+#include "setup/loaded_policy.h"
+#include "sim/pendulum_env.h"
+
+/// Evaluations of a policy over many episodes, and what is said of them.
+namespace upswing {
+
+/// One episode: its conditions and its result.
+struct JudgedEpisode {
+  std::vector<double> start;  // (S)
+  // Of the double pendulum:
+  Plant plant;
+  Disturbance disturbance;
+  bool for_its_plant = false;  // a controller was made for it, see TrialArguments::known_plant
+  EvaluationEpisode result;
+};
+
+/// A finished evaluation.
+struct EvalReport {
+  std::string policy;              // path
+  std::string physics;             // name of the engine
+  std::optional<ModelInfo> model;  // none: the built-in one
+  EnvConfig env;                   // what all episodes have in common
+  EnvSpec spec;
+  std::vector<JudgedEpisode> episodes;
+  Evaluation figures;
+  bool known_plant = false;   // each episode had a controller made for its plant
+  bool knows_values = false;  // the policy says what its Q-values estimate
+};
+
+/// Lets a policy control `episodes` episodes of the environments that a trial makes, and says how
+/// it did; where the plant is known and no controller can be made for it, that of the policy's own
+/// plant. `progress` (may be empty) is called with the share done, 0 to 1. Throws BadInput.
+EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& trial, int64_t episodes,
+                          ThreadPool& pool, const std::function<void(double)>& progress);
+
+/// In how many episodes a controller was made for the plant.
+int64_t NumMade(const EvalReport& report);
+
+/// Adds the figures of an evaluation to a JSON document.
+void AddFigures(const Evaluation& e, const EnvSpec& spec, bool knows_values,
+                nlohmann::ordered_json& j);
+
+/// The report as a JSON document.
+std::string EvalJson(const EvalReport& report);
+
+/// A row for each episode, counted from 0; a figure that it does not have (such as the swing-up
+/// time of one that is not upright at the end) is empty.
+std::string EpisodesCsv(const EvalReport& report);
+
+}  // namespace upswing

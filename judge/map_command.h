@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/thread_pool.h"
+#include "judge/map_result.h"
+#include "setup/loaded_policy.h"
+
+namespace upswing {
+
+/// How a map of a policy is asked for: its axes, and what is on neither of them.
+struct MapArguments {
+  std::string x = "mass2=-50%:+50%", y = "length2=-50%:+50%", physics, out;
+  std::vector<std::string> set;
+  int64_t episodes = 0;  // in a cell; 0: as many as are usual
+  int64_t seed = 0;
+  double check = 0;  // share of the cells to repeat in MuJoCo
+  bool unknown_plant = false;
+
+  /// The numbers among them: name, default, range, unit, help.
+  void Describe(Options& options);
+};
+
+/// The map of a policy that the arguments ask for, with no cell run yet. Throws BadInput.
+MapResult PlanMap(const MapArguments& a, const LoadedPolicy& loaded);
+
+/// The folder for a map's files, which is free. Throws BadInput, also if nothing can be drawn here.
+std::filesystem::path MapFolder(const MapArguments& a, const LoadedPolicy& loaded,
+                                const MapResult& map);
+
+/// Told the share (0 to 1) that is done of so many episodes, from any thread.
+using MapProgress = std::function<void(double episodes, double share)>;
+
+/// Runs all cells, and in MuJoCo the share that is to be checked there.
+void FillMap(const MapArguments& a, const LoadedPolicy& loaded, ThreadPool& pool,
+             const MapProgress& progress, MapResult& map);
+
+}  // namespace upswing

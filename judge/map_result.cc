@@ -1,0 +1,250 @@
+#include "judge/map_result.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/error.h"
+#include "core/json.h"
+#include "core/text.h"
+#include "io/file.h"
+#include "report/figure.h"
+#include "rl/evaluate.h"
+#include "setup/config.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+/// A number as a table has it: empty for none.
+std::string Cell(double number) { return std::isfinite(number) ? FormatNumber(number) : ""; }
+
+double RateOf(const MapResult& map, const MapCell& cell) {
+  return static_cast<double>(cell.successes) / map.config.episodes;
+}
+
+Panel MapPanel(const MapResult& map, const std::string& title, HeatMap heat_map) {
+  const MapAxis& x = map.config.x;
+  const MapAxis& y = map.config.y;
+  heat_map.x = x.values;
+  heat_map.y = y.values;
+  Panel panel;
+  panel.title = title;
+  panel.x_label = x.label();
+  panel.y_label = y.label();
+  panel.heat_map = std::move(heat_map);
+  const auto inside = [](const MapAxis& axis) {
+    return axis.at_training && *axis.at_training >= axis.values.front() &&
+           *axis.at_training <= axis.values.back();
+  };
+  if (!map.dot.empty() && inside(x) && inside(y)) {
+    panel.lines.push_back({map.dot, {*x.at_training}, {*y.at_training}, {}, {}, true});
+  }
+  return panel;
+}
+
+/// All that the axes do not say.
+std::string CaptionOf(const MapResult& map) {
+  const int episodes = map.config.episodes;
+  std::string text = Concat(episodes, episodes == 1 ? " episode" : " episodes", " a cell");
+  if (const std::string interval = map.success_interval(); !interval.empty()) {
+    text += Concat(" (", interval, ")");
+  }
+  text += Concat("; ", map.physics, "; seed ", map.config.seed);
+  return map.changes.empty() ? text : Concat(text, "; ", map.changes);
+}
+
+HeatMap SuccessMap(const MapResult& map) {
+  HeatMap success;
+  success.label = "successful episodes (%)";
+  success.high = 100;
+  for (const MapCell& cell : map.cells) success.z.push_back(100 * RateOf(map, cell));
+  return success;
+}
+
+Figure MapFigure(const MapResult& map) {
+  HeatMap success = SuccessMap(map), swing_up;
+  double longest = 0;  // swing-up time, s
+  swing_up.label = "swing-up time (s)";
+  for (const MapCell& cell : map.cells) {
+    swing_up.z.push_back(cell.swing_up_seconds);
+    longest = std::max(longest, cell.successes > 0 ? cell.swing_up_seconds : 0);
+  }
+  // Where nothing has to swing up, the times differ by nothing that colours could show.
+  if (longest < 0.1) swing_up.high = 1;
+  Figure figure;
+  figure.title = WithModel(map.policy, map.model);
+  figure.caption = CaptionOf(map);
+  figure.width = 1100;
+  figure.height = 530;
+  figure.columns = 2;
+  figure.panels = {
+      MapPanel(map, "Success", std::move(success)),
+      MapPanel(map, map.config.episodes > 1 ? "Swing-up time, median" : "Swing-up time",
+               std::move(swing_up))};
+  return figure;
+}
+
+/// The map as a JSON object.
+ordered_json JsonOf(const MapResult& map) {
+  const auto number = [](double x) { return std::isfinite(x) ? ordered_json(x) : nullptr; };
+  const auto axis = [](const MapAxis& a) -> ordered_json {
+    return {{"name", a.name}, {"unit", a.unit}, {"values", a.values}};
+  };
+  ordered_json j;
+  j["policy"] = map.policy;
+  j["seed"] = map.config.seed;
+  j["physics"] = map.physics;
+  for (const auto& [name, value] : PlantValues(map.config.point.plant)) j["plant"][name] = value;
+  j["model"] = map.model ? map.model->Json() : kBuiltIn;
+  j["unknown_plant"] = map.config.assumed_plant.has_value();
+  j["changes"] = map.changes;
+  j["x"] = axis(map.config.x);
+  j["y"] = axis(map.config.y);
+  j["episodes_per_cell"] = map.config.episodes;
+  j["mean_success_rate"] = map.mean_success();
+  j["cells_without_failure"] = map.always_success();
+  j["median_swing_up_seconds"] = number(map.median_swing_up());
+  const size_t columns = map.config.x.values.size();
+  for (size_t i = 0; i < map.cells.size(); ++i) {
+    j["success_rate"][i / columns].push_back(RateOf(map, map.cells[i]));
+    j["swing_up_seconds"][i / columns].push_back(number(map.cells[i].swing_up_seconds));
+  }
+  j["check"] = nullptr;
+  if (!map.checked.empty()) {
+    const MapAgreement a = map.agreement();
+    j["check"] = {
+        {"cells", a.cells},
+        {"same_successes", a.same_successes},
+        {"largest_success_difference", a.largest_success_difference},
+        {"both_succeed", a.both_succeed},
+        {"largest_swing_up_difference",
+         a.both_succeed > 0 ? ordered_json(a.largest_swing_up_difference) : ordered_json()}};
+  }
+  j["seconds"] = map.seconds;
+  j["episodes_per_second"] = static_cast<double>(map.episodes()) / map.seconds;
+  j["files"] = map.files;
+  return j;
+}
+
+}  // namespace
+
+double MapResult::mean_success() const {
+  double sum = 0;
+  for (const MapCell& cell : cells) sum += static_cast<double>(cell.successes);
+  return sum / static_cast<double>(episodes());
+}
+
+double MapResult::always_success() const {
+  const auto always = std::ranges::count_if(
+      cells, [this](const MapCell& cell) { return cell.successes == config.episodes; });
+  return static_cast<double>(always) / static_cast<double>(cells.size());
+}
+
+double MapResult::median_swing_up() const {
+  std::vector<double> medians;
+  for (const MapCell& cell : cells) {
+    if (cell.successes > 0) medians.push_back(cell.swing_up_seconds);
+  }
+  if (medians.empty()) return std::numeric_limits<double>::quiet_NaN();
+  return QuartilesOf(std::move(medians)).median;
+}
+
+std::string MapResult::success_interval() const {
+  // From one given start all episodes are the same, unless there is noise.
+  if (config.episodes == 1 && config.start_given) return "";
+  const Interval interval = WilsonInterval(config.episodes, config.episodes);
+  return fmt::format("{0} of {0}: 95% interval {1:.1f}% to 100%", config.episodes,
+                     100 * interval.low);
+}
+
+MapAgreement MapResult::agreement() const {
+  std::vector<MapCell> same;
+  for (const int64_t cell : checked) same.push_back(cells[static_cast<size_t>(cell)]);
+  return Compare(same, in_mujoco, config.episodes);
+}
+
+std::string MapCsv(const MapResult& map) {
+  const MapAxis& x = map.config.x;
+  const MapAxis& y = map.config.y;
+  std::string csv = Concat(x.name, ",", y.name,
+                           ",episodes,successes,success_rate,swing_up_seconds,mujoco_successes,"
+                           "mujoco_swing_up_seconds\n");
+  size_t next_checked = 0;
+  for (size_t i = 0; i < map.cells.size(); ++i) {
+    const MapCell& cell = map.cells[i];
+    csv += Concat(FormatNumber(x.values[i % x.values.size()]), ",",
+                  FormatNumber(y.values[i / x.values.size()]), ",", map.config.episodes, ",",
+                  cell.successes, ",", FormatNumber(RateOf(map, cell)), ",",
+                  Cell(cell.swing_up_seconds), ",");
+    const bool checked =
+        next_checked < map.checked.size() && map.checked[next_checked] == static_cast<int64_t>(i);
+    if (checked) {
+      const MapCell& again = map.in_mujoco[next_checked++];
+      csv += Concat(again.successes, ",", Cell(again.swing_up_seconds));
+    } else {
+      csv += ",";
+    }
+    csv += '\n';
+  }
+  return csv;
+}
+
+void WriteMap(MapResult& map, const std::filesystem::path& folder) {
+  const auto note = [&](const char* name) {
+    map.files.push_back((folder / name).string());
+    return folder / name;
+  };
+  WriteFileAtomically(note("map.csv"), MapCsv(map));
+  const Figure figure = MapFigure(map);
+  Draw(figure, note("map.svg"));
+  Draw(figure, note("map.png"));
+}
+
+std::string MapJson(const MapResult& map) { return PrintableJson(JsonOf(map)); }
+
+void CheckSameAxes(const std::vector<NamedMap>& maps) {
+  const MapConfig& first = maps.front().map.config;
+  for (const auto& [name, map] : maps) {
+    if (map.config.x.values == first.x.values && map.config.y.values == first.y.values) continue;
+    throw BadInput(Concat(name, ": expected a policy made for the same plant as ",
+                          maps.front().name, ", from which percentages on an axis are counted; ",
+                          "numbers (--x mass2=0.5:1.5) are the same for all"));
+  }
+}
+
+void WriteMaps(std::vector<NamedMap>& maps, const fs::path& folder) {
+  Figure figure;
+  figure.columns = maps.size() == 4 ? 2 : static_cast<int>(std::min<size_t>(3, maps.size()));
+  const int columns = figure.columns;
+  const int count = static_cast<int>(maps.size()), rows = (count + columns - 1) / columns;
+  figure.width = 40 + 420 * columns;
+  figure.height = 60 + 430 * rows;
+  figure.caption = CaptionOf(maps.front().map);
+  for (int i = 0; i < count; ++i) {
+    auto& [name, map] = maps[static_cast<size_t>(i)];
+    HeatMap success = SuccessMap(map);
+    success.bar = i % columns == columns - 1 || i == count - 1;
+    Panel& panel = figure.panels.emplace_back(MapPanel(map, name, std::move(success)));
+    // One legend of all dots, at the bottom left.
+    const bool names = i == (rows - 1) * columns;
+    for (Line& line : panel.lines) line.name = names ? "what it was made for" : "";
+    const fs::path table = folder / Concat("map-", i + 1, ".csv");
+    WriteFileAtomically(table, MapCsv(map));
+    map.files = {table.string(), (folder / "maps.svg").string(), (folder / "maps.png").string()};
+  }
+  Draw(figure, folder / "maps.svg");
+  Draw(figure, folder / "maps.png");
+}
+
+std::string MapsJson(const std::vector<NamedMap>& maps) {
+  ordered_json list = ordered_json::array();
+  for (const NamedMap& one : maps) list.push_back(JsonOf(one.map));
+  return PrintableJson(list);
+}
+
+}  // namespace upswing

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "judge/map_grid.h"
+#include "run/model_info.h"
+
+namespace upswing {
+
+/// A finished map.
+struct MapResult {
+  MapConfig config;
+  std::string policy;              // path
+  std::string physics;             // name of the engine
+  std::optional<ModelInfo> model;  // none: the built-in one
+  std::string changes;             // what is not as in the training, the axes aside; empty: nothing
+  std::string dot;                 // label of the training's place; empty: it is not on the map
+  std::vector<MapCell> cells;      // (ny × nx)
+  std::vector<int64_t> checked;    // cells that were repeated in MuJoCo, rising
+  std::vector<MapCell> in_mujoco;  // their results there
+  double seconds = 0;              // wall time of the map itself
+  std::vector<std::string> files;  // written
+
+  int64_t episodes() const { return config.cells() * config.episodes; }
+  double mean_success() const;     // rate over all episodes
+  double always_success() const;   // share of the cells where every episode succeeds
+  double median_swing_up() const;  // of the cells' medians, s; NaN if there are none
+  MapAgreement agreement() const;  // of the engines
+  /// What a cell without a failure implies, as text: `10 of 10: 95% interval 72.2% to 100%`.
+  std::string success_interval() const;
+};
+
+/// One row for each cell, x first; MuJoCo's results are empty where the cell was not repeated.
+std::string MapCsv(const MapResult& map);
+
+/// Writes map.csv, map.svg and map.png into a folder and notes them in `files`.
+void WriteMap(MapResult& map, const std::filesystem::path& folder);
+
+/// The map as a JSON document.
+std::string MapJson(const MapResult& map);
+
+/// Maps of several policies, side by side.
+struct NamedMap {
+  std::string name;  // short
+  MapResult map;
+};
+
+/// Throws BadInput unless all have the same axes.
+void CheckSameAxes(const std::vector<NamedMap>& maps);
+
+/// Writes map-1.csv, map-2.csv, … and maps.svg and maps.png, where the success of each is a panel,
+/// all with one scale of colours, into a folder, and notes them in each map's `files`.
+void WriteMaps(std::vector<NamedMap>& maps, const std::filesystem::path& folder);
+
+/// A JSON list of the maps.
+std::string MapsJson(const std::vector<NamedMap>& maps);
+
+}  // namespace upswing

@@ -1,0 +1,234 @@
+#include "judge/rollout.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "setup/config.h"
+
+namespace upswing {
+namespace {
+
+/// Control steps in a second, a whole number in all tasks.
+double StepsPerSecond(const EnvSpec& spec) { return std::round(1 / spec.step_seconds); }
+
+/// (Q) in units of reward.
+std::vector<double> ValuesOf(const Policy& policy, Matrix<const float> obs,
+                             Policy::Memory& memory) {
+  std::vector<float> numbers(static_cast<size_t>(policy.num_values()));
+  policy.Values(obs, Matrix<float>(numbers.data(), 1, policy.num_values()), memory);
+  const double scale = ValueUnitsOf(policy).reward_scale;
+  std::vector<double> values;
+  values.reserve(numbers.size());
+  for (const float value : numbers) values.push_back(value / scale);
+  return values;
+}
+
+/// What the policy estimates in a row, as far as it does.
+void Estimate(const Policy& policy, Matrix<const float> obs, Policy::Memory& memory,
+              RolloutRow& row) {
+  if (policy.num_values() > 0) row.q = ValuesOf(policy, obs, memory);
+  if (!policy.has_spread()) return;
+  row.spread.emplace();
+  policy.Spread(obs, {&row.spread->low, 1, 1}, {&row.spread->high, 1, 1}, memory);
+}
+
+/// The double pendulum's reward for the state and the torque of a row.
+void RewardRow(const Plant& plant, RolloutRow& row) {
+  const auto terms = RewardTerms(plant, StateOf(row), row.torque);
+  row.terms.assign(terms.begin(), terms.end());
+  row.reward = 0;
+  for (const double term : row.terms) row.reward += term;
+  row.at_goal = Inverted(StateOf(row));
+}
+
+}  // namespace
+
+int64_t RolloutSteps(const EnvSpec& spec, double seconds) {
+  return std::llround(seconds * StepsPerSecond(spec));
+}
+
+PendulumState StateOf(const RolloutRow& row) {
+  return {row.state[0], row.state[1], row.state[2], row.state[3]};
+}
+
+Episode::Episode(RolloutConfig config)
+    : config_(std::move(config)),
+      env_([&] {
+        EnvConfig env = config_.env;
+        env.episode_seconds = config_.seconds + 1;
+        return MakeEnv(env);
+      }()),
+      result_(env_->spec()) {
+  if (config_.start) env_->SetState(0, *config_.start);
+  if (config_.policy != nullptr) memory_ = config_.policy->Start(1);
+}
+
+std::vector<double> Episode::state() const {
+  std::vector<double> state(spec().state_names.size());
+  env_->GetState(0, state);
+  return state;
+}
+
+RolloutRow Episode::Step(bool motor) {
+  double torque = 0;
+  if (config_.policy != nullptr) config_.policy->Act(env_->obs(), {&torque, 1, 1}, *memory_);
+  if (step_ < config_.schedule.size()) torque = config_.schedule[step_];
+  if (!motor) torque = 0;
+  RolloutRow row;
+  row.t = static_cast<double>(step_++) / StepsPerSecond(spec());
+  row.state = state();
+  row.chosen = torque;
+  if (config_.estimates) Estimate(*config_.policy, env_->obs(), *memory_, row);
+  // Of the double pendulum, whose episode may begin anew at the end of this step.
+  const auto* env = pendulum();
+  const Plant plant = env != nullptr ? env->plant(0) : Plant();
+  env_->Step({&torque, 1, 1}, result_);
+  row.torque = result_.torque[0];
+  row.at_goal = result_.at_goal[0] != 0;
+  row.reward = result_.reward[0];
+  row.terms = result_.reward_terms;
+  if (env != nullptr) RewardRow(plant, row);
+  return row;
+}
+
+Error StateBlewUp(const RolloutRow& row) {
+  return Failure(Concat("the state blew up numerically after t = ", FormatNumber(row.t), " s"));
+}
+
+Rollout RunRollout(const RolloutConfig& config) {
+  Episode episode(config);
+  Rollout rollout{episode.spec(), {}, Plant(), Disturbance()};
+  if (const auto* pendulum = episode.pendulum(); pendulum != nullptr) {
+    rollout.plant = pendulum->plant(0);
+    rollout.disturbance = pendulum->disturbance(0);
+  }
+  // Behind the last step there is one more state: its row's step gives the motor's torque there.
+  const int64_t steps = RolloutSteps(rollout.spec, config.seconds);
+  for (int64_t k = 0; k <= steps; ++k) {
+    rollout.rows.push_back(episode.Step());
+    if (episode.pendulum() != nullptr && episode.terminated() && k < steps) {
+      throw StateBlewUp(rollout.rows.back());
+    }
+    if (episode.terminated() || episode.truncated()) break;
+  }
+  return rollout;
+}
+
+TorqueFigures TorquesOf(const Rollout& rollout) {
+  const bool pendulum = rollout.spec.task == kDoublePendulum;
+  const std::vector<RolloutRow>& rows = rollout.rows;
+  // The torque of the double pendulum's last state leads nowhere.
+  const size_t steps = rows.size() - (pendulum && rows.size() > 1 ? 1 : 0);
+  TorqueFigures figures;
+  double squares = 0, sum = 0, goal_sum = 0;
+  int64_t goal_since = -1;  // first state of the present stretch at the goal; -1: there is none
+  for (size_t k = 0; k < steps; ++k) {
+    const double torque = rows[k].torque;
+    const double change = k == 0 ? 0 : std::abs(torque - rows[k - 1].torque);
+    figures.peak = std::max(figures.peak, std::abs(torque));
+    squares += torque * torque;
+    sum += change;
+    goal_sum += change;
+    const bool at_goal = rows[std::min(pendulum ? k + 1 : k, rows.size() - 1)].at_goal;
+    if (!at_goal) goal_since = -1;
+    if (!at_goal || goal_since >= 0) continue;
+    goal_since = static_cast<int64_t>(k) + 1;
+    goal_sum = 0;
+  }
+  const auto seconds = [&](int64_t n) {
+    return static_cast<double>(n) * rollout.spec.step_seconds;
+  };
+  const auto count = static_cast<int64_t>(steps);
+  figures.rms = std::sqrt(squares / static_cast<double>(count));
+  figures.variation = sum / seconds(count);
+  const bool held = !rollout.spec.evaluation.by_return();
+  if (held && goal_since >= 0 && goal_since < count) {
+    figures.goal_variation = goal_sum / seconds(count - goal_since);
+  }
+  return figures;
+}
+
+std::string TorqueText(const Rollout& rollout) {
+  const TorqueFigures f = TorquesOf(rollout);
+  const std::string& unit = rollout.spec.action_unit;
+  std::string text = fmt::format("peak {:.4g} {}, rms {:.4g} {}, variation {:.4g} {}/s", f.peak,
+                                 unit, f.rms, unit, f.variation, unit);
+  if (f.goal_variation) text += fmt::format(", once upright {:.4g} {}/s", *f.goal_variation, unit);
+  return text;
+}
+
+std::string RolloutCsv(const Rollout& rollout) {
+  const bool pendulum = rollout.spec.task == kDoublePendulum;
+  std::string csv;
+  if (pendulum) {
+    csv =
+        "t,qpos0,qpos1,qvel0,qvel1,torque,energy,height,inverted,reward,energy_reward,"
+        "height_reward,balance_reward,velocity_penalty,torque_penalty\n";
+  } else {
+    csv = Concat("t,", Join(rollout.spec.state_names, ","), ",torque,reward,",
+                 Join(rollout.spec.term_names, ","), '\n');
+  }
+  for (const RolloutRow& row : rollout.rows) {
+    std::vector<double> cells{row.t};
+    cells.insert(cells.end(), row.state.begin(), row.state.end());
+    cells.push_back(row.torque);
+    if (pendulum) {
+      const PendulumState s = StateOf(row);
+      const double inverted = row.at_goal ? 1 : 0;
+      cells.insert(cells.end(), {Energy(rollout.plant, s), TipHeight(rollout.plant, s), inverted});
+    }
+    cells.push_back(row.reward);
+    for (const double term : row.terms) cells.push_back(term + 0.0);  // no -0
+    std::vector<std::string> texts;
+    texts.reserve(cells.size());
+    for (const double cell : cells) texts.push_back(FormatNumber(cell));
+    csv += Join(texts, ",") + '\n';
+  }
+  return csv;
+}
+
+EvaluationEpisode JudgeEpisode(const Policy& policy, const EnvConfig& config) {
+  return EvaluateEpisodes(policy, *MakeEnv(config)).front();
+}
+
+std::string JudgementText(const EvaluationEpisode& episode, const EvaluationRule& rule) {
+  std::string upright;
+  if (!rule.by_return()) {
+    upright = episode.swing_up_seconds
+                  ? fmt::format("upright from {:.2f} s to the end, ", *episode.swing_up_seconds)
+                  : "not upright at the end, ";
+  }
+  return fmt::format("{}, {}return {:.6g}", episode.success ? "success" : "failure", upright,
+                     episode.reward_sum);
+}
+
+std::string EpisodeText(const Rollout& rollout) {
+  if (rollout.spec.task != kDoublePendulum) return "";
+  std::string text = PlantText(rollout.plant);
+  const auto& [noise, delay] = rollout.disturbance;
+  if (noise > 0) text += Concat(", sensor_noise ", FormatNumber(noise));
+  if (delay > 0) text += Concat(", delay ", FormatNumber(delay));
+  return text;
+}
+
+std::vector<double> ParseStart(const std::string& text, const EnvSpec& spec) {
+  const std::vector<std::string_view> pieces = Split(text, ',');
+  const size_t S = spec.state_names.size();
+  std::vector<double> numbers;
+  for (const std::string_view piece : pieces) {
+    const auto number = ParseNumber(piece);
+    if (number && std::isfinite(*number)) numbers.push_back(*number);
+  }
+  if (pieces.size() != S || numbers.size() != S) {
+    throw BadInput(Concat("--start: expected ", S, " numbers ", Join(spec.state_names, ","),
+                          ", got \"", text, "\""));
+  }
+  return numbers;
+}
+
+}  // namespace upswing

@@ -1,0 +1,124 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+#include "core/policy.h"
+#include "core/sample.h"
+#include "rl/evaluate.h"
+#include "setup/task.h"
+
+/// One episode, step by step, as `simulate` writes and `plot` draws it.
+namespace upswing {
+
+/// One moment and the torque that acts from then on.
+struct RolloutRow {
+  double t = 0;               // s
+  std::vector<double> state;  // (S)
+  double torque = 0;          // what the motor gives: after its delay, within its limit; N·m
+                              // or the task's unit of actions
+  // Of the double pendulum for the state and the torque of this row, of other tasks for the step
+  // that begins here.
+  bool at_goal = false;
+  double reward = 0;          // the sum of the terms
+  std::vector<double> terms;  // (K)
+  // If asked for, and if the policy has them:
+  std::vector<double> q;           // (Q) values of its actions, or V alone, in units of reward
+  std::optional<Interval> spread;  // the central 68% of the torques that it learned to draw
+  double chosen = 0;               // the torque that was chosen, before delay and limit
+};
+
+struct RolloutConfig {
+  const Policy* policy = nullptr;            // who chooses torques; none: the schedule
+  std::vector<double> schedule;              // a torque for each step; 0 behind its end
+  EnvConfig env;                             // of one environment
+  std::optional<std::vector<double>> start;  // (S); none: that of the environment's own episode
+  double seconds = 20;                       // to the nearest step; less if it terminates
+  bool estimates = false;  // whether rows have what the policy estimates: q and spread
+};
+
+struct Rollout {
+  EnvSpec spec;
+  // At each control step; of the double pendulum the last state included, of other tasks up to the
+  // last step.
+  std::vector<RolloutRow> rows;
+  // Of this episode of the double pendulum:
+  Plant plant;
+  Disturbance disturbance;
+};
+
+/// An episode in the making, for RunRollout and for those who watch.
+class Episode {
+ public:
+  /// The policy must outlive it. Throws BadInput as MakeEnv does.
+  explicit Episode(RolloutConfig config);
+
+  /// The row of the present state, with which the environment steps on. Without `motor` the torque
+  /// is 0 instead of what policy or schedule choose.
+  RolloutRow Step(bool motor = true);
+
+  const EnvSpec& spec() const { return env_->spec(); }
+  /// The present state (S).
+  std::vector<double> state() const;
+  /// Whether the last step ended it; the environment is then in another one.
+  bool terminated() const { return result_.terminated[0] != 0; }
+  bool truncated() const { return result_.truncated[0] != 0; }
+  /// Of the double pendulum; null for other tasks.
+  PendulumEnv* pendulum() { return dynamic_cast<PendulumEnv*>(env_.get()); }
+  const PendulumEnv* pendulum() const { return dynamic_cast<const PendulumEnv*>(env_.get()); }
+
+ private:
+  RolloutConfig config_;
+  std::unique_ptr<VectorEnv> env_;
+  StepResult result_;
+  std::unique_ptr<Policy::Memory> memory_;
+  size_t step_ = 0;
+};
+
+/// That a state is no longer finite after the step of this row.
+Error StateBlewUp(const RolloutRow& row);
+
+/// How many control steps so many seconds are, to the nearest.
+int64_t RolloutSteps(const EnvSpec& spec, double seconds);
+
+/// Throws Failure if the state blows up.
+Rollout RunRollout(const RolloutConfig& config);
+
+/// The motor's torques over a rollout, as `eval` has them of an episode.
+struct TorqueFigures {
+  double peak = 0, rms = 0;  // N·m or the task's unit of actions
+  double variation = 0;      // Σ |τₖ - τₖ₋₁| a second
+  // The same over the last stretch at the goal, if it lasts to the end; of tasks whose goal is
+  // held.
+  std::optional<double> goal_variation;
+};
+TorqueFigures TorquesOf(const Rollout& rollout);
+/// The same in words: `peak 5 N·m, rms 1.2 N·m, variation 34 N·m/s, once upright 2 N·m/s`.
+std::string TorqueText(const Rollout& rollout);
+
+/// A table with a row for each state: t, state, torque, for the double pendulum energy, height and
+/// whether it is inverted, reward and its terms.
+std::string RolloutCsv(const Rollout& rollout);
+
+/// The double pendulum's state in a row.
+PendulumState StateOf(const RolloutRow& row);
+
+/// What `eval` says of the environment's own episode.
+EvaluationEpisode JudgeEpisode(const Policy& policy, const EnvConfig& env);
+
+/// The same in words: `success, upright from 2.34 s to the end, return 2345`.
+std::string JudgementText(const EvaluationEpisode& episode, const EvaluationRule& rule);
+
+/// What distinguishes an episode from others with the same flags: its plant, `mass1 0.93, …`, and
+/// its sensor noise (rad, rad/s) and delay (s) where there are any; empty for other tasks.
+std::string EpisodeText(const Rollout& rollout);
+
+/// A state as --start gives it: a number for each state variable, such as q1,q2,w1,w2 (rad, rad/s).
+/// Throws BadInput.
+std::vector<double> ParseStart(const std::string& text, const EnvSpec& spec);
+
+}  // namespace upswing

@@ -1,0 +1,143 @@
+#include "judge/trial.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "io/run_folder.h"
+#include "judge/rollout.h"
+#include "mujoco/engines.h"
+#include "setup/task.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The environments of a policy for a task without plant, sensors and engines. Throws BadInput if
+/// the arguments set one of these.
+EnvConfig OtherTask(const TrialArguments& a, const LoadedPolicy& loaded) {
+  const auto refuse = [&](const std::string& flag) {
+    throw BadInput(Concat(flag, ": expected none, as ", loaded.task, " has no such setting"));
+  };
+  if (!a.set.empty()) refuse("--set");
+  if (!a.model.empty()) refuse("--model");
+  if (a.unknown_plant) refuse("--unknown-plant");
+  if (!a.flags.empty()) refuse(FlagOf(a.flags.front().name));
+  EnvConfig env;
+  env.task = loaded.task;
+  env.seed = static_cast<uint64_t>(a.seed);
+  env.stream = "evaluation";
+  return env;
+}
+
+/// Where figures go unless the user says.
+fs::path DefaultOut(const LoadedPolicy& loaded, const std::string& name) {
+  const bool has_file = !loaded.path.empty();
+  const fs::path run = loaded.path.parent_path();
+  const std::string stem = has_file ? loaded.path.stem().string() : loaded.policy->kind();
+  const fs::path first = has_file && fs::exists(run / RunFolder::kConfig)
+                             ? run / name
+                             : fs::path("runs") / Concat(name, "-", stem);
+  fs::path out = first;
+  for (int number = 2; fs::exists(fs::symlink_status(out)); ++number) {
+    out = Concat(first.string(), "-", number);
+  }
+  return out;
+}
+
+}  // namespace
+
+TrialConditions ConditionsOf(const TrialArguments& a) {
+  TrialConditions conditions;
+  SetFlags(OptionsOf(conditions), a.flags);
+  return conditions;
+}
+
+EnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded) {
+  EnvConfig env;
+  if (loaded != nullptr && loaded->task != kDoublePendulum) return OtherTask(a, *loaded);
+  env.engine = &FindEngine(a.physics, "--physics");
+  const TrialConditions conditions = ConditionsOf(a);
+  env.disturbances = {conditions.disturbance};
+  env.randomization = conditions.randomization;
+  if (a.unknown_plant && loaded == nullptr) {
+    throw BadInput("--unknown-plant: expected a policy, to which the plant can be unknown");
+  }
+  if (loaded != nullptr) {
+    env.mjcf = loaded->mjcf;
+    env.memory = loaded->memory();
+    if (loaded->identifies()) env.identified_from = loaded->plant;
+    if (a.unknown_plant) env.assumed_plant = loaded->plant;
+  }
+  env.plants = {
+      ChangedPlant(loaded != nullptr ? loaded->plant : Plant(), a.model, a.set, env.mjcf)};
+  env.seed = static_cast<uint64_t>(a.seed);
+  env.stream = "evaluation";
+  return env;
+}
+
+std::unique_ptr<VectorEnv> OneEpisode(EnvConfig config, int index) {
+  config.num_envs = 1;
+  config.first_index += static_cast<uint64_t>(index);
+  return MakeEnv(config);
+}
+
+std::string ChangesText(const EnvConfig& env) {
+  if (env.task != kDoublePendulum) return "";
+  TrialConditions conditions, defaults;
+  conditions.disturbance = env.disturbance(0);
+  conditions.randomization = env.randomization;
+  const Options options = OptionsOf(conditions), usual = OptionsOf(defaults);
+  std::vector<std::string> texts;
+  for (size_t k = 0; k < options.all().size(); ++k) {
+    const Option& option = options.all()[k];
+    if (option.text() == usual.all()[k].text()) continue;
+    texts.push_back(Concat(option.name, " ", option.text()));
+  }
+  if (env.assumed_plant) texts.emplace_back("the plant unknown to the policy");
+  return Join(texts, ", ");
+}
+
+std::string PlantChangesText(Plant plant, const LoadedPolicy& loaded) {
+  Plant made_for = loaded.plant;
+  const Options now = OptionsOf(plant), before = OptionsOf(made_for);
+  std::vector<std::string> texts;
+  for (size_t k = 0; k < now.all().size(); ++k) {
+    const double value = *std::get<double*>(now.all()[k].target);
+    const double usual = *std::get<double*>(before.all()[k].target);
+    if (value == usual) continue;
+    texts.push_back(fmt::format("{} {:.4g} {} ({}: {:.4g})", now.all()[k].name, value,
+                                now.all()[k].unit, loaded.origin(), usual));
+  }
+  return Join(texts, ", ");
+}
+
+fs::path FigureFolder(const std::string& out, const LoadedPolicy& loaded, const std::string& name) {
+  if (out.empty()) return DefaultOut(loaded, name);
+  fs::path folder = out;
+  for (const char* extension : {".svg", ".png", ".csv"}) {
+    if (folder.extension() == extension) {
+      throw BadInput(
+          Concat("--out: expected a folder, in which several files are made, got the name "
+                 "of a file: ",
+                 out));
+    }
+  }
+  CheckFree(folder);
+  return folder;
+}
+
+std::optional<std::vector<double>> ChooseEpisode(const EpisodeArguments& a, EnvConfig& env) {
+  if (a.start && a.given()) {
+    throw BadInput("--start: expected none beside --episode, which has a start of its own");
+  }
+  env.first_index = static_cast<uint64_t>(std::max<int64_t>(0, a.number));
+  // The double pendulum begins hanging at rest, other tasks in a start of their own.
+  if (a.given() || (!a.start && env.task != kDoublePendulum)) return std::nullopt;
+  return ParseStart(a.start.value_or("0,0,0,0"), SpecOf(env));
+}
+
+}  // namespace upswing

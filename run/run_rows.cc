@@ -1,0 +1,41 @@
+#include "run/run_rows.h"
+
+namespace upswing {
+
+Row EpisodeRow(const TrainState& s, const FinishedEpisode& episode, const EnvSpec& spec) {
+  Row row{{"step", s.steps},
+          {"episode", s.episodes},
+          {"return", episode.reward_sum},
+          {"length", episode.length},
+          {"terminated", episode.terminated ? 1 : 0}};
+  const std::vector<std::string>& names = spec.term_names;
+  for (size_t k = 0; k < names.size(); ++k) row.emplace_back(names[k], episode.terms[k]);
+  return row;
+}
+
+Row MetricsRow(const TrainState& s, const Metrics& metrics) {
+  Row row{{"step", s.steps}, {"episodes", s.episodes}};
+  row.insert(row.end(), metrics.begin(), metrics.end());
+  row.emplace_back("mean_return", s.mean_return());
+  row.emplace_back("success_rate", s.last_success_rate);
+  row.emplace_back("seconds", s.seconds);
+  return row;
+}
+
+Row EvaluationRow(const TrainState& s, const Evaluation& e) {
+  return {{"step", s.steps},
+          {"success_rate", e.success_rate()},
+          {"success_low", e.success_interval.low},
+          {"success_high", e.success_interval.high},
+          {"mean_return", e.reward_sum.mean},
+          {"swing_up_seconds", e.swing_up_seconds.median},
+          {"work", e.work.mean},
+          {"rms_torque", e.rms_torque.mean},
+          {"torque_variation", e.torque_variation.mean},
+          {"torque_variation_upright", e.goal_variation.mean},
+          {"value", e.value},
+          {"discounted_return", e.discounted_return},
+          {"seconds", s.seconds}};
+}
+
+}  // namespace upswing

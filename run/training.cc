@@ -1,0 +1,106 @@
+#include "run/training.h"
+
+#include <utility>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "mujoco/engines.h"
+#include "setup/config_checks.h"
+#include "setup/loaded_policy.h"
+
+namespace upswing {
+namespace {
+
+constexpr std::string_view kCheckpointFormat = "upswing-checkpoint-1";
+
+/// The settings, if there is memory for such a training. Throws BadInput.
+Config Checked(Config config) {
+  CheckMemory(config);
+  return config;
+}
+
+/// Environments as the settings have them, whose work the pool shares.
+std::unique_ptr<VectorEnv> MakeTrainingEnv(const Config& config, ThreadPool& pool) {
+  EnvConfig env = config.Environments();
+  env.pool = &pool;
+  return MakeEnv(env);
+}
+
+}  // namespace
+
+EnvConfig EvaluationEnvironments(const Config& config, int64_t step) {
+  EnvConfig env = config.Environments();
+  env.num_envs = static_cast<int>(config.train.eval_episodes);
+  env.episode_seconds = SpecOf(env).evaluation.seconds;
+  env.start = StartStates();
+  env.weights = RewardWeights();
+  env.stream = Concat("evaluation at step ", step);
+  return env;
+}
+
+Training::Training(Config config, int threads, std::vector<TrainObserver*> observers)
+    : config_(Checked(std::move(config))),
+      pool_(threads),
+      env_(MakeTrainingEnv(config_, pool_)),
+      agent_(config_.MakeAgent(env_->spec(), pool_)),
+      trainer_({config_.train,
+                [this](const Policy& policy, int64_t step) { return Evaluate(policy, step); },
+                InfoOf(config_), std::move(observers)},
+               *agent_, *env_) {}
+
+std::unique_ptr<Policy> Training::policy() const {
+  PolicyInfo info = InfoOf(config_);
+  info.step = state().steps;
+  return agent_->ExportPolicy(std::move(info));
+}
+
+Evaluation Training::Evaluate(const Policy& policy, int64_t step) {
+  // The closed form finds a failing policy quickly; one that passes is evaluated in MuJoCo.
+  if (config_.eval_physics != kScreened) {
+    return EvaluateIn(FindEngine(config_.eval_physics, "--eval-physics"), policy, step);
+  }
+  if (config_.mjcf.empty()) {
+    Evaluation screening = EvaluateIn(kClosedForm, policy, step);
+    if (!screening.passed || config_.task != kDoublePendulum) return screening;
+  }
+  return EvaluateIn(kMuJoCo, policy, step);
+}
+
+Evaluation Training::EvaluateIn(const Engine& engine, const Policy& policy, int64_t step) {
+  EnvConfig config = EvaluationEnvironments(config_, step);
+  config.pool = &pool_;
+  config.engine = &engine;
+  const std::unique_ptr<VectorEnv> env = MakeEnv(config);
+  return upswing::Evaluate(policy, *env, &pool_);
+}
+
+Tensors Training::Checkpoint() {
+  Tensors checkpoint;
+  checkpoint.metadata = {{"format", std::string(kCheckpointFormat)},
+                         {"upswing_version", UPSWING_VERSION},
+                         {"config", ConfigToml(config_, true)},
+                         {"model", config_.mjcf}};
+  trainer_.State(Archive::Saver(checkpoint));
+  return checkpoint;
+}
+
+void Training::Load(const Tensors& checkpoint) {
+  const auto expect = [&](const std::string& key, std::string_view expected) {
+    const std::string& got = checkpoint.Metadata(key);
+    if (got != expected) {
+      throw BadInput(Concat(checkpoint.where(), ": ", key, ": expected \"", expected, "\", got \"",
+                            got, "\""));
+    }
+  };
+  expect("format", kCheckpointFormat);
+  expect("upswing_version", UPSWING_VERSION);
+  Config old_config = ConfigIn(checkpoint.Metadata("config"), checkpoint.where());
+  ExpectSameSettings(OptionsOf(old_config), OptionsOf(config_), checkpoint.where(),
+                     [](const Option& option) { return option.identity; });
+  if (checkpoint.Metadata("model") != config_.mjcf) {
+    throw BadInput(Concat(checkpoint.where(), ": made with another model than ", config_.model));
+  }
+  trainer_.State(Archive::Loader(checkpoint));
+}
+
+}  // namespace upswing

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "core/tensors.h"
+#include "core/thread_pool.h"
+#include "rl/trainer.h"
+#include "setup/config.h"
+
+namespace upswing {
+
+/// The environments of the evaluation at a step of a training with these settings: an episode in
+/// each. The engine is the training's.
+EnvConfig EvaluationEnvironments(const Config& config, int64_t step);
+
+/// A training made of its settings: environments, agent and training loop. It writes no file; see
+/// TrainingRun.
+class Training {
+ public:
+  /// With so many threads. Observers must outlive it. Throws BadInput if it would not fit into the
+  /// memory that is free.
+  Training(Config config, int threads, std::vector<TrainObserver*> observers = {});
+
+  /// One step of all environments; see Trainer::Step.
+  bool Step() { return trainer_.Step(); }
+  const Trainer& trainer() const { return trainer_; }
+  const TrainState& state() const { return trainer_.state(); }
+  const Config& config() const { return config_; }
+  const Agent& agent() const { return *agent_; }
+  const EnvSpec& spec() const { return env_->spec(); }
+  int threads() const { return pool_.threads(); }
+
+  /// The policy as it stands, without exploration.
+  std::unique_ptr<Policy> policy() const;
+
+  /// Evaluation of a policy from fresh starts with the reward's standard weights, on the training
+  /// plant or, where plants are random, on a fresh one for each episode; disturbed as in training.
+  Evaluation Evaluate(const Policy& policy, int64_t step);
+
+  /// Saves or loads the whole state.
+  void State(const Archive& archive) { trainer_.State(archive); }
+
+  /// The whole state, with the settings that it belongs to. Views the arrays: to be saved before
+  /// the next Step.
+  Tensors Checkpoint();
+  /// Throws BadInput unless the checkpoint is one of this version and of these settings.
+  void Load(const Tensors& checkpoint);
+
+ private:
+  Evaluation EvaluateIn(const Engine& engine, const Policy& policy, int64_t step);
+
+  Config config_;
+  ThreadPool pool_;
+  std::unique_ptr<VectorEnv> env_;
+  std::unique_ptr<Agent> agent_;
+  Trainer trainer_;
+};
+
+}  // namespace upswing

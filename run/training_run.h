@@ -1,0 +1,67 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "io/run_folder.h"
+#include "run/training.h"
+
+namespace upswing {
+
+/// What a user may request during a training.
+enum class TrainRequest { kGoOn, kCheckpoint, kStop };
+
+/// Whether one of the flags sets the number of steps.
+bool StepsGiven(const std::vector<FlagValue>& flags);
+
+/// A training in a run folder, into which it writes tables, log, checkpoints and the best policy.
+class TrainingRun : private TrainObserver {
+ public:
+  /// A new run in the folder `out`, with its first checkpoint; if `out` is empty in
+  /// runs/AGENT-seedSEED, or with -2, -3, … where that is taken. Throws BadInput, with nothing
+  /// written.
+  static std::unique_ptr<TrainingRun> Make(const std::filesystem::path& out, Config config);
+
+  /// The run in a folder, with some settings changed. Throws BadInput, with nothing changed, if
+  /// another process works there, if the run is not whole, or if it is another version's.
+  static std::unique_ptr<TrainingRun> Resume(const std::filesystem::path& path,
+                                             const std::vector<FlagValue>& flags = {});
+
+  const Training& training() const { return *training_; }
+  const std::filesystem::path& path() const { return path_; }
+
+  /// Who drives a run, besides being told how it goes on.
+  class Driver : public TrainObserver {
+   public:
+    /// After each step: whether to go on.
+    virtual TrainRequest AfterStep(const TrainState&) { return TrainRequest::kGoOn; }
+  };
+
+  /// Trains to the end, or until the driver asks to stop; then the state is on disk. Returns
+  /// whether it has ended. Throws Failure that names the step and the last complete checkpoint.
+  bool Train(Driver& driver);
+
+ private:
+  explicit TrainingRun(std::filesystem::path path) : path_(std::move(path)) {}
+  /// Loads the checkpoint and opens the tables, with the folder locked.
+  void Open();
+  bool Loop(Driver& driver);
+  void SaveCheckpoint();
+  void LogIfPossible(const std::string& line);
+
+  void OnEpisode(const TrainState& s, const FinishedEpisode& episode) override;
+  void OnMetrics(const TrainState& s, const Metrics& metrics) override;
+  void OnEvaluation(const TrainState& s, const Evaluation& e) override;
+  void OnBest(const TrainState& s, const Policy& policy) override;
+
+  std::filesystem::path path_;
+  std::optional<FolderLock> lock_;
+  std::unique_ptr<Training> training_;
+  std::optional<RunFolder> folder_;
+  TrainObserver* view_ = nullptr;  // told after the folder is written
+  int64_t checkpoint_at_ = 0;      // step of the last checkpoint
+};
+
+}  // namespace upswing

@@ -1,0 +1,180 @@
+#include "setup/config.h"
+
+#include "core/error.h"
+#include "core/text.h"
+#include "io/file.h"
+#include "io/run_folder.h"
+#include "mujoco/engines.h"
+#include "mujoco/mjcf_check.h"
+#include "mujoco/model.h"
+#include "rl/dqn.h"
+#include "rl/ppo.h"
+#include "rl/sac.h"
+
+namespace upswing {
+
+namespace fs = std::filesystem;
+
+const std::vector<std::string>& AlgorithmNames() {
+  static const std::vector<std::string> kNames{kDqn, kSac, kPpo};
+  return kNames;
+}
+
+void Config::Describe(Options& o) {
+  const std::string chosen = algorithm;
+  o.Section("train");
+  o.Add(&agent, "agent", "d3qn", "named agent whose settings the others begin with");
+  o.AddChoice(&algorithm, "algorithm", AlgorithmNames(),
+              "what learns; each algorithm has settings of its own")
+      .implied = true;
+  algorithm = chosen;
+  train.Describe(o);
+  o.Section("task");
+  o.AddChoice(&task, "task", TaskNames(), "what is to be learned").implied = true;
+  o.Add(&episode_seconds, "episode_seconds", 4, {0.02, 1e6}, "s", "length of a training episode")
+      .step = kControlPeriod;
+  o.Add(&random_start_share, "random_start_share", 0.5, kUnit, "",
+        "share of the episodes that begin in a random state instead of hanging");
+  o.Add(&random_start_velocity, "random_start_velocity", 5, {0, 50}, "rad/s",
+        "largest velocity of these random states");
+  o.Add(&memory, "memory", 0, {0, kMostMemory}, "steps",
+        "past steps whose torque and change of velocities the agent sees too");
+  o.Add(&identify, "identify", false,
+        "the agent sees what the motion tells of the plant: an estimate of its constants")
+      .implied = true;
+  o.AddChoice(&physics, "physics", EngineNames(),
+              "engine to train in; closed-form computes the same physics faster than mujoco");
+  std::vector<std::string> judges = EngineNames();
+  judges.insert(judges.begin(), std::string(kScreened));
+  o.AddChoice(&eval_physics, "eval_physics", judges,
+              "engine of the evaluations; screened: in mujoco what succeeds in closed-form");
+  o.Section("plant");
+  o.Add(&model, "model", "", "MJCF file to use instead of the built-in model");
+  plant.Describe(o);
+  disturbance.Describe(o);
+  randomization.Describe(o);
+  reward.Describe(o);
+  if (algorithm == kSac) {
+    sac.Describe(o);
+  } else if (algorithm == kPpo) {
+    ppo.Describe(o);
+  } else {
+    dqn.Describe(o);
+  }
+}
+
+Options EverySetting(Config& scratch) {
+  Options options;
+  for (const std::string& name : AlgorithmNames()) {
+    scratch.algorithm = name;
+    options.AddMissing(OptionsOf(scratch));
+  }
+  return options;
+}
+
+EnvConfig Config::Environments() const {
+  EnvConfig env;
+  env.task = task;
+  env.engine = &FindEngine(physics, "--physics");
+  env.plants = {plant};
+  env.disturbances = {disturbance};
+  env.randomization = randomization;
+  env.num_envs = static_cast<int>(train.envs);
+  env.episode_seconds = episode_seconds;
+  env.memory = static_cast<int>(memory);
+  if (identify) env.identified_from = plant;
+  env.start = {train.start_noise, random_start_share, random_start_velocity};
+  env.weights = reward;
+  env.seed = static_cast<uint64_t>(train.seed);
+  env.stream = "training environment";
+  env.mjcf = mjcf;
+  return env;
+}
+
+std::unique_ptr<Agent> Config::MakeAgent(const EnvSpec& spec, ThreadPool& pool) const {
+  const auto seed = static_cast<uint64_t>(train.seed);
+  if (algorithm == kSac) return std::make_unique<Sac>(sac, spec, seed, pool);
+  if (algorithm == kPpo) return std::make_unique<Ppo>(ppo, spec, seed, pool);
+  return std::make_unique<Dqn>(dqn, spec, seed, pool);
+}
+
+void ExpectSameSettings(const Options& before, const Options& now, const std::string& where,
+                        const std::function<bool(const Option&)>& counts) {
+  for (const Option& new_one : now.all()) {
+    const Option* old_one = before.Get(new_one.name);
+    const std::string old_text = old_one == nullptr ? "none" : old_one->text();
+    if (counts(new_one) && old_text != new_one.text()) {
+      throw BadInput(Concat(where, ": made with ", new_one.section, ".", new_one.name, " = ",
+                            old_text, ", but the configuration says ", new_one.text()));
+    }
+  }
+}
+
+void NameModelCopy(Config& config) {
+  if (!config.mjcf.empty()) config.model = RunFolder::kModel;
+}
+
+void MakeReadyForMany(Config& config) {
+  if (config.train.threads == 0) config.train.threads = 1;
+  NameModelCopy(config);
+}
+
+std::string CompleteToml(Config config) {
+  if (!config.model.empty()) config.model = fs::absolute(config.model).string();
+  return ConfigToml(std::move(config), false);
+}
+
+std::vector<Option> TrainingSettings(Config& config) {
+  std::vector<Option> settings;
+  const Options options = OptionsOf(config);
+  for (const Option& option : options.all()) {
+    const bool is_seed = option.target == Option::Target(&config.train.seed);
+    if (option.identity && !is_seed) settings.push_back(option);
+  }
+  return settings;
+}
+
+std::string ConfigToml(Config config, bool identity_only) {
+  return OptionsOf(config).Toml(
+      !identity_only, [&](const Option& option) { return !identity_only || option.identity; });
+}
+
+std::string PlantText(const Plant& plant) {
+  std::vector<std::string> texts;
+  for (const auto& [name, value] : PlantValues(plant)) {
+    texts.push_back(Concat(name, " ", FormatNumber(value)));
+  }
+  return Join(texts, ", ");
+}
+
+std::vector<const Option*> ApplyChanges(const Options& options, const std::vector<std::string>& set,
+                                        const std::string& flag) {
+  std::vector<const Option*> changed;
+  for (const std::string& change : set) {
+    const size_t equals = change.find('=');
+    if (equals == std::string::npos) {
+      throw BadInput(Concat(flag, ": expected NAME=VALUE, got \"", change, "\""));
+    }
+    const std::string name(Trim(std::string_view(change).substr(0, equals)));
+    const std::string where = Concat(flag, " ", name);
+    for (const Option* option : options.Find(name, where)) {
+      option->Set(Trim(std::string_view(change).substr(equals + 1)), where);
+      changed.push_back(option);
+    }
+  }
+  return changed;
+}
+
+Plant ChangedPlant(const Plant& base, const std::string& model, const std::vector<std::string>& set,
+                   std::string& mjcf) {
+  Plant plant = base;
+  const Options options = OptionsOf(plant);
+  if (!model.empty()) {
+    mjcf = ReadOwnFile(model, kMostMjcfBytes);
+    plant = PlantOf(*LoadModel(mjcf, model));
+  }
+  ApplyChanges(options, set);
+  return plant;
+}
+
+}  // namespace upswing

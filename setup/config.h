@@ -1,0 +1,147 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "core/options.h"
+#include "rl/dqn_config.h"
+#include "rl/ppo_config.h"
+#include "rl/sac_config.h"
+#include "rl/trainer.h"
+#include "setup/task.h"
+#include "sim/double_pendulum.h"
+
+namespace upswing {
+
+/// How many past steps an observation may remember.
+inline constexpr int kMostMemory = 100;
+
+/// Evaluations in the closed form, and once more in MuJoCo where they are passed there.
+inline constexpr std::string_view kScreened = "screened";
+
+inline constexpr const char* kDqn = "dqn";
+inline constexpr const char* kSac = "sac";
+inline constexpr const char* kPpo = "ppo";
+/// Names of the learning algorithms; the first is the usual one.
+const std::vector<std::string>& AlgorithmNames();
+
+/// All settings of a training. Those of an agent exist for its algorithm alone: the same name may
+/// mean another number, with another default, in another algorithm.
+struct Config {
+  std::string agent;      // the named agent that the other settings began with
+  std::string algorithm;  // of AlgorithmNames
+  std::string model;      // path of an MJCF file instead of the built-in model; empty: built-in
+  TrainConfig train;
+  std::string task;  // see TaskNames
+  double episode_seconds, random_start_share, random_start_velocity;
+  int64_t memory;
+  bool identify;
+  std::string physics, eval_physics;  // engines, see FindEngine, of training and evaluation
+  Plant plant;
+  Disturbance disturbance;
+  Randomization randomization;
+  RewardWeights reward;
+  DqnConfig dqn;
+  SacConfig sac;
+  PpoConfig ppo;
+
+  std::string mjcf;  // the text of `model`; not a setting
+
+  /// The defaults of an algorithm, by default the usual one.
+  explicit Config(std::string_view algorithm_name = AlgorithmNames().front())
+      : algorithm(algorithm_name) {
+    SetDefaults(*this);
+  }
+  /// Those of the algorithm.
+  void Describe(Options& options);
+
+  /// Training environments as these settings have them.
+  EnvConfig Environments() const;
+
+  /// A new agent for such environments, whose work the pool shares.
+  std::unique_ptr<Agent> MakeAgent(const EnvSpec& spec, ThreadPool& pool) const;
+};
+
+/// The settings of all algorithms, each name once; they point into `scratch`.
+Options EverySetting(Config& scratch);
+
+/// A setting given on the command line or in a study: name (or that of an alias), text, and where,
+/// which begins messages; an empty place stands for the flag of that name.
+struct FlagValue {
+  std::string name, text;
+  std::string where = {};
+};
+
+/// Sets what the flags say. Throws BadInput.
+void SetFlags(const Options& options, const std::vector<FlagValue>& flags);
+
+/// Builds the settings in their order: defaults < named agent < configuration file (none if empty,
+/// standard input if `-`) < flags; a model file's plant counts as defaults. Throws BadInput, also
+/// if settings contradict each other.
+Config BuildConfig(const std::filesystem::path& file, const std::vector<FlagValue>& flags);
+
+/// The same from a configuration file's text; `file` is its path, to whose folder the path of a
+/// model is relative.
+Config ParseConfig(std::string_view text, const std::filesystem::path& file,
+                   const std::vector<FlagValue>& flags);
+
+/// Names the copy of a model file in the run's folder, wherever that lies, in place of the file.
+void NameModelCopy(Config& config);
+
+/// Sets what differs in a run among many: it has one thread unless more are asked for, and its
+/// model lies beside it.
+void MakeReadyForMany(Config& config);
+
+/// The settings, such as agent.gamma, that are missing in the TOML text of a run: another version
+/// of the program wrote it.
+std::vector<std::string> MissingSettings(const std::string& text, const std::string& where,
+                                         bool identity_only);
+
+/// The settings of a run folder, changed by the flags. Throws BadInput, too, if the run's own file
+/// lacks one: that run is of another version, and today's default is not what it was made with.
+Config ReadRunConfig(const std::filesystem::path& run, const std::vector<FlagValue>& flags = {});
+
+/// The settings in a TOML document, over the defaults of its algorithm. `where` names it in
+/// messages, which give the line too. Throws BadInput.
+Config ConfigIn(std::string_view toml, const std::string& where);
+
+/// Applies a TOML document, as ConfigIn does.
+void ApplyToml(const Options& options, std::string_view toml, const std::string& where);
+
+/// Throws BadInput that names the first of the settings for which `counts` is true that two
+/// configurations do not have in common. `where` is what was made with the one `before`.
+void ExpectSameSettings(const Options& before, const Options& now, const std::string& where,
+                        const std::function<bool(const Option&)>& counts);
+
+/// The settings that distinguish trainings, without the seed; they point into `config`.
+std::vector<Option> TrainingSettings(Config& config);
+
+/// The settings as TOML; if `identity_only`, only those that change the training (not, for example,
+/// the number of threads).
+std::string ConfigToml(Config config, bool identity_only);
+
+/// The same with comments, for a file that may lie anywhere: the model's path is absolute.
+std::string CompleteToml(Config config);
+
+/// A plant's values as text: `mass1 1, mass2 1, …`.
+std::string PlantText(const Plant& plant);
+
+/// Names of the agents in configs/, in alphabetical order, and what each is.
+std::vector<std::pair<std::string, std::string>> NamedAgents();
+
+/// Sets what --set, or another flag like it, gives ("mass2=1.2") and returns it. Throws BadInput.
+std::vector<const Option*> ApplyChanges(const Options& options, const std::vector<std::string>& set,
+                                        const std::string& flag = "--set");
+
+/// The plant to try something on: `base`, or that of the model file if there is one, with the
+/// given changes ("mass2=1.2"). Reads the model into `mjcf`. Throws BadInput.
+Plant ChangedPlant(const Plant& base, const std::string& model, const std::vector<std::string>& set,
+                   std::string& mjcf);
+
+}  // namespace upswing

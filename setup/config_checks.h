@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "setup/config.h"
+
+namespace upswing {
+
+/// Whether a setting stands in a section that says what the environment is, not who learns in it.
+bool IsInEnvironmentSection(const Option& option);
+
+/// Throws BadInput that begins with `where` if settings, each of which is allowed, contradict each
+/// other, or do not exist in the task.
+void CheckSettings(Config& config, const std::string& where);
+
+/// Settings that are allowed but hardly intended, because nothing would be learned: a line each.
+std::vector<std::string> Warnings(const Config& config);
+
+/// Approximate size of a training.
+struct TrainingSize {
+  double memory;      // bytes at most, with a full replay memory
+  double checkpoint;  // bytes of the file then
+};
+TrainingSize SizeOf(const Config& config);
+
+/// Throws BadInput if there is too little memory for `runs` trainings at a time.
+void CheckMemory(const Config& config, int64_t runs = 1);
+
+}  // namespace upswing

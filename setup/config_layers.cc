@@ -1,0 +1,217 @@
+// How the settings of a training come together: defaults, named agent, configuration file, flags.
+#include <algorithm>
+#include <map>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "io/file.h"
+#include "io/run_folder.h"
+#include "io/streams.h"
+#include "setup/config.h"
+#include "setup/config_checks.h"
+#include "setup/named_agents.h"
+#include "setup/toml_settings.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+const NamedAgent& FindAgent(const std::string& name, const std::string& where) {
+  const auto agents = EmbeddedAgents();
+  const auto found = std::ranges::find_if(agents, [&](const auto& a) { return a.name == name; });
+  if (found != agents.end()) return *found;
+  std::vector<std::string> names;
+  for (const NamedAgent& agent : agents) names.emplace_back(agent.name);
+  throw BadInput(Concat(where, ": no agent is called \"", name, "\"", DidYouMean(name, names),
+                        "; there are ", Join(names, ", ")));
+}
+
+/// A text setting that other settings depend on: its value in the last layer that has it, and
+/// where that is, for messages.
+struct EarlySetting {
+  std::string value, where;
+  bool in_file = false;
+};
+
+EarlySetting FindEarly(std::string_view section, std::string_view key, const toml::table& file,
+                       const std::string& file_name, const std::vector<FlagValue>& flags) {
+  EarlySetting setting;
+  if (const auto* node = file[section][key].as_string()) {
+    setting = {node->get(), Concat(PlaceOf(*node, file_name), ": ", key), true};
+  }
+  for (const auto& [name, text, where] : flags) {
+    if (name == key) setting = {text, where.empty() ? FlagOf(name) : where};
+  }
+  return setting;
+}
+
+/// Throws BadInput that begins with `where` unless there is an algorithm of this name.
+void CheckAlgorithm(const std::string& name, const std::string& where) {
+  const std::vector<std::string>& names = AlgorithmNames();
+  if (std::ranges::find(names, name) != names.end()) return;
+  throw BadInput(Concat(where, ": expected one of ", Join(names, ", "), ", got \"", Printable(name),
+                        "\"", DidYouMean(name, names)));
+}
+
+/// The algorithm of a parsed configuration. Throws BadInput.
+std::string AlgorithmIn(const toml::table& table, const std::string& where) {
+  const EarlySetting found = FindEarly("train", "algorithm", table, where, {});
+  if (found.where.empty()) return AlgorithmNames().front();
+  CheckAlgorithm(found.value, found.where);
+  return found.value;
+}
+
+/// The settings of a configuration, which say of those that other algorithms have whose they are.
+Options KnownOptions(Config& config, std::string_view agent) {
+  Options options = OptionsOf(config);
+  std::map<std::string, std::vector<std::string>> owners;
+  for (const std::string& algorithm : AlgorithmNames()) {
+    Config other(algorithm);
+    const Options of_other = OptionsOf(other);
+    for (const Option& option : of_other.all()) owners[option.name].push_back(algorithm);
+  }
+  for (const auto& [name, algorithms] : owners) {
+    if (options.Get(name) != nullptr) continue;
+    options.Explain(name, Concat(name, " is a setting of ", Join(algorithms, " and "),
+                                 ", but agent ", agent, " learns by ", config.algorithm));
+  }
+  return options;
+}
+
+/// The named agent of a configuration, its settings and its algorithm.
+struct ChosenAgent {
+  std::string_view name;
+  std::string place;  // for messages
+  toml::table settings;
+  std::string algorithm;
+};
+
+/// Throws BadInput if there is no such agent, or if it does not learn by the algorithm that is
+/// asked for.
+ChosenAgent ChooseAgent(const toml::table& table, const std::string& where,
+                        const std::vector<FlagValue>& flags) {
+  EarlySetting setting = FindEarly("train", "agent", table, where, flags);
+  if (setting.where.empty()) setting.value = Config().agent;
+  const NamedAgent& agent = FindAgent(setting.value, setting.where);
+  const std::string place = Concat("agent ", agent.name);
+  toml::table settings = ParseToml(agent.toml, place);
+  const std::string algorithm = AlgorithmIn(settings, place);
+  const EarlySetting asked = FindEarly("train", "algorithm", table, where, flags);
+  if (!asked.where.empty()) {
+    CheckAlgorithm(asked.value, asked.where);
+    if (asked.value != algorithm) {
+      throw BadInput(Concat(asked.where, ": agent ", agent.name, " learns by ", algorithm, ", got ",
+                            asked.value, "; expected another agent, such as ", asked.value));
+    }
+  }
+  return {agent.name, place, std::move(settings), algorithm};
+}
+
+/// The settings of a parsed configuration file; see ParseConfig.
+Config ConfigOf(const toml::table& table, const fs::path& file,
+                const std::vector<FlagValue>& flags) {
+  const std::string where = file.empty() ? "" : InputName(file.string());
+  const ChosenAgent agent = ChooseAgent(table, where, flags);
+  Config config(agent.algorithm);
+  const Options options = KnownOptions(config, agent.name);
+
+  // A model file has a plant of its own, which other settings may change.
+  const EarlySetting model = FindEarly("plant", "model", table, where, flags);
+  std::string model_path = model.value;
+  if (!model_path.empty() && model.in_file) {
+    model_path = (file.parent_path() / model.value).string();  // counts from its file
+  }
+  if (!model_path.empty()) config.plant = ChangedPlant(config.plant, model_path, {}, config.mjcf);
+
+  ApplyTable(options, agent.settings, agent.place, false);
+  ApplyTable(options, table, where, false);
+  SetFlags(options, flags);
+  config.agent = agent.name;
+  config.model = model_path;
+  CheckSettings(config, where);
+  return config;
+}
+
+/// The settings that a configuration file lacks; see MissingSettings.
+std::vector<std::string> MissingIn(const toml::table& table, const std::string& where,
+                                   bool identity_only) {
+  Config scratch(AlgorithmIn(table, where));
+  const Options options = OptionsOf(scratch);
+  std::vector<std::string> missing;
+  for (const Option& option : options.all()) {
+    const bool needed = !option.implied && (option.identity || !identity_only);
+    if (!needed || table[option.section][option.name]) continue;
+    missing.push_back(Concat(option.section, ".", option.name));
+  }
+  return missing;
+}
+
+}  // namespace
+
+void SetFlags(const Options& options, const std::vector<FlagValue>& flags) {
+  for (const auto& [name, value, place] : flags) {
+    options.Set(name, value, place.empty() ? FlagOf(name) : place);
+  }
+}
+
+Config ConfigIn(std::string_view text, const std::string& where) {
+  const toml::table table = ParseToml(text, where);
+  Config config(AlgorithmIn(table, where));
+  ApplyTable(OptionsOf(config), table, where, false);
+  return config;
+}
+
+void ApplyToml(const Options& options, std::string_view text, const std::string& where) {
+  ApplyTable(options, ParseToml(text, where), where, false);
+}
+
+Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
+  return ParseConfig(file.empty() ? "" : ReadInput(file.string()), file, flags);
+}
+
+Config ParseConfig(std::string_view text, const fs::path& file,
+                   const std::vector<FlagValue>& flags) {
+  return ConfigOf(ParseToml(text, file.empty() ? "" : InputName(file.string())), file, flags);
+}
+
+std::vector<std::string> MissingSettings(const std::string& text, const std::string& where,
+                                         bool identity_only) {
+  return MissingIn(ParseToml(text, where), where, identity_only);
+}
+
+Config ReadRunConfig(const fs::path& run, const std::vector<FlagValue>& flags) {
+  const fs::path file = run / RunFolder::kConfig;
+  const toml::table table = ParseToml(ReadOwnFile(file), file.string());
+  const std::string model = table["plant"]["model"].value_or("");
+  if (!model.empty() && model != RunFolder::kModel) {  // a run is whole wherever it lies
+    throw BadInput(Concat(file.string(), ": model: expected ", RunFolder::kModel,
+                          ", the copy in the run folder, got \"", Printable(model), "\""));
+  }
+  ChooseAgent(table, file.string(), flags);  // whose algorithm says which settings there are
+  std::vector<std::string> missing = MissingIn(table, file.string(), false);
+  if (missing.empty()) return ConfigOf(table, file, flags);
+  constexpr size_t kMostNames = 6;  // that make a line which can still be read
+  const size_t more = missing.size() - std::min(missing.size(), kMostNames);
+  missing.resize(missing.size() - more);
+  throw BadInput(Concat(file.string(), ": expected every setting, as this version writes a run; ",
+                        "got none of ", Join(missing, ", "),
+                        more > 0 ? Concat(" and ", more, " more") : "",
+                        ": another version wrote it"));
+}
+
+std::vector<std::pair<std::string, std::string>> NamedAgents() {
+  std::vector<std::pair<std::string, std::string>> names;
+  for (const NamedAgent& agent : EmbeddedAgents()) {
+    // The file begins with a comment that says what it is.
+    std::vector<std::string> comment;
+    for (const std::string_view line : Split(agent.toml, '\n')) {
+      if (!line.starts_with('#')) break;
+      comment.emplace_back(Trim(line.substr(1)));
+    }
+    names.emplace_back(agent.name, Join(comment, " "));
+  }
+  return names;
+}
+
+}  // namespace upswing

@@ -1,0 +1,144 @@
+#include "setup/controllers.h"
+
+#include <algorithm>
+
+#include "control/hybrid.h"
+#include "core/error.h"
+#include "core/text.h"
+#include "setup/loaded_policy.h"
+
+namespace upswing {
+namespace {
+
+/// A controller's name and how it is made.
+struct Controller {
+  const char* name;
+  std::shared_ptr<const Policy> (*make)(const ControllerConfig& config);
+};
+
+using Made = std::shared_ptr<const Policy>;
+
+/// A swing-up by a law, which LQR catches.
+Made WithCatch(const ControllerConfig& config, const std::string& kind, const std::string& what,
+               const Options& settings, LawPolicy::Law law) {
+  return std::make_shared<HybridPolicy>(
+      kind, settings, config.lqr,
+      std::make_shared<LawPolicy>(kind, what, settings, config.plant, std::move(law)),
+      config.plant);
+}
+
+/// Throws BadInput unless the motor is where these laws have it.
+void ExpectPendubot(const char* kind, const Plant& plant) {
+  if (plant.actuated_joint == 1) return;
+  throw BadInput(
+      Concat(kind, ": expected a plant whose motor is at joint 1 (actuated_joint), got joint 2"));
+}
+
+Made MakeEnergyShaping(const ControllerConfig& config) {
+  ExpectPendubot("energy", config.plant);
+  LqrConfig lqr = config.lqr;
+  EnergyShapingConfig energy = config.energy;
+  return WithCatch(config, "energy",
+                   Concat("energy shaping, weights ", Rounded(energy.kE), ", ", Rounded(energy.kD),
+                          " and ", Rounded(energy.kP)),
+                   OptionsOfAll(lqr, energy),
+                   [energy, plant = Manipulator(config.plant)](const StateVector& d) {
+                     return EnergyShapingTorque(energy, plant, d);
+                   });
+}
+
+Made MakePartialFeedback(const ControllerConfig& config) {
+  ExpectPendubot("pfl", config.plant);
+  LqrConfig lqr = config.lqr;
+  PartialFeedbackConfig pfl = config.pfl;
+  return WithCatch(config, "pfl",
+                   Concat("collocated partial feedback linearisation, gains ", Rounded(pfl.kP),
+                          ", ", Rounded(pfl.kD), " and ", Rounded(pfl.kE)),
+                   OptionsOfAll(lqr, pfl),
+                   [pfl, plant = Manipulator(config.plant)](const StateVector& d) {
+                     return PartialFeedbackTorque(pfl, plant, d);
+                   });
+}
+
+Made MakeHybrid(const ControllerConfig& config) {
+  if (config.swing_up.empty()) {
+    throw BadInput("hybrid: expected a policy that swings up, by --swing-up POLICY, got none");
+  }
+  LqrConfig lqr = config.lqr;
+  return std::make_shared<HybridPolicy>("hybrid", OptionsOf(lqr), lqr,
+                                        LoadPolicy(config.swing_up).policy, config.plant);
+}
+
+constexpr Controller kControllers[] = {
+    {"energy", MakeEnergyShaping},
+    {"hybrid", MakeHybrid},
+    {"lqr",
+     [](const ControllerConfig& config) -> Made {
+       return std::make_shared<LqrPolicy>(config.lqr, config.plant);
+     }},
+    {"mpc",
+     [](const ControllerConfig& config) -> Made {
+       return std::make_shared<MpcPolicy>(config.lqr, config.mpc, config.plant);
+     }},
+    {"pfl", MakePartialFeedback},
+    {"tvlqr",
+     [](const ControllerConfig& config) -> Made {
+       return std::make_shared<TvlqrPolicy>(config.lqr, config.tvlqr, config.plant);
+     }},
+};
+
+/// The settings that differ, each as name and value.
+std::vector<std::string> Differences(const Options& now, const Options& usual) {
+  std::vector<std::string> texts;
+  for (size_t k = 0; k < now.all().size(); ++k) {
+    const Option& option = now.all()[k];
+    if (option.text() == usual.all()[k].text()) continue;
+    texts.push_back(Concat(option.name, " ", option.plain_text()));
+  }
+  return texts;
+}
+
+}  // namespace
+
+void ControllerConfig::Describe(Options& o) {
+  lqr.Describe(o);
+  tvlqr.Describe(o);
+  mpc.Describe(o);
+  energy.Describe(o);
+  pfl.Describe(o);
+  o.Section("hybrid");
+  o.Add(&swing_up, "swing_up", "", "policy that swings up, a file or run folder").usual = "none";
+}
+
+std::vector<std::string> ControllerNames() {
+  std::vector<std::string> names;
+  for (const Controller& controller : kControllers) names.emplace_back(controller.name);
+  return names;
+}
+
+bool IsController(const std::string& name) {
+  return std::ranges::any_of(kControllers, [&](const Controller& c) { return name == c.name; });
+}
+
+bool HasSection(const std::string& controller, const std::string& section) {
+  return section == "lqr" || section == controller;
+}
+
+std::shared_ptr<const Policy> MakeController(const std::string& name,
+                                             const ControllerConfig& config) {
+  for (const Controller& controller : kControllers) {
+    if (name == controller.name) return controller.make(config);
+  }
+  throw BadInput(Concat("expected a controller, one of ", Join(ControllerNames(), ", "), ", got \"",
+                        name, "\""));
+}
+
+std::string TitleOf(const std::string& name, ControllerConfig config) {
+  ControllerConfig usual;
+  std::vector<std::string> texts = Differences(OptionsOf(config), OptionsOf(usual));
+  const auto plant = Differences(OptionsOf(config.plant), OptionsOf(usual.plant));
+  if (!plant.empty()) texts.push_back(Concat("for ", Join(plant, " and ")));
+  return texts.empty() ? name : Concat(name, " (", Join(texts, ", "), ")");
+}
+
+}  // namespace upswing

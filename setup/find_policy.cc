@@ -1,0 +1,174 @@
+// Policies by what a command line calls them: a controller's name, a file or a run folder.
+#include <algorithm>
+#include <set>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "io/run_folder.h"
+#include "io/tensor_file.h"
+#include "setup/controllers.h"
+#include "setup/format.h"
+#include "setup/loaded_policy.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Which controller a setting is of.
+std::string SectionOf(const FlagValue& flag) {
+  ControllerConfig config;
+  return OptionsOf(config).Find(flag.name, FlagOf(flag.name)).front()->section;
+}
+
+/// What a policy that swings up was trained on. Throws BadInput that names the flag.
+Plant PlantOfSwingUp(const std::string& name) {
+  LoadedPolicy loaded;
+  try {
+    loaded = LoadPolicy(name);
+  } catch (const Error& error) {
+    throw Error(error.exit_code(), Concat("--swing-up: ", error.what()));
+  }
+  if (loaded.mjcf.empty()) return loaded.plant;
+  throw BadInput(Concat("--swing-up: expected a policy of the built-in model, got ", name,
+                        ", which was trained on another"));
+}
+
+}  // namespace
+
+std::vector<LoadedPolicy> GetPolicies(const std::vector<std::string>& names,
+                                      const PolicyArguments& controllers) {
+  for (const FlagValue& flag : controllers.flags) {
+    const auto has = [&](const std::string& name) {
+      return IsController(name) && HasSection(name, SectionOf(flag));
+    };
+    if (std::ranges::any_of(names, has)) continue;
+    const std::string got = names.empty() ? "none" : Join(names, ", ");
+    throw BadInput(
+        Concat(FlagOf(flag.name), ": expected the controller ", SectionOf(flag), ", got ", got));
+  }
+  if (!controllers.made_for.empty() && std::ranges::none_of(names, IsController)) {
+    throw BadInput(Concat("--made-for: expected a controller (", Join(ControllerNames(), ", "),
+                          ") to set, got ", names.empty() ? "none" : Join(names, ", ")));
+  }
+  std::vector<LoadedPolicy> policies;
+  std::set<std::filesystem::path> seen;  // files, and names of controllers
+  for (const std::string& name : names) {
+    PolicyArguments one{name, {}, {}};
+    if (IsController(name)) {
+      one.made_for = controllers.made_for;
+      std::ranges::copy_if(controllers.flags, std::back_inserter(one.flags),
+                           [&](const auto& flag) { return HasSection(name, SectionOf(flag)); });
+    }
+    policies.push_back(GetPolicy(one));
+    std::error_code none;
+    const auto file = std::filesystem::canonical(policies.back().path, none);
+    if (!seen.insert(none ? std::filesystem::path(name) : file).second) {
+      throw BadInput(Concat(Printable(name), ": given twice; expected each policy once"));
+    }
+  }
+  return policies;
+}
+
+LoadedPolicy GetPolicy(const PolicyArguments& a) {
+  ControllerConfig config;
+  SetFlags(OptionsOf(config), a.flags);
+  if (a.name == "hybrid" && !config.swing_up.empty())
+    config.plant = PlantOfSwingUp(config.swing_up);
+  ApplyChanges(OptionsOf(config.plant), a.made_for, "--made-for");
+  const bool is_controller = IsController(a.name), is_path = fs::exists(a.name);
+  if (is_controller && is_path) {
+    throw BadInput(Concat(a.name, ": expected the controller or a file, and there are both: ./",
+                          a.name, " is the file; for the controller, rename that"));
+  }
+  if (is_controller) {
+    for (const FlagValue& flag : a.flags) {
+      const std::string section = SectionOf(flag);
+      if (HasSection(a.name, section)) continue;
+      throw BadInput(
+          Concat(FlagOf(flag.name), ": expected the controller ", section, ", got ", a.name));
+    }
+    const auto remade = [name = a.name, config](const Plant& plant) {
+      ControllerConfig other = config;
+      other.plant = plant;
+      return MakeController(name, other);
+    };
+    return {TitleOf(a.name, config),
+            "",
+            remade(config.plant),
+            kDoublePendulum,
+            config.plant,
+            "",
+            remade};
+  }
+  const std::string controllers = Join(ControllerNames(), ", ");
+  if (a.has_settings()) {
+    const std::string flag = a.flags.empty() ? "--made-for" : FlagOf(a.flags.front().name);
+    throw BadInput(Concat(flag, ": expected a controller (", controllers, ") to set, got ",
+                          a.name.empty() ? "none" : a.name));
+  }
+  if (!is_path) {
+    throw BadInput(Concat(
+        a.name, ": no such file; expected a policy.safetensors, a run folder or a controller (",
+        controllers, ")", DidYouMean(a.name, ControllerNames())));
+  }
+  return LoadPolicy(a.name);
+}
+
+LoadedPolicy LoadPolicy(const fs::path& path) {
+  fs::path file = path;
+  if (fs::is_directory(path)) {
+    file = path / RunFolder::kPolicy;
+    if (fs::exists(path / RunFolder::kConfig) && !fs::exists(file)) {
+      throw BadInput(Concat(path.string(), ": this run has no policy: expected ",
+                            "policy.safetensors, which its first evaluation writes"));
+    }
+  }
+  if (!fs::exists(file)) {
+    const bool is_controller = IsController(path.string());
+    throw BadInput(Concat(file.string(),
+                          ": no such file; expected a policy.safetensors or a run folder",
+                          is_controller ? " here, where no controller will do" : ""));
+  }
+  return ReadPolicy(LoadTensors(file));
+}
+
+namespace {
+
+/// The last `parts` of a policy's path, of a run without the file.
+std::string EndOfPath(const LoadedPolicy& loaded, int parts) {
+  if (loaded.path.empty()) return loaded.name;
+  std::filesystem::path rest = loaded.path.parent_path(), end = loaded.path.stem();
+  if (end == "policy" && rest.has_filename()) {
+    end = rest.filename();
+    rest = rest.parent_path();
+  }
+  for (int part = 1; part < parts && rest.has_filename(); ++part) {
+    end = rest.filename() / end;
+    rest = rest.parent_path();
+  }
+  return end;
+}
+
+}  // namespace
+
+std::string TitleOf(const LoadedPolicy& loaded) { return EndOfPath(loaded, 1); }
+
+std::vector<std::string> TitlesOf(const std::vector<LoadedPolicy>& policies) {
+  constexpr int kMostParts = 20;
+  std::vector<std::string> titles;
+  for (const LoadedPolicy& loaded : policies) {
+    const auto is_own = [&](int parts) {
+      return std::ranges::count(policies, EndOfPath(loaded, parts), [&](const LoadedPolicy& other) {
+               return EndOfPath(other, parts);
+             }) == 1;
+    };
+    int parts = 1;
+    while (parts < kMostParts && !is_own(parts)) ++parts;
+    constexpr size_t kLongest = 30;  // bytes
+    titles.push_back(Shortened(EndOfPath(loaded, parts), kLongest));
+  }
+  return titles;
+}
+
+}  // namespace upswing

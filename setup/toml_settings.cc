@@ -1,0 +1,89 @@
+#include "setup/toml_settings.h"
+
+#include <algorithm>
+
+#include "core/error.h"
+#include "core/text.h"
+
+namespace upswing {
+namespace {
+
+/// Sets one key of a section, or one that stands alone if `section` is empty.
+FlagValue ApplyNode(const Options& options, const std::string& section, const std::string& key,
+                    const toml::node& node, const std::string& where) {
+  const std::string place = PlaceOf(node, where);
+  const std::string scope = section.empty() ? place : Concat(place, ": [", section, "]");
+  const FlagValue setting{key, TextOf(node).value_or(""), Concat(place, ": ", key)};
+  for (const Option* option : options.Find(key, scope)) {
+    if (!section.empty() && option->section != section) {
+      throw BadInput(
+          Concat(setting.where, ": expected in [", option->section, "], got in [", section, "]"));
+    }
+    const bool wants_text = std::holds_alternative<std::string*>(option->target);
+    if (!TextOf(node) || node.is_string() != wants_text) {
+      const std::string got = TextOf(node) ? Concat("\"", setting.text, "\"") : "another type";
+      throw BadInput(Concat(setting.where, ": expected ", option->expected(), ", got ", got));
+    }
+    option->Set(setting.text, setting.where);
+  }
+  return setting;
+}
+
+}  // namespace
+
+toml::table ParseToml(std::string_view text, const std::string& where) {
+  try {
+    return toml::parse(text);
+  } catch (const toml::parse_error& error) {
+    throw BadInput(Concat(where, ":", error.source().begin.line, ": ", error.description()));
+  }
+}
+
+std::string PlaceOf(const toml::node& node, const std::string& where) {
+  return Concat(where, ":", node.source().begin.line);
+}
+
+std::optional<std::string> TextOf(const toml::node& node) {
+  if (const auto* value = node.as_boolean()) return value->get() ? "true" : "false";
+  if (const auto* value = node.as_integer()) return std::to_string(value->get());
+  if (const auto* value = node.as_floating_point()) return FormatNumber(value->get());
+  if (const auto* value = node.as_string()) return value->get();
+  const auto* array = node.as_array();
+  if (array == nullptr) return std::nullopt;
+  std::vector<std::string> items;
+  for (const toml::node& item : *array) {
+    if (!item.is_integer()) return std::nullopt;
+    items.push_back(std::to_string(item.as_integer()->get()));
+  }
+  return Concat("[", Join(items, ", "), "]");
+}
+
+std::vector<FlagValue> ApplyTable(const Options& options, const toml::table& table,
+                                  const std::string& where, bool alone) {
+  std::vector<std::string> sections;
+  for (const Option& option : options.all()) sections.push_back(option.section);
+  std::vector<FlagValue> settings;
+  for (const auto& [name, node] : table) {
+    const std::string key(name.str());
+    const auto* section = node.as_table();
+    if (alone && section == nullptr) {
+      settings.push_back(ApplyNode(options, "", key, node, where));
+      continue;
+    }
+    if (section == nullptr) {
+      const Option& option = *options.Find(key, PlaceOf(node, where)).front();
+      throw BadInput(Concat(PlaceOf(node, where), ": ", key, ": belongs in [", option.section,
+                            "]: expected it below such a line, got it in no section"));
+    }
+    if (std::ranges::find(sections, key) == sections.end()) {
+      throw BadInput(Concat(PlaceOf(node, where), ": no section is called [", key, "]",
+                            DidYouMean(key, sections)));
+    }
+    for (const auto& [inner, value] : *section) {
+      settings.push_back(ApplyNode(options, key, std::string(inner.str()), value, where));
+    }
+  }
+  return settings;
+}
+
+}  // namespace upswing

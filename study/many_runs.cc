@@ -1,0 +1,297 @@
+#include "study/many_runs.h"
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <list>
+#include <map>
+#include <thread>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "io/child_process.h"
+#include "io/file.h"
+#include "io/lease.h"
+#include "io/machine.h"
+#include "io/run_folder.h"
+#include "study/study_worker.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kWorkersLog = "workers.log";
+
+/// The last line that is not empty.
+std::string LastLine(const fs::path& path) {
+  std::string last = "its log is empty";
+  std::error_code error;
+  const std::string text = fs::is_regular_file(path, error) ? ReadOwnFile(path) : "";
+  for (const std::string_view line : Split(text, '\n')) {
+    if (!line.empty()) last = line;
+  }
+  constexpr std::string_view kProgram = "upswing: ";  // the caller's message begins with it, too
+  return last.starts_with(kProgram) ? last.substr(kProgram.size()) : last;
+}
+
+// ---- Before anything runs.
+
+/// Throws unless the folder is free or holds what `mark` stands for.
+void CheckFolder(const fs::path& folder, const fs::path& mark) {
+  std::error_code error;
+  if (fs::is_regular_file(folder / mark, error)) return;
+  CheckFree(folder, Concat("it has no ", mark.string(), " to resume from; choose another --out"));
+}
+
+/// Throws if `what` was made with settings `before` that cannot be resumed with those of `now`.
+void CheckSame(Config before, Config now, bool more_steps, const std::string& what) {
+  if (!before.mjcf.empty()) before.model = now.model;
+  const auto counts = [&](const Option& option) {
+    if (option.name == "steps") return !more_steps || now.train.steps < before.train.steps;
+    return option.name == "stop_when_solved" || (option.identity && option.name != "seed");
+  };
+  try {
+    ExpectSameSettings(OptionsOf(before), OptionsOf(now), what, counts);
+    if (before.mjcf != now.mjcf) throw BadInput(Concat(what, ": made with another model"));
+  } catch (const Error& other) {
+    throw BadInput(Concat(other.what(), "; choose another --out"));
+  }
+}
+
+/// Throws if what is in a variant's folder was made with other settings: one of its runs, or, where
+/// none has begun, the settings themselves.
+void CheckRuns(const fs::path& folder, const Config& config, bool more_steps) {
+  std::error_code error;
+  const std::string mark = SettingsMark(config);
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    if (IsMakingName(entry.path().filename().string())) continue;
+    if (!fs::is_regular_file(entry.path() / RunFolder::kConfig, error)) continue;
+    const auto done = ReadDone(entry.path().string() + ".done");
+    const bool same = done && done->settings == mark && done->version == UPSWING_VERSION &&
+                      done->planned_steps == config.train.steps &&
+                      done->stop_when_solved == config.train.stop_when_solved;
+    if (!same) CheckSame(ReadRunConfig(entry.path()), config, more_steps, entry.path().string());
+  }
+  const fs::path settings = folder / kSettingsName;
+  if (!fs::is_regular_file(settings, error)) return;
+  CheckSame(BuildConfig(settings, {}), config, more_steps, settings.string());
+}
+
+/// Removes what processes that were killed left of their claims' other names.
+void RemoveStrays(const fs::path& folder) {
+  const auto old = fs::file_time_type::clock::now() - 2 * Lease::kUsual;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    std::error_code error;
+    const bool is_stray = entry.path().filename().string().find(".claim.") != std::string::npos;
+    if (is_stray && entry.last_write_time(error) < old && !error) fs::remove(entry.path(), error);
+  }
+}
+
+/// All runs as they stand.
+std::vector<SeedRun> ListRuns(const StudyPlan& plan) {
+  std::vector<SeedRun> runs = RunsOf(plan);
+  for (SeedRun& run : runs) {
+    try {
+      run.Read();
+    } catch (const Error& broken) {
+      run.problem = broken.what();
+      WriteFailed(run, run.problem);
+    }
+  }
+  return runs;
+}
+
+// ---- While they run.
+
+/// The worker processes of this machine, and what is to be seen of all runs.
+class LocalWorkers {
+ public:
+  LocalWorkers(const ManyRuns& many, std::vector<SeedRun>& runs, ManyRunsObserver& observer)
+      : many_(many), observer_(observer), log_(many.plan.folder / kWorkersLog) {
+    for (SeedRun& run : runs) {
+      if (!run.finished && run.problem.empty()) open_.push_back(&run);
+    }
+  }
+
+  /// Returns when all runs have ended; after a request to stop, when the workers have.
+  void Run() {
+    while (true) {
+      const TrainRequest request = observer_.Poll();
+      if (request == TrainRequest::kCheckpoint) SignalAll(SIGUSR1);
+      if (request == TrainRequest::kStop && !stopping_) {
+        stopping_ = true;
+        SignalAll(observer_.stop_signal());
+      }
+      Reap();
+      if (const auto now = Clock::now(); now >= look_at_) {
+        Look();
+        look_at_ = now + (open_.size() < 1000 ? kOften : kSeldom);
+        if (!stopping_) StartWorkers(now);
+      }
+      if (workers_.empty() && (stopping_ || open_.empty())) break;
+      observer_.Watch(running_);
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    Look();
+    if (many_.jobs == 0) running_.clear();     // others' go on
+    for (const SeedRun* run : running_) {      // they were stopped
+      if (fs::exists(run->claim())) continue;  // it goes on on another host
+      auto* stopped = *std::ranges::find(open_, run);
+      stopped->Read();
+      observer_.End(*stopped);
+    }
+    std::error_code error;
+    if (deaths_.empty()) fs::remove(log_, error);  // else it may say why
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::chrono::milliseconds kOften{60}, kSeldom{500};
+
+  /// Takes note of the workers that have ended.
+  void Reap() {
+    for (auto it = workers_.begin(); it != workers_.end();) {
+      const pid_t pid = it->pid();
+      const auto code = it->Poll();
+      const bool as_asked = stopping_ && code == 128 + observer_.stop_signal();
+      if (code && *code != 0 && *code != 1 && *code != kTryAgain && !as_asked) {
+        EndedBadly(pid, *code);
+      }
+      it = code ? workers_.erase(it) : std::next(it);
+    }
+  }
+
+  /// What a worker that died was at is left to another one, unless it is what kills them.
+  void EndedBadly(pid_t pid, int code) {
+    constexpr int kMostDeaths = 2;
+    const auto how = [code](const fs::path& log) {
+      return code > 128 ? Concat("ended by signal ", code - 128) : LastLine(log);
+    };
+    const std::string holder = Concat(ThisHost(), " ", pid, " ");
+    for (const SeedRun* run : open_) {
+      const auto lease = ReadLease(run->claim());
+      if (!lease || !lease->holder.starts_with(holder)) continue;
+      if (++deaths_[run] < kMostDeaths) return;
+      if (Lease::Take(run->claim(), "reports its end")) WriteFailed(*run, how(run->log()));
+      return;
+    }
+    if (++deaths_[nullptr] < kMostDeaths) return;  // between two runs
+    throw Failure(Concat("a worker ended: ", how(log_)));
+  }
+
+  /// Sees which runs have ended, run now, or wait. They are begun in their order, so beyond many
+  /// that wait none has begun.
+  void Look() {
+    constexpr int kEnough = 64;
+    std::vector<const SeedRun*> before = std::move(running_);
+    running_.clear();
+    waiting_ = 0;
+    for (auto it = open_.begin(); it != open_.end() && waiting_ < kEnough;) {
+      SeedRun& run = **it;
+      std::error_code error;
+      if (fs::exists(run.done(), error) || run.HasFailed()) ReadAgain(run);
+      if (run.finished || !run.problem.empty()) {
+        it = open_.erase(it);
+        observer_.End(run);
+        continue;
+      }
+      const bool until_now = stopping_ && std::ranges::find(before, &run) != before.end();
+      if (until_now || fs::exists(run.claim(), error)) {
+        running_.push_back(&run);
+      } else {
+        ++waiting_;
+      }
+      ++it;
+    }
+  }
+
+  static void ReadAgain(SeedRun& run) {
+    try {
+      run.Read();
+    } catch (const Error& error) {
+      run.problem = error.what();
+    }
+  }
+
+  /// Starts workers while there are runs for them: that wait, or whose worker has died.
+  void StartWorkers(Clock::time_point now) {
+    const auto jobs = static_cast<size_t>(many_.jobs);
+    if (workers_.size() >= jobs || open_.empty() || now < start_at_) return;
+    size_t runs = waiting_;
+    for (const SeedRun* run : running_) {
+      if (runs >= jobs) break;
+      const auto lease = ReadLease(run->claim());
+      if (!lease || lease->lost) ++runs;
+    }
+    const size_t wanted = std::min(jobs - workers_.size(), runs);
+    for (size_t i = 0; i < wanted; ++i) {
+      workers_.emplace_back(std::vector<std::string>{"study", "--work", many_.plan.folder.string()},
+                            log_);
+    }
+    start_at_ = now + std::chrono::seconds(1);  // they need a while to claim their runs
+  }
+
+  void SignalAll(int signal) {
+    for (const ChildProcess& worker : workers_) worker.Signal(signal);
+  }
+
+  const ManyRuns& many_;
+  ManyRunsObserver& observer_;
+  fs::path log_;
+  std::list<SeedRun*> open_;  // neither done nor failed
+  std::vector<const SeedRun*> running_;
+  size_t waiting_ = 0;  // that nobody has claimed
+  std::list<ChildProcess> workers_;
+  std::map<const SeedRun*, int> deaths_;  // of workers on a run; under null on none
+  Clock::time_point look_at_{}, start_at_{};
+  bool stopping_ = false;
+};
+
+}  // namespace
+
+FolderLock Prepare(const ManyRuns& many, const std::function<void()>& checked) {
+  // Nothing is touched before all is checked, nor while another process is at work there.
+  const StudyPlan& plan = many.plan;
+  const bool is_study = !many.mark_file.empty();
+  CheckFolder(plan.folder, is_study ? fs::path(many.mark_file) : fs::path(kSettingsName));
+  std::error_code error;
+  std::optional<FolderLock> lock;
+  if (fs::exists(plan.folder, error)) lock.emplace(plan.folder);
+  for (const Variant& variant : plan.variants) {
+    const fs::path folder = plan.folder / variant.name;
+    if (!variant.name.empty()) CheckNoLink(folder);
+    CheckRuns(folder, variant.config, many.more_steps);
+  }
+  checked();
+  WritePlan(plan);
+  if (is_study) WriteIfOther(plan.folder / many.mark_file, many.mark_text);
+  for (const SeedRun& run : RunsOf(plan)) {
+    fs::remove(run.failed());                                                  // it is tried again
+    if (fs::exists(run.claim())) (void)Lease::Take(run.claim(), "tidies up");  // if it is lost
+  }
+  for (const Variant& variant : plan.variants) RemoveStrays(plan.folder / variant.name);
+  return lock ? std::move(*lock) : FolderLock(plan.folder);
+}
+
+int TrainMany(const ManyRuns& many, ManyRunsObserver& observer) {
+  const FolderLock lock = Prepare(many, [&] { observer.Prepare(); });
+  std::vector<SeedRun> runs = ListRuns(many.plan);
+  observer.Begin(runs);
+  LocalWorkers(many, runs, observer).Run();
+  observer.Finish();
+
+  if (observer.stop_signal() != 0) return 128 + observer.stop_signal();
+  const size_t all = runs.size();
+  std::erase_if(runs, [](const SeedRun& run) { return run.problem.empty(); });
+  if (runs.empty()) return 0;
+  throw Failure(Concat(runs.size(), " of ", all, " runs in ", many.plan.folder.string(),
+                       " failed, the first of them ", runs.front().name, ": ",
+                       runs.front().problem));
+}
+
+int DefaultJobs(int64_t threads) {
+  return std::max(1, UsableProcessors() / static_cast<int>(std::max<int64_t>(1, threads)));
+}
+
+}  // namespace upswing

@@ -1,0 +1,141 @@
+#include "study/study_file.h"
+
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "setup/toml_settings.h"
+#include "study/seeds.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The settings of one table of the study, checked; a model's path is relative to the study's
+/// folder.
+std::vector<FlagValue> ReadSettings(const toml::node& node, const std::string& name,
+                                    const std::string& where) {
+  const auto* table = node.as_table();
+  const std::string place = PlaceOf(node, where);
+  if (table == nullptr) throw BadInput(Concat(place, ": ", name, ": expected a table of settings"));
+  Config scratch;  // takes the values, which shows whether they can be
+  std::vector<FlagValue> settings = ApplyTable(EverySetting(scratch), *table, where, true);
+  for (FlagValue& setting : settings) {
+    if (setting.name == "seed") {
+      throw BadInput(Concat(setting.where, ": expected no seed among the settings, but \"seeds = ",
+                            "…\" at the beginning"));
+    }
+    if (setting.name == "model" && !setting.text.empty()) {
+      setting.text = (fs::path(where).parent_path() / setting.text).string();
+    }
+  }
+  return settings;
+}
+
+/// The settings of a variant, checked together. Throws BadInput.
+Config BuildVariant(const std::string& name, const std::vector<FlagValue>& settings,
+                    const std::string& place, const std::string& where) {
+  try {
+    return BuildConfig("", settings);
+  } catch (const Error& error) {
+    const std::string_view what = error.what();
+    if (what.starts_with(where)) throw;  // it says the line
+    throw BadInput(Concat(place, ": variant \"", name, "\": ", what));
+  }
+}
+
+/// The variants in the order in which they stand in the file.
+std::vector<Variant> ReadVariants(const toml::table& study, const std::string& where) {
+  std::vector<FlagValue> common;
+  if (const toml::node* node = study.get("settings")) {
+    common = ReadSettings(*node, "settings", where);
+  }
+  const auto* variants = study["variants"].as_table();
+  if (variants == nullptr || variants->empty()) {
+    throw BadInput(Concat(where, ": expected at least one variant: a table [variants.NAME]"));
+  }
+  std::vector<std::pair<uint32_t, Variant>> placed;
+  for (const auto& [key, node] : *variants) {
+    const std::string name(key.str());
+    CheckVariantName(name, PlaceOf(node, where));
+    std::vector<FlagValue> settings = common;
+    const std::vector<FlagValue> own = ReadSettings(node, name, where);
+    settings.insert(settings.end(), own.begin(), own.end());
+    Variant variant{name, BuildVariant(name, settings, PlaceOf(node, where), where)};
+    MakeReadyForMany(variant.config);
+    for (const auto& [line, other] : placed) {
+      if (ConfigToml(other.config, true) == ConfigToml(variant.config, true) &&
+          other.config.mjcf == variant.config.mjcf) {
+        throw BadInput(Concat(PlaceOf(node, where), ": variant \"", name,
+                              "\" has the settings of \"", other.name, "\" in line ", line,
+                              "; expected other ones"));
+      }
+    }
+    placed.emplace_back(node.source().begin.line, std::move(variant));
+  }
+  std::ranges::stable_sort(placed, {}, [](const auto& entry) { return entry.first; });
+  std::vector<Variant> in_order;
+  in_order.reserve(placed.size());
+  for (auto& [line, variant] : placed) in_order.push_back(std::move(variant));
+  return in_order;
+}
+
+void CheckKeys(const toml::table& study, const std::string& where) {
+  const std::vector<std::string> known{"title", "seeds", "keep", "settings", "variants"};
+  for (const auto& [key, node] : study) {
+    const std::string name(key.str());
+    if (std::ranges::find(known, name) != known.end()) continue;
+    Config scratch;
+    const bool is_setting = std::ranges::any_of(
+        EverySetting(scratch).all(), [&](const Option& option) { return option.name == name; });
+    if (is_setting && name != "seed") {
+      throw BadInput(Concat(PlaceOf(node, where), ": ", name, ": belongs in [settings] or in a ",
+                            "[variants.NAME]: expected it below such a line"));
+    }
+    throw BadInput(Concat(PlaceOf(node, where), ": a study has no \"", name, "\"",
+                          DidYouMean(name, known), "; there are ", Join(known, ", ")));
+  }
+}
+
+/// The text of a key at the beginning of the file; empty if it is not there.
+std::string ReadText(const toml::table& study, const std::string& key, const std::string& where) {
+  const toml::node* node = study.get(key);
+  if (node == nullptr) return "";
+  const auto text = TextOf(*node);
+  if (!text || (key != "seeds" && !node->is_string())) {
+    throw BadInput(Concat(PlaceOf(*node, where), ": ", key, ": expected a text",
+                          key == "seeds" ? ", a number or a list of numbers" : ""));
+  }
+  return *text;
+}
+
+}  // namespace
+
+StudyFile ParseStudy(std::string_view text, const std::string& where) {
+  const toml::table table = ParseToml(text, where);
+  CheckKeys(table, where);
+  StudyFile study{ReadText(table, "title", where), ReadVariants(table, where), {}, {}};
+  if (const toml::node* keep = table.get("keep")) {
+    study.keep = ParseKeep(ReadText(table, "keep", where), Concat(PlaceOf(*keep, where), ": keep"));
+  }
+  const std::string seeds = ReadText(table, "seeds", where);
+  if (!seeds.empty()) {
+    study.seeds = ParseSeeds(seeds, Concat(PlaceOf(*table.get("seeds"), where), ": seeds"));
+  }
+  return study;
+}
+
+StudyOutline ParseStudyOutline(std::string_view text, const std::string& where) {
+  const toml::table table = ParseToml(text, where);
+  StudyOutline outline{ReadText(table, "title", where), {}};
+  if (const auto* variants = table["variants"].as_table()) {
+    for (const auto& [key, node] : *variants) outline.variants.emplace_back(key.str());
+  }
+  return outline;
+}
+
+}  // namespace upswing

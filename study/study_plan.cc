@@ -1,0 +1,197 @@
+#include "study/study_plan.h"
+
+#include <algorithm>
+#include <array>
+#include <fstream>
+
+#include "core/checksum.h"
+#include "core/error.h"
+#include "core/json.h"
+#include "core/text.h"
+#include "io/file.h"
+#include "io/run_folder.h"
+#include "study/seeds.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using nlohmann::ordered_json;
+
+constexpr std::array kKeeps{"all", "policy", "tables"};  // in the order of Keep
+constexpr size_t kMostVariants = 10'000, kMostPlanBytes = 1 << 24;
+
+/// The end of a file, at most so many bytes; empty if it is no regular file.
+std::string TailOf(const fs::path& path, std::streamoff bytes) {
+  std::error_code error;
+  if (!fs::is_regular_file(fs::symlink_status(path, error))) return "";
+  std::ifstream file(path, std::ios::binary | std::ios::ate);
+  if (!file) return "";
+  const std::streamoff size = file.tellg();
+  file.seekg(std::max<std::streamoff>(0, size - bytes));
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+}  // namespace
+
+std::string KeepName(Keep keep) { return kKeeps.at(static_cast<size_t>(keep)); }
+
+Keep ParseKeep(std::string_view text, const std::string& where) {
+  const auto* found = std::ranges::find(kKeeps, text);
+  if (found != kKeeps.end()) return static_cast<Keep>(found - kKeeps.begin());
+  throw BadInput(Concat(where, ": expected all, policy or tables, got \"", text, "\""));
+}
+
+int64_t SeedRun::Steps() const {
+  if (finished) return result->steps;
+  const int64_t at_checkpoint = result ? result->steps : 0;
+  // A row begins with its step; the last one may be half written.
+  const std::string tail = TailOf(path / RunFolder::kMetrics, 1024);
+  const std::vector<std::string_view> rows = Split(tail, '\n');
+  if (rows.size() < 3) return at_checkpoint;
+  const auto at_metrics = ParseInteger(Split(rows[rows.size() - 2], ',').front());
+  return std::max(at_checkpoint, at_metrics.value_or(0));
+}
+
+bool SeedRun::HasFailed() const {
+  std::error_code error;
+  return fs::exists(fs::symlink_status(failed(), error));
+}
+
+bool SeedRun::ReadIfFinished() {
+  result = ReadDone(done());
+  if (result && result->settings != settings) {
+    throw BadInput(Concat(done().string(), ": made with other settings than ",
+                          (path.parent_path() / kSettingsName).string(), " has"));
+  }
+  finished = AtEnd();
+  if (!finished) result.reset();  // that of fewer steps
+  return finished;
+}
+
+void SeedRun::Read() {
+  CheckNoLink(path);
+  problem.clear();
+  if (HasFailed()) {
+    problem = std::string(Trim(ReadOwnFile(failed(), 1 << 16)));
+    if (problem.empty()) problem = "failed";
+  }
+  if (!ReadIfFinished() && !IsReduced()) {
+    result = ReadCheckpointResult(path, SpecOf(variant->config.Environments()));
+  }
+}
+
+bool SeedRun::IsReduced() const {
+  return fs::exists(done()) && !fs::exists(RunFolder::CheckpointPath(path));
+}
+
+std::vector<SeedRun> RunsOf(const StudyPlan& plan) {
+  std::vector<std::string> settings;
+  for (const Variant& variant : plan.variants) settings.push_back(SettingsMark(variant.config));
+  std::vector<SeedRun> runs;
+  runs.reserve(plan.seeds.size() * plan.variants.size());
+  for (const int64_t seed : plan.seeds) {
+    for (size_t v = 0; v < plan.variants.size(); ++v) {
+      const Variant& variant = plan.variants[v];
+      const fs::path name = fs::path(variant.name) / Concat("seed", seed);
+      runs.push_back({&variant, settings[v], seed, name.string(), plan.folder / name, {}, ""});
+    }
+  }
+  return runs;
+}
+
+std::string SettingsMark(const Config& config) {
+  Config own = config;
+  own.model.clear();  // a model is what is in its file, not where that lies
+  Checksum sum;
+  for (const Option& option : TrainingSettings(own)) {
+    if (option.name == "steps" || option.name == "stop_when_solved") continue;
+    sum.Update(BytesOf(Concat(option.section, ".", option.name, "=", option.text(), "\n")));
+  }
+  sum.Update(BytesOf(own.mjcf));
+  return sum.Hex();
+}
+
+void WritePlan(const StudyPlan& plan) {
+  ordered_json variants = ordered_json::array();
+  for (const Variant& variant : plan.variants) {
+    const fs::path folder = plan.folder / variant.name;
+    MakeFolder(folder);
+    if (!variant.config.mjcf.empty()) WriteIfOther(folder / RunFolder::kModel, variant.config.mjcf);
+    Config config = variant.config;
+    const auto wanted = [](const Option& option) { return option.name != "seed"; };
+    WriteIfOther(folder / kSettingsName, OptionsOf(config).Toml(true, wanted));
+    variants.push_back({{"name", variant.name}, {"settings", SettingsMark(variant.config)}});
+  }
+  const ordered_json j{{"version", UPSWING_VERSION},
+                       {"keep", KeepName(plan.keep)},
+                       {"seeds", Concat("[", SeedsText(plan.seeds), "]")},
+                       {"variants", variants}};
+  WriteIfOther(plan.folder / kPlanName, PrintableJson(j) + "\n");
+}
+
+StudyPlan ReadPlan(const fs::path& folder) {
+  const fs::path path = folder / kPlanName;
+  const std::string where = path.string();
+  std::error_code error;
+  if (!fs::exists(path, error)) {
+    throw BadInput(
+        Concat(folder.string(), ": expected the folder of a study, got one without ", kPlanName));
+  }
+  StudyPlan plan;
+  plan.folder = folder;
+  try {
+    const json j = ParseJsonObject(ReadOwnFile(path, kMostPlanBytes), 4);
+    if (JsonText(j, "version") != UPSWING_VERSION) {
+      throw BadInput(Concat("made by Upswing ", JsonText(j, "version"), ", this is ",
+                            UPSWING_VERSION, ", which may train otherwise"));
+    }
+    plan.keep = ParseKeep(JsonText(j, "keep"), "keep");
+    plan.seeds = ParseSeeds(JsonText(j, "seeds"), "seeds");
+    for (const json& one : JsonList(j, "variants", kMostVariants)) {
+      if (!one.is_object()) throw BadInput("variants: expected objects");
+      Variant variant;
+      variant.name = JsonText(one, "name");
+      if (!variant.name.empty()) CheckVariantName(variant.name, "variants");
+      if (std::ranges::find(plan.variants, variant.name, &Variant::name) != plan.variants.end()) {
+        throw BadInput(Concat("variants: expected each once, but ", variant.name, " is twice"));
+      }
+      CheckNoLink(folder / variant.name);
+      const fs::path settings = folder / variant.name / kSettingsName;
+      variant.config = BuildConfig(settings, {});
+      MakeReadyForMany(variant.config);
+      if (SettingsMark(variant.config) != JsonText(one, "settings")) {
+        throw BadInput(Concat(settings.string(), " is not that of the plan; `study` makes both"));
+      }
+      plan.variants.push_back(std::move(variant));
+    }
+  } catch (const Error& broken) {
+    const std::string_view what = broken.what();
+    if (what.starts_with(folder.string())) throw;
+    throw BadInput(Concat(where, ": ", what));
+  }
+  return plan;
+}
+
+Keep KeepOf(const fs::path& folder) {
+  try {
+    const json j = ParseJsonObject(ReadOwnFile(folder / kPlanName, kMostPlanBytes), 4);
+    return ParseKeep(JsonText(j, "keep"), "keep");
+  } catch (const Error&) {
+    return Keep::kAll;
+  }
+}
+
+void CheckVariantName(const std::string& name, const std::string& place) {
+  const auto fits = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
+           c == '_';
+  };
+  if (name.empty() || !std::ranges::all_of(name, fits)) {
+    throw BadInput(
+        Concat(place, ": expected a name of letters, digits, - and _, got \"", name, "\""));
+  }
+}
+
+}  // namespace upswing

@@ -1,0 +1,172 @@
+#include "study/study_worker.h"
+
+#include <list>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "io/file.h"
+#include "io/lease.h"
+#include "io/run_folder.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Removes the files of a finished run but those that are to be kept.
+void Reduce(const SeedRun& run, Keep keep) {
+  if (keep == Keep::kAll) return;
+  fs::remove(run.log());
+  if (keep == Keep::kTables) return RemoveFolder(run.path);
+  for (const auto& entry : fs::directory_iterator(run.path)) {
+    const std::string name = entry.path().filename().string();
+    const bool kept = name == RunFolder::kConfig || name == RunFolder::kPolicy ||
+                      name == RunFolder::kEvaluations || name == RunFolder::kLog ||
+                      name == RunFolder::kModel;
+    if (!kept) fs::remove(entry.path());
+  }
+}
+
+/// Begins a run, or resumes what a worker left of it.
+std::unique_ptr<TrainingRun> MakeOrResume(const SeedRun& run) {
+  const TrainConfig& train = run.variant->config.train;
+  if (run.IsReduced() && fs::exists(run.path)) RemoveFolder(run.path);  // the same bits come again
+  if (fs::exists(run.path / RunFolder::kConfig)) {
+    return TrainingRun::Resume(
+        run.path,
+        {{"steps", std::to_string(train.steps), "steps"},
+         {"threads", std::to_string(train.threads), "threads"},
+         {"checkpoint_every", std::to_string(train.checkpoint_every), "checkpoint_every"},
+         {"stop_when_solved", train.stop_when_solved ? "true" : "false", "stop_when_solved"}});
+  }
+  Config config = run.variant->config;
+  config.train.seed = run.seed;
+  return TrainingRun::Make(run.path, std::move(config));
+}
+
+/// One worker.
+class Worker {
+ public:
+  Worker(const StudyPlan& plan, WorkerHost& host) : plan_(plan), host_(host) {}
+
+  WorkerOutcome Run() {
+    std::vector<SeedRun> runs = RunsOf(plan_);
+    std::list<SeedRun*> open;
+    for (SeedRun& run : runs) open.push_back(&run);
+    // Again, as long as that brings any: another worker may have lost one meanwhile.
+    for (bool tried = true; tried && !open.empty() && !outcome_.stopped;) {
+      tried = false;
+      for (auto it = open.begin(); it != open.end() && !outcome_.stopped;) {
+        const Turn turn = Try(**it);
+        tried = tried || turn == Turn::kTried;
+        it = turn == Turn::kAnothers ? std::next(it) : open.erase(it);
+      }
+    }
+    outcome_.anothers = std::ssize(open);
+    return outcome_;
+  }
+
+ private:
+  enum class Turn { kNothingToDo, kAnothers, kTried };
+
+  Turn Try(SeedRun& run) {
+    outcome_.stopped = host_.stopped();
+    if (outcome_.stopped) return Turn::kNothingToDo;
+    std::optional<Lease> lease;
+    try {
+      const bool ended = run.HasFailed() || run.ReadIfFinished();
+      if (ended && !fs::exists(run.claim())) return Turn::kNothingToDo;
+      if (auto taken = Lease::Take(run.claim(), "trains it")) lease.emplace(std::move(*taken));
+      if (ended) return Turn::kNothingToDo;  // its worker died before it gave the claim back
+      if (!lease) return Turn::kAnothers;
+      if (run.HasFailed() || run.ReadIfFinished()) return Turn::kNothingToDo;  // meanwhile
+      Train(run, *lease);
+    } catch (const FolderBusy&) {  // whoever lost the claim is still at work there
+      return Turn::kAnothers;
+    } catch (const std::exception& error) {
+      if (lease && !lease->held()) return Turn::kAnothers;
+      CountFailure(run, error);
+    }
+    return Turn::kTried;
+  }
+
+  /// Says why a run failed. Throws the error if even that cannot be written, or if nothing works
+  /// here, as on a broken host, which is not to fail all other runs too.
+  void CountFailure(const SeedRun& run, const std::exception& error) {
+    constexpr int kMostInARow = 3;
+    try {
+      WriteFailed(run, error.what());
+    } catch (const Error&) {
+      throw Failure(Concat(run.name, ": ", error.what()));
+    }
+    ++outcome_.failed;
+    if (++failed_in_a_row_ < kMostInARow) return;
+    throw Failure(Concat(kMostInARow, " runs in a row failed here, the last of them ", run.name,
+                         ": ", error.what()));
+  }
+
+  void Train(SeedRun& run, const Lease& lease) {
+    run.Read();
+    const auto make = [&] { return MakeOrResume(run); };
+    if (!run.AtEnd() && !host_.Train(run, make, [&] { return lease.held(); })) {
+      outcome_.stopped = true;
+      return;
+    }
+    if (!lease.held()) throw Failure("another worker has it");
+    Finish(run, plan_.keep);
+    ++outcome_.done;
+    failed_in_a_row_ = 0;
+  }
+
+  const StudyPlan& plan_;
+  WorkerHost& host_;
+  WorkerOutcome outcome_;
+  int failed_in_a_row_ = 0;
+};
+
+}  // namespace
+
+void WriteEvaluations(const StudyPlan& plan) {
+  std::string columns, table;
+  for (const SeedRun& run : RunsOf(plan)) {
+    const auto result = ReadDone(run.done());
+    if (!result) continue;
+    bool is_first = true;
+    for (const std::string_view line : Split(result->evaluations, '\n')) {
+      if (line.empty()) continue;
+      if (!is_first) {
+        table += Concat(run.variant->name, ',', run.seed, ',', line, '\n');
+      } else if (columns.empty()) {
+        columns = line;
+      } else if (columns != line) {
+        throw Failure(Concat(run.done().string(),
+                             ": its evaluations have other columns than those ", "of other runs"));
+      }
+      is_first = false;
+    }
+  }
+  WriteFileAtomically(plan.folder / "evaluations.csv",
+                      Concat("variant,seed,", columns, "\n", table));
+}
+
+void WriteFailed(const SeedRun& run, const std::string& why) {
+  WriteFileAtomically(run.failed(), Concat(Printable(why), "\n"));
+}
+
+WorkerOutcome WorkOn(const StudyPlan& plan, WorkerHost& host) { return Worker(plan, host).Run(); }
+
+void Finish(const SeedRun& run, Keep keep) {
+  const auto at_end = ReadCheckpointResult(run.path, SpecOf(run.variant->config.Environments()));
+  if (!at_end) throw Failure(Concat(run.path.string(), ": it was removed while it was trained"));
+  RunResult result = *at_end;
+  result.settings = run.settings;
+  result.planned_steps = run.variant->config.train.steps;
+  result.stop_when_solved = run.variant->config.train.stop_when_solved;
+  result.version = UPSWING_VERSION;
+  result.conditions = ReadConditions(run.path);
+  result.evaluations = ReadOwnFile(run.path / RunFolder::kEvaluations);
+  WriteDone(run.done(), result);
+  Reduce(run, keep);
+}
+
+}  // namespace upswing
