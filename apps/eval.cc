@@ -34,7 +34,7 @@ int RunEval(const EvalArguments& a) {
   }
   if (!a.episodes_csv.empty()) CheckWritable("--episodes-csv", a.episodes_csv);
   const LoadedPolicy loaded = GetPolicy(a.policy);
-  ThreadPool pool(ResolveThreads(a.threads));
+  ThreadPool pool(ResolveThreads(a.threads), a.threads == 0);
   const EvalReport report = [&] {
     EpisodeProgress progress(a.episodes, a.as_json);  // gone when the table is printed
     return EvaluatePolicy(loaded, a.trial, a.episodes, pool,

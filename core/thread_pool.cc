@@ -5,6 +5,7 @@
 #include <cassert>
 #include <cstdint>
 #include <exception>
+#include <limits>
 #include <mutex>
 #include <thread>
 #include <utility>
@@ -41,23 +42,27 @@ struct ThreadPool::Workers {
   Workers& operator=(const Workers&) = delete;
 
   void ParallelFor(int n, const std::function<void(int)>& task);
+  void Use(int count);
   void Stop();
-  void Work();
+  void Work(int index);
   void RunTasks();
 
   const std::function<void(int)>* task_ = nullptr;
   std::atomic<uint64_t> ticket_{0};      // the next task to take
   std::atomic<uint32_t> round_{0};       // increases at each ParallelFor; idle threads wait for it
   std::atomic<uint32_t> unfinished_{0};  // tasks of this round
+  std::atomic<int> used_;                // workers that wait for rounds; the others sleep
   std::atomic<bool> stopping_{false};
   std::mutex error_mutex_;
   std::exception_ptr error_;
   std::vector<std::thread> threads_;
 };
 
-ThreadPool::Workers::Workers(int count) {
+ThreadPool::Workers::Workers(int count) : used_(count) {
   try {
-    for (int thread = 0; thread < count; ++thread) threads_.emplace_back([this] { Work(); });
+    for (int index = 0; index < count; ++index) {
+      threads_.emplace_back([this, index] { Work(index); });
+    }
   } catch (...) {
     Stop();
     throw;
@@ -66,6 +71,7 @@ ThreadPool::Workers::Workers(int count) {
 
 void ThreadPool::Workers::Stop() {
   stopping_ = true;
+  Use(std::numeric_limits<int>::max());
   ++round_;
   round_.notify_all();
   for (std::thread& thread : threads_) thread.join();
@@ -83,9 +89,14 @@ void ThreadPool::Workers::ParallelFor(int n, const std::function<void(int)>& tas
   if (error_) std::rethrow_exception(std::exchange(error_, nullptr));
 }
 
-void ThreadPool::Workers::Work() {
+void ThreadPool::Workers::Use(int count) {
+  if (used_.exchange(count) < count) used_.notify_all();
+}
+
+void ThreadPool::Workers::Work(int index) {
   uint32_t seen = 0;
   while (true) {
+    for (int used = used_; used <= index; used = used_) used_.wait(used);
     WaitWhile(round_, seen);
     seen = round_;
     if (stopping_) return;
@@ -111,14 +122,21 @@ void ThreadPool::Workers::RunTasks() {
   }
 }
 
-ThreadPool::ThreadPool(int threads) : threads_(std::max(threads, 1)) {
+ThreadPool::ThreadPool(int threads, bool adapts)
+    : threads_(std::max(threads, 1)), adapts_(adapts), used_(threads_) {
   if (threads_ > 1) workers_ = std::make_unique<Workers>(threads_ - 1);
 }
 
 ThreadPool::~ThreadPool() = default;
 
+void ThreadPool::Use(int threads) {
+  if (used_ == threads) return;
+  used_ = threads;
+  if (workers_ != nullptr) workers_->Use(threads - 1);
+}
+
 void ThreadPool::ParallelFor(int n, const std::function<void(int)>& task) {
-  if (workers_ != nullptr && n > 1) return workers_->ParallelFor(n, task);
+  if (used_ > 1 && n > 1) return workers_->ParallelFor(n, task);
   for (int i = 0; i < n; ++i) task(i);  // no thread needs to be woken
 }
 

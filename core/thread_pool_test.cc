@@ -42,6 +42,16 @@ TEST(ThreadPool, ManyShortRoundsWithMoreThreadsThanProcessors) {
   EXPECT_GT(by_others, 0);
 }
 
+TEST(ThreadPool, RunsEveryTaskOnceWhileTheThreadsInUseChange) {
+  ThreadPool pool(4);
+  for (int round = 0; round < 500; ++round) {
+    pool.Use(1 + round * 7 % 4);
+    std::vector<int> calls(9);
+    pool.ParallelFor(9, [&](int i) { ++calls[static_cast<size_t>(i)]; });
+    for (const int count : calls) ASSERT_EQ(count, 1);
+  }
+}
+
 TEST(ThreadPool, SumsInAFixedOrderHaveTheSameBits) {
   const auto sum = [](int threads) {
     ThreadPool pool(threads);

@@ -44,7 +44,8 @@ float HuberLoss(float delta) {
 float HuberGradient(float delta) { return std::clamp(delta, -1.0F, 1.0F); }
 
 Dqn::Dqn(const DqnConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool& pool)
-    : OffPolicyAgent(config, spec, ActionSpace::Discrete(static_cast<size_t>(config.levels)), seed),
+    : OffPolicyAgent(config, spec, ActionSpace::Discrete(static_cast<size_t>(config.levels)), seed,
+                     pool),
       config_(config),
       obs_size_(static_cast<size_t>(spec.obs_size)),
       torques_(TorquesOf(config, spec)),

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/aligned.h"
+#include "core/thread_tuner.h"
 
 namespace upswing {
 namespace {
@@ -247,12 +248,15 @@ std::vector<EvaluationEpisode> EvaluateEpisodes(const Policy& policy, VectorEnv&
   std::vector<EpisodeTally> tallies(static_cast<size_t>(n), EpisodeTally(policy, spec));
   EstimateValues(policy, env, tallies);
 
+  ThreadTuner tuner(pool);
   const int64_t steps = StepsIn(spec.evaluation.seconds, spec);
   for (int64_t k = 1; k <= steps; ++k) {
     // Before the step: after the last one an environment that timed out has been reset.
     for (int i = 0; i < n; ++i) tallies[static_cast<size_t>(i)].SeeLean(env, i);
-    act(env.obs(), action);
-    env.Step(action, result);
+    tuner.Run([&] {
+      act(env.obs(), action);
+      env.Step(action, result);
+    });
     for (int i = 0; i < n; ++i) tallies[static_cast<size_t>(i)].Add(result, static_cast<size_t>(i));
     if (progress) progress(static_cast<double>(k) / static_cast<double>(steps));
     if (std::ranges::all_of(tallies, &EpisodeTally::ended)) break;

@@ -35,11 +35,12 @@ void OffPolicyConfig::Describe(Options& o) {
 }
 
 OffPolicyAgent::OffPolicyAgent(const OffPolicyConfig& config, const EnvSpec& spec,
-                               const ActionSpace& actions, uint64_t seed)
+                               const ActionSpace& actions, uint64_t seed, ThreadPool& pool)
     : explore_rng_(seed, "exploration"),
       act_action_(static_cast<size_t>(spec.num_envs) * static_cast<size_t>(actions.size)),
       td_error_(static_cast<size_t>(config.batch)),
       settings_(config),
+      update_threads_(&pool),
       obs_size_(static_cast<size_t>(spec.obs_size)),
       action_size_(static_cast<size_t>(actions.size)),
       action_space_(actions),
@@ -108,7 +109,7 @@ void OffPolicyAgent::Learn() {
       replay_.Sample(sample_rng_, batch_);
     }
     if (settings_.mirror) MirrorHalf(sample_rng_, mirror_signs_, action_space_, batch_);
-    Update(batch_);
+    update_threads_.Run([&] { Update(batch_); });
     if (settings_.prioritized) replay_.Prioritize(batch_, td_error_, settings_.priority_exponent);
   }
 }

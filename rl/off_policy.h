@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/options.h"
+#include "core/thread_tuner.h"
 #include "rl/agent.h"
 #include "rl/n_step.h"
 #include "rl/replay.h"
@@ -52,7 +53,7 @@ class OffPolicyAgent : public Agent {
  protected:
   /// Throws BadInput if minibatches are to be mirrored but the task has no mirror symmetry.
   OffPolicyAgent(const OffPolicyConfig& config, const EnvSpec& spec, const ActionSpace& actions,
-                 uint64_t seed);
+                 uint64_t seed, ThreadPool& pool);
 
   /// What is learned from an environment's step: its reward times reward_scale.
   virtual double RewardOf(const StepResult& result, size_t env);
@@ -76,6 +77,7 @@ class OffPolicyAgent : public Agent {
   double schedule() const;
 
   OffPolicyConfig settings_;
+  ThreadTuner update_threads_;
   size_t obs_size_, action_size_;
   ActionSpace action_space_;
   std::vector<float> mirror_signs_;  // (D)

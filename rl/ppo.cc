@@ -47,6 +47,7 @@ Ppo::Ppo(const PpoConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
       torques_(config.discrete() ? TorqueLevels(limit_[0], config.levels) : std::vector<double>()),
       mirror_signs_(spec.mirror_signs),
       pool_(pool),
+      update_threads_(&pool),
       shuffle_rng_(seed, "minibatches"),
       mirror_rng_(seed, "mirror"),
       actor_(config.Shape(D_), {outputs()}, B_, kAdamEpsilon),
@@ -209,7 +210,8 @@ void Ppo::Learn() {
     }
     const double before = kl_sum_;
     for (size_t first = 0; first < order_.size(); first += static_cast<size_t>(B_)) {
-      Update(std::span(order_).subspan(first, static_cast<size_t>(B_)));
+      const auto rows = std::span(order_).subspan(first, static_cast<size_t>(B_));
+      update_threads_.Run([&] { Update(rows); });
     }
     kl = (kl_sum_ - before) * static_cast<double>(B_) / static_cast<double>(order_.size());
   }

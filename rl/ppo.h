@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/thread_pool.h"
+#include "core/thread_tuner.h"
 #include "nn/adam.h"
 #include "rl/agent.h"
 #include "rl/normalizer.h"
@@ -95,6 +95,7 @@ class Ppo : public Agent {
   std::vector<double> torques_;      // (K) N·m, of levels; else empty
   std::vector<float> mirror_signs_;  // (D)
   ThreadPool& pool_;
+  ThreadTuner update_threads_;
   std::vector<Rng> explore_rngs_;  // of each block of environments
   Rng shuffle_rng_, mirror_rng_;
 

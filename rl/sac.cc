@@ -13,7 +13,7 @@
 namespace upswing {
 
 Sac::Sac(const SacConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool& pool)
-    : OffPolicyAgent(config, spec, ActionSpace{spec.action_size()}, seed),
+    : OffPolicyAgent(config, spec, ActionSpace{spec.action_size()}, seed, pool),
       config_(config),
       D_(spec.obs_size),
       A_(spec.action_size()),

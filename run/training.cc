@@ -40,7 +40,7 @@ EnvConfig EvaluationEnvironments(const Config& config, int64_t step) {
 
 Training::Training(Config config, int threads, std::vector<TrainObserver*> observers)
     : config_(Checked(std::move(config))),
-      pool_(threads),
+      pool_(threads, config_.train.threads == 0),
       env_(MakeTrainingEnv(config_, pool_)),
       agent_(config_.MakeAgent(env_->spec(), pool_)),
       trainer_({config_.train,

@@ -65,7 +65,7 @@ std::pair<std::string, std::string> EvaluateHandle(const PolicyHandle& policy,
   trial.unknown_plant = unknown_plant;
   Told told(progress);
   const nb::gil_scoped_release unlocked;
-  ThreadPool pool(ResolveThreads(threads));
+  ThreadPool pool(ResolveThreads(threads), threads == 0);
   const EvalReport report =
       EvaluatePolicy(policy.loaded(), trial, episodes, pool, [&](double share) { told(share); });
   return {EvalJson(report), EpisodesCsv(report)};
@@ -104,7 +104,7 @@ nb::tuple MapHandle(const PolicyHandle& policy, const SettingTexts& settings,
     map = PlanMap(a, policy.loaded());
     const std::filesystem::path folder =
         out.empty() ? std::filesystem::path() : MapFolder(a, policy.loaded(), map);
-    ThreadPool pool(ResolveThreads(threads));
+    ThreadPool pool(ResolveThreads(threads), threads == 0);
     FillMap(
         a, policy.loaded(), pool, [&](double /*episodes*/, double share) { told(share); }, map);
     if (!out.empty()) {

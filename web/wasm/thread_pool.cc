@@ -5,7 +5,9 @@ namespace upswing {
 
 struct ThreadPool::Workers {};
 
-ThreadPool::ThreadPool(int) : threads_(1) {}
+ThreadPool::ThreadPool(int, bool) : threads_(1), adapts_(false), used_(1) {}
+
+void ThreadPool::Use(int) {}
 
 ThreadPool::~ThreadPool() = default;
 
