@@ -105,7 +105,7 @@ std::vector<BestEpisode> BestEpisodeSearch::Judge(const StateVector& start,
     }
     optimizer_.model().Step(x, u);
     for (size_t i = 0; i < x.size(); ++i) {
-      const PendulumState s{x[i][0], x[i][1], x[i][2], x[i][3]};
+      const PendulumState s = StateOf(x[i]);
       const auto terms = RewardTerms(plant_, s, u[i]);
       for (size_t k = 0; k < terms.size(); ++k) {
         episodes[i].reward_sum += weights.weight[k] * terms[k];

@@ -1,31 +1,29 @@
-// Symbols as in sim/closed_form.h: J inertias, b coupling of the links (kg·m²), G moments of
-// gravity (N·m), d damping (N·m·s/rad).
 #include "control/linearize.h"
 
 #include <Eigen/LU>
 
-#include "sim/closed_form.h"
+#include "sim/manipulator.h"
 
 namespace upswing {
 
-LinearModel LinearizeUpright(const Plant& plant) {
-  ClosedFormBatch batch(1);
-  batch.SetPlant(0, plant);
-  const double J1 = batch.J1[0], J2 = batch.J2[0], b = batch.b[0];
-  const double G1 = batch.G1[0], G2 = batch.G2[0], d1 = batch.d1[0], d2 = batch.d2[0];
-
+LinearModel LinearizeUpright(const Manipulator& plant, int actuated_joint) {
   // M q̈ = e u + G q - D q̇, e the motor's joint. With cos q2 = 1 nothing of M is lost; gravity,
   // which pulls back hanging, pushes away; what is quadratic in the velocities has no part.
   Eigen::Matrix2d M, G, D;
-  M << J1 + J2 + 2 * b, J2 + b, J2 + b, J2 + kArmature;
-  G << G1 + G2, G2, G2, G2;
-  D << d1, 0, 0, d2;
+  const auto [M11, M12, M22] = plant.Mass(1);
+  M << M11, M12, M12, M22;
+  G << plant.G1 + plant.G2, plant.G2, plant.G2, plant.G2;
+  D << plant.d1, 0, 0, plant.d2;
   const Eigen::Matrix2d inverse = M.inverse();
 
   LinearModel model;
   model.A << Eigen::Matrix2d::Zero(), Eigen::Matrix2d::Identity(), inverse * G, -inverse * D;
-  model.B << 0, 0, inverse.col(plant.actuated_joint == 1 ? 0 : 1);
+  model.B << 0, 0, inverse.col(actuated_joint - 1);
   return model;
+}
+
+LinearModel LinearizeUpright(const Plant& plant) {
+  return LinearizeUpright(ManipulatorOf(plant), static_cast<int>(plant.actuated_joint));
 }
 
 LinearModel Discretize(const LinearModel& continuous, double h, int steps) {

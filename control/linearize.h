@@ -2,7 +2,7 @@
 
 #include <Eigen/Core>
 
-#include "sim/double_pendulum.h"
+#include "sim/manipulator.h"
 
 /// The double pendulum as a linear system about upright at rest.
 namespace upswing {
@@ -15,7 +15,9 @@ struct LinearModel {
   Eigen::Vector4d B;
 };
 
-/// The equations of motion of sim/closed_form.h, linearised about upright at rest: continuous time.
+/// The equations of motion, linearised about upright at rest: continuous time. Dry friction is left
+/// out: its slope at rest holds within 0.01 rad/s alone.
+LinearModel LinearizeUpright(const Manipulator& plant, int actuated_joint);
 LinearModel LinearizeUpright(const Plant& plant);
 
 /// A continuous model over `steps` Runge-Kutta steps of `h` seconds with the torque held: the

@@ -12,6 +12,7 @@ namespace upswing {
 
 /// [q1, q2, w1, w2]: rad and rad/s.
 using StateVector = Eigen::Vector4d;
+inline PendulumState StateOf(const StateVector& x) { return {x[0], x[1], x[2], x[3]}; }
 
 /// x⁺ = f(x, u): one control period with the torque u (N·m) held, by the very kernels of the
 /// simulation, of many states at once.

@@ -16,7 +16,7 @@ double RewardCost::Inversion(const StateVector& x) const {
 
 double RewardCost::Running(const StateVector& x, double u) const {
   const auto& [energy, height, balance, velocity, torque] = weights_.weight;
-  const PendulumState s{x[0], x[1], x[2], x[3]};
+  const PendulumState s = StateOf(x);
   const double inverted = Inversion(x);
   const double h = TipHeight(plant_, s) / (plant_.length1 + plant_.length2);
   return energy * (1.5 - std::clamp(NormalizedEnergy(plant_, s), 0.0, 1.5)) + height * (1 - h) / 2 +

@@ -21,7 +21,7 @@ void PartialFeedbackConfig::Describe(Options& o) {
 
 double EnergyShapingTorque(const EnergyShapingConfig& config, const Manipulator& plant,
                            const StateVector& deviation) {
-  const ManipulatorTerms t = plant.At(FromUpright(deviation));
+  const ManipulatorTerms t = plant.At(StateOf(FromUpright(deviation)));
   const double det = t.M11 * t.M22 - t.M12 * t.M12;
   const double F = t.M12 * t.h2 - t.M22 * t.h1;  // det q̈1 = M22 u + F
   const double w1 = deviation[2];
@@ -31,7 +31,7 @@ double EnergyShapingTorque(const EnergyShapingConfig& config, const Manipulator&
 
 double PartialFeedbackTorque(const PartialFeedbackConfig& config, const Manipulator& plant,
                              const StateVector& deviation) {
-  const ManipulatorTerms t = plant.At(FromUpright(deviation));
+  const ManipulatorTerms t = plant.At(StateOf(FromUpright(deviation)));
   const double w1 = deviation[2];
   const double acceleration =
       -config.kP * deviation[0] - config.kD * w1 - config.kE * t.energy * w1;

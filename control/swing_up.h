@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "control/controller.h"
-#include "control/manipulator.h"
+#include "sim/manipulator.h"
 
 /// Swing-up by laws of a formula each. They know nothing of the motor's limit; LQR catches what
 /// they bring up (control/hybrid.h).

@@ -22,7 +22,7 @@ UprightModes ModesOf(const Plant& plant) {
   modes.decay = -rates[3];
 
   const PassiveJoint passive =
-      PassiveJointOf(ConstantsOf(plant), static_cast<int>(plant.actuated_joint));
+      PassiveJointOf(ManipulatorOf(plant), static_cast<int>(plant.actuated_joint));
   modes.pole = passive.pole;
   modes.delta = passive.delta;
   return modes;

@@ -23,7 +23,7 @@ TEST(UprightModes, AreThoseThatIdentificationFinds) {
     Plant plant = box.Draw(Plant(), rng);
     plant.actuated_joint = n % 2 + 1;
     const UprightModes modes = ModesOf(plant);
-    const Falling falling = FallingOf(ConstantsOf(plant), plant, {});
+    const Falling falling = FallingOf(ManipulatorOf(plant), plant, {});
     EXPECT_NEAR(falling.rate[0], modes.faster, 1e-9);
     EXPECT_NEAR(falling.rate[1], modes.slower, 1e-9);
   }

@@ -200,11 +200,16 @@ void ControllerWriter::AddParts() {
 }
 
 void ControllerWriter::AddCatch(const LqrCatch& upright) {
+  if (config_.plant.coulomb1 != 0 || config_.plant.coulomb2 != 0) {
+    throw BadInput(Concat(loaded_.name,
+                          ": expected a plant without dry friction (coulomb1, coulomb2 ",
+                          "0), which the C code's look-ahead does not have"));
+  }
   ClosedFormBatch batch(1);
   batch.SetPlant(0, config_.plant);
   arrays_.push_back({"plant", "of the equations of motion",
                      Floats(std::array{batch.J1[0], batch.J2[0], batch.b[0], batch.G1[0],
-                                       batch.G2[0], batch.d1[0], batch.d2[0], kArmature})});
+                                       batch.G2[0], batch.d1[0], batch.d2[0], batch.a[0]})});
   arrays_.push_back(
       {"upright_cost", "of a deviation from upright", Floats(Triangle(upright.lqr().P))});
   arrays_.push_back({"region", "of attraction", Floats(std::array{upright.region()})});

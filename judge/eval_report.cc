@@ -40,7 +40,7 @@ std::vector<std::pair<std::string, std::string>> Cells(const EvalReport& report,
   if (spec.task == kDoublePendulum) {
     for (const auto& [name, value] : PlantValues(episode.plant)) add(name, value);
     const auto joint = static_cast<int>(episode.plant.actuated_joint);
-    const double delta = PassiveJointOf(ConstantsOf(episode.plant), joint).delta;
+    const double delta = PassiveJointOf(ManipulatorOf(episode.plant), joint).delta;
     add("delta", delta, std::isfinite(delta));
     add("sensor_noise", episode.disturbance.sensor_noise);
     add("delay", episode.disturbance.delay);

@@ -55,7 +55,7 @@ class IdentifyingEnvs : public testing::TestWithParam<const Engine*> {
     std::vector<double> errors;
     for (int i = 0; i < env.spec().num_envs; ++i) {
       const Plant& plant = env.plant(i);
-      const double delta = FallingOf(ConstantsOf(plant), plant, {}).delta;
+      const double delta = FallingOf(ManipulatorOf(plant), plant, {}).delta;
       errors.push_back(std::abs(env.obs()(i, kObservationSize + kConstants) - delta));
     }
     return Summary(errors);

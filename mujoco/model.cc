@@ -13,16 +13,29 @@ namespace upswing {
 namespace {
 
 /// Replaces MuJoCo's handlers, which print warnings and log them to a file in the current folder,
-/// and end the program on an error. Once, as they are global and threads compile models.
-void TakeOverMessages() {
+/// and end the program on an error; adds ours of dry friction. Once, as they are global and threads
+/// compile models.
+void SetHandlers() {
   static std::once_flag once;
   std::call_once(once, [] {
     mju_user_warning = [](const char*) {};
     mju_user_error = [](const char* message) { throw Failure(Concat("MuJoCo: ", message)); };
+    mjcb_passive = AddDryFriction;
   });
 }
 
 constexpr int kLinkBodies[2] = {1, 2};  // body 0 is the world
+
+/// Adds the dry friction c atan(s w) of models that have it, with c the frictionloss and s the user
+/// data of a joint. MuJoCo's own frictionloss is a constraint: at rest it holds, and it has no
+/// slope; as a passive force both engines agree to rounding.
+void AddDryFriction(const mjModel* model, mjData* data) {
+  if (!HasDryFriction(*model)) return;
+  for (int i = 0; i < model->nv; ++i) {
+    data->qfrc_passive[i] -=
+        model->dof_frictionloss[i] * std::atan(model->jnt_user[i] * data->qvel[i]);
+  }
+}
 
 /// Compiles untrusted MJCF: every error of MuJoCo's is bad input.
 ModelPtr CompileGiven(const std::string& mjcf, const std::string& where) {
@@ -126,7 +139,7 @@ void CheckGeometry(const mjModel& model, const std::string& where, const Expecta
 std::string MuJoCoVersion() { return mj_versionString(); }
 
 ModelPtr CompileModel(const std::string& mjcf, const std::string& where) {
-  TakeOverMessages();
+  SetHandlers();
   // One at a time: the thread sanitizer sees parsers in two threads share a buffer within MuJoCo.
   static std::mutex compiling;
   const std::lock_guard lock(compiling);
@@ -195,10 +208,26 @@ Plant PlantOf(const mjModel& model) {
 }
 
 ModelFields FieldsOf(mjModel& model) {
-  return {model.body_mass,      model.body_inertia, model.body_ipos,   model.body_pos,
-          model.geom_pos,       model.geom_size,    model.dof_damping, model.actuator_ctrlrange,
-          model.actuator_trnid, model.opt.gravity};
+  const bool rotors = HasRotors(model);
+  return {model.body_mass,
+          model.body_inertia,
+          model.body_ipos,
+          model.body_pos,
+          model.geom_pos,
+          model.geom_size,
+          model.dof_damping,
+          model.actuator_ctrlrange,
+          model.actuator_trnid,
+          model.opt.gravity,
+          rotors ? model.dof_armature : nullptr,
+          rotors ? model.tendon_armature : nullptr,
+          rotors ? model.wrap_prm : nullptr,
+          HasDryFriction(model) ? model.dof_frictionloss : nullptr};
 }
+
+bool HasRotors(const mjModel& model) { return model.ntendon == 1; }
+
+bool HasDryFriction(const mjModel& model) { return model.nuser_jnt == 1; }
 
 void WritePlant(const Plant& plant, const ModelFields& fields) {
   const std::array<double, 2> masses{plant.mass1, plant.mass2};
@@ -224,6 +253,21 @@ void WritePlant(const Plant& plant, const ModelFields& fields) {
   fields.actuator_trnid[0] = static_cast<int>(plant.actuated_joint) - 1;
   fields.gravity[0] = fields.gravity[1] = 0;
   fields.gravity[2] = -plant.gravity;
+
+  if (fields.tendon_armature != nullptr) {
+    fields.dof_armature[0] = Armature1(plant);
+    fields.tendon_armature[0] = plant.rotor_inertia;
+    fields.wrap_prm[0] = 1;
+    fields.wrap_prm[1] = -plant.gear_ratio;
+  } else if (plant.rotor_inertia != 0) {
+    throw BadInput("rotor_inertia: expected 0 with a model that has no rotors");
+  }
+  if (fields.dof_frictionloss != nullptr) {
+    fields.dof_frictionloss[0] = plant.coulomb1;
+    fields.dof_frictionloss[1] = plant.coulomb2;
+  } else if (plant.has_dry_friction()) {
+    throw BadInput("coulomb1, coulomb2: expected 0 with a model that has no dry friction");
+  }
 }
 
 }  // namespace upswing

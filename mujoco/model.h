@@ -39,7 +39,8 @@ ModelPtr LoadModel(const std::string& mjcf, const std::string& where);
 /// plant's parameters; such as "armature1 0.02 kg·m²".
 std::vector<std::string> DifferencesFromBuiltIn(const mjModel& model);
 
-/// The plant that a loaded model describes.
+/// The plant that a loaded model describes, without rotors and dry friction, which only the
+/// built-in one has.
 Plant PlantOf(const mjModel& model);
 
 /// Pointers to the plant's numbers: in an mjModel, or in rows that a batch has expanded. The
@@ -55,11 +56,20 @@ struct ModelFields {
   mjtNum* actuator_ctrlrange;  // (1 × 2)
   int* actuator_trnid;         // (1 × 2)
   mjtNum* gravity;             // (3)
+  // Null where the model was compiled without rotors or without dry friction.
+  mjtNum* dof_armature;      // (2)
+  mjtNum* tendon_armature;   // (1)
+  mjtNum* wrap_prm;          // (2)
+  mjtNum* dof_frictionloss;  // (2)
 };
+/// Whether a model has what a plant's rotors, and what its dry friction is written to.
+bool HasRotors(const mjModel& model);
+bool HasDryFriction(const mjModel& model);
 ModelFields FieldsOf(mjModel& model);
 
 /// Writes a plant into a loaded model, as if its MJCF had these numbers. mj_setConst or
-/// mjb_setConst must follow.
+/// mjb_setConst must follow. Throws BadInput if the plant has rotors or dry friction and the model
+/// was compiled without them.
 void WritePlant(const Plant& plant, const ModelFields& fields);
 
 }  // namespace upswing

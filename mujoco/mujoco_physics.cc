@@ -23,7 +23,10 @@ T* Expand(mjBatch* batch, const char* field, int env) {
   return rows + env * size;
 }
 
-ModelFields ExpandedFields(mjBatch* batch, int env) {
+ModelFields ExpandedFields(mjBatch* batch, bool rotors, bool friction, int env) {
+  const auto if_any = [&](bool any, const char* field) {
+    return any ? Expand(batch, field, env) : nullptr;
+  };
   return {Expand(batch, "body_mass", env),
           Expand(batch, "body_inertia", env),
           Expand(batch, "body_ipos", env),
@@ -33,7 +36,21 @@ ModelFields ExpandedFields(mjBatch* batch, int env) {
           Expand(batch, "dof_damping", env),
           Expand(batch, "actuator_ctrlrange", env),
           Expand<int>(batch, "actuator_trnid", env),
-          Expand(batch, "opt.gravity", env)};
+          Expand(batch, "opt.gravity", env),
+          if_any(rotors, "dof_armature"),
+          if_any(rotors, "tendon_armature"),
+          if_any(rotors, "wrap_prm"),
+          if_any(friction, "dof_frictionloss")};
+}
+
+/// A plant whose MJCF has all that any of these needs.
+Plant Superset(const std::vector<Plant>& plants) {
+  Plant superset;
+  for (const Plant& plant : plants) {
+    superset.rotor_inertia = std::max(superset.rotor_inertia, plant.rotor_inertia);
+    superset.coulomb1 = std::max({superset.coulomb1, plant.coulomb1, plant.coulomb2});
+  }
+  return superset;
 }
 
 }  // namespace
@@ -42,9 +59,12 @@ MuJoCoPhysics::MuJoCoPhysics(const PhysicsConfig& config)
     : config_(config),
       slice_size_(std::max(kSmallestSlice, (config.num_envs + kMostSlices - 1) / kMostSlices)) {
   // The model, with the plant that all environments share, or the first of many.
-  const ModelPtr model = config_.mjcf.empty() ? CompileModel(Mjcf(Plant()), "model")
-                                              : LoadModel(config_.mjcf, "model");
+  const ModelPtr model = config_.mjcf.empty()
+                             ? CompileModel(Mjcf(Superset(config_.plants)), "model")
+                             : LoadModel(config_.mjcf, "model");
   WritePlant(config_.plant(0), FieldsOf(*model));
+  rotors_ = HasRotors(*model);
+  dry_friction_ = HasDryFriction(*model);
   const DataPtr data(mj_makeData(model.get()));
   mj_setConst(model.get(), data.get());
   substeps_ = static_cast<int>(std::round(kControlPeriod / model->opt.timestep));
@@ -65,7 +85,7 @@ MuJoCoPhysics::Slice MuJoCoPhysics::MakeSlice(const mjModel& model, int first, i
   if (batch == nullptr) throw Failure(Concat("MuJoCo: ", message.data()));
   if (config_.plants.size() > 1) {
     for (int i = 0; i < count; ++i) {
-      WritePlant(config_.plant(first + i), ExpandedFields(batch.get(), i));
+      WritePlant(config_.plant(first + i), ExpandedFields(batch.get(), rotors_, dry_friction_, i));
     }
     mjb_setConst(batch.get(), nullptr, 0);
   }
@@ -99,7 +119,7 @@ void MuJoCoPhysics::SetPlant(int env, const Plant& plant) {
   config_.plants[static_cast<size_t>(env)] = plant;
   const Slice& slice = SliceOf(env);
   const int row = env - slice.first;
-  WritePlant(plant, ExpandedFields(slice.batch.get(), row));
+  WritePlant(plant, ExpandedFields(slice.batch.get(), rotors_, dry_friction_, row));
   mjb_setConst(slice.batch.get(), &row, 1);
 }
 

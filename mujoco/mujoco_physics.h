@@ -43,9 +43,10 @@ class MuJoCoPhysics : public Physics {
   PhysicsConfig config_;
   int slice_size_;
   std::vector<Slice> slices_;
-  int substeps_ = 0;                    // physics steps in a control period
-  int state_size_ = 0;                  // numbers in a state row
-  std::vector<double> previous_angle_;  // (N) of the motor's joint before the step, rad
+  bool rotors_ = false, dry_friction_ = false;  // of the model
+  int substeps_ = 0;                            // physics steps in a control period
+  int state_size_ = 0;                          // numbers in a state row
+  std::vector<double> previous_angle_;          // (N) of the motor's joint before the step, rad
 };
 
 }  // namespace upswing

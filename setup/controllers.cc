@@ -42,7 +42,7 @@ Made MakeEnergyShaping(const ControllerConfig& config) {
                    Concat("energy shaping, weights ", Rounded(energy.kE), ", ", Rounded(energy.kD),
                           " and ", Rounded(energy.kP)),
                    OptionsOfAll(lqr, energy),
-                   [energy, plant = Manipulator(config.plant)](const StateVector& d) {
+                   [energy, plant = ManipulatorOf(config.plant)](const StateVector& d) {
                      return EnergyShapingTorque(energy, plant, d);
                    });
 }
@@ -55,7 +55,7 @@ Made MakePartialFeedback(const ControllerConfig& config) {
                    Concat("collocated partial feedback linearisation, gains ", Rounded(pfl.kP),
                           ", ", Rounded(pfl.kD), " and ", Rounded(pfl.kE)),
                    OptionsOfAll(lqr, pfl),
-                   [pfl, plant = Manipulator(config.plant)](const StateVector& d) {
+                   [pfl, plant = ManipulatorOf(config.plant)](const StateVector& d) {
                      return PartialFeedbackTorque(pfl, plant, d);
                    });
 }

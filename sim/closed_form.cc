@@ -1,6 +1,6 @@
 // Symbols: q1, q2 joint angles (rad; 0 hanging, q2 relative to link 1), w1, w2 their velocities
 // (rad/s), tau torque of the motor (N·m), s and c sine and cosine, 12 of the sum of both angles.
-// The plant's constants J1, J2, b, G1, G2, … are those of closed_form.h.
+// The plant's constants J1, J2, b, a, G1, G2, … are those of manipulator.h.
 #include "sim/closed_form.h"
 
 #include <algorithm>
@@ -11,6 +11,8 @@
 #define HWY_TARGET_INCLUDE "sim/closed_form.cc"
 #include <hwy/foreach_target.h>
 // After foreach_target.h, which includes this file once for every target:
+#include <hwy/contrib/math/math-inl.h>
+
 #include "sim/sine_cosine-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -31,10 +33,11 @@ HWY_INLINE hn::Mask<D> DrivesJoint1(const ClosedFormBatch& batch, size_t i) {
 
 /// The constants of the equations of motion.
 struct Dynamics {
-  V J2, b, G1, G2, d1, d2;
+  V J2, b, G1, G2, d1, d2, f1, f2;
   V tau1, tau2;  // at each joint; one of them is the motor's, the other 0
+  V a2;          // 2 a
   V J12;         // J1 + J2
-  V M22;         // J2 + armature
+  V M22;         // J2 + a
   V det;         // the part of det M that does not depend on q2
 };
 
@@ -47,13 +50,17 @@ HWY_INLINE Dynamics LoadDynamics(const ClosedFormBatch& batch, size_t i) {
   p.G2 = LoadFrom(batch.G2, i);
   p.d1 = LoadFrom(batch.d1, i);
   p.d2 = LoadFrom(batch.d2, i);
+  p.f1 = LoadFrom(batch.f1, i);
+  p.f2 = LoadFrom(batch.f2, i);
   const V tau = LoadFrom(batch.tau, i);
   const auto at1 = DrivesJoint1(batch, i);
   p.tau1 = hn::IfThenElseZero(at1, tau);
   p.tau2 = hn::IfThenZeroElse(at1, tau);
+  const V a = LoadFrom(batch.a, i);
+  p.a2 = a + a;
   p.J12 = J1 + p.J2;
-  p.M22 = p.J2 + Constant(kArmature);
-  p.det = MulAdd(J1, p.J2, Constant(kArmature) * p.J12);
+  p.M22 = p.J2 + a;
+  p.det = MulAdd(J1, p.J2, a * p.J12);
   return p;
 }
 
@@ -91,69 +98,74 @@ HWY_INLINE V MotorAngleOf(const ClosedFormBatch& batch, size_t i, const State& x
   return hn::IfThenElse(DrivesJoint1(batch, i), x.q.one, x.q.two);
 }
 
-/// M(q) q̈ = f = τ - c(q, q̇) - g(q) - d q̇, solved for q̈.
+/// M(q) q̈ = r = τ - c(q, q̇) - g(q) - d q̇ - f atan(100 q̇), solved for q̈.
+template <bool kFriction>
 HWY_INLINE Joints Acceleration(const Dynamics& p, const State& x) {
   const auto [s1, c1] = SineCosineOf(x.q.one);
   const auto [s2, c2] = SineCosineOf(x.q.two);
   const auto& [w1, w2] = x.w;
   const V s12 = MulAdd(s1, c2, c1 * s2);
 
-  // M = [[J1 + J2 + 2 b c2, J2 + b c2], [·, J2 + armature]]; J1 has the armature already, so that
-  // det M = J1 J2 + armature (J1 + J2) + b c2 (2 armature - b c2).
+  // M = [[J1 + J2 + 2 b c2, J2 + b c2], [·, J2 + a]], so that
+  // det M = J1 J2 + a (J1 + J2) + b c2 (2 a - b c2).
   const V bc = p.b * c2;
   const V M11 = MulAdd(Constant(2), bc, p.J12);
   const V M12 = p.J2 + bc;
-  const V det = MulAdd(bc, Constant(2 * kArmature) - bc, p.det);
+  const V det = MulAdd(bc, p.a2 - bc, p.det);
 
-  // f1 = τ1 + b s2 (2 w1 + w2) w2 - G1 s1 - G2 s12 - d1 w1
-  // f2 = τ2 - b s2 w1² - G2 s12 - d2 w2
+  // r1 = τ1 + b s2 (2 w1 + w2) w2 - G1 s1 - G2 s12 - d1 w1 - f1 atan(100 w1)
+  // r2 = τ2 - b s2 w1² - G2 s12 - d2 w2 - f2 atan(100 w2)
   const V bs = p.b * s2;
   const V g2 = p.G2 * s12;
-  const V f1 = MulAdd(bs, MulAdd(Constant(2), w1, w2) * w2,
-                      NegMulAdd(p.G1, s1, NegMulAdd(p.d1, w1, p.tau1)) - g2);
-  const V minus_f2 = MulAdd(bs, w1 * w1, MulAdd(p.d2, w2, g2)) - p.tau2;
+  V r1 = MulAdd(bs, MulAdd(Constant(2), w1, w2) * w2,
+                NegMulAdd(p.G1, s1, NegMulAdd(p.d1, w1, p.tau1)) - g2);
+  V minus_r2 = MulAdd(bs, w1 * w1, MulAdd(p.d2, w2, g2)) - p.tau2;
+  if constexpr (kFriction) {
+    const V slope = Constant(kFrictionSlope);
+    r1 = NegMulAdd(p.f1, hn::Atan(kDoubles, slope * w1), r1);
+    minus_r2 = MulAdd(p.f2, hn::Atan(kDoubles, slope * w2), minus_r2);
+  }
 
   const V inverse = Constant(1) / det;
-  return {MulAdd(p.M22, f1, M12 * minus_f2) * inverse,
-          hn::Neg(MulAdd(M11, minus_f2, M12 * f1)) * inverse};
+  return {MulAdd(p.M22, r1, M12 * minus_r2) * inverse,
+          hn::Neg(MulAdd(M11, minus_r2, M12 * r1)) * inverse};
 }
 
 /// One classical Runge-Kutta step of K vectors of environments, whose operations the processor
 /// overlaps. For q̈ = a(q, w) its four slopes of q are the w of the stages, so that
 ///   q += h w + h²/6 (a1 + a2 + a3),  w += h/6 (a1 + 2 a2 + 2 a3 + a4).
-template <size_t K>
-HWY_INLINE void RungeKuttaStep(const Dynamics (&p)[K], State (&x)[K]) {
-  constexpr double h = kPhysicsTimestep;
+template <bool kFriction, size_t K>
+HWY_INLINE void RungeKuttaStep(const Dynamics (&p)[K], double h, State (&x)[K]) {
   Joints a1[K], a2[K], middle[K], early[K];
   State stage[K];
   HWY_UNROLL(2)
   for (size_t k = 0; k < K; ++k) {
-    a1[k] = Acceleration(p[k], x[k]);
+    a1[k] = Acceleration<kFriction>(p[k], x[k]);
     stage[k] = {x[k].q.Plus(h / 2, x[k].w), x[k].w.Plus(h / 2, a1[k])};
   }
   HWY_UNROLL(2)
   for (size_t k = 0; k < K; ++k) {
-    a2[k] = Acceleration(p[k], stage[k]);
+    a2[k] = Acceleration<kFriction>(p[k], stage[k]);
     stage[k] = {x[k].q.Plus(h / 2, stage[k].w), x[k].w.Plus(h / 2, a2[k])};
   }
   HWY_UNROLL(2)
   for (size_t k = 0; k < K; ++k) {
-    const Joints a3 = Acceleration(p[k], stage[k]);
+    const Joints a3 = Acceleration<kFriction>(p[k], stage[k]);
     stage[k] = {x[k].q.Plus(h, stage[k].w), x[k].w.Plus(h, a3)};
     middle[k] = a2[k] + a3;
     early[k] = a1[k] + middle[k];
   }
   HWY_UNROLL(2)
   for (size_t k = 0; k < K; ++k) {
-    const Joints a4 = Acceleration(p[k], stage[k]);
+    const Joints a4 = Acceleration<kFriction>(p[k], stage[k]);
     x[k].q = x[k].q.Plus(h, x[k].w).Plus(h * h / 6, early[k]);
     x[k].w = x[k].w.Plus(h / 6, early[k] + middle[k] + a4);
   }
 }
 
 /// Makes `steps` steps with the K vectors of environments from `first` on.
-template <size_t K>
-HWY_INLINE void AdvanceVectors(ClosedFormBatch& batch, int steps, size_t first) {
+template <bool kFriction, size_t K>
+HWY_INLINE void AdvanceVectors(ClosedFormBatch& batch, int steps, size_t first, double timestep) {
   const size_t lanes = hn::Lanes(kDoubles);
   Dynamics p[K];
   State x[K];
@@ -164,16 +176,22 @@ HWY_INLINE void AdvanceVectors(ClosedFormBatch& batch, int steps, size_t first) 
     hn::Store(MotorAngleOf(batch, first + k * lanes, x[k]), kDoubles,
               batch.angle_before.data() + first + k * lanes);
   }
-  for (int step = 0; step < steps; ++step) RungeKuttaStep(p, x);
+  for (int step = 0; step < steps; ++step) RungeKuttaStep<kFriction>(p, timestep, x);
   HWY_UNROLL(2)
   for (size_t k = 0; k < K; ++k) StoreState(x[k], first + k * lanes, batch);
 }
 
-void AdvanceRange(ClosedFormBatch& batch, int steps, size_t first, size_t last) {
+template <bool kFriction>
+void AdvanceAll(ClosedFormBatch& batch, int steps, size_t first, size_t last, double timestep) {
   const size_t lanes = hn::Lanes(kDoubles);
   size_t i = first;
-  for (; i + lanes < last; i += 2 * lanes) AdvanceVectors<2>(batch, steps, i);
-  if (i < last) AdvanceVectors<1>(batch, steps, i);
+  for (; i + lanes < last; i += 2 * lanes) AdvanceVectors<kFriction, 2>(batch, steps, i, timestep);
+  if (i < last) AdvanceVectors<kFriction, 1>(batch, steps, i, timestep);
+}
+
+void AdvanceRange(ClosedFormBatch& batch, int steps, size_t first, size_t last, double timestep) {
+  const auto advance = batch.dry_friction ? AdvanceAll<true> : AdvanceAll<false>;
+  advance(batch, steps, first, last, timestep);
 }
 
 /// The task's view of one vector of states, each number as an array over the lanes.
@@ -317,29 +335,21 @@ HWY_EXPORT(SineCosineRange);
 ClosedFormBatch::ClosedFormBatch(size_t num_envs) {
   constexpr size_t kWidest = HWY_NAMESPACE::kWidest;
   const size_t padded = (num_envs + kWidest - 1) / kWidest * kWidest;
-  for (Array* array :
-       {&q1, &q2, &w1, &w2,    &tau,   &angle_before, &J1, &J2,           &b,      &G1,
-        &G2, &d1, &d2, &limit, &joint, &T1,           &T2, &energy_scale, &share1, &share2}) {
+  for (Array* array : {&q1,    &q2,    &w1, &w2, &tau,          &angle_before, &J1,    &J2,
+                       &b,     &a,     &G1, &G2, &d1,           &d2,           &f1,    &f2,
+                       &limit, &joint, &T1, &T2, &energy_scale, &share1,       &share2}) {
     array->resize(padded);
   }
   for (size_t i = 0; i < padded; ++i) SetPlant(i, Plant());
 }
 
 void ClosedFormBatch::SetPlant(size_t env, const Plant& plant) {
-  const auto& [m1, m2, l1, l2, damping1, damping2, g, torque_limit, actuated_joint] = plant;
-  const double c1 = l1 / 2, c2 = l2 / 2;  // from the joint to the centre
-  const double I1 = CapsuleInertia(m1, kCapsuleRadius, l1).across;
-  const double I2 = CapsuleInertia(m2, kCapsuleRadius, l2).across;
-  J1[env] = I1 + m1 * c1 * c1 + m2 * l1 * l1 + kArmature;
-  J2[env] = I2 + m2 * c2 * c2;
-  b[env] = m2 * l1 * c2;
-  G1[env] = (m1 * c1 + m2 * l1) * g;
-  G2[env] = m2 * c2 * g;
-  d1[env] = damping1;
-  d2[env] = damping2;
-  limit[env] = torque_limit;
-  joint[env] = actuated_joint;
+  SetManipulator(env, ManipulatorOf(plant));
+  limit[env] = plant.torque_limit;
+  joint[env] = plant.actuated_joint;
 
+  const double m1 = plant.mass1, m2 = plant.mass2, l1 = plant.length1, l2 = plant.length2;
+  const double c1 = l1 / 2, c2 = l2 / 2;  // from the joint to the centre
   T1[env] = m1 * l1 * l1 / 12 + m1 * c1 * c1 + m2 * l1 * l1;
   T2[env] = m2 * l2 * l2 / 12 + m2 * c2 * c2;
   energy_scale[env] = 1 / (2 * EnergyTarget(plant));
@@ -347,12 +357,26 @@ void ClosedFormBatch::SetPlant(size_t env, const Plant& plant) {
   share2[env] = l2 / (l1 + l2);
 }
 
+void ClosedFormBatch::SetManipulator(size_t env, const Manipulator& m) {
+  J1[env] = m.J1;
+  J2[env] = m.J2;
+  b[env] = m.b;
+  a[env] = m.a;
+  G1[env] = m.G1;
+  G2[env] = m.G2;
+  d1[env] = m.d1;
+  d2[env] = m.d2;
+  f1[env] = m.f1;
+  f2[env] = m.f2;
+  dry_friction = dry_friction || m.f1 != 0 || m.f2 != 0;
+}
+
 void ClosedFormBatch::SetTorque(std::span<const double> torque) {
   for (size_t i = 0; i < torque.size(); ++i) tau[i] = std::clamp(torque[i], -limit[i], limit[i]);
 }
 
-void Advance(ClosedFormBatch& batch, int steps, size_t first, size_t last) {
-  HWY_DYNAMIC_DISPATCH(AdvanceRange)(batch, steps, first, last);
+void Advance(ClosedFormBatch& batch, int steps, size_t first, size_t last, double timestep) {
+  HWY_DYNAMIC_DISPATCH(AdvanceRange)(batch, steps, first, last, timestep);
 }
 
 void Judge(const ClosedFormBatch& batch, const RewardWeights& weights, size_t first, size_t last,

@@ -5,6 +5,7 @@
 #include "core/aligned.h"
 #include "core/env.h"
 #include "sim/double_pendulum.h"
+#include "sim/manipulator.h"
 
 /// The double pendulum in closed form, equivalent to the built-in MJCF: equations of motion,
 /// Runge-Kutta steps as MuJoCo makes them, and the task's observation and reward, vectorised over
@@ -22,6 +23,8 @@ struct ClosedFormBatch {
   size_t padded() const { return q1.size(); }  // P
   /// Computes an environment's constants from its plant.
   void SetPlant(size_t env, const Plant& plant);
+  /// Sets the equations of motion of an environment, and leaves what its task needs.
+  void SetManipulator(size_t env, const Manipulator& manipulator);
   /// Sets the motors (N), N·m, within their limits.
   void SetTorque(std::span<const double> torque);
 
@@ -31,18 +34,17 @@ struct ClosedFormBatch {
   Array tau;             // N·m, held until it is set again
   Array angle_before;    // of the motor's joint before the last Advance, rad
 
-  // Equations of motion, with c = l/2 and MuJoCo's capsules of inertia I about their centres.
-  Array J1;  // I1 + m1 c1² + m2 l1² + armature: inertia about joint 1, link 2 as a point, kg·m²
-  Array J2;  // I2 + m2 c2²: inertia of link 2 about joint 2, kg·m²
-  Array b;   // m2 l1 c2: coupling of the links, kg·m²
-  Array G1;  // (m1 c1 + m2 l1) g: largest moment of gravity about joint 1, link 2 as a point, N·m
-  Array G2;  // m2 c2 g: the same of link 2 about joint 2, N·m
-  Array d1, d2;  // damping, N·m·s/rad
-  Array limit;   // of the torque, N·m
-  Array joint;   // that the motor drives: 1 or 2
+  // Equations of motion, see Manipulator.
+  Array J1, J2, b, a;         // kg·m²
+  Array G1, G2;               // N·m
+  Array d1, d2;               // N·m·s/rad
+  Array f1, f2;               // N·m
+  bool dry_friction = false;  // whether any environment has it, or had it
+  Array limit;                // of the torque, N·m
+  Array joint;                // that the motor drives: 1 or 2
 
   // Task, whose energy is that of thin rods.
-  Array T1, T2;          // inertias like J1 and J2, kg·m²
+  Array T1, T2;          // inertias like J1 and J2, without armatures, kg·m²
   Array energy_scale;    // 1 / (2 EnergyTarget), 1/J
   Array share1, share2;  // l1 / (l1 + l2), l2 / (l1 + l2)
 };
@@ -54,9 +56,10 @@ inline int ClosedFormChunks(size_t num_envs) {
   return static_cast<int>((num_envs + kClosedFormChunk - 1) / kClosedFormChunk);
 }
 
-/// Makes `steps` Runge-Kutta steps of kPhysicsTimestep with environments `first` to `last`, each a
-/// multiple of kClosedFormChunk or N.
-void Advance(ClosedFormBatch& batch, int steps, size_t first, size_t last);
+/// Makes `steps` Runge-Kutta steps of `timestep` seconds with environments `first` to `last`, each
+/// a multiple of kClosedFormChunk or N.
+void Advance(ClosedFormBatch& batch, int steps, size_t first, size_t last,
+             double timestep = kPhysicsTimestep);
 
 /// Fills all of `result` but `truncated` from the states, as Observe, RewardTerms and Inverted do.
 /// A state that is not finite, or beyond MuJoCo's limit of 1e10, has terminated; the rest is then

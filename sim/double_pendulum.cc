@@ -8,6 +8,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/text.h"
+
 namespace upswing {
 
 void Plant::Describe(Options& o) {
@@ -25,6 +27,15 @@ void Plant::Describe(Options& o) {
                         "joint that the motor drives: 1 makes a pendubot, 2 an acrobot");
   joint.step = 1;
   joint.implied = true;
+  o.Add(&rotor_inertia, "rotor_inertia", 0, {0, 1}, "kg·m²",
+        "inertia of the rotor of each joint's motor")
+      .implied = true;
+  o.Add(&gear_ratio, "gear_ratio", 6, {0, 1000}, "", "turns of a rotor for one turn of its joint")
+      .implied = true;
+  o.Add(&coulomb1, "coulomb1", 0, {0, 10}, "N·m", "c of joint 1's dry friction c·atan(100 w)")
+      .implied = true;
+  o.Add(&coulomb2, "coulomb2", 0, {0, 10}, "N·m", "c of joint 2's dry friction c·atan(100 w)")
+      .implied = true;
   o.Alias("mass", {"mass1", "mass2"});
   o.Alias("length", {"length1", "length2"});
   o.Alias("damping", {"damping1", "damping2"});
@@ -33,9 +44,13 @@ void Plant::Describe(Options& o) {
 std::vector<std::pair<std::string, double>> PlantValues(Plant plant) {
   std::vector<std::pair<std::string, double>> values;
   const Options options = OptionsOf(plant);
-  for (const Option& option : options.all()) {
-    if (option.name == "actuated_joint" && plant.actuated_joint == 1) continue;
-    values.emplace_back(option.name, *std::get<double*>(option.target));
+  Plant usual;
+  const Options defaults = OptionsOf(usual);
+  for (size_t i = 0; i < options.all().size(); ++i) {
+    const Option& option = options.all()[i];
+    const double value = *std::get<double*>(option.target);
+    if (option.implied && value == *std::get<double*>(defaults.all()[i].target)) continue;
+    values.emplace_back(option.name, value);
   }
   return values;
 }
@@ -61,8 +76,13 @@ CapsuleInertia::CapsuleInertia(double m, double r, double l) {
   along = mc * r * r / 2 + ms * 2 * r * r / 5;
 }
 
+double Armature1(const Plant& plant) {
+  return kArmature + plant.gear_ratio * plant.gear_ratio * plant.rotor_inertia;
+}
+
 double Energy(const Plant& plant, const PendulumState& s) {
-  const auto& [m1, m2, l1, l2, d1, d2, g, limit, joint] = plant;
+  const double m1 = plant.mass1, m2 = plant.mass2, l1 = plant.length1, l2 = plant.length2;
+  const double g = plant.gravity;
   const double I1 = m1 * l1 * l1 / 12;
   const double I2 = m2 * l2 * l2 / 12;
   const double w12 = s.w1 + s.w2;  // absolute velocity of link 2
@@ -163,34 +183,50 @@ std::array<double, kRewardTerms> RewardTerms(const Plant& plant, const PendulumS
 std::string Mjcf(const Plant& plant) {
   // There are no contacts and no constraints: disabling these stages saves time and leaves the
   // trajectory as it is.
-  std::string mjcf = R"(<mujoco model="double_pendulum">
+  std::string mjcf = R"(<mujoco model="double_pendulum">@size
   <option gravity="0 0 -@gravity" timestep="0.005" integrator="RK4">
     <flag contact="disable" constraint="disable"/>
   </option>
   <worldbody>
     <body name="link1">
-      <joint name="joint1" type="hinge" axis="0 1 0" damping="@damping1" armature="0.01"/>
+      <joint name="joint1" type="hinge" axis="0 1 0" damping="@damping1" armature="@armature1"@friction1/>
       <geom type="capsule" size="0.04" fromto="0 0 0 0 0 -@length1" mass="@mass1"/>
       <body name="link2" pos="0 0 -@length1">
-        <joint name="joint2" type="hinge" axis="0 1 0" damping="@damping2" armature="0.01"/>
+        <joint name="joint2" type="hinge" axis="0 1 0" damping="@damping2" armature="0.01"@friction2/>
         <geom type="capsule" size="0.04" fromto="0 0 0 0 0 -@length2" mass="@mass2"/>
       </body>
     </body>
   </worldbody>
   <actuator>
     <motor name="torque@actuated_joint" joint="joint@actuated_joint" ctrllimited="true" ctrlrange="-@torque_limit @torque_limit"/>
-  </actuator>
+  </actuator>@tendon
 </mujoco>
 )";
-  // Each @name stands for that parameter.
+  // Each @name stands for a part that follows or for that parameter.
+  const auto fill = [&](const std::string& field, const std::string& text) {
+    for (size_t at = 0; (at = mjcf.find(field, at)) != std::string::npos;) {
+      mjcf.replace(at, field.size(), text);
+    }
+  };
+  const bool rotors = plant.rotor_inertia != 0, friction = plant.has_dry_friction();
+  fill("@armature1", FormatNumber(Armature1(plant)));
+  fill("@tendon", rotors ? R"(
+  <tendon>
+    <fixed name="rotor2" armature="@rotor_inertia">
+      <joint joint="joint1" coef="1"/>
+      <joint joint="joint2" coef="-@gear_ratio"/>
+    </fixed>
+  </tendon>)"
+                         : "");
+  fill("@size", friction ? "\n  <size nuser_jnt=\"1\"/>" : "");
+  for (const std::string joint : {"1", "2"}) {
+    fill("@friction" + joint,
+         friction ? Concat(" frictionloss=\"@coulomb", joint, "\" user=\"", kFrictionSlope, '"')
+                  : "");
+  }
   Plant values = plant;
   const Options options = OptionsOf(values);
-  for (const Option& option : options.all()) {
-    const std::string field = "@" + option.name;
-    for (size_t at = 0; (at = mjcf.find(field, at)) != std::string::npos;) {
-      mjcf.replace(at, field.size(), option.text());
-    }
-  }
+  for (const Option& option : options.all()) fill("@" + option.name, option.text());
   return mjcf;
 }
 

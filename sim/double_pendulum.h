@@ -31,6 +31,7 @@ inline constexpr int kPhysicsSteps = 4;            // in a control period
 static_assert(kPhysicsSteps * kPhysicsTimestep == kControlPeriod);
 inline constexpr double kArmature = 0.01;       // of both joints, kg·m²
 inline constexpr double kCapsuleRadius = 0.04;  // of both links, m
+inline constexpr double kFrictionSlope = 100;   // of the dry friction's arctangent, s/rad
 
 /// The parameters that can be set at run time. The radius of the capsules is fixed; inertia and
 /// centre of mass follow from mass and length.
@@ -41,14 +42,19 @@ struct Plant {
   double gravity;             // m/s², along -z
   double torque_limit;        // N·m
   double actuated_joint;      // which the motor drives: 1 (a pendubot) or 2 (an acrobot)
+  double rotor_inertia;       // of a motor at each joint, kg·m²
+  double gear_ratio;          // turns of a rotor for one of its joint
+  double coulomb1, coulomb2;  // dry friction c atan(100 w) of each joint, N·m
 
   Plant() { SetDefaults(*this); }
   /// One line per setting: name, default, range, unit, help.
   void Describe(Options& options);
+
+  bool has_dry_friction() const { return coulomb1 != 0 || coulomb2 != 0; }
 };
 
-/// Name and value of each of its parameters; of actuated_joint where it is not 1, so that what
-/// names none, as all before there was a choice, is of joint 1.
+/// Name and value of each of its parameters. Those that a file may lack (Option::implied) are left
+/// out at their defaults.
 std::vector<std::pair<std::string, double>> PlantValues(Plant plant);
 
 /// Principal moments of inertia (kg·m²) of a solid capsule, across and along its axis: mass m (kg),
@@ -58,6 +64,9 @@ struct CapsuleInertia {
 
   CapsuleInertia(double m, double r, double l);
 };
+
+/// Armature of joint 1 with the rotor of its motor, kg·m².
+double Armature1(const Plant& plant);
 
 /// State of the two joints.
 struct PendulumState {
@@ -147,7 +156,10 @@ struct RewardWeights {
   void Describe(Options& options);
 };
 
-/// The model as MJCF, with the plant's numbers to the last digit.
+/// The model as MJCF, with the plant's numbers to the last digit. Where there are rotors, that of
+/// joint 2's motor is a fixed tendon of the length q1 - gear_ratio q2. Where there is dry friction,
+/// each joint has its c as frictionloss, which as a constraint is switched off, and its slope as
+/// user data, by which mujoco/model.h knows to add it.
 std::string Mjcf(const Plant& plant);
 
 }  // namespace upswing

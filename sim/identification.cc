@@ -26,11 +26,6 @@ constexpr double kStrongestCoupling = 0.9;  // b² / (J1 J2): thin rods have at 
 
 using Row = std::array<double, kConstants>;
 
-/// Where an environment's constants are within a batch.
-std::array<ClosedFormBatch::Array*, kConstants> Arrays(ClosedFormBatch& batch) {
-  return {&batch.J1, &batch.J2, &batch.b, &batch.G1, &batch.G2, &batch.d1, &batch.d2};
-}
-
 /// Index of P(i, j), i ≤ j, in the rows of its upper triangle.
 constexpr size_t At(int i, int j) {
   return static_cast<size_t>(i * kConstants - i * (i - 1) / 2 + j - i);
@@ -77,17 +72,8 @@ struct Factors {
 const std::array<float, kIdentifiedSize> kIdentifiedMirrorSigns{1, 1, 1, 1,  1,  1, 1,
                                                                 1, 1, 1, -1, -1, -1};
 
-Constants ConstantsOf(const Plant& plant) {
-  ClosedFormBatch batch(1);
-  batch.SetPlant(0, plant);
-  Constants constants;
-  const auto arrays = Arrays(batch);
-  for (size_t k = 0; k < constants.size(); ++k) constants[k] = (*arrays[k])[0];
-  return constants;
-}
-
-PassiveJoint PassiveJointOf(const Constants& constants, int actuated_joint) {
-  const auto& [J1, J2, b, G1, G2, d1, d2] = constants;
+PassiveJoint PassiveJointOf(const Manipulator& plant, int actuated_joint) {
+  const auto& [J1, J2, b, a, G1, G2, d1, d2, f1, f2] = plant;
   const auto growth = [](double inertia, double damping, double gravity) {
     return (std::sqrt(damping * damping + 4 * inertia * gravity) - damping) / (2 * inertia);
   };
@@ -99,16 +85,17 @@ PassiveJoint PassiveJointOf(const Constants& constants, int actuated_joint) {
   }
   // Of link 2 in absolute angles φ1, φ2: n12 φ̈1 + n22 φ̈2 + d2 (φ̇2 - φ̇1) = G2 φ2. Its zero is
   // z = d2 / n12, by which delta is widened: n12 may be 0.
-  const double n12 = b - kArmature, pole = growth(J2 + kArmature, d2, G2);
+  const double n12 = b - a, pole = growth(J2 + a, d2, G2);
   return {pole, (d2 - pole * n12) / (d2 + pole * n12)};
 }
 
-Falling FallingOf(const Constants& constants, const Plant& motor, const PendulumState& s) {
+Falling FallingOf(const Manipulator& plant, const Plant& motor, const PendulumState& s) {
   const bool at_joint1 = motor.actuated_joint == 1;
-  const auto& [J1, J2, b, G1, G2, d1, d2] = constants;
+  const double G1 = plant.G1, G2 = plant.G2, d1 = plant.d1, d2 = plant.d2;
+  const auto [M11, M12, M22] = plant.Mass(1);
   // K(λ) = M λ² + D λ - G about upright; K(λ) y = 0 for a mode of rate λ. Its determinant is
   // k4 λ⁴ + k3 λ³ + k2 λ² + k1 λ + k0.
-  const double M11 = J1 + J2 + 2 * b, M12 = J2 + b, M22 = J2 + kArmature, G = G1 + G2;
+  const double G = G1 + G2;
   const double k4 = M11 * M22 - M12 * M12, k3 = M11 * d2 + M22 * d1;
   const double k2 = d1 * d2 - M11 * G2 - M22 * G + 2 * M12 * G2;
   const double k1 = -d1 * G2 - d2 * G, k0 = G1 * G2;
@@ -152,13 +139,13 @@ Falling FallingOf(const Constants& constants, const Plant& motor, const Pendulum
   // The gain that places both poles at their mirror images: Anderson, Moore, section 4.3.
   falling.torque = -2 * (fast + slow) / (fast - slow) * (falling.zeta[0] - falling.zeta[1]);
 
-  falling.delta = PassiveJointOf(constants, static_cast<int>(motor.actuated_joint)).delta;
+  falling.delta = PassiveJointOf(plant, static_cast<int>(motor.actuated_joint)).delta;
   return falling;
 }
 
 Identifier::Identifier(const Plant& nominal, int num_envs)
     : plant_(nominal),
-      nominal_(ConstantsOf(nominal)),
+      nominal_(ManipulatorOf(nominal)),
       prior_{},
       relative_(static_cast<size_t>(num_envs) * kConstants, 1.0),
       covariance_(static_cast<size_t>(num_envs) * kCovariance),
@@ -172,11 +159,13 @@ Identifier::Identifier(const Plant& nominal, int num_envs)
     Plant more = nominal, less = nominal;
     more.*parameter *= 1 + kStep;
     less.*parameter *= 1 - kStep;
-    const Constants high = ConstantsOf(more), low = ConstantsOf(less);
+    const Manipulator high = ManipulatorOf(more), low = ManipulatorOf(less);
     Row change{};
     for (size_t k = 0; k < change.size(); ++k) {
-      if (nominal_[k] > 0) {
-        change[k] = kPriorShare * (high[k] - low[k]) / (2 * kStep * nominal_[k]);
+      const auto constant = kIdentified[k];
+      const double usual = nominal_.*constant;
+      if (usual > 0) {
+        change[k] = kPriorShare * (high.*constant - low.*constant) / (2 * kStep * usual);
       }
     }
     for (int i = 0; i < kConstants; ++i) {
@@ -198,18 +187,17 @@ PendulumState Identifier::Replace(int env, const PendulumState& measured) {
   return before;
 }
 
-Constants Identifier::estimate(int env) const {
-  Constants constants = nominal_;
-  for (size_t k = 0; k < constants.size(); ++k) {
-    constants[k] *= relative_[static_cast<size_t>(env) * kConstants + k];
+Manipulator Identifier::estimate(int env) const {
+  Manipulator plant = nominal_;
+  for (size_t k = 0; k < kConstants; ++k) {
+    plant.*kIdentified[k] *= relative_[static_cast<size_t>(env) * kConstants + k];
   }
-  return constants;
+  return plant;
 }
 
-PendulumState Identifier::Predict(const Constants& constants, double torque,
+PendulumState Identifier::Predict(const Manipulator& plant, double torque,
                                   const PendulumState& from) {
-  const auto arrays = Arrays(prediction_);
-  for (size_t k = 0; k < constants.size(); ++k) (*arrays[k])[0] = constants[k];
+  prediction_.SetManipulator(0, plant);
   prediction_.q1[0] = from.q1;
   prediction_.q2[0] = from.q2;
   prediction_.w1[0] = from.w1;
@@ -224,20 +212,20 @@ void Identifier::Update(int env, double torque, const PendulumState& measured) {
   const PendulumState before = Replace(env, measured);
   const auto x = std::span(relative_).subspan(i * kConstants, kConstants);
   const auto P = std::span(covariance_).subspan(i * kCovariance, kCovariance);
-  const Constants estimated = estimate(env);
+  const Manipulator estimated = estimate(env);
   const PendulumState predicted = Predict(estimated, torque, before);
 
   // With Φ θ = τ for the true constants θ, the estimated ones leave Φ θ' - τ, by which they miss
   // the acceleration: M⁻¹ (Φ θ' - τ) h is what was measured less what was predicted. As a
   // prediction it is exact, as a derivative Φ is nearly so.
   Factors factors(before, measured);
-  const auto& [J1, J2, b, G1, G2, d1, d2] = estimated;
-  const double M11 = J1 + J2 + 2 * b * factors.c2, M12 = J2 + b * factors.c2, M22 = J2 + kArmature;
-  const double scale = -kControlPeriod / (M11 * M22 - M12 * M12);
+  const MassMatrix M = estimated.Mass(factors.c2);
+  const double scale = -kControlPeriod / M.det();
   for (size_t k = 0; k < x.size(); ++k) {
-    const double f1 = factors.one[k] * nominal_[k], f2 = factors.two[k] * nominal_[k];
-    factors.one[k] = scale * (M22 * f1 - M12 * f2);
-    factors.two[k] = scale * (M11 * f2 - M12 * f1);
+    const double usual = nominal_.*kIdentified[k];
+    const double f1 = factors.one[k] * usual, f2 = factors.two[k] * usual;
+    factors.one[k] = scale * (M.M22 * f1 - M.M12 * f2);
+    factors.two[k] = scale * (M.M11 * f2 - M.M12 * f1);
   }
   const auto at = [&](const Row& h) {
     return std::inner_product(x.begin(), x.end(), h.begin(), 0.0);
@@ -245,36 +233,36 @@ void Identifier::Update(int env, double torque, const PendulumState& measured) {
   const double y1 = measured.w1 - predicted.w1 + at(factors.one);
   const double y2 = measured.w2 - predicted.w2 + at(factors.two);
   for (int k = 0; k < kConstants; ++k) {
-    if (nominal_[static_cast<size_t>(k)] > 0) P[At(k, k)] += kDrift * kDrift;
+    if (nominal_.*kIdentified[static_cast<size_t>(k)] > 0) P[At(k, k)] += kDrift * kDrift;
   }
   Correct(factors.one, y1, x, P);
   Correct(factors.two, y2, x, P);
   for (double& share : x) share = std::clamp(share, kLeast, kMost);
-  const Constants c = estimate(env);
-  constexpr size_t kJ1 = 0, kJ2 = 1, kB = 2;
-  const double most = std::sqrt(kStrongestCoupling * c[kJ1] * c[kJ2]);
-  x[kB] = std::min(x[kB], most / nominal_[kB]);
+  const Manipulator now = estimate(env);
+  constexpr size_t kB = 2;
+  const double most = std::sqrt(kStrongestCoupling * now.J1 * now.J2);
+  x[kB] = std::min(x[kB], most / nominal_.b);
 }
 
 void Identifier::Observe(int env, const PendulumState& s, std::span<float> numbers) const {
   const auto i = static_cast<size_t>(env);
-  const Constants c = estimate(env);
-  const auto& [J1, J2, b, G1, G2, d1, d2] = c;
+  const Manipulator plant = estimate(env);
   size_t at = 0;
   // Where a mode is out of the motor's reach just now, its numbers are without a limit.
   const auto add = [&](double x) {
     numbers[at++] = std::isfinite(x) ? static_cast<float>(x) : 0.0F;
   };
-  for (size_t k = 0; k < c.size(); ++k) add((relative_[i * kConstants + k] - 1) / kConstantScale);
+  for (size_t k = 0; k < kConstants; ++k) add((relative_[i * kConstants + k] - 1) / kConstantScale);
 
-  const Falling falling = FallingOf(c, plant_, s);
+  const Falling falling = FallingOf(plant, plant_, s);
   add(std::clamp(falling.delta, -1.0, 1.0));
   add(std::tanh(0.1 / falling.delta));
   const double w12 = s.w1 + s.w2;
-  const double kinetic = 0.5 * (J1 * s.w1 * s.w1 + J2 * w12 * w12 + kArmature * s.w2 * s.w2) +
-                         b * std::cos(s.q2) * s.w1 * w12;
-  const double potential = -G1 * std::cos(s.q1) - G2 * std::cos(s.q1 + s.q2);
-  add((kinetic + potential) / (2 * (G1 + G2)) + 0.5);
+  const double kinetic =
+      0.5 * (plant.J1 * s.w1 * s.w1 + plant.J2 * w12 * w12 + plant.a * s.w2 * s.w2) +
+      plant.b * std::cos(s.q2) * s.w1 * w12;
+  const double potential = -plant.G1 * std::cos(s.q1) - plant.G2 * std::cos(s.q1 + s.q2);
+  add((kinetic + potential) / (2 * (plant.G1 + plant.G2)) + 0.5);
   for (const double zeta : falling.zeta) add(zeta / (1 + std::abs(zeta)));
   add(std::clamp(falling.torque, -1.0, 1.0));
 }

@@ -13,18 +13,18 @@
 /// section 11.2), whose prediction is the physics itself.
 namespace upswing {
 
-/// The constants of the equations of motion, in the order J1, J2, b, G1, G2, d1, d2 of
-/// ClosedFormBatch. The accelerations are linear in them.
+/// The constants that are identified: J1, J2, b, G1, G2, d1, d2 of Manipulator. The others,
+/// armature and dry friction, count as known. The equations of motion are linear in all.
 inline constexpr int kConstants = 7;
-using Constants = std::array<double, kConstants>;
-
-Constants ConstantsOf(const Plant& plant);
+inline constexpr std::array<double Manipulator::*, kConstants> kIdentified{
+    &Manipulator::J1, &Manipulator::J2, &Manipulator::b, &Manipulator::G1,
+    &Manipulator::G2, &Manipulator::d1, &Manipulator::d2};
 
 /// Of the joint without a motor, upright; see UprightModes.
 struct PassiveJoint {
   double pole, delta;
 };
-PassiveJoint PassiveJointOf(const Constants& constants, int actuated_joint);
+PassiveJoint PassiveJointOf(const Manipulator& plant, int actuated_joint);
 
 /// How the pendulum falls from upright with these constants. Each of the two unstable modes has a
 /// coordinate z, a weighted sum of the state, that moves by itself: ż = rate z + gain u. A motor
@@ -38,7 +38,7 @@ struct Falling {
 };
 
 /// `motor` gives the joint and the limit of the torque.
-Falling FallingOf(const Constants& constants, const Plant& motor, const PendulumState& s);
+Falling FallingOf(const Manipulator& plant, const Plant& motor, const PendulumState& s);
 
 /// What identification adds to an observation, 13 numbers:
 ///   7  each constant's deviation from the nominal plant's as a share of it, over kConstantScale;
@@ -62,8 +62,8 @@ class Identifier {
   /// Learns from a control period: the torque (N·m) that acted, and the state measured at its end.
   void Update(int env, double torque, const PendulumState& measured);
 
-  /// The constants as they are estimated.
-  Constants estimate(int env) const;
+  /// The plant as it is estimated.
+  Manipulator estimate(int env) const;
   /// What is added to the observation of a state (kIdentifiedSize).
   void Observe(int env, const PendulumState& s, std::span<float> numbers) const;
 
@@ -74,11 +74,11 @@ class Identifier {
 
   /// Keeps what was measured, and returns what was measured before.
   PendulumState Replace(int env, const PendulumState& measured);
-  /// Where the plant of these constants moves within a control period.
-  PendulumState Predict(const Constants& constants, double torque, const PendulumState& from);
+  /// Where a plant moves within a control period.
+  PendulumState Predict(const Manipulator& plant, double torque, const PendulumState& from);
 
   Plant plant_;  // the nominal one
-  Constants nominal_;
+  Manipulator nominal_;
   std::array<double, kCovariance> prior_;  // of the relative constants
   std::vector<double> relative_;           // (N × kConstants)
   std::vector<double> covariance_;         // (N × kCovariance) upper triangles

@@ -44,7 +44,7 @@ TEST(Falling, EachModeMovesByItself) {
   for (int n = 0; n < 40; ++n) {
     Plant plant = Near(0.5, rng);
     plant.actuated_joint = n % 2 + 1;
-    const Constants constants = ConstantsOf(plant);
+    const Manipulator constants = ManipulatorOf(plant);
     // A deviation of 1e-5, whose square is lost in rounding, and a torque of that size.
     const auto small = [&] { return 1e-5 * rng.Uniform(-1, 1); };
     const PendulumState before{kPi + small(), small(), small(), small()};
@@ -68,7 +68,7 @@ TEST(Falling, TheTorqueEndsBothFalls) {
   for (const double joint : {1.0, 2.0}) {
     Plant plant;
     plant.actuated_joint = joint;
-    const Constants constants = ConstantsOf(plant);
+    const Manipulator constants = ManipulatorOf(plant);
     PendulumState s{kPi + 2e-6, -3e-6, 1e-6, 0};
     const Falling start = FallingOf(constants, plant, s);
     for (int step = 0; step < 300; ++step) {
@@ -96,9 +96,9 @@ TEST(Identifier, FindsTheConstants) {
       s = Move(plant, s, torque);
       identifier.Update(0, torque, s);
     }
-    const Constants truth = ConstantsOf(plant), found = identifier.estimate(0);
-    for (size_t k = 0; k < truth.size(); ++k) {
-      EXPECT_NEAR(found[k] / truth[k], 1, 0.01) << k << ", motor at joint " << joint;
+    const Manipulator truth = ManipulatorOf(plant), found = identifier.estimate(0);
+    for (const auto constant : kIdentified) {
+      EXPECT_NEAR(found.*constant / truth.*constant, 1, 0.01) << "motor at joint " << joint;
     }
   }
 }

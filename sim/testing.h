@@ -11,11 +11,12 @@
 namespace upswing {
 
 /// Parameters from the whole of their ranges, evenly on a logarithmic scale (or in the cube root,
-/// where a range begins at 0).
+/// where a range begins at 0), without rotors and dry friction.
 inline Plant RandomPlant(Rng& rng) {
   Plant plant;
   const Options options = OptionsOf(plant);
   for (const Option& option : options.all()) {
+    if (option.implied && option.name != "actuated_joint") continue;
     const auto& [low, high] = option.range;
     *std::get<double*>(option.target) = low > 0
                                             ? std::exp(rng.Uniform(std::log(low), std::log(high)))
@@ -23,6 +24,17 @@ inline Plant RandomPlant(Rng& rng) {
     if (option.step > 0)
       *std::get<double*>(option.target) = std::round(*std::get<double*>(option.target));
   }
+  return plant;
+}
+
+/// The same with rotors and dry friction, as much of both as the physics' steps can follow.
+inline Plant RandomMachine(Rng& rng) {
+  Plant plant = RandomPlant(rng);
+  const double inertia = plant.mass2 * plant.length2 * plant.length2;  // about that of link 2
+  plant.gear_ratio = rng.Uniform(0, 10);
+  plant.rotor_inertia = rng.Uniform(0, 0.1) * inertia;
+  plant.coulomb1 = rng.Uniform(0, 0.2) * inertia;
+  plant.coulomb2 = rng.Uniform(0, 0.2) * inertia;
   return plant;
 }
 
