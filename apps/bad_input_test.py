@@ -46,7 +46,7 @@ class CommandLineTest(ProgramTest):
 
     def test_value_of_the_wrong_type(self):
         for flag, value, expected in (("--gamma", "high", "a number"),
-                                      ("--precision", "half", "one of float32, bfloat16"),
+                                      ("--physics", "half", "one of mujoco, closed-form"),
                                       ("--batch", "1.5", "an integer"),
                                       ("--seed", "", "an integer"),
                                       ("--eval-every", "1O0", "an integer"),

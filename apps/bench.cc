@@ -108,7 +108,7 @@ class BenchRunner {
     if (c.bytes > 0) rate("bytes_per_second", c.bytes);
     if (c.flops <= 0) return;
     rate("gflops", 1e-9 * c.flops);
-    if (c.float32) rate("peak_share", 1e-9 * c.flops / context_.peak_gflops.at(c.threads));
+    rate("peak_share", 1e-9 * c.flops / context_.peak_gflops.at(c.threads));
   }
 
   const BenchCases& cases_;
@@ -131,16 +131,12 @@ void CheckOptions(const BenchOptions& options) {
   const auto runs = [&](const char* part) {
     return options.parts.empty() || std::ranges::find(options.parts, part) != options.parts.end();
   };
-  if ((!options.network.empty() || !options.precision.empty()) && !runs("gradient")) {
-    throw BadInput("bench: --network and --precision are for the part gradient");
+  if (!options.network.empty() && !runs("gradient")) {
+    throw BadInput("bench: --network is for the part gradient");
   }
   if ((!options.hidden.empty() || options.batch > 0) && !runs("gradient") && !runs("sac") &&
       !runs("ppo")) {
     throw BadInput("bench: --hidden and --batch are for the parts gradient, sac and ppo");
-  }
-  if (options.precision == "bfloat16" && !options.simd.empty()) {
-    throw BadInput(
-        "--simd: expected none with --precision bfloat16, which has instructions of its own");
   }
   if (options.json) CheckWritable("--json", *options.json);
 }
@@ -216,8 +212,6 @@ void AddBench(CLI::App& program, Command& command) {
       .usual = "several";
   own.Add(&o->batch, "batch", 0, {1, 65536}, "", "gradient, sac, ppo: size of the minibatches")
       .usual = "several";
-  AddChoice(own, o->precision, "precision", {"float32", "bfloat16"}, "gradient: of the products",
-            "float32");
   AddArguments(*app, own);
 
   std::string parts = "Parts:\n";

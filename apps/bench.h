@@ -16,7 +16,6 @@ struct BenchOptions {
   std::vector<int64_t> threads;     // each case that can use threads runs with each of these
   std::string network;              // of gradient: "plain", "dueling" or "" for both
   std::vector<int64_t> hidden;      // of gradient, sac and ppo: widths of layers; empty: several
-  std::string precision;            // of gradient, as DqnConfig has it
   int64_t batch;                    // of gradient, sac and ppo; 0: several
   std::string simd;                 // vector instructions; empty: the best
   std::optional<std::string> json;  // file to write
@@ -37,7 +36,6 @@ struct BenchCase {
   int threads = 1;    // that work at once
   /// Makes the work, with all that it needs.
   std::function<BenchWork()> prepare = {};
-  bool float32 = true;  // so that the peak says something of it
 };
 using BenchCases = std::vector<BenchCase>;
 

@@ -79,16 +79,9 @@ double UpdateFlops(const DqnConfig& config) {
 BenchCase GradientCase(const DqnConfig& config, int threads,
                        const std::shared_ptr<Replay>& replay) {
   const std::string name =
-      fmt::format("gradient/{}{}/{}/batch:{}/threads:{}", config.dueling ? "dueling" : "plain",
-                  config.precision == "bfloat16" ? "-bfloat16" : "", fmt::join(config.hidden, "-"),
-                  config.batch, threads);
-  return {name,
-          "updates",
-          1,
-          UpdateFlops(config),
-          0,
-          threads,
-          [=]() -> BenchWork {
+      fmt::format("gradient/{}/{}/batch:{}/threads:{}", config.dueling ? "dueling" : "plain",
+                  fmt::join(config.hidden, "-"), config.batch, threads);
+  return {name, "updates", 1, UpdateFlops(config), 0, threads, [=]() -> BenchWork {
             struct Parts {
               ThreadPool pool;
               Dqn agent;
@@ -104,8 +97,7 @@ BenchCase GradientCase(const DqnConfig& config, int threads,
               replay->Sample(parts->rng, parts->batch);
               parts->agent.Update(parts->batch);
             };
-          },
-          config.precision != "bfloat16"};
+          }};
 }
 
 BenchCase ActCase(int batch) {
@@ -172,9 +164,7 @@ BenchCases GradientCases(const BenchOptions& options) {
     for (const std::vector<int64_t>& hidden : networks) {
       for (const int64_t batch : batches) {
         for (const int64_t threads : options.threads) {
-          DqnConfig config = BareConfig(dueling, hidden, batch);
-          if (!options.precision.empty()) config.precision = options.precision;
-          cases.push_back(GradientCase(config, threads, replay));
+          cases.push_back(GradientCase(BareConfig(dueling, hidden, batch), threads, replay));
         }
       }
     }

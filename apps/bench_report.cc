@@ -93,7 +93,7 @@ void BenchReporter::PrintRow(const BenchCase& measured, double wall, double cpu)
   line_.Print(Row(name_width_, measured.name,
                   fmt::format("{} {}/s", FormatCount(rate), measured.items),
                   has_flops ? fmt::format("{:.1f}", gflops) : "",
-                  has_flops && measured.float32 && peak != context_.peak_gflops.end()
+                  has_flops && peak != context_.peak_gflops.end()
                       ? fmt::format("{:.0f}%", 100 * gflops / peak->second)
                       : "",
                   measured.bytes > 0 ? fmt::format("{:.1f}", 1e-9 * measured.bytes / wall) : "",

@@ -130,22 +130,10 @@ class BenchTest(ProgramTest):
                 (["--network", "cnn"], ["--network", "cnn"]), (["--hidden", "64,x"], ["--hidden"]),
                 (["--batch", "0"], ["--batch"]), (["--json", ""], ["empty"]),
                 (["--json", "no/such/bench.json"], ["no/such"]),
-                (["--precision", "float16"], ["--precision", "float16"]),
                 (["act", "--batch", "8"], ["--batch", "gradient"]),
                 (["--thread", "2"], ["did you mean --threads?"])):
             with self.subTest(arguments=arguments):
                 self.refuse(["bench", *SHORT[2:], *arguments], *words)
-
-    def test_bfloat16(self):
-        """Measured where the processor can do it, refused where not."""
-        arguments = ["gradient", "--precision", "bfloat16", "--network", "dueling", "--hidden", 32,
-                     "--batch", 32, "--threads", 1]
-        done = self.run_here("bench", *SHORT, *arguments)
-        if done.returncode != 0:
-            return self.assert_one_line(done, 2, "bfloat16")
-        self.assertIn("gradient/dueling-bfloat16/32/batch:32/threads:1 ", done.stdout)
-        self.assertNotIn("%", done.stdout)  # the peak is that of float32
-        self.refuse(["bench", *arguments, "--simd", "portable"], "--simd", "bfloat16")
 
     def test_interrupt(self):
         process = self.start("bench", "act", "--seconds", 1000, "--json", "b.json", wait=False)

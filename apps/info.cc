@@ -15,7 +15,6 @@
 #include "io/tensor_file.h"
 #include "mujoco/model.h"
 #include "nn/actor_policy.h"
-#include "nn/bfloat16.h"
 #include "nn/q_policy.h"
 #include "run/model_info.h"
 #include "setup/config.h"
@@ -148,13 +147,11 @@ void PrintRun(const fs::path& path, bool has_policy) {
 
 /// The program's version and what it uses of this machine.
 void PrintProgram() {
-  const std::vector<std::string> bfloat16 = Bfloat16Paths();
   fmt::print("upswing {}\n", UPSWING_VERSION);
   fmt::print("  physics     MuJoCo {}\n", MuJoCoVersion());
   fmt::print("  threads     {} by default\n", ResolveThreads(0));
   fmt::print("  vectors     {} (this processor supports: {})\n", SimdPath(),
              fmt::join(SimdPaths(), ", "));
-  fmt::print("  bfloat16    {}\n", bfloat16.empty() ? "none" : bfloat16.front());
 }
 
 int RunInfo(const PolicyArguments& a) {

@@ -44,6 +44,19 @@ class ResumeTest(ProgramTest):
         self.succeed(*small())
         self.refuse(["train", "--resume", "run", "--steps", "3000"], "--steps", "4000", "3000")
 
+    def test_a_run_of_version_0_4_is_resumed(self):
+        """Its settings have a `precision`, which was removed: of two values, one is what is left."""
+        self.succeed(*small(steps=2000))
+        config = self.folder / "run/config.toml"
+        settings = config.read_text()
+        for value, words in (("float32", []), ("bfloat16", ["precision", "float32", "bfloat16"])):
+            config.write_text(settings.replace("[network]\n", f'[network]\nprecision = "{value}"\n'))
+            resume = ["train", "--resume", "run", "--steps", "4000"]
+            self.refuse(resume, *words) if words else self.succeed(*resume)
+            config.write_text(settings)
+        self.succeed(*small(steps=4000, out="never-stopped"))
+        self.assert_same_run("run", "never-stopped")
+
     def test_a_run_that_is_being_trained_is_not_resumed(self):
         process = self.start(*small(steps=ENDLESS, stop_when_solved=False))
         refused = run("train", "--resume", "run", cwd=self.folder)

@@ -201,15 +201,6 @@ class TrainTest(ProgramTest):
         self.succeed(*small(out="two", threads=2))
         self.assert_same_run("one", "two")
 
-    def test_bfloat16_learns_with_the_same_bytes_on_any_threads_or_is_refused(self):
-        if "bfloat16    none" in self.succeed("info"):
-            return self.refuse(small(precision="bfloat16"), "bfloat16", "AVX512_BF16")
-        self.succeed(*small(out="one", threads=1, precision="bfloat16"))
-        self.succeed(*small(out="two", threads=2, precision="bfloat16"))
-        self.succeed(*small(out="float"))
-        self.assert_same_run("one", "two")
-        self.assertNotEqual(self.policy_of("one"), self.policy_of("float"))
-
     # ---- That it learns.
 
     def named_agents(self):

@@ -54,11 +54,7 @@ void TrainView::Announce(const std::filesystem::path& run) const {
       FormatCount(training_.policy()->num_parameters()), config.train.envs, threads,
       threads == 1 ? "" : "s");
   if (config.task != kDoublePendulum) Say("  task {}\n", config.task);
-  const bool rounded = config.algorithm == kDqn && config.dqn.precision != "float32";
-  if (config.physics != kMuJoCo.name || rounded) {
-    Say("  physics {}, products in {}\n", config.physics,
-        rounded ? config.dqn.precision : "float32");
-  }
+  if (config.physics != kMuJoCo.name) Say("  physics {}\n", config.physics);
   const std::optional<ModelInfo> model = InfoOfModel(config.mjcf, config.model);
   if (model) Say("  model {}\n", model->Text());
   const TrainingSize size = SizeOf(config);

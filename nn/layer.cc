@@ -2,21 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <type_traits>
 
-#include "nn/bfloat16.h"
 #include "nn/linear.h"
 
 namespace upswing {
 
 template <typename T>
-Layer<T>::Layer(const LayerShape& shape, size_t offset, bool bfloat16)
+Layer<T>::Layer(const LayerShape& shape, size_t offset)
     : shape_(shape),
       weight_(offset),
       bias_(weight_ + static_cast<size_t>(shape.in) * static_cast<size_t>(shape.out)),
       gain_(bias_ + static_cast<size_t>(shape.out)),
-      norm_bias_(gain_ + static_cast<size_t>(shape.out)),
-      bfloat16_(bfloat16) {}
+      norm_bias_(gain_ + static_cast<size_t>(shape.out)) {}
 
 template <typename T>
 Matrix<const T> Layer<T>::W(std::span<const T> parameters) const {
@@ -51,46 +48,19 @@ LayerActivations<T> Layer<T>::MakeActivations(int max_batch, bool gradients) con
 template <typename T>
 void Layer<T>::Prepare(RowRange rows, std::span<const T> parameters, Prepared<T>& prepared) const {
   const auto [first, count] = rows;
-  const Matrix<const T> some = W(parameters).Rows(first, count);
-  Matrix<T> columns;
-  if (!prepared.transposed.empty()) {
-    columns = Matrix<T>(prepared.transposed.data() + weight_, out(), in()).Cols(first, count);
-    Transpose(some, columns);
-  }
-  if constexpr (std::is_same_v<T, float>) {
-    if (!prepared.pairs.empty()) {
-      const Matrix<uint32_t> pairs(prepared.pairs.data() + weight_, PairsIn(in()), out());
-      PackPairs(some, pairs.Rows(first / 2, PairsIn(count)));
-    }
-    if (!prepared.transposed_pairs.empty()) {
-      const Matrix<uint32_t> pairs(prepared.transposed_pairs.data() + weight_, PairsIn(out()),
-                                   in());
-      PackPairs(columns, pairs.Cols(first, count));
-    }
-  }
+  const Matrix<T> transposed(prepared.transposed.data() + weight_, out(), in());
+  Transpose(W(parameters).Rows(first, count), transposed.Cols(first, count));
 }
 
 template <typename T>
 void Layer<T>::Multiply(Weights<T> weights, Matrix<const T> x, bool relu, Matrix<T> y) const {
   const std::span<const T> bias = b(weights.parameters);
-  if constexpr (std::is_same_v<T, float>) {
-    if (bfloat16_ && weights.prepared != nullptr) {
-      const uint32_t* pairs = weights.prepared->pairs.data() + weight_;
-      return LinearForwardBfloat16(x, {pairs, PairsIn(in()), out()}, bias, relu, y);
-    }
-  }
   LinearForward(x, W(weights.parameters), bias, relu, y);
 }
 
 template <typename T>
 void Layer<T>::MultiplyTransposed(Weights<T> weights, Matrix<const T> dy,
                                   GradientPlace<T> input) const {
-  if constexpr (std::is_same_v<T, float>) {
-    if (bfloat16_) {
-      const uint32_t* pairs = weights.prepared->transposed_pairs.data() + weight_;
-      return LinearBackwardInputBfloat16(dy, {pairs, PairsIn(out()), in()}, input.gate, input.dx);
-    }
-  }
   const T* transposed = weights.prepared->transposed.data() + weight_;
   LinearBackwardInput(dy, Matrix<const T>(transposed, out(), in()), input.gate, input.dx);
 }
@@ -148,12 +118,7 @@ T Layer<T>::BackwardWeights(RowRange rows, Matrix<const T> x, const LayerActivat
   const Matrix<const T> columns = x.Cols(rows.first, rows.count);
   const Matrix<T> dw =
       Matrix<T>(gradient.data() + weight_, in(), out()).Rows(rows.first, rows.count);
-  if constexpr (std::is_same_v<T, float>) {
-    bfloat16_ ? LinearBackwardWeightBfloat16(columns, dlinear, dw)
-              : LinearBackwardWeight(columns, dlinear, dw);
-  } else {
-    LinearBackwardWeight(columns, dlinear, dw);
-  }
+  LinearBackwardWeight(columns, dlinear, dw);
   T squares = SquaredNorm<T>(dw.values());
   if (rows.first > 0) return squares;
 

@@ -25,8 +25,7 @@ auto RowsOf(Values& values, RowRange rows, int cols) {
 /// Copies of the weights in the layouts that products read, each at its parameter's offset.
 template <typename T>
 struct Prepared {
-  AlignedVector<T> transposed;                      // (out × in), for the backward pass
-  AlignedVector<uint32_t> pairs, transposed_pairs;  // bfloat16 pairs of both; else empty
+  AlignedVector<T> transposed;  // (out × in), for the backward pass
 };
 
 /// Parameters and their prepared copies; a forward pass in float works without the copies.
@@ -67,8 +66,8 @@ template <typename T>
 class Layer {
  public:
   /// W begins at `offset` of the parameters; b and, if layer_norm, gain and bias (out each) follow
-  /// it. With `bfloat16`, products of prepared weights round their operands.
-  Layer(const LayerShape& shape, size_t offset, bool bfloat16);
+  /// it.
+  Layer(const LayerShape& shape, size_t offset);
 
   int in() const { return shape_.in; }
   int out() const { return shape_.out; }
@@ -81,7 +80,7 @@ class Layer {
   /// Buffers for up to `max_batch` rows; those of gradients only if asked for.
   LayerActivations<T> MakeActivations(int max_batch, bool gradients) const;
 
-  /// Writes the copies of some rows of W, for the buffers that there are.
+  /// Writes the copies of some rows of W.
   void Prepare(RowRange rows, std::span<const T> parameters, Prepared<T>& prepared) const;
 
   /// Returns y, given x (rows.count × in).
@@ -116,7 +115,6 @@ class Layer {
 
   LayerShape shape_;
   size_t weight_, bias_, gain_, norm_bias_;  // offsets
-  bool bfloat16_;
 };
 
 extern template class Layer<float>;

@@ -6,7 +6,7 @@
 
 /// Kernels of small networks, for T = float and double. B = batch size.
 /// Every kernel is compiled for several kinds of vector instructions (core/simd.h). Apart from the
-/// rooflines, only linear.cc, product.cc and bfloat16.cc contain vector code.
+/// rooflines, only linear.cc and product.cc contain vector code.
 ///
 /// The order of each sum depends on the sizes alone, not on a row's position in the batch: cutting
 /// a batch into slices changes no bit.

@@ -1,12 +1,10 @@
 #include "nn/network.h"
 
 #include <algorithm>
-#include <type_traits>
 #include <variant>
 
 #include "core/error.h"
 #include "core/text.h"
-#include "nn/bfloat16.h"
 
 namespace upswing {
 namespace {
@@ -30,16 +28,9 @@ void CheckSizes(const MlpShape& trunk, const HeadShape& head) {
 
 /// The layout of a network that has no layers yet. Throws BadInput as Network does.
 template <typename T>
-ParameterLayout<T> EmptyLayout(const MlpShape& trunk, const HeadShape& head, bool bfloat16) {
+ParameterLayout<T> EmptyLayout(const MlpShape& trunk, const HeadShape& head) {
   CheckSizes(trunk, head);
-  if (bfloat16 && (!std::is_same_v<T, float> || Bfloat16Paths().empty())) {
-    throw BadInput(
-        "bfloat16 products: this processor has no instructions for them (AVX512_BF16); expected "
-        "precision float32");
-  }
-  ParameterLayout<T> layout;
-  layout.bfloat16 = bfloat16;
-  return layout;
+  return {};
 }
 
 template <typename T>
@@ -51,8 +42,8 @@ Head<T> MakeHead(int features, const HeadShape& shape, ParameterLayout<T>& layou
 }  // namespace
 
 template <typename T>
-Network<T>::Network(const MlpShape& trunk, const HeadShape& head, bool bfloat16)
-    : layout_(EmptyLayout<T>(trunk, head, bfloat16)),
+Network<T>::Network(const MlpShape& trunk, const HeadShape& head)
+    : layout_(EmptyLayout<T>(trunk, head)),
       trunk_(trunk, layout_),
       head_(MakeHead(trunk_.width(), head, layout_)) {}
 
@@ -72,12 +63,8 @@ typename Network<T>::Activations Network<T>::MakeActivations(int max_batch, bool
 }
 
 template <typename T>
-Prepared<T> Network<T>::MakePrepared(bool backward) const {
-  Prepared prepared;
-  if (backward) prepared.transposed.resize(layout_.size);
-  if (layout_.bfloat16) prepared.pairs.resize(layout_.size);
-  if (layout_.bfloat16 && backward) prepared.transposed_pairs.resize(layout_.size);
-  return prepared;
+Prepared<T> Network<T>::MakePrepared() const {
+  return {AlignedVector<T>(layout_.size)};
 }
 
 template <typename T>
@@ -131,7 +118,7 @@ T Network<T>::BackwardWeights(int task, Matrix<const T> x, const Activations& a,
 template <typename T>
 void Network<T>::Backward(std::span<const T> parameters, Matrix<const T> x, Activations& a,
                           Matrix<const T> dy, std::span<T> gradient, Matrix<T> dx) const {
-  Prepared prepared = MakePrepared(true);
+  Prepared prepared = MakePrepared();
   for (int task = 0; task < num_tasks(); ++task) Prepare(task, parameters, prepared);
   BackwardInputs({parameters, &prepared}, dy, {0, x.rows()}, a, dx);
   for (int task = 0; task < num_tasks(); ++task) BackwardWeights(task, x, a, gradient);

@@ -16,7 +16,7 @@ namespace upswing {
 ///
 /// A gradient takes three steps, each of which threads can share: Prepare over all tasks; Forward
 /// and BackwardInputs over slices of the batch; BackwardWeights over all tasks. The result has the
-/// same bits for any number of threads; with `bfloat16`, for the same slices. Backward does all of
+/// same bits for any number of threads. Backward does all of
 /// it. For the gradient with respect to the inputs alone, BackwardWeights is left out.
 template <typename T>
 class Network {
@@ -24,10 +24,8 @@ class Network {
   using Weights = upswing::Weights<T>;
   using Prepared = upswing::Prepared<T>;
 
-  /// With `bfloat16`, which T = float alone can have, products of prepared weights round their
-  /// operands (nn/bfloat16.h); sums, activations and parameters stay float. Throws BadInput on
-  /// invalid sizes, and if this processor has no such instructions.
-  Network(const MlpShape& trunk, const HeadShape& head, bool bfloat16 = false);
+  /// Throws BadInput on invalid sizes.
+  Network(const MlpShape& trunk, const HeadShape& head);
 
   size_t num_parameters() const { return layout_.size; }
   /// Name, place and shape of every parameter array; they follow one another without gaps.
@@ -43,8 +41,8 @@ class Network {
   /// Buffers for up to `max_batch` rows; those of gradients only if asked for.
   Activations MakeActivations(int max_batch, bool gradients) const;
 
-  /// Buffers for prepared copies; those of the backward pass only if asked for.
-  Prepared MakePrepared(bool backward) const;
+  /// Buffers for prepared copies, which the backward pass reads.
+  Prepared MakePrepared() const;
 
   /// Writes y, in the given rows.
   void Forward(Weights weights, Matrix<const T> x, RowRange rows, Activations& a,
@@ -58,7 +56,7 @@ class Network {
   /// The tasks of Prepare and BackwardWeights: 0 … num_tasks() - 1.
   int num_tasks() const { return static_cast<int>(layout_.tasks.size()); }
 
-  /// Writes the task's share of `prepared`, for the buffers that it has.
+  /// Writes the task's share of `prepared`.
   void Prepare(int task, std::span<const T> parameters, Prepared& prepared) const;
 
   /// Gradients of sum(dy · y) with respect to all activations in the given rows of the last

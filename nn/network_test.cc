@@ -6,7 +6,6 @@
 #include <numeric>
 
 #include "core/error.h"
-#include "nn/bfloat16.h"
 
 namespace upswing {
 namespace {
@@ -135,7 +134,7 @@ TEST_P(NetworkTest, SlicesOfTheBatchGiveTheSameBits) {
   f.activations = f.network.MakeActivations(7, true);
   std::ranges::fill(f.y, 0.0);
   AlignedVector<double> gradient(whole.size());
-  auto prepared = f.network.MakePrepared(true);
+  auto prepared = f.network.MakePrepared();
   for (int task = f.network.num_tasks() - 1; task >= 0; --task) {
     f.network.Prepare(task, f.parameters, prepared);
   }
@@ -184,62 +183,6 @@ INSTANTIATE_TEST_SUITE_P(
                       NetworkCase{"split_layers", {8, {130}, true}, {9, 70}}),
     [](const auto& info) { return info.param.name; });
 
-TEST(Network, Bfloat16FollowsFloatAndSlicesGiveTheSameBits) {
-  if (Bfloat16Paths().empty()) GTEST_SKIP() << "no bfloat16 instructions on this processor";
-  // 130 rows, 100 units: whole tiles and margins. The last slice has an odd number of rows.
-  const MlpShape trunk{8, {100, 96}, true};
-  const HeadShape head{9, 40};
-  constexpr int B = 129;
-  const Network<float> network(trunk, head, true);
-  AlignedVector<float> parameters(network.num_parameters()), x(B * 8), dy(B * 9), y(B * 9);
-  AlignedVector<float> dx(B * 8);
-  Rng rng(3, "bfloat16");
-  network.Initialize(rng, parameters);
-  for (float& value : x) value = static_cast<float>(rng.Normal());
-  for (float& value : dy) value = static_cast<float>(rng.Normal());
-  const Matrix<const float> X(x.data(), B, 8), DY(dy.data(), B, 9);
-  auto activations = network.MakeActivations(B, true);
-  auto prepared = network.MakePrepared(true);
-  for (int task = 0; task < network.num_tasks(); ++task) {
-    network.Prepare(task, parameters, prepared);
-  }
-  const auto gradient_by = [&](const std::vector<RowRange>& slices) {
-    AlignedVector<float> gradient(parameters.size());
-    for (const RowRange rows : slices) {
-      network.Forward({parameters, &prepared}, X, rows, activations, Matrix<float>(y, B, 9));
-      network.BackwardInputs({parameters, &prepared}, DY, rows, activations,
-                             Matrix<float>(dx, B, 8));
-    }
-    for (int task = 0; task < network.num_tasks(); ++task) {
-      network.BackwardWeights(task, X, activations, gradient);
-    }
-    return gradient;
-  };
-  const auto gradient = gradient_by({{0, 64}, {64, 65}});
-  const AlignedVector<float> y_bfloat16 = y, dx_bfloat16 = dx;
-  EXPECT_EQ(gradient_by({{64, 65}, {0, 64}}), gradient);
-  EXPECT_EQ(dx, dx_bfloat16);
-
-  // A bfloat16 has 8 bits: relative 2^-9 each. What is nearly 0 may pass a ReLU or not.
-  const Network<float> exact(trunk, head);
-  AlignedVector<float> exact_gradient(parameters.size());
-  exact.Forward({parameters}, X, {0, B}, activations, Matrix<float>(y, B, 9));
-  exact.Backward(parameters, X, activations, DY, exact_gradient, Matrix<float>(dx, B, 8));
-  const auto distance = [](const AlignedVector<float>& a, const AlignedVector<float>& b) {
-    double error = 0, norm = 0;
-    for (size_t i = 0; i < a.size(); ++i) {
-      error += std::pow(a[i] - b[i], 2);
-      norm += std::pow(b[i], 2);
-    }
-    return std::sqrt(error / norm);
-  };
-  EXPECT_LT(distance(y_bfloat16, y), 0.02);
-  EXPECT_LT(distance(gradient, exact_gradient), 0.1);
-  EXPECT_GT(distance(gradient, exact_gradient), 1e-5);  // it is rounded
-  EXPECT_LT(distance(dx_bfloat16, dx), 0.1);
-  EXPECT_GT(distance(dx_bfloat16, dx), 1e-5);
-}
-
 TEST(Network, InitialWeightsFillTheirRange) {
   const Network<float> network({8, {64}, true}, {9, 16});
   AlignedVector<float> parameters(network.num_parameters());
@@ -267,7 +210,6 @@ TEST(Network, RefusesInvalidSizes) {
   EXPECT_THROW(Network<float>({8, {4}}, {0}), Error);
   EXPECT_THROW(Network<float>({8, {4}}, {9, -1}), Error);
   EXPECT_THROW(Network<float>({8, {4}}, {9, 1 << 20}), Error);
-  EXPECT_THROW(Network<double>({8, {4}}, {9}, true), Error);  // bfloat16 is for float
 }
 
 }  // namespace

@@ -26,10 +26,8 @@ struct ParameterLayout {
     RowRange rows;
   };
   static constexpr int kTaskRows = 64;
-  static_assert(kTaskRows % 2 == 0, "tasks do not share pairs of rows");
 
-  bool bfloat16 = false;  // whether products round their operands
-  size_t size = 0;        // how many numbers the parameters are
+  size_t size = 0;  // how many numbers the parameters are
   std::vector<ParameterBlock> blocks;
   std::vector<Layer<T>> layers;
   std::vector<Task> tasks;
@@ -39,7 +37,7 @@ struct ParameterLayout {
     for (int first = 0; first < shape.in; first += kTaskRows) {
       tasks.push_back({layers.size(), {first, std::min(kTaskRows, shape.in - first)}});
     }
-    layers.emplace_back(shape, size, bfloat16);
+    layers.emplace_back(shape, size);
     AddBlock(name + ".weight", shape.in, shape.out);
     AddBlock(name + ".bias", 0, shape.out);
     if (shape.layer_norm) {

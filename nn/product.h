@@ -7,14 +7,13 @@
 namespace upswing {
 
 /// C (M × N) = A (M × K) · B (K × N) + bias, where A(m, k) = a[m · a_m + k · a_k]. All three
-/// products of a linear layer have this form. An operand is a number or, in bfloat16, a pair of
-/// consecutive numbers along K.
-template <typename Operand, typename T = Operand>
+/// products of a linear layer have this form.
+template <typename T>
 struct Product {
   int M, N, K;
-  const Operand* a;
+  const T* a;
   ptrdiff_t a_m, a_k;
-  Matrix<const Operand> b;    // (K × N)
+  Matrix<const T> b;          // (K × N)
   Matrix<T> c;                // (M × N)
   const T* bias = nullptr;    // (N), or null for none
   bool relu = false;          // C = max(C, 0)

@@ -33,9 +33,8 @@ template <typename T>
 class QNetwork : public Network<T> {
  public:
   /// Throws BadInput on invalid sizes, and as Network does.
-  explicit QNetwork(QNetworkShape shape, bool bfloat16 = false)
-      : Network<T>({shape.inputs, shape.hidden, shape.layer_norm}, {shape.actions, shape.head},
-                   bfloat16),
+  explicit QNetwork(QNetworkShape shape)
+      : Network<T>({shape.inputs, shape.hidden, shape.layer_norm}, {shape.actions, shape.head}),
         shape_(std::move(shape)) {
     if (shape_.dueling != (shape_.head > 0)) {
       throw BadInput(Concat("network: expected a head of at least one unit if it is dueling, and ",

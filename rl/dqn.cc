@@ -50,8 +50,7 @@ Dqn::Dqn(const DqnConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
       obs_size_(static_cast<size_t>(spec.obs_size)),
       torques_(TorquesOf(config, spec)),
       pool_(pool),
-      network_(config.Shape(spec.obs_size, static_cast<int>(torques_.size())),
-               config.precision == "bfloat16"),
+      network_(config.Shape(spec.obs_size, static_cast<int>(torques_.size()))),
       theta_(network_.num_parameters()),
       adam_(network_.num_parameters()),
       activations_(network_.MakeActivations(static_cast<int>(config.batch), true)),
@@ -61,8 +60,7 @@ Dqn::Dqn(const DqnConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
       dq_(q_.size()),
       y_(static_cast<size_t>(config.batch)),
       q_taken_(y_.size()),
-      prepared_(network_.MakePrepared(true)),
-      prepared_target_(network_.MakePrepared(false)),
+      prepared_(network_.MakePrepared()),
       gradient_(network_.num_parameters()),
       squares_(static_cast<size_t>(network_.num_tasks())),
       act_activations_(network_.MakeActivations(spec.num_envs, false)),
@@ -97,10 +95,8 @@ void Dqn::Update(const Minibatch& batch) {
   // Gradient of the mean Huber loss. Threads share the weights (to copy them into the layouts that
   // the products read), then slices of the batch, then the weights again.
   const int B = static_cast<int>(config_.batch);
-  pool_.ParallelFor(network_.num_tasks(), [&](int task) {
-    network_.Prepare(task, theta_, prepared_);
-    network_.Prepare(task, theta_target_, prepared_target_);
-  });
+  pool_.ParallelFor(network_.num_tasks(),
+                    [&](int task) { network_.Prepare(task, theta_, prepared_); });
   ForSlices(pool_, B, [&](RowRange rows) { BackwardRows(batch, rows); });
   CountErrors(batch);
   const Matrix<const float> s(batch.obs.data(), B, static_cast<int>(obs_size_));
@@ -133,7 +129,7 @@ void Dqn::BackwardRows(const Minibatch& batch, RowRange rows) {
   const int actions = static_cast<int>(torques_.size());
   const int obs_size = static_cast<int>(obs_size_);
   const QNetwork<float>::Weights online{theta_, &prepared_};
-  const QNetwork<float>::Weights target{theta_target_, &prepared_target_};
+  const QNetwork<float>::Weights target{theta_target_};
   // s, s' (B × D); all Q-values (B × A)
   const Matrix<const float> s(batch.obs.data(), B, obs_size);
   const Matrix<const float> s_next(batch.next_obs.data(), B, obs_size);

@@ -68,7 +68,7 @@ class Dqn : public OffPolicyAgent {
   QNetwork<float>::Activations activations_;
   AlignedVector<float> q_, q_select_, q_target_, dq_;  // (B × A)
   AlignedVector<float> y_, q_taken_;                   // (B) targets, Q(s, a)
-  QNetwork<float>::Prepared prepared_, prepared_target_;
+  QNetwork<float>::Prepared prepared_;
   AlignedVector<float> gradient_;  // (num_parameters)
   std::vector<float> squares_;     // of the gradient, by task
   QNetwork<float>::Activations act_activations_;

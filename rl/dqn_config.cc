@@ -7,8 +7,6 @@ void DqnConfig::Describe(Options& o) {
   o.Add(&hidden, "hidden", {256, 256}, {1, 4096}, "widths of the feature layers");
   o.Add(&head, "head", 128, {1, 4096}, "", "width of each dueling stream's hidden layer");
   o.Add(&layer_norm, "layer_norm", true, "layer normalisation after each feature layer");
-  o.AddChoice(&precision, "precision", {"float32", "bfloat16"},
-              "of the products while learning; bfloat16 needs AVX512_BF16");
 
   o.Section("agent");
   o.Add(&double_q, "double", true, "Double DQN: choose online, evaluate with the target");

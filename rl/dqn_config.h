@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
 #include <vector>
 
 #include "core/options.h"
@@ -16,7 +15,6 @@ struct DqnConfig : OffPolicyConfig {
   int64_t head;
   bool layer_norm, double_q, dueling;
   int64_t levels;
-  std::string precision;
   double tau;
   int64_t target_period;
   double policy_tau;

@@ -17,7 +17,7 @@ TrainedNetwork::TrainedNetwork(const MlpShape& trunk, const HeadShape& head, int
       gradient_(theta_.size()),
       adam_(theta_.size(), adam_epsilon),
       activations_(network_.MakeActivations(batch, true)),
-      prepared_(network_.MakePrepared(true)),
+      prepared_(network_.MakePrepared()),
       squares_(static_cast<size_t>(network_.num_tasks())) {}
 
 void TrainedNetwork::Prepare(ThreadPool& pool) {

@@ -8,6 +8,26 @@
 namespace upswing {
 namespace {
 
+/// A setting of an earlier version. Files may hold it with the value that is built in today.
+struct RemovedSetting {
+  std::string_view section, name, value;
+};
+constexpr RemovedSetting kRemoved[] = {{"network", "precision", "float32"}};
+
+/// Whether this setting was removed. Throws BadInput if it asks for something that no longer
+/// exists.
+bool IsRemoved(std::string_view section, std::string_view name, const toml::node& node,
+               const std::string& where) {
+  for (const RemovedSetting& removed : kRemoved) {
+    if (section != removed.section || name != removed.name) continue;
+    if (TextOf(node) == removed.value) return true;
+    throw BadInput(Concat(PlaceOf(node, where), ": ", name, ": expected ", removed.value,
+                          ", the only value since version 0.5.0, got ",
+                          TextOf(node).value_or("another type")));
+  }
+  return false;
+}
+
 /// Sets one key of a section, or one that stands alone if `section` is empty.
 FlagValue ApplyNode(const Options& options, const std::string& section, const std::string& key,
                     const toml::node& node, const std::string& where) {
@@ -80,6 +100,7 @@ std::vector<FlagValue> ApplyTable(const Options& options, const toml::table& tab
                             DidYouMean(key, sections)));
     }
     for (const auto& [inner, value] : *section) {
+      if (IsRemoved(key, inner.str(), value, where)) continue;
       settings.push_back(ApplyNode(options, key, std::string(inner.str()), value, where));
     }
   }

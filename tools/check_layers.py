@@ -44,15 +44,15 @@ ALLOWED_FILES = {
     "zlib.h": re.compile(r"io/png\.cc$"),
     "google": re.compile(r"io/"),
     "nanobind": re.compile(r"python/"),
-    "hwy": re.compile(r"(core/simd(_test)?|nn/(linear|product|bfloat16|roofline|registers-inl)|"
+    "hwy": re.compile(r"(core/simd(_test)?|nn/(linear|product|roofline|registers-inl)|"
                       r"sim/(closed_form|sine_cosine-inl)|realaigym/(plant|swing_net))\.(h|cc)$"),
     "Eigen": re.compile(r"(control|realaigym)/|nn/[^/]*_(test|bench)\.cc$"),
 }
 
 # Layers that need no operating system, the headers that would bring one, and the files that may
-# have them: tests, and what asks Linux for AMX where that is compiled.
+# have them: tests.
 PORTABLE = {"core", "nn", "sim", "rl", "control"}
-MAY_ASK_SYSTEM = re.compile(r"(_test|_bench)\.cc$|/testing\.h$|nn/bfloat16\.cc$")
+MAY_ASK_SYSTEM = re.compile(r"(_test|_bench)\.cc$|/testing\.h$")
 SYSTEM = re.compile(r"(unistd|fcntl|poll|sched|signal|csignal|filesystem|fstream|cstdio|stdio)(\.h)?$|"
                     r"sys/")
 

@@ -31,8 +31,7 @@ ALLOWED = {
         r"(a?(sin|cos|tan)h?|sincos|atan2|exp(2|m1)?|log(2|10|1p)?|pow|sqrt|cbrt|hypot|erfc?|fmod|"
         r"remainder|floor|ceil|l?l?round|nearbyint|rint|trunc|fmin|fmax|copysign|lgamma)f?|"
         r"__(mul|div)[sd]c3|c(abs|exp|log|sqrt)f?",
-    "threads: std::mutex, and the waiting of std::atomic (on Linux the system call futex; that for "
-    "AMX is another, where the compiler has AMX)":
+    "threads: std::mutex, and the waiting of std::atomic (on Linux the system call futex)":
         r"pthread_\w+|sched_yield|syscall",
     "Highway: which vector instructions the processor has, and how it reports its own errors":
         r"hwy::.*",
