@@ -2,11 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/LU>
 #include <numbers>
 #include <vector>
 
-#include "control/manipulator.h"
 #include "core/rng.h"
 
 namespace upswing {
@@ -26,12 +24,9 @@ Plant DrawPlant(Rng& rng) {
   return plant;
 }
 
-/// ẋ by the mass matrix and the rest of the equations of motion.
+/// ẋ by the equations of motion.
 StateVector Derivative(const Manipulator& plant, const StateVector& x, double u) {
-  const ManipulatorTerms t = plant.At(x);
-  Eigen::Matrix2d M;
-  M << t.M11, t.M12, t.M12, t.M22;
-  const Eigen::Vector2d a = M.inverse() * Eigen::Vector2d(u - t.h1, -t.h2);
+  const auto a = plant.Acceleration(StateOf(x), {u, 0});
   return {x[2], x[3], a[0], a[1]};
 }
 
@@ -61,7 +56,7 @@ TEST(PendulumModel, StepsAsTheEquationsOfMotionSay) {
     std::vector<StateVector> after = x;
     model.Step(after, u);
     for (size_t i = 0; i < x.size(); ++i) {
-      const StateVector expected = Stepped(Manipulator(plant), x[i], u[i]);
+      const StateVector expected = Stepped(ManipulatorOf(plant), x[i], u[i]);
       EXPECT_LT((after[i] - expected).norm(), 1e-11 * (1 + expected.norm()));
     }
   }
@@ -70,7 +65,7 @@ TEST(PendulumModel, StepsAsTheEquationsOfMotionSay) {
 TEST(PendulumModel, DerivativesAreThoseOfTheSteps) {
   Rng rng(2, "states");
   const Plant plant = DrawPlant(rng);
-  const Manipulator manipulator(plant);
+  const Manipulator manipulator = ManipulatorOf(plant);
   PendulumModel model(plant);
   std::vector<StateVector> x;
   std::vector<double> u;
@@ -109,17 +104,18 @@ TEST(Manipulator, EnergyChangesByWorkAndDampingAlone) {
   Rng rng(3, "states");
   for (int trial = 0; trial < 100; ++trial) {
     const Plant plant = DrawPlant(rng);
-    const Manipulator manipulator(plant);
+    const Manipulator manipulator = ManipulatorOf(plant);
     const StateVector x = DrawState(rng);
     const double u = rng.Uniform(-5, 5);
     constexpr double e = 1e-5;
     const StateVector rate = Derivative(manipulator, x, u);
-    const double change =
-        (manipulator.At(x + e * rate).energy - manipulator.At(x - e * rate).energy) / (2 * e);
+    const double change = (manipulator.At(StateOf(x + e * rate)).energy -
+                           manipulator.At(StateOf(x - e * rate)).energy) /
+                          (2 * e);
     const double power = u * x[2] - plant.damping1 * x[2] * x[2] - plant.damping2 * x[3] * x[3];
     EXPECT_NEAR(change, power, 1e-6 * (1 + std::abs(power)) + 1e-5);
   }
-  EXPECT_NEAR(Manipulator(Plant()).At({std::numbers::pi, 0, 0, 0}).energy, 0, 1e-12);
+  EXPECT_NEAR(ManipulatorOf(Plant()).At({std::numbers::pi, 0, 0, 0}).energy, 0, 1e-12);
 }
 
 }  // namespace

@@ -85,7 +85,7 @@ TEST(Hybrid, CatchesWhatALawBringsUp) {
   const Plant plant;
   PartialFeedbackConfig pfl;
   LqrConfig lqr;
-  const Manipulator manipulator(plant);
+  const Manipulator manipulator = ManipulatorOf(plant);
   const auto law = std::make_shared<LawPolicy>(
       "law", "a law", OptionsOf(pfl), plant,
       [&](const StateVector& d) { return PartialFeedbackTorque(pfl, manipulator, d); });

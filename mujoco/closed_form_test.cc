@@ -14,6 +14,7 @@
 #include "core/simd.h"
 #include "core/text.h"
 #include "io/file.h"
+#include "mujoco/engines.h"
 #include "mujoco/model.h"
 #include "sim/pendulum_env.h"
 #include "sim/testing.h"
@@ -73,7 +74,7 @@ double Cancellation(const ClosedFormBatch& batch, size_t i) {
   const double bc = batch.b[i] * std::cos(batch.q2[i]);
   const double M11 = batch.J1[i] + batch.J2[i] + 2 * bc;
   const double M12 = batch.J2[i] + bc;
-  const double M22 = batch.J2[i] + kArmature;
+  const double M22 = batch.J2[i] + batch.a[i];
   return M11 * M22 / (M11 * M22 - M12 * M12);
 }
 
@@ -115,7 +116,7 @@ TEST(ClosedForm, StepsLikeMuJoCoOverTheWholeRangeOfPlants) {
   std::vector<std::array<double, 4>> expected;
   Rng rng(2, "plants");
   for (size_t i = 0; i < kTrials; ++i) {
-    const Plant plant = RandomPlant(rng);
+    const Plant plant = i % 2 == 0 ? RandomPlant(rng) : RandomMachine(rng);
     const PendulumState s = RandomState(rng);
     torque.push_back(rng.Uniform(-1.2, 1.2) * plant.torque_limit);
     start.SetPlant(i, plant);
@@ -158,6 +159,35 @@ TEST(ClosedForm, FollowsMuJoCosReferenceTrajectoryFor10Seconds) {
       Advance(batch, 4, 0, 1);
     }
   });
+}
+
+TEST(ClosedForm, EnvironmentsOfDifferentMachinesMoveAsInMuJoCo) {
+  // Rotors and dry friction are written into models that were compiled once for all plants.
+  Rng rng(5, "plants");
+  PendulumEnvConfig config;
+  config.num_envs = 6;
+  config.plants.assign(6, Plant());
+  for (size_t i = 1; i < 6; ++i) {
+    config.plants[i].rotor_inertia = i % 2 == 0 ? 0 : rng.Uniform(0, 1e-3);
+    config.plants[i].gear_ratio = rng.Uniform(1, 8);
+    if (i > 2) config.plants[i].coulomb1 = config.plants[i].coulomb2 = 0.02;
+  }
+  PendulumEnv closed_form(config);
+  config.engine = &kMuJoCo;
+  PendulumEnv mujoco(config);
+  StepResult a = closed_form.MakeResult(), b = mujoco.MakeResult();
+  const std::vector<double> torque{1, -2, 3, 2, -1, 5};
+  for (int step = 0; step < 25; ++step) {
+    closed_form.Step(torque, a);
+    mujoco.Step(torque, b);
+  }
+  for (int i = 0; i < 6; ++i) {
+    const PendulumState p = closed_form.state(i), q = mujoco.state(i);
+    EXPECT_NEAR(p.q1, q.q1, 1e-9) << i;
+    EXPECT_NEAR(p.q2, q.q2, 1e-9) << i;
+    EXPECT_NEAR(p.w1, q.w1, 1e-9) << i;
+    EXPECT_NEAR(p.w2, q.w2, 1e-9) << i;
+  }
 }
 
 TEST(ClosedForm, JudgesAsTheFormulasDo) {

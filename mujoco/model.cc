@@ -12,6 +12,17 @@
 namespace upswing {
 namespace {
 
+/// Adds the dry friction c atan(s w) of models that have it, with c the frictionloss and s the user
+/// data of a joint. MuJoCo's own frictionloss is a constraint: at rest it holds, and it has no
+/// slope; as a passive force both engines agree to rounding.
+void AddDryFriction(const mjModel* model, mjData* data) {
+  if (!HasDryFriction(*model)) return;
+  for (int i = 0; i < model->nv; ++i) {
+    data->qfrc_passive[i] -=
+        model->dof_frictionloss[i] * std::atan(model->jnt_user[i] * data->qvel[i]);
+  }
+}
+
 /// Replaces MuJoCo's handlers, which print warnings and log them to a file in the current folder,
 /// and end the program on an error; adds ours of dry friction. Once, as they are global and threads
 /// compile models.
@@ -25,17 +36,6 @@ void SetHandlers() {
 }
 
 constexpr int kLinkBodies[2] = {1, 2};  // body 0 is the world
-
-/// Adds the dry friction c atan(s w) of models that have it, with c the frictionloss and s the user
-/// data of a joint. MuJoCo's own frictionloss is a constraint: at rest it holds, and it has no
-/// slope; as a passive force both engines agree to rounding.
-void AddDryFriction(const mjModel* model, mjData* data) {
-  if (!HasDryFriction(*model)) return;
-  for (int i = 0; i < model->nv; ++i) {
-    data->qfrc_passive[i] -=
-        model->dof_frictionloss[i] * std::atan(model->jnt_user[i] * data->qvel[i]);
-  }
-}
 
 /// Compiles untrusted MJCF: every error of MuJoCo's is bad input.
 ModelPtr CompileGiven(const std::string& mjcf, const std::string& where) {
