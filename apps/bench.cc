@@ -154,7 +154,7 @@ BenchCases WantedCases(const BenchOptions& options) {
 /// A text that is one of `choices` and empty where it is not given; `usual` says what that means.
 void AddChoice(Options& options, std::string& target, std::string_view name,
                std::vector<std::string> choices, std::string_view help, std::string_view usual) {
-  Option& option = options.Add(&target, name, "", help);
+  Option& option = options.Add(&target, name, help);
   option.choices = std::move(choices);
   option.usual = usual;
 }
@@ -201,17 +201,17 @@ void AddBench(CLI::App& program, Command& command) {
       ->check(NotEmpty())
       ->type_name("FILE");
   Options own;
-  own.Add(&o->threads, "threads", {}, {1, 256}, "numbers of threads").usual =
+  own.Add(&o->threads, "threads", {1, 256}, "numbers of threads").usual =
       "1 and one for each processor, up to 8";
   AddChoice(own, o->simd, "simd", SimdPaths(), "vector instructions", "the first");
-  own.Add(&o->seconds, "seconds", 0.2, {0.001, 1000}, "s", "for each repetition of a case");
-  own.Add(&o->repetitions, "repetitions", 3, {1, 1000}, "", "of a case; the median is printed");
+  own.Add(&o->seconds, "seconds", {0.001, 1000}, "s", "for each repetition of a case");
+  own.Add(&o->repetitions, "repetitions", {1, 1000}, "", "of a case; the median is printed");
   AddChoice(own, o->network, "network", {"plain", "dueling"}, "gradient: DQN or Dueling Double DQN",
             "both");
-  own.Add(&o->hidden, "hidden", {}, {1, 4096}, "gradient, sac, ppo: widths of the feature layers")
+  own.Add(&o->hidden, "hidden", {1, 4096}, "gradient, sac, ppo: widths of the feature layers")
       .usual = "several";
-  own.Add(&o->batch, "batch", 0, {1, 65536}, "", "gradient, sac, ppo: size of the minibatches")
-      .usual = "several";
+  own.Add(&o->batch, "batch", {1, 65536}, "", "gradient, sac, ppo: size of the minibatches").usual =
+      "several";
   AddArguments(*app, own);
 
   std::string parts = "Parts:\n";

@@ -16,11 +16,11 @@ struct BenchOptions {
   std::vector<int64_t> threads;     // each case that can use threads runs with each of these
   std::string network;              // of gradient: "plain", "dueling" or "" for both
   std::vector<int64_t> hidden;      // of gradient, sac and ppo: widths of layers; empty: several
-  int64_t batch;                    // of gradient, sac and ppo; 0: several
+  int64_t batch = 0;                // of gradient, sac and ppo; 0: several
   std::string simd;                 // vector instructions; empty: the best
   std::optional<std::string> json;  // file to write
-  double seconds;                   // for each repetition, at least
-  int64_t repetitions;
+  double seconds = 0.2;             // for each repetition, at least
+  int64_t repetitions = 3;          // of a case
 };
 
 /// What is timed: one call of it.

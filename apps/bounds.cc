@@ -23,7 +23,7 @@ struct BoundsArguments {
   std::vector<std::string> policies;
   std::vector<FlagValue> flags;  // settings of controllers among them
   std::string csv;
-  int64_t threads;
+  int64_t threads = 0;
   bool as_json = false;
 };
 
@@ -121,7 +121,7 @@ void AddBounds(CLI::App& program, Command& command) {
   AddArguments(*app, own);
   AddSet(*app, a->config.trial.set, "another plant, such as mass2=1.2");
   AddSeed(*app, a->config.trial.seed, "start states");
-  AddPhysics(*app, a->config.trial.physics, "mujoco");
+  AddPhysics(*app, a->config.trial.physics);
   AddThreads(*app, a->threads);
   app->add_option("--csv", a->csv, "table to write, a row for each episode")
       ->type_name("FILE")

@@ -81,9 +81,9 @@ void AddThreads(CLI::App& app, int64_t& threads) {
   AddArguments(app, options);
 }
 
-void AddPhysics(CLI::App& app, std::string& physics, const std::string& usual) {
+void AddPhysics(CLI::App& app, std::string& physics) {
   Options options;
-  DescribePhysics(options, &physics, usual);
+  DescribePhysics(options, &physics);
   AddArguments(app, options);
 }
 
@@ -95,7 +95,7 @@ void AddManyOptions(CLI::App& app, std::string& seeds, int64_t& jobs) {
       ->type_name("SEEDS")
       ->check(CLI::Validator(not_empty, ""));
   Options options;
-  options.Add(&jobs, "jobs", 0, {1, 4096}, "", "runs at a time").usual = "one for each processor";
+  options.Add(&jobs, "jobs", {1, 4096}, "", "runs at a time").usual = "one for each processor";
   AddArguments(app, options);
 }
 

@@ -59,8 +59,8 @@ void AddSeed(CLI::App& app, int64_t& seed, const std::string& what);
 /// Adds --threads, which ResolveThreads reads.
 void AddThreads(CLI::App& app, int64_t& threads);
 
-/// Adds --physics, which ParsePhysics reads; `usual` is the default.
-void AddPhysics(CLI::App& app, std::string& physics, const std::string& usual);
+/// Adds --physics, which FindEngine reads.
+void AddPhysics(CLI::App& app, std::string& physics);
 
 /// Adds --seeds and --jobs, for many runs; 0 jobs: as many as there are processors.
 void AddManyOptions(CLI::App& app, std::string& seeds, int64_t& jobs);

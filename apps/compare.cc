@@ -23,7 +23,7 @@ struct CompareArguments {
   std::vector<std::string> names;  // of runs and policies
   PolicyArguments controllers;     // settings of those among them
   std::string out;
-  int64_t threads;
+  int64_t threads = 0;
   bool unfinished = false, different_tasks = false, as_json = false;
 };
 

@@ -23,7 +23,7 @@ struct EvalArguments {
   PolicyArguments policy;
   std::string episodes_csv;
   TrialArguments trial;
-  int64_t episodes, threads;
+  int64_t episodes = 100, threads = 0;
   bool as_json = false;
 };
 

@@ -154,7 +154,7 @@ void AddExport(CLI::App& program, Command& command) {
       ->type_name("ID")
       ->check(NotEmpty("an ID"));
   Options own;
-  own.Add(&a->checkpoints, "checkpoints", 0, {2, 100}, "",
+  own.Add(&a->checkpoints, "checkpoints", {2, 100}, "",
           "for the page, so many policies from the untrained one to each, which is trained again "
           "for that; of Q-networks")
       .usual = "none";

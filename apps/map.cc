@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 struct MapCommand : MapArguments {
   std::vector<std::string> policies;
   PolicyArguments controllers;  // settings of those among them
-  int64_t threads;
+  int64_t threads = 0;
   bool as_json = false;
 };
 
@@ -98,7 +98,7 @@ void AddMap(CLI::App& program, Command& command) {
   a->Describe(own);
   AddArguments(*app, own);
   AddSet(*app, a->set, "what is on neither axis, such as gravity=9.7");
-  AddPhysics(*app, a->physics, "closed-form");
+  AddPhysics(*app, a->physics);
   AddUnknownPlant(*app, a->unknown_plant);
   app->add_option("--out", a->out, "new folder for map.csv, map.svg and map.png [RUN/map-X-Y]")
       ->type_name("FOLDER")

@@ -24,7 +24,7 @@ struct PlotArguments {
   std::string out;
   TrialArguments trial;
   EpisodeArguments episode;
-  double seconds;  // negative: not given
+  double seconds = -1;  // negative: not given
 };
 
 /// Time (s) from which it is upright to the end; negative if it is not upright at the end.
@@ -118,7 +118,7 @@ void AddPlot(CLI::App& program, Command& command) {
   AddPolicy(*app, a->policy)->required();
   AddEpisodeOptions(*app, a->episode);
   Options own;
-  Option& seconds = own.Add(&a->seconds, "seconds", -1, {0.1, 1000}, "s", "how long");
+  Option& seconds = own.Add(&a->seconds, "seconds", {0.1, 1000}, "s", "how long");
   seconds.step = kControlPeriod;
   seconds.usual = "10; with --episode 20";
   AddArguments(*app, own);

@@ -27,7 +27,7 @@ struct RealAiGymArguments {
   PolicyArguments policy;
   std::string figure, csv, search_out, from;
   std::vector<FlagValue> search;
-  int64_t threads, case_seed;
+  int64_t threads = 0, case_seed = 1;
   bool as_json = false;
 };
 
@@ -179,7 +179,7 @@ void AddRealAiGym(CLI::App& program, Command& command) {
   app->add_flag("--json", a->as_json, "print JSON instead of a table")->disable_flag_override();
   Options own;
   own.Section("cases");
-  own.Add(&a->case_seed, "case_seed", 1, {0, 1e15}, "",
+  own.Add(&a->case_seed, "case_seed", {0, 1e15}, "",
           "seed of the noise and the pushes of the robustness score");
   AddArguments(*app, own);
   BoardSearchConfig config;

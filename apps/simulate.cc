@@ -20,7 +20,7 @@ struct SimulateArguments {
   std::string torque, csv = "-";
   TrialArguments trial;
   EpisodeArguments episode;
-  double seconds;  // negative: not given
+  double seconds = -1;  // negative: not given
 };
 
 /// The column `torque` of a CSV file. Throws BadInput with the line.
@@ -81,7 +81,7 @@ void AddSimulate(CLI::App& program, Command& command) {
       ->check(NotEmpty());
   AddEpisodeOptions(*app, a->episode);
   Options own;
-  Option& seconds = own.Add(&a->seconds, "seconds", -1, {0, 1e5}, "s", "how long");
+  Option& seconds = own.Add(&a->seconds, "seconds", {0, 1e5}, "s", "how long");
   seconds.step = kControlPeriod;
   seconds.usual = "20, or as long as the torques last";
   AddArguments(*app, own);

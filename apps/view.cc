@@ -31,8 +31,9 @@ struct ViewArguments {
   EpisodeArguments episode;
   std::string record, csv;
   ViewLook look;
-  double seconds, fps, speed;  // negative: not given
-  int64_t width, height;
+  double seconds = -1, fps = -1;  // negative: not given
+  double speed = 1;
+  int64_t width = 960, height = 640;
   bool headless = false;
 };
 
@@ -185,20 +186,19 @@ void AddPolicies(CLI::App& app, ViewArguments& a) {
 /// Adds what a picture is like.
 void AddPicture(CLI::App& app, ViewArguments& a) {
   Options own;
-  own.Add(&a.seconds, "seconds", -1, {0, 1000}, "s", "how long a recording is, or a window is open")
+  own.Add(&a.seconds, "seconds", {0, 1000}, "s", "how long a recording is, or a window is open")
       .usual = "10, with --episode 20; a window: until it is closed";
-  own.Add(&a.fps, "fps", -1, {1, 200}, "", "frames a second of a recording").usual =
-      "50; of a GIF 25";
-  own.Add(&a.speed, "speed", 1, {0.01, 100}, "", "1: real time; 0.1: ten times slower");
-  own.Add(&a.width, "width", 960, {kLeastPixels, kMostPixels}, "", "of the picture, pixels");
-  own.Add(&a.height, "height", 640, {kLeastPixels, kMostPixels}, "", "of the picture, pixels");
-  own.Add(&a.look.camera.azimuth, "azimuth", 80, {-360, 360}, "deg",
+  own.Add(&a.fps, "fps", {1, 200}, "", "frames a second of a recording").usual = "50; of a GIF 25";
+  own.Add(&a.speed, "speed", {0.01, 100}, "", "1: real time; 0.1: ten times slower");
+  own.Add(&a.width, "width", {kLeastPixels, kMostPixels}, "", "of the picture, pixels");
+  own.Add(&a.height, "height", {kLeastPixels, kMostPixels}, "", "of the picture, pixels");
+  own.Add(&a.look.camera.azimuth, "azimuth", {-360, 360}, "deg",
           "of the camera; 90: across the pendulum's plane");
-  own.Add(&a.look.camera.elevation, "elevation", -8, {-90, 90}, "deg", "of the camera");
-  own.Add(&a.look.camera.distance, "distance", 0, {0, 1000}, "m",
+  own.Add(&a.look.camera.elevation, "elevation", {-90, 90}, "deg", "of the camera");
+  own.Add(&a.look.camera.distance, "distance", {0, 1000}, "m",
           "of the camera; 0: as far as shows all");
-  own.Add(&a.look.text, "text", true, "name, time and torque in the picture");
-  own.Add(&a.look.marks, "marks", true, "torque, goal and the tip's path in the picture");
+  own.Add(&a.look.text, "text", "name, time and torque in the picture");
+  own.Add(&a.look.marks, "marks", "torque, goal and the tip's path in the picture");
   AddArguments(app, own);
 }
 

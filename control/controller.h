@@ -73,7 +73,7 @@ class PendulumController : public ComputedPolicy {
 
 /// The settings of several structs together.
 template <typename First, typename... Others>
-Options OptionsOfAll(First& first, Others&... others) {
+Options OptionsOfAll(const First& first, const Others&... others) {
   Options options = OptionsOf(first);
   (options.AddMissing(OptionsOf(others)), ...);
   return options;

@@ -47,11 +47,11 @@ void LqrConfig::Describe(Options& o) {
   constexpr Range kWeight{0, 1e9};
   o.Section("lqr");
   // Those of Tedrake's Acrobot.
-  o.Add(&q1, "lqr_q1", 10, kWeight, "1/rad²", "weight of the angle of link 1 from upright");
-  o.Add(&q2, "lqr_q2", 10, kWeight, "1/rad²", "weight of the angle of link 2 to link 1");
-  o.Add(&w1, "lqr_w1", 1, kWeight, "s²/rad²", "weight of the velocity of q1");
-  o.Add(&w2, "lqr_w2", 1, kWeight, "s²/rad²", "weight of the velocity of q2");
-  o.Add(&torque, "lqr_torque", 1, kPositive, "1/(N·m)²", "weight of the torque");
+  o.Add(&q1, "lqr_q1", kWeight, "1/rad²", "weight of the angle of link 1 from upright");
+  o.Add(&q2, "lqr_q2", kWeight, "1/rad²", "weight of the angle of link 2 to link 1");
+  o.Add(&w1, "lqr_w1", kWeight, "s²/rad²", "weight of the velocity of q1");
+  o.Add(&w2, "lqr_w2", kWeight, "s²/rad²", "weight of the velocity of q2");
+  o.Add(&torque, "lqr_torque", kPositive, "1/(N·m)²", "weight of the torque");
 }
 
 Lqr SolveLqr(const LqrConfig& config, const Plant& plant) {

@@ -16,12 +16,11 @@ namespace upswing {
 /// What is minimised: Σ x' Q x + R u² over the control steps, x = [q1 - π, q2, w1, w2] (rad,
 /// rad/s), u the torque (N·m), Q diagonal.
 struct LqrConfig {
-  double q1, q2;  // of Q, 1/rad²
-  double w1, w2;  // of Q, s²/rad²
-  double torque;  // R, 1/(N·m)²
+  double q1 = 10, q2 = 10;  // of Q, 1/rad²
+  double w1 = 1, w2 = 1;    // of Q, s²/rad²
+  double torque = 1;        // R, 1/(N·m)²
 
-  LqrConfig() { SetDefaults(*this); }
-  /// One line per setting: name, default, range, unit, help.
+  /// One line per setting: name, range, unit, help.
   void Describe(Options& options);
 
   Eigen::Matrix4d Q() const { return Eigen::Vector4d(q1, q2, w1, w2).asDiagonal(); }

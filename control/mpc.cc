@@ -17,10 +17,8 @@ constexpr double kTolerance = 1e-6;  // of the cost, in an iteration
 
 void MpcConfig::Describe(Options& o) {
   o.Section("mpc");
-  o.Add(&seconds, "mpc_seconds", 2.5, {0.1, 10}, "s", "how far ahead it plans").step =
-      kControlPeriod;
-  o.Add(&iterations, "mpc_iterations", 2, {1, 1000}, "",
-        "improvements of the plan at each decision");
+  o.Add(&seconds, "mpc_seconds", {0.1, 10}, "s", "how far ahead it plans").step = kControlPeriod;
+  o.Add(&iterations, "mpc_iterations", {1, 1000}, "", "improvements of the plan at each decision");
 }
 
 /// The plans of some environments, and what improves one after the other.

@@ -11,11 +11,10 @@ namespace upswing {
 /// Settings of the predictive controller. The cost is that of the regulator, over the horizon, and
 /// its x' P x at the end.
 struct MpcConfig {
-  double seconds;      // horizon
-  int64_t iterations;  // of trajectory optimisation at each decision
+  double seconds = 2.5;    // horizon
+  int64_t iterations = 2;  // of trajectory optimisation at each decision
 
-  MpcConfig() { SetDefaults(*this); }
-  /// One line per setting: name, default, range, unit, help.
+  /// One line per setting: name, range, unit, help.
   void Describe(Options& options);
 };
 

@@ -13,17 +13,16 @@ namespace upswing {
 
 /// Weights of the energy law.
 struct EnergyShapingConfig {
-  double kE, kD, kP;  // of energy (1/(J²·s)), velocity (s) and angle of link 1 (1/s)
+  double kE = 0.0018, kD = 0.00067,
+         kP = 0.27;  // of energy (1/(J²·s)), velocity (s) and angle of link 1 (1/s)
 
-  EnergyShapingConfig() { SetDefaults(*this); }
   void Describe(Options& options);
 };
 
 /// Gains of partial feedback linearisation.
 struct PartialFeedbackConfig {
-  double kP, kD, kE;  // 1/s², 1/s, 1/(J·s)
+  double kP = 4, kD = 7, kE = 3;  // 1/s², 1/s, 1/(J·s)
 
-  PartialFeedbackConfig() { SetDefaults(*this); }
   void Describe(Options& options);
 };
 

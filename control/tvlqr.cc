@@ -25,9 +25,9 @@ constexpr double kCheaper = 0.25;
 
 void SwingUpConfig::Describe(Options& o) {
   o.Section("tvlqr");
-  o.Add(&seconds, "tvlqr_seconds", 4, {0.2, 30}, "s", "length of the planned swing-up").step =
+  o.Add(&seconds, "tvlqr_seconds", {0.2, 30}, "s", "length of the planned swing-up").step =
       kControlPeriod;
-  o.Add(&reserve, "tvlqr_reserve", 0.2, {0, 0.9}, "",
+  o.Add(&reserve, "tvlqr_reserve", {0, 0.9}, "",
         "share of the motor's torque that the plan leaves to the feedback");
 }
 

@@ -13,11 +13,10 @@ namespace upswing {
 /// How the swing-up is planned. The cost is that of the regulator, over the plan's time, and its
 /// x' P x at the end.
 struct SwingUpConfig {
-  double seconds;  // length of the plan
-  double reserve;  // share of the motor's torque that the plan leaves to the feedback
+  double seconds = 4;    // length of the plan
+  double reserve = 0.2;  // share of the motor's torque that the plan leaves to the feedback
 
-  SwingUpConfig() { SetDefaults(*this); }
-  /// One line per setting: name, default, range, unit, help.
+  /// One line per setting: name, range, unit, help.
   void Describe(Options& options);
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <stdexcept>
 
 #include "core/error.h"
 #include "core/text.h"
@@ -157,6 +158,7 @@ std::string Option::expected() const {
 }
 
 void Option::Set(std::string_view text, const std::string& where) const {
+  if (read_only) throw std::logic_error(Concat(name, ": set in a const struct"));
   const bool valid =
       std::visit(Overloaded{
                      [&](bool* value) {
@@ -202,43 +204,37 @@ void Option::Set(std::string_view text, const std::string& where) const {
 
 Option& Options::AddOption(Option::Target target, std::string_view name, Range range,
                            std::string_view unit, std::string_view help) {
-  return options_.emplace_back(Option{section_, std::string(name), target, range, std::string(unit),
-                                      std::string(help), true});
+  return options_.emplace_back(
+      Option{section_, std::string(name), target, range, std::string(unit), std::string(help)});
 }
 
-Option& Options::Add(bool* target, std::string_view name, bool value, std::string_view help) {
-  *target = value;
+Option& Options::Add(bool* target, std::string_view name, std::string_view help) {
   return AddOption(target, name, {}, "", help);
 }
 
-Option& Options::Add(int64_t* target, std::string_view name, int64_t value, Range range,
-                     std::string_view unit, std::string_view help) {
-  *target = value;
-  return AddOption(target, name, range, unit, help);
-}
-
-Option& Options::Add(double* target, std::string_view name, double value, Range range,
-                     std::string_view unit, std::string_view help) {
-  *target = value;
-  return AddOption(target, name, range, unit, help);
-}
-
-Option& Options::Add(std::string* target, std::string_view name, std::string_view value,
+Option& Options::Add(int64_t* target, std::string_view name, Range range, std::string_view unit,
                      std::string_view help) {
-  *target = value;
+  return AddOption(target, name, range, unit, help);
+}
+
+Option& Options::Add(double* target, std::string_view name, Range range, std::string_view unit,
+                     std::string_view help) {
+  return AddOption(target, name, range, unit, help);
+}
+
+Option& Options::Add(std::string* target, std::string_view name, std::string_view help) {
   return AddOption(target, name, {}, "", help);
 }
 
 Option& Options::AddChoice(std::string* target, std::string_view name,
                            std::vector<std::string> choices, std::string_view help) {
-  Option& option = Add(target, name, choices.front(), help);
+  Option& option = Add(target, name, help);
   option.choices = std::move(choices);
   return option;
 }
 
-Option& Options::Add(std::vector<int64_t>* target, std::string_view name,
-                     std::vector<int64_t> value, Range range, std::string_view help) {
-  *target = std::move(value);
+Option& Options::Add(std::vector<int64_t>* target, std::string_view name, Range range,
+                     std::string_view help) {
   return AddOption(target, name, range, "", help);
 }
 
@@ -310,6 +306,19 @@ std::string Options::Toml(bool comments, const std::function<bool(const Option&)
     toml += '\n';
   }
   return toml;
+}
+
+std::vector<Difference> Differences(const Options& now, const Options& before) {
+  std::vector<Difference> differences;
+  for (const Option& option : now.all()) {
+    const Option* other = before.Get(option.name);
+    if (other == nullptr) {
+      differences.push_back({option, std::nullopt});
+    } else if (other->text() != option.text()) {
+      differences.push_back({option, *other});
+    }
+  }
+  return differences;
 }
 
 }  // namespace upswing

@@ -4,8 +4,10 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <variant>
 #include <vector>
 
@@ -25,6 +27,13 @@ std::string FlagOf(std::string name);
 
 /// One setting, with all that flags, configuration files, help and validation need.
 struct Option {
+  /// What another value of the setting makes of a run.
+  enum class Decides {
+    kTraining,  // another training
+    kSeed,      // the same training with other random numbers
+    kEnd,       // the same run, longer or shorter
+    kNothing,   // the same run
+  };
   using Target = std::variant<bool*, int64_t*, double*, std::string*, std::vector<int64_t>*>;
 
   std::string section;  // TOML table
@@ -33,15 +42,20 @@ struct Option {
   Range range;          // numbers only
   std::string unit;     // such as "s"; may be empty
   std::string help;
-  bool identity;                          // whether runs that differ in it are different runs
+  Decides decides = Decides::kTraining;
   std::vector<std::string> choices = {};  // texts only: allowed values; empty: any
   double step = 0;                        // numbers only: must be a multiple of it; 0: any number
   // Whether a file that lacks it was made with the default, as all were before there was a choice.
   bool implied = false;
+  bool read_only = false;  // of a const struct
   std::string usual = {};  // describes the default instead of the value; may be empty
 
+  /// Whether runs that differ in it are different runs.
+  bool identity() const { return decides == Decides::kTraining || decides == Decides::kSeed; }
   /// Such as `--eval-every`.
   std::string flag() const;
+  /// The value of a setting whose target is a double.
+  double number() const { return *std::get<double*>(target); }
   /// The value as TOML writes it.
   std::string text() const;
   /// The value as a command line takes it, such as `64,64`.
@@ -60,29 +74,33 @@ struct Option {
 };
 
 /// The settings of one or more components, in the order in which they were added. Every component
-/// has a `void Describe(Options&)`; each of its lines names target, section, key, default, range,
-/// unit and help of one setting, and gives the target its default.
+/// has a `void Describe(Options&)`; each of its lines names target, key, range, unit and help of
+/// one setting and changes nothing. A setting's default is the initialiser of its member.
 class Options {
  public:
   /// Names the section that the following settings belong to.
   void Section(std::string_view section) { section_ = section; }
 
-  Option& Add(bool* target, std::string_view name, bool value, std::string_view help);
-  Option& Add(int64_t* target, std::string_view name, int64_t value, Range range,
-              std::string_view unit, std::string_view help);
-  Option& Add(double* target, std::string_view name, double value, Range range,
-              std::string_view unit, std::string_view help);
-  Option& Add(std::string* target, std::string_view name, std::string_view value,
+  Option& Add(bool* target, std::string_view name, std::string_view help);
+  Option& Add(int64_t* target, std::string_view name, Range range, std::string_view unit,
               std::string_view help);
-  /// A text that is one of `choices`; the first is the default.
+  Option& Add(double* target, std::string_view name, Range range, std::string_view unit,
+              std::string_view help);
+  Option& Add(std::string* target, std::string_view name, std::string_view help);
+  /// A text that is one of `choices`.
   Option& AddChoice(std::string* target, std::string_view name, std::vector<std::string> choices,
                     std::string_view help);
-  Option& Add(std::vector<int64_t>* target, std::string_view name, std::vector<int64_t> value,
-              Range range, std::string_view help);
+  Option& Add(std::vector<int64_t>* target, std::string_view name, Range range,
+              std::string_view help);
 
   /// One name that sets several settings, such as `mass` for `mass1` and `mass2`. Without `help`
   /// the text is "both … and …".
   void Alias(std::string_view name, std::vector<std::string> members, std::string_view help = "");
+
+  /// Setting one of them is a mistake of the program from now on.
+  void MakeReadOnly() {
+    for (Option& option : options_) option.read_only = true;
+  }
 
   /// Adds those of `others` whose names are not among these.
   void AddMissing(const Options& others);
@@ -121,21 +139,22 @@ class Options {
   std::map<std::string, std::string, std::less<>> missing_;  // name → why there is none
 };
 
-/// Gives a configuration struct the defaults of its Describe.
-template <typename Config>
-void SetDefaults(Config& config) {
-  Options options;
-  config.Describe(options);
-}
-
-/// The settings of a struct, which keeps its values. They point into it.
+/// The settings of a struct. They point into it; those of a const struct can only be read.
 template <typename Config>
 Options OptionsOf(Config& config) {
   Options options;
-  const Config values = config;
-  config.Describe(options);
-  config = values;
+  const_cast<std::remove_const_t<Config>&>(config).Describe(options);
+  if (std::is_const_v<Config>) options.MakeReadOnly();
   return options;
 }
+
+/// A setting whose value differs between two structs.
+struct Difference {
+  Option now;
+  std::optional<Option> before;  // nothing where the other struct has no such setting
+};
+
+/// The settings of `now` that `before` lacks or has with another value, in the order of `now`.
+std::vector<Difference> Differences(const Options& now, const Options& before);
 
 }  // namespace upswing

@@ -11,24 +11,23 @@ namespace upswing {
 namespace {
 
 struct Sample {
-  bool fast;
-  int64_t count;
-  double rate;
-  std::string name;
-  std::vector<int64_t> widths;
-  double mass1, mass2;
+  bool fast = true;
+  int64_t count = 3;
+  double rate = 0.5;
+  std::string name = "x";
+  std::vector<int64_t> widths = {4, 5};
+  double mass1 = 1, mass2 = 2;
 
-  Sample() { SetDefaults(*this); }
   void Describe(Options& o) {
     o.Section("one");
-    o.Add(&fast, "fast", true, "be fast");
-    o.Add(&count, "count", 3, {1, 10}, "pieces", "how many");
-    o.Add(&rate, "the_rate", 0.5, kUnit, "", "share");
+    o.Add(&fast, "fast", "be fast");
+    o.Add(&count, "count", {1, 10}, "pieces", "how many");
+    o.Add(&rate, "the_rate", kUnit, "", "share");
     o.Section("two");
-    o.Add(&name, "name", "x", "a name");
-    o.Add(&widths, "widths", {4, 5}, {1, 100}, "layers");
-    o.Add(&mass1, "mass1", 1, kPositive, "kg", "mass");
-    o.Add(&mass2, "mass2", 2, kPositive, "kg", "mass");
+    o.Add(&name, "name", "a name");
+    o.Add(&widths, "widths", {1, 100}, "layers");
+    o.Add(&mass1, "mass1", kPositive, "kg", "mass");
+    o.Add(&mass2, "mass2", kPositive, "kg", "mass");
     o.Alias("mass", {"mass1", "mass2"});
   }
 };
@@ -49,12 +48,30 @@ class OptionsTest : public ::testing::Test {
   Options options_;
 };
 
-TEST_F(OptionsTest, DescribeGivesTheDefaults) {
-  EXPECT_TRUE(sample_.fast);
-  EXPECT_EQ(sample_.count, 3);
-  EXPECT_EQ(sample_.rate, 0.5);
-  EXPECT_EQ(sample_.name, "x");
-  EXPECT_EQ(sample_.widths, (std::vector<int64_t>{4, 5}));
+TEST_F(OptionsTest, DescribeChangesNothing) {
+  sample_.count = 7;
+  const Sample& to_read = sample_;
+  EXPECT_EQ(OptionsOf(to_read).Get("count")->text(), "7");
+  EXPECT_EQ(sample_.count, 7);
+}
+
+TEST_F(OptionsTest, DifferencesAreInTheOrderOfTheSettingsWithBothValues) {
+  const Sample defaults;
+  EXPECT_TRUE(Differences(options_, OptionsOf(defaults)).empty());
+  sample_.mass2 = 2.5;
+  sample_.widths = {4};
+  Options more = options_;
+  int64_t extra = 1;
+  more.Add(&extra, "extra", {0, 9}, "", "that the other lacks");
+  const std::vector<Difference> found = Differences(more, OptionsOf(defaults));
+  ASSERT_EQ(found.size(), 3);
+  EXPECT_EQ(found[0].now.name, "widths");
+  EXPECT_EQ(found[0].now.text(), "[4]");
+  EXPECT_EQ(found[0].before->text(), "[4, 5]");
+  EXPECT_EQ(found[1].now.number(), 2.5);
+  EXPECT_EQ(found[1].before->number(), 2);
+  EXPECT_EQ(found[2].now.name, "extra");
+  EXPECT_FALSE(found[2].before);
 }
 
 TEST_F(OptionsTest, SetsEveryType) {
@@ -94,11 +111,10 @@ TEST_F(OptionsTest, ARejectedValueLeavesNumbersAndListsAsTheyWere) {
   EXPECT_EQ(sample_.widths, (std::vector<int64_t>{4, 5}));
 }
 
-TEST(Choice, IsOneOfThoseGivenAndTheFirstUnlessSet) {
-  std::string color;
+TEST(Choice, IsOneOfThoseGiven) {
+  std::string color = "red";
   Options options;
   options.AddChoice(&color, "color", {"red", "green"}, "of the pen");
-  EXPECT_EQ(color, "red");
   options.Set("color", "green", "--color");
   EXPECT_EQ(color, "green");
   try {
@@ -115,7 +131,7 @@ TEST(Choice, IsOneOfThoseGivenAndTheFirstUnlessSet) {
 TEST(Step, LetsThroughMultiplesAndNamesTheNearestOnes) {
   double pause = 0;
   Options options;
-  options.Add(&pause, "pause", 0, {0, 1}, "s", "between two steps").step = 0.02;
+  options.Add(&pause, "pause", {0, 1}, "s", "between two steps").step = 0.02;
   for (int count = 0; count <= 50; ++count) {
     // As people write it, and as arithmetic rounds it.
     for (const double value :

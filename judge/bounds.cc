@@ -20,10 +20,9 @@ double SwingUpSeconds(const EvaluationEpisode& e, const EvaluationRule& rule) {
 }  // namespace
 
 void BoundsConfig::Describe(Options& o) {
-  o.Add(&episodes, "episodes", 100, {1, 100000}, "", "how many of those of eval");
-  o.Add(&torques, "torques", 9, {3, 101}, "", "size of the table of torques");
-  o.Add(&guesses, "guesses", 24, {1, 10000}, "",
-        "swing-ups from hanging that the search begins with");
+  o.Add(&episodes, "episodes", {1, 100000}, "", "how many of those of eval");
+  o.Add(&torques, "torques", {3, 101}, "", "size of the table of torques");
+  o.Add(&guesses, "guesses", {1, 10000}, "", "swing-ups from hanging that the search begins with");
 }
 
 void CheckComparable(const LoadedPolicy& loaded, const BoundsConfig& config) {

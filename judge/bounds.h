@@ -17,10 +17,9 @@ struct BestEpisodes {
 
 struct BoundsConfig {
   TrialArguments trial;  // the plant, the engine and the seed of the starts
-  int64_t episodes, torques, guesses;
+  int64_t episodes = 100, torques = 9, guesses = 24;
 
-  BoundsConfig() { SetDefaults(*this); }
-  /// Its numbers: name, default, range, help.
+  /// Its numbers: name, range, help.
   void Describe(Options& options);
 };
 

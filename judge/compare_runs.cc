@@ -98,13 +98,11 @@ std::vector<Setting> SettingsOf(Config config) {
   config.model.clear();  // a model is what is in its file, not where that lies: see below
   // Those of all algorithms in one order, so that any two runs can be compared.
   Config scratch;
-  const std::vector<Option> own = TrainingSettings(config);
-  const Options all = EverySetting(scratch);
+  const Options own = OptionsOf(config), all = EverySetting(scratch);
   for (const Option& every : all.all()) {
-    const auto found =
-        std::ranges::find_if(own, [&](const Option& option) { return option.name == every.name; });
+    const Option* found = own.Get(every.name);
     const std::string name = Concat(every.section, ".", every.name);
-    if (found == own.end()) {
+    if (found == nullptr || found->decides != Option::Decides::kTraining) {
       settings.emplace_back(name, "none");
       continue;
     }

@@ -199,13 +199,9 @@ std::string EvalJson(const EvalReport& report) {
   j["model"] = report.model ? report.model->Json() : kBuiltIn;
   j["unknown_plant"] = report.env.assumed_plant.has_value();
   if (report.known_plant) j["known_plant"] = NumMade(report);
-  Disturbance disturbance = report.env.disturbance(0);
-  Randomization randomization = report.env.randomization;
-  for (const Options& options : {OptionsOf(disturbance), OptionsOf(randomization)}) {
-    for (const Option& option : options.all()) {
-      j[option.section][option.name] = *std::get<double*>(option.target);
-    }
-  }
+  const TrialConditions conditions{report.env.disturbance(0), report.env.randomization};
+  const Options options = OptionsOf(conditions);
+  for (const Option& option : options.all()) j[option.section][option.name] = option.number();
   AddFigures(report.figures, report.spec, report.knows_values, j);
   return PrintableJson(j);
 }

@@ -65,17 +65,13 @@ bool OnAxis(const MapConfig& config, const Option& option) {
 
 /// What no axis sets and is not as in the training: `mass1 1.2 kg (training: 1), …`.
 std::string ChangesOf(const MapConfig& config, const Training& training) {
-  MapPoint now = config.point, before = training.point;
-  const Options options = OptionsOf(now), usual = OptionsOf(before);
   std::vector<std::string> texts;
-  for (size_t k = 0; k < options.all().size(); ++k) {
-    const Option& option = options.all()[k];
-    const double value = *std::get<double*>(option.target);
-    const double then = *std::get<double*>(usual.all()[k].target);
-    if (value == then || OnAxis(config, option)) continue;
-    texts.push_back(fmt::format("{} {:.4g} {}", option.name, value, option.unit));
+  for (const auto& [option, before] :
+       Differences(OptionsOf(config.point), OptionsOf(training.point))) {
+    if (OnAxis(config, option)) continue;
+    texts.push_back(fmt::format("{} {:.4g} {}", option.name, option.number(), option.unit));
     if (option.section == "start") continue;
-    texts.back() += fmt::format(" ({}: {:.4g})", training.word, then);
+    texts.back() += fmt::format(" ({}: {:.4g})", training.word, before->number());
   }
   if (config.assumed_plant) texts.emplace_back("the plant unknown to the policy");
   return Join(texts, ", ");
@@ -142,9 +138,9 @@ std::vector<MapCell> RunCells(const MapConfig& config, const Policy& policy,
 }  // namespace
 
 void MapArguments::Describe(Options& o) {
-  o.Add(&episodes, "episodes", 0, {1, 100000}, "", "in a cell").usual =
+  o.Add(&episodes, "episodes", {1, 100000}, "", "in a cell").usual =
       "10, or 1 where the start is given";
-  o.Add(&check, "check", 0.02, kUnit, "", "share of the cells to repeat in MuJoCo");
+  o.Add(&check, "check", kUnit, "", "share of the cells to repeat in MuJoCo");
 }
 
 MapResult PlanMap(const MapArguments& a, const LoadedPolicy& loaded) {

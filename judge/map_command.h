@@ -14,14 +14,14 @@ namespace upswing {
 
 /// How a map of a policy is asked for: its axes, and what is on neither of them.
 struct MapArguments {
-  std::string x = "mass2=-50%:+50%", y = "length2=-50%:+50%", physics, out;
+  std::string x = "mass2=-50%:+50%", y = "length2=-50%:+50%", physics = "closed-form", out;
   std::vector<std::string> set;
   int64_t episodes = 0;  // in a cell; 0: as many as are usual
   int64_t seed = 0;
-  double check = 0;  // share of the cells to repeat in MuJoCo
+  double check = 0.02;  // share of the cells to repeat in MuJoCo
   bool unknown_plant = false;
 
-  /// The numbers among them: name, default, range, unit, help.
+  /// The numbers among them: name, range, unit, help.
   void Describe(Options& options);
 };
 

@@ -140,10 +140,10 @@ void MapPoint::Describe(Options& o) {
   plant.Describe(o);
   disturbance.Describe(o);
   o.Section("start");
-  o.Add(&q1, "q1", 0, {-360, 360}, "°", "angle of the first link, 0 hanging");
-  o.Add(&q2, "q2", 0, {-360, 360}, "°", "angle of the second link to the first");
-  o.Add(&w1, "w1", 0, {-50, 50}, "rad/s", "velocity of q1");
-  o.Add(&w2, "w2", 0, {-50, 50}, "rad/s", "velocity of q2");
+  o.Add(&q1, "q1", {-360, 360}, "°", "angle of the first link, 0 hanging");
+  o.Add(&q2, "q2", {-360, 360}, "°", "angle of the second link to the first");
+  o.Add(&w1, "w1", {-50, 50}, "rad/s", "velocity of q1");
+  o.Add(&w2, "w2", {-50, 50}, "rad/s", "velocity of q2");
 }
 
 PendulumState MapPoint::start() const {

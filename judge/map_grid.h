@@ -18,10 +18,9 @@ namespace upswing {
 struct MapPoint {
   Plant plant;
   Disturbance disturbance;
-  double q1, q2;  // degrees
-  double w1, w2;  // rad/s
+  double q1 = 0, q2 = 0;  // degrees
+  double w1 = 0, w2 = 0;  // rad/s
 
-  MapPoint() { SetDefaults(*this); }
   void Describe(Options& options);
   PendulumState start() const;
 };

@@ -87,30 +87,20 @@ std::unique_ptr<VectorEnv> OneEpisode(EnvConfig config, int index) {
 
 std::string ChangesText(const EnvConfig& env) {
   if (env.task != kDoublePendulum) return "";
-  TrialConditions conditions, defaults;
-  conditions.disturbance = env.disturbance(0);
-  conditions.randomization = env.randomization;
-  const Options options = OptionsOf(conditions), usual = OptionsOf(defaults);
+  const TrialConditions now{env.disturbance(0), env.randomization}, usual;
   std::vector<std::string> texts;
-  for (size_t k = 0; k < options.all().size(); ++k) {
-    const Option& option = options.all()[k];
-    if (option.text() == usual.all()[k].text()) continue;
+  for (const auto& [option, before] : Differences(OptionsOf(now), OptionsOf(usual))) {
     texts.push_back(Concat(option.name, " ", option.text()));
   }
   if (env.assumed_plant) texts.emplace_back("the plant unknown to the policy");
   return Join(texts, ", ");
 }
 
-std::string PlantChangesText(Plant plant, const LoadedPolicy& loaded) {
-  Plant made_for = loaded.plant;
-  const Options now = OptionsOf(plant), before = OptionsOf(made_for);
+std::string PlantChangesText(const Plant& plant, const LoadedPolicy& loaded) {
   std::vector<std::string> texts;
-  for (size_t k = 0; k < now.all().size(); ++k) {
-    const double value = *std::get<double*>(now.all()[k].target);
-    const double usual = *std::get<double*>(before.all()[k].target);
-    if (value == usual) continue;
-    texts.push_back(fmt::format("{} {:.4g} {} ({}: {:.4g})", now.all()[k].name, value,
-                                now.all()[k].unit, loaded.origin(), usual));
+  for (const auto& [now, before] : Differences(OptionsOf(plant), OptionsOf(loaded.plant))) {
+    texts.push_back(fmt::format("{} {:.4g} {} ({}: {:.4g})", now.name, now.number(), now.unit,
+                                loaded.origin(), before->number()));
   }
   return Join(texts, ", ");
 }

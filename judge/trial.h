@@ -17,10 +17,10 @@ namespace upswing {
 
 /// How a trial differs from the training.
 struct TrialArguments {
-  std::string model, physics;
+  std::string model, physics = "mujoco";
   std::vector<std::string> set;
   std::vector<FlagValue> flags;  // of the disturbance and of what is random
-  int64_t seed;
+  int64_t seed = 0;
   bool unknown_plant = false;
   bool known_plant = false;  // a controller is made anew for each episode's plant; eval alone
 };
@@ -52,7 +52,7 @@ std::string ChangesText(const EnvConfig& env);
 
 /// How a plant differs from what a policy was made for: `mass2 1.3 kg (training: 1), …`; empty: not
 /// at all.
-std::string PlantChangesText(Plant plant, const LoadedPolicy& loaded);
+std::string PlantChangesText(const Plant& plant, const LoadedPolicy& loaded);
 
 /// The folder that figures of a policy go to: `out` or, where that is empty, this name in its run's
 /// folder, runs/NAME-FILE for a policy file elsewhere, runs/NAME-CONTROLLER for a controller; with
@@ -64,7 +64,7 @@ std::filesystem::path FigureFolder(const std::string& out, const LoadedPolicy& l
 /// Which episode `simulate` and `plot` make: episode K of `eval`, or one from a given start.
 struct EpisodeArguments {
   std::optional<std::string> start;
-  int64_t number;  // K; negative: none
+  int64_t number = -1;  // K; negative: none
 
   /// Whether it is an episode of `eval`.
   bool given() const { return number >= 0; }

@@ -23,10 +23,10 @@ PendulumEnvConfig FourKinds() {
 }
 
 TEST(Disturbance, DelaysAreWholeControlPeriods) {
-  EXPECT_EQ(Disturbance(0, 0).delay_steps(), 0);
-  EXPECT_EQ(Disturbance(0, 0.02).delay_steps(), 1);
-  EXPECT_EQ(Disturbance(0, 0.06).delay_steps(), 3);
-  EXPECT_EQ(Disturbance(0, 1).delay_steps(), 50);
+  EXPECT_EQ((Disturbance{0, 0}).delay_steps(), 0);
+  EXPECT_EQ((Disturbance{0, 0.02}).delay_steps(), 1);
+  EXPECT_EQ((Disturbance{0, 0.06}).delay_steps(), 3);
+  EXPECT_EQ((Disturbance{0, 1}).delay_steps(), 50);
 }
 
 TEST(Disturbance, SettingsAreChecked) {

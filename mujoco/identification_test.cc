@@ -76,7 +76,7 @@ TEST_P(IdentifyingEnvs, FindThePlantOfEachEpisode) {
 
 TEST_P(IdentifyingEnvs, NoiseMakesItLessExact) {
   PendulumEnvConfig config = Box();
-  config.disturbances = {Disturbance(0.01, 0)};
+  config.disturbances = {Disturbance{0.01, 0}};
   PendulumEnv env(config);
   Excite(env, 4);
   const Errors errors = DeltaErrors(env);
@@ -128,7 +128,7 @@ TEST_P(IdentifyingEnvs, MirroringKeepsWhatIsKnown) {
 TEST_P(IdentifyingEnvs, LoadedStateContinuesWithTheSameBits) {
   PendulumEnvConfig config = Config();
   config.memory = 2;
-  config.disturbances = {Disturbance(0.01, 0.04)};
+  config.disturbances = {Disturbance{0.01, 0.04}};
   ExpectLoadedGoesOn(config, 7);
 }
 

@@ -69,7 +69,7 @@ TEST_P(RememberingEnvs, ObservationsEndWithTorquesAndChangesOfVelocities) {
 
 TEST_P(RememberingEnvs, WithADelayTheMemoryHasTheWaitingTorques) {
   PendulumEnvConfig config = Config(2);
-  config.disturbances = {Disturbance(0, 0.04)};
+  config.disturbances = {Disturbance{0, 0.04}};
   PendulumEnv env(config);
   StepResult result = env.MakeResult();
   for (const double torque : {1.0, 2.0, 3.0}) env.Step(std::vector<double>(3, torque), result);

@@ -51,7 +51,7 @@ ModelPtr CompileGiven(const std::string& mjcf, const std::string& where) {
 void CheckRanges(Plant plant, const std::string& where) {
   const Options options = OptionsOf(plant);
   for (const Option& option : options.all()) {
-    option.Set(FormatNumber(*std::get<double*>(option.target)), Concat(where, ": ", option.name));
+    option.Set(FormatNumber(option.number()), Concat(where, ": ", option.name));
   }
 }
 

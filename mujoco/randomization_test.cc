@@ -96,7 +96,7 @@ TEST(Randomization, DisturbancesGoFromTheNominalUpwards) {
   std::array<int, 6> delays{};
   double sum = 0;
   for (int n = 0; n < kCount; ++n) {
-    const Disturbance drawn = box.Draw(Disturbance(0.2, 0.04), rng);
+    const Disturbance drawn = box.Draw(Disturbance{0.2, 0.04}, rng);
     ASSERT_GE(drawn.sensor_noise, 0.2);
     ASSERT_LE(drawn.sensor_noise, 0.3);
     sum += drawn.sensor_noise;
@@ -213,7 +213,7 @@ TEST_P(RandomizedEnvs, ARestartWithoutASeedIsAnotherEpisodeOfItsOwn) {
 TEST_P(RandomizedEnvs, AStepLeavesWhatIsHeldAsItIs) {
   PendulumEnvConfig config = Config(3);
   config.memory = 2;
-  config.disturbances = {Disturbance(0, 0.02)};
+  config.disturbances = {Disturbance{0, 0.02}};
   PendulumEnv env(config), reference(config);
   StepResult result = env.MakeResult(), expected = reference.MakeResult();
   const std::vector<double> torque{1, -2, 3};

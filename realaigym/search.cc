@@ -123,20 +123,20 @@ void BoardSearchConfig::Describe(Options& o) {
   o.Section("search");
   o.AddChoice(&robot, "robot", {NameOf(Robot::kPendubot), NameOf(Robot::kAcrobot)},
               "which joint has the motor");
-  o.Add(&seed, "seed", 1, {0, 1e15}, "", "of the search's random numbers");
-  o.Add(&hidden, "hidden", 16, {4, 32}, "", "units in each of the network's two layers");
-  o.Add(&starts, "starts", 12, {1, 1000}, "", "random networks to begin with; the best goes on");
-  o.Add(&alone, "alone", 250, {1, 1e5}, "", "generations of each, on the nominal plant alone");
-  o.Add(&generations, "generations", 1200, {0, 1e6}, "", "generations after that");
-  o.Add(&first_population, "first_population", 64, {4, 1e4}, "",
+  o.Add(&seed, "seed", {0, 1e15}, "", "of the search's random numbers");
+  o.Add(&hidden, "hidden", {4, 32}, "", "units in each of the network's two layers");
+  o.Add(&starts, "starts", {1, 1000}, "", "random networks to begin with; the best goes on");
+  o.Add(&alone, "alone", {1, 1e5}, "", "generations of each, on the nominal plant alone");
+  o.Add(&generations, "generations", {0, 1e6}, "", "generations after that");
+  o.Add(&first_population, "first_population", {4, 1e4}, "",
         "candidates of a generation on the nominal plant");
-  o.Add(&population, "population", 64, {4, 1e4}, "", "candidates of a generation after that");
-  o.Add(&deviation, "deviation", 0.12, {1e-6, 10}, "", "of the network's numbers at first");
-  o.Add(&restart, "restart", 0.05, {1e-6, 10}, "", "deviation with which the second part begins");
-  o.Add(&mean_rate, "mean_rate", 2, {1e-6, 100}, "", "rate at which the mean follows the gradient");
-  o.Add(&performance_weight, "performance_weight", 3, {1e-6, 1e6}, "",
+  o.Add(&population, "population", {4, 1e4}, "", "candidates of a generation after that");
+  o.Add(&deviation, "deviation", {1e-6, 10}, "", "of the network's numbers at first");
+  o.Add(&restart, "restart", {1e-6, 10}, "", "deviation with which the second part begins");
+  o.Add(&mean_rate, "mean_rate", {1e-6, 100}, "", "rate at which the mean follows the gradient");
+  o.Add(&performance_weight, "performance_weight", {1e-6, 1e6}, "",
         "weight of the performance score as the second part begins");
-  o.Add(&last_weight, "last_weight", 10, {1e-6, 1e6}, "", "and as it ends");
+  o.Add(&last_weight, "last_weight", {1e-6, 1e6}, "", "and as it ends");
 }
 
 BoardSearch::BoardSearch(const BoardSearchConfig& config)

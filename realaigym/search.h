@@ -35,12 +35,12 @@ class Snes {
 
 /// How a policy for the boards is searched.
 struct BoardSearchConfig {
-  std::string robot;
-  int64_t seed, hidden, starts, alone, generations, population, first_population;
-  double deviation, restart, mean_rate, performance_weight, last_weight;
+  std::string robot = NameOf(Robot::kPendubot);
+  int64_t seed = 1, hidden = 16, starts = 12, alone = 250, generations = 1200, population = 64,
+          first_population = 64;
+  double deviation = 0.12, restart = 0.05, mean_rate = 2, performance_weight = 3, last_weight = 10;
 
-  BoardSearchConfig() { SetDefaults(*this); }
-  /// One line per setting: name, default, range, unit, help.
+  /// One line per setting: name, range, unit, help.
   void Describe(Options& options);
 };
 

@@ -4,26 +4,25 @@ namespace upswing {
 
 void DqnConfig::Describe(Options& o) {
   o.Section("network");
-  o.Add(&hidden, "hidden", {256, 256}, {1, 4096}, "widths of the feature layers");
-  o.Add(&head, "head", 128, {1, 4096}, "", "width of each dueling stream's hidden layer");
-  o.Add(&layer_norm, "layer_norm", true, "layer normalisation after each feature layer");
+  o.Add(&hidden, "hidden", {1, 4096}, "widths of the feature layers");
+  o.Add(&head, "head", {1, 4096}, "", "width of each dueling stream's hidden layer");
+  o.Add(&layer_norm, "layer_norm", "layer normalisation after each feature layer");
 
   o.Section("agent");
-  o.Add(&double_q, "double", true, "Double DQN: choose online, evaluate with the target");
-  o.Add(&dueling, "dueling", true, "Dueling: Q = V + A - mean(A)");
-  o.Add(&levels, "levels", 9, {2, 1001}, "torques", "that the agent chooses from, evenly spaced")
+  o.Add(&double_q, "double", "Double DQN: choose online, evaluate with the target");
+  o.Add(&dueling, "dueling", "Dueling: Q = V + A - mean(A)");
+  o.Add(&levels, "levels", {2, 1001}, "torques", "that the agent chooses from, evenly spaced")
       .implied = true;
   OffPolicyConfig::Describe(o);
-  o.Add(&tau, "tau", 0.02, kUnit, "", "Polyak averaging of the target, per update");
-  o.Add(&target_period, "target_period", 0, {0, 1e9}, "updates",
+  o.Add(&tau, "tau", kUnit, "", "Polyak averaging of the target, per update");
+  o.Add(&target_period, "target_period", {0, 1e9}, "updates",
         "copy the target every so many instead; 0: Polyak averaging");
-  o.Add(&policy_tau, "policy_tau", 0.01, {1e-9, 1}, "",
+  o.Add(&policy_tau, "policy_tau", {1e-9, 1}, "",
         "Polyak averaging of the policy that is judged and kept, per update, which falls with the "
         "learning rate; 1: as learned last");
-  o.Add(&epsilon_start, "epsilon_start", 1.0, kUnit, "",
-        "share of random actions at the beginning");
-  o.Add(&epsilon_end, "epsilon_end", 0.05, kUnit, "", "what epsilon falls to");
-  o.Add(&epsilon_decay, "epsilon_decay", 0.97, kUnit, "", "factor per episode");
+  o.Add(&epsilon_start, "epsilon_start", kUnit, "", "share of random actions at the beginning");
+  o.Add(&epsilon_end, "epsilon_end", kUnit, "", "what epsilon falls to");
+  o.Add(&epsilon_decay, "epsilon_decay", kUnit, "", "factor per episode");
 }
 
 QNetworkShape DqnConfig::Shape(int obs_size, int actions) const {

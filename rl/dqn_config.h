@@ -11,17 +11,16 @@ namespace upswing {
 
 /// Settings of the agent.
 struct DqnConfig : OffPolicyConfig {
-  std::vector<int64_t> hidden;
-  int64_t head;
-  bool layer_norm, double_q, dueling;
-  int64_t levels;
-  double tau;
-  int64_t target_period;
-  double policy_tau;
-  double epsilon_start, epsilon_end, epsilon_decay;
+  std::vector<int64_t> hidden = {256, 256};
+  int64_t head = 128;
+  bool layer_norm = true, double_q = true, dueling = true;
+  int64_t levels = 9;
+  double tau = 0.02;
+  int64_t target_period = 0;
+  double policy_tau = 0.01;
+  double epsilon_start = 1.0, epsilon_end = 0.05, epsilon_decay = 0.97;
 
-  DqnConfig() { SetDefaults(*this); }
-  /// One line per setting: name, default, range, unit, help.
+  /// One line per setting: name, range, unit, help.
   void Describe(Options& options);
 
   /// The shape of the network, for observations of `obs_size` numbers and so many actions.

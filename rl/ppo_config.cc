@@ -7,46 +7,44 @@ namespace upswing {
 
 void PpoConfig::Describe(Options& o) {
   o.Section("network");
-  o.Add(&hidden, "hidden", {64, 64}, {1, 4096}, "widths of the hidden layers of actor and critic");
+  o.Add(&hidden, "hidden", {1, 4096}, "widths of the hidden layers of actor and critic");
   o.AddChoice(&activation, "activation", {"tanh", "relu"}, "of the hidden units");
-  o.Add(&layer_norm, "layer_norm", false, "layer normalisation in each hidden layer");
+  o.Add(&layer_norm, "layer_norm", "layer normalisation in each hidden layer");
 
   o.Section("agent");
   o.AddChoice(&actions, "actions", {"continuous", "levels"},
               "continuous: torques drawn from a normal distribution; levels: from a few torques");
-  o.Add(&levels, "levels", 9, {2, 1001}, "torques", "how many actions = levels has, evenly spaced");
-  o.Add(&gamma, "gamma", 0.99, kUnit, "", "discount per control step");
-  o.Add(&lambda, "lambda", 0.95, kUnit, "", "decay of generalised advantages");
-  o.Add(&reward_scale, "reward_scale", 0.1, kPositive, "",
-        "the agent learns from reward times this");
-  o.Add(&horizon, "horizon", 32, {1, 1000000}, "steps",
+  o.Add(&levels, "levels", {2, 1001}, "torques", "how many actions = levels has, evenly spaced");
+  o.Add(&gamma, "gamma", kUnit, "", "discount per control step");
+  o.Add(&lambda, "lambda", kUnit, "", "decay of generalised advantages");
+  o.Add(&reward_scale, "reward_scale", kPositive, "", "the agent learns from reward times this");
+  o.Add(&horizon, "horizon", {1, 1000000}, "steps",
         "length of a rollout: what each environment does between updates");
-  o.Add(&epochs, "epochs", 4, {1, 1000}, "", "passes over a rollout");
-  o.Add(&batch, "batch", 256, {1, 1000000}, "steps",
+  o.Add(&epochs, "epochs", {1, 1000}, "", "passes over a rollout");
+  o.Add(&batch, "batch", {1, 1000000}, "steps",
         "in a minibatch; divides horizon times environments");
-  o.Add(&clip, "clip", 0.2, {1e-6, 1}, "",
+  o.Add(&clip, "clip", {1e-6, 1}, "",
         "the ratio of new to old probability is clipped to 1 by this");
-  o.Add(&value_clip, "value_clip", 0, kNotNegative, "",
+  o.Add(&value_clip, "value_clip", kNotNegative, "",
         "values are clipped to what they were by this; 0: not clipped");
-  o.Add(&entropy_bonus, "entropy_bonus", 0, {0, 10}, "",
+  o.Add(&entropy_bonus, "entropy_bonus", {0, 10}, "",
         "weight of the policy's entropy at the beginning");
-  o.Add(&entropy_bonus_end, "entropy_bonus_end", 0, {0, 10}, "",
+  o.Add(&entropy_bonus_end, "entropy_bonus_end", {0, 10}, "",
         "the same at the end of learning_rate_steps");
-  o.Add(&max_std, "max_std", 5, {0.01, 7}, "",
+  o.Add(&max_std, "max_std", {0.01, 7}, "",
         "largest standard deviation of continuous actions, in units of the limit");
-  o.Add(&initial_std, "initial_std", 1, {0.01, 5}, "",
+  o.Add(&initial_std, "initial_std", {0.01, 5}, "",
         "standard deviation of continuous actions at the beginning, in units of the limit");
-  o.Add(&normalize, "normalize", true,
+  o.Add(&normalize, "normalize",
         "normalise observations by their running mean and standard deviation");
-  o.Add(&mirror, "mirror", false, "mirror a random half of each minibatch");
-  o.Add(&learning_rate, "learning_rate", 1e-3, {0, 10}, "",
-        "learning rate of Adam at the beginning");
-  o.Add(&learning_rate_end, "learning_rate_end", 1e-4, {0, 10}, "", "learning rate at the end");
-  o.Add(&learning_rate_steps, "learning_rate_steps", 1000000, {1, 1e12}, "steps",
+  o.Add(&mirror, "mirror", "mirror a random half of each minibatch");
+  o.Add(&learning_rate, "learning_rate", {0, 10}, "", "learning rate of Adam at the beginning");
+  o.Add(&learning_rate_end, "learning_rate_end", {0, 10}, "", "learning rate at the end");
+  o.Add(&learning_rate_steps, "learning_rate_steps", {1, 1e12}, "steps",
         "over which the learning rate falls linearly");
-  o.Add(&kl_target, "kl_target", 0.01, {0, 10}, "nats",
+  o.Add(&kl_target, "kl_target", {0, 10}, "nats",
         "policy change of an update that the actor's learning rate is adapted to; 0: it is not");
-  o.Add(&max_gradient_norm, "max_gradient_norm", 0.5, kPositive, "",
+  o.Add(&max_gradient_norm, "max_gradient_norm", kPositive, "",
         "clip the global norm, of actor and critic each, to this");
 }
 

@@ -11,25 +11,24 @@ namespace upswing {
 
 /// Settings of proximal policy optimisation.
 struct PpoConfig {
-  std::vector<int64_t> hidden;
-  std::string activation;
-  bool layer_norm;
-  std::string actions;
-  int64_t levels;
-  double gamma, lambda;
-  double reward_scale;
-  int64_t horizon, epochs, batch;
-  double clip, value_clip;
-  double entropy_bonus, entropy_bonus_end;
-  double initial_std, max_std;
-  bool normalize, mirror;
-  double learning_rate, learning_rate_end;
-  int64_t learning_rate_steps;
-  double kl_target;
-  double max_gradient_norm;
+  std::vector<int64_t> hidden = {64, 64};
+  std::string activation = "tanh";
+  bool layer_norm = false;
+  std::string actions = "continuous";
+  int64_t levels = 9;
+  double gamma = 0.99, lambda = 0.95;
+  double reward_scale = 0.1;
+  int64_t horizon = 32, epochs = 4, batch = 256;
+  double clip = 0.2, value_clip = 0;
+  double entropy_bonus = 0, entropy_bonus_end = 0;
+  double initial_std = 1, max_std = 5;
+  bool normalize = true, mirror = false;
+  double learning_rate = 1e-3, learning_rate_end = 1e-4;
+  int64_t learning_rate_steps = 1000000;
+  double kl_target = 0.01;
+  double max_gradient_norm = 0.5;
 
-  PpoConfig() { SetDefaults(*this); }
-  /// One line per setting: name, default, range, unit, help.
+  /// One line per setting: name, range, unit, help.
   void Describe(Options& options);
 
   /// Whether actions are levels, not continuous.

@@ -129,29 +129,33 @@ void Trainer::State(const Archive& archive) {
                 Concat(state_.steps, ", the steps of the training"));
 }
 
+constexpr Range kCount{1, 1e12};
+
 void TrainConfig::Describe(Options& o) {
-  constexpr Range kCount{1, 1e12};
   o.Section("train");
-  o.Add(&seed, "seed", 1, {0, 9e15}, "", "seed of every random stream");
-  o.Add(&steps, "steps", 1000000, kCount, "steps", "train for at most this many in all").identity =
-      false;
-  o.Add(&envs, "envs", 32, {1, 4096}, "", "parallel environments");
-  o.Add(&stop_when_solved, "stop_when_solved", true,
-        "stop once two evaluations in a row are passed")
-      .identity = false;
-  o.Add(&eval_every, "eval_every", 10000, kCount, "steps", "from one evaluation to the next");
-  o.Add(&eval_episodes, "eval_episodes", 100, {1, 100000}, "", "episodes of an evaluation");
-  o.Add(&log_every, "log_every", 2000, kCount, "steps", "from one row of metrics.csv to the next");
-  o.Add(&checkpoint_every, "checkpoint_every", 50000, kCount, "steps",
-        "from one checkpoint to the next")
-      .identity = false;
-  o.Add(&threads, "threads", 0, {0, 256}, "",
-        "threads to use; 0: one for each processor, at most 8")
-      .identity = false;
-  o.Add(&start_noise, "start_noise", 0.1, {0, 10}, "rad, rad/s",
+  o.Add(&seed, "seed", {0, 9e15}, "", "seed of every random stream").decides =
+      Option::Decides::kSeed;
+  o.Add(&steps, "steps", kCount, "steps", "train for at most this many in all").decides =
+      Option::Decides::kEnd;
+  o.Add(&envs, "envs", {1, 4096}, "", "parallel environments");
+  o.Add(&stop_when_solved, "stop_when_solved", "stop once two evaluations in a row are passed")
+      .decides = Option::Decides::kEnd;
+  o.Add(&eval_every, "eval_every", kCount, "steps", "from one evaluation to the next");
+  o.Add(&eval_episodes, "eval_episodes", {1, 100000}, "", "episodes of an evaluation");
+  o.Add(&log_every, "log_every", kCount, "steps", "from one row of metrics.csv to the next");
+  o.Add(&checkpoint_every, "checkpoint_every", kCount, "steps", "from one checkpoint to the next")
+      .decides = Option::Decides::kNothing;
+  o.Add(&threads, "threads", {0, 256}, "", "threads to use; 0: one for each processor, at most 8")
+      .decides = Option::Decides::kNothing;
+  DescribeCurriculum(o);
+}
+
+void TrainConfig::DescribeCurriculum(Options& o) {
+  o.Section("train");
+  o.Add(&start_noise, "start_noise", {0, 10}, "rad, rad/s",
         "standard deviation of the start states around hanging");
-  o.Add(&start_noise_end, "start_noise_end", 0.1, {0, 10}, "rad, rad/s", "at the curriculum's end");
-  o.Add(&curriculum_steps, "curriculum_steps", 200000, kCount, "steps",
+  o.Add(&start_noise_end, "start_noise_end", {0, 10}, "rad, rad/s", "at the curriculum's end");
+  o.Add(&curriculum_steps, "curriculum_steps", kCount, "steps",
         "over which the noise changes linearly");
 }
 

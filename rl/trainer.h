@@ -15,16 +15,17 @@ namespace upswing {
 
 /// Settings of the training loop. "Steps" are control steps, counted over all environments.
 struct TrainConfig {
-  int64_t steps, envs, seed;
-  int64_t eval_every, eval_episodes, log_every, checkpoint_every;
-  bool stop_when_solved;
-  int64_t threads;
-  double start_noise, start_noise_end;
-  int64_t curriculum_steps;
+  int64_t steps = 1000000, envs = 32, seed = 1;
+  int64_t eval_every = 10000, eval_episodes = 100, log_every = 2000, checkpoint_every = 50000;
+  bool stop_when_solved = true;
+  int64_t threads = 0;
+  double start_noise = 0.1, start_noise_end = 0.1;
+  int64_t curriculum_steps = 200000;
 
-  TrainConfig() { SetDefaults(*this); }
-  /// One line per setting: name, default, range, unit, help.
+  /// One line per setting: name, range, unit, help.
   void Describe(Options& options);
+  /// Those of them that are of the curriculum.
+  void DescribeCurriculum(Options& options);
 
   /// The curriculum: noise of the start states, rising linearly over curriculum_steps.
   double StartNoise(int64_t step) const;

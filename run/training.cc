@@ -94,9 +94,9 @@ void Training::Load(const Tensors& checkpoint) {
   };
   expect("format", kCheckpointFormat);
   expect("upswing_version", UPSWING_VERSION);
-  Config old_config = ConfigIn(checkpoint.Metadata("config"), checkpoint.where());
-  ExpectSameSettings(OptionsOf(old_config), OptionsOf(config_), checkpoint.where(),
-                     [](const Option& option) { return option.identity; });
+  const Config old_config = ConfigIn(checkpoint.Metadata("config"), checkpoint.where());
+  ExpectSameSettings(old_config, config_, checkpoint.where(),
+                     [](const Option& option) { return option.identity(); });
   if (checkpoint.Metadata("model") != config_.mjcf) {
     throw BadInput(Concat(checkpoint.where(), ": made with another model than ", config_.model));
   }

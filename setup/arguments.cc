@@ -1,32 +1,25 @@
 #include "setup/arguments.h"
 
-#include <algorithm>
-#include <utility>
-#include <vector>
-
 #include "core/text.h"
 #include "mujoco/engines.h"
 
 namespace upswing {
 
 void DescribeSeed(Options& o, int64_t* seed, const std::string& what) {
-  o.Add(seed, "seed", 0, {0, 9e15}, "", Concat("of ", what));
+  o.Add(seed, "seed", {0, 9e15}, "", Concat("of ", what));
 }
 
 void DescribeThreads(Options& o, int64_t* threads) {
-  o.Add(threads, "threads", 0, {0, 256}, "", "0: one for each processor, at most 8");
+  o.Add(threads, "threads", {0, 256}, "", "0: one for each processor, at most 8");
 }
 
-void DescribePhysics(Options& o, std::string* physics, const std::string& usual) {
-  std::vector<std::string> engines = EngineNames();
-  std::stable_partition(engines.begin(), engines.end(),  // clang 14 cannot compile ranges::
-                        [&](const std::string& name) { return name == usual; });
-  o.AddChoice(physics, "physics", std::move(engines),
+void DescribePhysics(Options& o, std::string* physics) {
+  o.AddChoice(physics, "physics", EngineNames(),
               "engine; closed-form computes the same physics faster than mujoco");
 }
 
 void DescribeEvalEpisodes(Options& o, int64_t* episodes) {
-  o.Add(episodes, "episodes", 100, {1, 1000000}, "", "how many");
+  o.Add(episodes, "episodes", {1, 1000000}, "", "how many");
 }
 
 }  // namespace upswing

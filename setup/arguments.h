@@ -15,8 +15,8 @@ void DescribeSeed(Options& o, int64_t* seed, const std::string& what);
 /// "threads", which ResolveThreads reads.
 void DescribeThreads(Options& o, int64_t* threads);
 
-/// "physics", which FindEngine reads; `usual` is the default.
-void DescribePhysics(Options& o, std::string* physics, const std::string& usual);
+/// "physics", which FindEngine reads.
+void DescribePhysics(Options& o, std::string* physics);
 
 /// "episodes" of an evaluation.
 void DescribeEvalEpisodes(Options& o, int64_t* episodes);

@@ -21,25 +21,40 @@ const std::vector<std::string>& AlgorithmNames() {
 }
 
 void Config::Describe(Options& o) {
-  const std::string chosen = algorithm;
   o.Section("train");
-  o.Add(&agent, "agent", "d3qn", "named agent whose settings the others begin with");
+  o.Add(&agent, "agent", "named agent whose settings the others begin with");
   o.AddChoice(&algorithm, "algorithm", AlgorithmNames(),
               "what learns; each algorithm has settings of its own")
       .implied = true;
-  algorithm = chosen;
   train.Describe(o);
   o.Section("task");
   o.AddChoice(&task, "task", TaskNames(), "what is to be learned").implied = true;
-  o.Add(&episode_seconds, "episode_seconds", 4, {0.02, 1e6}, "s", "length of a training episode")
+  DescribeEnvironment(o);
+  if (algorithm == kSac) {
+    sac.Describe(o);
+  } else if (algorithm == kPpo) {
+    ppo.Describe(o);
+  } else {
+    dqn.Describe(o);
+  }
+}
+
+void Config::DescribePlantTask(Options& o) {
+  train.DescribeCurriculum(o);
+  DescribeEnvironment(o);
+}
+
+void Config::DescribeEnvironment(Options& o) {
+  o.Section("task");
+  o.Add(&episode_seconds, "episode_seconds", {0.02, 1e6}, "s", "length of a training episode")
       .step = kControlPeriod;
-  o.Add(&random_start_share, "random_start_share", 0.5, kUnit, "",
+  o.Add(&random_start_share, "random_start_share", kUnit, "",
         "share of the episodes that begin in a random state instead of hanging");
-  o.Add(&random_start_velocity, "random_start_velocity", 5, {0, 50}, "rad/s",
+  o.Add(&random_start_velocity, "random_start_velocity", {0, 50}, "rad/s",
         "largest velocity of these random states");
-  o.Add(&memory, "memory", 0, {0, kMostMemory}, "steps",
+  o.Add(&memory, "memory", {0, kMostMemory}, "steps",
         "past steps whose torque and change of velocities the agent sees too");
-  o.Add(&identify, "identify", false,
+  o.Add(&identify, "identify",
         "the agent sees what the motion tells of the plant: an estimate of its constants")
       .implied = true;
   o.AddChoice(&physics, "physics", EngineNames(),
@@ -49,18 +64,11 @@ void Config::Describe(Options& o) {
   o.AddChoice(&eval_physics, "eval_physics", judges,
               "engine of the evaluations; screened: in mujoco what succeeds in closed-form");
   o.Section("plant");
-  o.Add(&model, "model", "", "MJCF file to use instead of the built-in model");
+  o.Add(&model, "model", "MJCF file to use instead of the built-in model");
   plant.Describe(o);
   disturbance.Describe(o);
   randomization.Describe(o);
   reward.Describe(o);
-  if (algorithm == kSac) {
-    sac.Describe(o);
-  } else if (algorithm == kPpo) {
-    ppo.Describe(o);
-  } else {
-    dqn.Describe(o);
-  }
 }
 
 Options EverySetting(Config& scratch) {
@@ -98,15 +106,13 @@ std::unique_ptr<Agent> Config::MakeAgent(const EnvSpec& spec, ThreadPool& pool) 
   return std::make_unique<Dqn>(dqn, spec, seed, pool);
 }
 
-void ExpectSameSettings(const Options& before, const Options& now, const std::string& where,
+void ExpectSameSettings(const Config& before, const Config& now, const std::string& where,
                         const std::function<bool(const Option&)>& counts) {
-  for (const Option& new_one : now.all()) {
-    const Option* old_one = before.Get(new_one.name);
-    const std::string old_text = old_one == nullptr ? "none" : old_one->text();
-    if (counts(new_one) && old_text != new_one.text()) {
-      throw BadInput(Concat(where, ": made with ", new_one.section, ".", new_one.name, " = ",
-                            old_text, ", but the configuration says ", new_one.text()));
-    }
+  for (const auto& [option, old] : Differences(OptionsOf(now), OptionsOf(before))) {
+    if (!counts(option)) continue;
+    throw BadInput(Concat(where, ": made with ", option.section, ".", option.name, " = ",
+                          old ? old->text() : "none", ", but the configuration says ",
+                          option.text()));
   }
 }
 
@@ -121,22 +127,12 @@ void MakeReadyForMany(Config& config) {
 
 std::string CompleteToml(Config config) {
   if (!config.model.empty()) config.model = fs::absolute(config.model).string();
-  return ConfigToml(std::move(config), false);
+  return ConfigToml(config, false);
 }
 
-std::vector<Option> TrainingSettings(Config& config) {
-  std::vector<Option> settings;
-  const Options options = OptionsOf(config);
-  for (const Option& option : options.all()) {
-    const bool is_seed = option.target == Option::Target(&config.train.seed);
-    if (option.identity && !is_seed) settings.push_back(option);
-  }
-  return settings;
-}
-
-std::string ConfigToml(Config config, bool identity_only) {
+std::string ConfigToml(const Config& config, bool identity_only) {
   return OptionsOf(config).Toml(
-      !identity_only, [&](const Option& option) { return !identity_only || option.identity; });
+      !identity_only, [&](const Option& option) { return !identity_only || option.identity(); });
 }
 
 std::string PlantText(const Plant& plant) {

@@ -34,15 +34,16 @@ const std::vector<std::string>& AlgorithmNames();
 /// All settings of a training. Those of an agent exist for its algorithm alone: the same name may
 /// mean another number, with another default, in another algorithm.
 struct Config {
-  std::string agent;      // the named agent that the other settings began with
-  std::string algorithm;  // of AlgorithmNames
-  std::string model;      // path of an MJCF file instead of the built-in model; empty: built-in
+  std::string agent = "d3qn";  // the named agent that the other settings began with
+  std::string algorithm;       // of AlgorithmNames
+  std::string model;  // path of an MJCF file instead of the built-in model; empty: built-in
   TrainConfig train;
-  std::string task;  // see TaskNames
-  double episode_seconds, random_start_share, random_start_velocity;
-  int64_t memory;
-  bool identify;
-  std::string physics, eval_physics;  // engines, see FindEngine, of training and evaluation
+  std::string task = kDoublePendulum;  // see TaskNames
+  double episode_seconds = 4, random_start_share = 0.5, random_start_velocity = 5;
+  int64_t memory = 0;
+  bool identify = false;
+  std::string physics = "mujoco";       // engine of training, see FindEngine
+  std::string eval_physics{kScreened};  // engine of evaluations, or kScreened
   Plant plant;
   Disturbance disturbance;
   Randomization randomization;
@@ -55,11 +56,13 @@ struct Config {
 
   /// The defaults of an algorithm, by default the usual one.
   explicit Config(std::string_view algorithm_name = AlgorithmNames().front())
-      : algorithm(algorithm_name) {
-    SetDefaults(*this);
-  }
+      : algorithm(algorithm_name) {}
   /// Those of the algorithm.
   void Describe(Options& options);
+  /// Those that a task without a plant does not have.
+  void DescribePlantTask(Options& options);
+  /// Those of the double pendulum's environments.
+  void DescribeEnvironment(Options& options);
 
   /// Training environments as these settings have them.
   EnvConfig Environments() const;
@@ -116,15 +119,12 @@ void ApplyToml(const Options& options, std::string_view toml, const std::string&
 
 /// Throws BadInput that names the first of the settings for which `counts` is true that two
 /// configurations do not have in common. `where` is what was made with the one `before`.
-void ExpectSameSettings(const Options& before, const Options& now, const std::string& where,
+void ExpectSameSettings(const Config& before, const Config& now, const std::string& where,
                         const std::function<bool(const Option&)>& counts);
-
-/// The settings that distinguish trainings, without the seed; they point into `config`.
-std::vector<Option> TrainingSettings(Config& config);
 
 /// The settings as TOML; if `identity_only`, only those that change the training (not, for example,
 /// the number of threads).
-std::string ConfigToml(Config config, bool identity_only);
+std::string ConfigToml(const Config& config, bool identity_only);
 
 /// The same with comments, for a file that may lie anywhere: the model's path is absolute.
 std::string CompleteToml(Config config);

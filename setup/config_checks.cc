@@ -1,7 +1,6 @@
 #include "setup/config_checks.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "core/error.h"
@@ -158,15 +157,11 @@ void CheckBins(const SacConfig& s, const std::string& place) {
 /// has no such setting.
 void CheckTask(Config& config, const std::string& where) {
   if (config.task == kDoublePendulum) return;
-  constexpr std::array<std::string_view, 3> kCurriculum{"start_noise", "start_noise_end",
-                                                        "curriculum_steps"};
-  Config defaults(config.algorithm);
-  const Options now = OptionsOf(config), usual = OptionsOf(defaults);
-  for (size_t i = 0; i < now.all().size(); ++i) {
-    const Option& option = now.all()[i];
-    const bool of_pendulum = (option.name != "task" && IsInEnvironmentSection(option)) ||
-                             std::ranges::find(kCurriculum, option.name) != kCurriculum.end();
-    if (!of_pendulum || option.text() == usual.all()[i].text()) continue;
+  Config defaults;
+  Options now, usual;
+  config.DescribePlantTask(now);
+  defaults.DescribePlantTask(usual);
+  for (const auto& [option, other] : Differences(now, usual)) {
     throw BadInput(Concat(
         where.empty() ? "" : where + ": ", option.name, ": expected none, as the task ",
         config.task, " has no such setting, got ", option.text(), " (agent ", config.agent, ")"));
@@ -174,12 +169,6 @@ void CheckTask(Config& config, const std::string& where) {
 }
 
 }  // namespace
-
-bool IsInEnvironmentSection(const Option& option) {
-  constexpr std::array<std::string_view, 5> kSections{"task", "plant", "disturbance", "randomize",
-                                                      "reward"};
-  return std::ranges::find(kSections, option.section) != kSections.end();
-}
 
 void CheckSettings(Config& config, const std::string& where) {
   const std::string place = where.empty() ? "" : where + ": ";

@@ -8,9 +8,6 @@
 
 namespace upswing {
 
-/// Whether a setting stands in a section that says what the environment is, not who learns in it.
-bool IsInEnvironmentSection(const Option& option);
-
 /// Throws BadInput that begins with `where` if settings, each of which is allowed, contradict each
 /// other, or do not exist in the task.
 void CheckSettings(Config& config, const std::string& where);

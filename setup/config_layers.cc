@@ -140,7 +140,7 @@ std::vector<std::string> MissingIn(const toml::table& table, const std::string& 
   const Options options = OptionsOf(scratch);
   std::vector<std::string> missing;
   for (const Option& option : options.all()) {
-    const bool needed = !option.implied && (option.identity || !identity_only);
+    const bool needed = !option.implied && (option.identity() || !identity_only);
     if (!needed || table[option.section][option.name]) continue;
     missing.push_back(Concat(option.section, ".", option.name));
   }

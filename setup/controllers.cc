@@ -36,12 +36,11 @@ void ExpectPendubot(const char* kind, const Plant& plant) {
 
 Made MakeEnergyShaping(const ControllerConfig& config) {
   ExpectPendubot("energy", config.plant);
-  LqrConfig lqr = config.lqr;
-  EnergyShapingConfig energy = config.energy;
+  const EnergyShapingConfig& energy = config.energy;
   return WithCatch(config, "energy",
                    Concat("energy shaping, weights ", Rounded(energy.kE), ", ", Rounded(energy.kD),
                           " and ", Rounded(energy.kP)),
-                   OptionsOfAll(lqr, energy),
+                   OptionsOfAll(config.lqr, energy),
                    [energy, plant = ManipulatorOf(config.plant)](const StateVector& d) {
                      return EnergyShapingTorque(energy, plant, d);
                    });
@@ -49,12 +48,11 @@ Made MakeEnergyShaping(const ControllerConfig& config) {
 
 Made MakePartialFeedback(const ControllerConfig& config) {
   ExpectPendubot("pfl", config.plant);
-  LqrConfig lqr = config.lqr;
-  PartialFeedbackConfig pfl = config.pfl;
+  const PartialFeedbackConfig& pfl = config.pfl;
   return WithCatch(config, "pfl",
                    Concat("collocated partial feedback linearisation, gains ", Rounded(pfl.kP),
                           ", ", Rounded(pfl.kD), " and ", Rounded(pfl.kE)),
-                   OptionsOfAll(lqr, pfl),
+                   OptionsOfAll(config.lqr, pfl),
                    [pfl, plant = ManipulatorOf(config.plant)](const StateVector& d) {
                      return PartialFeedbackTorque(pfl, plant, d);
                    });
@@ -64,8 +62,7 @@ Made MakeHybrid(const ControllerConfig& config) {
   if (config.swing_up.empty()) {
     throw BadInput("hybrid: expected a policy that swings up, by --swing-up POLICY, got none");
   }
-  LqrConfig lqr = config.lqr;
-  return std::make_shared<HybridPolicy>("hybrid", OptionsOf(lqr), lqr,
+  return std::make_shared<HybridPolicy>("hybrid", OptionsOf(config.lqr), config.lqr,
                                         LoadPolicy(config.swing_up).policy, config.plant);
 }
 
@@ -87,17 +84,6 @@ constexpr Controller kControllers[] = {
      }},
 };
 
-/// The settings that differ, each as name and value.
-std::vector<std::string> Differences(const Options& now, const Options& usual) {
-  std::vector<std::string> texts;
-  for (size_t k = 0; k < now.all().size(); ++k) {
-    const Option& option = now.all()[k];
-    if (option.text() == usual.all()[k].text()) continue;
-    texts.push_back(Concat(option.name, " ", option.plain_text()));
-  }
-  return texts;
-}
-
 }  // namespace
 
 void ControllerConfig::Describe(Options& o) {
@@ -107,7 +93,7 @@ void ControllerConfig::Describe(Options& o) {
   energy.Describe(o);
   pfl.Describe(o);
   o.Section("hybrid");
-  o.Add(&swing_up, "swing_up", "", "policy that swings up, a file or run folder").usual = "none";
+  o.Add(&swing_up, "swing_up", "policy that swings up, a file or run folder").usual = "none";
 }
 
 std::vector<std::string> ControllerNames() {
@@ -133,10 +119,17 @@ std::shared_ptr<const Policy> MakeController(const std::string& name,
                         name, "\""));
 }
 
-std::string TitleOf(const std::string& name, ControllerConfig config) {
-  ControllerConfig usual;
-  std::vector<std::string> texts = Differences(OptionsOf(config), OptionsOf(usual));
-  const auto plant = Differences(OptionsOf(config.plant), OptionsOf(usual.plant));
+std::string TitleOf(const std::string& name, const ControllerConfig& config) {
+  const auto changes = [](const Options& now, const Options& usual) {
+    std::vector<std::string> texts;
+    for (const auto& [option, before] : Differences(now, usual)) {
+      texts.push_back(Concat(option.name, " ", option.plain_text()));
+    }
+    return texts;
+  };
+  const ControllerConfig usual;
+  std::vector<std::string> texts = changes(OptionsOf(config), OptionsOf(usual));
+  const auto plant = changes(OptionsOf(config.plant), OptionsOf(usual.plant));
   if (!plant.empty()) texts.push_back(Concat("for ", Join(plant, " and ")));
   return texts.empty() ? name : Concat(name, " (", Join(texts, ", "), ")");
 }

@@ -43,6 +43,6 @@ std::shared_ptr<const Policy> MakeController(const std::string& name,
                                              const ControllerConfig& config);
 
 /// Its name with what is not at its default: `lqr (lqr_torque 0.1, for mass2 1.2)`.
-std::string TitleOf(const std::string& name, ControllerConfig config);
+std::string TitleOf(const std::string& name, const ControllerConfig& config);
 
 }  // namespace upswing

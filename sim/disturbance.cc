@@ -9,9 +9,9 @@ namespace upswing {
 
 void Disturbance::Describe(Options& o) {
   o.Section("disturbance");
-  o.Add(&sensor_noise, "sensor_noise", 0, {0, 10}, "rad, rad/s",
+  o.Add(&sensor_noise, "sensor_noise", {0, 10}, "rad, rad/s",
         "standard deviation of the noise on all measured angles and velocities");
-  o.Add(&delay, "delay", 0, {0, kLargestDelay}, "s", "from the choice of a torque to its effect")
+  o.Add(&delay, "delay", {0, kLargestDelay}, "s", "from the choice of a torque to its effect")
       .step = kControlPeriod;
 }
 

@@ -20,12 +20,10 @@ inline constexpr double kLargestDelay = 1;  // s
 /// later, and zero torque before the first arrives. So an observation is always that of the present
 /// state, and what the delay hides are the torques that are still waiting.
 struct Disturbance {
-  double sensor_noise;  // standard deviation, on each measured angle and velocity, rad, rad/s
-  double delay;         // from the choice of a torque to its effect, s, in whole control periods
+  double sensor_noise = 0;  // standard deviation, on each measured angle and velocity, rad, rad/s
+  double delay = 0;  // from the choice of a torque to its effect, s, in whole control periods
 
-  Disturbance() { SetDefaults(*this); }
-  Disturbance(double noise, double seconds) : sensor_noise(noise), delay(seconds) {}
-  /// One line per setting: name, default, range, unit, help.
+  /// One line per setting: name, range, unit, help.
   void Describe(Options& options);
 
   bool any() const { return sensor_noise > 0 || delay > 0; }

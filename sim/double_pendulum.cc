@@ -15,42 +15,41 @@ namespace upswing {
 void Plant::Describe(Options& o) {
   constexpr Range kMass{0.01, 100}, kLength{0.1, 10}, kDamping{0, 100};
   o.Section("plant");
-  o.Add(&mass1, "mass1", 1.0, kMass, "kg", "mass of link 1");
-  o.Add(&mass2, "mass2", 1.0, kMass, "kg", "mass of link 2");
-  o.Add(&length1, "length1", 0.5, kLength, "m", "length of link 1");
-  o.Add(&length2, "length2", 0.5, kLength, "m", "length of link 2");
-  o.Add(&damping1, "damping1", 0.2, kDamping, "N·m·s/rad", "damping of joint 1");
-  o.Add(&damping2, "damping2", 0.2, kDamping, "N·m·s/rad", "damping of joint 2");
-  o.Add(&gravity, "gravity", 9.81, {0.01, 100}, "m/s²", "gravity, downwards");
-  o.Add(&torque_limit, "torque_limit", 5.0, {0.01, 1000}, "N·m", "largest torque of the motor");
-  Option& joint = o.Add(&actuated_joint, "actuated_joint", 1, {1, 2}, "",
+  o.Add(&mass1, "mass1", kMass, "kg", "mass of link 1");
+  o.Add(&mass2, "mass2", kMass, "kg", "mass of link 2");
+  o.Add(&length1, "length1", kLength, "m", "length of link 1");
+  o.Add(&length2, "length2", kLength, "m", "length of link 2");
+  o.Add(&damping1, "damping1", kDamping, "N·m·s/rad", "damping of joint 1");
+  o.Add(&damping2, "damping2", kDamping, "N·m·s/rad", "damping of joint 2");
+  o.Add(&gravity, "gravity", {0.01, 100}, "m/s²", "gravity, downwards");
+  o.Add(&torque_limit, "torque_limit", {0.01, 1000}, "N·m", "largest torque of the motor");
+  Option& joint = o.Add(&actuated_joint, "actuated_joint", {1, 2}, "",
                         "joint that the motor drives: 1 makes a pendubot, 2 an acrobot");
   joint.step = 1;
   joint.implied = true;
-  o.Add(&rotor_inertia, "rotor_inertia", 0, {0, 1}, "kg·m²",
+  o.Add(&rotor_inertia, "rotor_inertia", {0, 1}, "kg·m²",
         "inertia of the rotor of each joint's motor")
       .implied = true;
-  o.Add(&gear_ratio, "gear_ratio", 6, {0, 1000}, "", "turns of a rotor for one turn of its joint")
+  o.Add(&gear_ratio, "gear_ratio", {0, 1000}, "", "turns of a rotor for one turn of its joint")
       .implied = true;
-  o.Add(&coulomb1, "coulomb1", 0, {0, 10}, "N·m", "c of joint 1's dry friction c·atan(100 w)")
+  o.Add(&coulomb1, "coulomb1", {0, 10}, "N·m", "c of joint 1's dry friction c·atan(100 w)")
       .implied = true;
-  o.Add(&coulomb2, "coulomb2", 0, {0, 10}, "N·m", "c of joint 2's dry friction c·atan(100 w)")
+  o.Add(&coulomb2, "coulomb2", {0, 10}, "N·m", "c of joint 2's dry friction c·atan(100 w)")
       .implied = true;
   o.Alias("mass", {"mass1", "mass2"});
   o.Alias("length", {"length1", "length2"});
   o.Alias("damping", {"damping1", "damping2"});
 }
 
-std::vector<std::pair<std::string, double>> PlantValues(Plant plant) {
+std::vector<std::pair<std::string, double>> PlantValues(const Plant& plant) {
   std::vector<std::pair<std::string, double>> values;
   const Options options = OptionsOf(plant);
-  Plant usual;
+  const Plant usual;
   const Options defaults = OptionsOf(usual);
   for (size_t i = 0; i < options.all().size(); ++i) {
     const Option& option = options.all()[i];
-    const double value = *std::get<double*>(option.target);
-    if (option.implied && value == *std::get<double*>(defaults.all()[i].target)) continue;
-    values.emplace_back(option.name, value);
+    if (option.implied && option.number() == defaults.all()[i].number()) continue;
+    values.emplace_back(option.name, option.number());
   }
   return values;
 }
@@ -59,11 +58,11 @@ void RewardWeights::Describe(Options& o) {
   constexpr Range kWeight{0, 1000};
   auto& [energy, height, balance, velocity, torque] = weight;
   o.Section("reward");
-  o.Add(&energy, "energy_weight", 1, kWeight, "", "weight of the energy term");
-  o.Add(&height, "height_weight", 1, kWeight, "", "weight of the height term");
-  o.Add(&balance, "balance_weight", 1, kWeight, "", "weight of the balance term");
-  o.Add(&velocity, "velocity_weight", 1, kWeight, "", "weight of the velocity penalty");
-  o.Add(&torque, "torque_weight", 1, kWeight, "", "weight of the torque penalty");
+  o.Add(&energy, "energy_weight", kWeight, "", "weight of the energy term");
+  o.Add(&height, "height_weight", kWeight, "", "weight of the height term");
+  o.Add(&balance, "balance_weight", kWeight, "", "weight of the balance term");
+  o.Add(&velocity, "velocity_weight", kWeight, "", "weight of the velocity penalty");
+  o.Add(&torque, "torque_weight", kWeight, "", "weight of the torque penalty");
 }
 
 CapsuleInertia::CapsuleInertia(double m, double r, double l) {
@@ -224,8 +223,7 @@ std::string Mjcf(const Plant& plant) {
          friction ? Concat(" frictionloss=\"@coulomb", joint, "\" user=\"", kFrictionSlope, '"')
                   : "");
   }
-  Plant values = plant;
-  const Options options = OptionsOf(values);
+  const Options options = OptionsOf(plant);
   for (const Option& option : options.all()) fill("@" + option.name, option.text());
   return mjcf;
 }

@@ -36,18 +36,17 @@ inline constexpr double kFrictionSlope = 100;   // of the dry friction's arctang
 /// The parameters that can be set at run time. The radius of the capsules is fixed; inertia and
 /// centre of mass follow from mass and length.
 struct Plant {
-  double mass1, mass2;        // kg
-  double length1, length2;    // m
-  double damping1, damping2;  // N·m·s/rad
-  double gravity;             // m/s², along -z
-  double torque_limit;        // N·m
-  double actuated_joint;      // which the motor drives: 1 (a pendubot) or 2 (an acrobot)
-  double rotor_inertia;       // of a motor at each joint, kg·m²
-  double gear_ratio;          // turns of a rotor for one of its joint
-  double coulomb1, coulomb2;  // dry friction c atan(100 w) of each joint, N·m
+  double mass1 = 1.0, mass2 = 1.0;        // kg
+  double length1 = 0.5, length2 = 0.5;    // m
+  double damping1 = 0.2, damping2 = 0.2;  // N·m·s/rad
+  double gravity = 9.81;                  // m/s², along -z
+  double torque_limit = 5.0;              // N·m
+  double actuated_joint = 1;          // which the motor drives: 1 (a pendubot) or 2 (an acrobot)
+  double rotor_inertia = 0;           // of a motor at each joint, kg·m²
+  double gear_ratio = 6;              // turns of a rotor for one of its joint
+  double coulomb1 = 0, coulomb2 = 0;  // dry friction c atan(100 w) of each joint, N·m
 
-  Plant() { SetDefaults(*this); }
-  /// One line per setting: name, default, range, unit, help.
+  /// One line per setting: name, range, unit, help.
   void Describe(Options& options);
 
   bool has_dry_friction() const { return coulomb1 != 0 || coulomb2 != 0; }
@@ -55,7 +54,7 @@ struct Plant {
 
 /// Name and value of each of its parameters. Those that a file may lack (Option::implied) are left
 /// out at their defaults.
-std::vector<std::pair<std::string, double>> PlantValues(Plant plant);
+std::vector<std::pair<std::string, double>> PlantValues(const Plant& plant);
 
 /// Principal moments of inertia (kg·m²) of a solid capsule, across and along its axis: mass m (kg),
 /// radius r (m), length l of its cylinder (m).
@@ -149,10 +148,9 @@ std::array<double, kRewardTerms> RewardTerms(const Plant& plant, const PendulumS
 
 /// A weight for each term of the reward; 0 leaves it out.
 struct RewardWeights {
-  std::array<double, kRewardTerms> weight;
+  std::array<double, kRewardTerms> weight{1, 1, 1, 1, 1};
 
-  RewardWeights() { SetDefaults(*this); }
-  /// One line per setting: name, default, range, unit, help.
+  /// One line per setting: name, range, unit, help.
   void Describe(Options& options);
 };
 

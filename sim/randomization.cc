@@ -16,7 +16,7 @@ void Randomization::Describe(Options& o) {
   auto& [mass1, mass2, length1, length2, damping1, damping2, gravity, torque_limit] = plant;
   o.Section("randomize");
   const auto add = [&](double* target, std::string_view name, std::string_view what) {
-    o.Add(target, name, 0, kRelative, "", what);
+    o.Add(target, name, kRelative, "", what);
   };
   add(&mass1, "randomize_mass1", "each episode's mass1 is within ± this share of the plant's");
   add(&mass2, "randomize_mass2", "the same of mass2");
@@ -26,9 +26,9 @@ void Randomization::Describe(Options& o) {
   add(&damping2, "randomize_damping2", "the same of damping2");
   add(&gravity, "randomize_gravity", "the same of gravity");
   add(&torque_limit, "randomize_torque_limit", "the same of torque_limit");
-  o.Add(&sensor_noise, "randomize_sensor_noise", 0, {0, 10}, "rad, rad/s",
+  o.Add(&sensor_noise, "randomize_sensor_noise", {0, 10}, "rad, rad/s",
         "each episode's sensor noise is up to so much above sensor_noise");
-  o.Add(&delay, "randomize_delay", 0, {0, kLargestDelay}, "s",
+  o.Add(&delay, "randomize_delay", {0, kLargestDelay}, "s",
         "each episode's delay is up to so much above delay")
       .step = kControlPeriod;
   o.Alias("randomize",

@@ -13,16 +13,15 @@ namespace upswing {
 /// nominal ones; zeros: not at all.
 struct Randomization {
   /// Half-widths relative to the nominal value, in the order of Plant: 0.25 stands for ±25%.
-  std::array<double, 8> plant;
-  double sensor_noise;  // largest addition to the nominal one, rad, rad/s
-  double delay;         // the same, s
+  std::array<double, 8> plant{};
+  double sensor_noise = 0;  // largest addition to the nominal one, rad, rad/s
+  double delay = 0;         // the same, s
 
-  Randomization() { SetDefaults(*this); }
-  /// One line per setting: name, default, range, unit, help.
+  /// One line per setting: name, range, unit, help.
   void Describe(Options& options);
   bool any() const;
   /// Largest number of control periods that a delay may be above the nominal one.
-  int max_delay_steps() const { return Disturbance(0, delay).delay_steps(); }
+  int max_delay_steps() const { return Disturbance{0, delay}.delay_steps(); }
 
   /// A plant from the box: each parameter uniform and independent of the others. Always draws eight
   /// numbers from the stream.

@@ -45,14 +45,14 @@ void CheckFolder(const fs::path& folder, const fs::path& mark) {
 }
 
 /// Throws if `what` was made with settings `before` that cannot be resumed with those of `now`.
-void CheckSame(Config before, Config now, bool more_steps, const std::string& what) {
+void CheckSame(Config before, const Config& now, bool more_steps, const std::string& what) {
   if (!before.mjcf.empty()) before.model = now.model;
-  const auto counts = [&](const Option& option) {
-    if (option.name == "steps") return !more_steps || now.train.steps < before.train.steps;
-    return option.name == "stop_when_solved" || (option.identity && option.name != "seed");
+  if (more_steps) before.train.steps = std::min(before.train.steps, now.train.steps);
+  const auto counts = [](const Option& option) {
+    return option.decides == Option::Decides::kTraining || option.decides == Option::Decides::kEnd;
   };
   try {
-    ExpectSameSettings(OptionsOf(before), OptionsOf(now), what, counts);
+    ExpectSameSettings(before, now, what, counts);
     if (before.mjcf != now.mjcf) throw BadInput(Concat(what, ": made with another model"));
   } catch (const Error& other) {
     throw BadInput(Concat(other.what(), "; choose another --out"));

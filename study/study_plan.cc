@@ -105,8 +105,9 @@ std::string SettingsMark(const Config& config) {
   Config own = config;
   own.model.clear();  // a model is what is in its file, not where that lies
   Checksum sum;
-  for (const Option& option : TrainingSettings(own)) {
-    if (option.name == "steps" || option.name == "stop_when_solved") continue;
+  const Options options = OptionsOf(own);
+  for (const Option& option : options.all()) {
+    if (option.decides != Option::Decides::kTraining) continue;
     sum.Update(BytesOf(Concat(option.section, ".", option.name, "=", option.text(), "\n")));
   }
   sum.Update(BytesOf(own.mjcf));
@@ -119,9 +120,10 @@ void WritePlan(const StudyPlan& plan) {
     const fs::path folder = plan.folder / variant.name;
     MakeFolder(folder);
     if (!variant.config.mjcf.empty()) WriteIfOther(folder / RunFolder::kModel, variant.config.mjcf);
-    Config config = variant.config;
-    const auto wanted = [](const Option& option) { return option.name != "seed"; };
-    WriteIfOther(folder / kSettingsName, OptionsOf(config).Toml(true, wanted));
+    const auto wanted = [](const Option& option) {
+      return option.decides != Option::Decides::kSeed;
+    };
+    WriteIfOther(folder / kSettingsName, OptionsOf(variant.config).Toml(true, wanted));
     variants.push_back({{"name", variant.name}, {"settings", SettingsMark(variant.config)}});
   }
   const ordered_json j{{"version", UPSWING_VERSION},

@@ -12,8 +12,11 @@ namespace upswing {
 
 bool IsEnvironmentSetting(const Option& option) {
   constexpr std::array<std::string_view, 4> kMore{"agent", "envs", "threads", "start_noise"};
-  if (option.name == "task" || option.name == "eval_physics") return false;
-  return IsInEnvironmentSection(option) || std::ranges::find(kMore, option.name) != kMore.end();
+  Config scratch;
+  Options of_environment;
+  scratch.DescribeEnvironment(of_environment);
+  return (of_environment.Get(option.name) != nullptr && option.name != "eval_physics") ||
+         std::ranges::find(kMore, option.name) != kMore.end();
 }
 
 Config EnvironmentConfig(const std::vector<FlagValue>& flags) {

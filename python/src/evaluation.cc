@@ -49,12 +49,12 @@ std::pair<std::string, std::string> EvaluateHandle(const PolicyHandle& policy,
                                                    const std::string& model, bool unknown_plant,
                                                    const nb::object& progress) {
   TrialArguments trial;
-  int64_t episodes = 0, threads = 0;
+  int64_t episodes = 100, threads = 0;
   Options own;
   DescribeEvalEpisodes(own, &episodes);
   DescribeSeed(own, &trial.seed, "start states, noise and random plants");
   DescribeThreads(own, &threads);
-  DescribePhysics(own, &trial.physics, "mujoco");
+  DescribePhysics(own, &trial.physics);
   SetArguments(own, arguments);
   if (policy.loaded().task != kDoublePendulum && !settings.empty()) {
     throw BadInput(Concat(Printable(settings.front().first), ": expected none, as ",
@@ -89,7 +89,7 @@ nb::tuple MapHandle(const PolicyHandle& policy, const SettingTexts& settings,
   a.Describe(own);
   DescribeSeed(own, &a.seed, "starts and noise");
   DescribeThreads(own, &threads);
-  DescribePhysics(own, &a.physics, "closed-form");
+  DescribePhysics(own, &a.physics);
   SetArguments(own, arguments);
   if (!x.empty()) a.x = x;
   if (!y.empty()) a.y = y;
