@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "core/format.h"
 #include "core/sample.h"
 #include "core/text.h"
-#include "setup/format.h"
 
 namespace upswing {
 namespace {

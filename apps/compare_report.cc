@@ -6,9 +6,9 @@
 #include <cmath>
 
 #include "apps/eval_table.h"
+#include "core/format.h"
 #include "core/json.h"
 #include "core/text.h"
-#include "setup/format.h"
 #include "study/seeds.h"
 
 namespace upswing {

@@ -10,10 +10,10 @@
 
 #include "apps/commands.h"
 #include "core/error.h"
+#include "core/format.h"
 #include "core/text.h"
 #include "io/streams.h"
 #include "setup/controllers.h"
-#include "setup/format.h"
 
 namespace upswing {
 namespace {

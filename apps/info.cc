@@ -8,6 +8,7 @@
 #include "control/lqr_catch.h"
 #include "control/upright_modes.h"
 #include "core/error.h"
+#include "core/format.h"
 #include "core/simd.h"
 #include "core/text.h"
 #include "io/machine.h"
@@ -19,7 +20,6 @@
 #include "run/model_info.h"
 #include "setup/config.h"
 #include "setup/controllers.h"
-#include "setup/format.h"
 #include "setup/loaded_policy.h"
 #include "sim/double_pendulum.h"
 

@@ -7,10 +7,10 @@
 #include <limits>
 
 #include "apps/say.h"
+#include "core/format.h"
 #include "core/sample.h"
 #include "core/text.h"
 #include "setup/config_checks.h"
-#include "setup/format.h"
 #include "study/seeds.h"
 
 namespace upswing {

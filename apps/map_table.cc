@@ -4,9 +4,9 @@
 
 #include <cmath>
 
+#include "core/format.h"
 #include "core/text.h"
 #include "setup/config.h"
-#include "setup/format.h"
 
 namespace upswing {
 namespace {

@@ -9,8 +9,8 @@
 #include <cstdio>
 
 #include "apps/say.h"
+#include "core/format.h"
 #include "core/text.h"
-#include "setup/format.h"
 
 namespace upswing {
 namespace {

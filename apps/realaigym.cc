@@ -11,6 +11,7 @@
 #include "apps/say.h"
 #include "apps/signals.h"
 #include "core/error.h"
+#include "core/format.h"
 #include "core/text.h"
 #include "io/file.h"
 #include "io/machine.h"
@@ -18,7 +19,6 @@
 #include "io/tensor_file.h"
 #include "realaigym/boards.h"
 #include "report/figure.h"
-#include "setup/format.h"
 
 namespace upswing {
 namespace {

@@ -11,10 +11,10 @@
 #include "apps/signals.h"
 #include "apps/train_view.h"
 #include "core/error.h"
+#include "core/format.h"
 #include "core/text.h"
 #include "io/file.h"
 #include "io/lease.h"
-#include "setup/format.h"
 #include "study/study_worker.h"
 
 namespace upswing {

@@ -7,37 +7,14 @@
 
 #include "apps/say.h"
 #include "apps/signals.h"
+#include "core/format.h"
 #include "core/text.h"
 #include "io/run_folder.h"
 #include "mujoco/engines.h"
 #include "run/model_info.h"
 #include "setup/config_checks.h"
-#include "setup/format.h"
 
 namespace upswing {
-
-namespace {
-
-/// What learns, such as `double, dueling network 64-64 with heads of 32`.
-std::string LearnerText(const Config& config) {
-  if (config.algorithm == kSac) {
-    const SacConfig& s = config.sac;
-    return fmt::format("soft actor-critic, {} of {}", s.twin ? "networks" : "one critic, networks",
-                       fmt::join(s.hidden, "-"));
-  }
-  if (config.algorithm == kPpo) {
-    const PpoConfig& p = config.ppo;
-    return fmt::format("proximal policy optimisation, {}, networks of {}",
-                       p.discrete() ? fmt::format("{} torques", p.levels) : "any torque",
-                       fmt::join(p.hidden, "-"));
-  }
-  const DqnConfig& d = config.dqn;
-  return fmt::format("{}{} network {}{}", d.double_q ? "double, " : "",
-                     d.dueling ? "dueling" : "plain", fmt::join(d.hidden, "-"),
-                     d.dueling ? fmt::format(" with heads of {}", d.head) : "");
-}
-
-}  // namespace
 
 TrainView::TrainView(const Training& training)
     : training_(training),
@@ -50,7 +27,7 @@ void TrainView::Announce(const std::filesystem::path& run) const {
   const Config& config = training_.config();
   const int threads = training_.threads();
   Say("Training {} (seed {}) in {}\n", config.agent, config.train.seed, Printable(run.string()));
-  Say("  {}, {} parameters; {} environments, {} thread{}\n", LearnerText(config),
+  Say("  {}, {} parameters; {} environments, {} thread{}\n", config.learner().Text(),
       FormatCount(training_.policy()->num_parameters()), config.train.envs, threads,
       threads == 1 ? "" : "s");
   if (config.task != kDoublePendulum) Say("  task {}\n", config.task);

@@ -20,10 +20,10 @@ struct Trainings {
 /// a key that says which they are.
 Trainings& TrainingsOf(const Tensors& file) {
   static Trainings in_mujoco(TinyConfig("mujoco"));
-  static Trainings sac(TinyConfig("closed-form", kSac)), ppo(TinyConfig("closed-form", kPpo));
+  static Trainings sac(TinyConfig("closed-form", "sac")), ppo(TinyConfig("closed-form", "ppo"));
   static Trainings in_closed_form(TinyConfig("closed-form"));
-  if (file.metadata.contains(kSac)) return sac;
-  if (file.metadata.contains(kPpo)) return ppo;
+  if (file.metadata.contains("sac")) return sac;
+  if (file.metadata.contains("ppo")) return ppo;
   return file.metadata.contains("mujoco") ? in_mujoco : in_closed_form;
 }
 

@@ -26,8 +26,8 @@ void SaveCheckpoint(Training& training, const std::string& kind, const fs::path&
 }
 
 void MakeSeeds(const fs::path& corpus) {
-  for (const std::string kind : {"closed-form", "mujoco", kSac, kPpo}) {
-    const bool actor = kind == kSac || kind == kPpo;
+  for (const std::string kind : {"closed-form", "mujoco", "sac", "ppo"}) {
+    const bool actor = kind == "sac" || kind == "ppo";
     const Config config = actor ? TinyConfig("closed-form", kind) : TinyConfig(kind);
     Training training(config, 1);
     SaveCheckpoint(training, kind, corpus / "checkpoint/accepted" / (kind + "-new.safetensors"));

@@ -6,7 +6,7 @@
 namespace upswing {
 
 /// A training of a few hundred parameters with nearly everything switched on, in `physics`.
-inline Config TinyConfig(const std::string& physics, const std::string& algorithm = kDqn) {
+inline Config TinyConfig(const std::string& physics, const std::string& algorithm = "dqn") {
   Config config(algorithm);
   SetFlags(OptionsOf(config), {{"physics", physics},
                                {"envs", "2"},
@@ -22,9 +22,9 @@ inline Config TinyConfig(const std::string& physics, const std::string& algorith
                                {"eval_every", "1e12"}});
   const std::vector<FlagValue> off_policy{
       {"replay", "6"}, {"n_step", "2"}, {"learning_starts", "4"}, {"updates_per_step", "0.5"}};
-  if (algorithm == kPpo) {
+  if (algorithm == "ppo") {
     SetFlags(OptionsOf(config), {{"horizon", "4"}, {"epochs", "2"}, {"value_clip", "0.2"}});
-  } else if (algorithm == kSac) {
+  } else if (algorithm == "sac") {
     SetFlags(OptionsOf(config), off_policy);
     SetFlags(OptionsOf(config), {{"smoothness", "0.1"}, {"bins", "3"}});
   } else {

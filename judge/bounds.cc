@@ -6,9 +6,9 @@
 
 #include "control/best_episode.h"
 #include "core/error.h"
+#include "core/format.h"
 #include "core/text.h"
 #include "rl/torque_levels.h"
-#include "setup/format.h"
 
 namespace upswing {
 namespace {

@@ -8,11 +8,11 @@
 #include <set>
 
 #include "core/error.h"
+#include "core/format.h"
 #include "core/text.h"
 #include "run/model_info.h"
 #include "run/run_log.h"
 #include "setup/config.h"
-#include "setup/format.h"
 
 namespace upswing {
 namespace {

@@ -8,13 +8,13 @@
 #include <set>
 
 #include "core/error.h"
+#include "core/format.h"
 #include "core/text.h"
 #include "io/making.h"
 #include "io/run_folder.h"
 #include "run/model_info.h"
 #include "setup/config.h"
 #include "setup/controllers.h"
-#include "setup/format.h"
 #include "study/study_plan.h"
 
 namespace upswing {

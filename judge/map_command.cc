@@ -9,13 +9,13 @@
 #include <optional>
 
 #include "core/error.h"
+#include "core/format.h"
 #include "core/text.h"
 #include "io/file.h"
 #include "judge/trial.h"
 #include "mujoco/engines.h"
 #include "report/figure.h"
 #include "setup/config.h"
-#include "setup/format.h"
 
 namespace upswing {
 namespace {

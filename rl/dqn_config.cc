@@ -1,5 +1,8 @@
 #include "rl/dqn_config.h"
 
+#include "core/text.h"
+#include "rl/dqn.h"
+
 namespace upswing {
 
 void DqnConfig::Describe(Options& o) {
@@ -23,6 +26,35 @@ void DqnConfig::Describe(Options& o) {
   o.Add(&epsilon_start, "epsilon_start", kUnit, "", "share of random actions at the beginning");
   o.Add(&epsilon_end, "epsilon_end", kUnit, "", "what epsilon falls to");
   o.Add(&epsilon_decay, "epsilon_decay", kUnit, "", "factor per episode");
+}
+
+std::unique_ptr<Agent> DqnConfig::Make(const EnvSpec& spec, uint64_t seed, ThreadPool& pool) const {
+  return std::make_unique<Dqn>(*this, spec, seed, pool);
+}
+
+void DqnConfig::Check(int64_t /*num_envs*/) const { OffPolicyConfig::Check(); }
+
+AgentSize DqnConfig::Size(const EnvSpec& spec) const {
+  const int D = spec.obs_size;
+  const QNetwork<float> network(Shape(D, static_cast<int>(levels)));
+  return {static_cast<double>(network.num_parameters()),
+          // Online, target and kept parameters, gradient, Adam's two moments, and the forms that
+          // products want of online and target weights.
+          8, 5, 2.0 * D + 3, static_cast<double>(replay), static_cast<double>(batch),
+          Widest(hidden), 3 * static_cast<double>(hidden.size())};
+}
+
+std::string DqnConfig::Text() const {
+  return Concat(double_q ? "double, " : "", dueling ? "dueling" : "plain", " network ",
+                WidthsText(hidden), dueling ? Concat(" with heads of ", head) : "");
+}
+
+std::vector<std::string> DqnConfig::Warnings(int64_t steps, int64_t /*num_envs*/) const {
+  std::vector<std::string> warnings = OffPolicyConfig::Warnings(steps);
+  if (tau == 0 && target_period == 0) {
+    warnings.emplace_back("tau is 0: the target network will stay as it began");
+  }
+  return warnings;
 }
 
 QNetworkShape DqnConfig::Shape(int obs_size, int actions) const {

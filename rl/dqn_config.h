@@ -3,14 +3,14 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/options.h"
 #include "nn/q_network.h"
-#include "rl/off_policy.h"
+#include "rl/agent_config.h"
+#include "rl/off_policy_config.h"
 
 namespace upswing {
 
 /// Settings of the agent.
-struct DqnConfig : OffPolicyConfig {
+struct DqnConfig : AgentConfig, OffPolicyConfig {
   std::vector<int64_t> hidden = {256, 256};
   int64_t head = 128;
   bool layer_norm = true, double_q = true, dueling = true;
@@ -20,8 +20,12 @@ struct DqnConfig : OffPolicyConfig {
   double policy_tau = 0.01;
   double epsilon_start = 1.0, epsilon_end = 0.05, epsilon_decay = 0.97;
 
-  /// One line per setting: name, range, unit, help.
-  void Describe(Options& options);
+  void Describe(Options& options) override;
+  std::unique_ptr<Agent> Make(const EnvSpec& spec, uint64_t seed, ThreadPool& pool) const override;
+  void Check(int64_t num_envs) const override;
+  AgentSize Size(const EnvSpec& spec) const override;
+  std::string Text() const override;
+  std::vector<std::string> Warnings(int64_t steps, int64_t num_envs) const override;
 
   /// The shape of the network, for observations of `obs_size` numbers and so many actions.
   QNetworkShape Shape(int obs_size, int actions) const;

@@ -8,29 +8,6 @@
 
 namespace upswing {
 
-void OffPolicyConfig::Describe(Options& o) {
-  o.Add(&gamma, "gamma", kUnit, "", "discount per control step");
-  o.Add(&n_step, "n_step", {1, 100}, "steps", "length of the returns in the targets");
-  o.Add(&reward_scale, "reward_scale", kPositive, "", "the agent learns from reward times this");
-  o.Add(&batch, "batch", {1, 65536}, "", "transitions in a minibatch");
-  o.Add(&replay, "replay", {1, 10000000}, "", "transitions that the replay memory holds");
-  o.Add(&prioritized, "prioritized",
-        "prioritised replay: draw transitions by their last |TD error|");
-  o.Add(&priority_exponent, "priority_exponent", kUnit, "",
-        "alpha of prioritised replay; 0: uniform");
-  o.Add(&importance_exponent, "importance_exponent", kUnit, "",
-        "beta of prioritised replay at the beginning; it rises to 1 over learning_rate_steps");
-  o.Add(&mirror, "mirror", "mirror a random half of each minibatch, observations and actions");
-  o.Add(&learning_starts, "learning_starts", kNotNegative, "steps",
-        "what is seen before the first update");
-  o.Add(&updates_per_step, "updates_per_step", {0, 100}, "", "gradient steps per step");
-  o.Add(&learning_rate, "learning_rate", {0, 10}, "", "learning rate of Adam at the beginning");
-  o.Add(&learning_rate_end, "learning_rate_end", {0, 10}, "", "learning rate at the end");
-  o.Add(&learning_rate_steps, "learning_rate_steps", {1, 1e12}, "steps",
-        "over which the learning rate falls linearly");
-  o.Add(&max_gradient_norm, "max_gradient_norm", kPositive, "", "clip the global norm to this");
-}
-
 OffPolicyAgent::OffPolicyAgent(const OffPolicyConfig& config, const EnvSpec& spec,
                                const ActionSpace& actions, uint64_t seed, ThreadPool& pool)
     : explore_rng_(seed, "exploration"),

@@ -4,32 +4,13 @@
 #include <span>
 #include <vector>
 
-#include "core/options.h"
 #include "core/thread_tuner.h"
 #include "rl/agent.h"
 #include "rl/n_step.h"
+#include "rl/off_policy_config.h"
 #include "rl/replay.h"
 
 namespace upswing {
-
-/// Settings that all agents with a replay memory have.
-struct OffPolicyConfig {
-  double gamma = 0.99;
-  int64_t n_step = 3;
-  double reward_scale = 0.1;
-  int64_t batch = 128, replay = 300000;
-  bool prioritized = true;
-  double priority_exponent = 0.6, importance_exponent = 0.4;
-  bool mirror = true;
-  int64_t learning_starts = 2000;
-  double updates_per_step = 0.0625;
-  double learning_rate = 1e-3, learning_rate_end = 2e-5;
-  int64_t learning_rate_steps = 250000;
-  double max_gradient_norm = 10;
-
-  /// One line per setting: name, range, unit, help.
-  void Describe(Options& options);
-};
 
 /// An agent that learns from a replay memory: what DQN and SAC have in common. A derived agent acts
 /// and makes one gradient step from a minibatch.

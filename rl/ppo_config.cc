@@ -2,6 +2,8 @@
 
 #include "core/error.h"
 #include "core/text.h"
+#include "nn/network.h"
+#include "rl/ppo.h"
 
 namespace upswing {
 
@@ -46,6 +48,55 @@ void PpoConfig::Describe(Options& o) {
         "policy change of an update that the actor's learning rate is adapted to; 0: it is not");
   o.Add(&max_gradient_norm, "max_gradient_norm", kPositive, "",
         "clip the global norm, of actor and critic each, to this");
+}
+
+std::unique_ptr<Agent> PpoConfig::Make(const EnvSpec& spec, uint64_t seed, ThreadPool& pool) const {
+  return std::make_unique<Ppo>(*this, spec, seed, pool);
+}
+
+void PpoConfig::Check(int64_t num_envs) const {
+  CheckBatch(num_envs);
+  const PpoConfig usual;
+  if (!discrete() && levels != usual.levels) {
+    throw BadInput(Concat("levels: expected none with continuous actions, got ", levels,
+                          " (or actions = levels)"));
+  }
+  if (!discrete() && initial_std > max_std && initial_std != usual.initial_std) {
+    throw BadInput(
+        Concat("initial_std: expected at most max_std (", max_std, "), got ", initial_std));
+  }
+  if (discrete() && initial_std != usual.initial_std) {
+    throw BadInput(Concat("initial_std: expected none with actions = levels, got ", initial_std));
+  }
+}
+
+AgentSize PpoConfig::Size(const EnvSpec& spec) const {
+  const int D = spec.obs_size, A = spec.action_size();
+  const Network<float> actor(Shape(D), {discrete() ? static_cast<int>(levels) : A});
+  const Network<float> critic(Shape(D), {1});
+  return {static_cast<double>(actor.num_parameters() + critic.num_parameters()),
+          // Parameters, gradient, Adam's two moments, and what products want.
+          5, 3,
+          // Observation and successor, action, ln π, reward, V, V', advantage, target, order, ends.
+          2.0 * D + A + 9, static_cast<double>(horizon * spec.num_envs), static_cast<double>(batch),
+          Widest(hidden), 2 * 3 * static_cast<double>(hidden.size()), "rollout", "--horizon"};
+}
+
+std::string PpoConfig::Text() const {
+  return Concat("proximal policy optimisation, ",
+                discrete() ? Concat(levels, " torques") : "any torque", ", networks of ",
+                WidthsText(hidden));
+}
+
+std::vector<std::string> PpoConfig::Warnings(int64_t steps, int64_t num_envs) const {
+  std::vector<std::string> warnings;
+  if (horizon * num_envs > steps) {
+    warnings.push_back(Concat("a rollout is ", FormatCount(horizon * num_envs),
+                              " steps, and there are ", FormatCount(steps),
+                              ": nothing will be learned"));
+  }
+  WarnOfNoRate(learning_rate, learning_rate_end, warnings);
+  return warnings;
 }
 
 MlpShape PpoConfig::Shape(int obs_size) const {

@@ -4,13 +4,13 @@
 #include <string>
 #include <vector>
 
-#include "core/options.h"
 #include "nn/mlp.h"
+#include "rl/agent_config.h"
 
 namespace upswing {
 
 /// Settings of proximal policy optimisation.
-struct PpoConfig {
+struct PpoConfig : AgentConfig {
   std::vector<int64_t> hidden = {64, 64};
   std::string activation = "tanh";
   bool layer_norm = false;
@@ -28,8 +28,12 @@ struct PpoConfig {
   double kl_target = 0.01;
   double max_gradient_norm = 0.5;
 
-  /// One line per setting: name, range, unit, help.
-  void Describe(Options& options);
+  void Describe(Options& options) override;
+  std::unique_ptr<Agent> Make(const EnvSpec& spec, uint64_t seed, ThreadPool& pool) const override;
+  void Check(int64_t num_envs) const override;
+  AgentSize Size(const EnvSpec& spec) const override;
+  std::string Text() const override;
+  std::vector<std::string> Warnings(int64_t steps, int64_t num_envs) const override;
 
   /// Whether actions are levels, not continuous.
   bool discrete() const { return actions == "levels"; }

@@ -1,5 +1,12 @@
 #include "rl/sac_config.h"
 
+#include <algorithm>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "nn/network.h"
+#include "rl/sac.h"
+
 namespace upswing {
 
 void SacConfig::Describe(Options& o) {
@@ -30,6 +37,44 @@ void SacConfig::Describe(Options& o) {
   o.Add(
       &target_entropy, "target_entropy", {-100, 0.69}, "nats",
       "entropy of each component of the action, in units of its limit; uniform actions have 0.69");
+}
+
+std::unique_ptr<Agent> SacConfig::Make(const EnvSpec& spec, uint64_t seed, ThreadPool& pool) const {
+  return std::make_unique<Sac>(*this, spec, seed, pool);
+}
+
+void SacConfig::Check(int64_t /*num_envs*/) const {
+  OffPolicyConfig::Check();
+  if (bins == 1) throw BadInput("bins: expected 0 or at least 2, got 1");
+  if (bins > 0 && value_low >= value_high) {
+    throw BadInput(
+        Concat("value_low: expected less than value_high (", value_high, "), got ", value_low));
+  }
+}
+
+AgentSize SacConfig::Size(const EnvSpec& spec) const {
+  const int D = spec.obs_size, A = spec.action_size();
+  const double critics = twin ? 2 : 1;
+  const Network<float> actor(Trunk(D), {2 * A});
+  const Network<float> critic(Trunk(D + A), {static_cast<int>(std::max<int64_t>(1, bins))});
+  return {static_cast<double>(actor.num_parameters()) +
+              critics * static_cast<double>(critic.num_parameters()),
+          // Online, target or kept, gradient, Adam's two moments, and what products want.
+          6, 4, 2.0 * D + A + 2, static_cast<double>(replay), static_cast<double>(batch),
+          std::max(Widest(hidden), static_cast<double>(bins)),
+          (1 + critics) * 3 * static_cast<double>(hidden.size())};
+}
+
+std::string SacConfig::Text() const {
+  return Concat("soft actor-critic, ", twin ? "networks" : "one critic, networks", " of ",
+                WidthsText(hidden));
+}
+
+std::vector<std::string> SacConfig::Warnings(int64_t steps, int64_t /*num_envs*/) const {
+  std::vector<std::string> warnings = OffPolicyConfig::Warnings(steps);
+  if (actor_rate == 0) warnings.emplace_back("actor_rate is 0: the policy will stay as it began");
+  if (tau == 0) warnings.emplace_back("tau is 0: the targets will stay as they began");
+  return warnings;
 }
 
 MlpShape SacConfig::Trunk(int inputs) const { return {inputs, hidden, layer_norm}; }

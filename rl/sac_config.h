@@ -3,14 +3,14 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/options.h"
 #include "nn/mlp.h"
-#include "rl/off_policy.h"
+#include "rl/agent_config.h"
+#include "rl/off_policy_config.h"
 
 namespace upswing {
 
 /// Settings of the agent; see rl/sac.h.
-struct SacConfig : OffPolicyConfig {
+struct SacConfig : AgentConfig, OffPolicyConfig {
   std::vector<int64_t> hidden = {256, 256};
   bool layer_norm = true;
   int64_t bins = 0;
@@ -24,8 +24,12 @@ struct SacConfig : OffPolicyConfig {
   bool tune_alpha = true;
   double alpha = 0.1, alpha_rate = 3e-3, target_entropy = -1;
 
-  /// One line per setting: name, range, unit, help.
-  void Describe(Options& options);
+  void Describe(Options& options) override;
+  std::unique_ptr<Agent> Make(const EnvSpec& spec, uint64_t seed, ThreadPool& pool) const override;
+  void Check(int64_t num_envs) const override;
+  AgentSize Size(const EnvSpec& spec) const override;
+  std::string Text() const override;
+  std::vector<std::string> Warnings(int64_t steps, int64_t num_envs) const override;
 
   /// The trunk of a network of so many inputs.
   MlpShape Trunk(int inputs) const;

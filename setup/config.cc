@@ -7,17 +7,43 @@
 #include "mujoco/engines.h"
 #include "mujoco/mjcf_check.h"
 #include "mujoco/model.h"
-#include "rl/dqn.h"
-#include "rl/ppo.h"
-#include "rl/sac.h"
 
 namespace upswing {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+/// A learning algorithm's name and its settings, which know the rest of it.
+struct Algorithm {
+  const char* name;
+  AgentConfig& (*settings)(Config& config);
+};
+
+// The first is the usual one.
+constexpr Algorithm kAlgorithms[] = {
+    {"dqn", [](Config& config) -> AgentConfig& { return config.dqn; }},
+    {"sac", [](Config& config) -> AgentConfig& { return config.sac; }},
+    {"ppo", [](Config& config) -> AgentConfig& { return config.ppo; }},
+};
+
+}  // namespace
+
 const std::vector<std::string>& AlgorithmNames() {
-  static const std::vector<std::string> kNames{kDqn, kSac, kPpo};
+  static const std::vector<std::string> kNames = [] {
+    std::vector<std::string> names;
+    for (const Algorithm& algorithm : kAlgorithms) names.emplace_back(algorithm.name);
+    return names;
+  }();
   return kNames;
+}
+
+AgentConfig& Config::learner() {
+  for (const Algorithm& known : kAlgorithms) {
+    if (algorithm == known.name) return known.settings(*this);
+  }
+  throw Failure(Concat("algorithm: expected one of ", Join(AlgorithmNames(), ", "), ", got \"",
+                       algorithm, "\""));
 }
 
 void Config::Describe(Options& o) {
@@ -30,13 +56,7 @@ void Config::Describe(Options& o) {
   o.Section("task");
   o.AddChoice(&task, "task", TaskNames(), "what is to be learned").implied = true;
   DescribeEnvironment(o);
-  if (algorithm == kSac) {
-    sac.Describe(o);
-  } else if (algorithm == kPpo) {
-    ppo.Describe(o);
-  } else {
-    dqn.Describe(o);
-  }
+  learner().Describe(o);
 }
 
 void Config::DescribePlantTask(Options& o) {
@@ -97,13 +117,6 @@ EnvConfig Config::Environments() const {
   env.stream = "training environment";
   env.mjcf = mjcf;
   return env;
-}
-
-std::unique_ptr<Agent> Config::MakeAgent(const EnvSpec& spec, ThreadPool& pool) const {
-  const auto seed = static_cast<uint64_t>(train.seed);
-  if (algorithm == kSac) return std::make_unique<Sac>(sac, spec, seed, pool);
-  if (algorithm == kPpo) return std::make_unique<Ppo>(ppo, spec, seed, pool);
-  return std::make_unique<Dqn>(dqn, spec, seed, pool);
 }
 
 void ExpectSameSettings(const Config& before, const Config& now, const std::string& where,

@@ -25,9 +25,6 @@ inline constexpr int kMostMemory = 100;
 /// Evaluations in the closed form, and once more in MuJoCo where they are passed there.
 inline constexpr std::string_view kScreened = "screened";
 
-inline constexpr const char* kDqn = "dqn";
-inline constexpr const char* kSac = "sac";
-inline constexpr const char* kPpo = "ppo";
 /// Names of the learning algorithms; the first is the usual one.
 const std::vector<std::string>& AlgorithmNames();
 
@@ -58,6 +55,10 @@ struct Config {
   explicit Config(std::string_view algorithm_name = AlgorithmNames().front())
       : algorithm(algorithm_name) {}
   /// Those of the algorithm.
+  AgentConfig& learner();
+  const AgentConfig& learner() const { return const_cast<Config*>(this)->learner(); }
+
+  /// All of them, of the learners that of the algorithm.
   void Describe(Options& options);
   /// Those that a task without a plant does not have.
   void DescribePlantTask(Options& options);
@@ -68,7 +69,9 @@ struct Config {
   EnvConfig Environments() const;
 
   /// A new agent for such environments, whose work the pool shares.
-  std::unique_ptr<Agent> MakeAgent(const EnvSpec& spec, ThreadPool& pool) const;
+  std::unique_ptr<Agent> MakeAgent(const EnvSpec& spec, ThreadPool& pool) const {
+    return learner().Make(spec, static_cast<uint64_t>(train.seed), pool);
+  }
 };
 
 /// The settings of all algorithms, each name once; they point into `scratch`.

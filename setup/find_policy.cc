@@ -3,11 +3,11 @@
 #include <set>
 
 #include "core/error.h"
+#include "core/format.h"
 #include "core/text.h"
 #include "io/run_folder.h"
 #include "io/tensor_file.h"
 #include "setup/controllers.h"
-#include "setup/format.h"
 #include "setup/loaded_policy.h"
 
 namespace upswing {

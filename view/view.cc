@@ -6,9 +6,9 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/format.h"
 #include "core/text.h"
 #include "io/frames.h"
-#include "setup/format.h"
 
 namespace upswing {
 namespace {

@@ -43,7 +43,7 @@ LAYERS = ["core", "nn", "sim", "rl", "control"]
 FAST = ["nn/linear", "nn/product", "sim/closed_form", "control/trajectory", "control/pendulum_model", "rl/replay", "rl/sum_tree", "rl/n_step",
         "rl/sac_update"]
 SETUP = ["setup/config.cc", "setup/config_checks.cc", "setup/config_layers.cc", "setup/controllers.cc",
-         "setup/format.cc", "setup/loaded_policy.cc", "setup/task.cc", "setup/toml_settings.cc",
+         "setup/loaded_policy.cc", "setup/task.cc", "setup/toml_settings.cc",
          "run/training.cc"]
 
 # Of LLVM's libraries, what the module asks for.

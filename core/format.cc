@@ -1,17 +1,21 @@
-#include "setup/format.h"
-
-#include <fmt/format.h>
+#include "core/format.h"
 
 #include <cmath>
 #include <cstdint>
 
+#include "core/text.h"
+
 namespace upswing {
 
 std::string FormatDuration(double seconds) {
-  if (seconds < 60) return fmt::format("{:.1f} s", seconds);
+  if (seconds < 60) {
+    const auto tenths = static_cast<int64_t>(std::llround(10 * seconds));
+    return Concat(tenths / 10, ".", tenths % 10, " s");
+  }
   const auto whole = static_cast<int64_t>(std::llround(seconds));
-  if (whole < 3600) return fmt::format("{} min {:02} s", whole / 60, whole % 60);
-  return fmt::format("{} h {:02} min", whole / 3600, whole / 60 % 60);
+  const auto two_digits = [](int64_t x) { return Concat(x < 10 ? "0" : "", x); };
+  if (whole < 3600) return Concat(whole / 60, " min ", two_digits(whole % 60), " s");
+  return Concat(whole / 3600, " h ", two_digits(whole / 60 % 60), " min");
 }
 
 std::string Shortened(const std::string& text, size_t most) {

@@ -1,0 +1,26 @@
+#include "rl/agent_config.h"
+
+#include <algorithm>
+
+#include "core/format.h"
+#include "core/text.h"
+
+namespace upswing {
+
+std::string WidthsText(const std::vector<int64_t>& widths) {
+  std::vector<std::string> texts;
+  for (const int64_t width : widths) texts.push_back(std::to_string(width));
+  return Join(texts, "-");
+}
+
+double Widest(const std::vector<int64_t>& widths) {
+  return static_cast<double>(*std::ranges::max_element(widths));
+}
+
+void WarnOfNoRate(double begin, double end, std::vector<std::string>& warnings) {
+  if (begin == 0 && end == 0) {
+    warnings.emplace_back("learning_rate is 0 to the end: nothing will be learned");
+  }
+}
+
+}  // namespace upswing
