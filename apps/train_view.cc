@@ -140,8 +140,11 @@ void TrainView::Summarize(const std::filesystem::path& run, bool finished) {
   std::error_code error;
   const bool has_policy = s.best_step > 0 && std::filesystem::exists(policy, error);
   if (has_policy) {
-    Say("Best policy: {} (step {}, success {:.0f}%, return {:.0f})\n", Printable(policy.string()),
-        FormatCount(s.best_step), 100 * s.best_success_rate, s.best_return);
+    const bool unconfirmed =
+        IsScreened(training_.config()) && !s.solved && s.best_success_rate == 1;
+    Say("Best policy: {} (step {}, success {:.0f}%{}, return {:.0f})\n",
+        Printable(policy.string()), FormatCount(s.best_step), 100 * s.best_success_rate,
+        unconfirmed ? " in closed form" : "", s.best_return);
   } else if (s.best_step > 0) {
     Say("Best policy: of step {}, but {} no longer exists\n", FormatCount(s.best_step),
         Printable(policy.string()));

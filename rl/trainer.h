@@ -83,6 +83,10 @@ struct TrainSetup {
   PolicyInfo policy_info = {};
   /// Told in this order.
   std::vector<TrainObserver*> observers = {};
+  /// A stricter and slower judge of a policy that `evaluate` passes; empty: none. Its evaluation
+  /// counts in place of the other one. It judges the second passed policy in a row, before the task
+  /// counts as solved, and afterwards each policy that would be the best one.
+  std::function<Evaluation(const Policy&, int64_t step)> confirm = {};
 };
 
 /// The training loop, step by step. It knows neither files nor terminals: who drives it writes
@@ -111,7 +115,8 @@ class Trainer {
   void CountEpisodes();
   /// Evaluates the present policy. An unscheduled final evaluation does not count towards `solved`.
   void Evaluate(bool scheduled);
-  void KeepIfBest(const Evaluation& e);
+  bool IsBest(const Evaluation& e) const;
+  void KeepAsBest(const Evaluation& e);
   /// Solved: two passed evaluations in a row.
   void CountStreak(const Evaluation& e);
 

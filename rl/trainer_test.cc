@@ -47,6 +47,17 @@ class TrainerTest : public ::testing::Test, protected TrainObserver {
       e.passed = e.successes == 4;
       return e;
     };
+    if (!confirmations_.empty()) {
+      setup.confirm = [this](const Policy&, int64_t step) {
+        Evaluation e;
+        e.episodes = 4;
+        e.successes = confirmations_.at(confirmed_.size());
+        e.reward_sum.mean = 0.5;  // less than any other evaluation's
+        e.passed = e.successes == 4;
+        confirmed_.push_back(step);
+        return e;
+      };
+    }
     return {dqn_, std::move(setup)};
   }
 
@@ -69,6 +80,8 @@ class TrainerTest : public ::testing::Test, protected TrainObserver {
   DqnConfig dqn_;
   std::vector<int64_t> scripted_;  // successes of 4, one for each evaluation
   int evaluations_ = 0;
+  std::vector<int64_t> confirmations_;  // successes of 4 by the stricter judge; empty: there is none
+  std::vector<int64_t> confirmed_;      // steps at which it was asked
   // What it was told.
   std::vector<std::pair<int64_t, double>> episodes_;  // step and return
   std::vector<int64_t> metrics_, best_;               // steps
@@ -103,6 +116,38 @@ TEST_F(TrainerTest, TellsTheBestPolicyByItsSuccessAndThenItsReturn) {
   scripted_ = {1, 3, 2, 3, 1, 0};  // the scripted return rises by one with each evaluation
   EXPECT_EQ(Run().best_step, 400);
   EXPECT_EQ(best_, (std::vector<int64_t>{100, 200, 400}));
+}
+
+TEST_F(TrainerTest, SolvedIsConfirmedOnceAndThatPolicyIsTheBest) {
+  scripted_ = {4, 4, 4};
+  confirmations_ = {4};
+  const TrainState state = Run();
+  EXPECT_TRUE(state.solved);
+  EXPECT_EQ(state.streak_step, 100);
+  EXPECT_EQ(confirmed_, (std::vector<int64_t>{200}));
+  EXPECT_EQ(state.best_step, 200);
+  EXPECT_EQ(state.best_return, 0.5);  // as the stricter judge has it
+  EXPECT_EQ(best_, (std::vector<int64_t>{100, 200}));
+}
+
+TEST_F(TrainerTest, WhereItIsNotConfirmedTheStreakStartsAgain) {
+  scripted_ = {4, 4, 4, 4, 4, 4};
+  confirmations_ = {3, 4};
+  const TrainState state = Run();
+  EXPECT_TRUE(state.solved);
+  EXPECT_EQ(state.streak_step, 300);
+  EXPECT_EQ(confirmed_, (std::vector<int64_t>{200, 400}));
+  EXPECT_EQ(best_, (std::vector<int64_t>{100, 200, 300, 400}));
+}
+
+TEST_F(TrainerTest, OnceSolvedABetterPolicyIsConfirmedToo) {
+  scripted_ = {4, 4, 3, 4, 4, 0};
+  confirmations_ = {4, 3, 4};
+  config_.stop_when_solved = false;
+  const TrainState state = Run();
+  EXPECT_TRUE(state.solved);
+  EXPECT_EQ(confirmed_, (std::vector<int64_t>{200, 400, 500}));
+  EXPECT_EQ(state.best_step, 200);
 }
 
 TEST_F(TrainerTest, TellsMetricsAtTheirIntervalAndEachEpisodeOnce) {

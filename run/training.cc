@@ -28,6 +28,10 @@ std::unique_ptr<VectorEnv> MakeTrainingEnv(const Config& config, ThreadPool& poo
 
 }  // namespace
 
+bool IsScreened(const Config& config) {
+  return config.eval_physics == kScreened && config.mjcf.empty() && config.task == kDoublePendulum;
+}
+
 EnvConfig EvaluationEnvironments(const Config& config, int64_t step) {
   EnvConfig env = config.Environments();
   env.num_envs = static_cast<int>(config.train.eval_episodes);
@@ -43,10 +47,20 @@ Training::Training(Config config, int threads, std::vector<TrainObserver*> obser
       pool_(threads, config_.train.threads == 0),
       env_(MakeTrainingEnv(config_, pool_)),
       agent_(config_.MakeAgent(env_->spec(), pool_)),
-      trainer_({config_.train,
-                [this](const Policy& policy, int64_t step) { return Evaluate(policy, step); },
-                InfoOf(config_), std::move(observers)},
-               *agent_, *env_) {}
+      trainer_(MakeSetup(std::move(observers)), *agent_, *env_) {}
+
+TrainSetup Training::MakeSetup(std::vector<TrainObserver*> observers) {
+  TrainSetup setup{.config = config_.train,
+                   .policy_info = InfoOf(config_),
+                   .observers = std::move(observers)};
+  setup.evaluate = [this](const Policy& policy, int64_t step) { return Evaluate(policy, step); };
+  if (IsScreened(config_)) {
+    setup.confirm = [this](const Policy& policy, int64_t step) {
+      return EvaluateIn(kMuJoCo, policy, step);
+    };
+  }
+  return setup;
+}
 
 std::unique_ptr<Policy> Training::policy() const {
   PolicyInfo info = InfoOf(config_);
@@ -55,15 +69,9 @@ std::unique_ptr<Policy> Training::policy() const {
 }
 
 Evaluation Training::Evaluate(const Policy& policy, int64_t step) {
-  // The closed form finds a failing policy quickly; one that passes is evaluated in MuJoCo.
-  if (config_.eval_physics != kScreened) {
-    return EvaluateIn(FindEngine(config_.eval_physics, "--eval-physics"), policy, step);
-  }
-  if (config_.mjcf.empty()) {
-    Evaluation screening = EvaluateIn(kClosedForm, policy, step);
-    if (!screening.passed || config_.task != kDoublePendulum) return screening;
-  }
-  return EvaluateIn(kMuJoCo, policy, step);
+  if (IsScreened(config_)) return EvaluateIn(kClosedForm, policy, step);
+  if (config_.eval_physics == kScreened) return EvaluateIn(kMuJoCo, policy, step);
+  return EvaluateIn(FindEngine(config_.eval_physics, "--eval-physics"), policy, step);
 }
 
 Evaluation Training::EvaluateIn(const Engine& engine, const Policy& policy, int64_t step) {

@@ -14,6 +14,10 @@ namespace upswing {
 /// each. The engine is the training's.
 EnvConfig EvaluationEnvironments(const Config& config, int64_t step);
 
+/// Whether evaluations are in the closed form, and MuJoCo confirms what solves the task. With the
+/// same setting a model of your own, which has no closed form, is evaluated in MuJoCo.
+bool IsScreened(const Config& config);
+
 /// A training made of its settings: environments, agent and training loop. It writes no file; see
 /// TrainingRun.
 class Training {
@@ -48,6 +52,7 @@ class Training {
   void Load(const Tensors& checkpoint);
 
  private:
+  TrainSetup MakeSetup(std::vector<TrainObserver*> observers);
   Evaluation EvaluateIn(const Engine& engine, const Policy& policy, int64_t step);
 
   Config config_;

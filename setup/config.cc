@@ -82,7 +82,7 @@ void Config::DescribeEnvironment(Options& o) {
   std::vector<std::string> judges = EngineNames();
   judges.insert(judges.begin(), std::string(kScreened));
   o.AddChoice(&eval_physics, "eval_physics", judges,
-              "engine of the evaluations; screened: in mujoco what succeeds in closed-form");
+              "engine of the evaluations; screened: closed-form, and mujoco confirms what solves");
   o.Section("plant");
   o.Add(&model, "model", "MJCF file to use instead of the built-in model");
   plant.Describe(o);
