@@ -30,7 +30,7 @@ extern const Engine kClosedForm;
 /// Settings of the physics.
 struct PhysicsConfig {
   const Engine* engine = &kClosedForm;
-  std::vector<Plant> plants{Plant()};  // one for all environments, or one for each
+  std::vector<Plant> plants = std::vector<Plant>(1);  // one for all environments, or one for each
   int num_envs = 1;
   RewardWeights weights;
   std::string mjcf;            // replaces the built-in model if not empty; see LoadModel
