@@ -3,6 +3,7 @@
 #include "core/error.h"
 #include "core/format.h"
 #include "core/text.h"
+#include "rl/agent_config.h"
 
 namespace upswing {
 
