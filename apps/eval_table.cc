@@ -84,7 +84,7 @@ void PrintEvalTable(const EvalReport& report) {
   const Evaluation& e = report.figures;
   fmt::print("{}\n", Printable(report.policy));
   const EvaluationRule& rule = report.spec.evaluation;
-  if (report.spec.task == kDoublePendulum) {
+  if (HasPlant(report.spec.task)) {
     fmt::print("  plant          {}, physics {}\n", PlantText(report.env.plant(0)), report.physics);
   } else {
     fmt::print("  task           {}, success is {}\n", report.spec.task, SuccessText(rule));

@@ -92,7 +92,7 @@ void PrintPolicy(const LoadedPolicy& loaded) {
   fmt::print("{}\n", Printable(loaded.name));
   fmt::print("  what        {}, {} parameters\n", policy.description(),
              FormatCount(policy.num_parameters()));
-  if (loaded.task != kDoublePendulum) fmt::print("  task        {}\n", loaded.task);
+  if (!HasPlant(loaded.task)) fmt::print("  task        {}\n", loaded.task);
   EnvConfig env;
   env.task = loaded.task;
   std::span<const double> levels = policy.value_actions().values();
@@ -106,7 +106,7 @@ void PrintPolicy(const LoadedPolicy& loaded) {
   fmt::print("  made by     agent {}, seed {}, step {}, upswing {}\n", Known(info.agent),
              Known(info.seed), Known(info.step), Known(info.upswing_version));
   fmt::print("  evaluated   {}\n", EvaluationText(info));
-  if (loaded.task == kDoublePendulum) {
+  if (HasPlant(loaded.task)) {
     fmt::print("  observes    {}\n", ObservationText(loaded));
     fmt::print("  plant       {}\n", PlantText(loaded.plant));
   }

@@ -42,9 +42,12 @@ std::string Caption(const PlotArguments& a, const RolloutConfig& config, const R
                     const LoadedPolicy& loaded) {
   std::vector<std::string> parts;
   if (a.episode.given()) parts.push_back(Concat("episode ", a.episode.number, " of eval"));
-  const bool pendulum = config.env.task == kDoublePendulum;
-  const std::string usual = pendulum ? "0,0,0,0" : "of its own";
-  if (!a.episode.given()) parts.push_back(Concat("start ", a.episode.start.value_or(usual)));
+  const bool pendulum = HasPlant(config.env.task);
+  const char* usual = TaskNamed(config.env.task).usual_start;
+  if (!a.episode.given()) {
+    parts.push_back(
+        Concat("start ", a.episode.start.value_or(usual != nullptr ? usual : "of its own")));
+  }
   parts.push_back(Concat("seed ", a.trial.seed));
   if (!pendulum) return Join(parts, "; ");
   parts.push_back(a.trial.physics);
@@ -62,7 +65,7 @@ int RunPlot(const PlotArguments& a) {
   config.env = TrialEnvironments(a.trial, &loaded);
   config.start = ChooseEpisode(a.episode, config.env);
   const EnvSpec spec = SpecOf(config.env);
-  const bool pendulum = spec.task == kDoublePendulum;
+  const bool pendulum = HasPlant(spec.task);
   const double usual = a.episode.given() || !pendulum ? spec.evaluation.seconds : 10;
   config.seconds = a.seconds < 0 ? usual : a.seconds;
   config.estimates = true;

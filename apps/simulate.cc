@@ -59,7 +59,7 @@ int RunSimulate(const SimulateArguments& a) {
   WriteOutput(a.csv, RolloutCsv(rollout));
   if (IsStandardStream(a.csv)) return 0;
   fmt::print("{}: {} rows\n", Printable(a.csv), rollout.rows.size());
-  if (spec.task == kDoublePendulum) fmt::print("  plant      {}\n", EpisodeText(rollout));
+  if (HasPlant(spec.task)) fmt::print("  plant      {}\n", EpisodeText(rollout));
   fmt::print("  torque     {}\n", TorqueText(rollout));
   if (loaded && a.episode.given()) {
     fmt::print("  episode    {} of eval: {}\n", a.episode.number,

@@ -30,7 +30,7 @@ void TrainView::Announce(const std::filesystem::path& run) const {
   Say("  {}, {} parameters; {} environments, {} thread{}\n", config.learner().Text(),
       FormatCount(training_.policy()->num_parameters()), config.train.envs, threads,
       threads == 1 ? "" : "s");
-  if (config.task != kDoublePendulum) Say("  task {}\n", config.task);
+  if (!HasPlant(config.task)) Say("  task {}\n", config.task);
   if (config.physics != kMuJoCo.name) Say("  physics {}\n", config.physics);
   const std::optional<ModelInfo> model = InfoOfModel(config.mjcf, config.model);
   if (model) Say("  model {}\n", model->Text());
@@ -153,7 +153,7 @@ void TrainView::Summarize(const std::filesystem::path& run, bool finished) {
   const std::string folder = ShellQuoted(run.string());
   Say("Next:\n");
   if (has_policy) {
-    if (training_.config().task == kDoublePendulum) Say("  ./upswing demo {}\n", folder);
+    if (HasPlant(training_.config().task)) Say("  ./upswing demo {}\n", folder);
     Say("  ./upswing eval {0}\n  ./upswing info {0}\n", folder);
   }
   std::string how;

@@ -45,7 +45,7 @@ std::vector<LoadedPolicy> PoliciesOf(const ViewArguments& a) {
   }
   std::vector<LoadedPolicy> policies = GetPolicies(a.names, a.controller);
   for (const LoadedPolicy& loaded : policies) {
-    if (loaded.task == kDoublePendulum) continue;
+    if (HasPlant(loaded.task)) continue;
     throw BadInput(Concat(loaded.name, ": expected a policy of ", kDoublePendulum,
                           ", which alone can be viewed, got one of ", loaded.task));
   }

@@ -54,7 +54,7 @@ class Observer {
   explicit Observer(const ExportedPolicy& policy) : policy_(policy) {
     EnvConfig config;
     config.task = policy.loaded->task;
-    if (config.task != kDoublePendulum) env_ = MakeEnv(config);
+    if (!HasPlant(config.task)) env_ = MakeEnv(config);
   }
 
   /// That of a state (S), float numbers.

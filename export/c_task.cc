@@ -114,7 +114,7 @@ std::string PlantParagraph(const Plant& plant, const std::string& what) {
 }
 
 CTask CTaskOf(const LoadedPolicy& loaded) {
-  if (loaded.task == kDoublePendulum) return PendulumCode(loaded);
+  if (HasPlant(loaded.task)) return PendulumCode(loaded);
   if (loaded.task == kPendulumV1) {
     return {"swings up and balances a pendulum (Gymnasium's Pendulum-v1)",
             {{"theta", "rad    angle, 0 upright"}, {"omega", "rad/s  its velocity"}},

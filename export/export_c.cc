@@ -179,7 +179,7 @@ std::string HeaderWriter::HeadComment() const {
     states += Concat(" *   ", name, std::string(8 - std::min(size_t{7}, name.size()), ' '), meaning,
                      '\n');
   }
-  if (loaded.task == kDoublePendulum) {
+  if (HasPlant(loaded.task)) {
     plant = PlantParagraph(loaded.plant, "by which it computes energy and height");
   }
   size_t tanhs = policy_.kind == PolicyOutputKind::kSquashedGaussian ? 1 : 0;

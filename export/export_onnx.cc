@@ -146,7 +146,7 @@ void AddMetadata(OnnxModel& model, const ExportedPolicy& policy) {
   add("control_period", policy.spec.step_seconds);
   add("torque_limit", policy.limit);
   if (policy.is_discrete()) add("torques", policy.torques);
-  if (loaded.task == kDoublePendulum) {
+  if (HasPlant(loaded.task)) {
     ordered_json plant;
     for (const auto& [name, value] : PlantValues(loaded.plant)) plant[name] = value;
     add("plant", plant);

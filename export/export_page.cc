@@ -100,7 +100,7 @@ void AddCheckpoints(PageAgent& agent, const LoadedPolicy& loaded, int64_t count)
 PageAgent ReadAgent(const fs::path& path, const std::string& given_id, int64_t checkpoints) {
   const LoadedPolicy loaded = LoadPolicy(path);
   const std::string where = loaded.path.string();
-  if (loaded.task != kDoublePendulum) {
+  if (!HasPlant(loaded.task)) {
     throw BadInput(Concat(where,
                           ": expected a policy of the double pendulum, which is what the page ",
                           "shows, got one of ", loaded.task));

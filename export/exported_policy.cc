@@ -118,7 +118,7 @@ std::vector<NamedInput> PendulumInputs(int memory) {
 }
 
 std::vector<NamedInput> InputsOf(const LoadedPolicy& loaded) {
-  if (loaded.task == kDoublePendulum) return PendulumInputs(loaded.memory());
+  if (HasPlant(loaded.task)) return PendulumInputs(loaded.memory());
   if (loaded.task == kPendulumV1) {
     return {{"cos theta", "cosine of the angle, 0 upright"},
             {"sin theta", "its sine"},

@@ -26,7 +26,7 @@ void BoundsConfig::Describe(Options& o) {
 }
 
 void CheckComparable(const LoadedPolicy& loaded, const BoundsConfig& config) {
-  if (loaded.task != kDoublePendulum || !loaded.mjcf.empty()) {
+  if (!HasPlant(loaded.task) || !loaded.mjcf.empty()) {
     throw BadInput(
         Concat("bounds: expected policies of the built-in double pendulum, got ", loaded.name));
   }

@@ -37,7 +37,7 @@ std::vector<std::pair<std::string, std::string>> Cells(const EvalReport& report,
     cells.emplace_back(name, known ? FormatNumber(value) : "");
   };
   for (size_t i = 0; i < episode.start.size(); ++i) add(spec.state_names[i], episode.start[i]);
-  if (spec.task == kDoublePendulum) {
+  if (HasPlant(spec.task)) {
     for (const auto& [name, value] : PlantValues(episode.plant)) add(name, value);
     const auto joint = static_cast<int>(episode.plant.actuated_joint);
     const double delta = PassiveJointOf(ManipulatorOf(episode.plant), joint).delta;
@@ -189,9 +189,9 @@ std::string EvalJson(const EvalReport& report) {
   j["policy"] = report.policy;
   j["seed"] = report.env.seed;
   j["physics"] = nullptr;
-  if (report.spec.task == kDoublePendulum) j["physics"] = report.physics;
+  if (HasPlant(report.spec.task)) j["physics"] = report.physics;
   j["task"] = report.spec.task;
-  if (report.spec.task != kDoublePendulum) {
+  if (!HasPlant(report.spec.task)) {
     AddFigures(report.figures, report.spec, report.knows_values, j);
     return PrintableJson(j);
   }

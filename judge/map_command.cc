@@ -144,7 +144,7 @@ void MapArguments::Describe(Options& o) {
 }
 
 MapResult PlanMap(const MapArguments& a, const LoadedPolicy& loaded) {
-  if (loaded.task != kDoublePendulum) {
+  if (!HasPlant(loaded.task)) {
     throw BadInput(
         Concat("map: expected a policy of the double pendulum, whose plant and start are ",
                "the axes, got one of ", loaded.task));

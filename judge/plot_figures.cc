@@ -243,7 +243,7 @@ Panel QValues(const Rollout& rollout, std::span<const double> torques) {
 /// The motion over time: of the double pendulum with its energy, of other tasks each state
 /// variable.
 std::vector<Panel> StatePanels(const Rollout& rollout) {
-  if (rollout.spec.task == kDoublePendulum) {
+  if (HasPlant(rollout.spec.task)) {
     const std::vector<Moment> motion = MotionOf(rollout.rows);
     return {Angles(motion), Velocities(motion), Energies(motion, rollout.plant)};
   }

@@ -120,7 +120,7 @@ Rollout RunRollout(const RolloutConfig& config) {
 }
 
 TorqueFigures TorquesOf(const Rollout& rollout) {
-  const bool pendulum = rollout.spec.task == kDoublePendulum;
+  const bool pendulum = HasPlant(rollout.spec.task);
   const std::vector<RolloutRow>& rows = rollout.rows;
   // The torque of the double pendulum's last state leads nowhere.
   const size_t steps = rows.size() - (pendulum && rows.size() > 1 ? 1 : 0);
@@ -163,7 +163,7 @@ std::string TorqueText(const Rollout& rollout) {
 }
 
 std::string RolloutCsv(const Rollout& rollout) {
-  const bool pendulum = rollout.spec.task == kDoublePendulum;
+  const bool pendulum = HasPlant(rollout.spec.task);
   std::string csv;
   if (pendulum) {
     csv =
@@ -208,7 +208,7 @@ std::string JudgementText(const EvaluationEpisode& episode, const EvaluationRule
 }
 
 std::string EpisodeText(const Rollout& rollout) {
-  if (rollout.spec.task != kDoublePendulum) return "";
+  if (!HasPlant(rollout.spec.task)) return "";
   std::string text = PlantText(rollout.plant);
   const auto& [noise, delay] = rollout.disturbance;
   if (noise > 0) text += Concat(", sensor_noise ", FormatNumber(noise));

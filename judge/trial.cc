@@ -58,7 +58,7 @@ TrialConditions ConditionsOf(const TrialArguments& a) {
 
 EnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded) {
   EnvConfig env;
-  if (loaded != nullptr && loaded->task != kDoublePendulum) return OtherTask(a, *loaded);
+  if (loaded != nullptr && !HasPlant(loaded->task)) return OtherTask(a, *loaded);
   env.engine = &FindEngine(a.physics, "--physics");
   const TrialConditions conditions = ConditionsOf(a);
   env.disturbances = {conditions.disturbance};
@@ -86,7 +86,7 @@ std::unique_ptr<VectorEnv> OneEpisode(EnvConfig config, int index) {
 }
 
 std::string ChangesText(const EnvConfig& env) {
-  if (env.task != kDoublePendulum) return "";
+  if (!HasPlant(env.task)) return "";
   const TrialConditions now{env.disturbance(0), env.randomization}, usual;
   std::vector<std::string> texts;
   for (const auto& [option, before] : Differences(OptionsOf(now), OptionsOf(usual))) {
@@ -125,9 +125,9 @@ std::optional<std::vector<double>> ChooseEpisode(const EpisodeArguments& a, EnvC
     throw BadInput("--start: expected none beside --episode, which has a start of its own");
   }
   env.first_index = static_cast<uint64_t>(std::max<int64_t>(0, a.number));
-  // The double pendulum begins hanging at rest, other tasks in a start of their own.
-  if (a.given() || (!a.start && env.task != kDoublePendulum)) return std::nullopt;
-  return ParseStart(a.start.value_or("0,0,0,0"), SpecOf(env));
+  const char* usual = TaskNamed(env.task).usual_start;
+  if (a.given() || (!a.start && usual == nullptr)) return std::nullopt;
+  return ParseStart(a.start ? *a.start : usual, SpecOf(env));
 }
 
 }  // namespace upswing

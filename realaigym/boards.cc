@@ -151,7 +151,7 @@ Competitor GetCompetitor(const PolicyArguments& a, const std::string& robot) {
     }
   }
   const auto loaded = std::make_shared<const LoadedPolicy>(GetPolicy(a));
-  if (loaded->task != kDoublePendulum) {
+  if (!HasPlant(loaded->task)) {
     throw BadInput(Concat(Printable(loaded->name),
                           ": expected a policy of the double pendulum, got "
                           "one of ",

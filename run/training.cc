@@ -29,7 +29,7 @@ std::unique_ptr<VectorEnv> MakeTrainingEnv(const Config& config, ThreadPool& poo
 }  // namespace
 
 bool IsScreened(const Config& config) {
-  return config.eval_physics == kScreened && config.mjcf.empty() && config.task == kDoublePendulum;
+  return config.eval_physics == kScreened && config.mjcf.empty() && HasPlant(config.task);
 }
 
 EnvConfig EvaluationEnvironments(const Config& config, int64_t step) {

@@ -24,7 +24,7 @@ AgentSize SizeOfLearner(const Config& config) {
 /// Throws BadInput if a setting of the double pendulum is not at its default in another task, which
 /// has no such setting.
 void CheckTask(Config& config, const std::string& where) {
-  if (config.task == kDoublePendulum) return;
+  if (HasPlant(config.task)) return;
   Config defaults;
   Options now, usual;
   config.DescribePlantTask(now);

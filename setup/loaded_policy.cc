@@ -62,7 +62,7 @@ void CheckTask(const LoadedPolicy& loaded, const std::string& where) {
     throw BadInput(Concat(where, ": expected actions of ", spec.action_size(), " number, as ",
                           loaded.task, " has, got ", loaded.policy->action_size()));
   }
-  if (loaded.task == kDoublePendulum) return CheckObservation(loaded, where);
+  if (HasPlant(loaded.task)) return CheckObservation(loaded, where);
   if (loaded.policy->obs_size() != spec.obs_size) {
     throw BadInput(Concat(where, ": expected a policy of ", spec.obs_size, " observations, as ",
                           loaded.task, " has, got ", loaded.policy->obs_size()));
@@ -102,7 +102,7 @@ LoadedPolicy ReadPolicy(const Tensors& file) {
   const std::string task = info.task.empty() ? kDoublePendulum : info.task;
   LoadedPolicy loaded{where, where, policy, task, Plant(), ""};
   CheckTask(loaded, where);
-  if (loaded.task != kDoublePendulum) return loaded;
+  if (!HasPlant(loaded.task)) return loaded;
   loaded.plant = TrainingPlant(info, where);
   loaded.mjcf = info.model;
   if (!loaded.mjcf.empty()) LoadModel(loaded.mjcf, Concat(where, ": metadata \"model\""));
@@ -110,12 +110,12 @@ LoadedPolicy ReadPolicy(const Tensors& file) {
 }
 
 int LoadedPolicy::memory() const {
-  return task == kDoublePendulum ? MemorySteps(policy->obs_size(), identifies()) : 0;
+  return HasPlant(task) ? MemorySteps(policy->obs_size(), identifies()) : 0;
 }
 
 bool LoadedPolicy::identifies() const {
   const auto& observation = policy->info().observation;
-  return task == kDoublePendulum && observation && observation->identified;
+  return HasPlant(task) && observation && observation->identified;
 }
 
 PolicyInfo InfoOf(const Config& config) {
@@ -126,7 +126,7 @@ PolicyInfo InfoOf(const Config& config) {
   info.config = ConfigToml(config, true);
   info.task = config.task;
   info.control_period = SpecOf(config.Environments()).step_seconds;
-  if (config.task != kDoublePendulum) return info;
+  if (!HasPlant(config.task)) return info;
   for (const auto& [name, value] : PlantValues(config.plant)) info.plant[name] = value;
   info.observation = ObservationInfoOf(config.memory, config.identify);
   info.model = config.mjcf;

@@ -8,25 +8,27 @@
 namespace upswing {
 namespace {
 
-template <typename Task>
+template <typename GymTask>
 std::unique_ptr<VectorEnv> MakeGymTask(const EnvConfig& config) {
-  return std::make_unique<Task>(
+  return std::make_unique<GymTask>(
       GymTaskConfig{config.num_envs, config.seed, config.stream, config.first_index});
 }
 
-/// A task's name and how its environments are made.
-struct Task {
-  const char* name;
-  std::unique_ptr<VectorEnv> (*make)(const EnvConfig& config);
-};
+template <typename GymTask>
+constexpr Task RowOf(const char* name) {
+  return {name, MakeGymTask<GymTask>,
+          [](const EnvConfig& config) { return MakeGymTask<GymTask>(config)->spec(); }, false,
+          nullptr};
+}
 
 constexpr Task kTasks[] = {
     {kDoublePendulum,
      [](const EnvConfig& config) -> std::unique_ptr<VectorEnv> {
        return std::make_unique<PendulumEnv>(config);
-     }},
-    {kPendulumV1, MakeGymTask<PendulumV1>},
-    {kAcrobotV1, MakeGymTask<AcrobotV1>},
+     },
+     [](const EnvConfig& config) { return PendulumSpec(config); }, true, "0,0,0,0"},
+    RowOf<PendulumV1>(kPendulumV1),
+    RowOf<AcrobotV1>(kAcrobotV1),
 };
 
 }  // namespace
@@ -37,17 +39,11 @@ std::vector<std::string> TaskNames() {
   return names;
 }
 
-std::unique_ptr<VectorEnv> MakeEnv(const EnvConfig& config) {
+const Task& TaskNamed(std::string_view name) {
   for (const Task& task : kTasks) {
-    if (config.task == task.name) return task.make(config);
+    if (name == task.name) return task;
   }
-  throw BadInput(
-      Concat("task: expected one of ", Join(TaskNames(), ", "), ", got \"", config.task, "\""));
-}
-
-EnvSpec SpecOf(const EnvConfig& config) {
-  if (config.task == kDoublePendulum) return PendulumSpec(config);  // without making physics
-  return MakeEnv(config)->spec();
+  throw BadInput(Concat("task: expected one of ", Join(TaskNames(), ", "), ", got \"", name, "\""));
 }
 
 }  // namespace upswing

@@ -53,7 +53,7 @@ std::vector<std::array<std::string, 2>> StatusOf(const ViewEpisode& episode, dou
 ViewEpisode::ViewEpisode(ViewEntry entry) { Replace(std::move(entry)); }
 
 void ViewEpisode::Replace(ViewEntry entry) {
-  if (entry.env.task != kDoublePendulum) {
+  if (!HasPlant(entry.env.task)) {
     throw BadInput(Concat(entry.title, ": expected a policy of ", kDoublePendulum,
                           ", which alone can be viewed, got one of ", entry.env.task));
   }

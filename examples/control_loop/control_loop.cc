@@ -17,7 +17,7 @@ int main(int argc, char** argv) try {
   if (argc != 2) throw BadInput("usage: control_loop policy.safetensors");
   const LoadedPolicy loaded = LoadPolicy(argv[1]);
   const Policy& policy = *loaded.policy;
-  if (loaded.task != kDoublePendulum || loaded.memory() > 0) {
+  if (!HasPlant(loaded.task) || loaded.memory() > 0) {
     throw BadInput("expected a policy of the double pendulum without memory");
   }
 

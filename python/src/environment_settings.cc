@@ -30,7 +30,7 @@ Config EnvironmentConfig(const std::vector<FlagValue>& flags) {
     }
   }
   Config config = BuildConfig("", flags);
-  if (config.task != kDoublePendulum) {
+  if (!HasPlant(config.task)) {
     throw BadInput(Concat("agent: expected one of the task ", kDoublePendulum, ", got ",
                           config.agent, ", which learns ", config.task));
   }

@@ -56,7 +56,7 @@ std::pair<std::string, std::string> EvaluateHandle(const PolicyHandle& policy,
   DescribeThreads(own, &threads);
   DescribePhysics(own, &trial.physics);
   SetArguments(own, arguments);
-  if (policy.loaded().task != kDoublePendulum && !settings.empty()) {
+  if (!HasPlant(policy.loaded().task) && !settings.empty()) {
     throw BadInput(Concat(Printable(settings.front().first), ": expected none, as ",
                           policy.loaded().task, " has no such setting"));
   }

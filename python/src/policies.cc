@@ -90,7 +90,7 @@ nb::dict DescribeInfo(const PolicyHandle& self) {
   d["control_period"] = info.control_period;
   d["gamma"] = info.gamma;
   d["reward_scale"] = info.reward_scale;
-  d["plant"] = self.loaded().task == kDoublePendulum ? PlantDict(self.loaded().plant) : nb::dict();
+  d["plant"] = HasPlant(self.loaded().task) ? PlantDict(self.loaded().plant) : nb::dict();
   return d;
 }
 

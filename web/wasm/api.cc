@@ -167,7 +167,7 @@ UPSWING_EXPORT(policy_open) Controller* PolicyOpen(const std::byte* file, size_t
   return Guarded([&]() -> Controller* {
     const Tensors tensors = ReadSafetensors({file, file + size}, "the file");
     auto controller = std::make_unique<Controller>(ReadPolicy(tensors));
-    if (controller->loaded.task != kDoublePendulum) {
+    if (!HasPlant(controller->loaded.task)) {
       throw BadInput(
           Concat("expected a policy of the double pendulum, got one of ", controller->loaded.task));
     }
