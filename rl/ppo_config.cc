@@ -1,6 +1,7 @@
 #include "rl/ppo_config.h"
 
 #include "core/error.h"
+#include "core/format.h"
 #include "core/text.h"
 #include "nn/network.h"
 #include "rl/ppo.h"
