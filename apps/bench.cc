@@ -191,15 +191,11 @@ int RunBench(BenchOptions options) {
 
 }  // namespace
 
-void AddBench(CLI::App& program, Command& command) {
-  CLI::App* app = program.add_subcommand("bench", "Measure how fast it is on this machine");
+void AddBench(CommandLine& line) {
   auto o = std::make_shared<BenchOptions>();
-  app->add_option("parts", o->parts, "what to measure [everything]")->type_name("PART");
-  app->add_option(
-         "--json", o->json,
-         "file to write, in Google Benchmark's format; -: standard output, without the table")
-      ->check(NotEmpty())
-      ->type_name("FILE");
+  line.Texts("parts", o->parts, "PART", "what to measure [everything]");
+  line.Text("--json", o->json, "FILE",
+            "file to write, in Google Benchmark's format; -: standard output, without the table");
   Options own;
   own.Add(&o->threads, "threads", {1, 256}, "numbers of threads").usual =
       "1 and one for each processor, up to 8";
@@ -212,11 +208,11 @@ void AddBench(CLI::App& program, Command& command) {
       .usual = "several";
   own.Add(&o->batch, "batch", {1, 65536}, "", "gradient, sac, ppo: size of the minibatches").usual =
       "several";
-  AddArguments(*app, own);
+  line.Arguments(own);
 
   std::string parts = "Parts:\n";
   for (const BenchPart& part : Parts()) parts += fmt::format("  {:<10}{}\n", part.name, part.help);
-  app->footer(
+  line.Footer(
       parts +
       "\nGFLOP/s count the multiplications and additions that cannot be done without. The peak is\n"
       "what as many threads reach at once with multiply-adds in registers, measured before. CPU\n"
@@ -226,7 +222,7 @@ void AddBench(CLI::App& program, Command& command) {
       "  ./upswing bench gradient train --threads 1,2\n"
       "  ./upswing bench gradient --network plain --hidden 256,256 --batch 128 --json rate.json\n"
       "  ./upswing bench kernels --simd avx2 --seconds 1 --repetitions 5\n");
-  app->callback([o, &command] { command = [o] { return RunBench(*o); }; });
+  line.Run([o] { return RunBench(*o); });
 }
 
 }  // namespace upswing

@@ -108,26 +108,22 @@ int RunBounds(const BoundsArguments& a) {
 
 }  // namespace
 
-void AddBounds(CLI::App& program, Command& command) {
-  CLI::App* app = program.add_subcommand(
-      "bounds", "Search for the best episodes, and compare policies with them");
+void AddBounds(CommandLine& line) {
   auto a = std::make_shared<BoundsArguments>();
-  app->add_option("policy", a->policies, "policy files, run folders or controllers to compare")
-      ->type_name("POLICY|RUN");
+  line.Texts("policy", a->policies, "POLICY|RUN",
+             "policy files, run folders or controllers to compare");
   ControllerConfig controllers;
-  AddSettings(*app, OptionsOf(controllers), a->flags);
+  line.Settings(OptionsOf(controllers), a->flags);
   Options own;
   a->config.Describe(own);
-  AddArguments(*app, own);
-  AddSet(*app, a->config.trial.set, "another plant, such as mass2=1.2");
-  AddSeed(*app, a->config.trial.seed, "start states");
-  AddPhysics(*app, a->config.trial.physics);
-  AddThreads(*app, a->threads);
-  app->add_option("--csv", a->csv, "table to write, a row for each episode")
-      ->type_name("FILE")
-      ->check(NotEmpty());
-  app->add_flag("--json", a->as_json, "print JSON instead of a table")->disable_flag_override();
-  app->footer(
+  line.Arguments(own);
+  AddSet(line, a->config.trial.set, "another plant, such as mass2=1.2");
+  AddSeed(line, a->config.trial.seed, "start states");
+  AddPhysics(line, a->config.trial.physics);
+  AddThreads(line, a->threads);
+  line.Text("--csv", a->csv, "FILE", "table to write, a row for each episode");
+  line.Flag("--json", a->as_json, "print JSON instead of a table");
+  line.Footer(
       "The search knows the plant and each start: box-constrained differential dynamic "
       "programming\n"
       "from many first guesses, on the reward itself, smooth at first; for a table of torques "
@@ -138,7 +134,7 @@ void AddBounds(CLI::App& program, Command& command) {
       "  ./upswing bounds\n"
       "  ./upswing bounds runs/d3qn-seed1 runs/sac-seed1 mpc\n"
       "  ./upswing bounds --episodes 10 --set torque_limit=4 --csv bounds.csv\n");
-  app->callback([a, &command] { command = [a] { return RunBounds(*a); }; });
+  line.Run([a] { return RunBounds(*a); });
 }
 
 }  // namespace upswing

@@ -1,77 +1,63 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <cstdint>
-#include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
-#include "setup/config.h"
+#include "apps/command_line.h"
+#include "judge/trial.h"
 #include "setup/loaded_policy.h"
 
 namespace upswing {
 
-/// What the chosen subcommand does; returns the exit code.
-using Command = std::function<int()>;
+/// The program's commands, in the order of --help. Each is declared in the file of its name.
+std::span<const CommandEntry> Commands();
 
-/// Each adds its subcommand to the program and sets `command` when it is the one that was typed.
-void AddTrain(CLI::App& program, Command& command);
-void AddBounds(CLI::App& program, Command& command);
-void AddEval(CLI::App& program, Command& command);
-void AddSimulate(CLI::App& program, Command& command);
-void AddMap(CLI::App& program, Command& command);
-void AddPlot(CLI::App& program, Command& command);
-void AddInfo(CLI::App& program, Command& command);
-void AddCompare(CLI::App& program, Command& command);
-void AddStudy(CLI::App& program, Command& command);
-void AddExport(CLI::App& program, Command& command);
-void AddView(CLI::App& program, Command& command);
-void AddRealAiGym(CLI::App& program, Command& command);
-void AddBench(CLI::App& program, Command& command);
+void AddTrain(CommandLine& line);
+void AddBounds(CommandLine& line);
+void AddEval(CommandLine& line);
+void AddSimulate(CommandLine& line);
+void AddMap(CommandLine& line);
+void AddPlot(CommandLine& line);
+void AddInfo(CommandLine& line);
+void AddCompare(CommandLine& line);
+void AddStudy(CommandLine& line);
+void AddExport(CommandLine& line);
+void AddView(CommandLine& line);
+void AddRealAiGym(CommandLine& line);
+void AddBench(CommandLine& line);
 
-/// Refuses an empty text, such as that of a shell variable that is not set, for `what` is expected.
-CLI::Validator NotEmpty(const std::string& what = "a path");
-
-/// Adds a flag for each of a command's own arguments, which sets it at once; see Option::Set.
-void AddArguments(CLI::App& app, const Options& options);
-
-/// Adds a flag for each setting and alias, in the order in which they were described. What is given
-/// is added to `flags`.
-void AddSettings(CLI::App& app, const Options& options, std::vector<FlagValue>& flags);
-
-/// Lets --help show of `every` setting those of `options`, with their values now as defaults.
-void ShowDefaults(CLI::App& app, const Options& every, const Options& options);
-
-/// Adds the policy to try, a file, a run folder or a controller, and the controllers' settings; not
-/// required unless the caller says so.
-CLI::Option* AddPolicy(CLI::App& app, PolicyArguments& a);
+/// Adds the policy to try, a file, a run folder or a controller, and the controllers' settings.
+void AddPolicy(CommandLine& line, PolicyArguments& a);
 
 /// Adds the settings of controllers and --made-for.
-void AddControllers(CLI::App& app, PolicyArguments& a);
-
-/// Adds --start, which ParseStart reads.
-void AddStart(CLI::App& app, std::optional<std::string>& start);
+void AddControllers(CommandLine& line, PolicyArguments& a);
 
 /// Adds --seed, with `what` it is of.
-void AddSeed(CLI::App& app, int64_t& seed, const std::string& what);
+void AddSeed(CommandLine& line, int64_t& seed, const std::string& what);
 
 /// Adds --threads, which ResolveThreads reads.
-void AddThreads(CLI::App& app, int64_t& threads);
+void AddThreads(CommandLine& line, int64_t& threads);
 
 /// Adds --physics, which FindEngine reads.
-void AddPhysics(CLI::App& app, std::string& physics);
+void AddPhysics(CommandLine& line, std::string& physics);
 
 /// Adds --seeds and --jobs, for many runs; 0 jobs: as many as there are processors.
-void AddManyOptions(CLI::App& app, std::string& seeds, int64_t& jobs);
+void AddManyOptions(CommandLine& line, std::string& seeds, int64_t& jobs);
 
 /// Adds --set, which ApplyChanges reads.
-void AddSet(CLI::App& app, std::vector<std::string>& set, const std::string& help);
-
-/// Adds --set and --model, which choose another plant.
-void AddPlantOptions(CLI::App& app, std::vector<std::string>& set, std::string& model);
+void AddSet(CommandLine& line, std::vector<std::string>& set, const std::string& help);
 
 /// Adds --unknown-plant: observations are scaled as in training, also on another plant.
-void AddUnknownPlant(CLI::App& app, bool& unknown_plant);
+void AddUnknownPlant(CommandLine& line, bool& unknown_plant);
+
+/// Adds --set, --model, --physics, --seed (of `seed_of`), --unknown-plant, and the settings of
+/// Disturbance and Randomization: how `eval`, `simulate` and `plot` try a policy out.
+void AddTrialOptions(CommandLine& line, TrialArguments& a, const std::string& seed_of);
+
+/// Adds --start and --episode.
+void AddEpisodeOptions(CommandLine& line, EpisodeArguments& a);
 
 }  // namespace upswing

@@ -91,32 +91,23 @@ int RunCompare(const CompareArguments& arguments) {
 
 }  // namespace
 
-void AddCompare(CLI::App& program, Command& command) {
-  CLI::App* app = program.add_subcommand(
-      "compare", "Compare trainings over their seeds, with intervals and curves");
+void AddCompare(CommandLine& line) {
   auto a = std::make_shared<CompareArguments>();
-  app->add_option("runs", a->names,
-                  Concat("run folders, or folders that hold some; beside them policy.safetensors ",
-                         "or controllers: ", Join(ControllerNames(), ", ")))
-      ->type_name("RUN|FOLDER|POLICY")
-      ->required()
-      ->check(NotEmpty());
-  AddControllers(*app, a->controllers);
-  app->add_option("--out", a->out,
-                  "new folder for summary.csv, runs.csv, policies.csv, curves.svg and curves.png "
-                  "(curves-2 and so on for further tasks)")
-      ->type_name("FOLDER")
-      ->check(NotEmpty());
-  app->add_flag("--unfinished", a->unfinished, "compare unfinished runs too, as they are")
-      ->disable_flag_override();
-  app->add_flag(
-         "--different-tasks", a->different_tasks,
-         "compare groups that are evaluated on different tasks (plant, disturbance, number of "
-         "episodes) with each other as well")
-      ->disable_flag_override();
-  AddThreads(*app, a->threads);
-  app->add_flag("--json", a->as_json, "print JSON")->disable_flag_override();
-  app->footer(
+  line.Texts("runs", a->names, "RUN|FOLDER|POLICY",
+             Concat("run folders, or folders that hold some; beside them policy.safetensors ",
+                    "or controllers: ", Join(ControllerNames(), ", ")));
+  line.Require("runs");
+  AddControllers(line, a->controllers);
+  line.Text("--out", a->out, "FOLDER",
+            "new folder for summary.csv, runs.csv, policies.csv, curves.svg and curves.png "
+            "(curves-2 and so on for further tasks)");
+  line.Flag("--unfinished", a->unfinished, "compare unfinished runs too, as they are");
+  line.Flag("--different-tasks", a->different_tasks,
+            "compare groups that are evaluated on different tasks (plant, disturbance, number of "
+            "episodes) with each other as well");
+  AddThreads(line, a->threads);
+  line.Flag("--json", a->as_json, "print JSON");
+  line.Footer(
       "Runs with the same settings but the seed are one group. Figures are over its runs: the\n"
       "interquartile mean (IQM) with a 95% bootstrap interval; docs/statistics.md defines each.\n"
       "A run that did not solve the task counts as one that needs more than its budget. Groups\n"
@@ -131,7 +122,7 @@ void AddCompare(CLI::App& program, Command& command) {
       "  ./upswing compare runs --out runs/comparison       all agents in runs, with figures\n"
       "  ./upswing compare study --json                     STUDY/VARIANT/SEED, for a program\n"
       "  ./upswing compare runs/d3qn-seed* mpc tvlqr        beside classical control\n");
-  app->callback([a, &command] { command = [a] { return RunCompare(*a); }; });
+  line.Run([a] { return RunCompare(*a); });
 }
 
 }  // namespace upswing

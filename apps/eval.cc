@@ -5,7 +5,6 @@
 #include "apps/commands.h"
 #include "apps/eval_table.h"
 #include "apps/progress.h"
-#include "apps/trial_options.h"
 #include "core/error.h"
 #include "core/text.h"
 #include "core/thread_pool.h"
@@ -55,25 +54,22 @@ int RunEval(const EvalArguments& a) {
 
 }  // namespace
 
-void AddEval(CLI::App& program, Command& command) {
-  CLI::App* app = program.add_subcommand("eval", "Evaluate a policy over many episodes");
+void AddEval(CommandLine& line) {
   auto a = std::make_shared<EvalArguments>();
-  AddPolicy(*app, a->policy)->required();
+  AddPolicy(line, a->policy);
+  line.Require("policy");
   Options own;
   DescribeEvalEpisodes(own, &a->episodes);
-  AddArguments(*app, own);
-  app->add_option("--episodes-csv", a->episodes_csv,
-                  "table to write, a row for each episode: start, plant and figures; "
-                  "-: standard output, instead of the table of figures")
-      ->type_name("FILE")
-      ->check(NotEmpty());
-  AddTrialOptions(*app, a->trial, "start states, noise and random plants");
-  app->add_flag("--known-plant", a->trial.known_plant,
-                "a controller is made anew for the plant of each episode: what knowing it brings")
-      ->disable_flag_override();
-  AddThreads(*app, a->threads);
-  app->add_flag("--json", a->as_json, "print JSON instead of a table")->disable_flag_override();
-  app->footer(fmt::format(
+  line.Arguments(own);
+  line.Text("--episodes-csv", a->episodes_csv, "FILE",
+            "table to write, a row for each episode: start, plant and figures; "
+            "-: standard output, instead of the table of figures");
+  AddTrialOptions(line, a->trial, "start states, noise and random plants");
+  line.Flag("--known-plant", a->trial.known_plant,
+            "a controller is made anew for the plant of each episode: what knowing it brings");
+  AddThreads(line, a->threads);
+  line.Flag("--json", a->as_json, "print JSON instead of a table");
+  line.Footer(fmt::format(
       "An episode of the double pendulum lasts {} s from hanging with normal noise of 0.1 (rad,\n"
       "rad/s). It succeeds if both links are within 30° of upright for the whole of the last {} "
       "s.\n"
@@ -104,7 +100,7 @@ void AddEval(CLI::App& program, Command& command) {
       "of the\nepisode, which reveals it to the policy; with --unknown-plant by the plant of the "
       "training.\n",
       kEvaluationSeconds, kHoldSeconds, kReturnSeconds));
-  app->callback([a, &command] { command = [a] { return RunEval(*a); }; });
+  line.Run([a] { return RunEval(*a); });
 }
 
 }  // namespace upswing

@@ -122,49 +122,33 @@ int RunExport(const ExportArguments& a) {
 
 }  // namespace
 
-void AddExport(CLI::App& program, Command& command) {
-  CLI::App* app = program.add_subcommand(
-      "export", "Policies as ONNX or C or in the page; numbers to test other readers by");
+void AddExport(CommandLine& line) {
   auto a = std::make_shared<ExportArguments>();
-  app->add_option("policies", a->policies,
-                  "policy.safetensors or run folders; for --c also lqr, energy, pfl or tvlqr")
-      ->type_name("POLICY|RUN")
-      ->check(NotEmpty());
-  AddControllers(*app, a->controller);
-  app->add_option(
-         "--onnx", a->onnx,
-         "ONNX file to write: from observations to torques and values, for any runtime; -: "
-         "standard output")
-      ->type_name("FILE")
-      ->check(NotEmpty());
-  app->add_option("--c", a->c,
-                  "C99 header to write: from angles and velocities to torques, for a "
-                  "microcontroller; -: standard output")
-      ->type_name("FILE.h")
-      ->check(NotEmpty());
-  app->add_option("--prefix", a->prefix,
-                  "with which all names in the C header begin [name of the file]")
-      ->type_name("NAME")
-      ->check(NotEmpty("a name"));
-  app->add_option("--page", a->page,
-                  "the page's folder of agents; one of the same ID is replaced there")
-      ->type_name("FOLDER")
-      ->check(NotEmpty());
-  app->add_option("--id", a->id, "ID in the page, of a single policy [name of the run, or agent]")
-      ->type_name("ID")
-      ->check(NotEmpty("an ID"));
+  line.Texts("policies", a->policies, "POLICY|RUN",
+             "policy.safetensors or run folders; for --c also lqr, energy, pfl or tvlqr");
+  AddControllers(line, a->controller);
+  line.Text("--onnx", a->onnx, "FILE",
+            "ONNX file to write: from observations to torques and values, for any runtime; -: "
+            "standard output");
+  line.Text("--c", a->c, "FILE.h",
+            "C99 header to write: from angles and velocities to torques, for a "
+            "microcontroller; -: standard output");
+  line.Text("--prefix", a->prefix, "NAME",
+            "with which all names in the C header begin [name of the file]", "a name");
+  line.Text("--page", a->page, "FOLDER",
+            "the page's folder of agents; one of the same ID is replaced there");
+  line.Text("--id", a->id, "ID", "ID in the page, of a single policy [name of the run, or agent]",
+            "an ID");
   Options own;
   own.Add(&a->checkpoints, "checkpoints", {2, 100}, "",
           "for the page, so many policies from the untrained one to each, which is trained again "
           "for that; of Q-networks")
       .usual = "none";
-  AddArguments(*app, own);
-  app->add_option("--test-vectors", a->test_vectors,
-                  "JSON file to write: states, and what the task's formulas make of them; -: "
-                  "standard output")
-      ->type_name("FILE")
-      ->check(NotEmpty());
-  app->footer(
+  line.Arguments(own);
+  line.Text("--test-vectors", a->test_vectors, "FILE",
+            "JSON file to write: states, and what the task's formulas make of them; -: "
+            "standard output");
+  line.Footer(
       "Examples:\n"
       "  ./upswing export runs/d3qn-seed1 --onnx policy.onnx           for onnxruntime and others\n"
       "  ./upswing export runs/fast-seed1 --c policy.h                 for a microcontroller\n"
@@ -175,7 +159,7 @@ void AddExport(CLI::App& program, Command& command) {
       "  ./upswing export runs/d3qn-seed1 --page web/public/agents --checkpoints 10\n"
       "  ./upswing export --test-vectors vectors.json\n\n"
       "`./upswing demo runs/d3qn-seed1` puts it into the page and serves that.\n");
-  app->callback([a, &command] { command = [a] { return RunExport(*a); }; });
+  line.Run([a] { return RunExport(*a); });
 }
 
 }  // namespace upswing

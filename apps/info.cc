@@ -180,18 +180,16 @@ int RunInfo(const PolicyArguments& a) {
 
 }  // namespace
 
-void AddInfo(CLI::App& program, Command& command) {
-  CLI::App* app = program.add_subcommand(
-      "info", "Describe and check a policy or a run, or describe this machine");
+void AddInfo(CommandLine& line) {
   auto a = std::make_shared<PolicyArguments>();
-  AddPolicy(*app, *a);
-  app->footer(
+  AddPolicy(line, *a);
+  line.Footer(
       "Examples:\n"
       "  ./upswing info runs/d3qn-seed1\n"
       "  ./upswing info policy.safetensors\n"
       "  ./upswing info lqr --made-for mass2=1.2\n"
       "  ./upswing info                      which instructions the kernels use here\n");
-  app->callback([a, &command] { command = [a] { return RunInfo(*a); }; });
+  line.Run([a] { return RunInfo(*a); });
 }
 
 }  // namespace upswing

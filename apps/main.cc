@@ -12,7 +12,6 @@
 #include <system_error>
 
 #include "apps/commands.h"
-#include "apps/help.h"
 #include "apps/say.h"
 #include "apps/signals.h"
 #include "core/error.h"
@@ -63,45 +62,15 @@ void ChooseVectors() {
 }
 
 int Main(int argc, char** argv) {
-  CLI::App program(
-      "Upswing trains, tests and explains controllers that swing up and balance a double\n"
-      "pendulum with one motor at its first joint, in MuJoCo.",
-      "upswing");
-  program.set_version_flag("--version", "upswing " UPSWING_VERSION);
-  program.require_subcommand(1);
-  program.formatter(std::make_shared<HelpFormatter>());
-  program.footer(
-      "Examples:\n"
-      "  ./upswing train                      train the default agent until the task is solved\n"
-      "  ./upswing eval runs/d3qn-seed1       evaluate its best policy\n"
-      "  ./upswing compare runs               compare the agents in runs over their seeds\n"
-      "  ./upswing train --help               every setting, with its default\n");
-  Command command;
-  AddTrain(program, command);
-  AddEval(program, command);
-  AddBounds(program, command);
-  AddSimulate(program, command);
-  AddMap(program, command);
-  AddPlot(program, command);
-  AddView(program, command);
-  AddInfo(program, command);
-  AddCompare(program, command);
-  AddStudy(program, command);
-  AddExport(program, command);
-  AddRealAiGym(program, command);
-  AddBench(program, command);
-
   try {
-    try {
-      ChooseVectors();
-      program.parse(argc, argv);
-      return Finish(command());
-    } catch (const CLI::Success& request) {
-      return Finish(program.exit(request));  // --help and --version
-    }
-  } catch (const CLI::ParseError& error) {
-    SayError(OneLine(Explain(program, error)));
-    return 2;
+    ChooseVectors();
+    return Finish(RunProgram(
+        argc, argv, Commands(),
+        "Examples:\n"
+        "  ./upswing train                      train the default agent until the task is solved\n"
+        "  ./upswing eval runs/d3qn-seed1       evaluate its best policy\n"
+        "  ./upswing compare runs               compare the agents in runs over their seeds\n"
+        "  ./upswing train --help               every setting, with its default\n"));
   } catch (const Error& error) {
     SayError(OneLine(error.what()));
     return error.exit_code();

@@ -80,33 +80,27 @@ int RunMapCommand(const MapCommand& a) {
 
 }  // namespace
 
-void AddMap(CLI::App& program, Command& command) {
-  CLI::App* app =
-      program.add_subcommand("map", "Map how policies do on other plants or from other starts");
+void AddMap(CommandLine& line) {
   auto a = std::make_shared<MapCommand>();
-  app->add_option("policies", a->policies,
-                  Concat("policy.safetensors, run folder or controller: ",
-                         Join(ControllerNames(), ", "), "; several: side by side"))
-      ->type_name("POLICY|RUN")
-      ->required()
-      ->check(NotEmpty());
-  AddControllers(*app, a->controllers);
+  line.Texts("policies", a->policies, "POLICY|RUN",
+             Concat("policy.safetensors, run folder or controller: ", Join(ControllerNames(), ", "),
+                    "; several: side by side"));
+  line.Require("policies");
+  AddControllers(line, a->controllers);
   constexpr const char* kAxis = "NAME=FROM:TO[:CELLS]";
-  app->add_option("--x", a->x, "horizontal axis [mass2=-50%:+50%:31]")->type_name(kAxis);
-  app->add_option("--y", a->y, "vertical axis [length2=-50%:+50%:31]")->type_name(kAxis);
+  line.Text("--x", a->x, kAxis, "horizontal axis [mass2=-50%:+50%:31]", "");
+  line.Text("--y", a->y, kAxis, "vertical axis [length2=-50%:+50%:31]", "");
   Options own;
   a->Describe(own);
-  AddArguments(*app, own);
-  AddSet(*app, a->set, "what is on neither axis, such as gravity=9.7");
-  AddPhysics(*app, a->physics);
-  AddUnknownPlant(*app, a->unknown_plant);
-  app->add_option("--out", a->out, "new folder for map.csv, map.svg and map.png [RUN/map-X-Y]")
-      ->type_name("FOLDER")
-      ->check(NotEmpty());
-  AddSeed(*app, a->seed, "starts and noise");
-  AddThreads(*app, a->threads);
-  app->add_flag("--json", a->as_json, "print JSON instead of a table")->disable_flag_override();
-  app->footer(
+  line.Arguments(own);
+  AddSet(line, a->set, "what is on neither axis, such as gravity=9.7");
+  AddPhysics(line, a->physics);
+  AddUnknownPlant(line, a->unknown_plant);
+  line.Text("--out", a->out, "FOLDER", "new folder for map.csv, map.svg and map.png [RUN/map-X-Y]");
+  AddSeed(line, a->seed, "starts and noise");
+  AddThreads(line, a->threads);
+  line.Flag("--json", a->as_json, "print JSON instead of a table");
+  line.Footer(
       "Axes and --set take mass1, mass2, length1, length2, damping1, damping2 (mass, length,\n"
       "damping for both), gravity, torque_limit, actuated_joint (1 or 2), sensor_noise (rad,\n"
       "rad/s), delay (s, in whole control periods of 0.02 s; each is a cell), and the start: q1,\n"
@@ -125,7 +119,7 @@ void AddMap(CLI::App& program, Command& command) {
       "  ./upswing map runs/d3qn-seed1 --x q1=-180:180:73 --y q2=-180:180:73    from any angle\n"
       "  ./upswing map lqr --x q1=150:210:121 --y q2=-30:30:121    from where does it catch?\n"
       "  ./upswing map runs/d3qn-seed1 mpc tvlqr --episodes 1 --out runs/maps    side by side\n");
-  app->callback([a, &command] { command = [a] { return RunMapCommand(*a); }; });
+  line.Run([a] { return RunMapCommand(*a); });
 }
 
 }  // namespace upswing

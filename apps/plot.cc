@@ -4,7 +4,6 @@
 #include <optional>
 
 #include "apps/commands.h"
-#include "apps/trial_options.h"
 #include "core/text.h"
 #include "io/file.h"
 #include "judge/plot_figures.h"
@@ -115,21 +114,19 @@ int RunPlot(const PlotArguments& a) {
 
 }  // namespace
 
-void AddPlot(CLI::App& program, Command& command) {
-  CLI::App* app = program.add_subcommand("plot", "Draw one episode of a policy");
+void AddPlot(CommandLine& line) {
   auto a = std::make_shared<PlotArguments>();
-  AddPolicy(*app, a->policy)->required();
-  AddEpisodeOptions(*app, a->episode);
+  AddPolicy(line, a->policy);
+  line.Require("policy");
+  AddEpisodeOptions(line, a->episode);
   Options own;
   Option& seconds = own.Add(&a->seconds, "seconds", {0.1, 1000}, "s", "how long");
   seconds.step = kControlPeriod;
   seconds.usual = "10; with --episode 20";
-  AddArguments(*app, own);
-  AddTrialOptions(*app, a->trial, "noise, random plants and the start of --episode");
-  app->add_option("--out", a->out, "new folder for the figures [RUN/plot]")
-      ->type_name("FOLDER")
-      ->check(NotEmpty());
-  app->footer(
+  line.Arguments(own);
+  AddTrialOptions(line, a->trial, "noise, random plants and the start of --episode");
+  line.Text("--out", a->out, "FOLDER", "new folder for the figures [RUN/plot]");
+  line.Footer(
       "episode.svg and .png: angles, velocities, energy, torque, the reward's terms and what the\n"
       "policy estimates over time: Q-values, or of an actor its mean torque with the central 68% "
       "of\n"
@@ -145,7 +142,7 @@ void AddPlot(CLI::App& program, Command& command) {
       "  ./upswing plot runs/d3qn-seed1 --set mass2=1.3\n"
       "  ./upswing plot runs/d3qn-seed1 --randomize 0.25 --episode 17   as eval --randomize "
       "0.25\n");
-  app->callback([a, &command] { command = [a] { return RunPlot(*a); }; });
+  line.Run([a] { return RunPlot(*a); });
 }
 
 }  // namespace upswing

@@ -158,34 +158,24 @@ int RunRealAiGym(const RealAiGymArguments& a) {
 
 }  // namespace
 
-void AddRealAiGym(CLI::App& program, Command& command) {
-  CLI::App* app = program.add_subcommand(
-      "realaigym", "Score a policy by the rules of the benchmark RealAIGym, or search one");
+void AddRealAiGym(CommandLine& line) {
   auto a = std::make_shared<RealAiGymArguments>();
-  AddPolicy(*app, a->policy);
-  app->add_option("--search", a->search_out, "search a policy, write it here, then score it")
-      ->type_name("FILE")
-      ->check(NotEmpty());
-  app->add_option("--from", a->from, "policy to begin a search with [a random one]")
-      ->type_name("FILE")
-      ->check(NotEmpty());
-  app->add_option("--figure", a->figure, "draw the rows of robustness, .svg or .png")
-      ->type_name("FILE")
-      ->check(NotEmpty());
-  app->add_option("--csv", a->csv,
-                  "write the motion in the boards' own format; -: standard output, alone")
-      ->type_name("FILE")
-      ->check(NotEmpty());
-  app->add_flag("--json", a->as_json, "print JSON instead of a table")->disable_flag_override();
+  AddPolicy(line, a->policy);
+  line.Text("--search", a->search_out, "FILE", "search a policy, write it here, then score it");
+  line.Text("--from", a->from, "FILE", "policy to begin a search with [a random one]");
+  line.Text("--figure", a->figure, "FILE", "draw the rows of robustness, .svg or .png");
+  line.Text("--csv", a->csv, "FILE",
+            "write the motion in the boards' own format; -: standard output, alone");
+  line.Flag("--json", a->as_json, "print JSON instead of a table");
   Options own;
   own.Section("cases");
   own.Add(&a->case_seed, "case_seed", {0, 1e15}, "",
           "seed of the noise and the pushes of the robustness score");
-  AddArguments(*app, own);
+  line.Arguments(own);
   BoardSearchConfig config;
-  AddSettings(*app, OptionsOf(config), a->search);
-  AddThreads(*app, a->threads);
-  app->footer(
+  line.Settings(OptionsOf(config), a->search);
+  AddThreads(line, a->threads);
+  line.Footer(
       "Performance: one simulation of 10 s from hanging, on the boards' plant C.1 without "
       "friction,\n"
       "500 Hz. Robustness: 722 simulations with errors of the model, noise of the velocities and "
@@ -201,7 +191,7 @@ void AddRealAiGym(CLI::App& program, Command& command) {
       "  ./upswing realaigym --search acrobot.safetensors --robot acrobot --seed 2\n"
       "  ./upswing realaigym pendubot.safetensors --csv sim_swingup.csv --json\n"
       "  ./upswing realaigym baseline-lqr                           the baselines' regulator\n");
-  app->callback([a, &command] { command = [a] { return RunRealAiGym(*a); }; });
+  line.Run([a] { return RunRealAiGym(*a); });
 }
 
 }  // namespace upswing

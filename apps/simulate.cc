@@ -4,7 +4,6 @@
 #include <optional>
 
 #include "apps/commands.h"
-#include "apps/trial_options.h"
 #include "core/csv.h"
 #include "core/error.h"
 #include "core/text.h"
@@ -70,26 +69,20 @@ int RunSimulate(const SimulateArguments& a) {
 
 }  // namespace
 
-void AddSimulate(CLI::App& program, Command& command) {
-  CLI::App* app = program.add_subcommand(
-      "simulate", "Write one rollout of a policy, of given torques, or of none as CSV");
+void AddSimulate(CommandLine& line) {
   auto a = std::make_shared<SimulateArguments>();
-  AddPolicy(*app, a->policy);
-  app->add_option("--torque", a->torque,
-                  "CSV file with a column `torque` (N·m), a row for each 0.02 s; -: standard input")
-      ->type_name("FILE")
-      ->check(NotEmpty());
-  AddEpisodeOptions(*app, a->episode);
+  AddPolicy(line, a->policy);
+  line.Text("--torque", a->torque, "FILE",
+            "CSV file with a column `torque` (N·m), a row for each 0.02 s; -: standard input");
+  AddEpisodeOptions(line, a->episode);
   Options own;
   Option& seconds = own.Add(&a->seconds, "seconds", {0, 1e5}, "s", "how long");
   seconds.step = kControlPeriod;
   seconds.usual = "20, or as long as the torques last";
-  AddArguments(*app, own);
-  AddTrialOptions(*app, a->trial, "noise, random plants and the start of --episode");
-  app->add_option("--csv", a->csv, "file to write; -: standard output [-]")
-      ->type_name("FILE")
-      ->check(NotEmpty());
-  app->footer(
+  line.Arguments(own);
+  AddTrialOptions(line, a->trial, "noise, random plants and the start of --episode");
+  line.Text("--csv", a->csv, "FILE", "file to write; -: standard output [-]");
+  line.Footer(
       "Columns: t (s), qpos0, qpos1 (rad), qvel0, qvel1 (rad/s), torque (N·m, as the motor "
       "applies\n"
       "it over the next 0.02 s: after its delay, within its limit), energy (J), height of the tip\n"
@@ -101,7 +94,7 @@ void AddSimulate(CLI::App& program, Command& command) {
       "  ./upswing simulate --start 3.0,0,0,0 --set damping=0      let it fall\n"
       "  ./upswing eval runs/d3qn-seed1 --randomize 0.25 --episodes-csv episodes.csv\n"
       "  ./upswing simulate runs/d3qn-seed1 --randomize 0.25 --episode 17 --csv failure.csv\n");
-  app->callback([a, &command] { command = [a] { return RunSimulate(*a); }; });
+  line.Run([a] { return RunSimulate(*a); });
 }
 
 }  // namespace upswing

@@ -136,7 +136,7 @@ int RunStudy(const StudyArguments& arguments) {
 }
 
 /// Throws unless the arguments go together.
-void CheckArguments(const CLI::App& app, const StudyArguments& arguments) {
+void CheckArguments(const CommandLine& line, const StudyArguments& arguments) {
   if (arguments.work.empty() == arguments.file.empty()) {
     throw BadInput(arguments.file.empty()
                        ? "study: expected FILE.toml or --work FOLDER, got neither"
@@ -144,7 +144,7 @@ void CheckArguments(const CLI::App& app, const StudyArguments& arguments) {
   }
   const auto alone = [&](bool given, const char* what, std::initializer_list<const char*> others) {
     for (const std::string other : others) {
-      if (given && app.count(other) > 0) {
+      if (given && line.Has(other)) {
         throw BadInput(Concat(what, ": expected no ", other, " beside it"));
       }
     }
@@ -153,7 +153,7 @@ void CheckArguments(const CLI::App& app, const StudyArguments& arguments) {
         {"--out", "--seeds", "--jobs", "--keep", "--status", "--prepare", "--slurm"});
   alone(arguments.status, "--status", {"--seeds", "--jobs", "--keep", "--prepare"});
   for (const std::string flag : {"--tasks", "--print"}) {
-    if (!arguments.on_slurm && app.count(flag) > 0) {
+    if (!arguments.on_slurm && line.Has(flag)) {
       throw BadInput(Concat(flag, ": expected --slurm beside it"));
     }
   }
@@ -163,45 +163,31 @@ void CheckArguments(const CLI::App& app, const StudyArguments& arguments) {
 
 }  // namespace
 
-void AddStudy(CLI::App& program, Command& command) {
-  CLI::App* app =
-      program.add_subcommand("study", "Train variants of the settings, many seeds each");
+void AddStudy(CommandLine& line) {
   auto arguments = std::make_shared<StudyArguments>();
-  app->add_option("file", arguments->file, "what to train: variants, settings, seeds")
-      ->type_name("FILE.toml")
-      ->check(NotEmpty());
-  app->add_option("--out", arguments->out, "folder of the study [runs/FILE]")
-      ->type_name("FOLDER")
-      ->check(NotEmpty());
-  AddManyOptions(*app, arguments->seeds, arguments->jobs);
-  app->add_option("--keep", arguments->keep,
-                  "of a finished run: all, policy (and settings, evaluations, log) or tables (its\n"
-                  "rows in the study's tables alone) [all, or what FILE says]")
-      ->type_name("WHAT")
-      ->check(NotEmpty("all, policy or tables"));
-  app->add_flag("--status", arguments->status,
-                "print what is done, running and lost, and end; FILE may be the study's folder")
-      ->disable_flag_override();
-  app->add_flag("--prepare", arguments->prepare, "make the folder ready for workers, and end")
-      ->disable_flag_override();
-  app->add_option(
-         "--slurm", arguments->slurm.options,
-         "have the runs done by a cluster: queue a job array of workers with these options\n"
-         "of sbatch ('' for none), follow it, and compare at the end")
-      ->type_name("OPTIONS");
+  line.Text("file", arguments->file, "FILE.toml", "what to train: variants, settings, seeds");
+  line.Text("--out", arguments->out, "FOLDER", "folder of the study [runs/FILE]");
+  AddManyOptions(line, arguments->seeds, arguments->jobs);
+  line.Text("--keep", arguments->keep, "WHAT",
+            "of a finished run: all, policy (and settings, evaluations, log) or tables (its\n"
+            "rows in the study's tables alone) [all, or what FILE says]",
+            "all, policy or tables");
+  line.Flag("--status", arguments->status,
+            "print what is done, running and lost, and end; FILE may be the study's folder");
+  line.Flag("--prepare", arguments->prepare, "make the folder ready for workers, and end");
+  line.Text("--slurm", arguments->slurm.options, "OPTIONS",
+            "have the runs done by a cluster: queue a job array of workers with these options\n"
+            "of sbatch ('' for none), follow it, and compare at the end",
+            "");
   Options slurm;
-  slurm.Add(&arguments->slurm.tasks, "tasks", 0, {1, 100'000}, "", "of the job array: workers")
-      .usual = Concat("one for each run, at most ", kMostSlurmTasks);
-  AddArguments(*app, slurm);
-  app->add_flag("--print", arguments->print, "print the script for sbatch, and end")
-      ->disable_flag_override();
-  app->add_option(
-         "--work", arguments->work,
-         "be a worker of the study in this folder, on any host that shares it: train what\n"
-         "no other worker has, until nothing is left")
-      ->type_name("FOLDER")
-      ->check(NotEmpty());
-  app->footer(
+  slurm.Add(&arguments->slurm.tasks, "tasks", {1, 100'000}, "", "of the job array: workers").usual =
+      Concat("one for each run, at most ", kMostSlurmTasks);
+  line.Arguments(slurm);
+  line.Flag("--print", arguments->print, "print the script for sbatch, and end");
+  line.Text("--work", arguments->work, "FOLDER",
+            "be a worker of the study in this folder, on any host that shares it: train what\n"
+            "no other worker has, until nothing is left");
+  line.Footer(
       "A study file:\n"
       "  title = \"What does layer normalisation do?\"\n"
       "  seeds = 10                   # 1 to 10, or \"3,5,8-12\"\n"
@@ -221,11 +207,11 @@ void AddStudy(CLI::App& program, Command& command) {
       "same command resumes what was stopped or killed; finished runs are left as they are.\n"
       "Exit code 0: done; 1: a run failed; 2: bad usage or input; 130, 143: stopped; of a worker\n"
       "75: stopped by a signal, its run can be resumed by any other.\n");
-  app->callback([app, arguments, &command] {
-    arguments->on_slurm = app->count("--slurm") > 0;
-    CheckArguments(*app, *arguments);
-    command = [arguments] { return RunStudy(*arguments); };
+  line.Check([&line, arguments] {
+    arguments->on_slurm = line.Has("--slurm");
+    CheckArguments(line, *arguments);
   });
+  line.Run([arguments] { return RunStudy(*arguments); });
 }
 
 }  // namespace upswing

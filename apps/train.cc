@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "apps/commands.h"
-#include "apps/help.h"
 #include "apps/many_runs_view.h"
 #include "apps/signals.h"
 #include "apps/train_view.h"
@@ -75,28 +74,23 @@ int RunTrain(const TrainArguments& arguments) {
 }
 
 /// Throws if flags for many runs are combined with flags for a single one.
-void CheckManyArguments(const CLI::App& app) {
-  if (app.count("--seeds") > 0) {
+void CheckManyArguments(const CommandLine& line) {
+  if (line.Has("--seeds")) {
     for (const std::string other : {"--seed", "--resume"}) {
-      if (app.count(other) > 0)
-        throw BadInput(Concat("--seeds: expected no ", other, " beside it"));
+      if (line.Has(other)) throw BadInput(Concat("--seeds: expected no ", other, " beside it"));
     }
-  } else if (app.count("--jobs") > 0) {
+  } else if (line.Has("--jobs")) {
     throw BadInput("--jobs: expected --seeds beside it");
   }
 }
 
 /// Lets --help show the defaults of the agent and the configuration file that were given.
-void ShowDefaultsOfWhatIsChosen(CLI::App& app) {
-  const auto last_of = [&](const char* flag) -> std::string {
-    const std::vector<std::string> values = app.get_option(flag)->results();
-    return values.empty() ? "" : values.back();
-  };
+void ShowDefaultsOfWhatIsChosen(const CommandLine& line, const CommandLine::ShowOptions& show) {
   std::vector<FlagValue> flags;
-  if (const std::string agent = last_of("--agent"); !agent.empty()) flags = {{"agent", agent}};
-  Config config = BuildConfig(last_of("--config"), flags);
+  if (const std::string agent = line.Last("--agent"); !agent.empty()) flags = {{"agent", agent}};
+  Config config = BuildConfig(line.Last("--config"), flags);
   Config scratch;
-  ShowDefaults(app, EverySetting(scratch), OptionsOf(config));
+  show(EverySetting(scratch), OptionsOf(config));
 }
 
 /// The named agents, a paragraph each.
@@ -113,32 +107,25 @@ std::string AgentsText() {
 
 }  // namespace
 
-void AddTrain(CLI::App& program, Command& command) {
-  CLI::App* app = program.add_subcommand("train", "Train an agent until the task is solved");
+void AddTrain(CommandLine& line) {
   auto arguments = std::make_shared<TrainArguments>();
-  app->add_option("--out", arguments->out,
-                  "run folder to make [runs/AGENT-seedSEED];\n"
-                  "with --seeds the folder of all of them [runs/AGENT]")
-      ->type_name("FOLDER")
-      ->check(NotEmpty());
-  app->add_option("--config", arguments->config,
-                  "TOML file of settings, - for standard input; flags override it")
-      ->type_name("FILE")
-      ->check(NotEmpty());
-  app->add_option("--resume", arguments->resume,
-                  "resume a run from its checkpoint; --steps, --threads, --checkpoint-every and\n"
-                  "--stop-when-solved may be given again; a solved run continues with "
-                  "--no-stop-when-solved")
-      ->type_name("RUN")
-      ->check(NotEmpty());
-  app->add_flag("--print-config", arguments->print_config,
-                "print the settings of this training as a TOML file for --config, and end")
-      ->disable_flag_override();
-  AddManyOptions(*app, arguments->seeds, arguments->jobs);
+  line.Text("--out", arguments->out, "FOLDER",
+            "run folder to make [runs/AGENT-seedSEED];\n"
+            "with --seeds the folder of all of them [runs/AGENT]");
+  line.Text("--config", arguments->config, "FILE",
+            "TOML file of settings, - for standard input; flags override it");
+  line.Text("--resume", arguments->resume, "RUN",
+            "resume a run from its checkpoint; --steps, --threads, --checkpoint-every and\n"
+            "--stop-when-solved may be given again; a solved run continues with "
+            "--no-stop-when-solved");
+  line.Flag("--print-config", arguments->print_config,
+            "print the settings of this training as a TOML file for --config, and end");
+  AddManyOptions(line, arguments->seeds, arguments->jobs);
   Config defaults;
-  AddSettings(*app, EverySetting(defaults), arguments->flags);
-  app->formatter(std::make_shared<HelpFormatter>([app] { ShowDefaultsOfWhatIsChosen(*app); }));
-  app->footer(
+  line.Settings(EverySetting(defaults), arguments->flags);
+  line.ShowSettings(
+      [&line](const CommandLine::ShowOptions& show) { ShowDefaultsOfWhatIsChosen(line, show); });
+  line.Footer(
       AgentsText() +
       "\nExamples:\n"
       "  ./upswing train                                  the default agent, until solved\n"
@@ -153,15 +140,15 @@ void AddTrain(CLI::App& program, Command& command) {
       "  ./upswing train --seeds 3,5,8-12 --jobs 2 --out runs/many\n"
       "\nSIGINT and SIGTERM write a checkpoint and end with 130 and 143; SIGUSR1 writes one\n"
       "and continues. Exit code 0: done; 1: failed; 2: bad usage or input.\n");
-  app->callback([app, arguments, &command] {
-    if (app->count("--resume") > 0 && app->count("--out") + app->count("--config") > 0) {
+  line.Check([&line] {
+    if (line.Has("--resume") && (line.Has("--out") || line.Has("--config"))) {
       throw BadInput(
           "--resume: takes settings and folder from the run; expected neither --out nor "
           "--config beside it");
     }
-    CheckManyArguments(*app);
-    command = [arguments] { return RunTrain(*arguments); };
+    CheckManyArguments(line);
   });
+  line.Run([arguments] { return RunTrain(*arguments); });
 }
 
 }  // namespace upswing

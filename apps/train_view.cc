@@ -142,9 +142,9 @@ void TrainView::Summarize(const std::filesystem::path& run, bool finished) {
   if (has_policy) {
     const bool unconfirmed =
         IsScreened(training_.config()) && !s.solved && s.best_success_rate == 1;
-    Say("Best policy: {} (step {}, success {:.0f}%{}, return {:.0f})\n",
-        Printable(policy.string()), FormatCount(s.best_step), 100 * s.best_success_rate,
-        unconfirmed ? " in closed form" : "", s.best_return);
+    Say("Best policy: {} (step {}, success {:.0f}%{}, return {:.0f})\n", Printable(policy.string()),
+        FormatCount(s.best_step), 100 * s.best_success_rate, unconfirmed ? " in closed form" : "",
+        s.best_return);
   } else if (s.best_step > 0) {
     Say("Best policy: of step {}, but {} no longer exists\n", FormatCount(s.best_step),
         Printable(policy.string()));

@@ -8,7 +8,6 @@
 #include "apps/commands.h"
 #include "apps/progress.h"
 #include "apps/signals.h"
-#include "apps/trial_options.h"
 #include "core/error.h"
 #include "core/text.h"
 #include "io/frames.h"
@@ -172,19 +171,15 @@ int RunView(const ViewArguments& a) {
 }
 
 /// Adds the policies to look at, and the settings of the controllers among them.
-void AddPolicies(CLI::App& app, ViewArguments& a) {
-  AddPolicy(app, a.controller);
-  app.remove_option(app.get_option("policy"));
-  app.add_option(
-         "policies", a.names,
-         Concat("policy.safetensors, run folder or controller (", Join(ControllerNames(), ", "),
-                "), several side by side; none: nothing turns the motor"))
-      ->type_name("POLICY|RUN...")
-      ->check(NotEmpty());
+void AddPolicies(CommandLine& line, ViewArguments& a) {
+  AddControllers(line, a.controller);
+  line.Texts("policies", a.names, "POLICY|RUN...",
+             Concat("policy.safetensors, run folder or controller (", Join(ControllerNames(), ", "),
+                    "), several side by side; none: nothing turns the motor"));
 }
 
 /// Adds what a picture is like.
-void AddPicture(CLI::App& app, ViewArguments& a) {
+void AddPicture(CommandLine& line, ViewArguments& a) {
   Options own;
   own.Add(&a.seconds, "seconds", {0, 1000}, "s", "how long a recording is, or a window is open")
       .usual = "10, with --episode 20; a window: until it is closed";
@@ -199,31 +194,23 @@ void AddPicture(CLI::App& app, ViewArguments& a) {
           "of the camera; 0: as far as shows all");
   own.Add(&a.look.text, "text", "name, time and torque in the picture");
   own.Add(&a.look.marks, "marks", "torque, goal and the tip's path in the picture");
-  AddArguments(app, own);
+  line.Arguments(own);
 }
 
 }  // namespace
 
-void AddView(CLI::App& program, Command& command) {
-  CLI::App* app =
-      program.add_subcommand("view", "Show policies at work in a window, or record them as a film");
+void AddView(CommandLine& line) {
   auto a = std::make_shared<ViewArguments>();
-  AddPolicies(*app, *a);
-  app->add_option(
-         "--record", a->record,
-         "write FILE.mp4 or FILE.gif (with the program ffmpeg), FILE.png (the last moment) "
-         "or FOLDER/ (each frame as PNG) instead of opening a window")
-      ->type_name("FILE")
-      ->check(NotEmpty());
-  app->add_flag("--headless", a->headless, "open no window, as --record does")
-      ->disable_flag_override();
-  app->add_option("--csv", a->csv, "write the episode as `simulate` does; -: standard output")
-      ->type_name("FILE")
-      ->check(NotEmpty());
-  AddPicture(*app, *a);
-  AddEpisodeOptions(*app, a->episode);
-  AddTrialOptions(*app, a->trial, "noise, random plants and the start of --episode");
-  app->footer(
+  AddPolicies(line, *a);
+  line.Text("--record", a->record, "FILE",
+            "write FILE.mp4 or FILE.gif (with the program ffmpeg), FILE.png (the last moment) "
+            "or FOLDER/ (each frame as PNG) instead of opening a window");
+  line.Flag("--headless", a->headless, "open no window, as --record does");
+  line.Text("--csv", a->csv, "FILE", "write the episode as `simulate` does; -: standard output");
+  AddPicture(line, *a);
+  AddEpisodeOptions(line, a->episode);
+  AddTrialOptions(line, a->trial, "noise, random plants and the start of --episode");
+  line.Footer(
       "In the window: space pauses, right and left arrow step, backspace begins again, enter "
       "turns\n"
       "the policy off and on, tab changes the policy, P the plant, - and = the speed; double "
@@ -236,7 +223,7 @@ void AddView(CLI::App& program, Command& command) {
       "  ./upswing view runs/d3qn-seed1 --record swing-up.mp4 --seconds 5 --speed 0.5\n"
       "  ./upswing view runs/d3qn-seed1 --record frames/          PNG files, no ffmpeg\n"
       "  ./upswing view --start 3,0,0,0                           let it fall\n");
-  app->callback([a, &command] { command = [a] { return RunView(*a); }; });
+  line.Run([a] { return RunView(*a); });
 }
 
 }  // namespace upswing

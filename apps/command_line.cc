@@ -1,0 +1,281 @@
+#include "apps/command_line.h"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <iostream>
+#include <utility>
+
+#include "apps/say.h"
+#include "core/error.h"
+#include "core/text.h"
+
+namespace upswing {
+namespace {
+
+/// Returns what --help shows for a setting's value.
+std::string TypeName(const Option& option) {
+  constexpr std::array kNames{"", "INTEGER", "NUMBER", "TEXT", "LIST"};  // in Target's order
+  return option.name == "model" ? "FILE" : kNames.at(option.target.index());
+}
+
+/// Takes a flag's value.
+using TakeValue = std::function<void(const std::string&)>;
+
+/// Adds the flag of one setting; of several values the last counts.
+void AddFlag(CLI::App& app, const Option& option, const std::string& group, const TakeValue& take) {
+  const std::string help = option.about_with_default();
+  if (std::holds_alternative<bool*>(option.target)) {
+    app.add_flag_function(
+           option.flag() + ",!--no-" + option.flag().substr(2),
+           [take](int64_t on) { take(on > 0 ? "true" : "false"); }, help)
+        ->group(group)
+        ->disable_flag_override();
+    return;
+  }
+  app.add_option_function<std::string>(option.flag(), take, help)
+      ->group(group)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)
+      ->type_name(TypeName(option));
+}
+
+CLI::Validator NotEmpty(std::string_view what) {
+  return {[what = std::string(what)](const std::string& text) -> std::string {
+            return text.empty() ? Concat("expected ", what, ", got an empty text") : "";
+          },
+          ""};
+}
+
+/// Formats --help within kHelpColumns, without the `{false}` that CLI11 adds to a flag's --no-
+/// form.
+class HelpFormatter : public CLI::Formatter {
+ public:
+  /// `before` is called before help is printed, which may depend on the other arguments.
+  explicit HelpFormatter(std::function<void()> before = {}) : before_(std::move(before)) {}
+
+  std::string make_help(const CLI::App* app, std::string name,
+                        CLI::AppFormatMode mode) const override {
+    if (before_) before_();
+    return CLI::Formatter::make_help(app, std::move(name), mode);
+  }
+
+  std::string make_option_name(const CLI::Option* option, bool is_positional) const override {
+    std::string name = CLI::Formatter::make_option_name(option, is_positional);
+    constexpr std::string_view kNoise = "{false}";
+    const size_t at = name.find(kNoise);
+    return at == std::string::npos ? name : name.erase(at, kNoise.size());
+  }
+
+  std::string make_option_desc(const CLI::Option* option) const override {
+    std::string description = option->get_description();
+    std::ranges::replace(description, '\n', ' ');  // lines end where the width asks for it
+    return WrapText(description, kHelpColumns - get_column_width());
+  }
+
+ private:
+  std::function<void()> before_;
+};
+
+/// Returns every flag of a command, and the names of its subcommands.
+std::vector<std::string> KnownWords(const CLI::App& app) {
+  std::vector<std::string> words;
+  for (const CLI::Option* option : app.get_options()) {
+    for (const std::string& name : option->get_lnames()) words.push_back("--" + name);
+  }
+  for (const CLI::App* sub : app.get_subcommands({})) words.push_back(sub->get_name());
+  return words;
+}
+
+/// Says what is missing on the command line.
+std::string ExplainMissing(const CLI::App& program, const CLI::App& app) {
+  if (&app == &program) {
+    std::vector<std::string> names;
+    for (const CLI::App* sub : program.get_subcommands({})) names.push_back(sub->get_name());
+    return Concat("expected a command, one of ", Join(names, ", "), "; got none");
+  }
+  for (const CLI::Option* option : app.get_options()) {
+    if (!option->get_required() || option->count() > 0) continue;
+    return Concat(app.get_name(), ": expected ", option->get_type_name(), " (",
+                  option->get_description(), "), got none");
+  }
+  return Concat(app.get_name(), ": an argument is missing");
+}
+
+/// Says what was wrong with the values of a flag. CLI11 names the flag only at the beginning of its
+/// message, such as `--gamma: 1 required NUMBER missing`.
+std::string ExplainValues(const std::string& message) {
+  if (message.find("flag override") != std::string::npos) {
+    return Concat("--", message.substr(0, message.find(' ')), ": takes no value");
+  }
+  const std::string flag = message.substr(0, message.find_first_of(": "));
+  const bool several = message.find("received") != std::string::npos;
+  return Concat(flag, ": expected a value, got ", several ? "several" : "none");
+}
+
+/// Says in one line what was wrong with the command line.
+std::string Explain(const CLI::App& program, const CLI::ParseError& error) {
+  const auto chosen = program.get_subcommands();
+  const CLI::App& app = chosen.empty() ? program : *chosen.front();
+  if (const std::vector<std::string> unknown = app.remaining(); !unknown.empty()) {
+    const std::string word = unknown.front().substr(0, unknown.front().find('='));
+    return Concat(word.starts_with("-") ? "unknown flag " : "did not expect ", word,
+                  DidYouMean(word, KnownWords(app)));
+  }
+  if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr) {
+    return ExplainMissing(program, app);
+  }
+  if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr) {
+    return ExplainValues(error.what());
+  }
+  return error.what();
+}
+
+/// Adds a text argument; `Target` is std::string, an optional one or a vector.
+template <typename Target>
+CLI::Option* AddText(CLI::App& app, std::string_view name, Target& target, std::string_view type,
+                     std::string_view help, std::string_view what) {
+  CLI::Option* option = app.add_option(std::string(name), target, std::string(help));
+  if (!type.empty()) option->type_name(std::string(type));
+  if (!what.empty()) option->check(NotEmpty(what));
+  return option;
+}
+
+}  // namespace
+
+void CommandLine::Text(std::string_view name, std::string& target, std::string_view type,
+                       std::string_view help, std::string_view what) {
+  AddText(app_, name, target, type, help, what);
+}
+
+void CommandLine::Text(std::string_view name, std::optional<std::string>& target,
+                       std::string_view type, std::string_view help, std::string_view what) {
+  AddText(app_, name, target, type, help, what);
+}
+
+void CommandLine::Texts(std::string_view name, std::vector<std::string>& target,
+                        std::string_view type, std::string_view help) {
+  AddText(app_, name, target, type, help, kPath);
+}
+
+void CommandLine::Repeated(std::string_view name, std::vector<std::string>& target,
+                           std::string_view type, std::string_view help, std::string_view group) {
+  CLI::Option* option = AddText(app_, name, target, type, help, "");
+  option->take_all()->allow_extra_args(false);
+  if (!group.empty()) option->group(std::string(group));
+}
+
+void CommandLine::Require(std::string_view name) { app_.get_option(std::string(name))->required(); }
+
+void CommandLine::Flag(std::string_view name, bool& target, std::string_view help) {
+  app_.add_flag(std::string(name), target, std::string(help))->disable_flag_override();
+}
+
+void CommandLine::Arguments(const Options& options) {
+  for (const Option& option : options.all()) {
+    AddFlag(app_, option, "Options",
+            [option](const std::string& text) { option.Set(text, option.flag()); });
+  }
+}
+
+void CommandLine::Settings(const Options& options, std::vector<FlagValue>& flags) {
+  // CLI11 applies flags in this order: aliases first, so that what is more specific wins.
+  for (const auto& alias : options.aliases()) {
+    Option as_one = *options.Find(alias.name, alias.name).front();
+    as_one.help = alias.help;
+    app_.add_option_function<std::string>(
+            alias.flag(),
+            [&flags, name = alias.name](const std::string& text) {
+              flags.push_back({name, text});
+            },
+            as_one.about())
+        ->group(alias.section)
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)
+        ->type_name("NUMBER");
+  }
+  for (const Option& option : options.all()) {
+    AddFlag(app_, option, option.section, [&flags, name = option.name](const std::string& text) {
+      flags.push_back({name, text});
+    });
+  }
+}
+
+void CommandLine::ShowSettings(std::function<void(const ShowOptions&)> shown) {
+  const auto show = [this](const Options& every, const Options& options) {
+    for (const Option& option : every.all()) {
+      CLI::Option* flag = app_.get_option(option.flag());
+      const Option* found = options.Get(option.name);
+      flag->group(found == nullptr ? "" : found->section);
+      if (found != nullptr) flag->description(found->about_with_default());
+    }
+  };
+  app_.formatter(
+      std::make_shared<HelpFormatter>([shown = std::move(shown), show] { shown(show); }));
+}
+
+void CommandLine::Footer(const std::string& text) { app_.footer(text); }
+
+void CommandLine::Check(std::function<void()> check) { checks_.push_back(std::move(check)); }
+
+void CommandLine::Run(std::function<int()> run) { run_ = std::move(run); }
+
+bool CommandLine::Has(std::string_view name) const { return app_.count(std::string(name)) > 0; }
+
+std::string CommandLine::Last(std::string_view name) const {
+  const std::vector<std::string> values = app_.get_option(std::string(name))->results();
+  return values.empty() ? "" : values.back();
+}
+
+std::string WrapText(std::string_view text, size_t columns, size_t indent) {
+  std::string wrapped;
+  size_t column = indent;  // where the line ends so far
+  for (const std::string_view word : Split(text, ' ')) {
+    if (word.empty()) continue;
+    // Continuation bytes of UTF-8 take no column.
+    const auto width = static_cast<size_t>(std::ranges::count_if(
+        word, [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; }));
+    const bool is_first = column == indent;
+    if (!is_first && column + 1 + width > columns) {
+      wrapped += '\n' + std::string(indent, ' ');
+      column = indent;
+    } else if (!is_first) {
+      wrapped += ' ';
+      ++column;
+    }
+    wrapped += word;
+    column += width;
+  }
+  return wrapped;
+}
+
+int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> commands,
+               const std::string& footer) {
+  CLI::App program(
+      "Upswing trains, tests and explains controllers that swing up and balance a double\n"
+      "pendulum with one motor at its first joint, in MuJoCo.",
+      "upswing");
+  program.set_version_flag("--version", "upswing " UPSWING_VERSION);
+  program.require_subcommand(1);
+  program.formatter(std::make_shared<HelpFormatter>());
+  program.footer(footer);
+  std::vector<std::unique_ptr<CommandLine>> lines;
+  const CommandLine* chosen = nullptr;
+  for (const CommandEntry& command : commands) {
+    CLI::App* app = program.add_subcommand(command.name, command.help);
+    CommandLine& line = *lines.emplace_back(new CommandLine(*app));
+    command.declare(line);
+    app->callback([&line, &chosen] {
+      for (const auto& check : line.checks_) check();
+      chosen = &line;
+    });
+  }
+  try {
+    program.parse(argc, argv);
+  } catch (const CLI::Success& request) {  // --help and --version
+    return program.exit(request);
+  } catch (const CLI::ParseError& error) {
+    throw BadInput(Explain(program, error));
+  }
+  return chosen->run_();
+}
+
+}  // namespace upswing

@@ -1,0 +1,100 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/options.h"
+#include "setup/config.h"
+
+namespace CLI {
+class App;
+}
+
+/// The program's command line. Only command_line.cc knows the library that parses it.
+namespace upswing {
+
+/// A value that must not be empty, such as that of a shell variable that is not set.
+inline constexpr std::string_view kPath = "a path";
+
+/// One command while its arguments are declared, and what it does once they are parsed.
+class CommandLine {
+ public:
+  explicit CommandLine(CLI::App& app) : app_(app) {}
+
+  /// Adds a text: a flag where the name begins with `--`, else a positional argument. `type` stands
+  /// for the value in --help. An empty value is refused, as `what` is expected; an empty `what`
+  /// allows it.
+  void Text(std::string_view name, std::string& target, std::string_view type,
+            std::string_view help, std::string_view what = kPath);
+  void Text(std::string_view name, std::optional<std::string>& target, std::string_view type,
+            std::string_view help, std::string_view what = kPath);
+  /// Adds a positional argument that takes any number of texts.
+  void Texts(std::string_view name, std::vector<std::string>& target, std::string_view type,
+             std::string_view help);
+  /// Adds a flag that can be repeated, each time with one text.
+  void Repeated(std::string_view name, std::vector<std::string>& target, std::string_view type,
+                std::string_view help, std::string_view group = "");
+  /// Makes an argument that was added required.
+  void Require(std::string_view name);
+  /// Adds a flag without a value.
+  void Flag(std::string_view name, bool& target, std::string_view help);
+
+  /// Adds a flag for each of the command's own numbers and choices, which sets it at once; see
+  /// Option::Set.
+  void Arguments(const Options& options);
+  /// Adds a flag for each setting and alias, in the order in which they were described. What is
+  /// given is added to `flags`.
+  void Settings(const Options& options, std::vector<FlagValue>& flags);
+  /// Lets --help ask `shown`, which calls its argument with all settings that were added and with
+  /// those to show, whose values are the defaults.
+  using ShowOptions = std::function<void(const Options& every, const Options& options)>;
+  void ShowSettings(std::function<void(const ShowOptions&)> shown);
+
+  /// Adds the text below the arguments in --help.
+  void Footer(const std::string& text);
+  /// Adds a check that is made before anything else once all arguments are known.
+  void Check(std::function<void()> check);
+  /// Sets what the command does; it returns the exit code.
+  void Run(std::function<int()> run);
+
+  /// Whether the argument was given.
+  bool Has(std::string_view name) const;
+  /// The last value that was given for a flag; empty: none.
+  std::string Last(std::string_view name) const;
+
+ private:
+  friend int RunProgram(int argc, const char* const* argv,
+                        std::span<const struct CommandEntry> commands, const std::string& footer);
+
+  CLI::App& app_;
+  std::vector<std::function<void()>> checks_;
+  std::function<int()> run_;
+};
+
+/// A row of the table of commands.
+struct CommandEntry {
+  const char* name;
+  const char* help;  // one line
+  void (*declare)(CommandLine&);
+};
+
+/// Parses the command line, runs the command and returns its exit code. `footer` ends the
+/// program's --help. Throws BadInput, one line, where the command line is wrong.
+int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> commands,
+               const std::string& footer);
+
+/// The columns that a line of --help has at most.
+inline constexpr size_t kHelpColumns = 100;
+
+/// `text` in lines of at most `columns` characters, broken at blanks. All lines but the first begin
+/// with `indent` blanks; the first one stands behind as many columns, which the caller fills. A
+/// longer word has a line of its own.
+std::string WrapText(std::string_view text, size_t columns, size_t indent = 0);
+
+}  // namespace upswing
