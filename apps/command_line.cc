@@ -262,7 +262,7 @@ int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> 
   for (const CommandEntry& command : commands) {
     CLI::App* app = program.add_subcommand(command.name, command.help);
     CommandLine& line = *lines.emplace_back(new CommandLine(*app));
-    command.declare(line);
+    if (command.declare != nullptr) command.declare(line);
     app->callback([&line, &chosen] {
       for (const auto& check : line.checks_) check();
       chosen = &line;

@@ -80,8 +80,8 @@ class CommandLine {
 /// A row of the table of commands.
 struct CommandEntry {
   const char* name;
-  const char* help;  // one line
-  void (*declare)(CommandLine&);
+  const char* help;               // one line
+  void (*declare)(CommandLine&);  // null: the command is a program of its own
 };
 
 /// Parses the command line, runs the command and returns its exit code. `footer` ends the

@@ -6,28 +6,6 @@
 
 namespace upswing {
 
-std::span<const CommandEntry> Commands() {
-  static constexpr CommandEntry kCommands[] = {
-      {"train", "Train an agent until the task is solved", AddTrain},
-      {"eval", "Evaluate a policy over many episodes", AddEval},
-      {"bounds", "Search for the best episodes, and compare policies with them", AddBounds},
-      {"simulate", "Write one rollout of a policy, of given torques, or of none as CSV",
-       AddSimulate},
-      {"map", "Map how policies do on other plants or from other starts", AddMap},
-      {"plot", "Draw one episode of a policy", AddPlot},
-      {"view", "Show policies at work in a window, or record them as a film", AddView},
-      {"info", "Describe and check a policy or a run, or describe this machine", AddInfo},
-      {"compare", "Compare trainings over their seeds, with intervals and curves", AddCompare},
-      {"study", "Train variants of the settings, many seeds each", AddStudy},
-      {"export", "Policies as ONNX or C or in the page; numbers to test other readers by",
-       AddExport},
-      {"realaigym", "Score a policy by the rules of the benchmark RealAIGym, or search one",
-       AddRealAiGym},
-      {"bench", "Measure how fast it is on this machine", AddBench},
-  };
-  return kCommands;
-}
-
 void AddPolicy(CommandLine& line, PolicyArguments& a) {
   line.Text(
       "policy", a.name, "POLICY|RUN",

@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -12,9 +11,7 @@
 
 namespace upswing {
 
-/// The program's commands, in the order of --help. Each is declared in the file of its name.
-std::span<const CommandEntry> Commands();
-
+// The commands, each in the file of its name.
 void AddTrain(CommandLine& line);
 void AddBounds(CommandLine& line);
 void AddEval(CommandLine& line);
@@ -27,7 +24,6 @@ void AddStudy(CommandLine& line);
 void AddExport(CommandLine& line);
 void AddView(CommandLine& line);
 void AddRealAiGym(CommandLine& line);
-void AddBench(CommandLine& line);
 
 /// Adds the policy to try, a file, a run folder or a controller, and the controllers' settings.
 void AddPolicy(CommandLine& line, PolicyArguments& a);

@@ -1,102 +1,37 @@
-#include <poll.h>
-#include <unistd.h>
-
-#include <cerrno>
-#include <csignal>
-#include <cstdio>
-#include <cstdlib>
-#include <cstring>
-#include <exception>
-#include <filesystem>
-#include <iostream>
-#include <system_error>
-
 #include "apps/commands.h"
-#include "apps/say.h"
-#include "apps/signals.h"
-#include "core/error.h"
-#include "core/simd.h"
-#include "core/text.h"
-#include "io/file.h"
+#include "apps/program.h"
 
 namespace upswing {
 namespace {
 
-/// Whether standard output has no reader left, as when `| head -1` has ended.
-bool OutputIsClosed() {
-  pollfd output{STDOUT_FILENO, 0, 0};
-  return poll(&output, 1, 0) == 1 && (output.revents & POLLERR) != 0;
-}
-
-/// Ends as programs usually do in that case: quietly, by SIGPIPE.
-int EndByPipe() {
-  std::signal(SIGPIPE, SIG_DFL);
-  std::raise(SIGPIPE);
-  return 128 + SIGPIPE;
-}
-
-/// An error's message, which may quote a stranger's file, as one line of a terminal; the middle of
-/// a very long one is left out.
-std::string OneLine(std::string_view message) {
-  constexpr size_t kBegin = 1500;  // bytes
-  constexpr size_t kEnd = 500;
-  if (message.size() <= kBegin + kEnd) return Printable(message);
-  return Concat(Printable(message.substr(0, kBegin)), " … ",
-                Printable(message.substr(message.size() - kEnd)));
-}
-
-/// The exit code, unless the output cannot be written.
-int Finish(int exit_code) {
-  std::cout.flush();
-  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0 && std::cout.good()) return exit_code;
-  if (OutputIsClosed()) return EndByPipe();
-  SayError(Concat("cannot write the output: ", std::strerror(errno)));
-  return 1;
-}
-
-/// Uses the vector instructions that the environment variable UPSWING_VECTORS names, if there is
-/// one: for results of another processor, to the bit.
-void ChooseVectors() {
-  const char* path = std::getenv("UPSWING_VECTORS");
-  if (path != nullptr && *path != '\0') UseSimdPath(path);
-}
-
-int Main(int argc, char** argv) {
-  try {
-    ChooseVectors();
-    return Finish(RunProgram(
-        argc, argv, Commands(),
-        "Examples:\n"
-        "  ./upswing train                      train the default agent until the task is solved\n"
-        "  ./upswing eval runs/d3qn-seed1       evaluate its best policy\n"
-        "  ./upswing compare runs               compare the agents in runs over their seeds\n"
-        "  ./upswing train --help               every setting, with its default\n"));
-  } catch (const Error& error) {
-    SayError(OneLine(error.what()));
-    return error.exit_code();
-  } catch (const std::filesystem::filesystem_error& error) {
-    const Error of_path = PathError("cannot use", error.path1(), error.code().value());
-    SayError(OneLine(of_path.what()));
-    return of_path.exit_code();
-  } catch (const std::bad_alloc&) {
-    SayError("out of memory");
-    return 1;
-  } catch (const std::exception& error) {
-    if (OutputIsClosed() && std::ferror(stdout) != 0) return EndByPipe();
-    SayError(OneLine(error.what()));
-    return 1;
-  }
-}
+/// In the order of --help.
+constexpr CommandEntry kCommands[] = {
+    {"train", "Train an agent until the task is solved", AddTrain},
+    {"eval", "Evaluate a policy over many episodes", AddEval},
+    {"bounds", "Search for the best episodes, and compare policies with them", AddBounds},
+    {"simulate", "Write one rollout of a policy, of given torques, or of none as CSV", AddSimulate},
+    {"map", "Map how policies do on other plants or from other starts", AddMap},
+    {"plot", "Draw one episode of a policy", AddPlot},
+    {"view", "Show policies at work in a window, or record them as a film", AddView},
+    {"info", "Describe and check a policy or a run, or describe this machine", AddInfo},
+    {"compare", "Compare trainings over their seeds, with intervals and curves", AddCompare},
+    {"study", "Train variants of the settings, many seeds each", AddStudy},
+    {"export", "Policies as ONNX or C or in the page; numbers to test other readers by", AddExport},
+    {"realaigym", "Score a policy by the rules of the benchmark RealAIGym, or search one",
+     AddRealAiGym},
+    {"bench", "Measure how fast it is on this machine", nullptr},
+};
 
 }  // namespace
 }  // namespace upswing
 
 // What is thrown while an exception is reported ends us.
 int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape)
-  upswing::ListenToSignals();
-  upswing::OpenStandardFiles();
-  // A write that cannot be done fails where it is made, with a message, instead of ending us.
-  std::signal(SIGPIPE, SIG_IGN);
-  std::signal(SIGXFSZ, SIG_IGN);
-  return upswing::Main(argc, argv);
+  return upswing::MainProgram(
+      argc, argv, upswing::kCommands,
+      "Examples:\n"
+      "  ./upswing train                      train the default agent until the task is solved\n"
+      "  ./upswing eval runs/d3qn-seed1       evaluate its best policy\n"
+      "  ./upswing compare runs               compare the agents in runs over their seeds\n"
+      "  ./upswing train --help               every setting, with its default\n");
 }

@@ -31,6 +31,7 @@ LAYERS = {
     "export": BELOW_SETUP | {"setup", "run", "report"},
     "view": BELOW_SETUP | {"setup", "run", "judge"},
     "apps": LIBRARIES,
+    "bench": LIBRARIES | {"apps"},
     "python": LIBRARIES,
     "web": LIBRARIES,
     "fuzz": LIBRARIES,
@@ -44,9 +45,9 @@ ALLOWED_FILES = {
     "zlib.h": re.compile(r"io/png\.cc$"),
     "google": re.compile(r"io/"),
     "nanobind": re.compile(r"python/"),
-    "hwy": re.compile(r"(core/simd(_test)?|nn/(linear|product|roofline|registers-inl)|"
+    "hwy": re.compile(r"(core/simd(_test)?|nn/(linear|product|registers-inl)|bench/roofline|"
                       r"sim/(closed_form|sine_cosine-inl)|realaigym/(plant|swing_net))\.(h|cc)$"),
-    "Eigen": re.compile(r"(control|realaigym)/|nn/[^/]*_(test|bench)\.cc$"),
+    "Eigen": re.compile(r"(control|realaigym)/|nn/[^/]*_test\.cc$|bench/"),
 }
 
 # Layers that need no operating system, the headers that would bring one, and the files that may

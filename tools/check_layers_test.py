@@ -14,7 +14,7 @@ GOOD = {
     "core/simd_test.cc": "#include <hwy/highway.h>\n",
     "nn/linear.h": '#pragma once\n#include "core/rng.h"\n',
     "nn/linear.cc": '#include "nn/linear.h"\n#include <hwy/highway.h>\n',
-    "nn/linear_bench.cc": '#include "nn/linear.h"\n#include <Eigen/Core>\n',
+    "bench/linear_bench.cc": '#include "nn/linear.h"\n#include <Eigen/Core>\n',
     "nn/adam_test.cc": "#include <Eigen/Core>\n",
     "sim/task.h": "",
     "mujoco/model.h": "#include <mujoco/mujoco.h>\n",

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <memory>
 
-#include "apps/bench.h"
+#include "bench/bench.h"
 #include "core/rng.h"
 #include "core/thread_pool.h"
 #include "mujoco/engines.h"

@@ -1,10 +1,11 @@
+#include "rl/sac.h"
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <memory>
 
-#include "apps/bench.h"
-#include "rl/sac.h"
+#include "bench/bench.h"
 #include "sim/pendulum_v1.h"
 
 namespace upswing {

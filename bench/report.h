@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "apps/bench.h"
 #include "apps/progress.h"
+#include "bench/bench.h"
 
 namespace upswing {
 

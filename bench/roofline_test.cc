@@ -1,4 +1,4 @@
-#include "nn/roofline.h"
+#include "bench/roofline.h"
 
 #include <gtest/gtest.h>
 

@@ -1,9 +1,9 @@
-#include "nn/roofline.h"
+#include "bench/roofline.h"
 
 #include <cassert>
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "nn/roofline.cc"
+#define HWY_TARGET_INCLUDE "bench/roofline.cc"
 #include <hwy/foreach_target.h>  // includes this file once for each target
 // must come after foreach_target
 #include <hwy/highway.h>

@@ -1,11 +1,12 @@
+#include "rl/ppo.h"
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
 #include <memory>
 
-#include "apps/bench.h"
-#include "rl/ppo.h"
+#include "bench/bench.h"
 #include "sim/pendulum_v1.h"
 
 namespace upswing {

@@ -7,7 +7,7 @@
 #include <vector>
 
 /// What `upswing bench` is made of: cases, which know what to do and how much work that is, and
-/// their reporter (apps/bench_report.h).
+/// their reporter (bench/report.h).
 namespace upswing {
 
 /// What was typed.

@@ -8,12 +8,12 @@
 #include <memory>
 #include <thread>
 
-#include "apps/bench.h"
+#include "bench/bench.h"
+#include "bench/roofline.h"
 #include "core/aligned.h"
 #include "core/rng.h"
 #include "core/thread_pool.h"
 #include "nn/linear.h"
-#include "nn/roofline.h"
 
 namespace upswing {
 namespace {

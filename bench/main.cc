@@ -1,5 +1,3 @@
-#include "apps/bench.h"
-
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 
@@ -7,10 +5,11 @@
 #include <exception>
 #include <memory>
 
-#include "apps/bench_report.h"
-#include "apps/commands.h"
+#include "apps/program.h"
 #include "apps/say.h"
 #include "apps/signals.h"
+#include "bench/bench.h"
+#include "bench/report.h"
 #include "core/error.h"
 #include "core/simd.h"
 #include "core/text.h"
@@ -189,8 +188,6 @@ int RunBench(BenchOptions options) {
   return 0;
 }
 
-}  // namespace
-
 void AddBench(CommandLine& line) {
   auto o = std::make_shared<BenchOptions>();
   line.Texts("parts", o->parts, "PART", "what to measure [everything]");
@@ -225,4 +222,13 @@ void AddBench(CommandLine& line) {
   line.Run([o] { return RunBench(*o); });
 }
 
+constexpr CommandEntry kCommands[] = {
+    {"bench", "Measure how fast it is on this machine", AddBench}};
+
+}  // namespace
 }  // namespace upswing
+
+// What is thrown while an exception is reported ends us.
+int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape)
+  return upswing::MainProgram(argc, argv, upswing::kCommands, "");
+}

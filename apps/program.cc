@@ -1,0 +1,112 @@
+#include "apps/program.h"
+
+#include <poll.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <exception>
+#include <filesystem>
+#include <iostream>
+#include <system_error>
+
+#include "apps/say.h"
+#include "apps/signals.h"
+#include "core/error.h"
+#include "core/simd.h"
+#include "core/text.h"
+#include "io/command.h"
+#include "io/file.h"
+
+namespace upswing {
+namespace {
+
+/// Whether standard output has no reader left, as when `| head -1` has ended.
+bool OutputIsClosed() {
+  pollfd output{STDOUT_FILENO, 0, 0};
+  return poll(&output, 1, 0) == 1 && (output.revents & POLLERR) != 0;
+}
+
+/// Ends as programs usually do in that case: quietly, by SIGPIPE.
+int EndByPipe() {
+  std::signal(SIGPIPE, SIG_DFL);
+  std::raise(SIGPIPE);
+  return 128 + SIGPIPE;
+}
+
+/// An error's message, which may quote a stranger's file, as one line of a terminal; the middle of
+/// a very long one is left out.
+std::string OneLine(std::string_view message) {
+  constexpr size_t kBegin = 1500;  // bytes
+  constexpr size_t kEnd = 500;
+  if (message.size() <= kBegin + kEnd) return Printable(message);
+  return Concat(Printable(message.substr(0, kBegin)), " … ",
+                Printable(message.substr(message.size() - kEnd)));
+}
+
+/// The exit code, unless the output cannot be written.
+int Finish(int exit_code) {
+  std::cout.flush();
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0 && std::cout.good()) return exit_code;
+  if (OutputIsClosed()) return EndByPipe();
+  SayError(Concat("cannot write the output: ", std::strerror(errno)));
+  return 1;
+}
+
+/// Uses the vector instructions that the environment variable UPSWING_VECTORS names, if there is
+/// one: for results of another processor, to the bit.
+void ChooseVectors() {
+  const char* path = std::getenv("UPSWING_VECTORS");
+  if (path != nullptr && *path != '\0') UseSimdPath(path);
+}
+
+/// Runs a command that is a program of its own: `upswing-NAME` beside this one.
+void ReplaceByProgramOf(const std::string& command, char** argv) {
+  const std::filesystem::path program = ProgramPath().parent_path() / Concat("upswing-", command);
+  execv(program.c_str(), argv);
+  throw BadInput(Concat(command, ": expected the program ", program.string(), ", got ",
+                        std::strerror(errno), "; ./upswing ", command, " builds it"));
+}
+
+int Main(int argc, char** argv, std::span<const CommandEntry> commands, const std::string& footer) {
+  try {
+    for (const CommandEntry& command : commands) {
+      if (command.declare == nullptr && argc > 1 && command.name == std::string_view(argv[1])) {
+        ReplaceByProgramOf(command.name, argv);
+      }
+    }
+    ChooseVectors();
+    return Finish(RunProgram(argc, argv, commands, footer));
+  } catch (const Error& error) {
+    SayError(OneLine(error.what()));
+    return error.exit_code();
+  } catch (const std::filesystem::filesystem_error& error) {
+    const Error of_path = PathError("cannot use", error.path1(), error.code().value());
+    SayError(OneLine(of_path.what()));
+    return of_path.exit_code();
+  } catch (const std::bad_alloc&) {
+    SayError("out of memory");
+    return 1;
+  } catch (const std::exception& error) {
+    if (OutputIsClosed() && std::ferror(stdout) != 0) return EndByPipe();
+    SayError(OneLine(error.what()));
+    return 1;
+  }
+}
+
+}  // namespace
+
+int MainProgram(int argc, char** argv, std::span<const CommandEntry> commands,
+                const std::string& footer) {
+  ListenToSignals();
+  OpenStandardFiles();
+  // A write that cannot be done fails where it is made, with a message, instead of ending us.
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
+  return Main(argc, argv, commands, footer);
+}
+
+}  // namespace upswing
