@@ -12,6 +12,7 @@
 #include "core/text.h"
 #include "io/machine.h"
 #include "io/streams.h"
+#include "run/find_policy.h"
 #include "setup/arguments.h"
 #include "setup/controllers.h"
 

@@ -1,6 +1,7 @@
 #include "apps/commands.h"
 
 #include "core/text.h"
+#include "run/find_policy.h"
 #include "setup/arguments.h"
 #include "setup/controllers.h"
 

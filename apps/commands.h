@@ -7,6 +7,7 @@
 
 #include "apps/command_line.h"
 #include "judge/trial.h"
+#include "run/find_policy.h"
 #include "setup/loaded_policy.h"
 
 namespace upswing {

@@ -12,6 +12,7 @@
 #include "io/file.h"
 #include "io/machine.h"
 #include "report/figure.h"
+#include "run/find_policy.h"
 #include "setup/controllers.h"
 
 namespace upswing {

@@ -11,6 +11,7 @@
 #include "io/machine.h"
 #include "io/streams.h"
 #include "rl/evaluate.h"
+#include "run/find_policy.h"
 #include "setup/arguments.h"
 #include "setup/config.h"
 #include "setup/loaded_policy.h"

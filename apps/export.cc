@@ -13,6 +13,7 @@
 #include "core/format.h"
 #include "core/text.h"
 #include "io/streams.h"
+#include "run/find_policy.h"
 #include "setup/controllers.h"
 
 namespace upswing {

@@ -17,6 +17,8 @@
 #include "mujoco/model.h"
 #include "nn/actor_policy.h"
 #include "nn/q_policy.h"
+#include "run/config_files.h"
+#include "run/find_policy.h"
 #include "run/model_info.h"
 #include "setup/config.h"
 #include "setup/controllers.h"
@@ -121,7 +123,7 @@ void PrintPolicy(const LoadedPolicy& loaded) {
 void PrintRun(const fs::path& path, bool has_policy) {
   const Tensors checkpoint = LoadTensors(RunFolder::CheckpointPath(path));
   const Config config = ReadRunConfig(path);
-  const EnvSpec spec = SpecOf(config.Environments());
+  const EnvSpec spec = config.Spec();
   TrainState state(spec.num_envs, static_cast<int>(spec.term_names.size()));
   state.State(Archive::Loader(checkpoint).In("train"));
   fmt::print("{}\n", Printable(path.string()));

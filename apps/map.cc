@@ -11,6 +11,7 @@
 #include "io/file.h"
 #include "io/machine.h"
 #include "judge/map_command.h"
+#include "run/find_policy.h"
 #include "setup/controllers.h"
 #include "setup/loaded_policy.h"
 #include "view/view.h"

@@ -9,6 +9,7 @@
 #include "judge/plot_figures.h"
 #include "judge/rollout.h"
 #include "report/figure.h"
+#include "run/find_policy.h"
 #include "run/model_info.h"
 #include "setup/config.h"
 #include "setup/loaded_policy.h"

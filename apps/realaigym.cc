@@ -19,6 +19,7 @@
 #include "io/tensor_file.h"
 #include "realaigym/boards.h"
 #include "report/figure.h"
+#include "run/find_policy.h"
 
 namespace upswing {
 namespace {

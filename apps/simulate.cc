@@ -9,6 +9,7 @@
 #include "core/text.h"
 #include "io/streams.h"
 #include "judge/rollout.h"
+#include "run/find_policy.h"
 #include "setup/loaded_policy.h"
 
 namespace upswing {

@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "io/file.h"
+#include "io/machine.h"
 #include "report/figure.h"
 #include "setup/config_checks.h"
 #include "study/many_runs.h"
@@ -82,7 +83,8 @@ ManyRuns ReadStudy(const StudyArguments& arguments) {
   many.jobs = arguments.jobs;
   if (arguments.on_slurm) return many;
   if (many.jobs == 0) many.jobs = DefaultJobs(plan.variants.front().config.train.threads);
-  for (const Variant& variant : plan.variants) CheckMemory(variant.config, many.jobs);
+  for (const Variant& variant : plan.variants)
+    CheckMemory(variant.config, AvailableMemory(), many.jobs);
   return many;
 }
 

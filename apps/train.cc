@@ -11,7 +11,9 @@
 #include "apps/train_view.h"
 #include "core/error.h"
 #include "core/text.h"
+#include "io/machine.h"
 #include "io/streams.h"
+#include "run/config_files.h"
 #include "run/training_run.h"
 #include "setup/config.h"
 #include "setup/config_checks.h"
@@ -43,7 +45,7 @@ int RunSeeds(const TrainArguments& arguments) {
   plan.seeds = ParseSeeds(arguments.seeds, "--seeds");
   many.jobs = arguments.jobs > 0 ? arguments.jobs : DefaultJobs(config.train.threads);
   many.more_steps = StepsGiven(arguments.flags);
-  CheckMemory(config, many.jobs);
+  CheckMemory(config, AvailableMemory(), many.jobs);
   ManyRunsView view(many);
   return TrainMany(many, view);
 }

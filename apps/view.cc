@@ -15,6 +15,7 @@
 #include "setup/controllers.h"
 
 #ifdef UPSWING_VIEWER
+#include "run/find_policy.h"
 #include "view/view_window.h"
 #endif
 

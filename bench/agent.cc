@@ -12,8 +12,10 @@
 #include "rl/dqn.h"
 #include "rl/replay.h"
 #include "rl/torque_levels.h"
-#include "run/training.h"
+#include "run/config_files.h"
+#include "run/this_host.h"
 #include "setup/config.h"
+#include "setup/training.h"
 
 namespace upswing {
 namespace {
@@ -143,7 +145,7 @@ BenchCase TrainCase(const std::string& agent, const std::string& physics, int th
           0,
           threads,
           [=]() -> BenchWork {
-            const auto training = std::make_shared<Training>(config, threads);
+            const auto training = std::make_shared<Training>(config, ThisHost(threads));
             while (training->agent().updates() == 0) training->Step();
             return [training] { training->Step(); };
           }};

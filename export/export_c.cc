@@ -320,7 +320,7 @@ CHeader CHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
                           kLongestPrefix, " of them, got \"", prefix, "\""));
   }
   if (loaded.policy->num_parameters() > kMostParameters) {
-    throw BadInput(Concat(loaded.path.string(), ": expected at most ", kMostParameters,
+    throw BadInput(Concat(loaded.path, ": expected at most ", kMostParameters,
                           " parameters, for a longer header takes compilers long, got ",
                           loaded.policy->num_parameters()));
   }

@@ -6,8 +6,9 @@
 #include "export/export.h"
 #include "io/machine.h"
 #include "nn/q_policy.h"
-#include "run/training.h"
+#include "run/this_host.h"
 #include "setup/config.h"
+#include "setup/training.h"
 
 namespace upswing {
 namespace {
@@ -35,12 +36,12 @@ bool SameTensors(const Policy& a, const Policy& b) {
 }  // namespace
 
 std::vector<Checkpoint> CheckpointsOf(const LoadedPolicy& loaded, int64_t count) {
-  const std::string where = loaded.path.string();
+  const std::string where = loaded.path;
   const PolicyInfo& info = loaded.policy->info();
   const int64_t end = info.step.value_or(0);
   Config config = ConfigIn(info.config, Concat(where, ": metadata \"config\""));
   config.train.steps = std::max<int64_t>(1, end);
-  Training training(config, ResolveThreads(0));
+  Training training(config, ThisHost(ResolveThreads(0)));
 
   // All of them: how many there will be is known at the end.
   std::vector<Checkpoint> all{{0, SmallFile(training, where)}};

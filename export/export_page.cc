@@ -7,6 +7,7 @@
 #include "io/file.h"
 #include "io/run_folder.h"
 #include "report/runs.h"
+#include "run/find_policy.h"
 #include "run/train_command.h"
 #include "setup/config.h"
 #include "setup/loaded_policy.h"
@@ -58,7 +59,7 @@ fs::path RunOf(const fs::path& file) {
 ordered_json EntryOf(const LoadedPolicy& loaded, const std::string& id) {
   const PolicyInfo& info = loaded.policy->info();
   const auto need = [&](bool there, const char* key) {
-    if (!there) throw BadInput(Concat(loaded.path.string(), ": no metadata \"", key, "\""));
+    if (!there) throw BadInput(Concat(loaded.path, ": no metadata \"", key, "\""));
   };
   need(!info.agent.empty(), "agent");
   need(info.seed.has_value(), "seed");
@@ -99,7 +100,7 @@ void AddCheckpoints(PageAgent& agent, const LoadedPolicy& loaded, int64_t count)
 
 PageAgent ReadAgent(const fs::path& path, const std::string& given_id, int64_t checkpoints) {
   const LoadedPolicy loaded = LoadPolicy(path);
-  const std::string where = loaded.path.string();
+  const std::string where = loaded.path;
   if (!HasPlant(loaded.task)) {
     throw BadInput(Concat(where,
                           ": expected a policy of the double pendulum, which is what the page ",

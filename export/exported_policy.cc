@@ -155,7 +155,7 @@ double LargestSize(std::span<const double> values) {
 }
 
 Error UnknownObservations(const LoadedPolicy& loaded) {
-  return BadInput(Concat(loaded.path.string(), ": the observations of the task ", loaded.task,
+  return BadInput(Concat(loaded.path, ": the observations of the task ", loaded.task,
                          " are not known to export"));
 }
 
@@ -165,13 +165,13 @@ bool ExportedPolicy::critic_takes_action() const {
 
 ExportedPolicy TakeApart(const LoadedPolicy& loaded) {
   if (loaded.identifies()) {
-    throw BadInput(Concat(loaded.path.string(),
+    throw BadInput(Concat(loaded.path,
                           ": expected a policy that needs no identification of the plant: export "
                           "does not hold its estimator"));
   }
   EnvConfig env;
   env.task = loaded.task;
-  const std::string where = loaded.path.string();
+  const std::string where = loaded.path;
   ExportedPolicy exported;
   exported.loaded = &loaded;
   exported.spec = SpecOf(env);

@@ -12,6 +12,7 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "nn/actor_policy.h"
+#include "run/find_policy.h"
 #include "setup/loaded_policy.h"
 
 using namespace upswing;

@@ -4,6 +4,7 @@
 #include "core/safetensors.h"
 #include "fuzz/target.h"
 #include "fuzz/tiny_training.h"
+#include "run/this_host.h"
 
 namespace upswing {
 
@@ -12,7 +13,8 @@ namespace {
 /// Two trainings with the same settings, kept from one input to the next: loading overwrites the
 /// whole state, and making a training takes far longer than loading one.
 struct Trainings {
-  explicit Trainings(const Config& config) : first(config, 1), second(config, 1) {}
+  explicit Trainings(const Config& config)
+      : first(config, ThisHost(1)), second(config, ThisHost(1)) {}
   Training first, second;
 };
 

@@ -10,6 +10,7 @@
 #include "nn/actor_policy.h"
 #include "nn/q_policy.h"
 #include "realaigym/swing_policy.h"
+#include "run/this_host.h"
 #include "setup/loaded_policy.h"
 
 namespace upswing {
@@ -29,7 +30,7 @@ void MakeSeeds(const fs::path& corpus) {
   for (const std::string kind : {"closed-form", "mujoco", "sac", "ppo"}) {
     const bool actor = kind == "sac" || kind == "ppo";
     const Config config = actor ? TinyConfig("closed-form", kind) : TinyConfig(kind);
-    Training training(config, 1);
+    Training training(config, ThisHost(1));
     SaveCheckpoint(training, kind, corpus / "checkpoint/accepted" / (kind + "-new.safetensors"));
     // Until the replay memory is full, and in the middle of a rollout.
     for (int step = 0; step < 9; ++step) training.Step();

@@ -10,6 +10,7 @@
 #include "export/export.h"
 #include "fuzz/target.h"
 #include "realaigym/swing_policy.h"
+#include "run/find_policy.h"
 #include "run/train_command.h"
 #include "setup/loaded_policy.h"
 

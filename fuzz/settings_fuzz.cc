@@ -1,16 +1,27 @@
 // A configuration file, as `train --config` reads it and a run folder holds it.
+#include "core/error.h"
+#include "core/text.h"
 #include "fuzz/target.h"
 #include "setup/config.h"
 
 namespace upswing {
+namespace {
+
+Config Parse(std::string_view text) {
+  return ParseConfig(text, kInputName, {},
+                     [](const std::string& path, bool /*in_file*/) -> ModelFile {
+                       throw BadInput(Concat("model: expected none, got ", path));
+                     });
+}
+
+}  // namespace
 
 bool TryInput(std::string_view input) {
   Config config;
-  if (!Accepts([&] { config = ParseConfig(input, kInputName, {}); })) return false;
+  if (!Accepts([&] { config = Parse(input); })) return false;
   // What the program writes of it says the same.
   const std::string text = ConfigToml(config, false);
-  Expect(ConfigToml(ParseConfig(text, kInputName, {}), false) == text,
-         "to read the settings that were written");
+  Expect(ConfigToml(Parse(text), false) == text, "to read the settings that were written");
   return true;
 }
 

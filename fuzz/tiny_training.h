@@ -1,6 +1,6 @@
 #pragma once
 
-#include "run/training.h"
+#include "setup/training.h"
 #include "setup/config.h"
 
 namespace upswing {

@@ -6,8 +6,9 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "mujoco/engines.h"
-#include "run/training.h"
+#include "run/find_policy.h"
 #include "setup/task.h"
+#include "setup/training.h"
 
 namespace upswing {
 namespace {

@@ -12,6 +12,7 @@
 #include "core/text.h"
 #include "io/making.h"
 #include "io/run_folder.h"
+#include "run/config_files.h"
 #include "run/model_info.h"
 #include "setup/config.h"
 #include "setup/controllers.h"
@@ -116,7 +117,7 @@ std::vector<Setting> SettingsOf(Config config) {
 /// What a configuration says of a run, which has no evaluations yet.
 FoundRun Describe(const fs::path& path, const Config& config) {
   const TrainConfig& t = config.train;
-  const EnvSpec spec = SpecOf(config.Environments());
+  const EnvSpec spec = config.Spec();
   return {{path,
            {t.seed, t.steps, t.envs, t.eval_every, t.stop_when_solved, spec.evaluation,
             spec.action_unit},

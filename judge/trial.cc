@@ -9,6 +9,7 @@
 #include "io/run_folder.h"
 #include "judge/rollout.h"
 #include "mujoco/engines.h"
+#include "run/config_files.h"
 #include "setup/task.h"
 
 namespace upswing {
@@ -36,8 +37,8 @@ EnvConfig OtherTask(const TrialArguments& a, const LoadedPolicy& loaded) {
 /// Where figures go unless the user says.
 fs::path DefaultOut(const LoadedPolicy& loaded, const std::string& name) {
   const bool has_file = !loaded.path.empty();
-  const fs::path run = loaded.path.parent_path();
-  const std::string stem = has_file ? loaded.path.stem().string() : loaded.policy->kind();
+  const fs::path file = loaded.path, run = file.parent_path();
+  const std::string stem = has_file ? file.stem().string() : loaded.policy->kind();
   const fs::path first = has_file && fs::exists(run / RunFolder::kConfig)
                              ? run / name
                              : fs::path("runs") / Concat(name, "-", stem);

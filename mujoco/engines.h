@@ -2,7 +2,6 @@
 
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "sim/physics.h"
 
@@ -11,10 +10,12 @@ namespace upswing {
 /// MuJoCo's batch interface.
 extern const Engine kMuJoCo;
 
-/// The engines' names, the default first: "mujoco", "closed-form".
-std::vector<std::string> EngineNames();
+/// Those of the program: MuJoCo's and the closed form.
+Engines AllEngines();
 
-/// The engine with this name. Throws BadInput whose message begins with `where`.
-const Engine& FindEngine(std::string_view name, const std::string& where);
+/// The one of them with this name. Throws BadInput whose message begins with `where`.
+inline const Engine& FindEngine(std::string_view name, const std::string& where) {
+  return FindEngine(AllEngines(), name, where);
+}
 
 }  // namespace upswing

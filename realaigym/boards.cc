@@ -16,6 +16,7 @@
 #include "io/tensor_file.h"
 #include "realaigym/linear.h"
 #include "report/figure.h"
+#include "run/find_policy.h"
 #include "setup/controllers.h"
 #include "sim/identification.h"
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "realaigym/search.h"
+#include "run/find_policy.h"
 #include "setup/loaded_policy.h"
 
 /// RealAIGym's boards (docs/realaigym.md): scoring any policy by their rules.

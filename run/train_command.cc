@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "core/text.h"
+#include "run/config_files.h"
 #include "setup/config.h"
 
 namespace upswing {

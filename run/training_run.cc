@@ -8,8 +8,10 @@
 #include "io/file.h"
 #include "io/machine.h"
 #include "io/tensor_file.h"
+#include "run/config_files.h"
 #include "run/run_log.h"
 #include "run/run_rows.h"
+#include "run/this_host.h"
 
 namespace upswing {
 namespace {
@@ -34,7 +36,7 @@ std::unique_ptr<TrainingRun> TrainingRun::Make(const fs::path& out, Config confi
   NameModelCopy(config);
   std::unique_ptr<TrainingRun> run(new TrainingRun(out.empty() ? FreeRunFolder(config) : out));
   const int threads = ResolveThreads(config.train.threads);
-  run->training_ = std::make_unique<Training>(std::move(config), threads,
+  run->training_ = std::make_unique<Training>(std::move(config), ThisHost(threads),
                                               std::vector<TrainObserver*>{run.get()});
   const Config& made = run->training_->config();
   std::vector<std::pair<std::string, std::string>> files{
@@ -58,7 +60,7 @@ std::unique_ptr<TrainingRun> TrainingRun::Resume(const fs::path& path,
   NameModelCopy(config);
   const int64_t steps = config.train.steps;
   const int threads = ResolveThreads(config.train.threads);
-  run->training_ = std::make_unique<Training>(std::move(config), threads,
+  run->training_ = std::make_unique<Training>(std::move(config), ThisHost(threads),
                                               std::vector<TrainObserver*>{run.get()});
   run->Open();
   const int64_t done = run->training_->state().steps;

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "io/run_folder.h"
-#include "run/training.h"
+#include "setup/training.h"
 
 namespace upswing {
 

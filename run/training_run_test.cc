@@ -8,6 +8,8 @@
 #include "core/error.h"
 #include "io/file.h"
 #include "io/testing.h"
+#include "run/config_files.h"
+#include "run/this_host.h"
 
 namespace upswing {
 namespace {
@@ -108,7 +110,7 @@ TEST_F(TrainingRunTest, ATrainingInMemoryGivesThePolicyOfTheRun) {
   StopAt never(std::numeric_limits<int64_t>::max());
   const auto run = TrainingRun::Make(temp_ / "run", SmallConfig());
   EXPECT_TRUE(run->Train(never));
-  Training training(SmallConfig(), 1);
+  Training training(SmallConfig(), ThisHost(1));
   while (training.Step()) continue;
   EXPECT_EQ(training.state().steps, run->training().state().steps);
   EXPECT_EQ(training.state().best_return, run->training().state().best_return);

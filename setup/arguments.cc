@@ -1,7 +1,7 @@
 #include "setup/arguments.h"
 
 #include "core/text.h"
-#include "mujoco/engines.h"
+#include "sim/physics.h"
 
 namespace upswing {
 

@@ -2,15 +2,9 @@
 
 #include "core/error.h"
 #include "core/text.h"
-#include "io/file.h"
-#include "io/run_folder.h"
-#include "mujoco/engines.h"
-#include "mujoco/mjcf_check.h"
-#include "mujoco/model.h"
+#include "sim/physics.h"
 
 namespace upswing {
-
-namespace fs = std::filesystem;
 
 namespace {
 
@@ -103,7 +97,6 @@ Options EverySetting(Config& scratch) {
 EnvConfig Config::Environments() const {
   EnvConfig env;
   env.task = task;
-  env.engine = &FindEngine(physics, "--physics");
   env.plants = {plant};
   env.disturbances = {disturbance};
   env.randomization = randomization;
@@ -127,20 +120,6 @@ void ExpectSameSettings(const Config& before, const Config& now, const std::stri
                           old ? old->text() : "none", ", but the configuration says ",
                           option.text()));
   }
-}
-
-void NameModelCopy(Config& config) {
-  if (!config.mjcf.empty()) config.model = RunFolder::kModel;
-}
-
-void MakeReadyForMany(Config& config) {
-  if (config.train.threads == 0) config.train.threads = 1;
-  NameModelCopy(config);
-}
-
-std::string CompleteToml(Config config) {
-  if (!config.model.empty()) config.model = fs::absolute(config.model).string();
-  return ConfigToml(config, false);
 }
 
 std::string ConfigToml(const Config& config, bool identity_only) {
@@ -172,18 +151,6 @@ std::vector<const Option*> ApplyChanges(const Options& options, const std::vecto
     }
   }
   return changed;
-}
-
-Plant ChangedPlant(const Plant& base, const std::string& model, const std::vector<std::string>& set,
-                   std::string& mjcf) {
-  Plant plant = base;
-  const Options options = OptionsOf(plant);
-  if (!model.empty()) {
-    mjcf = ReadOwnFile(model, kMostMjcfBytes);
-    plant = PlantOf(*LoadModel(mjcf, model));
-  }
-  ApplyChanges(options, set);
-  return plant;
 }
 
 }  // namespace upswing

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <functional>
 #include <memory>
 #include <string>
@@ -65,8 +64,10 @@ struct Config {
   /// Those of the double pendulum's environments.
   void DescribeEnvironment(Options& options);
 
-  /// Training environments as these settings have them.
+  /// Training environments as these settings have them, in the closed form; `physics` names the
+  /// engine that they are to have.
   EnvConfig Environments() const;
+  EnvSpec Spec() const { return SpecOf(Environments()); }
 
   /// A new agent for such environments, whose work the pool shares.
   std::unique_ptr<Agent> MakeAgent(const EnvSpec& spec, ThreadPool& pool) const {
@@ -87,31 +88,26 @@ struct FlagValue {
 /// Sets what the flags say. Throws BadInput.
 void SetFlags(const Options& options, const std::vector<FlagValue>& flags);
 
-/// Builds the settings in their order: defaults < named agent < configuration file (none if empty,
-/// standard input if `-`) < flags; a model file's plant counts as defaults. Throws BadInput, also
-/// if settings contradict each other.
-Config BuildConfig(const std::filesystem::path& file, const std::vector<FlagValue>& flags);
+/// A model file: its path, as settings name it, its text and its plant.
+struct ModelFile {
+  std::string path, mjcf;
+  Plant plant;
+};
 
-/// The same from a configuration file's text; `file` is its path, to whose folder the path of a
-/// model is relative.
-Config ParseConfig(std::string_view text, const std::filesystem::path& file,
-                   const std::vector<FlagValue>& flags);
+/// Reads the model that settings name; `in_file`: those of a configuration file, to whose folder
+/// the path is relative. Throws BadInput.
+using ModelReader = std::function<ModelFile(const std::string& path, bool in_file)>;
 
-/// Names the copy of a model file in the run's folder, wherever that lies, in place of the file.
-void NameModelCopy(Config& config);
-
-/// Sets what differs in a run among many: it has one thread unless more are asked for, and its
-/// model lies beside it.
-void MakeReadyForMany(Config& config);
+/// Builds the settings in their order: defaults < named agent < configuration file, of which this
+/// is the text, < flags; a model file's plant counts as defaults. `where` names the file in
+/// messages. Throws BadInput, also if settings contradict each other.
+Config ParseConfig(std::string_view text, const std::string& where,
+                   const std::vector<FlagValue>& flags, const ModelReader& read_model);
 
 /// The settings, such as agent.gamma, that are missing in the TOML text of a run: another version
 /// of the program wrote it.
 std::vector<std::string> MissingSettings(const std::string& text, const std::string& where,
                                          bool identity_only);
-
-/// The settings of a run folder, changed by the flags. Throws BadInput, too, if the run's own file
-/// lacks one: that run is of another version, and today's default is not what it was made with.
-Config ReadRunConfig(const std::filesystem::path& run, const std::vector<FlagValue>& flags = {});
 
 /// The settings in a TOML document, over the defaults of its algorithm. `where` names it in
 /// messages, which give the line too. Throws BadInput.
@@ -129,9 +125,6 @@ void ExpectSameSettings(const Config& before, const Config& now, const std::stri
 /// the number of threads).
 std::string ConfigToml(const Config& config, bool identity_only);
 
-/// The same with comments, for a file that may lie anywhere: the model's path is absolute.
-std::string CompleteToml(Config config);
-
 /// A plant's values as text: `mass1 1, mass2 1, …`.
 std::string PlantText(const Plant& plant);
 
@@ -141,10 +134,5 @@ std::vector<std::pair<std::string, std::string>> NamedAgents();
 /// Sets what --set, or another flag like it, gives ("mass2=1.2") and returns it. Throws BadInput.
 std::vector<const Option*> ApplyChanges(const Options& options, const std::vector<std::string>& set,
                                         const std::string& flag = "--set");
-
-/// The plant to try something on: `base`, or that of the model file if there is one, with the
-/// given changes ("mass2=1.2"). Reads the model into `mjcf`. Throws BadInput.
-Plant ChangedPlant(const Plant& base, const std::string& model, const std::vector<std::string>& set,
-                   std::string& mjcf);
 
 }  // namespace upswing

@@ -6,7 +6,6 @@
 #include "core/error.h"
 #include "core/format.h"
 #include "core/text.h"
-#include "io/machine.h"
 
 namespace upswing {
 namespace {
@@ -18,7 +17,7 @@ std::string Gigabytes(double bytes) {
 }
 
 AgentSize SizeOfLearner(const Config& config) {
-  return config.learner().Size(SpecOf(config.Environments()));
+  return config.learner().Size(config.Spec());
 }
 
 /// Throws BadInput if a setting of the double pendulum is not at its default in another task, which
@@ -69,13 +68,12 @@ TrainingSize SizeOf(const Config& config) {
       saved + replay};
 }
 
-void CheckMemory(const Config& config, int64_t runs) {
+void CheckMemory(const Config& config, int64_t available, int64_t runs) {
   const double needed = static_cast<double>(runs) * SizeOf(config).memory;
-  const auto available = static_cast<double>(AvailableMemory());
-  if (needed <= available) return;
+  if (needed <= static_cast<double>(available)) return;
   const AgentSize learner = SizeOfLearner(config);
   throw BadInput(Concat(
-      "train: expected to fit into the ", Gigabytes(available), " of memory that are free, but ",
+      "train: expected to fit into the ", Gigabytes(static_cast<double>(available)), " of memory that are free, but ",
       runs > 1 ? Concat(runs, " trainings at a time, each with a ") : "a ", "network of ",
       FormatCount(learner.parameters), " parameters and a ", learner.store, " of ",
       FormatCount(learner.capacity), " transitions take up to ", Gigabytes(needed),

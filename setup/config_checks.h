@@ -22,7 +22,7 @@ struct TrainingSize {
 };
 TrainingSize SizeOf(const Config& config);
 
-/// Throws BadInput if there is too little memory for `runs` trainings at a time.
-void CheckMemory(const Config& config, int64_t runs = 1);
+/// Throws BadInput if `runs` trainings at a time do not fit into so many bytes.
+void CheckMemory(const Config& config, int64_t available, int64_t runs = 1);
 
 }  // namespace upswing

@@ -4,9 +4,6 @@
 
 #include "core/error.h"
 #include "core/text.h"
-#include "io/file.h"
-#include "io/run_folder.h"
-#include "io/streams.h"
 #include "setup/config.h"
 #include "setup/config_checks.h"
 #include "setup/named_agents.h"
@@ -14,8 +11,6 @@
 
 namespace upswing {
 namespace {
-
-namespace fs = std::filesystem;
 
 const NamedAgent& FindAgent(const std::string& name, const std::string& where) {
   const auto agents = EmbeddedAgents();
@@ -108,45 +103,6 @@ ChosenAgent ChooseAgent(const toml::table& table, const std::string& where,
   return {agent.name, place, std::move(settings), algorithm};
 }
 
-/// The settings of a parsed configuration file; see ParseConfig.
-Config ConfigOf(const toml::table& table, const fs::path& file,
-                const std::vector<FlagValue>& flags) {
-  const std::string where = file.empty() ? "" : InputName(file.string());
-  const ChosenAgent agent = ChooseAgent(table, where, flags);
-  Config config(agent.algorithm);
-  const Options options = KnownOptions(config, agent.name);
-
-  // A model file has a plant of its own, which other settings may change.
-  const EarlySetting model = FindEarly("plant", "model", table, where, flags);
-  std::string model_path = model.value;
-  if (!model_path.empty() && model.in_file) {
-    model_path = (file.parent_path() / model.value).string();  // counts from its file
-  }
-  if (!model_path.empty()) config.plant = ChangedPlant(config.plant, model_path, {}, config.mjcf);
-
-  ApplyTable(options, agent.settings, agent.place, false);
-  ApplyTable(options, table, where, false);
-  SetFlags(options, flags);
-  config.agent = agent.name;
-  config.model = model_path;
-  CheckSettings(config, where);
-  return config;
-}
-
-/// The settings that a configuration file lacks; see MissingSettings.
-std::vector<std::string> MissingIn(const toml::table& table, const std::string& where,
-                                   bool identity_only) {
-  Config scratch(AlgorithmIn(table, where));
-  const Options options = OptionsOf(scratch);
-  std::vector<std::string> missing;
-  for (const Option& option : options.all()) {
-    const bool needed = !option.implied && (option.identity() || !identity_only);
-    if (!needed || table[option.section][option.name]) continue;
-    missing.push_back(Concat(option.section, ".", option.name));
-  }
-  return missing;
-}
-
 }  // namespace
 
 void SetFlags(const Options& options, const std::vector<FlagValue>& flags) {
@@ -166,38 +122,43 @@ void ApplyToml(const Options& options, std::string_view text, const std::string&
   ApplyTable(options, ParseToml(text, where), where, false);
 }
 
-Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
-  return ParseConfig(file.empty() ? "" : ReadInput(file.string()), file, flags);
-}
+Config ParseConfig(std::string_view text, const std::string& where,
+                   const std::vector<FlagValue>& flags, const ModelReader& read_model) {
+  const toml::table table = ParseToml(text, where);
+  const ChosenAgent agent = ChooseAgent(table, where, flags);
+  Config config(agent.algorithm);
+  const Options options = KnownOptions(config, agent.name);
 
-Config ParseConfig(std::string_view text, const fs::path& file,
-                   const std::vector<FlagValue>& flags) {
-  return ConfigOf(ParseToml(text, file.empty() ? "" : InputName(file.string())), file, flags);
+  // A model file has a plant of its own, which other settings may change.
+  const EarlySetting named = FindEarly("plant", "model", table, where, flags);
+  ModelFile model;
+  if (!named.value.empty()) {
+    model = read_model(named.value, named.in_file);
+    config.plant = model.plant;
+    config.mjcf = model.mjcf;
+  }
+
+  ApplyTable(options, agent.settings, agent.place, false);
+  ApplyTable(options, table, where, false);
+  SetFlags(options, flags);
+  config.agent = agent.name;
+  config.model = model.path;
+  CheckSettings(config, where);
+  return config;
 }
 
 std::vector<std::string> MissingSettings(const std::string& text, const std::string& where,
                                          bool identity_only) {
-  return MissingIn(ParseToml(text, where), where, identity_only);
-}
-
-Config ReadRunConfig(const fs::path& run, const std::vector<FlagValue>& flags) {
-  const fs::path file = run / RunFolder::kConfig;
-  const toml::table table = ParseToml(ReadOwnFile(file), file.string());
-  const std::string model = table["plant"]["model"].value_or("");
-  if (!model.empty() && model != RunFolder::kModel) {  // a run is whole wherever it lies
-    throw BadInput(Concat(file.string(), ": model: expected ", RunFolder::kModel,
-                          ", the copy in the run folder, got \"", Printable(model), "\""));
+  const toml::table table = ParseToml(text, where);
+  const Config config(AlgorithmIn(table, where));
+  const Options options = OptionsOf(config);
+  std::vector<std::string> missing;
+  for (const Option& option : options.all()) {
+    const bool needed = !option.implied && (option.identity() || !identity_only);
+    if (!needed || table[option.section][option.name]) continue;
+    missing.push_back(Concat(option.section, ".", option.name));
   }
-  ChooseAgent(table, file.string(), flags);  // whose algorithm says which settings there are
-  std::vector<std::string> missing = MissingIn(table, file.string(), false);
-  if (missing.empty()) return ConfigOf(table, file, flags);
-  constexpr size_t kMostNames = 6;  // that make a line which can still be read
-  const size_t more = missing.size() - std::min(missing.size(), kMostNames);
-  missing.resize(missing.size() - more);
-  throw BadInput(Concat(file.string(), ": expected every setting, as this version writes a run; ",
-                        "got none of ", Join(missing, ", "),
-                        more > 0 ? Concat(" and ", more, " more") : "",
-                        ": another version wrote it"));
+  return missing;
 }
 
 std::vector<std::pair<std::string, std::string>> NamedAgents() {

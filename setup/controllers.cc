@@ -5,7 +5,6 @@
 #include "control/hybrid.h"
 #include "core/error.h"
 #include "core/text.h"
-#include "setup/loaded_policy.h"
 
 namespace upswing {
 namespace {
@@ -59,11 +58,11 @@ Made MakePartialFeedback(const ControllerConfig& config) {
 }
 
 Made MakeHybrid(const ControllerConfig& config) {
-  if (config.swing_up.empty()) {
+  if (config.swing_up_policy == nullptr) {
     throw BadInput("hybrid: expected a policy that swings up, by --swing-up POLICY, got none");
   }
   return std::make_shared<HybridPolicy>("hybrid", OptionsOf(config.lqr), config.lqr,
-                                        LoadPolicy(config.swing_up).policy, config.plant);
+                                        config.swing_up_policy, config.plant);
 }
 
 constexpr Controller kControllers[] = {

@@ -23,7 +23,8 @@ struct ControllerConfig {
   MpcConfig mpc;
   EnergyShapingConfig energy;
   PartialFeedbackConfig pfl;
-  std::string swing_up;  // of `hybrid`: a policy's file or run folder
+  std::string swing_up;  // of `hybrid`: what names the policy that swings up
+  std::shared_ptr<const Policy> swing_up_policy;  // that policy; not a setting
 
   /// The settings but the plant, which has flags of its own.
   void Describe(Options& options);

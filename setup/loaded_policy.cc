@@ -4,7 +4,6 @@
 
 #include "core/error.h"
 #include "core/text.h"
-#include "mujoco/model.h"
 #include "nn/actor_policy.h"
 #include "nn/q_policy.h"
 
@@ -85,7 +84,7 @@ Plant TrainingPlant(const PolicyInfo& info, const std::string& where) {
 
 }  // namespace
 
-LoadedPolicy ReadPolicy(const Tensors& file) {
+LoadedPolicy PolicyIn(const Tensors& file) {
   const std::string& where = file.where();
   const auto format = file.metadata.find("format");
   if (format != file.metadata.end() && format->second == "upswing-realaigym") {
@@ -105,7 +104,6 @@ LoadedPolicy ReadPolicy(const Tensors& file) {
   if (!HasPlant(loaded.task)) return loaded;
   loaded.plant = TrainingPlant(info, where);
   loaded.mjcf = info.model;
-  if (!loaded.mjcf.empty()) LoadModel(loaded.mjcf, Concat(where, ": metadata \"model\""));
   return loaded;
 }
 
@@ -125,7 +123,7 @@ PolicyInfo InfoOf(const Config& config) {
   info.upswing_version = UPSWING_VERSION;
   info.config = ConfigToml(config, true);
   info.task = config.task;
-  info.control_period = SpecOf(config.Environments()).step_seconds;
+  info.control_period = config.Spec().step_seconds;
   if (!HasPlant(config.task)) return info;
   for (const auto& [name, value] : PlantValues(config.plant)) info.plant[name] = value;
   info.observation = ObservationInfoOf(config.memory, config.identify);

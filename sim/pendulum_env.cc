@@ -30,10 +30,6 @@ std::optional<Disturber> MakeDisturber(const PendulumEnvConfig& config) {
 
 }  // namespace
 
-void Physics::Push(int /*env*/, const std::array<double, 2>& /*torque*/) {
-  throw Failure("this engine knows no pushes; mujoco does");
-}
-
 EnvSpec PendulumSpec(const PendulumEnvConfig& config) {
   EnvSpec spec;
   spec.task = kDoublePendulum;

@@ -4,6 +4,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/archive.h"
@@ -24,8 +25,21 @@ struct Engine {
   std::unique_ptr<Physics> (*make)(const PhysicsConfig& config);
 };
 
+/// The name of MuJoCo's engine, which mujoco/ has.
+inline constexpr const char* kMuJoCoName = "mujoco";
+
 /// Closed form: the built-in model only; many times faster than MuJoCo, equal to 12 digits a step.
 extern const Engine kClosedForm;
+
+/// Engines that a program has.
+using Engines = std::span<const Engine* const>;
+
+/// The names of all engines, whether a program has them or not; the default first: "mujoco",
+/// "closed-form".
+std::vector<std::string> EngineNames();
+
+/// The engine with this name. Throws BadInput whose message begins with `where`.
+const Engine& FindEngine(Engines engines, std::string_view name, const std::string& where);
 
 /// Settings of the physics.
 struct PhysicsConfig {

@@ -14,6 +14,7 @@
 #include "io/lease.h"
 #include "io/machine.h"
 #include "io/run_folder.h"
+#include "run/config_files.h"
 #include "study/study_worker.h"
 
 namespace upswing {

@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "core/text.h"
+#include "run/config_files.h"
 #include "setup/toml_settings.h"
 #include "study/seeds.h"
 

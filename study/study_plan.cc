@@ -10,6 +10,7 @@
 #include "core/text.h"
 #include "io/file.h"
 #include "io/run_folder.h"
+#include "run/config_files.h"
 #include "study/seeds.h"
 
 namespace upswing {
@@ -78,7 +79,7 @@ void SeedRun::Read() {
     if (problem.empty()) problem = "failed";
   }
   if (!ReadIfFinished() && !IsReduced()) {
-    result = ReadCheckpointResult(path, SpecOf(variant->config.Environments()));
+    result = ReadCheckpointResult(path, variant->config.Spec());
   }
 }
 

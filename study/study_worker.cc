@@ -156,7 +156,7 @@ void WriteFailed(const SeedRun& run, const std::string& why) {
 WorkerOutcome WorkOn(const StudyPlan& plan, WorkerHost& host) { return Worker(plan, host).Run(); }
 
 void Finish(const SeedRun& run, Keep keep) {
-  const auto at_end = ReadCheckpointResult(run.path, SpecOf(run.variant->config.Environments()));
+  const auto at_end = ReadCheckpointResult(run.path, run.variant->config.Spec());
   if (!at_end) throw Failure(Concat(run.path.string(), ": it was removed while it was trained"));
   RunResult result = *at_end;
   result.settings = run.settings;

@@ -10,8 +10,10 @@ import re
 import sys
 from pathlib import Path
 
-BELOW_SETUP = {"core", "nn", "sim", "rl", "control", "io", "mujoco"}
-LIBRARIES = BELOW_SETUP | {"report", "setup", "realaigym", "run", "study", "judge", "export", "view"}
+# Layers that need no operating system.
+PORTABLE = {"core", "nn", "sim", "rl", "control", "setup"}
+BELOW_RUN = PORTABLE | {"io", "mujoco"}
+LIBRARIES = BELOW_RUN | {"report", "realaigym", "run", "study", "judge", "export", "view"}
 
 # What each folder may include besides itself.
 LAYERS = {
@@ -23,13 +25,13 @@ LAYERS = {
     "io": {"core"},
     "mujoco": {"sim", "io", "core"},
     "report": {"io", "core"},
-    "setup": BELOW_SETUP,
-    "realaigym": BELOW_SETUP | {"setup", "report"},
-    "run": BELOW_SETUP | {"setup"},
-    "study": BELOW_SETUP | {"setup", "run"},
-    "judge": BELOW_SETUP | {"setup", "run", "study", "report"},
-    "export": BELOW_SETUP | {"setup", "run", "report"},
-    "view": BELOW_SETUP | {"setup", "run", "judge"},
+    "setup": PORTABLE,
+    "run": BELOW_RUN,
+    "realaigym": BELOW_RUN | {"run", "report"},
+    "study": BELOW_RUN | {"run"},
+    "judge": BELOW_RUN | {"run", "study", "report"},
+    "export": BELOW_RUN | {"run", "report"},
+    "view": BELOW_RUN | {"run", "judge"},
     "apps": LIBRARIES,
     "bench": LIBRARIES | {"apps"},
     "python": LIBRARIES,
@@ -52,7 +54,6 @@ ALLOWED_FILES = {
 
 # Layers that need no operating system, the headers that would bring one, and the files that may
 # have them: tests.
-PORTABLE = {"core", "nn", "sim", "rl", "control"}
 MAY_ASK_SYSTEM = re.compile(r"(_test|_bench)\.cc$|/testing\.h$")
 SYSTEM = re.compile(r"(unistd|fcntl|poll|sched|signal|csignal|filesystem|fstream|cstdio|stdio)(\.h)?$|"
                     r"sys/")

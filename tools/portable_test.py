@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The layers core, nn, sim, rl and control need no operating system: a program linked with all of
+"""The layers core, nn, sim, rl, control and setup need no operating system: a program linked with all of
 them trains in memory, and asks for nothing but what is allowed here.
 
 The program is portable_test in the build folder of the program in UPSWING (see apps/testing.py).
@@ -33,6 +33,8 @@ ALLOWED = {
         r"__(mul|div)[sd]c3|c(abs|exp|log|sqrt)f?",
     "threads: std::mutex, and the waiting of std::atomic (on Linux the system call futex)":
         r"pthread_\w+|sched_yield|syscall",
+    "toml++, whose parser of text is a shared library":
+        r"(typeinfo for |vtable for )?toml::.*",
     "Highway: which vector instructions the processor has, and how it reports its own errors":
         r"hwy::.*",
     "assertions, in a build that has them":

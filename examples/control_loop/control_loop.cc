@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/text.h"
+#include "run/find_policy.h"
 #include "setup/loaded_policy.h"
 #include "sim/double_pendulum.h"
 

@@ -3,9 +3,11 @@
 
 #include "core/error.h"
 #include "mujoco/engines.h"
-#include "run/training.h"
+#include "run/config_files.h"
+#include "run/this_host.h"
 #include "setup/config.h"
 #include "setup/task.h"
+#include "setup/training.h"
 
 using namespace upswing;
 
@@ -20,7 +22,8 @@ class Printer : public TrainObserver {
 int main() try {
   // Settings have the names of the program's flags: `upswing train --help`.
   Printer printer;
-  Training training(BuildConfig("", {{"agent", "fast"}, {"seed", "1"}}), /*threads=*/2, {&printer});
+  Training training(BuildConfig("", {{"agent", "fast"}, {"seed", "1"}}), ThisHost(/*threads=*/2),
+                    {&printer});
   while (training.Step()) continue;
   std::printf("%s\n", training.state().solved ? "solved" : "not solved");
 

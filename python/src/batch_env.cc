@@ -6,6 +6,7 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "io/machine.h"
+#include "mujoco/engines.h"
 #include "rl/torque_levels.h"
 #include "sim/pendulum_env.h"
 
@@ -14,6 +15,7 @@ namespace {
 
 std::unique_ptr<SeededEnv> MakeSeededEnv(const Config& config, ThreadPool& pool) {
   EnvConfig settings = config.Environments();
+  settings.engine = &FindEngine(config.physics, "physics");
   settings.pool = &pool;
   std::unique_ptr<VectorEnv> env = MakeEnv(settings);
   auto* seeded = dynamic_cast<SeededEnv*>(env.get());

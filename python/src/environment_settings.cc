@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "core/text.h"
+#include "run/config_files.h"
 #include "setup/config_checks.h"
 
 namespace upswing {

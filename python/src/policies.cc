@@ -16,6 +16,7 @@
 #include "io/tensor_file.h"
 #include "python/src/bindings.h"
 #include "python/src/function_policy.h"
+#include "run/find_policy.h"
 #include "setup/config.h"
 #include "setup/controllers.h"
 

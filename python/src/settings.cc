@@ -11,6 +11,7 @@
 #include "judge/trial.h"
 #include "python/src/bindings.h"
 #include "python/src/environment_settings.h"
+#include "run/config_files.h"
 #include "setup/config.h"
 #include "setup/config_checks.h"
 

@@ -13,7 +13,10 @@
 #include "io/machine.h"
 #include "io/run_folder.h"
 #include "python/src/bindings.h"
+#include "run/config_files.h"
+#include "run/find_policy.h"
 #include "run/run_rows.h"
+#include "run/this_host.h"
 #include "run/training_run.h"
 #include "setup/config_checks.h"
 
@@ -179,8 +182,8 @@ Driven Make(const std::vector<FlagValue>& flags, const std::string& config_file,
     return driven;
   }
   const int threads = ResolveThreads(config.train.threads);
-  driven.training =
-      std::make_unique<Training>(std::move(config), threads, std::vector<TrainObserver*>{&driver});
+  driven.training = std::make_unique<Training>(std::move(config), ThisHost(threads),
+                                               std::vector<TrainObserver*>{&driver});
   return driven;
 }
 

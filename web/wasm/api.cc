@@ -166,10 +166,13 @@ UPSWING_EXPORT(bytes_size) size_t BytesSize() { return bytes.size(); }
 UPSWING_EXPORT(policy_open) Controller* PolicyOpen(const std::byte* file, size_t size) {
   return Guarded([&]() -> Controller* {
     const Tensors tensors = ReadSafetensors({file, file + size}, "the file");
-    auto controller = std::make_unique<Controller>(ReadPolicy(tensors));
+    auto controller = std::make_unique<Controller>(PolicyIn(tensors));
     if (!HasPlant(controller->loaded.task)) {
       throw BadInput(
           Concat("expected a policy of the double pendulum, got one of ", controller->loaded.task));
+    }
+    if (!controller->loaded.mjcf.empty()) {
+      throw BadInput("it was trained on a model of its own, which this page does not have");
     }
     if (controller->loaded.plant.actuated_joint != 1) {
       throw BadInput(
@@ -337,7 +340,7 @@ UPSWING_EXPORT(learner_policy) int LearnerPolicy(Learner* learner, int best) {
 /// Leaves the settings of a named agent as JSON: name, value, range, unit and help of each.
 UPSWING_EXPORT(agent_settings) int AgentSettings(const char* agent, size_t size) {
   return Guarded([&] {
-    Config config = ParseConfig("", {}, {{"agent", {agent, size}, "agent"}});
+    const Config config = ConfigOf({{"agent", {agent, size}, "agent"}});
     json settings = json::array();
     const Options options = OptionsOf(config);
     for (const Option& option : options.all()) {

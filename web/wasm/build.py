@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Compiles core, nn, sim, rl, control and what a training needs of setup and run to WebAssembly, for the page.
+"""Compiles core, nn, sim, rl, control and setup to WebAssembly, for the page.
 
     build.py [MODULE]     writes MODULE, by default core.wasm beside this file
     build.py --versions   of what its bytes depend on, besides our sources
@@ -30,21 +30,17 @@ def pinned(name):
 
 ZIG = DEPS / f"zig-{pinned('zig')}"
 HIGHWAY = DEPS / f"highway-{pinned('highway')}"  # the version of NumPy that it comes with
-MUJOCO = DEPS / f"mujoco-{pinned('mujoco')}"  # its headers alone
 
 # Vectors of 128 bits, exceptions, and what every browser with those has.
 TARGET = ["-target", "wasm32-wasi", "-mcpu=generic+simd128+exception_handling+bulk_memory"
           "+nontrapping_fptoint+sign_ext", "-fwasm-exceptions", "-fvisibility=hidden", "-DNDEBUG"]
-MEMORY = 512 << 20  # bytes at most; see browser.cc
+MEMORY = 512 << 20  # bytes at most; see learner.cc
 STACK = 1 << 20
 
-LAYERS = ["core", "nn", "sim", "rl", "control"]
+LAYERS = ["core", "nn", "sim", "rl", "control", "setup"]
 # Where the time of a training goes is made fast, everything else small.
 FAST = ["nn/linear", "nn/product", "sim/closed_form", "control/trajectory", "control/pendulum_model", "rl/replay", "rl/sum_tree", "rl/n_step",
         "rl/sac_update"]
-SETUP = ["setup/config.cc", "setup/config_checks.cc", "setup/config_layers.cc", "setup/controllers.cc",
-         "setup/loaded_policy.cc", "setup/task.cc", "setup/toml_settings.cc",
-         "run/training.cc"]
 
 # Of LLVM's libraries, what the module asks for.
 CXXABI = ["abort_message", "cxa_aux_runtime", "cxa_default_handlers", "cxa_exception",
@@ -67,7 +63,6 @@ def include(*folders):
 def own_sources():
     sources = [path for layer in LAYERS for path in sorted((ROOT / layer).glob("*.cc"))
                if not path.stem.endswith(("_test", "_bench")) and path.name != "thread_pool.cc"]
-    sources += [ROOT / name for name in SETUP]
     return sources + sorted(HERE.glob("*.cc"))
 
 
@@ -92,7 +87,7 @@ def versions():
     found = {"zig": pinned("zig"), "highway of numpy": pinned("highway"),
              "nlohmann-json": of("nlohmann/detail/abi_macros.hpp" if abi.exists()
                                  else "nlohmann/json.hpp", *json),
-             "toml++": of("toml++/impl/version.h", *toml), "fmt": of("fmt/core.h", "FMT_VERSION")}
+             "toml++": of("toml++/impl/version.h", *toml)}
     return ", ".join(f"{name} {version}" for name, version in found.items())
 
 
@@ -127,7 +122,7 @@ def jobs():
     """Each source with its flags."""
     headers = WORK / "include"
     headers.mkdir(parents=True, exist_ok=True)
-    for name in ("nlohmann", "toml++", "fmt", "eigen3/Eigen"):
+    for name in ("nlohmann", "toml++", "eigen3/Eigen"):
         link = headers / Path(name).name
         if not link.is_symlink():
             link.symlink_to(Path("/usr/include") / name)
@@ -140,9 +135,9 @@ def jobs():
     # Zig leaves files out of the C++ library's headers; what mentions them compiles with them, and
     # is not linked.
     own = ["-std=c++20", "-Wall", "-Wextra", "-Wpedantic", "-ffp-contract=off",
-           "-DFMT_HEADER_ONLY", "-DTOML_FLOAT_CHARCONV=1", f'-DUPSWING_VERSION="{version}"',
+           "-DTOML_FLOAT_CHARCONV=1", f'-DUPSWING_VERSION="{version}"',
            "-U_LIBCPP_HAS_FILESYSTEM", "-D_LIBCPP_HAS_FILESYSTEM=1", *include(ROOT),
-           *(f"-isystem{folder}" for folder in (headers, HIGHWAY, MUJOCO / "include"))]
+           *(f"-isystem{folder}" for folder in (headers, HIGHWAY))]
     for source in [*own_sources(), agents]:
         yield source, [*own, "-O3" if f"{source.parent.name}/{source.stem}" in FAST else "-Oz"]
     cxx = ["-std=c++23", "-Oz", "-w", "-D_LIBCPP_BUILDING_LIBRARY", "-D_LIBCXXABI_BUILDING_LIBRARY",
@@ -161,7 +156,7 @@ def jobs():
 
 def make(module):
     """Writes the module, and beside it what it was made with."""
-    for folder in (ZIG, HIGHWAY, MUJOCO):
+    for folder in (ZIG, HIGHWAY):
         if not folder.exists():
             sys.exit(f"build.py: {folder} is missing: ./upswing test installs it")
     WORK.mkdir(parents=True, exist_ok=True)

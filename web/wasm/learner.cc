@@ -1,17 +1,27 @@
 #include "web/wasm/learner.h"
 
+#include "core/error.h"
 #include "core/safetensors.h"
+#include "core/text.h"
 
 namespace upswing {
 namespace {
 
 using nlohmann::json;
 
-Config ConfigFrom(std::vector<FlagValue> flags) {
+constexpr size_t kPage = 65536;              // bytes of WebAssembly's unit of memory
+constexpr size_t kMemoryLimit = 512u << 20;  // bytes, the same as in build.py
+
+Config InClosedForm(std::vector<FlagValue> flags) {
   // MuJoCo is not here to learn in, nor to judge.
   flags.push_back({"physics", kClosedForm.name});
   flags.push_back({"eval_physics", kClosedForm.name});
-  return ParseConfig("", {}, flags);
+  return ConfigOf(flags);
+}
+
+Host ThisPage() {
+  static constexpr const Engine* kEngines[] = {&kClosedForm};
+  return {kEngines, static_cast<int64_t>(kMemoryLimit - kPage * __builtin_wasm_memory_size(0))};
 }
 
 std::vector<std::byte> FileOf(const Policy& policy) {
@@ -21,7 +31,14 @@ std::vector<std::byte> FileOf(const Policy& policy) {
 
 }  // namespace
 
-Learner::Learner(const std::vector<FlagValue>& flags) : training_(ConfigFrom(flags), 1, {this}) {
+Config ConfigOf(const std::vector<FlagValue>& flags) {
+  return ParseConfig("", "", flags, [](const std::string& path, bool /*in_file*/) -> ModelFile {
+    throw BadInput(Concat(path, ": a page has no files"));
+  });
+}
+
+Learner::Learner(const std::vector<FlagValue>& flags)
+    : training_(InClosedForm(flags), ThisPage(), {this}) {
   Report();  // begins the lists
 }
 

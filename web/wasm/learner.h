@@ -4,9 +4,13 @@
 #include <string>
 #include <vector>
 
-#include "run/training.h"
+#include "setup/training.h"
 
 namespace upswing {
+
+/// The settings of a training that flags give. Throws BadInput as the program does, and for a
+/// model, as a page has no files.
+Config ConfigOf(const std::vector<FlagValue>& flags);
 
 /// A training that a page drives step by step and looks at in between.
 class Learner : private TrainObserver {

@@ -18,13 +18,20 @@ EnvConfig EvaluationEnvironments(const Config& config, int64_t step);
 /// same setting a model of your own, which has no closed form, is evaluated in MuJoCo.
 bool IsScreened(const Config& config);
 
+/// What a training finds on its computer.
+struct Host {
+  Engines engines;
+  int64_t memory;  // bytes that are free
+  int threads = 1;
+};
+
 /// A training made of its settings: environments, agent and training loop. It writes no file; see
 /// TrainingRun.
 class Training {
  public:
-  /// With so many threads. Observers must outlive it. Throws BadInput if it would not fit into the
-  /// memory that is free.
-  Training(Config config, int threads, std::vector<TrainObserver*> observers = {});
+  /// Observers must outlive it. Throws BadInput if it would not fit into the memory that is free,
+  /// or if the host lacks an engine of the settings.
+  Training(Config config, const Host& host, std::vector<TrainObserver*> observers = {});
 
   /// One step of all environments; see Trainer::Step.
   bool Step() { return trainer_.Step(); }
@@ -53,9 +60,14 @@ class Training {
 
  private:
   TrainSetup MakeSetup(std::vector<TrainObserver*> observers);
+  /// The engine of an evaluation.
+  const Engine& Named(std::string_view engine) const {
+    return FindEngine(engines_, engine, "--eval-physics");
+  }
   Evaluation EvaluateIn(const Engine& engine, const Policy& policy, int64_t step);
 
   Config config_;
+  Engines engines_;
   ThreadPool pool_;
   std::unique_ptr<VectorEnv> env_;
   std::unique_ptr<Agent> agent_;

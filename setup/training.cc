@@ -1,10 +1,9 @@
-#include "run/training.h"
+#include "setup/training.h"
 
 #include <utility>
 
 #include "core/error.h"
 #include "core/text.h"
-#include "mujoco/engines.h"
 #include "setup/config_checks.h"
 #include "setup/loaded_policy.h"
 
@@ -14,14 +13,16 @@ namespace {
 constexpr std::string_view kCheckpointFormat = "upswing-checkpoint-1";
 
 /// The settings, if there is memory for such a training. Throws BadInput.
-Config Checked(Config config) {
-  CheckMemory(config);
+Config Checked(Config config, const Host& host) {
+  CheckMemory(config, host.memory);
   return config;
 }
 
 /// Environments as the settings have them, whose work the pool shares.
-std::unique_ptr<VectorEnv> MakeTrainingEnv(const Config& config, ThreadPool& pool) {
+std::unique_ptr<VectorEnv> MakeTrainingEnv(const Config& config, Engines engines,
+ ThreadPool& pool) {
   EnvConfig env = config.Environments();
+  env.engine = &FindEngine(engines, config.physics, "--physics");
   env.pool = &pool;
   return MakeEnv(env);
 }
@@ -42,10 +43,11 @@ EnvConfig EvaluationEnvironments(const Config& config, int64_t step) {
   return env;
 }
 
-Training::Training(Config config, int threads, std::vector<TrainObserver*> observers)
-    : config_(Checked(std::move(config))),
-      pool_(threads, config_.train.threads == 0),
-      env_(MakeTrainingEnv(config_, pool_)),
+Training::Training(Config config, const Host& host, std::vector<TrainObserver*> observers)
+    : config_(Checked(std::move(config), host)),
+ engines_(host.engines),
+      pool_(host.threads, config_.train.threads == 0),
+      env_(MakeTrainingEnv(config_, engines_, pool_)),
       agent_(config_.MakeAgent(env_->spec(), pool_)),
       trainer_(MakeSetup(std::move(observers)), *agent_, *env_) {}
 
@@ -56,7 +58,7 @@ TrainSetup Training::MakeSetup(std::vector<TrainObserver*> observers) {
   setup.evaluate = [this](const Policy& policy, int64_t step) { return Evaluate(policy, step); };
   if (IsScreened(config_)) {
     setup.confirm = [this](const Policy& policy, int64_t step) {
-      return EvaluateIn(kMuJoCo, policy, step);
+      return EvaluateIn(Named(kMuJoCoName), policy, step);
     };
   }
   return setup;
@@ -70,8 +72,8 @@ std::unique_ptr<Policy> Training::policy() const {
 
 Evaluation Training::Evaluate(const Policy& policy, int64_t step) {
   if (IsScreened(config_)) return EvaluateIn(kClosedForm, policy, step);
-  if (config_.eval_physics == kScreened) return EvaluateIn(kMuJoCo, policy, step);
-  return EvaluateIn(FindEngine(config_.eval_physics, "--eval-physics"), policy, step);
+  if (config_.eval_physics == kScreened) return EvaluateIn(Named(kMuJoCoName), policy, step);
+  return EvaluateIn(Named(config_.eval_physics), policy, step);
 }
 
 Evaluation Training::EvaluateIn(const Engine& engine, const Policy& policy, int64_t step) {

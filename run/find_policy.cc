@@ -1,4 +1,5 @@
-// Policies by what a command line calls them: a controller's name, a file or a run folder.
+#include "run/find_policy.h"
+
 #include <algorithm>
 #include <set>
 
@@ -7,8 +8,8 @@
 #include "core/text.h"
 #include "io/run_folder.h"
 #include "io/tensor_file.h"
+#include "mujoco/model.h"
 #include "setup/controllers.h"
-#include "setup/loaded_policy.h"
 
 namespace upswing {
 namespace {
@@ -21,15 +22,15 @@ std::string SectionOf(const FlagValue& flag) {
   return OptionsOf(config).Find(flag.name, FlagOf(flag.name)).front()->section;
 }
 
-/// What a policy that swings up was trained on. Throws BadInput that names the flag.
-Plant PlantOfSwingUp(const std::string& name) {
+/// The policy of --swing-up. Throws BadInput that names the flag.
+LoadedPolicy SwingUpNamed(const std::string& name) {
   LoadedPolicy loaded;
   try {
     loaded = LoadPolicy(name);
   } catch (const Error& error) {
     throw Error(error.exit_code(), Concat("--swing-up: ", error.what()));
   }
-  if (loaded.mjcf.empty()) return loaded.plant;
+  if (loaded.mjcf.empty()) return loaded;
   throw BadInput(Concat("--swing-up: expected a policy of the built-in model, got ", name,
                         ", which was trained on another"));
 }
@@ -52,7 +53,7 @@ std::vector<LoadedPolicy> GetPolicies(const std::vector<std::string>& names,
                           ") to set, got ", names.empty() ? "none" : Join(names, ", ")));
   }
   std::vector<LoadedPolicy> policies;
-  std::set<std::filesystem::path> seen;  // files, and names of controllers
+  std::set<fs::path> seen;  // files, and names of controllers
   for (const std::string& name : names) {
     PolicyArguments one{name, {}, {}};
     if (IsController(name)) {
@@ -62,8 +63,8 @@ std::vector<LoadedPolicy> GetPolicies(const std::vector<std::string>& names,
     }
     policies.push_back(GetPolicy(one));
     std::error_code none;
-    const auto file = std::filesystem::canonical(policies.back().path, none);
-    if (!seen.insert(none ? std::filesystem::path(name) : file).second) {
+    const auto file = fs::canonical(policies.back().path, none);
+    if (!seen.insert(none ? fs::path(name) : file).second) {
       throw BadInput(Concat(Printable(name), ": given twice; expected each policy once"));
     }
   }
@@ -73,8 +74,11 @@ std::vector<LoadedPolicy> GetPolicies(const std::vector<std::string>& names,
 LoadedPolicy GetPolicy(const PolicyArguments& a) {
   ControllerConfig config;
   SetFlags(OptionsOf(config), a.flags);
-  if (a.name == "hybrid" && !config.swing_up.empty())
-    config.plant = PlantOfSwingUp(config.swing_up);
+  if (a.name == "hybrid" && !config.swing_up.empty()) {
+    const LoadedPolicy swing_up = SwingUpNamed(config.swing_up);
+    config.plant = swing_up.plant;
+    config.swing_up_policy = swing_up.policy;
+  }
   ApplyChanges(OptionsOf(config.plant), a.made_for, "--made-for");
   const bool is_controller = IsController(a.name), is_path = fs::exists(a.name);
   if (is_controller && is_path) {
@@ -133,12 +137,21 @@ LoadedPolicy LoadPolicy(const fs::path& path) {
   return ReadPolicy(LoadTensors(file));
 }
 
+LoadedPolicy ReadPolicy(const Tensors& file) {
+  LoadedPolicy loaded = PolicyIn(file);
+  if (!loaded.mjcf.empty()) {
+    LoadModel(loaded.mjcf, Concat(file.where(), ": metadata \"model\""));
+  }
+  return loaded;
+}
+
 namespace {
 
 /// The last `parts` of a policy's path, of a run without the file.
 std::string EndOfPath(const LoadedPolicy& loaded, int parts) {
   if (loaded.path.empty()) return loaded.name;
-  std::filesystem::path rest = loaded.path.parent_path(), end = loaded.path.stem();
+  const fs::path path = loaded.path;
+  fs::path rest = path.parent_path(), end = path.stem();
   if (end == "policy" && rest.has_filename()) {
     end = rest.filename();
     rest = rest.parent_path();

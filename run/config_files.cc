@@ -1,0 +1,81 @@
+#include "run/config_files.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "io/file.h"
+#include "io/run_folder.h"
+#include "io/streams.h"
+#include "mujoco/mjcf_check.h"
+#include "mujoco/model.h"
+
+namespace upswing {
+namespace {
+
+namespace fs = std::filesystem;
+
+ModelFile ReadModel(const std::string& path) {
+  ModelFile model{path, ReadOwnFile(path, kMostMjcfBytes), {}};
+  model.plant = PlantOf(*LoadModel(model.mjcf, path));
+  return model;
+}
+
+}  // namespace
+
+Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
+  const std::string text = file.empty() ? "" : ReadInput(file.string());
+  const std::string where = file.empty() ? "" : InputName(file.string());
+  return ParseConfig(text, where, flags, [&](const std::string& path, bool in_file) {
+    return ReadModel(in_file ? (file.parent_path() / path).string() : path);
+  });
+}
+
+Config ReadRunConfig(const fs::path& run, const std::vector<FlagValue>& flags) {
+  const fs::path file = run / RunFolder::kConfig;
+  const std::string text = ReadOwnFile(file);
+  std::vector<std::string> missing = MissingSettings(text, file.string(), false);
+  if (missing.empty()) {
+    return ParseConfig(text, file.string(), flags, [&](const std::string& path, bool /*in_file*/) {
+      if (path == RunFolder::kModel) return ReadModel((run / path).string());
+      throw BadInput(Concat(file.string(), ": model: expected ", RunFolder::kModel,
+                            ", the copy in the run folder, got \"", Printable(path), "\""));
+    });
+  }
+  constexpr size_t kMostNames = 6;  // that make a line which can still be read
+  const size_t more = missing.size() - std::min(missing.size(), kMostNames);
+  missing.resize(missing.size() - more);
+  throw BadInput(Concat(file.string(), ": expected every setting, as this version writes a run; ",
+                        "got none of ", Join(missing, ", "),
+                        more > 0 ? Concat(" and ", more, " more") : "",
+                        ": another version wrote it"));
+}
+
+void NameModelCopy(Config& config) {
+  if (!config.mjcf.empty()) config.model = RunFolder::kModel;
+}
+
+void MakeReadyForMany(Config& config) {
+  if (config.train.threads == 0) config.train.threads = 1;
+  NameModelCopy(config);
+}
+
+std::string CompleteToml(Config config) {
+  if (!config.model.empty()) config.model = fs::absolute(config.model).string();
+  return ConfigToml(config, false);
+}
+
+Plant ChangedPlant(const Plant& base, const std::string& model, const std::vector<std::string>& set,
+                   std::string& mjcf) {
+  Plant plant = base;
+  if (!model.empty()) {
+    ModelFile file = ReadModel(model);
+    plant = file.plant;
+    mjcf = std::move(file.mjcf);
+  }
+  ApplyChanges(OptionsOf(plant), set);
+  return plant;
+}
+
+}  // namespace upswing

@@ -1,0 +1,10 @@
+#pragma once
+
+#include "setup/training.h"
+
+namespace upswing {
+
+/// This computer with all engines of the program, and so many threads.
+Host ThisHost(int threads);
+
+}  // namespace upswing
