@@ -15,8 +15,7 @@
 #include "io/run_folder.h"
 #include "io/tensor_file.h"
 #include "mujoco/model.h"
-#include "nn/actor_policy.h"
-#include "nn/q_policy.h"
+#include "nn/network_policy.h"
 #include "run/config_files.h"
 #include "run/find_policy.h"
 #include "run/model_info.h"
@@ -97,9 +96,9 @@ void PrintPolicy(const LoadedPolicy& loaded) {
   if (!HasPlant(loaded.task)) fmt::print("  task        {}\n", loaded.task);
   EnvConfig env;
   env.task = loaded.task;
-  std::span<const double> levels = policy.value_actions().values();
-  const auto* of_actor = dynamic_cast<const ActorPolicy*>(&policy);
-  if (of_actor != nullptr) levels = of_actor->parts().torques;
+  const auto* learned = dynamic_cast<const NetworkPolicy*>(&policy);
+  std::span<const double> levels;
+  if (learned != nullptr) levels = learned->parts().torques;
   fmt::print("  torques     {}, every {} s\n",
              levels.empty()
                  ? "any within the limit"
@@ -114,10 +113,7 @@ void PrintPolicy(const LoadedPolicy& loaded) {
   }
   const std::optional<ModelInfo> model = InfoOfModel(loaded.mjcf, "");
   if (model) fmt::print("  model       {}\n", model->Text());
-  if (const auto* q = dynamic_cast<const QPolicy*>(&policy)) PrintSelfCheck(q->self_check());
-  if (const auto* actor = dynamic_cast<const ActorPolicy*>(&policy)) {
-    PrintSelfCheck(actor->self_check());
-  }
+  if (learned != nullptr) PrintSelfCheck(learned->self_check());
 }
 
 void PrintRun(const fs::path& path, bool has_policy) {

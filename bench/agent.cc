@@ -8,7 +8,7 @@
 #include "core/rng.h"
 #include "core/thread_pool.h"
 #include "mujoco/engines.h"
-#include "nn/q_policy.h"
+#include "nn/network_policy.h"
 #include "rl/dqn.h"
 #include "rl/replay.h"
 #include "rl/torque_levels.h"
@@ -42,8 +42,8 @@ std::shared_ptr<Replay> FilledReplay(int64_t size) {
 }
 
 /// Multiply-adds that each layer of a network takes for one row, the first layer first.
-std::vector<double> LayerMultiplyAdds(const QNetworkShape& shape) {
-  const QNetwork<float> network(shape);
+std::vector<double> LayerMultiplyAdds(const NetworkShape& shape) {
+  const Network network(shape);
   std::vector<double> layers;
   for (const ParameterBlock& block : network.blocks()) {
     if (block.in > 0) layers.push_back(static_cast<double>(block.in) * block.out);
@@ -103,7 +103,7 @@ BenchCase GradientCase(const DqnConfig& config, int threads,
 }
 
 BenchCase ActCase(int batch) {
-  const QNetworkShape shape = BareConfig(true, {256, 256}, batch).Shape(kObservationSize, kActions);
+  const NetworkShape shape = BareConfig(true, {256, 256}, batch).Shape(kObservationSize, kActions);
   // The value stream is left out: half of the streams' hidden layer, and the value.
   const std::vector<double> layers = LayerMultiplyAdds(shape);
   const double multiply_adds = layers[0] + layers[1] + layers[2] / 2 + layers[4];
@@ -116,11 +116,12 @@ BenchCase ActCase(int batch) {
       1,
       [=]() -> BenchWork {
         Rng rng(1, "benchmark");
-        const QNetwork<float> network(shape);
-        std::vector<float> parameters(network.num_parameters());
-        network.Initialize(rng, parameters);
-        const auto policy = std::make_shared<QPolicy>(
-            shape, parameters, TorqueLevels(Plant().torque_limit, kActions), PolicyInfo());
+        NetworkPolicyParts parts{ActionRule::kLevels, shape};
+        const Network network(shape);
+        parts.parameters.resize(network.num_parameters());
+        network.Initialize(rng, parts.parameters);
+        parts.torques = TorqueLevels(Plant().torque_limit, kActions);
+        const auto policy = std::make_shared<NetworkPolicy>(std::move(parts), PolicyInfo());
         const auto n = static_cast<size_t>(batch);
         const auto obs = std::make_shared<AlignedVector<float>>(n * kObservationSize);
         for (float& x : *obs) x = static_cast<float>(rng.Uniform(-1, 1));

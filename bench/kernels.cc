@@ -52,9 +52,9 @@ void AddProducts(int width, int B, BenchCases& cases) {
                        return [=] { multiply(*layer); };
                      }});
   };
-  add("forward", [](Layer& l) { LinearForward<float>(l.x, l.w, l.bias, true, l.y); });
-  add("backward_input", [](Layer& l) { LinearBackwardInput<float>(l.x, l.w, l.x, l.y); });
-  add("backward_weight", [](Layer& l) { LinearBackwardWeight<float>(l.x, l.x, l.dw); });
+  add("forward", [](Layer& l) { LinearForward(l.x, l.w, l.bias, true, l.y); });
+  add("backward_input", [](Layer& l) { LinearBackwardInput(l.x, l.w, l.x, l.y); });
+  add("backward_weight", [](Layer& l) { LinearBackwardWeight(l.x, l.x, l.dw); });
 }
 
 /// A whole step of Adam with Polyak averaging on n parameters.
@@ -77,8 +77,8 @@ BenchCase AdamCase(size_t n) {
             a->g = RandomNumbers(n, rng);
             for (auto* zeros : {&a->m, &a->v, &a->p, &a->target}) zeros->resize(n);
             return [a] {
-              const AdamConstants<float> constants{1, 0.9F, 0.999F, 1e-3F, 1e-8F, 0.005F};
-              AdamPolyakStep<float>(constants, a->g, a->m, a->v, a->p, a->target);
+              const AdamConstants constants{1, 0.9F, 0.999F, 1e-3F, 1e-8F, 0.005F};
+              AdamPolyakStep(constants, a->g, a->m, a->v, a->p, a->target);
             };
           }};
 }
@@ -92,7 +92,7 @@ BenchCase TransposeCase(int width) {
           1,
           [width]() -> BenchWork {
             const auto layer = std::make_shared<Layer>(width, 1);
-            return [=] { Transpose<float>(layer->w, layer->dw); };
+            return [=] { Transpose(layer->w, layer->dw); };
           }};
 }
 

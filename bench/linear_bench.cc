@@ -77,9 +77,9 @@ using Doer = std::function<void()>;
 // ---- Our kernels.
 
 Doer Ours(const Task& t) {
-  if (t.a_transposed) return [&t] { LinearBackwardWeight<float>(t.a, t.b, t.c); };
-  if (!t.has_bias) return [&t] { LinearBackwardInput<float>(t.a, t.b, {}, t.c); };
-  return [&t] { LinearForward<float>(t.a, t.b, t.bias, false, t.c); };
+  if (t.a_transposed) return [&t] { LinearBackwardWeight(t.a, t.b, t.c); };
+  if (!t.has_bias) return [&t] { LinearBackwardInput(t.a, t.b, {}, t.c); };
+  return [&t] { LinearForward(t.a, t.b, t.bias, false, t.c); };
 }
 
 // ---- Eigen.

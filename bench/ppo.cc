@@ -30,13 +30,9 @@ PpoConfig BareConfig(const std::vector<int64_t>& hidden, int64_t batch) {
 /// Operations of a network for one step: its forward pass when the rollout is made or valued, and
 /// in each epoch forward, backward and the gradient of the weights.
 double StepFlops(const PpoConfig& config, int obs_size) {
-  const Network<float> network(config.Shape(obs_size), {1});
-  double all = 0, first = 0;
-  for (const ParameterBlock& block : network.blocks()) {
-    const double products = static_cast<double>(block.in) * block.out;
-    if (all == 0) first = products;
-    all += products;
-  }
+  const Network network(config.Shape(obs_size, 1));
+  const double all = network.multiply_adds();
+  const double first = static_cast<double>(obs_size) * config.hidden.front();
   return 2 * (all + static_cast<double>(config.epochs) * (3 * all - first));
 }
 

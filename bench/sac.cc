@@ -49,22 +49,17 @@ Replay FilledReplay(const EnvSpec& spec, int64_t size) {
 
 /// Multiply-adds for one row: of all layers, and of the first.
 struct MultiplyAdds {
-  double all = 0, first = 0;
-  MultiplyAdds(const MlpShape& trunk, int outputs) {
-    const Network<float> network(trunk, {outputs});
-    for (const ParameterBlock& block : network.blocks()) {
-      const double products = static_cast<double>(block.in) * block.out;
-      if (all == 0) first = products;
-      all += products;
-    }
-  }
+  explicit MultiplyAdds(const NetworkShape& shape)
+      : all(Network(shape).multiply_adds()),
+        first(static_cast<double>(shape.inputs) * shape.hidden.front()) {}
+  double all, first;
 };
 
 /// Operations of a round. Critics, two each: at s' with the targets, forward and backward at s, a;
 /// forward and backward to the inputs for the actor. Actor: at s', forward and backward at s.
 double RoundFlops(const SacConfig& config, const EnvSpec& spec) {
   const int D = spec.obs_size, A = spec.action_size();
-  const MultiplyAdds critic(config.Trunk(D + A), 1), actor(config.Trunk(D), 2 * A);
+  const MultiplyAdds critic(config.Shape(D + A, 1)), actor(config.Shape(D, 2 * A));
   const double critics = 2 * (6 * critic.all - critic.first);
   return 2 * static_cast<double>(config.batch) * (critics + 4 * actor.all - actor.first);
 }

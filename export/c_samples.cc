@@ -20,20 +20,17 @@ constexpr double kTolerance = 1e-4;  // of the largest output
 constexpr double kMostFloat = std::numeric_limits<float>::max();
 
 /// What the layers make of an observation, in double precision.
-std::vector<double> Evaluate(const std::vector<PlainLayer>& layers, std::span<const float> obs) {
+std::vector<double> Evaluate(const std::vector<LayerView>& layers, std::span<const float> obs) {
   std::vector<double> x(obs.begin(), obs.end());
-  for (const PlainLayer& layer : layers) {
-    const Matrix<const float> W(layer.weight.data(), layer.out, layer.in);
-    std::vector<double> y(layer.bias.begin(), layer.bias.end());
-    for (int i = 0; i < layer.out; ++i) {
-      for (int j = 0; j < layer.in; ++j) {
-        y[static_cast<size_t>(i)] += double{W(i, j)} * x[static_cast<size_t>(j)];
-      }
+  for (const LayerView& layer : layers) {
+    std::vector<double> y(layer.b.begin(), layer.b.end());
+    for (int i = 0; i < layer.out(); ++i) {
+      for (int j = 0; j < layer.in(); ++j) y[i] += double{layer.W(j, i)} * x[j];
     }
     if (layer.layer_norm()) {
       double mean = 0, square = 0;
-      for (const double value : y) mean += value / layer.out;
-      for (const double value : y) square += (value - mean) * (value - mean) / layer.out;
+      for (const double value : y) mean += value / layer.out();
+      for (const double value : y) square += (value - mean) * (value - mean) / layer.out();
       for (size_t i = 0; i < y.size(); ++i) {
         y[i] = (y[i] - mean) / std::sqrt(square + double{kLayerNormEpsilon}) * layer.gain[i] +
                layer.norm_bias[i];
@@ -93,7 +90,7 @@ bool IsClear(std::vector<double> outputs) {
 
 }  // namespace
 
-CSamples DrawSamples(const ExportedPolicy& policy, const std::vector<PlainLayer>& layers) {
+CSamples DrawSamples(const ExportedPolicy& policy, const std::vector<LayerView>& layers) {
   constexpr double kPi = std::numbers::pi, kVelocity = 4;  // rad/s
   CSamples samples;
   samples.count = kSamples;

@@ -15,6 +15,6 @@ struct CSamples {
 };
 
 /// The same for every call. `layers` are those of the network that the header has.
-CSamples DrawSamples(const ExportedPolicy& policy, const std::vector<PlainLayer>& layers);
+CSamples DrawSamples(const ExportedPolicy& policy, const std::vector<LayerView>& layers);
 
 }  // namespace upswing

@@ -5,8 +5,8 @@
 #include "core/rng.h"
 #include "core/safetensors.h"
 #include "core/text.h"
-#include "nn/actor_policy.h"
 #include "nn/gaussian.h"
+#include "nn/network_policy.h"
 #include "rl/softmax.h"
 #include "setup/config.h"
 #include "setup/loaded_policy.h"
@@ -22,9 +22,9 @@ constexpr int kPieces = 10;  // of the range of torques
 
 /// Parameters of an untrained network. Those of its output are larger than usual, so that not all
 /// actions are near 0.
-std::vector<float> DrawParameters(const MlpShape& shape, int outputs, Rng& rng) {
-  const Network<float> network(shape, {outputs});
-  std::vector<float> parameters(network.num_parameters());
+AlignedVector<float> DrawParameters(const NetworkShape& shape, Rng& rng) {
+  const Network network(shape);
+  AlignedVector<float> parameters(network.num_parameters());
   network.Initialize(rng, parameters);
   for (const ParameterBlock& block : network.blocks()) {
     if (!block.name.starts_with("output")) continue;
@@ -34,23 +34,20 @@ std::vector<float> DrawParameters(const MlpShape& shape, int outputs, Rng& rng) 
 }
 
 /// A policy of this kind whose critic takes `critic_inputs` numbers; 0: there is none.
-ActorPolicy DrawPolicy(ActorOutput output, const MlpShape& actor, int critic_inputs, Rng& rng) {
-  ActorParts parts;
-  parts.output = output;
-  parts.actor = actor;
+NetworkPolicy DrawPolicy(ActionRule rule, const NetworkShape& actor, int critic_inputs, Rng& rng) {
+  NetworkPolicyParts parts{rule, actor};
   parts.action_limit = {Plant().torque_limit};
-  if (output == ActorOutput::kCategorical) parts.torques = {-5, -2.5, 0, 2.5, 5};
-  const int outputs = parts.torques.empty() ? 2 : static_cast<int>(parts.torques.size());
-  parts.parameters = DrawParameters(actor, outputs, rng);
+  if (rule == ActionRule::kCategorical) parts.torques = {-5, -2.5, 0, 2.5, 5};
+  parts.parameters = DrawParameters(actor, rng);
   if (critic_inputs > 0) {
-    parts.critic = {critic_inputs, {10}, !actor.layer_norm, actor.activation};
-    parts.critic_parameters = DrawParameters(parts.critic, 1, rng);
+    parts.critic = {critic_inputs, {10}, 1, !actor.layer_norm, actor.activation};
+    parts.critic_parameters = DrawParameters(parts.critic, rng);
   }
   return {std::move(parts), InfoOf(Config())};
 }
 
 /// The bytes of a policy's file, two hexadecimal digits each.
-std::string FileAsHex(const ActorPolicy& policy) {
+std::string FileAsHex(const NetworkPolicy& policy) {
   std::string hex;
   for (const std::byte byte : WriteSafetensors(policy.ToTensors()).Joined()) {
     for (const int shift : {4, 0}) {
@@ -62,8 +59,8 @@ std::string FileAsHex(const ActorPolicy& policy) {
 
 /// A Gaussian's probabilities of equal pieces of the range of torques, the ends with what is cut
 /// off there; a categorical's of its torques.
-std::vector<double> Probabilities(ActorOutput output, std::span<const float> outputs) {
-  if (output == ActorOutput::kCategorical) {
+std::vector<double> Probabilities(ActionRule rule, std::span<const float> outputs) {
+  if (rule == ActionRule::kCategorical) {
     const std::vector<double> logits(outputs.begin(), outputs.end());
     std::vector<double> probabilities(logits.size());
     Softmax<double>(logits, probabilities);
@@ -71,14 +68,14 @@ std::vector<double> Probabilities(ActorOutput output, std::span<const float> out
   }
   std::vector<double> all(kPieces + 2);
   ActionProbabilities(Gaussian<double>::From(outputs[0], outputs[1]),
-                      output == ActorOutput::kSquashedGaussian, all);
+                      rule == ActionRule::kSquashedGaussian, all);
   std::vector<double> probabilities(all.begin() + 1, all.end() - 1);
   probabilities.front() += all.front();
   probabilities.back() += all.back();
   return probabilities;
 }
 
-ordered_json CaseJson(const ActorPolicy& policy, std::vector<float>& obs) {
+ordered_json CaseJson(const NetworkPolicy& policy, std::vector<float>& obs) {
   const auto memory = policy.Start(1);
   const Matrix<const float> row(obs.data(), 1, kSize);
   std::vector<float> outputs(static_cast<size_t>(policy.num_outputs()));
@@ -89,7 +86,7 @@ ordered_json CaseJson(const ActorPolicy& policy, std::vector<float>& obs) {
   ordered_json j{
       {"observation", obs}, {"outputs", outputs},
       {"torque", torque},   {"low", low},
-      {"high", high},       {"probabilities", Probabilities(policy.parts().output, outputs)},
+      {"high", high},       {"probabilities", Probabilities(policy.parts().rule, outputs)},
       {"value", nullptr}};
   if (policy.num_values() == 0) return j;
   float value = 0;
@@ -102,19 +99,19 @@ ordered_json CaseJson(const ActorPolicy& policy, std::vector<float>& obs) {
 
 ordered_json ActorVectors() {
   struct Kind {
-    ActorOutput output;
-    MlpShape actor;
+    ActionRule rule;
+    NetworkShape actor;
     int critic_inputs;
   };
   const std::array<Kind, 4> kinds{
-      {{ActorOutput::kSquashedGaussian, {kSize, {12, 10}, true, Activation::kRelu}, kSize + 1},
-       {ActorOutput::kSquashedGaussian, {kSize, {8}, false, Activation::kTanh}, 0},
-       {ActorOutput::kClippedGaussian, {kSize, {10, 8}, false, Activation::kTanh}, kSize},
-       {ActorOutput::kCategorical, {kSize, {12}, true, Activation::kRelu}, kSize}}};
+      {{ActionRule::kSquashedGaussian, {kSize, {12, 10}, 2, true, Activation::kRelu}, kSize + 1},
+       {ActionRule::kSquashedGaussian, {kSize, {8}, 2, false, Activation::kTanh}, 0},
+       {ActionRule::kClippedGaussian, {kSize, {10, 8}, 2, false, Activation::kTanh}, kSize},
+       {ActionRule::kCategorical, {kSize, {12}, 5, true, Activation::kRelu}, kSize}}};
   ordered_json actors;
   Rng rng(0, "test vectors: actors");
   for (const Kind& kind : kinds) {
-    const ActorPolicy policy = DrawPolicy(kind.output, kind.actor, kind.critic_inputs, rng);
+    const NetworkPolicy policy = DrawPolicy(kind.rule, kind.actor, kind.critic_inputs, rng);
     ordered_json cases;
     for (int i = 0; i < kCases; ++i) {
       std::vector<float> obs(kSize);

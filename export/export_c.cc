@@ -22,32 +22,28 @@ constexpr int kBlockRows = 8;  // see NAME_linear
 
 /// The weights (out × in) in the order that NAME_linear reads: blocks of rows, each column by
 /// column; then the rows that are left.
-std::vector<float> InBlocks(const PlainLayer& layer) {
+std::vector<float> InBlocks(const LayerView& layer) {
   std::vector<float> ordered;
-  ordered.reserve(layer.weight.size());
-  const Matrix<const float> W(layer.weight.data(), layer.out, layer.in);
+  ordered.reserve(layer.W.size());
   int row = 0;
-  for (; row + kBlockRows <= layer.out; row += kBlockRows) {
-    for (int col = 0; col < layer.in; ++col) {
-      for (int k = 0; k < kBlockRows; ++k) ordered.push_back(W(row + k, col));
+  for (; row + kBlockRows <= layer.out(); row += kBlockRows) {
+    for (int col = 0; col < layer.in(); ++col) {
+      for (int k = 0; k < kBlockRows; ++k) ordered.push_back(layer.W(col, row + k));
     }
   }
-  const std::span<const float> rest = std::span(layer.weight).subspan(ordered.size());
-  ordered.insert(ordered.end(), rest.begin(), rest.end());
+  for (; row < layer.out(); ++row) {
+    for (int col = 0; col < layer.in(); ++col) ordered.push_back(layer.W(col, row));
+  }
   return ordered;
 }
 
+std::vector<float> Copy(std::span<const float> values) { return {values.begin(), values.end()}; }
+
 /// The layers that a torque takes: of a dueling network without the value stream, which does not
 /// change which torque is best; of a Gaussian with the mean alone.
-std::vector<PlainLayer> LayersOf(const ExportedPolicy& policy) {
-  std::vector<PlainLayer> layers = policy.network.features;
-  layers.insert(layers.end(), policy.network.outputs.begin(), policy.network.outputs.end());
-  if (!policy.is_discrete()) {
-    PlainLayer& last = layers.back();
-    last.out = 1;
-    last.weight.resize(static_cast<size_t>(last.in));
-    last.bias.resize(1);
-  }
+std::vector<LayerView> LayersOf(const ExportedPolicy& policy) {
+  std::vector<LayerView> layers = policy.ActingLayers();
+  if (!policy.is_discrete()) layers.back() = layers.back().Units(0, 1);
   return layers;
 }
 
@@ -96,7 +92,7 @@ std::string OriginOf(const PolicyInfo& info) {
 class HeaderWriter {
  public:
   HeaderWriter(const LoadedPolicy& loaded, const std::string& prefix)
-      : policy_(TakeApart(loaded)),
+      : policy_(ViewForExport(loaded)),
         task_(CTaskOf(loaded)),
         layers_(LayersOf(policy_)),
         samples_(DrawSamples(policy_, layers_)) {
@@ -114,7 +110,7 @@ class HeaderWriter {
   }
 
  private:
-  int num_outputs() const { return layers_.back().out; }
+  int num_outputs() const { return layers_.back().out(); }
   int memory() const { return policy_.loaded->memory(); }
 
   void AddConstants();
@@ -135,7 +131,7 @@ class HeaderWriter {
 
   const ExportedPolicy policy_;
   const CTask task_;
-  const std::vector<PlainLayer> layers_;
+  const std::vector<LayerView> layers_;
   const CSamples samples_;
   std::vector<CArray> arrays_;
   CHeader header_;
@@ -144,15 +140,15 @@ class HeaderWriter {
 void HeaderWriter::AddConstants() {
   arrays_ = task_.arrays;
   if (policy_.is_discrete()) {
-    arrays_.push_back({"torques", "N m", {policy_.torques.begin(), policy_.torques.end()}});
+    arrays_.push_back({"torques", "N m", {policy_.torques().begin(), policy_.torques().end()}});
   }
-  for (const PlainLayer& layer : layers_) {
+  for (const LayerView& layer : layers_) {
     const std::string name = CName(layer.name);
-    arrays_.push_back({name + "_weight", Concat(layer.out, " x ", layer.in), InBlocks(layer)});
-    arrays_.push_back({name + "_bias", "", layer.bias});
+    arrays_.push_back({name + "_weight", Concat(layer.out(), " x ", layer.in()), InBlocks(layer)});
+    arrays_.push_back({name + "_bias", "", Copy(layer.b)});
     if (!layer.layer_norm()) continue;
-    arrays_.push_back({name + "_norm_weight", "", layer.gain});
-    arrays_.push_back({name + "_norm_bias", "", layer.norm_bias});
+    arrays_.push_back({name + "_norm_weight", "", Copy(layer.gain)});
+    arrays_.push_back({name + "_norm_bias", "", Copy(layer.norm_bias)});
   }
 }
 
@@ -164,9 +160,9 @@ void HeaderWriter::CountWork() {
     header_.state_bytes += kFloat * (3 + kMemorySize * static_cast<size_t>(memory()));
   }
   size_t widest = 0;
-  for (const PlainLayer& layer : layers_) {
-    header_.multiply_adds += layer.weight.size();
-    widest = std::max(widest, static_cast<size_t>(layer.out));
+  for (const LayerView& layer : layers_) {
+    header_.multiply_adds += layer.W.size();
+    widest = std::max(widest, static_cast<size_t>(layer.out()));
   }
   const auto obs_size = static_cast<size_t>(policy_.obs_size());
   header_.stack_bytes = kFloat * (obs_size + static_cast<size_t>(num_outputs()) + 2 * widest);
@@ -182,9 +178,9 @@ std::string HeaderWriter::HeadComment() const {
   if (HasPlant(loaded.task)) {
     plant = PlantParagraph(loaded.plant, "by which it computes energy and height");
   }
-  size_t tanhs = policy_.kind == PolicyOutputKind::kSquashedGaussian ? 1 : 0;
-  for (const PlainLayer& layer : layers_) {
-    if (layer.activation == Activation::kTanh) tanhs += static_cast<size_t>(layer.out);
+  size_t tanhs = policy_.rule() == ActionRule::kSquashedGaussian ? 1 : 0;
+  for (const LayerView& layer : layers_) {
+    if (layer.activation == Activation::kTanh) tanhs += static_cast<size_t>(layer.out());
   }
   const std::string description = Replaced(loaded.policy->description(), "→", "-");
   return Filled(
@@ -244,7 +240,7 @@ std::string HeaderWriter::OutputsFunction() const {
   std::array<int, 2> sizes{};
   std::string calls, x = "observation";
   for (size_t i = 0; i < layers_.size(); ++i) {
-    const PlainLayer& layer = layers_[i];
+    const LayerView& layer = layers_[i];
     const bool last = i + 1 == layers_.size();
     const std::string name = "NAME_" + CName(layer.name), y = last         ? "outputs"
                                                               : i % 2 == 0 ? "a"
@@ -252,14 +248,15 @@ std::string HeaderWriter::OutputsFunction() const {
     const auto call = [&](const char* function, const std::string& arguments) {
       calls += Concat("  NAME_", function, '(', arguments, ");\n");
     };
-    if (!last) sizes[i % 2] = std::max(sizes[i % 2], layer.out);
-    call("linear",
-         Concat(name, "_weight, ", name, "_bias, ", layer.in, ", ", layer.out, ", ", x, ", ", y));
+    if (!last) sizes[i % 2] = std::max(sizes[i % 2], layer.out());
+    call("linear", Concat(name, "_weight, ", name, "_bias, ", layer.in(), ", ", layer.out(), ", ",
+                          x, ", ", y));
     if (layer.layer_norm()) {
-      call("layer_norm", Concat(name, "_norm_weight, ", name, "_norm_bias, ", layer.out, ", ", y));
+      call("layer_norm",
+           Concat(name, "_norm_weight, ", name, "_norm_bias, ", layer.out(), ", ", y));
     }
-    if (layer.activation == Activation::kRelu) call("relu", Concat(y, ", ", layer.out));
-    if (layer.activation == Activation::kTanh) call("tanh", Concat(y, ", ", layer.out));
+    if (layer.activation == Activation::kRelu) call("relu", Concat(y, ", ", layer.out()));
+    if (layer.activation == Activation::kTanh) call("tanh", Concat(y, ", ", layer.out()));
     x = y;
   }
   const std::string second = sizes[1] > 0 ? Concat(", b[", sizes[1], ']') : "";
@@ -287,16 +284,15 @@ std::string HeaderWriter::SelfTest() const {
 
 std::string HeaderWriter::Functions() const {
   bool norm = false, relu = false, tanh = false;
-  for (const PlainLayer& layer : layers_) {
+  for (const LayerView& layer : layers_) {
     norm = norm || layer.layer_norm();
     relu = relu || layer.activation == Activation::kRelu;
     tanh = tanh || layer.activation == Activation::kTanh;
   }
   const bool remembers = memory() > 0;
-  const char* choose = policy_.is_discrete() ? c_code::kChooseLargest
-                       : policy_.kind == PolicyOutputKind::kSquashedGaussian
-                           ? c_code::kChooseSquashed
-                           : c_code::kChooseClipped;
+  const char* choose = policy_.is_discrete()                             ? c_code::kChooseLargest
+                       : policy_.rule() == ActionRule::kSquashedGaussian ? c_code::kChooseSquashed
+                                                                         : c_code::kChooseClipped;
   const std::string init =
       Filled(c_code::kInit, {{"index", remembers ? "  int i;\n" : ""},
                              {"forget", remembers ? c_code::kForgetMemory : ""}});

@@ -5,7 +5,7 @@
 #include "core/text.h"
 #include "export/export.h"
 #include "io/machine.h"
-#include "nn/q_policy.h"
+#include "nn/network_policy.h"
 #include "run/this_host.h"
 #include "setup/config.h"
 #include "setup/training.h"
@@ -16,8 +16,8 @@ namespace {
 /// The policy as it stands, as a small file.
 std::vector<std::byte> SmallFile(const Training& training, const std::string& where) {
   const std::unique_ptr<Policy> policy = training.policy();
-  const auto* q = dynamic_cast<const QPolicy*>(policy.get());
-  if (q == nullptr) {
+  const auto* q = dynamic_cast<const NetworkPolicy*>(policy.get());
+  if (q == nullptr || q->is_actor()) {
     throw BadInput(Concat(where, ": --checkpoints: expected a Q-network, got ", policy->kind()));
   }
   Tensors file = q->Rounded().ToTensors();

@@ -5,6 +5,7 @@
 #include "export/exported_policy.h"
 #include "io/onnx.h"
 #include "nn/gaussian.h"
+#include "nn/linear.h"
 
 namespace upswing {
 namespace {
@@ -14,20 +15,20 @@ using nlohmann::ordered_json;
 constexpr const char* kInput = "observation";
 constexpr const char* kTorque = "torque";
 
-/// Adds y = activation(norm(W x + b)) of some rows of the layer; returns the name of y, `name`.
-std::string AddLayer(OnnxModel& model, const PlainLayer& layer, const std::string& x,
-                     const std::string& name, RowRange rows) {
-  const auto first = static_cast<size_t>(rows.first), count = static_cast<size_t>(rows.count);
-  const auto in = static_cast<size_t>(layer.in);
-  const auto vector = [&](const char* what, const std::vector<float>& values) {
-    return model.AddConstant(name + what, std::span(values).subspan(first, count), {rows.count});
+/// Adds y = activation(norm(W x + b)); returns the name of y: `name`.
+std::string AddLayer(OnnxModel& model, const LayerView& layer, const std::string& x,
+                     const std::string& name) {
+  const auto vector = [&](const char* what, std::span<const float> values) {
+    return model.AddConstant(name + what, values, {layer.out()});
   };
-  const std::string weight =
-      model.AddConstant(name + ".weight", std::span(layer.weight).subspan(first * in, count * in),
-                        {rows.count, layer.in});
+  std::vector<float> weight(layer.W.size());
+  Transpose(layer.W, Matrix<float>(weight, layer.out(), layer.in()));
   const bool active = layer.activation != Activation::kNone;
-  std::string y = model.AddNode(active || layer.layer_norm() ? name + ".linear" : name, "Gemm",
-                                {x, weight, vector(".bias", layer.bias)}, {{"transB", int64_t{1}}});
+  std::string y =
+      model.AddNode(active || layer.layer_norm() ? name + ".linear" : name, "Gemm",
+                    {x, model.AddConstant(name + ".weight", weight, {layer.out(), layer.in()}),
+                     vector(".bias", layer.b)},
+                    {{"transB", int64_t{1}}});
   if (layer.layer_norm()) {
     y = model.AddNode(
         active ? name + ".norm" : name, "LayerNormalization",
@@ -40,18 +41,18 @@ std::string AddLayer(OnnxModel& model, const PlainLayer& layer, const std::strin
 
 /// Adds layers one after the other; returns the name of what the last one makes: `last`, or, if
 /// that is empty, that of the layer.
-std::string AddLayers(OnnxModel& model, const std::vector<PlainLayer>& layers, std::string x,
+std::string AddLayers(OnnxModel& model, std::span<const LayerView> layers, std::string x,
                       const std::string& last = "") {
-  for (const PlainLayer& layer : layers) {
+  for (const LayerView& layer : layers) {
     const bool is_last = &layer == &layers.back() && !last.empty();
-    x = AddLayer(model, layer, x, is_last ? last : layer.name, {0, layer.out});
+    x = AddLayer(model, layer, x, is_last ? last : layer.name);
   }
   return x;
 }
 
 /// Adds the output `torque`: that of the largest preference.
 void AddChoice(OnnxModel& model, const ExportedPolicy& policy, const std::string& preferences) {
-  const std::vector<float> torques(policy.torques.begin(), policy.torques.end());
+  const std::vector<float> torques(policy.torques().begin(), policy.torques().end());
   const std::string table =
       model.AddConstant("torques", torques, {static_cast<int64_t>(torques.size())});
   const std::string index = model.AddNode("choice", "ArgMax", {preferences},
@@ -60,17 +61,15 @@ void AddChoice(OnnxModel& model, const ExportedPolicy& policy, const std::string
 }
 
 void AddQNetwork(OnnxModel& model, const ExportedPolicy& policy) {
-  const PlainNetwork& network = policy.network;
-  const std::string features = AddLayers(model, network.features, kInput);
-  const auto count = static_cast<int>(policy.torques.size());
-  model.AddOutput("q_values", count, "Q-value of each torque of the metadata `torques`");
-  if (network.value.empty()) {
-    AddChoice(model, policy, AddLayers(model, network.outputs, features, "q_values"));
-    return;
-  }
+  const NetworkShape& shape = policy.policy->parts().shape;
+  const std::span<const LayerView> layers = policy.layers;
+  model.AddOutput("q_values", shape.outputs, "Q-value of each torque of the metadata `torques`");
+  if (!shape.dueling())
+    return AddChoice(model, policy, AddLayers(model, layers, kInput, "q_values"));
+  const std::string features = AddLayers(model, layers.first(shape.hidden.size()), kInput);
   // Q = V + A - mean(A) (Wang et al., 2016, Eq 9); the argmax is that of A.
-  const std::string advantages = AddLayers(model, network.outputs, features);
-  const std::string value = AddLayers(model, network.value, features);
+  const std::string advantages = AddLayers(model, layers.last(2), features);
+  const std::string value = AddLayers(model, layers.subspan(shape.hidden.size(), 2), features);
   const std::string mean =
       model.AddNode("advantage.mean", "ReduceMean", {advantages},
                     {{"axes", std::vector<int64_t>{1}}, {"keepdims", int64_t{1}}});
@@ -82,26 +81,27 @@ void AddQNetwork(OnnxModel& model, const ExportedPolicy& policy) {
 /// Adds the distribution's outputs and the torque; returns the name of the action in units of its
 /// limit, which a critic may take.
 std::string AddActor(OnnxModel& model, const ExportedPolicy& policy) {
-  const std::string features = AddLayers(model, policy.network.features, kInput);
-  const PlainLayer& last = policy.network.outputs.back();
-  const auto limit = static_cast<float>(policy.action_limit);
+  const std::span<const LayerView> layers = policy.layers;
+  const std::string features = AddLayers(model, layers.first(layers.size() - 1), kInput);
+  const LayerView& last = layers.back();
+  const auto limit = static_cast<float>(policy.policy->parts().action_limit[0]);
   if (policy.is_discrete()) {
-    model.AddOutput("probabilities", last.out,
+    model.AddOutput("probabilities", last.out(),
                     "with which it drew each torque of the metadata `torques` as it learned");
-    const std::string logits = AddLayers(model, policy.network.outputs, features, "logits");
+    const std::string logits = AddLayer(model, last, features, "logits");
     model.AddNode("probabilities", "Softmax", {logits}, {{"axis", int64_t{1}}});
     AddChoice(model, policy, logits);
     if (!policy.critic_takes_action()) return "";
     const std::string whole = model.AddConstant("limit", {&limit, 1}, {1});
     return model.AddNode("action", "Div", {kTorque, whole});
   }
-  const bool squashed = policy.kind == PolicyOutputKind::kSquashedGaussian;
+  const bool squashed = policy.rule() == ActionRule::kSquashedGaussian;
   const char* bound = squashed ? "tanh(mean)" : "the mean, cut off at -1 and 1";
   model.AddOutput("mean", 1,
                   Concat("of the unbounded action; the torque is the limit times ", bound));
   model.AddOutput("log_std", 1, "logarithm of its standard deviation as it learned");
-  AddLayer(model, last, features, "mean", {0, 1});
-  const std::string raw = AddLayer(model, last, features, "log_std.raw", {1, 1});
+  AddLayer(model, last.Units(0, 1), features, "mean");
+  const std::string raw = AddLayer(model, last.Units(1, 1), features, "log_std.raw");
   const auto low = static_cast<float>(kLogStdLow), high = static_cast<float>(kLogStdHigh);
   const auto scalar = [&](const char* name, const float& value) {
     return model.AddConstant(name, {&value, 1}, {});
@@ -123,8 +123,7 @@ void AddCritic(OnnxModel& model, const ExportedPolicy& policy, const std::string
   if (policy.critic_takes_action()) {
     input = model.AddNode("critic.input", "Concat", {kInput, action}, {{"axis", int64_t{1}}});
   }
-  const std::string features = AddLayers(model, policy.critic.features, input);
-  AddLayers(model, policy.critic.outputs, features, "value");
+  AddLayers(model, policy.critic, input, "value");
 }
 
 void AddMetadata(OnnxModel& model, const ExportedPolicy& policy) {
@@ -145,7 +144,7 @@ void AddMetadata(OnnxModel& model, const ExportedPolicy& policy) {
   add("observation", observation);
   add("control_period", policy.spec.step_seconds);
   add("torque_limit", policy.limit);
-  if (policy.is_discrete()) add("torques", policy.torques);
+  if (policy.is_discrete()) add("torques", policy.torques());
   if (HasPlant(loaded.task)) {
     ordered_json plant;
     for (const auto& [name, value] : PlantValues(loaded.plant)) plant[name] = value;
@@ -165,16 +164,16 @@ void AddMetadata(OnnxModel& model, const ExportedPolicy& policy) {
 }  // namespace
 
 std::string OnnxModelOf(const LoadedPolicy& loaded) {
-  const ExportedPolicy policy = TakeApart(loaded);
+  const ExportedPolicy policy = ViewForExport(loaded);
   OnnxModel model("policy", UPSWING_VERSION,
                   Concat("Upswing, ", loaded.task, ": ", loaded.policy->description()));
   model.AddInput(kInput, policy.obs_size(),
                  "as the task's environment gives it; order and units: metadata `observation`");
-  if (policy.kind == PolicyOutputKind::kLevels) {
+  if (policy.rule() == ActionRule::kLevels) {
     AddQNetwork(model, policy);
   } else {
     const std::string action = AddActor(model, policy);
-    if (policy.has_critic()) AddCritic(model, policy, action);
+    if (!policy.critic.empty()) AddCritic(model, policy, action);
   }
   model.AddOutput(kTorque, 1, "N m, to hold for the metadata `control_period`, s");
   AddMetadata(model, policy);

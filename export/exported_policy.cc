@@ -7,81 +7,11 @@
 
 #include "core/error.h"
 #include "core/text.h"
-#include "nn/actor_policy.h"
-#include "nn/q_policy.h"
 #include "sim/acrobot_v1.h"
 #include "sim/pendulum_v1.h"
 
 namespace upswing {
 namespace {
-
-/// A layer of a policy's file.
-PlainLayer ReadLayer(const Tensors& file, const std::string& prefix, const std::string& name,
-                     int in, int out, Activation activation = Activation::kNone,
-                     bool layer_norm = false) {
-  PlainLayer layer{prefix + name, in, out, {}, {}, {}, {}, activation};
-  const auto units = static_cast<size_t>(out);
-  const auto read = [&](const char* what, std::vector<float>& values, size_t size) {
-    values.resize(size);
-    file.Read(layer.name + what, std::span(values));
-  };
-  read(".weight", layer.weight, units * static_cast<size_t>(in));
-  read(".bias", layer.bias, units);
-  if (!layer_norm) return layer;
-  read(".norm.weight", layer.gain, units);
-  read(".norm.bias", layer.norm_bias, units);
-  return layer;
-}
-
-std::vector<PlainLayer> ReadFeatures(const Tensors& file, const std::string& prefix,
-                                     const MlpShape& shape) {
-  std::vector<PlainLayer> layers;
-  int in = shape.inputs;
-  for (size_t i = 0; i < shape.hidden.size(); ++i) {
-    const int out = static_cast<int>(shape.hidden[i]);
-    layers.push_back(ReadLayer(file, prefix, Concat("feature.", i), in, out, shape.activation,
-                               shape.layer_norm));
-    in = out;
-  }
-  return layers;
-}
-
-/// Half of the rows of a layer: the first or the second.
-PlainLayer Half(const PlainLayer& whole, bool second, const std::string& name) {
-  PlainLayer half{name, whole.in, whole.out / 2, {}, {}, {}, {}, whole.activation};
-  const auto cut = [&](const std::vector<float>& values) {
-    const auto middle = values.begin() + static_cast<ptrdiff_t>(values.size() / 2);
-    return second ? std::vector<float>(middle, values.end())
-                  : std::vector<float>(values.begin(), middle);
-  };
-  half.weight = cut(whole.weight);
-  half.bias = cut(whole.bias);
-  return half;
-}
-
-PlainNetwork NetworkOf(const Tensors& file, const QNetworkShape& shape) {
-  PlainNetwork network;
-  network.features = ReadFeatures(file, "", {shape.inputs, shape.hidden, shape.layer_norm});
-  const int width = network.features.back().out;
-  if (!shape.dueling) {
-    network.outputs = {ReadLayer(file, "", "output", width, shape.actions)};
-    return network;
-  }
-  const int head = static_cast<int>(shape.head);
-  const PlainLayer streams = ReadLayer(file, "", "streams", width, 2 * head, Activation::kRelu);
-  network.value = {Half(streams, false, "streams.value"), ReadLayer(file, "", "value", head, 1)};
-  network.outputs = {Half(streams, true, "streams.advantage"),
-                     ReadLayer(file, "", "advantage", head, shape.actions)};
-  return network;
-}
-
-PlainNetwork NetworkOf(const Tensors& file, const std::string& prefix, const MlpShape& shape,
-                       int outputs) {
-  PlainNetwork network;
-  network.features = ReadFeatures(file, prefix, shape);
-  network.outputs = {ReadLayer(file, prefix, "output", network.features.back().out, outputs)};
-  return network;
-}
 
 /// Throws BadInput unless these torques can be told as float.
 void CheckTorques(std::span<const double> torques, const std::string& where) {
@@ -135,17 +65,6 @@ std::vector<NamedInput> InputsOf(const LoadedPolicy& loaded) {
   throw UnknownObservations(loaded);
 }
 
-PolicyOutputKind KindOf(ActorOutput output) {
-  switch (output) {
-    case ActorOutput::kSquashedGaussian:
-      return PolicyOutputKind::kSquashedGaussian;
-    case ActorOutput::kClippedGaussian:
-      return PolicyOutputKind::kClippedGaussian;
-    default:
-      return PolicyOutputKind::kCategorical;
-  }
-}
-
 }  // namespace
 
 double LargestSize(std::span<const double> values) {
@@ -159,11 +78,13 @@ Error UnknownObservations(const LoadedPolicy& loaded) {
                          " are not known to export"));
 }
 
-bool ExportedPolicy::critic_takes_action() const {
-  return has_critic() && critic.features.front().in > obs_size();
+std::vector<LayerView> ExportedPolicy::ActingLayers() const {
+  std::vector<LayerView> acting = layers;
+  if (policy->parts().shape.dueling()) acting.erase(acting.end() - 4, acting.end() - 2);
+  return acting;
 }
 
-ExportedPolicy TakeApart(const LoadedPolicy& loaded) {
+ExportedPolicy ViewForExport(const LoadedPolicy& loaded) {
   if (loaded.identifies()) {
     throw BadInput(Concat(loaded.path,
                           ": expected a policy that needs no identification of the plant: export "
@@ -176,29 +97,18 @@ ExportedPolicy TakeApart(const LoadedPolicy& loaded) {
   exported.loaded = &loaded;
   exported.spec = SpecOf(env);
   exported.observation = InputsOf(loaded);
-  if (const auto* q = dynamic_cast<const QPolicy*>(loaded.policy.get())) {
-    const std::span<const double> torques = q->value_actions().values();
-    CheckTorques(torques, where);
-    exported.torques.assign(torques.begin(), torques.end());
-    exported.limit = LargestSize(exported.torques);
-    exported.network = NetworkOf(q->ToTensors(), q->shape());
-    return exported;
-  }
-  const auto* actor = dynamic_cast<const ActorPolicy*>(loaded.policy.get());
-  if (actor == nullptr || actor->action_size() != 1) {
+  exported.policy = dynamic_cast<const NetworkPolicy*>(loaded.policy.get());
+  if (exported.policy == nullptr || exported.policy->action_size() != 1) {
     throw BadInput(Concat(where, ": expected a learned policy of one motor, got ",
                           loaded.policy->description()));
   }
-  const ActorParts& parts = actor->parts();
-  const Tensors file = actor->ToTensors();
-  exported.kind = KindOf(parts.output);
+  const NetworkPolicyParts& parts = exported.policy->parts();
   CheckTorques(parts.torques, where);
   CheckTorques(parts.action_limit, where);
-  exported.torques = parts.torques;
-  exported.action_limit = parts.action_limit[0];
-  exported.limit = exported.is_discrete() ? LargestSize(exported.torques) : exported.action_limit;
-  exported.network = NetworkOf(file, "", parts.actor, actor->num_outputs());
-  if (parts.critic.inputs > 0) exported.critic = NetworkOf(file, "critic.", parts.critic, 1);
+  exported.limit = exported.is_discrete() ? LargestSize(parts.torques) : parts.action_limit[0];
+  exported.layers = exported.policy->Layers();
+  exported.critic = exported.policy->CriticLayers();
+  for (LayerView& layer : exported.critic) layer.name = "critic." + layer.name;
   return exported;
 }
 

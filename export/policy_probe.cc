@@ -11,7 +11,7 @@
 
 #include "core/error.h"
 #include "core/text.h"
-#include "nn/actor_policy.h"
+#include "nn/network_policy.h"
 #include "run/find_policy.h"
 #include "setup/loaded_policy.h"
 
@@ -63,8 +63,9 @@ int main(int argc, char** argv) try {
   const std::vector<float> obs(rows.begin(), rows.end());
   const auto count = static_cast<int>(rows.size()) / D;
   const Matrix<const float> all(obs.data(), count, D);
-  const auto* actor = dynamic_cast<const ActorPolicy*>(&policy);
-  const int outputs = actor == nullptr ? 0 : actor->num_outputs();
+  const auto* learned = dynamic_cast<const NetworkPolicy*>(&policy);
+  const bool is_actor = learned != nullptr && learned->is_actor();
+  const int outputs = is_actor ? learned->num_outputs() : 0;
 
   const auto memory = policy.Start(count);
   const auto size = [&](int cols) {
@@ -73,7 +74,7 @@ int main(int argc, char** argv) try {
   std::vector<double> torques(size(1));
   std::vector<float> out(size(outputs)), values(size(policy.num_values()));
   policy.Act(all, {torques.data(), count, 1}, *memory);
-  if (actor != nullptr) actor->Outputs(all, {out.data(), count, outputs}, *memory);
+  if (is_actor) learned->Outputs(all, {out.data(), count, outputs}, *memory);
   if (policy.num_values() > 0) {
     policy.Values(all, {values.data(), count, policy.num_values()}, *memory);
   }

@@ -7,8 +7,7 @@
 #include "core/error.h"
 #include "fuzz/tiny_training.h"
 #include "io/tensor_file.h"
-#include "nn/actor_policy.h"
-#include "nn/q_policy.h"
+#include "nn/network_policy.h"
 #include "realaigym/swing_policy.h"
 #include "run/this_host.h"
 #include "setup/loaded_policy.h"
@@ -46,28 +45,28 @@ void MakeSeeds(const fs::path& corpus) {
   }
   // The other kind of network, as short as can be.
   const Plant plant;
-  const QNetworkShape shape{kObservationSize, 2, {1}, 0, false, false};
-  const QNetwork<float> network(shape);
   const PolicyInfo all = InfoOf(Config());
   PolicyInfo info;
   info.plant = all.plant;
   info.control_period = all.control_period;
   info.observation = all.observation;
-  for (const ActorOutput output : {ActorOutput::kClippedGaussian, ActorOutput::kCategorical}) {
-    const bool categorical = output == ActorOutput::kCategorical;
-    ActorParts parts;
-    parts.output = output;
-    parts.actor = {kObservationSize, {2}, false, Activation::kTanh};
+  for (const ActionRule rule : {ActionRule::kClippedGaussian, ActionRule::kCategorical}) {
+    const bool categorical = rule == ActionRule::kCategorical;
+    NetworkPolicyParts parts{rule};
+    parts.shape = {kObservationSize, {2}, categorical ? 3 : 2, false, Activation::kTanh};
     parts.parameters.assign(categorical ? 27 : 24, 0.25F);
     parts.action_limit = {plant.torque_limit};
     if (categorical) parts.torques = {-1, 0, 1};
-    parts.critic = {kObservationSize, {2}, false, Activation::kTanh};
+    parts.critic = {kObservationSize, {2}, 1, false, Activation::kTanh};
     parts.critic_parameters.assign(21, 0.5F);
-    SaveTensors(ActorPolicy(parts, info).ToTensors(),
+    SaveTensors(NetworkPolicy(parts, info).ToTensors(),
                 corpus / "policy/accepted" /
                     (categorical ? "categorical.safetensors" : "clipped-gaussian.safetensors"));
   }
-  const QPolicy policy(shape, std::vector<float>(network.num_parameters(), 0.25F), {-1, 1}, info);
+  NetworkPolicyParts parts{ActionRule::kLevels, {kObservationSize, {1}, 2}};
+  parts.parameters.assign(Network(parts.shape).num_parameters(), 0.25F);
+  parts.torques = {-1, 1};
+  const NetworkPolicy policy(parts, info);
   SaveTensors(policy.ToTensors(), corpus / "policy/accepted/plain-of-another-writer.safetensors");
   Tensors narrow = policy.Rounded().ToTensors();
   narrow.Narrow();

@@ -36,21 +36,20 @@ void Adam::Step(const Size& size, std::span<const float> gradient, std::span<flo
   const double t = static_cast<double>(steps_);
   const double correction1 = 1.0 - std::pow(kBeta1, t);
   const double correction2 = std::sqrt(1.0 - std::pow(kBeta2, t));
-  const AdamConstants<float> constants{
-      static_cast<float>(scale),
-      kBeta1,
-      kBeta2,
-      static_cast<float>(size.learning_rate * correction2 / correction1),
-      static_cast<float>(epsilon_ * correction2),
-      static_cast<float>(size.tau)};
+  const AdamConstants constants{static_cast<float>(scale),
+                                kBeta1,
+                                kBeta2,
+                                static_cast<float>(size.learning_rate * correction2 / correction1),
+                                static_cast<float>(epsilon_ * correction2),
+                                static_cast<float>(size.tau)};
 
   const size_t chunks = (parameters.size() + kChunk - 1) / kChunk;
   pool.ParallelFor(static_cast<int>(chunks), [&](int chunk) {
     const size_t first = static_cast<size_t>(chunk) * kChunk;
     const size_t count = std::min(kChunk, parameters.size() - first);
     const auto part = [&](auto values) { return values.subspan(first, count); };
-    AdamPolyakStep<float>(constants, part(gradient), part(std::span(m_)), part(std::span(v_)),
-                          part(parameters), target.empty() ? target : part(target));
+    AdamPolyakStep(constants, part(gradient), part(std::span(m_)), part(std::span(v_)),
+                   part(parameters), target.empty() ? target : part(target));
   });
 }
 

@@ -1,140 +1,145 @@
 #include "nn/layer.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "nn/linear.h"
 
 namespace upswing {
 
-template <typename T>
-Layer<T>::Layer(const LayerShape& shape, size_t offset)
-    : shape_(shape),
+LayerView LayerView::Units(int first, int count) const {
+  return {name,
+          W.Cols(first, count),
+          b.subspan(static_cast<size_t>(first), static_cast<size_t>(count)),
+          {},
+          {},
+          activation};
+}
+
+Layer::Layer(std::string name, int in, int out, Activation activation, bool layer_norm,
+             size_t offset)
+    : name_(std::move(name)),
+      in_(in),
+      out_(out),
+      activation_(activation),
+      layer_norm_(layer_norm),
       weight_(offset),
-      bias_(weight_ + static_cast<size_t>(shape.in) * static_cast<size_t>(shape.out)),
-      gain_(bias_ + static_cast<size_t>(shape.out)),
-      norm_bias_(gain_ + static_cast<size_t>(shape.out)) {}
+      bias_(weight_ + static_cast<size_t>(in) * static_cast<size_t>(out)),
+      gain_(bias_ + static_cast<size_t>(out)),
+      norm_bias_(gain_ + static_cast<size_t>(out)) {}
 
-template <typename T>
-Matrix<const T> Layer<T>::W(std::span<const T> parameters) const {
-  return {parameters.data() + weight_, in(), out()};
-}
-
-template <typename T>
-void Layer<T>::Initialize(Rng& rng, std::span<T> parameters) const {
-  const double bound = 1.0 / std::sqrt(in());
-  for (T& p : parameters.subspan(weight_, gain_ - weight_)) {
-    p = static_cast<T>(rng.Uniform(-bound, bound));
+std::vector<ParameterBlock> Layer::Blocks() const {
+  std::vector<ParameterBlock> blocks{{name_ + ".weight", weight_, in_, out_},
+                                     {name_ + ".bias", bias_, 0, out_}};
+  if (layer_norm_) {
+    blocks.push_back({name_ + ".norm.weight", gain_, 0, out_});
+    blocks.push_back({name_ + ".norm.bias", norm_bias_, 0, out_});
   }
-  if (!shape_.layer_norm) return;
-  std::ranges::fill(Vector(parameters, gain_), T{1});
-  std::ranges::fill(Vector(parameters, norm_bias_), T{0});
+  return blocks;
 }
 
-template <typename T>
-LayerActivations<T> Layer<T>::MakeActivations(int max_batch, bool gradients) const {
+LayerView Layer::View(std::span<const Real> parameters) const {
+  LayerView view{
+      name_,      {parameters.data() + weight_, in_, out_}, Vector(parameters, bias_), {}, {},
+      activation_};
+  if (!layer_norm_) return view;
+  view.gain = Vector(parameters, gain_);
+  view.norm_bias = Vector(parameters, norm_bias_);
+  return view;
+}
+
+void Layer::Initialize(Rng& rng, std::span<Real> parameters) const {
+  const double bound = 1.0 / std::sqrt(in_);
+  for (Real& p : parameters.subspan(weight_, gain_ - weight_)) {
+    p = static_cast<Real>(rng.Uniform(-bound, bound));
+  }
+  if (!layer_norm_) return;
+  std::ranges::fill(Vector(parameters, gain_), Real{1});
+  std::ranges::fill(Vector(parameters, norm_bias_), Real{0});
+}
+
+LayerActivations Layer::MakeActivations(int max_batch, bool gradients) const {
   const auto rows = static_cast<size_t>(max_batch);
-  const size_t numbers = rows * static_cast<size_t>(out());
-  LayerActivations<T> a;
+  const size_t numbers = rows * static_cast<size_t>(out_);
+  LayerActivations a;
   a.output.resize(numbers);
   if (gradients) a.grad_linear.resize(numbers);
-  if (!shape_.layer_norm) return a;
+  if (!layer_norm_) return a;
   a.normal.resize(numbers);
   a.inv_std.resize(rows);
   if (gradients) a.grad_normal.resize(numbers);
   return a;
 }
 
-template <typename T>
-void Layer<T>::Prepare(RowRange rows, std::span<const T> parameters, Prepared<T>& prepared) const {
-  const auto [first, count] = rows;
-  const Matrix<T> transposed(prepared.transposed.data() + weight_, out(), in());
-  Transpose(W(parameters).Rows(first, count), transposed.Cols(first, count));
-}
-
-template <typename T>
-void Layer<T>::Multiply(Weights<T> weights, Matrix<const T> x, bool relu, Matrix<T> y) const {
-  const std::span<const T> bias = b(weights.parameters);
-  LinearForward(x, W(weights.parameters), bias, relu, y);
-}
-
-template <typename T>
-void Layer<T>::MultiplyTransposed(Weights<T> weights, Matrix<const T> dy,
-                                  GradientPlace<T> input) const {
-  const T* transposed = weights.prepared->transposed.data() + weight_;
-  LinearBackwardInput(dy, Matrix<const T>(transposed, out(), in()), input.gate, input.dx);
-}
-
-template <typename T>
-Matrix<const T> Layer<T>::Forward(Weights<T> weights, Matrix<const T> x, RowRange rows,
-                                  LayerActivations<T>& a) const {
-  const bool relu = shape_.activation == Activation::kRelu;
-  const Matrix<T> y = RowsOf(a.output, rows, out());
-  if (shape_.layer_norm) {
-    const Matrix<T> normal = RowsOf(a.normal, rows, out());
-    Multiply(weights, x, false, normal);
-    LayerNormForward(normal, Vector(weights.parameters, gain_),
-                     Vector(weights.parameters, norm_bias_), RowsOf(a.inv_std, rows, 1).values(),
-                     relu, y);
+Matrix<const Real> Layer::Forward(std::span<const Real> parameters, Matrix<const Real> x,
+                                  RowRange rows, LayerActivations& a) const {
+  const bool relu = activation_ == Activation::kRelu;
+  const Matrix<const Real> W(parameters.data() + weight_, in_, out_);
+  const std::span<const Real> b = Vector(parameters, bias_);
+  const Matrix<Real> y = RowsOf(a.output, rows, out_);
+  if (layer_norm_) {
+    const Matrix<Real> normal = RowsOf(a.normal, rows, out_);
+    LinearForward(x, W, b, false, normal);
+    LayerNormForward(normal, Vector(parameters, gain_), Vector(parameters, norm_bias_),
+                     RowsOf(a.inv_std, rows, 1).values(), relu, y);
   } else {
-    Multiply(weights, x, relu, y);
+    LinearForward(x, W, b, relu, y);
   }
-  if (shape_.activation == Activation::kTanh) Tanh(y.values());
+  if (activation_ == Activation::kTanh) Tanh(y.values());
   return y;
 }
 
-template <typename T>
-Matrix<const T> Layer<T>::Output(RowRange rows, const LayerActivations<T>& a) const {
-  return RowsOf(a.output, rows, out());
+Matrix<const Real> Layer::Output(RowRange rows, const LayerActivations& a) const {
+  return RowsOf(a.output, rows, out_);
 }
 
-template <typename T>
-GradientPlace<T> Layer<T>::OutputGradient(RowRange rows, LayerActivations<T>& a) const {
-  const Matrix<T> dy = RowsOf(shape_.layer_norm ? a.grad_normal : a.grad_linear, rows, out());
-  if (shape_.activation != Activation::kRelu) return {dy};
+GradientPlace Layer::OutputGradient(RowRange rows, LayerActivations& a) const {
+  const Matrix<Real> dy = RowsOf(layer_norm_ ? a.grad_normal : a.grad_linear, rows, out_);
+  if (activation_ != Activation::kRelu) return {dy};
   return {dy, Output(rows, a)};
 }
 
-template <typename T>
-void Layer<T>::Backward(Weights<T> weights, RowRange rows, LayerActivations<T>& a,
-                        GradientPlace<T> input) const {
-  // dy: with respect to y; for a ReLU already to what is before it, because of the gate.
-  const Matrix<T> dy = OutputGradient(rows, a).dx;
-  const Matrix<T> dlinear = RowsOf(a.grad_linear, rows, out());
-  if (shape_.activation == Activation::kTanh) TanhBackward(Output(rows, a).values(), dy.values());
-  if (shape_.layer_norm) {
-    const Matrix<const T> x_hat = RowsOf(a.normal, rows, out());
-    const std::span<const T> inv_std = RowsOf(a.inv_std, rows, 1).values();
-    LayerNormBackwardInput<T>(x_hat, Vector(weights.parameters, gain_), inv_std, dy, dlinear);
-  }
-  if (!input.dx.empty()) MultiplyTransposed(weights, dlinear, input);
+void Layer::TransposeWeights(RowRange rows, std::span<const Real> parameters,
+                             std::span<Real> transposed) const {
+  const Matrix<const Real> W(parameters.data() + weight_, in_, out_);
+  const Matrix<Real> W_transposed(transposed.data() + weight_, out_, in_);
+  Transpose(W.Rows(rows.first, rows.count), W_transposed.Cols(rows.first, rows.count));
 }
 
-template <typename T>
-T Layer<T>::BackwardWeights(RowRange rows, Matrix<const T> x, const LayerActivations<T>& a,
-                            std::span<T> gradient) const {
+void Layer::Backward(std::span<const Real> parameters, std::span<const Real> transposed,
+                     RowRange rows, LayerActivations& a, GradientPlace input) const {
+  // dy: with respect to y; for a ReLU already to what is before it, because of the gate.
+  const Matrix<Real> dy = OutputGradient(rows, a).dx;
+  const Matrix<Real> dlinear = RowsOf(a.grad_linear, rows, out_);
+  if (activation_ == Activation::kTanh) TanhBackward(Output(rows, a).values(), dy.values());
+  if (layer_norm_) {
+    LayerNormBackwardInput(RowsOf(a.normal, rows, out_), Vector(parameters, gain_),
+                           RowsOf(a.inv_std, rows, 1).values(), dy, dlinear);
+  }
+  if (input.dx.empty()) return;
+  const Matrix<const Real> W_transposed(transposed.data() + weight_, out_, in_);
+  LinearBackwardInput(dlinear, W_transposed, input.gate, input.dx);
+}
+
+Real Layer::BackwardWeights(RowRange rows, Matrix<const Real> x, const LayerActivations& a,
+                            std::span<Real> gradient) const {
   const RowRange all{0, x.rows()};
-  const Matrix<const T> dlinear = RowsOf(a.grad_linear, all, out());
-  const Matrix<const T> columns = x.Cols(rows.first, rows.count);
-  const Matrix<T> dw =
-      Matrix<T>(gradient.data() + weight_, in(), out()).Rows(rows.first, rows.count);
-  LinearBackwardWeight(columns, dlinear, dw);
-  T squares = SquaredNorm<T>(dw.values());
+  const Matrix<const Real> dlinear = RowsOf(a.grad_linear, all, out_);
+  const Matrix<Real> dW =
+      Matrix<Real>(gradient.data() + weight_, in_, out_).Rows(rows.first, rows.count);
+  LinearBackwardWeight(x.Cols(rows.first, rows.count), dlinear, dW);
+  Real squares = SquaredNorm(dW.values());
   if (rows.first > 0) return squares;
 
-  const std::span<T> db = Vector(gradient, bias_);
+  const std::span<Real> db = Vector(gradient, bias_);
   SumRows(dlinear, db);
-  squares += SquaredNorm<T>(db);
-  if (!shape_.layer_norm) return squares;
-  const Matrix<const T> dnormal = RowsOf(a.grad_normal, all, out());
-  const std::span<T> dgain = Vector(gradient, gain_);
-  const std::span<T> dnorm_bias = Vector(gradient, norm_bias_);
-  LayerNormBackwardGain<T>(RowsOf(a.normal, all, out()), dnormal, dgain);
+  squares += SquaredNorm(db);
+  if (!layer_norm_) return squares;
+  const Matrix<const Real> dnormal = RowsOf(a.grad_normal, all, out_);
+  const std::span<Real> dgain = Vector(gradient, gain_);
+  const std::span<Real> dnorm_bias = Vector(gradient, norm_bias_);
+  LayerNormBackwardGain(RowsOf(a.normal, all, out_), dnormal, dgain);
   SumRows(dnormal, dnorm_bias);
-  return squares + (SquaredNorm<T>(dgain) + SquaredNorm<T>(dnorm_bias));
+  return squares + (SquaredNorm(dgain) + SquaredNorm(dnorm_bias));
 }
-
-template class Layer<float>;
-template class Layer<double>;
 
 }  // namespace upswing

@@ -1,14 +1,17 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
+#include <string>
+#include <vector>
 
 #include "core/aligned.h"
 #include "core/matrix.h"
 #include "core/rng.h"
+#include "nn/real.h"
 
-/// The layers that networks are made of. B = batch size. T = float to work, double to check
-/// gradients.
+/// The layers that networks are made of. B = batch size.
 namespace upswing {
 
 /// Some consecutive rows, of a batch or of a weight.
@@ -22,102 +25,103 @@ auto RowsOf(Values& values, RowRange rows, int cols) {
   return Matrix(std::span(values), rows.first + rows.count, cols).Rows(rows.first, rows.count);
 }
 
-/// Copies of the weights in the layouts that products read, each at its parameter's offset.
-template <typename T>
-struct Prepared {
-  AlignedVector<T> transposed;  // (out × in), for the backward pass
-};
-
-/// Parameters and their prepared copies; a forward pass in float works without the copies.
-template <typename T>
-struct Weights {
-  std::span<const T> parameters;
-  const Prepared<T>* prepared = nullptr;
-};
-
 /// A place for the gradient with respect to some numbers x.
-template <typename T>
 struct GradientPlace {
-  Matrix<T> dx;               // (B × n)
-  Matrix<const T> gate = {};  // (B × n) dx = 0 where it is 0: x, if that is the output of a ReLU
+  Matrix<Real> dx;               // (B × n)
+  Matrix<const Real> gate = {};  // (B × n) dx = 0 where it is 0: x, if that is a ReLU's output
 };
 
 enum class Activation { kNone, kRelu, kTanh };
 
-struct LayerShape {
-  int in, out;
-  Activation activation = Activation::kNone;
-  bool layer_norm = false;  // layer normalisation (Ba et al., 2016) before the activation
+/// A named parameter array within a network's flat parameters.
+struct ParameterBlock {
+  std::string name;  // such as "feature.0.weight"
+  size_t offset;     // first number
+  int in, out;       // a weight is (in × out); in is 0 for a vector of `out` numbers
+  size_t size() const { return static_cast<size_t>(std::max(1, in)) * static_cast<size_t>(out); }
+};
+
+/// Units of a layer with their numbers, for those that write a network in another form.
+struct LayerView {
+  std::string name;      // such as "feature.0"
+  Matrix<const Real> W;  // (in × out)
+  std::span<const Real> b, gain,
+      norm_bias;  // (out); without layer normalisation the last are empty
+  Activation activation;
+
+  int in() const { return W.rows(); }
+  int out() const { return W.cols(); }
+  bool layer_norm() const { return !gain.empty(); }
+  /// Some consecutive units of a layer without layer normalisation.
+  LayerView Units(int first, int count) const;
 };
 
 /// What forward and backward passes leave in each row of a batch.
-template <typename T>
 struct LayerActivations {
-  AlignedVector<T> normal, inv_std;  // (B × out) x̂, (B); if layer_norm
-  AlignedVector<T> output;           // (B × out)
+  AlignedVector<Real> normal, inv_std;  // (B × out) x̂, (B); if layer_norm
+  AlignedVector<Real> output;           // (B × out)
   // Gradients (B × out) with respect to x · W + b and, if layer_norm, to what it makes of that.
-  AlignedVector<T> grad_linear, grad_normal;
+  AlignedVector<Real> grad_linear, grad_normal;
 };
 
 /// y (B × out) = activation(norm(x · W + b)), with x (B × in), W (in × out) and b (out), at its
 /// place in a network's flat parameters. Immutable; a forward and a backward pass concern the given
 /// rows of the batch.
-template <typename T>
 class Layer {
  public:
-  /// W begins at `offset` of the parameters; b and, if layer_norm, gain and bias (out each) follow
-  /// it.
-  Layer(const LayerShape& shape, size_t offset);
+  /// W begins at `offset` of the parameters; b and, with layer normalisation (Ba et al., 2016)
+  /// before the activation, gain and bias (out each) follow it.
+  Layer(std::string name, int in, int out, Activation activation, bool layer_norm, size_t offset);
 
-  int in() const { return shape_.in; }
-  int out() const { return shape_.out; }
-  Matrix<const T> W(std::span<const T> parameters) const;
-  std::span<const T> b(std::span<const T> parameters) const { return Vector(parameters, bias_); }
+  int in() const { return in_; }
+  int out() const { return out_; }
+  /// NAME.weight, NAME.bias and, with layer normalisation, NAME.norm.weight and NAME.norm.bias.
+  std::vector<ParameterBlock> Blocks() const;
+  LayerView View(std::span<const Real> parameters) const;
 
   /// PyTorch's defaults: W and b uniform in ±1/√in, gain 1 and its bias 0.
-  void Initialize(Rng& rng, std::span<T> parameters) const;
+  void Initialize(Rng& rng, std::span<Real> parameters) const;
 
   /// Buffers for up to `max_batch` rows; those of gradients only if asked for.
-  LayerActivations<T> MakeActivations(int max_batch, bool gradients) const;
-
-  /// Writes the copies of some rows of W.
-  void Prepare(RowRange rows, std::span<const T> parameters, Prepared<T>& prepared) const;
+  LayerActivations MakeActivations(int max_batch, bool gradients) const;
 
   /// Returns y, given x (rows.count × in).
-  Matrix<const T> Forward(Weights<T> weights, Matrix<const T> x, RowRange rows,
-                          LayerActivations<T>& a) const;
+  Matrix<const Real> Forward(std::span<const Real> parameters, Matrix<const Real> x, RowRange rows,
+                             LayerActivations& a) const;
 
   /// The y of the last Forward.
-  Matrix<const T> Output(RowRange rows, const LayerActivations<T>& a) const;
+  Matrix<const Real> Output(RowRange rows, const LayerActivations& a) const;
   /// Where to put the gradient with respect to y before Backward.
-  GradientPlace<T> OutputGradient(RowRange rows, LayerActivations<T>& a) const;
+  GradientPlace OutputGradient(RowRange rows, LayerActivations& a) const;
+
+  /// Writes some rows of W, transposed (out × in), into their place in `transposed`, which has W at
+  /// the offset of `parameters`.
+  void TransposeWeights(RowRange rows, std::span<const Real> parameters,
+                        std::span<Real> transposed) const;
 
   /// Writes the gradients with respect to x · W + b and to x, where there is a place for the
-  /// latter.
-  void Backward(Weights<T> weights, RowRange rows, LayerActivations<T>& a,
-                GradientPlace<T> input) const;
+  /// latter, given all that TransposeWeights writes.
+  void Backward(std::span<const Real> parameters, std::span<const Real> transposed, RowRange rows,
+                LayerActivations& a, GradientPlace input) const;
 
   /// Writes the gradient with respect to some rows of W, and with the first rows to all vectors,
   /// into its place in `gradient`: the sum over all rows of x (B × in). Returns the sum of its
   /// squares.
-  T BackwardWeights(RowRange rows, Matrix<const T> x, const LayerActivations<T>& a,
-                    std::span<T> gradient) const;
+  Real BackwardWeights(RowRange rows, Matrix<const Real> x, const LayerActivations& a,
+                       std::span<Real> gradient) const;
 
  private:
-  /// y = x · W + b; y = max(y, 0) if `relu`.
-  void Multiply(Weights<T> weights, Matrix<const T> x, bool relu, Matrix<T> y) const;
-  /// dx = dy · Wᵀ.
-  void MultiplyTransposed(Weights<T> weights, Matrix<const T> dy, GradientPlace<T> input) const;
+  /// The vector (out) at this offset.
   template <typename Parameter>
   std::span<Parameter> Vector(std::span<Parameter> parameters, size_t offset) const {
-    return parameters.subspan(offset, static_cast<size_t>(shape_.out));
+    return parameters.subspan(offset, static_cast<size_t>(out_));
   }
 
-  LayerShape shape_;
+  std::string name_;
+  int in_, out_;
+  Activation activation_;
+  bool layer_norm_;
   size_t weight_, bias_, gain_, norm_bias_;  // offsets
 };
-
-extern template class Layer<float>;
-extern template class Layer<double>;
 
 }  // namespace upswing

@@ -1,130 +1,209 @@
 #include "nn/network.h"
 
 #include <algorithm>
-#include <variant>
+#include <iterator>
 
 #include "core/error.h"
 #include "core/text.h"
+#include "nn/linear.h"
 
 namespace upswing {
 namespace {
 
+constexpr int kTaskRows = 64;  // of a weight
+
 /// Throws BadInput on invalid sizes. Settings and policy files both end here.
-void CheckSizes(const MlpShape& trunk, const HeadShape& head) {
-  constexpr int64_t kMax = MlpShape::kMaxWidth;
+NetworkShape Checked(NetworkShape shape) {
+  constexpr int64_t kMax = NetworkShape::kMaxWidth;
   const auto valid = [](int64_t n) { return n >= 1 && n <= kMax; };
-  if (valid(trunk.inputs) && valid(head.outputs) && !trunk.hidden.empty() &&
-      trunk.hidden.size() <= MlpShape::kMaxLayers && std::ranges::all_of(trunk.hidden, valid) &&
-      (head.streams == 0 || valid(head.streams))) {
-    return;
+  if (valid(shape.inputs) && valid(shape.outputs) && !shape.hidden.empty() &&
+      shape.hidden.size() <= NetworkShape::kMaxLayers && std::ranges::all_of(shape.hidden, valid) &&
+      (!shape.dueling() || valid(shape.streams))) {
+    return shape;
   }
   std::vector<std::string> widths;
-  for (const int64_t width : trunk.hidden) widths.push_back(std::to_string(width));
-  throw BadInput(Concat("network: expected 1 to ", MlpShape::kMaxLayers, " layers of 1 to ", kMax,
-                        " units, got inputs ", trunk.inputs, ", outputs ", head.outputs, ", ",
-                        trunk.hidden.size(), " hidden layers (", Join(widths, ", "), "), head ",
-                        head.streams));
+  for (const int64_t width : shape.hidden) widths.push_back(std::to_string(width));
+  throw BadInput(Concat("network: expected 1 to ", NetworkShape::kMaxLayers, " layers of 1 to ",
+                        kMax, " units, got inputs ", shape.inputs, ", outputs ", shape.outputs,
+                        ", ", shape.hidden.size(), " hidden layers (", Join(widths, ", "),
+                        "), head ", shape.streams));
 }
 
-/// The layout of a network that has no layers yet. Throws BadInput as Network does.
-template <typename T>
-ParameterLayout<T> EmptyLayout(const MlpShape& trunk, const HeadShape& head) {
-  CheckSizes(trunk, head);
-  return {};
+/// y = V + A - mean(A) (Wang et al., 2016, Eq 9).
+void CombineStreams(Matrix<const Real> value, Matrix<const Real> advantage, Matrix<Real> y) {
+  for (int i = 0; i < y.rows(); ++i) {
+    Real mean = 0;
+    for (const Real A : advantage.row(i)) mean += A;
+    mean /= static_cast<Real>(y.cols());
+    for (int k = 0; k < y.cols(); ++k) y(i, k) = advantage(i, k) + (value(i, 0) - mean);
+  }
 }
 
-template <typename T>
-Head<T> MakeHead(int features, const HeadShape& shape, ParameterLayout<T>& layout) {
-  if (shape.streams == 0) return LinearHead<T>(features, shape, layout);
-  return DuelingHead<T>(features, shape, layout);
+/// Backward pass of CombineStreams: dV = sum(dy), dA = dy - mean(dy).
+void CombineStreamsBackward(Matrix<const Real> dy, Matrix<Real> dvalue, Matrix<Real> dadvantage) {
+  for (int i = 0; i < dy.rows(); ++i) {
+    Real sum = 0;
+    for (const Real g : dy.row(i)) sum += g;
+    dvalue(i, 0) = sum;
+    for (int k = 0; k < dy.cols(); ++k) {
+      dadvantage(i, k) = dy(i, k) - sum / static_cast<Real>(dy.cols());
+    }
+  }
 }
 
 }  // namespace
 
-template <typename T>
-Network<T>::Network(const MlpShape& trunk, const HeadShape& head)
-    : layout_(EmptyLayout<T>(trunk, head)),
-      trunk_(trunk, layout_),
-      head_(MakeHead(trunk_.width(), head, layout_)) {}
-
-template <typename T>
-void Network<T>::Initialize(Rng& rng, std::span<T> parameters) const {
-  for (const Layer<T>& layer : layout_.layers) layer.Initialize(rng, parameters);
+std::string NetworkShape::Text() const {
+  std::string text = std::to_string(inputs);
+  for (const int64_t width : hidden) text += Concat('-', width);
+  return dueling() ? Concat(text, "-(", streams, "→1, ", streams, "→", outputs, ')')
+                   : Concat(text, '-', outputs);
 }
 
-template <typename T>
-typename Network<T>::Activations Network<T>::MakeActivations(int max_batch, bool gradients) const {
-  Activations a;
-  for (const Layer<T>& layer : layout_.layers) {
-    auto& part = a.trunk.size() < trunk_.num_layers() ? a.trunk : a.head;
-    part.push_back(layer.MakeActivations(max_batch, gradients));
+Network::Network(NetworkShape shape) : shape_(Checked(std::move(shape))) {
+  int width = shape_.inputs;
+  for (size_t i = 0; i < num_hidden(); ++i) {
+    const int units = static_cast<int>(shape_.hidden[i]);
+    Add(Concat("feature.", i), width, units, shape_.activation, shape_.layer_norm);
+    width = units;
   }
+  if (!shape_.dueling()) {
+    Add("output", width, shape_.outputs);
+    return;
+  }
+  const int G = static_cast<int>(shape_.streams);
+  Add("streams", width, 2 * G, Activation::kRelu);
+  Add("value", G, 1);
+  Add("advantage", G, shape_.outputs);
+}
+
+void Network::Add(const std::string& name, int in, int out, Activation activation,
+                  bool layer_norm) {
+  const size_t offset = blocks_.empty() ? 0 : num_parameters();
+  for (int first = 0; first < in; first += kTaskRows) {
+    tasks_.push_back({layers_.size(), {first, std::min(kTaskRows, in - first)}});
+  }
+  layers_.emplace_back(name, in, out, activation, layer_norm, offset);
+  std::ranges::copy(layers_.back().Blocks(), std::back_inserter(blocks_));
+}
+
+double Network::multiply_adds() const {
+  double sum = 0;
+  for (const Layer& layer : layers_) sum += static_cast<double>(layer.in()) * layer.out();
+  return sum;
+}
+
+std::vector<LayerView> Network::Views(std::span<const Real> parameters) const {
+  std::vector<LayerView> views;
+  for (const Layer& layer : layers_) views.push_back(layer.View(parameters));
+  if (!shape_.dueling()) return views;
+  const int G = static_cast<int>(shape_.streams);
+  LayerView value = views[num_hidden()].Units(0, G), advantage = views[num_hidden()].Units(G, G);
+  value.name += ".value";
+  advantage.name += ".advantage";
+  views[num_hidden()] = value;
+  views.insert(views.end() - 1, advantage);
+  return views;
+}
+
+void Network::Initialize(Rng& rng, std::span<Real> parameters) const {
+  for (const Layer& layer : layers_) layer.Initialize(rng, parameters);
+}
+
+Network::Activations Network::MakeActivations(int max_batch, bool gradients) const {
+  Activations a;
+  for (const Layer& layer : layers_) a.push_back(layer.MakeActivations(max_batch, gradients));
   return a;
 }
 
-template <typename T>
-Prepared<T> Network<T>::MakePrepared() const {
-  return {AlignedVector<T>(layout_.size)};
+Matrix<const Real> Network::Trunk(std::span<const Real> parameters, Matrix<const Real> x,
+                                  RowRange rows, Activations& a) const {
+  Matrix<const Real> y = x.Rows(rows.first, rows.count);
+  for (size_t i = 0; i < num_hidden(); ++i) y = layers_[i].Forward(parameters, y, rows, a[i]);
+  return y;
 }
 
-template <typename T>
-void Network<T>::Prepare(int task, std::span<const T> parameters, Prepared& prepared) const {
-  const auto& t = layout_.tasks[static_cast<size_t>(task)];
-  layout_.layers[t.layer].Prepare(t.rows, parameters, prepared);
-}
-
-template <typename T>
-void Network<T>::Forward(Weights weights, Matrix<const T> x, RowRange rows, Activations& a,
-                         Matrix<T> y) const {
-  const Matrix<const T> features = trunk_.Forward(weights, x, rows, a.trunk);
-  const Matrix<T> y_rows = y.Rows(rows.first, rows.count);
-  std::visit([&](const auto& head) { head.Forward(weights, features, rows, a.head, y_rows); },
-             head_);
-}
-
-template <typename T>
-void Network<T>::ForwardPreferences(std::span<const T> parameters, Matrix<const T> x, RowRange rows,
-                                    Activations& a, Matrix<T> preferences) const {
-  const auto* dueling = std::get_if<DuelingHead<T>>(&head_);
-  if (dueling == nullptr) return Forward({parameters}, x, rows, a, preferences);
-  const Matrix<const T> features = trunk_.Forward({parameters}, x, rows, a.trunk);
-  dueling->ForwardAdvantages(parameters, features, rows, a.head,
-                             preferences.Rows(rows.first, rows.count));
-}
-
-template <typename T>
-void Network<T>::BackwardInputs(Weights weights, Matrix<const T> dy, RowRange rows, Activations& a,
-                                Matrix<T> dx) const {
-  const Matrix<const T> dy_rows = dy.Rows(rows.first, rows.count);
-  const GradientPlace<T> dfeatures = trunk_.FeatureGradient(rows, a.trunk);
-  std::visit([&](const auto& head) { head.Backward(weights, dy_rows, rows, a.head, dfeatures); },
-             head_);
-  trunk_.Backward(weights, rows, a.trunk, dx);
-}
-
-template <typename T>
-T Network<T>::BackwardWeights(int task, Matrix<const T> x, const Activations& a,
-                              std::span<T> gradient) const {
-  const auto& t = layout_.tasks[static_cast<size_t>(task)];
-  const size_t below = trunk_.num_layers();
-  if (t.layer < below) return trunk_.BackwardWeights(t.layer, t.rows, x, a.trunk, gradient);
-  const Matrix<const T> features = trunk_.Features({0, x.rows()}, a.trunk);
-  const auto of_head = [&](const auto& head) {
-    return head.BackwardWeights(t.layer - below, t.rows, features, a.head, gradient);
+void Network::Forward(std::span<const Real> parameters, Matrix<const Real> x, RowRange rows,
+                      Activations& a, Matrix<Real> y) const {
+  const Matrix<const Real> features = Trunk(parameters, x, rows, a);
+  const Matrix<Real> y_rows = y.Rows(rows.first, rows.count);
+  const size_t head = num_hidden();
+  const Matrix<const Real> first = layers_[head].Forward(parameters, features, rows, a[head]);
+  if (!shape_.dueling()) {
+    std::ranges::copy(first.values(), y_rows.values().begin());
+    return;
+  }
+  const int G = static_cast<int>(shape_.streams);
+  const auto stream = [&](size_t layer, int column) {
+    return layers_[layer].Forward(parameters, first.Cols(column, G), rows, a[layer]);
   };
-  return std::visit(of_head, head_);
+  CombineStreams(stream(head + 1, 0), stream(head + 2, G), y_rows);
 }
 
-template <typename T>
-void Network<T>::Backward(std::span<const T> parameters, Matrix<const T> x, Activations& a,
-                          Matrix<const T> dy, std::span<T> gradient, Matrix<T> dx) const {
-  Prepared prepared = MakePrepared();
-  for (int task = 0; task < num_tasks(); ++task) Prepare(task, parameters, prepared);
-  BackwardInputs({parameters, &prepared}, dy, {0, x.rows()}, a, dx);
+void Network::ForwardPreferences(std::span<const Real> parameters, Matrix<const Real> x,
+                                 RowRange rows, Activations& a, Matrix<Real> preferences) const {
+  if (!shape_.dueling()) return Forward(parameters, x, rows, a, preferences);
+  const Matrix<const Real> features = Trunk(parameters, x, rows, a);
+  const int G = static_cast<int>(shape_.streams);
+  const size_t head = num_hidden();
+  const LayerView streams = layers_[head].View(parameters);
+  const LayerView advantage = layers_[head + 2].View(parameters);
+  const Matrix<Real> hidden = RowsOf(a[head].output, rows, 2 * G).Cols(G, G);
+  LinearForward(features, streams.W.Cols(G, G), streams.b.subspan(shape_.streams), true, hidden);
+  LinearForward(hidden, advantage.W, advantage.b, false, preferences.Rows(rows.first, rows.count));
+}
+
+void Network::TransposeWeights(int task, std::span<const Real> parameters,
+                               std::span<Real> transposed) const {
+  const auto& [layer, rows] = tasks_[task];
+  layers_[layer].TransposeWeights(rows, parameters, transposed);
+}
+
+void Network::BackwardInputs(std::span<const Real> parameters, std::span<const Real> transposed,
+                             Matrix<const Real> dy, RowRange rows, Activations& a,
+                             Matrix<Real> dx) const {
+  const auto backward = [&](size_t layer, GradientPlace input) {
+    layers_[layer].Backward(parameters, transposed, rows, a[layer], input);
+  };
+  const auto gradient = [&](size_t layer) { return layers_[layer].OutputGradient(rows, a[layer]); };
+  const Matrix<const Real> dy_rows = dy.Rows(rows.first, rows.count);
+  const size_t head = num_hidden();
+  if (shape_.dueling()) {
+    const GradientPlace hidden = gradient(head);
+    const int G = static_cast<int>(shape_.streams);
+    const auto half = [&](int column) -> GradientPlace {
+      return {hidden.dx.Cols(column, G), hidden.gate.Cols(column, G)};
+    };
+    CombineStreamsBackward(dy_rows, gradient(head + 1).dx, gradient(head + 2).dx);
+    backward(head + 1, half(0));
+    backward(head + 2, half(G));
+  } else {
+    std::ranges::copy(dy_rows.values(), gradient(head).dx.values().begin());
+  }
+  for (size_t layer = head; layer > 0; --layer) backward(layer, gradient(layer - 1));
+  backward(0, {dx.empty() ? dx : dx.Rows(rows.first, rows.count)});
+}
+
+Real Network::BackwardWeights(int task, Matrix<const Real> x, const Activations& a,
+                              std::span<Real> gradient) const {
+  const auto& [layer, rows] = tasks_[task];
+  const size_t head = num_hidden();
+  Matrix<const Real> input = x;
+  if (layer > head) {  // the streams: value, then advantage
+    const int G = static_cast<int>(shape_.streams);
+    input = layers_[head].Output({0, x.rows()}, a[head]).Cols(layer == head + 1 ? 0 : G, G);
+  } else if (layer > 0) {
+    input = layers_[layer - 1].Output({0, x.rows()}, a[layer - 1]);
+  }
+  return layers_[layer].BackwardWeights(rows, input, a[layer], gradient);
+}
+
+void Network::Backward(std::span<const Real> parameters, Matrix<const Real> x, Activations& a,
+                       Matrix<const Real> dy, std::span<Real> gradient, Matrix<Real> dx) const {
+  AlignedVector<Real> transposed(num_parameters());
+  for (int task = 0; task < num_tasks(); ++task) TransposeWeights(task, parameters, transposed);
+  BackwardInputs(parameters, transposed, dy, {0, x.rows()}, a, dx);
   for (int task = 0; task < num_tasks(); ++task) BackwardWeights(task, x, a, gradient);
 }
-
-template class Network<float>;
-template class Network<double>;
 
 }  // namespace upswing

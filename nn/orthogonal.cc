@@ -32,8 +32,7 @@ std::vector<double> OrthonormalVectors(Rng& rng, int count, int size) {
 
 }  // namespace
 
-template <typename T>
-void OrthogonalWeights(Rng& rng, double gain, Matrix<T> w) {
+void OrthogonalWeights(Rng& rng, double gain, Matrix<float> w) {
   const bool rows = w.rows() <= w.cols();
   const int count = std::min(w.rows(), w.cols());
   const int size = std::max(w.rows(), w.cols());
@@ -41,29 +40,23 @@ void OrthogonalWeights(Rng& rng, double gain, Matrix<T> w) {
   const Matrix<const double> vectors(values.data(), count, size);
   for (int i = 0; i < w.rows(); ++i) {
     for (int j = 0; j < w.cols(); ++j) {
-      w(i, j) = static_cast<T>(gain * (rows ? vectors(i, j) : vectors(j, i)));
+      w(i, j) = static_cast<float>(gain * (rows ? vectors(i, j) : vectors(j, i)));
     }
   }
 }
 
-template <typename T>
-void InitializeOrthogonal(const Network<T>& network, double output_gain, Rng& rng,
-                          std::span<T> parameters) {
+void InitializeOrthogonal(const Network& network, double output_gain, Rng& rng,
+                          std::span<float> parameters) {
   for (const ParameterBlock& block : network.blocks()) {
-    const std::span<T> values = parameters.subspan(block.offset, block.size());
+    const std::span<float> values = parameters.subspan(block.offset, block.size());
     if (block.in > 0) {
       const bool output = block.name == "output.weight";
       OrthogonalWeights(rng, output ? output_gain : std::numbers::sqrt2,
-                        Matrix<T>(values, block.in, block.out));
+                        Matrix<float>(values, block.in, block.out));
     } else {
-      std::ranges::fill(values, block.name.ends_with("norm.weight") ? T{1} : T{0});
+      std::ranges::fill(values, block.name.ends_with("norm.weight") ? 1.0F : 0.0F);
     }
   }
 }
-
-template void OrthogonalWeights(Rng&, double, Matrix<float>);
-template void OrthogonalWeights(Rng&, double, Matrix<double>);
-template void InitializeOrthogonal(const Network<float>&, double, Rng&, std::span<float>);
-template void InitializeOrthogonal(const Network<double>&, double, Rng&, std::span<double>);
 
 }  // namespace upswing

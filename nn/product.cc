@@ -39,28 +39,28 @@ HWY_INLINE void ForTile(const F& f) {
 }
 
 /// The tile of C at (m, n); if kPartial it has one register in a row, of which `count` numbers.
-template <int kRows, int kVectors, bool kPartial, typename T>
-HWY_INLINE void MultiplyTile(const Product<T>& p, int m, int n, size_t count) {
-  const Tag<T> d;
+template <int kRows, int kVectors, bool kPartial>
+HWY_INLINE void MultiplyTile(const Product& p, int m, int n, size_t count) {
+  const Tag d;
   const int lanes = static_cast<int>(hn::Lanes(d));
-  Vec<T> c[kRows][kVectors];
+  Vec c[kRows][kVectors];
   HWY_UNROLL(16)
   for (int v = 0; v < kVectors; ++v) {
-    const Vec<T> start =
+    const Vec start =
         p.bias == nullptr ? hn::Zero(d) : Load<kPartial>(p.bias + n + v * lanes, count);
     HWY_UNROLL(16)
     for (int i = 0; i < kRows; ++i) c[i][v] = start;
   }
 
-  const T* a = p.a + m * p.a_m;
-  const T* b = p.b.data() + n;
+  const Real* a = p.a + m * p.a_m;
+  const Real* b = p.b.data() + n;
   for (int k = 0; k < p.K; ++k) {
-    Vec<T> b_row[kVectors];
+    Vec b_row[kVectors];
     HWY_UNROLL(16)
     for (int v = 0; v < kVectors; ++v) b_row[v] = Load<kPartial>(b + v * lanes, count);
     HWY_UNROLL(16)
     for (int i = 0; i < kRows; ++i) {
-      const Vec<T> a_ik = hn::Set(d, a[i * p.a_m]);
+      const Vec a_ik = hn::Set(d, a[i * p.a_m]);
       HWY_UNROLL(16)
       for (int v = 0; v < kVectors; ++v) c[i][v] = hn::MulAdd(a_ik, b_row[v], c[i][v]);
     }
@@ -74,14 +74,14 @@ HWY_INLINE void MultiplyTile(const Product<T>& p, int m, int n, size_t count) {
                                  HWY_ATTR { c[i][v] = hn::Max(c[i][v], hn::Zero(d)); });
   }
   if (!p.gate.empty()) {
-    const T* gate = &p.gate(m, n);
+    const Real* gate = &p.gate(m, n);
     const ptrdiff_t stride = p.gate.stride();
     ForTile<kRows, kVectors>([&](int i, int v) HWY_ATTR {
-      const Vec<T> open = Load<kPartial>(gate + i * stride + v * lanes, count);
+      const Vec open = Load<kPartial>(gate + i * stride + v * lanes, count);
       c[i][v] = hn::IfThenElseZero(hn::Gt(open, hn::Zero(d)), c[i][v]);
     });
   }
-  T* to = &p.c(m, n);
+  Real* to = &p.c(m, n);
   const ptrdiff_t stride = p.c.stride();
   ForTile<kRows, kVectors>(
       [&](int i, int v) HWY_ATTR { Store<kPartial>(c[i][v], to + i * stride + v * lanes, count); });
@@ -89,9 +89,9 @@ HWY_INLINE void MultiplyTile(const Product<T>& p, int m, int n, size_t count) {
 
 /// Rows m to `end` of C, from column n on as far as tiles of kRows × kVectors registers go; returns
 /// the first column after them.
-template <int kRows, int kVectors, typename T>
-int MultiplyColumns(const Product<T>& p, int m, int end, int n) {
-  const int step = kVectors * static_cast<int>(hn::Lanes(Tag<T>()));
+template <int kRows, int kVectors>
+int MultiplyColumns(const Product& p, int m, int end, int n) {
+  const int step = kVectors * static_cast<int>(hn::Lanes(Tag()));
   for (; n + step <= p.N; n += step) {
     for (int i = m; i < end; i += kRows) MultiplyTile<kRows, kVectors, false>(p, i, n, 0);
   }
@@ -99,8 +99,8 @@ int MultiplyColumns(const Product<T>& p, int m, int end, int n) {
 }
 
 /// All of C from row m on that can be cut into tiles of kRows rows; returns the first row after.
-template <int kRows, typename T>
-int MultiplyRows(const Product<T>& p, int m) {
+template <int kRows>
+int MultiplyRows(const Product& p, int m) {
   constexpr int kVectors = kRegisters / kRows;
   const int end = m + (p.M - m) / kRows * kRows;
   int n = MultiplyColumns<kRows, kVectors>(p, m, end, 0);
@@ -123,8 +123,8 @@ constexpr int kMostNarrow = 4;  // columns
 
 /// Four numbers of every fourth row from `from` on, one row behind the other in a register.
 template <class D>
-HWY_INLINE hn::Vec<D> LoadFourthRows(D d, const float* from, ptrdiff_t row) {
-  if constexpr (hn::MaxLanes(D()) == 4) {
+HWY_INLINE hn::Vec<D> LoadFourthRows(D d, const Real* from, ptrdiff_t row) {
+  if constexpr (hn::MaxLanes(D()) <= 4) {
     return hn::LoadU(d, from);
   } else {
     const hn::Half<D> half;
@@ -137,8 +137,8 @@ HWY_INLINE hn::Vec<D> LoadFourthRows(D d, const float* from, ptrdiff_t row) {
 /// A(m, k) of the rows from `a` on, one in a lane, for four k in turn; kAlongK: a_k = 1, else
 /// a_m = 1.
 template <bool kAlongK>
-HWY_INLINE void LoadRows(const Product<float>& p, const float* a, Vec<float> (&rows)[4]) {
-  const Tag<float> d;
+HWY_INLINE void LoadRows(const Product& p, const Real* a, Vec (&rows)[4]) {
+  const Tag d;
   HWY_UNROLL(4)
   for (int i = 0; i < 4; ++i) {
     rows[i] = kAlongK ? LoadFourthRows(d, a + i * p.a_m, p.a_m) : hn::LoadU(d, a + i * p.a_k);
@@ -148,22 +148,22 @@ HWY_INLINE void LoadRows(const Product<float>& p, const float* a, Vec<float> (&r
 
 /// kBlocks registers of rows from m on, of all kColumns columns. K is a multiple of four.
 template <int kBlocks, int kColumns, bool kAlongK>
-HWY_INLINE void MultiplyNarrowBlocks(const Product<float>& p, int m) {
-  const Tag<float> d;
+HWY_INLINE void MultiplyNarrowBlocks(const Product& p, int m) {
+  const Tag d;
   const int lanes = static_cast<int>(hn::Lanes(d));
-  Vec<float> c[kBlocks][kColumns];
+  Vec c[kBlocks][kColumns];
   HWY_UNROLL(4)
   for (int n = 0; n < kColumns; ++n) {
-    const Vec<float> start = p.bias == nullptr ? hn::Zero(d) : hn::Set(d, p.bias[n]);
+    const Vec start = p.bias == nullptr ? hn::Zero(d) : hn::Set(d, p.bias[n]);
     HWY_UNROLL(2)
     for (int block = 0; block < kBlocks; ++block) c[block][n] = start;
   }
 
-  const float* a = p.a + m * p.a_m;
+  const Real* a = p.a + m * p.a_m;
   for (int k = 0; k < p.K; k += 4) {
     HWY_UNROLL(2)
     for (int block = 0; block < kBlocks; ++block) {
-      Vec<float> rows[4];
+      Vec rows[4];
       LoadRows<kAlongK>(p, a + block * lanes * p.a_m, rows);
       HWY_UNROLL(4)
       for (int i = 0; i < 4; ++i) {
@@ -176,7 +176,7 @@ HWY_INLINE void MultiplyNarrowBlocks(const Product<float>& p, int m) {
     a += 4 * p.a_k;
   }
 
-  HWY_ALIGN float column[HWY_LANES(float)];
+  HWY_ALIGN Real column[HWY_LANES(Real)];
   for (int block = 0; block < kBlocks; ++block) {
     for (int n = 0; n < kColumns; ++n) {
       if (p.relu) c[block][n] = hn::Max(c[block][n], hn::Zero(d));
@@ -191,8 +191,8 @@ HWY_INLINE void MultiplyNarrowBlocks(const Product<float>& p, int m) {
 
 /// As many whole registers of rows as there are; returns the first row after them.
 template <int kColumns, bool kAlongK>
-int MultiplyNarrowRows(const Product<float>& p) {
-  const int lanes = static_cast<int>(hn::Lanes(Tag<float>()));
+int MultiplyNarrowRows(const Product& p) {
+  const int lanes = static_cast<int>(hn::Lanes(Tag()));
   int m = 0;
   for (; m + 2 * lanes <= p.M; m += 2 * lanes) MultiplyNarrowBlocks<2, kColumns, kAlongK>(p, m);
   for (; m + lanes <= p.M; m += lanes) MultiplyNarrowBlocks<1, kColumns, kAlongK>(p, m);
@@ -200,7 +200,7 @@ int MultiplyNarrowRows(const Product<float>& p) {
 }
 
 template <int kColumns>
-int MultiplyNarrow(const Product<float>& p) {
+int MultiplyNarrow(const Product& p) {
   if constexpr (kColumns > kMostNarrow) {
     return 0;
   } else {
@@ -212,20 +212,11 @@ int MultiplyNarrow(const Product<float>& p) {
 }
 #endif
 
-/// The rows of C that can be computed so, from the first on; returns how many.
-template <typename T>
-int MultiplyFewColumns([[maybe_unused]] const Product<T>& p) {
+void Multiply(const Product& p) {
+  int m = 0;
 #if HWY_TARGET != HWY_SCALAR
-  if constexpr (sizeof(T) == 4) {
-    if (p.K % 4 == 0) return MultiplyNarrow<1>(p);
-  }
+  if (sizeof(Real) == 4 && p.K % 4 == 0) m = MultiplyNarrow<1>(p);
 #endif
-  return 0;
-}
-
-template <typename T>
-void MultiplyAll(const Product<T>& p) {
-  int m = MultiplyFewColumns(p);
   m = MultiplyRows<kTileRows>(p, m);
   m = MultiplyRows<4>(p, m);
   m = MultiplyRows<3>(p, m);
@@ -233,20 +224,15 @@ void MultiplyAll(const Product<T>& p) {
   MultiplyRows<1>(p, m);
 }
 
-void MultiplyFloat(const Product<float>& p) { MultiplyAll(p); }
-void MultiplyDouble(const Product<double>& p) { MultiplyAll(p); }
-
 }  // namespace upswing::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace upswing {
 
-HWY_EXPORT(MultiplyFloat);
-HWY_EXPORT(MultiplyDouble);
+HWY_EXPORT(Multiply);
 
-void Multiply(const Product<float>& product) { HWY_DYNAMIC_DISPATCH(MultiplyFloat)(product); }
-void Multiply(const Product<double>& product) { HWY_DYNAMIC_DISPATCH(MultiplyDouble)(product); }
+void Multiply(const Product& product) { HWY_DYNAMIC_DISPATCH(Multiply)(product); }
 
 }  // namespace upswing
 #endif  // HWY_ONCE

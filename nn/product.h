@@ -3,21 +3,21 @@
 #include <cstddef>
 
 #include "core/matrix.h"
+#include "nn/real.h"
 
 namespace upswing {
 
 /// C (M × N) = A (M × K) · B (K × N) + bias, where A(m, k) = a[m · a_m + k · a_k]. All three
 /// products of a linear layer have this form.
-template <typename T>
 struct Product {
   int M, N, K;
-  const T* a;
+  const Real* a;
   ptrdiff_t a_m, a_k;
-  Matrix<const T> b;          // (K × N)
-  Matrix<T> c;                // (M × N)
-  const T* bias = nullptr;    // (N), or null for none
-  bool relu = false;          // C = max(C, 0)
-  Matrix<const T> gate = {};  // C = 0 where gate (M × N) is not positive; empty for none
+  Matrix<const Real> b;          // (K × N)
+  Matrix<Real> c;                // (M × N)
+  const Real* bias = nullptr;    // (N), or null for none
+  bool relu = false;             // C = max(C, 0)
+  Matrix<const Real> gate = {};  // C = 0 where gate (M × N) is not positive; empty for none
 
   /// The part that computes `rows` rows from m on and `cols` columns from n on.
   Product Part(int m, int rows, int n, int cols) const {
@@ -36,7 +36,6 @@ struct Product {
 };
 
 /// Computes C on vectors. The order of each sum depends on the sizes alone.
-void Multiply(const Product<float>& product);
-void Multiply(const Product<double>& product);
+void Multiply(const Product& product);
 
 }  // namespace upswing

@@ -13,45 +13,46 @@
 #include <cstddef>
 #include <type_traits>
 
+#include "nn/real.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace upswing::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-template <typename T>
-using Tag = hn::ScalableTag<T>;
-template <typename T>
-using Vec = hn::Vec<Tag<T>>;
+using Tag = hn::ScalableTag<Real>;
+using Vec = hn::Vec<Tag>;
 
 /// Whether masked stores leave the other numbers untouched, which threads that write next to each
 /// other need; on other targets Highway reads and rewrites the whole register.
 constexpr bool kMasked = HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3;
 
 /// Up to `count` numbers, or a whole register of them.
-template <bool kPartial, typename T>
-HWY_INLINE Vec<T> Load(const T* from, size_t count) {
-  const Tag<T> d;
+template <bool kPartial>
+HWY_INLINE Vec Load(const Real* from, size_t count) {
+  const Tag d;
   if constexpr (!kPartial) return hn::LoadU(d, from);
   if constexpr (kMasked) return hn::MaskedLoad(hn::FirstN(d, count), d, from);
-  HWY_ALIGN T lanes[HWY_LANES(T)] = {};
+  HWY_ALIGN Real lanes[HWY_LANES(Real)] = {};
   std::copy_n(from, count, lanes);
   return hn::Load(d, lanes);
 }
-template <bool kPartial, typename T>
-HWY_INLINE void Store(Vec<T> value, T* to, size_t count) {
-  const Tag<T> d;
+template <bool kPartial>
+HWY_INLINE void Store(Vec value, Real* to, size_t count) {
+  const Tag d;
   if constexpr (!kPartial) {
     hn::StoreU(value, d, to);
   } else if constexpr (kMasked) {
     hn::BlendedStore(value, hn::FirstN(d, count), d, to);
   } else {
-    HWY_ALIGN T lanes[HWY_LANES(T)];
+    HWY_ALIGN Real lanes[HWY_LANES(Real)];
     hn::Store(value, d, lanes);
     std::copy_n(lanes, count, to);
   }
 }
 
 #if HWY_TARGET != HWY_SCALAR
-/// Transposes 4 × 4 floats: each register holds one row of four, or of several blocks side by side.
+/// Transposes 4 × 4 numbers of float: each register holds one row of four, or of several blocks
+/// side by side.
 template <class D>
 HWY_INLINE void TransposeBlocks(D d, hn::Vec<D> (&rows)[4]) {
   const hn::Repartition<double, D> pairs;
@@ -69,19 +70,19 @@ HWY_INLINE void TransposeBlocks(D d, hn::Vec<D> (&rows)[4]) {
 // Passes over vectors: each applies `f(i, count, partial)` to whole registers and then, with
 // partial = true, to the `count` numbers that remain.
 
-template <typename T, typename F>
+template <typename F>
 HWY_INLINE void ForVectors(size_t n, const F& f) {
-  const size_t lanes = hn::Lanes(Tag<T>());
+  const size_t lanes = hn::Lanes(Tag());
   size_t i = 0;
   for (; i + lanes <= n; i += lanes) f(i, lanes, std::false_type());
   if (i < n) f(i, n - i, std::true_type());
 }
 
 /// Σ term(i, count, partial) over all vectors, with four independent sums.
-template <typename T, typename F>
-HWY_INLINE T SumVectors(size_t n, const F& term) {
-  const Tag<T> d;
-  Vec<T> sum[4] = {hn::Zero(d), hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+template <typename F>
+HWY_INLINE Real SumVectors(size_t n, const F& term) {
+  const Tag d;
+  Vec sum[4] = {hn::Zero(d), hn::Zero(d), hn::Zero(d), hn::Zero(d)};
   const size_t lanes = hn::Lanes(d);
   size_t i = 0;
   for (; i + 4 * lanes <= n; i += 4 * lanes) {
@@ -91,7 +92,7 @@ HWY_INLINE T SumVectors(size_t n, const F& term) {
   }
   for (; i + lanes <= n; i += lanes) sum[0] = hn::Add(sum[0], term(i, lanes, std::false_type()));
   if (i < n) sum[1] = hn::Add(sum[1], term(i, n - i, std::true_type()));
-  const Vec<T> all = hn::Add(hn::Add(sum[0], sum[1]), hn::Add(sum[2], sum[3]));
+  const Vec all = hn::Add(hn::Add(sum[0], sum[1]), hn::Add(sum[2], sum[3]));
   return hn::GetLane(hn::SumOfLanes(d, all));
 }
 

@@ -11,7 +11,7 @@
 #include "core/argmax.h"
 #include "core/error.h"
 #include "core/text.h"
-#include "nn/q_policy.h"
+#include "nn/network_policy.h"
 #include "rl/representation.h"
 #include "rl/torque_levels.h"
 #include "rl/trained_network.h"
@@ -60,7 +60,7 @@ Dqn::Dqn(const DqnConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
       dq_(q_.size()),
       y_(static_cast<size_t>(config.batch)),
       q_taken_(y_.size()),
-      prepared_(network_.MakePrepared()),
+      transposed_(network_.num_parameters()),
       gradient_(network_.num_parameters()),
       squares_(static_cast<size_t>(network_.num_tasks())),
       act_activations_(network_.MakeActivations(spec.num_envs, false)),
@@ -96,7 +96,7 @@ void Dqn::Update(const Minibatch& batch) {
   // the products read), then slices of the batch, then the weights again.
   const int B = static_cast<int>(config_.batch);
   pool_.ParallelFor(network_.num_tasks(),
-                    [&](int task) { network_.Prepare(task, theta_, prepared_); });
+                    [&](int task) { network_.TransposeWeights(task, theta_, transposed_); });
   ForSlices(pool_, B, [&](RowRange rows) { BackwardRows(batch, rows); });
   CountErrors(batch);
   const Matrix<const float> s(batch.obs.data(), B, static_cast<int>(obs_size_));
@@ -128,8 +128,6 @@ void Dqn::BackwardRows(const Minibatch& batch, RowRange rows) {
   const int B = static_cast<int>(config_.batch);
   const int actions = static_cast<int>(torques_.size());
   const int obs_size = static_cast<int>(obs_size_);
-  const QNetwork<float>::Weights online{theta_, &prepared_};
-  const QNetwork<float>::Weights target{theta_target_};
   // s, s' (B × D); all Q-values (B × A)
   const Matrix<const float> s(batch.obs.data(), B, obs_size);
   const Matrix<const float> s_next(batch.next_obs.data(), B, obs_size);
@@ -143,13 +141,13 @@ void Dqn::BackwardRows(const Minibatch& batch, RowRange rows) {
   };
 
   // y = r + γⁿ Q(s', a*; θ⁻)
-  network_.Forward(target, s_next, rows, activations_, q_target);
-  if (config_.double_q) network_.Forward(online, s_next, rows, activations_, q_select);
+  network_.Forward(theta_target_, s_next, rows, activations_, q_target);
+  if (config_.double_q) network_.Forward(theta_, s_next, rows, activations_, q_select);
   TdTargets(q_select.Rows(rows.first, rows.count), q_target.Rows(rows.first, rows.count),
             part(batch.reward), part(batch.discount), part(y_));
 
   // dL/dQ(s, a) = w clip(Q(s, a; θ) - y, ±1) / B, and 0 for all other actions
-  network_.Forward(online, s, rows, activations_, q);
+  network_.Forward(theta_, s, rows, activations_, q);
   std::ranges::fill(dq.Rows(rows.first, rows.count).values(), 0.0F);
   for (int i = rows.first; i < rows.first + rows.count; ++i) {
     const auto row = static_cast<size_t>(i);
@@ -158,7 +156,7 @@ void Dqn::BackwardRows(const Minibatch& batch, RowRange rows) {
     td_error_[row] = q(i, a) - y_[row];
     dq(i, a) = batch.weight[row] * HuberGradient(td_error_[row]) / static_cast<float>(B);
   }
-  network_.BackwardInputs(online, dq, rows, activations_);
+  network_.BackwardInputs(theta_, transposed_, dq, rows, activations_);
 }
 
 void Dqn::CountErrors(const Minibatch& batch) {
@@ -188,8 +186,7 @@ Metrics Dqn::TakeMetrics() {
                   {"q", q_sum_ / n},
                   {"td_error", td_sum_ / n},
                   {"gradient_norm", norm_sum_ / n}};
-  AddFeatureMetrics(activations_.trunk.back().output, config_.batch, config_.hidden.back(),
-                    metrics);
+  AddFeatureMetrics(network_.Features(activations_), config_.batch, config_.hidden.back(), metrics);
   loss_sum_ = q_sum_ = td_sum_ = norm_sum_ = 0;
   report_updates_ = 0;
   return metrics;
@@ -199,8 +196,8 @@ std::unique_ptr<Policy> Dqn::ExportPolicy(PolicyInfo info) const {
   info.gamma = config_.gamma;
   info.reward_scale = config_.reward_scale;
   const auto& theta = config_.policy_tau < 1 ? theta_policy_ : theta_;
-  return std::make_unique<QPolicy>(network_.shape(), std::vector<float>(theta.begin(), theta.end()),
-                                   torques_, std::move(info));
+  return std::make_unique<NetworkPolicy>(
+      NetworkPolicyParts{ActionRule::kLevels, network_.shape(), theta, torques_}, std::move(info));
 }
 
 void Dqn::State(const Archive& archive) {
@@ -216,7 +213,7 @@ void Dqn::State(const Archive& archive) {
   archive.Scalar("q_sum", q_sum_, kAnyNumber<double>);
   archive.Scalar("td_sum", td_sum_, kSum);
   archive.Scalar("norm_sum", norm_sum_, kSum);
-  archive.Array("last_features", std::span(activations_.trunk.back().output));
+  archive.Array("last_features", std::span(network_.Features(activations_)));
 }
 
 }  // namespace upswing

@@ -7,7 +7,7 @@
 
 #include "core/thread_pool.h"
 #include "nn/adam.h"
-#include "nn/q_network.h"
+#include "nn/network.h"
 #include "rl/dqn_config.h"
 #include "rl/off_policy.h"
 
@@ -60,18 +60,18 @@ class Dqn : public OffPolicyAgent {
   std::vector<double> torques_;  // (A)
   ThreadPool& pool_;
 
-  QNetwork<float> network_;
+  Network network_;
   AlignedVector<float> theta_, theta_target_;  // (num_parameters)
   AlignedVector<float> theta_policy_;  // Polyak average of θ that is evaluated; see policy_tau
   Adam adam_;
   // Of an update: B rows.
-  QNetwork<float>::Activations activations_;
+  Network::Activations activations_;
   AlignedVector<float> q_, q_select_, q_target_, dq_;  // (B × A)
   AlignedVector<float> y_, q_taken_;                   // (B) targets, Q(s, a)
-  QNetwork<float>::Prepared prepared_;
+  AlignedVector<float> transposed_;
   AlignedVector<float> gradient_;  // (num_parameters)
   std::vector<float> squares_;     // of the gradient, by task
-  QNetwork<float>::Activations act_activations_;
+  Network::Activations act_activations_;
   AlignedVector<float> act_q_;  // (N × A) of the last Act
 
   // Sums since TakeMetrics.

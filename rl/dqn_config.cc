@@ -36,7 +36,7 @@ void DqnConfig::Check(int64_t /*num_envs*/) const { OffPolicyConfig::Check(); }
 
 AgentSize DqnConfig::Size(const EnvSpec& spec) const {
   const int D = spec.obs_size;
-  const QNetwork<float> network(Shape(D, static_cast<int>(levels)));
+  const Network network(Shape(D, static_cast<int>(levels)));
   return {static_cast<double>(network.num_parameters()),
           // Online, target and kept parameters, gradient, Adam's two moments, and the forms that
           // products want of online and target weights.
@@ -57,8 +57,8 @@ std::vector<std::string> DqnConfig::Warnings(int64_t steps, int64_t /*num_envs*/
   return warnings;
 }
 
-QNetworkShape DqnConfig::Shape(int obs_size, int actions) const {
-  return {obs_size, actions, hidden, dueling ? head : 0, dueling, layer_norm};
+NetworkShape DqnConfig::Shape(int obs_size, int actions) const {
+  return {obs_size, hidden, actions, layer_norm, Activation::kRelu, dueling ? head : 0};
 }
 
 }  // namespace upswing

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "nn/q_network.h"
+#include "nn/network.h"
 #include "rl/agent_config.h"
 #include "rl/off_policy_config.h"
 
@@ -28,7 +28,7 @@ struct DqnConfig : AgentConfig, OffPolicyConfig {
   std::vector<std::string> Warnings(int64_t steps, int64_t num_envs) const override;
 
   /// The shape of the network, for observations of `obs_size` numbers and so many actions.
-  QNetworkShape Shape(int obs_size, int actions) const;
+  NetworkShape Shape(int obs_size, int actions) const;
 };
 
 }  // namespace upswing

@@ -9,7 +9,7 @@
 #include "core/argmax.h"
 #include "core/error.h"
 #include "core/testing.h"
-#include "nn/q_policy.h"
+#include "nn/network_policy.h"
 #include "rl/torque_levels.h"
 #include "rl/toy_env.h"
 
@@ -80,12 +80,11 @@ TEST(Torques, AreEvenlySpacedFromLimitToLimit) {
 /// Loss of a minibatch as the papers write it, in plain code from the exported networks.
 double LossByHand(const DqnConfig& config, std::span<const float> online,
                   std::span<const float> target, const Minibatch& batch) {
-  const QNetwork<float> network(
-      {1, 3, config.hidden, config.dueling ? config.head : 0, config.dueling, config.layer_norm});
+  const Network network(config.Shape(1, 3));
   auto activations = network.MakeActivations(1, false);
   const auto q = [&](std::span<const float> parameters, const float& x) {
     std::vector<float> values(3);
-    network.Forward({parameters}, Matrix<const float>(&x, 1, 1), {0, 1}, activations,
+    network.Forward(parameters, Matrix<const float>(&x, 1, 1), {0, 1}, activations,
                     Matrix<float>(values.data(), 1, 3));
     return values;
   };
@@ -211,11 +210,11 @@ TEST(Dqn, TheExportedPolicyIsAnAverageOfTheLearnedOnes) {
       average[i] += 0.25F * (agent.online()[i] - average[i]);
     }
   }
-  const QNetwork<float> network(config.Shape(1, 3));
+  const Network network(config.Shape(1, 3));
   auto activations = network.MakeActivations(1, false);
   const float x = 0.7F;
   std::vector<float> expected(3), got(3);
-  network.Forward({average}, {&x, 1, 1}, {0, 1}, activations, {expected.data(), 1, 3});
+  network.Forward(average, {&x, 1, 1}, {0, 1}, activations, {expected.data(), 1, 3});
   const auto policy = agent.ExportPolicy({});
   policy->Values({&x, 1, 1}, {got.data(), 1, 3}, *policy->Start(1));
   for (size_t a = 0; a < 3; ++a) EXPECT_NEAR(got[a], expected[a], 1e-5);
@@ -240,12 +239,12 @@ TEST(Dqn, TheAverageGrowsLongerAsTheLearningRateFalls) {
   agent.Update(RandomBatch(16));
   std::vector<float> average(first);
   for (size_t i = 0; i < average.size(); ++i) average[i] += 0.05F * (agent.online()[i] - first[i]);
-  const QNetwork<float> network(config.Shape(1, 3));
+  const Network network(config.Shape(1, 3));
   auto activations = network.MakeActivations(1, false);
   const float x = 0.7F;
   std::vector<float> expected(3), got(3), fast(3);
-  network.Forward({average}, {&x, 1, 1}, {0, 1}, activations, {expected.data(), 1, 3});
-  network.Forward({agent.online()}, {&x, 1, 1}, {0, 1}, activations, {fast.data(), 1, 3});
+  network.Forward(average, {&x, 1, 1}, {0, 1}, activations, {expected.data(), 1, 3});
+  network.Forward(agent.online(), {&x, 1, 1}, {0, 1}, activations, {fast.data(), 1, 3});
   const auto policy = agent.ExportPolicy({});
   policy->Values({&x, 1, 1}, {got.data(), 1, 3}, *policy->Start(1));
   for (size_t a = 0; a < 3; ++a) EXPECT_NEAR(got[a], expected[a], 1e-5);

@@ -4,17 +4,20 @@
 
 #include <numbers>
 
-#include "nn/q_policy.h"
+#include "nn/network_policy.h"
 #include "rl/toy_env.h"
 
 namespace upswing {
 namespace {
 
-/// A policy on one observation x that always chooses the same torque.
-QPolicy Constant(double torque) {
-  const QNetworkShape shape{1, 1, {1}, 0, false, false};
-  return {shape, std::vector<float>(QNetwork<float>(shape).num_parameters()), {torque}, {}};
+/// The parts of a policy on one observation x that always chooses the same torque.
+NetworkPolicyParts ConstantParts(double torque) {
+  NetworkPolicyParts parts{ActionRule::kLevels, {1, {1}, 1}};
+  parts.parameters.resize(Network(parts.shape).num_parameters());
+  parts.torques = {torque};
+  return parts;
 }
+NetworkPolicy Constant(double torque) { return {ConstantParts(torque), {}}; }
 
 /// Environment i is at the goal from its goal_from[i]-th state on, but for a gap.
 class ScriptedEnv : public ToyEnv {
@@ -67,10 +70,9 @@ PolicyInfo Units(double gamma, double reward_scale) {
 }
 
 TEST(Evaluate, ReportsTheValueAndTheReturnThatItEstimates) {
-  const QNetworkShape shape{1, 1, {1}, 0, false, false};
-  std::vector<float> parameters(QNetwork<float>(shape).num_parameters());
-  parameters.back() = 3;  // the output's bias: Q = 3 everywhere
-  const QPolicy policy(shape, parameters, {1}, Units(0.5, 2));
+  NetworkPolicyParts parts = ConstantParts(1);
+  parts.parameters.back() = 3;  // the output's bias: Q = 3 everywhere
+  const NetworkPolicy policy(parts, Units(0.5, 2));
   ScriptedEnv env({500, 501});
   const Evaluation e = Evaluate(policy, env);
   EXPECT_DOUBLE_EQ(e.value, 1.5);
@@ -172,13 +174,14 @@ TEST(Evaluate, AStretchAtTheGoalCountsItsOwnChangesOnly) {
 }
 
 /// A dueling policy on one observation whose torque changes often with it.
-QPolicy Fickle() {
-  const QNetworkShape shape{1, 9, {32, 32}, 16, true, true};
-  const QNetwork<float> network(shape);
-  std::vector<float> parameters(network.num_parameters());
+NetworkPolicy Fickle() {
+  NetworkPolicyParts parts{ActionRule::kLevels, {1, {32, 32}, 9, true, Activation::kRelu, 16}};
+  const Network network(parts.shape);
+  parts.parameters.resize(network.num_parameters());
+  parts.torques = {-0.8, -0.6, -0.4, -0.2, 0, 0.2, 0.4, 0.6, 0.8};
   Rng rng(3, "fickle");
-  network.Initialize(rng, parameters);
-  return {shape, parameters, {-0.8, -0.6, -0.4, -0.2, 0, 0.2, 0.4, 0.6, 0.8}, Units(0.9, 1)};
+  network.Initialize(rng, parts.parameters);
+  return {parts, Units(0.9, 1)};
 }
 
 TEST(Evaluate, ThreadsChangeNoBit) {
@@ -204,7 +207,7 @@ TEST(Evaluate, ThreadsChangeNoBit) {
 }
 
 TEST(Evaluate, ThreadsMayShareAPolicy) {
-  const QPolicy policy = Fickle();
+  const NetworkPolicy policy = Fickle();
   const auto value = [&](int seed) {
     ToyEnv env(203, static_cast<uint64_t>(seed));
     return Evaluate(policy, env).value;

@@ -50,8 +50,8 @@ Ppo::Ppo(const PpoConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
       update_threads_(&pool),
       shuffle_rng_(seed, "minibatches"),
       mirror_rng_(seed, "mirror"),
-      actor_(config.Shape(D_), {outputs()}, B_, kAdamEpsilon),
-      critic_(config.Shape(D_), {1}, B_, kAdamEpsilon),
+      actor_(config.Shape(D_, outputs()), B_, kAdamEpsilon),
+      critic_(config.Shape(D_, 1), B_, kAdamEpsilon),
       log_std_(config.discrete() ? 0 : limit_.size(),
                static_cast<float>(std::log(config.initial_std))),
       std_(log_std_.size()),
@@ -116,7 +116,7 @@ void Ppo::Act(Matrix<const float> obs, Matrix<double> action) {
     for (int i = rows.first; i < rows.first + rows.count; ++i) {
       normalizer_.Apply(obs.row(i), normal.row(i));
     }
-    actor_.network().Forward({actor_.theta()}, normal, rows, act_activations_, y);
+    actor_.network().Forward(actor_.theta(), normal, rows, act_activations_, y);
     Sample(rows, y, explore_rngs_[static_cast<size_t>(block)], action);
   });
 }

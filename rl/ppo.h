@@ -108,7 +108,7 @@ class Ppo : public Agent {
   RolloutBuffer rollout_;
   std::vector<int64_t> order_;                                    // (T·N) rows, shuffled
   AlignedVector<float> value_, next_value_, advantage_, target_;  // (T·N)
-  Network<float>::Activations act_activations_;                   // of N rows
+  Network::Activations act_activations_;                          // of N rows
   AlignedVector<float> act_obs_, act_outputs_;                    // (N × D), (N × outputs)
 
   // Of a minibatch.

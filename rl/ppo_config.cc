@@ -73,8 +73,8 @@ void PpoConfig::Check(int64_t num_envs) const {
 
 AgentSize PpoConfig::Size(const EnvSpec& spec) const {
   const int D = spec.obs_size, A = spec.action_size();
-  const Network<float> actor(Shape(D), {discrete() ? static_cast<int>(levels) : A});
-  const Network<float> critic(Shape(D), {1});
+  const Network actor(Shape(D, discrete() ? static_cast<int>(levels) : A));
+  const Network critic(Shape(D, 1));
   return {static_cast<double>(actor.num_parameters() + critic.num_parameters()),
           // Parameters, gradient, Adam's two moments, and what products want.
           5, 3,
@@ -100,8 +100,8 @@ std::vector<std::string> PpoConfig::Warnings(int64_t steps, int64_t num_envs) co
   return warnings;
 }
 
-MlpShape PpoConfig::Shape(int obs_size) const {
-  return {obs_size, hidden, layer_norm,
+NetworkShape PpoConfig::Shape(int obs_size, int outputs) const {
+  return {obs_size, hidden, outputs, layer_norm,
           activation == "tanh" ? Activation::kTanh : Activation::kRelu};
 }
 

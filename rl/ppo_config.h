@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "nn/mlp.h"
+#include "nn/network.h"
 #include "rl/agent_config.h"
 
 namespace upswing {
@@ -37,8 +37,8 @@ struct PpoConfig : AgentConfig {
 
   /// Whether actions are levels, not continuous.
   bool discrete() const { return actions == "levels"; }
-  /// The shape of actor and critic, for observations of `obs_size` numbers.
-  MlpShape Shape(int obs_size) const;
+  /// The shape of actor or critic, for observations of `obs_size` numbers.
+  NetworkShape Shape(int obs_size, int outputs) const;
   /// Throws BadInput unless minibatches divide a rollout of so many environments, of at most
   /// 10,000,000 steps.
   void CheckBatch(int64_t num_envs) const;

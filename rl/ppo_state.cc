@@ -4,8 +4,8 @@
 #include <numeric>
 
 #include "core/text.h"
-#include "nn/actor_policy.h"
 #include "nn/gaussian.h"
+#include "nn/network_policy.h"
 #include "rl/ppo.h"
 
 namespace upswing {
@@ -13,10 +13,10 @@ namespace {
 
 /// Parameters that do to raw observations what `weights` do to normalised ones, in double:
 /// x̂ W + b = x (W / σ) + (b - (μ / σ) W), in the first layer.
-std::vector<float> WithNormalizer(const Network<float>& network, std::span<const float> weights,
-                                  const Normalizer& normalizer) {
-  std::vector<float> folded(weights.begin(),
-                            weights.begin() + static_cast<ptrdiff_t>(network.num_parameters()));
+AlignedVector<float> WithNormalizer(const Network& network, std::span<const float> weights,
+                                    const Normalizer& normalizer) {
+  AlignedVector<float> folded(weights.begin(),
+                              weights.begin() + static_cast<ptrdiff_t>(network.num_parameters()));
   const ParameterBlock& W_block = network.blocks()[0];
   const ParameterBlock& b_block = network.blocks()[1];
   const Matrix<float> W(folded.data() + W_block.offset, W_block.in, W_block.out);
@@ -37,12 +37,12 @@ std::vector<float> WithNormalizer(const Network<float>& network, std::span<const
 
 /// Parameters of an actor with outputs (μ, ln σ), whose ln σ are constants: no weights, and they
 /// are the biases. The output layer is the last one.
-std::vector<float> WithLogStd(const Network<float>& network, const std::vector<float>& weights,
-                              std::span<const float> log_std) {
+AlignedVector<float> WithLogStd(const Network& network, const AlignedVector<float>& weights,
+                                std::span<const float> log_std) {
   const ParameterBlock& W_block = network.blocks()[network.blocks().size() - 2];
   const Matrix<const float> W(weights.data() + W_block.offset, W_block.in, W_block.out);
-  std::vector<float> both(weights.begin(),
-                          weights.begin() + static_cast<ptrdiff_t>(W_block.offset));
+  AlignedVector<float> both(weights.begin(),
+                            weights.begin() + static_cast<ptrdiff_t>(W_block.offset));
   for (int k = 0; k < W.rows(); ++k) {
     both.insert(both.end(), W.row(k).begin(), W.row(k).end());
     both.insert(both.end(), log_std.size(), 0.0F);
@@ -83,9 +83,10 @@ void Ppo::BeginSums() {
 std::unique_ptr<Policy> Ppo::ExportPolicy(PolicyInfo info) const {
   info.gamma = config_.gamma;
   info.reward_scale = config_.reward_scale;
-  ActorParts parts;
-  parts.output = config_.discrete() ? ActorOutput::kCategorical : ActorOutput::kClippedGaussian;
-  parts.actor = parts.critic = config_.Shape(D_);
+  NetworkPolicyParts parts;
+  parts.rule = config_.discrete() ? ActionRule::kCategorical : ActionRule::kClippedGaussian;
+  parts.shape = config_.Shape(D_, config_.discrete() ? outputs() : 2 * outputs());
+  parts.critic = config_.Shape(D_, 1);
   parts.parameters = WithNormalizer(actor_.network(), actor_.theta(), normalizer_);
   if (!config_.discrete()) {
     parts.parameters = WithLogStd(actor_.network(), parts.parameters, log_std_);
@@ -93,7 +94,7 @@ std::unique_ptr<Policy> Ppo::ExportPolicy(PolicyInfo info) const {
   parts.critic_parameters = WithNormalizer(critic_.network(), critic_.theta(), normalizer_);
   parts.action_limit = limit_;
   parts.torques = torques_;
-  return std::make_unique<ActorPolicy>(std::move(parts), std::move(info));
+  return std::make_unique<NetworkPolicy>(std::move(parts), std::move(info));
 }
 
 int64_t Ppo::updates_due() const {

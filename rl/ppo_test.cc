@@ -189,7 +189,7 @@ TEST_P(PpoActions, TheExportedPolicyIsTheAgentsMean) {
   ToyEnv env(4);
   Walk(agent, env, 200);
   const int outputs = config.discrete() ? 3 : 1;
-  const Network<float> network(config.Shape(1), {outputs}), critic(config.Shape(1), {1});
+  const Network network(config.Shape(1, outputs)), critic(config.Shape(1, 1));
   auto activations = network.MakeActivations(1, false),
        of_critic = critic.MakeActivations(1, false);
   const auto policy = agent.ExportPolicy({});
@@ -201,8 +201,8 @@ TEST_P(PpoActions, TheExportedPolicyIsTheAgentsMean) {
     float normal = 0, v = 0, value = 0;
     agent.normalizer().Apply({&x, 1}, {&normal, 1});
     std::vector<float> y(static_cast<size_t>(outputs));
-    network.Forward({agent.actor()}, {&normal, 1, 1}, {0, 1}, activations, {y.data(), 1, outputs});
-    critic.Forward({agent.critic()}, {&normal, 1, 1}, {0, 1}, of_critic, {&v, 1, 1});
+    network.Forward(agent.actor(), {&normal, 1, 1}, {0, 1}, activations, {y.data(), 1, outputs});
+    critic.Forward(agent.critic(), {&normal, 1, 1}, {0, 1}, of_critic, {&v, 1, 1});
     double action = 9;
     policy->Act({&x, 1, 1}, {&action, 1, 1}, *memory);
     policy->Values({&x, 1, 1}, {&value, 1, 1}, *memory);

@@ -54,7 +54,7 @@ void Ppo::Step(const Sums& sums) {
   const double max_norm = config_.max_gradient_norm;
   norm_sum_ += actor_.Step(BatchObs(), learning_rate(), max_norm, {}, 0, pool_);
   critic_.Step(BatchObs(), scheduled_rate(), max_norm, {}, 0, pool_);
-  const double norm = std::sqrt(SquaredNorm<float>(sums.dlog_std));
+  const double norm = std::sqrt(SquaredNorm(sums.dlog_std));
   log_std_adam_.Step({learning_rate(), norm, max_norm, 0}, sums.dlog_std, log_std_, {}, pool_);
   SetStd();
   ++updates_;

@@ -7,7 +7,7 @@
 
 #include "core/error.h"
 #include "core/text.h"
-#include "nn/actor_policy.h"
+#include "nn/network_policy.h"
 #include "rl/representation.h"
 
 namespace upswing {
@@ -24,7 +24,7 @@ Sac::Sac(const SacConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
       noise_rng_(seed, "policy noise"),
       actor_([&] {
         Rng rng(seed, "initial actor");
-        return TrainedNetwork(config.Trunk(D_), {2 * A_}, B_, rng);
+        return TrainedNetwork(config.Shape(D_, 2 * A_), B_, rng);
       }()),
       theta_policy_(actor_.theta().begin(), actor_.theta().end()),
       log_alpha_(1, static_cast<float>(std::max(double{-kMostLogAlpha}, std::log(config.alpha)))),
@@ -46,7 +46,7 @@ Sac::Sac(const SacConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
       begins_(static_cast<size_t>(spec.num_envs), 1) {
   for (size_t i = 0; i < num_critics(); ++i) {
     Rng rng(seed, "initial critic", i);
-    TrainedNetwork network(config.Trunk(D_ + A_), {bins_.outputs()}, B_, rng);
+    TrainedNetwork network(config.Shape(D_ + A_, bins_.outputs()), B_, rng);
     AlignedVector<float> target(network.theta().begin(), network.theta().end());
     const AlignedVector<float> outputs(Size(B_, bins_.outputs())), value(y_.size());
     critics_.push_back(
@@ -59,7 +59,7 @@ double Sac::alpha() const { return std::exp(double{log_alpha_[0]}); }
 void Sac::Act(Matrix<const float> obs, Matrix<double> action) {
   const Matrix<float> outputs(act_outputs_, obs.rows(), 2 * A_);
   ForSlices(pool_, obs.rows(), [&](RowRange rows) {
-    actor_.network().Forward({actor_.theta()}, obs, rows, act_activations_, outputs);
+    actor_.network().Forward(actor_.theta(), obs, rows, act_activations_, outputs);
   });
   Remember(obs);
   const bool random = steps_ < config_.learning_starts;
@@ -100,8 +100,7 @@ Metrics Sac::TakeMetrics() {
                   {"q", q_sum_ / n},
                   {"td_error", td_sum_ / n},
                   {"gradient_norm", norm_sum_ / n}};
-  AddFeatureMetrics(critics_.front().network.activations().trunk.back().output, B_,
-                    config_.hidden.back(), metrics);
+  AddFeatureMetrics(critics_.front().network.features(), B_, config_.hidden.back(), metrics);
   loss_sum_ = q_sum_ = td_sum_ = norm_sum_ = entropy_sum_ = 0;
   report_updates_ = report_actor_updates_ = 0;
   return metrics;
@@ -110,16 +109,14 @@ Metrics Sac::TakeMetrics() {
 std::unique_ptr<Policy> Sac::ExportPolicy(PolicyInfo info) const {
   info.gamma = config_.gamma;
   info.reward_scale = config_.reward_scale;
-  ActorParts parts;
-  parts.actor = config_.Trunk(D_);
-  parts.parameters.assign(theta_policy_.begin(), theta_policy_.end());
+  NetworkPolicyParts parts{ActionRule::kSquashedGaussian, actor_.network().shape(), theta_policy_};
   parts.action_limit = action_limit_;
   if (config_.bins == 0) {
-    parts.critic = config_.Trunk(D_ + A_);
+    parts.critic = config_.Shape(D_ + A_, 1);
     const std::span<const float> theta = critics_.front().network.theta();
     parts.critic_parameters.assign(theta.begin(), theta.end());
   }
-  return std::make_unique<ActorPolicy>(std::move(parts), std::move(info));
+  return std::make_unique<NetworkPolicy>(std::move(parts), std::move(info));
 }
 
 void Sac::State(const Archive& archive) {

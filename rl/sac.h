@@ -111,7 +111,7 @@ class Sac : public OffPolicyAgent {
   AlignedVector<float> inputs_, policy_inputs_;    // (B × (D + A)): s, a; s, a ~ π
   AlignedVector<float> y_;                         // (B)
 
-  Network<float>::Activations act_activations_;
+  Network::Activations act_activations_;
   AlignedVector<float> act_outputs_;     // (N × 2 A) of the last Act
   std::vector<float> mean_, last_mean_;  // (N × A) mean actions of this step and the last
   std::vector<int64_t> begins_;          // (N) 1 in the first step of an episode

@@ -55,8 +55,8 @@ void SacConfig::Check(int64_t /*num_envs*/) const {
 AgentSize SacConfig::Size(const EnvSpec& spec) const {
   const int D = spec.obs_size, A = spec.action_size();
   const double critics = twin ? 2 : 1;
-  const Network<float> actor(Trunk(D), {2 * A});
-  const Network<float> critic(Trunk(D + A), {static_cast<int>(std::max<int64_t>(1, bins))});
+  const Network actor(Shape(D, 2 * A));
+  const Network critic(Shape(D + A, static_cast<int>(std::max<int64_t>(1, bins))));
   return {static_cast<double>(actor.num_parameters()) +
               critics * static_cast<double>(critic.num_parameters()),
           // Online, target or kept, gradient, Adam's two moments, and what products want.
@@ -77,6 +77,8 @@ std::vector<std::string> SacConfig::Warnings(int64_t steps, int64_t /*num_envs*/
   return warnings;
 }
 
-MlpShape SacConfig::Trunk(int inputs) const { return {inputs, hidden, layer_norm}; }
+NetworkShape SacConfig::Shape(int inputs, int outputs) const {
+  return {inputs, hidden, outputs, layer_norm};
+}
 
 }  // namespace upswing

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "nn/mlp.h"
+#include "nn/network.h"
 #include "rl/agent_config.h"
 #include "rl/off_policy_config.h"
 
@@ -31,8 +31,8 @@ struct SacConfig : AgentConfig, OffPolicyConfig {
   std::string Text() const override;
   std::vector<std::string> Warnings(int64_t steps, int64_t num_envs) const override;
 
-  /// The trunk of a network of so many inputs.
-  MlpShape Trunk(int inputs) const;
+  /// The shape of a network of this many inputs and outputs.
+  NetworkShape Shape(int inputs, int outputs) const;
 };
 
 }  // namespace upswing

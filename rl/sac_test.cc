@@ -8,7 +8,7 @@
 
 #include "core/error.h"
 #include "core/testing.h"
-#include "nn/actor_policy.h"
+#include "nn/network_policy.h"
 #include "rl/toy_env.h"
 
 namespace upswing {
@@ -214,16 +214,16 @@ TEST(Sac, TheExportedPolicyIsTheActorsMeanAndItsCriticsValue) {
   spec.action_limit = {2.5};
   Sac agent(config, spec, 1, pool);
   for (int i = 0; i < 20; ++i) agent.Update(RandomBatch(16));
-  const Network<float> actor(config.Trunk(1), {2}), critic(config.Trunk(2), {1});
+  const Network actor(config.Shape(1, 2)), critic(config.Shape(2, 1));
   auto a = actor.MakeActivations(1, false), c = critic.MakeActivations(1, false);
   const auto policy = agent.ExportPolicy({});
   for (const float x : {-300.0F, -0.7F, 0.0F, 0.2F, 1e4F}) {  // saturated ones too
     float outputs[2], q = 0, value = 0;
-    actor.Forward({agent.actor()}, {&x, 1, 1}, {0, 1}, a, {outputs, 1, 2});
+    actor.Forward(agent.actor(), {&x, 1, 1}, {0, 1}, a, {outputs, 1, 2});
     const double mean = std::tanh(double{outputs[0]});
     EXPECT_NEAR(ActionAt(agent, x), 2.5 * mean, 1e-6);
     const float inputs[2]{x, static_cast<float>(mean)};
-    critic.Forward({agent.critic(0)}, {inputs, 1, 2}, {0, 1}, c, {&q, 1, 1});
+    critic.Forward(agent.critic(0), {inputs, 1, 2}, {0, 1}, c, {&q, 1, 1});
     policy->Values({&x, 1, 1}, {&value, 1, 1}, *policy->Start(1));
     EXPECT_NEAR(value, q, 1e-5 * std::max(1.0F, std::abs(q)));
   }

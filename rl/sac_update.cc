@@ -67,8 +67,8 @@ void Sac::SampleRows(Matrix<const float> obs, RowRange rows, Matrix<float> input
     }
   }
   const RowRange parts{rows.first * A_, rows.count * A_};
-  SquashSamples<float>(Part(x.mean, parts), Part(x.log_std, parts), Part(x.epsilon, parts),
-                       Part(x.deviation, parts), Part(x.action, parts), Part(x.log_prob, parts));
+  SquashSamples(Part(x.mean, parts), Part(x.log_std, parts), Part(x.epsilon, parts),
+                Part(x.deviation, parts), Part(x.action, parts), Part(x.log_prob, parts));
   CopyRows(obs, rows, 0, inputs);
   CopyRows({x.action.data(), B_, A_}, rows, D_, inputs);
   for (int i = rows.first; i < rows.first + rows.count; ++i) {

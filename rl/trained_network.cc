@@ -5,33 +5,31 @@
 
 namespace upswing {
 
-TrainedNetwork::TrainedNetwork(const MlpShape& trunk, const HeadShape& head, int batch, Rng& rng)
-    : TrainedNetwork(trunk, head, batch, Adam::kEpsilon) {
+TrainedNetwork::TrainedNetwork(const NetworkShape& shape, int batch, Rng& rng)
+    : TrainedNetwork(shape, batch, Adam::kEpsilon) {
   network_.Initialize(rng, theta_);
 }
 
-TrainedNetwork::TrainedNetwork(const MlpShape& trunk, const HeadShape& head, int batch,
-                               double adam_epsilon)
-    : network_(trunk, head),
+TrainedNetwork::TrainedNetwork(const NetworkShape& shape, int batch, double adam_epsilon)
+    : network_(shape),
       theta_(network_.num_parameters()),
       gradient_(theta_.size()),
+      transposed_(theta_.size()),
       adam_(theta_.size(), adam_epsilon),
       activations_(network_.MakeActivations(batch, true)),
-      prepared_(network_.MakePrepared()),
       squares_(static_cast<size_t>(network_.num_tasks())) {}
 
 void TrainedNetwork::Prepare(ThreadPool& pool) {
   if (!moved_) return;
   moved_ = false;
   pool.ParallelFor(network_.num_tasks(),
-                   [&](int task) { network_.Prepare(task, theta_, prepared_); });
+                   [&](int task) { network_.TransposeWeights(task, theta_, transposed_); });
 }
 
 double TrainedNetwork::Step(Matrix<const float> x, double learning_rate, double max_norm,
                             std::span<float> target, double tau, ThreadPool& pool) {
   pool.ParallelFor(network_.num_tasks(), [&](int task) {
-    squares_[static_cast<size_t>(task)] =
-        network_.BackwardWeights(task, x, activations_, gradient_);
+    squares_[task] = network_.BackwardWeights(task, x, activations_, gradient_);
   });
   const double norm = std::sqrt(std::accumulate(squares_.begin(), squares_.end(), 0.0));
   moved_ = true;
@@ -43,7 +41,7 @@ void TrainedNetwork::State(const Archive& archive) {
   moved_ = true;
   archive.Array("theta", std::span(theta_));
   adam_.State(archive.In("adam"));
-  archive.Array("last_features", std::span(activations_.trunk.back().output));
+  archive.Array("last_features", features());
 }
 
 }  // namespace upswing

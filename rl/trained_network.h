@@ -41,31 +41,32 @@ void ForSlices(ThreadPool& pool, int B, const Work& work) {
 class TrainedNetwork {
  public:
   /// With PyTorch's initial parameters.
-  TrainedNetwork(const MlpShape& trunk, const HeadShape& head, int batch, Rng& rng);
+  TrainedNetwork(const NetworkShape& shape, int batch, Rng& rng);
   /// With parameters of 0, which the caller fills, and this ε of Adam.
-  TrainedNetwork(const MlpShape& trunk, const HeadShape& head, int batch, double adam_epsilon);
+  TrainedNetwork(const NetworkShape& shape, int batch, double adam_epsilon);
 
-  const Network<float>& network() const { return network_; }
+  const Network& network() const { return network_; }
   std::span<const float> theta() const { return theta_; }
   std::span<float> mutable_theta() {
     moved_ = true;
     return theta_;
   }
-  const Network<float>::Activations& activations() const { return activations_; }
+  /// The features (B × H) of the last Forward.
+  std::span<float> features() { return network_.Features(activations_); }
 
-  /// Makes the copies of θ that Backward reads, if θ has moved; to be called before.
+  /// Transposes the weights for Backward, if θ has moved; to be called before.
   void Prepare(ThreadPool& pool);
   /// y = network(x) of the given rows, at these parameters or at θ.
   void Forward(std::span<const float> parameters, Matrix<const float> x, RowRange rows,
                Matrix<float> y) {
-    network_.Forward({parameters}, x, rows, activations_, y);
+    network_.Forward(parameters, x, rows, activations_, y);
   }
   void Forward(Matrix<const float> x, RowRange rows, Matrix<float> y) {
     Forward(theta_, x, rows, y);
   }
   /// The backward pass of the given rows after Forward at θ; see Network::BackwardInputs.
   void Backward(Matrix<const float> dy, RowRange rows, Matrix<float> dx = {}) {
-    network_.BackwardInputs({theta_, &prepared_}, dy, rows, activations_, dx);
+    network_.BackwardInputs(theta_, transposed_, dy, rows, activations_, dx);
   }
   /// One step of Adam along the gradient that Backward has left for the inputs x (B × D): θ moves,
   /// and `target` follows it with tau. Returns the gradient's norm before it is clipped to
@@ -78,12 +79,11 @@ class TrainedNetwork {
   int64_t steps() const { return adam_.steps(); }
 
  private:
-  Network<float> network_;
-  AlignedVector<float> theta_, gradient_;  // (num_parameters)
+  Network network_;
+  AlignedVector<float> theta_, gradient_, transposed_;  // (num_parameters)
   Adam adam_;
-  Network<float>::Activations activations_;
-  Network<float>::Prepared prepared_;
-  bool moved_ = true;           // whether θ has moved since prepared_ was made
+  Network::Activations activations_;
+  bool moved_ = true;           // whether θ has moved since transposed_ was made
   std::vector<float> squares_;  // of the gradient, by task
 };
 

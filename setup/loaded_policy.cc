@@ -4,8 +4,7 @@
 
 #include "core/error.h"
 #include "core/text.h"
-#include "nn/actor_policy.h"
-#include "nn/q_policy.h"
+#include "nn/network_policy.h"
 
 namespace upswing {
 namespace {
@@ -91,12 +90,7 @@ LoadedPolicy PolicyIn(const Tensors& file) {
     throw BadInput(
         Concat(where, ": is a policy for RealAIGym's boards, which `upswing realaigym` takes"));
   }
-  std::shared_ptr<const Policy> policy;
-  if (ActorPolicy::IsOutput(PolicyOutput(file))) {
-    policy = std::make_shared<ActorPolicy>(ActorPolicy::From(file));
-  } else {
-    policy = std::make_shared<QPolicy>(QPolicy::From(file));
-  }
+  const auto policy = std::make_shared<const NetworkPolicy>(NetworkPolicy::From(file));
   const PolicyInfo& info = policy->info();
   const std::string task = info.task.empty() ? kDoublePendulum : info.task;
   LoadedPolicy loaded{where, where, policy, task, Plant(), ""};

@@ -6,9 +6,8 @@
 #include <numeric>
 
 #include "core/safetensors.h"
-#include "nn/actor_policy.h"
 #include "nn/gaussian.h"
-#include "nn/q_policy.h"
+#include "nn/network_policy.h"
 #include "rl/softmax.h"
 #include "setup/controllers.h"
 #include "setup/loaded_policy.h"
@@ -49,51 +48,35 @@ int SetText(const json& value) {
 struct Controller {
   explicit Controller(LoadedPolicy policy)
       : loaded(std::move(policy)),
-        actor(dynamic_cast<const ActorPolicy*>(&*loaded.policy)),
-        q(dynamic_cast<const QPolicy*>(&*loaded.policy)),
+        learned(dynamic_cast<const NetworkPolicy*>(&*loaded.policy)),
         memory(loaded.policy->Start(1)) {}
 
-  bool gaussian() const {
-    return actor != nullptr && actor->parts().output != ActorOutput::kCategorical;
-  }
+  bool gaussian() const { return learned != nullptr && !learned->parts().chooses_torque(); }
   /// The torques (A, N·m) of which it takes one; none if it may take any.
   std::span<const double> torques() const {
-    if (actor != nullptr) return actor->parts().torques;
-    return loaded.policy->value_actions().values();
+    if (learned != nullptr) return learned->parts().torques;
+    return {};
   }
   /// How many numbers a decision has; see PolicyDecide.
   size_t columns() const { return 2 + (gaussian() ? 4 : torques().size()); }
   /// Whether it is made from the equations of motion, and may have plans.
-  bool computed() const { return actor == nullptr && q == nullptr; }
-  double self_check_error() const {
-    if (computed()) return 0;
-    return (q != nullptr ? q->self_check() : actor->self_check()).error;
-  }
+  bool computed() const { return learned == nullptr; }
+  double self_check_error() const { return computed() ? 0 : learned->self_check().error; }
   double limit() const {
     if (computed()) return loaded.plant.torque_limit;
-    return actor == nullptr ? 0 : actor->parts().action_limit.front();
+    return learned->is_actor() ? learned->parts().action_limit.front() : 0;
   }
 
   LoadedPolicy loaded;
-  const ActorPolicy* actor;
-  const QPolicy* q;
+  const NetworkPolicy* learned;            // null: it is computed
   std::unique_ptr<Policy::Memory> memory;  // of what has no plans
 };
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
-const char* KindOf(const Controller& c) {
+std::string KindOf(const Controller& c) {
   if (c.computed()) return "computed";
-  if (c.actor == nullptr) return "q";
-  switch (c.actor->parts().output) {
-    case ActorOutput::kSquashedGaussian:
-      return "squashed-gaussian";
-    case ActorOutput::kClippedGaussian:
-      return "clipped-gaussian";
-    case ActorOutput::kCategorical:
-      return "categorical";
-  }
-  return "";
+  return c.learned->is_actor() ? NameOf(c.learned->parts().rule) : "q";
 }
 
 json About(const Controller& c, const std::map<std::string, std::string>& metadata) {
@@ -123,25 +106,25 @@ Plant PlantAt(const double* values) {
 void DecideByQ(const Controller& c, Matrix<const float> obs, Policy::Memory& memory,
                std::span<double> row) {
   std::vector<float> q(c.torques().size());
-  c.q->Act(obs, {row.data(), 1, 1}, memory);
-  c.q->Values(obs, {q.data(), 1, static_cast<int>(q.size())}, memory);
+  c.learned->Act(obs, {row.data(), 1, 1}, memory);
+  c.learned->Values(obs, {q.data(), 1, static_cast<int>(q.size())}, memory);
   // Q = V + A - mean(A), so that V is their mean; a plain network has none.
   const double sum = std::accumulate(q.begin(), q.end(), 0.0);
-  row[1] = c.q->shape().dueling ? sum / static_cast<double>(q.size()) : kNone;
+  row[1] = c.learned->parts().shape.dueling() ? sum / static_cast<double>(q.size()) : kNone;
   std::ranges::copy(q, row.data() + 2);
 }
 
 /// The torque of an actor, V of its critic, and what it would draw while it learns.
 void DecideByActor(const Controller& c, Matrix<const float> obs, Policy::Memory& memory,
                    std::span<double> row) {
-  std::vector<float> outputs(static_cast<size_t>(c.actor->num_outputs()));
+  std::vector<float> outputs(static_cast<size_t>(c.learned->num_outputs()));
   float value = static_cast<float>(kNone);
-  c.actor->Outputs(obs, {outputs.data(), 1, c.actor->num_outputs()}, memory);
-  c.actor->Choose(outputs, row.first(1));
-  if (c.actor->num_values() > 0) c.actor->Values(obs, {&value, 1, 1}, memory);
+  c.learned->Outputs(obs, {outputs.data(), 1, c.learned->num_outputs()}, memory);
+  c.learned->Choose(outputs, row.first(1));
+  if (c.learned->num_values() > 0) c.learned->Values(obs, {&value, 1, 1}, memory);
   row[1] = value;
   if (c.gaussian()) {
-    c.actor->Spread(outputs, row.subspan(2, 1), row.subspan(3, 1));
+    c.learned->Spread(outputs, row.subspan(2, 1), row.subspan(3, 1));
     std::ranges::copy(outputs, row.data() + 4);
   } else {
     const std::vector<double> logits(outputs.begin(), outputs.end());
@@ -220,13 +203,13 @@ int PolicyDecide(Controller* controller, Policy::Memory* episode, const float* o
     const std::span<double> row(to, c.columns());
     if (episode == nullptr && c.computed()) c.memory = policy.Start(1);
     Policy::Memory& memory = episode != nullptr ? *episode : *c.memory;
-    if (c.q != nullptr) {
-      DecideByQ(c, observation, memory, row);
-    } else if (c.actor != nullptr) {
-      DecideByActor(c, observation, memory, row);
-    } else {
+    if (c.computed()) {
       policy.Act(observation, {to, 1, 1}, memory);
       row[1] = kNone;
+    } else if (c.learned->is_actor()) {
+      DecideByActor(c, observation, memory, row);
+    } else {
+      DecideByQ(c, observation, memory, row);
     }
     if (!std::isfinite(row[0])) row[0] = 0;  // numbers that overflowed on the way move nothing
     return 1;
