@@ -6,10 +6,9 @@
 #include <vector>
 
 #include "core/thread_pool.h"
-#include "nn/adam.h"
-#include "nn/network.h"
 #include "rl/dqn_config.h"
 #include "rl/off_policy.h"
+#include "rl/trained_network.h"
 
 /// Deep Q-Network (Mnih et al., 2015) and its extensions, each a flag.
 ///
@@ -42,7 +41,7 @@ class Dqn : public OffPolicyAgent {
   std::unique_ptr<Policy> ExportPolicy(PolicyInfo info) const override;
   void State(const Archive& archive) override;
 
-  std::span<const float> online() const { return theta_; }
+  std::span<const float> online() const { return online_.theta(); }
   std::span<const float> target() const { return theta_target_; }
   double epsilon() const;
   void Update(const Minibatch& batch) override;
@@ -50,33 +49,21 @@ class Dqn : public OffPolicyAgent {
  private:
   /// TD errors of some rows of a minibatch, and the backward pass to the activations.
   void BackwardRows(const Minibatch& batch, RowRange rows);
-  /// Adds a minibatch to the sums of the metrics. Throws Failure if the loss is not finite.
-  void CountErrors(const Minibatch& batch);
   /// Moves theta_policy_ towards θ by Polyak averaging.
   void AveragePolicy();
 
   DqnConfig config_;
-  size_t obs_size_;
+  int D_, B_;
   std::vector<double> torques_;  // (A)
   ThreadPool& pool_;
 
-  Network network_;
-  AlignedVector<float> theta_, theta_target_;  // (num_parameters)
-  AlignedVector<float> theta_policy_;  // Polyak average of θ that is evaluated; see policy_tau
-  Adam adam_;
+  TrainedNetwork online_;
+  AlignedVector<float> theta_target_, theta_policy_;  // θ⁻; average of θ that is judged: policy_tau
   // Of an update: B rows.
-  Network::Activations activations_;
   AlignedVector<float> q_, q_select_, q_target_, dq_;  // (B × A)
   AlignedVector<float> y_, q_taken_;                   // (B) targets, Q(s, a)
-  AlignedVector<float> transposed_;
-  AlignedVector<float> gradient_;  // (num_parameters)
-  std::vector<float> squares_;     // of the gradient, by task
   Network::Activations act_activations_;
   AlignedVector<float> act_q_;  // (N × A) of the last Act
-
-  // Sums since TakeMetrics.
-  double loss_sum_ = 0, q_sum_ = 0, td_sum_ = 0, norm_sum_ = 0;
-  int64_t report_updates_ = 0;
 };
 
 }  // namespace upswing

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/error.h"
 #include "core/text.h"
+#include "rl/schedule.h"
 
 namespace upswing {
 
@@ -29,17 +31,13 @@ OffPolicyAgent::OffPolicyAgent(const OffPolicyConfig& config, const EnvSpec& spe
   }
 }
 
-double OffPolicyAgent::schedule() const {
-  return std::min(1.0,
-                  static_cast<double>(steps_) / static_cast<double>(settings_.learning_rate_steps));
-}
-
 double OffPolicyAgent::learning_rate() const {
-  return std::lerp(settings_.learning_rate, settings_.learning_rate_end, schedule());
+  return Scheduled(settings_.learning_rate, settings_.learning_rate_end, steps_,
+                   settings_.learning_rate_steps);
 }
 
 double OffPolicyAgent::importance_exponent() const {
-  return std::lerp(settings_.importance_exponent, 1.0, schedule());
+  return Scheduled(settings_.importance_exponent, 1.0, steps_, settings_.learning_rate_steps);
 }
 
 double OffPolicyAgent::AveragingTau(double tau) const {
@@ -88,6 +86,30 @@ void OffPolicyAgent::Learn() {
   }
 }
 
+void OffPolicyAgent::CountErrors(double loss, double q, double td_error) {
+  if (!std::isfinite(loss)) {
+    throw Failure(
+        Concat("the loss is ", loss, " in update ", updates_ + 1, ", expected a finite number"));
+  }
+  loss_sum_ += loss;
+  q_sum_ += q;
+  td_sum_ += td_error;
+  ++report_updates_;
+}
+
+void OffPolicyAgent::TakeMeans(Metrics& metrics) {
+  const double n = static_cast<double>(std::max<int64_t>(1, report_updates_));
+  const auto take = [&](const char* name, double& sum) {
+    metrics.emplace_back(name, sum / n);
+    sum = 0;
+  };
+  take("loss", loss_sum_);
+  take("q", q_sum_);
+  take("td_error", td_sum_);
+  take("gradient_norm", norm_sum_);
+  report_updates_ = 0;
+}
+
 void OffPolicyAgent::SharedState(const Archive& archive) {
   constexpr int64_t kMostUpdates = 100 * kMostSteps;  // updates_per_step is at most 100
   replay_.State(archive.In("replay"));
@@ -101,6 +123,12 @@ void OffPolicyAgent::SharedState(const Archive& archive) {
   archive.Scalar("updates", updates_, {0, kMostUpdates});
   archive.Check(updates_ == updates_due(), "updates",
                 Concat(updates_due(), ", which the steps imply"));
+  constexpr Bounds<double> kSum{0, std::numeric_limits<double>::max()};
+  archive.Scalar("report_updates", report_updates_, {0, updates_});
+  archive.Scalar("loss_sum", loss_sum_, kSum);
+  archive.Scalar("q_sum", q_sum_, kAnyNumber<double>);
+  archive.Scalar("td_sum", td_sum_, kSum);
+  archive.Scalar("norm_sum", norm_sum_, kSum);
 }
 
 }  // namespace upswing

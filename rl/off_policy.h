@@ -43,19 +43,23 @@ class OffPolicyAgent : public Agent {
   /// Polyak rate of the policy that is judged: `tau` times the learning rate over that at the
   /// beginning. As learning slows, the average lengthens (Polyak and Juditsky, 1992).
   double AveragingTau(double tau) const;
-  /// Saves or loads memory, streams of random numbers and counters. Throws BadInput, too, if they
-  /// contradict each other.
+  /// Adds the means over a minibatch of the loss, of Q and of |TD error| to the metrics. Throws
+  /// Failure if the loss is not finite.
+  void CountErrors(double loss, double q, double td_error);
+  /// Adds the metrics of all such agents: the means since the last call.
+  void TakeMeans(Metrics& metrics);
+  /// Saves or loads memory, streams of random numbers, counters and the sums of the metrics. Throws
+  /// BadInput, too, if they contradict each other.
   void SharedState(const Archive& archive);
 
   Rng explore_rng_;
   std::vector<float> act_action_;  // (N × A) of the last Act
   std::vector<float> td_error_;    // (B) of the last Update: Q(s, a) - y, or its size
   int64_t steps_ = 0, episodes_ = 0, updates_ = 0;
+  double norm_sum_ = 0;  // of the gradients' norms since TakeMeans
 
  private:
   int64_t updates_due() const;
-  /// Progress of the learning-rate schedule, 0 to 1.
-  double schedule() const;
 
   OffPolicyConfig settings_;
   ThreadTuner update_threads_;
@@ -66,7 +70,9 @@ class OffPolicyAgent : public Agent {
   Replay replay_;
   NStep n_step_;
   Minibatch batch_;
-  std::vector<float> act_obs_;  // (N × D) of the last Act
+  std::vector<float> act_obs_;                    // (N × D) of the last Act
+  double loss_sum_ = 0, q_sum_ = 0, td_sum_ = 0;  // since TakeMeans, of so many updates:
+  int64_t report_updates_ = 0;
 };
 
 }  // namespace upswing

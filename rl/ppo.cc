@@ -101,11 +101,6 @@ void Ppo::SetStd() {
   }
 }
 
-double Ppo::schedule() const {
-  return std::min(1.0,
-                  static_cast<double>(steps_) / static_cast<double>(config_.learning_rate_steps));
-}
-
 void Ppo::Act(Matrix<const float> obs, Matrix<double> action) {
   const int N = obs.rows();
   const Matrix<float> normal(act_obs_, N, D_);
@@ -208,12 +203,12 @@ void Ppo::Learn() {
     for (size_t i = order_.size(); i > 1; --i) {
       std::swap(order_[i - 1], order_[shuffle_rng_.Below(i)]);
     }
-    const double before = kl_sum_;
+    const double before = report_.kl;
     for (size_t first = 0; first < order_.size(); first += static_cast<size_t>(B_)) {
       const auto rows = std::span(order_).subspan(first, static_cast<size_t>(B_));
       update_threads_.Run([&] { Update(rows); });
     }
-    kl = (kl_sum_ - before) * static_cast<double>(B_) / static_cast<double>(order_.size());
+    kl = (report_.kl - before) * static_cast<double>(B_) / static_cast<double>(order_.size());
   }
   AdaptRate(kl);
   // From the next rollout on: this one's probabilities, old and new, were of the same statistics.

@@ -13,6 +13,7 @@
 #include "rl/normalizer.h"
 #include "rl/ppo_config.h"
 #include "rl/rollout_buffer.h"
+#include "rl/schedule.h"
 #include "rl/trained_network.h"
 
 /// Proximal policy optimisation (Schulman et al., 2017) with generalised advantages (Schulman et
@@ -47,9 +48,9 @@ class Ppo : public Agent {
   const Normalizer& normalizer() const { return normalizer_; }
 
  private:
-  /// Sums over some rows of a minibatch.
+  /// Sums over some rows of a minibatch, or means over minibatches.
   struct Sums {
-    double policy_loss = 0, value_loss = 0, entropy = 0, kl = 0, clipped = 0;
+    double policy_loss = 0, value_loss = 0, entropy = 0, kl = 0, clipped = 0, norm = 0;
     AlignedVector<float> dlog_std;  // (A) gradient with respect to ln σ
     void Clear();
     void Add(const Sums& other);
@@ -69,7 +70,7 @@ class Ppo : public Agent {
   void BackwardCritic(RowRange rows, Sums& sums);
   /// Steps of actor, ln σ and critic along their gradients.
   void Step(const Sums& sums);
-  /// Begins the metrics' sums anew if they have been reported. Until the next rollout has been
+  /// Clears the metrics' sums if they have been reported. Until the next rollout has been
   /// learned from, the last one's stand.
   void BeginSums();
   void CountUpdate(const Sums& sums);
@@ -77,11 +78,11 @@ class Ppo : public Agent {
   static constexpr Bounds<double> kRateFactor{1e-3, 10};
   /// The KL-adaptive learning rate, given KL(π_old ‖ π) of the last epoch.
   void AdaptRate(double kl);
-  /// Progress of the schedules, 0 to 1.
-  double schedule() const;
-  double scheduled_rate() const {
-    return std::lerp(config_.learning_rate, config_.learning_rate_end, schedule());
+  /// What goes from `begin` to `end` as the learning rate does.
+  double Now(double begin, double end) const {
+    return Scheduled(begin, end, steps_, config_.learning_rate_steps);
   }
+  double scheduled_rate() const { return Now(config_.learning_rate, config_.learning_rate_end); }
   int64_t updates_due() const;
   /// ln σ within its range, and σ.
   void SetStd();
@@ -119,10 +120,9 @@ class Ppo : public Agent {
   std::vector<Sums> sums_;                                                          // by slice
 
   int64_t steps_ = 0, updates_ = 0;
-  // Sums since the first update after TakeMetrics.
+  // Since the first update after TakeMetrics, each a sum of minibatches' means.
   bool reported_ = false;
-  double policy_loss_sum_ = 0, value_loss_sum_ = 0, entropy_sum_ = 0, kl_sum_ = 0;
-  double clipped_sum_ = 0, norm_sum_ = 0;
+  Sums report_;
   double explained_variance_ = 0;
   int64_t report_updates_ = 0;
 };

@@ -56,15 +56,12 @@ AlignedVector<float> WithLogStd(const Network& network, const AlignedVector<floa
 
 Metrics Ppo::TakeMetrics() {
   const double n = static_cast<double>(std::max<int64_t>(1, report_updates_));
-  Metrics metrics{{"updates", static_cast<double>(updates_)},
-                  {"learning_rate", learning_rate()},
-                  {"policy_loss", policy_loss_sum_ / n},
-                  {"value_loss", value_loss_sum_ / n},
-                  {"entropy", entropy_sum_ / n},
-                  {"kl", kl_sum_ / n},
-                  {"clip_share", clipped_sum_ / n},
-                  {"explained_variance", explained_variance_},
-                  {"gradient_norm", norm_sum_ / n}};
+  Metrics metrics{
+      {"updates", static_cast<double>(updates_)}, {"learning_rate", learning_rate()},
+      {"policy_loss", report_.policy_loss / n},   {"value_loss", report_.value_loss / n},
+      {"entropy", report_.entropy / n},           {"kl", report_.kl / n},
+      {"clip_share", report_.clipped / n},        {"explained_variance", explained_variance_},
+      {"gradient_norm", report_.norm / n}};
   if (!std_.empty()) {
     const double sum = std::accumulate(std_.begin(), std_.end(), 0.0);
     metrics.emplace_back("std", sum / static_cast<double>(std_.size()));
@@ -75,7 +72,7 @@ Metrics Ppo::TakeMetrics() {
 
 void Ppo::BeginSums() {
   if (!reported_) return;
-  policy_loss_sum_ = value_loss_sum_ = entropy_sum_ = kl_sum_ = clipped_sum_ = norm_sum_ = 0;
+  report_.Clear();
   report_updates_ = 0;
   reported_ = false;
 }
@@ -138,12 +135,12 @@ void Ppo::State(const Archive& archive) {
                 "updates", Concat(updates_due(), ", which the steps imply, and as many of Adam"));
   archive.Scalar("report_updates", report_updates_, {0, updates_});
   archive.Scalar("reported", reported_);
-  archive.Scalar("policy_loss_sum", policy_loss_sum_, kAnyNumber<double>);
-  archive.Scalar("value_loss_sum", value_loss_sum_, {0, kLargest});
-  archive.Scalar("entropy_sum", entropy_sum_, kAnyNumber<double>);
-  archive.Scalar("kl_sum", kl_sum_, kAnyNumber<double>);
-  archive.Scalar("clipped_sum", clipped_sum_, {0, kLargest});
-  archive.Scalar("norm_sum", norm_sum_, {0, kLargest});
+  archive.Scalar("policy_loss_sum", report_.policy_loss, kAnyNumber<double>);
+  archive.Scalar("value_loss_sum", report_.value_loss, {0, kLargest});
+  archive.Scalar("entropy_sum", report_.entropy, kAnyNumber<double>);
+  archive.Scalar("kl_sum", report_.kl, kAnyNumber<double>);
+  archive.Scalar("clipped_sum", report_.clipped, {0, kLargest});
+  archive.Scalar("norm_sum", report_.norm, {0, kLargest});
   archive.Scalar("explained_variance", explained_variance_, {-kLargest, 1});
 }
 

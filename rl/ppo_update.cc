@@ -13,7 +13,7 @@
 namespace upswing {
 
 void Ppo::Sums::Clear() {
-  policy_loss = value_loss = entropy = kl = clipped = 0;
+  policy_loss = value_loss = entropy = kl = clipped = norm = 0;
   std::ranges::fill(dlog_std, 0.0F);
 }
 
@@ -52,7 +52,7 @@ void Ppo::Update(std::span<const int64_t> rows) {
 
 void Ppo::Step(const Sums& sums) {
   const double max_norm = config_.max_gradient_norm;
-  norm_sum_ += actor_.Step(BatchObs(), learning_rate(), max_norm, {}, 0, pool_);
+  report_.norm += actor_.Step(BatchObs(), learning_rate(), max_norm, {}, 0, pool_);
   critic_.Step(BatchObs(), scheduled_rate(), max_norm, {}, 0, pool_);
   const double norm = std::sqrt(SquaredNorm(sums.dlog_std));
   log_std_adam_.Step({learning_rate(), norm, max_norm, 0}, sums.dlog_std, log_std_, {}, pool_);
@@ -94,7 +94,7 @@ void Ppo::BackwardActor(RowRange rows, Sums& sums) {
   // L = mean of -min(r A, clip(r) A) - c H
   const auto B = static_cast<float>(B_);
   const auto clip = static_cast<float>(config_.clip);
-  const double bonus = std::lerp(config_.entropy_bonus, config_.entropy_bonus_end, schedule());
+  const double bonus = Now(config_.entropy_bonus, config_.entropy_bonus_end);
   const float dentropy = -static_cast<float>(bonus) / B;
   AlignedVector<float> p(torques_.size());
   for (int i = rows.first; i < rows.first + rows.count; ++i) {
@@ -144,11 +144,11 @@ void Ppo::CountUpdate(const Sums& sums) {
                          ", the KL divergence ", sums.kl / B, " in update ", updates_ + 1,
                          ", expected finite numbers"));
   }
-  policy_loss_sum_ += sums.policy_loss / B;
-  value_loss_sum_ += sums.value_loss / B;
-  entropy_sum_ += sums.entropy / B;
-  kl_sum_ += sums.kl / B;
-  clipped_sum_ += sums.clipped / B;
+  report_.policy_loss += sums.policy_loss / B;
+  report_.value_loss += sums.value_loss / B;
+  report_.entropy += sums.entropy / B;
+  report_.kl += sums.kl / B;
+  report_.clipped += sums.clipped / B;
 }
 
 }  // namespace upswing

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "core/error.h"
 #include "core/text.h"
@@ -22,10 +21,7 @@ Sac::Sac(const SacConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
       bins_(static_cast<int>(config.bins), config.value_low, config.value_high),
       pool_(pool),
       noise_rng_(seed, "policy noise"),
-      actor_([&] {
-        Rng rng(seed, "initial actor");
-        return TrainedNetwork(config.Shape(D_, 2 * A_), B_, rng);
-      }()),
+      actor_(config.Shape(D_, 2 * A_), B_, Rng(seed, "initial actor")),
       theta_policy_(actor_.theta().begin(), actor_.theta().end()),
       log_alpha_(1, static_cast<float>(std::max(double{-kMostLogAlpha}, std::log(config.alpha)))),
       alpha_adam_(1),
@@ -45,8 +41,8 @@ Sac::Sac(const SacConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
       last_mean_(act_action_.size()),
       begins_(static_cast<size_t>(spec.num_envs), 1) {
   for (size_t i = 0; i < num_critics(); ++i) {
-    Rng rng(seed, "initial critic", i);
-    TrainedNetwork network(config.Shape(D_ + A_, bins_.outputs()), B_, rng);
+    TrainedNetwork network(config.Shape(D_ + A_, bins_.outputs()), B_,
+                           Rng(seed, "initial critic", i));
     AlignedVector<float> target(network.theta().begin(), network.theta().end());
     const AlignedVector<float> outputs(Size(B_, bins_.outputs())), value(y_.size());
     critics_.push_back(
@@ -90,19 +86,15 @@ double Sac::RewardOf(const StepResult& result, size_t env) {
 }
 
 Metrics Sac::TakeMetrics() {
-  const double n = static_cast<double>(std::max<int64_t>(1, report_updates_));
   const double actor_n = static_cast<double>(std::max<int64_t>(1, report_actor_updates_));
   Metrics metrics{{"updates", static_cast<double>(updates_)},
                   {"alpha", alpha()},
                   {"entropy", entropy_sum_ / actor_n},
-                  {"learning_rate", learning_rate()},
-                  {"loss", loss_sum_ / n},
-                  {"q", q_sum_ / n},
-                  {"td_error", td_sum_ / n},
-                  {"gradient_norm", norm_sum_ / n}};
+                  {"learning_rate", learning_rate()}};
+  TakeMeans(metrics);
   AddFeatureMetrics(critics_.front().network.features(), B_, config_.hidden.back(), metrics);
-  loss_sum_ = q_sum_ = td_sum_ = norm_sum_ = entropy_sum_ = 0;
-  report_updates_ = report_actor_updates_ = 0;
+  entropy_sum_ = 0;
+  report_actor_updates_ = 0;
   return metrics;
 }
 
@@ -120,7 +112,6 @@ std::unique_ptr<Policy> Sac::ExportPolicy(PolicyInfo info) const {
 }
 
 void Sac::State(const Archive& archive) {
-  constexpr Bounds<double> kSum{0, std::numeric_limits<double>::max()};
   constexpr Bounds<float> kUnitRange{-1, 1};
   actor_.State(archive.In("actor"));
   archive.Array("theta_policy", std::span(theta_policy_));
@@ -140,12 +131,7 @@ void Sac::State(const Archive& archive) {
                     critics_.back().network.steps() == updates_ && actor_.steps() == of_actor &&
                     alpha_adam_.steps() == (config_.tune_alpha ? of_actor : 0),
                 "updates", "as many steps of Adam");
-  archive.Scalar("report_updates", report_updates_, {0, updates_});
   archive.Scalar("report_actor_updates", report_actor_updates_, {0, of_actor});
-  archive.Scalar("loss_sum", loss_sum_, kSum);
-  archive.Scalar("q_sum", q_sum_, kAnyNumber<double>);
-  archive.Scalar("td_sum", td_sum_, kSum);
-  archive.Scalar("norm_sum", norm_sum_, kSum);
   archive.Scalar("entropy_sum", entropy_sum_, kAnyNumber<double>);
 }
 

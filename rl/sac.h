@@ -82,8 +82,8 @@ class Sac : public OffPolicyAgent {
   void UpdateTemperature();
   /// Q of some rows after their outputs: the output itself, or the mean of a categorical one.
   void ValueRows(Critic& critic, RowRange rows) const;
-  /// Adds a minibatch to the sums of the metrics. Throws Failure if the loss is not finite.
-  void CountErrors();
+  /// Adds a minibatch to the metrics and writes td_error_.
+  void CountMinibatch();
   /// Fills samples_' noise.
   void DrawNoise();
   static size_t Size(int rows, int cols) {
@@ -117,8 +117,8 @@ class Sac : public OffPolicyAgent {
   std::vector<int64_t> begins_;          // (N) 1 in the first step of an episode
 
   // Sums since TakeMetrics.
-  double loss_sum_ = 0, q_sum_ = 0, td_sum_ = 0, norm_sum_ = 0, entropy_sum_ = 0;
-  int64_t report_updates_ = 0, report_actor_updates_ = 0;
+  double entropy_sum_ = 0;
+  int64_t report_actor_updates_ = 0;
 };
 
 }  // namespace upswing

@@ -40,7 +40,6 @@ void SoftTargets(std::span<const float> q1, std::span<const float> q2,
 void Sac::Update(const Minibatch& batch) {
   UpdateCritics(batch);
   ++updates_;
-  ++report_updates_;
   if (updates_ % config_.actor_period == 0) UpdateActor(batch);
 }
 
@@ -119,7 +118,7 @@ void Sac::UpdateCritics(const Minibatch& batch) {
   DrawNoise();
   for (Critic& critic : critics_) critic.network.Prepare(pool_);
   ForSlices(pool_, B_, [&](RowRange rows) { CriticRows(batch, rows); });
-  CountErrors();
+  CountMinibatch();
   for (Critic& critic : critics_) {
     norm_sum_ += critic.network.Step({inputs_.data(), B_, D_ + A_}, learning_rate(),
                                      config_.max_gradient_norm, critic.target, config_.tau, pool_) /
@@ -194,7 +193,7 @@ void Sac::UpdateTemperature() {
   log_alpha_[0] = std::clamp(log_alpha_[0], -kMostLogAlpha, kMostLogAlpha);
 }
 
-void Sac::CountErrors() {
+void Sac::CountMinibatch() {
   double loss = 0, q = 0, td = 0;
   std::ranges::fill(td_error_, 0.0F);
   for (const Critic& critic : critics_) {
@@ -208,13 +207,7 @@ void Sac::CountErrors() {
     }
   }
   const double n = static_cast<double>(critics_.size() * y_.size());
-  if (!std::isfinite(loss)) {
-    throw Failure(
-        Concat("the loss is ", loss, " in update ", updates_ + 1, ", expected a finite number"));
-  }
-  loss_sum_ += loss / n;
-  q_sum_ += q / n;
-  td_sum_ += td / n;
+  CountErrors(loss / n, q / n, td / n);
 }
 
 }  // namespace upswing

@@ -5,7 +5,7 @@
 
 namespace upswing {
 
-TrainedNetwork::TrainedNetwork(const NetworkShape& shape, int batch, Rng& rng)
+TrainedNetwork::TrainedNetwork(const NetworkShape& shape, int batch, Rng rng)
     : TrainedNetwork(shape, batch, Adam::kEpsilon) {
   network_.Initialize(rng, theta_);
 }

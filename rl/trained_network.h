@@ -41,7 +41,7 @@ void ForSlices(ThreadPool& pool, int B, const Work& work) {
 class TrainedNetwork {
  public:
   /// With PyTorch's initial parameters.
-  TrainedNetwork(const NetworkShape& shape, int batch, Rng& rng);
+  TrainedNetwork(const NetworkShape& shape, int batch, Rng rng);
   /// With parameters of 0, which the caller fills, and this ε of Adam.
   TrainedNetwork(const NetworkShape& shape, int batch, double adam_epsilon);
 

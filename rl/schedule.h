@@ -1,0 +1,16 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+namespace upswing {
+
+/// A setting that goes linearly from `begin` to `end` over the first `length` steps and stays
+/// there.
+inline double Scheduled(double begin, double end, int64_t steps, int64_t length) {
+  return std::lerp(begin, end,
+                   std::min(1.0, static_cast<double>(steps) / static_cast<double>(length)));
+}
+
+}  // namespace upswing
