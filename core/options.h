@@ -45,8 +45,7 @@ struct Option {
   Decides decides = Decides::kTraining;
   std::vector<std::string> choices = {};  // texts only: allowed values; empty: any
   double step = 0;                        // numbers only: must be a multiple of it; 0: any number
-  // Whether a file that lacks it was made with the default, as all were before there was a choice.
-  bool implied = false;
+  bool implied = false;  // files of version 0.4.0 lack it and stand for its default
   bool read_only = false;  // of a const struct
   std::string usual = {};  // describes the default instead of the value; may be empty
 
