@@ -45,7 +45,8 @@ struct Option {
   Decides decides = Decides::kTraining;
   std::vector<std::string> choices = {};  // texts only: allowed values; empty: any
   double step = 0;                        // numbers only: must be a multiple of it; 0: any number
-  bool implied = false;  // files of version 0.4.0 lack it and stand for its default
+  // Whether files of version 0.4.0 may lack it: they were made with the default.
+  bool implied = false;
   bool read_only = false;  // of a const struct
   std::string usual = {};  // describes the default instead of the value; may be empty
 
