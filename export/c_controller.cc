@@ -13,7 +13,6 @@
 #include "export/c_task.h"
 #include "export/c_text.h"
 #include "setup/controllers.h"
-#include "setup/toml_settings.h"
 #include "sim/closed_form.h"
 
 namespace upswing {
@@ -30,8 +29,7 @@ constexpr double kUprightShare = 0.005;      // of that, at most, about upright
 ControllerConfig ConfigOf(const LoadedPolicy& loaded) {
   ControllerConfig config;
   config.plant = loaded.plant;
-  const Options options = OptionsOf(config);
-  ApplyTable(options, ParseToml(loaded.policy->info().config, loaded.name), loaded.name, false);
+  ApplyToml(OptionsOf(config), loaded.policy->info().config, loaded.name);
   return config;
 }
 
