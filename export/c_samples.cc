@@ -114,7 +114,7 @@ CSamples DrawSamples(const ExportedPolicy& policy, const std::vector<LayerView>&
     } while (!IsClear(outputs) && ++draws < kMostDraws);
     for (const double output : outputs) {
       if (std::abs(output) < kMostFloat) continue;
-      throw BadInput(Concat(policy.loaded->path.string(),
+      throw BadInput(Concat(policy.loaded->path,
                             ": expected outputs within the range of float, got ", output));
     }
     all_clear = all_clear && IsClear(outputs);
