@@ -1,14 +1,17 @@
 #!/usr/bin/env python3
 """Compiles core, nn, sim, rl, control and setup to WebAssembly, for the page.
 
-    build.py [MODULE]     writes MODULE, by default core.wasm beside this file
+    build.py [MODULE]     writes MODULE, by default core.wasm beside this file, and a record of what it
+                          was made of, by default core.txt
     build.py --versions   of what its bytes depend on, besides our sources
+    build.py --check      says whether core.wasm is that of the sources, by the hashes of its record
 
 The compiler is Zig's clang, the C++ library that which comes with it as source, compiled here with
 exceptions, as files from strangers are refused by one. ./upswing test installs what it needs in
 build/deps. The same versions give the same bytes on any machine.
 """
 
+import hashlib
 import os
 import re
 import subprocess
@@ -74,6 +77,11 @@ def named_agents():
     return template.replace("@AGENT_ENTRIES@", entries)
 
 
+def project_version():
+    return re.search(r"project\(upswing VERSION ([0-9.]+)",
+                     (ROOT / "CMakeLists.txt").read_text(encoding="utf-8"))[1]
+
+
 def versions():
     """Name and version of what is compiled with our sources."""
     def of(header, *names):
@@ -89,6 +97,47 @@ def versions():
                                  else "nlohmann/json.hpp", *json),
              "toml++": of("toml++/impl/version.h", *toml)}
     return ", ".join(f"{name} {version}" for name, version in found.items())
+
+
+def included(sources):
+    """The sources and our headers that they include, directly or not."""
+    found, left = set(), list(sources)
+    while left:
+        path = left.pop()
+        if path in found:
+            continue
+        found.add(path)
+        for name in re.findall(r'^\s*#\s*include "([^"]+)"', path.read_text(encoding="utf-8"), re.M):
+            left += [header for header in (ROOT / name, path.parent / name) if header.is_file()][:1]
+    return sorted(found)
+
+
+def sources_hash():
+    """SHA-256 of all that the module is made of: sources, headers, the named agents, the pinned versions
+    and this file, which holds the flags."""
+    text = hashlib.sha256()
+    for path in [*included([*own_sources(), ROOT / "setup/named_agents.cc.in"]),
+                 *sorted((ROOT / "configs").glob("*.toml")), Path(__file__).resolve()]:
+        data = path.read_bytes()
+        text.update(f"{path.relative_to(ROOT)} {len(data)}\n".encode() + data)
+    text.update(" ".join(map(str, (project_version(), ZIG.name, HIGHWAY.name))).encode())
+    return text.hexdigest()
+
+
+def record(module):
+    """The lines of a module's record: versions, hash of the sources, hash of the module."""
+    return [versions(), f"sources {sources_hash()}",
+            f"module {hashlib.sha256(module.read_bytes()).hexdigest()}"]
+
+
+def recorded(module):
+    """The lines that stand beside a module."""
+    return module.with_suffix(".txt").read_text(encoding="utf-8").splitlines()
+
+
+def is_recorded(module):
+    """Whether a module and the sources have the hashes of the module's record."""
+    return recorded(module)[1:] == record(module)[1:]
 
 
 def run(program, *arguments):
@@ -130,12 +179,10 @@ def jobs():
     agents.write_text(named_agents(), encoding="utf-8")
     tag = WORK / "exception_tag.s"
     tag.write_text(EXCEPTION_TAG, encoding="utf-8")
-    version = re.search(r"project\(upswing VERSION ([0-9.]+)",
-                        (ROOT / "CMakeLists.txt").read_text(encoding="utf-8"))[1]
     # Zig leaves files out of the C++ library's headers; what mentions them compiles with them, and
     # is not linked.
     own = ["-std=c++20", "-Wall", "-Wextra", "-Wpedantic", "-ffp-contract=off",
-           "-DTOML_FLOAT_CHARCONV=1", f'-DUPSWING_VERSION="{version}"',
+           "-DTOML_FLOAT_CHARCONV=1", f'-DUPSWING_VERSION="{project_version()}"',
            "-U_LIBCPP_HAS_FILESYSTEM", "-D_LIBCPP_HAS_FILESYSTEM=1", *include(ROOT),
            *(f"-isystem{folder}" for folder in (headers, HIGHWAY))]
     for source in [*own_sources(), agents]:
@@ -165,11 +212,14 @@ def make(module):
     run("cc", *TARGET, "-mexec-model=reactor", "-s", f"-Wl,--max-memory={MEMORY}",
         f"-Wl,-z,stack-size={STACK}", *objects, "-o", module.resolve())
     module.chmod(0o644)
-    module.with_suffix(".txt").write_text(f"{versions()}\n", encoding="utf-8")
+    module.with_suffix(".txt").write_text("\n".join(record(module)) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
     if sys.argv[1:] == ["--versions"]:
         print(versions())
+    elif sys.argv[1:] == ["--check"]:
+        if not is_recorded(HERE / "core.wasm"):
+            sys.exit("build.py: core.txt records other sources or another module: run web/wasm/build.py")
     else:
         make(Path(sys.argv[1]) if len(sys.argv) > 1 else HERE / "core.wasm")

@@ -1,10 +1,15 @@
 #!/usr/bin/env python3
-"""The page's module, web/wasm/core.wasm, is that of the sources: compiled again it has the same bytes.
+"""The page's module, web/wasm/core.wasm, is that of the sources.
 
-Skipped where the compiler is missing (./upswing test installs it), and where another version of a
-library is installed than those in core.txt, which makes other bytes.
+Its record, core.txt, holds a hash of the sources and one of the module. Where both are those of the
+files, nothing is compiled. Otherwise, and with UPSWING_COMPILE_WASM=1, the sources are compiled again
+and have to give the same bytes.
+
+A compilation is skipped where the compiler is missing (./upswing test installs it), and where another
+version of a library is installed than those in core.txt, which makes other bytes.
 """
 
+import os
 import sys
 import tempfile
 import unittest
@@ -12,25 +17,38 @@ from pathlib import Path
 
 import build
 
+MODULE = build.HERE / "core.wasm"
+COMPILES = os.environ.get("UPSWING_COMPILE_WASM") == "1" or not build.is_recorded(MODULE)
+
 
 class Module(unittest.TestCase):
+    @unittest.skipUnless(COMPILES, "core.txt records these sources and this module")
     def test_is_that_of_the_sources(self):
-        module = build.HERE / "core.wasm"
-        made_with = module.with_suffix(".txt").read_text(encoding="utf-8").strip()
         with tempfile.TemporaryDirectory(prefix="upswing-") as folder:
             again = Path(folder) / "core.wasm"
             build.make(again)
-            self.assertEqual(again.with_suffix(".txt").read_text(encoding="utf-8").strip(), made_with)
-            self.assertTrue(again.read_bytes() == module.read_bytes(),
+            self.assertTrue(again.read_bytes() == MODULE.read_bytes(),
                             "web/wasm/core.wasm is not that of the sources: run web/wasm/build.py, "
                             "and put the new module under version control")
+            self.assertEqual(build.recorded(again), build.recorded(MODULE),
+                             "web/wasm/core.txt is out of date: run web/wasm/build.py")
+
+    def test_every_source_and_header_counts(self):
+        names = {str(path.relative_to(build.ROOT)) for path in build.included(build.own_sources())}
+        self.assertLessEqual({"web/wasm/api.cc", "nn/linear.cc", "nn/linear.h", "rl/agent.h"}, names)
+        with tempfile.TemporaryDirectory(prefix="upswing-") as name:
+            folder = Path(name)
+            (folder / "a.cc").write_text('#include "b.h"\n', encoding="utf-8")
+            (folder / "b.h").write_text('#include <vector>\n  #  include "c.h"\n', encoding="utf-8")
+            (folder / "c.h").write_text('#include "b.h"\n', encoding="utf-8")
+            self.assertEqual([path.name for path in build.included([folder / "a.cc"])],
+                             ["a.cc", "b.h", "c.h"])
 
 
 if __name__ == "__main__":
-    if not build.ZIG.exists() or not build.HIGHWAY.exists():
+    if COMPILES and not (build.ZIG.exists() and build.HIGHWAY.exists()):
         sys.exit("skipped: the compiler is missing; ./upswing test installs it")
-    there = (build.HERE / "core.txt").read_text(encoding="utf-8").strip()
-    if build.versions() != there:
-        print(f"skipped: core.wasm is of {there}, here are {build.versions()}")
+    if COMPILES and build.versions() != build.recorded(MODULE)[0]:
+        print(f"skipped: core.wasm is of {build.recorded(MODULE)[0]}, here are {build.versions()}")
         sys.exit()
     unittest.main()
