@@ -6,7 +6,6 @@
 
 #include "apps/commands.h"
 #include "control/lqr_catch.h"
-#include "control/upright_modes.h"
 #include "core/error.h"
 #include "core/format.h"
 #include "core/simd.h"
@@ -23,6 +22,7 @@
 #include "setup/controllers.h"
 #include "setup/loaded_policy.h"
 #include "sim/double_pendulum.h"
+#include "sim/upright_modes.h"
 
 namespace upswing {
 namespace {

@@ -164,7 +164,7 @@ std::vector<BestEpisodeSearch::Found> BestEpisodeSearch::From(const StateVector&
                                                               std::span<const TorqueTable> tables) {
   // From here the same torques, and those of the mirror image, under feedback.
   const LqrConfig lqr;
-  const QuadraticCost cost(lqr.Q(), lqr.torque, upright_.lqr().P);
+  const QuadraticCost cost(WeightsOf(lqr), lqr.torque, upright_.lqr().P);
   std::vector<Eigen::RowVector4d> feedback;
   for (const Eigen::RowVector4d& K : gains_) feedback.emplace_back(-K);
   std::vector<Found> best(tables.size());

@@ -12,10 +12,6 @@
 namespace upswing {
 namespace {
 
-double Wrapped(double angle) {
-  return angle - 2 * std::numbers::pi * std::nearbyint(angle / (2 * std::numbers::pi));
-}
-
 PolicyInfo InfoOf(const std::string& kind, const Options& settings, const Plant& plant) {
   PolicyInfo info;
   info.agent = kind;

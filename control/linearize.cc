@@ -1,7 +1,5 @@
 #include "control/linearize.h"
 
-#include <Eigen/LU>
-
 #include "sim/manipulator.h"
 
 namespace upswing {
@@ -9,12 +7,12 @@ namespace upswing {
 LinearModel LinearizeUpright(const Manipulator& plant, int actuated_joint) {
   // M q̈ = e u + G q - D q̇, e the motor's joint. With cos q2 = 1 nothing of M is lost; gravity,
   // which pulls back hanging, pushes away; what is quadratic in the velocities has no part.
-  Eigen::Matrix2d M, G, D;
+  Eigen::Matrix2d inverse, G, D;
   const auto [M11, M12, M22] = plant.Mass(1);
-  M << M11, M12, M12, M22;
+  inverse << M22, -M12, -M12, M11;
+  inverse /= plant.Mass(1).det();
   G << plant.G1 + plant.G2, plant.G2, plant.G2, plant.G2;
   D << plant.d1, 0, 0, plant.d2;
-  const Eigen::Matrix2d inverse = M.inverse();
 
   LinearModel model;
   model.A << Eigen::Matrix2d::Zero(), Eigen::Matrix2d::Identity(), inverse * G, -inverse * D;

@@ -1,19 +1,11 @@
 #pragma once
 
-#include <Eigen/Core>
-
+#include "control/riccati.h"
 #include "sim/manipulator.h"
 
-/// The double pendulum as a linear system about upright at rest.
+/// The double pendulum as a linear system about upright at rest: x = [q1 - π, q2, w1, w2], rad and
+/// rad/s; u the torque of the motor, N·m, which is not limited here.
 namespace upswing {
-
-/// ẋ = A x + B u, or x⁺ = A x + B u over one control period.
-/// x = [q1 - π, q2, w1, w2]: deviation from upright at rest, rad and rad/s. u: torque of the
-/// motor, N·m, which is not limited here.
-struct LinearModel {
-  Eigen::Matrix4d A;
-  Eigen::Vector4d B;
-};
 
 /// The equations of motion, linearised about upright at rest: continuous time. Dry friction is left
 /// out: its slope at rest holds within 0.01 rad/s alone.

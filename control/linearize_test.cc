@@ -6,9 +6,9 @@
 #include <numbers>
 
 #include "control/testing.h"
-#include "control/upright_modes.h"
 #include "core/rng.h"
 #include "sim/closed_form.h"
+#include "sim/upright_modes.h"
 
 namespace upswing {
 namespace {
@@ -29,10 +29,7 @@ Plant DrawPlant(Rng& rng) {
 Eigen::Vector4d AfterOnePeriod(const Plant& plant, const Eigen::Vector4d& x, double tau) {
   ClosedFormBatch batch(1);
   batch.SetPlant(0, plant);
-  batch.q1[0] = std::numbers::pi + x[0];
-  batch.q2[0] = x[1];
-  batch.w1[0] = x[2];
-  batch.w2[0] = x[3];
+  batch.SetState(0, {std::numbers::pi + x[0], x[1], x[2], x[3]});
   batch.tau[0] = tau;
   Advance(batch, kPhysicsSteps, 0, 1);
   return {batch.q1[0] - std::numbers::pi, batch.q2[0], batch.w1[0], batch.w2[0]};
@@ -67,8 +64,8 @@ TEST(Linearize, EqualsAnotherDerivationHeldExactly) {
   // Runge-Kutta steps of 0.005 s leave out (0.005 A)⁵/120 and what follows.
   const RiccatiCase standard = SciPyCases().front();
   const LinearModel model = OverOnePeriod(Plant());
-  EXPECT_NEAR((model.A - standard.A).cwiseAbs().maxCoeff(), 6.16e-8, 1e-10);
-  EXPECT_NEAR((model.B - standard.B).cwiseAbs().maxCoeff(), 1.22e-8, 1e-10);
+  EXPECT_NEAR((model.A - standard.model.A).cwiseAbs().maxCoeff(), 6.16e-8, 1e-10);
+  EXPECT_NEAR((model.B - standard.model.B).cwiseAbs().maxCoeff(), 1.22e-8, 1e-10);
 }
 
 TEST(Linearize, ModesOfTheStandardPlant) {

@@ -5,10 +5,9 @@
 #include <cmath>
 
 #include "control/linearize.h"
-#include "control/riccati.h"
-#include "control/upright_modes.h"
 #include "core/error.h"
 #include "core/text.h"
+#include "sim/upright_modes.h"
 
 namespace upswing {
 namespace {
@@ -31,7 +30,8 @@ Error NoGain(const LqrConfig& config, const Plant& plant) {
     return BadInput(Concat(
         "lqr: no gain was found with these weights, which are too far apart: that of the torque "
         "is ",
-        Rounded(config.torque), ", the largest of the state ", Rounded(config.Q().maxCoeff())));
+        Rounded(config.torque), ", the largest of the state ",
+        Rounded(WeightsOf(config).maxCoeff())));
   }
   return BadInput(
       Concat("lqr: no gain was found that holds this plant upright: its unstable modes grow at ",
@@ -43,23 +43,15 @@ Error NoGain(const LqrConfig& config, const Plant& plant) {
 
 }  // namespace
 
-void LqrConfig::Describe(Options& o) {
-  constexpr Range kWeight{0, 1e9};
-  o.Section("lqr");
-  // Those of Tedrake's Acrobot.
-  o.Add(&q1, "lqr_q1", kWeight, "1/rad²", "weight of the angle of link 1 from upright");
-  o.Add(&q2, "lqr_q2", kWeight, "1/rad²", "weight of the angle of link 2 to link 1");
-  o.Add(&w1, "lqr_w1", kWeight, "s²/rad²", "weight of the velocity of q1");
-  o.Add(&w2, "lqr_w2", kWeight, "s²/rad²", "weight of the velocity of q2");
-  o.Add(&torque, "lqr_torque", kPositive, "1/(N·m)²", "weight of the torque");
+Eigen::Matrix4d WeightsOf(const LqrConfig& config) {
+  return Eigen::Vector4d(config.q1, config.q2, config.w1, config.w2).asDiagonal();
 }
 
 Lqr SolveLqr(const LqrConfig& config, const Plant& plant) {
   const LinearModel model = Discretize(LinearizeUpright(plant), kPhysicsTimestep, kPhysicsSteps);
-  const Eigen::MatrixXd R = Eigen::MatrixXd::Constant(1, 1, config.torque);
-  const auto P = SolveRiccati(model.A, model.B, config.Q(), R);
-  if (!P) throw NoGain(config, plant);
-  return {GainOf(*P, model.A, model.B, R), *P};
+  const auto lqr = SolveDiscreteLqr(model, WeightsOf(config), config.torque);
+  if (!lqr) throw NoGain(config, plant);
+  return *lqr;
 }
 
 LqrPolicy::LqrPolicy(LqrConfig config, const Plant& plant)

@@ -1,12 +1,11 @@
 #include "control/lqr_catch.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <vector>
 
-#include "control/riccati.h"
+#include "control/linearize.h"
 #include "core/error.h"
 #include "core/rng.h"
 
@@ -57,8 +56,8 @@ bool AllSettle(const Lqr& lqr, double level, const std::vector<Eigen::Vector4d>&
 }  // namespace
 
 double RegionOfAttraction(const Lqr& lqr, const Plant& plant) {
-  const Eigen::Matrix4d shape =
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d>(lqr.P).operatorInverseSqrt();
+  const auto [V, values] = SymmetricModesOf(lqr.P);
+  const Eigen::Matrix4d shape = V * values.cwiseSqrt().cwiseInverse().asDiagonal() * V.transpose();
   std::vector<Eigen::Vector4d> directions = Directions();
   for (Eigen::Vector4d& d : directions) d = shape * d;
 
@@ -69,8 +68,7 @@ double RegionOfAttraction(const Lqr& lqr, const Plant& plant) {
   };
   // From the level up to which the torque is within its limit, max |K x| over x' P x = level being
   // sqrt(level K P⁻¹ K'), by factors of 2 to where it changes, then by halves.
-  double low = plant.torque_limit * plant.torque_limit /
-               (lqr.K * lqr.P.inverse() * lqr.K.transpose()).value();
+  double low = plant.torque_limit * plant.torque_limit / (lqr.K * shape).squaredNorm();
   int factors = 0;
   while (!all_settle(low)) {
     if (++factors > 40) return 0;

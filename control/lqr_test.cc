@@ -28,12 +28,9 @@ template <typename Torque>
 Deviation Simulate(const Plant& plant, const Deviation& x, int periods, const Torque& torque) {
   ClosedFormBatch batch(1);
   batch.SetPlant(0, plant);
-  batch.q1[0] = kPi + x[0];
-  batch.q2[0] = x[1];
-  batch.w1[0] = x[2];
-  batch.w2[0] = x[3];
+  batch.SetState(0, {kPi + x[0], x[1], x[2], x[3]});
   for (int period = 0; period < periods; ++period) {
-    batch.tau[0] = torque(PendulumState{batch.q1[0], batch.q2[0], batch.w1[0], batch.w2[0]});
+    batch.tau[0] = torque(batch.state(0));
     Advance(batch, kPhysicsSteps, 0, 1);
   }
   return {batch.q1[0] - kPi, batch.q2[0], batch.w1[0], batch.w2[0]};

@@ -15,12 +15,6 @@ constexpr double kTolerance = 1e-6;  // of the cost, in an iteration
 
 }  // namespace
 
-void MpcConfig::Describe(Options& o) {
-  o.Section("mpc");
-  o.Add(&seconds, "mpc_seconds", {0.1, 10}, "s", "how far ahead it plans").step = kControlPeriod;
-  o.Add(&iterations, "mpc_iterations", {1, 1000}, "", "improvements of the plan at each decision");
-}
-
 /// The plans of some environments, and what improves one after the other.
 struct MpcPolicy::Plans : Memory {
   Plans(int num_envs, const Plant& plant)
@@ -38,7 +32,7 @@ MpcPolicy::MpcPolicy(LqrConfig lqr, MpcConfig config, const Plant& plant)
     : PendulumController("mpc", OptionsOfAll(lqr, config), plant),
       config_(config),
       lqr_(SolveLqr(lqr, plant)),
-      cost_(lqr.Q(), lqr.torque, lqr_.P) {}
+      cost_(WeightsOf(lqr), lqr.torque, lqr_.P) {}
 
 std::string MpcPolicy::description() const {
   return Concat("model predictive control, ", Rounded(config_.seconds), " s ahead, ",

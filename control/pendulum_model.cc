@@ -10,10 +10,7 @@ constexpr double kDifference = 1e-5;
 constexpr size_t kPerturbed = 10;
 
 void Set(ClosedFormBatch& batch, size_t i, const StateVector& x, double u) {
-  batch.q1[i] = x[0];
-  batch.q2[i] = x[1];
-  batch.w1[i] = x[2];
-  batch.w2[i] = x[3];
+  batch.SetState(i, StateOf(x));
   batch.tau[i] = u;
 }
 

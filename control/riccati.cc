@@ -1,75 +1,129 @@
 // The symbols are those of Chu, Fan, Lin, Wang (2004): A, G, H of each doubling.
 #include "control/riccati.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
-#include <Eigen/SVD>
+#include <cmath>
 #include <limits>
 
 namespace upswing {
-
-using Eigen::MatrixXd;
-
 namespace {
 
+using Eigen::Matrix4d;
+using Eigen::Vector4d;
+
 constexpr int kMostDoublings = 60;         // k of them span 2^k control steps
-constexpr double kLeastControl = 1e-9;     // see IsStabilizable
 constexpr double kLargestResidual = 1e-6;  // beyond it rounding has eaten the solution
 
-MatrixXd Symmetric(const MatrixXd& X) { return (X + X.transpose()) / 2; }
+Matrix4d Symmetric(const Matrix4d& X) { return (X + X.transpose()) / 2; }
 
-}  // namespace
-
-bool IsStabilizable(const MatrixXd& A, const MatrixXd& B) {
-  const Eigen::Index n = A.rows();
-  const Eigen::VectorXcd modes = A.eigenvalues();
-  for (Eigen::Index i = 0; i < n; ++i) {
-    if (std::abs(modes[i]) < 1) continue;
-    // a + bi as the real matrix [a, -b; b, a], which has its singular values, each twice.
-    const MatrixXd I = MatrixXd::Identity(n, n), zero = MatrixXd::Zero(n, B.cols());
-    MatrixXd pencil(2 * n, 2 * (n + B.cols()));
-    pencil << modes[i].real() * I - A, -modes[i].imag() * I, B, zero,  //
-        modes[i].imag() * I, modes[i].real() * I - A, zero, B;
-    const Eigen::VectorXd sizes = pencil.jacobiSvd().singularValues();
-    if (!(sizes.minCoeff() > kLeastControl * sizes.maxCoeff())) return false;
+/// W⁻¹ X, by Gauss's elimination with partial pivoting.
+Matrix4d Solve(Matrix4d W, Matrix4d X) {
+  for (int k = 0; k < 4; ++k) {
+    int pivot = k;
+    for (int i = k + 1; i < 4; ++i) {
+      if (std::abs(W(i, k)) > std::abs(W(pivot, k))) pivot = i;
+    }
+    W.row(k).swap(W.row(pivot));
+    X.row(k).swap(X.row(pivot));
+    for (int i = k + 1; i < 4; ++i) {
+      const double factor = W(i, k) / W(k, k);
+      W.row(i) -= factor * W.row(k);
+      X.row(i) -= factor * X.row(k);
+    }
   }
-  return true;
+  for (int k = 3; k >= 0; --k) {
+    for (int j = k + 1; j < 4; ++j) X.row(k) -= W(k, j) * X.row(j);
+    X.row(k) /= W(k, k);
+  }
+  return X;
 }
 
-std::optional<MatrixXd> SolveRiccati(const MatrixXd& A, const MatrixXd& B, const MatrixXd& Q,
-                                     const MatrixXd& R) {
-  if (!IsStabilizable(A, B)) return std::nullopt;
-  const MatrixXd I = MatrixXd::Identity(A.rows(), A.cols());
-  MatrixXd A_k = A;
-  MatrixXd G = B * R.llt().solve(B.transpose());
-  MatrixXd H = Q;  // after k doublings the least cost of 2^k steps, without a cost of their end
+/// The limit of H, nothing if there is none. After k doublings H is the least cost of 2^k steps,
+/// without a cost of their end.
+std::optional<Matrix4d> Doubled(Matrix4d A, Matrix4d G, Matrix4d H) {
   for (int k = 0; k < kMostDoublings; ++k) {
-    const Eigen::PartialPivLU<MatrixXd> W(I + G * H);
-    const MatrixXd WA = W.solve(A_k);
-    const MatrixXd longer = A_k.transpose() * H * WA;
-    G += Symmetric(A_k * W.solve(G) * A_k.transpose());
+    const Matrix4d W = Matrix4d::Identity() + G * H;
+    const Matrix4d WA = Solve(W, A);
+    const Matrix4d longer = A.transpose() * H * WA;
+    G += Symmetric(A * Solve(W, G) * A.transpose());
     H += Symmetric(longer);
-    A_k = A_k * WA;
+    A = (A * WA).eval();
     if (!H.allFinite() || !G.allFinite()) return std::nullopt;
     if (longer.norm() <= std::numeric_limits<double>::epsilon() * H.norm()) break;
   }
-  const bool solved = RiccatiResidual(H, A, B, Q, R) <= kLargestResidual;
-  if (!solved || SpectralRadius(A - B * GainOf(H, A, B, R)) >= 1) return std::nullopt;
   return H;
 }
 
-MatrixXd GainOf(const MatrixXd& P, const MatrixXd& A, const MatrixXd& B, const MatrixXd& R) {
-  return (R + B.transpose() * P * B).llt().solve(B.transpose() * P * A);
+}  // namespace
+
+std::optional<Lqr> SolveDiscreteLqr(const LinearModel& model, const Matrix4d& Q, double R) {
+  const auto& [A, B] = model;
+  const auto P = Doubled(A, B * B.transpose() / R, Q);
+  if (!P) return std::nullopt;
+  const Eigen::RowVector4d K = B.transpose() * *P * A / (R + B.dot(*P * B));
+  const Matrix4d right = Q + A.transpose() * *P * (A - B * K);
+  const bool solved = (right - *P).norm() <= kLargestResidual * P->norm();
+  if (!solved || !(SpectralRadius(A - B * K) < 1)) return std::nullopt;
+  return Lqr{K, *P};
 }
 
-double SpectralRadius(const MatrixXd& A) { return A.eigenvalues().cwiseAbs().maxCoeff(); }
+std::optional<Lqr> SolveContinuousLqr(const LinearModel& model, const Matrix4d& Q, double R) {
+  const auto& [A, B] = model;
+  const Matrix4d I = Matrix4d::Identity(), G = B * B.transpose() / R;
+  const double gamma = A.norm();  // beyond all eigenvalues of A
+  const Matrix4d inverse = Solve(A - gamma * I, I);
+  const Matrix4d W = (A - gamma * I).transpose() + Q * inverse * G;
+  const Matrix4d W_inverse = Solve(W, I);
+  const auto P =
+      Doubled(I + 2 * gamma * W_inverse.transpose(), Symmetric(2 * gamma * inverse * G * W_inverse),
+              Symmetric(2 * gamma * W_inverse * Q * inverse));
+  if (!P) return std::nullopt;
+  const Matrix4d residual = A.transpose() * *P + *P * A - *P * G * *P + Q;
+  const double size = (*P * A).norm() + Q.norm();
+  if (!(residual.norm() <= kLargestResidual * size)) return std::nullopt;
+  return Lqr{B.transpose() * *P / R, *P};
+}
 
-double RiccatiResidual(const MatrixXd& P, const MatrixXd& A, const MatrixXd& B, const MatrixXd& Q,
-                       const MatrixXd& R) {
-  const MatrixXd right = Q + A.transpose() * P * (A - B * GainOf(P, A, B, R));
-  const double size = P.norm();
-  return size > 0 ? (right - P).norm() / size : (right - P).norm();
+double SpectralRadius(const Matrix4d& A) {
+  // Gelfand's formula, ‖Aⁿ‖^(1/n) with n = 2^k. Sizes are taken out and summed as logarithms.
+  constexpr int kSquarings = 55;  // beyond them 1/n is less than a rounding
+  Matrix4d power = A;
+  double logarithm = 0, share = 1;
+  for (int k = 0; k < kSquarings; ++k, share /= 2) {
+    const double size = power.norm();
+    if (size == 0) return 0;
+    power /= size;
+    logarithm += share * std::log(size);
+    power = (power * power).eval();
+  }
+  return std::exp(logarithm);
+}
+
+SymmetricModes SymmetricModesOf(Matrix4d S) {
+  constexpr int kSweeps = 30;
+  Matrix4d V = Matrix4d::Identity();
+  bool rotated = true;
+  for (int sweep = 0; sweep < kSweeps && rotated; ++sweep) {
+    rotated = false;
+    for (int p = 0; p < 4; ++p) {
+      for (int q = p + 1; q < 4; ++q) {
+        if (std::abs(S(p, q)) <= 1e-18 * std::sqrt(std::abs(S(p, p) * S(q, q)))) continue;
+        const double theta = (S(q, q) - S(p, p)) / (2 * S(p, q));
+        const double t = (theta < 0 ? -1 : 1) / (std::abs(theta) + std::hypot(theta, 1));
+        const double c = 1 / std::hypot(t, 1), s = t * c;
+        const auto rotate = [&](auto&& one, auto&& two) {
+          const Vector4d before = one;
+          one = c * before - s * two;
+          two = s * before + c * two;
+        };
+        rotate(S.col(p), S.col(q));
+        rotate(S.row(p).transpose(), S.row(q).transpose());
+        rotate(V.col(p), V.col(q));
+        S(p, q) = S(q, p) = 0;  // without what rounding leaves
+        rotated = true;
+      }
+    }
+  }
+  return {V, S.diagonal()};
 }
 
 }  // namespace upswing

@@ -1,34 +1,57 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <optional>
 
-/// The discrete algebraic Riccati equation
-///   P = Q + A' P A - A' P B (R + B' P B)⁻¹ B' P A.
-/// Shapes: A, Q, P (n × n), B (n × m), R (m × m); Q ≥ 0 and R > 0, both symmetric.
+/// Linear-quadratic regulators of four states and one input by algebraic Riccati equations.
 namespace upswing {
 
-/// Whether every mode of x⁺ = A x + B u that does not decay can be reached by u, by the test of
-/// Popov, Belevitch and Hautus: [λI - A, B] has full rank. Numerically: the smallest singular value
-/// is above 1e-9 times the largest.
-bool IsStabilizable(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);
+/// ẋ = A x + B u, or x⁺ = A x + B u over one control period.
+struct LinearModel {
+  Eigen::Matrix4d A;
+  Eigen::Vector4d B;
+};
 
-/// The stabilising solution P, by structure-preserving doubling: Chu, Fan, Lin, Wang,
-/// "Structure-preserving algorithms for periodic discrete-time algebraic Riccati equations",
-/// International Journal of Control 77 (2004), algorithm 2.1. Nothing where there is none: (A, B)
-/// cannot be stabilised, or Q does not see every mode that has to be.
-std::optional<Eigen::MatrixXd> SolveRiccati(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B,
-                                            const Eigen::MatrixXd& Q, const Eigen::MatrixXd& R);
+/// The regulator u = -K x and its least cost x' P x.
+struct Lqr {
+  Eigen::RowVector4d K;  // N·m/rad and N·m·s/rad
+  Eigen::Matrix4d P;
 
-/// The gain of u = -K x (m × n) that belongs to a solution: (R + B' P B)⁻¹ B' P A.
-Eigen::MatrixXd GainOf(const Eigen::MatrixXd& P, const Eigen::MatrixXd& A, const Eigen::MatrixXd& B,
-                       const Eigen::MatrixXd& R);
+  /// u (N·m) of a deviation x from upright.
+  double Torque(const Eigen::Vector4d& x) const { return -K.dot(x); }
+  /// The torque within ±limit.
+  double Torque(const Eigen::Vector4d& x, double limit) const {
+    return std::clamp(Torque(x), -limit, limit);
+  }
+  /// The least cost from x on.
+  double Cost(const Eigen::Vector4d& x) const { return x.dot(P * x); }
+};
 
-/// Largest |eigenvalue|: x⁺ = A x decays where it is below 1.
-double SpectralRadius(const Eigen::MatrixXd& A);
+/// Minimises Σ x' Q x + R u² of x⁺ = A x + B u, Q ≥ 0 and symmetric, R > 0:
+///   P = Q + A' P A - A' P B (R + B' P B)⁻¹ B' P A
+/// by structure-preserving doubling: Chu, Fan, Lin, Wang, "Structure-preserving algorithms for
+/// periodic discrete-time algebraic Riccati equations", International Journal of Control 77 (2004),
+/// algorithm 2.1. Nothing where there is no solution: (A, B) cannot be stabilised, or Q does not
+/// see every mode that has to be.
+std::optional<Lqr> SolveDiscreteLqr(const LinearModel& model, const Eigen::Matrix4d& Q, double R);
 
-/// Norm of the difference of the equation's two sides, over that of P.
-double RiccatiResidual(const Eigen::MatrixXd& P, const Eigen::MatrixXd& A, const Eigen::MatrixXd& B,
-                       const Eigen::MatrixXd& Q, const Eigen::MatrixXd& R);
+/// Minimises ∫ x' Q x + R u² dt of ẋ = A x + B u:
+///   A' P + P A - P B R⁻¹ B' P + Q = 0
+/// by the same doubling after a Cayley transform: Chu, Fan, Lin, "A structure-preserving doubling
+/// algorithm for continuous-time algebraic Riccati equations", Linear Algebra and its Applications
+/// 396 (2005). Nothing where there is no solution.
+std::optional<Lqr> SolveContinuousLqr(const LinearModel& model, const Eigen::Matrix4d& Q, double R);
+
+/// Largest |eigenvalue|: x⁺ = A x decays where it is below 1. NaN if A is not finite.
+double SpectralRadius(const Eigen::Matrix4d& A);
+
+/// The modes of a symmetric matrix S = V diag(values) V', V orthogonal.
+struct SymmetricModes {
+  Eigen::Matrix4d V;
+  Eigen::Vector4d values;
+};
+/// By cyclic Jacobi rotations: Golub, Van Loan, "Matrix Computations" (2013), section 8.5.
+SymmetricModes SymmetricModesOf(Eigen::Matrix4d S);
 
 }  // namespace upswing

@@ -5,26 +5,12 @@
 #include <utility>
 
 #include "control/controller.h"
+#include "control/settings.h"
 #include "sim/manipulator.h"
 
 /// Swing-up by laws of a formula each. They know nothing of the motor's limit; LQR catches what
 /// they bring up (control/hybrid.h).
 namespace upswing {
-
-/// Weights of the energy law.
-struct EnergyShapingConfig {
-  double kE = 0.0018, kD = 0.00067,
-         kP = 0.27;  // of energy (1/(J²·s)), velocity (s) and angle of link 1 (1/s)
-
-  void Describe(Options& options);
-};
-
-/// Gains of partial feedback linearisation.
-struct PartialFeedbackConfig {
-  double kP = 4, kD = 7, kE = 3;  // 1/s², 1/s, 1/(J·s)
-
-  void Describe(Options& options);
-};
 
 /// Drives energy E to that of rest upright and link 1 to upright, so that link 2 swings through
 /// upright again and again: Fantoni, Lozano, Spong, "Energy based control of the Pendubot", IEEE

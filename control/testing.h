@@ -6,23 +6,28 @@
 #include <string>
 #include <vector>
 
+#include "control/riccati.h"
 #include "core/json.h"
 
 /// What tests of controllers share.
 namespace upswing {
 
-/// An equation of control/riccati.h, and what SciPy says of it (testdata/make_riccati.py).
+/// A problem of control/riccati.h, and what SciPy says of it (testdata/make_riccati.py).
 struct RiccatiCase {
   std::string name;
-  Eigen::MatrixXd A, B, Q, R, P;
+  LinearModel model;
+  Eigen::Matrix4d Q;
+  double R;
+  Eigen::Matrix4d P;
   double spectral_radius;  // of A - B K
 };
 
-inline Eigen::MatrixXd MatrixOf(const nlohmann::json& rows) {
-  Eigen::MatrixXd matrix(rows.size(), rows.at(0).size());
-  for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
-    for (Eigen::Index j = 0; j < matrix.cols(); ++j) {
-      matrix(i, j) = rows.at(static_cast<size_t>(i)).at(static_cast<size_t>(j)).get<double>();
+/// A matrix of at most four rows and columns, with zeros around it.
+inline Eigen::Matrix4d MatrixOf(const nlohmann::json& rows) {
+  Eigen::Matrix4d matrix = Eigen::Matrix4d::Zero();
+  for (size_t i = 0; i < rows.size(); ++i) {
+    for (size_t j = 0; j < rows[i].size(); ++j) {
+      matrix(static_cast<int>(i), static_cast<int>(j)) = rows[i][j].get<double>();
     }
   }
   return matrix;
@@ -33,13 +38,19 @@ inline nlohmann::json TestData(const char* name) {
   return nlohmann::json::parse(std::ifstream(folder / "testdata" / name));
 }
 
-/// All cases; those of the pendulum first, and the standard one first of all.
+/// All cases of one input and at most four states; those of the pendulum first, and the standard
+/// one first of all.
 inline std::vector<RiccatiCase> SciPyCases() {
   std::vector<RiccatiCase> cases;
   const nlohmann::json file = TestData("riccati.json");
   for (const auto& c : file.at("cases")) {
-    cases.push_back({c.at("name"), MatrixOf(c.at("A")), MatrixOf(c.at("B")), MatrixOf(c.at("Q")),
-                     MatrixOf(c.at("R")), MatrixOf(c.at("P")), c.at("spectral_radius")});
+    if (c.at("A").size() > 4 || c.at("R").size() > 1) continue;
+    cases.push_back({c.at("name"),
+                     {MatrixOf(c.at("A")), MatrixOf(c.at("B")).col(0)},
+                     MatrixOf(c.at("Q")),
+                     c.at("R").at(0).at(0),
+                     MatrixOf(c.at("P")),
+                     c.at("spectral_radius")});
   }
   return cases;
 }

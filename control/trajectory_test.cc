@@ -12,7 +12,7 @@ namespace upswing {
 namespace {
 
 QuadraticCost StandardCost(const LqrConfig& config, const Plant& plant) {
-  return {config.Q(), config.torque, SolveLqr(config, plant).P};
+  return {WeightsOf(config), config.torque, SolveLqr(config, plant).P};
 }
 
 TEST(Trajectory, EqualsSciPyWhereThePendulumIsLinear) {

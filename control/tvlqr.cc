@@ -23,14 +23,6 @@ constexpr double kCheaper = 0.25;
 
 }  // namespace
 
-void SwingUpConfig::Describe(Options& o) {
-  o.Section("tvlqr");
-  o.Add(&seconds, "tvlqr_seconds", {0.2, 30}, "s", "length of the planned swing-up").step =
-      kControlPeriod;
-  o.Add(&reserve, "tvlqr_reserve", {0, 0.9}, "",
-        "share of the motor's torque that the plan leaves to the feedback");
-}
-
 std::optional<Trajectory> GuessSwingUp(const LqrConfig& lqr, const LqrCatch& upright, int steps,
                                        Rng& rng, TrajectoryOptimizer& optimizer) {
   const double limit = optimizer.model().plant().torque_limit;
@@ -42,7 +34,7 @@ std::optional<Trajectory> GuessSwingUp(const LqrConfig& lqr, const LqrCatch& upr
   for (size_t t = 0; t < length; ++t) {
     torques.push_back(amplitude * std::sin(rate * kControlPeriod * static_cast<double>(t) + phase));
   }
-  const QuadraticCost cost(price * lqr.Q(), price * lqr.torque, upright.lqr().P);
+  const QuadraticCost cost(price * WeightsOf(lqr), price * lqr.torque, upright.lqr().P);
   Trajectory trajectory = optimizer.Follow(cost, StateVector::Zero(), torques);
   optimizer.Improve(cost, kTolerance, kIterations, trajectory);
   if (!upright.Holds(UprightDeviation(trajectory.x.back()), optimizer.model())) return {};
@@ -58,7 +50,7 @@ std::optional<Trajectory> GuessSwingUp(const LqrConfig& lqr, const LqrCatch& upr
 
 SwingUp PlanSwingUp(const LqrConfig& lqr, const SwingUpConfig& config, const LqrCatch& upright,
                     const Plant& plant) {
-  const QuadraticCost cost(lqr.Q(), lqr.torque, upright.lqr().P);
+  const QuadraticCost cost(WeightsOf(lqr), lqr.torque, upright.lqr().P);
   const int steps = static_cast<int>(std::lround(config.seconds / kControlPeriod));
   Plant weaker = plant;
   weaker.torque_limit *= 1 - config.reserve;
@@ -95,7 +87,7 @@ SwingUp Tracking(Trajectory trajectory, const LqrConfig& lqr, const Eigen::Matri
     const auto& [A, B] = models[t];
     const Eigen::Matrix4d PA = plan.P[t + 1] * A;
     plan.K[t] = B.transpose() * PA / (lqr.torque + B.dot(plan.P[t + 1] * B));
-    plan.P[t] = lqr.Q() + A.transpose() * PA - PA.transpose() * B * plan.K[t];
+    plan.P[t] = WeightsOf(lqr) + A.transpose() * PA - PA.transpose() * B * plan.K[t];
     plan.P[t] = (plan.P[t] + plan.P[t].transpose()).eval() / 2;
   }
   return plan;

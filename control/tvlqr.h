@@ -10,16 +10,6 @@
 
 namespace upswing {
 
-/// How the swing-up is planned. The cost is that of the regulator, over the plan's time, and its
-/// x' P x at the end.
-struct SwingUpConfig {
-  double seconds = 4;    // length of the plan
-  double reserve = 0.2;  // share of the motor's torque that the plan leaves to the feedback
-
-  /// One line per setting: name, range, unit, help.
-  void Describe(Options& options);
-};
-
 /// A swing-up from hanging at rest, and how to stay near it.
 struct SwingUp {
   Trajectory trajectory;

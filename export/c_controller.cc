@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "control/tvlqr.h"
 #include "core/error.h"
 #include "core/rng.h"
 #include "core/text.h"

@@ -116,6 +116,11 @@ PageAgent ReadAgent(const fs::path& path, const std::string& given_id, int64_t c
                           ": expected a policy for a motor at joint 1, as the page's pendulum has "
                           "it, got one for joint 2"));
   }
+  if (loaded.plant.rotor_inertia != 0 || loaded.plant.has_dry_friction()) {
+    throw BadInput(Concat(where,
+                          ": expected a policy for a plant without rotors and dry friction, which "
+                          "the page's pendulum does not have"));
+  }
   const fs::path run = RunOf(loaded.path);
   std::string id = CleanId(run.filename().string());
   if (id.empty()) id = CleanId(loaded.policy->info().agent);

@@ -7,7 +7,7 @@
 
 #include "core/error.h"
 #include "core/text.h"
-#include "sim/identification.h"
+#include "sim/upright_modes.h"
 
 namespace upswing {
 namespace {
@@ -39,8 +39,7 @@ std::vector<std::pair<std::string, std::string>> Cells(const EvalReport& report,
   for (size_t i = 0; i < episode.start.size(); ++i) add(spec.state_names[i], episode.start[i]);
   if (HasPlant(spec.task)) {
     for (const auto& [name, value] : PlantValues(episode.plant)) add(name, value);
-    const auto joint = static_cast<int>(episode.plant.actuated_joint);
-    const double delta = PassiveJointOf(ManipulatorOf(episode.plant), joint).delta;
+    const double delta = ModesOf(episode.plant).delta;
     add("delta", delta, std::isfinite(delta));
     add("sensor_noise", episode.disturbance.sensor_noise);
     add("delay", episode.disturbance.delay);

@@ -46,13 +46,6 @@ PendulumState RandomState(Rng& rng) {
   return {rng.Uniform(-4, 4), rng.Uniform(-4, 4), rng.Uniform(-8, 8), rng.Uniform(-8, 8)};
 }
 
-void SetState(ClosedFormBatch& batch, size_t i, const PendulumState& s) {
-  batch.q1[i] = s.q1;
-  batch.q2[i] = s.q2;
-  batch.w1[i] = s.w1;
-  batch.w2[i] = s.w2;
-}
-
 std::array<double, 4> StateOf(const ClosedFormBatch& batch, size_t i) {
   return {batch.q1[i], batch.q2[i], batch.w1[i], batch.w2[i]};
 }
@@ -120,7 +113,7 @@ TEST(ClosedForm, StepsLikeMuJoCoOverTheWholeRangeOfPlants) {
     const PendulumState s = RandomState(rng);
     torque.push_back(rng.Uniform(-1.2, 1.2) * plant.torque_limit);
     start.SetPlant(i, plant);
-    SetState(start, i, s);
+    start.SetState(i, s);
     expected.push_back(StepOfMuJoCo(plant, s, torque.back()));
   }
   start.SetTorque(torque);
@@ -151,7 +144,7 @@ TEST(ClosedForm, FollowsMuJoCosReferenceTrajectoryFor10Seconds) {
   ASSERT_EQ(rows.size(), 501);
   OnEachPath([&](const std::string&) {
     ClosedFormBatch batch(1);
-    SetState(batch, 0, {rows[0][1], rows[0][2], rows[0][3], rows[0][4]});
+    batch.SetState(0, {rows[0][1], rows[0][2], rows[0][3], rows[0][4]});
     for (const auto& [t, q1, q2, w1, w2, torque] : rows) {
       const std::array expected{q1, q2, w1, w2};
       for (size_t k = 0; k < 4; ++k) ASSERT_NEAR(StateOf(batch, 0)[k], expected[k], 1e-9) << t;
@@ -203,7 +196,7 @@ TEST(ClosedForm, JudgesAsTheFormulasDo) {
     PendulumState s = RandomState(rng);
     if (i % 4 == 0) s.q2 = rng.Uniform(0.8, 1.2) * kPi - s.q1;  // more of them inverted
     if (i % 4 == 0) s.q1 = rng.Uniform(0.8, 1.2) * kPi;
-    SetState(batch, i, s);
+    batch.SetState(i, s);
     batch.angle_before[i] = MotorAngle(plants[i], s) - rng.Uniform(-0.1, 0.1);
   }
   batch.SetTorque(torque);
@@ -255,7 +248,7 @@ TEST(ClosedForm, PlaceAndNumberOfEnvironmentsChangeNoBit) {
     ClosedFormBatch batch(n);
     for (size_t i = 0; i < n; ++i) {
       batch.SetPlant(i, plants[first + i]);
-      SetState(batch, i, states[first + i]);
+      batch.SetState(i, states[first + i]);
     }
     StepResult result = ResultOf(static_cast<int>(n));
     batch.SetTorque(std::vector<double>(n, 1.5));
@@ -300,7 +293,7 @@ TEST(ClosedForm, NaNAndNumbersBeyondMuJoCosLimitAreBlowUps) {
                                           {2e10, 0, 0, 0}, {0, 0, 9e9, 0},  {0, 0, 0, -2e10}};
   const std::vector<uint8_t> expected{0, 1, 1, 1, 1, 1, 1, 0, 1};
   ClosedFormBatch batch(states.size());
-  for (size_t i = 0; i < states.size(); ++i) SetState(batch, i, states[i]);
+  for (size_t i = 0; i < states.size(); ++i) batch.SetState(i, states[i]);
   OnEachPath([&](const std::string&) {
     StepResult result = ResultOf(static_cast<int>(states.size()));
     Judge(batch, RewardWeights(), 0, states.size(), result);

@@ -14,7 +14,6 @@
 #include "core/json.h"
 #include "core/text.h"
 #include "io/tensor_file.h"
-#include "realaigym/linear.h"
 #include "report/figure.h"
 #include "run/find_policy.h"
 #include "setup/controllers.h"
@@ -83,15 +82,13 @@ class PolicyController : public BoardController {
 class RegulatorController : public BoardController {
  public:
   explicit RegulatorController(Robot robot)
-      : K_(SolveBoardRegulator(LinearizeUpright(BoardPlant(), robot), {0.97, 0.93, 0.39, 0.26},
-                               0.11)
-               .K) {}
+      : K_(SolveBoardLqr(robot, {0.97, 0.93, 0.39, 0.26}, 0.11).K) {}
 
   void Act(int /*step*/, const BoardMeasurement& m, size_t count, Lanes& torque) override {
     for (size_t lane = 0; lane < count; ++lane) {
       const auto [e1, e2] = Lean({m.q1[lane], m.q2[lane], 0, 0});
       // Lean has the second link's absolute angle.
-      const double q2 = std::remainder(e2 - e1, 2 * std::acos(-1.0));
+      const double q2 = Wrapped(e2 - e1);
       torque[lane] = -(K_[0] * e1 + K_[1] * q2 + K_[2] * m.w1[lane] + K_[3] * m.w2[lane]);
     }
   }

@@ -4,32 +4,37 @@
 
 #include <cmath>
 
+#include "control/linearize.h"
 #include "core/rng.h"
-#include "realaigym/linear.h"
+#include "realaigym/rules.h"
+#include "sim/closed_form.h"
 
 namespace upswing {
 namespace {
 
 // Numbers of the benchmark's own plant, without friction (docs/realaigym.md).
 
+/// Kinetic and potential energy, the latter 0 at the height of the pivot (J).
+double EnergyOf(const Manipulator& plant, const BoardState& s) {
+  return plant.At({s[0], s[1], s[2], s[3]}).energy + plant.G1 + plant.G2;
+}
+
 TEST(BoardPlant, AccelerationAndEnergyAreTheBenchmarks) {
-  BoardBlock block;
-  const BoardState s{1, 0.5, 0.3, -0.7};
-  block.SetState(3, s);
-  block.tau1[3] = 2;
-  const auto [a1, a2] = Accelerations(block);
-  EXPECT_NEAR(a1[3], 23.421661493, 1e-9);
-  EXPECT_NEAR(a2[3], -67.143867013, 1e-9);
-  EXPECT_NEAR(Energy(BoardPlant(), s), -1.3257887730, 1e-10);
+  const Manipulator plant = ManipulatorOf(BoardPlant());
+  const auto [a1, a2] = plant.Acceleration({1, 0.5, 0.3, -0.7}, {2, 0});
+  EXPECT_NEAR(a1, 23.421661493, 1e-9);
+  EXPECT_NEAR(a2, -67.143867013, 1e-9);
+  EXPECT_NEAR(EnergyOf(plant, {1, 0.5, 0.3, -0.7}), -1.3257887730, 1e-10);
 }
 
 /// The state after so many seconds from (1, 0.5, 0, 0) under a constant torque.
 BoardState After(double seconds, double torque) {
-  BoardBlock block;
-  block.SetState(0, {1, 0.5, 0, 0});
-  block.tau1[0] = torque;
-  for (int i = 0; i < std::lround(seconds / kBoardTimestep); ++i) Advance(block);
-  return block.state(0);
+  ClosedFormBatch batch(1);
+  batch.SetManipulator(0, ManipulatorOf(BoardPlant()));
+  batch.SetState(0, {1, 0.5, 0, 0});
+  batch.tau[0] = torque;
+  Advance(batch, static_cast<int>(std::lround(seconds / kBoardTimestep)), 0, 1, kBoardTimestep);
+  return {batch.q1[0], batch.q2[0], batch.w1[0], batch.w2[0]};
 }
 
 void ExpectState(const BoardState& got, const BoardState& expected) {
@@ -41,13 +46,13 @@ TEST(BoardPlant, MotionsAreTheBenchmarks) {
   ExpectState(After(1, 0), {-0.341916511, -0.434082669, 4.645649569, 0.330197003});
   const BoardState end = After(2, 0);
   ExpectState(end, {-0.529998365, -0.408895796, -4.793176912, 1.031446267});
-  EXPECT_NEAR(Energy(BoardPlant(), end), -1.32905037, 1e-8);
+  EXPECT_NEAR(EnergyOf(ManipulatorOf(BoardPlant()), end), -1.32905037, 1e-8);
   ExpectState(After(1, 1), {0.692529048, -1.140444454, 3.70580572, 2.034784789});
   ExpectState(After(2, 1), {-0.477500598, -0.10842366, -4.904724458, 6.464643867});
 }
 
 TEST(BoardPlant, LinearModelAndRegulatorAreTheBenchmarks) {
-  const BoardLinear model = LinearizeUpright(BoardPlant(), Robot::kPendubot);
+  const LinearModel model = LinearizeUpright(ManipulatorOf(BoardPlant()), 1);
   const Eigen::Matrix2d gravity = model.A.bottomLeftCorner<2, 2>();
   EXPECT_NEAR(gravity(0, 0), 34.45333863, 1e-8);
   EXPECT_NEAR(gravity(0, 1), -26.820907594, 1e-8);
@@ -55,25 +60,23 @@ TEST(BoardPlant, LinearModelAndRegulatorAreTheBenchmarks) {
   EXPECT_NEAR(gravity(1, 1), 74.534058517, 1e-8);
   EXPECT_NEAR(model.B[2], 27.179932885, 1e-8);
   EXPECT_NEAR(model.B[3], -44.272653678, 1e-8);
-  const Eigen::RowVector4d K = SolveBoardRegulator(model, {0.97, 0.93, 0.39, 0.26}, 0.11).K;
+  const Eigen::RowVector4d K = SolveBoardLqr(Robot::kPendubot, {0.97, 0.93, 0.39, 0.26}, 0.11).K;
   const Eigen::RowVector4d expected{-74.06251872, -71.588802601, -17.239516925, -12.792756538};
   EXPECT_LT((K - expected).cwiseAbs().maxCoeff(), 1e-7);
 }
 
 TEST(BoardPlant, LinearModelIsTheDerivativeOfTheMotion) {
-  BoardPlant plant;
-  plant.rotor_inertia = 6e-5;
-  plant.damping1 = 0.03;
-  plant.damping2 = -0.02;
-  for (const Robot robot : {Robot::kPendubot, Robot::kAcrobot}) {
-    const BoardLinear model = LinearizeUpright(plant, robot);
+  BoardPlant numbers;
+  numbers.rotor_inertia = 6e-5;
+  numbers.damping1 = 0.03;
+  numbers.damping2 = -0.02;
+  const Manipulator plant = ManipulatorOf(numbers);
+  for (const int joint : {1, 2}) {
+    const LinearModel model = LinearizeUpright(plant, joint);
     const auto acceleration = [&](const Eigen::Vector4d& x, double u) {
-      BoardBlock block;
-      block.SetPlant(0, plant);
-      block.SetState(0, {std::acos(-1.0) + x[0], x[1], x[2], x[3]});
-      (robot == Robot::kPendubot ? block.tau1 : block.tau2)[0] = u;
-      const auto [a1, a2] = Accelerations(block);
-      return Eigen::Vector2d(a1[0], a2[0]);
+      const auto [a1, a2] = plant.Acceleration({std::acos(-1.0) + x[0], x[1], x[2], x[3]},
+                                               {joint == 1 ? u : 0, joint == 2 ? u : 0});
+      return Eigen::Vector2d(a1, a2);
     };
     constexpr double h = 1e-6;
     for (Eigen::Index k = 0; k < 4; ++k) {
@@ -81,9 +84,8 @@ TEST(BoardPlant, LinearModelIsTheDerivativeOfTheMotion) {
       const Eigen::Vector2d slope = (acceleration(step, 0) - acceleration(-step, 0)) / (2 * h);
       EXPECT_LT((slope - model.A.col(k).tail<2>()).norm(), 1e-6) << k;
     }
-    const Eigen::Vector2d slope =
-        (acceleration(Eigen::Vector4d::Zero(), h) - acceleration(Eigen::Vector4d::Zero(), -h)) /
-        (2 * h);
+    const Eigen::Vector4d none = Eigen::Vector4d::Zero();
+    const Eigen::Vector2d slope = (acceleration(none, h) - acceleration(none, -h)) / (2 * h);
     EXPECT_LT((slope - model.B.tail<2>()).norm(), 1e-6);
   }
 }
@@ -98,13 +100,10 @@ TEST(BoardPlant, FrictionIsThatOfTheFormula) {
   p.friction1 = 0.15;
   p.friction2 = -0.12;
   for (int trial = 0; trial < 100; ++trial) {
-    const BoardState s{rng.Uniform(-3, 3), rng.Uniform(-3, 3), rng.Uniform(-9, 9),
-                       rng.Uniform(-9, 9)};
+    const PendulumState s{rng.Uniform(-3, 3), rng.Uniform(-3, 3), rng.Uniform(-9, 9),
+                          rng.Uniform(-9, 9)};
     const auto& [q1, q2, w1, w2] = s;
-    BoardBlock block;
-    block.SetPlant(0, p);
-    block.SetState(0, s);
-    const auto [a1, a2] = Accelerations(block);
+    const auto [a1, a2] = ManipulatorOf(p).Acceleration(s, {0, 0});
     const double gear = 6, J = p.rotor_inertia, c2 = std::cos(q2);
     const double h = p.mass2 * p.length1 * p.center2;
     Eigen::Matrix2d M;
@@ -117,7 +116,7 @@ TEST(BoardPlant, FrictionIsThatOfTheFormula) {
     const Eigen::Vector2d f(
         h * std::sin(q2) * (2 * w1 * w2 + w2 * w2) - g1 - 0.05 * w1 - 0.15 * std::atan(100 * w1),
         -h * std::sin(q2) * w1 * w1 - g2 + 0.08 * w2 + 0.12 * std::atan(100 * w2));
-    const Eigen::Vector2d rest = M * Eigen::Vector2d(a1[0], a2[0]) - f;
+    const Eigen::Vector2d rest = M * Eigen::Vector2d(a1, a2) - f;
     EXPECT_LT(rest.norm(), 1e-12 * (1 + f.norm()));
   }
 }

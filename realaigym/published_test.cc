@@ -15,7 +15,6 @@
 
 #include "core/csv.h"
 #include "core/thread_pool.h"
-#include "realaigym/linear.h"
 #include "realaigym/simulation.h"
 
 namespace upswing {
@@ -74,11 +73,8 @@ class Cubics {
 
 /// q̈ of the board's plant, rad/s².
 Eigen::Vector2d Acceleration(const Eigen::Vector4d& x, double torque) {
-  BoardBlock block;
-  block.SetState(0, {x[0], x[1], x[2], x[3]});
-  block.tau1[0] = torque;
-  const auto a = Accelerations(block);
-  return {a[0][0], a[1][0]};
+  const auto a = ManipulatorOf(BoardPlant()).Acceleration({x[0], x[1], x[2], x[3]}, {torque, 0});
+  return {a[0], a[1]};
 }
 
 /// The swing-up that the entry follows: two angles (rad), two velocities (rad/s), the torque (N·m).
@@ -110,7 +106,7 @@ class PublishedTvlqr : public BoardController {
     Plan();
     std::vector<Cubics> trajectory;  // of ReadTrajectory
     std::vector<Cubics> K;           // (4), N·m/rad and N·m·s/rad
-    BoardRegulator upright;
+    Lqr upright;
   };
 
   explicit PublishedTvlqr(const Plan& plan) : plan_(plan) {}
@@ -146,8 +142,7 @@ class PublishedTvlqr : public BoardController {
 
 PublishedTvlqr::Plan::Plan()
     : trajectory(ReadTrajectory()),
-      upright(SolveBoardRegulator(LinearizeUpright(BoardPlant(), Robot::kPendubot),
-                                  {0.97, 0.93, 0.39, 0.26}, 0.11)) {
+      upright(SolveBoardLqr(Robot::kPendubot, {0.97, 0.93, 0.39, 0.26}, 0.11)) {
   const Eigen::Matrix4d Q = Eigen::Vector4d(0.64, 0.56, 0.13, 0.037).asDiagonal();
   constexpr double kR = 0.82;
   std::array<std::vector<double>, 4> gains;

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "control/linearize.h"
 #include "core/rng.h"
 
 namespace upswing {
@@ -108,6 +109,12 @@ std::optional<Robot> RobotNamed(std::string_view name) {
     if (name == NameOf(robot)) return robot;
   }
   return std::nullopt;
+}
+
+Lqr SolveBoardLqr(Robot robot, const Eigen::Vector4d& Q, double R) {
+  const Manipulator plant = ManipulatorOf(BoardPlant());
+  return SolveContinuousLqr(LinearizeUpright(plant, static_cast<int>(robot)), Q.asDiagonal(), R)
+      .value();
 }
 
 bool AtGoal(const BoardState& state) {

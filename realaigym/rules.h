@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "control/riccati.h"
 #include "realaigym/plant.h"
 
 /// The rules of RealAIGym's simulation boards, version 2 (docs/realaigym.md): what is simulated,
@@ -18,6 +19,10 @@ enum class Robot { kPendubot = 1, kAcrobot = 2 };
 const char* NameOf(Robot robot);
 /// The one of this name; none if there is none.
 std::optional<Robot> RobotNamed(std::string_view name);
+
+/// The regulator of the board's plant about upright in continuous time, as the benchmark's
+/// baselines have it: minimises ∫ x' Q x + R u² dt, Q diagonal.
+Lqr SolveBoardLqr(Robot robot, const Eigen::Vector4d& Q, double R);
 
 /// A torque (N·m) about the motor's joint, beyond its limit too, for a moment: amplitude ·
 /// exp(-(t - time)²/(2 width²)).

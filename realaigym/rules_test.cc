@@ -10,6 +10,7 @@
 
 #include "core/rng.h"
 #include "realaigym/simulation.h"
+#include "sim/closed_form.h"
 
 namespace upswing {
 namespace {
@@ -220,12 +221,14 @@ TEST(RealAiGymSimulation, APushAddsToWhatTheMotorGivesAtItsLimit) {
         robot, {&episode, 1}, [](size_t) { return std::make_unique<Strong>(); }, nullptr, &trace);
     for (const size_t k : {980, 1000, 1040}) {
       const double z = (0.002 * static_cast<double>(k) - 2) / 0.05;
-      BoardBlock block;
-      block.SetPlant(0, BoardPlant());
-      block.SetState(0, trace[k].state);
-      (robot == Robot::kPendubot ? block.tau1 : block.tau2)[0] = 6 - 5 * std::exp(-z * z / 2);
-      Advance(block);
-      for (size_t i = 0; i < 4; ++i) EXPECT_NEAR(block.state(0)[i], trace[k + 1].state[i], 1e-12);
+      ClosedFormBatch batch(1);
+      batch.SetManipulator(0, ManipulatorOf(BoardPlant()));
+      batch.joint[0] = static_cast<double>(robot);
+      batch.tau[0] = 6 - 5 * std::exp(-z * z / 2);
+      ClosedFormBatch::Array* const state[] = {&batch.q1, &batch.q2, &batch.w1, &batch.w2};
+      for (size_t i = 0; i < 4; ++i) (*state[i])[0] = trace[k].state[i];
+      Advance(batch, 1, 0, 1, kBoardTimestep);
+      for (size_t i = 0; i < 4; ++i) EXPECT_NEAR((*state[i])[0], trace[k + 1].state[i], 1e-12);
     }
   }
 }

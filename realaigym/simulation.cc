@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "core/rng.h"
+#include "sim/closed_form.h"
 
 namespace upswing {
 namespace {
@@ -15,12 +16,6 @@ static_assert(kBoardLevels - 1 < kMostDelay);
 constexpr int kHeldSteps = 1000;  // the last 2 s
 constexpr int kNoted = 8;         // steps from one look at the nearness to the next
 constexpr int kHeldLooks = kHeldSteps / kNoted;
-
-/// std::remainder, but fast.
-double Wrapped(double angle) {
-  constexpr double kTurn = 2 * std::numbers::pi;
-  return angle - kTurn * std::nearbyint(angle / kTurn);
-}
 
 /// 1 upright at rest; 1/2 where the angles are off by 0.35 rad (their squares sum to 0.24), or by
 /// `velocity` in each velocity: what a search climbs.
@@ -49,11 +44,15 @@ struct LanePush {
 class Run {
  public:
   Run(Robot robot, std::span<const BoardEpisode> episodes)
-      : robot_(robot), episodes_(episodes), steps_(episodes.front().steps), past_(kMostDelay) {
+      : episodes_(episodes),
+        steps_(episodes.front().steps),
+        block_(kBoardBlock),
+        past_(kMostDelay) {
     sums_.last_below.fill(-1);
+    std::ranges::fill(block_.joint, static_cast<double>(robot));
     for (size_t lane = 0; lane < episodes.size(); ++lane) {
       const BoardEpisode& episode = episodes[lane];
-      block_.SetPlant(lane, episode.plant);
+      block_.SetManipulator(lane, ManipulatorOf(episode.plant));
       rngs_.emplace_back(episode.seed, "realaigym: noise");
       if (episode.velocity_noise > 0) velocity_noise_.push_back(lane);
       if (episode.torque_noise > 0) torque_noise_.push_back(lane);
@@ -70,17 +69,15 @@ class Run {
   }
 
   std::vector<BoardOutcome> Go(BoardController& controller, std::vector<BoardSample>* trace) {
-    const bool first_joint = robot_ == Robot::kPendubot;
-    const Lanes& angle = first_joint ? block_.q1 : block_.q2;
     for (int step = 0; step < steps_; ++step) {
       controller.Act(step, Measure(step), episodes_.size(), wanted_);
-      Drive(step, first_joint ? block_.tau1 : block_.tau2);
-      if (trace != nullptr) trace->push_back({step * kBoardTimestep, block_.state(0), torque_[0]});
+      Drive(step);
+      if (trace != nullptr) trace->push_back({step * kBoardTimestep, StateOf(0), torque_[0]});
       if (step % kNoted == 0) NoteNearness(step);
       if (step < steps_ - 1) NoteVelocities();
-      std::ranges::copy(angle, before_.begin());
-      Advance(block_);
-      Note(step, angle);
+      FindTips();
+      Advance(block_, 1, 0, kBoardBlock, kBoardTimestep);
+      Note(step);
     }
     std::vector<BoardOutcome> outcomes;
     for (size_t lane = 0; lane < episodes_.size(); ++lane) outcomes.push_back(OutcomeOf(lane));
@@ -88,6 +85,10 @@ class Run {
   }
 
  private:
+  BoardState StateOf(size_t lane) const {
+    return {block_.q1[lane], block_.q2[lane], block_.w1[lane], block_.w2[lane]};
+  }
+
   const BoardMeasurement& Measure(int step) {
     for (size_t i = 0; i < kBoardBlock; ++i) {
       seen_.q1[i] = block_.q1[i];
@@ -113,7 +114,7 @@ class Run {
   }
 
   /// From the torques that the controller wants to those that act.
-  void Drive(int step, Lanes& applied) {
+  void Drive(int step) {
     const double time = step * kBoardTimestep;
     for (size_t i = 0; i < kBoardBlock; ++i) {
       previous_[i] = torque_[i];
@@ -128,12 +129,12 @@ class Run {
     }
     for (size_t i = 0; i < kBoardBlock; ++i) {
       const double below = torque_[i] < kBoardTorqueLimit ? torque_[i] : kBoardTorqueLimit;
-      applied[i] = torque_[i] = below > -kBoardTorqueLimit ? below : -kBoardTorqueLimit;
+      block_.tau[i] = torque_[i] = below > -kBoardTorqueLimit ? below : -kBoardTorqueLimit;
     }
     for (const auto& [first, last, lane, push] : pushes_) {
       if (step <= first || step > last) continue;
       const double z = (time - push.time) / push.width;
-      applied[lane] += push.amplitude * std::exp(-z * z / 2);
+      block_.tau[lane] += push.amplitude * std::exp(-z * z / 2);
     }
   }
 
@@ -154,10 +155,23 @@ class Run {
     }
   }
 
+  /// The heights of the tips, m.
+  void FindTips() {
+    constexpr BoardPlant kPlant;  // no rule varies the lengths
+    Lanes q12, sine, c1, c12;
+    for (size_t i = 0; i < kBoardBlock; ++i) q12[i] = block_.q1[i] + block_.q2[i];
+    SineCosine(block_.q1, sine, c1);
+    SineCosine(q12, sine, c12);
+    for (size_t i = 0; i < kBoardBlock; ++i) {
+      tip_[i] = -kPlant.length1 * c1[i] - kPlant.length2 * c12[i];
+    }
+  }
+
   /// After a step: what its torque did to the motor's joint, and where the tip was before.
-  void Note(int step, const Lanes& angle) {
+  void Note(int step) {
     constexpr BoardPlant kPlant;
     constexpr double kLine = 0.9 * (kPlant.length1 + kPlant.length2);
+    const auto& angle = block_.joint[0] == 1 ? block_.q1 : block_.q2;
     for (size_t i = 0; i < kBoardBlock; ++i) {
       const double torque = torque_[i], size = std::abs(torque);
       sums_.max_torque[i] = sums_.max_torque[i] > size ? sums_.max_torque[i] : size;
@@ -168,9 +182,9 @@ class Run {
     if (step == steps_ - 1) return;  // of N samples there are N - 1 differences
     for (size_t i = 0; i < kBoardBlock; ++i) {
       const double torque = torque_[i];
-      sums_.energy[i] += std::abs((angle[i] - before_[i]) * torque);
+      sums_.energy[i] += std::abs((angle[i] - block_.angle_before[i]) * torque);
       sums_.torque_cost[i] += torque * torque * kBoardTimestep;
-      sums_.last_below[i] = block_.tip[i] > kLine ? sums_.last_below[i] : step;
+      sums_.last_below[i] = tip_[i] > kLine ? sums_.last_below[i] : step;
     }
   }
 
@@ -188,7 +202,7 @@ class Run {
     const int first = static_cast<int>(sums_.last_below[lane]) + 1;
     o.above_line = first < steps_ - 1;
     o.swing_up_seconds = std::min(first, steps_ - 1) * kBoardTimestep;
-    const BoardState end = block_.state(lane);
+    const BoardState end = StateOf(lane);
     o.at_goal = AtGoal(end);
     // A simulation that has blown up is the worst.
     const auto [q1, q2, w1, w2] = end;
@@ -199,17 +213,16 @@ class Run {
     return o;
   }
 
-  Robot robot_;
   std::span<const BoardEpisode> episodes_;
   int steps_;
-  BoardBlock block_;
+  ClosedFormBatch block_;
   std::vector<Rng> rngs_;
   // Which have it.
   std::vector<size_t> velocity_noise_, torque_noise_, delayed_, responding_;
   std::vector<LanePush> pushes_;
   std::vector<BoardMeasurement> past_;  // ring of the last kMostDelay states
   BoardMeasurement seen_{};
-  Lanes before_{};                          // angle of the motor's joint before the step, rad
+  Lanes tip_{};                             // height of the tip before the step, m
   Lanes wanted_{}, torque_{}, previous_{};  // N·m: asked for; that acts, without pushes; before it
   Sums sums_;
 };

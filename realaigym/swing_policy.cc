@@ -6,7 +6,6 @@
 #include "core/error.h"
 #include "core/rng.h"
 #include "core/text.h"
-#include "realaigym/linear.h"
 #include "realaigym/swing_net.h"
 
 namespace upswing {
@@ -36,8 +35,7 @@ class SwingController : public BoardController {
 }  // namespace
 
 SwingNet::SwingNet(Robot robot, int hidden) : robot_(robot), hidden_(hidden) {
-  const BoardRegulator regulator =
-      SolveBoardRegulator(LinearizeUpright(BoardPlant(), robot), {1, 1, 0.1, 0.1}, 1);
+  const Lqr regulator = SolveBoardLqr(robot, {1, 1, 0.1, 0.1}, 1);
   for (size_t i = 0; i < 4; ++i) {
     K_[i] = regulator.K[static_cast<Eigen::Index>(i)];
     for (size_t j = 0; j < 4; ++j) {

@@ -3,6 +3,9 @@
 #include <algorithm>
 
 #include "control/hybrid.h"
+#include "control/mpc.h"
+#include "control/swing_up.h"
+#include "control/tvlqr.h"
 #include "core/error.h"
 #include "core/text.h"
 

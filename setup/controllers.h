@@ -4,10 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "control/lqr.h"
-#include "control/mpc.h"
-#include "control/swing_up.h"
-#include "control/tvlqr.h"
+#include "control/settings.h"
 #include "core/policy.h"
 #include "sim/double_pendulum.h"
 

@@ -371,6 +371,13 @@ void ClosedFormBatch::SetManipulator(size_t env, const Manipulator& m) {
   dry_friction = dry_friction || m.f1 != 0 || m.f2 != 0;
 }
 
+void ClosedFormBatch::SetState(size_t env, const PendulumState& s) {
+  q1[env] = s.q1;
+  q2[env] = s.q2;
+  w1[env] = s.w1;
+  w2[env] = s.w2;
+}
+
 void ClosedFormBatch::SetTorque(std::span<const double> torque) {
   for (size_t i = 0; i < torque.size(); ++i) tau[i] = std::clamp(torque[i], -limit[i], limit[i]);
 }

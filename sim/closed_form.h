@@ -25,6 +25,8 @@ struct ClosedFormBatch {
   void SetPlant(size_t env, const Plant& plant);
   /// Sets the equations of motion of an environment, and leaves what its task needs.
   void SetManipulator(size_t env, const Manipulator& manipulator);
+  PendulumState state(size_t env) const { return {q1[env], q2[env], w1[env], w2[env]}; }
+  void SetState(size_t env, const PendulumState& state);
   /// Sets the motors (N), N·m, within their limits.
   void SetTorque(std::span<const double> torque);
 

@@ -25,16 +25,11 @@ ClosedFormPhysics::ClosedFormPhysics(const PhysicsConfig& config)
 }
 
 PendulumState ClosedFormPhysics::state(int env) const {
-  const auto i = static_cast<size_t>(env);
-  return {batch_.q1[i], batch_.q2[i], batch_.w1[i], batch_.w2[i]};
+  return batch_.state(static_cast<size_t>(env));
 }
 
 void ClosedFormPhysics::SetState(int env, const PendulumState& s) {
-  const auto i = static_cast<size_t>(env);
-  batch_.q1[i] = s.q1;
-  batch_.q2[i] = s.q2;
-  batch_.w1[i] = s.w1;
-  batch_.w2[i] = s.w2;
+  batch_.SetState(static_cast<size_t>(env), s);
 }
 
 void ClosedFormPhysics::SetPlant(int env, const Plant& plant) {

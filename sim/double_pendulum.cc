@@ -118,12 +118,13 @@ double MotorAngle(const Plant& plant, const PendulumState& s) {
   return plant.actuated_joint == 1 ? s.q1 : s.q2;
 }
 
+double Wrapped(double angle) {
+  constexpr double kTurn = 2 * std::numbers::pi;
+  return angle - kTurn * std::nearbyint(angle / kTurn);
+}
+
 std::array<double, 2> Lean(const PendulumState& s) {
-  constexpr double kPi = std::numbers::pi;
-  const auto from_upright = [](double angle) {
-    return angle - kPi - 2 * kPi * std::nearbyint((angle - kPi) / (2 * kPi));
-  };
-  return {from_upright(s.q1), from_upright(s.q1 + s.q2)};
+  return {Wrapped(s.q1 - std::numbers::pi), Wrapped(s.q1 + s.q2 - std::numbers::pi)};
 }
 
 std::array<float, kObservationSize> Observe(const Plant& plant, const PendulumState& s) {

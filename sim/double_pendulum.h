@@ -91,6 +91,9 @@ bool Inverted(const PendulumState& s);
 /// The angle of the joint that the motor drives (rad).
 double MotorAngle(const Plant& plant, const PendulumState& s);
 
+/// An angle in [-π, π], rad.
+double Wrapped(double angle);
+
 /// How far both links lean from straight up, rad, in [-π, π]; the second by its absolute angle.
 std::array<double, 2> Lean(const PendulumState& s);
 

@@ -72,77 +72,6 @@ struct Factors {
 const std::array<float, kIdentifiedSize> kIdentifiedMirrorSigns{1, 1, 1, 1,  1,  1, 1,
                                                                 1, 1, 1, -1, -1, -1};
 
-PassiveJoint PassiveJointOf(const Manipulator& plant, int actuated_joint) {
-  const auto& [J1, J2, b, a, G1, G2, d1, d2, f1, f2] = plant;
-  const auto growth = [](double inertia, double damping, double gravity) {
-    return (std::sqrt(damping * damping + 4 * inertia * gravity) - damping) / (2 * inertia);
-  };
-  if (actuated_joint == 2) {
-    // Of joint 1, under no torque: M11 q̈1 + d1 q̇1 - (G1 + G2) q1 = -(M12 q̈2 - G2 q2). Both sides
-    // are 0 for one rate where pole and zero are the same: then no torque reaches that mode.
-    const double pole = growth(J1 + J2 + 2 * b, d1, G1 + G2), zero = std::sqrt(G2 / (J2 + b));
-    return {pole, (zero - pole) / (zero + pole)};
-  }
-  // Of link 2 in absolute angles φ1, φ2: n12 φ̈1 + n22 φ̈2 + d2 (φ̇2 - φ̇1) = G2 φ2. Its zero is
-  // z = d2 / n12, by which delta is widened: n12 may be 0.
-  const double n12 = b - a, pole = growth(J2 + a, d2, G2);
-  return {pole, (d2 - pole * n12) / (d2 + pole * n12)};
-}
-
-Falling FallingOf(const Manipulator& plant, const Plant& motor, const PendulumState& s) {
-  const bool at_joint1 = motor.actuated_joint == 1;
-  const double G1 = plant.G1, G2 = plant.G2, d1 = plant.d1, d2 = plant.d2;
-  const auto [M11, M12, M22] = plant.Mass(1);
-  // K(λ) = M λ² + D λ - G about upright; K(λ) y = 0 for a mode of rate λ. Its determinant is
-  // k4 λ⁴ + k3 λ³ + k2 λ² + k1 λ + k0.
-  const double G = G1 + G2;
-  const double k4 = M11 * M22 - M12 * M12, k3 = M11 * d2 + M22 * d1;
-  const double k2 = d1 * d2 - M11 * G2 - M22 * G + 2 * M12 * G2;
-  const double k1 = -d1 * G2 - d2 * G, k0 = G1 * G2;
-
-  // The roots are real, two above 0. From above Newton's method falls to the largest one, and on
-  // the cubic without that to the next.
-  const auto newton = [](double x, double c4, double c3, double c2, double c1, double c0) {
-    for (int i = 0; i < 50; ++i) {
-      const double value = (((c4 * x + c3) * x + c2) * x + c1) * x + c0;
-      const double slope = ((4 * c4 * x + 3 * c3) * x + 2 * c2) * x + c1;
-      const double step = value / slope;
-      x -= step;
-      if (!(std::abs(step) > 1e-12 * x)) break;
-    }
-    return x;
-  };
-  Falling falling;
-  // Without damping λ² are the roots of a quadratic; damping makes each smaller.
-  const double undamped = -M11 * G2 - M22 * G + 2 * M12 * G2;
-  const double start =
-      std::sqrt((-undamped + std::sqrt(undamped * undamped - 4 * k4 * k0)) / (2 * k4));
-  const double fast = newton(start, k4, k3, k2, k1, k0);
-  // Division by (λ - fast): c3 λ³ + c2 λ² + c1 λ + c0
-  const double c3 = k4, c2 = k3 + fast * c3, c1 = k2 + fast * c2, c0 = k1 + fast * c1;
-  const double slow = newton(fast, 0, c3, c2, c1, c0);
-  falling.rate = {fast, slow};
-
-  // z = y' (M w + (M λ + D) q) grows as ż = λ z + y1 u, or y2 u of a motor at joint 2.
-  const auto lean = Lean(s);
-  const double q1 = lean[0], q2 = lean[1] - lean[0];
-  for (size_t i = 0; i < 2; ++i) {
-    const double rate = falling.rate[i];
-    const double K11 = (M11 * rate + d1) * rate - G, K12 = M12 * rate * rate - G2;
-    const double K22 = (M22 * rate + d2) * rate - G2;
-    const bool first = std::abs(K11) > std::abs(K22);
-    const double y1 = first ? -K12 : K22, y2 = first ? K11 : -K12;
-    const double z = y1 * (M11 * s.w1 + M12 * s.w2 + (M11 * rate + d1) * q1 + M12 * rate * q2) +
-                     y2 * (M12 * s.w1 + M22 * s.w2 + M12 * rate * q1 + (M22 * rate + d2) * q2);
-    falling.zeta[i] = rate * z / ((at_joint1 ? y1 : y2) * motor.torque_limit);
-  }
-  // The gain that places both poles at their mirror images: Anderson, Moore, section 4.3.
-  falling.torque = -2 * (fast + slow) / (fast - slow) * (falling.zeta[0] - falling.zeta[1]);
-
-  falling.delta = PassiveJointOf(plant, static_cast<int>(motor.actuated_joint)).delta;
-  return falling;
-}
-
 Identifier::Identifier(const Plant& nominal, int num_envs)
     : plant_(nominal),
       nominal_(ManipulatorOf(nominal)),
@@ -198,13 +127,10 @@ Manipulator Identifier::estimate(int env) const {
 PendulumState Identifier::Predict(const Manipulator& plant, double torque,
                                   const PendulumState& from) {
   prediction_.SetManipulator(0, plant);
-  prediction_.q1[0] = from.q1;
-  prediction_.q2[0] = from.q2;
-  prediction_.w1[0] = from.w1;
-  prediction_.w2[0] = from.w2;
+  prediction_.SetState(0, from);
   prediction_.tau[0] = torque;
   Advance(prediction_, kPhysicsSteps, 0, 1);
-  return {prediction_.q1[0], prediction_.q2[0], prediction_.w1[0], prediction_.w2[0]};
+  return prediction_.state(0);
 }
 
 void Identifier::Update(int env, double torque, const PendulumState& measured) {

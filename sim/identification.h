@@ -7,6 +7,7 @@
 #include "core/archive.h"
 #include "sim/closed_form.h"
 #include "sim/double_pendulum.h"
+#include "sim/upright_modes.h"
 
 /// Identification of an unknown plant while it moves, from measured angles and velocities and the
 /// torque of its motor: a Kalman filter of its constants (Ljung, "System Identification", 1999,
@@ -19,26 +20,6 @@ inline constexpr int kConstants = 7;
 inline constexpr std::array<double Manipulator::*, kConstants> kIdentified{
     &Manipulator::J1, &Manipulator::J2, &Manipulator::b, &Manipulator::G1,
     &Manipulator::G2, &Manipulator::d1, &Manipulator::d2};
-
-/// Of the joint without a motor, upright; see UprightModes.
-struct PassiveJoint {
-  double pole, delta;
-};
-PassiveJoint PassiveJointOf(const Manipulator& plant, int actuated_joint);
-
-/// How the pendulum falls from upright with these constants. Each of the two unstable modes has a
-/// coordinate z, a weighted sum of the state, that moves by itself: ż = rate z + gain u. A motor
-/// of limit u* can return z as long as |rate z| < gain u*; zeta = rate z / (gain u*) has this
-/// limit at 1.
-struct Falling {
-  std::array<double, 2> rate;  // the faster one first, 1/s
-  std::array<double, 2> zeta;  // of the state
-  double torque;  // that ends both falls with the least effort ∫u² dt, over the limit u*
-  double delta;   // see UprightModes
-};
-
-/// `motor` gives the joint and the limit of the torque.
-Falling FallingOf(const Manipulator& plant, const Plant& motor, const PendulumState& s);
 
 /// What identification adds to an observation, 13 numbers:
 ///   7  each constant's deviation from the nominal plant's as a share of it, over kConstantScale;

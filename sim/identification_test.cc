@@ -28,13 +28,10 @@ Plant Near(double share, Rng& rng) {
 PendulumState Move(const Plant& plant, const PendulumState& s, double torque) {
   ClosedFormBatch batch(1);
   batch.SetPlant(0, plant);
-  batch.q1[0] = s.q1;
-  batch.q2[0] = s.q2;
-  batch.w1[0] = s.w1;
-  batch.w2[0] = s.w2;
+  batch.SetState(0, s);
   batch.SetTorque({&torque, 1});
   Advance(batch, kPhysicsSteps, 0, 1);
-  return {batch.q1[0], batch.q2[0], batch.w1[0], batch.w2[0]};
+  return batch.state(0);
 }
 
 TEST(Falling, EachModeMovesByItself) {
@@ -52,10 +49,11 @@ TEST(Falling, EachModeMovesByItself) {
     const PendulumState after = Move(plant, before, torque);
     const Falling falling = FallingOf(constants, plant, before);
     const Falling later = FallingOf(constants, plant, after);
-    ASSERT_GT(falling.rate[0], falling.rate[1]);
-    ASSERT_GT(falling.rate[1], 0);
+    const std::array rates{falling.faster, falling.slower};
+    ASSERT_GT(rates[0], rates[1]);
+    ASSERT_GT(rates[1], 0);
     for (size_t i = 0; i < 2; ++i) {
-      const double growth = std::exp(falling.rate[i] * kControlPeriod);
+      const double growth = std::exp(rates[i] * kControlPeriod);
       const double expected = growth * falling.zeta[i] + (growth - 1) * torque / plant.torque_limit;
       // A Runge-Kutta step errs by (λ h)⁵/120 of ζ, which is 1e-9 with λ = 8.
       const double size = std::max(std::abs(falling.zeta[i]), 1e-5);

@@ -105,10 +105,7 @@ TEST(Manipulator, EnergyIsThatOfTheLagrangian) {
 
 void Set(ClosedFormBatch& batch, size_t i, const Plant& plant, const PendulumState& s, double tau) {
   batch.SetPlant(i, plant);
-  batch.q1[i] = s.q1;
-  batch.q2[i] = s.q2;
-  batch.w1[i] = s.w1;
-  batch.w2[i] = s.w2;
+  batch.SetState(i, s);
   batch.tau[i] = tau;
 }
 

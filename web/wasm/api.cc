@@ -162,6 +162,13 @@ UPSWING_EXPORT(policy_open) Controller* PolicyOpen(const std::byte* file, size_t
           "expected a policy for a motor at joint 1, as the page's pendulum has it, got one for "
           "joint 2");
     }
+    if (controller->loaded.plant.rotor_inertia != 0 ||
+        controller->loaded.plant.has_dry_friction()) {
+      throw BadInput(
+          "expected a policy for a plant without rotors and dry friction, which the page's "
+          "pendulum "
+          "does not have");
+    }
     SetText(About(*controller, tensors.metadata));
     return controller.release();
   });
