@@ -103,9 +103,10 @@ void AddMap(CommandLine& line) {
   line.Flag("--json", a->as_json, "print JSON instead of a table");
   line.Footer(
       "Axes and --set take mass1, mass2, length1, length2, damping1, damping2 (mass, length,\n"
-      "damping for both), gravity, torque_limit, actuated_joint (1 or 2), sensor_noise (rad,\n"
-      "rad/s), delay (s, in whole control periods of 0.02 s; each is a cell), and the start: q1,\n"
-      "q2 (degrees), w1, w2 (rad/s). Percentages are on top of the training's value. An episode\n"
+      "damping for both), gravity, torque_limit, actuated_joint (1 or 2), rotor_inertia,\n"
+      "gear_ratio, coulomb1, coulomb2, sensor_noise (rad, rad/s), delay (s, in whole control\n"
+      "periods of 0.02 s; each is a cell), and the start: q1, q2 (degrees), w1, w2 (rad/s).\n"
+      "Percentages are on top of the training's value. An episode\n"
       "is that of `upswing eval`; with a start, every episode begins exactly there; what of it is\n"
       "not given is 0 (hanging, at rest). Energy and height in the observation are scaled by the\n"
       "cell's own plant, which reveals it to the policy; with --unknown-plant by the plant of the\n"
