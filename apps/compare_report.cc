@@ -69,20 +69,20 @@ void PrintStability(const GroupSummary& summary) {
 }
 
 /// How strong and how smooth the best policies' torques are, as far as that is known.
-void PrintTorques(const GroupSummary& s, const RunPlan& plan) {
+void PrintTorques(const GroupSummary& s, const RunRecord& run) {
   const auto print = [&](const char* name, const Scores& scores, const std::string& unit) {
     if (std::isfinite(scores.low)) PrintScores(name, scores, Torque, unit);
   };
-  print("rms torque", s.rms_torque, Concat(" ", plan.action_unit));
-  print("its variation", s.torque_variation, Concat(" ", plan.action_unit, "/s"));
-  if (plan.rule.by_return()) return;
-  print("  once upright", s.upright_variation, Concat(" ", plan.action_unit, "/s"));
+  print("rms torque", s.rms_torque, Concat(" ", run.action_unit));
+  print("its variation", s.torque_variation, Concat(" ", run.action_unit, "/s"));
+  if (run.rule.by_return()) return;
+  print("  once upright", s.upright_variation, Concat(" ", run.action_unit, "/s"));
 }
 
 void PrintGroup(const RunGroup& group, const GroupSummary& s, const std::string& differences,
                 const std::string& task) {
   std::vector<int64_t> seeds;
-  for (const RunRecord& run : group.runs) seeds.push_back(run.plan.seed);
+  for (const RunRecord& run : group.runs) seeds.push_back(run.seed);
   fmt::print("{}\n", Printable(group.label));
   if (!task.empty()) fmt::print("  {:<16}{}\n", "task", Printable(task));
   if (!differences.empty()) fmt::print("  {:<16}{}\n", "settings", Printable(differences));
@@ -97,7 +97,7 @@ void PrintGroup(const RunGroup& group, const GroupSummary& s, const std::string&
   PrintScores("final success", s.final_success, Percent);
   PrintScores("best return", s.best_return, Whole);
   PrintScores("best success", s.best_success, Percent);
-  PrintTorques(s, group.runs.front().plan);
+  PrintTorques(s, group.runs.front());
   PrintStability(s);
   fmt::print("\n");
 }
@@ -167,7 +167,7 @@ ordered_json GroupJson(const RunGroup& group, const GroupSummary& s) {
   j["group"] = group.label;
   for (const RunRecord& run : group.runs) {
     j["runs"].push_back({{"path", run.path.string()},
-                         {"seed", run.plan.seed},
+                         {"seed", run.seed},
                          {"steps", run.evaluations.back().step},
                          {"seconds", run.evaluations.back().seconds},
                          {"finished", Finished(run)}});

@@ -297,24 +297,30 @@ class CompareTest(ProgramTest):
             self.write(run + "/log.txt", text)
 
         self.make_group("r", [1, 2, 3])
-        begin = "started at step 0, vector instructions AVX2, threads {}, processor {}"
-        end = "finished at step 4000, threads busy {}% of {} s"
+        def begin(threads, processor, vectors="AVX2"):
+            facts = {"threads": threads, "processor": processor, "vectors": vectors}
+            return f"started at step 0 {json.dumps(facts)}"
+
+        def end(busy, seconds):
+            return f'finished at step 4000 {json.dumps({"busy": busy, "seconds": seconds})}'
+
         for seed in (1, 2, 3):
-            log(f"r/seed{seed}", begin.format(2, "A"), end.format(90, 10.5))
+            log(f"r/seed{seed}", begin(2, "A"), end(0.9, 10.5))
         self.assertNotIn("times", " ".join(self.compare("r")["notes"]))
-        log("r/seed3", begin.format(1, "B\x1b[2J").replace("AVX2", "AVX-512"), end.format(90, 10))
+        log("r/seed3", begin(1, "B\x1b[2J", "AVX-512"), end(0.9, 10))
         notes = " ".join(self.compare("r")["notes"])
         self.assertIn("different numbers of threads: 1 (1 run), 2 (2 runs)", notes)
         self.assertIn("different processors: A; B\\x1b[2J", notes)
         self.assertIn("different vector instructions: AVX-512; AVX2", notes)
         self.assertNotIn("loads", notes)
-        log("r/seed3", begin.format(2, "A"), end.format(40, 22))
+        log("r/seed3", begin(2, "A"), end(0.4, 22))
         notes = " ".join(self.compare("r")["notes"])
         self.assertIn("different machine loads", notes)
         self.assertIn("40% of the time, another 90%", notes)
-        log("r/seed3", begin.format(2, "A"), end.format(40, 0.3))  # too short to tell
+        log("r/seed3", begin(2, "A"), end(0.4, 0.3))  # too short to tell
         self.assertNotIn("loads", " ".join(self.compare("r")["notes"]))
-        log("r/seed3", "\0\xff", "threads busy , threads , processor")
+        log("r/seed3", "\0\xff", "started {", '{"threads": "2", "busy": null, "seconds": []}',
+            "started at step 0, host a, vector instructions AVX2, threads 2, processor A")
         self.compare("r")
 
     def test_a_run_that_lacks_settings_is_not_filled_up_with_todays_defaults(self):

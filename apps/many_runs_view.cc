@@ -52,7 +52,7 @@ void ManyRunsView::Announce() const {
     }
   }
   const auto begun =
-      std::ranges::count_if(*runs_, [](const SeedRun& run) { return run.result.has_value(); });
+      std::ranges::count_if(*runs_, [](const SeedRun& run) { return run.state.has_value(); });
   if (begun > 0) {
     const size_t done = Measure().done;
     Say("  {} done before, resuming {}\n", done, static_cast<size_t>(begun) - done);
@@ -74,9 +74,9 @@ ManyRunsView::Progress ManyRunsView::Measure() const {
   for (const SeedRun& run : *runs_) {
     // Files are read for those that run alone: there may be thousands of others.
     const bool runs_now = std::ranges::find(running_, &run) != running_.end();
-    const auto steps = static_cast<double>(runs_now     ? run.Steps()
-                                           : run.result ? run.result->steps
-                                                        : 0);
+    const auto steps = static_cast<double>(runs_now    ? run.Steps()
+                                           : run.state ? run.state->steps
+                                                       : 0);
     progress.steps += steps;
     progress.done += run.finished ? 1 : 0;
     if (run.finished || !run.problem.empty()) continue;
@@ -115,12 +115,12 @@ void ManyRunsView::End(const SeedRun& run) {
     return line_.Print(fmt::format("  {:<20} failed: {} (log: {})", run.name,
                                    Printable(run.problem), Printable(run.log().string())));
   }
-  if (!run.result) return line_.Print(fmt::format("  {:<20} stopped before it began", run.name));
-  const RunResult& s = *run.result;
+  if (!run.state) return line_.Print(fmt::format("  {:<20} stopped before it began", run.name));
+  const TrainState& s = *run.state;
   const Progress progress = Measure();
   line_.Print(fmt::format("  {:<20} {:>11} steps  {:>12}  {:<22}  {} of {} runs done{}", run.name,
                           FormatCount(s.steps), FormatDuration(s.seconds),
-                          s.solved       ? "solved at " + FormatCount(s.solved_step)
+                          s.solved       ? "solved at " + FormatCount(s.streak_step)
                           : run.finished ? "done, not solved"
                                          : "stopped",
                           progress.done, runs_->size(),
@@ -134,17 +134,17 @@ void ManyRunsView::PrintTable(const Variant& variant) const {
   size_t not_judged = 0, failed = 0;
   for (const SeedRun& run : *runs_) {
     if (run.variant != &variant) continue;
-    if (!run.result || run.result->best_step == 0) {
+    if (!run.state || run.state->best_step == 0) {
       ++(run.problem.empty() ? not_judged : failed);
       continue;
     }
     if (steps.empty()) {
       Say("  {:<12} {:>11}  {:>12}  {:>7}  {:>8}\n", "", "solved at", "after", "success", "return");
     }
-    const RunResult& s = *run.result;
+    const TrainState& s = *run.state;
     solved += s.solved ? 1 : 0;
-    steps.push_back(s.solved ? static_cast<double>(s.solved_step) : kNever);
-    seconds.push_back(s.solved ? s.solved_seconds : kNever);
+    steps.push_back(s.solved ? static_cast<double>(s.streak_step) : kNever);
+    seconds.push_back(s.solved ? s.streak_seconds : kNever);
     success.push_back(s.best_success_rate);
     reward.push_back(s.best_return);
     if (steps.size() > kMostRows) continue;

@@ -88,7 +88,9 @@ int WorkOnStudy(const std::filesystem::path& folder) {
   LoggedRuns host;
   const WorkerOutcome outcome = WorkOn(plan, host);
   Say("{}: {} done here, {} failed{}{}\n", Printable(folder.string()), outcome.done, outcome.failed,
-      outcome.anothers > 0 ? fmt::format(", {} with other workers", outcome.anothers) : "",
+      outcome.claimed_by_others > 0
+          ? fmt::format(", {} with other workers", outcome.claimed_by_others)
+          : "",
       outcome.stopped ? ", stopped" : "");
   if (outcome.stopped) return kTryAgain;
   return outcome.failed > 0 ? 1 : 0;
@@ -111,7 +113,7 @@ int PrintStudyStatus(const std::filesystem::path& folder) {
     const auto lease = ReadLease(run.claim());
     if (run.finished) {
       ++c.done;
-      c.solved += run.result->solved ? 1 : 0;
+      c.solved += run.state->solved ? 1 : 0;
     } else if (lease) {
       ++(lease->lost ? c.lost : c.running);
       lines.push_back(fmt::format("  {:<20} {:>11} steps  {} by {}, seen {} ago", run.name,
@@ -121,7 +123,7 @@ int PrintStudyStatus(const std::filesystem::path& folder) {
       ++c.failed;
       lines.push_back(fmt::format("  {:<20} failed: {}", run.name, Printable(run.problem)));
     } else {
-      ++(run.result ? c.stopped : c.waiting);
+      ++(run.state ? c.stopped : c.waiting);
     }
   }
   Say("{}\n", Printable(folder.string()));

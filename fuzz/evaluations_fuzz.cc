@@ -5,7 +5,7 @@
 namespace upswing {
 
 bool TryInput(std::string_view input) {
-  RunRecord run{"", {1, 1000000, 32, 10000, true, {20, 10, 10, 0}}, {}};
+  RunRecord run{"", 1, 1000000, 32, 10000, true, {20, 10, 10, 0}};
   // The last line of an unfinished run may be cut off; that of others must be whole.
   const bool whole =
       Accepts([&] { run.evaluations = ParseEvaluations(std::string(input), kInputName, false); });

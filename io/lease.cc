@@ -56,31 +56,18 @@ double SecondsOf(const timespec& time) {
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
-/// A new file beside `path` under a name that no other process takes.
-struct UniqueFile {
-  fs::path path;
-  Descriptor descriptor;
+struct stat InfoOf(const Making& file) {
+  struct stat info {};
+  if (fstat(file.descriptor(), &info) != 0) throw PathError("cannot read", file.path(), errno);
+  return info;
+}
 
-  UniqueFile(const fs::path& beside, std::string_view what)
-      : path(Concat(beside.string(), ".", what, "-", RandomDigits())),
-        descriptor(open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644)) {
-    if (descriptor.get() < 0) throw PathError("cannot write", path, errno);
-  }
-  ~UniqueFile() { unlink(path.c_str()); }
-  UniqueFile(const UniqueFile&) = delete;
-  UniqueFile& operator=(const UniqueFile&) = delete;
-
-  struct stat info() const {
-    struct stat now {};
-    if (fstat(descriptor.get(), &now) != 0) throw PathError("cannot read", path, errno);
-    return now;
-  }
-  /// The file server's clock.
-  double Now() const {
-    if (futimens(descriptor.get(), nullptr) != 0) throw PathError("cannot write", path, errno);
-    return SecondsOf(info().st_mtim);
-  }
-};
+/// The file server's clock.
+double ServerClock(const Making& file) {
+  if (futimens(file.descriptor(), nullptr) != 0)
+    throw PathError("cannot write", file.path(), errno);
+  return SecondsOf(InfoOf(file).st_mtim);
+}
 
 /// The text of a lease: host, process, and who that is. Where the file could not be locked, no
 /// lock says whether that process lives.
@@ -114,7 +101,7 @@ double SecondsSinceBoot() {
 /// The file server's clock, or this machine's where nothing can be written.
 double NowBeside(const fs::path& path) {
   try {
-    return UniqueFile(path, "look").Now();
+    return ServerClock(Making(path, Making::Kind::kFile));
   } catch (const Error&) {
     timespec now{};
     clock_gettime(CLOCK_REALTIME, &now);
@@ -167,25 +154,25 @@ bool Lease::held() const { return state_->held(); }
 
 std::optional<Lease> Lease::Take(const fs::path& path, std::string_view holder,
                                  std::chrono::seconds lasts) {
-  UniqueFile own(path, "claim");
-  const bool locked = flock(own.descriptor.get(), LOCK_EX | LOCK_NB) == 0;
+  const Making own(path, Making::Kind::kFile);
+  const bool locked = flock(own.descriptor(), LOCK_EX | LOCK_NB) == 0;
   const std::string text = TextOf(holder, locked);
-  if (write(own.descriptor.get(), text.data(), text.size()) != std::ssize(text)) {
-    throw PathError("cannot write", own.path, errno);
+  if (write(own.descriptor(), text.data(), text.size()) != std::ssize(text)) {
+    throw PathError("cannot write", own.path(), errno);
   }
   // Some servers make the link and lose the answer.
   const auto take = [&] {
-    return link(own.path.c_str(), path.c_str()) == 0 || own.info().st_nlink == 2;
+    return link(own.path().c_str(), path.c_str()) == 0 || InfoOf(own).st_nlink == 2;
   };
   bool taken = take();
   if (!taken && errno != EEXIST) throw PathError("cannot write", path, errno);
   if (!taken) {
     const std::optional<Opened> other = Open(path);
-    if (other && !IsLost(*other, ReadText(*other), own.Now(), lasts)) return std::nullopt;
+    if (other && !IsLost(*other, ReadText(*other), ServerClock(own), lasts)) return std::nullopt;
     if (other) {
       // Of several that find it lost one takes it away; who takes away another one's new lease
       // gives it back.
-      const fs::path gone = own.path.string() + "-lost";
+      const fs::path gone = own.path().string() + "-lost";
       if (rename(path.c_str(), gone.c_str()) != 0) return std::nullopt;
       struct stat moved {};
       const bool same = lstat(gone.c_str(), &moved) == 0 && SameFile(moved, other->info);
@@ -196,8 +183,10 @@ std::optional<Lease> Lease::Take(const fs::path& path, std::string_view holder,
     taken = take();
   }
   if (!taken) return std::nullopt;
-  const struct stat own_info = own.info();
-  auto state = std::make_unique<State>(path, std::move(own.descriptor), own_info, lasts);
+  // A second descriptor of the same open file keeps the lock when `own` gives up its other name.
+  Descriptor kept(fcntl(own.descriptor(), F_DUPFD_CLOEXEC, 0));
+  if (kept.get() < 0) throw PathError("cannot write", path, errno);
+  auto state = std::make_unique<State>(path, std::move(kept), InfoOf(own), lasts);
   state->renewing = std::jthread([state = state.get(), lasts](std::stop_token stop) {
     std::mutex mutex;
     std::condition_variable_any asked;

@@ -81,7 +81,7 @@ fs::path PlaceOf(const fs::path& path) {
 
 void RunFolder::Create(const fs::path& given,
                        const std::vector<std::pair<std::string, std::string>>& files,
-                       Tensors checkpoint) {
+                       Tensors& checkpoint) {
   const fs::path path = WithoutSlash(given);
   const fs::path place = PlaceOf(path);
   try {

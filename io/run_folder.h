@@ -41,10 +41,11 @@ class RunFolder {
 
   /// Makes the folder with these files in it (name, text) and the first checkpoint. Missing parent
   /// folders are made, as mkdir -p does; the folder itself appears under its name whole or not at
-  /// all (see Making). Throws BadInput if something is there already, and as PathError does.
+  /// all (see Making). Adds the tables' sizes to the checkpoint, with which the folder can be
+  /// opened. Throws BadInput if something is there already, and as PathError does.
   static void Create(const std::filesystem::path& path,
                      const std::vector<std::pair<std::string, std::string>>& files,
-                     Tensors checkpoint);
+                     Tensors& checkpoint);
 
   /// Opens a run whose checkpoint has been loaded; the caller holds its FolderLock. Throws
   /// BadInput, with nothing changed, if a table is shorter than its size in the checkpoint, or is

@@ -11,12 +11,12 @@ namespace {
 
 TEST(RunFolder, ATableKeepsItsColumnsWhateverVersionGoesOnWithIt) {
   const TempFolder temp;
-  RunFolder::Create(temp / "run", {{"config.toml", ""}}, Tensors());
+  Tensors first;
+  RunFolder::Create(temp / "run", {{"config.toml", ""}}, first);
   const auto reopened = [&] {
     return RunFolder(temp / "run", LoadTensors(RunFolder::CheckpointPath(temp / "run")));
   };
   {
-    const Tensors first = LoadTensors(RunFolder::CheckpointPath(temp / "run"));
     RunFolder run(temp / "run", first);
     run.LogEvaluation({{"step", 10}, {"success", 0.5}, {"old", 3}});
     Tensors checkpoint;

@@ -57,12 +57,17 @@ std::string RunsCsv(const Comparison& comparison) {
     const RunGroup& group = comparison.runs.groups[i];
     for (size_t k = 0; k < group.runs.size(); ++k) {
       const RunRecord& run = group.runs[k];
-      csv += Concat(Cell(group.label), ',', Cell(run.path.string()), ',', run.plan.seed, ',',
+      csv += Concat(Cell(group.label), ',', Cell(run.path.string()), ',', run.seed, ',',
                     run.evaluations.back().step, ',', FormatNumber(run.evaluations.back().seconds));
       for (const auto& [name, scores] : NamedScores()) {
         csv += Concat(',', FormatNumber((comparison.summaries[i].*scores).values[k]));
       }
-      csv += Concat(',', Cell(run.host), ',', Cell(run.processor), ',', Cell(run.vectors), '\n');
+      // Several of a run that was resumed elsewhere.
+      for (const auto* names :
+           {&run.conditions.hosts, &run.conditions.processors, &run.conditions.vectors}) {
+        csv += Concat(',', Cell(Join({names->begin(), names->end()}, " + ")));
+      }
+      csv += '\n';
     }
   }
   return csv;

@@ -11,7 +11,6 @@
 #include "core/format.h"
 #include "core/text.h"
 #include "run/model_info.h"
-#include "run/run_log.h"
 #include "setup/config.h"
 
 namespace upswing {
@@ -20,10 +19,10 @@ namespace {
 constexpr size_t kLongText = 48;  // longer ones are not shown
 
 /// The content of the model of its training and evaluations; kBuiltIn for the built-in one.
-const std::string& ModelOf(const FoundRun& f) { return f.settings.back().second; }
+const std::string& ModelOf(const RunRecord& f) { return f.settings.back().second; }
 
 /// What its group is called.
-std::string LabelOf(const FoundRun& f) {
+std::string LabelOf(const RunRecord& f) {
   return Concat(f.variant.empty() ? f.agent : f.variant,
                 ModelOf(f) == kBuiltIn ? "" : ", other model");
 }
@@ -44,14 +43,14 @@ using Wanted = bool (*)(const std::string& name);
 /// The settings of a run in which not all of `others` agree with it, such as `hidden [64, 64], head
 /// 32`.
 std::string Differences(
-    const FoundRun& of, const std::vector<const FoundRun*>& others,
+    const RunRecord& of, const std::vector<const RunRecord*>& others,
     Wanted wanted = [](const std::string& name) { return name != "train.agent"; }) {
   std::vector<std::string> parts;
   for (size_t i = 0; i < of.settings.size(); ++i) {
     const std::string& name = of.settings[i].first;
     const std::string& value = of.settings[i].second;  // clang 14 captures no structured binding
     const bool differs = std::ranges::any_of(
-        others, [&](const FoundRun* other) { return other->settings[i].second != value; });
+        others, [&](const RunRecord* other) { return other->settings[i].second != value; });
     if (!differs || !wanted(name)) continue;
     const std::string key = name.substr(name.find('.') + 1);
     parts.push_back(value.size() < kLongText ? Concat(key, " ", value) : key);
@@ -61,8 +60,8 @@ std::string Differences(
 
 /// Says of each group (`first` has a run of each) how it differs from the others, and gives those
 /// of one name a second one: their differences among each other, or a number where these are many.
-void TellGroupsApart(GroupedRuns& grouped, const std::vector<const FoundRun*>& first) {
-  std::map<std::string, std::vector<const FoundRun*>> namesakes;
+void TellGroupsApart(GroupedRuns& grouped, const std::vector<const RunRecord*>& first) {
+  std::map<std::string, std::vector<const RunRecord*>> namesakes;
   for (size_t i = 0; i < first.size(); ++i) {
     grouped.differences.push_back(Differences(*first[i], first));
     namesakes[grouped.groups[i].label].push_back(first[i]);
@@ -87,9 +86,9 @@ void NotePlans(const GroupedRuns& grouped, std::vector<std::string>& notes) {
     std::set<int64_t> budgets;
     std::set<bool> stops;
     for (const RunRecord& run : group.runs) {
-      budgets.insert(run.plan.steps);
-      stops.insert(run.plan.stop_when_solved);
-      of_all.emplace(run.plan.steps, run.plan.stop_when_solved);
+      budgets.insert(run.steps);
+      stops.insert(run.stop_when_solved);
+      of_all.emplace(run.steps, run.stop_when_solved);
     }
     if (budgets.size() > 1) {
       notes.push_back(fmt::format("{}: the runs have different budgets, {} to {} steps",
@@ -115,11 +114,11 @@ void NotePlans(const GroupedRuns& grouped, std::vector<std::string>& notes) {
 }
 
 /// Whether runs that should take the same time had different shares of their processors.
-void NoteLoads(const std::vector<FoundRun>& runs, std::vector<std::string>& notes) {
+void NoteLoads(const std::vector<RunRecord>& runs, std::vector<std::string>& notes) {
   std::map<std::pair<std::vector<Setting>, std::set<int64_t>>, std::vector<double>> busy;
-  for (const FoundRun& f : runs) {
-    const RunConditions& c = f.conditions;
-    if (c.busy) busy[{f.settings, c.threads}].push_back(*c.busy);
+  for (const RunRecord& run : runs) {
+    const RunConditions& c = run.conditions;
+    if (c.busy) busy[{run.settings, c.threads}].push_back(*c.busy);
   }
   for (const auto& [same_work, shares] : busy) {
     constexpr double kAlike = 0.75;
@@ -134,13 +133,13 @@ void NoteLoads(const std::vector<FoundRun>& runs, std::vector<std::string>& note
 }
 
 /// What the times depend on besides the settings, where it is not the same for all.
-void NoteTimes(const std::vector<FoundRun>& runs, std::vector<std::string>& notes) {
+void NoteTimes(const std::vector<RunRecord>& runs, std::vector<std::string>& notes) {
   std::map<int64_t, int> threads;  // how many runs had so many
   std::set<std::string> processors, vectors;
   std::set<int64_t> intervals;
-  for (const FoundRun& f : runs) {
+  for (const RunRecord& f : runs) {
     const RunConditions& c = f.conditions;
-    intervals.insert(f.run.plan.eval_every);
+    intervals.insert(f.eval_every);
     for (const int64_t count : c.threads) ++threads[count];
     for (const std::string& name : c.processors) processors.insert(Printable(name));
     for (const std::string& name : c.vectors) vectors.insert(Printable(name));
@@ -173,17 +172,17 @@ void NoteTimes(const std::vector<FoundRun>& runs, std::vector<std::string>& note
 }
 
 /// Numbers the tasks that groups (`first` has a run of each) are evaluated on, in their order.
-void TellTasksApart(GroupedRuns& grouped, const std::vector<const FoundRun*>& first) {
-  std::vector<const FoundRun*> tasks;  // a run of each
-  for (const FoundRun* run : first) {
-    const auto same = [&](const FoundRun* other) {
+void TellTasksApart(GroupedRuns& grouped, const std::vector<const RunRecord*>& first) {
+  std::vector<const RunRecord*> tasks;  // a run of each
+  for (const RunRecord* run : first) {
+    const auto same = [&](const RunRecord* other) {
       return Differences(*run, {other}, IsTask).empty();
     };
     const auto at = std::ranges::find_if(tasks, same);
     grouped.tasks.push_back(static_cast<int>(at - tasks.begin()));
     if (at == tasks.end()) tasks.push_back(run);
   }
-  for (const FoundRun* task : tasks) {
+  for (const RunRecord* task : tasks) {
     grouped.task_texts.push_back(Differences(*task, tasks, IsTask));
   }
 }
@@ -208,19 +207,19 @@ GroupedRuns GroupRuns(const CompareRequest& request) {
         others > 0 ? Concat("; no run is left to compare (", others, " more were left out)") : ""));
   }
   GroupedRuns grouped;
-  std::vector<const FoundRun*> first;  // of each group
-  for (const FoundRun& f : found.runs) {
-    const auto same = [&](const FoundRun* other) { return other->settings == f.settings; };
+  std::vector<const RunRecord*> first;  // of each group
+  for (const RunRecord& f : found.runs) {
+    const auto same = [&](const RunRecord* other) { return other->settings == f.settings; };
     const auto at = static_cast<size_t>(std::ranges::find_if(first, same) - first.begin());
     if (at == first.size()) {
       first.push_back(&f);
       grouped.groups.push_back({LabelOf(f), {}});
-      grouped.configs.push_back(f.config);
+      grouped.configs.push_back(found.configs.at(f.path));
     }
-    grouped.groups[at].runs.push_back(f.run);
+    grouped.groups[at].runs.push_back(f);
   }
   for (RunGroup& group : grouped.groups) {
-    std::ranges::sort(group.runs, {}, [](const RunRecord& run) { return run.plan.seed; });
+    std::ranges::sort(group.runs, {}, [](const RunRecord& run) { return run.seed; });
   }
   TellGroupsApart(grouped, first);
   TellTasksApart(grouped, first);

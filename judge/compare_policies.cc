@@ -22,9 +22,9 @@ std::vector<EnvConfig> FinalEvaluations(const GroupedRuns& runs, int task) {
     if (runs.tasks[i] != task) continue;
     Config config = *runs.configs[i];
     for (const RunRecord& run : runs.groups[i].runs) {
-      config.train.seed = run.plan.seed;
+      config.train.seed = run.seed;
       const int64_t step = run.evaluations.back().step;
-      if (!seen.emplace(run.plan.seed, step).second) continue;
+      if (!seen.emplace(run.seed, step).second) continue;
       episodes += config.train.eval_episodes;
       if (!evaluations.empty() && episodes > kMostJudged) return evaluations;
       EnvConfig& env = evaluations.emplace_back(EvaluationEnvironments(config, step));

@@ -13,6 +13,7 @@
 #include "io/making.h"
 #include "io/run_folder.h"
 #include "run/config_files.h"
+#include "run/finished_run.h"
 #include "run/model_info.h"
 #include "setup/config.h"
 #include "setup/controllers.h"
@@ -115,102 +116,103 @@ std::vector<Setting> SettingsOf(Config config) {
 }
 
 /// What a configuration says of a run, which has no evaluations yet.
-FoundRun Describe(const fs::path& path, const Config& config) {
+RunRecord Describe(const fs::path& path, const Config& config) {
   const TrainConfig& t = config.train;
   const EnvSpec spec = config.Spec();
-  return {{path,
-           {t.seed, t.steps, t.envs, t.eval_every, t.stop_when_solved, spec.evaluation,
-            spec.action_unit},
-           {}},
-          config.agent,
-          "",
-          SettingsOf(config),
-          {},
-          std::make_shared<const Config>(config)};
+  RunRecord run{path, t.seed, t.steps, t.envs, t.eval_every, t.stop_when_solved, spec.evaluation};
+  run.action_unit = spec.action_unit;
+  run.agent = config.agent;
+  run.settings = SettingsOf(config);
+  return run;
 }
 
-/// The runs of studies that are done, whose settings stand once for all seeds.
-class StudyRuns {
+/// Reads runs, those of studies that are done from their result files.
+class RunReader {
  public:
-  /// Nothing if it is no such run, or if it went on since.
-  std::optional<FoundRun> Read(const fs::path& path) {
-    const auto seed = SeedOf(path);
-    if (!seed) return std::nullopt;
-    const auto result = ReadDone(DoneOf(path));
-    if (!result) return std::nullopt;
-    std::error_code error;
-    const fs::path table = path / RunFolder::kEvaluations;
-    if (fs::exists(table, error) && fs::file_size(table, error) != result->evaluations.size()) {
-      return std::nullopt;
+  RunReader(const CompareRequest& request, Found& found) : request_(request), found_(found) {}
+
+  /// Adds a run among those in the folder `argument`. Throws BadInput.
+  void Read(const fs::path& path, const fs::path& argument) {
+    const bool is_run = IsRun(path);
+    std::optional<RunRecord> run;
+    try {
+      run = ReadDone(path);
+    } catch (const Error&) {
+      if (!is_run) throw;  // its folder says all, too
     }
-    const OfVariant& variant = Of(path.parent_path());
-    if (variant.mark != result->settings) return std::nullopt;
-    FoundRun found = variant.run;
-    found.run.path = path;
-    found.run.plan.seed = *seed;
-    found.run.plan.steps = result->planned_steps;
-    found.run.plan.stop_when_solved = result->stop_when_solved;
-    found.conditions = result->conditions;
-    found.run.evaluations = ParseEvaluations(result->evaluations, DoneOf(path).string(), false);
-    return found;
+    if (!run && !is_run) {
+      throw BadInput(Concat(DoneOf(path).string(),
+                            ": made with other settings than those beside it, ",
+                            (path.parent_path() / kSettingsName).string()));
+    }
+    if (!run) {
+      const auto config = std::make_shared<const Config>(ReadRunConfig(path));
+      run = Describe(path, *config);
+      run->conditions = RunConditions::Of(path);
+      run->evaluations = ReadEvaluations(path, request_.unfinished);
+      found_.configs[path] = config;
+    }
+    // STUDY/VARIANT/seed1: the variant has a name of its own.
+    const fs::path below =
+        path.lexically_relative(request_.root.empty() ? argument : request_.root);
+    if (std::distance(below.begin(), below.end()) > 1) {
+      run->variant = path.parent_path().filename().string();
+    }
+    found_.runs.push_back(std::move(*run));
   }
 
  private:
-  struct OfVariant {
-    FoundRun run;
+  /// A variant of a study: what all of its seeds have in common.
+  struct VariantRuns {
+    std::shared_ptr<const Config> config;
+    RunRecord common;
     std::string mark;
   };
 
-  const OfVariant& Of(const fs::path& folder) {
-    const auto found = variants_.find(folder);
-    if (found != variants_.end()) return found->second;
+  /// From a run's result file; nothing if there is none, or if the run went on since.
+  std::optional<RunRecord> ReadDone(const fs::path& path) {
+    const auto seed = SeedOf(path);
+    if (!seed) return std::nullopt;
+    const auto done = FinishedRun::Read(DoneOf(path));
+    if (!done) return std::nullopt;
+    std::error_code error;
+    const fs::path table = path / RunFolder::kEvaluations;
+    if (fs::exists(table, error) && fs::file_size(table, error) != done->evaluations.size()) {
+      return std::nullopt;
+    }
+    const VariantRuns& variant = Of(path.parent_path());
+    if (variant.mark != done->settings) return std::nullopt;
+    RunRecord run = variant.common;
+    run.path = path;
+    run.seed = *seed;
+    run.steps = done->planned_steps;
+    run.stop_when_solved = done->stop_when_solved;
+    run.conditions = done->conditions;
+    run.evaluations = ParseEvaluations(done->evaluations, DoneOf(path).string(), false);
+    found_.configs[path] = variant.config;
+    return run;
+  }
+
+  const VariantRuns& Of(const fs::path& folder) {
+    const auto at = variants_.find(folder);
+    if (at != variants_.end()) return at->second;
     Config config = BuildConfig(folder / kSettingsName, {});
     MakeReadyForMany(config);
-    return variants_.emplace(folder, OfVariant{Describe(folder, config), SettingsMark(config)})
+    return variants_
+        .emplace(folder, VariantRuns{std::make_shared<const Config>(config),
+                                     Describe(folder, config), SettingsMark(config)})
         .first->second;
   }
 
-  std::map<fs::path, OfVariant> variants_;
+  const CompareRequest& request_;
+  Found& found_;
+  std::map<fs::path, VariantRuns> variants_;
 };
-
-FoundRun ReadRun(const fs::path& path, const fs::path& root, bool unfinished, StudyRuns& studies) {
-  FoundRun found;
-  const bool is_run = IsRun(path);
-  std::optional<FoundRun> done;
-  try {
-    done = studies.Read(path);
-  } catch (const Error&) {
-    if (!is_run) throw;  // its folder says all, too
-  }
-  if (done) {
-    found = std::move(*done);
-  } else if (!is_run) {
-    throw BadInput(Concat(DoneOf(path).string(),
-                          ": made with other settings than those beside it, ",
-                          (path.parent_path() / kSettingsName).string()));
-  } else {
-    found = Describe(path, ReadRunConfig(path));
-    found.conditions = ReadConditions(path);
-    found.run.evaluations = ReadEvaluations(path, unfinished);
-  }
-  const auto joined = [](const std::set<std::string>& names) {
-    return Join({names.begin(), names.end()}, " + ");
-  };
-  found.run.host = joined(found.conditions.hosts);
-  found.run.processor = joined(found.conditions.processors);
-  found.run.vectors = joined(found.conditions.vectors);
-  // STUDY/VARIANT/seed1: the variant has a name of its own.
-  const fs::path below = path.lexically_relative(root);
-  if (std::distance(below.begin(), below.end()) > 1) {
-    found.variant = path.parent_path().filename().string();
-  }
-  return found;
-}
 
 /// Reads all runs; what cannot be read is left out.
 Found ReadRuns(const CompareRequest& request) {
   Found found;
-  StudyRuns studies;
+  RunReader reader(request, found);
   std::set<fs::path> seen;
   for (const fs::path& argument : request.paths) {
     for (const fs::path& path : RunsIn(argument, found)) {
@@ -218,8 +220,7 @@ Found ReadRuns(const CompareRequest& request) {
         throw BadInput(Concat(path.string(), ": given twice; expected each run once"));
       }
       try {
-        found.runs.push_back(ReadRun(path, request.root.empty() ? argument : request.root,
-                                     request.unfinished, studies));
+        reader.Read(path, argument);
       } catch (const Error& error) {
         // Most messages begin with the file.
         const std::string what = error.what();
@@ -240,23 +241,23 @@ int64_t LastStep(const RunRecord& run) {
 }
 
 /// Of runs that are the same training, keeps the one that went furthest, of equals the first.
-void LeaveOutTwins(Found& found) {
-  const auto key = [](const FoundRun& f) { return std::pair(f.run.plan.seed, f.settings); };
+void DropDuplicates(Found& found) {
+  const auto key = [](const RunRecord& run) { return std::pair(run.seed, run.settings); };
   struct Furthest {
     fs::path path;
     int64_t step;
   };
   std::map<std::pair<int64_t, std::vector<Setting>>, Furthest> furthest;
-  for (const FoundRun& f : found.runs) {
-    const int64_t step = LastStep(f.run);
-    const auto [at, is_new] = furthest.try_emplace(key(f), Furthest{f.run.path, step});
-    if (!is_new && step > at->second.step) at->second = {f.run.path, step};
+  for (const RunRecord& run : found.runs) {
+    const int64_t step = LastStep(run);
+    const auto [at, is_new] = furthest.try_emplace(key(run), Furthest{run.path, step});
+    if (!is_new && step > at->second.step) at->second = {run.path, step};
   }
-  std::erase_if(found.runs, [&](const FoundRun& f) {
-    const fs::path& kept = furthest.at(key(f)).path;
-    if (f.run.path == kept) return false;
-    found.LeaveOut(f.run.path, Concat("the same training as ", kept.string(),
-                                      " (all settings and seed ", f.run.plan.seed, ")"));
+  std::erase_if(found.runs, [&](const RunRecord& run) {
+    const fs::path& kept = furthest.at(key(run)).path;
+    if (run.path == kept) return false;
+    found.LeaveOut(run.path, Concat("the same training as ", kept.string(),
+                                    " (all settings and seed ", run.seed, ")"));
     return true;
   });
 }
@@ -264,8 +265,7 @@ void LeaveOutTwins(Found& found) {
 /// Takes out runs without an evaluation, and unfinished ones unless they are asked for; then they
 /// are noted.
 void LeaveOutUnfinished(Found& found, bool unfinished) {
-  std::erase_if(found.runs, [&](const FoundRun& f) {
-    const RunRecord& run = f.run;
+  std::erase_if(found.runs, [&](const RunRecord& run) {
     if (Finished(run)) return false;
     if (run.evaluations.empty()) {
       found.LeaveOut(run.path, "has no evaluation yet");
@@ -273,7 +273,7 @@ void LeaveOutUnfinished(Found& found, bool unfinished) {
     }
     const std::string how_far =
         fmt::format("is unfinished, evaluated up to step {} of {}",
-                    FormatCount(run.evaluations.back().step), FormatCount(run.plan.steps));
+                    FormatCount(run.evaluations.back().step), FormatCount(run.steps));
     if (unfinished) {
       found.notes.push_back(Concat(run.path.string(), ": ", how_far));
     } else {
@@ -292,7 +292,7 @@ void Found::LeaveOut(const fs::path& path, std::string_view why) {
 
 Found FindRuns(const CompareRequest& request) {
   Found found = ReadRuns(request);
-  LeaveOutTwins(found);
+  DropDuplicates(found);
   LeaveOutUnfinished(found, request.unfinished);
   return found;
 }

@@ -1,14 +1,13 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "report/runs.h"
-#include "run/run_log.h"
 #include "setup/config.h"
 
 namespace upswing {
@@ -21,21 +20,11 @@ struct CompareRequest {
   bool different_tasks = false;     // also compare groups evaluated on different tasks
 };
 
-/// Name (`section.key`) and value of a setting; that of the model's content is kModelContent.
-using Setting = std::pair<std::string, std::string>;
-
-/// A run with its settings.
-struct FoundRun {
-  RunRecord run;
-  std::string agent, variant;     // its named agent; its folder's name within a study, or empty
-  std::vector<Setting> settings;  // those that distinguish trainings, without the seed
-  RunConditions conditions;       // what its times depend on
-  std::shared_ptr<const Config> config = {};  // that of a study's variant has another seed
-};
-
 /// The runs that are compared, and a line for each that is not.
 struct Found {
-  std::vector<FoundRun> runs;
+  std::vector<RunRecord> runs;
+  // Of each run by its path, or of the variant that it is a seed of.
+  std::map<std::filesystem::path, std::shared_ptr<const Config>> configs;
   std::vector<std::string> left_out, notes;
 
   void LeaveOut(const std::filesystem::path& path, std::string_view why);

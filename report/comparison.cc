@@ -30,7 +30,7 @@ double WhenSolved(const RunRecord& run, const std::function<double(const Evaluat
 /// The evaluation whose policy the run kept.
 const EvaluationRow& Best(const RunRecord& run) {
   return *std::ranges::max_element(run.evaluations, {}, [&](const EvaluationRow& row) {
-    return run.plan.rule.Score(row.success_rate, row.mean_return);
+    return run.rule.Score(row.success_rate, row.mean_return);
   });
 }
 

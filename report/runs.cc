@@ -2,6 +2,7 @@
 
 #include "core/csv.h"
 #include "core/error.h"
+#include "core/solved.h"
 #include "core/steps.h"
 #include "core/text.h"
 #include "io/file.h"
@@ -53,26 +54,22 @@ std::vector<EvaluationRow> ParseEvaluations(std::string text, const std::string&
 }
 
 std::optional<size_t> SolvedAt(const RunRecord& run) {
-  const RunPlan& plan = run.plan;
-  std::optional<size_t> first;  // of a streak
+  int64_t streak = 0;
+  size_t first = 0;
   for (size_t i = 0; i < run.evaluations.size(); ++i) {
     const EvaluationRow& row = run.evaluations[i];
-    if (!IsDue(row.step - plan.envs, row.step, plan.eval_every)) continue;
-    if (!plan.rule.Passed(row.success_rate, row.mean_return)) {
-      first.reset();
-    } else if (first) {
-      return first;
-    } else {
-      first = i;
-    }
+    if (!IsDue(row.step - run.envs, row.step, run.eval_every)) continue;
+    const bool solved = CountsAsSolved(run.rule.Passed(row.success_rate, row.mean_return), streak);
+    if (streak == 1) first = i;
+    if (solved) return first;
   }
   return std::nullopt;
 }
 
 bool Finished(const RunRecord& run) {
   if (run.evaluations.empty()) return false;
-  const bool used_up = run.evaluations.back().step >= run.plan.steps;
-  return used_up || (run.plan.stop_when_solved && SolvedAt(run).has_value());
+  return IsFinished(run.evaluations.back().step, run.steps, SolvedAt(run).has_value(),
+                    run.stop_when_solved);
 }
 
 }  // namespace upswing

@@ -5,9 +5,11 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/evaluation_rule.h"
+#include "io/run_conditions.h"
 
 namespace upswing {
 
@@ -26,23 +28,21 @@ struct EvaluationRow {
   static constexpr double kUnknown = std::numeric_limits<double>::infinity();
 };
 
-/// The settings of a run that a comparison needs.
-struct RunPlan {
-  int64_t seed, steps;       // steps: the budget
-  int64_t envs, eval_every;  // parallel environments; steps between two evaluations
-  bool stop_when_solved;
-  EvaluationRule rule;              // of the task
-  std::string action_unit = "N·m";  // of its torques
-};
+/// Name (`section.key`) and value of a setting; that of the model's content is kModelContent.
+using Setting = std::pair<std::string, std::string>;
 
-/// A training, read from its folder.
+/// A training, read from its folder or from its result file.
 struct RunRecord {
   std::filesystem::path path;
-  RunPlan plan;
-  std::vector<EvaluationRow> evaluations;  // in the order of their steps
-  // Where it was trained, with what instructions; several after each other joined by " + ", empty
-  // where that is not known.
-  std::string host = {}, processor = {}, vectors = {};
+  int64_t seed = 0, steps = 0;       // steps: the budget
+  int64_t envs = 0, eval_every = 0;  // parallel environments; steps between two evaluations
+  bool stop_when_solved = false;
+  EvaluationRule rule;                          // of the task
+  std::string action_unit = "N·m";              // of its torques
+  std::vector<EvaluationRow> evaluations = {};  // in the order of their steps
+  std::string agent = {}, variant = {};  // its named agent; its name within a study, or empty
+  std::vector<Setting> settings = {};    // those that distinguish trainings, without the seed
+  RunConditions conditions = {};         // what its times depend on
 };
 
 /// Reads evals.csv of a run folder; a file that does not exist yet is an empty table. Throws

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <numeric>
 
+#include "core/solved.h"
 #include "core/text.h"
 
 namespace upswing {
@@ -117,15 +118,10 @@ void Trainer::KeepAsBest(const Evaluation& e) {
 void Trainer::CountStreak(const Evaluation& e) {
   TrainState& s = state_;
   if (s.solved) return;
-  if (!e.passed) {
-    s.streak = 0;
-    return;
-  }
-  if (++s.streak == 1) {
-    s.streak_step = s.steps;
-    s.streak_seconds = s.seconds;
-  }
-  s.solved = s.streak == 2;
+  s.solved = CountsAsSolved(e.passed, s.streak);
+  if (s.streak != 1) return;
+  s.streak_step = s.steps;
+  s.streak_seconds = s.seconds;
 }
 
 void Trainer::State(const Archive& archive) {
@@ -184,7 +180,7 @@ double TrainState::mean_return() const {
 }
 
 bool TrainState::Finished(const TrainConfig& config) const {
-  return steps >= config.steps || (solved && config.stop_when_solved);
+  return IsFinished(steps, config.steps, solved, config.stop_when_solved);
 }
 
 void TrainState::State(const Archive& archive) {

@@ -80,8 +80,8 @@ class TrainerTest : public ::testing::Test, protected TrainObserver {
   DqnConfig dqn_;
   std::vector<int64_t> scripted_;  // successes of 4, one for each evaluation
   int evaluations_ = 0;
-  std::vector<int64_t> confirmations_;  // successes of 4 by the stricter judge; empty: there is none
-  std::vector<int64_t> confirmed_;      // steps at which it was asked
+  // Of the stricter judge, if there is one: successes of 4, and the steps at which it was asked.
+  std::vector<int64_t> confirmations_, confirmed_;
   // What it was told.
   std::vector<std::pair<int64_t, double>> episodes_;  // step and return
   std::vector<int64_t> metrics_, best_;               // steps

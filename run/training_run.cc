@@ -1,15 +1,17 @@
 #include "run/training_run.h"
 
 #include <algorithm>
+#include <chrono>
+#include <ctime>
 #include <utility>
 
 #include "core/error.h"
 #include "core/text.h"
 #include "io/file.h"
 #include "io/machine.h"
+#include "io/run_conditions.h"
 #include "io/tensor_file.h"
 #include "run/config_files.h"
-#include "run/run_log.h"
 #include "run/run_rows.h"
 #include "run/this_host.h"
 
@@ -26,25 +28,44 @@ fs::path FreeRunFolder(const Config& config) {
   return path;
 }
 
+/// The time that this process has taken since the clock was made, of the wall and of its threads.
+class WorkClock {
+ public:
+  double seconds() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+  }
+  /// Share of the time in which `threads` threads were at work, about 0 to 1.
+  double busy(int threads) const {
+    const double at_work = static_cast<double>(std::clock() - cpu_begin_) / CLOCKS_PER_SEC;
+    return at_work / std::max(1e-9, seconds() * threads);
+  }
+
+ private:
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+  std::clock_t cpu_begin_ = std::clock();
+};
+
 }  // namespace
 
 bool StepsGiven(const std::vector<FlagValue>& flags) {
   return std::ranges::any_of(flags, [](const FlagValue& flag) { return flag.name == "steps"; });
 }
 
+TrainingRun::TrainingRun(fs::path path, const Config& config)
+    : path_(std::move(path)), training_(config, ThisHost(ResolveThreads(config.train.threads)), {this}) {}
+
 std::unique_ptr<TrainingRun> TrainingRun::Make(const fs::path& out, Config config) {
   NameModelCopy(config);
-  std::unique_ptr<TrainingRun> run(new TrainingRun(out.empty() ? FreeRunFolder(config) : out));
-  const int threads = ResolveThreads(config.train.threads);
-  run->training_ = std::make_unique<Training>(std::move(config), ThisHost(threads),
-                                              std::vector<TrainObserver*>{run.get()});
-  const Config& made = run->training_->config();
+  const fs::path path = out.empty() ? FreeRunFolder(config) : out;
+  std::unique_ptr<TrainingRun> run(new TrainingRun(path, config));
+  const Config& made = run->training_.config();
   std::vector<std::pair<std::string, std::string>> files{
       {RunFolder::kConfig, ConfigToml(made, false)}};
   if (!made.mjcf.empty()) files.emplace_back(RunFolder::kModel, made.mjcf);
-  RunFolder::Create(run->path_, files, run->training_->Checkpoint());
-  run->lock_.emplace(run->path_);
-  run->Open();
+  Tensors checkpoint = run->training_.Checkpoint();
+  RunFolder::Create(path, files, checkpoint);
+  run->lock_.emplace(path);
+  run->folder_.emplace(path, checkpoint);
   return run;
 }
 
@@ -54,36 +75,31 @@ std::unique_ptr<TrainingRun> TrainingRun::Resume(const fs::path& path,
     throw BadInput(
         Concat("--resume ", path.string(), ": expected a run folder with a config.toml"));
   }
-  std::unique_ptr<TrainingRun> run(new TrainingRun(path));
-  run->lock_.emplace(path);  // before anything of it is read
+  FolderLock lock(path);  // before anything of it is read
   Config config = ReadRunConfig(path, flags);
   NameModelCopy(config);
-  const int64_t steps = config.train.steps;
-  const int threads = ResolveThreads(config.train.threads);
-  run->training_ = std::make_unique<Training>(std::move(config), ThisHost(threads),
-                                              std::vector<TrainObserver*>{run.get()});
-  run->Open();
-  const int64_t done = run->training_->state().steps;
-  if (StepsGiven(flags) && steps < done) {
-    throw BadInput(Concat("--steps: the run is at step ", done,
+  std::unique_ptr<TrainingRun> run(new TrainingRun(path, config));
+  run->lock_.emplace(std::move(lock));
+  Training& training = run->training_;
+  const Tensors checkpoint = LoadTensors(RunFolder::CheckpointPath(path));
+  training.Load(checkpoint);
+  run->checkpoint_at_ = training.state().steps;
+  run->folder_.emplace(path, checkpoint);
+  const int64_t steps = training.config().train.steps;
+  if (StepsGiven(flags) && steps < run->checkpoint_at_) {
+    throw BadInput(Concat("--steps: the run is at step ", run->checkpoint_at_,
                           " already; expected at least that in all, got ", steps));
   }
-  WriteFileAtomically(path / RunFolder::kConfig, ConfigToml(run->training_->config(), false));
+  WriteFileAtomically(path / RunFolder::kConfig, ConfigToml(training.config(), false));
   return run;
-}
-
-void TrainingRun::Open() {
-  const Tensors checkpoint = LoadTensors(RunFolder::CheckpointPath(path_));
-  training_->Load(checkpoint);
-  checkpoint_at_ = training_->state().steps;
-  folder_.emplace(path_, checkpoint);
 }
 
 bool TrainingRun::Train(Driver& driver) {
   view_ = &driver;
   const WorkClock clock;
-  const TrainState& s = training_->state();
-  folder_->Log(BeginLine(s.steps > 0, s.steps, training_->threads()));
+  const TrainState& s = training_.state();
+  folder_->Log(Concat(s.steps > 0 ? "resumed" : "started", " at step ", s.steps, " ",
+                      BeginFacts(training_.threads(), UPSWING_VERSION)));
   bool finished = false;
   try {
     finished = Loop(driver);
@@ -94,25 +110,26 @@ bool TrainingRun::Train(Driver& driver) {
     LogIfPossible(failure.what());
     throw failure;
   }
-  folder_->Log(EndLine(finished, s.steps, training_->threads(), clock));
+  folder_->Log(Concat(finished ? "finished" : "stopped", " at step ", s.steps, " ",
+                      EndFacts(clock.seconds(), clock.busy(training_.threads()))));
   return finished;
 }
 
 bool TrainingRun::Loop(Driver& driver) {
-  const int64_t every = training_->config().train.checkpoint_every;
-  while (training_->Step()) {
-    const TrainRequest request = driver.AfterStep(training_->state());
-    if (training_->trainer().IsDue(every) || request != TrainRequest::kGoOn) SaveCheckpoint();
-    if (request == TrainRequest::kStop) return training_->trainer().finished();
+  const int64_t every = training_.config().train.checkpoint_every;
+  while (training_.Step()) {
+    const TrainRequest request = driver.AfterStep(training_.state());
+    if (training_.trainer().IsDue(every) || request != TrainRequest::kGoOn) SaveCheckpoint();
+    if (request == TrainRequest::kStop) return training_.trainer().finished();
   }
-  if (checkpoint_at_ != training_->state().steps) SaveCheckpoint();
+  if (checkpoint_at_ != training_.state().steps) SaveCheckpoint();
   return true;
 }
 
 void TrainingRun::SaveCheckpoint() {
-  Tensors checkpoint = training_->Checkpoint();
+  Tensors checkpoint = training_.Checkpoint();
   folder_->SaveCheckpoint(checkpoint);
-  checkpoint_at_ = training_->state().steps;
+  checkpoint_at_ = training_.state().steps;
 }
 
 void TrainingRun::LogIfPossible(const std::string& line) {
@@ -123,7 +140,7 @@ void TrainingRun::LogIfPossible(const std::string& line) {
 }
 
 void TrainingRun::OnEpisode(const TrainState& s, const FinishedEpisode& episode) {
-  folder_->LogEpisode(EpisodeRow(s, episode, training_->spec()));
+  folder_->LogEpisode(EpisodeRow(s, episode, training_.spec()));
   view_->OnEpisode(s, episode);
 }
 

@@ -29,7 +29,7 @@ class TrainingRun : private TrainObserver {
   static std::unique_ptr<TrainingRun> Resume(const std::filesystem::path& path,
                                              const std::vector<FlagValue>& flags = {});
 
-  const Training& training() const { return *training_; }
+  const Training& training() const { return training_; }
   const std::filesystem::path& path() const { return path_; }
 
   /// Who drives a run, besides being told how it goes on.
@@ -39,14 +39,13 @@ class TrainingRun : private TrainObserver {
     virtual TrainRequest AfterStep(const TrainState&) { return TrainRequest::kGoOn; }
   };
 
-  /// Trains to the end, or until the driver asks to stop; then the state is on disk. Returns
-  /// whether it has ended. Throws Failure that names the step and the last complete checkpoint.
+  /// Trains to the end, or until the driver requests to stop; then the state is on disk. The driver
+  /// is told after the folder is written. Returns whether the training has ended. Throws Failure
+  /// that names the step and the last complete checkpoint.
   bool Train(Driver& driver);
 
  private:
-  explicit TrainingRun(std::filesystem::path path) : path_(std::move(path)) {}
-  /// Loads the checkpoint and opens the tables, with the folder locked.
-  void Open();
+  TrainingRun(std::filesystem::path path, const Config& config);
   bool Loop(Driver& driver);
   void SaveCheckpoint();
   void LogIfPossible(const std::string& line);
@@ -57,8 +56,8 @@ class TrainingRun : private TrainObserver {
   void OnBest(const TrainState& s, const Policy& policy) override;
 
   std::filesystem::path path_;
+  Training training_;
   std::optional<FolderLock> lock_;
-  std::unique_ptr<Training> training_;
   std::optional<RunFolder> folder_;
   TrainObserver* view_ = nullptr;  // told after the folder is written
   int64_t checkpoint_at_ = 0;      // step of the last checkpoint

@@ -52,9 +52,8 @@ Training::Training(Config config, const Host& host, std::vector<TrainObserver*> 
       trainer_(MakeSetup(std::move(observers)), *agent_, *env_) {}
 
 TrainSetup Training::MakeSetup(std::vector<TrainObserver*> observers) {
-  TrainSetup setup{.config = config_.train,
-                   .policy_info = InfoOf(config_),
-                   .observers = std::move(observers)};
+  TrainSetup setup{
+      .config = config_.train, .policy_info = InfoOf(config_), .observers = std::move(observers)};
   setup.evaluate = [this](const Policy& policy, int64_t step) { return Evaluate(policy, step); };
   if (IsScreened(config_)) {
     setup.confirm = [this](const Policy& policy, int64_t step) {

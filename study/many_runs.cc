@@ -68,7 +68,7 @@ void CheckRuns(const fs::path& folder, const Config& config, bool more_steps) {
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     if (IsMakingName(entry.path().filename().string())) continue;
     if (!fs::is_regular_file(entry.path() / RunFolder::kConfig, error)) continue;
-    const auto done = ReadDone(entry.path().string() + ".done");
+    const auto done = FinishedRun::Read(entry.path().string() + ".done");
     const bool same = done && done->settings == mark && done->version == UPSWING_VERSION &&
                       done->planned_steps == config.train.steps &&
                       done->stop_when_solved == config.train.stop_when_solved;
@@ -77,16 +77,6 @@ void CheckRuns(const fs::path& folder, const Config& config, bool more_steps) {
   const fs::path settings = folder / kSettingsName;
   if (!fs::is_regular_file(settings, error)) return;
   CheckSame(BuildConfig(settings, {}), config, more_steps, settings.string());
-}
-
-/// Removes what processes that were killed left of their claims' other names.
-void RemoveStrays(const fs::path& folder) {
-  const auto old = fs::file_time_type::clock::now() - 2 * Lease::kUsual;
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    std::error_code error;
-    const bool is_stray = entry.path().filename().string().find(".claim.") != std::string::npos;
-    if (is_stray && entry.last_write_time(error) < old && !error) fs::remove(entry.path(), error);
-  }
 }
 
 /// All runs as they stand.
@@ -271,7 +261,6 @@ FolderLock Prepare(const ManyRuns& many, const std::function<void()>& checked) {
     fs::remove(run.failed());                                                  // it is tried again
     if (fs::exists(run.claim())) (void)Lease::Take(run.claim(), "tidies up");  // if it is lost
   }
-  for (const Variant& variant : plan.variants) RemoveStrays(plan.folder / variant.name);
   return lock ? std::move(*lock) : FolderLock(plan.folder);
 }
 

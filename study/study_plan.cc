@@ -45,8 +45,8 @@ Keep ParseKeep(std::string_view text, const std::string& where) {
 }
 
 int64_t SeedRun::Steps() const {
-  if (finished) return result->steps;
-  const int64_t at_checkpoint = result ? result->steps : 0;
+  if (finished) return state->steps;
+  const int64_t at_checkpoint = state ? state->steps : 0;
   // A row begins with its step; the last one may be half written.
   const std::string tail = TailOf(path / RunFolder::kMetrics, 1024);
   const std::vector<std::string_view> rows = Split(tail, '\n');
@@ -61,13 +61,15 @@ bool SeedRun::HasFailed() const {
 }
 
 bool SeedRun::ReadIfFinished() {
-  result = ReadDone(done());
+  state.reset();
+  const auto result = FinishedRun::Read(done());
   if (result && result->settings != settings) {
     throw BadInput(Concat(done().string(), ": made with other settings than ",
                           (path.parent_path() / kSettingsName).string(), " has"));
   }
+  if (result) state = result->state;
   finished = AtEnd();
-  if (!finished) result.reset();  // that of fewer steps
+  if (!finished) state.reset();  // that of fewer steps
   return finished;
 }
 
@@ -79,7 +81,7 @@ void SeedRun::Read() {
     if (problem.empty()) problem = "failed";
   }
   if (!ReadIfFinished() && !IsReduced()) {
-    result = ReadCheckpointResult(path, variant->config.Spec());
+    state = ReadTrainState(path, variant->config.Spec());
   }
 }
 

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "run/run_result.h"
+#include "run/finished_run.h"
 #include "setup/config.h"
 
 namespace upswing {
@@ -45,25 +45,25 @@ struct SeedRun {
   int64_t seed;
   std::string name;                 // such as `seed3` or `dqn/seed3`
   std::filesystem::path path;       // of its folder
-  std::optional<RunResult> result;  // where it stands; nothing: it has not begun
+  std::optional<TrainState> state;  // where it stands; nothing: it has not begun
   std::string problem;              // why it failed; empty if it did not
-  bool finished = false;            // it says so itself: its result is in done()
+  bool finished = false;            // it says so itself, in done()
 
   std::filesystem::path log() const { return With(".log"); }        // what it printed
   std::filesystem::path claim() const { return With(".claim"); }    // the Lease of who trains it
   std::filesystem::path done() const { return With(".done"); }      // its result
   std::filesystem::path failed() const { return With(".failed"); }  // why it failed, one line
   /// Whether it stands at its end, though perhaps it does not say so yet.
-  bool AtEnd() const { return result && result->Finished(variant->config.train); }
+  bool AtEnd() const { return state && state->Finished(variant->config.train); }
   /// Whether it is said that it failed.
   bool HasFailed() const;
   /// Whether it was done, and what resuming it takes was not kept.
   bool IsReduced() const;
   /// Steps made, of its checkpoint or, where that is further, of its metrics.
   int64_t Steps() const;
-  /// Reads again whether it is finished, and its result then. Throws BadInput.
+  /// Reads again whether it is finished, and its state then. Throws BadInput.
   bool ReadIfFinished();
-  /// Reads result and problem again. Throws BadInput.
+  /// Reads state and problem again. Throws BadInput.
   void Read();
 
  private:

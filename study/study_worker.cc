@@ -59,15 +59,15 @@ class Worker {
       for (auto it = open.begin(); it != open.end() && !outcome_.stopped;) {
         const Turn turn = Try(**it);
         tried = tried || turn == Turn::kTried;
-        it = turn == Turn::kAnothers ? std::next(it) : open.erase(it);
+        it = turn == Turn::kClaimedByOthers ? std::next(it) : open.erase(it);
       }
     }
-    outcome_.anothers = std::ssize(open);
+    outcome_.claimed_by_others = std::ssize(open);
     return outcome_;
   }
 
  private:
-  enum class Turn { kNothingToDo, kAnothers, kTried };
+  enum class Turn { kNothingToDo, kClaimedByOthers, kTried };
 
   Turn Try(SeedRun& run) {
     outcome_.stopped = host_.stopped();
@@ -78,13 +78,13 @@ class Worker {
       if (ended && !fs::exists(run.claim())) return Turn::kNothingToDo;
       if (auto taken = Lease::Take(run.claim(), "trains it")) lease.emplace(std::move(*taken));
       if (ended) return Turn::kNothingToDo;  // its worker died before it gave the claim back
-      if (!lease) return Turn::kAnothers;
+      if (!lease) return Turn::kClaimedByOthers;
       if (run.HasFailed() || run.ReadIfFinished()) return Turn::kNothingToDo;  // meanwhile
       Train(run, *lease);
     } catch (const FolderBusy&) {  // whoever lost the claim is still at work there
-      return Turn::kAnothers;
+      return Turn::kClaimedByOthers;
     } catch (const std::exception& error) {
-      if (lease && !lease->held()) return Turn::kAnothers;
+      if (lease && !lease->held()) return Turn::kClaimedByOthers;
       CountFailure(run, error);
     }
     return Turn::kTried;
@@ -129,7 +129,7 @@ class Worker {
 void WriteEvaluations(const StudyPlan& plan) {
   std::string columns, table;
   for (const SeedRun& run : RunsOf(plan)) {
-    const auto result = ReadDone(run.done());
+    const auto result = FinishedRun::Read(run.done());
     if (!result) continue;
     bool is_first = true;
     for (const std::string_view line : Split(result->evaluations, '\n')) {
@@ -156,16 +156,17 @@ void WriteFailed(const SeedRun& run, const std::string& why) {
 WorkerOutcome WorkOn(const StudyPlan& plan, WorkerHost& host) { return Worker(plan, host).Run(); }
 
 void Finish(const SeedRun& run, Keep keep) {
-  const auto at_end = ReadCheckpointResult(run.path, run.variant->config.Spec());
+  const Config& config = run.variant->config;
+  const auto at_end = ReadTrainState(run.path, config.Spec());
   if (!at_end) throw Failure(Concat(run.path.string(), ": it was removed while it was trained"));
-  RunResult result = *at_end;
-  result.settings = run.settings;
-  result.planned_steps = run.variant->config.train.steps;
-  result.stop_when_solved = run.variant->config.train.stop_when_solved;
-  result.version = UPSWING_VERSION;
-  result.conditions = ReadConditions(run.path);
-  result.evaluations = ReadOwnFile(run.path / RunFolder::kEvaluations);
-  WriteDone(run.done(), result);
+  const FinishedRun result{*at_end,
+                           run.settings,
+                           config.train.steps,
+                           config.train.stop_when_solved,
+                           UPSWING_VERSION,
+                           RunConditions::Of(run.path),
+                           ReadOwnFile(run.path / RunFolder::kEvaluations)};
+  result.Write(run.done());
   Reduce(run, keep);
 }
 

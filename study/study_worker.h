@@ -27,8 +27,8 @@ class WorkerHost {
 
 /// How a worker ended.
 struct WorkerOutcome {
-  int64_t done = 0, failed = 0;  // runs
-  int64_t anothers = 0;          // that others work on
+  int64_t done = 0, failed = 0;   // runs
+  int64_t claimed_by_others = 0;  // runs that other workers train
   bool stopped = false;
 };
 
