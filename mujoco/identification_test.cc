@@ -62,7 +62,7 @@ class IdentifyingEnvs : public testing::TestWithParam<const Engine*> {
   }
 };
 
-INSTANTIATE_TEST_SUITE_P(Physics, IdentifyingEnvs, Engines(), EngineName);
+INSTANTIATE_TEST_SUITE_P(Physics, IdentifyingEnvs, EachEngine(), EngineName);
 
 TEST_P(IdentifyingEnvs, FindThePlantOfEachEpisode) {
   PendulumEnv env(Box());

@@ -20,7 +20,7 @@ class RememberingEnvs : public testing::TestWithParam<const Engine*> {
   }
 };
 
-INSTANTIATE_TEST_SUITE_P(Physics, RememberingEnvs, Engines(), EngineName);
+INSTANTIATE_TEST_SUITE_P(Physics, RememberingEnvs, EachEngine(), EngineName);
 
 TEST_P(RememberingEnvs, ObservationsEndWithTorquesAndChangesOfVelocities) {
   PendulumEnv env(Config(2)), plain(Config(0));

@@ -24,7 +24,7 @@ class PendulumEnvs : public testing::TestWithParam<const Engine*> {
   static PendulumEnvConfig SmallConfig();
 };
 
-INSTANTIATE_TEST_SUITE_P(Physics, PendulumEnvs, Engines(), EngineName);
+INSTANTIATE_TEST_SUITE_P(Physics, PendulumEnvs, EachEngine(), EngineName);
 
 PendulumEnvConfig PendulumEnvs::SmallConfig() {
   PendulumEnvConfig config = Config();

@@ -122,7 +122,7 @@ class RandomizedEnvs : public testing::TestWithParam<const Engine*> {
   }
 };
 
-INSTANTIATE_TEST_SUITE_P(Physics, RandomizedEnvs, Engines(), EngineName);
+INSTANTIATE_TEST_SUITE_P(Physics, RandomizedEnvs, EachEngine(), EngineName);
 
 TEST_P(RandomizedEnvs, EveryEpisodeMovesAsItsOwnPlantDoes) {
   PendulumEnvConfig config = Config(3);

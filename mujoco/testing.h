@@ -14,7 +14,7 @@
 namespace upswing {
 
 /// The engines, as values of a parametrised test, and their names in it.
-inline auto Engines() { return testing::Values(&kMuJoCo, &kClosedForm); }
+inline auto EachEngine() { return testing::Values(&kMuJoCo, &kClosedForm); }
 inline std::string EngineName(const testing::TestParamInfo<const Engine*>& info) {
   return info.param == &kMuJoCo ? "MuJoCo" : "ClosedForm";
 }
