@@ -7,12 +7,7 @@
 namespace upswing {
 
 LayerView LayerView::Units(int first, int count) const {
-  return {name,
-          W.Cols(first, count),
-          b.subspan(static_cast<size_t>(first), static_cast<size_t>(count)),
-          {},
-          {},
-          activation};
+  return {name, W.Cols(first, count), b.subspan(first, count), {}, {}, activation};
 }
 
 Layer::Layer(std::string name, int in, int out, Activation activation, bool layer_norm,
@@ -23,9 +18,9 @@ Layer::Layer(std::string name, int in, int out, Activation activation, bool laye
       activation_(activation),
       layer_norm_(layer_norm),
       weight_(offset),
-      bias_(weight_ + static_cast<size_t>(in) * static_cast<size_t>(out)),
-      gain_(bias_ + static_cast<size_t>(out)),
-      norm_bias_(gain_ + static_cast<size_t>(out)) {}
+      bias_(weight_ + in * out),
+      gain_(bias_ + out),
+      norm_bias_(gain_ + out) {}
 
 std::vector<ParameterBlock> Layer::Blocks() const {
   std::vector<ParameterBlock> blocks{{name_ + ".weight", weight_, in_, out_},

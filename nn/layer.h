@@ -114,7 +114,7 @@ class Layer {
   /// The vector (out) at this offset.
   template <typename Parameter>
   std::span<Parameter> Vector(std::span<Parameter> parameters, size_t offset) const {
-    return parameters.subspan(offset, static_cast<size_t>(out_));
+    return parameters.subspan(offset, out_);
   }
 
   std::string name_;

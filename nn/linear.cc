@@ -98,14 +98,13 @@ void LayerNormForward(Matrix<Real> x, std::span<const Real> gain, std::span<cons
       });
     }
     for (int k = 0; k < rows; ++k) {
-      inv_std[static_cast<size_t>(first + k)] =
-          Real{1} / std::sqrt(square[k] / static_cast<Real>(n) + kEpsilon);
+      inv_std[first + k] = Real{1} / std::sqrt(square[k] / static_cast<Real>(n) + kEpsilon);
     }
     for (int k = 0; k < rows; ++k) {
       Real* row = x.row(first + k).data();
       Real* out = y.row(first + k).data();
       const Vec center = hn::Set(d, mean[k]);
-      const Vec scale = hn::Set(d, inv_std[static_cast<size_t>(first + k)]);
+      const Vec scale = hn::Set(d, inv_std[first + k]);
       ForVectors(n, [&](size_t i, size_t count, auto partial) HWY_ATTR {
         const Vec x_hat = hn::Mul(hn::Sub(Load<partial.value>(row + i, count), center), scale);
         Store<partial.value>(x_hat, row + i, count);
@@ -140,7 +139,7 @@ void LayerNormBackwardInput(Matrix<const Real> x_hat, std::span<const Real> gain
       const Vec rest = hn::Sub(g(i, count, partial), hn::Set(d, mean));
       const Vec result =
           hn::NegMulAdd(Load<partial.value>(normal + i, count), hn::Set(d, along), rest);
-      const Vec scale = hn::Set(d, inv_std[static_cast<size_t>(r)]);
+      const Vec scale = hn::Set(d, inv_std[r]);
       Store<partial.value>(hn::Mul(scale, result), dx.row(r).data() + i, count);
     });
   }

@@ -115,12 +115,11 @@ std::vector<LayerView> NetworkPolicy::CriticLayers() const {
 std::unique_ptr<Policy::Memory> NetworkPolicy::Start(int /*num_envs*/) const {
   auto workspace = std::make_unique<Workspace>();
   workspace->network = network_.MakeActivations(kBlock, false);
-  workspace->outputs.resize(static_cast<size_t>(kBlock) * static_cast<size_t>(num_outputs()));
+  workspace->outputs.resize(static_cast<size_t>(kBlock) * num_outputs());
   workspace->action.resize(parts_.action_limit.size());
   if (!critic_) return workspace;
   workspace->critic = critic_->MakeActivations(kBlock, false);
-  workspace->critic_inputs.resize(static_cast<size_t>(kBlock) *
-                                  static_cast<size_t>(parts_.critic.inputs));
+  workspace->critic_inputs.resize(static_cast<size_t>(kBlock) * parts_.critic.inputs);
   return workspace;
 }
 
@@ -191,8 +190,7 @@ void NetworkPolicy::Values(Matrix<const float> obs, Matrix<float> values, Memory
 
 void NetworkPolicy::Spread(Matrix<const float> obs, Matrix<double> low, Matrix<double> high,
                            Memory& memory) const {
-  AlignedVector<float> outputs(static_cast<size_t>(obs.rows()) *
-                               static_cast<size_t>(num_outputs()));
+  AlignedVector<float> outputs(static_cast<size_t>(obs.rows()) * num_outputs());
   const Matrix<float> rows(outputs, obs.rows(), num_outputs());
   Outputs(obs, rows, memory);
   for (int i = 0; i < obs.rows(); ++i) Spread(rows.row(i), low.row(i), high.row(i));

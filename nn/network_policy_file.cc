@@ -180,9 +180,9 @@ struct SampleResults {
   Matrix<const float> output_rows, value_rows;
 
   SampleResults(const NetworkPolicy& policy, Matrix<const float> obs)
-      : outputs(static_cast<size_t>(obs.rows() * policy.num_outputs())),
+      : outputs(obs.rows() * policy.num_outputs()),
         values(policy.is_actor() && policy.num_values() > 0 ? obs.rows() : 0),
-        actions(static_cast<size_t>(obs.rows() * policy.action_size())),
+        actions(obs.rows() * policy.action_size()),
         output_rows(outputs.data(), obs.rows(), policy.num_outputs()),
         value_rows(values.data(), static_cast<int>(values.size()), 1) {
     const auto memory = policy.Start(obs.rows());
@@ -208,8 +208,8 @@ void CheckOutputs(const Tensors& file, const std::string& name, Matrix<const flo
     const double error = std::abs(double{got} - expected[i]);
     if (!(error <= tolerance)) {  // nor if it is not a number
       throw BadInput(Concat(file.where(), ": self-check: expected ", what, " ", expected[i],
-                            " up to ", tolerance, ", got ", got, " (sample ",
-                            i / static_cast<size_t>(computed.cols()), ")"));
+                            " up to ", tolerance, ", got ", got, " (sample ", i / computed.cols(),
+                            ")"));
     }
     check.error = std::max(check.error, error);
   }
@@ -252,7 +252,7 @@ std::string NameOf(ActionRule rule) {
 
 Tensors NetworkPolicy::ToTensors() const {
   Rng rng(0, "policy self-check");
-  std::vector<float> obs(static_cast<size_t>(kSamples * obs_size()));
+  std::vector<float> obs(kSamples * obs_size());
   for (float& x : obs) x = static_cast<float>(rng.Uniform(-1, 1));
   const SampleResults results(*this, {obs.data(), kSamples, obs_size()});
 
@@ -338,11 +338,11 @@ void NetworkPolicy::CheckSamples(const Tensors& file) {
     };
     if (parts_.chooses_torque()
             ? MayChoose(parts_.torques, stored[i], row, 2 * self_check_.tolerance)
-            : near(parts_.action_limit[i % static_cast<size_t>(A)])) {
+            : near(parts_.action_limit[i % A])) {
       continue;
     }
     throw BadInput(Concat(file.where(), ": self-check: expected action ", stored[i], ", got ", got,
-                          " (sample ", i / static_cast<size_t>(A), ")"));
+                          " (sample ", i / A, ")"));
   }
   if (critic_) CheckOutputs(file, "sample.value", results.value_rows, "value", self_check_);
 }

@@ -10,7 +10,7 @@ namespace {
 
 /// `count` orthonormal vectors of `size` numbers, one after another; count ≤ size.
 std::vector<double> OrthonormalVectors(Rng& rng, int count, int size) {
-  std::vector<double> values(static_cast<size_t>(count) * static_cast<size_t>(size));
+  std::vector<double> values(static_cast<size_t>(count) * size);
   const Matrix<double> vectors(values.data(), count, size);
   for (int i = 0; i < count; ++i) {
     const std::span<double> v = vectors.row(i);

@@ -55,7 +55,7 @@ Dqn::Dqn(const DqnConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
       q_select_(q_.size()),
       q_target_(q_.size()),
       dq_(q_.size()),
-      y_(static_cast<size_t>(B_)),
+      y_(B_),
       q_taken_(y_.size()),
       act_activations_(online_.network().MakeActivations(spec.num_envs, false)),
       act_q_(static_cast<size_t>(spec.num_envs) * torques_.size()) {}
@@ -117,16 +117,12 @@ void Dqn::BackwardRows(const Minibatch& batch, RowRange rows) {
   const Matrix<const float> s(batch.obs.data(), B_, D_), s_next(batch.next_obs.data(), B_, D_);
   const Matrix<float> q(q_, B_, A), q_target(q_target_, B_, A), dq(dq_, B_, A);
   const Matrix<float> q_select(config_.double_q ? q_select_ : q_target_, B_, A);
-  const auto part = [&](auto& values) {
-    return std::span(values).subspan(static_cast<size_t>(rows.first),
-                                     static_cast<size_t>(rows.count));
-  };
 
   // y = r + γⁿ Q(s', a*; θ⁻)
   online_.Forward(theta_target_, s_next, rows, q_target);
   if (config_.double_q) online_.Forward(s_next, rows, q_select);
   TdTargets(q_select.Rows(rows.first, rows.count), q_target.Rows(rows.first, rows.count),
-            part(batch.reward), part(batch.discount), part(y_));
+            Part(batch.reward, rows), Part(batch.discount, rows), Part(y_, rows));
 
   // dL/dQ(s, a) = w clip(Q(s, a; θ) - y, ±1) / B, and 0 for all other actions
   online_.Forward(s, rows, q);

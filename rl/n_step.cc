@@ -7,12 +7,12 @@
 namespace upswing {
 
 NStep::NStep(int num_envs, int n, double gamma, int obs_size, ActionSpace actions)
-    : n_(static_cast<size_t>(n)),
-      obs_size_(static_cast<size_t>(obs_size)),
-      action_size_(static_cast<size_t>(actions.size)),
+    : n_(n),
+      obs_size_(obs_size),
+      action_size_(actions.size),
       gamma_(gamma),
       actions_(actions),
-      count_(static_cast<size_t>(num_envs)),
+      count_(num_envs),
       obs_(count_.size() * n_ * obs_size_),
       action_(count_.size() * n_ * action_size_),
       reward_(count_.size() * n_) {}

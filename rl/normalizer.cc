@@ -12,10 +12,7 @@ constexpr int64_t kMost = 1'000'000'000'000'000;  // more observations than any 
 }  // namespace
 
 Normalizer::Normalizer(int obs_size)
-    : mean_(static_cast<size_t>(obs_size)),
-      squares_(mean_.size()),
-      center_(mean_.size()),
-      scale_(mean_.size(), 1.0F) {}
+    : mean_(obs_size), squares_(mean_.size()), center_(mean_.size()), scale_(mean_.size(), 1.0F) {}
 
 void Normalizer::Add(Matrix<const float> obs) {
   if (obs.rows() == 0) return;

@@ -58,19 +58,19 @@ Ppo::Ppo(const PpoConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
       log_std_adam_(log_std_.size(), kAdamEpsilon),
       normalizer_(D_),
       rollout_(config.horizon, spec.num_envs, D_, spec.action_size()),
-      order_(static_cast<size_t>(rollout_.size())),
+      order_(rollout_.size()),
       value_(order_.size()),
       next_value_(order_.size()),
       advantage_(order_.size()),
       target_(order_.size()),
       act_activations_(actor_.network().MakeActivations(spec.num_envs, false)),
-      act_obs_(static_cast<size_t>(spec.num_envs * D_)),
-      act_outputs_(static_cast<size_t>(spec.num_envs * outputs())),
-      obs_(static_cast<size_t>(B_ * D_)),
+      act_obs_(spec.num_envs * D_),
+      act_outputs_(spec.num_envs * outputs()),
+      obs_(B_ * D_),
       action_(static_cast<size_t>(B_) * limit_.size()),
-      y_(static_cast<size_t>(B_ * outputs())),
+      y_(B_ * outputs()),
       dy_(y_.size()),
-      V_(static_cast<size_t>(B_)),
+      V_(B_),
       dV_(V_.size()),
       old_log_prob_(V_.size()),
       old_value_(old_log_prob_.size()),
@@ -112,7 +112,7 @@ void Ppo::Act(Matrix<const float> obs, Matrix<double> action) {
       normalizer_.Apply(obs.row(i), normal.row(i));
     }
     actor_.network().Forward(actor_.theta(), normal, rows, act_activations_, y);
-    Sample(rows, y, explore_rngs_[static_cast<size_t>(block)], action);
+    Sample(rows, y, explore_rngs_[block], action);
   });
 }
 
@@ -121,20 +121,19 @@ void Ppo::Sample(RowRange rows, Matrix<const float> outputs, Rng& rng, Matrix<do
   const std::span<float> log_prob = rollout_.log_prob();
   AlignedVector<float> p(torques_.size());
   for (int i = rows.first; i < rows.first + rows.count; ++i) {
-    const auto row = static_cast<size_t>(i);
     if (config_.discrete()) {
       const Categorical<float> policy(outputs.row(i), p);
       const size_t level = policy.Sample(rng);
       stored(i, 0) = static_cast<float>(level);
-      log_prob[row] = policy.LogProb(level);
+      log_prob[i] = policy.LogProb(level);
       action(i, 0) = torques_[level];
     } else {
       const DiagonalGaussian<float> policy{outputs.row(i), log_std_, std_};
       policy.Sample(rng, stored.row(i));
-      log_prob[row] = policy.LogProb(stored.row(i));
+      log_prob[i] = policy.LogProb(stored.row(i));
       // The environment gets what is within the limit; π speaks of what was drawn.
       for (int k = 0; k < stored.cols(); ++k) {
-        action(i, k) = limit_[static_cast<size_t>(k)] * std::clamp(stored(i, k), -1.0F, 1.0F);
+        action(i, k) = limit_[k] * std::clamp(stored(i, k), -1.0F, 1.0F);
       }
     }
   }
@@ -176,12 +175,12 @@ void Ppo::Estimate() {
         const std::span<const float> obs = rollout_.all_next_obs().row(row);
         end_obs.insert(end_obs.end(), obs.begin(), obs.end());
       }
-      next_value_[static_cast<size_t>(row)] = t < T - 1 ? value_[static_cast<size_t>(row + N)] : 0;
+      next_value_[row] = t < T - 1 ? value_[row + N] : 0;
     }
   }
   std::vector<float> end_value(ends.size());
   Values({end_obs.data(), static_cast<int>(ends.size()), D_}, end_value);
-  for (size_t i = 0; i < ends.size(); ++i) next_value_[static_cast<size_t>(ends[i])] = end_value[i];
+  for (size_t i = 0; i < ends.size(); ++i) next_value_[ends[i]] = end_value[i];
 
   GeneralizedAdvantages({rollout_.rewards(),
                          {value_.data(), T, N},
@@ -205,7 +204,7 @@ void Ppo::Learn() {
     }
     const double before = report_.kl;
     for (size_t first = 0; first < order_.size(); first += static_cast<size_t>(B_)) {
-      const auto rows = std::span(order_).subspan(first, static_cast<size_t>(B_));
+      const auto rows = std::span(order_).subspan(first, B_);
       update_threads_.Run([&] { Update(rows); });
     }
     kl = (report_.kl - before) * static_cast<double>(B_) / static_cast<double>(order_.size());

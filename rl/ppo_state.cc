@@ -22,7 +22,7 @@ AlignedVector<float> WithNormalizer(const Network& network, std::span<const floa
   const Matrix<float> W(folded.data() + W_block.offset, W_block.in, W_block.out);
   const std::vector<double> deviation = normalizer.deviation();
   for (int j = 0; j < W.cols(); ++j) {
-    float& b = folded[b_block.offset + static_cast<size_t>(j)];
+    float& b = folded[b_block.offset + j];
     double shifted = b;
     for (int k = 0; k < W.rows(); ++k) {
       const auto input = static_cast<size_t>(k);

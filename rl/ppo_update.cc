@@ -28,7 +28,7 @@ void Ppo::Sums::Add(const Sums& other) {
 
 void Ppo::Update(std::span<const int64_t> rows) {
   for (size_t i = 0; i < rows.size(); ++i) {
-    batch_advantage_[i] = advantage_[static_cast<size_t>(rows[i])];
+    batch_advantage_[i] = advantage_[rows[i]];
   }
   Standardize(batch_advantage_);
   if (config_.mirror) {
@@ -38,7 +38,7 @@ void Ppo::Update(std::span<const int64_t> rows) {
   actor_.Prepare(pool_);
   critic_.Prepare(pool_);
   ForSlices(pool_, B_, [&](RowRange slice) {
-    Sums& sums = sums_[static_cast<size_t>(slice.first / SliceRows(B_))];
+    Sums& sums = sums_[slice.first / SliceRows(B_)];
     sums.Clear();
     Gather(rows, slice);
     BackwardActor(slice, sums);
@@ -67,19 +67,18 @@ void Ppo::Gather(std::span<const int64_t> from, RowRange rows) {
   const float* log_prob = rollout_.log_probs().data();
   const auto last_level = static_cast<float>(config_.levels - 1);
   for (int i = rows.first; i < rows.first + rows.count; ++i) {
-    const auto row = static_cast<size_t>(i);
-    const auto place = static_cast<size_t>(from[row]);
+    const auto place = static_cast<size_t>(from[i]);
     const auto source = static_cast<int>(place);
-    const bool mirror = mirrored_[row] != 0;
+    const bool mirror = mirrored_[i] != 0;
     for (int k = 0; k < D_; ++k) {
-      const float sign = mirror ? mirror_signs_[static_cast<size_t>(k)] : 1;
+      const float sign = mirror ? mirror_signs_[k] : 1;
       s(i, k) = sign * all_obs(source, k);
     }
     normalizer_.Apply(s.row(i), s.row(i));
     for (int k = 0; k < a.cols(); ++k) a(i, k) = all_actions(source, k);
-    old_log_prob_[row] = log_prob[place];
-    old_value_[row] = value_[place];
-    batch_target_[row] = target_[place];
+    old_log_prob_[i] = log_prob[place];
+    old_value_[i] = value_[place];
+    batch_target_[i] = target_[place];
     if (!mirror) continue;
     // The mirrored step was drawn as often as the step itself: it has the same π_old.
     for (float& x : a.row(i)) x = config_.discrete() ? last_level - x : -x;
@@ -98,11 +97,10 @@ void Ppo::BackwardActor(RowRange rows, Sums& sums) {
   const float dentropy = -static_cast<float>(bonus) / B;
   AlignedVector<float> p(torques_.size());
   for (int i = rows.first; i < rows.first + rows.count; ++i) {
-    const auto row = static_cast<size_t>(i);
     const auto backward = [&](float log_prob, float entropy, const auto& gradient) {
-      const float log_ratio = log_prob - old_log_prob_[row];
+      const float log_ratio = log_prob - old_log_prob_[i];
       const float ratio = std::exp(log_ratio);
-      const LossTerm<float> term = ClippedLoss(ratio, batch_advantage_[row], clip);
+      const LossTerm<float> term = ClippedLoss(ratio, batch_advantage_[i], clip);
       gradient(term.gradient / B);
       sums.policy_loss += term.loss;
       sums.entropy += entropy;
@@ -129,8 +127,7 @@ void Ppo::BackwardCritic(RowRange rows, Sums& sums) {
   critic_.Forward(BatchObs(), rows, V);
   const auto clip = static_cast<float>(config_.value_clip);
   for (int i = rows.first; i < rows.first + rows.count; ++i) {
-    const auto row = static_cast<size_t>(i);
-    const LossTerm<float> term = ValueLoss(V(i, 0), old_value_[row], batch_target_[row], clip);
+    const LossTerm<float> term = ValueLoss(V(i, 0), old_value_[i], batch_target_[i], clip);
     dV(i, 0) = term.gradient / static_cast<float>(B_);
     sums.value_loss += term.loss;
   }

@@ -25,10 +25,10 @@ void ActionSpace::Check(const Archive& archive, std::string_view name,
 }
 
 Minibatch::Minibatch(int size, int obs_size, int action_size)
-    : obs(static_cast<size_t>(size) * static_cast<size_t>(obs_size)),
+    : obs(static_cast<size_t>(size) * obs_size),
       next_obs(obs.size()),
-      action(static_cast<size_t>(size) * static_cast<size_t>(action_size)),
-      reward(static_cast<size_t>(size)),
+      action(static_cast<size_t>(size) * action_size),
+      reward(size),
       discount(reward.size()),
       index(reward.size()),
       weight(reward.size(), 1.0F) {}
@@ -49,13 +49,13 @@ void MirrorHalf(Rng& rng, std::span<const float> signs, const ActionSpace& actio
 }
 
 Replay::Replay(int64_t capacity, int obs_size, ActionSpace actions, bool prioritized)
-    : capacity_(capacity), obs_size_(static_cast<size_t>(obs_size)), actions_(actions) {
+    : capacity_(capacity), obs_size_(obs_size), actions_(actions) {
   if (prioritized) priorities_.emplace(capacity);
 }
 
 void Replay::Add(const Transition& t) {
   if (size() < capacity_) rows_.resize(rows_.size() + row_size());
-  float* row = rows_.data() + static_cast<size_t>(next_) * row_size();
+  float* row = rows_.data() + next_ * row_size();
   row = std::ranges::copy(t.obs, row).out;
   row = std::ranges::copy(t.next_obs, row).out;
   row = std::ranges::copy(t.action, row).out;
@@ -75,7 +75,7 @@ Transition Replay::at(int64_t index) const {
 void Replay::Gather(Minibatch& batch) const {
   // The memory is larger than any cache: prefetch all rows instead of waiting for each.
   for (const int64_t index : batch.index) {
-    const float* row = rows_.data() + static_cast<size_t>(index) * row_size();
+    const float* row = rows_.data() + index * row_size();
     constexpr size_t kLine = 16;  // floats in a line of the cache
     for (size_t at = 0; at < row_size() + kLine; at += kLine) {
       __builtin_prefetch(row + std::min(at, row_size() - 1));

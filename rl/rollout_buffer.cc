@@ -12,10 +12,10 @@ RolloutBuffer::RolloutBuffer(int64_t steps, int num_envs, int obs_size, int acti
       num_envs_(num_envs),
       obs_size_(obs_size),
       action_size_(action_size),
-      obs_(static_cast<size_t>(steps * num_envs * obs_size)),
+      obs_(steps * num_envs * obs_size),
       next_obs_(obs_.size()),
-      action_(static_cast<size_t>(steps * num_envs * action_size)),
-      log_prob_(static_cast<size_t>(steps * num_envs)),
+      action_(steps * num_envs * action_size),
+      log_prob_(steps * num_envs),
       reward_(log_prob_.size()),
       terminated_(log_prob_.size()),
       truncated_(log_prob_.size()) {}

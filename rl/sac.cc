@@ -31,7 +31,7 @@ Sac::Sac(const SacConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
         const AlignedVector<float> zeros(Size(B_, A_));
         return Samples{zeros, zeros, zeros, zeros, zeros, zeros};
       }()),
-      log_prob_(static_cast<size_t>(B_)),
+      log_prob_(B_),
       inputs_(Size(B_, D_ + A_)),
       policy_inputs_(inputs_.size()),
       y_(log_prob_.size()),
@@ -39,7 +39,7 @@ Sac::Sac(const SacConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
       act_outputs_(Size(spec.num_envs, 2 * A_)),
       mean_(act_action_.size()),
       last_mean_(act_action_.size()),
-      begins_(static_cast<size_t>(spec.num_envs), 1) {
+      begins_(spec.num_envs, 1) {
   for (size_t i = 0; i < num_critics(); ++i) {
     TrainedNetwork network(config.Shape(D_ + A_, bins_.outputs()), B_,
                            Rng(seed, "initial critic", i));
@@ -61,12 +61,12 @@ void Sac::Act(Matrix<const float> obs, Matrix<double> action) {
   const bool random = steps_ < config_.learning_starts;
   for (int env = 0; env < obs.rows(); ++env) {
     for (int k = 0; k < A_; ++k) {
-      const auto i = Size(env, A_) + static_cast<size_t>(k);
+      const auto i = Size(env, A_) + k;
       const auto policy = Gaussian<float>::From(outputs(env, k), outputs(env, A_ + k));
       const double u = policy.mean + policy.std * explore_rng_.Normal();
       const double chosen = random ? explore_rng_.Uniform(-1, 1) : std::tanh(u);
       act_action_[i] = static_cast<float>(chosen);
-      action(env, k) = action_limit_[static_cast<size_t>(k)] * act_action_[i];
+      action(env, k) = action_limit_[k] * act_action_[i];
       if (config_.smoothness > 0) mean_[i] = std::tanh(policy.mean);
     }
   }

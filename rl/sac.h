@@ -86,9 +86,7 @@ class Sac : public OffPolicyAgent {
   void CountMinibatch();
   /// Fills samples_' noise.
   void DrawNoise();
-  static size_t Size(int rows, int cols) {
-    return static_cast<size_t>(rows) * static_cast<size_t>(cols);
-  }
+  static size_t Size(int rows, int cols) { return static_cast<size_t>(rows) * cols; }
   size_t num_critics() const { return config_.twin ? 2 : 1; }
 
   SacConfig config_;

@@ -12,13 +12,6 @@
 namespace upswing {
 namespace {
 
-/// The part of some numbers (B) that belongs to these rows.
-template <typename Values>
-auto Part(Values& values, RowRange rows) {
-  return std::span(values).subspan(static_cast<size_t>(rows.first),
-                                   static_cast<size_t>(rows.count));
-}
-
 /// Writes some rows of x into y, from this column on.
 void CopyRows(Matrix<const float> x, RowRange rows, int column, Matrix<float> y) {
   for (int i = rows.first; i < rows.first + rows.count; ++i) {
@@ -60,7 +53,7 @@ void Sac::SampleRows(Matrix<const float> obs, RowRange rows, Matrix<float> input
   Samples& x = samples_;
   for (int i = rows.first; i < rows.first + rows.count; ++i) {
     for (int k = 0; k < A_; ++k) {
-      const size_t at = Size(i, A_) + static_cast<size_t>(k);
+      const size_t at = Size(i, A_) + k;
       x.mean[at] = outputs(i, k);
       x.log_std[at] = std::clamp(outputs(i, A_ + k), kLow, kHigh);
     }
@@ -72,14 +65,14 @@ void Sac::SampleRows(Matrix<const float> obs, RowRange rows, Matrix<float> input
   CopyRows({x.action.data(), B_, A_}, rows, D_, inputs);
   for (int i = rows.first; i < rows.first + rows.count; ++i) {
     const std::span<const float> each = Matrix<const float>(x.log_prob.data(), B_, A_).row(i);
-    log_prob_[static_cast<size_t>(i)] = std::accumulate(each.begin(), each.end(), 0.0F);
+    log_prob_[i] = std::accumulate(each.begin(), each.end(), 0.0F);
   }
 }
 
 void Sac::ValueRows(Critic& critic, RowRange rows) const {
   const Matrix<const float> outputs(critic.outputs.data(), B_, bins_.outputs());
   for (int i = rows.first; i < rows.first + rows.count; ++i) {
-    critic.value[static_cast<size_t>(i)] = bins_.Value(outputs.row(i));
+    critic.value[i] = bins_.Value(outputs.row(i));
   }
 }
 
@@ -105,9 +98,8 @@ void Sac::CriticRows(const Minibatch& batch, RowRange rows) {
     critic.network.Forward(sa, rows, outputs);
     ValueRows(critic, rows);
     for (int i = rows.first; i < rows.first + rows.count; ++i) {
-      const auto row = static_cast<size_t>(i);
-      const float weight = batch.weight[row] / static_cast<float>(B_);
-      critic.loss[row] = batch.weight[row] * bins_.Loss(outputs.row(i), y_[row], dy.row(i));
+      const float weight = batch.weight[i] / static_cast<float>(B_);
+      critic.loss[i] = batch.weight[i] * bins_.Loss(outputs.row(i), y_[i], dy.row(i));
       for (float& gradient : dy.row(i)) gradient *= weight;
     }
     critic.network.Backward(dy, rows);
@@ -140,9 +132,8 @@ void Sac::ActorRows(const Minibatch& batch, RowRange rows) {
     const Matrix<float> outputs(critic.outputs, B_, bins_.outputs());
     const Matrix<float> dy(critic.dy, B_, bins_.outputs());
     for (int i = rows.first; i < rows.first + rows.count; ++i) {
-      const auto row = static_cast<size_t>(i);
-      const bool counts = critic.value[row] < other.value[row] ||
-                          (critic.value[row] == other.value[row] && &critic == &critics_.front());
+      const bool counts = critic.value[i] < other.value[i] ||
+                          (critic.value[i] == other.value[i] && &critic == &critics_.front());
       bins_.ValueGradient(outputs.row(i), counts ? 1.0F : 0.0F, dy.row(i));
     }
     critic.network.Backward(dy, rows, {critic.dinputs, B_, D_ + A_});
@@ -152,7 +143,7 @@ void Sac::ActorRows(const Minibatch& batch, RowRange rows) {
   const Matrix<float> dy(actor_dy_, B_, 2 * A_);
   for (int i = rows.first; i < rows.first + rows.count; ++i) {
     for (int k = 0; k < A_; ++k) {
-      const size_t at = Size(i, A_) + static_cast<size_t>(k);
+      const size_t at = Size(i, A_) + k;
       float dq_da = 0;
       for (Critic& critic : critics_) {
         dq_da += Matrix<float>(critic.dinputs, B_, D_ + A_)(i, D_ + k);

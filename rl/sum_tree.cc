@@ -11,7 +11,7 @@ SumTree::SumTree(int64_t capacity)
     : leaves_(std::bit_ceil(static_cast<size_t>(capacity))), nodes_(2 * leaves_) {}
 
 void SumTree::Set(int64_t index, double value) {
-  size_t node = leaves_ + static_cast<size_t>(index);
+  size_t node = leaves_ + index;
   nodes_[node] = value;
   while (node > 1) {
     node /= 2;
@@ -46,7 +46,7 @@ void SumTree::Find(std::span<const double> masses, std::span<int64_t> indices) c
 }
 
 void SumTree::State(const Archive& archive, int64_t count, Bounds<double> bounds) {
-  const auto numbers = std::span(nodes_).subspan(leaves_, static_cast<size_t>(count));
+  const auto numbers = std::span(nodes_).subspan(leaves_, count);
   archive.Array("numbers", numbers, bounds);
   if (!archive.loading()) return;
   for (size_t node = leaves_ - 1; node > 0; --node) {

@@ -19,7 +19,7 @@ class SumTree {
   explicit SumTree(int64_t capacity);
 
   void Set(int64_t index, double value);
-  double at(int64_t index) const { return nodes_[leaves_ + static_cast<size_t>(index)]; }
+  double at(int64_t index) const { return nodes_[leaves_ + index]; }
   double total() const { return nodes_[1]; }
 
   /// For each mass, below total(), the index at which the running sum of the numbers first exceeds

@@ -17,7 +17,7 @@ TrainedNetwork::TrainedNetwork(const NetworkShape& shape, int batch, double adam
       transposed_(theta_.size()),
       adam_(theta_.size(), adam_epsilon),
       activations_(network_.MakeActivations(batch, true)),
-      squares_(static_cast<size_t>(network_.num_tasks())) {}
+      squares_(network_.num_tasks()) {}
 
 void TrainedNetwork::Prepare(ThreadPool& pool) {
   if (!moved_) return;

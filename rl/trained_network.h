@@ -36,6 +36,12 @@ void ForSlices(ThreadPool& pool, int B, const Work& work) {
   });
 }
 
+/// The part of some numbers (B) that belongs to these rows.
+template <typename Values>
+auto Part(Values& values, RowRange rows) {
+  return std::span(values).subspan(rows.first, rows.count);
+}
+
 /// A network with its parameters θ and all that moves them: gradient, Adam's moments, buffers of a
 /// minibatch of B rows.
 class TrainedNetwork {
