@@ -14,7 +14,8 @@ void DqnConfig::Describe(Options& o) {
   o.Section("agent");
   o.Add(&double_q, "double", "Double DQN: choose online, evaluate with the target");
   o.Add(&dueling, "dueling", "Dueling: Q = V + A - mean(A)");
-  o.Add(&levels, "levels", {2, 1001}, "torques", "that the agent chooses from, evenly spaced");
+  o.Add(&levels, "levels", {2, 1001}, "torques", "that the agent chooses from, evenly spaced")
+      .implied = true;
   OffPolicyConfig::Describe(o);
   o.Add(&tau, "tau", kUnit, "", "Polyak averaging of the target, per update");
   o.Add(&target_period, "target_period", {0, 1e9}, "updates",

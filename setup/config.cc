@@ -44,10 +44,11 @@ void Config::Describe(Options& o) {
   o.Section("train");
   o.Add(&agent, "agent", "named agent whose settings the others begin with");
   o.AddChoice(&algorithm, "algorithm", AlgorithmNames(),
-              "what learns; each algorithm has settings of its own");
+              "what learns; each algorithm has settings of its own")
+      .implied = true;
   train.Describe(o);
   o.Section("task");
-  o.AddChoice(&task, "task", TaskNames(), "what is to be learned");
+  o.AddChoice(&task, "task", TaskNames(), "what is to be learned").implied = true;
   DescribeEnvironment(o);
   learner().Describe(o);
 }
@@ -68,7 +69,8 @@ void Config::DescribeEnvironment(Options& o) {
   o.Add(&memory, "memory", {0, kMostMemory}, "steps",
         "past steps whose torque and change of velocities the agent sees too");
   o.Add(&identify, "identify",
-        "the agent sees what the motion tells of the plant: an estimate of its constants");
+        "the agent sees what the motion tells of the plant: an estimate of its constants")
+      .implied = true;
   o.AddChoice(&physics, "physics", EngineNames(),
               "engine to train in; closed-form computes the same physics faster than mujoco");
   std::vector<std::string> judges = EngineNames();

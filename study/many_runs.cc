@@ -48,7 +48,7 @@ void CheckFolder(const fs::path& folder, const fs::path& mark) {
 /// Throws if `what` was made with settings `before` that cannot be resumed with those of `now`.
 void CheckSame(Config before, const Config& now, bool more_steps, const std::string& what) {
   if (!before.mjcf.empty()) before.model = now.model;
-  if (more_steps) before.train.steps = std::min(before.train.steps, now.train.steps);
+  if (more_steps) before.train.steps = std::max(before.train.steps, now.train.steps);
   const auto counts = [](const Option& option) {
     return option.decides == Option::Decides::kTraining || option.decides == Option::Decides::kEnd;
   };

@@ -25,7 +25,7 @@ LAYERS = {
     "io": {"core"},
     "mujoco": {"sim", "io", "core"},
     "report": {"io", "core"},
-    "setup": PORTABLE,
+    "setup": PORTABLE - {"setup"},
     "run": BELOW_RUN,
     "realaigym": BELOW_RUN | {"run", "report"},
     "study": BELOW_RUN | {"run"},
