@@ -9,12 +9,12 @@ export default defineConfig({
   testDir: 'tests',
   testMatch: '*.page.ts',
   outputDir: 'node_modules/.playwright',
-  workers: 1,
+  workers: 2,
   forbidOnly: process.env.UPSWING_REQUIRE_WEB === '1',
   reporter: 'list',
-  // For busy machines; what passes does not wait.
-  timeout: 120_000,
-  expect: { timeout: 30_000 },
+  // For a machine twenty times slower than two idle cores; what passes does not wait.
+  timeout: 2_400_000,
+  expect: { timeout: 600_000 },
   use: {
     baseURL: `http://127.0.0.1:${port}/`,
     launchOptions,

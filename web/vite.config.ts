@@ -16,6 +16,6 @@ export default defineConfig({
     include: ['src/**/*.test.ts', 'build/**/*.test.ts'],
     environment: 'node',
     setupFiles: ['tests/core.ts'],
-    testTimeout: 120_000, // ms: no test asks how fast, and a machine may be busy
+    testTimeout: 1_200_000, // ms: no test asks how fast, and a machine may be busy
   },
 });

@@ -59,7 +59,7 @@ test.each([
   ['pfl', 0],
   ['tvlqr', 0],
   ['mpc', 0],
-])('the controller %s acts as in `upswing simulate`', { timeout: 30_000 }, (name, q1) => {
+])('the controller %s acts as in `upswing simulate`', (name, q1) => {
   world.policy = new Policy(name);
   world.agentOn = true;
   world.reset({ ...HANGING, q1 });
@@ -74,27 +74,23 @@ test.each([
   expect(world.uprightFor).toBeGreaterThan(3);
 });
 
-test(
-  'a controller that looks, or is asked of other states, keeps its plan',
-  { timeout: 30_000 },
-  () => {
-    world.policy = new Policy('tvlqr');
-    world.agentOn = true;
-    const torques = (disturb: () => void) => {
-      world.reset();
-      run(1);
-      disturb();
-      return run(2).map(({ torque }) => torque);
-    };
-    const alone = torques(() => {});
-    const asked = torques(() => {
-      world.look();
-      world.decisionAt({ q1: 3, q2: 0.1, w1: 0, w2: 0 });
-    });
-    expect(asked).toEqual(alone);
-    expect(new Set(alone).size).toBeGreaterThan(10);
-  },
-);
+test('a controller that looks, or is asked of other states, keeps its plan', () => {
+  world.policy = new Policy('tvlqr');
+  world.agentOn = true;
+  const torques = (disturb: () => void) => {
+    world.reset();
+    run(1);
+    disturb();
+    return run(2).map(({ torque }) => torque);
+  };
+  const alone = torques(() => {});
+  const asked = torques(() => {
+    world.look();
+    world.decisionAt({ q1: 3, q2: 0.1, w1: 0, w2: 0 });
+  });
+  expect(asked).toEqual(alone);
+  expect(new Set(alone).size).toBeGreaterThan(10);
+});
 
 test('another plant, too', () => {
   agentOn('d3qn');

@@ -33,7 +33,6 @@ for (const [name, media] of [
   test(`${name}: axe finds nothing in any step of the tour, nor in everything`, async ({
     page,
   }) => {
-    test.slow();
     await page.emulateMedia(media);
     await page.goto('./#tour');
     await ready(page);

@@ -115,15 +115,15 @@ test('a database that never answers does not stop the page', async ({ page }) =>
   await expect(page.locator('#agent')).toHaveValue('own');
 });
 
-for (const name of ['gravity', 'mass1', 'mass2', 'length1', 'length2', 'torque_limit']) {
-  test(`a plant with a ${name} of 0 is refused, and the charts go on`, async ({ page }) => {
-    await open(page);
+test('a plant with a parameter of 0 is refused, and the charts go on', async ({ page }) => {
+  await open(page);
+  for (const name of ['gravity', 'mass1', 'mass2', 'length1', 'length2', 'torque_limit']) {
     await bring(page, ofPlant({ [name]: 0 }));
     await expect(page.locator('#message')).toContainText(`${name}: expected a number in [0.`);
     await expect(page.locator('#agent')).toHaveValue('d3qn');
     await expect(page.locator('#q-value')).toHaveText(/best \d/);
-  });
-}
+  }
+});
 
 test.describe('on a canvas that is read back', () => {
   test.use({ complains: true }); // that it could be faster
