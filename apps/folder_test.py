@@ -9,7 +9,7 @@ import signal
 import time
 import unittest
 
-from testing import (ProgramTest, SmallRunTest, read_tensors, run, small, snapshot, with_number,
+from testing import (PATIENCE, ProgramTest, SmallRunTest, read_tensors, run, small, snapshot, with_number,
                      write_tensors)
 
 GROWING = ["metrics.csv", "episodes.csv", "evals.csv", "events.out.tfevents.0.upswing", "log.txt"]
@@ -80,12 +80,12 @@ class LinkTest(RunTest):
                 (self.folder / "run" / name).unlink()
                 os.mkfifo(self.folder / "run" / name)
                 done = self.run_here(*(self.RESUME if name != "policy.safetensors" else
-                                       ["eval", "run"]), timeout=100)
+                                       ["eval", "run"]), timeout=PATIENCE)
                 self.assert_one_line(done, 2, f"run/{name}")
         self.restore()
         (self.folder / "run/evals.csv").unlink()
         os.mkfifo(self.folder / "run/evals.csv")
-        self.assertEqual(self.run_here("compare", "run", timeout=100).returncode, 2)
+        self.assertEqual(self.run_here("compare", "run", timeout=PATIENCE).returncode, 2)
 
     def test_the_page_is_not_written_through_a_link(self):
         self.succeed("export", "run", "--page", "page", "--id", "a")
@@ -141,7 +141,7 @@ class CounterTest(RunTest):
         with self.subTest(name=name, number=number):
             changed = {name: with_number(self.tensors[name], index, number)}
             write_tensors(self.checkpoint, self.metadata, self.tensors | changed)
-            self.refuse(self.RESUME, "run/checkpoint.safetensors: tensor", "expected", timeout=100)
+            self.refuse(self.RESUME, "run/checkpoint.safetensors: tensor", "expected", timeout=PATIENCE)
 
     def test_counters(self):
         steps = 4000
@@ -192,7 +192,7 @@ class CounterTest(RunTest):
                 with self.subTest(name=name):
                     changed = {name: (tensor[0], tensor[1], bytes(32))}
                     write_tensors(self.checkpoint, self.metadata, self.tensors | changed)
-                    self.refuse(self.RESUME, f'"{name}"', timeout=100)
+                    self.refuse(self.RESUME, f'"{name}"', timeout=PATIENCE)
 
 
 class PlaceTest(ProgramTest):

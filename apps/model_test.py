@@ -8,7 +8,7 @@ import resource
 import shutil
 import unittest
 
-from testing import (MODEL, ProgramTest, read_tensors, run, small, train_once, write_tensors)
+from testing import (MODEL, PATIENCE, ProgramTest, read_tensors, run, small, train_once, write_tensors)
 
 # Were one of these compiled, it would take a lot of memory or time, or never end.
 BOMBS = {
@@ -66,7 +66,7 @@ class BombTest(ProgramTest):
         cls.policy = train_once(cls, steps=400, eval_every=400, eval_episodes=1)
 
     def refuse_quickly(self, arguments, *words):
-        self.refuse(arguments, *words, preexec_fn=limits, timeout=60)
+        self.refuse(arguments, *words, preexec_fn=limits, timeout=PATIENCE)
 
     def write_bytes(self, name, text):
         (self.folder / name).write_bytes(text.encode("utf-8", "surrogateescape"))
@@ -114,11 +114,11 @@ class BombTest(ProgramTest):
                             ("folder", "expected a file, got a folder")):
             for command in (["simulate"], small(), ["eval", self.policy]):
                 with self.subTest(name=name, command=command):
-                    done = self.run_here(*command, "--model", name, preexec_fn=limits, timeout=60)
+                    done = self.run_here(*command, "--model", name, preexec_fn=limits, timeout=PATIENCE)
                     self.assert_one_line(done, 2, name, words)
         with open(self.folder / "large", "wb") as file:
             file.truncate(1 << 40)
-        done = self.run_here("simulate", "--model", "large", preexec_fn=limits, timeout=60)
+        done = self.run_here("simulate", "--model", "large", preexec_fn=limits, timeout=PATIENCE)
         self.assert_one_line(done, 2, "large: expected at most 65536 bytes, got 1099511627776")
 
 

@@ -6,7 +6,6 @@ The packages live in a virtual environment of their own (readers_environment.py)
 """
 
 import json
-import time
 import unittest
 
 import readers_environment
@@ -87,9 +86,7 @@ class ReadersTest(ProgramTest):
 
     def test_tensorboard_reads_a_run_that_was_killed_and_resumed(self):
         process = self.start(*small(steps=10**9))
-        while not (self.folder / "run/policy.safetensors").exists():
-            self.assertIsNone(process.poll())
-            time.sleep(0.01)
+        self.wait_for((self.folder / "run/policy.safetensors").exists)
         self.end(process)
         steps = int(load(self.folder / "run/checkpoint.safetensors")[1]["train/steps"]) + 4000
         self.succeed("train", "--resume", "run", "--steps", steps)

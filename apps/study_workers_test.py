@@ -11,7 +11,7 @@ import subprocess
 import time
 import unittest
 
-from testing import ProgramTest, snapshot
+from testing import PATIENCE, ProgramTest, snapshot
 
 STUDY = """title = "Little"
 seeds = 4
@@ -96,7 +96,7 @@ class WorkersTest(ProgramTest):
         study = self.prepare(text, "study", "--keep", "tables")
         rng = random.Random(1)
         workers, kills = [], 0
-        deadline = time.monotonic() + 120 + SEEDS
+        deadline = time.monotonic() + PATIENCE + 20 * SEEDS
         while sum(len(list((study / name).glob("*.done"))) for name in ("one", "two")) < 2 * SEEDS:
             self.assertLess(time.monotonic(), deadline)
             workers = [worker for worker in workers if worker.poll() is None]
@@ -107,7 +107,7 @@ class WorkersTest(ProgramTest):
                 rng.choice(workers).kill()
                 kills += 1
         for worker in workers:
-            self.assertIn(worker.wait(60), (0, -signal.SIGKILL))
+            self.assertIn(worker.wait(PATIENCE), (0, -signal.SIGKILL))
         self.prepare(text, "study", "--keep", "tables")  # a worker may have died giving its claim back
         self.assertFalse(list(study.rglob("*.claim")) + list(study.rglob("*.failed")))
         self.succeed("study", "little.toml", "--out", "whole", "--keep", "tables")
@@ -143,7 +143,7 @@ class WorkersTest(ProgramTest):
                 self.wait_for(lambda: log.exists() and
                               log.read_text(encoding="utf-8").count("\n") > before)
                 worker.send_signal(number)
-                self.assertEqual(worker.wait(60), 75)
+                self.assertEqual(worker.wait(PATIENCE), 75)
                 self.assertFalse(list(study.rglob("*.claim")))
                 self.assertIn("stopped at step", log.read_text(encoding="utf-8"))
         self.assertIn("resumed at step", (study / "one/seed1/log.txt").read_text(encoding="utf-8"))
@@ -208,7 +208,7 @@ class WorkersTest(ProgramTest):
         self.assertIsNone(worker.poll())
         for process in (worker, other):
             process.terminate()
-            self.assertEqual(process.wait(60), 75)
+            self.assertEqual(process.wait(PATIENCE), 75)
         self.assertFalse(list(study.rglob("*.failed")))
 
     def test_odd_things_in_place_of_files(self):

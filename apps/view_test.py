@@ -13,7 +13,7 @@ import time
 import unittest
 import zlib
 
-from testing import ROOT, UPSWING, ProgramTest, run, train_once
+from testing import PATIENCE, ROOT, UPSWING, ProgramTest, run, train_once
 
 AGENTS = ROOT / "web/public/agents"
 FAST = AGENTS / "fast.safetensors"
@@ -202,22 +202,16 @@ class Pictures(ViewTest):
 
     def test_what_is_interrupted_leaves_nothing(self):
         need(self, "ffmpeg")
-        for name in ("a.mp4", "a.png", "frames/"):
+        for name in ("a.mp4", "frames/"):  # they begin to write at once
             arguments = [UPSWING, "view", FAST, "--record", name, "--seconds", "1000", "--width", "64",
                          "--height", "48", "--fps", "1"]
             with subprocess.Popen(arguments, cwd=self.folder, stdout=subprocess.PIPE,
                                   stderr=subprocess.STDOUT) as process:
-                # It has begun when there is something; a picture alone, soon.
-                for _ in range(300):
-                    if name == "a.png" or list(self.folder.iterdir()):
-                        break
-                    time.sleep(0.02)
-                time.sleep(0.5)
+                self.wait_for(lambda: process.poll() is not None or list(self.folder.iterdir()))
                 process.send_signal(signal.SIGTERM)
-                process.communicate()
-            if name != "a.png":
-                self.assertEqual(process.returncode, 143)
-                self.assertEqual(list(self.folder.iterdir()), [])
+                said, _ = process.communicate()
+            self.assertEqual(process.returncode, 143, said)
+            self.assertEqual(list(self.folder.iterdir()), [])
 
 
 class BadInput(ViewTest):
@@ -351,11 +345,10 @@ class Window(ViewTest):
         self.xdotool("windowfocus", "--sync", self.id)
 
     def until(self, condition):
-        for _ in range(300):
-            if condition():
-                return
-            time.sleep(0.1)
-        self.fail(f"nothing happened; the title is {self.title()}")
+        deadline = time.monotonic() + PATIENCE
+        while not condition():
+            self.assertLess(time.monotonic(), deadline, f"nothing happened; the title is {self.title()}")
+            time.sleep(0.05)
 
     def title(self):
         return self.xdotool("getwindowname", self.id)
@@ -372,7 +365,7 @@ class Window(ViewTest):
 
     def close(self):
         self.key("ctrl+q")
-        self.assertEqual(self.process.wait(60), 0)
+        self.assertEqual(self.process.wait(PATIENCE), 0)
         self.assertEqual(self.process.stdout.read(), "")
 
     def screenshot(self):
@@ -383,6 +376,13 @@ class Window(ViewTest):
              "rawvideo", "-"], check=True, stdout=subprocess.PIPE)
         self.assertEqual(len(done.stdout), 320 * 240 * 3)
         return 320, 240, [done.stdout]
+
+    def still(self):
+        """The window as a picture, once it changes no more."""
+        seen = self.screenshot()
+        while (now := self.screenshot()) != seen:
+            seen = now
+        return seen
 
     def rows(self, name="seen.csv"):
         with open(self.folder / name, encoding="utf-8", newline="") as file:
@@ -428,18 +428,17 @@ class Window(ViewTest):
         self.says("paused")
         self.key("BackSpace")
         self.says(r"- 0\.00 s")
-        time.sleep(0.3)
-        seen = self.screenshot()
-        # Without smoothed edges, as it is drawn by a processor.
-        mean, share = difference(seen, self.picture(FAST, "--start", "3.1415926,0,0,0", "--seconds", 0,
-                                                    size=(320, 240)))
-        self.assertLess(mean, 4)
-        self.assertLess(share, 0.03)
+        expected = self.picture(FAST, "--start", "3.1415926,0,0,0", "--seconds", 0, size=(320, 240))
+
+        def is_drawn():
+            # Without smoothed edges, as it is drawn by a processor.
+            mean, share = difference(self.screenshot(), expected)
+            return mean < 4 and share < 0.03
+        self.until(is_drawn)
         for key in ("F1", "F3", "F4"):
+            seen = self.still()
             self.key(key)
             self.until(lambda: self.screenshot() != seen)
-            time.sleep(0.2)
-            seen = self.screenshot()
         self.close()
 
     def test_mouse(self):
@@ -483,11 +482,11 @@ class Window(ViewTest):
 
     def test_it_ends_by_itself_and_by_signals(self):
         self.open(FAST, "--seconds", 0.6, "--csv", "seen.csv")
-        self.assertEqual(self.process.wait(60), 0)
+        self.assertEqual(self.process.wait(PATIENCE), 0)
         self.assertEqual(len(self.rows()), 30)
         self.open(FAST)
         self.process.send_signal(signal.SIGTERM)
-        self.assertEqual(self.process.wait(60), 143)
+        self.assertEqual(self.process.wait(PATIENCE), 143)
 
 
 if __name__ == "__main__":
