@@ -45,7 +45,6 @@ class ThreadTuner {
   size_t candidate_ = 0;                // equal to chosen_: no trial is running
   bool upwards_ = true;                 // whether the trial tries more threads; then it tries fewer
   int calls_ = 0;                       // of the present block
-  int rounds_ = 0;                      // pairs of blocks that have been timed
   std::array<double, 2> seconds_ = {};  // of this round, on the chosen and the candidate number
   std::vector<double> ratios_;          // candidate over chosen, of each round
   double trial_seconds_ = 0;            // that this trial has taken
