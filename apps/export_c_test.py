@@ -372,6 +372,23 @@ class HeaderTest(ProgramTest):
             self.write("policy.h", whole.replace(right, wrong))
             self.assertEqual(self.self_test(), 3, right)
 
+    def test_the_c_files_of_exports_compile_on_their_own(self):
+        """With export/c/tables.h in place of an export's tables."""
+        folder = ROOT / "export/c"
+        simulates = ["-DPOLICY_LOOK_AHEAD=9"]
+        ways = [("pendulum", []), ("pendulum", ["-DPOLICY_MEMORY_SIZE=12"]),
+                ("pendulum", ["-DPOLICY_RULE='s'"]), ("pendulum", ["-DPOLICY_RULE='c'"]),
+                ("pendulum_v1", []), ("acrobot_v1", []), ("lqr", []), ("swing_up", simulates),
+                ("swing_up", [*simulates, "-DPOLICY_LAW='p'"]),
+                ("tvlqr", [*simulates, "-DPOLICY_PLAN_STEPS=1"])]
+        parts = {"numbers", "network", "network_test", "regulator", "catch", "controller"}
+        self.assertEqual({path.stem for path in folder.glob("*.c")},
+                         {name for name, _ in ways} | parts)
+        for name, options in ways:
+            with self.subTest(f"{name} {options}"):
+                done = compile_c(self.folder, folder / f"{name}.c", "-Wconversion", "-c", *options)
+                self.assertEqual((done.returncode, done.stdout), (0, ""))
+
     def test_two_policies_in_one_program(self):
         for name in ("fast", "sac"):
             self.succeed("export", AGENTS / f"{name}.safetensors", "--c", f"{name}.h")

@@ -9,9 +9,7 @@
 #include "core/error.h"
 #include "core/rng.h"
 #include "core/text.h"
-#include "export/c_code.h"
-#include "export/c_controller_code.h"
-#include "export/c_task.h"
+#include "export/c_header.h"
 #include "export/c_text.h"
 #include "setup/controllers.h"
 #include "sim/closed_form.h"
@@ -123,192 +121,104 @@ std::vector<float> StepsFrom(const std::vector<float>& states, const std::vector
   return steps;
 }
 
-/// A header while it is made.
-class ControllerWriter {
- public:
-  explicit ControllerWriter(const LoadedPolicy& loaded)
-      : loaded_(loaded), kind_(loaded.policy->kind()), config_(ConfigOf(loaded)) {}
-
-  CHeader Write(const std::string& prefix) {
-    AddParts();
-    for (const CArray& array : arrays_) header_.constant_bytes += 4 * array.values.size();
-    header_.prefix = prefix;
-    header_.state_bytes = plan_steps_ > 0 ? 12 : 4;
-    // The deviation; for others its copy that is simulated, too, and five arrays of a step.
-    header_.stack_bytes = 4 * sizeof(float) * (kind_ == "lqr" ? 1 : 7);
-    std::string text = Concat(Head(), Declarations(), c_code::kNumbers, "\n");
-    for (const CArray& array : arrays_) text += ArrayText(array);
-    text += Concat(code_, Control(), SelfTest(), "\n#endif\n");
-    header_.text =
-        Replaced(Replaced(text, "NAME_", prefix + "_"), "CAPS_", UpperCase(prefix) + "_");
-    return header_;
-  }
-
- private:
-  void AddParts();
-  void AddCatch(const LqrCatch& upright);
-  void AddPlan(const SwingUp& plan);
-  std::string Head() const;
-  std::string Declarations() const;
-  std::string Control() const;
-  std::string SelfTest() const;
-
-  const LoadedPolicy& loaded_;
-  const std::string kind_;
-  const ControllerConfig config_;
-  std::vector<CArray> arrays_;
-  std::string code_;    // functions before NAME_control
-  std::string choose_;  // statements that choose a torque u at d
-  int look_ahead_ = 0, plan_steps_ = 0;
-  CHeader header_;
-};
-
-void ControllerWriter::AddParts() {
-  const auto gain = [&](const Lqr& lqr) {
-    arrays_.push_back({"gain", "N m/rad, N m s/rad", Floats(lqr.K)});
-    code_ = c_code::kDeviation;
-  };
-  if (kind_ == "lqr") {
-    gain(SolveLqr(config_.lqr, config_.plant));
-    choose_ = "    u = NAME_regulator(d);\n";
-    return;
-  }
-  const LqrCatch upright(config_.lqr, config_.plant);
-  gain(upright.lqr());
-  AddCatch(upright);
-  if (kind_ == "tvlqr") {
-    AddPlan(dynamic_cast<const TvlqrPolicy&>(*loaded_.policy).plan());
-    choose_ = R"c(    if (NAME_catches(d)) {
-      state->step = CAPS_PLAN_STEPS;
-      state->sign = 1.0f;
-      u = NAME_regulator(d);
-    } else {
-      u = NAME_follow(state, d);
-    }
-)c";
-    return;
-  }
-  const bool energy = kind_ == "energy";
-  const std::vector<double> gains =
-      energy ? std::vector{config_.energy.kP, config_.energy.kD, config_.energy.kE}
-             : std::vector{config_.pfl.kP, config_.pfl.kD, config_.pfl.kE};
-  arrays_.push_back({"law_gains", "of angle, velocity and energy", Floats(gains)});
-  code_ +=
-      Filled(c_code::kTerms, {{"law", energy ? c_code::kEnergyShaping : c_code::kPartialFeedback}});
-  choose_ = "    u = NAME_catches(d) ? NAME_regulator(d) : NAME_law(d);\n";
-}
-
-void ControllerWriter::AddCatch(const LqrCatch& upright) {
-  if (config_.plant.coulomb1 != 0 || config_.plant.coulomb2 != 0) {
-    throw BadInput(Concat(loaded_.name,
+/// The tables by which export/c/catch.c simulates.
+void AddCatch(const LoadedPolicy& loaded, const LqrCatch& upright, CParts& parts) {
+  const Plant& plant = loaded.plant;
+  if (plant.coulomb1 != 0 || plant.coulomb2 != 0) {
+    throw BadInput(Concat(loaded.name,
                           ": expected a plant without dry friction (coulomb1, coulomb2 ",
                           "0), which the C code's look-ahead does not have"));
   }
   ClosedFormBatch batch(1);
-  batch.SetPlant(0, config_.plant);
-  arrays_.push_back({"plant", "of the equations of motion",
-                     Floats(std::array{batch.J1[0], batch.J2[0], batch.b[0], batch.G1[0],
-                                       batch.G2[0], batch.d1[0], batch.d2[0], batch.a[0]})});
-  arrays_.push_back(
+  batch.SetPlant(0, plant);
+  parts.constants.push_back(
+      {"plant", "of the equations of motion",
+       Floats(std::array{batch.J1[0], batch.J2[0], batch.b[0], batch.G1[0], batch.G2[0],
+                         batch.d1[0], batch.d2[0], batch.a[0]})});
+  parts.constants.push_back(
       {"upright_cost", "of a deviation from upright", Floats(Triangle(upright.lqr().P))});
-  arrays_.push_back({"region", "of attraction", Floats(std::array{upright.region()})});
-  look_ahead_ = upright.steps();
-  const bool first = config_.plant.actuated_joint == 1;
-  code_ += c_code::kCost + Filled(c_code::kCatch, {{"torque1", first ? "torque + " : ""},
-                                                   {"torque2", first ? "" : "torque + "}});
+  parts.constants.push_back({"region", "of attraction", Floats(std::array{upright.region()})});
+  parts.macros.emplace_back("LOOK_AHEAD", Concat(upright.steps(), " /* control periods */"));
+  parts.macros.emplace_back("ACTUATED_JOINT", Concat(plant.actuated_joint));
 }
 
-void ControllerWriter::AddPlan(const SwingUp& plan) {
-  plan_steps_ = plan.trajectory.steps();
+void AddPlan(const SwingUp& plan, CParts& parts) {
+  const int steps = plan.trajectory.steps();
   std::vector<double> places, gains, costs;
-  for (size_t t = 0; t < static_cast<size_t>(plan_steps_); ++t) {
+  for (size_t t = 0; t < static_cast<size_t>(steps); ++t) {
     const StateVector d = UprightDeviation(plan.trajectory.x[t]);
     places.insert(places.end(), d.begin(), d.end());
     gains.insert(gains.end(), plan.K[t].begin(), plan.K[t].end());
     const std::vector<double> cost = Triangle(plan.P[t]);
     costs.insert(costs.end(), cost.begin(), cost.end());
   }
-  arrays_.push_back({"plan", "deviations from upright", Floats(places)});
-  arrays_.push_back({"plan_torque", "N m", Floats(plan.trajectory.u)});
-  arrays_.push_back({"plan_gain", "N m/rad, N m s/rad", Floats(gains)});
-  arrays_.push_back({"plan_cost", "of leaving the plan", Floats(costs)});
-  code_ += c_code::kPlan;
+  parts.constants.push_back({"plan", "deviations from upright", Floats(places)});
+  parts.constants.push_back({"plan_torque", "N m", Floats(plan.trajectory.u)});
+  parts.constants.push_back({"plan_gain", "N m/rad, N m s/rad", Floats(gains)});
+  parts.constants.push_back({"plan_cost", "of leaving the plan", Floats(costs)});
+  parts.macros.emplace_back("PLAN_STEPS", Concat(steps, " /* control periods */"));
+  parts.work += Concat(", and ", 2 * steps, " quadratic forms");
 }
 
-std::string ControllerWriter::Head() const {
-  std::string states;
-  const CTask task = CTaskOf(loaded_);
-  for (const auto& [name, meaning] : task.state) {
-    states += Concat(" *   ", name, std::string(8 - name.size(), ' '), meaning, '\n');
+CHeader WriteController(const LoadedPolicy& loaded, const std::string& prefix) {
+  const std::string kind = loaded.policy->kind();
+  const ControllerConfig config = ConfigOf(loaded);
+  const double limit = config.plant.torque_limit, tolerance = kTorqueShare * limit;
+  const bool simulates = kind != "lqr";
+  CHeader header;
+  header.prefix = prefix;
+  header.state_bytes = kind == "tvlqr" ? 12 : 4;
+  // The deviation; for others its copy that is simulated, too, and five arrays of a step.
+  header.stack_bytes = 4 * sizeof(float) * (simulates ? 7 : 1);
+  CParts parts;
+  parts.file = kind == "lqr" || kind == "tvlqr" ? kind + ".c" : "swing_up.c";
+  parts.goal = simulates ? "swings up and balances a double pendulum with one motor"
+                         : "holds a double pendulum with one motor upright";
+  parts.origin =
+      Concat("It is ", CommentText(loaded.name), ": ", CommentText(loaded.policy->description()));
+  parts.state = PendulumArguments();
+  parts.motor = config.plant.actuated_joint == 1 ? "at joint 1" : "at joint 2";
+  parts.limit = limit;
+  parts.period = kControlPeriod;
+  parts.plant = "of which it knows all";
+  parts.made_for = config.plant;
+  parts.work = "a product of four numbers.";
+  const auto gain = [&](const Lqr& lqr) {
+    parts.constants.push_back({"gain", "N m/rad, N m s/rad", Floats(lqr.K)});
+  };
+  if (simulates) {
+    const LqrCatch upright(config.lqr, config.plant);
+    gain(upright.lqr());
+    AddCatch(loaded, upright, parts);
+    parts.work = Concat("up to ", upright.steps(),
+                        " control periods of simulation near upright, of 16 derivatives each");
+    if (kind == "tvlqr") {
+      AddPlan(dynamic_cast<const TvlqrPolicy&>(*loaded.policy).plan(), parts);
+    } else {
+      const bool energy = kind == "energy";
+      const std::vector<double> gains =
+          energy ? std::vector{config.energy.kP, config.energy.kD, config.energy.kE}
+                 : std::vector{config.pfl.kP, config.pfl.kD, config.pfl.kE};
+      parts.constants.push_back({"law_gains", "of angle, velocity and energy", Floats(gains)});
+      parts.macros.emplace_back(
+          "LAW", energy ? "'e' /* energy shaping */" : "'p' /* partial feedback linearisation */");
+    }
+    parts.work += "; away from upright none of the simulation.";
+  } else {
+    gain(SolveLqr(config.lqr, config.plant));
   }
-  std::string work = "Work of a call: a product of four numbers.";
-  if (look_ahead_ > 0) {
-    work = Concat("Work of a call: up to ", look_ahead_,
-                  " control periods of simulation near upright, of 16 derivatives each");
-    if (plan_steps_ > 0) work += Concat(", and ", 2 * plan_steps_, " quadratic forms");
-    work += "; away from upright none of the simulation.";
-  }
-  const char* goal =
-      kind_ == "lqr" ? "holds a double pendulum with one motor upright" : task.goal.c_str();
-  return Filled(
-      c_code::kHead,
-      {{"goal", goal},
-       {"origin", Paragraph(Concat("It is ", CommentText(loaded_.name), ": ",
-                                   CommentText(loaded_.policy->description()),
-                                   ". Written by Upswing ", UPSWING_VERSION, '.'))},
-       {"names", "q1, q2, w1, w2"},
-       {"states", states},
-       {"motor", task.motor},
-       {"limit", FormatNumber(config_.plant.torque_limit)},
-       {"period", FormatNumber(kControlPeriod)},
-       {"plant", PlantParagraph(config_.plant, "of which it knows all")},
-       {"needs", Paragraph(Concat("Flash: ", header_.constant_bytes,
-                                  " bytes of constants, 1 to 3 KB of code, and up to 600 bytes "
-                                  "of samples where the self test is used. RAM: ",
-                                  header_.state_bytes, " bytes of state, and arrays of ",
-                                  header_.stack_bytes, " bytes on the stack. ", work))}});
-}
 
-std::string ControllerWriter::Declarations() const {
-  std::string sizes;
-  if (look_ahead_ > 0) {
-    sizes += Concat("#define CAPS_LOOK_AHEAD ", look_ahead_, " /* control periods */\n");
-  }
-  if (plan_steps_ > 0) {
-    sizes += Concat("#define CAPS_PLAN_STEPS ", plan_steps_, " /* control periods */\n");
-  }
-  return Filled(Concat(c_code::kOpening, sizes, c_code::kDeclarations),
-                {{"period", CLiteral(static_cast<float>(kControlPeriod))},
-                 {"limit", CLiteral(static_cast<float>(config_.plant.torque_limit))},
-                 {"constant_bytes", Concat(header_.constant_bytes)},
-                 {"acted", ""},
-                 {"state", plan_steps_ > 0 ? c_code::kPlace : ""}});
-}
-
-std::string ControllerWriter::Control() const {
-  return Filled(c_code::kControllerControl,
-                {{"forget", plan_steps_ > 0 ? "  state->step = -1;\n  state->sign = 1.0f;\n" : ""},
-                 {"choose", choose_}});
-}
-
-std::string ControllerWriter::SelfTest() const {
-  const double tolerance = kTorqueShare * config_.plant.torque_limit;
   std::vector<float> states, torques;
-  DrawSamples(loaded_, tolerance, states, torques);
-  std::string steps;
-  if (look_ahead_ > 0) {
-    steps = ArrayText({"sample_steps", "deviations a control period later",
-                       StepsFrom(states, torques, config_.plant)});
+  DrawSamples(loaded, tolerance, states, torques);
+  parts.samples = {{"sample_states", "q1, q2, w1, w2", states}, {"sample_torques", "N m", torques}};
+  if (simulates) {
+    parts.samples.push_back({"sample_steps", "deviations a control period later",
+                             StepsFrom(states, torques, config.plant)});
   }
-  const CChecksum checksum = ChecksumOf(arrays_);
-  return Filled(Concat(c_code::kChecksum, c_code::kControllerSelfTest),
-                {{"tables", ArrayText({"sample_states", "q1, q2, w1, w2", states}) +
-                                ArrayText({"sample_torques", "N m", torques}) + steps},
-                 {"step", look_ahead_ > 0 ? c_code::kStepTest : ""},
-                 {"sums", checksum.lines},
-                 {"checksum", Concat(checksum.sum, 'u')},
-                 {"samples", Concat(kSamples)},
-                 {"torque_tolerance", CLiteral(static_cast<float>(tolerance))}});
+  parts.macros.emplace_back("SAMPLES", Concat(kSamples));
+  parts.macros.emplace_back("TORQUE_TOLERANCE", CLiteral(static_cast<float>(tolerance)));
+  WriteHeader(parts, header);
+  return header;
 }
 
 }  // namespace
@@ -326,7 +236,7 @@ CHeader ControllerHeaderOf(const LoadedPolicy& loaded, const std::string& prefix
         "hybrid: expected lqr, energy, pfl, tvlqr or a learned policy to write as C, got "
         "two of them; export the policy that swings up, and lqr, each by itself");
   }
-  return ControllerWriter(loaded).Write(prefix);
+  return WriteController(loaded, prefix);
 }
 
 }  // namespace upswing

@@ -39,12 +39,6 @@ std::string Replaced(std::string text, std::string_view from, std::string_view t
   return text;
 }
 
-std::string Filled(std::string text,
-                   const std::vector<std::pair<std::string, std::string>>& values) {
-  for (const auto& [word, value] : values) text = Replaced(text, "@" + word + "@", value);
-  return text;
-}
-
 std::string UpperCase(std::string text) {
   for (char& c : text) c = c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
   return text;

@@ -2,7 +2,6 @@
 
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 /// Pieces of C source code.
@@ -17,10 +16,6 @@ std::string CLiteral(float value);
 
 /// `text` with each `from` replaced by `to`.
 std::string Replaced(std::string text, std::string_view from, std::string_view to);
-
-/// `text` with each @word@ replaced by what that stands for.
-std::string Filled(std::string text,
-                   const std::vector<std::pair<std::string, std::string>>& values);
 
 std::string UpperCase(std::string text);
 

@@ -43,7 +43,6 @@ TEST(CText, LiteralsReadBackAsTheSameFloat) {
 TEST(CText, WrapsBetweenWords) {
   const std::string text = Paragraph(std::string(300, 'x') + " y z");
   EXPECT_EQ(text, " * " + std::string(300, 'x') + "\n * y z");
-  EXPECT_EQ(Filled("@a@ and @b@, @a@", {{"a", "1"}, {"b", "@c@"}}), "1 and @c@, 1");
 }
 
 }  // namespace

@@ -1,27 +1,27 @@
 #include <algorithm>
-#include <array>
-#include <cmath>
+#include <numbers>
 
 #include "core/error.h"
 #include "core/text.h"
-#include "export/c_code.h"
 #include "export/c_controller.h"
+#include "export/c_header.h"
 #include "export/c_samples.h"
-#include "export/c_task.h"
 #include "export/c_text.h"
 #include "export/export.h"
 #include "export/exported_policy.h"
 #include "io/streams.h"
+#include "sim/acrobot_v1.h"
+#include "sim/pendulum_v1.h"
 
 namespace upswing {
 namespace {
 
 constexpr size_t kMostParameters = 2'000'000;  // of which a header is some 23 MB
 constexpr size_t kLongestPrefix = 32;
-constexpr int kBlockRows = 8;  // see NAME_linear
+constexpr int kBlockRows = 8;  // see linear in export/c/network.c
 
-/// The weights (out × in) in the order that NAME_linear reads: blocks of rows, each column by
-/// column; then the rows that are left.
+/// The weights (out × in) in the order that linear in export/c/network.c reads: blocks of rows,
+/// each column by column; then the rows that are left.
 std::vector<float> InBlocks(const LayerView& layer) {
   std::vector<float> ordered;
   ordered.reserve(layer.W.size());
@@ -88,224 +88,144 @@ std::string OriginOf(const PolicyInfo& info) {
   return parts.empty() ? "unknown" : CommentText(Join(parts, ", "));
 }
 
-/// A header while it is made.
-class HeaderWriter {
- public:
-  HeaderWriter(const LoadedPolicy& loaded, const std::string& prefix)
-      : policy_(ViewForExport(loaded)),
-        task_(CTaskOf(loaded)),
-        layers_(LayersOf(policy_)),
-        samples_(DrawSamples(policy_, layers_)) {
-    header_.prefix = prefix;
-    AddConstants();
+/// The constants by which energy and height are computed (export/c/pendulum.c). The energy is
+/// linear in them, so they follow from Energy at some states.
+std::vector<float> EnergyConstants(const Plant& plant) {
+  constexpr double kPi = std::numbers::pi;
+  const double whole = 2 * EnergyTarget(plant);
+  const double hanging = Energy(plant, {0, 0, 0, 0}), folded = Energy(plant, {0, kPi, 0, 0});
+  const double own1 = Energy(plant, {0, 0, 1, -1}) - hanging;  // w1 = 1, w1 + w2 = 0
+  const double own2 = Energy(plant, {0, 0, 0, 1}) - hanging;   // w1 = 0, w1 + w2 = 1
+  const double both = Energy(plant, {0, 0, 1, 0}) - hanging - own1 - own2;
+  const double length = plant.length1 + plant.length2;
+  std::vector<float> constants;
+  for (const double constant :
+       {own1 / whole, own2 / whole, both / whole, (hanging + folded) / 2 / whole,
+        (hanging - folded) / 2 / whole, plant.length1 / length, plant.length2 / length}) {
+    constants.push_back(static_cast<float>(constant));
   }
-
-  CHeader Write() {
-    CountWork();
-    const std::string body = Concat(Declarations(), c_code::kNumbers, Constants(), Functions());
-    header_.text =
-        Replaced(Replaced(Concat(HeadComment(), body, "\n#endif\n"), "NAME_", header_.prefix + "_"),
-                 "CAPS_", UpperCase(header_.prefix) + "_");
-    return std::move(header_);
-  }
-
- private:
-  int num_outputs() const { return layers_.back().out(); }
-  int memory() const { return policy_.loaded->memory(); }
-
-  void AddConstants();
-  void CountWork();
-  std::string HeadComment() const;
-  std::string Declarations() const;
-  std::string Constants() const;
-  std::string Functions() const;
-  std::string OutputsFunction() const;
-  std::string SelfTest() const;
-
-  /// Names of the state in a list, such as "q1, q2", each after `before`.
-  std::string StateNames(const std::string& before) const {
-    std::vector<std::string> names;
-    for (const NamedInput& input : task_.state) names.push_back(before + input.name);
-    return Join(names, ", ");
-  }
-
-  const ExportedPolicy policy_;
-  const CTask task_;
-  const std::vector<LayerView> layers_;
-  const CSamples samples_;
-  std::vector<CArray> arrays_;
-  CHeader header_;
-};
-
-void HeaderWriter::AddConstants() {
-  arrays_ = task_.arrays;
-  if (policy_.is_discrete()) {
-    arrays_.push_back({"torques", "N m", {policy_.torques().begin(), policy_.torques().end()}});
-  }
-  for (const LayerView& layer : layers_) {
-    const std::string name = CName(layer.name);
-    arrays_.push_back({name + "_weight", Concat(layer.out(), " x ", layer.in()), InBlocks(layer)});
-    arrays_.push_back({name + "_bias", "", Copy(layer.b)});
-    if (!layer.layer_norm()) continue;
-    arrays_.push_back({name + "_norm_weight", "", Copy(layer.gain)});
-    arrays_.push_back({name + "_norm_bias", "", Copy(layer.norm_bias)});
-  }
+  return constants;
 }
 
-void HeaderWriter::CountWork() {
-  constexpr size_t kFloat = 4;
-  for (const CArray& array : arrays_) header_.constant_bytes += kFloat * array.values.size();
-  header_.state_bytes = kFloat;  // the last torque
-  if (memory() > 0) {
-    header_.state_bytes += kFloat * (3 + kMemorySize * static_cast<size_t>(memory()));
-  }
-  size_t widest = 0;
-  for (const LayerView& layer : layers_) {
-    header_.multiply_adds += layer.W.size();
-    widest = std::max(widest, static_cast<size_t>(layer.out()));
-  }
-  const auto obs_size = static_cast<size_t>(policy_.obs_size());
-  header_.stack_bytes = kFloat * (obs_size + static_cast<size_t>(num_outputs()) + 2 * widest);
-}
-
-std::string HeaderWriter::HeadComment() const {
-  const LoadedPolicy& loaded = *policy_.loaded;
-  std::string states, plant;
-  for (const auto& [name, meaning] : task_.state) {
-    states += Concat(" *   ", name, std::string(8 - std::min(size_t{7}, name.size()), ' '), meaning,
-                     '\n');
-  }
+/// What a header says and does of a task.
+void AddTask(const LoadedPolicy& loaded, CParts& parts) {
   if (HasPlant(loaded.task)) {
-    plant = PlantParagraph(loaded.plant, "by which it computes energy and height");
+    // As export/c/pendulum.c has them.
+    static_assert(kMaxVelocity1 == 10 && kMaxVelocity2 == 20);
+    static_assert(kMemoryVelocity == 1 && kMemoryTorque == 5 && kMemorySize == 3);
+    parts.file = "pendulum.c";
+    parts.goal = "swings up and balances a double pendulum with one motor";
+    parts.state = PendulumArguments();
+    parts.motor = loaded.plant.actuated_joint == 1 ? "at joint 1" : "at joint 2";
+    parts.plant = "by which it computes energy and height";
+    parts.made_for = loaded.plant;
+    parts.constants = {
+        {"energy", "of the observed energy and height", EnergyConstants(loaded.plant)}};
+  } else if (loaded.task == kPendulumV1) {
+    parts.file = "pendulum_v1.c";
+    parts.goal = "swings up and balances a pendulum (Gymnasium's Pendulum-v1)";
+    parts.state = {{"theta", "rad    angle, 0 upright"}, {"omega", "rad/s  its velocity"}};
+    parts.motor = "at the joint";
+  } else if (loaded.task == kAcrobotV1) {
+    parts.file = "acrobot_v1.c";
+    parts.goal = "swings the end of a double pendulum up (Gymnasium's Acrobot-v1)";
+    parts.state = {{"theta1", "rad    angle of link 1, 0 hanging"},
+                   {"theta2", "rad    angle of link 2 relative to link 1, 0 in line with it"},
+                   {"omega1", "rad/s  velocity of theta1"},
+                   {"omega2", "rad/s  velocity of theta2"}};
+    parts.motor = "at the joint between the links";
+  } else {
+    throw UnknownObservations(loaded);
   }
-  size_t tanhs = policy_.rule() == ActionRule::kSquashedGaussian ? 1 : 0;
-  for (const LayerView& layer : layers_) {
-    if (layer.activation == Activation::kTanh) tanhs += static_cast<size_t>(layer.out());
-  }
-  const std::string description = Replaced(loaded.policy->description(), "→", "-");
-  return Filled(
-      c_code::kHead,
-      {{"goal", task_.goal},
-       {"origin", Paragraph(Concat("It is the ", CommentText(description), "; ",
-                                   OriginOf(loaded.policy->info()), ". Written by Upswing ",
-                                   UPSWING_VERSION, '.'))},
-       {"names", StateNames("")},
-       {"states", states},
-       {"motor", task_.motor},
-       {"limit", FormatNumber(policy_.limit)},
-       {"period", FormatNumber(policy_.spec.step_seconds)},
-       {"plant", plant},
-       {"needs", Paragraph(Concat(
-                     "Flash: ", header_.constant_bytes,
-                     " bytes of constants, 1 to 2 KB of code, and 1 KB of "
-                     "samples where the self test is used. RAM: ",
-                     header_.state_bytes, " bytes of state, and arrays of ", header_.stack_bytes,
-                     " bytes on the stack in a call. Work of a call: ", header_.multiply_adds,
-                     " multiply-adds, ", task_.sines, " sines and cosines",
-                     tanhs > 0 ? Concat(", ", tanhs, " of tanh") : "", '.'))}});
 }
 
-std::string HeaderWriter::Declarations() const {
-  std::string observation, memory_size;
+/// The layers' arrays, and the list of the layers.
+void AddLayers(const std::vector<LayerView>& layers, const std::string& prefix, CParts& parts) {
+  std::string rows;
+  for (const LayerView& layer : layers) {
+    const std::string name = CName(layer.name), array = Concat(prefix, '_', name);
+    const auto add = [&](const char* what, const std::string& comment, std::vector<float> values) {
+      parts.constants.push_back({name + what, comment, std::move(values)});
+    };
+    add("_weight", Concat(layer.out(), " x ", layer.in()), InBlocks(layer));
+    add("_bias", "", Copy(layer.b));
+    std::string norm = "0, 0";
+    if (layer.layer_norm()) {
+      add("_norm_weight", "", Copy(layer.gain));
+      add("_norm_bias", "", Copy(layer.norm_bias));
+      norm = Concat(array, "_norm_weight,\n   ", array, "_norm_bias");
+    }
+    const char activation = layer.activation == Activation::kRelu   ? 'r'
+                            : layer.activation == Activation::kTanh ? 't'
+                                                                    : 'n';
+    rows += Concat("  {", array, "_weight, ", array, "_bias,\n   ", norm, ",\n   ", layer.in(),
+                   ", ", layer.out(), ", '", activation, "'},\n");
+  }
+  parts.layers = Concat(
+      "static const struct {\n  const float *weight, *bias, *norm_weight, *norm_bias;\n"
+      "  int in, out;\n  char activation; /* r: relu, t: tanh, n: none */\n} ",
+      prefix, "_layers[", layers.size(), "] = {\n", rows, "};\n");
+}
+
+CHeader NetworkHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
+  const ExportedPolicy policy = ViewForExport(loaded);
+  const std::vector<LayerView> layers = LayersOf(policy);
+  const CSamples samples = DrawSamples(policy, layers);
+  const int outputs = layers.back().out(), memory = loaded.memory();
+  const bool squashed = policy.rule() == ActionRule::kSquashedGaussian;
+  CHeader header;
+  header.prefix = prefix;
+  CParts parts;
+  AddTask(loaded, parts);
+  if (policy.is_discrete()) {
+    parts.constants.push_back(
+        {"torques", "N m", {policy.torques().begin(), policy.torques().end()}});
+  }
+  AddLayers(layers, prefix, parts);
+
+  constexpr size_t kFloat = 4;
+  header.state_bytes = kFloat;  // the last torque
+  if (memory > 0) header.state_bytes += kFloat * static_cast<size_t>(3 + kMemorySize * memory);
+  int widest = 0, tanhs = squashed ? 1 : 0;
+  for (const LayerView& layer : layers) {
+    header.multiply_adds += layer.W.size();
+    widest = std::max(widest, layer.out());
+    if (layer.activation == Activation::kTanh) tanhs += layer.out();
+  }
+  header.stack_bytes = kFloat * static_cast<size_t>(policy.obs_size() + outputs + 2 * widest);
+
+  parts.origin = Concat("It is the ", CommentText(Replaced(loaded.policy->description(), "→", "-")),
+                        "; ", OriginOf(loaded.policy->info()));
+  parts.limit = policy.limit;
+  parts.period = policy.spec.step_seconds;
+  parts.work = Concat(header.multiply_adds, " multiply-adds, ", loaded.task == kPendulumV1 ? 2 : 4,
+                      " sines and cosines", tanhs > 0 ? Concat(", ", tanhs, " of tanh") : "", '.');
+  std::string observation = "/* of the observation:\n";
   int index = 0;
-  for (const auto& [name, meaning] : policy_.observation) {
+  for (const auto& [name, meaning] : policy.observation) {
     observation += Concat("     ", index++, ": ", name, ": ", meaning, '\n');
   }
-  if (memory() > 0) {
-    memory_size = Concat("#define CAPS_MEMORY_SIZE ", kMemorySize * memory(),
-                         " /* of the observation, for ", memory(), " past steps */\n");
+  parts.macros = {{"OBSERVATION_SIZE", Concat(policy.obs_size(), ' ', observation, "*/")},
+                  {"OUTPUT_SIZE", Concat(outputs, " /* of the network */")},
+                  {"MULTIPLY_ADDS", Concat(header.multiply_adds, "L /* of a call */")},
+                  {"LAYERS", Concat(layers.size())},
+                  {"WIDEST_LAYER", Concat(widest)},
+                  {"RULE", policy.is_discrete() ? "'l' /* the largest output's torque */"
+                           : squashed           ? "'s' /* the mean, squashed */"
+                                                : "'c' /* the mean, clipped */"},
+                  {"STATE_SIZE", Concat(parts.state.size())},
+                  {"SAMPLES", Concat(samples.count)},
+                  {"OUTPUT_TOLERANCE", CLiteral(samples.output_tolerance)},
+                  {"TORQUE_TOLERANCE", CLiteral(samples.torque_tolerance)}};
+  if (memory > 0) {
+    parts.macros.emplace_back("MEMORY_SIZE",
+                              Concat(kMemorySize * memory, " /* for ", memory, " past steps */"));
   }
-  return Filled(
-      Concat(c_code::kOpening, c_code::kSizes, c_code::kDeclarations, c_code::kObservation),
-      {{"period", CLiteral(static_cast<float>(policy_.spec.step_seconds))},
-       {"limit", CLiteral(static_cast<float>(policy_.limit))},
-       {"inputs", Concat(policy_.obs_size())},
-       {"outputs", Concat(num_outputs())},
-       {"memory", memory_size},
-       {"multiply_adds", Concat(header_.multiply_adds)},
-       {"constant_bytes", Concat(header_.constant_bytes)},
-       {"acted", memory() > 0 ? "; if another one acted, write that here" : ""},
-       {"state", memory() > 0 ? c_code::kMemoryState : ""},
-       {"observation", observation}});
-}
-
-std::string HeaderWriter::Constants() const {
-  std::string text = "\n";
-  for (const CArray& array : arrays_) text += ArrayText(array);
-  return text;
-}
-
-std::string HeaderWriter::OutputsFunction() const {
-  // Layers write into two buffers in turns, the last one into `outputs`.
-  std::array<int, 2> sizes{};
-  std::string calls, x = "observation";
-  for (size_t i = 0; i < layers_.size(); ++i) {
-    const LayerView& layer = layers_[i];
-    const bool last = i + 1 == layers_.size();
-    const std::string name = "NAME_" + CName(layer.name), y = last         ? "outputs"
-                                                              : i % 2 == 0 ? "a"
-                                                                           : "b";
-    const auto call = [&](const char* function, const std::string& arguments) {
-      calls += Concat("  NAME_", function, '(', arguments, ");\n");
-    };
-    if (!last) sizes[i % 2] = std::max(sizes[i % 2], layer.out());
-    call("linear", Concat(name, "_weight, ", name, "_bias, ", layer.in(), ", ", layer.out(), ", ",
-                          x, ", ", y));
-    if (layer.layer_norm()) {
-      call("layer_norm",
-           Concat(name, "_norm_weight, ", name, "_norm_bias, ", layer.out(), ", ", y));
-    }
-    if (layer.activation == Activation::kRelu) call("relu", Concat(y, ", ", layer.out()));
-    if (layer.activation == Activation::kTanh) call("tanh", Concat(y, ", ", layer.out()));
-    x = y;
-  }
-  const std::string second = sizes[1] > 0 ? Concat(", b[", sizes[1], ']') : "";
-  return Filled(c_code::kOutputs,
-                {{"buffers", Concat("a[", sizes[0], ']', second)}, {"layers", calls}});
-}
-
-std::string HeaderWriter::SelfTest() const {
-  const CChecksum checksum = ChecksumOf(arrays_);
-  const std::string tables = Concat(ArrayText({"sample_states", StateNames(""), samples_.states}),
-                                    ArrayText({"sample_outputs", "", samples_.outputs}),
-                                    ArrayText({"sample_torques", "N m", samples_.torques}));
-  std::vector<std::string> state;
-  for (size_t i = 0; i < task_.state.size(); ++i) state.push_back(Concat("x[", i, ']'));
-  return Filled(Concat(c_code::kChecksum, c_code::kSelfTest),
-                {{"tables", tables},
-                 {"state_size", Concat(task_.state.size())},
-                 {"sums", checksum.lines},
-                 {"checksum", Concat(checksum.sum, 'u')},
-                 {"samples", Concat(samples_.count)},
-                 {"sample", Join(state, ", ")},
-                 {"output_tolerance", CLiteral(samples_.output_tolerance)},
-                 {"torque_tolerance", CLiteral(samples_.torque_tolerance)}});
-}
-
-std::string HeaderWriter::Functions() const {
-  bool norm = false, relu = false, tanh = false;
-  for (const LayerView& layer : layers_) {
-    norm = norm || layer.layer_norm();
-    relu = relu || layer.activation == Activation::kRelu;
-    tanh = tanh || layer.activation == Activation::kTanh;
-  }
-  const bool remembers = memory() > 0;
-  const char* choose = policy_.is_discrete()                             ? c_code::kChooseLargest
-                       : policy_.rule() == ActionRule::kSquashedGaussian ? c_code::kChooseSquashed
-                                                                         : c_code::kChooseClipped;
-  const std::string init =
-      Filled(c_code::kInit, {{"index", remembers ? "  int i;\n" : ""},
-                             {"forget", remembers ? c_code::kForgetMemory : ""}});
-  const std::string observe = Filled(
-      c_code::kObserve, {{"and_memory", remembers ? ", and of what the state remembers" : ""},
-                         {"parameters", StateNames("float ")},
-                         {"observe", task_.observe + (remembers ? "" : "  (void)state;\n")}});
-  return Concat(
-      c_code::kLinear, norm ? c_code::kLayerNorm : "", relu ? c_code::kRelu : "",
-      tanh ? c_code::kTanh : "", OutputsFunction(), choose, init, observe,
-      c_code::kControlObservation,
-      Filled(c_code::kControl, {{"parameters", StateNames("float ")}, {"names", StateNames("")}}),
-      SelfTest());
+  parts.samples = {{"sample_states", "", samples.states},
+                   {"sample_outputs", "", samples.outputs},
+                   {"sample_torques", "N m", samples.torques}};
+  WriteHeader(parts, header);
+  return header;
 }
 
 }  // namespace
@@ -321,7 +241,7 @@ CHeader CHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
                           loaded.policy->num_parameters()));
   }
   if (loaded.path.empty()) return ControllerHeaderOf(loaded, prefix);
-  return HeaderWriter(loaded, prefix).Write();
+  return NetworkHeaderOf(loaded, prefix);
 }
 
 std::string CPrefixOf(const std::string& file, const LoadedPolicy& loaded) {

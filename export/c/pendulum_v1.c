@@ -1,0 +1,32 @@
+/* A network for Gymnasium's Pendulum-v1. */
+#include "network.c"
+
+/* The observation of these angles and velocities. */
+static inline void policy_observe(policy_state *state, float theta, float omega,
+                                  float *observation) {
+  observation[0] = cosf(theta);
+  observation[1] = sinf(theta);
+  observation[2] = omega;
+  (void)state;
+}
+
+static inline void policy_observe_sample(policy_state *state, const float *x, float *observation) {
+  policy_observe(state, x[0], x[1], observation);
+}
+
+/* The torque for these angles and velocities, to be called every POLICY_PERIOD seconds. */
+static inline policy_status policy_control(policy_state *state, float theta, float omega,
+                                           float *torque) {
+  float observation[POLICY_OBSERVATION_SIZE];
+  policy_status status;
+  if (!torque) return POLICY_NULL_POINTER;
+  *torque = 0.0f;
+  if (!state) return POLICY_NULL_POINTER;
+  policy_observe(state, theta, omega, observation);
+  status = policy_control_observation(observation, torque);
+  state->torque = *torque;
+  if (status != POLICY_OK) policy_init(state);
+  return status;
+}
+
+#include "network_test.c"

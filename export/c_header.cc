@@ -1,0 +1,148 @@
+#include "export/c_header.h"
+
+#include <algorithm>
+#include <bit>
+
+#include "core/text.h"
+#include "export/c_text.h"
+
+namespace upswing {
+namespace {
+
+std::string_view FileNamed(std::string_view name) {
+  const auto files = EmbeddedCFiles();
+  return std::ranges::find(files, name, &CFile::name)->text;
+}
+
+/// The text of a file, with those that it includes in their places; tables.h is what the header
+/// begins with.
+std::string Expanded(std::string_view name) {
+  constexpr std::string_view kInclude = "#include \"";
+  std::string text;
+  for (std::string_view line : Split(FileNamed(name), '\n')) {
+    if (!line.starts_with(kInclude)) {
+      text += Concat(line, '\n');
+      continue;
+    }
+    line.remove_prefix(kInclude.size());
+    line.remove_suffix(1);
+    if (line != "tables.h") text += Expanded(line);
+  }
+  return text.substr(0, text.find_last_not_of('\n') + 1) + '\n';
+}
+
+std::string ArrayText(const CArray& array, const std::string& prefix) {
+  std::vector<std::string> words;
+  for (const float value : array.values) words.push_back(CLiteral(value) + ",");
+  words.back().back() = '}';
+  const std::string comment = array.comment.empty() ? "" : Concat(" /* ", array.comment, " */");
+  return Concat("static const float ", prefix, '_', array.name, '[', array.values.size(), "] = {",
+                comment, "\n  ", Wrapped(words, "  ", 2), ";\n");
+}
+
+/// The arrays of constants in a list, for the checksum.
+std::string TablesText(const std::vector<CArray>& arrays, const std::string& prefix) {
+  std::string text = "static const struct {\n  const float *values;\n  long count;\n} ";
+  text += Concat(prefix, "_tables[", arrays.size(), "] = {\n");
+  for (const CArray& array : arrays) {
+    text += Concat("  {", prefix, '_', array.name, ", ", array.values.size(), "L},\n");
+  }
+  return text + "};\n";
+}
+
+/// What checksum_of_all in export/c/numbers.c computes of these arrays: FNV-1a.
+uint32_t ChecksumOf(const std::vector<CArray>& arrays) {
+  uint32_t sum = 2166136261U;
+  for (const CArray& array : arrays) {
+    for (const float value : array.values) {
+      sum = (sum ^ std::bit_cast<uint32_t>(value)) * 16777619U;
+    }
+  }
+  return sum;
+}
+
+std::string PlantParagraph(const CParts& parts) {
+  if (parts.plant.empty()) return "";
+  std::vector<std::string> values;
+  for (const auto& [name, value] : PlantValues(parts.made_for)) {
+    values.push_back(Concat(name, ' ', FormatNumber(value)));
+  }
+  return Paragraph(Concat("Made for this plant (kg, m, N m s/rad, m/s2, N m), ", parts.plant, ": ",
+                          Join(values, ", "), '.')) +
+         "\n *\n";
+}
+
+std::string HeadComment(const CParts& parts, const CHeader& header) {
+  const std::string &name = header.prefix, caps = UpperCase(name);
+  const std::string period = FormatNumber(parts.period);
+  std::string states;
+  std::vector<std::string> names;
+  for (const NamedInput& input : parts.state) {
+    names.push_back(input.name);
+    states +=
+        Concat(" *   ", input.name, std::string(8 - input.name.size(), ' '), input.meaning, '\n');
+  }
+  return Concat(
+      "/* A policy that ", parts.goal, ", as one C99 header.\n *\n",
+      Paragraph(Concat(parts.origin, ". Written by Upswing ", UPSWING_VERSION, '.')),
+      "\n *\n *   static ", name, "_state state;\n *   float torque;\n *   if (", name,
+      "_selftest() != ", caps, "_OK) stop();\n *   ", name,
+      "_init(&state);   before the first step, and after any pause\n *   for (;;) {   every ",
+      period, " s\n *     ", name, "_control(&state, ", Join(names, ", "),
+      ", &torque);\n *     set_motor(torque);\n *   }\n *\n",
+      " * In, in this order; an angle may have made any number of turns:\n", states,
+      " * Out: the torque ", parts.motor, ", N m, within +-", FormatNumber(parts.limit),
+      ", to be held for ", period, R"c( s. A positive one
+ * pushes the joint's angle up. Which way round counts as positive does not matter, as long as it is
+ * the same for all of these.
+ *
+)c",
+      PlantParagraph(parts),
+      R"c( * What is not finite, and null pointers, the status tells: the torque is then 0, and what was
+ * remembered is forgotten, as after )c",
+      name, "_init.\n *\n",
+      Paragraph(Concat("Flash: ", header.constant_bytes,
+                       " bytes of constants, 1 to 3 KB of code, and up to 1 KB of samples where "
+                       "the self test is used. RAM: ",
+                       header.state_bytes, " bytes of state, and arrays of ", header.stack_bytes,
+                       " bytes on the stack in a call. Work of a call: ", parts.work)),
+      "\n *\n * All arithmetic is in float. Nothing is allocated, and nothing is static but "
+      "constants. */\n");
+}
+
+}  // namespace
+
+std::vector<NamedInput> PendulumArguments() {
+  return {{"q1", "rad    angle of link 1, 0 hanging"},
+          {"q2", "rad    angle of link 2 relative to link 1, 0 in line with it"},
+          {"w1", "rad/s  velocity of q1"},
+          {"w2", "rad/s  velocity of q2"}};
+}
+
+void WriteHeader(const CParts& parts, CHeader& header) {
+  for (const CArray& array : parts.constants) header.constant_bytes += 4 * array.values.size();
+  const std::string &name = header.prefix, caps = UpperCase(name);
+  std::string& text = header.text;
+  text = Concat(HeadComment(parts, header), "#ifndef UPSWING_", caps, "_H\n#define UPSWING_", caps,
+                "_H\n\n#include <math.h>\n#include <stdint.h>\n\n");
+  const auto define = [&](const std::string& macro, const std::string& value) {
+    text += Concat("#define ", caps, '_', macro, ' ', value, '\n');
+  };
+  const auto number = [](double value) { return CLiteral(static_cast<float>(value)); };
+  define("PERIOD", number(parts.period) + " /* s, between two calls */");
+  define("TORQUE_LIMIT", number(parts.limit) + " /* N m, no torque is beyond it */");
+  define("CONSTANT_BYTES", Concat(header.constant_bytes, 'L'));
+  for (const auto& [macro, value] : parts.macros) define(macro, value);
+  define("TABLES", Concat(parts.constants.size()));
+  define("CHECKSUM", Concat(ChecksumOf(parts.constants), "u /* of the tables */"));
+  text += '\n';
+  for (const CArray& array : parts.constants) text += ArrayText(array, name);
+  text += parts.layers + TablesText(parts.constants, name);
+  text += "/* Samples: states, one after the other, and what Upswing makes of them. */\n";
+  for (const CArray& array : parts.samples) text += ArrayText(array, name);
+  // The files' own prefix is "policy".
+  const std::string code = Replaced(Expanded(parts.file), "policy_", name + "_");
+  text += Concat('\n', Replaced(code, "POLICY_", caps + "_"), "\n#endif\n");
+}
+
+}  // namespace upswing

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "export/export.h"
+#include "export/exported_policy.h"
+
+/// A header in C: a comment, macros and tables, and a file of export/c with the files that it
+/// includes.
+namespace upswing {
+
+/// A file of export/c, which CMake compiles in.
+struct CFile {
+  std::string_view name, text;
+};
+std::span<const CFile> EmbeddedCFiles();
+
+/// An array of constants.
+struct CArray {
+  std::string name, comment;
+  std::vector<float> values;
+};
+
+/// What a header is made of. Names of macros and arrays lack the prefix.
+struct CParts {
+  std::string file;               // of export/c, such as "pendulum.c"
+  std::string goal;               // what the policy does
+  std::string origin;             // where it is from
+  std::vector<NamedInput> state;  // the arguments of its control function
+  std::string motor;              // where the torque acts
+  double limit = 0;               // N m
+  double period = 0;              // s
+  std::string plant;              // what it takes from `made_for`; empty: nothing
+  Plant made_for;
+  std::string work;  // of a call
+  /// Name, value with comment.
+  std::vector<std::pair<std::string, std::string>> macros;
+  std::vector<CArray> constants;  // of which there is a checksum
+  std::string layers;             // the definition of the table of layers, if there is one
+  std::vector<CArray> samples;    // for the self test
+};
+
+/// Those of the double pendulum.
+std::vector<NamedInput> PendulumArguments();
+
+/// Writes `text`, and counts the constants; `header` has the sizes in RAM and the prefix.
+void WriteHeader(const CParts& parts, CHeader& header);
+
+}  // namespace upswing
