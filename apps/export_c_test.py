@@ -103,7 +103,7 @@ class HeaderTest(ProgramTest):
         call = ", ".join(f"in[{i + 1}]" for i in range(TASKS[task]))
         driver = DRIVER.replace("STATES", str(TASKS[task])).replace("CALL", call)
         self.write("driver.c", driver)
-        self.compile("driver.c", "-O2", *options, compiler=compiler, standard=standard)
+        self.compile("driver.c", "-O1", *options, compiler=compiler, standard=standard)
 
     def compile(self, *arguments, **more):
         done = compile_c(self.folder, *arguments, **more)
@@ -265,7 +265,7 @@ class HeaderTest(ProgramTest):
             with self.subTest(f"{name} {options} {begin}"):
                 self.succeed("export", name, *options, "--c", "policy.h")
                 self.write("driver.c", driver)
-                self.compile("driver.c", "-O2", "-Wconversion", *SANITIZE)
+                self.compile("driver.c", "-O1", "-Wconversion", *SANITIZE)
                 self.succeed("simulate", name, *options, "--start", begin, "--physics",
                              "closed-form", "--csv", "rollout.csv")
                 rows = read_csv(self.folder / "rollout.csv")[:-1]

@@ -69,7 +69,7 @@ test('a training: what it reports, and that the program judges its policy in MuJ
   } finally {
     rmSync(folder, { recursive: true });
   }
-}, 120_000);
+});
 
 test('SAC learns too, with settings of its own', async () => {
   const learner = new Learner(await newCore(), 'sac-fast', 1, { learning_starts: '64' });
