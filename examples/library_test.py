@@ -54,7 +54,12 @@ add_library(all_of_them OBJECT all.cc)
 target_link_libraries(portable PRIVATE upswing::control upswing::rl)
 target_link_libraries(all_of_them PRIVATE upswing::judge upswing::control)
 """
-WANTS = """foreach(wanted "0.4" "0.3" "0.99" "1.0" "0.4 COMPONENTS physics" "0.4 COMPONENTS rl")
+# Requests for the package, and whether it answers them: its own minor version has to match.
+VERSION = re.search(r"project\(upswing VERSION (\d+\.\d+)",
+                    (ROOT / "CMakeLists.txt").read_text(encoding="utf-8"))[1]
+WANTED = {VERSION: "1", "0.3": "0", "0.99": "0", "1.0": "0", f"{VERSION} COMPONENTS physics": "0",
+          f"{VERSION} COMPONENTS rl": "1"}
+WANTS = "foreach(wanted " + " ".join(f'"{wanted}"' for wanted in WANTED) + """)
   separate_arguments(words UNIX_COMMAND "${wanted}")
   find_package(upswing ${words} QUIET)
   message(STATUS "wants ${wanted}: ${upswing_FOUND}")
@@ -160,8 +165,7 @@ class Library(unittest.TestCase):
 
     def test_package_refuses_what_it_is_not(self):
         answers = dict(re.findall(r"^-- wants (.*?): (\d)$", self.configured, re.MULTILINE))
-        self.assertEqual(answers, {"0.4": "1", "0.3": "0", "0.99": "0", "1.0": "0",
-                                   "0.4 COMPONENTS physics": "0", "0.4 COMPONENTS rl": "1"})
+        self.assertEqual(answers, WANTED)
 
     def test_installed_program(self):
         self.assertIn("MuJoCo 4.0.0",
