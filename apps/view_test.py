@@ -314,7 +314,7 @@ class Window(ViewTest):
             self.skipTest(done.stderr.strip())
         reading, writing = os.pipe()
         server = subprocess.Popen(["Xvfb", "-displayfd", str(writing), "-screen", "0", "480x360x24",
-                                   "-nolisten", "tcp"], pass_fds=[writing],
+                                   "-nolisten", "tcp", "-noreset"], pass_fds=[writing],
                                   stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         os.close(writing)
         self.addCleanup(server.wait)
