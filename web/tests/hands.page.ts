@@ -145,20 +145,22 @@ test('a finger that takes hold of the pendulum does not scroll', async ({ browse
   });
   const page = await context.newPage();
   await open(page);
-  const prevented = await page.evaluate(() => {
-    const canvas = document.getElementById('scene')!;
-    const { left, top, width, height } = canvas.getBoundingClientRect();
-    return [0, 0.45 * width].map((aside) => {
-      const touch = new Touch({
-        identifier: 1,
-        target: canvas,
-        clientX: left + width / 2 + aside,
-        clientY: top + height / 2 + 60,
+  const prevented = () =>
+    page.evaluate(() => {
+      const canvas = document.getElementById('scene')!;
+      const { left, top, width, height } = canvas.getBoundingClientRect();
+      return [0, 0.45 * width].map((aside) => {
+        const touch = new Touch({
+          identifier: 1,
+          target: canvas,
+          clientX: left + width / 2 + aside,
+          clientY: top + height / 2 + 60,
+        });
+        const event = new TouchEvent('touchstart', { changedTouches: [touch], cancelable: true });
+        return !canvas.dispatchEvent(event);
       });
-      const event = new TouchEvent('touchstart', { changedTouches: [touch], cancelable: true });
-      return !canvas.dispatchEvent(event);
     });
-  });
-  expect(prevented).toEqual([true, false]);
+  // On a slow machine the canvas still changes its size after the page is ready.
+  await expect.poll(prevented).toEqual([true, false]);
   await context.close();
 });
