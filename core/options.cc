@@ -53,8 +53,6 @@ std::string RangeInBrackets(Range range, double step) {
                 step > 0 ? " in steps of " + FormatNumber(step) : "", ")");
 }
 
-bool Inside(double value, Range range) { return value >= range.low && value <= range.high; }
-
 /// Whether a number is a multiple of `step`, up to rounding; true if that is 0.
 bool IsMultiple(double value, double step) {
   constexpr double kRounding = 1e-9;
@@ -65,7 +63,7 @@ bool IsMultiple(double value, double step) {
 /// else empty.
 std::string NearestText(std::string_view text, Range range, double step) {
   const auto value = ParseNumber(text);
-  if (!value || !Inside(*value, range) || IsMultiple(*value, step)) return "";
+  if (!value || !range.Contains(*value) || IsMultiple(*value, step)) return "";
   const auto multiple = [&](double count) {
     constexpr double kDigits = 1e12;  // 35 × 0.02 is 0.7, not 0.7000000000000001
     return FormatNumber(std::round(count * step * kDigits) / kDigits);
@@ -81,7 +79,7 @@ std::optional<std::vector<int64_t>> ParseList(std::string_view text, Range range
   std::vector<int64_t> values;
   for (const std::string_view piece : Split(text, ',')) {
     const auto value = ParseInteger(piece);
-    if (!value || !Inside(static_cast<double>(*value), range)) return std::nullopt;
+    if (!value || !range.Contains(static_cast<double>(*value))) return std::nullopt;
     values.push_back(*value);
   }
   return values;
@@ -168,13 +166,13 @@ void Option::Set(std::string_view text, const std::string& where) const {
                      },
                      [&](int64_t* value) {
                        const auto parsed = ParseInteger(text);
-                       if (!parsed || !Inside(static_cast<double>(*parsed), range)) return false;
+                       if (!parsed || !range.Contains(static_cast<double>(*parsed))) return false;
                        *value = *parsed;
                        return true;
                      },
                      [&](double* value) {
                        const auto parsed = ParseNumber(text);
-                       if (!parsed || !std::isfinite(*parsed) || !Inside(*parsed, range) ||
+                       if (!parsed || !std::isfinite(*parsed) || !range.Contains(*parsed) ||
                            !IsMultiple(*parsed, step)) {
                          return false;
                        }

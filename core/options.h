@@ -17,6 +17,9 @@ namespace upswing {
 struct Range {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
+
+  /// False for NaN.
+  bool Contains(double value) const { return value >= low && value <= high; }
 };
 inline constexpr Range kPositive{1e-9, 1e9};
 inline constexpr Range kNotNegative{0, 1e12};

@@ -17,8 +17,6 @@ constexpr size_t kMostInputs = 4096;
 constexpr size_t kLongestName = 64;
 constexpr int64_t kLongestMemory = 4096;  // steps; the network's inputs settle it
 
-bool Inside(double value, Range range) { return value >= range.low && value <= range.high; }
-
 std::vector<std::string> Texts(const json& object, const std::string& name) {
   std::vector<std::string> texts;
   for (const json& item : JsonList(object, name, kMostInputs)) {
@@ -91,7 +89,7 @@ class Reader {
   std::optional<double> Number(const std::string& key, Range range) const {
     if (!metadata_.contains(key)) return std::nullopt;
     const std::optional<double> number = ParseNumber(Text(key));
-    if (number && Inside(*number, range)) return number;  // NaN is not inside
+    if (number && range.Contains(*number)) return number;
     throw Wrong(
         key, Concat("a number in [", FormatNumber(range.low), ", ", FormatNumber(range.high), "]"));
   }
@@ -99,7 +97,7 @@ class Reader {
   std::optional<int64_t> Counter(const std::string& key) const {
     if (!metadata_.contains(key)) return std::nullopt;
     const std::optional<int64_t> count = ParseInteger(Text(key));
-    if (count && Inside(static_cast<double>(*count), kCounter)) return count;
+    if (count && kCounter.Contains(static_cast<double>(*count))) return count;
     throw Wrong(key, Concat("an integer in [0, ", FormatNumber(kCounter.high), "]"));
   }
 

@@ -17,8 +17,8 @@
 namespace upswing {
 namespace {
 
-constexpr int kSamples = 16;
-constexpr int kMostDraws = 1000;       // of each
+constexpr int kLawSamples = 16;
+constexpr int kDrawsOfEach = 1000;     // of each
 constexpr double kTorqueShare = 5e-4;  // of the limit: tolerance of a sample's torque
 constexpr double kNearby = 1e-3;       // rad, rad/s: so near to a sample the torque does not jump
 const StateVector kRange(3.14, 3.14, 4, 4);  // ±, of a sample: rad, rad/s
@@ -88,11 +88,11 @@ StateVector DrawState(const LoadedPolicy& loaded, Rng& rng, bool upright) {
 void DrawSamples(const LoadedPolicy& loaded, double tolerance, std::vector<float>& states,
                  std::vector<float>& torques) {
   Rng rng(0, "samples of a controller's C header");
-  for (int i = 0; i < kSamples; ++i) {
+  for (int i = 0; i < kLawSamples; ++i) {
     const bool upright = i % 2 == 0;
     StateVector x = DrawState(loaded, rng, upright);
     for (int draw = 1; Jumps(loaded, x, tolerance / 2); ++draw) {
-      if (draw == kMostDraws) {
+      if (draw == kDrawsOfEach) {
         throw BadInput(Concat(loaded.name, ": found no states where the torque is smooth enough ",
                               "for the header's self test"));
       }
@@ -215,7 +215,7 @@ CHeader WriteController(const LoadedPolicy& loaded, const std::string& prefix) {
     parts.samples.push_back({"sample_steps", "deviations a control period later",
                              StepsFrom(states, torques, config.plant)});
   }
-  parts.macros.emplace_back("SAMPLES", Concat(kSamples));
+  parts.macros.emplace_back("SAMPLES", Concat(kLawSamples));
   parts.macros.emplace_back("TORQUE_TOLERANCE", CLiteral(static_cast<float>(tolerance)));
   WriteHeader(parts, header);
   return header;

@@ -20,7 +20,7 @@ namespace {
 
 constexpr int kOutput = 3;  // the file that it writes, as its own descriptor
 
-Error SystemFailure(std::string_view what) {
+Error FilmFailure(std::string_view what) {
   return Failure(Concat("film: cannot ", what, ": ", std::strerror(errno)));
 }
 
@@ -44,7 +44,7 @@ Ffmpeg::Ffmpeg(const std::vector<std::string>& words, int output)
     : input_(-1), errors_(memfd_create("ffmpeg", MFD_CLOEXEC)) {
   std::array<int, 2> pipe_ends{};
   if (errors_.get() < 0 || pipe2(pipe_ends.data(), O_CLOEXEC) != 0) {
-    throw SystemFailure("talk to ffmpeg");
+    throw FilmFailure("talk to ffmpeg");
   }
   const Descriptor read_end(pipe_ends[0]);
   input_ = Descriptor(pipe_ends[1]);
@@ -113,7 +113,7 @@ void Ffmpeg::Write(std::span<const uint8_t> bytes) {
       input_ = Descriptor(-1);
       Fail(Wait());
     }
-    if (written < 0) throw SystemFailure("write to ffmpeg");
+    if (written < 0) throw FilmFailure("write to ffmpeg");
     bytes = bytes.subspan(static_cast<size_t>(written));
   }
 }

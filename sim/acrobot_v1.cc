@@ -10,8 +10,8 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 constexpr double kStepSeconds = 0.2;
 constexpr int64_t kEpisodeSteps = 500;
-constexpr double kMaxVelocity1 = 4 * kPi, kMaxVelocity2 = 9 * kPi;  // rad/s
-constexpr double kMaxTorque = 1.0;                                  // N·m
+constexpr double kMaxOmega1 = 4 * kPi, kMaxOmega2 = 9 * kPi;  // rad/s
+constexpr double kMaxTorque = 1.0;                            // N·m
 constexpr double kGoalHeight = 1.0;  // of the free end over the first joint, m
 
 EnvSpec Spec() {
@@ -74,8 +74,7 @@ Variables RungeKutta(const Variables& s, double tau, double h) {
 }  // namespace
 
 AcrobotV1::AcrobotV1(const GymTaskConfig& config)
-    : GymTask(Spec(),
-              {kEpisodeSteps, {0.1, 0.1, 0.1, 0.1}, {kPi, kPi, kMaxVelocity1, kMaxVelocity2}},
+    : GymTask(Spec(), {kEpisodeSteps, {0.1, 0.1, 0.1, 0.1}, {kPi, kPi, kMaxOmega1, kMaxOmega2}},
               config) {
   Begin();
 }
@@ -88,8 +87,8 @@ void AcrobotV1::Move(Matrix<double> states, std::span<const double> torque,
     const Variables next = RungeKutta(s, torque[i], kStepSeconds);
     states(0, env) = std::remainder(next.theta1, 2 * kPi);
     states(1, env) = std::remainder(next.theta2, 2 * kPi);
-    states(2, env) = std::clamp(next.omega1, -kMaxVelocity1, kMaxVelocity1);
-    states(3, env) = std::clamp(next.omega2, -kMaxVelocity2, kMaxVelocity2);
+    states(2, env) = std::clamp(next.omega1, -kMaxOmega1, kMaxOmega1);
+    states(3, env) = std::clamp(next.omega2, -kMaxOmega2, kMaxOmega2);
 
     const double height = -std::cos(states(0, env)) - std::cos(states(0, env) + states(1, env));
     const bool at_goal = height > kGoalHeight;
