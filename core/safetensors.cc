@@ -198,9 +198,8 @@ Safetensors WriteSafetensors(const Tensors& tensors) {
   const uint64_t length = text.size();
   const auto length_bytes = std::as_bytes(std::span(&length, 1));
   Safetensors written;
-  written.head.assign(length_bytes.begin(), length_bytes.end());
-  const auto text_bytes = BytesOf(text);
-  written.head.insert(written.head.end(), text_bytes.begin(), text_bytes.end());
+  written.head.resize(length_bytes.size() + text.size());
+  std::ranges::copy(BytesOf(text), std::ranges::copy(length_bytes, written.head.begin()).out);
   for (const auto& [name, tensor] : order) written.bodies.push_back(tensor->bytes);
   return written;
 }

@@ -34,18 +34,6 @@ Error NoWindow() {
       Concat("view: no window can be opened: ", GlfwError(), "; --record FILE draws without one"));
 }
 
-/// GLFW for as long as there is a window.
-struct Library {
-  Library() {
-    // MuJoCo looks for the functions of OpenGL in what is loaded for all to see.
-    if (dlopen("libGL.so.1", RTLD_NOW | RTLD_GLOBAL) == nullptr) {
-      dlopen("libEGL.so.1", RTLD_NOW | RTLD_GLOBAL);
-    }
-    if (glfwInit() == GLFW_FALSE) throw NoWindow();
-  }
-  ~Library() { glfwTerminate(); }
-};
-
 /// Whether the present context is drawn by the processor.
 bool IsSoftware() {
   using GetString = const unsigned char* (*)(unsigned int);
@@ -59,6 +47,18 @@ bool IsSoftware() {
 }  // namespace
 
 struct Window::Impl {
+  /// GLFW for as long as there is a window.
+  struct Library {
+    Library() {
+      // MuJoCo looks for the functions of OpenGL in what is loaded for all to see.
+      if (dlopen("libGL.so.1", RTLD_NOW | RTLD_GLOBAL) == nullptr) {
+        dlopen("libEGL.so.1", RTLD_NOW | RTLD_GLOBAL);
+      }
+      if (glfwInit() == GLFW_FALSE) throw NoWindow();
+    }
+    ~Library() { glfwTerminate(); }
+  };
+
   Library library;
   GLFWwindow* window = nullptr;
   std::optional<Painter> painter;

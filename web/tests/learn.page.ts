@@ -73,8 +73,8 @@ test('an agent learns from nothing, takes the stage, stays, and is what Node and
   expect(await swingsUp(page)).toBe(true);
 
   // At the next visit it is still there.
+  await page.goto('about:blank');
   await page.goto('./#agent=own&on=1');
-  await page.reload();
   await expect(page.locator('#agent')).toHaveValue('own');
   await expect(page.locator('#agent option:checked')).toHaveText(
     'learned here, fast, seed 1 (yours)',
