@@ -3,10 +3,11 @@ import type { QDecision } from '../src/decision';
 import { balanced, largestDifference, open, run, startFrom, test } from './page';
 import { policyPath, simulate } from './program';
 
-test('the agent, when it may act, swings up and balances, while one watches', async ({ page }) => {
+test('the agent, when it may act, swings up and balances', async ({ page }) => {
   await open(page);
   await expect(page.locator('#badge')).toHaveText('hanging');
   await page.getByRole('button', { name: 'Run the agent' }).click();
+  await run(page, 8);
   await expect(page.locator('#badge')).toHaveText(/balanced for/);
   await expect(page.locator('#live')).toHaveText('balanced');
   await page.getByRole('button', { name: 'Run the agent' }).click(); // off: it falls
@@ -61,6 +62,7 @@ test('a link brings controllers that were not learned', async ({ page }) => {
   await expect(page.locator('#agent-command')).toHaveText('./upswing simulate lqr');
   await expect(page.locator('#twin-name')).toHaveText('MPC: always plans');
   await expect(page.locator('#q-name')).toHaveText('Decision');
+  await run(page, 5);
   await expect(page.locator('#badge')).toHaveText('cannot swing up');
   await startFrom(page, 0);
   await run(page, 15);
@@ -112,8 +114,7 @@ test('what "Try this" promises is so', async ({ page }) => {
     );
   expect(tries.length).toBeGreaterThan(5);
   for (const [hash, balances] of tries) {
-    await page.goto('about:blank');
-    await open(page, hash);
+    await page.evaluate((link) => upswing.open(link), hash);
     await startFrom(page, 0);
     await run(page, 20);
     const held = await balanced(page);

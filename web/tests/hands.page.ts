@@ -5,6 +5,7 @@ const state = () => upswing.world.state;
 
 test('a drag pulls the balanced pendulum down, and the agent brings it back', async ({ page }) => {
   await open(page, '#agent=d3qn&on=1');
+  await run(page, 8);
   await expect(page.locator('#badge')).toHaveText(/balanced for/);
   const tip = await onScreen(page, 0, 0.98);
   const away = await onScreen(page, 0.9, 0.1);
@@ -15,6 +16,7 @@ test('a drag pulls the balanced pendulum down, and the agent brings it back', as
   await expect(page.locator('#badge')).toHaveText('swinging up');
   await page.mouse.up();
   expect(await page.evaluate(() => upswing.world.drag)).toBeNull();
+  await run(page, 10);
   await expect(page.locator('#badge')).toHaveText(/balanced for [1-9]/);
 });
 
