@@ -12,7 +12,7 @@ POLICY = ROOT / "web/public/agents/fast.safetensors"
 
 class Bounds(ProgramTest):
     def test_nothing_is_better_than_the_best(self):
-        found = json.loads(self.succeed("bounds", POLICY, "tvlqr", "--episodes", 4, "--guesses", 8,
+        found = json.loads(self.succeed("bounds", POLICY, "tvlqr", "--episodes", 2, "--guesses", 6,
                                         "--csv", "bounds.csv", "--json"))
         rows = {row["name"]: row for row in found["rows"]}
         self.assertEqual(list(rows), ["any torque", "9 torques", str(POLICY), "tvlqr"])
@@ -22,9 +22,9 @@ class Bounds(ProgramTest):
             self.assertLessEqual(row["return"]["mean"], best["return"]["mean"])
             self.assertGreaterEqual(row["swing_up_seconds"], best["swing_up_seconds"])
         # Policies are judged on the episodes of eval, and as eval judges them.
-        judged = json.loads(self.succeed("eval", "tvlqr", "--episodes", 4, "--json"))
+        judged = json.loads(self.succeed("eval", "tvlqr", "--episodes", 2, "--json"))
         self.assertEqual(rows["tvlqr"]["return"], judged["return"])
-        self.succeed("eval", "tvlqr", "--episodes", 4, "--episodes-csv", "eval.csv")
+        self.succeed("eval", "tvlqr", "--episodes", 2, "--episodes-csv", "eval.csv")
 
         def read(name):
             with open(self.folder / name, encoding="utf-8", newline="") as file:
@@ -36,8 +36,8 @@ class Bounds(ProgramTest):
             self.assertLessEqual(float(row["swing_up_seconds"]), float(row["swing_up_seconds_table"]))
 
     def test_threads_change_nothing(self):
-        one, two = (self.succeed("bounds", "--episodes", 2, "--guesses", 4, "--physics", "closed-form",
-                                 "--threads", threads) for threads in (1, 2))
+        one, two = (self.succeed("bounds", "--episodes", 2, "--guesses", 2, "--torques", 3, "--physics",
+                                 "closed-form", "--threads", threads) for threads in (1, 2))
         self.assertEqual(one, two)
         self.assertIn("Nothing proves that there is no better.", one)
 

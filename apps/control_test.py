@@ -153,13 +153,13 @@ class SwingUp(ProgramTest):
         return json.loads(self.succeed("eval", *arguments, "--json"))
 
     def test_plans_and_laws_swing_up_and_hold(self):
-        for controller, episodes in (("tvlqr", 20), ("mpc", 5), ("pfl", 20)):
+        for controller, episodes in (("tvlqr", 10), ("mpc", 3), ("pfl", 10)):
             for physics in ("mujoco", "closed-form"):
                 result = self.eval(controller, "--episodes", episodes, "--physics", physics)
                 self.assertGreaterEqual(result["successes"], 0.9 * episodes, controller)
-        energy = self.eval("energy", "--episodes", 40)  # its law asks for more than the motor has
-        self.assertGreater(energy["successes"], 15)
-        self.assertLess(energy["successes"], 40)
+        energy = self.eval("energy", "--episodes", 20)  # its law asks for more than the motor has
+        self.assertGreater(energy["successes"], 7)
+        self.assertLess(energy["successes"], 20)
 
     def test_plans_know_their_plant(self):
         heavy = ("--made-for", "mass2=1.2", "--made-for", "length1=0.45")

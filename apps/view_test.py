@@ -371,7 +371,7 @@ class Window(ViewTest):
     def screenshot(self):
         """The window as a picture."""
         done = subprocess.run(
-            ["ffmpeg", "-loglevel", "error", "-f", "x11grab", "-draw_mouse", "0", "-video_size",
+            ["ffmpeg", "-loglevel", "error", "-probesize", "32", "-f", "x11grab", "-draw_mouse", "0", "-video_size",
              "320x240", "-i", self.environment["DISPLAY"], "-frames:v", "1", "-pix_fmt", "rgb24", "-f",
              "rawvideo", "-"], check=True, stdout=subprocess.PIPE)
         self.assertEqual(len(done.stdout), 320 * 240 * 3)
