@@ -50,6 +50,10 @@ class Run {
         past_(kMostDelay) {
     sums_.last_below.fill(-1);
     std::ranges::fill(block_.joint, static_cast<double>(robot));
+    constexpr BoardPlant kPlant;  // no rule varies the lengths
+    constexpr double kLength = kPlant.length1 + kPlant.length2;
+    std::ranges::fill(block_.share1, kPlant.length1 / kLength);
+    std::ranges::fill(block_.share2, kPlant.length2 / kLength);
     for (size_t lane = 0; lane < episodes.size(); ++lane) {
       const BoardEpisode& episode = episodes[lane];
       block_.SetManipulator(lane, ManipulatorOf(episode.plant));
@@ -75,7 +79,6 @@ class Run {
       if (trace != nullptr) trace->push_back({step * kBoardTimestep, StateOf(0), torque_[0]});
       if (step % kNoted == 0) NoteNearness(step);
       if (step < steps_ - 1) NoteVelocities();
-      FindTips();
       Advance(block_, 1, 0, kBoardBlock, kBoardTimestep);
       Note(step);
     }
@@ -155,22 +158,9 @@ class Run {
     }
   }
 
-  /// The heights of the tips, m.
-  void FindTips() {
-    constexpr BoardPlant kPlant;  // no rule varies the lengths
-    Lanes q12, sine, c1, c12;
-    for (size_t i = 0; i < kBoardBlock; ++i) q12[i] = block_.q1[i] + block_.q2[i];
-    SineCosine(block_.q1, sine, c1);
-    SineCosine(q12, sine, c12);
-    for (size_t i = 0; i < kBoardBlock; ++i) {
-      tip_[i] = -kPlant.length1 * c1[i] - kPlant.length2 * c12[i];
-    }
-  }
-
   /// After a step: what its torque did to the motor's joint, and where the tip was before.
   void Note(int step) {
-    constexpr BoardPlant kPlant;
-    constexpr double kLine = 0.9 * (kPlant.length1 + kPlant.length2);
+    constexpr double kLine = 0.9;  // of the length of both links
     const auto& angle = block_.joint[0] == 1 ? block_.q1 : block_.q2;
     for (size_t i = 0; i < kBoardBlock; ++i) {
       const double torque = torque_[i], size = std::abs(torque);
@@ -184,7 +174,7 @@ class Run {
       const double torque = torque_[i];
       sums_.energy[i] += std::abs((angle[i] - block_.angle_before[i]) * torque);
       sums_.torque_cost[i] += torque * torque * kBoardTimestep;
-      sums_.last_below[i] = tip_[i] > kLine ? sums_.last_below[i] : step;
+      sums_.last_below[i] = block_.height_before[i] > kLine ? sums_.last_below[i] : step;
     }
   }
 
@@ -222,7 +212,6 @@ class Run {
   std::vector<LanePush> pushes_;
   std::vector<BoardMeasurement> past_;  // ring of the last kMostDelay states
   BoardMeasurement seen_{};
-  Lanes tip_{};                             // height of the tip before the step, m
   Lanes wanted_{}, torque_{}, previous_{};  // N·m: asked for; that acts, without pushes; before it
   Sums sums_;
 };

@@ -98,11 +98,26 @@ HWY_INLINE V MotorAngleOf(const ClosedFormBatch& batch, size_t i, const State& x
   return hn::IfThenElse(DrivesJoint1(batch, i), x.q.one, x.q.two);
 }
 
+/// Sines and cosines of the joints' angles.
+struct Angles {
+  Angle q1, q2;
+
+  HWY_INLINE V c12() const { return NegMulAdd(q1.s, q2.s, q1.c * q2.c); }
+};
+
+HWY_INLINE Angles AnglesOf(const Joints& q) { return {SineCosineOf(q.one), SineCosineOf(q.two)}; }
+
+/// Height of the tip over the pivot, over the length of both links.
+HWY_INLINE V HeightOf(const ClosedFormBatch& batch, size_t i, const Angles& angles) {
+  return hn::Neg(
+      MulAdd(LoadFrom(batch.share1, i), angles.q1.c, LoadFrom(batch.share2, i) * angles.c12()));
+}
+
 /// M(q) q̈ = r = τ - c(q, q̇) - g(q) - d q̇ - f atan(100 q̇), solved for q̈.
 template <bool kFriction>
-HWY_INLINE Joints Acceleration(const Dynamics& p, const State& x) {
-  const auto [s1, c1] = SineCosineOf(x.q.one);
-  const auto [s2, c2] = SineCosineOf(x.q.two);
+HWY_INLINE Joints Acceleration(const Dynamics& p, const State& x, const Angles& angles) {
+  const auto& [s1, c1] = angles.q1;
+  const auto& [s2, c2] = angles.q2;
   const auto& [w1, w2] = x.w;
   const V s12 = MulAdd(s1, c2, c1 * s2);
 
@@ -134,30 +149,33 @@ HWY_INLINE Joints Acceleration(const Dynamics& p, const State& x) {
 /// One classical Runge-Kutta step of K vectors of environments, whose operations the processor
 /// overlaps. For q̈ = a(q, w) its four slopes of q are the w of the stages, so that
 ///   q += h w + h²/6 (a1 + a2 + a3),  w += h/6 (a1 + 2 a2 + 2 a3 + a4).
+/// `before` gets the angles of the first stage.
 template <bool kFriction, size_t K>
-HWY_INLINE void RungeKuttaStep(const Dynamics (&p)[K], double h, State (&x)[K]) {
+HWY_INLINE void RungeKuttaStep(const Dynamics (&p)[K], double h, State (&x)[K],
+                               Angles (&before)[K]) {
   Joints a1[K], a2[K], middle[K], early[K];
   State stage[K];
   HWY_UNROLL(2)
   for (size_t k = 0; k < K; ++k) {
-    a1[k] = Acceleration<kFriction>(p[k], x[k]);
+    before[k] = AnglesOf(x[k].q);
+    a1[k] = Acceleration<kFriction>(p[k], x[k], before[k]);
     stage[k] = {x[k].q.Plus(h / 2, x[k].w), x[k].w.Plus(h / 2, a1[k])};
   }
   HWY_UNROLL(2)
   for (size_t k = 0; k < K; ++k) {
-    a2[k] = Acceleration<kFriction>(p[k], stage[k]);
+    a2[k] = Acceleration<kFriction>(p[k], stage[k], AnglesOf(stage[k].q));
     stage[k] = {x[k].q.Plus(h / 2, stage[k].w), x[k].w.Plus(h / 2, a2[k])};
   }
   HWY_UNROLL(2)
   for (size_t k = 0; k < K; ++k) {
-    const Joints a3 = Acceleration<kFriction>(p[k], stage[k]);
+    const Joints a3 = Acceleration<kFriction>(p[k], stage[k], AnglesOf(stage[k].q));
     stage[k] = {x[k].q.Plus(h, stage[k].w), x[k].w.Plus(h, a3)};
     middle[k] = a2[k] + a3;
     early[k] = a1[k] + middle[k];
   }
   HWY_UNROLL(2)
   for (size_t k = 0; k < K; ++k) {
-    const Joints a4 = Acceleration<kFriction>(p[k], stage[k]);
+    const Joints a4 = Acceleration<kFriction>(p[k], stage[k], AnglesOf(stage[k].q));
     x[k].q = x[k].q.Plus(h, x[k].w).Plus(h * h / 6, early[k]);
     x[k].w = x[k].w.Plus(h / 6, early[k] + middle[k] + a4);
   }
@@ -169,6 +187,7 @@ HWY_INLINE void AdvanceVectors(ClosedFormBatch& batch, int steps, size_t first, 
   const size_t lanes = hn::Lanes(kDoubles);
   Dynamics p[K];
   State x[K];
+  Angles before[K];
   HWY_UNROLL(2)
   for (size_t k = 0; k < K; ++k) {
     p[k] = LoadDynamics(batch, first + k * lanes);
@@ -176,9 +195,13 @@ HWY_INLINE void AdvanceVectors(ClosedFormBatch& batch, int steps, size_t first, 
     hn::Store(MotorAngleOf(batch, first + k * lanes, x[k]), kDoubles,
               batch.angle_before.data() + first + k * lanes);
   }
-  for (int step = 0; step < steps; ++step) RungeKuttaStep<kFriction>(p, timestep, x);
+  for (int step = 0; step < steps; ++step) RungeKuttaStep<kFriction>(p, timestep, x, before);
   HWY_UNROLL(2)
-  for (size_t k = 0; k < K; ++k) StoreState(x[k], first + k * lanes, batch);
+  for (size_t k = 0; k < K; ++k) {
+    const size_t i = first + k * lanes;
+    hn::Store(HeightOf(batch, i, before[k]), kDoubles, batch.height_before.data() + i);
+    StoreState(x[k], i, batch);
+  }
 }
 
 template <bool kFriction>
@@ -211,9 +234,10 @@ struct Pose {
 
 HWY_INLINE Pose PoseOf(const ClosedFormBatch& batch, size_t i, const State& x) {
   Pose pose;
-  pose.q1 = SineCosineOf(x.q.one);
-  pose.q2 = SineCosineOf(x.q.two);
-  pose.c12 = NegMulAdd(pose.q1.s, pose.q2.s, pose.q1.c * pose.q2.c);
+  const Angles angles = AnglesOf(x.q);
+  pose.q1 = angles.q1;
+  pose.q2 = angles.q2;
+  pose.c12 = angles.c12();
 
   // E = (T1 w1² + T2 w12²)/2 + b c2 w1 w12 - G1 c1 - G2 c12, with w12 = w1 + w2
   const V half = Constant(0.5);
@@ -223,8 +247,7 @@ HWY_INLINE Pose PoseOf(const ClosedFormBatch& batch, size_t i, const State& x) {
   const V minus_potential =
       MulAdd(LoadFrom(batch.G1, i), pose.q1.c, LoadFrom(batch.G2, i) * pose.c12);
   pose.energy = MulAdd(kinetic - minus_potential, LoadFrom(batch.energy_scale, i), half);
-  pose.height =
-      hn::Neg(MulAdd(LoadFrom(batch.share1, i), pose.q1.c, LoadFrom(batch.share2, i) * pose.c12));
+  pose.height = HeightOf(batch, i, angles);
   return pose;
 }
 
@@ -335,9 +358,11 @@ HWY_EXPORT(SineCosineRange);
 ClosedFormBatch::ClosedFormBatch(size_t num_envs) {
   constexpr size_t kWidest = HWY_NAMESPACE::kWidest;
   const size_t padded = (num_envs + kWidest - 1) / kWidest * kWidest;
-  for (Array* array : {&q1,    &q2,    &w1, &w2, &tau,          &angle_before, &J1,    &J2,
-                       &b,     &a,     &G1, &G2, &d1,           &d2,           &f1,    &f2,
-                       &limit, &joint, &T1, &T2, &energy_scale, &share1,       &share2}) {
+  for (Array* array :
+       {&q1,           &q2,     &w1,    &w2,    &tau,   &angle_before, &height_before,
+        &J1,           &J2,     &b,     &a,     &G1,    &G2,           &d1,
+        &d2,           &f1,     &f2,    &limit, &joint, &T1,           &T2,
+        &energy_scale, &share1, &share2}) {
     array->resize(padded);
   }
   for (size_t i = 0; i < padded; ++i) SetPlant(i, Plant());

@@ -35,6 +35,7 @@ struct ClosedFormBatch {
   Array q1, q2, w1, w2;  // rad, rad/s
   Array tau;             // N·m, held until it is set again
   Array angle_before;    // of the motor's joint before the last Advance, rad
+  Array height_before;   // of the tip before the last step of it, over the length of both links
 
   // Equations of motion, see Manipulator.
   Array J1, J2, b, a;         // kg·m²
