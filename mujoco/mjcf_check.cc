@@ -3,12 +3,12 @@
 #include <tinyxml2.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string_view>
 #include <vector>
 
 #include "core/error.h"
 #include "core/text.h"
-#include "sim/double_pendulum.h"
 
 namespace upswing {
 namespace {
@@ -17,124 +17,59 @@ constexpr int kMostElements = 200;  // the built-in model has 15
 constexpr int kMostLevels = 10;     // of nesting; the built-in model has 5
 constexpr size_t kMostName = 100;   // bytes
 
-/// What an attribute may hold: numbers, one of some words, or a name.
-struct Attribute {
-  std::string_view name;
-  size_t least = 0, most = 0;   // count of numbers; 0: words or a name
-  double low = 0, high = 0;     // of each number
-  std::string_view words = {};  // the allowed words; empty: any name
-};
+constexpr double kLargest = 1e6;  // size of a number
 
-/// An element, its attributes and the elements that it may contain.
+/// An element, and the attributes and elements that it may have, as words.
 struct Element {
-  std::string_view name;
-  std::vector<Attribute> attributes;
-  std::string_view children = {};
+  std::string name, attributes, children = {};
 };
 
-constexpr std::string_view kBool = "false true";
-constexpr double kAny = 1e6;  // bound of numbers without a narrower range
-
-constexpr Attribute Name(std::string_view name) { return {name}; }
-constexpr Attribute Word(std::string_view name, std::string_view words) {
-  return {name, 0, 0, 0, 0, words};
-}
-constexpr Attribute Number(std::string_view name, double low = -kAny, double high = kAny) {
-  return {name, 1, 1, low, high};
-}
-constexpr Attribute Numbers(std::string_view name, size_t least, size_t most, double low = -kAny,
-                            double high = kAny) {
-  return {name, least, most, low, high};
-}
-
-std::vector<Attribute> operator+(std::vector<Attribute> a, const std::vector<Attribute>& b) {
-  a.insert(a.end(), b.begin(), b.end());
-  return a;
-}
+/// Attributes that hold a name. Others hold numbers and kKeywords; how many and which, MuJoCo
+/// checks.
+constexpr std::string_view kNames =
+    "name class childclass model joint actuator body1 body2 target eulerseq";
+constexpr std::string_view kKeywords =
+    "false true auto enable disable degree radian local Euler RK4 implicit implicitfast PGS CG "
+    "Newton dense sparse pyramidal elliptic hinge slide ball free capsule sphere ellipsoid "
+    "cylinder box plane fixed track trackcom targetbody targetbodycom spot directional point";
 
 /// The elements that a model may contain.
 std::vector<Element> MakeElements() {
-  constexpr std::string_view kSwitch = "enable disable";
-  const std::vector<Attribute> named{Name("name"), Name("class")};
-  const std::vector<Attribute> place{Numbers("pos", 3, 3),       Numbers("quat", 4, 4),
-                                     Numbers("axisangle", 4, 4), Numbers("xyaxes", 6, 6),
-                                     Numbers("zaxis", 3, 3),     Numbers("euler", 3, 3)};
-  const std::vector<Attribute> look{Numbers("rgba", 4, 4, 0, 1), Number("group", 0, 5)};
-  const std::vector<Attribute> shape{Numbers("size", 1, 3, 0), Numbers("fromto", 6, 6)};
-  const std::vector<Attribute> contact{Number("contype", 0),   Number("conaffinity", 0),
-                                       Number("condim", 1, 6), Numbers("friction", 1, 3, 0),
-                                       Number("margin"),       Numbers("solref", 1, 2),
-                                       Numbers("solimp", 1, 5)};
+  const std::string named = "name class ", place = "pos quat axisangle xyaxes zaxis euler ",
+                    shape = named + place + "type size fromto rgba group ";
   return {
-      {"mujoco",
-       {Name("model")},
-       "compiler option default worldbody actuator sensor contact keyframe"},
-      {"compiler",
-       {Word("angle", "degree radian"), Word("autolimits", kBool), Word("coordinate", "local"),
-        Word("inertiafromgeom", "false true auto"), Name("eulerseq")}},
+      {"mujoco", "model", "compiler option default worldbody actuator sensor contact keyframe"},
+      {"compiler", "angle autolimits coordinate inertiafromgeom eulerseq"},
       {"option",
-       // A shorter timestep makes an evaluation take minutes.
-       {Number("timestep", 1e-4, kControlPeriod), Numbers("gravity", 3, 3),
-        Word("integrator", "Euler RK4 implicit implicitfast"), Number("iterations", 1, 1000),
-        Number("ls_iterations", 1, 1000), Number("tolerance", 0, 1), Number("ls_tolerance", 0, 1),
-        Word("solver", "PGS CG Newton"), Word("jacobian", "dense sparse auto"),
-        Word("cone", "pyramidal elliptic"), Number("density", 0), Number("viscosity", 0)},
+       "timestep gravity integrator iterations ls_iterations tolerance ls_tolerance solver "
+       "jacobian cone density viscosity",
        "flag"},
       // Without the flags that switch off gravity, springs, damping, the motor or its limit.
       {"flag",
-       {Word("contact", kSwitch), Word("constraint", kSwitch), Word("equality", kSwitch),
-        Word("frictionloss", kSwitch), Word("limit", kSwitch), Word("warmstart", kSwitch),
-        Word("eulerdamp", kSwitch), Word("refsafe", kSwitch), Word("midphase", kSwitch),
-        Word("nativeccd", kSwitch), Word("island", kSwitch), Word("energy", kSwitch),
-        Word("sensor", kSwitch)}},
-      {"default", {Name("class")}, "default joint geom site motor"},
-      {"worldbody", {}, "body light camera site"},
-      {"body", std::vector{Name("name"), Name("childclass")} + place,
-       "joint geom body inertial light camera site"},
-      {"inertial", std::vector{Number("mass", 0), Numbers("diaginertia", 3, 3, 0),
-                               Numbers("fullinertia", 6, 6)} +
-                       place},
-      {"joint",
-       named + std::vector{Word("type", "hinge slide ball free"), Numbers("axis", 3, 3),
-                           Numbers("pos", 3, 3), Number("ref"), Number("springref"),
-                           Number("stiffness", 0), Number("damping", 0), Number("armature", 0),
-                           Number("frictionloss", 0), Word("limited", "false true auto"),
-                           Numbers("range", 2, 2), Numbers("solreflimit", 1, 2),
-                           Numbers("solimplimit", 1, 5), Numbers("solreffriction", 1, 2),
-                           Numbers("solimpfriction", 1, 5), Number("margin"),
-                           Number("group", 0, 5)}},
-      {"geom", named +
-                   std::vector{Word("type", "capsule sphere ellipsoid cylinder box plane"),
-                               Number("mass", 0), Number("density", 0)} +
-                   shape + place + look + contact},
-      {"site", named + std::vector{Word("type", "capsule sphere ellipsoid cylinder box")} + shape +
-                   place + look},
-      {"camera", named +
-                     std::vector{Word("mode", "fixed track trackcom targetbody targetbodycom"),
-                                 Name("target"), Number("fovy", 0, 180)} +
-                     place},
-      {"light",
-       named + std::vector{Word("mode", "fixed track trackcom targetbody targetbodycom"),
-                           Name("target"), Word("type", "spot directional point"),
-                           Word("directional", kBool), Word("castshadow", kBool),
-                           Word("active", kBool), Numbers("pos", 3, 3), Numbers("dir", 3, 3),
-                           Numbers("diffuse", 3, 3, 0), Numbers("ambient", 3, 3, 0),
-                           Numbers("specular", 3, 3, 0), Numbers("attenuation", 3, 3, 0),
-                           Number("cutoff", 0, 180), Number("exponent", 0)}},
-      {"actuator", {}, "motor"},
-      {"motor", named + std::vector{Name("joint"), Numbers("gear", 1, 6),
-                                    Word("ctrllimited", "false true auto"),
-                                    Numbers("ctrlrange", 2, 2), Number("group", 0, 5)}},
-      {"sensor", {}, "jointpos jointvel actuatorfrc"},
-      {"jointpos", {Name("name"), Name("joint")}},
-      {"jointvel", {Name("name"), Name("joint")}},
-      {"actuatorfrc", {Name("name"), Name("actuator")}},
-      {"contact", {}, "exclude"},
-      {"exclude", {Name("name"), Name("body1"), Name("body2")}},
-      {"keyframe", {}, "key"},
-      {"key",
-       {Name("name"), Number("time"), Numbers("qpos", 2, 2), Numbers("qvel", 2, 2),
-        Numbers("ctrl", 1, 1)}},
+       "contact constraint equality frictionloss limit warmstart eulerdamp refsafe midphase "
+       "nativeccd island energy sensor"},
+      {"default", "class", "default joint geom site motor"},
+      {"worldbody", "", "body light camera site"},
+      {"body", "name childclass " + place, "joint geom body inertial light camera site"},
+      {"inertial", "mass diaginertia fullinertia " + place},
+      {"joint", named +
+                    "type axis pos ref springref stiffness damping armature frictionloss limited "
+                    "range solreflimit solimplimit solreffriction solimpfriction margin group"},
+      {"geom", shape + "mass density contype conaffinity condim friction margin solref solimp"},
+      {"site", shape},
+      {"camera", named + place + "mode target fovy"},
+      {"light", named + "mode target type directional castshadow active pos dir diffuse ambient "
+                        "specular attenuation cutoff exponent"},
+      {"actuator", "", "motor"},
+      {"motor", named + "joint gear ctrllimited ctrlrange group"},
+      {"sensor", "", "jointpos jointvel actuatorfrc"},
+      {"jointpos", "name joint"},
+      {"jointvel", "name joint"},
+      {"actuatorfrc", "name actuator"},
+      {"contact", "", "exclude"},
+      {"exclude", "name body1 body2"},
+      {"keyframe", "", "key"},
+      {"key", "name time qpos qvel ctrl"},
   };
 }
 
@@ -228,45 +163,33 @@ class Checker {
   void CheckAttribute(const tinyxml2::XMLAttribute& attribute, const Element& element) const {
     const int line = attribute.GetLineNum();
     const std::string name = attribute.Name();
-    const auto known = std::ranges::find(element.attributes, name, &Attribute::name);
-    if (known == element.attributes.end()) {
-      std::vector<std::string> names;
-      for (const Attribute& a : element.attributes) names.emplace_back(a.name);
+    const std::vector<std::string> names = Words(element.attributes);
+    if (std::ranges::count(names, name) == 0) {
       Refuse(line, Concat("<", element.name, "> takes no ", Quoted(name), " here",
                           DidYouMean(name.substr(0, kMostName), names), "; expected ",
                           names.empty() ? "no attribute" : Join(names, ", ")));
     }
     const std::string_view text = attribute.Value();
-    const std::string expected = Expected(*known, text);
+    const std::string expected = Expected(name, text);
     if (expected.empty()) return;
     Refuse(line,
            Concat("<", element.name, "> ", name, ": expected ", expected, ", got ", Quoted(text)));
   }
 
-  /// What was expected; empty if the text is valid.
-  static std::string Expected(const Attribute& attribute, std::string_view text) {
-    if (attribute.most > 0) return ExpectedNumbers(attribute, text);
-    const bool fits = text.size() <= kMostName && Printable(text) == text;
-    if (attribute.words.empty()) {
+  /// What the attribute of this name takes; empty if it takes the text.
+  static std::string Expected(const std::string& name, std::string_view text) {
+    if (std::ranges::count(Words(kNames), name) > 0) {
+      const bool fits = text.size() <= kMostName && Printable(text) == text;
       return fits ? "" : Concat("a name of at most ", kMostName, " bytes");
     }
-    const std::vector<std::string> words = Words(attribute.words);
-    if (std::ranges::find(words, text) != words.end()) return "";
-    return Join(words, " or ");
-  }
-
-  static std::string ExpectedNumbers(const Attribute& a, std::string_view text) {
-    const std::vector<std::string> words = Words(text);
+    const std::vector<std::string> keywords = Words(kKeywords);
     const auto fits = [&](const std::string& word) {
       const auto number = ParseNumber(word);
-      return number && *number >= a.low && *number <= a.high;
+      return number ? std::abs(*number) <= kLargest : std::ranges::count(keywords, word) > 0;
     };
-    if (words.size() >= a.least && words.size() <= a.most && std::ranges::all_of(words, fits)) {
-      return "";
-    }
-    const std::string count = a.least == a.most ? Concat(a.most) : Concat(a.least, " to ", a.most);
-    return Concat(a.most == 1 ? "a number" : count + " numbers", " in [", FormatNumber(a.low), ", ",
-                  FormatNumber(a.high), "]");
+    const std::vector<std::string> words = Words(text);
+    if (!words.empty() && std::ranges::all_of(words, fits)) return "";
+    return Concat("numbers within ", FormatNumber(kLargest), " or a keyword of MJCF");
   }
 
   const std::string& where_;

@@ -13,10 +13,10 @@ inline constexpr size_t kMostMjcfBytes = 65536;
 /// Throws BadInput, with `where` (a file's name) and the line, unless `mjcf` is well-formed XML in
 /// UTF-8 of at most kMostMjcfBytes, made of nothing but the elements and attributes that describe a
 /// double pendulum: links, joints, a motor, options of the simulation, and harmless extras (lights,
-/// cameras, sites, sensors of joints, key frames). Each number must be finite and within a range.
+/// cameras, sites, sensors of joints, key frames). Each number must be finite and within 1e6.
 /// Refused is what reads files, repeats elements, takes its size from a number, or changes the
 /// motion in a way that the plant's parameters do not describe (wind, gravity compensation, limits
-/// of forces). LoadModel then checks whether the model is a double pendulum.
+/// of forces). MuJoCo then checks the values, and LoadModel whether the model is a double pendulum.
 void CheckMjcf(const std::string& mjcf, const std::string& where);
 
 }  // namespace upswing

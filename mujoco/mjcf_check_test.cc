@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -20,10 +21,12 @@ std::string Changed(const std::string& from, const std::string& to) {
   return mjcf.replace(mjcf.find(from), from.size(), to);
 }
 
-/// The message that is thrown; empty if nothing is.
-std::string ErrorOf(const std::string& mjcf) {
+/// The message that `check` throws; empty if it throws nothing.
+std::string ErrorOf(
+    const std::string& mjcf,
+    const std::function<void(const std::string&, const std::string&)>& check = CheckMjcf) {
   try {
-    CheckMjcf(mjcf, "m.xml");
+    check(mjcf, "m.xml");
   } catch (const Error& error) {
     EXPECT_EQ(error.exit_code(), 2);
     return error.what();
@@ -145,28 +148,51 @@ TEST(MjcfCheck, SaysWhichAttributeWasNotExpectedAndWhere) {
   }
 }
 
+// What this check leaves to MuJoCo and to the check of the model.
+TEST(MjcfCheck, LoadModelRefusesEveryOtherNumberAndWord) {
+  for (const auto& [from, to] : std::vector<std::pair<std::string, std::string>>{
+           {"\"0.005\"", "\"1e-9\""},
+           {"\"0.005\"", "\"0.005 0.005\""},
+           {"\"0.005\"", "\"Euler\""},
+           {"<option ", "<option iterations=\"1000000\" "},
+           {"<option ", "<option ls_iterations=\"1000000\" "},
+           {"<option ", "<option density=\"-1\" "},
+           {"<option ", "<option viscosity=\"-1\" "},
+           {"armature=\"0.01\"", "armature=\"-0.01\""},
+           {"damping=\"0.2\"", "damping=\"-0.2\""},
+           {"damping=\"0.2\"", "damping=\"0.2 -1\""},
+           {"damping=\"0.2\"", "damping=\"0.2 1\""},
+           {"damping=", "stiffness=\"-1\" damping="},
+           {"damping=", "stiffness=\"0 1\" damping="},
+           {"damping=", "frictionloss=\"-1\" damping="},
+           {"0 0 0 0 0 -0.5", "0 0 0 0 0 -0.5 1"},
+           {"0 0 -9.81", "0 0"},
+           {"size=\"0.04\"", "size=\"0.04 1 1 1\""},
+           {"type=\"hinge\"", "type=\"capsule\""},
+           {"type=\"capsule\"", "type=\"box\""},
+           {"RK4", "PGS"}}) {
+    const std::string error =
+        ErrorOf(Changed(from, to),
+                [](const std::string& mjcf, const std::string& where) { LoadModel(mjcf, where); });
+    EXPECT_TRUE(error.starts_with("m.xml: ")) << to << ": " << error;
+    EXPECT_EQ(error.find('\n'), std::string::npos) << error;
+  }
+}
+
 TEST(MjcfCheck, BoundsEveryNumber) {
   for (const auto& [from, to, words] : std::vector<std::array<std::string, 3>>{
-           {"\"0.005\"", "\"1e-9\"", "<option> timestep: expected a number in [1e-04, 0.02]"},
-           {"\"0.005\"", "\"nan\"", "timestep"},
+           {"\"0.005\"", "\"nan\"", "<option> timestep: expected numbers within 1000000"},
            {"\"0.005\"", "\"\"", "timestep"},
-           {"\"0.005\"", "\"0.005 0.005\"", "expected a number in"},
            {"\"0.005\"", "\"0.005x\"", "timestep"},
-           {"<option ", "<option iterations=\"1000000000\" ", "in [1, 1000], got \"1000000000\""},
-           {"<option ", "<option ls_iterations=\"0\" ", "ls_iterations"},
-           {"armature=\"0.01\"", "armature=\"-0.01\"", "<joint> armature: expected a number in [0"},
+           {"\"0.005\"", "\"0x1p900\"", "timestep"},
+           {"<option ", "<option iterations=\"1000000000\" ", "got \"1000000000\""},
            {"armature=\"0.01\"", "armature=\"inf\"", "armature"},
+           {"armature=\"0.01\"", "armature=\"-Infinity\"", "armature"},
            {"armature=\"0.01\"", "armature=\"1e300\"", "armature"},
-           {"damping=\"0.2\"", "damping=\"-0.2\"", "damping"},
-           {"damping=\"0.2\"", "damping=\"0.2 -1\"", "damping: expected a number"},
-           {"damping=", "stiffness=\"-1\" damping=", "stiffness"},
-           {"damping=", "frictionloss=\"-1\" damping=", "frictionloss"},
-           {"0 0 0 0 0 -0.5", "0 0 0 0 0 -0.5 1", "fromto: expected 6 numbers"},
-           {"0 0 -9.81", "0 0", "gravity: expected 3 numbers"},
-           {"size=\"0.04\"", "size=\"0.04 1 1 1\"", "size: expected 1 to 3 numbers"},
-           {"type=\"hinge\"", "type=\"screw\"", "expected hinge or slide or ball or free"},
-           {"type=\"capsule\"", "type=\"hfield\"", "expected capsule or"},
-           {"RK4", "rk4", "expected Euler or RK4"}}) {
+           {"damping=\"0.2\"", "damping=\"0.2 NaN\"", "damping"},
+           {"type=\"hinge\"", "type=\"screw\"", "or a keyword of MJCF, got \"screw\""},
+           {"type=\"capsule\"", "type=\"hfield\"", "type"},
+           {"RK4", "rk4", "integrator"}}) {
     ExpectRefused(Changed(from, to), words);
   }
 }
@@ -201,7 +227,7 @@ TEST(MjcfCheck, BoundsTextNamesElementsAndNesting) {
   ExpectRefused("<mujoco " + name + "=\"1\"/>", "takes no \"aaaa");
   ExpectRefused("<" + name + "/>", "expected <mujoco>, got \"aaaa");
   ExpectRefused("<mujoco><option gravity=\"" + std::string(60000, '1') + "\"/></mujoco>",
-                "gravity: expected 3 numbers");
+                "gravity: expected numbers");
   std::string many = "<mujoco><worldbody>", nested = many, deep;
   for (int i = 0; i < 5000; ++i) many += "<light/>";
   ExpectRefused(many + "</worldbody></mujoco>", "at most 200 elements");
