@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 #include <memory>
 
 #include "apps/commands.h"
@@ -68,9 +69,8 @@ int RunBounds(const BoundsArguments& a) {
   for (const LoadedPolicy& loaded : policies) CheckComparable(loaded, a.config);
   ThreadPool pool(ResolveThreads(a.threads));
   const EpisodeBounds bounds = [&] {
-    // A guess is an episode from hanging.
-    EpisodeProgress progress(static_cast<double>(a.config.guesses + a.config.episodes), a.as_json);
-    return FindBounds(a.config, pool, [&](double share) { progress.Show(share); });
+    EpisodeProgress progress(a.as_json);
+    return FindBounds(a.config, pool, std::ref(progress));
   }();
 
   std::vector<Row> rows;
@@ -81,11 +81,9 @@ int RunBounds(const BoundsArguments& a) {
   add("any torque", bounds.any);
   add(fmt::format("{} torques", a.config.torques), bounds.table);
   for (const LoadedPolicy& loaded : policies) {
-    EpisodeProgress judged(static_cast<double>(a.config.episodes), a.as_json);
+    EpisodeProgress progress(a.as_json);
     const Evaluation figures =
-        EvaluatePolicy(loaded, a.config.trial, a.config.episodes, pool, [&](double share) {
-          judged.Show(share);
-        }).figures;
+        EvaluatePolicy(loaded, a.config.trial, a.config.episodes, pool, std::ref(progress)).figures;
     rows.push_back({loaded.name, figures, figures.swing_up_seconds});
   }
   if (!a.csv.empty()) WriteOutput(a.csv, BoundsCsv(bounds));

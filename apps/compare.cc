@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 
 #include "apps/commands.h"
@@ -74,9 +75,7 @@ int RunCompare(const CompareArguments& arguments) {
     ThreadPool pool(ResolveThreads(arguments.threads));
     EpisodeProgress progress(arguments.as_json);
     const bool make_anew = arguments.controllers.made_for.empty();
-    AddPolicies(
-        policies, make_anew, pool,
-        [&](double episodes, double share) { progress.Show(episodes, share); }, comparison);
+    AddPolicies(policies, make_anew, pool, std::ref(progress), comparison);
   }
   if (arguments.as_json) {
     fmt::print("{}\n", ComparisonJson(comparison));

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <functional>
 #include <memory>
 
 #include "apps/commands.h"
@@ -36,9 +37,8 @@ int RunEval(const EvalArguments& a) {
   const LoadedPolicy loaded = GetPolicy(a.policy);
   ThreadPool pool(ResolveThreads(a.threads), a.threads == 0);
   const EvalReport report = [&] {
-    EpisodeProgress progress(a.episodes, a.as_json);  // gone when the table is printed
-    return EvaluatePolicy(loaded, a.trial, a.episodes, pool,
-                          [&](double share) { progress.Show(share); });
+    EpisodeProgress progress(a.as_json);  // gone when the table is printed
+    return EvaluatePolicy(loaded, a.trial, a.episodes, pool, std::ref(progress));
   }();
   if (!a.episodes_csv.empty()) WriteOutput(a.episodes_csv, EpisodesCsv(report));
   if (to_output) return 0;  // the rows alone, for a reader

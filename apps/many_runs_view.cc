@@ -69,45 +69,45 @@ void ManyRunsView::Announce() const {
   std::fflush(stdout);
 }
 
-ManyRunsView::Progress ManyRunsView::Measure() const {
-  Progress progress;
+ManyRunsView::Standing ManyRunsView::Measure() const {
+  Standing standing;
   for (const SeedRun& run : *runs_) {
     // Files are read for those that run alone: there may be thousands of others.
     const bool runs_now = std::ranges::find(running_, &run) != running_.end();
     const auto steps = static_cast<double>(runs_now    ? run.Steps()
                                            : run.state ? run.state->steps
                                                        : 0);
-    progress.steps += steps;
-    progress.done += run.finished ? 1 : 0;
+    standing.steps += steps;
+    standing.done += run.finished ? 1 : 0;
     if (run.finished || !run.problem.empty()) continue;
-    progress.left += std::max(0.0, static_cast<double>(run.variant->config.train.steps) - steps);
+    standing.left += std::max(0.0, static_cast<double>(run.variant->config.train.steps) - steps);
   }
-  const double all = progress.steps + progress.left;
-  progress.share = all > 0 ? progress.steps / all : 1;
+  const double all = standing.steps + standing.left;
+  standing.share = all > 0 ? standing.steps / all : 1;
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin_;
-  progress.steps_per_second = (progress.steps - steps_before_) / std::max(1e-3, elapsed.count());
+  standing.steps_per_second = (standing.steps - steps_before_) / std::max(1e-3, elapsed.count());
   const bool may_end_early = std::ranges::any_of(
       *runs_, [](const SeedRun& run) { return run.variant->config.train.stop_when_solved; });
-  progress.time_left = fmt::format("{} {} left", may_end_early ? "at most" : "about",
-                                   progress.steps_per_second > 0
-                                       ? FormatDuration(progress.left / progress.steps_per_second)
+  standing.time_left = fmt::format("{} {} left", may_end_early ? "at most" : "about",
+                                   standing.steps_per_second > 0
+                                       ? FormatDuration(standing.left / standing.steps_per_second)
                                        : "?");
-  return progress;
+  return standing;
 }
 
 void ManyRunsView::Watch(const std::vector<const SeedRun*>& running) {
   running_ = running;
   if (!line_.due()) return;
-  const Progress progress = Measure();
+  const Standing standing = Measure();
   std::vector<std::string> fields{
-      fmt::format("{} of {} runs", progress.done, runs_->size()), progress.time_left,
-      fmt::format("{} steps/s", FormatCount(std::max(0.0, progress.steps_per_second)))};
+      fmt::format("{} of {} runs", standing.done, runs_->size()), standing.time_left,
+      fmt::format("{} steps/s", FormatCount(std::max(0.0, standing.steps_per_second)))};
   for (const SeedRun* run : running) {
     const auto all = static_cast<double>(run->variant->config.train.steps);
     fields.push_back(
         fmt::format("{} {:.0f}%", run->name, 100 * static_cast<double>(run->Steps()) / all));
   }
-  line_.Show(progress.share, fields);
+  line_.Show(standing.share, fields);
 }
 
 void ManyRunsView::End(const SeedRun& run) {
@@ -117,14 +117,14 @@ void ManyRunsView::End(const SeedRun& run) {
   }
   if (!run.state) return line_.Print(fmt::format("  {:<20} stopped before it began", run.name));
   const TrainState& s = *run.state;
-  const Progress progress = Measure();
+  const Standing standing = Measure();
   line_.Print(fmt::format("  {:<20} {:>11} steps  {:>12}  {:<22}  {} of {} runs done{}", run.name,
                           FormatCount(s.steps), FormatDuration(s.seconds),
                           s.solved       ? "solved at " + FormatCount(s.streak_step)
                           : run.finished ? "done, not solved"
                                          : "stopped",
-                          progress.done, runs_->size(),
-                          progress.left > 0 ? ", " + progress.time_left : ""));
+                          standing.done, runs_->size(),
+                          standing.left > 0 ? ", " + standing.time_left : ""));
 }
 
 void ManyRunsView::PrintTable(const Variant& variant) const {

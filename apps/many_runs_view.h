@@ -36,14 +36,14 @@ class ManyRunsView : public ManyRunsObserver {
 
  private:
   /// How far all runs are together.
-  struct Progress {
+  struct Standing {
     size_t done = 0;             // runs
     double steps = 0, left = 0;  // made, and at most to be made
     double share = 0;            // of the work, 0 to 1
     double steps_per_second = 0;
     std::string time_left;  // such as `at most 3 min 20 s left`
   };
-  Progress Measure() const;
+  Standing Measure() const;
   void Announce() const;
   void PrintTable(const Variant& variant) const;
 

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <functional>
 #include <memory>
 
 #include "apps/commands.h"
@@ -20,6 +21,7 @@ namespace upswing {
 namespace {
 
 namespace fs = std::filesystem;
+
 /// What was typed.
 struct MapCommand : MapArguments {
   std::vector<std::string> policies;
@@ -28,54 +30,35 @@ struct MapCommand : MapArguments {
   bool as_json = false;
 };
 
-/// Fills a planned map, with a progress line.
-void FillShown(const MapCommand& a, const LoadedPolicy& loaded, ThreadPool& pool, MapResult& map) {
-  EpisodeProgress line(a.as_json);
-  FillMap(
-      a, loaded, pool, [&](double episodes, double share) { line.Show(episodes, share); }, map);
-}
-
-/// Maps of several policies, side by side.
-int RunMaps(const MapCommand& a) {
-  if (a.out.empty()) {
+int RunMapCommand(const MapCommand& a) {
+  const bool several = a.policies.size() > 1;
+  if (several && a.out.empty()) {
     throw BadInput(Concat("--out: expected a folder for the maps of ", Join(a.policies, ", ")));
   }
   const std::vector<LoadedPolicy> policies = GetPolicies(a.policies, a.controllers);
-  std::vector<NamedMap> maps;
   const std::vector<std::string> titles = TitlesOf(policies);
+  std::vector<NamedMap> maps;
   for (size_t i = 0; i < policies.size(); ++i) {
     maps.push_back({titles[i], PlanMap(a, policies[i])});
   }
   CheckSameAxes(maps);
   const fs::path folder = MapFolder(a, policies.front(), maps.front().map);
   ThreadPool pool(ResolveThreads(a.threads));
-  for (size_t i = 0; i < maps.size(); ++i) FillShown(a, policies[i], pool, maps[i].map);
+  for (size_t i = 0; i < maps.size(); ++i) {
+    EpisodeProgress progress(a.as_json);
+    FillMap(a, policies[i], pool, std::ref(progress), maps[i].map);
+  }
   MakeNewFolder(folder);
-  WriteMaps(maps, folder);
+  if (several) {
+    WriteMaps(maps, folder);
+  } else {
+    WriteMap(maps.front().map, folder);
+  }
   if (a.as_json) {
-    fmt::print("{}\n", MapsJson(maps));
+    fmt::print("{}\n", several ? MapsJson(maps) : MapJson(maps.front().map));
     return 0;
   }
   for (const NamedMap& one : maps) PrintMapTable(one.map);
-  return 0;
-}
-
-int RunMapCommand(const MapCommand& a) {
-  if (a.policies.size() > 1) return RunMaps(a);
-  PolicyArguments policy = a.controllers;
-  policy.name = a.policies.front();
-  const LoadedPolicy loaded = GetPolicy(policy);
-  MapResult map = PlanMap(a, loaded);
-  const fs::path folder = MapFolder(a, loaded, map);
-  ThreadPool pool(ResolveThreads(a.threads));
-  FillShown(a, loaded, pool, map);
-  MakeNewFolder(folder);
-  WriteMap(map, folder);
-  if (a.as_json) {
-    fmt::print("{}\n", MapJson(map));
-  } else {
-    PrintMapTable(map);
-  }
   return 0;
 }
 

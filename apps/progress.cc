@@ -58,29 +58,22 @@ void ProgressLine::Clear() {
   last_ = {};
 }
 
-void EpisodeProgress::Show(double episodes, double share) {
-  if (episodes != episodes_) {
-    begin_ = told_;
-    episodes_ = episodes;
-  }
-  told_ = Clock::now();
-  Show(share);
-}
-
-void EpisodeProgress::Show(double share) {
-  const auto now = Clock::now();
+void EpisodeProgress::operator()(double done, double total) {
+  if (total != total_) begin_ = told_;
+  total_ = total;
+  const auto now = told_ = Clock::now();
   const bool plain = !line_.terminal() && now - last_plain_ >= std::chrono::seconds(10);
   if (!plain && (quiet_ || !line_.due())) return;
   const double seconds = std::chrono::duration<double>(now - begin_).count();
-  const double rate = share * episodes_ / seconds;
+  const double rate = done / seconds;
   const std::string episodes =
       Concat(rate < 10 ? fmt::format("{:.2g}", rate) : FormatCount(rate), " episodes/s");
-  const std::string left = FormatDuration(seconds * (1 - share) / share) + " left";
+  const std::string left = FormatDuration((total - done) / rate) + " left";
   if (plain) {
     last_plain_ = now;
-    SayError(fmt::format("{:.0f}%  {}  {}", 100 * share, episodes, left));
+    SayError(fmt::format("{:.0f}%  {}  {}", 100 * done / total, episodes, left));
   } else {
-    line_.Show(share, {episodes, left});
+    line_.Show(done / total, {episodes, left});
   }
 }
 

@@ -37,24 +37,19 @@ class ProgressLine {
   Clock::time_point last_{};
 };
 
-/// A progress line for work on so many episodes: their rate and the time left. Where standard
-/// output is no terminal, a plain line on standard error every ten seconds.
+/// A progress line for work on episodes: their rate and the time left. Where standard output is no
+/// terminal, a plain line on standard error every ten seconds.
 class EpisodeProgress {
  public:
   /// Shows no bar if `quiet`.
-  EpisodeProgress(double episodes, bool quiet) : episodes_(episodes), quiet_(quiet) {}
-  /// Of work that says how much it is as it goes.
-  explicit EpisodeProgress(bool quiet) : EpisodeProgress(0, quiet) {}
+  explicit EpisodeProgress(bool quiet) : quiet_(quiet) {}
 
-  /// `share` of the work is done, above 0 and up to 1.
-  void Show(double share);
-  /// The same of so many episodes. Another number of them is other work, which began when the last
-  /// one was told of.
-  void Show(double episodes, double share);
+  /// As a Progress. Other work began when the last call came.
+  void operator()(double done, double total);
 
  private:
   using Clock = std::chrono::steady_clock;
-  double episodes_;
+  double total_ = 0;
   bool quiet_;
   ProgressLine line_;
   Clock::time_point begin_ = Clock::now();

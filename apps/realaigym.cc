@@ -4,6 +4,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <memory>
 
 #include "apps/commands.h"
@@ -139,9 +140,8 @@ int RunRealAiGym(const RealAiGymArguments& a) {
   if (StopSignal() != 0) return 128 + StopSignal();
   BoardReport report;
   {
-    EpisodeProgress progress(kBoardSimulations, a.as_json);
-    report = ScoreOnBoard(competitor, static_cast<uint64_t>(a.case_seed), pool,
-                          [&](double share) { progress.Show(share); });
+    EpisodeProgress progress(a.as_json);
+    report = ScoreOnBoard(competitor, static_cast<uint64_t>(a.case_seed), pool, std::ref(progress));
   }
   if (!a.csv.empty()) WriteOutput(a.csv, BoardCsv(report));
   if (!a.figure.empty()) DrawBoard(report, a.figure);

@@ -113,10 +113,9 @@ int RunHeadless(const ViewArguments& a, View& view, double seconds) {
     const bool quiet = IsStandardStream(a.csv);
     const int64_t frames = Record(
         view, config, [] { return StopSignal() != 0; },
-        [&](int64_t done, int64_t all) {
+        [&](double done, double total) {
           if (quiet || !progress.due()) return;
-          progress.Show(static_cast<double>(done) / static_cast<double>(all),
-                        {fmt::format("picture {} of {}", done, all)});
+          progress.Show(done / total, {fmt::format("picture {} of {}", done, total)});
         });
     progress.Clear();
     if (frames == 0) return 128 + StopSignal();

@@ -43,8 +43,7 @@ bool IsBetter(const BestEpisode& one, const BestEpisode& other, Aim aim) {
 
 }  // namespace
 
-BestEpisodeSearch::BestEpisodeSearch(const Plant& plant, int guesses,
-                                     const std::function<void()>& progress)
+BestEpisodeSearch::BestEpisodeSearch(const Plant& plant, int guesses, const Progress& progress)
     : plant_(plant), upright_(LqrConfig(), plant), optimizer_(plant) {
   const LqrConfig lqr;
   Rng rng(1, "guesses");
@@ -59,7 +58,7 @@ BestEpisodeSearch::BestEpisodeSearch(const Plant& plant, int guesses,
         best = std::move(trajectory);
       }
     }
-    if (progress) progress();
+    if (progress) progress(guess + 1, guesses);
   }
   if (!best) {
     throw BadInput(Concat("found no swing-up of this plant with ", Rounded(plant.torque_limit),

@@ -1,12 +1,12 @@
 #pragma once
 
-#include <functional>
 #include <span>
 #include <vector>
 
 #include "control/lqr_catch.h"
 #include "control/trajectory.h"
 #include "control/tvlqr.h"
+#include "core/progress.h"
 
 /// The best return and the least swing-up time of an episode that a search finds, knowing the plant
 /// and where it starts. Nothing says that there is no better: they bound the best return from below
@@ -33,9 +33,9 @@ using TorqueTable = std::vector<double>;
 /// as long as that helps.
 class BestEpisodeSearch {
  public:
-  /// Searches from hanging with `guesses` sine waves, and calls `progress` (may be empty) after
-  /// each. Throws as SolveLqr, and BadInput if none swings up.
-  BestEpisodeSearch(const Plant& plant, int guesses, const std::function<void()>& progress);
+  /// Searches from hanging with `guesses` sine waves, which `progress` counts. Throws as SolveLqr,
+  /// and BadInput if none swings up.
+  BestEpisodeSearch(const Plant& plant, int guesses, const Progress& progress);
 
   /// Of an episode, the best for either aim.
   struct Found {

@@ -37,21 +37,18 @@ void CheckComparable(const LoadedPolicy& loaded, const BoundsConfig& config) {
                         loaded.name, " for ", PlantText(judged), "; --set chooses the plant"));
 }
 
-EpisodeBounds FindBounds(const BoundsConfig& config, ThreadPool& pool,
-                         const std::function<void(double)>& progress) {
+EpisodeBounds FindBounds(const BoundsConfig& config, ThreadPool& pool, const Progress& progress) {
   const EnvConfig env = TrialEnvironments(config.trial, nullptr);
   const Plant& plant = env.plants.front();
   const EvaluationRule rule = SpecOf(env).evaluation;
   const auto n = static_cast<size_t>(config.episodes);
 
   const std::vector<TorqueTable> tables{{}, TorqueLevels(plant.torque_limit, config.torques)};
-  // An episode takes about as long as a guess.
-  const double work = static_cast<double>(config.guesses + config.episodes);
   double done = 0;
   std::mutex mutex;
-  const auto show = [&] {
+  const auto show = [&](double, double) {
     const std::lock_guard lock(mutex);
-    if (progress) progress(++done / work);
+    if (progress) progress(++done, static_cast<double>(config.guesses + config.episodes));
   };
   const BestEpisodeSearch search(plant, static_cast<int>(config.guesses), show);
 
@@ -80,7 +77,7 @@ EpisodeBounds FindBounds(const BoundsConfig& config, ThreadPool& pool,
     if (SwingUpSeconds(bounds.table.of_time[i], rule) < SwingUpSeconds(fastest, rule)) {
       fastest = bounds.table.of_time[i];
     }
-    show();
+    show(0, 0);
   });
   return bounds;
 }

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -32,10 +31,9 @@ struct EpisodeBounds {
 };
 
 /// Searches (control/best_episode.h), then judges what was found in the engine that the trial
-/// names. `progress` (may be empty) is called with the share done. Throws BadInput, and as
-/// BestEpisodeSearch does.
-EpisodeBounds FindBounds(const BoundsConfig& config, ThreadPool& pool,
-                         const std::function<void(double)>& progress);
+/// names. `progress` counts guesses and episodes, which take about as long. Throws BadInput,
+/// and as BestEpisodeSearch does.
+EpisodeBounds FindBounds(const BoundsConfig& config, ThreadPool& pool, const Progress& progress);
 
 /// Throws BadInput unless the policy is judged on the plant that the search knows.
 void CheckComparable(const LoadedPolicy& loaded, const BoundsConfig& config);

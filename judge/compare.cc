@@ -130,7 +130,7 @@ Comparison Compare(const CompareRequest& request) {
 }
 
 void AddPolicies(const std::vector<LoadedPolicy>& policies, bool make_anew, ThreadPool& pool,
-                 const JudgingProgress& progress, Comparison& comparison) {
+                 const Progress& progress, Comparison& comparison) {
   comparison.policies = JudgePolicies(policies, make_anew, pool, progress, comparison.runs);
   for (size_t group = 0; group < comparison.summaries.size(); ++group) {
     for (size_t policy = 0; policy < comparison.policies.size(); ++policy) {

@@ -35,7 +35,7 @@ Comparison Compare(const CompareRequest& request);
 
 /// Judges policies (JudgePolicies) and sets them beside the groups.
 void AddPolicies(const std::vector<LoadedPolicy>& policies, bool make_anew, ThreadPool& pool,
-                 const JudgingProgress& progress, Comparison& comparison);
+                 const Progress& progress, Comparison& comparison);
 
 /// Writes summary.csv (a row for each group), runs.csv (a row for each run), policies.csv (a row
 /// for each policy and task, if there are any) and the learning curves of each task as

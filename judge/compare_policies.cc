@@ -67,9 +67,8 @@ struct Job {
   int64_t episodes = 0;
 };
 
-/// `progress` is told how many episodes are done.
 JudgedPolicy Judge(const LoadedPolicy& loaded, const Job& job, ThreadPool& pool,
-                   const std::function<void(double)>& progress) {
+                   const Progress& progress) {
   JudgedPolicy judged;
   judged.name = loaded.name;
   judged.task = job.task;
@@ -82,8 +81,8 @@ JudgedPolicy Judge(const LoadedPolicy& loaded, const Job& job, ThreadPool& pool,
     env.identified_from.reset();
     if (loaded.identifies()) env.identified_from = loaded.plant;
     const auto done = static_cast<double>(episodes.size());
-    const auto more = EvaluateEpisodes(*job.policy, *MakeEnv(env), &pool, [&](double share) {
-      progress(done + share * env.num_envs);
+    const auto more = EvaluateEpisodes(*job.policy, *MakeEnv(env), &pool, [&](double part, double) {
+      progress(done + part, static_cast<double>(job.episodes));
     });
     episodes.insert(episodes.end(), more.begin(), more.end());
   }
@@ -126,7 +125,7 @@ std::vector<Job> JobsOf(const std::vector<LoadedPolicy>& policies, bool make_ane
 }  // namespace
 
 std::vector<JudgedPolicy> JudgePolicies(const std::vector<LoadedPolicy>& policies, bool make_anew,
-                                        ThreadPool& pool, const JudgingProgress& progress,
+                                        ThreadPool& pool, const Progress& progress,
                                         GroupedRuns& runs) {
   const std::vector<std::string> titles = TitlesOf(policies);
   double all = 0, before = 0;
@@ -134,8 +133,9 @@ std::vector<JudgedPolicy> JudgePolicies(const std::vector<LoadedPolicy>& policie
   for (const Job& job : jobs) all += static_cast<double>(job.episodes);
   std::vector<JudgedPolicy> judged;
   for (const Job& job : jobs) {
-    judged.push_back(Judge(policies[job.index], job, pool,
-                           [&](double done) { progress(all, (before + done) / all); }));
+    judged.push_back(Judge(policies[job.index], job, pool, [&](double done, double) {
+      if (progress) progress(before + done, all);
+    }));
     judged.back().title = titles[job.index];
     before += static_cast<double>(job.episodes);
   }

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -37,14 +36,12 @@ struct AgainstPolicy {
 /// At most so many episodes of a task, unless one run's evaluation has more.
 inline constexpr int64_t kMostJudged = 1000;
 
-using JudgingProgress = std::function<void(double episodes, double share)>;
-
 /// Judges policies on each task that the groups are evaluated on, over the episodes of the runs'
 /// final evaluations. With `make_anew` controllers are made for the plant of these. What is not
-/// judged on some task is noted. `progress` is told the share (0 to 1) that is done of so many
-/// episodes. Throws BadInput, before any episode, where a policy is of none of the tasks.
+/// judged on some task is noted. `progress` counts episodes. Throws BadInput, before any episode,
+/// where a policy is of none of the tasks.
 std::vector<JudgedPolicy> JudgePolicies(const std::vector<LoadedPolicy>& policies, bool make_anew,
-                                        ThreadPool& pool, const JudgingProgress& progress,
+                                        ThreadPool& pool, const Progress& progress,
                                         GroupedRuns& runs);
 
 AgainstPolicy CompareWithPolicy(const GroupSummary& group, const JudgedPolicy& policy);

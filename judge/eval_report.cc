@@ -69,7 +69,7 @@ using Remade = decltype(LoadedPolicy::remade);
 
 /// The results of the episodes of `config`, each with a controller made for its plant.
 void JudgeMade(const Policy& policy, const Remade& remade, const EnvConfig& config,
-               const std::function<void(double)>& progress, size_t first, EvalReport& report) {
+               const Progress& progress, size_t first, EvalReport& report) {
   std::mutex mutex;
   int done = 0;
   config.pool->ParallelFor(config.num_envs, [&](int i) {
@@ -84,14 +84,14 @@ void JudgeMade(const Policy& policy, const Remade& remade, const EnvConfig& conf
     one.pool = nullptr;
     episode.result = EvaluateEpisodes(made ? *made : policy, *OneEpisode(one, i)).front();
     const std::lock_guard lock(mutex);
-    progress(static_cast<double>(++done) / config.num_envs);
+    progress(++done, config.num_envs);
   });
 }
 
 /// Judges the episodes first, first + 1, … of the environments of `config`, which says how many.
 /// With `remade` each by a controller made for its plant.
 void JudgeEpisodes(const Policy& policy, const Remade* remade, const EnvConfig& config,
-                   const std::function<void(double)>& progress, EvalReport& report) {
+                   const Progress& progress, EvalReport& report) {
   const std::unique_ptr<VectorEnv> env = MakeEnv(config);
   const auto first = report.episodes.size();
   const auto* pendulum = dynamic_cast<const PendulumEnv*>(env.get());
@@ -141,7 +141,7 @@ void AddFigures(const Evaluation& e, const EnvSpec& spec, bool knows_values, ord
 }
 
 EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& trial, int64_t episodes,
-                          ThreadPool& pool, const std::function<void(double)>& progress) {
+                          ThreadPool& pool, const Progress& progress) {
   if (trial.known_plant && !loaded.remade) {
     throw BadInput(Concat(
         "--known-plant: expected a controller, which can be made for a plant, got ", loaded.name));
@@ -166,10 +166,8 @@ EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& tria
     config.num_envs = static_cast<int>(std::min(kAtOnce, episodes - done));
     JudgeEpisodes(
         *loaded.policy, trial.known_plant ? &loaded.remade : nullptr, config,
-        [&](double share) {
-          if (!progress) return;
-          progress((static_cast<double>(done) + share * config.num_envs) /
-                   static_cast<double>(episodes));
+        [&](double part, double) {
+          if (progress) progress(static_cast<double>(done) + part, static_cast<double>(episodes));
         },
         report);
   }

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -41,9 +40,9 @@ struct EvalReport {
 
 /// Lets a policy control `episodes` episodes of the environments that a trial makes, and says how
 /// it did; where the plant is known and no controller can be made for it, that of the policy's own
-/// plant. `progress` (may be empty) is called with the share done, 0 to 1. Throws BadInput.
+/// plant. `progress` counts episodes. Throws BadInput.
 EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& trial, int64_t episodes,
-                          ThreadPool& pool, const std::function<void(double)>& progress);
+                          ThreadPool& pool, const Progress& progress);
 
 /// In how many episodes a controller was made for the plant.
 int64_t NumMade(const EvalReport& report);

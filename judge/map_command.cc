@@ -26,31 +26,31 @@ using Clock = std::chrono::steady_clock;
 constexpr int64_t kMostEpisodes = 10000000;
 
 /// What a policy was trained on, or a controller made for.
-struct Training {
+struct DesignConditions {
   MapPoint point;               // plant and disturbance; hanging
   Randomization randomization;  // around them
   bool known = false;           // the file says more than the plant
   std::string word;             // "training" or "design"
 };
 
-Training TrainingOf(const LoadedPolicy& loaded) {
-  Training training;
-  training.point.plant = loaded.plant;
-  training.word = loaded.origin();
+DesignConditions DesignOf(const LoadedPolicy& loaded) {
+  DesignConditions design;
+  design.point.plant = loaded.plant;
+  design.word = loaded.origin();
   if (loaded.path.empty()) {
-    training.known = true;  // for no noise, no delay, nothing random
-    return training;
+    design.known = true;  // for no noise, no delay, nothing random
+    return design;
   }
   const std::string& settings = loaded.policy->info().config;
-  if (settings.empty()) return training;
+  if (settings.empty()) return design;
   try {
     const Config config = ConfigIn(settings, "config");
-    training.point.disturbance = config.disturbance;
-    training.randomization = config.randomization;
-    training.known = true;
+    design.point.disturbance = config.disturbance;
+    design.randomization = config.randomization;
+    design.known = true;
   } catch (const Error&) {  // NOLINT(bugprone-empty-catch): written by another version
   }
-  return training;
+  return design;
 }
 
 /// Whether an axis sets this setting.
@@ -64,46 +64,47 @@ bool OnAxis(const MapConfig& config, const Option& option) {
 }
 
 /// What no axis sets and is not as in the training: `mass1 1.2 kg (training: 1), …`.
-std::string ChangesOf(const MapConfig& config, const Training& training) {
+std::string ChangesOf(const MapConfig& config, const DesignConditions& design) {
   std::vector<std::string> texts;
   for (const auto& [option, before] :
-       Differences(OptionsOf(config.point), OptionsOf(training.point))) {
+       Differences(OptionsOf(config.point), OptionsOf(design.point))) {
     if (OnAxis(config, option)) continue;
     texts.push_back(fmt::format("{} {:.4g} {}", option.name, option.number(), option.unit));
     if (option.section == "start") continue;
-    texts.back() += fmt::format(" ({}: {:.4g})", training.word, before->number());
+    texts.back() += fmt::format(" ({}: {:.4g})", design.word, before->number());
   }
   if (config.assumed_plant) texts.emplace_back("the plant unknown to the policy");
   return Join(texts, ", ");
 }
 
 /// Label of the training's place on the axes, as far as it holds there.
-std::string DotOf(const MapConfig& config, const Training& training, bool changed) {
+std::string DotOf(const MapConfig& config, const DesignConditions& design, bool changed) {
   const MapAxis &x = config.x, &y = config.y;
   if (x.start && y.start && !changed) return "hanging";
-  if (training.randomization.any()) return "middle of the training's range";
-  if (!changed && !config.start_given && training.known) {
-    return Concat("as in ", training.word);
+  if (design.randomization.any()) return "middle of the training's range";
+  if (!changed && !config.start_given && design.known) {
+    return Concat("as in ", design.word);
   }
   const auto piece = [&](const MapAxis& axis) {
-    return Concat(axis.name, axis.start ? " hanging" : Concat(" as in ", training.word));
+    return Concat(axis.name, axis.start ? " hanging" : Concat(" as in ", design.word));
   };
   return Concat(piece(x), ", ", piece(y));
 }
 
-MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded, const Training& training) {
+MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded,
+                   const DesignConditions& design) {
   MapConfig config;
   config.point.plant = loaded.plant;
   config.mjcf = loaded.mjcf;
   if (a.unknown_plant) config.assumed_plant = loaded.plant;
   if (loaded.identifies()) config.identified_from = loaded.plant;
-  config.x = ParseMapAxis(a.x, training.point, "--x");
-  config.y = ParseMapAxis(a.y, training.point, "--y");
+  config.x = ParseMapAxis(a.x, design.point, "--x");
+  config.y = ParseMapAxis(a.y, design.point, "--y");
   CheckDifferent(config.x, config.y);
   const Options options = OptionsOf(config.point);
   for (MapAxis* axis : {&config.x, &config.y}) {
     const bool in_plant = options.Find(axis->name, "map").front()->section != "disturbance";
-    if (!in_plant && !training.known) axis->at_training.reset();
+    if (!in_plant && !design.known) axis->at_training.reset();
   }
   for (const Option* option : ApplyChanges(options, a.set)) {
     config.start_given |= option->section == "start";
@@ -127,14 +128,6 @@ MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded, const Trai
   return config;
 }
 
-/// Runs cells and tells how far they are.
-std::vector<MapCell> RunCells(const MapConfig& config, const Policy& policy,
-                              std::span<const int64_t> cells, ThreadPool& pool,
-                              const MapProgress& progress) {
-  const double episodes = static_cast<double>(cells.size()) * config.episodes;
-  return RunMap(config, policy, cells, pool, [&](double share) { progress(episodes, share); });
-}
-
 }  // namespace
 
 void MapArguments::Describe(Options& o) {
@@ -150,10 +143,10 @@ MapResult PlanMap(const MapArguments& a, const LoadedPolicy& loaded) {
                "the axes, got one of ", loaded.task));
   }
   MapResult map;
-  const Training training = TrainingOf(loaded);
-  map.config = ConfigOf(a, loaded, training);
-  map.changes = ChangesOf(map.config, training);
-  map.dot = DotOf(map.config, training, !map.changes.empty());
+  const DesignConditions design = DesignOf(loaded);
+  map.config = ConfigOf(a, loaded, design);
+  map.changes = ChangesOf(map.config, design);
+  map.dot = DotOf(map.config, design, !map.changes.empty());
   map.policy = loaded.name;
   map.physics = a.physics;
   map.model = InfoOfModel(loaded.mjcf, "");
@@ -168,17 +161,17 @@ fs::path MapFolder(const MapArguments& a, const LoadedPolicy& loaded, const MapR
 }
 
 void FillMap(const MapArguments& a, const LoadedPolicy& loaded, ThreadPool& pool,
-             const MapProgress& progress, MapResult& map) {
+             const Progress& progress, MapResult& map) {
   std::vector<int64_t> all(static_cast<size_t>(map.config.cells()));
   std::iota(all.begin(), all.end(), int64_t{0});
   const auto begin = Clock::now();
-  map.cells = RunCells(map.config, *loaded.policy, all, pool, progress);
+  map.cells = RunMap(map.config, *loaded.policy, all, pool, progress);
   map.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
   if (map.config.engine == &kMuJoCo) return;
   map.checked = DrawCells(map.config, a.check);
   MapConfig mujoco = map.config;
   mujoco.engine = &kMuJoCo;
-  map.in_mujoco = RunCells(mujoco, *loaded.policy, map.checked, pool, progress);
+  map.in_mujoco = RunMap(mujoco, *loaded.policy, map.checked, pool, progress);
 }
 
 }  // namespace upswing

@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -32,11 +31,8 @@ MapResult PlanMap(const MapArguments& a, const LoadedPolicy& loaded);
 std::filesystem::path MapFolder(const MapArguments& a, const LoadedPolicy& loaded,
                                 const MapResult& map);
 
-/// Told the share (0 to 1) that is done of so many episodes, from any thread.
-using MapProgress = std::function<void(double episodes, double share)>;
-
-/// Runs all cells, and in MuJoCo the share that is to be checked there.
+/// Runs all cells, and in MuJoCo the share that is to be checked there. `progress` counts episodes.
 void FillMap(const MapArguments& a, const LoadedPolicy& loaded, ThreadPool& pool,
-             const MapProgress& progress, MapResult& map);
+             const Progress& progress, MapResult& map);
 
 }  // namespace upswing

@@ -225,11 +225,12 @@ MapPoint MapConfig::PointOf(int64_t cell) const {
 
 std::vector<MapCell> RunMap(const MapConfig& config, const Policy& policy,
                             std::span<const int64_t> cells, ThreadPool& pool,
-                            const std::function<void(double)>& progress) {
+                            const Progress& progress) {
   const std::vector<EpisodeRange> ranges = RangesOf(cells, config.episodes);
   std::vector<std::vector<EpisodeResult>> results(ranges.size());
   std::mutex mutex;
-  size_t done = 0;
+  double done = 0;
+  const double total = static_cast<double>(cells.size()) * config.episodes;
   std::atomic<bool> failed = false;  // then the other ranges are not run
   pool.ParallelFor(static_cast<int>(ranges.size()), [&](int range) {
     if (failed) return;
@@ -237,8 +238,8 @@ std::vector<MapCell> RunMap(const MapConfig& config, const Policy& policy,
     try {
       results[i] = RunRange(config, policy, ranges[i]);
       const std::lock_guard lock(mutex);
-      ++done;
-      if (progress) progress(static_cast<double>(done) / static_cast<double>(ranges.size()));
+      done += ranges[i].count;
+      if (progress) progress(done, total);
     } catch (...) {
       failed = true;
       throw;

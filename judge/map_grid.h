@@ -1,13 +1,13 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "core/policy.h"
+#include "core/progress.h"
 #include "core/thread_pool.h"
 #include "sim/pendulum_env.h"
 
@@ -68,11 +68,10 @@ struct MapCell {
 };
 
 /// Results of the listed cells, in the order of the list. The pool shares the work, which changes
-/// no bit; a cell does not depend on which others there are. `progress` (may be empty) is called
-/// with the share done (0 to 1), from any thread, one call at a time.
+/// no bit; a cell does not depend on which others there are. `progress` counts episodes.
 std::vector<MapCell> RunMap(const MapConfig& config, const Policy& policy,
                             std::span<const int64_t> cells, ThreadPool& pool,
-                            const std::function<void(double)>& progress);
+                            const Progress& progress);
 
 /// `share` of the cells (at least one if it is not 0), drawn by the seed, in rising order.
 std::vector<int64_t> DrawCells(const MapConfig& config, double share);

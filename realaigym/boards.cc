@@ -206,7 +206,7 @@ BoardEntry BoardReport::Entry() const {
 }
 
 BoardReport ScoreOnBoard(const Competitor& competitor, uint64_t seed, ThreadPool& pool,
-                         const std::function<void(double)>& progress) {
+                         const Progress& progress) {
   const auto begin = std::chrono::steady_clock::now();
   BoardReport report{competitor, {}, {}, {}, 0};
   const std::array<BoardEpisode, 1> nominal;
@@ -222,7 +222,7 @@ BoardReport ScoreOnBoard(const Competitor& competitor, uint64_t seed, ThreadPool
       competitor.robot, episodes, competitor.make, &pool, nullptr, [&](size_t count) {
         const std::lock_guard lock(mutex);
         done += count;
-        progress(static_cast<double>(done) / static_cast<double>(episodes.size()));
+        if (progress) progress(static_cast<double>(done), static_cast<double>(episodes.size()));
       });
   report.robustness = JudgeRobustness(cases, outcomes);
   report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

@@ -1,11 +1,11 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "core/progress.h"
 #include "realaigym/search.h"
 #include "run/find_policy.h"
 #include "setup/loaded_policy.h"
@@ -59,9 +59,9 @@ struct BoardReport {
   BoardEntry Entry() const;
 };
 
-/// Makes all simulations. `progress` is told the share that is done, from any thread.
+/// Makes all simulations. `progress` counts them.
 BoardReport ScoreOnBoard(const Competitor& competitor, uint64_t seed, ThreadPool& pool,
-                         const std::function<void(double)>& progress);
+                         const Progress& progress);
 
 std::string BoardJson(const BoardReport& report);
 /// The nominal motion in the boards' own format.

@@ -237,8 +237,7 @@ Evaluation Summarize(std::span<const EvaluationEpisode> episodes, const Evaluati
 }
 
 std::vector<EvaluationEpisode> EvaluateEpisodes(const Policy& policy, VectorEnv& env,
-                                                ThreadPool* pool,
-                                                const std::function<void(double)>& progress) {
+                                                ThreadPool* pool, const Progress& progress) {
   const EnvSpec& spec = env.spec();
   const int n = spec.num_envs;
   SharedActing act(policy, n, pool);
@@ -258,7 +257,7 @@ std::vector<EvaluationEpisode> EvaluateEpisodes(const Policy& policy, VectorEnv&
       env.Step(action, result);
     });
     for (int i = 0; i < n; ++i) tallies[static_cast<size_t>(i)].Add(result, static_cast<size_t>(i));
-    if (progress) progress(static_cast<double>(k) / static_cast<double>(steps));
+    if (progress) progress(n * static_cast<double>(k) / static_cast<double>(steps), n);
     if (std::ranges::all_of(tallies, &EpisodeTally::ended)) break;
   }
 
@@ -269,7 +268,7 @@ std::vector<EvaluationEpisode> EvaluateEpisodes(const Policy& policy, VectorEnv&
 }
 
 Evaluation Evaluate(const Policy& policy, VectorEnv& env, ThreadPool* pool,
-                    const std::function<void(double)>& progress) {
+                    const Progress& progress) {
   return Summarize(EvaluateEpisodes(policy, env, pool, progress), env.spec().evaluation);
 }
 

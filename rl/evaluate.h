@@ -1,6 +1,5 @@
 #pragma once
 
-#include <functional>
 #include <numbers>
 #include <optional>
 #include <span>
@@ -8,6 +7,7 @@
 
 #include "core/env.h"
 #include "core/policy.h"
+#include "core/progress.h"
 #include "core/sample.h"
 #include "core/thread_pool.h"
 
@@ -70,17 +70,16 @@ ValueUnits ValueUnitsOf(const Policy& policy);
 
 /// Lets `policy` control every environment from its present state for as long as the task's rule
 /// says, and returns one result for each. Episodes must not time out earlier. The pool shares the
-/// forward passes, which changes no bit. `progress` (may be empty) is called with the share done, 0
-/// to 1.
+/// forward passes, which changes no bit. `progress` counts episodes.
 std::vector<EvaluationEpisode> EvaluateEpisodes(const Policy& policy, VectorEnv& env,
                                                 ThreadPool* pool = nullptr,
-                                                const std::function<void(double)>& progress = {});
+                                                const Progress& progress = {});
 
 /// Summarises episodes of a task with this rule.
 Evaluation Summarize(std::span<const EvaluationEpisode> episodes, const EvaluationRule& rule);
 
 /// EvaluateEpisodes, then Summarize.
 Evaluation Evaluate(const Policy& policy, VectorEnv& env, ThreadPool* pool = nullptr,
-                    const std::function<void(double)>& progress = {});
+                    const Progress& progress = {});
 
 }  // namespace upswing

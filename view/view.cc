@@ -178,7 +178,7 @@ double UsualFps(const std::string& path) {
 }
 
 int64_t Record(View& view, const RecordConfig& config, const std::function<bool()>& stopped,
-               const std::function<void(int64_t, int64_t)>& progress) {
+               const Progress& progress) {
   // Frame i shows the time i · speed / fps; a picture alone, the end.
   const bool alone = RecordingKindOf(config.flag, config.path) == RecordingKind::kPng;
   const double step = alone ? config.seconds : config.speed / config.fps;  // s
@@ -196,7 +196,7 @@ int64_t Record(View& view, const RecordConfig& config, const std::function<bool(
     }
     writer->Write(offscreen.Render(view.At(steps)));
     if (stopped()) return 0;
-    progress(i + 1, frames);
+    if (progress) progress(static_cast<double>(i + 1), static_cast<double>(frames));
   }
   writer->Finish();
   return frames;

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/progress.h"
 #include "judge/rollout.h"
 #include "mujoco/offscreen.h"
 #include "mujoco/painter.h"
@@ -125,9 +126,9 @@ struct RecordConfig {
 /// What a film's frames a second are if nobody says.
 double UsualFps(const std::string& path);
 
-/// Records; `stopped` is asked after each frame and ends it without a file. `progress` is told how
-/// many frames of how many are done. Returns the number of frames; 0 if it was stopped.
+/// Records; `stopped` is asked after each frame and ends it without a file. `progress` counts
+/// frames. Returns the number of frames; 0 if it was stopped.
 int64_t Record(View& view, const RecordConfig& config, const std::function<bool()>& stopped,
-               const std::function<void(int64_t, int64_t)>& progress);
+               const Progress& progress);
 
 }  // namespace upswing

@@ -4,6 +4,8 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <functional>
+
 #include "core/error.h"
 #include "core/text.h"
 #include "io/file.h"
@@ -24,17 +26,18 @@ void SetArguments(const Options& options, const SettingTexts& arguments) {
   for (const auto& [name, text] : arguments) options.Set(name, text, name);
 }
 
-/// Tells a Python function, or nobody if it is None, the share that is done; Ctrl-C ends the work.
-class Told {
+/// A Progress that calls a Python function, unless it is None, with the share that is done. Ctrl-C
+/// ends the work.
+class PythonProgress {
  public:
-  explicit Told(nb::object function) : function_(std::move(function)) {}
+  explicit PythonProgress(nb::object function) : function_(std::move(function)) {}
 
-  /// Calls come from any thread, one at a time; Python hears of those in the caller's.
-  void operator()(double share) {
+  /// Python is called in the caller's thread only.
+  void operator()(double done, double total) {
     if (!interrupts_.due()) return;
     const nb::gil_scoped_acquire lock;
     CheckSignals();
-    if (!function_.is_none()) function_(share);
+    if (!function_.is_none()) function_(done / total);
   }
 
  private:
@@ -63,11 +66,10 @@ std::pair<std::string, std::string> EvaluateHandle(const PolicyHandle& policy,
   SetSurroundings(FlagsOf(settings), trial);
   trial.model = model;
   trial.unknown_plant = unknown_plant;
-  Told told(progress);
+  PythonProgress told(progress);
   const nb::gil_scoped_release unlocked;
   ThreadPool pool(ResolveThreads(threads), threads == 0);
-  const EvalReport report =
-      EvaluatePolicy(policy.loaded(), trial, episodes, pool, [&](double share) { told(share); });
+  const EvalReport report = EvaluatePolicy(policy.loaded(), trial, episodes, pool, std::ref(told));
   return {EvalJson(report), EpisodesCsv(report)};
 }
 
@@ -96,7 +98,7 @@ nb::tuple MapHandle(const PolicyHandle& policy, const SettingTexts& settings,
   for (const FlagValue& flag : FlagsOf(settings)) a.set.push_back(flag.name + "=" + flag.text);
   a.unknown_plant = unknown_plant;
   a.out = out;
-  Told told(progress);
+  PythonProgress told(progress);
   MapResult map;
   std::string json;
   {
@@ -105,8 +107,7 @@ nb::tuple MapHandle(const PolicyHandle& policy, const SettingTexts& settings,
     const std::filesystem::path folder =
         out.empty() ? std::filesystem::path() : MapFolder(a, policy.loaded(), map);
     ThreadPool pool(ResolveThreads(threads), threads == 0);
-    FillMap(
-        a, policy.loaded(), pool, [&](double /*episodes*/, double share) { told(share); }, map);
+    FillMap(a, policy.loaded(), pool, std::ref(told), map);
     if (!out.empty()) {
       MakeNewFolder(folder);
       WriteMap(map, folder);
