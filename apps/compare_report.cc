@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "apps/eval_table.h"
 #include "core/format.h"
@@ -42,8 +43,7 @@ std::string PairsText(const Estimate& e) {
   return Concat("with probability ", EstimateText(e, Share), e.interval ? agreement : "");
 }
 
-void PrintScores(const char* name, const Scores& s, Formatter format,
-                 const std::string& unit = "") {
+void PrintScores(const char* name, const Scores& s, Formatter format, const std::string& unit) {
   if (s.low == s.high) {
     fmt::print("  {:<16}{}{}{}\n", name, format(s.low), unit,
                s.values.size() > 1 ? " in every run" : "");
@@ -68,15 +68,17 @@ void PrintStability(const GroupSummary& summary) {
       Percent(s.lowest));
 }
 
-/// How strong and how smooth the best policies' torques are, as far as that is known.
-void PrintTorques(const GroupSummary& s, const RunRecord& run) {
-  const auto print = [&](const char* name, const Scores& scores, const std::string& unit) {
-    if (std::isfinite(scores.low)) PrintScores(name, scores, Torque, unit);
-  };
-  print("rms torque", s.rms_torque, Concat(" ", run.action_unit));
-  print("its variation", s.torque_variation, Concat(" ", run.action_unit, "/s"));
-  if (run.rule.by_return()) return;
-  print("  once upright", s.upright_variation, Concat(" ", run.action_unit, "/s"));
+/// A figure over the runs of a group, if one of them has it.
+void PrintFigure(const RunFigure& figure, const Scores& scores, const std::string& torque_unit) {
+  if (!std::isfinite(scores.low)) return;
+  using enum RunFigure::Kind;
+  static const std::map<RunFigure::Kind, Formatter> kFormats{
+      {kSeconds, Seconds}, {kSteps, Steps},   {kReturn, Whole},
+      {kShare, Percent},   {kTorque, Torque}, {kTorqueRate, Torque}};
+  std::string unit;
+  if (figure.kind == kTorque) unit = " " + torque_unit;
+  if (figure.kind == kTorqueRate) unit = Concat(" ", torque_unit, "/s");
+  PrintScores(figure.label, scores, kFormats.at(figure.kind), unit);
 }
 
 void PrintGroup(const RunGroup& group, const GroupSummary& s, const std::string& differences,
@@ -89,15 +91,12 @@ void PrintGroup(const RunGroup& group, const GroupSummary& s, const std::string&
   fmt::print("  {:<16}{} ({})\n", "seeds", group.runs.size(), SeedsText(seeds));
   fmt::print("  {:<16}{} of {} (95% {} to {})\n", "solved", s.solved, group.runs.size(),
              Percent(s.solved_interval.low), Percent(s.solved_interval.high));
-  if (s.solved > 0) {
-    PrintScores("time to solve", s.solve_seconds, Seconds);
-    PrintScores("steps to solve", s.solve_steps, Steps);
+  const RunRecord& run = group.runs.front();
+  for (const RunFigure& figure : RunFigures()) {
+    const bool upright = figure.scores == &GroupSummary::upright_variation;
+    if (upright && run.rule.by_return()) continue;
+    PrintFigure(figure, s.*figure.scores, run.action_unit);
   }
-  PrintScores("final return", s.final_return, Whole);
-  PrintScores("final success", s.final_success, Percent);
-  PrintScores("best return", s.best_return, Whole);
-  PrintScores("best success", s.best_success, Percent);
-  PrintTorques(s, group.runs.front());
   PrintStability(s);
   fmt::print("\n");
 }
@@ -174,7 +173,7 @@ ordered_json GroupJson(const RunGroup& group, const GroupSummary& s) {
   }
   j["solved"] = s.solved;
   j["solved_interval_95"] = {s.solved_interval.low, s.solved_interval.high};
-  for (const auto& [name, scores] : NamedScores()) j[name] = ScoresJson(s.*scores);
+  for (const RunFigure& figure : RunFigures()) j[figure.name] = ScoresJson(s.*figure.scores);
   j["once_solved"] = {
       {"seeds", s.stability.runs},
       {"steady_seeds", s.stability.steady_runs},
@@ -189,17 +188,15 @@ ordered_json GroupJson(const RunGroup& group, const GroupSummary& s) {
 
 void PrintComparison(const Comparison& comparison) {
   const GroupedRuns& runs = comparison.runs;
+  const auto task_text = [&](int task) {
+    return NumTasks(comparison) > 1 ? fmt::format("{} ({})", task + 1, runs.task_texts[task]) : "";
+  };
   for (size_t i = 0; i < runs.groups.size(); ++i) {
-    const auto task = static_cast<size_t>(runs.tasks[i]);
-    const bool several = NumTasks(comparison) > 1;
     PrintGroup(runs.groups[i], comparison.summaries[i], runs.differences[i],
-               several ? fmt::format("{} ({})", task + 1, runs.task_texts[task]) : "");
+               task_text(runs.tasks[i]));
   }
   for (const JudgedPolicy& policy : comparison.policies) {
-    const auto task = static_cast<size_t>(policy.task);
-    PrintPolicy(policy, NumTasks(comparison) > 1
-                            ? fmt::format("{} ({})", task + 1, runs.task_texts[task])
-                            : "");
+    PrintPolicy(policy, task_text(policy.task));
   }
   for (const PairSummary& pair : comparison.pairs) PrintPair(comparison, pair);
   for (const AgainstPolicy& against : comparison.against) PrintAgainst(comparison, against);

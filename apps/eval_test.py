@@ -38,10 +38,10 @@ class EvalTest(ProgramTest):
         result = self.evaluate()
         self.assertEqual(list(result), [
             "policy", "seed", "physics", "task", "plant", "model", "unknown_plant", "disturbance",
-            "randomize", "episodes", "successes", "success_rate", "success_interval_95", "swing_up_seconds",
-            "settled", "settling_seconds", "steady_tilt_degrees", "return", "reward_terms", "value",
-            "discounted_return", "energy_used", "peak_torque", "rms_torque", "torque_variation",
-            "torque_variation_upright", "torque_changes_upright"])
+            "randomize", "episodes", "successes", "success_rate", "success_interval_95", "settled",
+            "steady_tilt_degrees", "reward_terms", "return", "swing_up_seconds", "settling_seconds",
+            "energy_used", "peak_torque", "rms_torque", "torque_variation",
+            "torque_variation_upright", "torque_changes_upright", "value", "discounted_return"])
         self.assertEqual(result["plant"], PLANT | {"gravity": 0.05, "damping1": 1, "damping2": 1})
         self.assertEqual(result["policy"], str(self.policy / "policy.safetensors"))
         self.assertEqual(list(result["reward_terms"]), REWARD_TERMS)

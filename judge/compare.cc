@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 
 #include "core/text.h"
 #include "io/file.h"
@@ -32,8 +31,8 @@ std::string ScoreCells(const Scores& s) {
 
 std::string SummaryCsv(const Comparison& comparison) {
   std::string csv = "group,seeds,solved,solved_low,solved_high";
-  for (const auto& [name, scores] : NamedScores()) {
-    csv += fmt::format(",{0}_median,{0}_iqm,{0}_low,{0}_high", name);
+  for (const RunFigure& figure : RunFigures()) {
+    csv += fmt::format(",{0}_median,{0}_iqm,{0}_low,{0}_high", figure.name);
   }
   csv += ",evaluations_after_solved,of_them_steady,lowest_success_after_solved,task\n";
   for (size_t i = 0; i < comparison.summaries.size(); ++i) {
@@ -41,7 +40,7 @@ std::string SummaryCsv(const Comparison& comparison) {
     const RunGroup& group = comparison.runs.groups[i];
     csv += Concat(Cell(group.label), ',', group.runs.size(), ',', s.solved, ',',
                   FormatNumber(s.solved_interval.low), ',', FormatNumber(s.solved_interval.high));
-    for (const auto& [name, scores] : NamedScores()) csv += ScoreCells(s.*scores);
+    for (const RunFigure& figure : RunFigures()) csv += ScoreCells(s.*figure.scores);
     csv += Concat(',', s.stability.evaluations, ',', s.stability.steady_evaluations, ',',
                   s.stability.evaluations > 0 ? FormatNumber(s.stability.lowest) : "", ',',
                   comparison.runs.tasks[i] + 1, '\n');
@@ -51,7 +50,7 @@ std::string SummaryCsv(const Comparison& comparison) {
 
 std::string RunsCsv(const Comparison& comparison) {
   std::string csv = "group,run,seed,steps,seconds";
-  for (const auto& [name, scores] : NamedScores()) csv += Concat(',', name);
+  for (const RunFigure& figure : RunFigures()) csv += Concat(',', figure.name);
   csv += ",host,processor,vectors\n";
   for (size_t i = 0; i < comparison.summaries.size(); ++i) {
     const RunGroup& group = comparison.runs.groups[i];
@@ -59,8 +58,8 @@ std::string RunsCsv(const Comparison& comparison) {
       const RunRecord& run = group.runs[k];
       csv += Concat(Cell(group.label), ',', Cell(run.path.string()), ',', run.seed, ',',
                     run.evaluations.back().step, ',', FormatNumber(run.evaluations.back().seconds));
-      for (const auto& [name, scores] : NamedScores()) {
-        csv += Concat(',', FormatNumber((comparison.summaries[i].*scores).values[k]));
+      for (const RunFigure& figure : RunFigures()) {
+        csv += Concat(',', FormatNumber((comparison.summaries[i].*figure.scores).values[k]));
       }
       // Several of a run that was resumed elsewhere.
       for (const auto* names :
@@ -98,21 +97,6 @@ size_t NumTasks(const Comparison& comparison) {
 }
 
 std::string CurvesName(size_t task) { return task == 0 ? "curves" : Concat("curves-", task + 1); }
-
-std::span<const std::pair<const char*, Scores GroupSummary::*>> NamedScores() {
-  static constexpr std::array<std::pair<const char*, Scores GroupSummary::*>, 9> kScores{{
-      {"solve_seconds", &GroupSummary::solve_seconds},
-      {"solve_steps", &GroupSummary::solve_steps},
-      {"final_return", &GroupSummary::final_return},
-      {"final_success", &GroupSummary::final_success},
-      {"best_return", &GroupSummary::best_return},
-      {"best_success", &GroupSummary::best_success},
-      {"best_rms_torque", &GroupSummary::rms_torque},
-      {"best_torque_variation", &GroupSummary::torque_variation},
-      {"best_torque_variation_upright", &GroupSummary::upright_variation},
-  }};
-  return kScores;
-}
 
 Comparison Compare(const CompareRequest& request) {
   Comparison comparison;

@@ -1,12 +1,9 @@
 #pragma once
 
 #include <filesystem>
-#include <span>
 #include <string>
-#include <utility>
 #include <vector>
 
-#include "judge/compare_groups.h"
 #include "judge/compare_policies.h"
 #include "report/comparison.h"
 
@@ -26,9 +23,6 @@ size_t NumTasks(const Comparison& comparison);
 
 /// The name of the files with a task's learning curves, without ending: `curves`, `curves-2`, …
 std::string CurvesName(size_t task);
-
-/// The figures of a group that are scores over its runs, under the names that files give them.
-std::span<const std::pair<const char*, Scores GroupSummary::*>> NamedScores();
 
 /// Compares runs; see GroupRuns. Throws BadInput.
 Comparison Compare(const CompareRequest& request);

@@ -1,5 +1,3 @@
-#include "judge/compare_groups.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,6 +8,7 @@
 #include "core/error.h"
 #include "core/format.h"
 #include "core/text.h"
+#include "judge/compare_runs.h"
 #include "run/model_info.h"
 #include "setup/config.h"
 

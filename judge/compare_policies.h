@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "core/thread_pool.h"
-#include "judge/compare_groups.h"
+#include "judge/compare_runs.h"
 #include "report/comparison.h"
 #include "rl/evaluate.h"
 #include "setup/loaded_policy.h"

@@ -16,21 +16,25 @@ using nlohmann::ordered_json;
 
 constexpr double kDegrees = 180 / std::numbers::pi;
 
-ordered_json MomentsJson(const Moments& m, double scale = 1) {
+ordered_json FigureJson(double value) { return value; }
+ordered_json FigureJson(const Moments& m, double scale = 1) {
   return {{"mean", scale * m.mean}, {"deviation", scale * m.deviation}};
 }
-
-/// null if there is no such episode.
-ordered_json QuartilesJson(const Quartiles& q, int64_t episodes) {
-  if (episodes == 0) return nullptr;
+ordered_json FigureJson(const Quartiles& q) {
   return {{"median", q.median}, {"quartiles", {q.low, q.high}}};
+}
+
+/// Whether a figure says something.
+bool IsKnown(const EvaluationFigure& figure, bool upright, bool settled, bool valued) {
+  using enum EvaluationFigure::Known;
+  return figure.known == kAlways || (figure.known == kUpright && upright) ||
+         (figure.known == kSettled && settled) || (figure.known == kValued && valued);
 }
 
 /// Name and text of each figure of an episode, in the order of the columns.
 std::vector<std::pair<std::string, std::string>> Cells(const EvalReport& report,
                                                        const JudgedEpisode& episode) {
   const EnvSpec& spec = report.spec;
-  const EvaluationRule& rule = spec.evaluation;
   const EvaluationEpisode& e = episode.result;
   std::vector<std::pair<std::string, std::string>> cells;
   const auto add = [&](const std::string& name, double value, bool known = true) {
@@ -45,23 +49,16 @@ std::vector<std::pair<std::string, std::string>> Cells(const EvalReport& report,
     add("delay", episode.disturbance.delay);
   }
   add("success", e.success ? 1 : 0);
-  const bool held = !rule.by_return();  // the goal is to be held
-  const bool upright = held && e.swing_up_seconds.has_value();
-  add("swing_up_seconds", e.swing_up_seconds.value_or(0), upright);
-  add("settling_seconds", e.settling_seconds.value_or(0), held && e.settling_seconds.has_value());
   for (size_t body = 0; body < e.tilt.size(); ++body) {
     add(Concat("tilt", body + 1, "_degrees"), e.tilt[body] * kDegrees);
   }
-  add("return", e.reward_sum);
   for (size_t k = 0; k < e.terms.size(); ++k) add(spec.term_names[k], e.terms[k] + 0.0);
-  add("value", e.value, report.knows_values);
-  add("discounted_return", e.discounted_return, report.knows_values);
-  add("energy_used", e.work);
-  add("peak_torque", e.peak_torque);
-  add("rms_torque", e.rms_torque);
-  add("torque_variation", e.torque_variation);
-  add("torque_variation_upright", e.goal_variation, upright);
-  add("torque_changes_upright", e.goal_changes, upright);
+  const bool held = !spec.evaluation.by_return();  // the goal is to be held
+  const bool upright = held && e.swing_up_seconds, settled = held && e.settling_seconds;
+  for (const EvaluationFigure& figure : EvaluationFigures()) {
+    add(figure.name, figure.Of(e).value_or(0),
+        IsKnown(figure, upright, settled, report.knows_values));
+  }
   return cells;
 }
 
@@ -113,31 +110,26 @@ void JudgeEpisodes(const Policy& policy, const Remade* remade, const EnvConfig& 
 }  // namespace
 
 void AddFigures(const Evaluation& e, const EnvSpec& spec, bool knows_values, ordered_json& j) {
-  const bool any = !spec.evaluation.by_return() && e.successes > 0;
+  const bool upright = !spec.evaluation.by_return() && e.successes > 0;
+  const bool settled = upright && e.settled > 0;
   j["episodes"] = e.episodes;
   j["successes"] = e.successes;
   j["success_rate"] = e.success_rate();
   j["success_interval_95"] = {e.success_interval.low, e.success_interval.high};
-  j["swing_up_seconds"] = QuartilesJson(e.swing_up_seconds, any ? e.successes : 0);
-  j["settled"] = any ? e.settled : 0;
-  j["settling_seconds"] = QuartilesJson(e.settling_seconds, any ? e.settled : 0);
+  j["settled"] = upright ? e.settled : 0;
   j["steady_tilt_degrees"] = nullptr;
-  if (any && e.tilt.size() == 2) {
-    j["steady_tilt_degrees"] = {{"link1", MomentsJson(e.tilt[0], kDegrees)},
-                                {"link2", MomentsJson(e.tilt[1], kDegrees)}};
+  if (upright && e.tilt.size() == 2) {
+    j["steady_tilt_degrees"] = {{"link1", FigureJson(e.tilt[0], kDegrees)},
+                                {"link2", FigureJson(e.tilt[1], kDegrees)}};
   }
-  j["return"] = MomentsJson(e.reward_sum);
   for (size_t k = 0; k < e.term_means.size(); ++k) {
     j["reward_terms"][spec.term_names[k]] = e.term_means[k];
   }
-  j["value"] = knows_values ? ordered_json(e.value) : nullptr;
-  j["discounted_return"] = knows_values ? ordered_json(e.discounted_return) : nullptr;
-  j["energy_used"] = MomentsJson(e.work);
-  j["peak_torque"] = e.peak_torque;
-  j["rms_torque"] = MomentsJson(e.rms_torque);
-  j["torque_variation"] = MomentsJson(e.torque_variation);
-  j["torque_variation_upright"] = any ? MomentsJson(e.goal_variation) : nullptr;
-  j["torque_changes_upright"] = any ? MomentsJson(e.goal_changes) : nullptr;
+  for (const EvaluationFigure& figure : EvaluationFigures()) {
+    ordered_json& value = j[figure.name] = nullptr;
+    if (!IsKnown(figure, upright, settled, knows_values)) continue;
+    value = std::visit([&](auto member) { return FigureJson(e.*member); }, figure.summary);
+  }
 }
 
 EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& trial, int64_t episodes,

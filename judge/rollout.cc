@@ -119,47 +119,25 @@ Rollout RunRollout(const RolloutConfig& config) {
   return rollout;
 }
 
-TorqueFigures TorquesOf(const Rollout& rollout) {
+std::string TorqueText(const Rollout& rollout) {
   const bool pendulum = HasPlant(rollout.spec.task);
   const std::vector<RolloutRow>& rows = rollout.rows;
   // The torque of the double pendulum's last state leads nowhere.
   const size_t steps = rows.size() - (pendulum && rows.size() > 1 ? 1 : 0);
-  TorqueFigures figures;
-  double squares = 0, sum = 0, goal_sum = 0;
-  int64_t goal_since = -1;  // first state of the present stretch at the goal; -1: there is none
+  TorqueTally tally(1, rollout.spec.step_seconds);
   for (size_t k = 0; k < steps; ++k) {
-    const double torque = rows[k].torque;
-    const double change = k == 0 ? 0 : std::abs(torque - rows[k - 1].torque);
-    figures.peak = std::max(figures.peak, std::abs(torque));
-    squares += torque * torque;
-    sum += change;
-    goal_sum += change;
-    const bool at_goal = rows[std::min(pendulum ? k + 1 : k, rows.size() - 1)].at_goal;
-    if (!at_goal) goal_since = -1;
-    if (!at_goal || goal_since >= 0) continue;
-    goal_since = static_cast<int64_t>(k) + 1;
-    goal_sum = 0;
+    const size_t after = std::min(pendulum ? k + 1 : k, rows.size() - 1);
+    tally.Add({&rows[k].torque, 1}, rows[after].at_goal);
   }
-  const auto seconds = [&](int64_t n) {
-    return static_cast<double>(n) * rollout.spec.step_seconds;
-  };
-  const auto count = static_cast<int64_t>(steps);
-  figures.rms = std::sqrt(squares / static_cast<double>(count));
-  figures.variation = sum / seconds(count);
-  const bool held = !rollout.spec.evaluation.by_return();
-  if (held && goal_since >= 0 && goal_since < count) {
-    figures.goal_variation = goal_sum / seconds(count - goal_since);
-  }
-  return figures;
-}
-
-std::string TorqueText(const Rollout& rollout) {
-  const TorqueFigures f = TorquesOf(rollout);
+  const bool upright = !rollout.spec.evaluation.by_return() && tally.has_goal_steps();
+  EvaluationEpisode e;
+  tally.Finish(upright, e);
   const std::string& unit = rollout.spec.action_unit;
-  std::string text = fmt::format("peak {:.4g} {}, rms {:.4g} {}, variation {:.4g} {}/s", f.peak,
-                                 unit, f.rms, unit, f.variation, unit);
-  if (f.goal_variation) text += fmt::format(", once upright {:.4g} {}/s", *f.goal_variation, unit);
-  return text;
+  const std::string text =
+      fmt::format("peak {:.4g} {}, rms {:.4g} {}, variation {:.4g} {}/s", e.peak_torque, unit,
+                  e.rms_torque, unit, e.torque_variation, unit);
+  if (!upright) return text;
+  return text + fmt::format(", once upright {:.4g} {}/s", e.goal_variation, unit);
 }
 
 std::string RolloutCsv(const Rollout& rollout) {

@@ -88,16 +88,8 @@ int64_t RolloutSteps(const EnvSpec& spec, double seconds);
 /// Throws Failure if the state blows up.
 Rollout RunRollout(const RolloutConfig& config);
 
-/// The motor's torques over a rollout, as `eval` has them of an episode.
-struct TorqueFigures {
-  double peak = 0, rms = 0;  // N·m or the task's unit of actions
-  double variation = 0;      // Σ |τₖ - τₖ₋₁| a second
-  // The same over the last stretch at the goal, if it lasts to the end; of tasks whose goal is
-  // held.
-  std::optional<double> goal_variation;
-};
-TorqueFigures TorquesOf(const Rollout& rollout);
-/// The same in words: `peak 5 N·m, rms 1.2 N·m, variation 34 N·m/s, once upright 2 N·m/s`.
+/// The motor's torques over a rollout, as `eval` has them of an episode:
+/// `peak 5 N·m, rms 1.2 N·m, variation 34 N·m/s, once upright 2 N·m/s`.
 std::string TorqueText(const Rollout& rollout);
 
 /// A table with a row for each state: t, state, torque, for the double pendulum energy, height and

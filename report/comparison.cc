@@ -2,29 +2,27 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
-#include <limits>
+#include <utility>
 
 namespace upswing {
 namespace {
 
-/// A figure of each run, summarised.
-Scores ScoresOf(const RunGroup& group, const std::function<double(const RunRecord&)>& figure) {
-  Scores scores;
-  for (const RunRecord& run : group.runs) scores.values.push_back(figure(run));
-  const auto [low, high] = std::ranges::minmax(scores.values);
-  scores.low = low;
-  scores.high = high;
-  scores.median = QuartilesOf(scores.values).median;
-  scores.iqm = EstimateIqm({scores.values});
-  return scores;
+Scores ScoresOf(std::vector<double> values) {
+  const auto [low, high] = std::ranges::minmax(values);
+  const double median = QuartilesOf(values).median;
+  const Estimate iqm = EstimateIqm({values});
+  return {std::move(values), low, median, high, iqm};
 }
 
-/// A figure of the evaluation that solved the run. A run that is not solved would have needed an
-/// unknown amount more than its budget: infinity.
-double WhenSolved(const RunRecord& run, const std::function<double(const EvaluationRow&)>& figure) {
+/// The evaluation that solved the run. A run that is not solved would have needed an unknown amount
+/// more than its budget: infinity.
+double SolveSeconds(const RunRecord& run) {
   const auto at = SolvedAt(run);
-  return at ? figure(run.evaluations[*at]) : std::numeric_limits<double>::infinity();
+  return at ? run.evaluations[*at].seconds : EvaluationRow::kUnknown;
+}
+double SolveSteps(const RunRecord& run) {
+  const auto at = SolvedAt(run);
+  return at ? static_cast<double>(run.evaluations[*at].step) : EvaluationRow::kUnknown;
 }
 
 /// The evaluation whose policy the run kept.
@@ -65,27 +63,41 @@ bool AllFinite(const std::vector<double>& values) {
 
 }  // namespace
 
+std::span<const RunFigure> RunFigures() {
+  using R = const RunRecord&;
+  using S = GroupSummary;
+  using enum RunFigure::Kind;
+  static constexpr RunFigure kFigures[] = {
+      {"solve_seconds", "time to solve", kSeconds, &S::solve_seconds, SolveSeconds},
+      {"solve_steps", "steps to solve", kSteps, &S::solve_steps, SolveSteps},
+      {"final_return", "final return", kReturn, &S::final_return,
+       [](R run) { return run.evaluations.back().mean_return; }},
+      {"final_success", "final success", kShare, &S::final_success,
+       [](R run) { return run.evaluations.back().success_rate; }},
+      {"best_return", "best return", kReturn, &S::best_return,
+       [](R run) { return Best(run).mean_return; }},
+      {"best_success", "best success", kShare, &S::best_success,
+       [](R run) { return Best(run).success_rate; }},
+      {"best_rms_torque", "rms torque", kTorque, &S::rms_torque,
+       [](R run) { return Best(run).rms_torque; }},
+      {"best_torque_variation", "its variation", kTorqueRate, &S::torque_variation,
+       [](R run) { return Best(run).torque_variation; }},
+      {"best_torque_variation_upright", "  once upright", kTorqueRate, &S::upright_variation,
+       [](R run) { return Best(run).upright_variation; }},
+  };
+  return kFigures;
+}
+
 GroupSummary Summarize(const RunGroup& group) {
-  const auto seconds = [](const EvaluationRow& row) { return row.seconds; };
-  const auto steps = [](const EvaluationRow& row) { return static_cast<double>(row.step); };
   GroupSummary s;
   s.solved =
       std::ranges::count_if(group.runs, [](const RunRecord& run) { return bool(SolvedAt(run)); });
-  s.solved_interval = WilsonInterval(s.solved, static_cast<int64_t>(group.runs.size()));
-  s.solve_seconds = ScoresOf(group, [&](const RunRecord& run) { return WhenSolved(run, seconds); });
-  s.solve_steps = ScoresOf(group, [&](const RunRecord& run) { return WhenSolved(run, steps); });
-  s.final_return =
-      ScoresOf(group, [](const RunRecord& r) { return r.evaluations.back().mean_return; });
-  s.final_success =
-      ScoresOf(group, [](const RunRecord& r) { return r.evaluations.back().success_rate; });
-  s.best_return = ScoresOf(group, [](const RunRecord& run) { return Best(run).mean_return; });
-  s.best_success = ScoresOf(group, [](const RunRecord& run) { return Best(run).success_rate; });
-  const auto of_best = [&](double EvaluationRow::*figure) {
-    return ScoresOf(group, [&](const RunRecord& run) { return Best(run).*figure; });
-  };
-  s.rms_torque = of_best(&EvaluationRow::rms_torque);
-  s.torque_variation = of_best(&EvaluationRow::torque_variation);
-  s.upright_variation = of_best(&EvaluationRow::upright_variation);
+  s.solved_interval = WilsonInterval(s.solved, std::ssize(group.runs));
+  for (const RunFigure& figure : RunFigures()) {
+    std::vector<double> values;
+    for (const RunRecord& run : group.runs) values.push_back(figure.of(run));
+    s.*figure.scores = ScoresOf(std::move(values));
+  }
   s.stability = StabilityOf(group);
   return s;
 }

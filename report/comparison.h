@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -45,6 +46,17 @@ struct GroupSummary {
   Stability stability;
 };
 GroupSummary Summarize(const RunGroup& group);
+
+/// A figure of a run, which GroupSummary has over the runs of a group.
+struct RunFigure {
+  enum class Kind { kSeconds, kSteps, kReturn, kShare, kTorque, kTorqueRate };
+
+  const char *name, *label;  // in files; for people
+  Kind kind;
+  Scores GroupSummary::*scores;
+  double (*of)(const RunRecord&);  // infinite where it is not reached or not known
+};
+std::span<const RunFigure> RunFigures();
 
 /// Comparison of two groups: differences are a - b.
 struct PairSummary {

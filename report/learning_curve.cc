@@ -13,8 +13,7 @@ constexpr int64_t kCurveResamples = 2000;  // at each point
 constexpr double kIntervals = 200;         // of a grid
 
 /// y of one run at `x`.
-double At(const RunRecord& run, const EvaluationFigure& x_of, const EvaluationFigure& y_of,
-          double x) {
+double At(const RunRecord& run, const CurveAxis& x_of, const CurveAxis& y_of, double x) {
   const auto& rows = run.evaluations;
   const auto after = std::ranges::lower_bound(rows, x, {}, x_of);
   if (after == rows.end()) return y_of(rows.back());
@@ -30,7 +29,7 @@ double SuccessPercent(const EvaluationRow& row) { return 100 * row.success_rate;
 double Return(const EvaluationRow& row) { return row.mean_return; }
 
 /// Where the longest run ends.
-double LastOf(const std::vector<RunGroup>& groups, const EvaluationFigure& x) {
+double LastOf(const std::vector<RunGroup>& groups, const CurveAxis& x) {
   double last = 0;
   for (const RunGroup& group : groups) {
     for (const RunRecord& run : group.runs) last = std::max(last, x(run.evaluations.back()));
@@ -39,7 +38,7 @@ double LastOf(const std::vector<RunGroup>& groups, const EvaluationFigure& x) {
 }
 
 /// Where the first run of the group ends.
-double FirstEnd(const RunGroup& group, const EvaluationFigure& x) {
+double FirstEnd(const RunGroup& group, const CurveAxis& x) {
   double first = x(group.runs.front().evaluations.back());
   for (const RunRecord& run : group.runs) first = std::min(first, x(run.evaluations.back()));
   return first;
@@ -56,7 +55,7 @@ std::vector<std::vector<RunGroup>> Parts(const std::vector<RunGroup>& groups) {
 /// One quantity over another.
 struct Axes {
   const char *x_label, *y_label;
-  EvaluationFigure x, y;
+  CurveAxis x, y;
 };
 
 Panel CurvesPanel(const std::vector<RunGroup>& groups, const Axes& axes, double end, bool legend) {
@@ -93,7 +92,7 @@ std::pair<double, double> RangeFromZero(const std::vector<const Panel*>& panels)
 
 }  // namespace
 
-Line LearningCurve(const RunGroup& group, const EvaluationFigure& x, const EvaluationFigure& y,
+Line LearningCurve(const RunGroup& group, const CurveAxis& x, const CurveAxis& y,
                    const std::vector<double>& grid) {
   Line line;
   line.name = group.label;
@@ -111,7 +110,7 @@ Line LearningCurve(const RunGroup& group, const EvaluationFigure& x, const Evalu
   return line;
 }
 
-std::vector<double> CurveGrid(const RunGroup& group, const EvaluationFigure& x, double end) {
+std::vector<double> CurveGrid(const RunGroup& group, const CurveAxis& x, double end) {
   double begin = 0;
   for (const RunRecord& run : group.runs) begin = std::max(begin, x(run.evaluations.front()));
   if (begin >= end) return {begin};

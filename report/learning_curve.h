@@ -10,16 +10,16 @@
 namespace upswing {
 
 /// A number of an evaluation, for an axis of a figure.
-using EvaluationFigure = std::function<double(const EvaluationRow&)>;
+using CurveAxis = std::function<double(const EvaluationRow&)>;
 
 /// The interquartile mean of `y` over the runs at each x of the grid, as a curve with its pointwise
 /// 95% interval as a band (none for a single run). Between two evaluations of a run y is
 /// interpolated; after the last one it keeps its value.
-Line LearningCurve(const RunGroup& group, const EvaluationFigure& x, const EvaluationFigure& y,
+Line LearningCurve(const RunGroup& group, const CurveAxis& x, const CurveAxis& y,
                    const std::vector<double>& grid);
 
 /// Equally spaced x from the first at which every run of the group has been evaluated to `end`.
-std::vector<double> CurveGrid(const RunGroup& group, const EvaluationFigure& x, double end);
+std::vector<double> CurveGrid(const RunGroup& group, const CurveAxis& x, double end);
 
 inline constexpr size_t kMostCurves = 5;  // in one panel
 

@@ -28,7 +28,7 @@ class EpisodeTally {
         gamma_(ValueUnitsOf(policy).gamma),
         discount_(gamma_ > 0 ? 1 : 0),
         lean_(static_cast<size_t>(spec.bodies)),
-        last_torque_(spec.action_limit.size()) {
+        torques_(spec.action_limit.size(), seconds_) {
     episode_.terms.resize(spec.term_names.size());
     episode_.tilt.resize(lean_.size());
   }
@@ -43,8 +43,8 @@ class EpisodeTally {
     const bool settled =
         std::ranges::all_of(lean_, [](double x) { return std::abs(x) < kSettledTilt; });
     if (!settled) settled_since_ = -1;
-    if (settled && settled_since_ < 0) settled_since_ = step_;
-    if (step_ < steps_ - tilt_steps_) return;
+    if (settled && settled_since_ < 0) settled_since_ = torques_.steps();
+    if (torques_.steps() < steps_ - tilt_steps_) return;
     for (size_t b = 0; b < lean_.size(); ++b) {
       episode_.tilt[b] += lean_[b] / static_cast<double>(tilt_steps_);
     }
@@ -53,21 +53,15 @@ class EpisodeTally {
   /// Adds environment `i` of the next step's result.
   void Add(const StepResult& result, size_t i) {
     if (ended_) return;
-    ++step_;
     episode_.work += result.work[i];
-    const size_t A = last_torque_.size();
-    AddTorque(std::span(result.torque).subspan(i * A, A));
+    const size_t A = result.torque.size() / result.work.size();
+    torques_.Add(std::span(result.torque).subspan(i * A, A), result.at_goal[i] != 0);
     episode_.discounted_return += discount_ * result.reward[i];
     discount_ *= gamma_;
     const size_t terms = episode_.terms.size();
-    if (step_ <= return_steps_) {
+    if (torques_.steps() <= return_steps_) {
       episode_.reward_sum += result.reward[i];
       for (size_t j = 0; j < terms; ++j) episode_.terms[j] += result.reward_terms[i * terms + j];
-    }
-    if (!result.at_goal[i]) goal_since_ = -1;
-    if (result.at_goal[i] && goal_since_ < 0) {
-      goal_since_ = step_;
-      goal_variation_ = goal_changes_ = 0;
     }
     ended_ = result.terminated[i];
   }
@@ -75,52 +69,29 @@ class EpisodeTally {
   /// The results; call once, at the end.
   EvaluationEpisode Finish() {
     // Where the goal ends an episode, it is reached; else an end is a numerical blow-up.
-    const bool at_goal = goal_since_ >= 0 && (!ended_ || rule_.by_return());
+    const int64_t goal_since = torques_.goal_since();
+    const bool at_goal = goal_since >= 0 && (!ended_ || rule_.by_return());
     const bool settled = settled_since_ >= 0 && at_goal;
     const auto seconds = [&](int64_t steps) { return static_cast<double>(steps) * seconds_; };
     EvaluationEpisode& e = episode_;
-    e.seconds = seconds(step_);
-    if (at_goal) e.swing_up_seconds = seconds(goal_since_);
+    e.seconds = seconds(torques_.steps());
+    if (at_goal) e.swing_up_seconds = seconds(goal_since);
     if (settled) e.settling_seconds = seconds(settled_since_);
     e.success = rule_.by_return() ? e.reward_sum >= rule_.solved_return
-                                  : at_goal && goal_since_ <= steps_ - hold_steps_;
-    e.rms_torque = std::sqrt(squares_ / static_cast<double>(step_));
-    e.torque_variation = variation_ / seconds(step_);
-    if (at_goal && goal_since_ < step_) {
-      e.goal_variation = goal_variation_ / seconds(step_ - goal_since_);
-      e.goal_changes = static_cast<double>(goal_changes_) / seconds(step_ - goal_since_);
-    }
+                                  : at_goal && goal_since <= steps_ - hold_steps_;
+    torques_.Finish(at_goal, e);
     return std::move(e);
   }
 
  private:
-  /// Adds the torques (A) of a step, N·m.
-  void AddTorque(std::span<const double> torque) {
-    double change = 0;
-    for (size_t a = 0; a < torque.size(); ++a) {
-      episode_.peak_torque = std::max(episode_.peak_torque, std::abs(torque[a]));
-      squares_ += torque[a] * torque[a];
-      if (step_ > 1) change += std::abs(torque[a] - last_torque_[a]);
-      last_torque_[a] = torque[a];
-    }
-    variation_ += change;
-    goal_variation_ += change;
-    goal_changes_ += change > 0 ? 1 : 0;
-  }
-
   EvaluationRule rule_;
   double seconds_;  // of a step
   int64_t steps_, return_steps_, hold_steps_, tilt_steps_;
   double gamma_, discount_;   // γ, γᵏ
   std::vector<double> lean_;  // (bodies) rad, now
-  int64_t step_ = 0;          // steps so far
-  int64_t goal_since_ = -1;   // first state of the present stretch at the goal
+  TorqueTally torques_;
   int64_t settled_since_ = -1;
-  bool ended_ = false;               // terminated: further steps belong to another episode
-  std::vector<double> last_torque_;  // (A)
-  double squares_ = 0, variation_ = 0;
-  double goal_variation_ = 0;  // in the present stretch at the goal
-  int64_t goal_changes_ = 0;
+  bool ended_ = false;  // terminated: further steps belong to another episode
   EvaluationEpisode episode_;
 };
 
@@ -137,24 +108,20 @@ void EstimateValues(const Policy& policy, const VectorEnv& env, std::span<Episod
   }
 }
 
-/// One figure of each episode.
-std::vector<double> Figures(const std::vector<const EvaluationEpisode*>& episodes,
-                            double EvaluationEpisode::*figure) {
+/// A figure of those episodes that have it.
+std::vector<double> ValuesOf(const EvaluationFigure& figure,
+                             const std::vector<const EvaluationEpisode*>& episodes) {
   std::vector<double> values;
   values.reserve(episodes.size());
-  for (const EvaluationEpisode* episode : episodes) values.push_back(episode->*figure);
-  return values;
-}
-
-/// The same of those episodes that have it.
-std::vector<double> Figures(const std::vector<const EvaluationEpisode*>& episodes,
-                            std::optional<double> EvaluationEpisode::*figure) {
-  std::vector<double> values;
   for (const EvaluationEpisode* episode : episodes) {
-    if (const std::optional<double>& value = episode->*figure) values.push_back(*value);
+    if (const std::optional<double> value = figure.Of(*episode)) values.push_back(*value);
   }
   return values;
 }
+
+double MiddleOf(double value) { return value; }
+double MiddleOf(const Moments& moments) { return moments.mean; }
+double MiddleOf(const Quartiles& quartiles) { return quartiles.median; }
 
 /// Acts for all environments, in slices that a pool can share.
 class SharedActing {
@@ -189,6 +156,66 @@ class SharedActing {
 
 }  // namespace
 
+double EvaluationFigure::Of(const Evaluation& evaluation) const {
+  return std::visit([&](auto member) { return MiddleOf(evaluation.*member); }, summary);
+}
+
+std::optional<double> EvaluationFigure::Of(const EvaluationEpisode& episode) const {
+  return std::visit([&](auto member) { return std::optional<double>(episode.*member); }, result);
+}
+
+std::span<const EvaluationFigure> EvaluationFigures() {
+  using E = Evaluation;
+  using One = EvaluationEpisode;
+  using enum EvaluationFigure::Known;
+  static constexpr EvaluationFigure kFigures[] = {
+      {"return", "mean_return", kAlways, &E::reward_sum, &One::reward_sum},
+      {"swing_up_seconds", "swing_up_seconds", kUpright, &E::swing_up_seconds,
+       &One::swing_up_seconds},
+      {"settling_seconds", nullptr, kSettled, &E::settling_seconds, &One::settling_seconds},
+      {"energy_used", "work", kAlways, &E::work, &One::work},
+      {"peak_torque", nullptr, kAlways, &E::peak_torque, &One::peak_torque},
+      {"rms_torque", "rms_torque", kAlways, &E::rms_torque, &One::rms_torque},
+      {"torque_variation", "torque_variation", kAlways, &E::torque_variation,
+       &One::torque_variation},
+      {"torque_variation_upright", "torque_variation_upright", kUpright, &E::goal_variation,
+       &One::goal_variation},
+      {"torque_changes_upright", nullptr, kUpright, &E::goal_changes, &One::goal_changes},
+      {"value", "value", kValued, &E::value, &One::value},
+      {"discounted_return", "discounted_return", kValued, &E::discounted_return,
+       &One::discounted_return},
+  };
+  return kFigures;
+}
+
+void TorqueTally::Add(std::span<const double> torque, bool at_goal) {
+  ++steps_;
+  double change = 0;
+  for (size_t a = 0; a < torque.size(); ++a) {
+    peak_ = std::max(peak_, std::abs(torque[a]));
+    squares_ += torque[a] * torque[a];
+    if (steps_ > 1) change += std::abs(torque[a] - last_[a]);
+    last_[a] = torque[a];
+  }
+  variation_ += change;
+  goal_variation_ += change;
+  goal_changes_ += change > 0 ? 1 : 0;
+  if (!at_goal) goal_since_ = -1;
+  if (!at_goal || goal_since_ >= 0) return;
+  goal_since_ = steps_;
+  goal_variation_ = goal_changes_ = 0;
+}
+
+void TorqueTally::Finish(bool at_goal, EvaluationEpisode& episode) const {
+  const auto seconds = [&](int64_t steps) { return static_cast<double>(steps) * seconds_; };
+  episode.peak_torque = peak_;
+  episode.rms_torque = std::sqrt(squares_ / static_cast<double>(steps_));
+  episode.torque_variation = variation_ / seconds(steps_);
+  if (!at_goal || !has_goal_steps()) return;
+  episode.goal_variation = goal_variation_ / seconds(steps_ - goal_since_);
+  episode.goal_changes = static_cast<double>(goal_changes_) / seconds(steps_ - goal_since_);
+}
+
 ValueUnits ValueUnitsOf(const Policy& policy) {
   const PolicyInfo& info = policy.info();
   if (!info.gamma || !info.reward_scale) return {};
@@ -205,17 +232,21 @@ Evaluation Summarize(std::span<const EvaluationEpisode> episodes, const Evaluati
   e.episodes = static_cast<int64_t>(all.size());
   e.successes = static_cast<int64_t>(successful.size());
   e.success_interval = WilsonInterval(e.successes, e.episodes);
-  e.swing_up_seconds = QuartilesOf(Figures(successful, &EvaluationEpisode::swing_up_seconds));
-  std::vector<double> settling = Figures(successful, &EvaluationEpisode::settling_seconds);
-  e.settled = static_cast<int64_t>(settling.size());
-  e.settling_seconds = QuartilesOf(std::move(settling));
-  e.seconds = MomentsOf(Figures(all, &EvaluationEpisode::seconds));
-  e.reward_sum = MomentsOf(Figures(all, &EvaluationEpisode::reward_sum));
-  e.work = MomentsOf(Figures(all, &EvaluationEpisode::work));
-  e.rms_torque = MomentsOf(Figures(all, &EvaluationEpisode::rms_torque));
-  e.torque_variation = MomentsOf(Figures(all, &EvaluationEpisode::torque_variation));
-  e.goal_variation = MomentsOf(Figures(successful, &EvaluationEpisode::goal_variation));
-  e.goal_changes = MomentsOf(Figures(successful, &EvaluationEpisode::goal_changes));
+  e.settled = std::ranges::count_if(
+      successful, [](const EvaluationEpisode* one) { return one->settling_seconds.has_value(); });
+  for (const EvaluationFigure& figure : EvaluationFigures()) {
+    using enum EvaluationFigure::Known;
+    const bool upright = figure.known == kUpright || figure.known == kSettled;
+    const std::vector<double> values = ValuesOf(figure, upright ? successful : all);
+    if (const auto* moments = std::get_if<Moments Evaluation::*>(&figure.summary)) {
+      e.** moments = MomentsOf(values);
+    } else if (const auto* times = std::get_if<Quartiles Evaluation::*>(&figure.summary)) {
+      e.** times = QuartilesOf(values);
+    }
+  }
+  std::vector<double> seconds;
+  for (const EvaluationEpisode* episode : all) seconds.push_back(episode->seconds);
+  e.seconds = MomentsOf(seconds);
   for (size_t body = 0; !successful.empty() && body < episodes.front().tilt.size(); ++body) {
     std::vector<double> tilts;
     tilts.reserve(successful.size());

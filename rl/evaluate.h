@@ -3,6 +3,7 @@
 #include <numbers>
 #include <optional>
 #include <span>
+#include <variant>
 #include <vector>
 
 #include "core/env.h"
@@ -59,6 +60,53 @@ struct Evaluation {
   }
   /// Whether it is passed, by the rule of the task.
   bool passed = false;
+};
+
+/// A figure of episodes and evaluations: its names in files, and where it is.
+struct EvaluationFigure {
+  /// Always; of episodes upright at the end, and of those settled then, in tasks whose goal is
+  /// held; of policies that estimate values.
+  enum class Known { kAlways, kUpright, kSettled, kValued };
+
+  const char* name;    // in JSON and in the table of episodes
+  const char* column;  // of its mean or median in evals.csv; null: not there
+  Known known;
+  std::variant<double Evaluation::*, Moments Evaluation::*, Quartiles Evaluation::*> summary;
+  std::variant<double EvaluationEpisode::*, std::optional<double> EvaluationEpisode::*> result;
+
+  /// Its value, mean or median.
+  double Of(const Evaluation& evaluation) const;
+  std::optional<double> Of(const EvaluationEpisode& episode) const;
+};
+
+/// All of them, in the order of the columns of evals.csv.
+std::span<const EvaluationFigure> EvaluationFigures();
+
+/// Accumulates the torques of an episode, step by step.
+class TorqueTally {
+ public:
+  /// Of `size` motors.
+  TorqueTally(size_t size, double step_seconds) : seconds_(step_seconds), last_(size) {}
+
+  /// Adds the torques (A) of a step, and whether it leads to the goal.
+  void Add(std::span<const double> torque, bool at_goal);
+
+  int64_t steps() const { return steps_; }
+  /// First state of the present stretch at the goal; -1: it is not there.
+  int64_t goal_since() const { return goal_since_; }
+  /// Whether that stretch has a step.
+  bool has_goal_steps() const { return goal_since_ >= 0 && goal_since_ < steps_; }
+
+  /// Sets the figures of the torques; those of the stretch only `at_goal`.
+  void Finish(bool at_goal, EvaluationEpisode& episode) const;
+
+ private:
+  double seconds_;            // of a step
+  std::vector<double> last_;  // (A)
+  int64_t steps_ = 0, goal_since_ = -1;
+  double peak_ = 0, squares_ = 0, variation_ = 0;
+  double goal_variation_ = 0;  // in the present stretch at the goal
+  int64_t goal_changes_ = 0;
 };
 
 /// What values estimate: the sum of γᵏ · reward_scale · r, by the policy's metadata.

@@ -22,20 +22,16 @@ Row MetricsRow(const TrainState& s, const Metrics& metrics) {
   return row;
 }
 
-Row EvaluationRow(const TrainState& s, const Evaluation& e) {
-  return {{"step", s.steps},
+Row EvaluationCells(const TrainState& s, const Evaluation& e) {
+  Row row{{"step", s.steps},
           {"success_rate", e.success_rate()},
           {"success_low", e.success_interval.low},
-          {"success_high", e.success_interval.high},
-          {"mean_return", e.reward_sum.mean},
-          {"swing_up_seconds", e.swing_up_seconds.median},
-          {"work", e.work.mean},
-          {"rms_torque", e.rms_torque.mean},
-          {"torque_variation", e.torque_variation.mean},
-          {"torque_variation_upright", e.goal_variation.mean},
-          {"value", e.value},
-          {"discounted_return", e.discounted_return},
-          {"seconds", s.seconds}};
+          {"success_high", e.success_interval.high}};
+  for (const EvaluationFigure& figure : EvaluationFigures()) {
+    if (figure.column != nullptr) row.emplace_back(figure.column, figure.Of(e));
+  }
+  row.emplace_back("seconds", s.seconds);
+  return row;
 }
 
 }  // namespace upswing

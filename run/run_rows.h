@@ -13,6 +13,6 @@ Row EpisodeRow(const TrainState& s, const FinishedEpisode& episode, const EnvSpe
 Row MetricsRow(const TrainState& s, const Metrics& metrics);
 
 /// Of evals.csv: an evaluation.
-Row EvaluationRow(const TrainState& s, const Evaluation& e);
+Row EvaluationCells(const TrainState& s, const Evaluation& e);
 
 }  // namespace upswing

@@ -52,7 +52,8 @@ bool StepsGiven(const std::vector<FlagValue>& flags) {
 }
 
 TrainingRun::TrainingRun(fs::path path, const Config& config)
-    : path_(std::move(path)), training_(config, ThisHost(ResolveThreads(config.train.threads)), {this}) {}
+    : path_(std::move(path)),
+      training_(config, ThisHost(ResolveThreads(config.train.threads)), {this}) {}
 
 std::unique_ptr<TrainingRun> TrainingRun::Make(const fs::path& out, Config config) {
   NameModelCopy(config);
@@ -150,7 +151,7 @@ void TrainingRun::OnMetrics(const TrainState& s, const Metrics& metrics) {
 }
 
 void TrainingRun::OnEvaluation(const TrainState& s, const Evaluation& e) {
-  folder_->LogEvaluation(EvaluationRow(s, e));
+  folder_->LogEvaluation(EvaluationCells(s, e));
   folder_->Log(Concat("step ", s.steps, ": ", e.successes, " of ", e.episodes,
                       " episodes succeed, mean return ", FormatNumber(e.reward_sum.mean)));
   view_->OnEvaluation(s, e);

@@ -68,7 +68,7 @@ class PythonDriver final : public TrainingRun::Driver {
     events_.emplace_back("metrics", MetricsRow(s, metrics));
   }
   void OnEvaluation(const TrainState& s, const Evaluation& e) override {
-    events_.emplace_back("evaluation", EvaluationRow(s, e));
+    events_.emplace_back("evaluation", EvaluationCells(s, e));
   }
   void OnBest(const TrainState& s, const Policy& policy) override {
     best_ = CopyOf(policy, "the best policy of this training");
