@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <memory>
-#include <optional>
 
 #include "apps/commands.h"
 #include "apps/progress.h"
@@ -23,6 +22,7 @@ namespace upswing {
 namespace {
 
 constexpr size_t kMostPolicies = 16;
+constexpr double kForEver = 1e7;  // s, until the window closes or the recording ends
 
 struct ViewArguments {
   std::vector<std::string> names;
@@ -53,12 +53,13 @@ std::vector<LoadedPolicy> PoliciesOf(const ViewArguments& a) {
 }
 
 /// What is shown, in its order; `policies` must outlive it.
-std::vector<ViewEntry> EntriesOf(const ViewArguments& a,
-                                 const std::vector<LoadedPolicy>& policies) {
-  std::vector<ViewEntry> entries;
+std::vector<RolloutConfig> EntriesOf(const ViewArguments& a,
+                                     const std::vector<LoadedPolicy>& policies) {
+  std::vector<RolloutConfig> entries;
   const auto add = [&](const LoadedPolicy* loaded, const std::string& title) {
-    ViewEntry entry;
+    RolloutConfig entry;
     entry.title = title;
+    entry.seconds = kForEver;
     if (loaded != nullptr) entry.policy = loaded->policy.get();
     entry.env = TrialEnvironments(a.trial, loaded);
     entry.start = ChooseEpisode(a.episode, entry.env);
@@ -73,7 +74,7 @@ std::vector<ViewEntry> EntriesOf(const ViewArguments& a,
 #ifdef UPSWING_VIEWER
 /// The plants to switch to: the one that was asked for, those of the policies' trainings, and the
 /// usual one; each once.
-std::vector<std::pair<std::string, Plant>> PlantsOf(const std::vector<ViewEntry>& entries,
+std::vector<std::pair<std::string, Plant>> PlantsOf(const std::vector<RolloutConfig>& entries,
                                                     const std::vector<LoadedPolicy>& policies) {
   std::vector<std::pair<std::string, Plant>> plants;
   const auto add = [&](const std::string& name, const Plant& plant) {
@@ -91,24 +92,13 @@ std::vector<std::pair<std::string, Plant>> PlantsOf(const std::vector<ViewEntry>
 }
 #endif
 
-/// Writes the table of `simulate`, up to `seconds`.
-void WriteCsv(const std::string& path, ViewEpisode& episode, double seconds) {
-  const int64_t steps = RolloutSteps(episode.rollout().spec, seconds);
-  while (episode.steps() <= steps) episode.Step();
-  Rollout rollout = episode.rollout();
-  rollout.rows.resize(static_cast<size_t>(steps) + 1);
-  WriteOutput(path, RolloutCsv(rollout));
-}
-
 /// Without a window.
-int RunHeadless(const ViewArguments& a, View& view, double seconds) {
+int RunHeadless(const ViewArguments& a, const std::vector<RolloutConfig>& entries, PictureSize size,
+                double seconds) {
   InstallSignalHandlers("");
   if (!a.record.empty()) {
-    RecordConfig config{a.record,
-                        seconds,
-                        a.fps < 0 ? UsualFps(a.record) : a.fps,
-                        a.speed,
-                        {static_cast<int>(a.width), static_cast<int>(a.height)}};
+    View view(entries, a.look, size);
+    const RecordConfig config{a.record, seconds, a.fps, a.speed, size};
     ProgressLine progress;
     const bool quiet = IsStandardStream(a.csv);
     const int64_t frames = Record(
@@ -124,7 +114,10 @@ int RunHeadless(const ViewArguments& a, View& view, double seconds) {
                  frames == 1 ? "picture" : "pictures", a.width, a.height);
     }
   }
-  if (!a.csv.empty()) WriteCsv(a.csv, view.episodes().front(), seconds);
+  if (a.csv.empty()) return 0;
+  RolloutConfig episode = entries.front();
+  episode.seconds = seconds;
+  WriteOutput(a.csv, RolloutCsv(RunRollout(episode)));
   return 0;
 }
 
@@ -142,13 +135,10 @@ int RunView(const ViewArguments& a) {
   }
   if (!a.csv.empty()) CheckWritable("--csv", a.csv);
   const std::vector<LoadedPolicy> policies = PoliciesOf(a);
-  const std::vector<ViewEntry> entries = EntriesOf(a, policies);
+  const std::vector<RolloutConfig> entries = EntriesOf(a, policies);
   const PictureSize size{static_cast<int>(a.width), static_cast<int>(a.height)};
   const double usual = a.episode.given() ? kEvaluationSeconds : 10;
-  if (headless) {
-    View view(entries, a.look, size);
-    return RunHeadless(a, view, a.seconds < 0 ? usual : a.seconds);
-  }
+  if (headless) return RunHeadless(a, entries, size, a.seconds < 0 ? usual : a.seconds);
 #ifdef UPSWING_VIEWER
   InstallSignalHandlers("");
   const WindowConfig config{entries,

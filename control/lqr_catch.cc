@@ -100,8 +100,8 @@ bool LqrCatch::Holds(const StateVector& deviation, PendulumModel& model) const {
   StateVector x = FromUpright(deviation);
   for (int step = 0; step < steps_; ++step) {
     const StateVector d = UprightDeviation(x);
-    const double lean2 = UprightDeviation({x[0] + x[1], 0, 0, 0})[0];
-    if (std::abs(d[0]) > kLargestLean || std::abs(lean2) > kLargestLean) return false;
+    const auto [lean1, lean2] = Lean(StateOf(x));
+    if (std::abs(lean1) > kLargestLean || std::abs(lean2) > kLargestLean) return false;
     if (lqr_.Cost(d) <= region_) return true;
     const double u = lqr_.Torque(d, limit_);
     model.Step({&x, 1}, {&u, 1});

@@ -117,7 +117,7 @@ bool TrajectoryOptimizer::Backward(const TrajectoryCost& cost, const Trajectory&
     const double Qu = l.u + B.dot(Vx);
     const Eigen::Matrix4d VA = Vxx * A;
     const Eigen::Matrix4d Qxx = l.xx + A.transpose() * VA;
-    const Eigen::RowVector4d Qux = l.ux.transpose() + B.transpose() * VA;
+    const Eigen::RowVector4d Qux = B.transpose() * VA;
     const double Quu = l.uu + B.dot(Vxx * B);
     // As if to change the torque, and the state that it leads to, cost a little more.
     const double curvature = Quu + regularization * (1 + B.squaredNorm());

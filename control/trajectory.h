@@ -25,8 +25,7 @@ struct Trajectory {
 struct CostExpansion {
   StateVector x = StateVector::Zero();           // first derivatives
   double u = 0;                                  //
-  Eigen::Matrix4d xx = Eigen::Matrix4d::Zero();  // second derivatives; the whole may not curve down
-  Eigen::Vector4d ux = Eigen::Vector4d::Zero();  //
+  Eigen::Matrix4d xx = Eigen::Matrix4d::Zero();  // second derivatives; xx may not curve down
   double uu = 0;                                 //
 };
 

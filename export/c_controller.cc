@@ -160,8 +160,19 @@ void AddPlan(const SwingUp& plan, CParts& parts) {
   parts.work += Concat(", and ", 2 * steps, " quadratic forms");
 }
 
-CHeader WriteController(const LoadedPolicy& loaded, const std::string& prefix) {
+}  // namespace
+
+CHeader ControllerHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
   const std::string kind = loaded.policy->kind();
+  for (const auto& [refused, what] :
+       {std::pair{"mpc",
+                  "a controller that optimises a trajectory at each decision; tvlqr follows one "
+                  "that is planned once"},
+        {"hybrid", "two of them; export the policy that swings up, and lqr, each by itself"}}) {
+    if (kind != refused) continue;
+    throw BadInput(Concat(kind, ": expected lqr, energy, pfl, tvlqr or a learned policy to write ",
+                          "as C, got ", what));
+  }
   const ControllerConfig config = ConfigOf(loaded);
   const double limit = config.plant.torque_limit, tolerance = kTorqueShare * limit;
   const bool simulates = kind != "lqr";
@@ -171,13 +182,11 @@ CHeader WriteController(const LoadedPolicy& loaded, const std::string& prefix) {
   // The deviation; for others its copy that is simulated, too, and five arrays of a step.
   header.stack_bytes = 4 * sizeof(float) * (simulates ? 7 : 1);
   CParts parts;
-  parts.file = kind == "lqr" || kind == "tvlqr" ? kind + ".c" : "swing_up.c";
-  parts.goal = simulates ? "swings up and balances a double pendulum with one motor"
-                         : "holds a double pendulum with one motor upright";
+  parts.task = PendulumTask(config.plant.actuated_joint, 0);
+  parts.task.file = kind == "lqr" || kind == "tvlqr" ? kind + ".c" : "swing_up.c";
+  if (!simulates) parts.task.goal = "holds a double pendulum with one motor upright";
   parts.origin =
       Concat("It is ", CommentText(loaded.name), ": ", CommentText(loaded.policy->description()));
-  parts.state = PendulumArguments();
-  parts.motor = config.plant.actuated_joint == 1 ? "at joint 1" : "at joint 2";
   parts.limit = limit;
   parts.period = kControlPeriod;
   parts.plant = "of which it knows all";
@@ -219,24 +228,6 @@ CHeader WriteController(const LoadedPolicy& loaded, const std::string& prefix) {
   parts.macros.emplace_back("TORQUE_TOLERANCE", CLiteral(static_cast<float>(tolerance)));
   WriteHeader(parts, header);
   return header;
-}
-
-}  // namespace
-
-CHeader ControllerHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
-  const std::string kind = loaded.policy->kind();
-  if (kind == "mpc") {
-    throw BadInput(
-        "mpc: expected lqr, energy, pfl, tvlqr or a learned policy to write as C, got a "
-        "controller that optimises a trajectory at each decision; tvlqr follows one "
-        "that is planned once");
-  }
-  if (kind == "hybrid") {
-    throw BadInput(
-        "hybrid: expected lqr, energy, pfl, tvlqr or a learned policy to write as C, got "
-        "two of them; export the policy that swings up, and lqr, each by itself");
-  }
-  return WriteController(loaded, prefix);
 }
 
 }  // namespace upswing

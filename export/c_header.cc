@@ -77,13 +77,13 @@ std::string HeadComment(const CParts& parts, const CHeader& header) {
   const std::string period = FormatNumber(parts.period);
   std::string states;
   std::vector<std::string> names;
-  for (const NamedInput& input : parts.state) {
+  for (const NamedInput& input : parts.task.state) {
     names.push_back(input.name);
     states +=
         Concat(" *   ", input.name, std::string(8 - input.name.size(), ' '), input.meaning, '\n');
   }
   return Concat(
-      "/* A policy that ", parts.goal, ", as one C99 header.\n *\n",
+      "/* A policy that ", parts.task.goal, ", as one C99 header.\n *\n",
       Paragraph(Concat(parts.origin, ". Written by Upswing ", UPSWING_VERSION, '.')),
       "\n *\n *   static ", name, "_state state;\n *   float torque;\n *   if (", name,
       "_selftest() != ", caps, "_OK) stop();\n *   ", name,
@@ -91,7 +91,7 @@ std::string HeadComment(const CParts& parts, const CHeader& header) {
       period, " s\n *     ", name, "_control(&state, ", Join(names, ", "),
       ", &torque);\n *     set_motor(torque);\n *   }\n *\n",
       " * In, in this order; an angle may have made any number of turns:\n", states,
-      " * Out: the torque ", parts.motor, ", N m, within +-", FormatNumber(parts.limit),
+      " * Out: the torque ", parts.task.motor, ", N m, within +-", FormatNumber(parts.limit),
       ", to be held for ", period, R"c( s. A positive one
  * pushes the joint's angle up. Which way round counts as positive does not matter, as long as it is
  * the same for all of these.
@@ -111,13 +111,6 @@ std::string HeadComment(const CParts& parts, const CHeader& header) {
 }
 
 }  // namespace
-
-std::vector<NamedInput> PendulumArguments() {
-  return {{"q1", "rad    angle of link 1, 0 hanging"},
-          {"q2", "rad    angle of link 2 relative to link 1, 0 in line with it"},
-          {"w1", "rad/s  velocity of q1"},
-          {"w2", "rad/s  velocity of q2"}};
-}
 
 void WriteHeader(const CParts& parts, CHeader& header) {
   for (const CArray& array : parts.constants) header.constant_bytes += 4 * array.values.size();
@@ -141,7 +134,7 @@ void WriteHeader(const CParts& parts, CHeader& header) {
   text += "/* Samples: states, one after the other, and what Upswing makes of them. */\n";
   for (const CArray& array : parts.samples) text += ArrayText(array, name);
   // The files' own prefix is "policy".
-  const std::string code = Replaced(Expanded(parts.file), "policy_", name + "_");
+  const std::string code = Replaced(Expanded(parts.task.file), "policy_", name + "_");
   text += Concat('\n', Replaced(code, "POLICY_", caps + "_"), "\n#endif\n");
 }
 

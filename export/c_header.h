@@ -28,14 +28,11 @@ struct CArray {
 
 /// What a header is made of. Names of macros and arrays lack the prefix.
 struct CParts {
-  std::string file;               // of export/c, such as "pendulum.c"
-  std::string goal;               // what the policy does
-  std::string origin;             // where it is from
-  std::vector<NamedInput> state;  // the arguments of its control function
-  std::string motor;              // where the torque acts
-  double limit = 0;               // N m
-  double period = 0;              // s
-  std::string plant;              // what it takes from `made_for`; empty: nothing
+  ExportedTask task;   // whose state are the arguments of the control function
+  std::string origin;  // where the policy is from
+  double limit = 0;    // N m
+  double period = 0;   // s
+  std::string plant;   // what it takes from `made_for`; empty: nothing
   Plant made_for;
   std::string work;  // of a call
   /// Name, value with comment.
@@ -44,9 +41,6 @@ struct CParts {
   std::string layers;             // the definition of the table of layers, if there is one
   std::vector<CArray> samples;    // for the self test
 };
-
-/// Those of the double pendulum.
-std::vector<NamedInput> PendulumArguments();
 
 /// Writes `text`, and counts the constants; `header` has the sizes in RAM and the prefix.
 void WriteHeader(const CParts& parts, CHeader& header);

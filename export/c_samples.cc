@@ -51,20 +51,17 @@ class Observer {
   explicit Observer(const ExportedPolicy& policy) : policy_(policy) {
     EnvConfig config;
     config.task = policy.loaded->task;
-    if (!HasPlant(config.task)) env_ = MakeEnv(config);
+    config.plants = {policy.loaded->plant};
+    env_ = MakeEnv(config);
   }
 
   /// That of a state (S), float numbers.
   std::vector<float> Observe(std::span<const double> s) const {
-    if (env_) {
-      env_->SetState(0, s);
-      const auto row = env_->obs().row(0);
-      return {row.begin(), row.end()};
-    }
-    const auto now = upswing::Observe(policy_.loaded->plant, {s[0], s[1], s[2], s[3]});
+    env_->SetState(0, s);
+    const auto now = env_->obs().row(0);
     std::vector<float> obs(now.begin(), now.end());
     obs.resize(static_cast<size_t>(policy_.obs_size()));
-    const int steps = MemorySteps(policy_.obs_size());
+    const int steps = policy_.loaded->memory();
     if (steps > 0 && !before_.empty()) upswing::Remember(before_, torque_, steps, obs);
     return obs;
   }
@@ -77,7 +74,7 @@ class Observer {
 
  private:
   const ExportedPolicy& policy_;
-  std::unique_ptr<VectorEnv> env_;  // of a task without memory
+  std::unique_ptr<VectorEnv> env_;  // without memory
   std::vector<float> before_;       // (D) the last observation; empty: there is none
   double torque_ = 0;               // chosen there
 };

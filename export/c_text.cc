@@ -44,6 +44,19 @@ std::string UpperCase(std::string text) {
   return text;
 }
 
+std::string Cleaned(std::string_view text, char separator) {
+  std::string cleaned;
+  for (const char c : text) {
+    const bool is_capital = c >= 'A' && c <= 'Z';
+    const char small = is_capital ? static_cast<char>(c - 'A' + 'a') : c;
+    const bool fits = (small >= 'a' && small <= 'z') || (small >= '0' && small <= '9');
+    if (fits) cleaned += small;
+    if (!fits && !cleaned.empty() && cleaned.back() != separator) cleaned += separator;
+  }
+  if (cleaned.ends_with(separator)) cleaned.pop_back();
+  return cleaned;
+}
+
 std::string Wrapped(const std::vector<std::string>& words, const std::string& indent,
                     size_t column) {
   std::string text;

@@ -19,6 +19,9 @@ std::string Replaced(std::string text, std::string_view from, std::string_view t
 
 std::string UpperCase(std::string text);
 
+/// `text` in small letters and digits, with one `separator` in place of anything else between them.
+std::string Cleaned(std::string_view text, char separator);
+
 /// `words` on lines of at most 100 characters, each line after the first behind `indent`; the first
 /// has `column` characters already.
 std::string Wrapped(const std::vector<std::string>& words, const std::string& indent,

@@ -23,19 +23,6 @@ std::vector<std::string> ExportToPage(const std::vector<std::filesystem::path>& 
                                       const std::string& id, int64_t checkpoints,
                                       const std::filesystem::path& folder);
 
-/// A policy as it was on the way to another one, as a file.
-struct Checkpoint {
-  int64_t step = 0;
-  std::vector<std::byte> bytes;
-};
-
-/// Trains a policy that was learned again, with the settings in its file, and returns it as it was
-/// at `count` - 1 steps before: untrained, and at evaluations that lie evenly on the way to it. The
-/// parameters are rounded to bfloat16, so that a file has half the size. Throws BadInput if it is
-/// no Q-network, if there are fewer evaluations, or if the training has another end, as on a
-/// processor with other vector instructions.
-std::vector<Checkpoint> CheckpointsOf(const LoadedPolicy& loaded, int64_t count);
-
 /// A learned policy as a file in ONNX's format: `observation` (batch × D) in; `torque` and, by
 /// kind, `q_values`, `mean` and `log_std`, `probabilities`, `value` out; what they mean as metadata
 /// (docs/export.md). Throws BadInput if it is none that was learned.

@@ -10,8 +10,6 @@
 #include "export/export.h"
 #include "export/exported_policy.h"
 #include "io/streams.h"
-#include "sim/acrobot_v1.h"
-#include "sim/pendulum_v1.h"
 
 namespace upswing {
 namespace {
@@ -56,20 +54,10 @@ std::string CName(std::string name) {
 /// `text` as the beginning of C's names: small letters and digits, a letter first, with a _ in
 /// place of anything else between them.
 std::string AsPrefix(std::string_view text) {
-  std::string prefix;
-  for (const char c : text) {
-    const bool is_capital = c >= 'A' && c <= 'Z';
-    const char small = is_capital ? static_cast<char>(c - 'A' + 'a') : c;
-    const bool is_letter = small >= 'a' && small <= 'z';
-    if (is_letter || (small >= '0' && small <= '9')) {
-      if (prefix.empty() && !is_letter) prefix = "policy_";
-      prefix += small;
-    } else if (!prefix.empty() && prefix.back() != '_') {
-      prefix += '_';
-    }
-  }
+  std::string prefix = Cleaned(text, '_');
+  if (!prefix.empty() && prefix[0] <= '9') prefix = "policy_" + prefix;
   prefix.resize(std::min(prefix.size(), kLongestPrefix));
-  while (prefix.ends_with('_')) prefix.pop_back();
+  if (prefix.ends_with('_')) prefix.pop_back();
   return prefix;
 }
 
@@ -107,36 +95,14 @@ std::vector<float> EnergyConstants(const Plant& plant) {
   return constants;
 }
 
-/// What a header says and does of a task.
-void AddTask(const LoadedPolicy& loaded, CParts& parts) {
-  if (HasPlant(loaded.task)) {
-    // As export/c/pendulum.c has them.
-    static_assert(kMaxVelocity1 == 10 && kMaxVelocity2 == 20);
-    static_assert(kMemoryVelocity == 1 && kMemoryTorque == 5 && kMemorySize == 3);
-    parts.file = "pendulum.c";
-    parts.goal = "swings up and balances a double pendulum with one motor";
-    parts.state = PendulumArguments();
-    parts.motor = loaded.plant.actuated_joint == 1 ? "at joint 1" : "at joint 2";
-    parts.plant = "by which it computes energy and height";
-    parts.made_for = loaded.plant;
-    parts.constants = {
-        {"energy", "of the observed energy and height", EnergyConstants(loaded.plant)}};
-  } else if (loaded.task == kPendulumV1) {
-    parts.file = "pendulum_v1.c";
-    parts.goal = "swings up and balances a pendulum (Gymnasium's Pendulum-v1)";
-    parts.state = {{"theta", "rad    angle, 0 upright"}, {"omega", "rad/s  its velocity"}};
-    parts.motor = "at the joint";
-  } else if (loaded.task == kAcrobotV1) {
-    parts.file = "acrobot_v1.c";
-    parts.goal = "swings the end of a double pendulum up (Gymnasium's Acrobot-v1)";
-    parts.state = {{"theta1", "rad    angle of link 1, 0 hanging"},
-                   {"theta2", "rad    angle of link 2 relative to link 1, 0 in line with it"},
-                   {"omega1", "rad/s  velocity of theta1"},
-                   {"omega2", "rad/s  velocity of theta2"}};
-    parts.motor = "at the joint between the links";
-  } else {
-    throw UnknownObservations(loaded);
-  }
+/// What the double pendulum's header needs of its plant.
+void AddPlant(const Plant& plant, CParts& parts) {
+  // As export/c/pendulum.c has them.
+  static_assert(kMaxVelocity1 == 10 && kMaxVelocity2 == 20);
+  static_assert(kMemoryVelocity == 1 && kMemoryTorque == 5 && kMemorySize == 3);
+  parts.plant = "by which it computes energy and height";
+  parts.made_for = plant;
+  parts.constants = {{"energy", "of the observed energy and height", EnergyConstants(plant)}};
 }
 
 /// The layers' arrays, and the list of the layers.
@@ -176,7 +142,8 @@ CHeader NetworkHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
   CHeader header;
   header.prefix = prefix;
   CParts parts;
-  AddTask(loaded, parts);
+  parts.task = policy.task;
+  if (HasPlant(loaded.task)) AddPlant(loaded.plant, parts);
   if (policy.is_discrete()) {
     parts.constants.push_back(
         {"torques", "N m", {policy.torques().begin(), policy.torques().end()}});
@@ -198,11 +165,11 @@ CHeader NetworkHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
                         "; ", OriginOf(loaded.policy->info()));
   parts.limit = policy.limit;
   parts.period = policy.spec.step_seconds;
-  parts.work = Concat(header.multiply_adds, " multiply-adds, ", loaded.task == kPendulumV1 ? 2 : 4,
+  parts.work = Concat(header.multiply_adds, " multiply-adds, ", parts.task.state.size(),
                       " sines and cosines", tanhs > 0 ? Concat(", ", tanhs, " of tanh") : "", '.');
   std::string observation = "/* of the observation:\n";
   int index = 0;
-  for (const auto& [name, meaning] : policy.observation) {
+  for (const auto& [name, meaning] : policy.task.observation) {
     observation += Concat("     ", index++, ": ", name, ": ", meaning, '\n');
   }
   parts.macros = {{"OBSERVATION_SIZE", Concat(policy.obs_size(), ' ', observation, "*/")},
@@ -213,7 +180,7 @@ CHeader NetworkHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
                   {"RULE", policy.is_discrete() ? "'l' /* the largest output's torque */"
                            : squashed           ? "'s' /* the mean, squashed */"
                                                 : "'c' /* the mean, clipped */"},
-                  {"STATE_SIZE", Concat(parts.state.size())},
+                  {"STATE_SIZE", Concat(parts.task.state.size())},
                   {"SAMPLES", Concat(samples.count)},
                   {"OUTPUT_TOLERANCE", CLiteral(samples.output_tolerance)},
                   {"TORQUE_TOLERANCE", CLiteral(samples.torque_tolerance)}};

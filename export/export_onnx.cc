@@ -136,7 +136,7 @@ void AddMetadata(OnnxModel& model, const ExportedPolicy& policy) {
     if (value) add(key, *value);
   };
   ordered_json observation;
-  for (const auto& [name, meaning] : policy.observation) {
+  for (const auto& [name, meaning] : policy.task.observation) {
     observation.push_back({{"name", name}, {"meaning", meaning}});
   }
   add("task", loaded.task);

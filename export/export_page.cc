@@ -2,21 +2,33 @@
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
+#include "core/safetensors.h"
 #include "core/text.h"
+#include "export/c_text.h"
 #include "export/export.h"
 #include "io/file.h"
+#include "io/machine.h"
 #include "io/run_folder.h"
+#include "nn/network_policy.h"
 #include "report/runs.h"
 #include "run/find_policy.h"
+#include "run/this_host.h"
 #include "run/train_command.h"
 #include "setup/config.h"
 #include "setup/loaded_policy.h"
+#include "setup/training.h"
 
 namespace upswing {
 namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
+
+/// A policy as it was on the way to another one, as a file.
+struct Checkpoint {
+  int64_t step = 0;
+  std::vector<std::byte> bytes;
+};
 
 /// A policy on its way into the page.
 struct PageAgent {
@@ -30,20 +42,6 @@ struct PageAgent {
     return Concat(id, "-at-", checkpoint.step, ".safetensors");
   }
 };
-
-/// `name` in small letters and digits, with a - in place of anything else between them.
-std::string CleanId(std::string_view name) {
-  std::string id;
-  for (const char c : name) {
-    const bool is_capital = c >= 'A' && c <= 'Z';
-    const char small = is_capital ? static_cast<char>(c - 'A' + 'a') : c;
-    const bool fits = (small >= 'a' && small <= 'z') || (small >= '0' && small <= '9');
-    if (fits) id += small;
-    if (!fits && !id.empty() && id.back() != '-') id += '-';
-  }
-  while (id.ends_with('-')) id.pop_back();
-  return id;
-}
 
 /// The run folder that a policy lies in; empty if it lies elsewhere.
 fs::path RunOf(const fs::path& file) {
@@ -89,6 +87,65 @@ ordered_json CurveJson(const std::vector<EvaluationRow>& evaluations) {
   return curve;
 }
 
+/// The policy as it stands, as a small file.
+std::vector<std::byte> SmallFile(const Training& training, const std::string& where) {
+  const std::unique_ptr<Policy> policy = training.policy();
+  const auto* q = dynamic_cast<const NetworkPolicy*>(policy.get());
+  if (q == nullptr || q->is_actor()) {
+    throw BadInput(Concat(where, ": --checkpoints: expected a Q-network, got ", policy->kind()));
+  }
+  Tensors file = q->Rounded().ToTensors();
+  file.Narrow();
+  return WriteSafetensors(file).Joined();
+}
+
+/// Whether two policies compute the same.
+bool SameTensors(const Policy& a, const Policy& b) {
+  const Tensors first = a.ToTensors(), second = b.ToTensors();
+  return std::ranges::equal(first.all(), second.all(), [](const auto& one, const auto& other) {
+    return one.first == other.first && std::ranges::equal(one.second.bytes, other.second.bytes);
+  });
+}
+
+/// Trains a learned policy again, with the settings in its file, and returns it as it was at
+/// `count`
+/// - 1 steps before: untrained, and at evaluations that lie evenly on the way to it. The parameters
+/// are rounded to bfloat16, which halves the file. Throws BadInput if it is no Q-network, if there
+/// are fewer evaluations, or if the training has another end, as on a processor with other vector
+/// instructions.
+std::vector<Checkpoint> CheckpointsOf(const LoadedPolicy& loaded, int64_t count) {
+  const std::string where = loaded.path;
+  const PolicyInfo& info = loaded.policy->info();
+  const int64_t end = info.step.value_or(0);
+  Config config = ConfigIn(info.config, Concat(where, ": metadata \"config\""));
+  config.train.steps = std::max<int64_t>(1, end);
+  Training training(config, ThisHost(ResolveThreads(0)));
+
+  // All of them: how many there will be is known at the end.
+  std::vector<Checkpoint> all{{0, SmallFile(training, where)}};
+  while (training.state().steps < end && training.Step()) {
+    if (training.state().steps < end && training.trainer().IsDue(config.train.eval_every)) {
+      all.push_back({training.state().steps, SmallFile(training, where)});
+    }
+  }
+  if (!SameTensors(*training.policy(), *loaded.policy)) {
+    throw BadInput(Concat(where,
+                          ": --checkpoints: the training with its settings comes to another policy "
+                          "here: expected a file of this version, and of a processor with the same "
+                          "vector instructions"));
+  }
+  const auto most = static_cast<int64_t>(all.size());
+  if (count - 1 > most) {
+    throw BadInput(Concat("--checkpoints: expected at most ", most + 1, ", as many as ", where,
+                          " has evaluations, and the untrained policy, got ", count));
+  }
+  std::vector<Checkpoint> chosen;
+  for (int64_t i = 0; i < count - 1; ++i) {
+    chosen.push_back(std::move(all[static_cast<size_t>(i * most / (count - 1))]));
+  }
+  return chosen;
+}
+
 void AddCheckpoints(PageAgent& agent, const LoadedPolicy& loaded, int64_t count) {
   agent.checkpoints = CheckpointsOf(loaded, count);
   ordered_json& list = agent.entry["checkpoints"];
@@ -122,8 +179,8 @@ PageAgent ReadAgent(const fs::path& path, const std::string& given_id, int64_t c
                           "the page's pendulum does not have"));
   }
   const fs::path run = RunOf(loaded.path);
-  std::string id = CleanId(run.filename().string());
-  if (id.empty()) id = CleanId(loaded.policy->info().agent);
+  std::string id = Cleaned(run.filename().string(), '-');
+  if (id.empty()) id = Cleaned(loaded.policy->info().agent, '-');
   if (!given_id.empty()) id = given_id;
   if (id.empty()) throw BadInput(Concat(where, ": names no agent; expected --id"));
 
@@ -142,7 +199,7 @@ std::vector<PageAgent> ReadAgents(const std::vector<fs::path>& paths, const std:
   if (!id.empty() && paths.size() > 1) {
     throw BadInput(Concat("--id: expected a single policy, got ", paths.size()));
   }
-  if (!id.empty() && CleanId(id) != id) {
+  if (!id.empty() && Cleaned(id, '-') != id) {
     throw BadInput(
         Concat("--id: expected small letters, digits and - between them, got \"", id, "\""));
   }

@@ -47,22 +47,35 @@ std::vector<NamedInput> PendulumInputs(int memory) {
   return inputs;
 }
 
-std::vector<NamedInput> InputsOf(const LoadedPolicy& loaded) {
-  if (HasPlant(loaded.task)) return PendulumInputs(loaded.memory());
-  if (loaded.task == kPendulumV1) {
-    return {{"cos theta", "cosine of the angle, 0 upright"},
-            {"sin theta", "its sine"},
-            {"omega", "velocity of theta, rad/s"}};
+/// Throws BadInput of a task that has no row here.
+ExportedTask TaskOf(const LoadedPolicy& loaded) {
+  for (const ExportedTask& task :
+       {PendulumTask(loaded.plant.actuated_joint, loaded.memory()),
+        ExportedTask{kPendulumV1,
+                     "pendulum_v1.c",
+                     "swings up and balances a pendulum (Gymnasium's Pendulum-v1)",
+                     "at the joint",
+                     {{"theta", "rad    angle, 0 upright"}, {"omega", "rad/s  its velocity"}},
+                     {{"cos theta", "cosine of the angle, 0 upright"},
+                      {"sin theta", "its sine"},
+                      {"omega", "velocity of theta, rad/s"}}},
+        ExportedTask{kAcrobotV1,
+                     "acrobot_v1.c",
+                     "swings the end of a double pendulum up (Gymnasium's Acrobot-v1)",
+                     "at the joint between the links",
+                     {{"theta1", "rad    angle of link 1, 0 hanging"},
+                      {"theta2", "rad    angle of link 2 relative to link 1, 0 in line with it"},
+                      {"omega1", "rad/s  velocity of theta1"},
+                      {"omega2", "rad/s  velocity of theta2"}},
+                     {{"cos theta1", "cosine of the angle of link 1, 0 hanging"},
+                      {"sin theta1", "its sine"},
+                      {"cos theta2", "cosine of the angle of link 2 relative to link 1"},
+                      {"sin theta2", "its sine"},
+                      {"omega1", "velocity of theta1, rad/s"},
+                      {"omega2", "velocity of theta2, rad/s"}}}}) {
+    if (task.name == loaded.task) return task;
   }
-  if (loaded.task == kAcrobotV1) {
-    return {{"cos theta1", "cosine of the angle of link 1, 0 hanging"},
-            {"sin theta1", "its sine"},
-            {"cos theta2", "cosine of the angle of link 2 relative to link 1"},
-            {"sin theta2", "its sine"},
-            {"omega1", "velocity of theta1, rad/s"},
-            {"omega2", "velocity of theta2, rad/s"}};
-  }
-  throw UnknownObservations(loaded);
+  throw BadInput(Concat(loaded.path, ": the task ", loaded.task, " cannot be exported"));
 }
 
 }  // namespace
@@ -73,9 +86,16 @@ double LargestSize(std::span<const double> values) {
   return largest;
 }
 
-Error UnknownObservations(const LoadedPolicy& loaded) {
-  return BadInput(Concat(loaded.path, ": the observations of the task ", loaded.task,
-                         " are not known to export"));
+ExportedTask PendulumTask(double actuated_joint, int memory) {
+  return {kDoublePendulum,
+          "pendulum.c",
+          "swings up and balances a double pendulum with one motor",
+          Concat("at joint ", actuated_joint),
+          {{"q1", "rad    angle of link 1, 0 hanging"},
+           {"q2", "rad    angle of link 2 relative to link 1, 0 in line with it"},
+           {"w1", "rad/s  velocity of q1"},
+           {"w2", "rad/s  velocity of q2"}},
+          PendulumInputs(memory)};
 }
 
 std::vector<LayerView> ExportedPolicy::ActingLayers() const {
@@ -96,7 +116,7 @@ ExportedPolicy ViewForExport(const LoadedPolicy& loaded) {
   ExportedPolicy exported;
   exported.loaded = &loaded;
   exported.spec = SpecOf(env);
-  exported.observation = InputsOf(loaded);
+  exported.task = TaskOf(loaded);
   exported.policy = dynamic_cast<const NetworkPolicy*>(loaded.policy.get());
   if (exported.policy == nullptr || exported.policy->action_size() != 1) {
     throw BadInput(Concat(where, ": expected a learned policy of one motor, got ",

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "core/env.h"
-#include "core/error.h"
 #include "nn/network_policy.h"
 #include "setup/loaded_policy.h"
 
@@ -22,6 +21,18 @@ struct NamedInput {
   std::string meaning;  // such as "velocity of q1 over 10 rad/s"
 };
 
+/// What exports say of a task, and the file of export/c that observes it.
+struct ExportedTask {
+  std::string name, file;
+  std::string goal;                     // what a policy does
+  std::string motor;                    // where its torque acts
+  std::vector<NamedInput> state;        // (S)
+  std::vector<NamedInput> observation;  // (D)
+};
+
+/// The double pendulum with a motor at this joint; observations remember `memory` steps.
+ExportedTask PendulumTask(double actuated_joint, int memory);
+
 struct ExportedPolicy {
   const LoadedPolicy* loaded = nullptr;
   EnvSpec spec;                           // of its task
@@ -29,7 +40,7 @@ struct ExportedPolicy {
   std::vector<LayerView> layers;          // of its network; see Network::Views
   std::vector<LayerView> critic;          // of an actor's critic, if it has one: "critic.…"
   double limit = 0;                       // no torque is beyond it, N·m
-  std::vector<NamedInput> observation;    // (D)
+  ExportedTask task;
 
   ActionRule rule() const { return policy->parts().rule; }
   /// The torques that it chooses from; empty: any within the limit.
@@ -44,9 +55,6 @@ struct ExportedPolicy {
 
 /// The largest size of some numbers; 0 of none.
 double LargestSize(std::span<const double> values);
-
-/// That the observations of a policy's task cannot be told elsewhere.
-Error UnknownObservations(const LoadedPolicy& loaded);
 
 /// Views a policy, which has to outlive the result. Throws BadInput, with the path, if it was not
 /// learned, or if its torques are beyond float.

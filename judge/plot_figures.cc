@@ -24,18 +24,6 @@ struct Moment {
   PendulumState state;
 };
 
-/// Angle and velocity at `share` of the time h (s) from (q0, w0) to (q1, w1): the cubic that has
-/// these ends, and its derivative (Hermite). The torque is the same all the while, so that nothing
-/// happens in between.
-std::pair<double, double> Between(double q0, double w0, double q1, double w1, double h,
-                                  double share) {
-  const double s = share, s2 = s * s, s3 = s2 * s;
-  const double q = (2 * s3 - 3 * s2 + 1) * q0 + (s3 - 2 * s2 + s) * h * w0 +
-                   (3 * s2 - 2 * s3) * q1 + (s3 - s2) * h * w1;
-  const double w = 6 * (s2 - s) * (q0 - q1) / h + (3 * s2 - 4 * s + 1) * w0 + (3 * s2 - 2 * s) * w1;
-  return {q, w};
-}
-
 /// The rows, with three moments interpolated between each two: the motion is no straight line.
 std::vector<Moment> MotionOf(const Rows& rows) {
   constexpr int kPieces = 4;
@@ -46,9 +34,7 @@ std::vector<Moment> MotionOf(const Rows& rows) {
     const double h = rows[i + 1].t - rows[i].t;
     for (int k = 0; k < kPieces; ++k) {
       const double share = static_cast<double>(k) / kPieces;
-      const auto [q1, w1] = Between(a.q1, a.w1, b.q1, b.w1, h, share);
-      const auto [q2, w2] = Between(a.q2, a.w2, b.q2, b.w2, h, share);
-      motion.push_back({rows[i].t + share * h, {q1, q2, w1, w2}});
+      motion.push_back({rows[i].t + share * h, StateBetween(a, b, h, share)});
     }
   }
   motion.push_back({rows.back().t, StateOf(rows.back())});

@@ -56,6 +56,19 @@ PendulumState StateOf(const RolloutRow& row) {
   return {row.state[0], row.state[1], row.state[2], row.state[3]};
 }
 
+PendulumState StateBetween(const PendulumState& a, const PendulumState& b, double h, double share) {
+  const double s = share, s2 = s * s, s3 = s2 * s;
+  const auto angle = [&](double q0, double w0, double q1, double w1) {
+    return (2 * s3 - 3 * s2 + 1) * q0 + (s3 - 2 * s2 + s) * h * w0 + (3 * s2 - 2 * s3) * q1 +
+           (s3 - s2) * h * w1;
+  };
+  const auto velocity = [&](double q0, double w0, double q1, double w1) {
+    return 6 * (s2 - s) * (q0 - q1) / h + (3 * s2 - 4 * s + 1) * w0 + (3 * s2 - 2 * s) * w1;
+  };
+  return {angle(a.q1, a.w1, b.q1, b.w1), angle(a.q2, a.w2, b.q2, b.w2),
+          velocity(a.q1, a.w1, b.q1, b.w1), velocity(a.q2, a.w2, b.q2, b.w2)};
+}
+
 Episode::Episode(RolloutConfig config)
     : config_(std::move(config)),
       env_([&] {
@@ -63,60 +76,72 @@ Episode::Episode(RolloutConfig config)
         env.episode_seconds = config_.seconds + 1;
         return MakeEnv(env);
       }()),
-      result_(env_->spec()) {
+      result_(env_->spec()),
+      rollout_{env_->spec(), {}, Plant(), Disturbance()} {
   if (config_.start) env_->SetState(0, *config_.start);
   if (config_.policy != nullptr) memory_ = config_.policy->Start(1);
+  if (pendulum() == nullptr) return;
+  rollout_.plant = pendulum()->plant(0);
+  rollout_.disturbance = pendulum()->disturbance(0);
 }
 
-std::vector<double> Episode::state() const {
-  std::vector<double> state(spec().state_names.size());
-  env_->GetState(0, state);
-  return state;
-}
-
-RolloutRow Episode::Step(bool motor) {
+void Episode::Step(bool motor, const std::array<double, 2>& push) {
+  const std::array<double, 2> before =
+      inputs_.empty() ? std::array<double, 2>{} : inputs_.back().push;
+  if (push != before) pendulum()->Push(0, push);
+  inputs_.push_back({motor, push});
+  const size_t step = rollout_.rows.size();
   double torque = 0;
   if (config_.policy != nullptr) config_.policy->Act(env_->obs(), {&torque, 1, 1}, *memory_);
-  if (step_ < config_.schedule.size()) torque = config_.schedule[step_];
+  if (step < config_.schedule.size()) torque = config_.schedule[step];
   if (!motor) torque = 0;
   RolloutRow row;
-  row.t = static_cast<double>(step_++) / StepsPerSecond(spec());
-  row.state = state();
+  row.t = static_cast<double>(step) / StepsPerSecond(rollout_.spec);
+  row.state.resize(rollout_.spec.state_names.size());
+  env_->GetState(0, row.state);
   row.chosen = torque;
   if (config_.estimates) Estimate(*config_.policy, env_->obs(), *memory_, row);
-  // Of the double pendulum, whose episode may begin anew at the end of this step.
-  const auto* env = pendulum();
-  const Plant plant = env != nullptr ? env->plant(0) : Plant();
   env_->Step({&torque, 1, 1}, result_);
   row.torque = result_.torque[0];
   row.at_goal = result_.at_goal[0] != 0;
   row.reward = result_.reward[0];
   row.terms = result_.reward_terms;
-  if (env != nullptr) RewardRow(plant, row);
-  return row;
+  if (pendulum() != nullptr) RewardRow(rollout_.plant, row);
+  rollout_.rows.push_back(std::move(row));
+  if (pendulum() == nullptr || result_.terminated[0] == 0) return;
+  throw Failure(Concat(
+      "the state blew up numerically after t = ", FormatNumber(rollout_.rows.back().t), " s"));
 }
 
-Error StateBlewUp(const RolloutRow& row) {
-  return Failure(Concat("the state blew up numerically after t = ", FormatNumber(row.t), " s"));
+void Episode::GoBack(int64_t steps) {
+  std::vector<Input> inputs = inputs_;
+  inputs.resize(static_cast<size_t>(std::clamp<int64_t>(steps, 0, this->steps())));
+  *this = Episode(config_);
+  for (const Input& input : inputs) Step(input.motor, input.push);
+}
+
+PendulumState Episode::StateOfRow(int64_t k) const {
+  return k < steps() ? StateOf(rollout_.rows[static_cast<size_t>(k)]) : pendulum()->state(0);
+}
+
+PendulumState Episode::StateAt(double steps) const {
+  const auto k = static_cast<int64_t>(std::floor(steps));
+  const double share = steps - static_cast<double>(k);
+  const PendulumState a = StateOfRow(k);
+  return share > 0 ? StateBetween(a, StateOfRow(k + 1), kControlPeriod, share) : a;
+}
+
+double Episode::TorqueAt(double steps) const {
+  const auto k = std::min(static_cast<int64_t>(std::floor(steps)), this->steps() - 1);
+  return k < 0 ? 0 : rollout_.rows[static_cast<size_t>(k)].torque;
 }
 
 Rollout RunRollout(const RolloutConfig& config) {
   Episode episode(config);
-  Rollout rollout{episode.spec(), {}, Plant(), Disturbance()};
-  if (const auto* pendulum = episode.pendulum(); pendulum != nullptr) {
-    rollout.plant = pendulum->plant(0);
-    rollout.disturbance = pendulum->disturbance(0);
-  }
   // Behind the last step there is one more state: its row's step gives the motor's torque there.
-  const int64_t steps = RolloutSteps(rollout.spec, config.seconds);
-  for (int64_t k = 0; k <= steps; ++k) {
-    rollout.rows.push_back(episode.Step());
-    if (episode.pendulum() != nullptr && episode.terminated() && k < steps) {
-      throw StateBlewUp(rollout.rows.back());
-    }
-    if (episode.terminated() || episode.truncated()) break;
-  }
-  return rollout;
+  const int64_t steps = RolloutSteps(episode.rollout().spec, config.seconds);
+  while (episode.steps() <= steps && !episode.done()) episode.Step();
+  return episode.rollout();
 }
 
 std::string TorqueText(const Rollout& rollout) {

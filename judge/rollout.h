@@ -1,12 +1,12 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "core/error.h"
 #include "core/policy.h"
 #include "core/sample.h"
 #include "rl/evaluate.h"
@@ -39,6 +39,7 @@ struct RolloutConfig {
   std::optional<std::vector<double>> start;  // (S); none: that of the environment's own episode
   double seconds = 20;                       // to the nearest step; less if it terminates
   bool estimates = false;  // whether rows have what the policy estimates: q and spread
+  std::string title;       // what a picture calls it
 };
 
 struct Rollout {
@@ -51,36 +52,49 @@ struct Rollout {
   Disturbance disturbance;
 };
 
-/// An episode in the making, for RunRollout and for those who watch.
+/// An episode in the making, for RunRollout and for `view`.
 class Episode {
  public:
   /// The policy must outlive it. Throws BadInput as MakeEnv does.
   explicit Episode(RolloutConfig config);
 
-  /// The row of the present state, with which the environment steps on. Without `motor` the torque
-  /// is 0 instead of what policy or schedule choose.
-  RolloutRow Step(bool motor = true);
+  /// Adds the row of the present state, with which the environment steps on. Without `motor` the
+  /// torque is 0 instead of what policy or schedule choose; `push` (N·m) turns the joints of a
+  /// double pendulum. Throws Failure if its state blows up, or if its physics know no push.
+  void Step(bool motor = true, const std::array<double, 2>& push = {});
+  /// Goes back to the state after so many of these steps.
+  void GoBack(int64_t steps);
 
-  const EnvSpec& spec() const { return env_->spec(); }
-  /// The present state (S).
-  std::vector<double> state() const;
+  const RolloutConfig& config() const { return config_; }
+  /// Everything up to the last step.
+  const Rollout& rollout() const { return rollout_; }
+  int64_t steps() const { return static_cast<int64_t>(rollout_.rows.size()); }
   /// Whether the last step ended it; the environment is then in another one.
-  bool terminated() const { return result_.terminated[0] != 0; }
-  bool truncated() const { return result_.truncated[0] != 0; }
+  bool done() const { return result_.done(0); }
   /// Of the double pendulum; null for other tasks.
-  PendulumEnv* pendulum() { return dynamic_cast<PendulumEnv*>(env_.get()); }
-  const PendulumEnv* pendulum() const { return dynamic_cast<const PendulumEnv*>(env_.get()); }
+  PendulumEnv* pendulum() const { return dynamic_cast<PendulumEnv*>(env_.get()); }
+
+  /// The double pendulum's state after so many steps, at most steps(), with a fraction: between two
+  /// of them along the cubic that has their angles and velocities.
+  PendulumState StateAt(double steps) const;
+  /// The motor's torque then, N·m.
+  double TorqueAt(double steps) const;
 
  private:
+  /// What a step was made with.
+  struct Input {
+    bool motor;
+    std::array<double, 2> push;
+  };
+  PendulumState StateOfRow(int64_t k) const;
+
   RolloutConfig config_;
   std::unique_ptr<VectorEnv> env_;
   StepResult result_;
   std::unique_ptr<Policy::Memory> memory_;
-  size_t step_ = 0;
+  Rollout rollout_;
+  std::vector<Input> inputs_;  // of each step
 };
-
-/// That a state is no longer finite after the step of this row.
-Error StateBlewUp(const RolloutRow& row);
 
 /// How many control steps so many seconds are, to the nearest.
 int64_t RolloutSteps(const EnvSpec& spec, double seconds);
@@ -98,6 +112,10 @@ std::string RolloutCsv(const Rollout& rollout);
 
 /// The double pendulum's state in a row.
 PendulumState StateOf(const RolloutRow& row);
+
+/// The state at a share of the `h` seconds from one state to another: along the cubic that has
+/// their angles and velocities.
+PendulumState StateBetween(const PendulumState& a, const PendulumState& b, double h, double share);
 
 /// What `eval` says of the environment's own episode.
 EvaluationEpisode JudgeEpisode(const Policy& policy, const EnvConfig& env);

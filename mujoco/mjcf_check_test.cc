@@ -156,6 +156,7 @@ TEST(MjcfCheck, LoadModelRefusesEveryOtherNumberAndWord) {
            {"\"0.005\"", "\"Euler\""},
            {"<option ", "<option iterations=\"1000000\" "},
            {"<option ", "<option ls_iterations=\"1000000\" "},
+           {"<option ", "<option ls_iterations=\"0\" "},
            {"<option ", "<option density=\"-1\" "},
            {"<option ", "<option viscosity=\"-1\" "},
            {"armature=\"0.01\"", "armature=\"-0.01\""},

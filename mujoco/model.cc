@@ -88,10 +88,12 @@ void CheckStructure(const mjModel& model, const Expectation& expect) {
   const double substeps = kControlPeriod / model.opt.timestep;
   // A shorter timestep makes an evaluation take minutes.
   expect(substeps > 0.5 && substeps < 200.5 && std::abs(substeps - std::round(substeps)) < 1e-6,
-         Concat("a timestep of at least 1e-04 s that divides ", kControlPeriod, " s, got ",
+         Concat("a timestep that divides ", kControlPeriod, " s, of at least 1e-04 s, got ",
                 model.opt.timestep));
-  const int most = std::max(model.opt.iterations, model.opt.ls_iterations);
-  expect(most <= 1000, Concat("at most 1000 iterations of the solver, got ", most));
+  for (const int iterations : {model.opt.iterations, model.opt.ls_iterations}) {
+    expect(iterations >= 1 && iterations <= 1000,
+           Concat("1 to 1000 iterations of the solver, got ", iterations));
+  }
   expect(model.opt.density >= 0 && model.opt.viscosity >= 0,
          "density and viscosity that are not negative");
 }

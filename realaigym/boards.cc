@@ -286,7 +286,7 @@ void DrawBoard(const BoardReport& report, const fs::path& file) {
   model.heat_map->label = "ends upright";
   model.heat_map->high = 1;
   for (int i = 1; i <= kBoardLevels; ++i) model.heat_map->x.push_back(i);
-  const size_t parameters = kBoardModelNames.size();
+  const size_t parameters = kBoardVariations.size();
   for (size_t k = 0; k < parameters; ++k) {
     model.heat_map->y.push_back(static_cast<double>(k + 1));
     const auto& share = report.robustness.curves[k].share;

@@ -11,47 +11,6 @@
 namespace upswing {
 namespace {
 
-double Between(double low, double high, double level) { return low + (high - low) * level; }
-
-/// The plant with one parameter at `level` of its range.
-BoardPlant Varied(int parameter, double level, double& value) {
-  BoardPlant plant;
-  const double factor = Between(0.75, 1.25, level);
-  value = factor;
-  switch (parameter) {
-    case 0:
-      plant.rotor_inertia = value = Between(0, 1e-4, level);
-      break;
-    case 1:
-      plant.center1 *= factor;
-      break;
-    case 2:
-      plant.inertia1 *= factor;
-      break;
-    case 3:
-      plant.center2 *= factor;
-      break;
-    case 4:
-      plant.mass2 *= factor;
-      break;
-    case 5:
-      plant.inertia2 *= factor;
-      break;
-    case 6:
-      plant.damping1 = value = Between(-0.1, 0.1, level);
-      break;
-    case 7:
-      plant.damping2 = value = Between(-0.1, 0.1, level);
-      break;
-    case 8:
-      plant.friction1 = value = Between(-0.2, 0.2, level);
-      break;
-    default:
-      plant.friction2 = value = Between(-0.2, 0.2, level);
-  }
-  return plant;
-}
-
 /// Six pushes with growing times, three of them, at random, about the joint with the motor. Those
 /// about the other one do nothing there (docs/realaigym.md).
 std::array<BoardPush, 3> RandomPushes(Rng& rng) {
@@ -69,35 +28,6 @@ std::array<BoardPush, 3> RandomPushes(Rng& rng) {
   std::array<BoardPush, 3> ours;
   for (size_t k = 0; k < 3; ++k) ours[k] = all[static_cast<size_t>(order[k])];
   return ours;
-}
-
-RobustnessCase MakeCase(RobustnessRow row, int parameter, double level, uint64_t seed) {
-  RobustnessCase made{row, parameter, level, {}};
-  BoardEpisode& episode = made.episode;
-  episode.seed = seed;
-  switch (row) {
-    case RobustnessRow::kModel:
-      episode.plant = Varied(parameter, level, made.value);
-      break;
-    case RobustnessRow::kVelocityNoise:
-      episode.velocity_noise = made.value = Between(0, 0.5, level);
-      break;
-    case RobustnessRow::kTorqueNoise:
-      episode.torque_noise = made.value = Between(0, 1.1, level);
-      break;
-    case RobustnessRow::kResponse:
-      episode.response = made.value = Between(0.1, 2, level);
-      break;
-    case RobustnessRow::kDelay:
-      episode.delay = static_cast<int>(std::lround(level * (kBoardLevels - 1)));
-      made.value = episode.delay * kBoardTimestep;
-      break;
-    case RobustnessRow::kPush: {
-      Rng rng(seed, "realaigym: pushes");
-      episode.pushes = RandomPushes(rng);
-    }
-  }
-  return made;
 }
 
 }  // namespace
@@ -119,10 +49,8 @@ Lqr SolveBoardLqr(Robot robot, const Eigen::Vector4d& Q, double R) {
 
 bool AtGoal(const BoardState& state) {
   const auto [q1, q2, w1, w2] = state;
-  const auto near = [](double angle, double goal) {
-    return std::abs(std::remainder(angle - goal, 2 * std::numbers::pi)) < kBoardGoalAngle;
-  };
-  return near(q1, std::numbers::pi) && near(q2, 0) && std::abs(w1) < kBoardGoalVelocity &&
+  return std::abs(Wrapped(q1 - std::numbers::pi)) < kBoardGoalAngle &&
+         std::abs(Wrapped(q2)) < kBoardGoalAngle && std::abs(w1) < kBoardGoalVelocity &&
          std::abs(w2) < kBoardGoalVelocity;
 }
 
@@ -143,8 +71,37 @@ double PerformanceScore(const BoardOutcome& outcome) {
   return 1 - std::accumulate(penalties.begin(), penalties.end(), 0.0) / 5;
 }
 
-BoardEpisode EpisodeOf(RobustnessRow row, int parameter, double level, uint64_t seed) {
-  return MakeCase(row, parameter, level, seed).episode;
+RobustnessCase MakeCase(RobustnessRow row, int parameter, double level, uint64_t seed) {
+  RobustnessCase made{row, parameter, level, {}};
+  BoardEpisode& episode = made.episode;
+  episode.seed = seed;
+  switch (row) {
+    case RobustnessRow::kModel: {
+      const BoardVariation& varied = kBoardVariations.at(static_cast<size_t>(parameter));
+      double& number = episode.plant.*varied.parameter;
+      made.value = varied.low + (varied.high - varied.low) * level;
+      number = varied.is_factor ? number * made.value : made.value;
+      break;
+    }
+    case RobustnessRow::kVelocityNoise:
+      episode.velocity_noise = made.value = 0.5 * level;
+      break;
+    case RobustnessRow::kTorqueNoise:
+      episode.torque_noise = made.value = 1.1 * level;
+      break;
+    case RobustnessRow::kResponse:
+      episode.response = made.value = 0.1 + (2 - 0.1) * level;
+      break;
+    case RobustnessRow::kDelay:
+      episode.delay = static_cast<int>(std::lround(level * (kBoardLevels - 1)));
+      made.value = episode.delay * kBoardTimestep;
+      break;
+    case RobustnessRow::kPush: {
+      Rng rng(seed, "realaigym: pushes");
+      episode.pushes = RandomPushes(rng);
+    }
+  }
+  return made;
 }
 
 std::vector<RobustnessCase> RobustnessCases(uint64_t seed) {
@@ -154,7 +111,7 @@ std::vector<RobustnessCase> RobustnessCases(uint64_t seed) {
     const double share = static_cast<double>(level) / (kBoardLevels - 1);
     cases.push_back(MakeCase(row, parameter, share, rng.Next()));
   };
-  for (int parameter = 0; parameter < static_cast<int>(kBoardModelNames.size()); ++parameter) {
+  for (int parameter = 0; parameter < static_cast<int>(kBoardVariations.size()); ++parameter) {
     for (int level = 0; level < kBoardLevels; ++level) add(RobustnessRow::kModel, parameter, level);
   }
   for (const RobustnessRow row : {RobustnessRow::kVelocityNoise, RobustnessRow::kTorqueNoise}) {
@@ -186,7 +143,7 @@ Robustness JudgeRobustness(const std::vector<RobustnessCase>& cases,
     }
     const auto row = static_cast<int>(each.row);
     const bool model = each.row == RobustnessRow::kModel;
-    const std::string name = model ? kBoardModelNames.at(static_cast<size_t>(each.parameter))
+    const std::string name = model ? kBoardVariations.at(static_cast<size_t>(each.parameter)).name
                                    : kRobustnessRowNames.at(static_cast<size_t>(row));
     if (result.curves.empty() || result.curves.back().name != name) {
       result.curves.push_back({name, {}, {}});

@@ -72,31 +72,47 @@ enum class RobustnessRow { kModel, kVelocityNoise, kTorqueNoise, kResponse, kDel
 inline constexpr int kRobustnessRows = 6;
 inline constexpr std::array<const char*, kRobustnessRows> kRobustnessRowNames{
     "model", "velocity noise", "torque noise", "response", "delay", "pushes"};
-/// The parameters of the model that are varied, one at a time.
-inline constexpr std::array<const char*, 10> kBoardModelNames{"Ir", "m1 r1", "I1", "m2 r2", "m2",
-                                                              "I2", "b1",    "b2", "cf1",   "cf2"};
+/// A parameter of the model that is varied, the others being those of the board: from `low` to
+/// `high`, in units of the board's value where it is a factor.
+struct BoardVariation {
+  const char* name;
+  double BoardPlant::*parameter;
+  double low, high;
+  bool is_factor;
+};
+inline constexpr std::array<BoardVariation, 10> kBoardVariations{
+    {{"Ir", &BoardPlant::rotor_inertia, 0, 1e-4, false},
+     {"m1 r1", &BoardPlant::center1, 0.75, 1.25, true},
+     {"I1", &BoardPlant::inertia1, 0.75, 1.25, true},
+     {"m2 r2", &BoardPlant::center2, 0.75, 1.25, true},
+     {"m2", &BoardPlant::mass2, 0.75, 1.25, true},
+     {"I2", &BoardPlant::inertia2, 0.75, 1.25, true},
+     {"b1", &BoardPlant::damping1, -0.1, 0.1, false},
+     {"b2", &BoardPlant::damping2, -0.1, 0.1, false},
+     {"cf1", &BoardPlant::friction1, -0.2, 0.2, false},
+     {"cf2", &BoardPlant::friction2, -0.2, 0.2, false}}};
 inline constexpr int kBoardLevels = 21;     // of what a row varies
 inline constexpr int kBoardRepeats = 10;    // of a level of noise
 inline constexpr int kBoardPushCases = 50;  // profiles
 
 /// Of a report: the nominal one, and those of the rows.
 inline constexpr int kBoardSimulations =
-    1 + kBoardLevels * (static_cast<int>(kBoardModelNames.size()) + 2 * kBoardRepeats + 1 + 1) +
+    1 + kBoardLevels * (static_cast<int>(kBoardVariations.size()) + 2 * kBoardRepeats + 1 + 1) +
     kBoardPushCases;
 
 /// A simulation of the robustness score and its place there.
 struct RobustnessCase {
   RobustnessRow row;
-  int parameter;  // of the model
+  int parameter;  // of kBoardVariations
   double value;   // what is varied
   BoardEpisode episode;
 };
 
-/// All of them, in the order of the rows. The seed is that of noise and pushes.
-std::vector<RobustnessCase> RobustnessCases(uint64_t seed);
+/// A case of a row at `level` from 0 to 1 of its range; the seed is that of noise and pushes.
+RobustnessCase MakeCase(RobustnessRow row, int parameter, double level, uint64_t seed);
 
-/// A case of a row at `level` from 0 to 1 of its range.
-BoardEpisode EpisodeOf(RobustnessRow row, int parameter, double level, uint64_t seed);
+/// All of them, in the order of the rows.
+std::vector<RobustnessCase> RobustnessCases(uint64_t seed);
 
 /// What a row shows: a share for each level, of a parameter of the model or of the repeats.
 struct RobustnessCurve {

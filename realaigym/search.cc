@@ -52,14 +52,14 @@ constexpr double kLinearDeviation = 0.1;  // of the regulator's numbers at first
 std::vector<Drawn> DrawEpisodes(Rng& rng) {
   std::vector<Drawn> drawn{{0, {}}};
   const auto draw = [&](RobustnessRow row, int count, double weight) {
-    std::array<int, kBoardModelNames.size()> parameters;
+    std::array<int, kBoardVariations.size()> parameters;
     std::iota(parameters.begin(), parameters.end(), 0);
     for (int k = 0; k < count; ++k) {
       const auto i = static_cast<size_t>(k);
       std::swap(parameters[i], parameters[i + rng.Below(parameters.size() - i)]);
       const double level =
           row == RobustnessRow::kModel ? rng.Uniform() : (k + rng.Uniform()) / count;
-      drawn.push_back({weight / count, EpisodeOf(row, parameters[i], level, rng.Next())});
+      drawn.push_back({weight / count, MakeCase(row, parameters[i], level, rng.Next()).episode});
     }
   };
   draw(RobustnessRow::kModel, 6, 0.25);

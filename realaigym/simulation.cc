@@ -93,12 +93,10 @@ class Run {
   }
 
   const BoardMeasurement& Measure(int step) {
-    for (size_t i = 0; i < kBoardBlock; ++i) {
-      seen_.q1[i] = block_.q1[i];
-      seen_.q2[i] = block_.q2[i];
-      seen_.w1[i] = block_.w1[i];
-      seen_.w2[i] = block_.w2[i];
-    }
+    std::ranges::copy(block_.q1, seen_.q1.begin());
+    std::ranges::copy(block_.q2, seen_.q2.begin());
+    std::ranges::copy(block_.w1, seen_.w1.begin());
+    std::ranges::copy(block_.w2, seen_.w2.begin());
     if (!delayed_.empty()) past_[static_cast<size_t>(step % kMostDelay)] = seen_;
     for (const size_t lane : delayed_) {
       const int then = std::max(0, step - episodes_[lane].delay);
@@ -119,10 +117,8 @@ class Run {
   /// From the torques that the controller wants to those that act.
   void Drive(int step) {
     const double time = step * kBoardTimestep;
-    for (size_t i = 0; i < kBoardBlock; ++i) {
-      previous_[i] = torque_[i];
-      torque_[i] = wanted_[i];
-    }
+    previous_ = torque_;
+    torque_ = wanted_;
     for (const size_t lane : torque_noise_) {
       torque_[lane] += episodes_[lane].torque_noise * rngs_[lane].Normal();
     }

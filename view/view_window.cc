@@ -82,7 +82,7 @@ class Session {
   static constexpr std::array<double, 2> kNoPush{};
 
   /// Whether its physics know of pushes.
-  static bool CanPush(const ViewEpisode& episode) { return episode.entry().env.engine == &kMuJoCo; }
+  static bool CanPush(const Episode& episode) { return episode.config().env.engine == &kMuJoCo; }
 
   /// Moves the shown time on by so many control steps.
   void Advance(double steps) {
@@ -91,7 +91,7 @@ class Session {
     shown_ = std::min(shown_ + steps, most);
     try {
       for (size_t i = 0; i < view_.episodes().size(); ++i) {
-        ViewEpisode& episode = view_.episodes()[i];
+        Episode& episode = view_.episodes()[i];
         while (static_cast<double>(episode.steps()) < shown_) {
           episode.Step(motor_, CanPush(episode) ? view_.PullTorques(i) : kNoPush);
         }
@@ -110,13 +110,13 @@ class Session {
   void StepBack() {
     Settle();
     const auto steps = static_cast<int64_t>(std::max(0.0, shown_ - 1));
-    for (ViewEpisode& episode : view_.episodes()) episode.GoBack(steps);
+    for (Episode& episode : view_.episodes()) episode.GoBack(steps);
     Settle();
   }
 
   void Restart() {
     for (size_t i = 0; i < config_.entries.size(); ++i) {
-      ViewEntry entry = view_.episodes()[i].entry();
+      RolloutConfig entry = view_.episodes()[i].config();
       entry.start = config_.entries[i].start;
       view_.Replace(i, std::move(entry));
     }
@@ -128,9 +128,9 @@ class Session {
   void ChangeEntries(const Change& change) {
     Settle();
     for (size_t i = 0; i < view_.episodes().size(); ++i) {
-      ViewEpisode& episode = view_.episodes()[i];
-      ViewEntry entry = episode.entry();
-      const PendulumState s = episode.env().state(0);
+      Episode& episode = view_.episodes()[i];
+      RolloutConfig entry = episode.config();
+      const PendulumState s = episode.pendulum()->state(0);
       entry.start = std::vector<double>{s.q1, s.q2, s.w1, s.w2};
       change(entry, static_cast<int>(i));
       view_.Replace(i, std::move(entry));
@@ -141,9 +141,9 @@ class Session {
   /// The policy of another entry, on this entry's plant.
   void TakeOver(size_t number) {
     if (number >= config_.entries.size()) return;
-    ChangeEntries([&](ViewEntry& entry, int i) {
+    ChangeEntries([&](RolloutConfig& entry, int i) {
       if (view_.shown() >= 0 && i != view_.shown()) return;
-      const ViewEntry& other = config_.entries[number];
+      const RolloutConfig& other = config_.entries[number];
       entry.title = other.title;
       entry.policy = other.policy;
       entry.env.memory = other.env.memory;
@@ -166,7 +166,7 @@ class Session {
       random.plant.fill(0.25);
       plant = random.Draw(config_.plants.front().second, plant_rng_);
     }
-    ChangeEntries([&](ViewEntry& entry, int) {
+    ChangeEntries([&](RolloutConfig& entry, int) {
       entry.env.plants = {plant};
       entry.env.randomization = Randomization();
     });
@@ -273,7 +273,7 @@ class Session {
 
     std::string title = "upswing view";
     if (view_.episodes().size() == 1 || view_.shown() >= 0) {
-      title += Concat(" - ", view_.episodes()[Shown()].entry().title);
+      title += Concat(" - ", view_.episodes()[Shown()].config().title);
     }
     title += fmt::format(" - {:.2f} s", std::round(shown_ * kControlPeriod * 100) / 100);
     if (speed_ != 1) title += fmt::format(" - speed {:g}", speed_);
@@ -287,21 +287,21 @@ class Session {
 
   /// What F2 shows of the first of the shown.
   Lines Information() {
-    const ViewEpisode& episode = view_.episodes()[Shown()];
+    const Episode& episode = view_.episodes()[Shown()];
     const PendulumState s = episode.StateAt(shown_);
-    const Plant plant = episode.plant();
+    const Plant plant = episode.rollout().plant;
     Lines lines{
         {"Speed", fmt::format("{:g}", speed_)},
         {"Angles", fmt::format("{:+.3f} {:+.3f} rad", s.q1, s.q2)},
         {"Velocities", fmt::format("{:+.3f} {:+.3f} rad/s", s.w1, s.w2)},
         {"Energy", fmt::format("{:.2f} of {:.2f} J", Energy(plant, s), EnergyTarget(plant))}};
     double sum = 0;
-    for (const RolloutRow& row : episode.rows()) sum += row.reward;
+    for (const RolloutRow& row : episode.rollout().rows) sum += row.reward;
     lines.push_back({"Return", fmt::format("{:.1f}", sum)});
     for (const auto& [name, value] : PlantValues(plant)) {
       lines.push_back({name, fmt::format("{:.4g}", value)});
     }
-    const Disturbance noise = episode.disturbance();
+    const Disturbance noise = episode.rollout().disturbance;
     lines.push_back({"sensor_noise", FormatNumber(noise.sensor_noise)});
     lines.push_back({"delay", FormatNumber(noise.delay)});
     return lines;
@@ -328,19 +328,19 @@ class Session {
         static_cast<float>(static_cast<double>(first + kChartPoints) * kControlPeriod);
     int line = 0;
     for (size_t i = 0; i < view_.episodes().size(); ++i) {
-      const ViewEpisode& episode = view_.episodes()[i];
+      const Episode& episode = view_.episodes()[i];
       chart_.linepnt[i] = 0;
       if (view_.shown() >= 0 && static_cast<int>(i) != view_.shown()) continue;
-      const double limit = episode.plant().torque_limit;
+      const double limit = episode.rollout().plant.torque_limit;
       chart_.range[1][0] = static_cast<float>(-limit);
       chart_.range[1][1] = static_cast<float>(limit);
-      std::string name = episode.entry().title.substr(0, sizeof(chart_.linename[0]) - 1);
+      std::string name = episode.config().title.substr(0, sizeof(chart_.linename[0]) - 1);
       std::ranges::replace_if(
           name, [](char c) { return c < 0x20 || c > 0x7E; }, '?');
       *fmt::format_to_n(chart_.linename[line], sizeof(chart_.linename[0]) - 1, "{}", name).out = 0;
       int count = 0;
       for (int64_t k = first; k < std::min(last, episode.steps()); ++k) {
-        const RolloutRow& row = episode.rows()[static_cast<size_t>(k)];
+        const RolloutRow& row = episode.rollout().rows[static_cast<size_t>(k)];
         chart_.linedata[line][2 * count] = static_cast<float>(row.t);
         chart_.linedata[line][2 * count + 1] = static_cast<float>(row.torque);
         ++count;

@@ -10,7 +10,7 @@ namespace upswing {
 
 /// What the window of `view` shows.
 struct WindowConfig {
-  std::vector<ViewEntry> entries;
+  std::vector<RolloutConfig> entries;
   std::vector<std::pair<std::string, Plant>> plants;  // to switch to, with names
   ViewLook look;
   PictureSize size;
