@@ -5,6 +5,7 @@
 #include <numbers>
 #include <vector>
 
+#include "control/testing.h"
 #include "core/rng.h"
 
 namespace upswing {
@@ -12,16 +13,6 @@ namespace {
 
 StateVector DrawState(Rng& rng) {
   return {rng.Uniform(-4, 4), rng.Uniform(-4, 4), rng.Uniform(-8, 8), rng.Uniform(-12, 12)};
-}
-
-/// Masses, lengths, dampings and gravity within ±50%.
-Plant DrawPlant(Rng& rng) {
-  Plant plant;
-  const Options options = OptionsOf(plant);
-  for (const Option& option : options.all()) {
-    *std::get<double*>(option.target) *= rng.Uniform(0.5, 1.5);
-  }
-  return plant;
 }
 
 /// ẋ by the equations of motion.

@@ -4,13 +4,28 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "control/riccati.h"
 #include "core/json.h"
+#include "core/options.h"
+#include "core/rng.h"
+#include "sim/double_pendulum.h"
 
 /// What tests of controllers share.
 namespace upswing {
+
+/// A plant within half of the standard one's parameters, with the motor at joint 1.
+inline Plant DrawPlant(Rng& rng) {
+  Plant plant;
+  const Options options = OptionsOf(plant);
+  for (const Option& option : options.all()) {
+    *std::get<double*>(option.target) *= rng.Uniform(0.5, 1.5);
+  }
+  plant.actuated_joint = 1;
+  return plant;
+}
 
 /// A problem of control/riccati.h, and what SciPy says of it (testdata/make_riccati.py).
 struct RiccatiCase {

@@ -29,8 +29,6 @@ StepResult ResultOf(int num_envs) {
   return StepResult(PendulumSpec(config));
 }
 
-constexpr double kPi = std::numbers::pi;
-
 /// Calls test(path) on each path that this processor has, and goes back to the best.
 template <typename Test>
 void OnEachPath(const Test& test) {

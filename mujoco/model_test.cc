@@ -16,7 +16,7 @@ namespace {
 constexpr double kArmature = 0.01;  // kg·m²
 constexpr double kRadius = 0.04;    // m
 
-Plant RandomPlant(Rng& rng) {
+Plant ModeratePlant(Rng& rng) {
   Plant p;
   for (double* x : {&p.mass1, &p.mass2, &p.length1, &p.length2}) *x = rng.Uniform(0.3, 3);
   p.damping1 = rng.Uniform(0, 1);
@@ -109,7 +109,7 @@ TEST(Model, HangingHasTheMassMatrixAndInertiasOfTheSpecification) {
 TEST(Model, APlantWrittenAtRunTimeEqualsOneThatWasCompiled) {
   Rng rng(1, "plants");
   for (int trial = 0; trial < 20; ++trial) {
-    const Plant plant = RandomPlant(rng);
+    const Plant plant = ModeratePlant(rng);
     const ModelPtr written = ModelWith(plant);
     const ModelPtr compiled = CompileModel(Mjcf(plant), "test");
     const auto same = [](const mjtNum* a, const mjtNum* b, int n) {
@@ -139,7 +139,7 @@ TEST(Model, APlantWrittenAtRunTimeEqualsOneThatWasCompiled) {
 TEST(Model, MuJoCoStepsLikeTheClosedFormAt100RandomStatesAndPlants) {
   Rng rng(2, "closed form");
   for (int trial = 0; trial < 100; ++trial) {
-    const Plant plant = RandomPlant(rng);
+    const Plant plant = ModeratePlant(rng);
     const ModelPtr model = ModelWith(plant);
     const DataPtr data(mj_makeData(model.get()));
     const ClosedForm closed{plant, model->body_inertia[3], model->body_inertia[6]};

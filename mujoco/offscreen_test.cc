@@ -12,11 +12,11 @@
 
 #include "core/error.h"
 #include "mujoco/painter.h"
+#include "sim/testing.h"
 
 namespace upswing {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 using Pixels = std::vector<uint8_t>;
 using Angles = std::array<double, 2>;
 

@@ -12,7 +12,7 @@ namespace upswing {
 namespace {
 
 constexpr Real kUnwritten = Real(1e30);  // shows what a gradient leaves out
-constexpr double kEpsilon = std::numeric_limits<Real>::epsilon();
+constexpr double kRounding = std::numeric_limits<Real>::epsilon();
 
 struct NetworkCase {
   const char* name;
@@ -158,7 +158,7 @@ TEST_P(NetworkTest, OutputsAreThoseOfTheDefinitionAndRowsDoNotDependOnTheirBatch
     const std::vector<double> expected = Definition(f.network, f.parameters, f.X().row(i));
     for (int k = 0; k < f.A; ++k) {
       EXPECT_EQ(f.y[k], together[i * f.A + k]);
-      EXPECT_NEAR(f.y[k], expected[k], 800 * kEpsilon);
+      EXPECT_NEAR(f.y[k], expected[k], 800 * kRounding);
     }
   }
 }
@@ -188,7 +188,7 @@ TEST_P(NetworkTest, SlicesOfTheBatchGiveTheSameBits) {
   EXPECT_EQ(gradient, whole);
   EXPECT_EQ(dx, whole_dx);
   const double norm = std::inner_product(whole.begin(), whole.end(), whole.begin(), 0.0);
-  EXPECT_NEAR(squares, norm, 4500 * kEpsilon * norm);
+  EXPECT_NEAR(squares, norm, 4500 * kRounding * norm);
 }
 
 TEST_P(NetworkTest, PreferencesDifferFromOutputsByAConstantOfTheRow) {
@@ -199,7 +199,7 @@ TEST_P(NetworkTest, PreferencesDifferFromOutputsByAConstantOfTheRow) {
                                Matrix<Real>(preferences, f.B, f.A));
   for (size_t i = 0; i < f.y.size(); ++i) {
     const size_t first = i / static_cast<size_t>(f.A) * static_cast<size_t>(f.A);
-    EXPECT_NEAR(preferences[i] - preferences[first], f.y[i] - f.y[first], 4500 * kEpsilon);
+    EXPECT_NEAR(preferences[i] - preferences[first], f.y[i] - f.y[first], 4500 * kRounding);
   }
 }
 

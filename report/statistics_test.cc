@@ -13,7 +13,7 @@
 namespace upswing {
 namespace {
 
-constexpr double kInf = std::numeric_limits<double>::infinity();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 void ExpectSame(const Estimate& got, const nlohmann::json& expected, const char* what) {
   SCOPED_TRACE(what);
@@ -48,8 +48,8 @@ TEST(Statistics, InterquartileMeanByHand) {
   EXPECT_EQ(InterquartileMean({1, 2, 9}), 4);           // floor(3/4) = 0 cut
   EXPECT_EQ(InterquartileMean({100, 1, 2, 6}), 4);      // one at each end
   EXPECT_EQ(InterquartileMean({-50, 1, 2, 6, 90}), 3);  // still one
-  EXPECT_EQ(InterquartileMean({kInf, 1, 2, 6}), 4);
-  EXPECT_EQ(InterquartileMean({kInf, kInf, 2, 6}), kInf);
+  EXPECT_EQ(InterquartileMean({kInfinity, 1, 2, 6}), 4);
+  EXPECT_EQ(InterquartileMean({kInfinity, kInfinity, 2, 6}), kInfinity);
 }
 
 TEST(Statistics, ProbabilityOfImprovementByHand) {
@@ -57,7 +57,7 @@ TEST(Statistics, ProbabilityOfImprovementByHand) {
   EXPECT_DOUBLE_EQ(ProbabilityOfImprovement(x, y), (0 + 0 + 1 + 0.5 + 1 + 0.5) / 6);
   EXPECT_DOUBLE_EQ(ProbabilityOfImprovement(x, y) + ProbabilityOfImprovement(y, x), 1);
   // Two runs that never solve the task are as good as each other, and worse than one that does.
-  const std::vector<double> never{-kInf, -kInf}, once{-kInf, -20};
+  const std::vector<double> never{-kInfinity, -kInfinity}, once{-kInfinity, -20};
   EXPECT_EQ(ProbabilityOfImprovement(never, never), 0.5);
   EXPECT_EQ(ProbabilityOfImprovement(once, never), 0.75);
 }
@@ -95,7 +95,8 @@ TEST(Statistics, AProbabilityHasAnIntervalWhereAllPairsAgreeToo) {
   EXPECT_EQ(none.interval->low, 0);
   EXPECT_NEAR(none.interval->high, 1 - p, 1e-12);
   // Runs that never solve give little information on which would be sooner.
-  const Estimate ties = EstimateImprovement({{-kInf, -kInf, -kInf}}, {{-kInf, -kInf, -kInf}});
+  const Estimate ties = EstimateImprovement({{-kInfinity, -kInfinity, -kInfinity}},
+                                            {{-kInfinity, -kInfinity, -kInfinity}});
   EXPECT_NEAR(ties.interval->low, 0.153, 0.001);
   EXPECT_NEAR(ties.interval->high, 0.847, 0.001);
 }
@@ -122,10 +123,10 @@ TEST(Statistics, TheScoreIntervalOfAProbabilityHoldsItInAbout95PercentOfCases) {
 }
 
 TEST(Statistics, AnIntervalOfRunsThatNeverSolvedReachesInfinity) {
-  const Estimate some = EstimateIqm({{10, 11, 12, 13, kInf}});
+  const Estimate some = EstimateIqm({{10, 11, 12, 13, kInfinity}});
   EXPECT_EQ(some.value, 12);
   EXPECT_LT(some.interval->low, 12);
-  EXPECT_EQ(some.interval->high, kInf);
+  EXPECT_EQ(some.interval->high, kInfinity);
 }
 
 /// Share of the samples of `runs` normal numbers whose interval for the IQM holds the true one, 0.

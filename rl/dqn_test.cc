@@ -10,13 +10,14 @@
 #include "core/error.h"
 #include "core/testing.h"
 #include "nn/network_policy.h"
+#include "rl/testing.h"
 #include "rl/torque_levels.h"
 #include "rl/toy_env.h"
 
 namespace upswing {
 namespace {
 
-DqnConfig SmallConfig() {
+DqnConfig SmallDqn() {
   DqnConfig config;
   config.hidden = {16, 16};
   config.head = 8;
@@ -101,17 +102,10 @@ double LossByHand(const DqnConfig& config, std::span<const float> online,
   return loss / static_cast<double>(batch.action.size());
 }
 
-/// One of an agent's metrics.
-double Metric(const Metrics& metrics, const std::string& name) {
-  const auto found = std::ranges::find(metrics, name, &Metrics::value_type::first);
-  EXPECT_NE(found, metrics.end()) << name;
-  return found->second;
-}
-
 class DqnVariants : public ::testing::TestWithParam<std::tuple<bool, bool>> {};
 
 TEST_P(DqnVariants, LossIsThatOfThePapersAndFalls) {
-  DqnConfig config = SmallConfig();
+  DqnConfig config = SmallDqn();
   std::tie(config.double_q, config.dueling) = GetParam();
   config.learning_rate = config.learning_rate_end = 1e-2;
   ThreadPool pool(1);
@@ -146,7 +140,7 @@ void Walk(Dqn& agent, ToyEnv& env, int steps) {
 
 TEST(Dqn, WeightsMultiplyTheGradientOfTheirTransition) {
   // A transition of weight 1/2, twice, equals one of weight 1; one of weight 0 changes nothing.
-  DqnConfig config = SmallConfig();
+  DqnConfig config = SmallDqn();
   config.batch = 4;
   config.max_gradient_norm = 1e9;
   ThreadPool pool(1);
@@ -185,7 +179,7 @@ TEST(Dqn, MirroringNegatesTorquesAndSomeObservations) {
   EXPECT_GT(mirrored, 16);
   EXPECT_LT(mirrored, 48);
 
-  DqnConfig config = SmallConfig();
+  DqnConfig config = SmallDqn();
   config.mirror = true;
   ThreadPool pool(1);
   EnvSpec spec = ToyEnv::Spec(1);
@@ -198,7 +192,7 @@ TEST(Dqn, MirroringNegatesTorquesAndSomeObservations) {
 }
 
 TEST(Dqn, TheExportedPolicyIsAnAverageOfTheLearnedOnes) {
-  DqnConfig config = SmallConfig();
+  DqnConfig config = SmallDqn();
   config.policy_tau = 0.25;
   ThreadPool pool(1);
   Dqn agent(config, ToyEnv::Spec(1), 1, pool);
@@ -221,7 +215,7 @@ TEST(Dqn, TheExportedPolicyIsAnAverageOfTheLearnedOnes) {
 }
 
 TEST(Dqn, TheAverageGrowsLongerAsTheLearningRateFalls) {
-  DqnConfig config = SmallConfig();
+  DqnConfig config = SmallDqn();
   config.policy_tau = 0.5;
   config.learning_rate = 1e-2;
   config.learning_rate_end = 1e-3;
@@ -252,7 +246,7 @@ TEST(Dqn, TheAverageGrowsLongerAsTheLearningRateFalls) {
 }
 
 TEST(Dqn, TargetFollowsByPolyakAveragingAtEachUpdate) {
-  DqnConfig config = SmallConfig();
+  DqnConfig config = SmallDqn();
   config.tau = 0.25;
   ThreadPool pool(1);
   Dqn agent(config, ToyEnv::Spec(1), 1, pool);
@@ -264,7 +258,7 @@ TEST(Dqn, TargetFollowsByPolyakAveragingAtEachUpdate) {
 }
 
 TEST(Dqn, TargetCanBeCopiedPeriodically) {
-  DqnConfig config = SmallConfig();
+  DqnConfig config = SmallDqn();
   config.target_period = 3;
   ThreadPool pool(1);
   Dqn agent(config, ToyEnv::Spec(1), 1, pool);
@@ -279,7 +273,7 @@ TEST(Dqn, TargetCanBeCopiedPeriodically) {
 TEST(Dqn, ATruncationBootstrapsFromItsOwnLastObservationAndATerminationFromNothing) {
   // Through the whole path: environment → agent → memory. Outward steps leave ±5; an episode of
   // ten steps is truncated. A start is drawn near 0, so a reset observation would show.
-  DqnConfig config = SmallConfig();
+  DqnConfig config = SmallDqn();
   config.updates_per_step = 0;
   ThreadPool pool(1);
   Dqn agent(config, ToyEnv::Spec(2), 1, pool);
@@ -301,7 +295,7 @@ TEST(Dqn, ATruncationBootstrapsFromItsOwnLastObservationAndATerminationFromNothi
 TEST(Dqn, UpdatesFollowTheStepsForAnyNumberOfEnvironments) {
   for (const int envs : {1, 4}) {
     ThreadPool pool(1);
-    Dqn agent(SmallConfig(), ToyEnv::Spec(envs), 1, pool);
+    Dqn agent(SmallDqn(), ToyEnv::Spec(envs), 1, pool);
     ToyEnv env(envs);
     Walk(agent, env, 400 / envs);
     EXPECT_EQ(agent.updates(), (400 - 32) / 2);
@@ -309,7 +303,7 @@ TEST(Dqn, UpdatesFollowTheStepsForAnyNumberOfEnvironments) {
 }
 
 TEST(Dqn, EpsilonDecaysWithEachEpisodeToItsEnd) {
-  DqnConfig config = SmallConfig();
+  DqnConfig config = SmallDqn();
   config.epsilon_decay = 0.5;
   config.epsilon_end = 0.2;
   ThreadPool pool(1);
@@ -328,7 +322,7 @@ TEST(Dqn, EpsilonDecaysWithEachEpisodeToItsEnd) {
 TEST(Dqn, LearnsToStayNearZero) {
   for (const uint64_t seed : {1, 2, 3}) {
     ThreadPool pool(1);
-    Dqn agent(SmallConfig(), ToyEnv::Spec(4), seed, pool);
+    Dqn agent(SmallDqn(), ToyEnv::Spec(4), seed, pool);
     ToyEnv env(4, seed);
     Walk(agent, env, 1500);
     const auto policy = agent.ExportPolicy({});
@@ -341,7 +335,7 @@ TEST(Dqn, LearnsToStayNearZero) {
 }
 
 TEST(Dqn, TheNumberOfThreadsChangesNoBit) {
-  DqnConfig config = SmallConfig();
+  DqnConfig config = SmallDqn();
   config.batch = 128;  // four slices
   // Layers of 130 and 70 inputs are five tasks, their 19,000 parameters three chunks of Adam.
   config.hidden = {130};
@@ -358,7 +352,7 @@ TEST(Dqn, TheNumberOfThreadsChangesNoBit) {
 }
 
 TEST(Dqn, LoadedStateContinuesWithTheSameBits) {
-  DqnConfig config = SmallConfig();
+  DqnConfig config = SmallDqn();
   config.n_step = 3;
   config.prioritized = config.mirror = true;
   config.policy_tau = 0.1;
@@ -385,12 +379,12 @@ TEST(Dqn, LoadedStateContinuesWithTheSameBits) {
 
 TEST(Dqn, NumbersThatAreNotFiniteAreFailures) {
   ThreadPool pool(1);
-  Dqn agent(SmallConfig(), ToyEnv::Spec(1), 1, pool);
+  Dqn agent(SmallDqn(), ToyEnv::Spec(1), 1, pool);
   ToyEnv env(1);
   env.poison = true;
   EXPECT_THROW(Walk(agent, env, 1), Error);
 
-  Dqn other(SmallConfig(), ToyEnv::Spec(1), 1, pool);
+  Dqn other(SmallDqn(), ToyEnv::Spec(1), 1, pool);
   const std::vector<float> before(other.online().begin(), other.online().end());
   Minibatch batch = RandomBatch(16);
   batch.reward[3] = std::numeric_limits<float>::infinity();

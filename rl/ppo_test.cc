@@ -7,12 +7,13 @@
 
 #include "core/error.h"
 #include "core/testing.h"
+#include "rl/testing.h"
 #include "rl/toy_env.h"
 
 namespace upswing {
 namespace {
 
-PpoConfig SmallConfig(const std::string& actions = "continuous") {
+PpoConfig SmallPpo(const std::string& actions = "continuous") {
   PpoConfig config;
   config.hidden = {16, 16};
   config.actions = actions;
@@ -36,13 +37,6 @@ void Walk(Ppo& agent, VectorEnv& env, int steps) {
     agent.Observe(result);
     agent.Learn();
   }
-}
-
-/// One of an agent's metrics.
-double Metric(const Metrics& metrics, const std::string& name) {
-  const auto found = std::ranges::find(metrics, name, &Metrics::value_type::first);
-  EXPECT_NE(found, metrics.end()) << name;
-  return found == metrics.end() ? NAN : found->second;
 }
 
 std::vector<float> Parameters(const Ppo& agent) {
@@ -96,7 +90,7 @@ INSTANTIATE_TEST_SUITE_P(Actions, PpoActions, ::testing::Values("continuous", "l
 TEST_P(PpoActions, OnTheFirstMinibatchTheRatioIsOne) {
   // One minibatch is a whole rollout and there is one epoch: π is still π_old. The statistics of
   // the observations change after each rollout; were they not the same for both, KL would not be 0.
-  PpoConfig config = SmallConfig(GetParam());
+  PpoConfig config = SmallPpo(GetParam());
   config.epochs = 1;
   config.batch = config.horizon * 4;
   ThreadPool pool(1);
@@ -119,7 +113,7 @@ TEST_P(PpoActions, OnTheFirstMinibatchTheRatioIsOne) {
 }
 
 TEST_P(PpoActions, FindsTheBestActionOfABandit) {
-  PpoConfig config = SmallConfig(GetParam());
+  PpoConfig config = SmallPpo(GetParam());
   config.levels = 11;  // -1, -0.8 … 0.6 … 1
   ThreadPool pool(1);
   Ppo agent(config, ToyEnv::Spec(8), 1, pool);
@@ -130,7 +124,7 @@ TEST_P(PpoActions, FindsTheBestActionOfABandit) {
 
 TEST_P(PpoActions, MirroringTeachesTheMirroredState) {
   // x = -1 never occurs; by symmetry -0.6 is best there.
-  PpoConfig config = SmallConfig(GetParam());
+  PpoConfig config = SmallPpo(GetParam());
   config.levels = 11;
   config.mirror = true;
   ThreadPool pool(1);
@@ -145,7 +139,7 @@ TEST_P(PpoActions, MirroringTeachesTheMirroredState) {
 TEST_P(PpoActions, LearnsToStayNearZero) {
   for (const uint64_t seed : {1, 2, 3}) {
     ThreadPool pool(1);
-    Ppo agent(SmallConfig(GetParam()), ToyEnv::Spec(4), seed, pool);
+    Ppo agent(SmallPpo(GetParam()), ToyEnv::Spec(4), seed, pool);
     ToyEnv env(4, seed);
     Walk(agent, env, 3000);
     for (const float x : {-2.0F, 2.0F}) EXPECT_NEAR(ActionAt(agent, x), -x / 2, 0.25);
@@ -156,7 +150,7 @@ TEST_P(PpoActions, LearnsToStayNearZero) {
 TEST(Ppo, ATruncationHasAFutureAndATerminationHasNone) {
   // A reward of 1 at each step: V = 1 / (1 - γ) = 10 if episodes are only cut off. Were the cut
   // taken for an end, or the value of the next start for the future, V would be another.
-  PpoConfig config = SmallConfig();
+  PpoConfig config = SmallPpo();
   config.kl_target = 0;
   config.learning_rate = config.learning_rate_end = 1e-2;
   config.max_gradient_norm = 100;
@@ -181,7 +175,7 @@ TEST(Ppo, ATruncationHasAFutureAndATerminationHasNone) {
 
 TEST_P(PpoActions, TheExportedPolicyIsTheAgentsMean) {
   // Its network on normalised observations, without exploration.
-  PpoConfig config = SmallConfig(GetParam());
+  PpoConfig config = SmallPpo(GetParam());
   ThreadPool pool(1);
   EnvSpec spec = ToyEnv::Spec(4);
   spec.action_limit = {3};
@@ -221,7 +215,7 @@ TEST_P(PpoActions, TheExportedPolicyIsTheAgentsMean) {
 TEST(Ppo, TheEnvironmentGetsTheClippedActionAndTheBufferTheRawOne) {
   // σ = 5: most actions are beyond the limit. Were the clipped one stored, its probability under π
   // would not be that of what was drawn, which KL on the first minibatch shows.
-  PpoConfig config = SmallConfig();
+  PpoConfig config = SmallPpo();
   config.initial_std = 5;
   config.epochs = 1;
   config.batch = 16 * 4;
@@ -246,7 +240,7 @@ TEST(Ppo, TheEnvironmentGetsTheClippedActionAndTheBufferTheRawOne) {
 }
 
 TEST(Ppo, MetricsAreThoseOfTheLastRolloutUntilThereIsAnother) {
-  PpoConfig config = SmallConfig();
+  PpoConfig config = SmallPpo();
   ThreadPool pool(1);
   Ppo agent(config, ToyEnv::Spec(4), 1, pool);
   ToyEnv env(4);
@@ -261,7 +255,7 @@ TEST(Ppo, MetricsAreThoseOfTheLastRolloutUntilThereIsAnother) {
 
 TEST(Ppo, TheLearningRateFollowsTheKlTarget) {
   for (const bool large : {false, true}) {
-    PpoConfig config = SmallConfig();
+    PpoConfig config = SmallPpo();
     config.kl_target = large ? 1e9 : 1e-9;
     ThreadPool pool(1);
     Ppo agent(config, ToyEnv::Spec(4), 1, pool);
@@ -272,7 +266,7 @@ TEST(Ppo, TheLearningRateFollowsTheKlTarget) {
 }
 
 TEST(Ppo, TheEntropyBonusRaisesTheDeviationToItsBoundAndEndsWithTheSchedule) {
-  PpoConfig config = SmallConfig();
+  PpoConfig config = SmallPpo();
   config.kl_target = 0;
   config.learning_rate = config.learning_rate_end = 1e-2;
   config.entropy_bonus = 10;
@@ -289,7 +283,7 @@ TEST(Ppo, TheEntropyBonusRaisesTheDeviationToItsBoundAndEndsWithTheSchedule) {
 }
 
 TEST_P(PpoActions, TheNumberOfThreadsChangesNoBit) {
-  PpoConfig config = SmallConfig(GetParam());
+  PpoConfig config = SmallPpo(GetParam());
   config.hidden = {130, 70};  // several tasks a layer, three chunks of Adam
   config.batch = 128;
   config.mirror = true;
@@ -305,7 +299,7 @@ TEST_P(PpoActions, TheNumberOfThreadsChangesNoBit) {
 }
 
 TEST_P(PpoActions, LoadedStateContinuesWithTheSameBits) {
-  PpoConfig config = SmallConfig(GetParam());
+  PpoConfig config = SmallPpo(GetParam());
   config.mirror = true;
   config.value_clip = 0.2;
   for (const int steps : {32, 41}) {  // between rollouts, and within one
@@ -332,7 +326,7 @@ TEST_P(PpoActions, LoadedStateContinuesWithTheSameBits) {
 }
 
 TEST(Ppo, AStateThatIsNoneIsRefused) {
-  const PpoConfig config = SmallConfig("levels");
+  const PpoConfig config = SmallPpo("levels");
   ThreadPool pool(1);
   Ppo agent(config, ToyEnv::Spec(2), 1, pool);
   ToyEnv env(2);
@@ -360,7 +354,7 @@ TEST(Ppo, AStateThatIsNoneIsRefused) {
 
 TEST(Ppo, SettingsThatDoNotFitAreRefused) {
   ThreadPool pool(1);
-  PpoConfig config = SmallConfig();
+  PpoConfig config = SmallPpo();
   config.batch = 24;  // of 16 × 4 = 64
   try {
     const Ppo agent(config, ToyEnv::Spec(4), 1, pool);
@@ -377,20 +371,20 @@ TEST(Ppo, SettingsThatDoNotFitAreRefused) {
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("such as 64, got 100"), std::string::npos);
   }
-  config = SmallConfig();
+  config = SmallPpo();
   config.mirror = true;
   EnvSpec spec = ToyEnv::Spec(1);
   spec.mirror_signs.clear();
   EXPECT_THROW(Ppo(config, spec, 1, pool), Error);
-  config = SmallConfig("levels");
+  config = SmallPpo("levels");
   spec.action_limit = {1, 1};
   EXPECT_THROW(Ppo(config, spec, 1, pool), Error);
-  EXPECT_NO_THROW(Ppo(SmallConfig(), spec, 1, pool));
+  EXPECT_NO_THROW(Ppo(SmallPpo(), spec, 1, pool));
 }
 
 TEST(Ppo, NumbersThatAreNotFiniteAreFailures) {
   ThreadPool pool(1);
-  Ppo agent(SmallConfig(), ToyEnv::Spec(1), 1, pool);
+  Ppo agent(SmallPpo(), ToyEnv::Spec(1), 1, pool);
   ToyEnv env(1);
   env.poison = true;
   EXPECT_THROW(Walk(agent, env, 1), Error);

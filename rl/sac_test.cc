@@ -9,12 +9,13 @@
 #include "core/error.h"
 #include "core/testing.h"
 #include "nn/network_policy.h"
+#include "rl/testing.h"
 #include "rl/toy_env.h"
 
 namespace upswing {
 namespace {
 
-SacConfig SmallConfig() {
+SacConfig SmallSac() {
   SacConfig config;
   config.hidden = {16, 16};
   config.batch = 16;
@@ -38,12 +39,6 @@ Minibatch RandomBatch(int size) {
     batch.discount[i] = i % 3 == 0 ? 0.0F : 0.9F;
   }
   return batch;
-}
-
-double Metric(const Metrics& metrics, const std::string& name) {
-  const auto found = std::ranges::find(metrics, name, &Metrics::value_type::first);
-  EXPECT_NE(found, metrics.end()) << name;
-  return found->second;
 }
 
 std::vector<float> Copy(std::span<const float> values) { return {values.begin(), values.end()}; }
@@ -88,7 +83,7 @@ TEST(Temperature, RisesWhileEntropyIsBelowItsTarget) {
 }
 
 TEST(Sac, TheLearnedTemperatureHoldsTheEntropyAtItsTarget) {
-  SacConfig config = SmallConfig();
+  SacConfig config = SmallSac();
   config.alpha_rate = 0.02;
   config.target_entropy = -0.5;
   config.actor_period = 1;
@@ -103,7 +98,7 @@ TEST(Sac, TheLearnedTemperatureHoldsTheEntropyAtItsTarget) {
 }
 
 TEST(Sac, AFixedTemperatureStays) {
-  SacConfig config = SmallConfig();
+  SacConfig config = SmallSac();
   config.tune_alpha = false;
   config.alpha = 0.3;
   ThreadPool pool(1);
@@ -113,9 +108,9 @@ TEST(Sac, AFixedTemperatureStays) {
 }
 
 /// Observations of 0, one step each, reward 1 - (a - 0.4)²: a bandit.
-class Bandit : public ToyEnv {
+class PeakBandit : public ToyEnv {
  public:
-  explicit Bandit(int num_envs) : ToyEnv(num_envs) { SetStartNoise(0); }
+  explicit PeakBandit(int num_envs) : ToyEnv(num_envs) { SetStartNoise(0); }
   void Step(Matrix<const double> action, StepResult& r) override {
     ToyEnv::Step(action, r);
     for (size_t i = 0; i < r.reward.size(); ++i) {
@@ -132,7 +127,7 @@ class Bandit : public ToyEnv {
 TEST(Sac, FindsTheBestActionOfABandit) {
   for (const int bins : {0, 31}) {
     for (const uint64_t seed : {1, 2, 3}) {
-      SacConfig config = SmallConfig();
+      SacConfig config = SmallSac();
       config.mirror = false;
       config.bins = bins;
       config.value_low = -1;
@@ -142,7 +137,7 @@ TEST(Sac, FindsTheBestActionOfABandit) {
       config.alpha = 0.01;
       ThreadPool pool(1);
       Sac agent(config, ToyEnv::Spec(4), seed, pool);
-      Bandit env(4);
+      PeakBandit env(4);
       Walk(agent, env, 1000);
       EXPECT_NEAR(ActionAt(agent, 0), 0.4, 0.1) << "bins " << bins << ", seed " << seed;
     }
@@ -161,7 +156,7 @@ class Constant : public ToyEnv {
 
 TEST(Sac, AConstantRewardIsWorthItsSumForEver) {
   // α = 0, so Q = 1 / (1 - γ): truncations must bootstrap.
-  SacConfig config = SmallConfig();
+  SacConfig config = SmallSac();
   config.tune_alpha = false;
   config.alpha = 0;
   config.gamma = 0.8;
@@ -177,7 +172,7 @@ TEST(Sac, AConstantRewardIsWorthItsSumForEver) {
 
 TEST(Sac, LearnsToStayNearZero) {
   for (const uint64_t seed : {1, 2, 3}) {
-    SacConfig config = SmallConfig();
+    SacConfig config = SmallSac();
     config.gamma = 0.9;
     ThreadPool pool(1);
     Sac agent(config, ToyEnv::Spec(4), seed, pool);
@@ -191,7 +186,7 @@ TEST(Sac, LearnsToStayNearZero) {
 
 TEST(Sac, TheActorsStepLeavesTheCriticsAlone) {
   // Two agents that differ in whether the actor learns have the same critics after one update.
-  SacConfig config = SmallConfig();
+  SacConfig config = SmallSac();
   ThreadPool pool(1);
   config.actor_period = 1;
   Sac learns(config, ToyEnv::Spec(1), 1, pool);
@@ -207,7 +202,7 @@ TEST(Sac, TheActorsStepLeavesTheCriticsAlone) {
 }
 
 TEST(Sac, TheExportedPolicyIsTheActorsMeanAndItsCriticsValue) {
-  SacConfig config = SmallConfig();
+  SacConfig config = SmallSac();
   config.policy_tau = 1;
   ThreadPool pool(1);
   EnvSpec spec = ToyEnv::Spec(1);
@@ -230,7 +225,7 @@ TEST(Sac, TheExportedPolicyIsTheActorsMeanAndItsCriticsValue) {
 }
 
 TEST(Sac, ATruncationBootstrapsFromItsOwnLastObservationAndATerminationFromNothing) {
-  SacConfig config = SmallConfig();
+  SacConfig config = SmallSac();
   config.updates_per_step = 0;
   config.learning_starts = 1000;  // uniform actions
   ThreadPool pool(1);
@@ -251,7 +246,7 @@ TEST(Sac, ATruncationBootstrapsFromItsOwnLastObservationAndATerminationFromNothi
 }
 
 TEST(Sac, SmoothnessChargesForChangesOfTheMeanWithinAnEpisode) {
-  SacConfig config = SmallConfig();
+  SacConfig config = SmallSac();
   config.updates_per_step = 0;
   config.learning_starts = 0;
   config.policy_tau = 1;
@@ -281,14 +276,14 @@ TEST(Sac, MirrorsOnlyWhereTheTaskHasSymmetry) {
   ThreadPool pool(1);
   EnvSpec spec = ToyEnv::Spec(1);
   spec.mirror_signs.clear();
-  SacConfig config = SmallConfig();
+  SacConfig config = SmallSac();
   EXPECT_THROW(Sac(config, spec, 1, pool), Error);
   config.mirror = false;
   EXPECT_NO_THROW(Sac(config, spec, 1, pool));
 }
 
 TEST(Sac, TheNumberOfThreadsChangesNoBit) {
-  SacConfig config = SmallConfig();
+  SacConfig config = SmallSac();
   config.batch = 128;     // four slices
   config.hidden = {130};  // three tasks
   std::vector<float> actor[2], critic[2];
@@ -308,7 +303,7 @@ TEST(Sac, TheNumberOfThreadsChangesNoBit) {
 class SacState : public ::testing::TestWithParam<int> {};
 
 TEST_P(SacState, LoadedStateContinuesWithTheSameBits) {
-  SacConfig config = SmallConfig();
+  SacConfig config = SmallSac();
   config.n_step = 3;
   config.smoothness = 0.1;
   config.policy_tau = 0.1;
@@ -340,12 +335,12 @@ INSTANTIATE_TEST_SUITE_P(Critics, SacState, ::testing::Values(0, 11));
 
 TEST(Sac, NumbersThatAreNotFiniteAreFailures) {
   ThreadPool pool(1);
-  Sac agent(SmallConfig(), ToyEnv::Spec(1), 1, pool);
+  Sac agent(SmallSac(), ToyEnv::Spec(1), 1, pool);
   ToyEnv env(1);
   env.poison = true;
   EXPECT_THROW(Walk(agent, env, 1), Error);
 
-  Sac other(SmallConfig(), ToyEnv::Spec(1), 1, pool);
+  Sac other(SmallSac(), ToyEnv::Spec(1), 1, pool);
   const std::vector<float> before = Copy(other.critic(0));
   Minibatch batch = RandomBatch(16);
   batch.reward[3] = std::numeric_limits<float>::infinity();

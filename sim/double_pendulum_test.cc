@@ -3,17 +3,15 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 #include <numeric>
 
 #include "core/rng.h"
+#include "sim/testing.h"
 
 namespace upswing {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-
-Plant RandomPlant(Rng& rng) {
+Plant ModeratePlant(Rng& rng) {
   Plant p;
   for (double* x : {&p.mass1, &p.mass2, &p.length1, &p.length2}) *x = rng.Uniform(0.2, 2);
   p.gravity = rng.Uniform(1, 20);
@@ -39,7 +37,7 @@ TEST(Energy, MatchesRodsCutIntoPieces) {
   Rng rng(1, "energy");
   constexpr int n = 2000;
   for (int trial = 0; trial < 20; ++trial) {
-    const Plant p = RandomPlant(rng);
+    const Plant p = ModeratePlant(rng);
     const PendulumState s = RandomState(rng);
     const double a = s.q1 + s.q2;
     const double wa = s.w1 + s.w2;
@@ -111,7 +109,7 @@ TEST(Observe, ByHand) {
 TEST(Task, EnergyAndHeightFollowTheCurrentPlant) {
   Rng rng(2, "normalisers");
   for (int trial = 0; trial < 10; ++trial) {
-    const Plant p = RandomPlant(rng);
+    const Plant p = ModeratePlant(rng);
     const auto hanging = Observe(p, {});
     const auto inverted = Observe(p, {kPi, 0, 0, 0});
     EXPECT_NEAR(hanging[6], 0, 1e-6);

@@ -6,12 +6,12 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <numbers>
 
 #include "core/error.h"
 #include "core/testing.h"
 #include "sim/acrobot_v1.h"
 #include "sim/pendulum_v1.h"
+#include "sim/testing.h"
 
 namespace upswing {
 namespace {
@@ -29,8 +29,6 @@ template <typename Task>
 std::unique_ptr<SeededEnv> Make(const GymTaskConfig& config) {
   return std::make_unique<Task>(config);
 }
-
-constexpr double kPi = std::numbers::pi;
 
 class GymTasks : public testing::TestWithParam<TaskCase> {
  protected:

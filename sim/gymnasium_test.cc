@@ -7,18 +7,16 @@
 #include <fstream>
 #include <iterator>
 #include <map>
-#include <numbers>
 
 #include "core/csv.h"
 #include "core/error.h"
 #include "core/text.h"
 #include "sim/acrobot_v1.h"
 #include "sim/pendulum_v1.h"
+#include "sim/testing.h"
 
 namespace upswing {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
 
 /// The columns of a file by their names; each row is one step.
 using Table = std::map<std::string, std::vector<double>>;

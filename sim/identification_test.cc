@@ -5,17 +5,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <vector>
 
 #include "core/rng.h"
 #include "sim/closed_form.h"
 #include "sim/randomization.h"
+#include "sim/testing.h"
 
 namespace upswing {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
 
 /// The standard plant with each number off by up to `share`.
 Plant Near(double share, Rng& rng) {

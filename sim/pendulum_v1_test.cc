@@ -4,12 +4,11 @@
 
 #include <array>
 #include <cmath>
-#include <numbers>
+
+#include "sim/testing.h"
 
 namespace upswing {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
 
 /// One step of one environment from a state under a torque.
 class PendulumV1Step : public testing::Test {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cmath>
+#include <numbers>
 #include <variant>
 
 #include "core/options.h"
@@ -9,6 +10,8 @@
 
 /// What tests of the double pendulum share.
 namespace upswing {
+
+inline constexpr double kPi = std::numbers::pi;
 
 /// Parameters from the whole of their ranges, evenly on a logarithmic scale (or in the cube root,
 /// where a range begins at 0), without rotors and dry friction.

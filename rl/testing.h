@@ -1,0 +1,21 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <string>
+
+#include "rl/agent.h"
+
+/// What tests of agents share.
+namespace upswing {
+
+/// One of an agent's metrics. Fails the test if there is none of that name.
+inline double Metric(const Metrics& metrics, const std::string& name) {
+  const auto found = std::ranges::find(metrics, name, &Metrics::value_type::first);
+  EXPECT_NE(found, metrics.end()) << name;
+  return found == metrics.end() ? std::numeric_limits<double>::quiet_NaN() : found->second;
+}
+
+}  // namespace upswing
