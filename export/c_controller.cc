@@ -1,5 +1,3 @@
-#include "export/c_controller.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -42,6 +42,21 @@ struct CParts {
   std::vector<CArray> samples;    // for the self test
 };
 
+/// States, one control period after the other, and what a policy makes of them: by these a C header
+/// tests itself. S state variables, O outputs of the network.
+struct CSamples {
+  int count = 0;
+  std::vector<float> states, outputs, torques;       // (count × S), (count × O), (count)
+  float output_tolerance = 0, torque_tolerance = 0;  // for other roundings
+};
+
+/// The same for every call. `layers` are those of the network that the header has.
+CSamples DrawSamples(const ExportedPolicy& policy, const std::vector<LayerView>& layers);
+
+/// The C header of a controller: lqr, energy, pfl or tvlqr; see CHeaderOf, which checks the prefix.
+/// Throws BadInput for others.
+CHeader ControllerHeaderOf(const LoadedPolicy& loaded, const std::string& prefix);
+
 /// Writes `text`, and counts the constants; `header` has the sizes in RAM and the prefix.
 void WriteHeader(const CParts& parts, CHeader& header);
 

@@ -1,5 +1,3 @@
-#include "export/c_samples.h"
-
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -10,6 +8,7 @@
 #include "core/error.h"
 #include "core/rng.h"
 #include "core/text.h"
+#include "export/c_header.h"
 
 namespace upswing {
 namespace {

@@ -3,9 +3,7 @@
 
 #include "core/error.h"
 #include "core/text.h"
-#include "export/c_controller.h"
 #include "export/c_header.h"
-#include "export/c_samples.h"
 #include "export/c_text.h"
 #include "export/export.h"
 #include "export/exported_policy.h"
