@@ -187,7 +187,7 @@ HWY_INLINE void AdvanceVectors(ClosedFormBatch& batch, int steps, size_t first, 
   const size_t lanes = hn::Lanes(kDoubles);
   Dynamics p[K];
   State x[K];
-  Angles before[K];
+  Angles before[K] = {};  // of the last step
   HWY_UNROLL(2)
   for (size_t k = 0; k < K; ++k) {
     p[k] = LoadDynamics(batch, first + k * lanes);
