@@ -436,7 +436,7 @@ class CompareTest(ProgramTest):
         refuse = lambda arguments, *words: self.refuse(["compare", *arguments], *words)
         refuse(["lqr", "tvlqr"], "expected trainings beside lqr tvlqr", "bounds lqr tvlqr")
         refuse(["r", "lqr", "--different-tasks"], "--different-tasks", "got lqr")
-        refuse(["r", "--lqr-torque", "2"], "--lqr-torque: expected the controller lqr, got none")
+        refuse(["r", "--lqr-torque", "2"], "--lqr-torque: expected a controller (", "to set, got none")
         refuse(["r", "lqr", "--made-for", "actuated_joint=2"],
                "lqr (for actuated_joint 2): was made for a motor at joint 2, and that of the "
                "runs is at joint 1")

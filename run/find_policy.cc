@@ -35,23 +35,30 @@ LoadedPolicy SwingUpNamed(const std::string& name) {
                         ", which was trained on another"));
 }
 
+/// Throws BadInput if settings of a controller are given that none of the names is.
+void CheckSettings(const PolicyArguments& settings, const std::vector<std::string>& names) {
+  const std::string got = names.empty() ? "none" : Join(names, ", ");
+  if (settings.has_settings() && std::ranges::none_of(names, IsController)) {
+    const std::string flag =
+        settings.flags.empty() ? "--made-for" : FlagOf(settings.flags.front().name);
+    throw BadInput(Concat(flag, ": expected a controller (", Join(ControllerNames(), ", "),
+                          ") to set, got ", got));
+  }
+  for (const FlagValue& flag : settings.flags) {
+    const std::string section = SectionOf(flag);
+    const auto has = [&](const std::string& name) {
+      return IsController(name) && HasSection(name, section);
+    };
+    if (std::ranges::any_of(names, has)) continue;
+    throw BadInput(Concat(FlagOf(flag.name), ": expected the controller ", section, ", got ", got));
+  }
+}
+
 }  // namespace
 
 std::vector<LoadedPolicy> GetPolicies(const std::vector<std::string>& names,
                                       const PolicyArguments& controllers) {
-  for (const FlagValue& flag : controllers.flags) {
-    const auto has = [&](const std::string& name) {
-      return IsController(name) && HasSection(name, SectionOf(flag));
-    };
-    if (std::ranges::any_of(names, has)) continue;
-    const std::string got = names.empty() ? "none" : Join(names, ", ");
-    throw BadInput(
-        Concat(FlagOf(flag.name), ": expected the controller ", SectionOf(flag), ", got ", got));
-  }
-  if (!controllers.made_for.empty() && std::ranges::none_of(names, IsController)) {
-    throw BadInput(Concat("--made-for: expected a controller (", Join(ControllerNames(), ", "),
-                          ") to set, got ", names.empty() ? "none" : Join(names, ", ")));
-  }
+  CheckSettings(controllers, names);
   std::vector<LoadedPolicy> policies;
   std::set<fs::path> seen;  // files, and names of controllers
   for (const std::string& name : names) {
@@ -72,6 +79,7 @@ std::vector<LoadedPolicy> GetPolicies(const std::vector<std::string>& names,
 }
 
 LoadedPolicy GetPolicy(const PolicyArguments& a) {
+  CheckSettings(a, a.name.empty() ? std::vector<std::string>() : std::vector{a.name});
   ControllerConfig config;
   SetFlags(OptionsOf(config), a.flags);
   if (a.name == "hybrid" && !config.swing_up.empty()) {
@@ -86,12 +94,6 @@ LoadedPolicy GetPolicy(const PolicyArguments& a) {
                           a.name, " is the file; for the controller, rename that"));
   }
   if (is_controller) {
-    for (const FlagValue& flag : a.flags) {
-      const std::string section = SectionOf(flag);
-      if (HasSection(a.name, section)) continue;
-      throw BadInput(
-          Concat(FlagOf(flag.name), ": expected the controller ", section, ", got ", a.name));
-    }
     const auto remade = [name = a.name, config](const Plant& plant) {
       ControllerConfig other = config;
       other.plant = plant;
@@ -105,16 +107,10 @@ LoadedPolicy GetPolicy(const PolicyArguments& a) {
             "",
             remade};
   }
-  const std::string controllers = Join(ControllerNames(), ", ");
-  if (a.has_settings()) {
-    const std::string flag = a.flags.empty() ? "--made-for" : FlagOf(a.flags.front().name);
-    throw BadInput(Concat(flag, ": expected a controller (", controllers, ") to set, got ",
-                          a.name.empty() ? "none" : a.name));
-  }
   if (!is_path) {
     throw BadInput(Concat(
         a.name, ": no such file; expected a policy.safetensors, a run folder or a controller (",
-        controllers, ")", DidYouMean(a.name, ControllerNames())));
+        Join(ControllerNames(), ", "), ")", DidYouMean(a.name, ControllerNames())));
   }
   return LoadPolicy(a.name);
 }
