@@ -42,21 +42,6 @@ class PrintedTo {
   Descriptor output_, error_;
 };
 
-/// Stops a run that another worker has taken.
-class ClaimedView : public TrainView {
- public:
-  ClaimedView(const Training& training, const std::function<bool()>& ours)
-      : TrainView(training), ours_(ours) {}
-
-  TrainRequest AfterStep(const TrainState& s) override {
-    if (!ours_()) throw Failure("another worker may have it, as this one was halted");
-    return TrainView::AfterStep(s);
-  }
-
- private:
-  const std::function<bool()>& ours_;
-};
-
 /// Each run in its log, as `train` would print it.
 class LoggedRuns : public WorkerHost {
  public:
@@ -64,12 +49,9 @@ class LoggedRuns : public WorkerHost {
              const std::function<bool()>& ours) override {
     const PrintedTo log(run.log());
     try {
-      const std::unique_ptr<TrainingRun> training = make();
-      ClaimedView view(training->training(), ours);
-      view.Announce(training->path());
-      const bool finished = training->Train(view);
-      view.Summarize(training->path(), finished);
-      return finished;
+      return TrainAndShow(*make(), [&] {
+        if (!ours()) throw Failure("another worker may have it, as this one was halted");
+      });
     } catch (const std::exception& error) {
       SayError(Printable(error.what()));
       throw;
