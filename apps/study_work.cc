@@ -42,41 +42,19 @@ class PrintedTo {
   Descriptor output_, error_;
 };
 
-/// Stops a run that another worker has taken.
-class ClaimedView : public TrainView {
- public:
-  ClaimedView(const Training& training, const std::function<bool()>& ours)
-      : TrainView(training), ours_(ours) {}
-
-  TrainRequest AfterStep(const TrainState& s) override {
-    if (!ours_()) throw Failure("another worker may have it, as this one was halted");
-    return TrainView::AfterStep(s);
+/// Trains a run of a study and prints into its log what `train` would print.
+bool TrainLogged(const SeedRun& run, const std::function<std::unique_ptr<TrainingRun>()>& make,
+                 const std::function<bool()>& ours) {
+  const PrintedTo log(run.log());
+  try {
+    return TrainAndShow(*make(), [&] {
+      if (!ours()) throw Failure("another worker may have it, as this one was halted");
+    });
+  } catch (const std::exception& error) {
+    SayError(Printable(error.what()));
+    throw;
   }
-
- private:
-  const std::function<bool()>& ours_;
-};
-
-/// Each run in its log, as `train` would print it.
-class LoggedRuns : public WorkerHost {
- public:
-  bool Train(const SeedRun& run, const std::function<std::unique_ptr<TrainingRun>()>& make,
-             const std::function<bool()>& ours) override {
-    const PrintedTo log(run.log());
-    try {
-      const std::unique_ptr<TrainingRun> training = make();
-      ClaimedView view(training->training(), ours);
-      view.Announce(training->path());
-      const bool finished = training->Train(view);
-      view.Summarize(training->path(), finished);
-      return finished;
-    } catch (const std::exception& error) {
-      SayError(Printable(error.what()));
-      throw;
-    }
-  }
-  bool stopped() override { return StopSignal() != 0; }
-};
+}
 
 }  // namespace
 
@@ -85,8 +63,7 @@ int WorkOnStudy(const std::filesystem::path& folder) {
   // A job of Slurm hears so that its time is up.
   if (std::getenv("SLURM_JOB_ID") != nullptr) StopAtUserSignals();
   const StudyPlan plan = ReadPlan(folder);
-  LoggedRuns host;
-  const WorkerOutcome outcome = WorkOn(plan, host);
+  const WorkerOutcome outcome = WorkOn(plan, TrainLogged, [] { return StopSignal() != 0; });
   Say("{}: {} done here, {} failed{}{}\n", Printable(folder.string()), outcome.done, outcome.failed,
       outcome.claimed_by_others > 0
           ? fmt::format(", {} with other workers", outcome.claimed_by_others)
@@ -105,11 +82,7 @@ int PrintStudyStatus(const std::filesystem::path& folder) {
   std::vector<std::string> lines;
   for (SeedRun& run : RunsOf(plan)) {
     Counts& c = counts[run.variant];
-    try {
-      run.Read();
-    } catch (const Error& error) {
-      run.problem = error.what();
-    }
+    run.Refresh();
     const auto lease = ReadLease(run.claim());
     if (run.finished) {
       ++c.done;

@@ -68,11 +68,7 @@ int RunTrain(const TrainArguments& arguments) {
   const std::unique_ptr<TrainingRun> run =
       config ? TrainingRun::Make(arguments.out, std::move(*config))
              : TrainingRun::Resume(arguments.resume, arguments.flags);
-  TrainView view(run->training());
-  view.Announce(run->path());
-  const bool finished = run->Train(view);
-  view.Summarize(run->path(), finished);
-  return finished ? 0 : 128 + StopSignal();
+  return TrainAndShow(*run) ? 0 : 128 + StopSignal();
 }
 
 /// Throws if flags for many runs are combined with flags for a single one.

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <filesystem>
 #include <optional>
 
+#include "apps/progress.h"
 #include "apps/say.h"
 #include "apps/signals.h"
 #include "core/format.h"
@@ -15,6 +17,48 @@
 #include "setup/config_checks.h"
 
 namespace upswing {
+namespace {
+
+/// What people see of a training: a progress line, a line for each evaluation, a summary.
+class TrainView : public TrainObserver {
+ public:
+  /// A training, which must outlive this, from where it stands.
+  explicit TrainView(const Training& training);
+
+  /// Prints what is trained and where.
+  void Announce(const std::filesystem::path& run) const;
+
+  void OnMetrics(const TrainState& s, const Metrics& metrics) override;
+  void OnEvaluation(const TrainState& s, const Evaluation& e) override;
+  /// Shows progress if it is time to; returns what signals request.
+  TrainRequest Poll();
+
+  /// Prints the result and the next commands to type. `finished`: the training was not stopped.
+  void Summarize(const std::filesystem::path& run, bool finished);
+
+ private:
+  void UpdateRates(const TrainState& state);
+  /// The rate of updates as the lines show it.
+  std::string UpdatesText() const;
+  /// What the agent has to tell, such as `eps 0.05` and `loss 0.0012`.
+  std::vector<std::string> AgentTexts() const;
+  void ShowProgress(const TrainState& state);
+
+  /// Prints in one sentence how far the training is.
+  void PrintOutcome(bool finished) const;
+
+  const Training& training_;
+  ProgressLine line_;
+  int64_t begin_step_;  // where this view's training began
+  Metrics metrics_;     // the last ones
+
+  // Rates of training, between two reports at least half a second apart; before there are such, of
+  // all that was reported; 0 before the first report.
+  double steps_per_second_ = 0, updates_per_second_ = 0;
+  bool rates_settled_ = false;
+  int64_t since_step_, since_updates_;
+  double since_seconds_;
+};
 
 TrainView::TrainView(const Training& training)
     : training_(training),
@@ -50,8 +94,8 @@ void TrainView::OnMetrics(const TrainState& s, const Metrics& metrics) {
   UpdateRates(s);
 }
 
-TrainRequest TrainView::AfterStep(const TrainState& s) {
-  if (line_.due()) ShowProgress(s);
+TrainRequest TrainView::Poll() {
+  if (line_.due()) ShowProgress(training_.state());
   return PollSignals();
 }
 
@@ -160,6 +204,19 @@ void TrainView::Summarize(const std::filesystem::path& run, bool finished) {
   if (finished && s.solved && config.stop_when_solved) how += " --no-stop-when-solved";
   if (finished && s.steps >= config.steps) how += fmt::format(" --steps {}", 2 * s.steps);
   Say("  ./upswing train --resume {}{}\n", folder, how);
+}
+
+}  // namespace
+
+bool TrainAndShow(TrainingRun& run, const std::function<void()>& check) {
+  TrainView view(run.training());
+  view.Announce(run.path());
+  const bool finished = run.Train(view, [&] {
+    check();
+    return view.Poll();
+  });
+  view.Summarize(run.path(), finished);
+  return finished;
 }
 
 }  // namespace upswing

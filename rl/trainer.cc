@@ -51,7 +51,7 @@ bool Trainer::Step() {
   CountEpisodes();
   if (IsDue(config.log_every)) {
     const Metrics metrics = agent_.TakeMetrics();
-    for (TrainObserver* observer : setup_.observers) observer->OnMetrics(s, metrics);
+    for (TrainObserver* observer : observers_) observer->OnMetrics(s, metrics);
   }
   if (IsDue(config.eval_every) || s.steps >= config.steps) Evaluate(IsDue(config.eval_every));
   return true;
@@ -70,7 +70,7 @@ void Trainer::CountEpisodes() {
     ++s.episodes;
     const FinishedEpisode episode{s.episode_return[env], s.episode_length[env],
                                   result_.terminated[env] != 0, sums};
-    for (TrainObserver* observer : setup_.observers) observer->OnEpisode(s, episode);
+    for (TrainObserver* observer : observers_) observer->OnEpisode(s, episode);
     if (s.recent_returns.size() == kRecentEpisodes) {
       s.recent_returns.erase(s.recent_returns.begin());
     }
@@ -92,7 +92,7 @@ void Trainer::Evaluate(bool scheduled) {
   // Until the task is solved, the best policy's own figures come from the milder judge.
   if (IsBest(e) || (confirm && !s.solved)) KeepAsBest(e);
   if (scheduled) CountStreak(e);
-  for (TrainObserver* observer : setup_.observers) observer->OnEvaluation(s, e);
+  for (TrainObserver* observer : observers_) observer->OnEvaluation(s, e);
 }
 
 bool Trainer::IsBest(const Evaluation& e) const {
@@ -109,7 +109,7 @@ void Trainer::KeepAsBest(const Evaluation& e) {
   info.success_rate = e.success_rate();
   info.mean_return = e.reward_sum.mean;
   const std::unique_ptr<Policy> policy = agent_.ExportPolicy(info);
-  for (TrainObserver* observer : setup_.observers) observer->OnBest(s, *policy);
+  for (TrainObserver* observer : observers_) observer->OnBest(s, *policy);
   s.best_success_rate = e.success_rate();
   s.best_return = e.reward_sum.mean;
   s.best_step = s.steps;

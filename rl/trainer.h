@@ -81,8 +81,6 @@ struct TrainSetup {
   std::function<Evaluation(const Policy&, int64_t step)> evaluate = {};
   /// Describes the policy, to which the step and the evaluation's results are added.
   PolicyInfo policy_info = {};
-  /// Told in this order.
-  std::vector<TrainObserver*> observers = {};
   /// A stricter and slower judge of a policy that `evaluate` passes; empty: none. Its evaluation
   /// counts in place of the other one. It judges the second passed policy in a row, before the task
   /// counts as solved, and afterwards each policy that would be the best one.
@@ -95,6 +93,9 @@ class Trainer {
  public:
   /// The agent and the environments, which must outlive it.
   Trainer(TrainSetup setup, Agent& agent, VectorEnv& env);
+
+  /// Calls this observer from now on, after those added before. It must outlive the last Step.
+  void AddObserver(TrainObserver& observer) { observers_.push_back(&observer); }
 
   /// One step of all environments, then what is due: updates, metrics, an evaluation. False, with
   /// nothing done, once the training is finished. Throws Failure if a number is not finite.
@@ -121,6 +122,7 @@ class Trainer {
   void CountStreak(const Evaluation& e);
 
   TrainSetup setup_;
+  std::vector<TrainObserver*> observers_;
   Agent& agent_;
   VectorEnv& env_;
   TrainState state_;

@@ -30,12 +30,14 @@ class TrainerTest : public ::testing::Test, protected TrainObserver {
     ToyEnv env{4};
     Dqn agent;
     Trainer trainer;
-    Parts(const DqnConfig& dqn, TrainSetup setup)
-        : agent(dqn, env.spec(), 1, pool), trainer(std::move(setup), agent, env) {}
+    Parts(const DqnConfig& dqn, TrainSetup setup, TrainObserver& observer)
+        : agent(dqn, env.spec(), 1, pool), trainer(std::move(setup), agent, env) {
+      trainer.AddObserver(observer);
+    }
   };
 
   Parts Make() {
-    TrainSetup setup{config_, {}, {}, {this}};
+    TrainSetup setup{.config = config_};
     setup.evaluate = [this](const Policy&, int64_t) {
       Evaluation e;
       e.episodes = 4;
@@ -58,7 +60,7 @@ class TrainerTest : public ::testing::Test, protected TrainObserver {
         return e;
       };
     }
-    return {dqn_, std::move(setup)};
+    return {dqn_, std::move(setup), *this};
   }
 
   /// Trains to the end; returns the state there.

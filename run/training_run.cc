@@ -52,8 +52,9 @@ bool StepsGiven(const std::vector<FlagValue>& flags) {
 }
 
 TrainingRun::TrainingRun(fs::path path, const Config& config)
-    : path_(std::move(path)),
-      training_(config, ThisHost(ResolveThreads(config.train.threads)), {this}) {}
+    : path_(std::move(path)), training_(config, ThisHost(ResolveThreads(config.train.threads))) {
+  training_.AddObserver(*this);
+}
 
 std::unique_ptr<TrainingRun> TrainingRun::Make(const fs::path& out, Config config) {
   NameModelCopy(config);
@@ -95,15 +96,15 @@ std::unique_ptr<TrainingRun> TrainingRun::Resume(const fs::path& path,
   return run;
 }
 
-bool TrainingRun::Train(Driver& driver) {
-  view_ = &driver;
+bool TrainingRun::Train(TrainObserver& view, const std::function<TrainRequest()>& poll) {
+  training_.AddObserver(view);
   const WorkClock clock;
   const TrainState& s = training_.state();
   folder_->Log(Concat(s.steps > 0 ? "resumed" : "started", " at step ", s.steps, " ",
                       BeginFacts(training_.threads(), UPSWING_VERSION)));
   bool finished = false;
   try {
-    finished = Loop(driver);
+    finished = Loop(poll);
   } catch (const Error& error) {
     const Error failure = Failure(Concat("training stopped at step ", s.steps, ": ", error.what(),
                                          "; the checkpoint of step ", checkpoint_at_,
@@ -116,10 +117,10 @@ bool TrainingRun::Train(Driver& driver) {
   return finished;
 }
 
-bool TrainingRun::Loop(Driver& driver) {
+bool TrainingRun::Loop(const std::function<TrainRequest()>& poll) {
   const int64_t every = training_.config().train.checkpoint_every;
   while (training_.Step()) {
-    const TrainRequest request = driver.AfterStep(training_.state());
+    const TrainRequest request = poll();
     if (training_.trainer().IsDue(every) || request != TrainRequest::kGoOn) SaveCheckpoint();
     if (request == TrainRequest::kStop) return training_.trainer().finished();
   }
@@ -142,24 +143,20 @@ void TrainingRun::LogIfPossible(const std::string& line) {
 
 void TrainingRun::OnEpisode(const TrainState& s, const FinishedEpisode& episode) {
   folder_->LogEpisode(EpisodeRow(s, episode, training_.spec()));
-  view_->OnEpisode(s, episode);
 }
 
 void TrainingRun::OnMetrics(const TrainState& s, const Metrics& metrics) {
   folder_->LogMetrics(MetricsRow(s, metrics));
-  view_->OnMetrics(s, metrics);
 }
 
 void TrainingRun::OnEvaluation(const TrainState& s, const Evaluation& e) {
   folder_->LogEvaluation(EvaluationCells(s, e));
   folder_->Log(Concat("step ", s.steps, ": ", e.successes, " of ", e.episodes,
                       " episodes succeed, mean return ", FormatNumber(e.reward_sum.mean)));
-  view_->OnEvaluation(s, e);
 }
 
-void TrainingRun::OnBest(const TrainState& s, const Policy& policy) {
+void TrainingRun::OnBest(const TrainState& /*s*/, const Policy& policy) {
   SaveTensors(policy.ToTensors(), path_ / RunFolder::kPolicy);
-  view_->OnBest(s, policy);
 }
 
 }  // namespace upswing

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -32,21 +33,15 @@ class TrainingRun : private TrainObserver {
   const Training& training() const { return training_; }
   const std::filesystem::path& path() const { return path_; }
 
-  /// Who drives a run, besides being told how it goes on.
-  class Driver : public TrainObserver {
-   public:
-    /// After each step: whether to go on.
-    virtual TrainRequest AfterStep(const TrainState&) { return TrainRequest::kGoOn; }
-  };
-
-  /// Trains to the end, or until the driver requests to stop; then the state is on disk. The driver
-  /// is told after the folder is written. Returns whether the training has ended. Throws Failure
-  /// that names the step and the last complete checkpoint.
-  bool Train(Driver& driver);
+  /// Trains to the end, or until `poll`, called after each step, requests to stop; then the state
+  /// is on disk. The view observes each event after the folder has it, and must outlive the
+  /// training. To be called once. Returns whether the training has ended. Throws Failure that names
+  /// the step and the last complete checkpoint.
+  bool Train(TrainObserver& view, const std::function<TrainRequest()>& poll);
 
  private:
   TrainingRun(std::filesystem::path path, const Config& config);
-  bool Loop(Driver& driver);
+  bool Loop(const std::function<TrainRequest()>& poll);
   void SaveCheckpoint();
   void LogIfPossible(const std::string& line);
 
@@ -59,8 +54,7 @@ class TrainingRun : private TrainObserver {
   Training training_;
   std::optional<FolderLock> lock_;
   std::optional<RunFolder> folder_;
-  TrainObserver* view_ = nullptr;  // told after the folder is written
-  int64_t checkpoint_at_ = 0;      // step of the last checkpoint
+  int64_t checkpoint_at_ = 0;  // step of the last checkpoint
 };
 
 }  // namespace upswing

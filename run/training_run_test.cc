@@ -19,6 +19,8 @@ namespace fs = std::filesystem;
 /// Small trainings in folders of their own.
 class TrainingRunTest : public ::testing::Test {
  protected:
+  static constexpr int64_t kNever = std::numeric_limits<int64_t>::max();
+
   static Config SmallConfig() {
     return BuildConfig("", {{"agent", "fast"},
                             {"hidden", "8"},
@@ -35,14 +37,23 @@ class TrainingRunTest : public ::testing::Test {
                             {"threads", "1"}});
   }
 
-  /// Stops at a step.
-  struct StopAt : TrainingRun::Driver {
-    explicit StopAt(int64_t step) : stop(step) {}
-    TrainRequest AfterStep(const TrainState& s) override {
-      return s.steps >= stop ? TrainRequest::kStop : TrainRequest::kGoOn;
-    }
-    int64_t stop;
-  };
+  /// Trains a run until this step. Returns whether it has ended.
+  static bool TrainUntil(int64_t step, TrainingRun& run) {
+    TrainObserver no_view;
+    return run.Train(no_view, [&] {
+      const bool stop = run.training().state().steps >= step;
+      return stop ? TrainRequest::kStop : TrainRequest::kGoOn;
+    });
+  }
+
+  /// Trains a run until this step, where it fails as on a full disk.
+  static void FailAt(int64_t step, const std::string& why, TrainingRun& run) {
+    TrainObserver no_view;
+    run.Train(no_view, [&] {
+      if (run.training().state().steps >= step) throw Failure(why);
+      return TrainRequest::kGoOn;
+    });
+  }
 
   /// Everything that does not depend on the clock.
   static void ExpectSame(const fs::path& a, const fs::path& b) {
@@ -54,16 +65,13 @@ class TrainingRunTest : public ::testing::Test {
 };
 
 TEST_F(TrainingRunTest, StoppedAndResumedEqualsNeverStopped) {
-  StopAt never(std::numeric_limits<int64_t>::max());
-  EXPECT_TRUE(TrainingRun::Make(temp_ / "whole", SmallConfig())->Train(never));
+  EXPECT_TRUE(TrainUntil(kNever, *TrainingRun::Make(temp_ / "whole", SmallConfig())));
 
-  StopAt at_once(4);
-  EXPECT_FALSE(TrainingRun::Make(temp_ / "parts", SmallConfig())->Train(at_once));
+  EXPECT_FALSE(TrainUntil(4, *TrainingRun::Make(temp_ / "parts", SmallConfig())));
   for (const int64_t step : {36, 100, 404, 777}) {
-    StopAt stop(step);
-    EXPECT_FALSE(TrainingRun::Resume(temp_ / "parts")->Train(stop));
+    EXPECT_FALSE(TrainUntil(step, *TrainingRun::Resume(temp_ / "parts")));
   }
-  EXPECT_TRUE(TrainingRun::Resume(temp_ / "parts")->Train(never));
+  EXPECT_TRUE(TrainUntil(kNever, *TrainingRun::Resume(temp_ / "parts")));
   ExpectSame(temp_ / "whole", temp_ / "parts");
 }
 
@@ -75,15 +83,8 @@ TEST_F(TrainingRunTest, ARunInWorkIsLockedAndNeverOverwritten) {
 }
 
 TEST_F(TrainingRunTest, AFailureNamesItsStepAndKeepsTheLastCheckpoint) {
-  // Fails after step 300 as a full disk or a number that is not finite would.
-  struct Fail : TrainingRun::Driver {
-    TrainRequest AfterStep(const TrainState& s) override {
-      if (s.steps >= 300) throw Failure("enough");
-      return TrainRequest::kGoOn;
-    }
-  } fail;
   try {
-    TrainingRun::Make(temp_ / "run", SmallConfig())->Train(fail);
+    FailAt(300, "enough", *TrainingRun::Make(temp_ / "run", SmallConfig()));
     FAIL();
   } catch (const Error& error) {
     EXPECT_EQ(error.exit_code(), 1);
@@ -96,20 +97,15 @@ TEST_F(TrainingRunTest, AFailureNamesItsStepAndKeepsTheLastCheckpoint) {
 }
 
 TEST_F(TrainingRunTest, LogEscapesLineBreaks) {
-  struct Fail : TrainingRun::Driver {
-    TrainRequest AfterStep(const TrainState&) override {
-      throw Failure("x\n2026-01-01 finished\x1b[2J");
-    }
-  } fail;
-  EXPECT_THROW(TrainingRun::Make(temp_ / "run", SmallConfig())->Train(fail), Error);
+  const auto run = TrainingRun::Make(temp_ / "run", SmallConfig());
+  EXPECT_THROW(FailAt(0, "x\n2026-01-01 finished\x1b[2J", *run), Error);
   const std::string log = ReadTextFile(temp_ / "run" / RunFolder::kLog);
   EXPECT_NE(log.find(R"(x\n2026-01-01 finished\x1b[2J)"), std::string::npos) << log;
 }
 
 TEST_F(TrainingRunTest, ATrainingInMemoryGivesThePolicyOfTheRun) {
-  StopAt never(std::numeric_limits<int64_t>::max());
   const auto run = TrainingRun::Make(temp_ / "run", SmallConfig());
-  EXPECT_TRUE(run->Train(never));
+  EXPECT_TRUE(TrainUntil(kNever, *run));
   Training training(SmallConfig(), ThisHost(1));
   while (training.Step()) continue;
   EXPECT_EQ(training.state().steps, run->training().state().steps);

@@ -20,7 +20,7 @@ Config Checked(Config config, const Host& host) {
 
 /// Environments as the settings have them, whose work the pool shares.
 std::unique_ptr<VectorEnv> MakeTrainingEnv(const Config& config, Engines engines,
- ThreadPool& pool) {
+                                           ThreadPool& pool) {
   EnvConfig env = config.Environments();
   env.engine = &FindEngine(engines, config.physics, "--physics");
   env.pool = &pool;
@@ -43,22 +43,26 @@ EnvConfig EvaluationEnvironments(const Config& config, int64_t step) {
   return env;
 }
 
-Training::Training(Config config, const Host& host, std::vector<TrainObserver*> observers)
+Training::Training(Config config, const Host& host)
     : config_(Checked(std::move(config), host)),
- engines_(host.engines),
       pool_(host.threads, config_.train.threads == 0),
-      env_(MakeTrainingEnv(config_, engines_, pool_)),
+      env_(MakeTrainingEnv(config_, host.engines, pool_)),
       agent_(config_.MakeAgent(env_->spec(), pool_)),
-      trainer_(MakeSetup(std::move(observers)), *agent_, *env_) {}
+      trainer_(MakeSetup(host.engines), *agent_, *env_) {}
 
-TrainSetup Training::MakeSetup(std::vector<TrainObserver*> observers) {
-  TrainSetup setup{
-      .config = config_.train, .policy_info = InfoOf(config_), .observers = std::move(observers)};
-  setup.evaluate = [this](const Policy& policy, int64_t step) { return Evaluate(policy, step); };
-  if (IsScreened(config_)) {
-    setup.confirm = [this](const Policy& policy, int64_t step) {
-      return EvaluateIn(Named(kMuJoCoName), policy, step);
+TrainSetup Training::MakeSetup(const Engines& engines) {
+  const auto judge_in = [this](const Engine& engine) {
+    return [this, &engine](const Policy& policy, int64_t step) {
+      return Evaluate(engine, policy, step);
     };
+  };
+  const std::string_view name =
+      config_.eval_physics == kScreened ? kMuJoCoName : std::string_view(config_.eval_physics);
+  const auto judge = judge_in(FindEngine(engines, name, "--eval-physics"));
+  TrainSetup setup{.config = config_.train, .evaluate = judge, .policy_info = InfoOf(config_)};
+  if (IsScreened(config_)) {
+    setup.evaluate = judge_in(kClosedForm);
+    setup.confirm = judge;
   }
   return setup;
 }
@@ -69,13 +73,7 @@ std::unique_ptr<Policy> Training::policy() const {
   return agent_->ExportPolicy(std::move(info));
 }
 
-Evaluation Training::Evaluate(const Policy& policy, int64_t step) {
-  if (IsScreened(config_)) return EvaluateIn(kClosedForm, policy, step);
-  if (config_.eval_physics == kScreened) return EvaluateIn(Named(kMuJoCoName), policy, step);
-  return EvaluateIn(Named(config_.eval_physics), policy, step);
-}
-
-Evaluation Training::EvaluateIn(const Engine& engine, const Policy& policy, int64_t step) {
+Evaluation Training::Evaluate(const Engine& engine, const Policy& policy, int64_t step) {
   EnvConfig config = EvaluationEnvironments(config_, step);
   config.pool = &pool_;
   config.engine = &engine;

@@ -29,9 +29,12 @@ struct Host {
 /// TrainingRun.
 class Training {
  public:
-  /// Observers must outlive it. Throws BadInput if it would not fit into the memory that is free,
-  /// or if the host lacks an engine of the settings.
-  Training(Config config, const Host& host, std::vector<TrainObserver*> observers = {});
+  /// Throws BadInput if it would not fit into the free memory, or if the host lacks an engine of
+  /// the settings.
+  Training(Config config, const Host& host);
+
+  /// Calls this observer from now on; see Trainer::AddObserver.
+  void AddObserver(TrainObserver& observer) { trainer_.AddObserver(observer); }
 
   /// One step of all environments; see Trainer::Step.
   bool Step() { return trainer_.Step(); }
@@ -45,13 +48,6 @@ class Training {
   /// The policy as it stands, without exploration.
   std::unique_ptr<Policy> policy() const;
 
-  /// Evaluation of a policy from fresh starts with the reward's standard weights, on the training
-  /// plant or, where plants are random, on a fresh one for each episode; disturbed as in training.
-  Evaluation Evaluate(const Policy& policy, int64_t step);
-
-  /// Saves or loads the whole state.
-  void State(const Archive& archive) { trainer_.State(archive); }
-
   /// The whole state, with the settings that it belongs to. Views the arrays: to be saved before
   /// the next Step.
   Tensors Checkpoint();
@@ -59,15 +55,12 @@ class Training {
   void Load(const Tensors& checkpoint);
 
  private:
-  TrainSetup MakeSetup(std::vector<TrainObserver*> observers);
-  /// The engine of an evaluation.
-  const Engine& Named(std::string_view engine) const {
-    return FindEngine(engines_, engine, "--eval-physics");
-  }
-  Evaluation EvaluateIn(const Engine& engine, const Policy& policy, int64_t step);
+  TrainSetup MakeSetup(const Engines& engines);
+  /// Evaluation of a policy from fresh starts with the reward's standard weights, on the training
+  /// plant or, where plants are random, on a fresh one for each episode; disturbed as in training.
+  Evaluation Evaluate(const Engine& engine, const Policy& policy, int64_t step);
 
   Config config_;
-  Engines engines_;
   ThreadPool pool_;
   std::unique_ptr<VectorEnv> env_;
   std::unique_ptr<Agent> agent_;

@@ -83,12 +83,8 @@ void CheckRuns(const fs::path& folder, const Config& config, bool more_steps) {
 std::vector<SeedRun> ListRuns(const StudyPlan& plan) {
   std::vector<SeedRun> runs = RunsOf(plan);
   for (SeedRun& run : runs) {
-    try {
-      run.Read();
-    } catch (const Error& broken) {
-      run.problem = broken.what();
-      WriteFailed(run, run.problem);
-    }
+    run.Refresh();
+    if (!run.problem.empty() && !run.HasFailed()) WriteFailed(run, run.problem);
   }
   return runs;
 }
@@ -181,7 +177,7 @@ class LocalWorkers {
     for (auto it = open_.begin(); it != open_.end() && waiting_ < kEnough;) {
       SeedRun& run = **it;
       std::error_code error;
-      if (fs::exists(run.done(), error) || run.HasFailed()) ReadAgain(run);
+      if (fs::exists(run.done(), error) || run.HasFailed()) run.Refresh();
       if (run.finished || !run.problem.empty()) {
         it = open_.erase(it);
         observer_.End(run);
@@ -194,14 +190,6 @@ class LocalWorkers {
         ++waiting_;
       }
       ++it;
-    }
-  }
-
-  static void ReadAgain(SeedRun& run) {
-    try {
-      run.Read();
-    } catch (const Error& error) {
-      run.problem = error.what();
     }
   }
 

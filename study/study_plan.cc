@@ -36,8 +36,6 @@ std::string TailOf(const fs::path& path, std::streamoff bytes) {
 
 }  // namespace
 
-std::string KeepName(Keep keep) { return kKeeps.at(static_cast<size_t>(keep)); }
-
 Keep ParseKeep(std::string_view text, const std::string& where) {
   const auto* found = std::ranges::find(kKeeps, text);
   if (found != kKeeps.end()) return static_cast<Keep>(found - kKeeps.begin());
@@ -82,6 +80,14 @@ void SeedRun::Read() {
   }
   if (!ReadIfFinished() && !IsReduced()) {
     state = ReadTrainState(path, variant->config.Spec());
+  }
+}
+
+void SeedRun::Refresh() {
+  try {
+    Read();
+  } catch (const Error& error) {
+    problem = error.what();
   }
 }
 
@@ -130,7 +136,7 @@ void WritePlan(const StudyPlan& plan) {
     variants.push_back({{"name", variant.name}, {"settings", SettingsMark(variant.config)}});
   }
   const ordered_json j{{"version", UPSWING_VERSION},
-                       {"keep", KeepName(plan.keep)},
+                       {"keep", kKeeps.at(static_cast<size_t>(plan.keep))},
                        {"seeds", Concat("[", SeedsText(plan.seeds), "]")},
                        {"variants", variants}};
   WriteIfOther(plan.folder / kPlanName, PrintableJson(j) + "\n");

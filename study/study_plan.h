@@ -24,9 +24,7 @@ enum class Keep {
   kPolicy,  // its best policy, settings, evaluations and log
   kTables,  // its rows of the study's tables
 };
-/// "all", "policy" or "tables".
-std::string KeepName(Keep keep);
-/// Throws BadInput that begins with `where`.
+/// The value that "all", "policy" or "tables" names. Throws BadInput that begins with `where`.
 Keep ParseKeep(std::string_view text, const std::string& where);
 
 /// Many trainings: each variant with each seed, in FOLDER/VARIANT/seedN.
@@ -65,6 +63,8 @@ struct SeedRun {
   bool ReadIfFinished();
   /// Reads state and problem again. Throws BadInput.
   void Read();
+  /// The same, but an error becomes the run's problem.
+  void Refresh();
 
  private:
   std::filesystem::path With(const char* ending) const { return path.string() + ending; }

@@ -27,6 +27,22 @@ void Reduce(const SeedRun& run, Keep keep) {
   }
 }
 
+/// Writes that a run is done, and removes what is not kept of it. The caller holds its claim.
+void Finish(const SeedRun& run, Keep keep) {
+  const Config& config = run.variant->config;
+  const auto at_end = ReadTrainState(run.path, config.Spec());
+  if (!at_end) throw Failure(Concat(run.path.string(), ": it was removed while it was trained"));
+  const FinishedRun result{*at_end,
+                           run.settings,
+                           config.train.steps,
+                           config.train.stop_when_solved,
+                           UPSWING_VERSION,
+                           RunConditions::Of(run.path),
+                           ReadOwnFile(run.path / RunFolder::kEvaluations)};
+  result.Write(run.done());
+  Reduce(run, keep);
+}
+
 /// Begins a run, or resumes what a worker left of it.
 std::unique_ptr<TrainingRun> MakeOrResume(const SeedRun& run) {
   const TrainConfig& train = run.variant->config.train;
@@ -47,7 +63,8 @@ std::unique_ptr<TrainingRun> MakeOrResume(const SeedRun& run) {
 /// One worker.
 class Worker {
  public:
-  Worker(const StudyPlan& plan, WorkerHost& host) : plan_(plan), host_(host) {}
+  Worker(const StudyPlan& plan, const TrainSeedRun& train, const std::function<bool()>& stopped)
+      : plan_(plan), train_(train), stopped_(stopped) {}
 
   WorkerOutcome Run() {
     std::vector<SeedRun> runs = RunsOf(plan_);
@@ -70,7 +87,7 @@ class Worker {
   enum class Turn { kNothingToDo, kClaimedByOthers, kTried };
 
   Turn Try(SeedRun& run) {
-    outcome_.stopped = host_.stopped();
+    outcome_.stopped = stopped_();
     if (outcome_.stopped) return Turn::kNothingToDo;
     std::optional<Lease> lease;
     try {
@@ -108,7 +125,7 @@ class Worker {
   void Train(SeedRun& run, const Lease& lease) {
     run.Read();
     const auto make = [&] { return MakeOrResume(run); };
-    if (!run.AtEnd() && !host_.Train(run, make, [&] { return lease.held(); })) {
+    if (!run.AtEnd() && !train_(run, make, [&] { return lease.held(); })) {
       outcome_.stopped = true;
       return;
     }
@@ -119,7 +136,8 @@ class Worker {
   }
 
   const StudyPlan& plan_;
-  WorkerHost& host_;
+  const TrainSeedRun& train_;
+  const std::function<bool()>& stopped_;
   WorkerOutcome outcome_;
   int failed_in_a_row_ = 0;
 };
@@ -153,21 +171,9 @@ void WriteFailed(const SeedRun& run, const std::string& why) {
   WriteFileAtomically(run.failed(), Concat(Printable(why), "\n"));
 }
 
-WorkerOutcome WorkOn(const StudyPlan& plan, WorkerHost& host) { return Worker(plan, host).Run(); }
-
-void Finish(const SeedRun& run, Keep keep) {
-  const Config& config = run.variant->config;
-  const auto at_end = ReadTrainState(run.path, config.Spec());
-  if (!at_end) throw Failure(Concat(run.path.string(), ": it was removed while it was trained"));
-  const FinishedRun result{*at_end,
-                           run.settings,
-                           config.train.steps,
-                           config.train.stop_when_solved,
-                           UPSWING_VERSION,
-                           RunConditions::Of(run.path),
-                           ReadOwnFile(run.path / RunFolder::kEvaluations)};
-  result.Write(run.done());
-  Reduce(run, keep);
+WorkerOutcome WorkOn(const StudyPlan& plan, const TrainSeedRun& train,
+                     const std::function<bool()>& stopped) {
+  return Worker(plan, train, stopped).Run();
 }
 
 }  // namespace upswing

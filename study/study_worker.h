@@ -12,18 +12,12 @@ namespace upswing {
 /// What a worker that was told to stop ends with, as sysexits.h has it: try again later.
 inline constexpr int kTryAgain = 75;
 
-/// Who lets a worker's runs be seen, and may stop it.
-class WorkerHost {
- public:
-  virtual ~WorkerHost() = default;
-
-  /// Makes or resumes a run and trains it to its end, or until it is to stop. Returns whether it
-  /// has ended by itself. Throws, and writes nothing more, once it is no longer `ours`, which is to
-  /// be asked after each step.
-  virtual bool Train(const SeedRun& run, const std::function<std::unique_ptr<TrainingRun>()>& make,
-                     const std::function<bool()>& ours) = 0;
-  virtual bool stopped() = 0;
-};
+/// Trains a run, which `make` makes or resumes, to its end or until a signal stops it. Calls `ours`
+/// after each step and, once that returns false, throws and writes nothing more. Returns whether
+/// the training has ended.
+using TrainSeedRun = std::function<bool(const SeedRun& run,
+                                        const std::function<std::unique_ptr<TrainingRun>()>& make,
+                                        const std::function<bool()>& ours)>;
 
 /// How a worker ended.
 struct WorkerOutcome {
@@ -38,7 +32,9 @@ struct WorkerOutcome {
 /// run that fails the reason is written beside it, and no worker tries it again until the study is
 /// begun anew. A run that was done twice does no harm: its bits are the same. Throws Failure if
 /// several runs in a row failed here, or if nothing can be written.
-WorkerOutcome WorkOn(const StudyPlan& plan, WorkerHost& host);
+/// Begins no other run once `stopped` returns true.
+WorkerOutcome WorkOn(const StudyPlan& plan, const TrainSeedRun& train,
+                     const std::function<bool()>& stopped);
 
 /// Writes evaluations.csv into the folder of a plan: the rows of evals.csv of all runs that are
 /// done, with their variant and seed.
@@ -46,9 +42,5 @@ void WriteEvaluations(const StudyPlan& plan);
 
 /// Writes that a run has failed, and why.
 void WriteFailed(const SeedRun& run, const std::string& why);
-
-/// Writes that a run is done, and removes what is not to be kept of it. To be called with its
-/// claim.
-void Finish(const SeedRun& run, Keep keep);
 
 }  // namespace upswing

@@ -138,7 +138,8 @@ int main() try {
     CartEnv carts(50, /*seed=*/1000 + uint64_t(step));
     return Evaluate(policy, carts);
   };
-  Trainer trainer({train, evaluate, {}, {&printer}}, agent, env);
+  Trainer trainer({train, evaluate}, agent, env);
+  trainer.AddObserver(printer);
   while (trainer.Step()) continue;
 
   std::printf("%s after %d steps\n", trainer.state().solved ? "solved" : "not solved",

@@ -22,8 +22,8 @@ class Printer : public TrainObserver {
 int main() try {
   // Settings have the names of the program's flags: `upswing train --help`.
   Printer printer;
-  Training training(BuildConfig("", {{"agent", "fast"}, {"seed", "1"}}), ThisHost(/*threads=*/2),
-                    {&printer});
+  Training training(BuildConfig("", {{"agent", "fast"}, {"seed", "1"}}), ThisHost(/*threads=*/2));
+  training.AddObserver(printer);
   while (training.Step()) continue;
   std::printf("%s\n", training.state().solved ? "solved" : "not solved");
 

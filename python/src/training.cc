@@ -52,7 +52,7 @@ PolicyPointer CopyOf(const Policy& policy, const std::string& name) {
 
 /// Tells Python's `tick` of a training: after a step at which something was due, and every tenth of
 /// a second. It returns False to stop the training.
-class PythonDriver final : public TrainingRun::Driver {
+class PythonDriver final : public TrainObserver {
  public:
   explicit PythonDriver(nb::callable tick) : tick_(std::move(tick)) {}
 
@@ -75,13 +75,13 @@ class PythonDriver final : public TrainingRun::Driver {
     events_.emplace_back("best", Row{{"step", s.steps}});
   }
 
-  TrainRequest AfterStep(const TrainState& s) override {
+  TrainRequest Poll() {
     constexpr std::chrono::milliseconds kBetween(100);
     const auto now = std::chrono::steady_clock::now();
     if (events_.empty() && now - last_ < kBetween) return TrainRequest::kGoOn;
     last_ = now;
     try {
-      return Tell(s) ? TrainRequest::kGoOn : TrainRequest::kStop;
+      return Tell() ? TrainRequest::kGoOn : TrainRequest::kStop;
     } catch (...) {  // the training is to end in order, with its checkpoint
       error_ = std::current_exception();
       return TrainRequest::kStop;
@@ -89,7 +89,8 @@ class PythonDriver final : public TrainingRun::Driver {
   }
 
  private:
-  bool Tell(const TrainState& s) {
+  bool Tell() {
+    const TrainState& s = training_->state();
     const nb::gil_scoped_acquire lock;
     CheckSignals();
     nb::list events;
@@ -153,21 +154,18 @@ struct Driven {
   void Train(PythonDriver& driver) {
     driver.Begin(its());
     if (run) {
-      finished = run->Train(driver);
+      finished = run->Train(driver, [&] { return driver.Poll(); });
       return;
     }
-    finished = true;
-    while (training->Step()) {
-      if (driver.AfterStep(training->state()) != TrainRequest::kStop) continue;
-      finished = training->trainer().finished();
-      return;
-    }
+    training->AddObserver(driver);
+    while (training->Step() && driver.Poll() != TrainRequest::kStop) continue;
+    finished = training->trainer().finished();
   }
 };
 
 /// `about` hears of the settings before anything is written.
 Driven Make(const std::vector<FlagValue>& flags, const std::string& config_file,
-            const std::string& out, const std::string& resume, PythonDriver& driver,
+            const std::string& out, const std::string& resume,
             const std::function<void(const Config&)>& about) {
   Driven driven;
   if (!resume.empty()) {
@@ -182,8 +180,7 @@ Driven Make(const std::vector<FlagValue>& flags, const std::string& config_file,
     return driven;
   }
   const int threads = ResolveThreads(config.train.threads);
-  driven.training = std::make_unique<Training>(std::move(config), ThisHost(threads),
-                                               std::vector<TrainObserver*>{&driver});
+  driven.training = std::make_unique<Training>(std::move(config), ThisHost(threads));
   return driven;
 }
 
@@ -200,7 +197,7 @@ nb::dict Train(const SettingTexts& settings, const std::string& config, const st
   PolicyPointer last, best;
   {
     const nb::gil_scoped_release unlocked;
-    driven = Make(flags, config, out, resume, driver, warn_about);
+    driven = Make(flags, config, out, resume, warn_about);
     driven.Train(driver);
     if (driver.error()) std::rethrow_exception(driver.error());
     last = CopyOf(*driven.its().policy(), "the last policy of this training");

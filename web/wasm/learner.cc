@@ -37,8 +37,8 @@ Config ConfigOf(const std::vector<FlagValue>& flags) {
   });
 }
 
-Learner::Learner(const std::vector<FlagValue>& flags)
-    : training_(InClosedForm(flags), ThisPage(), {this}) {
+Learner::Learner(const std::vector<FlagValue>& flags) : training_(InClosedForm(flags), ThisPage()) {
+  training_.AddObserver(*this);
   Report();  // begins the lists
 }
 
