@@ -107,7 +107,7 @@ int RunPlot(const PlotArguments& a) {
   fmt::print("  torque     {}\n", TorqueText(rollout));
   if (a.episode.given()) {
     fmt::print("  episode    {} of eval: {}\n", a.episode.number,
-               JudgementText(JudgeEpisode(*loaded.policy, config.env), spec.evaluation));
+               JudgementText(*loaded.policy, config.env));
   }
   fmt::print("  written    {}\n", Join(files, ", "));
   return 0;

@@ -63,7 +63,7 @@ int RunSimulate(const SimulateArguments& a) {
   fmt::print("  torque     {}\n", TorqueText(rollout));
   if (loaded && a.episode.given()) {
     fmt::print("  episode    {} of eval: {}\n", a.episode.number,
-               JudgementText(JudgeEpisode(*loaded->policy, config.env), spec.evaluation));
+               JudgementText(*loaded->policy, config.env));
   }
   return 0;
 }

@@ -195,13 +195,11 @@ std::string RolloutCsv(const Rollout& rollout) {
   return csv;
 }
 
-EvaluationEpisode JudgeEpisode(const Policy& policy, const EnvConfig& config) {
-  return EvaluateEpisodes(policy, *MakeEnv(config)).front();
-}
-
-std::string JudgementText(const EvaluationEpisode& episode, const EvaluationRule& rule) {
+std::string JudgementText(const Policy& policy, const EnvConfig& config) {
+  const std::unique_ptr<VectorEnv> env = MakeEnv(config);
+  const EvaluationEpisode episode = EvaluateEpisodes(policy, *env).front();
   std::string upright;
-  if (!rule.by_return()) {
+  if (!env->spec().evaluation.by_return()) {
     upright = episode.swing_up_seconds
                   ? fmt::format("upright from {:.2f} s to the end, ", *episode.swing_up_seconds)
                   : "not upright at the end, ";
@@ -217,21 +215,6 @@ std::string EpisodeText(const Rollout& rollout) {
   if (noise > 0) text += Concat(", sensor_noise ", FormatNumber(noise));
   if (delay > 0) text += Concat(", delay ", FormatNumber(delay));
   return text;
-}
-
-std::vector<double> ParseStart(const std::string& text, const EnvSpec& spec) {
-  const std::vector<std::string_view> pieces = Split(text, ',');
-  const size_t S = spec.state_names.size();
-  std::vector<double> numbers;
-  for (const std::string_view piece : pieces) {
-    const auto number = ParseNumber(piece);
-    if (number && std::isfinite(*number)) numbers.push_back(*number);
-  }
-  if (pieces.size() != S || numbers.size() != S) {
-    throw BadInput(Concat("--start: expected ", S, " numbers ", Join(spec.state_names, ","),
-                          ", got \"", text, "\""));
-  }
-  return numbers;
 }
 
 }  // namespace upswing

@@ -117,18 +117,12 @@ PendulumState StateOf(const RolloutRow& row);
 /// their angles and velocities.
 PendulumState StateBetween(const PendulumState& a, const PendulumState& b, double h, double share);
 
-/// What `eval` says of the environment's own episode.
-EvaluationEpisode JudgeEpisode(const Policy& policy, const EnvConfig& env);
-
-/// The same in words: `success, upright from 2.34 s to the end, return 2345`.
-std::string JudgementText(const EvaluationEpisode& episode, const EvaluationRule& rule);
+/// What `eval` says of the environment's own episode, such as
+/// `success, upright from 2.34 s to the end, return 2345`.
+std::string JudgementText(const Policy& policy, const EnvConfig& config);
 
 /// What distinguishes an episode from others with the same flags: its plant, `mass1 0.93, …`, and
 /// its sensor noise (rad, rad/s) and delay (s) where there are any; empty for other tasks.
 std::string EpisodeText(const Rollout& rollout);
-
-/// A state as --start gives it: a number for each state variable, such as q1,q2,w1,w2 (rad, rad/s).
-/// Throws BadInput.
-std::vector<double> ParseStart(const std::string& text, const EnvSpec& spec);
 
 }  // namespace upswing

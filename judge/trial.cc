@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/error.h"
 #include "core/text.h"
 #include "io/run_folder.h"
-#include "judge/rollout.h"
 #include "mujoco/engines.h"
 #include "run/config_files.h"
 #include "setup/task.h"
@@ -47,6 +47,23 @@ fs::path DefaultOut(const LoadedPolicy& loaded, const std::string& name) {
     out = Concat(first.string(), "-", number);
   }
   return out;
+}
+
+/// A state as --start gives it: a number for each state variable, such as q1,q2,w1,w2 (rad, rad/s).
+/// Throws BadInput.
+std::vector<double> ParseStart(const std::string& text, const EnvSpec& spec) {
+  const std::vector<std::string_view> pieces = Split(text, ',');
+  const size_t S = spec.state_names.size();
+  std::vector<double> numbers;
+  for (const std::string_view piece : pieces) {
+    const auto number = ParseNumber(piece);
+    if (number && std::isfinite(*number)) numbers.push_back(*number);
+  }
+  if (pieces.size() != S || numbers.size() != S) {
+    throw BadInput(Concat("--start: expected ", S, " numbers ", Join(spec.state_names, ","),
+                          ", got \"", text, "\""));
+  }
+  return numbers;
 }
 
 }  // namespace
