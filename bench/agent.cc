@@ -6,7 +6,6 @@
 
 #include "bench/bench.h"
 #include "core/rng.h"
-#include "core/thread_pool.h"
 #include "mujoco/engines.h"
 #include "nn/network_policy.h"
 #include "rl/dqn.h"
@@ -85,7 +84,7 @@ BenchCase GradientCase(const DqnConfig& config, int threads,
                   fmt::join(config.hidden, "-"), config.batch, threads);
   return {name, "updates", 1, UpdateFlops(config), 0, threads, [=]() -> BenchWork {
             struct Parts {
-              ThreadPool pool;
+              BenchPool pool;
               Dqn agent;
               Minibatch batch;
               Rng rng{1, "replay sampling"};
@@ -138,6 +137,7 @@ BenchCase TrainCase(const std::string& agent, const std::string& physics, int th
   const Config config = BuildConfig({}, {{"agent", agent},
                                          {"physics", physics},
                                          {"steps", "1000000000"},
+                                         {"threads", std::to_string(threads)},
                                          {"eval_every", "1000000000"}});
   return {fmt::format("train/{}/{}/threads:{}", agent, physics, threads),
           "steps",
@@ -146,7 +146,8 @@ BenchCase TrainCase(const std::string& agent, const std::string& physics, int th
           0,
           threads,
           [=]() -> BenchWork {
-            const auto training = std::make_shared<Training>(config, ThisHost(threads));
+            const auto training =
+                std::make_shared<Training>(config, ThisHost(ResolveThreads(threads)));
             while (training->agent().updates() == 0) training->Step();
             return [training] { training->Step(); };
           }};

@@ -74,7 +74,7 @@ BenchCase RoundCase(const std::vector<int64_t>& hidden, int64_t batch, int threa
           threads,
           [=]() -> BenchWork {
             struct Parts {
-              ThreadPool pool;
+              BenchPool pool;
               Sac agent;
               Replay replay;
               Minibatch batch;
