@@ -2,12 +2,14 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "core/thread_pool.h"
 #include "io/machine.h"
+#include "rl/replay.h"
 
 /// What `upswing bench` is made of: cases, which know what to do and how much work that is, and
 /// their reporter (bench/report.h).
@@ -47,6 +49,10 @@ struct BenchCase {
   std::function<BenchWork()> prepare = {};
 };
 using BenchCases = std::vector<BenchCase>;
+
+/// A replay memory filled with `size` random transitions, 2% of which terminate. Whole actions are
+/// 0 to 8.
+std::shared_ptr<Replay> FilledReplay(int64_t size, int obs_size, const ActionSpace& actions);
 
 // The parts, each with its cases.
 BenchCases KernelCases(const BenchOptions& options);
