@@ -115,6 +115,14 @@ class BenchTest(ProgramTest):
         medians = [entry for entry in entries if entry.get("aggregate_name") == "median"]
         self.assertEqual(len(medians), 12)
 
+    def test_automatic_threads(self):
+        parts = {"gradient": ["gradient/plain/24-16/batch:8"], "sac": ["sac/24-16/batch:8"],
+                 "ppo": ["ppo/24-16/batch:8"]}
+        rows, written = self.bench(*parts, "--network", "plain", "--hidden", "24,16", "--batch", 8,
+                                   "--threads", "0,1")
+        self.check([f"{name}/threads:{threads}" for names in parts.values() for name in names
+                    for threads in (0, 1)], rows, written)
+
     def test_vector_instructions(self):
         rows, written = self.bench("act", "--simd", "portable")
         self.check(ACT, rows, written)
@@ -123,7 +131,7 @@ class BenchTest(ProgramTest):
     def test_bad_input(self):
         for arguments, words in (
                 (["kernel"], ["kernel", "did you mean kernels?", "gradient, sac, ppo, act"]),
-                (["--threads", "0"], ["--threads"]), (["--threads", "1,x"], ["--threads"]),
+                (["--threads", "-1"], ["--threads"]), (["--threads", "1,x"], ["--threads"]),
                 (["--threads", ""], ["--threads"]), (["--seconds", "0"], ["--seconds"]),
                 (["--seconds", "nan"], ["--seconds"]), (["--repetitions", "0"], ["--repetitions"]),
                 (["--repetitions", "1.5"], ["--repetitions"]), (["--simd", "mmx"], ["mmx"]),

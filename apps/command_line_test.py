@@ -87,7 +87,7 @@ class NumberTest(ProgramTest):
             (["plot", "x", "--seconds", "nan"],
              '--seconds: expected a multiple of 0.02 in [0.1, 1000], got "nan"'),
             (["bench", "--threads", "1,x"],
-             '--threads: expected a list of integers in [1, 256], got "1,x"'),
+             '--threads: expected a list of integers in [0, 256], got "1,x"'),
             (["bench", "--repetitions", "0"],
              '--repetitions: expected an integer in [1, 1000], got "0"'),
             (["bench", "--network", "cnn"], '--network: expected one of plain, dueling, got "cnn"'),

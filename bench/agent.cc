@@ -6,7 +6,6 @@
 
 #include "bench/bench.h"
 #include "core/rng.h"
-#include "core/thread_pool.h"
 #include "mujoco/engines.h"
 #include "nn/network_policy.h"
 #include "rl/dqn.h"
@@ -24,22 +23,6 @@ constexpr int kActions = 9;
 
 /// What the agent of a case learns.
 EnvSpec OneEnvironment() { return PendulumSpec(PendulumEnvConfig()); }
-
-/// A replay memory filled with random transitions, 2% of which terminate.
-std::shared_ptr<Replay> FilledReplay(int64_t size) {
-  Rng rng(1, "benchmark");
-  auto replay = std::make_shared<Replay>(size, kObservationSize, ActionSpace::Discrete(kActions));
-  std::vector<float> obs(kObservationSize);
-  std::vector<float> next_obs(kObservationSize);
-  for (int64_t i = 0; i < size; ++i) {
-    for (float& x : obs) x = static_cast<float>(rng.Uniform(-1, 1));
-    for (float& x : next_obs) x = static_cast<float>(rng.Uniform(-1, 1));
-    const auto action = static_cast<float>(rng.Below(kActions));
-    replay->Add({obs, next_obs, std::span(&action, 1), static_cast<float>(rng.Uniform(-1, 1)),
-                 rng.Uniform() < 0.02 ? 0.0F : 0.99F});
-  }
-  return replay;
-}
 
 /// Multiply-adds that each layer of a network takes for one row, the first layer first.
 std::vector<double> LayerMultiplyAdds(const NetworkShape& shape) {
@@ -85,7 +68,7 @@ BenchCase GradientCase(const DqnConfig& config, int threads,
                   fmt::join(config.hidden, "-"), config.batch, threads);
   return {name, "updates", 1, UpdateFlops(config), 0, threads, [=]() -> BenchWork {
             struct Parts {
-              ThreadPool pool;
+              BenchPool pool;
               Dqn agent;
               Minibatch batch;
               Rng rng{1, "replay sampling"};
@@ -138,6 +121,7 @@ BenchCase TrainCase(const std::string& agent, const std::string& physics, int th
   const Config config = BuildConfig({}, {{"agent", agent},
                                          {"physics", physics},
                                          {"steps", "1000000000"},
+                                         {"threads", std::to_string(threads)},
                                          {"eval_every", "1000000000"}});
   return {fmt::format("train/{}/{}/threads:{}", agent, physics, threads),
           "steps",
@@ -146,7 +130,8 @@ BenchCase TrainCase(const std::string& agent, const std::string& physics, int th
           0,
           threads,
           [=]() -> BenchWork {
-            const auto training = std::make_shared<Training>(config, ThisHost(threads));
+            const auto training =
+                std::make_shared<Training>(config, ThisHost(ResolveThreads(threads)));
             while (training->agent().updates() == 0) training->Step();
             return [training] { training->Step(); };
           }};
@@ -154,13 +139,31 @@ BenchCase TrainCase(const std::string& agent, const std::string& physics, int th
 
 }  // namespace
 
+std::shared_ptr<Replay> FilledReplay(int64_t size, int obs_size, const ActionSpace& actions) {
+  Rng rng(1, "benchmark");
+  auto replay = std::make_shared<Replay>(size, obs_size, actions);
+  std::vector<float> obs(obs_size), next_obs(obs_size), action(actions.size);
+  for (int64_t i = 0; i < size; ++i) {
+    for (float& x : obs) x = static_cast<float>(rng.Uniform(-1, 1));
+    for (float& x : next_obs) x = static_cast<float>(rng.Uniform(-1, 1));
+    for (float& a : action) {
+      a = actions.whole ? static_cast<float>(rng.Below(kActions))
+                        : static_cast<float>(rng.Uniform(-1, 1));
+    }
+    replay->Add({obs, next_obs, action, static_cast<float>(rng.Uniform(-1, 1)),
+                 rng.Uniform() < 0.02 ? 0.0F : 0.99F});
+  }
+  return replay;
+}
+
 BenchCases GradientCases(const BenchOptions& options) {
   std::vector<std::vector<int64_t>> networks{{64, 64}, {128, 128}, {256, 256}};
   if (!options.hidden.empty()) networks = {options.hidden};
   std::vector<int64_t> batches{32, 64, 128, 256};
   if (options.batch > 0) batches = {options.batch};
 
-  const std::shared_ptr<Replay> replay = FilledReplay(100'000);
+  const std::shared_ptr<Replay> replay =
+      FilledReplay(100'000, kObservationSize, ActionSpace::Discrete(kActions));
   BenchCases cases;
   for (const bool dueling : {false, true}) {
     if (!options.network.empty() && (options.network == "dueling") != dueling) continue;
@@ -183,13 +186,15 @@ BenchCases ReplayCases(const BenchOptions& /*options*/) {
   constexpr int kBatch = 128;
   constexpr int64_t kStored = 300'000;
   const auto sample = [=]() -> BenchWork {
-    const std::shared_ptr<Replay> replay = FilledReplay(kStored);
+    const std::shared_ptr<Replay> replay =
+        FilledReplay(kStored, kObservationSize, ActionSpace::Discrete(kActions));
     const auto batch = std::make_shared<Minibatch>(kBatch, kObservationSize);
     const auto rng = std::make_shared<Rng>(1, "replay sampling");
     return [=] { replay->Sample(*rng, *batch); };
   };
   const auto add = [=]() -> BenchWork {
-    const std::shared_ptr<Replay> replay = FilledReplay(kStored);
+    const std::shared_ptr<Replay> replay =
+        FilledReplay(kStored, kObservationSize, ActionSpace::Discrete(kActions));
     const std::vector<float> obs(kObservationSize, 0.5F), action{1};
     return [=] {
       for (int i = 0; i < kBatch; ++i) replay->Add({obs, obs, action, 0.5F, 0.99F});

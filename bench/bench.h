@@ -2,9 +2,14 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "core/thread_pool.h"
+#include "io/machine.h"
+#include "rl/replay.h"
 
 /// What `upswing bench` is made of: cases, which know what to do and how much work that is, and
 /// their reporter (bench/report.h).
@@ -13,7 +18,7 @@ namespace upswing {
 /// What was typed.
 struct BenchOptions {
   std::vector<std::string> parts;   // empty: all
-  std::vector<int64_t> threads;     // each case that can use threads runs with each of these
+  std::vector<int64_t> threads;     // a case that can use threads runs with each; 0: chosen
   std::string network;              // of gradient: "plain", "dueling" or "" for both
   std::vector<int64_t> hidden;      // of gradient, sac and ppo: widths of layers; empty: several
   int64_t batch = 0;                // of gradient, sac and ppo; 0: several
@@ -21,6 +26,12 @@ struct BenchOptions {
   std::optional<std::string> json;  // file to write
   double seconds = 0.2;             // for each repetition, at least
   int64_t repetitions = 3;          // of a case
+};
+
+/// The threads of a case. With 0 threads there is one for each processor, up to 8, and a
+/// ThreadTuner chooses how many of them work, as in a training without --threads.
+struct BenchPool : ThreadPool {
+  explicit BenchPool(int threads) : ThreadPool(ResolveThreads(threads), threads == 0) {}
 };
 
 /// What is timed: one call of it.
@@ -38,6 +49,10 @@ struct BenchCase {
   std::function<BenchWork()> prepare = {};
 };
 using BenchCases = std::vector<BenchCase>;
+
+/// A replay memory filled with `size` random transitions, 2% of which terminate. Whole actions are
+/// 0 to 8.
+std::shared_ptr<Replay> FilledReplay(int64_t size, int obs_size, const ActionSpace& actions);
 
 // The parts, each with its cases.
 BenchCases KernelCases(const BenchOptions& options);

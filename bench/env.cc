@@ -6,7 +6,6 @@
 
 #include "bench/bench.h"
 #include "core/rng.h"
-#include "core/thread_pool.h"
 #include "mujoco/engines.h"
 #include "rl/torque_levels.h"
 #include "sim/closed_form.h"
@@ -42,7 +41,7 @@ class Torques {
 /// MuJoCo's steps as the environment makes them: with what the task says of each fourth, a few
 /// percent of the time.
 BenchWork PhysicsInMuJoCo(int num_envs, int threads) {
-  const auto pool = std::make_shared<ThreadPool>(threads);
+  const auto pool = std::make_shared<BenchPool>(threads);
   PendulumEnvConfig config;
   config.num_envs = num_envs;
   config.pool = pool.get();
@@ -57,7 +56,7 @@ BenchWork PhysicsInClosedForm(int num_envs, int threads) {
   const auto n = static_cast<size_t>(num_envs);
   const auto batch = std::make_shared<ClosedFormBatch>(n);
   for (size_t env = 0; env < n; ++env) batch->SetPlant(env, Plant());
-  const auto pool = std::make_shared<ThreadPool>(threads);
+  const auto pool = std::make_shared<BenchPool>(threads);
   const auto torques = std::make_shared<Torques>(num_envs);
   return [=] {
     batch->SetTorque(torques->Next());
@@ -92,7 +91,7 @@ BenchCase EnvCase(const std::string& physics, int num_envs, int threads) {
           0,
           threads,
           [=]() -> BenchWork {
-            const auto pool = std::make_shared<ThreadPool>(threads);
+            const auto pool = std::make_shared<BenchPool>(threads);
             PendulumEnvConfig config;
             config.engine = &FindEngine(physics, "physics");
             config.num_envs = num_envs;

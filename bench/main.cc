@@ -145,7 +145,10 @@ BenchCases WantedCases(const BenchOptions& options) {
   for (const BenchPart& part : Parts()) {
     const auto& wanted = options.parts;
     if (!wanted.empty() && std::ranges::find(wanted, part.name) == wanted.end()) continue;
-    for (BenchCase& c : part.cases(options)) cases.push_back(std::move(c));
+    for (BenchCase& c : part.cases(options)) {
+      c.threads = ResolveThreads(c.threads);
+      cases.push_back(std::move(c));
+    }
   }
   return cases;
 }
@@ -194,7 +197,7 @@ void AddBench(CommandLine& line) {
   line.Text("--json", o->json, "FILE",
             "file to write, in Google Benchmark's format; -: standard output, without the table");
   Options own;
-  own.Add(&o->threads, "threads", {1, 256}, "numbers of threads").usual =
+  own.Add(&o->threads, "threads", {0, 256}, "numbers of threads; 0: chosen by timing").usual =
       "1 and one for each processor, up to 8";
   AddChoice(own, o->simd, "simd", SimdPaths(), "vector instructions", "the first");
   own.Add(&o->seconds, "seconds", {0.001, 1000}, "s", "for each repetition of a case");
@@ -217,6 +220,7 @@ void AddBench(CommandLine& line) {
       "Examples:\n"
       "  ./upswing bench                                  everything, about two minutes\n"
       "  ./upswing bench gradient train --threads 1,2\n"
+      "  ./upswing bench sac --threads 0,1                the automatic choice beside one thread\n"
       "  ./upswing bench gradient --network plain --hidden 256,256 --batch 128 --json rate.json\n"
       "  ./upswing bench kernels --simd avx2 --seconds 1 --repetitions 5\n");
   line.Run([o] { return RunBench(*o); });

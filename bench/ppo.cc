@@ -38,7 +38,7 @@ double StepFlops(const PpoConfig& config, int obs_size) {
 
 /// Environments and agent of a case.
 struct Parts {
-  ThreadPool pool;
+  BenchPool pool;
   PendulumV1 env;
   Ppo agent;
   StepResult result;

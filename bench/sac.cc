@@ -28,25 +28,6 @@ SacConfig BareConfig(const std::vector<int64_t>& hidden, int64_t batch) {
   return config;
 }
 
-/// A replay memory of random transitions, 2% of which terminate.
-Replay FilledReplay(const EnvSpec& spec, int64_t size) {
-  Rng rng(1, "benchmark");
-  Replay replay(size, spec.obs_size, ActionSpace{spec.action_size()});
-  std::vector<float> obs(static_cast<size_t>(spec.obs_size)), next_obs(obs.size());
-  std::vector<float> action(static_cast<size_t>(spec.action_size()));
-  const auto draw = [&](std::vector<float>& numbers) {
-    for (float& x : numbers) x = static_cast<float>(rng.Uniform(-1, 1));
-  };
-  for (int64_t i = 0; i < size; ++i) {
-    draw(obs);
-    draw(next_obs);
-    draw(action);
-    replay.Add({obs, next_obs, action, static_cast<float>(rng.Uniform(-1, 1)),
-                rng.Uniform() < 0.02 ? 0.0F : 0.99F});
-  }
-  return replay;
-}
-
 /// Multiply-adds for one row: of all layers, and of the first.
 struct MultiplyAdds {
   explicit MultiplyAdds(const NetworkShape& shape)
@@ -74,20 +55,20 @@ BenchCase RoundCase(const std::vector<int64_t>& hidden, int64_t batch, int threa
           threads,
           [=]() -> BenchWork {
             struct Parts {
-              ThreadPool pool;
+              BenchPool pool;
               Sac agent;
-              Replay replay;
+              std::shared_ptr<Replay> replay;
               Minibatch batch;
               Rng rng{1, "replay sampling"};
               Parts(const SacConfig& c, int pool_threads)
                   : pool(pool_threads),
                     agent(c, OneEnvironment(), 1, pool),
-                    replay(FilledReplay(OneEnvironment(), c.replay)),
+                    replay(FilledReplay(c.replay, OneEnvironment().obs_size, ActionSpace{1})),
                     batch(static_cast<int>(c.batch), OneEnvironment().obs_size) {}
             };
             const auto parts = std::make_shared<Parts>(config, threads);
             return [parts] {
-              parts->replay.Sample(parts->rng, parts->batch);
+              parts->replay->Sample(parts->rng, parts->batch);
               parts->agent.Update(parts->batch);
             };
           }};
