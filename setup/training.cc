@@ -87,7 +87,7 @@ Tensors Training::Checkpoint() {
                          {"upswing_version", UPSWING_VERSION},
                          {"config", ConfigToml(config_, true)},
                          {"model", config_.mjcf}};
-  trainer_.State(Archive::Saver(checkpoint));
+  State(Archive::Saver(checkpoint));
   return checkpoint;
 }
 
@@ -107,7 +107,7 @@ void Training::Load(const Tensors& checkpoint) {
   if (checkpoint.Metadata("model") != config_.mjcf) {
     throw BadInput(Concat(checkpoint.where(), ": made with another model than ", config_.model));
   }
-  trainer_.State(Archive::Loader(checkpoint));
+  State(Archive::Loader(checkpoint));
 }
 
 }  // namespace upswing

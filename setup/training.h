@@ -48,6 +48,9 @@ class Training {
   /// The policy as it stands, without exploration.
   std::unique_ptr<Policy> policy() const;
 
+  /// Saves or loads the whole state, without the settings.
+  void State(const Archive& archive) { trainer_.State(archive); }
+
   /// The whole state, with the settings that it belongs to. Views the arrays: to be saved before
   /// the next Step.
   Tensors Checkpoint();
