@@ -186,14 +186,15 @@ class Rendering(unittest.TestCase):
     def test_pictures(self):
         hanging, upright = self.draw([0, 0, 0, 0]), self.draw([np.pi, 0, 0, 0])
         self.assertEqual((hanging.shape, hanging.dtype), ((480, 640, 3), np.uint8))
-        np.testing.assert_array_equal(hanging, self.draw([0, 0, 0, 0]))
+        # Software that draws in several threads need not draw an edge twice the same.
+        self.assertLess((hanging != self.draw([0, 0, 0, 0])).mean(), 0.001)
         # The links are in the lower half when hanging and in the upper one when upright.
         changed = (hanging.astype(int) - upright).any(axis=2)
         self.assertGreater(changed[:240].sum(), 500)
         self.assertGreater(changed[240:].sum(), 500)
         self.assertLess(changed[:, :200].sum() + changed[:, 440:].sum(), 200)
         self.assertEqual(self.draw([0] * 4, width=100, height=50).shape, (50, 100, 3))
-        self.assertFalse(np.array_equal(hanging, self.draw([0] * 4, length2=1)))
+        self.assertGreater((hanging != self.draw([0] * 4, length2=1)).mean(), 0.005)
 
     def test_gymnasium_finds_nothing_wrong_with_pictures(self):
         with warnings.catch_warnings(record=True) as caught:

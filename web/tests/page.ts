@@ -3,10 +3,15 @@ import type { Page } from '@playwright/test';
 import type {} from '../src/page/global';
 
 /// A test that fails if the page writes errors or warnings to the console, unless `complains` is set.
+/// The page draws 15 times a second: without a graphics card, that is most of what a test costs.
 export const test = base.extend<{ complains: boolean; silent: void }>({
   complains: [false, { option: true }],
   silent: [
     async ({ context, complains }, use) => {
+      await context.addInitScript(() => {
+        const { requestAnimationFrame: soon } = globalThis;
+        globalThis.requestAnimationFrame = (draw) => Number(setTimeout(() => soon(draw), 50));
+      });
       const complaints: string[] = [];
       context.on('console', (message) => {
         if (['error', 'warning'].includes(message.type())) complaints.push(message.text());
