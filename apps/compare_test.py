@@ -118,16 +118,6 @@ class CompareTest(ProgramTest):
         self.assertEqual([float(row["best_torque_variation"]) for row in rows],
                          [value / 100 for value in best])
 
-    def test_runs_whose_tables_do_not_tell_torques(self):
-        self.make_group("runs", [1, 2])
-        for seed in (1, 2):
-            path = self.folder / f"runs/seed{seed}/evals.csv"
-            table = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()]
-            path.write_text("".join(",".join(row[:4] + row[7:]) + "\n" for row in table))
-        (group,) = self.compare("runs")["groups"]
-        self.assertEqual(group["best_rms_torque"]["values"], [None, None])
-        self.assertNotIn("torque", self.succeed("compare", "runs"))
-
     def test_the_median_of_runs_half_of_which_never_solve_is_not_reached(self):
         self.make_group("runs", [1, 2, None, None])
         (group,) = self.compare("runs")["groups"]

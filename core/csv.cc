@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "core/error.h"
 #include "core/text.h"
@@ -41,13 +40,12 @@ std::vector<std::string> CellsOf(std::string_view line, const std::string& place
 }  // namespace
 
 std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::string>& names,
-                               const std::string& where, const std::vector<std::string>& optional) {
+                               const std::string& where) {
   std::vector<CsvColumn> columns;
-  columns.reserve(names.size() + optional.size());
+  columns.reserve(names.size());
   for (const std::string& name : names) columns.push_back({name, {}});
-  for (const std::string& name : optional) columns.push_back({name, {}});
-  std::vector<std::optional<size_t>> places;  // indices of the wanted columns in a row
-  size_t width = 0;                           // cells of a row; 0 before the line of names
+  std::vector<size_t> places;  // indices of the wanted columns in a row
+  size_t width = 0;            // cells of a row; 0 before the line of names
   int line_number = 0;
   constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
@@ -59,13 +57,11 @@ std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::str
     if (width == 0) {
       for (const CsvColumn& column : columns) {
         const auto found = std::ranges::find(cells, column.name);
-        const bool there = found != cells.end();
-        if (!there && places.size() < names.size()) {
+        if (found == cells.end()) {
           throw BadInput(
               Concat(place, "expected a column \"", column.name, "\", got \"", line, "\""));
         }
-        places.emplace_back();
-        if (there) places.back() = static_cast<size_t>(found - cells.begin());
+        places.push_back(static_cast<size_t>(found - cells.begin()));
       }
       width = cells.size();
       continue;
@@ -74,8 +70,7 @@ std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::str
       throw BadInput(Concat(place, "expected ", width, " columns, got ", cells.size()));
     }
     for (size_t i = 0; i < places.size(); ++i) {
-      if (!places[i]) continue;
-      const std::string& cell = cells[*places[i]];
+      const std::string& cell = cells[places[i]];
       const auto number = ParseNumber(cell);
       if (!number || !std::isfinite(*number)) {
         throw BadInput(

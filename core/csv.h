@@ -12,15 +12,13 @@ struct CsvColumn {
   std::vector<double> values;  // one for each row
 };
 
-/// The columns called `names`, then those called `optional`, of a CSV text: a line of names, then
-/// rows of cells. A cell may be in double quotes, within which a comma is part of the text and two
-/// quotes stand for one. A byte-order mark at the beginning, lines that begin with #, empty lines
-/// and the contents of other columns are ignored. Messages begin with `where` (a path) and the
-/// line. Throws BadInput if a column is missing, a row has another number of cells than the first
-/// line, a quote is not closed in its line, or a cell is not a finite number. An optional column
-/// that is missing has no values.
+/// The columns called `names` of a CSV text: a line of names, then rows of cells. A cell may be in
+/// double quotes, within which a comma is part of the text and two quotes stand for one. A
+/// byte-order mark at the beginning, lines that begin with #, empty lines and the contents of other
+/// columns are ignored. Messages begin with `where` (a path) and the line. Throws BadInput if a
+/// column is missing, a row has another number of cells than the first line, a quote is not closed
+/// in its line, or a cell is not a finite number.
 std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::string>& names,
-                               const std::string& where,
-                               const std::vector<std::string>& optional = {});
+                               const std::string& where);
 
 }  // namespace upswing

@@ -18,15 +18,6 @@ TEST(Csv, WantedColumnsInTheOrderOfTheirNames) {
   EXPECT_TRUE(ReadCsv("a\n", {"a"}, "t.csv").front().values.empty());
 }
 
-TEST(Csv, OptionalColumnsMayBeMissing) {
-  const auto columns = ReadCsv("a,c\n1,2\n3,4\n", {"a"}, "t.csv", {"b", "c"});
-  ASSERT_EQ(columns.size(), 3U);
-  EXPECT_EQ(columns[0].values, (std::vector<double>{1, 3}));
-  EXPECT_TRUE(columns[1].values.empty());
-  EXPECT_EQ(columns[2].values, (std::vector<double>{2, 4}));
-  EXPECT_THROW(ReadCsv("a,c\n1,x\n", {"a"}, "t.csv", {"c"}), Error);
-}
-
 TEST(Csv, AsSpreadsheetsAndLibrariesWriteIt) {
   const auto values = [](std::string_view text) {
     return ReadCsv(text, {"torque"}, "t.csv").front().values;

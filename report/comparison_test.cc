@@ -46,7 +46,6 @@ TEST(Comparison, FinalAndBestEvaluation) {
 
 TEST(Comparison, TorquesAreThoseOfTheBestEvaluation) {
   RunGroup group{"a", {MadeRun(1, {{1, 2600}, {1, 2500}}), MadeRun(2, {{0, 0}, {1, 9}})}};
-  EXPECT_EQ(Summarize(group).rms_torque.values, (std::vector<double>{kInf, kInf}));
   for (RunRecord& run : group.runs) {
     for (EvaluationRow& row : run.evaluations) {
       row.rms_torque = row.mean_return / 1000;

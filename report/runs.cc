@@ -27,12 +27,10 @@ std::vector<EvaluationRow> ParseEvaluations(std::string text, const std::string&
     }
     text.erase(text.rfind('\n') + 1);  // everything if there is no whole line
   }
-  const auto columns = ReadCsv(text, {"step", "seconds", "success_rate", "mean_return"}, where,
-                               {"rms_torque", "torque_variation", "torque_variation_upright"});
-  const auto known = [&](size_t column, size_t row) {
-    const std::vector<double>& values = columns[column].values;
-    return values.empty() ? EvaluationRow::kUnknown : values[row];
-  };
+  const auto columns = ReadCsv(text,
+                               {"step", "seconds", "success_rate", "mean_return", "rms_torque",
+                                "torque_variation", "torque_variation_upright"},
+                               where);
   std::vector<EvaluationRow> rows;
   for (size_t i = 0; i < columns[0].values.size(); ++i) {
     constexpr double kMostSteps = 1e15;
@@ -41,8 +39,9 @@ std::vector<EvaluationRow> ParseEvaluations(std::string text, const std::string&
                             FormatNumber(columns[0].values[i])));
     }
     rows.push_back({static_cast<int64_t>(columns[0].values[i]), columns[1].values[i],
-                    columns[2].values[i], columns[3].values[i], known(4, i), known(5, i),
-                    columns[2].values[i] > 0 ? known(6, i) : EvaluationRow::kUnknown});
+                    columns[2].values[i], columns[3].values[i], columns[4].values[i],
+                    columns[5].values[i],
+                    columns[2].values[i] > 0 ? columns[6].values[i] : EvaluationRow::kUnknown});
     if (i > 0 && (rows[i].step <= rows[i - 1].step || rows[i].seconds < rows[i - 1].seconds)) {
       throw BadInput(Concat(where, ": expected steps and seconds that rise, got ", rows[i - 1].step,
                             " and ", rows[i].step, " steps, ", FormatNumber(rows[i - 1].seconds),

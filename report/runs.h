@@ -19,10 +19,8 @@ struct EvaluationRow {
   double seconds;       // of training so far, evaluations excluded
   double success_rate;  // share of the episodes
   double mean_return;
-  // Means over the episodes, in the task's unit of actions and that a second; infinite where they
-  // are not known, as in tables of older versions.
-  double rms_torque = kUnknown;
-  double torque_variation = kUnknown;
+  // Means over the episodes, in the task's unit of actions and that a second.
+  double rms_torque = 0, torque_variation = 0;
   double upright_variation = kUnknown;  // of the episodes that succeed, from upright to their end
 
   static constexpr double kUnknown = std::numeric_limits<double>::infinity();
