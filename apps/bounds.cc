@@ -30,14 +30,14 @@ struct BoundsArguments {
 };
 
 /// A line of the table: what was found, or how a policy did.
-struct Row {
+struct BoundsRow {
   std::string name;
   Evaluation figures;  // of the episodes with the best return
   Quartiles swing_up_seconds;
 };
 
 /// `width`: columns of the longest name.
-std::string RowText(const Row& row, const Row& best, size_t width) {
+std::string RowText(const BoundsRow& row, const BoundsRow& best, size_t width) {
   const double mean = row.figures.reward_sum.mean;
   std::string text =
       fmt::format("  {:<{}}  {:6.1f} ± {:5.1f} {:7.1f}%", Printable(row.name), width, mean,
@@ -47,7 +47,7 @@ std::string RowText(const Row& row, const Row& best, size_t width) {
                             row.swing_up_seconds.median - best.swing_up_seconds.median);
 }
 
-nlohmann::ordered_json RowJson(const Row& row, const Row& best) {
+nlohmann::ordered_json RowJson(const BoundsRow& row, const BoundsRow& best) {
   const double mean = row.figures.reward_sum.mean;
   return {{"name", row.name},
           {"success_rate", row.figures.success_rate()},
@@ -73,7 +73,7 @@ int RunBounds(const BoundsArguments& a) {
     return FindBounds(a.config, pool, std::ref(progress));
   }();
 
-  std::vector<Row> rows;
+  std::vector<BoundsRow> rows;
   const auto add = [&](const std::string& name, const BestEpisodes& best) {
     rows.push_back({name, Summarize(best.of_return, bounds.rule),
                     Summarize(best.of_time, bounds.rule).swing_up_seconds});
@@ -89,16 +89,16 @@ int RunBounds(const BoundsArguments& a) {
   if (!a.csv.empty()) WriteOutput(a.csv, BoundsCsv(bounds));
   if (a.as_json) {
     nlohmann::ordered_json j;
-    for (const Row& row : rows) j["rows"].push_back(RowJson(row, rows.front()));
+    for (const BoundsRow& row : rows) j["rows"].push_back(RowJson(row, rows.front()));
     fmt::print("{}\n", PrintableJson(j));
     return 0;
   }
   fmt::print("Best found of {} episode{}, judged in {}\n", a.config.episodes,
              a.config.episodes == 1 ? "" : "s", a.config.trial.physics);
   size_t width = 0;
-  for (const Row& row : rows) width = std::max(width, Printable(row.name).size());
+  for (const BoundsRow& row : rows) width = std::max(width, Printable(row.name).size());
   fmt::print("  {:<{}}  {:<14} {:>8}   median swing-up time\n", "", width, "return", "share");
-  for (const Row& row : rows) fmt::print("{}\n", RowText(row, rows.front(), width));
+  for (const BoundsRow& row : rows) fmt::print("{}\n", RowText(row, rows.front(), width));
   fmt::print(
       "  ± is the standard deviation over the episodes. Returns and times are searched for apart.\n"
       "  Nothing proves that there is no better.\n");

@@ -4,16 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <string>
 #include <vector>
 
+#include "core/format.h"
 #include "core/text.h"
 
 namespace upswing {
 namespace {
-
-constexpr double kDegrees = 180 / std::numbers::pi;
 
 /// How long the episodes are: one length, or, where some end earlier than others, their mean.
 std::string LengthText(const Moments& seconds) {

@@ -20,8 +20,8 @@ static_assert(kReturnSteps * kControlPeriod == kReturnSeconds);
 constexpr int kPlannedSteps = 300;
 /// How smooth the reward is taken, one after the other.
 constexpr double kWidths[] = {0.3, 0.1, 0.05, 0.02, 0.01};
-constexpr double kTolerance = 1e-6;
-constexpr int kIterations = 150;
+constexpr double kSearchTolerance = 1e-6;
+constexpr int kSearchIterations = 150;
 constexpr int kChanges = 100;  // of single torques
 
 /// Weights with which the return grows with the time that is spent upright. A little energy and
@@ -83,7 +83,7 @@ Trajectory BestEpisodeSearch::Sharpen(const Trajectory& trajectory, const Reward
   for (const double width : kWidths) {
     const RewardCost cost(plant_, weights, width);
     now = TrajectoryOptimizer::Priced(cost, std::move(now));
-    optimizer_.Improve(cost, kTolerance, kIterations, now);
+    optimizer_.Improve(cost, kSearchTolerance, kSearchIterations, now);
     const double reward_sum = Judge(now.x[0], now.u, {}, weights).reward_sum;
     if (reward_sum > most) std::tie(most, best) = std::tuple(reward_sum, now);
   }
@@ -172,7 +172,7 @@ std::vector<BestEpisodeSearch::Found> BestEpisodeSearch::From(const StateVector&
     for (StateVector& x : planned.x) x *= sign;
     for (double& u : planned.u) u *= sign;
     Trajectory trajectory = optimizer_.Follow(cost, start, planned, feedback);
-    optimizer_.Improve(cost, kTolerance, kIterations, trajectory);
+    optimizer_.Improve(cost, kSearchTolerance, kSearchIterations, trajectory);
     for (const Aim aim : {Aim::kReturn, Aim::kTime}) {
       trajectory = Sharpen(trajectory, WeightsOf(aim));
       for (size_t i = 0; i < tables.size(); ++i) {

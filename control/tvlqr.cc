@@ -16,8 +16,8 @@ namespace {
 constexpr int kGuesses = 16;
 /// Control periods of the longest guess: 5 s. What is longer is held upright to its end at first.
 constexpr int kLongestGuess = 250;
-constexpr int kIterations = 300;
-constexpr double kTolerance = 1e-7;  // of the cost, in an iteration
+constexpr int kPlanIterations = 300;
+constexpr double kPlanTolerance = 1e-7;  // of the cost, in an iteration
 /// It moves to another place of the plan where that costs less than this share.
 constexpr double kCheaper = 0.25;
 
@@ -36,7 +36,7 @@ std::optional<Trajectory> GuessSwingUp(const LqrConfig& lqr, const LqrCatch& upr
   }
   const QuadraticCost cost(price * WeightsOf(lqr), price * lqr.torque, upright.lqr().P);
   Trajectory trajectory = optimizer.Follow(cost, StateVector::Zero(), torques);
-  optimizer.Improve(cost, kTolerance, kIterations, trajectory);
+  optimizer.Improve(cost, kPlanTolerance, kPlanIterations, trajectory);
   if (!upright.Holds(UprightDeviation(trajectory.x.back()), optimizer.model())) return {};
   while (trajectory.steps() < steps) {
     StateVector x = trajectory.x.back();
@@ -62,7 +62,7 @@ SwingUp PlanSwingUp(const LqrConfig& lqr, const SwingUpConfig& config, const Lqr
     std::optional<Trajectory> found = GuessSwingUp(lqr, upright, steps, rng, optimizer);
     if (!found) continue;
     Trajectory trajectory = TrajectoryOptimizer::Priced(cost, *std::move(found));
-    optimizer.Improve(cost, kTolerance, kIterations, trajectory);
+    optimizer.Improve(cost, kPlanTolerance, kPlanIterations, trajectory);
     const bool holds = upright.Holds(UprightDeviation(trajectory.x.back()), model);
     if (holds && (!best || trajectory.cost < best->cost)) best = std::move(trajectory);
   }

@@ -1,10 +1,13 @@
 #pragma once
 
 #include <concepts>
+#include <numbers>
 #include <string>
 
 /// Numbers as people read them.
 namespace upswing {
+
+inline constexpr double kDegrees = 180 / std::numbers::pi;  // in a radian
 
 /// Seconds as people read them: `8.3 s`, `2 min 05 s`, `1 h 04 min`.
 std::string FormatDuration(double seconds);

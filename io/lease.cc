@@ -26,7 +26,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr size_t kMostBytes = 1000;  // of the file
+constexpr size_t kMostText = 1000;  // of the file
 
 /// A file that is open, and what it is.
 struct Opened {
@@ -73,11 +73,11 @@ double ServerClock(const Making& file) {
 /// lock says whether that process lives.
 std::string TextOf(std::string_view holder, bool locked) {
   return Concat(locked ? "" : "unlocked ", ThisHost(), " ", getpid(), " ", holder, "\n")
-      .substr(0, kMostBytes);
+      .substr(0, kMostText);
 }
 
 std::string ReadText(const Opened& file) {
-  std::array<char, kMostBytes> text{};
+  std::array<char, kMostText> text{};
   const ssize_t size = pread(file.descriptor.get(), text.data(), text.size(), 0);
   return {text.data(), static_cast<size_t>(std::max<ssize_t>(0, size))};
 }

@@ -19,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view kEventsName = "events.out.tfevents.0.upswing";
-constexpr int64_t kMostBytes = int64_t{1} << 60;
+constexpr int64_t kLargestTable = int64_t{1} << 60;
 
 // The files that grow during a run, whose sizes are in the checkpoint.
 constexpr std::array kTables{"metrics", "episodes", "evals", "events"};
@@ -39,7 +39,7 @@ void AddSizes(Tensors& checkpoint, const std::array<int64_t, kTables.size()>& si
 int64_t KnownSize(const Tensors& checkpoint, std::string_view table, const fs::path& path,
                   int64_t size) {
   int64_t known = 0;
-  Archive::Loader(checkpoint).Scalar(SizeName(table), known, {0, kMostBytes});
+  Archive::Loader(checkpoint).Scalar(SizeName(table), known, {0, kLargestTable});
   if (size >= known) return known;
   throw BadInput(Concat(path.string(), ": expected at least the ", known,
                         " bytes that its checkpoint records, got ", size));

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <mutex>
-#include <numbers>
 
 #include "core/error.h"
+#include "core/format.h"
 #include "core/text.h"
 #include "sim/upright_modes.h"
 
@@ -14,7 +14,6 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr double kDegrees = 180 / std::numbers::pi;
 
 ordered_json FigureJson(double value) { return value; }
 ordered_json FigureJson(const Moments& m, double scale = 1) {

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <numeric>
 
+#include "core/format.h"
 #include "core/text.h"
 
 namespace upswing {
@@ -13,7 +13,6 @@ namespace {
 
 using Rows = std::vector<RolloutRow>;
 
-constexpr double kDegrees = 180 / std::numbers::pi;
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 // Where angles wrap, degrees: hanging and upright are both well inside.
 constexpr double kLinkLow = -135, kJointLow = -180;

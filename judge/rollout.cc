@@ -29,8 +29,8 @@ std::vector<double> ValuesOf(const Policy& policy, Matrix<const float> obs,
 }
 
 /// What the policy estimates in a row, as far as it does.
-void Estimate(const Policy& policy, Matrix<const float> obs, Policy::Memory& memory,
-              RolloutRow& row) {
+void AddEstimates(const Policy& policy, Matrix<const float> obs, Policy::Memory& memory,
+                  RolloutRow& row) {
   if (policy.num_values() > 0) row.q = ValuesOf(policy, obs, memory);
   if (!policy.has_spread()) return;
   row.spread.emplace();
@@ -100,7 +100,7 @@ void Episode::Step(bool motor, const std::array<double, 2>& push) {
   row.state.resize(rollout_.spec.state_names.size());
   env_->GetState(0, row.state);
   row.chosen = torque;
-  if (config_.estimates) Estimate(*config_.policy, env_->obs(), *memory_, row);
+  if (config_.estimates) AddEstimates(*config_.policy, env_->obs(), *memory_, row);
   env_->Step({&torque, 1, 1}, result_);
   row.torque = result_.torque[0];
   row.at_goal = result_.at_goal[0] != 0;
