@@ -14,7 +14,6 @@ namespace {
 
 using nlohmann::ordered_json;
 
-
 ordered_json FigureJson(double value) { return value; }
 ordered_json FigureJson(const Moments& m, double scale = 1) {
   return {{"mean", scale * m.mean}, {"deviation", scale * m.deviation}};
