@@ -86,13 +86,16 @@ std::vector<std::string> KnownWords(const CLI::App& app) {
   return words;
 }
 
+/// Says which commands there are, as `got` is none.
+std::string ExplainCommands(const CLI::App& program, const std::string& got) {
+  std::vector<std::string> names;
+  for (const CLI::App* sub : program.get_subcommands({})) names.push_back(sub->get_name());
+  return Concat("expected a command, one of ", Join(names, ", "), "; got ", got);
+}
+
 /// Says what is missing on the command line.
 std::string ExplainMissing(const CLI::App& program, const CLI::App& app) {
-  if (&app == &program) {
-    std::vector<std::string> names;
-    for (const CLI::App* sub : program.get_subcommands({})) names.push_back(sub->get_name());
-    return Concat("expected a command, one of ", Join(names, ", "), "; got none");
-  }
+  if (&app == &program) return ExplainCommands(program, "none");
   for (const CLI::Option* option : app.get_options()) {
     if (!option->get_required() || option->count() > 0) continue;
     return Concat(app.get_name(), ": expected ", option->get_type_name(), " (",
@@ -118,8 +121,10 @@ std::string Explain(const CLI::App& program, const CLI::ParseError& error) {
   const CLI::App& app = chosen.empty() ? program : *chosen.front();
   if (const std::vector<std::string> unknown = app.remaining(); !unknown.empty()) {
     const std::string word = unknown.front().substr(0, unknown.front().find('='));
-    return Concat(word.starts_with("-") ? "unknown flag " : "did not expect ", word,
-                  DidYouMean(word, KnownWords(app)));
+    const std::string meant = DidYouMean(word, KnownWords(app));
+    if (word.starts_with("-")) return Concat("unknown flag ", word, meant);
+    return &app == &program ? ExplainCommands(program, Concat("\"", word, "\"", meant))
+                            : Concat("did not expect ", word, meant);
   }
   if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr) {
     return ExplainMissing(program, app);

@@ -99,6 +99,7 @@ class NumberTest(ProgramTest):
     def test_what_is_missing_or_too_much(self):
         self.refuse_numbers(
             ([], "expected a command, one of train, eval, "),
+            (["evla"], 'got "evla" (did you mean eval?)'),
             (["eval"], "eval: expected POLICY|RUN (policy.safetensors, run folder or controller: "
                        "energy, hybrid, lqr, mpc, pfl, tvlqr), got none"),
             (["compare"], "compare: expected RUN|FOLDER"),

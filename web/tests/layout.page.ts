@@ -35,6 +35,7 @@ test('at any size every link and control can be clicked, every text can be seen'
   page,
 }) => {
   await openAt(page, SIZES[0]!);
+  await expect(page.locator('#reward')).not.toBeEmpty();
   for (const { width, height } of SIZES) {
     await page.setViewportSize({ width, height });
     const covered = await page.evaluate(() => {
