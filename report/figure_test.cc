@@ -243,7 +243,7 @@ TEST_F(FigureTest, WithoutGnuplotTheMessageNamesThePackage) {
 TEST_F(FigureTest, AnErrorOfGnuplotIsReportedOnOneLine) {
   WriteFileAtomically(
       folder_ / "gnuplot",
-      "#!/bin/sh\nprintf '\\nplot x\\n     ^\\n\"-\" line 7: the reason\\n\\n' >&2\n"
+      "#!/bin/sh\nprintf '\\nplot x\\n     ^\\n\"/dev/stdin\" line 7: the reason\\n\\n' >&2\n"
       "exit 1\n");
   fs::permissions(folder_ / "gnuplot", fs::perms::owner_all);
   EXPECT_EQ(FailureWithPath(folder_.path().string(), folder_ / "a.svg"),

@@ -22,7 +22,8 @@ std::string ErrorIn(const std::string& message) {
 }  // namespace
 
 std::string RunGnuplot(const std::string& script) {
-  const std::optional<CommandResult> done = RunCommand({"gnuplot", "-d", "-"}, script);
+  // Of "-" it would read each byte by itself.
+  const std::optional<CommandResult> done = RunCommand({"gnuplot", "-d", "/dev/stdin"}, script);
   if (!done) {
     throw Failure(
         "figure: expected the program gnuplot (Debian's package gnuplot-nox), found none in PATH");
