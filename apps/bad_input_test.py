@@ -329,11 +329,11 @@ class RunFolderTest(SmallRunTest):
                 self.refuse(["simulate", "--seconds", "1", "--csv", csv], csv)
 
     def test_output_that_cannot_be_written(self):
-        for command in (["simulate"], ["simulate", "--seconds", "1"], ["eval", "run", "--json"],
-                        ["eval", "run"], ["info", "run"]):
+        for command in (["simulate"], ["simulate", "--seconds", "1"],
+                        ["eval", "run", "--episodes", "1", "--json"],
+                        ["eval", "run", "--episodes", "1"], ["info", "run"]):
             with self.subTest(command=command), open("/dev/full", "w", encoding="utf-8") as full:
-                done = subprocess.run([UPSWING, *command], cwd=self.folder, stdout=full,
-                                      stderr=subprocess.PIPE, encoding="utf-8", check=False)
+                done = self.run_here(*command, stdout=full)
                 self.assert_one_line(done, 1, "No space left on device")
 
     def test_training_does_not_need_its_output(self):

@@ -67,11 +67,11 @@ def small(**changes):
     return arguments
 
 
-def run(*arguments, cwd=None, **more):
+def run(*arguments, cwd=None, stdout=subprocess.PIPE, **more):
     """Runs the program to its end; text comes back in stdout and stderr, there without the lines
     that long work writes every ten seconds."""
     done = subprocess.run([UPSWING, *map(str, arguments)], cwd=cwd, check=False,
-                          stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                          stdin=subprocess.DEVNULL, stdout=stdout,
                           stderr=subprocess.PIPE, encoding="utf-8", **more)
     done.stderr = re.sub(r"(?m)^upswing: \d+%  \S+ episodes/s  .+ left\n", "", done.stderr)
     return done
