@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "mujoco/egl.h"
 #include "mujoco/painter.h"
 #include "sim/testing.h"
 
@@ -29,7 +30,7 @@ class OffscreenTest : public testing::Test {
     GTEST_SKIP() << "graphics drivers are not made for sanitizers";
 #endif
     try {
-      const Offscreen probe({64, 64});
+      const EglContext probe;
     } catch (const Error& error) {
       if (std::getenv("UPSWING_REQUIRE_PICTURES") != nullptr) throw;
       GTEST_SKIP() << error.what();

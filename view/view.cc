@@ -112,8 +112,8 @@ int64_t Record(View& view, const RecordConfig& config, const std::function<bool(
   const int64_t frames =
       alone ? 1 : static_cast<int64_t>(std::floor(config.seconds / step + 1e-9)) + 1;
   const FrameFormat format{config.size.width, config.size.height, fps, frames};
-  Offscreen offscreen(config.size);
   const auto writer = MakeFrameWriter("--record", config.path, format);
+  Offscreen offscreen(config.size);
   for (int64_t i = 0; i < frames; ++i) {
     const double seconds = alone ? config.seconds : static_cast<double>(i) * step;
     // Rounded, as a control step's own time must find its own row.
