@@ -43,15 +43,12 @@ add_subdirectory(docs)
 add_subdirectory(headers)
 add_subdirectory(wants)
 """
-DOCS = """find_package(upswing REQUIRED COMPONENTS sim rl)
+DOCS = """find_package(upswing REQUIRED COMPONENTS sim rl control)
 add_executable(docs docs.cc)
-target_link_libraries(docs PRIVATE upswing::sim upswing::rl)
+target_link_libraries(docs PRIVATE upswing::sim upswing::rl upswing::control)
 """
 HEADERS = """find_package(upswing REQUIRED)
-add_compile_options(-O0)
-add_library(portable OBJECT portable.cc)
 add_library(all_of_them OBJECT all.cc)
-target_link_libraries(portable PRIVATE upswing::control upswing::rl)
 target_link_libraries(all_of_them PRIVATE upswing::judge upswing::control)
 """
 # Requests for the package, and whether it answers them: its own minor version has to match.
@@ -79,18 +76,17 @@ class Library(unittest.TestCase):
         cls.include = cls.prefix / "include/upswing"
         source = cls.folder / "source"
         for path, text in (("CMakeLists.txt", PROJECT), ("docs/CMakeLists.txt", DOCS),
-                           ("docs/docs.cc", "\n".join(cls.blocks())),
+                           ("docs/docs.cc", "\n".join([*cls.blocks(), cls.all_headers(PORTABLE)])),
                            ("headers/CMakeLists.txt", HEADERS),
-                           ("headers/portable.cc", cls.all_headers(PORTABLE)),
                            ("headers/all.cc", cls.all_headers(LAYERS)),
                            ("wants/CMakeLists.txt", WANTS)):
             (source / path).parent.mkdir(parents=True, exist_ok=True)
             (source / path).write_text(text, encoding="utf-8")
         cache = (BUILD / "CMakeCache.txt").read_text(encoding="utf-8")
         compiler = re.search(r"^CMAKE_CXX_COMPILER:\w+=(.*)", cache, re.MULTILINE)[1]
-        # Most of the time goes into headers, so an optimizer that works harder gains nothing.
+        # What takes time when it runs is in the library, so nothing is optimized here.
         options = [f"-DCMAKE_CXX_COMPILER={compiler}", f"-DCMAKE_PREFIX_PATH={cls.prefix}",
-                   "-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_CXX_FLAGS_RELEASE=-O1 -DNDEBUG",
+                   "-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_CXX_FLAGS_RELEASE=-O0 -DNDEBUG",
                    "-DCMAKE_CXX_FLAGS=-Wall -Wextra -Wpedantic -Werror"]
         if shutil.which("ccache"):
             options.append("-DCMAKE_CXX_COMPILER_LAUNCHER=ccache")
@@ -124,8 +120,8 @@ class Library(unittest.TestCase):
     def test_train_and_judge(self):
         lines = run(self.build("train_and_judge")).splitlines()
         self.assertEqual(lines[-2], "solved")
-        judged = re.match(r"judged in MuJoCo: (\d+) of 200 episodes", lines[-1])
-        self.assertGreaterEqual(int(judged[1]), 190)
+        judged = re.match(r"judged in MuJoCo: (\d+) of 100 episodes", lines[-1])
+        self.assertGreaterEqual(int(judged[1]), 95)
 
     def test_own_task(self):
         program = self.build("own_task")
@@ -161,7 +157,7 @@ class Library(unittest.TestCase):
 
     def test_every_header_can_be_included(self):
         self.assertEqual({path.name for path in self.include.iterdir()}, set(LAYERS))
-        self.build("portable", "all_of_them")
+        self.build("docs", "all_of_them")  # docs: with no more than what the portable ones need
 
     def test_package_refuses_what_it_is_not(self):
         answers = dict(re.findall(r"^-- wants (.*?): (\d)$", self.configured, re.MULTILINE))

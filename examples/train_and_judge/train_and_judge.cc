@@ -1,4 +1,4 @@
-// Trains the agent `fast` on the double pendulum, in memory, and judges it on 200 new starts.
+// Trains the agent `fast` on the double pendulum, in memory, and judges it on 100 new starts.
 #include <cstdio>
 
 #include "core/error.h"
@@ -29,7 +29,7 @@ int main() try {
 
   EnvConfig test;  // the double pendulum, hanging with a little noise
   test.engine = &kMuJoCo;
-  test.num_envs = 200;
+  test.num_envs = 100;
   test.seed = 2;
   const Evaluation e = Evaluate(*training.policy(), *MakeEnv(test));
   std::printf("judged in MuJoCo: %d of %d episodes succeed; swing-up in %.2f s (median)\n",
