@@ -67,12 +67,14 @@ class ResumeTest(ProgramTest):
 
     def test_killed_before_it_trains_leaves_a_whole_run_or_none(self):
         moments = random.Random(2)
+        short = {"steps": 1000, "eval_every": 1000}
         for i in range(10):
             run = self.folder / f"run{i}"
-            process = self.start(*small(out=run.name), wait=False)
+            process = self.start(*small(out=run.name, **short), wait=False)
             time.sleep(moments.uniform(0, 0.01))
             self.end(process, signal.SIGKILL)
-            again = ["train", "--resume", run.name] if run.exists() else small(out=run.name)
+            again = (["train", "--resume", run.name] if run.exists() else
+                     small(out=run.name, **short))
             self.succeed(*again)
         self.assertEqual(len({(self.folder / f"run{i}/policy.safetensors").read_bytes()
                               for i in range(10)}), 1)

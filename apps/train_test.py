@@ -4,9 +4,11 @@
 import json
 import os
 import re
+import tempfile
 import unittest
+from pathlib import Path
 
-from testing import (MODEL, REWARD_TERMS, ROOT, RUN_FILES, ProgramTest, read_csv, read_tensors,
+from testing import (MODEL, REWARD_TERMS, ROOT, RUN_FILES, ProgramTest, read_csv, read_tensors, run,
                      small)
 
 ENDLESS = small(steps=10**9, stop_when_solved=False)
@@ -18,26 +20,89 @@ EVALS = ["step", "success_rate", "success_low", "success_high", "mean_return", "
          "work", "rms_torque", "torque_variation", "torque_variation_upright", "value", "discounted_return", "seconds"]
 
 
+class SmallTrainingTest(ProgramTest):
+    """One small training: what it prints and writes."""
+
+    @classmethod
+    def setUpClass(cls):
+        temporary = tempfile.TemporaryDirectory(prefix="upswing-")
+        cls.addClassCleanup(temporary.cleanup)
+        cls.place = Path(temporary.name)
+        done = run(*small(), cwd=cls.place)
+        assert (done.returncode, done.stderr) == (0, ""), done
+        cls.output = done.stdout
+
+    def table(self, name, columns):
+        """The rows of a table of the run, which has just these columns."""
+        path = self.place / "run" / name
+        self.assertEqual(path.read_text(encoding="utf-8").splitlines()[0], ",".join(columns))
+        return read_csv(path)
+
+    def test_plain_lines_when_piped(self):
+        self.assertNotIn("\x1b", self.output)
+        self.assertNotIn("\r", self.output)
+        self.assertTrue(self.output.startswith("Training d3qn-small (seed 1) in run\n"), self.output)
+        # Rates are known from the first report on, however short the time.
+        self.assertEqual(len(re.findall(r"^ *[24],000 steps .* [1-9][\d,]* updates/s .*"
+                                        r"success +\d/4$", self.output, re.M)), 2)
+
+    def test_run_folder_holds_just_its_files(self):
+        self.assertEqual({path.name for path in (self.place / "run").iterdir()}, RUN_FILES)
+        self.assertEqual([path.name for path in self.place.iterdir()], ["run"])
+
+    def test_log_tells_what_times_depend_on(self):
+        log = (self.place / "run/log.txt").read_text(encoding="utf-8")
+        begin = json.loads(re.search(r"Z started at step 0 (\{.*\})\n", log).group(1))
+        self.assertEqual(list(begin), ["host", "vectors", "threads", "processor", "version"])
+        self.assertEqual(begin["threads"], 1)
+        end = json.loads(re.search(r"Z finished at step 4000 (\{.*\})\n$", log).group(1))
+        self.assertEqual(list(end), ["seconds", "busy"])
+        self.assertGreater(end["busy"], 0)
+
+    def test_metrics(self):
+        rows = self.table("metrics.csv", METRICS)
+        # Eight parallel environments: the row comes with the first step at or past a multiple.
+        self.assertEqual([row["step"] for row in rows],
+                         [504, 1000, 1504, 2000, 2504, 3000, 3504, 4000])
+        self.assertEqual([row["updates"] for row in rows],
+                         [(row["step"] - 200) // 4 for row in rows])
+        for before, after in zip(rows, rows[1:]):
+            self.assertGreaterEqual(before["epsilon"], after["epsilon"])
+            self.assertGreater(before["learning_rate"], after["learning_rate"])
+            self.assertLessEqual(before["seconds"], after["seconds"])
+        for row in rows:
+            self.assertGreater(row["loss"], 0)
+            self.assertGreater(row["td_error"], 0)
+            self.assertGreater(row["gradient_norm"], 0)
+            self.assertAlmostEqual(row["epsilon"], max(0.05, 0.97 ** row["episodes"]), delta=1e-12)
+
+    def test_episodes(self):
+        rows = self.table("episodes.csv", EPISODES)
+        self.assertEqual([row["episode"] for row in rows], list(range(1, 17)))  # 4000 / 200 - 4
+        for row in rows:
+            self.assertEqual((row["length"], row["terminated"]), (200, 0))
+            self.assertAlmostEqual(sum(row[term] for term in REWARD_TERMS), row["return"],
+                                   delta=1e-9)
+            self.assertTrue(0 <= row["energy"] <= 300 and 0 <= row["height"] <= 200, row)
+            self.assertEqual(row["balance"] % 5, 0)
+            self.assertTrue(row["velocity_penalty"] <= 0 and row["torque_penalty"] < 0, row)
+
+    def test_evaluations(self):
+        rows = self.table("evals.csv", EVALS)
+        self.assertEqual([row["step"] for row in rows], [2000, 4000])
+        for row in rows:
+            self.assertTrue(0 <= row["success_low"] <= row["success_rate"] <= row["success_high"]
+                            <= 1, row)
+            self.assertTrue(row["work"] > 0 and 0 < row["rms_torque"] <= 5, row)
+            self.assertTrue(0 < row["torque_variation"] <= 500, row)
+            self.assertLessEqual(row["torque_variation_upright"], 500 * row["success_rate"] or 0)
+
+
 class TrainTest(ProgramTest):
     def policy_of(self, name):
         return (self.folder / name / "policy.safetensors").read_bytes()
 
-    def table(self, name, columns):
-        """The rows of a table of the run, which has just these columns."""
-        path = self.folder / "run" / name
-        self.assertEqual(path.read_text(encoding="utf-8").splitlines()[0], ",".join(columns))
-        return read_csv(path)
-
     # ---- What it prints.
-
-    def test_plain_lines_when_piped(self):
-        output = self.succeed(*small())
-        self.assertNotIn("\x1b", output)
-        self.assertNotIn("\r", output)
-        self.assertTrue(output.startswith("Training d3qn-small (seed 1) in run\n"), output)
-        # Rates are known from the first report on, however short the time.
-        self.assertEqual(len(re.findall(r"^ *[24],000 steps .* [1-9][\d,]* updates/s .*"
-                                        r"success +\d/4$", output, re.M)), 2)
 
     def test_a_rate_is_told_once_it_is_known(self):
         output = self.succeed(*small(log_every=3000))
@@ -68,65 +133,9 @@ class TrainTest(ProgramTest):
 
     # ---- What it writes.
 
-    def test_run_folder_holds_just_its_files(self):
-        self.succeed(*small())
-        self.assertEqual({path.name for path in (self.folder / "run").iterdir()}, RUN_FILES)
-        self.assertEqual([path.name for path in self.folder.iterdir()], ["run"])
-
-    def test_log_tells_what_times_depend_on(self):
-        self.succeed(*small())
-        log = (self.folder / "run/log.txt").read_text(encoding="utf-8")
-        begin = json.loads(re.search(r"Z started at step 0 (\{.*\})\n", log).group(1))
-        self.assertEqual(list(begin), ["host", "vectors", "threads", "processor", "version"])
-        self.assertEqual(begin["threads"], 1)
-        end = json.loads(re.search(r"Z finished at step 4000 (\{.*\})\n$", log).group(1))
-        self.assertEqual(list(end), ["seconds", "busy"])
-        self.assertGreater(end["busy"], 0)
-
-    def test_metrics(self):
-        self.succeed(*small())
-        rows = self.table("metrics.csv", METRICS)
-        # Eight parallel environments: the row comes with the first step at or past a multiple.
-        self.assertEqual([row["step"] for row in rows],
-                         [504, 1000, 1504, 2000, 2504, 3000, 3504, 4000])
-        self.assertEqual([row["updates"] for row in rows],
-                         [(row["step"] - 200) // 4 for row in rows])
-        for before, after in zip(rows, rows[1:]):
-            self.assertGreaterEqual(before["epsilon"], after["epsilon"])
-            self.assertGreater(before["learning_rate"], after["learning_rate"])
-            self.assertLessEqual(before["seconds"], after["seconds"])
-        for row in rows:
-            self.assertGreater(row["loss"], 0)
-            self.assertGreater(row["td_error"], 0)
-            self.assertGreater(row["gradient_norm"], 0)
-            self.assertAlmostEqual(row["epsilon"], max(0.05, 0.97 ** row["episodes"]), delta=1e-12)
-
-    def test_episodes(self):
-        self.succeed(*small())
-        rows = self.table("episodes.csv", EPISODES)
-        self.assertEqual([row["episode"] for row in rows], list(range(1, 17)))  # 4000 / 200 - 4
-        for row in rows:
-            self.assertEqual((row["length"], row["terminated"]), (200, 0))
-            self.assertAlmostEqual(sum(row[term] for term in REWARD_TERMS), row["return"],
-                                   delta=1e-9)
-            self.assertTrue(0 <= row["energy"] <= 300 and 0 <= row["height"] <= 200, row)
-            self.assertEqual(row["balance"] % 5, 0)
-            self.assertTrue(row["velocity_penalty"] <= 0 and row["torque_penalty"] < 0, row)
-
-    def test_evaluations(self):
-        self.succeed(*small())
-        rows = self.table("evals.csv", EVALS)
-        self.assertEqual([row["step"] for row in rows], [2000, 4000])
-        for row in rows:
-            self.assertTrue(0 <= row["success_low"] <= row["success_rate"] <= row["success_high"]
-                            <= 1, row)
-            self.assertTrue(row["work"] > 0 and 0 < row["rms_torque"] <= 5, row)
-            self.assertTrue(0 < row["torque_variation"] <= 500, row)
-            self.assertLessEqual(row["torque_variation_upright"], 500 * row["success_rate"] or 0)
-
     def test_best_evaluation_is_kept(self):
         self.succeed(*small(steps=20000))
-        rows = self.table("evals.csv", EVALS)
+        rows = read_csv(self.folder / "run/evals.csv")
         best = max(rows, key=lambda row: (row["success_rate"], row["mean_return"]))
         about, _ = read_tensors(self.folder / "run/policy.safetensors")
         self.assertEqual(float(about["step"]), best["step"])
