@@ -92,7 +92,7 @@ class WorkersTest(ProgramTest):
                       self.succeed("study", "little.toml", "--out", "study"))
 
     def test_workers_that_are_killed_lose_no_run_and_change_no_bit(self):
-        text = STUDY.replace("seeds = 4", f"seeds = {SEEDS}").replace("400", "2000")
+        text = STUDY.replace("seeds = 4", f"seeds = {SEEDS}").replace("400", "1000")
         study = self.prepare(text, "study", "--keep", "tables")
         rng = random.Random(1)
         workers, kills = [], 0
