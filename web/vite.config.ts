@@ -16,6 +16,7 @@ export default defineConfig({
     include: ['src/**/*.test.ts', 'build/**/*.test.ts'],
     environment: 'node',
     setupFiles: ['tests/core.ts'],
+    isolate: false, // the core is compiled once; no test changes what another one imports
     testTimeout: 1_200_000, // ms: no test asks how fast, and a machine may be busy
   },
 });

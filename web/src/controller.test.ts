@@ -12,6 +12,7 @@ test('what nobody holds any more is freed', async () => {
   async function openAndForget(times: number): Promise<number> {
     for (let k = 0; k < times; ++k) {
       new CoreController(file.slice(0));
+      if (k % 5 > 0) continue; // a collection takes longer than an opening
       collect();
       await new Promise((resolve) => setTimeout(resolve, 0));
     }

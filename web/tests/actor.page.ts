@@ -20,7 +20,7 @@ const CHARTS = [
 ];
 
 test('the chart is that of the policy, and Q-values come back with a Q-network', async ({
-  page,
+  stage: page,
 }) => {
   await open(page);
   await expect(page.locator('#q-name')).toHaveText('Q-values');
@@ -38,51 +38,49 @@ test('the chart is that of the policy, and Q-values come back with a Q-network',
   }
 });
 
-test.describe('on a canvas that is read back', () => {
-  test.use({ complains: true }); // that it could be faster
-
-  test('the curve is in the middle of its mean, and moves with what is seen', async ({ page }) => {
-    await open(page);
-    await page.locator('#pause').click();
-    /// Where the line at the mean is (0 left, 1 right), and the share of the chart that is painted.
-    const chart = () =>
-      page.evaluate(async () => {
-        for (let k = 0; k < 4; ++k) await new Promise(requestAnimationFrame);
-        const canvas = document.getElementById('q') as HTMLCanvasElement;
-        const { width, height } = canvas;
-        const { data } = canvas.getContext('2d')!.getImageData(0, 0, width, height);
-        // In its top rows nothing else stands but the curve's own peak.
-        const alpha = (x: number, y: number) => data[4 * (y * width + x) + 3]!;
-        let painted = 0;
-        for (let at = 3; at < data.length; at += 4) painted += data[at]! > 0 ? 1 : 0;
-        const ratio = canvas.width / canvas.clientWidth;
-        const { torque } = upswing.world.decision!;
-        const at = 10 + ((torque + 5) / 10) * (canvas.clientWidth - 20);
-        const column = Math.floor(at * ratio);
-        let line = 0;
-        const rows = Math.round((canvas.clientHeight - 24) * ratio);
-        for (let y = Math.round(6 * ratio); y < rows; ++y) line += alpha(column, y) > 200 ? 1 : 0;
-        return { painted: painted / (width * height), line: line / rows, mean: torque };
-      });
-    const means = new Set<number>();
-    for (const file of actorFiles().slice(0, 3)) {
-      await bring(page, file);
-      await expect(page.locator('#agent')).toHaveValue('own');
-      for (const q1 of [0, 1, -2]) {
-        await startFrom(page, q1);
-        const { painted, line, mean } = await chart();
-        expect(painted).toBeGreaterThan(0.03);
-        expect(line).toBeGreaterThan(0.85);
-        means.add(Math.round(100 * mean));
-      }
-      await page.locator('#agent').selectOption('d3qn');
-      await expect(page.locator('#agent')).toHaveValue('d3qn');
+test('the curve is in the middle of its mean, and moves with what is seen', async ({
+  stage: page,
+}) => {
+  await open(page);
+  await page.locator('#pause').click();
+  /// Where the line at the mean is (0 left, 1 right), and the share of the chart that is painted.
+  const chart = () =>
+    page.evaluate(async () => {
+      for (let k = 0; k < 4; ++k) await new Promise(requestAnimationFrame);
+      const canvas = document.getElementById('q') as HTMLCanvasElement;
+      const { width, height } = canvas;
+      const { data } = canvas.getContext('2d')!.getImageData(0, 0, width, height);
+      // In its top rows nothing else stands but the curve's own peak.
+      const alpha = (x: number, y: number) => data[4 * (y * width + x) + 3]!;
+      let painted = 0;
+      for (let at = 3; at < data.length; at += 4) painted += data[at]! > 0 ? 1 : 0;
+      const ratio = canvas.width / canvas.clientWidth;
+      const { torque } = upswing.world.decision!;
+      const at = 10 + ((torque + 5) / 10) * (canvas.clientWidth - 20);
+      const column = Math.floor(at * ratio);
+      let line = 0;
+      const rows = Math.round((canvas.clientHeight - 24) * ratio);
+      for (let y = Math.round(6 * ratio); y < rows; ++y) line += alpha(column, y) > 200 ? 1 : 0;
+      return { painted: painted / (width * height), line: line / rows, mean: torque };
+    });
+  const means = new Set<number>();
+  for (const file of actorFiles().slice(0, 3)) {
+    await bring(page, file);
+    await expect(page.locator('#agent')).toHaveValue('own');
+    for (const q1 of [0, 1, -2]) {
+      await startFrom(page, q1);
+      const { painted, line, mean } = await chart();
+      expect(painted).toBeGreaterThan(0.03);
+      expect(line).toBeGreaterThan(0.85);
+      means.add(Math.round(100 * mean));
     }
-    expect(means.size).toBeGreaterThan(6);
-  });
+    await page.locator('#agent').selectOption('d3qn');
+    await expect(page.locator('#agent')).toHaveValue('d3qn');
+  }
+  expect(means.size).toBeGreaterThan(6);
 });
 
-test('its torque is that of `upswing simulate`', async ({ page }, info) => {
+test('its torque is that of `upswing simulate`', async ({ stage: page }, info) => {
   await open(page);
   for (const [i, file] of actorFiles().entries()) {
     const path = info.outputPath(`actor${i}.safetensors`);
@@ -116,7 +114,7 @@ const SIZES = [
 ] as const;
 
 test('at any size the chart is seen with the pendulum, and its numbers in full', async ({
-  page,
+  stage: page,
 }) => {
   await open(page);
   for (const file of actorFiles()) {
@@ -150,7 +148,7 @@ test('at any size the chart is seen with the pendulum, and its numbers in full',
   }
 });
 
-test('further down it is explained, and the chart goes on', async ({ page }) => {
+test('further down it is explained, and the chart goes on', async ({ stage: page }) => {
   await page.setViewportSize({ width: 390, height: 844 });
   await open(page);
   await bring(page, actorFiles()[0]!);

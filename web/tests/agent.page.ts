@@ -1,9 +1,9 @@
 import { expect } from '@playwright/test';
 import type { QDecision } from '../src/decision';
-import { balanced, largestDifference, open, run, startFrom, test } from './page';
+import { advance, balanced, largestDifference, open, run, startFrom, test } from './page';
 import { policyPath, simulate } from './program';
 
-test('the agent, when it may act, swings up and balances', async ({ page }) => {
+test('the agent, when it may act, swings up and balances', async ({ stage: page }) => {
   await open(page);
   await expect(page.locator('#badge')).toHaveText('hanging');
   await page.getByRole('button', { name: 'Run the agent' }).click();
@@ -14,22 +14,9 @@ test('the agent, when it may act, swings up and balances', async ({ page }) => {
   await expect(page.locator('#badge')).toHaveText('swinging freely');
 });
 
-test('every agent is up within 10 s and holds for 20 s', async ({ page }) => {
-  await open(page);
-  const ids = await page.evaluate(() =>
-    upswing.agents.list.map(({ id }) => id).filter((id) => id !== 'lqr'),
-  );
-  expect(ids.length).toBeGreaterThan(3);
-  for (const id of ids) {
-    await page.evaluate((agent) => upswing.choose(agent), id);
-    await startFrom(page, 0);
-    await page.evaluate(() => (upswing.world.agentOn = true));
-    await run(page, 30);
-    expect(await balanced(page), id).toBeGreaterThan(20);
-  }
-});
-
-test('the first 5 s are those of `upswing simulate`: states and torques', async ({ page }) => {
+test('the first 5 s are those of `upswing simulate`: states and torques', async ({
+  stage: page,
+}) => {
   await open(page, '#agent=d3qn&on=1');
   await startFrom(page, 0);
   const rows = await run(page, 5);
@@ -39,7 +26,9 @@ test('the first 5 s are those of `upswing simulate`: states and torques', async 
   expect(rows.map((row) => row[5])).toEqual(expected.slice(0, 250).map((row) => row[5]));
 });
 
-test('another agent can be chosen, and has its own text, curve and mark', async ({ page }) => {
+test('another agent can be chosen, and has its own text, curve and mark', async ({
+  stage: page,
+}) => {
   await open(page);
   await expect(page.locator('#agent-what')).toContainText('the pendulum that it learned with');
   await page.locator('#agent').selectOption('d3qn-adaptive');
@@ -55,22 +44,21 @@ test('another agent can be chosen, and has its own text, curve and mark', async 
   await expect.poll(width).toBeLessThan(wide / 2);
 });
 
-test('a link brings controllers that were not learned', async ({ page }) => {
+test('a link brings controllers that were not learned', async ({ stage: page }) => {
   await open(page, '#agent=lqr&twin=mpc&on=1');
   await expect(page.locator('#agent-what')).toContainText('cannot swing them up');
   await expect(page.locator('#trained-on')).toHaveText('what the agent was made for');
   await expect(page.locator('#agent-command')).toHaveText('./upswing simulate lqr');
   await expect(page.locator('#twin-name')).toHaveText('MPC: always plans');
   await expect(page.locator('#q-name')).toHaveText('Decision');
-  await run(page, 5);
   await expect(page.locator('#badge')).toHaveText('cannot swing up');
   await startFrom(page, 0);
-  await run(page, 15);
+  await advance(page, 8);
   expect(await balanced(page)).toBe(0);
   await expect(page.locator('#twin-badge')).toHaveText(/balanced for/);
   await startFrom(page, 3.13);
-  await run(page, 5);
-  expect(await balanced(page)).toBe(5);
+  await advance(page, 2);
+  expect(await balanced(page)).toBe(2);
   await page.locator('#agent').selectOption('mpc');
   await expect(page.locator('#map-value')).toHaveText('not for one that plans');
   await expect(page).toHaveURL(/agent=mpc&twin=mpc/);
@@ -91,7 +79,7 @@ test('of two agents that are asked for, the last one counts', async ({ page }) =
   expect(await page.evaluate(() => upswing.world.policy!.controller.text)).toContain('8-64-64');
 });
 
-test('a pendulum that is posed is judged at once', async ({ page }) => {
+test('a pendulum that is posed is judged at once', async ({ stage: page }) => {
   await open(page, '#agent=d3qn');
   await startFrom(page, 0);
   const best = () => page.evaluate(() => Math.max(...(upswing.world.decision as QDecision).q));
@@ -104,7 +92,7 @@ test('a pendulum that is posed is judged at once', async ({ page }) => {
   await expect(page.locator('#badge')).toHaveText('paused, upright');
 });
 
-test('what "Try this" promises is so', async ({ page }) => {
+test('what "Try this" promises is so', async ({ stage: page }) => {
   await open(page);
   await expect(page.locator('#try summary')).toBeInViewport();
   const tries = await page
@@ -116,7 +104,7 @@ test('what "Try this" promises is so', async ({ page }) => {
   for (const [hash, balances] of tries) {
     await page.evaluate((link) => upswing.open(link), hash);
     await startFrom(page, 0);
-    await run(page, 20);
+    await advance(page, 20);
     const held = await balanced(page);
     if (balances === 'yes') expect(held, hash).toBeGreaterThan(10);
     else expect(held, hash).toBeLessThan(5);

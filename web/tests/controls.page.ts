@@ -5,7 +5,7 @@ import { policyPath, readPolicy } from './program';
 
 const time = () => upswing.world.time;
 
-test('pause stands still, step goes on by 0.02 s, reset hangs', async ({ page }) => {
+test('pause stands still, step goes on by 0.02 s, reset hangs', async ({ stage: page }) => {
   await open(page, '#on=1');
   await page.getByRole('button', { name: 'Pause' }).click();
   const stopped = await page.evaluate(time);
@@ -40,7 +40,7 @@ test('a link whose agent arrives late does not disturb the one that was opened a
   expect(await page.evaluate(() => upswing.world.state.q1)).toBe(1.5);
 });
 
-test('speed', async ({ page }) => {
+test('speed', async ({ stage: page }) => {
   await open(page);
   const rate = async () => {
     const [t, start] = await page.evaluate(() => [upswing.world.time, performance.now()]);
@@ -85,7 +85,7 @@ test('by keyboard alone', async ({ page }) => {
   await expect(page.locator('#agent-on')).toHaveAttribute('aria-pressed', 'false');
 });
 
-test('keys can be switched off, and stay so', async ({ page }) => {
+test('keys can be switched off, and stay so', async ({ stage: page }) => {
   await open(page);
   await page.getByText('Keyboard', { exact: true }).click();
   await page.locator('#keys').uncheck();
@@ -107,7 +107,7 @@ test('keys can be switched off, and stay so', async ({ page }) => {
   await expect(page.locator('#agent-on')).toHaveAttribute('aria-pressed', 'true');
 });
 
-test('while paused, the keyboard sets the start', async ({ page }) => {
+test('while paused, the keyboard sets the start', async ({ stage: page }) => {
   await open(page);
   await expect(page.locator('#pose')).toBeHidden();
   await startFrom(page, 3, -1, 2, 1);
@@ -133,7 +133,7 @@ test('while paused, the keyboard sets the start', async ({ page }) => {
 });
 
 test('the trail is that of the last 1.3 s, at any rate of frames and any speed', async ({
-  page,
+  stage: page,
 }) => {
   await open(page);
   await startFrom(page, 0);
@@ -160,7 +160,7 @@ test('the trail is that of the last 1.3 s, at any rate of frames and any speed',
   expect(Math.max(...long)).toBeCloseTo(1.3, 9);
 });
 
-test("a policy of one's own", async ({ page }) => {
+test("a policy of one's own", async ({ stage: page }) => {
   await open(page);
   await page.locator('#file').setInputFiles(policyPath('fast'));
   await expect(page.locator('#agent')).toHaveValue('own');
@@ -168,7 +168,7 @@ test("a policy of one's own", async ({ page }) => {
   await expect(page.locator('#message')).toBeHidden();
 });
 
-test('a policy that is dropped on the page', async ({ page }) => {
+test('a policy that is dropped on the page', async ({ stage: page }) => {
   await open(page);
   const bytes = [...readFileSync(policyPath('fast'))];
   await page.evaluate((content) => {
@@ -179,7 +179,7 @@ test('a policy that is dropped on the page', async ({ page }) => {
   await expect(page.locator('#agent option:checked')).toHaveText('mine.safetensors (yours)');
 });
 
-test('a broken policy is refused with a reason, and the agent stays', async ({ page }) => {
+test('a broken policy is refused with a reason, and the agent stays', async ({ stage: page }) => {
   await open(page, '#agent=d3qn');
   const whole = Buffer.from(readPolicy('fast'));
   const files = [
@@ -196,7 +196,7 @@ test('a broken policy is refused with a reason, and the agent stays', async ({ p
   }
 });
 
-test('the trajectory can be saved', async ({ page }) => {
+test('the trajectory can be saved', async ({ stage: page }) => {
   await open(page, '#on=1');
   await page.waitForTimeout(500);
   await page.getByRole('button', { name: 'Pause' }).click();
@@ -207,7 +207,7 @@ test('the trajectory can be saved', async ({ page }) => {
   expect(csv.length).toBeGreaterThan(5);
 });
 
-test('dark and light', async ({ page }) => {
+test('dark and light', async ({ stage: page }) => {
   await open(page);
   const background = () => page.evaluate(() => getComputedStyle(document.body).backgroundColor);
   const light = await background();
@@ -217,7 +217,7 @@ test('dark and light', async ({ page }) => {
   expect(await background()).toBe(light);
 });
 
-test('dark where the system is dark, on canvases too', async ({ page }) => {
+test('dark where the system is dark, on canvases too', async ({ stage: page }) => {
   await open(page);
   const colors = () =>
     page.evaluate(() => [

@@ -3,7 +3,9 @@ import { balanced, onScreen, open, run, startFrom, test } from './page';
 
 const state = () => upswing.world.state;
 
-test('a drag pulls the balanced pendulum down, and the agent brings it back', async ({ page }) => {
+test('a drag pulls the balanced pendulum down, and the agent brings it back', async ({
+  stage: page,
+}) => {
   await open(page, '#agent=d3qn&on=1');
   await run(page, 8);
   await expect(page.locator('#badge')).toHaveText(/balanced for/);
@@ -20,49 +22,47 @@ test('a drag pulls the balanced pendulum down, and the agent brings it back', as
   await expect(page.locator('#badge')).toHaveText(/balanced for [1-9]/);
 });
 
-test.describe('on a canvas that is read back', () => {
-  test.use({ complains: true }); // that it could be faster
-
-  test('a shove moves it, to the side of its arrow', async ({ page }) => {
-    await open(page);
-    for (const [name, key, side] of [
-      ['Shove to the right', 'ArrowRight', -1],
-      ['Shove to the left', 'ArrowLeft', 1],
-    ] as const) {
-      await startFrom(page, 0);
-      await page.getByRole('button', { name }).click();
-      await run(page, 0.3);
-      const shoved = await page.evaluate(state);
-      // The arrow is still there when the shove is over.
-      const [arrow, none] = await page.evaluate((side) => {
-        const { scene, world } = upswing;
-        const { context, element, width } = scene.canvas;
-        const { q1, q2 } = world.state;
-        const [x, y] = scene.at({
-          x: -(Math.sin(q1) + Math.sin(q1 + q2)) / 2,
-          z: -(Math.cos(q1) + Math.cos(q1 + q2)) / 2,
-        });
-        const ratio = element.width / width;
-        const pixel = () => {
-          scene.draw(world, world.state, []);
-          return context.getImageData((x - 30 * side) * ratio, y * ratio, 1, 1).data.join();
-        };
-        const drawn = pixel();
-        world.shoved = null;
-        return [drawn, pixel()];
-      }, side);
-      expect(arrow).not.toBe(none);
-      expect(Math.sign(shoved.q1 + shoved.q2)).toBe(side); // a positive angle is to the left
-      await startFrom(page, 0);
-      await page.keyboard.press(key);
-      await run(page, 0.3);
-      const pressed = await page.evaluate(state);
-      expect(pressed.q1).toBeCloseTo(shoved.q1, 9);
-    }
-  });
+test('a shove moves it, to the side of its arrow', async ({ stage: page }) => {
+  await open(page);
+  for (const [name, key, side] of [
+    ['Shove to the right', 'ArrowRight', -1],
+    ['Shove to the left', 'ArrowLeft', 1],
+  ] as const) {
+    await startFrom(page, 0);
+    await page.getByRole('button', { name }).click();
+    await run(page, 0.3);
+    const shoved = await page.evaluate(state);
+    // The arrow is still there when the shove is over.
+    const [arrow, none] = await page.evaluate((side) => {
+      const { scene, world } = upswing;
+      const { context, element, width } = scene.canvas;
+      const { q1, q2 } = world.state;
+      const [x, y] = scene.at({
+        x: -(Math.sin(q1) + Math.sin(q1 + q2)) / 2,
+        z: -(Math.cos(q1) + Math.cos(q1 + q2)) / 2,
+      });
+      const ratio = element.width / width;
+      const pixel = () => {
+        scene.draw(world, world.state, []);
+        return context.getImageData((x - 30 * side) * ratio, y * ratio, 1, 1).data.join();
+      };
+      const drawn = pixel();
+      world.shoved = null;
+      return [drawn, pixel()];
+    }, side);
+    expect(arrow).not.toBe(none);
+    expect(Math.sign(shoved.q1 + shoved.q2)).toBe(side); // a positive angle is to the left
+    await startFrom(page, 0);
+    await page.keyboard.press(key);
+    await run(page, 0.3);
+    const pressed = await page.evaluate(state);
+    expect(pressed.q1).toBeCloseTo(shoved.q1, 9);
+  }
 });
 
-test('the agent holds against one shove, not against ten, and gets up again', async ({ page }) => {
+test('the agent holds against one shove, not against ten, and gets up again', async ({
+  stage: page,
+}) => {
   await open(page, '#agent=d3qn&on=1');
   await startFrom(page, Math.PI);
   await run(page, 3);
@@ -76,7 +76,7 @@ test('the agent holds against one shove, not against ten, and gets up again', as
   expect(await balanced(page)).toBeGreaterThan(1);
 });
 
-test('a shove during a drag is not kept for later', async ({ page }) => {
+test('a shove during a drag is not kept for later', async ({ stage: page }) => {
   await open(page);
   await startFrom(page, 0);
   await page.evaluate(() => {
@@ -89,7 +89,7 @@ test('a shove during a drag is not kept for later', async ({ page }) => {
   expect(await page.evaluate(() => upswing.world.push)).toBeNull();
 });
 
-test('one hand at a time, with the left button of a mouse', async ({ page }) => {
+test('one hand at a time, with the left button of a mouse', async ({ stage: page }) => {
   await open(page);
   const [tip, aside] = [await onScreen(page, 0, -0.9), await onScreen(page, 0.5, 0.5)];
   const drag = () => page.evaluate(() => upswing.world.drag?.target ?? null);
@@ -112,7 +112,7 @@ test('one hand at a time, with the left button of a mouse', async ({ page }) => 
   expect(await drag()).toBeNull();
 });
 
-test('a mere touch while paused changes nothing', async ({ page }) => {
+test('a mere touch while paused changes nothing', async ({ stage: page }) => {
   await open(page);
   await startFrom(page, 1, 0.5, 2, -1);
   const elbow = await onScreen(page, -0.3 * Math.sin(1), -0.3 * Math.cos(1));
@@ -120,7 +120,7 @@ test('a mere touch while paused changes nothing', async ({ page }) => {
   expect(await page.evaluate(state)).toEqual({ q1: 1, q2: 0.5, w1: 2, w2: -1 });
 });
 
-test('while paused, dragging sets the start', async ({ page }) => {
+test('while paused, dragging sets the start', async ({ stage: page }) => {
   await open(page);
   await page.getByRole('button', { name: 'Pause' }).click();
   const drag = async (from: [number, number], to: [number, number]) => {

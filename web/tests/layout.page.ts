@@ -32,7 +32,7 @@ async function openAt(page: Page, size: { width: number; height: number }): Prom
 }
 
 test('at any size every link and control can be clicked, every text can be seen', async ({
-  page,
+  stage: page,
 }) => {
   await openAt(page, SIZES[0]!);
   await expect(page.locator('#reward')).not.toBeEmpty();
@@ -58,7 +58,7 @@ test('at any size every link and control can be clicked, every text can be seen'
   }
 });
 
-test('while one scrolls, the pendulum covers nothing else', async ({ page }) => {
+test('while one scrolls, the pendulum covers nothing else', async ({ stage: page }) => {
   await openAt(page, SIZES[0]!);
   for (const size of [...SIZES, ...SMALL]) {
     await page.setViewportSize(size);
@@ -81,7 +81,7 @@ test('while one scrolls, the pendulum covers nothing else', async ({ page }) => 
   }
 });
 
-test('the pendulum keeps its size, and the badge stays beside it', async ({ page }) => {
+test('the pendulum keeps its size, and the badge stays beside it', async ({ stage: page }) => {
   await open(page);
   await page.locator('#pause').click(); // the longest badge
   for (const size of [...SMALL, ...SIZES]) {
@@ -99,7 +99,7 @@ test('the pendulum keeps its size, and the badge stays beside it', async ({ page
   }
 });
 
-test('on phones and tablets pendulum and Q-values are on one screen', async ({ page }) => {
+test('on phones and tablets pendulum and Q-values are on one screen', async ({ stage: page }) => {
   await open(page);
   for (const [width, height] of [
     [360, 640],
@@ -123,7 +123,9 @@ test('on phones and tablets pendulum and Q-values are on one screen', async ({ p
   }
 });
 
-test('an example leads back to the pendulum, also when it is chosen again', async ({ page }) => {
+test('an example leads back to the pendulum, also when it is chosen again', async ({
+  stage: page,
+}) => {
   await page.setViewportSize({ width: 390, height: 700 });
   await page.emulateMedia({ reducedMotion: 'reduce' });
   await open(page);
@@ -145,7 +147,7 @@ test('an example leads back to the pendulum, also when it is chosen again', asyn
   }
 });
 
-test('a message is in sight wherever the page is scrolled to', async ({ page }) => {
+test('a message is in sight wherever the page is scrolled to', async ({ stage: page }) => {
   await page.setViewportSize({ width: 360, height: 640 });
   await open(page);
   await page.locator('#file').scrollIntoViewIfNeeded();
@@ -161,7 +163,9 @@ test('a message is in sight wherever the page is scrolled to', async ({ page }) 
   await expect(page.locator('#message')).toBeHidden();
 });
 
-test('a formula that is too wide takes the focus and scrolls by keyboard', async ({ page }) => {
+test('a formula that is too wide takes the focus and scrolls by keyboard', async ({
+  stage: page,
+}) => {
   await openAt(page, { width: 340, height: 640 });
   const reward = page.locator('details:has-text("At each step") > math');
   await reward.focus();
@@ -175,9 +179,8 @@ test('a formula that is too wide takes the focus and scrolls by keyboard', async
 
 test.describe('with forced colours', () => {
   for (const colorScheme of ['light', 'dark'] as const) {
-    test(`${colorScheme}: button and pendulum can be seen`, async ({ browser }) => {
-      const context = await browser.newContext({ forcedColors: 'active', colorScheme });
-      const page = await context.newPage();
+    test(`${colorScheme}: button and pendulum can be seen`, async ({ stage: page }) => {
+      await page.emulateMedia({ forcedColors: 'active', colorScheme });
       await open(page, '#on=1');
       await page.locator('#pause').click();
       // No backplate between the button's text and its background.
@@ -214,12 +217,11 @@ test.describe('with forced colours', () => {
       });
       expect(drawn.cone).toBe(drawn.outside);
       expect(new Set([drawn.upper, drawn.lower, drawn.outside]).size).toBe(3);
-      await context.close();
     });
   }
 });
 
-test('"Run the agent" looks pressed while it is on', async ({ page }) => {
+test('"Run the agent" looks pressed while it is on', async ({ stage: page }) => {
   await open(page);
   const look = () =>
     page.locator('#agent-on').evaluate((button) => {

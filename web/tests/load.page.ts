@@ -3,7 +3,9 @@ import type { Page, Response } from '@playwright/test';
 import { gzipSync } from 'node:zlib';
 import { open, test } from './page';
 
-test('the page loads and asks nobody else', async ({ page }) => {
+test('the page loads at most 2.3 MB compressed, and asks nobody else', async ({ page }) => {
+  const responses: Response[] = [];
+  page.on('response', (response) => responses.push(response));
   const hosts = new Set<string>();
   page.on('request', (request) => hosts.add(new URL(request.url()).host));
   const wasm = page.waitForResponse(/\.wasm$/);
@@ -12,13 +14,6 @@ test('the page loads and asks nobody else', async ({ page }) => {
   await page.waitForLoadState('networkidle');
   expect([...hosts]).toEqual([new URL(page.url()).host]);
   await expect(page.locator('#loading')).toBeHidden();
-});
-
-test('the first load is at most 2.3 MB compressed', async ({ page }) => {
-  const responses: Response[] = [];
-  page.on('response', (response) => responses.push(response));
-  await open(page);
-  await page.waitForLoadState('networkidle');
   const bodies = await Promise.all(responses.map((response) => response.body()));
   const sizes = bodies.map((body) => gzipSync(body).length);
   expect(sizes.length).toBeGreaterThan(4);

@@ -23,7 +23,7 @@ const ofPlant = (plant: Record<string, number>) =>
 const bring = (page: Page, buffer: Buffer, name = 'mine.safetensors') =>
   page.locator('#file').setInputFiles({ name, mimeType: '', buffer });
 
-test('a reload keeps it, until it is removed', async ({ page }) => {
+test('a reload keeps it, until it is removed', async ({ stage: page }) => {
   await open(page);
   await expect(page.locator('#own')).toBeHidden();
   await page.locator('#file').setInputFiles(policyPath('fast'));
@@ -52,8 +52,8 @@ test('a reload keeps it, until it is removed', async ({ page }) => {
   await expect(page.locator('#agent option[value=own]')).toHaveCount(0);
 });
 
-test('a link for others has no agent of your own', async ({ page, context }) => {
-  await context.grantPermissions(['clipboard-read', 'clipboard-write']);
+test('a link for others has no agent of your own', async ({ stage: page }) => {
+  await page.context().grantPermissions(['clipboard-read', 'clipboard-write']);
   await open(page, '#mass2=1.2');
   await page.locator('#file').setInputFiles(policyPath('fast'));
   await expect(page).toHaveURL(/agent=own/);
@@ -115,7 +115,7 @@ test('a database that never answers does not stop the page', async ({ page }) =>
   await expect(page.locator('#agent')).toHaveValue('own');
 });
 
-test('a plant with a parameter of 0 is refused, and the charts go on', async ({ page }) => {
+test('a plant with a parameter of 0 is refused, and the charts go on', async ({ stage: page }) => {
   await open(page);
   for (const name of ['gravity', 'mass1', 'mass2', 'length1', 'length2', 'torque_limit']) {
     await bring(page, ofPlant({ [name]: 0 }));
@@ -125,37 +125,33 @@ test('a plant with a parameter of 0 is refused, and the charts go on', async ({ 
   }
 });
 
-test.describe('on a canvas that is read back', () => {
-  test.use({ complains: true }); // that it could be faster
-
-  test('Q-values that are not finite do not spoil the chart for the next ones', async ({
-    page,
-  }) => {
-    await open(page, '#agent=d3qn');
-    await page.locator('#pause').click();
-    const painted = () =>
-      page.evaluate(async () => {
-        for (let k = 0; k < 4; ++k) await new Promise(requestAnimationFrame);
-        const canvas = document.getElementById('q') as HTMLCanvasElement;
-        const { data } = canvas
-          .getContext('2d')!
-          .getImageData(0, 0, canvas.width, canvas.height - 30);
-        return data.filter((alpha, i) => i % 4 === 3 && alpha > 0).length;
-      });
-    const before = await painted();
-    await page.evaluate(() => {
-      const { world } = upswing;
-      const good = world.decision as QDecision;
-      world.decision = { ...good, q: good.q.map(() => NaN) };
+test('Q-values that are not finite do not spoil the chart for the next ones', async ({
+  stage: page,
+}) => {
+  await open(page, '#agent=d3qn');
+  await page.locator('#pause').click();
+  const painted = () =>
+    page.evaluate(async () => {
+      for (let k = 0; k < 4; ++k) await new Promise(requestAnimationFrame);
+      const canvas = document.getElementById('q') as HTMLCanvasElement;
+      const { data } = canvas
+        .getContext('2d')!
+        .getImageData(0, 0, canvas.width, canvas.height - 30);
+      return data.filter((alpha, i) => i % 4 === 3 && alpha > 0).length;
     });
-    const during = await painted();
-    expect(during).toBeLessThan(before / 2);
-    await page.evaluate(() => upswing.world.look());
-    expect(await painted()).toBeGreaterThan(0.9 * before);
+  const before = await painted();
+  await page.evaluate(() => {
+    const { world } = upswing;
+    const good = world.decision as QDecision;
+    world.decision = { ...good, q: good.q.map(() => NaN) };
   });
+  const during = await painted();
+  expect(during).toBeLessThan(before / 2);
+  await page.evaluate(() => upswing.world.look());
+  expect(await painted()).toBeGreaterThan(0.9 * before);
 });
 
-test('sliders extend to a plant beyond them, and so do links', async ({ page }) => {
+test('sliders extend to a plant beyond them, and so do links', async ({ stage: page }) => {
   await open(page);
   const plant = { mass1: 5, length2: 2, gravity: 60, mass2: 0.01, torque_limit: 400 };
   await bring(page, ofPlant(plant));
@@ -191,7 +187,7 @@ test('sliders extend to a plant beyond them, and so do links', async ({ page }) 
   await expect(page.locator('#mass1')).toHaveAttribute('max', '3');
 });
 
-test('what a policy file says is text, of bounded length', async ({ page }) => {
+test('what a policy file says is text, of bounded length', async ({ stage: page }) => {
   await open(page);
   const evil = `<img src=x onerror="globalThis.ran=1">${'W'.repeat(5000)}`;
   await bring(page, changed({ format_version: evil }), `${evil.slice(0, 200)}.safetensors`);
@@ -232,7 +228,7 @@ test('what the list of agents says is text, of bounded length', async ({ page })
   expect(await page.locator('img:not(h1 > img)').count()).toBe(0);
 });
 
-test('a link that says too much is told in few words', async ({ page }) => {
+test('a link that says too much is told in few words', async ({ stage: page }) => {
   await open(page, `#${'k'.repeat(3000)}=1&agent=${'a'.repeat(3000)}&mass1=${'9'.repeat(3000)}`);
   const message = page.locator('#message-text');
   await expect(message).toContainText('Not all of the link could be used');

@@ -1,36 +1,114 @@
 import { test as base, expect } from '@playwright/test';
-import type { Page } from '@playwright/test';
+import type { BrowserContext, Page } from '@playwright/test';
+import type { Clock } from '../src/page/clock';
 import type {} from '../src/page/global';
 
-/// A test that fails if the page writes errors or warnings to the console, unless `complains` is set.
-/// The page draws 15 times a second: without a graphics card, that is most of what a test costs.
-export const test = base.extend<{ complains: boolean; silent: void }>({
+/// What a page draws costs most without a graphics card: 10 frames a second are enough.
+function drawSeldom(): void {
+  const { requestAnimationFrame: soon } = globalThis;
+  const waiting: FrameRequestCallback[] = [];
+  globalThis.requestAnimationFrame = (draw) => waiting.push(draw);
+  setInterval(() => {
+    // Nothing is drawn while the stage waits for its next test.
+    if (document.body?.inert) return;
+    for (const draw of waiting.splice(0)) soon(draw);
+  }, 100);
+}
+
+/// Errors and warnings that pages of a context write to the console from now on.
+function complaintsOf(context: BrowserContext): string[] {
+  const complaints: string[] = [];
+  context.on('console', (message) => {
+    const text = message.text();
+    // The page reads no canvas back; tests do.
+    if (text.includes('willReadFrequently')) return;
+    if (['error', 'warning'].includes(message.type())) complaints.push(text);
+  });
+  context.on('weberror', (error) => complaints.push(String(error.error())));
+  return complaints;
+}
+
+interface Kept {
+  page: Page;
+  complaints: string[];
+}
+
+/// A test fails if its page writes errors or warnings to the console, unless `complains` is set.
+///
+/// `page` begins in a browser context of its own, and open() loads it. Where that is not what a test is
+/// about, it takes `stage`: one page for all tests of a Playwright worker, which is put back as it was at
+/// first, and in which open() loads nothing. Loading takes twenty times as long.
+export const test = base.extend<{ complains: boolean; stage: Page }, { kept: Kept }>({
   complains: [false, { option: true }],
-  silent: [
-    async ({ context, complains }, use) => {
-      await context.addInitScript(() => {
-        const { requestAnimationFrame: soon } = globalThis;
-        globalThis.requestAnimationFrame = (draw) => Number(setTimeout(() => soon(draw), 50));
-      });
-      const complaints: string[] = [];
-      context.on('console', (message) => {
-        if (['error', 'warning'].includes(message.type())) complaints.push(message.text());
-      });
-      context.on('weberror', (error) => complaints.push(String(error.error())));
-      await use();
-      if (!complains) expect(complaints).toEqual([]);
+  context: async ({ context, complains }, use) => {
+    await context.addInitScript(drawSeldom);
+    const complaints = complaintsOf(context);
+    await use(context);
+    if (!complains) expect(complaints).toEqual([]);
+  },
+  kept: [
+    async ({ browser }, use, { project }) => {
+      const context = await browser.newContext({ baseURL: project.use.baseURL });
+      await context.addInitScript(drawSeldom);
+      await use({ page: await context.newPage(), complaints: complaintsOf(context) });
+      await context.close();
     },
-    { auto: true },
+    { scope: 'worker' },
   ],
+  stage: async ({ kept: { page, complaints }, complains }, use) => {
+    if (page.url() !== 'about:blank') await setBack(page);
+    complaints.length = 0;
+    await use(page);
+    await page.evaluate(() => (document.body.inert = true));
+    if (!complains) expect(complaints).toEqual([]);
+  },
 });
 
-/// Opens the page, everything that it has, and waits until the pendulum hangs in it.
+/// As a new visitor finds it: nothing kept or chosen, no input held down, at the top.
+async function setBack(page: Page): Promise<void> {
+  await page.unrouteAll();
+  await page.context().clearPermissions();
+  await page.mouse.up();
+  await page.setViewportSize({ width: 1280, height: 720 });
+  await page.emulateMedia({ colorScheme: null, forcedColors: null, reducedMotion: null });
+  await page.evaluate(async () => {
+    document.body.inert = false;
+    localStorage.clear();
+    delete document.documentElement.dataset.theme;
+    for (const details of document.querySelectorAll('details')) {
+      details.open = details.matches('#explain > :first-child');
+    }
+    delete (upswing.clock as Partial<Clock>).advance; // where a test had stopped it
+    await upswing.agents.forgetOwn();
+    scrollTo({ top: 0, behavior: 'instant' });
+  });
+}
+
+/// Opens the page, everything that it has, and waits until the pendulum hangs in it. Where the page is
+/// there already, it begins with this address as with any other that a visitor follows.
 export async function open(page: Page, hash = '#everything'): Promise<void> {
-  await page.goto(`./${hash}`);
+  if (page.url() === 'about:blank') {
+    await page.goto(`./${hash}`);
+  } else {
+    await page.evaluate(async (hash) => {
+      history.replaceState(null, '', `./${hash}`);
+      await upswing.open(hash);
+    }, hash);
+  }
   await expect(page.locator('#agent-on')).toBeEnabled();
 }
 
-/// Simulates so many seconds at once, and returns the rows
+/// Simulates so many seconds at once.
+export function advance(page: Page, seconds: number): Promise<void> {
+  return page.evaluate(
+    (steps) => {
+      for (let k = 0; k < steps; ++k) upswing.world.advance();
+    },
+    Math.round(200 * seconds),
+  );
+}
+
+/// The same, and returns the rows
 /// [t, q1, q2, w1, w2, torque] of each control step.
 export function run(page: Page, seconds: number): Promise<number[][]> {
   return page.evaluate((duration) => {

@@ -16,7 +16,7 @@ const START = [2.5, 0.4, 0.3, -0.5] as const;
 const free = (...set: string[]) =>
   simulate('--start', START.join(), '--seconds', '3', ...set.flatMap((s) => ['--set', s]));
 
-test('each slider changes the physics as in `upswing simulate`', async ({ page }) => {
+test('each slider changes the physics as in `upswing simulate`', async ({ stage: page }) => {
   await open(page);
   const nominal = free();
   for (const [name, value] of OTHER) {
@@ -31,7 +31,7 @@ test('each slider changes the physics as in `upswing simulate`', async ({ page }
   expect(largestDifference(await run(page, 3), nominal)).toBeLessThan(1e-9);
 });
 
-test('all of them together, live', async ({ page }) => {
+test('all of them together, live', async ({ stage: page }) => {
   await open(page);
   await startFrom(page, ...START);
   await run(page, 1);
@@ -42,7 +42,7 @@ test('all of them together, live', async ({ page }) => {
   expect(largestDifference(rows, other)).toBeLessThan(1e-9);
 });
 
-test('limit of the motor, sensor noise and delay act on the agent', async ({ page }) => {
+test('limit of the motor, sensor noise and delay act on the agent', async ({ stage: page }) => {
   await open(page, '#agent=d3qn&on=1');
   const torques = async () => {
     await startFrom(page, 0.3);
@@ -63,7 +63,7 @@ test('limit of the motor, sensor noise and delay act on the agent', async ({ pag
   expect(await torques()).not.toEqual(before);
 });
 
-test('one slider goes back alone', async ({ page }) => {
+test('one slider goes back alone', async ({ stage: page }) => {
   await open(page);
   const back = page.getByRole('button', { name: 'Reset Gravity' });
   await expect(back).toBeDisabled();
@@ -73,7 +73,7 @@ test('one slider goes back alone', async ({ page }) => {
   expect(await page.evaluate(() => upswing.world.plant)).toMatchObject({ gravity: 9.81, mass1: 2 });
 });
 
-test('the address holds what was set, and brings it back', async ({ page, context }) => {
+test('the address holds what was set, and brings it back', async ({ stage: page }) => {
   await open(page);
   await page.locator('#agent').selectOption('fast');
   await slide(page, 'mass2', 1.25);
@@ -81,12 +81,13 @@ test('the address holds what was set, and brings it back', async ({ page, contex
   await slide(page, 'speed', 0.5);
   await page.getByRole('button', { name: 'Run the agent' }).click();
   await expect(page).toHaveURL(/on=1/); // the address follows a little later
-  const other = await context.newPage();
-  await open(other, new URL(page.url()).hash);
-  await expect(other.locator('#agent')).toHaveValue('fast');
-  await expect(other.locator('#mass2')).toHaveValue('1.25');
-  await expect(other.locator('#agent-on')).toHaveAttribute('aria-pressed', 'true');
-  const set = await other.evaluate(() => ({
+  const { hash } = new URL(page.url());
+  await page.goto('about:blank');
+  await open(page, hash);
+  await expect(page.locator('#agent')).toHaveValue('fast');
+  await expect(page.locator('#mass2')).toHaveValue('1.25');
+  await expect(page.locator('#agent-on')).toHaveAttribute('aria-pressed', 'true');
+  const set = await page.evaluate(() => ({
     mass2: upswing.world.plant.mass2,
     noise: upswing.world.disturbance.sensor_noise,
     speed: upswing.clock.speed,
@@ -94,7 +95,9 @@ test('the address holds what was set, and brings it back', async ({ page, contex
   expect(set).toEqual({ mass2: 1.25, noise: 0.02, speed: 0.5 });
 });
 
-test('an address that is not understood is told, and the rest of it holds', async ({ page }) => {
+test('an address that is not understood is told, and the rest of it holds', async ({
+  stage: page,
+}) => {
   await open(page, '#agent=none&mass1=-3&mass2=1.5&colour=red');
   const message = page.locator('#message');
   await expect(message).toContainText('unknown agent "none"');
@@ -103,7 +106,7 @@ test('an address that is not understood is told, and the rest of it holds', asyn
   expect(await page.evaluate(() => upswing.world.plant)).toMatchObject({ mass1: 1, mass2: 1.5 });
 });
 
-test('another address in the same tab begins anew with it', async ({ page }) => {
+test('another address in the same tab begins anew with it', async ({ stage: page }) => {
   await open(page, '#agent=d3qn&on=1');
   await page.waitForTimeout(500);
   await page.evaluate(() => (location.hash = '#agent=fast&mass1=1.4'));

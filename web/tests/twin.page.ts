@@ -18,7 +18,7 @@ const run = (page: Page, seconds: number) =>
   }, seconds);
 
 test('with the same agent they stay together to the bit, whatever happens to them', async ({
-  page,
+  stage: page,
 }) => {
   await open(page, '#agent=fast&on=1');
   await startFrom(page, 0);
@@ -52,7 +52,7 @@ test('with the same agent they stay together to the bit, whatever happens to the
 });
 
 test('a link brings both agents, and the adaptive one holds what the other cannot', async ({
-  page,
+  stage: page,
 }) => {
   await open(page, '#everything');
   await page.getByText('Try this', { exact: true }).click();
@@ -78,7 +78,7 @@ test('a second agent that is not there is told', async ({ page }) => {
   await expect(page.getByLabel('Beside it')).toHaveValue('');
 });
 
-test('at any size both are seen whole', async ({ page }) => {
+test('at any size both are seen whole', async ({ stage: page }) => {
   await open(page, '#agent=fast&twin=sac');
   for (const [width, height] of [
     [320, 640],
