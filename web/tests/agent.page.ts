@@ -44,6 +44,17 @@ test('another agent can be chosen, and has its own text, curve and mark', async 
   await expect.poll(width).toBeLessThan(wide / 2);
 });
 
+// That each is up within 10 s and holds is in src/agents.test.ts and src/world.test.ts.
+test('every agent can be chosen', async ({ stage: page }) => {
+  await open(page);
+  const ids = await page.evaluate(() => upswing.agents.list.map(({ id }) => id));
+  expect(ids.length).toBeGreaterThan(3);
+  for (const id of ids) {
+    expect(await page.evaluate((agent) => upswing.choose(agent), id), id).toBe(true);
+    await expect(page.locator('#agent')).toHaveValue(id);
+  }
+});
+
 test('a link brings controllers that were not learned', async ({ stage: page }) => {
   await open(page, '#agent=lqr&twin=mpc&on=1');
   await expect(page.locator('#agent-what')).toContainText('cannot swing them up');
