@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
 #include <numbers>
 
 #include "control/testing.h"
@@ -84,7 +83,7 @@ TEST_P(Uncontrollable, WhereDeltaIsZeroTheTorqueMovesNothingOfOneMode) {
   const Plant plant = UncontrollablePlant(GetParam());
   const LinearModel model = LinearizeUpright(plant);
   // A left eigenvector of A for that mode, of which the torque moves nothing.
-  const Eigen::EigenSolver<Eigen::Matrix4d> solver(model.A.transpose());
+  const EigenSolver solver(model.A.transpose());
   const double pole = ModesOf(plant).pole;
   int found = 0;
   for (int k = 0; k < 4; ++k) {

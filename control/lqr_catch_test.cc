@@ -2,9 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
 #include <vector>
 
+#include "control/testing.h"
 #include "core/rng.h"
 
 namespace upswing {
@@ -26,8 +26,7 @@ TEST(LqrCatch, CatchesAllOfItsRegion) {
   heavy.mass2 = 1.25;
   for (const Plant& plant : {Plant(), heavy}) {
     const LqrCatch upright(LqrConfig(), plant);
-    const Eigen::Matrix4d shape =
-        Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d>(upright.lqr().P).operatorInverseSqrt();
+    const Eigen::Matrix4d shape = SymmetricEigenSolver(upright.lqr().P).operatorInverseSqrt();
     PendulumModel model(plant);
     Rng rng(7, "inside");
     int caught_beyond = 0;

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Eigenvalues>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -15,6 +15,11 @@
 
 /// What tests of controllers share.
 namespace upswing {
+
+/// Eigenvalues and eigenvectors. Of matrices of any size, as fixed sizes take twice as long to
+/// compile.
+using EigenSolver = Eigen::EigenSolver<Eigen::MatrixXd>;
+using SymmetricEigenSolver = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>;
 
 /// A plant within half of the standard one's parameters, with the motor at joint 1.
 inline Plant DrawPlant(Rng& rng) {

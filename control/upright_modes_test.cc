@@ -2,13 +2,13 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <functional>
 
 #include "control/linearize.h"
+#include "control/testing.h"
 #include "core/rng.h"
 #include "sim/randomization.h"
 
@@ -24,7 +24,7 @@ TEST(UprightModes, AreEigenvaluesOfTheLinearModel) {
     plant.actuated_joint = n % 2 + 1;
     const UprightModes modes = ModesOf(plant);
     std::array<double, 4> rates;
-    const Eigen::Vector4cd eigenvalues = LinearizeUpright(plant).A.eigenvalues();
+    const auto eigenvalues = EigenSolver(LinearizeUpright(plant).A, false).eigenvalues();
     for (size_t i = 0; i < 4; ++i) rates[i] = eigenvalues[static_cast<Eigen::Index>(i)].real();
     std::ranges::sort(rates, std::greater<>());
     EXPECT_NEAR(modes.faster, rates[0], 1e-9);
@@ -52,7 +52,7 @@ TEST(UprightModes, DeltaIsZeroWhereTheMotorLosesAMode) {
     }
     const auto least_reach = [](const Plant& plant) {
       const LinearModel model = LinearizeUpright(plant);
-      const Eigen::EigenSolver<Eigen::Matrix4d> modes(model.A.transpose());
+      const EigenSolver modes(model.A.transpose());
       double least = 1;
       for (int i = 0; i < 4; ++i) {
         if (modes.eigenvalues()[i].real() <= 0) continue;
