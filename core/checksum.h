@@ -7,6 +7,8 @@
 #include <span>
 #include <string>
 
+#include "core/text.h"
+
 namespace upswing {
 
 /// Detects broken files, not forged ones. Like FNV-1a (its offset basis and prime), but over 8-byte
@@ -20,11 +22,7 @@ class Checksum {
   }
 
   /// 16 hexadecimal digits.
-  std::string Hex() const {
-    std::string hex;
-    for (int shift = 60; shift >= 0; shift -= 4) hex += "0123456789abcdef"[(hash_ >> shift) & 15];
-    return hex;
-  }
+  std::string Hex() const { return HexDigits(hash_, 16); }
 
  private:
   void Mix(std::span<const std::byte> bytes) {

@@ -40,11 +40,7 @@ const std::vector<Path>& Paths() {
 
 }  // namespace
 
-std::vector<std::string> SimdPaths() {
-  std::vector<std::string> names;
-  for (const Path& path : Paths()) names.push_back(path.name);
-  return names;
-}
+std::vector<std::string> SimdPaths() { return NamesOf(Paths()); }
 
 std::string SimdPath() {
   const int64_t usable = hwy::SupportedTargets();

@@ -83,13 +83,9 @@ bool IsControl(char32_t c) {
          in(0xe0000, 0xe007f);
 }
 
-/// Such as `\x1b`: the last `digits` hexadecimal digits of `value` behind a backslash and `kind`.
+/// Such as `\x1b`.
 std::string Escape(char kind, char32_t value, int digits) {
-  std::string escape{'\\', kind};
-  for (int shift = 4 * (digits - 1); shift >= 0; shift -= 4) {
-    escape += "0123456789abcdef"[(value >> shift) & 15];
-  }
-  return escape;
+  return Concat('\\', kind, HexDigits(value, digits));
 }
 
 }  // namespace
@@ -163,6 +159,22 @@ std::string Join(const std::vector<std::string>& parts, std::string_view separat
     joined += part;
   }
   return joined;
+}
+
+std::string Replaced(std::string text, std::string_view from, std::string_view to) {
+  for (size_t at = text.find(from); at != std::string::npos; at = text.find(from, at)) {
+    text.replace(at, from.size(), to);
+    at += to.size();
+  }
+  return text;
+}
+
+std::string HexDigits(uint64_t number, int digits) {
+  std::string hex;
+  for (int shift = 4 * (digits - 1); shift >= 0; shift -= 4) {
+    hex += "0123456789abcdef"[(number >> shift) & 15];
+  }
+  return hex;
 }
 
 std::string Printable(std::string_view text) {

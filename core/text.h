@@ -64,6 +64,20 @@ std::vector<std::string_view> Split(std::string_view text, char separator);
 /// `parts` with `separator` between them.
 std::string Join(const std::vector<std::string>& parts, std::string_view separator);
 
+/// The names of the rows of a table.
+template <typename Rows>
+std::vector<std::string> NamesOf(const Rows& rows) {
+  std::vector<std::string> names;
+  for (const auto& row : rows) names.emplace_back(row.name);
+  return names;
+}
+
+/// `text` with each `from` replaced by `to`.
+std::string Replaced(std::string text, std::string_view from, std::string_view to);
+
+/// The last `digits` hexadecimal digits of a number.
+std::string HexDigits(uint64_t number, int digits);
+
 /// `text`, which may come from an untrusted file, for one line of a terminal: control characters,
 /// bytes that are not UTF-8, and the characters that reorder text or break lines are replaced by
 /// escapes such as `\n`, `\x1b` or `\u202e`. Everything else, including backslashes, is kept.

@@ -14,9 +14,6 @@ std::string CommentText(std::string_view text);
 /// The shortest literal that reads back as the same finite float, such as `0.1f`.
 std::string CLiteral(float value);
 
-/// `text` with each `from` replaced by `to`.
-std::string Replaced(std::string text, std::string_view from, std::string_view to);
-
 std::string UpperCase(std::string text);
 
 /// `text` in small letters and digits, with one `separator` in place of anything else between them.

@@ -210,9 +210,7 @@ NetworkPolicy DrawPolicy(ActionRule rule, const NetworkShape& actor, int critic_
 std::string FileAsHex(const NetworkPolicy& policy) {
   std::string hex;
   for (const std::byte byte : WriteSafetensors(policy.ToTensors()).Joined()) {
-    for (const int shift : {4, 0}) {
-      hex += "0123456789abcdef"[(std::to_integer<int>(byte) >> shift) & 15];
-    }
+    hex += HexDigits(std::to_integer<uint64_t>(byte), 2);
   }
   return hex;
 }

@@ -72,9 +72,7 @@ std::string RandomDigits() {
   if (getrandom(&number, sizeof(number), 0) != sizeof(number)) {
     throw Failure("the system gives no random numbers");
   }
-  std::string digits;
-  for (size_t i = 0; i < kDigits; ++i, number >>= 4) digits += "0123456789abcdef"[number & 15];
-  return digits;
+  return HexDigits(number, kDigits);
 }
 
 Descriptor::~Descriptor() {

@@ -70,10 +70,7 @@ constexpr const char* kTemplate = R"(<mujoco model="picture">
 std::string Fill(const std::vector<std::pair<std::string, double>>& values) {
   std::string text = kTemplate;
   for (const auto& [name, value] : values) {
-    const std::string field = "@" + name;
-    for (size_t at = 0; (at = text.find(field, at)) != std::string::npos;) {
-      text.replace(at, field.size(), FormatNumber(value));
-    }
+    text = Replaced(std::move(text), "@" + name, FormatNumber(value));
   }
   return text;
 }

@@ -24,11 +24,7 @@ constexpr Algorithm kAlgorithms[] = {
 }  // namespace
 
 const std::vector<std::string>& AlgorithmNames() {
-  static const std::vector<std::string> kNames = [] {
-    std::vector<std::string> names;
-    for (const Algorithm& algorithm : kAlgorithms) names.emplace_back(algorithm.name);
-    return names;
-  }();
+  static const std::vector<std::string> kNames = NamesOf(kAlgorithms);
   return kNames;
 }
 

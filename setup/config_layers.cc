@@ -16,8 +16,7 @@ const NamedAgent& FindAgent(const std::string& name, const std::string& where) {
   const auto agents = EmbeddedAgents();
   const auto found = std::ranges::find_if(agents, [&](const auto& a) { return a.name == name; });
   if (found != agents.end()) return *found;
-  std::vector<std::string> names;
-  for (const NamedAgent& agent : agents) names.emplace_back(agent.name);
+  const std::vector<std::string> names = NamesOf(agents);
   throw BadInput(Concat(where, ": no agent is called \"", name, "\"", DidYouMean(name, names),
                         "; there are ", Join(names, ", ")));
 }

@@ -98,11 +98,7 @@ void ControllerConfig::Describe(Options& o) {
   o.Add(&swing_up, "swing_up", "policy that swings up, a file or run folder").usual = "none";
 }
 
-std::vector<std::string> ControllerNames() {
-  std::vector<std::string> names;
-  for (const Controller& controller : kControllers) names.emplace_back(controller.name);
-  return names;
-}
+std::vector<std::string> ControllerNames() { return NamesOf(kControllers); }
 
 bool IsController(const std::string& name) {
   return std::ranges::any_of(kControllers, [&](const Controller& c) { return name == c.name; });

@@ -33,11 +33,7 @@ constexpr Task kTasks[] = {
 
 }  // namespace
 
-std::vector<std::string> TaskNames() {
-  std::vector<std::string> names;
-  for (const Task& task : kTasks) names.emplace_back(task.name);
-  return names;
-}
+std::vector<std::string> TaskNames() { return NamesOf(kTasks); }
 
 const Task& TaskNamed(std::string_view name) {
   for (const Task& task : kTasks) {

@@ -204,9 +204,7 @@ std::string Mjcf(const Plant& plant) {
 )";
   // Each @name stands for a part that follows or for that parameter.
   const auto fill = [&](const std::string& field, const std::string& text) {
-    for (size_t at = 0; (at = mjcf.find(field, at)) != std::string::npos;) {
-      mjcf.replace(at, field.size(), text);
-    }
+    mjcf = Replaced(std::move(mjcf), field, text);
   };
   const bool rotors = plant.rotor_inertia != 0, friction = plant.has_dry_friction();
   fill("@armature1", FormatNumber(Armature1(plant)));
