@@ -206,34 +206,11 @@ Option& Options::AddOption(Option::Target target, std::string_view name, Range r
       Option{section_, std::string(name), target, range, std::string(unit), std::string(help)});
 }
 
-Option& Options::Add(bool* target, std::string_view name, std::string_view help) {
-  return AddOption(target, name, {}, "", help);
-}
-
-Option& Options::Add(int64_t* target, std::string_view name, Range range, std::string_view unit,
-                     std::string_view help) {
-  return AddOption(target, name, range, unit, help);
-}
-
-Option& Options::Add(double* target, std::string_view name, Range range, std::string_view unit,
-                     std::string_view help) {
-  return AddOption(target, name, range, unit, help);
-}
-
-Option& Options::Add(std::string* target, std::string_view name, std::string_view help) {
-  return AddOption(target, name, {}, "", help);
-}
-
 Option& Options::AddChoice(std::string* target, std::string_view name,
                            std::vector<std::string> choices, std::string_view help) {
   Option& option = Add(target, name, help);
   option.choices = std::move(choices);
   return option;
-}
-
-Option& Options::Add(std::vector<int64_t>* target, std::string_view name, Range range,
-                     std::string_view help) {
-  return AddOption(target, name, range, "", help);
 }
 
 void Options::Alias(std::string_view name, std::vector<std::string> members,

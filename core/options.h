@@ -1,5 +1,6 @@
 #pragma once
 
+#include <concepts>
 #include <cstdint>
 #include <functional>
 #include <limits>
@@ -84,17 +85,26 @@ class Options {
   /// Names the section that the following settings belong to.
   void Section(std::string_view section) { section_ = section; }
 
-  Option& Add(bool* target, std::string_view name, std::string_view help);
-  Option& Add(int64_t* target, std::string_view name, Range range, std::string_view unit,
-              std::string_view help);
-  Option& Add(double* target, std::string_view name, Range range, std::string_view unit,
-              std::string_view help);
-  Option& Add(std::string* target, std::string_view name, std::string_view help);
+  /// A switch or a text.
+  template <typename T>
+  requires std::same_as<T, bool> || std::same_as<T, std::string> Option& Add(
+      T* target, std::string_view name, std::string_view help) {
+    return AddOption(target, name, {}, "", help);
+  }
+  /// A number.
+  template <typename T>
+  requires std::same_as<T, int64_t> || std::same_as<T, double> Option& Add(
+      T* target, std::string_view name, Range range, std::string_view unit, std::string_view help) {
+    return AddOption(target, name, range, unit, help);
+  }
   /// A text that is one of `choices`.
   Option& AddChoice(std::string* target, std::string_view name, std::vector<std::string> choices,
                     std::string_view help);
+  /// A list of integers.
   Option& Add(std::vector<int64_t>* target, std::string_view name, Range range,
-              std::string_view help);
+              std::string_view help) {
+    return AddOption(target, name, range, "", help);
+  }
 
   /// One name that sets several settings, such as `mass` for `mass1` and `mass2`. Without `help`
   /// the text is "both … and …".
