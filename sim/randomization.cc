@@ -5,27 +5,28 @@
 namespace upswing {
 namespace {
 
-constexpr double Plant::*kParameters[] = {&Plant::mass1,   &Plant::mass2,       &Plant::length1,
-                                          &Plant::length2, &Plant::damping1,    &Plant::damping2,
-                                          &Plant::gravity, &Plant::torque_limit};
+/// A parameter of the plant that may be random.
+struct Parameter {
+  const char* name;
+  double Plant::*value;
+};
+constexpr Parameter kParameters[] = {
+    {"mass1", &Plant::mass1},       {"mass2", &Plant::mass2},
+    {"length1", &Plant::length1},   {"length2", &Plant::length2},
+    {"damping1", &Plant::damping1}, {"damping2", &Plant::damping2},
+    {"gravity", &Plant::gravity},   {"torque_limit", &Plant::torque_limit}};
 
 }  // namespace
 
 void Randomization::Describe(Options& o) {
   constexpr Range kRelative{0, 0.99};  // what is drawn stays positive
-  auto& [mass1, mass2, length1, length2, damping1, damping2, gravity, torque_limit] = plant;
   o.Section("randomize");
-  const auto add = [&](double* target, std::string_view name, std::string_view what) {
-    o.Add(target, name, kRelative, "", what);
-  };
-  add(&mass1, "randomize_mass1", "each episode's mass1 is within ± this share of the plant's");
-  add(&mass2, "randomize_mass2", "the same of mass2");
-  add(&length1, "randomize_length1", "the same of length1");
-  add(&length2, "randomize_length2", "the same of length2");
-  add(&damping1, "randomize_damping1", "the same of damping1");
-  add(&damping2, "randomize_damping2", "the same of damping2");
-  add(&gravity, "randomize_gravity", "the same of gravity");
-  add(&torque_limit, "randomize_torque_limit", "the same of torque_limit");
+  for (size_t k = 0; k < plant.size(); ++k) {
+    const std::string name = kParameters[k].name;
+    o.Add(&plant[k], "randomize_" + name, kRelative, "",
+          k == 0 ? "each episode's mass1 is within ± this share of the plant's"
+                 : "the same of " + name);
+  }
   o.Add(&sensor_noise, "randomize_sensor_noise", {0, 10}, "rad, rad/s",
         "each episode's sensor noise is up to so much above sensor_noise");
   o.Add(&delay, "randomize_delay", {0, kLargestDelay}, "s",
@@ -49,7 +50,7 @@ bool Randomization::any() const {
 Plant Randomization::Draw(const Plant& nominal, Rng& rng) const {
   Plant drawn = nominal;
   for (size_t k = 0; k < plant.size(); ++k) {
-    drawn.*kParameters[k] *= 1 + rng.Uniform(-plant[k], plant[k]);
+    drawn.*kParameters[k].value *= 1 + rng.Uniform(-plant[k], plant[k]);
   }
   return drawn;
 }
