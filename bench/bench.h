@@ -50,6 +50,9 @@ struct BenchCase {
 };
 using BenchCases = std::vector<BenchCase>;
 
+/// Torque levels of agents that choose from some.
+inline constexpr int kBenchActions = 9;
+
 /// A replay memory filled with `size` random transitions, 2% of which terminate. Whole actions are
 /// 0 to 8.
 std::shared_ptr<Replay> FilledReplay(int64_t size, int obs_size, const ActionSpace& actions);

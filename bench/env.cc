@@ -19,7 +19,7 @@ namespace {
 class Torques {
  public:
   explicit Torques(int num_envs) : num_envs_(static_cast<size_t>(num_envs)) {
-    const std::vector<double> levels = TorqueLevels(Plant().torque_limit, 9);
+    const std::vector<double> levels = TorqueLevels(Plant().torque_limit, kBenchActions);
     Rng rng(1, "benchmark");
     for (size_t i = 0; i < kSteps * num_envs_; ++i) {
       values_.push_back(levels[rng.Below(levels.size())]);
@@ -70,13 +70,11 @@ BenchWork PhysicsInClosedForm(int num_envs, int threads) {
 /// Runge-Kutta steps, four to a control period.
 BenchCase PhysicsCase(const std::string& physics, int num_envs, int threads) {
   const bool closed_form = &FindEngine(physics, "physics") == &kClosedForm;
-  return {fmt::format("physics/{}/envs:{}/threads:{}", physics, num_envs, threads),
-          "steps",
-          static_cast<double>(kPhysicsSteps) * num_envs,
-          0,
-          0,
-          threads,
-          [=]() -> BenchWork {
+  return {.name = fmt::format("physics/{}/envs:{}/threads:{}", physics, num_envs, threads),
+          .items = "steps",
+          .count = static_cast<double>(kPhysicsSteps) * num_envs,
+          .threads = threads,
+          .prepare = [=]() -> BenchWork {
             return closed_form ? PhysicsInClosedForm(num_envs, threads)
                                : PhysicsInMuJoCo(num_envs, threads);
           }};
@@ -84,13 +82,11 @@ BenchCase PhysicsCase(const std::string& physics, int num_envs, int threads) {
 
 /// Whole environment steps: physics, observation, reward and, at the end of episodes, reset.
 BenchCase EnvCase(const std::string& physics, int num_envs, int threads) {
-  return {fmt::format("env/{}/envs:{}/threads:{}", physics, num_envs, threads),
-          "steps",
-          static_cast<double>(num_envs),
-          0,
-          0,
-          threads,
-          [=]() -> BenchWork {
+  return {.name = fmt::format("env/{}/envs:{}/threads:{}", physics, num_envs, threads),
+          .items = "steps",
+          .count = static_cast<double>(num_envs),
+          .threads = threads,
+          .prepare = [=]() -> BenchWork {
             const auto pool = std::make_shared<BenchPool>(threads);
             PendulumEnvConfig config;
             config.engine = &FindEngine(physics, "physics");

@@ -46,8 +46,10 @@ struct Layer {
 /// The three products of a layer, as a gradient step has them.
 void AddProducts(int width, int B, BenchCases& cases) {
   const auto add = [&](const char* name, auto multiply) {
-    cases.push_back({fmt::format("kernels/{0}/{1}x{1}/batch:{2}", name, width, B), "products", 1,
-                     2.0 * width * width * B, 0, 1, [=]() -> BenchWork {
+    cases.push_back({.name = fmt::format("kernels/{0}/{1}x{1}/batch:{2}", name, width, B),
+                     .items = "products",
+                     .flops = 2.0 * width * width * B,
+                     .prepare = [=]() -> BenchWork {
                        const auto layer = std::make_shared<Layer>(width, B);
                        return [=] { multiply(*layer); };
                      }});
@@ -62,13 +64,11 @@ BenchCase AdamCase(size_t n) {
   constexpr double kFlops = 16;   // a parameter, a division and a square root among them
   constexpr double kNumbers = 9;  // a parameter: five read, four written
   const auto count = static_cast<double>(n);
-  return {fmt::format("kernels/adam_polyak/{}", n),
-          "passes",
-          1,
-          kFlops * count,
-          kNumbers * sizeof(float) * count,
-          1,
-          [n]() -> BenchWork {
+  return {.name = fmt::format("kernels/adam_polyak/{}", n),
+          .items = "passes",
+          .flops = kFlops * count,
+          .bytes = kNumbers * sizeof(float) * count,
+          .prepare = [n]() -> BenchWork {
             struct Arrays {
               AlignedVector<float> g, m, v, p, target;
             };
@@ -84,13 +84,10 @@ BenchCase AdamCase(size_t n) {
 }
 
 BenchCase TransposeCase(int width) {
-  return {fmt::format("kernels/transpose/{0}x{0}", width),
-          "passes",
-          1,
-          0,
-          2.0 * sizeof(float) * width * width,
-          1,
-          [width]() -> BenchWork {
+  return {.name = fmt::format("kernels/transpose/{0}x{0}", width),
+          .items = "passes",
+          .bytes = 2.0 * sizeof(float) * width * width,
+          .prepare = [width]() -> BenchWork {
             const auto layer = std::make_shared<Layer>(width, 1);
             return [=] { Transpose(layer->w, layer->dw); };
           }};
@@ -100,13 +97,10 @@ BenchCase TransposeCase(int width) {
 /// into.
 BenchCase TriadCase(const char* memory, size_t bytes) {
   const size_t n = bytes / (3 * sizeof(float)) / 16 * 16;
-  return {fmt::format("kernels/triad/{}", memory),
-          "passes",
-          1,
-          0,
-          3.0 * sizeof(float) * static_cast<double>(n),
-          1,
-          [n]() -> BenchWork {
+  return {.name = fmt::format("kernels/triad/{}", memory),
+          .items = "passes",
+          .bytes = 3.0 * sizeof(float) * static_cast<double>(n),
+          .prepare = [n]() -> BenchWork {
             const auto a = std::make_shared<AlignedVector<float>>(n, 1.0F);
             const auto b = std::make_shared<AlignedVector<float>>(n, 1.0F);
             const auto c = std::make_shared<AlignedVector<float>>(n, 1.0F);

@@ -40,18 +40,16 @@ std::vector<BenchPart> Parts() {
   };
 }
 
-std::vector<std::string> PartNames() {
-  std::vector<std::string> names;
-  for (const BenchPart& part : Parts()) names.push_back(part.name);
-  return names;
-}
-
 /// Hands the cases to Google Benchmark, which calls back several times for each of them. At a
 /// signal to stop, the measurement that runs is given up, and those that follow.
 class BenchRunner {
  public:
-  BenchRunner(const BenchCases& cases, const BenchContext& context, bool quiet)
-      : cases_(cases), context_(context), reporter_(cases, context, quiet) {}
+  BenchRunner(const BenchCases& cases, const BenchOptions& options,
+              const std::map<int, double>& peak_gflops)
+      : cases_(cases),
+        options_(options),
+        peak_gflops_(peak_gflops),
+        reporter_(cases, options, peak_gflops) {}
 
   void Run() {
     for (const BenchCase& c : cases_) {
@@ -59,8 +57,8 @@ class BenchRunner {
                                    [this, &c](benchmark::State& state) { Measure(c, state); })
           ->UseRealTime()
           ->MeasureProcessCPUTime()
-          ->MinTime(context_.seconds)
-          ->Repetitions(context_.repetitions);
+          ->MinTime(options_.seconds)
+          ->Repetitions(static_cast<int>(options_.repetitions));
     }
     benchmark::RunSpecifiedBenchmarks(&reporter_);
     benchmark::ClearRegisteredBenchmarks();
@@ -107,11 +105,12 @@ class BenchRunner {
     if (c.bytes > 0) rate("bytes_per_second", c.bytes);
     if (c.flops <= 0) return;
     rate("gflops", 1e-9 * c.flops);
-    rate("peak_share", 1e-9 * c.flops / context_.peak_gflops.at(c.threads));
+    rate("peak_share", 1e-9 * c.flops / peak_gflops_.at(c.threads));
   }
 
   const BenchCases& cases_;
-  const BenchContext& context_;
+  const BenchOptions& options_;
+  const std::map<int, double>& peak_gflops_;
   BenchReporter reporter_;
   const BenchCase* prepared_ = nullptr;  // the case that work_ is of
   BenchWork work_;
@@ -120,7 +119,7 @@ class BenchRunner {
 
 /// Throws BadInput on what the command line's own checks cannot see.
 void CheckOptions(const BenchOptions& options) {
-  const std::vector<std::string> names = PartNames();
+  const std::vector<std::string> names = NamesOf(Parts());
   for (const std::string& part : options.parts) {
     if (std::ranges::find(names, part) == names.end()) {
       throw BadInput(Concat("bench: no part is called \"", part, "\"", DidYouMean(part, names),
@@ -153,14 +152,6 @@ BenchCases WantedCases(const BenchOptions& options) {
   return cases;
 }
 
-/// A text that is one of `choices` and empty where it is not given; `usual` says what that means.
-void AddChoice(Options& options, std::string& target, std::string_view name,
-               std::vector<std::string> choices, std::string_view help, std::string_view usual) {
-  Option& option = options.Add(&target, name, help);
-  option.choices = std::move(choices);
-  option.usual = usual;
-}
-
 int RunBench(BenchOptions options) {
   CheckOptions(options);
   if (!options.simd.empty()) UseSimdPath(options.simd);
@@ -171,15 +162,14 @@ int RunBench(BenchOptions options) {
 
   InstallSignalHandlers("");
   const BenchCases cases = WantedCases(options);
-  BenchContext context{CpuModel(), SimdPath(),      options.threads,
-                       {},         options.seconds, static_cast<int>(options.repetitions)};
+  std::map<int, double> peak_gflops;  // by number of threads
   for (const BenchCase& c : cases) {
-    double& peak = context.peak_gflops[c.threads];
+    double& peak = peak_gflops[c.threads];
     if (c.flops > 0 && peak == 0) peak = MeasurePeakGflops(c.threads);
   }
-  std::erase_if(context.peak_gflops, [](const auto& peak) { return peak.second == 0; });
+  std::erase_if(peak_gflops, [](const auto& peak) { return peak.second == 0; });
 
-  BenchRunner runner(cases, context, options.json && IsStandardStream(*options.json));
+  BenchRunner runner(cases, options, peak_gflops);
   runner.Run();
   if (StopSignal() != 0) {
     SayError(fmt::format("stopped after {} of {} cases{}", runner.reporter().cases_done(),
@@ -199,11 +189,11 @@ void AddBench(CommandLine& line) {
   Options own;
   own.Add(&o->threads, "threads", {0, 256}, "numbers of threads; 0: chosen by timing").usual =
       "1 and one for each processor, up to 8";
-  AddChoice(own, o->simd, "simd", SimdPaths(), "vector instructions", "the first");
+  own.AddChoice(&o->simd, "simd", SimdPaths(), "vector instructions").usual = "the first";
   own.Add(&o->seconds, "seconds", {0.001, 1000}, "s", "for each repetition of a case");
   own.Add(&o->repetitions, "repetitions", {1, 1000}, "", "of a case; the median is printed");
-  AddChoice(own, o->network, "network", {"plain", "dueling"}, "gradient: DQN or Dueling Double DQN",
-            "both");
+  own.AddChoice(&o->network, "network", {"plain", "dueling"}, "gradient: DQN or Dueling Double DQN")
+      .usual = "both";
   own.Add(&o->hidden, "hidden", {1, 4096}, "gradient, sac, ppo: widths of the feature layers")
       .usual = "several";
   own.Add(&o->batch, "batch", {1, 65536}, "", "gradient, sac, ppo: size of the minibatches").usual =

@@ -7,7 +7,9 @@
 
 #include "core/format.h"
 #include "core/sample.h"
+#include "core/simd.h"
 #include "core/text.h"
+#include "io/streams.h"
 
 namespace upswing {
 namespace {
@@ -30,8 +32,12 @@ std::string Row(size_t name_width, const std::string& name, const std::string& r
 
 }  // namespace
 
-BenchReporter::BenchReporter(const BenchCases& cases, const BenchContext& context, bool quiet)
-    : cases_(cases), context_(context), quiet_(quiet) {
+BenchReporter::BenchReporter(const BenchCases& cases, const BenchOptions& options,
+                             const std::map<int, double>& peak_gflops)
+    : cases_(cases),
+      options_(options),
+      peak_gflops_(peak_gflops),
+      quiet_(options.json && IsStandardStream(*options.json)) {
   json_.SetOutputStream(&json_text_);
   json_.SetErrorStream(&json_text_);
   for (const BenchCase& c : cases_) name_width_ = std::max(name_width_, c.name.size());
@@ -40,17 +46,16 @@ BenchReporter::BenchReporter(const BenchCases& cases, const BenchContext& contex
 bool BenchReporter::ReportContext(const Context& context) {
   if (quiet_) return json_.ReportContext(context);
   std::string peaks;
-  for (const auto& [threads, gflops] : context_.peak_gflops) {
+  for (const auto& [threads, gflops] : peak_gflops_) {
     peaks += fmt::format("{} {:.1f} GFLOP/s with {} thread{}", peaks.empty() ? "; peak" : ",",
                          gflops, threads, threads == 1 ? "" : "s");
   }
   const std::vector<double>& load = context.cpu_info.load_avg;
-  line_.Print(fmt::format("{}, {} processors{}, vector instructions {}{}", context_.cpu_model,
-                          context.cpu_info.num_cpus,
-                          load.empty() ? "" : fmt::format(" (load {:.1f})", load.front()),
-                          context_.simd_path, peaks));
+  line_.Print(fmt::format(
+      "{}, {} processors{}, vector instructions {}{}", CpuModel(), context.cpu_info.num_cpus,
+      load.empty() ? "" : fmt::format(" (load {:.1f})", load.front()), SimdPath(), peaks));
   line_.Print(fmt::format("Median of {} × {} s for each of {} cases; times are those of one item",
-                          context_.repetitions, FormatNumber(context_.seconds), cases_.size()));
+                          options_.repetitions, FormatNumber(options_.seconds), cases_.size()));
   line_.Print(Row(name_width_, "case", "rate", "GFLOP/s", "of peak", "GB/s", "wall", "CPU"));
   return json_.ReportContext(context);
 }
@@ -88,16 +93,15 @@ void BenchReporter::PrintRow(const BenchCase& measured, double wall, double cpu)
   if (quiet_) return;
   const double rate = measured.count / wall;
   const double gflops = 1e-9 * measured.flops / wall;
-  const auto peak = context_.peak_gflops.find(measured.threads);
+  const auto peak = peak_gflops_.find(measured.threads);
   const bool has_flops = measured.flops > 0;
-  line_.Print(Row(name_width_, measured.name,
-                  fmt::format("{} {}/s", FormatCount(rate), measured.items),
-                  has_flops ? fmt::format("{:.1f}", gflops) : "",
-                  has_flops && peak != context_.peak_gflops.end()
-                      ? fmt::format("{:.0f}%", 100 * gflops / peak->second)
-                      : "",
-                  measured.bytes > 0 ? fmt::format("{:.1f}", 1e-9 * measured.bytes / wall) : "",
-                  FormatTime(wall / measured.count), FormatTime(cpu / measured.count)));
+  line_.Print(Row(
+      name_width_, measured.name, fmt::format("{} {}/s", FormatCount(rate), measured.items),
+      has_flops ? fmt::format("{:.1f}", gflops) : "",
+      has_flops && peak != peak_gflops_.end() ? fmt::format("{:.0f}%", 100 * gflops / peak->second)
+                                              : "",
+      measured.bytes > 0 ? fmt::format("{:.1f}", 1e-9 * measured.bytes / wall) : "",
+      FormatTime(wall / measured.count), FormatTime(cpu / measured.count)));
 }
 
 void BenchReporter::ShowProgress(const BenchCase& running) {
@@ -114,15 +118,15 @@ std::string BenchReporter::Json() const {
   auto json = nlohmann::ordered_json::parse(json_text_.str());
   auto& context = json["context"];
   context["upswing_version"] = UPSWING_VERSION;
-  context["cpu_model"] = context_.cpu_model;
-  context["simd_path"] = context_.simd_path;
-  context["threads"] = context_.threads;
+  context["cpu_model"] = CpuModel();
+  context["simd_path"] = SimdPath();
+  context["threads"] = options_.threads;
   context["peak_gflops"] = nlohmann::ordered_json::object();
-  for (const auto& [threads, gflops] : context_.peak_gflops) {
+  for (const auto& [threads, gflops] : peak_gflops_) {
     context["peak_gflops"][std::to_string(threads)] = gflops;
   }
-  context["seconds"] = context_.seconds;
-  context["repetitions"] = context_.repetitions;
+  context["seconds"] = options_.seconds;
+  context["repetitions"] = options_.repetitions;
   return json.dump(2) + "\n";
 }
 

@@ -12,20 +12,13 @@
 
 namespace upswing {
 
-/// The machine and how it was used.
-struct BenchContext {
-  std::string cpu_model, simd_path;
-  std::vector<int64_t> threads;
-  std::map<int, double> peak_gflops;  // by number of threads; empty: not measured
-  double seconds;                     // of a repetition
-  int repetitions;
-};
-
 /// Prints a table as the cases are measured, and keeps what Google Benchmark writes as JSON.
 class BenchReporter : public benchmark::BenchmarkReporter {
  public:
-  /// `quiet`: no table is printed.
-  BenchReporter(const BenchCases& cases, const BenchContext& context, bool quiet);
+  /// All have to outlive it. `peak_gflops`: by number of threads, where it was measured. Where the
+  /// JSON goes to standard output, no table is printed.
+  BenchReporter(const BenchCases& cases, const BenchOptions& options,
+                const std::map<int, double>& peak_gflops);
 
   bool ReportContext(const Context& context) override;
   void ReportRuns(const std::vector<Run>& runs) override;
@@ -45,7 +38,8 @@ class BenchReporter : public benchmark::BenchmarkReporter {
   void PrintRow(const BenchCase& measured, double wall, double cpu);
 
   const BenchCases& cases_;
-  const BenchContext& context_;
+  const BenchOptions& options_;
+  const std::map<int, double>& peak_gflops_;
   std::ostringstream json_text_;
   benchmark::JSONReporter json_;
   ProgressLine line_;
