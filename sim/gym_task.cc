@@ -9,7 +9,7 @@
 namespace upswing {
 
 GymTask::GymTask(EnvSpec spec, Limits limits, const GymTaskConfig& config)
-    : spec_(std::move(spec)), limits_(std::move(limits)), stream_(config.stream) {
+    : spec_(std::move(spec)), limits_(std::move(limits)) {
   spec_.num_envs = config.num_envs;
   const auto n = static_cast<size_t>(config.num_envs);
   for (size_t i = 0; i < n; ++i) {
@@ -38,32 +38,6 @@ void GymTask::BeginEpisode(int env) {
   Observe(states().Cols(env, 1), Observations().Rows(env, 1));
 }
 
-void GymTask::Restart(int env, std::optional<uint64_t> seed) {
-  if (seed) rngs_[static_cast<size_t>(env)] = Rng(*seed, stream_);
-  Reset(env);
-}
-
-void GymTask::Hold(int env) {
-  const auto i = static_cast<size_t>(env);
-  held_.resize(step_counts_.size());
-  held_[i].resize(limits_.state_bound.size());
-  GetState(env, held_[i]);
-}
-
-void GymTask::KeepHeld(StepResult& result) {
-  for (size_t i = 0; i < held_.size(); ++i) {
-    if (held_[i].empty()) continue;
-    const auto env = static_cast<int>(i);
-    for (int k = 0; k < num_states(); ++k) states()(k, env) = held_[i][static_cast<size_t>(k)];
-    const size_t terms = spec_.term_names.size();
-    std::fill_n(result.reward_terms.begin() + static_cast<ptrdiff_t>(i * terms), terms, 0.0);
-    result.torque[i] = result.work[i] = 0;
-    result.at_goal[i] = result.terminated[i] = 0;
-    --step_counts_[i];
-  }
-  held_.clear();
-}
-
 void GymTask::GetState(int env, std::span<double> state) const {
   const Matrix<const double> all(states_.data(), num_states(), num_envs());
   for (int k = 0; k < num_states(); ++k) state[static_cast<size_t>(k)] = all(k, env);
@@ -87,7 +61,6 @@ void GymTask::Step(Matrix<const double> action, StepResult& result) {
     result.torque[i] = std::clamp(action(static_cast<int>(i), 0), -limit, limit);
   }
   Move(states(), result.torque, result);
-  KeepHeld(result);
   Observe(states(), Observations());
   std::ranges::copy(obs_, result.next_obs.begin());
 

@@ -7,7 +7,6 @@
 
 #include "core/env.h"
 #include "core/rng.h"
-#include "sim/seeded_env.h"
 
 namespace upswing {
 
@@ -22,7 +21,7 @@ struct GymTaskConfig {
 /// N environments of a small task of Gymnasium's (https://gymnasium.farama.org) with one torque.
 /// This class limits the torque, counts steps, truncates, resets and saves; a derived class has the
 /// equations. Letters: S state variables, D observation size, K reward terms.
-class GymTask : public SeededEnv {
+class GymTask : public VectorEnv {
  public:
   const EnvSpec& spec() const override { return spec_; }
   Matrix<const float> obs() const override { return {obs_.data(), num_envs(), spec_.obs_size}; }
@@ -31,8 +30,6 @@ class GymTask : public SeededEnv {
   /// Throws BadInput unless each state variable is within its bound.
   void SetState(int env, std::span<const double> state) override;
   void State(const Archive& archive) override;
-  void Restart(int env, std::optional<uint64_t> seed) override;
-  void Hold(int env) override;
 
  protected:
   /// What the class needs to know besides `spec`, whose num_envs the settings replace.
@@ -58,8 +55,6 @@ class GymTask : public SeededEnv {
   int num_states() const { return static_cast<int>(limits_.state_bound.size()); }  // S
   Matrix<double> states() { return {states_, num_states(), num_envs()}; }
   Matrix<float> Observations() { return {obs_, num_envs(), spec_.obs_size}; }
-  /// Takes back the step of the environments that are held, and its result.
-  void KeepHeld(StepResult& result);
   /// A new episode of an environment, in a start state.
   void Reset(int env);
   /// The same in its present state.
@@ -67,12 +62,10 @@ class GymTask : public SeededEnv {
 
   EnvSpec spec_;
   Limits limits_;
-  std::string stream_;
-  std::vector<Rng> rngs_;                  // (N) of the start states
-  std::vector<double> states_;             // (S, N)
-  std::vector<float> obs_;                 // (N, D)
-  std::vector<int64_t> step_counts_;       // (N) since the episode began
-  std::vector<std::vector<double>> held_;  // (N) states that the next Step keeps; or empty
+  std::vector<Rng> rngs_;             // (N) of the start states
+  std::vector<double> states_;        // (S, N)
+  std::vector<float> obs_;            // (N, D)
+  std::vector<int64_t> step_counts_;  // (N) since the episode began
 };
 
 }  // namespace upswing

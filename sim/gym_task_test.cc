@@ -18,7 +18,7 @@ namespace {
 
 struct TaskCase {
   std::string name;  // as a file's
-  std::unique_ptr<SeededEnv> (*make)(const GymTaskConfig&);
+  std::unique_ptr<VectorEnv> (*make)(const GymTaskConfig&);
   std::vector<double> start_bound, state_bound;  // (S)
   int episode_steps;
 };
@@ -26,16 +26,16 @@ struct TaskCase {
 void PrintTo(const TaskCase& task, std::ostream* out) { *out << task.name; }
 
 template <typename Task>
-std::unique_ptr<SeededEnv> Make(const GymTaskConfig& config) {
+std::unique_ptr<VectorEnv> Make(const GymTaskConfig& config) {
   return std::make_unique<Task>(config);
 }
 
 class GymTasks : public testing::TestWithParam<TaskCase> {
  protected:
-  static std::unique_ptr<SeededEnv> MakeEnv(const GymTaskConfig& config) {
+  static std::unique_ptr<VectorEnv> MakeEnv(const GymTaskConfig& config) {
     return GetParam().make(config);
   }
-  static std::unique_ptr<SeededEnv> MakeEnv(int num_envs) {
+  static std::unique_ptr<VectorEnv> MakeEnv(int num_envs) {
     GymTaskConfig config;
     config.num_envs = num_envs;
     config.seed = 3;
@@ -172,40 +172,6 @@ TEST_P(GymTasks, APartOfTheEnvironmentsIsAsThoseOfTheWhole) {
   }
 }
 
-TEST_P(GymTasks, ARestartWithASeedGivesTheEpisodesOfANewEnvironment) {
-  GymTaskConfig config;
-  config.num_envs = 2;
-  const auto env = MakeEnv(config);
-  StepResult result(env->spec());
-  Step(*env, {1, -1}, result);
-  env->Restart(1, 7);
-  config.num_envs = 1;
-  config.seed = 7;
-  const auto fresh = MakeEnv(config);
-  EXPECT_EQ(StateOf(*env, 1), StateOf(*fresh, 0));
-  env->Restart(1, std::nullopt);
-  fresh->Restart(0, std::nullopt);
-  EXPECT_EQ(StateOf(*env, 1), StateOf(*fresh, 0));
-}
-
-TEST_P(GymTasks, AStepLeavesWhatIsHeldAsItIs) {
-  const auto env = MakeEnv(2), reference = MakeEnv(2);
-  StepResult result(env->spec()), expected(env->spec());
-  env->Hold(1);
-  Step(*env, {0, 1}, result);
-  EXPECT_EQ(StateOf(*env, 1), StateOf(*reference, 1));
-  EXPECT_NE(StateOf(*env, 0), StateOf(*reference, 0));
-  EXPECT_EQ(result.reward[1], 0);
-  EXPECT_EQ(result.torque[1], 0);
-  for (int step = 0; step < GetParam().episode_steps; ++step) {
-    Step(*env, {0, std::sin(step)}, result);
-    Step(*reference, {0, std::sin(step)}, expected);
-    ASSERT_EQ(result.reward[1], expected.reward[1]);
-    ASSERT_EQ(result.truncated[1], expected.truncated[1]);
-    ASSERT_EQ(StateOf(*env, 1), StateOf(*reference, 1));
-  }
-}
-
 TEST_P(GymTasks, SavedAndLoadedGoesOnWithTheSameBits) {
   const auto saved = MakeEnv(3);
   GymTaskConfig other;
@@ -229,7 +195,7 @@ TEST_P(GymTasks, SavedAndLoadedGoesOnWithTheSameBits) {
 
 /// Whether an environment takes its own state with one array replaced.
 template <typename T>
-bool Takes(std::unique_ptr<SeededEnv> env, const std::string& name, std::vector<T> values) {
+bool Takes(std::unique_ptr<VectorEnv> env, const std::string& name, std::vector<T> values) {
   try {
     SaveAndLoad(
         [&](const Archive& archive) {

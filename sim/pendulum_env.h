@@ -15,7 +15,6 @@
 #include "sim/identification.h"
 #include "sim/physics.h"
 #include "sim/randomization.h"
-#include "sim/seeded_env.h"
 
 namespace upswing {
 
@@ -60,7 +59,7 @@ EnvSpec PendulumSpec(const PendulumEnvConfig& config);
 /// With randomised plants, observation and reward are those of the episode's own plant. With
 /// disturbances, observations hold what the sensors measure, and motors apply the delayed torque;
 /// state, reward and goal are the true ones.
-class PendulumEnv : public SeededEnv {
+class PendulumEnv : public VectorEnv {
  public:
   /// Throws BadInput as the engine does.
   explicit PendulumEnv(const PendulumEnvConfig& config);
@@ -76,9 +75,15 @@ class PendulumEnv : public SeededEnv {
   void GetState(int env, std::span<double> state) const override;
   void SetState(int env, std::span<const double> state) override;
   void SetStartNoise(double sigma) override { config_.start.noise = sigma; }
-  void Restart(int env, std::optional<uint64_t> seed) override;
-  void Hold(int env) override;
   void State(const Archive& archive) override;
+
+  /// Begins another episode of an environment, as Gymnasium's reset asks for. With a seed, this
+  /// episode and those that follow are the ones that a first environment of a new set with this
+  /// seed would have.
+  void Restart(int env, std::optional<uint64_t> seed);
+  /// Lets the next Step leave an environment as it is: its successor is the present observation,
+  /// all else of its result 0.
+  void Hold(int env);
 
   /// The plant of the running episode.
   const Plant& plant(int env) const {
