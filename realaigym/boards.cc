@@ -6,7 +6,6 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
-#include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -216,15 +215,9 @@ BoardReport ScoreOnBoard(const Competitor& competitor, uint64_t seed, ThreadPool
   std::vector<BoardEpisode> episodes;
   episodes.reserve(cases.size());
   for (const RobustnessCase& each : cases) episodes.push_back(each.episode);
-  std::mutex mutex;
-  size_t done = 0;
-  const auto outcomes = SimulateOnBoard(
-      competitor.robot, episodes, competitor.make, &pool, nullptr, [&](size_t count) {
-        const std::lock_guard lock(mutex);
-        done += count;
-        if (progress) progress(static_cast<double>(done), static_cast<double>(episodes.size()));
-      });
-  report.robustness = JudgeRobustness(cases, outcomes);
+  report.robustness = JudgeRobustness(
+      cases,
+      SimulateOnBoard(competitor.robot, episodes, competitor.make, &pool, nullptr, progress));
   report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return report;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <mutex>
 #include <numbers>
 
 #include "core/rng.h"
@@ -217,8 +218,10 @@ class Run {
 std::vector<BoardOutcome> SimulateOnBoard(Robot robot, std::span<const BoardEpisode> episodes,
                                           const BoardControllerMaker& make, ThreadPool* pool,
                                           std::vector<BoardSample>* trace,
-                                          const std::function<void(size_t)>& done) {
+                                          const Progress& progress) {
   std::vector<BoardOutcome> outcomes(episodes.size());
+  std::mutex mutex;
+  double done = 0;
   const int blocks = static_cast<int>((episodes.size() + kBoardBlock - 1) / kBoardBlock);
   ParallelFor(pool, blocks, [&](int index) {
     const size_t first = static_cast<size_t>(index) * kBoardBlock;
@@ -227,7 +230,9 @@ std::vector<BoardOutcome> SimulateOnBoard(Robot robot, std::span<const BoardEpis
     auto run = std::make_unique<Run>(robot, episodes.subspan(first, count));
     std::ranges::copy(run->Go(*controller, first == 0 ? trace : nullptr),
                       outcomes.begin() + static_cast<std::ptrdiff_t>(first));
-    if (done) done(count);
+    if (!progress) return;
+    const std::lock_guard lock(mutex);
+    progress(done += static_cast<double>(count), static_cast<double>(episodes.size()));
   });
   return outcomes;
 }

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "core/progress.h"
 #include "core/thread_pool.h"
 #include "realaigym/rules.h"
 
@@ -35,10 +36,10 @@ struct BoardSample {
 };
 
 /// Simulates all episodes, in blocks on the pool's threads. With `trace`, it gets the steps of the
-/// first one. `done`, if any, is told how many are finished, from any thread.
+/// first one. `progress` counts them.
 std::vector<BoardOutcome> SimulateOnBoard(Robot robot, std::span<const BoardEpisode> episodes,
                                           const BoardControllerMaker& make, ThreadPool* pool,
                                           std::vector<BoardSample>* trace = nullptr,
-                                          const std::function<void(size_t)>& done = nullptr);
+                                          const Progress& progress = nullptr);
 
 }  // namespace upswing
