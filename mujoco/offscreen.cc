@@ -44,25 +44,7 @@ Offscreen::Offscreen(PictureSize size)
   pixels_.resize(rows_.size());
 }
 
-Offscreen::Offscreen(const Plant& plant, const std::string& mjcf, PictureSize size,
-                     const Camera& camera)
-    : Offscreen(size) {
-  scene_ = std::make_unique<PendulumScene>(plant, mjcf);
-  scene_->SetCamera(camera, static_cast<double>(size.width) / size.height);
-}
-
 Offscreen::~Offscreen() = default;
-
-std::span<const uint8_t> Offscreen::Render(std::span<const double> qpos, double torque) {
-  if (scene_ == nullptr || qpos.size() != 2) {
-    throw BadInput(Concat("picture: expected two angles, got ", qpos.size()));
-  }
-  Marks marks;
-  marks.torque = torque;
-  scene_->Update({qpos[0], qpos[1], 0, 0}, marks);
-  const ScenePanel panel{scene_.get(), "", {}};
-  return Render(std::span(&panel, 1));
-}
 
 std::span<const uint8_t> Offscreen::Render(std::span<const ScenePanel> panels) {
   {

@@ -27,29 +27,19 @@ PictureSize CheckedSize(PictureSize size);
 /// thread may use it, one at a time; several of these do not disturb each other.
 class Offscreen {
  public:
-  /// Pictures of one pendulum: this plant, of the built-in model or of a file's (`mjcf` if it is
-  /// not empty). Throws BadInput as LoadModel does and if a size is out of range, and Failure with
-  /// what to install where there is no EGL or no device for it.
-  Offscreen(const Plant& plant, const std::string& mjcf, PictureSize size,
-            const Camera& camera = {});
-  /// Pictures of any panels.
+  /// Throws BadInput if a size is out of range, and Failure with what to install where there is no
+  /// EGL or no device for it.
   explicit Offscreen(PictureSize size);
   ~Offscreen();
 
-  /// The picture of that pendulum: pixels (height × width × 3), red, green, blue, the top row
-  /// first, until the next call. `qpos` (2) has the joints' angles, rad; `torque`, N·m, is drawn.
-  std::span<const uint8_t> Render(std::span<const double> qpos, double torque = 0);
-
-  /// The picture of these panels side by side.
+  /// The picture of these panels side by side: pixels (height × width × 3), red, green, blue, the
+  /// top row first, until the next call.
   std::span<const uint8_t> Render(std::span<const ScenePanel> panels);
-
-  PictureSize size() const { return size_; }
 
  private:
   struct Graphics;
 
   PictureSize size_;
-  std::unique_ptr<PendulumScene> scene_;  // of one pendulum; else null
   std::unique_ptr<Graphics> graphics_;
   std::vector<uint8_t> pixels_, rows_;  // top row first, and as OpenGL has them
 };

@@ -38,10 +38,24 @@ class OffscreenTest : public testing::Test {
   }
 };
 
-Pixels Render(Offscreen& offscreen, Angles q, double torque = 0) {
-  const auto pixels = offscreen.Render(q, torque);
-  return {pixels.begin(), pixels.end()};
-}
+/// Pictures of one pendulum.
+class Artist {
+ public:
+  explicit Artist(PictureSize size, const Plant& plant = {}, const Camera& camera = {})
+      : offscreen_(size), scene_(plant, "") {
+    scene_.SetCamera(camera, static_cast<double>(size.width) / size.height);
+  }
+  Pixels Draw(Angles q, double torque = 0) {
+    scene_.Update({q[0], q[1], 0, 0}, {.torque = torque});
+    const ScenePanel panel{&scene_, "", {}};
+    const auto pixels = offscreen_.Render({&panel, 1});
+    return {pixels.begin(), pixels.end()};
+  }
+
+ private:
+  Offscreen offscreen_;
+  PendulumScene scene_;
+};
 
 /// The middle of the pixels in which a colour prevails: column and row in [-1, 1], right and up;
 /// nothing if there are hardly any.
@@ -72,11 +86,11 @@ TEST_F(OffscreenTest, LinksAreWhereTheAnglesSay) {
   Camera camera;
   camera.azimuth = 90;  // along +y
   camera.elevation = 0;
-  Offscreen offscreen(Plant(), "", size, camera);
+  Artist artist(size, Plant(), camera);
   for (const Angles q : {Angles{0, 0}, Angles{kPi, 0}, Angles{kPi / 2, 0}, Angles{-kPi / 2, 0},
                          Angles{kPi / 2, kPi / 2}, Angles{kPi / 2, -kPi / 2}}) {
     SCOPED_TRACE(testing::Message() << "q = " << q[0] << ", " << q[1]);
-    const auto middle = MiddleOf(Render(offscreen, q), size, IsBlue);
+    const auto middle = MiddleOf(artist.Draw(q), size, IsBlue);
     ASSERT_TRUE(middle);
     // Centre of both links (m) over what half of the picture shows (m): 1.16 of their reach, 1 m.
     const double x = -(0.375 * std::sin(q[0]) + 0.125 * std::sin(q[0] + q[1])) / 1.16;
@@ -88,51 +102,51 @@ TEST_F(OffscreenTest, LinksAreWhereTheAnglesSay) {
 
 TEST_F(OffscreenTest, TorqueAndGoalAreShown) {
   const PictureSize size{240, 240};
-  Offscreen offscreen(Plant(), "", size);
-  EXPECT_FALSE(MiddleOf(Render(offscreen, {0, 0}), size, IsOrange));
+  Artist artist(size);
+  EXPECT_FALSE(MiddleOf(artist.Draw({0, 0}), size, IsOrange));
   // Positive torque turns clockwise: from the top over the right.
-  const auto right = MiddleOf(Render(offscreen, {0, 0}, 3), size, IsOrange);
-  const auto left = MiddleOf(Render(offscreen, {0, 0}, -3), size, IsOrange);
+  const auto right = MiddleOf(artist.Draw({0, 0}, 3), size, IsOrange);
+  const auto left = MiddleOf(artist.Draw({0, 0}, -3), size, IsOrange);
   ASSERT_TRUE(right && left);
   EXPECT_GT((*right)[0], 0.05);
   EXPECT_LT((*left)[0], -0.05);
   // The goal becomes green when both links are upright.
-  EXPECT_FALSE(MiddleOf(Render(offscreen, {0, 0}), size, IsGreen));
-  const auto goal = MiddleOf(Render(offscreen, {kPi + 0.2, 0}), size, IsGreen);
+  EXPECT_FALSE(MiddleOf(artist.Draw({0, 0}), size, IsGreen));
+  const auto goal = MiddleOf(artist.Draw({kPi + 0.2, 0}), size, IsGreen);
   ASSERT_TRUE(goal);
   EXPECT_GT((*goal)[1], 0.6);
 }
 
 TEST_F(OffscreenTest, APictureDependsOnItsArgumentsAlone) {
-  Offscreen one(Plant(), "", {160, 120}), other(Plant(), "", {96, 200});
-  const Pixels first = Render(one, {1, 2}, 1);
+  Artist one({160, 120}), other({96, 200});
+  const Pixels first = one.Draw({1, 2}, 1);
   EXPECT_EQ(first.size(), 160U * 120 * 3);
-  const Pixels of_other = Render(other, {1, 2}, 1);
+  const Pixels of_other = other.Draw({1, 2}, 1);
   EXPECT_EQ(of_other.size(), 96U * 200 * 3);
-  EXPECT_NE(Render(one, {1, 2.2}, 1), first);
-  EXPECT_EQ(Render(one, {1, 2}, 1), first);
-  EXPECT_EQ(Render(other, {1, 2}, 1), of_other);
+  EXPECT_NE(one.Draw({1, 2.2}, 1), first);
+  EXPECT_EQ(one.Draw({1, 2}, 1), first);
+  EXPECT_EQ(other.Draw({1, 2}, 1), of_other);
 }
 
 TEST_F(OffscreenTest, AnyThreadMayDraw) {
-  Offscreen offscreen(Plant(), "", {96, 96});
-  const Pixels here = Render(offscreen, {1, 2});
+  Artist artist({96, 96});
+  const Pixels here = artist.Draw({1, 2});
   Pixels there;
-  std::thread([&] { there = Render(offscreen, {1, 2}); }).join();
+  std::thread([&] { there = artist.Draw({1, 2}); }).join();
   EXPECT_EQ(there, here);
   // Two threads, each with its own, at the same time.
   std::array<Pixels, 2> both;
   std::vector<std::thread> threads;
   for (Pixels& pixels : both) {
     threads.emplace_back([&pixels] {
-      Offscreen own(Plant(), "", {96, 96});
-      for (int i = 0; i < 5; ++i) pixels = Render(own, {1, 2});
+      Artist own({96, 96});
+      for (int i = 0; i < 5; ++i) pixels = own.Draw({1, 2});
     });
   }
   for (std::thread& thread : threads) thread.join();
   EXPECT_EQ(both[0], here);
   EXPECT_EQ(both[1], here);
-  EXPECT_EQ(Render(offscreen, {1, 2}), here);
+  EXPECT_EQ(artist.Draw({1, 2}), here);
 }
 
 TEST_F(OffscreenTest, ShowsThePlant) {
@@ -141,9 +155,9 @@ TEST_F(OffscreenTest, ShowsThePlant) {
   const PictureSize size{200, 200};
   Camera camera;
   camera.distance = 4;
-  Offscreen usual(Plant(), "", size, camera), shorter(small, "", size, camera);
-  const auto a = MiddleOf(Render(usual, {kPi, 0}), size, IsBlue);
-  const auto b = MiddleOf(Render(shorter, {kPi, 0}), size, IsBlue);
+  Artist usual(size, Plant(), camera), shorter(size, small, camera);
+  const auto a = MiddleOf(usual.Draw({kPi, 0}), size, IsBlue);
+  const auto b = MiddleOf(shorter.Draw({kPi, 0}), size, IsBlue);
   ASSERT_TRUE(a && b);
   EXPECT_GT((*a)[1], (*b)[1] + 0.05);
 }

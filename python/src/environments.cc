@@ -1,4 +1,4 @@
-// BatchEnv for Python: actions in, arrays that view its results.
+// Double pendulums behind Gymnasium's interface: actions in, arrays that view the results.
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
@@ -7,17 +7,24 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <concepts>
 #include <memory>
 #include <mutex>
 #include <optional>
 
 #include "core/error.h"
 #include "core/text.h"
-#include "python/src/batch_env.h"
+#include "io/machine.h"
+#include "mujoco/engines.h"
+#include "mujoco/offscreen.h"
+#include "mujoco/painter.h"
 #include "python/src/bindings.h"
-#include "python/src/environment_settings.h"
-#include "python/src/pictures.h"
 #include "rl/ppo_config.h"
+#include "rl/torque_levels.h"
+#include "run/config_files.h"
+#include "setup/config_checks.h"
+#include "sim/pendulum_env.h"
 
 namespace upswing {
 namespace {
@@ -25,8 +32,8 @@ namespace {
 namespace nb = nanobind;
 
 using AnyArray = nb::ndarray<nb::ro, nb::device::cpu, nb::c_contig>;
-template <typename T, typename... Shape>
-using View = nb::ndarray<nb::numpy, const T, Shape...>;
+template <typename T>
+using View = nb::ndarray<nb::numpy, const T>;
 
 /// Which actions there are: 0 for any torque, else how many torques to choose from. The names are
 /// those of PPO's settings.
@@ -38,126 +45,227 @@ int64_t LevelsOf(const std::string& actions, const std::string& levels) {
   return config.discrete() ? config.levels : 0;
 }
 
-/// The settings of so many environments.
+/// The settings of so many environments: those of the named agent (the usual one if none is named)
+/// with these changes. Throws BadInput for settings that environments do not have.
 Config ConfigOf(const std::string& num_envs, const SettingTexts& settings) {
   std::vector<FlagValue> flags = FlagsOf(settings);
   flags.push_back({"envs", num_envs, "num_envs"});
-  return EnvironmentConfig(flags);
+  Config scratch;
+  const Options every = EverySetting(scratch);
+  for (const FlagValue& flag : flags) {
+    for (const Option* option : every.Find(flag.name, flag.where)) {
+      if (IsEnvironmentSetting(*option)) continue;
+      throw BadInput(Concat(flag.where, ": expected a setting of an environment, and ", flag.name,
+                            " is one of a training alone"));
+    }
+  }
+  Config config = BuildConfig("", flags);
+  if (!HasPlant(config.task)) {
+    throw BadInput(Concat("agent: expected one of the task ", kDoublePendulum, ", got ",
+                          config.agent, ", which learns ", config.task));
+  }
+  return config;
 }
 
-/// A BatchEnv that calls from several threads wait for.
+PendulumEnvConfig EnvConfigOf(const Config& config, ThreadPool& pool) {
+  PendulumEnvConfig environments = config.Environments();
+  environments.engine = &FindEngine(config.physics, "physics");
+  environments.pool = &pool;
+  return environments;
+}
+
+/// N environments stepped together. Calls from several threads wait for each other. Results stay
+/// where they are, so that arrays can view them. Letters as in core/env.h; L torque levels.
 class Environments {
  public:
+  /// `same_step`: where an episode has ended, another one begins at once; else the next step begins
+  /// it and ignores the action (Gymnasium's AutoresetMode). Throws BadInput.
   Environments(const std::string& num_envs, const SettingTexts& settings,
                const std::string& actions, const std::string& levels, bool same_step)
-      : env_(ConfigOf(num_envs, settings), LevelsOf(actions, levels),
-             same_step ? BatchEnv::Autoreset::kSameStep : BatchEnv::Autoreset::kNextStep) {}
-
-  /// One step under actions (N, or N × A for any torque) of a type that Python may have.
-  void Step(const AnyArray& action) {
-    const bool any_torque = env_.levels().empty();
-    const auto [data, size] = Checked(action, any_torque);
-    const nb::gil_scoped_release unlocked;
-    const std::lock_guard lock(mutex_);
-    const auto as = [&, data = data, size = size]<typename T>(T /*example*/) {
-      return std::span(static_cast<const T*>(data), size);
-    };
-    if (any_torque) {
-      if (action.dtype() == nb::dtype<float>()) return env_.StepContinuous(as(float{}));
-      return env_.StepContinuous(as(double{}));
-    }
-    if (action.dtype() == nb::dtype<int32_t>()) return env_.StepLevels(as(int32_t{}));
-    return env_.StepLevels(as(int64_t{}));
+      : config_(ConfigOf(num_envs, settings)),
+        same_step_(same_step),
+        pool_(ResolveThreads(config_.train.threads)),
+        env_(EnvConfigOf(config_, pool_)),
+        actions_(static_cast<size_t>(env_.num_envs())),
+        result_(env_.spec()) {
+    const int64_t count = LevelsOf(actions, levels);
+    if (count > 0) levels_ = TorqueLevels(spec().action_limit.front(), count);
+    std::ranges::copy(env_.obs().values(), result_.next_obs.begin());
   }
 
+  const EnvSpec& spec() const { return env_.spec(); }
+  const Config& config() const { return config_; }
+  const std::vector<double>& levels() const { return levels_; }
+  int threads() const { return pool_.threads(); }
+  /// What came of the last step; `next_obs` has the successors, also of finished episodes.
+  const StepResult& result() const { return result_; }
+  /// What to act on (N, D).
+  std::span<const float> obs() const {
+    return same_step_ ? env_.obs().values() : std::span<const float>(result_.next_obs);
+  }
+
+  /// One step under actions: torques (N × A, N·m), or which of the levels (N), of a type that
+  /// Python may have.
+  void Step(const AnyArray& action) {
+    CheckShape(action);
+    Alone([&] {
+      if (levels_.empty()) {
+        action.dtype() == nb::dtype<float>() ? Take<float>(action) : Take<double>(action);
+      } else {
+        action.dtype() == nb::dtype<int32_t>() ? Take<int32_t>(action) : Take<int64_t>(action);
+      }
+      // An environment whose episode has ended is at the start of another one already.
+      for (const int env : ended_) env_.Hold(env);
+      env_.Step(actions_, result_);
+      ended_.clear();
+      for (int env = 0; env < spec().num_envs && !same_step_; ++env) {
+        if (result_.done(static_cast<size_t>(env))) ended_.push_back(env);
+      }
+    });
+  }
+
+  /// Begins an episode of each environment for which `mask` (N) is not 0. Those with a seed (N)
+  /// have the episodes of a first environment with that seed from then on.
   void Reset(const std::vector<std::optional<uint64_t>>& seeds, const std::vector<uint8_t>& mask) {
-    const nb::gil_scoped_release unlocked;
-    const std::lock_guard lock(mutex_);
-    env_.Reset(seeds, mask);
+    Alone([&] {
+      for (size_t i = 0; i < mask.size(); ++i) {
+        if (mask[i] == 0) continue;
+        const int env = static_cast<int>(i);
+        // Where one has ended, another episode has begun and nobody has seen it.
+        const bool begun = std::erase(ended_, env) > 0;
+        if (!begun || seeds[i]) env_.Restart(env, seeds[i]);
+        result_.torque[i] = 0;  // none acts yet
+        ShowStart(env);
+      }
+    });
   }
 
   /// The picture of an environment as it stands, with the torque that acted last: a new array
   /// (height × width × 3), red, green, blue, the top row first.
   nb::ndarray<nb::numpy, uint8_t> Draw(int env, int width, int height) {
-    const std::array<size_t, 3> shape{static_cast<size_t>(height), static_cast<size_t>(width), 3};
-    std::unique_ptr<uint8_t[]> pixels;
-    {
-      const nb::gil_scoped_release unlocked;
-      const std::lock_guard lock(mutex_);
-      if (!pictures_) pictures_.emplace(PictureSize{width, height});
-      std::array<double, 4> s{};
-      env_.GetState(env, s);
-      const double torque = env_.result().torque[static_cast<size_t>(env)];
-      const auto picture =
-          pictures_->Draw(env_.plant(env), env_.config().mjcf, {s[0], s[1], s[2], s[3]}, torque);
-      pixels = std::make_unique<uint8_t[]>(picture.size());
-      std::ranges::copy(picture, pixels.get());
-    }
-    const nb::capsule owner(pixels.get(),
-                            [](void* p) noexcept { delete[] static_cast<uint8_t*>(p); });
-    return {pixels.release(), shape.size(), shape.data(), owner};
+    auto pixels = NewArray<uint8_t>({static_cast<size_t>(height), static_cast<size_t>(width), 3});
+    Alone([&] {
+      if (!offscreen_) offscreen_.emplace(PictureSize{width, height});
+      const Plant& plant = env_.plant(env);
+      if (!scene_ || PlantValues(scene_->plant()) != PlantValues(plant)) {
+        scene_.emplace(plant, config_.mjcf);
+        scene_->SetCamera(Camera(), static_cast<double>(width) / height);
+      }
+      scene_->Update(env_.state(env), {.torque = result_.torque[static_cast<size_t>(env)]});
+      const ScenePanel panel{&*scene_, "", {}};
+      std::ranges::copy(offscreen_->Render({&panel, 1}), pixels.data());
+    });
+    return pixels;
   }
 
   std::vector<double> State(int env) {
-    std::vector<double> state(env_.spec().state_names.size());
-    const nb::gil_scoped_release unlocked;
-    const std::lock_guard lock(mutex_);
-    env_.GetState(env, state);
-    return state;
-  }
-  void SetState(int env, const std::vector<double>& state) {
-    const nb::gil_scoped_release unlocked;
-    const std::lock_guard lock(mutex_);
-    env_.SetState(env, state);
-  }
-  Plant PlantOf(int env) {
-    const nb::gil_scoped_release unlocked;
-    const std::lock_guard lock(mutex_);
-    return env_.plant(env);
+    return Alone([&] {
+      const auto [q1, q2, w1, w2] = env_.state(env);
+      return std::vector{q1, q2, w1, w2};
+    });
   }
 
-  BatchEnv& env() { return env_; }
+  /// Begins an episode of an environment in a state (S).
+  void SetState(int env, const std::vector<double>& state) {
+    Alone([&] {
+      env_.SetState(env, state);
+      ShowStart(env);
+    });
+  }
+
+  Plant PlantOf(int env) {
+    return Alone([&] { return env_.plant(env); });
+  }
 
  private:
-  /// The numbers of an array of actions. Throws BadInput.
-  std::pair<const void*, size_t> Checked(const AnyArray& action, bool any_torque) const {
-    const auto n = static_cast<size_t>(env_.spec().num_envs);
-    const size_t A = any_torque ? env_.spec().action_limit.size() : 1;
-    const bool fits =
-        action.size() == n * A &&
-        (any_torque ? action.ndim() == 2 && action.shape(0) == n : action.ndim() == 1);
-    if (!fits) {
-      std::vector<std::string> shape;
-      for (size_t k = 0; k < action.ndim(); ++k) shape.push_back(std::to_string(action.shape(k)));
-      throw BadInput(Concat("action: expected an array of shape (", n,
-                            any_torque ? Concat(", ", A) : ",", "), got (", Join(shape, ", "),
-                            action.ndim() == 1 ? ",)" : ")"));
-    }
-    return {action.data(), action.size()};
+  /// Does `work` without the interpreter's lock, when no other call is at work.
+  template <typename Work>
+  auto Alone(const Work& work) -> decltype(work()) {
+    const nb::gil_scoped_release unlocked;
+    const std::lock_guard lock(mutex_);
+    return work();
   }
 
-  BatchEnv env_;
-  std::optional<Pictures> pictures_;
+  /// Throws BadInput unless there is an action for each environment.
+  void CheckShape(const AnyArray& action) const {
+    const auto n = static_cast<size_t>(spec().num_envs);
+    const bool torques = levels_.empty();
+    const bool fits = action.size() == n && action.ndim() == (torques ? 2 : 1) &&
+                      (!torques || action.shape(0) == n);
+    if (fits) return;
+    std::vector<std::string> shape;
+    for (size_t k = 0; k < action.ndim(); ++k) shape.push_back(std::to_string(action.shape(k)));
+    throw BadInput(Concat("action: expected an array of shape (", n, torques ? ", 1" : ",",
+                          "), got (", Join(shape, ", "), action.ndim() == 1 ? ",)" : ")"));
+  }
+
+  /// Sets actions_ from an array of this type. Throws BadInput.
+  template <typename Number>
+  void Take(const AnyArray& action) {
+    const auto* numbers = static_cast<const Number*>(action.data());
+    const auto wrong = [&](size_t i, const std::string& expected, auto got) {
+      return BadInput(Concat("action", spec().num_envs > 1 ? Concat(" of environment ", i) : "",
+                             ": expected ", expected, ", got ", got));
+    };
+    for (size_t i = 0; i < actions_.size(); ++i) {
+      if constexpr (std::floating_point<Number>) {
+        if (!std::isfinite(numbers[i])) {
+          throw wrong(i, Concat("a finite number of ", spec().action_unit), numbers[i]);
+        }
+        actions_[i] = numbers[i];
+      } else {
+        const auto level = static_cast<size_t>(numbers[i]);  // of a negative number: a large one
+        if (level >= levels_.size()) {
+          throw wrong(i, Concat("a torque level from 0 to ", levels_.size() - 1), numbers[i]);
+        }
+        actions_[i] = levels_[level];
+      }
+    }
+  }
+
+  /// Lets the present observation of an environment be that of the last step.
+  void ShowStart(int env) {
+    const auto obs = env_.obs();
+    const Matrix<float> shown(result_.next_obs, obs.rows(), obs.cols());
+    std::ranges::copy(obs.row(env), shown.row(env).begin());
+  }
+
+  Config config_;
+  bool same_step_;
+  ThreadPool pool_;
+  PendulumEnv env_;
+  std::vector<double> levels_;   // (L) N·m; empty: any torque
+  std::vector<double> actions_;  // (N) N·m
+  StepResult result_;
+  std::vector<int> ended_;  // environments whose next step begins another episode
+  std::optional<Offscreen> offscreen_;
+  std::optional<PendulumScene> scene_;  // drawn last
   std::mutex mutex_;
 };
 
-/// A property that views numbers of the environments, which live as long as the array.
-template <typename T, typename Get>
-void AddView(nb::class_<Environments>& c, const char* name, bool matrix, const Get& get) {
+/// An array (N × anything, or N) that views numbers of the environments.
+template <typename T>
+View<T> ViewOf(const Environments& self, std::span<const T> values, bool matrix) {
+  const auto n = static_cast<size_t>(self.spec().num_envs);
+  const std::array<size_t, 2> shape{n, values.size() / n};
+  return {values.data(), matrix ? size_t{2} : size_t{1}, shape.data()};
+}
+
+/// A property that views a table of the last step's results, which lives as long as the array.
+template <typename T>
+void AddView(nb::class_<Environments>& c, const char* name, std::vector<T> StepResult::*table,
+             bool matrix) {
   c.def_prop_ro(
       name,
-      [matrix, get](Environments& self) {
-        const std::span<const T> values = get(self.env());
-        const auto n = static_cast<size_t>(self.env().spec().num_envs);
-        const std::array<size_t, 2> shape{n, n == 0 ? 0 : values.size() / n};
-        return View<T>(values.data(), matrix ? 2 : 1, shape.data());
+      [=](Environments& self) {
+        return ViewOf(self, std::span<const T>(self.result().*table), matrix);
       },
       nb::rv_policy::reference_internal);
 }
 
 /// The task as a dictionary.
 nb::dict DescribeTask(Environments& self) {
-  const EnvSpec& spec = self.env().spec();
+  const EnvSpec& spec = self.spec();
   nb::dict d;
   d["task"] = spec.task;
   d["num_envs"] = spec.num_envs;
@@ -168,9 +276,9 @@ nb::dict DescribeTask(Environments& self) {
   d["reward_terms"] = spec.term_names;
   d["state_names"] = spec.state_names;
   d["state_units"] = spec.state_units;
-  d["levels"] = self.env().levels();
-  d["threads"] = self.env().threads();
-  d["settings"] = ConfigToml(self.env().config(), false);
+  d["levels"] = self.levels();
+  d["threads"] = self.threads();
+  d["settings"] = ConfigToml(self.config(), false);
   return d;
 }
 
@@ -190,7 +298,17 @@ void BindEnvironments(nb::module_& m) {
       .def("set_state", &Environments::SetState, nb::arg("env"), nb::arg("state"))
       .def(
           "plant", [](Environments& self, int env) { return PlantDict(self.PlantOf(env)); },
-          nb::arg("env"));
+          nb::arg("env"))
+      .def_prop_ro(
+          "obs", [](Environments& self) { return ViewOf(self, self.obs(), true); },
+          nb::rv_policy::reference_internal);
+  AddView(c, "final_obs", &StepResult::next_obs, true);
+  AddView(c, "reward", &StepResult::reward, false);
+  AddView(c, "reward_terms", &StepResult::reward_terms, true);
+  AddView(c, "torque", &StepResult::torque, true);
+  AddView(c, "terminated", &StepResult::terminated, false);
+  AddView(c, "truncated", &StepResult::truncated, false);
+  AddView(c, "at_goal", &StepResult::at_goal, false);
   m.def(
       "check_picture_size",
       [](int64_t width, int64_t height) {
@@ -200,23 +318,6 @@ void BindEnvironments(nb::module_& m) {
         CheckedSize({clamp(width), clamp(height)});
       },
       nb::arg("width"), nb::arg("height"));
-  AddView<float>(c, "obs", true, [](const BatchEnv& e) { return e.obs(); });
-  AddView<float>(c, "final_obs", true, [](const BatchEnv& e) { return e.final_obs(); });
-  AddView<double>(c, "reward", false,
-                  [](const BatchEnv& e) { return std::span<const double>(e.result().reward); });
-  AddView<double>(c, "reward_terms", true, [](const BatchEnv& e) {
-    return std::span<const double>(e.result().reward_terms);
-  });
-  AddView<double>(c, "torque", true,
-                  [](const BatchEnv& e) { return std::span<const double>(e.result().torque); });
-  AddView<uint8_t>(c, "terminated", false, [](const BatchEnv& e) {
-    return std::span<const uint8_t>(e.result().terminated);
-  });
-  AddView<uint8_t>(c, "truncated", false, [](const BatchEnv& e) {
-    return std::span<const uint8_t>(e.result().truncated);
-  });
-  AddView<uint8_t>(c, "at_goal", false,
-                   [](const BatchEnv& e) { return std::span<const uint8_t>(e.result().at_goal); });
 }
 
 }  // namespace upswing

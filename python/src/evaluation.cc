@@ -1,9 +1,9 @@
 // Evaluations and maps for Python.
-#include <nanobind/ndarray.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
 #include <functional>
 
 #include "core/error.h"
@@ -13,7 +13,6 @@
 #include "judge/eval_report.h"
 #include "judge/map_command.h"
 #include "python/src/bindings.h"
-#include "python/src/environment_settings.h"
 #include "setup/arguments.h"
 
 namespace upswing {
@@ -24,6 +23,19 @@ namespace nb = nanobind;
 /// What a function of the package is told besides settings: name and text of each.
 void SetArguments(const Options& options, const SettingTexts& arguments) {
   for (const auto& [name, text] : arguments) options.Set(name, text, name);
+}
+
+/// Sets what the flags say of the surroundings. Throws BadInput.
+void SetSurroundings(const std::vector<FlagValue>& flags, TrialArguments& trial) {
+  TrialSurroundings scratch;
+  const Options options = OptionsOf(scratch), plant = OptionsOf(scratch.plant);
+  for (const FlagValue& flag : flags) {
+    if (plant.Get(options.Find(flag.name, flag.where).front()->name) != nullptr) {
+      trial.set.push_back(Concat(flag.name, "=", flag.text));
+    } else {
+      trial.flags.push_back(flag);
+    }
+  }
 }
 
 /// A Progress that calls a Python function, unless it is None, with the share that is done. Ctrl-C
@@ -76,10 +88,9 @@ std::pair<std::string, std::string> EvaluateHandle(const PolicyHandle& policy,
 /// The numbers of a map as a new array (ny × nx).
 template <typename T, typename Get>
 nb::ndarray<nb::numpy, T> Grid(const MapResult& map, const Get& get) {
-  auto* numbers = new T[map.cells.size()];
-  const nb::capsule owner(numbers, [](void* p) noexcept { delete[] static_cast<T*>(p); });
-  for (size_t i = 0; i < map.cells.size(); ++i) numbers[i] = get(map.cells[i]);
-  return {numbers, {map.config.y.values.size(), map.config.x.values.size()}, owner};
+  auto grid = NewArray<T>({map.config.y.values.size(), map.config.x.values.size()});
+  std::ranges::transform(map.cells, grid.data(), get);
+  return grid;
 }
 
 nb::tuple MapHandle(const PolicyHandle& policy, const SettingTexts& settings,

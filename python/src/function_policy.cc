@@ -1,6 +1,4 @@
-#include "python/src/function_policy.h"
-
-#include <nanobind/ndarray.h>
+// A Python function as a policy.
 #include <nanobind/stl/string.h>
 
 #include <algorithm>
@@ -9,6 +7,7 @@
 
 #include "core/error.h"
 #include "core/text.h"
+#include "python/src/bindings.h"
 #include "sim/double_pendulum.h"
 
 namespace upswing {
@@ -40,12 +39,10 @@ class FunctionPolicy final : public Policy {
     const nb::gil_scoped_acquire lock;
     const auto n = static_cast<size_t>(obs.rows());
     // A copy: the function may keep it.
-    auto* numbers = new float[n * static_cast<size_t>(obs.cols())];
-    const nb::capsule owner(numbers, [](void* p) noexcept { delete[] static_cast<float*>(p); });
+    const auto array = NewArray<float>({n, static_cast<size_t>(obs.cols())});
     for (int i = 0; i < obs.rows(); ++i) {
-      std::ranges::copy(obs.row(i), numbers + static_cast<ptrdiff_t>(i) * obs.cols());
+      std::ranges::copy(obs.row(i), array.data() + static_cast<ptrdiff_t>(i) * obs.cols());
     }
-    const nb::ndarray<nb::numpy, float> array(numbers, {n, static_cast<size_t>(obs.cols())}, owner);
     const nb::object result =
         nb::module_::import_("numpy").attr("ascontiguousarray")(function_(array), "float64");
     const auto torque = nb::cast<nb::ndarray<const double, nb::c_contig, nb::device::cpu>>(result);

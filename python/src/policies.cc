@@ -1,5 +1,4 @@
 // Policies for Python: of files, of controllers, and of Python functions.
-#include <nanobind/ndarray.h>
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/map.h>
 #include <nanobind/stl/optional.h>
@@ -9,13 +8,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <type_traits>
 
 #include "core/error.h"
 #include "core/safetensors.h"
 #include "core/text.h"
 #include "io/tensor_file.h"
 #include "python/src/bindings.h"
-#include "python/src/function_policy.h"
 #include "run/find_policy.h"
 #include "setup/config.h"
 #include "setup/controllers.h"
@@ -128,8 +128,8 @@ void PolicyHandle::Keep(SizedMemory memory) {
 }
 
 void BindPolicies(nb::module_& m) {
-  nb::class_<PolicyHandle>(m, "PolicyHandle")
-      .def("act", &Act, nb::arg("obs"), nb::arg("out"))
+  nb::class_<PolicyHandle> c(m, "PolicyHandle");
+  c.def("act", &Act, nb::arg("obs"), nb::arg("out"))
       .def("values", &Values, nb::arg("obs"), nb::arg("out"))
       .def("spread", &Spread, nb::arg("obs"), nb::arg("low"), nb::arg("high"))
       .def(
@@ -139,31 +139,31 @@ void BindPolicies(nb::module_& m) {
             SaveTensors(self.policy().ToTensors(), path);
           },
           nb::arg("path"))
-      .def("to_bytes",
-           [](const PolicyHandle& self) {
-             const std::vector<std::byte> file =
-                 WriteSafetensors(self.policy().ToTensors()).Joined();
-             return nb::bytes(file.data(), file.size());
-           })
-      .def_prop_ro("name", [](const PolicyHandle& self) { return self.loaded().name; })
-      .def_prop_ro("kind", [](const PolicyHandle& self) { return self.policy().kind(); })
-      .def_prop_ro("description",
-                   [](const PolicyHandle& self) { return self.policy().description(); })
-      .def_prop_ro("task", [](const PolicyHandle& self) { return self.loaded().task; })
-      .def_prop_ro("memory", [](const PolicyHandle& self) { return self.loaded().memory(); })
-      .def_prop_ro("identifies",
-                   [](const PolicyHandle& self) { return self.loaded().identifies(); })
-      .def_prop_ro("obs_size", [](const PolicyHandle& self) { return self.policy().obs_size(); })
-      .def_prop_ro("action_size",
-                   [](const PolicyHandle& self) { return self.policy().action_size(); })
-      .def_prop_ro("num_parameters",
-                   [](const PolicyHandle& self) { return self.policy().num_parameters(); })
-      .def_prop_ro("num_values",
-                   [](const PolicyHandle& self) { return self.policy().num_values(); })
-      .def_prop_ro("has_spread",
-                   [](const PolicyHandle& self) { return self.policy().has_spread(); })
-      .def("value_actions", &ValueActions)
-      .def("info", &DescribeInfo);
+      .def("to_bytes", [](const PolicyHandle& self) {
+        const std::vector<std::byte> file = WriteSafetensors(self.policy().ToTensors()).Joined();
+        return nb::bytes(file.data(), file.size());
+      });
+  const auto add = [&](const char* name, auto member) {
+    c.def_prop_ro(name, [member](const PolicyHandle& self) {
+      if constexpr (std::is_invocable_v<decltype(member), const Policy&>) {
+        return std::invoke(member, self.policy());
+      } else {
+        return std::invoke(member, self.loaded());
+      }
+    });
+  };
+  add("name", &LoadedPolicy::name);
+  add("kind", &Policy::kind);
+  add("description", &Policy::description);
+  add("task", &LoadedPolicy::task);
+  add("memory", &LoadedPolicy::memory);
+  add("identifies", &LoadedPolicy::identifies);
+  add("obs_size", &Policy::obs_size);
+  add("action_size", &Policy::action_size);
+  add("num_parameters", &Policy::num_parameters);
+  add("num_values", &Policy::num_values);
+  add("has_spread", &Policy::has_spread);
+  c.def("value_actions", &ValueActions).def("info", &DescribeInfo);
   m.def("load_policy", &Load, nb::arg("name"), nb::arg("settings"), nb::arg("made_for"));
   m.def(
       "policy_of_bytes",

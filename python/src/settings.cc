@@ -6,11 +6,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <string_view>
 
 #include "core/text.h"
-#include "judge/trial.h"
 #include "python/src/bindings.h"
-#include "python/src/environment_settings.h"
 #include "run/config_files.h"
 #include "setup/config.h"
 #include "setup/config_checks.h"
@@ -90,6 +89,15 @@ nb::tuple SettingsOfTrial() {
 }
 
 }  // namespace
+
+bool IsEnvironmentSetting(const Option& option) {
+  constexpr std::array<std::string_view, 4> kMore{"agent", "envs", "threads", "start_noise"};
+  Config scratch;
+  Options of_environment;
+  scratch.DescribeEnvironment(of_environment);
+  return (of_environment.Get(option.name) != nullptr && option.name != "eval_physics") ||
+         std::ranges::find(kMore, option.name) != kMore.end();
+}
 
 nb::dict PlantDict(const Plant& plant) {
   nb::dict d;
