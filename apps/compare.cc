@@ -24,9 +24,10 @@ namespace fs = std::filesystem;
 struct CompareArguments {
   std::vector<std::string> names;  // of runs and policies
   PolicyArguments controllers;     // settings of those among them
+  CompareRequest runs;             // but for its paths
   std::string out;
   int64_t threads = 0;
-  bool unfinished = false, different_tasks = false, as_json = false;
+  bool as_json = false;
 };
 
 /// A controller, or a policy's file; anything else is to be a run or to hold some.
@@ -46,14 +47,14 @@ void CheckPolicies(const CompareArguments& a, const std::vector<std::string>& po
                           ", whose evaluations say on what to judge, got none (`upswing bounds ",
                           names, "` compares policies alone)"));
   }
-  if (a.different_tasks) {
+  if (a.runs.different_tasks) {
     throw BadInput(Concat("--different-tasks: expected no policy beside it, as each is judged on ",
                           "the task of the runs, got ", names));
   }
 }
 
 int RunCompare(const CompareArguments& arguments) {
-  CompareRequest request;
+  CompareRequest request = arguments.runs;
   std::vector<std::string> policy_names;
   for (const std::string& name : arguments.names) {
     if (IsPolicy(name)) {
@@ -63,8 +64,6 @@ int RunCompare(const CompareArguments& arguments) {
     }
   }
   CheckPolicies(arguments, policy_names);
-  request.unfinished = arguments.unfinished;
-  request.different_tasks = arguments.different_tasks;
   if (!arguments.out.empty()) {
     CheckFree(arguments.out);
     CheckCanDraw();
@@ -101,8 +100,8 @@ void AddCompare(CommandLine& line) {
   line.Text("--out", a->out, "FOLDER",
             "new folder for summary.csv, runs.csv, policies.csv, curves.svg and curves.png "
             "(curves-2 and so on for further tasks)");
-  line.Flag("--unfinished", a->unfinished, "compare unfinished runs too, as they are");
-  line.Flag("--different-tasks", a->different_tasks,
+  line.Flag("--unfinished", a->runs.unfinished, "compare unfinished runs too, as they are");
+  line.Flag("--different-tasks", a->runs.different_tasks,
             "compare groups that are evaluated on different tasks (plant, disturbance, number of "
             "episodes) with each other as well");
   AddThreads(line, a->threads);

@@ -81,13 +81,15 @@ void PrintFigure(const RunFigure& figure, const Scores& scores, const std::strin
   PrintScores(figure.label, scores, kFormats.at(figure.kind), unit);
 }
 
-void PrintGroup(const RunGroup& group, const GroupSummary& s, const std::string& differences,
-                const std::string& task) {
+void PrintGroup(const RunGroup& group, const std::string& task) {
+  const GroupSummary& s = group.summary;
   std::vector<int64_t> seeds;
   for (const RunRecord& run : group.runs) seeds.push_back(run.seed);
   fmt::print("{}\n", Printable(group.label));
   if (!task.empty()) fmt::print("  {:<16}{}\n", "task", Printable(task));
-  if (!differences.empty()) fmt::print("  {:<16}{}\n", "settings", Printable(differences));
+  if (!group.differences.empty()) {
+    fmt::print("  {:<16}{}\n", "settings", Printable(group.differences));
+  }
   fmt::print("  {:<16}{} ({})\n", "seeds", group.runs.size(), SeedsText(seeds));
   fmt::print("  {:<16}{} of {} (95% {} to {})\n", "solved", s.solved, group.runs.size(),
              Percent(s.solved_interval.low), Percent(s.solved_interval.high));
@@ -102,8 +104,8 @@ void PrintGroup(const RunGroup& group, const GroupSummary& s, const std::string&
 }
 
 void PrintPair(const Comparison& comparison, const PairSummary& pair) {
-  fmt::print("{} against {}\n", Printable(comparison.runs.groups[pair.a].label),
-             Printable(comparison.runs.groups[pair.b].label));
+  fmt::print("{} against {}\n", Printable(comparison.groups[pair.a].label),
+             Printable(comparison.groups[pair.b].label));
   fmt::print("  {:<16}{}", "solves sooner", PairsText(pair.sooner));
   if (pair.seconds_difference) {
     fmt::print("; difference of IQMs, s: {}", EstimateText(*pair.seconds_difference, Signed));
@@ -134,7 +136,7 @@ void PrintPolicy(const JudgedPolicy& policy, const std::string& task) {
 }
 
 void PrintAgainst(const Comparison& comparison, const AgainstPolicy& against) {
-  const RunGroup& group = comparison.runs.groups[against.group];
+  const RunGroup& group = comparison.groups[against.group];
   fmt::print("{} against {}\n", Printable(group.label),
              Printable(comparison.policies[against.policy].name));
   fmt::print("  {:<16}in {} of {} (95% {} to {}); difference of the IQM to its return: {}\n\n",
@@ -143,25 +145,23 @@ void PrintAgainst(const Comparison& comparison, const AgainstPolicy& against) {
              EstimateText(against.difference, Signed));
 }
 
-/// A number, or null for one that is not reached.
-ordered_json Number(double x) { return std::isfinite(x) ? ordered_json(x) : ordered_json(); }
+// JSON has null for a number that is not finite, as of what is not reached.
 
 ordered_json EstimateJson(const Estimate& e) {
-  ordered_json j{{"value", Number(e.value)}, {"interval_95", nullptr}};
-  if (e.interval) j["interval_95"] = {Number(e.interval->low), Number(e.interval->high)};
+  ordered_json j{{"value", e.value}, {"interval_95", nullptr}};
+  if (e.interval) j["interval_95"] = {e.interval->low, e.interval->high};
   return j;
 }
 
 ordered_json ScoresJson(const Scores& s) {
-  ordered_json j;
-  j["median"] = Number(s.median);
-  j["iqm"] = EstimateJson(s.iqm);
-  j["range"] = {Number(s.low), Number(s.high)};
-  for (const double value : s.values) j["values"].push_back(Number(value));
-  return j;
+  return {{"median", s.median},
+          {"iqm", EstimateJson(s.iqm)},
+          {"range", {s.low, s.high}},
+          {"values", s.values}};
 }
 
-ordered_json GroupJson(const RunGroup& group, const GroupSummary& s) {
+ordered_json GroupJson(const RunGroup& group) {
+  const GroupSummary& s = group.summary;
   ordered_json j;
   j["group"] = group.label;
   for (const RunRecord& run : group.runs) {
@@ -181,27 +181,26 @@ ordered_json GroupJson(const RunGroup& group, const GroupSummary& s) {
       {"steady_evaluations", s.stability.steady_evaluations},
       {"lowest_success",
        s.stability.evaluations > 0 ? ordered_json(s.stability.lowest) : ordered_json()}};
+  j["settings"] = group.differences;
+  j["task"] = group.task + 1;
   return j;
 }
 
 }  // namespace
 
 void PrintComparison(const Comparison& comparison) {
-  const GroupedRuns& runs = comparison.runs;
   const auto task_text = [&](int task) {
-    return NumTasks(comparison) > 1 ? fmt::format("{} ({})", task + 1, runs.task_texts[task]) : "";
+    if (NumTasks(comparison) == 1) return std::string();
+    return fmt::format("{} ({})", task + 1, comparison.task_texts[static_cast<size_t>(task)]);
   };
-  for (size_t i = 0; i < runs.groups.size(); ++i) {
-    PrintGroup(runs.groups[i], comparison.summaries[i], runs.differences[i],
-               task_text(runs.tasks[i]));
-  }
+  for (const RunGroup& group : comparison.groups) PrintGroup(group, task_text(group.task));
   for (const JudgedPolicy& policy : comparison.policies) {
     PrintPolicy(policy, task_text(policy.task));
   }
   for (const PairSummary& pair : comparison.pairs) PrintPair(comparison, pair);
   for (const AgainstPolicy& against : comparison.against) PrintAgainst(comparison, against);
-  for (const std::string& note : runs.notes) fmt::print("Note: {}\n", Printable(note));
-  const bool fewer = std::ranges::any_of(runs.groups, [](const RunGroup& group) {
+  for (const std::string& note : comparison.notes) fmt::print("Note: {}\n", Printable(note));
+  const bool fewer = std::ranges::any_of(comparison.groups, [](const RunGroup& group) {
     return ResamplesOf({std::vector<double>(group.runs.size())}) < kResamples;
   });
   fmt::print(
@@ -217,7 +216,7 @@ void PrintComparison(const Comparison& comparison) {
 
 void PrintWritten(const Comparison& comparison, const std::filesystem::path& folder) {
   std::string curves;
-  for (size_t task = 0; task < NumTasks(comparison); ++task) {
+  for (int task = 0; task < NumTasks(comparison); ++task) {
     curves += fmt::format(", {0}.svg, {0}.png", CurvesName(task));
   }
   fmt::print("Written: summary.csv, runs.csv{}{} in {}\n",
@@ -228,23 +227,18 @@ void PrintWritten(const Comparison& comparison, const std::filesystem::path& fol
 std::string ComparisonJson(const Comparison& comparison) {
   ordered_json j;
   j["resamples"] = kResamples;
-  j["notes"] = comparison.runs.notes;
-  for (size_t i = 0; i < comparison.summaries.size(); ++i) {
-    j["groups"].push_back(GroupJson(comparison.runs.groups[i], comparison.summaries[i]));
-    j["groups"].back()["settings"] = comparison.runs.differences[i];
-    j["groups"].back()["task"] = comparison.runs.tasks[i] + 1;
-  }
+  j["notes"] = comparison.notes;
+  for (const RunGroup& group : comparison.groups) j["groups"].push_back(GroupJson(group));
   j["pairs"] = ordered_json::array();
   for (const PairSummary& pair : comparison.pairs) {
-    ordered_json p;
-    p["group"] = comparison.runs.groups[pair.a].label;
-    p["against"] = comparison.runs.groups[pair.b].label;
-    p["solves_sooner"] = EstimateJson(pair.sooner);
-    p["solve_seconds_difference"] =
-        pair.seconds_difference ? EstimateJson(*pair.seconds_difference) : ordered_json();
-    p["higher_return"] = EstimateJson(pair.higher_return);
-    p["return_difference"] = EstimateJson(pair.return_difference);
-    j["pairs"].push_back(p);
+    j["pairs"].push_back(
+        {{"group", comparison.groups[pair.a].label},
+         {"against", comparison.groups[pair.b].label},
+         {"solves_sooner", EstimateJson(pair.sooner)},
+         {"solve_seconds_difference",
+          pair.seconds_difference ? EstimateJson(*pair.seconds_difference) : ordered_json()},
+         {"higher_return", EstimateJson(pair.higher_return)},
+         {"return_difference", EstimateJson(pair.return_difference)}});
   }
   j["policies"] = ordered_json::array();
   for (const JudgedPolicy& policy : comparison.policies) {
@@ -255,7 +249,7 @@ std::string ComparisonJson(const Comparison& comparison) {
   j["against_policies"] = ordered_json::array();
   for (const AgainstPolicy& against : comparison.against) {
     j["against_policies"].push_back(
-        {{"group", comparison.runs.groups[against.group].label},
+        {{"group", comparison.groups[against.group].label},
          {"policy", comparison.policies[against.policy].name},
          {"higher_return", against.higher},
          {"higher_return_interval_95", {against.higher_interval.low, against.higher_interval.high}},

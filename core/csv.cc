@@ -82,4 +82,21 @@ std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::str
   return columns;
 }
 
+void CsvTable::Add(std::string_view name, std::string_view text) {
+  if (first_) names_ += Concat(name, ',');
+  if (text.find_first_of(",\"\n\r") == text.npos) {
+    rows_ += Concat(text, ',');
+    return;
+  }
+  rows_ += '"';
+  for (const char c : text) rows_ += c == '"' ? "\"\"" : std::string(1, c);
+  rows_ += "\",";
+}
+
+void CsvTable::EndRow() {
+  if (first_) names_.back() = '\n';
+  rows_.back() = '\n';
+  first_ = false;
+}
+
 }  // namespace upswing

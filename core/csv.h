@@ -1,8 +1,11 @@
 #pragma once
 
+#include <concepts>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "core/text.h"
 
 namespace upswing {
 
@@ -20,5 +23,22 @@ struct CsvColumn {
 /// in its line, or a cell is not a finite number.
 std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::string>& names,
                                const std::string& where);
+
+/// A CSV text in the making. The names of the first row's cells are its first line.
+class CsvTable {
+ public:
+  /// Adds a cell to the row: a text, in quotes where a reader needs them, or a number. A number
+  /// that is not known is an empty text.
+  void Add(std::string_view name, std::string_view text);
+  void Add(std::string_view name, double number) { Add(name, FormatNumber(number)); }
+  void Add(std::string_view name, std::integral auto number) { Add(name, Concat(number)); }
+  void EndRow();
+
+  std::string text() const { return names_ + rows_; }
+
+ private:
+  std::string names_, rows_;
+  bool first_ = true;  // row
+};
 
 }  // namespace upswing

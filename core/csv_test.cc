@@ -51,5 +51,19 @@ TEST(Csv, MessagesNameLineAndColumn) {
   EXPECT_EQ(Complaint("a,b\n1,\"\"\n"), "t.csv:2: b: expected a finite number, got \"\"");
 }
 
+TEST(Csv, ATableHasTheNamesOfItsFirstRowAndQuotesWhatHasToBe) {
+  CsvTable table;
+  for (const int64_t row : {int64_t{1}, int64_t{9'000'000'000'000'000}}) {
+    table.Add("a", row);
+    table.Add("empty", "");
+    table.Add("text", "x,\"y\"\n");
+    table.Add("c", 0.1);
+    table.EndRow();
+  }
+  EXPECT_EQ(table.text(),
+            "a,empty,text,c\n1,,\"x,\"\"y\"\"\n\",0.1\n"
+            "9000000000000000,,\"x,\"\"y\"\"\n\",0.1\n");
+}
+
 }  // namespace
 }  // namespace upswing

@@ -1,13 +1,13 @@
 #include "judge/compare.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <set>
 
+#include "core/csv.h"
 #include "core/error.h"
 #include "core/text.h"
 #include "io/file.h"
+#include "judge/compare_runs.h"
 #include "mujoco/engines.h"
 #include "report/learning_curve.h"
 #include "run/find_policy.h"
@@ -22,92 +22,92 @@ namespace fs = std::filesystem;
 /// Episodes of a task on which policies are judged, at most, unless one run's evaluation has more.
 constexpr int64_t kMostJudged = 1000;
 
-/// The text of a CSV cell: quoted where it has to be.
-std::string Cell(const std::string& text) {
-  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
-  return quoted + '"';
-}
-
-/// Median, IQM and its interval; what is not reached is `inf`, an interval of one run is empty.
-std::string ScoreCells(const Scores& s) {
-  const auto& interval = s.iqm.interval;
-  return Concat(',', FormatNumber(s.median), ',', FormatNumber(s.iqm.value), ',',
-                interval ? FormatNumber(interval->low) : "", ',',
-                interval ? FormatNumber(interval->high) : "");
-}
-
-std::string SummaryCsv(const Comparison& comparison) {
-  std::string csv = "group,seeds,solved,solved_low,solved_high";
-  for (const RunFigure& figure : RunFigures()) {
-    csv += fmt::format(",{0}_median,{0}_iqm,{0}_low,{0}_high", figure.name);
+std::string SummaryCsv(const std::vector<RunGroup>& groups) {
+  CsvTable csv;
+  for (const RunGroup& group : groups) {
+    const GroupSummary& s = group.summary;
+    csv.Add("group", group.label);
+    csv.Add("seeds", group.runs.size());
+    csv.Add("solved", s.solved);
+    csv.Add("solved_low", s.solved_interval.low);
+    csv.Add("solved_high", s.solved_interval.high);
+    for (const RunFigure& figure : RunFigures()) {
+      // What is not reached is `inf`; an interval of one run is empty.
+      const Scores& scores = s.*figure.scores;
+      const auto& interval = scores.iqm.interval;
+      csv.Add(Concat(figure.name, "_median"), scores.median);
+      csv.Add(Concat(figure.name, "_iqm"), scores.iqm.value);
+      csv.Add(Concat(figure.name, "_low"), interval ? FormatNumber(interval->low) : "");
+      csv.Add(Concat(figure.name, "_high"), interval ? FormatNumber(interval->high) : "");
+    }
+    csv.Add("evaluations_after_solved", s.stability.evaluations);
+    csv.Add("of_them_steady", s.stability.steady_evaluations);
+    csv.Add("lowest_success_after_solved",
+            s.stability.evaluations > 0 ? FormatNumber(s.stability.lowest) : "");
+    csv.Add("task", group.task + 1);
+    csv.EndRow();
   }
-  csv += ",evaluations_after_solved,of_them_steady,lowest_success_after_solved,task\n";
-  for (size_t i = 0; i < comparison.summaries.size(); ++i) {
-    const GroupSummary& s = comparison.summaries[i];
-    const RunGroup& group = comparison.runs.groups[i];
-    csv += Concat(Cell(group.label), ',', group.runs.size(), ',', s.solved, ',',
-                  FormatNumber(s.solved_interval.low), ',', FormatNumber(s.solved_interval.high));
-    for (const RunFigure& figure : RunFigures()) csv += ScoreCells(s.*figure.scores);
-    csv += Concat(',', s.stability.evaluations, ',', s.stability.steady_evaluations, ',',
-                  s.stability.evaluations > 0 ? FormatNumber(s.stability.lowest) : "", ',',
-                  comparison.runs.tasks[i] + 1, '\n');
-  }
-  return csv;
+  return csv.text();
 }
 
-std::string RunsCsv(const Comparison& comparison) {
-  std::string csv = "group,run,seed,steps,seconds";
-  for (const RunFigure& figure : RunFigures()) csv += Concat(',', figure.name);
-  csv += ",host,processor,vectors\n";
-  for (size_t i = 0; i < comparison.summaries.size(); ++i) {
-    const RunGroup& group = comparison.runs.groups[i];
+std::string RunsCsv(const std::vector<RunGroup>& groups) {
+  CsvTable csv;
+  // Several of a run that was resumed elsewhere.
+  const auto add = [&](const char* name, const std::set<std::string>& texts) {
+    csv.Add(name, Join({texts.begin(), texts.end()}, " + "));
+  };
+  for (const RunGroup& group : groups) {
     for (size_t k = 0; k < group.runs.size(); ++k) {
       const RunRecord& run = group.runs[k];
-      csv += Concat(Cell(group.label), ',', Cell(run.path.string()), ',', run.seed, ',',
-                    run.evaluations.back().step, ',', FormatNumber(run.evaluations.back().seconds));
+      csv.Add("group", group.label);
+      csv.Add("run", run.path.string());
+      csv.Add("seed", run.seed);
+      csv.Add("steps", run.evaluations.back().step);
+      csv.Add("seconds", run.evaluations.back().seconds);
       for (const RunFigure& figure : RunFigures()) {
-        csv += Concat(',', FormatNumber((comparison.summaries[i].*figure.scores).values[k]));
+        csv.Add(figure.name, (group.summary.*figure.scores).values[k]);
       }
-      // Several of a run that was resumed elsewhere.
-      for (const auto* names :
-           {&run.conditions.hosts, &run.conditions.processors, &run.conditions.vectors}) {
-        csv += Concat(',', Cell(Join({names->begin(), names->end()}, " + ")));
-      }
-      csv += '\n';
+      add("host", run.conditions.hosts);
+      add("processor", run.conditions.processors);
+      add("vectors", run.conditions.vectors);
+      csv.EndRow();
     }
   }
-  return csv;
+  return csv.text();
 }
 
 std::string PoliciesCsv(const std::vector<JudgedPolicy>& policies) {
-  std::string csv =
-      "policy,task,runs,episodes,success_rate,success_low,success_high,swing_up_seconds_median,"
-      "return,return_deviation,rms_torque,torque_variation,torque_variation_upright\n";
+  CsvTable csv;
   for (const JudgedPolicy& policy : policies) {
     const Evaluation& e = policy.figures;
-    const bool upright = policy.upright();
-    csv += Concat(Cell(policy.name), ',', policy.task + 1, ',', policy.runs, ',', e.episodes, ',',
-                  FormatNumber(e.success_rate()), ',', FormatNumber(e.success_interval.low), ',',
-                  FormatNumber(e.success_interval.high), ',',
-                  upright ? FormatNumber(e.swing_up_seconds.median) : "", ',',
-                  FormatNumber(e.reward_sum.mean), ',', FormatNumber(e.reward_sum.deviation), ',',
-                  FormatNumber(e.rms_torque.mean), ',', FormatNumber(e.torque_variation.mean), ',',
-                  upright ? FormatNumber(e.goal_variation.mean) : "", '\n');
+    const auto if_upright = [&](double x) { return policy.upright() ? FormatNumber(x) : ""; };
+    csv.Add("policy", policy.name);
+    csv.Add("task", policy.task + 1);
+    csv.Add("runs", policy.runs);
+    csv.Add("episodes", e.episodes);
+    csv.Add("success_rate", e.success_rate());
+    csv.Add("success_low", e.success_interval.low);
+    csv.Add("success_high", e.success_interval.high);
+    csv.Add("swing_up_seconds_median", if_upright(e.swing_up_seconds.median));
+    csv.Add("return", e.reward_sum.mean);
+    csv.Add("return_deviation", e.reward_sum.deviation);
+    csv.Add("rms_torque", e.rms_torque.mean);
+    csv.Add("torque_variation", e.torque_variation.mean);
+    csv.Add("torque_variation_upright", if_upright(e.goal_variation.mean));
+    csv.EndRow();
   }
-  return csv;
+  return csv.text();
 }
 
 /// The episodes of the final evaluations of runs that are evaluated on one task.
-std::vector<EnvConfig> FinalEvaluations(const GroupedRuns& runs, int task) {
+std::vector<EnvConfig> FinalEvaluations(const Comparison& comparison, int task) {
   std::vector<EnvConfig> evaluations;
   std::set<std::pair<int64_t, int64_t>> seen;  // seed and step
   int64_t episodes = 0;
-  for (size_t i = 0; i < runs.groups.size(); ++i) {
-    if (runs.tasks[i] != task) continue;
-    Config config = *runs.configs[i];
-    for (const RunRecord& run : runs.groups[i].runs) {
+  for (size_t i = 0; i < comparison.groups.size(); ++i) {
+    if (comparison.groups[i].task != task) continue;
+    Config config = *comparison.configs[i];
+    for (const RunRecord& run : comparison.groups[i].runs) {
       config.train.seed = run.seed;
       const int64_t step = run.evaluations.back().step;
       if (!seen.emplace(run.seed, step).second) continue;
@@ -146,20 +146,16 @@ void ExpectJoint(const LoadedPolicy& loaded, bool make_anew, const Plant& plant)
 
 /// A policy to judge on a task.
 struct Job {
-  size_t index;  // of the policy
+  const LoadedPolicy& loaded;
   std::shared_ptr<const Policy> policy;
-  int task;
   std::vector<EnvConfig> evaluations;
+  JudgedPolicy judged;  // but for its figures
   int64_t episodes = 0;
 };
 
-JudgedPolicy Judge(const LoadedPolicy& loaded, const Job& job, ThreadPool& pool,
-                   const Progress& progress) {
-  JudgedPolicy judged;
-  judged.name = loaded.name;
-  judged.task = job.task;
-  judged.runs = std::ssize(job.evaluations);
-  judged.spec = SpecOf(job.evaluations.front());
+/// The figures of a policy. `progress` counts its episodes.
+Evaluation Judge(const Job& job, ThreadPool& pool, const Progress& progress) {
+  const LoadedPolicy& loaded = job.loaded;
   std::vector<EvaluationEpisode> episodes;
   for (EnvConfig env : job.evaluations) {
     env.pool = &pool;
@@ -172,20 +168,20 @@ JudgedPolicy Judge(const LoadedPolicy& loaded, const Job& job, ThreadPool& pool,
     });
     episodes.insert(episodes.end(), more.begin(), more.end());
   }
-  judged.figures = Summarize(episodes, judged.spec.evaluation);
-  return judged;
+  return Summarize(episodes, job.judged.spec.evaluation);
 }
 
 /// What is to be judged; what is not is noted.
 std::vector<Job> JobsOf(const std::vector<LoadedPolicy>& policies, bool make_anew,
-                        GroupedRuns& runs) {
-  const int tasks = static_cast<int>(runs.task_texts.size());
+                        Comparison& comparison) {
+  const std::vector<std::string> titles = TitlesOf(policies);
+  const int tasks = static_cast<int>(comparison.task_texts.size());
   std::vector<Job> jobs;
   for (size_t index = 0; index < policies.size(); ++index) {
     const LoadedPolicy& loaded = policies[index];
     std::vector<std::string> others;  // tasks that it is not of
     for (int task = 0; task < tasks; ++task) {
-      Job job{index, nullptr, task, FinalEvaluations(runs, task)};
+      Job job{loaded, nullptr, FinalEvaluations(comparison, task), {}};
       const EnvConfig& first = job.evaluations.front();
       if (first.task != loaded.task) {
         others.push_back(first.task);
@@ -193,6 +189,8 @@ std::vector<Job> JobsOf(const std::vector<LoadedPolicy>& policies, bool make_ane
       }
       ExpectJoint(loaded, make_anew, first.plant(0));
       job.policy = PolicyFor(loaded, make_anew, first);
+      job.judged = {loaded.name, titles[index], task, std::ssize(job.evaluations), SpecOf(first),
+                    {}};
       for (const EnvConfig& env : job.evaluations) job.episodes += env.num_envs;
       jobs.push_back(std::move(job));
     }
@@ -201,49 +199,28 @@ std::vector<Job> JobsOf(const std::vector<LoadedPolicy>& policies, bool make_ane
                             ", as the runs are, got one of ", loaded.task));
     }
     if (!others.empty()) {
-      runs.notes.push_back(Concat(loaded.name, ": not judged on ", others.front(),
-                                  ", as it is a policy of ", loaded.task));
+      comparison.notes.push_back(Concat(loaded.name, ": not judged on ", others.front(),
+                                        ", as it is a policy of ", loaded.task));
     }
   }
   return jobs;
 }
 
-std::vector<JudgedPolicy> JudgePolicies(const std::vector<LoadedPolicy>& policies, bool make_anew,
-                                        ThreadPool& pool, const Progress& progress,
-                                        GroupedRuns& runs) {
-  const std::vector<std::string> titles = TitlesOf(policies);
-  double all = 0, before = 0;
-  const std::vector<Job> jobs = JobsOf(policies, make_anew, runs);
-  for (const Job& job : jobs) all += static_cast<double>(job.episodes);
-  std::vector<JudgedPolicy> judged;
-  for (const Job& job : jobs) {
-    judged.push_back(Judge(policies[job.index], job, pool, [&](double done, double) {
-      if (progress) progress(before + done, all);
-    }));
-    judged.back().title = titles[job.index];
-    before += static_cast<double>(job.episodes);
-  }
-  return judged;
-}
-
 }  // namespace
 
-size_t NumTasks(const Comparison& comparison) {
-  return static_cast<size_t>(*std::ranges::max_element(comparison.runs.tasks)) + 1;
+int NumTasks(const Comparison& comparison) {
+  return std::ranges::max_element(comparison.groups, {}, &RunGroup::task)->task + 1;
 }
 
-std::string CurvesName(size_t task) { return task == 0 ? "curves" : Concat("curves-", task + 1); }
+std::string CurvesName(int task) { return task == 0 ? "curves" : Concat("curves-", task + 1); }
 
 Comparison Compare(const CompareRequest& request) {
-  Comparison comparison;
-  comparison.runs = GroupRuns(request);
-  for (const RunGroup& group : comparison.runs.groups) {
-    comparison.summaries.push_back(Summarize(group));
-  }
-  for (size_t b = 1; b < comparison.summaries.size(); ++b) {
+  Comparison comparison = GroupRuns(request);
+  std::vector<RunGroup>& groups = comparison.groups;
+  for (RunGroup& group : groups) group.summary = Summarize(group);
+  for (size_t b = 1; b < groups.size(); ++b) {
     for (size_t a = 0; a < b; ++a) {
-      if (comparison.runs.tasks[a] != comparison.runs.tasks[b]) continue;
-      comparison.pairs.push_back(ComparePair(comparison.summaries, b, a));
+      if (groups[a].task == groups[b].task) comparison.pairs.push_back(ComparePair(groups, b, a));
     }
   }
   return comparison;
@@ -251,12 +228,21 @@ Comparison Compare(const CompareRequest& request) {
 
 void AddPolicies(const std::vector<LoadedPolicy>& policies, bool make_anew, ThreadPool& pool,
                  const Progress& progress, Comparison& comparison) {
-  comparison.policies = JudgePolicies(policies, make_anew, pool, progress, comparison.runs);
-  for (size_t group = 0; group < comparison.summaries.size(); ++group) {
+  double all = 0, before = 0;
+  const std::vector<Job> jobs = JobsOf(policies, make_anew, comparison);
+  for (const Job& job : jobs) all += static_cast<double>(job.episodes);
+  for (const Job& job : jobs) {
+    JudgedPolicy& judged = comparison.policies.emplace_back(job.judged);
+    judged.figures = Judge(job, pool, [&](double done, double) {
+      if (progress) progress(before + done, all);
+    });
+    before += static_cast<double>(job.episodes);
+  }
+  for (size_t group = 0; group < comparison.groups.size(); ++group) {
     for (size_t policy = 0; policy < comparison.policies.size(); ++policy) {
       const JudgedPolicy& judged = comparison.policies[policy];
-      if (comparison.runs.tasks[group] != judged.task) continue;
-      std::vector<double> differences = comparison.summaries[group].final_return.values;
+      if (comparison.groups[group].task != judged.task) continue;
+      std::vector<double> differences = comparison.groups[group].summary.final_return.values;
       for (double& value : differences) value -= judged.figures.reward_sum.mean;
       const int64_t higher = std::ranges::count_if(differences, [](double x) { return x > 0; });
       comparison.against.push_back({group, policy, higher,
@@ -267,15 +253,13 @@ void AddPolicies(const std::vector<LoadedPolicy>& policies, bool make_anew, Thre
 }
 
 void WriteComparison(const Comparison& comparison, const fs::path& folder) {
-  for (size_t task = 0; task < NumTasks(comparison); ++task) {
+  for (int task = 0; task < NumTasks(comparison); ++task) {
     std::vector<RunGroup> groups;
-    for (size_t i = 0; i < comparison.runs.groups.size(); ++i) {
-      if (static_cast<size_t>(comparison.runs.tasks[i]) != task) continue;
-      groups.push_back(comparison.runs.groups[i]);
-    }
+    std::ranges::copy_if(comparison.groups, std::back_inserter(groups),
+                         [&](const RunGroup& group) { return group.task == task; });
     std::vector<Level> levels;
     for (const JudgedPolicy& policy : comparison.policies) {
-      if (static_cast<size_t>(policy.task) != task) continue;
+      if (policy.task != task) continue;
       levels.push_back(
           {policy.title, policy.figures.success_rate(), policy.figures.reward_sum.mean});
     }
@@ -283,8 +267,8 @@ void WriteComparison(const Comparison& comparison, const fs::path& folder) {
     Draw(curves, folder / Concat(CurvesName(task), ".svg"));
     Draw(curves, folder / Concat(CurvesName(task), ".png"));
   }
-  WriteFileAtomically(folder / "summary.csv", SummaryCsv(comparison));
-  WriteFileAtomically(folder / "runs.csv", RunsCsv(comparison));
+  WriteFileAtomically(folder / "summary.csv", SummaryCsv(comparison.groups));
+  WriteFileAtomically(folder / "runs.csv", RunsCsv(comparison.groups));
   if (comparison.policies.empty()) return;
   WriteFileAtomically(folder / "policies.csv", PoliciesCsv(comparison.policies));
 }

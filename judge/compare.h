@@ -1,24 +1,33 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "core/progress.h"
 #include "core/thread_pool.h"
-#include "judge/compare_runs.h"
 #include "report/comparison.h"
 #include "rl/evaluate.h"
+#include "setup/config.h"
 #include "setup/loaded_policy.h"
 
 /// Groups of runs, and policies and controllers beside them: these have no seeds and nothing to
 /// solve, but do have a return.
 namespace upswing {
 
+/// Which runs to compare.
+struct CompareRequest {
+  std::vector<std::filesystem::path> paths;  // run folders, or folders that hold some, at any depth
+  std::filesystem::path root = {};  // below it a run's folder names its variant; empty: each path
+  bool unfinished = false;          // include runs that are not finished
+  bool different_tasks = false;     // also compare groups evaluated on different tasks
+};
+
 /// A policy on the task of some groups of runs.
 struct JudgedPolicy {
   std::string name, title;  // as it was typed; short, for a figure
-  int task = 0;             // as GroupedRuns::tasks
+  int task = 0;             // as RunGroup::task
   int64_t runs = 0;         // over the episodes of the final evaluations of so many
   EnvSpec spec;
   Evaluation figures;
@@ -37,20 +46,25 @@ struct AgainstPolicy {
 
 /// Groups of runs in figures, and pairs of groups beside each other; policies beside them.
 struct Comparison {
-  GroupedRuns runs;
-  std::vector<GroupSummary> summaries;  // of each group
+  std::vector<RunGroup> groups;         // in the order in which they were found
   std::vector<PairSummary> pairs;       // each group with each one before it
-  std::vector<JudgedPolicy> policies = {};
-  std::vector<AgainstPolicy> against = {};  // each group with each policy on its task
+  std::vector<std::string> task_texts;  // of each task: the settings in which not all agree
+  std::vector<std::string> notes;       // remarks, a line each
+  // Of each group: the settings, in which its runs differ by seed and by what makes no other run.
+  std::vector<std::shared_ptr<const Config>> configs;
+  std::vector<JudgedPolicy> policies;
+  std::vector<AgainstPolicy> against;  // each group with each policy on its task
 };
 
 /// How many tasks groups are compared on.
-size_t NumTasks(const Comparison& comparison);
+int NumTasks(const Comparison& comparison);
 
 /// The name of the files with a task's learning curves, without ending: `curves`, `curves-2`, …
-std::string CurvesName(size_t task);
+std::string CurvesName(int task);
 
-/// Compares runs; see GroupRuns. Throws BadInput.
+/// Compares runs. What is no run, cannot be read, has no evaluation, is unfinished (unless asked
+/// for) or the same training as another is left out, with a note. Throws BadInput where nothing is
+/// left, where a path is not there, or where a run stands twice.
 Comparison Compare(const CompareRequest& request);
 
 /// Judges policies on each task that the groups are evaluated on, over the episodes of the runs'

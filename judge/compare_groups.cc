@@ -57,31 +57,34 @@ std::string Differences(
   return Join(parts, ", ");
 }
 
-/// Says of each group (`first` has a run of each) how it differs from the others, and gives those
-/// of one name a second one: their differences among each other, or a number where these are many.
-void TellGroupsApart(GroupedRuns& grouped, const std::vector<const RunRecord*>& first) {
+/// Says of each group how it differs from the others, and gives those of one name a second one:
+/// their differences among each other, or a number where these are many.
+void TellGroupsApart(std::vector<RunGroup>& groups) {
+  std::vector<const RunRecord*> all;  // a run of each
   std::map<std::string, std::vector<const RunRecord*>> namesakes;
-  for (size_t i = 0; i < first.size(); ++i) {
-    grouped.differences.push_back(Differences(*first[i], first));
-    namesakes[grouped.groups[i].label].push_back(first[i]);
+  for (const RunGroup& group : groups) {
+    all.push_back(&group.runs.front());
+    namesakes[group.label].push_back(&group.runs.front());
   }
   std::map<std::string, int> count;
-  for (size_t i = 0; i < first.size(); ++i) {
-    std::string& label = grouped.groups[i].label;
+  for (RunGroup& group : groups) {
+    std::string& label = group.label;
+    const RunRecord& run = group.runs.front();
+    group.differences = Differences(run, all);
     const auto& same_name = namesakes[label];
     if (same_name.size() == 1) continue;
     const int number = ++count[label];
-    const std::string differences = Differences(*first[i], same_name);
+    const std::string differences = Differences(run, same_name);
     label += differences.empty() || differences.size() > kLongText ? Concat(" #", number)
                                                                    : Concat(" (", differences, ")");
   }
 }
 
 /// What a reader of the figures should know.
-void NotePlans(const GroupedRuns& grouped, std::vector<std::string>& notes) {
+void NotePlans(const std::vector<RunGroup>& groups, std::vector<std::string>& notes) {
   std::set<std::pair<int64_t, bool>> of_all;
   std::map<size_t, std::vector<std::string>> few;  // labels by their number of seeds
-  for (const RunGroup& group : grouped.groups) {
+  for (const RunGroup& group : groups) {
     std::set<int64_t> budgets;
     std::set<bool> stops;
     for (const RunRecord& run : group.runs) {
@@ -170,26 +173,27 @@ void NoteTimes(const std::vector<RunRecord>& runs, std::vector<std::string>& not
   }
 }
 
-/// Numbers the tasks that groups (`first` has a run of each) are evaluated on, in their order.
-void TellTasksApart(GroupedRuns& grouped, const std::vector<const RunRecord*>& first) {
+/// Numbers the tasks that groups are evaluated on, in their order.
+void TellTasksApart(Comparison& comparison) {
   std::vector<const RunRecord*> tasks;  // a run of each
-  for (const RunRecord* run : first) {
+  for (RunGroup& group : comparison.groups) {
+    const RunRecord& run = group.runs.front();
     const auto same = [&](const RunRecord* other) {
-      return Differences(*run, {other}, IsTask).empty();
+      return Differences(run, {other}, IsTask).empty();
     };
     const auto at = std::ranges::find_if(tasks, same);
-    grouped.tasks.push_back(static_cast<int>(at - tasks.begin()));
-    if (at == tasks.end()) tasks.push_back(run);
+    group.task = static_cast<int>(at - tasks.begin());
+    if (at == tasks.end()) tasks.push_back(&run);
   }
   for (const RunRecord* task : tasks) {
-    grouped.task_texts.push_back(Differences(*task, tasks, IsTask));
+    comparison.task_texts.push_back(Differences(*task, tasks, IsTask));
   }
 }
 
-void NoteTasks(GroupedRuns& grouped, bool different_tasks) {
-  const size_t tasks = grouped.task_texts.size();
+void NoteTasks(Comparison& comparison, bool different_tasks) {
+  const size_t tasks = comparison.task_texts.size();
   if (tasks == 1) return;
-  grouped.notes.push_back(fmt::format(
+  comparison.notes.push_back(fmt::format(
       "the groups are evaluated on {} different tasks: {}", tasks,
       different_tasks ? "figures of different tasks stand beside each other"
                       : "groups are compared within each (--different-tasks: all with all)"));
@@ -197,7 +201,7 @@ void NoteTasks(GroupedRuns& grouped, bool different_tasks) {
 
 }  // namespace
 
-GroupedRuns GroupRuns(const CompareRequest& request) {
+Comparison GroupRuns(const CompareRequest& request) {
   const Found found = FindRuns(request);
   if (found.runs.empty()) {
     const size_t others = found.left_out.size() - 1;
@@ -205,35 +209,37 @@ GroupedRuns GroupRuns(const CompareRequest& request) {
         found.left_out.front(),
         others > 0 ? Concat("; no run is left to compare (", others, " more were left out)") : ""));
   }
-  GroupedRuns grouped;
-  std::vector<const RunRecord*> first;  // of each group
-  for (const RunRecord& f : found.runs) {
-    const auto same = [&](const RunRecord* other) { return other->settings == f.settings; };
-    const auto at = static_cast<size_t>(std::ranges::find_if(first, same) - first.begin());
-    if (at == first.size()) {
-      first.push_back(&f);
-      grouped.groups.push_back({LabelOf(f), {}});
-      grouped.configs.push_back(found.configs.at(f.path));
+  Comparison comparison;
+  std::vector<RunGroup>& groups = comparison.groups;
+  for (const RunRecord& run : found.runs) {
+    const auto same = [&](const RunGroup& group) {
+      return group.runs.front().settings == run.settings;
+    };
+    auto at = std::ranges::find_if(groups, same);
+    if (at == groups.end()) {
+      at = groups.insert(at, {LabelOf(run), {}});
+      comparison.configs.push_back(found.configs.at(run.path));
     }
-    grouped.groups[at].runs.push_back(f);
+    at->runs.push_back(run);
   }
-  for (RunGroup& group : grouped.groups) {
-    std::ranges::sort(group.runs, {}, [](const RunRecord& run) { return run.seed; });
+  for (RunGroup& group : groups) std::ranges::sort(group.runs, {}, &RunRecord::seed);
+  TellGroupsApart(groups);
+  TellTasksApart(comparison);
+  comparison.notes = found.notes;
+  NotePlans(groups, comparison.notes);
+  for (const RunGroup& group : groups) {
+    const std::string& model = ModelOf(group.runs.front());
+    if (model == kBuiltIn) continue;
+    comparison.notes.push_back(
+        Concat(group.label, ": on a model that is not the ", "built-in one (content ", model, ")"));
   }
-  TellGroupsApart(grouped, first);
-  TellTasksApart(grouped, first);
-  grouped.notes = found.notes;
-  NotePlans(grouped, grouped.notes);
-  for (size_t i = 0; i < first.size(); ++i) {
-    if (ModelOf(*first[i]) == kBuiltIn) continue;
-    grouped.notes.push_back(Concat(grouped.groups[i].label, ": on a model that is not the ",
-                                   "built-in one (content ", ModelOf(*first[i]), ")"));
+  NoteTimes(found.runs, comparison.notes);
+  NoteTasks(comparison, request.different_tasks);
+  for (const std::string& line : found.left_out) comparison.notes.push_back(line + ": left out");
+  if (request.different_tasks) {
+    for (RunGroup& group : groups) group.task = 0;
   }
-  NoteTimes(found.runs, grouped.notes);
-  NoteTasks(grouped, request.different_tasks);
-  if (request.different_tasks) grouped.tasks.assign(first.size(), 0);
-  for (const std::string& line : found.left_out) grouped.notes.push_back(line + ": left out");
-  return grouped;
+  return comparison;
 }
 
 }  // namespace upswing

@@ -7,18 +7,9 @@
 #include <string_view>
 #include <vector>
 
-#include "report/comparison.h"
-#include "setup/config.h"
+#include "judge/compare.h"
 
 namespace upswing {
-
-/// Which runs to compare.
-struct CompareRequest {
-  std::vector<std::filesystem::path> paths;  // run folders, or folders that hold some, at any depth
-  std::filesystem::path root = {};  // below it a run's folder names its variant; empty: each path
-  bool unfinished = false;          // include runs that are not finished
-  bool different_tasks = false;     // also compare groups evaluated on different tasks
-};
 
 /// The runs that are compared, and a line for each that is not.
 struct Found {
@@ -38,21 +29,8 @@ inline constexpr const char* kModelContent = "model";
 /// there, or where a run stands twice.
 Found FindRuns(const CompareRequest& request);
 
-/// Runs by their settings: those of one group differ only in the seed and in settings that do not
-/// change the training, such as the number of threads.
-struct GroupedRuns {
-  std::vector<RunGroup> groups;          // in the order in which they were found
-  std::vector<std::string> differences;  // of each group: the settings in which not all agree
-  std::vector<int> tasks;                // of each group: which task it is evaluated on, from 0
-  std::vector<std::string> task_texts;   // of each task: the settings in which not all agree
-  std::vector<std::string> notes;        // remarks on them, a line each
-  // Of each group: the settings, in which its runs differ by seed and by what makes no other run.
-  std::vector<std::shared_ptr<const Config>> configs;
-};
-
-/// Finds, reads and groups them. What is no run, cannot be read, is unfinished (unless asked for)
-/// or the same training as another is left out, with a note. Throws BadInput where nothing is left,
-/// where a path is not there, or where a run stands twice.
-GroupedRuns GroupRuns(const CompareRequest& request);
+/// Finds, reads and groups runs by their settings: those of one group differ only in the seed and
+/// in settings that do not change the training, such as the number of threads. Throws as Compare.
+Comparison GroupRuns(const CompareRequest& request);
 
 }  // namespace upswing

@@ -102,10 +102,11 @@ GroupSummary Summarize(const RunGroup& group) {
   return s;
 }
 
-PairSummary ComparePair(const std::vector<GroupSummary>& groups, size_t a, size_t b) {
-  const std::vector<double>& seconds_a = groups[a].solve_seconds.values;
-  const std::vector<double>& seconds_b = groups[b].solve_seconds.values;
-  const Strata return_a{groups[a].final_return.values}, return_b{groups[b].final_return.values};
+PairSummary ComparePair(const std::vector<RunGroup>& groups, size_t a, size_t b) {
+  const GroupSummary &of_a = groups[a].summary, &of_b = groups[b].summary;
+  const std::vector<double>& seconds_a = of_a.solve_seconds.values;
+  const std::vector<double>& seconds_b = of_b.solve_seconds.values;
+  const Strata return_a{of_a.final_return.values}, return_b{of_b.final_return.values};
   PairSummary pair{a, b, {}, {}, {}, {}};
   pair.sooner = EstimateImprovement({Negated(seconds_a)}, {Negated(seconds_b)});
   pair.higher_return = EstimateImprovement(return_a, return_b);

@@ -14,12 +14,6 @@ namespace upswing {
 
 inline constexpr double kSteadyRate = 0.99;  // success rate that a steady run keeps once solved
 
-/// Runs of one agent with different seeds.
-struct RunGroup {
-  std::string label;
-  std::vector<RunRecord> runs;  // by seed; each has at least one evaluation
-};
-
 /// One quantity over the runs of a group.
 struct Scores {
   std::vector<double> values;  // one for each run, in their order; not solved: +infinity
@@ -45,6 +39,15 @@ struct GroupSummary {
   Scores rms_torque, torque_variation, upright_variation;
   Stability stability;
 };
+
+/// Runs of one agent with different seeds.
+struct RunGroup {
+  std::string label;
+  std::vector<RunRecord> runs;   // by seed; each has at least one evaluation
+  std::string differences = {};  // from the other groups: settings in which not all agree
+  int task = 0;                  // which of the groups' tasks it is evaluated on
+  GroupSummary summary = {};     // of the runs
+};
 GroupSummary Summarize(const RunGroup& group);
 
 /// A figure of a run, which GroupSummary has over the runs of a group.
@@ -67,6 +70,6 @@ struct PairSummary {
   std::optional<Estimate> seconds_difference;
   Estimate return_difference;
 };
-PairSummary ComparePair(const std::vector<GroupSummary>& groups, size_t a, size_t b);
+PairSummary ComparePair(const std::vector<RunGroup>& groups, size_t a, size_t b);
 
 }  // namespace upswing
