@@ -57,7 +57,8 @@ std::string CheckText(const MapResult& map) {
 void PrintMapTable(const MapResult& map) {
   const MapConfig& config = map.config;
   fmt::print("{}\n", Printable(map.policy));
-  fmt::print("  plant      {}, physics {}\n", PlantText(config.point.plant), map.physics);
+  fmt::print("  plant      {}, physics {}\n", PlantText(config.point.plant),
+             config.env.engine->name);
   if (map.model) fmt::print("  model      {}\n", map.model->Text());
   fmt::print("  map        {} × {}: {} × {} cells, {} episode{} each\n", RangeText(config.x),
              RangeText(config.y), config.x.values.size(), config.y.values.size(), config.episodes,
@@ -86,28 +87,25 @@ int RunMapCommand(const MapCommand& a) {
   }
   const std::vector<LoadedPolicy> policies = GetPolicies(a.policies, a.controllers);
   const std::vector<std::string> titles = TitlesOf(policies);
-  std::vector<NamedMap> maps;
+  std::vector<MapResult> maps;
   for (size_t i = 0; i < policies.size(); ++i) {
-    maps.push_back({titles[i], PlanMap(a, policies[i])});
+    maps.push_back(PlanMap(a, policies[i]));
+    maps[i].title = titles[i];
   }
   CheckSameAxes(maps);
-  const fs::path folder = MapFolder(a, policies.front(), maps.front().map);
+  const fs::path folder = MapFolder(a, policies.front(), maps.front());
   ThreadPool pool(ResolveThreads(a.threads));
   for (size_t i = 0; i < maps.size(); ++i) {
     EpisodeProgress progress(a.as_json);
-    FillMap(a, policies[i], pool, std::ref(progress), maps[i].map);
+    FillMap(a, policies[i], pool, std::ref(progress), maps[i]);
   }
   MakeNewFolder(folder);
-  if (several) {
-    WriteMaps(maps, folder);
-  } else {
-    WriteMap(maps.front().map, folder);
-  }
+  WriteMaps(maps, folder);
   if (a.as_json) {
-    fmt::print("{}\n", several ? MapsJson(maps) : MapJson(maps.front().map));
+    fmt::print("{}\n", MapsJson(maps));
     return 0;
   }
-  for (const NamedMap& one : maps) PrintMapTable(one.map);
+  for (const MapResult& map : maps) PrintMapTable(map);
   return 0;
 }
 
@@ -126,11 +124,11 @@ void AddMap(CommandLine& line) {
   Options own;
   a->Describe(own);
   line.Arguments(own);
-  AddSet(line, a->set, "what is on neither axis, such as gravity=9.7");
-  AddPhysics(line, a->physics);
-  AddUnknownPlant(line, a->unknown_plant);
+  AddSet(line, a->trial.set, "what is on neither axis, such as gravity=9.7");
+  AddPhysics(line, a->trial.physics);
+  AddUnknownPlant(line, a->trial.unknown_plant);
   line.Text("--out", a->out, "FOLDER", "new folder for map.csv, map.svg and map.png [RUN/map-X-Y]");
-  AddSeed(line, a->seed, "starts and noise");
+  AddSeed(line, a->trial.seed, "starts and noise");
   AddThreads(line, a->threads);
   line.Flag("--json", a->as_json, "print JSON instead of a table");
   line.Footer(

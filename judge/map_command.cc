@@ -12,7 +12,6 @@
 #include "core/format.h"
 #include "core/text.h"
 #include "io/file.h"
-#include "judge/trial.h"
 #include "mujoco/engines.h"
 #include "report/figure.h"
 #include "setup/config.h"
@@ -73,7 +72,7 @@ std::string ChangesOf(const MapConfig& config, const DesignConditions& design) {
     if (option.section == "start") continue;
     texts.back() += fmt::format(" ({}: {:.4g})", design.word, before->number());
   }
-  if (config.assumed_plant) texts.emplace_back("the plant unknown to the policy");
+  if (config.env.assumed_plant) texts.emplace_back("the plant unknown to the policy");
   return Join(texts, ", ");
 }
 
@@ -94,10 +93,10 @@ std::string DotOf(const MapConfig& config, const DesignConditions& design, bool 
 MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded,
                    const DesignConditions& design) {
   MapConfig config;
+  TrialArguments trial = a.trial;
+  trial.set.clear();  // it is for the point
+  config.env = TrialEnvironments(trial, &loaded);
   config.point.plant = loaded.plant;
-  config.mjcf = loaded.mjcf;
-  if (a.unknown_plant) config.assumed_plant = loaded.plant;
-  if (loaded.identifies()) config.identified_from = loaded.plant;
   config.x = ParseMapAxis(a.x, design.point, "--x");
   config.y = ParseMapAxis(a.y, design.point, "--y");
   CheckDifferent(config.x, config.y);
@@ -106,7 +105,7 @@ MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded,
     const bool in_plant = options.Find(axis->name, "map").front()->section != "disturbance";
     if (!in_plant && !design.known) axis->at_training.reset();
   }
-  for (const Option* option : ApplyChanges(options, a.set)) {
+  for (const Option* option : ApplyChanges(options, a.trial.set)) {
     config.start_given |= option->section == "start";
     for (const MapAxis* axis : {&config.x, &config.y}) {
       const auto members = options.Find(axis->name, "map");
@@ -119,8 +118,6 @@ MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded,
   // From one start each episode is the same, unless there is noise.
   const int usual = config.start_given ? 1 : 10;
   config.episodes = a.episodes > 0 ? static_cast<int>(a.episodes) : usual;
-  config.engine = &FindEngine(a.physics, "--physics");
-  config.seed = static_cast<uint64_t>(a.seed);
   if (config.cells() * config.episodes > kMostEpisodes) {
     throw BadInput(Concat("map: expected at most ", FormatCount(kMostEpisodes), " episodes, got ",
                           FormatCount(config.cells()), " cells of ", config.episodes));
@@ -148,7 +145,6 @@ MapResult PlanMap(const MapArguments& a, const LoadedPolicy& loaded) {
   map.changes = ChangesOf(map.config, design);
   map.dot = DotOf(map.config, design, !map.changes.empty());
   map.policy = loaded.name;
-  map.physics = a.physics;
   map.model = InfoOfModel(loaded.mjcf, "");
   return map;
 }
@@ -167,10 +163,10 @@ void FillMap(const MapArguments& a, const LoadedPolicy& loaded, ThreadPool& pool
   const auto begin = Clock::now();
   map.cells = RunMap(map.config, *loaded.policy, all, pool, progress);
   map.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
-  if (map.config.engine == &kMuJoCo) return;
+  if (map.config.env.engine == &kMuJoCo) return;
   map.checked = DrawCells(map.config, a.check);
   MapConfig mujoco = map.config;
-  mujoco.engine = &kMuJoCo;
+  mujoco.env.engine = &kMuJoCo;
   map.in_mujoco = RunMap(mujoco, *loaded.policy, map.checked, pool, progress);
 }
 

@@ -7,18 +7,19 @@
 
 #include "core/thread_pool.h"
 #include "judge/map_result.h"
+#include "judge/trial.h"
 #include "setup/loaded_policy.h"
 
 namespace upswing {
 
 /// How a map of a policy is asked for: its axes, and what is on neither of them.
 struct MapArguments {
-  std::string x = "mass2=-50%:+50%", y = "length2=-50%:+50%", physics = "closed-form", out;
-  std::vector<std::string> set;
+  std::string x = "mass2=-50%:+50%", y = "length2=-50%:+50%", out;
+  TrialArguments trial;  // what is set may also be sensors, motor and the start
   int64_t episodes = 0;  // in a cell; 0: as many as are usual
-  int64_t seed = 0;
-  double check = 0.02;  // share of the cells to repeat in MuJoCo
-  bool unknown_plant = false;
+  double check = 0.02;   // share of the cells to repeat in MuJoCo
+
+  MapArguments() { trial.physics = kClosedForm.name; }
 
   /// The numbers among them: name, range, unit, help.
   void Describe(Options& options);

@@ -75,14 +75,8 @@ int64_t ParseCells(std::string_view text, const std::string& where) {
 
 std::vector<EpisodeResult> RunRange(const MapConfig& config, const Policy& policy,
                                     const EpisodeRange& range) {
-  PendulumEnvConfig env_config;
-  env_config.engine = config.engine;
-  env_config.mjcf = config.mjcf;
-  env_config.assumed_plant = config.assumed_plant;
-  env_config.identified_from = config.identified_from;
-  env_config.memory = MemorySteps(policy.obs_size(), config.identified_from.has_value());
+  PendulumEnvConfig env_config = config.env;
   env_config.num_envs = range.count;
-  env_config.seed = config.seed;
   env_config.stream = "map";
   env_config.first_index = static_cast<uint64_t>(range.first);
   env_config.plants.clear();
@@ -264,7 +258,7 @@ std::vector<int64_t> DrawCells(const MapConfig& config, double share) {
   const auto wanted = static_cast<size_t>(
       std::max<int64_t>(1, std::llround(share * static_cast<double>(config.cells()))));
   // The first part of a random order (Fisher and Yates).
-  Rng rng(config.seed, "map: cells to check");
+  Rng rng(config.env.seed, "map: cells to check");
   for (size_t i = 0; i < wanted; ++i) std::swap(cells[i], cells[i + rng.Below(cells.size() - i)]);
   cells.resize(wanted);
   std::ranges::sort(cells);

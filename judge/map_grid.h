@@ -51,10 +51,7 @@ struct MapConfig {
   MapAxis x, y;              // (nx), (ny)
   bool start_given = false;  // episodes begin at the point's start, else hanging with usual noise
   int episodes = 1;          // in a cell
-  const Engine* engine = &kClosedForm;
-  std::string mjcf;                                     // another model; empty: the built-in one
-  std::optional<Plant> assumed_plant, identified_from;  // see PendulumEnvConfig
-  uint64_t seed = 0;  // of starts, sensor noise, and the choice of cells to check
+  PendulumEnvConfig env;     // all else; its seed is that of the choice of cells to check, too
 
   int64_t cells() const { return static_cast<int64_t>(x.values.size() * y.values.size()); }
   /// What cell `i` sets; cells go along x first.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/csv.h"
 #include "core/error.h"
 #include "core/json.h"
 #include "core/text.h"
@@ -21,7 +22,7 @@ namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
 /// A number as a table has it: empty for none.
-std::string Cell(double number) { return std::isfinite(number) ? FormatNumber(number) : ""; }
+std::string Known(double number) { return std::isfinite(number) ? FormatNumber(number) : ""; }
 
 double RateOf(const MapResult& map, const MapCell& cell) {
   return static_cast<double>(cell.successes) / map.config.episodes;
@@ -54,7 +55,7 @@ std::string CaptionOf(const MapResult& map) {
   if (const std::string interval = map.success_interval(); !interval.empty()) {
     text += Concat(" (", interval, ")");
   }
-  text += Concat("; ", map.physics, "; seed ", map.config.seed);
+  text += Concat("; ", map.config.env.engine->name, "; seed ", map.config.env.seed);
   return map.changes.empty() ? text : Concat(text, "; ", map.changes);
 }
 
@@ -89,30 +90,50 @@ Figure MapFigure(const MapResult& map) {
   return figure;
 }
 
-/// The map as a JSON object.
+/// The success of each policy in a panel.
+Figure SuccessFigure(const std::vector<MapResult>& maps) {
+  Figure figure;
+  figure.columns = maps.size() == 4 ? 2 : static_cast<int>(std::min<size_t>(3, maps.size()));
+  const int columns = figure.columns;
+  const int count = static_cast<int>(maps.size()), rows = (count + columns - 1) / columns;
+  figure.width = 40 + 420 * columns;
+  figure.height = 60 + 430 * rows;
+  figure.caption = CaptionOf(maps.front());
+  for (int i = 0; i < count; ++i) {
+    const MapResult& map = maps[static_cast<size_t>(i)];
+    HeatMap success = SuccessMap(map);
+    success.bar = i % columns == columns - 1 || i == count - 1;
+    Panel& panel = figure.panels.emplace_back(MapPanel(map, map.title, std::move(success)));
+    // One legend of all dots, at the bottom left.
+    const bool names = i == (rows - 1) * columns;
+    for (Line& line : panel.lines) line.name = names ? "what it was made for" : "";
+  }
+  return figure;
+}
+
+/// The map as a JSON object, where null stands for a number that is not finite.
 ordered_json JsonOf(const MapResult& map) {
-  const auto number = [](double x) { return std::isfinite(x) ? ordered_json(x) : nullptr; };
   const auto axis = [](const MapAxis& a) -> ordered_json {
     return {{"name", a.name}, {"unit", a.unit}, {"values", a.values}};
   };
   ordered_json j;
   j["policy"] = map.policy;
-  j["seed"] = map.config.seed;
-  j["physics"] = map.physics;
+  j["seed"] = map.config.env.seed;
+  j["physics"] = map.config.env.engine->name;
   for (const auto& [name, value] : PlantValues(map.config.point.plant)) j["plant"][name] = value;
   j["model"] = map.model ? map.model->Json() : kBuiltIn;
-  j["unknown_plant"] = map.config.assumed_plant.has_value();
+  j["unknown_plant"] = map.config.env.assumed_plant.has_value();
   j["changes"] = map.changes;
   j["x"] = axis(map.config.x);
   j["y"] = axis(map.config.y);
   j["episodes_per_cell"] = map.config.episodes;
   j["mean_success_rate"] = map.mean_success();
   j["cells_without_failure"] = map.always_success();
-  j["median_swing_up_seconds"] = number(map.median_swing_up());
+  j["median_swing_up_seconds"] = map.median_swing_up();
   const size_t columns = map.config.x.values.size();
   for (size_t i = 0; i < map.cells.size(); ++i) {
     j["success_rate"][i / columns].push_back(RateOf(map, map.cells[i]));
-    j["swing_up_seconds"][i / columns].push_back(number(map.cells[i].swing_up_seconds));
+    j["swing_up_seconds"][i / columns].push_back(map.cells[i].swing_up_seconds);
   }
   j["check"] = nullptr;
   if (!map.checked.empty()) {
@@ -169,81 +190,55 @@ MapAgreement MapResult::agreement() const {
 }
 
 std::string MapCsv(const MapResult& map) {
-  const MapAxis& x = map.config.x;
-  const MapAxis& y = map.config.y;
-  std::string csv = Concat(x.name, ",", y.name,
-                           ",episodes,successes,success_rate,swing_up_seconds,mujoco_successes,"
-                           "mujoco_swing_up_seconds\n");
+  const MapAxis &x = map.config.x, &y = map.config.y;
+  CsvTable csv;
   size_t next_checked = 0;
   for (size_t i = 0; i < map.cells.size(); ++i) {
     const MapCell& cell = map.cells[i];
-    csv += Concat(FormatNumber(x.values[i % x.values.size()]), ",",
-                  FormatNumber(y.values[i / x.values.size()]), ",", map.config.episodes, ",",
-                  cell.successes, ",", FormatNumber(RateOf(map, cell)), ",",
-                  Cell(cell.swing_up_seconds), ",");
     const bool checked =
         next_checked < map.checked.size() && map.checked[next_checked] == static_cast<int64_t>(i);
-    if (checked) {
-      const MapCell& again = map.in_mujoco[next_checked++];
-      csv += Concat(again.successes, ",", Cell(again.swing_up_seconds));
-    } else {
-      csv += ",";
-    }
-    csv += '\n';
+    const MapCell* again = checked ? &map.in_mujoco[next_checked++] : nullptr;
+    csv.Add(x.name, x.values[i % x.values.size()]);
+    csv.Add(y.name, y.values[i / x.values.size()]);
+    csv.Add("episodes", map.config.episodes);
+    csv.Add("successes", cell.successes);
+    csv.Add("success_rate", RateOf(map, cell));
+    csv.Add("swing_up_seconds", Known(cell.swing_up_seconds));
+    csv.Add("mujoco_successes", again ? Concat(again->successes) : "");
+    csv.Add("mujoco_swing_up_seconds", again ? Known(again->swing_up_seconds) : "");
+    csv.EndRow();
   }
-  return csv;
+  return csv.text();
 }
 
-void WriteMap(MapResult& map, const std::filesystem::path& folder) {
-  const auto note = [&](const char* name) {
-    map.files.push_back((folder / name).string());
-    return folder / name;
-  };
-  WriteFileAtomically(note("map.csv"), MapCsv(map));
-  const Figure figure = MapFigure(map);
-  Draw(figure, note("map.svg"));
-  Draw(figure, note("map.png"));
-}
-
-std::string MapJson(const MapResult& map) { return PrintableJson(JsonOf(map)); }
-
-void CheckSameAxes(const std::vector<NamedMap>& maps) {
-  const MapConfig& first = maps.front().map.config;
-  for (const auto& [name, map] : maps) {
+void CheckSameAxes(const std::vector<MapResult>& maps) {
+  const MapConfig& first = maps.front().config;
+  for (const MapResult& map : maps) {
     if (map.config.x.values == first.x.values && map.config.y.values == first.y.values) continue;
-    throw BadInput(Concat(name, ": expected a policy made for the same plant as ",
-                          maps.front().name, ", from which percentages on an axis are counted; ",
+    throw BadInput(Concat(map.title, ": expected a policy made for the same plant as ",
+                          maps.front().title, ", from which percentages on an axis are counted; ",
                           "numbers (--x mass2=0.5:1.5) are the same for all"));
   }
 }
 
-void WriteMaps(std::vector<NamedMap>& maps, const fs::path& folder) {
-  Figure figure;
-  figure.columns = maps.size() == 4 ? 2 : static_cast<int>(std::min<size_t>(3, maps.size()));
-  const int columns = figure.columns;
-  const int count = static_cast<int>(maps.size()), rows = (count + columns - 1) / columns;
-  figure.width = 40 + 420 * columns;
-  figure.height = 60 + 430 * rows;
-  figure.caption = CaptionOf(maps.front().map);
-  for (int i = 0; i < count; ++i) {
-    auto& [name, map] = maps[static_cast<size_t>(i)];
-    HeatMap success = SuccessMap(map);
-    success.bar = i % columns == columns - 1 || i == count - 1;
-    Panel& panel = figure.panels.emplace_back(MapPanel(map, name, std::move(success)));
-    // One legend of all dots, at the bottom left.
-    const bool names = i == (rows - 1) * columns;
-    for (Line& line : panel.lines) line.name = names ? "what it was made for" : "";
-    const fs::path table = folder / Concat("map-", i + 1, ".csv");
-    WriteFileAtomically(table, MapCsv(map));
-    map.files = {table.string(), (folder / "maps.svg").string(), (folder / "maps.png").string()};
+void WriteMaps(std::vector<MapResult>& maps, const fs::path& folder) {
+  const bool several = maps.size() > 1;
+  const Figure figure = several ? SuccessFigure(maps) : MapFigure(maps.front());
+  const fs::path svg = folder / (several ? "maps.svg" : "map.svg");
+  const fs::path png = folder / (several ? "maps.png" : "map.png");
+  for (size_t i = 0; i < maps.size(); ++i) {
+    const fs::path table = folder / (several ? Concat("map-", i + 1, ".csv") : "map.csv");
+    WriteFileAtomically(table, MapCsv(maps[i]));
+    maps[i].files = {table.string(), svg.string(), png.string()};
   }
-  Draw(figure, folder / "maps.svg");
-  Draw(figure, folder / "maps.png");
+  Draw(figure, svg);
+  Draw(figure, png);
 }
 
-std::string MapsJson(const std::vector<NamedMap>& maps) {
+std::string MapsJson(const std::vector<MapResult>& maps) {
+  if (maps.size() == 1) return PrintableJson(JsonOf(maps.front()));
   ordered_json list = ordered_json::array();
-  for (const NamedMap& one : maps) list.push_back(JsonOf(one.map));
+  for (const MapResult& map : maps) list.push_back(JsonOf(map));
   return PrintableJson(list);
 }
 

@@ -13,8 +13,7 @@ namespace upswing {
 /// A finished map.
 struct MapResult {
   MapConfig config;
-  std::string policy;              // path
-  std::string physics;             // name of the engine
+  std::string policy, title;       // path; short, for a figure of several
   std::optional<ModelInfo> model;  // none: the built-in one
   std::string changes;             // what is not as in the training, the axes aside; empty: nothing
   std::string dot;                 // label of the training's place; empty: it is not on the map
@@ -36,26 +35,15 @@ struct MapResult {
 /// One row for each cell, x first; MuJoCo's results are empty where the cell was not repeated.
 std::string MapCsv(const MapResult& map);
 
-/// Writes map.csv, map.svg and map.png into a folder and notes them in `files`.
-void WriteMap(MapResult& map, const std::filesystem::path& folder);
-
-/// The map as a JSON document.
-std::string MapJson(const MapResult& map);
-
-/// Maps of several policies, side by side.
-struct NamedMap {
-  std::string name;  // short
-  MapResult map;
-};
-
 /// Throws BadInput unless all have the same axes.
-void CheckSameAxes(const std::vector<NamedMap>& maps);
+void CheckSameAxes(const std::vector<MapResult>& maps);
 
-/// Writes map-1.csv, map-2.csv, … and maps.svg and maps.png, where the success of each is a panel,
-/// all with one scale of colours, into a folder, and notes them in each map's `files`.
-void WriteMaps(std::vector<NamedMap>& maps, const std::filesystem::path& folder);
+/// Writes map.csv, map.svg and map.png into a folder and notes them in the map's `files`; of
+/// several maps map-1.csv, map-2.csv, … and maps.svg and maps.png, where the success of each is a
+/// panel, all with one scale of colours.
+void WriteMaps(std::vector<MapResult>& maps, const std::filesystem::path& folder);
 
-/// A JSON list of the maps.
-std::string MapsJson(const std::vector<NamedMap>& maps);
+/// The map as a JSON document, or a list of several.
+std::string MapsJson(const std::vector<MapResult>& maps);
 
 }  // namespace upswing

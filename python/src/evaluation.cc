@@ -100,17 +100,19 @@ nb::tuple MapHandle(const PolicyHandle& policy, const SettingTexts& settings,
   int64_t threads = 0;
   Options own;
   a.Describe(own);
-  DescribeSeed(own, &a.seed, "starts and noise");
+  DescribeSeed(own, &a.trial.seed, "starts and noise");
   DescribeThreads(own, &threads);
-  DescribePhysics(own, &a.physics);
+  DescribePhysics(own, &a.trial.physics);
   SetArguments(own, arguments);
   if (!x.empty()) a.x = x;
   if (!y.empty()) a.y = y;
-  for (const FlagValue& flag : FlagsOf(settings)) a.set.push_back(flag.name + "=" + flag.text);
-  a.unknown_plant = unknown_plant;
+  for (const FlagValue& flag : FlagsOf(settings))
+    a.trial.set.push_back(flag.name + "=" + flag.text);
+  a.trial.unknown_plant = unknown_plant;
   a.out = out;
   PythonProgress told(progress);
-  MapResult map;
+  std::vector<MapResult> maps(1);
+  MapResult& map = maps.front();
   std::string json;
   {
     const nb::gil_scoped_release unlocked;
@@ -121,9 +123,9 @@ nb::tuple MapHandle(const PolicyHandle& policy, const SettingTexts& settings,
     FillMap(a, policy.loaded(), pool, std::ref(told), map);
     if (!out.empty()) {
       MakeNewFolder(folder);
-      WriteMap(map, folder);
+      WriteMaps(maps, folder);
     }
-    json = MapJson(map);
+    json = MapsJson(maps);
   }
   return nb::make_tuple(
       json, Grid<int64_t>(map, [](const MapCell& cell) { return cell.successes; }),
