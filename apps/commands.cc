@@ -69,11 +69,11 @@ void AddTrialOptions(CommandLine& line, TrialArguments& a, const std::string& se
   line.Check([&a] { (void)ConditionsOf(a); });
 }
 
-void AddEpisodeOptions(CommandLine& line, EpisodeArguments& a) {
+void AddEpisodeOptions(CommandLine& line, TrialArguments& a) {
   line.Text("--start", a.start, "q1,q2,w1,w2", "where it begins, rad and rad/s [0,0,0,0: hanging]",
             "");
   Options own;
-  own.Add(&a.number, "episode", {0, 999999}, "", "that of `eval` with the same flags, from 0")
+  own.Add(&a.episode, "episode", {0, 999999}, "", "that of `eval` with the same flags, from 0")
       .usual = "none";
   line.Arguments(own);
 }

@@ -54,7 +54,7 @@ void AddUnknownPlant(CommandLine& line, bool& unknown_plant);
 /// Disturbance and Randomization: how `eval`, `simulate` and `plot` try a policy out.
 void AddTrialOptions(CommandLine& line, TrialArguments& a, const std::string& seed_of);
 
-/// Adds --start and --episode.
-void AddEpisodeOptions(CommandLine& line, EpisodeArguments& a);
+/// Adds --start and --episode: the one episode that `simulate`, `plot` and `view` make.
+void AddEpisodeOptions(CommandLine& line, TrialArguments& a);
 
 }  // namespace upswing

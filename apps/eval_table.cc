@@ -83,7 +83,8 @@ void PrintEvalTable(const EvalReport& report) {
   fmt::print("{}\n", Printable(report.policy));
   const EvaluationRule& rule = report.spec.evaluation;
   if (HasPlant(report.spec.task)) {
-    fmt::print("  plant          {}, physics {}\n", PlantText(report.env.plant(0)), report.physics);
+    fmt::print("  plant          {}, physics {}\n", PlantText(report.env.plant(0)),
+               report.env.engine->name);
   } else {
     fmt::print("  task           {}, success is {}\n", report.spec.task, SuccessText(rule));
   }

@@ -23,7 +23,6 @@ struct PlotArguments {
   PolicyArguments policy;
   std::string out;
   TrialArguments trial;
-  EpisodeArguments episode;
   double seconds = -1;  // negative: not given
 };
 
@@ -41,12 +40,12 @@ double UprightSince(const std::vector<RolloutRow>& rows) {
 std::string Caption(const PlotArguments& a, const RolloutConfig& config, const Rollout& rollout,
                     const LoadedPolicy& loaded) {
   std::vector<std::string> parts;
-  if (a.episode.given()) parts.push_back(Concat("episode ", a.episode.number, " of eval"));
+  if (a.trial.is_of_eval()) parts.push_back(Concat("episode ", a.trial.episode, " of eval"));
   const bool pendulum = HasPlant(config.env.task);
   const char* usual = TaskNamed(config.env.task).usual_start;
-  if (!a.episode.given()) {
+  if (!a.trial.is_of_eval()) {
     parts.push_back(
-        Concat("start ", a.episode.start.value_or(usual != nullptr ? usual : "of its own")));
+        Concat("start ", a.trial.start.value_or(usual != nullptr ? usual : "of its own")));
   }
   parts.push_back(Concat("seed ", a.trial.seed));
   if (!pendulum) return Join(parts, "; ");
@@ -60,13 +59,10 @@ std::string Caption(const PlotArguments& a, const RolloutConfig& config, const R
 
 int RunPlot(const PlotArguments& a) {
   const LoadedPolicy loaded = GetPolicy(a.policy);
-  RolloutConfig config;
-  config.policy = loaded.policy.get();
-  config.env = TrialEnvironments(a.trial, &loaded);
-  config.start = ChooseEpisode(a.episode, config.env);
+  RolloutConfig config = TrialEpisode(a.trial, &loaded);
   const EnvSpec spec = SpecOf(config.env);
   const bool pendulum = HasPlant(spec.task);
-  const double usual = a.episode.given() || !pendulum ? spec.evaluation.seconds : 10;
+  const double usual = a.trial.is_of_eval() || !pendulum ? spec.evaluation.seconds : 10;
   config.seconds = a.seconds < 0 ? usual : a.seconds;
   config.estimates = true;
   const std::optional<ModelInfo> model = InfoOfModel(config.env.mjcf, a.trial.model);
@@ -105,8 +101,8 @@ int RunPlot(const PlotArguments& a) {
   fmt::print("  {}    {}\n", pendulum ? "upright" : "at goal",
              since < 0 ? "not at the end" : fmt::format("from {:.2f} s to the end", since + later));
   fmt::print("  torque     {}\n", TorqueText(rollout));
-  if (a.episode.given()) {
-    fmt::print("  episode    {} of eval: {}\n", a.episode.number,
+  if (a.trial.is_of_eval()) {
+    fmt::print("  episode    {} of eval: {}\n", a.trial.episode,
                JudgementText(*loaded.policy, config.env));
   }
   fmt::print("  written    {}\n", Join(files, ", "));
@@ -119,7 +115,7 @@ void AddPlot(CommandLine& line) {
   auto a = std::make_shared<PlotArguments>();
   AddPolicy(line, a->policy);
   line.Require("policy");
-  AddEpisodeOptions(line, a->episode);
+  AddEpisodeOptions(line, a->trial);
   Options own;
   Option& seconds = own.Add(&a->seconds, "seconds", {0.1, 1000}, "s", "how long");
   seconds.step = kControlPeriod;

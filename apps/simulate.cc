@@ -19,7 +19,6 @@ struct SimulateArguments {
   PolicyArguments policy;
   std::string torque, csv = "-";
   TrialArguments trial;
-  EpisodeArguments episode;
   double seconds = -1;  // negative: not given
 };
 
@@ -37,11 +36,8 @@ int RunSimulate(const SimulateArguments& a) {
   }
   std::optional<LoadedPolicy> loaded;
   if (!a.policy.empty()) loaded.emplace(GetPolicy(a.policy));
-  RolloutConfig config;
+  RolloutConfig config = TrialEpisode(a.trial, loaded ? &*loaded : nullptr);
   if (!a.torque.empty()) config.schedule = ReadTorqueFile(a.torque);
-
-  if (loaded) config.policy = loaded->policy.get();
-  config.env = TrialEnvironments(a.trial, loaded ? &*loaded : nullptr);
   const EnvSpec spec = SpecOf(config.env);
 
   // As many steps as were asked for, or as the schedule has rows.
@@ -53,7 +49,6 @@ int RunSimulate(const SimulateArguments& a) {
     throw BadInput(Concat("--seconds: expected at most ", FormatNumber(scheduled), ", for which ",
                           InputName(a.torque), " has torques, got ", FormatNumber(config.seconds)));
   }
-  config.start = ChooseEpisode(a.episode, config.env);
   const Rollout rollout = RunRollout(config);
 
   WriteOutput(a.csv, RolloutCsv(rollout));
@@ -61,8 +56,8 @@ int RunSimulate(const SimulateArguments& a) {
   fmt::print("{}: {} rows\n", Printable(a.csv), rollout.rows.size());
   if (HasPlant(spec.task)) fmt::print("  plant      {}\n", EpisodeText(rollout));
   fmt::print("  torque     {}\n", TorqueText(rollout));
-  if (loaded && a.episode.given()) {
-    fmt::print("  episode    {} of eval: {}\n", a.episode.number,
+  if (loaded && a.trial.is_of_eval()) {
+    fmt::print("  episode    {} of eval: {}\n", a.trial.episode,
                JudgementText(*loaded->policy, config.env));
   }
   return 0;
@@ -75,7 +70,7 @@ void AddSimulate(CommandLine& line) {
   AddPolicy(line, a->policy);
   line.Text("--torque", a->torque, "FILE",
             "CSV file with a column `torque` (N·m), a row for each 0.02 s; -: standard input");
-  AddEpisodeOptions(line, a->episode);
+  AddEpisodeOptions(line, a->trial);
   Options own;
   Option& seconds = own.Add(&a->seconds, "seconds", {0, 1e5}, "s", "how long");
   seconds.step = kControlPeriod;

@@ -28,7 +28,6 @@ struct ViewArguments {
   std::vector<std::string> names;
   PolicyArguments controller;  // settings of those that are controllers
   TrialArguments trial;
-  EpisodeArguments episode;
   std::string record, csv;
   ViewLook look;
   double seconds = -1, fps = -1;  // negative: not given
@@ -57,13 +56,9 @@ std::vector<RolloutConfig> EntriesOf(const ViewArguments& a,
                                      const std::vector<LoadedPolicy>& policies) {
   std::vector<RolloutConfig> entries;
   const auto add = [&](const LoadedPolicy* loaded, const std::string& title) {
-    RolloutConfig entry;
+    RolloutConfig& entry = entries.emplace_back(TrialEpisode(a.trial, loaded));
     entry.title = title;
     entry.seconds = kForEver;
-    if (loaded != nullptr) entry.policy = loaded->policy.get();
-    entry.env = TrialEnvironments(a.trial, loaded);
-    entry.start = ChooseEpisode(a.episode, entry.env);
-    entries.push_back(std::move(entry));
   };
   const std::vector<std::string> titles = TitlesOf(policies);
   for (size_t i = 0; i < policies.size(); ++i) add(&policies[i], titles[i]);
@@ -137,7 +132,7 @@ int RunView(const ViewArguments& a) {
   const std::vector<LoadedPolicy> policies = PoliciesOf(a);
   const std::vector<RolloutConfig> entries = EntriesOf(a, policies);
   const PictureSize size{static_cast<int>(a.width), static_cast<int>(a.height)};
-  const double usual = a.episode.given() ? kEvaluationSeconds : 10;
+  const double usual = a.trial.is_of_eval() ? kEvaluationSeconds : 10;
   if (headless) return RunHeadless(a, entries, size, a.seconds < 0 ? usual : a.seconds);
 #ifdef UPSWING_VIEWER
   InstallSignalHandlers("");
@@ -198,7 +193,7 @@ void AddView(CommandLine& line) {
   line.Flag("--headless", a->headless, "open no window, as --record does");
   line.Text("--csv", a->csv, "FILE", "write the episode as `simulate` does; -: standard output");
   AddPicture(line, *a);
-  AddEpisodeOptions(line, a->episode);
+  AddEpisodeOptions(line, a->trial);
   AddTrialOptions(line, a->trial, "noise, random plants and the start of --episode");
   line.Footer(
       "In the window: space pauses, right and left arrow step, backspace begins again, enter "

@@ -142,7 +142,6 @@ EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& tria
   EvalReport report;
   report.policy = loaded.name;
   report.known_plant = trial.known_plant;
-  report.physics = trial.physics;
   report.env = TrialEnvironments(trial, &loaded);
   report.model = InfoOfModel(report.env.mjcf, trial.model);
   report.env.num_envs = static_cast<int>(episodes);
@@ -176,7 +175,7 @@ std::string EvalJson(const EvalReport& report) {
   j["policy"] = report.policy;
   j["seed"] = report.env.seed;
   j["physics"] = nullptr;
-  if (HasPlant(report.spec.task)) j["physics"] = report.physics;
+  if (HasPlant(report.spec.task)) j["physics"] = report.env.engine->name;
   j["task"] = report.spec.task;
   if (!HasPlant(report.spec.task)) {
     AddFigures(report.figures, report.spec, report.knows_values, j);

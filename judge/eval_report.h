@@ -28,7 +28,6 @@ struct JudgedEpisode {
 /// A finished evaluation.
 struct EvalReport {
   std::string policy;              // path
-  std::string physics;             // name of the engine
   std::optional<ModelInfo> model;  // none: the built-in one
   EnvConfig env;                   // what all episodes have in common
   EnvSpec spec;

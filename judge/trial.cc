@@ -138,14 +138,19 @@ fs::path FigureFolder(const std::string& out, const LoadedPolicy& loaded, const 
   return folder;
 }
 
-std::optional<std::vector<double>> ChooseEpisode(const EpisodeArguments& a, EnvConfig& env) {
-  if (a.start && a.given()) {
+RolloutConfig TrialEpisode(const TrialArguments& a, const LoadedPolicy* loaded) {
+  if (a.start && a.is_of_eval()) {
     throw BadInput("--start: expected none beside --episode, which has a start of its own");
   }
-  env.first_index = static_cast<uint64_t>(std::max<int64_t>(0, a.number));
-  const char* usual = TaskNamed(env.task).usual_start;
-  if (a.given() || (!a.start && usual == nullptr)) return std::nullopt;
-  return ParseStart(a.start ? *a.start : usual, SpecOf(env));
+  RolloutConfig config;
+  if (loaded != nullptr) config.policy = loaded->policy.get();
+  config.env = TrialEnvironments(a, loaded);
+  config.env.first_index = static_cast<uint64_t>(std::max<int64_t>(0, a.episode));
+  const char* usual = TaskNamed(config.env.task).usual_start;
+  if (a.start || (!a.is_of_eval() && usual != nullptr)) {
+    config.start = ParseStart(a.start ? *a.start : usual, SpecOf(config.env));
+  }
+  return config;
 }
 
 }  // namespace upswing

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "judge/rollout.h"
 #include "setup/config.h"
 #include "setup/loaded_policy.h"
 #include "sim/pendulum_env.h"
@@ -23,6 +24,12 @@ struct TrialArguments {
   int64_t seed = 0;
   bool unknown_plant = false;
   bool known_plant = false;  // a controller is made anew for each episode's plant; eval alone
+  // Of the single episode that `simulate`, `plot` and `view` make: where it starts, or which one of
+  // `eval` it is (negative: none of them).
+  std::optional<std::string> start;
+  int64_t episode = -1;
+
+  bool is_of_eval() const { return episode >= 0; }
 };
 
 /// Sensors, motors and what is random.
@@ -61,17 +68,8 @@ std::string PlantChangesText(const Plant& plant, const LoadedPolicy& loaded);
 std::filesystem::path FigureFolder(const std::string& out, const LoadedPolicy& loaded,
                                    const std::string& name);
 
-/// Which episode `simulate` and `plot` make: episode K of `eval`, or one from a given start.
-struct EpisodeArguments {
-  std::optional<std::string> start;
-  int64_t number = -1;  // K; negative: none
-
-  /// Whether it is an episode of `eval`.
-  bool given() const { return number >= 0; }
-};
-
-/// Sets the episode of `env`, which has one environment. Returns where it starts; nothing: in the
-/// episode's own start. Throws BadInput.
-std::optional<std::vector<double>> ChooseEpisode(const EpisodeArguments& a, EnvConfig& env);
+/// The single episode that the arguments ask for, of a policy (null: none) that must outlive it.
+/// Throws BadInput.
+RolloutConfig TrialEpisode(const TrialArguments& a, const LoadedPolicy* loaded);
 
 }  // namespace upswing
