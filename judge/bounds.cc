@@ -5,6 +5,7 @@
 #include <mutex>
 
 #include "control/best_episode.h"
+#include "core/csv.h"
 #include "core/error.h"
 #include "core/format.h"
 #include "core/text.h"
@@ -83,19 +84,21 @@ EpisodeBounds FindBounds(const BoundsConfig& config, ThreadPool& pool, const Pro
 }
 
 std::string BoundsCsv(const EpisodeBounds& bounds) {
-  std::string csv =
-      "episode,q1,q2,w1,w2,return,swing_up_seconds,return_table,swing_up_seconds_table\n";
+  CsvTable csv;
   for (size_t i = 0; i < bounds.starts.size(); ++i) {
-    csv += std::to_string(i);
-    const auto add = [&](double number) { csv += ',' + FormatNumber(number); };
-    for (const double number : bounds.starts[i]) add(number);
-    for (const BestEpisodes* best : {&bounds.any, &bounds.table}) {
-      add(best->of_return[i].reward_sum);
-      add(SwingUpSeconds(best->of_time[i], bounds.rule));
-    }
-    csv += '\n';
+    const std::vector<double>& start = bounds.starts[i];
+    csv.Add("episode", i);
+    csv.Add("q1", start[0]);
+    csv.Add("q2", start[1]);
+    csv.Add("w1", start[2]);
+    csv.Add("w2", start[3]);
+    csv.Add("return", bounds.any.of_return[i].reward_sum);
+    csv.Add("swing_up_seconds", SwingUpSeconds(bounds.any.of_time[i], bounds.rule));
+    csv.Add("return_table", bounds.table.of_return[i].reward_sum);
+    csv.Add("swing_up_seconds_table", SwingUpSeconds(bounds.table.of_time[i], bounds.rule));
+    csv.EndRow();
   }
-  return csv;
+  return csv.text();
 }
 
 }  // namespace upswing

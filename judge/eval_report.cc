@@ -4,6 +4,7 @@
 #include <cmath>
 #include <mutex>
 
+#include "core/csv.h"
 #include "core/error.h"
 #include "core/format.h"
 #include "core/text.h"
@@ -29,14 +30,12 @@ bool IsKnown(const EvaluationFigure& figure, bool upright, bool settled, bool va
          (figure.known == kSettled && settled) || (figure.known == kValued && valued);
 }
 
-/// Name and text of each figure of an episode, in the order of the columns.
-std::vector<std::pair<std::string, std::string>> Cells(const EvalReport& report,
-                                                       const JudgedEpisode& episode) {
+/// Adds conditions and figures of an episode to its row.
+void AddCells(const EvalReport& report, const JudgedEpisode& episode, CsvTable& csv) {
   const EnvSpec& spec = report.spec;
   const EvaluationEpisode& e = episode.result;
-  std::vector<std::pair<std::string, std::string>> cells;
   const auto add = [&](const std::string& name, double value, bool known = true) {
-    cells.emplace_back(name, known ? FormatNumber(value) : "");
+    csv.Add(name, known ? FormatNumber(value) : "");
   };
   for (size_t i = 0; i < episode.start.size(); ++i) add(spec.state_names[i], episode.start[i]);
   if (HasPlant(spec.task)) {
@@ -57,7 +56,6 @@ std::vector<std::pair<std::string, std::string>> Cells(const EvalReport& report,
     add(figure.name, figure.Of(e).value_or(0),
         IsKnown(figure, upright, settled, report.knows_values));
   }
-  return cells;
 }
 
 using Remade = decltype(LoadedPolicy::remade);
@@ -193,17 +191,13 @@ std::string EvalJson(const EvalReport& report) {
 }
 
 std::string EpisodesCsv(const EvalReport& report) {
-  std::string csv = "episode";
-  for (const auto& [name, text] : Cells(report, report.episodes.front())) csv += ',' + name;
-  csv += '\n';
+  CsvTable csv;
   for (size_t i = 0; i < report.episodes.size(); ++i) {
-    csv += std::to_string(i);
-    for (const auto& [name, text] : Cells(report, report.episodes[i])) {
-      csv += ',' + text;
-    }
-    csv += '\n';
+    csv.Add("episode", i);
+    AddCells(report, report.episodes[i], csv);
+    csv.EndRow();
   }
-  return csv;
+  return csv.text();
 }
 
 }  // namespace upswing
