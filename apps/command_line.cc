@@ -230,28 +230,6 @@ std::string CommandLine::Last(std::string_view name) const {
   return values.empty() ? "" : values.back();
 }
 
-std::string WrapText(std::string_view text, size_t columns, size_t indent) {
-  std::string wrapped;
-  size_t column = indent;  // where the line ends so far
-  for (const std::string_view word : Split(text, ' ')) {
-    if (word.empty()) continue;
-    // Continuation bytes of UTF-8 take no column.
-    const auto width = static_cast<size_t>(std::ranges::count_if(
-        word, [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; }));
-    const bool is_first = column == indent;
-    if (!is_first && column + 1 + width > columns) {
-      wrapped += '\n' + std::string(indent, ' ');
-      column = indent;
-    } else if (!is_first) {
-      wrapped += ' ';
-      ++column;
-    }
-    wrapped += word;
-    column += width;
-  }
-  return wrapped;
-}
-
 int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> commands,
                const std::string& footer) {
   CLI::App program(

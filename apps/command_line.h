@@ -92,9 +92,4 @@ int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> 
 /// The columns that a line of --help has at most.
 inline constexpr size_t kHelpColumns = 100;
 
-/// `text` in lines of at most `columns` characters, broken at blanks. All lines but the first begin
-/// with `indent` blanks; the first one stands behind as many columns, which the caller fills. A
-/// longer word has a line of its own.
-std::string WrapText(std::string_view text, size_t columns, size_t indent = 0);
-
 }  // namespace upswing

@@ -177,6 +177,31 @@ std::string HexDigits(uint64_t number, int digits) {
   return hex;
 }
 
+size_t Columns(std::string_view text) {
+  // Continuation bytes take no column.
+  return static_cast<size_t>(std::ranges::count_if(
+      text, [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; }));
+}
+
+std::string WrapText(std::string_view text, size_t columns, size_t indent) {
+  std::string wrapped;
+  size_t column = indent;  // where the line ends so far
+  for (const std::string_view word : Split(text, ' ')) {
+    if (word.empty()) continue;
+    const bool is_first = column == indent;
+    if (!is_first && column + 1 + Columns(word) > columns) {
+      wrapped += '\n' + std::string(indent, ' ');
+      column = indent;
+    } else if (!is_first) {
+      wrapped += ' ';
+      ++column;
+    }
+    wrapped += word;
+    column += Columns(word);
+  }
+  return wrapped;
+}
+
 std::string Printable(std::string_view text) {
   std::string shown;
   while (!text.empty()) {

@@ -78,6 +78,14 @@ std::string Replaced(std::string text, std::string_view from, std::string_view t
 /// The last `digits` hexadecimal digits of a number.
 std::string HexDigits(uint64_t number, int digits);
 
+/// The number of characters of a UTF-8 text, each of which takes a column.
+size_t Columns(std::string_view text);
+
+/// `text` in lines of at most `columns` characters, broken at blanks. All lines but the first begin
+/// with `indent` blanks; the first one stands behind as many columns, which the caller fills. A
+/// longer word has a line of its own.
+std::string WrapText(std::string_view text, size_t columns, size_t indent = 0);
+
 /// `text`, which may come from an untrusted file, for one line of a terminal: control characters,
 /// bytes that are not UTF-8, and the characters that reorder text or break lines are replaced by
 /// escapes such as `\n`, `\x1b` or `\u202e`. Everything else, including backslashes, is kept.

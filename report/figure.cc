@@ -6,8 +6,8 @@
 
 #include "core/error.h"
 #include "core/text.h"
+#include "io/command.h"
 #include "io/file.h"
-#include "report/gnuplot.h"
 #include "report/layout.h"
 
 namespace upswing {
@@ -285,6 +285,36 @@ class PanelScript {
   std::optional<std::pair<double, double>> x_range_, y_range_;  // of the heat map
   std::string text_;
 };
+
+/// The line of gnuplot's message with the error, without its place in the script.
+std::string ErrorIn(const std::string& message) {
+  std::string last;
+  for (const std::string_view line : Split(message, '\n')) {
+    if (!line.empty()) last = line;
+    if (const size_t colon = line.find(": "); line.starts_with('"') && colon != line.npos) {
+      return std::string(line.substr(colon + 2));
+    }
+  }
+  return last.empty() ? "it said nothing" : last;
+}
+
+/// Runs gnuplot on a script and returns its standard output. The user's own settings of gnuplot are
+/// not read. Throws Failure if it is missing, or with gnuplot's error message.
+std::string RunGnuplot(const std::string& script) {
+  // Of "-" it would read each byte by itself.
+  const std::optional<CommandResult> done = RunCommand({"gnuplot", "-d", "/dev/stdin"}, script);
+  if (!done) {
+    throw Failure(
+        "figure: expected the program gnuplot (Debian's package gnuplot-nox), found none in PATH");
+  }
+  if (done->signal != 0) {
+    throw Failure(Concat("figure: gnuplot was ended by signal ", done->signal));
+  }
+  if (done->exit_code != 0) {
+    throw Failure(Concat("figure: gnuplot failed: ", ErrorIn(done->errors)));
+  }
+  return done->output;
+}
 
 constexpr size_t kFirstCaptionLabel = 10;  // the panels have lower numbers
 

@@ -13,16 +13,15 @@ constexpr double kCharacter = 7.2;    // mean width of a character of kFontSize
 constexpr double kLegendSample = 44;  // width of a legend's piece of line
 constexpr double kTitleHeight = 28;
 
-/// Number of characters in UTF-8 text: all bytes but continuation bytes.
-double Characters(std::string_view text) {
-  return static_cast<double>(std::ranges::count_if(
-      text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; }));
+/// How many characters of a font of this scale fit the figure's width.
+size_t CharactersIn(const Figure& figure, double scale) {
+  return static_cast<size_t>((figure.width - 32) / (scale * kCharacter));
 }
 
 double LegendWidth(const Panel& panel) {
-  double longest = 0;
-  for (const Line& line : panel.lines) longest = std::max(longest, Characters(line.name));
-  return kLegendSample + kCharacter * longest;
+  size_t longest = 0;
+  for (const Line& line : panel.lines) longest = std::max(longest, Columns(line.name));
+  return kLegendSample + kCharacter * static_cast<double>(longest);
 }
 
 /// Space that a panel needs around its axes, pixels.
@@ -55,23 +54,17 @@ Margins MarginsOf(const Panel& panel) {
 }  // namespace
 
 std::vector<std::string> CaptionLines(const Figure& figure) {
-  std::vector<std::string> lines;
-  const double room = (figure.width - 32) / kCharacter;
-  for (const std::string_view word : Split(figure.caption, ' ')) {
-    if (word.empty()) continue;
-    const bool fits = !lines.empty() && Characters(lines.back()) + 1 + Characters(word) <= room;
-    if (fits) lines.back() += ' ';
-    if (!fits) lines.emplace_back();
-    lines.back() += word;
-  }
-  return lines;
+  if (figure.caption.empty()) return {};
+  const std::string text = WrapText(figure.caption, CharactersIn(figure, 1));
+  const std::vector<std::string_view> lines = Split(text, '\n');
+  return {lines.begin(), lines.end()};
 }
 
 std::string FittedTitle(const Figure& figure) {
-  const double room = (figure.width - 32) / (kTitleScale * kCharacter);
-  if (Characters(figure.title) <= room) return figure.title;
+  const size_t room = CharactersIn(figure, kTitleScale);
+  if (Columns(figure.title) <= room) return figure.title;
   std::string_view end = figure.title;
-  while (Characters(end) > room - 1 || (end.front() & 0xC0) == 0x80) end.remove_prefix(1);
+  while (Columns(end) > room - 1 || (end.front() & 0xC0) == 0x80) end.remove_prefix(1);
   return Concat("…", end);
 }
 
