@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <functional>
-#include <memory>
 
 #include "apps/commands.h"
 #include "apps/progress.h"
@@ -108,20 +107,20 @@ int RunBounds(const BoundsArguments& a) {
 }  // namespace
 
 void AddBounds(CommandLine& line) {
-  auto a = std::make_shared<BoundsArguments>();
-  line.Texts("policy", a->policies, "POLICY|RUN",
+  BoundsArguments& a = line.Runs(RunBounds);
+  line.Texts("policy", a.policies, "POLICY|RUN",
              "policy files, run folders or controllers to compare");
   ControllerConfig controllers;
-  line.Settings(OptionsOf(controllers), a->flags);
+  line.Settings(OptionsOf(controllers), a.flags);
   Options own;
-  a->config.Describe(own);
+  a.config.Describe(own);
   line.Arguments(own);
-  AddSet(line, a->config.trial.set, "another plant, such as mass2=1.2");
-  AddSeed(line, a->config.trial.seed, "start states");
-  AddPhysics(line, a->config.trial.physics);
-  AddThreads(line, a->threads);
-  line.Text("--csv", a->csv, "FILE", "table to write, a row for each episode");
-  line.Flag("--json", a->as_json, "print JSON instead of a table");
+  AddSet(line, a.config.trial.set, "another plant, such as mass2=1.2");
+  AddSeed(line, a.config.trial.seed, "start states");
+  AddPhysics(line, a.config.trial.physics);
+  AddThreads(line, a.threads);
+  line.Text("--csv", a.csv, "FILE", "table to write, a row for each episode");
+  line.Flag("--json", a.as_json, "print JSON instead of a table");
   line.Footer(
       "The search knows the plant and each start: box-constrained differential dynamic "
       "programming\n"
@@ -133,7 +132,6 @@ void AddBounds(CommandLine& line) {
       "  ./upswing bounds\n"
       "  ./upswing bounds runs/d3qn-seed1 runs/sac-seed1 mpc\n"
       "  ./upswing bounds --episodes 10 --set torque_limit=4 --csv bounds.csv\n");
-  line.Run([a] { return RunBounds(*a); });
 }
 
 }  // namespace upswing

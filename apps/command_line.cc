@@ -221,8 +221,6 @@ void CommandLine::Footer(const std::string& text) { app_.footer(text); }
 
 void CommandLine::Check(std::function<void()> check) { checks_.push_back(std::move(check)); }
 
-void CommandLine::Run(std::function<int()> run) { run_ = std::move(run); }
-
 bool CommandLine::Has(std::string_view name) const { return app_.count(std::string(name)) > 0; }
 
 std::string CommandLine::Last(std::string_view name) const {

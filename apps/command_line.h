@@ -60,8 +60,13 @@ class CommandLine {
   void Footer(const std::string& text);
   /// Adds a check that is made before anything else once all arguments are known.
   void Check(std::function<void()> check);
-  /// Sets what the command does; it returns the exit code.
-  void Run(std::function<int()> run);
+  /// Sets what the command does; it returns the exit code. Returns its arguments, to be declared.
+  template <typename Arguments>
+  Arguments& Runs(int (*run)(const Arguments&)) {
+    auto arguments = std::make_shared<Arguments>();
+    run_ = [arguments, run] { return run(*arguments); };
+    return *arguments;
+  }
 
   /// Whether the argument was given.
   bool Has(std::string_view name) const;

@@ -2,7 +2,6 @@
 
 #include <filesystem>
 #include <functional>
-#include <memory>
 
 #include "apps/commands.h"
 #include "apps/compare_report.h"
@@ -91,21 +90,21 @@ int RunCompare(const CompareArguments& arguments) {
 }  // namespace
 
 void AddCompare(CommandLine& line) {
-  auto a = std::make_shared<CompareArguments>();
-  line.Texts("runs", a->names, "RUN|FOLDER|POLICY",
+  CompareArguments& a = line.Runs(RunCompare);
+  line.Texts("runs", a.names, "RUN|FOLDER|POLICY",
              Concat("run folders, or folders that hold some; beside them policy.safetensors ",
                     "or controllers: ", Join(ControllerNames(), ", ")));
   line.Require("runs");
-  AddControllers(line, a->controllers);
-  line.Text("--out", a->out, "FOLDER",
+  AddControllers(line, a.controllers);
+  line.Text("--out", a.out, "FOLDER",
             "new folder for summary.csv, runs.csv, policies.csv, curves.svg and curves.png "
             "(curves-2 and so on for further tasks)");
-  line.Flag("--unfinished", a->runs.unfinished, "compare unfinished runs too, as they are");
-  line.Flag("--different-tasks", a->runs.different_tasks,
+  line.Flag("--unfinished", a.runs.unfinished, "compare unfinished runs too, as they are");
+  line.Flag("--different-tasks", a.runs.different_tasks,
             "compare groups that are evaluated on different tasks (plant, disturbance, number of "
             "episodes) with each other as well");
-  AddThreads(line, a->threads);
-  line.Flag("--json", a->as_json, "print JSON");
+  AddThreads(line, a.threads);
+  line.Flag("--json", a.as_json, "print JSON");
   line.Footer(
       "Runs with the same settings but the seed are one group. Figures are over its runs: the\n"
       "interquartile mean (IQM) with a 95% bootstrap interval; docs/statistics.md defines each.\n"
@@ -121,7 +120,6 @@ void AddCompare(CommandLine& line) {
       "  ./upswing compare runs --out runs/comparison       all agents in runs, with figures\n"
       "  ./upswing compare study --json                     STUDY/VARIANT/SEED, for a program\n"
       "  ./upswing compare runs/d3qn-seed* mpc tvlqr        beside classical control\n");
-  line.Run([a] { return RunCompare(*a); });
 }
 
 }  // namespace upswing

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <functional>
-#include <memory>
 
 #include "apps/commands.h"
 #include "apps/eval_table.h"
@@ -56,20 +55,20 @@ int RunEval(const EvalArguments& a) {
 }  // namespace
 
 void AddEval(CommandLine& line) {
-  auto a = std::make_shared<EvalArguments>();
-  AddPolicy(line, a->policy);
+  EvalArguments& a = line.Runs(RunEval);
+  AddPolicy(line, a.policy);
   line.Require("policy");
   Options own;
-  DescribeEvalEpisodes(own, &a->episodes);
+  DescribeEvalEpisodes(own, &a.episodes);
   line.Arguments(own);
-  line.Text("--episodes-csv", a->episodes_csv, "FILE",
+  line.Text("--episodes-csv", a.episodes_csv, "FILE",
             "table to write, a row for each episode: start, plant and figures; "
             "-: standard output, instead of the table of figures");
-  AddTrialOptions(line, a->trial, "start states, noise and random plants");
-  line.Flag("--known-plant", a->trial.known_plant,
+  AddTrialOptions(line, a.trial, "start states, noise and random plants");
+  line.Flag("--known-plant", a.trial.known_plant,
             "a controller is made anew for the plant of each episode: what knowing it brings");
-  AddThreads(line, a->threads);
-  line.Flag("--json", a->as_json, "print JSON instead of a table");
+  AddThreads(line, a.threads);
+  line.Flag("--json", a.as_json, "print JSON instead of a table");
   line.Footer(fmt::format(
       "An episode of the double pendulum lasts {} s from hanging with normal noise of 0.1 (rad,\n"
       "rad/s). It succeeds if both links are within 30° of upright for the whole of the last {} "
@@ -101,7 +100,6 @@ void AddEval(CommandLine& line) {
       "of the\nepisode, which reveals it to the policy; with --unknown-plant by the plant of the "
       "training.\n",
       kEvaluationSeconds, kHoldSeconds, kReturnSeconds));
-  line.Run([a] { return RunEval(*a); });
 }
 
 }  // namespace upswing

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -124,29 +123,29 @@ int RunExport(const ExportArguments& a) {
 }  // namespace
 
 void AddExport(CommandLine& line) {
-  auto a = std::make_shared<ExportArguments>();
-  line.Texts("policies", a->policies, "POLICY|RUN",
+  ExportArguments& a = line.Runs(RunExport);
+  line.Texts("policies", a.policies, "POLICY|RUN",
              "policy.safetensors or run folders; for --c also lqr, energy, pfl or tvlqr");
-  AddControllers(line, a->controller);
-  line.Text("--onnx", a->onnx, "FILE",
+  AddControllers(line, a.controller);
+  line.Text("--onnx", a.onnx, "FILE",
             "ONNX file to write: from observations to torques and values, for any runtime; -: "
             "standard output");
-  line.Text("--c", a->c, "FILE.h",
+  line.Text("--c", a.c, "FILE.h",
             "C99 header to write: from angles and velocities to torques, for a "
             "microcontroller; -: standard output");
-  line.Text("--prefix", a->prefix, "NAME",
+  line.Text("--prefix", a.prefix, "NAME",
             "with which all names in the C header begin [name of the file]", "a name");
-  line.Text("--page", a->page, "FOLDER",
+  line.Text("--page", a.page, "FOLDER",
             "the page's folder of agents; one of the same ID is replaced there");
-  line.Text("--id", a->id, "ID", "ID in the page, of a single policy [name of the run, or agent]",
+  line.Text("--id", a.id, "ID", "ID in the page, of a single policy [name of the run, or agent]",
             "an ID");
   Options own;
-  own.Add(&a->checkpoints, "checkpoints", {2, 100}, "",
+  own.Add(&a.checkpoints, "checkpoints", {2, 100}, "",
           "for the page, so many policies from the untrained one to each, which is trained again "
           "for that; of Q-networks")
       .usual = "none";
   line.Arguments(own);
-  line.Text("--test-vectors", a->test_vectors, "FILE",
+  line.Text("--test-vectors", a.test_vectors, "FILE",
             "JSON file to write: states, and what the task's formulas make of them; -: "
             "standard output");
   line.Footer(
@@ -160,7 +159,6 @@ void AddExport(CommandLine& line) {
       "  ./upswing export runs/d3qn-seed1 --page web/public/agents --checkpoints 10\n"
       "  ./upswing export --test-vectors vectors.json\n\n"
       "`./upswing demo runs/d3qn-seed1` puts it into the page and serves that.\n");
-  line.Run([a] { return RunExport(*a); });
 }
 
 }  // namespace upswing

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <memory>
 #include <optional>
 
 #include "apps/commands.h"
@@ -179,15 +178,14 @@ int RunInfo(const PolicyArguments& a) {
 }  // namespace
 
 void AddInfo(CommandLine& line) {
-  auto a = std::make_shared<PolicyArguments>();
-  AddPolicy(line, *a);
+  PolicyArguments& a = line.Runs(RunInfo);
+  AddPolicy(line, a);
   line.Footer(
       "Examples:\n"
       "  ./upswing info runs/d3qn-seed1\n"
       "  ./upswing info policy.safetensors\n"
       "  ./upswing info lqr --made-for mass2=1.2\n"
       "  ./upswing info                      which instructions the kernels use here\n");
-  line.Run([a] { return RunInfo(*a); });
 }
 
 }  // namespace upswing

@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <functional>
-#include <memory>
 
 #include "apps/commands.h"
 #include "apps/progress.h"
@@ -112,25 +111,25 @@ int RunMapCommand(const MapCommand& a) {
 }  // namespace
 
 void AddMap(CommandLine& line) {
-  auto a = std::make_shared<MapCommand>();
-  line.Texts("policies", a->policies, "POLICY|RUN",
+  MapCommand& a = line.Runs(RunMapCommand);
+  line.Texts("policies", a.policies, "POLICY|RUN",
              Concat("policy.safetensors, run folder or controller: ", Join(ControllerNames(), ", "),
                     "; several: side by side"));
   line.Require("policies");
-  AddControllers(line, a->controllers);
+  AddControllers(line, a.controllers);
   constexpr const char* kAxis = "NAME=FROM:TO[:CELLS]";
-  line.Text("--x", a->x, kAxis, "horizontal axis [mass2=-50%:+50%:31]", "");
-  line.Text("--y", a->y, kAxis, "vertical axis [length2=-50%:+50%:31]", "");
+  line.Text("--x", a.x, kAxis, "horizontal axis [mass2=-50%:+50%:31]", "");
+  line.Text("--y", a.y, kAxis, "vertical axis [length2=-50%:+50%:31]", "");
   Options own;
-  a->Describe(own);
+  a.Describe(own);
   line.Arguments(own);
-  AddSet(line, a->trial.set, "what is on neither axis, such as gravity=9.7");
-  AddPhysics(line, a->trial.physics);
-  AddUnknownPlant(line, a->trial.unknown_plant);
-  line.Text("--out", a->out, "FOLDER", "new folder for map.csv, map.svg and map.png [RUN/map-X-Y]");
-  AddSeed(line, a->trial.seed, "starts and noise");
-  AddThreads(line, a->threads);
-  line.Flag("--json", a->as_json, "print JSON instead of a table");
+  AddSet(line, a.trial.set, "what is on neither axis, such as gravity=9.7");
+  AddPhysics(line, a.trial.physics);
+  AddUnknownPlant(line, a.trial.unknown_plant);
+  line.Text("--out", a.out, "FOLDER", "new folder for map.csv, map.svg and map.png [RUN/map-X-Y]");
+  AddSeed(line, a.trial.seed, "starts and noise");
+  AddThreads(line, a.threads);
+  line.Flag("--json", a.as_json, "print JSON instead of a table");
   line.Footer(
       "Axes and --set take mass1, mass2, length1, length2, damping1, damping2 (mass, length,\n"
       "damping for both), gravity, torque_limit, actuated_joint (1 or 2), rotor_inertia,\n"
@@ -151,7 +150,6 @@ void AddMap(CommandLine& line) {
       "  ./upswing map runs/d3qn-seed1 --x q1=-180:180:73 --y q2=-180:180:73    from any angle\n"
       "  ./upswing map lqr --x q1=150:210:121 --y q2=-30:30:121    from where does it catch?\n"
       "  ./upswing map runs/d3qn-seed1 mpc tvlqr --episodes 1 --out runs/maps    side by side\n");
-  line.Run([a] { return RunMapCommand(*a); });
 }
 
 }  // namespace upswing

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <memory>
 #include <optional>
 
 #include "apps/commands.h"
@@ -112,17 +111,17 @@ int RunPlot(const PlotArguments& a) {
 }  // namespace
 
 void AddPlot(CommandLine& line) {
-  auto a = std::make_shared<PlotArguments>();
-  AddPolicy(line, a->policy);
+  PlotArguments& a = line.Runs(RunPlot);
+  AddPolicy(line, a.policy);
   line.Require("policy");
-  AddEpisodeOptions(line, a->trial);
+  AddEpisodeOptions(line, a.trial);
   Options own;
-  Option& seconds = own.Add(&a->seconds, "seconds", {0.1, 1000}, "s", "how long");
+  Option& seconds = own.Add(&a.seconds, "seconds", {0.1, 1000}, "s", "how long");
   seconds.step = kControlPeriod;
   seconds.usual = "10; with --episode 20";
   line.Arguments(own);
-  AddTrialOptions(line, a->trial, "noise, random plants and the start of --episode");
-  line.Text("--out", a->out, "FOLDER", "new folder for the figures [RUN/plot]");
+  AddTrialOptions(line, a.trial, "noise, random plants and the start of --episode");
+  line.Text("--out", a.out, "FOLDER", "new folder for the figures [RUN/plot]");
   line.Footer(
       "episode.svg and .png: angles, velocities, energy, torque, the reward's terms and what the\n"
       "policy estimates over time: Q-values, or of an actor its mean torque with the central 68% "
@@ -139,7 +138,6 @@ void AddPlot(CommandLine& line) {
       "  ./upswing plot runs/d3qn-seed1 --set mass2=1.3\n"
       "  ./upswing plot runs/d3qn-seed1 --randomize 0.25 --episode 17   as eval --randomize "
       "0.25\n");
-  line.Run([a] { return RunPlot(*a); });
 }
 
 }  // namespace upswing

@@ -5,7 +5,6 @@
 #include <chrono>
 #include <cmath>
 #include <functional>
-#include <memory>
 
 #include "apps/commands.h"
 #include "apps/progress.h"
@@ -160,22 +159,22 @@ int RunRealAiGym(const RealAiGymArguments& a) {
 }  // namespace
 
 void AddRealAiGym(CommandLine& line) {
-  auto a = std::make_shared<RealAiGymArguments>();
-  AddPolicy(line, a->policy);
-  line.Text("--search", a->search_out, "FILE", "search a policy, write it here, then score it");
-  line.Text("--from", a->from, "FILE", "policy to begin a search with [a random one]");
-  line.Text("--figure", a->figure, "FILE", "draw the rows of robustness, .svg or .png");
-  line.Text("--csv", a->csv, "FILE",
+  RealAiGymArguments& a = line.Runs(RunRealAiGym);
+  AddPolicy(line, a.policy);
+  line.Text("--search", a.search_out, "FILE", "search a policy, write it here, then score it");
+  line.Text("--from", a.from, "FILE", "policy to begin a search with [a random one]");
+  line.Text("--figure", a.figure, "FILE", "draw the rows of robustness, .svg or .png");
+  line.Text("--csv", a.csv, "FILE",
             "write the motion in the boards' own format; -: standard output, alone");
-  line.Flag("--json", a->as_json, "print JSON instead of a table");
+  line.Flag("--json", a.as_json, "print JSON instead of a table");
   Options own;
   own.Section("cases");
-  own.Add(&a->case_seed, "case_seed", {0, 1e15}, "",
+  own.Add(&a.case_seed, "case_seed", {0, 1e15}, "",
           "seed of the noise and the pushes of the robustness score");
   line.Arguments(own);
   BoardSearchConfig config;
-  line.Settings(OptionsOf(config), a->search);
-  AddThreads(line, a->threads);
+  line.Settings(OptionsOf(config), a.search);
+  AddThreads(line, a.threads);
   line.Footer(
       "Performance: one simulation of 10 s from hanging, on the boards' plant C.1 without "
       "friction,\n"
@@ -192,7 +191,6 @@ void AddRealAiGym(CommandLine& line) {
       "  ./upswing realaigym --search acrobot.safetensors --robot acrobot --seed 2\n"
       "  ./upswing realaigym pendubot.safetensors --csv sim_swingup.csv --json\n"
       "  ./upswing realaigym baseline-lqr                           the baselines' regulator\n");
-  line.Run([a] { return RunRealAiGym(*a); });
 }
 
 }  // namespace upswing

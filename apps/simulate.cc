@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <memory>
 #include <optional>
 
 #include "apps/commands.h"
@@ -66,18 +65,18 @@ int RunSimulate(const SimulateArguments& a) {
 }  // namespace
 
 void AddSimulate(CommandLine& line) {
-  auto a = std::make_shared<SimulateArguments>();
-  AddPolicy(line, a->policy);
-  line.Text("--torque", a->torque, "FILE",
+  SimulateArguments& a = line.Runs(RunSimulate);
+  AddPolicy(line, a.policy);
+  line.Text("--torque", a.torque, "FILE",
             "CSV file with a column `torque` (N·m), a row for each 0.02 s; -: standard input");
-  AddEpisodeOptions(line, a->trial);
+  AddEpisodeOptions(line, a.trial);
   Options own;
-  Option& seconds = own.Add(&a->seconds, "seconds", {0, 1e5}, "s", "how long");
+  Option& seconds = own.Add(&a.seconds, "seconds", {0, 1e5}, "s", "how long");
   seconds.step = kControlPeriod;
   seconds.usual = "20, or as long as the torques last";
   line.Arguments(own);
-  AddTrialOptions(line, a->trial, "noise, random plants and the start of --episode");
-  line.Text("--csv", a->csv, "FILE", "file to write; -: standard output [-]");
+  AddTrialOptions(line, a.trial, "noise, random plants and the start of --episode");
+  line.Text("--csv", a.csv, "FILE", "file to write; -: standard output [-]");
   line.Footer(
       "Columns: t (s), qpos0, qpos1 (rad), qvel0, qvel1 (rad/s), torque (N·m, as the motor "
       "applies\n"
@@ -90,7 +89,6 @@ void AddSimulate(CommandLine& line) {
       "  ./upswing simulate --start 3.0,0,0,0 --set damping=0      let it fall\n"
       "  ./upswing eval runs/d3qn-seed1 --randomize 0.25 --episodes-csv episodes.csv\n"
       "  ./upswing simulate runs/d3qn-seed1 --randomize 0.25 --episode 17 --csv failure.csv\n");
-  line.Run([a] { return RunSimulate(*a); });
 }
 
 }  // namespace upswing

@@ -166,27 +166,27 @@ void CheckArguments(const CommandLine& line, const StudyArguments& arguments) {
 }  // namespace
 
 void AddStudy(CommandLine& line) {
-  auto arguments = std::make_shared<StudyArguments>();
-  line.Text("file", arguments->file, "FILE.toml", "what to train: variants, settings, seeds");
-  line.Text("--out", arguments->out, "FOLDER", "folder of the study [runs/FILE]");
-  AddManyOptions(line, arguments->seeds, arguments->jobs);
-  line.Text("--keep", arguments->keep, "WHAT",
+  StudyArguments& arguments = line.Runs(RunStudy);
+  line.Text("file", arguments.file, "FILE.toml", "what to train: variants, settings, seeds");
+  line.Text("--out", arguments.out, "FOLDER", "folder of the study [runs/FILE]");
+  AddManyOptions(line, arguments.seeds, arguments.jobs);
+  line.Text("--keep", arguments.keep, "WHAT",
             "of a finished run: all, policy (and settings, evaluations, log) or tables (its\n"
             "rows in the study's tables alone) [all, or what FILE says]",
             "all, policy or tables");
-  line.Flag("--status", arguments->status,
+  line.Flag("--status", arguments.status,
             "print what is done, running and lost, and end; FILE may be the study's folder");
-  line.Flag("--prepare", arguments->prepare, "make the folder ready for workers, and end");
-  line.Text("--slurm", arguments->slurm.options, "OPTIONS",
+  line.Flag("--prepare", arguments.prepare, "make the folder ready for workers, and end");
+  line.Text("--slurm", arguments.slurm.options, "OPTIONS",
             "have the runs done by a cluster: queue a job array of workers with these options\n"
             "of sbatch ('' for none), follow it, and compare at the end",
             "");
   Options slurm;
-  slurm.Add(&arguments->slurm.tasks, "tasks", {1, 100'000}, "", "of the job array: workers").usual =
+  slurm.Add(&arguments.slurm.tasks, "tasks", {1, 100'000}, "", "of the job array: workers").usual =
       Concat("one for each run, at most ", kMostSlurmTasks);
   line.Arguments(slurm);
-  line.Flag("--print", arguments->print, "print the script for sbatch, and end");
-  line.Text("--work", arguments->work, "FOLDER",
+  line.Flag("--print", arguments.print, "print the script for sbatch, and end");
+  line.Text("--work", arguments.work, "FOLDER",
             "be a worker of the study in this folder, on any host that shares it: train what\n"
             "no other worker has, until nothing is left");
   line.Footer(
@@ -209,11 +209,10 @@ void AddStudy(CommandLine& line) {
       "same command resumes what was stopped or killed; finished runs are left as they are.\n"
       "Exit code 0: done; 1: a run failed; 2: bad usage or input; 130, 143: stopped; of a worker\n"
       "75: stopped by a signal, its run can be resumed by any other.\n");
-  line.Check([&line, arguments] {
-    arguments->on_slurm = line.Has("--slurm");
-    CheckArguments(line, *arguments);
+  line.Check([&line, &arguments] {
+    arguments.on_slurm = line.Has("--slurm");
+    CheckArguments(line, arguments);
   });
-  line.Run([arguments] { return RunStudy(*arguments); });
 }
 
 }  // namespace upswing

@@ -106,21 +106,21 @@ std::string AgentsText() {
 }  // namespace
 
 void AddTrain(CommandLine& line) {
-  auto arguments = std::make_shared<TrainArguments>();
-  line.Text("--out", arguments->out, "FOLDER",
+  TrainArguments& arguments = line.Runs(RunTrain);
+  line.Text("--out", arguments.out, "FOLDER",
             "run folder to make [runs/AGENT-seedSEED];\n"
             "with --seeds the folder of all of them [runs/AGENT]");
-  line.Text("--config", arguments->config, "FILE",
+  line.Text("--config", arguments.config, "FILE",
             "TOML file of settings, - for standard input; flags override it");
-  line.Text("--resume", arguments->resume, "RUN",
+  line.Text("--resume", arguments.resume, "RUN",
             "resume a run from its checkpoint; --steps, --threads, --checkpoint-every and\n"
             "--stop-when-solved may be given again; a solved run continues with "
             "--no-stop-when-solved");
-  line.Flag("--print-config", arguments->print_config,
+  line.Flag("--print-config", arguments.print_config,
             "print the settings of this training as a TOML file for --config, and end");
-  AddManyOptions(line, arguments->seeds, arguments->jobs);
+  AddManyOptions(line, arguments.seeds, arguments.jobs);
   Config defaults;
-  line.Settings(EverySetting(defaults), arguments->flags);
+  line.Settings(EverySetting(defaults), arguments.flags);
   line.ShowSettings(
       [&line](const CommandLine::ShowOptions& show) { ShowDefaultsOfWhatIsChosen(line, show); });
   line.Footer(
@@ -146,7 +146,6 @@ void AddTrain(CommandLine& line) {
     }
     CheckManyArguments(line);
   });
-  line.Run([arguments] { return RunTrain(*arguments); });
 }
 
 }  // namespace upswing

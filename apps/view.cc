@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <memory>
-
 #include "apps/commands.h"
 #include "apps/progress.h"
 #include "apps/signals.h"
@@ -185,16 +183,16 @@ void AddPicture(CommandLine& line, ViewArguments& a) {
 }  // namespace
 
 void AddView(CommandLine& line) {
-  auto a = std::make_shared<ViewArguments>();
-  AddPolicies(line, *a);
-  line.Text("--record", a->record, "FILE",
+  ViewArguments& a = line.Runs(RunView);
+  AddPolicies(line, a);
+  line.Text("--record", a.record, "FILE",
             "write FILE.mp4 or FILE.gif (with the program ffmpeg), FILE.png (the last moment) "
             "or FOLDER/ (each frame as PNG) instead of opening a window");
-  line.Flag("--headless", a->headless, "open no window, as --record does");
-  line.Text("--csv", a->csv, "FILE", "write the episode as `simulate` does; -: standard output");
-  AddPicture(line, *a);
-  AddEpisodeOptions(line, a->trial);
-  AddTrialOptions(line, a->trial, "noise, random plants and the start of --episode");
+  line.Flag("--headless", a.headless, "open no window, as --record does");
+  line.Text("--csv", a.csv, "FILE", "write the episode as `simulate` does; -: standard output");
+  AddPicture(line, a);
+  AddEpisodeOptions(line, a.trial);
+  AddTrialOptions(line, a.trial, "noise, random plants and the start of --episode");
   line.Footer(
       "In the window: space pauses, right and left arrow step, backspace begins again, enter "
       "turns\n"
@@ -208,7 +206,6 @@ void AddView(CommandLine& line) {
       "  ./upswing view runs/d3qn-seed1 --record swing-up.mp4 --seconds 5 --speed 0.5\n"
       "  ./upswing view runs/d3qn-seed1 --record frames/          PNG files, no ffmpeg\n"
       "  ./upswing view --start 3,0,0,0                           let it fall\n");
-  line.Run([a] { return RunView(*a); });
 }
 
 }  // namespace upswing

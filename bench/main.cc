@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <exception>
-#include <memory>
 
 #include "apps/program.h"
 #include "apps/say.h"
@@ -182,21 +181,21 @@ int RunBench(BenchOptions options) {
 }
 
 void AddBench(CommandLine& line) {
-  auto o = std::make_shared<BenchOptions>();
-  line.Texts("parts", o->parts, "PART", "what to measure [everything]");
-  line.Text("--json", o->json, "FILE",
+  BenchOptions& o = line.Runs(RunBench);
+  line.Texts("parts", o.parts, "PART", "what to measure [everything]");
+  line.Text("--json", o.json, "FILE",
             "file to write, in Google Benchmark's format; -: standard output, without the table");
   Options own;
-  own.Add(&o->threads, "threads", {0, 256}, "numbers of threads; 0: chosen by timing").usual =
+  own.Add(&o.threads, "threads", {0, 256}, "numbers of threads; 0: chosen by timing").usual =
       "1 and one for each processor, up to 8";
-  own.AddChoice(&o->simd, "simd", SimdPaths(), "vector instructions").usual = "the first";
-  own.Add(&o->seconds, "seconds", {0.001, 1000}, "s", "for each repetition of a case");
-  own.Add(&o->repetitions, "repetitions", {1, 1000}, "", "of a case; the median is printed");
-  own.AddChoice(&o->network, "network", {"plain", "dueling"}, "gradient: DQN or Dueling Double DQN")
+  own.AddChoice(&o.simd, "simd", SimdPaths(), "vector instructions").usual = "the first";
+  own.Add(&o.seconds, "seconds", {0.001, 1000}, "s", "for each repetition of a case");
+  own.Add(&o.repetitions, "repetitions", {1, 1000}, "", "of a case; the median is printed");
+  own.AddChoice(&o.network, "network", {"plain", "dueling"}, "gradient: DQN or Dueling Double DQN")
       .usual = "both";
-  own.Add(&o->hidden, "hidden", {1, 4096}, "gradient, sac, ppo: widths of the feature layers")
+  own.Add(&o.hidden, "hidden", {1, 4096}, "gradient, sac, ppo: widths of the feature layers")
       .usual = "several";
-  own.Add(&o->batch, "batch", {1, 65536}, "", "gradient, sac, ppo: size of the minibatches").usual =
+  own.Add(&o.batch, "batch", {1, 65536}, "", "gradient, sac, ppo: size of the minibatches").usual =
       "several";
   line.Arguments(own);
 
@@ -213,7 +212,6 @@ void AddBench(CommandLine& line) {
       "  ./upswing bench sac --threads 0,1                the automatic choice beside one thread\n"
       "  ./upswing bench gradient --network plain --hidden 256,256 --batch 128 --json rate.json\n"
       "  ./upswing bench kernels --simd avx2 --seconds 1 --repetitions 5\n");
-  line.Run([o] { return RunBench(*o); });
 }
 
 constexpr CommandEntry kCommands[] = {
