@@ -7,13 +7,12 @@
 
 #include "apps/commands.h"
 #include "apps/progress.h"
-#include "core/error.h"
+#include "core/format.h"
 #include "core/json.h"
 #include "core/text.h"
 #include "io/machine.h"
 #include "io/streams.h"
 #include "run/find_policy.h"
-#include "setup/arguments.h"
 #include "setup/controllers.h"
 
 namespace upswing {
@@ -92,8 +91,8 @@ int RunBounds(const BoundsArguments& a) {
     fmt::print("{}\n", PrintableJson(j));
     return 0;
   }
-  fmt::print("Best found of {} episode{}, judged in {}\n", a.config.episodes,
-             a.config.episodes == 1 ? "" : "s", a.config.trial.physics);
+  fmt::print("Best found of {}, judged in {}\n", Counted(a.config.episodes, "episode"),
+             a.config.trial.physics);
   size_t width = 0;
   for (const BoundsRow& row : rows) width = std::max(width, Printable(row.name).size());
   fmt::print("  {:<{}}  {:<14} {:>8}   median swing-up time\n", "", width, "return", "share");

@@ -3,10 +3,8 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
-#include <iostream>
 #include <utility>
 
-#include "apps/say.h"
 #include "core/error.h"
 #include "core/text.h"
 

@@ -1,12 +1,12 @@
 #pragma once
 
-#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 #include "core/options.h"
@@ -62,8 +62,8 @@ class CommandLine {
   void Check(std::function<void()> check);
   /// Sets what the command does; it returns the exit code. Returns its arguments, to be declared.
   template <typename Arguments>
-  Arguments& Runs(int (*run)(const Arguments&)) {
-    auto arguments = std::make_shared<Arguments>();
+  std::remove_cvref_t<Arguments>& Runs(int (*run)(Arguments)) {
+    const auto arguments = std::make_shared<std::remove_cvref_t<Arguments>>();
     run_ = [arguments, run] { return run(*arguments); };
     return *arguments;
   }

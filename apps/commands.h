@@ -1,14 +1,12 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "apps/command_line.h"
 #include "judge/trial.h"
 #include "run/find_policy.h"
-#include "setup/loaded_policy.h"
 
 namespace upswing {
 

@@ -10,7 +10,6 @@
 #include "core/thread_pool.h"
 #include "io/machine.h"
 #include "io/streams.h"
-#include "rl/evaluate.h"
 #include "run/find_policy.h"
 #include "setup/arguments.h"
 #include "setup/config.h"

@@ -41,9 +41,9 @@ void ManyRunsView::Begin(const std::vector<SeedRun>& runs) {
 void ManyRunsView::Announce() const {
   const size_t variants = plan_.variants.size();
   Say("Training {} in {}\n", Printable(many_.what), Printable(plan_.folder.string()));
-  Say("  {}seed{} {}: {} run{}{}\n", variants == 1 ? "" : fmt::format("{} variants, ", variants),
-      plan_.seeds.size() == 1 ? "" : "s", SeedsText(plan_.seeds), runs_->size(),
-      runs_->size() == 1 ? "" : "s",
+  Say("  {}seed{} {}: {}{}\n", variants == 1 ? "" : fmt::format("{} variants, ", variants),
+      plan_.seeds.size() == 1 ? "" : "s", SeedsText(plan_.seeds),
+      Counted(std::ssize(*runs_), "run"),
       many_.jobs == 0 ? "" : fmt::format(", {} at a time", many_.jobs));
   for (const Variant& variant : plan_.variants) {
     for (const std::string& warning : Warnings(variant.config)) {
@@ -130,8 +130,7 @@ void ManyRunsView::End(const SeedRun& run) {
 void ManyRunsView::PrintTable(const Variant& variant) const {
   Say("\n{}\n", Printable(variant.name.empty() ? many_.what : variant.name));
   std::vector<double> steps, seconds, success, reward;
-  size_t solved = 0;
-  size_t not_judged = 0, failed = 0;
+  int64_t solved = 0, not_judged = 0, failed = 0;
   for (const SeedRun& run : *runs_) {
     if (run.variant != &variant) continue;
     if (!run.state || run.state->best_step == 0) {
@@ -160,10 +159,8 @@ void ManyRunsView::PrintTable(const Variant& variant) const {
              QuartilesOf(success).median, QuartilesOf(reward).median,
              fmt::format("{} of {} solved", solved, steps.size()));
   }
-  if (not_judged > 0) {
-    Say("  {} run{} not evaluated yet\n", not_judged, not_judged == 1 ? "" : "s");
-  }
-  if (failed > 0) Say("  {} run{} failed\n", failed, failed == 1 ? "" : "s");
+  if (not_judged > 0) Say("  {} not evaluated yet\n", Counted(not_judged, "run"));
+  if (failed > 0) Say("  {} failed\n", Counted(failed, "run"));
 }
 
 size_t ManyRunsView::Left() const {

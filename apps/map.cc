@@ -16,7 +16,6 @@
 #include "setup/config.h"
 #include "setup/controllers.h"
 #include "setup/loaded_policy.h"
-#include "view/view.h"
 
 namespace upswing {
 namespace {
@@ -59,9 +58,9 @@ void PrintMapTable(const MapResult& map) {
   fmt::print("  plant      {}, physics {}\n", PlantText(config.point.plant),
              config.env.engine->name);
   if (map.model) fmt::print("  model      {}\n", map.model->Text());
-  fmt::print("  map        {} × {}: {} × {} cells, {} episode{} each\n", RangeText(config.x),
-             RangeText(config.y), config.x.values.size(), config.y.values.size(), config.episodes,
-             config.episodes == 1 ? "" : "s");
+  fmt::print("  map        {} × {}: {} × {} cells, {} each\n", RangeText(config.x),
+             RangeText(config.y), config.x.values.size(), config.y.values.size(),
+             Counted(config.episodes, "episode"));
   if (!map.changes.empty()) fmt::print("  with       {}\n", map.changes);
   const std::string interval = map.success_interval();
   fmt::print("  success    {:.1f}% of all episodes; no failure in {:.1f}% of the cells{}\n",

@@ -13,7 +13,6 @@
 #include "core/error.h"
 #include "core/format.h"
 #include "core/text.h"
-#include "io/file.h"
 #include "io/machine.h"
 #include "io/streams.h"
 #include "io/tensor_file.h"

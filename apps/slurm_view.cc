@@ -5,6 +5,7 @@
 
 #include "apps/say.h"
 #include "core/error.h"
+#include "core/format.h"
 #include "core/text.h"
 #include "io/lease.h"
 
@@ -40,8 +41,8 @@ void SlurmView::Begin(const std::vector<SeedRun>& runs) {
                          " of this study is still queued"));
   }
   if (*queued > 0) {
-    Say("  Job array {}, queued before: {} task{} left, output in {}\n", array_->number(), *queued,
-        *queued == 1 ? "" : "s", Logs(many_, *array_));
+    Say("  Job array {}, queued before: {} left, output in {}\n", array_->number(),
+        Counted(*queued, "task"), Logs(many_, *array_));
   } else {
     const std::string script = SlurmScriptFor(many_.plan, runs, request_);
     array_ = SlurmArray::Submit(many_.plan.folder, script);

@@ -69,11 +69,10 @@ TrainView::TrainView(const Training& training)
 
 void TrainView::Announce(const std::filesystem::path& run) const {
   const Config& config = training_.config();
-  const int threads = training_.threads();
   Say("Training {} (seed {}) in {}\n", config.agent, config.train.seed, Printable(run.string()));
-  Say("  {}, {} parameters; {} environments, {} thread{}\n", config.learner().Text(),
-      FormatCount(training_.policy()->num_parameters()), config.train.envs, threads,
-      threads == 1 ? "" : "s");
+  Say("  {}, {} parameters; {} environments, {}\n", config.learner().Text(),
+      FormatCount(training_.policy()->num_parameters()), config.train.envs,
+      Counted(training_.threads(), "thread"));
   if (!HasPlant(config.task)) Say("  task {}\n", config.task);
   if (config.physics != kMuJoCo.name) Say("  physics {}\n", config.physics);
   const std::optional<ModelInfo> model = InfoOfModel(config.mjcf, config.model);

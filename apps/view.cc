@@ -6,6 +6,7 @@
 #include "apps/progress.h"
 #include "apps/signals.h"
 #include "core/error.h"
+#include "core/format.h"
 #include "core/text.h"
 #include "io/frames.h"
 #include "io/streams.h"
@@ -103,8 +104,8 @@ int RunHeadless(const ViewArguments& a, const std::vector<RolloutConfig>& entrie
     progress.Clear();
     if (frames == 0) return 128 + StopSignal();
     if (!quiet) {
-      fmt::print("{}: {} {} of {}x{}\n", Printable(a.record), frames,
-                 frames == 1 ? "picture" : "pictures", a.width, a.height);
+      fmt::print("{}: {} of {}x{}\n", Printable(a.record), Counted(frames, "picture"), a.width,
+                 a.height);
     }
   }
   if (a.csv.empty()) return 0;

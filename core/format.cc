@@ -36,4 +36,8 @@ std::string FormatCount(double number) {
   return grouped;
 }
 
+std::string Counted(int64_t count, const std::string& noun) {
+  return Concat(count, ' ', noun, count == 1 ? "" : "s");
+}
+
 }  // namespace upswing

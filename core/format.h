@@ -1,6 +1,7 @@
 #pragma once
 
 #include <concepts>
+#include <cstdint>
 #include <numbers>
 #include <string>
 
@@ -21,5 +22,8 @@ template <std::integral T>
 std::string FormatCount(T number) {
   return FormatCount(static_cast<double>(number));
 }
+
+/// A count of a noun: `1 run`, `3 runs`.
+std::string Counted(int64_t count, const std::string& noun);
 
 }  // namespace upswing

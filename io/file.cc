@@ -160,6 +160,14 @@ void MakeNewFolder(const fs::path& folder) {
   MakeFolder(folder);
 }
 
+fs::path FreePath(const fs::path& path) {
+  fs::path free = path;
+  for (int number = 2; fs::exists(fs::symlink_status(free)); ++number) {
+    free = Concat(path.string(), "-", number);
+  }
+  return free;
+}
+
 void MakeFolder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);

@@ -55,6 +55,9 @@ void WriteNamedFile(const std::filesystem::path& path, std::string_view text);
 void CheckFree(const std::filesystem::path& folder,
                std::string_view advice = "choose another --out");
 
+/// `path`, or with -2, -3, … behind it where that is taken.
+std::filesystem::path FreePath(const std::filesystem::path& path);
+
 /// Makes a folder and its missing parents. Throws as PathError does.
 void MakeFolder(const std::filesystem::path& folder);
 

@@ -1,13 +1,10 @@
 #include "judge/bounds.h"
 
-#include <algorithm>
-#include <memory>
 #include <mutex>
 
 #include "control/best_episode.h"
 #include "core/csv.h"
 #include "core/error.h"
-#include "core/format.h"
 #include "core/text.h"
 #include "rl/torque_levels.h"
 

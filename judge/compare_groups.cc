@@ -10,7 +10,6 @@
 #include "core/text.h"
 #include "judge/compare_runs.h"
 #include "run/model_info.h"
-#include "setup/config.h"
 
 namespace upswing {
 namespace {
@@ -153,7 +152,7 @@ void NoteTimes(const std::vector<RunRecord>& runs, std::vector<std::string>& not
     std::vector<std::string> counts;
     counts.reserve(threads.size());
     for (const auto& [count, of_runs] : threads) {
-      counts.push_back(fmt::format("{} ({} run{})", count, of_runs, of_runs == 1 ? "" : "s"));
+      counts.push_back(fmt::format("{} ({})", count, Counted(of_runs, "run")));
     }
     notes.push_back(
         Concat("times were measured with different numbers of threads: ", Join(counts, ", ")));

@@ -6,7 +6,6 @@
 #include <array>
 #include <chrono>
 #include <numeric>
-#include <optional>
 
 #include "core/error.h"
 #include "core/format.h"

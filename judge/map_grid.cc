@@ -29,24 +29,6 @@ struct EpisodeRange {
 /// Swing-up time (s) of an episode that succeeds.
 using EpisodeResult = std::optional<double>;
 
-/// An end of an axis: a number, or a percentage on top of the training's value.
-struct AxisEnd {
-  double value = 0;
-  bool percent = false;
-};
-
-AxisEnd ParseEnd(std::string_view text, const std::string& where) {
-  AxisEnd end;
-  end.percent = text.ends_with('%');
-  if (end.percent) text.remove_suffix(1);
-  const auto number = ParseNumber(text);
-  if (!number || !std::isfinite(*number)) {
-    throw BadInput(Concat(where, ": expected a number or a percentage, got \"", text, "\""));
-  }
-  end.value = *number;
-  return end;
-}
-
 /// The one value that the settings have, if they all have it.
 std::optional<double> CommonValue(const std::vector<const Option*>& members) {
   const double first = *std::get<double*>(members.front()->target);
@@ -56,13 +38,20 @@ std::optional<double> CommonValue(const std::vector<const Option*>& members) {
   return first;
 }
 
-double Resolve(const AxisEnd& end, const MapAxis& axis, const std::string& where) {
-  if (!end.percent) return end.value;
+/// An end of an axis: a number, or a percentage on top of the training's value.
+double ParseEnd(std::string_view text, const MapAxis& axis, const std::string& where) {
+  const bool percent = text.ends_with('%');
+  if (percent) text.remove_suffix(1);
+  const auto number = ParseNumber(text);
+  if (!number || !std::isfinite(*number)) {
+    throw BadInput(Concat(where, ": expected a number or a percentage, got \"", text, "\""));
+  }
+  if (!percent) return *number;
   if (!axis.at_training || *axis.at_training == 0) {
     throw BadInput(Concat(where, ": expected numbers, got a percentage of ",
                           axis.at_training ? "0" : "values that differ"));
   }
-  return *axis.at_training * (1 + end.value / 100);
+  return *axis.at_training * (1 + *number / 100);
 }
 
 int64_t ParseCells(std::string_view text, const std::string& where) {
@@ -169,8 +158,8 @@ MapAxis ParseMapAxis(const std::string& text, const MapPoint& training, const st
   axis.start = members.front()->section == "start";
   axis.at_training = CommonValue(members);
 
-  const double from = Resolve(ParseEnd(pieces[0].substr(1), place), axis, place);
-  const double to = Resolve(ParseEnd(pieces[1], place), axis, place);
+  const double from = ParseEnd(pieces[0].substr(1), axis, place);
+  const double to = ParseEnd(pieces[1], axis, place);
   for (const double end : {from, to}) options.Set(axis.name, FormatNumber(end), place);
   if (from >= to) {
     throw BadInput(
@@ -263,23 +252,6 @@ std::vector<int64_t> DrawCells(const MapConfig& config, double share) {
   cells.resize(wanted);
   std::ranges::sort(cells);
   return cells;
-}
-
-MapAgreement Compare(std::span<const MapCell> a, std::span<const MapCell> b, int episodes) {
-  MapAgreement result;
-  result.cells = static_cast<int64_t>(a.size());
-  for (size_t i = 0; i < a.size(); ++i) {
-    const auto successes = static_cast<double>(std::abs(a[i].successes - b[i].successes));
-    result.same_successes += successes == 0 ? 1 : 0;
-    result.largest_success_difference =
-        std::max(result.largest_success_difference, successes / episodes);
-    const double seconds = std::abs(a[i].swing_up_seconds - b[i].swing_up_seconds);
-    if (std::isfinite(seconds)) {
-      ++result.both_succeed;
-      result.largest_swing_up_difference = std::max(result.largest_swing_up_difference, seconds);
-    }
-  }
-  return result;
 }
 
 }  // namespace upswing

@@ -73,13 +73,4 @@ std::vector<MapCell> RunMap(const MapConfig& config, const Policy& policy,
 /// `share` of the cells (at least one if it is not 0), drawn by the seed, in rising order.
 std::vector<int64_t> DrawCells(const MapConfig& config, double share);
 
-/// How far two runs of some cells agree.
-struct MapAgreement {
-  int64_t cells = 0, same_successes = 0;   // cells, and those with as many successes
-  double largest_success_difference = 0;   // of the rates
-  int64_t both_succeed = 0;                // cells where both have successes
-  double largest_swing_up_difference = 0;  // of the medians of these, s
-};
-MapAgreement Compare(std::span<const MapCell> a, std::span<const MapCell> b, int episodes);
-
 }  // namespace upswing

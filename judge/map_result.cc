@@ -8,12 +8,12 @@
 
 #include "core/csv.h"
 #include "core/error.h"
+#include "core/format.h"
 #include "core/json.h"
 #include "core/text.h"
 #include "io/file.h"
 #include "report/figure.h"
 #include "rl/evaluate.h"
-#include "setup/config.h"
 
 namespace upswing {
 namespace {
@@ -50,8 +50,7 @@ Panel MapPanel(const MapResult& map, const std::string& title, HeatMap heat_map)
 
 /// All that the axes do not say.
 std::string CaptionOf(const MapResult& map) {
-  const int episodes = map.config.episodes;
-  std::string text = Concat(episodes, episodes == 1 ? " episode" : " episodes", " a cell");
+  std::string text = Concat(Counted(map.config.episodes, "episode"), " a cell");
   if (const std::string interval = map.success_interval(); !interval.empty()) {
     text += Concat(" (", interval, ")");
   }
@@ -184,9 +183,20 @@ std::string MapResult::success_interval() const {
 }
 
 MapAgreement MapResult::agreement() const {
-  std::vector<MapCell> same;
-  for (const int64_t cell : checked) same.push_back(cells[static_cast<size_t>(cell)]);
-  return Compare(same, in_mujoco, config.episodes);
+  MapAgreement result;
+  result.cells = std::ssize(checked);
+  for (size_t i = 0; i < checked.size(); ++i) {
+    const MapCell &a = cells[static_cast<size_t>(checked[i])], &b = in_mujoco[i];
+    const auto successes = static_cast<double>(std::abs(a.successes - b.successes));
+    result.same_successes += successes == 0 ? 1 : 0;
+    result.largest_success_difference =
+        std::max(result.largest_success_difference, successes / config.episodes);
+    const double seconds = std::abs(a.swing_up_seconds - b.swing_up_seconds);
+    if (!std::isfinite(seconds)) continue;
+    ++result.both_succeed;
+    result.largest_swing_up_difference = std::max(result.largest_swing_up_difference, seconds);
+  }
+  return result;
 }
 
 std::string MapCsv(const MapResult& map) {

@@ -10,6 +10,14 @@
 
 namespace upswing {
 
+/// How far the engines agree on the cells that were repeated.
+struct MapAgreement {
+  int64_t cells = 0, same_successes = 0;   // cells, and those with as many successes
+  double largest_success_difference = 0;   // of the rates
+  int64_t both_succeed = 0;                // cells where both have successes
+  double largest_swing_up_difference = 0;  // of the medians of these, s
+};
+
 /// A finished map.
 struct MapResult {
   MapConfig config;
@@ -27,7 +35,7 @@ struct MapResult {
   double mean_success() const;     // rate over all episodes
   double always_success() const;   // share of the cells where every episode succeeds
   double median_swing_up() const;  // of the cells' medians, s; NaN if there are none
-  MapAgreement agreement() const;  // of the engines
+  MapAgreement agreement() const;
   /// What a cell without a failure implies, as text: `10 of 10: 95% interval 72.2% to 100%`.
   std::string success_interval() const;
 };

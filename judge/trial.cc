@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "core/text.h"
+#include "io/file.h"
 #include "io/run_folder.h"
 #include "mujoco/engines.h"
 #include "run/config_files.h"
@@ -39,14 +40,8 @@ fs::path DefaultOut(const LoadedPolicy& loaded, const std::string& name) {
   const bool has_file = !loaded.path.empty();
   const fs::path file = loaded.path, run = file.parent_path();
   const std::string stem = has_file ? file.stem().string() : loaded.policy->kind();
-  const fs::path first = has_file && fs::exists(run / RunFolder::kConfig)
-                             ? run / name
-                             : fs::path("runs") / Concat(name, "-", stem);
-  fs::path out = first;
-  for (int number = 2; fs::exists(fs::symlink_status(out)); ++number) {
-    out = Concat(first.string(), "-", number);
-  }
-  return out;
+  const bool of_run = has_file && fs::exists(run / RunFolder::kConfig);
+  return FreePath(of_run ? run / name : fs::path("runs") / Concat(name, "-", stem));
 }
 
 /// A state as --start gives it: a number for each state variable, such as q1,q2,w1,w2 (rad, rad/s).

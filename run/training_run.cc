@@ -20,14 +20,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A folder under runs/ that is not there yet.
-fs::path FreeRunFolder(const Config& config) {
-  const std::string base = Concat("runs/", config.agent, "-seed", config.train.seed);
-  fs::path path = base;
-  for (int i = 2; fs::exists(path); ++i) path = Concat(base, "-", i);
-  return path;
-}
-
 /// The time that this process has taken since the clock was made, of the wall and of its threads.
 class WorkClock {
  public:
@@ -58,7 +50,8 @@ TrainingRun::TrainingRun(fs::path path, const Config& config)
 
 std::unique_ptr<TrainingRun> TrainingRun::Make(const fs::path& out, Config config) {
   NameModelCopy(config);
-  const fs::path path = out.empty() ? FreeRunFolder(config) : out;
+  const fs::path usual = Concat("runs/", config.agent, "-seed", config.train.seed);
+  const fs::path path = out.empty() ? FreePath(usual) : out;
   std::unique_ptr<TrainingRun> run(new TrainingRun(path, config));
   const Config& made = run->training_.config();
   std::vector<std::pair<std::string, std::string>> files{

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/format.h"
 #include "core/text.h"
 #include "io/frames.h"
 

@@ -11,7 +11,6 @@
 #include "judge/rollout.h"
 #include "mujoco/offscreen.h"
 #include "mujoco/painter.h"
-#include "setup/loaded_policy.h"
 
 /// Policies at work, to be looked at: in a window or as a recording. What is shown are the states
 /// of the same episodes as `simulate` writes.
