@@ -1,12 +1,10 @@
 // A study: variants of the settings, each trained with many seeds.
 #include <algorithm>
-#include <memory>
 
 #include "apps/commands.h"
 #include "apps/compare_report.h"
 #include "apps/many_runs_view.h"
 #include "apps/say.h"
-#include "apps/slurm_view.h"
 #include "apps/study_work.h"
 #include "core/error.h"
 #include "core/text.h"
@@ -16,6 +14,7 @@
 #include "setup/config_checks.h"
 #include "study/many_runs.h"
 #include "study/seeds.h"
+#include "study/slurm.h"
 #include "study/study_file.h"
 #include "study/study_worker.h"
 
@@ -126,14 +125,9 @@ int RunStudy(const StudyArguments& arguments) {
   }
   if (arguments.print) return PrintSlurmScript(many.plan, arguments.slurm);
   CheckCanDraw();  // before hours of training, not after
-  std::unique_ptr<ManyRunsView> view;
-  if (arguments.on_slurm) {
-    CheckSlurm();
-    view = std::make_unique<SlurmView>(many, arguments.slurm);
-  } else {
-    view = std::make_unique<ManyRunsView>(many);
-  }
-  const int exit_code = TrainMany(many, *view);
+  if (arguments.on_slurm) CheckSlurm();
+  const int exit_code =
+      arguments.on_slurm ? TrainOnSlurmAndShow(many, arguments.slurm) : TrainManyAndShow(many);
   return exit_code != 0 ? exit_code : CompareStudy(many.plan);
 }
 

@@ -46,8 +46,7 @@ int RunSeeds(const TrainArguments& arguments) {
   many.jobs = arguments.jobs > 0 ? arguments.jobs : DefaultJobs(config.train.threads);
   many.more_steps = StepsGiven(arguments.flags);
   CheckMemory(config, AvailableMemory(), many.jobs);
-  ManyRunsView view(many);
-  return TrainMany(many, view);
+  return TrainManyAndShow(many);
 }
 
 /// Prints the settings that the training would have.

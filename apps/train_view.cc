@@ -23,29 +23,157 @@ namespace {
 class TrainView : public TrainObserver {
  public:
   /// A training, which must outlive this, from where it stands.
-  explicit TrainView(const Training& training);
+  explicit TrainView(const Training& training)
+      : training_(training),
+        begin_step_(training.state().steps),
+        since_step_(training.state().steps),
+        since_updates_(training.agent().updates()),
+        since_seconds_(training.state().seconds) {}
 
   /// Prints what is trained and where.
-  void Announce(const std::filesystem::path& run) const;
+  void Announce(const std::filesystem::path& run) const {
+    const Config& config = training_.config();
+    Say("Training {} (seed {}) in {}\n", config.agent, config.train.seed, Printable(run.string()));
+    Say("  {}, {} parameters; {} environments, {}\n", config.learner().Text(),
+        FormatCount(training_.policy()->num_parameters()), config.train.envs,
+        Counted(training_.threads(), "thread"));
+    if (!HasPlant(config.task)) Say("  task {}\n", config.task);
+    if (config.physics != kMuJoCo.name) Say("  physics {}\n", config.physics);
+    const std::optional<ModelInfo> model = InfoOfModel(config.mjcf, config.model);
+    if (model) Say("  model {}\n", model->Text());
+    const TrainingSize size = SizeOf(config);
+    constexpr double kGigabyte = 1e9;
+    if (size.memory > kGigabyte) {
+      Say("  up to {:.1f} GB of memory, and {:.1f} GB for the checkpoint on disk\n",
+          size.memory / kGigabyte, size.checkpoint / kGigabyte);
+    }
+    for (const std::string& warning : Warnings(config)) Say("  Warning: {}\n", warning);
+    if (since_step_ > 0) Say("  resuming at step {}\n", FormatCount(since_step_));
+    std::fflush(stdout);
+  }
 
-  void OnMetrics(const TrainState& s, const Metrics& metrics) override;
-  void OnEvaluation(const TrainState& s, const Evaluation& e) override;
+  void OnMetrics(const TrainState& s, const Metrics& metrics) override {
+    metrics_ = metrics;
+    UpdateRates(s);
+  }
+
+  void OnEvaluation(const TrainState& s, const Evaluation& e) override {
+    line_.Print(
+        fmt::format("{:>9} steps  {:>11}  {:>6} updates/s  {}  return {:6.0f}  success {:3}/{}",
+                    FormatCount(s.steps), FormatDuration(s.seconds), UpdatesText(),
+                    Join(AgentTexts(), "  "), e.reward_sum.mean, e.successes, e.episodes));
+  }
+
   /// Shows progress if it is time to; returns what signals request.
-  TrainRequest Poll();
+  TrainRequest Poll() {
+    if (line_.due()) ShowProgress(training_.state());
+    return PollSignals();
+  }
 
   /// Prints the result and the next commands to type. `finished`: the training was not stopped.
-  void Summarize(const std::filesystem::path& run, bool finished);
+  void Summarize(const std::filesystem::path& run, bool finished) {
+    const TrainState& s = training_.state();
+    const TrainConfig& config = training_.config().train;
+    line_.Clear();
+    PrintOutcome(finished);
+    const std::filesystem::path policy = run / RunFolder::kPolicy;
+    std::error_code error;
+    const bool has_policy = s.best_step > 0 && std::filesystem::exists(policy, error);
+    if (has_policy) {
+      const bool unconfirmed =
+          IsScreened(training_.config()) && !s.solved && s.best_success_rate == 1;
+      Say("Best policy: {} (step {}, success {:.0f}%{}, return {:.0f})\n",
+          Printable(policy.string()), FormatCount(s.best_step), 100 * s.best_success_rate,
+          unconfirmed ? " in closed form" : "", s.best_return);
+    } else if (s.best_step > 0) {
+      Say("Best policy: of step {}, but {} no longer exists\n", FormatCount(s.best_step),
+          Printable(policy.string()));
+    }
+    if (Printable(run.string()) != run.string()) return;  // such a name cannot be typed
+    const std::string folder = ShellQuoted(run.string());
+    Say("Next:\n");
+    if (has_policy) {
+      if (HasPlant(training_.config().task)) Say("  ./upswing demo {}\n", folder);
+      Say("  ./upswing eval {0}\n  ./upswing info {0}\n", folder);
+    }
+    std::string how;
+    if (finished && s.solved && config.stop_when_solved) how += " --no-stop-when-solved";
+    if (finished && s.steps >= config.steps) how += fmt::format(" --steps {}", 2 * s.steps);
+    Say("  ./upswing train --resume {}{}\n", folder, how);
+  }
 
  private:
-  void UpdateRates(const TrainState& state);
+  void UpdateRates(const TrainState& s) {
+    const double elapsed = s.seconds - since_seconds_;
+    const bool is_long = elapsed >= 0.5;
+    if (elapsed <= 0 || (rates_settled_ && !is_long)) return;
+    const int64_t updates = training_.agent().updates();
+    steps_per_second_ = static_cast<double>(s.steps - since_step_) / elapsed;
+    updates_per_second_ = static_cast<double>(updates - since_updates_) / elapsed;
+    if (!is_long) return;
+    rates_settled_ = true;
+    since_step_ = s.steps;
+    since_updates_ = updates;
+    since_seconds_ = s.seconds;
+  }
+
   /// The rate of updates as the lines show it.
-  std::string UpdatesText() const;
+  std::string UpdatesText() const {
+    return steps_per_second_ > 0 ? FormatCount(updates_per_second_) : "-";
+  }
+
   /// What the agent has to tell, such as `eps 0.05` and `loss 0.0012`.
-  std::vector<std::string> AgentTexts() const;
-  void ShowProgress(const TrainState& state);
+  std::vector<std::string> AgentTexts() const {
+    const bool learned = training_.agent().updates() > 0;
+    std::vector<std::string> texts;
+    for (const auto& [name, value] : metrics_) {
+      if (name == "alpha") texts.push_back(fmt::format("alpha {:.3f}", value));
+      if (name == "epsilon") texts.push_back(fmt::format("eps {:.2f}", value));
+      if (name == "std") texts.push_back(fmt::format("std {:.2f}", value));
+      if (name == "loss") {
+        texts.push_back(learned ? fmt::format("loss {:.4f}", value) : "loss      -");
+      }
+    }
+    return texts;
+  }
+
+  void ShowProgress(const TrainState& s) {
+    const int64_t steps_in_all = training_.config().train.steps;
+    const auto steps_left = static_cast<double>(steps_in_all - s.steps);
+    std::vector<std::string> fields{fmt::format("success {:.0f}%", 100 * s.last_success_rate),
+                                    fmt::format("return {:.0f}", s.mean_return())};
+    if (steps_per_second_ > 0) {
+      fields.insert(fields.begin(),
+                    fmt::format("at most {} left", FormatDuration(steps_left / steps_per_second_)));
+      fields.push_back(fmt::format("{} steps/s", FormatCount(steps_per_second_)));
+      fields.push_back(fmt::format("{} updates/s", UpdatesText()));
+    }
+    for (const std::string& text : AgentTexts()) fields.push_back(text);
+    line_.Show(static_cast<double>(s.steps) / static_cast<double>(steps_in_all), fields);
+  }
 
   /// Prints in one sentence how far the training is.
-  void PrintOutcome(bool finished) const;
+  void PrintOutcome(bool finished) const {
+    const TrainState& s = training_.state();
+    const TrainConfig& config = training_.config().train;
+    const bool did_nothing = begin_step_ > 0 && s.steps == begin_step_ && finished;
+    const bool all_steps_done = s.steps >= config.steps;
+    if (did_nothing && all_steps_done) {
+      Say("Nothing to do: all {} steps were done before (--steps is the total){}.\n",
+          FormatCount(config.steps), s.solved ? ", and it is solved" : "");
+    } else if (did_nothing) {
+      Say("Nothing to do: it was solved before, at step {} after {} of training, and stops when\n"
+          "solved. With --no-stop-when-solved it continues to step {} (--steps).\n",
+          FormatCount(s.streak_step), FormatDuration(s.streak_seconds), FormatCount(config.steps));
+    } else if (s.solved) {
+      Say("Solved after {} of training, at step {} (training so far: {}, {} steps).\n",
+          FormatDuration(s.streak_seconds), FormatCount(s.streak_step), FormatDuration(s.seconds),
+          FormatCount(s.steps));
+    } else {
+      Say("{} at step {} after {} of training; not solved yet.\n", finished ? "Done" : "Stopped",
+          FormatCount(s.steps), FormatDuration(s.seconds));
+    }
+  }
 
   const Training& training_;
   ProgressLine line_;
@@ -59,151 +187,6 @@ class TrainView : public TrainObserver {
   int64_t since_step_, since_updates_;
   double since_seconds_;
 };
-
-TrainView::TrainView(const Training& training)
-    : training_(training),
-      begin_step_(training.state().steps),
-      since_step_(training.state().steps),
-      since_updates_(training.agent().updates()),
-      since_seconds_(training.state().seconds) {}
-
-void TrainView::Announce(const std::filesystem::path& run) const {
-  const Config& config = training_.config();
-  Say("Training {} (seed {}) in {}\n", config.agent, config.train.seed, Printable(run.string()));
-  Say("  {}, {} parameters; {} environments, {}\n", config.learner().Text(),
-      FormatCount(training_.policy()->num_parameters()), config.train.envs,
-      Counted(training_.threads(), "thread"));
-  if (!HasPlant(config.task)) Say("  task {}\n", config.task);
-  if (config.physics != kMuJoCo.name) Say("  physics {}\n", config.physics);
-  const std::optional<ModelInfo> model = InfoOfModel(config.mjcf, config.model);
-  if (model) Say("  model {}\n", model->Text());
-  const TrainingSize size = SizeOf(config);
-  constexpr double kGigabyte = 1e9;
-  if (size.memory > kGigabyte) {
-    Say("  up to {:.1f} GB of memory, and {:.1f} GB for the checkpoint on disk\n",
-        size.memory / kGigabyte, size.checkpoint / kGigabyte);
-  }
-  for (const std::string& warning : Warnings(config)) Say("  Warning: {}\n", warning);
-  if (since_step_ > 0) Say("  resuming at step {}\n", FormatCount(since_step_));
-  std::fflush(stdout);
-}
-
-void TrainView::OnMetrics(const TrainState& s, const Metrics& metrics) {
-  metrics_ = metrics;
-  UpdateRates(s);
-}
-
-TrainRequest TrainView::Poll() {
-  if (line_.due()) ShowProgress(training_.state());
-  return PollSignals();
-}
-
-void TrainView::OnEvaluation(const TrainState& s, const Evaluation& e) {
-  line_.Print(
-      fmt::format("{:>9} steps  {:>11}  {:>6} updates/s  {}  return {:6.0f}  success {:3}/{}",
-                  FormatCount(s.steps), FormatDuration(s.seconds), UpdatesText(),
-                  Join(AgentTexts(), "  "), e.reward_sum.mean, e.successes, e.episodes));
-}
-
-void TrainView::UpdateRates(const TrainState& s) {
-  const double elapsed = s.seconds - since_seconds_;
-  const bool is_long = elapsed >= 0.5;
-  if (elapsed <= 0 || (rates_settled_ && !is_long)) return;
-  const int64_t updates = training_.agent().updates();
-  steps_per_second_ = static_cast<double>(s.steps - since_step_) / elapsed;
-  updates_per_second_ = static_cast<double>(updates - since_updates_) / elapsed;
-  if (!is_long) return;
-  rates_settled_ = true;
-  since_step_ = s.steps;
-  since_updates_ = updates;
-  since_seconds_ = s.seconds;
-}
-
-std::string TrainView::UpdatesText() const {
-  return steps_per_second_ > 0 ? FormatCount(updates_per_second_) : "-";
-}
-
-void TrainView::ShowProgress(const TrainState& s) {
-  const int64_t steps_in_all = training_.config().train.steps;
-  const auto steps_left = static_cast<double>(steps_in_all - s.steps);
-  std::vector<std::string> fields{fmt::format("success {:.0f}%", 100 * s.last_success_rate),
-                                  fmt::format("return {:.0f}", s.mean_return())};
-  if (steps_per_second_ > 0) {
-    fields.insert(fields.begin(),
-                  fmt::format("at most {} left", FormatDuration(steps_left / steps_per_second_)));
-    fields.push_back(fmt::format("{} steps/s", FormatCount(steps_per_second_)));
-    fields.push_back(fmt::format("{} updates/s", UpdatesText()));
-  }
-  for (const std::string& text : AgentTexts()) fields.push_back(text);
-  line_.Show(static_cast<double>(s.steps) / static_cast<double>(steps_in_all), fields);
-}
-
-std::vector<std::string> TrainView::AgentTexts() const {
-  const bool learned = training_.agent().updates() > 0;
-  std::vector<std::string> texts;
-  for (const auto& [name, value] : metrics_) {
-    if (name == "alpha") texts.push_back(fmt::format("alpha {:.3f}", value));
-    if (name == "epsilon") texts.push_back(fmt::format("eps {:.2f}", value));
-    if (name == "std") texts.push_back(fmt::format("std {:.2f}", value));
-    if (name == "loss") {
-      texts.push_back(learned ? fmt::format("loss {:.4f}", value) : "loss      -");
-    }
-  }
-  return texts;
-}
-
-void TrainView::PrintOutcome(bool finished) const {
-  const TrainState& s = training_.state();
-  const TrainConfig& config = training_.config().train;
-  const bool did_nothing = begin_step_ > 0 && s.steps == begin_step_ && finished;
-  const bool all_steps_done = s.steps >= config.steps;
-  if (did_nothing && all_steps_done) {
-    Say("Nothing to do: all {} steps were done before (--steps is the total){}.\n",
-        FormatCount(config.steps), s.solved ? ", and it is solved" : "");
-  } else if (did_nothing) {
-    Say("Nothing to do: it was solved before, at step {} after {} of training, and stops when\n"
-        "solved. With --no-stop-when-solved it continues to step {} (--steps).\n",
-        FormatCount(s.streak_step), FormatDuration(s.streak_seconds), FormatCount(config.steps));
-  } else if (s.solved) {
-    Say("Solved after {} of training, at step {} (training so far: {}, {} steps).\n",
-        FormatDuration(s.streak_seconds), FormatCount(s.streak_step), FormatDuration(s.seconds),
-        FormatCount(s.steps));
-  } else {
-    Say("{} at step {} after {} of training; not solved yet.\n", finished ? "Done" : "Stopped",
-        FormatCount(s.steps), FormatDuration(s.seconds));
-  }
-}
-
-void TrainView::Summarize(const std::filesystem::path& run, bool finished) {
-  const TrainState& s = training_.state();
-  const TrainConfig& config = training_.config().train;
-  line_.Clear();
-  PrintOutcome(finished);
-  const std::filesystem::path policy = run / RunFolder::kPolicy;
-  std::error_code error;
-  const bool has_policy = s.best_step > 0 && std::filesystem::exists(policy, error);
-  if (has_policy) {
-    const bool unconfirmed =
-        IsScreened(training_.config()) && !s.solved && s.best_success_rate == 1;
-    Say("Best policy: {} (step {}, success {:.0f}%{}, return {:.0f})\n", Printable(policy.string()),
-        FormatCount(s.best_step), 100 * s.best_success_rate, unconfirmed ? " in closed form" : "",
-        s.best_return);
-  } else if (s.best_step > 0) {
-    Say("Best policy: of step {}, but {} no longer exists\n", FormatCount(s.best_step),
-        Printable(policy.string()));
-  }
-  if (Printable(run.string()) != run.string()) return;  // such a name cannot be typed
-  const std::string folder = ShellQuoted(run.string());
-  Say("Next:\n");
-  if (has_policy) {
-    if (HasPlant(training_.config().task)) Say("  ./upswing demo {}\n", folder);
-    Say("  ./upswing eval {0}\n  ./upswing info {0}\n", folder);
-  }
-  std::string how;
-  if (finished && s.solved && config.stop_when_solved) how += " --no-stop-when-solved";
-  if (finished && s.steps >= config.steps) how += fmt::format(" --steps {}", 2 * s.steps);
-  Say("  ./upswing train --resume {}{}\n", folder, how);
-}
 
 }  // namespace
 

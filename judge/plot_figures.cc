@@ -82,13 +82,14 @@ class WrappingCurve {
   double low_, last_angle_ = 0, last_other_ = 0, last_turns_ = 0;
 };
 
-template <typename Y>
-Line OverTime(const std::string& name, const std::vector<Moment>& motion, Y y) {
+/// A curve through rows or moments.
+template <typename Samples, typename Y>
+Line OverTime(const std::string& name, const Samples& samples, Y y) {
   Line line;
   line.name = name;
-  for (const Moment& m : motion) {
+  for (const auto& m : samples) {
     line.x.push_back(m.t);
-    line.y.push_back(y(m.state));
+    line.y.push_back(y(m));
   }
   return line;
 }
@@ -128,10 +129,10 @@ Panel PanelOf(const std::string& y_label, std::vector<Line> lines) {
 }
 
 Panel Angles(const std::vector<Moment>& motion) {
-  Panel panel = PanelOf(
-      "angle (°)",
-      {AngleOverTime("link 1", motion, Link1), AngleOverTime("link 2, absolute", motion, Link2),
-       OverTime("upright", motion, [](const PendulumState&) { return 180.0; })});
+  Panel panel =
+      PanelOf("angle (°)", {AngleOverTime("link 1", motion, Link1),
+                            AngleOverTime("link 2, absolute", motion, Link2),
+                            OverTime("upright", motion, [](const Moment&) { return 180.0; })});
   panel.y_range = {kLinkLow, kLinkLow + 360};
   panel.y_tick = 90;
   return panel;
@@ -139,16 +140,15 @@ Panel Angles(const std::vector<Moment>& motion) {
 
 Panel Velocities(const std::vector<Moment>& motion) {
   return PanelOf("velocity (rad/s)",
-                 {OverTime("joint 1", motion, [](const PendulumState& s) { return s.w1; }),
-                  OverTime("joint 2", motion, [](const PendulumState& s) { return s.w2; })});
+                 {OverTime("joint 1", motion, [](const Moment& m) { return m.state.w1; }),
+                  OverTime("joint 2", motion, [](const Moment& m) { return m.state.w2; })});
 }
 
 Panel Energies(const std::vector<Moment>& motion, const Plant& plant) {
   const double target = EnergyTarget(plant);
-  return PanelOf(
-      "energy (J)",
-      {OverTime("energy", motion, [&](const PendulumState& s) { return Energy(plant, s); }),
-       OverTime("target", motion, [&](const PendulumState&) { return target; })});
+  return PanelOf("energy (J)", {OverTime("energy", motion,
+                                         [&](const Moment& m) { return Energy(plant, m.state); }),
+                                OverTime("target", motion, [&](const Moment&) { return target; })});
 }
 
 std::string TorqueLabel(const EnvSpec& spec) { return Concat("torque (", spec.action_unit, ")"); }
@@ -234,13 +234,9 @@ std::vector<Panel> StatePanels(const Rollout& rollout) {
   }
   std::vector<Panel> panels;
   for (size_t i = 0; i < rollout.spec.state_names.size(); ++i) {
-    Line line;
-    for (const RolloutRow& row : rollout.rows) {
-      line.x.push_back(row.t);
-      line.y.push_back(row.state[i]);
-    }
-    panels.push_back(PanelOf(
-        Concat(rollout.spec.state_names[i], " (", rollout.spec.state_units[i], ")"), {line}));
+    panels.push_back(
+        PanelOf(Concat(rollout.spec.state_names[i], " (", rollout.spec.state_units[i], ")"),
+                {OverTime("", rollout.rows, [i](const RolloutRow& row) { return row.state[i]; })}));
   }
   return panels;
 }
