@@ -70,20 +70,16 @@ int RunPlot(const PlotArguments& a) {
   const Rollout rollout = RunRollout(config);
 
   MakeNewFolder(folder);
-  Figure episode = EpisodeFigure(rollout, *loaded.policy);
-  std::vector<std::pair<std::string, Figure*>> figures{{"episode", &episode}};
-  Figure phase;
-  if (pendulum) {
-    phase = PhaseFigure(rollout);
-    figures.emplace_back("phase", &phase);
-  }
+  std::vector<std::pair<std::string, Figure>> figures{
+      {"episode", EpisodeFigure(rollout, *loaded.policy)}};
+  if (pendulum) figures.emplace_back("phase", PhaseFigure(rollout));
   std::vector<std::string> files;
-  for (const auto& [name, figure] : figures) {
-    figure->title = WithModel(loaded.name, model);
-    figure->caption = Caption(a, config, rollout, loaded);
+  for (auto& [name, figure] : figures) {
+    figure.title = WithModel(loaded.name, model);
+    figure.caption = Caption(a, config, rollout, loaded);
     for (const char* ending : {".svg", ".png"}) {
       const fs::path file = folder / Concat(name, ending);
-      Draw(*figure, file);
+      Draw(figure, file);
       files.push_back(Printable(file.string()));
     }
   }

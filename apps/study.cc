@@ -43,8 +43,7 @@ struct StudyArguments {
 void CheckSameStudy(const StudyPlan& plan, const std::string& title) {
   const fs::path file = plan.folder / kStudyName;
   const std::string where = file.string();
-  std::error_code error;
-  if (!fs::is_regular_file(file, error)) return;
+  if (!IsFile(file)) return;
   const StudyOutline before = ParseStudyOutline(ReadTextFile(file), where);
   if (before.title != title) {
     throw BadInput(Concat(where, ": made with title \"", before.title, "\", but the study says \"",

@@ -11,6 +11,7 @@
 #include "apps/signals.h"
 #include "core/format.h"
 #include "core/text.h"
+#include "io/file.h"
 #include "io/run_folder.h"
 #include "mujoco/engines.h"
 #include "run/model_info.h"
@@ -77,8 +78,7 @@ class TrainView : public TrainObserver {
     line_.Clear();
     PrintOutcome(finished);
     const std::filesystem::path policy = run / RunFolder::kPolicy;
-    std::error_code error;
-    const bool has_policy = s.best_step > 0 && std::filesystem::exists(policy, error);
+    const bool has_policy = s.best_step > 0 && Exists(policy);
     if (has_policy) {
       const bool unconfirmed =
           IsScreened(training_.config()) && !s.solved && s.best_success_rate == 1;

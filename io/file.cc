@@ -84,6 +84,21 @@ Error PathError(std::string_view what, const fs::path& path, int error_number) {
           Concat(what, " ", path.string(), ": ", std::strerror(error_number))};
 }
 
+bool Exists(const fs::path& path) {
+  std::error_code error;
+  return fs::exists(path, error);
+}
+
+bool IsFile(const fs::path& path) {
+  std::error_code error;
+  return fs::is_regular_file(path, error);
+}
+
+bool IsOwnFile(const fs::path& path) {
+  std::error_code error;
+  return fs::is_regular_file(fs::symlink_status(path, error));
+}
+
 std::vector<std::byte> ReadFile(const fs::path& path) {
   return ReadAll(Descriptor(open(path.c_str(), O_RDONLY | O_CLOEXEC)), path, false);
 }
@@ -115,9 +130,7 @@ void WriteFileAtomically(const fs::path& path, std::string_view text) {
 }
 
 void WriteIfOther(const fs::path& path, const std::string& text) {
-  std::error_code error;
-  const bool is_own = fs::is_regular_file(fs::symlink_status(path, error));
-  if (!is_own || ReadOwnFile(path) != text) WriteFileAtomically(path, text);
+  if (!IsOwnFile(path) || ReadOwnFile(path) != text) WriteFileAtomically(path, text);
 }
 
 void CheckNoLink(const fs::path& folder) {

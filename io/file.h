@@ -15,6 +15,12 @@
 
 namespace upswing {
 
+/// Whether something is there, a regular file, or one that is no link; false where that cannot be
+/// seen.
+bool Exists(const std::filesystem::path& path);
+bool IsFile(const std::filesystem::path& path);
+bool IsOwnFile(const std::filesystem::path& path);
+
 /// The whole file. Throws BadInput if it cannot be read.
 std::vector<std::byte> ReadFile(const std::filesystem::path& path);
 

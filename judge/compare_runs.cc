@@ -10,6 +10,7 @@
 #include "core/error.h"
 #include "core/format.h"
 #include "core/text.h"
+#include "io/file.h"
 #include "io/making.h"
 #include "io/run_folder.h"
 #include "run/config_files.h"
@@ -25,8 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 
 bool IsRun(const fs::path& folder) {
-  std::error_code error;
-  const auto has = [&](const char* name) { return fs::exists(folder / name, error); };
+  const auto has = [&](const char* name) { return Exists(folder / name); };
   return has(RunFolder::kConfig) && (has(RunFolder::kEvaluations) || has(RunFolder::kCheckpoint));
 }
 
@@ -42,10 +42,7 @@ std::optional<int64_t> SeedOf(const fs::path& path) {
 }
 
 /// Whether it is a run, or a study's of which no more than its result was kept.
-bool IsKept(const fs::path& run) {
-  std::error_code error;
-  return IsRun(run) || fs::is_regular_file(fs::symlink_status(DoneOf(run), error));
-}
+bool IsKept(const fs::path& run) { return IsRun(run) || IsOwnFile(DoneOf(run)); }
 
 /// Adds the run folders in a folder, at any depth; links are not followed.
 void AddRuns(const fs::path& folder, Found& found, std::vector<fs::path>& paths) {
@@ -71,15 +68,15 @@ void AddRuns(const fs::path& folder, Found& found, std::vector<fs::path>& paths)
 
 /// The run folders in a folder, in alphabetical order.
 std::vector<fs::path> RunsIn(const fs::path& folder, Found& found) {
-  std::error_code error;
   if (IsKept(folder)) return {folder};
-  if (!fs::exists(folder, error)) {
+  if (!Exists(folder)) {
     throw BadInput(
         Concat(folder.string(), ": expected a run folder, one that holds some, a policy's ",
                "file or a controller (", Join(ControllerNames(), ", "),
                "), got nothing of that name", DidYouMean(folder.string(), ControllerNames())));
   }
   std::vector<fs::path> paths;
+  std::error_code error;
   if (!fs::is_directory(folder, error)) {
     found.LeaveOut(folder, "expected a run folder or a policy.safetensors, got another file");
     return paths;

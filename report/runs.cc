@@ -33,15 +33,14 @@ std::vector<EvaluationRow> ParseEvaluations(std::string text, const std::string&
                                where);
   std::vector<EvaluationRow> rows;
   for (size_t i = 0; i < columns[0].values.size(); ++i) {
+    const auto cell = [&](size_t column) { return columns[column].values[i]; };
     constexpr double kMostSteps = 1e15;
-    if (!(columns[0].values[i] >= 0 && columns[0].values[i] <= kMostSteps)) {
+    if (!(cell(0) >= 0 && cell(0) <= kMostSteps)) {
       throw BadInput(Concat(where, ": row ", i + 1, ": expected a number of steps, got ",
-                            FormatNumber(columns[0].values[i])));
+                            FormatNumber(cell(0))));
     }
-    rows.push_back({static_cast<int64_t>(columns[0].values[i]), columns[1].values[i],
-                    columns[2].values[i], columns[3].values[i], columns[4].values[i],
-                    columns[5].values[i],
-                    columns[2].values[i] > 0 ? columns[6].values[i] : EvaluationRow::kUnknown});
+    rows.push_back({static_cast<int64_t>(cell(0)), cell(1), cell(2), cell(3), cell(4), cell(5),
+                    cell(2) > 0 ? cell(6) : EvaluationRow::kUnknown});
     if (i > 0 && (rows[i].step <= rows[i - 1].step || rows[i].seconds < rows[i - 1].seconds)) {
       throw BadInput(Concat(where, ": expected steps and seconds that rise, got ", rows[i - 1].step,
                             " and ", rows[i].step, " steps, ", FormatNumber(rows[i - 1].seconds),

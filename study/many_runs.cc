@@ -27,8 +27,7 @@ constexpr const char* kWorkersLog = "workers.log";
 /// The last line that is not empty.
 std::string LastLine(const fs::path& path) {
   std::string last = "its log is empty";
-  std::error_code error;
-  const std::string text = fs::is_regular_file(path, error) ? ReadOwnFile(path) : "";
+  const std::string text = IsFile(path) ? ReadOwnFile(path) : "";
   for (const std::string_view line : Split(text, '\n')) {
     if (!line.empty()) last = line;
   }
@@ -40,8 +39,7 @@ std::string LastLine(const fs::path& path) {
 
 /// Throws unless the folder is free or holds what `mark` stands for.
 void CheckFolder(const fs::path& folder, const fs::path& mark) {
-  std::error_code error;
-  if (fs::is_regular_file(folder / mark, error)) return;
+  if (IsFile(folder / mark)) return;
   CheckFree(folder, Concat("it has no ", mark.string(), " to resume from; choose another --out"));
 }
 
@@ -67,7 +65,7 @@ void CheckRuns(const fs::path& folder, const Config& config, bool more_steps) {
   const std::string mark = SettingsMark(config);
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     if (IsMakingName(entry.path().filename().string())) continue;
-    if (!fs::is_regular_file(entry.path() / RunFolder::kConfig, error)) continue;
+    if (!IsFile(entry.path() / RunFolder::kConfig)) continue;
     const auto done = FinishedRun::Read(entry.path().string() + ".done");
     const bool same = done && done->settings == mark && done->version == UPSWING_VERSION &&
                       done->planned_steps == config.train.steps &&
@@ -75,7 +73,7 @@ void CheckRuns(const fs::path& folder, const Config& config, bool more_steps) {
     if (!same) CheckSame(ReadRunConfig(entry.path()), config, more_steps, entry.path().string());
   }
   const fs::path settings = folder / kSettingsName;
-  if (!fs::is_regular_file(settings, error)) return;
+  if (!IsFile(settings)) return;
   CheckSame(BuildConfig(settings, {}), config, more_steps, settings.string());
 }
 
@@ -176,15 +174,14 @@ class LocalWorkers {
     waiting_ = 0;
     for (auto it = open_.begin(); it != open_.end() && waiting_ < kEnough;) {
       SeedRun& run = **it;
-      std::error_code error;
-      if (fs::exists(run.done(), error) || run.HasFailed()) run.Refresh();
+      if (Exists(run.done()) || run.HasFailed()) run.Refresh();
       if (run.finished || !run.problem.empty()) {
         it = open_.erase(it);
         observer_.End(run);
         continue;
       }
       const bool until_now = stopping_ && std::ranges::find(before, &run) != before.end();
-      if (until_now || fs::exists(run.claim(), error)) {
+      if (until_now || Exists(run.claim())) {
         running_.push_back(&run);
       } else {
         ++waiting_;
@@ -234,9 +231,8 @@ FolderLock Prepare(const ManyRuns& many, const std::function<void()>& checked) {
   const StudyPlan& plan = many.plan;
   const bool is_study = !many.mark_file.empty();
   CheckFolder(plan.folder, is_study ? fs::path(many.mark_file) : fs::path(kSettingsName));
-  std::error_code error;
   std::optional<FolderLock> lock;
-  if (fs::exists(plan.folder, error)) lock.emplace(plan.folder);
+  if (Exists(plan.folder)) lock.emplace(plan.folder);
   for (const Variant& variant : plan.variants) {
     const fs::path folder = plan.folder / variant.name;
     if (!variant.name.empty()) CheckNoLink(folder);

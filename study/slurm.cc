@@ -155,8 +155,7 @@ SlurmArray SlurmArray::Submit(const fs::path& folder, const std::string& script)
 
 std::optional<SlurmArray> SlurmArray::LastOf(const fs::path& folder) {
   const fs::path path = SlurmFolder(folder) / kNumberName;
-  std::error_code error;
-  if (!fs::is_regular_file(fs::symlink_status(path, error))) return std::nullopt;
+  if (!IsOwnFile(path)) return std::nullopt;
   return Parse(ReadOwnFile(path, 1000));
 }
 

@@ -25,8 +25,7 @@ constexpr size_t kMostVariants = 10'000, kMostPlanBytes = 1 << 24;
 
 /// The end of a file, at most so many bytes; empty if it is no regular file.
 std::string TailOf(const fs::path& path, std::streamoff bytes) {
-  std::error_code error;
-  if (!fs::is_regular_file(fs::symlink_status(path, error))) return "";
+  if (!IsOwnFile(path)) return "";
   std::ifstream file(path, std::ios::binary | std::ios::ate);
   if (!file) return "";
   const std::streamoff size = file.tellg();
@@ -145,8 +144,7 @@ void WritePlan(const StudyPlan& plan) {
 StudyPlan ReadPlan(const fs::path& folder) {
   const fs::path path = folder / kPlanName;
   const std::string where = path.string();
-  std::error_code error;
-  if (!fs::exists(path, error)) {
+  if (!Exists(path)) {
     throw BadInput(
         Concat(folder.string(), ": expected the folder of a study, got one without ", kPlanName));
   }
