@@ -84,7 +84,7 @@ void PrintFigure(const RunFigure& figure, const Scores& scores, const std::strin
 void PrintGroup(const RunGroup& group, const std::string& task) {
   const GroupSummary& s = group.summary;
   std::vector<int64_t> seeds;
-  for (const RunRecord& run : group.runs) seeds.push_back(run.seed);
+  for (const RunRecord& run : group.runs) seeds.push_back(run.config.train.seed);
   fmt::print("{}\n", Printable(group.label));
   if (!task.empty()) fmt::print("  {:<16}{}\n", "task", Printable(task));
   if (!group.differences.empty()) {
@@ -93,11 +93,11 @@ void PrintGroup(const RunGroup& group, const std::string& task) {
   fmt::print("  {:<16}{} ({})\n", "seeds", group.runs.size(), SeedsText(seeds));
   fmt::print("  {:<16}{} of {} (95% {} to {})\n", "solved", s.solved, group.runs.size(),
              Percent(s.solved_interval.low), Percent(s.solved_interval.high));
-  const RunRecord& run = group.runs.front();
+  const EnvSpec spec = group.runs.front().config.Spec();
   for (const RunFigure& figure : RunFigures()) {
     const bool upright = figure.scores == &GroupSummary::upright_variation;
-    if (upright && run.rule.by_return()) continue;
-    PrintFigure(figure, s.*figure.scores, run.action_unit);
+    if (upright && spec.evaluation.by_return()) continue;
+    PrintFigure(figure, s.*figure.scores, spec.action_unit);
   }
   PrintStability(s);
   fmt::print("\n");
@@ -166,7 +166,7 @@ ordered_json GroupJson(const RunGroup& group) {
   j["group"] = group.label;
   for (const RunRecord& run : group.runs) {
     j["runs"].push_back({{"path", run.path.string()},
-                         {"seed", run.seed},
+                         {"seed", run.config.train.seed},
                          {"steps", run.evaluations.back().step},
                          {"seconds", run.evaluations.back().seconds},
                          {"finished", Finished(run)}});

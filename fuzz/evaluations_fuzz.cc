@@ -1,11 +1,11 @@
 // The table of a run's evaluations, as `compare` and `export` read it.
 #include "fuzz/target.h"
-#include "report/runs.h"
+#include "run/run_record.h"
 
 namespace upswing {
 
 bool TryInput(std::string_view input) {
-  RunRecord run{"", 1, 1000000, 32, 10000, true, {20, 10, 10, 0}};
+  RunRecord run{"", Config(), ""};
   // The last line of an unfinished run may be cut off; that of others must be whole.
   const bool whole =
       Accepts([&] { run.evaluations = ParseEvaluations(std::string(input), kInputName, false); });

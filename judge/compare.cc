@@ -8,8 +8,8 @@
 #include "core/text.h"
 #include "io/file.h"
 #include "judge/compare_runs.h"
+#include "judge/learning_curve.h"
 #include "mujoco/engines.h"
-#include "report/learning_curve.h"
 #include "run/find_policy.h"
 #include "setup/task.h"
 #include "setup/training.h"
@@ -61,7 +61,7 @@ std::string RunsCsv(const std::vector<RunGroup>& groups) {
       const RunRecord& run = group.runs[k];
       csv.Add("group", group.label);
       csv.Add("run", run.path.string());
-      csv.Add("seed", run.seed);
+      csv.Add("seed", run.config.train.seed);
       csv.Add("steps", run.evaluations.back().step);
       csv.Add("seconds", run.evaluations.back().seconds);
       for (const RunFigure& figure : RunFigures()) {
@@ -104,13 +104,12 @@ std::vector<EnvConfig> FinalEvaluations(const Comparison& comparison, int task) 
   std::vector<EnvConfig> evaluations;
   std::set<std::pair<int64_t, int64_t>> seen;  // seed and step
   int64_t episodes = 0;
-  for (size_t i = 0; i < comparison.groups.size(); ++i) {
-    if (comparison.groups[i].task != task) continue;
-    Config config = *comparison.configs[i];
-    for (const RunRecord& run : comparison.groups[i].runs) {
-      config.train.seed = run.seed;
+  for (const RunGroup& group : comparison.groups) {
+    if (group.task != task) continue;
+    for (const RunRecord& run : group.runs) {
+      const Config& config = run.config;
       const int64_t step = run.evaluations.back().step;
-      if (!seen.emplace(run.seed, step).second) continue;
+      if (!seen.emplace(config.train.seed, step).second) continue;
       episodes += config.train.eval_episodes;
       if (!evaluations.empty() && episodes > kMostJudged) return evaluations;
       EnvConfig& env = evaluations.emplace_back(EvaluationEnvironments(config, step));

@@ -1,15 +1,13 @@
 #pragma once
 
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <vector>
 
 #include "core/progress.h"
 #include "core/thread_pool.h"
-#include "report/comparison.h"
+#include "judge/comparison.h"
 #include "rl/evaluate.h"
-#include "setup/config.h"
 #include "setup/loaded_policy.h"
 
 /// Groups of runs, and policies and controllers beside them: these have no seeds and nothing to
@@ -50,8 +48,6 @@ struct Comparison {
   std::vector<PairSummary> pairs;       // each group with each one before it
   std::vector<std::string> task_texts;  // of each task: the settings in which not all agree
   std::vector<std::string> notes;       // remarks, a line each
-  // Of each group: the settings, in which its runs differ by seed and by what makes no other run.
-  std::vector<std::shared_ptr<const Config>> configs;
   std::vector<JudgedPolicy> policies;
   std::vector<AgainstPolicy> against;  // each group with each policy on its task
 };

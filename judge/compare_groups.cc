@@ -16,13 +16,36 @@ namespace {
 
 constexpr size_t kLongText = 48;  // longer ones are not shown
 
-/// The content of the model of its training and evaluations; kBuiltIn for the built-in one.
-const std::string& ModelOf(const RunRecord& f) { return f.settings.back().second; }
+/// As the name of a setting: the content of the model.
+constexpr const char* kModelContent = "model";
+
+/// Name (`section.key`) and value of each setting of all algorithms that decides the training, and
+/// of the model's content: in one order, so that any two runs can be compared.
+using Settings = std::vector<std::pair<std::string, std::string>>;
+
+Settings SettingsOf(Config config) {
+  Settings settings;
+  config.model.clear();  // a model is what is in its file, not where that lies: see below
+  Config scratch;
+  const Options own = OptionsOf(config), all = EverySetting(scratch);
+  for (const Option& every : all.all()) {
+    const Option* found = own.Get(every.name);
+    const std::string name = Concat(every.section, ".", every.name);
+    if (found == nullptr || found->decides != Option::Decides::kTraining) {
+      settings.emplace_back(name, "none");
+      continue;
+    }
+    const auto* text = std::get_if<std::string*>(&found->target);
+    settings.emplace_back(name, text != nullptr ? **text : found->text());
+  }
+  settings.emplace_back(kModelContent, ModelContent(config.mjcf));
+  return settings;
+}
 
 /// What its group is called.
-std::string LabelOf(const RunRecord& f) {
-  return Concat(f.variant.empty() ? f.agent : f.variant,
-                ModelOf(f) == kBuiltIn ? "" : ", other model");
+std::string LabelOf(const RunRecord& run) {
+  return Concat(run.variant.empty() ? run.config.agent : run.variant,
+                run.config.mjcf.empty() ? "" : ", other model");
 }
 
 /// Whether a setting belongs to the task that a policy is evaluated on, and not to its training or
@@ -38,17 +61,16 @@ bool IsTask(const std::string& name) {
 /// Whether a setting counts.
 using Wanted = bool (*)(const std::string& name);
 
-/// The settings of a run in which not all of `others` agree with it, such as `hidden [64, 64], head
-/// 32`.
+/// The settings in which not all of `others` agree, such as `hidden [64, 64], head 32`.
 std::string Differences(
-    const RunRecord& of, const std::vector<const RunRecord*>& others,
+    const Settings& settings, const std::vector<const Settings*>& others,
     Wanted wanted = [](const std::string& name) { return name != "train.agent"; }) {
   std::vector<std::string> parts;
-  for (size_t i = 0; i < of.settings.size(); ++i) {
-    const std::string& name = of.settings[i].first;
-    const std::string& value = of.settings[i].second;  // clang 14 captures no structured binding
+  for (size_t i = 0; i < settings.size(); ++i) {
+    const std::string& name = settings[i].first;
+    const std::string& value = settings[i].second;  // clang 14 captures no structured binding
     const bool differs = std::ranges::any_of(
-        others, [&](const RunRecord* other) { return other->settings[i].second != value; });
+        others, [&](const Settings* other) { return (*other)[i].second != value; });
     if (!differs || !wanted(name)) continue;
     const std::string key = name.substr(name.find('.') + 1);
     parts.push_back(value.size() < kLongText ? Concat(key, " ", value) : key);
@@ -56,24 +78,23 @@ std::string Differences(
   return Join(parts, ", ");
 }
 
-/// Says of each group how it differs from the others, and gives those of one name a second one:
-/// their differences among each other, or a number where these are many.
-void TellGroupsApart(std::vector<RunGroup>& groups) {
-  std::vector<const RunRecord*> all;  // a run of each
-  std::map<std::string, std::vector<const RunRecord*>> namesakes;
-  for (const RunGroup& group : groups) {
-    all.push_back(&group.runs.front());
-    namesakes[group.label].push_back(&group.runs.front());
+/// Says of each group (`settings` are theirs) how it differs from the others, and gives those of
+/// one name a second one: their differences among each other, or a number where these are many.
+void TellGroupsApart(std::vector<RunGroup>& groups, const std::vector<Settings>& settings) {
+  std::vector<const Settings*> all;
+  std::map<std::string, std::vector<const Settings*>> namesakes;
+  for (size_t i = 0; i < groups.size(); ++i) {
+    all.push_back(&settings[i]);
+    namesakes[groups[i].label].push_back(&settings[i]);
   }
   std::map<std::string, int> count;
-  for (RunGroup& group : groups) {
-    std::string& label = group.label;
-    const RunRecord& run = group.runs.front();
-    group.differences = Differences(run, all);
+  for (size_t i = 0; i < groups.size(); ++i) {
+    std::string& label = groups[i].label;
+    groups[i].differences = Differences(settings[i], all);
     const auto& same_name = namesakes[label];
     if (same_name.size() == 1) continue;
     const int number = ++count[label];
-    const std::string differences = Differences(run, same_name);
+    const std::string differences = Differences(settings[i], same_name);
     label += differences.empty() || differences.size() > kLongText ? Concat(" #", number)
                                                                    : Concat(" (", differences, ")");
   }
@@ -87,9 +108,10 @@ void NotePlans(const std::vector<RunGroup>& groups, std::vector<std::string>& no
     std::set<int64_t> budgets;
     std::set<bool> stops;
     for (const RunRecord& run : group.runs) {
-      budgets.insert(run.steps);
-      stops.insert(run.stop_when_solved);
-      of_all.emplace(run.steps, run.stop_when_solved);
+      const TrainConfig& train = run.config.train;
+      budgets.insert(train.steps);
+      stops.insert(train.stop_when_solved);
+      of_all.emplace(train.steps, train.stop_when_solved);
     }
     if (budgets.size() > 1) {
       notes.push_back(fmt::format("{}: the runs have different budgets, {} to {} steps",
@@ -116,7 +138,7 @@ void NotePlans(const std::vector<RunGroup>& groups, std::vector<std::string>& no
 
 /// Whether runs that should take the same time had different shares of their processors.
 void NoteLoads(const std::vector<RunRecord>& runs, std::vector<std::string>& notes) {
-  std::map<std::pair<std::vector<Setting>, std::set<int64_t>>, std::vector<double>> busy;
+  std::map<std::pair<std::string, std::set<int64_t>>, std::vector<double>> busy;
   for (const RunRecord& run : runs) {
     const RunConditions& c = run.conditions;
     if (c.busy) busy[{run.settings, c.threads}].push_back(*c.busy);
@@ -140,7 +162,7 @@ void NoteTimes(const std::vector<RunRecord>& runs, std::vector<std::string>& not
   std::set<int64_t> intervals;
   for (const RunRecord& f : runs) {
     const RunConditions& c = f.conditions;
-    intervals.insert(f.eval_every);
+    intervals.insert(f.config.train.eval_every);
     for (const int64_t count : c.threads) ++threads[count];
     for (const std::string& name : c.processors) processors.insert(Printable(name));
     for (const std::string& name : c.vectors) vectors.insert(Printable(name));
@@ -172,19 +194,18 @@ void NoteTimes(const std::vector<RunRecord>& runs, std::vector<std::string>& not
   }
 }
 
-/// Numbers the tasks that groups are evaluated on, in their order.
-void TellTasksApart(Comparison& comparison) {
-  std::vector<const RunRecord*> tasks;  // a run of each
-  for (RunGroup& group : comparison.groups) {
-    const RunRecord& run = group.runs.front();
-    const auto same = [&](const RunRecord* other) {
-      return Differences(run, {other}, IsTask).empty();
+/// Numbers the tasks that groups (`settings` are theirs) are evaluated on, in their order.
+void TellTasksApart(Comparison& comparison, const std::vector<Settings>& settings) {
+  std::vector<const Settings*> tasks;  // of a group on each
+  for (size_t i = 0; i < settings.size(); ++i) {
+    const auto same = [&](const Settings* other) {
+      return Differences(settings[i], {other}, IsTask).empty();
     };
     const auto at = std::ranges::find_if(tasks, same);
-    group.task = static_cast<int>(at - tasks.begin());
-    if (at == tasks.end()) tasks.push_back(&run);
+    comparison.groups[i].task = static_cast<int>(at - tasks.begin());
+    if (at == tasks.end()) tasks.push_back(&settings[i]);
   }
-  for (const RunRecord* task : tasks) {
+  for (const Settings* task : tasks) {
     comparison.task_texts.push_back(Differences(*task, tasks, IsTask));
   }
 }
@@ -210,6 +231,7 @@ Comparison GroupRuns(const CompareRequest& request) {
   }
   Comparison comparison;
   std::vector<RunGroup>& groups = comparison.groups;
+  std::vector<Settings> settings;  // of each group
   for (const RunRecord& run : found.runs) {
     const auto same = [&](const RunGroup& group) {
       return group.runs.front().settings == run.settings;
@@ -217,20 +239,22 @@ Comparison GroupRuns(const CompareRequest& request) {
     auto at = std::ranges::find_if(groups, same);
     if (at == groups.end()) {
       at = groups.insert(at, {LabelOf(run), {}});
-      comparison.configs.push_back(found.configs.at(run.path));
+      settings.push_back(SettingsOf(run.config));
     }
     at->runs.push_back(run);
   }
-  for (RunGroup& group : groups) std::ranges::sort(group.runs, {}, &RunRecord::seed);
-  TellGroupsApart(groups);
-  TellTasksApart(comparison);
+  for (RunGroup& group : groups) {
+    std::ranges::sort(group.runs, {}, [](const RunRecord& run) { return run.config.train.seed; });
+  }
+  TellGroupsApart(groups, settings);
+  TellTasksApart(comparison, settings);
   comparison.notes = found.notes;
   NotePlans(groups, comparison.notes);
   for (const RunGroup& group : groups) {
-    const std::string& model = ModelOf(group.runs.front());
-    if (model == kBuiltIn) continue;
-    comparison.notes.push_back(
-        Concat(group.label, ": on a model that is not the ", "built-in one (content ", model, ")"));
+    const std::string& mjcf = group.runs.front().config.mjcf;
+    if (mjcf.empty()) continue;
+    comparison.notes.push_back(Concat(group.label, ": on a model that is not the ",
+                                      "built-in one (content ", ModelContent(mjcf), ")"));
   }
   NoteTimes(found.runs, comparison.notes);
   NoteTasks(comparison, request.different_tasks);

@@ -92,37 +92,6 @@ std::vector<fs::path> RunsIn(const fs::path& folder, Found& found) {
   return paths;
 }
 
-std::vector<Setting> SettingsOf(Config config) {
-  std::vector<Setting> settings;
-  config.model.clear();  // a model is what is in its file, not where that lies: see below
-  // Those of all algorithms in one order, so that any two runs can be compared.
-  Config scratch;
-  const Options own = OptionsOf(config), all = EverySetting(scratch);
-  for (const Option& every : all.all()) {
-    const Option* found = own.Get(every.name);
-    const std::string name = Concat(every.section, ".", every.name);
-    if (found == nullptr || found->decides != Option::Decides::kTraining) {
-      settings.emplace_back(name, "none");
-      continue;
-    }
-    const auto* text = std::get_if<std::string*>(&found->target);
-    settings.emplace_back(name, text != nullptr ? **text : found->text());
-  }
-  settings.emplace_back(kModelContent, ModelContent(config.mjcf));  // the last one, for ModelOf
-  return settings;
-}
-
-/// What a configuration says of a run, which has no evaluations yet.
-RunRecord Describe(const fs::path& path, const Config& config) {
-  const TrainConfig& t = config.train;
-  const EnvSpec spec = config.Spec();
-  RunRecord run{path, t.seed, t.steps, t.envs, t.eval_every, t.stop_when_solved, spec.evaluation};
-  run.action_unit = spec.action_unit;
-  run.agent = config.agent;
-  run.settings = SettingsOf(config);
-  return run;
-}
-
 /// Reads runs, those of studies that are done from their result files.
 class RunReader {
  public:
@@ -143,11 +112,10 @@ class RunReader {
                             (path.parent_path() / kSettingsName).string()));
     }
     if (!run) {
-      const auto config = std::make_shared<const Config>(ReadRunConfig(path));
-      run = Describe(path, *config);
+      run = RunRecord{path, ReadRunConfig(path), ""};
+      run->settings = SettingsMark(run->config);
       run->conditions = RunConditions::Of(path);
       run->evaluations = ReadEvaluations(path, request_.unfinished);
-      found_.configs[path] = config;
     }
     // STUDY/VARIANT/seed1: the variant has a name of its own.
     const fs::path below =
@@ -159,13 +127,6 @@ class RunReader {
   }
 
  private:
-  /// A variant of a study: what all of its seeds have in common.
-  struct VariantRuns {
-    std::shared_ptr<const Config> config;
-    RunRecord common;
-    std::string mark;
-  };
-
   /// From a run's result file; nothing if there is none, or if the run went on since.
   std::optional<RunRecord> ReadDone(const fs::path& path) {
     const auto seed = SeedOf(path);
@@ -177,33 +138,30 @@ class RunReader {
     if (fs::exists(table, error) && fs::file_size(table, error) != done->evaluations.size()) {
       return std::nullopt;
     }
-    const VariantRuns& variant = Of(path.parent_path());
-    if (variant.mark != done->settings) return std::nullopt;
-    RunRecord run = variant.common;
+    RunRecord run = VariantIn(path.parent_path());
+    if (run.settings != done->settings) return std::nullopt;
     run.path = path;
-    run.seed = *seed;
-    run.steps = done->planned_steps;
-    run.stop_when_solved = done->stop_when_solved;
+    run.config.train.seed = *seed;
+    run.config.train.steps = done->planned_steps;
+    run.config.train.stop_when_solved = done->stop_when_solved;
     run.conditions = done->conditions;
     run.evaluations = ParseEvaluations(done->evaluations, DoneOf(path).string(), false);
-    found_.configs[path] = variant.config;
     return run;
   }
 
-  const VariantRuns& Of(const fs::path& folder) {
+  /// What all seeds of a variant have in common.
+  const RunRecord& VariantIn(const fs::path& folder) {
     const auto at = variants_.find(folder);
     if (at != variants_.end()) return at->second;
-    Config config = BuildConfig(folder / kSettingsName, {});
-    MakeReadyForMany(config);
-    return variants_
-        .emplace(folder, VariantRuns{std::make_shared<const Config>(config),
-                                     Describe(folder, config), SettingsMark(config)})
-        .first->second;
+    RunRecord run{folder, BuildConfig(folder / kSettingsName, {}), ""};
+    MakeReadyForMany(run.config);
+    run.settings = SettingsMark(run.config);
+    return variants_.emplace(folder, std::move(run)).first->second;
   }
 
   const CompareRequest& request_;
   Found& found_;
-  std::map<fs::path, VariantRuns> variants_;
+  std::map<fs::path, RunRecord> variants_;
 };
 
 /// Reads all runs; what cannot be read is left out.
@@ -239,12 +197,14 @@ int64_t LastStep(const RunRecord& run) {
 
 /// Of runs that are the same training, keeps the one that went furthest, of equals the first.
 void DropDuplicates(Found& found) {
-  const auto key = [](const RunRecord& run) { return std::pair(run.seed, run.settings); };
+  const auto key = [](const RunRecord& run) {
+    return std::pair(run.config.train.seed, run.settings);
+  };
   struct Furthest {
     fs::path path;
     int64_t step;
   };
-  std::map<std::pair<int64_t, std::vector<Setting>>, Furthest> furthest;
+  std::map<std::pair<int64_t, std::string>, Furthest> furthest;
   for (const RunRecord& run : found.runs) {
     const int64_t step = LastStep(run);
     const auto [at, is_new] = furthest.try_emplace(key(run), Furthest{run.path, step});
@@ -254,7 +214,7 @@ void DropDuplicates(Found& found) {
     const fs::path& kept = furthest.at(key(run)).path;
     if (run.path == kept) return false;
     found.LeaveOut(run.path, Concat("the same training as ", kept.string(),
-                                    " (all settings and seed ", run.seed, ")"));
+                                    " (all settings and seed ", run.config.train.seed, ")"));
     return true;
   });
 }
@@ -270,7 +230,7 @@ void LeaveOutUnfinished(Found& found, bool unfinished) {
     }
     const std::string how_far =
         fmt::format("is unfinished, evaluated up to step {} of {}",
-                    FormatCount(run.evaluations.back().step), FormatCount(run.steps));
+                    FormatCount(run.evaluations.back().step), FormatCount(run.config.train.steps));
     if (unfinished) {
       found.notes.push_back(Concat(run.path.string(), ": ", how_far));
     } else {

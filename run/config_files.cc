@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/checksum.h"
 #include "core/error.h"
 #include "core/text.h"
 #include "io/file.h"
@@ -64,6 +65,19 @@ void MakeReadyForMany(Config& config) {
 std::string CompleteToml(Config config) {
   if (!config.model.empty()) config.model = fs::absolute(config.model).string();
   return ConfigToml(config, false);
+}
+
+std::string SettingsMark(const Config& config) {
+  Config own = config;
+  own.model.clear();  // a model is what is in its file, not where that lies
+  Checksum sum;
+  const Options options = OptionsOf(own);
+  for (const Option& option : options.all()) {
+    if (option.decides != Option::Decides::kTraining) continue;
+    sum.Update(BytesOf(Concat(option.section, ".", option.name, "=", option.text(), "\n")));
+  }
+  sum.Update(BytesOf(own.mjcf));
+  return sum.Hex();
 }
 
 Plant ChangedPlant(const Plant& base, const std::string& model, const std::vector<std::string>& set,

@@ -26,6 +26,10 @@ void MakeReadyForMany(Config& config);
 /// ConfigToml with comments, for a file that may lie anywhere: the model's path is absolute.
 std::string CompleteToml(Config config);
 
+/// What identifies the settings of trainings, but for seed, steps and whether they stop when
+/// solved: a checksum.
+std::string SettingsMark(const Config& config);
+
 /// The plant to try something on: `base`, or that of the model file if there is one, with the
 /// given changes ("mass2=1.2"). Reads the model into `mjcf`. Throws BadInput.
 Plant ChangedPlant(const Plant& base, const std::string& model, const std::vector<std::string>& set,

@@ -4,7 +4,6 @@
 #include <array>
 #include <fstream>
 
-#include "core/checksum.h"
 #include "core/error.h"
 #include "core/json.h"
 #include "core/text.h"
@@ -107,19 +106,6 @@ std::vector<SeedRun> RunsOf(const StudyPlan& plan) {
     }
   }
   return runs;
-}
-
-std::string SettingsMark(const Config& config) {
-  Config own = config;
-  own.model.clear();  // a model is what is in its file, not where that lies
-  Checksum sum;
-  const Options options = OptionsOf(own);
-  for (const Option& option : options.all()) {
-    if (option.decides != Option::Decides::kTraining) continue;
-    sum.Update(BytesOf(Concat(option.section, ".", option.name, "=", option.text(), "\n")));
-  }
-  sum.Update(BytesOf(own.mjcf));
-  return sum.Hex();
 }
 
 void WritePlan(const StudyPlan& plan) {

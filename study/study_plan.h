@@ -73,10 +73,6 @@ struct SeedRun {
 /// read.
 std::vector<SeedRun> RunsOf(const StudyPlan& plan);
 
-/// What identifies the settings of trainings, but for seed, steps and whether they stop when
-/// solved: a checksum.
-std::string SettingsMark(const Config& config);
-
 /// Writes the plan into its folder: plan.json, and the settings of each variant in
 /// VARIANT/settings.toml, with the model where it is not the built-in one.
 void WritePlan(const StudyPlan& plan);

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "report/comparison.h"
+#include "judge/comparison.h"
 #include "report/figure.h"
 
 namespace upswing {

@@ -1,4 +1,4 @@
-#include "report/learning_curve.h"
+#include "judge/learning_curve.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "report/runs.h"
+#include "run/run_record.h"
 
 #include "core/csv.h"
 #include "core/error.h"
@@ -52,12 +52,14 @@ std::vector<EvaluationRow> ParseEvaluations(std::string text, const std::string&
 }
 
 std::optional<size_t> SolvedAt(const RunRecord& run) {
+  const TrainConfig& train = run.config.train;
+  const EvaluationRule rule = run.config.Spec().evaluation;
   int64_t streak = 0;
   size_t first = 0;
   for (size_t i = 0; i < run.evaluations.size(); ++i) {
     const EvaluationRow& row = run.evaluations[i];
-    if (!IsDue(row.step - run.envs, row.step, run.eval_every)) continue;
-    const bool solved = CountsAsSolved(run.rule.Passed(row.success_rate, row.mean_return), streak);
+    if (!IsDue(row.step - train.envs, row.step, train.eval_every)) continue;
+    const bool solved = CountsAsSolved(rule.Passed(row.success_rate, row.mean_return), streak);
     if (streak == 1) first = i;
     if (solved) return first;
   }
@@ -66,8 +68,8 @@ std::optional<size_t> SolvedAt(const RunRecord& run) {
 
 bool Finished(const RunRecord& run) {
   if (run.evaluations.empty()) return false;
-  return IsFinished(run.evaluations.back().step, run.steps, SolvedAt(run).has_value(),
-                    run.stop_when_solved);
+  return IsFinished(run.evaluations.back().step, run.config.train.steps, SolvedAt(run).has_value(),
+                    run.config.train.stop_when_solved);
 }
 
 }  // namespace upswing

@@ -1,10 +1,10 @@
-#include "report/learning_curve.h"
+#include "judge/learning_curve.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "report/testing.h"
+#include "run/testing.h"
 
 namespace upswing {
 namespace {

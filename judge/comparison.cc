@@ -1,4 +1,4 @@
-#include "report/comparison.h"
+#include "judge/comparison.h"
 
 #include <algorithm>
 #include <cmath>
@@ -27,8 +27,9 @@ double SolveSteps(const RunRecord& run) {
 
 /// The evaluation whose policy the run kept.
 const EvaluationRow& Best(const RunRecord& run) {
+  const EvaluationRule rule = run.config.Spec().evaluation;
   return *std::ranges::max_element(run.evaluations, {}, [&](const EvaluationRow& row) {
-    return run.rule.Score(row.success_rate, row.mean_return);
+    return rule.Score(row.success_rate, row.mean_return);
   });
 }
 

@@ -5,6 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include "run/run_record.h"
+
 /// What tests of comparisons share.
 namespace upswing {
 
@@ -12,8 +14,13 @@ namespace upswing {
 /// evaluation for each pair of success rate and return.
 inline RunRecord MadeRun(int64_t seed, const std::vector<std::pair<double, double>>& evaluations,
                          int64_t budget = 5000, bool stop_when_solved = true) {
-  constexpr EvaluationRule kRule{20, 10, 10, 0};  // by success
-  RunRecord run{"run" + std::to_string(seed), seed, budget, 8, 1000, stop_when_solved, kRule};
+  RunRecord run{"run" + std::to_string(seed), Config(), ""};
+  TrainConfig& train = run.config.train;
+  train.seed = seed;
+  train.steps = budget;
+  train.envs = 8;
+  train.eval_every = 1000;
+  train.stop_when_solved = stop_when_solved;
   for (const auto& [success, mean_return] : evaluations) {
     const auto k = static_cast<int64_t>(run.evaluations.size()) + 1;
     run.evaluations.push_back({1000 * k, static_cast<double>(k), success, mean_return});

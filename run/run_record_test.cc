@@ -1,11 +1,11 @@
-#include "report/runs.h"
+#include "run/run_record.h"
 
 #include <gtest/gtest.h>
 
 #include "core/error.h"
 #include "io/file.h"
 #include "io/testing.h"
-#include "report/testing.h"
+#include "run/testing.h"
 
 namespace upswing {
 namespace {

@@ -5,11 +5,10 @@
 #include <limits>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
-#include "core/evaluation_rule.h"
 #include "io/run_conditions.h"
+#include "setup/config.h"
 
 namespace upswing {
 
@@ -26,21 +25,14 @@ struct EvaluationRow {
   static constexpr double kUnknown = std::numeric_limits<double>::infinity();
 };
 
-/// Name (`section.key`) and value of a setting; that of the model's content is kModelContent.
-using Setting = std::pair<std::string, std::string>;
-
 /// A training, read from its folder or from its result file.
 struct RunRecord {
   std::filesystem::path path;
-  int64_t seed = 0, steps = 0;       // steps: the budget
-  int64_t envs = 0, eval_every = 0;  // parallel environments; steps between two evaluations
-  bool stop_when_solved = false;
-  EvaluationRule rule;                          // of the task
-  std::string action_unit = "N·m";              // of its torques
+  Config config;
+  std::string settings;                         // SettingsMark
   std::vector<EvaluationRow> evaluations = {};  // in the order of their steps
-  std::string agent = {}, variant = {};  // its named agent; its name within a study, or empty
-  std::vector<Setting> settings = {};    // those that distinguish trainings, without the seed
-  RunConditions conditions = {};         // what its times depend on
+  RunConditions conditions = {};                // what its times depend on
+  std::string variant = {};                     // its name within a study, or empty
 };
 
 /// Reads evals.csv of a run folder; a file that does not exist yet is an empty table. Throws

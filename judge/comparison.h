@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "core/sample.h"
-#include "report/runs.h"
 #include "report/statistics.h"
+#include "run/run_record.h"
 
 namespace upswing {
 

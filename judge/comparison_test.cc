@@ -1,10 +1,10 @@
-#include "report/comparison.h"
+#include "judge/comparison.h"
 
 #include <gtest/gtest.h>
 
 #include <limits>
 
-#include "report/testing.h"
+#include "run/testing.h"
 
 namespace upswing {
 namespace {
