@@ -60,7 +60,8 @@ class CommandLine {
   void Footer(const std::string& text);
   /// Adds a check that is made before anything else once all arguments are known.
   void Check(std::function<void()> check);
-  /// Sets what the command does; it returns the exit code. Returns its arguments, to be declared.
+  /// Sets the function that runs the command and returns the exit code. Returns the arguments that
+  /// it will get, which the caller declares.
   template <typename Arguments>
   std::remove_cvref_t<Arguments>& Runs(int (*run)(Arguments)) {
     const auto arguments = std::make_shared<std::remove_cvref_t<Arguments>>();

@@ -145,8 +145,8 @@ void PrintAgainst(const Comparison& comparison, const AgainstPolicy& against) {
              EstimateText(against.difference, Signed));
 }
 
-// JSON has null for a number that is not finite, as of what is not reached.
-
+/// JSON writes null for a number that is not finite, such as the time to solve of a run that never
+/// did.
 ordered_json EstimateJson(const Estimate& e) {
   ordered_json j{{"value", e.value}, {"interval_95", nullptr}};
   if (e.interval) j["interval_95"] = {e.interval->low, e.interval->high};

@@ -24,7 +24,7 @@ struct CsvColumn {
 std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::string>& names,
                                const std::string& where);
 
-/// A CSV text in the making. The names of the first row's cells are its first line.
+/// Builds a CSV text. The names of the first row's cells become its first line.
 class CsvTable {
  public:
   /// Adds a cell to the row: a text, in quotes where a reader needs them, or a number. A number

@@ -15,8 +15,8 @@
 
 namespace upswing {
 
-/// Whether something is there, a regular file, or one that is no link; false where that cannot be
-/// seen.
+/// Whether the path exists, is a regular file, or is a regular file and no link; false if that
+/// cannot be found out.
 bool Exists(const std::filesystem::path& path);
 bool IsFile(const std::filesystem::path& path);
 bool IsOwnFile(const std::filesystem::path& path);
@@ -61,7 +61,7 @@ void WriteNamedFile(const std::filesystem::path& path, std::string_view text);
 void CheckFree(const std::filesystem::path& folder,
                std::string_view advice = "choose another --out");
 
-/// `path`, or with -2, -3, … behind it where that is taken.
+/// `path` if nothing is there, else the first free one of `path`-2, `path`-3, ….
 std::filesystem::path FreePath(const std::filesystem::path& path);
 
 /// Makes a folder and its missing parents. Throws as PathError does.

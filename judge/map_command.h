@@ -14,7 +14,7 @@ namespace upswing {
 /// How a map of a policy is asked for: its axes, and what is on neither of them.
 struct MapArguments {
   std::string x = "mass2=-50%:+50%", y = "length2=-50%:+50%", out;
-  TrialArguments trial;  // what is set may also be sensors, motor and the start
+  TrialArguments trial;  // its `set` may also name noise, delay and the start
   int64_t episodes = 0;  // in a cell; 0: as many as are usual
   double check = 0.02;   // share of the cells to repeat in MuJoCo
 

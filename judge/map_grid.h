@@ -51,7 +51,7 @@ struct MapConfig {
   MapAxis x, y;              // (nx), (ny)
   bool start_given = false;  // episodes begin at the point's start, else hanging with usual noise
   int episodes = 1;          // in a cell
-  PendulumEnvConfig env;     // all else; its seed is that of the choice of cells to check, too
+  PendulumEnvConfig env;     // the rest; its seed also draws the cells to check
 
   int64_t cells() const { return static_cast<int64_t>(x.values.size() * y.values.size()); }
   /// What cell `i` sets; cells go along x first.

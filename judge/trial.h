@@ -24,8 +24,8 @@ struct TrialArguments {
   int64_t seed = 0;
   bool unknown_plant = false;
   bool known_plant = false;  // a controller is made anew for each episode's plant; eval alone
-  // Of the single episode that `simulate`, `plot` and `view` make: where it starts, or which one of
-  // `eval` it is (negative: none of them).
+  // The single episode of `simulate`, `plot` and `view`: its start, or its number in `eval`
+  // (negative: it is none of those).
   std::optional<std::string> start;
   int64_t episode = -1;
 
