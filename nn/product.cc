@@ -3,6 +3,8 @@
 // read along its rows or its columns.
 #include "nn/product.h"
 
+#include <algorithm>
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "nn/product.cc"
 #include <hwy/foreach_target.h>  // includes this file once for each target
@@ -27,6 +29,7 @@ constexpr int kRegisters = 16;
 constexpr int kTileRows = 6;
 constexpr int kRegisters = 12;
 #endif
+constexpr int kWidestTile = 8;  // registers in a row
 
 /// Calls `f(row, register)` for each register of a tile.
 template <int kRows, int kVectors, typename F>
@@ -38,16 +41,20 @@ HWY_INLINE void ForTile(const F& f) {
   }
 }
 
-/// The tile of C at (m, n); if kPartial it has one register in a row, of which `count` numbers.
+/// The tile of C at (m, n); if kPartial, the last register of a row has `count` numbers.
 template <int kRows, int kVectors, bool kPartial>
 HWY_INLINE void MultiplyTile(const Product& p, int m, int n, size_t count) {
   const Tag d;
   const int lanes = static_cast<int>(hn::Lanes(d));
+  // Register v of a row of numbers.
+  const auto load = [&](const Real* row, int v) HWY_ATTR {
+    return kPartial && v == kVectors - 1 ? Load<kPartial>(row + v * lanes, count)
+                                         : hn::LoadU(d, row + v * lanes);
+  };
   Vec c[kRows][kVectors];
   HWY_UNROLL(16)
   for (int v = 0; v < kVectors; ++v) {
-    const Vec start =
-        p.bias == nullptr ? hn::Zero(d) : Load<kPartial>(p.bias + n + v * lanes, count);
+    const Vec start = p.bias == nullptr ? hn::Zero(d) : load(p.bias + n, v);
     HWY_UNROLL(16)
     for (int i = 0; i < kRows; ++i) c[i][v] = start;
   }
@@ -57,7 +64,7 @@ HWY_INLINE void MultiplyTile(const Product& p, int m, int n, size_t count) {
   for (int k = 0; k < p.K; ++k) {
     Vec b_row[kVectors];
     HWY_UNROLL(16)
-    for (int v = 0; v < kVectors; ++v) b_row[v] = Load<kPartial>(b + v * lanes, count);
+    for (int v = 0; v < kVectors; ++v) b_row[v] = load(b, v);
     HWY_UNROLL(16)
     for (int i = 0; i < kRows; ++i) {
       const Vec a_ik = hn::Set(d, a[i * p.a_m]);
@@ -77,39 +84,53 @@ HWY_INLINE void MultiplyTile(const Product& p, int m, int n, size_t count) {
     const Real* gate = &p.gate(m, n);
     const ptrdiff_t stride = p.gate.stride();
     ForTile<kRows, kVectors>([&](int i, int v) HWY_ATTR {
-      const Vec open = Load<kPartial>(gate + i * stride + v * lanes, count);
+      const Vec open = load(gate + i * stride, v);
       c[i][v] = hn::IfThenElseZero(hn::Gt(open, hn::Zero(d)), c[i][v]);
     });
   }
   Real* to = &p.c(m, n);
   const ptrdiff_t stride = p.c.stride();
-  ForTile<kRows, kVectors>(
-      [&](int i, int v) HWY_ATTR { Store<kPartial>(c[i][v], to + i * stride + v * lanes, count); });
+  ForTile<kRows, kVectors>([&](int i, int v) HWY_ATTR {
+    if (kPartial && v == kVectors - 1) {
+      Store<kPartial>(c[i][v], to + i * stride + v * lanes, count);
+    } else {
+      hn::StoreU(c[i][v], d, to + i * stride + v * lanes);
+    }
+  });
 }
 
-/// Rows m to `end` of C, from column n on as far as tiles of kRows × kVectors registers go; returns
-/// the first column after them.
+/// Rows m to `end` of C, from column n on: tiles of kRows × `vectors` registers, `vectors` at most
+/// kVectors, and then a narrower one for the remaining columns.
 template <int kRows, int kVectors>
-int MultiplyColumns(const Product& p, int m, int end, int n) {
-  const int step = kVectors * static_cast<int>(hn::Lanes(Tag()));
-  for (; n + step <= p.N; n += step) {
+void MultiplyColumns(const Product& p, int m, int end, int n, int vectors) {
+  if constexpr (kVectors > 1) {
+    if (vectors < kVectors) return MultiplyColumns<kRows, kVectors - 1>(p, m, end, n, vectors);
+  }
+  const int lanes = static_cast<int>(hn::Lanes(Tag()));
+  for (; n + kVectors * lanes <= p.N; n += kVectors * lanes) {
     for (int i = m; i < end; i += kRows) MultiplyTile<kRows, kVectors, false>(p, i, n, 0);
   }
-  return n;
+  const int rest = (p.N - n + lanes - 1) / lanes;
+  if constexpr (kVectors > 1) {
+    if (rest > 0 && rest < kVectors) {
+      return MultiplyColumns<kRows, kVectors - 1>(p, m, end, n, rest);
+    }
+  }
+  if (rest == 0) return;
+  const size_t count = static_cast<size_t>(p.N - n - 1) % hn::Lanes(Tag()) + 1;
+  for (int i = m; i < end; i += kRows) MultiplyTile<kRows, kVectors, true>(p, i, n, count);
 }
 
 /// All of C from row m on that can be cut into tiles of kRows rows; returns the first row after.
 template <int kRows>
 int MultiplyRows(const Product& p, int m) {
-  constexpr int kVectors = kRegisters / kRows;
+  // As few tiles as registers allow, of about equal width: narrow ones have too few sums in flight.
+  constexpr int kVectors = std::min(kRegisters / kRows, kWidestTile);
+  const int lanes = static_cast<int>(hn::Lanes(Tag()));
+  const int vectors = (p.N + lanes - 1) / lanes;
+  const int tiles = (vectors + kVectors - 1) / kVectors;
   const int end = m + (p.M - m) / kRows * kRows;
-  int n = MultiplyColumns<kRows, kVectors>(p, m, end, 0);
-  if constexpr (kVectors > 4) n = MultiplyColumns<kRows, 4>(p, m, end, n);
-  n = MultiplyColumns<kRows, 1>(p, m, end, n);
-  if (n < p.N) {
-    const auto count = static_cast<size_t>(p.N - n);
-    for (int i = m; i < end; i += kRows) MultiplyTile<kRows, 1, true>(p, i, n, count);
-  }
+  if (end > m) MultiplyColumns<kRows, kVectors>(p, m, end, 0, (vectors + tiles - 1) / tiles);
   return end;
 }
 
@@ -219,7 +240,6 @@ void Multiply(const Product& p) {
 #endif
   m = MultiplyRows<kTileRows>(p, m);
   m = MultiplyRows<4>(p, m);
-  m = MultiplyRows<3>(p, m);
   m = MultiplyRows<2>(p, m);
   MultiplyRows<1>(p, m);
 }
