@@ -2,8 +2,8 @@
 
 #include <cstdint>
 #include <span>
-#include <vector>
 
+#include "core/aligned.h"
 #include "core/archive.h"
 
 namespace upswing {
@@ -30,8 +30,8 @@ class SumTree {
   void State(const Archive& archive, int64_t count, Bounds<double> bounds);
 
  private:
-  size_t leaves_;              // a power of two
-  std::vector<double> nodes_;  // (2 · leaves): the root is 1, the children of i are 2i and 2i + 1
+  size_t leaves_;                // a power of two
+  AlignedVector<double> nodes_;  // (2 · leaves): the root is 1, the children of i are 2i and 2i + 1
 };
 
 }  // namespace upswing
