@@ -22,7 +22,7 @@ void Adam::Step(const Size& size, std::span<const float> gradient, std::span<flo
                 std::span<float> target, ThreadPool& pool) {
   constexpr double kBeta1 = 0.9;
   constexpr double kBeta2 = 0.999;
-  constexpr size_t kChunk = 8192;  // numbers in a task
+  constexpr size_t kChunk = 2048;  // numbers in a task
 
   if (!std::isfinite(size.gradient_norm)) {
     throw Failure(
