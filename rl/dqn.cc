@@ -46,7 +46,6 @@ Dqn::Dqn(const DqnConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
       D_(spec.obs_size),
       B_(static_cast<int>(config.batch)),
       torques_(TorquesOf(config, spec)),
-      pool_(pool),
       online_(config.Shape(D_, static_cast<int>(torques_.size())), B_,
               Rng(seed, "initial parameters")),
       theta_target_(online_.theta().begin(), online_.theta().end()),

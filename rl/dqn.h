@@ -55,7 +55,6 @@ class Dqn : public OffPolicyAgent {
   DqnConfig config_;
   int D_, B_;
   std::vector<double> torques_;  // (A)
-  ThreadPool& pool_;
 
   TrainedNetwork online_;
   AlignedVector<float> theta_target_, theta_policy_;  // θ⁻; average of θ that is judged: policy_tau

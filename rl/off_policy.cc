@@ -12,7 +12,8 @@ namespace upswing {
 
 OffPolicyAgent::OffPolicyAgent(const OffPolicyConfig& config, const EnvSpec& spec,
                                const ActionSpace& actions, uint64_t seed, ThreadPool& pool)
-    : explore_rng_(seed, "exploration"),
+    : pool_(pool),
+      explore_rng_(seed, "exploration"),
       act_action_(static_cast<size_t>(spec.num_envs) * actions.size),
       td_error_(config.batch),
       settings_(config),
@@ -75,15 +76,21 @@ int64_t OffPolicyAgent::updates_due() const {
 
 void OffPolicyAgent::Learn() {
   while (updates_ < updates_due()) {
-    if (settings_.prioritized) {
-      replay_.SamplePrioritized(sample_rng_, importance_exponent(), batch_);
-    } else {
-      replay_.Sample(sample_rng_, batch_);
-    }
-    if (settings_.mirror) MirrorHalf(sample_rng_, mirror_signs_, action_space_, batch_);
-    update_threads_.Run([&] { Update(batch_); });
+    update_threads_.Run([&] {
+      SampleBatch();
+      Update(batch_);
+    });
     if (settings_.prioritized) replay_.Prioritize(batch_, td_error_, settings_.priority_exponent);
   }
+}
+
+void OffPolicyAgent::SampleBatch() {
+  if (settings_.prioritized) {
+    replay_.SamplePrioritized(sample_rng_, importance_exponent(), pool_, batch_);
+  } else {
+    replay_.Sample(sample_rng_, batch_);
+  }
+  if (settings_.mirror) MirrorHalf(sample_rng_, mirror_signs_, action_space_, batch_);
 }
 
 void OffPolicyAgent::CountErrors(double loss, double q, double td_error) {

@@ -52,6 +52,7 @@ class OffPolicyAgent : public Agent {
   /// BadInput, too, if they contradict each other.
   void SharedState(const Archive& archive);
 
+  ThreadPool& pool_;
   Rng explore_rng_;
   std::vector<float> act_action_;  // (N × A) of the last Act
   std::vector<float> td_error_;    // (B) of the last Update: Q(s, a) - y, or its size
@@ -60,6 +61,8 @@ class OffPolicyAgent : public Agent {
 
  private:
   int64_t updates_due() const;
+  /// Draws a minibatch.
+  void SampleBatch();
 
   OffPolicyConfig settings_;
   ThreadTuner update_threads_;

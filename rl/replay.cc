@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/text.h"
+#include "rl/trained_network.h"
 
 namespace upswing {
 namespace {
@@ -72,16 +73,16 @@ Transition Replay::at(int64_t index) const {
           rest[action_size()], rest[action_size() + 1]};
 }
 
-void Replay::Gather(Minibatch& batch) const {
+void Replay::Gather(RowRange rows, Minibatch& batch) const {
   // The memory is larger than any cache: prefetch all rows instead of waiting for each.
-  for (const int64_t index : batch.index) {
+  for (const int64_t index : Part(batch.index, rows)) {
     const float* row = rows_.data() + index * row_size();
     constexpr size_t kLine = 16;  // floats in a line of the cache
     for (size_t at = 0; at < row_size() + kLine; at += kLine) {
       __builtin_prefetch(row + std::min(at, row_size() - 1));
     }
   }
-  for (size_t i = 0; i < batch.index.size(); ++i) {
+  for (int i = rows.first; i < rows.first + rows.count; ++i) {
     const Transition t = at(batch.index[i]);
     std::ranges::copy(t.obs, batch.obs.data() + i * obs_size_);
     std::ranges::copy(t.next_obs, batch.next_obs.data() + i * obs_size_);
@@ -95,19 +96,21 @@ void Replay::Sample(Rng& rng, Minibatch& batch) const {
   for (int64_t& index : batch.index) {
     index = static_cast<int64_t>(rng.Below(static_cast<uint64_t>(size())));
   }
-  Gather(batch);
+  Gather({0, batch.size()}, batch);
   std::ranges::fill(batch.weight, 1.0F);
 }
 
-void Replay::SamplePrioritized(Rng& rng, double beta, Minibatch& batch) const {
+void Replay::SamplePrioritized(Rng& rng, double beta, ThreadPool& pool, Minibatch& batch) const {
   const size_t B = batch.reward.size();
   const double part = priorities_->total() / static_cast<double>(B);
   double smallest = largest_priority_;
   std::vector<double> masses(B);
   for (size_t i = 0; i < B; ++i) masses[i] = part * (static_cast<double>(i) + rng.Uniform());
-  priorities_->Find(masses, batch.index);
+  ForSlices(pool, batch.size(), [&](RowRange rows) {
+    priorities_->Find(Part(masses, rows), Part(batch.index, rows));
+    Gather(rows, batch);
+  });
   for (const int64_t index : batch.index) smallest = std::min(smallest, priority(index));
-  Gather(batch);
   // N and Σ p cancel in the ratio to the largest weight, that of the smallest priority.
   for (size_t i = 0; i < B; ++i) {
     batch.weight[i] = static_cast<float>(std::pow(smallest / priority(batch.index[i]), beta));

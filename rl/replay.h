@@ -9,6 +9,8 @@
 #include "core/archive.h"
 #include "core/matrix.h"
 #include "core/rng.h"
+#include "core/thread_pool.h"
+#include "nn/layer.h"
 #include "rl/sum_tree.h"
 
 namespace upswing {
@@ -75,7 +77,7 @@ class Replay {
   /// Draws transition i with P(i) = p_i / Σ p, one from each of B equal parts of the sum. Its
   /// weight is (N · P(i))^-β, N = size(), over the largest of the minibatch (Section 3.4). `beta`
   /// is β.
-  void SamplePrioritized(Rng& rng, double beta, Minibatch& batch) const;
+  void SamplePrioritized(Rng& rng, double beta, ThreadPool& pool, Minibatch& batch) const;
 
   /// Sets the priorities of the minibatch's transitions. Stored is p = (|TD error| + 1e-6)^α, the
   /// paper's p^α (Section 3.3); `alpha` is α. A new transition has the largest so far.
@@ -92,8 +94,8 @@ class Replay {
  private:
   size_t row_size() const { return 2 * obs_size_ + action_size() + 2; }
   size_t action_size() const { return static_cast<size_t>(actions_.size); }  // A
-  /// Copies the transitions of batch.index into the minibatch.
-  void Gather(Minibatch& batch) const;
+  /// Copies the transitions of batch.index into these rows of the minibatch.
+  void Gather(RowRange rows, Minibatch& batch) const;
 
   int64_t capacity_;
   size_t obs_size_;

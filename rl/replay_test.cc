@@ -71,12 +71,13 @@ TEST(Replay, AMillionTransitionsOfThePendulumFitIn100Megabytes) {
 }
 
 TEST(Replay, DrawsByPriorityAndWeighsAsThePaperDoes) {
+  ThreadPool pool(2);
   Replay replay(4, 2, kNine, true);
   for (int i = 0; i < 4; ++i) replay.Add(Numbered(i).transition);
   // Before any update all are drawn with the same probability, and have weight 1.
   Rng rng(1, "replay test");
   Minibatch batch(4, 2);
-  replay.SamplePrioritized(rng, 0.5, batch);
+  replay.SamplePrioritized(rng, 0.5, pool, batch);
   EXPECT_EQ(batch.index, (std::vector<int64_t>{0, 1, 2, 3}));
   EXPECT_EQ(batch.weight[2], 1);
 
@@ -87,7 +88,7 @@ TEST(Replay, DrawsByPriorityAndWeighsAsThePaperDoes) {
   constexpr int rounds = 10000;
   constexpr double beta = 0.7;
   for (int round = 0; round < rounds; ++round) {
-    replay.SamplePrioritized(rng, beta, batch);
+    replay.SamplePrioritized(rng, beta, pool, batch);
     double largest = 0;
     for (const int64_t i : batch.index) largest = std::max(largest, std::pow(i + 1, -beta));
     for (size_t i = 0; i < 4; ++i) {
@@ -116,6 +117,7 @@ TEST(Replay, ANewTransitionHasTheLargestPrioritySoFar) {
 }
 
 TEST(Replay, LoadedPrioritiesDrawTheSame) {
+  ThreadPool pool(2);
   Replay saved(5, 2, kNine, true), loaded(5, 2, kNine, true);
   for (int i = 0; i < 7; ++i) saved.Add(Numbered(i).transition);
   Minibatch batch(3, 2), other(3, 2);
@@ -126,8 +128,8 @@ TEST(Replay, LoadedPrioritiesDrawTheSame) {
   for (Replay* replay : {&saved, &loaded}) replay->Add(Numbered(7).transition);
   Rng rng(1, "replay test"), other_rng(1, "replay test");
   for (int round = 0; round < 100; ++round) {
-    saved.SamplePrioritized(rng, 0.5, batch);
-    loaded.SamplePrioritized(other_rng, 0.5, other);
+    saved.SamplePrioritized(rng, 0.5, pool, batch);
+    loaded.SamplePrioritized(other_rng, 0.5, pool, other);
     ASSERT_EQ(batch.index, other.index);
     ASSERT_EQ(batch.weight, other.weight);
   }

@@ -19,7 +19,6 @@ Sac::Sac(const SacConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
       B_(static_cast<int>(config.batch)),
       action_limit_(spec.action_limit),
       bins_(static_cast<int>(config.bins), config.value_low, config.value_high),
-      pool_(pool),
       noise_rng_(seed, "policy noise"),
       actor_(config.Shape(D_, 2 * A_), B_, Rng(seed, "initial actor")),
       theta_policy_(actor_.theta().begin(), actor_.theta().end()),

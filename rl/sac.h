@@ -93,7 +93,6 @@ class Sac : public OffPolicyAgent {
   int D_, A_, B_;
   std::vector<double> action_limit_;  // (A)
   ValueBins bins_;
-  ThreadPool& pool_;
   Rng noise_rng_;
 
   TrainedNetwork actor_;
