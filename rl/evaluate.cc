@@ -123,7 +123,8 @@ double MiddleOf(double value) { return value; }
 double MiddleOf(const Moments& moments) { return moments.mean; }
 double MiddleOf(const Quartiles& quartiles) { return quartiles.median; }
 
-/// Acts for all environments, in slices that a pool can share.
+/// Acts for all environments, in slices that a pool can share. Calls `before(i)` for each
+/// environment i first.
 class SharedActing {
  public:
   SharedActing(const Policy& policy, int num_envs, ThreadPool* pool)
@@ -138,10 +139,12 @@ class SharedActing {
     }
   }
 
-  void operator()(Matrix<const float> obs, Matrix<double> action) {
+  template <typename Before>
+  void operator()(Matrix<const float> obs, Matrix<double> action, const Before& before) {
     ParallelFor(pool_, static_cast<int>(memories_.size()), [&](int slice) {
       const int first = slice * size_;
       const int count = std::min(size_, obs.rows() - first);
+      for (int i = first; i < first + count; ++i) before(i);
       policy_.Act(obs.Rows(first, count), action.Rows(first, count),
                   *memories_[static_cast<size_t>(slice)]);
     });
@@ -280,21 +283,26 @@ std::vector<EvaluationEpisode> EvaluateEpisodes(const Policy& policy, VectorEnv&
 
   ThreadTuner tuner(pool);
   const int64_t steps = StepsIn(spec.evaluation.seconds, spec);
-  for (int64_t k = 1; k <= steps; ++k) {
-    // Before the step: after the last one an environment that timed out has been reset.
-    for (int i = 0; i < n; ++i) tallies[static_cast<size_t>(i)].SeeLean(env, i);
+  bool ended = false;
+  for (int64_t k = 1; k <= steps && !ended; ++k) {
     tuner.Run([&] {
-      act(env.obs(), action);
-      env.Step(action, result);
+      act(env.obs(), action, [&](int i) {
+        if (k > 1) tallies[i].Add(result, i);
+        // Before the step: after the last one an environment that timed out has been reset.
+        tallies[i].SeeLean(env, i);
+      });
+      ended = std::ranges::all_of(tallies, &EpisodeTally::ended);
+      if (!ended) env.Step(action, result);
     });
-    for (int i = 0; i < n; ++i) tallies[static_cast<size_t>(i)].Add(result, static_cast<size_t>(i));
     if (progress) progress(n * static_cast<double>(k) / static_cast<double>(steps), n);
-    if (std::ranges::all_of(tallies, &EpisodeTally::ended)) break;
   }
 
   std::vector<EvaluationEpisode> episodes;
   episodes.reserve(tallies.size());
-  for (EpisodeTally& tally : tallies) episodes.push_back(tally.Finish());
+  for (int i = 0; i < n; ++i) {
+    tallies[i].Add(result, i);
+    episodes.push_back(tallies[i].Finish());
+  }
   return episodes;
 }
 

@@ -118,7 +118,7 @@ ValueUnits ValueUnitsOf(const Policy& policy);
 
 /// Lets `policy` control every environment from its present state for as long as the task's rule
 /// says, and returns one result for each. Episodes must not time out earlier. The pool shares the
-/// forward passes, which changes no bit. `progress` counts episodes.
+/// work, which changes no bit. `progress` counts episodes.
 std::vector<EvaluationEpisode> EvaluateEpisodes(const Policy& policy, VectorEnv& env,
                                                 ThreadPool* pool = nullptr,
                                                 const Progress& progress = {});

@@ -53,7 +53,7 @@ struct ClosedFormBatch {
 };
 
 /// The kernels may split a batch at multiples of this many environments.
-inline constexpr size_t kClosedFormChunk = 64;
+inline constexpr size_t kClosedFormChunk = 48;
 /// Number of such chunks in N environments.
 inline int ClosedFormChunks(size_t num_envs) {
   return static_cast<int>((num_envs + kClosedFormChunk - 1) / kClosedFormChunk);
