@@ -14,7 +14,7 @@ namespace upswing {
 namespace {
 
 constexpr int kSmallestSlice = 4;  // environments; fewer do not repay a task of their own
-constexpr int kMostSlices = 32;
+constexpr int kMostSlices = 20;
 
 /// Gives every simulation of the batch its own row of a model field.
 template <typename T = mjtNum>
@@ -106,6 +106,10 @@ MuJoCoPhysics::MuJoCoPhysics(const PhysicsConfig& config)
   WritePlant(config_.plant(0), FieldsOf(*model));
   rotors_ = HasRotors(*model);
   dry_friction_ = HasDryFriction(*model);
+  // The built-in model has none of these. MuJoCo does not search for what is disabled.
+  if (config_.mjcf.empty()) {
+    model->opt.disableflags |= mjDSBL_SPRING | mjDSBL_SENSOR | mjDSBL_ISLAND;
+  }
   const DataPtr data(mj_makeData(model.get()));
   mj_setConst(model.get(), data.get());
   substeps_ = static_cast<int>(std::round(kControlPeriod / model->opt.timestep));
