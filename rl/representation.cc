@@ -8,14 +8,23 @@ namespace upswing {
 
 double FeatureRank(Matrix<const float> features) {
   // XXᵀ has the same nonzero eigenvalues; its trace is Σ λ, the sum of its squared entries Σ λ².
+  // By columns, so that the products of a row with all rows before it advance together.
+  const int rows = features.rows(), cols = features.cols();
+  std::vector<float> columns(static_cast<size_t>(rows) * cols);
+  for (int i = 0; i < rows; ++i) {
+    for (int k = 0; k < cols; ++k) columns[k * rows + i] = features(i, k);
+  }
   double trace = 0, squares = 0;
-  for (int i = 0; i < features.rows(); ++i) {
-    const auto x = features.row(i);
-    for (int j = 0; j <= i; ++j) {
-      const double dot = std::inner_product(x.begin(), x.end(), features.row(j).begin(), 0.0);
-      if (i == j) trace += dot;
-      squares += (i == j ? 1 : 2) * dot * dot;
+  std::vector<double> dots(rows);
+  for (int i = 0; i < rows; ++i) {
+    std::ranges::fill(dots, 0.0);
+    for (int k = 0; k < cols; ++k) {
+      const float* column = columns.data() + k * rows;
+      const float x = column[i];
+      for (int j = 0; j <= i; ++j) dots[j] += x * column[j];
     }
+    trace += dots[i];
+    for (int j = 0; j <= i; ++j) squares += (i == j ? 1 : 2) * dots[j] * dots[j];
   }
   return squares > 0 ? trace * trace / squares : 0;
 }
