@@ -7,9 +7,9 @@
 namespace upswing {
 namespace {
 
-constexpr int kBlock = 4;            // calls that are timed together
-constexpr int kRounds = 7;           // pairs of blocks, whose median ratio decides
-constexpr double kHopeless = 1.3;    // a ratio that ends a trial after one round
+constexpr int kBlock = 4;       // calls that are timed together
+constexpr int kRounds = 7;      // pairs of blocks, whose median ratio decides
+constexpr double kClear = 1.3;  // a ratio that decides after one round; of more threads, 1 / it
 constexpr double kWorthwhile = .95;  // a ratio that is worth more threads
 constexpr double kTrialShare = .01;  // of the time goes into trials
 
@@ -54,8 +54,9 @@ void ThreadTuner::Compare() {
   ratios_.push_back(seconds_[1] / seconds_[0]);
   seconds_ = {};
   calls_ = 0;
-  const bool hopeless = ratios_.size() == 1 && ratios_.front() > kHopeless;
-  if (hopeless || ratios_.size() == kRounds) NextCandidate();
+  const double ratio = ratios_.back();
+  const bool clear = ratio > kClear || (upwards_ && ratio < 1 / kClear);
+  if ((clear && ratios_.size() == 1) || ratios_.size() == kRounds) NextCandidate();
 }
 
 void ThreadTuner::NextCandidate() {
