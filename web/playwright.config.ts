@@ -14,10 +14,11 @@ export default defineConfig({
   reporter: 'list',
   // For a machine twenty times slower than two idle cores; what passes does not wait.
   timeout: 2_400_000,
-  expect: { timeout: 600_000 },
+  expect: { timeout: 300_000 },
   use: {
     baseURL: `http://127.0.0.1:${port}/`,
     launchOptions,
+    actionTimeout: 300_000,
   },
   webServer: {
     command: `vite preview --outDir "${page}" --host 127.0.0.1 --port ${port} --strictPort`,

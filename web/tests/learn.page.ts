@@ -11,7 +11,7 @@ import { coreModule } from './core';
 import { advance, balanced, open, startFrom, test } from './page';
 import { policyPath, runProgram } from './program';
 
-/// Of those up to 20, one of the two that learn with the fewest steps.
+/// Seed 9 needs among the fewest steps of seeds 1 to 20.
 const SEED = 9;
 
 const status = (page: Page) => page.locator('#learn-status');
@@ -206,8 +206,20 @@ test('pause, go on, another seed, start over', async ({ stage: page }) => {
   await expect.poll(rests, { intervals: [1000] }).toBe(true);
   await page.getByRole('button', { name: 'Go on' }).click();
   await expect.poll(steps).toBeGreaterThan(before);
-  await page.getByRole('button', { name: 'Start over' }).click();
-  await expect.poll(steps).toBeLessThan(before);
+  // Watched from the click on: a moment later it may have more steps again.
+  await page.evaluate(
+    (before) =>
+      new Promise<void>((fewer) => {
+        const steps = document.getElementById('learn-steps')!;
+        const look = () => {
+          if (Number(steps.innerText.replaceAll(',', '')) < before) fewer();
+          else setTimeout(look, 10);
+        };
+        document.getElementById('learn-again')!.click();
+        look();
+      }),
+    before,
+  );
   await page.locator('#learn-start').click();
 });
 

@@ -35,9 +35,9 @@ interface Kept {
 
 /// A test fails if its page writes errors or warnings to the console, unless `complains` is set.
 ///
-/// `page` begins in a browser context of its own, and open() loads it. Where that is not what a test is
-/// about, it takes `stage`: one page for all tests of a Playwright worker, which is put back as it was at
-/// first, and in which open() loads nothing. Loading takes twenty times as long.
+/// `page` begins in a browser context of its own, and open() loads it. Tests that are not about loading
+/// take `stage`: one page for all tests of a Playwright worker. It is put back as it was at first, and
+/// open() loads nothing in it. Loading takes twenty times as long.
 export const test = base.extend<{ complains: boolean; stage: Page }, { kept: Kept }>({
   complains: [false, { option: true }],
   context: async ({ context, complains }, use) => {
@@ -64,7 +64,7 @@ export const test = base.extend<{ complains: boolean; stage: Page }, { kept: Kep
   },
 });
 
-/// As a new visitor finds it: nothing kept or chosen, no input held down, at the top.
+/// As a new visitor finds it: nothing kept or chosen, no mouse button held down, at the top.
 async function setBack(page: Page): Promise<void> {
   await page.unrouteAll();
   await page.context().clearPermissions();
@@ -98,7 +98,7 @@ export async function open(page: Page, hash = '#everything'): Promise<void> {
   await expect(page.locator('#agent-on')).toBeEnabled();
 }
 
-/// Simulates so many seconds at once.
+/// Simulates `seconds` at once.
 export function advance(page: Page, seconds: number): Promise<void> {
   return page.evaluate(
     (steps) => {
@@ -108,8 +108,7 @@ export function advance(page: Page, seconds: number): Promise<void> {
   );
 }
 
-/// The same, and returns the rows
-/// [t, q1, q2, w1, w2, torque] of each control step.
+/// Simulates `seconds` at once; returns a row [t, q1, q2, w1, w2, torque] for each control step.
 export function run(page: Page, seconds: number): Promise<number[][]> {
   return page.evaluate((duration) => {
     const { world } = upswing;
@@ -129,8 +128,10 @@ export function run(page: Page, seconds: number): Promise<number[][]> {
 
 /// Sets the state and pauses, so that only run() advances time.
 export async function startFrom(page: Page, q1: number, q2 = 0, w1 = 0, w2 = 0): Promise<void> {
-  const pause = page.getByRole('button', { name: 'Pause' });
-  if (await pause.isVisible()) await pause.click();
+  const pause = page.locator('#pause');
+  await expect(pause).toBeVisible(); // the view may still be changing
+  if ((await pause.textContent()) === 'Pause') await pause.click();
+  await expect(pause).toHaveText('Resume');
   await page.evaluate((s) => upswing.world.reset(s), { q1, q2, w1, w2 });
 }
 

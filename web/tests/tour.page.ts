@@ -41,7 +41,7 @@ test('nothing moves by itself where motion is not wanted', async ({ stage: page 
   await run(page, 1);
   expect(await page.evaluate(() => upswing.world.state)).toEqual({ q1: 0, q2: 0, w1: 0, w2: 0 });
   await page.getByRole('button', { name: 'Swing up' }).click();
-  await expect(page.locator('#badge')).toHaveText('swinging up');
+  await expect(page.locator('#badge')).toHaveText(/swinging up|balanced/);
 });
 
 test('from step to step, by buttons, numbers and address, and back', async ({ stage: page }) => {
@@ -115,9 +115,10 @@ test('you are the motor: an arrow is its whole torque, and holding one lifts not
     expect((await run(page, 0.02)).at(-1)![5]).toBe(torque);
     await page.mouse.up();
     expect((await run(page, 0.02)).at(-1)![5]).toBe(0);
+    // The tour looks at the height once in a few frames: the pendulum stays up until it has.
+    await expect(answer(page)).toContainText(/Your best: \d+% of the way up/);
     await page.evaluate(() => upswing.reset());
   }
-  await expect(answer(page)).toContainText(/Your best: \d+% of the way up/);
   await page.getByRole('button', { name: 'Next' }).click();
   await page.keyboard.down('ArrowLeft'); // a shove again
   expect(await page.evaluate(() => upswing.world.byHand)).toBe(0);
