@@ -122,7 +122,7 @@ std::string Explain(const CLI::App& program, const CLI::ParseError& error) {
     const std::string meant = DidYouMean(word, KnownWords(app));
     if (word.starts_with("-")) return Concat("unknown flag ", word, meant);
     return &app == &program ? ExplainCommands(program, Concat("\"", word, "\"", meant))
-                            : Concat("did not expect ", word, meant);
+                            : Concat(app.get_name(), ": did not expect ", word, meant);
   }
   if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr) {
     return ExplainMissing(program, app);

@@ -128,11 +128,12 @@ uint64_t ReadSafetensorsLength(std::span<const std::byte> first_bytes, uint64_t 
   uint64_t length = 0;
   if (first_bytes.size() < sizeof(length)) throw BadInput(Concat("it has ", file_size, " bytes"));
   std::memcpy(&length, first_bytes.data(), sizeof(length));
+  if (length > kMaxHeader) {
+    throw BadInput(
+        Concat("its first 8 bytes are no length of a header, expected at most ", kMaxHeader));
+  }
   if (length > file_size - sizeof(length)) {
     throw BadInput(Concat("its header should have ", length, " bytes, the file has ", file_size));
-  }
-  if (length > kMaxHeader) {
-    throw BadInput(Concat("its header has ", length, " bytes, expected at most ", kMaxHeader));
   }
   return length;
 }

@@ -241,7 +241,8 @@ std::string DidYouMean(std::string_view word, const std::vector<std::string>& na
         return to_a != to_b ? to_a < to_b : CommonEnds(word, a) > CommonEnds(word, b);
       });
   if (nearest == names.end()) return "";
-  const size_t tolerance = std::max<size_t>(2, word.size() / 3);
+  const size_t letters = word.size() - std::min(word.size(), word.find_first_not_of('-'));
+  const size_t tolerance = letters <= 3 ? 1 : std::max<size_t>(2, letters / 3);
   if (EditDistance(word, *nearest) > tolerance) return "";
   return Concat(" (did you mean ", *nearest, "?)");
 }

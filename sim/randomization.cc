@@ -24,13 +24,12 @@ void Randomization::Describe(Options& o) {
   for (size_t k = 0; k < plant.size(); ++k) {
     const std::string name = kParameters[k].name;
     o.Add(&plant[k], "randomize_" + name, kRelative, "",
-          k == 0 ? "each episode's mass1 is within ± this share of the plant's"
-                 : "the same of " + name);
+          "each episode's " + name + " is within ± this share of the plant's");
   }
   o.Add(&sensor_noise, "randomize_sensor_noise", {0, 10}, "rad, rad/s",
-        "each episode's sensor noise is up to so much above sensor_noise");
+        "each episode's sensor noise is up to this much above sensor_noise");
   o.Add(&delay, "randomize_delay", {0, kLargestDelay}, "s",
-        "each episode's delay is up to so much above delay")
+        "each episode's delay is up to this much above delay")
       .step = kControlPeriod;
   o.Alias("randomize",
           {"randomize_mass1", "randomize_mass2", "randomize_length1", "randomize_length2",
