@@ -261,7 +261,7 @@ class SlurmView : public ManyRunsView {
     ask_at_ = Clock::now() + kAskEvery;
   }
 
-  /// Throws Failure if nobody works on the runs that are left.
+  /// Throws Failure if unfinished runs have no worker.
   void Watch(const std::vector<const SeedRun*>& running) override {
     ManyRunsView::Watch(running);
     const auto now = Clock::now();

@@ -11,7 +11,7 @@ namespace upswing {
 /// Trains many runs on this machine. Signals stop them. Returns and throws as TrainMany.
 int TrainManyAndShow(const ManyRuns& many);
 
-/// What was typed of a job array for Slurm.
+/// Options of a Slurm job array from the command line.
 struct SlurmRequest {
   std::string options;  // of sbatch
   int64_t tasks = 0;    // workers; 0: one for each run that is not done, up to kMostSlurmTasks

@@ -32,6 +32,7 @@ class CsvTable {
   void Add(std::string_view name, std::string_view text);
   void Add(std::string_view name, double number) { Add(name, FormatNumber(number)); }
   void Add(std::string_view name, std::integral auto number) { Add(name, Concat(number)); }
+  /// Ends a row, which has a cell.
   void EndRow();
 
   std::string text() const { return names_ + rows_; }

@@ -25,7 +25,7 @@ using Settings = std::vector<std::pair<std::string, std::string>>;
 
 Settings SettingsOf(Config config) {
   Settings settings;
-  config.model.clear();  // a model is what is in its file, not where that lies: see below
+  config.model.clear();  // a model is what is in its file, not where the file lies
   Config scratch;
   const Options own = OptionsOf(config), all = EverySetting(scratch);
   for (const Option& every : all.all()) {

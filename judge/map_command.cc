@@ -93,7 +93,7 @@ MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded,
                    const DesignConditions& design) {
   MapConfig config;
   TrialArguments trial = a.trial;
-  trial.set.clear();  // it is for the point
+  trial.set.clear();  // it changes config.point, not the environments
   config.env = TrialEnvironments(trial, &loaded);
   config.point.plant = loaded.plant;
   config.x = ParseMapAxis(a.x, design.point, "--x");

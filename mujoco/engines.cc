@@ -45,7 +45,7 @@ ModelFields ExpandedFields(mjBatch* batch, bool rotors, bool friction, int env) 
           if_any(friction, "dof_frictionloss")};
 }
 
-/// A plant whose MJCF has all that any of these needs.
+/// A plant whose MJCF has every element that these plants need.
 Plant Superset(const std::vector<Plant>& plants) {
   Plant superset;
   for (const Plant& plant : plants) {

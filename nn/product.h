@@ -35,7 +35,7 @@ struct Product {
   }
 };
 
-/// Computes C on vectors. The order of each sum depends on the sizes alone.
+/// Computes C, of at least one column, on vectors. The order of each sum depends on the sizes alone.
 void Multiply(const Product& product);
 
 }  // namespace upswing

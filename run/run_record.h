@@ -40,7 +40,7 @@ struct RunRecord {
 /// killed run leaves it, is an error, too, unless `may_be_cut`: then it is left out.
 std::vector<EvaluationRow> ReadEvaluations(const std::filesystem::path& run, bool may_be_cut);
 
-/// The same of the table's text; `where` is its path.
+/// Parses the text of evals.csv; `where` is its path.
 std::vector<EvaluationRow> ParseEvaluations(std::string text, const std::string& where,
                                             bool may_be_cut);
 

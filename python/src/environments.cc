@@ -45,7 +45,7 @@ int64_t LevelsOf(const std::string& actions, const std::string& levels) {
   return config.discrete() ? config.levels : 0;
 }
 
-/// The settings of so many environments: those of the named agent (the usual one if none is named)
+/// Settings of `num_envs` environments: those of the named agent (the usual one if none is named)
 /// with these changes. Throws BadInput for settings that environments do not have.
 Config ConfigOf(const std::string& num_envs, const SettingTexts& settings) {
   std::vector<FlagValue> flags = FlagsOf(settings);
@@ -131,7 +131,7 @@ class Environments {
       for (size_t i = 0; i < mask.size(); ++i) {
         if (mask[i] == 0) continue;
         const int env = static_cast<int>(i);
-        // Where one has ended, another episode has begun and nobody has seen it.
+        // After an end the next episode has already begun, unseen.
         const bool begun = std::erase(ended_, env) > 0;
         if (!begun || seeds[i]) env_.Restart(env, seeds[i]);
         result_.torque[i] = 0;  // none acts yet
@@ -145,7 +145,11 @@ class Environments {
   nb::ndarray<nb::numpy, uint8_t> Draw(int env, int width, int height) {
     auto pixels = NewArray<uint8_t>({static_cast<size_t>(height), static_cast<size_t>(width), 3});
     Alone([&] {
-      if (!offscreen_) offscreen_.emplace(PictureSize{width, height});
+      if (!offscreen_ || picture_width_ != width || picture_height_ != height) {
+        offscreen_.emplace(PictureSize{width, height});
+        picture_width_ = width;
+        picture_height_ = height;
+      }
       const Plant& plant = env_.plant(env);
       if (!scene_ || PlantValues(scene_->plant()) != PlantValues(plant)) {
         scene_.emplace(plant, config_.mjcf);
@@ -239,7 +243,8 @@ class Environments {
   StepResult result_;
   std::vector<int> ended_;  // environments whose next step begins another episode
   std::optional<Offscreen> offscreen_;
-  std::optional<PendulumScene> scene_;  // drawn last
+  int picture_width_ = 0, picture_height_ = 0;  // pixels that it draws
+  std::optional<PendulumScene> scene_;          // drawn last
   std::mutex mutex_;
 };
 
