@@ -37,6 +37,7 @@ test('a shove moves it, to the side of its arrow', async ({ stage: page }) => {
       const { scene, world } = upswing;
       const { context, element, width } = scene.canvas;
       const { q1, q2 } = world.state;
+      scene.draw(world, world.state, []); // at the size that the canvas has by now
       const [x, y] = scene.at({
         x: -(Math.sin(q1) + Math.sin(q1 + q2)) / 2,
         z: -(Math.cos(q1) + Math.cos(q1 + q2)) / 2,
