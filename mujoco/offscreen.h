@@ -18,6 +18,8 @@ inline constexpr int kLeastPixels = 16, kMostPixels = 8192;
 /// Size of a picture, pixels.
 struct PictureSize {
   int width = 640, height = 480;
+
+  bool operator==(const PictureSize&) const = default;
 };
 
 /// The size; throws BadInput if it is out of range.
@@ -35,6 +37,8 @@ class Offscreen {
   /// The picture of these panels side by side: pixels (height × width × 3), red, green, blue, the
   /// top row first, until the next call.
   std::span<const uint8_t> Render(std::span<const ScenePanel> panels);
+
+  PictureSize size() const { return size_; }
 
  private:
   struct Graphics;

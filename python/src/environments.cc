@@ -145,16 +145,13 @@ class Environments {
   nb::ndarray<nb::numpy, uint8_t> Draw(int env, int width, int height) {
     auto pixels = NewArray<uint8_t>({static_cast<size_t>(height), static_cast<size_t>(width), 3});
     Alone([&] {
-      if (!offscreen_ || picture_width_ != width || picture_height_ != height) {
-        offscreen_.emplace(PictureSize{width, height});
-        picture_width_ = width;
-        picture_height_ = height;
-      }
+      const PictureSize size{width, height};
+      if (!offscreen_ || offscreen_->size() != size) offscreen_.emplace(size);
       const Plant& plant = env_.plant(env);
       if (!scene_ || PlantValues(scene_->plant()) != PlantValues(plant)) {
         scene_.emplace(plant, config_.mjcf);
-        scene_->SetCamera(Camera(), static_cast<double>(width) / height);
       }
+      scene_->SetCamera(Camera(), static_cast<double>(width) / height);
       scene_->Update(env_.state(env), {.torque = result_.torque[static_cast<size_t>(env)]});
       const ScenePanel panel{&*scene_, "", {}};
       std::ranges::copy(offscreen_->Render({&panel, 1}), pixels.data());
@@ -243,8 +240,7 @@ class Environments {
   StepResult result_;
   std::vector<int> ended_;  // environments whose next step begins another episode
   std::optional<Offscreen> offscreen_;
-  int picture_width_ = 0, picture_height_ = 0;  // pixels that it draws
-  std::optional<PendulumScene> scene_;          // drawn last
+  std::optional<PendulumScene> scene_;  // drawn last
   std::mutex mutex_;
 };
 
