@@ -35,7 +35,8 @@ struct Product {
   }
 };
 
-/// Computes C, of at least one column, on vectors. The order of each sum depends on the sizes alone.
+/// Computes C, of at least one column, on vectors. The order of each sum depends on the sizes
+/// alone.
 void Multiply(const Product& product);
 
 }  // namespace upswing

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "core/text.h"
-#include "rl/trained_network.h"
+#include "rl/slices.h"
 
 namespace upswing {
 namespace {
