@@ -64,7 +64,7 @@ export const test = base.extend<{ complains: boolean; stage: Page }, { kept: Kep
   },
 });
 
-/// As a new visitor finds it: nothing kept or chosen, no mouse button held down, at the top.
+/// As a new visitor finds it: nothing kept, chosen or learning, no mouse button held down, at the top.
 async function setBack(page: Page): Promise<void> {
   await page.unrouteAll();
   await page.context().clearPermissions();
@@ -79,6 +79,7 @@ async function setBack(page: Page): Promise<void> {
       details.open = details.matches('#explain > :first-child');
     }
     delete (upswing.clock as Partial<Clock>).advance; // where a test had stopped it
+    upswing.learn.stop();
     await upswing.agents.forgetOwn();
     scrollTo({ top: 0, behavior: 'instant' });
   });
