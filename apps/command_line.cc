@@ -113,16 +113,24 @@ std::string ExplainValues(const std::string& message) {
   return Concat(flag, ": expected a value, got ", several ? "several" : "none");
 }
 
+/// Explains the first word that `app`, the program or one of its commands, does not know; empty if
+/// there is none.
+std::string ExplainUnknown(const CLI::App& program, const CLI::App& app) {
+  const std::vector<std::string> unknown = app.remaining();
+  if (unknown.empty()) return "";
+  const std::string word = unknown.front().substr(0, unknown.front().find('='));
+  const std::string meant = DidYouMean(word, KnownWords(app));
+  if (word.starts_with("-")) return Concat("unknown flag ", word, meant);
+  return &app == &program ? ExplainCommands(program, Concat("\"", word, "\"", meant))
+                          : Concat(app.get_name(), ": did not expect ", word, meant);
+}
+
 /// Says in one line what was wrong with the command line.
 std::string Explain(const CLI::App& program, const CLI::ParseError& error) {
   const auto chosen = program.get_subcommands();
   const CLI::App& app = chosen.empty() ? program : *chosen.front();
-  if (const std::vector<std::string> unknown = app.remaining(); !unknown.empty()) {
-    const std::string word = unknown.front().substr(0, unknown.front().find('='));
-    const std::string meant = DidYouMean(word, KnownWords(app));
-    if (word.starts_with("-")) return Concat("unknown flag ", word, meant);
-    return &app == &program ? ExplainCommands(program, Concat("\"", word, "\"", meant))
-                            : Concat(app.get_name(), ": did not expect ", word, meant);
+  for (const CLI::App* asked : {&program, &app}) {
+    if (std::string unknown = ExplainUnknown(program, *asked); !unknown.empty()) return unknown;
   }
   if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr) {
     return ExplainMissing(program, app);
@@ -250,6 +258,9 @@ int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> 
   try {
     program.parse(argc, argv);
   } catch (const CLI::Success& request) {  // --help and --version
+    if (const std::string unknown = ExplainUnknown(program, program); !unknown.empty()) {
+      throw BadInput(unknown);
+    }
     return program.exit(request);
   } catch (const CLI::ParseError& error) {
     throw BadInput(Explain(program, error));

@@ -100,6 +100,14 @@ class NumberTest(ProgramTest):
         self.refuse_numbers(
             ([], "expected a command, one of train, eval, "),
             (["evla"], 'got "evla" (did you mean eval?)'),
+            (["evaluate"], 'got "evaluate" (did you mean eval?)'),
+            (["tets"], 'got "tets" (did you mean test?)'),
+            (["pyhton"], 'got "pyhton" (did you mean python?)'),
+            (["demos"], 'got "demos" (did you mean demo?)'),
+            (["docs", "--help"], 'expected a command, one of train, '),
+            (["docs", "train"], 'got "docs"'),
+            (["--help", "docs"], 'got "docs"'),
+            (["--version", "x"], 'got "x"'),
             (["eval"], "eval: expected POLICY|RUN (policy.safetensors, run folder or controller: "
                        "energy, hybrid, lqr, mpc, pfl, tvlqr), got none"),
             (["compare"], "compare: expected RUN|FOLDER"),
@@ -292,6 +300,21 @@ class LauncherTest(ProgramTest):
         self.assert_one_line(self.launch("--nosetup", "info"), 2, "unknown flag --nosetup",
                              "there is only --no-setup")
         self.assertEqual(self.launch("--no-setup", "info", "x").stdout, "ran: info x\n")
+
+    def test_its_help_lists_the_commands_of_the_program(self):
+        listed = self.launch("--no-setup", "help").stdout
+        commands = self.succeed("--help").split("Subcommands:\n")[1].split("\n\n")[0]
+        for command in re.findall(r"(?m)^  (\w+) ", commands):
+            self.assertIn(f"\n  ./upswing {command} ", listed)
+        self.assertEqual(self.launch("--no-setup", "help", "info").stdout, "ran: info --help\n")
+
+    def test_words_that_ctest_would_ignore(self):
+        for words in (["--cluster", "foo"], ["foo"], ["--preset", "debug", "foo"]):
+            with self.subTest(words=words):
+                self.assert_one_line(self.launch("--no-setup", "test", *words), 2,
+                                     "did not expect foo")
+        self.assert_one_line(self.launch("--no-setup", "test", "--preset=debug", "--cluster"), 2,
+                             "expected --cluster")
 
     def test_tests_that_are_not_built(self):
         done = self.launch("--no-setup", "test", "-R", "rl.Dqn")

@@ -20,6 +20,9 @@ constexpr CommandEntry kCommands[] = {
     {"realaigym", "Score a policy by the rules of the benchmark RealAIGym, or search one",
      AddRealAiGym},
     {"bench", "Measure how fast it is on this machine", nullptr},
+    {"demo", "Serve the page where the pendulum is swung up live", nullptr},
+    {"python", "Run Python with the package upswing", nullptr},
+    {"test", "Build and run every test", nullptr},
 };
 
 }  // namespace

@@ -68,7 +68,7 @@ void ReplaceByProgramOf(const std::string& command, char** argv) {
   const std::filesystem::path program = ProgramPath().parent_path() / Concat("upswing-", command);
   execv(program.c_str(), argv);
   throw BadInput(Concat(command, ": expected the program ", program.string(), ", got ",
-                        std::strerror(errno), "; ./upswing ", command, " builds it"));
+                        std::strerror(errno), "; run it as ./upswing ", command));
 }
 
 int Main(int argc, char** argv, std::span<const CommandEntry> commands, const std::string& footer) {

@@ -241,10 +241,19 @@ std::string DidYouMean(std::string_view word, const std::vector<std::string>& na
         return to_a != to_b ? to_a < to_b : CommonEnds(word, a) > CommonEnds(word, b);
       });
   if (nearest == names.end()) return "";
-  const size_t letters = word.size() - std::min(word.size(), word.find_first_not_of('-'));
+  const auto count_letters = [](std::string_view text) {
+    return text.size() - std::min(text.size(), text.find_first_not_of('-'));
+  };
+  const size_t letters = count_letters(word);
   const size_t tolerance = letters <= 3 ? 1 : std::max<size_t>(2, letters / 3);
-  if (EditDistance(word, *nearest) > tolerance) return "";
-  return Concat(" (did you mean ", *nearest, "?)");
+  const auto meant = [](std::string_view name) { return Concat(" (did you mean ", name, "?)"); };
+  if (EditDistance(word, *nearest) <= tolerance) return meant(*nearest);
+  constexpr size_t kFewest = 3;  // letters that two words must share
+  const auto begins = std::ranges::find_if(names, [&](const std::string& name) {
+    return std::min(letters, count_letters(name)) >= kFewest &&
+           (word.starts_with(name) || name.starts_with(word));
+  });
+  return begins == names.end() ? "" : meant(*begins);
 }
 
 std::span<const std::byte> BytesOf(std::string_view text) {

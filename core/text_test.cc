@@ -64,6 +64,10 @@ TEST(Text, SuggestsTheNearestNameOnlyIfItIsNear) {
   EXPECT_EQ(DidYouMean("gama", names), " (did you mean gamma?)");
   EXPECT_EQ(DidYouMean("mas2", {"mass", "mass1", "mass2"}), " (did you mean mass2?)");
   EXPECT_EQ(DidYouMean("eval-evry", names), " (did you mean eval_every?)");
+  EXPECT_EQ(DidYouMean("evaluate", {"train", "eval"}), " (did you mean eval?)");
+  EXPECT_EQ(DidYouMean("simul", {"eval", "simulate"}), " (did you mean simulate?)");
+  EXPECT_EQ(DidYouMean("qw", {"qwerty"}), "");
+  EXPECT_EQ(DidYouMean("--yield", {"--y"}), "");
   EXPECT_EQ(DidYouMean("zzzzzz", names), "");
   EXPECT_EQ(DidYouMean("gamma", {}), "");
 }
