@@ -44,7 +44,7 @@ void CheckSameStudy(const StudyPlan& plan, const std::string& title) {
   const fs::path file = plan.folder / kStudyName;
   const std::string where = file.string();
   if (!IsFile(file)) return;
-  const StudyOutline before = ParseStudyOutline(ReadTextFile(file), where);
+  const StudyOutline before = ParseStudyOutline(ReadOwnFile(file), where);
   if (before.title != title) {
     throw BadInput(Concat(where, ": made with title \"", before.title, "\", but the study says \"",
                           title, "\"; choose another --out"));

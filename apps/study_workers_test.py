@@ -279,6 +279,44 @@ class WorkersTest(ProgramTest):
         self.refuse(["study", "x.toml", "--keep", "none"], "x.toml")
         self.refuse(["study", "little.toml", "--keep", "none"], "--keep: expected all, policy")
 
+    def test_settings_that_are_no_file_are_not_waited_for(self):
+        study = self.prepare(STUDY, "study", "--keep", "tables")
+        self.work()
+        commands = [["study", "--work", "study"], ["study", "study", "--status"],
+                    ["compare", "study"]]
+        settings = study / "one/settings.toml"
+        whole = settings.read_text(encoding="utf-8")
+
+        def refuse_all(why):
+            for command in commands:
+                with self.subTest(command=command, why=why):
+                    done = self.run_here(*command, timeout=PATIENCE)
+                    self.assertIn("one/settings.toml: " + why, done.stdout + done.stderr)
+            settings.unlink()
+
+        settings.unlink()
+        os.mkfifo(settings)
+        refuse_all("expected a file, got a pipe or a device")
+        settings.symlink_to("/dev/zero")
+        refuse_all("expected a file, got a pipe or a device")
+        settings.touch()
+        os.truncate(settings, 1 << 40)
+        refuse_all("expected at most 67108864 bytes")
+        settings.write_text(whole.replace('model = ""', 'model = "../../m.xml"'), encoding="utf-8")
+        refuse_all("model: expected model.xml, the copy in the same folder")
+
+    def test_texts_of_a_result_split_no_row_of_a_table(self):
+        study = self.prepare()
+        self.work()
+        done = study / "one/seed1.done"
+        result = json.loads(done.read_text(encoding="utf-8"))
+        texts = {name: ["a\nb\r\u2028\x1b[2J"] for name in ("hosts", "processors", "vectors")}
+        done.write_text(json.dumps(result | texts), encoding="utf-8")
+        self.succeed("compare", "study", "--out", "compared")
+        rows = (self.folder / "compared/runs.csv").read_text(encoding="utf-8").splitlines()
+        self.assertEqual(len(rows), 1 + 8)
+        self.assertEqual(rows[1].split(",")[-3:], [r"a\nb\r\u2028\x1b[2J"] * 3)
+
     def test_broken_results(self):
         study = self.prepare()
         self.write("study/one/seed1.done", "{")

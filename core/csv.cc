@@ -82,9 +82,10 @@ std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::str
   return columns;
 }
 
-void CsvTable::Add(std::string_view name, std::string_view text) {
+void CsvTable::Add(std::string_view name, std::string_view given) {
   if (first_) names_ += Concat(name, ',');
-  if (text.find_first_of(",\"\n\r") == text.npos) {
+  const std::string text = Printable(given);  // a row stays one line
+  if (text.find_first_of(",\"") == text.npos) {
     rows_ += Concat(text, ',');
     return;
   }

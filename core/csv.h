@@ -27,8 +27,8 @@ std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::str
 /// Builds a CSV text. The names of the first row's cells become its first line.
 class CsvTable {
  public:
-  /// Adds a cell to the row: a text, in quotes where a reader needs them, or a number. A number
-  /// that is not known is an empty text.
+  /// Adds a cell to the row: a text, Printable and in quotes where a reader needs them, or a
+  /// number. A number that is not known is an empty text.
   void Add(std::string_view name, std::string_view text);
   void Add(std::string_view name, double number) { Add(name, FormatNumber(number)); }
   void Add(std::string_view name, std::integral auto number) { Add(name, Concat(number)); }

@@ -56,13 +56,14 @@ TEST(Csv, ATableHasTheNamesOfItsFirstRowAndQuotesWhatHasToBe) {
   for (const int64_t row : {int64_t{1}, int64_t{9'000'000'000'000'000}}) {
     table.Add("a", row);
     table.Add("empty", "");
-    table.Add("text", "x,\"y\"\n");
+    table.Add("text", "x,\"y\"");
+    table.Add("lines", "1\n2\u20283");
     table.Add("c", 0.1);
     table.EndRow();
   }
   EXPECT_EQ(table.text(),
-            "a,empty,text,c\n1,,\"x,\"\"y\"\"\n\",0.1\n"
-            "9000000000000000,,\"x,\"\"y\"\"\n\",0.1\n");
+            "a,empty,text,lines,c\n1,,\"x,\"\"y\"\"\",1\\n2\\u20283,0.1\n"
+            "9000000000000000,,\"x,\"\"y\"\"\",1\\n2\\u20283,0.1\n");
 }
 
 }  // namespace

@@ -9,6 +9,9 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <fstream>
+#include <iterator>
+#include <optional>
 #include <utility>
 
 #include "core/error.h"
@@ -38,17 +41,24 @@ bool IsOfPath(int error_number) {
   return std::ranges::find(kOfPath, error_number) != kOfPath.end();
 }
 
-/// The whole of what was opened. Throws BadInput.
-std::vector<std::byte> ReadAll(const Descriptor& fd, const fs::path& path, bool only_regular) {
+/// The whole of what was opened. With `most_bytes`: only of a regular file that is no larger.
+/// Throws BadInput.
+std::vector<std::byte> ReadAll(const Descriptor& fd, const fs::path& path,
+                               std::optional<size_t> most_bytes) {
   const auto cannot = [&](std::string_view why) {
     return BadInput(Concat("cannot read ", path.string(), ": ", why));
   };
   struct stat info {};
   if (fd.get() < 0 || fstat(fd.get(), &info) != 0) throw cannot(std::strerror(errno));
   if (S_ISDIR(info.st_mode)) throw cannot("expected a file, got a folder");
-  if (only_regular && !S_ISREG(info.st_mode)) {
+  if (most_bytes && !S_ISREG(info.st_mode)) {
     throw cannot("expected a file, got a pipe or a device");
   }
+  const auto expect_fits = [&](uintmax_t size) {
+    if (!most_bytes || size <= *most_bytes) return;
+    throw cannot(Concat("expected at most ", *most_bytes, " bytes, got ", size));
+  };
+  expect_fits(static_cast<uintmax_t>(info.st_size));
   // A pipe has no size, so read until the end instead of trusting one.
   std::vector<std::byte> bytes(static_cast<size_t>(info.st_size));
   size_t filled = 0;
@@ -59,6 +69,7 @@ std::vector<std::byte> ReadAll(const Descriptor& fd, const fs::path& path, bool 
     if (got < 0) throw cannot(std::strerror(errno));
     if (got == 0) break;
     filled += static_cast<size_t>(got);
+    expect_fits(filled);
   }
   bytes.resize(filled);
   return bytes;
@@ -100,21 +111,28 @@ bool IsOwnFile(const fs::path& path) {
 }
 
 std::vector<std::byte> ReadFile(const fs::path& path) {
-  return ReadAll(Descriptor(open(path.c_str(), O_RDONLY | O_CLOEXEC)), path, false);
+  return ReadAll(Descriptor(open(path.c_str(), O_RDONLY | O_CLOEXEC)), path, std::nullopt);
 }
 
 std::string ReadTextFile(const fs::path& path) { return TextOf(ReadFile(path)); }
 
 std::string ReadOwnFile(const fs::path& path, size_t most_bytes) {
+  return TextOf(ReadOwnBytes(path, most_bytes));
+}
+
+std::vector<std::byte> ReadOwnBytes(const fs::path& path, size_t most_bytes) {
   // O_NONBLOCK: opening a pipe would wait for a writer.
-  const Descriptor fd(open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
-  struct stat info {};
-  if (fd.get() >= 0 && fstat(fd.get(), &info) == 0 && S_ISREG(info.st_mode) &&
-      static_cast<uintmax_t>(info.st_size) > most_bytes) {
-    throw BadInput(Concat("cannot read ", path.string(), ": expected at most ", most_bytes,
-                          " bytes, got ", info.st_size));
-  }
-  return TextOf(ReadAll(fd, path, true));
+  return ReadAll(Descriptor(open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)), path,
+                 most_bytes);
+}
+
+std::string ReadEnd(const fs::path& path, std::streamoff most_bytes) {
+  if (!IsOwnFile(path)) return "";
+  std::ifstream file(path, std::ios::binary | std::ios::ate);
+  if (!file) return "";
+  const std::streamoff size = file.tellg();
+  file.seekg(std::max<std::streamoff>(0, size - most_bytes));
+  return {std::istreambuf_iterator<char>(file), {}};
 }
 
 void WriteFileAtomically(const fs::path& path, std::span<const std::span<const std::byte>> parts) {

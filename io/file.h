@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <limits>
+#include <ios>
 #include <span>
 #include <string>
 #include <string_view>
@@ -32,10 +32,16 @@ std::string ReadTextFile(const std::filesystem::path& path);
 /// permission is missing; Failure if the work itself failed, as on a full disk.
 Error PathError(std::string_view what, const std::filesystem::path& path, int error_number);
 
+/// The size of an untrusted text file that no run exceeds: an evaluation takes some 150 bytes.
+inline constexpr size_t kMostTextBytes = 1 << 26;
+
 /// The whole of an untrusted file, such as those of run folders and models: only a regular file of
 /// at most `most_bytes`, as a pipe might never end. Throws BadInput, without waiting, for all else.
-std::string ReadOwnFile(const std::filesystem::path& path,
-                        size_t most_bytes = std::numeric_limits<size_t>::max());
+std::string ReadOwnFile(const std::filesystem::path& path, size_t most_bytes = kMostTextBytes);
+std::vector<std::byte> ReadOwnBytes(const std::filesystem::path& path, size_t most_bytes);
+
+/// The end of an untrusted file, at most `most_bytes`; empty if it is no regular file.
+std::string ReadEnd(const std::filesystem::path& path, std::streamoff most_bytes);
 
 /// Replaces the file at this path by one of `parts`, one after the other: written to a temporary
 /// file beside it (see Making), synchronised to disk, then renamed, so that at every moment either

@@ -54,6 +54,18 @@ TEST_F(FileTest, ASmallFileIsARegularOneWithinItsBound) {
   for (const fs::path& file : {folder_ / "pipe", fs::path("/dev/zero")}) {
     EXPECT_EQ(ends(error_of(file, 11), ": expected a file, got a pipe or a device"), "");
   }
+  // A file of the system, whose size is said to be 0.
+  EXPECT_EQ(
+      error_of("/proc/self/status", 11).find("cannot read /proc/self/status: expected at most"),
+      0U);
+}
+
+TEST_F(FileTest, TheEndOfAFileIsOfARegularOne) {
+  WriteFileAtomically(folder_ / "a", "twelve bytes");
+  EXPECT_EQ(ReadEnd(folder_ / "a", 5), "bytes");
+  EXPECT_EQ(ReadEnd(folder_ / "a", 50), "twelve bytes");
+  ASSERT_EQ(mkfifo((folder_ / "pipe").c_str(), 0666), 0);
+  for (const char* name : {"pipe", "none", ""}) EXPECT_EQ(ReadEnd(folder_ / name, 5), "") << name;
 }
 
 TEST_F(FileTest, AWriteThatDoesNotFitLeavesTheOldFileAndNothingElse) {

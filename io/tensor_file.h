@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
+#include <limits>
 #include <string_view>
 
 #include "core/tensors.h"
@@ -11,8 +13,13 @@ namespace upswing {
 /// Writes the file atomically, with a checksum. Throws Failure.
 void SaveTensors(const Tensors& tensors, const std::filesystem::path& path);
 
-/// Reads and checks everything: sizes, shapes, offsets, checksum. Throws BadInput.
-Tensors LoadTensors(const std::filesystem::path& path);
+/// A size that no policy's file exceeds: twice eight layers of 4096 units.
+inline constexpr size_t kMostPolicyBytes = size_t{1} << 31;
+
+/// Reads and checks everything: sizes, shapes, offsets, checksum. Throws BadInput, also if the file
+/// is larger than `most_bytes`.
+Tensors LoadTensors(const std::filesystem::path& path,
+                    size_t most_bytes = std::numeric_limits<size_t>::max());
 
 /// Reads only the metadata and the tensors whose names begin with `prefix`, a small part of a large
 /// file, for display. The checksum, which covers the whole file, is not verified; use LoadTensors

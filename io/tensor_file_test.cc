@@ -41,8 +41,8 @@ class TensorFileTest : public ::testing::Test {
 
   /// The message of the error that loading these bytes gives.
   std::string LoadError(std::span<const std::byte> bytes) const {
-    // Not as the program writes, which waits until the disk has it, as some file systems do also for
-    // a file that is written anew.
+    // Not as the program writes, which waits until the disk has it, as some file systems do also
+    // for a file that is written anew.
     fs::remove(path_);
     std::ofstream(path_, std::ios::binary)
         .write(reinterpret_cast<const char*>(bytes.data()),
@@ -192,6 +192,7 @@ TEST_F(TensorFileTest, APartOfABrokenFileIsRefusedAsTheWholeIs) {
   // Opening a pipe would wait for a writer.
   const fs::path pipe = folder_ / "pipe";
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_THROW(LoadTensors(path_, fs::file_size(path_) - 1), Error);
   for (const fs::path& path : {pipe, folder_.path()}) {
     const std::string error = "cannot read " + path.string() + ": expected a regular file";
     EXPECT_EQ(part_error(path), error);

@@ -153,7 +153,7 @@ class RunReader {
   const RunRecord& VariantIn(const fs::path& folder) {
     const auto at = variants_.find(folder);
     if (at != variants_.end()) return at->second;
-    RunRecord run{folder, BuildConfig(folder / kSettingsName, {}), ""};
+    RunRecord run{folder, ReadSettings(folder / kSettingsName), ""};
     MakeReadyForMany(run.config);
     run.settings = SettingsMark(run.config);
     return variants_.emplace(folder, std::move(run)).first->second;

@@ -118,7 +118,7 @@ Competitor OfSearch(const std::string& name, SwingPolicy policy) {
 }  // namespace
 
 SwingPolicy LoadSwingPolicy(const fs::path& path) {
-  const Tensors tensors = LoadTensors(path);
+  const Tensors tensors = LoadTensors(path, kMostPolicyBytes);
   if (!IsSwingPolicy(tensors)) {
     throw BadInput(Concat(Printable(path.string()), ": expected a policy of `realaigym --search`"));
   }
@@ -140,7 +140,7 @@ Competitor GetCompetitor(const PolicyArguments& a, const std::string& robot) {
             [asked](size_t) { return std::make_unique<RegulatorController>(asked); }};
   }
   if (!IsController(a.name) && fs::is_regular_file(a.name)) {
-    const Tensors tensors = LoadTensors(a.name);
+    const Tensors tensors = LoadTensors(a.name, kMostPolicyBytes);
     if (IsSwingPolicy(tensors)) {
       Competitor found = OfSearch(a.name, ReadSwingPolicy(tensors));
       ExpectRobot(a.name, found.robot, ParseRobot(robot, found.robot));

@@ -23,6 +23,16 @@ ModelFile ReadModel(const std::string& path) {
   return model;
 }
 
+/// ParseConfig of a file in the folder of a run or a study, whose model is the copy beside it.
+Config ParseInFolder(const fs::path& file, const std::string& text,
+                     const std::vector<FlagValue>& flags) {
+  return ParseConfig(text, file.string(), flags, [&](const std::string& path, bool /*in_file*/) {
+    if (path == RunFolder::kModel) return ReadModel((file.parent_path() / path).string());
+    throw BadInput(Concat(file.string(), ": model: expected ", RunFolder::kModel,
+                          ", the copy in the same folder, got \"", Printable(path), "\""));
+  });
+}
+
 }  // namespace
 
 Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
@@ -37,13 +47,7 @@ Config ReadRunConfig(const fs::path& run, const std::vector<FlagValue>& flags) {
   const fs::path file = run / RunFolder::kConfig;
   const std::string text = ReadOwnFile(file);
   std::vector<std::string> missing = MissingSettings(text, file.string(), false);
-  if (missing.empty()) {
-    return ParseConfig(text, file.string(), flags, [&](const std::string& path, bool /*in_file*/) {
-      if (path == RunFolder::kModel) return ReadModel((run / path).string());
-      throw BadInput(Concat(file.string(), ": model: expected ", RunFolder::kModel,
-                            ", the copy in the run folder, got \"", Printable(path), "\""));
-    });
-  }
+  if (missing.empty()) return ParseInFolder(file, text, flags);
   constexpr size_t kMostNames = 6;  // that make a line which can still be read
   const size_t more = missing.size() - std::min(missing.size(), kMostNames);
   missing.resize(missing.size() - more);
@@ -52,6 +56,8 @@ Config ReadRunConfig(const fs::path& run, const std::vector<FlagValue>& flags) {
                         more > 0 ? Concat(" and ", more, " more") : "",
                         ": another version wrote it"));
 }
+
+Config ReadSettings(const fs::path& file) { return ParseInFolder(file, ReadOwnFile(file), {}); }
 
 void NameModelCopy(Config& config) {
   if (!config.mjcf.empty()) config.model = RunFolder::kModel;

@@ -16,6 +16,10 @@ Config BuildConfig(const std::filesystem::path& file, const std::vector<FlagValu
 /// lacks one: that run is of another version, and today's default is not what it was made with.
 Config ReadRunConfig(const std::filesystem::path& run, const std::vector<FlagValue>& flags = {});
 
+/// The settings of a variant in a study's folder, a regular file. A model in it is the copy beside
+/// it. Throws BadInput.
+Config ReadSettings(const std::filesystem::path& file);
+
 /// Names the copy of a model file in the run's folder, wherever that lies, in place of the file.
 void NameModelCopy(Config& config);
 

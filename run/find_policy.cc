@@ -130,7 +130,7 @@ LoadedPolicy LoadPolicy(const fs::path& path) {
                           ": no such file; expected a policy.safetensors or a run folder",
                           is_controller ? " here, where no controller will do" : ""));
   }
-  return ReadPolicy(LoadTensors(file));
+  return ReadPolicy(LoadTensors(file, kMostPolicyBytes));
 }
 
 LoadedPolicy ReadPolicy(const Tensors& file) {

@@ -14,7 +14,6 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 using nlohmann::ordered_json;
 
-constexpr size_t kMostBytes = 1 << 26;  // of the file; an evaluation takes some 150
 constexpr int64_t kMost = int64_t{1} << 62;
 
 FinishedRun Parse(const json& j) {
@@ -64,7 +63,7 @@ std::optional<FinishedRun> FinishedRun::Read(const fs::path& path) {
   std::error_code error;
   if (!fs::exists(fs::symlink_status(path, error))) return std::nullopt;
   try {
-    return Parse(ParseJsonObject(ReadOwnFile(path, kMostBytes)));
+    return Parse(ParseJsonObject(ReadOwnFile(path)));
   } catch (const Error& broken) {
     const std::string_view what = broken.what();
     if (what.starts_with(path.string())) throw;

@@ -27,7 +27,7 @@ constexpr const char* kWorkersLog = "workers.log";
 /// The last line that is not empty.
 std::string LastLine(const fs::path& path) {
   std::string last = "its log is empty";
-  const std::string text = IsFile(path) ? ReadOwnFile(path) : "";
+  const std::string text = ReadEnd(path, 1 << 16);
   for (const std::string_view line : Split(text, '\n')) {
     if (!line.empty()) last = line;
   }
@@ -74,7 +74,7 @@ void CheckRuns(const fs::path& folder, const Config& config, bool more_steps) {
   }
   const fs::path settings = folder / kSettingsName;
   if (!IsFile(settings)) return;
-  CheckSame(BuildConfig(settings, {}), config, more_steps, settings.string());
+  CheckSame(ReadSettings(settings), config, more_steps, settings.string());
 }
 
 /// All runs as they stand.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
 
 #include "core/error.h"
 #include "core/json.h"
@@ -22,16 +21,6 @@ using nlohmann::ordered_json;
 constexpr std::array kKeeps{"all", "policy", "tables"};  // in the order of Keep
 constexpr size_t kMostVariants = 10'000, kMostPlanBytes = 1 << 24;
 
-/// The end of a file, at most so many bytes; empty if it is no regular file.
-std::string TailOf(const fs::path& path, std::streamoff bytes) {
-  if (!IsOwnFile(path)) return "";
-  std::ifstream file(path, std::ios::binary | std::ios::ate);
-  if (!file) return "";
-  const std::streamoff size = file.tellg();
-  file.seekg(std::max<std::streamoff>(0, size - bytes));
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
 }  // namespace
 
 Keep ParseKeep(std::string_view text, const std::string& where) {
@@ -44,7 +33,7 @@ int64_t SeedRun::Steps() const {
   if (finished) return state->steps;
   const int64_t at_checkpoint = state ? state->steps : 0;
   // A row begins with its step; the last one may be half written.
-  const std::string tail = TailOf(path / RunFolder::kMetrics, 1024);
+  const std::string tail = ReadEnd(path / RunFolder::kMetrics, 1024);
   const std::vector<std::string_view> rows = Split(tail, '\n');
   if (rows.size() < 3) return at_checkpoint;
   const auto at_metrics = ParseInteger(Split(rows[rows.size() - 2], ',').front());
@@ -154,7 +143,7 @@ StudyPlan ReadPlan(const fs::path& folder) {
       }
       CheckNoLink(folder / variant.name);
       const fs::path settings = folder / variant.name / kSettingsName;
-      variant.config = BuildConfig(settings, {});
+      variant.config = ReadSettings(settings);
       MakeReadyForMany(variant.config);
       if (SettingsMark(variant.config) != JsonText(one, "settings")) {
         throw BadInput(Concat(settings.string(), " is not that of the plan; `study` makes both"));

@@ -153,10 +153,10 @@ void WriteEvaluations(const StudyPlan& plan) {
     for (const std::string_view line : Split(result->evaluations, '\n')) {
       if (line.empty()) continue;
       if (!is_first) {
-        table += Concat(run.variant->name, ',', run.seed, ',', line, '\n');
+        table += Concat(run.variant->name, ',', run.seed, ',', Printable(line), '\n');
       } else if (columns.empty()) {
-        columns = line;
-      } else if (columns != line) {
+        columns = Printable(line);
+      } else if (columns != Printable(line)) {
         throw Failure(Concat(run.done().string(),
                              ": its evaluations have other columns than those ", "of other runs"));
       }
