@@ -54,6 +54,10 @@ class Lqr(ProgramTest):
         other = json.loads(self.succeed("eval", "lqr", "--set", "mass2=1.2", "--episodes", 4,
                                         "--physics", "closed-form", "--json"))
         self.assertEqual((other["policy"], other["plant"]["mass2"]), ("lqr", 1.2))
+        note = "it balances and does not swing up"
+        for name, balances in (("lqr", True), ("energy", False)):
+            table = self.succeed("eval", name, "--episodes", 1, "--physics", "closed-form")
+            self.assertEqual(note in table, balances, name)
 
     def test_info(self):
         text = self.succeed("info", "lqr")

@@ -95,6 +95,9 @@ void PrintEvalTable(const EvalReport& report) {
     fmt::print("  made for       the plant of each episode; for {} of {} there is none\n",
                e.episodes - NumMade(report), e.episodes);
   }
+  if (report.only_balances) {
+    fmt::print("  note           it balances and does not swing up; episodes begin hanging\n");
+  }
   fmt::print("  success        {} of {} = {:.1f}%   (95% interval {:.1f}% to {:.1f}%)\n",
              e.successes, e.episodes, 100 * e.success_rate(), 100 * e.success_interval.low,
              100 * e.success_interval.high);

@@ -8,6 +8,7 @@
 #include "core/error.h"
 #include "core/format.h"
 #include "core/text.h"
+#include "setup/controllers.h"
 #include "sim/upright_modes.h"
 
 namespace upswing {
@@ -145,6 +146,7 @@ EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& tria
   report.env.num_envs = static_cast<int>(episodes);
   report.spec = SpecOf(report.env);
   report.knows_values = ValueUnitsOf(*loaded.policy).gamma > 0;
+  report.only_balances = OnlyBalances(loaded.policy->kind());
   constexpr int64_t kAtOnce = 4096;
   for (int64_t done = 0; done < episodes; done += kAtOnce) {
     EnvConfig config = report.env;

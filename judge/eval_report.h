@@ -33,8 +33,9 @@ struct EvalReport {
   EnvSpec spec;
   std::vector<JudgedEpisode> episodes;
   Evaluation figures;
-  bool known_plant = false;   // each episode had a controller made for its plant
-  bool knows_values = false;  // the policy says what its Q-values estimate
+  bool known_plant = false;    // each episode had a controller made for its plant
+  bool knows_values = false;   // the policy says what its Q-values estimate
+  bool only_balances = false;  // a controller that does not swing up
 };
 
 /// Lets a policy control `episodes` episodes of the environments that a trial makes, and says how

@@ -16,6 +16,7 @@ namespace {
 struct Controller {
   const char* name;
   std::shared_ptr<const Policy> (*make)(const ControllerConfig& config);
+  bool only_balances = false;
 };
 
 using Made = std::shared_ptr<const Policy>;
@@ -74,7 +75,8 @@ constexpr Controller kControllers[] = {
     {"lqr",
      [](const ControllerConfig& config) -> Made {
        return std::make_shared<LqrPolicy>(config.lqr, config.plant);
-     }},
+     },
+     true},
     {"mpc",
      [](const ControllerConfig& config) -> Made {
        return std::make_shared<MpcPolicy>(config.lqr, config.mpc, config.plant);
@@ -102,6 +104,11 @@ std::vector<std::string> ControllerNames() { return NamesOf(kControllers); }
 
 bool IsController(const std::string& name) {
   return std::ranges::any_of(kControllers, [&](const Controller& c) { return name == c.name; });
+}
+
+bool OnlyBalances(const std::string& name) {
+  return std::ranges::any_of(
+      kControllers, [&](const Controller& c) { return name == c.name && c.only_balances; });
 }
 
 bool HasSection(const std::string& controller, const std::string& section) {

@@ -32,6 +32,9 @@ std::vector<std::string> ControllerNames();
 
 bool IsController(const std::string& name);
 
+/// Whether a controller holds the pendulum upright and does not swing it up.
+bool OnlyBalances(const std::string& name);
+
 /// Whether a controller has the settings of this section: its own, and those of lqr, on which all
 /// build.
 bool HasSection(const std::string& controller, const std::string& section);
