@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
+#include <iterator>
 #include <utility>
 
 #include "core/error.h"
@@ -51,9 +52,14 @@ class HelpFormatter : public CLI::Formatter {
   /// `before` is called before help is printed, which may depend on the other arguments.
   explicit HelpFormatter(std::function<void()> before = {}) : before_(std::move(before)) {}
 
+  /// Hides the flags that are not shown.
+  void HideFlags() const {
+    if (before_) before_();
+  }
+
   std::string make_help(const CLI::App* app, std::string name,
                         CLI::AppFormatMode mode) const override {
-    if (before_) before_();
+    HideFlags();
     return CLI::Formatter::make_help(app, std::move(name), mode);
   }
 
@@ -74,14 +80,36 @@ class HelpFormatter : public CLI::Formatter {
   std::function<void()> before_;
 };
 
-/// Returns every flag of a command, and the names of its subcommands.
+std::vector<std::string> FlagsOf(const CLI::Option& option) {
+  std::vector<std::string> flags;
+  for (const std::string& name : option.get_lnames()) flags.push_back("--" + name);
+  return flags;
+}
+
+bool IsHidden(const CLI::Option& option) { return option.get_group().empty(); }
+
+/// Returns every flag of a command that is not hidden, and the names of its subcommands.
 std::vector<std::string> KnownWords(const CLI::App& app) {
   std::vector<std::string> words;
   for (const CLI::Option* option : app.get_options()) {
-    for (const std::string& name : option->get_lnames()) words.push_back("--" + name);
+    if (!IsHidden(*option)) std::ranges::copy(FlagsOf(*option), std::back_inserter(words));
   }
   for (const CLI::App* sub : app.get_subcommands({})) words.push_back(sub->get_name());
   return words;
+}
+
+/// Says of a flag that is not known what was meant, or why there is none of that name.
+std::string ExplainFlag(const CLI::App& app, const std::string& word) {
+  if (const auto* help = dynamic_cast<const HelpFormatter*>(app.get_formatter().get())) {
+    help->HideFlags();
+  }
+  const std::string meant = DidYouMean(word, KnownWords(app));
+  if (!meant.empty()) return meant;
+  for (const CLI::Option* option : app.get_options()) {
+    const bool near = IsHidden(*option) && !DidYouMean(word, FlagsOf(*option)).empty();
+    if (near) return Concat("; ", option->get_description());
+  }
+  return "";
 }
 
 /// Says which commands there are, as `got` is none.
@@ -119,8 +147,8 @@ std::string ExplainUnknown(const CLI::App& program, const CLI::App& app) {
   const std::vector<std::string> unknown = app.remaining();
   if (unknown.empty()) return "";
   const std::string word = unknown.front().substr(0, unknown.front().find('='));
+  if (word.starts_with("-")) return Concat("unknown flag ", word, ExplainFlag(app, word));
   const std::string meant = DidYouMean(word, KnownWords(app));
-  if (word.starts_with("-")) return Concat("unknown flag ", word, meant);
   return &app == &program ? ExplainCommands(program, Concat("\"", word, "\"", meant))
                           : Concat(app.get_name(), ": did not expect ", word, meant);
 }
@@ -216,7 +244,8 @@ void CommandLine::ShowSettings(std::function<void(const ShowOptions&)> shown) {
       CLI::Option* flag = app_.get_option(option.flag());
       const Option* found = options.Get(option.name);
       flag->group(found == nullptr ? "" : found->section);
-      if (found != nullptr) flag->description(found->about_with_default());
+      flag->description(found == nullptr ? options.WhyMissing(option.name)
+                                         : found->about_with_default());
     }
   };
   app_.formatter(

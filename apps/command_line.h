@@ -52,7 +52,8 @@ class CommandLine {
   /// given is added to `flags`.
   void Settings(const Options& options, std::vector<FlagValue>& flags);
   /// Lets --help ask `shown`, which calls its argument with all settings that were added and with
-  /// those to show, whose values are the defaults.
+  /// those to show, whose values are the defaults. Only flags of these are suggested for a misspelt
+  /// one; of the others the message has their WhyMissing.
   using ShowOptions = std::function<void(const Options& every, const Options& options)>;
   void ShowSettings(std::function<void(const ShowOptions&)> shown);
 

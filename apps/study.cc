@@ -113,7 +113,12 @@ int RunStudy(const StudyArguments& arguments) {
   if (!arguments.work.empty()) return WorkOnStudy(arguments.work);
   if (arguments.status) {
     const bool is_folder = fs::is_directory(arguments.file);
-    return PrintStudyStatus(is_folder ? fs::path(arguments.file) : arguments.folder());
+    const fs::path folder = is_folder ? fs::path(arguments.file) : arguments.folder();
+    if (!Exists(arguments.file) && !Exists(folder)) {
+      throw BadInput(Concat(arguments.file, ": expected a study's file or folder, got nothing of ",
+                            "that name"));
+    }
+    return PrintStudyStatus(folder);
   }
   const ManyRuns many = ReadStudy(arguments);
   if (arguments.prepare) {

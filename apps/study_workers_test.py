@@ -272,7 +272,10 @@ class WorkersTest(ProgramTest):
                 self.refuse(["study", "--work", "study"], words)
         self.write("study/plan.json", "{")
         self.refuse(["study", "--work", "study"], "study/plan.json")
-        self.refuse(["study", "--work", "none"], "none: expected the folder of a study")
+        self.refuse(["study", "--work", "none"],
+                    "none: expected the folder of a study, got nothing of that name")
+        self.refuse(["study", "none.toml", "--status"], "none.toml: expected a study's file or folder")
+        self.refuse(["study", "none.toml"], "cannot read none.toml: No such file")
         self.refuse(["study", "--work", "study", "--jobs", "2"], "--work: expected no --jobs")
         self.refuse(["study", "--work", "study", "x.toml"], "--work: expected no FILE.toml")
         self.refuse(["study", "--work", ""], "--work: expected a path")

@@ -81,13 +81,17 @@ void CheckManyArguments(const CommandLine& line) {
   }
 }
 
-/// Lets --help show the defaults of the agent and the configuration file that were given.
+/// Lets --help show the defaults of the agent and the file, or of the run, that were given.
 void ShowDefaultsOfWhatIsChosen(const CommandLine& line, const CommandLine::ShowOptions& show) {
   std::vector<FlagValue> flags;
-  if (const std::string agent = line.Last("--agent"); !agent.empty()) flags = {{"agent", agent}};
-  Config config = BuildConfig(line.Last("--config"), flags);
+  // Of an algorithm alone, the agent of its name is shown.
+  for (const char* flag : {"--algorithm", "--agent"}) {
+    if (const std::string agent = line.Last(flag); !agent.empty()) flags = {{"agent", agent, flag}};
+  }
+  const std::string run = line.Last("--resume");
+  Config config = run.empty() ? BuildConfig(line.Last("--config"), flags) : ReadRunConfig(run);
   Config scratch;
-  show(EverySetting(scratch), OptionsOf(config));
+  show(EverySetting(scratch), KnownOptions(config));
 }
 
 /// The named agents, a paragraph each.

@@ -233,6 +233,11 @@ void Options::Explain(std::string_view name, std::string_view why) {
   missing_[std::string(name)] = why;
 }
 
+std::string Options::WhyMissing(std::string_view name) const {
+  const auto why = missing_.find(name);
+  return why == missing_.end() ? "" : why->second;
+}
+
 const Option* Options::Get(std::string_view name) const {
   const auto found =
       std::ranges::find_if(options_, [&](const Option& option) { return option.name == name; });
@@ -251,8 +256,8 @@ std::vector<const Option*> Options::Find(std::string_view name, const std::strin
     known.push_back(option.name);
     if (std::count(names.begin(), names.end(), option.name) != 0) found.push_back(&option);
   }
-  if (const auto why = missing_.find(name); found.empty() && why != missing_.end()) {
-    throw BadInput(Concat(where, ": ", why->second));
+  if (const std::string why = WhyMissing(name); found.empty() && !why.empty()) {
+    throw BadInput(Concat(where, ": ", why));
   }
   if (found.empty()) {
     std::string hint = DidYouMean(name, known);

@@ -120,6 +120,8 @@ class Options {
 
   /// Says why there is no setting of this name, for the message of Find.
   void Explain(std::string_view name, std::string_view why);
+  /// What Explain said; empty: nothing.
+  std::string WhyMissing(std::string_view name) const;
 
   const std::vector<Option>& all() const { return options_; }
   /// The setting of this name; nullptr if there is none.

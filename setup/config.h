@@ -78,6 +78,10 @@ struct Config {
 /// The settings of all algorithms, each name once; they point into `scratch`.
 Options EverySetting(Config& scratch);
 
+/// The settings of a configuration. For a name that only other algorithms have, WhyMissing names
+/// them.
+Options KnownOptions(Config& config);
+
 /// A setting given on the command line or in a study: name (or that of an alias), text, and where,
 /// which begins messages; an empty place stands for the flag of that name.
 struct FlagValue {

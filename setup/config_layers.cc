@@ -56,23 +56,6 @@ std::string AlgorithmIn(const toml::table& table, const std::string& where) {
   return found.value;
 }
 
-/// The settings of a configuration, which say of those that other algorithms have whose they are.
-Options KnownOptions(Config& config, std::string_view agent) {
-  Options options = OptionsOf(config);
-  std::map<std::string, std::vector<std::string>> owners;
-  for (const std::string& algorithm : AlgorithmNames()) {
-    Config other(algorithm);
-    const Options of_other = OptionsOf(other);
-    for (const Option& option : of_other.all()) owners[option.name].push_back(algorithm);
-  }
-  for (const auto& [name, algorithms] : owners) {
-    if (options.Get(name) != nullptr) continue;
-    options.Explain(name, Concat(name, " is a setting of ", Join(algorithms, " and "),
-                                 ", but agent ", agent, " learns by ", config.algorithm));
-  }
-  return options;
-}
-
 /// The named agent of a configuration, its settings and its algorithm.
 struct ChosenAgent {
   std::string_view name;
@@ -104,6 +87,22 @@ ChosenAgent ChooseAgent(const toml::table& table, const std::string& where,
 
 }  // namespace
 
+Options KnownOptions(Config& config) {
+  Options options = OptionsOf(config);
+  std::map<std::string, std::vector<std::string>> owners;
+  for (const std::string& algorithm : AlgorithmNames()) {
+    Config other(algorithm);
+    const Options of_other = OptionsOf(other);
+    for (const Option& option : of_other.all()) owners[option.name].push_back(algorithm);
+  }
+  for (const auto& [name, algorithms] : owners) {
+    if (options.Get(name) != nullptr) continue;
+    options.Explain(name, Concat(name, " is a setting of ", Join(algorithms, " and "),
+                                 ", but agent ", config.agent, " learns by ", config.algorithm));
+  }
+  return options;
+}
+
 void SetFlags(const Options& options, const std::vector<FlagValue>& flags) {
   for (const auto& [name, value, place] : flags) {
     options.Set(name, value, place.empty() ? FlagOf(name) : place);
@@ -126,7 +125,8 @@ Config ParseConfig(std::string_view text, const std::string& where,
   const toml::table table = ParseToml(text, where);
   const ChosenAgent agent = ChooseAgent(table, where, flags);
   Config config(agent.algorithm);
-  const Options options = KnownOptions(config, agent.name);
+  config.agent = agent.name;
+  const Options options = KnownOptions(config);
 
   // A model file has a plant of its own, which other settings may change.
   const EarlySetting named = FindEarly("plant", "model", table, where, flags);

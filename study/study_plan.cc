@@ -121,7 +121,8 @@ StudyPlan ReadPlan(const fs::path& folder) {
   const std::string where = path.string();
   if (!Exists(path)) {
     throw BadInput(
-        Concat(folder.string(), ": expected the folder of a study, got one without ", kPlanName));
+        Concat(folder.string(), ": expected the folder of a study, got ",
+               Exists(folder) ? Concat("one without ", kPlanName) : "nothing of that name"));
   }
   StudyPlan plan;
   plan.folder = folder;
