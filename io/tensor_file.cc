@@ -7,6 +7,7 @@
 #include "core/safetensors.h"
 #include "core/text.h"
 #include "io/file.h"
+#include "io/machine.h"
 
 namespace upswing {
 namespace {
@@ -30,7 +31,8 @@ void SaveTensors(const Tensors& tensors, const std::filesystem::path& path) {
 }
 
 Tensors LoadTensors(const std::filesystem::path& path, size_t most_bytes) {
-  return ReadSafetensors(ReadOwnBytes(path, most_bytes), path.string());
+  const auto memory = static_cast<size_t>(AvailableMemory());
+  return ReadSafetensors(ReadOwnBytes(path, std::min(most_bytes, memory)), path.string());
 }
 
 Tensors LoadPartOfTensors(const std::filesystem::path& path, std::string_view prefix) {

@@ -17,7 +17,7 @@ void SaveTensors(const Tensors& tensors, const std::filesystem::path& path);
 inline constexpr size_t kMostPolicyBytes = size_t{1} << 31;
 
 /// Reads and checks everything: sizes, shapes, offsets, checksum. Throws BadInput, also if the file
-/// is larger than `most_bytes`.
+/// is larger than `most_bytes` or than the memory that is left.
 Tensors LoadTensors(const std::filesystem::path& path,
                     size_t most_bytes = std::numeric_limits<size_t>::max());
 

@@ -193,6 +193,10 @@ TEST_F(TensorFileTest, APartOfABrokenFileIsRefusedAsTheWholeIs) {
   const fs::path pipe = folder_ / "pipe";
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
   EXPECT_THROW(LoadTensors(path_, fs::file_size(path_) - 1), Error);
+  const fs::path sparse = folder_ / "sparse";
+  WriteFileAtomically(sparse, "");
+  fs::resize_file(sparse, uintmax_t{1} << 43);  // 8 TiB
+  EXPECT_THROW(LoadTensors(sparse), Error);
   for (const fs::path& path : {pipe, folder_.path()}) {
     const std::string error = "cannot read " + path.string() + ": expected a regular file";
     EXPECT_EQ(part_error(path), error);
