@@ -3,6 +3,7 @@
 //   fuzz_seeds fuzz/corpus
 #include <cstdio>
 #include <filesystem>
+#include <tuple>
 
 #include "core/error.h"
 #include "fuzz/tiny_training.h"
@@ -71,8 +72,11 @@ void MakeSeeds(const fs::path& corpus) {
   Tensors narrow = policy.Rounded().ToTensors();
   narrow.Narrow();
   SaveTensors(narrow, corpus / "policy/accepted/bfloat16.safetensors");
-  const SwingNet net(Robot::kAcrobot, 4);
-  SaveTensors(net.ToTensors(net.Initial(1)), corpus / "policy/accepted/searched.safetensors");
+  for (const auto& [robot, hidden, name] : {std::tuple(Robot::kAcrobot, 4, "searched.safetensors"),
+                                            {Robot::kPendubot, 16, "searched-16.safetensors"}}) {
+    const SwingNet net(robot, hidden);
+    SaveTensors(net.ToTensors(net.Initial(1)), corpus / "policy/accepted" / name);
+  }
 }
 
 }  // namespace

@@ -4,11 +4,13 @@
 #include <cmath>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/safetensors.h"
 #include "core/text.h"
 #include "export/export.h"
 #include "fuzz/target.h"
+#include "realaigym/simulation.h"
 #include "realaigym/swing_policy.h"
 #include "run/find_policy.h"
 #include "run/train_command.h"
@@ -17,16 +19,29 @@
 namespace upswing {
 namespace {
 
-/// A policy of the boards is written as it was read, and chooses torques.
+/// A policy of the boards is written as it was read, chooses finite torques from any state that a
+/// simulation may reach, and moves the board for a while.
 void TrySwingPolicy(const Tensors& tensors) {
   const SwingPolicy policy = ReadSwingPolicy(tensors);
   const Tensors again = policy.net.ToTensors(policy.numbers);
   Expect(ReadSwingPolicy(again).numbers == policy.numbers, "the same numbers again");
+  const auto finite = [](double x) { return std::isfinite(x); };
+  const auto controller = policy.net.Control(policy.numbers);
   BoardMeasurement measured{};
-  measured.q1.fill(0.5);
   Lanes torque{};
-  policy.net.Control(policy.numbers)->Act(0, measured, kBoardBlock, torque);
-  Expect(std::ranges::all_of(torque, [](double x) { return std::isfinite(x); }), "finite torques");
+  for (const double q : {0.0, 3.1, 3.2, -1e3, 1e6}) {
+    measured.q1.fill(q);
+    measured.q2.fill(-q);
+    controller->Act(q == 0 ? 0 : 1, measured, kBoardBlock, torque);
+    Expect(std::ranges::all_of(torque, finite), "finite torques");
+  }
+  BoardEpisode episode;
+  episode.steps = 100;
+  std::vector<BoardSample> trace;
+  SimulateOnBoard(
+      policy.net.robot(), {&episode, 1}, [&](size_t) { return policy.net.Control(policy.numbers); },
+      nullptr, &trace);
+  Expect(std::ranges::all_of(trace, finite, &BoardSample::torque), "finite torques of an episode");
 }
 
 }  // namespace
