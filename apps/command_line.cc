@@ -103,8 +103,7 @@ std::string ExplainFlag(const CLI::App& app, const std::string& word) {
   if (const auto* help = dynamic_cast<const HelpFormatter*>(app.get_formatter().get())) {
     help->HideFlags();
   }
-  const std::string meant = DidYouMean(word, KnownWords(app));
-  if (!meant.empty()) return meant;
+  if (std::string meant = DidYouMean(word, KnownWords(app)); !meant.empty()) return meant;
   for (const CLI::Option* option : app.get_options()) {
     const bool near = IsHidden(*option) && !DidYouMean(word, FlagsOf(*option)).empty();
     if (near) return Concat("; ", option->get_description());
