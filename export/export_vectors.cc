@@ -160,9 +160,10 @@ ordered_json Delays() {
   ordered_json delays;
   const std::vector<double> chosen = DrawTorques(12, "test vectors: delay");
   for (const double delay : {0.0, 0.02, 0.05, 0.1}) {
-    const Disturbance disturbance{0, delay};
-    Disturber disturber({disturbance}, 1, disturbance.delay_steps(), 0, "");
-    disturber.Begin(0);
+    Disturbance disturbance;
+    disturbance.delay = delay;
+    Disturber disturber({disturbance}, 1, disturbance, 0, "");
+    disturber.Begin(0, {});
     std::vector<double> applied;
     for (size_t i = 0; i < chosen.size(); ++i) {
       const auto step = static_cast<int64_t>(i);

@@ -43,8 +43,8 @@ void AddCells(const EvalReport& report, const JudgedEpisode& episode, CsvTable& 
     for (const auto& [name, value] : PlantValues(episode.plant)) add(name, value);
     const double delta = ModesOf(episode.plant).delta;
     add("delta", delta, std::isfinite(delta));
-    add("sensor_noise", episode.disturbance.sensor_noise);
-    add("delay", episode.disturbance.delay);
+    const Options disturbance = OptionsOf(episode.disturbance);
+    for (const Option& option : disturbance.all()) add(option.name, option.number());
   }
   add("success", e.success ? 1 : 0);
   for (size_t body = 0; body < e.tilt.size(); ++body) {

@@ -56,19 +56,6 @@ PendulumState StateOf(const RolloutRow& row) {
   return {row.state[0], row.state[1], row.state[2], row.state[3]};
 }
 
-PendulumState StateBetween(const PendulumState& a, const PendulumState& b, double h, double share) {
-  const double s = share, s2 = s * s, s3 = s2 * s;
-  const auto angle = [&](double q0, double w0, double q1, double w1) {
-    return (2 * s3 - 3 * s2 + 1) * q0 + (s3 - 2 * s2 + s) * h * w0 + (3 * s2 - 2 * s3) * q1 +
-           (s3 - s2) * h * w1;
-  };
-  const auto velocity = [&](double q0, double w0, double q1, double w1) {
-    return 6 * (s2 - s) * (q0 - q1) / h + (3 * s2 - 4 * s + 1) * w0 + (3 * s2 - 2 * s) * w1;
-  };
-  return {angle(a.q1, a.w1, b.q1, b.w1), angle(a.q2, a.w2, b.q2, b.w2),
-          velocity(a.q1, a.w1, b.q1, b.w1), velocity(a.q2, a.w2, b.q2, b.w2)};
-}
-
 Episode::Episode(RolloutConfig config)
     : config_(std::move(config)),
       env_([&] {
@@ -211,9 +198,10 @@ std::string JudgementText(const Policy& policy, const EnvConfig& config) {
 std::string EpisodeText(const Rollout& rollout) {
   if (!HasPlant(rollout.spec.task)) return "";
   std::string text = PlantText(rollout.plant);
-  const auto& [noise, delay] = rollout.disturbance;
-  if (noise > 0) text += Concat(", sensor_noise ", FormatNumber(noise));
-  if (delay > 0) text += Concat(", delay ", FormatNumber(delay));
+  const Options options = OptionsOf(rollout.disturbance);
+  for (const Option& option : options.all()) {
+    if (option.number() > 0) text += Concat(", ", option.name, " ", FormatNumber(option.number()));
+  }
   return text;
 }
 

@@ -113,16 +113,12 @@ std::string RolloutCsv(const Rollout& rollout);
 /// The double pendulum's state in a row.
 PendulumState StateOf(const RolloutRow& row);
 
-/// The state at a share of the `h` seconds from one state to another: along the cubic that has
-/// their angles and velocities.
-PendulumState StateBetween(const PendulumState& a, const PendulumState& b, double h, double share);
-
 /// What `eval` says of the environment's own episode, such as
 /// `success, upright from 2.34 s to the end, return 2345`.
 std::string JudgementText(const Policy& policy, const EnvConfig& config);
 
 /// What distinguishes an episode from others with the same flags: its plant, `mass1 0.93, …`, and
-/// its sensor noise (rad, rad/s) and delay (s) where there are any; empty for other tasks.
+/// the settings of its disturbance that are not 0; empty for other tasks.
 std::string EpisodeText(const Rollout& rollout);
 
 }  // namespace upswing

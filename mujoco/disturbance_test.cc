@@ -41,7 +41,7 @@ TEST(Disturbance, SettingsAreChecked) {
 }
 
 TEST(Disturber, TorquesArriveAfterTheDelayAndNoneFromAnEarlierEpisode) {
-  Disturber motors({{0, 0}, {0, 0.02}, {0, 0.06}}, 3, 3, 1, "test");
+  Disturber motors({{0, 0}, {0, 0.02}, {0, 0.06}}, 3, {0, 0.06}, 1, "test");
   // Torques that three motors apply when 1, 2, 3, … are chosen for all; the last two begin a new
   // episode before the step at which 5 is chosen.
   const double expected[7][3] = {{1, 0, 0}, {2, 1, 0}, {3, 2, 0}, {4, 3, 1},
@@ -49,8 +49,8 @@ TEST(Disturber, TorquesArriveAfterTheDelayAndNoneFromAnEarlierEpisode) {
   std::vector<int64_t> steps{0, 0, 0};
   for (int k = 0; k < 7; ++k) {
     if (k == 4) {
-      motors.Begin(1);
-      motors.Begin(2);
+      motors.Begin(1, {});
+      motors.Begin(2, {});
       steps[1] = steps[2] = 0;
     }
     const auto held = motors.Apply(std::vector<double>(3, k + 1), steps);
@@ -61,7 +61,7 @@ TEST(Disturber, TorquesArriveAfterTheDelayAndNoneFromAnEarlierEpisode) {
 
 TEST(Disturber, NoiseIsNormalAndIndependentOnAllFour) {
   constexpr int kCount = 20000;
-  Disturber sensors({{0.3, 0}}, 1, 0, 1, "test");
+  Disturber sensors({{0.3, 0}}, 1, {0.3, 0}, 1, "test");
   const PendulumState truth{1, 2, 3, 4};
   double sum[4] = {}, product[4][4] = {}, fourth[4] = {}, lag = 0, last = 0;
   for (int n = 0; n < kCount; ++n) {
@@ -88,13 +88,13 @@ TEST(Disturber, NoiseIsNormalAndIndependentOnAllFour) {
 }
 
 TEST(Disturber, EachEnvironmentHasItsOwnStream) {
-  Disturber two({{1, 0}}, 2, 0, 7, "test");
-  Disturber second({{0, 0}, {1, 0}}, 2, 0, 7, "test"), other({{1, 0}}, 2, 0, 7, "other");
+  Disturber two({{1, 0}}, 2, {1, 0}, 7, "test");
+  Disturber second({{0, 0}, {1, 0}}, 2, {1, 0}, 7, "test"), other({{1, 0}}, 2, {1, 0}, 7, "other");
   (void)two.Measure(0, {});  // takes nothing from the second's stream
   const double noise = two.Measure(1, {}).q1;
   EXPECT_EQ(noise, second.Measure(1, {}).q1);
   EXPECT_NE(noise, other.Measure(1, {}).q1);
-  EXPECT_NE(noise, Disturber({{1, 0}}, 1, 0, 7, "test").Measure(0, {}).q1);
+  EXPECT_NE(noise, Disturber({{1, 0}}, 1, {1, 0}, 7, "test").Measure(0, {}).q1);
 }
 
 TEST(DisturbedEnv, OnlyMeasurementsHaveNoise) {
@@ -156,6 +156,77 @@ TEST(DisturbedEnv, ADelayedMotorActsAsOneThatIsCommandedLater) {
 
 TEST(DisturbedEnv, LoadedStateContinuesWithTheSameBits) {
   ExpectLoadedGoesOn(FourKinds(), 5);  // with torques under way
+}
+
+/// Environments whose sensors differ, with each physics.
+class MeasuredEnvs : public testing::TestWithParam<const Engine*> {
+ protected:
+  static PendulumEnvConfig Config() {
+    PendulumEnvConfig config;
+    config.engine = GetParam();
+    config.num_envs = 3;
+    config.episode_seconds = 0.14;  // seven steps
+    config.disturbances = {{}, {0, 0, {0.02, 1000, 0.04, 0}}, {0.01, 0.02, {0.005, 0, 0.01, 0.02}}};
+    return config;
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(Physics, MeasuredEnvs, EachEngine(), EngineName);
+
+TEST_P(MeasuredEnvs, ObservationsAreOfThePastCountsAndTheRestIsTrue) {
+  PendulumEnv env(Config());
+  PendulumEnvConfig perfect = Config();
+  perfect.disturbances = {Disturbance()};
+  PendulumEnv reference(perfect);
+  StepResult result = env.MakeResult(), expected = reference.MakeResult();
+  for (int episode = 0; episode < 3; ++episode) {
+    const PendulumState start = env.state(1);
+    std::vector<PendulumState> past;  // the start is at index 3
+    for (int k = -3; k <= 0; ++k) {
+      const double t = k * kControlPeriod;
+      past.push_back({start.q1 + t * start.w1, start.q2 + t * start.w2, start.w1, start.w2});
+    }
+    for (int step = 0; step < 7; ++step) {
+      const PendulumState &then = past[past.size() - 2], &before = past[past.size() - 4];
+      const double q1 = Quantized(then.q1, 1000), q2 = Quantized(then.q2, 1000);
+      const auto seen = Observe(env.plant(1), {q1, q2, (q1 - Quantized(before.q1, 1000)) / 0.04,
+                                               (q2 - Quantized(before.q2, 1000)) / 0.04});
+      for (size_t k = 0; k < kObservationSize; ++k) ASSERT_NEAR(env.obs().row(1)[k], seen[k], 1e-6);
+      const double torque = 4 * std::sin(step + episode);
+      env.Step(std::vector<double>(3, torque), result);
+      reference.Step(std::vector<double>(3, torque), expected);
+      past.push_back(env.state(1));
+      for (const size_t i : {0, 1}) ASSERT_EQ(result.reward[i], expected.reward[i]);
+      ASSERT_TRUE(std::ranges::equal(env.obs().row(0), reference.obs().row(0),
+                                     [](float a, float b) { return std::abs(a - b) < 1e-6; }));
+    }
+  }
+}
+
+TEST_P(MeasuredEnvs, LoadedStateContinuesWithTheSameBits) {
+  PendulumEnvConfig config = Config();
+  ExpectLoadedGoesOn(config, 5);
+  config.randomization.sensor_latency = 0.05;
+  config.randomization.plant.fill(0.2);
+  ExpectLoadedGoesOn(config, 9);  // in the second episode
+}
+
+TEST(MeasuredEnv, BothPhysicsMeasureTheSame) {
+  PendulumEnvConfig config;
+  config.num_envs = 20;
+  config.episode_seconds = 1;
+  config.start.random_share = 0.5;
+  config.disturbances = {{0, 0, {0.005, 4096, 0.01, 0.005}}};
+  PendulumEnv twin(config);
+  config.engine = &kMuJoCo;
+  PendulumEnv mujoco(config);
+  StepResult a = mujoco.MakeResult(), b = twin.MakeResult();
+  for (int step = 0; step < 120; ++step) {  // over two resets
+    const std::vector<double> torque(20, 5 * std::sin(0.3 * step));
+    mujoco.Step(torque, a);
+    twin.Step(torque, b);
+    for (size_t k = 0; k < a.next_obs.size(); ++k) ASSERT_NEAR(a.next_obs[k], b.next_obs[k], 1e-6);
+  }
 }
 
 }  // namespace

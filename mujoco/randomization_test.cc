@@ -34,6 +34,7 @@ TEST(Randomization, SettingsAreCheckedAndHaveAliases) {
     EXPECT_THROW(options.Set("randomize", bad, "test"), Error) << bad;
   }
   EXPECT_THROW(options.Set("randomize_delay", "-0.02", "test"), Error);
+  EXPECT_THROW(options.Set("randomize_sensor_latency", "0.2", "test"), Error);
   options.Set("randomize", "0.25", "test");
   options.Set("randomize_length", "0.1", "test");
   EXPECT_EQ(box.plant, (std::array{0.25, 0.25, 0.1, 0.1, 0.25, 0.25, 0.25, 0.0}));
@@ -106,6 +107,23 @@ TEST(Randomization, DisturbancesGoFromTheNominalUpwards) {
   for (size_t k = 0; k < delays.size(); ++k) {
     EXPECT_NEAR(delays[k], k < 2 ? 0 : kCount / 4.0, k < 2 ? 0 : 5 * std::sqrt(kCount * 3 / 16.0));
   }
+}
+
+TEST(Randomization, ARandomLatencyLeavesTheOtherDraws) {
+  Randomization box;
+  box.sensor_noise = 0.1;
+  Rng rng(1, "test"), same(1, "test");
+  const Disturbance nominal{0.2, 0.04, {0.01, 4096, 0.01, 0.02}};
+  const Disturbance before = box.Draw(nominal, rng);
+  EXPECT_EQ(before.sensors.latency, 0.01);
+  EXPECT_EQ(before.sensors.encoder_counts, 4096);
+  box.sensor_latency = 0.03;
+  const Disturbance drawn = box.Draw(nominal, same);
+  EXPECT_EQ(drawn.sensor_noise, before.sensor_noise);
+  EXPECT_GT(drawn.sensors.latency, 0.01);
+  EXPECT_LE(drawn.sensors.latency, box.Largest(nominal).sensors.latency);
+  EXPECT_EQ(drawn.sensors.velocity_filter, 0.02);
+  EXPECT_NE(rng.Next(), same.Next());
 }
 
 class RandomizedEnvs : public testing::TestWithParam<const Engine*> {

@@ -13,23 +13,30 @@ void Disturbance::Describe(Options& o) {
         "standard deviation of the noise on all measured angles and velocities");
   o.Add(&delay, "delay", {0, kLargestDelay}, "s", "from the choice of a torque to its effect")
       .step = kControlPeriod;
+  sensors.Describe(o);
 }
 
 int Disturbance::delay_steps() const {
   return static_cast<int>(std::lround(delay / kControlPeriod));
 }
 
-Disturber::Disturber(std::vector<Disturbance> disturbances, int num_envs, int max_delay,
-                     uint64_t seed, const std::string& stream, uint64_t first_index)
-    : capacity_(static_cast<size_t>(max_delay)), disturbances_(std::move(disturbances)) {
+Disturber::Disturber(std::vector<Disturbance> disturbances, int num_envs,
+                     const Disturbance& largest, uint64_t seed, const std::string& stream,
+                     uint64_t first_index)
+    : capacity_(static_cast<size_t>(largest.delay_steps())),
+      disturbances_(std::move(disturbances)) {
   const auto n = static_cast<size_t>(num_envs);
   disturbances_.resize(n, disturbances_.front());
   queues_.resize(n * capacity_);
   applied_.resize(n);
+  if (!largest.sensors.exact()) sensors_.emplace(num_envs, largest.sensors);
   for (size_t i = 0; i < n; ++i) rngs_.emplace_back(seed, stream, first_index + i);
 }
 
-void Disturber::Begin(int env) { std::ranges::fill(Queue(env), 0.0); }
+void Disturber::Begin(int env, const PendulumState& start) {
+  std::ranges::fill(Queue(env), 0.0);
+  if (sensors_) sensors_->Begin(env, start);
+}
 
 std::span<const double> Disturber::Apply(std::span<const double> torque,
                                          std::span<const int64_t> steps) {
@@ -49,7 +56,9 @@ void Disturber::TakeBack(int env, int64_t step) {
 }
 
 PendulumState Disturber::Measure(int env, PendulumState s) {
-  const double noise = disturbances_[static_cast<size_t>(env)].sensor_noise;
+  const Disturbance& disturbance = disturbances_[static_cast<size_t>(env)];
+  if (sensors_) s = sensors_->Measure(env, disturbance.sensors, s);
+  const double noise = disturbance.sensor_noise;
   if (noise == 0) return s;
   Rng& rng = rngs_[static_cast<size_t>(env)];
   for (double* x : {&s.q1, &s.q2, &s.w1, &s.w2}) *x += noise * rng.Normal();
@@ -58,6 +67,7 @@ PendulumState Disturber::Measure(int env, PendulumState s) {
 
 void Disturber::State(const Archive& archive) {
   archive.Array("queues", std::span(queues_));
+  if (sensors_) sensors_->State(archive.In("sensors"));
   for (size_t i = 0; i < rngs_.size(); ++i) rngs_[i].State(archive.In(Concat("rng.", i)));
 }
 

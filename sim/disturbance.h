@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -9,24 +10,26 @@
 #include "core/options.h"
 #include "core/rng.h"
 #include "sim/double_pendulum.h"
+#include "sim/sensors.h"
 
 namespace upswing {
 
 inline constexpr double kLargestDelay = 1;  // s
 
-/// Sensor noise and motor delay of one environment; zeros: none.
+/// Sensor noise, motor delay and sensors of one environment; zeros: none.
 ///
 /// The delay is the motor's: the torque chosen at one step is applied so many control periods
-/// later, and zero torque before the first arrives. So an observation is always that of the present
-/// state, and what the delay hides are the torques that are still waiting.
+/// later, and zero torque before the first arrives. What the delay hides are the torques that are
+/// still waiting. How old the measured state is, the sensors' latency says.
 struct Disturbance {
   double sensor_noise = 0;  // standard deviation, on each measured angle and velocity, rad, rad/s
   double delay = 0;  // from the choice of a torque to its effect, s, in whole control periods
+  SensorModel sensors = {};
 
   /// One line per setting: name, range, unit, help.
   void Describe(Options& options);
 
-  bool any() const { return sensor_noise > 0 || delay > 0; }
+  bool any() const { return sensor_noise > 0 || delay > 0 || !sensors.exact(); }
   /// The delay in control periods.
   int delay_steps() const;
 };
@@ -35,13 +38,13 @@ struct Disturbance {
 class Disturber {
  public:
   /// For environments with one of `disturbances` for all or one for each, none of which will have a
-  /// delay of more than `max_delay` control periods. Environment i draws its noise from (seed,
-  /// stream, first_index + i).
-  Disturber(std::vector<Disturbance> disturbances, int num_envs, int max_delay, uint64_t seed,
-            const std::string& stream, uint64_t first_index = 0);
+  /// larger value of any setting than `largest`. Environment i draws its noise from (seed, stream,
+  /// first_index + i).
+  Disturber(std::vector<Disturbance> disturbances, int num_envs, const Disturbance& largest,
+            uint64_t seed, const std::string& stream, uint64_t first_index = 0);
 
-  /// Begins an episode: no torque is waiting.
-  void Begin(int env);
+  /// Begins an episode in a state: no torque is waiting.
+  void Begin(int env, const PendulumState& start);
   /// Sets another disturbance, in effect from the next episode on.
   void Set(int env, const Disturbance& disturbance) {
     disturbances_[static_cast<size_t>(env)] = disturbance;
@@ -59,7 +62,7 @@ class Disturber {
   /// Takes back what Apply did to an environment at this step of its episode.
   void TakeBack(int env, int64_t step);
 
-  /// The state as the sensors measure it.
+  /// Takes the true state at a control step and returns what the sensors measure then, with noise.
   PendulumState Measure(int env, PendulumState state);
 
   /// Saves or loads the state; the disturbances themselves are not part of it.
@@ -74,6 +77,7 @@ class Disturber {
   std::vector<Disturbance> disturbances_;  // (N)
   std::vector<double> queues_;             // (N × capacity) torques that wait, N·m
   std::vector<double> applied_;            // (N) N·m
+  std::optional<Sensors> sensors_;         // none if all are exact
   std::vector<Rng> rngs_;                  // (N)
 };
 

@@ -79,6 +79,19 @@ double Armature1(const Plant& plant) {
   return kArmature + plant.gear_ratio * plant.gear_ratio * plant.rotor_inertia;
 }
 
+PendulumState StateBetween(const PendulumState& a, const PendulumState& b, double h, double share) {
+  const double s = share, s2 = s * s, s3 = s2 * s;
+  const auto angle = [&](double q0, double w0, double q1, double w1) {
+    return (2 * s3 - 3 * s2 + 1) * q0 + (s3 - 2 * s2 + s) * h * w0 + (3 * s2 - 2 * s3) * q1 +
+           (s3 - s2) * h * w1;
+  };
+  const auto velocity = [&](double q0, double w0, double q1, double w1) {
+    return 6 * (s2 - s) * (q0 - q1) / h + (3 * s2 - 4 * s + 1) * w0 + (3 * s2 - 2 * s) * w1;
+  };
+  return {angle(a.q1, a.w1, b.q1, b.w1), angle(a.q2, a.w2, b.q2, b.w2),
+          velocity(a.q1, a.w1, b.q1, b.w1), velocity(a.q2, a.w2, b.q2, b.w2)};
+}
+
 double Energy(const Plant& plant, const PendulumState& s) {
   const double m1 = plant.mass1, m2 = plant.mass2, l1 = plant.length1, l2 = plant.length2;
   const double g = plant.gravity;

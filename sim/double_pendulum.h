@@ -73,6 +73,10 @@ struct PendulumState {
   double w1 = 0, w2 = 0;  // rad/s
 };
 
+/// The state at a share of the `h` seconds from one state to another: along the cubic that has
+/// their angles and velocities.
+PendulumState StateBetween(const PendulumState& a, const PendulumState& b, double h, double share);
+
 /// Mechanical energy (J), with thin-rod inertias m l²/12 and heights counted from the pivot.
 double Energy(const Plant& plant, const PendulumState& s);
 

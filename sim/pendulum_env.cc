@@ -14,17 +14,21 @@ namespace {
 std::string PlantStream(const std::string& stream) { return Concat(stream, ": plant"); }
 std::string NoiseStream(const std::string& stream) { return Concat(stream, ": sensor noise"); }
 
-/// The sensors and motors of these settings; nothing if there is neither noise nor delay.
+/// The sensors and motors of these settings; nothing if they are perfect.
 std::optional<Disturber> MakeDisturber(const PendulumEnvConfig& config) {
   const Randomization& random = config.randomization;
-  int max_delay = 0;
-  bool any = random.sensor_noise > 0 || random.delay > 0;
+  Disturbance largest;
+  const Options most = OptionsOf(largest);
   for (const Disturbance& each : config.disturbances) {
-    max_delay = std::max(max_delay, each.delay_steps() + random.max_delay_steps());
-    any = any || each.any();
+    const Disturbance drawn = random.Largest(each);
+    const Options options = OptionsOf(drawn);
+    for (size_t k = 0; k < options.all().size(); ++k) {
+      double& value = *std::get<double*>(most.all()[k].target);
+      value = std::max(value, options.all()[k].number());
+    }
   }
-  if (!any) return std::nullopt;
-  return Disturber(config.disturbances, config.num_envs, max_delay, config.seed,
+  if (!largest.any()) return std::nullopt;
+  return Disturber(config.disturbances, config.num_envs, largest, config.seed,
                    NoiseStream(config.stream), config.first_index);
 }
 
@@ -96,7 +100,7 @@ void PendulumEnv::SetState(int env, std::span<const double> s) {
 void PendulumEnv::SetState(int env, const PendulumState& s) {
   physics_->SetState(env, s);
   step_counts_[static_cast<size_t>(env)] = 0;
-  if (disturber_) disturber_->Begin(env);
+  if (disturber_) disturber_->Begin(env, s);
   std::ranges::fill(Row(obs_, env), 0.0F);  // nothing to remember yet
   const PendulumState measured = Measure(env);
   std::ranges::copy(Observation(env, measured), Row(obs_, env).begin());

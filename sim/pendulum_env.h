@@ -126,7 +126,7 @@ class PendulumEnv : public VectorEnv {
   EnvSpec spec_;
   std::unique_ptr<Physics> physics_;
   int64_t episode_steps_;
-  std::optional<Disturber> disturber_;  // none without noise and delay
+  std::optional<Disturber> disturber_;  // none if sensors and motors are perfect
   std::vector<Rng> rngs_;               // (N)
   // With randomised plants; else empty.
   std::vector<Plant> plants_;     // (N) of the running episodes

@@ -31,6 +31,9 @@ void Randomization::Describe(Options& o) {
   o.Add(&delay, "randomize_delay", {0, kLargestDelay}, "s",
         "each episode's delay is up to this much above delay")
       .step = kControlPeriod;
+  o.Add(&sensor_latency, "randomize_sensor_latency", {0, kLongestLatency}, "s",
+        "each episode's sensor latency is up to this much above sensor_latency")
+      .implied = true;
   o.Alias("randomize",
           {"randomize_mass1", "randomize_mass2", "randomize_length1", "randomize_length2",
            "randomize_damping1", "randomize_damping2", "randomize_gravity"},
@@ -42,7 +45,7 @@ void Randomization::Describe(Options& o) {
 }
 
 bool Randomization::any() const {
-  return sensor_noise > 0 || delay > 0 ||
+  return sensor_noise > 0 || delay > 0 || sensor_latency > 0 ||
          std::ranges::any_of(plant, [](double x) { return x > 0; });
 }
 
@@ -55,9 +58,22 @@ Plant Randomization::Draw(const Plant& nominal, Rng& rng) const {
 }
 
 Disturbance Randomization::Draw(const Disturbance& nominal, Rng& rng) const {
-  const double noise = nominal.sensor_noise + rng.Uniform(0, sensor_noise);
-  const int more = static_cast<int>(rng.Uniform() * (max_delay_steps() + 1));
-  return {noise, (nominal.delay_steps() + more) * kControlPeriod};
+  Disturbance drawn = nominal;
+  drawn.sensor_noise += rng.Uniform(0, sensor_noise);
+  const int most = Disturbance{0, delay}.delay_steps();
+  const int more = static_cast<int>(rng.Uniform() * (most + 1));
+  drawn.delay = (nominal.delay_steps() + more) * kControlPeriod;
+  // Trainings of earlier versions drew no third number.
+  if (sensor_latency > 0) drawn.sensors.latency += rng.Uniform(0, sensor_latency);
+  return drawn;
+}
+
+Disturbance Randomization::Largest(const Disturbance& nominal) const {
+  Disturbance largest = nominal;
+  largest.sensor_noise += sensor_noise;
+  largest.delay += delay;
+  largest.sensors.latency += sensor_latency;
+  return largest;
 }
 
 }  // namespace upswing

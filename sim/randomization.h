@@ -9,25 +9,26 @@
 
 namespace upswing {
 
-/// Domain randomisation: how far each episode's plant, sensor noise and delay may be from the
+/// Domain randomisation: how far each episode's plant, sensors and motor may be from the
 /// nominal ones; zeros: not at all.
 struct Randomization {
   /// Half-widths relative to the nominal value, in the order of Plant: 0.25 stands for ±25%.
   std::array<double, 8> plant{};
-  double sensor_noise = 0;  // largest addition to the nominal one, rad, rad/s
-  double delay = 0;         // the same, s
+  double sensor_noise = 0;    // largest addition to the nominal one, rad, rad/s
+  double delay = 0;           // the same, s
+  double sensor_latency = 0;  // the same, s
 
   /// One line per setting: name, range, unit, help.
   void Describe(Options& options);
   bool any() const;
-  /// Largest number of control periods that a delay may be above the nominal one.
-  int max_delay_steps() const { return Disturbance{0, delay}.delay_steps(); }
-
   /// A plant from the box: each parameter uniform and independent of the others. Always draws eight
   /// numbers from the stream.
   Plant Draw(const Plant& nominal, Rng& rng) const;
-  /// Uniform noise, and a uniform number of control periods. Draws two numbers from the stream.
+  /// Uniform noise, a uniform number of control periods, and a uniform latency. Draws two numbers
+  /// from the stream, and a third if the latency is random.
   Disturbance Draw(const Disturbance& nominal, Rng& rng) const;
+  /// The largest values that Draw may return.
+  Disturbance Largest(const Disturbance& nominal) const;
 };
 
 }  // namespace upswing

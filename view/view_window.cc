@@ -301,9 +301,11 @@ class Session {
     for (const auto& [name, value] : PlantValues(plant)) {
       lines.push_back({name, fmt::format("{:.4g}", value)});
     }
-    const Disturbance noise = episode.rollout().disturbance;
-    lines.push_back({"sensor_noise", FormatNumber(noise.sensor_noise)});
-    lines.push_back({"delay", FormatNumber(noise.delay)});
+    const Options disturbance = OptionsOf(episode.rollout().disturbance);
+    for (const Option& option : disturbance.all()) {
+      if (option.implied && option.number() == 0) continue;
+      lines.push_back({option.name, FormatNumber(option.number())});
+    }
     return lines;
   }
 

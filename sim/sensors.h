@@ -1,0 +1,70 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/archive.h"
+#include "core/options.h"
+#include "sim/double_pendulum.h"
+
+/// Encoders of both joints, velocities computed from them, and the age of what they measure.
+///
+/// Symbols: N counts per revolution, q̂ measured angle (rad), ŵ measured velocity (rad/s), T window
+/// (s), τ time constant (s), L latency (s).
+namespace upswing {
+
+inline constexpr double kLongestLatency = 0.1;  // s
+inline constexpr double kLongestWindow = 0.1;   // s
+inline constexpr double kSlowestFilter = 1;     // s
+/// Time between two updates of the velocity filter (s), as in a motor drive at 1 kHz.
+inline constexpr double kFilterPeriod = 0.001;
+
+/// The sensors of one environment; zeros: exact, present angles and velocities.
+struct SensorModel {
+  double latency = 0;          // L, age of the measured angles and velocities, s
+  double encoder_counts = 0;   // N, of each joint; 0: exact angles
+  double velocity_window = 0;  // T of ŵ(t) = (q̂(t) - q̂(t - T)) / T; 0: the true velocity, s
+  double velocity_filter = 0;  // τ of the low-pass τ dy/dt = ŵ - y; 0: none, s
+
+  /// One line per setting: name, range, unit, help.
+  void Describe(Options& options);
+
+  bool exact() const {
+    return latency == 0 && encoder_counts == 0 && velocity_window == 0 && velocity_filter == 0;
+  }
+};
+
+/// The nearest angle (rad) of an encoder with this many counts per revolution; 0: the angle itself.
+double Quantized(double angle, double counts);
+
+/// The sensors of N environments. They keep the states of the last control steps. Between two
+/// steps the motion is the cubic that has their angles and velocities (StateBetween): against the
+/// physics' own steps of a swing-up this is off by 3e-7 rad in the median and 1e-4 rad at most, and
+/// every physics, timestep, window and latency is served alike.
+class Sensors {
+ public:
+  /// For N environments none of which has a larger latency or window than `slowest`.
+  Sensors(int num_envs, const SensorModel& slowest);
+
+  /// Begins an episode in this state. Before it the joints moved at its velocities.
+  void Begin(int env, const PendulumState& start);
+
+  /// Takes the true state at a control step and returns what the sensors measure then.
+  PendulumState Measure(int env, const SensorModel& model, const PendulumState& now);
+
+  void State(const Archive& archive);
+
+ private:
+  std::span<double> Past(int env) {
+    return std::span(past_).subspan(static_cast<size_t>(env) * 4 * moments_, 4 * moments_);
+  }
+  std::span<double> Filtered(int env) {
+    return std::span(filtered_).subspan(static_cast<size_t>(env) * 2, 2);
+  }
+
+  size_t moments_;                // M, control steps that are kept
+  std::vector<double> past_;      // (N × M × 4) true states q1, q2, w1, w2, the latest first
+  std::vector<double> filtered_;  // (N × 2) y of both joints, rad/s
+};
+
+}  // namespace upswing
