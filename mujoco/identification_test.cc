@@ -84,6 +84,14 @@ TEST_P(IdentifyingEnvs, NoiseMakesItLessExact) {
   EXPECT_GT(errors.median, 0.001);
 }
 
+TEST_P(IdentifyingEnvs, KnowsItsSensors) {
+  PendulumEnvConfig config = Box();
+  config.disturbances = {{0, 0, {0.005, 4096, 0.01, 0}}};
+  PendulumEnv env(config);
+  Excite(env, 4);
+  EXPECT_LT(DeltaErrors(env).median, 0.04);
+}
+
 TEST_P(IdentifyingEnvs, NothingIsToldOfThePlant) {
   PendulumEnvConfig config = Config(), other = Config();
   other.plants.front().mass2 = 1.2;
@@ -128,7 +136,7 @@ TEST_P(IdentifyingEnvs, MirroringKeepsWhatIsKnown) {
 TEST_P(IdentifyingEnvs, LoadedStateContinuesWithTheSameBits) {
   PendulumEnvConfig config = Config();
   config.memory = 2;
-  config.disturbances = {Disturbance{0.01, 0.04}};
+  config.disturbances = {{0.01, 0.04, {0.01, 4096, 0.02, 0.02}}};
   ExpectLoadedGoesOn(config, 7);
 }
 

@@ -55,14 +55,18 @@ void Disturber::TakeBack(int env, int64_t step) {
   if (delay > 0) std::swap(applied_[i], Queue(env)[static_cast<size_t>(step % delay)]);
 }
 
-PendulumState Disturber::Measure(int env, PendulumState s) {
+PendulumState Disturber::Measure(int env, PendulumState s, double torque) {
   const Disturbance& disturbance = disturbances_[static_cast<size_t>(env)];
-  if (sensors_) s = sensors_->Measure(env, disturbance.sensors, s);
+  if (sensors_) s = sensors_->Measure(env, disturbance.sensors, s, torque);
   const double noise = disturbance.sensor_noise;
   if (noise == 0) return s;
   Rng& rng = rngs_[static_cast<size_t>(env)];
   for (double* x : {&s.q1, &s.q2, &s.w1, &s.w2}) *x += noise * rng.Normal();
   return s;
+}
+
+double Disturber::MeasuredTorque(int env, double torque) const {
+  return sensors_ ? sensors_->Torque(env, disturbance(env).sensors) : torque;
 }
 
 void Disturber::State(const Archive& archive) {

@@ -62,8 +62,13 @@ class Disturber {
   /// Takes back what Apply did to an environment at this step of its episode.
   void TakeBack(int env, int64_t step);
 
-  /// Takes the true state at a control step and returns what the sensors measure then, with noise.
-  PendulumState Measure(int env, PendulumState state);
+  /// Takes the true state at a control step and the torque (N·m) that acted in the control period
+  /// before it, 0 at the start, and returns what the sensors measure, with noise.
+  PendulumState Measure(int env, PendulumState state, double torque);
+
+  /// The mean torque (N·m) over the control period in which the last measured velocities changed;
+  /// `torque` acted in the last control period.
+  double MeasuredTorque(int env, double torque) const;
 
   /// Saves or loads the state; the disturbances themselves are not part of it.
   void State(const Archive& archive);

@@ -33,8 +33,8 @@ constexpr size_t At(int i, int j) {
 double Get(std::span<const double> P, int i, int j) { return P[i <= j ? At(i, j) : At(j, i)]; }
 
 /// Takes in an equation h·x = y of the relative constants x with covariance P: a Kalman filter's
-/// update.
-void Correct(const Row& h, double y, std::span<double> x, std::span<double> P) {
+/// update. `noise` is the standard deviation of y (rad/s) beside kNoise and kSurprise.
+void Correct(const Row& h, double y, double noise, std::span<double> x, std::span<double> P) {
   Row PH{};
   double innovation = y, spread = 0;
   for (int i = 0; i < kConstants; ++i) {
@@ -43,7 +43,7 @@ void Correct(const Row& h, double y, std::span<double> x, std::span<double> P) {
     spread += h[i] * PH[i];
   }
   const double surprise = kSurprise * innovation;
-  const double S = spread + kNoise * kNoise + surprise * surprise;
+  const double S = spread + kNoise * kNoise + noise * noise + surprise * surprise;
   for (int i = 0; i < kConstants; ++i) {
     x[i] += PH[i] / S * innovation;
     for (int j = i; j < kConstants; ++j) P[At(i, j)] -= PH[i] * PH[j] / S;
@@ -133,7 +133,7 @@ PendulumState Identifier::Predict(const Manipulator& plant, double torque,
   return prediction_.state(0);
 }
 
-void Identifier::Update(int env, double torque, const PendulumState& measured) {
+void Identifier::Update(int env, double torque, const PendulumState& measured, double noise) {
   const auto i = static_cast<size_t>(env);
   const PendulumState before = Replace(env, measured);
   const auto x = std::span(relative_).subspan(i * kConstants, kConstants);
@@ -161,8 +161,8 @@ void Identifier::Update(int env, double torque, const PendulumState& measured) {
   for (int k = 0; k < kConstants; ++k) {
     if (nominal_.*kIdentified[static_cast<size_t>(k)] > 0) P[At(k, k)] += kDrift * kDrift;
   }
-  Correct(factors.one, y1, x, P);
-  Correct(factors.two, y2, x, P);
+  Correct(factors.one, y1, noise, x, P);
+  Correct(factors.two, y2, noise, x, P);
   for (double& share : x) share = std::clamp(share, kLeast, kMost);
   const Manipulator now = estimate(env);
   constexpr size_t kB = 2;

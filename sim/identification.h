@@ -41,7 +41,9 @@ class Identifier {
   /// Begins an episode of an environment in a measured state: nothing is known of its plant.
   void Begin(int env, const PendulumState& measured);
   /// Learns from a control period: the torque (N·m) that acted, and the state measured at its end.
-  void Update(int env, double torque, const PendulumState& measured);
+  /// `noise` is the standard deviation (rad/s) of the sensors' own error in the measured change of
+  /// velocities.
+  void Update(int env, double torque, const PendulumState& measured, double noise = 0);
 
   /// The plant as it is estimated.
   Manipulator estimate(int env) const;

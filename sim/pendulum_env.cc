@@ -102,16 +102,22 @@ void PendulumEnv::SetState(int env, const PendulumState& s) {
   step_counts_[static_cast<size_t>(env)] = 0;
   if (disturber_) disturber_->Begin(env, s);
   std::ranges::fill(Row(obs_, env), 0.0F);  // nothing to remember yet
-  const PendulumState measured = Measure(env);
+  const PendulumState measured = Measure(env, 0);
   std::ranges::copy(Observation(env, measured), Row(obs_, env).begin());
   if (!identifier_) return;
   identifier_->Begin(env, measured);
   identifier_->Observe(env, measured, Row(obs_, env).subspan(kObservationSize, kIdentifiedSize));
 }
 
-PendulumState PendulumEnv::Measure(int env) {
+PendulumState PendulumEnv::Measure(int env, double torque) {
   const PendulumState s = state(env);
-  return disturber_ ? disturber_->Measure(env, s) : s;
+  return disturber_ ? disturber_->Measure(env, s, torque) : s;
+}
+
+void PendulumEnv::Identify(int env, double torque, const PendulumState& measured) {
+  if (!disturber_) return identifier_->Update(env, torque, measured);
+  identifier_->Update(env, disturber_->MeasuredTorque(env, torque), measured,
+                      disturber_->disturbance(env).sensors.velocity_noise());
 }
 
 std::array<float, kObservationSize> PendulumEnv::Observation(int env,
@@ -202,10 +208,10 @@ void PendulumEnv::Step(std::span<const double> torque, StepResult& result) {
     ++step_counts_[i];
     const auto next_obs = Row(result.next_obs, env);
     if (disturber_ || config_.assumed_plant || identifier_) {
-      const PendulumState measured = Measure(env);
+      const PendulumState measured = Measure(env, result.torque[i]);
       std::ranges::copy(Observation(env, measured), next_obs.begin());
       if (identifier_ && !result.terminated[i]) {
-        identifier_->Update(env, result.torque[i], measured);
+        Identify(env, result.torque[i], measured);
         identifier_->Observe(env, measured, next_obs.subspan(kObservationSize, kIdentifiedSize));
       }
     }

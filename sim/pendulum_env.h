@@ -103,8 +103,11 @@ class PendulumEnv : public VectorEnv {
   void Reset(int env);
   /// Gives a new episode its own plant and disturbance.
   void Randomize(int env);
-  /// What the environment's sensors measure now; draws their noise.
-  PendulumState Measure(int env);
+  /// What the environment's sensors measure now, after a control period of this torque (N·m), at
+  /// the start 0; draws their noise.
+  PendulumState Measure(int env, double torque);
+  /// Lets the identification learn from that.
+  void Identify(int env, double torque, const PendulumState& measured);
   /// The observation of what was measured, without memory and identification.
   std::array<float, kObservationSize> Observation(int env, const PendulumState& measured) const;
   /// Moves rows of kObservationSize numbers to where those of an observation with memory begin.

@@ -55,6 +55,11 @@ void SensorModel::Describe(Options& o) {
       .implied = true;
 }
 
+double SensorModel::velocity_noise() const {
+  if (encoder_counts == 0 || velocity_window == 0) return 0;
+  return 2 * std::numbers::pi / encoder_counts / velocity_window * std::sqrt(4.0 / 12);
+}
+
 double Quantized(double angle, double counts) {
   if (counts == 0) return angle;
   const double count = 2 * std::numbers::pi / counts;  // rad
@@ -66,6 +71,7 @@ Sensors::Sensors(int num_envs, const SensorModel& slowest) {
   // The oldest update of a filter is less than a control period before.
   moments_ = static_cast<size_t>(std::ceil(age / kControlPeriod)) + 2;
   past_.resize(static_cast<size_t>(num_envs) * 4 * moments_);
+  torques_.resize(static_cast<size_t>(num_envs) * moments_);
   filtered_.resize(static_cast<size_t>(num_envs) * 2);
 }
 
@@ -77,19 +83,27 @@ void Sensors::Begin(int env, const PendulumState& start) {
     const double age = static_cast<double>(k + 1) * kControlPeriod;
     std::ranges::copy(std::array{q1 - age * w1, q2 - age * w2, w1, w2}, past.begin() + 4 * k);
   }
+  std::ranges::fill(Torques(env), 0.0);
   std::ranges::copy(std::array{w1, w2}, Filtered(env).begin());
 }
 
-PendulumState Sensors::Measure(int env, const SensorModel& model, const PendulumState& now) {
+PendulumState Sensors::Measure(int env, const SensorModel& model, const PendulumState& now,
+                               double torque) {
   const auto past = Past(env);
   std::copy_backward(past.begin(), past.end() - 4, past.end());
   std::ranges::copy(std::array{now.q1, now.q2, now.w1, now.w2}, past.begin());
-  PendulumState measured = Reading(past, model, model.latency);
-  if (model.velocity_filter == 0) return measured;
+  const auto torques = Torques(env);
+  std::copy_backward(torques.begin(), torques.end() - 1, torques.end());
+  torques.front() = torque;
 
+  PendulumState measured = Reading(past, model, model.latency);
+  const auto y = Filtered(env);
+  if (model.velocity_filter == 0) {
+    std::ranges::copy(std::array{measured.w1, measured.w2}, y.begin());
+    return measured;
+  }
   // y is the filter's exact answer to a ŵ that holds from one update to the next.
   const double share = 1 - std::exp(-kFilterPeriod / model.velocity_filter);
-  const auto y = Filtered(env);
   for (int update = kFilterUpdates - 1; update >= 0; --update) {
     const PendulumState s = Reading(past, model, model.latency + update * kFilterPeriod);
     y[0] += share * (s.w1 - y[0]);
@@ -100,8 +114,18 @@ PendulumState Sensors::Measure(int env, const SensorModel& model, const Pendulum
   return measured;
 }
 
+double Sensors::Torque(int env, const SensorModel& model) const {
+  const auto last = static_cast<double>(moments_ - 2);
+  const double steps = std::min(model.velocity_age() / kControlPeriod, last);
+  const auto k = static_cast<size_t>(steps);
+  const double share = steps - static_cast<double>(k);
+  const double* torque = torques_.data() + static_cast<size_t>(env) * moments_;
+  return (1 - share) * torque[k] + share * torque[k + 1];
+}
+
 void Sensors::State(const Archive& archive) {
   archive.Array("past", std::span(past_));
+  archive.Array("torques", std::span(torques_));
   archive.Array("filtered", std::span(filtered_));
 }
 

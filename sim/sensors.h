@@ -32,6 +32,11 @@ struct SensorModel {
   bool exact() const {
     return latency == 0 && encoder_counts == 0 && velocity_window == 0 && velocity_filter == 0;
   }
+  /// Mean age of the measured velocities, L + T/2 + τ, s.
+  double velocity_age() const { return latency + velocity_window / 2 + velocity_filter; }
+  /// Standard deviation (rad/s) of what rounding adds to the change between two measured
+  /// velocities: four angles, each off by a count over √12.
+  double velocity_noise() const;
 };
 
 /// The nearest angle (rad) of an encoder with this many counts per revolution; 0: the angle itself.
@@ -49,8 +54,13 @@ class Sensors {
   /// Begins an episode in this state. Before it the joints moved at its velocities.
   void Begin(int env, const PendulumState& start);
 
-  /// Takes the true state at a control step and returns what the sensors measure then.
-  PendulumState Measure(int env, const SensorModel& model, const PendulumState& now);
+  /// Takes the true state at a control step and the torque (N·m) that acted in the control period
+  /// before it, 0 at the start, and returns what the sensors measure.
+  PendulumState Measure(int env, const SensorModel& model, const PendulumState& now, double torque);
+
+  /// The mean torque (N·m) over the control period in which the last measured velocities changed.
+  /// Like the velocities, it is velocity_age() old, if no older than the states that are kept.
+  double Torque(int env, const SensorModel& model) const;
 
   void State(const Archive& archive);
 
@@ -58,12 +68,16 @@ class Sensors {
   std::span<double> Past(int env) {
     return std::span(past_).subspan(static_cast<size_t>(env) * 4 * moments_, 4 * moments_);
   }
+  std::span<double> Torques(int env) {
+    return std::span(torques_).subspan(static_cast<size_t>(env) * moments_, moments_);
+  }
   std::span<double> Filtered(int env) {
     return std::span(filtered_).subspan(static_cast<size_t>(env) * 2, 2);
   }
 
   size_t moments_;                // M, control steps that are kept
   std::vector<double> past_;      // (N × M × 4) true states q1, q2, w1, w2, the latest first
+  std::vector<double> torques_;   // (N × M) of the control periods before these states, N·m
   std::vector<double> filtered_;  // (N × 2) y of both joints, rad/s
 };
 

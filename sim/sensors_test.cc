@@ -18,7 +18,7 @@ constexpr double kTurn = 2 * std::numbers::pi;
 PendulumState AtStart(const SensorModel& model, const PendulumState& start) {
   Sensors sensors(1, model);
   sensors.Begin(0, start);
-  return sensors.Measure(0, model, start);
+  return sensors.Measure(0, model, start, 0);
 }
 
 TEST(SensorModel, SettingsAreChecked) {
@@ -78,7 +78,7 @@ TEST(Sensors, LatencyAndWindowReachBackToEarlierControlSteps) {
   for (int step = 0; step < 8; ++step) {
     q1.push_back(std::sin(step));
     const PendulumState now{q1.back(), 0, std::cos(step), 0};
-    const PendulumState measured = sensors.Measure(1, model, now);
+    const PendulumState measured = sensors.Measure(1, model, now, 0);
     const size_t k = q1.size() - 2;
     ASSERT_EQ(measured.q1, q1[k]);
     ASSERT_EQ(measured.w1, (q1[k] - q1[k - 2]) / 0.04);
@@ -102,7 +102,7 @@ TEST(Sensors, BetweenControlStepsTheyMeasureWhatThePhysicsDo) {
       before[k] = batch.state(0);
     }
     for (int k = 0; k < kPhysicsSteps; ++k) {
-      const PendulumState measured = sensors.Measure(k, models[k], batch.state(0));
+      const PendulumState measured = sensors.Measure(k, models[k], batch.state(0), 0);
       if (step == 0) continue;
       ASSERT_NEAR(measured.q1, before[k].q1, k == 0 ? 0 : 1e-4);
       ASSERT_NEAR(measured.q2, before[k].q2, k == 0 ? 0 : 1e-4);
@@ -116,12 +116,12 @@ TEST(Sensors, TheFilterAnswersAStepByTheClosedFormula) {
   const SensorModel model{0, 0, 0, 0.05};
   Sensors sensors(1, model);
   sensors.Begin(0, {});
-  EXPECT_EQ(sensors.Measure(0, model, {}).w1, 0);
-  const double y0 = sensors.Measure(0, model, {0.02, 0, 2, 0}).w1;
+  EXPECT_EQ(sensors.Measure(0, model, {}, 0).w1, 0);
+  const double y0 = sensors.Measure(0, model, {0.02, 0, 2, 0}, 0).w1;
   EXPECT_GT(y0, 0);
   for (int step = 1; step < 20; ++step) {
     const double t = step * kControlPeriod;
-    const PendulumState measured = sensors.Measure(0, model, {0.02 + 2 * t, 0, 2, 0});
+    const PendulumState measured = sensors.Measure(0, model, {0.02 + 2 * t, 0, 2, 0}, 0);
     ASSERT_NEAR(measured.w1, 2 + (y0 - 2) * std::exp(-t / 0.05), 1e-12);
     ASSERT_EQ(measured.w2, 0);
     ASSERT_EQ(measured.q1, 0.02 + 2 * t);  // only the velocities pass it
@@ -136,9 +136,46 @@ TEST(Sensors, ASlowerFilterLagsByItsTimeConstant) {
   double w1 = 0;
   for (int step = 0; step < 100; ++step) {
     const double t = step * kControlPeriod;
-    w1 = sensors.Measure(0, model, {t * t / 2, 0, t, 0}).w1;
+    w1 = sensors.Measure(0, model, {t * t / 2, 0, t, 0}, 0).w1;
   }
   EXPECT_NEAR(w1, 99 * kControlPeriod - 0.03, kFilterPeriod);
+}
+
+TEST(Sensors, TheTorqueIsAsOldAsTheVelocities) {
+  // The velocities are 5 + 10/2 + 15 ms old: a quarter of the control period before the last.
+  const SensorModel model{0.005, 0, 0.01, 0.015};
+  EXPECT_DOUBLE_EQ(model.velocity_age(), 0.025);
+  Sensors sensors(1, {0.005, 0, 0.02, 0.015});
+  sensors.Begin(0, {});
+  sensors.Measure(0, model, {}, 0);
+  sensors.Measure(0, model, {}, 4);
+  EXPECT_NEAR(sensors.Torque(0, model), 0, 1e-12);
+  sensors.Measure(0, model, {}, 8);
+  EXPECT_NEAR(sensors.Torque(0, model), 0.75 * 4, 1e-12);
+  sensors.Measure(0, model, {}, 2);
+  // What is older than the states that are kept counts as the oldest.
+  EXPECT_NEAR(sensors.Torque(0, {0, 0, 0, 1}), 4, 1e-12);
+}
+
+TEST(Sensors, RoundingNoiseOfTheVelocities) {
+  // Angles at random places within their counts; in the window joint 1 moves by 0 to 10 counts.
+  const SensorModel model{0, 1000, 0.01, 0};
+  Sensors sensors(1, model);
+  Rng rng(1, "test");
+  constexpr int kCount = 20000;
+  double square = 0;
+  for (int n = 0; n < kCount; ++n) {
+    double w[2];
+    for (double& each : w) {
+      const PendulumState start{rng.Uniform(0, 1), 0, rng.Uniform(0, kTurn), 0};
+      sensors.Begin(0, start);
+      each = sensors.Measure(0, model, start, 0).w1 - start.w1;
+    }
+    square += std::pow(w[1] - w[0], 2);
+  }
+  EXPECT_NEAR(std::sqrt(square / kCount), model.velocity_noise(), 0.02 * model.velocity_noise());
+  EXPECT_EQ((SensorModel{0.01, 1000, 0, 0.01}).velocity_noise(), 0);
+  EXPECT_EQ((SensorModel{0.01, 0, 0.01, 0.01}).velocity_noise(), 0);
 }
 
 TEST(Sensors, ExactOnesBesideOthersMeasureTheSameBits) {
@@ -148,11 +185,12 @@ TEST(Sensors, ExactOnesBesideOthersMeasureTheSameBits) {
   sensors.Begin(1, {});
   for (int step = 0; step < 5; ++step) {
     const PendulumState now{0.1 * step, 1.0 / (step + 3), std::sin(step), std::cos(step)};
-    const PendulumState measured = sensors.Measure(0, SensorModel(), now);
+    const PendulumState measured = sensors.Measure(0, SensorModel(), now, step);
     EXPECT_EQ(measured.q1, now.q1);
     EXPECT_EQ(measured.q2, now.q2);
     EXPECT_EQ(measured.w1, now.w1);
     EXPECT_EQ(measured.w2, now.w2);
+    EXPECT_EQ(sensors.Torque(0, SensorModel()), step);
   }
 }
 
@@ -160,14 +198,16 @@ TEST(Sensors, LoadedOnesContinueWithTheSameBits) {
   const SensorModel model{0.005, 4096, 0.03, 0.01};
   Sensors saved(1, model), loaded(1, model);
   saved.Begin(0, {1, 2, 3, 4});
-  for (int step = 0; step < 3; ++step) saved.Measure(0, model, {0.1 * step, 0, 5, 0});
+  for (int step = 0; step < 3; ++step) saved.Measure(0, model, {0.1 * step, 0, 5, 0}, step);
   SaveAndLoad([&](const Archive& archive) { saved.State(archive); },
               [&](const Archive& archive) { loaded.State(archive); });
   for (int step = 3; step < 6; ++step) {
     const PendulumState now{0.1 * step, 0, 5, 0};
-    const PendulumState a = saved.Measure(0, model, now), b = loaded.Measure(0, model, now);
+    const PendulumState a = saved.Measure(0, model, now, step);
+    const PendulumState b = loaded.Measure(0, model, now, step);
     EXPECT_EQ(a.q1, b.q1);
     EXPECT_EQ(a.w1, b.w1);
+    EXPECT_EQ(saved.Torque(0, model), loaded.Torque(0, model));
   }
 }
 
