@@ -40,6 +40,10 @@ interface Exports {
   identifier_begin(identifier: number): void;
   identifier_update(identifier: number): void;
   identifier_observe(identifier: number): void;
+  sensors_open(): number;
+  sensors_close(sensors: number): void;
+  sensors_begin(sensors: number): void;
+  sensors_measure(sensors: number): void;
   capsule_inertia(): void;
   pendulum_mjcf(): void;
   learner_open(settings: number, bytes: number): number;

@@ -29,9 +29,11 @@ export class Identifier {
     core().formula(numbers(measured), () => core().exports.identifier_begin(this.at));
   }
 
-  /// After a control period in which `torque` (N·m) acted.
-  update(torque: number, measured: State): void {
-    core().formula([...numbers(measured), torque], () => core().exports.identifier_update(this.at));
+  /// After a control period in which `torque` (N·m) acted, with this noise of the sensors.
+  update(measured: State, torque: number, noise: number): void {
+    core().formula([...numbers(measured), torque, noise], () =>
+      core().exports.identifier_update(this.at),
+    );
   }
 
   /// What is added to the observation of a state.

@@ -1,6 +1,7 @@
 import { CoreController } from './controller';
 import type { Controller, Decision, Memory } from './decision';
 import { DISTURBANCE_LIMITS } from './disturbance';
+import type { Disturbance } from './disturbance';
 import { CONTROL_PERIOD, PLANT_LIMITS, plantIn } from './pendulum';
 import type { Parameter, Plant, Range } from './pendulum';
 import { BadInput } from './bad_input';
@@ -69,8 +70,8 @@ export class Policy {
     return within(PLANT_LIMITS[name], nominal * (1 - share), nominal * (1 + share));
   }
 
-  /// The same for the errors of sensors and motor: rad and rad/s, control periods.
-  trainedDisturbance(name: 'sensor_noise' | 'delay'): Range {
+  /// The same for the errors of sensors and motor, in the units of Disturbance.
+  trainedDisturbance(name: keyof Disturbance): Range {
     const unit = name === 'delay' ? CONTROL_PERIOD : 1;
     const least = this.setting(name) / unit;
     const most = least + this.setting(`randomize_${name}`) / unit;

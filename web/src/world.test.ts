@@ -116,6 +116,36 @@ test('an agent identifies a plant of which it is not told, with a motor that is 
   expectTrajectory(run(5), simulate(policyPath('d3qn-adaptive'), '--seconds', '5', ...flags), 1e-6);
 });
 
+test.each([
+  ['d3qn', 5],
+  ['d3qn-adaptive', 5],
+])('%s measures with encoders as in `upswing simulate`', (id, seconds) => {
+  agentOn(id);
+  Object.assign(world.disturbance, {
+    sensor_latency: 0.005,
+    encoder_counts: 4096,
+    velocity_window: 0.01,
+    velocity_filter: 0.004,
+  });
+  world.reset();
+  const flags = ['--sensor-latency', '0.005', '--encoder-counts', '4096'];
+  flags.push('--velocity-window', '0.01', '--velocity-filter', '0.004');
+  const rows = simulate(policyPath(id), '--seconds', `${seconds}`, ...flags);
+  expectTrajectory(run(seconds), rows, 1e-6);
+});
+
+test('a decision that is looked at changes nothing of what the sensors show', () => {
+  agentOn('d3qn');
+  Object.assign(world.disturbance, { encoder_counts: 1000, velocity_window: 0.03 });
+  const torques = (look: () => void) => {
+    world.reset();
+    run(0.5);
+    look();
+    return run(1).map(({ torque }) => torque);
+  };
+  expect(torques(() => world.look())).toEqual(torques(() => {}));
+});
+
 test('what is remembered is what was chosen, also where the motor cannot give it', () => {
   agentOn('d3qn-randomized');
   world.plant = { ...NOMINAL, torque_limit: 4 };

@@ -1,4 +1,4 @@
-import { DelayLine, measure } from './disturbance';
+import { blurred, DelayLine, exact, PERFECT } from './disturbance';
 import type { Disturbance } from './disturbance';
 import { Identifier } from './identifier';
 import {
@@ -15,6 +15,8 @@ import {
 import type { Plant, State } from './pendulum';
 import type { Decision, Memory } from './decision';
 import type { Policy } from './policy';
+import { Sensors } from './sensors';
+import type { Reading } from './sensors';
 import type { Push, Simulator, Vec } from './simulator';
 
 export const STEPS_PER_SECOND = PHYSICS_STEPS / CONTROL_PERIOD; // of physics
@@ -38,7 +40,7 @@ export interface Moment {
 /// The pendulum with its motor, its agent, and the hand that disturbs it. Independent of the page.
 export class World {
   readonly simulator: Simulator;
-  readonly disturbance: Disturbance = { sensor_noise: 0, delay: 0 };
+  readonly disturbance: Disturbance = { ...PERFECT };
   agentOn = false;
   /// N·m, that a visitor asks of the motor while the agent is off.
   byHand = 0;
@@ -65,6 +67,8 @@ export class World {
   private identifier: Identifier | null = null;
   private identifies = false;
   private readonly motor = new DelayLine();
+  private readonly sensors = new Sensors();
+  private reading: Reading | null = null; // at the last control step; null at a start
   private steps = 0; // of physics, in all
   private uprightSince: number | null = null; // physics step; null if the links are not upright
   private untilControl = 0; // steps until the agent chooses again
@@ -122,6 +126,8 @@ export class World {
   reset(state: State = HANGING): void {
     this.simulator.state = state;
     this.motor.clear();
+    this.sensors.begin(state);
+    this.reading = null;
     this.observation = null;
     this.identifies = false;
     this.forget();
@@ -198,7 +204,7 @@ export class World {
     return Float32Array.of(...observe(policy.plant, measured), ...identifier.observe(measured));
   }
 
-  /// The observation at this moment.
+  /// The observation at this moment; encoders show what they showed at the last control step.
   private observe(measured = this.measured()): Float32Array {
     const { policy, observation: before, chosen } = this;
     const now = this.present(measured);
@@ -211,20 +217,22 @@ export class World {
   }
 
   private measured(): State {
-    return measure(this.state, this.disturbance.sensor_noise);
+    const shown = exact(this.disturbance) ? null : this.reading;
+    return blurred(shown?.state ?? this.state, this.disturbance.sensor_noise);
   }
 
   /// Learns of the plant from the last control period.
-  private identify(measured: State): void {
-    if (this.identifies) this.identifier?.update(this.torque, measured);
+  private identify(measured: State, { torque, noise }: Reading): void {
+    if (this.identifies) this.identifier?.update(measured, torque, noise);
     else this.identifier?.begin(measured);
     this.identifies = true;
   }
 
   private control(): void {
     const { plant, policy, state } = this;
+    this.reading = this.sensors.measure(state, this.torque, this.disturbance);
     const measured = this.measured();
-    this.identify(measured);
+    this.identify(measured, this.reading);
     this.observation = this.observe(measured);
     this.decision = policy?.act(this.observation, this.memory) ?? null;
     this.chosen = this.agentOn ? (this.decision?.torque ?? 0) : this.byHand;

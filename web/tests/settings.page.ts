@@ -1,6 +1,6 @@
 import { expect } from '@playwright/test';
 import { largestDifference, open, run, slide, startFrom, test } from './page';
-import { simulate } from './program';
+import { policyPath, simulate } from './program';
 
 const OTHER = [
   ['mass1', 1.6],
@@ -61,6 +61,23 @@ test('limit of the motor, sensor noise and delay act on the agent', async ({ sta
   expect(await torques()).toEqual(before);
   await slide(page, 'sensor_noise', 0.1);
   expect(await torques()).not.toEqual(before);
+});
+
+test('encoders, their velocities and latency act as in `upswing simulate`', async ({
+  stage: page,
+}) => {
+  await open(page, '#agent=d3qn&on=1&velocity_window=0.01');
+  await slide(page, 'encoder_counts', 4096);
+  await slide(page, 'sensor_latency', 0.005);
+  await slide(page, 'velocity_filter', 0.004);
+  await startFrom(page, 0.3);
+  const rows = await run(page, 3);
+  const flags = ['--encoder-counts', '4096', '--velocity-window', '0.01', '--sensor-latency'];
+  flags.push('0.005', '--velocity-filter', '0.004', '--start', '0.3,0,0,0', '--seconds', '3');
+  expect(largestDifference(rows, simulate(policyPath('d3qn'), ...flags))).toBeLessThan(1e-6);
+  await expect(page.locator('output[for=encoder_counts]')).toHaveText('4096 counts');
+  await page.getByRole('button', { name: 'Reset sliders' }).click();
+  expect(await page.evaluate(() => upswing.world.disturbance.encoder_counts)).toBe(0);
 });
 
 test('one slider goes back alone', async ({ stage: page }) => {

@@ -12,6 +12,7 @@
 #include "setup/controllers.h"
 #include "setup/loaded_policy.h"
 #include "sim/identification.h"
+#include "sim/sensors.h"
 #include "web/wasm/learner.h"
 
 #define UPSWING_EXPORT(name) extern "C" __attribute__((export_name(#name)))
@@ -268,9 +269,10 @@ UPSWING_EXPORT(identifier_begin) void IdentifierBegin(Identifier* identifier) {
   identifier->Begin(0, {number[0], number[1], number[2], number[3]});
 }
 
-/// Learns from a measured state (4), and the torque that acted in the control period before it.
+/// Learns from a measured state (4), the torque that acted in the control period before it, and the
+/// noise of Identifier::Update.
 UPSWING_EXPORT(identifier_update) void IdentifierUpdate(Identifier* identifier) {
-  identifier->Update(0, number[4], {number[0], number[1], number[2], number[3]});
+  identifier->Update(0, number[4], {number[0], number[1], number[2], number[3]}, number[5]);
 }
 
 /// Of a state (4): what the estimate adds to its observation (kIdentifiedSize).
@@ -278,6 +280,29 @@ UPSWING_EXPORT(identifier_observe) void IdentifierObserve(const Identifier* iden
   std::array<float, kIdentifiedSize> added;
   identifier->Observe(0, {number[0], number[1], number[2], number[3]}, added);
   std::ranges::copy(added, number.begin());
+}
+
+/// The sensors of one pendulum.
+UPSWING_EXPORT(sensors_open) Sensors* SensorsOpen() {
+  return std::make_unique<Sensors>(1, SensorModel{kLongestLatency, 0, kLongestWindow, 0}).release();
+}
+
+UPSWING_EXPORT(sensors_close) void SensorsClose(Sensors* sensors) { delete sensors; }
+
+/// Begins in a state (4).
+UPSWING_EXPORT(sensors_begin) void SensorsBegin(Sensors* sensors) {
+  sensors->Begin(0, {number[0], number[1], number[2], number[3]});
+}
+
+/// Of the state (4) at a control step, the torque in the control period before it, and a
+/// SensorModel (4): the measured state (4), Sensors::Torque and SensorModel::velocity_noise.
+UPSWING_EXPORT(sensors_measure) void SensorsMeasure(Sensors* sensors) {
+  const PendulumState now{number[0], number[1], number[2], number[3]};
+  const SensorModel model{number[5], number[6], number[7], number[8]};
+  const PendulumState measured = sensors->Measure(0, model, now, number[4]);
+  std::ranges::copy(std::array{measured.q1, measured.q2, measured.w1, measured.w2,
+                               sensors->Torque(0, model), model.velocity_noise()},
+                    number.begin());
 }
 
 /// Of a capsule's mass, radius and length: its inertia across and along.

@@ -20,7 +20,7 @@ import { prefersStill } from './motion';
 import { Pose } from './pose';
 import { save } from './save';
 import { RANGES, Settings } from './settings';
-import { BEGINNING, decode, encode, OWN, problemText } from './share';
+import { BEGINNING, decode, disturbanceOf, encode, OWN, problemText } from './share';
 import type { Shared } from './share';
 import { changeTheme, onThemeChange } from './theme';
 import { Tour } from './tour';
@@ -277,7 +277,7 @@ export class Page {
 
   private apply(shared: Shared): void {
     this.settings.setPlant(shared.plant);
-    this.settings.setDisturbance(shared.sensor_noise, shared.delay);
+    this.settings.setDisturbance(disturbanceOf(shared));
     this.setSpeed(shared.speed);
     this.setAgentOn(shared.on);
   }

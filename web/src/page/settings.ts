@@ -1,4 +1,5 @@
 import { DISTURBANCE_LIMITS } from '../disturbance';
+import type { Disturbance } from '../disturbance';
 import { CONTROL_PERIOD, NOMINAL, PLANT_LIMITS } from '../pendulum';
 import type { Parameter, Plant, Range } from '../pendulum';
 import type { Policy } from '../policy';
@@ -34,7 +35,9 @@ const PLANT: readonly Row[] = [
   { name: 'torque_limit', label: 'Limit of the motor', unit: 'N·m', min: 1, max: 10, step: 0.25 },
 ];
 
-const DISTURBANCE: readonly SliderSpec[] = [
+const milliseconds = (seconds: number) => `${Number((1000 * seconds).toPrecision(4))} ms`;
+
+const DISTURBANCE: readonly (SliderSpec & { name: keyof Disturbance })[] = [
   {
     name: 'sensor_noise',
     label: 'Sensor noise (σ)',
@@ -56,6 +59,50 @@ const DISTURBANCE: readonly SliderSpec[] = [
     initial: 0,
     format: (periods) => `${1000 * CONTROL_PERIOD * periods} ms`,
   },
+  {
+    name: 'encoder_counts',
+    label: 'Encoders',
+    unit: 'counts',
+    min: 0,
+    max: 8192,
+    limits: DISTURBANCE_LIMITS.encoder_counts,
+    step: 256,
+    initial: 0,
+    format: (counts) => (counts === 0 ? 'exact' : `${counts} counts`),
+  },
+  {
+    name: 'velocity_window',
+    label: 'Velocities from angles over',
+    unit: 'ms',
+    min: 0,
+    max: 0.05,
+    limits: DISTURBANCE_LIMITS.velocity_window,
+    step: 0.001,
+    initial: 0,
+    format: (seconds) => (seconds === 0 ? 'exact' : milliseconds(seconds)),
+  },
+  {
+    name: 'velocity_filter',
+    label: 'Low-pass of the velocities (τ)',
+    unit: 'ms',
+    min: 0,
+    max: 0.05,
+    limits: DISTURBANCE_LIMITS.velocity_filter,
+    step: 0.001,
+    initial: 0,
+    format: milliseconds,
+  },
+  {
+    name: 'sensor_latency',
+    label: 'Latency of the sensors',
+    unit: 'ms',
+    min: 0,
+    max: 0.05,
+    limits: DISTURBANCE_LIMITS.sensor_latency,
+    step: 0.001,
+    initial: 0,
+    format: milliseconds,
+  },
 ];
 
 /// The largest and smallest that a link to this page may bring, also beyond the sliders, which then
@@ -70,7 +117,7 @@ export const RANGES: ReadonlyMap<string, Range> = new Map<string, Range>([
 export class Settings {
   private readonly plant = new Map<Parameter, Slider>();
   private readonly world: World;
-  private readonly disturbance: Record<'sensor_noise' | 'delay', Slider>;
+  private readonly disturbance = new Map<keyof Disturbance, Slider>();
 
   constructor(world: World, onChange: () => void) {
     this.world = world;
@@ -83,15 +130,14 @@ export class Settings {
       this.plant.set(row.name, slider);
       element('plant-sliders').append(slider.element);
     }
-    const [noise, delay] = DISTURBANCE.map(
-      (spec) =>
-        new Slider(spec, (value) => {
-          world.disturbance[spec.name as 'sensor_noise' | 'delay'] = value;
-          onChange();
-        }),
-    ) as [Slider, Slider];
-    this.disturbance = { sensor_noise: noise, delay };
-    element('disturbance-sliders').append(noise.element, delay.element);
+    for (const spec of DISTURBANCE) {
+      const slider = new Slider(spec, (value) => {
+        world.disturbance[spec.name] = value;
+        onChange();
+      });
+      this.disturbance.set(spec.name, slider);
+      element('disturbance-sliders').append(slider.element);
+    }
   }
 
   setPlant(plant: Plant): void {
@@ -99,10 +145,9 @@ export class Settings {
     for (const [name, slider] of this.plant) slider.value = plant[name];
   }
 
-  setDisturbance(sensor_noise: number, delay: number): void {
-    Object.assign(this.world.disturbance, { sensor_noise, delay });
-    this.disturbance.sensor_noise.value = sensor_noise;
-    this.disturbance.delay.value = delay;
+  setDisturbance(disturbance: Disturbance): void {
+    Object.assign(this.world.disturbance, disturbance);
+    for (const [name, slider] of this.disturbance) slider.value = disturbance[name];
   }
 
   /// Marks on each slider what this policy was trained on.
@@ -113,7 +158,6 @@ export class Settings {
     element('trained-on').textContent = policy.isLearned
       ? 'what the agent was trained on'
       : 'what the agent was made for';
-    this.disturbance.sensor_noise.trained = policy.trainedDisturbance('sensor_noise');
-    this.disturbance.delay.trained = policy.trainedDisturbance('delay');
+    for (const [name, slider] of this.disturbance) slider.trained = policy.trainedDisturbance(name);
   }
 }

@@ -10,6 +10,9 @@ const RANGES: ReadonlyMap<string, Range> = new Map<string, Range>([
   ['speed', [0.1, 2]],
   ['sensor_noise', [0, 0.2]],
   ['delay', [0, 5]],
+  ['sensor_latency', [0, 0.1]],
+  ['encoder_counts', [0, 1e9]],
+  ['velocity_window', [0, 0.1]],
 ]);
 const has = (agent: string) => agent !== 'unknown' && agent !== 'own';
 
@@ -27,6 +30,10 @@ test('a link brings back what it was made from', () => {
     plant: { ...NOMINAL, mass1: 1.2345678901234567, gravity: 3.71 },
     sensor_noise: 0.05,
     delay: 2,
+    sensor_latency: 0.005,
+    encoder_counts: 4096,
+    velocity_window: 0.01,
+    velocity_filter: 0,
   };
   expect(decode(`#${encode(shared)}`, RANGES, has)).toEqual({ shared, problems: [] });
 });

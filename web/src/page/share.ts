@@ -1,3 +1,5 @@
+import { PERFECT } from '../disturbance';
+import type { Disturbance } from '../disturbance';
 import { NOMINAL } from '../pendulum';
 import type { Parameter, Plant, Range } from '../pendulum';
 import { quoted } from '../text';
@@ -8,14 +10,12 @@ export const OWN = 'own';
 const NOT_IN_IT = "it was made with somebody's own policy, which is not in it";
 
 /// What a link contains: the agent, whether it is on, and every setting that was changed.
-export interface Shared {
+export interface Shared extends Disturbance {
   agent: string | null;
   twin: string | null; // the agent beside it
   on: boolean;
   speed: number;
   plant: Plant;
-  sensor_noise: number;
-  delay: number; // control periods
 }
 
 /// The state in which the page begins.
@@ -25,13 +25,19 @@ export const BEGINNING: Readonly<Shared> = {
   on: false,
   speed: 1,
   plant: NOMINAL,
-  sensor_noise: 0,
-  delay: 0,
+  ...PERFECT,
 };
 
+/// The errors of sensors and motor of a link.
+export function disturbanceOf(shared: Shared): Disturbance {
+  const { sensor_noise, delay, sensor_latency, encoder_counts } = shared;
+  const { velocity_window, velocity_filter } = shared;
+  return { sensor_noise, delay, sensor_latency, encoder_counts, velocity_window, velocity_filter };
+}
+
 /// The numbers of a link, by their names in it.
-function numbersOf({ speed, plant, sensor_noise, delay }: Shared): Record<string, number> {
-  return { speed, ...plant, sensor_noise, delay };
+function numbersOf(shared: Shared): Record<string, number> {
+  return { speed: shared.speed, ...shared.plant, ...disturbanceOf(shared) };
 }
 
 /// The part of an address after #; only what differs from the beginning.
@@ -72,8 +78,8 @@ export function decode(
       problems.push(`${name}: expected ${range[0]} to ${range[1]}, got ${quoted(text)}`);
     } else if (name === 'delay') {
       shared.delay = Math.round(value);
-    } else if (name === 'speed' || name === 'sensor_noise') {
-      shared[name] = value;
+    } else if (name === 'speed' || name in PERFECT) {
+      shared[name as 'speed' | keyof Disturbance] = value;
     } else {
       shared.plant[name as Parameter] = value;
     }
