@@ -45,7 +45,9 @@ class EvalTest(ProgramTest):
         self.assertEqual(result["plant"], PLANT | {"gravity": 0.05, "damping1": 1, "damping2": 1})
         self.assertEqual(result["policy"], str(self.policy / "policy.safetensors"))
         self.assertEqual(list(result["reward_terms"]), REWARD_TERMS)
-        self.assertEqual(result["disturbance"], {"sensor_noise": 0, "delay": 0})
+        self.assertEqual(result["disturbance"], {
+            "sensor_noise": 0, "delay": 0, "sensor_latency": 0, "encoder_counts": 0,
+            "velocity_window": 0, "velocity_filter": 0})
         self.assertEqual(set(result["randomize"].values()), {0})
 
     def test_on_a_terminal_the_bar_is_gone_when_the_table_comes(self):
@@ -302,10 +304,14 @@ class EvalTest(ProgramTest):
 
     def test_noise_and_delay_are_said_and_change_the_result(self):
         usual = self.evaluate()
-        for flag, name in (("--sensor-noise", "sensor_noise"), ("--delay", "delay")):
+        for name in ("sensor_noise", "delay", "sensor_latency", "velocity_window",
+                     "velocity_filter"):
+            flag = "--" + name.replace("_", "-")
             disturbed = self.evaluate(flag, 0.1)
             self.assertEqual(disturbed["disturbance"], usual["disturbance"] | {name: 0.1})
             self.assertNotEqual(disturbed["return"], usual["return"])
+        encoders = self.evaluate("--encoder-counts", 100)
+        self.assertNotEqual(encoders["return"], usual["return"])
         table = self.succeed("eval", self.policy, "--episodes", 2, "--delay", 0.04,
                              "--randomize-mass2", 0.5)
         self.assertIn("delay 0.04, randomize_mass2 0.5\n", table)

@@ -125,6 +125,12 @@ class MapTest(ProgramTest):
         for value, expected in zip(result["x"]["values"], (0.02, 0.04, 0.06, 0.08), strict=True):
             self.assertAlmostEqual(value, expected, delta=1e-12)
 
+    def test_sensors_may_be_axes(self):
+        result = self.map("--x", "encoder_counts=0:4096:2", "--y", "sensor_latency=0:0.01:2",
+                          "--set", "velocity_window=0.01", "--episodes", 1, "--check", 1)
+        self.assertEqual(result["y"]["unit"], "s")
+        self.assertEqual(result["x"]["values"], [0, 4096])
+
     def test_table(self):
         text = self.succeed("map", self.policy, *GRID, "--episodes", 2)
         for word in ("gravity 0.05 to 3 m/s² × mass2 0.5 to 1.5 kg: 3 × 3 cells, 2 episodes each",

@@ -151,6 +151,17 @@ class ResumeTest(ProgramTest):
         self.assertIn("randomize_length2 = 0.25",
                       (self.folder / "mujoco-run/config.toml").read_text())
 
+    def test_more_steps_with_encoders_equal_a_run_of_that_many(self):
+        for physics in ("mujoco", "closed-form"):
+            changes = {"physics": physics, "episode_seconds": 0.42, "identify": True,
+                       "encoder_counts": 4096, "velocity_window": 0.03, "velocity_filter": 0.01,
+                       "randomize_sensor_latency": 0.04}
+            self.succeed(*small(steps=4000, out=f"{physics}-run", **changes))
+            self.succeed("train", "--resume", f"{physics}-run", "--steps", 8000)
+            self.succeed(*small(steps=8000, out=f"{physics}-at-once", **changes))
+            self.assert_same_run(f"{physics}-run", f"{physics}-at-once")
+        self.assertIn("encoder_counts = 4096", (self.folder / "mujoco-run/config.toml").read_text())
+
     def test_another_number_of_threads_may_resume(self):
         self.succeed(*small(steps=4000, threads=1))
         self.succeed("train", "--resume", "run", "--steps", 8000, "--threads", 2)

@@ -261,7 +261,7 @@ std::vector<const Option*> Options::Find(std::string_view name, const std::strin
   }
   if (found.empty()) {
     std::string hint = DidYouMean(name, known);
-    constexpr size_t kMostNames = 24;  // more would make the line unreadable
+    constexpr size_t kMostNames = 30;  // more would make the line unreadable
     if (hint.empty() && known.size() < kMostNames) hint = Concat("; there are ", Join(known, ", "));
     throw BadInput(Concat(where, ": no setting is called \"", name, "\"", hint));
   }

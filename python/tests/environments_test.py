@@ -38,6 +38,7 @@ class Environments(unittest.TestCase):
     def test_gymnasium_finds_nothing_wrong(self):
         for settings in ({}, {"physics": "closed-form"}, {"actions": "levels"},
                          {"sensor_noise": 0.1, "delay": 0.04, "randomize": 0.25, "memory": 4},
+                         {"encoder_counts": 4096, "velocity_window": 0.01, "sensor_latency": 0.005},
                          {"actions": "levels", "levels": 3, "physics": "closed-form"}):
             with self.subTest(settings), warnings.catch_warnings(record=True) as caught:
                 warnings.simplefilter("always")

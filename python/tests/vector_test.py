@@ -13,7 +13,8 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 import upswing
 
 ID = "upswing/DoublePendulum-v0"
-ROUGH = {"sensor_noise": 0.02, "delay": 0.04, "randomize": 0.2, "memory": 2,
+ROUGH = {"sensor_noise": 0.02, "delay": 0.04, "encoder_counts": 4096, "velocity_window": 0.03,
+         "randomize_sensor_latency": 0.02, "randomize": 0.2, "memory": 2,
          "random_start_share": 0.5}
 
 

@@ -47,7 +47,8 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
             `environment`): agent, whose environment it is; physics ("mujoco" or "closed-form"),
             episode_seconds, random_start_share, start_noise, memory; the plant (mass1, …,
             torque_limit, actuated_joint, rotor_inertia, gear_ratio, coulomb1, coulomb2, model);
-            sensor_noise, delay; randomize, …; the reward's weights
+            sensor_noise, delay, encoder_counts, velocity_window, velocity_filter, sensor_latency;
+            randomize, …; the reward's weights
 
     >>> env = gym.make("upswing/DoublePendulum-v0", physics="closed-form", mass2=1.2, delay=0.02)
     >>> obs, info = env.reset(seed=1, options={"state": [3.14, 0, 0, 0]})

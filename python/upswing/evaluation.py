@@ -72,7 +72,8 @@ def evaluate(
         memory: of a function: past control steps that its observations remember
         progress: called now and then with the share that is done, 0 to 1
         **settings: plant, sensors, motor and what is random, such as mass2=1.2, sensor_noise=0.02,
-            delay=0.02, randomize=0.25; by default the policy's own plant, nothing else
+            encoder_counts=4096, delay=0.02, randomize=0.25; by default the policy's own plant,
+            nothing else
 
     >>> upswing.evaluate("runs/d3qn-seed1", episodes=1000, randomize=0.1)["success_rate"]
     """
@@ -139,6 +140,7 @@ def map(  # pylint: disable=redefined-builtin
         policy: as `evaluate` takes it, of the double pendulum
         x, y: axes, "NAME=FROM:TO[:CELLS]", where both ends may be percentages on top of the
             training's value; names are those of the plant, sensor_noise (rad, rad/s), delay (s),
+            sensor_latency (s), encoder_counts, velocity_window (s), velocity_filter (s),
             and the start: q1, q2 (degrees), w1, w2 (rad/s); by default the mass and the length
             of the second link, within 50%
         episodes: in a cell; by default 10, or 1 where the start is given
