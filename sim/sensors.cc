@@ -67,7 +67,7 @@ double Quantized(double angle, double counts) {
 }
 
 Sensors::Sensors(int num_envs, const SensorModel& slowest) {
-  const double age = slowest.latency + slowest.velocity_window;
+  const double age = std::max(slowest.latency + slowest.velocity_window, slowest.velocity_age());
   // The oldest update of a filter is less than a control period before.
   moments_ = static_cast<size_t>(std::ceil(age / kControlPeriod)) + 2;
   past_.resize(static_cast<size_t>(num_envs) * 4 * moments_);
@@ -115,8 +115,7 @@ PendulumState Sensors::Measure(int env, const SensorModel& model, const Pendulum
 }
 
 double Sensors::Torque(int env, const SensorModel& model) const {
-  const auto last = static_cast<double>(moments_ - 2);
-  const double steps = std::min(model.velocity_age() / kControlPeriod, last);
+  const double steps = model.velocity_age() / kControlPeriod;
   const auto k = static_cast<size_t>(steps);
   const double share = steps - static_cast<double>(k);
   const double* torque = torques_.data() + static_cast<size_t>(env) * moments_;

@@ -48,7 +48,7 @@ double Quantized(double angle, double counts);
 /// every physics, timestep, window and latency is served alike.
 class Sensors {
  public:
-  /// For N environments none of which has a larger latency or window than `slowest`.
+  /// For N environments none of which has a larger latency, window or time constant than `slowest`.
   Sensors(int num_envs, const SensorModel& slowest);
 
   /// Begins an episode in this state. Before it the joints moved at its velocities.
@@ -59,7 +59,7 @@ class Sensors {
   PendulumState Measure(int env, const SensorModel& model, const PendulumState& now, double torque);
 
   /// The mean torque (N·m) over the control period in which the last measured velocities changed.
-  /// Like the velocities, it is velocity_age() old, if no older than the states that are kept.
+  /// Like the velocities, it is velocity_age() old.
   double Torque(int env, const SensorModel& model) const;
 
   void State(const Archive& archive);

@@ -145,16 +145,15 @@ TEST(Sensors, TheTorqueIsAsOldAsTheVelocities) {
   // The velocities are 5 + 10/2 + 15 ms old: a quarter of the control period before the last.
   const SensorModel model{0.005, 0, 0.01, 0.015};
   EXPECT_DOUBLE_EQ(model.velocity_age(), 0.025);
-  Sensors sensors(1, {0.005, 0, 0.02, 0.015});
+  Sensors sensors(1, {0.005, 0, 0.02, 0.03});
   sensors.Begin(0, {});
   sensors.Measure(0, model, {}, 0);
   sensors.Measure(0, model, {}, 4);
   EXPECT_NEAR(sensors.Torque(0, model), 0, 1e-12);
   sensors.Measure(0, model, {}, 8);
   EXPECT_NEAR(sensors.Torque(0, model), 0.75 * 4, 1e-12);
-  sensors.Measure(0, model, {}, 2);
-  // What is older than the states that are kept counts as the oldest.
-  EXPECT_NEAR(sensors.Torque(0, {0, 0, 0, 1}), 4, 1e-12);
+  // The slowest filter that these sensors keep enough for.
+  EXPECT_NEAR(sensors.Torque(0, {0, 0, 0, 0.03}), 0.5 * 4, 1e-12);
 }
 
 TEST(Sensors, RoundingNoiseOfTheVelocities) {

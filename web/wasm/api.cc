@@ -284,7 +284,8 @@ UPSWING_EXPORT(identifier_observe) void IdentifierObserve(const Identifier* iden
 
 /// The sensors of one pendulum.
 UPSWING_EXPORT(sensors_open) Sensors* SensorsOpen() {
-  return std::make_unique<Sensors>(1, SensorModel{kLongestLatency, 0, kLongestWindow, 0}).release();
+  const SensorModel slowest{kLongestLatency, 0, kLongestWindow, kSlowestFilter};
+  return std::make_unique<Sensors>(1, slowest).release();
 }
 
 UPSWING_EXPORT(sensors_close) void SensorsClose(Sensors* sensors) { delete sensors; }
