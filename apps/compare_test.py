@@ -45,9 +45,9 @@ class CompareTest(ProgramTest):
         (folder / "config.toml").write_text(settings, encoding="utf-8")
         (folder / "evals.csv").write_text(
             "step,success_rate,success_low,mean_return,rms_torque,torque_variation,"
-            "torque_variation_upright,seconds\n"
+            "torque_variation_upright,value,discounted_return,seconds\n"
             + "".join(f"{1000 * k},{rate},0,{value},{value / 1000},{value / 100},"
-                      f"{value / 500 * rate},{2.5 * k}\n"
+                      f"{value / 500 * rate},{300 * rate},200,{2.5 * k}\n"
                       for k, (rate, value) in enumerate(rows, 1)))
         return path
 

@@ -65,6 +65,11 @@ void PrintTorques(const Evaluation& e, const EnvSpec& spec) {
 
 }  // namespace
 
+std::string ValueWarning(double ratio) {
+  if (!std::isfinite(ratio) || std::abs(ratio - 1) <= 0.25) return "";
+  return fmt::format("expects {:.2g} times what it attains", ratio);
+}
+
 std::string MomentsText(const Moments& m, double scale) {
   constexpr double kLeast = 1e-6;  // below it a deviation is rounding
   const double mean = scale * m.mean, deviation = scale * m.deviation;
@@ -110,6 +115,8 @@ void PrintEvalTable(const EvalReport& report) {
   if (report.knows_values) {
     fmt::print("  value at start {:.4g} expected, {:.4g} attained (discounted reward)\n", e.value,
                e.discounted_return);
+    const std::string warning = ValueWarning(ValueRatio(e.value, e.discounted_return));
+    if (!warning.empty()) fmt::print("                 it {}\n", warning);
   }
   fmt::print("  energy used    {} J   in {}\n", MomentsText(e.work), LengthText(e.seconds));
   PrintTorques(e, report.spec);

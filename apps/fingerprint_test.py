@@ -37,27 +37,22 @@ CASES = {
 SLOW = {"d3qn", "d3qn-bare", "dqn"}  # without vector instructions
 
 PINNED = {
-    ("d3qn", "avx512"): ("b7d2ed954e38f454", "ea55070ca4518b59"),
     ("d3qn-bare", "avx512"): ("49a53614a224402d", "7354f565dc255071"),
-    ("d3qn-randomized", "avx512"): ("edad694eea358b41", "8f76695aea02db40"),
-    ("d3qn-small", "avx512"): ("c6b1ee08204cbb1a", "c87e39bea4cd38bd"),
-    ("dqn", "avx512"): ("e97e22afdab380bc", "caa7df9d25f8707f"),
-    ("fast", "avx512"): ("a0b995bb1800dcd5", "6b1adc0b33342d1f"),
     ("ppo", "avx512"): ("ce863a10c4591c03", "b83fd75bcb1f6108"),
     ("ppo-discrete", "avx512"): ("77bb72242c932e1e", "28ba5f0b80c29322"),
     ("sac-fast", "avx512"): ("78cc21007713adca", "e05c8e8d44483c3b"),
-    ("d3qn", "avx2"): ("f3292dc9bcd871bd", "f001e0850ae9bfc4"),
+    ("d3qn", "avx2"): ("e1fe9731178dac57", "cf24350c653dab3a"),
     ("d3qn-bare", "avx2"): ("49a53614a224402d", "7354f565dc255071"),
-    ("d3qn-randomized", "avx2"): ("01533d70da9b6363", "ac86aa966475f94b"),
-    ("d3qn-small", "avx2"): ("275e7b74c0c046ca", "c8e73fc63d4f4acc"),
-    ("dqn", "avx2"): ("e7e873751d5bb77e", "30925e0c6ec1e61a"),
-    ("fast", "avx2"): ("87beb79ed39b5680", "6229176dbee34982"),
+    ("d3qn-randomized", "avx2"): ("2e8af1142c4a8210", "e5cd7c049d829d80"),
+    ("d3qn-small", "avx2"): ("376418ed9c533265", "9b7ab7b39e333135"),
+    ("dqn", "avx2"): ("4453d79e34a502a3", "15c9822f5c05b01e"),
+    ("fast", "avx2"): ("ef2ad3cdce367e29", "1832b4f0cfd5782d"),
     ("ppo", "avx2"): ("ce863a10c4591c03", "ffcafd666cc4a3bd"),
     ("ppo-discrete", "avx2"): ("2bc534143160ffe1", "ded4fe6412d2b8cd"),
     ("sac-fast", "avx2"): ("eea8d9483ce97703", "9381935c11a69779"),
-    ("d3qn-randomized", "portable"): ("0a0fb5e05949f407", "a1f87f7dce46f0cb"),
-    ("d3qn-small", "portable"): ("55acee64b0902ba5", "8cf868245d197a1e"),
-    ("fast", "portable"): ("ff5ea96eb3a62dd8", "4f2c17f391b14013"),
+    ("d3qn-randomized", "portable"): ("87f0338a06d508c1", "5af7b35d41b99212"),
+    ("d3qn-small", "portable"): ("e4969a15c1945ed6", "d5c9084387934092"),
+    ("fast", "portable"): ("900ea51a84f6bd4b", "d4ea80a1bc11d8b0"),
     ("ppo", "portable"): ("ebda7e5f8c50a8db", "6f0087929cae8b04"),
     ("ppo-discrete", "portable"): ("52694e6fd553c6fd", "fed33d50d51c7d08"),
     ("sac-fast", "portable"): ("fc3a7ded716622ca", "e81540cb781d91a7"),
@@ -118,8 +113,8 @@ class FingerprintTest(unittest.TestCase):
         for agent, vectors in cases():
             with self.subTest(agent=agent, vectors=vectors):
                 got = fingerprint(agent, vectors)
-                if got is None:
-                    continue  # not on this processor
+                if got is None or (agent, vectors) not in PINNED:
+                    continue  # not on this processor, or not pinned: --print prints it
                 tried += 1
                 self.assertEqual(got, PINNED[agent, vectors])
         self.assertGreater(tried, 0)

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <optional>
 
+#include "apps/eval_table.h"
 #include "apps/progress.h"
 #include "apps/say.h"
 #include "apps/signals.h"
@@ -59,6 +60,7 @@ class TrainView : public TrainObserver {
   }
 
   void OnEvaluation(const TrainState& s, const Evaluation& e) override {
+    value_warning_ = ValueWarning(ValueRatio(e.value, e.discounted_return));
     line_.Print(
         fmt::format("{:>9} steps  {:>11}  {:>6} updates/s  {}  return {:6.0f}  success {:3}/{}",
                     FormatCount(s.steps), FormatDuration(s.seconds), UpdatesText(),
@@ -88,6 +90,9 @@ class TrainView : public TrainObserver {
     } else if (s.best_step > 0) {
       Say("Best policy: of step {}, but {} no longer exists\n", FormatCount(s.best_step),
           Printable(policy.string()));
+    }
+    if (!value_warning_.empty()) {
+      Say("Its values are not true yet: at the last evaluation it {}\n", value_warning_);
     }
     if (Printable(run.string()) != run.string()) return;  // such a name cannot be typed
     const std::string folder = ShellQuoted(run.string());
@@ -177,8 +182,9 @@ class TrainView : public TrainObserver {
 
   const Training& training_;
   ProgressLine line_;
-  int64_t begin_step_;  // where this view's training began
-  Metrics metrics_;     // the last ones
+  int64_t begin_step_;         // where this view's training began
+  Metrics metrics_;            // the last ones
+  std::string value_warning_;  // of the last evaluation
 
   // Rates of training, between two reports at least half a second apart; before there are such, of
   // all that was reported; 0 before the first report.

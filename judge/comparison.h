@@ -37,6 +37,7 @@ struct GroupSummary {
   Scores best_return, best_success;    // at the best one: by success, then by return
   // Of the torques at the best one (EvaluationRow); infinite where they are not known.
   Scores rms_torque, torque_variation, upright_variation;
+  Scores value_ratio;  // at the last evaluation, expected over attained; infinite: nothing attained
   Stability stability;
 };
 
@@ -52,7 +53,7 @@ GroupSummary Summarize(const RunGroup& group);
 
 /// A figure of a run, which GroupSummary has over the runs of a group.
 struct RunFigure {
-  enum class Kind { kSeconds, kSteps, kReturn, kShare, kTorque, kTorqueRate };
+  enum class Kind { kSeconds, kSteps, kReturn, kShare, kTorque, kTorqueRate, kRatio };
 
   const char *name, *label;  // in files; for people
   Kind kind;

@@ -82,6 +82,9 @@ class Layer {
   /// PyTorch's defaults: W and b uniform in ±1/√in, gain 1 and its bias 0.
   void Initialize(Rng& rng, std::span<Real> parameters) const;
 
+  /// b (out).
+  std::span<Real> Bias(std::span<Real> parameters) const { return Vector(parameters, bias_); }
+
   /// Buffers for up to `max_batch` rows; those of gradients only if asked for.
   LayerActivations MakeActivations(int max_batch, bool gradients) const;
 

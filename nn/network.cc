@@ -110,6 +110,11 @@ void Network::Initialize(Rng& rng, std::span<Real> parameters) const {
   for (const Layer& layer : layers_) layer.Initialize(rng, parameters);
 }
 
+void Network::ShiftOutputs(Real shift, std::span<Real> parameters) const {
+  const Layer& values = layers_[shape_.dueling() ? num_hidden() + 1 : num_hidden()];
+  for (Real& bias : values.Bias(parameters)) bias += shift;
+}
+
 Network::Activations Network::MakeActivations(int max_batch, bool gradients) const {
   Activations a;
   for (const Layer& layer : layers_) a.push_back(layer.MakeActivations(max_batch, gradients));

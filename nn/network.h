@@ -58,6 +58,9 @@ class Network {
   /// PyTorch's defaults: weights and biases uniform in ±1/√inputs, layer norm gain 1 and bias 0.
   void Initialize(Rng& rng, std::span<Real> parameters) const;
 
+  /// Adds `shift` to every output, for all inputs: to the last bias, of a dueling network V's.
+  void ShiftOutputs(Real shift, std::span<Real> parameters) const;
+
   /// What forward and backward passes leave in each row of a batch, by layer.
   using Activations = std::vector<LayerActivations>;
   /// Buffers for up to `max_batch` rows; those of gradients only if asked for.

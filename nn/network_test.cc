@@ -220,6 +220,15 @@ INSTANTIATE_TEST_SUITE_P(
                       NetworkCase{"split_layers", {8, {130}, 9, true, kRelu, 70}}),
     [](const auto& info) { return info.param.name; });
 
+TEST_P(NetworkTest, AShiftMovesAllOutputs) {
+  Objective f(GetParam(), 5);
+  f.Value();
+  const AlignedVector<Real> before = f.y;
+  f.network.ShiftOutputs(Real(0.75), f.parameters);
+  f.Value();
+  for (size_t i = 0; i < f.y.size(); ++i) EXPECT_NEAR(f.y[i], before[i] + Real(0.75), 1e-5);
+}
+
 TEST(Network, InitialWeightsFillTheirRange) {
   const Network network({8, {64}, 9, true, kRelu, 16});
   AlignedVector<Real> parameters(network.num_parameters());

@@ -54,8 +54,10 @@ Dqn::Dqn(const DqnConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
       q_select_(q_.size()),
       q_target_(q_.size()),
       dq_(q_.size()),
+      mirrored_(static_cast<size_t>(B_) * D_),
       y_(B_),
       q_taken_(y_.size()),
+      error_(y_.size()),
       act_activations_(online_.network().MakeActivations(spec.num_envs, false)),
       act_q_(static_cast<size_t>(spec.num_envs) * torques_.size()) {}
 
@@ -101,6 +103,14 @@ void Dqn::Update(const Minibatch& batch) {
     std::ranges::copy(online_.theta(), theta_target_.begin());
   }
   if (config_.policy_tau < 1) AveragePolicy();
+  if (config_.reward_centering > 0) ShiftValues(CenteringShift(batch, error_));
+}
+
+void Dqn::ShiftValues(float shift) {
+  for (const std::span<float> theta : {online_.mutable_theta(), std::span<float>(theta_target_),
+                                       std::span<float>(theta_policy_)}) {
+    online_.network().ShiftOutputs(shift, theta);
+  }
 }
 
 void Dqn::AveragePolicy() {
@@ -111,15 +121,28 @@ void Dqn::AveragePolicy() {
   }
 }
 
+void Dqn::ForwardMirrored(Matrix<const float> s, RowRange rows, Matrix<float> q) {
+  const Matrix<float> mirrored(mirrored_, B_, D_);
+  for (int i = rows.first; i < rows.first + rows.count; ++i) {
+    for (int k = 0; k < D_; ++k) mirrored(i, k) = mirror_signs_[k] * s(i, k);
+  }
+  online_.Forward(theta_target_, mirrored, rows, q);
+  for (int i = rows.first; i < rows.first + rows.count; ++i) std::ranges::reverse(q.row(i));
+}
+
 void Dqn::BackwardRows(const Minibatch& batch, RowRange rows) {
   const int A = static_cast<int>(torques_.size());
   const Matrix<const float> s(batch.obs.data(), B_, D_), s_next(batch.next_obs.data(), B_, D_);
   const Matrix<float> q(q_, B_, A), q_target(q_target_, B_, A), dq(dq_, B_, A);
-  const Matrix<float> q_select(config_.double_q ? q_select_ : q_target_, B_, A);
+  const Matrix<float> q_select(config_.double_q || config_.mirror ? q_select_ : q_target_, B_, A);
 
   // y = r + γⁿ Q(s', a*; θ⁻)
-  online_.Forward(theta_target_, s_next, rows, q_target);
-  if (config_.double_q) online_.Forward(s_next, rows, q_select);
+  online_.Forward(config_.double_q ? online_.theta() : theta_target_, s_next, rows, q_select);
+  if (config_.mirror) {
+    ForwardMirrored(s_next, rows, q_target);
+  } else if (config_.double_q) {
+    online_.Forward(theta_target_, s_next, rows, q_target);
+  }
   TdTargets(q_select.Rows(rows.first, rows.count), q_target.Rows(rows.first, rows.count),
             Part(batch.reward, rows), Part(batch.discount, rows), Part(y_, rows));
 
@@ -130,7 +153,8 @@ void Dqn::BackwardRows(const Minibatch& batch, RowRange rows) {
     const int a = static_cast<int>(batch.action[i]);
     q_taken_[i] = q(i, a);
     td_error_[i] = q(i, a) - y_[i];
-    dq(i, a) = batch.weight[i] * HuberGradient(td_error_[i]) / static_cast<float>(B_);
+    error_[i] = HuberGradient(td_error_[i]);
+    dq(i, a) = batch.weight[i] * error_[i] / static_cast<float>(B_);
   }
   online_.Backward(dq, rows);
 }

@@ -19,7 +19,9 @@ namespace upswing {
 /// TD targets y (B). `select` chooses a* = argmax_a select(s', a), and y = r + discount ·
 /// evaluate(s', a*):
 /// - DQN: both are Q(s', ·; θ⁻), so that y = r + γ max_a Q(s', a; θ⁻) (Mnih et al., 2015);
-/// - Double DQN: select = Q(s', ·; θ), evaluate = Q(s', ·; θ⁻) (van Hasselt et al., 2016, Eq 4).
+/// - Double DQN: select = Q(s', ·; θ), evaluate = Q(s', ·; θ⁻) (van Hasselt et al., 2016, Eq 4);
+/// - with mirror symmetry, either of them: evaluate = Q(σs', σ·; θ⁻), σ the mirror. The true values
+///   are equal, and their errors nearly independent, as in Double Q-learning (van Hasselt, 2010).
 /// All Q-values are (B × A), reward and discount (B); discount is γⁿ, or 0 after a termination.
 void TdTargets(Matrix<const float> select, Matrix<const float> evaluate,
                std::span<const float> reward, std::span<const float> discount, std::span<float> y);
@@ -49,6 +51,10 @@ class Dqn : public OffPolicyAgent {
  private:
   /// TD errors of some rows of a minibatch, and the backward pass to the activations.
   void BackwardRows(const Minibatch& batch, RowRange rows);
+  /// Q(σs, σ·; θ⁻) (B × A) of some rows: the torques, in ascending order, change places.
+  void ForwardMirrored(Matrix<const float> s, RowRange rows, Matrix<float> q);
+  /// Adds `shift` to the values of all parameters.
+  void ShiftValues(float shift);
   /// Moves theta_policy_ towards θ by Polyak averaging.
   void AveragePolicy();
 
@@ -60,7 +66,8 @@ class Dqn : public OffPolicyAgent {
   AlignedVector<float> theta_target_, theta_policy_;  // θ⁻; average of θ that is judged: policy_tau
   // Of an update: B rows.
   AlignedVector<float> q_, q_select_, q_target_, dq_;  // (B × A)
-  AlignedVector<float> y_, q_taken_;                   // (B) targets, Q(s, a)
+  AlignedVector<float> mirrored_;                      // (B × D) σs'
+  AlignedVector<float> y_, q_taken_, error_;           // (B) targets, Q(s, a), clipped TD errors
   Network::Activations act_activations_;
   AlignedVector<float> act_q_;  // (N × A) of the last Act
 };

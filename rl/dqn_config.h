@@ -15,7 +15,7 @@ struct DqnConfig : AgentConfig, OffPolicyConfig {
   int64_t head = 128;
   bool layer_norm = true, double_q = true, dueling = true;
   int64_t levels = 9;
-  double tau = 0.02;
+  double tau = 0.03;
   int64_t target_period = 0;
   double policy_tau = 0.01;
   double epsilon_start = 1.0, epsilon_end = 0.05, epsilon_decay = 0.97;

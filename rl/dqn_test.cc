@@ -27,6 +27,7 @@ DqnConfig SmallDqn() {
   config.updates_per_step = 0.5;
   config.n_step = 1;
   config.reward_scale = 1;
+  config.reward_centering = 0;
   config.levels = 3;
   return config;
 }
@@ -91,10 +92,11 @@ double LossByHand(const DqnConfig& config, std::span<const float> online,
   };
   double loss = 0;
   for (size_t i = 0; i < batch.action.size(); ++i) {
-    const auto q_target = q(target, batch.next_obs[i]);
-    const auto q_online = q(online, batch.next_obs[i]);
-    const double next = config.double_q ? q_target[static_cast<size_t>(ArgMax(q_online))]
-                                        : *std::ranges::max_element(q_target);
+    const auto chosen = ArgMax(q(config.double_q ? online : target, batch.next_obs[i]));
+    // The mirror image has the opposite observation, and the torques in reverse.
+    const double next = config.mirror
+                            ? q(target, -batch.next_obs[i])[static_cast<size_t>(2 - chosen)]
+                            : q(target, batch.next_obs[i])[static_cast<size_t>(chosen)];
     const double y = batch.reward[i] + batch.discount[i] * next;
     const double delta = q(online, batch.obs[i])[static_cast<size_t>(batch.action[i])] - y;
     loss += std::abs(delta) <= 1 ? delta * delta / 2 : std::abs(delta) - 0.5;
@@ -102,11 +104,11 @@ double LossByHand(const DqnConfig& config, std::span<const float> online,
   return loss / static_cast<double>(batch.action.size());
 }
 
-class DqnVariants : public ::testing::TestWithParam<std::tuple<bool, bool>> {};
+class DqnVariants : public ::testing::TestWithParam<std::tuple<bool, bool, bool>> {};
 
 TEST_P(DqnVariants, LossIsThatOfThePapersAndFalls) {
   DqnConfig config = SmallDqn();
-  std::tie(config.double_q, config.dueling) = GetParam();
+  std::tie(config.double_q, config.dueling, config.mirror) = GetParam();
   config.learning_rate = config.learning_rate_end = 1e-2;
   ThreadPool pool(1);
   Dqn agent(config, ToyEnv::Spec(1), 1, pool);
@@ -123,7 +125,47 @@ TEST_P(DqnVariants, LossIsThatOfThePapersAndFalls) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Flags, DqnVariants,
-                         ::testing::Combine(::testing::Bool(), ::testing::Bool()));
+                         ::testing::Combine(::testing::Bool(), ::testing::Bool(),
+                                            ::testing::Bool()));
+
+TEST(Dqn, CenteringShiftsAllValuesByAShareOfTheMeanError) {
+  DqnConfig config = SmallDqn();
+  config.learning_rate = config.learning_rate_end = 0;  // the shift is all that happens
+  config.tau = 0;
+  config.reward_centering = 0.5;
+  config.mirror = false;
+  for (const bool dueling : {false, true}) {
+    config.dueling = dueling;
+    ThreadPool pool(1);
+    Dqn agent(config, ToyEnv::Spec(1), 1, pool);
+    const Minibatch batch = RandomBatch(16);
+    const Network network(config.Shape(1, 3));
+    auto activations = network.MakeActivations(16, false);
+    const auto values = [&](std::span<const float> parameters, std::span<const float> obs) {
+      std::vector<float> q(48);
+      network.Forward(parameters, {obs.data(), 16, 1}, {0, 16}, activations, {q.data(), 16, 3});
+      return q;
+    };
+    const std::vector<float> q = values(agent.online(), batch.obs);
+    const std::vector<float> next = values(agent.online(), batch.next_obs);
+    double errors = 0, per_shift = 0;
+    for (size_t i = 0; i < 16; ++i) {
+      const float best = *std::max_element(&next[3 * i], &next[3 * i] + 3);
+      const double y = batch.reward[i] + batch.discount[i] * best;
+      errors += std::clamp(q[3 * i + static_cast<size_t>(batch.action[i])] - y, -1.0, 1.0);
+      per_shift += 1 - batch.discount[i];
+    }
+    agent.Update(batch);
+    const double shift = -0.5 * errors / per_shift;
+    EXPECT_GT(std::abs(shift), 1e-3);
+    const std::vector<float> online = values(agent.online(), batch.obs);
+    const std::vector<float> target = values(agent.target(), batch.obs);
+    for (size_t i = 0; i < 48; ++i) {
+      EXPECT_NEAR(online[i], q[i] + shift, 1e-5);
+      EXPECT_NEAR(target[i], q[i] + shift, 1e-5);
+    }
+  }
+}
 
 /// Trains on the toy environment for a number of steps of all environments.
 void Walk(Dqn& agent, ToyEnv& env, int steps) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <utility>
 
@@ -223,6 +224,11 @@ ValueUnits ValueUnitsOf(const Policy& policy) {
   const PolicyInfo& info = policy.info();
   if (!info.gamma || !info.reward_scale) return {};
   return {*info.gamma, *info.reward_scale};
+}
+
+double ValueRatio(double value, double discounted_return) {
+  return discounted_return > 0 ? value / discounted_return
+                               : std::numeric_limits<double>::infinity();
 }
 
 Evaluation Summarize(std::span<const EvaluationEpisode> episodes, const EvaluationRule& rule) {

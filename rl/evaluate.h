@@ -116,6 +116,9 @@ struct ValueUnits {
 /// The units in a policy's metadata.
 ValueUnits ValueUnitsOf(const Policy& policy);
 
+/// What a policy expects at the start over what it attains; infinite unless it attains more than 0.
+double ValueRatio(double value, double discounted_return);
+
 /// Lets `policy` control every environment from its present state for as long as the task's rule
 /// says, and returns one result for each. Episodes must not time out earlier. The pool shares the
 /// work, which changes no bit. `progress` counts episodes.

@@ -15,13 +15,13 @@ OffPolicyAgent::OffPolicyAgent(const OffPolicyConfig& config, const EnvSpec& spe
     : pool_(pool),
       explore_rng_(seed, "exploration"),
       act_action_(static_cast<size_t>(spec.num_envs) * actions.size),
+      mirror_signs_(spec.mirror_signs),
       td_error_(config.batch),
       settings_(config),
       update_threads_(&pool),
       obs_size_(spec.obs_size),
       action_size_(actions.size),
       action_space_(actions),
-      mirror_signs_(spec.mirror_signs),
       sample_rng_(seed, "replay sampling"),
       replay_(config.replay, spec.obs_size, actions, config.prioritized),
       n_step_(spec.num_envs, static_cast<int>(config.n_step), config.gamma, spec.obs_size, actions),
@@ -91,6 +91,16 @@ void OffPolicyAgent::SampleBatch() {
     replay_.Sample(sample_rng_, batch_);
   }
   if (settings_.mirror) MirrorHalf(sample_rng_, mirror_signs_, action_space_, batch_);
+}
+
+float OffPolicyAgent::CenteringShift(const Minibatch& batch, std::span<const float> error) const {
+  // A shift of all values by x changes each error by (1 - γⁿ) x.
+  double errors = 0, per_shift = 0;
+  for (size_t i = 0; i < error.size(); ++i) {
+    errors += double{batch.weight[i]} * error[i];
+    per_shift += double{batch.weight[i]} * (1 - batch.discount[i]);
+  }
+  return per_shift > 0 ? static_cast<float>(-settings_.reward_centering * errors / per_shift) : 0;
 }
 
 void OffPolicyAgent::CountErrors(double loss, double q, double td_error) {

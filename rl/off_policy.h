@@ -43,6 +43,12 @@ class OffPolicyAgent : public Agent {
   /// Polyak rate of the policy that is judged: `tau` times the learning rate over that at the
   /// beginning. As learning slows, the average lengthens (Polyak and Juditsky, 1992).
   double AveragingTau(double tau) const;
+  /// How far all values shift after a minibatch with these errors (B), Q(s, a) - y as the loss
+  /// counts them: reward_centering times the shift that makes their mean 0. It moves online and
+  /// target values together, so that their common level does not wait for the slow target network.
+  /// This is reward centering (Naik et al., 2024, Eq 12), whose average reward r̄ is (1 - γ) times
+  /// the sum of all shifts.
+  float CenteringShift(const Minibatch& batch, std::span<const float> error) const;
   /// Adds the means over a minibatch of the loss, of Q and of |TD error| to the metrics. Throws
   /// Failure if the loss is not finite.
   void CountErrors(double loss, double q, double td_error);
@@ -54,8 +60,9 @@ class OffPolicyAgent : public Agent {
 
   ThreadPool& pool_;
   Rng explore_rng_;
-  std::vector<float> act_action_;  // (N × A) of the last Act
-  std::vector<float> td_error_;    // (B) of the last Update: Q(s, a) - y, or its size
+  std::vector<float> act_action_;    // (N × A) of the last Act
+  std::vector<float> mirror_signs_;  // (D) of the observations; empty: no symmetry
+  std::vector<float> td_error_;      // (B) of the last Update: Q(s, a) - y, or its size
   int64_t steps_ = 0, episodes_ = 0, updates_ = 0;
   double norm_sum_ = 0;  // of the gradients' norms since TakeMeans
 
@@ -68,7 +75,6 @@ class OffPolicyAgent : public Agent {
   ThreadTuner update_threads_;
   size_t obs_size_, action_size_;
   ActionSpace action_space_;
-  std::vector<float> mirror_signs_;  // (D)
   Rng sample_rng_;
   Replay replay_;
   NStep n_step_;

@@ -19,7 +19,11 @@ void OffPolicyConfig::Describe(Options& o) {
         "alpha of prioritised replay; 0: uniform");
   o.Add(&importance_exponent, "importance_exponent", kUnit, "",
         "beta of prioritised replay at the beginning; it rises to 1 over learning_rate_steps");
-  o.Add(&mirror, "mirror", "mirror a random half of each minibatch, observations and actions");
+  o.Add(
+      &mirror, "mirror",
+      "mirror a random half of each minibatch; DQN also evaluates its targets at mirrored states");
+  o.Add(&reward_centering, "reward_centering", kUnit, "",
+        "share of the shift of all values that makes the mean TD error 0, per update; 0: none");
   o.Add(&learning_starts, "learning_starts", kNotNegative, "steps",
         "what is seen before the first update");
   o.Add(&updates_per_step, "updates_per_step", {0, 100}, "", "gradient steps per step");

@@ -17,6 +17,7 @@ struct OffPolicyConfig {
   bool prioritized = true;
   double priority_exponent = 0.6, importance_exponent = 0.4;
   bool mirror = true;
+  double reward_centering = 0.025;
   int64_t learning_starts = 2000;
   double updates_per_step = 0.0625;
   double learning_rate = 1e-3, learning_rate_end = 2e-5;

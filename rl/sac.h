@@ -78,6 +78,8 @@ class Sac : public OffPolicyAgent {
   void CriticRows(const Minibatch& batch, RowRange rows);
   void ActorRows(const Minibatch& batch, RowRange rows);
   void UpdateCritics(const Minibatch& batch);
+  /// Shifts the values of each critic by reward centering.
+  void CenterCritics(const Minibatch& batch);
   void UpdateActor(const Minibatch& batch);
   void UpdateTemperature();
   /// Q of some rows after their outputs: the output itself, or the mean of a categorical one.
@@ -106,7 +108,7 @@ class Sac : public OffPolicyAgent {
   Samples samples_;                                // (B × A)
   AlignedVector<float> log_prob_;                  // (B) ln π(a|s)
   AlignedVector<float> inputs_, policy_inputs_;    // (B × (D + A)): s, a; s, a ~ π
-  AlignedVector<float> y_;                         // (B)
+  AlignedVector<float> y_, error_;                 // (B) targets, TD errors of one critic
 
   Network::Activations act_activations_;
   AlignedVector<float> act_outputs_;     // (N × 2 A) of the last Act

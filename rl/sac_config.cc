@@ -31,6 +31,8 @@ void SacConfig::Describe(Options& o) {
   o.Add(&policy_tau, "policy_tau", {1e-9, 1}, "",
         "Polyak averaging of the policy that is judged and kept, per update of the actor, which "
         "falls with the learning rate; 1: as learned last");
+  o.Add(&entropy_reward, "entropy_reward",
+        "count entropy as reward in the critics' targets; off: in the actor's loss alone");
   o.Add(&tune_alpha, "tune_alpha", "learn the temperature, so that entropy meets its target");
   o.Add(&alpha, "alpha", {0, 1e6}, "", "temperature, or what it begins with");
   o.Add(&alpha_rate, "alpha_rate", {0, 10}, "", "learning rate of its logarithm");

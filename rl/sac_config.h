@@ -11,6 +11,7 @@ namespace upswing {
 
 /// Settings of the agent; see rl/sac.h.
 struct SacConfig : AgentConfig, OffPolicyConfig {
+  SacConfig() { reward_centering = 0; }
   std::vector<int64_t> hidden = {256, 256};
   bool layer_norm = true;
   int64_t bins = 0;
@@ -21,6 +22,7 @@ struct SacConfig : AgentConfig, OffPolicyConfig {
   double actor_rate = 1;
   double tau = 0.02;
   double policy_tau = 0.01;
+  bool entropy_reward = true;
   bool tune_alpha = true;
   double alpha = 0.1, alpha_rate = 3e-3, target_entropy = -1;
 

@@ -24,6 +24,7 @@ SacConfig SmallSac() {
   config.updates_per_step = 0.5;
   config.n_step = 1;
   config.reward_scale = 1;
+  config.reward_centering = 0;
   config.learning_rate = config.learning_rate_end = 3e-3;
   return config;
 }
@@ -73,6 +74,30 @@ TEST(SoftTargets, ByHand) {
   EXPECT_FLOAT_EQ(y[0], 1 + 0.9F * (2 + 0.5F));
   EXPECT_FLOAT_EQ(y[1], 2 + 0.81F * (1 - 0.25F));
   EXPECT_FLOAT_EQ(y[2], 3);
+}
+
+TEST(Sac, CenteringFindsTheLevelOfValues) {
+  // With a reward of 1 in each step and γ = 0.9, the mean value is 10; entropy that counts as
+  // reward adds to it. Nothing but the shift moves the values.
+  const auto level = [](bool entropy_reward) {
+    SacConfig config = SmallSac();
+    config.learning_rate = config.learning_rate_end = config.tau = 0;
+    config.reward_centering = 0.05;
+    config.entropy_reward = entropy_reward;
+    config.twin = config.tune_alpha = false;
+    config.alpha = 3;
+    ThreadPool pool(1);
+    Sac agent(config, ToyEnv::Spec(1), 1, pool);
+    Minibatch batch = RandomBatch(16);
+    std::ranges::fill(batch.reward, 1.0F);
+    std::ranges::fill(batch.discount, 0.9F);
+    for (int update = 0; update < 300; ++update) agent.Update(batch);
+    agent.TakeMetrics();
+    agent.Update(batch);
+    return Metric(agent.TakeMetrics(), "q");
+  };
+  EXPECT_NEAR(level(false), 10, 1.5);
+  EXPECT_GT(level(true), 15);
 }
 
 TEST(Temperature, RisesWhileEntropyIsBelowItsTarget) {

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <numeric>
 
 #include "core/error.h"
@@ -79,15 +80,15 @@ void Sac::ValueRows(Critic& critic, RowRange rows) const {
 void Sac::CriticRows(const Minibatch& batch, RowRange rows) {
   const Matrix<const float> s(batch.obs.data(), B_, D_), s_next(batch.next_obs.data(), B_, D_);
   const Matrix<float> sa(inputs_, B_, D_ + A_), next_sa(policy_inputs_, B_, D_ + A_);
-  // y = r + γⁿ (min Q'(s', a') - α ln π(a'|s')), a' ~ π(s')
+  // y = r + γⁿ (min Q'(s', a') - α ln π(a'|s')), a' ~ π(s'); without entropy_reward, α = 0
   SampleRows(s_next, rows, next_sa);
   for (Critic& critic : critics_) {
     critic.network.Forward(critic.target, next_sa, rows, {critic.outputs, B_, bins_.outputs()});
     ValueRows(critic, rows);
   }
   SoftTargets(Part(critics_.front().value, rows), Part(critics_.back().value, rows),
-              Part(log_prob_, rows), alpha(), Part(batch.reward, rows), Part(batch.discount, rows),
-              Part(y_, rows));
+              Part(log_prob_, rows), config_.entropy_reward ? alpha() : 0.0,
+              Part(batch.reward, rows), Part(batch.discount, rows), Part(y_, rows));
 
   // The gradient of the mean loss between Q(s, a) and y.
   CopyRows(s, rows, 0, sa);
@@ -111,10 +112,20 @@ void Sac::UpdateCritics(const Minibatch& batch) {
   for (Critic& critic : critics_) critic.network.Prepare(pool_);
   ForSlices(pool_, B_, [&](RowRange rows) { CriticRows(batch, rows); });
   CountMinibatch();
+  if (config_.reward_centering > 0 && config_.bins == 0) CenterCritics(batch);
   for (Critic& critic : critics_) {
     norm_sum_ += critic.network.Step({inputs_.data(), B_, D_ + A_}, learning_rate(),
                                      config_.max_gradient_norm, critic.target, config_.tau, pool_) /
                  static_cast<double>(critics_.size());
+  }
+}
+
+void Sac::CenterCritics(const Minibatch& batch) {
+  for (Critic& critic : critics_) {
+    std::ranges::transform(critic.value, y_, error_.begin(), std::minus<>());
+    const float shift = CenteringShift(batch, error_);
+    critic.network.network().ShiftOutputs(shift, critic.network.mutable_theta());
+    critic.network.network().ShiftOutputs(shift, critic.target);
   }
 }
 

@@ -7,6 +7,7 @@
 #include "core/text.h"
 #include "io/file.h"
 #include "io/run_folder.h"
+#include "rl/evaluate.h"
 
 namespace upswing {
 
@@ -27,10 +28,11 @@ std::vector<EvaluationRow> ParseEvaluations(std::string text, const std::string&
     }
     text.erase(text.rfind('\n') + 1);  // everything if there is no whole line
   }
-  const auto columns = ReadCsv(text,
-                               {"step", "seconds", "success_rate", "mean_return", "rms_torque",
-                                "torque_variation", "torque_variation_upright"},
-                               where);
+  const auto columns =
+      ReadCsv(text,
+              {"step", "seconds", "success_rate", "mean_return", "rms_torque", "torque_variation",
+               "torque_variation_upright", "value", "discounted_return"},
+              where);
   std::vector<EvaluationRow> rows;
   for (size_t i = 0; i < columns[0].values.size(); ++i) {
     const auto cell = [&](size_t column) { return columns[column].values[i]; };
@@ -40,7 +42,7 @@ std::vector<EvaluationRow> ParseEvaluations(std::string text, const std::string&
                             FormatNumber(cell(0))));
     }
     rows.push_back({static_cast<int64_t>(cell(0)), cell(1), cell(2), cell(3), cell(4), cell(5),
-                    cell(2) > 0 ? cell(6) : EvaluationRow::kUnknown});
+                    cell(2) > 0 ? cell(6) : EvaluationRow::kUnknown, ValueRatio(cell(7), cell(8))});
     if (i > 0 && (rows[i].step <= rows[i - 1].step || rows[i].seconds < rows[i - 1].seconds)) {
       throw BadInput(Concat(where, ": expected steps and seconds that rise, got ", rows[i - 1].step,
                             " and ", rows[i].step, " steps, ", FormatNumber(rows[i - 1].seconds),

@@ -21,6 +21,7 @@ struct EvaluationRow {
   // Means over the episodes, in the task's unit of actions and that a second.
   double rms_torque = 0, torque_variation = 0;
   double upright_variation = kUnknown;  // of the episodes that succeed, from upright to their end
+  double value_ratio = kUnknown;        // ValueRatio
 
   static constexpr double kUnknown = std::numeric_limits<double>::infinity();
 };

@@ -55,22 +55,25 @@ class ReadEvaluationsTest : public testing::Test {
   }
   const std::string head_ =
       "step,success_rate,mean_return,rms_torque,torque_variation,torque_variation_upright,"
-      "seconds\n";
+      "seconds,value,discounted_return\n";
   TempFolder folder_;
 };
 
 TEST_F(ReadEvaluationsTest, VariationOnceUprightIsThatOfEpisodesThatSucceed) {
-  WriteFileAtomically(folder_ / "evals.csv", head_ + "1,0,2,3,4,0,5\n2,0.5,2,1,2,0.25,6\n");
+  WriteFileAtomically(folder_ / "evals.csv",
+                      head_ + "1,0,2,3,4,0,5,300,200\n2,0.5,2,1,2,0.25,6,300,200\n");
   const auto rows = ReadEvaluations(folder_.path(), false);
   EXPECT_EQ(rows[0].rms_torque, 3);
   EXPECT_EQ(rows[0].torque_variation, 4);
   EXPECT_EQ(rows[0].upright_variation, EvaluationRow::kUnknown);
   EXPECT_EQ(rows[1].upright_variation, 0.25);
+  EXPECT_EQ(rows[1].value_ratio, 1.5);
 }
 
 TEST_F(ReadEvaluationsTest, RowsAndNone) {
   EXPECT_TRUE(ReadEvaluations(folder_.path(), false).empty());
-  EXPECT_EQ(Complaint(head_ + "1000,0.5,20,1,2,3,1.5\n2000,1,2600,1,2,3,3\n"), "none");
+  EXPECT_EQ(Complaint(head_ + "1000,0.5,20,1,2,3,1.5,300,200\n2000,1,2600,1,2,3,3,300,200\n"),
+            "none");
   const auto rows = ReadEvaluations(folder_.path(), false);
   ASSERT_EQ(rows.size(), 2U);
   EXPECT_EQ(rows[1].step, 2000);
@@ -80,7 +83,7 @@ TEST_F(ReadEvaluationsTest, RowsAndNone) {
 }
 
 TEST_F(ReadEvaluationsTest, AnIncompleteLineIsAnErrorOrLeftOut) {
-  EXPECT_NE(Complaint(head_ + "1000,0,20,1,2,3,1\n2000,1,26").find("half-written"),
+  EXPECT_NE(Complaint(head_ + "1000,0,20,1,2,3,1,300,200\n2000,1,26").find("half-written"),
             std::string::npos);
   EXPECT_EQ(ReadEvaluations(folder_.path(), true).size(), 1U);
   EXPECT_NE(Complaint("step,succ").find("half-written"), std::string::npos);
@@ -88,13 +91,15 @@ TEST_F(ReadEvaluationsTest, AnIncompleteLineIsAnErrorOrLeftOut) {
 }
 
 TEST_F(ReadEvaluationsTest, ImpossibleTablesAreRefused) {
-  EXPECT_NE(Complaint(head_ + "1000,0,x,1,2,3,1\n").find("evals.csv:2: mean_return"),
+  EXPECT_NE(Complaint(head_ + "1000,0,x,1,2,3,1,300,200\n").find("evals.csv:2: mean_return"),
             std::string::npos);
   EXPECT_NE(Complaint("step,seconds\n1,2\n").find("\"success_rate\""), std::string::npos);
-  EXPECT_NE(Complaint(head_ + "1000,0,20,1,2,3,1\n1000,0,20,1,2,3,2\n").find("rise"),
-            std::string::npos);
-  EXPECT_NE(Complaint(head_ + "1000,0,20,1,2,3,1\n2000,0,20,1,2,3,0.5\n").find("rise"),
-            std::string::npos);
+  EXPECT_NE(
+      Complaint(head_ + "1000,0,20,1,2,3,1,300,200\n1000,0,20,1,2,3,2,300,200\n").find("rise"),
+      std::string::npos);
+  EXPECT_NE(
+      Complaint(head_ + "1000,0,20,1,2,3,1,300,200\n2000,0,20,1,2,3,0.5,300,200\n").find("rise"),
+      std::string::npos);
 }
 
 }  // namespace
