@@ -25,7 +25,7 @@ std::string Steps(double x) { return std::isfinite(x) ? FormatCount(x) : "not so
 std::string Torque(double x) { return std::isfinite(x) ? fmt::format("{:.3g}", x) : "not known"; }
 std::string Whole(double x) { return FormatCount(x); }
 std::string Percent(double x) { return fmt::format("{:.1f}%", 100 * x); }
-std::string Share(double x) { return std::isfinite(x) ? fmt::format("{:.2f}", x) : "not known"; }
+std::string Share(double x) { return fmt::format("{:.2f}", x); }
 std::string Signed(double x) { return fmt::format("{:+.1f}", x); }
 
 /// `18.7 s (95% 17.0 s to 22.3 s)`.
@@ -71,17 +71,18 @@ void PrintStability(const GroupSummary& summary) {
 /// A figure over the runs of a group, if one of them has it.
 void PrintFigure(const RunFigure& figure, const Scores& scores, const std::string& torque_unit) {
   if (!std::isfinite(scores.low)) return;
+  if (figure.kind == RunFigure::Kind::kRatio && !std::isfinite(scores.high)) return;
   using enum RunFigure::Kind;
   static const std::map<RunFigure::Kind, Formatter> kFormats{
       {kSeconds, Seconds}, {kSteps, Steps},       {kReturn, Whole}, {kShare, Percent},
       {kTorque, Torque},   {kTorqueRate, Torque}, {kRatio, Share}};
   std::string unit;
   if (figure.kind == kTorque) unit = " " + torque_unit;
-  if (figure.kind == kRatio) unit = " of what is attained";
   if (figure.kind == kTorqueRate) unit = Concat(" ", torque_unit, "/s");
   PrintScores(figure.label, scores, kFormats.at(figure.kind), unit);
-  const std::string warning = figure.kind == kRatio ? ValueWarning(scores.median) : "";
-  if (!warning.empty()) fmt::print("  {:<16}the median agent {}\n", "", warning);
+  if (figure.kind == kRatio && ValueIsOff(scores.median, 1)) {
+    fmt::print("  {:<16}the expected value is off by more than a quarter\n", "");
+  }
 }
 
 void PrintGroup(const RunGroup& group, const std::string& task) {

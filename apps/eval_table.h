@@ -13,9 +13,8 @@ std::string MomentsText(const Moments& m, double scale = 1);
 /// Such as `2.74 s   (median; middle half 2.70 to 2.78 s)`.
 std::string QuartilesText(const Quartiles& q);
 
-/// Such as `expects 2.5 times what it attains`, for a ratio of both; empty if that is within a
-/// quarter of 1 or infinite.
-std::string ValueWarning(double ratio);
+/// Whether an agent expects over a quarter more or less, in discounted reward, than it attains.
+bool ValueIsOff(double expected, double attained);
 
 /// Prints the report on standard output.
 void PrintEvalTable(const EvalReport& report);

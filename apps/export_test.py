@@ -424,6 +424,15 @@ class ShippedTest(ProgramTest):
                 entry.pop("checkpoints", None)
                 self.assertEqual(json.loads(text)["agents"], [entry])
 
+    def test_the_pages_own_agents_attain_what_they_expect(self):
+        for path in sorted((ROOT / "web/public/agents").glob("*.safetensors")):
+            if "-at-" in path.name:
+                continue  # a policy on the way
+            with self.subTest(agent=path.stem):
+                result = json.loads(self.succeed("eval", path, "--episodes", 50, "--json",
+                                                 "--physics", "closed-form"))
+                self.assertAlmostEqual(result["value"] / result["discounted_return"], 1, delta=0.1)
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -84,12 +84,13 @@ void CheckManyArguments(const CommandLine& line) {
 /// Lets --help show the defaults of the agent and the file, or of the run, that were given.
 void ShowDefaultsOfWhatIsChosen(const CommandLine& line, const CommandLine::ShowOptions& show) {
   std::vector<FlagValue> flags;
-  // Of an algorithm alone, the agent of its name is shown.
+  // --algorithm without --agent shows the agent of that name.
   for (const char* flag : {"--algorithm", "--agent"}) {
     if (const std::string agent = line.Last(flag); !agent.empty()) flags = {{"agent", agent, flag}};
   }
-  const std::string run = line.Last("--resume");
-  Config config = run.empty() ? BuildConfig(line.Last("--config"), flags) : ReadRunConfig(run);
+  const std::string run = line.Last("--resume"),
+                    file = line.Last("--config");  // "-": standard input
+  Config config = run.empty() ? BuildConfig(file == "-" ? "" : file, flags) : ReadRunConfig(run);
   Config scratch;
   show(EverySetting(scratch), KnownOptions(config));
 }

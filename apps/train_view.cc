@@ -60,7 +60,8 @@ class TrainView : public TrainObserver {
   }
 
   void OnEvaluation(const TrainState& s, const Evaluation& e) override {
-    value_warning_ = ValueWarning(ValueRatio(e.value, e.discounted_return));
+    value_ = e.value;
+    discounted_return_ = e.discounted_return;
     line_.Print(
         fmt::format("{:>9} steps  {:>11}  {:>6} updates/s  {}  return {:6.0f}  success {:3}/{}",
                     FormatCount(s.steps), FormatDuration(s.seconds), UpdatesText(),
@@ -91,8 +92,10 @@ class TrainView : public TrainObserver {
       Say("Best policy: of step {}, but {} no longer exists\n", FormatCount(s.best_step),
           Printable(policy.string()));
     }
-    if (!value_warning_.empty()) {
-      Say("Its values are not true yet: at the last evaluation it {}\n", value_warning_);
+    if (s.solved && ValueIsOff(value_, discounted_return_)) {
+      Say("Value estimate: at the last evaluation the agent expected {:.4g} and attained {:.4g}\n"
+          "(discounted reward), which is off by more than a quarter.\n",
+          value_, discounted_return_);
     }
     if (Printable(run.string()) != run.string()) return;  // such a name cannot be typed
     const std::string folder = ShellQuoted(run.string());
@@ -182,9 +185,9 @@ class TrainView : public TrainObserver {
 
   const Training& training_;
   ProgressLine line_;
-  int64_t begin_step_;         // where this view's training began
-  Metrics metrics_;            // the last ones
-  std::string value_warning_;  // of the last evaluation
+  int64_t begin_step_;                        // where this view's training began
+  Metrics metrics_;                           // the last ones
+  double value_ = 0, discounted_return_ = 0;  // of the last evaluation
 
   // Rates of training, between two reports at least half a second apart; before there are such, of
   // all that was reported; 0 before the first report.

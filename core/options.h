@@ -120,7 +120,7 @@ class Options {
 
   /// Says why there is no setting of this name, for the message of Find.
   void Explain(std::string_view name, std::string_view why);
-  /// What Explain said; empty: nothing.
+  /// The text given to Explain; empty if none.
   std::string WhyMissing(std::string_view name) const;
 
   const std::vector<Option>& all() const { return options_; }

@@ -119,6 +119,7 @@ std::vector<Checkpoint> CheckpointsOf(const LoadedPolicy& loaded, int64_t count)
   const int64_t end = info.step.value_or(0);
   Config config = ConfigIn(info.config, Concat(where, ": metadata \"config\""));
   config.train.steps = std::max<int64_t>(1, end);
+  config.train.stop_when_solved = false;  // it may have been trained on
   Training training(config, ThisHost(ResolveThreads(0)));
 
   // All of them: how many there will be is known at the end.

@@ -75,7 +75,7 @@ std::span<const RunFigure> RunFigures() {
        [](R run) { return run.evaluations.back().mean_return; }},
       {"final_success", "final success", kShare, &S::final_success,
        [](R run) { return run.evaluations.back().success_rate; }},
-      {"final_value_ratio", "final value", kRatio, &S::value_ratio,
+      {"final_value_ratio", "value/attained", kRatio, &S::value_ratio,
        [](R run) { return run.evaluations.back().value_ratio; }},
       {"best_return", "best return", kReturn, &S::best_return,
        [](R run) { return Best(run).mean_return; }},

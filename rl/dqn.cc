@@ -136,7 +136,8 @@ void Dqn::BackwardRows(const Minibatch& batch, RowRange rows) {
   const Matrix<float> q(q_, B_, A), q_target(q_target_, B_, A), dq(dq_, B_, A);
   const Matrix<float> q_select(config_.double_q || config_.mirror ? q_select_ : q_target_, B_, A);
 
-  // y = r + γⁿ Q(s', a*; θ⁻)
+  // y = r + γⁿ Q(s', a*; θ⁻), or with mirror y = r + γⁿ Q(σs', σa*; θ⁻); θ selects a* in Double
+  // DQN, else θ⁻.
   online_.Forward(config_.double_q ? online_.theta() : theta_target_, s_next, rows, q_select);
   if (config_.mirror) {
     ForwardMirrored(s_next, rows, q_target);

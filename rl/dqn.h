@@ -51,7 +51,8 @@ class Dqn : public OffPolicyAgent {
  private:
   /// TD errors of some rows of a minibatch, and the backward pass to the activations.
   void BackwardRows(const Minibatch& batch, RowRange rows);
-  /// Q(σs, σ·; θ⁻) (B × A) of some rows: the torques, in ascending order, change places.
+  /// Q(σs, σ·; θ⁻) (B × A) of some rows: reversing the columns mirrors the torques, which ascend
+  /// and are symmetric about 0.
   void ForwardMirrored(Matrix<const float> s, RowRange rows, Matrix<float> q);
   /// Adds `shift` to the values of all parameters.
   void ShiftValues(float shift);

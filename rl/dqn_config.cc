@@ -14,12 +14,12 @@ void DqnConfig::Describe(Options& o) {
   o.Section("agent");
   o.Add(&double_q, "double", "Double DQN: choose online, evaluate with the target");
   o.Add(&dueling, "dueling", "Dueling: Q = V + A - mean(A)");
-  o.Add(&levels, "levels", {2, 1001}, "torques", "that the agent chooses from, evenly spaced")
-      .implied = true;
+  o.Add(&levels, "levels", {2, 1001}, "torques", "number of evenly spaced torque levels").implied =
+      true;
   OffPolicyConfig::Describe(o);
   o.Add(&tau, "tau", kUnit, "", "Polyak averaging of the target, per update");
   o.Add(&target_period, "target_period", {0, 1e9}, "updates",
-        "copy the target every so many instead; 0: Polyak averaging");
+        "copy the target network every N updates; 0: Polyak averaging");
   o.Add(&policy_tau, "policy_tau", {1e-9, 1}, "",
         "Polyak averaging of the policy that is judged and kept, per update, which falls with the "
         "learning rate; 1: as learned last");

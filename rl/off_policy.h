@@ -43,11 +43,11 @@ class OffPolicyAgent : public Agent {
   /// Polyak rate of the policy that is judged: `tau` times the learning rate over that at the
   /// beginning. As learning slows, the average lengthens (Polyak and Juditsky, 1992).
   double AveragingTau(double tau) const;
-  /// How far all values shift after a minibatch with these errors (B), Q(s, a) - y as the loss
-  /// counts them: reward_centering times the shift that makes their mean 0. It moves online and
-  /// target values together, so that their common level does not wait for the slow target network.
-  /// This is reward centering (Naik et al., 2024, Eq 12), whose average reward r̄ is (1 - γ) times
-  /// the sum of all shifts.
+  /// The shift of all values after a minibatch: reward_centering times the shift that makes the
+  /// weighted mean error 0. `error` (B) is Q(s, a) - y, clipped if the loss clips. Online and
+  /// target values shift together, so that the target network's lag does not slow their common
+  /// level. This is reward centering (Naik et al., 2024, Eq 12), whose average reward r̄ is (1 - γ)
+  /// times the sum of all shifts.
   float CenteringShift(const Minibatch& batch, std::span<const float> error) const;
   /// Adds the means over a minibatch of the loss, of Q and of |TD error| to the metrics. Throws
   /// Failure if the loss is not finite.

@@ -19,13 +19,13 @@ void OffPolicyConfig::Describe(Options& o) {
         "alpha of prioritised replay; 0: uniform");
   o.Add(&importance_exponent, "importance_exponent", kUnit, "",
         "beta of prioritised replay at the beginning; it rises to 1 over learning_rate_steps");
-  o.Add(
-      &mirror, "mirror",
-      "mirror a random half of each minibatch; DQN also evaluates its targets at mirrored states");
+  o.Add(&mirror, "mirror",
+        "mirror a random half of each minibatch; DQN also evaluates targets at mirrored states");
   o.Add(&reward_centering, "reward_centering", kUnit, "",
-        "share of the shift of all values that makes the mean TD error 0, per update; 0: none");
+        "fraction of the mean TD error that each update removes by shifting all values, for gamma "
+        "near 0.99; 0 or a categorical critic: off");
   o.Add(&learning_starts, "learning_starts", kNotNegative, "steps",
-        "what is seen before the first update");
+        "steps before the first update");
   o.Add(&updates_per_step, "updates_per_step", {0, 100}, "", "gradient steps per step");
   o.Add(&learning_rate, "learning_rate", {0, 10}, "", "learning rate of Adam at the beginning");
   o.Add(&learning_rate_end, "learning_rate_end", {0, 10}, "", "learning rate at the end");
@@ -55,6 +55,11 @@ std::vector<std::string> OffPolicyConfig::Warnings(int64_t steps) const {
   }
   if (updates_per_step == 0) {
     warnings.emplace_back("updates_per_step is 0: nothing will be learned");
+  }
+  if (reward_centering > 0 && gamma > 0.995) {
+    warnings.push_back(Concat("reward_centering divides by 1 - gamma: with gamma ",
+                              FormatNumber(gamma), ", ", FormatNumber(reward_centering),
+                              " may be too much, and values overshoot"));
   }
   WarnOfNoRate(learning_rate, learning_rate_end, warnings);
   return warnings;

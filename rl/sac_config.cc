@@ -32,7 +32,7 @@ void SacConfig::Describe(Options& o) {
         "Polyak averaging of the policy that is judged and kept, per update of the actor, which "
         "falls with the learning rate; 1: as learned last");
   o.Add(&entropy_reward, "entropy_reward",
-        "count entropy as reward in the critics' targets; off: in the actor's loss alone");
+        "add the entropy bonus to the critics' targets; off: only the actor's loss has it");
   o.Add(&tune_alpha, "tune_alpha", "learn the temperature, so that entropy meets its target");
   o.Add(&alpha, "alpha", {0, 1e6}, "", "temperature, or what it begins with");
   o.Add(&alpha_rate, "alpha_rate", {0, 10}, "", "learning rate of its logarithm");

@@ -15,7 +15,7 @@ struct Randomization {
   /// Half-widths relative to the nominal value, in the order of Plant: 0.25 stands for ±25%.
   std::array<double, 8> plant{};
   double sensor_noise = 0;    // largest addition to the nominal one, rad, rad/s
-  double delay = 0;           // the same, s
+  double delay = 0;           // largest addition to the delay, s
   double sensor_latency = 0;  // the same, s
 
   /// One line per setting: name, range, unit, help.

@@ -142,7 +142,7 @@ test('the default agent: from an untrained policy to the one of the page, fetche
   expect(checkpoints()).toEqual([]);
   await page.getByRole('button', { name: 'How the default agent learned' }).click();
   const where = page.locator('#learn-where');
-  await expect(where).toHaveText('on the stage: after 170,016 steps');
+  await expect(where).toHaveText('on the stage: after 240,000 steps');
   await expect(page.locator('#learn-success')).toHaveText('100%');
   expect(checkpoints()).toEqual([]);
 
@@ -166,12 +166,12 @@ test('the default agent: from an untrained policy to the one of the page, fetche
   await expect(page.locator('#learn-success')).toHaveText('–');
   expect(await successes()).toBe(0);
   expect(checkpoints().length).toBe(1);
-  await scrub.fill('92000');
-  await expect(where).toHaveText('on the stage: after 90,016 steps');
+  await scrub.fill('61000');
+  await expect(where).toHaveText('on the stage: after 50,016 steps');
   await expect(page.locator('#learn-success')).toHaveText('0%');
   expect(await successes()).toBe(0);
   await scrub.press('End');
-  await expect(where).toHaveText('on the stage: after 170,016 steps');
+  await expect(where).toHaveText('on the stage: after 240,000 steps');
   expect(await successes()).toBe(5);
   expect(checkpoints().length).toBe(2);
 
@@ -181,13 +181,13 @@ test('the default agent: from an untrained policy to the one of the page, fetche
   expect(step).toBe('0');
 
   // One that is not there is told, and the one before stays.
-  await page.route(/-at-30016\.safetensors$/, (route) =>
+  await page.route(/-at-20000\.safetensors$/, (route) =>
     route.fulfill({ status: 200, body: 'no' }),
   );
-  await scrub.fill('30000');
+  await scrub.fill('22000');
   const message = page.locator('#message');
-  await expect(message).toContainText('The agent after 30,016 steps cannot be shown');
-  expect(await page.evaluate(() => upswing.world.policy!.metadata.get('step'))).toBe('170016');
+  await expect(message).toContainText('The agent after 20,000 steps cannot be shown');
+  expect(await page.evaluate(() => upswing.world.policy!.metadata.get('step'))).toBe('240000');
 });
 
 test('pause, go on, another seed, start over', async ({ stage: page }) => {
@@ -326,7 +326,7 @@ test('an agent that is chosen before the first news stays', async ({ stage: page
     await upswing.choose('fast');
   });
   await expect(page.locator('#learn-updates')).not.toHaveText('0');
-  expect(await page.evaluate(() => upswing.world.policy!.metadata.get('step'))).toBe('90016');
+  expect(await page.evaluate(() => upswing.world.policy!.metadata.get('step'))).toBe('230016');
 });
 
 test('settings are those of the program, which says what is wrong with them', async ({

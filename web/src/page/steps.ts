@@ -112,7 +112,7 @@ function agent(stage: Stage): Step {
     answer(world) {
       on.ariaPressed = String(world.agentOn);
       return world.agentOn && heldFor(world) > HELD
-        ? 'The same motor as yours. It learned this in an hour of swinging, computed within seconds.'
+        ? 'The same motor as yours. It learned this in 80 minutes of swinging, computed within seconds.'
         : '';
     },
   };
