@@ -346,7 +346,7 @@ class HeaderTest(ProgramTest):
         return subprocess.run([self.folder / "program"], check=False).returncode
 
     def test_self_test_finds_any_changed_number(self):
-        self.succeed(*small(hidden="8,8", head=4))
+        self.succeed(*small(hidden="8,8", head=4, mirror=False, reward_centering=0, tau=0.02))
         self.succeed("export", "run", "--c", "policy.h")
         tables = re.findall(r"static const float (policy_\w+)\[(\d+)\] = ", self.header())
         self.assertGreater(sum(int(count) for _, count in tables), 300)
@@ -365,7 +365,7 @@ class HeaderTest(ProgramTest):
                 for (i = 0; i < tables[t].count; i++) {
                   float *x = tables[t].numbers + i;
                   const float right = *x;
-                  *x = right + (tables[t].sample ? 0.1f : 0.01f) * fmaxf(1.0f, fabsf(right));
+                  *x = right + (tables[t].sample ? 0.03f : 0.01f) * fmaxf(1.0f, fabsf(right));
                   if (policy_selftest() != POLICY_DAMAGED) printf("%s[%d]\n", tables[t].name, i);
                   *x = nextafterf(right, 9.0f);
                   if (!tables[t].sample && policy_selftest() != POLICY_DAMAGED)
