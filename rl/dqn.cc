@@ -57,7 +57,6 @@ Dqn::Dqn(const DqnConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
       mirrored_(static_cast<size_t>(B_) * D_),
       y_(B_),
       q_taken_(y_.size()),
-      error_(y_.size()),
       act_activations_(online_.network().MakeActivations(spec.num_envs, false)),
       act_q_(static_cast<size_t>(spec.num_envs) * torques_.size()) {}
 
@@ -86,11 +85,12 @@ void Dqn::Update(const Minibatch& batch) {
   // Gradient of the mean Huber loss.
   online_.Prepare(pool_);
   ForSlices(pool_, B_, [&](RowRange rows) { BackwardRows(batch, rows); });
-  double loss = 0, q = 0, td = 0;
+  double loss = 0, q = 0, td = 0, errors = 0;
   for (int i = 0; i < B_; ++i) {
     loss += batch.weight[i] * HuberLoss(td_error_[i]);
     q += q_taken_[i];
     td += std::abs(td_error_[i]);
+    errors += double{batch.weight[i]} * HuberGradient(td_error_[i]);
   }
   CountErrors(loss / B_, q / B_, td / B_);
 
@@ -103,7 +103,7 @@ void Dqn::Update(const Minibatch& batch) {
     std::ranges::copy(online_.theta(), theta_target_.begin());
   }
   if (config_.policy_tau < 1) AveragePolicy();
-  if (config_.reward_centering > 0) ShiftValues(CenteringShift(batch, error_));
+  if (config_.reward_centering > 0) ShiftValues(CenteringShift(batch, errors));
 }
 
 void Dqn::ShiftValues(float shift) {
@@ -154,8 +154,7 @@ void Dqn::BackwardRows(const Minibatch& batch, RowRange rows) {
     const int a = static_cast<int>(batch.action[i]);
     q_taken_[i] = q(i, a);
     td_error_[i] = q(i, a) - y_[i];
-    error_[i] = HuberGradient(td_error_[i]);
-    dq(i, a) = batch.weight[i] * error_[i] / static_cast<float>(B_);
+    dq(i, a) = batch.weight[i] * HuberGradient(td_error_[i]) / static_cast<float>(B_);
   }
   online_.Backward(dq, rows);
 }

@@ -68,7 +68,7 @@ class Dqn : public OffPolicyAgent {
   // Of an update: B rows.
   AlignedVector<float> q_, q_select_, q_target_, dq_;  // (B × A)
   AlignedVector<float> mirrored_;                      // (B × D) σs'
-  AlignedVector<float> y_, q_taken_, error_;           // (B) targets, Q(s, a), clipped TD errors
+  AlignedVector<float> y_, q_taken_;                   // (B) targets, Q(s, a)
   Network::Activations act_activations_;
   AlignedVector<float> act_q_;  // (N × A) of the last Act
 };

@@ -93,11 +93,10 @@ void OffPolicyAgent::SampleBatch() {
   if (settings_.mirror) MirrorHalf(sample_rng_, mirror_signs_, action_space_, batch_);
 }
 
-float OffPolicyAgent::CenteringShift(const Minibatch& batch, std::span<const float> error) const {
+float OffPolicyAgent::CenteringShift(const Minibatch& batch, double errors) const {
   // A shift of all values by x changes each error by (1 - γⁿ) x.
-  double errors = 0, per_shift = 0;
-  for (size_t i = 0; i < error.size(); ++i) {
-    errors += double{batch.weight[i]} * error[i];
+  double per_shift = 0;
+  for (size_t i = 0; i < batch.weight.size(); ++i) {
     per_shift += double{batch.weight[i]} * (1 - batch.discount[i]);
   }
   return per_shift > 0 ? static_cast<float>(-settings_.reward_centering * errors / per_shift) : 0;

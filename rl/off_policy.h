@@ -44,11 +44,11 @@ class OffPolicyAgent : public Agent {
   /// beginning. As learning slows, the average lengthens (Polyak and Juditsky, 1992).
   double AveragingTau(double tau) const;
   /// The shift of all values after a minibatch: reward_centering times the shift that makes the
-  /// weighted mean error 0. `error` (B) is Q(s, a) - y, clipped if the loss clips. Online and
-  /// target values shift together, so that the target network's lag does not slow their common
-  /// level. This is reward centering (Naik et al., 2024, Eq 12), whose average reward r̄ is (1 - γ)
-  /// times the sum of all shifts.
-  float CenteringShift(const Minibatch& batch, std::span<const float> error) const;
+  /// weighted mean error 0. `errors` is the weighted sum of Q(s, a) - y, clipped if the loss clips.
+  /// Online and target values shift together, so that the target network's lag does not slow their
+  /// common level. This is reward centering (Naik et al., 2024, Eq 12), whose average reward r̄ is
+  /// (1 - γ) times the sum of all shifts.
+  float CenteringShift(const Minibatch& batch, double errors) const;
   /// Adds the means over a minibatch of the loss, of Q and of |TD error| to the metrics. Throws
   /// Failure if the loss is not finite.
   void CountErrors(double loss, double q, double td_error);

@@ -34,7 +34,6 @@ Sac::Sac(const SacConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
       inputs_(Size(B_, D_ + A_)),
       policy_inputs_(inputs_.size()),
       y_(log_prob_.size()),
-      error_(y_.size()),
       act_activations_(actor_.network().MakeActivations(spec.num_envs, false)),
       act_outputs_(Size(spec.num_envs, 2 * A_)),
       mean_(act_action_.size()),

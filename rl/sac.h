@@ -108,7 +108,7 @@ class Sac : public OffPolicyAgent {
   Samples samples_;                                // (B × A)
   AlignedVector<float> log_prob_;                  // (B) ln π(a|s)
   AlignedVector<float> inputs_, policy_inputs_;    // (B × (D + A)): s, a; s, a ~ π
-  AlignedVector<float> y_, error_;                 // (B) targets, TD errors of one critic
+  AlignedVector<float> y_;                         // (B)
 
   Network::Activations act_activations_;
   AlignedVector<float> act_outputs_;     // (N × 2 A) of the last Act

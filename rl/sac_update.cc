@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
 #include <numeric>
 
 #include "core/error.h"
@@ -122,8 +121,11 @@ void Sac::UpdateCritics(const Minibatch& batch) {
 
 void Sac::CenterCritics(const Minibatch& batch) {
   for (Critic& critic : critics_) {
-    std::ranges::transform(critic.value, y_, error_.begin(), std::minus<>());
-    const float shift = CenteringShift(batch, error_);
+    double errors = 0;
+    for (size_t i = 0; i < y_.size(); ++i) {
+      errors += double{batch.weight[i]} * (critic.value[i] - y_[i]);
+    }
+    const float shift = CenteringShift(batch, errors);
     critic.network.network().ShiftOutputs(shift, critic.network.mutable_theta());
     critic.network.network().ShiftOutputs(shift, critic.target);
   }

@@ -20,6 +20,15 @@ int Disturbance::delay_steps() const {
   return static_cast<int>(std::lround(delay / kControlPeriod));
 }
 
+Disturbance Larger(const Disturbance& a, const Disturbance& b) {
+  const SensorModel &x = a.sensors, &y = b.sensors;
+  return {std::max(a.sensor_noise, b.sensor_noise),
+          std::max(a.delay, b.delay),
+          {std::max(x.latency, y.latency), std::max(x.encoder_counts, y.encoder_counts),
+           std::max(x.velocity_window, y.velocity_window),
+           std::max(x.velocity_filter, y.velocity_filter)}};
+}
+
 Disturber::Disturber(std::vector<Disturbance> disturbances, int num_envs,
                      const Disturbance& largest, uint64_t seed, const std::string& stream,
                      uint64_t first_index)

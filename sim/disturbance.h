@@ -34,6 +34,9 @@ struct Disturbance {
   int delay_steps() const;
 };
 
+/// The larger value of each setting.
+Disturbance Larger(const Disturbance& a, const Disturbance& b);
+
 /// The sensors and motors of N environments.
 class Disturber {
  public:

@@ -18,14 +18,8 @@ std::string NoiseStream(const std::string& stream) { return Concat(stream, ": se
 std::optional<Disturber> MakeDisturber(const PendulumEnvConfig& config) {
   const Randomization& random = config.randomization;
   Disturbance largest;
-  const Options most = OptionsOf(largest);
   for (const Disturbance& each : config.disturbances) {
-    const Disturbance drawn = random.Largest(each);
-    const Options options = OptionsOf(drawn);
-    for (size_t k = 0; k < options.all().size(); ++k) {
-      double& value = *std::get<double*>(most.all()[k].target);
-      value = std::max(value, options.all()[k].number());
-    }
+    largest = Larger(largest, random.Largest(each));
   }
   if (!largest.any()) return std::nullopt;
   return Disturber(config.disturbances, config.num_envs, largest, config.seed,

@@ -16,7 +16,7 @@ struct Randomization {
   std::array<double, 8> plant{};
   double sensor_noise = 0;    // largest addition to the nominal one, rad, rad/s
   double delay = 0;           // largest addition to the delay, s
-  double sensor_latency = 0;  // the same, s
+  double sensor_latency = 0;  // largest addition to the sensor latency, s
 
   /// One line per setting: name, range, unit, help.
   void Describe(Options& options);

@@ -68,13 +68,8 @@ test('a training that diverges ends with a reason, and its core goes on', async 
   const learner = new Learner(host, 'fast', 1, {
     ...{ layer_norm: 'false', dueling: 'false', hidden: '64,64,64,64,64,64,64,64', gamma: '1' },
     ...{ reward_scale: '1e9', balance_weight: '1000', learning_rate: '10', tau: '1' },
-    ...{
-      max_gradient_norm: '1e9',
-      learning_starts: '128',
-      updates_per_step: '1',
-      batch: '32',
-      mirror: 'false',
-    },
+    ...{ max_gradient_norm: '1e9', learning_starts: '128', updates_per_step: '1', batch: '32' },
+    mirror: 'false',
   });
   expect(() => {
     for (let k = 0; k < 20; ++k) learner.run(50);
