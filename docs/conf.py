@@ -22,8 +22,6 @@ version = release = re.search(r"project\(upswing VERSION (\S+)",
                               (root / "CMakeLists.txt").read_text(encoding="utf-8"))[1]
 extensions = ["myst_parser", "breathe", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 
-exclude_patterns = ["files"]  # what pages link to outside docs/
-
 myst_enable_extensions = ["dollarmath", "deflist"]
 myst_heading_anchors = 4
 

@@ -97,7 +97,7 @@ def stage_page(stage, path, name):
         elif inside.startswith("docs" + os.sep):
             new = str(Path(inside).relative_to("docs"))
         elif (ROOT / inside).is_file():
-            new = f"files/{inside}"
+            new = f"files/{inside}" + (".txt" if inside.endswith(".md") else "")  # no page
             stage.write(new, (ROOT / inside).read_bytes())
         else:
             return link[0]  # Sphinx says what is wrong with it
@@ -280,7 +280,7 @@ def for_doxygen(text):
     # A comment behind a member describes it.
     text = re.sub(r"([;,]) +// +", r"\1  ///< ", text)
     # Sphinx's parser of C++ does not take lambdas.
-    return re.sub(r"= *\[\] *\{(.*?)\}(\(\))?(?=[;,)])", "= {}", text)
+    return re.sub(r"=\s*\[\] *\{[^{}]*\}(\(\))?(?=[;,)])", "= {}", text)
 
 
 def run_doxygen():

@@ -57,7 +57,7 @@ def agents():
 def help_of(command, *arguments):
     """The help text of a command."""
     if command == "bench":
-        return output_of(UPSWING.with_name("upswing-bench"), "--help")
+        return output_of(UPSWING.with_name("upswing-bench"), "bench", "--help")
     if command in LAUNCHER_COMMANDS:
         return output_of(ROOT / "upswing", "--no-setup", command, "--help")
     return program(command, *arguments, "--help")
