@@ -27,8 +27,9 @@ myst_heading_anchors = 4
 
 breathe_projects = {"upswing": os.environ["UPSWING_DOXYGEN_XML"]}
 breathe_default_project = "upswing"
-# Two headers may each have a struct of the same name in an implementation namespace.
-suppress_warnings = ["duplicate_declaration.cpp"]
+breathe_show_include = False
+smartquotes = False  # an s' in a formula is no quotation
+default_role = "literal"  # docstrings have names in single backticks
 
 # The package's own sources are read; what it imports is not needed for that.
 autodoc_mock_imports = ["gymnasium", "numpy", "typing_extensions", "upswing._mujoco",

@@ -191,7 +191,6 @@ The package `upswing`. [Python](../howto/python.md) shows how to use it.
    :members:
    :exclude-members: Error, Failure, InputError
    :imported-members:
-   :show-inheritance:
 
 .. py:exception:: upswing.InputError
 

@@ -248,6 +248,7 @@ def write():
 # --- Measurements -------------------------------------------------------------------------------
 
 RECIPES = {}
+NONE = "–"  # not measured, or not applicable
 
 
 def recipe(table_id):
@@ -269,7 +270,7 @@ class Lab:
         self.commands = []
 
     def run(self, *arguments, record=True):
-        """The output of a command of the program. `{tmp}` in the record stands for the folder."""
+        """The output of a command of the program. The record has `runs` for the folder."""
         arguments = [str(argument) for argument in arguments]
         if record:
             self.commands.append("./upswing " + " ".join(arguments).replace(str(self.folder), "runs"))
@@ -290,8 +291,10 @@ class Lab:
         return time.monotonic() - begin
 
 
-PAGE_AGENTS = ROOT / "web/public/agents"
-CONTROLLERS = ("energy", "pfl", "tvlqr", "mpc")
+PAGE_AGENTS = Path("web/public/agents")
+OVERVIEW_AGENTS = ("d3qn", "dqn", "double-dqn", "dueling-dqn", "fast", "sac", "sac-fast", "ppo",
+                   "ppo-discrete", "d3qn-randomized", "d3qn-adaptive")
+CONTROLLERS = ("lqr", "energy", "pfl", "tvlqr", "mpc")
 SLOW = {"mpc"}  # plans at each decision: fewer random plants
 
 
@@ -301,33 +304,34 @@ def percent(share):
 
 @recipe("overview")
 def overview(lab):
-    shown = json.loads((PAGE_AGENTS / "agents.json").read_text(encoding="utf-8"))["agents"]
-    agents = {each["agent"]: PAGE_AGENTS.relative_to(ROOT) / each["file"] for each in shown}
-    policies = {**{f"`{name}`": path for name, path in agents.items()},
-                **{f"`{name}` (controller)": name for name in CONTROLLERS}}
+    """Policies are those of the page, else those of the first seed that is trained for the time."""
     episodes = 2 if lab.few else 100
-    bounds = lab.json("bounds", *policies.values(), "--episodes", episodes)
+    policies, seconds = {}, {}
+    for agent in OVERVIEW_AGENTS[4:5] if lab.few else OVERVIEW_AGENTS:
+        outs = [lab.folder / f"{agent}-seed{seed}" for seed in range(1, 2 if lab.few else 6)]
+        times = [lab.wall_clock("train", "--agent", agent, "--seed", k + 1, "--out", out,
+                                *(["--steps", 4000] if lab.few else [])) for k, out in enumerate(outs)]
+        seconds[agent] = format_number(statistics.median(times), 2)
+        shown = PAGE_AGENTS / f"{agent}.safetensors"
+        policies[agent] = str(shown if (ROOT / shown).exists() else outs[0])
+    policies |= {name: name for name in (CONTROLLERS[:1] if lab.few else CONTROLLERS)}
+    swing_up = ["--swing-up", PAGE_AGENTS / "fast.safetensors"]  # of hybrid
+    policies["hybrid"] = "hybrid"
+    bounds = lab.json("bounds", *policies.values(), *swing_up, "--episodes", episodes)
     shares = {row["name"]: row["share"] for row in bounds["rows"]}
     rows = []
     for name, policy in policies.items():
-        nominal = lab.json("eval", policy, "--episodes", episodes)
-        plants = 2 if lab.few else 100 if policy in SLOW else 1000
-        box = lab.json("eval", policy, "--randomize", 0.25, "--episodes", plants)
-        seconds = ""
-        if policy not in CONTROLLERS:
-            agent = policy.stem
-            seeds = range(1, 2 if lab.few else 6)
-            few = ["--steps", 4000] if lab.few else []
-            seconds = format_number(statistics.median(
-                lab.wall_clock("train", "--agent", agent, "--seed", seed, "--out",
-                               lab.folder / f"{agent}-seed{seed}", *few) for seed in seeds), 2)
-        swing_up = nominal["swing_up_seconds"]["median"]
-        rows.append([name, percent(nominal["success_rate"]),
-                     "" if swing_up is None else f"{swing_up:.2f}",
-                     percent(shares[str(policy)]), percent(box["success_rate"]),
-                     format_number(nominal["torque_variation"]["mean"], 2), seconds])
-    return ["agent or controller", "success", "swing-up time [s]", "return / bound",
-            "success on ±25% plants", "torque variation [N·m/s]", "training [s]"], rows
+        more = swing_up if name == "hybrid" else []
+        nominal = lab.json("eval", policy, *more, "--episodes", episodes)
+        plants = 2 if lab.few else 100 if name in SLOW else 1000
+        box = lab.json("eval", policy, *more, "--randomize", 0.25, "--episodes", plants)
+        median = nominal["swing_up_seconds"]["median"]
+        rows.append([f"`{name}`", percent(nominal["success_rate"]),
+                     NONE if median is None else f"{median:.2f}", percent(shares[policy]),
+                     percent(box["success_rate"]),
+                     f"{nominal['torque_variation']['mean']:.1f}", seconds.get(name, NONE)])
+    return ["agent", "success", "swing-up [s]", "return / bound", "±25% plants",
+            "torque variation [N·m/s]", "time to train [s]"], rows
 
 
 @recipe("time-to-solve")
@@ -342,15 +346,16 @@ def time_to_solve(lab):
         rows.append([f"`{agent}`", f"{group['solved']} of {len(group['runs'])}",
                      spread(group["solve_seconds"], lambda x: format_number(x, 2)),
                      spread(group["solve_steps"], lambda x: f"{x:,.0f}")])
-    return ["agent", "solved", "time to solve [s]", "steps to solve"], rows
+    return ["agent", "solved", "time to solve [s]: median (range)",
+            "steps to solve: median (range)"], rows
 
 
 def spread(figure, text):
-    """Such as `0.5 (0.3–0.7)`: median and range; empty if nothing was solved."""
-    if figure["median"] is None or None in figure["range"]:
-        return ""
-    low, high = figure["range"]
-    return f"{text(figure['median'])} ({text(low)}–{text(high)})"
+    """Such as `0.5 (0.3 to 0.7)`: the median and the range of the seeds that solved."""
+    if figure["median"] is None:
+        return NONE
+    values = [value for value in figure["values"] if value is not None]
+    return f"{text(figure['median'])} ({text(min(values))} to {text(max(values))})"
 
 
 def format_number(value, digits):
