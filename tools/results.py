@@ -325,7 +325,7 @@ def overview(lab):
         nominal = lab.json("eval", policy, *more, "--episodes", episodes)
         plants = 2 if lab.few else 100 if name in SLOW else 1000
         box = lab.json("eval", policy, *more, "--randomize", 0.25, "--episodes", plants)
-        median = nominal["swing_up_seconds"]["median"]
+        median = (nominal["swing_up_seconds"] or {}).get("median")  # null: none swings up
         rows.append([f"`{name}`", percent(nominal["success_rate"]),
                      NONE if median is None else f"{median:.2f}", percent(shares[policy]),
                      percent(box["success_rate"]),
