@@ -318,7 +318,8 @@ def overview(lab):
     swing_up = ["--swing-up", PAGE_AGENTS / "fast.safetensors"]  # of hybrid
     policies["hybrid"] = "hybrid"
     bounds = lab.json("bounds", *policies.values(), *swing_up, "--episodes", episodes)
-    shares = {row["name"]: row["share"] for row in bounds["rows"]}
+    # The last rows are those of the policies, in their order.
+    shares = dict(zip(policies, [row["share"] for row in bounds["rows"]][-len(policies):]))
     rows = []
     for name, policy in policies.items():
         more = swing_up if name == "hybrid" else []
@@ -327,7 +328,7 @@ def overview(lab):
         box = lab.json("eval", policy, *more, "--randomize", 0.25, "--episodes", plants)
         median = (nominal["swing_up_seconds"] or {}).get("median")  # null: none swings up
         rows.append([f"`{name}`", percent(nominal["success_rate"]),
-                     NONE if median is None else f"{median:.2f}", percent(shares[policy]),
+                     NONE if median is None else f"{median:.2f}", percent(shares[name]),
                      percent(box["success_rate"]),
                      f"{nominal['torque_variation']['mean']:.1f}", seconds.get(name, NONE)])
     return ["agent", "success", "swing-up [s]", "return / bound", "±25% plants",
