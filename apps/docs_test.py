@@ -4,13 +4,26 @@
 import csv
 import io
 import math
+import os
 import re
+import shutil
+import subprocess
+import sys
 import unittest
+from pathlib import Path
 
-from testing import ROOT, ProgramTest, read_csv, train_once
+from testing import ROOT, UPSWING, ProgramTest, read_csv, train_once
 
-DOCUMENTS = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md")),
-             ROOT / "tools/peers/README.md"]
+sys.path.insert(0, str(ROOT / "tools"))
+import program  # noqa: E402
+import prose  # noqa: E402
+import results  # noqa: E402
+
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+DOCUMENTS = [*sorted(ROOT.glob("*.md")), *PAGES[1:], ROOT / "tools/peers/README.md"]
+# Written when the site is built: tools/docs.py.
+GENERATED = {f"docs/reference/{name}.md"
+             for name in ("command-line", "settings", "cpp-api", "python-api")}
 
 
 def text_of(name):
@@ -23,20 +36,37 @@ def first_column(markdown):
 
 
 class RunFolder(ProgramTest):
+    PAGE = "docs/reference/run-folder.md"
+
     @classmethod
     def setUpClass(cls):
         cls.run_path = train_once(cls)
-        cls.sections = dict(re.findall(r"^## (\S+\.csv)\n(.*?)(?=^## |\Z)",
-                                       text_of("docs/run-folder.md"), re.MULTILINE | re.DOTALL))
+        cls.sections = dict(re.findall(r"^## (\S+\.csv)\n(.*?)(?=^## |\Z)", text_of(cls.PAGE),
+                                       re.MULTILINE | re.DOTALL))
+
+    @staticmethod
+    def header(path):
+        with open(path, encoding="utf-8", newline="") as file:
+            return next(csv.reader(file))
 
     def test_every_column_is_explained(self):
         self.assertEqual(set(self.sections), {path.name for path in self.run_path.glob("*.csv")})
-        for name, section in self.sections.items():
-            with open(self.run_path / name, encoding="utf-8", newline="") as file:
-                self.assertEqual(first_column(section), next(csv.reader(file)), name)
+        for name in self.sections.keys() - {"metrics.csv"}:
+            self.assertEqual(first_column(self.sections[name]), self.header(self.run_path / name), name)
+
+    def test_every_metric_is_explained(self):
+        common, *parts = re.split(r"^### (DQN|SAC|PPO)\n", self.sections["metrics.csv"],
+                                  flags=re.MULTILINE)
+        dqn = {"head": None, "learning_starts": None, "updates_per_step": None}
+        runs = {"DQN": self.run_path, "SAC": train_once(self, agent="sac-fast", head=None),
+                "PPO": train_once(self, agent="ppo", **dqn)}
+        self.assertEqual(parts[::2], list(runs))
+        for algorithm, text in zip(parts[::2], parts[1::2]):
+            self.assertEqual(sorted(first_column(common) + first_column(text)),
+                             sorted(self.header(runs[algorithm] / "metrics.csv")), algorithm)
 
     def test_every_file_is_named(self):
-        files = first_column(text_of("docs/run-folder.md").split("## ", maxsplit=1)[0])
+        files = first_column(text_of(self.PAGE).split("## ", maxsplit=1)[0])
         self.assertEqual(set(files) - {"model.xml"}, {path.name for path in self.run_path.iterdir()})
 
     def test_terms_add_up_to_the_return(self):
@@ -46,7 +76,7 @@ class RunFolder(ProgramTest):
 
 
 def reward_terms(q1, q2, w1, w2, tau, m1=1, m2=1, l1=0.5, l2=0.5, g=9.81):
-    """docs/task.md in Python."""
+    """docs/reference/task.md in Python."""
     pe = (-m1 * g * l1 / 2 * math.cos(q1)
           - m2 * g * (l1 * math.cos(q1) + l2 / 2 * math.cos(q1 + q2)))
     ke = (m1 * l1**2 / 12 * w1**2 / 2 + m2 * l2**2 / 12 * (w1 + w2)**2 / 2
@@ -68,7 +98,7 @@ class Task(ProgramTest):
         rows = self.succeed("simulate", ROOT / "web/public/agents/d3qn.safetensors", "--seconds",
                             5, "--physics", "closed-form")
         seen = set()
-        names = first_column(text_of("docs/task.md").split("## Reward")[1].split("##")[0])
+        names = first_column(text_of("docs/reference/task.md").split("## Reward")[1].split("##")[0])
         for row in csv.DictReader(io.StringIO(rows)):
             x = {name: float(text) for name, text in row.items()}
             # The torque of a row is held from its state on: its reward's terms are of both.
@@ -81,19 +111,135 @@ class Task(ProgramTest):
         self.assertEqual(seen, {0, 5})
 
 
+def outside_code(markdown):
+    return re.sub(r"^(```+|~~~+)[^\n]*\n.*?^\1[^\n]*$", "", markdown,
+                  flags=re.MULTILINE | re.DOTALL)
+
+
+def anchors(markdown):
+    """The anchors of the headings, as GitHub and MyST make them."""
+    found = set()
+    for heading in re.findall(r"^#+ +(.*?)\s*$", outside_code(markdown), re.MULTILINE):
+        text = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).lower()
+        slug = re.sub(r"[^\w\- ]", "", text).replace(" ", "-")
+        found.add(next(name for name in [slug, *(f"{slug}-{k}" for k in range(1, 99))]
+                       if name not in found))
+    return found
+
+
+def commands_in(markdown):
+    """[command, words] of each `./upswing …` in fenced blocks and in code within a line."""
+    blocks = re.findall(r"^```[^\n]*\n(.*?)^```", markdown, re.MULTILINE | re.DOTALL)
+    codes = re.findall(r"`([^`\n]+)`", outside_code(markdown)) + [
+        line for block in blocks for line in block.replace("\\\n", " ").splitlines()]
+    for line in codes:
+        for words in re.findall(r"\./upswing((?: +[^\s|&;#<>()]+)+)", line.split(" #")[0]):
+            words = [word for word in words.split() if word != "--no-setup"]
+            if words and re.fullmatch("[a-z]+", words[0]):
+                yield words[0], words[1:]
+
+
 class Documents(ProgramTest):
     def test_links_lead_somewhere(self):
         for path in DOCUMENTS:
             text = path.read_text(encoding="utf-8")
-            for target in re.findall(r'\]\(([^)\s]+)\)|src="([^"]+)"', text):
+            seen = outside_code(text)
+            for target in re.findall(r'\]\(([^)\s]+)\)|src="([^"]+)"', seen):
                 target = "".join(target)
-                if not re.match(r"https?://", target):
-                    self.assertTrue((path.parent / target.split("#")[0]).exists(),
-                                    f"{path.name}: {target}")
+                if re.match(r"[a-z]+:", target):
+                    continue
+                place, _, anchor = target.partition("#")
+                there = Path(os.path.normpath(path.parent / place)) if place else path
+                name = str(there.relative_to(ROOT))
+                with self.subTest(page=path.name, target=target):
+                    self.assertTrue(there.exists() or name in GENERATED)
+                    if anchor and there.suffix == ".md" and name not in GENERATED:
+                        self.assertIn(anchor, anchors(there.read_text(encoding="utf-8")))
 
-    def test_readme_leads_to_every_document(self):
-        for path in (ROOT / "docs").glob("*.md"):
-            self.assertIn(f"(docs/{path.name})", text_of("README.md"))
+    def test_commands_and_flags_exist(self):
+        known = set(program.commands())
+        for path in PAGES:
+            for command, words in commands_in(path.read_text(encoding="utf-8")):
+                with self.subTest(page=path.name, command=command):
+                    self.assertIn(command, known | {"help"})
+                    flags = {word.split("=")[0] for word in words if re.match("--[a-z]", word)}
+                    if command == "test" or "--" in words or command == "python":
+                        continue  # what follows is for ctest or for Python
+                    self.assertLessEqual(flags, program.flags(command) | {"--help"})
+
+    def test_tables_and_values_are_up_to_date(self):
+        done = subprocess.run([sys.executable, "-B", ROOT / "tools/results.py", "check"],
+                              check=False, stdout=subprocess.PIPE, encoding="utf-8")
+        self.assertEqual((done.returncode, done.stdout), (0, ""))
+
+    def test_a_wrong_table_or_value_is_found(self):
+        (path, *_) = [path for path in results.DATA.glob("*.json")
+                      if path.stem != "machines"] or [None]
+        if path is None:
+            self.skipTest("there is no measured table yet")
+        table = results.load(path.stem)
+        name, column = table["rows"][0][0].replace("`", ""), len(table["columns"]) - 1
+        shown = f"<!-- table: {path.stem} -->\n{results.render('table', path.stem)}<!-- end -->\n"
+        value = f"<!-- value: {path.stem} {name} {column} -->{{}}<!-- end -->\n"
+        right = value.format(table["rows"][0][column])
+        self.assertEqual(list(results.problems_of(shown + right)), [])
+        self.assertEqual(len(list(results.problems_of(shown.replace("|---", "|----", 1)))), 1)
+        self.assertEqual(len(list(results.problems_of(value.format("12345.678")))), 1)
+        self.assertEqual(len(list(results.problems_of("<!-- table: no-such -->\n<!-- end -->"))), 1)
+        self.assertEqual(results.rendered(shown.replace("|---", "|----", 1)), shown)
+
+    def test_plain_english(self):
+        for path in PAGES:
+            for sentence, fault in prose.faults(path.read_text(encoding="utf-8")):
+                with self.subTest(page=path.name, fault=fault):
+                    self.fail(sentence)
+
+    def test_the_patterns_find_faults(self):
+        # Of the README of version 0.4.0 and its relatives.
+        for sentence in (
+                "Nobody has tried Ubuntu yet.",
+                "learning_md says what is in a file.",
+                "or `pip install .` into an environment of one's own.",
+                "our scores beside the published ones",
+                "A controller is made anew for the plant of each episode.",
+                "Then one is the motor oneself.",
+                "copy the target every so many instead",
+                "It costs so much that nothing is left.",
+                "Units such as those of the plant are kept.",
+                "the same of the second link",
+                "*Everything* has all there is: drag the pendulum with mouse or finger, shove it, pause, "
+                "go step by step or ten times slower, change masses, lengths, dampings, gravity, the "
+                "motor, blur the sensors, delay the torque; compare two agents side by side."):
+            with self.subTest(sentence):
+                self.assertNotEqual(list(prose.faults(sentence)), [])
+        for text in ("What is a plant?", "```text\nnobody\n```", "`anew`",
+                     "The motor swings the pendulum up.", "| beside_x | 1 |"):
+            with self.subTest(text):
+                self.assertEqual(list(prose.faults(text)), [])
+
+    def test_blocks_marked_as_tests_succeed(self):
+        launcher = self.folder / "launcher"
+        launcher.write_text(f'#!/bin/sh\nexec "{UPSWING}" "$@"\n', encoding="utf-8")
+        launcher.chmod(0o755)
+        for path in PAGES:
+            blocks = re.findall(r"^```sh test\n(.*?)^```", path.read_text(encoding="utf-8"),
+                                re.MULTILINE | re.DOTALL)
+            if not blocks:
+                continue
+            # The blocks of a page run one after the other, in what looks like a fresh copy.
+            here = self.folder / "page"
+            here.mkdir()
+            for entry in ROOT.iterdir():
+                if entry.name not in {"upswing", "build", "runs", ".git"}:
+                    (here / entry.name).symlink_to(entry)
+            (here / "upswing").symlink_to(launcher)
+            for block in blocks:
+                with self.subTest(page=path.name, block=block):
+                    done = subprocess.run(["sh", "-eu"], input=block, cwd=here, check=False,
+                                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                                          encoding="utf-8")
+                    self.assertEqual(done.returncode, 0, done.stdout)
+            shutil.rmtree(here)
 
     def test_the_post_is_named_where_it_is_mentioned(self):
         for path in DOCUMENTS:
@@ -132,6 +278,60 @@ class Documents(ProgramTest):
         policy = re.search(r"upswing eval (web/public/agents/\S+)", text_of("README.md"))[1]
         self.assertIn("success", self.succeed("eval", ROOT / policy, "--episodes", 2, "--physics",
                                               "closed-form"))
+
+
+class Site(ProgramTest):
+    """The documentation as HTML, built by ./upswing docs in build/docs-venv."""
+
+    def setUp(self):
+        super().setUp()
+        self.python = ROOT / "build/docs-venv/bin/python"
+        if not self.python.exists() or not shutil.which("doxygen"):
+            if os.environ.get("UPSWING_REQUIRE_DOCS"):
+                self.fail("build/docs-venv or Doxygen is missing: run ./upswing docs")
+            self.skipTest("run ./upswing docs once, which installs Sphinx and Doxygen")
+
+    def test_builds_without_a_warning_and_needs_no_network(self):
+        site = self.folder / "site"
+        done = subprocess.run([self.python, "-B", ROOT / "tools/docs.py", "build", site],
+                              check=False, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                              stderr=subprocess.STDOUT, encoding="utf-8")
+        self.assertEqual((done.returncode, done.stdout), (0, ""))
+        self.assertTrue((site / "searchindex.js").exists())
+        for page in site.rglob("*.html"):
+            text = page.read_text(encoding="utf-8")
+            loaded = re.findall(r'<(?:script|link|img)\b[^>]*?(?:src|href)="([^"]+)"', text)
+            for address in loaded:
+                self.assertFalse(re.match(r"(?:[a-z]+:)?//", address), f"{page.name}: {address}")
+            self.assertNotIn('href="/', text, page.name)
+        landing = text_of("docs/landing/index.html")
+        for target in re.findall(r'href="docs/([^"]+)"', landing):
+            self.assertTrue((site / target).exists(), target)
+        for header in ("core/env.h", "rl/dqn.h"):
+            page = site / "reference/cpp-api" / f"{header.split('/', maxsplit=1)[0]}.html"
+            self.assertIn(header, page.read_text(encoding="utf-8"))
+        self.assertIn("Dqn", (site / "reference/cpp-api/rl.html").read_text(encoding="utf-8"))
+
+
+class Launcher(ProgramTest):
+    """./upswing docs: what it refuses."""
+
+    def test_bad_input_is_refused_in_one_line(self):
+        (self.folder / "full").mkdir()
+        (self.folder / "full/file").touch()
+        for arguments, *words in ((["--sreve"], "--sreve", "--help"),
+                                  (["--site"], "--site"), (["--site="], "--site"),
+                                  (["--site", "full"], "full", "empty"),
+                                  (["--site", "no/where"], "no"),
+                                  (["--serve", "--site", "new"], "--serve"),
+                                  (["page"], "page")):
+            with self.subTest(arguments=arguments):
+                done = subprocess.run([ROOT / "upswing", "--no-setup", "docs", *arguments],
+                                      cwd=self.folder, stdin=subprocess.DEVNULL, check=False,
+                                      stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                      encoding="utf-8")
+                self.assert_one_line(done, 2, "docs: ", *words)
+                self.assertEqual(done.stdout, "")
 
 
 if __name__ == "__main__":

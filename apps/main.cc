@@ -21,6 +21,7 @@ constexpr CommandEntry kCommands[] = {
      AddRealAiGym},
     {"bench", "Measure how fast it is on this machine", nullptr},
     {"demo", "Serve the page where the pendulum is swung up live", nullptr},
+    {"docs", "Build the documentation, or the whole web site", nullptr},
     {"python", "Run Python with the package upswing", nullptr},
     {"test", "Build and run every test", nullptr},
 };

@@ -178,7 +178,7 @@ class DoublePendulumVectorEnv(VectorEnv[npt.NDArray[np.float32], Any, npt.NDArra
 
     Args:
         num_envs: N, 1 to 4096
-        actions, levels, **settings: as of `DoublePendulumEnv`; and threads, 0: one for each
+        actions, levels, settings: as of `DoublePendulumEnv`; and threads, 0: one for each
             processor, at most 8
         autoreset_mode: AutoresetMode.NEXT_STEP: of an episode that has ended, the next step begins
             another one and ignores the action. AutoresetMode.SAME_STEP: it begins at once; the last

@@ -1,0 +1,368 @@
+#!/usr/bin/env python3
+"""Builds the documentation: ./upswing docs runs this in its virtual environment.
+
+  docs.py build FOLDER    a static site, which works from any folder and from file://
+  docs.py serve FOLDER    serves a folder on this machine only
+
+The pages of docs/ and the generated pages of the reference are put together in build/docs-work, from
+where Sphinx builds. What has not changed is not built again.
+"""
+
+import argparse
+import functools
+import http.server
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from urllib.parse import unquote
+
+import program
+from program import ROOT
+
+WORK = Path(os.environ.get("UPSWING_DOCS_WORK", ROOT / "build/docs-work"))
+SOURCE = WORK / "source"
+XML = WORK / "doxygen/xml"
+
+# Pages of the repository's root that the site has too.
+ROOT_PAGES = {"CHANGELOG.md": "development/changelog.md",
+              "CONTRIBUTING.md": "development/contributing.md",
+              "SECURITY.md": "development/security.md"}
+
+LAYERS = {
+    "core": "Contracts and basics", "nn": "Networks", "sim": "Tasks", "rl": "Learning",
+    "control": "Controllers", "io": "Files and processes", "mujoco": "MuJoCo",
+    "report": "Statistics and figures", "setup": "Settings and named agents",
+    "realaigym": "RealAIGym", "run": "Runs on disk", "study": "Studies", "judge": "Evaluation",
+    "export": "Export", "view": "Films and pictures"}
+
+
+class Stage:
+    """The folder that Sphinx reads. Files that did not change keep their time."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        self.files = set()
+
+    def write(self, name, content):
+        content = content.encode() if isinstance(content, str) else content
+        path = self.folder / name
+        self.files.add(path)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if not path.is_file() or path.read_bytes() != content:
+            path.write_bytes(content)
+
+    def remove_others(self, out):
+        """Removes files that are no longer part of it, and what was built from them."""
+        for path in self.folder.rglob("*"):
+            if path.is_file() and path not in self.files:
+                path.unlink()
+                (out / path.relative_to(self.folder)).with_suffix(".html").unlink(missing_ok=True)
+
+
+# --- Pages written by hand ----------------------------------------------------------------------
+
+
+def stage_pages(stage):
+    docs = ROOT / "docs"
+    for path in sorted(docs.rglob("*")):
+        name = str(path.relative_to(docs))
+        if path.suffix == ".md":
+            stage_page(stage, path, name)
+        elif path.is_file() and "__pycache__" not in name:
+            stage.write(name, path.read_bytes())
+    for root_name, name in ROOT_PAGES.items():
+        stage_page(stage, ROOT / root_name, name)
+    stage.write("_static/icon.svg", (ROOT / "web/public/icon.svg").read_bytes())
+
+
+def stage_page(stage, path, name):
+    """Copies a page, with links that lead to the same places from where the copy is."""
+    folder = (SOURCE / name).parent
+
+    def redirect(link):
+        text, target = link[1], link[2]
+        if re.match(r"[a-z]+:|#", target):
+            return link[0]
+        place, anchor = (target.split("#", 1) + [""])[:2]
+        inside = os.path.relpath(os.path.normpath(path.parent / unquote(place)), ROOT)
+        if (ROOT / inside).is_dir():
+            return text.removeprefix("[").removesuffix("]") if not text.startswith("!") else link[0]
+        if inside == "README.md":
+            new = "index.md"
+        elif inside in ROOT_PAGES:
+            new = ROOT_PAGES[inside]
+        elif inside.startswith("docs" + os.sep):
+            new = str(Path(inside).relative_to("docs"))
+        elif (ROOT / inside).is_file():
+            new = f"files/{inside}" + (".txt" if inside.endswith(".md") else "")  # no page
+            stage.write(new, (ROOT / inside).read_bytes())
+        else:
+            return link[0]  # Sphinx says what is wrong with it
+        target = os.path.relpath(SOURCE / new, folder) + ("#" + anchor if anchor else "")
+        return f"{text}({target})"
+
+    stage.write(name, outside_code(path.read_text(encoding="utf-8"), lambda text: re.sub(
+        r"(!?\[(?:[^\[\]]|!\[[^\]]*\]\([^)]*\))*\])\(([^)\s]+)\)", redirect, text)))
+
+
+def outside_code(text, change):
+    """The text, changed outside fenced blocks."""
+    pieces = re.split(r"(^(?P<fence>```+|~~~+)[^\n]*\n.*?^(?P=fence)[^\n]*\n)", text,
+                      flags=re.MULTILINE | re.DOTALL)
+    # Of each fenced block, split() returns the block and then its fence.
+    return "".join(change(piece) if i % 3 == 0 else piece if i % 3 == 1 else ""
+                   for i, piece in enumerate(pieces))
+
+
+# --- Generated pages ----------------------------------------------------------------------------
+
+
+def command_line_page():
+    parts = ["# Command line\n\nThe help text of every command, as `./upswing COMMAND --help` prints "
+             "it. [Settings](settings.md) has the settings of trainings as tables.\n",
+             "| command | what it does |\n|---|---|\n"
+             + "".join(f"| [`{name}`](#{name}) | {text} |\n"
+                       for name, text in program.commands().items())]
+    for name in program.commands():
+        text = program.help_of(name).rstrip().replace(str(ROOT), ".")
+        parts.append(f"## {name}\n\n```text\n{text}\n```\n")
+    return "\n".join(parts)
+
+
+def settings_page():
+    """One table for each section; sections that algorithms share come once."""
+    per_algorithm = {name: program.settings(agent) for name, agent in program.ALGORITHMS.items()}
+    own = {"network", "agent"}
+    shared = {name: setting for settings in per_algorithm.values()
+              for name, setting in settings.items() if setting.section not in own}
+    parts = ["""# Settings
+
+Every setting of a training is a key of a TOML file (`./upswing train --config FILE`), a flag with `-`
+in place of `_` (`--eval-every` sets `eval_every`), and a line of the run's `config.toml`.
+Precedence, from weak to strong: defaults, named agent, file, flags. `./upswing train --agent AGENT
+--print-config` prints the settings of a named agent.
+
+The defaults are those of the agents """
+             + ", ".join(f"`{agent}`" for agent in program.ALGORITHMS.values())
+             + ". A default that differs between them names the agent.\n"]
+    for section in dict.fromkeys(setting.section for setting in shared.values()):
+        parts.append(f"## {section}\n")
+        parts.append(settings_table(
+            [(setting, defaults_of(name, per_algorithm)) for name, setting in shared.items()
+             if setting.section == section]))
+    for algorithm, settings in per_algorithm.items():
+        parts.append(f"## Algorithm {algorithm}\n")
+        for section in ("network", "agent"):
+            parts.append(f"### {algorithm}: {section}\n")
+            parts.append(settings_table([(setting, code(setting.default))
+                                         for setting in settings.values()
+                                         if setting.section == section]))
+    return "\n".join(parts)
+
+
+def settings_table(rows):
+    lines = [[f"`{setting.name}`", default, setting.values, setting.unit, setting.meaning]
+             for setting, default in rows]
+    return "| name | default | range | unit | meaning |\n|---|---|---|---|---|\n" + "".join(
+        f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in line)} |\n" for line in lines)
+
+
+def code(value):
+    return "none" if value in ("", '""') else f"`{value}`"
+
+
+def defaults_of(name, per_algorithm):
+    defaults = {program.ALGORITHMS[algorithm]: code(settings[name].default)
+                for algorithm, settings in per_algorithm.items() if name in settings}
+    if len(set(defaults.values())) == 1:
+        return next(iter(defaults.values()))
+    return ", ".join(f"{agent}: {default}" for agent, default in defaults.items())
+
+
+PYTHON_PAGE = """# Python API
+
+The package `upswing`. [Python](../howto/python.md) shows how to use it.
+
+```{eval-rst}
+.. automodule:: upswing
+   :members:
+   :exclude-members: Error, Failure, InputError
+   :imported-members:
+
+.. py:exception:: upswing.InputError
+
+   An argument is wrong. A :py:exc:`ValueError`.
+
+.. py:exception:: upswing.Failure
+
+   Work failed although its arguments are right, such as writing to a full disk. A
+   :py:exc:`RuntimeError`.
+
+.. py:exception:: upswing.Error
+
+   The base class of both.
+```
+"""
+
+
+def layers():
+    text = (ROOT / "cmake/install.cmake").read_text(encoding="utf-8")
+    return re.search(r"set\(UPSWING_LAYERS ([^)]*)\)", text)[1].split()
+
+
+def headers_of(layer):
+    """The headers that cmake --install installs."""
+    return [path for path in sorted((ROOT / layer).glob("*.h"))
+            if path.name != "testing.h" and not path.name.endswith("-inl.h")]
+
+
+# Parts of a header that its page has: all but private ones.
+SECTIONS = ("briefdescription detaileddescription innerclass define enum func typedef var "
+            "user-defined public-type public-func public-attrib public-static-func "
+            "public-static-attrib protected-type protected-func protected-attrib "
+            "protected-static-func protected-static-attrib")
+
+
+def stage_cpp_api(stage):
+    names = layers()
+    listing = "".join(f"| [`{name}`](cpp-api/{name}.md) | {LAYERS.get(name, name)} | "
+                      f"{len(headers_of(name))} |\n" for name in names)
+    stage.write("reference/cpp-api.md", f"""# C++ API
+
+The installed headers, by layer. A layer uses only layers above it in this table. [The C++
+library](../howto/cpp-library.md) shows how to link it. All names are in the namespace `upswing`.
+
+| layer | purpose | headers |
+|---|---|---|
+{listing}
+```{{toctree}}
+:hidden:
+:maxdepth: 1
+
+{chr(10).join(f"cpp-api/{name}" for name in names)}
+```
+""")
+    for name in names:
+        parts = [f"# {LAYERS.get(name, name)}: {name}\n"]
+        for header in headers_of(name):
+            path = f"{name}/{header.name}"
+            parts.append(f"## {path}\n\n```{{doxygenfile}} {path}\n:sections: {SECTIONS}\n```\n")
+        stage.write(f"reference/cpp-api/{name}.md", "\n".join(parts))
+
+
+DOXYFILE = """
+GENERATE_HTML = NO
+GENERATE_LATEX = NO
+GENERATE_XML = YES
+XML_PROGRAMLISTING = NO
+EXTRACT_ALL = YES
+JAVADOC_AUTOBRIEF = YES
+SORT_MEMBER_DOCS = NO
+MACRO_EXPANSION = YES
+QUIET = YES
+WARNINGS = NO
+RECURSIVE = YES
+# A struct and a function have this name, which Sphinx takes for one thing.
+EXCLUDE_SYMBOLS = Difference
+"""
+
+
+def for_doxygen(text):
+    """A header as Doxygen and Sphinx can show it."""
+    # Above the namespace, a comment describes the header. All names are in one namespace, which would
+    # be in front of each.
+    text = re.sub(r"((?:^///.*\n)+)namespace upswing \{\n", r"/// \\file\n\1", text, flags=re.MULTILINE)
+    text = re.sub(r"^namespace upswing \{\n|^\}  // namespace upswing\n", "", text, flags=re.MULTILINE)
+    # A comment behind a member describes it.
+    text = re.sub(r"([;,]) +// +", r"\1  ///< ", text)
+    # Sphinx's parser of C++ does not take lambdas.
+    return re.sub(r"=\s*\[\] *\{[^{}]*\}(\(\))?(?=[;,)])", "= {}", text)
+
+
+def run_doxygen():
+    """Writes the XML of the headers, unless it is there."""
+    headers = Stage(WORK / "headers")
+    for name in layers():
+        for header in headers_of(name):
+            headers.write(f"{name}/{header.name}", for_doxygen(header.read_text(encoding="utf-8")))
+    headers.remove_others(WORK)
+    settings = DOXYFILE + (f"OUTPUT_DIRECTORY = {XML.parent}\nINPUT = {headers.folder}\n"
+                           f"STRIP_FROM_PATH = {headers.folder}\n")
+    stamp = XML.parent / "made-of.txt"
+    state = settings + "".join(f"{header} {header.stat().st_mtime_ns}\n"
+                               for header in sorted(headers.files))
+    if stamp.exists() and stamp.read_text(encoding="utf-8") == state:
+        return
+    shutil.rmtree(XML.parent, ignore_errors=True)
+    XML.parent.mkdir(parents=True)
+    subprocess.run(["doxygen", "-"], input=settings, check=True, encoding="utf-8")
+    # Breathe finds a header by its name in the index, which Doxygen writes without the folder.
+    index = XML / "index.xml"
+
+    def with_folder(entry):
+        place = re.search(r'<location file="([^"]+)"',
+                          (XML / f"{entry[1]}.xml").read_text(encoding="utf-8"))
+        return entry[0].replace(f"<name>{entry[2]}</name>", f"<name>{place[1]}</name>")
+
+    index.write_text(re.sub(r'<compound refid="([^"]+)" kind="file"><name>([^<]+)</name>',
+                            with_folder, index.read_text(encoding="utf-8")), encoding="utf-8")
+    stamp.write_text(state, encoding="utf-8")
+
+
+# --- The site -----------------------------------------------------------------------------------
+
+
+def build(out, jobs):
+    run_doxygen()
+    stage = Stage(SOURCE)
+    stage_pages(stage)
+    stage.write("reference/command-line.md", command_line_page())
+    stage.write("reference/settings.md", settings_page())
+    stage.write("reference/python-api.md", PYTHON_PAGE)
+    stage_cpp_api(stage)
+    stage.remove_others(out)
+    doctrees = WORK / "doctrees"
+    done = subprocess.run(
+        [sys.executable, "-m", "sphinx", "-b", "html", "-q", "-W", "--jobs", jobs,
+         "-d", doctrees, SOURCE, out], check=False, stdin=subprocess.DEVNULL,
+        env=os.environ | {"UPSWING_ROOT": str(ROOT), "UPSWING_DOXYGEN_XML": str(XML)})
+    if done.returncode != 0:
+        shutil.rmtree(doctrees, ignore_errors=True)  # else the next build would not warn again
+        return 1
+    return 0
+
+
+def serve(folder):
+    handler = functools.partial(http.server.SimpleHTTPRequestHandler, directory=folder)
+    for port in range(4174, 4274):
+        try:
+            server = http.server.ThreadingHTTPServer(("127.0.0.1", port), handler)
+        except OSError:
+            continue
+        print(f"upswing: the documentation is at http://localhost:{port}/ (Ctrl-C to end)",
+              flush=True)
+        try:
+            server.serve_forever()
+        except KeyboardInterrupt:
+            return 130
+    print("upswing: docs: ports 4174 to 4273 are all in use", file=sys.stderr)
+    return 1
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("action", choices=("build", "serve"))
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--jobs", default="auto", help="processes of Sphinx")
+    arguments = parser.parse_args()
+    if arguments.action == "serve":
+        return serve(arguments.folder)
+    return build(arguments.folder, arguments.jobs)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,118 @@
+# shellcheck shell=sh
+# ./upswing docs: builds the documentation. Read by ./upswing, whose functions it uses, after
+# tools/web.sh and tools/demo.sh.
+: "${root:?}" "${setup:?}" "${program:?}" "${page:?}" "${packages:?}"
+
+docs=$root/build/docs
+docs_venv=$root/build/docs-venv
+
+docs_usage() {
+  cat <<'END_OF_USAGE'
+Usage: ./upswing docs [--serve | --site FOLDER]
+
+Builds the documentation into build/docs: static pages with search, which work from any folder. Installs
+Doxygen and, into build/docs-venv, Sphinx, if they are missing.
+
+  --serve        serve it on this machine only
+  --site FOLDER  write a complete web site: a landing page, the page of ./upswing demo in page/ and the
+                 documentation in docs/; FOLDER must be new or empty
+
+Examples:
+  ./upswing docs
+  ./upswing docs --serve
+  ./upswing docs --site site && python3 -m http.server -d site
+END_OF_USAGE
+}
+
+# In place of that of demo.sh, whose check of a folder is used here.
+bad_input() { say "docs: $*"; exit 2; }
+
+docs() {
+  action=build dist=''
+  while [ $# -gt 0 ]; do
+    case $1 in
+      -h | --help) docs_usage; exit 0 ;;
+      --serve) [ "$action" = build ] || bad_input "expected --serve or --site, once"; action=serve ;;
+      --site=*) set_site "${1#*=}" ;;
+      --site)
+        [ $# -gt 1 ] || bad_input "--site: expected a folder, got none"
+        shift
+        set_site "$1"
+        ;;
+      -*) bad_input "unknown flag $1 (see ./upswing docs --help)" ;;
+      *) bad_input "did not expect \"$1\" (see ./upswing docs --help)" ;;
+    esac
+    shift
+  done
+
+  if [ "$setup" = yes ]; then
+    set_up_docs
+    set_up release upswing
+    build_docs
+  fi
+  [ -f "$docs/index.html" ] || fail "the documentation is not built: run ./upswing docs once" \
+    "without --no-setup"
+  case $action in
+    serve) exec python3 -B "$root/tools/docs.py" serve "$docs" ;;
+    site) build_demo && write_site ;;
+    build) echo "$docs/index.html: the documentation; to look at it: ./upswing docs --serve" ;;
+  esac
+}
+
+# set_site FOLDER
+set_site() {
+  [ "$action" = build ] || bad_input "expected --serve or --site, once"
+  action=site
+  case $1 in "") bad_input "--site: expected a folder, got an empty text" ;; esac
+  set_demo_option --dist "$1"
+}
+
+# What the virtual environment has to be made of.
+docs_stamp() {
+  python3 -c 'import sys; print(sys.version, sys.base_exec_prefix)'
+  cat "$root/tools/docs-requirements.txt"
+}
+
+# Makes the virtual environment unless it is there; its mark is written last.
+make_docs_venv() {
+  stamp=$(docs_stamp)
+  mark=$docs_venv/made-of.txt
+  [ ! -f "$mark" ] || [ "$(cat "$mark")" != "$stamp" ] || return 0
+  say "making a virtual environment for the documentation (build/docs-venv)"
+  rm -rf "$docs_venv"
+  python3 -m venv "$docs_venv" || fail "could not make a virtual environment (see above)"
+  "$docs_venv/bin/python" -m pip --disable-pip-version-check install --quiet \
+    --only-binary=:all: --requirement "$root/tools/docs-requirements.txt" >&2 ||
+    fail "pip could not install Sphinx (see above). Is there a network?"
+  echo "$stamp" >"$mark"
+}
+
+# Installs Doxygen and Sphinx. Where set_up follows, one lock after the other is held.
+set_up_docs() {
+  # shellcheck disable=SC2086  # a list of words
+  (install_packages $packages doxygen && lock && make_docs_venv) </dev/null || exit 1
+}
+
+build_docs() {
+  (lock && exec "$docs_venv/bin/python" -B tools/docs.py build "$docs") </dev/null >&2 ||
+    fail "the documentation could not be built (see above)"
+}
+
+# The landing page, the page and the documentation; they appear in their folder whole or not at all.
+write_site() {
+  tmp=$(mktemp -d "$(dirname -- "$dist")/.upswing-site.XXXXXX") || fail "cannot write next to $dist"
+  trap 'rm -rf "$tmp"' EXIT
+  trap 'exit 130' INT
+  trap 'exit 143' TERM
+  { cp "$root/docs/landing/index.html" "$root/web/public/icon.svg" "$tmp/" &&
+    cp -R "$page" "$tmp/page" && cp -R "$docs" "$tmp/docs" &&
+    # GitHub Pages leaves out folders such as _static unless this file is there.
+    : >"$tmp/.nojekyll"; } || fail "could not copy the site (see above)"
+  chmod =rwx "$tmp" # as the umask has it
+  mv -T -- "$tmp" "$dist" || fail "could not move the site to $dist (see above)"
+  case $dist in
+    *[[:cntrl:]]*) echo "the site is written, for any web server" ;;
+    *) echo "$dist: the site, for any web server; to look at it:" \
+      "python3 -m http.server -d $(quoted "$dist")" ;;
+  esac
+}

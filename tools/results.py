@@ -1,0 +1,449 @@
+#!/usr/bin/env python3
+"""Measured numbers and generated tables of the documentation.
+
+  results.py write            renders every table in README.md and docs/ from docs/results/data
+                              and from the program
+  results.py check            lists what is out of date, and ends with 1 if anything is
+  results.py measure ID       runs the commands of a table and rewrites docs/results/data/ID.json
+  results.py measure ID --try    prints the table with few seeds and episodes; writes nothing
+  results.py machine          adds this machine to machines.json and prints its ID
+
+docs/results/data/ID.json holds one table, as it is displayed:
+
+  {"title": …, "commands": […], "measured": {"version": …, "date": …, "machine": …, "commit": …},
+   "columns": […], "rows": [[…], …]}
+
+Pages show it between `<!-- table: ID -->` and `<!-- end -->`, and one cell of it in a sentence as
+`<!-- value: ID ROW COLUMN -->text<!-- end -->`. ROW is the text of the first cell without
+backticks; COLUMN is an index or a header. GENERATED lists the tables that come from the program:
+`<!-- generated: commands -->` … `<!-- end -->`.
+"""
+
+import argparse
+import datetime
+import json
+import os
+import platform
+import re
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import program
+from program import ROOT
+
+DATA = ROOT / "docs/results/data"
+BLOCK = re.compile(r"(<!-- (table|generated): ([^\n]+?) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
+VALUE = re.compile(r"<!-- value: (\S+) ([^\n]+?) -->(.*?)<!-- end -->", re.DOTALL)
+
+
+class Problem(Exception):
+    """What is wrong with a page or a table, in one line."""
+
+
+# --- Tables -------------------------------------------------------------------------------------
+
+
+def markdown_table(columns, rows):
+    head = f"| {' | '.join(columns)} |\n|{'---|' * len(columns)}\n"
+    return head + "".join(f"| {' | '.join(cells)} |\n" for cells in rows)
+
+
+def machines(data=DATA):
+    return json.loads((data / "machines.json").read_text(encoding="utf-8"))
+
+
+def load(table_id, data=DATA):
+    """A measured table, checked."""
+    path = data / f"{table_id}.json"
+    if not path.exists():
+        raise Problem(f"{table_id}: there is no {path.name} in docs/results/data")
+    try:
+        table = json.loads(path.read_text(encoding="utf-8"))
+        columns, rows, measured = table["columns"], table["rows"], table["measured"]
+        missing = {"version", "date", "machine", "commit"} - set(measured)
+    except (ValueError, KeyError, TypeError) as error:
+        raise Problem(f"{path.name}: expected a table, got {error!r}") from None
+    if missing:
+        raise Problem(f"{path.name}: measured lacks {', '.join(sorted(missing))}")
+    if measured["machine"] not in machines(data):
+        raise Problem(f"{path.name}: machine {measured['machine']} is not in machines.json")
+    for row in rows:
+        if len(row) != len(columns) or not all(isinstance(cell, str) for cell in row):
+            raise Problem(f"{path.name}: expected {len(columns)} texts in each row, got {row}")
+    return table
+
+
+def cell_of(table, row_and_column):
+    """The cell that `ROW COLUMN` names; both may contain blanks."""
+    words = row_and_column.split(" ")
+    names = [row[0].replace("`", "") for row in table["rows"]]
+    headers = [header.replace("`", "") for header in table["columns"]]
+    for cut in range(1, len(words)):
+        row, column = " ".join(words[:cut]), " ".join(words[cut:])
+        if row not in names:
+            continue
+        cells = table["rows"][names.index(row)]
+        if column in headers:
+            return cells[headers.index(column)]
+        if column.isdecimal() and int(column) < len(cells):
+            return cells[int(column)]
+    raise Problem(f"no row and column are called \"{row_and_column}\"")
+
+
+# --- Tables from the program --------------------------------------------------------------------
+
+GENERATED = {}
+
+
+def generated(name):
+    def add(function):
+        GENERATED[name] = function
+        return function
+    return add
+
+
+@generated("commands")
+def commands_table():
+    return markdown_table(["command", "what it does"],
+                          [[f"`./upswing {name}`", text] for name, text in program.commands().items()])
+
+
+@generated("agents")
+def agents_table():
+    return markdown_table(["agent", "algorithm", "what it is"],
+                          [[f"`{name}`", program.algorithm_of(name), text]
+                           for name, text in program.agents().items()])
+
+
+@generated("hyperparameters")
+def hyperparameters_table(algorithm):
+    """Every named agent of the algorithm as a column, every setting that differs as a row."""
+    names = [name for name in program.agents() if program.algorithm_of(name) == algorithm]
+    if not names:
+        raise Problem(f"hyperparameters: no agent has the algorithm {algorithm}")
+    default = program.ALGORITHMS[algorithm]
+    names.sort(key=lambda name: name != default)
+    columns = [program.settings(name) for name in names]
+    rows = []
+    for setting in columns[0]:
+        values = [column[setting].default if setting in column else "" for column in columns]
+        if setting != "agent" and len(set(values)) > 1:
+            rows.append([f"`{setting}`", *(readable(value) for value in values)])
+    return markdown_table(["setting", *(f"`{name}`" for name in names)], rows)
+
+
+def readable(value):
+    """A TOML value as a table shows it, such as 1,000,000."""
+    return f"{int(value):,}" if value.isdecimal() else value.strip('"[]')
+
+
+@generated("machines")
+def machines_table():
+    return markdown_table(["machine", "processor", "cores", "memory", "system"],
+                          [[f"`{name}`", each["cpu"], str(each["cores"]), each["memory"],
+                            each["system"]] for name, each in machines().items()])
+
+
+@generated("measurements")
+def measurements_table():
+    """Where each table comes from."""
+    rows = []
+    for path in sorted(DATA.glob("*.json")):
+        if path.stem == "machines":
+            continue
+        table = load(path.stem)
+        measured = table["measured"]
+        commands = "<br>".join(f"`{command}`" for command in table["commands"])
+        rows.append([table["title"], measured["version"], measured["date"],
+                     f"`{measured['machine']}`", measured["commit"][:10],
+                     commands.replace("|", "\\|")])
+    return markdown_table(["table", "version", "date", "machine", "commit", "commands"], rows)
+
+
+# --- Pages --------------------------------------------------------------------------------------
+
+
+def pages(root=ROOT):
+    return [root / "README.md", *sorted((root / "docs").rglob("*.md"))]
+
+
+def without_code(text):
+    """The text with fenced blocks blanked, so that examples of markers in them do not count."""
+    return re.sub(r"^(```|~~~)[^\n]*\n.*?^\1[^\n]*$", lambda block: re.sub(r"[^\n]", " ", block[0]),
+                  text, flags=re.MULTILINE | re.DOTALL)
+
+
+def render(kind, name):
+    if kind == "table":
+        table = load(name)
+        return markdown_table(table["columns"], table["rows"])
+    function, *arguments = name.split()
+    if function not in GENERATED:
+        raise Problem(f"generated: expected one of {', '.join(GENERATED)}, got {function}")
+    return GENERATED[function](*arguments)
+
+
+def rendered(text):
+    """The text with all its tables rendered."""
+    seen = without_code(text)
+    pieces, end = [], 0
+    for block in BLOCK.finditer(seen):
+        pieces += [text[end:block.end(1)], render(block[2], block[3])]
+        end = block.start(5)
+    return "".join([*pieces, text[end:]])
+
+
+def problems_of(text):
+    """What is wrong with a page."""
+    seen = without_code(text)
+    opened, closed = len(re.findall(r"<!-- (?:table|generated|value): ", seen)), seen.count("<!-- end -->")
+    if opened != closed:
+        yield f"{opened} markers open a table or value and {closed} end one"
+    for block in BLOCK.finditer(seen):
+        try:
+            if render(block[2], block[3]) != block[4]:
+                yield f"{block[2]} {block[3]}: out of date; run tools/results.py write"
+        except Problem as problem:
+            yield str(problem)
+    for value in VALUE.finditer(seen):
+        try:
+            cell = cell_of(load(value[1]), value[2])
+            if not re.search(rf"(?<![\d.,]){re.escape(value[3])}(?![\d]|[.,]\d)", cell):
+                yield f"value {value[1]} {value[2]}: \"{value[3]}\" does not occur in \"{cell}\""
+        except Problem as problem:
+            yield f"value {value[1]}: {problem}"
+
+
+def check():
+    problems = [f"{page.relative_to(ROOT)}: {problem}" for page in pages()
+                for problem in problems_of(page.read_text(encoding="utf-8"))]
+    for path in sorted(DATA.glob("*.json")):
+        try:
+            if path.stem != "machines":
+                load(path.stem)
+        except Problem as problem:
+            problems.append(str(problem))
+    print("".join(f"{problem}\n" for problem in problems), end="")
+    return 1 if problems else 0
+
+
+def write():
+    for page in pages():
+        text = page.read_text(encoding="utf-8")
+        try:
+            new = rendered(text)
+        except Problem as problem:
+            print(f"{page.relative_to(ROOT)}: {problem}", file=sys.stderr)
+            return 1
+        if new != text:
+            page.write_text(new, encoding="utf-8")
+            print(page.relative_to(ROOT))
+    return 0
+
+
+# --- Measurements -------------------------------------------------------------------------------
+
+RECIPES = {}
+NONE = "–"  # not measured, or not applicable
+
+
+def recipe(table_id):
+    """Declares how a table is measured: a function that takes a Lab and returns columns and rows."""
+    def add(function):
+        RECIPES[table_id] = function
+        return function
+    return add
+
+
+class Lab:
+    """Runs commands as a reader would, and keeps them for the record.
+
+    `few` stands for a trial: two seeds and a handful of episodes."""
+
+    def __init__(self, folder, few):
+        self.folder = folder
+        self.few = few
+        self.commands = []
+
+    def run(self, *arguments, record=True):
+        """The output of a command of the program. The record has `runs` for the folder."""
+        arguments = [str(argument) for argument in arguments]
+        if record:
+            self.commands.append("./upswing " + " ".join(arguments).replace(str(self.folder), "runs"))
+        done = subprocess.run([ROOT / "upswing", "--no-setup", *arguments], cwd=ROOT, check=False,
+                              stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                              stderr=subprocess.PIPE, encoding="utf-8")
+        if done.returncode != 0:
+            raise Problem(f"./upswing {' '.join(arguments)}: {done.stderr.strip()}")
+        return done.stdout
+
+    def json(self, *arguments, **more):
+        return json.loads(self.run(*arguments, "--json", **more))
+
+    def wall_clock(self, *arguments, **more):
+        """Seconds from the command line to the next prompt."""
+        begin = time.monotonic()
+        self.run(*arguments, **more)
+        return time.monotonic() - begin
+
+
+PAGE_AGENTS = Path("web/public/agents")
+OVERVIEW_AGENTS = ("d3qn", "dqn", "double-dqn", "dueling-dqn", "fast", "sac", "sac-fast", "ppo",
+                   "ppo-discrete", "d3qn-randomized", "d3qn-adaptive")
+CONTROLLERS = ("lqr", "energy", "pfl", "tvlqr", "mpc")
+SLOW = {"mpc"}  # plans at each decision: fewer random plants
+
+
+def percent(share):
+    return f"{100 * share:.1f}%".replace(".0%", "%")
+
+
+@recipe("overview")
+def overview(lab):
+    """Policies are those of the page, else those of the first seed that is trained for the time."""
+    episodes = 2 if lab.few else 100
+    policies, seconds = {}, {}
+    for agent in OVERVIEW_AGENTS[4:5] if lab.few else OVERVIEW_AGENTS:
+        outs = [lab.folder / f"{agent}-seed{seed}" for seed in range(1, 2 if lab.few else 6)]
+        times = [lab.wall_clock("train", "--agent", agent, "--seed", k + 1, "--out", out,
+                                *(["--steps", 4000] if lab.few else [])) for k, out in enumerate(outs)]
+        seconds[agent] = format_number(statistics.median(times), 2)
+        shown = PAGE_AGENTS / f"{agent}.safetensors"
+        policies[agent] = str(shown if (ROOT / shown).exists() else outs[0])
+    policies |= {name: name for name in (CONTROLLERS[:1] if lab.few else CONTROLLERS)}
+    swing_up = ["--swing-up", PAGE_AGENTS / "fast.safetensors"]  # of hybrid
+    policies["hybrid"] = "hybrid"
+    bounds = lab.json("bounds", *policies.values(), *swing_up, "--episodes", episodes)
+    # The last rows are those of the policies, in their order.
+    shares = dict(zip(policies, [row["share"] for row in bounds["rows"]][-len(policies):]))
+    rows = []
+    for name, policy in policies.items():
+        more = swing_up if name == "hybrid" else []
+        nominal = lab.json("eval", policy, *more, "--episodes", episodes)
+        plants = 2 if lab.few else 100 if name in SLOW else 1000
+        box = lab.json("eval", policy, *more, "--randomize", 0.25, "--episodes", plants)
+        median = (nominal["swing_up_seconds"] or {}).get("median")  # null: none swings up
+        rows.append([f"`{name}`", percent(nominal["success_rate"]),
+                     NONE if median is None else f"{median:.2f}", percent(shares[name]),
+                     percent(box["success_rate"]),
+                     f"{nominal['torque_variation']['mean']:.1f}", seconds.get(name, NONE)])
+    return ["agent", "success", "swing-up [s]", "return / bound", "±25% plants",
+            "torque variation [N·m/s]", "time to train [s]"], rows
+
+
+@recipe("time-to-solve")
+def time_to_solve(lab):
+    rows = []
+    for agent in ("d3qn", "fast", "sac", "sac-fast", "ppo", "dqn", "double-dqn", "dueling-dqn"):
+        few = ["--steps", 4000] if lab.few else []
+        out = lab.folder / agent
+        lab.run("train", "--agent", agent, "--seeds", 2 if lab.few else 20, "--threads", 2,
+                "--jobs", 1, "--out", out, *few)
+        (group,) = lab.json("compare", out)["groups"]
+        rows.append([f"`{agent}`", f"{group['solved']} of {len(group['runs'])}",
+                     spread(group["solve_seconds"], lambda x: format_number(x, 2)),
+                     spread(group["solve_steps"], lambda x: f"{x:,.0f}")])
+    return ["agent", "solved", "time to solve [s]: median (range)",
+            "steps to solve: median (range)"], rows
+
+
+def spread(figure, text):
+    """Such as `0.5 (0.3 to 0.7)`: the median and the range of the seeds that solved."""
+    if figure["median"] is None:
+        return NONE
+    values = [value for value in figure["values"] if value is not None]
+    return f"{text(figure['median'])} ({text(min(values))} to {text(max(values))})"
+
+
+def format_number(value, digits):
+    """A number with so many significant digits, and never an exponent."""
+    if value == 0:
+        return "0"
+    decimals = max(0, digits - 1 - int(f"{abs(value):e}".split("e")[1]))
+    return f"{value:,.{decimals}f}" if decimals else f"{round(value):,}"
+
+
+def this_machine():
+    """Processor, cores, memory and system."""
+    text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
+    name = re.search(r"^model name\s*: (.*)", text, re.MULTILINE)
+    kilobytes = int(re.search(r"MemTotal:\s*(\d+)",
+                              Path("/proc/meminfo").read_text(encoding="utf-8"))[1])
+    release = platform.freedesktop_os_release()
+    return {"cpu": name[1].strip() if name else platform.processor() or platform.machine(),
+            "cores": len(os.sched_getaffinity(0)), "memory": f"{round(kilobytes / 2**20)} GiB",
+            "system": f"{release['PRETTY_NAME']}, {platform.machine()}"}
+
+
+def machine_id():
+    """The ID of this machine in machines.json, where it is added if it is new."""
+    known, mine = machines(), this_machine()
+    for name, each in known.items():
+        if each == mine:
+            return name
+    word = re.search(r"EPYC|Xeon|Ryzen|Threadripper|Core|Neoverse|Apple", mine["cpu"])
+    base = f"{word[0].lower() if word else platform.machine()}-{mine['cores']}"
+    name = next(name for name in [base, *(f"{base}-{k}" for k in range(2, 100))] if name not in known)
+    known[name] = mine
+    write_json(DATA / "machines.json", known)
+    return name
+
+
+def write_json(path, value):
+    path.write_text(json.dumps(value, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def measure(table_id, few):
+    if table_id not in RECIPES:
+        raise Problem(f"measure: expected one of {', '.join(RECIPES)}, got {table_id}")
+    with tempfile.TemporaryDirectory(prefix="upswing-results-") as folder:
+        lab = Lab(Path(folder), few)
+        columns, rows = RECIPES[table_id](lab)
+    if few:
+        print(markdown_table(columns, rows), end="")
+        return
+    path = DATA / f"{table_id}.json"
+    old = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    commit = subprocess.run(["git", "rev-parse", "HEAD"], cwd=ROOT, check=True,
+                            stdout=subprocess.PIPE, encoding="utf-8").stdout.strip()
+    measured = {"version": program.program("--version").split()[-1],
+                "date": datetime.date.today().strftime("%Y-%m"), "machine": machine_id(),
+                "commit": commit}
+    write_json(path, {"title": old.get("title", table_id.replace("-", " ").capitalize()),
+                      "commands": lab.commands, "measured": measured, "columns": columns,
+                      "rows": rows})
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    actions = parser.add_subparsers(dest="action", required=True)
+    for name in ("write", "check", "machine"):
+        actions.add_parser(name)
+    measuring = actions.add_parser("measure")
+    measuring.add_argument("id", help=f"one of {', '.join(RECIPES)}")
+    measuring.add_argument("--try", dest="few", action="store_true",
+                           help="few seeds and episodes; print the table, write nothing")
+    arguments = parser.parse_args()
+    try:
+        match arguments.action:
+            case "write":
+                return write()
+            case "check":
+                return check()
+            case "machine":
+                print(machine_id())
+            case "measure":
+                measure(arguments.id, arguments.few)
+    except Problem as problem:
+        print(f"results.py: {problem}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
