@@ -48,6 +48,7 @@ VARIABLES = {
 }
 INK, MUTED, GRID, PAPER, LINK1, LINK2, TORQUE = (placeholder for placeholder, _, _ in VARIABLES.values())
 
+# Colours of figures without agents.
 REWARD = {"energy": "#2f7de0", "height": "#2a9d9d", "balance": "#b98200", "velocity penalty": "#b06ac8",
           "torque penalty": "#d84a4a"}
 
@@ -92,7 +93,7 @@ def panel(fig, left, top, width, height, **options):
 def note(fig, x, y, text, **options):
     """Text at this place, in pixels from the top left."""
     w, h = fig.get_size_inches() * 72
-    return fig.text(x / w, 1 - y / h, text, va=options.pop("va", "center"), **options)
+    return fig.text(x / w, 1 - y / h, text, va=options.pop("va", "center_baseline"), **options)
 
 
 def svg(fig):
@@ -104,6 +105,7 @@ def svg(fig):
     width, height = (round(float(number) * 72) for number in fig.get_size_inches())
     text = re.sub(r'<svg [^>]*>', f'<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '
                   f'width="{width}" height="{height}" viewBox="0 0 {width} {height}" role="img">', text, count=1)
+    text = re.sub(r'(?<= d=")[^"]*', lambda path: re.sub(r"\d+\.\d{3,}", lambda x: f"{float(x[0]):.2f}", path[0]), text)
     text = re.sub(r" *<metadata>.*?</metadata>\n", "", text, flags=re.S)
     text = re.sub(r"<!DOCTYPE[^>]*>\n", "", text)
     text = re.sub(r"(font(?:-family)?:[^;\"]*)'DejaVu Sans'", r"\1system-ui, -apple-system, 'Segoe UI', sans-serif", text)
@@ -173,8 +175,9 @@ def episode():
         angles.plot(t, values, color=color)
         angles.annotate(name, (t[-1], values[-1]), (8, 0), textcoords="offset points", color=color, va="center",
                         fontsize=16, annotation_clip=False)
-    ticks = range(180 * math.floor(min(map(min, degrees)) / 180), 180 * math.ceil(max(map(max, degrees)) / 180) + 1, 180)
-    angles.set_yticks(list(ticks))
+    low, high = min(map(min, degrees)) - 20, max(map(max, degrees)) + 30
+    angles.set_ylim(low, high)
+    angles.set_yticks([tick for tick in range(-720, 721, 90) if low <= tick <= high])
     angles.set_ylabel("angle [°]")
 
     torque.step(t, column["torque"], where="post", color=TORQUE, linewidth=1.6)
@@ -228,7 +231,7 @@ def ablation(name, agent, reference):
         axes.grid(axis="y", visible=False)
         axes.tick_params(axis="y", length=0)
         axes.set_yticks(range(len(rows)), [row[0] for row in rows] if k == 0 else [])
-        axes.set_xticks([1000, 1500, 2000] if limits[0] == LOW else [2400, 2500, 2600, 2700])
+        axes.set_xticks([1000, 1500, 2000] if limits[0] == LOW else [2400, 2500, 2600, 2700][0 if narrow else 1:])
         axes.xaxis.set_major_formatter("{x:,.0f}")
         axes.spines["left"].set_visible(False)
         if limits[0] < values[reference][0] < limits[1]:
@@ -243,7 +246,8 @@ def ablation(name, agent, reference):
         for axes, x in ((panels[0][0], 1), (panels[1][0], 0)):
             axes.plot([x], [0], marker=[(-0.5, -1), (0.5, 1)], markersize=12, color=MUTED, transform=axes.transAxes,
                       clip_on=False, linestyle="none", markeredgewidth=1.3)
-    note(fig, 415, height + 74, "return at the end: mean of the middle half of the seeds, 95% interval", ha="center")
+    note(fig, 415, height + 74, "return at the end: interquartile mean of the seeds, 95% interval "
+                                f"(dashed line: {rows[reference][0]})", ha="center")
     note(fig, 690, 16, "return", ha="right", color=MUTED)
     note(fig, 785, 16, "solved", ha="right", color=MUTED)
     solved = columns.index("solved")
@@ -259,7 +263,6 @@ for _name, _agent, _reference in (("extensions", "fast", "all"), ("dqn-family", 
     DRAWN[f"study-{_name}"] = lambda name=_name, agent=_agent, reference=_reference: ablation(name, agent, reference)
 
 ROBOTS = ("pendubot", "acrobot")
-OURS = AGENTS["fast"]  # our searched policies belong to no agent
 CHALLENGES = ("model", "velocity noise", "torque noise", "response", "delay", "pushes")
 
 
@@ -276,7 +279,7 @@ def entries(columns_of):
 
 
 def dots(fig, left, width, top, rows, values, names, limits, texts=None):
-    """A panel with one row for each entry: ours large and coloured."""
+    """A panel with one row for each entry: ours large and filled."""
     axes = panel(fig, left, top, width, 22 * len(rows))
     axes.set_xlim(*limits)
     axes.set_ylim(len(rows) - 0.5, -0.5)
@@ -288,14 +291,16 @@ def dots(fig, left, width, top, rows, values, names, limits, texts=None):
         if value is None:
             continue
         ours = row[0] == "ours"
-        axes.plot(value, y, "o", color=OURS if ours else MUTED, markersize=10 if ours else 7, clip_on=False)
+        axes.plot(value, y, "o", color=INK if ours else MUTED, markerfacecolor=INK if ours else PAPER,
+                  markersize=10 if ours else 7, markeredgewidth=1.6, clip_on=False)
         if texts:
-            axes.annotate(texts[y], (value, y), (9, 0), textcoords="offset points", va="center",
-                          color=OURS if ours else INK, fontweight="bold" if ours else "normal", annotation_clip=False)
+            axes.annotate(texts[y], (value, y), (9, 0), textcoords="offset points", va="center_baseline",
+                          color=INK if ours else MUTED, fontweight="bold" if ours else "normal", annotation_clip=False)
     for label, row in zip(axes.get_yticklabels(), rows):
         if row[0] == "ours":
-            label.set_color(OURS)
             label.set_fontweight("bold")
+        else:
+            label.set_color(MUTED)
     return axes
 
 
@@ -356,7 +361,7 @@ def edges(centers):
 def maps():
     """Success over the masses of both links, of an agent of one plant and of one that identifies its plant."""
     fig, image = canvas(800, 410), None
-    for k, (agent, left) in enumerate((("d3qn", 70), ("d3qn-adaptive", 400))):
+    for k, (agent, left) in enumerate((("d3qn", 70), ("d3qn-adaptive", 390))):
         rows = rows_of(CSV / f"map-{agent}.csv")
         if not rows:
             return None
@@ -368,11 +373,10 @@ def maps():
         axes.plot(1, 1, "o", markerfacecolor="none", markeredgecolor="#ffffff", markersize=13, markeredgewidth=3.5)
         axes.plot(1, 1, "o", markerfacecolor="none", markeredgecolor="#d84a4a", markersize=13, markeredgewidth=2)
         if agent == "d3qn-adaptive":
-            for color, width, dash in (("#ffffff", 3.5, (0, (4, 3))), ("#d84a4a", 2, (0, (7, 5.25)))):
-                axes.plot([0.75, 1.25, 1.25, 0.75, 0.75], [0.75, 0.75, 1.25, 1.25, 0.75], color=color, linewidth=width,
-                          linestyle="-" if width > 3 else "-")
+            for color, width in (("#ffffff", 3.5), ("#d84a4a", 2)):
+                axes.plot([0.75, 1.25, 1.25, 0.75, 0.75], [0.75, 0.75, 1.25, 1.25, 0.75], color=color, linewidth=width)
         axes.set_xticks([0.6, 0.8, 1, 1.2, 1.4])
-        axes.set_yticks([0.6, 0.8, 1, 1.2, 1.4])
+        axes.set_yticks([0.6, 0.8, 1, 1.2, 1.4], None if k == 0 else [""] * 5)
         axes.set_xlabel("mass of link 1 [kg]")
         if k == 0:
             axes.set_ylabel("mass of link 2 [kg]")
@@ -403,12 +407,11 @@ def lqr_catch():
     axes.set_xlabel("θ₁ [°]")
     axes.set_ylabel("θ₂ [°]")
     from matplotlib import colormaps
-    for k, (share, name) in enumerate(((1.0, "the lqr gets it upright"), (0.0, "it does not"))):
-        mark = panel(fig, 540, 30 + 34 * k, 18, 18)
-        mark.set_axis_off()
-        mark.imshow([[colormaps["viridis"](share)[:3]]])
+    for k, (share, name) in enumerate(((1.0, "upright in the end"), (0.0, "not"))):
+        mark = panel(fig, 540, 30 + 34 * k, 18, 18, xticks=[], yticks=[], facecolor=colormaps["viridis"](share))
+        mark.spines[:].set_visible(False)
         note(fig, 568, 39 + 34 * k, name)
-    note(fig, 540, 118, "Every start is at rest.", color=MUTED)
+    note(fig, 540, 118, "Each start is at rest.", color=MUTED)
     return fig
 
 
@@ -455,6 +458,8 @@ def pareto():
 
     pixels = {name: axes.transData.transform((x, height(y))) for name, x, y in points}
     taken = [(x - 8, y - 8, x + 8, y + 8) for x, y in pixels.values()]
+    steps = axes.transData.transform(corners)
+    taken += [(min(a[0], b[0]), min(a[1], b[1]), max(a[0], b[0]) + 1, max(a[1], b[1]) + 1) for a, b in zip(steps, steps[1:])]
     for name, x, y in points:
         axes.plot(x, height(y), "s" if name in CONTROLLERS else "o", color=AGENTS[name], markersize=11,
                   markeredgecolor=PAPER, markeredgewidth=1, zorder=3)
@@ -462,14 +467,14 @@ def pareto():
     from matplotlib.lines import Line2D
     marks = [Line2D([], [], color=MUTED, marker=marker, linestyle="none", markersize=10) for marker in "os"]
     marks.append(Line2D([], [], color=MUTED, linewidth=1.3, linestyle=(0, (4, 3))))
-    axes.legend(marks, ["agent", "controller", "nothing is both smoother and better"], loc="lower center",
+    axes.legend(marks, ["agent", "controller", "best trade-offs"], loc="lower center",
                 bbox_to_anchor=(0.5, 1.0), ncols=3, borderpad=0, handletextpad=0.4)
     return fig
 
 
 def place_label(axes, name, at, taken):
-    """Write a name beside its dot where no dot or earlier name is."""
-    width, height = 7.6 * len(name), 15
+    """Write a name beside its dot where no dot, line or earlier name is."""
+    width, height = 8 * len(name), 15
     (left, bottom), (right, top) = axes.transAxes.transform([(0, 0), (1, 1)])
     for dx, dy, align in ((11, 0, "left"), (-11, 0, "right"), (0, 17, "center"), (0, -17, "center"), (11, 15, "left"),
                           (11, -15, "left"), (-11, 15, "right"), (-11, -15, "right"), (0, 30, "center"),
@@ -559,7 +564,7 @@ def seeds_wrong():
         return None
     rows = [row for row in rows if row["score"] == "best_return"]
     comparisons = list(dict.fromkeys(row["comparison"] for row in rows))
-    fig = canvas(800, 560)
+    fig = canvas(800, 550)
     for k, comparison in enumerate(comparisons):
         axes = panel(fig, 60 + 252 * (k % 3), 86 + 236 * (k // 3), 220, 168)
         for statistic, color in STATISTICS.items():
@@ -578,7 +583,7 @@ def seeds_wrong():
         if k == 0:
             fig.legend(loc="upper center", ncols=3, bbox_to_anchor=(0.5, 1.0), handlelength=1.8, columnspacing=2)
     note(fig, 16, 290, "wrong conclusions [%]", rotation=90, ha="center")
-    note(fig, 422, 542, "seeds of each agent", ha="center")
+    note(fig, 422, 532, "seeds of each agent", ha="center")
     return fig
 
 
