@@ -6,9 +6,10 @@
     python3 tools/figures.py --measure        run the program for the data of episode, maps and lqr-catch
     python3 tools/figures.py --values FOLDER  collect FOLDER/*/evals.csv for values-over-training
 
-Each figure is a function with @figure. It reads docs/results/data/*.json or docs/figures/**/*.csv, so drawing needs
-matplotlib (tools/docs-requirements.txt) and no built program. Draw again when a data file changes: tools/figures_test.py
-compares. Colours of ink and background are CSS variables with a dark variant; colours of agents are the same in both.
+Each figure is a function with @figure. It reads docs/results/data/*.json or docs/figures/**/*.csv. Drawing
+needs matplotlib (tools/docs-requirements.txt) and no built program. Draw again when a data file changes:
+tools/figures_test.py compares. Ink and background are CSS variables with a dark variant. Colours of agents
+are the same in both.
 """
 import argparse
 import csv
@@ -27,7 +28,7 @@ DATA = ROOT / "docs/results/data"
 FIGURES = ROOT / "docs/figures"
 CSV = FIGURES / "data"
 
-# The colour of each agent and controller, in every figure. Each has a contrast of 3 or more on white and on PAPER's dark.
+# The colour of each agent and controller, in every figure: a contrast of 3 or more on both backgrounds.
 AGENTS = {
     "d3qn": "#2f7de0", "dqn": "#8c8c3a", "double-dqn": "#b06ac8", "dueling-dqn": "#2a9d9d", "fast": "#d9662a",
     "sac": "#1a9b6c", "sac-fast": "#6f9a24", "ppo": "#d0478f", "ppo-discrete": "#b5707f",
@@ -218,20 +219,22 @@ def ablation(name, agent, reference):
         return None
     columns, rows = data
     at = next(k for k, column in enumerate(columns) if column.startswith("return at the end"))
+    rows = [row for row in rows if interval(row[at])]
     values = [interval(row[at]) for row in rows]
+    lowest, highest = min([LOW, *(low - 50 for _, low, _ in values)]), max([HIGH, *(high + 20 for _, _, high in values)])
     reference = next(k for k, row in enumerate(rows) if row[0] == reference)
     fig = canvas(800, 26 * len(rows) + 92)
     height = 26 * len(rows)
     narrow = min(low for _, low, _ in values) >= BREAK
-    panels = [(panel(fig, 210, 30, 410, height), (BREAK, HIGH))] if narrow else [
-        (panel(fig, 210, 30, 130, height), (LOW, BREAK)), (panel(fig, 346, 30, 274, height), (BREAK, HIGH))]
+    panels = [(panel(fig, 210, 30, 410, height), (BREAK, highest))] if narrow else [
+        (panel(fig, 210, 30, 130, height), (lowest, BREAK)), (panel(fig, 346, 30, 274, height), (BREAK, highest))]
     for k, (axes, limits) in enumerate(panels):
         axes.set_xlim(*limits)
         axes.set_ylim(len(rows) - 0.5, -0.5)
         axes.grid(axis="y", visible=False)
         axes.tick_params(axis="y", length=0)
         axes.set_yticks(range(len(rows)), [row[0] for row in rows] if k == 0 else [])
-        axes.set_xticks([1000, 1500, 2000] if limits[0] == LOW else [2400, 2500, 2600, 2700][0 if narrow else 1:])
+        axes.set_xticks([1000, 1500, 2000] if limits[1] == BREAK else [2400, 2500, 2600, 2700][0 if narrow else 1:])
         axes.xaxis.set_major_formatter("{x:,.0f}")
         axes.spines["left"].set_visible(False)
         if limits[0] < values[reference][0] < limits[1]:
