@@ -1,0 +1,710 @@
+#!/usr/bin/env python3
+"""Draw the figures of the documentation, as SVG in docs/figures/.
+
+    python3 tools/figures.py                  draw all figures
+    python3 tools/figures.py pareto maps      draw these
+    python3 tools/figures.py --measure        run the program for the data of episode, maps and lqr-catch
+    python3 tools/figures.py --values FOLDER  collect FOLDER/*/evals.csv for values-over-training
+
+Each figure is a function with @figure. It reads docs/results/data/*.json or docs/figures/**/*.csv. Drawing
+needs matplotlib (tools/docs-requirements.txt) and no built program. Draw again when a data file changes:
+tools/figures_test.py compares. Ink and background are CSS variables with a dark variant. Colours of agents
+are the same in both.
+"""
+import argparse
+import csv
+import io
+import json
+import math
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+from seeds.wilson import wilson
+
+ROOT = Path(__file__).resolve().parent.parent
+DATA = ROOT / "docs/results/data"
+FIGURES = ROOT / "docs/figures"
+CSV = FIGURES / "data"
+
+# The colour of each agent and controller, in every figure: a contrast of 3 or more on both backgrounds.
+AGENTS = {
+    "d3qn": "#2f7de0", "dqn": "#8c8c3a", "double-dqn": "#b06ac8", "dueling-dqn": "#2a9d9d", "fast": "#d9662a",
+    "sac": "#1a9b6c", "sac-fast": "#6f9a24", "ppo": "#d0478f", "ppo-discrete": "#b5707f",
+    "d3qn-randomized": "#8a6fe0", "d3qn-adaptive": "#b98200",
+    "lqr": "#7f8794", "energy": "#a8764a", "pfl": "#8f8072", "tvlqr": "#5b88ad", "mpc": "#d84a4a", "hybrid": "#2b96b8",
+}
+CONTROLLERS = {"lqr", "energy", "pfl", "tvlqr", "mpc", "hybrid"}
+
+# Colours that change in the dark: name: (placeholder for matplotlib, light, dark).
+VARIABLES = {
+    "ink": ("#010101", "#1d2333", "#e6e8ee"),
+    "muted": ("#020202", "#565c6e", "#a6abba"),
+    "grid": ("#030303", "#dfe2e8", "#333a4a"),
+    "paper": ("#040404", "#ffffff", "#14171f"),
+    "link1": ("#050505", "#2456c4", "#7aa5ff"),  # as in pendulum.svg
+    "link2": ("#060606", "#c8500f", "#ff9a5c"),
+    "torque": ("#070707", "#0b7a6e", "#4fd1c0"),
+}
+INK, MUTED, GRID, PAPER, LINK1, LINK2, TORQUE = (placeholder for placeholder, _, _ in VARIABLES.values())
+
+# Colours of figures without agents.
+REWARD = {"energy": "#2f7de0", "height": "#2a9d9d", "balance": "#b98200", "velocity penalty": "#b06ac8",
+          "torque penalty": "#d84a4a"}
+
+DRAWN = {}  # name of the figure: function that returns a matplotlib figure, or None without data
+
+
+def figure(name):
+    def register(function):
+        DRAWN[name] = function
+        return function
+    return register
+
+
+# --- Style ---
+
+def style():
+    import matplotlib
+    matplotlib.use("svg")
+    matplotlib.rcdefaults()
+    matplotlib.rcParams.update({
+        "svg.fonttype": "none", "svg.hashsalt": "upswing", "font.family": "DejaVu Sans", "font.size": 13,
+        "text.color": INK, "axes.labelcolor": INK, "axes.edgecolor": MUTED, "axes.facecolor": "none",
+        "figure.facecolor": PAPER, "xtick.color": MUTED, "ytick.color": MUTED, "xtick.labelcolor": INK,
+        "ytick.labelcolor": INK, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
+        "grid.color": GRID, "grid.linewidth": 1, "axes.axisbelow": True, "axes.linewidth": 1, "lines.linewidth": 2,
+        "legend.frameon": False, "legend.fontsize": 13, "figure.dpi": 72, "savefig.dpi": 144, "path.simplify": True,
+        "xtick.major.size": 4, "ytick.major.size": 4, "lines.solid_capstyle": "round",
+    })
+
+
+def canvas(width, height):
+    from matplotlib.figure import Figure
+    return Figure(figsize=(width / 72, height / 72))
+
+
+def panel(fig, left, top, width, height, **options):
+    """Axes at this place, in pixels from the top left."""
+    w, h = fig.get_size_inches() * 72
+    return fig.add_axes((left / w, 1 - (top + height) / h, width / w, height / h), **options)
+
+
+def note(fig, x, y, text, **options):
+    """Text at this place, in pixels from the top left."""
+    w, h = fig.get_size_inches() * 72
+    return fig.text(x / w, 1 - y / h, text, va=options.pop("va", "center_baseline"), **options)
+
+
+def svg(fig):
+    """The figure as text: the same bytes for the same data."""
+    file = io.StringIO()
+    fig.savefig(file, format="svg", facecolor=PAPER,
+                metadata={"Date": None, "Creator": None, "Type": None, "Format": None})
+    text = file.getvalue()
+    width, height = (round(float(number) * 72) for number in fig.get_size_inches())
+    text = re.sub(r'<svg [^>]*>', f'<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '
+                  f'width="{width}" height="{height}" viewBox="0 0 {width} {height}" role="img">', text, count=1)
+    text = re.sub(r'(?<= d=")[^"]*', lambda path: re.sub(r"\d+\.\d{3,}", lambda x: f"{float(x[0]):.2f}", path[0]), text)
+    text = re.sub(r" *<metadata>.*?</metadata>\n", "", text, flags=re.S)
+    text = re.sub(r"<!DOCTYPE[^>]*>\n", "", text)
+    text = re.sub(r"(font(?:-family)?:[^;\"]*)'DejaVu Sans'", r"\1system-ui, -apple-system, 'Segoe UI', sans-serif", text)
+    for name, (placeholder, _, _) in VARIABLES.items():
+        text = text.replace(placeholder, f"var(--{name})")
+    light, dark = (";".join(f"--{name}:{colors[k]}" for name, colors in VARIABLES.items()) for k in (1, 2))
+    rule = f"svg{{{light}}}\n@media (prefers-color-scheme:dark){{svg{{{dark}}}}}\n"
+    text = text.replace("</style>", f"\n{rule}</style>", 1)
+    return "\n".join(line.rstrip() for line in text.splitlines()) + "\n"
+
+
+# --- Data ---
+
+def table(name):
+    """Columns and rows of a data file, without Markdown, or None."""
+    path = DATA / f"{name}.json"
+    if not path.exists():
+        return None
+    data = json.loads(path.read_text(encoding="utf-8"))
+    plain = [[cell.replace("`", "").replace("*", "").replace("\\|", "|") for cell in row]
+             for row in [data["columns"], *data["rows"]]]
+    return plain[0], plain[1:]
+
+
+def number(cell):
+    """The first number of a cell, or None."""
+    found = re.match(r"-?[\d,]*\.?\d+", cell)
+    return float(found[0].replace(",", "")) if found else None
+
+
+def interval(cell):
+    """Value, low and high of '2,667 (2,657 to 2,682)'."""
+    found = [float(text.replace(",", "")) for text in re.findall(r"-?[\d,]*\.?\d+", cell)]
+    return found if len(found) == 3 else None
+
+
+def rows_of(path):
+    if not path.exists():
+        return None
+    with open(path, newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+# --- Figures ---
+
+@figure("episode")
+def episode():
+    """Angles, torque and the terms of the reward over one swing-up of d3qn."""
+    rows = rows_of(CSV / "episode.csv")
+    if not rows:
+        return None
+    column = {name: [float(row[name]) for row in rows] for name in rows[0]}
+    t, upright = column["t"], next(float(row["t"]) for row in rows if row["inverted"] == "1")
+    fig = canvas(800, 640)
+    angles, torque, reward = (panel(fig, 70, top, 610, height)
+                              for top, height in ((20, 170), (220, 110), (360, 220)))
+    for axes in (angles, torque, reward):
+        axes.set_xlim(0, t[-1])
+        axes.axvline(upright, color=MUTED, linewidth=1.3, linestyle=(0, (4, 3)))
+        axes.set_xticks(range(int(t[-1]) + 1))
+        if axes is not reward:
+            axes.tick_params(labelbottom=False)
+    angles.text(upright + 0.06, 1, "upright from here on", transform=angles.get_xaxis_transform(), va="top", color=MUTED)
+
+    degrees = [[math.degrees(angle) for angle in column[name]] for name in ("q1", "q2")]
+    for values, color, name in zip(degrees, (LINK1, LINK2), ("θ₁", "θ₂")):
+        angles.plot(t, values, color=color)
+        angles.annotate(name, (t[-1], values[-1]), (8, 0), textcoords="offset points", color=color, va="center",
+                        fontsize=16, annotation_clip=False)
+    low, high = min(map(min, degrees)) - 20, max(map(max, degrees)) + 30
+    angles.set_ylim(low, high)
+    angles.set_yticks([tick for tick in range(-720, 721, 90) if low <= tick <= high])
+    angles.set_ylabel("angle [°]")
+
+    torque.step(t, column["torque"], where="post", color=TORQUE, linewidth=1.6)
+    torque.set_yticks([-5, 0, 5])
+    torque.set_ylim(-5.8, 5.8)
+    torque.set_ylabel("torque [N·m]")
+    torque.annotate("τ", (t[-1], 0), (8, 0), textcoords="offset points", color=TORQUE, va="center", fontsize=16,
+                    annotation_clip=False)
+
+    positive, negative = [column[name] for name in ("energy", "height", "balance")], [
+        [-abs(value) for value in column[name]] for name in ("velocity_penalty", "torque_penalty")]
+    below, above = [0.0] * len(t), [0.0] * len(t)
+    for name, values in zip(REWARD, positive + negative):
+        base = above if values in positive else below
+        top = [a + b for a, b in zip(base, values)]
+        reward.fill_between(t, base, top, color=REWARD[name], linewidth=0, step="post", label=name)
+        base[:] = top
+    reward.step(t, column["reward"], where="post", color=INK, linewidth=1.5, label="sum")
+    reward.set_ylabel("reward of a step")
+    reward.set_xlabel("time [s]")
+    reward.set_ylim(min(below) - 0.3, max(above) + 0.3)
+    handles, names = reward.get_legend_handles_labels()
+    order = ["sum", "balance", "height", "energy", "velocity penalty", "torque penalty"]
+    reward.legend([handles[names.index(name)] for name in order],
+                  [name.replace(" penalty", "\npenalty") for name in order], loc="center left",
+                  bbox_to_anchor=(1.005, 0.5), handlelength=1, borderpad=0, labelspacing=0.7)
+    fig.align_ylabels([angles, torque, reward])
+    return fig
+
+
+BREAK, LOW, HIGH = 2400, 950, 2720  # returns: the axis is compressed below BREAK
+
+
+def ablation(name, agent, reference):
+    """One row for each variant: return at the end with its 95% interval, and how many seeds solved."""
+    data = table(name)
+    if not data:
+        return None
+    columns, rows = data
+    at = next(k for k, column in enumerate(columns) if column.startswith("return at the end"))
+    rows = [row for row in rows if interval(row[at])]
+    values = [interval(row[at]) for row in rows]
+    lowest, highest = min([LOW, *(low - 50 for _, low, _ in values)]), max([HIGH, *(high + 20 for _, _, high in values)])
+    reference = next(k for k, row in enumerate(rows) if row[0] == reference)
+    fig = canvas(800, 26 * len(rows) + 92)
+    height = 26 * len(rows)
+    narrow = min(low for _, low, _ in values) >= BREAK
+    panels = [(panel(fig, 210, 30, 410, height), (BREAK, highest))] if narrow else [
+        (panel(fig, 210, 30, 130, height), (lowest, BREAK)), (panel(fig, 346, 30, 274, height), (BREAK, highest))]
+    for k, (axes, limits) in enumerate(panels):
+        axes.set_xlim(*limits)
+        axes.set_ylim(len(rows) - 0.5, -0.5)
+        axes.grid(axis="y", visible=False)
+        axes.tick_params(axis="y", length=0)
+        axes.set_yticks(range(len(rows)), [row[0] for row in rows] if k == 0 else [])
+        axes.set_xticks([1000, 1500, 2000] if limits[1] == BREAK else [2400, 2500, 2600, 2700][0 if narrow else 1:])
+        axes.xaxis.set_major_formatter("{x:,.0f}")
+        axes.spines["left"].set_visible(False)
+        if limits[0] < values[reference][0] < limits[1]:
+            axes.axvline(values[reference][0], color=MUTED, linewidth=1.3, linestyle=(0, (4, 3)))
+        for y, (row, (value, low, high)) in enumerate(zip(rows, values)):
+            color = AGENTS.get(row[0], AGENTS[agent])
+            axes.plot([low, high], [y, y], color=color, linewidth=2.5, solid_capstyle="butt")
+            if limits[0] < value < limits[1]:
+                axes.plot(value, y, "o", color=color, markersize=9, markeredgecolor=PAPER, markeredgewidth=1,
+                          clip_on=False)
+    if len(panels) == 2:
+        for axes, x in ((panels[0][0], 1), (panels[1][0], 0)):
+            axes.plot([x], [0], marker=[(-0.5, -1), (0.5, 1)], markersize=12, color=MUTED, transform=axes.transAxes,
+                      clip_on=False, linestyle="none", markeredgewidth=1.3)
+    note(fig, 415, height + 74, "return at the end: interquartile mean of the seeds, 95% interval "
+                                f"(dashed line: {rows[reference][0]})", ha="center")
+    note(fig, 690, 16, "return", ha="right", color=MUTED)
+    note(fig, 785, 16, "solved", ha="right", color=MUTED)
+    solved = columns.index("solved")
+    for y, (row, (value, _, _)) in enumerate(zip(rows, values)):
+        note(fig, 690, 30 + 26 * (y + 0.5), f"{value:,.0f}", ha="right")
+        note(fig, 785, 30 + 26 * (y + 0.5), row[solved], ha="right")
+    return fig
+
+
+for _name, _agent, _reference in (("extensions", "fast", "all"), ("dqn-family", "dqn", "dqn"), ("post", "dqn", "dqn"),
+                                  ("reward", "fast", "all"), ("curriculum", "fast", "hanging"),
+                                  ("sac-extensions", "sac-fast", "all"), ("ppo-parts", "ppo", "all")):
+    DRAWN[f"study-{_name}"] = lambda name=_name, agent=_agent, reference=_reference: ablation(name, agent, reference)
+
+ROBOTS = ("pendubot", "acrobot")
+CHALLENGES = ("model", "velocity noise", "torque noise", "response", "delay", "pushes")
+
+
+def entries(columns_of):
+    """(robot, first pixel, columns, rows) of each RealAIGym table, below each other."""
+    top = 50
+    for robot in ROBOTS:
+        data = table(f"realaigym-{robot}")
+        if data:
+            columns, rows = data
+            rows = [row for row in rows if any(number(row[columns.index(name)]) is not None for name in columns_of)]
+            yield robot, top, columns, rows
+            top += 22 * len(rows) + 50
+
+
+def dots(fig, left, width, top, rows, values, names, limits, texts=None):
+    """A panel with one row for each entry: ours large and filled."""
+    axes = panel(fig, left, top, width, 22 * len(rows))
+    axes.set_xlim(*limits)
+    axes.set_ylim(len(rows) - 0.5, -0.5)
+    axes.grid(axis="x", visible=False)
+    axes.spines["left"].set_visible(False)
+    axes.set_yticks(range(len(rows)), [row[0] for row in rows] if names else [""] * len(rows))
+    axes.tick_params(axis="y", length=0)
+    for y, (row, value) in enumerate(zip(rows, values)):
+        if value is None:
+            continue
+        ours = row[0] == "ours"
+        axes.plot(value, y, "o", color=INK if ours else MUTED, markerfacecolor=INK if ours else PAPER,
+                  markersize=10 if ours else 7, markeredgewidth=1.6, clip_on=False)
+        if texts:
+            axes.annotate(texts[y], (value, y), (9, 0), textcoords="offset points", va="center_baseline",
+                          color=INK if ours else MUTED, fontweight="bold" if ours else "normal", annotation_clip=False)
+    for label, row in zip(axes.get_yticklabels(), rows):
+        if row[0] == "ours":
+            label.set_fontweight("bold")
+        else:
+            label.set_color(MUTED)
+    return axes
+
+
+@figure("realaigym-scores")
+def realaigym_scores():
+    """Scores of performance and robustness, ours beside the published entries."""
+    blocks = list(entries(("S", "R")))
+    if not blocks:
+        return None
+    _, top, _, rows = blocks[-1]
+    fig = canvas(800, top + 22 * len(rows) + 40)
+    note(fig, 150 + 130, 14, "S: performance", ha="center", color=MUTED)
+    note(fig, 480 + 130, 14, "R: robustness", ha="center", color=MUTED)
+    for robot, top, columns, rows in blocks:
+        note(fig, 138, top - 14, robot, ha="right", color=MUTED, style="italic")
+        for k, (name, left) in enumerate((("S", 150), ("R", 480))):
+            cells = [row[columns.index(name)] for row in rows]
+            axes = dots(fig, left, 260, top, rows, [number(cell) for cell in cells], k == 0,
+                        (0.3, 0.8) if name == "S" else (0.2, 1), cells)
+            if robot != blocks[-1][0]:
+                axes.tick_params(axis="x", labelbottom=False)
+    return fig
+
+
+@figure("realaigym-robustness")
+def realaigym_robustness():
+    """The six rows of robustness, ours beside the published entries."""
+    blocks = list(entries(CHALLENGES))
+    if not blocks:
+        return None
+    _, top, _, rows = blocks[-1]
+    fig = canvas(800, top + 22 * len(rows) + 62)
+    for k, name in enumerate(CHALLENGES):
+        left = 140 + 109 * k
+        note(fig, left + 44, 14, name, ha="center", color=MUTED)
+        for robot, top, columns, rows in blocks:
+            if k == 0:
+                note(fig, 128, top - 14, robot, ha="right", color=MUTED, style="italic")
+            axes = dots(fig, left, 88, top, rows, [number(row[columns.index(name)]) for row in rows], k == 0, (-4, 104))
+            axes.set_xticks([0, 50, 100], [] if robot != blocks[-1][0] else None)
+            axes.grid(axis="x", visible=True)
+    note(fig, 460, top + 22 * len(rows) + 46, "simulations passed [%]", ha="center")
+    return fig
+
+
+def success_map(axes, grid, extent):
+    """Success from 0 to 1, with the same colours in every map."""
+    return axes.imshow(grid, origin="lower", extent=extent, cmap="viridis", vmin=0, vmax=1, interpolation="nearest",
+                       aspect="auto")
+
+
+def edges(centers):
+    half = (centers[-1] - centers[0]) / (len(centers) - 1) / 2
+    return centers[0] - half, centers[-1] + half
+
+
+@figure("maps")
+def maps():
+    """Success over the masses of both links, of an agent of one plant and of one that identifies its plant."""
+    fig, image = canvas(800, 410), None
+    for k, (agent, left) in enumerate((("d3qn", 70), ("d3qn-adaptive", 390))):
+        rows = rows_of(CSV / f"map-{agent}.csv")
+        if not rows:
+            return None
+        x, y = (sorted({float(row[name]) for row in rows}) for name in ("mass1", "mass2"))
+        success = {(float(row["mass1"]), float(row["mass2"])): float(row["success_rate"]) for row in rows}
+        axes = panel(fig, left, 40, 300, 300)
+        image = success_map(axes, [[success[mass1, mass2] for mass1 in x] for mass2 in y], (*edges(x), *edges(y)))
+        axes.grid(visible=False)
+        axes.plot(1, 1, "o", markerfacecolor="none", markeredgecolor="#ffffff", markersize=13, markeredgewidth=3.5)
+        axes.plot(1, 1, "o", markerfacecolor="none", markeredgecolor="#d84a4a", markersize=13, markeredgewidth=2)
+        if agent == "d3qn-adaptive":
+            for color, width in (("#ffffff", 3.5), ("#d84a4a", 2)):
+                axes.plot([0.75, 1.25, 1.25, 0.75, 0.75], [0.75, 0.75, 1.25, 1.25, 0.75], color=color, linewidth=width)
+        axes.set_xticks([0.6, 0.8, 1, 1.2, 1.4])
+        axes.set_yticks([0.6, 0.8, 1, 1.2, 1.4], None if k == 0 else [""] * 5)
+        axes.set_xlabel("mass of link 1 [kg]")
+        if k == 0:
+            axes.set_ylabel("mass of link 2 [kg]")
+        note(fig, left + 150, 22, agent, ha="center", color=AGENTS[agent], fontweight="bold")
+    bar = fig.colorbar(image, cax=panel(fig, 724, 40, 16, 300), ticks=[0, 0.25, 0.5, 0.75, 1])
+    bar.ax.set_yticklabels(["0%", "25%", "50%", "75%", "100%"])
+    bar.outline.set_visible(False)
+    bar.ax.grid(visible=False)
+    note(fig, 724, 22, "success")
+    return fig
+
+
+@figure("lqr-catch")
+def lqr_catch():
+    """From where, at rest, the LQR catches the pendulum."""
+    path = CSV / "lqr-catch.csv"
+    if not path.exists():
+        return None
+    with open(path, newline="", encoding="utf-8") as file:
+        header, *lines = list(csv.reader(file))
+    x, y = [float(cell) for cell in header[1:]], [float(line[0]) for line in lines]
+    fig = canvas(800, 500)
+    axes = panel(fig, 90, 20, 420, 420)
+    success_map(axes, [[int(cell) for cell in line[1:]] for line in lines], (*edges(x), *edges(y)))
+    axes.grid(visible=False)
+    axes.set_xticks([150, 165, 180, 195, 210])
+    axes.set_yticks([-30, -15, 0, 15, 30])
+    axes.set_xlabel("θ₁ [°]")
+    axes.set_ylabel("θ₂ [°]")
+    from matplotlib import colormaps
+    for k, (share, name) in enumerate(((1.0, "upright in the end"), (0.0, "not"))):
+        mark = panel(fig, 540, 30 + 34 * k, 18, 18, xticks=[], yticks=[], facecolor=colormaps["viridis"](share))
+        mark.spines[:].set_visible(False)
+        note(fig, 568, 39 + 34 * k, name)
+    note(fig, 540, 118, "Each start is at rest.", color=MUTED)
+    return fig
+
+
+@figure("pareto")
+def pareto():
+    """Return against torque variation of all agents and controllers."""
+    data = table("overview")
+    if not data:
+        return None
+    columns, rows = data
+    share, variation = (next(k for k, column in enumerate(columns) if column.startswith(name))
+                        for name in ("return / bound", "torque variation"))
+    points = [(row[0], number(row[variation]), number(row[share])) for row in rows
+              if number(row[variation]) is not None and number(row[share]) is not None]
+    fig = canvas(800, 500)
+    axes = panel(fig, 80, 40, 700, 390)
+    axes.set_xscale("log")
+
+    def height(percent):  # what is missing to the bound, on a logarithmic scale
+        return -math.log10(max(100 - percent, 0.5))
+
+    smallest, largest = min(x for _, x, _ in points), max(x for _, x, _ in points)
+    axes.set_xlim(smallest / 1.5, largest * 1.8)
+    axes.set_ylim(min(height(y) for _, _, y in points) - 0.12, max(height(y) for _, _, y in points) + 0.12)
+    ticks = [tick for tick in (0, 50, 80, 90, 95, 98, 99) if axes.get_ylim()[0] <= height(tick) <= axes.get_ylim()[1]]
+    axes.set_yticks([height(tick) for tick in ticks], [f"{tick}%" for tick in ticks])
+    decades = [tick for tick in (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500)
+               if axes.get_xlim()[0] <= tick <= axes.get_xlim()[1]]
+    axes.set_xticks(decades, [f"{tick:g}" for tick in decades])
+    axes.minorticks_off()
+    axes.set_xlabel("torque variation [N·m/s] (less is smoother)")
+    axes.set_ylabel("return, share of the bound")
+
+    best, front = -math.inf, []
+    for _, x, y in sorted(points, key=lambda point: (point[1], -point[2])):
+        if y > best:
+            front.append((x, height(y)))
+            best = y
+    corners = [front[0]]
+    for x, y in front[1:]:
+        corners += [(x, corners[-1][1]), (x, y)]
+    corners = [(front[0][0], axes.get_ylim()[0]), *corners, (axes.get_xlim()[1], corners[-1][1])]
+    axes.plot(*zip(*corners), color=MUTED, linewidth=1.3, linestyle=(0, (4, 3)), zorder=1)
+
+    pixels = {name: axes.transData.transform((x, height(y))) for name, x, y in points}
+    taken = [(x - 8, y - 8, x + 8, y + 8) for x, y in pixels.values()]
+    steps = axes.transData.transform(corners)
+    taken += [(min(a[0], b[0]), min(a[1], b[1]), max(a[0], b[0]) + 1, max(a[1], b[1]) + 1) for a, b in zip(steps, steps[1:])]
+    for name, x, y in points:
+        axes.plot(x, height(y), "s" if name in CONTROLLERS else "o", color=AGENTS[name], markersize=11,
+                  markeredgecolor=PAPER, markeredgewidth=1, zorder=3)
+        place_label(axes, name, pixels[name], taken)
+    from matplotlib.lines import Line2D
+    marks = [Line2D([], [], color=MUTED, marker=marker, linestyle="none", markersize=10) for marker in "os"]
+    marks.append(Line2D([], [], color=MUTED, linewidth=1.3, linestyle=(0, (4, 3))))
+    axes.legend(marks, ["agent", "controller", "best trade-offs"], loc="lower center",
+                bbox_to_anchor=(0.5, 1.0), ncols=3, borderpad=0, handletextpad=0.4)
+    return fig
+
+
+def place_label(axes, name, at, taken):
+    """Write a name beside its dot where no dot, line or earlier name is."""
+    width, height = 8 * len(name), 15
+    (left, bottom), (right, top) = axes.transAxes.transform([(0, 0), (1, 1)])
+    for dx, dy, align in ((11, 0, "left"), (-11, 0, "right"), (0, 17, "center"), (0, -17, "center"), (11, 15, "left"),
+                          (11, -15, "left"), (-11, 15, "right"), (-11, -15, "right"), (0, 30, "center"),
+                          (0, -30, "center"), (24, 26, "left"), (24, -26, "left"), (0, 45, "center")):
+        x = at[0] + dx - {"left": 0, "center": width / 2, "right": width}[align]
+        box = (x, at[1] + dy - height / 2, x + width, at[1] + dy + height / 2)
+        inside = left <= box[0] and box[2] <= right + 10 and bottom <= box[1] and box[3] <= top + 10
+        if inside and not any(box[0] < b[2] and b[0] < box[2] and box[1] < b[3] and b[1] < box[3] for b in taken):
+            break
+    taken.append(box)
+    axes.annotate(name, at, (dx, dy), xycoords="figure pixels", textcoords="offset points", ha=align, va="center",
+                  color=AGENTS[name], fontweight="bold", annotation_clip=False)
+
+
+@figure("values-over-training")
+def values_over_training():
+    """Expected over attained discounted return: median and range of the seeds, over training."""
+    rows = rows_of(DATA / "values-over-training.csv")
+    if not rows:
+        return None
+    from statistics import median
+    fig = canvas(800, 420)
+    axes = panel(fig, 80, 20, 690, 335)
+    axes.set_yscale("log")
+    axes.axhline(1, color=INK, linewidth=1.2)
+    for agent in dict.fromkeys(row["agent"] for row in rows):
+        steps = {}
+        for row in rows:
+            if row["agent"] == agent:
+                steps.setdefault(int(row["step"]), []).append(float(row["ratio"]))
+        most = max(map(len, steps.values()))
+        steps = {step: ratios for step, ratios in sorted(steps.items()) if len(ratios) == most}  # all seeds are there
+        axes.fill_between(list(steps), [min(each) for each in steps.values()], [max(each) for each in steps.values()],
+                          color=AGENTS[agent], alpha=0.2, linewidth=0)
+        axes.plot(list(steps), [median(each) for each in steps.values()], color=AGENTS[agent], label=agent)
+    low, high = axes.get_ylim()
+    low, high = max(low, 0.1), min(high, 4)
+    axes.set_ylim(low, high)
+    ticks = [tick for tick in (0.1, 0.2, 0.5, 0.75, 1, 1.5, 2, 3, 4) if low <= tick <= high]
+    axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
+    axes.minorticks_off()
+    axes.xaxis.set_major_formatter("{x:,.0f}")
+    axes.set_xlim(left=0)
+    axes.set_xlabel("steps")
+    axes.set_ylabel("expected / attained return")
+    axes.legend(loc="upper right", ncols=3)
+    return fig
+
+
+@figure("success-by-delta")
+def success_by_delta():
+    """Success over |δ|, with Wilson's 95% intervals."""
+    data = table("robustness-delta")
+    if not data:
+        return None
+    columns, rows = data
+    rows = [row for row in rows if row[0] != "all"]
+    fig = canvas(800, 420)
+    axes = panel(fig, 80, 20, 700, 330)
+    middle = (len(columns) - 3) / 2
+    for k, name in enumerate(columns[2:]):
+        x = [place + 0.12 * (k - middle) for place in range(len(rows))]
+        shares = [number(row[k + 2]) / 100 for row in rows]
+        bounds = [wilson(round(share * number(row[1])), number(row[1])) for share, row in zip(shares, rows)]
+        color = AGENTS[name.split()[0]]
+        axes.plot(x, [100 * share for share in shares], color=color, linewidth=1.3, alpha=0.6)
+        axes.vlines(x, [100 * low for low, _ in bounds], [100 * high for _, high in bounds], color=color, linewidth=2.5)
+        axes.plot(x, [100 * share for share in shares], "o", color=color, markersize=8, markeredgecolor=PAPER, label=name)
+    axes.set_xticks(range(len(rows)), [row[0].replace(" to ", "–") for row in rows])
+    axes.grid(axis="x", visible=False)
+    axes.set_ylim(-3, 103)
+    axes.set_ylabel("success [%]")
+    axes.set_xlabel("|δ| of the plant")
+    axes.legend(loc="lower right", handlelength=1)
+    return fig
+
+
+STATISTICS = {"mean": "#2f7de0", "median": "#d9662a", "IQM": "#1a9b6c", "Welch's t, 5%": "#d0478f",
+              "Mann-Whitney, 5%": "#b98200", "bootstrap of IQM, 95%": "#8a6fe0"}
+
+
+@figure("seeds-wrong")
+def seeds_wrong():
+    """Share of wrong conclusions over the number of seeds, by return."""
+    rows = rows_of(FIGURES / "seeds/seeds.csv")
+    if not rows:
+        return None
+    rows = [row for row in rows if row["score"] == "best_return"]
+    comparisons = list(dict.fromkeys(row["comparison"] for row in rows))
+    fig = canvas(800, 550)
+    for k, comparison in enumerate(comparisons):
+        axes = panel(fig, 60 + 252 * (k % 3), 86 + 236 * (k // 3), 220, 168)
+        for statistic, color in STATISTICS.items():
+            chosen = [(int(row["seeds"]), 100 * float(row["wrong"])) for row in rows
+                      if row["comparison"] == comparison and row["statistic"] == statistic]
+            bare = "," not in statistic
+            axes.plot(*zip(*chosen), marker="o" if bare else "s", markersize=5, color=color, linewidth=1.8,
+                      linestyle="-" if bare else (0, (3, 1.5)), label=statistic)
+        axes.set_xscale("log")
+        axes.minorticks_off()
+        axes.set_xticks([3, 5, 10, 30, 100], ["3", "5", "10", "30", "100"])
+        axes.set_ylim(0, 50)
+        axes.set_yticks(range(0, 51, 10), None if k % 3 == 0 else [""] * 6)
+        title = comparison if " " in comparison else f"fast or {comparison}"
+        note(fig, 170 + 252 * (k % 3), 74 + 236 * (k // 3), title, ha="center", color=MUTED)
+        if k == 0:
+            fig.legend(loc="upper center", ncols=3, bbox_to_anchor=(0.5, 1.0), handlelength=1.8, columnspacing=2)
+    note(fig, 16, 290, "wrong conclusions [%]", rotation=90, ha="center")
+    note(fig, 422, 532, "seeds of each agent", ha="center")
+    return fig
+
+
+@figure("seeds-distribution")
+def seeds_distribution():
+    """Histograms of steps to solve and of return over ten thousand seeds of fast."""
+    rows = rows_of(FIGURES / "seeds/fast.csv")
+    if not rows:
+        return None
+    fig = canvas(800, 330)
+    for column, scale, width, label, left in (("solve_steps", 1000, 10, "steps to solve [thousands]", 75),
+                                              ("best_return", 1, 15, "return of the best policy", 450)):
+        values = [float(row[column]) / scale for row in rows]
+        first = width * math.floor(min(values) / width)
+        bins = [first + width * k for k in range(int((max(values) - first) / width) + 2)]
+        axes = panel(fig, left, 16, 325, 250)
+        axes.hist(values, bins=bins, color=AGENTS["fast"], histtype="stepfilled")
+        axes.set_yscale("log")
+        axes.set_ylim(0.7, None)
+        axes.set_yticks([1, 10, 100, 1000], ["1", "10", "100", "1,000"])
+        axes.minorticks_off()
+        axes.grid(axis="x", visible=False)
+        axes.xaxis.set_major_formatter("{x:,.0f}")
+        axes.set_xlabel(label)
+        if column == "solve_steps":
+            axes.set_ylabel("seeds")
+    return fig
+
+
+# --- Data from the program ---
+
+def measure(program):
+    """Run the program for the figures that show its output."""
+    import tempfile
+    agents = ROOT / "web/public/agents"
+    CSV.mkdir(parents=True, exist_ok=True)
+
+    def run(*words):
+        return subprocess.run([program, *map(str, words)], check=True, stdout=subprocess.PIPE, text=True).stdout
+
+    def write(name, header, lines):
+        with open(CSV / name, "w", newline="", encoding="utf-8") as file:
+            csv.writer(file, lineterminator="\n").writerows([header, *lines])
+
+    names = {"t": "t", "qpos0": "q1", "qpos1": "q2", "torque": "torque", "inverted": "inverted", "reward": "reward",
+             "energy_reward": "energy", "height_reward": "height", "balance_reward": "balance",
+             "velocity_penalty": "velocity_penalty", "torque_penalty": "torque_penalty"}
+    rows = csv.DictReader(run("simulate", agents / "d3qn.safetensors", "--seconds", 6, "--csv", "-").splitlines())
+    write("episode.csv", names.values(), [[f"{float(row[name]):.6g}" for name in names] for row in rows])
+
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder)
+        run("map", *(agents / f"{name}.safetensors" for name in ("d3qn", "d3qn-adaptive")), "--x", "mass1=-40%:+40%:21",
+            "--y", "mass2=-40%:+40%:21", "--episodes", 5, "--check", 0, "--out", out / "maps")
+        run("map", "lqr", "--x", "q1=150:210:121", "--y", "q2=-30:30:121", "--check", 0, "--out", out / "lqr")
+        keep_maps(out / "maps", write)
+        keep_lqr(out / "lqr", write)
+
+
+def keep_maps(folder, write):
+    for k, agent in enumerate(("d3qn", "d3qn-adaptive"), 1):
+        header = ["mass1", "mass2", "episodes", "success_rate"]
+        write(f"map-{agent}.csv", header,
+              [[f"{float(row[name]):.6g}" for name in header] for row in rows_of(folder / f"map-{k}.csv")])
+
+
+def keep_lqr(folder, write):
+    """A line for each q2, a column for each q1 [°]: 1 if upright in the end."""
+    grid = {}
+    for row in rows_of(folder / "map.csv"):
+        grid.setdefault(float(row["q2"]), {})[float(row["q1"])] = row["successes"]
+    write("lqr-catch.csv", ["q2 / q1", *(f"{q1:g}" for q1 in next(iter(grid.values())))],
+          [[f"{q2:g}", *line.values()] for q2, line in grid.items()])
+
+
+def collect_values(folder):
+    """Write values-over-training.csv from the evals.csv of runs named AGENT-seedN."""
+    lines = []
+    for path in sorted(folder.glob("*/evals.csv")):
+        agent, _, seed = path.parent.name.rpartition("-seed")
+        if agent not in AGENTS:
+            sys.exit(f"figures: {path.parent}: expected a name such as fast-seed1")
+        lines += [[agent, seed, row["step"], f"{float(row['value']) / float(row['discounted_return']):.4g}"]
+                  for row in rows_of(path) if float(row["discounted_return"]) > 0]
+    with open(DATA / "values-over-training.csv", "w", newline="", encoding="utf-8") as file:
+        csv.writer(file, lineterminator="\n").writerows([["agent", "seed", "step", "ratio"], *lines])
+
+
+def draw(name):
+    """The SVG of a figure, or None if its data do not exist."""
+    style()
+    fig = DRAWN[name]()
+    return svg(fig) if fig else None
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("figures", nargs="*", metavar="FIGURE", help=f"figures to draw [all]: {', '.join(DRAWN)}")
+    parser.add_argument("--measure", action="store_true", help="run the program for episode, maps and lqr-catch first")
+    parser.add_argument("--program", default=str(ROOT / "upswing"), help="program that --measure runs")
+    parser.add_argument("--values", type=Path, metavar="FOLDER", help="folder of runs AGENT-seedN to collect first")
+    a = parser.parse_args()
+    for name in a.figures:
+        if name not in DRAWN:
+            parser.error(f"FIGURE: expected one of {', '.join(DRAWN)}, got {name}")
+    if a.measure:
+        measure(a.program)
+    if a.values:
+        collect_values(a.values)
+    for name in a.figures or DRAWN:
+        text = draw(name)
+        if text is None:
+            print(f"{name}: no data, not drawn")
+            continue
+        path = FIGURES / f"{name}.svg"
+        path.write_text(text, encoding="utf-8")
+        print(f"{path.relative_to(ROOT)}: {len(text) // 1000} kB")
+
+
+if __name__ == "__main__":
+    main()
