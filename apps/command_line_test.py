@@ -33,7 +33,7 @@ class HelpTest(ProgramTest):
 
     def test_defaults_are_those_of_the_agent_and_of_the_file(self):
         self.assertIn("[256,256]", self.help_of("--hidden", "train"))
-        self.assertIn("[64,64]", self.help_of("--hidden", "train", "--agent", "fast"))
+        self.assertIn("[48,32]", self.help_of("--hidden", "train", "--agent", "fast"))
         self.assertIn("[fast]", self.help_of("--agent", "train", "--agent", "fast"))
         self.assertIn("[closed-form]", self.help_of("--physics", "train", "--agent=fast"))
         self.write("s.toml", '[train]\nagent = "dqn"\n[agent]\ngamma = 0.9\n')
@@ -150,7 +150,7 @@ class SettingsTest(ProgramTest):
     def test_print_config_is_a_file_for_config(self):
         text = self.succeed("train", "--agent", "fast", "--gamma", "0.98", "--print-config")
         self.assertRegex(text, r"(?m)^gamma = 0.98  # discount per control step \(0 to 1\)$")
-        self.assertRegex(text, r"(?m)^hidden = \[64, 64\]  # ")
+        self.assertRegex(text, r"(?m)^hidden = \[48, 32\]  # ")
         self.assertRegex(text, r'(?m)^agent = "fast"  # ')
         self.assertEqual(list(self.folder.iterdir()), [])
         self.write("s.toml", text)

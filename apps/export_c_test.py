@@ -455,16 +455,16 @@ class HeaderTest(ProgramTest):
 
     def test_what_it_says_of_itself(self):
         printed = self.succeed("export", AGENTS / "fast.safetensors", "--c", "policy.h")
-        # 8-64-64, the advantage stream alone: 64-32-9, and layer normalisation.
-        weights = 8 * 64 + 64 * 64 + 64 * 32 + 32 * 9
-        constants = 4 * (weights + 3 * 2 * 64 + 32 + 9 + 9 + 7)
+        # 8-48-32, the advantage stream alone: 32-32-9, and layer normalisation.
+        weights = 8 * 48 + 48 * 32 + 32 * 32 + 32 * 9
+        constants = 4 * (weights + 3 * (48 + 32) + 32 + 9 + 9 + 7)
         self.assertIn(f"{weights:,} multiply-adds", printed)
         self.assertIn(f"{constants:,} bytes of constants", printed)
         header = self.header()
         for words in (f"Flash: {constants} bytes", f"{weights} multiply-adds",
                       f"POLICY_MULTIPLY_ADDS {weights}L",
                       "#define POLICY_PERIOD 0.02f", "#define POLICY_TORQUE_LIMIT 5.0f",
-                      "agent fast, seed 2", "mass2 1, length1 0.5", "rad/s  velocity of q2"):
+                      "agent fast, seed 3", "mass2 1, length1 0.5", "rad/s  velocity of q2"):
             self.assertTrue(words in header.replace("\n * ", " "), words)
         self.assertEqual([line for line in header.splitlines() if len(line) > 100], [])
         sizes = [int(size) for name, size in re.findall(r"static const float (\w+)\[(\d+)\]", header)

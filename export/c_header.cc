@@ -35,9 +35,10 @@ std::string ArrayText(const CArray& array, const std::string& prefix) {
   std::vector<std::string> words;
   for (const float value : array.values) words.push_back(CLiteral(value) + ",");
   words.back().back() = '}';
+  words.back() += ';';
   const std::string comment = array.comment.empty() ? "" : Concat(" /* ", array.comment, " */");
   return Concat("static const float ", prefix, '_', array.name, '[', array.values.size(), "] = {",
-                comment, "\n  ", Wrapped(words, "  ", 2), ";\n");
+                comment, "\n  ", Wrapped(words, "  ", 2), "\n");
 }
 
 /// The arrays of constants in a list, for the checksum.

@@ -11,14 +11,21 @@ namespace upswing {
 
 /// Settings of the agent.
 struct DqnConfig : AgentConfig, OffPolicyConfig {
+  DqnConfig() {
+    n_step = 5;
+    priority_exponent = 0.7;
+    importance_exponent = 0.2;
+    updates_per_step = 0.04;
+    learning_rate_steps = 350000;
+  }
   std::vector<int64_t> hidden = {256, 256};
   int64_t head = 128;
   bool layer_norm = true, double_q = true, dueling = true;
   int64_t levels = 9;
-  double tau = 0.03;
+  double tau = 0.025;
   int64_t target_period = 0;
-  double policy_tau = 0.01;
-  double epsilon_start = 1.0, epsilon_end = 0.05, epsilon_decay = 0.97;
+  double policy_tau = 0.022;
+  double epsilon_start = 1.0, epsilon_end = 0.05, epsilon_decay = 0.977;
 
   void Describe(Options& options) override;
   std::unique_ptr<Agent> Make(const EnvSpec& spec, uint64_t seed, ThreadPool& pool) const override;

@@ -35,7 +35,7 @@ struct Config {
   std::string model;  // path of an MJCF file instead of the built-in model; empty: built-in
   TrainConfig train;
   std::string task = kDoublePendulum;  // see TaskNames
-  double episode_seconds = 4, random_start_share = 0.5, random_start_velocity = 5;
+  double episode_seconds = 4, random_start_share = 0.9, random_start_velocity = 5;
   int64_t memory = 0;
   bool identify = false;
   std::string physics = "mujoco";       // engine of training, see FindEngine

@@ -74,7 +74,7 @@ describe('a policy', () => {
     ],
     [
       'network',
-      '{"inputs":9,"actions":9,"hidden":[64,64],"head":32,"dueling":true,"layer_norm":true}',
+      '{"inputs":9,"actions":9,"hidden":[48,32],"head":32,"dueling":true,"layer_norm":true}',
     ],
     ['plant', '{"mass1":"heavy"}'],
     ['plant', 'null'],

@@ -87,7 +87,7 @@ test('of two agents that are asked for, the last one counts', async ({ page }) =
   await (await slow).finished();
   await page.waitForTimeout(200);
   await expect(page.locator('#agent')).toHaveValue('fast');
-  expect(await page.evaluate(() => upswing.world.policy!.controller.text)).toContain('8-64-64');
+  expect(await page.evaluate(() => upswing.world.policy!.controller.text)).toContain('8-48-32');
 });
 
 test('a pendulum that is posed is judged at once', async ({ stage: page }) => {

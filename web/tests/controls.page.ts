@@ -164,7 +164,7 @@ test("a policy of one's own", async ({ stage: page }) => {
   await open(page);
   await page.locator('#file').setInputFiles(policyPath('fast'));
   await expect(page.locator('#agent')).toHaveValue('own');
-  await expect(page.locator('#agent-text')).toContainText('8-64-64');
+  await expect(page.locator('#agent-text')).toContainText('8-48-32');
   await expect(page.locator('#message')).toBeHidden();
 });
 

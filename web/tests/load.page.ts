@@ -104,7 +104,7 @@ test.describe('what is missing or broken is told', () => {
     }
     await page.locator('#agent').selectOption('fast');
     await expect(page.locator('#agent-on')).toBeEnabled();
-    await expect(page.locator('#agent-text')).toContainText('8-64-64');
+    await expect(page.locator('#agent-text')).toContainText('8-48-32');
   });
 
   for (const what of ['missing', 'no answer'] as const) {

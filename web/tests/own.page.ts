@@ -34,14 +34,14 @@ test('a reload keeps it, until it is removed', async ({ stage: page }) => {
   await expect(page.locator('#agent-on')).toBeEnabled();
   await expect(page.locator('#agent')).toHaveValue('own');
   await expect(page.locator('#agent option:checked')).toHaveText('fast.safetensors (yours)');
-  await expect(page.locator('#agent-text')).toContainText('8-64-64');
+  await expect(page.locator('#agent-text')).toContainText('8-48-32');
   await expect(page.locator('#message')).toBeHidden();
   // A plain visit begins with the default agent, and still offers it.
   await page.goto('about:blank');
   await open(page);
   await expect(page.locator('#agent')).toHaveValue('d3qn');
   await page.locator('#agent').selectOption('own');
-  await expect(page.locator('#agent-text')).toContainText('8-64-64');
+  await expect(page.locator('#agent-text')).toContainText('8-48-32');
 
   await page.getByRole('button', { name: 'Remove it' }).click();
   await expect(page.locator('#agent')).toHaveValue('d3qn');
