@@ -1,9 +1,13 @@
 // npm run pictures: the page as docs/ and the README show it.
+import { execFileSync } from 'node:child_process';
+import { mkdtempSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { ready, serve, visit } from './visit.mjs';
 
 const server = await serve();
-const docs = fileURLToPath(new URL('../../docs/', import.meta.url));
+const docs = fileURLToPath(new URL('../../docs/figures/', import.meta.url));
 
 /// Time stands still, without the look of a page that is paused.
 async function stop() {
@@ -57,6 +61,32 @@ for (const [name, options, scene] of [
     await scene(page);
     await page.screenshot({ path: `${docs}${name}.png` });
   });
-  console.log(`docs/${name}.png`);
+  console.log(`docs/figures/${name}.png`);
 }
+
+/// The README's film: the agent swings up, is shoved twice, and recovers. 25 frames a second.
+await visit({ viewport: { width: 900, height: 760 } }, async (page) => {
+  const folder = mkdtempSync(join(tmpdir(), 'upswing-film-'));
+  await page.goto(`${server.address}#agent=d3qn&on=1`);
+  await ready(page);
+  await page.evaluate(stop);
+  for (let frame = 0; frame < 220; ++frame) {
+    await page.evaluate(async (frame) => {
+      if (frame === 85) upswing.world.shoveTo(1);
+      if (frame === 145) upswing.world.shoveTo(-1);
+      for (let k = 0; k < 8; ++k) upswing.world.advance(); // 5 ms each
+      upswing.clock.settle();
+      await new Promise(requestAnimationFrame);
+      await new Promise(requestAnimationFrame);
+    }, frame);
+    const clip = { x: 17, y: 86, width: 548, height: 572 };
+    await page.screenshot({ path: join(folder, `${String(frame).padStart(3, '0')}.png`), clip });
+  }
+  const palette =
+    'scale=420:-1:flags=lanczos,split[a][b];[a]palettegen=max_colors=48[p];[b][p]paletteuse=dither=none';
+  const frames = ['-framerate', '25', '-i', join(folder, '%03d.png')];
+  execFileSync('ffmpeg', ['-y', '-v', 'error', ...frames, '-vf', palette, `${docs}recovery.gif`]);
+  rmSync(folder, { recursive: true });
+});
+console.log('docs/figures/recovery.gif');
 await server.close();
