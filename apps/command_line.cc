@@ -6,6 +6,7 @@
 #include <iterator>
 #include <utility>
 
+#include "apps/progress.h"
 #include "core/error.h"
 #include "core/text.h"
 
@@ -18,10 +19,10 @@ std::string TypeName(const Option& option) {
   return option.name == "model" ? "FILE" : kNames.at(option.target.index());
 }
 
-/// Takes a flag's value.
+/// Receives a flag's value.
 using TakeValue = std::function<void(const std::string&)>;
 
-/// Adds the flag of one setting; of several values the last counts.
+/// Adds the flag of one setting; the last of several values counts.
 void AddFlag(CLI::App& app, const Option& option, const std::string& group, const TakeValue& take) {
   const std::string help = option.about_with_default();
   if (std::holds_alternative<bool*>(option.target)) {
@@ -45,7 +46,7 @@ CLI::Validator NotEmpty(std::string_view what) {
           ""};
 }
 
-/// Formats --help within kHelpColumns, without the `{false}` that CLI11 adds to a flag's --no-
+/// Formats --help within HelpColumns(), without the `{false}` that CLI11 adds to a flag's --no-
 /// form.
 class HelpFormatter : public CLI::Formatter {
  public:
@@ -73,7 +74,7 @@ class HelpFormatter : public CLI::Formatter {
   std::string make_option_desc(const CLI::Option* option) const override {
     std::string description = option->get_description();
     std::ranges::replace(description, '\n', ' ');  // lines end where the width asks for it
-    return WrapText(description, kHelpColumns - get_column_width());
+    return WrapText(description, HelpColumns() - get_column_width());
   }
 
  private:
@@ -98,7 +99,7 @@ std::vector<std::string> KnownWords(const CLI::App& app) {
   return words;
 }
 
-/// Says of a flag that is not known what was meant, or why there is none of that name.
+/// Suggests a similar flag for an unknown one, or explains why this command lacks it.
 std::string ExplainFlag(const CLI::App& app, const std::string& word) {
   if (const auto* help = dynamic_cast<const HelpFormatter*>(app.get_formatter().get())) {
     help->HideFlags();
@@ -111,14 +112,14 @@ std::string ExplainFlag(const CLI::App& app, const std::string& word) {
   return "";
 }
 
-/// Says which commands there are, as `got` is none.
+/// The message for `got`, which is no command.
 std::string ExplainCommands(const CLI::App& program, const std::string& got) {
   std::vector<std::string> names;
   for (const CLI::App* sub : program.get_subcommands({})) names.push_back(sub->get_name());
   return Concat("expected a command, one of ", Join(names, ", "), "; got ", got);
 }
 
-/// Says what is missing on the command line.
+/// The message for a missing argument.
 std::string ExplainMissing(const CLI::App& program, const CLI::App& app) {
   if (&app == &program) return ExplainCommands(program, "none");
   for (const CLI::Option* option : app.get_options()) {
@@ -126,14 +127,14 @@ std::string ExplainMissing(const CLI::App& program, const CLI::App& app) {
     return Concat(app.get_name(), ": expected ", option->get_type_name(), " (",
                   option->get_description(), "), got none");
   }
-  return Concat(app.get_name(), ": an argument is missing");
+  return Concat(app.get_name(), ": expected another argument, got none");
 }
 
-/// Says what was wrong with the values of a flag. CLI11 names the flag only at the beginning of its
-/// message, such as `--gamma: 1 required NUMBER missing`.
+/// The message for a wrong number of values of a flag. CLI11 names the flag only at the beginning of
+/// its message, such as `--gamma: 1 required NUMBER missing`.
 std::string ExplainValues(const std::string& message) {
   if (message.find("flag override") != std::string::npos) {
-    return Concat("--", message.substr(0, message.find(' ')), ": takes no value");
+    return Concat("--", message.substr(0, message.find(' ')), ": expected no value, got one");
   }
   const std::string flag = message.substr(0, message.find_first_of(": "));
   const bool several = message.find("received") != std::string::npos;
@@ -149,10 +150,10 @@ std::string ExplainUnknown(const CLI::App& program, const CLI::App& app) {
   if (word.starts_with("-")) return Concat("unknown flag ", word, ExplainFlag(app, word));
   const std::string meant = DidYouMean(word, KnownWords(app));
   return &app == &program ? ExplainCommands(program, Concat("\"", word, "\"", meant))
-                          : Concat(app.get_name(), ": did not expect ", word, meant);
+                          : Concat(app.get_name(), ": expected no argument ", word, meant);
 }
 
-/// Says in one line what was wrong with the command line.
+/// The message for a wrong command line, in one line.
 std::string Explain(const CLI::App& program, const CLI::ParseError& error) {
   const auto chosen = program.get_subcommands();
   const CLI::App& app = chosen.empty() ? program : *chosen.front();
@@ -179,6 +180,8 @@ CLI::Option* AddText(CLI::App& app, std::string_view name, Target& target, std::
 }
 
 }  // namespace
+
+size_t HelpColumns() { return static_cast<size_t>(std::clamp(TerminalWidth(100), 80, 100)); }
 
 void CommandLine::Text(std::string_view name, std::string& target, std::string_view type,
                        std::string_view help, std::string_view what) {
@@ -216,7 +219,7 @@ void CommandLine::Arguments(const Options& options) {
 }
 
 void CommandLine::Settings(const Options& options, std::vector<FlagValue>& flags) {
-  // CLI11 applies flags in this order: aliases first, so that what is more specific wins.
+  // CLI11 applies flags in this order: aliases first, so that the more specific flag wins.
   for (const auto& alias : options.aliases()) {
     Option as_one = *options.Find(alias.name, alias.name).front();
     as_one.help = alias.help;
@@ -265,8 +268,8 @@ std::string CommandLine::Last(std::string_view name) const {
 int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> commands,
                const std::string& footer) {
   CLI::App program(
-      "Upswing trains, tests and explains controllers that swing up and balance a double\n"
-      "pendulum with one motor at its first joint, in MuJoCo.",
+      "Upswing trains, compares, explains and deploys controllers that swing up and balance\n"
+      "a double pendulum with one motor.",
       "upswing");
   program.set_version_flag("--version", "upswing " UPSWING_VERSION);
   program.require_subcommand(1);

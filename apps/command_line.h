@@ -19,10 +19,10 @@ class App;
 /// The program's command line. Only command_line.cc knows the library that parses it.
 namespace upswing {
 
-/// A value that must not be empty, such as that of a shell variable that is not set.
+/// The expected kind of an argument whose value must not be empty, as from an unset shell variable.
 inline constexpr std::string_view kPath = "a path";
 
-/// One command while its arguments are declared, and what it does once they are parsed.
+/// One command: declares its arguments, then runs it with their values.
 class CommandLine {
  public:
   explicit CommandLine(CLI::App& app) : app_(app) {}
@@ -96,7 +96,8 @@ struct CommandEntry {
 int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> commands,
                const std::string& footer);
 
-/// The columns that a line of --help has at most.
-inline constexpr size_t kHelpColumns = 100;
+/// The largest number of columns of a line of --help: the terminal's, from 80 to 100; without a
+/// terminal 100.
+size_t HelpColumns();
 
 }  // namespace upswing

@@ -61,8 +61,8 @@ BestEpisodeSearch::BestEpisodeSearch(const Plant& plant, int guesses, const Prog
     if (progress) progress(guess + 1, guesses);
   }
   if (!best) {
-    throw BadInput(Concat("found no swing-up of this plant with ", Rounded(plant.torque_limit),
-                          " N·m from ", guesses, " guesses"));
+    throw BadInput(Concat("--guesses: found no swing-up of this plant with ",
+                          Rounded(plant.torque_limit), " N·m from ", guesses, " guesses"));
   }
   from_hanging_ = *std::move(best);
   gains_ = Tracking(from_hanging_, lqr, upright_.lqr().P, optimizer_.model()).K;

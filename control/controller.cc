@@ -62,8 +62,7 @@ void PendulumController::Act(Matrix<const float> obs, Matrix<double> action, Mem
 
 Tensors ComputedPolicy::ToTensors() const {
   throw BadInput(Concat(kind(),
-                        ": expected a policy that is kept in a file, got one that is made "
-                        "anew each time"));
+                        ": expected a policy that has a file, got a controller, which has none"));
 }
 
 }  // namespace upswing

@@ -131,14 +131,14 @@ std::vector<Checkpoint> CheckpointsOf(const LoadedPolicy& loaded, int64_t count)
   }
   if (!SameTensors(*training.policy(), *loaded.policy)) {
     throw BadInput(Concat(where,
-                          ": --checkpoints: the training with its settings comes to another policy "
-                          "here: expected a file of this version, and of a processor with the same "
-                          "vector instructions"));
+                          ": --checkpoints: expected the same policy from training it again, got "
+                          "another; the file has to come from this version of Upswing and from a "
+                          "processor with the same vector instructions"));
   }
   const auto most = static_cast<int64_t>(all.size());
   if (count - 1 > most) {
-    throw BadInput(Concat("--checkpoints: expected at most ", most + 1, ", as many as ", where,
-                          " has evaluations, and the untrained policy, got ", count));
+    throw BadInput(Concat("--checkpoints: expected at most ", most + 1, ", the evaluations of ",
+                          where, " and the untrained policy, got ", count));
   }
   std::vector<Checkpoint> chosen;
   for (int64_t i = 0; i < count - 1; ++i) {
@@ -161,29 +161,29 @@ PageAgent ReadAgent(const fs::path& path, const std::string& given_id, int64_t c
   const std::string where = loaded.path;
   if (!HasPlant(loaded.task)) {
     throw BadInput(Concat(where,
-                          ": expected a policy of the double pendulum, which is what the page ",
-                          "shows, got one of ", loaded.task));
+                          ": expected a policy of ", kDoublePendulum,
+                          ", the only task of the page, got one of ", loaded.task));
   }
   if (!loaded.mjcf.empty()) {
     throw BadInput(Concat(where,
-                          ": was made with a model of its own, and the page shows the "
-                          "built-in one alone"));
+                          ": expected a policy of the built-in model, the only one of the page, got "
+                          "one of another MJCF model"));
   }
   if (loaded.plant.actuated_joint != 1) {
     throw BadInput(Concat(where,
-                          ": expected a policy for a motor at joint 1, as the page's pendulum has "
-                          "it, got one for joint 2"));
+                          ": expected a policy for a motor at joint 1, as in the page, got one for "
+                          "joint 2"));
   }
   if (loaded.plant.rotor_inertia != 0 || loaded.plant.has_dry_friction()) {
     throw BadInput(Concat(where,
-                          ": expected a policy for a plant without rotors and dry friction, which "
-                          "the page's pendulum does not have"));
+                          ": expected a policy for a plant without rotors and dry friction, as in "
+                          "the page, got one with them"));
   }
   const fs::path run = RunOf(loaded.path);
   std::string id = Cleaned(run.filename().string(), '-');
   if (id.empty()) id = Cleaned(loaded.policy->info().agent, '-');
   if (!given_id.empty()) id = given_id;
-  if (id.empty()) throw BadInput(Concat(where, ": names no agent; expected --id"));
+  if (id.empty()) throw BadInput(Concat(where, ": expected a name with letters or digits, or --id, got neither"));
 
   PageAgent agent{id, path, ReadFile(loaded.path), EntryOf(loaded, id), {}};
   const std::optional<std::string> command = TrainCommand(loaded.policy->info(), where);
@@ -202,17 +202,15 @@ std::vector<PageAgent> ReadAgents(const std::vector<fs::path>& paths, const std:
   }
   if (!id.empty() && Cleaned(id, '-') != id) {
     throw BadInput(
-        Concat("--id: expected small letters, digits and - between them, got \"", id, "\""));
+        Concat("--id: expected lower-case letters, digits and - between them, got \"", id, "\""));
   }
   std::vector<PageAgent> agents;
   for (const fs::path& path : paths) {
     PageAgent agent = ReadAgent(path, id, checkpoints);
     const auto same = std::ranges::find(agents, agent.id, &PageAgent::id);
     if (same != agents.end()) {
-      throw BadInput(Concat(path.string(), ": would be \"", agent.id, "\" in the page, as ",
-                            same->from.string(),
-                            " would; expected different names (--id gives "
-                            "one)"));
+      throw BadInput(Concat(path.string(), ": expected a different ID than ", same->from.string(),
+                            ", got \"", agent.id, "\" for both; --id sets one"));
     }
     agents.push_back(std::move(agent));
   }

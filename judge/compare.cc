@@ -113,7 +113,7 @@ std::vector<EnvConfig> FinalEvaluations(const Comparison& comparison, int task) 
       episodes += config.train.eval_episodes;
       if (!evaluations.empty() && episodes > kMostJudged) return evaluations;
       EnvConfig& env = evaluations.emplace_back(EvaluationEnvironments(config, step));
-      // Screened: in MuJoCo are those that count.
+      // Screened: the evaluations in MuJoCo count.
       const bool screened = config.eval_physics == kScreened;
       env.engine = screened ? &kMuJoCo : &FindEngine(config.eval_physics, "--eval-physics");
     }
@@ -131,7 +131,7 @@ std::shared_ptr<const Policy> PolicyFor(const LoadedPolicy& loaded, bool make_an
     return loaded.remade(env.plant(0));
   } catch (const Error& error) {
     throw Error(error.exit_code(),
-                Concat(error.what(), " (for the plant of the runs; --made-for names another)"));
+                Concat(error.what(), " (designed for the plant of the runs; --made-for sets another one)"));
   }
 }
 
@@ -139,8 +139,8 @@ std::shared_ptr<const Policy> PolicyFor(const LoadedPolicy& loaded, bool make_an
 void ExpectJoint(const LoadedPolicy& loaded, bool make_anew, const Plant& plant) {
   const double own = loaded.plant.actuated_joint, given = plant.actuated_joint;
   if (own == given || (loaded.remade && make_anew)) return;
-  throw BadInput(Concat(loaded.name, ": was made for a motor at joint ", own,
-                        ", and that of the runs is at joint ", given));
+  throw BadInput(Concat(loaded.name, ": expected a policy for a motor at joint ", given,
+                        ", as in the runs, got one for joint ", own));
 }
 
 /// A policy to judge on a task.
@@ -170,7 +170,7 @@ Evaluation Judge(const Job& job, ThreadPool& pool, const Progress& progress) {
   return Summarize(episodes, job.judged.spec.evaluation);
 }
 
-/// What is to be judged; what is not is noted.
+/// The policies to evaluate, per task; notes the others.
 std::vector<Job> JobsOf(const std::vector<LoadedPolicy>& policies, bool make_anew,
                         Comparison& comparison) {
   const std::vector<std::string> titles = TitlesOf(policies);
@@ -195,11 +195,11 @@ std::vector<Job> JobsOf(const std::vector<LoadedPolicy>& policies, bool make_ane
     }
     if (std::ssize(others) == tasks) {
       throw BadInput(Concat(loaded.name, ": expected a policy of ", others.front(),
-                            ", as the runs are, got one of ", loaded.task));
+                            ", the task of the runs, got one of ", loaded.task));
     }
     if (!others.empty()) {
-      comparison.notes.push_back(Concat(loaded.name, ": not judged on ", others.front(),
-                                        ", as it is a policy of ", loaded.task));
+      comparison.notes.push_back(Concat(loaded.name, ": not evaluated on ", others.front(),
+                                        ", because it is a policy of ", loaded.task));
     }
   }
   return jobs;

@@ -133,10 +133,10 @@ EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& tria
                           ThreadPool& pool, const Progress& progress) {
   if (trial.known_plant && !loaded.remade) {
     throw BadInput(Concat(
-        "--known-plant: expected a controller, which can be made for a plant, got ", loaded.name));
+        "--known-plant: expected a controller, which has a design plant, got ", loaded.name));
   }
   if (trial.known_plant && trial.unknown_plant) {
-    throw BadInput("--known-plant: expected no --unknown-plant beside it");
+    throw BadInput("--known-plant: expected no --unknown-plant with it");
   }
   EvalReport report;
   report.policy = loaded.name;

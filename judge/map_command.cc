@@ -109,8 +109,8 @@ MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded,
     for (const MapAxis* axis : {&config.x, &config.y}) {
       const auto members = options.Find(axis->name, "map");
       if (std::ranges::find(members, option) == members.end()) continue;
-      throw BadInput(Concat("--set ", option->name, ": expected another name, ", axis->name,
-                            " is an axis of the map"));
+      throw BadInput(Concat("--set ", option->name, ": expected a quantity that is on no axis; the axis ",
+                            axis->name, " sets it"));
     }
   }
   config.start_given |= config.x.start || config.y.start;
@@ -119,7 +119,7 @@ MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded,
   config.episodes = a.episodes > 0 ? static_cast<int>(a.episodes) : usual;
   if (config.cells() * config.episodes > kMostEpisodes) {
     throw BadInput(Concat("map: expected at most ", FormatCount(kMostEpisodes), " episodes, got ",
-                          FormatCount(config.cells()), " cells of ", config.episodes));
+                          FormatCount(config.cells()), " cells × ", config.episodes, " episodes"));
   }
   return config;
 }
@@ -127,16 +127,15 @@ MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded,
 }  // namespace
 
 void MapArguments::Describe(Options& o) {
-  o.Add(&episodes, "episodes", {1, 100000}, "", "in a cell").usual =
-      "10, or 1 where the start is given";
-  o.Add(&check, "check", kUnit, "", "share of the cells to repeat in MuJoCo");
+  o.Add(&episodes, "episodes", {1, 100000}, "", "number of episodes per cell").usual =
+      "10; 1 if the start is given";
+  o.Add(&check, "check", kUnit, "", "share of cells to repeat in MuJoCo");
 }
 
 MapResult PlanMap(const MapArguments& a, const LoadedPolicy& loaded) {
   if (!HasPlant(loaded.task)) {
     throw BadInput(
-        Concat("map: expected a policy of the double pendulum, whose plant and start are ",
-               "the axes, got one of ", loaded.task));
+        Concat("map: expected a policy of ", kDoublePendulum, ", got one of ", loaded.task));
   }
   MapResult map;
   const DesignConditions design = DesignOf(loaded);

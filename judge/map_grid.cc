@@ -48,8 +48,8 @@ double ParseEnd(std::string_view text, const MapAxis& axis, const std::string& w
   }
   if (!percent) return *number;
   if (!axis.at_training || *axis.at_training == 0) {
-    throw BadInput(Concat(where, ": expected numbers, got a percentage of ",
-                          axis.at_training ? "0" : "values that differ"));
+    throw BadInput(Concat(where, ": expected a number, got a percentage of ",
+                          axis.at_training ? "a training value of 0" : "unequal training values"));
   }
   return *axis.at_training * (1 + *number / 100);
 }
@@ -123,10 +123,10 @@ void MapPoint::Describe(Options& o) {
   plant.Describe(o);
   disturbance.Describe(o);
   o.Section("start");
-  o.Add(&q1, "q1", {-360, 360}, "°", "angle of the first link, 0 hanging");
-  o.Add(&q2, "q2", {-360, 360}, "°", "angle of the second link to the first");
-  o.Add(&w1, "w1", {-50, 50}, "rad/s", "velocity of q1");
-  o.Add(&w2, "w2", {-50, 50}, "rad/s", "velocity of q2");
+  o.Add(&q1, "q1", {-360, 360}, "°", "start angle of link 1; 0: hanging");
+  o.Add(&q2, "q2", {-360, 360}, "°", "start angle of link 2 relative to link 1");
+  o.Add(&w1, "w1", {-50, 50}, "rad/s", "start velocity of q1");
+  o.Add(&w2, "w2", {-50, 50}, "rad/s", "start velocity of q2");
 }
 
 PendulumState MapPoint::start() const {
@@ -146,7 +146,7 @@ MapAxis ParseMapAxis(const std::string& text, const MapPoint& training, const st
     for (const Option& option : options.all()) names.push_back(option.name);
     for (const auto& alias : options.aliases()) names.push_back(alias.name);
     throw BadInput(Concat(where, ": expected NAME=FROM:TO or NAME=FROM:TO:CELLS, got \"", text,
-                          "\"; the names are ", Join(names, ", ")));
+                          "\"; NAME is one of ", Join(names, ", ")));
   }
   MapAxis axis;
   axis.name = Trim(std::string_view(text).substr(0, equals));

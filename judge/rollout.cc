@@ -97,7 +97,7 @@ void Episode::Step(bool motor, const std::array<double, 2>& push) {
   rollout_.rows.push_back(std::move(row));
   if (pendulum() == nullptr || result_.terminated[0] == 0) return;
   throw Failure(Concat(
-      "the state blew up numerically after t = ", FormatNumber(rollout_.rows.back().t), " s"));
+      "the simulation diverged after t = ", FormatNumber(rollout_.rows.back().t), " s"));
 }
 
 void Episode::GoBack(int64_t steps) {

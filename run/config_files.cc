@@ -29,7 +29,7 @@ Config ParseInFolder(const fs::path& file, const std::string& text,
   return ParseConfig(text, file.string(), flags, [&](const std::string& path, bool /*in_file*/) {
     if (path == RunFolder::kModel) return ReadModel((file.parent_path() / path).string());
     throw BadInput(Concat(file.string(), ": model: expected ", RunFolder::kModel,
-                          ", the copy in the same folder, got \"", Printable(path), "\""));
+                          " in the same folder, got \"", Printable(path), "\""));
   });
 }
 
@@ -51,10 +51,9 @@ Config ReadRunConfig(const fs::path& run, const std::vector<FlagValue>& flags) {
   constexpr size_t kMostNames = 6;  // that make a line which can still be read
   const size_t more = missing.size() - std::min(missing.size(), kMostNames);
   missing.resize(missing.size() - more);
-  throw BadInput(Concat(file.string(), ": expected every setting, as this version writes a run; ",
-                        "got none of ", Join(missing, ", "),
-                        more > 0 ? Concat(" and ", more, " more") : "",
-                        ": another version wrote it"));
+  throw BadInput(Concat(file.string(), ": expected every setting of this version, got none of ",
+                        Join(missing, ", "), more > 0 ? Concat(" and ", more, " more") : "",
+                        "; another version wrote the file"));
 }
 
 Config ReadSettings(const fs::path& file) { return ParseInFolder(file, ReadOwnFile(file), {}); }

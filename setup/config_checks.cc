@@ -30,8 +30,8 @@ void CheckTask(Config& config, const std::string& where) {
   defaults.DescribePlantTask(usual);
   for (const auto& [option, other] : Differences(now, usual)) {
     throw BadInput(Concat(
-        where.empty() ? "" : where + ": ", option.name, ": expected none, as the task ",
-        config.task, " has no such setting, got ", option.text(), " (agent ", config.agent, ")"));
+        where.empty() ? "" : where + ": ", option.name, ": expected none, because the task ",
+        config.task, " of agent ", config.agent, " has no such setting, got ", option.text()));
   }
 }
 
@@ -52,7 +52,7 @@ std::vector<std::string> Warnings(const Config& config) {
   const int64_t steps = (config.train.steps + envs - 1) / envs * envs;
   std::vector<std::string> warnings = config.learner().Warnings(steps, envs);
   if (std::ranges::all_of(config.reward.weight, [](double weight) { return weight == 0; })) {
-    warnings.emplace_back("every weight of the reward is 0: there is nothing to learn");
+    warnings.emplace_back("every reward weight is 0: the agent learns nothing");
   }
   return warnings;
 }
@@ -73,11 +73,12 @@ void CheckMemory(const Config& config, int64_t available, int64_t runs) {
   if (needed <= static_cast<double>(available)) return;
   const AgentSize learner = SizeOfLearner(config);
   throw BadInput(Concat(
-      "train: expected to fit into the ", Gigabytes(static_cast<double>(available)), " of memory that are free, but ",
-      runs > 1 ? Concat(runs, " trainings at a time, each with a ") : "a ", "network of ",
+      "train: expected at most ", Gigabytes(static_cast<double>(available)),
+      " of memory, which is what is free, got ", Gigabytes(needed), " for ",
+      runs > 1 ? Concat(runs, " runs at a time, each with a ") : "a ", "network of ",
       FormatCount(learner.parameters), " parameters and a ", learner.store, " of ",
-      FormatCount(learner.capacity), " transitions take up to ", Gigabytes(needed),
-      " (smaller: --hidden, ", learner.store_flag, runs > 1 ? ", --jobs" : "", ")"));
+      FormatCount(learner.capacity), " transitions; reduce --hidden", runs > 1 ? ", " : " or ",
+      learner.store_flag, runs > 1 ? " or --jobs" : ""));
 }
 
 }  // namespace upswing

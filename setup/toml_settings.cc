@@ -37,7 +37,8 @@ FlagValue ApplyNode(const Options& options, const std::string& section, const st
   for (const Option* option : options.Find(key, scope)) {
     if (!section.empty() && option->section != section) {
       throw BadInput(
-          Concat(setting.where, ": expected in [", option->section, "], got in [", section, "]"));
+          Concat(setting.where, ": expected in section [", option->section, "], got in [", section,
+                   "]"));
     }
     const bool wants_text = std::holds_alternative<std::string*>(option->target);
     if (!TextOf(node) || node.is_string() != wants_text) {
@@ -92,11 +93,11 @@ std::vector<FlagValue> ApplyTable(const Options& options, const toml::table& tab
     }
     if (section == nullptr) {
       const Option& option = *options.Find(key, PlaceOf(node, where)).front();
-      throw BadInput(Concat(PlaceOf(node, where), ": ", key, ": belongs in [", option.section,
-                            "]: expected it below such a line, got it in no section"));
+      throw BadInput(Concat(PlaceOf(node, where), ": ", key, ": expected in section [", option.section,
+                            "], got outside any section"));
     }
     if (std::ranges::find(sections, key) == sections.end()) {
-      throw BadInput(Concat(PlaceOf(node, where), ": no section is called [", key, "]",
+      throw BadInput(Concat(PlaceOf(node, where), ": expected a known section, got [", key, "]",
                             DidYouMean(key, sections)));
     }
     for (const auto& [inner, value] : *section) {

@@ -52,7 +52,7 @@ void CheckSame(Config before, const Config& now, bool more_steps, const std::str
   };
   try {
     ExpectSameSettings(before, now, what, counts);
-    if (before.mjcf != now.mjcf) throw BadInput(Concat(what, ": made with another model"));
+    if (before.mjcf != now.mjcf) throw BadInput(Concat(what, ": expected the same MJCF model as before, got another"));
   } catch (const Error& other) {
     throw BadInput(Concat(other.what(), "; choose another --out"));
   }
@@ -260,7 +260,7 @@ int TrainMany(const ManyRuns& many, ManyRunsObserver& observer) {
   std::erase_if(runs, [](const SeedRun& run) { return run.problem.empty(); });
   if (runs.empty()) return 0;
   throw Failure(Concat(runs.size(), " of ", all, " runs in ", many.plan.folder.string(),
-                       " failed, the first of them ", runs.front().name, ": ",
+                       " failed; first ", runs.front().name, ": ",
                        runs.front().problem));
 }
 

@@ -31,7 +31,7 @@ void Reduce(const SeedRun& run, Keep keep) {
 void Finish(const SeedRun& run, Keep keep) {
   const Config& config = run.variant->config;
   const auto at_end = ReadTrainState(run.path, config.Spec());
-  if (!at_end) throw Failure(Concat(run.path.string(), ": it was removed while it was trained"));
+  if (!at_end) throw Failure(Concat(run.path.string(), ": expected the run's folder, which was removed during the training"));
   const FinishedRun result{*at_end,
                            run.settings,
                            config.train.steps,
@@ -118,7 +118,7 @@ class Worker {
     }
     ++outcome_.failed;
     if (++failed_in_a_row_ < kMostInARow) return;
-    throw Failure(Concat(kMostInARow, " runs in a row failed here, the last of them ", run.name,
+    throw Failure(Concat(kMostInARow, " runs in a row failed on this worker; last ", run.name,
                          ": ", error.what()));
   }
 
@@ -129,7 +129,7 @@ class Worker {
       outcome_.stopped = true;
       return;
     }
-    if (!lease.held()) throw Failure("another worker has it");
+    if (!lease.held()) throw Failure("another worker has claimed the run");
     Finish(run, plan_.keep);
     ++outcome_.done;
     failed_in_a_row_ = 0;
@@ -158,7 +158,7 @@ void WriteEvaluations(const StudyPlan& plan) {
         columns = Printable(line);
       } else if (columns != Printable(line)) {
         throw Failure(Concat(run.done().string(),
-                             ": its evaluations have other columns than those ", "of other runs"));
+                             ": expected evaluations with the columns of the other runs, got others"));
       }
       is_first = false;
     }

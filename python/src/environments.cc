@@ -55,14 +55,14 @@ Config ConfigOf(const std::string& num_envs, const SettingTexts& settings) {
   for (const FlagValue& flag : flags) {
     for (const Option* option : every.Find(flag.name, flag.where)) {
       if (IsEnvironmentSetting(*option)) continue;
-      throw BadInput(Concat(flag.where, ": expected a setting of an environment, and ", flag.name,
-                            " is one of a training alone"));
+      throw BadInput(Concat(flag.where, ": expected a setting of an environment, got ", flag.name,
+                            ", a setting of a training"));
     }
   }
   Config config = BuildConfig("", flags);
   if (!HasPlant(config.task)) {
-    throw BadInput(Concat("agent: expected one of the task ", kDoublePendulum, ", got ",
-                          config.agent, ", which learns ", config.task));
+    throw BadInput(Concat("agent: expected an agent of the task ", kDoublePendulum, ", got ",
+                          config.agent, " of the task ", config.task));
   }
   return config;
 }

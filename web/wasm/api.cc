@@ -156,19 +156,17 @@ UPSWING_EXPORT(policy_open) Controller* PolicyOpen(const std::byte* file, size_t
           Concat("expected a policy of the double pendulum, got one of ", controller->loaded.task));
     }
     if (!controller->loaded.mjcf.empty()) {
-      throw BadInput("it was trained on a model of its own, which this page does not have");
+      throw BadInput("expected a policy of the built-in model, got one of another MJCF model");
     }
     if (controller->loaded.plant.actuated_joint != 1) {
       throw BadInput(
-          "expected a policy for a motor at joint 1, as the page's pendulum has it, got one for "
-          "joint 2");
+          "expected a policy for a motor at joint 1, as in the page, got one for joint 2");
     }
     if (controller->loaded.plant.rotor_inertia != 0 ||
         controller->loaded.plant.has_dry_friction()) {
       throw BadInput(
-          "expected a policy for a plant without rotors and dry friction, which the page's "
-          "pendulum "
-          "does not have");
+          "expected a policy for a plant without rotors and dry friction, as in the page, got one "
+          "with them");
     }
     SetText(About(*controller, tensors.metadata));
     return controller.release();
@@ -325,7 +323,7 @@ UPSWING_EXPORT(learner_open) Learner* LearnerOpen(const char* settings, size_t s
     std::vector<FlagValue> flags;
     for (const std::string_view line : Split({settings, size}, '\n')) {
       const size_t equals = line.find('=');
-      if (equals == std::string_view::npos) throw BadInput("settings: expected NAME=VALUE");
+      if (equals == std::string_view::npos) throw BadInput(Concat("settings: expected NAME=VALUE, got \"", line, "\""));
       const std::string name(line.substr(0, equals));
       flags.push_back({name, std::string(line.substr(equals + 1)), name});
     }
