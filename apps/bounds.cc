@@ -98,7 +98,8 @@ int RunBounds(const BoundsArguments& a) {
   fmt::print("  {:<{}}  {:<14} {:>8}   median swing-up time\n", "", width, "return", "share");
   for (const BoundsRow& row : rows) fmt::print("{}\n", RowText(row, rows.front(), width));
   fmt::print(
-      "  ± is the standard deviation over episodes. The best return and the shortest time come from\n"
+      "  ± is the standard deviation over episodes. The best return and the shortest time come "
+      "from\n"
       "  separate searches. A better result may exist.\n");
   return 0;
 }

@@ -130,8 +130,8 @@ std::string ExplainMissing(const CLI::App& program, const CLI::App& app) {
   return Concat(app.get_name(), ": expected another argument, got none");
 }
 
-/// The message for a wrong number of values of a flag. CLI11 names the flag only at the beginning of
-/// its message, such as `--gamma: 1 required NUMBER missing`.
+/// The message for a wrong number of values of a flag. CLI11 names the flag only at the beginning
+/// of its message, such as `--gamma: 1 required NUMBER missing`.
 std::string ExplainValues(const std::string& message) {
   if (message.find("flag override") != std::string::npos) {
     return Concat("--", message.substr(0, message.find(' ')), ": expected no value, got one");

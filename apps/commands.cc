@@ -8,9 +8,9 @@
 namespace upswing {
 
 void AddPolicy(CommandLine& line, PolicyArguments& a) {
-  line.Text(
-      "policy", a.name, "POLICY|RUN",
-      Concat("policy.safetensors, a run folder or a controller (", Join(ControllerNames(), ", "), ")"));
+  line.Text("policy", a.name, "POLICY|RUN",
+            Concat("policy.safetensors, a run folder or a controller (",
+                   Join(ControllerNames(), ", "), ")"));
   AddControllers(line, a);
 }
 
@@ -41,7 +41,8 @@ void AddPhysics(CommandLine& line, std::string& physics) {
 }
 
 void AddManyOptions(CommandLine& line, std::string& seeds, int64_t& jobs) {
-  line.Text("--seeds", seeds, "SEEDS", "seeds, one run each: 10 for 1 to 10, or a list such as 3,5,8-12",
+  line.Text("--seeds", seeds, "SEEDS",
+            "seeds, one run each: 10 for 1 to 10, or a list such as 3,5,8-12",
             "a number of seeds or a list such as 3,5,8-12");
   Options options;
   options.Add(&jobs, "jobs", {1, 4096}, "", "number of runs at a time").usual = "one per processor";
@@ -70,10 +71,11 @@ void AddTrialOptions(CommandLine& line, TrialArguments& a, const std::string& se
 }
 
 void AddEpisodeOptions(CommandLine& line, TrialArguments& a) {
-  line.Text("--start", a.start, "q1,q2,w1,w2", "start state [rad, rad/s] (default 0,0,0,0: hanging)",
-            "");
+  line.Text("--start", a.start, "q1,q2,w1,w2",
+            "start state [rad, rad/s] (default 0,0,0,0: hanging)", "");
   Options own;
-  own.Add(&a.episode, "episode", {0, 999999}, "", "index of the episode of `eval` with the same flags")
+  own.Add(&a.episode, "episode", {0, 999999}, "",
+          "index of the episode of `eval` with the same flags")
       .usual = "none";
   line.Arguments(own);
 }

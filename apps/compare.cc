@@ -72,8 +72,8 @@ int RunCompare(const CompareArguments& arguments) {
   if (!policies.empty()) {
     ThreadPool pool(ResolveThreads(arguments.threads));
     EpisodeProgress progress(arguments.as_json);
-    const bool make_anew = arguments.controllers.made_for.empty();
-    AddPolicies(policies, make_anew, pool, std::ref(progress), comparison);
+    const bool redesign = arguments.controllers.made_for.empty();
+    AddPolicies(policies, redesign, pool, std::ref(progress), comparison);
   }
   if (arguments.as_json) {
     fmt::print("{}\n", ComparisonJson(comparison));
@@ -99,7 +99,8 @@ void AddCompare(CommandLine& line) {
   line.Text("--out", a.out, "FOLDER",
             "new folder for summary.csv, runs.csv, policies.csv, curves.svg and curves.png "
             "(curves-2, … for further tasks)");
-  line.Flag("--unfinished", a.runs.unfinished, "compare unfinished runs too, up to their last evaluation");
+  line.Flag("--unfinished", a.runs.unfinished,
+            "compare unfinished runs too, up to their last evaluation");
   line.Flag("--different-tasks", a.runs.different_tasks,
             "compare also groups whose evaluations differ in plant, disturbance or number of "
             "episodes");

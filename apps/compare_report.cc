@@ -57,8 +57,7 @@ void PrintStability(const GroupSummary& summary) {
   const Stability& s = summary.stability;
   if (summary.solved == 0) return;
   if (s.runs == 0) {
-    fmt::print("  {:<16}no later evaluations: each run stopped when solved\n",
-               "once solved");
+    fmt::print("  {:<16}no later evaluations: each run stopped when solved\n", "once solved");
     return;
   }
   fmt::print(
@@ -208,7 +207,8 @@ void PrintComparison(const Comparison& comparison) {
     return ResamplesOf({std::vector<double>(group.runs.size())}) < kResamples;
   });
   fmt::print(
-      "Intervals: Wilson for shares, Newcombe if all pairs of runs agree, else percentile bootstrap "
+      "Intervals: Wilson for shares, Newcombe if all pairs of runs agree, else percentile "
+      "bootstrap "
       "with\n{}{} resamples of the runs.\n",
       fewer ? "at most " : "", FormatCount(kResamples));
   if (!comparison.policies.empty()) {

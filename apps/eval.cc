@@ -29,7 +29,8 @@ struct EvalArguments {
 int RunEval(const EvalArguments& a) {
   const bool to_output = IsStandardStream(a.episodes_csv);
   if (to_output && a.as_json) {
-    throw BadInput("--json: expected a file for --episodes-csv, got - (standard output), where the JSON goes");
+    throw BadInput(
+        "--json: expected a file for --episodes-csv, got - (standard output), where the JSON goes");
   }
   if (!a.episodes_csv.empty()) CheckWritable("--episodes-csv", a.episodes_csv);
   const LoadedPolicy loaded = GetPolicy(a.policy);

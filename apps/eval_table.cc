@@ -96,11 +96,13 @@ void PrintEvalTable(const EvalReport& report) {
   const std::string changes = ChangesText(report.env);
   if (!changes.empty()) fmt::print("  {:<15}{}\n", "with", changes);
   if (report.known_plant) {
-    fmt::print("  designed for   the plant of each episode; {} of {} plants have no such controller\n",
-               e.episodes - NumMade(report), e.episodes);
+    fmt::print(
+        "  designed for   the plant of each episode; {} of {} plants have no such controller\n",
+        e.episodes - NumDesigned(report), e.episodes);
   }
   if (report.only_balances) {
-    fmt::print("  note           the controller balances and does not swing up; episodes start hanging\n");
+    fmt::print(
+        "  note           the controller balances and does not swing up; episodes start hanging\n");
   }
   fmt::print("  success        {} of {} = {:.1f}%   (95% interval {:.1f}% to {:.1f}%)\n",
              e.successes, e.episodes, 100 * e.success_rate(), 100 * e.success_interval.low,

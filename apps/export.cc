@@ -52,9 +52,9 @@ LoadedPolicy SinglePolicy(const ExportArguments& a, const char* flag, bool takes
   policy.name = a.policies.front();
   const std::string& name = policy.name;
   if (!takes && IsController(name) && !fs::exists(name)) {
-    throw BadInput(Concat(name, ": expected a learned policy (policy.safetensors or a run folder), ",
-                          "got a controller, which has no network; --c exports lqr, energy, pfl ",
-                          "and tvlqr"));
+    throw BadInput(Concat(
+        name, ": expected a learned policy (policy.safetensors or a run folder), ",
+        "got a controller, which has no network; --c exports lqr, energy, pfl ", "and tvlqr"));
   }
   return GetPolicy(policy);
 }
@@ -85,8 +85,7 @@ int ExportC(const ExportArguments& a) {
     fmt::print("  work        {} multiply-adds per call, every {} s\n",
                FormatCount(header.multiply_adds), period);
   } else {
-    fmt::print("  work        one call every {} s; see the first lines of the header\n",
-               period);
+    fmt::print("  work        one call every {} s; see the first lines of the header\n", period);
   }
   return 0;
 }
@@ -102,19 +101,21 @@ int ExportPage(const ExportArguments& a) {
 
 int RunExport(const ExportArguments& a) {
   CheckOne(a);
-  if (!a.prefix.empty() && a.c.empty())
-    throw BadInput("--prefix: expected --c with it, got none");
+  if (!a.prefix.empty() && a.c.empty()) throw BadInput("--prefix: expected --c with it, got none");
   if (a.checkpoints > 0 && a.page.empty()) {
     throw BadInput("--checkpoints: expected --page with it, got none");
   }
   if (a.c.empty() && !(a.controller.flags.empty() && a.controller.made_for.empty())) {
-    throw BadInput("settings of a controller: expected --c with them, the only export of controllers");
+    throw BadInput(
+        "settings of a controller: expected --c with them, the only export of controllers");
   }
   if (!a.onnx.empty()) return ExportOnnx(a);
   if (!a.c.empty()) return ExportC(a);
   if (!a.page.empty()) return ExportPage(a);
   if (!a.policies.empty() || !a.id.empty()) {
-    throw BadInput("--test-vectors: expected no policy and no --id, because the vectors depend only on the task");
+    throw BadInput(
+        "--test-vectors: expected no policy and no --id, because the vectors depend only on the "
+        "task");
   }
   WriteOutput(a.test_vectors, TestVectorsJson());
   return 0;
@@ -127,17 +128,19 @@ void AddExport(CommandLine& line) {
   line.Texts("policies", a.policies, "POLICY|RUN",
              "policies: policy.safetensors or run folders; for --c also lqr, energy, pfl or tvlqr");
   AddControllers(line, a.controller);
-  line.Text("--onnx", a.onnx, "FILE",
-            "ONNX file to write, which maps observations to torques and values; -: standard output");
-  line.Text("--c", a.c, "FILE.h",
-            "C99 header to write for a microcontroller, which maps angles and velocities to torques; "
-            "-: standard output");
+  line.Text(
+      "--onnx", a.onnx, "FILE",
+      "ONNX file to write, which maps observations to torques and values; -: standard output");
+  line.Text(
+      "--c", a.c, "FILE.h",
+      "C99 header to write for a microcontroller, which maps angles and velocities to torques; "
+      "-: standard output");
   line.Text("--prefix", a.prefix, "NAME",
             "prefix of all names in the C header (default the file name)", "a name");
   line.Text("--page", a.page, "FOLDER",
             "folder of the page's agents to write into; replaces agents with the same ID");
-  line.Text("--id", a.id, "ID", "ID of a single policy in the page (default name of the run, or agent)",
-            "an ID");
+  line.Text("--id", a.id, "ID",
+            "ID of a single policy in the page (default name of the run, or agent)", "an ID");
   Options own;
   own.Add(&a.checkpoints, "checkpoints", {2, 100}, "",
           "number of policies per agent in the page, from untrained to trained; trains the agent "

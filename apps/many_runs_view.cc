@@ -38,8 +38,8 @@ void PrintRow(const std::string& name, double step, double seconds, double succe
       DurationOrDash(seconds), 100 * success, reward, remark.empty() ? "" : "  ", remark);
 }
 
-/// The printed view of many runs: a progress line, a line per finished run, a table. Signals stop the
-/// runs.
+/// The printed view of many runs: a progress line, a line per finished run, a table. Signals stop
+/// the runs.
 class ManyRunsView : public ManyRunsObserver {
  public:
   /// The plan must outlive it.
@@ -73,7 +73,8 @@ class ManyRunsView : public ManyRunsObserver {
       return line_.Print(fmt::format("  {:<20} failed: {} (log: {})", run.name,
                                      Printable(run.problem), Printable(run.log().string())));
     }
-    if (!run.state) return line_.Print(fmt::format("  {:<20} stopped before its first step", run.name));
+    if (!run.state)
+      return line_.Print(fmt::format("  {:<20} stopped before its first step", run.name));
     const TrainState& s = *run.state;
     const Standing standing = Measure();
     line_.Print(fmt::format("  {:<20} {:>11} steps  {:>12}  {:<22}  {} of {} runs done{}", run.name,
@@ -107,7 +108,8 @@ class ManyRunsView : public ManyRunsObserver {
  protected:
   /// Prints how to continue after a signal to stop.
   virtual void SayStopped(size_t done) const {
-    Say("Stopped with {} of {} runs done; the same command resumes the others.\n", done, runs_->size());
+    Say("Stopped with {} of {} runs done; the same command resumes the others.\n", done,
+        runs_->size());
   }
 
   /// Runs that are neither done nor failed.
@@ -177,7 +179,8 @@ class ManyRunsView : public ManyRunsObserver {
     const auto reduced = std::ranges::count_if(
         *runs_, [](const SeedRun& run) { return !run.finished && run.IsReduced(); });
     if (reduced > 0) {
-      Say("  {} finished with fewer steps: trained again from the start, because no checkpoint is kept\n",
+      Say("  {} finished with fewer steps: trained again from the start, because no checkpoint is "
+          "kept\n",
           reduced);
     }
     for (const SeedRun& run : *runs_) {

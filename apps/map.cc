@@ -39,8 +39,8 @@ std::string RangeText(const MapAxis& axis) {
 std::string CheckText(const MapResult& map) {
   const MapAgreement a = map.agreement();
   std::string text =
-      fmt::format("{} of {} cells repeated in MuJoCo: {} with equal successes", FormatCount(a.cells),
-                  FormatCount(map.config.cells()),
+      fmt::format("{} of {} cells repeated in MuJoCo: {} with equal successes",
+                  FormatCount(a.cells), FormatCount(map.config.cells()),
                   a.same_successes == a.cells ? "all" : FormatCount(a.same_successes));
   if (a.same_successes < a.cells) {
     text += fmt::format(", the others differ by up to {:.0f}%", 100 * a.largest_success_difference);
@@ -81,7 +81,8 @@ void PrintMapTable(const MapResult& map) {
 int RunMapCommand(const MapCommand& a) {
   const bool several = a.policies.size() > 1;
   if (several && a.out.empty()) {
-    throw BadInput(Concat("--out: expected a folder for several maps, got none; policies: ", Join(a.policies, ", ")));
+    throw BadInput(Concat("--out: expected a folder for several maps, got none; policies: ",
+                          Join(a.policies, ", ")));
   }
   const std::vector<LoadedPolicy> policies = GetPolicies(a.policies, a.controllers);
   const std::vector<std::string> titles = TitlesOf(policies);
@@ -125,7 +126,8 @@ void AddMap(CommandLine& line) {
   AddSet(line, a.trial.set, "value of a quantity on neither axis, such as gravity=9.7");
   AddPhysics(line, a.trial.physics);
   AddUnknownPlant(line, a.trial.unknown_plant);
-  line.Text("--out", a.out, "FOLDER", "new folder for map.csv, map.svg and map.png (default RUN/map-X-Y)");
+  line.Text("--out", a.out, "FOLDER",
+            "new folder for map.csv, map.svg and map.png (default RUN/map-X-Y)");
   AddSeed(line, a.trial.seed, "starts and noise");
   AddThreads(line, a.threads);
   line.Flag("--json", a.as_json, "print JSON instead of a table");

@@ -108,16 +108,19 @@ Competitor Search(const RealAiGymArguments& a, ThreadPool& pool) {
 int RunRealAiGym(const RealAiGymArguments& a) {
   const bool searches = !a.search_out.empty();
   if (searches == !a.policy.empty()) {
-    throw BadInput(searches ? "--search: expected no policy with it"
-                            : "realaigym: expected a policy to score or --search FILE, got neither");
+    throw BadInput(searches
+                       ? "--search: expected no policy with it"
+                       : "realaigym: expected a policy to score or --search FILE, got neither");
   }
   if (IsStandardStream(a.search_out)) throw BadInput("--search: expected a file, got -");
-  if (!searches && !a.from.empty()) throw BadInput("--from: expected --search FILE with it, got none");
+  if (!searches && !a.from.empty())
+    throw BadInput("--from: expected --search FILE with it, got none");
   std::string robot;
   for (const FlagValue& flag : a.search) {
     constexpr std::array kOfFrom{"robot", "hidden", "starts", "alone", "first_population"};
     if (!a.from.empty() && std::ranges::count(kOfFrom, flag.name) > 0) {
-      throw BadInput(Concat(FlagOf(flag.name), ": expected none with --from, which starts from a policy"));
+      throw BadInput(
+          Concat(FlagOf(flag.name), ": expected none with --from, which starts from a policy"));
     }
     if (flag.name == "robot") robot = flag.text;
     if (searches || flag.name == "robot") continue;
@@ -130,7 +133,8 @@ int RunRealAiGym(const RealAiGymArguments& a) {
   if (!a.figure.empty()) CheckFigureName(a.figure);
   const bool to_output = IsStandardStream(a.csv);
   if (to_output && a.as_json) {
-    throw BadInput("--json: expected a file for --csv, got - (standard output), where the JSON goes");
+    throw BadInput(
+        "--json: expected a file for --csv, got - (standard output), where the JSON goes");
   }
   if (!a.figure.empty()) CheckCanDraw();
   ThreadPool pool(ResolveThreads(a.threads));
@@ -160,11 +164,13 @@ int RunRealAiGym(const RealAiGymArguments& a) {
 void AddRealAiGym(CommandLine& line) {
   RealAiGymArguments& a = line.Runs(RunRealAiGym);
   AddPolicy(line, a.policy);
-  line.Text("--search", a.search_out, "FILE", "policy file to write: search a policy, then score it");
+  line.Text("--search", a.search_out, "FILE",
+            "policy file to write: search a policy, then score it");
   line.Text("--from", a.from, "FILE", "policy that the search starts from (default a random one)");
   line.Text("--figure", a.figure, "FILE", "figure of the robustness score to draw, .svg or .png");
   line.Text("--csv", a.csv, "FILE",
-            "CSV file to write, the motion in the format of RealAIGym; -: standard output, without a table");
+            "CSV file to write, the motion in the format of RealAIGym; -: standard output, without "
+            "a table");
   line.Flag("--json", a.as_json, "print JSON instead of a table");
   Options own;
   own.Section("cases");

@@ -25,7 +25,8 @@ struct SimulateArguments {
 std::vector<double> ReadTorqueFile(const std::string& path) {
   const std::string where = InputName(path);
   std::vector<double> torques = ReadCsv(ReadInput(path), {"torque"}, where).front().values;
-  if (torques.empty()) throw BadInput(Concat(where, ": expected at least one row of torques, got none"));
+  if (torques.empty())
+    throw BadInput(Concat(where, ": expected at least one row of torques, got none"));
   return torques;
 }
 

@@ -76,7 +76,8 @@ ManyRuns ReadStudy(const StudyArguments& arguments) {
   plan.seeds =
       arguments.seeds.empty() ? std::move(study.seeds) : ParseSeeds(arguments.seeds, "--seeds");
   if (plan.seeds.empty()) {
-    throw BadInput(Concat(file.string(), ": expected a line such as seeds = 10, or --seeds, got neither"));
+    throw BadInput(
+        Concat(file.string(), ": expected a line such as seeds = 10, or --seeds, got neither"));
   }
   many.jobs = arguments.jobs;
   if (arguments.on_slurm) return many;
@@ -115,7 +116,8 @@ int RunStudy(const StudyArguments& arguments) {
     const bool is_folder = fs::is_directory(arguments.file);
     const fs::path folder = is_folder ? fs::path(arguments.file) : arguments.folder();
     if (!Exists(arguments.file) && !Exists(folder)) {
-      throw BadInput(Concat(arguments.file, ": no such file or folder; expected a study's file or folder"));
+      throw BadInput(
+          Concat(arguments.file, ": no such file or folder; expected a study's file or folder"));
     }
     return PrintStudyStatus(folder);
   }
@@ -171,16 +173,17 @@ void AddStudy(CommandLine& line) {
             "files of a finished run to keep; all; policy: policy, settings, evaluations and log; "
             "tables: none, only its rows in the study's tables (default all, or FILE's value)",
             "all, policy or tables");
-  line.Flag("--status", arguments.status,
-            "print how many runs are done, running and lost, and exit; also takes the study's folder");
+  line.Flag(
+      "--status", arguments.status,
+      "print how many runs are done, running and lost, and exit; also takes the study's folder");
   line.Flag("--prepare", arguments.prepare, "prepare the folder for workers, and exit");
   line.Text("--slurm", arguments.slurm.options, "OPTIONS",
             "run the study on a Slurm cluster: queue a job array of workers with these options of "
             "sbatch ('' for none), follow it, and compare at the end",
             "");
   Options slurm;
-  slurm.Add(&arguments.slurm.tasks, "tasks", {1, 100'000}, "", "number of workers in the job array").usual =
-      Concat("one per run, at most ", kMostSlurmTasks);
+  slurm.Add(&arguments.slurm.tasks, "tasks", {1, 100'000}, "", "number of workers in the job array")
+      .usual = Concat("one per run, at most ", kMostSlurmTasks);
   line.Arguments(slurm);
   line.Flag("--print", arguments.print, "print the script for sbatch, and exit");
   line.Text("--work", arguments.work, "FOLDER",

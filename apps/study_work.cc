@@ -48,7 +48,8 @@ bool TrainLogged(const SeedRun& run, const std::function<std::unique_ptr<Trainin
   const PrintedTo log(run.log());
   try {
     return TrainAndShow(*make(), [&] {
-      if (!ours()) throw Failure("another worker may have claimed the run while this one was halted");
+      if (!ours())
+        throw Failure("another worker may have claimed the run while this one was halted");
     });
   } catch (const std::exception& error) {
     SayError(Printable(error.what()));
@@ -64,7 +65,8 @@ int WorkOnStudy(const std::filesystem::path& folder) {
   if (std::getenv("SLURM_JOB_ID") != nullptr) StopAtUserSignals();
   const StudyPlan plan = ReadPlan(folder);
   const WorkerOutcome outcome = WorkOn(plan, TrainLogged, [] { return StopSignal() != 0; });
-  Say("{}: this worker finished {}, {} failed{}{}\n", Printable(folder.string()), outcome.done, outcome.failed,
+  Say("{}: this worker finished {}, {} failed{}{}\n", Printable(folder.string()), outcome.done,
+      outcome.failed,
       outcome.claimed_by_others > 0
           ? fmt::format(", {} claimed by other workers", outcome.claimed_by_others)
           : "",

@@ -127,21 +127,20 @@ void AddTrain(CommandLine& line) {
   line.Settings(EverySetting(defaults), arguments.flags);
   line.ShowSettings(
       [&line](const CommandLine::ShowOptions& show) { ShowChosenDefaults(line, show); });
-  line.Footer(
-      AgentsText() +
-      "\nExamples:\n"
-      "  ./upswing train                         train the default agent until solved\n"
-      "  ./upswing train --agent dqn --seed 3 --out runs/a\n"
-      "  ./upswing train --gamma 0.98 --hidden 128,128             set any setting\n"
-      "  ./upswing train --mass2 1.2 --no-stop-when-solved --steps 500000\n"
-      "  ./upswing train --randomize 0.25 --delay 0.02  draw a plant for each episode\n"
-      "  ./upswing train --resume runs/a --no-stop-when-solved --steps 2000000\n"
-      "  ./upswing train --agent fast --print-config > my.toml     edit, then --config\n"
-      "  ./upswing train --seeds 10              train or resume runs/d3qn/seed1 to 10\n"
-      "  ./upswing train --seeds 3,5,8-12 --jobs 2 --out runs/many\n"
-      "\nSIGINT and SIGTERM write a checkpoint and end the program with exit code 130 or\n"
-      "143. SIGUSR1 writes a checkpoint, and the training continues. Other exit codes:\n"
-      "0: done; 1: failed; 2: bad usage or input.\n");
+  line.Footer(AgentsText() +
+              "\nExamples:\n"
+              "  ./upswing train                         train the default agent until solved\n"
+              "  ./upswing train --agent dqn --seed 3 --out runs/a\n"
+              "  ./upswing train --gamma 0.98 --hidden 128,128             set any setting\n"
+              "  ./upswing train --mass2 1.2 --no-stop-when-solved --steps 500000\n"
+              "  ./upswing train --randomize 0.25 --delay 0.02  draw a plant for each episode\n"
+              "  ./upswing train --resume runs/a --no-stop-when-solved --steps 2000000\n"
+              "  ./upswing train --agent fast --print-config > my.toml     edit, then --config\n"
+              "  ./upswing train --seeds 10              train or resume runs/d3qn/seed1 to 10\n"
+              "  ./upswing train --seeds 3,5,8-12 --jobs 2 --out runs/many\n"
+              "\nSIGINT and SIGTERM write a checkpoint and end the program with exit code 130 or\n"
+              "143. SIGUSR1 writes a checkpoint, and the training continues. Other exit codes:\n"
+              "0: done; 1: failed; 2: bad usage or input.\n");
   line.Check([&line] {
     if (line.Has("--resume") && (line.Has("--out") || line.Has("--config"))) {
       throw BadInput(

@@ -157,18 +157,22 @@ int RunView(const ViewArguments& a) {
 /// Adds the policies to look at, and the settings of the controllers among them.
 void AddPolicies(CommandLine& line, ViewArguments& a) {
   AddControllers(line, a.controller);
-  line.Texts("policies", a.names, "POLICY|RUN...",
-             Concat("policies, shown side by side: policy.safetensors, run folders or controllers (",
-                    Join(ControllerNames(), ", "), "); none: the motor is off"));
+  line.Texts(
+      "policies", a.names, "POLICY|RUN...",
+      Concat("policies, shown side by side: policy.safetensors, run folders or controllers (",
+             Join(ControllerNames(), ", "), "); none: the motor is off"));
 }
 
 /// Adds the options of the picture.
 void AddPicture(CommandLine& line, ViewArguments& a) {
   Options own;
-  own.Add(&a.seconds, "seconds", {0, 1000}, "s", "length of the recording, or time until the window closes")
+  own.Add(&a.seconds, "seconds", {0, 1000}, "s",
+          "length of the recording, or time until the window closes")
       .usual = "10; 20 with --episode; a window stays open";
-  own.Add(&a.fps, "fps", {1, 200}, "", "frames per second of a recording").usual = "50; 25 for a GIF";
-  own.Add(&a.speed, "speed", {0.01, 100}, "", "playback speed; 1: real time; 0.1: ten times slower");
+  own.Add(&a.fps, "fps", {1, 200}, "", "frames per second of a recording").usual =
+      "50; 25 for a GIF";
+  own.Add(&a.speed, "speed", {0.01, 100}, "",
+          "playback speed; 1: real time; 0.1: ten times slower");
   own.Add(&a.width, "width", {kLeastPixels, kMostPixels}, "pixels", "width of the picture");
   own.Add(&a.height, "height", {kLeastPixels, kMostPixels}, "pixels", "height of the picture");
   own.Add(&a.look.camera.azimuth, "azimuth", {-360, 360}, "deg",

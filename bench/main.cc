@@ -121,8 +121,8 @@ void CheckOptions(const BenchOptions& options) {
   const std::vector<std::string> names = NamesOf(Parts());
   for (const std::string& part : options.parts) {
     if (std::ranges::find(names, part) == names.end()) {
-      throw BadInput(Concat("bench: expected parts of ", Join(names, ", "), ", got \"", part,
-                            "\"", DidYouMean(part, names)));
+      throw BadInput(Concat("bench: expected parts of ", Join(names, ", "), ", got \"", part, "\"",
+                            DidYouMean(part, names)));
     }
   }
   const auto runs = [&](const char* part) {
@@ -192,13 +192,16 @@ void AddBench(CommandLine& line) {
       "1 and one per processor, at most 8";
   own.AddChoice(&o.simd, "simd", SimdPaths(), "vector instructions to use").usual = "the first";
   own.Add(&o.seconds, "seconds", {0.001, 1000}, "s", "time per repetition of a case");
-  own.Add(&o.repetitions, "repetitions", {1, 1000}, "", "repetitions of each case; the table shows the median");
-  own.AddChoice(&o.network, "network", {"plain", "dueling"}, "network of gradient: plain DQN or Dueling Double DQN")
+  own.Add(&o.repetitions, "repetitions", {1, 1000}, "",
+          "repetitions of each case; the table shows the median");
+  own.AddChoice(&o.network, "network", {"plain", "dueling"},
+                "network of gradient: plain DQN or Dueling Double DQN")
       .usual = "both";
   own.Add(&o.hidden, "hidden", {1, 4096}, "widths of the hidden layers of gradient, sac and ppo")
       .usual = "several";
-  own.Add(&o.batch, "batch", {1, 65536}, "transitions", "size of the minibatches of gradient, sac and ppo").usual =
-      "several";
+  own.Add(&o.batch, "batch", {1, 65536}, "transitions",
+          "size of the minibatches of gradient, sac and ppo")
+      .usual = "several";
   line.Arguments(own);
 
   std::string parts = "Parts:\n";

@@ -18,7 +18,8 @@ void LqrConfig::Describe(Options& o) {
 void MpcConfig::Describe(Options& o) {
   o.Section("mpc");
   o.Add(&seconds, "mpc_seconds", {0.1, 10}, "s", "planning horizon of mpc").step = kControlPeriod;
-  o.Add(&iterations, "mpc_iterations", {1, 1000}, "", "optimisation steps of mpc's plan at each decision");
+  o.Add(&iterations, "mpc_iterations", {1, 1000}, "",
+        "optimisation steps of mpc's plan at each decision");
 }
 
 void SwingUpConfig::Describe(Options& o) {
@@ -32,9 +33,11 @@ void SwingUpConfig::Describe(Options& o) {
 void EnergyShapingConfig::Describe(Options& o) {
   // The best of 1,900 random choices: most starts swing up with the standard motor.
   o.Section("energy");
-  o.Add(&kE, "energy_ke", kNotNegative, "1/(J²·s)", "weight of the squared energy error in the Lyapunov function");
+  o.Add(&kE, "energy_ke", kNotNegative, "1/(J²·s)",
+        "weight of the squared energy error in the Lyapunov function");
   o.Add(&kD, "energy_kd", kPositive, "s", "weight of w1 squared in the Lyapunov function");
-  o.Add(&kP, "energy_kp", kNotNegative, "1/s", "weight of q1 squared, from upright, in the Lyapunov function");
+  o.Add(&kP, "energy_kp", kNotNegative, "1/s",
+        "weight of q1 squared, from upright, in the Lyapunov function");
 }
 
 void PartialFeedbackConfig::Describe(Options& o) {

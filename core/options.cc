@@ -55,9 +55,9 @@ std::string RangeInWords(Range range, double step) {
 
 /// A line of help: `HELP [UNIT] (VALUES; DEFAULT)`, without the parts that are empty.
 std::string HelpLine(const Option& option, const std::string& fallback) {
-  std::vector<std::string> notes{option.choices.empty() ? RangeInWords(option.range, option.step)
-                                                        : Join(option.choices, ", "),
-                                 fallback.empty() ? "" : "default " + fallback};
+  std::vector<std::string> notes{
+      option.choices.empty() ? RangeInWords(option.range, option.step) : Join(option.choices, ", "),
+      fallback.empty() ? "" : "default " + fallback};
   std::erase(notes, "");
   return Concat(option.help, option.unit.empty() ? "" : Concat(" [", option.unit, "]"),
                 notes.empty() ? "" : Concat(" (", Join(notes, "; "), ")"));
@@ -160,7 +160,8 @@ std::string Option::expected() const {
 }
 
 void Option::Set(std::string_view text, const std::string& where) const {
-  if (read_only) throw std::logic_error(Concat(name, ": a setting of a const struct cannot change"));
+  if (read_only)
+    throw std::logic_error(Concat(name, ": a setting of a const struct cannot change"));
   const bool valid =
       std::visit(Overloaded{
                      [&](bool* value) {
@@ -266,7 +267,8 @@ std::vector<const Option*> Options::Find(std::string_view name, const std::strin
   if (found.empty()) {
     std::string hint = DidYouMean(name, known);
     constexpr size_t kMostNames = 30;  // more would make the line unreadable
-    if (hint.empty() && known.size() < kMostNames) hint = Concat("; expected one of ", Join(known, ", "));
+    if (hint.empty() && known.size() < kMostNames)
+      hint = Concat("; expected one of ", Join(known, ", "));
     throw BadInput(Concat(where, ": expected a setting, got \"", name, "\"", hint));
   }
   return found;

@@ -21,7 +21,7 @@ constexpr size_t kMaxRank = 8;            // numbers in a shape
 constexpr std::string_view kChecksumKey = "\"checksum\":\"";
 constexpr std::string_view kNoChecksum = "0000000000000000";
 
-/// Where the checksum's digits stand in the header; npos if the file has none.
+/// Position of the checksum's digits in the header; npos if the file has no checksum.
 size_t FindChecksum(std::string_view header) {
   const size_t key = header.find(kChecksumKey);
   return key == std::string_view::npos ? key : key + kChecksumKey.size();
@@ -60,11 +60,13 @@ SafetensorsEntry ParseEntry(const json& entry, size_t data_size) {
     throw BadInput("\"data_offsets\": expected two bytes, begin and end of the data");
   }
   if (static_cast<uint64_t>(offsets[1]) > data_size) {
-    throw BadInput(Concat("\"data_offsets\": expected an end of at most ", data_size, ", got ", offsets[1]));
+    throw BadInput(
+        Concat("\"data_offsets\": expected an end of at most ", data_size, ", got ", offsets[1]));
   }
   const auto begin = static_cast<size_t>(offsets[0]), end = static_cast<size_t>(offsets[1]);
   if (ByteCount(tensor.shape, tensor.dtype) != end - begin) {
-    throw BadInput(Concat("expected as many bytes as ", tensor.Describe(), " has, got ", end - begin));
+    throw BadInput(
+        Concat("expected as many bytes as ", tensor.Describe(), " has, got ", end - begin));
   }
   return {std::move(tensor), begin, end - begin};
 }
@@ -114,8 +116,8 @@ void VerifyChecksum(std::string header, const std::map<std::string, Tensor>& ten
             [](const Tensor* a, const Tensor* b) { return a->bytes.data() < b->bytes.data(); });
   for (const Tensor* tensor : order) checksum.Update(tensor->bytes);
   if (checksum.Hex() == expected) return;
-  throw BadInput(Concat("damaged or modified: expected the checksum ", expected, ", got ",
-                        checksum.Hex()));
+  throw BadInput(
+      Concat("damaged or modified: expected the checksum ", expected, ", got ", checksum.Hex()));
 }
 
 }  // namespace
@@ -126,14 +128,16 @@ Error BrokenSafetensors(const std::string& where, std::string_view why) {
 
 uint64_t ReadSafetensorsLength(std::span<const std::byte> first_bytes, uint64_t file_size) {
   uint64_t length = 0;
-  if (first_bytes.size() < sizeof(length)) throw BadInput(Concat("expected at least 8 bytes, got ", file_size));
+  if (first_bytes.size() < sizeof(length))
+    throw BadInput(Concat("expected at least 8 bytes, got ", file_size));
   std::memcpy(&length, first_bytes.data(), sizeof(length));
   if (length > kMaxHeader) {
-    throw BadInput(
-        Concat("header length in the first 8 bytes: expected at most ", kMaxHeader, ", got ", length));
+    throw BadInput(Concat("header length in the first 8 bytes: expected at most ", kMaxHeader,
+                          ", got ", length));
   }
   if (length > file_size - sizeof(length)) {
-    throw BadInput(Concat("header: expected ", length, " bytes, got a file of ", file_size, " bytes"));
+    throw BadInput(
+        Concat("header: expected ", length, " bytes, got a file of ", file_size, " bytes"));
   }
   return length;
 }

@@ -91,7 +91,8 @@ void DrawSamples(const LoadedPolicy& loaded, double tolerance, std::vector<float
     StateVector x = DrawState(loaded, rng, upright);
     for (int draw = 1; Jumps(loaded, x, tolerance / 2); ++draw) {
       if (draw == kDrawsOfEach) {
-        throw BadInput(Concat(loaded.name, ": found no states for the header's self-test where the ",
+        throw BadInput(Concat(loaded.name,
+                              ": found no states for the header's self-test where the ",
                               "torque is smooth enough"));
       }
       x = DrawState(loaded, rng, upright);
@@ -168,8 +169,8 @@ CHeader ControllerHeaderOf(const LoadedPolicy& loaded, const std::string& prefix
                   "that is planned once"},
         {"hybrid", "two of them; export the policy that swings up, and lqr, each by itself"}}) {
     if (kind != refused) continue;
-    throw BadInput(Concat(kind, ": expected lqr, energy, pfl, tvlqr or a learned policy for C, got ",
-                          what));
+    throw BadInput(
+        Concat(kind, ": expected lqr, energy, pfl, tvlqr or a learned policy for C, got ", what));
   }
   const ControllerConfig config = ConfigOf(loaded);
   const double limit = config.plant.torque_limit, tolerance = kTorqueShare * limit;

@@ -160,14 +160,14 @@ PageAgent ReadAgent(const fs::path& path, const std::string& given_id, int64_t c
   const LoadedPolicy loaded = LoadPolicy(path);
   const std::string where = loaded.path;
   if (!HasPlant(loaded.task)) {
-    throw BadInput(Concat(where,
-                          ": expected a policy of ", kDoublePendulum,
+    throw BadInput(Concat(where, ": expected a policy of ", kDoublePendulum,
                           ", the only task of the page, got one of ", loaded.task));
   }
   if (!loaded.mjcf.empty()) {
-    throw BadInput(Concat(where,
-                          ": expected a policy of the built-in model, the only one of the page, got "
-                          "one of another MJCF model"));
+    throw BadInput(
+        Concat(where,
+               ": expected a policy of the built-in model, the only one of the page, got "
+               "one of another MJCF model"));
   }
   if (loaded.plant.actuated_joint != 1) {
     throw BadInput(Concat(where,
@@ -183,7 +183,8 @@ PageAgent ReadAgent(const fs::path& path, const std::string& given_id, int64_t c
   std::string id = Cleaned(run.filename().string(), '-');
   if (id.empty()) id = Cleaned(loaded.policy->info().agent, '-');
   if (!given_id.empty()) id = given_id;
-  if (id.empty()) throw BadInput(Concat(where, ": expected a name with letters or digits, or --id, got neither"));
+  if (id.empty())
+    throw BadInput(Concat(where, ": expected a name with letters or digits, or --id, got neither"));
 
   PageAgent agent{id, path, ReadFile(loaded.path), EntryOf(loaded, id), {}};
   const std::optional<std::string> command = TrainCommand(loaded.policy->info(), where);

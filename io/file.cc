@@ -162,7 +162,8 @@ void WriteNamedFile(const fs::path& path, std::string_view text) {
   if (stat(path.c_str(), &info) != 0) {
     if (errno != ENOENT) throw PathError("cannot write", path, errno);
     if (lstat(path.c_str(), &info) == 0) {
-      throw BadInput(Concat("cannot write ", path.string(), ": expected a file, got a link to nothing"));
+      throw BadInput(
+          Concat("cannot write ", path.string(), ": expected a file, got a link to nothing"));
     }
     return WriteFileAtomically(path, text);
   }

@@ -20,7 +20,8 @@ double SwingUpSeconds(const EvaluationEpisode& e, const EvaluationRule& rule) {
 void BoundsConfig::Describe(Options& o) {
   o.Add(&episodes, "episodes", {1, 100000}, "", "number of episodes, the first ones of eval");
   o.Add(&torques, "torques", {3, 101}, "", "number of torque levels in the table");
-  o.Add(&guesses, "guesses", {1, 10000}, "", "number of swing-ups from hanging that the search starts with");
+  o.Add(&guesses, "guesses", {1, 10000}, "",
+        "number of swing-ups from hanging that the search starts with");
 }
 
 void CheckComparable(const LoadedPolicy& loaded, const BoundsConfig& config) {
@@ -32,7 +33,8 @@ void CheckComparable(const LoadedPolicy& loaded, const BoundsConfig& config) {
   const Plant judged = TrialEnvironments(config.trial, &loaded).plants.front();
   if (PlantValues(searched) == PlantValues(judged)) return;
   throw BadInput(Concat("bounds: expected a policy for ", PlantText(searched), ", got ",
-                        loaded.name, " for ", PlantText(judged), "; change the plant of the search with --set"));
+                        loaded.name, " for ", PlantText(judged),
+                        "; change the plant of the search with --set"));
 }
 
 EpisodeBounds FindBounds(const BoundsConfig& config, ThreadPool& pool, const Progress& progress) {

@@ -58,16 +58,16 @@ int NumTasks(const Comparison& comparison);
 /// The name of the files with a task's learning curves, without ending: `curves`, `curves-2`, …
 std::string CurvesName(int task);
 
-/// Compares runs. What is no run, cannot be read, has no evaluation, is unfinished (unless asked
-/// for) or the same training as another is left out, with a note. Throws BadInput where nothing is
-/// left, where a path is not there, or where a run stands twice.
+/// Compares runs. Leaves out, with a note, folders without a run and runs that are unreadable,
+/// unfinished (unless requested), without an evaluation or the same training as another. Throws
+/// BadInput if no run is left, a path does not exist, or a run is given twice.
 Comparison Compare(const CompareRequest& request);
 
-/// Judges policies on each task that the groups are evaluated on, over the episodes of the runs'
-/// final evaluations, and sets them beside the groups. With `make_anew` controllers are made for
-/// the plant of these. What is not judged on some task is noted. `progress` counts episodes. Throws
-/// BadInput, before any episode, where a policy is of none of the tasks.
-void AddPolicies(const std::vector<LoadedPolicy>& policies, bool make_anew, ThreadPool& pool,
+/// Evaluates policies on each task of the groups, over the episodes of the runs' final evaluations,
+/// and adds them to the comparison. With `redesign`, controllers are designed for the plant of
+/// these episodes. Notes tasks without an evaluation of a policy. `progress` counts episodes.
+/// Throws BadInput, before any episode, for a policy of none of the tasks.
+void AddPolicies(const std::vector<LoadedPolicy>& policies, bool redesign, ThreadPool& pool,
                  const Progress& progress, Comparison& comparison);
 
 /// Writes summary.csv (a row for each group), runs.csv (a row for each run), policies.csv (a row

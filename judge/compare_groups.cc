@@ -128,8 +128,8 @@ void NotePlans(const std::vector<RunGroup>& groups, std::vector<std::string>& no
     }
   }
   for (const auto& [seeds, labels] : few) {
-    notes.push_back(
-        fmt::format("{}: intervals are too narrow, because {} seeds are few", Join(labels, ", "), seeds));
+    notes.push_back(fmt::format("{}: intervals are too narrow, because {} seeds are few",
+                                Join(labels, ", "), seeds));
   }
   if (notes.empty() && of_all.size() > 1) {
     notes.emplace_back("the groups differ in steps or stop_when_solved");

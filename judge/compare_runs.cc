@@ -70,10 +70,10 @@ void AddRuns(const fs::path& folder, Found& found, std::vector<fs::path>& paths)
 std::vector<fs::path> RunsIn(const fs::path& folder, Found& found) {
   if (IsKept(folder)) return {folder};
   if (!Exists(folder)) {
-    throw BadInput(
-        Concat(folder.string(), ": no such file or folder; expected a run, a folder of runs, ",
-               "a policy.safetensors or a controller (", Join(ControllerNames(), ", "), ")",
-               DidYouMean(folder.string(), ControllerNames())));
+    throw BadInput(Concat(folder.string(),
+                          ": no such file or folder; expected a run, a folder of runs, ",
+                          "a policy.safetensors or a controller (", Join(ControllerNames(), ", "),
+                          ")", DidYouMean(folder.string(), ControllerNames())));
   }
   std::vector<fs::path> paths;
   std::error_code error;
@@ -107,8 +107,7 @@ class RunReader {
       if (!is_run) throw;  // its folder holds the same facts
     }
     if (!run && !is_run) {
-      throw BadInput(Concat(DoneOf(path).string(),
-                            ": expected the settings of ",
+      throw BadInput(Concat(DoneOf(path).string(), ": expected the settings of ",
                             (path.parent_path() / kSettingsName).string(), ", got others"));
     }
     if (!run) {

@@ -38,14 +38,14 @@ struct EvalReport {
   bool only_balances = false;  // a controller that does not swing up
 };
 
-/// Lets a policy control `episodes` episodes of the environments that a trial makes, and says how
-/// it did; where the plant is known and no controller can be made for it, that of the policy's own
-/// plant. `progress` counts episodes. Throws BadInput.
+/// Evaluates a policy over `episodes` episodes of a trial's environments. With trial.known_plant a
+/// controller is designed for each episode's plant; if that fails, the given one is used.
+/// `progress` counts episodes. Throws BadInput.
 EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& trial, int64_t episodes,
                           ThreadPool& pool, const Progress& progress);
 
-/// In how many episodes a controller was made for the plant.
-int64_t NumMade(const EvalReport& report);
+/// Number of episodes with a controller designed for their plant.
+int64_t NumDesigned(const EvalReport& report);
 
 /// Adds the figures of an evaluation to a JSON document.
 void AddFigures(const Evaluation& e, const EnvSpec& spec, bool knows_values,

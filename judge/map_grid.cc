@@ -29,7 +29,7 @@ struct EpisodeRange {
 /// Swing-up time (s) of an episode that succeeds.
 using EpisodeResult = std::optional<double>;
 
-/// The one value that the settings have, if they all have it.
+/// The common value of the settings; none if they differ.
 std::optional<double> CommonValue(const std::vector<const Option*>& members) {
   const double first = *std::get<double*>(members.front()->target);
   for (const Option* member : members) {
@@ -38,7 +38,7 @@ std::optional<double> CommonValue(const std::vector<const Option*>& members) {
   return first;
 }
 
-/// An end of an axis: a number, or a percentage on top of the training's value.
+/// An end of an axis: a number, or a percentage relative to the training's value.
 double ParseEnd(std::string_view text, const MapAxis& axis, const std::string& where) {
   const bool percent = text.ends_with('%');
   if (percent) text.remove_suffix(1);
@@ -165,7 +165,7 @@ MapAxis ParseMapAxis(const std::string& text, const MapPoint& training, const st
     throw BadInput(
         Concat(place, ": expected FROM < TO, got ", FormatNumber(from), " and ", FormatNumber(to)));
   }
-  // What goes in steps has a cell for each, unless the text says otherwise.
+  // A setting with steps has a cell per step by default.
   const double step = members.front()->step;
   const int64_t usual = step > 0 ? std::llround((to - from) / step) + 1 : kDefaultCells;
   const int64_t cells = pieces.size() == 3 ? ParseCells(pieces[2], place) : usual;

@@ -22,7 +22,8 @@ namespace fs = std::filesystem;
 /// the arguments set one of these.
 EnvConfig OtherTask(const TrialArguments& a, const LoadedPolicy& loaded) {
   const auto refuse = [&](const std::string& flag) {
-    throw BadInput(Concat(flag, ": expected none, because the task ", loaded.task, " has no such setting"));
+    throw BadInput(
+        Concat(flag, ": expected none, because the task ", loaded.task, " has no such setting"));
   };
   if (!a.set.empty()) refuse("--set");
   if (!a.model.empty()) refuse("--model");

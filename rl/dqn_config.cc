@@ -12,7 +12,8 @@ void DqnConfig::Describe(Options& o) {
   o.Add(&layer_norm, "layer_norm", "apply layer normalisation after each feature layer");
 
   o.Section("agent");
-  o.Add(&double_q, "double", "Double DQN: choose the next action online, value it with the target network");
+  o.Add(&double_q, "double",
+        "Double DQN: choose the next action online, value it with the target network");
   o.Add(&dueling, "dueling", "dueling network: Q = V + A - mean(A)");
   o.Add(&levels, "levels", {2, 1001}, "", "number of evenly spaced torque levels").implied = true;
   OffPolicyConfig::Describe(o);
@@ -24,7 +25,8 @@ void DqnConfig::Describe(Options& o) {
         "learning rate; 1: no averaging");
   o.Add(&epsilon_start, "epsilon_start", kUnit, "", "initial probability of a random action");
   o.Add(&epsilon_end, "epsilon_end", kUnit, "", "lowest probability of a random action");
-  o.Add(&epsilon_decay, "epsilon_decay", kUnit, "", "factor on the probability of a random action after each episode");
+  o.Add(&epsilon_decay, "epsilon_decay", kUnit, "",
+        "factor on the probability of a random action after each episode");
 }
 
 std::unique_ptr<Agent> DqnConfig::Make(const EnvSpec& spec, uint64_t seed, ThreadPool& pool) const {

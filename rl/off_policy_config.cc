@@ -10,7 +10,8 @@ namespace upswing {
 void OffPolicyConfig::Describe(Options& o) {
   o.Add(&gamma, "gamma", kUnit, "", "discount factor per control step");
   o.Add(&n_step, "n_step", {1, 100}, "steps", "length of the n-step returns in the targets");
-  o.Add(&reward_scale, "reward_scale", kPositive, "", "factor on the reward that the agent learns from");
+  o.Add(&reward_scale, "reward_scale", kPositive, "",
+        "factor on the reward that the agent learns from");
   o.Add(&batch, "batch", {1, 65536}, "transitions", "size of a minibatch");
   o.Add(&replay, "replay", {1, 10000000}, "transitions", "capacity of the replay memory");
   o.Add(&prioritized, "prioritized",
@@ -31,14 +32,15 @@ void OffPolicyConfig::Describe(Options& o) {
   o.Add(&learning_rate_end, "learning_rate_end", {0, 10}, "", "final learning rate of Adam");
   o.Add(&learning_rate_steps, "learning_rate_steps", {1, 1e12}, "steps",
         "length of the linear decay of the learning rate");
-  o.Add(&max_gradient_norm, "max_gradient_norm", kPositive, "", "largest global norm of the gradient, which is clipped to it");
+  o.Add(&max_gradient_norm, "max_gradient_norm", kPositive, "",
+        "largest global norm of the gradient, which is clipped to it");
 }
 
 void OffPolicyConfig::Check() const {
   if (batch > replay) {
-    throw BadInput(
-        Concat("batch: expected at most ", replay, " transitions, the capacity of the replay ",
-               "memory (replay), got ", batch));
+    throw BadInput(Concat("batch: expected at most ", replay,
+                          " transitions, the capacity of the replay ", "memory (replay), got ",
+                          batch));
   }
   if (learning_starts > replay) {
     throw BadInput(Concat("learning_starts: expected at most ", replay,

@@ -11,7 +11,8 @@ namespace upswing {
 void PpoConfig::Describe(Options& o) {
   o.Section("network");
   o.Add(&hidden, "hidden", {1, 4096}, "widths of the hidden layers of actor and critic");
-  o.AddChoice(&activation, "activation", {"tanh", "relu"}, "activation function of the hidden units");
+  o.AddChoice(&activation, "activation", {"tanh", "relu"},
+              "activation function of the hidden units");
   o.Add(&layer_norm, "layer_norm", "apply layer normalisation in each hidden layer");
 
   o.Section("agent");
@@ -21,18 +22,16 @@ void PpoConfig::Describe(Options& o) {
         "number of evenly spaced torque levels, with actions = levels");
   o.Add(&gamma, "gamma", kUnit, "", "discount factor per control step");
   o.Add(&lambda, "lambda", kUnit, "", "decay factor of generalised advantage estimation");
-  o.Add(&reward_scale, "reward_scale", kPositive, "", "factor on the reward that the agent learns from");
+  o.Add(&reward_scale, "reward_scale", kPositive, "",
+        "factor on the reward that the agent learns from");
   o.Add(&horizon, "horizon", {1, 1000000}, "steps",
         "length of a rollout, which each environment makes between updates");
   o.Add(&epochs, "epochs", {1, 1000}, "", "number of passes over each rollout");
-  o.Add(&batch, "batch", {1, 1000000}, "steps",
-        "size of a minibatch; divides horizon times envs");
-  o.Add(&clip, "clip", {1e-6, 1}, "",
-        "clip range around 1 of the ratio of new to old probability");
+  o.Add(&batch, "batch", {1, 1000000}, "steps", "size of a minibatch; divides horizon times envs");
+  o.Add(&clip, "clip", {1e-6, 1}, "", "clip range around 1 of the ratio of new to old probability");
   o.Add(&value_clip, "value_clip", kNotNegative, "",
         "clip range around the old value; 0: no clipping");
-  o.Add(&entropy_bonus, "entropy_bonus", {0, 10}, "",
-        "initial weight of the policy's entropy");
+  o.Add(&entropy_bonus, "entropy_bonus", {0, 10}, "", "initial weight of the policy's entropy");
   o.Add(&entropy_bonus_end, "entropy_bonus_end", {0, 10}, "",
         "weight of the policy's entropy after learning_rate_steps");
   o.Add(&max_std, "max_std", {0.01, 7}, "",

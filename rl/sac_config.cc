@@ -26,19 +26,21 @@ void SacConfig::Describe(Options& o) {
         "limit");
   o.Add(&actor_period, "actor_period", {1, 1e9}, "updates",
         "critic updates per update of actor and temperature");
-  o.Add(&actor_rate, "actor_rate", {0, 1000}, "", "ratio of the actor's learning rate to the critics'");
+  o.Add(&actor_rate, "actor_rate", {0, 1000}, "",
+        "ratio of the actor's learning rate to the critics'");
   o.Add(&tau, "tau", kUnit, "", "Polyak factor of the target critics, per update");
   o.Add(&policy_tau, "policy_tau", {1e-9, 1}, "",
         "Polyak factor of the policy that is evaluated and saved, per actor update; decays with "
         "the learning rate; 1: no averaging");
   o.Add(&entropy_reward, "entropy_reward",
         "add the entropy bonus to the critics' targets; false: only to the actor's loss");
-  o.Add(&tune_alpha, "tune_alpha", "learn the temperature so that the entropy meets target_entropy");
+  o.Add(&tune_alpha, "tune_alpha",
+        "learn the temperature so that the entropy meets target_entropy");
   o.Add(&alpha, "alpha", {0, 1e6}, "", "temperature; with tune_alpha its initial value");
-  o.Add(&alpha_rate, "alpha_rate", {0, 10}, "", "learning rate of the logarithm of the temperature");
-  o.Add(
-      &target_entropy, "target_entropy", {-100, 0.69}, "nats",
-      "target entropy per action component in units of its limit; uniform actions have 0.69");
+  o.Add(&alpha_rate, "alpha_rate", {0, 10}, "",
+        "learning rate of the logarithm of the temperature");
+  o.Add(&target_entropy, "target_entropy", {-100, 0.69}, "nats",
+        "target entropy per action component in units of its limit; uniform actions have 0.69");
 }
 
 std::unique_ptr<Agent> SacConfig::Make(const EnvSpec& spec, uint64_t seed, ThreadPool& pool) const {

@@ -141,8 +141,8 @@ void TrainConfig::Describe(Options& o) {
   o.Add(&steps, "steps", kCount, "steps", "training budget, summed over all environments").decides =
       Option::Decides::kEnd;
   o.Add(&envs, "envs", {1, 4096}, "", "number of parallel environments");
-  o.Add(&stop_when_solved, "stop_when_solved", "stop when two evaluations in a row pass")
-      .decides = Option::Decides::kEnd;
+  o.Add(&stop_when_solved, "stop_when_solved", "stop when two evaluations in a row pass").decides =
+      Option::Decides::kEnd;
   o.Add(&eval_every, "eval_every", kCount, "steps", "interval between evaluations");
   o.Add(&eval_episodes, "eval_episodes", {1, 100000}, "", "number of episodes per evaluation");
   o.Add(&log_every, "log_every", kCount, "steps", "interval between rows of metrics.csv");

@@ -22,7 +22,7 @@ std::string SectionOf(const FlagValue& flag) {
   return OptionsOf(config).Find(flag.name, FlagOf(flag.name)).front()->section;
 }
 
-/// The policy of --swing-up. Throws BadInput that names the flag.
+/// Loads the policy of --swing-up. Throws BadInput that names the flag.
 LoadedPolicy SwingUpNamed(const std::string& name) {
   LoadedPolicy loaded;
   try {
@@ -50,7 +50,8 @@ void CheckSettings(const PolicyArguments& settings, const std::vector<std::strin
       return IsController(name) && HasSection(name, section);
     };
     if (std::ranges::any_of(names, has)) continue;
-    throw BadInput(Concat(FlagOf(flag.name), ": expected the controller ", section, " with it, got ", got));
+    throw BadInput(
+        Concat(FlagOf(flag.name), ": expected the controller ", section, " with it, got ", got));
   }
 }
 
@@ -90,22 +91,22 @@ LoadedPolicy GetPolicy(const PolicyArguments& a) {
   ApplyChanges(OptionsOf(config.plant), a.made_for, "--made-for");
   const bool is_controller = IsController(a.name), is_path = fs::exists(a.name);
   if (is_controller && is_path) {
-    throw BadInput(Concat(a.name, ": expected a controller or a file, got the name of both; ./", a.name,
-                          " means the file; rename the file to use the controller"));
+    throw BadInput(Concat(a.name, ": expected a controller or a file, got the name of both; ./",
+                          a.name, " means the file; rename the file to use the controller"));
   }
   if (is_controller) {
-    const auto remade = [name = a.name, config](const Plant& plant) {
+    const auto design_for = [name = a.name, config](const Plant& plant) {
       ControllerConfig other = config;
       other.plant = plant;
       return MakeController(name, other);
     };
     return {TitleOf(a.name, config),
             "",
-            remade(config.plant),
+            design_for(config.plant),
             kDoublePendulum,
             config.plant,
             "",
-            remade};
+            design_for};
   }
   if (!is_path) {
     throw BadInput(Concat(

@@ -8,13 +8,13 @@ namespace upswing {
 
 namespace {
 
-/// A learning algorithm's name and its settings, which know the rest of it.
+/// A learning algorithm's name and its settings, which create the agent.
 struct Algorithm {
   const char* name;
   AgentConfig& (*settings)(Config& config);
 };
 
-// The first is the usual one.
+// The first is the default.
 constexpr Algorithm kAlgorithms[] = {
     {"dqn", [](Config& config) -> AgentConfig& { return config.dqn; }},
     {"sac", [](Config& config) -> AgentConfig& { return config.sac; }},
@@ -67,8 +67,9 @@ void Config::DescribeEnvironment(Options& o) {
   o.Add(&identify, "identify",
         "let the agent observe an estimate of the plant's constants, identified from its motion")
       .implied = true;
-  o.AddChoice(&physics, "physics", EngineNames(),
-              "physics engine of the training; closed-form is faster than mujoco, with the same physics");
+  o.AddChoice(
+      &physics, "physics", EngineNames(),
+      "physics engine of the training; closed-form is faster than mujoco, with the same physics");
   std::vector<std::string> judges = EngineNames();
   judges.insert(judges.begin(), std::string(kScreened));
   o.AddChoice(&eval_physics, "eval_physics", judges,

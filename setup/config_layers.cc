@@ -21,8 +21,8 @@ const NamedAgent& FindAgent(const std::string& name, const std::string& where) {
                         "\"", DidYouMean(name, names)));
 }
 
-/// A text setting that other settings depend on: its value in the last layer that has it, and
-/// where that is, for messages.
+/// A text setting that other settings depend on: its value in the last layer that sets it, and the
+/// place, for messages.
 struct EarlySetting {
   std::string value, where;
   bool in_file = false;
@@ -64,8 +64,7 @@ struct ChosenAgent {
   std::string algorithm;
 };
 
-/// Throws BadInput if there is no such agent, or if it does not learn by the algorithm that is
-/// asked for.
+/// Throws BadInput if there is no such agent, or if it has another algorithm than requested.
 ChosenAgent ChooseAgent(const toml::table& table, const std::string& where,
                         const std::vector<FlagValue>& flags) {
   EarlySetting setting = FindEarly("train", "agent", table, where, flags);
@@ -98,9 +97,9 @@ Options KnownOptions(Config& config) {
   }
   for (const auto& [name, algorithms] : owners) {
     if (options.Get(name) != nullptr) continue;
-    options.Explain(name, Concat("expected a setting of ", config.algorithm, ", the algorithm of agent ",
-                                 config.agent, ", got ", name, ", a setting of ",
-                                 Join(algorithms, " and ")));
+    options.Explain(
+        name, Concat("expected a setting of ", config.algorithm, ", the algorithm of agent ",
+                     config.agent, ", got ", name, ", a setting of ", Join(algorithms, " and ")));
   }
   return options;
 }
@@ -130,7 +129,7 @@ Config ParseConfig(std::string_view text, const std::string& where,
   config.agent = agent.name;
   const Options options = KnownOptions(config);
 
-  // A model file has a plant of its own, which other settings may change.
+  // A model file has its own plant; other settings may change it.
   const EarlySetting named = FindEarly("plant", "model", table, where, flags);
   ModelFile model;
   if (!named.value.empty()) {

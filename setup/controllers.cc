@@ -12,7 +12,7 @@
 namespace upswing {
 namespace {
 
-/// A controller's name and how it is made.
+/// A controller's name and its factory.
 struct Controller {
   const char* name;
   std::shared_ptr<const Policy> (*make)(const ControllerConfig& config);
@@ -30,7 +30,7 @@ Made WithCatch(const ControllerConfig& config, const std::string& kind, const st
       config.plant);
 }
 
-/// Throws BadInput unless the motor is where these laws have it.
+/// Throws BadInput unless the motor is at joint 1, as these laws assume.
 void ExpectPendubot(const char* kind, const Plant& plant) {
   if (plant.actuated_joint == 1) return;
   throw BadInput(
@@ -97,7 +97,8 @@ void ControllerConfig::Describe(Options& o) {
   energy.Describe(o);
   pfl.Describe(o);
   o.Section("hybrid");
-  o.Add(&swing_up, "swing_up", "policy that swings up: policy.safetensors or a run folder").usual = "none";
+  o.Add(&swing_up, "swing_up", "policy that swings up: policy.safetensors or a run folder").usual =
+      "none";
 }
 
 std::vector<std::string> ControllerNames() { return NamesOf(kControllers); }

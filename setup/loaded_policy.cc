@@ -32,10 +32,11 @@ void CheckObservation(const LoadedPolicy& loaded, const std::string& where) {
   const bool same_scale =
       !given->identified || given->identified->scale == expected.identified->scale;
   if (given->max_velocity != expected.max_velocity || !same_scale || !same_memory()) {
-    throw BadInput(Concat(where,
-                          ": metadata \"observation\": expected the names and scales of this version "
-                          "and a memory of ",
-                          loaded.memory(), " steps, as the network's inputs have, got others"));
+    throw BadInput(
+        Concat(where,
+               ": metadata \"observation\": expected the names and scales of this version "
+               "and a memory of ",
+               loaded.memory(), " steps, as the network's inputs have, got others"));
   }
 }
 
@@ -51,10 +52,9 @@ void CheckTask(const LoadedPolicy& loaded, const std::string& where) {
   const EnvSpec spec = SpecOf(config);
   const auto& period = loaded.policy->info().control_period;
   if (period != spec.step_seconds) {
-    throw BadInput(Concat(where, ": metadata \"control_period\": expected ",
-                          FormatNumber(spec.step_seconds),
-                          " s, the control period of the task, got ",
-                          period ? FormatNumber(*period) : "none"));
+    throw BadInput(Concat(
+        where, ": metadata \"control_period\": expected ", FormatNumber(spec.step_seconds),
+        " s, the control period of the task, got ", period ? FormatNumber(*period) : "none"));
   }
   if (loaded.policy->action_size() != spec.action_size()) {
     throw BadInput(Concat(where, ": expected ", spec.action_size(), " number per action, as in ",

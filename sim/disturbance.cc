@@ -58,7 +58,7 @@ std::span<const double> Disturber::Apply(std::span<const double> torque,
   return applied_;
 }
 
-void Disturber::TakeBack(int env, int64_t step) {
+void Disturber::Undo(int env, int64_t step) {
   const auto i = static_cast<size_t>(env);
   const int delay = disturbances_[i].delay_steps();
   if (delay > 0) std::swap(applied_[i], Queue(env)[static_cast<size_t>(step % delay)]);

@@ -62,8 +62,8 @@ class Disturber {
   /// returns those that the motors apply now (N).
   std::span<const double> Apply(std::span<const double> torque, std::span<const int64_t> steps);
 
-  /// Takes back what Apply did to an environment at this step of its episode.
-  void TakeBack(int env, int64_t step);
+  /// Undoes the effect of Apply on an environment at this step of its episode.
+  void Undo(int env, int64_t step);
 
   /// Takes the true state at a control step and the torque (N·m) that acted in the control period
   /// before it, 0 at the start, and returns what the sensors measure, with noise.

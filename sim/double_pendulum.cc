@@ -27,8 +27,7 @@ void Plant::Describe(Options& o) {
                         "joint that the motor drives; 1: pendubot, 2: acrobot");
   joint.step = 1;
   joint.implied = true;
-  o.Add(&rotor_inertia, "rotor_inertia", {0, 1}, "kg·m²",
-        "rotor inertia of each joint's motor")
+  o.Add(&rotor_inertia, "rotor_inertia", {0, 1}, "kg·m²", "rotor inertia of each joint's motor")
       .implied = true;
   o.Add(&gear_ratio, "gear_ratio", {0, 1000}, "", "gear ratio: rotor turns per joint turn")
       .implied = true;

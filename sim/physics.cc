@@ -58,7 +58,8 @@ class ClosedFormPhysics : public Physics {
 const Engine kClosedForm{
     "closed-form", [](const PhysicsConfig& config) -> std::unique_ptr<Physics> {
       if (!config.mjcf.empty()) {
-        throw BadInput("physics = closed-form: expected the built-in model, got another MJCF model");
+        throw BadInput(
+            "physics = closed-form: expected the built-in model, got another MJCF model");
       }
       return std::make_unique<ClosedFormPhysics>(config);
     }};

@@ -34,11 +34,12 @@ void Randomization::Describe(Options& o) {
   o.Add(&sensor_latency, "randomize_sensor_latency", {0, kLongestLatency}, "s",
         "largest random increase of sensor_latency, drawn for each episode")
       .implied = true;
-  o.Alias("randomize",
-          {"randomize_mass1", "randomize_mass2", "randomize_length1", "randomize_length2",
-           "randomize_damping1", "randomize_damping2", "randomize_gravity"},
-          "draw masses, lengths, dampings and gravity for each episode within ± this share of their "
-          "nominal values");
+  o.Alias(
+      "randomize",
+      {"randomize_mass1", "randomize_mass2", "randomize_length1", "randomize_length2",
+       "randomize_damping1", "randomize_damping2", "randomize_gravity"},
+      "draw masses, lengths, dampings and gravity for each episode within ± this share of their "
+      "nominal values");
   o.Alias("randomize_mass", {"randomize_mass1", "randomize_mass2"});
   o.Alias("randomize_length", {"randomize_length1", "randomize_length2"});
   o.Alias("randomize_damping", {"randomize_damping1", "randomize_damping2"});

@@ -52,7 +52,8 @@ void CheckSame(Config before, const Config& now, bool more_steps, const std::str
   };
   try {
     ExpectSameSettings(before, now, what, counts);
-    if (before.mjcf != now.mjcf) throw BadInput(Concat(what, ": expected the same MJCF model as before, got another"));
+    if (before.mjcf != now.mjcf)
+      throw BadInput(Concat(what, ": expected the same MJCF model as before, got another"));
   } catch (const Error& other) {
     throw BadInput(Concat(other.what(), "; choose another --out"));
   }
@@ -260,8 +261,7 @@ int TrainMany(const ManyRuns& many, ManyRunsObserver& observer) {
   std::erase_if(runs, [](const SeedRun& run) { return run.problem.empty(); });
   if (runs.empty()) return 0;
   throw Failure(Concat(runs.size(), " of ", all, " runs in ", many.plan.folder.string(),
-                       " failed; first ", runs.front().name, ": ",
-                       runs.front().problem));
+                       " failed; first ", runs.front().name, ": ", runs.front().problem));
 }
 
 int DefaultJobs(int64_t threads) {

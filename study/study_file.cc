@@ -27,7 +27,8 @@ std::vector<FlagValue> ReadSettings(const toml::node& node, const std::string& n
   std::vector<FlagValue> settings = ApplyTable(EverySetting(scratch), *table, where, true);
   for (FlagValue& setting : settings) {
     if (setting.name == "seed") {
-      throw BadInput(Concat(setting.where, ": expected no seed in the settings; a line seeds = … at the ",
+      throw BadInput(Concat(setting.where,
+                            ": expected no seed in the settings; a line seeds = … at the ",
                             "beginning of the file sets the seeds"));
     }
     if (setting.name == "model" && !setting.text.empty()) {
@@ -94,11 +95,12 @@ void CheckKeys(const toml::table& study, const std::string& where) {
     const bool is_setting = std::ranges::any_of(
         EverySetting(scratch).all(), [&](const Option& option) { return option.name == name; });
     if (is_setting && name != "seed") {
-      throw BadInput(Concat(PlaceOf(node, where), ": ", name, ": expected in [settings] or [variants.NAME], ",
+      throw BadInput(Concat(PlaceOf(node, where), ": ", name,
+                            ": expected in [settings] or [variants.NAME], ",
                             "got at the beginning of the file"));
     }
-    throw BadInput(Concat(PlaceOf(node, where), ": expected one of ", Join(known, ", "), ", got \"", name,
-                          "\"", DidYouMean(name, known)));
+    throw BadInput(Concat(PlaceOf(node, where), ": expected one of ", Join(known, ", "), ", got \"",
+                          name, "\"", DidYouMean(name, known)));
   }
 }
 

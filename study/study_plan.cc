@@ -120,9 +120,8 @@ StudyPlan ReadPlan(const fs::path& folder) {
   const fs::path path = folder / kPlanName;
   const std::string where = path.string();
   if (!Exists(path)) {
-    throw BadInput(
-        Concat(folder.string(), ": expected the folder of a study, got ",
-               Exists(folder) ? Concat("one without ", kPlanName) : "no such folder"));
+    throw BadInput(Concat(folder.string(), ": expected the folder of a study, got ",
+                          Exists(folder) ? Concat("one without ", kPlanName) : "no such folder"));
   }
   StudyPlan plan;
   plan.folder = folder;

@@ -31,7 +31,9 @@ void Reduce(const SeedRun& run, Keep keep) {
 void Finish(const SeedRun& run, Keep keep) {
   const Config& config = run.variant->config;
   const auto at_end = ReadTrainState(run.path, config.Spec());
-  if (!at_end) throw Failure(Concat(run.path.string(), ": expected the run's folder, which was removed during the training"));
+  if (!at_end)
+    throw Failure(Concat(run.path.string(),
+                         ": expected the run's folder, which was removed during the training"));
   const FinishedRun result{*at_end,
                            run.settings,
                            config.train.steps,
@@ -118,8 +120,8 @@ class Worker {
     }
     ++outcome_.failed;
     if (++failed_in_a_row_ < kMostInARow) return;
-    throw Failure(Concat(kMostInARow, " runs in a row failed on this worker; last ", run.name,
-                         ": ", error.what()));
+    throw Failure(Concat(kMostInARow, " runs in a row failed on this worker; last ", run.name, ": ",
+                         error.what()));
   }
 
   void Train(SeedRun& run, const Lease& lease) {
@@ -157,8 +159,9 @@ void WriteEvaluations(const StudyPlan& plan) {
       } else if (columns.empty()) {
         columns = Printable(line);
       } else if (columns != Printable(line)) {
-        throw Failure(Concat(run.done().string(),
-                             ": expected evaluations with the columns of the other runs, got others"));
+        throw Failure(
+            Concat(run.done().string(),
+                   ": expected evaluations with the columns of the other runs, got others"));
       }
       is_first = false;
     }

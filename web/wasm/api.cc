@@ -323,7 +323,8 @@ UPSWING_EXPORT(learner_open) Learner* LearnerOpen(const char* settings, size_t s
     std::vector<FlagValue> flags;
     for (const std::string_view line : Split({settings, size}, '\n')) {
       const size_t equals = line.find('=');
-      if (equals == std::string_view::npos) throw BadInput(Concat("settings: expected NAME=VALUE, got \"", line, "\""));
+      if (equals == std::string_view::npos)
+        throw BadInput(Concat("settings: expected NAME=VALUE, got \"", line, "\""));
       const std::string name(line.substr(0, equals));
       flags.push_back({name, std::string(line.substr(equals + 1)), name});
     }
