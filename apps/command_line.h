@@ -27,9 +27,9 @@ class CommandLine {
  public:
   explicit CommandLine(CLI::App& app) : app_(app) {}
 
-  /// Adds a text: a flag where the name begins with `--`, else a positional argument. `type` stands
-  /// for the value in --help. An empty value is refused, as `what` is expected; an empty `what`
-  /// allows it.
+  /// Adds a text: a flag if the name begins with `--`, else a positional argument. --help shows
+  /// `type` for the value. `what` names the expected value in the error for an empty one; an empty
+  /// `what` allows empty values.
   void Text(std::string_view name, std::string& target, std::string_view type,
             std::string_view help, std::string_view what = kPath);
   void Text(std::string_view name, std::optional<std::string>& target, std::string_view type,
@@ -45,15 +45,15 @@ class CommandLine {
   /// Adds a flag without a value.
   void Flag(std::string_view name, bool& target, std::string_view help);
 
-  /// Adds a flag for each of the command's own numbers and choices, which sets it at once; see
-  /// Option::Set.
+  /// Adds a flag for each of the command's own numbers and choices. The flag sets the value at
+  /// once; see Option::Set.
   void Arguments(const Options& options);
-  /// Adds a flag for each setting and alias, in the order in which they were described. What is
-  /// given is added to `flags`.
+  /// Adds a flag for each setting and alias, in the order of their descriptions. Given values are
+  /// appended to `flags`.
   void Settings(const Options& options, std::vector<FlagValue>& flags);
-  /// Lets --help ask `shown`, which calls its argument with all settings that were added and with
-  /// those to show, whose values are the defaults. Only flags of these are suggested for a misspelt
-  /// one; of the others the message has their WhyMissing.
+  /// Lets --help call `shown`. It calls its argument with all added settings and with the settings
+  /// to show, whose values are the defaults. A misspelt flag gets suggestions from the shown
+  /// settings; for the others the message is their WhyMissing.
   using ShowOptions = std::function<void(const Options& every, const Options& options)>;
   void ShowSettings(std::function<void(const ShowOptions&)> shown);
 

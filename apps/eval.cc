@@ -40,7 +40,7 @@ int RunEval(const EvalArguments& a) {
     return EvaluatePolicy(loaded, a.trial, a.episodes, pool, std::ref(progress));
   }();
   if (!a.episodes_csv.empty()) WriteOutput(a.episodes_csv, EpisodesCsv(report));
-  if (to_output) return 0;  // the rows alone, for a reader
+  if (to_output) return 0;  // only the rows, for another program
   if (a.as_json) {
     fmt::print("{}\n", EvalJson(report));
   } else {

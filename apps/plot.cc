@@ -90,7 +90,7 @@ int RunPlot(const PlotArguments& a) {
     fmt::print("  task       {}\n", spec.task);
   }
   if (model) fmt::print("  model      {}\n", model->Text());
-  // Of other tasks a row tells of the state that its step leads to.
+  // In other tasks a row has the state after its step.
   const double later = pendulum ? 0 : spec.step_seconds;
   const double since = UprightSince(rollout.rows);
   fmt::print("  {}    {}\n", pendulum ? "upright" : "at goal",

@@ -68,8 +68,7 @@ bool Jumps(const LoadedPolicy& loaded, const StateVector& x, double least) {
   return false;
 }
 
-/// A state whose numbers are floats, anywhere or so near to upright that the torque is within its
-/// limit.
+/// A random state of floats: anywhere, or so close to upright that the torque is within its limit.
 StateVector DrawState(const LoadedPolicy& loaded, Rng& rng, bool upright) {
   StateVector x;
   for (int k = 0; k < 4; ++k) x[k] = rng.Uniform(-1, 1) * kRange[k];

@@ -35,8 +35,8 @@ std::vector<float> InBlocks(const LayerView& layer) {
 
 std::vector<float> Copy(std::span<const float> values) { return {values.begin(), values.end()}; }
 
-/// The layers that a torque takes: of a dueling network without the value stream, which does not
-/// change which torque is best; of a Gaussian with the mean alone.
+/// The layers that choose the torque: without the value stream of a dueling network, which does not
+/// change the best torque; only the mean of a Gaussian.
 std::vector<LayerView> LayersOf(const ExportedPolicy& policy) {
   std::vector<LayerView> layers = policy.ActingLayers();
   if (!policy.is_discrete()) layers.back() = layers.back().Units(0, 1);

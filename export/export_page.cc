@@ -43,7 +43,7 @@ struct PageAgent {
   }
 };
 
-/// The run folder that a policy lies in; empty if it lies elsewhere.
+/// The run folder of a policy; empty if it is in no run folder.
 fs::path RunOf(const fs::path& file) {
   const fs::path folder = file.has_parent_path() ? file.parent_path() : ".";
   const bool is_run =
@@ -87,7 +87,7 @@ ordered_json CurveJson(const std::vector<EvaluationRow>& evaluations) {
   return curve;
 }
 
-/// The policy as it stands, as a small file.
+/// The current policy as a small file.
 std::vector<std::byte> SmallFile(const Training& training, const std::string& where) {
   const std::unique_ptr<Policy> policy = training.policy();
   const auto* q = dynamic_cast<const NetworkPolicy*>(policy.get());

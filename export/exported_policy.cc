@@ -13,7 +13,7 @@
 namespace upswing {
 namespace {
 
-/// Throws BadInput unless these torques can be told as float.
+/// Throws BadInput unless these torques fit into floats.
 void CheckTorques(std::span<const double> torques, const std::string& where) {
   for (const double torque : torques) {
     if (std::abs(torque) <= std::numeric_limits<float>::max()) continue;

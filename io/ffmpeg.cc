@@ -62,7 +62,7 @@ Ffmpeg::Ffmpeg(const std::vector<std::string>& words, int output)
   posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
   posix_spawn_file_actions_adddup2(&files, errors_.get(), STDERR_FILENO);
   posix_spawn_file_actions_adddup2(&files, output, kOutput);
-  // In a group of its own, so that a terminal's Ctrl-C reaches us alone; with usual signals.
+  // ffmpeg gets its own process group, so that Ctrl-C in a terminal reaches only this program.
   posix_spawnattr_t attributes;
   posix_spawnattr_init(&attributes);
   sigset_t usual;

@@ -25,7 +25,7 @@ using Settings = std::vector<std::pair<std::string, std::string>>;
 
 Settings SettingsOf(Config config) {
   Settings settings;
-  config.model.clear();  // a model is what is in its file, not where the file lies
+  config.model.clear();  // the content of a model counts, not its path
   Config scratch;
   const Options own = OptionsOf(config), all = EverySetting(scratch);
   for (const Option& every : all.all()) {
@@ -78,8 +78,8 @@ std::string Differences(
   return Join(parts, ", ");
 }
 
-/// Says of each group (`settings` are theirs) how it differs from the others, and gives those of
-/// one name a second one: their differences among each other, or a number where these are many.
+/// Sets the differences of each group (with these `settings`) from the others. Groups with the same
+/// name get a second name: their differences from each other, or a number if there are many.
 void TellGroupsApart(std::vector<RunGroup>& groups, const std::vector<Settings>& settings) {
   std::vector<const Settings*> all;
   std::map<std::string, std::vector<const Settings*>> namesakes;
@@ -157,7 +157,7 @@ void NoteLoads(const std::vector<RunRecord>& runs, std::vector<std::string>& not
 
 /// What the times depend on besides the settings, where it is not the same for all.
 void NoteTimes(const std::vector<RunRecord>& runs, std::vector<std::string>& notes) {
-  std::map<int64_t, int> threads;  // how many runs had so many
+  std::map<int64_t, int> threads;  // number of threads → number of runs
   std::set<std::string> processors, vectors;
   std::set<int64_t> intervals;
   for (const RunRecord& f : runs) {

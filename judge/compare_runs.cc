@@ -30,7 +30,7 @@ bool IsRun(const fs::path& folder) {
   return has(RunFolder::kConfig) && (has(RunFolder::kEvaluations) || has(RunFolder::kCheckpoint));
 }
 
-/// The file beside a run of a study that says that it is done.
+/// The result file of a finished run of a study, next to the run folder.
 fs::path DoneOf(const fs::path& run) { return run.string() + ".done"; }
 
 /// The seed of a run of a study, by its name; nothing if it has none.
@@ -92,7 +92,7 @@ std::vector<fs::path> RunsIn(const fs::path& folder, Found& found) {
   return paths;
 }
 
-/// Reads runs, those of studies that are done from their result files.
+/// Reads runs; finished runs of studies from their result files.
 class RunReader {
  public:
   RunReader(const CompareRequest& request, Found& found) : request_(request), found_(found) {}

@@ -12,7 +12,7 @@
 #include "setup/loaded_policy.h"
 #include "sim/pendulum_env.h"
 
-/// Evaluations of a policy over many episodes, and what is said of them.
+/// Evaluations of a policy over many episodes, and their reports.
 namespace upswing {
 
 /// One episode: its conditions and its result.
@@ -21,7 +21,7 @@ struct JudgedEpisode {
   // Of the double pendulum:
   Plant plant;
   Disturbance disturbance;
-  bool for_its_plant = false;  // a controller was made for it, see TrialArguments::known_plant
+  bool for_its_plant = false;  // had its own controller, see TrialArguments::known_plant
   EvaluationEpisode result;
 };
 
@@ -33,8 +33,8 @@ struct EvalReport {
   EnvSpec spec;
   std::vector<JudgedEpisode> episodes;
   Evaluation figures;
-  bool known_plant = false;    // each episode had a controller made for its plant
-  bool knows_values = false;   // the policy says what its Q-values estimate
+  bool known_plant = false;    // a controller was designed for the plant of each episode
+  bool knows_values = false;   // the policy's file defines the unit of its values
   bool only_balances = false;  // a controller that does not swing up
 };
 

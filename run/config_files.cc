@@ -23,7 +23,7 @@ ModelFile ReadModel(const std::string& path) {
   return model;
 }
 
-/// ParseConfig of a file in the folder of a run or a study, whose model is the copy beside it.
+/// ParseConfig of a file in the folder of a run or a study, with the model in the same folder.
 Config ParseInFolder(const fs::path& file, const std::string& text,
                      const std::vector<FlagValue>& flags) {
   return ParseConfig(text, file.string(), flags, [&](const std::string& path, bool /*in_file*/) {
@@ -74,7 +74,7 @@ std::string CompleteToml(Config config) {
 
 std::string SettingsMark(const Config& config) {
   Config own = config;
-  own.model.clear();  // a model is what is in its file, not where that lies
+  own.model.clear();  // the content of a model counts, not its path
   Checksum sum;
   const Options options = OptionsOf(own);
   for (const Option& option : options.all()) {

@@ -28,16 +28,15 @@ struct LoadedPolicy {
   int memory() const;
   /// Whether its observations contain an estimate of the plant.
   bool identifies() const;
-  /// Where it is from: "training", or "design" of a controller.
+  /// Origin: "training", or "design" for a controller.
   const char* origin() const { return path.empty() ? "design" : "training"; }
 };
 
-/// The policy in a file, whose model, if it is not the built-in one, is not checked. Throws
-/// BadInput, too, where the file says of its task what this program cannot do: another control
-/// period, other observations.
+/// The policy in a file. Its MJCF model is not checked. Throws BadInput also for a task that this
+/// program lacks: another control period or other observations.
 LoadedPolicy PolicyIn(const Tensors& file);
 
-/// What a policy file says of the agent and the task that it was trained on.
+/// Metadata of a policy file on its agent and task.
 PolicyInfo InfoOf(const Config& config);
 
 }  // namespace upswing

@@ -50,7 +50,7 @@ Config BuildVariant(const std::string& name, const std::vector<FlagValue>& setti
   }
 }
 
-/// The variants in the order in which they stand in the file.
+/// The variants, in the order of the file.
 std::vector<Variant> ReadVariants(const toml::table& study, const std::string& where) {
   std::vector<FlagValue> common;
   if (const toml::node* node = study.get("settings")) {

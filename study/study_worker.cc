@@ -27,7 +27,8 @@ void Reduce(const SeedRun& run, Keep keep) {
   }
 }
 
-/// Writes that a run is done, and removes what is not kept of it. The caller holds its claim.
+/// Writes the result file of a run and removes the files that are not kept. The caller has the
+/// claim.
 void Finish(const SeedRun& run, Keep keep) {
   const Config& config = run.variant->config;
   const auto at_end = ReadTrainState(run.path, config.Spec());
@@ -100,7 +101,7 @@ class Worker {
       if (!lease) return Turn::kClaimedByOthers;
       if (run.HasFailed() || run.ReadIfFinished()) return Turn::kNothingToDo;  // meanwhile
       Train(run, *lease);
-    } catch (const FolderBusy&) {  // whoever lost the claim is still at work there
+    } catch (const FolderBusy&) {  // the worker that lost the claim is still running there
       return Turn::kClaimedByOthers;
     } catch (const std::exception& error) {
       if (lease && !lease->held()) return Turn::kClaimedByOthers;
@@ -109,8 +110,8 @@ class Worker {
     return Turn::kTried;
   }
 
-  /// Says why a run failed. Throws the error if even that cannot be written, or if nothing works
-  /// here, as on a broken host, which is not to fail all other runs too.
+  /// Writes why a run failed. Throws the error if that fails, or after several failures in a row: a
+  /// broken host must not fail all other runs.
   void CountFailure(const SeedRun& run, const std::exception& error) {
     constexpr int kMostInARow = 3;
     try {

@@ -20,7 +20,7 @@ namespace {
 
 namespace nb = nanobind;
 
-/// What a function of the package is told besides settings: name and text of each.
+/// Sets the arguments of a function of the package, given as name and text.
 void SetArguments(const Options& options, const SettingTexts& arguments) {
   for (const auto& [name, text] : arguments) options.Set(name, text, name);
 }
