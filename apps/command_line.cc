@@ -46,6 +46,27 @@ CLI::Validator NotEmpty(std::string_view what) {
           ""};
 }
 
+/// `text` with its prose wrapped to HelpColumns(). Indented lines and headings (`Examples:`) stay.
+std::string Reflowed(std::string_view text) {
+  std::string result, prose;
+  const auto end_paragraph = [&] {
+    if (!prose.empty()) result += WrapText(prose, HelpColumns()) + '\n';
+    prose.clear();
+  };
+  for (const std::string_view line : Split(text, '\n')) {
+    if (line.empty() || line.starts_with(' ')) {
+      end_paragraph();
+      result += Concat(line, '\n');
+      continue;
+    }
+    prose += Concat(prose.empty() ? "" : " ", line);
+    if (line.ends_with(':')) end_paragraph();
+  }
+  end_paragraph();
+  result.pop_back();
+  return result;
+}
+
 /// Formats --help within HelpColumns(), without the `{false}` that CLI11 adds to a flag's --no-
 /// form.
 class HelpFormatter : public CLI::Formatter {
@@ -62,6 +83,10 @@ class HelpFormatter : public CLI::Formatter {
                         CLI::AppFormatMode mode) const override {
     HideFlags();
     return CLI::Formatter::make_help(app, std::move(name), mode);
+  }
+
+  std::string make_footer(const CLI::App* app) const override {
+    return Reflowed(CLI::Formatter::make_footer(app));
   }
 
   std::string make_option_name(const CLI::Option* option, bool is_positional) const override {
@@ -268,17 +293,21 @@ std::string CommandLine::Last(std::string_view name) const {
 int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> commands,
                const std::string& footer) {
   CLI::App program(
-      "Upswing trains, compares, explains and deploys controllers that swing up and balance\n"
-      "a double pendulum with one motor.",
+      "Upswing trains, compares, explains and deploys controllers that swing up and\n"
+      "balance a double pendulum with one motor.",
       "upswing");
   program.set_version_flag("--version", "upswing " UPSWING_VERSION);
   program.require_subcommand(1);
-  program.formatter(std::make_shared<HelpFormatter>());
+  const auto formatter = std::make_shared<HelpFormatter>();
+  constexpr size_t kCommandColumns = 14;
+  formatter->column_width(kCommandColumns);
+  program.formatter(formatter);
   program.footer(footer);
   std::vector<std::unique_ptr<CommandLine>> lines;
   const CommandLine* chosen = nullptr;
   for (const CommandEntry& command : commands) {
     CLI::App* app = program.add_subcommand(command.name, command.help);
+    app->formatter(std::make_shared<HelpFormatter>());
     CommandLine& line = *lines.emplace_back(new CommandLine(*app));
     if (command.declare != nullptr) command.declare(line);
     app->callback([&line, &chosen] {
