@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <iterator>
+#include <sstream>
 #include <utility>
 
 #include "apps/progress.h"
@@ -47,13 +48,14 @@ CLI::Validator NotEmpty(std::string_view what) {
 }
 
 /// `text` with its prose wrapped to HelpColumns(). Indented lines and headings (`Examples:`) stay.
-std::string Reflowed(std::string_view text) {
+std::string Reflowed(const std::string& text) {
   std::string result, prose;
   const auto end_paragraph = [&] {
     if (!prose.empty()) result += WrapText(prose, HelpColumns()) + '\n';
     prose.clear();
   };
-  for (const std::string_view line : Split(text, '\n')) {
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
     if (line.empty() || line.starts_with(' ')) {
       end_paragraph();
       result += Concat(line, '\n');
@@ -63,7 +65,6 @@ std::string Reflowed(std::string_view text) {
     if (line.ends_with(':')) end_paragraph();
   }
   end_paragraph();
-  result.pop_back();
   return result;
 }
 
