@@ -61,8 +61,9 @@ std::string Reflowed(const std::string& text) {
       result += Concat(line, '\n');
       continue;
     }
+    const bool heading = prose.empty() && line.ends_with(':');
     prose += Concat(prose.empty() ? "" : " ", line);
-    if (line.ends_with(':')) end_paragraph();
+    if (heading) end_paragraph();
   }
   end_paragraph();
   return result;
