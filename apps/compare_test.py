@@ -400,7 +400,7 @@ class CompareTest(ProgramTest):
         self.assertEqual(pfl("--made-for", "mass2=1.1"), pfl())
         self.assertNotEqual(pfl("--made-for", "mass2=1"), pfl())
         text = self.succeed("compare", *names, "--out", "out")
-        self.assertRegex(text, r"lqr\n  episodes +4, of the final evaluations of one run\n"
+        self.assertRegex(text, r"lqr\n  episodes +4, from the final evaluations of one run\n"
                                r"  success +0\.0% \(95% 0\.0% to 49\.0%\)\n  return ")
         self.assertIn("d3qn-small against lqr\n", text)
         with open(self.folder / "out/policies.csv", encoding="utf-8", newline="") as file:

@@ -262,7 +262,7 @@ class EvalTest(ProgramTest):
 
     def test_bad_episodes(self):
         self.refuse(["simulate", self.policy, "--episode", 1, "--start", "0,0,0,0"], "--start",
-                    "beside --episode")
+                    "with --episode")
         self.refuse(["plot", self.policy, "--episode", -1], "--episode")
         self.refuse(["simulate", "--unknown-plant"], "--unknown-plant: expected a policy")
         self.refuse(["eval", self.policy, "--episodes-csv", ""], "--episodes-csv")

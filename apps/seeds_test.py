@@ -182,7 +182,7 @@ class SeedsTest(ProgramTest):
         reason = f"many/seed1/{checkpoint.name}: not a valid safetensors file"
         self.assert_one_line(failed, 1, "1 of 3 runs in many failed", "seed1: " + reason)
         # Reported before the others run, and in its place among them.
-        self.assertRegex(failed.stdout, rf"(?m)\A.*\n.*\n.*done before.*\n  seed1 +failed: {reason}")
+        self.assertRegex(failed.stdout, rf"(?m)\A.*\n.*\n.*already done.*\n  seed1 +failed: {reason}")
         self.assertRegex(failed.stdout, r"(?m)^  1 run failed$")
         self.assertNotIn("not evaluated yet", failed.stdout)
         self.assertIn("./upswing compare many --unfinished\n", failed.stdout)

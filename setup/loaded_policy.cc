@@ -87,8 +87,9 @@ LoadedPolicy PolicyIn(const Tensors& file) {
   const std::string& where = file.where();
   const auto format = file.metadata.find("format");
   if (format != file.metadata.end() && format->second == "upswing-realaigym") {
-    throw BadInput(
-        Concat(where, ": expected a policy of `upswing train`, got one of `upswing realaigym`"));
+    throw BadInput(Concat(
+        where,
+        ": expected a policy of `upswing train`, got one for RealAIGym (`upswing realaigym`)"));
   }
   const auto policy = std::make_shared<const NetworkPolicy>(NetworkPolicy::From(file));
   const PolicyInfo& info = policy->info();
