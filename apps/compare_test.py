@@ -325,7 +325,7 @@ class CompareTest(ProgramTest):
         self.refuse(["compare", "old"], "got none of network.hidden, network.head")
         config.write_text('[train]\nagent = "d3qn"\n', encoding="utf-8")
         self.assertRegex(self.run_here("compare", "old").stderr,
-                         r"got none of (\w+\.\w+, ){5}\w+\.\w+ and \d+ more: another version")
+                         r"got none of (\w+\.\w+, ){5}\w+\.\w+ and \d+ more; another version")
 
     def test_unfinished_runs_on_demand(self):
         self.make_group("r", [1, 2])

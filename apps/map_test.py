@@ -64,7 +64,7 @@ class MapTest(ProgramTest):
         xml.dom.minidom.parseString(text)
         for word in ("gravity (m/s²)", "mass2 (kg)", "Success", "Swing-up time, median",
                      "as in training", "successful episodes (%)", "swing-up time (s)",
-                     "4 episodes a cell (4 of 4: 95% interval 51.0% to 100%); closed-form; seed 0"):
+                     "4 episodes per cell (4 of 4: 95% interval 51.0% to 100%); closed-form; seed 0"):
             self.assertIn(word, text)
         self.assertEqual(result["files"], ["map/map.csv", "map/map.svg", "map/map.png"])
 
@@ -182,12 +182,12 @@ class MapTest(ProgramTest):
         self.assertEqual((self.folder / "both/map-1.csv").read_bytes(),
                          (self.folder / "alone/map.csv").read_bytes())
         svg = (self.folder / "both/maps.svg").read_text(encoding="utf-8")
-        for words in (">run<", ">lqr (lqr_torque 2)<", ">what it was made for<"):
+        for words in (">run<", ">lqr (lqr_torque 2)<", ">training or design<"):
             self.assertIn(words, svg)
         self.assertEqual(svg.count(">successful episodes (%)<"), 1)  # one scale
         self.refuse(["map", self.policy, "lqr", *grid], "--out: expected a folder")
         self.refuse(["map", self.policy, "lqr", "--x", "gravity=-20%:+20%", "--out", "other"],
-                    "lqr: expected a policy made for the same plant as run")
+                    "lqr: expected a policy with the same plant as run")
 
     def test_a_check_without_successes_has_nothing_to_compare(self):
         text = self.succeed("map", self.policy, "--x", "gravity=20:30:2", "--y", "mass2=5:6:2",
