@@ -98,21 +98,22 @@ class CommandLineTest(ProgramTest):
                 self.refuse(["eval", "run", "--physics", engine], *words)
         self.write("m.xml", MODEL)
         self.refuse([*TRAIN, "--physics", "closed-form", "--model", "m.xml"],
-                    "physics closed-form: expected the built-in model")
+                    "physics = closed-form: expected the built-in model")
 
     def test_settings_of_another_algorithm(self):
         for flags, words in (
-                (["--alpha", "0.1"], ["--alpha", "sac", "agent d3qn learns by dqn"]),
+                (["--alpha", "0.1"], ["--alpha: expected a setting of dqn, the algorithm of agent d3qn, got alpha, a setting "
+                                       "of sac"]),
                 (["--agent", "sac", "--epsilon-start", "1"],
-                 ["--epsilon-start", "of dqn", "agent sac learns by sac"]),
-                (["--agent", "ppo", "--n-step", "1"], ["n_step", "dqn and sac", "learns by ppo"]),
-                (["--algorithm", "sac"], ["--algorithm", "d3qn learns by dqn", "got sac"]),
+                 ["--epsilon-start: expected a setting of sac, the algorithm of agent sac", "of dqn"]),
+                (["--agent", "ppo", "--n-step", "1"], ["expected a setting of ppo", "got n_step, a setting of dqn and sac"]),
+                (["--algorithm", "sac"], ["--algorithm: expected dqn, the algorithm of agent d3qn, got sac"]),
                 (["--algorithm", "sac", "--double-q"],
-                 ["unknown flag --double-q; double is a setting of dqn", "sac learns by sac"]),
+                 ["unknown flag --double-q; expected a setting of sac", "got double, a setting of dqn"]),
                 (["--agent", "sac", "--double-q"],
-                 ["unknown flag --double-q; double is a setting of dqn", "sac learns by sac"]),
+                 ["unknown flag --double-q; expected a setting of sac", "got double, a setting of dqn"]),
                 (["--agent", "sac", "--alhpa", "1"], ["--alhpa (did you mean --alpha?)"]),
-                (["--alhpa", "1"], ["--alhpa; alpha is a setting of sac", "d3qn learns by dqn"]),
+                (["--alhpa", "1"], ["--alhpa; expected a setting of dqn", "agent d3qn, got alpha, a setting of sac"]),
                 (["--algorithm", "sarsa"], ["--algorithm", "dqn, sac, ppo", "sarsa"]),
                 (["--agent", "sac", "--bins", "1"], ["bins", "at least 2", "got 1"]),
                 (["--agent", "sac", "--bins", "9", "--value-low", "3", "--value-high", "3"],

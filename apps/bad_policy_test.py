@@ -37,18 +37,18 @@ class PolicyFileTest(SmallRunTest):
         self.policy.unlink()
         self.refuse_policy("no such file")
         self.refuse(["eval", "nothing"], "nothing", "no such file")
-        self.refuse(["eval", "run"], "run", "this run has no policy")
+        self.refuse(["eval", "run"], "run", "expected a run with a policy.safetensors")
 
     def test_truncated(self):
         whole = self.policy.read_bytes()
         for size in (0, 7, 8, 100, len(whole) // 2, len(whole) - 1):
             with self.subTest(size=size):
                 self.policy.write_bytes(whole[:size])
-                self.refuse(["eval", "run"], "policy.safetensors", "not a whole safetensors file")
+                self.refuse(["eval", "run"], "policy.safetensors", "not a valid safetensors file")
 
     def test_too_long(self):
         self.policy.write_bytes(self.policy.read_bytes() + b"\0" * 8)
-        self.refuse_policy("not a whole safetensors file", "8 bytes too many")
+        self.refuse_policy("not a valid safetensors file", "bytes of data, got")
 
     def test_corrupted(self):
         whole = self.policy.read_bytes()
@@ -60,8 +60,8 @@ class PolicyFileTest(SmallRunTest):
 
     def test_something_else(self):
         self.policy.write_text("t,torque\n0,1\n" * 20)
-        self.refuse_policy("not a whole safetensors file")
-        self.refuse(["info", "run/config.toml"], "run/config.toml", "not a whole safetensors file")
+        self.refuse_policy("not a valid safetensors file")
+        self.refuse(["info", "run/config.toml"], "run/config.toml", "not a valid safetensors file")
 
     def test_tensor_of_another_shape_or_type(self):
         _, tensors = read_tensors(self.policy)
@@ -124,13 +124,13 @@ class PolicyFileTest(SmallRunTest):
                 broken = bytearray(whole)
                 broken[begin:begin + len(text)] = text
                 self.policy.write_bytes(broken)
-                self.refuse_policy("not a whole safetensors file")
+                self.refuse_policy("not a valid safetensors file")
 
     def test_a_file_of_another_writer_needs_none(self):
         self.change(drop=["upswing_version"])
         self.assertNotIn(b"checksum", self.policy.read_bytes())
         text = self.succeed("info", "run/policy.safetensors")
-        self.assertIn("checksum    none: the self-check cannot notice", text)
+        self.assertIn("checksum    none: a changed weight goes unnoticed", text)
         self.assertIn("upswing unknown", text)
 
     def test_metadata(self):
@@ -239,7 +239,7 @@ class PolicyFileTest(SmallRunTest):
         self.refuse_policy(shown)
         self.restore()
         self.change(tensors={forged: (forged, [1], bytes(8))})
-        self.refuse_policy(f"type {shown} is not ours")
+        self.refuse_policy(f"dtype: expected a known type, got {shown}")
         self.restore()
         self.change({"format": forged})
         self.refuse_policy(f'got "{shown}"')
@@ -249,7 +249,7 @@ class PolicyFileTest(SmallRunTest):
         self.restore()
         self.change(tensors={"y" * 100000: ("F32", [1], bytes(8))})
         done = self.run_here("info", "run/policy.safetensors")
-        self.assert_one_line(done, 2, "expected the bytes of F32 [1], got 8")
+        self.assert_one_line(done, 2, "expected as many bytes as F32 [1] has, got 8")
         self.assertLess(len(done.stderr), 2500)
 
     def test_policy_for_other_observations(self):

@@ -27,7 +27,7 @@ struct BoundsArguments {
   bool as_json = false;
 };
 
-/// A line of the table: what was found, or how a policy did.
+/// A row of the table: the search or a policy.
 struct BoundsRow {
   std::string name;
   Evaluation figures;  // of the episodes with the best return
@@ -40,7 +40,7 @@ std::string RowText(const BoundsRow& row, const BoundsRow& best, size_t width) {
   std::string text =
       fmt::format("  {:<{}}  {:6.1f} ± {:5.1f} {:7.1f}%", Printable(row.name), width, mean,
                   row.figures.reward_sum.deviation, 100 * mean / best.figures.reward_sum.mean);
-  if (row.figures.successes == 0) return text + "   none stays upright";
+  if (row.figures.successes == 0) return text + "   no episode stays upright";
   return text + fmt::format("   {:.2f} s (+{:.2f} s)", row.swing_up_seconds.median,
                             row.swing_up_seconds.median - best.swing_up_seconds.median);
 }
@@ -54,7 +54,7 @@ nlohmann::ordered_json RowJson(const BoundsRow& row, const BoundsRow& best) {
           {"swing_up_seconds", row.swing_up_seconds.median}};
 }
 
-/// What controllers among the policies are made for: nothing where there are none.
+/// The design plant of the controllers among the policies; empty if there are none.
 std::vector<std::string> MadeFor(const BoundsArguments& a) {
   return std::ranges::any_of(a.policies, IsController) ? a.config.trial.set
                                                        : std::vector<std::string>();
@@ -62,7 +62,7 @@ std::vector<std::string> MadeFor(const BoundsArguments& a) {
 
 int RunBounds(const BoundsArguments& a) {
   if (!a.csv.empty()) CheckWritable("--csv", a.csv);
-  // Controllers are made for the plant that the search knows.
+  // The design plant of controllers is the plant of the search.
   const std::vector<LoadedPolicy> policies = GetPolicies(a.policies, {"", a.flags, MadeFor(a)});
   for (const LoadedPolicy& loaded : policies) CheckComparable(loaded, a.config);
   ThreadPool pool(ResolveThreads(a.threads));
@@ -91,15 +91,16 @@ int RunBounds(const BoundsArguments& a) {
     fmt::print("{}\n", PrintableJson(j));
     return 0;
   }
-  fmt::print("Best found of {}, judged in {}\n", Counted(a.config.episodes, "episode"),
+  fmt::print("Best results found in {}, evaluated in {}\n", Counted(a.config.episodes, "episode"),
              a.config.trial.physics);
   size_t width = 0;
   for (const BoundsRow& row : rows) width = std::max(width, Printable(row.name).size());
   fmt::print("  {:<{}}  {:<14} {:>8}   median swing-up time\n", "", width, "return", "share");
   for (const BoundsRow& row : rows) fmt::print("{}\n", RowText(row, rows.front(), width));
   fmt::print(
-      "  ± is the standard deviation over the episodes. Returns and times are searched for apart.\n"
-      "  Nothing proves that there is no better.\n");
+      "  ± is the standard deviation over episodes. The best return and the shortest time come "
+      "from\n"
+      "  separate searches. A better result may exist.\n");
   return 0;
 }
 
@@ -108,25 +109,24 @@ int RunBounds(const BoundsArguments& a) {
 void AddBounds(CommandLine& line) {
   BoundsArguments& a = line.Runs(RunBounds);
   line.Texts("policy", a.policies, "POLICY|RUN",
-             "policy files, run folders or controllers to compare");
+             "policies to compare: policy.safetensors, run folders or controllers");
   ControllerConfig controllers;
   line.Settings(OptionsOf(controllers), a.flags);
   Options own;
   a.config.Describe(own);
   line.Arguments(own);
-  AddSet(line, a.config.trial.set, "another plant, such as mass2=1.2");
+  AddSet(line, a.config.trial.set, "change of the plant, such as mass2=1.2");
   AddSeed(line, a.config.trial.seed, "start states");
   AddPhysics(line, a.config.trial.physics);
   AddThreads(line, a.threads);
-  line.Text("--csv", a.csv, "FILE", "table to write, a row for each episode");
+  line.Text("--csv", a.csv, "FILE", "CSV file to write, a row per episode");
   line.Flag("--json", a.as_json, "print JSON instead of a table");
   line.Footer(
-      "The search knows the plant and each start: box-constrained differential dynamic "
-      "programming\n"
-      "from many first guesses, on the reward itself, smooth at first; for a table of torques "
-      "rounded,\n"
-      "then changed one by one (docs/control.md). What it finds is a bound from below of the best\n"
-      "return, and one from above of the least time. Episodes are those of eval.\n\n"
+      "The search knows the plant and each start state. It maximises the reward by\n"
+      "box-constrained differential dynamic programming from many initial guesses. For a\n"
+      "table of torques it rounds the result, then changes one torque at a time. The\n"
+      "result is a lower bound of the best return and an upper bound of the shortest\n"
+      "swing-up time. Episodes are those of eval.\n\n"
       "Examples:\n"
       "  ./upswing bounds\n"
       "  ./upswing bounds runs/d3qn-seed1 runs/sac-seed1 mpc\n"

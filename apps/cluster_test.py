@@ -128,14 +128,14 @@ class ClusterTest(ProgramTest):
         self.wait_for(lambda: any(self.claims(node) for node in NODES))
         code, rest = self.end(follower, signal.SIGINT)
         self.assertEqual(code, 130)
-        self.assertIn(f"Job array {array} goes on; the same command follows it again, "
+        self.assertIn(f"Job array {array} continues; the same command follows it again, "
                       f"`scancel {array}` cancels it.", rest)
         follower, _, how = self.follow(2)
-        self.assertIn(f"Job array {array}, queued before: ", how)
+        self.assertIn(f"Following job array {array}: ", how)
         self.cluster.ask("scancel", array)
         output = follower.communicate()[0]
         self.assertEqual(follower.returncode, 1, output)
-        self.assertRegex(output, rf"upswing: no task of job array {array} is left, but [1-4] of the runs")
+        self.assertRegex(output, rf"upswing: job array {array} has ended, but [1-4] runs are not done")
         # They were told: no task is queued again, and the runs can be resumed at once.
         self.assertEqual(self.cluster.job(f"{array}_1")["JobState"], "CANCELLED")
         self.assertEqual(self.count_in_status("lost"), 0)

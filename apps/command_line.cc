@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <iterator>
+#include <sstream>
 #include <utility>
 
+#include "apps/progress.h"
 #include "core/error.h"
 #include "core/text.h"
 
@@ -18,10 +20,10 @@ std::string TypeName(const Option& option) {
   return option.name == "model" ? "FILE" : kNames.at(option.target.index());
 }
 
-/// Takes a flag's value.
+/// Receives a flag's value.
 using TakeValue = std::function<void(const std::string&)>;
 
-/// Adds the flag of one setting; of several values the last counts.
+/// Adds the flag of one setting; the last of several values counts.
 void AddFlag(CLI::App& app, const Option& option, const std::string& group, const TakeValue& take) {
   const std::string help = option.about_with_default();
   if (std::holds_alternative<bool*>(option.target)) {
@@ -45,7 +47,29 @@ CLI::Validator NotEmpty(std::string_view what) {
           ""};
 }
 
-/// Formats --help within kHelpColumns, without the `{false}` that CLI11 adds to a flag's --no-
+/// `text` with its prose wrapped to HelpColumns(). Indented lines and headings (`Examples:`) stay.
+std::string Reflowed(const std::string& text) {
+  std::string result, prose;
+  const auto end_paragraph = [&] {
+    if (!prose.empty()) result += WrapText(prose, HelpColumns()) + '\n';
+    prose.clear();
+  };
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.empty() || line.starts_with(' ')) {
+      end_paragraph();
+      result += Concat(line, '\n');
+      continue;
+    }
+    const bool heading = prose.empty() && line.ends_with(':');
+    prose += Concat(prose.empty() ? "" : " ", line);
+    if (heading) end_paragraph();
+  }
+  end_paragraph();
+  return result;
+}
+
+/// Formats --help within HelpColumns(), without the `{false}` that CLI11 adds to a flag's --no-
 /// form.
 class HelpFormatter : public CLI::Formatter {
  public:
@@ -63,6 +87,10 @@ class HelpFormatter : public CLI::Formatter {
     return CLI::Formatter::make_help(app, std::move(name), mode);
   }
 
+  std::string make_footer(const CLI::App* app) const override {
+    return Reflowed(CLI::Formatter::make_footer(app));
+  }
+
   std::string make_option_name(const CLI::Option* option, bool is_positional) const override {
     std::string name = CLI::Formatter::make_option_name(option, is_positional);
     constexpr std::string_view kNoise = "{false}";
@@ -73,7 +101,7 @@ class HelpFormatter : public CLI::Formatter {
   std::string make_option_desc(const CLI::Option* option) const override {
     std::string description = option->get_description();
     std::ranges::replace(description, '\n', ' ');  // lines end where the width asks for it
-    return WrapText(description, kHelpColumns - get_column_width());
+    return WrapText(description, HelpColumns() - get_column_width());
   }
 
  private:
@@ -98,7 +126,7 @@ std::vector<std::string> KnownWords(const CLI::App& app) {
   return words;
 }
 
-/// Says of a flag that is not known what was meant, or why there is none of that name.
+/// Suggests a similar flag for an unknown one, or explains why this command lacks it.
 std::string ExplainFlag(const CLI::App& app, const std::string& word) {
   if (const auto* help = dynamic_cast<const HelpFormatter*>(app.get_formatter().get())) {
     help->HideFlags();
@@ -111,14 +139,14 @@ std::string ExplainFlag(const CLI::App& app, const std::string& word) {
   return "";
 }
 
-/// Says which commands there are, as `got` is none.
+/// The message for `got`, which is no command.
 std::string ExplainCommands(const CLI::App& program, const std::string& got) {
   std::vector<std::string> names;
   for (const CLI::App* sub : program.get_subcommands({})) names.push_back(sub->get_name());
   return Concat("expected a command, one of ", Join(names, ", "), "; got ", got);
 }
 
-/// Says what is missing on the command line.
+/// The message for a missing argument.
 std::string ExplainMissing(const CLI::App& program, const CLI::App& app) {
   if (&app == &program) return ExplainCommands(program, "none");
   for (const CLI::Option* option : app.get_options()) {
@@ -126,14 +154,14 @@ std::string ExplainMissing(const CLI::App& program, const CLI::App& app) {
     return Concat(app.get_name(), ": expected ", option->get_type_name(), " (",
                   option->get_description(), "), got none");
   }
-  return Concat(app.get_name(), ": an argument is missing");
+  return Concat(app.get_name(), ": expected another argument, got none");
 }
 
-/// Says what was wrong with the values of a flag. CLI11 names the flag only at the beginning of its
-/// message, such as `--gamma: 1 required NUMBER missing`.
+/// The message for a wrong number of values of a flag. CLI11 names the flag only at the beginning
+/// of its message, such as `--gamma: 1 required NUMBER missing`.
 std::string ExplainValues(const std::string& message) {
   if (message.find("flag override") != std::string::npos) {
-    return Concat("--", message.substr(0, message.find(' ')), ": takes no value");
+    return Concat("--", message.substr(0, message.find(' ')), ": expected no value, got one");
   }
   const std::string flag = message.substr(0, message.find_first_of(": "));
   const bool several = message.find("received") != std::string::npos;
@@ -149,10 +177,10 @@ std::string ExplainUnknown(const CLI::App& program, const CLI::App& app) {
   if (word.starts_with("-")) return Concat("unknown flag ", word, ExplainFlag(app, word));
   const std::string meant = DidYouMean(word, KnownWords(app));
   return &app == &program ? ExplainCommands(program, Concat("\"", word, "\"", meant))
-                          : Concat(app.get_name(), ": did not expect ", word, meant);
+                          : Concat(app.get_name(), ": expected no argument ", word, meant);
 }
 
-/// Says in one line what was wrong with the command line.
+/// The message for a wrong command line, in one line.
 std::string Explain(const CLI::App& program, const CLI::ParseError& error) {
   const auto chosen = program.get_subcommands();
   const CLI::App& app = chosen.empty() ? program : *chosen.front();
@@ -179,6 +207,8 @@ CLI::Option* AddText(CLI::App& app, std::string_view name, Target& target, std::
 }
 
 }  // namespace
+
+size_t HelpColumns() { return static_cast<size_t>(std::clamp(TerminalWidth(100), 80, 100)); }
 
 void CommandLine::Text(std::string_view name, std::string& target, std::string_view type,
                        std::string_view help, std::string_view what) {
@@ -216,7 +246,7 @@ void CommandLine::Arguments(const Options& options) {
 }
 
 void CommandLine::Settings(const Options& options, std::vector<FlagValue>& flags) {
-  // CLI11 applies flags in this order: aliases first, so that what is more specific wins.
+  // CLI11 applies flags in this order: aliases first, so that the more specific flag wins.
   for (const auto& alias : options.aliases()) {
     Option as_one = *options.Find(alias.name, alias.name).front();
     as_one.help = alias.help;
@@ -265,17 +295,21 @@ std::string CommandLine::Last(std::string_view name) const {
 int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> commands,
                const std::string& footer) {
   CLI::App program(
-      "Upswing trains, tests and explains controllers that swing up and balance a double\n"
-      "pendulum with one motor at its first joint, in MuJoCo.",
+      "Upswing trains, compares, explains and deploys controllers that swing up and\n"
+      "balance a double pendulum with one motor.",
       "upswing");
   program.set_version_flag("--version", "upswing " UPSWING_VERSION);
   program.require_subcommand(1);
-  program.formatter(std::make_shared<HelpFormatter>());
+  const auto formatter = std::make_shared<HelpFormatter>();
+  constexpr size_t kCommandColumns = 14;
+  formatter->column_width(kCommandColumns);
+  program.formatter(formatter);
   program.footer(footer);
   std::vector<std::unique_ptr<CommandLine>> lines;
   const CommandLine* chosen = nullptr;
   for (const CommandEntry& command : commands) {
     CLI::App* app = program.add_subcommand(command.name, command.help);
+    app->formatter(std::make_shared<HelpFormatter>());
     CommandLine& line = *lines.emplace_back(new CommandLine(*app));
     if (command.declare != nullptr) command.declare(line);
     app->callback([&line, &chosen] {

@@ -19,17 +19,17 @@ class App;
 /// The program's command line. Only command_line.cc knows the library that parses it.
 namespace upswing {
 
-/// A value that must not be empty, such as that of a shell variable that is not set.
+/// The expected kind of an argument whose value must not be empty, as from an unset shell variable.
 inline constexpr std::string_view kPath = "a path";
 
-/// One command while its arguments are declared, and what it does once they are parsed.
+/// One command: declares its arguments, then runs it with their values.
 class CommandLine {
  public:
   explicit CommandLine(CLI::App& app) : app_(app) {}
 
-  /// Adds a text: a flag where the name begins with `--`, else a positional argument. `type` stands
-  /// for the value in --help. An empty value is refused, as `what` is expected; an empty `what`
-  /// allows it.
+  /// Adds a text: a flag if the name begins with `--`, else a positional argument. --help shows
+  /// `type` for the value. `what` names the expected value in the error for an empty one; an empty
+  /// `what` allows empty values.
   void Text(std::string_view name, std::string& target, std::string_view type,
             std::string_view help, std::string_view what = kPath);
   void Text(std::string_view name, std::optional<std::string>& target, std::string_view type,
@@ -45,15 +45,15 @@ class CommandLine {
   /// Adds a flag without a value.
   void Flag(std::string_view name, bool& target, std::string_view help);
 
-  /// Adds a flag for each of the command's own numbers and choices, which sets it at once; see
-  /// Option::Set.
+  /// Adds a flag for each of the command's own numbers and choices. The flag sets the value at
+  /// once; see Option::Set.
   void Arguments(const Options& options);
-  /// Adds a flag for each setting and alias, in the order in which they were described. What is
-  /// given is added to `flags`.
+  /// Adds a flag for each setting and alias, in the order of their descriptions. Given values are
+  /// appended to `flags`.
   void Settings(const Options& options, std::vector<FlagValue>& flags);
-  /// Lets --help ask `shown`, which calls its argument with all settings that were added and with
-  /// those to show, whose values are the defaults. Only flags of these are suggested for a misspelt
-  /// one; of the others the message has their WhyMissing.
+  /// Lets --help call `shown`. It calls its argument with all added settings and with the settings
+  /// to show, whose values are the defaults. A misspelt flag gets suggestions from the shown
+  /// settings; for the others the message is their WhyMissing.
   using ShowOptions = std::function<void(const Options& every, const Options& options)>;
   void ShowSettings(std::function<void(const ShowOptions&)> shown);
 
@@ -96,7 +96,8 @@ struct CommandEntry {
 int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> commands,
                const std::string& footer);
 
-/// The columns that a line of --help has at most.
-inline constexpr size_t kHelpColumns = 100;
+/// The largest number of columns of a line of --help: the terminal's, from 80 to 100; without a
+/// terminal 100.
+size_t HelpColumns();
 
 }  // namespace upswing

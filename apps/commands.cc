@@ -8,9 +8,9 @@
 namespace upswing {
 
 void AddPolicy(CommandLine& line, PolicyArguments& a) {
-  line.Text(
-      "policy", a.name, "POLICY|RUN",
-      Concat("policy.safetensors, run folder or controller: ", Join(ControllerNames(), ", ")));
+  line.Text("policy", a.name, "POLICY|RUN",
+            Concat("policy.safetensors, a run folder or a controller (",
+                   Join(ControllerNames(), ", "), ")"));
   AddControllers(line, a);
 }
 
@@ -18,7 +18,7 @@ void AddControllers(CommandLine& line, PolicyArguments& a) {
   const ControllerConfig defaults;
   line.Settings(OptionsOf(defaults), a.flags);
   line.Repeated("--made-for", a.made_for, "NAME=VALUE",
-                "plant that a controller is made for, such as mass2=1.2 (repeat for more)",
+                "change of the controller's design plant, such as mass2=1.2 (repeatable)",
                 "controller");
 }
 
@@ -41,26 +41,27 @@ void AddPhysics(CommandLine& line, std::string& physics) {
 }
 
 void AddManyOptions(CommandLine& line, std::string& seeds, int64_t& jobs) {
-  line.Text("--seeds", seeds, "SEEDS", "a run for each: 10 for 1 to 10, or a list such as 3,5,8-12",
+  line.Text("--seeds", seeds, "SEEDS",
+            "seeds, one run each: 10 for 1 to 10, or a list such as 3,5,8-12",
             "a number of seeds or a list such as 3,5,8-12");
   Options options;
-  options.Add(&jobs, "jobs", {1, 4096}, "", "runs at a time").usual = "one for each processor";
+  options.Add(&jobs, "jobs", {1, 4096}, "", "number of runs at a time").usual = "one per processor";
   line.Arguments(options);
 }
 
 void AddSet(CommandLine& line, std::vector<std::string>& set, const std::string& help) {
-  line.Repeated("--set", set, "NAME=VALUE", help + " (repeat for more)");
+  line.Repeated("--set", set, "NAME=VALUE", help + " (repeatable)");
 }
 
 void AddUnknownPlant(CommandLine& line, bool& unknown_plant) {
   line.Flag("--unknown-plant", unknown_plant,
-            "scale the observed energy and height by the training's plant");
+            "scale observed energy and height by the training's plant, not the episode's");
 }
 
 void AddTrialOptions(CommandLine& line, TrialArguments& a, const std::string& seed_of) {
   AddSeed(line, a.seed, seed_of);
-  AddSet(line, a.set, "another plant, such as mass2=1.2");
-  line.Text("--model", a.model, "FILE", "MJCF file to use instead of the policy's model");
+  AddSet(line, a.set, "change of the plant, such as mass2=1.2");
+  line.Text("--model", a.model, "FILE", "MJCF file that replaces the policy's model");
   AddPhysics(line, a.physics);
   AddUnknownPlant(line, a.unknown_plant);
   const TrialConditions defaults;
@@ -70,10 +71,11 @@ void AddTrialOptions(CommandLine& line, TrialArguments& a, const std::string& se
 }
 
 void AddEpisodeOptions(CommandLine& line, TrialArguments& a) {
-  line.Text("--start", a.start, "q1,q2,w1,w2", "where it begins, rad and rad/s [0,0,0,0: hanging]",
-            "");
+  line.Text("--start", a.start, "q1,q2,w1,w2",
+            "start state [rad, rad/s] (default 0,0,0,0: hanging)", "");
   Options own;
-  own.Add(&a.episode, "episode", {0, 999999}, "", "that of `eval` with the same flags, from 0")
+  own.Add(&a.episode, "episode", {0, 999999}, "",
+          "index of the episode of `eval` with the same flags")
       .usual = "none";
   line.Arguments(own);
 }

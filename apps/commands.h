@@ -24,13 +24,13 @@ void AddExport(CommandLine& line);
 void AddView(CommandLine& line);
 void AddRealAiGym(CommandLine& line);
 
-/// Adds the policy to try, a file, a run folder or a controller, and the controllers' settings.
+/// Adds the policy argument (a file, a run folder or a controller) and the controllers' settings.
 void AddPolicy(CommandLine& line, PolicyArguments& a);
 
 /// Adds the settings of controllers and --made-for.
 void AddControllers(CommandLine& line, PolicyArguments& a);
 
-/// Adds --seed, with `what` it is of.
+/// Adds --seed, the seed of `what`.
 void AddSeed(CommandLine& line, int64_t& seed, const std::string& what);
 
 /// Adds --threads, which ResolveThreads reads.
@@ -39,7 +39,7 @@ void AddThreads(CommandLine& line, int64_t& threads);
 /// Adds --physics, which FindEngine reads.
 void AddPhysics(CommandLine& line, std::string& physics);
 
-/// Adds --seeds and --jobs, for many runs; 0 jobs: as many as there are processors.
+/// Adds --seeds and --jobs, for many runs; 0 jobs: one per processor.
 void AddManyOptions(CommandLine& line, std::string& seeds, int64_t& jobs);
 
 /// Adds --set, which ApplyChanges reads.
@@ -49,10 +49,10 @@ void AddSet(CommandLine& line, std::vector<std::string>& set, const std::string&
 void AddUnknownPlant(CommandLine& line, bool& unknown_plant);
 
 /// Adds --set, --model, --physics, --seed (of `seed_of`), --unknown-plant, and the settings of
-/// Disturbance and Randomization: how `eval`, `simulate` and `plot` try a policy out.
+/// Disturbance and Randomization: the conditions of `eval`, `simulate` and `plot`.
 void AddTrialOptions(CommandLine& line, TrialArguments& a, const std::string& seed_of);
 
-/// Adds --start and --episode: the one episode that `simulate`, `plot` and `view` make.
+/// Adds --start and --episode: the single episode of `simulate`, `plot` and `view`.
 void AddEpisodeOptions(CommandLine& line, TrialArguments& a);
 
 }  // namespace upswing

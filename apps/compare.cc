@@ -21,15 +21,15 @@ namespace {
 namespace fs = std::filesystem;
 
 struct CompareArguments {
-  std::vector<std::string> names;  // of runs and policies
-  PolicyArguments controllers;     // settings of those among them
-  CompareRequest runs;             // but for its paths
+  std::vector<std::string> names;  // runs and policies
+  PolicyArguments controllers;     // settings of the controllers among them
+  CompareRequest runs;             // without its paths
   std::string out;
   int64_t threads = 0;
   bool as_json = false;
 };
 
-/// A controller, or a policy's file; anything else is to be a run or to hold some.
+/// Whether a name is a controller or a policy file; other names are runs or folders of runs.
 bool IsPolicy(const std::string& name) {
   const fs::path path = name;
   std::error_code error;
@@ -37,18 +37,18 @@ bool IsPolicy(const std::string& name) {
          (path.extension() == ".safetensors" && !fs::is_directory(path, error));
 }
 
-/// Throws BadInput unless policies that are named have runs beside them, of one task each.
+/// Throws BadInput if there are policies without runs, or with --different-tasks.
 void CheckPolicies(const CompareArguments& a, const std::vector<std::string>& policies) {
   if (policies.empty()) return;
   const std::string names = Join(policies, " ");
   if (policies.size() == a.names.size()) {
-    throw BadInput(Concat("compare: expected trainings beside ", names,
-                          ", whose evaluations say on what to judge, got none (`upswing bounds ",
-                          names, "` compares policies alone)"));
+    throw BadInput(Concat("compare: expected runs too, whose episodes ", names,
+                          " can be evaluated on, got none (`upswing bounds ", names,
+                          "` compares policies without runs)"));
   }
   if (a.runs.different_tasks) {
-    throw BadInput(Concat("--different-tasks: expected no policy beside it, as each is judged on ",
-                          "the task of the runs, got ", names));
+    throw BadInput(Concat("--different-tasks: expected no policy with it, because a policy is ",
+                          "evaluated on the runs' task, got ", names));
   }
 }
 
@@ -72,8 +72,8 @@ int RunCompare(const CompareArguments& arguments) {
   if (!policies.empty()) {
     ThreadPool pool(ResolveThreads(arguments.threads));
     EpisodeProgress progress(arguments.as_json);
-    const bool make_anew = arguments.controllers.made_for.empty();
-    AddPolicies(policies, make_anew, pool, std::ref(progress), comparison);
+    const bool redesign = arguments.controllers.made_for.empty();
+    AddPolicies(policies, redesign, pool, std::ref(progress), comparison);
   }
   if (arguments.as_json) {
     fmt::print("{}\n", ComparisonJson(comparison));
@@ -92,34 +92,35 @@ int RunCompare(const CompareArguments& arguments) {
 void AddCompare(CommandLine& line) {
   CompareArguments& a = line.Runs(RunCompare);
   line.Texts("runs", a.names, "RUN|FOLDER|POLICY",
-             Concat("run folders, or folders that hold some; beside them policy.safetensors ",
-                    "or controllers: ", Join(ControllerNames(), ", ")));
+             Concat("runs or folders of runs; with them also policies: policy.safetensors or ",
+                    "controllers (", Join(ControllerNames(), ", "), ")"));
   line.Require("runs");
   AddControllers(line, a.controllers);
   line.Text("--out", a.out, "FOLDER",
             "new folder for summary.csv, runs.csv, policies.csv, curves.svg and curves.png "
-            "(curves-2 and so on for further tasks)");
-  line.Flag("--unfinished", a.runs.unfinished, "compare unfinished runs too, as they are");
+            "(curves-2, … for further tasks)");
+  line.Flag("--unfinished", a.runs.unfinished,
+            "compare unfinished runs too, up to their last evaluation");
   line.Flag("--different-tasks", a.runs.different_tasks,
-            "compare groups that are evaluated on different tasks (plant, disturbance, number of "
-            "episodes) with each other as well");
+            "compare also groups whose evaluations differ in plant, disturbance or number of "
+            "episodes");
   AddThreads(line, a.threads);
   line.Flag("--json", a.as_json, "print JSON");
   line.Footer(
-      "Runs with the same settings but the seed are one group. Figures are over its runs: the\n"
-      "interquartile mean (IQM) with a 95% bootstrap interval; docs/statistics.md defines each.\n"
-      "A run that did not solve the task counts as one that needs more than its budget. Groups\n"
-      "are compared with those that are evaluated on the same task. Broken and unfinished runs,\n"
-      "and folders without a run, are left out with a note.\n\n"
-      "A policy's file or a controller has no seeds. It is judged on the episodes of the runs'\n"
-      "final evaluations (of the first runs, up to 1,000 episodes), a controller made for their\n"
-      "plant unless --made-for says otherwise; its return stands beside the runs', without an\n"
-      "interval. mpc takes half a second of a processor for an episode.\n\n"
+      "Runs that differ only in the seed are one group. Figures are over the runs of a\n"
+      "group: the interquartile mean (IQM) with a 95% bootstrap interval. A run that did\n"
+      "not solve the task counts as one that needs more than its budget. Groups are\n"
+      "compared if they are evaluated on the same task. A note names each broken or\n"
+      "unfinished run and each folder without a run; they are left out.\n\n"
+      "A policy or controller has no seeds. It is evaluated on the episodes of the runs'\n"
+      "final evaluations (of the first runs, up to 1,000 episodes). A controller is\n"
+      "designed for the runs' plant unless --made-for changes that. Its return has no\n"
+      "interval. mpc needs half a second of processor time per episode.\n\n"
       "Examples:\n"
-      "  ./upswing compare runs/d3qn-seed*                  one agent over its seeds\n"
-      "  ./upswing compare runs --out runs/comparison       all agents in runs, with figures\n"
-      "  ./upswing compare study --json                     STUDY/VARIANT/SEED, for a program\n"
-      "  ./upswing compare runs/d3qn-seed* mpc tvlqr        beside classical control\n");
+      "  ./upswing compare runs/d3qn-seed*               one agent over its seeds\n"
+      "  ./upswing compare runs --out runs/comparison    all agents in runs, with figures\n"
+      "  ./upswing compare runs/post --json              a study, for another program\n"
+      "  ./upswing compare runs/d3qn-seed* mpc tvlqr     with classical control\n");
 }
 
 }  // namespace upswing

@@ -17,7 +17,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-/// A number as the table shows it; infinity: not reached by enough runs.
+/// Formats a number of the table; infinity: too few runs reached it.
 using Formatter = std::string (*)(double);
 
 std::string Seconds(double x) { return std::isfinite(x) ? FormatDuration(x) : "not solved"; }
@@ -57,13 +57,12 @@ void PrintStability(const GroupSummary& summary) {
   const Stability& s = summary.stability;
   if (summary.solved == 0) return;
   if (s.runs == 0) {
-    fmt::print("  {:<16}no later evaluations: every run that solved stopped there\n",
-               "once solved");
+    fmt::print("  {:<16}no later evaluations: each run stopped when solved\n", "once solved");
     return;
   }
   fmt::print(
-      "  {:<16}{} of {} seeds keep at least {:.0f}% in every later evaluation; so do {} of "
-      "{} evaluations, lowest {}\n",
+      "  {:<16}{} of {} seeds reach {:.0f}% success in every later evaluation, as do {} of {} "
+      "evaluations; lowest {}\n",
       "once solved", s.steady_runs, s.runs, 100 * kSteadyRate, s.steady_evaluations, s.evaluations,
       Percent(s.lowest));
 }
@@ -81,7 +80,7 @@ void PrintFigure(const RunFigure& figure, const Scores& scores, const std::strin
   if (figure.kind == kTorqueRate) unit = Concat(" ", torque_unit, "/s");
   PrintScores(figure.label, scores, kFormats.at(figure.kind), unit);
   if (figure.kind == kRatio && ValueIsOff(scores.median, 1)) {
-    fmt::print("  {:<16}the expected value is off by more than a quarter\n", "");
+    fmt::print("  {:<16}the estimate is off by more than a quarter\n", "");
   }
 }
 
@@ -112,13 +111,13 @@ void PrintPair(const Comparison& comparison, const PairSummary& pair) {
              Printable(comparison.groups[pair.b].label));
   fmt::print("  {:<16}{}", "solves sooner", PairsText(pair.sooner));
   if (pair.seconds_difference) {
-    fmt::print("; difference of IQMs, s: {}", EstimateText(*pair.seconds_difference, Signed));
+    fmt::print("; difference of IQMs [s]: {}", EstimateText(*pair.seconds_difference, Signed));
   }
   fmt::print("\n  {:<16}{}; difference of IQMs: {}\n\n", "higher return",
              PairsText(pair.higher_return), EstimateText(pair.return_difference, Signed));
 }
 
-/// How a policy did, which has no seeds.
+/// Prints the figures of a policy, which has no seeds.
 void PrintPolicy(const JudgedPolicy& policy, const std::string& task) {
   const Evaluation& e = policy.figures;
   const auto print = [](const char* name, const std::string& text) {
@@ -126,7 +125,7 @@ void PrintPolicy(const JudgedPolicy& policy, const std::string& task) {
   };
   fmt::print("{}\n", Printable(policy.name));
   if (!task.empty()) print("task", Printable(task));
-  print("episodes", fmt::format("{}, of the final evaluations of {}", FormatCount(e.episodes),
+  print("episodes", fmt::format("{}, from the final evaluations of {}", FormatCount(e.episodes),
                                 policy.runs == 1 ? "one run" : Concat(policy.runs, " runs")));
   print("success", EstimateText({e.success_rate(), e.success_interval}, Percent));
   const bool upright = policy.upright();
@@ -134,7 +133,7 @@ void PrintPolicy(const JudgedPolicy& policy, const std::string& task) {
   print("return", MomentsText(e.reward_sum));
   const std::string& unit = policy.spec.action_unit;
   print("rms torque", Concat(Torque(e.rms_torque.mean), ' ', unit));
-  print("its variation", Concat(Torque(e.torque_variation.mean), ' ', unit, "/s"));
+  print("torque change", Concat(Torque(e.torque_variation.mean), ' ', unit, "/s"));
   if (upright) print("  once upright", Concat(Torque(e.goal_variation.mean), ' ', unit, "/s"));
   fmt::print("\n");
 }
@@ -143,7 +142,7 @@ void PrintAgainst(const Comparison& comparison, const AgainstPolicy& against) {
   const RunGroup& group = comparison.groups[against.group];
   fmt::print("{} against {}\n", Printable(group.label),
              Printable(comparison.policies[against.policy].name));
-  fmt::print("  {:<16}in {} of {} (95% {} to {}); difference of the IQM to its return: {}\n\n",
+  fmt::print("  {:<16}in {} of {} runs (95% {} to {}); IQM minus the policy's return: {}\n\n",
              "higher return", against.higher, group.runs.size(),
              Percent(against.higher_interval.low), Percent(against.higher_interval.high),
              EstimateText(against.difference, Signed));
@@ -208,13 +207,14 @@ void PrintComparison(const Comparison& comparison) {
     return ResamplesOf({std::vector<double>(group.runs.size())}) < kResamples;
   });
   fmt::print(
-      "Intervals: Wilson for shares, else percentile bootstrap of {}{} resamples of the runs, or "
-      "Newcombe's\nwhere all pairs of runs agree.\n",
+      "Intervals: Wilson for shares, Newcombe if all pairs of runs agree, else percentile "
+      "bootstrap "
+      "with\n{}{} resamples of the runs.\n",
       fewer ? "at most " : "", FormatCount(kResamples));
   if (!comparison.policies.empty()) {
     fmt::print(
-        "A policy has no seeds: its return is a mean, ± the standard deviation, over episodes. "
-        "Intervals of\ndifferences to it are of the runs alone.\n");
+        "A policy has no seeds: its return is the mean ± the standard deviation over episodes. "
+        "Intervals of\ndifferences to it cover only the spread of the runs.\n");
   }
 }
 

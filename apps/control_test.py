@@ -54,7 +54,7 @@ class Lqr(ProgramTest):
         other = json.loads(self.succeed("eval", "lqr", "--set", "mass2=1.2", "--episodes", 4,
                                         "--physics", "closed-form", "--json"))
         self.assertEqual((other["policy"], other["plant"]["mass2"]), ("lqr", 1.2))
-        note = "it balances and does not swing up"
+        note = "the controller balances and does not swing up"
         for name, balances in (("lqr", True), ("energy", False)):
             table = self.succeed("eval", name, "--episodes", 1, "--physics", "closed-form")
             self.assertEqual(note in table, balances, name)
@@ -79,9 +79,9 @@ class Lqr(ProgramTest):
         self.assertEqual(self.simulate("--set", "actuated_joint=2", "--start", "3.131,0.02,0,0",
                                        "--seconds", 3)[-1]["inverted"], 0)
         self.refuse(["eval", "lqr", "--made-for", "actuated_joint=2", "--made-for",
-                     "damping1=0.5659823434"], "lqr: no gain was found", "damping of joint 1 cancels")
+                     "damping1=0.5659823434"], "lqr: found no gain", "damping of joint 1 cancels")
         for law in ("energy", "pfl"):
-            self.refuse(["eval", law, "--made-for", "actuated_joint=2"], f"{law}: ", "motor is at joint 1")
+            self.refuse(["eval", law, "--made-for", "actuated_joint=2"], f"{law}: ", "motor at joint 1")
         for joint in ("0", "1.5", "3"):
             self.refuse(["eval", "lqr", "--set", f"actuated_joint={joint}"], "actuated_joint",
                         "a multiple of 1 in [1, 2]")
@@ -119,9 +119,9 @@ class Lqr(ProgramTest):
         self.assertTrue((self.folder / "runs/plot-lqr-2/phase.png").exists())
 
     def test_what_cannot_be_held(self):
-        self.refuse(["eval", "lqr", "--made-for", LOST], "lqr: no gain was found", "3.804/s",
+        self.refuse(["eval", "lqr", "--made-for", LOST], "lqr: found no gain", "3.804/s",
                     "ratio 0.891", "delta")
-        self.refuse(["map", "lqr", "--made-for", LOST], "lqr: no gain was found")
+        self.refuse(["map", "lqr", "--made-for", LOST], "lqr: found no gain")
         self.refuse(["eval", "lqr", "--made-for", "damping2=90"], "steps of 0.005 s", "557/s")
         self.refuse(["eval", "lqr", *"--lqr-q1 0 --lqr-q2 0 --lqr-w1 0 --lqr-w2 0".split()],
                     "expected a weight above 0")
@@ -137,18 +137,18 @@ class Lqr(ProgramTest):
                         POLICY)
             self.refuse([command, POLICY, "--made-for", "mass1=2"], "--made-for: expected a controller")
         for command in ("simulate", "info"):  # without a policy
-            self.refuse([command, "--lqr-q1", "3"], f"expected a controller ({ALL}) to set, got none")
+            self.refuse([command, "--lqr-q1", "3"], f"expected a controller ({ALL}) with it, got none")
 
     def test_bad_names(self):
         for command in ("eval", "simulate", "plot", "map", "info"):
             self.refuse([command, "lqrr"], "lqrr: no such file", "did you mean lqr?")
-        self.refuse(["export", "lqr", "--page", "page"], "lqr: no such file", "no controller")
+        self.refuse(["export", "lqr", "--page", "page"], "lqr: no such file", "not a controller")
         self.refuse(["eval", "lqr", "--task", "acrobot-v1"], "unknown flag --task")
 
     def test_a_file_of_that_name(self):
         self.write("lqr", "no policy")
         for command in ("eval", "simulate", "plot", "map", "info"):
-            self.refuse([command, "lqr"], "expected the controller or a file", "./lqr")
+            self.refuse([command, "lqr"], "expected a controller or a file", "./lqr")
         self.refuse(["eval", "./lqr"], "safetensors")
 
 
@@ -180,10 +180,10 @@ class SwingUp(ProgramTest):
         self.assertLess(caught["steady_tilt_degrees"]["link1"]["mean"], alone["steady_tilt_degrees"]["link1"]["mean"])
         self.assertIn("and lqr upright, region of attraction x'Px < ",
                       self.succeed("info", "hybrid", "--swing-up", POLICY))
-        self.refuse(["eval", "hybrid"], "hybrid: expected a policy that swings up, by --swing-up")
+        self.refuse(["eval", "hybrid"], "hybrid: expected a policy that swings up (--swing-up")
         self.refuse(["eval", "hybrid", "--swing-up", "none"], "--swing-up: none: no such file")
-        self.refuse(["eval", "mpc", "--swing-up", POLICY], "--swing-up: expected the controller hybrid, got mpc")
-        self.refuse(["eval", "lqr", "--mpc-seconds", 3], "--mpc-seconds: expected the controller mpc, got lqr")
+        self.refuse(["eval", "mpc", "--swing-up", POLICY], "--swing-up: expected the controller hybrid with it, got mpc")
+        self.refuse(["eval", "lqr", "--mpc-seconds", 3], "--mpc-seconds: expected the controller mpc with it, got lqr")
         self.refuse(["eval", POLICY, "--swing-up", POLICY], "--swing-up: expected a controller")
 
     def test_upright_all_of_them_hold(self):
@@ -205,14 +205,14 @@ class SwingUp(ProgramTest):
             self.assertEqual(self.eval("tvlqr", "--tvlqr-seconds", seconds, "--episodes", 3)["successes"], 3)
 
     def test_what_cannot_be_planned(self):
-        self.refuse(["info", "lqr", "--lqr-q1", "1e9", "--lqr-torque", "1e-9"], "weights, which are too far")
+        self.refuse(["info", "lqr", "--lqr-q1", "1e9", "--lqr-torque", "1e-9"], "weights so far apart")
         self.succeed("simulate", "energy", "--energy-ke", 0, "--energy-kp", 0, "--seconds", 1)
         self.refuse(["eval", "energy", "--energy-kd", "0"], "--energy-kd")
         self.refuse(["eval", "tvlqr", "--tvlqr-seconds", "1"], "tvlqr: found no swing-up of 1 s with 4 N")
         self.refuse(["eval", "tvlqr", "--tvlqr-seconds", "1.01"], "--tvlqr-seconds", "multiple of 0.02")
         self.refuse(["eval", "mpc", "--mpc-iterations", "0"], "--mpc-iterations")
         for controller in ("energy", "mpc", "pfl", "tvlqr"):
-            self.refuse(["eval", controller, "--made-for", LOST], "lqr: no gain was found", "delta")
+            self.refuse(["eval", controller, "--made-for", LOST], "lqr: found no gain", "delta")
 
 
 if __name__ == "__main__":

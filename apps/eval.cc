@@ -29,7 +29,8 @@ struct EvalArguments {
 int RunEval(const EvalArguments& a) {
   const bool to_output = IsStandardStream(a.episodes_csv);
   if (to_output && a.as_json) {
-    throw BadInput("--json: expected a file of its own for --episodes-csv, got - for it");
+    throw BadInput(
+        "--json: expected a file for --episodes-csv, got - (standard output), where the JSON goes");
   }
   if (!a.episodes_csv.empty()) CheckWritable("--episodes-csv", a.episodes_csv);
   const LoadedPolicy loaded = GetPolicy(a.policy);
@@ -39,7 +40,7 @@ int RunEval(const EvalArguments& a) {
     return EvaluatePolicy(loaded, a.trial, a.episodes, pool, std::ref(progress));
   }();
   if (!a.episodes_csv.empty()) WriteOutput(a.episodes_csv, EpisodesCsv(report));
-  if (to_output) return 0;  // the rows alone, for a reader
+  if (to_output) return 0;  // only the rows, for another program
   if (a.as_json) {
     fmt::print("{}\n", EvalJson(report));
   } else {
@@ -61,43 +62,40 @@ void AddEval(CommandLine& line) {
   DescribeEvalEpisodes(own, &a.episodes);
   line.Arguments(own);
   line.Text("--episodes-csv", a.episodes_csv, "FILE",
-            "table to write, a row for each episode: start, plant and figures; "
-            "-: standard output, instead of the table of figures");
+            "CSV file to write, a row per episode: start, plant and results; -: standard output, "
+            "instead of the table");
   AddTrialOptions(line, a.trial, "start states, noise and random plants");
   line.Flag("--known-plant", a.trial.known_plant,
-            "a controller is made anew for the plant of each episode: what knowing it brings");
+            "design a controller again for the plant of each episode, as if it knew the plant");
   AddThreads(line, a.threads);
   line.Flag("--json", a.as_json, "print JSON instead of a table");
   line.Footer(fmt::format(
-      "An episode of the double pendulum lasts {} s from hanging with normal noise of 0.1 (rad,\n"
-      "rad/s). It succeeds if both links are within 30° of upright for the whole of the last {} "
-      "s.\n"
-      "The return is the undiscounted sum of the reward, standard weights, over the first {} s.\n"
-      "Settled is a link within 9° of upright. Steady tilt, chatter and torque once upright are "
-      "over\n"
-      "successful episodes. docs/task.md has the other tasks.\n\n"
+      "An episode of the double pendulum starts hanging, with normal noise of 0.1 (rad,\n"
+      "rad/s), and lasts {} s. It succeeds if both links are within 30° of upright\n"
+      "throughout the last {} s. The return is the undiscounted sum of the reward, with\n"
+      "the standard weights, over the first {} s. A link within 9° of upright is settled.\n"
+      "Steady tilt, chatter and torque once upright are means over successful episodes.\n\n"
       "Examples:\n"
       "  ./upswing eval runs/d3qn-seed1\n"
       "  ./upswing eval policy.safetensors --episodes 1000 --seed 7 --json\n"
       "  ./upswing eval runs/d3qn-seed1 --set mass2=1.05 --set gravity=9.7\n"
       "  ./upswing eval runs/d3qn-seed1 --sensor-noise 0.02 --delay 0.02\n"
-      "  ./upswing eval runs/d3qn-seed1 --randomize 0.25 --episodes 1000   share of a box of "
-      "plants\n"
+      "  ./upswing eval runs/d3qn-seed1 --randomize 0.25 --episodes 1000\n"
       "  ./upswing eval runs/d3qn-seed1 --randomize 0.25 --episodes-csv episodes.csv\n"
-      "  ./upswing plot runs/d3qn-seed1 --randomize 0.25 --episode 17      look at one of them\n"
-      "  ./upswing eval mpc --randomize 0.25 --known-plant                 told each plant\n\n"
-      "Instead of a file, a controller's name will do (docs/control.md): lqr holds the pendulum "
-      "upright\n"
-      "and does not swing it up; tvlqr follows a planned swing-up, mpc plans anew at each "
-      "decision; "
-      "pfl\n"
-      "and energy pump energy until lqr catches; hybrid --swing-up POLICY lets lqr catch what was "
-      "learned.\n"
-      "--set takes mass1, mass2, length1, length2, damping1, damping2, gravity, torque_limit, and\n"
-      "mass, length, damping for both. With --randomize each episode has its own plant, drawn from "
-      "a\nbox around that one. Energy and height in the observation are scaled by the true plant "
-      "of the\nepisode, which reveals it to the policy; with --unknown-plant by the plant of the "
-      "training.\n",
+      "  ./upswing plot runs/d3qn-seed1 --randomize 0.25 --episode 17    draw episode 17\n"
+      "  ./upswing eval mpc --randomize 0.25 --known-plant\n\n"
+      "Controllers:\n"
+      "  lqr     holds the pendulum upright and does not swing it up\n"
+      "  tvlqr   follows a planned swing-up\n"
+      "  mpc     plans again at each decision\n"
+      "  pfl     pumps energy by partial feedback linearisation until lqr catches\n"
+      "  energy  pumps energy by energy shaping until lqr catches\n"
+      "  hybrid  lets lqr catch what --swing-up POLICY swings up\n\n"
+      "--set takes mass1, mass2, length1, length2, damping1, damping2, gravity,\n"
+      "torque_limit, and mass, length and damping for both links. With --randomize each\n"
+      "episode draws its plant from a box around the nominal one. Observed energy and\n"
+      "height are scaled by the episode's plant, which reveals the plant to the policy.\n"
+      "With --unknown-plant they are scaled by the plant of the training.\n",
       kEvaluationSeconds, kHoldSeconds, kReturnSeconds));
 }
 

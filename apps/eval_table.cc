@@ -13,24 +13,24 @@
 namespace upswing {
 namespace {
 
-/// How long the episodes are: one length, or, where some end earlier than others, their mean.
+/// Length of the episodes: one length, or the mean where some end earlier.
 std::string LengthText(const Moments& seconds) {
   constexpr double kSame = 1e-6;  // s
   if (seconds.deviation < kSame) return fmt::format("{:.6g} s", seconds.mean);
-  return fmt::format("the {} s of an episode", MomentsText(seconds));
+  return fmt::format("{} s per episode", MomentsText(seconds));
 }
 
-/// What makes an episode a success, such as `a return of -100 or more`.
+/// The condition of success, such as `a return of -100 or more`.
 std::string SuccessText(const EvaluationRule& rule) {
   if (rule.by_return()) return fmt::format("a return of {:.6g} or more", rule.solved_return);
-  return fmt::format("to be at the goal throughout the last {} of {} s", rule.hold_seconds,
+  return fmt::format("the goal held throughout the last {} of {} s", rule.hold_seconds,
                      rule.seconds);
 }
 
-/// Figures of the successful episodes alone, of a task whose goal is to be held.
+/// Prints figures over successful episodes, for a task whose goal has to be held.
 void PrintSuccesses(const Evaluation& e) {
   if (e.successes == 0) {
-    fmt::print("  swing-up time  no episode stays upright\n");
+    fmt::print("  swing-up time  none: no episode stays upright\n");
     return;
   }
   fmt::print("  swing-up time  {}\n", QuartilesText(e.swing_up_seconds));
@@ -40,25 +40,25 @@ void PrintSuccesses(const Evaluation& e) {
     fmt::print("  settling time  {}, within {}: {} of {}\n", QuartilesText(e.settling_seconds),
                within, e.settled, e.successes);
   } else {
-    fmt::print("  settling time  none stays within {}\n", within);
+    fmt::print("  settling time  none: no episode stays within {}\n", within);
   }
   std::vector<std::string> tilts;
   for (const Moments& tilt : e.tilt) {
     tilts.push_back(fmt::format("link {} {}°", tilts.size() + 1, MomentsText(tilt, kDegrees)));
   }
-  fmt::print("  steady tilt    {}   of the last {} s\n", Join(tilts, ", "), kSteadyTiltSeconds);
+  fmt::print("  steady tilt    {}   in the last {} s\n", Join(tilts, ", "), kSteadyTiltSeconds);
 }
 
 void PrintTorques(const Evaluation& e, const EnvSpec& spec) {
   const std::string& unit = spec.action_unit;
   fmt::print("  torque         peak {:.4g} {}, rms {} {}\n", e.peak_torque, unit,
              MomentsText(e.rms_torque), unit);
-  fmt::print("  its variation  {} {}/s", MomentsText(e.torque_variation), unit);
+  fmt::print("  torque change  {} {}/s", MomentsText(e.torque_variation), unit);
   const bool upright = !spec.evaluation.by_return() && e.successes > 0;
-  if (upright) fmt::print("; once upright {} {}/s", MomentsText(e.goal_variation), unit);
+  if (upright) fmt::print("; {} {}/s once upright", MomentsText(e.goal_variation), unit);
   fmt::print("\n");
   if (upright) {
-    fmt::print("  chatter        {} changes of the torque a second, once upright\n",
+    fmt::print("  chatter        {} torque changes per second once upright\n",
                MomentsText(e.goal_changes));
   }
 }
@@ -96,11 +96,13 @@ void PrintEvalTable(const EvalReport& report) {
   const std::string changes = ChangesText(report.env);
   if (!changes.empty()) fmt::print("  {:<15}{}\n", "with", changes);
   if (report.known_plant) {
-    fmt::print("  made for       the plant of each episode; for {} of {} there is none\n",
-               e.episodes - NumMade(report), e.episodes);
+    fmt::print(
+        "  designed for   the plant of each episode; {} of {} plants have no such controller\n",
+        e.episodes - NumDesigned(report), e.episodes);
   }
   if (report.only_balances) {
-    fmt::print("  note           it balances and does not swing up; episodes begin hanging\n");
+    fmt::print(
+        "  note           the controller balances and does not swing up; episodes start hanging\n");
   }
   fmt::print("  success        {} of {} = {:.1f}%   (95% interval {:.1f}% to {:.1f}%)\n",
              e.successes, e.episodes, 100 * e.success_rate(), 100 * e.success_interval.low,
@@ -115,7 +117,7 @@ void PrintEvalTable(const EvalReport& report) {
     fmt::print("  value at start {:.4g} expected, {:.4g} attained (discounted reward)\n", e.value,
                e.discounted_return);
     if (ValueIsOff(e.value, e.discounted_return)) {
-      fmt::print("                 the expectation is off by more than a quarter\n");
+      fmt::print("                 the estimate is off by more than a quarter\n");
     }
   }
   fmt::print("  energy used    {} J   in {}\n", MomentsText(e.work), LengthText(e.seconds));

@@ -144,9 +144,9 @@ class EvalTest(ProgramTest):
         for words in ("return", "energy used", "peak", "rms", "gravity 0.05",
                       "± is the standard deviation over the episodes"):
             self.assertIn(words, table)
-        for name, words in (("torque_variation", "its variation  {} N·m/s; once upright"),
-                            ("torque_variation_upright", "once upright {} N·m/s\n"),
-                            ("torque_changes_upright", "chatter        {} changes of the torque")):
+        for name, words in (("torque_variation", "torque change  {} N·m/s; "),
+                            ("torque_variation_upright", "; {} N·m/s once upright\n"),
+                            ("torque_changes_upright", "chatter        {} torque changes per second once upright")):
             self.assertIn(words.format(moments_text(result[name])), table)
         tilt = result["steady_tilt_degrees"]["link1"]
         self.assertIn(f"link 1 {moments_text(tilt)}°", table)
@@ -262,7 +262,7 @@ class EvalTest(ProgramTest):
 
     def test_bad_episodes(self):
         self.refuse(["simulate", self.policy, "--episode", 1, "--start", "0,0,0,0"], "--start",
-                    "beside --episode")
+                    "with --episode")
         self.refuse(["plot", self.policy, "--episode", -1], "--episode")
         self.refuse(["simulate", "--unknown-plant"], "--unknown-plant: expected a policy")
         self.refuse(["eval", self.policy, "--episodes-csv", ""], "--episodes-csv")

@@ -267,7 +267,7 @@ class PageTest(ProgramTest):
         _, untrained = read_tensors(self.folder / "page" / files[0])
         write_tensors(self.folder / "other.safetensors", about, untrained)
         self.refuse(["export", "other.safetensors", "--page", "page", "--checkpoints", "2"],
-                    "comes to another policy")
+                    "expected the same policy from training it again")
         self.assertEqual((self.folder / "page/agents.json").read_text(), before)
 
     def test_the_way_is_that_of_a_q_network_in_the_page(self):

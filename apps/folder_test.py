@@ -46,7 +46,7 @@ class LinkTest(RunTest):
                 with self.subTest(name=name, hard=hard):
                     self.restore()
                     away = self.link_away(f"run/{name}", hard)
-                    self.refuse(self.RESUME, f"run/{name}", "a file of this folder alone",
+                    self.refuse(self.RESUME, f"run/{name}", "a regular file that only this folder has",
                                 "hard links" if hard else "a link")
                     away.unlink()
 
@@ -277,12 +277,12 @@ class PlaceTest(ProgramTest):
         self.succeed(*small(**TINY))
         (self.folder / "many/policy.safetensors").unlink()
         output = self.succeed("train", "--resume", "many")
-        self.assertRegex(output, r"Best policy: of step \d+, but many/policy\.safetensors no longer "
+        self.assertRegex(output, r"Best policy: from step \d+, but many/policy\.safetensors no longer "
                                  r"exists")
         self.assertNotIn("upswing eval", output)
         self.assertRegex(self.succeed("info", "many"),
-                         r"policy +the best, of step \d+, no longer exists")
-        self.refuse(["eval", "many"], "many: this run has no policy")
+                         r"policy +the best one, from step \d+, no longer exists")
+        self.refuse(["eval", "many"], "many: expected a run with a policy.safetensors")
 
 
 if __name__ == "__main__":

@@ -34,42 +34,42 @@ std::string Known(std::optional<int64_t> count) {
   return count ? std::to_string(*count) : "unknown";
 }
 
-/// What a policy of the double pendulum sees.
+/// The observation of a policy of the double pendulum.
 std::string ObservationText(const LoadedPolicy& loaded) {
-  std::string text = fmt::format("{} numbers of the motion", kObservationSize);
+  std::string text = fmt::format("{} numbers for the motion", kObservationSize);
   if (loaded.identifies()) {
-    text += fmt::format(", {} of the plant as it identifies it", kIdentifiedSize);
+    text += fmt::format(", {} for the identified plant", kIdentifiedSize);
   }
   const int steps = loaded.memory();
   if (steps > 0) {
     text +=
-        fmt::format(", {} of {}", kMemorySize,
+        fmt::format(", {} for {}", kMemorySize,
                     steps == 1 ? "the last step" : fmt::format("each of the last {} steps", steps));
   }
   return text;
 }
 
-/// How the policy did in the evaluation that it was kept for.
+/// The result of the evaluation in which the policy was the best.
 std::string EvaluationText(const PolicyInfo& info) {
   if (!info.success_rate || !info.mean_return) return "unknown";
-  return fmt::format("success {:.0f}%, mean return {:.0f} (at that step)", 100 * *info.success_rate,
+  return fmt::format("success {:.0f}%, mean return {:.0f}", 100 * *info.success_rate,
                      *info.mean_return);
 }
 
 void PrintSelfCheck(const SelfCheck& check) {
-  fmt::print("  self-check  passed, largest difference {:.1e} of at most {:.1e}\n", check.error,
+  fmt::print("  self-check  passed, largest difference {:.1e} (allowed {:.1e})\n", check.error,
              check.tolerance);
   if (check.has_checksum) {
-    fmt::print("  checksum    correct: the file is as it was written\n");
+    fmt::print("  checksum    correct\n");
     return;
   }
   fmt::print(
-      "  checksum    none: the self-check cannot notice a changed weight that moves no "
-      "output of the\n"
-      "              samples by more than that\n");
+      "  checksum    none: a changed weight goes unnoticed if it moves no output of the "
+      "samples\n"
+      "              by more than allowed\n");
 }
 
-/// What is known of a controller, which has no file and no training.
+/// Prints a controller, which has no file and no training.
 void PrintController(const LoadedPolicy& loaded) {
   const Policy& policy = *loaded.policy;
   fmt::print("{}\n", Printable(loaded.name));
@@ -78,10 +78,10 @@ void PrintController(const LoadedPolicy& loaded) {
              *policy.info().control_period);
   fmt::print("  plant       {}\n", PlantText(loaded.plant));
   const UprightModes modes = ModesOf(loaded.plant);
-  fmt::print("  modes       upright, grow at {:.3g}/s and {:.3g}/s (ratio {:.3g}), delta {:.2f}\n",
+  fmt::print("  modes       grow at {:.3g}/s and {:.3g}/s upright (ratio {:.3g}), delta {:.2f}\n",
              modes.faster, modes.slower, modes.slower / modes.faster, modes.delta);
   if (const auto* regulator = dynamic_cast<const LqrPolicy*>(&policy)) {
-    fmt::print("  region      of attraction, by simulation: x'Px < {:.4g}\n",
+    fmt::print("  region      of attraction x'Px < {:.4g}, found by simulation\n",
                RegionOfAttraction(regulator->lqr(), loaded.plant));
   }
 }
@@ -100,7 +100,7 @@ void PrintPolicy(const LoadedPolicy& loaded) {
   if (learned != nullptr) levels = learned->parts().torques;
   fmt::print("  torques     {}, every {} s\n",
              levels.empty()
-                 ? "any within the limit"
+                 ? "any within the torque limit"
                  : fmt::format("{} {}", fmt::join(levels, ", "), SpecOf(env).action_unit),
              *info.control_period);
   fmt::print("  made by     agent {}, seed {}, step {}, upswing {}\n", Known(info.agent),
@@ -137,12 +137,12 @@ void PrintRun(const fs::path& path, bool has_policy) {
   }
   if (has_policy) return;
   fmt::print("  policy      {}\n", state.best_step == 0
-                                       ? "none yet: the first evaluation writes it"
-                                       : fmt::format("the best, of step {}, no longer exists",
+                                       ? "none yet; the first evaluation writes one"
+                                       : fmt::format("the best one, from step {}, no longer exists",
                                                      FormatCount(state.best_step)));
 }
 
-/// The program's version and what it uses of this machine.
+/// Prints the program's version and what it uses on this machine.
 void PrintProgram() {
   fmt::print("upswing {}\n", UPSWING_VERSION);
   fmt::print("  physics     MuJoCo {}\n", MuJoCoVersion());
@@ -169,7 +169,7 @@ int RunInfo(const PolicyArguments& a) {
     if (!fs::exists(run_policy)) throw;
     throw Error(
         error.exit_code(),
-        Concat(error.what(), " (its policy is a file of its own: ", run_policy.string(), ")"));
+        Concat(error.what(), " (its policy is a separate file: ", run_policy.string(), ")"));
   }
   if (!is_run || fs::exists(run_policy)) PrintPolicy(GetPolicy(a));
   return 0;
@@ -185,7 +185,7 @@ void AddInfo(CommandLine& line) {
       "  ./upswing info runs/d3qn-seed1\n"
       "  ./upswing info policy.safetensors\n"
       "  ./upswing info lqr --made-for mass2=1.2\n"
-      "  ./upswing info                      which instructions the kernels use here\n");
+      "  ./upswing info               threads and vector instructions on this machine\n");
 }
 
 }  // namespace upswing

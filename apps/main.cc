@@ -4,38 +4,37 @@
 namespace upswing {
 namespace {
 
-/// In the order of --help.
+/// The only list of commands, in the order of --help. ./upswing prints it too: one line each.
 constexpr CommandEntry kCommands[] = {
-    {"train", "Train an agent until the task is solved", AddTrain},
+    {"train", "Train an agent until it solves the task", AddTrain},
     {"eval", "Evaluate a policy over many episodes", AddEval},
-    {"bounds", "Search for the best episodes, and compare policies with them", AddBounds},
-    {"simulate", "Write one rollout of a policy, of given torques, or of none as CSV", AddSimulate},
-    {"map", "Map how policies do on other plants or from other starts", AddMap},
-    {"plot", "Draw one episode of a policy", AddPlot},
-    {"view", "Show policies at work in a window, or record them as a film", AddView},
+    {"bounds", "Search for the best episodes and compare policies with them", AddBounds},
+    {"simulate", "Write one rollout of a policy or of given torques as CSV", AddSimulate},
+    {"map", "Map success over two quantities of plant, sensors or start", AddMap},
+    {"plot", "Draw one episode of a policy as figures", AddPlot},
+    {"view", "Show policies in a window, or record them as a film or pictures", AddView},
     {"info", "Describe and check a policy or a run, or describe this machine", AddInfo},
-    {"compare", "Compare trainings over their seeds, with intervals and curves", AddCompare},
-    {"study", "Train variants of the settings, many seeds each", AddStudy},
-    {"export", "Policies as ONNX or C or in the page; numbers to test other readers by", AddExport},
-    {"realaigym", "Score a policy by the rules of the benchmark RealAIGym, or search one",
-     AddRealAiGym},
-    {"bench", "Measure how fast it is on this machine", nullptr},
-    {"demo", "Serve the page where the pendulum is swung up live", nullptr},
+    {"compare", "Compare runs over their seeds, with intervals and curves", AddCompare},
+    {"study", "Train variants of the settings, each with many seeds", AddStudy},
+    {"export", "Export policies as ONNX or C, or into the page", AddExport},
+    {"realaigym", "Score a policy by the rules of RealAIGym, or search for one", AddRealAiGym},
+    {"bench", "Measure the speed of the program on this machine", nullptr},
+    {"demo", "Serve the page in which policies swing up the pendulum live", nullptr},
     {"docs", "Build the documentation, or the whole web site", nullptr},
     {"python", "Run Python with the package upswing", nullptr},
-    {"test", "Build and run every test", nullptr},
+    {"test", "Build and run all tests", nullptr},
 };
 
 }  // namespace
 }  // namespace upswing
 
-// What is thrown while an exception is reported ends us.
+// An exception while another one is reported ends the program.
 int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape)
   return upswing::MainProgram(
       argc, argv, upswing::kCommands,
       "Examples:\n"
-      "  ./upswing train                      train the default agent until the task is solved\n"
-      "  ./upswing eval runs/d3qn-seed1       evaluate its best policy\n"
-      "  ./upswing compare runs               compare the agents in runs over their seeds\n"
-      "  ./upswing train --help               every setting, with its default\n");
+      "  ./upswing train                   train the default agent until it solves the task\n"
+      "  ./upswing eval runs/d3qn-seed1    evaluate its best policy\n"
+      "  ./upswing compare runs            compare the agents in runs over their seeds\n"
+      "  ./upswing train --help            show all settings with their defaults\n");
 }

@@ -38,15 +38,15 @@ void PrintRow(const std::string& name, double step, double seconds, double succe
       DurationOrDash(seconds), 100 * success, reward, remark.empty() ? "" : "  ", remark);
 }
 
-/// What people see of many runs: a progress line, a line for each that has ended, a table. Signals
-/// stop them.
+/// The printed view of many runs: a progress line, a line per finished run, a table. Signals stop
+/// the runs.
 class ManyRunsView : public ManyRunsObserver {
  public:
   /// The plan must outlive it.
   explicit ManyRunsView(const ManyRuns& many) : many_(many) {}
 
   void Prepare() override { InstallSignalHandlers(kStoppingTraining); }
-  /// Prints what is trained and where. The rate counts the steps made from now on.
+  /// Prints variants, seeds and folder. The rate counts steps from now on.
   void Begin(const std::vector<SeedRun>& runs) override {
     runs_ = &runs;
     steps_before_ = Measure().steps;
@@ -73,7 +73,8 @@ class ManyRunsView : public ManyRunsObserver {
       return line_.Print(fmt::format("  {:<20} failed: {} (log: {})", run.name,
                                      Printable(run.problem), Printable(run.log().string())));
     }
-    if (!run.state) return line_.Print(fmt::format("  {:<20} stopped before it began", run.name));
+    if (!run.state)
+      return line_.Print(fmt::format("  {:<20} stopped before its first step", run.name));
     const TrainState& s = *run.state;
     const Standing standing = Measure();
     line_.Print(fmt::format("  {:<20} {:>11} steps  {:>12}  {:<22}  {} of {} runs done{}", run.name,
@@ -91,7 +92,7 @@ class ManyRunsView : public ManyRunsObserver {
     line_.Clear();
     for (const Variant& variant : many_.plan.variants) PrintTable(variant);
     const size_t done = Measure().done;
-    Say("\nSuccess and return are those of each run's best policy at evaluation.\n");
+    Say("\nSuccess and return: evaluation of each run's best policy.\n");
     if (stopped) SayStopped(done);
     const bool can_be_typed = Printable(many_.plan.folder.string()) == many_.plan.folder.string();
     if (can_be_typed && (done < runs_->size() || !many_.compared)) {
@@ -105,9 +106,10 @@ class ManyRunsView : public ManyRunsObserver {
   int stop_signal() const override { return StopSignal(); }
 
  protected:
-  /// Says how it goes on after a signal to stop.
+  /// Prints how to continue after a signal to stop.
   virtual void SayStopped(size_t done) const {
-    Say("Stopped, {} of {} runs done; the same command resumes them.\n", done, runs_->size());
+    Say("Stopped with {} of {} runs done; the same command resumes the others.\n", done,
+        runs_->size());
   }
 
   /// Runs that are neither done nor failed.
@@ -120,7 +122,7 @@ class ManyRunsView : public ManyRunsObserver {
   ProgressLine line_;
 
  private:
-  /// How far all runs are together.
+  /// Progress of all runs together.
   struct Standing {
     size_t done = 0;             // runs
     double steps = 0, left = 0;  // made, and at most to be made
@@ -132,7 +134,7 @@ class ManyRunsView : public ManyRunsObserver {
   Standing Measure() const {
     Standing standing;
     for (const SeedRun& run : *runs_) {
-      // Files are read for those that run alone: there may be thousands of others.
+      // Reads the files of running runs only: there may be thousands of others.
       const bool runs_now = std::ranges::find(running_, &run) != running_.end();
       const auto steps = static_cast<double>(runs_now    ? run.Steps()
                                              : run.state ? run.state->steps
@@ -172,12 +174,13 @@ class ManyRunsView : public ManyRunsObserver {
         std::ranges::count_if(*runs_, [](const SeedRun& run) { return run.state.has_value(); });
     if (begun > 0) {
       const size_t done = Measure().done;
-      Say("  {} done before, resuming {}\n", done, static_cast<size_t>(begun) - done);
+      Say("  {} already done, resuming {}\n", done, static_cast<size_t>(begun) - done);
     }
     const auto reduced = std::ranges::count_if(
         *runs_, [](const SeedRun& run) { return !run.finished && run.IsReduced(); });
     if (reduced > 0) {
-      Say("  {} that were done with fewer steps are trained from the beginning: no more was kept\n",
+      Say("  {} finished with fewer steps: trained again from the start, because no checkpoint is "
+          "kept\n",
           reduced);
     }
     for (const SeedRun& run : *runs_) {
@@ -229,15 +232,15 @@ class ManyRunsView : public ManyRunsObserver {
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };
 
-/// Many runs whose workers are the tasks of a job array: queues it, or finds the one that is queued
-/// already, and shows how the runs go on. A signal to stop ends the view alone.
+/// The view of many runs whose workers are the tasks of a job array: queues the array, or finds the
+/// queued one, and shows progress. A signal to stop ends the view; the jobs continue.
 class SlurmView : public ManyRunsView {
  public:
   /// The plan must outlive it; many.jobs is 0.
   SlurmView(const ManyRuns& many, SlurmRequest request)
       : ManyRunsView(many), request_(std::move(request)) {}
 
-  void Prepare() override { InstallSignalHandlers("\nthe jobs go on\n"); }
+  void Prepare() override { InstallSignalHandlers("\nthe jobs continue\n"); }
 
   /// Throws Failure if the array cannot be queued.
   void Begin(const std::vector<SeedRun>& runs) override {
@@ -246,11 +249,11 @@ class SlurmView : public ManyRunsView {
     array_ = SlurmArray::LastOf(many_.plan.folder);
     const auto queued = array_ ? array_->TasksLeft() : 0;
     if (!queued) {
-      throw Failure(Concat("squeue does not say whether job array ", array_->number(),
-                           " of this study is still queued"));
+      throw Failure(Concat("squeue: expected the state of job array ", array_->number(),
+                           " of this study, got none"));
     }
     if (*queued > 0) {
-      Say("  Job array {}, queued before: {} left, output in {}\n", array_->number(),
+      Say("  Following job array {}: {} left, output in {}\n", array_->number(),
           Counted(*queued, "task"), Logs());
     } else {
       const std::string script = SlurmScriptFor(many_.plan, runs, request_);
@@ -271,29 +274,29 @@ class SlurmView : public ManyRunsView {
  protected:
   void SayStopped(size_t done) const override {
     if (!array_) return ManyRunsView::SayStopped(done);
-    Say("Job array {} goes on; the same command follows it again, `{}` cancels it.\n",
+    Say("Job array {} continues; the same command follows it again, `{}` cancels it.\n",
         array_->number(), array_->CancelCommand());
   }
 
  private:
   using Clock = std::chrono::steady_clock;
-  static constexpr std::chrono::seconds kAskEvery{15};  // squeue asks a daemon that all share
+  static constexpr std::chrono::seconds kAskEvery{15};  // squeue loads a shared daemon
 
   void CheckQueue(const std::vector<const SeedRun*>& running, Clock::time_point now) {
     const auto tasks = array_->TasksLeft();
     const bool are_none = tasks == 0;
-    // What the last task did may not have been seen yet.
+    // The last task's files may not be visible yet.
     const bool were_none = std::exchange(none_left_, are_none);
     ask_at_ = now + (are_none ? std::chrono::seconds(2) : kAskEvery);
     if (!are_none || !were_none) return;
-    // Other workers may be at work, or a lost one's claims have to run out.
+    // Other workers may be running, or a lost worker's claims have yet to expire.
     for (const SeedRun* run : running) {
       const auto lease = ReadLease(run->claim());
       if (lease && !lease->lost) return;
     }
     line_.Clear();
-    throw Failure(Concat("no task of job array ", array_->number(), " is left, but ", Left(),
-                         " of the runs are not done (output: ", Logs(),
+    throw Failure(Concat("job array ", array_->number(), " has ended, but ", Left(),
+                         " runs are not done (output: ", Logs(),
                          "); the same command queues them again"));
   }
 

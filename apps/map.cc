@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What was typed.
+/// The arguments of `map`.
 struct MapCommand : MapArguments {
   std::vector<std::string> policies;
   PolicyArguments controllers;  // settings of those among them
@@ -39,14 +39,14 @@ std::string RangeText(const MapAxis& axis) {
 std::string CheckText(const MapResult& map) {
   const MapAgreement a = map.agreement();
   std::string text =
-      fmt::format("{} of {} cells again in MuJoCo: {} with as many successes", FormatCount(a.cells),
-                  FormatCount(map.config.cells()),
+      fmt::format("{} of {} cells repeated in MuJoCo: {} with equal successes",
+                  FormatCount(a.cells), FormatCount(map.config.cells()),
                   a.same_successes == a.cells ? "all" : FormatCount(a.same_successes));
   if (a.same_successes < a.cells) {
     text += fmt::format(", the others differ by up to {:.0f}%", 100 * a.largest_success_difference);
   }
   if (a.both_succeed == 0) return text + ", no successes to compare";
-  if (a.largest_swing_up_difference == 0) return text + ", swing-up times the same";
+  if (a.largest_swing_up_difference == 0) return text + ", equal swing-up times";
   return text +
          fmt::format(", swing-up times differ by up to {:.2f} s", a.largest_swing_up_difference);
 }
@@ -69,9 +69,9 @@ void PrintMapTable(const MapResult& map) {
   if (std::isfinite(map.median_swing_up())) {
     fmt::print("  swing-up   {:.2f} s, median of the cells' medians\n", map.median_swing_up());
   } else {
-    fmt::print("  swing-up   no episode stays upright\n");
+    fmt::print("  swing-up   none: no episode stays upright\n");
   }
-  fmt::print("  rate       {} episodes in {}: {} a second\n", FormatCount(map.episodes()),
+  fmt::print("  rate       {} episodes in {}: {} per second\n", FormatCount(map.episodes()),
              FormatDuration(map.seconds),
              FormatCount(static_cast<double>(map.episodes()) / map.seconds));
   if (!map.checked.empty()) fmt::print("  check      {}\n", CheckText(map));
@@ -81,7 +81,8 @@ void PrintMapTable(const MapResult& map) {
 int RunMapCommand(const MapCommand& a) {
   const bool several = a.policies.size() > 1;
   if (several && a.out.empty()) {
-    throw BadInput(Concat("--out: expected a folder for the maps of ", Join(a.policies, ", ")));
+    throw BadInput(Concat("--out: expected a folder for several maps, got none; policies: ",
+                          Join(a.policies, ", ")));
   }
   const std::vector<LoadedPolicy> policies = GetPolicies(a.policies, a.controllers);
   const std::vector<std::string> titles = TitlesOf(policies);
@@ -112,44 +113,47 @@ int RunMapCommand(const MapCommand& a) {
 void AddMap(CommandLine& line) {
   MapCommand& a = line.Runs(RunMapCommand);
   line.Texts("policies", a.policies, "POLICY|RUN",
-             Concat("policy.safetensors, run folder or controller: ", Join(ControllerNames(), ", "),
-                    "; several: side by side"));
+             Concat("policies, several for maps side by side: policy.safetensors, run folders or ",
+                    "controllers (", Join(ControllerNames(), ", "), ")"));
   line.Require("policies");
   AddControllers(line, a.controllers);
   constexpr const char* kAxis = "NAME=FROM:TO[:CELLS]";
-  line.Text("--x", a.x, kAxis, "horizontal axis [mass2=-50%:+50%:31]", "");
-  line.Text("--y", a.y, kAxis, "vertical axis [length2=-50%:+50%:31]", "");
+  line.Text("--x", a.x, kAxis, "horizontal axis (default mass2=-50%:+50%:31)", "");
+  line.Text("--y", a.y, kAxis, "vertical axis (default length2=-50%:+50%:31)", "");
   Options own;
   a.Describe(own);
   line.Arguments(own);
-  AddSet(line, a.trial.set, "what is on neither axis, such as gravity=9.7");
+  AddSet(line, a.trial.set, "value of a quantity on neither axis, such as gravity=9.7");
   AddPhysics(line, a.trial.physics);
   AddUnknownPlant(line, a.trial.unknown_plant);
-  line.Text("--out", a.out, "FOLDER", "new folder for map.csv, map.svg and map.png [RUN/map-X-Y]");
+  line.Text("--out", a.out, "FOLDER",
+            "new folder for map.csv, map.svg and map.png (default RUN/map-X-Y)");
   AddSeed(line, a.trial.seed, "starts and noise");
   AddThreads(line, a.threads);
   line.Flag("--json", a.as_json, "print JSON instead of a table");
   line.Footer(
-      "Axes and --set take mass1, mass2, length1, length2, damping1, damping2 (mass, length,\n"
-      "damping for both), gravity, torque_limit, actuated_joint (1 or 2), rotor_inertia,\n"
-      "gear_ratio, coulomb1, coulomb2, sensor_noise (rad, rad/s), delay (s, in whole control\n"
-      "periods of 0.02 s; each is a cell), sensor_latency (s), encoder_counts, velocity_window\n"
-      "(s), velocity_filter (s), and the start: q1, q2 (degrees), w1, w2 (rad/s).\n"
-      "Percentages are on top of the training's value. An episode\n"
-      "is that of `upswing eval`; with a start, every episode begins exactly there; what of it is\n"
-      "not given is 0 (hanging, at rest). Energy and height in the observation are scaled by the\n"
-      "cell's own plant, which reveals it to the policy; with --unknown-plant by the plant of the\n"
-      "training.\n"
-      "Without --out a map goes into map-X-Y in the run's folder, or into runs/map-X-Y-NAME for a\n"
-      "policy file elsewhere; then map-X-Y-2, …. Maps of several policies need --out, and are\n"
-      "map-1.csv, map-2.csv, … with maps.svg and maps.png of their success.\n\n"
+      "Quantities for axes and --set:\n"
+      "  plant    mass1, mass2, length1, length2, damping1, damping2 (mass, length, damping\n"
+      "           for both links), gravity, torque_limit, actuated_joint (1 or 2),\n"
+      "           rotor_inertia, gear_ratio, coulomb1, coulomb2\n"
+      "  sensors  sensor_noise [rad, rad/s], sensor_latency [s], encoder_counts,\n"
+      "           velocity_window [s], velocity_filter [s]\n"
+      "  motor    delay [s], in control periods of 0.02 s, one cell each\n"
+      "  start    q1, q2 [°], w1, w2 [rad/s]; 0 if not given: hanging, at rest\n\n"
+      "A percentage is relative to the training's value: +10% is 1.1 times it. Episodes are\n"
+      "those of eval; with a start, every episode starts exactly there. Observed energy and\n"
+      "height are scaled by the cell's plant, which reveals the plant to the policy. With\n"
+      "--unknown-plant they are scaled by the plant of the training.\n\n"
+      "Without --out, a map goes into map-X-Y in the run folder, or into runs/map-X-Y-NAME\n"
+      "for another policy file; a second map into map-X-Y-2. Several policies need --out:\n"
+      "it gets map-1.csv, map-2.csv, … and maps.svg and maps.png of their success.\n\n"
       "Examples:\n"
       "  ./upswing map runs/d3qn-seed1\n"
       "  ./upswing map runs/d3qn-seed1 --x mass=0.8:1.2 --y damping=0:0.4:21 --episodes 20\n"
       "  ./upswing map runs/d3qn-seed1 --x sensor_noise=0:0.1 --y delay=0:0.1:6\n"
-      "  ./upswing map runs/d3qn-seed1 --x q1=-180:180:73 --y q2=-180:180:73    from any angle\n"
-      "  ./upswing map lqr --x q1=150:210:121 --y q2=-30:30:121    from where does it catch?\n"
-      "  ./upswing map runs/d3qn-seed1 mpc tvlqr --episodes 1 --out runs/maps    side by side\n");
+      "  ./upswing map runs/d3qn-seed1 --x q1=-180:180:73 --y q2=-180:180:73\n"
+      "  ./upswing map lqr --x q1=150:210:121 --y q2=-30:30:121\n"
+      "  ./upswing map runs/d3qn-seed1 mpc tvlqr --episodes 1 --out runs/maps\n");
 }
 
 }  // namespace upswing

@@ -64,7 +64,7 @@ class MapTest(ProgramTest):
         xml.dom.minidom.parseString(text)
         for word in ("gravity (m/s²)", "mass2 (kg)", "Success", "Swing-up time, median",
                      "as in training", "successful episodes (%)", "swing-up time (s)",
-                     "4 episodes a cell (4 of 4: 95% interval 51.0% to 100%); closed-form; seed 0"):
+                     "4 episodes per cell (4 of 4: 95% interval 51.0% to 100%); closed-form; seed 0"):
             self.assertIn(word, text)
         self.assertEqual(result["files"], ["map/map.csv", "map/map.svg", "map/map.png"])
 
@@ -134,7 +134,7 @@ class MapTest(ProgramTest):
     def test_table(self):
         text = self.succeed("map", self.policy, *GRID, "--episodes", 2)
         for word in ("gravity 0.05 to 3 m/s² × mass2 0.5 to 1.5 kg: 3 × 3 cells, 2 episodes each",
-                     "% of all episodes", "18 episodes in", "1 of 9 cells again in MuJoCo",
+                     "% of all episodes", "18 episodes in", "1 of 9 cells repeated in MuJoCo",
                      "(2 of 2: 95% interval 34.2% to 100%)",
                      f"{self.policy}/map-gravity-mass2/map.csv"):
             self.assertIn(word, text)
@@ -182,17 +182,17 @@ class MapTest(ProgramTest):
         self.assertEqual((self.folder / "both/map-1.csv").read_bytes(),
                          (self.folder / "alone/map.csv").read_bytes())
         svg = (self.folder / "both/maps.svg").read_text(encoding="utf-8")
-        for words in (">run<", ">lqr (lqr_torque 2)<", ">what it was made for<"):
+        for words in (">run<", ">lqr (lqr_torque 2)<", ">training or design<"):
             self.assertIn(words, svg)
         self.assertEqual(svg.count(">successful episodes (%)<"), 1)  # one scale
         self.refuse(["map", self.policy, "lqr", *grid], "--out: expected a folder")
         self.refuse(["map", self.policy, "lqr", "--x", "gravity=-20%:+20%", "--out", "other"],
-                    "lqr: expected a policy made for the same plant as run")
+                    "lqr: expected a policy with the same plant as run")
 
     def test_a_check_without_successes_has_nothing_to_compare(self):
         text = self.succeed("map", self.policy, "--x", "gravity=20:30:2", "--y", "mass2=5:6:2",
                             "--episodes", 1, "--check", 1, "--out", "none")
-        self.assertIn("all with as many successes, no successes to compare", text)
+        self.assertIn("all with equal successes, no successes to compare", text)
         result = self.map("--x", "gravity=20:30:2", "--y", "mass2=5:6:2", "--episodes", 1,
                           "--check", 1)
         self.assertEqual((result["check"]["both_succeed"],
@@ -227,7 +227,7 @@ class MapTest(ProgramTest):
     def test_other_bad_input(self):
         self.refuse(["map"], "policy")
         self.refuse(["map", "nowhere"], "nowhere", "no such file")
-        self.refuse(["map", self.policy, "--set", "mass2=1"], "mass2", "axis of the map")
+        self.refuse(["map", self.policy, "--set", "mass2=1"], "--set mass2: expected a quantity that is on no axis; the axis mass2 sets it")
         self.refuse(["map", self.policy, "--set", "gravit=1"], "did you mean gravity?")
         self.refuse(["map", self.policy, "--check", "2"], "--check")
         self.refuse(["map", self.policy, "--episodes", "0"], "--episodes")
@@ -238,7 +238,7 @@ class MapTest(ProgramTest):
                     "taken: expected a new or empty folder, got a file")
         (self.folder / "full/mine").mkdir(parents=True)
         self.refuse(["map", self.policy, "--out", "full"],
-                    "full: expected a new or empty folder, got one that holds something")
+                    "full: expected a new or empty folder, got one that is not empty")
 
     def test_without_gnuplot_it_does_not_begin(self):
         self.refuse(["map", self.policy], "gnuplot-nox", code=1, env={"PATH": str(self.folder)})

@@ -172,7 +172,7 @@ class RunTest(ProgramTest):
         self.write("own.xml", self.OWN)
         self.succeed(*small(model="own.xml", steps=400))
         self.write("run/model.xml", MODEL.replace('armature="0.01"', 'armature="0.05"', 1))
-        self.refuse(["train", "--resume", "run"], "made with another model")
+        self.refuse(["train", "--resume", "run"], "expected a checkpoint of the same model")
         (self.folder / "run/model.xml").unlink()
         self.refuse(["train", "--resume", "run"], "run/model.xml", "No such file")
 
@@ -196,7 +196,7 @@ class RunTest(ProgramTest):
         self.assertIn("armature1 0.02", self.succeed("study", "s.toml", "--out", "x") +
                       self.succeed("info", "x/b/seed1"))
         self.write("s.toml", text.replace("two.xml", "one.xml"))
-        self.refuse(["study", "s.toml", "--out", "y"], 'variant "b" has the settings of "a"')
+        self.refuse(["study", "s.toml", "--out", "y"], 'variant "b": expected settings of its own, got those of "a"')
 
 
 class SaidTest(ProgramTest):
@@ -253,10 +253,10 @@ class SaidTest(ProgramTest):
     def test_compare(self):
         shutil.copytree(self.trained, self.folder / "runs/a")
         output = self.succeed("compare", "runs", "--unfinished")
-        self.assertRegex(output, "d3qn-small, other model: on a model that is " + self.CAPTION)
+        self.assertRegex(output, "d3qn-small, other model: uses an MJCF model, " + self.CAPTION)
         shutil.copytree(self.ours, self.folder / "runs/b")
         output = self.succeed("compare", "runs", "--unfinished", "--different-tasks")
-        self.assertRegex(output, "d3qn-small, other model: on a model that is " + self.CAPTION)
+        self.assertRegex(output, "d3qn-small, other model: uses an MJCF model, " + self.CAPTION)
         self.assertRegex(output, r"model built-in")
 
 

@@ -25,7 +25,7 @@ struct PlotArguments {
   double seconds = -1;  // negative: not given
 };
 
-/// Time (s) from which it is upright to the end; negative if it is not upright at the end.
+/// Time (s) since which the pendulum is upright until the end; negative if it is not upright then.
 double UprightSince(const std::vector<RolloutRow>& rows) {
   double since = -1;
   for (const RolloutRow& row : rows) {
@@ -35,7 +35,7 @@ double UprightSince(const std::vector<RolloutRow>& rows) {
   return since;
 }
 
-/// What stands below the title: which episode, and what is not as in the training.
+/// The caption below the title: the episode, and how it differs from the training.
 std::string Caption(const PlotArguments& a, const RolloutConfig& config, const Rollout& rollout,
                     const LoadedPolicy& loaded) {
   std::vector<std::string> parts;
@@ -90,7 +90,7 @@ int RunPlot(const PlotArguments& a) {
     fmt::print("  task       {}\n", spec.task);
   }
   if (model) fmt::print("  model      {}\n", model->Text());
-  // Of other tasks a row tells of the state that its step leads to.
+  // In other tasks a row has the state after its step.
   const double later = pendulum ? 0 : spec.step_seconds;
   const double since = UprightSince(rollout.rows);
   fmt::print("  {}    {}\n", pendulum ? "upright" : "at goal",
@@ -112,28 +112,24 @@ void AddPlot(CommandLine& line) {
   line.Require("policy");
   AddEpisodeOptions(line, a.trial);
   Options own;
-  Option& seconds = own.Add(&a.seconds, "seconds", {0.1, 1000}, "s", "how long");
+  Option& seconds = own.Add(&a.seconds, "seconds", {0.1, 1000}, "s", "length of the episode");
   seconds.step = kControlPeriod;
-  seconds.usual = "10; with --episode 20";
+  seconds.usual = "10; 20 with --episode";
   line.Arguments(own);
   AddTrialOptions(line, a.trial, "noise, random plants and the start of --episode");
-  line.Text("--out", a.out, "FOLDER", "new folder for the figures [RUN/plot]");
+  line.Text("--out", a.out, "FOLDER", "new folder for the figures (default RUN/plot)");
   line.Footer(
-      "episode.svg and .png: angles, velocities, energy, torque, the reward's terms and what the\n"
-      "policy estimates over time: Q-values, or of an actor its mean torque with the central 68% "
-      "of\n"
-      "those that it would draw, and V. phase.svg and .png: velocity over angle of both joints.\n"
-      "Printed of the torque: its largest, its root mean square, and its total variation a "
-      "second.\n"
-      "`upswing simulate` writes the same episode as a table. Without --out they go into\n"
-      "plot in the run's folder, or into runs/plot-NAME for a policy file elsewhere; then plot-2,\n"
-      "and so on.\n\n"
+      "episode.svg and .png show angles, velocities, energy, torque, reward terms and the\n"
+      "policy's estimates over time: Q-values, or the actor's mean torque with its central\n"
+      "68% interval, and V. phase.svg and .png show velocity over angle for both joints.\n"
+      "`simulate` writes the same episode as a table.\n\n"
+      "Without --out, the figures go into plot in the run folder, or into runs/plot-NAME for\n"
+      "another policy file; the next figures into plot-2.\n\n"
       "Examples:\n"
       "  ./upswing plot runs/d3qn-seed1\n"
       "  ./upswing plot runs/d3qn-seed1 --start 3.0,0,0,0 --seconds 5 --out caught\n"
       "  ./upswing plot runs/d3qn-seed1 --set mass2=1.3\n"
-      "  ./upswing plot runs/d3qn-seed1 --randomize 0.25 --episode 17   as eval --randomize "
-      "0.25\n");
+      "  ./upswing plot runs/d3qn-seed1 --randomize 0.25 --episode 17\n");
 }
 
 }  // namespace upswing

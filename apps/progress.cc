@@ -13,15 +13,12 @@
 #include "core/text.h"
 
 namespace upswing {
-namespace {
 
-int TerminalWidth() {
+int TerminalWidth(int unknown) {
   winsize size{};
   const bool known = ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
-  return known ? size.ws_col : 80;
+  return known ? size.ws_col : unknown;
 }
-
-}  // namespace
 
 ProgressLine::ProgressLine() : terminal_(isatty(STDOUT_FILENO) == 1) {}
 
@@ -34,7 +31,7 @@ void ProgressLine::Show(double share, const std::vector<std::string>& fields) {
   const int full = static_cast<int>(std::lround(std::clamp(share, 0.0, 1.0) * kBar));
   std::string line =
       fmt::format("[{:=>{}}{: >{}}] {:3.0f}%", "", full, "", kBar - full, 100 * share);
-  const auto width = static_cast<size_t>(std::max(30, TerminalWidth() - 1));
+  const auto width = static_cast<size_t>(std::max(30, TerminalWidth(80) - 1));
   for (const std::string& field : fields) {
     if (line.size() + 2 + field.size() > width) break;
     line += "  " + field;
@@ -59,9 +56,9 @@ void ProgressLine::Clear() {
 }
 
 void EpisodeProgress::operator()(double done, double total) {
-  if (total != total_) begin_ = told_;
+  if (total != total_) begin_ = last_call_;
   total_ = total;
-  const auto now = told_ = Clock::now();
+  const auto now = last_call_ = Clock::now();
   const bool plain = !line_.terminal() && now - last_plain_ >= std::chrono::seconds(10);
   if (!plain && (quiet_ || !line_.due())) return;
   const double seconds = std::chrono::duration<double>(now - begin_).count();

@@ -6,8 +6,11 @@
 
 namespace upswing {
 
-/// A line at the bottom of the terminal that is rewritten a few times a second. Where standard
-/// output is no terminal it shows nothing, and Print writes plain lines.
+/// The columns of the terminal of standard output; `unknown` if there is none.
+int TerminalWidth(int unknown);
+
+/// A line at the bottom of the terminal that is rewritten a few times a second. Without a
+/// terminal the line is not shown, and Print writes plain lines.
 class ProgressLine {
  public:
   ProgressLine();
@@ -17,17 +20,16 @@ class ProgressLine {
 
   bool terminal() const { return terminal_; }
 
-  /// Whether a line would be shown now: there is a terminal, and the last one is old enough.
+  /// Whether Show would draw: there is a terminal, and the last line is old enough.
   bool due() const;
 
-  /// Shows a bar of `share` (0 to 1) and behind it as many of the fields as the terminal has room
-  /// for, the first ones first.
+  /// Shows a bar of `share` (0 to 1), then the first fields, as many as fit into the terminal.
   void Show(double share, const std::vector<std::string>& fields);
 
   /// Prints a line that stays, above the bar.
   void Print(const std::string& line);
 
-  /// Takes the bar away.
+  /// Removes the bar.
   void Clear();
 
  private:
@@ -37,14 +39,14 @@ class ProgressLine {
   Clock::time_point last_{};
 };
 
-/// A progress line for work on episodes: their rate and the time left. Where standard output is no
-/// terminal, a plain line on standard error every ten seconds.
+/// A progress line for work on episodes: their rate and the time left. Without a terminal, a plain
+/// line on standard error every ten seconds.
 class EpisodeProgress {
  public:
   /// Shows no bar if `quiet`.
   explicit EpisodeProgress(bool quiet) : quiet_(quiet) {}
 
-  /// As a Progress. Other work began when the last call came.
+  /// A Progress. A new `total` begins other work, at the time of the last call.
   void operator()(double done, double total);
 
  private:
@@ -53,7 +55,7 @@ class EpisodeProgress {
   bool quiet_;
   ProgressLine line_;
   Clock::time_point begin_ = Clock::now();
-  Clock::time_point told_ = begin_;
+  Clock::time_point last_call_ = begin_;
   Clock::time_point last_plain_ = begin_;
 };
 

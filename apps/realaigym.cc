@@ -31,7 +31,7 @@ struct RealAiGymArguments {
   bool as_json = false;
 };
 
-/// A number of a table, or a dash for one that is not known.
+/// A number of a table; a dash if it is unknown.
 std::string Cell(double x, int decimals, double factor = 1) {
   return std::isfinite(x) ? fmt::format("{:.{}f}", factor * x, decimals) : "–";
 }
@@ -63,12 +63,12 @@ void PrintReport(const BoardReport& report) {
   fmt::print("  published\n");
   for (const BoardEntry& entry : PublishedEntries(robot)) PrintEntry(entry);
   if (!report.competitor.plant.empty()) {
-    fmt::print("  made for {}, not for the board's plant\n", report.competitor.plant);
+    fmt::print("  designed for {}, not for the board's plant\n", report.competitor.plant);
   }
   fmt::print("  {} simulations of 10 s in {:.2f} s; largest torque {:.2f} N·m\n", kBoardSimulations,
              report.seconds, report.nominal.max_torque);
   if (!report.nominal.above_line) {
-    fmt::print("  it does not swing up: the tip is not above 0.45 m at the end\n");
+    fmt::print("  no swing-up: the tip is not above 0.45 m at the end\n");
   }
 }
 
@@ -77,7 +77,7 @@ Competitor Search(const RealAiGymArguments& a, ThreadPool& pool) {
   SetFlags(OptionsOf(config), a.search);
   BoardSearch search =
       a.from.empty() ? BoardSearch(config) : BoardSearch(config, LoadSwingPolicy(a.from));
-  InstallSignalHandlers("\nwriting the policy so far\n");
+  InstallSignalHandlers("\nwriting the best policy so far\n");
   const auto begin = std::chrono::steady_clock::now();
   BoardSearch::Report report;
   {
@@ -100,7 +100,7 @@ Competitor Search(const RealAiGymArguments& a, ThreadPool& pool) {
     Say("stopped at generation {} of {}: {}\n", search.generation(), search.generations(),
         Printable(a.search_out));
   } else if (!a.as_json) {
-    Say("searched in {}: {}\n", FormatDuration(seconds), Printable(a.search_out));
+    Say("search took {}: {}\n", FormatDuration(seconds), Printable(a.search_out));
   }
   return CompetitorOf(search, a.search_out);
 }
@@ -108,20 +108,23 @@ Competitor Search(const RealAiGymArguments& a, ThreadPool& pool) {
 int RunRealAiGym(const RealAiGymArguments& a) {
   const bool searches = !a.search_out.empty();
   if (searches == !a.policy.empty()) {
-    throw BadInput(searches ? "--search: expected no policy beside it"
-                            : "realaigym: expected a policy to score, or --search FILE");
+    throw BadInput(searches
+                       ? "--search: expected no policy with it"
+                       : "realaigym: expected a policy to score or --search FILE, got neither");
   }
   if (IsStandardStream(a.search_out)) throw BadInput("--search: expected a file, got -");
-  if (!searches && !a.from.empty()) throw BadInput("--from: expected --search FILE with it");
+  if (!searches && !a.from.empty())
+    throw BadInput("--from: expected --search FILE with it, got none");
   std::string robot;
   for (const FlagValue& flag : a.search) {
     constexpr std::array kOfFrom{"robot", "hidden", "starts", "alone", "first_population"};
     if (!a.from.empty() && std::ranges::count(kOfFrom, flag.name) > 0) {
-      throw BadInput(Concat(FlagOf(flag.name), ": expected none, as --from begins with a policy"));
+      throw BadInput(
+          Concat(FlagOf(flag.name), ": expected none with --from, which starts from a policy"));
     }
     if (flag.name == "robot") robot = flag.text;
     if (searches || flag.name == "robot") continue;
-    throw BadInput(Concat(FlagOf(flag.name), ": expected --search FILE with it"));
+    throw BadInput(Concat(FlagOf(flag.name), ": expected --search FILE with it, got none"));
   }
   for (const auto& [flag, path] :
        {std::pair{"--search", &a.search_out}, {"--csv", &a.csv}, {"--figure", &a.figure}}) {
@@ -130,7 +133,8 @@ int RunRealAiGym(const RealAiGymArguments& a) {
   if (!a.figure.empty()) CheckFigureName(a.figure);
   const bool to_output = IsStandardStream(a.csv);
   if (to_output && a.as_json) {
-    throw BadInput("--json: expected a file of its own for --csv, got - for it");
+    throw BadInput(
+        "--json: expected a file for --csv, got - (standard output), where the JSON goes");
   }
   if (!a.figure.empty()) CheckCanDraw();
   ThreadPool pool(ResolveThreads(a.threads));
@@ -160,36 +164,35 @@ int RunRealAiGym(const RealAiGymArguments& a) {
 void AddRealAiGym(CommandLine& line) {
   RealAiGymArguments& a = line.Runs(RunRealAiGym);
   AddPolicy(line, a.policy);
-  line.Text("--search", a.search_out, "FILE", "search a policy, write it here, then score it");
-  line.Text("--from", a.from, "FILE", "policy to begin a search with [a random one]");
-  line.Text("--figure", a.figure, "FILE", "draw the rows of robustness, .svg or .png");
+  line.Text("--search", a.search_out, "FILE",
+            "policy file to write: search a policy, then score it");
+  line.Text("--from", a.from, "FILE", "policy that the search starts from (default a random one)");
+  line.Text("--figure", a.figure, "FILE", "figure of the robustness score to draw, .svg or .png");
   line.Text("--csv", a.csv, "FILE",
-            "write the motion in the boards' own format; -: standard output, alone");
+            "CSV file to write, the motion in the format of RealAIGym; -: standard output, without "
+            "a table");
   line.Flag("--json", a.as_json, "print JSON instead of a table");
   Options own;
   own.Section("cases");
   own.Add(&a.case_seed, "case_seed", {0, 1e15}, "",
-          "seed of the noise and the pushes of the robustness score");
+          "seed of noise and pushes in the robustness score");
   line.Arguments(own);
   BoardSearchConfig config;
   line.Settings(OptionsOf(config), a.search);
   AddThreads(line, a.threads);
   line.Footer(
-      "Performance: one simulation of 10 s from hanging, on the boards' plant C.1 without "
-      "friction,\n"
-      "500 Hz. Robustness: 722 simulations with errors of the model, noise of the velocities and "
-      "of\n"
-      "the torque, a motor that responds too little or too much, delay, and pushes; a share of "
-      "each\n"
-      "row ends upright. A policy that holds a torque for longer is called at its own period.\n"
-      "docs/realaigym.md has the formulas. All of this is simulated.\n\n"
+      "Performance: one simulation of 10 s from hanging, on RealAIGym's plant C.1 without\n"
+      "friction, at 500 Hz. Robustness: 722 simulations with model errors, noise on\n"
+      "velocities and torque, a motor that responds too little or too much, delay and\n"
+      "pushes; each score is the share of simulations that end upright. A policy with a\n"
+      "longer control period keeps its period. All results are simulated.\n\n"
       "Examples:\n"
-      "  ./upswing realaigym --search pendubot.safetensors          search one, some minutes\n"
+      "  ./upswing realaigym --search pendubot.safetensors         takes some minutes\n"
       "  ./upswing realaigym pendubot.safetensors --figure rows.svg\n"
       "  ./upswing realaigym --search better.safetensors --from pendubot.safetensors\n"
       "  ./upswing realaigym --search acrobot.safetensors --robot acrobot --seed 2\n"
       "  ./upswing realaigym pendubot.safetensors --csv sim_swingup.csv --json\n"
-      "  ./upswing realaigym baseline-lqr                           the baselines' regulator\n");
+      "  ./upswing realaigym baseline-lqr              the regulator of the baselines\n");
 }
 
 }  // namespace upswing

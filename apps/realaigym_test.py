@@ -135,12 +135,12 @@ class RealAIGym(ProgramTest):
     def test_the_baselines_regulator_does_not_swing_up(self):
         found = json.loads(self.succeed("realaigym", "baseline-lqr", "--json"))
         self.assertEqual((found["performance"]["score"], found["robustness"]["score"]), (0, 0))
-        self.assertIn("does not swing up", self.succeed("realaigym", "baseline-lqr", "--robot", "acrobot"))
+        self.assertIn("no swing-up", self.succeed("realaigym", "baseline-lqr", "--robot", "acrobot"))
 
     def test_bad_input(self):
         self.search()
         refuse = self.refuse
-        refuse(["realaigym"], "expected a policy to score, or --search")
+        refuse(["realaigym"], "expected a policy to score or --search FILE, got neither")
         refuse(["realaigym", "p.safetensors", "--search", "q.safetensors"], "--search")
         refuse(["realaigym", "p.safetensors", "--hidden", 8], "--hidden", "--search")
         refuse(["realaigym", "nothing.safetensors"], "nothing.safetensors: no such file")

@@ -83,7 +83,7 @@ class SeedsTest(ProgramTest):
     def test_finished_runs_are_left_alone_and_others_come_to_them(self):
         self.succeed(*small(**TINY), "--seeds", 2)
         before = snapshot(self.folder)
-        self.assertIn("2 done before", self.succeed(*small(**TINY), "--seeds", 2))
+        self.assertIn("2 already done", self.succeed(*small(**TINY), "--seeds", 2))
         self.assertEqual(snapshot(self.folder), before)
         self.succeed(*small(**TINY), "--seeds", 3)
         after = snapshot(self.folder)
@@ -123,7 +123,7 @@ class SeedsTest(ProgramTest):
 
     def test_interrupted_and_restarted_equals_never_stopped(self):
         output = self.check_restart(signal.SIGINT, 130)
-        self.assertIn("Stopped, 0 of 2 runs done; the same command resumes them.", output)
+        self.assertIn("Stopped with 0 of 2 runs done; the same command resumes the others.", output)
         self.assertIn("stopped at step",
                       (self.folder / "many/seed1/log.txt").read_text(encoding="utf-8"))
 
@@ -179,10 +179,10 @@ class SeedsTest(ProgramTest):
         checkpoint = self.folder / "many/seed1/checkpoint.safetensors"
         checkpoint.write_bytes(checkpoint.read_bytes()[:1000])
         failed = self.run_here(*small(**TINY | {"steps": 800}), "--seeds", 3)
-        reason = f"many/seed1/{checkpoint.name}: not a whole safetensors file"
+        reason = f"many/seed1/{checkpoint.name}: not a valid safetensors file"
         self.assert_one_line(failed, 1, "1 of 3 runs in many failed", "seed1: " + reason)
         # Reported before the others run, and in its place among them.
-        self.assertRegex(failed.stdout, rf"(?m)\A.*\n.*\n.*done before.*\n  seed1 +failed: {reason}")
+        self.assertRegex(failed.stdout, rf"(?m)\A.*\n.*\n.*already done.*\n  seed1 +failed: {reason}")
         self.assertRegex(failed.stdout, r"(?m)^  1 run failed$")
         self.assertNotIn("not evaluated yet", failed.stdout)
         self.assertIn("./upswing compare many --unfinished\n", failed.stdout)
@@ -233,7 +233,7 @@ class SeedsTest(ProgramTest):
         shown = self.watch(150, [*small(**ENDLESS), "--seeds", 2, "--jobs", 2],
                            r"\r\x1b\[K\[[= ]{16}\] +\d+%  0 of 2 runs  about [^\r]+ left  "
                            r"[1-9][\d,]* steps/s  seed1 \d+%  seed2 \d+%")
-        self.assertIn("Stopped, 0 of 2 runs done", shown)
+        self.assertIn("Stopped with 0 of 2 runs done", shown)
 
 
 if __name__ == "__main__":

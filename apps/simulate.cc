@@ -25,13 +25,14 @@ struct SimulateArguments {
 std::vector<double> ReadTorqueFile(const std::string& path) {
   const std::string where = InputName(path);
   std::vector<double> torques = ReadCsv(ReadInput(path), {"torque"}, where).front().values;
-  if (torques.empty()) throw BadInput(Concat(where, ": expected rows of torques, got none"));
+  if (torques.empty())
+    throw BadInput(Concat(where, ": expected at least one row of torques, got none"));
   return torques;
 }
 
 int RunSimulate(const SimulateArguments& a) {
   if (!a.policy.empty() && !a.torque.empty()) {
-    throw BadInput("simulate: expected a policy or --torque, got both");
+    throw BadInput("simulate: expected a policy or --torque FILE, got both");
   }
   std::optional<LoadedPolicy> loaded;
   if (!a.policy.empty()) loaded.emplace(GetPolicy(a.policy));
@@ -45,8 +46,9 @@ int RunSimulate(const SimulateArguments& a) {
   config.seconds = a.seconds < 0 ? usual : a.seconds;
   if (!config.schedule.empty() &&
       RolloutSteps(spec, config.seconds) > static_cast<int64_t>(config.schedule.size())) {
-    throw BadInput(Concat("--seconds: expected at most ", FormatNumber(scheduled), ", for which ",
-                          InputName(a.torque), " has torques, got ", FormatNumber(config.seconds)));
+    throw BadInput(Concat("--seconds: expected at most ", FormatNumber(scheduled),
+                          " s, the length of ", InputName(a.torque), ", got ",
+                          FormatNumber(config.seconds)));
   }
   const Rollout rollout = RunRollout(config);
 
@@ -68,25 +70,24 @@ void AddSimulate(CommandLine& line) {
   SimulateArguments& a = line.Runs(RunSimulate);
   AddPolicy(line, a.policy);
   line.Text("--torque", a.torque, "FILE",
-            "CSV file with a column `torque` (N·m), a row for each 0.02 s; -: standard input");
+            "CSV file with a column `torque` [N·m], a row per 0.02 s; -: standard input");
   AddEpisodeOptions(line, a.trial);
   Options own;
-  Option& seconds = own.Add(&a.seconds, "seconds", {0, 1e5}, "s", "how long");
+  Option& seconds = own.Add(&a.seconds, "seconds", {0, 1e5}, "s", "length of the rollout");
   seconds.step = kControlPeriod;
-  seconds.usual = "20, or as long as the torques last";
+  seconds.usual = "20, or the length of the file of --torque";
   line.Arguments(own);
   AddTrialOptions(line, a.trial, "noise, random plants and the start of --episode");
-  line.Text("--csv", a.csv, "FILE", "file to write; -: standard output [-]");
+  line.Text("--csv", a.csv, "FILE", "CSV file to write; -: standard output (default -)");
   line.Footer(
-      "Columns: t (s), qpos0, qpos1 (rad), qvel0, qvel1 (rad/s), torque (N·m, as the motor "
-      "applies\n"
-      "it over the next 0.02 s: after its delay, within its limit), energy (J), height of the tip\n"
-      "(m), inverted (0 or 1), and the reward with its five terms for the state and the torque of\n"
-      "that row.\n\n"
+      "Columns: t [s], qpos0, qpos1 [rad], qvel0, qvel1 [rad/s], torque [N·m], energy [J],\n"
+      "height of the tip [m], inverted (0 or 1), the reward and its five terms. The torque\n"
+      "is what the motor applies over the next 0.02 s, after its delay and within its\n"
+      "limit. The reward is that of the row's state and torque.\n\n"
       "Examples:\n"
       "  ./upswing simulate runs/d3qn-seed1 --csv rollout.csv\n"
       "  ./upswing simulate --torque torques.csv --start 0.1,-0.05,0,0 --seconds 10\n"
-      "  ./upswing simulate --start 3.0,0,0,0 --set damping=0      let it fall\n"
+      "  ./upswing simulate --start 3.0,0,0,0 --set damping=0      no motor: it falls\n"
       "  ./upswing eval runs/d3qn-seed1 --randomize 0.25 --episodes-csv episodes.csv\n"
       "  ./upswing simulate runs/d3qn-seed1 --randomize 0.25 --episode 17 --csv failure.csv\n");
 }

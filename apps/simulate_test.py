@@ -261,13 +261,12 @@ class PolicyRolloutTest(ProgramTest):
         self.assertIn('"steps":2', read_tensors(self.folder / "remembering/policy.safetensors")[0]
                       ["observation"])
         self.succeed("eval", "remembering", "--episodes", 2)
-        self.assertIn(" motion, 3 of each of the last 2 steps\n", self.succeed("info", "remembering"))
+        self.assertIn(" motion, 3 for each of the last 2 steps\n", self.succeed("info", "remembering"))
 
     def test_a_policy_that_identifies_the_plant_is_told_nothing_of_it(self):
         self.succeed(*small(memory=1, out="identifying"), "--identify", "--randomize", 0.1)
         metadata, _ = read_tensors(self.folder / "identifying/policy.safetensors")
-        self.assertIn("observes    8 numbers of the motion, 13 of the plant as it identifies it, "
-                      "3 of the last step\n", self.succeed("info", "identifying"))
+        self.assertIn("observes    8 numbers for the motion, 13 for the identified plant, 3 for the last step\n", self.succeed("info", "identifying"))
         observation = json.loads(metadata["observation"])
         self.assertEqual(len(observation["identified"]["names"]), 13)
         self.assertEqual(json.loads(metadata["network"])["inputs"], 8 + 13 + 3)
@@ -283,7 +282,7 @@ class PolicyRolloutTest(ProgramTest):
                 self.succeed(words[0], "identifying", *words[1:])
         for flag in ("--c", "--onnx"):
             with self.subTest(flag):
-                self.refuse(["export", "identifying", flag, "out"], "needs no identification")
+                self.refuse(["export", "identifying", flag, "out"], "expected a policy without identification")
         # A network without the inputs that its metadata claim.
         metadata, tensors = read_tensors(self.folder / "identifying/policy.safetensors")
         metadata["observation"] = json.dumps(observation | {"identified": {

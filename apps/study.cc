@@ -25,10 +25,10 @@ namespace fs = std::filesystem;
 
 constexpr const char* kStudyName = "study.toml";  // in the folder of a study
 
-/// What was typed.
+/// The arguments of `study`.
 struct StudyArguments {
   std::string file, out, seeds, keep, work;
-  int64_t jobs = 0;  // 0: as many as there are processors
+  int64_t jobs = 0;  // 0: one per processor
   bool status = false, prepare = false;
   SlurmRequest slurm;
   bool on_slurm = false, print = false;
@@ -46,13 +46,13 @@ void CheckSameStudy(const StudyPlan& plan, const std::string& title) {
   if (!IsFile(file)) return;
   const StudyOutline before = ParseStudyOutline(ReadOwnFile(file), where);
   if (before.title != title) {
-    throw BadInput(Concat(where, ": made with title \"", before.title, "\", but the study says \"",
+    throw BadInput(Concat(where, ": made with title \"", before.title, "\", but the study has \"",
                           title, "\"; choose another --out"));
   }
   for (const std::string& name : before.variants) {
     if (std::ranges::find(plan.variants, name, &Variant::name) != plan.variants.end()) continue;
     throw BadInput(Concat(where, ": made with a variant \"", name,
-                          "\", which the study does not have; choose another --out"));
+                          "\", which the study lacks; choose another --out"));
   }
 }
 
@@ -76,7 +76,8 @@ ManyRuns ReadStudy(const StudyArguments& arguments) {
   plan.seeds =
       arguments.seeds.empty() ? std::move(study.seeds) : ParseSeeds(arguments.seeds, "--seeds");
   if (plan.seeds.empty()) {
-    throw BadInput(Concat(file.string(), ": expected \"seeds = 10\" or the like, or --seeds"));
+    throw BadInput(
+        Concat(file.string(), ": expected a line such as seeds = 10, or --seeds, got neither"));
   }
   many.jobs = arguments.jobs;
   if (arguments.on_slurm) return many;
@@ -95,7 +96,7 @@ int CompareStudy(const StudyPlan& plan) {
   const Comparison comparison = Compare(request);
   WriteComparison(comparison, plan.folder);
   WriteEvaluations(plan);
-  Say("Every evaluation of every run: evaluations.csv\n");
+  Say("All evaluations of all runs: evaluations.csv\n");
   PrintComparison(comparison);
   PrintWritten(comparison, plan.folder);
   return 0;
@@ -115,15 +116,15 @@ int RunStudy(const StudyArguments& arguments) {
     const bool is_folder = fs::is_directory(arguments.file);
     const fs::path folder = is_folder ? fs::path(arguments.file) : arguments.folder();
     if (!Exists(arguments.file) && !Exists(folder)) {
-      throw BadInput(Concat(arguments.file, ": expected a study's file or folder, got nothing of ",
-                            "that name"));
+      throw BadInput(
+          Concat(arguments.file, ": no such file or folder; expected a study's file or folder"));
     }
     return PrintStudyStatus(folder);
   }
   const ManyRuns many = ReadStudy(arguments);
   if (arguments.prepare) {
     Prepare(many);
-    Say("Prepared {}. On any host that shares it:\n  ./upswing study --work {}\n",
+    Say("Prepared {}. Next, on any host that shares the folder:\n  ./upswing study --work {}\n",
         Printable(many.plan.folder.string()), ShellQuoted(Printable(many.plan.folder.string())));
     return 0;
   }
@@ -140,12 +141,12 @@ void CheckArguments(const CommandLine& line, const StudyArguments& arguments) {
   if (arguments.work.empty() == arguments.file.empty()) {
     throw BadInput(arguments.file.empty()
                        ? "study: expected FILE.toml or --work FOLDER, got neither"
-                       : "--work: expected no FILE.toml beside it");
+                       : "--work: expected no FILE.toml with it");
   }
   const auto alone = [&](bool given, const char* what, std::initializer_list<const char*> others) {
     for (const std::string other : others) {
       if (given && line.Has(other)) {
-        throw BadInput(Concat(what, ": expected no ", other, " beside it"));
+        throw BadInput(Concat(what, ": expected no ", other, " with it"));
       }
     }
   };
@@ -154,7 +155,7 @@ void CheckArguments(const CommandLine& line, const StudyArguments& arguments) {
   alone(arguments.status, "--status", {"--seeds", "--jobs", "--keep", "--prepare"});
   for (const std::string flag : {"--tasks", "--print"}) {
     if (!arguments.on_slurm && line.Has(flag)) {
-      throw BadInput(Concat(flag, ": expected --slurm beside it"));
+      throw BadInput(Concat(flag, ": expected --slurm with it, got none"));
     }
   }
   alone(arguments.on_slurm, "--slurm", {"--jobs", "--status", "--prepare"});
@@ -165,33 +166,34 @@ void CheckArguments(const CommandLine& line, const StudyArguments& arguments) {
 
 void AddStudy(CommandLine& line) {
   StudyArguments& arguments = line.Runs(RunStudy);
-  line.Text("file", arguments.file, "FILE.toml", "what to train: variants, settings, seeds");
-  line.Text("--out", arguments.out, "FOLDER", "folder of the study [runs/FILE]");
+  line.Text("file", arguments.file, "FILE.toml", "study file: variants, settings and seeds");
+  line.Text("--out", arguments.out, "FOLDER", "folder of the study (default runs/FILE)");
   AddManyOptions(line, arguments.seeds, arguments.jobs);
   line.Text("--keep", arguments.keep, "WHAT",
-            "of a finished run: all, policy (and settings, evaluations, log) or tables (its\n"
-            "rows in the study's tables alone) [all, or what FILE says]",
+            "files of a finished run to keep; all; policy: policy, settings, evaluations and log; "
+            "tables: none, only its rows in the study's tables (default all, or FILE's value)",
             "all, policy or tables");
-  line.Flag("--status", arguments.status,
-            "print what is done, running and lost, and end; FILE may be the study's folder");
-  line.Flag("--prepare", arguments.prepare, "make the folder ready for workers, and end");
+  line.Flag(
+      "--status", arguments.status,
+      "print how many runs are done, running and lost, and exit; also takes the study's folder");
+  line.Flag("--prepare", arguments.prepare, "prepare the folder for workers, and exit");
   line.Text("--slurm", arguments.slurm.options, "OPTIONS",
-            "have the runs done by a cluster: queue a job array of workers with these options\n"
-            "of sbatch ('' for none), follow it, and compare at the end",
+            "run the study on a Slurm cluster: queue a job array of workers with these options of "
+            "sbatch ('' for none), follow it, and compare at the end",
             "");
   Options slurm;
-  slurm.Add(&arguments.slurm.tasks, "tasks", {1, 100'000}, "", "of the job array: workers").usual =
-      Concat("one for each run, at most ", kMostSlurmTasks);
+  slurm.Add(&arguments.slurm.tasks, "tasks", {1, 100'000}, "", "number of workers in the job array")
+      .usual = Concat("one per run, at most ", kMostSlurmTasks);
   line.Arguments(slurm);
-  line.Flag("--print", arguments.print, "print the script for sbatch, and end");
+  line.Flag("--print", arguments.print, "print the script for sbatch, and exit");
   line.Text("--work", arguments.work, "FOLDER",
-            "be a worker of the study in this folder, on any host that shares it: train what\n"
-            "no other worker has, until nothing is left");
+            "work on the study in this folder, on any host that shares it: claim and train runs "
+            "until none is left");
   line.Footer(
       "A study file:\n"
       "  title = \"What does layer normalisation do?\"\n"
       "  seeds = 10                   # 1 to 10, or \"3,5,8-12\"\n"
-      "  [settings]                   # of all variants, as in a configuration file\n"
+      "  [settings]                   # for all variants, as in a configuration file\n"
       "  agent = \"d3qn-small\"\n"
       "  steps = 300000\n"
       "  [variants.with]\n"
@@ -201,12 +203,13 @@ void AddStudy(CommandLine& line) {
       "  ./upswing study configs/studies/post.toml\n"
       "  ./upswing study configs/studies/post.toml --seeds 3 --out runs/short\n"
       "  ./upswing study configs/studies/post.toml --status\n"
-      "  ./upswing study --work runs/post          one more worker, here or on another host\n"
-      "  ./upswing study configs/studies/post.toml --slurm '--partition=short --time=2:00:00'\n"
-      "\nEach run lies in FOLDER/VARIANT/seedN, what it prints in FOLDER/VARIANT/seedN.log. The\n"
-      "same command resumes what was stopped or killed; finished runs are left as they are.\n"
-      "Exit code 0: done; 1: a run failed; 2: bad usage or input; 130, 143: stopped; of a worker\n"
-      "75: stopped by a signal, its run can be resumed by any other.\n");
+      "  ./upswing study --work runs/post          one more worker, on any host\n"
+      "  ./upswing study configs/studies/post.toml \\\n"
+      "    --slurm '--partition=short --time=2:00:00'\n"
+      "\nThe folder of a run is FOLDER/VARIANT/seedN, its log is FOLDER/VARIANT/seedN.log. The\n"
+      "same command resumes stopped and killed runs; finished runs stay unchanged.\n"
+      "Exit code 0: done; 1: a run failed; 2: bad usage or input; 130 or 143: stopped. A\n"
+      "worker that a signal stops has exit code 75; any worker can resume its run.\n");
   line.Check([&line, &arguments] {
     arguments.on_slurm = line.Has("--slurm");
     CheckArguments(line, arguments);

@@ -95,7 +95,7 @@ class StudyTest(ProgramTest):
         self.write("little.toml", STUDY)
         self.succeed("study", "little.toml")
         before = snapshot(self.folder / "runs/little")
-        self.assertIn("6 done before", self.succeed("study", "little.toml"))
+        self.assertIn("6 already done", self.succeed("study", "little.toml"))
         self.assertEqual(snapshot(self.folder / "runs/little"), before)
         self.write("little.toml", STUDY + "[variants.new]\ngamma = 0.5\n")
         self.succeed("study", "little.toml")
@@ -126,7 +126,7 @@ class StudyTest(ProgramTest):
         config = (self.folder / "x/own/seed1/config.toml").read_text(encoding="utf-8")
         self.assertIn("\nmass1 = 1.25 ", config)
         again = self.succeed("study", "sub/s.toml", "--seeds", "1-1", "--out", "x")
-        self.assertIn("2 done before", again)
+        self.assertIn("2 already done", again)
 
     def test_other_settings_are_refused_with_what_differs(self):
         self.write("little.toml", STUDY)
@@ -176,7 +176,7 @@ class StudyTest(ProgramTest):
                 ("seed = 3\n" + one, [":1:", '"seed"', "did you mean seeds?"]),
                 ("seeds = 2\n", ["[variants.NAME]"]),
                 ("seeds = 2\n[variants]\n", ["[variants.NAME]"]),
-                (one, ['"seeds = 10"']),
+                (one, ["seeds = 10"]),
                 ('seeds = "0-"\n' + one, [":1: seeds: expected", "3,5,8-12"]),
                 ("seeds = [1, 1]\n" + one, [":1: seeds:", "1 is twice"]),
                 ("seeds = 0\n" + one, [":1: seeds:", "1 to 10000"]),
@@ -184,7 +184,7 @@ class StudyTest(ProgramTest):
                 ("title = 3\nseeds = 2\n" + one, [":1: title: expected a text"]),
                 ("seeds = 2\n[settings]\ngama = 0.9\n" + one, [":3:", "did you mean gamma?"]),
                 ("seeds = 2\n[settings.agnet]\n" + one, [":2:", "did you mean agent?"]),
-                ("seeds = 2\n[settings.task]\ngamma = 1\n" + one, [":3: gamma: expected in [agent]"]),
+                ("seeds = 2\n[settings.task]\ngamma = 1\n" + one, [":3: gamma: expected in section [agent]"]),
                 ("seeds = 2\n" + one + 'gamma = "0.9"\n', [":3: gamma: expected a number"]),
                 ("seeds = 2\n" + one + "gamma = 1.9\n", [":3: gamma: expected a number in [0, 1]"]),
                 ("seeds = 2\n" + one + 'agent = "d3qm"\n', [":3: agent:", "did you mean d3qn?"]),

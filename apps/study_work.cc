@@ -20,7 +20,7 @@
 namespace upswing {
 namespace {
 
-/// During its lifetime all that is printed goes to the end of a file.
+/// During its lifetime, standard output and error are appended to a file.
 class PrintedTo {
  public:
   explicit PrintedTo(const std::filesystem::path& path)
@@ -42,13 +42,14 @@ class PrintedTo {
   Descriptor output_, error_;
 };
 
-/// Trains a run of a study and prints into its log what `train` would print.
+/// Trains a run of a study, with the output of `train` in its log.
 bool TrainLogged(const SeedRun& run, const std::function<std::unique_ptr<TrainingRun>()>& make,
                  const std::function<bool()>& ours) {
   const PrintedTo log(run.log());
   try {
     return TrainAndShow(*make(), [&] {
-      if (!ours()) throw Failure("another worker may have it, as this one was halted");
+      if (!ours())
+        throw Failure("another worker may have claimed the run while this one was halted");
     });
   } catch (const std::exception& error) {
     SayError(Printable(error.what()));
@@ -60,13 +61,14 @@ bool TrainLogged(const SeedRun& run, const std::function<std::unique_ptr<Trainin
 
 int WorkOnStudy(const std::filesystem::path& folder) {
   InstallSignalHandlers(kStoppingTraining);
-  // A job of Slurm hears so that its time is up.
+  // Slurm announces the end of a job by these signals.
   if (std::getenv("SLURM_JOB_ID") != nullptr) StopAtUserSignals();
   const StudyPlan plan = ReadPlan(folder);
   const WorkerOutcome outcome = WorkOn(plan, TrainLogged, [] { return StopSignal() != 0; });
-  Say("{}: {} done here, {} failed{}{}\n", Printable(folder.string()), outcome.done, outcome.failed,
+  Say("{}: this worker finished {}, {} failed{}{}\n", Printable(folder.string()), outcome.done,
+      outcome.failed,
       outcome.claimed_by_others > 0
-          ? fmt::format(", {} with other workers", outcome.claimed_by_others)
+          ? fmt::format(", {} claimed by other workers", outcome.claimed_by_others)
           : "",
       outcome.stopped ? ", stopped" : "");
   if (outcome.stopped) return kTryAgain;

@@ -88,7 +88,7 @@ class WorkersTest(ProgramTest):
         self.work()
         self.assertEqual(snapshot(study), before)
         # The command itself has nothing left to train, and compares.
-        self.assertIn("8 done before, resuming 0",
+        self.assertIn("8 already done, resuming 0",
                       self.succeed("study", "little.toml", "--out", "study"))
 
     def test_workers_that_are_killed_lose_no_run_and_change_no_bit(self):
@@ -260,21 +260,21 @@ class WorkersTest(ProgramTest):
     def test_folders_of_strangers(self):
         study = self.prepare()
         plan = json.loads((study / "plan.json").read_text(encoding="utf-8"))
-        for changes, words in (({"version": "0.0.1"}, "made by Upswing 0.0.1"),
+        for changes, words in (({"version": "0.0.1"}, "got one of 0.0.1"),
                                ({"keep": "none"}, "keep: expected all, policy or tables"),
                                ({"seeds": "1-9999999"}, "1 to 10000 seeds"),
                                ({"seeds": 3}, "seeds"),
                                ({"variants": [{"name": "../x", "settings": "0"}]}, "letters"),
-                               ({"variants": [{"name": "one", "settings": "0"}]}, "not that of the plan"),
-                               ({"variants": [3]}, "variants: expected objects")):
+                               ({"variants": [{"name": "one", "settings": "0"}]}, "one/settings.toml: expected the settings of plan.json"),
+                               ({"variants": [3]}, "variants: expected a list of objects")):
             with self.subTest(changes=changes):
                 self.write("study/plan.json", json.dumps(plan | changes))
                 self.refuse(["study", "--work", "study"], words)
         self.write("study/plan.json", "{")
         self.refuse(["study", "--work", "study"], "study/plan.json")
         self.refuse(["study", "--work", "none"],
-                    "none: expected the folder of a study, got nothing of that name")
-        self.refuse(["study", "none.toml", "--status"], "none.toml: expected a study's file or folder")
+                    "none: expected the folder of a study, got no such folder")
+        self.refuse(["study", "none.toml", "--status"], "none.toml: no such file or folder; expected a study's file or folder")
         self.refuse(["study", "none.toml"], "cannot read none.toml: No such file")
         self.refuse(["study", "--work", "study", "--jobs", "2"], "--work: expected no --jobs")
         self.refuse(["study", "--work", "study", "x.toml"], "--work: expected no FILE.toml")
@@ -306,7 +306,7 @@ class WorkersTest(ProgramTest):
         os.truncate(settings, 1 << 40)
         refuse_all("expected at most 67108864 bytes")
         settings.write_text(whole.replace('model = ""', 'model = "../../m.xml"'), encoding="utf-8")
-        refuse_all("model: expected model.xml, the copy in the same folder")
+        refuse_all("model: expected model.xml in the same folder")
 
     def test_texts_of_a_result_split_no_row_of_a_table(self):
         study = self.prepare()
@@ -331,7 +331,7 @@ class WorkersTest(ProgramTest):
         result = json.loads(done.read_text(encoding="utf-8"))
         self.write("study/two/seed1.done", json.dumps(result | {"settings": "0"}))
         self.work(code=1)
-        self.assertIn("made with other settings than", (study / "two/seed1.failed").read_text("utf-8"))
+        self.assertIn("expected the settings of ", (study / "two/seed1.failed").read_text("utf-8"))
         target = self.write("elsewhere.done", "{}")
         (study / "one/seed1.done").unlink()
         (study / "one/seed1.done").symlink_to(target)
@@ -375,8 +375,8 @@ class SlurmTest(ProgramTest):
         self.refuse([*study, "--slurm", "", "--jobs", "2"], "--slurm: expected no --jobs")
         self.refuse([*study, "--slurm", "", "--status"], "--slurm: expected no --status")
         self.refuse([*study, "--slurm", "", "--tasks", "0"], "--tasks")
-        self.refuse([*study, "--tasks", "2"], "--tasks: expected --slurm beside it")
-        self.refuse([*study, "--print"], "--print: expected --slurm beside it")
+        self.refuse([*study, "--tasks", "2"], "--tasks: expected --slurm with it, got none")
+        self.refuse([*study, "--print"], "--print: expected --slurm with it, got none")
         self.refuse(["study", "--work", "x", "--slurm", ""], "--work: expected no --slurm")
 
     def test_without_slurm_it_does_not_begin(self):

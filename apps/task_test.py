@@ -83,7 +83,7 @@ class TaskTest(unittest.TestCase):
         with open(table, encoding="utf-8", newline="") as file:
             steps = [min(500, 1 - float(row["return"])) for row in csv.DictReader(file)]
         self.assertLess(min(steps), 500)
-        mean, deviation = map(float, re.search(r" J   in the (\S+) ± (\S+) s of an", line).groups())
+        mean, deviation = map(float, re.search(r" J   in (\S+) ± (\S+) s per", line).groups())
         self.assertAlmostEqual(mean, 0.2 * statistics.mean(steps), delta=0.51)
         self.assertAlmostEqual(deviation, 0.2 * statistics.stdev(steps), delta=0.51)
 

@@ -25,15 +25,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What was typed.
+/// The arguments of `train`.
 struct TrainArguments {
   std::string config, out, resume, seeds;
-  int64_t jobs = 0;  // 0: as many as there are processors
+  int64_t jobs = 0;  // 0: one per processor
   bool print_config = false;
   std::vector<FlagValue> flags;
 };
 
-/// The same settings with many seeds.
+/// Trains one agent with many seeds.
 int RunSeeds(const TrainArguments& arguments) {
   ManyRuns many;
   StudyPlan& plan = many.plan;
@@ -60,7 +60,7 @@ int PrintConfig(const TrainArguments& arguments) {
 int RunTrain(const TrainArguments& arguments) {
   if (arguments.print_config) return PrintConfig(arguments);
   if (!arguments.seeds.empty()) return RunSeeds(arguments);
-  // What is read before anything is begun may be interrupted; what is begun ends in order.
+  // A signal may interrupt the reading of settings; a training ends with a checkpoint.
   std::optional<Config> config;
   if (arguments.resume.empty()) config = BuildConfig(arguments.config, arguments.flags);
   InstallSignalHandlers(kStoppingTraining);
@@ -74,15 +74,15 @@ int RunTrain(const TrainArguments& arguments) {
 void CheckManyArguments(const CommandLine& line) {
   if (line.Has("--seeds")) {
     for (const std::string other : {"--seed", "--resume"}) {
-      if (line.Has(other)) throw BadInput(Concat("--seeds: expected no ", other, " beside it"));
+      if (line.Has(other)) throw BadInput(Concat("--seeds: expected no ", other, " with it"));
     }
   } else if (line.Has("--jobs")) {
-    throw BadInput("--jobs: expected --seeds beside it");
+    throw BadInput("--jobs: expected --seeds with it, got none");
   }
 }
 
-/// Lets --help show the defaults of the agent and the file, or of the run, that were given.
-void ShowDefaultsOfWhatIsChosen(const CommandLine& line, const CommandLine::ShowOptions& show) {
+/// Lets --help show the defaults of the given agent and file, or of the given run.
+void ShowChosenDefaults(const CommandLine& line, const CommandLine::ShowOptions& show) {
   std::vector<FlagValue> flags;
   // --algorithm without --agent shows the agent of that name.
   for (const char* flag : {"--algorithm", "--agent"}) {
@@ -98,11 +98,12 @@ void ShowDefaultsOfWhatIsChosen(const CommandLine& line, const CommandLine::Show
 /// The named agents, a paragraph each.
 std::string AgentsText() {
   std::string text =
-      "Settings and defaults are those of the agent (and file) given: train --agent sac --help.\n\n"
+      "The help shows the settings and defaults of the given agent and file:\n"
+      "  ./upswing train --agent sac --help\n\n"
       "Named agents:\n";
   constexpr size_t kIndent = 20;
   for (const auto& [name, what] : NamedAgents()) {
-    text += fmt::format("  {:<18}{}\n", name, WrapText(what, kHelpColumns, kIndent));
+    text += fmt::format("  {:<18}{}\n", name, WrapText(what, HelpColumns(), kIndent));
   }
   return text;
 }
@@ -112,41 +113,39 @@ std::string AgentsText() {
 void AddTrain(CommandLine& line) {
   TrainArguments& arguments = line.Runs(RunTrain);
   line.Text("--out", arguments.out, "FOLDER",
-            "run folder to make [runs/AGENT-seedSEED];\n"
-            "with --seeds the folder of all of them [runs/AGENT]");
+            "new run folder (default runs/AGENT-seedSEED); with --seeds the folder of all runs "
+            "(default runs/AGENT)");
   line.Text("--config", arguments.config, "FILE",
-            "TOML file of settings, - for standard input; flags override it");
+            "TOML file of settings; -: standard input; flags override the file");
   line.Text("--resume", arguments.resume, "RUN",
-            "resume a run from its checkpoint; --steps, --threads, --checkpoint-every and\n"
-            "--stop-when-solved may be given again; a solved run continues with "
-            "--no-stop-when-solved");
+            "run to resume from its checkpoint; only --steps, --threads, --checkpoint-every and "
+            "--stop-when-solved may change; a solved run continues with --no-stop-when-solved");
   line.Flag("--print-config", arguments.print_config,
-            "print the settings of this training as a TOML file for --config, and end");
+            "print the settings of this training as TOML for --config, and exit");
   AddManyOptions(line, arguments.seeds, arguments.jobs);
   Config defaults;
   line.Settings(EverySetting(defaults), arguments.flags);
   line.ShowSettings(
-      [&line](const CommandLine::ShowOptions& show) { ShowDefaultsOfWhatIsChosen(line, show); });
-  line.Footer(
-      AgentsText() +
-      "\nExamples:\n"
-      "  ./upswing train                                  the default agent, until solved\n"
-      "  ./upswing train --agent dqn --seed 3 --out runs/a\n"
-      "  ./upswing train --gamma 0.98 --hidden 128,128    any setting as a flag\n"
-      "  ./upswing train --mass2 1.2 --no-stop-when-solved --steps 500000\n"
-      "  ./upswing train --randomize 0.25 --delay 0.02    a new random plant each episode\n"
-      "  ./upswing train --resume runs/a --no-stop-when-solved --steps 2000000   resume\n"
-      "  ./upswing train --agent fast --print-config > my.toml   then edit, and train --config\n"
-      "  ./upswing train --seeds 10                       in runs/d3qn/seed1 to seed10, in\n"
-      "                                                   parallel; the same command resumes\n"
-      "  ./upswing train --seeds 3,5,8-12 --jobs 2 --out runs/many\n"
-      "\nSIGINT and SIGTERM write a checkpoint and end with 130 and 143; SIGUSR1 writes one\n"
-      "and continues. Exit code 0: done; 1: failed; 2: bad usage or input.\n");
+      [&line](const CommandLine::ShowOptions& show) { ShowChosenDefaults(line, show); });
+  line.Footer(AgentsText() +
+              "\nExamples:\n"
+              "  ./upswing train                         train the default agent until solved\n"
+              "  ./upswing train --agent dqn --seed 3 --out runs/a\n"
+              "  ./upswing train --gamma 0.98 --hidden 128,128             set any setting\n"
+              "  ./upswing train --mass2 1.2 --no-stop-when-solved --steps 500000\n"
+              "  ./upswing train --randomize 0.25 --delay 0.02  draw a plant for each episode\n"
+              "  ./upswing train --resume runs/a --no-stop-when-solved --steps 2000000\n"
+              "  ./upswing train --agent fast --print-config > my.toml     edit, then --config\n"
+              "  ./upswing train --seeds 10              train or resume runs/d3qn/seed1 to 10\n"
+              "  ./upswing train --seeds 3,5,8-12 --jobs 2 --out runs/many\n"
+              "\nSIGINT and SIGTERM write a checkpoint and end the program with exit code 130 or\n"
+              "143. SIGUSR1 writes a checkpoint, and the training continues. Other exit codes:\n"
+              "0: done; 1: failed; 2: bad usage or input.\n");
   line.Check([&line] {
     if (line.Has("--resume") && (line.Has("--out") || line.Has("--config"))) {
       throw BadInput(
-          "--resume: takes settings and folder from the run; expected neither --out nor "
-          "--config beside it");
+          "--resume: expected neither --out nor --config with it: the run has its own settings and "
+          "folder");
     }
     CheckManyArguments(line);
   });

@@ -21,10 +21,10 @@
 namespace upswing {
 namespace {
 
-/// What people see of a training: a progress line, a line for each evaluation, a summary.
+/// The printed view of a training: a progress line, a line per evaluation, a summary.
 class TrainView : public TrainObserver {
  public:
-  /// A training, which must outlive this, from where it stands.
+  /// A view of a training, which must outlive it, from its current step on.
   explicit TrainView(const Training& training)
       : training_(training),
         begin_step_(training.state().steps),
@@ -32,7 +32,7 @@ class TrainView : public TrainObserver {
         since_updates_(training.agent().updates()),
         since_seconds_(training.state().seconds) {}
 
-  /// Prints what is trained and where.
+  /// Prints agent, sizes and folder.
   void Announce(const std::filesystem::path& run) const {
     const Config& config = training_.config();
     Say("Training {} (seed {}) in {}\n", config.agent, config.train.seed, Printable(run.string()));
@@ -46,7 +46,7 @@ class TrainView : public TrainObserver {
     const TrainingSize size = SizeOf(config);
     constexpr double kGigabyte = 1e9;
     if (size.memory > kGigabyte) {
-      Say("  up to {:.1f} GB of memory, and {:.1f} GB for the checkpoint on disk\n",
+      Say("  up to {:.1f} GB of memory and {:.1f} GB of disk for the checkpoint\n",
           size.memory / kGigabyte, size.checkpoint / kGigabyte);
     }
     for (const std::string& warning : Warnings(config)) Say("  Warning: {}\n", warning);
@@ -68,7 +68,7 @@ class TrainView : public TrainObserver {
                     Join(AgentTexts(), "  "), e.reward_sum.mean, e.successes, e.episodes));
   }
 
-  /// Shows progress if it is time to; returns what signals request.
+  /// Updates the progress line if it is due; returns the request of a signal.
   TrainRequest Poll() {
     if (line_.due()) ShowProgress(training_.state());
     return PollSignals();
@@ -87,14 +87,14 @@ class TrainView : public TrainObserver {
           IsScreened(training_.config()) && !s.solved && s.best_success_rate == 1;
       Say("Best policy: {} (step {}, success {:.0f}%{}, return {:.0f})\n",
           Printable(policy.string()), FormatCount(s.best_step), 100 * s.best_success_rate,
-          unconfirmed ? " in closed form" : "", s.best_return);
+          unconfirmed ? " in closed-form physics" : "", s.best_return);
     } else if (s.best_step > 0) {
-      Say("Best policy: of step {}, but {} no longer exists\n", FormatCount(s.best_step),
+      Say("Best policy: from step {}, but {} no longer exists\n", FormatCount(s.best_step),
           Printable(policy.string()));
     }
     if (s.solved && ValueIsOff(value_, discounted_return_)) {
-      Say("Value estimate: at the last evaluation the agent expected {:.4g} and attained {:.4g}\n"
-          "(discounted reward), which is off by more than a quarter.\n",
+      Say("Warning: at the last evaluation the agent expected a discounted return of {:.4g} and\n"
+          "got {:.4g}; the estimate is off by more than a quarter.\n",
           value_, discounted_return_);
     }
     if (Printable(run.string()) != run.string()) return;  // such a name cannot be typed
@@ -125,12 +125,12 @@ class TrainView : public TrainObserver {
     since_seconds_ = s.seconds;
   }
 
-  /// The rate of updates as the lines show it.
+  /// The rate of updates; a dash before it is known.
   std::string UpdatesText() const {
     return steps_per_second_ > 0 ? FormatCount(updates_per_second_) : "-";
   }
 
-  /// What the agent has to tell, such as `eps 0.05` and `loss 0.0012`.
+  /// Metrics of the agent, such as `eps 0.05` and `loss 0.0012`.
   std::vector<std::string> AgentTexts() const {
     const bool learned = training_.agent().updates() > 0;
     std::vector<std::string> texts;
@@ -160,21 +160,21 @@ class TrainView : public TrainObserver {
     line_.Show(static_cast<double>(s.steps) / static_cast<double>(steps_in_all), fields);
   }
 
-  /// Prints in one sentence how far the training is.
+  /// Prints the outcome in one sentence.
   void PrintOutcome(bool finished) const {
     const TrainState& s = training_.state();
     const TrainConfig& config = training_.config().train;
     const bool did_nothing = begin_step_ > 0 && s.steps == begin_step_ && finished;
     const bool all_steps_done = s.steps >= config.steps;
     if (did_nothing && all_steps_done) {
-      Say("Nothing to do: all {} steps were done before (--steps is the total){}.\n",
-          FormatCount(config.steps), s.solved ? ", and it is solved" : "");
+      Say("Nothing to do: the run has all {} steps (--steps is the total){}.\n",
+          FormatCount(config.steps), s.solved ? " and is solved" : "");
     } else if (did_nothing) {
-      Say("Nothing to do: it was solved before, at step {} after {} of training, and stops when\n"
-          "solved. With --no-stop-when-solved it continues to step {} (--steps).\n",
+      Say("Nothing to do: the run was solved at step {} after {} of training. With\n"
+          "--no-stop-when-solved it continues to step {} (--steps).\n",
           FormatCount(s.streak_step), FormatDuration(s.streak_seconds), FormatCount(config.steps));
     } else if (s.solved) {
-      Say("Solved after {} of training, at step {} (training so far: {}, {} steps).\n",
+      Say("Solved after {} of training, at step {} (in all {}, {} steps).\n",
           FormatDuration(s.streak_seconds), FormatCount(s.streak_step), FormatDuration(s.seconds),
           FormatCount(s.steps));
     } else {

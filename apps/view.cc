@@ -35,7 +35,7 @@ struct ViewArguments {
   bool headless = false;
 };
 
-/// The policies that were named, in their order. Throws BadInput.
+/// The policies of the command line, in their order. Throws BadInput.
 std::vector<LoadedPolicy> PoliciesOf(const ViewArguments& a) {
   if (a.names.size() > kMostPolicies) {
     throw BadInput(
@@ -45,12 +45,12 @@ std::vector<LoadedPolicy> PoliciesOf(const ViewArguments& a) {
   for (const LoadedPolicy& loaded : policies) {
     if (HasPlant(loaded.task)) continue;
     throw BadInput(Concat(loaded.name, ": expected a policy of ", kDoublePendulum,
-                          ", which alone can be viewed, got one of ", loaded.task));
+                          ", the only task with a view, got one of ", loaded.task));
   }
   return policies;
 }
 
-/// What is shown, in its order; `policies` must outlive it.
+/// One rollout per policy, in their order; `policies` must outlive them.
 std::vector<RolloutConfig> EntriesOf(const ViewArguments& a,
                                      const std::vector<LoadedPolicy>& policies) {
   std::vector<RolloutConfig> entries;
@@ -66,8 +66,8 @@ std::vector<RolloutConfig> EntriesOf(const ViewArguments& a,
 }
 
 #ifdef UPSWING_VIEWER
-/// The plants to switch to: the one that was asked for, those of the policies' trainings, and the
-/// usual one; each once.
+/// The plants that the window can switch to: the requested one, those of the policies' trainings,
+/// and the default one; each once.
 std::vector<std::pair<std::string, Plant>> PlantsOf(const std::vector<RolloutConfig>& entries,
                                                     const std::vector<LoadedPolicy>& policies) {
   std::vector<std::pair<std::string, Plant>> plants;
@@ -77,11 +77,11 @@ std::vector<std::pair<std::string, Plant>> PlantsOf(const std::vector<RolloutCon
     }
     plants.emplace_back(name, plant);
   };
-  add("as at the beginning", entries.front().env.plant(0));
+  add("as at the start", entries.front().env.plant(0));
   for (const LoadedPolicy& loaded : policies) {
     add(Concat(loaded.origin(), " of ", TitleOf(loaded)), loaded.plant);
   }
-  add("the usual one", Plant());
+  add("the default", Plant());
   return plants;
 }
 #endif
@@ -125,7 +125,7 @@ int RunView(const ViewArguments& a) {
     throw BadInput(Concat("--csv: expected one policy, got ", a.names.size()));
   }
   if (!a.csv.empty() && a.csv == a.record) {
-    throw BadInput(Concat("--csv: expected another file than that of --record, got ", a.csv));
+    throw BadInput(Concat("--csv: expected another file than --record, got ", a.csv));
   }
   if (!a.csv.empty()) CheckWritable("--csv", a.csv);
   const std::vector<LoadedPolicy> policies = PoliciesOf(a);
@@ -148,36 +148,40 @@ int RunView(const ViewArguments& a) {
   return StopSignal() == 0 ? 0 : 128 + StopSignal();
 #else
   throw Failure(
-      "view: this program was built without the window: ./upswing view builds it (by hand: cmake "
-      "--preset release -DUPSWING_VIEWER=ON, with GLFW 3.3); --record FILE and --headless need "
-      "none");
+      "view: this program was built without the window; ./upswing view builds it (by hand: cmake "
+      "--preset release -DUPSWING_VIEWER=ON, with GLFW 3.3); --record FILE and --headless need no "
+      "window");
 #endif
 }
 
 /// Adds the policies to look at, and the settings of the controllers among them.
 void AddPolicies(CommandLine& line, ViewArguments& a) {
   AddControllers(line, a.controller);
-  line.Texts("policies", a.names, "POLICY|RUN...",
-             Concat("policy.safetensors, run folder or controller (", Join(ControllerNames(), ", "),
-                    "), several side by side; none: nothing turns the motor"));
+  line.Texts(
+      "policies", a.names, "POLICY|RUN...",
+      Concat("policies, shown side by side: policy.safetensors, run folders or controllers (",
+             Join(ControllerNames(), ", "), "); none: the motor is off"));
 }
 
-/// Adds what a picture is like.
+/// Adds the options of the picture.
 void AddPicture(CommandLine& line, ViewArguments& a) {
   Options own;
-  own.Add(&a.seconds, "seconds", {0, 1000}, "s", "how long a recording is, or a window is open")
-      .usual = "10, with --episode 20; a window: until it is closed";
-  own.Add(&a.fps, "fps", {1, 200}, "", "frames a second of a recording").usual = "50; of a GIF 25";
-  own.Add(&a.speed, "speed", {0.01, 100}, "", "1: real time; 0.1: ten times slower");
-  own.Add(&a.width, "width", {kLeastPixels, kMostPixels}, "", "of the picture, pixels");
-  own.Add(&a.height, "height", {kLeastPixels, kMostPixels}, "", "of the picture, pixels");
+  own.Add(&a.seconds, "seconds", {0, 1000}, "s",
+          "length of the recording, or time until the window closes")
+      .usual = "10; 20 with --episode; a window stays open";
+  own.Add(&a.fps, "fps", {1, 200}, "", "frames per second of a recording").usual =
+      "50; 25 for a GIF";
+  own.Add(&a.speed, "speed", {0.01, 100}, "",
+          "playback speed; 1: real time; 0.1: ten times slower");
+  own.Add(&a.width, "width", {kLeastPixels, kMostPixels}, "pixels", "width of the picture");
+  own.Add(&a.height, "height", {kLeastPixels, kMostPixels}, "pixels", "height of the picture");
   own.Add(&a.look.camera.azimuth, "azimuth", {-360, 360}, "deg",
-          "of the camera; 90: across the pendulum's plane");
-  own.Add(&a.look.camera.elevation, "elevation", {-90, 90}, "deg", "of the camera");
+          "azimuth of the camera; 90: perpendicular to the pendulum's plane");
+  own.Add(&a.look.camera.elevation, "elevation", {-90, 90}, "deg", "elevation of the camera");
   own.Add(&a.look.camera.distance, "distance", {0, 1000}, "m",
-          "of the camera; 0: as far as shows all");
-  own.Add(&a.look.text, "text", "name, time and torque in the picture");
-  own.Add(&a.look.marks, "marks", "torque, goal and the tip's path in the picture");
+          "distance of the camera; 0: far enough to show everything");
+  own.Add(&a.look.text, "text", "show name, time and torque in the picture");
+  own.Add(&a.look.marks, "marks", "show torque, goal and the tip's path in the picture");
   line.Arguments(own);
 }
 
@@ -187,26 +191,27 @@ void AddView(CommandLine& line) {
   ViewArguments& a = line.Runs(RunView);
   AddPolicies(line, a);
   line.Text("--record", a.record, "FILE",
-            "write FILE.mp4 or FILE.gif (with the program ffmpeg), FILE.png (the last moment) "
-            "or FOLDER/ (each frame as PNG) instead of opening a window");
-  line.Flag("--headless", a.headless, "open no window, as --record does");
-  line.Text("--csv", a.csv, "FILE", "write the episode as `simulate` does; -: standard output");
+            "recording to write instead of opening a window: FILE.mp4 or FILE.gif (needs ffmpeg), "
+            "FILE.png (the last frame) or FOLDER/ (each frame as PNG)");
+  line.Flag("--headless", a.headless, "open no window; needs --record or --csv");
+  line.Text("--csv", a.csv, "FILE", "CSV file to write, as `simulate` does; -: standard output");
   AddPicture(line, a);
   AddEpisodeOptions(line, a.trial);
   AddTrialOptions(line, a.trial, "noise, random plants and the start of --episode");
   line.Footer(
-      "In the window: space pauses, right and left arrow step, backspace begins again, enter "
-      "turns\n"
-      "the policy off and on, tab changes the policy, P the plant, - and = the speed; double "
-      "click\n"
-      "selects a link and ctrl-drag pulls at it; F1 shows all keys.\n\n"
+      "Keys in the window:\n"
+      "  space        pause                enter    turn the policy off or on\n"
+      "  left, right  step                 tab      next policy\n"
+      "  backspace    start again          P        next plant\n"
+      "  - =          slower, faster       F1       show all keys\n"
+      "A double click selects a link; ctrl-drag pulls it.\n\n"
       "Examples:\n"
       "  ./upswing view runs/d3qn-seed1\n"
-      "  ./upswing view runs/d3qn-seed1 lqr --start 3.1,0,0,0     side by side\n"
+      "  ./upswing view runs/d3qn-seed1 lqr --start 3.1,0,0,0\n"
       "  ./upswing view runs/d3qn-seed1 --set mass2=1.3 --delay 0.02\n"
       "  ./upswing view runs/d3qn-seed1 --record swing-up.mp4 --seconds 5 --speed 0.5\n"
-      "  ./upswing view runs/d3qn-seed1 --record frames/          PNG files, no ffmpeg\n"
-      "  ./upswing view --start 3,0,0,0                           let it fall\n");
+      "  ./upswing view runs/d3qn-seed1 --record frames/    PNG files, without ffmpeg\n"
+      "  ./upswing view --start 3,0,0,0                     no motor: it falls\n");
 }
 
 }  // namespace upswing

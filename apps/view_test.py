@@ -264,7 +264,7 @@ class BadInput(ViewTest):
         self.write("lib/libEGL.so.1", "no library")
         for environment, *words in (
                 ({"LD_LIBRARY_PATH": "lib"}, "libEGL.so.1", "libegl1"),
-                ({"__EGL_VENDOR_LIBRARY_FILENAMES": "/none"}, "EGL", "no device", "libgl1-mesa-dri")):
+                ({"__EGL_VENDOR_LIBRARY_FILENAMES": "/none"}, "EGL: expected a device", "found none", "libgl1-mesa-dri")):
             self.refuse(["view", FAST, "--record", "x.png"], *words, code=1,
                         env=os.environ | environment)
         for name in ("x.mp4", "x.gif"):

@@ -27,13 +27,13 @@ struct BenchPart {
 
 std::vector<BenchPart> Parts() {
   return {
-      {"kernels", "products of a layer, Adam, transposition, memory bandwidth", KernelCases},
-      {"gradient", "gradient steps: a minibatch sampled and learned from", GradientCases},
-      {"sac", "rounds of SAC: a minibatch sampled, two critics, actor and temperature", SacCases},
-      {"ppo", "steps of PPO: Pendulum-v1, and two epochs of learning", PpoCases},
+      {"kernels", "layer products, Adam, transposition, memory bandwidth", KernelCases},
+      {"gradient", "updates of DQN: sample a minibatch and learn from it", GradientCases},
+      {"sac", "updates of SAC: minibatch, two critics, actor, temperature", SacCases},
+      {"ppo", "steps of PPO on Pendulum-v1, with two epochs of learning", PpoCases},
       {"act", "actions of a policy", ActCases},
-      {"replay", "sampling from and adding to a replay memory of 300,000", ReplayCases},
-      {"physics", "Runge-Kutta steps of MuJoCo and of the closed form", PhysicsCases},
+      {"replay", "sampling and adding, with a replay memory of 300,000", ReplayCases},
+      {"physics", "Runge-Kutta steps in MuJoCo and in closed form", PhysicsCases},
       {"env", "environment steps: physics, observation, reward, reset", EnvCases},
       {"train", "training steps: environment and agent, without evaluations", TrainCases},
   };
@@ -116,24 +116,25 @@ class BenchRunner {
   std::exception_ptr error_;
 };
 
-/// Throws BadInput on what the command line's own checks cannot see.
+/// Throws BadInput for options that do not go together.
 void CheckOptions(const BenchOptions& options) {
   const std::vector<std::string> names = NamesOf(Parts());
   for (const std::string& part : options.parts) {
     if (std::ranges::find(names, part) == names.end()) {
-      throw BadInput(Concat("bench: no part is called \"", part, "\"", DidYouMean(part, names),
-                            "; there are ", Join(names, ", ")));
+      throw BadInput(Concat("bench: expected parts of ", Join(names, ", "), ", got \"", part, "\"",
+                            DidYouMean(part, names)));
     }
   }
   const auto runs = [&](const char* part) {
     return options.parts.empty() || std::ranges::find(options.parts, part) != options.parts.end();
   };
   if (!options.network.empty() && !runs("gradient")) {
-    throw BadInput("bench: --network is for the part gradient");
+    throw BadInput("--network: expected the part gradient with it, got other parts");
   }
   if ((!options.hidden.empty() || options.batch > 0) && !runs("gradient") && !runs("sac") &&
       !runs("ppo")) {
-    throw BadInput("bench: --hidden and --batch are for the parts gradient, sac and ppo");
+    throw BadInput(
+        "--hidden, --batch: expected one of the parts gradient, sac and ppo with them, got others");
   }
   if (options.json) CheckWritable("--json", *options.json);
 }
@@ -182,45 +183,49 @@ int RunBench(BenchOptions options) {
 
 void AddBench(CommandLine& line) {
   BenchOptions& o = line.Runs(RunBench);
-  line.Texts("parts", o.parts, "PART", "what to measure [everything]");
+  line.Texts("parts", o.parts, "PART", "parts to measure (default all)");
   line.Text("--json", o.json, "FILE",
-            "file to write, in Google Benchmark's format; -: standard output, without the table");
+            "JSON file to write, in the format of Google Benchmark; -: standard output, without "
+            "the table");
   Options own;
   own.Add(&o.threads, "threads", {0, 256}, "numbers of threads; 0: chosen by timing").usual =
-      "1 and one for each processor, up to 8";
-  own.AddChoice(&o.simd, "simd", SimdPaths(), "vector instructions").usual = "the first";
-  own.Add(&o.seconds, "seconds", {0.001, 1000}, "s", "for each repetition of a case");
-  own.Add(&o.repetitions, "repetitions", {1, 1000}, "", "of a case; the median is printed");
-  own.AddChoice(&o.network, "network", {"plain", "dueling"}, "gradient: DQN or Dueling Double DQN")
+      "1 and one per processor, at most 8";
+  own.AddChoice(&o.simd, "simd", SimdPaths(), "vector instructions to use").usual = "the first";
+  own.Add(&o.seconds, "seconds", {0.001, 1000}, "s", "time per repetition of a case");
+  own.Add(&o.repetitions, "repetitions", {1, 1000}, "",
+          "repetitions of each case; the table shows the median");
+  own.AddChoice(&o.network, "network", {"plain", "dueling"},
+                "network of gradient: plain DQN or Dueling Double DQN")
       .usual = "both";
-  own.Add(&o.hidden, "hidden", {1, 4096}, "gradient, sac, ppo: widths of the feature layers")
+  own.Add(&o.hidden, "hidden", {1, 4096}, "widths of the hidden layers of gradient, sac and ppo")
       .usual = "several";
-  own.Add(&o.batch, "batch", {1, 65536}, "", "gradient, sac, ppo: size of the minibatches").usual =
-      "several";
+  own.Add(&o.batch, "batch", {1, 65536}, "transitions",
+          "size of the minibatches of gradient, sac and ppo")
+      .usual = "several";
   line.Arguments(own);
 
   std::string parts = "Parts:\n";
   for (const BenchPart& part : Parts()) parts += fmt::format("  {:<10}{}\n", part.name, part.help);
   line.Footer(
       parts +
-      "\nGFLOP/s count the multiplications and additions that cannot be done without. The peak is\n"
-      "what as many threads reach at once with multiply-adds in registers, measured before. CPU\n"
-      "time is that of all threads; other load disturbs it less than wall time.\n\n"
+      "\nGFLOP/s counts only the necessary multiplications and additions. The peak is measured\n"
+      "first: multiply-adds in registers on the same number of threads. CPU time is the sum\n"
+      "over all threads; other load affects it less than wall time.\n\n"
       "Examples:\n"
-      "  ./upswing bench                                  everything, about two minutes\n"
+      "  ./upswing bench                               everything, about two minutes\n"
       "  ./upswing bench gradient train --threads 1,2\n"
-      "  ./upswing bench sac --threads 0,1                the automatic choice beside one thread\n"
-      "  ./upswing bench gradient --network plain --hidden 256,256 --batch 128 --json rate.json\n"
+      "  ./upswing bench sac --threads 0,1             automatic choice and one thread\n"
+      "  ./upswing bench gradient --network plain --hidden 256,256 --json rate.json\n"
       "  ./upswing bench kernels --simd avx2 --seconds 1 --repetitions 5\n");
 }
 
 constexpr CommandEntry kCommands[] = {
-    {"bench", "Measure how fast it is on this machine", AddBench}};
+    {"bench", "Measure the speed of the program on this machine", AddBench}};
 
 }  // namespace
 }  // namespace upswing
 
-// What is thrown while an exception is reported ends us.
+// An exception while another one is reported ends the program.
 int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape)
   return upswing::MainProgram(argc, argv, upswing::kCommands, "");
 }

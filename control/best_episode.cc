@@ -24,8 +24,8 @@ constexpr double kSearchTolerance = 1e-6;
 constexpr int kSearchIterations = 150;
 constexpr int kChanges = 100;  // of single torques
 
-/// Weights with which the return grows with the time that is spent upright. A little energy and
-/// height tell the way there.
+/// Reward weights for which the return grows with the time upright. Small energy and height terms
+/// guide the search there.
 RewardWeights WeightsOf(Aim aim) {
   RewardWeights weights;
   if (aim == Aim::kTime) weights.weight = {0.02, 0.02, 1, 0, 0};
@@ -61,8 +61,8 @@ BestEpisodeSearch::BestEpisodeSearch(const Plant& plant, int guesses, const Prog
     if (progress) progress(guess + 1, guesses);
   }
   if (!best) {
-    throw BadInput(Concat("found no swing-up of this plant with ", Rounded(plant.torque_limit),
-                          " N·m from ", guesses, " guesses"));
+    throw BadInput(Concat("--guesses: found no swing-up of this plant with ",
+                          Rounded(plant.torque_limit), " N·m from ", guesses, " guesses"));
   }
   from_hanging_ = *std::move(best);
   gains_ = Tracking(from_hanging_, lqr, upright_.lqr().P, optimizer_.model()).K;
@@ -161,7 +161,7 @@ BestEpisode BestEpisodeSearch::WithTable(const Trajectory& trajectory, const Tor
 
 std::vector<BestEpisodeSearch::Found> BestEpisodeSearch::From(const StateVector& start,
                                                               std::span<const TorqueTable> tables) {
-  // From here the same torques, and those of the mirror image, under feedback.
+  // First guesses: the known torques and their mirror image, under feedback from this start.
   const LqrConfig lqr;
   const QuadraticCost cost(WeightsOf(lqr), lqr.torque, upright_.lqr().P);
   std::vector<Eigen::RowVector4d> feedback;

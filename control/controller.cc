@@ -61,9 +61,8 @@ void PendulumController::Act(Matrix<const float> obs, Matrix<double> action, Mem
 }
 
 Tensors ComputedPolicy::ToTensors() const {
-  throw BadInput(Concat(kind(),
-                        ": expected a policy that is kept in a file, got one that is made "
-                        "anew each time"));
+  throw BadInput(
+      Concat(kind(), ": expected a policy that has a file, got a controller, which has none"));
 }
 
 }  // namespace upswing

@@ -16,25 +16,24 @@ namespace {
 Error NoGain(const LqrConfig& config, const Plant& plant) {
   const UprightModes modes = ModesOf(plant);
   if (std::max({config.q1, config.q2, config.w1, config.w2}) == 0) {
-    return BadInput("lqr: expected a weight above 0 of q1, q2, w1 or w2, got none");
+    return BadInput("lqr: expected a weight above 0 for q1, q2, w1 or w2, got only 0");
   }
   // Where a Runge-Kutta step no longer decays: Hairer, Wanner, "Solving Ordinary Differential
   // Equations II" (1996), section IV.2.
   constexpr double kLargestDecay = 2.785 / kPhysicsTimestep;
   if (modes.decay > kLargestDecay) {
-    return BadInput(Concat("lqr: expected a plant that steps of ", kPhysicsTimestep,
-                           " s can follow, whose damping acts at up to ", Rounded(kLargestDecay),
-                           "/s, got ", Rounded(modes.decay), "/s"));
+    return BadInput(Concat("lqr: expected a plant whose damping decays at no more than ",
+                           Rounded(kLargestDecay), "/s, so that time steps of ", kPhysicsTimestep,
+                           " s are stable, got ", Rounded(modes.decay), "/s"));
   }
   if (std::abs(modes.delta) > 1e-3) {
     return BadInput(Concat(
-        "lqr: no gain was found with these weights, which are too far apart: that of the torque "
-        "is ",
-        Rounded(config.torque), ", the largest of the state ",
+        "lqr: no gain exists numerically for weights so far apart: the weight of the torque is ",
+        Rounded(config.torque), ", the largest weight of the state ",
         Rounded(WeightsOf(config).maxCoeff())));
   }
   return BadInput(
-      Concat("lqr: no gain was found that holds this plant upright: its unstable modes grow at ",
+      Concat("lqr: found no gain that holds this plant upright: its unstable modes grow at ",
              Rounded(modes.faster), "/s and ", Rounded(modes.slower), "/s (ratio ",
              Rounded(modes.slower / modes.faster), "), and delta is ", Rounded(modes.delta),
              "; where that is 0, damping of joint ", plant.actuated_joint == 1 ? 2 : 1,

@@ -91,9 +91,8 @@ LqrCatch::LqrCatch(const LqrConfig& config, const Plant& plant)
       limit_(plant.torque_limit) {
   if (region_ > 0) return;
   throw BadInput(
-      "lqr: found no region of attraction: with these weights it holds the pendulum, if at all, "
-      "only "
-      "from too near to upright");
+      "lqr: found no region of attraction: with these weights LQR catches the pendulum only very "
+      "close to upright, if at all");
 }
 
 bool LqrCatch::Holds(const StateVector& deviation, PendulumModel& model) const {

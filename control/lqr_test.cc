@@ -224,7 +224,7 @@ TEST(Lqr, RefusesAPlantThatCannotBeHeld) {
   plant.damping2 = 0.38976969143555484;  // see linearize_test.cc
   const std::string message = MessageOf(LqrConfig(), plant);
   EXPECT_TRUE(
-      message.starts_with("lqr: no gain was found that holds this plant upright: its "
+      message.starts_with("lqr: found no gain that holds this plant upright: its "
                           "unstable modes grow at 3.804/s and 3.389/s (ratio 0.8911), and "
                           "delta is "))
       << message;
@@ -238,15 +238,15 @@ TEST(Lqr, RefusesAPlantThatTheStepsCannotFollow) {
   Plant plant;
   plant.damping2 = 100;
   EXPECT_EQ(MessageOf(LqrConfig(), plant),
-            "lqr: expected a plant that steps of 0.005 s can follow, whose damping acts at up to "
-            "557/s, got 3111/s");
+            "lqr: expected a plant whose damping decays at no more than 557/s, so that time steps of "
+            "0.005 s are stable, got 3111/s");
 }
 
 TEST(Lqr, RefusesWeightsOfNothing) {
   LqrConfig config;
   config.q1 = config.q2 = config.w1 = config.w2 = 0;
   EXPECT_EQ(MessageOf(config, Plant()),
-            "lqr: expected a weight above 0 of q1, q2, w1 or w2, got none");
+            "lqr: expected a weight above 0 for q1, q2, w1 or w2, got only 0");
   config.w2 = 1;
   EXPECT_EQ(MessageOf(config, Plant()), "");
 }

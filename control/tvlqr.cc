@@ -69,8 +69,8 @@ SwingUp PlanSwingUp(const LqrConfig& lqr, const SwingUpConfig& config, const Lqr
   if (!best) {
     throw BadInput(Concat("tvlqr: found no swing-up of ", Rounded(config.seconds), " s with ",
                           Rounded(weaker.torque_limit),
-                          " N·m that ends where lqr catches; --tvlqr-seconds allows for a longer "
-                          "one, --tvlqr-reserve 0 for all of the motor"));
+                          " N·m that ends where lqr catches; try a larger --tvlqr-seconds or "
+                          "--tvlqr-reserve 0, which gives the plan the whole torque limit"));
   }
   return Tracking(*std::move(best), lqr, upright.lqr().P, model);
 }

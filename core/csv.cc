@@ -15,7 +15,7 @@ size_t EndOfCell(std::string_view line, size_t at, const std::string& place) {
   for (; at < line.size() && (quoted || line[at] != ','); ++at) {
     if (line[at] == '"') quoted = !quoted;  // two quotes in a row change nothing
   }
-  if (quoted) throw BadInput(Concat(place, "expected a quote that is closed, got \"", line, "\""));
+  if (quoted) throw BadInput(Concat(place, "expected a closing quote, got \"", line, "\""));
   return at;
 }
 

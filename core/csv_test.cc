@@ -47,7 +47,7 @@ TEST(Csv, MessagesNameLineAndColumn) {
   EXPECT_EQ(Complaint("a,b\n# c\n1,x\n"), "t.csv:3: b: expected a finite number, got \"x\"");
   EXPECT_EQ(Complaint("a,b\n1,inf\n"), "t.csv:2: b: expected a finite number, got \"inf\"");
   EXPECT_EQ(Complaint("a,b\nx,1\n"), "none");
-  EXPECT_EQ(Complaint("a,b\n\"x,1\n"), "t.csv:2: expected a quote that is closed, got \"\"x,1\"");
+  EXPECT_EQ(Complaint("a,b\n\"x,1\n"), "t.csv:2: expected a closing quote, got \"\"x,1\"");
   EXPECT_EQ(Complaint("a,b\n1,\"\"\n"), "t.csv:2: b: expected a finite number, got \"\"");
 }
 

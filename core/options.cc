@@ -46,11 +46,21 @@ std::string RangeText(Range range) {
   return "";
 }
 
-/// ` (0 to 1)`, ` (0 to 1 in steps of 0.02)` and the like; empty where all numbers are allowed.
-std::string RangeInBrackets(Range range, double step) {
+/// `0 to 1` or `0 to 1 in steps of 0.02`; empty if all numbers are allowed.
+std::string RangeInWords(Range range, double step) {
   if (!std::isfinite(range.low) || !std::isfinite(range.high)) return "";
-  return Concat(" (", FormatNumber(range.low), " to ", FormatNumber(range.high),
-                step > 0 ? " in steps of " + FormatNumber(step) : "", ")");
+  return Concat(FormatNumber(range.low), " to ", FormatNumber(range.high),
+                step > 0 ? " in steps of " + FormatNumber(step) : "");
+}
+
+/// A line of help: `HELP [UNIT] (VALUES; DEFAULT)`, without the parts that are empty.
+std::string HelpLine(const Option& option, const std::string& fallback) {
+  std::vector<std::string> notes{
+      option.choices.empty() ? RangeInWords(option.range, option.step) : Join(option.choices, ", "),
+      fallback.empty() ? "" : "default " + fallback};
+  std::erase(notes, "");
+  return Concat(option.help, option.unit.empty() ? "" : Concat(" [", option.unit, "]"),
+                notes.empty() ? "" : Concat(" (", Join(notes, "; "), ")"));
 }
 
 /// Whether a number is a multiple of `step`, up to rounding; true if that is 0.
@@ -124,16 +134,10 @@ std::string Option::on_command_line() const {
   return Concat(flag(), " ", ShellQuoted(plain_text()));
 }
 
-std::string Option::about() const {
-  std::string text = help;
-  if (!unit.empty()) text += ", " + unit;
-  if (!choices.empty()) text += ": " + Join(choices, ", ");
-  return text + RangeInBrackets(range, step);
-}
+std::string Option::about() const { return HelpLine(*this, ""); }
 
 std::string Option::about_with_default() const {
-  const std::string value = usual.empty() ? plain_text() : usual;
-  return value.empty() ? about() : Concat(about(), " [", value, "]");
+  return HelpLine(*this, usual.empty() ? plain_text() : usual);
 }
 
 std::string Option::expected() const {
@@ -156,7 +160,8 @@ std::string Option::expected() const {
 }
 
 void Option::Set(std::string_view text, const std::string& where) const {
-  if (read_only) throw std::logic_error(Concat(name, ": set in a const struct"));
+  if (read_only)
+    throw std::logic_error(Concat(name, ": a setting of a const struct cannot change"));
   const bool valid =
       std::visit(Overloaded{
                      [&](bool* value) {
@@ -215,7 +220,7 @@ Option& Options::AddChoice(std::string* target, std::string_view name,
 
 void Options::Alias(std::string_view name, std::vector<std::string> members,
                     std::string_view help) {
-  std::string text = help.empty() ? Concat("both ", Join(members, " and ")) : std::string(help);
+  std::string text = help.empty() ? Concat("set ", Join(members, " and ")) : std::string(help);
   aliases_.push_back({section_, std::string(name), std::move(members), std::move(text)});
 }
 
@@ -262,8 +267,9 @@ std::vector<const Option*> Options::Find(std::string_view name, const std::strin
   if (found.empty()) {
     std::string hint = DidYouMean(name, known);
     constexpr size_t kMostNames = 30;  // more would make the line unreadable
-    if (hint.empty() && known.size() < kMostNames) hint = Concat("; there are ", Join(known, ", "));
-    throw BadInput(Concat(where, ": no setting is called \"", name, "\"", hint));
+    if (hint.empty() && known.size() < kMostNames)
+      hint = Concat("; expected one of ", Join(known, ", "));
+    throw BadInput(Concat(where, ": expected a setting, got \"", name, "\"", hint));
   }
   return found;
 }

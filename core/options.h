@@ -29,32 +29,32 @@ inline constexpr Range kUnit{0, 1};  // a share or probability
 /// The flag of a setting or an alias, such as `--eval-every` for `eval_every`.
 std::string FlagOf(std::string name);
 
-/// One setting, with all that flags, configuration files, help and validation need.
+/// One setting: what flags, configuration files, help and validation need to know of it.
 struct Option {
-  /// What another value of the setting makes of a run.
+  /// What a change of the setting changes.
   enum class Decides {
-    kTraining,  // another training
-    kSeed,      // the same training with other random numbers
-    kEnd,       // the same run, longer or shorter
-    kNothing,   // the same run
+    kTraining,  // the training
+    kSeed,      // only the random numbers of the training
+    kEnd,       // only the length of the run
+    kNothing,   // nothing that the run computes
   };
   using Target = std::variant<bool*, int64_t*, double*, std::string*, std::vector<int64_t>*>;
 
   std::string section;  // TOML table
-  std::string name;     // TOML key; the flag is the same with - for _
-  Target target;        // where the value lives
+  std::string name;     // TOML key; the flag has - for _
+  Target target;        // the variable that holds the value
   Range range;          // numbers only
   std::string unit;     // such as "s"; may be empty
-  std::string help;
+  std::string help;     // a noun phrase or an imperative
   Decides decides = Decides::kTraining;
   std::vector<std::string> choices = {};  // texts only: allowed values; empty: any
   double step = 0;                        // numbers only: must be a multiple of it; 0: any number
-  // Whether files of version 0.4.0 may lack it: they were made with the default.
+  // Files of version 0.4.0 may lack the setting; they were made with its default.
   bool implied = false;
-  bool read_only = false;  // of a const struct
-  std::string usual = {};  // describes the default instead of the value; may be empty
+  bool read_only = false;  // the setting belongs to a const struct
+  std::string usual = {};  // default in words, shown instead of the value; may be empty
 
-  /// Whether runs that differ in it are different runs.
+  /// Whether another value makes another run, which cannot be resumed.
   bool identity() const { return decides == Decides::kTraining || decides == Decides::kSeed; }
   /// Such as `--eval-every`.
   std::string flag() const;
@@ -66,9 +66,10 @@ struct Option {
   std::string plain_text() const;
   /// Flag and value as a shell's command line has them, such as `--hidden 64,64` or `--no-double`.
   std::string on_command_line() const;
-  /// Help, unit, choices and range, such as `length of a training episode, s (0.02 to 10)`.
+  /// Line of help: text, unit, choices or range, such as `length of a training episode [s] (0.02 to
+  /// 10)`.
   std::string about() const;
-  /// The same, then the value as its default: `…, s (0.02 to 10) [4]`.
+  /// Line of help with the current value as the default: `… [s] (0.02 to 10; default 4)`.
   std::string about_with_default() const;
   /// Such as `a number in [0, 1]` or `a multiple of 0.02 in [0, 1]`.
   std::string expected() const;
@@ -107,10 +108,10 @@ class Options {
   }
 
   /// One name that sets several settings, such as `mass` for `mass1` and `mass2`. Without `help`
-  /// the text is "both … and …".
+  /// the text is "set … and …".
   void Alias(std::string_view name, std::vector<std::string> members, std::string_view help = "");
 
-  /// Setting one of them is a mistake of the program from now on.
+  /// Makes a later Set of any of these settings throw std::logic_error.
   void MakeReadOnly() {
     for (Option& option : options_) option.read_only = true;
   }
@@ -118,7 +119,7 @@ class Options {
   /// Adds those of `others` whose names are not among these.
   void AddMissing(const Options& others);
 
-  /// Says why there is no setting of this name, for the message of Find.
+  /// Sets the message of Find for a name that these settings lack.
   void Explain(std::string_view name, std::string_view why);
   /// The text given to Explain; empty if none.
   std::string WhyMissing(std::string_view name) const;

@@ -101,7 +101,7 @@ TEST_F(OptionsTest, SaysWhatWasExpectedWhatWasGivenAndWhere) {
   EXPECT_EQ(ErrorOf("the_rate", "nan"), "here: expected a number in [0, 1], got \"nan\"");
   EXPECT_EQ(ErrorOf("fast", "yes"), "here: expected true or false, got \"yes\"");
   EXPECT_EQ(ErrorOf("widths", "4,x"), "here: expected a list of integers in [1, 100], got \"4,x\"");
-  EXPECT_EQ(ErrorOf("cuont", "1"), "here: no setting is called \"cuont\" (did you mean count?)");
+  EXPECT_EQ(ErrorOf("cuont", "1"), "here: expected a setting, got \"cuont\" (did you mean count?)");
 }
 
 TEST_F(OptionsTest, ARejectedValueLeavesNumbersAndListsAsTheyWere) {
@@ -171,18 +171,18 @@ TEST_F(OptionsTest, OnACommandLine) {
 
 TEST_F(OptionsTest, SaysWhatEachIsWithUnitRangeAndDefault) {
   const auto find = [&](const char* name) { return *options_.Find(name, "").front(); };
-  EXPECT_EQ(find("count").about(), "how many, pieces (1 to 10)");
-  EXPECT_EQ(find("count").about_with_default(), "how many, pieces (1 to 10) [3]");
-  EXPECT_EQ(find("widths").about_with_default(), "layers (1 to 100) [4,5]");
-  EXPECT_EQ(find("name").about_with_default(), "a name [x]");
-  EXPECT_EQ(find("fast").about_with_default(), "be fast [true]");
+  EXPECT_EQ(find("count").about(), "how many [pieces] (1 to 10)");
+  EXPECT_EQ(find("count").about_with_default(), "how many [pieces] (1 to 10; default 3)");
+  EXPECT_EQ(find("widths").about_with_default(), "layers (1 to 100; default 4,5)");
+  EXPECT_EQ(find("name").about_with_default(), "a name (default x)");
+  EXPECT_EQ(find("fast").about_with_default(), "be fast (default true)");
   options_.Set("name", "", "");
   EXPECT_EQ(find("name").about_with_default(), "a name");
   Option count = find("count");
   count.usual = "as many as there are";
-  EXPECT_EQ(count.about_with_default(), "how many, pieces (1 to 10) [as many as there are]");
+  EXPECT_EQ(count.about_with_default(), "how many [pieces] (1 to 10; default as many as there are)");
   EXPECT_NE(options_.Toml(true, [](const Option&) { return true; })
-                .find("count = 3  # how many, pieces (1 to 10)\n"),
+                .find("count = 3  # how many [pieces] (1 to 10)\n"),
             std::string::npos);
 }
 

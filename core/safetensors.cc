@@ -21,7 +21,7 @@ constexpr size_t kMaxRank = 8;            // numbers in a shape
 constexpr std::string_view kChecksumKey = "\"checksum\":\"";
 constexpr std::string_view kNoChecksum = "0000000000000000";
 
-/// Where the checksum's digits stand in the header; npos if the file has none.
+/// Position of the checksum's digits in the header; npos if the file has no checksum.
 size_t FindChecksum(std::string_view header) {
   const size_t key = header.find(kChecksumKey);
   return key == std::string_view::npos ? key : key + kChecksumKey.size();
@@ -50,21 +50,23 @@ std::vector<int64_t> Integers(const json& entry, const std::string& name, size_t
 
 /// One entry of the header, checked against the size of the file's data. Throws BadInput.
 SafetensorsEntry ParseEntry(const json& entry, size_t data_size) {
-  if (!entry.is_object()) throw BadInput("expected dtype, shape and data_offsets");
+  if (!entry.is_object()) throw BadInput("expected an object of dtype, shape and data_offsets");
   const std::string& dtype_name = JsonText(entry, "dtype");
   const std::optional<Dtype> dtype = DtypeCalled(dtype_name);
-  if (!dtype) throw BadInput(Concat("type ", dtype_name, " is not ours"));
+  if (!dtype) throw BadInput(Concat("dtype: expected a known type, got ", dtype_name));
   Tensor tensor{*dtype, Integers(entry, "shape", kMaxRank), {}};
   const std::vector<int64_t> offsets = Integers(entry, "data_offsets", 2);
   if (offsets.size() != 2 || offsets[0] < 0 || offsets[0] > offsets[1]) {
-    throw BadInput("\"data_offsets\": expected where its data begin and end");
+    throw BadInput("\"data_offsets\": expected two bytes, begin and end of the data");
   }
   if (static_cast<uint64_t>(offsets[1]) > data_size) {
-    throw BadInput(Concat("data end at byte ", offsets[1], " of ", data_size));
+    throw BadInput(
+        Concat("\"data_offsets\": expected an end of at most ", data_size, ", got ", offsets[1]));
   }
   const auto begin = static_cast<size_t>(offsets[0]), end = static_cast<size_t>(offsets[1]);
   if (ByteCount(tensor.shape, tensor.dtype) != end - begin) {
-    throw BadInput(Concat("expected the bytes of ", tensor.Describe(), ", got ", end - begin));
+    throw BadInput(
+        Concat("expected as many bytes as ", tensor.Describe(), " has, got ", end - begin));
   }
   return {std::move(tensor), begin, end - begin};
 }
@@ -78,10 +80,10 @@ void CheckCovered(const std::map<std::string, SafetensorsEntry>& entries, size_t
   std::ranges::sort(pieces);
   size_t end = 0;
   for (const auto& [begin, size] : pieces) {
-    if (size > 0 && begin != end) throw BadInput("tensors overlap");
+    if (size > 0 && begin != end) throw BadInput("expected tensors that do not overlap");
     end += size;
   }
-  if (end != data_size) throw BadInput(Concat(data_size - end, " bytes too many"));
+  if (end != data_size) throw BadInput(Concat("expected ", end, " bytes of data, got ", data_size));
 }
 
 /// The text of a header, padded to whole words. Throws Failure if it would be too long to load or
@@ -102,7 +104,7 @@ std::string HeaderText(const json& header) {
 /// zeros in place of the checksum) and of `tensors`.
 void VerifyChecksum(std::string header, const std::map<std::string, Tensor>& tensors) {
   const size_t at = FindChecksum(header);
-  if (at == std::string::npos) throw BadInput("its checksum is not where Upswing writes it");
+  if (at == std::string::npos) throw BadInput("checksum: expected it where Upswing writes it");
   const std::string expected = header.substr(at, kNoChecksum.size());
   header.replace(at, kNoChecksum.size(), kNoChecksum);
   Checksum checksum;
@@ -114,26 +116,28 @@ void VerifyChecksum(std::string header, const std::map<std::string, Tensor>& ten
             [](const Tensor* a, const Tensor* b) { return a->bytes.data() < b->bytes.data(); });
   for (const Tensor* tensor : order) checksum.Update(tensor->bytes);
   if (checksum.Hex() == expected) return;
-  throw BadInput(Concat("it is damaged or was changed: expected the checksum ", expected, ", got ",
-                        checksum.Hex()));
+  throw BadInput(
+      Concat("damaged or modified: expected the checksum ", expected, ", got ", checksum.Hex()));
 }
 
 }  // namespace
 
 Error BrokenSafetensors(const std::string& where, std::string_view why) {
-  return BadInput(Concat(where, ": not a whole safetensors file: ", why));
+  return BadInput(Concat(where, ": not a valid safetensors file: ", why));
 }
 
 uint64_t ReadSafetensorsLength(std::span<const std::byte> first_bytes, uint64_t file_size) {
   uint64_t length = 0;
-  if (first_bytes.size() < sizeof(length)) throw BadInput(Concat("it has ", file_size, " bytes"));
+  if (first_bytes.size() < sizeof(length))
+    throw BadInput(Concat("expected at least 8 bytes, got ", file_size));
   std::memcpy(&length, first_bytes.data(), sizeof(length));
   if (length > kMaxHeader) {
-    throw BadInput(
-        Concat("its first 8 bytes are no length of a header, expected at most ", kMaxHeader));
+    throw BadInput(Concat("header length in the first 8 bytes: expected at most ", kMaxHeader,
+                          ", got ", length));
   }
   if (length > file_size - sizeof(length)) {
-    throw BadInput(Concat("its header should have ", length, " bytes, the file has ", file_size));
+    throw BadInput(
+        Concat("header: expected ", length, " bytes, got a file of ", file_size, " bytes"));
   }
   return length;
 }
@@ -143,7 +147,7 @@ SafetensorsHeader ReadSafetensorsHeader(std::string_view text, size_t data_size)
   try {
     object = ParseJsonObject(text);
   } catch (const Error& error) {
-    throw BadInput(Concat("its header: ", error.what()));
+    throw BadInput(Concat("header: ", error.what()));
   }
   SafetensorsHeader header;
   for (const auto& [name, entry] : object.items()) {
@@ -221,7 +225,7 @@ Tensors ReadSafetensors(std::vector<std::byte> content, std::string where) {
     tensors.has_checksum = tensors.metadata.contains("checksum");
     if (tensors.has_checksum) VerifyChecksum(text, tensors.all());
     if (!tensors.has_checksum && tensors.metadata.contains("upswing_version")) {
-      throw BadInput("it has an upswing_version, but no checksum, which Upswing always writes");
+      throw BadInput("metadata \"checksum\": expected one, as in every file of Upswing, got none");
     }
   } catch (const Error& error) {
     throw BrokenSafetensors(tensors.where(), error.what());

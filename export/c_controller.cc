@@ -68,8 +68,7 @@ bool Jumps(const LoadedPolicy& loaded, const StateVector& x, double least) {
   return false;
 }
 
-/// A state whose numbers are floats, anywhere or so near to upright that the torque is within its
-/// limit.
+/// A random state of floats: anywhere, or so close to upright that the torque is within its limit.
 StateVector DrawState(const LoadedPolicy& loaded, Rng& rng, bool upright) {
   StateVector x;
   for (int k = 0; k < 4; ++k) x[k] = rng.Uniform(-1, 1) * kRange[k];
@@ -91,8 +90,9 @@ void DrawSamples(const LoadedPolicy& loaded, double tolerance, std::vector<float
     StateVector x = DrawState(loaded, rng, upright);
     for (int draw = 1; Jumps(loaded, x, tolerance / 2); ++draw) {
       if (draw == kDrawsOfEach) {
-        throw BadInput(Concat(loaded.name, ": found no states where the torque is smooth enough ",
-                              "for the header's self test"));
+        throw BadInput(Concat(loaded.name,
+                              ": found no states for the header's self-test where the ",
+                              "torque is smooth enough"));
       }
       x = DrawState(loaded, rng, upright);
     }
@@ -124,8 +124,8 @@ void AddCatch(const LoadedPolicy& loaded, const LqrCatch& upright, CParts& parts
   const Plant& plant = loaded.plant;
   if (plant.coulomb1 != 0 || plant.coulomb2 != 0) {
     throw BadInput(Concat(loaded.name,
-                          ": expected a plant without dry friction (coulomb1, coulomb2 ",
-                          "0), which the C code's look-ahead does not have"));
+                          ": expected a plant without dry friction (coulomb1 and coulomb2 ",
+                          "0), which the C code does not model"));
   }
   ClosedFormBatch batch(1);
   batch.SetPlant(0, plant);
@@ -168,8 +168,8 @@ CHeader ControllerHeaderOf(const LoadedPolicy& loaded, const std::string& prefix
                   "that is planned once"},
         {"hybrid", "two of them; export the policy that swings up, and lqr, each by itself"}}) {
     if (kind != refused) continue;
-    throw BadInput(Concat(kind, ": expected lqr, energy, pfl, tvlqr or a learned policy to write ",
-                          "as C, got ", what));
+    throw BadInput(
+        Concat(kind, ": expected lqr, energy, pfl, tvlqr or a learned policy for C, got ", what));
   }
   const ControllerConfig config = ConfigOf(loaded);
   const double limit = config.plant.torque_limit, tolerance = kTorqueShare * limit;

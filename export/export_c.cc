@@ -35,8 +35,8 @@ std::vector<float> InBlocks(const LayerView& layer) {
 
 std::vector<float> Copy(std::span<const float> values) { return {values.begin(), values.end()}; }
 
-/// The layers that a torque takes: of a dueling network without the value stream, which does not
-/// change which torque is best; of a Gaussian with the mean alone.
+/// The layers that choose the torque: without the value stream of a dueling network, which does not
+/// change the best torque; only the mean of a Gaussian.
 std::vector<LayerView> LayersOf(const ExportedPolicy& policy) {
   std::vector<LayerView> layers = policy.ActingLayers();
   if (!policy.is_discrete()) layers.back() = layers.back().Units(0, 1);
@@ -197,12 +197,12 @@ CHeader NetworkHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
 
 CHeader CHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
   if (prefix.size() > kLongestPrefix || AsPrefix(prefix) != prefix || prefix.empty()) {
-    throw BadInput(Concat("prefix: expected small letters, digits and _, a letter first, at most ",
-                          kLongestPrefix, " of them, got \"", prefix, "\""));
+    throw BadInput(Concat("prefix: expected a lower-case letter, then lower-case letters, digits ",
+                          "and _, at most ", kLongestPrefix, " characters, got \"", prefix, "\""));
   }
   if (loaded.policy->num_parameters() > kMostParameters) {
     throw BadInput(Concat(loaded.path, ": expected at most ", kMostParameters,
-                          " parameters, for a longer header takes compilers long, got ",
+                          " parameters, as larger headers compile slowly, got ",
                           loaded.policy->num_parameters()));
   }
   if (loaded.path.empty()) return ControllerHeaderOf(loaded, prefix);

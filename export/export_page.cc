@@ -43,7 +43,7 @@ struct PageAgent {
   }
 };
 
-/// The run folder that a policy lies in; empty if it lies elsewhere.
+/// The run folder of a policy; empty if it is in no run folder.
 fs::path RunOf(const fs::path& file) {
   const fs::path folder = file.has_parent_path() ? file.parent_path() : ".";
   const bool is_run =
@@ -87,7 +87,7 @@ ordered_json CurveJson(const std::vector<EvaluationRow>& evaluations) {
   return curve;
 }
 
-/// The policy as it stands, as a small file.
+/// The current policy as a small file.
 std::vector<std::byte> SmallFile(const Training& training, const std::string& where) {
   const std::unique_ptr<Policy> policy = training.policy();
   const auto* q = dynamic_cast<const NetworkPolicy*>(policy.get());
@@ -131,14 +131,14 @@ std::vector<Checkpoint> CheckpointsOf(const LoadedPolicy& loaded, int64_t count)
   }
   if (!SameTensors(*training.policy(), *loaded.policy)) {
     throw BadInput(Concat(where,
-                          ": --checkpoints: the training with its settings comes to another policy "
-                          "here: expected a file of this version, and of a processor with the same "
-                          "vector instructions"));
+                          ": --checkpoints: expected the same policy from training it again, got "
+                          "another; the file has to come from this version of Upswing and from a "
+                          "processor with the same vector instructions"));
   }
   const auto most = static_cast<int64_t>(all.size());
   if (count - 1 > most) {
-    throw BadInput(Concat("--checkpoints: expected at most ", most + 1, ", as many as ", where,
-                          " has evaluations, and the untrained policy, got ", count));
+    throw BadInput(Concat("--checkpoints: expected at most ", most + 1, ", the evaluations of ",
+                          where, " and the untrained policy, got ", count));
   }
   std::vector<Checkpoint> chosen;
   for (int64_t i = 0; i < count - 1; ++i) {
@@ -160,30 +160,31 @@ PageAgent ReadAgent(const fs::path& path, const std::string& given_id, int64_t c
   const LoadedPolicy loaded = LoadPolicy(path);
   const std::string where = loaded.path;
   if (!HasPlant(loaded.task)) {
-    throw BadInput(Concat(where,
-                          ": expected a policy of the double pendulum, which is what the page ",
-                          "shows, got one of ", loaded.task));
+    throw BadInput(Concat(where, ": expected a policy of ", kDoublePendulum,
+                          ", the only task of the page, got one of ", loaded.task));
   }
   if (!loaded.mjcf.empty()) {
-    throw BadInput(Concat(where,
-                          ": was made with a model of its own, and the page shows the "
-                          "built-in one alone"));
+    throw BadInput(
+        Concat(where,
+               ": expected a policy of the built-in model, the only one of the page, got "
+               "one of another MJCF model"));
   }
   if (loaded.plant.actuated_joint != 1) {
     throw BadInput(Concat(where,
-                          ": expected a policy for a motor at joint 1, as the page's pendulum has "
-                          "it, got one for joint 2"));
+                          ": expected a policy for a motor at joint 1, as in the page, got one for "
+                          "joint 2"));
   }
   if (loaded.plant.rotor_inertia != 0 || loaded.plant.has_dry_friction()) {
     throw BadInput(Concat(where,
-                          ": expected a policy for a plant without rotors and dry friction, which "
-                          "the page's pendulum does not have"));
+                          ": expected a policy for a plant without rotors and dry friction, as in "
+                          "the page, got one with them"));
   }
   const fs::path run = RunOf(loaded.path);
   std::string id = Cleaned(run.filename().string(), '-');
   if (id.empty()) id = Cleaned(loaded.policy->info().agent, '-');
   if (!given_id.empty()) id = given_id;
-  if (id.empty()) throw BadInput(Concat(where, ": names no agent; expected --id"));
+  if (id.empty())
+    throw BadInput(Concat(where, ": expected a name with letters or digits, or --id, got neither"));
 
   PageAgent agent{id, path, ReadFile(loaded.path), EntryOf(loaded, id), {}};
   const std::optional<std::string> command = TrainCommand(loaded.policy->info(), where);
@@ -202,17 +203,15 @@ std::vector<PageAgent> ReadAgents(const std::vector<fs::path>& paths, const std:
   }
   if (!id.empty() && Cleaned(id, '-') != id) {
     throw BadInput(
-        Concat("--id: expected small letters, digits and - between them, got \"", id, "\""));
+        Concat("--id: expected lower-case letters, digits and - between them, got \"", id, "\""));
   }
   std::vector<PageAgent> agents;
   for (const fs::path& path : paths) {
     PageAgent agent = ReadAgent(path, id, checkpoints);
     const auto same = std::ranges::find(agents, agent.id, &PageAgent::id);
     if (same != agents.end()) {
-      throw BadInput(Concat(path.string(), ": would be \"", agent.id, "\" in the page, as ",
-                            same->from.string(),
-                            " would; expected different names (--id gives "
-                            "one)"));
+      throw BadInput(Concat(path.string(), ": expected a different ID than ", same->from.string(),
+                            ", got \"", agent.id, "\" for both; --id sets one"));
     }
     agents.push_back(std::move(agent));
   }

@@ -13,7 +13,7 @@
 namespace upswing {
 namespace {
 
-/// Throws BadInput unless these torques can be told as float.
+/// Throws BadInput unless these torques fit into floats.
 void CheckTorques(std::span<const double> torques, const std::string& where) {
   for (const double torque : torques) {
     if (std::abs(torque) <= std::numeric_limits<float>::max()) continue;
@@ -75,7 +75,7 @@ ExportedTask TaskOf(const LoadedPolicy& loaded) {
                       {"omega2", "velocity of theta2, rad/s"}}}}) {
     if (task.name == loaded.task) return task;
   }
-  throw BadInput(Concat(loaded.path, ": the task ", loaded.task, " cannot be exported"));
+  throw BadInput(Concat(loaded.path, ": expected a task that can be exported, got ", loaded.task));
 }
 
 }  // namespace
@@ -107,8 +107,8 @@ std::vector<LayerView> ExportedPolicy::ActingLayers() const {
 ExportedPolicy ViewForExport(const LoadedPolicy& loaded) {
   if (loaded.identifies()) {
     throw BadInput(Concat(loaded.path,
-                          ": expected a policy that needs no identification of the plant: export "
-                          "does not hold its estimator"));
+                          ": expected a policy without identification of the plant, which exports "
+                          "do not contain, got one with it"));
   }
   EnvConfig env;
   env.task = loaded.task;
@@ -119,7 +119,7 @@ ExportedPolicy ViewForExport(const LoadedPolicy& loaded) {
   exported.task = TaskOf(loaded);
   exported.policy = dynamic_cast<const NetworkPolicy*>(loaded.policy.get());
   if (exported.policy == nullptr || exported.policy->action_size() != 1) {
-    throw BadInput(Concat(where, ": expected a learned policy of one motor, got ",
+    throw BadInput(Concat(where, ": expected a learned policy for one motor, got ",
                           loaded.policy->description()));
   }
   const NetworkPolicyParts& parts = exported.policy->parts();

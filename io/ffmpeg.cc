@@ -24,7 +24,7 @@ Error FilmFailure(std::string_view what) {
   return Failure(Concat("film: cannot ", what, ": ", std::strerror(errno)));
 }
 
-/// The last line of what it said.
+/// The last line of ffmpeg's messages.
 std::string LastLine(int file) {
   std::string text(4096, '\0');
   const off_t end = lseek(file, 0, SEEK_END);
@@ -44,7 +44,7 @@ Ffmpeg::Ffmpeg(const std::vector<std::string>& words, int output)
     : input_(-1), errors_(memfd_create("ffmpeg", MFD_CLOEXEC)) {
   std::array<int, 2> pipe_ends{};
   if (errors_.get() < 0 || pipe2(pipe_ends.data(), O_CLOEXEC) != 0) {
-    throw FilmFailure("talk to ffmpeg");
+    throw FilmFailure("open a pipe to ffmpeg");
   }
   const Descriptor read_end(pipe_ends[0]);
   input_ = Descriptor(pipe_ends[1]);
@@ -62,7 +62,7 @@ Ffmpeg::Ffmpeg(const std::vector<std::string>& words, int output)
   posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
   posix_spawn_file_actions_adddup2(&files, errors_.get(), STDERR_FILENO);
   posix_spawn_file_actions_adddup2(&files, output, kOutput);
-  // In a group of its own, so that a terminal's Ctrl-C reaches us alone; with usual signals.
+  // ffmpeg gets its own process group, so that Ctrl-C in a terminal reaches only this program.
   posix_spawnattr_t attributes;
   posix_spawnattr_init(&attributes);
   sigset_t usual;
@@ -79,7 +79,7 @@ Ffmpeg::Ffmpeg(const std::vector<std::string>& words, int output)
   if (error == ENOENT) {
     throw Failure(
         "film: expected the program ffmpeg (Debian's package ffmpeg), found none in PATH; FILE.png "
-        "and FOLDER/ need none");
+        "and FOLDER/ need no ffmpeg");
   }
   throw Failure(Concat("film: cannot run ffmpeg: ", std::strerror(error)));
 }

@@ -162,7 +162,8 @@ void WriteNamedFile(const fs::path& path, std::string_view text) {
   if (stat(path.c_str(), &info) != 0) {
     if (errno != ENOENT) throw PathError("cannot write", path, errno);
     if (lstat(path.c_str(), &info) == 0) {
-      throw BadInput(Concat("cannot write ", path.string(), ": it is a link that leads nowhere"));
+      throw BadInput(
+          Concat("cannot write ", path.string(), ": expected a file, got a link to nothing"));
     }
     return WriteFileAtomically(path, text);
   }
@@ -180,8 +181,8 @@ void CheckFree(const fs::path& folder, std::string_view advice) {
   if (is_folder && error) throw PathError("cannot read", folder, error.value());
   const bool leads_nowhere = fs::is_symlink(there) && !fs::exists(folder, error);
   throw BadInput(Concat(folder.string(), ": expected a new or empty folder, got ",
-                        is_folder       ? "one that holds something"
-                        : leads_nowhere ? "a link that leads nowhere"
+                        is_folder       ? "one that is not empty"
+                        : leads_nowhere ? "a link to nothing"
                                         : "a file",
                         " (", advice, ")"));
 }
@@ -219,7 +220,7 @@ AppendFile::AppendFile(fs::path path)
                        O_WRONLY | O_CREAT | O_APPEND | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0666)) {
   const auto refuse = [&](std::string_view what) {
     return BadInput(Concat("cannot write ", path_.string(),
-                           ": expected a file of this folder alone, got ", what));
+                           ": expected a regular file that only this folder has, got ", what));
   };
   if (descriptor_.get() < 0) {
     const int error_number = errno;

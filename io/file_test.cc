@@ -146,7 +146,7 @@ TEST_F(FileTest, ANewOrEmptyFolderIsTakenAndNothingElse) {
     EXPECT_EQ(error.exit_code(), 2);
     EXPECT_EQ(error.what(), (folder_ / "a").string() +
                                 ": expected a new or empty folder, got one "
-                                "that holds something (go on with it)");
+                                "that is not empty (go on with it)");
   }
   EXPECT_EQ(ReadTextFile(folder_ / "file"), "kept");
   EXPECT_NO_THROW(CheckFree(folder_ / "file/below"));
@@ -203,7 +203,7 @@ TEST_F(FileTest, AppendFileIsOpenedThroughNoLink) {
     } catch (const Error& error) {
       EXPECT_EQ(error.exit_code(), 2);
       const std::string expected =
-          (folder_ / name).string() + ": expected a file of this folder alone";
+          (folder_ / name).string() + ": expected a regular file that only this folder has";
       EXPECT_NE(std::string(error.what()).find(expected), std::string::npos) << error.what();
     }
   }

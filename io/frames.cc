@@ -135,7 +135,7 @@ std::unique_ptr<FrameWriter> MakeFrameWriter(const std::string& flag, const std:
     if (bytes > kMostGifBytes) {
       throw BadInput(fmt::format(
           "{}: expected a GIF of at most {:.0f} MB of raw frames, got {:.0f} MB ({} frames of "
-          "{}x{}): take less time, fewer frames a second or a smaller size, or mp4",
+          "{}x{}); reduce --seconds, --fps or the size, or write an mp4",
           flag, kMostGifBytes / 1e6, bytes / 1e6, format.frames, format.width, format.height));
     }
   }

@@ -45,7 +45,7 @@ Tensors LoadPartOfTensors(const std::filesystem::path& path, std::string_view pr
   const auto read = [&](uint64_t from, std::span<std::byte> bytes) {
     file.seekg(static_cast<std::streamoff>(from));
     file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-    if (!file) throw BadInput("it became shorter while it was read");
+    if (!file) throw BadInput("the file shrank while it was read");
   };
   try {
     std::vector<std::byte> first(std::min<uint64_t>(sizeof(uint64_t), file_size));

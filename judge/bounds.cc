@@ -18,9 +18,10 @@ double SwingUpSeconds(const EvaluationEpisode& e, const EvaluationRule& rule) {
 }  // namespace
 
 void BoundsConfig::Describe(Options& o) {
-  o.Add(&episodes, "episodes", {1, 100000}, "", "how many of those of eval");
-  o.Add(&torques, "torques", {3, 101}, "", "size of the table of torques");
-  o.Add(&guesses, "guesses", {1, 10000}, "", "swing-ups from hanging that the search begins with");
+  o.Add(&episodes, "episodes", {1, 100000}, "", "number of episodes, the first ones of eval");
+  o.Add(&torques, "torques", {3, 101}, "", "number of torque levels in the table");
+  o.Add(&guesses, "guesses", {1, 10000}, "",
+        "number of swing-ups from hanging that the search starts with");
 }
 
 void CheckComparable(const LoadedPolicy& loaded, const BoundsConfig& config) {
@@ -32,7 +33,8 @@ void CheckComparable(const LoadedPolicy& loaded, const BoundsConfig& config) {
   const Plant judged = TrialEnvironments(config.trial, &loaded).plants.front();
   if (PlantValues(searched) == PlantValues(judged)) return;
   throw BadInput(Concat("bounds: expected a policy for ", PlantText(searched), ", got ",
-                        loaded.name, " for ", PlantText(judged), "; --set chooses the plant"));
+                        loaded.name, " for ", PlantText(judged),
+                        "; change the plant of the search with --set"));
 }
 
 EpisodeBounds FindBounds(const BoundsConfig& config, ThreadPool& pool, const Progress& progress) {

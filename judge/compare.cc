@@ -113,7 +113,7 @@ std::vector<EnvConfig> FinalEvaluations(const Comparison& comparison, int task) 
       episodes += config.train.eval_episodes;
       if (!evaluations.empty() && episodes > kMostJudged) return evaluations;
       EnvConfig& env = evaluations.emplace_back(EvaluationEnvironments(config, step));
-      // Screened: in MuJoCo are those that count.
+      // Screened: the evaluations in MuJoCo count.
       const bool screened = config.eval_physics == kScreened;
       env.engine = screened ? &kMuJoCo : &FindEngine(config.eval_physics, "--eval-physics");
     }
@@ -121,26 +121,27 @@ std::vector<EnvConfig> FinalEvaluations(const Comparison& comparison, int task) 
   return evaluations;
 }
 
-/// The policy, or the controller made for the plant of the episodes. Throws BadInput where there is
-/// none for it.
-std::shared_ptr<const Policy> PolicyFor(const LoadedPolicy& loaded, bool make_anew,
+/// The policy, or the controller designed for the plant of the episodes. Throws BadInput if no such
+/// controller exists.
+std::shared_ptr<const Policy> PolicyFor(const LoadedPolicy& loaded, bool redesign,
                                         const EnvConfig& env) {
   const bool same = PlantValues(loaded.plant) == PlantValues(env.plant(0));
-  if (!loaded.remade || !make_anew || same) return loaded.policy;
+  if (!loaded.design_for || !redesign || same) return loaded.policy;
   try {
-    return loaded.remade(env.plant(0));
+    return loaded.design_for(env.plant(0));
   } catch (const Error& error) {
-    throw Error(error.exit_code(),
-                Concat(error.what(), " (for the plant of the runs; --made-for names another)"));
+    throw Error(
+        error.exit_code(),
+        Concat(error.what(), " (designed for the plant of the runs; --made-for sets another one)"));
   }
 }
 
-/// Throws BadInput unless the motor is at the joint that the policy was made for.
-void ExpectJoint(const LoadedPolicy& loaded, bool make_anew, const Plant& plant) {
+/// Throws BadInput unless the motor is at the policy's joint.
+void ExpectJoint(const LoadedPolicy& loaded, bool redesign, const Plant& plant) {
   const double own = loaded.plant.actuated_joint, given = plant.actuated_joint;
-  if (own == given || (loaded.remade && make_anew)) return;
-  throw BadInput(Concat(loaded.name, ": was made for a motor at joint ", own,
-                        ", and that of the runs is at joint ", given));
+  if (own == given || (loaded.design_for && redesign)) return;
+  throw BadInput(Concat(loaded.name, ": expected a policy for a motor at joint ", given,
+                        ", as in the runs, got one for joint ", own));
 }
 
 /// A policy to judge on a task.
@@ -148,7 +149,7 @@ struct Job {
   const LoadedPolicy& loaded;
   std::shared_ptr<const Policy> policy;
   std::vector<EnvConfig> evaluations;
-  JudgedPolicy judged;  // but for its figures
+  JudgedPolicy judged;  // without its figures
   int64_t episodes = 0;
 };
 
@@ -170,15 +171,15 @@ Evaluation Judge(const Job& job, ThreadPool& pool, const Progress& progress) {
   return Summarize(episodes, job.judged.spec.evaluation);
 }
 
-/// What is to be judged; what is not is noted.
-std::vector<Job> JobsOf(const std::vector<LoadedPolicy>& policies, bool make_anew,
+/// The policies to evaluate, per task; notes the others.
+std::vector<Job> JobsOf(const std::vector<LoadedPolicy>& policies, bool redesign,
                         Comparison& comparison) {
   const std::vector<std::string> titles = TitlesOf(policies);
   const int tasks = static_cast<int>(comparison.task_texts.size());
   std::vector<Job> jobs;
   for (size_t index = 0; index < policies.size(); ++index) {
     const LoadedPolicy& loaded = policies[index];
-    std::vector<std::string> others;  // tasks that it is not of
+    std::vector<std::string> others;  // tasks of which it is not a policy
     for (int task = 0; task < tasks; ++task) {
       Job job{loaded, nullptr, FinalEvaluations(comparison, task), {}};
       const EnvConfig& first = job.evaluations.front();
@@ -186,8 +187,8 @@ std::vector<Job> JobsOf(const std::vector<LoadedPolicy>& policies, bool make_ane
         others.push_back(first.task);
         continue;
       }
-      ExpectJoint(loaded, make_anew, first.plant(0));
-      job.policy = PolicyFor(loaded, make_anew, first);
+      ExpectJoint(loaded, redesign, first.plant(0));
+      job.policy = PolicyFor(loaded, redesign, first);
       job.judged = {loaded.name, titles[index], task, std::ssize(job.evaluations), SpecOf(first),
                     {}};
       for (const EnvConfig& env : job.evaluations) job.episodes += env.num_envs;
@@ -195,11 +196,11 @@ std::vector<Job> JobsOf(const std::vector<LoadedPolicy>& policies, bool make_ane
     }
     if (std::ssize(others) == tasks) {
       throw BadInput(Concat(loaded.name, ": expected a policy of ", others.front(),
-                            ", as the runs are, got one of ", loaded.task));
+                            ", the task of the runs, got one of ", loaded.task));
     }
     if (!others.empty()) {
-      comparison.notes.push_back(Concat(loaded.name, ": not judged on ", others.front(),
-                                        ", as it is a policy of ", loaded.task));
+      comparison.notes.push_back(Concat(loaded.name, ": not evaluated on ", others.front(),
+                                        ", because it is a policy of ", loaded.task));
     }
   }
   return jobs;
@@ -225,10 +226,10 @@ Comparison Compare(const CompareRequest& request) {
   return comparison;
 }
 
-void AddPolicies(const std::vector<LoadedPolicy>& policies, bool make_anew, ThreadPool& pool,
+void AddPolicies(const std::vector<LoadedPolicy>& policies, bool redesign, ThreadPool& pool,
                  const Progress& progress, Comparison& comparison) {
   double all = 0, before = 0;
-  const std::vector<Job> jobs = JobsOf(policies, make_anew, comparison);
+  const std::vector<Job> jobs = JobsOf(policies, redesign, comparison);
   for (const Job& job : jobs) all += static_cast<double>(job.episodes);
   for (const Job& job : jobs) {
     JudgedPolicy& judged = comparison.policies.emplace_back(job.judged);

@@ -10,13 +10,13 @@
 #include "rl/evaluate.h"
 #include "setup/loaded_policy.h"
 
-/// Groups of runs, and policies and controllers beside them: these have no seeds and nothing to
-/// solve, but do have a return.
+/// Comparison of groups of runs with each other and with policies and controllers, which have a
+/// return but no seeds and no time to solve.
 namespace upswing {
 
 /// Which runs to compare.
 struct CompareRequest {
-  std::vector<std::filesystem::path> paths;  // run folders, or folders that hold some, at any depth
+  std::vector<std::filesystem::path> paths;  // runs or folders of runs, at any depth
   std::filesystem::path root = {};  // below it a run's folder names its variant; empty: each path
   bool unfinished = false;          // include runs that are not finished
   bool different_tasks = false;     // also compare groups evaluated on different tasks
@@ -24,9 +24,9 @@ struct CompareRequest {
 
 /// A policy on the task of some groups of runs.
 struct JudgedPolicy {
-  std::string name, title;  // as it was typed; short, for a figure
+  std::string name, title;  // as on the command line; short, for a figure
   int task = 0;             // as RunGroup::task
-  int64_t runs = 0;         // over the episodes of the final evaluations of so many
+  int64_t runs = 0;         // number of runs whose final evaluations give the episodes
   EnvSpec spec;
   Evaluation figures;
 
@@ -34,7 +34,7 @@ struct JudgedPolicy {
   bool upright() const { return !spec.evaluation.by_return() && figures.successes > 0; }
 };
 
-/// A group of runs beside a policy on the same task.
+/// A group of runs compared with a policy on the same task.
 struct AgainstPolicy {
   size_t group, policy;
   int64_t higher;            // how many runs have the higher final return
@@ -42,7 +42,7 @@ struct AgainstPolicy {
   Estimate difference;       // of the IQM of the runs' final returns, to the policy's return
 };
 
-/// Groups of runs in figures, and pairs of groups beside each other; policies beside them.
+/// Figures of groups of runs, of pairs of groups and of policies.
 struct Comparison {
   std::vector<RunGroup> groups;         // in the order in which they were found
   std::vector<PairSummary> pairs;       // each group with each one before it
@@ -52,22 +52,22 @@ struct Comparison {
   std::vector<AgainstPolicy> against;  // each group with each policy on its task
 };
 
-/// How many tasks groups are compared on.
+/// Number of tasks of the groups.
 int NumTasks(const Comparison& comparison);
 
 /// The name of the files with a task's learning curves, without ending: `curves`, `curves-2`, …
 std::string CurvesName(int task);
 
-/// Compares runs. What is no run, cannot be read, has no evaluation, is unfinished (unless asked
-/// for) or the same training as another is left out, with a note. Throws BadInput where nothing is
-/// left, where a path is not there, or where a run stands twice.
+/// Compares runs. Leaves out, with a note, folders without a run and runs that are unreadable,
+/// unfinished (unless requested), without an evaluation or the same training as another. Throws
+/// BadInput if no run is left, a path does not exist, or a run is given twice.
 Comparison Compare(const CompareRequest& request);
 
-/// Judges policies on each task that the groups are evaluated on, over the episodes of the runs'
-/// final evaluations, and sets them beside the groups. With `make_anew` controllers are made for
-/// the plant of these. What is not judged on some task is noted. `progress` counts episodes. Throws
-/// BadInput, before any episode, where a policy is of none of the tasks.
-void AddPolicies(const std::vector<LoadedPolicy>& policies, bool make_anew, ThreadPool& pool,
+/// Evaluates policies on each task of the groups, over the episodes of the runs' final evaluations,
+/// and adds them to the comparison. With `redesign`, controllers are designed for the plant of
+/// these episodes. Notes tasks without an evaluation of a policy. `progress` counts episodes.
+/// Throws BadInput, before any episode, for a policy of none of the tasks.
+void AddPolicies(const std::vector<LoadedPolicy>& policies, bool redesign, ThreadPool& pool,
                  const Progress& progress, Comparison& comparison);
 
 /// Writes summary.csv (a row for each group), runs.csv (a row for each run), policies.csv (a row

@@ -25,7 +25,7 @@ using Settings = std::vector<std::pair<std::string, std::string>>;
 
 Settings SettingsOf(Config config) {
   Settings settings;
-  config.model.clear();  // a model is what is in its file, not where the file lies
+  config.model.clear();  // the content of a model counts, not its path
   Config scratch;
   const Options own = OptionsOf(config), all = EverySetting(scratch);
   for (const Option& every : all.all()) {
@@ -78,8 +78,8 @@ std::string Differences(
   return Join(parts, ", ");
 }
 
-/// Says of each group (`settings` are theirs) how it differs from the others, and gives those of
-/// one name a second one: their differences among each other, or a number where these are many.
+/// Sets the differences of each group (with these `settings`) from the others. Groups with the same
+/// name get a second name: their differences from each other, or a number if there are many.
 void TellGroupsApart(std::vector<RunGroup>& groups, const std::vector<Settings>& settings) {
   std::vector<const Settings*> all;
   std::map<std::string, std::vector<const Settings*>> namesakes;
@@ -119,20 +119,20 @@ void NotePlans(const std::vector<RunGroup>& groups, std::vector<std::string>& no
                                   FormatCount(*budgets.rbegin())));
     }
     if (stops.size() > 1) {
-      notes.push_back(group.label + ": some runs stop when solved and some go on");
+      notes.push_back(group.label + ": some runs stop when solved and some do not");
     }
     if (group.runs.size() == 1) {
-      notes.push_back(group.label + ": no intervals, there is one seed only");
+      notes.push_back(group.label + ": no intervals, because there is only one seed");
     } else if (group.runs.size() < 5) {
       few[group.runs.size()].push_back(group.label);
     }
   }
   for (const auto& [seeds, labels] : few) {
-    notes.push_back(
-        fmt::format("{}: {} seeds are few, intervals are too narrow", Join(labels, ", "), seeds));
+    notes.push_back(fmt::format("{}: intervals are too narrow, because {} seeds are few",
+                                Join(labels, ", "), seeds));
   }
   if (notes.empty() && of_all.size() > 1) {
-    notes.emplace_back("the groups differ in their budgets of steps or in stopping when solved");
+    notes.emplace_back("the groups differ in steps or stop_when_solved");
   }
 }
 
@@ -157,7 +157,7 @@ void NoteLoads(const std::vector<RunRecord>& runs, std::vector<std::string>& not
 
 /// What the times depend on besides the settings, where it is not the same for all.
 void NoteTimes(const std::vector<RunRecord>& runs, std::vector<std::string>& notes) {
-  std::map<int64_t, int> threads;  // how many runs had so many
+  std::map<int64_t, int> threads;  // number of threads → number of runs
   std::set<std::string> processors, vectors;
   std::set<int64_t> intervals;
   for (const RunRecord& f : runs) {
@@ -189,7 +189,7 @@ void NoteTimes(const std::vector<RunRecord>& runs, std::vector<std::string>& not
   NoteLoads(runs, notes);
   if (intervals.size() > 1) {
     notes.push_back(fmt::format(
-        "evaluated every {} to {} steps: times and steps to solve are as coarse as that",
+        "runs are evaluated every {} to {} steps: the resolution of times and steps to solve",
         FormatCount(*intervals.begin()), FormatCount(*intervals.rbegin())));
   }
 }
@@ -215,8 +215,8 @@ void NoteTasks(Comparison& comparison, bool different_tasks) {
   if (tasks == 1) return;
   comparison.notes.push_back(fmt::format(
       "the groups are evaluated on {} different tasks: {}", tasks,
-      different_tasks ? "figures of different tasks stand beside each other"
-                      : "groups are compared within each (--different-tasks: all with all)"));
+      different_tasks ? "the table holds figures of different tasks"
+                      : "groups are compared within a task (--different-tasks compares all)"));
 }
 
 }  // namespace
@@ -253,8 +253,8 @@ Comparison GroupRuns(const CompareRequest& request) {
   for (const RunGroup& group : groups) {
     const std::string& mjcf = group.runs.front().config.mjcf;
     if (mjcf.empty()) continue;
-    comparison.notes.push_back(Concat(group.label, ": on a model that is not the ",
-                                      "built-in one (content ", ModelContent(mjcf), ")"));
+    comparison.notes.push_back(Concat(group.label, ": uses an MJCF model, not the built-in one ",
+                                      "(content ", ModelContent(mjcf), ")"));
   }
   NoteTimes(found.runs, comparison.notes);
   NoteTasks(comparison, request.different_tasks);

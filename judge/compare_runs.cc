@@ -30,7 +30,7 @@ bool IsRun(const fs::path& folder) {
   return has(RunFolder::kConfig) && (has(RunFolder::kEvaluations) || has(RunFolder::kCheckpoint));
 }
 
-/// The file beside a run of a study that says that it is done.
+/// The result file of a finished run of a study, next to the run folder.
 fs::path DoneOf(const fs::path& run) { return run.string() + ".done"; }
 
 /// The seed of a run of a study, by its name; nothing if it has none.
@@ -70,10 +70,10 @@ void AddRuns(const fs::path& folder, Found& found, std::vector<fs::path>& paths)
 std::vector<fs::path> RunsIn(const fs::path& folder, Found& found) {
   if (IsKept(folder)) return {folder};
   if (!Exists(folder)) {
-    throw BadInput(
-        Concat(folder.string(), ": expected a run folder, one that holds some, a policy's ",
-               "file or a controller (", Join(ControllerNames(), ", "),
-               "), got nothing of that name", DidYouMean(folder.string(), ControllerNames())));
+    throw BadInput(Concat(folder.string(),
+                          ": no such file or folder; expected a run, a folder of runs, ",
+                          "a policy.safetensors or a controller (", Join(ControllerNames(), ", "),
+                          ")", DidYouMean(folder.string(), ControllerNames())));
   }
   std::vector<fs::path> paths;
   std::error_code error;
@@ -87,12 +87,12 @@ std::vector<fs::path> RunsIn(const fs::path& folder, Found& found) {
   if (paths.empty() && found.left_out.size() == problems) {
     found.LeaveOut(folder,
                    "expected a run folder (config.toml beside evals.csv or "
-                   "checkpoint.safetensors) or one that holds some, got none");
+                   "checkpoint.safetensors) or a folder of runs, got neither");
   }
   return paths;
 }
 
-/// Reads runs, those of studies that are done from their result files.
+/// Reads runs; finished runs of studies from their result files.
 class RunReader {
  public:
   RunReader(const CompareRequest& request, Found& found) : request_(request), found_(found) {}
@@ -104,12 +104,11 @@ class RunReader {
     try {
       run = ReadDone(path);
     } catch (const Error&) {
-      if (!is_run) throw;  // its folder says all, too
+      if (!is_run) throw;  // its folder holds the same facts
     }
     if (!run && !is_run) {
-      throw BadInput(Concat(DoneOf(path).string(),
-                            ": made with other settings than those beside it, ",
-                            (path.parent_path() / kSettingsName).string()));
+      throw BadInput(Concat(DoneOf(path).string(), ": expected the settings of ",
+                            (path.parent_path() / kSettingsName).string(), ", got others"));
     }
     if (!run) {
       run = RunRecord{path, ReadRunConfig(path), ""};
@@ -164,7 +163,7 @@ class RunReader {
   std::map<fs::path, RunRecord> variants_;
 };
 
-/// Reads all runs; what cannot be read is left out.
+/// Reads all runs; leaves out runs that cannot be read.
 Found ReadRuns(const CompareRequest& request) {
   Found found;
   RunReader reader(request, found);
@@ -172,7 +171,7 @@ Found ReadRuns(const CompareRequest& request) {
   for (const fs::path& argument : request.paths) {
     for (const fs::path& path : RunsIn(argument, found)) {
       if (!seen.insert(fs::weakly_canonical(path)).second) {
-        throw BadInput(Concat(path.string(), ": given twice; expected each run once"));
+        throw BadInput(Concat(path.string(), ": expected each run once, got it twice"));
       }
       try {
         reader.Read(path, argument);
@@ -190,7 +189,7 @@ Found ReadRuns(const CompareRequest& request) {
   return found;
 }
 
-/// How many steps were trained up to the last evaluation.
+/// Steps of the training up to the last evaluation.
 int64_t LastStep(const RunRecord& run) {
   return run.evaluations.empty() ? 0 : run.evaluations.back().step;
 }

@@ -83,7 +83,7 @@ std::span<const RunFigure> RunFigures() {
        [](R run) { return Best(run).success_rate; }},
       {"best_rms_torque", "rms torque", kTorque, &S::rms_torque,
        [](R run) { return Best(run).rms_torque; }},
-      {"best_torque_variation", "its variation", kTorqueRate, &S::torque_variation,
+      {"best_torque_variation", "torque change", kTorqueRate, &S::torque_variation,
        [](R run) { return Best(run).torque_variation; }},
       {"best_torque_variation_upright", "  once upright", kTorqueRate, &S::upright_variation,
        [](R run) { return Best(run).upright_variation; }},

@@ -59,20 +59,20 @@ void AddCells(const EvalReport& report, const JudgedEpisode& episode, CsvTable& 
   }
 }
 
-using Remade = decltype(LoadedPolicy::remade);
+using DesignFor = decltype(LoadedPolicy::design_for);
 
-/// The results of the episodes of `config`, each with a controller made for its plant.
-void JudgeMade(const Policy& policy, const Remade& remade, const EnvConfig& config,
-               const Progress& progress, size_t first, EvalReport& report) {
+/// Evaluates the episodes of `config`, each with a controller designed for its plant.
+void JudgeDesigned(const Policy& policy, const DesignFor& design_for, const EnvConfig& config,
+                   const Progress& progress, size_t first, EvalReport& report) {
   std::mutex mutex;
   int done = 0;
   config.pool->ParallelFor(config.num_envs, [&](int i) {
     JudgedEpisode& episode = report.episodes[first + static_cast<size_t>(i)];
     std::shared_ptr<const Policy> made;
     try {
-      made = remade(episode.plant);
+      made = design_for(episode.plant);
       episode.for_its_plant = true;
-    } catch (const Error&) {  // the plant cannot be held, or not be swung up
+    } catch (const Error&) {  // no controller holds or swings up this plant
     }
     EnvConfig one = config;
     one.pool = nullptr;
@@ -82,9 +82,9 @@ void JudgeMade(const Policy& policy, const Remade& remade, const EnvConfig& conf
   });
 }
 
-/// Judges the episodes first, first + 1, … of the environments of `config`, which says how many.
-/// With `remade` each by a controller made for its plant.
-void JudgeEpisodes(const Policy& policy, const Remade* remade, const EnvConfig& config,
+/// Evaluates the episodes of the environments of `config` and appends them to the report. With
+/// `design_for`, each episode has a controller designed for its plant.
+void JudgeEpisodes(const Policy& policy, const DesignFor* design_for, const EnvConfig& config,
                    const Progress& progress, EvalReport& report) {
   const std::unique_ptr<VectorEnv> env = MakeEnv(config);
   const auto first = report.episodes.size();
@@ -97,7 +97,7 @@ void JudgeEpisodes(const Policy& policy, const Remade* remade, const EnvConfig& 
     episode.plant = pendulum->plant(i);
     episode.disturbance = pendulum->disturbance(i);
   }
-  if (remade) return JudgeMade(policy, *remade, config, progress, first, report);
+  if (design_for) return JudgeDesigned(policy, *design_for, config, progress, first, report);
   std::vector<EvaluationEpisode> results = EvaluateEpisodes(policy, *env, config.pool, progress);
   for (size_t i = 0; i < results.size(); ++i) {
     report.episodes[first + i].result = std::move(results[i]);
@@ -131,12 +131,12 @@ void AddFigures(const Evaluation& e, const EnvSpec& spec, bool knows_values, ord
 
 EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& trial, int64_t episodes,
                           ThreadPool& pool, const Progress& progress) {
-  if (trial.known_plant && !loaded.remade) {
-    throw BadInput(Concat(
-        "--known-plant: expected a controller, which can be made for a plant, got ", loaded.name));
+  if (trial.known_plant && !loaded.design_for) {
+    throw BadInput(Concat("--known-plant: expected a controller, which has a design plant, got ",
+                          loaded.name));
   }
   if (trial.known_plant && trial.unknown_plant) {
-    throw BadInput("--known-plant: expected no --unknown-plant beside it");
+    throw BadInput("--known-plant: expected no --unknown-plant with it");
   }
   EvalReport report;
   report.policy = loaded.name;
@@ -154,7 +154,7 @@ EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& tria
     config.first_index += static_cast<uint64_t>(done);
     config.num_envs = static_cast<int>(std::min(kAtOnce, episodes - done));
     JudgeEpisodes(
-        *loaded.policy, trial.known_plant ? &loaded.remade : nullptr, config,
+        *loaded.policy, trial.known_plant ? &loaded.design_for : nullptr, config,
         [&](double part, double) {
           if (progress) progress(static_cast<double>(done) + part, static_cast<double>(episodes));
         },
@@ -166,7 +166,7 @@ EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& tria
   return report;
 }
 
-int64_t NumMade(const EvalReport& report) {
+int64_t NumDesigned(const EvalReport& report) {
   return std::ranges::count(report.episodes, true, &JudgedEpisode::for_its_plant);
 }
 
@@ -184,7 +184,7 @@ std::string EvalJson(const EvalReport& report) {
   for (const auto& [name, value] : PlantValues(report.env.plant(0))) j["plant"][name] = value;
   j["model"] = report.model ? report.model->Json() : kBuiltIn;
   j["unknown_plant"] = report.env.assumed_plant.has_value();
-  if (report.known_plant) j["known_plant"] = NumMade(report);
+  if (report.known_plant) j["known_plant"] = NumDesigned(report);
   const TrialConditions conditions{report.env.disturbance(0), report.env.randomization};
   const Options options = OptionsOf(conditions);
   for (const Option& option : options.all()) j[option.section][option.name] = option.number();

@@ -12,7 +12,7 @@
 #include "setup/loaded_policy.h"
 #include "sim/pendulum_env.h"
 
-/// Evaluations of a policy over many episodes, and what is said of them.
+/// Evaluations of a policy over many episodes, and their reports.
 namespace upswing {
 
 /// One episode: its conditions and its result.
@@ -21,7 +21,7 @@ struct JudgedEpisode {
   // Of the double pendulum:
   Plant plant;
   Disturbance disturbance;
-  bool for_its_plant = false;  // a controller was made for it, see TrialArguments::known_plant
+  bool for_its_plant = false;  // had its own controller, see TrialArguments::known_plant
   EvaluationEpisode result;
 };
 
@@ -33,19 +33,19 @@ struct EvalReport {
   EnvSpec spec;
   std::vector<JudgedEpisode> episodes;
   Evaluation figures;
-  bool known_plant = false;    // each episode had a controller made for its plant
-  bool knows_values = false;   // the policy says what its Q-values estimate
+  bool known_plant = false;    // a controller was designed for the plant of each episode
+  bool knows_values = false;   // the policy's file defines the unit of its values
   bool only_balances = false;  // a controller that does not swing up
 };
 
-/// Lets a policy control `episodes` episodes of the environments that a trial makes, and says how
-/// it did; where the plant is known and no controller can be made for it, that of the policy's own
-/// plant. `progress` counts episodes. Throws BadInput.
+/// Evaluates a policy over `episodes` episodes of a trial's environments. With trial.known_plant a
+/// controller is designed for each episode's plant; if that fails, the given one is used.
+/// `progress` counts episodes. Throws BadInput.
 EvalReport EvaluatePolicy(const LoadedPolicy& loaded, const TrialArguments& trial, int64_t episodes,
                           ThreadPool& pool, const Progress& progress);
 
-/// In how many episodes a controller was made for the plant.
-int64_t NumMade(const EvalReport& report);
+/// Number of episodes with a controller designed for their plant.
+int64_t NumDesigned(const EvalReport& report);
 
 /// Adds the figures of an evaluation to a JSON document.
 void AddFigures(const Evaluation& e, const EnvSpec& spec, bool knows_values,

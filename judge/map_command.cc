@@ -23,11 +23,11 @@ using Clock = std::chrono::steady_clock;
 
 constexpr int64_t kMostEpisodes = 10000000;
 
-/// What a policy was trained on, or a controller made for.
+/// Conditions of a policy's training or of a controller's design.
 struct DesignConditions {
   MapPoint point;               // plant and disturbance; hanging
   Randomization randomization;  // around them
-  bool known = false;           // the file says more than the plant
+  bool known = false;           // the file has more than the plant
   std::string word;             // "training" or "design"
 };
 
@@ -36,7 +36,7 @@ DesignConditions DesignOf(const LoadedPolicy& loaded) {
   design.point.plant = loaded.plant;
   design.word = loaded.origin();
   if (loaded.path.empty()) {
-    design.known = true;  // for no noise, no delay, nothing random
+    design.known = true;  // designed without noise, delay and random plants
     return design;
   }
   const std::string& settings = loaded.policy->info().config;
@@ -61,7 +61,7 @@ bool OnAxis(const MapConfig& config, const Option& option) {
   });
 }
 
-/// What no axis sets and is not as in the training: `mass1 1.2 kg (training: 1), …`.
+/// Values on no axis that differ from the training, such as `mass1 1.2 kg (training: 1), …`.
 std::string ChangesOf(const MapConfig& config, const DesignConditions& design) {
   std::vector<std::string> texts;
   for (const auto& [option, before] :
@@ -75,7 +75,7 @@ std::string ChangesOf(const MapConfig& config, const DesignConditions& design) {
   return Join(texts, ", ");
 }
 
-/// Label of the training's place on the axes, as far as it holds there.
+/// Label of the training's point on the axes.
 std::string DotOf(const MapConfig& config, const DesignConditions& design, bool changed) {
   const MapAxis &x = config.x, &y = config.y;
   if (x.start && y.start && !changed) return "hanging";
@@ -109,17 +109,18 @@ MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded,
     for (const MapAxis* axis : {&config.x, &config.y}) {
       const auto members = options.Find(axis->name, "map");
       if (std::ranges::find(members, option) == members.end()) continue;
-      throw BadInput(Concat("--set ", option->name, ": expected another name, ", axis->name,
-                            " is an axis of the map"));
+      throw BadInput(Concat("--set ", option->name,
+                            ": expected a quantity that is on no axis; the axis ", axis->name,
+                            " sets it"));
     }
   }
   config.start_given |= config.x.start || config.y.start;
-  // From one start each episode is the same, unless there is noise.
+  // Without noise, all episodes from one start are equal.
   const int usual = config.start_given ? 1 : 10;
   config.episodes = a.episodes > 0 ? static_cast<int>(a.episodes) : usual;
   if (config.cells() * config.episodes > kMostEpisodes) {
     throw BadInput(Concat("map: expected at most ", FormatCount(kMostEpisodes), " episodes, got ",
-                          FormatCount(config.cells()), " cells of ", config.episodes));
+                          FormatCount(config.cells()), " cells × ", config.episodes, " episodes"));
   }
   return config;
 }
@@ -127,16 +128,15 @@ MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded,
 }  // namespace
 
 void MapArguments::Describe(Options& o) {
-  o.Add(&episodes, "episodes", {1, 100000}, "", "in a cell").usual =
-      "10, or 1 where the start is given";
-  o.Add(&check, "check", kUnit, "", "share of the cells to repeat in MuJoCo");
+  o.Add(&episodes, "episodes", {1, 100000}, "", "number of episodes per cell").usual =
+      "10; 1 if the start is given";
+  o.Add(&check, "check", kUnit, "", "share of cells to repeat in MuJoCo");
 }
 
 MapResult PlanMap(const MapArguments& a, const LoadedPolicy& loaded) {
   if (!HasPlant(loaded.task)) {
     throw BadInput(
-        Concat("map: expected a policy of the double pendulum, whose plant and start are ",
-               "the axes, got one of ", loaded.task));
+        Concat("map: expected a policy of ", kDoublePendulum, ", got one of ", loaded.task));
   }
   MapResult map;
   const DesignConditions design = DesignOf(loaded);

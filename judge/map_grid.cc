@@ -29,7 +29,7 @@ struct EpisodeRange {
 /// Swing-up time (s) of an episode that succeeds.
 using EpisodeResult = std::optional<double>;
 
-/// The one value that the settings have, if they all have it.
+/// The common value of the settings; none if they differ.
 std::optional<double> CommonValue(const std::vector<const Option*>& members) {
   const double first = *std::get<double*>(members.front()->target);
   for (const Option* member : members) {
@@ -38,7 +38,7 @@ std::optional<double> CommonValue(const std::vector<const Option*>& members) {
   return first;
 }
 
-/// An end of an axis: a number, or a percentage on top of the training's value.
+/// An end of an axis: a number, or a percentage relative to the training's value.
 double ParseEnd(std::string_view text, const MapAxis& axis, const std::string& where) {
   const bool percent = text.ends_with('%');
   if (percent) text.remove_suffix(1);
@@ -48,8 +48,8 @@ double ParseEnd(std::string_view text, const MapAxis& axis, const std::string& w
   }
   if (!percent) return *number;
   if (!axis.at_training || *axis.at_training == 0) {
-    throw BadInput(Concat(where, ": expected numbers, got a percentage of ",
-                          axis.at_training ? "0" : "values that differ"));
+    throw BadInput(Concat(where, ": expected a number, got a percentage of ",
+                          axis.at_training ? "a training value of 0" : "unequal training values"));
   }
   return *axis.at_training * (1 + *number / 100);
 }
@@ -123,10 +123,10 @@ void MapPoint::Describe(Options& o) {
   plant.Describe(o);
   disturbance.Describe(o);
   o.Section("start");
-  o.Add(&q1, "q1", {-360, 360}, "°", "angle of the first link, 0 hanging");
-  o.Add(&q2, "q2", {-360, 360}, "°", "angle of the second link to the first");
-  o.Add(&w1, "w1", {-50, 50}, "rad/s", "velocity of q1");
-  o.Add(&w2, "w2", {-50, 50}, "rad/s", "velocity of q2");
+  o.Add(&q1, "q1", {-360, 360}, "°", "start angle of link 1; 0: hanging");
+  o.Add(&q2, "q2", {-360, 360}, "°", "start angle of link 2 relative to link 1");
+  o.Add(&w1, "w1", {-50, 50}, "rad/s", "start velocity of q1");
+  o.Add(&w2, "w2", {-50, 50}, "rad/s", "start velocity of q2");
 }
 
 PendulumState MapPoint::start() const {
@@ -146,7 +146,7 @@ MapAxis ParseMapAxis(const std::string& text, const MapPoint& training, const st
     for (const Option& option : options.all()) names.push_back(option.name);
     for (const auto& alias : options.aliases()) names.push_back(alias.name);
     throw BadInput(Concat(where, ": expected NAME=FROM:TO or NAME=FROM:TO:CELLS, got \"", text,
-                          "\"; the names are ", Join(names, ", ")));
+                          "\"; NAME is one of ", Join(names, ", ")));
   }
   MapAxis axis;
   axis.name = Trim(std::string_view(text).substr(0, equals));
@@ -165,7 +165,7 @@ MapAxis ParseMapAxis(const std::string& text, const MapPoint& training, const st
     throw BadInput(
         Concat(place, ": expected FROM < TO, got ", FormatNumber(from), " and ", FormatNumber(to)));
   }
-  // What goes in steps has a cell for each, unless the text says otherwise.
+  // A setting with steps has a cell per step by default.
   const double step = members.front()->step;
   const int64_t usual = step > 0 ? std::llround((to - from) / step) + 1 : kDefaultCells;
   const int64_t cells = pieces.size() == 3 ? ParseCells(pieces[2], place) : usual;

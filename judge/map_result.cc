@@ -48,9 +48,9 @@ Panel MapPanel(const MapResult& map, const std::string& title, HeatMap heat_map)
   return panel;
 }
 
-/// All that the axes do not say.
+/// The caption: episodes, engine, seed and changes.
 std::string CaptionOf(const MapResult& map) {
-  std::string text = Concat(Counted(map.config.episodes, "episode"), " a cell");
+  std::string text = Concat(Counted(map.config.episodes, "episode"), " per cell");
   if (const std::string interval = map.success_interval(); !interval.empty()) {
     text += Concat(" (", interval, ")");
   }
@@ -105,7 +105,7 @@ Figure SuccessFigure(const std::vector<MapResult>& maps) {
     Panel& panel = figure.panels.emplace_back(MapPanel(map, map.title, std::move(success)));
     // One legend of all dots, at the bottom left.
     const bool names = i == (rows - 1) * columns;
-    for (Line& line : panel.lines) line.name = names ? "what it was made for" : "";
+    for (Line& line : panel.lines) line.name = names ? "training or design" : "";
   }
   return figure;
 }
@@ -225,9 +225,10 @@ void CheckSameAxes(const std::vector<MapResult>& maps) {
   const MapConfig& first = maps.front().config;
   for (const MapResult& map : maps) {
     if (map.config.x.values == first.x.values && map.config.y.values == first.y.values) continue;
-    throw BadInput(Concat(map.title, ": expected a policy made for the same plant as ",
-                          maps.front().title, ", from which percentages on an axis are counted; ",
-                          "numbers (--x mass2=0.5:1.5) are the same for all"));
+    throw BadInput(Concat(map.title, ": expected a policy with the same plant as ",
+                          maps.front().title,
+                          ", because percentages on an axis are relative to that plant, got ",
+                          "another plant; numbers (--x mass2=0.5:1.5) suit all policies"));
   }
 }
 

@@ -166,7 +166,7 @@ Panel Rewards(const Rollout& rollout) {
     std::ranges::replace(name, '_', ' ');
     lines.push_back(Held(name, rows, [k](const RolloutRow& row) { return row.terms[k]; }));
   }
-  return PanelOf("reward a step", std::move(lines));
+  return PanelOf("reward per step", std::move(lines));
 }
 
 double Largest(const RolloutRow& row) { return *std::ranges::max_element(row.q); }

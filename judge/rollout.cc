@@ -96,8 +96,8 @@ void Episode::Step(bool motor, const std::array<double, 2>& push) {
   if (pendulum() != nullptr) RewardRow(rollout_.plant, row);
   rollout_.rows.push_back(std::move(row));
   if (pendulum() == nullptr || result_.terminated[0] == 0) return;
-  throw Failure(Concat(
-      "the state blew up numerically after t = ", FormatNumber(rollout_.rows.back().t), " s"));
+  throw Failure(
+      Concat("the simulation diverged after t = ", FormatNumber(rollout_.rows.back().t), " s"));
 }
 
 void Episode::GoBack(int64_t steps) {

@@ -22,7 +22,8 @@ namespace fs = std::filesystem;
 /// the arguments set one of these.
 EnvConfig OtherTask(const TrialArguments& a, const LoadedPolicy& loaded) {
   const auto refuse = [&](const std::string& flag) {
-    throw BadInput(Concat(flag, ": expected none, as ", loaded.task, " has no such setting"));
+    throw BadInput(
+        Concat(flag, ": expected none, because the task ", loaded.task, " has no such setting"));
   };
   if (!a.set.empty()) refuse("--set");
   if (!a.model.empty()) refuse("--model");
@@ -77,7 +78,7 @@ EnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded)
   env.disturbances = {conditions.disturbance};
   env.randomization = conditions.randomization;
   if (a.unknown_plant && loaded == nullptr) {
-    throw BadInput("--unknown-plant: expected a policy, to which the plant can be unknown");
+    throw BadInput("--unknown-plant: expected a policy with it, got none");
   }
   if (loaded != nullptr) {
     env.mjcf = loaded->mjcf;
@@ -124,9 +125,7 @@ fs::path FigureFolder(const std::string& out, const LoadedPolicy& loaded, const 
   for (const char* extension : {".svg", ".png", ".csv"}) {
     if (folder.extension() == extension) {
       throw BadInput(
-          Concat("--out: expected a folder, in which several files are made, got the name "
-                 "of a file: ",
-                 out));
+          Concat("--out: expected a folder for several files, got the name of a file: ", out));
     }
   }
   CheckFree(folder);
@@ -135,7 +134,7 @@ fs::path FigureFolder(const std::string& out, const LoadedPolicy& loaded, const 
 
 RolloutConfig TrialEpisode(const TrialArguments& a, const LoadedPolicy* loaded) {
   if (a.start && a.is_of_eval()) {
-    throw BadInput("--start: expected none beside --episode, which has a start of its own");
+    throw BadInput("--start: expected none with --episode, which has its own start");
   }
   RolloutConfig config;
   if (loaded != nullptr) config.policy = loaded->policy.get();

@@ -12,27 +12,27 @@
 #include "setup/loaded_policy.h"
 #include "sim/pendulum_env.h"
 
-/// The plant, sensors and motor on which `eval`, `simulate` and `plot` try a policy out. With
-/// the same flags they make the same episodes.
+/// The plant, sensors and motor for `eval`, `simulate` and `plot`. The same flags make the same
+/// episodes in all of them.
 namespace upswing {
 
 /// How a trial differs from the training.
 struct TrialArguments {
   std::string model, physics = "mujoco";
   std::vector<std::string> set;
-  std::vector<FlagValue> flags;  // of the disturbance and of what is random
+  std::vector<FlagValue> flags;  // settings of Disturbance and Randomization
   int64_t seed = 0;
   bool unknown_plant = false;
-  bool known_plant = false;  // a controller is made anew for each episode's plant; eval alone
-  // The single episode of `simulate`, `plot` and `view`: its start, or its number in `eval`
-  // (negative: it is none of those).
+  bool known_plant = false;  // design a controller for each episode's plant; only in eval
+  // The single episode of `simulate`, `plot` and `view`: its start, or its index in `eval`
+  // (negative: none).
   std::optional<std::string> start;
   int64_t episode = -1;
 
   bool is_of_eval() const { return episode >= 0; }
 };
 
-/// Sensors, motors and what is random.
+/// Disturbances of sensors and motor, and random plants.
 struct TrialConditions {
   Disturbance disturbance;
   Randomization randomization;
@@ -43,33 +43,32 @@ struct TrialConditions {
   }
 };
 
-/// Those of the arguments. Throws BadInput.
+/// The conditions that the arguments set. Throws BadInput.
 TrialConditions ConditionsOf(const TrialArguments& a);
 
-/// The environments that the arguments ask for: those of the policy's training with the given
-/// changes; without a policy (null) those of the built-in plant. Environment i has episode i.
-/// Throws BadInput.
+/// The environments of a trial: the environments of the policy's training with the changes of the
+/// arguments; without a policy (null), environments of the built-in plant. Environment i has
+/// episode i. Throws BadInput.
 EnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded);
 
-/// The environment whose one episode is number `index` of those of `config`.
+/// An environment with the single episode `index` of `config`.
 std::unique_ptr<VectorEnv> OneEpisode(EnvConfig config, int index);
 
-/// What is not at its default, as text: `delay 0.02, …`; empty if nothing is.
+/// Conditions that differ from the defaults, such as `delay 0.02, …`; empty if none.
 std::string ChangesText(const EnvConfig& env);
 
-/// How a plant differs from what a policy was made for: `mass2 1.3 kg (training: 1), …`; empty: not
-/// at all.
+/// Differences of a plant from the policy's own plant, such as `mass2 1.3 kg (training: 1), …`;
+/// empty if there are none.
 std::string PlantChangesText(const Plant& plant, const LoadedPolicy& loaded);
 
-/// The folder that figures of a policy go to: `out` or, where that is empty, this name in its run's
-/// folder, runs/NAME-FILE for a policy file elsewhere, runs/NAME-CONTROLLER for a controller; with
-/// -2, -3, … where that is taken. Throws BadInput if something is in it, or if it is called as a
-/// figure is.
+/// The folder for figures of a policy: `out`; if that is empty, NAME in the run folder,
+/// runs/NAME-FILE for another policy file or runs/NAME-CONTROLLER for a controller, with -2, -3, …
+/// if the folder exists. Throws BadInput if `out` is not empty or has the name of a figure.
 std::filesystem::path FigureFolder(const std::string& out, const LoadedPolicy& loaded,
                                    const std::string& name);
 
-/// The single episode that the arguments ask for, of a policy (null: none) that must outlive it.
-/// Throws BadInput.
+/// The single episode of the arguments, with a policy (null: none) that must outlive it. Throws
+/// BadInput.
 RolloutConfig TrialEpisode(const TrialArguments& a, const LoadedPolicy* loaded);
 
 }  // namespace upswing

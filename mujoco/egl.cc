@@ -107,7 +107,7 @@ class Egl {
     }
     if (platform != nullptr && Works(platform(kPlatformSurfaceless, nullptr, nullptr))) return;
     if (Works(eglGetDisplay(nullptr))) return;
-    throw Failure(Concat("EGL found no device that can draw with OpenGL", kAdvice));
+    throw Failure(Concat("EGL: expected a device that can draw with OpenGL, found none", kAdvice));
   }
 
   /// Whether OpenGL can draw on this display; then it is the one.

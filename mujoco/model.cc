@@ -271,13 +271,13 @@ void WritePlant(const Plant& plant, const ModelFields& fields) {
     fields.wrap_prm[0] = 1;
     fields.wrap_prm[1] = -plant.gear_ratio;
   } else if (plant.rotor_inertia != 0) {
-    throw BadInput("rotor_inertia: expected 0 with a model that has no rotors");
+    throw BadInput("rotor_inertia: expected 0, because the model has no rotors");
   }
   if (fields.dof_frictionloss != nullptr) {
     fields.dof_frictionloss[0] = plant.coulomb1;
     fields.dof_frictionloss[1] = plant.coulomb2;
   } else if (plant.has_dry_friction()) {
-    throw BadInput("coulomb1, coulomb2: expected 0 with a model that has no dry friction");
+    throw BadInput("coulomb1, coulomb2: expected 0, because the model has no dry friction");
   }
 }
 

@@ -38,8 +38,8 @@ NetworkPolicyParts Checked(NetworkPolicyParts parts) {
   const bool levels = parts.rule == ActionRule::kLevels;
   const size_t outputs = parts.chooses_torque() ? Q : 2 * A;
   if (parts.chooses_torque() ? A != (levels ? 0 : 1) || Q == 0 : A == 0 || Q != 0) {
-    throw BadInput(Concat("policy: expected torques or limits as ", NameOf(parts.rule),
-                          " has them, got ", Q, " torques and ", A, " limits"));
+    throw BadInput(Concat("policy: expected torques or limits for a ", NameOf(parts.rule), ", got ",
+                          Q, " torques and ", A, " limits"));
   }
   if (static_cast<size_t>(parts.shape.outputs) != outputs) {
     throw BadInput(Concat("policy: expected a network of ", outputs,

@@ -33,7 +33,7 @@ def python_type(option):
 
 def about(option):
     """Help, unit and range of a setting, on one line."""
-    text = option["help"] + (f", {option['unit']}" if option["unit"] else "")
+    text = option["help"] + (f" [{option['unit']}]" if option["unit"] else "")
     if option["low"] is not None and option["high"] is not None:
         text += f" ({option['low']:g} to {option['high']:g})"
     return text
@@ -57,12 +57,14 @@ def main():
     options, aliases = every_setting()
     environment = [option for option in options
                    if option["environment"] and option["name"] != "envs"]
-    # These are arguments of their own.
+    # `train` has separate arguments for these.
     training = [option for option in options if option["name"] not in ("agent", "seed")]
     start = [{"name": name, "type": "float", "choices": [], "help": help_text, "unit": unit,
               "low": None, "high": None}
-             for name, help_text, unit in (("q1", "start", "degrees"), ("q2", "start", "degrees"),
-                                           ("w1", "start", "rad/s"), ("w2", "start", "rad/s"))]
+             for name, help_text, unit in (
+                 ("q1", "start angle of link 1; 0: hanging", "°"),
+                 ("q2", "start angle of link 2 relative to link 1", "°"),
+                 ("w1", "start velocity of q1", "rad/s"), ("w2", "start velocity of q2", "rad/s"))]
     trial = _upswing.trial_settings()
     on_map = [option for option in trial[0] if option["section"] in ("plant", "disturbance")]
     lines = ['"""Settings as keyword arguments; written by write_types.py from the C++ code."""', "",

@@ -105,9 +105,8 @@ Robot ParseRobot(const std::string& name, Robot usual) {
 /// Throws BadInput where a policy is of the other robot.
 void ExpectRobot(const std::string& name, Robot own, Robot asked) {
   if (own == asked) return;
-  throw BadInput(Concat("--robot: ", Printable(name), " is of the ", NameOf(own),
-                        ", whose motor is at joint ", static_cast<int>(own), ", not of the ",
-                        NameOf(asked)));
+  throw BadInput(Concat("--robot: expected ", NameOf(own), ", the robot of ", Printable(name),
+                        " (motor at joint ", static_cast<int>(own), "), got ", NameOf(asked)));
 }
 
 Competitor OfSearch(const std::string& name, SwingPolicy policy) {

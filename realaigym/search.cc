@@ -122,21 +122,26 @@ void Snes::Tell(const std::vector<double>& fitness) {
 void BoardSearchConfig::Describe(Options& o) {
   o.Section("search");
   o.AddChoice(&robot, "robot", {NameOf(Robot::kPendubot), NameOf(Robot::kAcrobot)},
-              "which joint has the motor");
-  o.Add(&seed, "seed", {0, 1e15}, "", "of the search's random numbers");
-  o.Add(&hidden, "hidden", {4, 32}, "", "units in each of the network's two layers");
-  o.Add(&starts, "starts", {1, 1000}, "", "random networks to begin with; the best goes on");
-  o.Add(&alone, "alone", {1, 1e5}, "", "generations of each, on the nominal plant alone");
-  o.Add(&generations, "generations", {0, 1e6}, "", "generations after that");
+              "robot; the motor of the pendubot is at joint 1, of the acrobot at joint 2");
+  o.Add(&seed, "seed", {0, 1e15}, "", "seed of the search");
+  o.Add(&hidden, "hidden", {4, 32}, "", "width of each of the network's two layers");
+  o.Add(&starts, "starts", {1, 1000}, "",
+        "number of random initial networks; the search continues with the best");
+  o.Add(&alone, "alone", {1, 1e5}, "", "generations per initial network, on the nominal plant");
+  o.Add(&generations, "generations", {0, 1e6}, "",
+        "generations of the robust search, which follows");
   o.Add(&first_population, "first_population", {4, 1e4}, "",
-        "candidates of a generation on the nominal plant");
-  o.Add(&population, "population", {4, 1e4}, "", "candidates of a generation after that");
-  o.Add(&deviation, "deviation", {1e-6, 10}, "", "of the network's numbers at first");
-  o.Add(&restart, "restart", {1e-6, 10}, "", "deviation with which the second part begins");
-  o.Add(&mean_rate, "mean_rate", {1e-6, 100}, "", "rate at which the mean follows the gradient");
+        "candidates per generation on the nominal plant");
+  o.Add(&population, "population", {4, 1e4}, "", "candidates per generation of the robust search");
+  o.Add(&deviation, "deviation", {1e-6, 10}, "",
+        "initial standard deviation of the network's parameters");
+  o.Add(&restart, "restart", {1e-6, 10}, "",
+        "standard deviation at the start of the robust search");
+  o.Add(&mean_rate, "mean_rate", {1e-6, 100}, "", "learning rate of the mean of the candidates");
   o.Add(&performance_weight, "performance_weight", {1e-6, 1e6}, "",
-        "weight of the performance score as the second part begins");
-  o.Add(&last_weight, "last_weight", {1e-6, 1e6}, "", "and as it ends");
+        "weight of the performance score at the start of the robust search");
+  o.Add(&last_weight, "last_weight", {1e-6, 1e6}, "",
+        "weight of the performance score at the end of the robust search");
 }
 
 BoardSearch::BoardSearch(const BoardSearchConfig& config)

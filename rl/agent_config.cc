@@ -19,7 +19,7 @@ double Widest(const std::vector<int64_t>& widths) {
 
 void WarnOfNoRate(double begin, double end, std::vector<std::string>& warnings) {
   if (begin == 0 && end == 0) {
-    warnings.emplace_back("learning_rate is 0 to the end: nothing will be learned");
+    warnings.emplace_back("learning_rate and learning_rate_end are 0: the agent learns nothing");
   }
 }
 

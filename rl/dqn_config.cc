@@ -7,25 +7,26 @@ namespace upswing {
 
 void DqnConfig::Describe(Options& o) {
   o.Section("network");
-  o.Add(&hidden, "hidden", {1, 4096}, "widths of the feature layers");
-  o.Add(&head, "head", {1, 4096}, "", "width of each dueling stream's hidden layer");
-  o.Add(&layer_norm, "layer_norm", "layer normalisation after each feature layer");
+  o.Add(&hidden, "hidden", {1, 4096}, "widths of the hidden feature layers");
+  o.Add(&head, "head", {1, 4096}, "", "width of the hidden layer of each dueling stream");
+  o.Add(&layer_norm, "layer_norm", "apply layer normalisation after each feature layer");
 
   o.Section("agent");
-  o.Add(&double_q, "double", "Double DQN: choose online, evaluate with the target");
-  o.Add(&dueling, "dueling", "Dueling: Q = V + A - mean(A)");
-  o.Add(&levels, "levels", {2, 1001}, "torques", "number of evenly spaced torque levels").implied =
-      true;
+  o.Add(&double_q, "double",
+        "Double DQN: choose the next action online, value it with the target network");
+  o.Add(&dueling, "dueling", "dueling network: Q = V + A - mean(A)");
+  o.Add(&levels, "levels", {2, 1001}, "", "number of evenly spaced torque levels").implied = true;
   OffPolicyConfig::Describe(o);
-  o.Add(&tau, "tau", kUnit, "", "Polyak averaging of the target, per update");
+  o.Add(&tau, "tau", kUnit, "", "Polyak factor of the target network, per update");
   o.Add(&target_period, "target_period", {0, 1e9}, "updates",
         "copy the target network every N updates; 0: Polyak averaging");
   o.Add(&policy_tau, "policy_tau", {1e-9, 1}, "",
-        "Polyak averaging of the policy that is judged and kept, per update, which falls with the "
-        "learning rate; 1: as learned last");
-  o.Add(&epsilon_start, "epsilon_start", kUnit, "", "share of random actions at the beginning");
-  o.Add(&epsilon_end, "epsilon_end", kUnit, "", "what epsilon falls to");
-  o.Add(&epsilon_decay, "epsilon_decay", kUnit, "", "factor per episode");
+        "Polyak factor of the policy that is evaluated and saved, per update; decays with the "
+        "learning rate; 1: no averaging");
+  o.Add(&epsilon_start, "epsilon_start", kUnit, "", "initial probability of a random action");
+  o.Add(&epsilon_end, "epsilon_end", kUnit, "", "lowest probability of a random action");
+  o.Add(&epsilon_decay, "epsilon_decay", kUnit, "",
+        "factor on the probability of a random action after each episode");
 }
 
 std::unique_ptr<Agent> DqnConfig::Make(const EnvSpec& spec, uint64_t seed, ThreadPool& pool) const {
@@ -52,7 +53,7 @@ std::string DqnConfig::Text() const {
 std::vector<std::string> DqnConfig::Warnings(int64_t steps, int64_t /*num_envs*/) const {
   std::vector<std::string> warnings = OffPolicyConfig::Warnings(steps);
   if (tau == 0 && target_period == 0) {
-    warnings.emplace_back("tau is 0: the target network will stay as it began");
+    warnings.emplace_back("tau is 0: the target network never changes");
   }
   return warnings;
 }

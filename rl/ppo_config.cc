@@ -11,44 +11,44 @@ namespace upswing {
 void PpoConfig::Describe(Options& o) {
   o.Section("network");
   o.Add(&hidden, "hidden", {1, 4096}, "widths of the hidden layers of actor and critic");
-  o.AddChoice(&activation, "activation", {"tanh", "relu"}, "of the hidden units");
-  o.Add(&layer_norm, "layer_norm", "layer normalisation in each hidden layer");
+  o.AddChoice(&activation, "activation", {"tanh", "relu"},
+              "activation function of the hidden units");
+  o.Add(&layer_norm, "layer_norm", "apply layer normalisation in each hidden layer");
 
   o.Section("agent");
   o.AddChoice(&actions, "actions", {"continuous", "levels"},
-              "continuous: torques drawn from a normal distribution; levels: from a few torques");
-  o.Add(&levels, "levels", {2, 1001}, "torques", "how many actions = levels has, evenly spaced");
-  o.Add(&gamma, "gamma", kUnit, "", "discount per control step");
-  o.Add(&lambda, "lambda", kUnit, "", "decay of generalised advantages");
-  o.Add(&reward_scale, "reward_scale", kPositive, "", "the agent learns from reward times this");
+              "kind of actions; continuous: normally distributed torques; levels: fixed torques");
+  o.Add(&levels, "levels", {2, 1001}, "",
+        "number of evenly spaced torque levels, with actions = levels");
+  o.Add(&gamma, "gamma", kUnit, "", "discount factor per control step");
+  o.Add(&lambda, "lambda", kUnit, "", "decay factor of generalised advantage estimation");
+  o.Add(&reward_scale, "reward_scale", kPositive, "",
+        "factor on the reward that the agent learns from");
   o.Add(&horizon, "horizon", {1, 1000000}, "steps",
-        "length of a rollout: what each environment does between updates");
-  o.Add(&epochs, "epochs", {1, 1000}, "", "passes over a rollout");
-  o.Add(&batch, "batch", {1, 1000000}, "steps",
-        "in a minibatch; divides horizon times environments");
-  o.Add(&clip, "clip", {1e-6, 1}, "",
-        "the ratio of new to old probability is clipped to 1 by this");
+        "length of a rollout, which each environment makes between updates");
+  o.Add(&epochs, "epochs", {1, 1000}, "", "number of passes over each rollout");
+  o.Add(&batch, "batch", {1, 1000000}, "steps", "size of a minibatch; divides horizon times envs");
+  o.Add(&clip, "clip", {1e-6, 1}, "", "clip range around 1 of the ratio of new to old probability");
   o.Add(&value_clip, "value_clip", kNotNegative, "",
-        "values are clipped to what they were by this; 0: not clipped");
-  o.Add(&entropy_bonus, "entropy_bonus", {0, 10}, "",
-        "weight of the policy's entropy at the beginning");
+        "clip range around the old value; 0: no clipping");
+  o.Add(&entropy_bonus, "entropy_bonus", {0, 10}, "", "initial weight of the policy's entropy");
   o.Add(&entropy_bonus_end, "entropy_bonus_end", {0, 10}, "",
-        "the same at the end of learning_rate_steps");
+        "weight of the policy's entropy after learning_rate_steps");
   o.Add(&max_std, "max_std", {0.01, 7}, "",
-        "largest standard deviation of continuous actions, in units of the limit");
+        "largest standard deviation of continuous actions, in units of their limit");
   o.Add(&initial_std, "initial_std", {0.01, 5}, "",
-        "standard deviation of continuous actions at the beginning, in units of the limit");
+        "initial standard deviation of continuous actions, in units of their limit");
   o.Add(&normalize, "normalize",
         "normalise observations by their running mean and standard deviation");
   o.Add(&mirror, "mirror", "mirror a random half of each minibatch");
-  o.Add(&learning_rate, "learning_rate", {0, 10}, "", "learning rate of Adam at the beginning");
-  o.Add(&learning_rate_end, "learning_rate_end", {0, 10}, "", "learning rate at the end");
+  o.Add(&learning_rate, "learning_rate", {0, 10}, "", "initial learning rate of Adam");
+  o.Add(&learning_rate_end, "learning_rate_end", {0, 10}, "", "final learning rate of Adam");
   o.Add(&learning_rate_steps, "learning_rate_steps", {1, 1e12}, "steps",
-        "over which the learning rate falls linearly");
+        "length of the linear decay of the learning rate");
   o.Add(&kl_target, "kl_target", {0, 10}, "nats",
-        "policy change of an update that the actor's learning rate is adapted to; 0: it is not");
+        "target KL divergence of an update, to which the actor's learning rate adapts; 0: off");
   o.Add(&max_gradient_norm, "max_gradient_norm", kPositive, "",
-        "clip the global norm, of actor and critic each, to this");
+        "largest global norm of the gradient, of actor and critic each, which is clipped to it");
 }
 
 std::unique_ptr<Agent> PpoConfig::Make(const EnvSpec& spec, uint64_t seed, ThreadPool& pool) const {
@@ -59,8 +59,8 @@ void PpoConfig::Check(int64_t num_envs) const {
   CheckBatch(num_envs);
   const PpoConfig usual;
   if (!discrete() && levels != usual.levels) {
-    throw BadInput(Concat("levels: expected none with continuous actions, got ", levels,
-                          " (or actions = levels)"));
+    throw BadInput(Concat("levels: expected none with actions = continuous, got ", levels,
+                          "; set actions = levels to use it"));
   }
   if (!discrete() && initial_std > max_std && initial_std != usual.initial_std) {
     throw BadInput(
@@ -92,9 +92,9 @@ std::string PpoConfig::Text() const {
 std::vector<std::string> PpoConfig::Warnings(int64_t steps, int64_t num_envs) const {
   std::vector<std::string> warnings;
   if (horizon * num_envs > steps) {
-    warnings.push_back(Concat("a rollout is ", FormatCount(horizon * num_envs),
-                              " steps, and there are ", FormatCount(steps),
-                              ": nothing will be learned"));
+    warnings.push_back(Concat("a rollout has ", FormatCount(horizon * num_envs),
+                              " steps and the training only ", FormatCount(steps),
+                              ": the agent learns nothing"));
   }
   WarnOfNoRate(learning_rate, learning_rate_end, warnings);
   return warnings;

@@ -11,34 +11,36 @@ namespace upswing {
 
 void SacConfig::Describe(Options& o) {
   o.Section("network");
-  o.Add(&hidden, "hidden", {1, 4096}, "widths of the feature layers of each network");
-  o.Add(&layer_norm, "layer_norm", "layer normalisation after each feature layer");
+  o.Add(&hidden, "hidden", {1, 4096}, "widths of the hidden layers of actor and critics");
+  o.Add(&layer_norm, "layer_norm", "apply layer normalisation after each hidden layer");
   o.Add(&bins, "bins", {0, 1001}, "",
-        "values of a categorical critic (HL-Gauss); 0: the critic puts out one number");
-  o.Add(&value_low, "value_low", {-1e9, 1e9}, "", "least value of a categorical critic");
-  o.Add(&value_high, "value_high", {-1e9, 1e9}, "", "largest value of a categorical critic");
+        "number of value bins of a categorical critic (HL-Gauss); 0: scalar critic");
+  o.Add(&value_low, "value_low", {-1e9, 1e9}, "", "lowest value of a categorical critic");
+  o.Add(&value_high, "value_high", {-1e9, 1e9}, "", "highest value of a categorical critic");
 
   o.Section("agent");
-  o.Add(&twin, "twin", "two critics, of which the smaller value counts");
+  o.Add(&twin, "twin", "train two critics and use the smaller value");
   OffPolicyConfig::Describe(o);
   o.Add(&smoothness, "smoothness", {0, 1e6}, "",
-        "the agent's reward falls by this times the squared change of its mean action, in units of "
-        "the limit");
+        "weight of the penalty on squared changes of the mean action, which is in units of its "
+        "limit");
   o.Add(&actor_period, "actor_period", {1, 1e9}, "updates",
-        "critic updates for each update of actor and temperature");
-  o.Add(&actor_rate, "actor_rate", {0, 1000}, "", "the actor's learning rate over the critics'");
-  o.Add(&tau, "tau", kUnit, "", "Polyak averaging of the target critics, per update");
+        "critic updates per update of actor and temperature");
+  o.Add(&actor_rate, "actor_rate", {0, 1000}, "",
+        "ratio of the actor's learning rate to the critics'");
+  o.Add(&tau, "tau", kUnit, "", "Polyak factor of the target critics, per update");
   o.Add(&policy_tau, "policy_tau", {1e-9, 1}, "",
-        "Polyak averaging of the policy that is judged and kept, per update of the actor, which "
-        "falls with the learning rate; 1: as learned last");
+        "Polyak factor of the policy that is evaluated and saved, per actor update; decays with "
+        "the learning rate; 1: no averaging");
   o.Add(&entropy_reward, "entropy_reward",
-        "add the entropy bonus to the critics' targets; off: only the actor's loss has it");
-  o.Add(&tune_alpha, "tune_alpha", "learn the temperature, so that entropy meets its target");
-  o.Add(&alpha, "alpha", {0, 1e6}, "", "temperature, or what it begins with");
-  o.Add(&alpha_rate, "alpha_rate", {0, 10}, "", "learning rate of its logarithm");
-  o.Add(
-      &target_entropy, "target_entropy", {-100, 0.69}, "nats",
-      "entropy of each component of the action, in units of its limit; uniform actions have 0.69");
+        "add the entropy bonus to the critics' targets; false: only to the actor's loss");
+  o.Add(&tune_alpha, "tune_alpha",
+        "learn the temperature so that the entropy meets target_entropy");
+  o.Add(&alpha, "alpha", {0, 1e6}, "", "temperature; with tune_alpha its initial value");
+  o.Add(&alpha_rate, "alpha_rate", {0, 10}, "",
+        "learning rate of the logarithm of the temperature");
+  o.Add(&target_entropy, "target_entropy", {-100, 0.69}, "nats",
+        "target entropy per action component in units of its limit; uniform actions have 0.69");
 }
 
 std::unique_ptr<Agent> SacConfig::Make(const EnvSpec& spec, uint64_t seed, ThreadPool& pool) const {
@@ -74,8 +76,8 @@ std::string SacConfig::Text() const {
 
 std::vector<std::string> SacConfig::Warnings(int64_t steps, int64_t /*num_envs*/) const {
   std::vector<std::string> warnings = OffPolicyConfig::Warnings(steps);
-  if (actor_rate == 0) warnings.emplace_back("actor_rate is 0: the policy will stay as it began");
-  if (tau == 0) warnings.emplace_back("tau is 0: the targets will stay as they began");
+  if (actor_rate == 0) warnings.emplace_back("actor_rate is 0: the policy never changes");
+  if (tau == 0) warnings.emplace_back("tau is 0: the target critics never change");
   return warnings;
 }
 

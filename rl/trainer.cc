@@ -136,19 +136,19 @@ constexpr Range kCount{1, 1e12};
 
 void TrainConfig::Describe(Options& o) {
   o.Section("train");
-  o.Add(&seed, "seed", {0, 9e15}, "", "seed of every random stream").decides =
+  o.Add(&seed, "seed", {0, 9e15}, "", "seed of all random numbers").decides =
       Option::Decides::kSeed;
-  o.Add(&steps, "steps", kCount, "steps", "train for at most this many in all").decides =
+  o.Add(&steps, "steps", kCount, "steps", "training budget, summed over all environments").decides =
       Option::Decides::kEnd;
-  o.Add(&envs, "envs", {1, 4096}, "", "parallel environments");
-  o.Add(&stop_when_solved, "stop_when_solved", "stop once two evaluations in a row are passed")
-      .decides = Option::Decides::kEnd;
-  o.Add(&eval_every, "eval_every", kCount, "steps", "from one evaluation to the next");
-  o.Add(&eval_episodes, "eval_episodes", {1, 100000}, "", "episodes of an evaluation");
-  o.Add(&log_every, "log_every", kCount, "steps", "from one row of metrics.csv to the next");
-  o.Add(&checkpoint_every, "checkpoint_every", kCount, "steps", "from one checkpoint to the next")
+  o.Add(&envs, "envs", {1, 4096}, "", "number of parallel environments");
+  o.Add(&stop_when_solved, "stop_when_solved", "stop when two evaluations in a row pass").decides =
+      Option::Decides::kEnd;
+  o.Add(&eval_every, "eval_every", kCount, "steps", "interval between evaluations");
+  o.Add(&eval_episodes, "eval_episodes", {1, 100000}, "", "number of episodes per evaluation");
+  o.Add(&log_every, "log_every", kCount, "steps", "interval between rows of metrics.csv");
+  o.Add(&checkpoint_every, "checkpoint_every", kCount, "steps", "interval between checkpoints")
       .decides = Option::Decides::kNothing;
-  o.Add(&threads, "threads", {0, 256}, "", "threads to use; 0: one for each processor, at most 8")
+  o.Add(&threads, "threads", {0, 256}, "", "number of threads; 0: one per processor, at most 8")
       .decides = Option::Decides::kNothing;
   DescribeCurriculum(o);
 }
@@ -156,10 +156,11 @@ void TrainConfig::Describe(Options& o) {
 void TrainConfig::DescribeCurriculum(Options& o) {
   o.Section("train");
   o.Add(&start_noise, "start_noise", {0, 10}, "rad, rad/s",
-        "standard deviation of the start states around hanging");
-  o.Add(&start_noise_end, "start_noise_end", {0, 10}, "rad, rad/s", "at the curriculum's end");
+        "initial standard deviation of the start states around hanging");
+  o.Add(&start_noise_end, "start_noise_end", {0, 10}, "rad, rad/s",
+        "standard deviation of the start states after curriculum_steps");
   o.Add(&curriculum_steps, "curriculum_steps", kCount, "steps",
-        "over which the noise changes linearly");
+        "length of the linear change from start_noise to start_noise_end");
 }
 
 double TrainConfig::StartNoise(int64_t step) const {

@@ -23,13 +23,13 @@ ModelFile ReadModel(const std::string& path) {
   return model;
 }
 
-/// ParseConfig of a file in the folder of a run or a study, whose model is the copy beside it.
+/// ParseConfig of a file in the folder of a run or a study, with the model in the same folder.
 Config ParseInFolder(const fs::path& file, const std::string& text,
                      const std::vector<FlagValue>& flags) {
   return ParseConfig(text, file.string(), flags, [&](const std::string& path, bool /*in_file*/) {
     if (path == RunFolder::kModel) return ReadModel((file.parent_path() / path).string());
     throw BadInput(Concat(file.string(), ": model: expected ", RunFolder::kModel,
-                          ", the copy in the same folder, got \"", Printable(path), "\""));
+                          " in the same folder, got \"", Printable(path), "\""));
   });
 }
 
@@ -51,10 +51,9 @@ Config ReadRunConfig(const fs::path& run, const std::vector<FlagValue>& flags) {
   constexpr size_t kMostNames = 6;  // that make a line which can still be read
   const size_t more = missing.size() - std::min(missing.size(), kMostNames);
   missing.resize(missing.size() - more);
-  throw BadInput(Concat(file.string(), ": expected every setting, as this version writes a run; ",
-                        "got none of ", Join(missing, ", "),
-                        more > 0 ? Concat(" and ", more, " more") : "",
-                        ": another version wrote it"));
+  throw BadInput(Concat(file.string(), ": expected every setting of this version, got none of ",
+                        Join(missing, ", "), more > 0 ? Concat(" and ", more, " more") : "",
+                        "; another version wrote the file"));
 }
 
 Config ReadSettings(const fs::path& file) { return ParseInFolder(file, ReadOwnFile(file), {}); }
@@ -75,7 +74,7 @@ std::string CompleteToml(Config config) {
 
 std::string SettingsMark(const Config& config) {
   Config own = config;
-  own.model.clear();  // a model is what is in its file, not where that lies
+  own.model.clear();  // the content of a model counts, not its path
   Checksum sum;
   const Options options = OptionsOf(own);
   for (const Option& option : options.all()) {

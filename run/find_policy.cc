@@ -22,7 +22,7 @@ std::string SectionOf(const FlagValue& flag) {
   return OptionsOf(config).Find(flag.name, FlagOf(flag.name)).front()->section;
 }
 
-/// The policy of --swing-up. Throws BadInput that names the flag.
+/// Loads the policy of --swing-up. Throws BadInput that names the flag.
 LoadedPolicy SwingUpNamed(const std::string& name) {
   LoadedPolicy loaded;
   try {
@@ -32,17 +32,17 @@ LoadedPolicy SwingUpNamed(const std::string& name) {
   }
   if (loaded.mjcf.empty()) return loaded;
   throw BadInput(Concat("--swing-up: expected a policy of the built-in model, got ", name,
-                        ", which was trained on another"));
+                        ", which was trained on another model"));
 }
 
-/// Throws BadInput if settings of a controller are given that none of the names is.
+/// Throws BadInput for settings of controllers that are not among the names.
 void CheckSettings(const PolicyArguments& settings, const std::vector<std::string>& names) {
   const std::string got = names.empty() ? "none" : Join(names, ", ");
   if (settings.has_settings() && std::ranges::none_of(names, IsController)) {
     const std::string flag =
         settings.flags.empty() ? "--made-for" : FlagOf(settings.flags.front().name);
     throw BadInput(Concat(flag, ": expected a controller (", Join(ControllerNames(), ", "),
-                          ") to set, got ", got));
+                          ") with it, got ", got));
   }
   for (const FlagValue& flag : settings.flags) {
     const std::string section = SectionOf(flag);
@@ -50,7 +50,8 @@ void CheckSettings(const PolicyArguments& settings, const std::vector<std::strin
       return IsController(name) && HasSection(name, section);
     };
     if (std::ranges::any_of(names, has)) continue;
-    throw BadInput(Concat(FlagOf(flag.name), ": expected the controller ", section, ", got ", got));
+    throw BadInput(
+        Concat(FlagOf(flag.name), ": expected the controller ", section, " with it, got ", got));
   }
 }
 
@@ -72,7 +73,7 @@ std::vector<LoadedPolicy> GetPolicies(const std::vector<std::string>& names,
     std::error_code none;
     const auto file = fs::canonical(policies.back().path, none);
     if (!seen.insert(none ? fs::path(name) : file).second) {
-      throw BadInput(Concat(Printable(name), ": given twice; expected each policy once"));
+      throw BadInput(Concat(Printable(name), ": expected each policy once, got it twice"));
     }
   }
   return policies;
@@ -90,22 +91,22 @@ LoadedPolicy GetPolicy(const PolicyArguments& a) {
   ApplyChanges(OptionsOf(config.plant), a.made_for, "--made-for");
   const bool is_controller = IsController(a.name), is_path = fs::exists(a.name);
   if (is_controller && is_path) {
-    throw BadInput(Concat(a.name, ": expected the controller or a file, and there are both: ./",
-                          a.name, " is the file; for the controller, rename that"));
+    throw BadInput(Concat(a.name, ": expected a controller or a file, got the name of both; ./",
+                          a.name, " means the file; rename the file to use the controller"));
   }
   if (is_controller) {
-    const auto remade = [name = a.name, config](const Plant& plant) {
+    const auto design_for = [name = a.name, config](const Plant& plant) {
       ControllerConfig other = config;
       other.plant = plant;
       return MakeController(name, other);
     };
     return {TitleOf(a.name, config),
             "",
-            remade(config.plant),
+            design_for(config.plant),
             kDoublePendulum,
             config.plant,
             "",
-            remade};
+            design_for};
   }
   if (!is_path) {
     throw BadInput(Concat(
@@ -120,15 +121,15 @@ LoadedPolicy LoadPolicy(const fs::path& path) {
   if (fs::is_directory(path)) {
     file = path / RunFolder::kPolicy;
     if (fs::exists(path / RunFolder::kConfig) && !fs::exists(file)) {
-      throw BadInput(Concat(path.string(), ": this run has no policy: expected ",
-                            "policy.safetensors, which its first evaluation writes"));
+      throw BadInput(Concat(path.string(), ": expected a run with a policy.safetensors, got one ",
+                            "without; the first evaluation writes it"));
     }
   }
   if (!fs::exists(file)) {
     const bool is_controller = IsController(path.string());
     throw BadInput(Concat(file.string(),
                           ": no such file; expected a policy.safetensors or a run folder",
-                          is_controller ? " here, where no controller will do" : ""));
+                          is_controller ? ", not a controller" : ""));
   }
   return ReadPolicy(LoadTensors(file, kMostPolicyBytes));
 }

@@ -23,8 +23,8 @@ std::vector<EvaluationRow> ParseEvaluations(std::string text, const std::string&
                                             bool may_be_cut) {
   if (!text.empty() && !text.ends_with('\n')) {
     if (!may_be_cut) {
-      throw BadInput(Concat(where, ": its last line is half-written: expected a run that ",
-                            "has finished (train --resume repairs it)"));
+      throw BadInput(Concat(where, ": expected a finished run, got a half-written last line ",
+                            "(train --resume repairs it)"));
     }
     text.erase(text.rfind('\n') + 1);  // everything if there is no whole line
   }
@@ -44,10 +44,10 @@ std::vector<EvaluationRow> ParseEvaluations(std::string text, const std::string&
     rows.push_back({static_cast<int64_t>(cell(0)), cell(1), cell(2), cell(3), cell(4), cell(5),
                     cell(2) > 0 ? cell(6) : EvaluationRow::kUnknown, ValueRatio(cell(7), cell(8))});
     if (i > 0 && (rows[i].step <= rows[i - 1].step || rows[i].seconds < rows[i - 1].seconds)) {
-      throw BadInput(Concat(where, ": expected steps and seconds that rise, got ", rows[i - 1].step,
-                            " and ", rows[i].step, " steps, ", FormatNumber(rows[i - 1].seconds),
-                            " and ", FormatNumber(rows[i].seconds), " s in rows ", i, " and ",
-                            i + 1));
+      throw BadInput(Concat(where, ": expected increasing steps and seconds, got ",
+                            rows[i - 1].step, " and ", rows[i].step, " steps, ",
+                            FormatNumber(rows[i - 1].seconds), " and ",
+                            FormatNumber(rows[i].seconds), " s in rows ", i, " and ", i + 1));
     }
   }
   return rows;

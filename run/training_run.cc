@@ -82,8 +82,8 @@ std::unique_ptr<TrainingRun> TrainingRun::Resume(const fs::path& path,
   run->folder_.emplace(path, checkpoint);
   const int64_t steps = training.config().train.steps;
   if (StepsGiven(flags) && steps < run->checkpoint_at_) {
-    throw BadInput(Concat("--steps: the run is at step ", run->checkpoint_at_,
-                          " already; expected at least that in all, got ", steps));
+    throw BadInput(Concat("--steps: expected at least ", run->checkpoint_at_,
+                          ", the steps that the run has already, got ", steps));
   }
   WriteFileAtomically(path / RunFolder::kConfig, ConfigToml(training.config(), false));
   return run;

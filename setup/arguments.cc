@@ -6,20 +6,20 @@
 namespace upswing {
 
 void DescribeSeed(Options& o, int64_t* seed, const std::string& what) {
-  o.Add(seed, "seed", {0, 9e15}, "", Concat("of ", what));
+  o.Add(seed, "seed", {0, 9e15}, "", Concat("seed of ", what));
 }
 
 void DescribeThreads(Options& o, int64_t* threads) {
-  o.Add(threads, "threads", {0, 256}, "", "0: one for each processor, at most 8");
+  o.Add(threads, "threads", {0, 256}, "", "number of threads; 0: one per processor, at most 8");
 }
 
 void DescribePhysics(Options& o, std::string* physics) {
   o.AddChoice(physics, "physics", EngineNames(),
-              "engine; closed-form computes the same physics faster than mujoco");
+              "physics engine; closed-form is faster than mujoco, with the same physics");
 }
 
 void DescribeEvalEpisodes(Options& o, int64_t* episodes) {
-  o.Add(episodes, "episodes", {1, 1000000}, "", "how many");
+  o.Add(episodes, "episodes", {1, 1000000}, "", "number of episodes");
 }
 
 }  // namespace upswing

@@ -8,13 +8,13 @@ namespace upswing {
 
 namespace {
 
-/// A learning algorithm's name and its settings, which know the rest of it.
+/// A learning algorithm's name and its settings, which create the agent.
 struct Algorithm {
   const char* name;
   AgentConfig& (*settings)(Config& config);
 };
 
-// The first is the usual one.
+// The first is the default.
 constexpr Algorithm kAlgorithms[] = {
     {"dqn", [](Config& config) -> AgentConfig& { return config.dqn; }},
     {"sac", [](Config& config) -> AgentConfig& { return config.sac; }},
@@ -38,13 +38,13 @@ AgentConfig& Config::learner() {
 
 void Config::Describe(Options& o) {
   o.Section("train");
-  o.Add(&agent, "agent", "named agent whose settings the others begin with");
+  o.Add(&agent, "agent", "named agent that sets the defaults of the other settings");
   o.AddChoice(&algorithm, "algorithm", AlgorithmNames(),
-              "what learns; each algorithm has settings of its own")
+              "learning algorithm; each has its own settings")
       .implied = true;
   train.Describe(o);
   o.Section("task");
-  o.AddChoice(&task, "task", TaskNames(), "what is to be learned").implied = true;
+  o.AddChoice(&task, "task", TaskNames(), "task to learn").implied = true;
   DescribeEnvironment(o);
   learner().Describe(o);
 }
@@ -59,22 +59,24 @@ void Config::DescribeEnvironment(Options& o) {
   o.Add(&episode_seconds, "episode_seconds", {0.02, 1e6}, "s", "length of a training episode")
       .step = kControlPeriod;
   o.Add(&random_start_share, "random_start_share", kUnit, "",
-        "share of the episodes that begin in a random state instead of hanging");
+        "share of training episodes that start in a random state instead of hanging");
   o.Add(&random_start_velocity, "random_start_velocity", {0, 50}, "rad/s",
-        "largest velocity of these random states");
+        "largest velocity of random start states");
   o.Add(&memory, "memory", {0, kMostMemory}, "steps",
-        "past steps whose torque and change of velocities the agent sees too");
+        "number of past steps whose torque and velocity changes the agent observes");
   o.Add(&identify, "identify",
-        "the agent sees what the motion tells of the plant: an estimate of its constants")
+        "let the agent observe an estimate of the plant's constants, identified from its motion")
       .implied = true;
-  o.AddChoice(&physics, "physics", EngineNames(),
-              "engine to train in; closed-form computes the same physics faster than mujoco");
+  o.AddChoice(
+      &physics, "physics", EngineNames(),
+      "physics engine of the training; closed-form is faster than mujoco, with the same physics");
   std::vector<std::string> judges = EngineNames();
   judges.insert(judges.begin(), std::string(kScreened));
   o.AddChoice(&eval_physics, "eval_physics", judges,
-              "engine of the evaluations; screened: closed-form, and mujoco confirms what solves");
+              "physics engine of evaluations; screened: closed-form, and mujoco confirms a solved "
+              "task");
   o.Section("plant");
-  o.Add(&model, "model", "MJCF file to use instead of the built-in model");
+  o.Add(&model, "model", "MJCF file that replaces the built-in model");
   plant.Describe(o);
   disturbance.Describe(o);
   randomization.Describe(o);
@@ -113,7 +115,7 @@ void ExpectSameSettings(const Config& before, const Config& now, const std::stri
   for (const auto& [option, old] : Differences(OptionsOf(now), OptionsOf(before))) {
     if (!counts(option)) continue;
     throw BadInput(Concat(where, ": made with ", option.section, ".", option.name, " = ",
-                          old ? old->text() : "none", ", but the configuration says ",
+                          old ? old->text() : "none", ", but the configuration has ",
                           option.text()));
   }
 }

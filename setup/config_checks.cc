@@ -16,12 +16,10 @@ std::string Gigabytes(double bytes) {
   return Concat(tenths / 10, ".", tenths % 10, " GB");
 }
 
-AgentSize SizeOfLearner(const Config& config) {
-  return config.learner().Size(config.Spec());
-}
+AgentSize SizeOfLearner(const Config& config) { return config.learner().Size(config.Spec()); }
 
-/// Throws BadInput if a setting of the double pendulum is not at its default in another task, which
-/// has no such setting.
+/// Throws BadInput for a setting of the double pendulum with another value than its default in a
+/// task without that setting.
 void CheckTask(Config& config, const std::string& where) {
   if (HasPlant(config.task)) return;
   Config defaults;
@@ -29,9 +27,9 @@ void CheckTask(Config& config, const std::string& where) {
   config.DescribePlantTask(now);
   defaults.DescribePlantTask(usual);
   for (const auto& [option, other] : Differences(now, usual)) {
-    throw BadInput(Concat(
-        where.empty() ? "" : where + ": ", option.name, ": expected none, as the task ",
-        config.task, " has no such setting, got ", option.text(), " (agent ", config.agent, ")"));
+    throw BadInput(Concat(where.empty() ? "" : where + ": ", option.name,
+                          ": expected none, because the task ", config.task, " of agent ",
+                          config.agent, " has no such setting, got ", option.text()));
   }
 }
 
@@ -47,12 +45,12 @@ void CheckSettings(Config& config, const std::string& where) {
 }
 
 std::vector<std::string> Warnings(const Config& config) {
-  // Environments step together: a training ends with the lock-step that reaches its last step.
+  // All environments step together: a training ends with the step that reaches its budget.
   const int64_t envs = config.train.envs;
   const int64_t steps = (config.train.steps + envs - 1) / envs * envs;
   std::vector<std::string> warnings = config.learner().Warnings(steps, envs);
   if (std::ranges::all_of(config.reward.weight, [](double weight) { return weight == 0; })) {
-    warnings.emplace_back("every weight of the reward is 0: there is nothing to learn");
+    warnings.emplace_back("every reward weight is 0: the agent learns nothing");
   }
   return warnings;
 }
@@ -62,7 +60,7 @@ TrainingSize SizeOf(const Config& config) {
   const AgentSize l = SizeOfLearner(config);
   const double replay = kFloat * l.transition * l.capacity;
   const double saved = kFloat * l.saved_arrays * l.parameters;
-  // The first checkpoint, without a replay memory, lies beside what it is loaded into.
+  // The first checkpoint, without a replay memory, is in memory together with the training.
   return {
       kFloat * (l.arrays * l.parameters + l.batch * l.widest * l.layers) + std::max(saved, replay),
       saved + replay};
@@ -72,12 +70,13 @@ void CheckMemory(const Config& config, int64_t available, int64_t runs) {
   const double needed = static_cast<double>(runs) * SizeOf(config).memory;
   if (needed <= static_cast<double>(available)) return;
   const AgentSize learner = SizeOfLearner(config);
-  throw BadInput(Concat(
-      "train: expected to fit into the ", Gigabytes(static_cast<double>(available)), " of memory that are free, but ",
-      runs > 1 ? Concat(runs, " trainings at a time, each with a ") : "a ", "network of ",
-      FormatCount(learner.parameters), " parameters and a ", learner.store, " of ",
-      FormatCount(learner.capacity), " transitions take up to ", Gigabytes(needed),
-      " (smaller: --hidden, ", learner.store_flag, runs > 1 ? ", --jobs" : "", ")"));
+  throw BadInput(Concat("train: expected at most ", Gigabytes(static_cast<double>(available)),
+                        " of memory, which is what is free, got ", Gigabytes(needed), " for ",
+                        runs > 1 ? Concat(runs, " runs at a time, each with a ") : "a ",
+                        "network of ", FormatCount(learner.parameters), " parameters and a ",
+                        learner.store, " of ", FormatCount(learner.capacity),
+                        " transitions; reduce --hidden", runs > 1 ? ", " : " or ",
+                        learner.store_flag, runs > 1 ? " or --jobs" : ""));
 }
 
 }  // namespace upswing

@@ -1,4 +1,4 @@
-// How the settings of a training come together: defaults, named agent, configuration file, flags.
+// The layers of a training's settings: defaults, named agent, configuration file, flags.
 #include <algorithm>
 #include <map>
 
@@ -17,12 +17,12 @@ const NamedAgent& FindAgent(const std::string& name, const std::string& where) {
   const auto found = std::ranges::find_if(agents, [&](const auto& a) { return a.name == name; });
   if (found != agents.end()) return *found;
   const std::vector<std::string> names = NamesOf(agents);
-  throw BadInput(Concat(where, ": no agent is called \"", name, "\"", DidYouMean(name, names),
-                        "; there are ", Join(names, ", ")));
+  throw BadInput(Concat(where, ": expected an agent, one of ", Join(names, ", "), ", got \"", name,
+                        "\"", DidYouMean(name, names)));
 }
 
-/// A text setting that other settings depend on: its value in the last layer that has it, and
-/// where that is, for messages.
+/// A text setting that other settings depend on: its value in the last layer that sets it, and the
+/// place, for messages.
 struct EarlySetting {
   std::string value, where;
   bool in_file = false;
@@ -64,8 +64,7 @@ struct ChosenAgent {
   std::string algorithm;
 };
 
-/// Throws BadInput if there is no such agent, or if it does not learn by the algorithm that is
-/// asked for.
+/// Throws BadInput if there is no such agent, or if it has another algorithm than requested.
 ChosenAgent ChooseAgent(const toml::table& table, const std::string& where,
                         const std::vector<FlagValue>& flags) {
   EarlySetting setting = FindEarly("train", "agent", table, where, flags);
@@ -78,8 +77,9 @@ ChosenAgent ChooseAgent(const toml::table& table, const std::string& where,
   if (!asked.where.empty()) {
     CheckAlgorithm(asked.value, asked.where);
     if (asked.value != algorithm) {
-      throw BadInput(Concat(asked.where, ": agent ", agent.name, " learns by ", algorithm, ", got ",
-                            asked.value, "; expected another agent, such as ", asked.value));
+      throw BadInput(Concat(asked.where, ": expected ", algorithm, ", the algorithm of agent ",
+                            agent.name, ", got ", asked.value, "; choose another agent, such as ",
+                            asked.value));
     }
   }
   return {agent.name, place, std::move(settings), algorithm};
@@ -97,8 +97,9 @@ Options KnownOptions(Config& config) {
   }
   for (const auto& [name, algorithms] : owners) {
     if (options.Get(name) != nullptr) continue;
-    options.Explain(name, Concat(name, " is a setting of ", Join(algorithms, " and "),
-                                 ", but agent ", config.agent, " learns by ", config.algorithm));
+    options.Explain(
+        name, Concat("expected a setting of ", config.algorithm, ", the algorithm of agent ",
+                     config.agent, ", got ", name, ", a setting of ", Join(algorithms, " and ")));
   }
   return options;
 }
@@ -128,7 +129,7 @@ Config ParseConfig(std::string_view text, const std::string& where,
   config.agent = agent.name;
   const Options options = KnownOptions(config);
 
-  // A model file has a plant of its own, which other settings may change.
+  // A model file has its own plant; other settings may change it.
   const EarlySetting named = FindEarly("plant", "model", table, where, flags);
   ModelFile model;
   if (!named.value.empty()) {
@@ -163,7 +164,7 @@ std::vector<std::string> MissingSettings(const std::string& text, const std::str
 std::vector<std::pair<std::string, std::string>> NamedAgents() {
   std::vector<std::pair<std::string, std::string>> names;
   for (const NamedAgent& agent : EmbeddedAgents()) {
-    // The file begins with a comment that says what it is.
+    // The file begins with a comment that describes the agent.
     std::vector<std::string> comment;
     for (const std::string_view line : Split(agent.toml, '\n')) {
       if (!line.starts_with('#')) break;

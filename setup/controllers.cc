@@ -12,7 +12,7 @@
 namespace upswing {
 namespace {
 
-/// A controller's name and how it is made.
+/// A controller's name and its factory.
 struct Controller {
   const char* name;
   std::shared_ptr<const Policy> (*make)(const ControllerConfig& config);
@@ -30,11 +30,11 @@ Made WithCatch(const ControllerConfig& config, const std::string& kind, const st
       config.plant);
 }
 
-/// Throws BadInput unless the motor is where these laws have it.
+/// Throws BadInput unless the motor is at joint 1, as these laws assume.
 void ExpectPendubot(const char* kind, const Plant& plant) {
   if (plant.actuated_joint == 1) return;
   throw BadInput(
-      Concat(kind, ": expected a plant whose motor is at joint 1 (actuated_joint), got joint 2"));
+      Concat(kind, ": expected a plant with the motor at joint 1 (actuated_joint), got joint 2"));
 }
 
 Made MakeEnergyShaping(const ControllerConfig& config) {
@@ -63,7 +63,7 @@ Made MakePartialFeedback(const ControllerConfig& config) {
 
 Made MakeHybrid(const ControllerConfig& config) {
   if (config.swing_up_policy == nullptr) {
-    throw BadInput("hybrid: expected a policy that swings up, by --swing-up POLICY, got none");
+    throw BadInput("hybrid: expected a policy that swings up (--swing-up POLICY), got none");
   }
   return std::make_shared<HybridPolicy>("hybrid", OptionsOf(config.lqr), config.lqr,
                                         config.swing_up_policy, config.plant);
@@ -97,7 +97,8 @@ void ControllerConfig::Describe(Options& o) {
   energy.Describe(o);
   pfl.Describe(o);
   o.Section("hybrid");
-  o.Add(&swing_up, "swing_up", "policy that swings up, a file or run folder").usual = "none";
+  o.Add(&swing_up, "swing_up", "policy that swings up: policy.safetensors or a run folder").usual =
+      "none";
 }
 
 std::vector<std::string> ControllerNames() { return NamesOf(kControllers); }

@@ -32,10 +32,11 @@ void CheckObservation(const LoadedPolicy& loaded, const std::string& where) {
   const bool same_scale =
       !given->identified || given->identified->scale == expected.identified->scale;
   if (given->max_velocity != expected.max_velocity || !same_scale || !same_memory()) {
-    throw BadInput(Concat(where,
-                          ": metadata \"observation\": expected the scales of "
-                          "docs/policy-format.md and a memory of ",
-                          loaded.memory(), " steps, as the network has inputs"));
+    throw BadInput(
+        Concat(where,
+               ": metadata \"observation\": expected the names and scales of this version "
+               "and a memory of ",
+               loaded.memory(), " steps, as the network's inputs have, got others"));
   }
 }
 
@@ -51,19 +52,18 @@ void CheckTask(const LoadedPolicy& loaded, const std::string& where) {
   const EnvSpec spec = SpecOf(config);
   const auto& period = loaded.policy->info().control_period;
   if (period != spec.step_seconds) {
-    throw BadInput(Concat(where, ": metadata \"control_period\": expected ",
-                          FormatNumber(spec.step_seconds),
-                          " s, for which this program holds a torque, got ",
-                          period ? FormatNumber(*period) : "none"));
+    throw BadInput(Concat(
+        where, ": metadata \"control_period\": expected ", FormatNumber(spec.step_seconds),
+        " s, the control period of the task, got ", period ? FormatNumber(*period) : "none"));
   }
   if (loaded.policy->action_size() != spec.action_size()) {
-    throw BadInput(Concat(where, ": expected actions of ", spec.action_size(), " number, as ",
-                          loaded.task, " has, got ", loaded.policy->action_size()));
+    throw BadInput(Concat(where, ": expected ", spec.action_size(), " number per action, as in ",
+                          loaded.task, ", got ", loaded.policy->action_size()));
   }
   if (HasPlant(loaded.task)) return CheckObservation(loaded, where);
   if (loaded.policy->obs_size() != spec.obs_size) {
-    throw BadInput(Concat(where, ": expected a policy of ", spec.obs_size, " observations, as ",
-                          loaded.task, " has, got ", loaded.policy->obs_size()));
+    throw BadInput(Concat(where, ": expected a policy of ", spec.obs_size, " observations, as in ",
+                          loaded.task, ", got ", loaded.policy->obs_size()));
   }
 }
 
@@ -87,8 +87,9 @@ LoadedPolicy PolicyIn(const Tensors& file) {
   const std::string& where = file.where();
   const auto format = file.metadata.find("format");
   if (format != file.metadata.end() && format->second == "upswing-realaigym") {
-    throw BadInput(
-        Concat(where, ": is a policy for RealAIGym's boards, which `upswing realaigym` takes"));
+    throw BadInput(Concat(
+        where,
+        ": expected a policy of `upswing train`, got one for RealAIGym (`upswing realaigym`)"));
   }
   const auto policy = std::make_shared<const NetworkPolicy>(NetworkPolicy::From(file));
   const PolicyInfo& info = policy->info();

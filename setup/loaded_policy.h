@@ -13,30 +13,30 @@ namespace upswing {
 
 /// A policy and what it needs to be tried out.
 struct LoadedPolicy {
-  std::string name;  // for people
-  std::string path;  // of its file; empty: a controller, which has none
+  std::string name;  // for messages
+  std::string path;  // its file; empty for a controller
   std::shared_ptr<const Policy> policy;
   std::string task;  // see TaskNames
   // Of the double pendulum:
-  Plant plant;       // what it was made for
+  Plant plant;       // plant of the training or of the design
   std::string mjcf;  // empty: the built-in model
-  // Of a controller: the same, made for another plant; throws BadInput if there is none for it.
-  std::function<std::shared_ptr<const Policy>(const Plant&)> remade = {};
+  // Designs the controller for another plant; empty for a learned policy. Throws BadInput if no
+  // such controller exists.
+  std::function<std::shared_ptr<const Policy>(const Plant&)> design_for = {};
 
-  /// How many past steps its observations remember.
+  /// Number of past steps in its observations.
   int memory() const;
-  /// Whether they hold an estimate of the plant.
+  /// Whether its observations contain an estimate of the plant.
   bool identifies() const;
-  /// Where it is from: "training", or "design" of a controller.
+  /// Origin: "training", or "design" for a controller.
   const char* origin() const { return path.empty() ? "design" : "training"; }
 };
 
-/// The policy in a file, whose model, if it is not the built-in one, is not checked. Throws
-/// BadInput, too, where the file says of its task what this program cannot do: another control
-/// period, other observations.
+/// The policy in a file. Its MJCF model is not checked. Throws BadInput also for a task that this
+/// program lacks: another control period or other observations.
 LoadedPolicy PolicyIn(const Tensors& file);
 
-/// What a policy file says of the agent and the task that it was trained on.
+/// Metadata of a policy file on its agent and task.
 PolicyInfo InfoOf(const Config& config);
 
 }  // namespace upswing

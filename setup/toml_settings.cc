@@ -8,14 +8,13 @@
 namespace upswing {
 namespace {
 
-/// A setting of an earlier version. Files may hold it with the value that is built in today.
+/// A setting of an earlier version. Files may have it with today's built-in value.
 struct RemovedSetting {
   std::string_view section, name, value;
 };
 constexpr RemovedSetting kRemoved[] = {{"network", "precision", "float32"}};
 
-/// Whether this setting was removed. Throws BadInput if it asks for something that no longer
-/// exists.
+/// Whether this setting was removed. Throws BadInput for another value than today's.
 bool IsRemoved(std::string_view section, std::string_view name, const toml::node& node,
                const std::string& where) {
   for (const RemovedSetting& removed : kRemoved) {
@@ -28,7 +27,7 @@ bool IsRemoved(std::string_view section, std::string_view name, const toml::node
   return false;
 }
 
-/// Sets one key of a section, or one that stands alone if `section` is empty.
+/// Sets one key of a section, or a key without a section if `section` is empty.
 FlagValue ApplyNode(const Options& options, const std::string& section, const std::string& key,
                     const toml::node& node, const std::string& where) {
   const std::string place = PlaceOf(node, where);
@@ -36,8 +35,8 @@ FlagValue ApplyNode(const Options& options, const std::string& section, const st
   const FlagValue setting{key, TextOf(node).value_or(""), Concat(place, ": ", key)};
   for (const Option* option : options.Find(key, scope)) {
     if (!section.empty() && option->section != section) {
-      throw BadInput(
-          Concat(setting.where, ": expected in [", option->section, "], got in [", section, "]"));
+      throw BadInput(Concat(setting.where, ": expected in section [", option->section,
+                            "], got in [", section, "]"));
     }
     const bool wants_text = std::holds_alternative<std::string*>(option->target);
     if (!TextOf(node) || node.is_string() != wants_text) {
@@ -92,11 +91,11 @@ std::vector<FlagValue> ApplyTable(const Options& options, const toml::table& tab
     }
     if (section == nullptr) {
       const Option& option = *options.Find(key, PlaceOf(node, where)).front();
-      throw BadInput(Concat(PlaceOf(node, where), ": ", key, ": belongs in [", option.section,
-                            "]: expected it below such a line, got it in no section"));
+      throw BadInput(Concat(PlaceOf(node, where), ": ", key, ": expected in section [",
+                            option.section, "], got outside any section"));
     }
     if (std::ranges::find(sections, key) == sections.end()) {
-      throw BadInput(Concat(PlaceOf(node, where), ": no section is called [", key, "]",
+      throw BadInput(Concat(PlaceOf(node, where), ": expected a known section, got [", key, "]",
                             DidYouMean(key, sections)));
     }
     for (const auto& [inner, value] : *section) {

@@ -105,7 +105,9 @@ void Training::Load(const Tensors& checkpoint) {
   ExpectSameSettings(old_config, config_, checkpoint.where(),
                      [](const Option& option) { return option.identity(); });
   if (checkpoint.Metadata("model") != config_.mjcf) {
-    throw BadInput(Concat(checkpoint.where(), ": made with another model than ", config_.model));
+    throw BadInput(Concat(checkpoint.where(),
+                          ": expected a checkpoint of the same model, got one of another than ",
+                          config_.model));
   }
   State(Archive::Loader(checkpoint));
 }

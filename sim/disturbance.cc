@@ -10,8 +10,8 @@ namespace upswing {
 void Disturbance::Describe(Options& o) {
   o.Section("disturbance");
   o.Add(&sensor_noise, "sensor_noise", {0, 10}, "rad, rad/s",
-        "standard deviation of the noise on all measured angles and velocities");
-  o.Add(&delay, "delay", {0, kLargestDelay}, "s", "from the choice of a torque to its effect")
+        "standard deviation of the noise on measured angles and velocities");
+  o.Add(&delay, "delay", {0, kLargestDelay}, "s", "time from choosing a torque to its effect")
       .step = kControlPeriod;
   sensors.Describe(o);
 }
@@ -58,7 +58,7 @@ std::span<const double> Disturber::Apply(std::span<const double> torque,
   return applied_;
 }
 
-void Disturber::TakeBack(int env, int64_t step) {
+void Disturber::Undo(int env, int64_t step) {
   const auto i = static_cast<size_t>(env);
   const int delay = disturbances_[i].delay_steps();
   if (delay > 0) std::swap(applied_[i], Queue(env)[static_cast<size_t>(step % delay)]);

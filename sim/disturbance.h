@@ -18,9 +18,8 @@ inline constexpr double kLargestDelay = 1;  // s
 
 /// Sensor noise, motor delay and sensors of one environment; zeros: none.
 ///
-/// The delay is the motor's: the torque chosen at one step is applied so many control periods
-/// later, and zero torque before the first arrives. What the delay hides are the torques that are
-/// still waiting. How old the measured state is, the sensors' latency says.
+/// The delay belongs to the motor: a torque acts `delay` after its choice; before the first one,
+/// the torque is zero. The sensors' latency is the age of the measured state.
 struct Disturbance {
   double sensor_noise = 0;  // standard deviation, on each measured angle and velocity, rad, rad/s
   double delay = 0;  // from the choice of a torque to its effect, s, in whole control periods
@@ -62,8 +61,8 @@ class Disturber {
   /// returns those that the motors apply now (N).
   std::span<const double> Apply(std::span<const double> torque, std::span<const int64_t> steps);
 
-  /// Takes back what Apply did to an environment at this step of its episode.
-  void TakeBack(int env, int64_t step);
+  /// Undoes the effect of Apply on an environment at this step of its episode.
+  void Undo(int env, int64_t step);
 
   /// Takes the true state at a control step and the torque (N·m) that acted in the control period
   /// before it, 0 at the start, and returns what the sensors measure, with noise.

@@ -21,20 +21,21 @@ void Plant::Describe(Options& o) {
   o.Add(&length2, "length2", kLength, "m", "length of link 2");
   o.Add(&damping1, "damping1", kDamping, "N·m·s/rad", "damping of joint 1");
   o.Add(&damping2, "damping2", kDamping, "N·m·s/rad", "damping of joint 2");
-  o.Add(&gravity, "gravity", {0.01, 100}, "m/s²", "gravity, downwards");
+  o.Add(&gravity, "gravity", {0.01, 100}, "m/s²", "downward gravity");
   o.Add(&torque_limit, "torque_limit", {0.01, 1000}, "N·m", "largest torque of the motor");
   Option& joint = o.Add(&actuated_joint, "actuated_joint", {1, 2}, "",
-                        "joint that the motor drives: 1 makes a pendubot, 2 an acrobot");
+                        "joint that the motor drives; 1: pendubot, 2: acrobot");
   joint.step = 1;
   joint.implied = true;
-  o.Add(&rotor_inertia, "rotor_inertia", {0, 1}, "kg·m²",
-        "inertia of the rotor of each joint's motor")
+  o.Add(&rotor_inertia, "rotor_inertia", {0, 1}, "kg·m²", "rotor inertia of each joint's motor")
       .implied = true;
-  o.Add(&gear_ratio, "gear_ratio", {0, 1000}, "", "turns of a rotor for one turn of its joint")
+  o.Add(&gear_ratio, "gear_ratio", {0, 1000}, "", "gear ratio: rotor turns per joint turn")
       .implied = true;
-  o.Add(&coulomb1, "coulomb1", {0, 10}, "N·m", "c of joint 1's dry friction c·atan(100 w)")
+  o.Add(&coulomb1, "coulomb1", {0, 10}, "N·m",
+        "dry friction of joint 1: c in c·atan(100 w), w the joint's velocity")
       .implied = true;
-  o.Add(&coulomb2, "coulomb2", {0, 10}, "N·m", "c of joint 2's dry friction c·atan(100 w)")
+  o.Add(&coulomb2, "coulomb2", {0, 10}, "N·m",
+        "dry friction of joint 2: c in c·atan(100 w), w the joint's velocity")
       .implied = true;
   o.Alias("mass", {"mass1", "mass2"});
   o.Alias("length", {"length1", "length2"});
@@ -58,11 +59,11 @@ void RewardWeights::Describe(Options& o) {
   constexpr Range kWeight{0, 1000};
   auto& [energy, height, balance, velocity, torque] = weight;
   o.Section("reward");
-  o.Add(&energy, "energy_weight", kWeight, "", "weight of the energy term");
-  o.Add(&height, "height_weight", kWeight, "", "weight of the height term");
-  o.Add(&balance, "balance_weight", kWeight, "", "weight of the balance term");
-  o.Add(&velocity, "velocity_weight", kWeight, "", "weight of the velocity penalty");
-  o.Add(&torque, "torque_weight", kWeight, "", "weight of the torque penalty");
+  o.Add(&energy, "energy_weight", kWeight, "", "reward weight of the energy term");
+  o.Add(&height, "height_weight", kWeight, "", "reward weight of the height term");
+  o.Add(&balance, "balance_weight", kWeight, "", "reward weight of the balance term");
+  o.Add(&velocity, "velocity_weight", kWeight, "", "reward weight of the velocity penalty");
+  o.Add(&torque, "torque_weight", kWeight, "", "reward weight of the torque penalty");
 }
 
 CapsuleInertia::CapsuleInertia(double m, double r, double l) {

@@ -174,7 +174,7 @@ void PendulumEnv::RestoreHeld() {
   for (size_t i = 0; i < held_.size(); ++i) {
     if (!held_[i]) continue;
     physics_->SetState(static_cast<int>(i), *held_[i]);
-    if (disturber_) disturber_->TakeBack(static_cast<int>(i), step_counts_[i]);
+    if (disturber_) disturber_->Undo(static_cast<int>(i), step_counts_[i]);
   }
 }
 

@@ -58,7 +58,8 @@ class ClosedFormPhysics : public Physics {
 const Engine kClosedForm{
     "closed-form", [](const PhysicsConfig& config) -> std::unique_ptr<Physics> {
       if (!config.mjcf.empty()) {
-        throw BadInput("physics closed-form: expected the built-in model, got another MJCF model");
+        throw BadInput(
+            "physics = closed-form: expected the built-in model, got another MJCF model");
       }
       return std::make_unique<ClosedFormPhysics>(config);
     }};
@@ -75,7 +76,7 @@ const Engine& FindEngine(Engines engines, std::string_view name, const std::stri
 }
 
 void Physics::Push(int /*env*/, const std::array<double, 2>& /*torque*/) {
-  throw Failure("this engine knows no pushes; mujoco does");
+  throw Failure("physics: expected mujoco, the only engine with pushes, got another");
 }
 
 }  // namespace upswing

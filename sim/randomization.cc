@@ -19,26 +19,27 @@ constexpr Parameter kParameters[] = {
 }  // namespace
 
 void Randomization::Describe(Options& o) {
-  constexpr Range kRelative{0, 0.99};  // what is drawn stays positive
+  constexpr Range kRelative{0, 0.99};  // drawn values stay positive
   o.Section("randomize");
   for (size_t k = 0; k < plant.size(); ++k) {
     const std::string name = kParameters[k].name;
     o.Add(&plant[k], "randomize_" + name, kRelative, "",
-          "each episode's " + name + " is within ± this share of the plant's");
+          "draw " + name + " for each episode within ± this share of its nominal value");
   }
   o.Add(&sensor_noise, "randomize_sensor_noise", {0, 10}, "rad, rad/s",
-        "each episode's sensor noise is up to this much above sensor_noise");
+        "largest random increase of sensor_noise, drawn for each episode");
   o.Add(&delay, "randomize_delay", {0, kLargestDelay}, "s",
-        "each episode's delay is up to this much above delay")
+        "largest random increase of delay, drawn for each episode")
       .step = kControlPeriod;
   o.Add(&sensor_latency, "randomize_sensor_latency", {0, kLongestLatency}, "s",
-        "each episode's sensor latency is up to this much above sensor_latency")
+        "largest random increase of sensor_latency, drawn for each episode")
       .implied = true;
-  o.Alias("randomize",
-          {"randomize_mass1", "randomize_mass2", "randomize_length1", "randomize_length2",
-           "randomize_damping1", "randomize_damping2", "randomize_gravity"},
-          "share: each episode's masses, lengths, dampings and gravity are within ± this of the "
-          "plant's");
+  o.Alias(
+      "randomize",
+      {"randomize_mass1", "randomize_mass2", "randomize_length1", "randomize_length2",
+       "randomize_damping1", "randomize_damping2", "randomize_gravity"},
+      "draw masses, lengths, dampings and gravity for each episode within ± this share of their "
+      "nominal values");
   o.Alias("randomize_mass", {"randomize_mass1", "randomize_mass2"});
   o.Alias("randomize_length", {"randomize_length1", "randomize_length2"});
   o.Alias("randomize_damping", {"randomize_damping1", "randomize_damping2"});

@@ -40,18 +40,18 @@ PendulumState Reading(std::span<const double> past, const SensorModel& model, do
 }  // namespace
 
 void SensorModel::Describe(Options& o) {
-  // Files of version 0.4.0 lack them.
+  // Files of version 0.4.0 lack these settings.
   o.Add(&latency, "sensor_latency", {0, kLongestLatency}, "s",
         "age of the measured angles and velocities")
       .implied = true;
   o.Add(&encoder_counts, "encoder_counts", {0, 1e9}, "1/revolution",
-        "counts of each joint's encoder, to which angles are rounded; 0: exact angles")
+        "encoder counts per revolution, which round the measured angles; 0: exact angles")
       .implied = true;
   o.Add(&velocity_window, "velocity_window", {0, kLongestWindow}, "s",
-        "measure velocities as differences of measured angles over this time; 0: true velocities")
+        "time over which velocities are differences of measured angles; 0: true velocities")
       .implied = true;
   o.Add(&velocity_filter, "velocity_filter", {0, kSlowestFilter}, "s",
-        "time constant of a first-order low-pass on the measured velocities; 0: none")
+        "time constant of a first-order low-pass filter on measured velocities; 0: no filter")
       .implied = true;
 }
 

@@ -37,13 +37,13 @@ std::string LastLine(const fs::path& path) {
 
 // ---- Before anything runs.
 
-/// Throws unless the folder is free or holds what `mark` stands for.
+/// Throws unless the folder is free or has the file `mark`.
 void CheckFolder(const fs::path& folder, const fs::path& mark) {
   if (IsFile(folder / mark)) return;
   CheckFree(folder, Concat("it has no ", mark.string(), " to resume from; choose another --out"));
 }
 
-/// Throws if `what` was made with settings `before` that cannot be resumed with those of `now`.
+/// Throws if `what`, made with the settings `before`, cannot be resumed with `now`.
 void CheckSame(Config before, const Config& now, bool more_steps, const std::string& what) {
   if (!before.mjcf.empty()) before.model = now.model;
   if (more_steps) before.train.steps = std::max(before.train.steps, now.train.steps);
@@ -52,14 +52,14 @@ void CheckSame(Config before, const Config& now, bool more_steps, const std::str
   };
   try {
     ExpectSameSettings(before, now, what, counts);
-    if (before.mjcf != now.mjcf) throw BadInput(Concat(what, ": made with another model"));
+    if (before.mjcf != now.mjcf)
+      throw BadInput(Concat(what, ": expected the same MJCF model as before, got another"));
   } catch (const Error& other) {
     throw BadInput(Concat(other.what(), "; choose another --out"));
   }
 }
 
-/// Throws if what is in a variant's folder was made with other settings: one of its runs, or, where
-/// none has begun, the settings themselves.
+/// Throws if a run in a variant's folder, or the folder's settings file, has other settings.
 void CheckRuns(const fs::path& folder, const Config& config, bool more_steps) {
   std::error_code error;
   const std::string mark = SettingsMark(config);
@@ -77,7 +77,7 @@ void CheckRuns(const fs::path& folder, const Config& config, bool more_steps) {
   CheckSame(ReadSettings(settings), config, more_steps, settings.string());
 }
 
-/// All runs as they stand.
+/// All runs in their current state.
 std::vector<SeedRun> ListRuns(const StudyPlan& plan) {
   std::vector<SeedRun> runs = RunsOf(plan);
   for (SeedRun& run : runs) {
@@ -89,7 +89,7 @@ std::vector<SeedRun> ListRuns(const StudyPlan& plan) {
 
 // ---- While they run.
 
-/// The worker processes of this machine, and what is to be seen of all runs.
+/// The worker processes of this machine, and the progress of all runs.
 class LocalWorkers {
  public:
   LocalWorkers(const ManyRuns& many, std::vector<SeedRun>& runs, ManyRunsObserver& observer)
@@ -190,7 +190,7 @@ class LocalWorkers {
     }
   }
 
-  /// Starts workers while there are runs for them: that wait, or whose worker has died.
+  /// Starts workers while runs wait for one or have lost theirs.
   void StartWorkers(Clock::time_point now) {
     const auto jobs = static_cast<size_t>(many_.jobs);
     if (workers_.size() >= jobs || open_.empty() || now < start_at_) return;
@@ -217,7 +217,7 @@ class LocalWorkers {
   fs::path log_;
   std::list<SeedRun*> open_;  // neither done nor failed
   std::vector<const SeedRun*> running_;
-  size_t waiting_ = 0;  // that nobody has claimed
+  size_t waiting_ = 0;  // unclaimed runs
   std::list<ChildProcess> workers_;
   std::map<const SeedRun*, int> deaths_;  // of workers on a run; under null on none
   Clock::time_point look_at_{}, start_at_{};
@@ -260,8 +260,7 @@ int TrainMany(const ManyRuns& many, ManyRunsObserver& observer) {
   std::erase_if(runs, [](const SeedRun& run) { return run.problem.empty(); });
   if (runs.empty()) return 0;
   throw Failure(Concat(runs.size(), " of ", all, " runs in ", many.plan.folder.string(),
-                       " failed, the first of them ", runs.front().name, ": ",
-                       runs.front().problem));
+                       " failed; first ", runs.front().name, ": ", runs.front().problem));
 }
 
 int DefaultJobs(int64_t threads) {

@@ -56,8 +56,8 @@ constexpr const char* kNumberName = "array";  // in SlurmFolder: what sbatch ans
 
 Error NoSbatch() {
   return Failure(
-      "--slurm: expected Slurm's program sbatch, found none in PATH: is this a machine where jobs "
-      "are submitted?");
+      "--slurm: expected Slurm's program sbatch, found none in PATH; run the command on a login "
+      "node of the cluster");
 }
 
 /// A path for a script: absolute, and free of what would end its line.
@@ -67,7 +67,7 @@ std::string PathForScript(const fs::path& path) {
   // After a backslash Slurm would not replace %A and the like.
   if (Printable(text) != text || text.find('\\') != text.npos) {
     throw BadInput(
-        Concat("--slurm: expected a folder of printable characters without \\, got ", text));
+        Concat("--slurm: expected a folder name of printable characters without \\, got ", text));
   }
   return text;
 }

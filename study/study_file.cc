@@ -23,12 +23,13 @@ std::vector<FlagValue> ReadSettings(const toml::node& node, const std::string& n
   const auto* table = node.as_table();
   const std::string place = PlaceOf(node, where);
   if (table == nullptr) throw BadInput(Concat(place, ": ", name, ": expected a table of settings"));
-  Config scratch;  // takes the values, which shows whether they can be
+  Config scratch;  // takes the values, which checks them
   std::vector<FlagValue> settings = ApplyTable(EverySetting(scratch), *table, where, true);
   for (FlagValue& setting : settings) {
     if (setting.name == "seed") {
-      throw BadInput(Concat(setting.where, ": expected no seed among the settings, but \"seeds = ",
-                            "…\" at the beginning"));
+      throw BadInput(Concat(setting.where,
+                            ": expected no seed in the settings; a line seeds = … at the ",
+                            "beginning of the file sets the seeds"));
     }
     if (setting.name == "model" && !setting.text.empty()) {
       setting.text = (fs::path(where).parent_path() / setting.text).string();
@@ -49,7 +50,7 @@ Config BuildVariant(const std::string& name, const std::vector<FlagValue>& setti
   }
 }
 
-/// The variants in the order in which they stand in the file.
+/// The variants, in the order of the file.
 std::vector<Variant> ReadVariants(const toml::table& study, const std::string& where) {
   std::vector<FlagValue> common;
   if (const toml::node* node = study.get("settings")) {
@@ -72,8 +73,8 @@ std::vector<Variant> ReadVariants(const toml::table& study, const std::string& w
       if (ConfigToml(other.config, true) == ConfigToml(variant.config, true) &&
           other.config.mjcf == variant.config.mjcf) {
         throw BadInput(Concat(PlaceOf(node, where), ": variant \"", name,
-                              "\" has the settings of \"", other.name, "\" in line ", line,
-                              "; expected other ones"));
+                              "\": expected settings of its own, got those of \"", other.name,
+                              "\" in line ", line));
       }
     }
     placed.emplace_back(node.source().begin.line, std::move(variant));
@@ -94,11 +95,12 @@ void CheckKeys(const toml::table& study, const std::string& where) {
     const bool is_setting = std::ranges::any_of(
         EverySetting(scratch).all(), [&](const Option& option) { return option.name == name; });
     if (is_setting && name != "seed") {
-      throw BadInput(Concat(PlaceOf(node, where), ": ", name, ": belongs in [settings] or in a ",
-                            "[variants.NAME]: expected it below such a line"));
+      throw BadInput(Concat(PlaceOf(node, where), ": ", name,
+                            ": expected in [settings] or [variants.NAME], ",
+                            "got at the beginning of the file"));
     }
-    throw BadInput(Concat(PlaceOf(node, where), ": a study has no \"", name, "\"",
-                          DidYouMean(name, known), "; there are ", Join(known, ", ")));
+    throw BadInput(Concat(PlaceOf(node, where), ": expected one of ", Join(known, ", "), ", got \"",
+                          name, "\"", DidYouMean(name, known)));
   }
 }
 

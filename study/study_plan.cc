@@ -49,8 +49,8 @@ bool SeedRun::ReadIfFinished() {
   state.reset();
   const auto result = FinishedRun::Read(done());
   if (result && result->settings != settings) {
-    throw BadInput(Concat(done().string(), ": made with other settings than ",
-                          (path.parent_path() / kSettingsName).string(), " has"));
+    throw BadInput(Concat(done().string(), ": expected the settings of ",
+                          (path.parent_path() / kSettingsName).string(), ", got others"));
   }
   if (result) state = result->state;
   finished = AtEnd();
@@ -120,34 +120,34 @@ StudyPlan ReadPlan(const fs::path& folder) {
   const fs::path path = folder / kPlanName;
   const std::string where = path.string();
   if (!Exists(path)) {
-    throw BadInput(
-        Concat(folder.string(), ": expected the folder of a study, got ",
-               Exists(folder) ? Concat("one without ", kPlanName) : "nothing of that name"));
+    throw BadInput(Concat(folder.string(), ": expected the folder of a study, got ",
+                          Exists(folder) ? Concat("one without ", kPlanName) : "no such folder"));
   }
   StudyPlan plan;
   plan.folder = folder;
   try {
     const json j = ParseJsonObject(ReadOwnFile(path, kMostPlanBytes), 4);
     if (JsonText(j, "version") != UPSWING_VERSION) {
-      throw BadInput(Concat("made by Upswing ", JsonText(j, "version"), ", this is ",
-                            UPSWING_VERSION, ", which may train otherwise"));
+      throw BadInput(Concat("expected a study of Upswing ", UPSWING_VERSION, ", got one of ",
+                            JsonText(j, "version"), ", which may train differently"));
     }
     plan.keep = ParseKeep(JsonText(j, "keep"), "keep");
     plan.seeds = ParseSeeds(JsonText(j, "seeds"), "seeds");
     for (const json& one : JsonList(j, "variants", kMostVariants)) {
-      if (!one.is_object()) throw BadInput("variants: expected objects");
+      if (!one.is_object()) throw BadInput("variants: expected a list of objects");
       Variant variant;
       variant.name = JsonText(one, "name");
       if (!variant.name.empty()) CheckVariantName(variant.name, "variants");
       if (std::ranges::find(plan.variants, variant.name, &Variant::name) != plan.variants.end()) {
-        throw BadInput(Concat("variants: expected each once, but ", variant.name, " is twice"));
+        throw BadInput(Concat("variants: expected each name once, got ", variant.name, " twice"));
       }
       CheckNoLink(folder / variant.name);
       const fs::path settings = folder / variant.name / kSettingsName;
       variant.config = ReadSettings(settings);
       MakeReadyForMany(variant.config);
       if (SettingsMark(variant.config) != JsonText(one, "settings")) {
-        throw BadInput(Concat(settings.string(), " is not that of the plan; `study` makes both"));
+        throw BadInput(Concat(settings.string(), ": expected the settings of ", kPlanName,
+                              ", got others; `upswing study` writes both"));
       }
       plan.variants.push_back(std::move(variant));
     }

@@ -27,11 +27,14 @@ void Reduce(const SeedRun& run, Keep keep) {
   }
 }
 
-/// Writes that a run is done, and removes what is not kept of it. The caller holds its claim.
+/// Writes the result file of a run and removes the files that are not kept. The caller has the
+/// claim.
 void Finish(const SeedRun& run, Keep keep) {
   const Config& config = run.variant->config;
   const auto at_end = ReadTrainState(run.path, config.Spec());
-  if (!at_end) throw Failure(Concat(run.path.string(), ": it was removed while it was trained"));
+  if (!at_end)
+    throw Failure(Concat(run.path.string(),
+                         ": expected the run's folder, which was removed during the training"));
   const FinishedRun result{*at_end,
                            run.settings,
                            config.train.steps,
@@ -98,7 +101,7 @@ class Worker {
       if (!lease) return Turn::kClaimedByOthers;
       if (run.HasFailed() || run.ReadIfFinished()) return Turn::kNothingToDo;  // meanwhile
       Train(run, *lease);
-    } catch (const FolderBusy&) {  // whoever lost the claim is still at work there
+    } catch (const FolderBusy&) {  // the worker that lost the claim is still running there
       return Turn::kClaimedByOthers;
     } catch (const std::exception& error) {
       if (lease && !lease->held()) return Turn::kClaimedByOthers;
@@ -107,8 +110,8 @@ class Worker {
     return Turn::kTried;
   }
 
-  /// Says why a run failed. Throws the error if even that cannot be written, or if nothing works
-  /// here, as on a broken host, which is not to fail all other runs too.
+  /// Writes why a run failed. Throws the error if that fails, or after several failures in a row: a
+  /// broken host must not fail all other runs.
   void CountFailure(const SeedRun& run, const std::exception& error) {
     constexpr int kMostInARow = 3;
     try {
@@ -118,8 +121,8 @@ class Worker {
     }
     ++outcome_.failed;
     if (++failed_in_a_row_ < kMostInARow) return;
-    throw Failure(Concat(kMostInARow, " runs in a row failed here, the last of them ", run.name,
-                         ": ", error.what()));
+    throw Failure(Concat(kMostInARow, " runs in a row failed on this worker; last ", run.name, ": ",
+                         error.what()));
   }
 
   void Train(SeedRun& run, const Lease& lease) {
@@ -129,7 +132,7 @@ class Worker {
       outcome_.stopped = true;
       return;
     }
-    if (!lease.held()) throw Failure("another worker has it");
+    if (!lease.held()) throw Failure("another worker has claimed the run");
     Finish(run, plan_.keep);
     ++outcome_.done;
     failed_in_a_row_ = 0;
@@ -157,8 +160,9 @@ void WriteEvaluations(const StudyPlan& plan) {
       } else if (columns.empty()) {
         columns = Printable(line);
       } else if (columns != Printable(line)) {
-        throw Failure(Concat(run.done().string(),
-                             ": its evaluations have other columns than those ", "of other runs"));
+        throw Failure(
+            Concat(run.done().string(),
+                   ": expected evaluations with the columns of the other runs, got others"));
       }
       is_first = false;
     }

@@ -3,7 +3,7 @@
 
     tools/check_layers.py [ROOT]
 
-Prints one line for each offender, as file:line: what is wrong, and exits with 1 if there is one.
+Prints a line FILE:LINE: PROBLEM for each wrong include. Exit code 1 if there is one.
 """
 
 import re

@@ -11,14 +11,13 @@ demo_usage() {
   cat <<'END_OF_USAGE'
 Usage: ./upswing demo [POLICY|RUN...] [--port N] [--dist FOLDER]
 
-Serves the page in which the pendulum is swung up live, on this machine alone. Installs Node and
-what the page is built with, and builds it, if that has not been done.
+Serves the page in which policies swing up the pendulum live, to this machine only. Installs Node
+and the page's packages and builds the page if they are missing.
 
-  POLICY|RUN     policy.safetensors or run folder, added to the policies that come with the
-                 page; stays there until the page is rebuilt
-  --port N       where to listen [4173, or the next one that is free]
-  --dist FOLDER  put the finished page there instead, to be copied to any web server; FOLDER must
-                 be new or empty
+  POLICY|RUN     policy.safetensors or run folder to add to the page's policies; it stays until the
+                 page is built again
+  --port N       port to listen on (default 4173, or the next free one)
+  --dist FOLDER  new or empty folder to write the page into, for any web server, instead of serving
 
 Examples:
   ./upswing demo
@@ -48,17 +47,17 @@ demo() {
       -*) bad_input "unknown flag $word (see ./upswing demo --help)" ;;
       *)
         [ -e "$word" ] || bad_input "$word: no such file or folder; expected a policy or a run"
-        set -- "$@" "$word" # behind those that are still to be read
+        set -- "$@" "$word" # behind the words that are still to be read
         ;;
     esac
   done
   [ -z "$dist" ] || [ -z "$port" ] || bad_input "expected --port or --dist, got both"
 
   build_demo
-  # The program is needed for policies alone.
+  # Only policies need the program.
   if [ $# -gt 0 ]; then
     set_up release upswing
-    [ -x "$program" ] || fail "the program is not built: run it once without --no-setup"
+    [ -x "$program" ] || fail "the program is not built: run ./upswing demo once without --no-setup"
   fi
   if [ -n "$dist" ]; then
     write_dist "$@"
@@ -83,9 +82,9 @@ set_demo_option() {
       dist=${2%/}
       dist=${dist:-/}
       [ ! -e "$dist" ] || { [ -d "$dist" ] && [ -z "$(ls -A -- "$dist")" ]; } ||
-        bad_input "$dist: there is something already; expected a new or an empty folder"
+        bad_input "$dist: expected a new or empty folder, got one that holds files, or a file"
       [ -d "$(dirname -- "$dist")" ] ||
-        bad_input "$(dirname -- "$dist"): no such folder, in which to make $(basename -- "$dist")"
+        bad_input "--dist: expected the existing folder $(dirname -- "$dist") for $(basename -- "$dist")"
       ;;
   esac
 }
@@ -99,8 +98,8 @@ page_hash() {
 # Sets up Node, and builds the page if it is missing or made from other sources.
 build_demo() {
   if [ "$setup" = no ]; then
-    [ -f "$page/index.html" ] || fail "the page is not built: run it once without --no-setup"
-    find_node || [ -n "$dist" ] || fail "there is no Node: run it once without --no-setup"
+    [ -f "$page/index.html" ] || fail "the page is not built: run ./upswing demo once without --no-setup"
+    find_node || [ -n "$dist" ] || fail "Node is not installed: run ./upswing demo once without --no-setup"
     return
   fi
   set_up_node

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Draws a rollout of `upswing simulate` as SVG: the two links at many moments, early ones faint, and
-the torque and the tip's height over time.
+the torque and the height of the tip over time.
 
   ./upswing simulate runs/d3qn-seed1 --seconds 5 --csv rollout.csv
   tools/draw_rollout.py rollout.csv docs/swing-up.svg

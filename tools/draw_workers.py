@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Watches the folder of a study until all of its runs are done, and draws who worked on which run when.
+"""Watches the folder of a study until all runs are done, then draws which worker trained which run when.
 
     tools/draw_workers.py runs/my workers.svg
 """

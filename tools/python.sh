@@ -9,13 +9,13 @@ python_usage() {
   cat <<'END_OF_USAGE'
 Usage: ./upswing python [ARGUMENTS]
 
-Runs Python with the package upswing (docs/python.md), in a virtual environment in build/python-venv.
-Makes it, and builds the package's module, if that has not been done. ARGUMENTS go to Python.
+Runs Python with the package upswing, in the virtual environment build/python-venv. Creates the
+environment and builds the package if they are missing. ARGUMENTS go to Python.
 
 Examples:
-  ./upswing python                                             a prompt: import upswing
+  ./upswing python                                     start a prompt, then: import upswing
   ./upswing python -c 'import upswing; print(upswing.train(agent="fast", seed=1))'
-  ./upswing python -m pip install stable-baselines3            more packages beside it
+  ./upswing python -m pip install stable-baselines3    add a package to the environment
   ./upswing python examples/python/sb3_sac.py
 END_OF_USAGE
 }

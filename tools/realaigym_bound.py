@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""The best performance score of RealAIGym's boards that direct optimisation finds.
+"""Searches the best performance score of RealAIGym by direct optimisation.
 
-Of a swing-up within --seconds that ends upright at rest: a motion and its torques are the unknowns,
-the score's penalties the cost, the equations of motion in Runge-Kutta steps of 4 ms the constraints.
-From many random torques; what is found is a local optimum each. Needs `pip install casadi`.
+The unknowns are the motion and torques of a swing-up that ends upright at rest within --seconds. The
+cost is the sum of the score's penalties. The constraints are the equations of motion in Runge-Kutta
+steps of 4 ms. Each start from random torques finds a local optimum. Needs `pip install casadi`.
 
     python3 tools/realaigym_bound.py pendubot --starts 40
 """
@@ -116,10 +116,12 @@ class Problem:
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("robot", choices=["pendubot", "acrobot"])
-    parser.add_argument("--starts", type=int, default=40)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--seconds", type=float, default=2.4)
+    parser.add_argument("robot", choices=["pendubot", "acrobot"], help="robot of the benchmark")
+    parser.add_argument("--starts", type=int, default=40,
+                        help="number of random starts (default 40)")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the starts (default 1)")
+    parser.add_argument("--seconds", type=float, default=2.4,
+                        help="time of the swing-up [s] (default 2.4)")
     a = parser.parse_args()
     problem = Problem(1 if a.robot == "pendubot" else 2, a.seconds)
     rng = np.random.default_rng(a.seed)

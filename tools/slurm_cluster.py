@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""A real Slurm with two nodes on this host, in network and host names of its own, for tests.
+"""Runs a real Slurm cluster of two nodes on this host for tests, in its own network namespace.
 
-    tools/slurm_cluster.py [COMMAND...]     run it (default: a shell) where sbatch, squeue, … answer
+    tools/slurm_cluster.py [COMMAND...]     run COMMAND (default: a shell) inside the cluster
 
-Partitions: `low` (the default) and `high`, whose jobs preempt those of `low`, which are requeued. Each
-node has two processors and is a process namespace of its own: Cluster.lose(node) takes its power away.
-Needs root and Debian's slurm-wlm, munge and iproute2 (see `problem`). Everything is in a temporary
-folder, and everything ends with this process, however that ends.
+Partitions: `low` (default) and `high`; jobs in `high` preempt jobs in `low`, which are requeued. Each
+node has two processors and its own process namespace: Cluster.lose(node) simulates a power failure.
+Needs root and Debian's slurm-wlm, munge and iproute2 (see `problem`). All files are in a temporary
+folder. All processes end with this one.
 """
 
 import os

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""How well do policies do on plants that are harder or easier to hold upright?
+"""Shows the success of policies on plants that are easier or harder to hold upright.
 
     tools/upright_modes.py POLICY|RUN|'CONTROLLER FLAGS' ... [--episodes 1000] [--share 0.25] [--seed 1]
         [--physics mujoco] [--figure FILE.svg|FILE.png]
     tools/upright_modes.py runs/d3qn-adaptive-seed1 'mpc --known-plant' --figure delta.svg
 
-Where delta (docs/control.md) is 0, no torque reaches one of the two modes in which the upright pendulum
-falls. Each episode has a plant from a box of ± SHARE, as in `upswing eval --randomize`. Needs
-a built program (./upswing --version).
+With delta = 0, no torque reaches one of the two modes in which the upright pendulum falls. Each episode
+draws its plant from a box of ± SHARE, as `upswing eval --randomize` does. Needs a built program
+(./upswing --version).
 """
 import argparse
 import csv
@@ -68,12 +68,16 @@ def plot(policies, results, file):
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("policies", nargs="+", metavar="policy")
-    parser.add_argument("--episodes", type=int, default=1000)
-    parser.add_argument("--share", type=float, default=0.25)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--physics", default="mujoco")
-    parser.add_argument("--figure", help="success over |delta|, with 95%% intervals, by gnuplot")
+    parser.add_argument("policies", nargs="+", metavar="policy",
+                        help="policy file, run folder or 'CONTROLLER FLAGS'")
+    parser.add_argument("--episodes", type=int, default=1000,
+                        help="number of episodes per policy (default 1000)")
+    parser.add_argument("--share", type=float, default=0.25,
+                        help="half-width of the box of plants (default 0.25)")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the episodes (default 1)")
+    parser.add_argument("--physics", default="mujoco",
+                        help="mujoco or closed-form (default mujoco)")
+    parser.add_argument("--figure", help="figure to draw with gnuplot: success over |delta|, with 95%% intervals")
     a = parser.parse_args()
     results = [episodes(policy, a) for policy in a.policies]
     print("|delta|       plants  success")

@@ -23,23 +23,23 @@ constexpr double kMostLag = 0.1;           // s of real time that are made up fo
 constexpr double kPictureTime = 1.0 / 60;  // s, at least
 constexpr int kChartPoints = 250;
 
-/// What the keys do, as F1 shows it.
+/// The keys, as F1 shows them.
 const Lines& Help() {
-  static const Lines help{{"Space", "pause, go on"},
-                          {"Right, Left arrow", "a step on, a step back"},
-                          {"Backspace", "begin again"},
+  static const Lines help{{"Space", "pause, continue"},
+                          {"Right, Left arrow", "step forward, step back"},
+                          {"Backspace", "start again"},
                           {"- and =", "slower, faster"},
                           {"Enter", "policy off, on"},
-                          {"Tab", "one policy alone, the next, all"},
+                          {"Tab", "show one policy, the next, all"},
                           {"1 to 9", "this policy takes over"},
-                          {"P", "another plant"},
+                          {"P", "next plant"},
                           {"Drag", "turn the camera"},
                           {"Right drag", "move the camera"},
                           {"Scroll", "zoom"},
                           {"Double click", "select a link"},
-                          {"Ctrl + right drag", "pull at it"},
-                          {"Ctrl + drag", "twist it"},
-                          {"Esc", "camera as at the beginning"},
+                          {"Ctrl + right drag", "pull the link"},
+                          {"Ctrl + drag", "twist the link"},
+                          {"Esc", "reset the camera"},
                           {"F1, F2, F3", "help, information, chart"},
                           {"F4", "torque, goal and path"},
                           {"F5", "full screen"},
@@ -153,11 +153,11 @@ class Session {
     Notice(Concat("policy: ", config_.entries[number].title));
   }
 
-  /// The next plant of the list, or one at random, ±25%, behind its end.
+  /// The next plant of the list; after the last one a random plant within ±25%.
   void NextPlant() {
     plant_ = (plant_ + 1) % (config_.plants.size() + 1);
     Plant plant;
-    std::string name = "at random";
+    std::string name = "random";
     if (plant_ < config_.plants.size()) {
       name = config_.plants[plant_].first;
       plant = config_.plants[plant_].second;

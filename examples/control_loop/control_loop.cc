@@ -19,7 +19,7 @@ int main(int argc, char** argv) try {
   const LoadedPolicy loaded = LoadPolicy(argv[1]);
   const Policy& policy = *loaded.policy;
   if (!HasPlant(loaded.task) || loaded.memory() > 0) {
-    throw BadInput("expected a policy of the double pendulum without memory");
+    throw BadInput("expected a policy of the double pendulum without memory, got another");
   }
 
   const std::unique_ptr<Policy::Memory> memory = policy.Start(/*num_envs=*/1);

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""PPO in one file, in the manner of CleanRL, on Upswing's vector environment.
+"""PPO in one file, in the style of CleanRL, on Upswing's vector environment.
 
     ./upswing python examples/python/ppo.py --steps 2000000
 
-Environments reset in the step after an episode's last (Gymnasium's NEXT_STEP, the default): that step
-is no transition, and is left out of the loss.
+An environment resets in the step after the end of an episode (Gymnasium's NEXT_STEP, the default).
+That step is no transition; the loss leaves it out.
 """
 
 import argparse
@@ -81,10 +81,12 @@ def learn(agent, optimizer, batch):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--envs", type=int, default=256)
-    parser.add_argument("--steps", type=int, default=3_000_000)
-    parser.add_argument("--threads", type=int, default=1, help="of PyTorch and the environments")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the training (default 1)")
+    parser.add_argument("--envs", type=int, default=256, help="number of environments (default 256)")
+    parser.add_argument("--steps", type=int, default=3_000_000,
+                        help="steps of the training (default 3,000,000)")
+    parser.add_argument("--threads", type=int, default=1,
+                        help="number of threads of PyTorch and the environments (default 1)")
     a = parser.parse_args()
     torch.manual_seed(a.seed)
     torch.set_num_threads(a.threads)

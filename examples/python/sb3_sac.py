@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""Stable-Baselines3's SAC learns to swing up and balance on Upswing's vector environment.
+"""Trains Stable-Baselines3's SAC to swing up and balance on Upswing's vector environment.
 
     ./upswing python examples/python/sb3_sac.py --threads 1
 
-Its settings are those of our agent sac-fast as far as it has them: one critic, three-step targets,
-layer normalisation, a learning rate that falls.
+The settings are those of Upswing's agent sac-fast where SAC has them: one critic, three-step targets,
+layer normalisation, a decaying learning rate.
 
-Every so many steps our `evaluate` judges its mean action as it judges our own agents: 100 episodes of
-20 s, in the closed form first and in MuJoCo once they all succeed. Two passed evaluations in a row
-solve the task.
+Every --eval-every steps, Upswing's `evaluate` evaluates the mean action as it does for its own agents:
+100 episodes of 20 s, first in closed form, then in MuJoCo if all succeed. Two passed evaluations in a
+row solve the task.
 """
 
 import argparse
@@ -64,13 +64,14 @@ class Judge(BaseCallback):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--threads", type=int, default=1, help="of PyTorch and the environments")
-    parser.add_argument("--envs", type=int, default=32)
-    parser.add_argument("--updates", type=int, default=4, help="gradient steps for each lock-step")
-    parser.add_argument("--steps", type=int, default=250_000, help="at most; the learning rate falls until then")
-    parser.add_argument("--eval-every", type=int, default=10_000, help="steps")
-    parser.add_argument("--save", help="file for Stable-Baselines3's model")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the training (default 1)")
+    parser.add_argument("--threads", type=int, default=1,
+                        help="number of threads of PyTorch and the environments (default 1)")
+    parser.add_argument("--envs", type=int, default=32, help="number of environments (default 32)")
+    parser.add_argument("--updates", type=int, default=4, help="updates per step of all environments (default 4)")
+    parser.add_argument("--steps", type=int, default=250_000, help="training budget; the learning rate decays until its end (default 250,000)")
+    parser.add_argument("--eval-every", type=int, default=10_000, help="interval between evaluations [steps] (default 10,000)")
+    parser.add_argument("--save", help="file to write, the model of Stable-Baselines3")
     a = parser.parse_args()
     torch.set_num_threads(a.threads)
     envs = UpswingVecEnv(a.envs, reward_scale=0.1, agent="sac-fast", threads=a.threads)

@@ -1,12 +1,11 @@
 #!/usr/bin/env python3
-"""Optuna searches settings of an agent, in several processes on one journal file.
+"""Searches settings of an agent with Optuna, in several processes on one journal file.
 
     ./upswing python examples/python/search.py --trials 30 --processes 2
 
-A trial trains three seeds and is worth the mean time to solve, in thousands of steps: what is not
-solved counts as twice its steps. After each evaluation it says how it does, and Optuna stops what
-falls behind. The same command, on this machine or on another one that sees the file, goes on with the
-search; `--show` prints what was found.
+A trial trains three seeds. Its score is the mean time to solve in thousands of steps; a run that is
+not solved counts as twice its steps. Trials report after each evaluation, and Optuna stops bad ones. The
+same command continues the search, on any machine that shares the file. `--show` prints the results.
 """
 
 import argparse
@@ -61,15 +60,16 @@ def search(a):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--journal", default="search.log", help="file of the search")
-    parser.add_argument("--agent", default="fast")
-    parser.add_argument("--steps", type=int, default=200_000, help="of each training, at most")
-    parser.add_argument("--trials", type=int, default=20, help="to make now")
-    parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument("--show", action="store_true", help="print what was found, and end")
+    parser.add_argument("--journal", default="search.log", help="journal file (default search.log)")
+    parser.add_argument("--agent", default="fast", help="named agent (default fast)")
+    parser.add_argument("--steps", type=int, default=200_000, help="budget of each training (default 200,000)")
+    parser.add_argument("--trials", type=int, default=20, help="number of new trials (default 20)")
+    parser.add_argument("--processes", type=int, default=2,
+                        help="number of processes (default 2)")
+    parser.add_argument("--show", action="store_true", help="print the results and exit")
     a = parser.parse_args()
     if not a.show:
-        # Begun anew, not forked: a process that was forked lacks its parent's threads.
+        # Spawned, not forked: a forked process lacks its parent's threads.
         context = multiprocessing.get_context("spawn")
         processes = [context.Process(target=search, args=(a,)) for _ in range(a.processes)]
         for process in processes:

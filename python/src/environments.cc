@@ -35,8 +35,7 @@ using AnyArray = nb::ndarray<nb::ro, nb::device::cpu, nb::c_contig>;
 template <typename T>
 using View = nb::ndarray<nb::numpy, const T>;
 
-/// Which actions there are: 0 for any torque, else how many torques to choose from. The names are
-/// those of PPO's settings.
+/// Number of torque levels; 0 for continuous actions. The names of the settings are PPO's.
 int64_t LevelsOf(const std::string& actions, const std::string& levels) {
   PpoConfig config;
   const Options options = OptionsOf(config);
@@ -45,7 +44,7 @@ int64_t LevelsOf(const std::string& actions, const std::string& levels) {
   return config.discrete() ? config.levels : 0;
 }
 
-/// Settings of `num_envs` environments: those of the named agent (the usual one if none is named)
+/// Settings of `num_envs` environments: the settings of the named agent (or of the default one)
 /// with these changes. Throws BadInput for settings that environments do not have.
 Config ConfigOf(const std::string& num_envs, const SettingTexts& settings) {
   std::vector<FlagValue> flags = FlagsOf(settings);
@@ -55,14 +54,14 @@ Config ConfigOf(const std::string& num_envs, const SettingTexts& settings) {
   for (const FlagValue& flag : flags) {
     for (const Option* option : every.Find(flag.name, flag.where)) {
       if (IsEnvironmentSetting(*option)) continue;
-      throw BadInput(Concat(flag.where, ": expected a setting of an environment, and ", flag.name,
-                            " is one of a training alone"));
+      throw BadInput(Concat(flag.where, ": expected a setting of an environment, got ", flag.name,
+                            ", a setting of a training"));
     }
   }
   Config config = BuildConfig("", flags);
   if (!HasPlant(config.task)) {
-    throw BadInput(Concat("agent: expected one of the task ", kDoublePendulum, ", got ",
-                          config.agent, ", which learns ", config.task));
+    throw BadInput(Concat("agent: expected an agent of the task ", kDoublePendulum, ", got ",
+                          config.agent, " of the task ", config.task));
   }
   return config;
 }
@@ -140,8 +139,8 @@ class Environments {
     });
   }
 
-  /// The picture of an environment as it stands, with the torque that acted last: a new array
-  /// (height × width × 3), red, green, blue, the top row first.
+  /// A picture of an environment's current state and last torque: a new array (height × width × 3),
+  /// red, green, blue, top row first.
   nb::ndarray<nb::numpy, uint8_t> Draw(int env, int width, int height) {
     auto pixels = NewArray<uint8_t>({static_cast<size_t>(height), static_cast<size_t>(width), 3});
     Alone([&] {

@@ -59,11 +59,11 @@ void CheckSignals() {
 }
 
 void BindErrors(nb::module_& m) {
-  error_class = MakeClass(m, "Error", "What Upswing could not do; the base of its exceptions.",
-                          PyExc_Exception);
-  input_error_class =
-      MakeClass(m, "InputError", "Bad input: what was expected, what came, where.",
-                nb::make_tuple(nb::handle(error_class), nb::handle(PyExc_ValueError)).ptr());
+  error_class = MakeClass(m, "Error", "Base class of Upswing's exceptions.", PyExc_Exception);
+  input_error_class = MakeClass(
+      m, "InputError",
+      "Wrong input: the message names the argument, what was expected and what was given.",
+      nb::make_tuple(nb::handle(error_class), nb::handle(PyExc_ValueError)).ptr());
   failure_class =
       MakeClass(m, "Failure", "The work itself failed: a full disk, a number that is not finite.",
                 nb::make_tuple(nb::handle(error_class), nb::handle(PyExc_RuntimeError)).ptr());

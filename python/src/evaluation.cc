@@ -20,7 +20,7 @@ namespace {
 
 namespace nb = nanobind;
 
-/// What a function of the package is told besides settings: name and text of each.
+/// Sets the arguments of a function of the package, given as name and text.
 void SetArguments(const Options& options, const SettingTexts& arguments) {
   for (const auto& [name, text] : arguments) options.Set(name, text, name);
 }
@@ -72,7 +72,7 @@ std::pair<std::string, std::string> EvaluateHandle(const PolicyHandle& policy,
   DescribePhysics(own, &trial.physics);
   SetArguments(own, arguments);
   if (!HasPlant(policy.loaded().task) && !settings.empty()) {
-    throw BadInput(Concat(Printable(settings.front().first), ": expected none, as ",
+    throw BadInput(Concat(Printable(settings.front().first), ": expected none, because the task ",
                           policy.loaded().task, " has no such setting"));
   }
   SetSurroundings(FlagsOf(settings), trial);

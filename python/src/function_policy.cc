@@ -60,7 +60,7 @@ class FunctionPolicy final : public Policy {
   }
 
   Tensors ToTensors() const override {
-    throw BadInput("policy: expected one that is kept in files, got a function in Python");
+    throw BadInput("policy: expected a policy that has a file, got a Python function");
   }
 
  private:

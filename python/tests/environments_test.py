@@ -245,7 +245,7 @@ class BadInput(BadInputTest):
     def test_settings_as_the_program_has_them(self):
         for text, settings in {
                 'mass2: expected a number in [0.01, 100], got "-1"': {"mass2": -1},
-                'gravty: no setting is called "gravty" (did you mean gravity?)': {"gravty": 1},
+                'gravty: expected a setting, got "gravty" (did you mean gravity?)': {"gravty": 1},
                 "gamma: expected a setting of an environment": {"gamma": 0.9},
                 "num_envs: expected": None,
                 'levels: expected an integer in [2, 1001], got "1"':
@@ -257,8 +257,8 @@ class BadInput(BadInputTest):
                 "actions: expected one of continuous, levels": {"actions": "discrete"},
                 "delay: expected a multiple of 0.02": {"delay": 0.03},
                 'mass1: expected a number in [0.01, 100], got "nan"': {"mass1": np.nan},
-                "agent: expected one of the task double-pendulum": {"agent": "acrobot"},
-                'agent: no agent is called "fsat"': {"agent": "fsat"},
+                "agent: expected an agent of the task double-pendulum": {"agent": "acrobot"},
+                'got "fsat"': {"agent": "fsat"},
                 "render_mode: expected": {"render_mode": "human"},
                 "/nothing/here.xml": {"model": "/nothing/here.xml"}}.items():
             if settings is not None:

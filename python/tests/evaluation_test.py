@@ -104,7 +104,7 @@ class Evaluations(BadInputTest):
                 "seed: expected": {"seed": -1},
                 "threads: expected": {"threads": 1000},
                 'physics: expected one of mujoco, closed-form, got "x"': {"physics": "x"},
-                'mas: no setting is called "mas" (did you mean mass?)': {"mas": 1},
+                'mas: expected a setting, got "mas" (did you mean mass?)': {"mas": 1},
                 "mass2: expected a number in [0.01, 100]": {"mass2": "heavy"},
                 "delay: expected a multiple of 0.02": {"delay": 0.01},
                 "/nothing.xml": {"model": "/nothing.xml"}}.items():
@@ -113,7 +113,7 @@ class Evaluations(BadInputTest):
                                "finite torques": lambda obs: [np.nan] * len(obs)}.items():
             self.refuse(what, upswing.evaluate, function, episodes=1)
         self.refuse("got int", upswing.evaluate, 3)
-        self.refuse("memory: expected it beside a function", upswing.evaluate, policy, memory=2)
+        self.refuse("memory: expected none with a policy", upswing.evaluate, policy, memory=2)
         self.refuse("memory: expected an integer", upswing.evaluate, policy, memory="2")
 
 
@@ -151,7 +151,7 @@ class Maps(unittest.TestCase):
     def test_bad_input(self):
         for what, arguments in {
                 'x: expected NAME=FROM:TO': {"x": "mass2"},
-                "y: no setting is called": {"y": "mas=1:2"},
+                "y: expected a setting, got": {"y": "mas=1:2"},
                 "x and --y: expected two different": {"x": "mass=1:2", "y": "mass1=1:2"},
                 "mass2: expected another name": {"mass2": 1},
                 "gravity: expected a number": {"gravity": -1},

@@ -177,7 +177,7 @@ class BadInput(BadInputTest):
         self.refuse("expected shape (N, 8)", lambda: policy.act(0))
 
     def test_settings_of_controllers(self):
-        self.refuse("lqr_torq: no setting", lambda: upswing.load_policy("lqr", lqr_torq=1))
+        self.refuse("lqr_torq: expected a setting", lambda: upswing.load_policy("lqr", lqr_torq=1))
         self.refuse("made_for mass2: expected",
                     lambda: upswing.load_policy("lqr", made_for={"mass2": -1}))
         self.refuse("expected a controller", lambda: upswing.load_policy(
@@ -187,7 +187,7 @@ class BadInput(BadInputTest):
         policy = upswing.load_policy(AGENTS / "d3qn.safetensors")
         with self.assertRaises(upswing.Error):
             policy.save("/nowhere/at/all.safetensors")
-        self.refuse("kept in a file", lambda: upswing.load_policy("lqr").save("/tmp/x.safetensors"))
+        self.refuse("expected a policy that has a file", lambda: upswing.load_policy("lqr").save("/tmp/x.safetensors"))
 
 
 if __name__ == "__main__":

@@ -205,8 +205,8 @@ class BadInput(InFolder, BadInputTest):
 
     def test_settings(self):
         self.refuse_training('gamma: expected a number in [0, 1], got "2"', gamma=2)
-        self.refuse_training('gama: no setting is called "gama" (did you mean gamma?)', gama=1)
-        self.refuse_training('agent: no agent is called "fsat" (did you mean fast?)', "fsat")
+        self.refuse_training('gama: expected a setting, got "gama" (did you mean gamma?)', gama=1)
+        self.refuse_training('got "fsat" (did you mean fast?)', "fsat")
         self.refuse_training('seed: expected an integer in [0, 9000000000000000], got "x"', seed="x")
         self.refuse_training('hidden: expected a list of integers', hidden=[64, "x"])
         self.refuse_training('double: expected', double=3)
@@ -221,7 +221,7 @@ class BadInput(InFolder, BadInputTest):
         self.refuse_training(str(self.path / "full"), out=self.path / "full", **SMALL)
         self.assertEqual(os.listdir(self.path / "full"), ["file"])
         self.refuse_training("resume", resume=self.path / "nothing")
-        self.refuse_training("resume: takes settings and folder", resume="x", out="y")
+        self.refuse_training("resume: expected neither out nor config", resume="x", out="y")
         self.refuse_training("out: expected a path, got an empty text", out="")
 
     def test_what_makes_no_sense_is_warned_of(self):
@@ -233,7 +233,7 @@ class BadInput(InFolder, BadInputTest):
                 upswing.train("fast", out=self.path / "run", **SMALL | {"learning_starts": 5000})
         self.assertFalse((self.path / "run").exists())
         self.assertEqual(len(caught), 1)
-        self.assertIn("nothing will be learned", str(caught[0].message))
+        self.assertIn("the agent learns nothing", str(caught[0].message))
         self.assertEqual(caught[0].filename, __file__)
 
 

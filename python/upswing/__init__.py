@@ -1,6 +1,6 @@
 """Upswing: controllers that swing up and balance a double pendulum with one motor.
 
-The C++ program's environments, agents, evaluations and maps, from the same code:
+The package runs the environments, trainings, evaluations and maps of the C++ program:
 
 >>> import gymnasium as gym, upswing
 >>> envs = gym.make_vec("upswing/DoublePendulum-v0", num_envs=1024, physics="closed-form")
@@ -8,15 +8,14 @@ The C++ program's environments, agents, evaluations and maps, from the same code
 >>> upswing.evaluate(training.best)["success_rate"]
 1.0
 
-Settings are keyword arguments with the names, units, ranges and defaults of the program's flags
-(`upswing.settings()` lists them). What is wrong with an argument is said by an `InputError`, which
-is a `ValueError`; what fails by itself, such as writing to a full disk, by a `Failure`, which is a
-`RuntimeError`.
+Settings are keyword arguments with the names, units, ranges and defaults of the program's flags;
+`upswing.settings()` lists them. A wrong argument raises `InputError`, a `ValueError`. A failure of
+the work itself, such as writing to a full disk, raises `Failure`, a `RuntimeError`.
 """
 
 from gymnasium.envs.registration import register as _register
 
-from . import _mujoco as _mujoco  # loads MuJoCo's library, before the module that needs it
+from . import _mujoco as _mujoco  # loads MuJoCo's library for the next module
 from ._upswing import Error, Failure, InputError
 from ._upswing import version as __version__
 from .envs import DoublePendulumEnv, DoublePendulumVectorEnv

@@ -1,4 +1,4 @@
-"""What one environment and many have in common: settings, spaces, seeds, starts."""
+"""Common part of the single and the vector environment: settings, spaces, seeds, starts."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from ._settings import text_of, texts_of, whole_number
 
 
 class Core:
-    """What one and many environments have in common."""
+    """Settings, spaces and episodes of one or more environments."""
 
     def __init__(self, num_envs: int, settings: dict[str, Any], actions: str,
                  levels: int | None, same_step: bool) -> None:
         if "envs" in settings:
-            raise _upswing.InputError("envs: expected num_envs instead")
+            raise _upswing.InputError("envs: expected none; num_envs is the number of environments")
         if levels is not None and actions == "continuous":
-            raise _upswing.InputError("levels: expected actions=\"levels\" beside it")
+            raise _upswing.InputError("levels: expected actions=\"levels\" with it")
         self.env = _upswing.Environments(text_of(num_envs), texts_of(settings), text_of(actions),
                                          text_of(9 if levels is None else levels), same_step)
         spec = self.env.spec()
@@ -34,7 +34,7 @@ class Core:
         self.settings: str = spec["settings"]
         self.threads: int = spec["threads"]
         self.is_reset = False
-        # cos, sin, w, cos, sin, w, energy, height; what a memory adds has no bounds either.
+        # cos, sin, w, cos, sin, w, energy, height; then the memory, without bounds.
         high = np.full(spec["obs_size"], np.inf, np.float32)
         high[[0, 1, 3, 4, 7]] = 1
         self.observation_space = spaces.Box(-high, high, dtype=np.float32)
@@ -44,7 +44,7 @@ class Core:
             else spaces.Box(-limit, limit, dtype=np.float32))
 
     def actions_of(self, actions: Any) -> npt.NDArray[Any]:
-        """An array as the C++ code takes it: float32 or float64 torques, int32 or int64 levels."""
+        """Actions as an array for the C++ code: float32 or float64 torques, int32 or int64 levels."""
         array = np.asarray(actions)
         kind = array.dtype.kind
         if len(self.levels) > 0:
@@ -57,20 +57,20 @@ class Core:
         elif array.dtype not in (np.float32, np.float64):
             if kind != "f":
                 raise _upswing.InputError(
-                    f"action: expected torques in N·m as floating-point numbers, got {array.dtype} "
-                    "(or actions=\"levels\")")
+                    f"action: expected torques [N·m] as floating-point numbers, got {array.dtype}; "
+                    "torque levels need actions=\"levels\"")
             array = array.astype(np.float32)
         return np.ascontiguousarray(array) if array.ndim > 0 else array
 
     def check(self, closed: bool) -> None:
-        """Raises unless a step can be made."""
+        """Raises an error unless a step is possible."""
         if closed:
             raise gym.error.ClosedEnvironmentError("step: the environment is closed")
         if not self.is_reset:
-            raise gym.error.ResetNeeded("step: expected a call of reset before it")
+            raise gym.error.ResetNeeded("step: expected a call of reset first")
 
     def seeds_of(self, seed: Any, generator: np.random.Generator) -> list[int | None]:
-        """A seed for each environment: None goes on with its random stream."""
+        """A seed for each environment; None continues its random stream."""
         n = self.num_envs
         if seed is None:
             if self.is_reset:
@@ -85,7 +85,7 @@ class Core:
         return [(first + i) % 2**64 for i in range(n)]
 
     def begin(self, seeds: list[int | None], options: dict[str, Any] | None) -> None:
-        """Begins episodes."""
+        """Starts episodes."""
         options = dict(options or {})
         mask = options.pop("reset_mask", None)
         states = options.pop("state", None)
@@ -99,10 +99,10 @@ class Core:
             mask = np.asarray(mask)
             if mask.shape != (n,) or mask.dtype != np.bool_ or not mask.any():
                 raise _upswing.InputError(
-                    f"reset_mask: expected {n} bools, one of them true at least, got {mask.dtype} "
+                    f"reset_mask: expected {n} bools with at least one True, got {mask.dtype} "
                     f"of shape {mask.shape}")
             if not self.is_reset and not mask.all():
-                raise gym.error.ResetNeeded("reset_mask: expected a reset of all before it")
+                raise gym.error.ResetNeeded("reset_mask: expected a reset of all environments first")
         if states is not None:
             size = len(self.state_names)
             try:
@@ -115,7 +115,7 @@ class Core:
                     f"state: expected {', '.join(self.state_names)} (rad, rad/s) of shape "
                     f"({size},) or ({n}, {size}), got shape {np.shape(states)}") from None
             if not np.isfinite(states[mask]).all():
-                raise _upswing.InputError("state: expected finite numbers")
+                raise _upswing.InputError("state: expected finite numbers, got others")
         self.env.reset(seeds, mask.astype(np.uint8).tolist())
         if states is not None:
             for i in np.flatnonzero(mask):
@@ -135,14 +135,14 @@ def seed_of(seed: Any) -> int:
 
 
 def picture_size(width: int, height: int) -> tuple[int, int]:
-    """Width and height of pictures, pixels. Raises InputError."""
+    """Width and height of pictures [pixels]. Raises InputError."""
     size = whole_number("width", width), whole_number("height", height)
     _upswing.check_picture_size(*size)
     return size
 
 
 def check_render_mode(mode: str | None, metadata: dict[str, Any]) -> None:
-    """Raises InputError unless there is such a mode."""
+    """Raises InputError unless the render mode exists."""
     if mode is not None and mode not in metadata["render_modes"]:
         raise _upswing.InputError(
             f"render_mode: expected None or one of {metadata['render_modes']}, got {mode!r}")

@@ -1,4 +1,4 @@
-"""Loads MuJoCo's library from the package mujoco-core, wherever that is installed."""
+"""Loads MuJoCo's library from the package mujoco-core."""
 
 import ctypes
 import importlib.util
@@ -8,8 +8,8 @@ LIBRARY = "libmujoco.so.4.0.0"
 
 
 def load() -> None:
-    """Loads it, if the package has it; else the extension module looks for it where it was built."""
-    # Found, not imported: the package's own Python is not needed.
+    """Loads the library of the package; without it, the extension module uses its build's library."""
+    # Finds the package without importing it.
     spec = importlib.util.find_spec("mujoco")
     for folder in (spec and spec.submodule_search_locations) or ():
         if (Path(folder) / LIBRARY).exists():

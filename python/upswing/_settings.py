@@ -1,4 +1,4 @@
-"""Settings: what there is to set, and Python values as the texts that the C++ code checks."""
+"""The list of settings, and Python values as texts that the C++ code checks."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ class Setting:
     """One setting.
 
     Attributes:
-        name: the keyword argument; the program's flag is the same with - for _
-        section: of the configuration file, such as "plant"
+        name: keyword argument; the program's flag has - for _
+        section: section of the configuration file, such as "plant"
         type: "bool", "int", "float", "str" or "list[int]"
-        default: its value unless it is given
-        low, high: the ends of the numbers that are allowed; None: there is no end
-        step: numbers must be a multiple of it; None: any number
-        choices: the texts that are allowed; empty: any
-        unit: such as "s"; may be empty
-        help: what it is
-        environment: whether environments have it, not trainings alone
-        members: the settings that this name stands for, such as mass1 and mass2; empty: itself
+        default: default value
+        low, high: smallest and largest allowed number; None: no limit
+        step: allowed numbers are multiples of it; None: any number
+        choices: allowed texts; empty: any text
+        unit: unit, such as "s"; may be empty
+        help: description, a noun phrase or an imperative
+        environment: whether environments have the setting too, not only trainings
+        members: names of the settings that an alias sets, such as mass1 and mass2; empty for others
     """
 
     name: str
@@ -45,9 +45,9 @@ class Setting:
 
 
 def settings(agent: str = "d3qn") -> dict[str, Setting]:
-    """The settings of a training by a named agent, with its defaults, by their names.
+    """The settings of a named agent's training by name, with the agent's defaults.
 
-    Those with `environment` are keyword arguments of the environments too.
+    Settings with `environment` are keyword arguments of the environments too.
 
     >>> upswing.settings("fast")["learning_rate"].default
     0.002
@@ -56,12 +56,12 @@ def settings(agent: str = "d3qn") -> dict[str, Setting]:
 
 
 def trial_settings() -> dict[str, Setting]:
-    """The settings that `evaluate` takes: plant, sensors, motor, and what is random."""
+    """The settings of `evaluate` by name: plant, sensors, motor and random plants."""
     return _by_name(*_upswing.trial_settings())
 
 
 def agents() -> dict[str, str]:
-    """The named agents, and what each is."""
+    """The named agents with a description each."""
     return dict(_upswing.agents())
 
 
@@ -76,7 +76,7 @@ def _by_name(options: list[dict[str, Any]], aliases: list[dict[str, Any]]) -> di
 
 
 def whole_number(name: str, value: Any) -> int:
-    """The value of an argument that is to be an integer."""
+    """The value of an integer argument. Raises InputError."""
     try:
         return operator.index(value)
     except TypeError:

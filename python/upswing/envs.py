@@ -1,4 +1,4 @@
-"""The double pendulum as environments of Gymnasium, computed by the C++ code."""
+"""Gymnasium environments of the double pendulum, computed by the C++ code."""
 
 from __future__ import annotations
 
@@ -19,36 +19,35 @@ from ._types import EnvironmentSettings
 
 
 class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
-    """A double pendulum with a motor at one of its joints, to be swung up and balanced.
+    """A double pendulum with one motor, to swing up and balance.
 
-    `gym.make("upswing/DoublePendulum-v0")` makes it. docs/task.md has it as formulas.
+    Create it by `gym.make("upswing/DoublePendulum-v0")`. docs/reference/task.md has the formulas.
 
     Observation (8,), float32: cos q1, sin q1, w1/10, cos q2, sin q2, w2/20, energy (0 hanging at
-    rest, 1 upright at rest), height of the tip (-1 to 1); angles in rad, 0 hanging, q2 relative to
-    the first link, velocities in rad/s. With `memory`, 3 more for each past step: changes of w1 and
-    w2 (rad/s), torque over 5 N·m.
+    rest, 1 upright at rest), height of the tip (-1 to 1). Angles are in rad, 0 hanging, q2 relative
+    to link 1; velocities are in rad/s. `memory` adds 3 numbers per past step: changes of w1 and w2
+    [rad/s] and the torque over 5 N·m.
 
-    Action: the torque (1,), N·m, held for 0.02 s, limited to `torque_limit`; with
-    actions="levels" the number of one of `levels` torques, evenly spaced, the largest negative
-    first.
+    Action: torque (1,) [N·m], held for 0.02 s and limited to `torque_limit`. With actions="levels":
+    index of one of `levels` evenly spaced torques, from the largest negative one upwards.
 
-    Reward: docs/task.md; from 0 a step hanging still to 7 upright at rest. An episode is
-    truncated after `episode_seconds`; it terminates only if its numbers blow up.
+    Reward: per step 0 hanging at rest to 7 upright at rest. An episode is truncated after
+    `episode_seconds`; it terminates only if the simulation diverges.
 
-    Info: "torque" that acted, N·m; "at_goal", whether both links are within 30° of upright;
-    "reward_terms", whose sum is the reward.
+    Info: "torque", the applied torque [N·m]; "at_goal", whether both links are within 30° of
+    upright; "reward_terms", whose sum is the reward.
 
     Args:
         actions: "continuous" or "levels"
-        levels: how many torques there are with actions="levels", 9 by default
+        levels: number of torques with actions="levels" (default 9)
         render_mode: "rgb_array" or None
-        width, height: of pictures, pixels
-        **settings: as those of trainings, with the same defaults (`upswing.settings()`, those with
-            `environment`): agent, whose environment it is; physics ("mujoco" or "closed-form"),
-            episode_seconds, random_start_share, start_noise, memory; the plant (mass1, …,
-            torque_limit, actuated_joint, rotor_inertia, gear_ratio, coulomb1, coulomb2, model);
-            sensor_noise, delay, encoder_counts, velocity_window, velocity_filter, sensor_latency;
-            randomize, …; the reward's weights
+        width, height: size of pictures [pixels]
+        **settings: settings of the environment with the defaults of a training, the ones with
+            `environment` in `upswing.settings()`: agent, which sets the defaults; physics ("mujoco"
+            or "closed-form"), episode_seconds, random_start_share, start_noise, memory; the plant
+            (mass1, …, torque_limit, actuated_joint, rotor_inertia, gear_ratio, coulomb1, coulomb2,
+            model); sensor_noise, delay, encoder_counts, velocity_window, velocity_filter,
+            sensor_latency; randomize, …; the reward weights
 
     >>> env = gym.make("upswing/DoublePendulum-v0", physics="closed-form", mass2=1.2, delay=0.02)
     >>> obs, info = env.reset(seed=1, options={"state": [3.14, 0, 0, 0]})
@@ -82,11 +81,11 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
-        """Begins an episode.
+        """Starts an episode.
 
         Args:
-            seed: of this and the episodes that follow; None: they go on as they would
-            options: {"state": [q1, q2, w1, w2]} (rad, rad/s) is where it begins
+            seed: seed of this and the following episodes; None continues the random stream
+            options: {"state": [q1, q2, w1, w2]} [rad, rad/s] sets the start state
 
         Returns:
             Observation (D,), float32, and info
@@ -106,7 +105,7 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
         """Holds a torque for 0.02 s.
 
         Args:
-            action: torque (1,), N·m, or the number of a torque level
+            action: torque (1,) [N·m] or index of a torque level
 
         Returns:
             Observation (D,), float32; reward; terminated; truncated; info
@@ -114,7 +113,7 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
         core = self._core
         core.check(self._closed)
         if self._ended:
-            raise gym.error.ResetNeeded("step: the episode has ended; expected a call of reset")
+            raise gym.error.ResetNeeded("step: expected a call of reset, because the episode has ended")
         array = core.actions_of(action)
         wanted = () if len(core.levels) > 0 else (1,)
         if array.shape != wanted:
@@ -133,60 +132,60 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
 
     @property
     def state(self) -> npt.NDArray[np.float64]:
-        """q1, q2 (rad), w1, w2 (rad/s), whatever the sensors say; (4,)."""
+        """True state q1, q2 [rad], w1, w2 [rad/s], without sensor errors; (4,)."""
         return self._core.states()[0]
 
     @property
     def plant(self) -> dict[str, float]:
-        """The plant of the running episode, by the settings' names."""
+        """Plant of the current episode: value by setting."""
         return self._core.env.plant(0)
 
     @property
     def torques(self) -> npt.NDArray[np.float64]:
-        """The torques that there are to choose from, N·m, (L,); empty with continuous actions."""
+        """Torque levels [N·m], (L,); empty with continuous actions."""
         return self._core.levels
 
     def render(self) -> npt.NDArray[np.uint8] | None:
-        """A picture of it as it stands, with the torque that acted last, by MuJoCo's renderer.
+        """Draws the current state and the last torque with MuJoCo's renderer.
 
         Returns:
-            Pixels (height, width, 3), red, green, blue; None without a `render_mode`
+            Pixels (height, width, 3) in red, green, blue; None without a `render_mode`
 
         Raises:
-            Failure: there is no EGL, which draws without a display (Debian's libegl1 and
+            Failure: EGL is missing, which draws without a display (Debian's libegl1 and
                 libgl1-mesa-dri)
         """
         if self._closed:
             raise gym.error.ClosedEnvironmentError("render: the environment is closed")
         if self.render_mode is None:
-            gym.logger.warn('render: expected render_mode="rgb_array", given to gym.make')
+            gym.logger.warn('render: expected render_mode="rgb_array" in gym.make, got None')
             return None
         return self._core.env.draw(0, *self._size)
 
     def close(self) -> None:
-        """Ends it; closing it once more does nothing."""
+        """Closes the environment; a second call does nothing."""
         self._closed = True
 
 
 class DoublePendulumVectorEnv(VectorEnv[npt.NDArray[np.float32], Any, npt.NDArray[Any]], EzPickle):
-    """Many double pendulums (see `DoublePendulumEnv`), stepped together by the C++ code's threads.
+    """Many double pendulums (see `DoublePendulumEnv`), stepped together by threads in C++.
 
-    `gym.make_vec("upswing/DoublePendulum-v0", num_envs=1024)` makes it. Letters: N environments, D
-    numbers in an observation. While it steps, the interpreter's lock is released.
+    Create it by `gym.make_vec("upswing/DoublePendulum-v0", num_envs=1024)`. N is the number of
+    environments, D the size of an observation. A step releases the interpreter's lock.
 
-    Environment i of `reset(seed=s)` has the episodes of a single one with seed s + i.
+    After `reset(seed=s)`, environment i has the episodes of a single environment with seed s + i.
 
     Args:
-        num_envs: N, 1 to 4096
-        actions, levels, settings: as of `DoublePendulumEnv`; and threads, 0: one for each
-            processor, at most 8
-        autoreset_mode: AutoresetMode.NEXT_STEP: of an episode that has ended, the next step begins
-            another one and ignores the action. AutoresetMode.SAME_STEP: it begins at once; the last
-            observation is in infos["final_obs"]. Their values, "NextStep" and "SameStep", will do
-        copy: whether what `reset` and `step` return are copies; else they are views, without a copy
-            of anything, of memory that the next step overwrites
+        num_envs: number N of environments (1 to 4096)
+        actions, levels, **settings: as in `DoublePendulumEnv`; also threads, the number of threads
+            (0: one per processor, at most 8)
+        autoreset_mode: AutoresetMode.NEXT_STEP ("NextStep"): the step after the end of an episode
+            starts the next one and ignores the action. AutoresetMode.SAME_STEP ("SameStep"): the
+            next episode starts at once, and infos["final_obs"] has the last observation
+        copy: return copies from `reset` and `step`; False returns views of memory that the next
+            step overwrites
         render_mode: "rgb_array" or None
-        width, height: of pictures, pixels
+        width, height: size of pictures [pixels]
     """
 
     metadata: dict[str, Any] = {
@@ -236,13 +235,13 @@ class DoublePendulumVectorEnv(VectorEnv[npt.NDArray[np.float32], Any, npt.NDArra
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
-        """Begins an episode of every environment.
+        """Starts an episode in every environment.
 
         Args:
-            seed: s, for s, s + 1, … in turn; or one for each environment; None: they go on as they
-                would
-            options: {"state": q1, q2, w1, w2 (rad, rad/s)}, (4,) or (N, 4), where they begin;
-                {"reset_mask": bools (N,)}, which of them to begin
+            seed: seed s for the seeds s, s + 1, …, or one seed per environment; None continues the
+                random streams
+            options: {"state": q1, q2, w1, w2 [rad, rad/s]}, (4,) or (N, 4), sets the start states;
+                {"reset_mask": bools (N,)} selects the environments to reset
 
         Returns:
             Observations (N, D), float32, and an empty dictionary
@@ -260,13 +259,13 @@ class DoublePendulumVectorEnv(VectorEnv[npt.NDArray[np.float32], Any, npt.NDArra
         """Holds a torque in every environment for 0.02 s.
 
         Args:
-            actions: torques (N, 1), N·m, float32 or float64; or torque levels (N,), integers
+            actions: torques (N, 1) [N·m], float32 or float64, or indices of torque levels (N,)
 
         Returns:
             Observations (N, D), float32; rewards (N,), float64; terminated and truncated (N,),
-            bool; infos: with SAME_STEP, where episodes have ended, "final_obs" (N,), an array (D,)
-            or None for each environment, "final_info", and which they are, "_final_obs",
-            "_final_info"
+            bool; infos. With SAME_STEP, infos has "final_obs" (N,), an array (D,) for each ended
+            episode and None for the others, "final_info", and the masks "_final_obs" and
+            "_final_info" of ended episodes
         """
         core = self._core
         core.check(self.closed)
@@ -282,11 +281,11 @@ class DoublePendulumVectorEnv(VectorEnv[npt.NDArray[np.float32], Any, npt.NDArra
                 self._truncated.copy(), infos)
 
     def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:
-        """A picture of each, as of `DoublePendulumEnv.render`: a tuple of N."""
+        """Pictures of all N environments, as from `DoublePendulumEnv.render`."""
         if self.closed:
             raise gym.error.ClosedEnvironmentError("render: the environments are closed")
         if self.render_mode is None:
-            gym.logger.warn('render: expected render_mode="rgb_array", given to gym.make_vec')
+            gym.logger.warn('render: expected render_mode="rgb_array" in gym.make_vec, got None')
             return None
         return tuple(self._core.env.draw(i, *self._size) for i in range(self.num_envs))
 
@@ -304,7 +303,7 @@ class DoublePendulumVectorEnv(VectorEnv[npt.NDArray[np.float32], Any, npt.NDArra
 
     @property
     def torque(self) -> npt.NDArray[np.float64]:
-        """Torques of the last step as they acted, N·m, (N, 1); a view."""
+        """Applied torques of the last step [N·m], (N, 1); a view."""
         return self._core.env.torque
 
     @property
@@ -314,23 +313,23 @@ class DoublePendulumVectorEnv(VectorEnv[npt.NDArray[np.float32], Any, npt.NDArra
 
     @property
     def reward_terms(self) -> dict[str, npt.NDArray[np.float64]]:
-        """The terms of the last step's rewards, (N,) each, which add up to them; views."""
+        """Terms of the last step's rewards, (N,) each; their sum is the reward; views."""
         terms = self._core.env.reward_terms
         return {name: terms[:, k] for k, name in enumerate(self._core.reward_terms)}
 
     @property
     def states(self) -> npt.NDArray[np.float64]:
-        """q1, q2 (rad), w1, w2 (rad/s) of each, whatever the sensors say; (N, 4)."""
+        """True states q1, q2 [rad], w1, w2 [rad/s], without sensor errors; (N, 4)."""
         return self._core.states()
 
     @property
     def plants(self) -> list[dict[str, float]]:
-        """The plants of the running episodes, by the settings' names."""
+        """Plants of the current episodes: values by setting."""
         return [self._core.env.plant(i) for i in range(self.num_envs)]
 
     @property
     def torques(self) -> npt.NDArray[np.float64]:
-        """The torques that there are to choose from, N·m, (L,); empty with continuous actions."""
+        """Torque levels [N·m], (L,); empty with continuous actions."""
         return self._core.levels
 
 

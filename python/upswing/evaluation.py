@@ -20,14 +20,14 @@ from ._types import MapSettings, TrialSettings
 
 
 class Evaluation(dict[str, Any]):
-    """How a policy did over many episodes: the figures of `upswing eval --json`, by their names.
+    """Results of a policy over many episodes: the figures of `upswing eval --json` by name.
 
-    Such as "success_rate", "success_interval_95", "swing_up_seconds" (median and quartiles, s),
-    "return", "peak_torque" (N·m), "energy_used" (J).
+    Examples: "success_rate", "success_interval_95", "swing_up_seconds" (median and quartiles [s]),
+    "return", "peak_torque" [N·m], "energy_used" [J].
 
     Attributes:
-        per_episode: what each episode was and how it went: the columns of `--episodes-csv`, each
-            an array (episodes,); NaN where an episode has no such figure
+        per_episode: columns of `--episodes-csv`, conditions and results of each episode, as arrays
+            (episodes,); NaN where an episode lacks a figure
     """
 
     def __init__(self, figures: dict[str, Any], per_episode: dict[str, npt.NDArray[np.float64]]):
@@ -55,25 +55,26 @@ def evaluate(
 ) -> Evaluation:
     """Evaluates a policy over many episodes, as `upswing eval` does.
 
-    An episode of the double pendulum lasts 20 s from hanging with normal noise of 0.1 (rad, rad/s).
-    It succeeds if both links are within 30° of upright for the whole of the last 10 s. The return is
-    the undiscounted sum of the reward over the first 10 s.
+    An episode of the double pendulum lasts 20 s and starts hanging, with normal noise of 0.1 (rad,
+    rad/s).
+    It succeeds if both links are within 30° of upright throughout the last 10 s. The return is the
+    undiscounted sum of the reward over the first 10 s.
 
     Args:
-        policy: a `Policy`, the path of a file or a run folder, a controller's name, or a function:
-            observations (N, D), float32 → torques (N,) or (N, 1), N·m, such as that of another
-            library's agent; it may be called in any thread, one call at a time
-        episodes: how many
-        seed: of start states, noise and random plants
+        policy: a `Policy`, the path of a policy file or run folder, the name of a controller, or a
+            function from observations (N, D), float32, to torques (N,) or (N, 1) [N·m], such as an
+            agent of another library; calls may come from any thread, one at a time
+        episodes: number of episodes
+        seed: seed of start states, noise and random plants
         physics: "mujoco" or "closed-form"
-        model: MJCF file to use instead of the policy's model
-        unknown_plant: scale the observed energy and height by the training's plant
-        threads: to use; 0: one for each processor, at most 8
-        memory: of a function: past control steps that its observations remember
-        progress: called now and then with the share that is done, 0 to 1
-        **settings: plant, sensors, motor and what is random, such as mass2=1.2, sensor_noise=0.02,
-            encoder_counts=4096, delay=0.02, randomize=0.25; by default the policy's own plant,
-            nothing else
+        model: MJCF file that replaces the policy's model
+        unknown_plant: scale observed energy and height by the training's plant, not the episode's
+        threads: number of threads (0: one per processor, at most 8)
+        memory: for a function, the number of past control steps in its observations
+        progress: function that gets the finished share (0 to 1) from time to time
+        **settings: plant, sensors, motor and random plants, such as mass2=1.2, sensor_noise=0.02,
+            encoder_counts=4096, delay=0.02, randomize=0.25; by default the policy's own plant
+            without disturbances
 
     >>> upswing.evaluate("runs/d3qn-seed1", episodes=1000, randomize=0.1)["success_rate"]
     """
@@ -85,21 +86,21 @@ def evaluate(
 
 
 def _columns(table: str) -> dict[str, npt.NDArray[np.float64]]:
-    """The columns of a table; NaN for empty cells."""
+    """Columns of a CSV table; NaN for empty cells."""
     rows = list(csv.reader(io.StringIO(table)))
     numbers = np.array([[float(cell) if cell else np.nan for cell in row] for row in rows[1:]])
     return {name: numbers[:, k].copy() for k, name in enumerate(rows[0])}
 
 
 class Map(dict[str, Any]):
-    """A map of a policy: what `upswing map --json` says, by its names, and its cells.
+    """A map of a policy: the figures of `upswing map --json` by name, and the cells.
 
     Attributes:
-        x, y: the axes' values, (nx,) and (ny,)
-        x_label, y_label: such as "mass2 (kg)"
-        successes: successful episodes in each cell, (ny, nx)
-        success_rate: the same as a share, (ny, nx)
-        swing_up_seconds: their median swing-up time, s, (ny, nx); NaN where none succeeds
+        x, y: values of the axes, (nx,) and (ny,)
+        x_label, y_label: labels of the axes, such as "mass2 (kg)"
+        successes: successful episodes per cell, (ny, nx)
+        success_rate: share of successful episodes per cell, (ny, nx)
+        swing_up_seconds: median swing-up time of successful episodes [s], (ny, nx); NaN without any
     """
 
     def __init__(self, figures: dict[str, Any], successes: npt.NDArray[np.int64],
@@ -134,25 +135,24 @@ def map(  # pylint: disable=redefined-builtin
     progress: Callable[[float], Any] | None = None,
     **settings: Unpack[MapSettings],
 ) -> Map:
-    """Maps how a policy does on other plants or from other starts, as `upswing map` does.
+    """Maps the success of a policy over two quantities, as `upswing map` does.
 
     Args:
-        policy: as `evaluate` takes it, of the double pendulum
-        x, y: axes, "NAME=FROM:TO[:CELLS]", where both ends may be percentages on top of the
-            training's value; names are those of the plant, sensor_noise (rad, rad/s), delay (s),
-            sensor_latency (s), encoder_counts, velocity_window (s), velocity_filter (s),
-            and the start: q1, q2 (degrees), w1, w2 (rad/s); by default the mass and the length
-            of the second link, within 50%
-        episodes: in a cell; by default 10, or 1 where the start is given
-        seed: of starts and noise
+        policy: policy of the double pendulum, as for `evaluate`
+        x, y: axes "NAME=FROM:TO[:CELLS]"; FROM and TO may be percentages relative to the training's
+            value. NAME is a parameter of the plant, sensor_noise [rad, rad/s], delay [s],
+            sensor_latency [s], encoder_counts, velocity_window [s], velocity_filter [s], or a
+            start: q1, q2 [°], w1, w2 [rad/s]. Defaults: mass2 and length2 within ±50%
+        episodes: number of episodes per cell (default 10; 1 if the start is given)
+        seed: seed of starts and noise
         physics: "closed-form" or "mujoco"
-        check: share of the cells to repeat in MuJoCo
-        unknown_plant: scale the observed energy and height by the training's plant
-        threads: to use; 0: one for each processor, at most 8
-        memory: of a function: past control steps that its observations remember
-        out: new folder for map.csv, map.svg and map.png; by default nothing is written
-        progress: called now and then with the share that is done, 0 to 1
-        **settings: what is on neither axis, such as gravity=9.7
+        check: share of cells to repeat in MuJoCo
+        unknown_plant: scale observed energy and height by the training's plant, not the cell's
+        threads: number of threads (0: one per processor, at most 8)
+        memory: for a function, the number of past control steps in its observations
+        out: new folder for map.csv, map.svg and map.png; by default no files are written
+        progress: function that gets the finished share (0 to 1) from time to time
+        **settings: values of quantities on neither axis, such as gravity=9.7
 
     >>> result = upswing.map("runs/d3qn-seed1", x="q1=-180:180:73", y="q2=-180:180:73")
     """

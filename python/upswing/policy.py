@@ -1,4 +1,4 @@
-"""Policies: what `train` made, what its files hold, and controllers."""
+"""Policies from trainings, policy files and controllers."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from ._settings import text_of, texts_of, whole_number
 
 
 class Policy:
-    """A controller: observations in, torques out. Immutable, and safe from several threads.
+    """A policy or controller: maps observations to torques. Immutable and thread-safe.
 
     Letters: N observations, D numbers in each (`obs_size`), A numbers in an action (1), Q values.
 
     Attributes:
-        name: its file, or what it is called
-        kind: such as "q-network" or "lqr"
-        description: what it is, in words
-        task: such as "double-pendulum"
-        obs_size: D; of the double pendulum 8, and 3 for each step of `memory`
+        name: file or name of the policy
+        kind: kind of the policy, such as "q-network" or "lqr"
+        description: description in words
+        task: task of the policy, such as "double-pendulum"
+        obs_size: D, for the double pendulum 8, plus 3 per step of `memory`
         action_size: A
-        memory: past control steps that its observations remember
-        identifies: whether they hold an estimate of the plant
-        num_parameters: how many numbers were learned; 0: none
-        info: what its file says of how it was made and for which plant; None where it says nothing
+        memory: number of past control steps in the observations
+        identifies: whether the observations contain an estimate of the plant
+        num_parameters: number of learned parameters; 0 for a controller
+        info: metadata of the file: origin and plant; None where the file has none
     """
 
     def __init__(self, handle: _upswing.PolicyHandle, made_by: tuple[Any, ...] = ()) -> None:
-        """Policies come from `load_policy` and `train`."""
+        """For internal use: `load_policy` and `train` create policies."""
         self._handle = handle
-        self._made_by = made_by  # of a controller: name, settings and plant
+        self._made_by = made_by  # for a controller: name, settings and design plant
         self.name: str = handle.name
         self.kind: str = handle.kind
         self.description: str = handle.description
@@ -47,13 +47,13 @@ class Policy:
         self.info: dict[str, Any] = handle.info()
 
     def act(self, obs: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        """The actions for some observations, without exploration.
+        """Computes actions for observations, without exploration.
 
         Args:
-            obs: (N, D), or (D,) for one; as the environments give them
+            obs: observations (N, D), or one observation (D,), as the environments return them
 
         Returns:
-            Actions, N·m (or the task's unit): (N, A), or (A,) for one observation
+            Actions [N·m, or the task's unit], (N, A), or (A,) for one observation
         """
         rows, one = self._rows(obs)
         action = np.empty((len(rows), self.action_size))
@@ -64,20 +64,20 @@ class Policy:
 
     @property
     def value_actions(self) -> npt.NDArray[np.float64]:
-        """The torques (Q,), N·m, that `values` are of; empty for V and for policies without."""
+        """Torques (Q,) [N·m] of the columns of `values`; empty for V and for policies without values."""
         return np.array(self._handle.value_actions())
 
     def values(self, obs: npt.ArrayLike) -> npt.NDArray[np.float32]:
-        """What it estimates of observations: a Q-value for each of its torques, or V alone.
+        """Estimates the values of observations: a Q-value per torque, or V.
 
-        Their unit is that of the learned targets: the sum of gamma^k · reward_scale · reward, with
-        the `gamma` and `reward_scale` of `info`.
+        A value estimates the sum of gamma^k · reward_scale · reward, with `gamma` and
+        `reward_scale` of `info`.
 
         Args:
-            obs: (N, D), or (D,) for one
+            obs: observations (N, D), or one observation (D,)
 
         Returns:
-            (N, Q), or (Q,) for one observation; Q is 0 for policies that estimate none
+            Values (N, Q), or (Q,) for one observation; Q is 0 for policies without values
         """
         rows, one = self._rows(obs)
         values = np.empty((len(rows), self._handle.num_values), np.float32)
@@ -87,14 +87,14 @@ class Policy:
     def spread(
         self, obs: npt.ArrayLike
     ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]] | None:
-        """The central 68% of the torques that it learned to draw.
+        """Computes the central 68% interval of the learned distribution of torques.
 
         Args:
-            obs: (N, D), or (D,) for one
+            obs: observations (N, D), or one observation (D,)
 
         Returns:
-            Lower and upper ends, N·m, (N, A) each, or (A,) for one observation; None for policies
-            that were not learned as a distribution
+            Lower and upper ends [N·m], (N, A) each, or (A,) for one observation; None for policies
+            without a distribution
         """
         if not self._handle.has_spread:
             return None
@@ -104,7 +104,7 @@ class Policy:
         return (low[0], high[0]) if one else (low, high)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes it to a file as the program does (docs/policy-format.md)."""
+        """Writes the policy to a file, in the program's format."""
         self._handle.save(os.fspath(path))
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -113,7 +113,7 @@ class Policy:
         return _of_bytes, (self._handle.to_bytes(), self.name)
 
     def _rows(self, obs: npt.ArrayLike) -> tuple[npt.NDArray[np.float32], bool]:
-        """Observations (N, D), and whether there was one alone."""
+        """Observations (N, D), and whether `obs` was a single one."""
         rows = np.ascontiguousarray(obs, np.float32)
         if np.ndim(obs) not in (1, 2):
             raise _upswing.InputError(
@@ -135,12 +135,12 @@ def load_policy(
     """Loads a policy.
 
     Args:
-        path: a policy file, a run folder (its best policy), or the name of a controller, "lqr"
-        made_for: of a controller: the plant that it is made for, such as {"mass2": 1.2}
-        **settings: of a controller: its settings, such as lqr_torque
+        path: policy file, run folder (for its best policy) or name of a controller, such as "lqr"
+        made_for: changes of a controller's design plant, such as {"mass2": 1.2}
+        **settings: settings of a controller, such as lqr_torque
 
     Raises:
-        InputError: there is no such policy, or the file is broken or for something else
+        InputError: the policy does not exist, or its file is broken or of another kind
     """
     changes = [f"{name}={text_of(value)}" for name, value in (made_for or {}).items()]
     return _load(os.fspath(path), texts_of(settings), changes)
@@ -156,15 +156,15 @@ def _of_bytes(file: bytes, name: str) -> Policy:
 
 
 def handle_of(policy: PolicyLike, memory: int = 0) -> _upswing.PolicyHandle:
-    """What the C++ code takes for a policy, a path, a controller's name, or a function."""
+    """The C++ object of a policy, a path, a controller's name or a function."""
     memory = whole_number("memory", memory)
     if isinstance(policy, (str, os.PathLike)):
         policy = load_policy(policy)
     if isinstance(policy, Policy):
         if memory != 0:
             raise _upswing.InputError(
-                f"memory: expected it beside a function, got a policy whose memory is "
-                f"{policy.memory} steps")
+                f"memory: expected none with a policy, which has its own memory of "
+                f"{policy.memory} steps, got {memory}")
         return policy._handle  # pylint: disable=protected-access
     if callable(policy):
         return _upswing.function_policy(policy, memory)

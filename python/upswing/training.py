@@ -1,4 +1,4 @@
-"""Trainings."""
+"""Training of agents."""
 
 from __future__ import annotations
 
@@ -23,22 +23,21 @@ Row = dict[str, Any]
 
 @dataclasses.dataclass(frozen=True)
 class Training:
-    """What is left of a training.
+    """Result of a training.
 
     Attributes:
-        best: the policy with the best evaluation, as the program's policy.safetensors; None if
-            there was no evaluation
-        last: the policy as it stood at the end
-        solved: whether two evaluations in a row were passed
-        finished: whether it ended by itself: solved, or at its last step
-        solved_step, solved_seconds: steps and training time until then; None if it is not solved
-        steps, episodes, updates: control steps, episodes and gradient steps
-        seconds: time of training, evaluations excluded, s
-        best_step, best_success_rate, best_return: of the evaluation of `best`
-        agent, seed, threads: what trained
-        path: its run folder; None if it wrote none
-        config: all settings as TOML; in a file, `train(config=...)` takes them
-        evaluations, metrics: rows of evals.csv and metrics.csv (docs/run-folder.md)
+        best: policy with the best evaluation, as in policy.safetensors; None without an evaluation
+        last: policy at the end of the training
+        solved: whether two evaluations in a row passed
+        finished: whether the training ended by itself: solved, or at its last step
+        solved_step, solved_seconds: steps and training time until solved; None if not solved
+        steps, episodes, updates: number of control steps, episodes and updates
+        seconds: training time without evaluations [s]
+        best_step, best_success_rate, best_return: results of the evaluation of `best`
+        agent, seed, threads: agent, seed and number of threads
+        path: run folder; None if none was written
+        config: all settings as TOML, for a file that `train(config=...)` reads
+        evaluations, metrics: rows of evals.csv and metrics.csv
     """
 
     best: Policy | None
@@ -77,30 +76,30 @@ def train(
     on_best: Callable[[Policy], Any] | None = None,
     **settings: Unpack[TrainingSettings],
 ) -> Training:
-    """Trains an agent until it has solved the task, as `upswing train` does, bit for bit.
+    """Trains an agent until it solves the task, bit for bit as `upswing train` does.
 
-    It writes nothing unless `out` names a folder. Ctrl-C raises KeyboardInterrupt after the step
-    that runs; a run folder then has a checkpoint, from which `resume` goes on.
+    The training writes no files without `out`. Ctrl-C raises KeyboardInterrupt after the current
+    step; a run folder then has a checkpoint for `resume`.
 
     Args:
-        agent: a named agent (see `upswing.agents`), by default "d3qn"
-        seed: of every random stream
-        out: run folder to make, as the program's (docs/run-folder.md)
+        agent: named agent, see `upswing.agents` (default "d3qn")
+        seed: seed of all random numbers
+        out: new run folder, as the program writes it
         config: TOML file of settings; keyword arguments override it
-        resume: run folder to go on with; `steps`, `threads`, `checkpoint_every` and
-            `stop_when_solved` may be given again
-        progress: whether a line on standard error says how far it is; by default in a terminal
-        on_episode, on_metrics, on_evaluation: called with a row of episodes.csv, metrics.csv and
-            evals.csv (docs/run-folder.md has the units) as a dictionary; where one returns False,
-            the training stops
-        on_best: called with the best policy so far, at the evaluation that says so; the same holds
+        resume: run folder to resume; only `steps`, `threads`, `checkpoint_every` and
+            `stop_when_solved` may change
+        progress: show progress on standard error (default: in a terminal)
+        on_episode, on_metrics, on_evaluation: functions that get a row of episodes.csv, metrics.csv
+            or evals.csv as a dictionary; the training stops if one returns False
+        on_best: function that gets the best policy so far, at its evaluation; the training stops if
+            it returns False
         **settings: any setting of the agent, see `upswing.settings(agent)`
 
     Returns:
-        Training: what is left of it
+        Training: result of the training
 
     Raises:
-        InputError: a setting is out of its range, or they contradict each other
+        InputError: a setting is out of range, or settings contradict each other
         Failure: a number is not finite, or a file cannot be written
 
     >>> training = upswing.train(agent="fast", seed=1, hidden=[64, 64], mass2=1.1)
@@ -109,7 +108,8 @@ def train(
     named: dict[str, Any] = {"agent": agent, "seed": seed}
     if resume is not None and (out is not None or config is not None):
         raise _upswing.InputError(
-            "resume: takes settings and folder from the run; expected neither out nor config")
+            "resume: expected neither out nor config with it: the run has its own settings and "
+            "folder")
     texts = texts_of({name: value for name, value in named.items() if value is not None}
                      | dict(settings))
     for name, path in (("out", out), ("config", config), ("resume", resume)):
@@ -126,7 +126,7 @@ def train(
     listeners = {"episode": on_episode, "metrics": on_metrics, "evaluation": on_evaluation}
 
     def tick(events: list[tuple[str, Any]], state: Row) -> bool:
-        """Hears of what was due at a step; says whether to go on."""
+        """Handles the events of a step; returns whether to continue."""
         wanted = True
         for kind, what in events:
             if kind == "best":
@@ -162,7 +162,7 @@ def _path(path: str | os.PathLike[str] | None) -> str:
 
 
 class _ProgressLine:
-    """A line that says how far a training is, and one that stays for each evaluation."""
+    """A line with the progress of a training, and a permanent line per evaluation."""
 
     def __init__(self, file: TextIO) -> None:
         self._file = file

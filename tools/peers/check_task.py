@@ -1,12 +1,11 @@
 #!/usr/bin/env python3
-"""Checks that pendulum.py is the same task as that of the program.
+"""Checks that pendulum.py is the same task as the program's.
 
   build/peers-venv/bin/python tools/peers/check_task.py
 
-Two rollouts of `upswing simulate`, one with the nine torques and one with any, are compared row by
-row: state, observation, reward. Then the transitions that `upswing train` has put into its replay
-memory are made again one by one: torque, successor, reward and the end of the episode. Prints one
-line, or what differs, with exit code 1.
+Compares two rollouts of `upswing simulate`, one with nine torque levels and one with any torque, row by
+row: state, observation, reward. Then repeats each transition in the replay memory of `upswing train`:
+torque, successor, reward, end of the episode. Prints one line, or the differences with exit code 1.
 """
 
 import csv

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Measures Upswing and other libraries on this machine, alternating, and prints a table.
+"""Measures Upswing and other libraries on this machine in turn and prints a table.
 
 Examples:
   tools/peers/compare.py                                   gradient and training, about six minutes
@@ -10,10 +10,10 @@ Examples:
   tools/peers/compare.py --measure sac --task double-pendulum --width 256 --batch 256 --steps 2000
   tools/peers/compare.py --measure ppo --threads 1 --sides rltools,stable-baselines3
 
-gradient: gradient steps of DQN alone, on a filled replay memory. training: steps of a training with
-DQN, one environment and one update a step. acrobot: our agent of that name from its first step to
-its last, and the return that it reaches. sac, ppo: such trainings with SAC and PPO. The number of
-the round is the seed. The peers are installed into build/ first (once).
+gradient: updates of DQN on a full replay memory. training: steps of a DQN training with one
+environment and one update per step. acrobot: a whole training of the agent `acrobot`, and its return.
+sac, ppo: whole trainings with SAC and PPO. The seed is the number of the round. The first call
+installs the other libraries into build/.
 """
 
 import argparse
@@ -179,24 +179,24 @@ def parse_arguments():
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--measure", type=several(one_of(MEASURES)),
                         default=["gradient", "training"], metavar="LIST",
-                        help=f"of {', '.join(MEASURES)} [gradient,training]")
+                        help=f"measures, of {', '.join(MEASURES)} (default gradient,training)")
     parser.add_argument("--sides", type=several(one_of(SIDES)), default=SIDES, metavar="LIST",
-                        help=f"of {', '.join(SIDES)} [all]")
+                        help=f"libraries, of {', '.join(SIDES)} (default all)")
     parser.add_argument("--task", type=one_of(actors.TASKS), default="pendulum-v1", metavar="TASK",
-                        help=f"of sac and ppo: {' or '.join(actors.TASKS)} [pendulum-v1]")
+                        help=f"task of sac and ppo: {' or '.join(actors.TASKS)} (default pendulum-v1)")
     parser.add_argument("--width", type=number(1, 4096), metavar="W",
-                        help="of both hidden layers [256; sac, ppo: 64]")
+                        help="width of both hidden layers (default 256; sac and ppo 64)")
     parser.add_argument("--batch", type=number(1, 65536), metavar="B",
-                        help="transitions in a minibatch [128; sac: 100; ppo: 256]")
+                        help="transitions per minibatch (default 128; sac 100; ppo 256)")
     parser.add_argument("--steps", type=number(1, 10**9), metavar="N",
-                        help="of a training with sac or ppo [20000, 300000]")
+                        help="steps of a training (default sac 20000, ppo 300000)")
     parser.add_argument("--threads", type=several(number(1, 256)), default=[1, 2], metavar="LIST",
-                        help="how many threads, one measurement for each [1,2]")
+                        help="numbers of threads, one measurement each (default 1,2)")
     parser.add_argument("--rounds", type=number(1, 1000), default=5, metavar="N",
-                        help="measurements of each side [5]")
+                        help="number of measurements of each side (default 5)")
     parser.add_argument("--seconds", type=number(0.1, 3600, float), default=3.0, metavar="S",
-                        help="length of a measurement of gradient or training, about [3]")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures there, too")
+                        help="length of a measurement of gradient or training [s] (default 3)")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="JSON file to write, with all figures")
     a = parser.parse_args()
     a.given = {name: getattr(a, name) for name in ("width", "batch", "steps") if getattr(a, name)}
     if a.json and a.json.is_dir():

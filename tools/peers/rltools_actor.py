@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""RLtools' SAC and PPO on Pendulum-v1: one training, printed as one JSON line.
+"""Trains RLtools' SAC or PPO on Pendulum-v1 once and prints the result as one JSON line.
 
   build/rltools-venv/bin/python tools/peers/rltools_actor.py sac --width 256 --batch 256
   build/rltools-venv/bin/python tools/peers/rltools_actor.py ppo --seed 3
@@ -67,14 +67,15 @@ def compiled(what, width, batch):
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("measure", choices=["sac", "ppo"])
+    parser.add_argument("measure", choices=["sac", "ppo"], help="algorithm")
     parser.add_argument("--task", choices=["pendulum-v1"], default="pendulum-v1",
-                        help="what is learned [pendulum-v1]")
-    parser.add_argument("--width", type=int, help="of both hidden layers [64]")
-    parser.add_argument("--batch", type=int, help="minibatch [sac: 100, ppo: 256]")
-    parser.add_argument("--threads", type=int, choices=[1], default=1, help="threads [1]")
-    parser.add_argument("--steps", type=int, help="of the training [sac: 20000, ppo: 300000]")
-    parser.add_argument("--seed", type=int, default=1, help="of the training [1]")
+                        help="task to learn (default pendulum-v1)")
+    parser.add_argument("--width", type=int, help="width of both hidden layers (default 64)")
+    parser.add_argument("--batch", type=int, help="transitions per minibatch (default sac 100, ppo 256)")
+    parser.add_argument("--threads", type=int, choices=[1], default=1, help="number of threads (default 1)")
+    parser.add_argument("--steps", type=int,
+                        help="steps of the training (default sac 20000, ppo 300000)")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the training (default 1)")
     a = parser.parse_args()
     for name, value in actors.DEFAULTS[a.measure].items():
         if getattr(a, name) is None:

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Stable-Baselines3's SAC and PPO: one training, printed as one JSON line.
+"""Trains Stable-Baselines3's SAC or PPO once and prints the result as one JSON line.
 
   build/peers-venv/bin/python tools/peers/sb3_actor.py sac --width 256 --batch 256
   build/peers-venv/bin/python tools/peers/sb3_actor.py ppo --task double-pendulum --seed 3
@@ -70,16 +70,18 @@ def measure(a):
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("measure", choices=["sac", "ppo"])
+    parser.add_argument("measure", choices=["sac", "ppo"], help="algorithm")
     parser.add_argument("--task", choices=list(actors.TASKS), default="pendulum-v1",
-                        help="what is learned [pendulum-v1]")
-    parser.add_argument("--width", type=int, help="of both hidden layers [64]")
-    parser.add_argument("--batch", type=int, help="minibatch [sac: 100, ppo: 256]")
-    parser.add_argument("--threads", type=int, default=1, help="threads of PyTorch [1]")
-    parser.add_argument("--steps", type=int, help="of the training [sac: 20000, ppo: 300000]")
-    parser.add_argument("--seed", type=int, default=1, help="of the training [1]")
+                        help="task to learn (default pendulum-v1)")
+    parser.add_argument("--width", type=int, help="width of both hidden layers (default 64)")
+    parser.add_argument("--batch", type=int, help="transitions per minibatch (default sac 100, ppo 256)")
+    parser.add_argument("--threads", type=int, default=1, help="number of threads of PyTorch (default 1)")
+    parser.add_argument("--steps", type=int,
+                        help="steps of the training (default sac 20000, ppo 300000)")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the training (default 1)")
     parser.add_argument("--envs", type=int, default=actors.ENVS,
-                        help=f"PPO's environments; a rollout has {actors.ROLLOUT} steps in all [4]")
+                        help=f"environments of PPO, for rollouts of {actors.ROLLOUT} steps in all (default "
+                             f"{actors.ENVS})")
     a = parser.parse_args()
     for name, value in actors.DEFAULTS[a.measure].items():
         if getattr(a, name) is None:

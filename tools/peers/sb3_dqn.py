@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Stable-Baselines3's DQN: one measurement, printed as one JSON line.
+"""Measures Stable-Baselines3's DQN once and prints the result as one JSON line.
 
   build/peers-venv/bin/python tools/peers/sb3_dqn.py gradient --threads 2
   build/peers-venv/bin/python tools/peers/sb3_dqn.py training --width 64 --seconds 5
   build/peers-venv/bin/python tools/peers/sb3_dqn.py acrobot --seed 3
 
-gradient: model.train alone, on a replay memory that is filled. training: model.learn with one
-update a step, once learning has begun. Both are on the double pendulum. acrobot: Gymnasium's
-Acrobot-v1 with the settings of our agent `acrobot`, learned to the last step and then evaluated.
+gradient: model.train on a full replay memory. training: model.learn with one update per step, after
+the warm-up. Both are on the double pendulum. acrobot: Gymnasium's
+Acrobot-v1 with the settings of our agent `acrobot`, trained to the last step, then evaluated.
 """
 
 import argparse
@@ -134,12 +134,18 @@ def acrobot(seed):
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("measure", choices=["gradient", "training", "acrobot"])
-    parser.add_argument("--width", type=int, default=256, help="of both hidden layers [256]")
-    parser.add_argument("--batch", type=int, default=128, help="transitions in a minibatch [128]")
-    parser.add_argument("--threads", type=int, default=1, help="threads of PyTorch [1]")
-    parser.add_argument("--seconds", type=float, default=3.0, help="to measure for [3]")
-    parser.add_argument("--seed", type=int, default=1, help="of the training on Acrobot-v1 [1]")
+    parser.add_argument("measure", choices=["gradient", "training", "acrobot"],
+                        help="what to measure")
+    parser.add_argument("--width", type=int, default=256,
+                        help="width of both hidden layers (default 256)")
+    parser.add_argument("--batch", type=int, default=128,
+                        help="transitions per minibatch (default 128)")
+    parser.add_argument("--threads", type=int, default=1,
+                        help="number of threads of PyTorch (default 1)")
+    parser.add_argument("--seconds", type=float, default=3.0,
+                        help="length of the measurement [s] (default 3)")
+    parser.add_argument("--seed", type=int, default=1,
+                        help="seed of the training on Acrobot-v1 (default 1)")
     a = parser.parse_args()
     torch.set_num_threads(a.threads)
     if a.measure == "acrobot":

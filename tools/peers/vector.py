@@ -80,9 +80,10 @@ def measure(side, threads, seconds):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--seconds", type=float, default=1, help="of each side in a round")
-    parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--rounds", type=int, default=5,
+                        help="number of measurements of each side (default 5)")
+    parser.add_argument("--seconds", type=float, default=1, help="length of a measurement [s] (default 1)")
+    parser.add_argument("--threads", type=int, default=1, help="number of threads (default 1)")
     parser.add_argument("--side", help=argparse.SUPPRESS)
     a = parser.parse_args()
     if a.side:

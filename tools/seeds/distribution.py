@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What do very many trainings of one agent have in common, and how far apart are they?
+"""Shows the distribution of results over very many seeds of one agent.
 
     ./upswing study configs/studies/ten-thousand.toml
     ./upswing python tools/seeds/distribution.py runs/ten-thousand --out docs/seeds
@@ -82,9 +82,9 @@ def plot(seeds, values, title, file):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", type=Path, help="a study's, with runs.csv")
-    parser.add_argument("--group", default="fast", help="of which agent")
-    parser.add_argument("--out", type=Path, help="folder for the table and the figure")
+    parser.add_argument("folder", type=Path, help="folder of a study, with runs.csv")
+    parser.add_argument("--group", default="fast", help="agent or variant (default fast)")
+    parser.add_argument("--out", type=Path, help="folder for the table and the figures")
     a = parser.parse_args()
     seeds, values = read(a.folder, a.group)
     show(seeds, values)

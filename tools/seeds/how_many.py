@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""How often would a study of few seeds have come to the wrong conclusion?
+"""Shows how often a study with few seeds comes to a wrong conclusion.
 
     ./upswing study configs/studies/how-many-seeds.toml
     ./upswing python tools/seeds/how_many.py runs/how-many-seeds --out docs/seeds
 
-Takes the runs of a study with very many seeds for the truth, draws small studies from them again and
-again, and counts what each would have said: that the better agent is better, that the worse one is, or
-that nothing can be said. Writes seeds.csv and, by gnuplot, SCORE.svg and SCORE.png for each score.
+Treats a study with very many seeds as the truth, draws small studies from it many times, and counts
+their conclusions: the better agent is better, the worse agent is better, or undecided. Writes seeds.csv
+and, with gnuplot, SCORE.svg and SCORE.png for each score.
 """
 
 import argparse
@@ -190,11 +190,11 @@ def compare(groups, score, a):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", type=Path, help="a study's, with runs.csv")
-    parser.add_argument("--baseline", default="fast", help="what the others are compared with")
-    parser.add_argument("--scores", default="solve_steps,best_return", help="columns of runs.csv")
-    parser.add_argument("--sizes", default="3,5,10,30,100", help="seeds of the small studies")
-    parser.add_argument("--draws", type=int, default=2000, help="small studies of each size")
+    parser.add_argument("folder", type=Path, help="folder of a study, with runs.csv")
+    parser.add_argument("--baseline", default="fast", help="group that the others are compared with (default fast)")
+    parser.add_argument("--scores", default="solve_steps,best_return", help="columns of runs.csv (default solve_steps,best_return)")
+    parser.add_argument("--sizes", default="3,5,10,30,100", help="seeds per small study (default 3,5,10,30,100)")
+    parser.add_argument("--draws", type=int, default=2000, help="number of small studies per size (default 2000)")
     parser.add_argument("--out", type=Path, help="folder for seeds.csv and the figures")
     a = parser.parse_args()
     a.sizes = [int(n) for n in a.sizes.split(",")]

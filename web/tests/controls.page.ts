@@ -185,9 +185,9 @@ test('a broken policy is refused with a reason, and the agent stays', async ({
   await open(page, '#agent=d3qn');
   const whole = Buffer.from(readPolicy('fast'));
   const files = [
-    ['cut.safetensors', whole.subarray(0, whole.length - 100), 'not a whole safetensors file'],
-    ['text.safetensors', Buffer.from('<script>alert(1)</script>'), 'not a whole safetensors file'],
-    ['empty.safetensors', Buffer.alloc(0), 'not a whole safetensors file'],
+    ['cut.safetensors', whole.subarray(0, whole.length - 100), 'not a valid safetensors file'],
+    ['text.safetensors', Buffer.from('<script>alert(1)</script>'), 'not a valid safetensors file'],
+    ['empty.safetensors', Buffer.alloc(0), 'not a valid safetensors file'],
     ['huge.safetensors', Buffer.alloc(0), 'larger than 16 MB'],
   ] as const;
   for (const [name, bytes, reason] of files) {

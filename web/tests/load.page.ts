@@ -86,7 +86,7 @@ test.describe('what is missing or broken is told', () => {
 
   test('a policy: the page runs without it, and another one can be chosen', async ({ page }) => {
     for (const [answer, words] of [
-      [{ status: 200, body: 'broken' }, 'not a whole safetensors file'],
+      [{ status: 200, body: 'broken' }, 'not a valid safetensors file'],
       [{ status: 404 }, 'agents/d3qn.safetensors is missing'],
       [null, 'cannot be fetched'],
     ] as const) {

@@ -22,8 +22,8 @@ using nlohmann::json;
 
 namespace {
 
-std::string text;               // of the last call that gives one
-std::vector<std::byte> bytes;   // the same of files
+std::string text;               // result of the last call that returns a text
+std::vector<std::byte> bytes;   // result of the last call that returns a file
 std::array<double, 32> number;  // into and out of the formulas
 
 /// Runs `work` and returns what it does; 0 if it throws, with the reason as the text.
@@ -156,19 +156,17 @@ UPSWING_EXPORT(policy_open) Controller* PolicyOpen(const std::byte* file, size_t
           Concat("expected a policy of the double pendulum, got one of ", controller->loaded.task));
     }
     if (!controller->loaded.mjcf.empty()) {
-      throw BadInput("it was trained on a model of its own, which this page does not have");
+      throw BadInput("expected a policy of the built-in model, got one of another MJCF model");
     }
     if (controller->loaded.plant.actuated_joint != 1) {
       throw BadInput(
-          "expected a policy for a motor at joint 1, as the page's pendulum has it, got one for "
-          "joint 2");
+          "expected a policy for a motor at joint 1, as in the page, got one for joint 2");
     }
     if (controller->loaded.plant.rotor_inertia != 0 ||
         controller->loaded.plant.has_dry_friction()) {
       throw BadInput(
-          "expected a policy for a plant without rotors and dry friction, which the page's "
-          "pendulum "
-          "does not have");
+          "expected a policy for a plant without rotors and dry friction, as in the page, got one "
+          "with them");
     }
     SetText(About(*controller, tensors.metadata));
     return controller.release();
@@ -230,8 +228,8 @@ void GaussianProbabilities(double mean, double log_std, int squashed, double* to
   ActionProbabilities(Gaussian<double>::From(mean, log_std), squashed != 0, {to, count});
 }
 
-/// Writes what an observation (D) remembers of so many steps: `before` is the one before it, at
-/// which the torque was chosen.
+/// Writes the memory of `steps` steps into an observation (D). `before` is the previous
+/// observation, for which the torque was chosen.
 UPSWING_EXPORT(observation_remember)
 void ObservationRemember(const float* before, double torque, int steps, float* obs, size_t size) {
   Remember({before, size}, torque, steps, {obs, size});
@@ -319,13 +317,14 @@ UPSWING_EXPORT(pendulum_mjcf) void PendulumMjcf() { text = Mjcf(PlantAt(number.d
 // ----------------------------------------------------------------------------------------------
 // Learners.
 
-/// The settings, lines NAME=VALUE, are those of the program; see docs/learning.md.
+/// Opens a learner with the program's settings, given as lines NAME=VALUE.
 UPSWING_EXPORT(learner_open) Learner* LearnerOpen(const char* settings, size_t size) {
   return Guarded([&] {
     std::vector<FlagValue> flags;
     for (const std::string_view line : Split({settings, size}, '\n')) {
       const size_t equals = line.find('=');
-      if (equals == std::string_view::npos) throw BadInput("settings: expected NAME=VALUE");
+      if (equals == std::string_view::npos)
+        throw BadInput(Concat("settings: expected NAME=VALUE, got \"", line, "\""));
       const std::string name(line.substr(0, equals));
       flags.push_back({name, std::string(line.substr(equals + 1)), name});
     }
@@ -335,17 +334,17 @@ UPSWING_EXPORT(learner_open) Learner* LearnerOpen(const char* settings, size_t s
 
 UPSWING_EXPORT(learner_close) void LearnerClose(Learner* learner) { delete learner; }
 
-/// At most so many steps of all environments. 1: there is more; 2: finished; 0: it failed.
+/// Makes at most `most` steps of all environments. Returns 1: not finished; 2: finished; 0: failed.
 UPSWING_EXPORT(learner_run) int LearnerRun(Learner* learner, int most) {
   return Guarded([&] { return learner->Run(most) ? 1 : 2; });
 }
 
-/// Leaves as JSON where the training stands, and what has happened since the last report.
+/// Leaves the state of the training and its events since the last report as JSON.
 UPSWING_EXPORT(learner_report) int LearnerReport(Learner* learner) {
   return Guarded([&] { return SetText(learner->Report()); });
 }
 
-/// Leaves the policy as it stands, or the best at an evaluation (empty: there was none), as a file.
+/// Leaves the current policy, or the best evaluated one (empty: none yet), as a file.
 UPSWING_EXPORT(learner_policy) int LearnerPolicy(Learner* learner, int best) {
   return Guarded([&] {
     bytes = best != 0 ? learner->best() : learner->policy();

@@ -33,7 +33,7 @@ std::vector<std::byte> FileOf(const Policy& policy) {
 
 Config ConfigOf(const std::vector<FlagValue>& flags) {
   return ParseConfig("", "", flags, [](const std::string& path, bool /*in_file*/) -> ModelFile {
-    throw BadInput(Concat(path, ": a page has no files"));
+    throw BadInput(Concat("model: expected none in the page, got ", path));
   });
 }
 

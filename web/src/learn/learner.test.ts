@@ -51,16 +51,16 @@ test('settings are checked as the program checks them, in one line', async () =>
   for (const [settings, words] of [
     [{ learning_rate: '-1' }, 'learning_rate: expected a number in [0, 10], got "-1"'],
     [{ learning_rat: '1' }, 'learning_rate'],
-    [{ batch: '1000', replay: '100' }, 'batch: expected at most as many transitions'],
+    [{ batch: '1000', replay: '100' }, 'batch: expected at most 100 transitions'],
     [{ hidden: '4096,4096', replay: '10000000' }, 'memory'],
-    [{ model: 'x.xml' }, 'a page has no files'],
+    [{ model: 'x.xml' }, 'model: expected none in the page'],
     [{ seed: '1\nepsilon_end' }, 'NAME=VALUE'],
   ] as [Record<string, string>, string][]) {
     const open = () => new Learner(host, 'fast', 1, settings);
     expect(open).toThrow(BadInput);
     expect(open).toThrow(words);
   }
-  expect(() => new Learner(host, 'nobody', 1)).toThrow('no agent is called "nobody"');
+  expect(() => new Learner(host, 'nobody', 1)).toThrow('got "nobody"');
 });
 
 test('a training that diverges ends with a reason, and its core goes on', async () => {
@@ -82,7 +82,7 @@ test('the settings of an agent, with what the program says of them', () => {
   const settings = agentSettings(core(), 'fast');
   expect(settings.get('learning_rate')).toMatchObject({ value: '0.002', low: 0, high: 10 });
   expect(settings.get('hidden')).toMatchObject({ value: '48,32' });
-  expect(settings.get('epsilon_end')!.help).toBe('what epsilon falls to');
+  expect(settings.get('epsilon_end')!.help).toBe('lowest probability of a random action');
 });
 
 test('trainings one after another take no more memory', async () => {
