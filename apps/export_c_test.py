@@ -516,14 +516,14 @@ class HeaderTest(ProgramTest):
 
 
 def block_of_documentation(section):
-    """The lines that a section of docs/export.md tells to type."""
-    text = (ROOT / "docs/export.md").read_text(encoding="utf-8").split(f"### {section}\n")[1]
+    """The lines that a section of docs/howto/export.md tells to type."""
+    text = (ROOT / "docs/howto/export.md").read_text(encoding="utf-8").split(f"### {section}\n")[1]
     return "".join(line[4:] + "\n" for line in text.split("\n### ")[0].splitlines()
                    if line.startswith("    "))
 
 
 class DocumentedTest(ProgramTest):
-    """What docs/export.md says can be typed."""
+    """What docs/howto/export.md says can be typed."""
 
     def type(self, lines):
         """Types lines in a folder that has the examples; returns all that they say."""
@@ -554,7 +554,7 @@ class DocumentedTest(ProgramTest):
         self.assertEqual(said.count("instructions"), 4)
 
     def test_the_loop_of_the_controller(self):
-        text = (ROOT / "docs/export.md").read_text(encoding="utf-8")
+        text = (ROOT / "docs/howto/export.md").read_text(encoding="utf-8")
         (code,) = re.findall(r"^```c\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
         self.succeed("export", AGENTS / "fast.safetensors", "--c", "policy.h")
         include, loop = code.split("\n", maxsplit=1)
@@ -574,7 +574,7 @@ class DocumentedTest(ProgramTest):
         self.assertEqual(subprocess.run([self.folder / "program"], check=False).returncode, 0)
 
     def test_every_name_is_explained(self):
-        text = (ROOT / "docs/export.md").read_text(encoding="utf-8")
+        text = (ROOT / "docs/howto/export.md").read_text(encoding="utf-8")
         self.succeed("export", AGENTS / "fast.safetensors", "--c", "policy.h")
         header = (self.folder / "policy.h").read_text(encoding="ascii")
         for name in re.findall(r"^#define (POLICY_\w+) ", header, re.MULTILINE):

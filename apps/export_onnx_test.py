@@ -167,7 +167,7 @@ class OnnxTest(ProgramTest):
 
     def test_the_documentation(self):
         """Its Python runs, and it names every output and every metadata."""
-        text = (ROOT / "docs/export.md").read_text(encoding="utf-8")
+        text = (ROOT / "docs/howto/export.md").read_text(encoding="utf-8")
         (code,) = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
         named = set(re.findall(r"`(\w+)`", text))
         for name in ("d3qn-randomized", "sac", "fast"):

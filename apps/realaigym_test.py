@@ -67,13 +67,13 @@ class RealAIGym(ProgramTest):
             self.assertIn(word, text)
 
     def test_the_policy_of_the_documentation(self):
-        found = json.loads(self.succeed("realaigym", ROOT / "docs/realaigym-pendubot.safetensors",
+        found = json.loads(self.succeed("realaigym", ROOT / "docs/figures/realaigym-pendubot.safetensors",
                                         "--json"))
         self.assertAlmostEqual(found["performance"]["score"], 0.7001, delta=0.001)
         # Cells at an edge depend on rounding.
         self.assertAlmostEqual(found["robustness"]["score"], 0.943, delta=0.02)
 
-        found = json.loads(self.succeed("realaigym", ROOT / "docs/realaigym-acrobot.safetensors",
+        found = json.loads(self.succeed("realaigym", ROOT / "docs/figures/realaigym-acrobot.safetensors",
                                         "--json"))
         self.assertEqual(found["robot"], "acrobot")
         self.assertAlmostEqual(found["performance"]["score"], 0.651, delta=0.002)

@@ -120,7 +120,7 @@ def read_tensors(path):
 
 
 def checksum(pieces):
-    """That of Upswing's files, over their header and tensors (docs/policy-format.md)."""
+    """That of Upswing's files, over their header and tensors (docs/reference/policy-format.md)."""
     value = 0xcbf29ce484222325
     for piece in pieces:
         for (word,) in struct.iter_unpack("<Q", piece + bytes(-len(piece) % 8)):

@@ -56,8 +56,8 @@ class Policy {
   virtual void Spread(Matrix<const float> /*obs*/, Matrix<double> /*low*/, Matrix<double> /*high*/,
                       Memory&) const {}
 
-  /// What its file holds (docs/policy-format.md). Throws BadInput if this kind is not kept in
-  /// files.
+  /// What its file holds (docs/reference/policy-format.md). Throws BadInput if this kind is not
+  /// kept in files.
   virtual Tensors ToTensors() const = 0;
 };
 

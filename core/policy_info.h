@@ -8,7 +8,7 @@
 
 namespace upswing {
 
-/// The contents of a policy's observations (docs/policy-format.md).
+/// The contents of a policy's observations (docs/reference/policy-format.md).
 struct ObservationInfo {
   std::vector<std::string> names;    // of the inputs, without those of the memory
   std::vector<double> max_velocity;  // rad/s, by which w1 and w2 are divided

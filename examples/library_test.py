@@ -101,7 +101,7 @@ class Library(unittest.TestCase):
     @staticmethod
     def blocks():
         """The C++ of the documentation."""
-        text = (ROOT / "docs/library.md").read_text(encoding="utf-8")
+        text = (ROOT / "docs/howto/cpp-library.md").read_text(encoding="utf-8")
         return re.findall(r"^```cpp\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
 
     @classmethod
@@ -149,7 +149,7 @@ class Library(unittest.TestCase):
             self.assertEqual(sum(line.startswith(begin) for line in lines), 1, begin)
 
     def test_every_target_and_example_is_documented(self):
-        text = (ROOT / "docs/library.md").read_text(encoding="utf-8")
+        text = (ROOT / "docs/howto/cpp-library.md").read_text(encoding="utf-8")
         self.assertEqual(re.findall(r"^\| `upswing::(\w+)`", text, re.MULTILINE), LAYERS)
         for path in (ROOT / "examples").glob("*/CMakeLists.txt"):
             name = path.parent.name

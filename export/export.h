@@ -25,11 +25,11 @@ std::vector<std::string> ExportToPage(const std::vector<std::filesystem::path>& 
 
 /// A learned policy as a file in ONNX's format: `observation` (batch × D) in; `torque` and, by
 /// kind, `q_values`, `mean` and `log_std`, `probabilities`, `value` out; what they mean as metadata
-/// (docs/export.md). Throws BadInput if it is none that was learned.
+/// (docs/howto/export.md). Throws BadInput if it is none that was learned.
 std::string OnnxModelOf(const LoadedPolicy& loaded);
 
 /// A learned policy, or a controller whose law is small, as a C99 header without dependencies
-/// (docs/export.md).
+/// (docs/howto/export.md).
 struct CHeader {
   std::string prefix;  // with which all of its names begin
   std::string text;

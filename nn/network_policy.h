@@ -55,7 +55,8 @@ struct SelfCheck {
 
 /// The policy of a network: a Q-network's best action (DQN), or the middle of the distribution that
 /// an actor learned (SAC, PPO). Stored in one `policy.safetensors` with its description, its
-/// origin, and sample inputs and outputs that every load recomputes (docs/policy-format.md).
+/// origin, and sample inputs and outputs that every load recomputes
+/// (docs/reference/policy-format.md).
 class NetworkPolicy : public Policy {
  public:
   /// Throws BadInput if the parts do not fit together.

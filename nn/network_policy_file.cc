@@ -1,5 +1,5 @@
-// The files of network policies (docs/policy-format.md): the format, the parameters of their
-// networks, and sample inputs and outputs that every load recomputes.
+// The files of network policies (docs/reference/policy-format.md): the format, the parameters of
+// their networks, and sample inputs and outputs that every load recomputes.
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -116,7 +116,7 @@ TEST_P(NetworkTest, GradientOfTheInputsMatchesFiniteDifferences) {
 }
 #endif
 
-/// y of one row x, as docs/policy-format.md defines it, in double.
+/// y of one row x, as docs/reference/policy-format.md defines it, in double.
 std::vector<double> Definition(const Network& network, std::span<const Real> parameters,
                                std::span<const Real> x) {
   const auto after = [](const LayerView& layer, const std::vector<double>& input) {

@@ -10,7 +10,7 @@
 #include "run/find_policy.h"
 #include "setup/loaded_policy.h"
 
-/// RealAIGym's boards (docs/realaigym.md): scoring any policy by their rules.
+/// RealAIGym's boards (docs/howto/realaigym.md): scoring any policy by their rules.
 namespace upswing {
 
 /// What competes: a policy found by a search, any policy of the double pendulum, or the

@@ -5,7 +5,7 @@
 
 #include "sim/manipulator.h"
 
-/// The double pendulum of the benchmark RealAIGym (docs/realaigym.md): its numbers, and the
+/// The double pendulum of the benchmark RealAIGym (docs/howto/realaigym.md): its numbers, and the
 /// constants of the equations of motion that follow. Unlike those of Plant, its inertias are about
 /// the joints.
 namespace upswing {

@@ -12,7 +12,7 @@
 namespace upswing {
 namespace {
 
-// Numbers of the benchmark's own plant, without friction (docs/realaigym.md).
+// Numbers of the benchmark's own plant, without friction (docs/howto/realaigym.md).
 
 /// Kinetic and potential energy, the latter 0 at the height of the pivot (J).
 double EnergyOf(const Manipulator& plant, const BoardState& s) {

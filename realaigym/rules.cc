@@ -12,7 +12,7 @@ namespace upswing {
 namespace {
 
 /// Six pushes with growing times, three of them, at random, about the joint with the motor. Those
-/// about the other one do nothing there (docs/realaigym.md).
+/// about the other one do nothing there (docs/howto/realaigym.md).
 std::array<BoardPush, 3> RandomPushes(Rng& rng) {
   std::array<int, 6> order;
   std::iota(order.begin(), order.end(), 0);

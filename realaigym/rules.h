@@ -10,8 +10,8 @@
 #include "control/riccati.h"
 #include "realaigym/plant.h"
 
-/// The rules of RealAIGym's simulation boards, version 2 (docs/realaigym.md): what is simulated,
-/// and the scores of performance and robustness.
+/// The rules of RealAIGym's simulation boards, version 2 (docs/howto/realaigym.md): what is
+/// simulated, and the scores of performance and robustness.
 namespace upswing {
 
 /// Which joint has the motor.

@@ -10,8 +10,8 @@
 
 /// Figures over independent runs, as Agarwal, Schwarzer, Castro, Courville and Bellemare (2021),
 /// "Deep Reinforcement Learning at the Edge of the Statistical Precipice", recommend them.
-/// docs/statistics.md has the formulas. A score may be infinite (a run that never solved its task),
-/// but not NaN.
+/// docs/howto/compare.md has the formulas. A score may be infinite (a run that never solved its
+/// task), but not NaN.
 namespace upswing {
 
 inline constexpr int64_t kResamples = 10000;  // of a bootstrap interval, at most

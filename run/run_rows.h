@@ -3,7 +3,8 @@
 #include "io/run_folder.h"
 #include "rl/trainer.h"
 
-/// What is told of a training as it goes on: the rows of a run's tables (docs/run-folder.md).
+/// What is told of a training as it goes on: the rows of a run's tables
+/// (docs/reference/run-folder.md).
 namespace upswing {
 
 /// Of episodes.csv: a training episode that has ended.

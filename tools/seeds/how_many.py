@@ -2,7 +2,7 @@
 """Shows how often a study with few seeds comes to a wrong conclusion.
 
     ./upswing study configs/studies/how-many-seeds.toml
-    ./upswing python tools/seeds/how_many.py runs/how-many-seeds --out docs/seeds
+    ./upswing python tools/seeds/how_many.py runs/how-many-seeds --out docs/figures/seeds
 
 Treats a study with very many seeds as the truth, draws small studies from it many times, and counts
 their conclusions: the better agent is better, the worse agent is better, or undecided. Writes seeds.csv
@@ -24,7 +24,7 @@ LEVEL = 0.05
 
 
 def interquartile_mean(x):
-    """Over the last axis, as docs/statistics.md defines it."""
+    """Over the last axis, as docs/howto/compare.md defines it."""
     cut = x.shape[-1] // 4
     return np.sort(x, axis=-1)[..., cut:x.shape[-1] - cut].mean(axis=-1)
 

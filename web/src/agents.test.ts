@@ -22,7 +22,7 @@ function lean(angle: number): number {
   return (180 / Math.PI) * Math.acos(-Math.cos(angle));
 }
 
-// The rule by which their seeds were chosen (docs/page.md), and for as long as 30 s.
+// The rule by which their seeds were chosen (docs/howto/page.md), and for as long as 30 s.
 test.each(list.agents.map(({ id }) => id))(
   '%s is up within 10 s and stands, not at a lean',
   (id) => {

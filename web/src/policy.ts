@@ -9,7 +9,7 @@ import { printable } from './text';
 
 const LONGEST_REASON = 200; // characters; a file's own text may be part of it
 
-/// A learned policy (docs/policy-format.md) or a controller: observation → torque.
+/// A learned policy (docs/reference/policy-format.md) or a controller: observation → torque.
 export class Policy {
   readonly metadata: ReadonlyMap<string, string>;
   readonly controller: Controller;

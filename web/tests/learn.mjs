@@ -1,6 +1,6 @@
 // npm run measure:learn: how long an agent takes to learn in the built page, seed by seed, how smoothly
 // the page runs meanwhile, and whether trainings one after another leave anything behind. Measurements of
-// this machine for docs/page.md, not a test. UPSWING names the program, whose time stands beside.
+// this machine for docs/howto/page.md, not a test. UPSWING names the program, whose time stands beside.
 import { execFileSync } from 'node:child_process';
 import { mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';

@@ -1,5 +1,5 @@
 // npm run measure: how large the built page is, how soon it paints, how smoothly it runs, and how much
-// of a processor it takes. Measurements of this machine for docs/page.md, not a test.
+// of a processor it takes. Measurements of this machine for docs/howto/page.md, not a test.
 import { gzipSync } from 'node:zlib';
 import { ready, serve, visit } from './visit.mjs';
 

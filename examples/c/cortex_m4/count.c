@@ -2,7 +2,7 @@
  *
  *     ./upswing export POLICY --c policy.h
  *     arm-none-eabi-gcc -std=c99 -O2 -mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16 -I. \
- *         --specs=rdimon.specs -nostartfiles ... (docs/export.md has the whole line)
+ *         --specs=rdimon.specs -nostartfiles ... (docs/howto/export.md has the whole line)
  *     qemu-system-arm -M mps2-an386 -icount shift=8 -semihosting -nographic -kernel count.elf
  *
  * With -icount every instruction takes the same time, which the timer SysTick measures. */

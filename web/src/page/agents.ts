@@ -86,7 +86,7 @@ const PLAIN: ReadonlyMap<string, string> = new Map([
   ['ppo', `It learned by trial, from its latest trials alone, and may use any torque. ${CAN}`],
 ]);
 
-/// Controllers that are made from the equations of motion (docs/control.md): title, and how they act.
+/// Controllers that are made from the equations of motion (docs/controllers.md): title, and how they act.
 const COMPUTED: ReadonlyMap<string, readonly [string, string]> = new Map([
   [
     'lqr',
