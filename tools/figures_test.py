@@ -14,7 +14,7 @@ DOCS = figures.ROOT / "docs"
 DARK = "@media (prefers-color-scheme:dark)"
 
 # Drawn by the program itself, not by tools/figures.py. They show what a user gets.
-OUTPUT = {"map.svg", "workers.svg", "swing-up.svg"}
+OUTPUT = {"map.svg", "workers.svg"}
 
 
 def shown():

@@ -79,7 +79,7 @@ await visit({ viewport: { width: 900, height: 760 } }, async (page) => {
       await new Promise(requestAnimationFrame);
       await new Promise(requestAnimationFrame);
     }, frame);
-    const clip = { x: 17, y: 86, width: 548, height: 572 };
+    const clip = { x: 17, y: 86, width: 548, height: 540 };
     await page.screenshot({ path: join(folder, `${String(frame).padStart(3, '0')}.png`), clip });
   }
   const palette =
