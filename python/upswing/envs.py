@@ -177,7 +177,7 @@ class DoublePendulumVectorEnv(VectorEnv[npt.NDArray[np.float32], Any, npt.NDArra
 
     Args:
         num_envs: number N of environments (1 to 4096)
-        actions, levels, **settings: as in `DoublePendulumEnv`; also threads, the number of threads
+        actions, levels, settings: as in `DoublePendulumEnv`; also threads, the number of threads
             (0: one per processor, at most 8)
         autoreset_mode: AutoresetMode.NEXT_STEP ("NextStep"): the step after the end of an episode
             starts the next one and ignores the action. AutoresetMode.SAME_STEP ("SameStep"): the
