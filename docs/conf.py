@@ -18,6 +18,7 @@ root = Path(os.environ["UPSWING_ROOT"])
 sys.path.insert(0, str(root / "python"))
 
 project = "Upswing"
+copyright = "the Upswing developers"
 version = release = re.search(r"project\(upswing VERSION (\S+)",
                               (root / "CMakeLists.txt").read_text(encoding="utf-8"))[1]
 extensions = ["myst_parser", "breathe", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
