@@ -118,7 +118,7 @@ void AddCompare(CommandLine& line) {
       "interval. mpc needs half a second of processor time per episode.\n\n"
       "Examples:\n"
       "  ./upswing compare runs/d3qn-seed*               one agent over its seeds\n"
-      "  ./upswing compare runs --out runs/comparison    all agents in runs, with figures\n"
+      "  ./upswing compare runs --out runs/comparison    all agents, with figures\n"
       "  ./upswing compare runs/post --json              a study, for another program\n"
       "  ./upswing compare runs/d3qn-seed* mpc tvlqr     with classical control\n");
 }

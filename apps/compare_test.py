@@ -201,8 +201,8 @@ class CompareTest(ProgramTest):
         refuse(["none"], "none: no such file or folder")
         refuse(["r", "none"], "none: no such file or folder")
         refuse(["file"], "file: expected a run folder or a policy.safetensors, got another file")
-        refuse(["empty"], "empty", "config.toml", "got none")
-        refuse(["r", "r/seed2"], "r/seed2", "given twice")
+        refuse(["empty"], "empty", "config.toml", "got neither")
+        refuse(["r", "r/seed2"], "r/seed2", "got it twice")
         refuse(["begun"], "begun", "unfinished", "2,000 of 4,000", "--unfinished")
         refuse(["bare"], "bare: has no evaluation yet")
         refuse(["bare", "--unfinished"], "bare: has no evaluation yet")
@@ -418,7 +418,7 @@ class CompareTest(ProgramTest):
         svg = (self.folder / "two/curves.svg").read_text(encoding="utf-8")
         for title in ("run", "copy/run"):
             self.assertIn(f">{title}<", svg)
-        self.refuse(["compare", *names[:2], "./run/../run/policy.safetensors"], "given twice")
+        self.refuse(["compare", *names[:2], "./run/../run/policy.safetensors"], "got it twice")
 
     def test_refuses_policies_without_runs_or_of_another_task(self):
         self.make_group("r", [1, 2])

@@ -82,7 +82,7 @@ void AddEval(CommandLine& line) {
       "  ./upswing eval runs/d3qn-seed1 --sensor-noise 0.02 --delay 0.02\n"
       "  ./upswing eval runs/d3qn-seed1 --randomize 0.25 --episodes 1000\n"
       "  ./upswing eval runs/d3qn-seed1 --randomize 0.25 --episodes-csv episodes.csv\n"
-      "  ./upswing plot runs/d3qn-seed1 --randomize 0.25 --episode 17    draw episode 17\n"
+      "  ./upswing plot runs/d3qn-seed1 --randomize 0.25 --episode 17\n"
       "  ./upswing eval mpc --randomize 0.25 --known-plant\n\n"
       "Controllers:\n"
       "  lqr     holds the pendulum upright and does not swing it up\n"

@@ -78,10 +78,12 @@ void PrintController(const LoadedPolicy& loaded) {
              *policy.info().control_period);
   fmt::print("  plant       {}\n", PlantText(loaded.plant));
   const UprightModes modes = ModesOf(loaded.plant);
-  fmt::print("  modes       grow at {:.3g}/s and {:.3g}/s upright (ratio {:.3g}), delta {:.2f}\n",
-             modes.faster, modes.slower, modes.slower / modes.faster, modes.delta);
+  fmt::print(
+      "  modes       unstable upright, grow at {:.3g}/s and {:.3g}/s (ratio {:.3g}), delta "
+      "{:.2f}\n",
+      modes.faster, modes.slower, modes.slower / modes.faster, modes.delta);
   if (const auto* regulator = dynamic_cast<const LqrPolicy*>(&policy)) {
-    fmt::print("  region      of attraction x'Px < {:.4g}, found by simulation\n",
+    fmt::print("  region      of attraction, by simulation: x'Px < {:.4g}\n",
                RegionOfAttraction(regulator->lqr(), loaded.plant));
   }
 }

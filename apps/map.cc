@@ -133,8 +133,8 @@ void AddMap(CommandLine& line) {
   line.Flag("--json", a.as_json, "print JSON instead of a table");
   line.Footer(
       "Quantities for axes and --set:\n"
-      "  plant    mass1, mass2, length1, length2, damping1, damping2 (mass, length, damping\n"
-      "           for both links), gravity, torque_limit, actuated_joint (1 or 2),\n"
+      "  plant    mass1, mass2, length1, length2, damping1, damping2 (mass, length,\n"
+      "           damping for both links), gravity, torque_limit, actuated_joint (1 or 2),\n"
       "           rotor_inertia, gear_ratio, coulomb1, coulomb2\n"
       "  sensors  sensor_noise [rad, rad/s], sensor_latency [s], encoder_counts,\n"
       "           velocity_window [s], velocity_filter [s]\n"
@@ -149,7 +149,7 @@ void AddMap(CommandLine& line) {
       "it gets map-1.csv, map-2.csv, … and maps.svg and maps.png of their success.\n\n"
       "Examples:\n"
       "  ./upswing map runs/d3qn-seed1\n"
-      "  ./upswing map runs/d3qn-seed1 --x mass=0.8:1.2 --y damping=0:0.4:21 --episodes 20\n"
+      "  ./upswing map runs/d3qn-seed1 --x mass=0.8:1.2 --y damping=0:0.4:21\n"
       "  ./upswing map runs/d3qn-seed1 --x sensor_noise=0:0.1 --y delay=0:0.1:6\n"
       "  ./upswing map runs/d3qn-seed1 --x q1=-180:180:73 --y q2=-180:180:73\n"
       "  ./upswing map lqr --x q1=150:210:121 --y q2=-30:30:121\n"

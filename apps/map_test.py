@@ -215,7 +215,7 @@ class MapTest(ProgramTest):
                 ("mass2=:2", "mass2", '""'),
                 ("mass2=1:nan", "mass2", '"nan"'),
                 ("delay=0:2", "delay", "in [0, 1]"),
-                ("delay=-50%:50%", "delay", "percentage of 0"),
+                ("delay=-50%:50%", "delay", "percentage of a training value of 0"),
                 ("delay=0:0.05", "delay", "a multiple of 0.02", "the nearest are 0.04 and 0.06"),
                 ("delay=0:0.1:5", "--x delay", '"0.025"', "the nearest are 0.02 and 0.04"),
                 ("q1=-400:0", "q1", "in [-360, 360]")):

@@ -197,10 +197,10 @@ class SeedsTest(ProgramTest):
 
     def test_other_settings_are_refused_with_what_differs(self):
         self.succeed(*small(**TINY), "--seeds", 1)
-        for changes, words in (({"gamma": 0.9}, ["agent.gamma = 0.99", "says 0.9"]),
+        for changes, words in (({"gamma": 0.9}, ["agent.gamma = 0.99", "has 0.9"]),
                                ({"agent": "d3qn"}, ["train.agent", "d3qn-small"]),
-                               ({"steps": 300}, ["train.steps = 400", "says 300"]),
-                               ({"steps": None}, ["train.steps = 400", "says 1000000"]),
+                               ({"steps": 300}, ["train.steps = 400", "has 300"]),
+                               ({"steps": None}, ["train.steps = 400", "has 1000000"]),
                                ({"stop_when_solved": False}, ["train.stop_when_solved"])):
             with self.subTest(changes=changes):
                 self.refuse([*small(**TINY | changes), "--seeds", "2"], "many/seed1: made with",

@@ -89,7 +89,7 @@ void AddSimulate(CommandLine& line) {
       "  ./upswing simulate --torque torques.csv --start 0.1,-0.05,0,0 --seconds 10\n"
       "  ./upswing simulate --start 3.0,0,0,0 --set damping=0      no motor: it falls\n"
       "  ./upswing eval runs/d3qn-seed1 --randomize 0.25 --episodes-csv episodes.csv\n"
-      "  ./upswing simulate runs/d3qn-seed1 --randomize 0.25 --episode 17 --csv failure.csv\n");
+      "  ./upswing simulate runs/d3qn-seed1 --randomize 0.25 --episode 17 --csv e.csv\n");
 }
 
 }  // namespace upswing

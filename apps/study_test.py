@@ -134,17 +134,17 @@ class StudyTest(ProgramTest):
         self.write("little.toml", STUDY.replace("gamma = 0.9", "gamma = 0.8"))
         # Of the first run that the folder lists, which is any of them.
         self.refuse(["study", "little.toml"], "runs/little/but/seed", ": made with agent.gamma = 0.9",
-                    "says 0.8", "choose another --out")
+                    "has 0.8", "choose another --out")
 
     def test_another_study_does_not_take_the_place_of_one(self):
         endless = STUDY.replace("steps = 400", "steps = 10000000")
         process = self.start("study", self.write("little.toml", endless), "--out", "x")
         self.assertEqual(self.end(process, signal.SIGINT)[0], 130)
         for old, new, *words in (
-                ('"Little"', '"Large"', 'x/study.toml: made with title "Little"', 'says "Large"'),
-                ('title = "Little"', "", 'made with title "Little"', 'says ""'),
+                ('"Little"', '"Large"', 'x/study.toml: made with title "Little"', 'has "Large"'),
+                ('title = "Little"', "", 'made with title "Little"', 'has ""'),
                 ("[variants.with]", "", 'made with a variant "with"'),
-                ("gamma = 0.9", "gamma = 0.8", "x/but", "made with agent.gamma = 0.9", "says 0.8")):
+                ("gamma = 0.9", "gamma = 0.8", "x/but", "made with agent.gamma = 0.9", "has 0.8")):
             with self.subTest(new=new):
                 self.write("other.toml", endless.replace(old, new))
                 self.refuse(["study", "other.toml", "--out", "x"], *words, "choose another --out")
@@ -157,7 +157,7 @@ class StudyTest(ProgramTest):
                 shutil.rmtree(seed) if seed.is_dir() else seed.unlink()
         self.write("little.toml", STUDY.replace("gamma = 0.9", "gamma = 0.8"))
         self.refuse(["study", "little.toml"], "little/but/settings.toml: made with agent.gamma = 0.9",
-                    "says 0.8", "choose another --out")
+                    "has 0.8", "choose another --out")
 
     def test_a_folder_of_something_else_is_refused(self):
         self.write("little.toml", STUDY)

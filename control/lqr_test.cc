@@ -237,9 +237,10 @@ TEST(Lqr, RefusesAPlantThatCannotBeHeld) {
 TEST(Lqr, RefusesAPlantThatTheStepsCannotFollow) {
   Plant plant;
   plant.damping2 = 100;
-  EXPECT_EQ(MessageOf(LqrConfig(), plant),
-            "lqr: expected a plant whose damping decays at no more than 557/s, so that time steps of "
-            "0.005 s are stable, got 3111/s");
+  EXPECT_EQ(
+      MessageOf(LqrConfig(), plant),
+      "lqr: expected a plant whose damping decays at no more than 557/s, so that time steps of "
+      "0.005 s are stable, got 3111/s");
 }
 
 TEST(Lqr, RefusesWeightsOfNothing) {

@@ -180,7 +180,8 @@ TEST_F(OptionsTest, SaysWhatEachIsWithUnitRangeAndDefault) {
   EXPECT_EQ(find("name").about_with_default(), "a name");
   Option count = find("count");
   count.usual = "as many as there are";
-  EXPECT_EQ(count.about_with_default(), "how many [pieces] (1 to 10; default as many as there are)");
+  EXPECT_EQ(count.about_with_default(),
+            "how many [pieces] (1 to 10; default as many as there are)");
   EXPECT_NE(options_.Toml(true, [](const Option&) { return true; })
                 .find("count = 3  # how many [pieces] (1 to 10)\n"),
             std::string::npos);
