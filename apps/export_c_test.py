@@ -518,8 +518,8 @@ class HeaderTest(ProgramTest):
 def block_of_documentation(section):
     """The lines that a section of docs/howto/export.md tells to type."""
     text = (ROOT / "docs/howto/export.md").read_text(encoding="utf-8").split(f"### {section}\n")[1]
-    return "".join(line[4:] + "\n" for line in text.split("\n### ")[0].splitlines()
-                   if line.startswith("    "))
+    blocks = re.findall(r"^```sh\n(.*?)^```", text.split("\n### ")[0], re.MULTILINE | re.DOTALL)
+    return "".join(blocks)
 
 
 class DocumentedTest(ProgramTest):

@@ -74,7 +74,7 @@ class SmallTrainingTest(ProgramTest):
             self.assertGreater(row["loss"], 0)
             self.assertGreater(row["td_error"], 0)
             self.assertGreater(row["gradient_norm"], 0)
-            self.assertAlmostEqual(row["epsilon"], max(0.05, 0.97 ** row["episodes"]), delta=1e-12)
+            self.assertAlmostEqual(row["epsilon"], max(0.05, 0.977 ** row["episodes"]), delta=1e-12)
 
     def test_episodes(self):
         rows = self.table("episodes.csv", EPISODES)

@@ -6,13 +6,11 @@ README.md, CHANGELOG.md, CONTRIBUTING.md or SECURITY.md into one to a page of th
 another file of the repository into a download of that file, and a link to a folder into its text.
 """
 
+import importlib.util
 import os
 import re
 import sys
 from pathlib import Path
-
-from docutils import nodes
-from latex2mathml import converter
 
 root = Path(os.environ["UPSWING_ROOT"])
 sys.path.insert(0, str(root / "python"))
@@ -21,7 +19,8 @@ project = "Upswing"
 copyright = "the Upswing developers"
 version = release = re.search(r"project\(upswing VERSION (\S+)",
                               (root / "CMakeLists.txt").read_text(encoding="utf-8"))[1]
-extensions = ["myst_parser", "breathe", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+extensions = ["myst_parser", "breathe", "sphinx.ext.autodoc", "sphinx.ext.napoleon",
+              "sphinx.ext.mathjax"]
 
 myst_enable_extensions = ["dollarmath", "deflist"]
 myst_heading_anchors = 4
@@ -41,33 +40,13 @@ napoleon_numpy_docstring = False
 
 html_theme = "furo"
 html_title = f"Upswing {version}"
-html_static_path = ["_static"]
+# One file of MathJax, with its fonts, from a package that has all of it: no network, no other host.
+package = importlib.util.find_spec("sphinx-mathjax-offline").submodule_search_locations[0]
+mathjax_path = "tex-svg-full.js"
+html_static_path = ["_static", str(Path(package) / "static/mathjax" / mathjax_path)]
 html_css_files = ["style.css"]
 html_favicon = "_static/icon.svg"
 html_show_sourcelink = False
 html_copy_source = False
 html_show_sphinx = False
 html_theme_options = {"light_logo": "icon.svg", "dark_logo": "icon.svg"}
-html_math_renderer = "mathml"
-
-
-# Formulas become MathML, which browsers draw themselves: no script, no fonts, no network.
-def mathml(formula, display):
-    text = converter.convert(formula, display=display)
-    # A prime is raised by itself; as an exponent it would be tiny with most fonts.
-    return re.sub(r"<msup>(<mi>[^<]*</mi>)<mi>&#x02032;</mi></msup>",
-                  r'<mrow>\1<mo lspace="0" rspace="0">&#x02032;</mo></mrow>', text)
-
-
-def inline_math(translator, node):
-    translator.body.append(mathml(node.astext(), "inline"))
-    raise nodes.SkipNode
-
-
-def displayed_math(translator, node):
-    translator.body.append(f'<div class="formula">{mathml(node.astext(), "block")}</div>\n')
-    raise nodes.SkipNode
-
-
-def setup(app):
-    app.add_html_math_renderer("mathml", (inline_math, None), (displayed_math, None))

@@ -153,7 +153,7 @@ class Library(unittest.TestCase):
         self.assertEqual(re.findall(r"^\| `upswing::(\w+)`", text, re.MULTILINE), LAYERS)
         for path in (ROOT / "examples").glob("*/CMakeLists.txt"):
             name = path.parent.name
-            self.assertIn(f"(../examples/{name}/{name}.cc)", text)
+            self.assertIn(f"(../../examples/{name}/{name}.cc)", text)
 
     def test_every_header_can_be_included(self):
         self.assertEqual({path.name for path in self.include.iterdir()}, set(LAYERS))

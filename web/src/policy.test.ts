@@ -45,7 +45,7 @@ test('refuses what is cut off, or says so', () => {
   expect(() => new Policy(new ArrayBuffer(0))).toThrow('expected at least 8 bytes, got 0');
   const long = fileOf({});
   new DataView(long).setBigUint64(0, 2n ** 63n, true);
-  expect(() => new Policy(long)).toThrow('header length in the first 8 bytes');
+  expect(() => new Policy(long)).toThrow('header length');
 });
 
 describe('a policy', () => {
@@ -146,7 +146,7 @@ describe('a policy', () => {
       }
     }
     const without = changed(({ header }) => (header.__metadata__!.upswing_version = '0.3.0'));
-    expect(() => new Policy(without)).toThrow('no checksum');
+    expect(() => new Policy(without)).toThrow('"checksum": expected one');
     const wrong = changed(({ header }) => (header.__metadata__!.checksum = '0123456789abcdef'));
     expect(() => new Policy(wrong)).toThrow('checksum');
   });

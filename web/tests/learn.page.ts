@@ -326,7 +326,7 @@ test('an agent that is chosen before the first news stays', async ({ stage: page
     await upswing.choose('fast');
   });
   await expect(page.locator('#learn-updates')).not.toHaveText('0');
-  expect(await page.evaluate(() => upswing.world.policy!.metadata.get('step'))).toBe('230016');
+  expect(await page.evaluate(() => upswing.world.policy!.metadata.get('step'))).toBe('210016');
 });
 
 test('settings are those of the program, which says what is wrong with them', async ({
