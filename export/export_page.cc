@@ -184,7 +184,8 @@ PageAgent ReadAgent(const fs::path& path, const std::string& given_id, int64_t c
   if (id.empty()) id = Cleaned(loaded.policy->info().agent, '-');
   if (!given_id.empty()) id = given_id;
   if (id.empty())
-    throw BadInput(Concat(where, ": expected a name with letters or digits, or --id, got neither"));
+    throw BadInput(
+        Concat(where, ": expected metadata \"agent\" or --id for the ID in the page, got neither"));
 
   PageAgent agent{id, path, ReadFile(loaded.path), EntryOf(loaded, id), {}};
   const std::optional<std::string> command = TrainCommand(loaded.policy->info(), where);
