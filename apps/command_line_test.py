@@ -104,9 +104,9 @@ class NumberTest(ProgramTest):
             (["tets"], 'got "tets" (did you mean test?)'),
             (["pyhton"], 'got "pyhton" (did you mean python?)'),
             (["demos"], 'got "demos" (did you mean demo?)'),
-            (["docs", "--help"], 'expected a command, one of train, '),
-            (["docs", "train"], 'got "docs"'),
-            (["--help", "docs"], 'got "docs"'),
+            (["doc", "--help"], 'expected a command, one of train, '),
+            (["doc", "train"], 'got "doc"'),
+            (["--help", "doc"], 'got "doc"'),
             (["--version", "x"], 'got "x"'),
             (["eval"], "eval: expected POLICY|RUN (policy.safetensors, a run folder or a controller "
                        "(energy, hybrid, lqr, mpc, pfl, tvlqr)), got none"),

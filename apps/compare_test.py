@@ -348,7 +348,7 @@ class CompareTest(ProgramTest):
         with open(self.folder / "out/summary.csv", encoding="utf-8", newline="") as file:
             rows = list(csv.DictReader(file))
         self.assertEqual([row["group"] for row in rows],
-                         ["d3qn (hidden [256, 256], n_step 3)", "d3qn (hidden [9, 9], n_step 1)"])
+                         ["d3qn (hidden [256, 256], n_step 5)", "d3qn (hidden [9, 9], n_step 1)"])
         self.assertEqual(rows[0]["solve_seconds_iqm"], "inf")
         self.assertAlmostEqual(float(rows[1]["solve_seconds_iqm"]), 20 / 3, delta=1e-12)
         with open(self.folder / "out/runs.csv", encoding="utf-8", newline="") as file:

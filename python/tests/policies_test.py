@@ -166,7 +166,7 @@ class BadInput(BadInputTest):
             obs = np.zeros(8)
             self.refuse("expected 6 numbers for each observation, got 8", lambda: policy.act(obs))
             self.refuse("mass2: expected none", lambda: upswing.evaluate(policy, mass2=2))
-            self.refuse("expected a policy of the double pendulum", lambda: upswing.map(policy))
+            self.refuse("expected a policy of double-pendulum", lambda: upswing.map(policy))
             self.assertIn("success_rate", upswing.evaluate(policy, episodes=2))
 
     def test_observations(self):
