@@ -176,8 +176,10 @@ std::string ExplainUnknown(const CLI::App& program, const CLI::App& app) {
   const std::string word = unknown.front().substr(0, unknown.front().find('='));
   if (word.starts_with("-")) return Concat("unknown flag ", word, ExplainFlag(app, word));
   const std::string meant = DidYouMean(word, KnownWords(app));
-  return &app == &program ? ExplainCommands(program, Concat("\"", word, "\"", meant))
-                          : Concat(app.get_name(), ": expected no argument ", word, meant);
+  return &app == &program
+             ? ExplainCommands(program, Concat("\"", word, "\"", meant))
+             : Concat(app.get_name(), ": expected no argument ", word,
+                      meant.empty() ? "; a value follows its flag, as in --seed 1" : meant);
 }
 
 /// The message for a wrong command line, in one line.

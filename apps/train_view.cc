@@ -36,9 +36,9 @@ class TrainView : public TrainObserver {
   void Announce(const std::filesystem::path& run) const {
     const Config& config = training_.config();
     Say("Training {} (seed {}) in {}\n", config.agent, config.train.seed, Printable(run.string()));
-    Say("  {}, {} parameters; {} environments, {}\n", config.learner().Text(),
-        FormatCount(training_.policy()->num_parameters()), config.train.envs,
-        Counted(training_.threads(), "thread"));
+    Say("  {}, {} parameters; {}, {}\n", config.learner().Text(),
+        FormatCount(training_.policy()->num_parameters()),
+        Counted(config.train.envs, "environment"), Counted(training_.threads(), "thread"));
     if (!HasPlant(config.task)) Say("  task {}\n", config.task);
     if (config.physics != kMuJoCo.name) Say("  physics {}\n", config.physics);
     const std::optional<ModelInfo> model = InfoOfModel(config.mjcf, config.model);
@@ -92,7 +92,8 @@ class TrainView : public TrainObserver {
       Say("Best policy: from step {}, but {} no longer exists\n", FormatCount(s.best_step),
           Printable(policy.string()));
     }
-    if (s.solved && ValueIsOff(value_, discounted_return_)) {
+    if (s.solved && !training_.config().learner().HasSoftValues() &&
+        ValueIsOff(value_, discounted_return_)) {
       Say("Warning: at the last evaluation the agent expected a discounted return of {:.4g} and\n"
           "got {:.4g}; the estimate is off by more than a quarter.\n",
           value_, discounted_return_);

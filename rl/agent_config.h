@@ -48,6 +48,8 @@ struct AgentConfig {
 
   /// Settings that keep the agent from learning in so many steps, a line each.
   virtual std::vector<std::string> Warnings(int64_t steps, int64_t num_envs) const = 0;
+  /// Whether values include an entropy bonus, so that they differ from discounted returns.
+  virtual bool HasSoftValues() const { return false; }
 };
 
 /// Widths of layers as text, such as `64-64`.

@@ -32,6 +32,7 @@ struct SacConfig : AgentConfig, OffPolicyConfig {
   AgentSize Size(const EnvSpec& spec) const override;
   std::string Text() const override;
   std::vector<std::string> Warnings(int64_t steps, int64_t num_envs) const override;
+  bool HasSoftValues() const override { return entropy_reward; }
 
   /// The shape of a network of this many inputs and outputs.
   NetworkShape Shape(int inputs, int outputs) const;
