@@ -146,7 +146,7 @@ describe('a policy', () => {
       }
     }
     const without = changed(({ header }) => (header.__metadata__!.upswing_version = '0.3.0'));
-    expect(() => new Policy(without)).toThrow('no checksum');
+    expect(() => new Policy(without)).toThrow('metadata "checksum": expected one');
     const wrong = changed(({ header }) => (header.__metadata__!.checksum = '0123456789abcdef'));
     expect(() => new Policy(wrong)).toThrow('checksum');
   });
