@@ -342,7 +342,7 @@ def overview(lab):
 @recipe("time-to-solve")
 def time_to_solve(lab):
     rows = []
-    for agent in ("d3qn", "fast", "sac", "sac-fast", "ppo", "dqn", "double-dqn", "dueling-dqn"):
+    for agent in ("d3qn", "fast", "sac", "sac-fast", "ppo"):
         few = ["--steps", 4000] if lab.few else []
         out = lab.folder / agent
         lab.run("train", "--agent", agent, "--seeds", 2 if lab.few else 20, "--threads", 2,
