@@ -127,17 +127,28 @@ def hyperparameters_table(algorithm, *names):
     """Named agents as columns (without names: all of the algorithm), and these settings as rows:
     all of the network and of the algorithm, all of training and task that change what is learned,
     and those of plant, sensors, random plants and reward in which the agents differ."""
+    return settings_table(algorithm, names, LEARNING)
+
+
+@generated("differences")
+def differences_table(algorithm, *names):
+    """Named agents as columns, and the settings in which they differ as rows."""
+    return settings_table(algorithm, names, set())
+
+
+def settings_table(algorithm, names, sections):
+    """Rows: the settings of these sections, and those in which the agents differ."""
     known = [name for name in program.agents() if program.algorithm_of(name) == algorithm]
     default = program.ALGORITHMS.get(algorithm)
     names = names or sorted(known, key=lambda name: name != default)
     if not known or not set(names) <= set(known):
-        raise Problem(f"hyperparameters: expected an algorithm and agents of it, got "
+        raise Problem("expected an algorithm and agents of it, got "
                       f"{' '.join([algorithm, *names])}")
     columns = [program.settings(name) for name in names]
     rows = []
     for setting, first in columns[0].items():
         values = [column[setting].default for column in columns]
-        if setting not in BOOKKEEPING and (first.section in LEARNING or len(set(values)) > 1):
+        if setting not in BOOKKEEPING and (first.section in sections or len(set(values)) > 1):
             rows.append([f"`{setting}`", *(readable(value) for value in values)])
     return markdown_table(["setting", *(f"`{name}`" for name in names)], rows)
 
