@@ -13,7 +13,8 @@ docs/results/data/ID.json holds one table, as it is displayed:
   {"title": …, "commands": […], "measured": {"version": …, "date": …, "machine": …, "commit": …},
    "columns": […], "rows": [[…], …]}
 
-Pages show it between `<!-- table: ID -->` and `<!-- end -->`, and one cell of it in a sentence as
+Pages show it between `<!-- table: ID -->` and `<!-- end -->`, above a line that names version, date,
+machine and first command. They show one cell of it in a sentence as
 `<!-- value: ID ROW COLUMN -->text<!-- end -->`. ROW is the text of the first cell without
 backticks; COLUMN is an index or a header. GENERATED lists the tables that come from the program:
 `<!-- generated: commands -->` … `<!-- end -->`.
@@ -36,6 +37,8 @@ import program
 from program import ROOT
 
 DATA = ROOT / "docs/results/data"
+MACHINES_PAGE = ROOT / "docs/results/index.md"
+UNRECORDED = "unrecorded"  # machine of an old table
 BLOCK = re.compile(r"(<!-- (table|generated): ([^\n]+?) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 VALUE = re.compile(r"<!-- value: (\S+) ([^\n]+?) -->(.*?)<!-- end -->", re.DOTALL)
 
@@ -120,20 +123,38 @@ def agents_table():
 
 
 @generated("hyperparameters")
-def hyperparameters_table(algorithm):
-    """Every named agent of the algorithm as a column, every setting that differs as a row."""
-    names = [name for name in program.agents() if program.algorithm_of(name) == algorithm]
-    if not names:
-        raise Problem(f"hyperparameters: no agent has the algorithm {algorithm}")
-    default = program.ALGORITHMS[algorithm]
-    names.sort(key=lambda name: name != default)
+def hyperparameters_table(algorithm, *names):
+    """Named agents as columns (without names: all of the algorithm), and these settings as rows:
+    all of the network and of the algorithm, all of training and task that change what is learned,
+    and those of plant, sensors, random plants and reward in which the agents differ."""
+    return settings_table(algorithm, names, LEARNING)
+
+
+@generated("differences")
+def differences_table(algorithm, *names):
+    """Named agents as columns, and the settings in which they differ as rows."""
+    return settings_table(algorithm, names, set())
+
+
+def settings_table(algorithm, names, sections):
+    """Rows: the settings of these sections, and those in which the agents differ."""
+    known = [name for name in program.agents() if program.algorithm_of(name) == algorithm]
+    default = program.ALGORITHMS.get(algorithm)
+    names = names or sorted(known, key=lambda name: name != default)
+    if not known or not set(names) <= set(known):
+        raise Problem("expected an algorithm and agents of it, got "
+                      f"{' '.join([algorithm, *names])}")
     columns = [program.settings(name) for name in names]
     rows = []
-    for setting in columns[0]:
-        values = [column[setting].default if setting in column else "" for column in columns]
-        if setting != "agent" and len(set(values)) > 1:
+    for setting, first in columns[0].items():
+        values = [column[setting].default for column in columns]
+        if setting not in BOOKKEEPING and (first.section in sections or len(set(values)) > 1):
             rows.append([f"`{setting}`", *(readable(value) for value in values)])
     return markdown_table(["setting", *(f"`{name}`" for name in names)], rows)
+
+
+LEARNING = {"train", "task", "network", "agent"}  # sections
+BOOKKEEPING = {"agent", "algorithm", "seed", "log_every", "checkpoint_every", "threads"}
 
 
 def readable(value):
@@ -145,7 +166,8 @@ def readable(value):
 def machines_table():
     return markdown_table(["machine", "processor", "cores", "memory", "system"],
                           [[f"`{name}`", each["cpu"], str(each["cores"]), each["memory"],
-                            each["system"]] for name, each in machines().items()])
+                            each["system"]] for name, each in machines().items()
+                           if name != UNRECORDED])
 
 
 @generated("measurements")
@@ -177,35 +199,49 @@ def without_code(text):
                   text, flags=re.MULTILINE | re.DOTALL)
 
 
-def render(kind, name):
+def origin(table, page):
+    """Version, date, machine and commands of a measured table: the line below it."""
+    measured, commands = table["measured"], table["commands"]
+    parts = [f"Version {measured['version']}", measured["date"]]
+    if measured["machine"] != UNRECORDED:
+        place = os.path.relpath(MACHINES_PAGE, page.parent)
+        parts.append(f"[{measured['machine']}]({place}#machines)")
+    line = ", ".join(parts)
+    if commands:
+        number = f"first of {len(commands)} commands: " if len(commands) > 1 else ""
+        line += f"; {number}`{commands[0]}`"
+    return f"\n*{line}*\n"
+
+
+def render(kind, name, page=MACHINES_PAGE):
     if kind == "table":
         table = load(name)
-        return markdown_table(table["columns"], table["rows"])
+        return markdown_table(table["columns"], table["rows"]) + origin(table, page)
     function, *arguments = name.split()
     if function not in GENERATED:
         raise Problem(f"generated: expected one of {', '.join(GENERATED)}, got {function}")
     return GENERATED[function](*arguments)
 
 
-def rendered(text):
-    """The text with all its tables rendered."""
+def rendered(text, page=MACHINES_PAGE):
+    """The text of a page with all its tables rendered."""
     seen = without_code(text)
     pieces, end = [], 0
     for block in BLOCK.finditer(seen):
-        pieces += [text[end:block.end(1)], render(block[2], block[3])]
+        pieces += [text[end:block.end(1)], render(block[2], block[3], page)]
         end = block.start(5)
     return "".join([*pieces, text[end:]])
 
 
-def problems_of(text):
-    """What is wrong with a page."""
+def problems_of(text, page=MACHINES_PAGE):
+    """What is wrong with the text of a page."""
     seen = without_code(text)
     opened, closed = len(re.findall(r"<!-- (?:table|generated|value): ", seen)), seen.count("<!-- end -->")
     if opened != closed:
         yield f"{opened} markers open a table or value and {closed} end one"
     for block in BLOCK.finditer(seen):
         try:
-            if render(block[2], block[3]) != block[4]:
+            if render(block[2], block[3], page) != block[4]:
                 yield f"{block[2]} {block[3]}: out of date; run tools/results.py write"
         except Problem as problem:
             yield str(problem)
@@ -220,7 +256,7 @@ def problems_of(text):
 
 def check():
     problems = [f"{page.relative_to(ROOT)}: {problem}" for page in pages()
-                for problem in problems_of(page.read_text(encoding="utf-8"))]
+                for problem in problems_of(page.read_text(encoding="utf-8"), page)]
     for path in sorted(DATA.glob("*.json")):
         try:
             if path.stem != "machines":
@@ -235,7 +271,7 @@ def write():
     for page in pages():
         text = page.read_text(encoding="utf-8")
         try:
-            new = rendered(text)
+            new = rendered(text, page)
         except Problem as problem:
             print(f"{page.relative_to(ROOT)}: {problem}", file=sys.stderr)
             return 1
