@@ -209,7 +209,8 @@ def episode():
     return fig
 
 
-BREAK, LOW, HIGH = 2400, 950, 2720  # returns: the axis is compressed below BREAK
+BREAK, LOW, HIGH = 2400, 950, 2720  # returns: the axis is compressed below BREAK or less
+CLEAR = 60                          # distance of every return from the break
 
 
 def ablation(name, agent, reference):
@@ -226,15 +227,19 @@ def ablation(name, agent, reference):
     fig = canvas(800, 26 * len(rows) + 92)
     height = 26 * len(rows)
     narrow = min(low for _, low, _ in values) >= BREAK
-    panels = [(panel(fig, 210, 30, 410, height), (BREAK, highest))] if narrow else [
-        (panel(fig, 210, 30, 130, height), (lowest, BREAK)), (panel(fig, 346, 30, 274, height), (BREAK, highest))]
+    cut = BREAK
+    while not narrow and any(abs(value - cut) < CLEAR for value, _, _ in values):
+        cut -= 50
+    panels = [(panel(fig, 210, 30, 410, height), (cut, highest))] if narrow else [
+        (panel(fig, 210, 30, 130, height), (lowest, cut)), (panel(fig, 346, 30, 274, height), (cut, highest))]
     for k, (axes, limits) in enumerate(panels):
         axes.set_xlim(*limits)
         axes.set_ylim(len(rows) - 0.5, -0.5)
         axes.grid(axis="y", visible=False)
         axes.tick_params(axis="y", length=0)
         axes.set_yticks(range(len(rows)), [row[0] for row in rows] if k == 0 else [])
-        axes.set_xticks([1000, 1500, 2000] if limits[1] == BREAK else [2400, 2500, 2600, 2700][0 if narrow else 1:])
+        axes.set_xticks([1000, 1500, 2000] if limits[1] == cut else
+                        [tick for tick in (2400, 2500, 2600, 2700) if narrow or tick > cut])
         axes.xaxis.set_major_formatter("{x:,.0f}")
         axes.spines["left"].set_visible(False)
         if limits[0] < values[reference][0] < limits[1]:
@@ -322,7 +327,8 @@ def realaigym_scores():
         for k, (name, left) in enumerate((("S", 150), ("R", 480))):
             cells = [row[columns.index(name)] for row in rows]
             axes = dots(fig, left, 260, top, rows, [number(cell) for cell in cells], k == 0,
-                        (0.3, 0.8) if name == "S" else (0.2, 1), cells)
+                        (0.3, 0.9) if name == "S" else (0.2, 1.2), cells)  # the right end is for the values
+            axes.set_xticks([0.3, 0.4, 0.5, 0.6, 0.7] if name == "S" else [0.2, 0.4, 0.6, 0.8, 1])
             if robot != blocks[-1][0]:
                 axes.tick_params(axis="x", labelbottom=False)
     return fig
@@ -363,7 +369,7 @@ def edges(centers):
 @figure("maps")
 def maps():
     """Success over the masses of both links, of an agent of one plant and of one that identifies its plant."""
-    fig, image = canvas(800, 410), None
+    fig, image = canvas(800, 440), None
     for k, (agent, left) in enumerate((("d3qn", 70), ("d3qn-adaptive", 390))):
         rows = rows_of(CSV / f"map-{agent}.csv")
         if not rows:
@@ -389,6 +395,12 @@ def maps():
     bar.outline.set_visible(False)
     bar.ax.grid(visible=False)
     note(fig, 724, 22, "success")
+    for x, marker, name in ((120, "o", "nominal plant"), (330, "s", "±25%: the plants of d3qn-adaptive's training")):
+        mark = panel(fig, x, 412, 20, 20)
+        mark.set_axis_off()
+        mark.plot(0, 0, marker, markerfacecolor="none", markeredgecolor="#d84a4a", markersize=13, markeredgewidth=2,
+                  clip_on=False)
+        note(fig, x + 28, 422, name)
     return fig
 
 
@@ -420,13 +432,15 @@ def lqr_catch():
 
 @figure("pareto")
 def pareto():
-    """Return against torque variation of all agents and controllers."""
+    """What return misses to the bound, against torque change, of all agents and controllers."""
     data = table("overview")
     if not data:
         return None
     columns, rows = data
     share, variation = (next(k for k, column in enumerate(columns) if column.startswith(name))
                         for name in ("return / bound", "torque variation"))
+    success = columns.index("success")
+    unreliable = {row[0] for row in rows if number(row[success]) != 100}
     points = [(row[0], number(row[variation]), number(row[share])) for row in rows
               if number(row[variation]) is not None and number(row[share]) is not None]
     fig = canvas(800, 500)
@@ -440,17 +454,17 @@ def pareto():
     axes.set_xlim(smallest / 1.5, largest * 1.8)
     axes.set_ylim(min(height(y) for _, _, y in points) - 0.12, max(height(y) for _, _, y in points) + 0.12)
     ticks = [tick for tick in (0, 50, 80, 90, 95, 98, 99) if axes.get_ylim()[0] <= height(tick) <= axes.get_ylim()[1]]
-    axes.set_yticks([height(tick) for tick in ticks], [f"{tick}%" for tick in ticks])
+    axes.set_yticks([height(tick) for tick in ticks], [f"{100 - tick}" for tick in ticks])
     decades = [tick for tick in (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500)
                if axes.get_xlim()[0] <= tick <= axes.get_xlim()[1]]
     axes.set_xticks(decades, [f"{tick:g}" for tick in decades])
     axes.minorticks_off()
-    axes.set_xlabel("torque variation [N·m/s] (less is smoother)")
-    axes.set_ylabel("return, share of the bound")
+    axes.set_xlabel("torque change [N·m/s] (less is smoother)")
+    axes.set_ylabel("return, missing to the bound [%]")
 
     best, front = -math.inf, []
-    for _, x, y in sorted(points, key=lambda point: (point[1], -point[2])):
-        if y > best:
+    for name, x, y in sorted(points, key=lambda point: (point[1], -point[2])):
+        if y > best and name not in unreliable:
             front.append((x, height(y)))
             best = y
     corners = [front[0]]
@@ -464,14 +478,16 @@ def pareto():
     steps = axes.transData.transform(corners)
     taken += [(min(a[0], b[0]), min(a[1], b[1]), max(a[0], b[0]) + 1, max(a[1], b[1]) + 1) for a, b in zip(steps, steps[1:])]
     for name, x, y in points:
-        axes.plot(x, height(y), "s" if name in CONTROLLERS else "o", color=AGENTS[name], markersize=11,
-                  markeredgecolor=PAPER, markeredgewidth=1, zorder=3)
+        axes.plot(x, height(y), "s" if name in CONTROLLERS else "o", markersize=11, zorder=3,
+                  **(dict(markerfacecolor=PAPER, markeredgecolor=AGENTS[name], markeredgewidth=2) if name in unreliable
+                     else dict(color=AGENTS[name], markeredgecolor=PAPER, markeredgewidth=1)))
         place_label(axes, name, pixels[name], taken)
     from matplotlib.lines import Line2D
     marks = [Line2D([], [], color=MUTED, marker=marker, linestyle="none", markersize=10) for marker in "os"]
+    marks.append(Line2D([], [], color=MUTED, markerfacecolor=PAPER, marker="s", linestyle="none", markersize=10))
     marks.append(Line2D([], [], color=MUTED, linewidth=1.3, linestyle=(0, (4, 3))))
-    axes.legend(marks, ["agent", "controller", "best trade-offs"], loc="lower center",
-                bbox_to_anchor=(0.5, 1.0), ncols=3, borderpad=0, handletextpad=0.4)
+    axes.legend(marks, ["agent", "controller", "hollow: some episodes fail", "best trade-offs"], loc="lower center",
+                bbox_to_anchor=(0.5, 1.0), ncols=4, borderpad=0, handletextpad=0.4)
     return fig
 
 
@@ -551,7 +567,10 @@ def success_by_delta():
     axes.set_ylim(-3, 103)
     axes.set_ylabel("success [%]")
     axes.set_xlabel("|δ| of the plant")
-    axes.legend(loc="lower right", handlelength=1)
+    from matplotlib.lines import Line2D
+    handles, names = axes.get_legend_handles_labels()
+    bar = Line2D([], [], color=MUTED, marker="|", markersize=15, markeredgewidth=2.5, linestyle="none")
+    axes.legend([*handles, bar], [*names, "bar: 95% interval"], loc="lower right", handlelength=1)
     return fig
 
 
