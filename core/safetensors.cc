@@ -132,8 +132,7 @@ uint64_t ReadSafetensorsLength(std::span<const std::byte> first_bytes, uint64_t 
     throw BadInput(Concat("expected at least 8 bytes, got ", file_size));
   std::memcpy(&length, first_bytes.data(), sizeof(length));
   if (length > kMaxHeader) {
-    throw BadInput(Concat("header length: expected at most ", kMaxHeader,
-                          ", got ", length));
+    throw BadInput(Concat("header length: expected at most ", kMaxHeader, ", got ", length));
   }
   if (length > file_size - sizeof(length)) {
     throw BadInput(
