@@ -26,7 +26,7 @@ Examples:
 END_OF_USAGE
 }
 
-bad_input() { say "demo: $*"; exit 2; }
+bad_input() { say "$command: $*"; exit 2; }
 
 # Reads the arguments: `runs` (how many there are of them, which stay as "$@"), `port`, `dist`.
 demo() {

@@ -24,9 +24,6 @@ Examples:
 END_OF_USAGE
 }
 
-# In place of that of demo.sh, whose check of a folder is used here.
-bad_input() { say "docs: $*"; exit 2; }
-
 docs() {
   action=build dist=''
   while [ $# -gt 0 ]; do
@@ -67,30 +64,11 @@ set_site() {
   set_demo_option --dist "$1"
 }
 
-# What the virtual environment has to be made of.
-docs_stamp() {
-  python3 -c 'import sys; print(sys.version, sys.base_exec_prefix)'
-  cat "$root/tools/docs-requirements.txt"
-}
-
-# Makes the virtual environment unless it is there; its mark is written last.
-make_docs_venv() {
-  stamp=$(docs_stamp)
-  mark=$docs_venv/made-of.txt
-  [ ! -f "$mark" ] || [ "$(cat "$mark")" != "$stamp" ] || return 0
-  say "making a virtual environment for the documentation (build/docs-venv)"
-  rm -rf "$docs_venv"
-  python3 -m venv "$docs_venv" || fail "could not make a virtual environment (see above)"
-  "$docs_venv/bin/python" -m pip --disable-pip-version-check install --quiet \
-    --only-binary=:all: --requirement "$root/tools/docs-requirements.txt" >&2 ||
-    fail "pip could not install Sphinx (see above). Is there a network?"
-  echo "$stamp" >"$mark"
-}
-
 # Installs Doxygen and Sphinx. Where set_up follows, one lock after the other is held.
 set_up_docs() {
   # shellcheck disable=SC2086  # a list of words
-  (install_packages $packages doxygen && lock && make_docs_venv) </dev/null || exit 1
+  (install_packages $packages doxygen && lock &&
+    make_venv "the documentation" "$docs_venv" python3 tools/docs-requirements.txt) </dev/null || exit 1
 }
 
 build_docs() {

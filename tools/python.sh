@@ -34,28 +34,10 @@ END
   return 1
 }
 
-# What the environment has to be made of.
-python_stamp() {
-  "$1" -c 'import sys; print(sys.version, sys.base_exec_prefix)'
-  cat "$root"/tools/python-requirements.txt
-}
-
-# Makes the virtual environment unless it is there; its mark is written last.
+# Makes the virtual environment, which has the package as it is built.
 make_python_venv() {
   base=$(find_base_python) || fail "no Python 3.10 or newer with its headers (Debian's python3-dev)"
-  stamp=$(python_stamp "$base")
-  mark=$python_venv/made-of.txt
-  [ ! -f "$mark" ] || [ "$(cat "$mark")" != "$stamp" ] || return 0
-  say "making a virtual environment for Python (build/python-venv)"
-  rm -rf "$python_venv"
-  "$base" -m venv "$python_venv" || fail "could not make a virtual environment (see above)"
-  "$python_venv/bin/python" -m pip --disable-pip-version-check install --quiet \
-    --only-binary=:all: --requirement "$root/tools/python-requirements.txt" >&2 ||
-    fail "pip could not install what the package needs (see above). Is there a network?"
-  # The package as it is built.
-  echo "$root/build/release/python" >"$("$python_venv/bin/python" -c \
-    'import sysconfig; print(sysconfig.get_path("purelib"))')/upswing-build.pth"
-  echo "$stamp" >"$mark"
+  make_venv Python "$python_venv" "$base" tools/python-requirements.txt "$root/build/release/python"
 }
 
 # Lets the release build have the package too.
