@@ -20,6 +20,7 @@ from pathlib import Path
 from urllib.parse import unquote
 
 import program
+from pages import FENCED, markdown_table
 from program import ROOT
 
 WORK = Path(os.environ.get("UPSWING_DOCS_WORK", ROOT / "build/docs-work"))
@@ -110,11 +111,11 @@ def stage_page(stage, path, name):
 
 def outside_code(text, change):
     """The text, changed outside fenced blocks."""
-    pieces = re.split(r"(^(?P<fence>```+|~~~+)[^\n]*\n.*?^(?P=fence)[^\n]*\n)", text,
-                      flags=re.MULTILINE | re.DOTALL)
-    # Of each fenced block, split() returns the block and then its fence.
-    return "".join(change(piece) if i % 3 == 0 else piece if i % 3 == 1 else ""
-                   for i, piece in enumerate(pieces))
+    pieces, end = [], 0
+    for block in FENCED.finditer(text):
+        pieces += [change(text[end:block.start()]), block[0]]
+        end = block.end()
+    return "".join([*pieces, change(text[end:])])
 
 
 # --- Generated pages ----------------------------------------------------------------------------
@@ -123,9 +124,9 @@ def outside_code(text, change):
 def command_line_page():
     parts = ["# Command line\n\nThe help text of every command, as `./upswing COMMAND --help` prints "
              "it. [Settings](settings.md) has the settings of trainings as tables.\n",
-             "| command | what it does |\n|---|---|\n"
-             + "".join(f"| [`{name}`](#{name}) | {text} |\n"
-                       for name, text in program.commands().items())]
+             markdown_table(["command", "what it does"],
+                            [[f"[`{name}`](#{name})", text]
+                             for name, text in program.commands().items()])]
     for name in program.commands():
         text = program.help_of(name).rstrip().replace(str(ROOT), ".")
         parts.append(f"## {name}\n\n```text\n{text}\n```\n")
@@ -166,8 +167,8 @@ The defaults are those of the agents """
 def settings_table(rows):
     lines = [[f"`{setting.name}`", default, setting.values, setting.unit, setting.meaning]
              for setting, default in rows]
-    return "| name | default | range | unit | meaning |\n|---|---|---|---|---|\n" + "".join(
-        f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in line)} |\n" for line in lines)
+    return markdown_table(["name", "default", "range", "unit", "meaning"],
+                          [[cell.replace("|", "\\|") for cell in line] for line in lines])
 
 
 def code(value):
@@ -228,15 +229,14 @@ SECTIONS = ("briefdescription detaileddescription innerclass define enum func ty
 
 def stage_cpp_api(stage):
     names = layers()
-    listing = "".join(f"| [`{name}`](cpp-api/{name}.md) | {LAYERS.get(name, name)} | "
-                      f"{len(headers_of(name))} |\n" for name in names)
+    listing = markdown_table(["layer", "purpose", "headers"],
+                             [[f"[`{name}`](cpp-api/{name}.md)", LAYERS.get(name, name),
+                               str(len(headers_of(name)))] for name in names])
     stage.write("reference/cpp-api.md", f"""# C++ API
 
 The installed headers, by layer. A layer uses only layers above it in this table. [The C++
 library](../howto/cpp-library.md) shows how to link it. All names are in the namespace `upswing`.
 
-| layer | purpose | headers |
-|---|---|---|
 {listing}
 ```{{toctree}}
 :hidden:

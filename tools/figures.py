@@ -21,10 +21,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+from program import ROOT
+from results import DATA
 from seeds.wilson import wilson
 
-ROOT = Path(__file__).resolve().parent.parent
-DATA = ROOT / "docs/results/data"
 FIGURES = ROOT / "docs/figures"
 CSV = FIGURES / "data"
 
@@ -53,7 +53,11 @@ INK, MUTED, GRID, PAPER, LINK1, LINK2, TORQUE = (placeholder for placeholder, _,
 REWARD = {"energy": "#2f7de0", "height": "#2a9d9d", "balance": "#b98200", "velocity penalty": "#b06ac8",
           "torque penalty": "#d84a4a"}
 
-DRAWN = {}  # name of the figure: function that returns a matplotlib figure, or None without data
+DRAWN = {}  # name of the figure: function that returns a matplotlib figure, or raises NoData
+
+
+class NoData(Exception):
+    """A data file of the figure does not exist or is empty."""
 
 
 def figure(name):
@@ -121,10 +125,10 @@ def svg(fig):
 # --- Data ---
 
 def table(name):
-    """Columns and rows of a data file, without Markdown, or None."""
+    """Columns and rows of a data file, without Markdown. Raises NoData."""
     path = DATA / f"{name}.json"
     if not path.exists():
-        return None
+        raise NoData
     data = json.loads(path.read_text(encoding="utf-8"))
     plain = [[cell.replace("`", "").replace("*", "").replace("\\|", "|") for cell in row]
              for row in [data["columns"], *data["rows"]]]
@@ -144,10 +148,16 @@ def interval(cell):
 
 
 def rows_of(path):
-    if not path.exists():
-        return None
     with open(path, newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
+
+
+def data_of(path):
+    """The rows of a data file, by column. Raises NoData."""
+    rows = rows_of(path) if path.exists() else []
+    if not rows:
+        raise NoData
+    return rows
 
 
 # --- Figures ---
@@ -155,9 +165,7 @@ def rows_of(path):
 @figure("episode")
 def episode():
     """Angles, torque and the terms of the reward over one swing-up of d3qn."""
-    rows = rows_of(CSV / "episode.csv")
-    if not rows:
-        return None
+    rows = data_of(CSV / "episode.csv")
     column = {name: [float(row[name]) for row in rows] for name in rows[0]}
     t, upright = column["t"], next(float(row["t"]) for row in rows if row["inverted"] == "1")
     fig = canvas(800, 640)
@@ -215,10 +223,7 @@ CLEAR = 60                          # distance of every return from the break
 
 def ablation(name, agent, reference):
     """One row for each variant: return at the end with its 95% interval, and how many seeds solved."""
-    data = table(name)
-    if not data:
-        return None
-    columns, rows = data
+    columns, rows = table(name)
     at = next(k for k, column in enumerate(columns) if column.startswith("return at the end"))
     rows = [row for row in rows if interval(row[at])]
     values = [interval(row[at]) for row in rows]
@@ -278,12 +283,10 @@ def entries(columns_of):
     """(robot, first pixel, columns, rows) of each RealAIGym table, below each other."""
     top = 50
     for robot in ROBOTS:
-        data = table(f"realaigym-{robot}")
-        if data:
-            columns, rows = data
-            rows = [row for row in rows if any(number(row[columns.index(name)]) is not None for name in columns_of)]
-            yield robot, top, columns, rows
-            top += 22 * len(rows) + 50
+        columns, rows = table(f"realaigym-{robot}")
+        rows = [row for row in rows if any(number(row[columns.index(name)]) is not None for name in columns_of)]
+        yield robot, top, columns, rows
+        top += 22 * len(rows) + 50
 
 
 def dots(fig, left, width, top, rows, values, names, limits, texts=None):
@@ -316,8 +319,6 @@ def dots(fig, left, width, top, rows, values, names, limits, texts=None):
 def realaigym_scores():
     """Scores of performance and robustness, ours beside the published entries."""
     blocks = list(entries(("S", "R")))
-    if not blocks:
-        return None
     _, top, _, rows = blocks[-1]
     fig = canvas(800, top + 22 * len(rows) + 40)
     note(fig, 150 + 130, 14, "S: performance", ha="center", color=MUTED)
@@ -338,8 +339,6 @@ def realaigym_scores():
 def realaigym_robustness():
     """The six rows of robustness, ours beside the published entries."""
     blocks = list(entries(CHALLENGES))
-    if not blocks:
-        return None
     _, top, _, rows = blocks[-1]
     fig = canvas(800, top + 22 * len(rows) + 62)
     for k, name in enumerate(CHALLENGES):
@@ -371,9 +370,7 @@ def maps():
     """Success over the masses of both links, of an agent of one plant and of one that identifies its plant."""
     fig, image = canvas(800, 440), None
     for k, (agent, left) in enumerate((("d3qn", 70), ("d3qn-adaptive", 390))):
-        rows = rows_of(CSV / f"map-{agent}.csv")
-        if not rows:
-            return None
+        rows = data_of(CSV / f"map-{agent}.csv")
         x, y = (sorted({float(row[name]) for row in rows}) for name in ("mass1", "mass2"))
         success = {(float(row["mass1"]), float(row["mass2"])): float(row["success_rate"]) for row in rows}
         axes = panel(fig, left, 40, 300, 300)
@@ -407,15 +404,12 @@ def maps():
 @figure("lqr-catch")
 def lqr_catch():
     """From where, at rest, the LQR catches the pendulum."""
-    path = CSV / "lqr-catch.csv"
-    if not path.exists():
-        return None
-    with open(path, newline="", encoding="utf-8") as file:
-        header, *lines = list(csv.reader(file))
-    x, y = [float(cell) for cell in header[1:]], [float(line[0]) for line in lines]
+    rows = data_of(CSV / "lqr-catch.csv")
+    first, *columns = rows[0]
+    x, y = [float(column) for column in columns], [float(row[first]) for row in rows]
     fig = canvas(800, 500)
     axes = panel(fig, 90, 20, 420, 420)
-    success_map(axes, [[int(cell) for cell in line[1:]] for line in lines], (*edges(x), *edges(y)))
+    success_map(axes, [[int(row[column]) for column in columns] for row in rows], (*edges(x), *edges(y)))
     axes.grid(visible=False)
     axes.set_xticks([150, 165, 180, 195, 210])
     axes.set_yticks([-30, -15, 0, 15, 30])
@@ -433,10 +427,7 @@ def lqr_catch():
 @figure("pareto")
 def pareto():
     """What return misses to the bound, against torque change, of all agents and controllers."""
-    data = table("overview")
-    if not data:
-        return None
-    columns, rows = data
+    columns, rows = table("overview")
     share, variation = (next(k for k, column in enumerate(columns) if column.startswith(name))
                         for name in ("return / bound", "torque variation"))
     success = columns.index("success")
@@ -511,9 +502,7 @@ def place_label(axes, name, at, taken):
 @figure("values-over-training")
 def values_over_training():
     """Expected over attained discounted return: median and range of the seeds, over training."""
-    rows = rows_of(DATA / "values-over-training.csv")
-    if not rows:
-        return None
+    rows = data_of(DATA / "values-over-training.csv")
     from statistics import median
     fig = canvas(800, 420)
     axes = panel(fig, 80, 20, 690, 335)
@@ -546,10 +535,7 @@ def values_over_training():
 @figure("success-by-delta")
 def success_by_delta():
     """Success over |δ|, with Wilson's 95% intervals."""
-    data = table("robustness-delta")
-    if not data:
-        return None
-    columns, rows = data
+    columns, rows = table("robustness-delta")
     rows = [row for row in rows if row[0] != "all"]
     fig = canvas(800, 420)
     axes = panel(fig, 80, 20, 700, 330)
@@ -581,9 +567,7 @@ STATISTICS = {"mean": "#2f7de0", "median": "#d9662a", "IQM": "#1a9b6c", "Welch's
 @figure("seeds-wrong")
 def seeds_wrong():
     """Share of wrong conclusions over the number of seeds, by return."""
-    rows = rows_of(FIGURES / "seeds/seeds.csv")
-    if not rows:
-        return None
+    rows = data_of(FIGURES / "seeds/seeds.csv")
     rows = [row for row in rows if row["score"] == "best_return"]
     comparisons = list(dict.fromkeys(row["comparison"] for row in rows))
     fig = canvas(800, 550)
@@ -612,9 +596,7 @@ def seeds_wrong():
 @figure("seeds-distribution")
 def seeds_distribution():
     """Histograms of steps to solve and of return over ten thousand seeds of fast."""
-    rows = rows_of(FIGURES / "seeds/fast.csv")
-    if not rows:
-        return None
+    rows = data_of(FIGURES / "seeds/fast.csv")
     fig = canvas(800, 330)
     for column, scale, width, label, left in (("solve_steps", 1000, 10, "steps to solve [thousands]", 75),
                                               ("best_return", 1, 15, "return of the best policy", 450)):
@@ -697,8 +679,10 @@ def collect_values(folder):
 def draw(name):
     """The SVG of a figure, or None if its data do not exist."""
     style()
-    fig = DRAWN[name]()
-    return svg(fig) if fig else None
+    try:
+        return svg(DRAWN[name]())
+    except NoData:
+        return None
 
 
 def main():

@@ -9,8 +9,8 @@ from pathlib import Path
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import figures
+from pages import pages
 
-DOCS = figures.ROOT / "docs"
 DARK = "@media (prefers-color-scheme:dark)"
 
 # Drawn by the program itself, not by tools/figures.py. They show what a user gets.
@@ -19,7 +19,7 @@ OUTPUT = {"map.svg", "workers.svg"}
 
 def shown():
     """(page, file) of every picture in docs/figures that a page shows."""
-    for page in [figures.ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]:
+    for page in pages():
         text = page.read_text(encoding="utf-8")
         for link in re.findall(r"!\[[^\]]*\]\(([^)\s]+)\)", text) + re.findall(r'<img[^>]* src="([^"]+)"', text):
             path = (page.parent / link).resolve()

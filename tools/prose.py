@@ -8,7 +8,8 @@ import re
 import sys
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+from pages import pages, without_code
+
 MOST_WORDS = 40  # of a sentence
 
 # What is found, and what to write instead.
@@ -30,8 +31,8 @@ HABITS = {
 
 def paragraphs(markdown):
     """The prose: paragraphs, list items, headings and cells of tables, without what is no prose."""
-    text = re.sub(r"^(```+|~~~+)[^\n]*\n.*?^\1[^\n]*$", "\n", markdown, flags=re.MULTILINE | re.DOTALL)
-    text = re.sub(r"(<!-- (?:table|generated): .*? -->).*?<!-- end -->", "\n", text, flags=re.DOTALL)
+    text = re.sub(r"(<!-- (?:table|generated): .*? -->).*?<!-- end -->", "\n", without_code(markdown),
+                  flags=re.DOTALL)
     text = re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
     text = re.sub(r"\$\$.*?\$\$", "\n\nX\n\n", text, flags=re.DOTALL)
     text = re.sub(r"\$[^$\n]+\$", "X", text)
@@ -65,7 +66,7 @@ def faults(markdown):
 
 
 def main(names):
-    paths = [Path(name) for name in names] or [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+    paths = [Path(name) for name in names] or pages()
     found = [f"{path}: {fault}: {sentence}\n" for path in paths
              for sentence, fault in faults(path.read_text(encoding="utf-8"))]
     print("".join(found), end="")

@@ -17,7 +17,7 @@ Pages show it between `<!-- table: ID -->` and `<!-- end -->`, above a line that
 machine and first command. They show one cell of it in a sentence as
 `<!-- value: ID ROW COLUMN -->text<!-- end -->`. ROW is the text of the first cell without
 backticks; COLUMN is an index or a header. GENERATED lists the tables that come from the program:
-`<!-- generated: commands -->` … `<!-- end -->`.
+`<!-- generated: machines -->` … `<!-- end -->`.
 """
 
 import argparse
@@ -34,6 +34,7 @@ import time
 from pathlib import Path
 
 import program
+from pages import markdown_table, pages, without_code
 from program import ROOT
 
 DATA = ROOT / "docs/results/data"
@@ -48,11 +49,6 @@ class Problem(Exception):
 
 
 # --- Tables -------------------------------------------------------------------------------------
-
-
-def markdown_table(columns, rows):
-    head = f"| {' | '.join(columns)} |\n|{'---|' * len(columns)}\n"
-    return head + "".join(f"| {' | '.join(cells)} |\n" for cells in rows)
 
 
 def machines(data=DATA):
@@ -109,19 +105,6 @@ def generated(name):
     return add
 
 
-@generated("commands")
-def commands_table():
-    return markdown_table(["command", "what it does"],
-                          [[f"`./upswing {name}`", text] for name, text in program.commands().items()])
-
-
-@generated("agents")
-def agents_table():
-    return markdown_table(["agent", "algorithm", "what it is"],
-                          [[f"`{name}`", program.algorithm_of(name), text]
-                           for name, text in program.agents().items()])
-
-
 @generated("hyperparameters")
 def hyperparameters_table(algorithm, *names):
     """Named agents as columns (without names: all of the algorithm), and these settings as rows:
@@ -170,33 +153,7 @@ def machines_table():
                            if name != UNRECORDED])
 
 
-@generated("measurements")
-def measurements_table():
-    """Where each table comes from."""
-    rows = []
-    for path in sorted(DATA.glob("*.json")):
-        if path.stem == "machines":
-            continue
-        table = load(path.stem)
-        measured = table["measured"]
-        commands = "<br>".join(f"`{command}`" for command in table["commands"])
-        rows.append([table["title"], measured["version"], measured["date"],
-                     f"`{measured['machine']}`", measured["commit"][:10],
-                     commands.replace("|", "\\|")])
-    return markdown_table(["table", "version", "date", "machine", "commit", "commands"], rows)
-
-
 # --- Pages --------------------------------------------------------------------------------------
-
-
-def pages(root=ROOT):
-    return [root / "README.md", *sorted((root / "docs").rglob("*.md"))]
-
-
-def without_code(text):
-    """The text with fenced blocks blanked, so that examples of markers in them do not count."""
-    return re.sub(r"^(```|~~~)[^\n]*\n.*?^\1[^\n]*$", lambda block: re.sub(r"[^\n]", " ", block[0]),
-                  text, flags=re.MULTILINE | re.DOTALL)
 
 
 def origin(table, page):
