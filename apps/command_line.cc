@@ -136,7 +136,7 @@ std::string ExplainFlag(const CLI::App& app, const std::string& word) {
     const bool near = IsHidden(*option) && !DidYouMean(word, FlagsOf(*option)).empty();
     if (near) return Concat("; ", option->get_description());
   }
-  return "";
+  return app.get_option_no_throw("--set") != nullptr ? "; --set NAME=VALUE changes the plant" : "";
 }
 
 /// The message for `got`, which is no command.
@@ -175,11 +175,14 @@ std::string ExplainUnknown(const CLI::App& program, const CLI::App& app) {
   if (unknown.empty()) return "";
   const std::string word = unknown.front().substr(0, unknown.front().find('='));
   if (word.starts_with("-")) return Concat("unknown flag ", word, ExplainFlag(app, word));
-  const std::string meant = DidYouMean(word, KnownWords(app));
-  return &app == &program
-             ? ExplainCommands(program, Concat("\"", word, "\"", meant))
-             : Concat(app.get_name(), ": expected no argument ", word,
-                      meant.empty() ? "; a value follows its flag, as in --seed 1" : meant);
+  std::string meant = DidYouMean(word, KnownWords(app));
+  if (&app == &program) return ExplainCommands(program, Concat("\"", word, "\"", meant));
+  if (meant.empty()) {
+    const bool has_agents = app.get_option_no_throw("--agent") != nullptr;
+    meant = Concat("; a value follows its flag, as in --",
+                   has_agents ? Concat("agent ", word) : std::string("seed 1"));
+  }
+  return Concat(app.get_name(), ": expected no argument ", word, meant);
 }
 
 /// The message for a wrong command line, in one line.

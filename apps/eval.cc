@@ -92,7 +92,9 @@ void AddEval(CommandLine& line) {
       "  energy  pumps energy by energy shaping until lqr catches\n"
       "  hybrid  lets lqr catch what --swing-up POLICY swings up\n\n"
       "--set takes mass1, mass2, length1, length2, damping1, damping2, gravity,\n"
-      "torque_limit, and mass, length and damping for both links. With --randomize each\n"
+      "torque_limit, actuated_joint, rotor_inertia, gear_ratio, coulomb1 and coulomb2 (dry "
+      "friction),\n"
+      "and mass, length and damping for both links. With --randomize each\n"
       "episode draws its plant from a box around the nominal one. Observed energy and\n"
       "height are scaled by the episode's plant, which reveals the plant to the policy.\n"
       "With --unknown-plant they are scaled by the plant of the training.\n",

@@ -8,6 +8,7 @@
 #include "control/linearize.h"
 #include "core/error.h"
 #include "core/rng.h"
+#include "core/text.h"
 
 namespace upswing {
 namespace {
@@ -90,9 +91,10 @@ LqrCatch::LqrCatch(const LqrConfig& config, const Plant& plant)
       steps_(SettleSteps(lqr_, plant) / 2),
       limit_(plant.torque_limit) {
   if (region_ > 0) return;
-  throw BadInput(
-      "lqr: found no region of attraction: with these weights LQR catches the pendulum only very "
-      "close to upright, if at all");
+  const bool dry = plant.coulomb1 > 0 || plant.coulomb2 > 0;
+  throw BadInput(Concat("lqr: found no region of attraction: with these weights ",
+                        dry ? "and dry friction (coulomb1, coulomb2) " : "",
+                        "LQR catches the pendulum only very close to upright, if at all"));
 }
 
 bool LqrCatch::Holds(const StateVector& deviation, PendulumModel& model) const {

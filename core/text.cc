@@ -88,6 +88,18 @@ std::string Escape(char kind, char32_t value, int digits) {
   return Concat('\\', kind, HexDigits(value, digits));
 }
 
+/// The first letters of a name's words: "lr" for "--learning-rate".
+std::string Initials(std::string_view name) {
+  std::string initials;
+  bool begins = true;
+  for (const char c : name) {
+    const bool separates = c == '-' || c == '_';
+    if (begins && !separates) initials += c;
+    begins = separates;
+  }
+  return initials;
+}
+
 }  // namespace
 
 std::string_view Piece::Write(int64_t number) {
@@ -241,13 +253,16 @@ std::string DidYouMean(std::string_view word, const std::vector<std::string>& na
         return to_a != to_b ? to_a < to_b : CommonEnds(word, a) > CommonEnds(word, b);
       });
   if (nearest == names.end()) return "";
-  const auto count_letters = [](std::string_view text) {
-    return text.size() - std::min(text.size(), text.find_first_not_of('-'));
+  const auto letters_of = [](std::string_view text) {
+    return text.substr(std::min(text.size(), text.find_first_not_of('-')));
   };
+  const auto count_letters = [&](std::string_view text) { return letters_of(text).size(); };
   const size_t letters = count_letters(word);
   const size_t tolerance = letters <= 3 ? 1 : std::max<size_t>(2, letters / 3);
   const auto meant = [](std::string_view name) { return Concat(" (did you mean ", name, "?)"); };
   if (EditDistance(word, *nearest) <= tolerance) return meant(*nearest);
+  const auto abbreviated = std::ranges::find(names, letters_of(word), Initials);
+  if (letters > 1 && abbreviated != names.end()) return meant(*abbreviated);
   constexpr size_t kFewest = 3;  // letters that two words must share
   const auto begins = std::ranges::find_if(names, [&](const std::string& name) {
     return std::min(letters, count_letters(name)) >= kFewest &&

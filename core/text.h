@@ -96,8 +96,9 @@ std::string Printable(std::string_view text);
 std::string ShellQuoted(std::string_view text);
 
 /// " (did you mean NAME?)" for the name nearest to `word` in edit distance, among equals the
-/// one that begins and ends most as it does; if none is near, for a name that begins with `word` or
-/// that `word` begins with; "" if there is no such name either.
+/// one that begins and ends most as it does; if none is near, for a name whose words have
+/// these initials, that begins with `word`, or that `word` begins with; "" if there is no such name
+/// either.
 std::string DidYouMean(std::string_view word, const std::vector<std::string>& names);
 
 }  // namespace upswing

@@ -64,6 +64,8 @@ TEST(Text, SuggestsTheNearestNameOnlyIfItIsNear) {
   EXPECT_EQ(DidYouMean("gama", names), " (did you mean gamma?)");
   EXPECT_EQ(DidYouMean("mas2", {"mass", "mass1", "mass2"}), " (did you mean mass2?)");
   EXPECT_EQ(DidYouMean("eval-evry", names), " (did you mean eval_every?)");
+  EXPECT_EQ(DidYouMean("--lr", {"--layers", "--learning-rate"}),
+            " (did you mean --learning-rate?)");
   EXPECT_EQ(DidYouMean("evaluate", {"train", "eval"}), " (did you mean eval?)");
   EXPECT_EQ(DidYouMean("simul", {"eval", "simulate"}), " (did you mean simulate?)");
   EXPECT_EQ(DidYouMean("qw", {"qwerty"}), "");

@@ -1,6 +1,7 @@
 #include "run/find_policy.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <set>
 
 #include "core/error.h"
@@ -109,9 +110,13 @@ LoadedPolicy GetPolicy(const PolicyArguments& a) {
             design_for};
   }
   if (!is_path) {
+    const std::string shipped = Concat("web/public/agents/", a.name, ".safetensors");
+    const std::string meant = std::filesystem::exists(shipped)
+                                  ? Concat(" (did you mean ", shipped, "?)")
+                                  : DidYouMean(a.name, ControllerNames());
     throw BadInput(Concat(
         a.name, ": no such file; expected a policy.safetensors, a run folder or a controller (",
-        Join(ControllerNames(), ", "), ")", DidYouMean(a.name, ControllerNames())));
+        Join(ControllerNames(), ", "), ")", meant));
   }
   return LoadPolicy(a.name);
 }

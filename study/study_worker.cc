@@ -76,13 +76,14 @@ class Worker {
     // Again, as long as that brings any: another worker may have lost one meanwhile.
     for (bool tried = true; tried && !open.empty() && !outcome_.stopped;) {
       tried = false;
+      outcome_.claimed_by_others = 0;
       for (auto it = open.begin(); it != open.end() && !outcome_.stopped;) {
         const Turn turn = Try(**it);
         tried = tried || turn == Turn::kTried;
+        if (turn == Turn::kClaimedByOthers) ++outcome_.claimed_by_others;
         it = turn == Turn::kClaimedByOthers ? std::next(it) : open.erase(it);
       }
     }
-    outcome_.claimed_by_others = std::ssize(open);
     return outcome_;
   }
 
