@@ -33,7 +33,7 @@ struct Lqr {
 /// Method: structure-preserving doubling of Chu, Fan, Lin, Wang, "Structure-preserving algorithms
 /// for periodic discrete-time algebraic Riccati equations", International Journal of Control 77
 /// (2004), algorithm 2.1. Returns nothing if there is no solution: (A, B) cannot be stabilised, or
-/// Q does not detect every mode that needs it.
+/// Q gives no cost to a mode that has to be stabilised.
 std::optional<Lqr> SolveDiscreteLqr(const LinearModel& model, const Eigen::Matrix4d& Q, double R);
 
 /// Minimises ∫ x' Q x + R u² dt of ẋ = A x + B u:

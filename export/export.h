@@ -15,10 +15,10 @@ std::string TestVectorsJson();
 
 /// Copies policies (files or run folders) into a page's folder of agents as ID.safetensors. Adds
 /// them to its agents.json, replacing entries with the same ID. `id` names a single policy; empty:
-/// named by its run's folder, else by its agent. Each policy gets `checkpoints` earlier versions,
-/// from the untrained one to itself (0: none). Reads and checks everything before it writes
-/// anything. Returns the names of the files. Throws BadInput; Failure if the folder cannot be
-/// written.
+/// named by its run's folder, else by its agent. Each policy has `checkpoints` versions
+/// in the page, from the untrained one to itself (0: only itself). Reads and checks everything
+/// before it writes anything. Returns the names of the files. Throws BadInput; Failure if the
+/// folder cannot be written.
 std::vector<std::string> ExportToPage(const std::vector<std::filesystem::path>& paths,
                                       const std::string& id, int64_t checkpoints,
                                       const std::filesystem::path& folder);

@@ -107,11 +107,11 @@ bool SameTensors(const Policy& a, const Policy& b) {
   });
 }
 
-/// Repeats the training of a learned policy with the settings in its file. Returns `count`
-/// versions: the untrained one, then evaluations evenly spaced up to the policy itself. Parameters
-/// are rounded to bfloat16, which halves the file. Throws BadInput if the policy is not a Q-network
-/// or there are fewer evaluations. Also throws it if the repeated training ends differently, as on
-/// a processor with other vector instructions.
+/// Repeats the training of a learned policy with the settings in its file. Returns
+/// `count` - 1 earlier versions: the untrained one, then evenly spaced evaluations. Parameters are
+/// rounded to bfloat16, which halves the file. Throws BadInput if the policy is not a Q-network or
+/// there are fewer evaluations. Also throws it if the repeated training ends differently, as on a
+/// processor with other vector instructions.
 std::vector<Checkpoint> CheckpointsOf(const LoadedPolicy& loaded, int64_t count) {
   const std::string where = loaded.path;
   const PolicyInfo& info = loaded.policy->info();

@@ -106,7 +106,7 @@ MuJoCoPhysics::MuJoCoPhysics(const PhysicsConfig& config)
   WritePlant(config_.plant(0), FieldsOf(*model));
   rotors_ = HasRotors(*model);
   dry_friction_ = HasDryFriction(*model);
-  // The built-in model has no contacts and constraints, so MuJoCo need not look for them.
+  // The built-in model has no springs, sensors and islands. Disabled, MuJoCo skips the search.
   if (config_.mjcf.empty()) {
     model->opt.disableflags |= mjDSBL_SPRING | mjDSBL_SENSOR | mjDSBL_ISLAND;
   }

@@ -123,7 +123,7 @@ struct RobustnessCurve {
 };
 
 struct Robustness {
-  std::array<double, kRobustnessRows> rows{};  // share of passed levels
+  std::array<double, kRobustnessRows> rows{};  // share of passed levels, or of pushes
   std::vector<RobustnessCurve> curves;  // ten of the model, then the other rows without pushes
   double score() const;
 };

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Measures environment steps per second from Python, next to the C++ rate of the same call and to
-Gymnasium's own vector of environments over MuJoCo's Python package.
+"""Measures environment steps per second from Python, from C++ and by Gymnasium's own vector.
+
+The C++ rate is that of the same call. Gymnasium's vector steps MuJoCo's Python package.
 
     ./upswing python tools/peers/vector.py --rounds 5
 
