@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Damaged checkpoints, full disks and diverging trainings: one clear line, and nothing is lost."""
+"""Tests of damaged checkpoints, full disks and diverging trainings: one clear error line, and no
+data is lost."""
 
 import math
 import resource
@@ -108,7 +109,7 @@ class CheckpointTest(SmallRunTest):
             with self.subTest(command=command):
                 self.refuse(command, "run/config.toml: expected every setting",
                             "got none of agent.gamma; another version wrote the file")
-        # As a user's own file it need not be whole.
+        # A configuration given by the user may be incomplete.
         self.succeed(*small(steps=400, out="again"), "--config", "run/config.toml")
 
     def test_broken_configuration(self):
@@ -125,12 +126,13 @@ class CheckpointTest(SmallRunTest):
 
 
 class DiskFullTest(ProgramTest):
-    """The replay memory grows, and with it each checkpoint."""
+    """The replay memory grows, and each checkpoint grows with it."""
 
-    SMALL_FILES = 60  # kilobytes that the other files of a small run take on a disk
+    SMALL_FILES = 60  # kilobytes of a small run's other files on disk
 
     def assert_stopped_and_whole(self, done, kept_step, run_name="run"):
-        """It stopped with one line that names step and checkpoint, and what is there is whole."""
+        """Asserts one error line that names step and checkpoint, and that the remaining files are
+        complete."""
         self.assert_one_line(done, 1, "training stopped at step", f"checkpoint of step {kept_step}",
                              "is kept in " + run_name)
         self.assertNotIn("Done", done.stdout)
@@ -170,11 +172,11 @@ class DiskFullTest(ProgramTest):
                     preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (5000, 5000)))
 
     def on_small_disk(self, kilobytes, arguments):
-        """Runs the program in a tmpfs of its own, of which the run is copied here afterwards."""
+        """Runs the program in its own tmpfs, and copies the run here afterwards."""
         script = (f'mount -t tmpfs -o size={kilobytes}k tmpfs "$PWD/disk" || exit 99\n'
                   'cd disk; "$@"; code=$?; cp -a run .. || exit 98; exit $code')
         (self.folder / "disk").mkdir()
-        # A mount namespace of its own: the disk disappears with the shell.
+        # A separate mount namespace: the disk disappears with the shell.
         done = subprocess.run(["unshare", "--mount", "--map-root-user", "sh", "-c", script, "sh",
                                UPSWING, *arguments], cwd=self.folder, stdout=subprocess.PIPE,
                               stderr=subprocess.PIPE, encoding="utf-8", check=False)
@@ -183,7 +185,8 @@ class DiskFullTest(ProgramTest):
         return done
 
     def test_on_a_full_disk(self):
-        # While a checkpoint replaces another there are two. Room for two of step 2000.
+        # Two checkpoints exist while one replaces the other. The disk has room for two of step
+        # 2000.
         self.succeed(*small(steps=2000, out="measured"))
         checkpoint = (self.folder / "measured/checkpoint.safetensors").stat().st_size
         done = self.on_small_disk(2 * checkpoint // 1024 + self.SMALL_FILES, small())
@@ -194,7 +197,8 @@ class DiskFullTest(ProgramTest):
         self.assert_resumes_to_the_same_bytes()
 
     def test_on_a_disk_that_a_table_fills(self):
-        # No checkpoint but the first; a row of metrics.csv for each step fills the rest.
+        # The run writes only its first checkpoint; a row of metrics.csv for each step fills the
+        # rest of the disk.
         settings = {"log_every": 8, "checkpoint_every": 10**9, "steps": 8000, "eval_every": 10**6}
         self.succeed(*small(**settings | {"steps": 8, "eval_episodes": 1, "out": "measured"}))
         checkpoint = (self.folder / "measured/checkpoint.safetensors").stat().st_size
@@ -220,7 +224,7 @@ class NotFiniteTest(ProgramTest):
                       (self.folder / "run/log.txt").read_text(encoding="utf-8"))
         self.assertFalse(list(self.folder.rglob("*.tmp")))
 
-        # What was kept is whole: it leads to the same end again.
+        # The kept files are complete: resuming leads to the same end again.
         again = self.run_here("train", "--resume", "run")
         self.assertEqual((again.returncode, again.stderr), (1, done.stderr))
 

@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""Bad input: one clear line, exit code 2 (usage or input) or 1 (failed), and nothing is lost."""
+"""Tests of bad input: one clear error line, exit code 2 (usage or input) or 1 (failed), and no data
+is lost."""
 
 import subprocess
 import unittest
 
 from testing import MODEL, UPSWING, ProgramTest, SmallRunTest, small
 
-# If it is wrongly accepted it does not take long.
+# If one of these is wrongly accepted, the test stays short.
 TRAIN = ["train", "--steps", "8", "--eval-episodes", "1", "--out", "run"]
 
 

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Policy files that are damaged, made by hand or hostile: refused with one clear line."""
+"""Tests of policy files that are damaged, handmade or hostile: refused with one clear error
+line."""
 
 import json
 import math
@@ -20,7 +21,7 @@ class PolicyFileTest(SmallRunTest):
         self.refuse(["info", "run/policy.safetensors"], "run/policy.safetensors", *words)
 
     def change(self, metadata=(), tensors=(), drop=()):
-        """Rewrites the policy file with another content, whole in itself."""
+        """Rewrites the policy file with other content; the file itself is well-formed."""
         old_metadata, old_tensors = read_tensors(self.policy)
         kept = {name: tensor for name, tensor in (old_tensors | dict(tensors)).items()
                 if name not in drop}
@@ -102,7 +103,7 @@ class PolicyFileTest(SmallRunTest):
                 self.restore()
 
     def test_a_little_more_than_rounding(self):
-        # The bias of the value moves every Q-value by what it is moved by itself.
+        # A change of the value's bias changes every Q-value by the same amount.
         _, tensors = read_tensors(self.policy)
         largest = max(map(abs, struct.unpack("<144f", tensors["sample.q"][2])))
         (bias,) = struct.unpack("<f", tensors["value.bias"][2])
@@ -198,15 +199,16 @@ class PolicyFileTest(SmallRunTest):
                 self.refuse_info("network")
 
     def refuse_in_little_memory(self, *words):
-        """A gigabyte of addresses, most of which the program and its libraries take anyway."""
+        """Limits the address space to a gigabyte; the program and its libraries need most of it
+        anyway."""
         limit = None
-        if "UPSWING_SANITIZED" not in os.environ:  # a sanitizer needs far more of them
+        if "UPSWING_SANITIZED" not in os.environ:  # sanitizers need far more
             limit = lambda: resource.setrlimit(resource.RLIMIT_AS, (1 << 30, 1 << 30))
         self.refuse(["info", "claims.safetensors"], "claims.safetensors", *words,
                     preexec_fn=limit)
 
     def claim(self, network, tensors):
-        """Writes a policy whose metadata say that it has this network."""
+        """Writes a policy with metadata that claim this network."""
         metadata, _ = read_tensors(self.policy)
         write_tensors(self.folder / "claims.safetensors",
                       metadata | {"network": json.dumps(network)}, tensors)
@@ -219,7 +221,7 @@ class PolicyFileTest(SmallRunTest):
         self.claim(big | {"hidden": [1] * 100000}, {"torques": ("F64", [9], bytes(72))})
         self.refuse_in_little_memory('"hidden": expected a list of at most 16')
 
-        # Each sample has 4096 Q-values, of which the file holds those of 16.
+        # Each sample has 4096 Q-values; the file holds those of 16 samples.
         wide = {"inputs": 8, "actions": 4096, "hidden": [1], "head": 0, "dueling": False,
                 "layer_norm": False}
         samples = 400000
@@ -257,7 +259,7 @@ class PolicyFileTest(SmallRunTest):
         self.refuse_policy("expected", "8", "4")
 
     def change_inputs(self, inputs):
-        """Makes it a policy of zeros for observations of another size."""
+        """Writes a policy of zeros for observations of another size."""
         metadata, tensors = read_tensors(self.policy)
         network = json.loads(metadata["network"]) | {"inputs": inputs}
         zeros = {name: (dtype, shape, bytes(len(data)))

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""`upswing bench`: what it prints and writes, not how fast anything is."""
+"""Tests of `upswing bench`: its output and files, but no speeds."""
 
 import json
 import signal
@@ -9,7 +9,7 @@ from testing import ProgramTest
 
 SHORT = ["--seconds", "0.001", "--repetitions", "1"]
 
-# What each part measures with one thread, in this order.
+# The measurements of each part with one thread, in this order.
 KERNELS = [f"kernels/{product}/{width}x{width}/batch:{batch}"
            for width in (64, 128, 256) for batch in (1, 32, 128, 256)
            for product in ("forward", "backward_input", "backward_weight")]
@@ -32,14 +32,14 @@ TRAIN = [f"train/{agent}/{engine}/threads:1" for agent in ("d3qn", "d3qn-small")
 
 class BenchTest(ProgramTest):
     def bench(self, *arguments):
-        """Runs the command with a JSON file; returns the rows of its table and the JSON."""
+        """Runs the command with a JSON file. Returns the rows of its table and the JSON."""
         text = self.succeed("bench", *SHORT, "--json", "bench.json", *arguments)
         rows = {line.split()[0]: line for line in text.splitlines()[3:]}
         written = json.loads((self.folder / "bench.json").read_text(encoding="utf-8"))
         return rows, written
 
     def check(self, names, rows, written):
-        """All cases are there, in the table and in the JSON, with rates that can be."""
+        """Asserts that table and JSON have all cases, with plausible rates."""
         benchmarks = written["benchmarks"]
         self.assertEqual([entry["name"] for entry in benchmarks], names)
         self.assertEqual(list(rows), names)
@@ -54,8 +54,8 @@ class BenchTest(ProgramTest):
                     self.check_peak(entry, written["context"], rows[entry["name"]])
 
     def check_peak(self, entry, context, row):
-        """Operations per second are below what the processor can do: generously, for another load
-        may have disturbed the measurement of its peak."""
+        """Asserts that operations per second are below the processor's peak. The margin is
+        generous, because other load may have disturbed the measurement of the peak."""
         peak = context["peak_gflops"][str(entry["threads"])]
         self.assertGreater(entry["gflops"], 0)
         self.assertLess(entry["peak_share"], 3)
@@ -91,7 +91,8 @@ class BenchTest(ProgramTest):
         self.check(["gradient/plain/24-16/batch:8/threads:2"], rows, written)
         entry = written["benchmarks"][0]
         self.assertEqual(entry["threads"], 2)
-        # Two forward passes, the gradients of weights, and of inputs but the observations.
+        # Work: two forward passes, the gradients of weights, and the gradients of inputs without
+        # the observations.
         layers = [8 * 24, 24 * 16, 16 * 9]
         flops = 2 * 8 * (3 * sum(layers) + sum(layers[1:]))
         self.assertAlmostEqual(entry["gflops"] / entry["items_per_second"] * 1e9, flops, delta=1e-3)

@@ -21,7 +21,7 @@ namespace {
 struct BoundsArguments {
   BoundsConfig config;
   std::vector<std::string> policies;
-  std::vector<FlagValue> flags;  // settings of controllers among them
+  std::vector<FlagValue> flags;  // includes the settings of controllers
   std::string csv;
   int64_t threads = 0;
   bool as_json = false;
@@ -34,7 +34,7 @@ struct BoundsRow {
   Quartiles swing_up_seconds;
 };
 
-/// `width`: columns of the longest name.
+/// `width` is the length of the longest name in columns.
 std::string RowText(const BoundsRow& row, const BoundsRow& best, size_t width) {
   const double mean = row.figures.reward_sum.mean;
   std::string text =
@@ -62,7 +62,7 @@ std::vector<std::string> MadeFor(const BoundsArguments& a) {
 
 int RunBounds(const BoundsArguments& a) {
   if (!a.csv.empty()) CheckWritable("--csv", a.csv);
-  // The design plant of controllers is the plant of the search.
+  // Controllers are designed for the plant of the search.
   const std::vector<LoadedPolicy> policies = GetPolicies(a.policies, {"", a.flags, MadeFor(a)});
   for (const LoadedPolicy& loaded : policies) CheckComparable(loaded, a.config);
   ThreadPool pool(ResolveThreads(a.threads));

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The best that is found of an episode, and how near policies come to it: `bounds`."""
+"""Tests of `bounds`: the best episodes of a search, and how close policies come to them."""
 
 import csv
 import json
@@ -21,7 +21,7 @@ class Bounds(ProgramTest):
         for row in rows.values():
             self.assertLessEqual(row["return"]["mean"], best["return"]["mean"])
             self.assertGreaterEqual(row["swing_up_seconds"], best["swing_up_seconds"])
-        # Policies are judged on the episodes of eval, and as eval judges them.
+        # Policies are evaluated on the episodes of `eval`, with the same results.
         judged = json.loads(self.succeed("eval", "tvlqr", "--episodes", 2, "--json"))
         self.assertEqual(rows["tvlqr"]["return"], judged["return"])
         self.succeed("eval", "tvlqr", "--episodes", 2, "--episodes-csv", "eval.csv")

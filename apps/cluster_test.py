@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""`upswing study --slurm` on a Slurm of two nodes: what a study leaves there is what it leaves on one
-machine, whatever befalls the tasks."""
+"""Tests of `upswing study --slurm` on a Slurm of two nodes: a study leaves the same files as on one
+machine, whatever happens to the tasks."""
 
 import os
 import re
@@ -44,7 +44,8 @@ class ClusterTest(ProgramTest):
         self.write("little.toml", STUDY.replace("SEEDS", str(seeds)).replace("STEPS", str(steps)))
 
     def follow(self, tasks, options="--partition=low"):
-        """Starts `study --slurm`; returns process, number of the array, and the line that has it."""
+        """Starts `study --slurm`. Returns the process, the array's number, and the line with the
+        number."""
         process = self.start("study", "little.toml", "--slurm", options, "--tasks", tasks)
         for line in process.stdout:
             if found := re.search(r"ob array (\d+)", line):
@@ -64,7 +65,7 @@ class ClusterTest(ProgramTest):
                              without_times(self.folder / "alone" / table), table)
 
     def claims(self, node):
-        """Runs that are claimed on a node and have been trained for a while."""
+        """Runs that a worker on a node has claimed and trained for a while."""
         return [path for path in (self.folder / "runs/little").glob("*/seed*.claim")
                 if read_if_there(path).startswith(node + "/")
                 and (path.with_suffix("") / "checkpoint.safetensors").exists()]
@@ -80,7 +81,7 @@ class ClusterTest(ProgramTest):
 
     @staticmethod
     def worker_of(task):
-        """The process of a task's worker."""
+        """The process id of a task's worker."""
         array, index = task.split("_")
         for process in Path("/proc").glob("[0-9]*"):
             environment = read_if_there(process / "environ").split("\0")
@@ -108,7 +109,7 @@ class ClusterTest(ProgramTest):
         self.wait_for_state(preempted, "RUNNING")
         self.assertEqual(self.cluster.job(preempted)["Restarts"], "1")
 
-        # Slurm notices the loss, and the claims run out.
+        # Slurm notices the lost node, and the claims expire.
         for task in lost:
             self.wait_for_state(task, "PENDING")
             self.cluster.ask("scontrol", "update", f"JobId={task}", "StartTime=now+1hour")
@@ -136,7 +137,8 @@ class ClusterTest(ProgramTest):
         output = follower.communicate()[0]
         self.assertEqual(follower.returncode, 1, output)
         self.assertRegex(output, rf"upswing: job array {array} has ended, but [1-4] runs are not done")
-        # They were told: no task is queued again, and the runs can be resumed at once.
+        # The workers were notified: no task is queued again, and the runs can be resumed
+        # immediately.
         self.assertEqual(self.cluster.job(f"{array}_1")["JobState"], "CANCELLED")
         self.assertEqual(self.count_in_status("lost"), 0)
         follower, another, _ = self.follow(3)
@@ -178,7 +180,7 @@ class ClusterTest(ProgramTest):
         return (self.folder / out / "slurm/array").read_text(encoding="utf-8").strip()
 
     def count_in_status(self, column):
-        """The sum over variants of a column of `study --status`."""
+        """The sum of a column of `study --status` over the variants."""
         lines = self.succeed("study", "little.toml", "--status").splitlines()
         at = lines[1].split().index(column) + 1
         return sum(int(line.split()[at]) for line in lines[2:] if line.split()[:1] in
@@ -193,7 +195,7 @@ def read_if_there(path):
 
 
 def without_times(path):
-    """The rows of a table of a study, without the columns of clock and host."""
+    """The rows of a study's table, without the columns of clock and host."""
     return [{name: text for name, text in row.items() if "seconds" not in name and name != "host"}
             for row in without_seconds(path)]
 

@@ -14,16 +14,16 @@
 namespace upswing {
 namespace {
 
-/// Returns what --help shows for a setting's value.
+/// The placeholder of a setting's value in --help.
 std::string TypeName(const Option& option) {
-  constexpr std::array kNames{"", "INTEGER", "NUMBER", "TEXT", "LIST"};  // in Target's order
+  constexpr std::array kNames{"", "INTEGER", "NUMBER", "TEXT", "LIST"};  // in the order of Target
   return option.name == "model" ? "FILE" : kNames.at(option.target.index());
 }
 
-/// Receives a flag's value.
+/// A function that receives a flag's value.
 using TakeValue = std::function<void(const std::string&)>;
 
-/// Adds the flag of one setting; the last of several values counts.
+/// Adds the flag of one setting. If the flag is repeated, the last value counts.
 void AddFlag(CLI::App& app, const Option& option, const std::string& group, const TakeValue& take) {
   const std::string help = option.about_with_default();
   if (std::holds_alternative<bool*>(option.target)) {
@@ -47,7 +47,8 @@ CLI::Validator NotEmpty(std::string_view what) {
           ""};
 }
 
-/// `text` with its prose wrapped to HelpColumns(). Indented lines and headings (`Examples:`) stay.
+/// `text` with its prose wrapped to HelpColumns(). Indented lines and headings (`Examples:`) keep
+/// their line breaks.
 std::string Reflowed(const std::string& text) {
   std::string result, prose;
   const auto end_paragraph = [&] {
@@ -73,7 +74,7 @@ std::string Reflowed(const std::string& text) {
 /// form.
 class HelpFormatter : public CLI::Formatter {
  public:
-  /// `before` is called before help is printed, which may depend on the other arguments.
+  /// `before` is called before help is printed, because help may depend on the other arguments.
   explicit HelpFormatter(std::function<void()> before = {}) : before_(std::move(before)) {}
 
   /// Hides the flags that are not shown.
@@ -100,7 +101,7 @@ class HelpFormatter : public CLI::Formatter {
 
   std::string make_option_desc(const CLI::Option* option) const override {
     std::string description = option->get_description();
-    std::ranges::replace(description, '\n', ' ');  // lines end where the width asks for it
+    std::ranges::replace(description, '\n', ' ');  // the wrapping below sets the line ends
     return WrapText(description, HelpColumns() - get_column_width());
   }
 
@@ -116,7 +117,7 @@ std::vector<std::string> FlagsOf(const CLI::Option& option) {
 
 bool IsHidden(const CLI::Option& option) { return option.get_group().empty(); }
 
-/// Returns every flag of a command that is not hidden, and the names of its subcommands.
+/// All flags of a command that are not hidden, and the names of its subcommands.
 std::vector<std::string> KnownWords(const CLI::App& app) {
   std::vector<std::string> words;
   for (const CLI::Option* option : app.get_options()) {
@@ -139,7 +140,7 @@ std::string ExplainFlag(const CLI::App& app, const std::string& word) {
   return app.get_option_no_throw("--set") != nullptr ? "; --set NAME=VALUE changes the plant" : "";
 }
 
-/// The message for `got`, which is no command.
+/// The message for `got`, a word that is not a command.
 std::string ExplainCommands(const CLI::App& program, const std::string& got) {
   std::vector<std::string> names;
   for (const CLI::App* sub : program.get_subcommands({})) names.push_back(sub->get_name());
@@ -169,7 +170,7 @@ std::string ExplainValues(const std::string& message) {
 }
 
 /// Explains the first word that `app`, the program or one of its commands, does not know; empty if
-/// there is none.
+/// it knows all.
 std::string ExplainUnknown(const CLI::App& program, const CLI::App& app) {
   const std::vector<std::string> unknown = app.remaining();
   if (unknown.empty()) return "";
@@ -201,7 +202,7 @@ std::string Explain(const CLI::App& program, const CLI::ParseError& error) {
   return error.what();
 }
 
-/// Adds a text argument; `Target` is std::string, an optional one or a vector.
+/// Adds a text argument; `Target` is std::string, an optional string or a vector.
 template <typename Target>
 CLI::Option* AddText(CLI::App& app, std::string_view name, Target& target, std::string_view type,
                      std::string_view help, std::string_view what) {
@@ -251,7 +252,7 @@ void CommandLine::Arguments(const Options& options) {
 }
 
 void CommandLine::Settings(const Options& options, std::vector<FlagValue>& flags) {
-  // CLI11 applies flags in this order: aliases first, so that the more specific flag wins.
+  // CLI11 applies flags in this order. Aliases come first, so that the more specific flag wins.
   for (const auto& alias : options.aliases()) {
     Option as_one = *options.Find(alias.name, alias.name).front();
     as_one.help = alias.help;

@@ -19,7 +19,8 @@ class App;
 /// The program's command line. Only command_line.cc knows the library that parses it.
 namespace upswing {
 
-/// The expected kind of an argument whose value must not be empty, as from an unset shell variable.
+/// Description of an argument whose value must not be empty. An unset shell variable gives an empty
+/// one.
 inline constexpr std::string_view kPath = "a path";
 
 /// One command: declares its arguments, then runs it with their values.
@@ -45,24 +46,25 @@ class CommandLine {
   /// Adds a flag without a value.
   void Flag(std::string_view name, bool& target, std::string_view help);
 
-  /// Adds a flag for each of the command's own numbers and choices. The flag sets the value at
-  /// once; see Option::Set.
+  /// Adds a flag for each of the command's own numbers and choices. Parsing the flag sets the value
+  /// immediately; see Option::Set.
   void Arguments(const Options& options);
   /// Adds a flag for each setting and alias, in the order of their descriptions. Given values are
   /// appended to `flags`.
   void Settings(const Options& options, std::vector<FlagValue>& flags);
-  /// Lets --help call `shown`. It calls its argument with all added settings and with the settings
-  /// to show, whose values are the defaults. A misspelt flag gets suggestions from the shown
-  /// settings; for the others the message is their WhyMissing.
+  /// Sets the function that chooses the settings in --help. It calls its argument with all added
+  /// settings and with the settings to show, whose values are the defaults. A misspelt flag gets
+  /// suggestions from the shown settings; a hidden setting's flag gets its WhyMissing as the
+  /// message.
   using ShowOptions = std::function<void(const Options& every, const Options& options)>;
   void ShowSettings(std::function<void(const ShowOptions&)> shown);
 
   /// Adds the text below the arguments in --help.
   void Footer(const std::string& text);
-  /// Adds a check that is made before anything else once all arguments are known.
+  /// Adds a check that runs once all arguments are known, before anything else.
   void Check(std::function<void()> check);
   /// Sets the function that runs the command and returns the exit code. Returns the arguments that
-  /// it will get, which the caller declares.
+  /// the function will get; the caller declares them.
   template <typename Arguments>
   std::remove_cvref_t<Arguments>& Runs(int (*run)(Arguments)) {
     const auto arguments = std::make_shared<std::remove_cvref_t<Arguments>>();
@@ -72,7 +74,7 @@ class CommandLine {
 
   /// Whether the argument was given.
   bool Has(std::string_view name) const;
-  /// The last value that was given for a flag; empty: none.
+  /// The last value given for a flag; empty: none.
   std::string Last(std::string_view name) const;
 
  private:
@@ -88,15 +90,15 @@ class CommandLine {
 struct CommandEntry {
   const char* name;
   const char* help;               // one line
-  void (*declare)(CommandLine&);  // null: the command is a program of its own
+  void (*declare)(CommandLine&);  // null: the command is a separate program
 };
 
-/// Parses the command line, runs the command and returns its exit code. `footer` ends the
-/// program's --help. Throws BadInput, one line, where the command line is wrong.
+/// Parses the command line, runs the command and returns its exit code. `footer` ends the program's
+/// --help. Throws BadInput with a message of one line if the command line is wrong.
 int RunProgram(int argc, const char* const* argv, std::span<const CommandEntry> commands,
                const std::string& footer);
 
-/// The largest number of columns of a line of --help: the terminal's, from 80 to 100; without a
+/// Largest number of columns in a line of --help: the terminal's, limited to 80 to 100; without a
 /// terminal 100.
 size_t HelpColumns();
 

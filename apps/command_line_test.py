@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The command line: help, numbers, `-` for standard streams, and what is said of mistakes."""
+"""Tests of the command line: help, numbers, `-` for standard streams, and error messages."""
 
 import json
 import os
@@ -12,7 +12,7 @@ from testing import ROOT, UPSWING, ProgramTest, small, train_once
 
 COMMANDS = ("train", "eval", "simulate", "map", "plot", "info", "compare", "study", "export",
             "realaigym", "bench")
-# Words that only the library of the command line would choose.
+# Phrases of the command-line library that must not appear in our messages.
 FOREIGN = ("not in range", "Could not convert", "is required", "required but received", "missing",
            "Value ", "RequiredError", "At Most", "The following argument")
 
@@ -25,7 +25,7 @@ class HelpTest(ProgramTest):
                     self.assertLessEqual(len(line), 100)
 
     def help_of(self, flag, *arguments):
-        """The lines on a flag, as one."""
+        """The help lines of a flag, joined into one."""
         text = self.succeed(*arguments, "--help")
         found = re.search(rf"(?m)^  {flag}\b.*\n(?: {{30}}.*\n)*", text)
         self.assertIsNotNone(found, flag)
@@ -64,7 +64,7 @@ class HelpTest(ProgramTest):
 
 
 class NumberTest(ProgramTest):
-    """One way to read numbers, and one to refuse them, for every command."""
+    """All commands parse and refuse numbers in the same way."""
 
     def refuse_numbers(self, *cases):
         for arguments, message in cases:
@@ -155,7 +155,7 @@ class SettingsTest(ProgramTest):
         self.assertEqual(list(self.folder.iterdir()), [])
         self.write("s.toml", text)
         self.assertEqual(self.succeed("train", "--config", "s.toml", "--print-config"), text)
-        # It says just what a run says.
+        # --print-config prints the same text that a run writes.
         changes = {"agent": "fast", "steps": 8}
         printed = self.succeed(*small(**changes), "--print-config")
         self.succeed(*small(**changes))
@@ -186,7 +186,7 @@ class SettingsTest(ProgramTest):
         self.assertNotIn("Warning", self.succeed(*small(steps=400, out="good")))
         self.assertNotIn("Warning", self.succeed(*small(steps=400, out="copied", tau=0,
                                                         target_period=10)))
-        # 32 environments end at step 416.
+        # A run with 32 environments ends at step 416.
         rounded = {"envs": 32, "steps": 400, "learning_starts": 400, "eval_episodes": 1}
         self.assertNotIn("Warning", self.succeed(*small(**rounded, out="rounded")))
         none = rounded | {"learning_starts": 416}
@@ -255,7 +255,7 @@ class StreamTest(ProgramTest):
                 self.assertEqual((done.returncode, done.stderr), (-signal.SIGPIPE, ""))
 
     def test_a_training_goes_on_without_a_reader(self):
-        # More lines than any buffer takes.
+        # More lines than any buffer holds.
         settings = small(eval_every=8, eval_episodes=1, steps=2000, out="unread")
         read_end, write_end = os.pipe()
         os.close(read_end)
@@ -274,7 +274,8 @@ class StreamTest(ProgramTest):
 
 
 class LauncherTest(ProgramTest):
-    """./upswing, in a folder that only looks like the repository: nothing is installed or built."""
+    """Tests of ./upswing in a folder that only looks like the repository: nothing is installed or
+    built."""
 
     def setUp(self):
         super().setUp()

@@ -10,7 +10,7 @@
 
 namespace upswing {
 
-// The commands, each in the file of its name.
+// Declarations of the commands; each has a source file with its name.
 void AddTrain(CommandLine& line);
 void AddBounds(CommandLine& line);
 void AddEval(CommandLine& line);
@@ -33,19 +33,19 @@ void AddControllers(CommandLine& line, PolicyArguments& a);
 /// Adds --seed, the seed of `what`.
 void AddSeed(CommandLine& line, int64_t& seed, const std::string& what);
 
-/// Adds --threads, which ResolveThreads reads.
+/// Adds --threads, the argument of ResolveThreads.
 void AddThreads(CommandLine& line, int64_t& threads);
 
-/// Adds --physics, which FindEngine reads.
+/// Adds --physics, the argument of FindEngine.
 void AddPhysics(CommandLine& line, std::string& physics);
 
 /// Adds --seeds and --jobs, for many runs; 0 jobs: one per processor.
 void AddManyOptions(CommandLine& line, std::string& seeds, int64_t& jobs);
 
-/// Adds --set, which ApplyChanges reads.
+/// Adds --set, the argument of ApplyChanges.
 void AddSet(CommandLine& line, std::vector<std::string>& set, const std::string& help);
 
-/// Adds --unknown-plant: observations are scaled as in training, also on another plant.
+/// Adds --unknown-plant: on another plant, observations are still scaled as in training.
 void AddUnknownPlant(CommandLine& line, bool& unknown_plant);
 
 /// Adds --set, --model, --physics, --seed (of `seed_of`), --unknown-plant, and the settings of

@@ -21,8 +21,8 @@ namespace {
 namespace fs = std::filesystem;
 
 struct CompareArguments {
-  std::vector<std::string> names;  // runs and policies
-  PolicyArguments controllers;     // settings of the controllers among them
+  std::vector<std::string> names;  // of runs and policies
+  PolicyArguments controllers;     // settings of the controllers
   CompareRequest runs;             // without its paths
   std::string out;
   int64_t threads = 0;

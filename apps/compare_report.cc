@@ -17,7 +17,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-/// Formats a number of the table; infinity: too few runs reached it.
+/// Formats a number of the table; infinity means that too few runs reached it.
 using Formatter = std::string (*)(double);
 
 std::string Seconds(double x) { return std::isfinite(x) ? FormatDuration(x) : "not solved"; }
@@ -67,7 +67,7 @@ void PrintStability(const GroupSummary& summary) {
       Percent(s.lowest));
 }
 
-/// A figure over the runs of a group, if one of them has it.
+/// Prints a figure over the runs of a group if at least one run has it.
 void PrintFigure(const RunFigure& figure, const Scores& scores, const std::string& torque_unit) {
   if (!std::isfinite(scores.low)) return;
   if (figure.kind == RunFigure::Kind::kRatio && !std::isfinite(scores.high)) return;
@@ -148,8 +148,7 @@ void PrintAgainst(const Comparison& comparison, const AgainstPolicy& against) {
              EstimateText(against.difference, Signed));
 }
 
-/// JSON writes null for a number that is not finite, such as the time to solve of a run that never
-/// did.
+/// JSON writes null for a number that is not finite, such as the time to solve of an unsolved run.
 ordered_json EstimateJson(const Estimate& e) {
   ordered_json j{{"value", e.value}, {"interval_95", nullptr}};
   if (e.interval) j["interval_95"] = {e.interval->low, e.interval->high};

@@ -7,14 +7,14 @@
 
 namespace upswing {
 
-/// Prints it as tables.
+/// Prints a comparison as tables.
 void PrintComparison(const Comparison& comparison);
 
-/// Says what was written to a folder.
+/// Prints which files were written to a folder.
 void PrintWritten(const Comparison& comparison, const std::filesystem::path& folder);
 
-/// The same as JSON, with every run's figures. What is not reached (the time to solve of a run that
-/// never did) is null.
+/// A comparison as JSON, with every run's figures. A figure that is not reached (the time to solve
+/// of an unsolved run) is null.
 std::string ComparisonJson(const Comparison& comparison);
 
 }  // namespace upswing

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""`upswing compare`: groups, figures over seeds, what it refuses, and the files that it writes."""
+"""Tests of `upswing compare`: groups, figures over seeds, refused input, and written files."""
 
 import csv
 import json
@@ -15,7 +15,7 @@ OUTPUTS = ["curves.png", "curves.svg", "runs.csv", "summary.csv"]
 
 
 def iqm(values):
-    """Mean without the floor(n/4) smallest and largest."""
+    """Mean without the floor(n/4) smallest and largest values."""
     cut = len(values) // 4
     return statistics.fmean(sorted(values)[cut:len(values) - cut])
 
@@ -23,7 +23,7 @@ def iqm(values):
 class CompareTest(ProgramTest):
     @classmethod
     def setUpClass(cls):
-        # The settings of a run as `train` writes them.
+        # The settings of a run, as `train` writes them.
         cls.settings = {}
         for agent in ("d3qn", "dqn"):
             path = train_once(cls, agent=agent, hidden=None, head=None, steps=8, eval_every=None,
@@ -32,8 +32,8 @@ class CompareTest(ProgramTest):
             cls.settings[agent] = (path / "config.toml").read_text(encoding="utf-8")
 
     def make_run(self, path, seed, rows, *, agent="d3qn", steps=4000, stop=True, more=""):
-        """A run folder with an evaluation (success rate, return) every 1,000 steps, of 2.5 s each,
-        as `train` writes it; `more` are lines of other settings."""
+        """Makes a run folder as `train` writes it, with an evaluation (success rate, return) every
+        1,000 steps of 2.5 s each. `more` are lines of other settings."""
         folder = self.folder / path
         folder.mkdir(parents=True)
         settings = self.settings[agent]
@@ -52,7 +52,7 @@ class CompareTest(ProgramTest):
         return path
 
     def make_group(self, path, solved_at, **more):
-        """A run for each entry: the evaluation that solves it, or None."""
+        """Makes a run for each entry: the index of the evaluation that solves it, or None."""
         for seed, k in enumerate(solved_at, 1):
             rows = ([(0.5, 1000 + seed)] * (k - 1) + [(1, 2600 + seed), (1, 2500 + seed)] if k
                     else [(0.5, 900 + seed)] * 4)
@@ -138,7 +138,7 @@ class CompareTest(ProgramTest):
         self.assertIsNone(pair["solve_seconds_difference"])
         self.assertEqual(pair["return_difference"]["value"],
                          (2501 + 2502 + 903) / 3 - (2501 + 2502 + 2503) / 3)
-        # No pair of three and three is not the same as never.
+        # Zero of nine pairs does not mean that it never happens.
         low, high = pair["solves_sooner"]["interval_95"]
         self.assertEqual(low, 0)
         self.assertAlmostEqual(high, 0.499, delta=0.001)
@@ -174,7 +174,7 @@ class CompareTest(ProgramTest):
         answer = self.compare("run")
         self.assertIsNone(answer["groups"][0]["final_return"]["iqm"]["interval_95"])
         self.assertIn("no intervals, because there is only one seed", answer["notes"][0])
-        # "In every run" is said of several only.
+        # "In every run" needs several runs.
         self.assertIn("final return    2,610\n", self.succeed("compare", "run"))
         self.make_run("two/1", 1, [(1, 2600), (1, 2610)])
         self.make_run("two/2", 2, [(1, 2600), (1, 2610)])
@@ -332,7 +332,7 @@ class CompareTest(ProgramTest):
         self.make_run("begun", 3, [(0, 1), (1, 1)])
         self.make_run("bare", 4, [])
         with open(self.folder / "begun/evals.csv", "a", encoding="utf-8") as file:
-            file.write("3000,1,0,2")  # what a full disk leaves
+            file.write("3000,1,0,2")  # left by a full disk
         self.refuse(["compare", "begun"], "begun/evals.csv", "half-written", "--resume")
         answer = self.compare("r", "begun", "bare", "--unfinished")
         self.assertEqual([run["steps"] for run in answer["groups"][0]["runs"]], [2000, 3000, 2000])
@@ -395,7 +395,7 @@ class CompareTest(ProgramTest):
         self.assertEqual(against[0]["return_difference"], {"value": 0, "interval_95": None})
         self.assertEqual(against[1]["return_difference"]["value"],
                          row["mean_return"] - lqr["return"]["mean"])
-        # A controller is made for the plant of the runs, unless another one is named.
+        # A controller is designed for the plant of the runs, unless another plant is named.
         pfl = lambda *flags: self.compare("run", "pfl", *flags)["policies"][0]["return"]
         self.assertEqual(pfl("--made-for", "mass2=1.1"), pfl())
         self.assertNotEqual(pfl("--made-for", "mass2=1"), pfl())
@@ -411,7 +411,7 @@ class CompareTest(ProgramTest):
         svg = (self.folder / "out/curves.svg").read_text(encoding="utf-8")
         self.assertIn("lqr", svg)
         self.assertNotIn("policy.safetensors", svg)  # a path would not fit
-        # Policies whose folders have the same name are told apart by the folders before them.
+        # Policies in folders with the same name are distinguished by the parent folders.
         (self.folder / "copy/run").mkdir(parents=True)
         shutil.copy(self.folder / "run/policy.safetensors", self.folder / "copy/run")
         self.succeed("compare", *names[:2], "copy/run/policy.safetensors", "--out", "two")

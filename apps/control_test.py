@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Controllers made from the equations of motion, where a policy's file could stand."""
+"""Tests of controllers computed from the equations of motion, used in place of a policy file."""
 
 import csv
 import io
@@ -34,7 +34,7 @@ class Lqr(ProgramTest):
             rows = self.simulate("--start", "3.11,0.02,0.1,-0.05", "--seconds", 5, "--physics", physics)
             for row in rows[:-1]:
                 u = -sum(k * x for k, x in zip(GAIN, deviation(row)))
-                # Observations are in single precision.
+                # Observations have single precision.
                 self.assertAlmostEqual(row["torque"], min(max(u, -5), 5), delta=2e-3)
             self.assertLess(max(map(abs, deviation(rows[-1]))), 1e-4)
             self.assertTrue(all(row["inverted"] for row in rows))
@@ -49,8 +49,8 @@ class Lqr(ProgramTest):
         result = json.loads(self.succeed("eval", "lqr", "--lqr-torque", 0.1, "--made-for", "mass2=1.2",
                                          "--episodes", 4, "--physics", "closed-form", "--json"))
         self.assertEqual(result["policy"], "lqr (lqr_torque 0.1, for mass2 1.2)")
-        self.assertEqual(result["plant"]["mass2"], 1.2)  # tried on what it was made for
-        self.assertEqual(result["successes"], 0)         # it does not swing up
+        self.assertEqual(result["plant"]["mass2"], 1.2)  # evaluated on its design plant
+        self.assertEqual(result["successes"], 0)         # lqr does not swing up
         other = json.loads(self.succeed("eval", "lqr", "--set", "mass2=1.2", "--episodes", 4,
                                         "--physics", "closed-form", "--json"))
         self.assertEqual((other["policy"], other["plant"]["mass2"]), ("lqr", 1.2))
@@ -75,7 +75,7 @@ class Lqr(ProgramTest):
             rows = self.simulate("--made-for", "actuated_joint=2", "--start", "3.131,0.02,0,0",
                                  "--seconds", 8, "--physics", physics)
             self.assertLess(max(map(abs, deviation(rows[-1]))), 1e-3)
-        # Made for the other joint, it does not hold this one.
+        # A controller for the other joint does not hold this one.
         self.assertEqual(self.simulate("--set", "actuated_joint=2", "--start", "3.131,0.02,0,0",
                                        "--seconds", 3)[-1]["inverted"], 0)
         self.refuse(["eval", "lqr", "--made-for", "actuated_joint=2", "--made-for",
@@ -109,7 +109,7 @@ class Lqr(ProgramTest):
         self.assertLess(min(map(min, result["success_rate"])), 1)
         figure = (self.folder / "map/map.svg").read_text(encoding="utf-8")
         self.assertIn("mass2 as in design, damping2 as in design", figure)
-        self.assertNotIn("0.0202", figure)  # the colour bar of times that are all 0.02 s
+        self.assertNotIn("0.0202", figure)  # the colour bar if all times are 0.02 s
 
     def test_plot(self):
         text = self.succeed("plot", "lqr", "--start", "3.1,0,0,0", "--seconds", 2)
@@ -161,7 +161,7 @@ class SwingUp(ProgramTest):
             for physics in ("mujoco", "closed-form"):
                 result = self.eval(controller, "--episodes", episodes, "--physics", physics)
                 self.assertGreaterEqual(result["successes"], 0.9 * episodes, controller)
-        energy = self.eval("energy", "--episodes", 20)  # its law asks for more than the motor has
+        energy = self.eval("energy", "--episodes", 20)  # the law exceeds the motor's limit
         self.assertGreater(energy["successes"], 7)
         self.assertLess(energy["successes"], 20)
 
@@ -169,7 +169,7 @@ class SwingUp(ProgramTest):
         heavy = ("--made-for", "mass2=1.2", "--made-for", "length1=0.45")
         self.assertEqual(self.eval("tvlqr", *heavy, "--episodes", 10)["successes"], 10)
         self.assertEqual(self.eval("mpc", *heavy, "--episodes", 2)["successes"], 2)
-        other = self.eval("tvlqr", "--set", "mass2=3", "--episodes", 10)  # not what it is for
+        other = self.eval("tvlqr", "--set", "mass2=3", "--episodes", 10)  # not its design plant
         self.assertLess(other["successes"], 10)
 
     def test_hybrid_catches_what_a_network_brings_up(self):
@@ -187,7 +187,7 @@ class SwingUp(ProgramTest):
         self.refuse(["eval", POLICY, "--swing-up", POLICY], "--swing-up: expected a controller")
 
     def test_upright_all_of_them_hold(self):
-        # From 1 degree off, and with noise; tvlqr once left the regulator to swing up again.
+        # Starts 1 degree off, and with noise. tvlqr once left the regulator to swing up again.
         for controller in ("energy", "lqr", "pfl", "tvlqr"):
             rows = list(csv.DictReader(io.StringIO(self.succeed(
                 "simulate", controller, "--start", "3.13,0,0,0", "--seconds", 3, "--sensor-noise", 0.005))))

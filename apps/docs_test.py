@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What the documentation says, held against the program and the repository."""
+"""Compares the documentation with the program and the repository."""
 
 import csv
 import io
@@ -22,7 +22,7 @@ from pages import pages, without_code  # noqa: E402
 
 PAGES = pages()
 DOCUMENTS = [*sorted(ROOT.glob("*.md")), *PAGES[1:], ROOT / "tools/peers/README.md"]
-# Written when the site is built: tools/docs.py.
+# Pages written when the site is built: tools/docs.py.
 GENERATED = {f"docs/reference/{name}.md"
              for name in ("command-line", "settings", "cpp-api", "python-api")}
 
@@ -32,7 +32,7 @@ def text_of(name):
 
 
 def first_column(markdown):
-    """What stands in backticks at the beginning of the rows of a table."""
+    """The text in backticks at the beginning of each table row."""
     return re.findall(r"^\| `([^`]+)`", markdown, re.MULTILINE)
 
 
@@ -77,7 +77,7 @@ class RunFolder(ProgramTest):
 
 
 def reward_terms(q1, q2, w1, w2, tau, m1=1, m2=1, l1=0.5, l2=0.5, g=9.81):
-    """docs/reference/task.md in Python."""
+    """The reward of docs/reference/task.md in Python."""
     pe = (-m1 * g * l1 / 2 * math.cos(q1)
           - m2 * g * (l1 * math.cos(q1) + l2 / 2 * math.cos(q1 + q2)))
     ke = (m1 * l1**2 / 12 * w1**2 / 2 + m2 * l2**2 / 12 * (w1 + w2)**2 / 2
@@ -102,7 +102,7 @@ class Task(ProgramTest):
         names = first_column(text_of("docs/reference/task.md").split("## Reward")[1].split("##")[0])
         for row in csv.DictReader(io.StringIO(rows)):
             x = {name: float(text) for name, text in row.items()}
-            # The torque of a row is held from its state on: its reward's terms are of both.
+            # A row's torque acts from its state on, and the reward's terms use both.
             terms = reward_terms(x["qpos0"], x["qpos1"], x["qvel0"], x["qvel1"], x["torque"])
             self.assertEqual(names, list(terms))
             for name in names:
@@ -113,7 +113,7 @@ class Task(ProgramTest):
 
 
 def anchors(markdown):
-    """The anchors of the headings, as GitHub and MyST make them."""
+    """The anchors of the headings, as GitHub and MyST generate them."""
     found = set()
     for heading in re.findall(r"^#+ +(.*?)\s*$", without_code(markdown), re.MULTILINE):
         text = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).lower()
@@ -124,7 +124,7 @@ def anchors(markdown):
 
 
 def commands_in(markdown):
-    """[command, words] of each `./upswing …` in fenced blocks and in code within a line."""
+    """[command, words] of each `./upswing …` in fenced blocks and inline code."""
     blocks = re.findall(r"^```[^\n]*\n(.*?)^```", markdown, re.MULTILINE | re.DOTALL)
     codes = re.findall(r"`([^`\n]+)`", without_code(markdown)) + [
         line for block in blocks for line in block.replace("\\\n", " ").splitlines()]
@@ -160,7 +160,7 @@ class Documents(ProgramTest):
                     self.assertIn(command, known | {"help"})
                     flags = {word.split("=")[0] for word in words if re.match("--[a-z]", word)}
                     if command == "test" or "--" in words or command == "python":
-                        continue  # what follows is for ctest or for Python
+                        continue  # the rest is for ctest or Python
                     self.assertLessEqual(flags, program.flags(command) | {"--help"})
 
     def test_tables_and_values_are_up_to_date(self):
@@ -188,7 +188,7 @@ class Documents(ProgramTest):
                     self.fail(sentence)
 
     def test_the_patterns_find_faults(self):
-        # Of the README of version 0.4.0 and its relatives.
+        # Sentences of the README of version 0.4.0 and similar ones.
         for sentence in (
                 "Nobody has tried Ubuntu yet.",
                 "learning_md says what is in a file.",
@@ -219,7 +219,7 @@ class Documents(ProgramTest):
                                 re.MULTILINE | re.DOTALL)
             if not blocks:
                 continue
-            # The blocks of a page run one after the other, in what looks like a fresh copy.
+            # The blocks of a page run in order, in a folder that looks like a fresh checkout.
             here = self.folder / "page"
             here.mkdir()
             for entry in ROOT.iterdir():
@@ -275,7 +275,7 @@ class Documents(ProgramTest):
 
 
 class Site(ProgramTest):
-    """The documentation as HTML, built by ./upswing docs in build/docs-venv."""
+    """Tests of the documentation as HTML, built by ./upswing docs in build/docs-venv."""
 
     def setUp(self):
         super().setUp()
@@ -308,7 +308,7 @@ class Site(ProgramTest):
 
 
 class Launcher(ProgramTest):
-    """./upswing docs: what it refuses."""
+    """Tests of the errors of ./upswing docs."""
 
     def test_bad_input_is_refused_in_one_line(self):
         (self.folder / "full").mkdir()

@@ -36,7 +36,7 @@ int RunEval(const EvalArguments& a) {
   const LoadedPolicy loaded = GetPolicy(a.policy);
   ThreadPool pool(ResolveThreads(a.threads), a.threads == 0);
   const EvalReport report = [&] {
-    EpisodeProgress progress(a.as_json);  // gone when the table is printed
+    EpisodeProgress progress(a.as_json);  // removed before the table is printed
     return EvaluatePolicy(loaded, a.trial, a.episodes, pool, std::ref(progress));
   }();
   if (!a.episodes_csv.empty()) WriteOutput(a.episodes_csv, EpisodesCsv(report));

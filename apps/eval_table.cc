@@ -13,7 +13,7 @@
 namespace upswing {
 namespace {
 
-/// Length of the episodes: one length, or the mean where some end earlier.
+/// Length of the episodes: the common length, or the mean if some end earlier.
 std::string LengthText(const Moments& seconds) {
   constexpr double kSame = 1e-6;  // s
   if (seconds.deviation < kSame) return fmt::format("{:.6g} s", seconds.mean);
@@ -70,7 +70,7 @@ bool ValueIsOff(double expected, double attained) {
 }
 
 std::string MomentsText(const Moments& m, double scale) {
-  constexpr double kLeast = 1e-6;  // below it a deviation is rounding
+  constexpr double kLeast = 1e-6;  // smaller deviations are rounding errors
   const double mean = scale * m.mean, deviation = scale * m.deviation;
   if (deviation < kLeast) return fmt::format("{:.4g} ± 0", mean);
   const int decimals = std::max(0, 1 - static_cast<int>(std::floor(std::log10(deviation))));

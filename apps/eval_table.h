@@ -6,17 +6,17 @@
 
 namespace upswing {
 
-/// Such as `34.18 ± 0.57`: two digits of the deviation, or its whole part, and the mean to as many
-/// decimals.
+/// Mean and deviation, such as `34.18 ± 0.57`. The deviation has two digits, or more if its whole
+/// part has more. The mean has as many decimals as the deviation.
 std::string MomentsText(const Moments& m, double scale = 1);
 
-/// Such as `2.74 s   (median; middle half 2.70 to 2.78 s)`.
+/// Median and quartiles, such as `2.74 s   (median; middle half 2.70 to 2.78 s)`.
 std::string QuartilesText(const Quartiles& q);
 
-/// Whether an agent expects over a quarter more or less, in discounted reward, than it attains.
+/// Whether an agent's expected discounted reward differs from the attained one by over a quarter.
 bool ValueIsOff(double expected, double attained);
 
-/// Prints the report on standard output.
+/// Prints an evaluation on standard output.
 void PrintEvalTable(const EvalReport& report);
 
 }  // namespace upswing

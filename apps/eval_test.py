@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""`upswing eval`: its table, its JSON, and that the same question gets the same answer."""
+"""Tests of `upswing eval`: its table, its JSON, and that repeating it gives the same result."""
 
 import csv
 import json
@@ -18,7 +18,7 @@ PLANT = {"mass1": 1, "mass2": 1, "length1": 0.5, "length2": 0.5, "damping1": 0.2
 
 
 def moments_text(moments):
-    """As the table has them: two digits of the deviation, or its whole part."""
+    """Moments as the table shows them: two digits of the deviation, or its whole part."""
     decimals = max(0, 1 - math.floor(math.log10(moments["deviation"])))
     return f"{moments['mean']:.{decimals}f} ± {moments['deviation']:.{decimals}f}"
 
@@ -26,7 +26,7 @@ def moments_text(moments):
 class EvalTest(ProgramTest):
     @classmethod
     def setUpClass(cls):
-        # A plant that is soon learned, so that there are successes to look at.
+        # An easy plant, so that there are successes to test.
         cls.policy = train_once(cls, gravity=0.05, damping=1, hidden="64,64", head=32,
                                 eval_episodes=1, steps=100000, checkpoint_every=20000)
 
@@ -65,7 +65,7 @@ class EvalTest(ProgramTest):
         drawn = json.loads(self.succeed("eval", "tvlqr", "--known-plant", "--randomize", 0.1,
                                         "--episodes", 3, "--json"))
         self.assertEqual(drawn["known_plant"], 3)
-        # No motor holds this one, so none is made for it.
+        # No motor holds this plant, so no controller is designed for it.
         lost = json.loads(self.succeed("eval", "lqr", "--known-plant", "--set", "damping2=0.38977",
                                        "--episodes", 2, "--json"))
         self.assertEqual((lost["known_plant"], lost["successes"]), (0, 0))
@@ -154,7 +154,7 @@ class EvalTest(ProgramTest):
                       table)
 
     def replay(self, episode, *flags):
-        """What `simulate` makes of an episode."""
+        """The rows of `simulate` for an episode."""
         text = self.succeed("simulate", self.policy, "--episode", episode, *flags)
         return [{name: float(cell) for name, cell in row.items()}
                 for row in csv.DictReader(text.splitlines())]
@@ -180,7 +180,7 @@ class EvalTest(ProgramTest):
         for row in rows:
             upright = row["swing_up_seconds"] != ""
             self.assertEqual(row["torque_changes_upright"] != "", upright)
-        # More episodes go on where fewer end.
+        # More episodes extend the list of fewer episodes.
         self.assertEqual(self.episodes(*flags, count=8)[:6], rows)
 
     def test_simulate_and_plot_say_the_torque_of_the_episode(self):
@@ -213,7 +213,7 @@ class EvalTest(ProgramTest):
         self.assertEqual(len(rows), 1001)
         for name, column in zip(("q1", "q2", "w1", "w2"), ("qpos0", "qpos1", "qvel0", "qvel1")):
             self.assertEqual(rows[0][column], number[name])
-        # An evaluation counts the rewards of the state after each step.
+        # An evaluation sums the rewards of the state after each step.
         terms = [0.0] * 5
         for before, row in zip(rows[:500], rows[1:501]):
             torque_penalty = (-0.05 if row["inverted"] else -0.01) * before["torque"] ** 2
@@ -255,7 +255,7 @@ class EvalTest(ProgramTest):
         self.assertEqual((usual["unknown_plant"], blind["unknown_plant"]), (False, True))
         self.assertNotEqual(usual["return"], blind["return"])
         self.assertEqual(blind["plant"], usual["plant"])
-        # On the plant of the training it is the same.
+        # On the training's plant, the flag changes nothing.
         self.assertEqual(self.evaluate("--unknown-plant")["return"], self.evaluate()["return"])
         self.assertIn("the plant unknown to the policy",
                       self.succeed("eval", self.policy, "--episodes", 1, "--unknown-plant"))
@@ -292,7 +292,7 @@ class EvalTest(ProgramTest):
         self.assertEqual(box["plant"], usual["plant"])
         self.assertNotEqual(box["return"], usual["return"])
         self.assertEqual(box, self.evaluate("--randomize", 0.25, "--threads", 3))
-        # One plant out of the box, and the box without a width.
+        # One plant from the box, and a box without width.
         self.assertNotEqual(box, self.evaluate("--randomize", 0.25, "--randomize-length", 0))
         self.assertEqual(usual, self.evaluate("--randomize", 0))
 

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 struct ExportArguments {
   std::vector<std::string> policies;
-  PolicyArguments controller;  // its settings
+  PolicyArguments controller;  // settings of a controller
   std::string page, id, test_vectors, onnx, c, prefix;
   int64_t checkpoints = 0;
 };

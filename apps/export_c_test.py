@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""`upswing export --c`: the header compiles without a warning as C99 and C++, and gives the torques that
-the program gives, for every kind of policy; it knows when it is damaged, and what is no number.
+"""Tests of `upswing export --c`, for every kind of policy. The header compiles without a warning as
+C99 and C++, and gives the program's torques. It detects damage to itself, and input that is not
+finite.
 """
 
 import array
@@ -20,7 +21,7 @@ EXAMPLE = ROOT / "examples/c"
 COUNT = 10_000
 STRICT = ["-pedantic", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion", "-Wshadow"]
 SANITIZE = ["-fsanitize=undefined,address", "-fno-sanitize-recover=all"]
-# Those that are here: (command, language options).
+# The installed compilers: (command, language options).
 COMPILERS = [(compiler, standard)
              for compiler, standard in (("gcc", "-std=c99"), ("clang", "-std=c99"),
                                         ("clang-14", "-std=c99"), ("g++", "-std=c++98"),
@@ -28,8 +29,8 @@ COMPILERS = [(compiler, standard)
              if shutil.which(compiler)]
 TASKS = {"double-pendulum": 4, "pendulum-v1": 2, "acrobot-v1": 4}  # numbers of a state
 
-# Reads rows of float: whether an episode begins, the state, the torque that then acted. Writes status,
-# torque and outputs of each.
+# Reads rows of float: whether an episode begins, the state, the torque that acted after it. Writes
+# status, torque and outputs of each.
 DRIVER = r"""
 #include "policy.h"
 #include <stdio.h>
@@ -76,7 +77,7 @@ int main(void)
 
 
 def compile_c(folder, source, *options, compiler="gcc", standard="-std=c99"):
-    """Compiles a file of the folder; returns what the compiler says of it."""
+    """Compiles a file of the folder. Returns the compiler's messages."""
     language = ["-x", "c++"] if compiler == "g++" else []
     return subprocess.run([compiler, standard, *STRICT, *options, *language, source, "-x", "none",
                            "-o", "program", "-lm"], cwd=folder, check=False,
@@ -85,14 +86,14 @@ def compile_c(folder, source, *options, compiler="gcc", standard="-std=c99"):
 
 
 def rows_of(numbers, count):
-    """An array cut into `count` rows."""
+    """An array split into `count` rows."""
     width = len(numbers) // count
     return [numbers[i * width:(i + 1) * width] for i in range(count)]
 
 
 @functools.cache
 def random_states(size, turns=3):
-    """States of all kinds, as float has them: angles of some turns, then velocities."""
+    """Random states, rounded to float: angles of several turns, then velocities."""
     rng = random.Random(0)
     bounds = [turns * 3.14] * (size // 2) + [8] * (size // 2)
     return array.array("f", (rng.uniform(-bound, bound) for _ in range(COUNT) for bound in bounds))
@@ -129,7 +130,7 @@ class HeaderTest(ProgramTest):
                 for row in rows_of(array.array("f", done.stdout), count)]
 
     def assert_same(self, got, torques):
-        """The program's torques, except where two outputs are as good as equal."""
+        """Asserts equal torques, except where two outputs are practically equal."""
         limit = float(re.search(r"POLICY_TORQUE_LIMIT (\S+)f", self.header())[1])
         scale = max(abs(x) for _, _, outputs in got for x in outputs)
         others = 0
@@ -149,7 +150,7 @@ class HeaderTest(ProgramTest):
         return (self.folder / "policy.h").read_text(encoding="ascii")
 
     def check(self, policy, *options, task="double-pendulum"):
-        """10,000 random states, each the beginning of an episode."""
+        """Asserts equal torques in 10,000 random states, each the beginning of an episode."""
         self.build(policy, *options, task=task)
         size = TASKS[task]
         states = random_states(size, 3 if task == "double-pendulum" else 1)
@@ -162,7 +163,7 @@ class HeaderTest(ProgramTest):
         for name in ("fast", "dqn", "d3qn", "sac", "ppo", "d3qn-randomized"):
             with self.subTest(name):
                 self.check(AGENTS / f"{name}.safetensors", "-Wconversion")
-            if name in ("dqn", "d3qn"):  # of the same kind as fast, and larger
+            if name in ("dqn", "d3qn"):  # larger, but of the same kind as fast
                 continue
             for compiler, standard in COMPILERS[1:]:
                 with self.subTest(f"{compiler} {standard} {name}"):
@@ -175,7 +176,7 @@ class HeaderTest(ProgramTest):
         self.check_outputs_of_the_plain_network()
 
     def check_outputs_of_the_plain_network(self):
-        """Of a plain network they are the Q-values."""
+        """A plain network's outputs are its Q-values."""
         states = random_states(4)
         expected = rows_of(probe(self.folder / "run", "states", states), COUNT)
         scale = max(abs(q) for row in expected for q in row[1:])
@@ -240,7 +241,7 @@ class HeaderTest(ProgramTest):
                     states, wrong = array.array("f"), []
                     for place in range(4):
                         for x in bad:
-                            # An angle may be of any size.
+                            # Angles may have any size.
                             wrong.append(place > 1 or not abs(x) < math.inf)
                             states.extend([*good[:place], x, *good[place + 1:]])
                             states.extend(good)
@@ -250,15 +251,16 @@ class HeaderTest(ProgramTest):
                         self.assertEqual(status, is_wrong, (i, got[2 * i]))
                         self.assertTrue(not is_wrong or torque == 0)
                         self.assertEqual(got[2 * i + 1][0], 0)
-                    # What was remembered is forgotten: the next is as the first of an episode.
+                    # After wrong input the memory is empty: the next call is like the first of an
+                    # episode.
                     first = self.drive(array.array("f", good), 4)[0]
                     for i, is_wrong in enumerate(wrong):
                         if is_wrong:
                             self.assertEqual(got[2 * i + 1][1], first[1])
 
     def test_controllers(self):
-        """Over closed loops they give the program's torques, but where a decision hangs on a
-        rounding."""
+        """In closed loops, controllers give the program's torques, except where rounding
+        decides."""
         call = ", ".join(f"in[{i + 1}]" for i in range(4))
         driver = CONTROLLER_DRIVER.replace("CALL", call)
         for name, options, begins in (("lqr", ["--lqr-torque", 2], ["3.12,0,0,0"]),
@@ -273,7 +275,7 @@ class HeaderTest(ProgramTest):
                     self.check_controller(name, options, begin)
 
     def check_controller(self, name, options, begin):
-        """A closed loop of the program's, with the torques of the compiled one."""
+        """Compares a closed loop of the program with the torques of the compiled controller."""
         self.succeed("simulate", name, *options, "--start", begin, "--physics", "closed-form", "--csv",
                      "rollout.csv")
         rows = read_csv(self.folder / "rollout.csv")[:-1]
@@ -289,7 +291,7 @@ class HeaderTest(ProgramTest):
     def test_controllers_of_other_plants_pass_their_self_test(self):
         names = ("mass1", "mass2", "length1", "length2", "damping1", "damping2", "gravity",
                  "torque_limit")
-        # The first two were hard for the choice of a place on the plan, the others for the step.
+        # The first two starts were hard for choosing a place on the plan, the others for the step.
         for name, values in (
                 ("tvlqr", (1.062, 1.135, .513, .498, .188, .226, 9.494, 5.877)),
                 ("tvlqr", (1.192, .915, .537, .556, .231, .173, 9.315, 5.92)),
@@ -340,7 +342,7 @@ class HeaderTest(ProgramTest):
         self.assertEqual(subprocess.run([self.folder / "program"], check=False).returncode, 0)
 
     def self_test(self):
-        """The exit code of a program that tests the header at hand."""
+        """The exit code of a program that runs the header's self-test."""
         self.write("test.c", '#include "policy.h"\nint main(void) { return (int)policy_selftest(); }')
         self.compile("test.c")
         return subprocess.run([self.folder / "program"], check=False).returncode
@@ -350,7 +352,8 @@ class HeaderTest(ProgramTest):
         self.succeed("export", "run", "--c", "policy.h")
         tables = re.findall(r"static const float (policy_\w+)\[(\d+)\] = ", self.header())
         self.assertGreater(sum(int(count) for _, count in tables), 300)
-        # Each number in turn, and the last bit of each that is no sample; in memory, as const is gone.
+        # Changes each number in turn, and the last bit of each number that is not a sample. Works
+        # in memory, because `const` is removed.
         self.write("change.c", r"""
             #include <math.h>
             #include <stdint.h>
@@ -393,7 +396,7 @@ class HeaderTest(ProgramTest):
             self.assertEqual(self.self_test(), 3, right)
 
     def test_the_c_files_of_exports_compile_on_their_own(self):
-        """With export/c/tables.h in place of an export's tables."""
+        """Compiles export/c with its own tables.h in place of an export's tables."""
         folder = ROOT / "export/c"
         simulates = ["-DPOLICY_LOOK_AHEAD=9"]
         ways = [("pendulum", []), ("pendulum", ["-DPOLICY_MEMORY_SIZE=12"]),
@@ -455,7 +458,7 @@ class HeaderTest(ProgramTest):
 
     def test_what_it_says_of_itself(self):
         printed = self.succeed("export", AGENTS / "fast.safetensors", "--c", "policy.h")
-        # 8-48-32, the advantage stream alone: 32-32-9, and layer normalisation.
+        # Layers 8-48-32, the advantage stream 32-32-9 only, and layer normalisation.
         weights = 8 * 48 + 48 * 32 + 32 * 32 + 32 * 9
         constants = 4 * (weights + 3 * (48 + 32) + 32 + 9 + 9 + 7)
         self.assertIn(f"{weights:,} multiply-adds", printed)
@@ -483,7 +486,7 @@ class HeaderTest(ProgramTest):
         for path in sorted((ROOT / "fuzz/corpus/policy/accepted").iterdir()):
             with self.subTest(path.name):
                 metadata, _ = read_tensors(path)
-                if metadata["format"] == "upswing-realaigym":  # is not for this program's tasks
+                if metadata["format"] == "upswing-realaigym":  # not for this program's tasks
                     self.refuse(["export", path, "--c", "x.h"], path.name, "RealAIGym")
                     continue
                 self.succeed("export", path, "--c", "policy.h")
@@ -516,17 +519,17 @@ class HeaderTest(ProgramTest):
 
 
 def block_of_documentation(section):
-    """The lines that a section of docs/howto/export.md tells to type."""
+    """The lines that a section of docs/howto/export.md asks you to type."""
     text = (ROOT / "docs/howto/export.md").read_text(encoding="utf-8").split(f"### {section}\n")[1]
     blocks = re.findall(r"^```sh\n(.*?)^```", text.split("\n### ")[0], re.MULTILINE | re.DOTALL)
     return "".join(blocks)
 
 
 class DocumentedTest(ProgramTest):
-    """What docs/howto/export.md says can be typed."""
+    """Tests that the commands in docs/howto/export.md work."""
 
     def type(self, lines):
-        """Types lines in a folder that has the examples; returns all that they say."""
+        """Runs lines in a folder with the examples; returns their output."""
         if not (self.folder / "examples").exists():
             (self.folder / "examples").symlink_to(ROOT / "examples")
         done = subprocess.run(["sh", "-euc", lines.replace("./upswing ", f"'{UPSWING}' ")],
@@ -536,8 +539,8 @@ class DocumentedTest(ProgramTest):
         return done.stdout
 
     def test_export_compile_swing_up(self):
-        """With the page's agent of that name in place of the training, which examples/library_test.py
-        does to its end."""
+        """Uses the page's agent of that name instead of the training, which
+        examples/library_test.py runs to its end."""
         train, rest = block_of_documentation("A closed loop in plain C").split("\n", maxsplit=1)
         self.assertEqual(train, "./upswing train --agent fast --out runs/fast")
         (self.folder / "runs/fast").mkdir(parents=True)
@@ -582,7 +585,7 @@ class DocumentedTest(ProgramTest):
 
 
 class SwingUpTest(ProgramTest):
-    """The closed loop in plain C of examples/c."""
+    """Tests of the closed loop in plain C of examples/c."""
 
     def build(self, agent, source="swing_up.c"):
         self.succeed("export", AGENTS / f"{agent}.safetensors", "--c", "policy.h")
@@ -639,12 +642,12 @@ class SwingUpTest(ProgramTest):
 @unittest.skipUnless(shutil.which("arm-none-eabi-gcc") and shutil.which("qemu-system-arm"),
                      "no gcc-arm-none-eabi and qemu-system-arm here")
 class CortexM4Test(ProgramTest):
-    """The same on a Cortex-M4 with its own arithmetic and newlib's math, in QEMU."""
+    """Tests of examples/c on a Cortex-M4 in QEMU, with its own arithmetic and newlib's math."""
 
     PROCESSOR = ["-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"]
 
     def run_there(self, source, *qemu, optimize="-O2"):
-        """Builds a program for it and runs it."""
+        """Builds a program for the Cortex-M4 and runs it."""
         folder = EXAMPLE / "cortex_m4"
         done = subprocess.run(
             ["arm-none-eabi-gcc", "-std=c99", optimize, *STRICT, *self.PROCESSOR, "-I.", source,
@@ -660,7 +663,7 @@ class CortexM4Test(ProgramTest):
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, encoding="utf-8")
 
     def test_self_test_and_work(self):
-        # (agent, instructions for each multiply-add at most: load, multiply, add, and loops)
+        # (agent, most instructions per multiply-add): load, multiply, add, and loops
         for agent, most in (("fast", 6), ("d3qn-randomized", 6), ("sac", 6)):
             for optimize in ("-O2", "-Os"):
                 with self.subTest(f"{agent} {optimize}"):

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""`upswing export --onnx`: ONNX's own checker accepts the file, and onnxruntime computes of it what the
-program does, for every kind of policy.
+"""Tests of `upswing export --onnx`, for every kind of policy. ONNX's own checker accepts the file,
+and onnxruntime computes the program's results from it.
 """
 
 import json
@@ -22,11 +22,11 @@ import onnxruntime
 
 AGENTS = ROOT / "web/public/agents"
 COUNT = 10_000
-ERROR = 1e-5  # share of the largest value
+ERROR = 1e-5  # relative to the largest value
 
 
 def session_of(path):
-    """onnxruntime's reader of a file, with one thread."""
+    """A session of onnxruntime for a file, with one thread."""
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
@@ -39,7 +39,7 @@ def shapes(values):
 
 
 def observations(size):
-    """Rows around those of a swing-up, some far out."""
+    """Observations near those of a swing-up, some far away."""
     rng = np.random.default_rng(0)
     scale = rng.choice([0.5, 1, 3], size=(COUNT, 1))
     return (scale * rng.standard_normal((COUNT, size))).astype(np.float32)
@@ -52,7 +52,7 @@ def what_the_program_says(policy, obs):
 
 class OnnxTest(ProgramTest):
     def export(self, policy):
-        """Exports and checks; returns the model and the outputs for the observations."""
+        """Exports and checks a policy. Returns the model and its outputs for the observations."""
         self.assertIn("policy.onnx (", self.succeed("export", policy, "--onnx", "policy.onnx"))
         model = onnx.load(self.folder / "policy.onnx")
         onnx.checker.check_model(model, full_check=True)
@@ -67,7 +67,7 @@ class OnnxTest(ProgramTest):
         got = dict(zip(names, session.run(names, {"observation": obs}), strict=True))
         for name, (batch, size) in shapes(model.graph.output).items():
             self.assertEqual((batch, got[name].shape), ("batch", (COUNT, size)), name)
-        # One row alone gives the same, and so does none.
+        # A single row gives the same outputs; zero rows work, too.
         one = session.run(names, {"observation": obs[:1]})
         for name, row in zip(names, one, strict=True):
             np.testing.assert_allclose(row, got[name][:1], rtol=0, atol=1e-5 * np.abs(got[name]).max())
@@ -78,7 +78,7 @@ class OnnxTest(ProgramTest):
         self.assertGreater(np.ptp(expected), 0)
 
     def assert_same_choice(self, got, torque, preferences):
-        """The same torque, except where two preferences are as good as equal."""
+        """Asserts equal torques, except where two preferences are practically equal."""
         differs = got[:, 0] != torque.astype(np.float32)
         ordered = np.sort(preferences[differs], axis=1)
         margin = ordered[:, -1] - ordered[:, -2]
@@ -131,7 +131,8 @@ class OnnxTest(ProgramTest):
                 shutil.rmtree(self.folder / "run")
 
     def test_actors_of_the_test_vectors(self):
-        """Each output, with tanh and ReLU, with and without layer normalisation and a critic."""
+        """Tests each output, with tanh and ReLU, with and without layer normalisation and a
+        critic."""
         vectors = json.loads(self.succeed("export", "--test-vectors", "-"))
         kinds = []
         for i, actor in enumerate(vectors["actors"]):
@@ -166,7 +167,7 @@ class OnnxTest(ProgramTest):
         self.assertEqual(model.producer_name, "upswing")
 
     def test_the_documentation(self):
-        """Its Python runs, and it names every output and every metadata."""
+        """The page's Python code runs, and the page names every output and every metadatum."""
         text = (ROOT / "docs/howto/export.md").read_text(encoding="utf-8")
         (code,) = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
         named = set(re.findall(r"`(\w+)`", text))

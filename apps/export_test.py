@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""`upswing export`: test vectors against a second derivation, and policies in the page's folder."""
+"""Tests of `upswing export`: test vectors against a second derivation, and policies in the page's
+folder."""
 
 import array
 import json
@@ -106,7 +107,7 @@ class TestVectorsTest(ProgramTest):
         self.assertEqual(sum(case["plant"]["mass1"] == 1 for case in cases), 16)
         for name in PLANT:
             self.assertGreater(len({case["plant"][name] for case in cases}), 40)
-        # On both sides of the 30°, by half a degree, with either link.
+        # States half a degree on both sides of the 30° limit, with either link.
         for link in (0, 1):
             for inside in (True, False):
                 edge = math.radians(29.5 if inside else 30.5)
@@ -218,7 +219,7 @@ class PageTest(ProgramTest):
         self.assertEqual(command[:5], ["train", "--agent", "d3qn-small", "--seed", "7"])
         for word in ("--hidden 16,16", "--no-double", "--gamma 0.97", "--mass2 1.25"):
             self.assertIn(word, self.index()[0]["command"])
-        self.assertNotIn("--learning-rate", command)  # as the named agent has it
+        self.assertNotIn("--learning-rate", command)  # the named agent has this value
         self.succeed(*command, "--out", "again", "--threads", 1, "--steps", 4000)
         self.assertEqual((self.folder / "again/policy.safetensors").read_bytes(),
                          (self.folder / "page/run.safetensors").read_bytes())
@@ -239,7 +240,7 @@ class PageTest(ProgramTest):
         bytes_of = {name: (self.folder / "page" / name).read_bytes() for name in files}
         self.assertEqual(len(set(bytes_of.values())), len(steps) - 1)
 
-        # The training up to there, its parameters rounded to bfloat16.
+        # Compare with a training of this length, with parameters rounded to bfloat16.
         self.succeed(*small(seed=7, steps=steps[1], eval_every=2000, out="short", **self.SETTINGS))
         _, exact = read_tensors(self.folder / "short/policy.safetensors")
         rounded_about, rounded = read_tensors(self.folder / "page" / files[1])
@@ -256,7 +257,7 @@ class PageTest(ProgramTest):
                 self.assertLessEqual(abs(got - expected), 2**-8 * abs(expected))
         self.succeed("eval", "page/" + files[1], "--episodes", "2")
 
-        # Again, and by the policy alone: the same bytes.
+        # Repeating it, and exporting only the policy, gives the same bytes.
         self.succeed("export", "run/policy.safetensors", "--id", "run", "--page", "page",
                      "--checkpoints", count)
         self.assertEqual({name: (self.folder / "page" / name).read_bytes() for name in files},
@@ -289,11 +290,11 @@ class PageTest(ProgramTest):
         shutil.copy(self.folder / "two/policy.safetensors", self.folder / "lonely.safetensors")
         self.succeed("export", "one", "two/policy.safetensors", "--page", "page")
         self.assertEqual([entry["id"] for entry in self.index()], ["one", "two"])
-        self.assertIn("curve", self.index()[1])  # its file lies in a run folder
+        self.assertIn("curve", self.index()[1])  # the file is in a run folder
         self.succeed("export", "lonely.safetensors", "--page", "page")
         self.assertEqual([entry["id"] for entry in self.index()], ["one", "two", "dqn"])
         self.assertNotIn("curve", self.index()[2])
-        # One of the same ID is replaced where it stands; what the others say stays.
+        # An entry with the same ID is replaced in place; the other entries keep their text.
         text = (self.folder / "page/agents.json").read_text()
         index = json.loads(text)
         index["agents"][1]["note"] = "by hand"
@@ -361,13 +362,13 @@ class PageTest(ProgramTest):
 
         words = shlex.split(command_of(f'"{evil}"'))
         self.assertEqual(words[words.index("--model") + 1], evil)
-        # A shell says so too: each word is one.
+        # A shell also reads each word as one.
         printed = command_of(f'"{evil}"').replace("./upswing", "printf '%s\\n'")
         shown = subprocess.run(["sh", "-c", printed], cwd=self.folder, check=True,
                                stdout=subprocess.PIPE, encoding="utf-8").stdout
         self.assertEqual(shown.splitlines(), words[1:])
         self.assertFalse((self.folder / "y").exists())
-        # Text with invisible characters is left out.
+        # A command with invisible characters is left out.
         for text in ('"a\\u001b[2Jb"', '"a\\u202eb"'):
             self.assertIsNone(command_of(text), text)
 
@@ -413,21 +414,21 @@ class ShippedTest(ProgramTest):
                           for one in (entry, *entry.get("checkpoints", []))} | {"agents.json"})
         for entry in entries:
             with self.subTest(agent=entry["id"]):
-                # One that masters a box of plants need not master every plant of it.
+                # An agent trained on a box of plants need not succeed on every plant.
                 least = {"d3qn-adaptive": 0.95, "d3qn-randomized": 0.85}.get(entry["agent"], 1)
                 self.assertGreaterEqual(entry["success_rate"], least)
                 self.assertEqual(max(entry["curve"]["success_rate"]), entry["success_rate"])
                 self.succeed("export", folder / entry["file"], "--id", entry["id"],
                              "--page", entry["id"])
                 text = (self.folder / entry["id"] / "agents.json").read_text()
-                del entry["curve"]  # that of the run, which is not here
+                del entry["curve"]  # needs the run, which is not here
                 entry.pop("checkpoints", None)
                 self.assertEqual(json.loads(text)["agents"], [entry])
 
     def test_the_pages_own_agents_attain_what_they_expect(self):
         for path in sorted((ROOT / "web/public/agents").glob("*.safetensors")):
             if "-at-" in path.name:
-                continue  # a policy on the way
+                continue  # a checkpoint
             with self.subTest(agent=path.stem):
                 result = json.loads(self.succeed("eval", path, "--episodes", 50, "--json",
                                                  "--physics", "closed-form"))

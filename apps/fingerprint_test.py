@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Short trainings give the bits that they always gave: a change that should not alter learning, such
-as a refactoring, keeps these fingerprints.
+"""Short trainings keep their bits: a change that should not alter learning, such as a refactoring,
+keeps these fingerprints.
 
-A fingerprint is a hash of the policy's tensors and one of the tables without clock times. Bits
-depend on the vector instructions, and on how a compiler fuses and orders operations, so they are
-pinned for each vector path and for release builds by g++ alone. Where a change alters them on
-purpose, `apps/fingerprint_test.py --print` prints the new ones.
+A fingerprint is a hash of the policy's tensors and a hash of the tables without clock times. Bits
+depend on the vector instructions, and on how a compiler fuses and orders operations. Fingerprints
+are therefore pinned for each vector path, and only for release builds by g++. After a deliberate
+change, `apps/fingerprint_test.py --print` prints the new ones.
 """
 
 import csv
@@ -21,8 +21,7 @@ from pathlib import Path
 
 from testing import run
 
-# In MuJoCo and in closed form, on random plants with a memory, without any extension, and by each
-# algorithm.
+# Cases: MuJoCo and closed form, random plants with a memory, no extension, and each algorithm.
 CASES = {
     "d3qn": ["--steps", "6000", "--eval-every", "3000", "--eval-episodes", "10"],
     "d3qn-bare": ["--steps", "3000", "--eval-every", "1000", "--eval-episodes", "5"],
@@ -58,7 +57,7 @@ PINNED = {
     ("sac-fast", "portable"): ("fc3a7ded716622ca", "e81540cb781d91a7"),
 }
 
-# To be printed by --print on a processor that has AVX-512.
+# Cases that --print has to print on a processor with AVX-512.
 UNPINNED = {(agent, "avx512") for agent in ("d3qn", "d3qn-randomized", "d3qn-small", "dqn", "fast")}
 
 
@@ -67,7 +66,7 @@ def digest(data):
 
 
 def policy_digest(path):
-    """Hash of a safetensors file's tensors, by their names; metadata are left out."""
+    """Hash of a safetensors file's tensors, by their names, without metadata."""
     content = path.read_bytes()
     length = struct.unpack("<Q", content[:8])[0]
     header = json.loads(content[8:8 + length])
@@ -117,7 +116,7 @@ class FingerprintTest(unittest.TestCase):
             with self.subTest(agent=agent, vectors=vectors):
                 got = fingerprint(agent, vectors)
                 if got is None or (agent, vectors) in UNPINNED:
-                    continue  # not on this processor
+                    continue  # not supported by this processor
                 tried += 1
                 self.assertEqual(got, PINNED[agent, vectors])
         self.assertGreater(tried, 0)

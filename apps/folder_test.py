@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Folders from untrusted sources: nothing is written through a link, every counter of a checkpoint
-has its bounds; and folders that are made: where they were asked for, whole or not at all."""
+"""Tests of folders. Untrusted ones: the program writes nothing through a link, and bounds every
+counter of a checkpoint. New ones: the program creates them where requested, complete or not at
+all."""
 
 import os
 import random
@@ -19,7 +20,7 @@ TINY = {"steps": 400, "hidden": 8, "head": 8, "eval_episodes": 2, "eval_every": 
 
 
 class RunTest(SmallRunTest):
-    """A small run beside another user's files."""
+    """Tests of a small run next to another user's files."""
 
     RESUME = ["train", "--resume", "run", "--steps", "8000"]
 
@@ -28,7 +29,7 @@ class RunTest(SmallRunTest):
         (self.folder / "precious").mkdir()
 
     def link_away(self, path, hard=False):
-        """Moves a file to `precious` and leaves a link to it; returns where it is now."""
+        """Moves a file to `precious` and leaves a link to it. Returns its new path."""
         path = self.folder / path
         away = self.folder / "precious" / path.name
         shutil.move(path, away)
@@ -95,7 +96,7 @@ class LinkTest(RunTest):
         for name in ("agents.json", "a.safetensors"):
             (self.folder / f"page/.{name}.upswing-tmp").symlink_to("../precious/file")
         before = snapshot(self.folder / "precious")
-        (self.folder / "run/evals.csv").unlink()  # the entry is another one than before
+        (self.folder / "run/evals.csv").unlink()  # the index then differs from before
         self.succeed("export", "run", "--page", "page", "--id", "a")
         self.assertEqual(snapshot(self.folder / "precious"), before)
         self.assertFalse((self.folder / "page/agents.json").is_symlink())
@@ -131,7 +132,7 @@ class LinkTest(RunTest):
 
 
 class CounterTest(RunTest):
-    """Numbers that no training writes."""
+    """Tests of numbers that no training writes."""
 
     def setUp(self):
         super().setUp()
@@ -244,7 +245,7 @@ class PlaceTest(ProgramTest):
                 self.assertEqual(path.stat().st_mode & 0o777, 0o666 & ~umask, path)
 
     def test_a_killed_run_leaves_nothing_that_stays(self):
-        # A large network, whose first checkpoint takes its time.
+        # A large network: its first checkpoint takes some time.
         slow = small(**TINY | {"hidden": "512,512", "out": "runs/a"})
         moments = random.Random(3)
         for _ in range(20):
@@ -255,7 +256,7 @@ class PlaceTest(ProgramTest):
             time.sleep(moments.uniform(0, 0.02))
             self.end(process, signal.SIGKILL)
             names = [path.name for path in runs.iterdir()]
-            self.assertLessEqual(len(names), 1, names)  # the run, whole, or what was left of it
+            self.assertLessEqual(len(names), 1, names)  # the complete run, or its leftovers
             if (runs / "a").exists():
                 self.assertTrue(self.made("runs/a"))
             shutil.rmtree(runs / "a", ignore_errors=True)
@@ -268,7 +269,7 @@ class PlaceTest(ProgramTest):
         left = self.folder / "many/.seed3.making-0123456789abcdef"
         shutil.copytree(self.folder / "many/seed1", left)
         (left / "config.toml").write_text("half", encoding="utf-8")
-        os.utime(left, (0, 0))  # another host's, and long ago
+        os.utime(left, (0, 0))  # of another host, and old
         self.assertEqual(self.succeed("compare", "many"), expected)
         self.succeed(*small(**TINY), "--seeds", 3)
         self.assertFalse(left.exists())

@@ -28,13 +28,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A text from a file on one line; "unknown" where the file does not say.
+/// A text from a file on one line; "unknown" if the file lacks it.
 std::string Known(const std::string& text) { return text.empty() ? "unknown" : Printable(text); }
 std::string Known(std::optional<int64_t> count) {
   return count ? std::to_string(*count) : "unknown";
 }
 
-/// The observation of a policy of the double pendulum.
+/// The observation of a double pendulum policy.
 std::string ObservationText(const LoadedPolicy& loaded) {
   std::string text = fmt::format("{} numbers for the motion", kObservationSize);
   if (loaded.identifies()) {
@@ -49,7 +49,7 @@ std::string ObservationText(const LoadedPolicy& loaded) {
   return text;
 }
 
-/// The result of the evaluation in which the policy was the best.
+/// The result of the evaluation at which the policy was the best.
 std::string EvaluationText(const PolicyInfo& info) {
   if (!info.success_rate || !info.mean_return) return "unknown";
   return fmt::format("success {:.0f}%, mean return {:.0f}", 100 * *info.success_rate,
@@ -69,7 +69,7 @@ void PrintSelfCheck(const SelfCheck& check) {
       "              by more than allowed\n");
 }
 
-/// Prints a controller, which has no file and no training.
+/// Prints a controller, which has neither a file nor a training.
 void PrintController(const LoadedPolicy& loaded) {
   const Policy& policy = *loaded.policy;
   fmt::print("{}\n", Printable(loaded.name));
@@ -144,7 +144,7 @@ void PrintRun(const fs::path& path, bool has_policy) {
                                                      FormatCount(state.best_step)));
 }
 
-/// Prints the program's version and what it uses on this machine.
+/// Prints the program's version, and the libraries and hardware that it uses on this machine.
 void PrintProgram() {
   fmt::print("upswing {}\n", UPSWING_VERSION);
   fmt::print("  physics     MuJoCo {}\n", MuJoCoVersion());

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""`upswing info`: what a policy or a run is, how it was made, and its self-check."""
+"""Tests of `upswing info`: the description of a policy or run, how it was made, and its
+self-check."""
 
 import os
 import re
@@ -64,7 +65,7 @@ class InfoTest(ProgramTest):
                 if command[-1] != "--json":
                     self.assertTrue(text.startswith(shown), repr(text))
         self.assertEqual(self.succeed("info", evil.name).count("\n  self-check  passed"), 1)
-        # Nor do bytes that are no text.
+        # A name may also contain bytes that are not text.
         odd = self.folder / "run"
         evil.rename(odd)
         name = os.fsdecode(b"r\xff")

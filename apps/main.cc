@@ -4,7 +4,7 @@
 namespace upswing {
 namespace {
 
-/// The only list of commands, in the order of --help. ./upswing prints it too: one line each.
+/// The only list of commands, in the order of --help. ./upswing prints it, too, one line each.
 constexpr CommandEntry kCommands[] = {
     {"train", "Train an agent until it solves the task", AddTrain},
     {"eval", "Evaluate a policy over many episodes", AddEval},
@@ -28,7 +28,7 @@ constexpr CommandEntry kCommands[] = {
 }  // namespace
 }  // namespace upswing
 
-// An exception while another one is reported ends the program.
+// An exception during the report of another one ends the program.
 int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape)
   return upswing::MainProgram(
       argc, argv, upswing::kCommands,

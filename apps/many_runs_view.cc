@@ -24,7 +24,7 @@
 namespace upswing {
 namespace {
 
-constexpr size_t kMostRows = 50;  // of a variant in the table
+constexpr size_t kMostRows = 50;  // per variant in the table
 constexpr double kNever = std::numeric_limits<double>::infinity();
 
 std::string CountOrDash(double value) { return std::isfinite(value) ? FormatCount(value) : "-"; }
@@ -42,11 +42,11 @@ void PrintRow(const std::string& name, double step, double seconds, double succe
 /// the runs.
 class ManyRunsView : public ManyRunsObserver {
  public:
-  /// The plan must outlive it.
+  /// The plan must outlive the view.
   explicit ManyRunsView(const ManyRuns& many) : many_(many) {}
 
   void Prepare() override { InstallSignalHandlers(kStoppingTraining); }
-  /// Prints variants, seeds and folder. The rate counts steps from now on.
+  /// Prints variants, seeds and folder. From here on, the rate counts steps.
   void Begin(const std::vector<SeedRun>& runs) override {
     runs_ = &runs;
     steps_before_ = Measure().steps;
@@ -122,10 +122,10 @@ class ManyRunsView : public ManyRunsObserver {
   ProgressLine line_;
 
  private:
-  /// Progress of all runs together.
+  /// Progress over all runs.
   struct Standing {
-    size_t done = 0;             // runs
-    double steps = 0, left = 0;  // made, and at most to be made
+    size_t done = 0;             // finished runs
+    double steps = 0, left = 0;  // made; at most to be made
     double share = 0;            // of the work, 0 to 1
     double steps_per_second = 0;
     std::string time_left;  // such as `at most 3 min 20 s left`
@@ -134,7 +134,7 @@ class ManyRunsView : public ManyRunsObserver {
   Standing Measure() const {
     Standing standing;
     for (const SeedRun& run : *runs_) {
-      // Reads the files of running runs only: there may be thousands of others.
+      // Reads only the files of running runs, because there may be thousands of others.
       const bool runs_now = std::ranges::find(running_, &run) != running_.end();
       const auto steps = static_cast<double>(runs_now    ? run.Steps()
                                              : run.state ? run.state->steps
@@ -228,7 +228,7 @@ class ManyRunsView : public ManyRunsObserver {
 
   const std::vector<SeedRun>* runs_ = nullptr;
   std::vector<const SeedRun*> running_;
-  double steps_before_ = 0;  // made before this process
+  double steps_before_ = 0;  // made before this process began
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };
 
@@ -236,7 +236,7 @@ class ManyRunsView : public ManyRunsObserver {
 /// queued one, and shows progress. A signal to stop ends the view; the jobs continue.
 class SlurmView : public ManyRunsView {
  public:
-  /// The plan must outlive it; many.jobs is 0.
+  /// The plan must outlive the view; many.jobs is 0.
   SlurmView(const ManyRuns& many, SlurmRequest request)
       : ManyRunsView(many), request_(std::move(request)) {}
 
@@ -280,16 +280,16 @@ class SlurmView : public ManyRunsView {
 
  private:
   using Clock = std::chrono::steady_clock;
-  static constexpr std::chrono::seconds kAskEvery{15};  // squeue loads a shared daemon
+  static constexpr std::chrono::seconds kAskEvery{15};  // each squeue loads a shared daemon
 
   void CheckQueue(const std::vector<const SeedRun*>& running, Clock::time_point now) {
     const auto tasks = array_->TasksLeft();
     const bool are_none = tasks == 0;
-    // The last task's files may not be visible yet.
+    // The files of the last task may not be visible yet.
     const bool were_none = std::exchange(none_left_, are_none);
     ask_at_ = now + (are_none ? std::chrono::seconds(2) : kAskEvery);
     if (!are_none || !were_none) return;
-    // Other workers may be running, or a lost worker's claims have yet to expire.
+    // Other workers may be running, or the claims of a lost worker may not have expired yet.
     for (const SeedRun* run : running) {
       const auto lease = ReadLease(run->claim());
       if (lease && !lease->lost) return;
@@ -300,7 +300,7 @@ class SlurmView : public ManyRunsView {
                          "); the same command queues them again"));
   }
 
-  /// Where the array's output goes.
+  /// Path of the array's output.
   std::string Logs() const {
     return Printable((SlurmFolder(many_.plan.folder) / (array_->number() + "_*.log")).string());
   }
@@ -308,7 +308,7 @@ class SlurmView : public ManyRunsView {
   SlurmRequest request_;
   std::optional<SlurmArray> array_;
   Clock::time_point ask_at_{};
-  bool none_left_ = false;  // when last asked
+  bool none_left_ = false;  // result of the last query
 };
 
 }  // namespace

@@ -25,12 +25,12 @@ namespace fs = std::filesystem;
 /// The arguments of `map`.
 struct MapCommand : MapArguments {
   std::vector<std::string> policies;
-  PolicyArguments controllers;  // settings of those among them
+  PolicyArguments controllers;  // of the controllers among the policies
   int64_t threads = 0;
   bool as_json = false;
 };
 
-/// "mass2 0.5 to 1.5 kg".
+/// Name, range and unit of an axis, such as "mass2 0.5 to 1.5 kg".
 std::string RangeText(const MapAxis& axis) {
   return fmt::format("{} {:.4g} to {:.4g} {}", axis.name, axis.values.front(), axis.values.back(),
                      axis.unit);

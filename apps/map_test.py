@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""`upswing map`: its table, its files, that a cell is what `eval` says, and bad input."""
+"""Tests of `upswing map`: its table, its files, that a cell matches `eval`, and bad input."""
 
 import csv
 import json
@@ -18,7 +18,7 @@ GRID = ("--x", "gravity=0.05:3:3", "--y", "mass2=-50%:+50%:3")
 class MapTest(ProgramTest):
     @classmethod
     def setUpClass(cls):
-        # A plant that is soon learned, so that there are successes and failures to look at.
+        # An easy plant, so that there are successes and failures to test.
         cls.policy = train_once(cls, gravity=0.05, damping=1, hidden="64,64", head=32,
                                 eval_episodes=1, steps=60000, checkpoint_every=20000)
 
@@ -49,7 +49,7 @@ class MapTest(ProgramTest):
             self.assertEqual(row["swing_up_seconds"], "" if seconds is None else
                              row["swing_up_seconds"])
             self.assertTrue(seconds is None or 0 < seconds <= 10)
-        # The engines do the same.
+        # Both engines give the same results.
         checked = [row for row in rows if row["mujoco_successes"]]
         self.assertEqual(len(checked), 3)
         self.assertEqual(result["check"]["cells"], 3)
@@ -77,7 +77,7 @@ class MapTest(ProgramTest):
                     "eval", self.policy, "--json", "--set", f"gravity={gravity}", "--set",
                     f"torque_limit={torque}", "--physics", "closed-form"))
                 rate = result["success_rate"][row][column]
-                # Other starts: within five standard deviations of two samples of 100.
+                # Different starts: allow five standard deviations of two samples of 100.
                 p = (rate + judged["success_rate"]) / 2
                 self.assertAlmostEqual(rate, judged["success_rate"],
                                        delta=5 * math.sqrt(p * (1 - p) / 50) + 1e-9)
@@ -90,7 +90,7 @@ class MapTest(ProgramTest):
         self.assertIsNone(mujoco["check"])
         for key in ("success_rate", "swing_up_seconds"):
             self.assertEqual(one[key], many[key])
-        # In a chaotic motion rounding may make the engines differ, but hardly ever does.
+        # In a chaotic motion, rounding can make the engines differ, but it rarely does.
         for a, b in zip(sum(one["success_rate"], []), sum(mujoco["success_rate"], [])):
             self.assertAlmostEqual(a, b, delta=0.1)
         self.assertNotEqual(self.map(*grid, "--seed", 1, out="seed")["swing_up_seconds"],
@@ -104,10 +104,10 @@ class MapTest(ProgramTest):
                                  sum(result["swing_up_seconds"], [])):
             self.assertIn(rate, (0, 1))
             self.assertEqual(seconds is None, rate == 0)
-        # The same state a turn away has the same observation.
+        # The same state one turn away has the same observation.
         self.assertEqual([row[0] for row in result["success_rate"]],
                          [row[-1] for row in result["success_rate"]])
-        # The episode that `simulate` makes from there.
+        # Compare with the episode of `simulate` from this start.
         table = self.succeed("simulate", self.policy, "--physics", "closed-form", "--start",
                              f"{-math.pi / 2},0,0.1,0").splitlines()
         inverted = [line.split(",")[8] == "1" for line in table[1:]]
@@ -139,7 +139,7 @@ class MapTest(ProgramTest):
                      f"{self.policy}/map-gravity-mass2/map.csv"):
             self.assertIn(word, text)
         self.assertTrue((self.policy / "map-gravity-mass2/map.svg").is_file())
-        # A second map goes beside the first.
+        # A second map gets a new folder next to the first.
         self.assertIn("map-gravity-mass2-2/map.csv",
                       self.succeed("map", self.policy, *GRID, "--episodes", 1))
         shutil.rmtree(self.policy / "map-gravity-mass2")
@@ -164,7 +164,7 @@ class MapTest(ProgramTest):
             self.assertIn(words, plain)
         self.assertNotIn(">as in training<", text)
         self.assertNotEqual(changed["swing_up_seconds"], usual["swing_up_seconds"])
-        # One exact start has no chance in it.
+        # With one exact start, nothing is random.
         _, text = self.figure("--set", "q1=20", out="start")
         self.assertIn("q1 20 °", text)
         self.assertNotIn("interval", text)
@@ -176,7 +176,7 @@ class MapTest(ProgramTest):
         self.assertEqual([m["policy"] for m in maps][1], "lqr (lqr_torque 2)")
         alone = self.map(*grid, out="alone")
         self.assertEqual(maps[0]["success_rate"], alone["success_rate"])
-        self.assertEqual(maps[1]["mean_success_rate"], 0)  # it does not swing up
+        self.assertEqual(maps[1]["mean_success_rate"], 0)  # lqr does not swing up
         self.assertEqual(sorted(path.name for path in (self.folder / "both").iterdir()),
                          ["map-1.csv", "map-2.csv", "maps.png", "maps.svg"])
         self.assertEqual((self.folder / "both/map-1.csv").read_bytes(),
@@ -184,7 +184,7 @@ class MapTest(ProgramTest):
         svg = (self.folder / "both/maps.svg").read_text(encoding="utf-8")
         for words in (">run<", ">lqr (lqr_torque 2)<", ">training or design<"):
             self.assertIn(words, svg)
-        self.assertEqual(svg.count(">successful episodes (%)<"), 1)  # one scale
+        self.assertEqual(svg.count(">successful episodes (%)<"), 1)  # a single scale
         self.refuse(["map", self.policy, "lqr", *grid], "--out: expected a folder")
         self.refuse(["map", self.policy, "lqr", "--x", "gravity=-20%:+20%", "--out", "other"],
                     "lqr: expected a policy with the same plant as run")

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Another model than the built-in one: what MJCF is accepted, that a run keeps it, that results
-say so."""
+"""Tests of models other than the built-in one: the accepted MJCF, that a run keeps its model, and
+that results mention it."""
 
 import json
 import os
@@ -10,7 +10,7 @@ import unittest
 
 from testing import (MODEL, PATIENCE, ProgramTest, read_tensors, run, small, train_once, write_tensors)
 
-# Were one of these compiled, it would take a lot of memory or time, or never end.
+# Compiling one of these would take a lot of memory or time, or never end.
 BOMBS = {
     "hfield": MODEL.replace("<worldbody>", '<asset><hfield name="h" nrow="40000" ncol="40000" '
                             'size="1 1 1 1"/></asset><worldbody>'),
@@ -52,14 +52,14 @@ BOMBS = {
 
 
 def limits():
-    """Little memory and time, so that what asks for much fails."""
+    """Limits memory and time, so that expensive work fails."""
     resource.setrlimit(resource.RLIMIT_CPU, (20, 20))
-    if "UPSWING_SANITIZED" not in os.environ:  # a sanitizer reserves the address space
+    if "UPSWING_SANITIZED" not in os.environ:  # sanitizers reserve the address space
         resource.setrlimit(resource.RLIMIT_AS, (1 << 30, 1 << 30))
 
 
 class BombTest(ProgramTest):
-    """Models that would need too much memory or time are refused before they are compiled."""
+    """Models that would need too much memory or time are refused before compilation."""
 
     @classmethod
     def setUpClass(cls):
@@ -123,7 +123,8 @@ class BombTest(ProgramTest):
 
 
 class HiddenTest(ProgramTest):
-    """What would change the motion without the plant's parameters showing it."""
+    """Elements that would change the motion without a change of the plant's parameters are
+    refused."""
 
     def test_it_is_refused(self):
         for old, new, *words in (
@@ -144,7 +145,7 @@ class HiddenTest(ProgramTest):
 
 
 class RunTest(ProgramTest):
-    """A run holds its model whole."""
+    """A run stores its complete model."""
 
     OWN = MODEL.replace('armature="0.01"', 'armature="0.02"', 1)
 
@@ -156,7 +157,7 @@ class RunTest(ProgramTest):
         self.succeed(*small(model="../own.xml", out="../parts", steps=2000),
                      cwd=self.folder / "a/sub")
         self.write("a/own.xml", MODEL.replace('armature="0.01"', 'armature="0.05"'))
-        self.write("b/model.xml", MODEL)  # of which the other folder must not take notice
+        self.write("b/model.xml", MODEL)  # the other folder must not use this one
         shutil.move(self.folder / "a/parts", self.folder / "moved")
         (self.folder / "a/own.xml").unlink()
         self.succeed("train", "--resume", "../moved", "--steps", 4000, cwd=self.folder / "b")
@@ -200,7 +201,7 @@ class RunTest(ProgramTest):
 
 
 class SaidTest(ProgramTest):
-    """Every report of results says that the model was not the built-in one."""
+    """Every report of results mentions a model that is not the built-in one."""
 
     @classmethod
     def setUpClass(cls):

@@ -25,7 +25,8 @@ struct PlotArguments {
   double seconds = -1;  // negative: not given
 };
 
-/// Time (s) since which the pendulum is upright until the end; negative if it is not upright then.
+/// Start (s) of the last upright stretch, which lasts to the end; negative if the end is not
+/// upright.
 double UprightSince(const std::vector<RolloutRow>& rows) {
   double since = -1;
   for (const RolloutRow& row : rows) {
@@ -90,7 +91,7 @@ int RunPlot(const PlotArguments& a) {
     fmt::print("  task       {}\n", spec.task);
   }
   if (model) fmt::print("  model      {}\n", model->Text());
-  // In other tasks a row has the state after its step.
+  // In other tasks, a row has the state after its step.
   const double later = pendulum ? 0 : spec.step_seconds;
   const double since = UprightSince(rollout.rows);
   fmt::print("  {}    {}\n", pendulum ? "upright" : "at goal",

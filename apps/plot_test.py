@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""`upswing plot`: its figures, its summary, and bad input."""
+"""Tests of `upswing plot`: its figures, its summary, and bad input."""
 
 import csv
 import re
@@ -51,7 +51,7 @@ class PlotTest(ProgramTest):
             self.assertIn(word, episode)
         for word in ("Q-value", "greedy"):
             self.assertNotIn(word, episode)
-        # A torque of any size, and a band about it.
+        # An actor's figure has a torque curve with a band.
         self.assertRegex(self.succeed("simulate", actor, "--seconds", 2, "--csv", "a.csv"),
                          r"  torque     peak [\d.e-]+ N·m, rms [\d.e-]+ N·m, variation")
         png = (self.folder / "out/episode.png").read_bytes()
@@ -69,7 +69,7 @@ class PlotTest(ProgramTest):
             self.succeed("plot", self.policy, "--seconds", 0.1)
             self.addCleanup(shutil.rmtree, self.policy / f"plot{number}")
             self.assertTrue((self.policy / f"plot{number}/phase.png").is_file())
-        # A policy file that is in no run's folder.
+        # A policy file outside any run folder.
         shutil.copy(self.policy / "policy.safetensors", self.folder / "mine.safetensors")
         for number in ("", "-2"):
             text = self.succeed("plot", "mine.safetensors", "--seconds", 0.1)
@@ -94,7 +94,7 @@ class PlotTest(ProgramTest):
 
     def test_the_way_between_two_steps_is_no_straight_line(self):
         self.succeed("plot", self.policy, "--seconds", 1, "--start", "0,0,4,0", "--out", "out")
-        # 50 steps, four pieces each; steps of a held torque have corners of right angles instead.
+        # 50 steps have four pieces each; held torques instead have right-angled corners.
         longest = max(self.curves("out/phase.svg"), key=len)
         self.assertGreater(len(longest), 150)
 
@@ -104,19 +104,20 @@ class PlotTest(ProgramTest):
                                                 "3.1,0.1,0,0").splitlines()))
         flips = sum(a["inverted"] != b["inverted"] for a, b in zip(rows, rows[1:]))
         self.assertGreater(flips, 0)
-        # Balance, 5 and 0 above each other, and torques: every piece is level or upright.
+        # The balance reward, between 5 and 0, and the torques: every piece is horizontal or
+        # vertical.
         level = [curve for curve in self.curves("out/episode.svg") if len(curve) > 100 and
                  all(a[0] == b[0] or a[1] == b[1] for a, b in zip(curve, curve[1:]))]
         self.assertGreaterEqual(len(level), 4)
 
     def test_the_greedy_line_has_chosen_torques_only(self):
-        # 20 s are more steps than the heat map has columns.
+        # An episode of 20 s has more steps than the heat map has columns.
         self.succeed("plot", self.policy, "--seconds", 20, "--out", "out")
         torques = {row["torque"] for row in csv.DictReader(
             self.succeed("simulate", self.policy, "--seconds", 20).splitlines())}
         torque = [curve for curve in self.curves("out/episode.svg") if len(curve) > 100 and
                   all(a[0] == b[0] or a[1] == b[1] for a, b in zip(curve, curve[1:]))]
-        greedy = max(torque, key=lambda curve: max(y for _, y in curve))  # the lowest panel
+        greedy = max(torque, key=lambda curve: max(y for _, y in curve))  # in the lowest panel
         self.assertEqual(len({y for _, y in greedy}), len(torques))
 
     def test_same_episode_same_figures(self):

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The process: exit codes if its output is lost, signals at any moment, no /proc."""
+"""Tests of the process: exit codes after lost output, signals at any moment, no /proc."""
 
 import os
 import signal
@@ -11,14 +11,14 @@ from testing import UPSWING, ProgramTest, small
 
 TINY = {"steps": 400, "hidden": 8, "head": 8, "eval_episodes": 2, "eval_every": 200,
         "log_every": 200, "learning_starts": 50, "threads": None, "out": "run"}
-# Redirections under which something cannot be written.
+# Redirections with which standard error cannot be written.
 NO_STDERR = ("2>/dev/full", "2>&-")
 NO_OUTPUT = (">/dev/full", ">&-", ">/dev/full 2>&1", ">&- 2>&-", "<&- >&- 2>&-")
 
 
 class OutputTest(ProgramTest):
     def shell(self, redirection, *arguments):
-        """Exit code of the program under a shell's redirection."""
+        """Exit code of the program with a shell redirection."""
         return subprocess.run(["sh", "-c", f'"$@" {redirection}', "sh", UPSWING,
                                *map(str, arguments)], cwd=self.folder, check=False,
                               stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
@@ -64,7 +64,7 @@ class OutputTest(ProgramTest):
 
 class SignalTest(ProgramTest):
     def test_usr1_and_usr2_do_not_end_a_training_that_has_hardly_begun(self):
-        # It waits for its settings.
+        # The program waits for its settings.
         os.mkfifo(self.folder / "settings")
         process = self.start(*small(**TINY | {"out": "run"}), "--config", "settings", wait=False)
         with open(self.folder / "settings", "w", encoding="utf-8") as settings:
@@ -103,7 +103,7 @@ class NoProcTest(ProgramTest):
 
 
 class InputTest(ProgramTest):
-    """Exit code 2 where the input is at fault, for every error of the system."""
+    """Every system error about the input gives exit code 2."""
 
     def setUp(self):
         super().setUp()
@@ -137,7 +137,7 @@ class InputTest(ProgramTest):
         closed.chmod(0)
         self.addCleanup(closed.chmod, 0o755)
         if os.geteuid() == 0:
-            # Another user, who may still reach what is given here.
+            # Run as another user, who may still reach the given files.
             user = {"user": 65534, "group": 65534, "extra_groups": []}
             for path in (self.folder, *Path(UPSWING).resolve().parents):
                 if not path.stat().st_mode & 0o001:

@@ -24,21 +24,21 @@
 namespace upswing {
 namespace {
 
-/// Whether standard output has no reader left, as when `| head -1` has ended.
+/// Whether standard output has no reader any more, as after `| head -1` has ended.
 bool OutputIsClosed() {
   pollfd output{STDOUT_FILENO, 0, 0};
   return poll(&output, 1, 0) == 1 && (output.revents & POLLERR) != 0;
 }
 
-/// Ends as programs usually do in that case: quietly, by SIGPIPE.
+/// Ends quietly by SIGPIPE, as programs usually do when nobody reads their output.
 int EndByPipe() {
   std::signal(SIGPIPE, SIG_DFL);
   std::raise(SIGPIPE);
   return 128 + SIGPIPE;
 }
 
-/// An error's message, which may quote a stranger's file, as one line of a terminal; the middle of
-/// a very long one is left out.
+/// An error's message as one line for a terminal. It may quote an untrusted file, so it is escaped,
+/// and the middle of a very long message is left out.
 std::string OneLine(std::string_view message) {
   constexpr size_t kBegin = 1500;  // bytes
   constexpr size_t kEnd = 500;
@@ -47,7 +47,7 @@ std::string OneLine(std::string_view message) {
                 Printable(message.substr(message.size() - kEnd)));
 }
 
-/// The exit code, unless the output cannot be written.
+/// The exit code; another one if the output cannot be written.
 int Finish(int exit_code) {
   std::cout.flush();
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0 && std::cout.good()) return exit_code;
@@ -56,14 +56,14 @@ int Finish(int exit_code) {
   return 1;
 }
 
-/// Uses the vector instructions that the environment variable UPSWING_VECTORS names, if there is
-/// one: for results of another processor, to the bit.
+/// Selects the vector instructions named in the environment variable UPSWING_VECTORS, if it is set.
+/// They reproduce the results of another processor to the bit.
 void ChooseVectors() {
   const char* path = std::getenv("UPSWING_VECTORS");
   if (path != nullptr && *path != '\0') UseSimdPath(path);
 }
 
-/// Runs a command that is a program of its own: `upswing-NAME` beside this one.
+/// Runs a command that is a separate program: `upswing-NAME` in the same folder.
 void ReplaceByProgramOf(const std::string& command, char** argv) {
   const std::filesystem::path program = ProgramPath().parent_path() / Concat("upswing-", command);
   execv(program.c_str(), argv);
@@ -103,7 +103,7 @@ int MainProgram(int argc, char** argv, std::span<const CommandEntry> commands,
                 const std::string& footer) {
   ListenToSignals();
   OpenStandardFiles();
-  // A write that cannot be done fails where it is made, with a message, instead of ending us.
+  // A failed write then returns an error, which gets a message, instead of ending the program.
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
   return Main(argc, argv, commands, footer);

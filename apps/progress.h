@@ -6,7 +6,7 @@
 
 namespace upswing {
 
-/// The columns of the terminal of standard output; `unknown` if there is none.
+/// Width of standard output's terminal in columns; `unknown` if there is no terminal.
 int TerminalWidth(int unknown);
 
 /// A line at the bottom of the terminal that is rewritten a few times a second. Without a
@@ -20,10 +20,10 @@ class ProgressLine {
 
   bool terminal() const { return terminal_; }
 
-  /// Whether Show would draw: there is a terminal, and the last line is old enough.
+  /// Whether Show would draw: there is a terminal, and the last drawing is old enough.
   bool due() const;
 
-  /// Shows a bar of `share` (0 to 1), then the first fields, as many as fit into the terminal.
+  /// Shows a bar of `share` (0 to 1) and as many of the first fields as fit into the terminal.
   void Show(double share, const std::vector<std::string>& fields);
 
   /// Prints a line that stays, above the bar.
@@ -39,14 +39,14 @@ class ProgressLine {
   Clock::time_point last_{};
 };
 
-/// A progress line for work on episodes: their rate and the time left. Without a terminal, a plain
-/// line on standard error every ten seconds.
+/// A progress line for work on episodes: their rate and the time left. Without a terminal, it
+/// prints a plain line on standard error every ten seconds.
 class EpisodeProgress {
  public:
   /// Shows no bar if `quiet`.
   explicit EpisodeProgress(bool quiet) : quiet_(quiet) {}
 
-  /// A Progress. A new `total` begins other work, at the time of the last call.
+  /// A Progress. A new `total` begins a new piece of work at the time of the last call.
   void operator()(double done, double total);
 
  private:

@@ -1,5 +1,5 @@
-"""The virtual environment with independent readers of our files, in build/readers-venv. It is made when
-it is missing or when tools/readers-requirements.txt has changed.
+"""The virtual environment in build/readers-venv with independent readers of our files. It is
+created if it is missing or tools/readers-requirements.txt has changed.
 """
 
 import fcntl
@@ -16,7 +16,7 @@ REQUIREMENTS = ROOT / "tools/readers-requirements.txt"
 
 
 def enter(script):
-    """Continues the test `script` in the Python of the environment if it is the program that runs."""
+    """Restarts the test `script` in the environment's Python if it is the running program."""
     is_program = Path(sys.argv[0]).resolve() == Path(script).resolve()
     if not is_program or inside():
         return
@@ -29,12 +29,12 @@ def inside():
 
 
 def wanted():
-    """What the environment has to be made of."""
+    """The inputs of the environment, as text; a change requires a new one."""
     return f"{sys.version}\n{sys.base_exec_prefix}\n{REQUIREMENTS.read_text(encoding='utf-8')}"
 
 
 def make():
-    """Makes the environment unless it is there; its mark is written last."""
+    """Creates the environment if it is missing; writes its mark last."""
     mark = VENV / "made-of.txt"
     VENV.parent.mkdir(exist_ok=True)
     with open(f"{VENV}.lock", "w", encoding="utf-8") as lock:
@@ -51,7 +51,7 @@ def make():
 
 
 def command(problem, *arguments):
-    """Runs a command to its end; if it fails, so does the test."""
+    """Runs a command to its end; a failure fails the test."""
     done = subprocess.run(arguments, check=False, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                           encoding="utf-8")
     if done.returncode != 0:

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Independent readers agree with what the program writes: TensorBoard's own reader of event files,
-the safetensors package, and the forward pass of the network in numpy.
+"""Checks that independent readers agree with the program's files: TensorBoard's reader of event
+files, the safetensors package, and the network's forward pass in numpy.
 
-The packages live in a virtual environment of their own (readers_environment.py).
+The packages are in a separate virtual environment (readers_environment.py).
 """
 
 import json
@@ -48,7 +48,7 @@ def forward(network, weights, obs):
 
 
 def act(output, weights, outputs):
-    """Torques (B) of what an actor network puts out (B × outputs)."""
+    """Torques (B) from an actor network's outputs (B × outputs)."""
     if output == "categorical":
         return weights["torques"][outputs.argmax(axis=1)]
     mean = outputs[:, 0]
@@ -57,14 +57,14 @@ def act(output, weights, outputs):
 
 
 def load(path):
-    """Metadata and arrays of a safetensors file, by the package."""
+    """Metadata and arrays of a safetensors file, read by the package."""
     with safe_open(path, framework="np") as file:
         return file.metadata(), {name: file.get_tensor(name) for name in file.keys()}
 
 
 class ReadersTest(ProgramTest):
     def scalars(self):
-        """{tag: [(step, value)]} of the run's event file, by TensorBoard."""
+        """{tag: [(step, value)]} of the run's event file, read by TensorBoard."""
         events = EventAccumulator(str(self.folder / "run"), size_guidance={"scalars": 0})
         events.Reload()
         return {tag: [(event.step, event.value) for event in events.Scalars(tag)]
@@ -93,7 +93,7 @@ class ReadersTest(ProgramTest):
         self.assert_scalars_are_the_tables()
 
     def check_policy(self, **changes):
-        """The package reads the names, shapes and samples that the network ought to have."""
+        """The package reads the expected names, shapes and samples of the network."""
         self.succeed(*small(**changes))
         path = self.folder / "run/policy.safetensors"
         about, tensors = load(path)
@@ -105,7 +105,8 @@ class ReadersTest(ProgramTest):
         np.testing.assert_array_equal(tensors["torques"], np.linspace(-5, 5, 9))
 
         q = forward(network, tensors, tensors["sample.obs"])
-        # The program computes in single precision: some roundings of numbers of this size.
+        # The program computes in single precision: allow some rounding errors of numbers of this
+        # size.
         np.testing.assert_allclose(tensors["sample.q"], q, rtol=0, atol=2e-5 * np.abs(q).max())
         np.testing.assert_array_equal(tensors["sample.torque"],
                                       tensors["torques"][tensors["sample.q"].argmax(axis=1)])
@@ -147,7 +148,7 @@ class ReadersTest(ProgramTest):
             self.check_actor(ROOT / f"fuzz/corpus/policy/accepted/{output}.safetensors", output)
 
     def test_actors_of_the_test_vectors(self):
-        """What is written for readers in other languages, read by one."""
+        """Reads the test vectors for other languages in Python."""
         vectors = json.loads(self.succeed("export", "--test-vectors", "-"))
         self.assertEqual(len(vectors["actors"]), 4)
         for actor in vectors["actors"]:
@@ -171,7 +172,8 @@ class ReadersTest(ProgramTest):
             self.check_draws(output, outputs, cases)
 
     def check_draws(self, output, outputs, cases):
-        """Tenths of the range of torques, and the central 68%, by drawing."""
+        """Checks by drawing: the probabilities of tenths of the torque range, and the central
+        68%."""
         rng = np.random.default_rng(0)
         draws = 200_000
         for (mean, log_std), case in zip(outputs, cases, strict=True):
@@ -180,7 +182,7 @@ class ReadersTest(ProgramTest):
             share = np.histogram(torque, bins=np.linspace(-5, 5, 11))[0] / draws
             np.testing.assert_allclose(case["probabilities"], share, atol=0.006)
             within = np.mean((torque >= case["low"]) & (torque <= case["high"]))
-            # What is cut off lies at an end, and with it more than 68%.
+            # Clipped torques are at an end of the range, and then the interval holds more than 68%.
             self.assertGreater(within, 0.677)
             if max(abs(case["low"]), abs(case["high"])) < 5:
                 self.assertLess(within, 0.688)
@@ -217,7 +219,7 @@ class ReadersTest(ProgramTest):
 
 
 def actor_shapes(network, outputs, prefix=""):
-    """Names and shapes of the arrays of an actor's network, or of its critic's."""
+    """Names and shapes of the arrays of an actor's or its critic's network."""
     shapes = {}
     width = network["inputs"]
     for i, out in enumerate(network["hidden"]):

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""`upswing realaigym`: scores by the rules of RealAIGym, and the search of a policy."""
+"""Tests of `upswing realaigym`: scores by the rules of RealAIGym, and the search for a policy."""
 
 import csv
 import io
@@ -17,7 +17,7 @@ POLICY = ROOT / "web/public/agents/fast.safetensors"
 
 
 def score(rows):
-    """Performance, version 2, of a motion in the boards' format."""
+    """The performance score, version 2, of a motion in the boards' format."""
     l1, l2 = 0.2, 0.3
     t = [row["time"] for row in rows]
     q = [(row["pos_meas1"], row["pos_meas2"]) for row in rows]
@@ -57,7 +57,7 @@ class RealAIGym(ProgramTest):
         rows = [found["robustness"][name] for name in
                 ("model", "velocity noise", "torque noise", "response", "delay", "pushes")]
         self.assertAlmostEqual(found["robustness"]["score"], sum(rows) / 6, delta=1e-12)
-        # Read again, by any number of threads, it has the same scores.
+        # Scoring the file again, with any number of threads, gives the same scores.
         again = json.loads(self.succeed("realaigym", "p.safetensors", "--json", "--threads", 3))
         for each in (found, again):
             del each["seconds"]
@@ -99,7 +99,7 @@ class RealAIGym(ProgramTest):
         with subprocess.Popen([UPSWING, "realaigym", "--search", "kept.safetensors", *map(str, SMALL),
                                "--generations", "100000"], cwd=self.folder, stdout=subprocess.PIPE,
                               text=True) as search:
-            search.stdout.readline()  # it has begun
+            search.stdout.readline()  # the search has begun
             search.send_signal(signal.SIGINT)
             rest = search.stdout.read()
         self.assertEqual(search.returncode, 130)
@@ -122,13 +122,13 @@ class RealAIGym(ProgramTest):
         self.assertIn("delay", (self.folder / "rows.svg").read_text(encoding="utf-8"))
 
     def test_policies_of_the_double_pendulum(self):
-        # Their own plant is another: that they act is what counts.
+        # These policies have another plant; only check that they act.
         found = json.loads(self.succeed("realaigym", POLICY, "--json"))
         self.assertEqual(found["robot"], "pendubot")
         self.assertGreater(found["performance"]["max_torque"], 1)
         motion = self.succeed("realaigym", POLICY, "--csv", "-")
         torques = [float(row["tau_con1"]) for row in csv.DictReader(io.StringIO(motion))]
-        for k in range(0, 5000, 10):  # held for 20 ms
+        for k in range(0, 5000, 10):  # each torque is held for 20 ms
             self.assertEqual(len(set(torques[k:k + 10])), 1)
         self.refuse(["realaigym", POLICY, "--robot", "acrobot"], "--robot", "joint 1")
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A training that is stopped at any moment and resumed equals one that never was."""
+"""Tests that a training stopped at any moment and resumed equals one that was never stopped."""
 
 import os
 import random
@@ -15,13 +15,13 @@ EVAL_EVERY = 2000
 
 class ResumeTest(ProgramTest):
     def step_of(self, name="run"):
-        """The step of a run's checkpoint."""
+        """The checkpoint's step of a run."""
         _, tensors = read_tensors(self.folder / name / "checkpoint.safetensors")
         return int.from_bytes(tensors["train/steps"][2], "little")
 
     def finish(self, name="run"):
-        """Lets a stopped endless run go on to the second next evaluation, and makes a run of that
-        many steps that never was stopped. Returns the number of steps."""
+        """Continues a stopped endless run to the second next evaluation, and makes a run of that
+        length that was never stopped. Returns the number of steps."""
         steps = (self.step_of(name) // EVAL_EVERY + 2) * EVAL_EVERY
         self.succeed("train", "--resume", name, "--steps", steps)
         self.succeed(*small(steps=steps, stop_when_solved=False, out="never-stopped"))
@@ -36,7 +36,7 @@ class ResumeTest(ProgramTest):
             code, _ = self.end(process, signal.SIGKILL)
             self.assertEqual(code, -signal.SIGKILL)
             arguments = ["train", "--resume", "run"]
-        # However short those moments were on this machine, some of it has been trained.
+        # Even if those moments were short on this machine, some steps have been trained.
         self.finish()
         self.assert_same_run("run", "never-stopped")
 
@@ -45,7 +45,8 @@ class ResumeTest(ProgramTest):
         self.refuse(["train", "--resume", "run", "--steps", "3000"], "--steps", "4000", "3000")
 
     def test_a_run_of_version_0_4_is_resumed(self):
-        """Its settings have a `precision`, which was removed: of two values, one is what is left."""
+        """Settings of version 0.4 have a `precision`, which was removed; only one of its two values
+        is still supported."""
         self.succeed(*small(steps=2000))
         config = self.folder / "run/config.toml"
         settings = config.read_text()
@@ -140,7 +141,7 @@ class ResumeTest(ProgramTest):
         self.assertIn('physics = "closed-form"', (self.folder / "run/config.toml").read_text())
 
     def test_more_steps_with_random_plants_equal_a_run_of_that_many(self):
-        # Episodes of 21 steps: the run is resumed within them, with torques under way.
+        # Episodes have 21 steps, so the run resumes within them, with delayed torques pending.
         for physics in ("mujoco", "closed-form"):
             changes = {"physics": physics, "episode_seconds": 0.42, "randomize": 0.25,
                        "sensor_noise": 0.01, "randomize_delay": 0.06}
@@ -169,7 +170,7 @@ class ResumeTest(ProgramTest):
         self.assert_same_run("run", "at-once")
 
     def test_no_stop_when_solved_goes_on(self):
-        # Almost without gravity the pendulum stays where it comes to rest: soon learned.
+        # Almost without gravity the pendulum stays where it stops, so it is solved soon.
         easy = {"gravity": 0.05, "damping": 1, "hidden": "64,64", "head": 32, "eval_episodes": 1,
                 "eval_every": EVAL_EVERY, "steps": 100000, "checkpoint_every": 5000}
         self.assertIn("Solved after", self.succeed(*small(**easy)))

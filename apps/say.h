@@ -7,19 +7,19 @@
 
 namespace upswing {
 
-/// Opens standard input, output and error where they were closed, so that no file of ours gets
-/// their numbers. They stay what they were: nothing comes in, and every write fails.
+/// Opens standard input, output and error if they are closed, so that none of our files gets their
+/// numbers. They still behave as closed: input is empty, and every write fails.
 void OpenStandardFiles();
 
-/// `text` on standard output, for people who watch long work: if it cannot be written the work
-/// continues, and the program reports it at its end.
+/// Prints `text` on standard output for people who watch long work. If this fails, the work
+/// continues, and the program reports the failure at its end.
 void SayText(std::string_view text);
 template <typename... T>
 void Say(fmt::format_string<T...> format, T&&... arguments) {
   SayText(fmt::format(format, std::forward<T>(arguments)...));
 }
 
-/// `upswing: MESSAGE` on standard error, if that can be written.
+/// Prints `upswing: MESSAGE` on standard error; ignores failure.
 void SayError(std::string_view message) noexcept;
 
 }  // namespace upswing

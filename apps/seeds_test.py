@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""`upswing train --seeds`: many runs at a time equal as many single ones, also when interrupted."""
+"""Tests of `upswing train --seeds`: many runs at a time equal single runs, also after
+interruptions."""
 
 import fcntl
 import os
@@ -13,7 +14,7 @@ from testing import MODEL, RUN_FILES, ProgramTest, run, small, snapshot
 
 TINY = {"steps": 400, "hidden": 8, "head": 8, "eval_episodes": 2, "eval_every": 200,
         "log_every": 200, "learning_starts": 50, "threads": None, "out": "many"}
-# Long enough to be interrupted as soon as it has begun.
+# Long enough for an interruption right after the start.
 SHORT = TINY | {"steps": 12000, "eval_every": 6000, "checkpoint_every": 1000}
 ENDLESS = TINY | {"steps": 10**9, "stop_when_solved": False}
 
@@ -28,12 +29,12 @@ class SeedsTest(ProgramTest):
         return [int(word) for word in path.read_text(encoding="ascii").split()]
 
     def wait_until_free(self, name):
-        """Waits until no process works in the folder of a run."""
+        """Waits until no process works in a run's folder."""
         descriptor = os.open(self.folder / name, os.O_RDONLY)
         fcntl.flock(descriptor, fcntl.LOCK_EX)
         os.close(descriptor)
 
-    # ---- What it makes.
+    # ---- Results.
 
     def test_each_seed_equals_the_run_alone(self):
         output = self.succeed(*small(**TINY), "--seeds", "2,5-6")
@@ -59,7 +60,7 @@ class SeedsTest(ProgramTest):
         self.assertIn("./upswing compare runs/d3qn-small\n", output)
 
     def test_the_table_tells_what_the_runs_say(self):
-        # Almost without gravity the pendulum stays where it comes to rest: soon learned.
+        # Almost without gravity the pendulum stays where it stops, so it is solved soon.
         easy = {"gravity": 0.05, "damping": 1, "hidden": "64,64", "head": 32, "eval_episodes": 1,
                 "eval_every": 2000, "steps": 100000, "threads": None, "out": "easy"}
         output = self.succeed(*small(**easy), "--seeds", "1,2,3")
@@ -78,7 +79,7 @@ class SeedsTest(ProgramTest):
         self.succeed("train", "--config", "many/settings.toml", "--seed", 2, "--out", "alone/seed2")
         self.assert_same_runs("many", "alone", (2,))
 
-    # ---- Going on.
+    # ---- Resuming.
 
     def test_finished_runs_are_left_alone_and_others_come_to_them(self):
         self.succeed(*small(**TINY), "--seeds", 2)
@@ -141,20 +142,20 @@ class SeedsTest(ProgramTest):
         process = self.start(*small(**ENDLESS), "--seeds", 1)
         self.wait_for(lambda: (self.folder / "many/seed1/metrics.csv").exists())
         child = self.children(process)[0]
-        os.kill(child, signal.SIGSTOP)  # this one will not end in order
+        os.kill(child, signal.SIGSTOP)  # this child cannot end in order
         process.send_signal(signal.SIGINT)
 
         def caught():
             status = Path(f"/proc/{process.pid}/status").read_text(encoding="ascii")
             mask = int(status.split("SigCgt:")[1].split()[0], 16)
             return mask >> (signal.SIGINT - 1) & 1
-        self.wait_for(lambda: not caught())  # the first one has come
+        self.wait_for(lambda: not caught())  # the first signal has arrived
         time.sleep(0.1)
         self.assertIsNone(process.poll())
         self.assertEqual(self.end(process, signal.SIGINT)[0], -signal.SIGINT)
         self.wait_until_free("many/seed1")
 
-    # ---- What goes wrong.
+    # ---- Errors.
 
     def test_a_run_that_fails_is_named_and_the_others_go_on(self):
         self.succeed(*small(**TINY), "--seeds", "1-1")
@@ -181,7 +182,7 @@ class SeedsTest(ProgramTest):
         failed = self.run_here(*small(**TINY | {"steps": 800}), "--seeds", 3)
         reason = f"many/seed1/{checkpoint.name}: not a valid safetensors file"
         self.assert_one_line(failed, 1, "1 of 3 runs in many failed", "seed1: " + reason)
-        # Reported before the others run, and in its place among them.
+        # Reported before the others run, and listed in its place among them.
         self.assertRegex(failed.stdout, rf"(?m)\A.*\n.*\n.*already done.*\n  seed1 +failed: {reason}")
         self.assertRegex(failed.stdout, r"(?m)^  1 run failed$")
         self.assertNotIn("not evaluated yet", failed.stdout)

@@ -14,7 +14,7 @@ std::atomic<bool> g_checkpoint_wanted{false};
 std::string_view g_notice;  // set before the handlers are installed
 static_assert(std::atomic<int>::is_always_lock_free);
 
-/// Notes the first of these signals; a second one ends the program at once.
+/// Records the first of these signals; a second one ends the program at once.
 void StopAt(int number) {
   struct sigaction stop {};
   stop.sa_handler = [](int signal) {

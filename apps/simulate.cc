@@ -21,7 +21,7 @@ struct SimulateArguments {
   double seconds = -1;  // negative: not given
 };
 
-/// The column `torque` of a CSV file. Throws BadInput with the line.
+/// The column `torque` of a CSV file. Throws BadInput with the line number.
 std::vector<double> ReadTorqueFile(const std::string& path) {
   const std::string where = InputName(path);
   std::vector<double> torques = ReadCsv(ReadInput(path), {"torque"}, where).front().values;
@@ -40,7 +40,7 @@ int RunSimulate(const SimulateArguments& a) {
   if (!a.torque.empty()) config.schedule = ReadTorqueFile(a.torque);
   const EnvSpec spec = SpecOf(config.env);
 
-  // As many steps as were asked for, or as the schedule has rows.
+  // The requested number of steps, or one step for each row of the schedule.
   const double scheduled = static_cast<double>(config.schedule.size()) * spec.step_seconds;
   const double usual = config.schedule.empty() ? spec.evaluation.seconds : scheduled;
   config.seconds = a.seconds < 0 ? usual : a.seconds;

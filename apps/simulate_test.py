@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""`upswing simulate`: physics against a reference, the reward recomputed, CSV in and out."""
+"""Tests of `upswing simulate`: physics against a reference, the reward recomputed, CSV in and
+out."""
 
 import csv
 import json
@@ -14,7 +15,7 @@ COLUMNS = ["t", "qpos0", "qpos1", "qvel0", "qvel1", "torque", "energy", "height"
            "reward", "energy_reward", "height_reward", "balance_reward", "velocity_penalty",
            "torque_penalty"]
 STATE = COLUMNS[1:5]
-CAPSULE_INERTIA = 0.025995421686746994  # kg·m², across, of a link of 1 kg
+CAPSULE_INERTIA = 0.025995421686746994  # kg·m², across a link of 1 kg
 ARMATURE = 0.01  # kg·m²
 STANDARD = {"mass1": 1.0, "mass2": 1.0, "length1": 0.5, "length2": 0.5, "gravity": 9.81}
 
@@ -29,7 +30,7 @@ def numbers(row):
 
 
 def energy(plant, row):
-    """Mechanical energy (J) of two thin rods, heights counted from the pivot."""
+    """Mechanical energy (J) of two thin rods, with heights measured from the pivot."""
     m1, m2, l1, l2, g = (plant[name] for name in STANDARD)
     q1, q2, w1, w2 = (row[name] for name in STATE)
     potential = (-m1 * g * (l1 / 2) * math.cos(q1)
@@ -47,12 +48,12 @@ def height(plant, row):
 
 
 def tilt(angle):
-    """Distance of an absolute angle from straight up (rad)."""
+    """Distance of an absolute angle from straight up, rad."""
     return abs(math.remainder(angle - math.pi, 2 * math.pi))
 
 
 def expected_terms(plant, row):
-    """Energy, height, inverted and the five reward terms, by their definition."""
+    """Energy, height, inverted and the five reward terms, from their definitions."""
     target = (plant["mass1"] * plant["gravity"] * plant["length1"] / 2
               + plant["mass2"] * plant["gravity"] * (plant["length1"] + plant["length2"] / 2))
     e = energy(plant, row)
@@ -74,7 +75,7 @@ def expected_terms(plant, row):
 
 class SimulateTest(ProgramTest):
     def simulate(self, *arguments):
-        """The rows that it prints, as numbers."""
+        """The printed rows, as numbers."""
         return [numbers(row) for row in parse(self.succeed("simulate", *arguments))]
 
     def reference_rollout(self, *more):
@@ -137,7 +138,7 @@ class SimulateTest(ProgramTest):
                                                   + ARMATURE * (w1**2 + w2**2))
         rows = self.simulate("--start", "2,0,0,0", "--seconds", 10, "--set", "damping=0")
         for row in rows:
-            # Of RK4 at 5 ms: 1e-4 J and less.
+            # The error of RK4 at 5 ms is 1e-4 J or less.
             self.assertAlmostEqual(capsule_energy(row), capsule_energy(rows[0]), delta=1e-3)
 
     def test_damping_takes_energy_away(self):
@@ -178,7 +179,7 @@ class SimulateTest(ProgramTest):
                 self.assertTrue(math.isfinite(float(text)), text)
 
     def test_any_row_is_a_start_of_the_same_trajectory(self):
-        # Only if every digit is there.
+        # The comparison is exact only if the CSV has every digit.
         rows = parse(self.succeed("simulate", "--start", "2,-0.05,0,0", "--seconds", 4))
         start = ",".join(rows[100][name] for name in STATE)
         later = parse(self.succeed("simulate", "--start", start, "--seconds", 2))

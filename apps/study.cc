@@ -1,4 +1,4 @@
-// A study: variants of the settings, each trained with many seeds.
+// The command `study`: variants of the settings, each trained with many seeds.
 #include <algorithm>
 
 #include "apps/commands.h"
@@ -23,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kStudyName = "study.toml";  // in the folder of a study
+constexpr const char* kStudyName = "study.toml";  // in a study's folder
 
 /// The arguments of `study`.
 struct StudyArguments {
@@ -38,8 +38,8 @@ struct StudyArguments {
   }
 };
 
-/// Throws if the folder belongs to another study, which this one would replace: one with another
-/// title, or with a variant that this one does not have. (TrainMany compares the settings.)
+/// Throws if the folder belongs to another study, which this one would replace: another title, or a
+/// variant that this study lacks. TrainMany compares the settings.
 void CheckSameStudy(const StudyPlan& plan, const std::string& title) {
   const fs::path file = plan.folder / kStudyName;
   const std::string where = file.string();
@@ -102,7 +102,7 @@ int CompareStudy(const StudyPlan& plan) {
   return 0;
 }
 
-/// Prints what --slurm would submit.
+/// Prints the script that --slurm would submit.
 int PrintSlurmScript(const StudyPlan& plan, const SlurmRequest& request) {
   std::vector<SeedRun> runs = RunsOf(plan);
   for (SeedRun& run : runs) run.Read();
@@ -129,14 +129,14 @@ int RunStudy(const StudyArguments& arguments) {
     return 0;
   }
   if (arguments.print) return PrintSlurmScript(many.plan, arguments.slurm);
-  CheckCanDraw();  // before hours of training, not after
+  CheckCanDraw();  // fail before hours of training, not after
   if (arguments.on_slurm) CheckSlurm();
   const int exit_code =
       arguments.on_slurm ? TrainOnSlurmAndShow(many, arguments.slurm) : TrainManyAndShow(many);
   return exit_code != 0 ? exit_code : CompareStudy(many.plan);
 }
 
-/// Throws unless the arguments go together.
+/// Throws if the arguments contradict each other.
 void CheckArguments(const CommandLine& line, const StudyArguments& arguments) {
   if (arguments.work.empty() == arguments.file.empty()) {
     throw BadInput(arguments.file.empty()

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""`upswing study`: variants and seeds of a file, in their folders, stopped and resumed."""
+"""Tests of `upswing study`: variants and seeds from a file, in their folders, stopped and
+resumed."""
 
 import json
 import re
@@ -62,7 +63,7 @@ class StudyTest(ProgramTest):
         self.assertTrue(output.startswith(
             'Training "Little" in runs/little\n  3 variants, seeds 1-2: 6 runs'), output)
         self.assertIn("Written: summary.csv", output)
-        self.assertNotIn("Next:", output)  # it has compared them itself
+        self.assertNotIn("Next:", output)  # the study compares its runs itself
         study = self.folder / "runs/little"
         self.assertEqual({path.name for path in study.iterdir()},
                          {"study.toml", "plan.json", *VARIANTS, *SUMMARY})
@@ -132,7 +133,7 @@ class StudyTest(ProgramTest):
         self.write("little.toml", STUDY)
         self.succeed("study", "little.toml")
         self.write("little.toml", STUDY.replace("gamma = 0.9", "gamma = 0.8"))
-        # Of the first run that the folder lists, which is any of them.
+        # The error names the first run that the folder lists, in any order.
         self.refuse(["study", "little.toml"], "runs/little/but/seed", ": made with agent.gamma = 0.9",
                     "has 0.8", "choose another --out")
 
@@ -201,7 +202,8 @@ class StudyTest(ProgramTest):
         self.refuse(["study"], "study: expected FILE.toml")
 
     def test_the_studies_of_the_project_can_be_run(self):
-        """Each is planned whole, which reads the settings of every variant; nothing is trained."""
+        """Every study file can be planned, which parses the settings of all variants; no training
+        runs."""
         studies = sorted((ROOT / "configs/studies").glob("*.toml"))
         self.assertEqual(len(studies), 9)
         for path in studies:

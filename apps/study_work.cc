@@ -20,7 +20,7 @@
 namespace upswing {
 namespace {
 
-/// During its lifetime, standard output and error are appended to a file.
+/// Appends standard output and error to a file during its lifetime.
 class PrintedTo {
  public:
   explicit PrintedTo(const std::filesystem::path& path)
@@ -42,7 +42,7 @@ class PrintedTo {
   Descriptor output_, error_;
 };
 
-/// Trains a run of a study, with the output of `train` in its log.
+/// Trains a study's run, and writes the output of `train` to its log.
 bool TrainLogged(const SeedRun& run, const std::function<std::unique_ptr<TrainingRun>()>& make,
                  const std::function<bool()>& ours) {
   const PrintedTo log(run.log());
@@ -61,7 +61,7 @@ bool TrainLogged(const SeedRun& run, const std::function<std::unique_ptr<Trainin
 
 int WorkOnStudy(const std::filesystem::path& folder) {
   InstallSignalHandlers(kStoppingTraining);
-  // Slurm announces the end of a job by these signals.
+  // Slurm announces the end of a job's time with these signals.
   if (std::getenv("SLURM_JOB_ID") != nullptr) StopAtUserSignals();
   const StudyPlan plan = ReadPlan(folder);
   const WorkerOutcome outcome = WorkOn(plan, TrainLogged, [] { return StopSignal() != 0; });

@@ -4,12 +4,12 @@
 
 namespace upswing {
 
-/// A worker of the study in a folder: trains what no other one has, until nothing is left for it.
-/// What a run prints goes to its log, a line about all to standard output. Returns the exit code:
-/// 0, 1 if a run failed, kTryAgain if a signal stopped it.
+/// Runs a worker of the study in a folder: trains runs without another worker until none is left. A
+/// run's output goes to its log; one line about each run goes to standard output. Returns the exit
+/// code: 0, 1 if a run failed, kTryAgain if a signal stopped the worker.
 int WorkOnStudy(const std::filesystem::path& folder);
 
-/// Prints how far the study in a folder is, and who works on it.
+/// Prints the progress and the workers of the study in a folder.
 int PrintStudyStatus(const std::filesystem::path& folder);
 
 }  // namespace upswing

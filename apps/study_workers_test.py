@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Workers of a study: any number, on any hosts, killed at any moment; reduced runs; bad folders."""
+"""Tests of study workers: any number, on any hosts, killed at any moment; reduced runs; bad
+folders."""
 
 import json
 import os
@@ -29,14 +30,14 @@ learning_starts = 50
 gamma = 0.9
 """
 ENDLESS = STUDY.replace("steps = 400", "steps = 1000000000")
-# For a longer test: 500 seeds are 1,000 runs.
+# UPSWING_TEST_SEEDS makes the test longer: 500 seeds are 1,000 runs.
 SEEDS = int(os.environ.get("UPSWING_TEST_SEEDS", 20))
 WORKERS = 4 if SEEDS <= 20 else 8
 FOREIGN = "elsewhere/0123abcd 17 trains it\n"
 
 
 def without_clocks(done):
-    """A finished run's result without what depends on the clock or the machine."""
+    """A finished run's result, without values that depend on the clock or the machine."""
     result = json.loads(done.read_text(encoding="utf-8"))
     for name in ("busy", "seconds", "solved_seconds"):
         result.pop(name)
@@ -87,7 +88,7 @@ class WorkersTest(ProgramTest):
         before = snapshot(study)
         self.work()
         self.assertEqual(snapshot(study), before)
-        # The command itself has nothing left to train, and compares.
+        # The study command has nothing left to train, and compares.
         self.assertIn("8 already done, resuming 0",
                       self.succeed("study", "little.toml", "--out", "study"))
 
@@ -108,7 +109,7 @@ class WorkersTest(ProgramTest):
                 kills += 1
         for worker in workers:
             self.assertIn(worker.wait(PATIENCE), (0, -signal.SIGKILL))
-        self.prepare(text, "study", "--keep", "tables")  # a worker may have died giving its claim back
+        self.prepare(text, "study", "--keep", "tables")  # a worker may have died in between
         self.assertFalse(list(study.rglob("*.claim")) + list(study.rglob("*.failed")))
         self.succeed("study", "little.toml", "--out", "whole", "--keep", "tables")
         self.assert_same_study("study", "whole", range(1, SEEDS + 1))
@@ -156,7 +157,7 @@ class WorkersTest(ProgramTest):
         failed = study / "one/seed2.failed"
         self.assertIn("expected a new or empty folder", failed.read_text(encoding="utf-8"))
         self.assertEqual(len(list(study.rglob("*.done"))), 7)
-        self.work()  # nothing is left that it could do
+        self.work()  # no runs are left
         status = self.succeed("study", "little.toml", "--out", "study", "--status")
         self.assertRegex(status, r"one/seed2 +failed: .*expected a new or empty folder")
         (study / "one/seed2/precious").unlink()
@@ -171,8 +172,8 @@ class WorkersTest(ProgramTest):
         self.prepare(STUDY, "all", "--keep", "all")
         self.work("all")
         shutil.copytree(self.folder / "all/one/seed1", study / "one/seed1")
-        (study / "one/seed1.done").unlink()  # as if its worker was killed in between
-        self.succeed("study", "little.toml", "--out", "study")  # it still keeps the tables alone
+        (study / "one/seed1.done").unlink()  # as if the worker had been killed in between
+        self.succeed("study", "little.toml", "--out", "study")  # still keeps only the tables
         self.assertTrue((study / "one/seed1.done").exists())
         self.assertFalse((study / "one/seed1").exists())
         self.assert_same_study("study", "all")
@@ -201,7 +202,7 @@ class WorkersTest(ProgramTest):
         log = study / "one/seed1/log.txt"
         self.wait_for(log.exists)
         claim = study / "one/seed1.claim"
-        # Another worker of this host leaves it alone, however old its claim is.
+        # Another worker on this host leaves the claim alone, however old it is.
         os.utime(claim, (time.time() - 1000,) * 2)
         other = self.start_worker()
         self.wait_for((study / "two/seed1/log.txt").exists)
@@ -226,7 +227,7 @@ class WorkersTest(ProgramTest):
         self.assertIn("seed2.failed", self.run_here(*again).stderr)
         self.refuse(["study", "study", "--status", "--keep", "all"], "--status: expected no --keep")
 
-    # ---- What is kept.
+    # ---- Kept files.
 
     def test_reduced_studies_say_the_same(self):
         self.write("little.toml", STUDY.replace("seeds = 4", 'seeds = 4\nkeep = "policy"'))
@@ -248,7 +249,7 @@ class WorkersTest(ProgramTest):
         rows = (self.folder / "tables/evaluations.csv").read_text(encoding="utf-8").splitlines()
         self.assertTrue(rows[0].startswith("variant,seed,step,success_rate,"))
         self.assertEqual(len(rows), 1 + 8 * 2)
-        # More steps: what was not kept is trained once more.
+        # With more steps, runs that were not kept are trained again.
         longer = STUDY.replace("= 400", "= 800")
         self.write("little.toml", longer)
         for out in ("tables", "all"):
@@ -341,7 +342,7 @@ class WorkersTest(ProgramTest):
 
 
 class SlurmTest(ProgramTest):
-    """What needs no Slurm; `cluster_test.py` has one."""
+    """Tests that need no Slurm; `cluster_test.py` runs with one."""
 
     def test_the_script_is_printed_and_nothing_is_written(self):
         self.write("little.toml", STUDY)

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Other tasks than the double pendulum: every command works with them, or says why it does not."""
+"""Tests of other tasks than the double pendulum: every command supports them, or refuses with a
+reason."""
 
 import csv
 import json
@@ -71,9 +72,9 @@ class TaskTest(unittest.TestCase):
             table = run("eval", self.root / policy, "--episodes", 20, *flags)
             self.assertEqual(table.returncode, 0, table.stderr)
             return next(line for line in table.stdout.splitlines() if "energy used" in line)
-        self.assertTrue(energy_line("pendulum-v1").endswith(" J   in 10 s"))  # always as long
-        # Long enough to reach the goal. A step costs 1, but not the one that reaches it and ends
-        # the episode.
+        self.assertTrue(energy_line("pendulum-v1").endswith(" J   in 10 s"))  # fixed length
+        # Long enough to reach the goal. Each step costs 1, except the last one, which reaches the
+        # goal and ends the episode.
         trained = run("train", "--task", "acrobot-v1", "--levels", 3, "--hidden", "16", "--head", 8,
                       "--steps", 20000, "--envs", 4, "--eval-every", 5000, "--eval-episodes", 5,
                       "--learning-starts", 200, "--threads", 1, "--out", self.root / "reaches")
@@ -99,7 +100,7 @@ class TaskTest(unittest.TestCase):
             rows = read_csv(out)
             for name in list(episode)[1:1 + states]:
                 self.assertEqual(rows[0][name], float(episode[name]))
-            # The row behind the last step has no step of its own, unless the goal ended it.
+            # The row after the last step has no step of its own, unless the goal ended the episode.
             rewards = [row["reward"] for row in rows]
             self.assertIn(True, [abs(sum(rewards[:n]) - float(episode["return"])) < 1e-9
                                  for n in (len(rewards) - 1, len(rewards))])

@@ -1,7 +1,7 @@
-"""What the end-to-end tests of the program share: running it, small settings, reading its files.
+"""Helpers that the program's end-to-end tests share: running it, small settings, reading its files.
 
-The program is taken from the environment variable UPSWING, else from the release build of the
-repository in UPSWING_ROOT.
+The environment variable UPSWING names the program; without it, the release build of the repository
+in UPSWING_ROOT is used.
 """
 
 import csv
@@ -22,8 +22,8 @@ from pathlib import Path
 ROOT = Path(os.environ.get("UPSWING_ROOT", Path(__file__).resolve().parent.parent))
 UPSWING = Path(os.environ.get("UPSWING", ROOT / "build/release/apps/upswing"))
 
-# Seconds after which a wait counts as hanging. No test waits for this: on a machine twenty times slower
-# than two idle cores, what is waited for comes within it.
+# Seconds after which a wait counts as hanging. Passing tests never wait this long, even on a
+# machine twenty times slower than two idle cores.
 PATIENCE = 1200
 
 RUN_FILES = {"config.toml", "metrics.csv", "episodes.csv", "evals.csv", "log.txt",
@@ -55,8 +55,8 @@ MODEL = """<mujoco>
 
 
 def small(**changes):
-    """`train` with small settings and the given changes; None takes a setting away, True and False
-    are flags."""
+    """`train` with small settings and the given changes. None removes a setting; True and False are
+    flags."""
     arguments = ["train"]
     for name, value in (SMALL | changes).items():
         flag = name.replace("_", "-")
@@ -68,8 +68,8 @@ def small(**changes):
 
 
 def run(*arguments, cwd=None, stdout=subprocess.PIPE, **more):
-    """Runs the program to its end; text comes back in stdout and stderr, there without the lines
-    that long work writes every ten seconds."""
+    """Runs the program to its end; stdout and stderr are text. Removes from stderr the lines that
+    long work writes every ten seconds."""
     done = subprocess.run([UPSWING, *map(str, arguments)], cwd=cwd, check=False,
                           stdin=subprocess.DEVNULL, stdout=stdout,
                           stderr=subprocess.PIPE, encoding="utf-8", **more)
@@ -78,8 +78,8 @@ def run(*arguments, cwd=None, stdout=subprocess.PIPE, **more):
 
 
 def probe(policy, what, numbers):
-    """What the library's policy makes of rows of observations or states (export/policy_probe.cc), as one
-    array of doubles."""
+    """Results of the library's policy for rows of observations or states (export/policy_probe.cc),
+    as one array of doubles."""
     done = subprocess.run([UPSWING.parent.parent / "policy_probe", policy, what], check=False,
                           input=array("d", numbers).tobytes(), stdout=subprocess.PIPE,
                           stderr=subprocess.PIPE)
@@ -94,14 +94,14 @@ def read_csv(path):
 
 
 def without_seconds(path):
-    """The rows of a table as text, without the column that differs from run to run."""
+    """The rows of a table as text, without the column that differs between runs."""
     with open(path, encoding="utf-8", newline="") as file:
         return [{name: text for name, text in row.items() if name != "seconds"}
                 for row in csv.DictReader(file)]
 
 
 def snapshot(folder):
-    """Every file below a folder with its bytes, and every folder with None."""
+    """Every file below a folder with its bytes, and every subfolder with None."""
     return {str(path.relative_to(folder)): path.read_bytes() if path.is_file() else None
             for path in sorted(Path(folder).rglob("*"))}
 
@@ -120,7 +120,8 @@ def read_tensors(path):
 
 
 def checksum(pieces):
-    """That of Upswing's files, over their header and tensors (docs/reference/policy-format.md)."""
+    """The checksum of Upswing's files, over header and tensors
+    (docs/reference/policy-format.md)."""
     value = 0xcbf29ce484222325
     for piece in pieces:
         for (word,) in struct.iter_unpack("<Q", piece + bytes(-len(piece) % 8)):
@@ -130,8 +131,8 @@ def checksum(pieces):
 
 
 def write_tensors(path, metadata, tensors):
-    """Writes a safetensors file, with the right checksum if it says an upswing_version, so that only
-    its content can be wrong."""
+    """Writes a safetensors file. If its metadata have upswing_version, the checksum is correct, so
+    that only the content can be wrong."""
     zeros = "0" * 16
     about = {key: text for key, text in metadata.items() if key != "checksum"}
     if "upswing_version" in about:
@@ -159,15 +160,15 @@ def with_number(tensor, index, number):
 
 
 def state_of(path):
-    """What a checkpoint holds, without what depends on the clock: the seconds, and with them the
-    lengths of the tables."""
+    """A checkpoint's content without values that depend on the clock: the seconds, and the lengths
+    of the tables."""
     _, tensors = read_tensors(path)
     return {name: tensor for name, tensor in tensors.items()
             if not name.endswith("seconds") and not name.startswith("run/size/")}
 
 
 def train_once(test_class, **changes):
-    """Trains with small settings for all tests of a class; the run folder goes with them."""
+    """Trains with small settings for all tests of a class; deletes the run folder afterwards."""
     folder = tempfile.TemporaryDirectory(prefix="upswing-")
     test_class.addClassCleanup(folder.cleanup)
     path = Path(folder.name, "run")
@@ -177,7 +178,7 @@ def train_once(test_class, **changes):
 
 
 class ProgramTest(unittest.TestCase):
-    """Tests of the program, each in a folder of its own that is the current one."""
+    """Base class for tests of the program; each test has its own current folder."""
 
     maxDiff = 2000
 
@@ -190,13 +191,13 @@ class ProgramTest(unittest.TestCase):
         return run(*arguments, **{"cwd": self.folder} | more)
 
     def succeed(self, *arguments, **more):
-        """Runs the program, which has to succeed with an empty stderr; returns stdout."""
+        """Runs the program, asserts success and an empty stderr, and returns stdout."""
         done = self.run_here(*arguments, **more)
         self.assertEqual((done.returncode, done.stderr), (0, ""), done)
         return done.stdout
 
     def assert_one_line(self, done, code, *words):
-        """It ended with this exit code and one line on stderr in which all words occur."""
+        """Asserts this exit code, and one line on stderr that contains all words."""
         self.assertEqual(done.returncode, code, done)
         self.assertEqual(len(done.stderr.splitlines()), 1, done.stderr)
         self.assertTrue(done.stderr.startswith("upswing: "), done.stderr)
@@ -206,7 +207,7 @@ class ProgramTest(unittest.TestCase):
             self.assertIn(str(word), done.stderr)
 
     def refuse(self, arguments, *words, code=2, **more):
-        """Runs the program, which has to refuse: one line, no output, no file touched."""
+        """Runs the program, and asserts that it refuses: one line, no output, no changed file."""
         before = snapshot(self.folder)
         done = self.run_here(*arguments, **more)
         self.assert_one_line(done, code, *words)
@@ -219,7 +220,8 @@ class ProgramTest(unittest.TestCase):
         return name
 
     def start(self, *arguments, wait=True):
-        """Starts the program, waits until it says that it trains, and kills it in the end."""
+        """Starts the program, waits until it begins to train, and kills it at the end of the
+        test."""
         process = subprocess.Popen([UPSWING, *map(str, arguments)], cwd=self.folder,
                                    stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                    stderr=subprocess.STDOUT, encoding="utf-8")
@@ -245,8 +247,8 @@ class ProgramTest(unittest.TestCase):
             time.sleep(0.01)
 
     def watch(self, columns, arguments, *patterns):
-        """Runs the program on a terminal of that width until it has shown all patterns, or a lot,
-        and interrupts it; returns what it showed."""
+        """Runs the program on a terminal of that width until it has shown all patterns, or a lot of
+        output. Then interrupts it, and returns what it showed."""
         terminal, its_end = pty.openpty()
         with subprocess.Popen(["sh", "-c", 'stty cols "$0"; exec "$@"', str(columns), UPSWING,
                                *map(str, arguments)], cwd=self.folder,
@@ -267,7 +269,8 @@ class ProgramTest(unittest.TestCase):
         return shown
 
     def screen(self, *arguments):
-        """Runs the program on a terminal; returns the lines that it left there, escapes obeyed."""
+        """Runs the program on a terminal. Returns the lines left on the terminal after escape
+        sequences."""
         terminal, its_end = pty.openpty()
         with subprocess.Popen([UPSWING, *map(str, arguments)], cwd=self.folder, stdin=its_end,
                               stdout=its_end, stderr=its_end) as process:
@@ -280,14 +283,15 @@ class ProgramTest(unittest.TestCase):
         return [line.rsplit("\x1b[K", 1)[-1] for line in shown.replace("\r\n", "\n").split("\n")]
 
     def read_terminal(self, terminal):
-        """What comes next; nothing when its other end is closed."""
+        """The next output; empty if the other end is closed."""
         try:
             return os.read(terminal, 65536).decode()
-        except OSError:  # Linux's way to say that the other end is closed
+        except OSError:  # Linux: the other end is closed
             return ""
 
     def assert_same_run(self, a, b):
-        """Two run folders hold the same but for the clock: policy, tables, whole state."""
+        """Asserts that two run folders are equal except for clock values: policy, tables, whole
+        state."""
         a, b = self.folder / a, self.folder / b
         self.assertEqual((a / "policy.safetensors").read_bytes(),
                          (b / "policy.safetensors").read_bytes())
@@ -301,7 +305,8 @@ class ProgramTest(unittest.TestCase):
 
 
 class SmallRunTest(ProgramTest):
-    """Tests of a small finished run in the folder `run`, trained once and copied for each test."""
+    """Base class for tests of a small finished run in the folder `run`, trained once and copied for
+    each test."""
 
     @classmethod
     def setUpClass(cls):
@@ -314,20 +319,20 @@ class SmallRunTest(ProgramTest):
         self.checkpoint = self.folder / "run/checkpoint.safetensors"
 
     def restore(self):
-        """Replaces the run by a fresh copy."""
+        """Replaces the run with a fresh copy."""
         shutil.rmtree(self.folder / "run")
         shutil.copytree(self.made, self.folder / "run")
 
     @staticmethod
     def flip(path, position):
-        """Inverts one bit."""
+        """Inverts one bit of a file."""
         data = bytearray(path.read_bytes())
         data[position] ^= 0x10
         path.write_bytes(data)
 
     @staticmethod
     def places(path):
-        """Bytes all over a safetensors file: in its length, header, checksum and tensors."""
+        """Positions all over a safetensors file: in its length, header, checksum and tensors."""
         data = path.read_bytes()
         header = int.from_bytes(data[:8], "little")
         checksum = data.index(b'"checksum":"') + 12

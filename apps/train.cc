@@ -49,7 +49,7 @@ int RunSeeds(const TrainArguments& arguments) {
   return TrainManyAndShow(many);
 }
 
-/// Prints the settings that the training would have.
+/// Prints the settings that the training would use.
 int PrintConfig(const TrainArguments& arguments) {
   const Config config = arguments.resume.empty() ? BuildConfig(arguments.config, arguments.flags)
                                                  : ReadRunConfig(arguments.resume, arguments.flags);
@@ -60,7 +60,7 @@ int PrintConfig(const TrainArguments& arguments) {
 int RunTrain(const TrainArguments& arguments) {
   if (arguments.print_config) return PrintConfig(arguments);
   if (!arguments.seeds.empty()) return RunSeeds(arguments);
-  // A signal may interrupt the reading of settings; a training ends with a checkpoint.
+  // A signal may interrupt the reading of settings; a training instead ends with a checkpoint.
   std::optional<Config> config;
   if (arguments.resume.empty()) config = BuildConfig(arguments.config, arguments.flags);
   InstallSignalHandlers(kStoppingTraining);
@@ -84,7 +84,7 @@ void CheckManyArguments(const CommandLine& line) {
 /// Lets --help show the defaults of the given agent and file, or of the given run.
 void ShowChosenDefaults(const CommandLine& line, const CommandLine::ShowOptions& show) {
   std::vector<FlagValue> flags;
-  // --algorithm without --agent shows the agent of that name.
+  // --algorithm without --agent shows the agent with the algorithm's name.
   for (const char* flag : {"--algorithm", "--agent"}) {
     if (const std::string agent = line.Last(flag); !agent.empty()) flags = {{"agent", agent, flag}};
   }
@@ -95,7 +95,7 @@ void ShowChosenDefaults(const CommandLine& line, const CommandLine::ShowOptions&
   show(EverySetting(scratch), KnownOptions(config));
 }
 
-/// The named agents, a paragraph each.
+/// The named agents, one paragraph each.
 std::string AgentsText() {
   std::string text =
       "The help shows the settings and defaults of the given agent and file:\n"

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""`upswing train`: what it prints and writes, that it learns, and that it does the same twice."""
+"""Tests of `upswing train`: its output and files, that it learns, and that it is reproducible."""
 
 import json
 import os
@@ -21,7 +21,7 @@ EVALS = ["step", "success_rate", "success_low", "success_high", "mean_return", "
 
 
 class SmallTrainingTest(ProgramTest):
-    """One small training: what it prints and writes."""
+    """Tests of one small training: its output and its files."""
 
     @classmethod
     def setUpClass(cls):
@@ -33,7 +33,7 @@ class SmallTrainingTest(ProgramTest):
         cls.output = done.stdout
 
     def table(self, name, columns):
-        """The rows of a table of the run, which has just these columns."""
+        """The rows of a table of the run, after asserting its columns."""
         path = self.place / "run" / name
         self.assertEqual(path.read_text(encoding="utf-8").splitlines()[0], ",".join(columns))
         return read_csv(path)
@@ -42,7 +42,7 @@ class SmallTrainingTest(ProgramTest):
         self.assertNotIn("\x1b", self.output)
         self.assertNotIn("\r", self.output)
         self.assertTrue(self.output.startswith("Training d3qn-small (seed 1) in run\n"), self.output)
-        # Rates are known from the first report on, however short the time.
+        # Rates are known from the first report on, however little time has passed.
         self.assertEqual(len(re.findall(r"^ *[24],000 steps .* [1-9][\d,]* updates/s .*"
                                         r"success +\d/4$", self.output, re.M)), 2)
 
@@ -61,7 +61,7 @@ class SmallTrainingTest(ProgramTest):
 
     def test_metrics(self):
         rows = self.table("metrics.csv", METRICS)
-        # Eight parallel environments: the row comes with the first step at or past a multiple.
+        # With eight parallel environments, a row comes at the first step at or past a multiple.
         self.assertEqual([row["step"] for row in rows],
                          [504, 1000, 1504, 2000, 2504, 3000, 3504, 4000])
         self.assertEqual([row["updates"] for row in rows],
@@ -102,7 +102,7 @@ class TrainTest(ProgramTest):
     def policy_of(self, name):
         return (self.folder / name / "policy.safetensors").read_bytes()
 
-    # ---- What it prints.
+    # ---- Output.
 
     def test_a_rate_is_told_once_it_is_known(self):
         output = self.succeed(*small(log_every=3000))
@@ -114,7 +114,7 @@ class TrainTest(ProgramTest):
         self.assertIn("not solved yet", output)
         self.assertIn("Best policy: run/policy.safetensors", output)
         watch, *commands = re.findall(r"^  \./upswing (.*)$", output, re.M)
-        self.assertEqual(watch, "demo run")  # the launcher's own command
+        self.assertEqual(watch, "demo run")  # the launcher's command
         self.assertEqual(len(commands), 3)
         for command in commands:
             self.succeed(*command.split())
@@ -124,14 +124,14 @@ class TrainTest(ProgramTest):
                  r"loss \d\.\d+", r"return -?\d+", r"success \d+%", r"at most [^\r]+ left")
         bar = r"\r\x1b\[K\[[= ]{16}\] +\d+% [^\r]*"
         shown = self.watch(200, ENDLESS, *(bar + fact for fact in facts))
-        self.assertIn("\r\x1b[KStopped at step", shown)  # in the bar's place
+        self.assertIn("\r\x1b[KStopped at step", shown)  # in place of the bar
 
     def test_progress_bar_keeps_to_the_width(self):
         bar = r"\r\x1b\[K(\[[= ]{16}\] +\d+% [^\r]*)\r"
         for shown in re.findall(bar, self.watch(60, ENDLESS, bar)):
             self.assertLess(len(shown), 60)
 
-    # ---- What it writes.
+    # ---- Files.
 
     def test_best_evaluation_is_kept(self):
         self.succeed(*small(steps=20000))
@@ -159,7 +159,7 @@ class TrainTest(ProgramTest):
         for name in ("run.new", "run.tmp"):
             self.assertTrue((self.folder / name / "precious").exists(), name)
 
-    # ---- The same again.
+    # ---- Reproducibility.
 
     def test_config_runs_again_to_the_same_bytes(self):
         self.succeed(*small(gamma=0.97, mass2=1.1, epsilon_decay=0.9, double=False))
@@ -183,7 +183,7 @@ class TrainTest(ProgramTest):
         model = MODEL
         for old, new in (('mass="1"', 'mass="1.2"'), ('mass="1"', 'mass="0.7"'),
                          ('damping="0"', 'damping="0.1"'), ('damping="0"', 'damping="0.2"'),
-                         # The first link's end, and the second link's place on it.
+                         # Change the first link's end, and the second link's position on it.
                          ('fromto="0 0 0 0 0 -0.5"', 'fromto="0 0 0 0 0 -0.6"'),
                          ('pos="0 0 -0.5"', 'pos="0 0 -0.6"'),
                          ("<option ", '<option gravity="0 0 -9.5" '),
@@ -214,7 +214,7 @@ class TrainTest(ProgramTest):
         self.succeed(*small(out="two", threads=2))
         self.assert_same_run("one", "two")
 
-    # ---- That it learns.
+    # ---- Learning.
 
     def named_agents(self):
         help_text = self.succeed("train", "--help")

@@ -24,7 +24,7 @@ namespace {
 /// The printed view of a training: a progress line, a line per evaluation, a summary.
 class TrainView : public TrainObserver {
  public:
-  /// A view of a training, which must outlive it, from its current step on.
+  /// Shows a training, which must outlive the view, from its current step on.
   explicit TrainView(const Training& training)
       : training_(training),
         begin_step_(training.state().steps),
@@ -68,7 +68,7 @@ class TrainView : public TrainObserver {
                     Join(AgentTexts(), "  "), e.reward_sum.mean, e.successes, e.episodes));
   }
 
-  /// Updates the progress line if it is due; returns the request of a signal.
+  /// Updates the progress line if it is due. Returns the request of a signal.
   TrainRequest Poll() {
     if (line_.due()) ShowProgress(training_.state());
     return PollSignals();
@@ -131,7 +131,7 @@ class TrainView : public TrainObserver {
     return steps_per_second_ > 0 ? FormatCount(updates_per_second_) : "-";
   }
 
-  /// Metrics of the agent, such as `eps 0.05` and `loss 0.0012`.
+  /// The agent's metrics, such as `eps 0.05` and `loss 0.0012`.
   std::vector<std::string> AgentTexts() const {
     const bool learned = training_.agent().updates() > 0;
     std::vector<std::string> texts;
@@ -186,12 +186,12 @@ class TrainView : public TrainObserver {
 
   const Training& training_;
   ProgressLine line_;
-  int64_t begin_step_;                        // where this view's training began
-  Metrics metrics_;                           // the last ones
+  int64_t begin_step_;                        // of the training in this view
+  Metrics metrics_;                           // last reported
   double value_ = 0, discounted_return_ = 0;  // of the last evaluation
 
-  // Rates of training, between two reports at least half a second apart; before there are such, of
-  // all that was reported; 0 before the first report.
+  // Training rates between two reports at least half a second apart. Until there are two such
+  // reports, the rates over all reports; 0 before the first report.
   double steps_per_second_ = 0, updates_per_second_ = 0;
   bool rates_settled_ = false;
   int64_t since_step_, since_updates_;

@@ -25,7 +25,7 @@ constexpr double kForEver = 1e7;  // s, until the window closes or the recording
 
 struct ViewArguments {
   std::vector<std::string> names;
-  PolicyArguments controller;  // settings of those that are controllers
+  PolicyArguments controller;  // settings of the controllers
   TrialArguments trial;
   std::string record, csv;
   ViewLook look;
@@ -66,8 +66,8 @@ std::vector<RolloutConfig> EntriesOf(const ViewArguments& a,
 }
 
 #ifdef UPSWING_VIEWER
-/// The plants that the window can switch to: the requested one, those of the policies' trainings,
-/// and the default one; each once.
+/// The plants that the window can switch to, without duplicates: the requested one, those of the
+/// policies' trainings, and the default one.
 std::vector<std::pair<std::string, Plant>> PlantsOf(const std::vector<RolloutConfig>& entries,
                                                     const std::vector<LoadedPolicy>& policies) {
   std::vector<std::pair<std::string, Plant>> plants;
@@ -86,7 +86,7 @@ std::vector<std::pair<std::string, Plant>> PlantsOf(const std::vector<RolloutCon
 }
 #endif
 
-/// Without a window.
+/// Records a film or picture, and writes the CSV, without a window.
 int RunHeadless(const ViewArguments& a, const std::vector<RolloutConfig>& entries, PictureSize size,
                 double seconds) {
   InstallSignalHandlers("");
@@ -154,7 +154,7 @@ int RunView(const ViewArguments& a) {
 #endif
 }
 
-/// Adds the policies to look at, and the settings of the controllers among them.
+/// Adds the policies to view, and the settings of the controllers among them.
 void AddPolicies(CommandLine& line, ViewArguments& a) {
   AddControllers(line, a.controller);
   line.Texts(

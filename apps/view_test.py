@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""`upswing view`: pictures and films without a window, the window under Xvfb, and bad input."""
+"""Tests of `upswing view`: pictures and films without a window, the window under Xvfb, and bad
+input."""
 
 import csv
 import functools
@@ -21,11 +22,11 @@ from testing import PATIENCE, ROOT, UPSWING, ProgramTest, run, train_once
 AGENTS = ROOT / "web/public/agents"
 FAST = AGENTS / "fast.safetensors"
 REFERENCES = ROOT / "apps/testdata/view"
-REQUIRED = "UPSWING_REQUIRE_PICTURES" in os.environ  # nothing may be missing
+REQUIRED = "UPSWING_REQUIRE_PICTURES" in os.environ  # then no program may be missing
 
 
 def read_png(path):
-    """Width, height and rows of (red, green, blue) bytes of a PNG of ours or of a reference."""
+    """Width, height and rows of (red, green, blue) bytes of a PNG, ours or a reference."""
     data = path.read_bytes()
     assert data[:8] == b"\x89PNG\r\n\x1a\n", path
     width, height, depth, kind, *rest = struct.unpack(">IIBBBBB", data[16:29])
@@ -65,14 +66,15 @@ def read_png(path):
 
 
 def difference(a, b):
-    """Mean difference of two pictures' bytes, and the share of those that differ by more than 48."""
+    """Mean difference of two pictures' bytes, and the share of bytes that differ by more than
+    48."""
     differences = [abs(x - y) for x, y in zip(b"".join(a[2]), b"".join(b[2]))]
     return (sum(differences) / len(differences),
             sum(each > 48 for each in differences) / len(differences))
 
 
 def probe(path):
-    """What ffprobe says of a film: codec, width, height, frames, seconds."""
+    """A film's properties by ffprobe: codec, width, height, frames, seconds."""
     done = subprocess.run(
         ["ffprobe", "-v", "error", "-count_frames", "-show_streams", "-show_format", "-of", "json",
          path], check=True, stdout=subprocess.PIPE)
@@ -83,7 +85,7 @@ def probe(path):
 
 
 def need(*programs):
-    """Skips tests for which a program is missing, unless none may be."""
+    """Skips tests if a program is missing, unless all are required."""
     for program in programs:
         if shutil.which(program) is None:
             assert not REQUIRED, f"{program} is missing"
@@ -92,13 +94,13 @@ def need(*programs):
 
 @functools.cache
 def why_nothing_draws():
-    """Why this machine draws no pictures; empty where it does."""
+    """The reason why this machine draws no pictures; empty if it draws."""
     done = run("view", FAST, "--record", "/dev/null/x.png", "--seconds", 0, cwd="/")
     return done.stderr.strip() if "need EGL" in done.stderr and not REQUIRED else ""
 
 
 class ViewTest(ProgramTest):
-    """Tests that draw; skipped where nothing can."""
+    """Base class for tests that draw; skipped if this machine cannot."""
 
     @classmethod
     def setUpClass(cls):
@@ -108,7 +110,7 @@ class ViewTest(ProgramTest):
             raise unittest.SkipTest(why_nothing_draws())
 
     def picture(self, *arguments, name="a.png", size=(160, 120)):
-        """The picture that `view` makes of these arguments."""
+        """The picture that `view` draws for these arguments."""
         self.succeed("view", *arguments, "--record", name, "--width", size[0], "--height", size[1])
         picture = read_png(self.folder / name)
         self.assertEqual(picture[:2], size)
@@ -129,7 +131,7 @@ class Pictures(ViewTest):
                 arguments = [*arguments, "--seconds", 1.5]
                 expected = self.succeed("simulate", *arguments)
                 self.assertEqual(self.succeed("view", "--headless", *arguments, "--csv", "-"), expected)
-        # Recording makes it no other.
+        # Recording does not change the file.
         self.succeed("view", "fast.safetensors", "--seconds", 1.5, "--record", "a.png", "--width", 64,
                      "--height", 64, "--csv", "a.csv", "--speed", 0.3)
         self.assertEqual((self.folder / "a.csv").read_text(encoding="utf-8"),
@@ -147,13 +149,13 @@ class Pictures(ViewTest):
                 drawn[name] = self.picture(*arguments, size=size)
                 stored[name] = read_png(REFERENCES / f"{name}.png")
                 mean, share = difference(drawn[name], stored[name])
-                # Other drivers round and smooth edges in other ways.
+                # Other drivers have different rounding and antialiasing.
                 self.assertLess(mean, 2.5)
                 self.assertLess(share, 0.01)
-        # That is less than what a tenth of a second changes, or the text.
+        # A tenth of a second, or the text, changes more than that.
         for flags in (["--seconds", 1, "--no-text"], ["--seconds", 0.9]):
             self.assertGreater(difference(self.picture(FAST, *flags), stored["swing"])[1], 0.01)
-        # Marks are small; they can be left out.
+        # Marks are small, and can be switched off.
         plain = self.picture(FAST, "--seconds", 0.9, "--no-text", "--no-marks")
         self.assertGreater(difference(plain, drawn["swing"])[1], 0.002)
 
@@ -174,8 +176,8 @@ class Pictures(ViewTest):
         self.assertEqual(sorted(path.name for path in self.folder.iterdir()), ["frames"])
 
     def test_films(self):
-        """Of names that a shell, ffmpeg or printf would read otherwise, one of them a link; a size that
-        video codecs do not take is padded."""
+        """Films with names that a shell, ffmpeg or printf would misread, one of them a link. A size
+        that video codecs do not accept is padded."""
         need("ffmpeg", "ffprobe")
         self.write("old.mp4", "old")
         (self.folder / "-i x.mp4").symlink_to("old.mp4")
@@ -205,7 +207,7 @@ class Pictures(ViewTest):
 
     def test_what_is_interrupted_leaves_nothing(self):
         need("ffmpeg")
-        for name in ("a.mp4", "frames/"):  # they begin to write at once
+        for name in ("a.mp4", "frames/"):  # these begin to write immediately
             arguments = [UPSWING, "view", FAST, "--record", name, "--seconds", "1000", "--width", "64",
                          "--height", "48", "--fps", "1"]
             with subprocess.Popen(arguments, cwd=self.folder, stdout=subprocess.PIPE,
@@ -306,7 +308,7 @@ class Launcher(unittest.TestCase):
 
 
 class Window(ViewTest):
-    """The window under Xvfb, with keys and mouse of xdotool (XTest)."""
+    """Tests of the window under Xvfb, with keys and mouse from xdotool (XTest)."""
 
     @classmethod
     def setUpClass(cls):
@@ -338,7 +340,7 @@ class Window(ViewTest):
         return done.stdout.strip()
 
     def open(self, *arguments):
-        """Opens the window in the upper left corner, with the focus."""
+        """Opens the window in the upper left corner, with focus."""
         self.process = subprocess.Popen(
             [UPSWING, "view", *map(str, arguments), "--width", "320", "--height", "240"],
             cwd=self.folder, env=self.environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
@@ -377,7 +379,7 @@ class Window(ViewTest):
         self.assertEqual(self.process.stdout.read(), "")
 
     def screenshot(self):
-        """The window as a picture, out of the file in which the server keeps its screen (XWD)."""
+        """The window as a picture, from the file in which the server keeps its screen (XWD)."""
         data = self.shown.read_bytes()
         header = struct.unpack(">25I", data[:100])
         bits, line, colors = header[11], header[12], header[19]
@@ -392,7 +394,7 @@ class Window(ViewTest):
         return 320, 240, rows
 
     def still(self):
-        """The window as a picture, once it changes no more."""
+        """The window as a picture, once it stops changing."""
         seen = self.screenshot()
         while (now := self.screenshot()) != seen:
             seen = now
@@ -414,7 +416,7 @@ class Window(ViewTest):
         self.says("speed 0.25")
         self.key("equal", "equal")
         self.until(lambda: "speed" not in self.title())
-        # Steps, from the beginning.
+        # Single steps, from the beginning.
         self.key("BackSpace")
         self.says(r"- 0\.00 s")
         self.key("Right", "Right", "Right", "Right", "Right")
@@ -428,7 +430,7 @@ class Window(ViewTest):
         self.key("Return", "space")
         self.until(lambda: self.seconds() > 0.5 and "paused" not in self.title())
         self.close()
-        # It moves as in `simulate`, until its motor was switched off.
+        # It moves as in `simulate` until its motor is switched off.
         rows = self.rows()
         usual = list(csv.DictReader(self.succeed("simulate", FAST, "--seconds", 1).splitlines()))
         self.assertEqual(rows[:3], usual[:3])
@@ -445,7 +447,7 @@ class Window(ViewTest):
         self.says(r"- 0\.00 s")
 
         def is_drawn():
-            # Without smoothed edges, as it is drawn by a processor.
+            # The processor draws it without antialiasing.
             mean, share = difference(self.screenshot(), expected)
             return mean < 4 and share < 0.03
         self.until(is_drawn)
@@ -456,27 +458,27 @@ class Window(ViewTest):
         self.close()
 
     def test_mouse(self):
-        # Hanging at rest, with nothing that turns the motor.
+        # Hangs at rest; no motor acts.
         self.open("--csv", "seen.csv")
         self.key("space", "BackSpace")
         self.says(r"- 0\.00 s")
         before = self.screenshot()
         self.xdotool("mousemove", 160, 190, "click", "--repeat", 2, "--delay", 60, 1)
-        self.until(lambda: self.screenshot() != before)  # it is marked
+        self.until(lambda: self.screenshot() != before)  # the selection is marked
         self.xdotool("keydown", "ctrl", "mousedown", 3)
         for x in range(164, 230, 4):
             self.xdotool("mousemove", x, 186)
         self.key("Right", "Right", "Right", "Right", "Right")
         self.xdotool("mouseup", 3, "keyup", "ctrl")
         self.says(r"- 0\.10 s")
-        # Without ctrl the camera moves, and nothing else does.
+        # Without ctrl, only the camera moves.
         seen = self.screenshot()
         self.xdotool("mousemove", 100, 100, "mousedown", 1, "mousemove", 160, 110, "mouseup", 1)
         self.until(lambda: self.screenshot() != seen)
         self.close()
         rows = self.rows()
         self.assertEqual(float(rows[0]["qpos0"]), 0)
-        # To the right is against the angles' sense.
+        # A pull to the right is against the angles' direction.
         self.assertLess(float(rows[-1]["qpos0"]) + float(rows[-1]["qpos1"]), -1e-3)
 
     def test_several_policies_and_plants(self):

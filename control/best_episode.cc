@@ -16,16 +16,16 @@ namespace {
 
 constexpr int kReturnSteps = 500;
 static_assert(kReturnSteps * kControlPeriod == kReturnSeconds);
-/// Steps that are optimised: 6 s; upright is reached in less than half of it.
+/// Number of optimised steps: 6 s; upright is reached in less than half of them.
 constexpr int kPlannedSteps = 300;
-/// How smooth the reward is taken, one after the other.
+/// Smoothing widths of the reward, in the order of use.
 constexpr double kWidths[] = {0.3, 0.1, 0.05, 0.02, 0.01};
 constexpr double kSearchTolerance = 1e-6;
 constexpr int kSearchIterations = 150;
-constexpr int kChanges = 100;  // of single torques
+constexpr int kChanges = 100;  // largest number of changes of single torques
 
-/// Reward weights for which the return grows with the time upright. Small energy and height terms
-/// guide the search there.
+/// Reward weights with which the return grows with the time upright. Small energy and height terms
+/// guide the search.
 RewardWeights WeightsOf(Aim aim) {
   RewardWeights weights;
   if (aim == Aim::kTime) weights.weight = {0.02, 0.02, 1, 0, 0};

@@ -8,52 +8,53 @@
 #include "control/tvlqr.h"
 #include "core/progress.h"
 
-/// The best return and the least swing-up time of an episode that a search finds, knowing the plant
-/// and where it starts. Nothing says that there is no better: they bound the best return from below
-/// and the least time from above.
+/// Search for the best return and the shortest swing-up of an episode, with full knowledge of the
+/// plant and the start state. A better episode may exist: the results are a lower bound on the best
+/// return and an upper bound on the shortest time.
 namespace upswing {
 
-/// Torques from the start on; when they end, upright is near and the regulator holds.
+/// Torques of an episode from its start. After the last one, upright is near and the regulator
+/// holds.
 struct BestEpisode {
   StateVector start;
   std::vector<double> torques;  // N·m, one for each control period
   double reward_sum = 0;        // return, over the first kReturnSeconds
-  double swing_up_seconds = 0;  // start of the stretch that is inverted up to the end of those
+  double swing_up_seconds = 0;  // start of the final inverted stretch of the first kReturnSeconds
 };
 
-/// What a search is after.
+/// The objective of a search: the largest return or the shortest swing-up time.
 enum class Aim { kReturn, kTime };
 
-/// The torques (N·m) that a motor has, ascending; empty: any within its limit.
+/// The torques (N·m) that a motor can apply, ascending; empty: any torque within its limit.
 using TorqueTable = std::vector<double>;
 
-/// Finds episodes of one plant. By continuation: box-DDP on the regulator's cost from sine waves of
-/// many lengths, then on the reward itself, smooth at first and sharper each time (RewardCost). For
-/// a table of torques the result is rounded under feedback, and each step's torque is then changed
-/// as long as that helps.
+/// Finds episodes of one plant by continuation. First, box-DDP minimises the regulator's cost from
+/// sine waves of many lengths. Then it maximises the reward itself, smooth at first and sharper in
+/// each round (RewardCost). For a torque table, feedback rounds the result, and single torques are
+/// changed as long as that helps.
 class BestEpisodeSearch {
  public:
-  /// Searches from hanging with `guesses` sine waves, which `progress` counts. Throws as SolveLqr,
-  /// and BadInput if none swings up.
+  /// Searches from hanging with `guesses` sine waves; `progress` counts them. Throws as SolveLqr
+  /// does, and BadInput if no guess swings up.
   BestEpisodeSearch(const Plant& plant, int guesses, const Progress& progress);
 
-  /// Of an episode, the best for either aim.
+  /// The best episode found for each aim.
   struct Found {
     BestEpisode of_return, of_time;
   };
-  /// The best that is found of an episode from `start` with each of these tables, beginning with
-  /// what is best from hanging and its mirror image.
+  /// The best episodes found from `start`, one Found for each table. The search begins with the
+  /// best trajectory from hanging and its mirror image.
   std::vector<Found> From(const StateVector& start, std::span<const TorqueTable> tables);
 
-  /// The torque (N·m) of the table with which the regulator holds upright.
+  /// The torque (N·m) of the table that is nearest to the regulator's torque.
   double Hold(const StateVector& deviation, const TorqueTable& table) const;
 
   const Plant& plant() const { return plant_; }
 
  private:
-  /// A trajectory with a better return by these weights, from one that swings up.
+  /// Improves the return, by these weights, of a trajectory that swings up.
   Trajectory Sharpen(const Trajectory& trajectory, const RewardWeights& weights);
-  /// The episodes of some sequences of torques from one start.
+  /// Simulates one episode for each sequence of torques, all from one start.
   std::vector<BestEpisode> Judge(const StateVector& start,
                                  std::span<const std::vector<double>> torques,
                                  const TorqueTable& table, const RewardWeights& weights);
@@ -61,27 +62,27 @@ class BestEpisodeSearch {
                     const TorqueTable& table = {}, const RewardWeights& weights = {}) {
     return Judge(start, {&torques, 1}, table, weights)[0];
   }
-  /// The trajectory's episode with the torques of the table.
+  /// The trajectory's episode, rounded to the torques of the table.
   BestEpisode WithTable(const Trajectory& trajectory, const TorqueTable& table, Aim aim);
-  /// The nearest torques of the table, under feedback about the trajectory, up to the regulator's
-  /// region of attraction.
+  /// The table's torques nearest to the feedback about the trajectory, until the state is in the
+  /// regulator's region of attraction.
   std::vector<double> Round(const Trajectory& trajectory, const TorqueTable& table);
-  /// Changes one torque of the table at a time, at most a hundred times, while that makes a better
-  /// episode.
+  /// Changes one torque of the table at a time while that improves the episode, at most kChanges
+  /// times.
   BestEpisode Polish(BestEpisode episode, const TorqueTable& table, Aim aim);
   double Nearest(double torque, const TorqueTable& table) const;
 
   Plant plant_;
   LqrCatch upright_;
   TrajectoryOptimizer optimizer_;
-  Trajectory from_hanging_;                // with the best return
-  std::vector<Eigen::RowVector4d> gains_;  // K about it: u - K (x - x_t)
+  Trajectory from_hanging_;                // trajectory with the best return
+  std::vector<Eigen::RowVector4d> gains_;  // feedback K about it: u - K (x - x_t)
 };
 
-/// Acts as an episode says, then holds upright; for one environment.
+/// Replays an episode's torques, then holds upright; for one environment.
 class EpisodePolicy : public PendulumController {
  public:
-  /// `search` and `table` outlive it.
+  /// `search` and `table` must outlive the policy.
   EpisodePolicy(BestEpisode episode, const BestEpisodeSearch& search, const TorqueTable& table)
       : PendulumController("best-episode", Options(), search.plant()),
         episode_(std::move(episode)),

@@ -56,8 +56,9 @@ void ExpectSingleTorquesCannotMakeItBetter(const BestEpisode& best,
   }
 }
 
-/// The least time in which full torque, switched at most four times at multiples of 0.08 s, brings
-/// the plant from hanging to where the regulator catches it inverted: all 3,000 ways are tried.
+/// The shortest time in which bang-bang torque brings the plant from hanging to where the regulator
+/// catches it inverted. The torque switches at most four times, at multiples of 0.08 s; all 3,000
+/// ways are tried.
 double LeastBangBangSeconds(const Plant& plant, int last_step) {
   constexpr int kGrid = 4, kSwitches = 4;
   struct Branch {

@@ -30,7 +30,7 @@ StateVector UprightDeviation(const StateVector& x) {
 }
 
 StateVector UprightDeviation(std::span<const float> obs) {
-  // Of q1 - π both sine and cosine are the negatives of those of q1.
+  // Sine and cosine of q1 - π are the negatives of those of q1.
   const auto angle = [](double sine, double cosine) { return std::atan2(sine, cosine); };
   return {angle(-obs[1], -obs[0]), angle(obs[4], obs[3]), kMaxVelocity1 * obs[2],
           kMaxVelocity2 * obs[5]};

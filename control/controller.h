@@ -13,40 +13,40 @@
 
 namespace upswing {
 
-/// [q1 - π, q2, w1, w2], the angles in [-π, π], of a state and of what an observation of
-/// sim/double_pendulum.h tells.
+/// The deviation from upright [q1 - π, q2, w1, w2], angles in [-π, π], of a state or of an
+/// observation of sim/double_pendulum.h.
 StateVector UprightDeviation(const StateVector& x);
 StateVector UprightDeviation(std::span<const float> obs);
 
-/// x - y, the angles in [-π, π].
+/// x - y, with the angles in [-π, π].
 StateVector Difference(const StateVector& x, const StateVector& y);
 
-/// The state of a deviation from upright.
+/// The state with this deviation from upright.
 inline StateVector FromUpright(const StateVector& d) {
   return {std::numbers::pi + d[0], d[1], d[2], d[3]};
 }
 
-/// With four significant digits, such as 3.389.
+/// x with four significant digits, such as 3.389.
 std::string Rounded(double x);
 
-/// A policy of the double pendulum that is computed from the equations of motion of one plant.
+/// A policy of the double pendulum that is computed from one plant's equations of motion.
 class ComputedPolicy : public Policy {
  public:
   std::string kind() const override { return info_.agent; }
   int obs_size() const override { return kObservationSize; }
   int action_size() const override { return 1; }
   const PolicyInfo& info() const override { return info_; }
-  /// Throws BadInput: it is made anew each time.
+  /// Throws BadInput: a computed policy has no tensors, because each program computes it again.
   Tensors ToTensors() const override;
 
  protected:
-  /// `settings`: how it was made.
+  /// `settings` describes how the policy was computed.
   ComputedPolicy(const std::string& kind, const Options& settings, const Plant& plant);
 
   const Plant& plant() const { return plant_; }
-  /// Of other observations than those without memory, for parts that see more of them.
+  /// Sets the observation, for parts that see more than one without memory.
   void SetObservation(const ObservationInfo& observation) { info_.observation = observation; }
-  /// A torque (N·m) within the motor's limit.
+  /// A torque (N·m) cut at the motor's limit.
   double Limited(double u) const {
     return std::clamp(u, -plant_.torque_limit, plant_.torque_limit);
   }
@@ -56,8 +56,8 @@ class ComputedPolicy : public Policy {
   PolicyInfo info_;
 };
 
-/// One that sees the angles and velocities of an observation; energy and height do not matter to
-/// it.
+/// A computed policy that uses only the angles and velocities of an observation, not energy and
+/// height.
 class PendulumController : public ComputedPolicy {
  public:
   using ComputedPolicy::ComputedPolicy;
@@ -66,12 +66,12 @@ class PendulumController : public ComputedPolicy {
   void Act(Matrix<const float> obs, Matrix<double> action, Memory& memory) const override;
 
  private:
-  /// The torque (N·m) at a deviation from upright of environment `env` of those of `memory`; what
-  /// is beyond the motor's limit is cut.
+  /// The torque (N·m) at a deviation from upright, for environment `env` of `memory`. The caller
+  /// cuts it at the motor's limit.
   virtual double Torque(const StateVector& deviation, size_t env, Memory& memory) const = 0;
 };
 
-/// The settings of several structs together.
+/// Collects the settings of several structs.
 template <typename First, typename... Others>
 Options OptionsOfAll(const First& first, const Others&... others) {
   Options options = OptionsOf(first);
@@ -79,7 +79,7 @@ Options OptionsOfAll(const First& first, const Others&... others) {
   return options;
 }
 
-/// The Memory of a controller that remembers something of each environment.
+/// Memory of a controller that stores a Past for each environment.
 template <typename Past>
 struct MemoryOf : Policy::Memory {
   explicit MemoryOf(int num_envs, const Past& beginning)

@@ -5,7 +5,7 @@
 
 namespace upswing {
 
-/// The memory of the swing-up, and a plant to look ahead with.
+/// The swing-up's memory, and a plant to look ahead with.
 struct HybridPolicy::Parts : Memory {
   Parts(std::unique_ptr<Memory> memory, const Plant& plant)
       : swing_up(std::move(memory)), model(plant) {}

@@ -7,12 +7,12 @@
 
 namespace upswing {
 
-/// Swings up by one means, and holds upright with the linear-quadratic regulator wherever that
-/// catches (LqrCatch::Holds, asked anew at each decision).
+/// Swings up with another policy, and holds upright with the linear-quadratic regulator whenever
+/// that catches. Each decision asks LqrCatch::Holds again.
 class HybridPolicy : public ComputedPolicy {
  public:
-  /// `swing_up`: any policy of the double pendulum with one torque. `kind`, `settings`: what it is
-  /// called and how it was made. Throws as SolveLqr, and BadInput if it is none.
+  /// `swing_up`: any policy of the double pendulum with one torque. `kind`, `settings`: its name
+  /// and how it was made. Throws as SolveLqr does, and BadInput if `swing_up` is not such a policy.
   HybridPolicy(const std::string& kind, const Options& settings, const LqrConfig& lqr,
                std::shared_ptr<const Policy> swing_up, const Plant& plant);
 

@@ -5,8 +5,8 @@
 namespace upswing {
 
 LinearModel LinearizeUpright(const Manipulator& plant, int actuated_joint) {
-  // M q̈ = e u + G q - D q̇, e the motor's joint. With cos q2 = 1 nothing of M is lost; gravity,
-  // which pulls back hanging, pushes away; what is quadratic in the velocities has no part.
+  // M q̈ = e u + G q - D q̇, with e the motor's joint. M keeps all terms with cos q2 = 1. Gravity,
+  // which pulls back when hanging, pushes away here. Terms quadratic in the velocities vanish.
   Eigen::Matrix2d inverse, G, D;
   const auto [M11, M12, M22] = plant.Mass(1);
   inverse << M22, -M12, -M12, M11;
@@ -25,8 +25,8 @@ LinearModel LinearizeUpright(const Plant& plant) {
 }
 
 LinearModel Discretize(const LinearModel& continuous, double h, int steps) {
-  // Of [x, u] with u held, hence linear without an input. A Runge-Kutta step is then the beginning
-  // of the exponential's series: 1 + Z + Z²/2 + Z³/6 + Z⁴/24, with Z the system's matrix times h.
+  // [x, u] with u held is a linear system without an input. A Runge-Kutta step is then the start of
+  // the exponential series: 1 + Z + Z²/2 + Z³/6 + Z⁴/24, with Z the system's matrix times h.
   using Matrix5d = Eigen::Matrix<double, 5, 5>;
   const Matrix5d one = Matrix5d::Identity();
   Matrix5d Z = Matrix5d::Zero();

@@ -12,7 +12,7 @@
 namespace upswing {
 namespace {
 
-/// Where the closed form is after one control period of a deviation x from upright and a torque.
+/// The closed form's deviation after one control period from a deviation x and a torque.
 Eigen::Vector4d AfterOnePeriod(const Plant& plant, const Eigen::Vector4d& x, double tau) {
   ClosedFormBatch batch(1);
   batch.SetPlant(0, plant);
@@ -32,7 +32,7 @@ TEST(Linearize, IsTheJacobianOfTheClosedForm) {
     Plant plant = DrawPlant(rng);
     plant.actuated_joint = rng.Uniform() < 0.5 ? 1 : 2;
     const LinearModel model = OverOnePeriod(plant);
-    // Central differences: of third order in e, and rounding of 4e-16 over e.
+    // Central differences: the error is of third order in e, plus rounding of 4e-16 over e.
     constexpr double e = 1e-5;
     for (int k = 0; k < 4; ++k) {
       const Eigen::Vector4d dx = e * Eigen::Vector4d::Unit(k);
@@ -49,7 +49,7 @@ TEST(Linearize, IsTheJacobianOfTheClosedForm) {
 
 TEST(Linearize, EqualsAnotherDerivationHeldExactly) {
   // testdata/make_riccati.py has the equations in absolute angles and the matrix exponential. Four
-  // Runge-Kutta steps of 0.005 s leave out (0.005 A)⁵/120 and what follows.
+  // Runge-Kutta steps of 0.005 s omit (0.005 A)⁵/120 and higher terms.
   const RiccatiCase standard = SciPyCases().front();
   const LinearModel model = OverOnePeriod(Plant());
   EXPECT_NEAR((model.A - standard.model.A).cwiseAbs().maxCoeff(), 6.16e-8, 1e-10);
@@ -63,8 +63,8 @@ TEST(Linearize, ModesOfTheStandardPlant) {
   EXPECT_NEAR(modes.delta, -0.40195, 1e-5);
 }
 
-/// The standard plant with its motor at a joint, and the damping of the other one at which delta is
-/// 0, by bisection.
+/// The standard plant with its motor at `joint`. Bisection sets the damping of the other joint so
+/// that delta is 0.
 Plant UncontrollablePlant(int joint) {
   Plant plant;
   plant.actuated_joint = joint;
@@ -82,7 +82,7 @@ class Uncontrollable : public testing::TestWithParam<int> {};
 TEST_P(Uncontrollable, WhereDeltaIsZeroTheTorqueMovesNothingOfOneMode) {
   const Plant plant = UncontrollablePlant(GetParam());
   const LinearModel model = LinearizeUpright(plant);
-  // A left eigenvector of A for that mode, of which the torque moves nothing.
+  // A left eigenvector of A for this mode; the torque has no part in it.
   const EigenSolver solver(model.A.transpose());
   const double pole = ModesOf(plant).pole;
   int found = 0;

@@ -12,14 +12,14 @@
 namespace upswing {
 namespace {
 
-/// Why there is no solution, for the user.
+/// The error for the user, with the reason why there is no solution.
 Error NoGain(const LqrConfig& config, const Plant& plant) {
   const UprightModes modes = ModesOf(plant);
   if (std::max({config.q1, config.q2, config.w1, config.w2}) == 0) {
     return BadInput("lqr: expected a weight above 0 for q1, q2, w1 or w2, got only 0");
   }
-  // Where a Runge-Kutta step no longer decays: Hairer, Wanner, "Solving Ordinary Differential
-  // Equations II" (1996), section IV.2.
+  // Rate beyond which a Runge-Kutta step no longer decays: Hairer, Wanner, "Solving Ordinary
+  // Differential Equations II" (1996), section IV.2.
   constexpr double kLargestDecay = 2.785 / kPhysicsTimestep;
   if (modes.decay > kLargestDecay) {
     return BadInput(Concat("lqr: expected a plant whose damping decays at no more than ",

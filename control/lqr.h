@@ -7,21 +7,21 @@
 
 /// The linear-quadratic regulator about upright: Anderson, Moore, "Optimal Control: Linear
 /// Quadratic Methods" (1990); Tedrake, "Underactuated Robotics", chapter 8. It is the best
-/// controller of the linear model; of the pendulum it is one near upright, as long as the torque is
+/// controller of the linear model. It controls the pendulum near upright, as long as the torque is
 /// within its limit.
 namespace upswing {
 
-/// Q, diagonal.
+/// The diagonal matrix Q.
 Eigen::Matrix4d WeightsOf(const LqrConfig& config);
 
-/// Solves the problem for a plant and the control period. Throws BadInput if the plant cannot be
-/// stabilised by its motor, or if no gain that these weights make stabilises it.
+/// Solves the regulator problem for a plant and the control period. Throws BadInput if the plant's
+/// motor cannot stabilise it, or if no gain from these weights does.
 Lqr SolveLqr(const LqrConfig& config, const Plant& plant);
 
-/// u = -K x, at most the torque limit.
+/// The controller u = -K x, cut at the torque limit.
 class LqrPolicy : public PendulumController {
  public:
-  /// Throws as SolveLqr.
+  /// Throws as SolveLqr does.
   LqrPolicy(LqrConfig config, const Plant& plant);
 
   std::string description() const override;

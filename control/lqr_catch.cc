@@ -13,12 +13,12 @@
 namespace upswing {
 namespace {
 
-constexpr int kSamples = 512;      // states of an ellipsoid
-constexpr double kSettled = 1e-3;  // by which share of itself their cost has to have fallen
+constexpr int kSamples = 512;      // states on an ellipsoid
+constexpr double kSettled = 1e-3;  // settled: the cost has fallen to this share
 constexpr double kLargestLean = std::numbers::pi / 3;
 
-/// Control periods in which the cost falls to kSettled with the slowest mode of the regulator, half
-/// as many again, and at least 5 s.
+/// Control periods in which the regulator's slowest mode makes the cost fall to kSettled, times
+/// 1.5, and at least 5 s.
 int SettleSteps(const Lqr& lqr, const Plant& plant) {
   const LinearModel model = Discretize(LinearizeUpright(plant), kPhysicsTimestep, kPhysicsSteps);
   const double slowest = SpectralRadius(model.A - model.B * lqr.K);
@@ -26,7 +26,7 @@ int SettleSteps(const Lqr& lqr, const Plant& plant) {
       std::clamp(1.5 * std::log(kSettled) / (2 * std::log(slowest)), 250.0, 2000.0));
 }
 
-/// Points of the unit sphere in four dimensions.
+/// Random points on the unit sphere in four dimensions.
 std::vector<Eigen::Vector4d> Directions() {
   std::vector<Eigen::Vector4d> directions(kSamples);
   Rng rng(1, "directions");
@@ -67,8 +67,9 @@ double RegionOfAttraction(const Lqr& lqr, const Plant& plant) {
   const auto all_settle = [&](double level) {
     return AllSettle(lqr, level, directions, steps, model);
   };
-  // From the level up to which the torque is within its limit, max |K x| over x' P x = level being
-  // sqrt(level K P⁻¹ K'), by factors of 2 to where it changes, then by halves.
+  // The first level is the largest at which the torque stays within its limit: max |K x| over x' P
+  // x = level is sqrt(level K P⁻¹ K'). The search changes it by factors of 2 until the result
+  // changes, then bisects.
   double low = plant.torque_limit * plant.torque_limit / (lqr.K * shape).squaredNorm();
   int factors = 0;
   while (!all_settle(low)) {

@@ -22,8 +22,7 @@ constexpr double kPi = std::numbers::pi;
 
 using Deviation = std::array<double, 4>;  // x = [q1 - π, q2, w1, w2]
 
-/// Lets `torque(x)`, N·m, hold the pendulum for so many control periods from x; returns where it is
-/// then.
+/// Simulates `periods` control periods from x under `torque(x)`, N·m. Returns the final deviation.
 template <typename Torque>
 Deviation Simulate(const Plant& plant, const Deviation& x, int periods, const Torque& torque) {
   ClosedFormBatch batch(1);
@@ -40,7 +39,7 @@ double Size(const Deviation& x) {
   return std::hypot(std::hypot(x[0], x[1]), std::hypot(x[2], x[3]));
 }
 
-/// What the policy does in a state, N·m, as an environment would ask it.
+/// The policy's torque in a state, N·m, through an observation, as an environment asks for it.
 double TorqueOf(const LqrPolicy& policy, const Plant& plant, const PendulumState& state) {
   const auto obs = Observe(plant, state);
   double torque = std::numeric_limits<double>::quiet_NaN();
@@ -49,7 +48,7 @@ double TorqueOf(const LqrPolicy& policy, const Plant& plant, const PendulumState
   return torque;
 }
 
-/// A deviation of this size, in any direction.
+/// A random deviation of this size.
 Deviation Draw(Rng& rng, double size) {
   Deviation x;
   for (double& number : x) number = rng.Normal();
@@ -63,11 +62,11 @@ TEST(Lqr, HoldsThePendulumUpright) {
   const LqrPolicy policy(LqrConfig(), plant);
   Rng rng(1, "starts");
   for (int trial = 0; trial < 300; ++trial) {
-    // So small that the torque, about 125 N·m a radian, stays within its 5 N·m.
+    // Small enough that the torque, about 125 N·m per radian, stays within its 5 N·m.
     const Deviation start = Draw(rng, 0.01);
     const auto torque = [&](const PendulumState& state) { return TorqueOf(policy, plant, state); };
-    // Its slowest mode shrinks by 0.933 a period, to 1e-15 in 10 s; observations in single
-    // precision leave some 1e-7.
+    // The slowest mode shrinks by 0.933 per period, to 1e-15 in 10 s. Single-precision observations
+    // leave some 1e-7.
     EXPECT_LT(Size(Simulate(plant, start, 500, torque)), 1e-5);
   }
 }
@@ -83,7 +82,7 @@ TEST(Lqr, OtherGainsDoNotHoldIt) {
   EXPECT_LT(after(1), 1e-8);
   EXPECT_GT(after(0), 0.01);
   EXPECT_GT(after(0.4), 0.01);
-  EXPECT_FALSE(after(-1) < 0.01);  // of the wrong sign: not even finite
+  EXPECT_FALSE(after(-1) < 0.01);  // a gain of the wrong sign: the result is not even finite
 }
 
 TEST(Lqr, TorqueByHand) {
@@ -169,7 +168,7 @@ TEST(Lqr, ValueIsTheCostOfARollout) {
 
 TEST(Lqr, GainOfTheStandardPlant) {
   const Lqr lqr = SolveLqr(LqrConfig(), Plant());
-  const RiccatiCase scipy = SciPyCases().front();  // held exactly instead of by Runge-Kutta steps
+  const RiccatiCase scipy = SciPyCases().front();  // exact hold instead of Runge-Kutta steps
   for (size_t i = 0; i < 4; ++i) {
     for (size_t j = 0; j < 4; ++j) {
       const double P = scipy.P(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
@@ -253,7 +252,7 @@ TEST(Lqr, RefusesWeightsOfNothing) {
 }
 
 TEST(Lqr, EveryPlantIsHeldOrRefused) {
-  // Over the whole ranges of the settings.
+  // The settings are drawn from their whole ranges.
   Rng rng(5, "plants");
   int held = 0;
   for (int trial = 0; trial < 2000; ++trial) {

@@ -9,13 +9,13 @@
 namespace upswing {
 namespace {
 
-/// Iterations of an episode's first plan, which has none to begin with.
+/// Iterations for the first plan of an episode, which has no previous plan.
 constexpr int kFirstIterations = 100;
-constexpr double kTolerance = 1e-6;  // of the cost, in an iteration
+constexpr double kTolerance = 1e-6;  // relative gain of an iteration
 
 }  // namespace
 
-/// The plans of some environments, and what improves one after the other.
+/// The plans of some environments, and one optimiser for all of them.
 struct MpcPolicy::Plans : Memory {
   Plans(int num_envs, const Plant& plant)
       : plans(static_cast<size_t>(num_envs)), optimizer(plant) {}
@@ -53,18 +53,18 @@ double MpcPolicy::Torque(const StateVector& deviation, size_t env, Memory& memor
   if (first) {
     trajectory = optimizer.Follow(cost_, x, std::vector<double>(T, 0.0));
   } else {
-    // The rest of the plan, and a last torque as the regulator would choose it.
+    // Shift the plan by one step; the regulator chooses the new last torque.
     const StateVector last = UprightDeviation(trajectory.x.back());
     trajectory.x.erase(trajectory.x.begin());
     trajectory.u.erase(trajectory.u.begin());
     K.erase(K.begin());
     trajectory.u.push_back(lqr_.Torque(last));
     K.push_back(-lqr_.K);
-    // Angles count from where the plan has them.
+    // Count full turns as the plan does.
     x = trajectory.x[0] + Difference(x, trajectory.x[0]);
     trajectory = optimizer.Follow(cost_, x, trajectory, K);
   }
-  // What the regulator would do, where that is better.
+  // Take the regulator's own trajectory if it costs less.
   const Trajectory upright{std::vector<StateVector>(T + 1, x - UprightDeviation(x)),
                            std::vector<double>(T, 0.0), 0};
   Trajectory regulated =

@@ -9,13 +9,12 @@
 
 namespace upswing {
 
-/// Model predictive control by trajectory optimisation: each decision improves the plan of the one
-/// before, from where the pendulum is now, and takes its first torque. Tassa, Erez, Todorov,
-/// "Synthesis and stabilization of complex behaviors through online trajectory optimization"
-/// (IROS 2012).
+/// Model predictive control by trajectory optimisation. Each decision improves the previous plan
+/// from the present state, and applies the plan's first torque. Tassa, Erez, Todorov, "Synthesis
+/// and stabilization of complex behaviors through online trajectory optimization" (IROS 2012).
 class MpcPolicy : public PendulumController {
  public:
-  /// Throws as SolveLqr.
+  /// Throws as SolveLqr does.
   MpcPolicy(LqrConfig lqr, MpcConfig config, const Plant& plant);
 
   std::string description() const override;

@@ -3,10 +3,10 @@
 namespace upswing {
 namespace {
 
-/// Steps of the differences, rad, rad/s and N·m: the error of a central difference, of the order of
-/// its square, and that of rounding, of the order of 1e-16 over it, are about equal.
+/// Step of the central differences, rad, rad/s and N·m. Truncation, of the order of its square, and
+/// rounding, of the order of 1e-16 over it, are about equal.
 constexpr double kDifference = 1e-5;
-/// A point is perturbed in either direction of four states and a torque.
+/// Perturbations of a point: both directions of four states and a torque.
 constexpr size_t kPerturbed = 10;
 
 void Set(ClosedFormBatch& batch, size_t i, const StateVector& x, double u) {
@@ -29,7 +29,7 @@ void PendulumModel::Reserve(ClosedFormBatch& batch, size_t n) const {
 void PendulumModel::Step(std::span<StateVector> x, std::span<const double> u) {
   Reserve(few_, x.size());
   for (size_t i = 0; i < x.size(); ++i) Set(few_, i, x[i], u[i]);
-  Advance(few_, kPhysicsSteps, 0, x.size());  // and what else is in their last vector
+  Advance(few_, kPhysicsSteps, 0, x.size());  // Advance also steps the padding of the last vector
   for (size_t i = 0; i < x.size(); ++i) x[i] = Get(few_, i);
 }
 

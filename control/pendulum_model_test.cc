@@ -15,13 +15,13 @@ StateVector DrawState(Rng& rng) {
   return {rng.Uniform(-4, 4), rng.Uniform(-4, 4), rng.Uniform(-8, 8), rng.Uniform(-12, 12)};
 }
 
-/// ẋ by the equations of motion.
+/// ẋ from the equations of motion.
 StateVector Derivative(const Manipulator& plant, const StateVector& x, double u) {
   const auto a = plant.Acceleration(StateOf(x), {u, 0});
   return {x[2], x[3], a[0], a[1]};
 }
 
-/// One control period by textbook Runge-Kutta steps.
+/// One control period, by textbook Runge-Kutta steps.
 StateVector Stepped(const Manipulator& plant, StateVector x, double u) {
   for (int step = 0; step < kPhysicsSteps; ++step) {
     constexpr double h = kPhysicsTimestep;
@@ -42,7 +42,7 @@ TEST(PendulumModel, StepsAsTheEquationsOfMotionSay) {
     std::vector<double> u;
     for (int i = 0; i < 7; ++i) {
       x.push_back(DrawState(rng));
-      u.push_back(rng.Uniform(-20, 20));  // limits do not matter
+      u.push_back(rng.Uniform(-20, 20));  // the model ignores the torque limit
     }
     std::vector<StateVector> after = x;
     model.Step(after, u);
@@ -66,7 +66,7 @@ TEST(PendulumModel, DerivativesAreThoseOfTheSteps) {
   }
   std::vector<LinearModel> models(x.size());
   model.Linearize(x, u, models);
-  // Of fourth order, with other steps: (8 (f(e) - f(-e)) - (f(2e) - f(-2e))) / 12e.
+  // Fourth-order differences with another step: (8 (f(e) - f(-e)) - (f(2e) - f(-2e))) / 12e.
   constexpr double e = 1e-3;
   for (size_t i = 0; i < x.size(); ++i) {
     const auto derivative = [&](const StateVector& dx, double du) -> StateVector {

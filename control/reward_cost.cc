@@ -26,7 +26,7 @@ double RewardCost::Running(const StateVector& x, double u) const {
 }
 
 CostExpansion RewardCost::ExpandRunning(const StateVector& x, double u) const {
-  // Central differences of the state; the cost is quadratic in the torque.
+  // Central differences over the state; the cost is quadratic in the torque.
   constexpr double e = 1e-4;
   CostExpansion l;
   const double here = Running(x, u);

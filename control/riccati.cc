@@ -1,4 +1,4 @@
-// The symbols are those of Chu, Fan, Lin, Wang (2004): A, G, H of each doubling.
+// Symbols A, G, H of each doubling as in Chu, Fan, Lin, Wang (2004).
 #include "control/riccati.h"
 
 #include <cmath>
@@ -11,11 +11,11 @@ using Eigen::Matrix4d;
 using Eigen::Vector4d;
 
 constexpr int kMostDoublings = 60;         // k of them span 2^k control steps
-constexpr double kLargestResidual = 1e-6;  // beyond it rounding has eaten the solution
+constexpr double kLargestResidual = 1e-6;  // above it, rounding has ruined the solution
 
 Matrix4d Symmetric(const Matrix4d& X) { return (X + X.transpose()) / 2; }
 
-/// W⁻¹ X, by Gauss's elimination with partial pivoting.
+/// W⁻¹ X, by Gaussian elimination with partial pivoting.
 Matrix4d Solve(Matrix4d W, Matrix4d X) {
   for (int k = 0; k < 4; ++k) {
     int pivot = k;
@@ -37,8 +37,8 @@ Matrix4d Solve(Matrix4d W, Matrix4d X) {
   return X;
 }
 
-/// The limit of H, nothing if there is none. After k doublings H is the least cost of 2^k steps,
-/// without a cost of their end.
+/// The limit of H, or nothing if there is none. After k doublings, H is the smallest cost of 2^k
+/// steps without a final cost.
 std::optional<Matrix4d> Doubled(Matrix4d A, Matrix4d G, Matrix4d H) {
   for (int k = 0; k < kMostDoublings; ++k) {
     const Matrix4d W = Matrix4d::Identity() + G * H;
@@ -69,7 +69,7 @@ std::optional<Lqr> SolveDiscreteLqr(const LinearModel& model, const Matrix4d& Q,
 std::optional<Lqr> SolveContinuousLqr(const LinearModel& model, const Matrix4d& Q, double R) {
   const auto& [A, B] = model;
   const Matrix4d I = Matrix4d::Identity(), G = B * B.transpose() / R;
-  const double gamma = A.norm();  // beyond all eigenvalues of A
+  const double gamma = A.norm();  // larger than all eigenvalues of A
   const Matrix4d inverse = Solve(A - gamma * I, I);
   const Matrix4d W = (A - gamma * I).transpose() + Q * inverse * G;
   const Matrix4d W_inverse = Solve(W, I);
@@ -84,8 +84,9 @@ std::optional<Lqr> SolveContinuousLqr(const LinearModel& model, const Matrix4d& 
 }
 
 double SpectralRadius(const Matrix4d& A) {
-  // Gelfand's formula, ‖Aⁿ‖^(1/n) with n = 2^k. Sizes are taken out and summed as logarithms.
-  constexpr int kSquarings = 55;  // beyond them 1/n is less than a rounding
+  // Gelfand's formula, ‖Aⁿ‖^(1/n) with n = 2^k. Each squaring divides the power by its norm and
+  // sums the norms' logarithms.
+  constexpr int kSquarings = 55;  // after these, 1/n is below the rounding error
   Matrix4d power = A;
   double logarithm = 0, share = 1;
   for (int k = 0; k < kSquarings; ++k, share /= 2) {
@@ -118,7 +119,7 @@ SymmetricModes SymmetricModesOf(Matrix4d S) {
         rotate(S.col(p), S.col(q));
         rotate(S.row(p).transpose(), S.row(q).transpose());
         rotate(V.col(p), V.col(q));
-        S(p, q) = S(q, p) = 0;  // without what rounding leaves
+        S(p, q) = S(q, p) = 0;  // drop the rounding error
         rotated = true;
       }
     }

@@ -4,46 +4,46 @@
 #include <algorithm>
 #include <optional>
 
-/// Linear-quadratic regulators of four states and one input by algebraic Riccati equations.
+/// Linear-quadratic regulators with four states and one input, by algebraic Riccati equations.
 namespace upswing {
 
-/// ẋ = A x + B u, or x⁺ = A x + B u over one control period.
+/// A linear model: ẋ = A x + B u, or x⁺ = A x + B u over one control period.
 struct LinearModel {
   Eigen::Matrix4d A;
   Eigen::Vector4d B;
 };
 
-/// The regulator u = -K x and its least cost x' P x.
+/// The regulator u = -K x and its smallest cost x' P x.
 struct Lqr {
   Eigen::RowVector4d K;  // N·m/rad and N·m·s/rad
   Eigen::Matrix4d P;
 
-  /// u (N·m) of a deviation x from upright.
+  /// u (N·m) for a deviation x from upright.
   double Torque(const Eigen::Vector4d& x) const { return -K.dot(x); }
-  /// The torque within ±limit.
+  /// u (N·m) for a deviation x from upright, within ±limit.
   double Torque(const Eigen::Vector4d& x, double limit) const {
     return std::clamp(Torque(x), -limit, limit);
   }
-  /// The least cost from x on.
+  /// The smallest cost from x on.
   double Cost(const Eigen::Vector4d& x) const { return x.dot(P * x); }
 };
 
-/// Minimises Σ x' Q x + R u² of x⁺ = A x + B u, Q ≥ 0 and symmetric, R > 0:
+/// Minimises Σ x' Q x + R u² of x⁺ = A x + B u, with Q ≥ 0 and symmetric, R > 0:
 ///   P = Q + A' P A - A' P B (R + B' P B)⁻¹ B' P A
-/// by structure-preserving doubling: Chu, Fan, Lin, Wang, "Structure-preserving algorithms for
-/// periodic discrete-time algebraic Riccati equations", International Journal of Control 77 (2004),
-/// algorithm 2.1. Nothing where there is no solution: (A, B) cannot be stabilised, or Q does not
-/// see every mode that has to be.
+/// Method: structure-preserving doubling of Chu, Fan, Lin, Wang, "Structure-preserving algorithms
+/// for periodic discrete-time algebraic Riccati equations", International Journal of Control 77
+/// (2004), algorithm 2.1. Returns nothing if there is no solution: (A, B) cannot be stabilised, or
+/// Q gives no cost to a mode that has to be stabilised.
 std::optional<Lqr> SolveDiscreteLqr(const LinearModel& model, const Eigen::Matrix4d& Q, double R);
 
 /// Minimises ∫ x' Q x + R u² dt of ẋ = A x + B u:
 ///   A' P + P A - P B R⁻¹ B' P + Q = 0
-/// by the same doubling after a Cayley transform: Chu, Fan, Lin, "A structure-preserving doubling
-/// algorithm for continuous-time algebraic Riccati equations", Linear Algebra and its Applications
-/// 396 (2005). Nothing where there is no solution.
+/// Method: a Cayley transform, then doubling as in SolveDiscreteLqr. Chu, Fan, Lin, "A
+/// structure-preserving doubling algorithm for continuous-time algebraic Riccati equations", Linear
+/// Algebra and its Applications 396 (2005). Returns nothing if there is no solution.
 std::optional<Lqr> SolveContinuousLqr(const LinearModel& model, const Eigen::Matrix4d& Q, double R);
 
-/// Largest |eigenvalue|: x⁺ = A x decays where it is below 1. NaN if A is not finite.
+/// Largest |eigenvalue|: x⁺ = A x decays if it is below 1. NaN if A is not finite.
 double SpectralRadius(const Eigen::Matrix4d& A);
 
 /// The modes of a symmetric matrix S = V diag(values) V', V orthogonal.
@@ -51,7 +51,8 @@ struct SymmetricModes {
   Eigen::Matrix4d V;
   Eigen::Vector4d values;
 };
-/// By cyclic Jacobi rotations: Golub, Van Loan, "Matrix Computations" (2013), section 8.5.
+/// Modes of S by cyclic Jacobi rotations: Golub, Van Loan, "Matrix Computations" (2013), section
+/// 8.5.
 SymmetricModes SymmetricModesOf(Eigen::Matrix4d S);
 
 }  // namespace upswing

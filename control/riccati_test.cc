@@ -22,7 +22,7 @@ Matrix4d Drawn(Rng& rng) {
   return A;
 }
 
-/// A system of two states, and two that are 0.
+/// A system with two states, padded with two zero states.
 LinearModel Two(double a11, double a12, double a21, double a22, double b1, double b2) {
   LinearModel model{Matrix4d::Zero(), {b1, b2, 0, 0}};
   model.A.topLeftCorner<2, 2>() << a11, a12, a21, a22;
@@ -46,7 +46,7 @@ TEST(Riccati, EqualsSciPy) {
 TEST(Riccati, EqualsTheRecursionOfLongerAndLongerHorizons) {
   const RiccatiCase c = SciPyCases().front();
   const auto& [A, B] = c.model;
-  Matrix4d P = c.Q;  // of one step; 4,096 more are as good as infinitely many
+  Matrix4d P = c.Q;  // cost of one step; 4,096 more are practically infinitely many
   for (int step = 0; step < 4096; ++step) {
     const Eigen::RowVector4d K = B.transpose() * P * A / (c.R + B.dot(P * B));
     P = (c.Q + A.transpose() * P * (A - B * K)).eval();
@@ -65,8 +65,8 @@ TEST(Riccati, OneStateByHand) {
 }
 
 TEST(Riccati, ContinuousSolutionIsThatOfTheStableSubspace) {
-  // P = Y X⁻¹ of the stable eigenvectors [X; Y] of the Hamiltonian matrix: Laub, "A Schur method
-  // for solving algebraic Riccati equations" (1979), with eigenvectors in place of Schur's.
+  // P = Y X⁻¹ from the stable eigenvectors [X; Y] of the Hamiltonian matrix: Laub, "A Schur method
+  // for solving algebraic Riccati equations" (1979), with eigenvectors instead of Schur vectors.
   Rng rng(1, "systems");
   for (int trial = 0; trial < 100; ++trial) {
     const LinearModel model{3 * Drawn(rng),
@@ -100,7 +100,7 @@ TEST(Riccati, NoSolutionWhereAGrowingModeCannotBeReached) {
 TEST(Riccati, NoSolutionWhereAGrowingModeCostsNothing) {
   const LinearModel model = Two(1.1, 0, 0, 0.5, 1, 1);
   Matrix4d Q = Vector4d(0, 1, 0, 0).asDiagonal();
-  EXPECT_FALSE(SolveDiscreteLqr(model, Q, 1).has_value());  // the least cost is that of u = 0
+  EXPECT_FALSE(SolveDiscreteLqr(model, Q, 1).has_value());  // the cheapest control is u = 0
   Q(0, 0) = 1e-6;
   EXPECT_TRUE(SolveDiscreteLqr(model, Q, 1).has_value());
 }

@@ -7,7 +7,7 @@ namespace upswing {
 void LqrConfig::Describe(Options& o) {
   constexpr Range kWeight{0, 1e9};
   o.Section("lqr");
-  // The weights of Tedrake's acrobot.
+  // Weights from Tedrake's acrobot.
   o.Add(&q1, "lqr_q1", kWeight, "1/rad²", "LQR weight of q1, the angle of link 1 from upright");
   o.Add(&q2, "lqr_q2", kWeight, "1/rad²", "LQR weight of q2, the angle of link 2 to link 1");
   o.Add(&w1, "lqr_w1", kWeight, "s²/rad²", "LQR weight of w1, the velocity of q1");
@@ -31,7 +31,7 @@ void SwingUpConfig::Describe(Options& o) {
 }
 
 void EnergyShapingConfig::Describe(Options& o) {
-  // The best of 1,900 random choices: most starts swing up with the standard motor.
+  // The best of 1,900 random settings: with the standard motor, most starts swing up.
   o.Section("energy");
   o.Add(&kE, "energy_ke", kNotNegative, "1/(J²·s)",
         "weight of the squared energy error in the Lyapunov function");
@@ -41,7 +41,7 @@ void EnergyShapingConfig::Describe(Options& o) {
 }
 
 void PartialFeedbackConfig::Describe(Options& o) {
-  // The best of 800 random choices.
+  // The best of 800 random settings.
   o.Section("pfl");
   o.Add(&kP, "pfl_kp", kNotNegative, "1/s²", "gain of q1, the angle of link 1 from upright");
   o.Add(&kD, "pfl_kd", kNotNegative, "1/s", "gain of w1, the velocity of q1");

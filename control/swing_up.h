@@ -8,26 +8,26 @@
 #include "control/settings.h"
 #include "sim/manipulator.h"
 
-/// Swing-up by laws of a formula each. They know nothing of the motor's limit; LQR catches what
-/// they bring up (control/hybrid.h).
+/// Swing-up laws, each a formula. They ignore the motor's limit; control/hybrid.h catches the
+/// pendulum with LQR once they have brought it near upright.
 namespace upswing {
 
-/// Drives energy E to that of rest upright and link 1 to upright, so that link 2 swings through
-/// upright again and again: Fantoni, Lozano, Spong, "Energy based control of the Pendubot", IEEE
+/// Drives the energy E to that of rest upright and link 1 to upright, so that link 2 swings through
+/// upright again and again. Fantoni, Lozano, Spong, "Energy based control of the Pendubot", IEEE
 /// Transactions on Automatic Control 45 (2000). For V = kE E²/2 + kD w1²/2 + kP q̃1²/2, without
-/// damping, the torque makes dV/dt = -w1². Its denominator is never 0 only where kD is large
-/// against kE; the standard gains, for a weak motor, pass through 0 on the way up, where the torque
+/// damping, the torque makes dV/dt = -w1². The torque's denominator avoids 0 only if kD is large
+/// against kE. The standard gains, for a weak motor, pass through 0 on the way up; there the torque
 /// is at its limit and changes sign.
 double EnergyShapingTorque(const EnergyShapingConfig& config, const Manipulator& plant,
                            const StateVector& deviation);
 
 /// Makes q̈1 = -kP q̃1 - kD w1 - kE E w1 by collocated partial feedback linearisation: Spong,
-/// "Partial feedback linearization of underactuated mechanical systems" (IROS 1994). The last term,
-/// ours, pumps energy.
+/// "Partial feedback linearization of underactuated mechanical systems" (IROS 1994). The last term
+/// is our addition and pumps energy.
 double PartialFeedbackTorque(const PartialFeedbackConfig& config, const Manipulator& plant,
                              const StateVector& deviation);
 
-/// Swing-up by a law: a torque for each deviation from upright.
+/// Swing-up by a law that gives a torque for each deviation from upright.
 class LawPolicy : public PendulumController {
  public:
   using Law = std::function<double(const StateVector& deviation)>;

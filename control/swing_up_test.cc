@@ -43,7 +43,7 @@ TEST(SwingUp, EnergyShapingLetsTheFunctionOfLyapunovFall) {
   for (int trial = 0; trial < 200; ++trial) {
     const StateVector d = DrawDeviation(rng), x = FromUpright(d);
     const double u = EnergyShapingTorque(config, plant, d);
-    if (std::abs(u) > 100) continue;  // near the torque's pole
+    if (std::abs(u) > 100) continue;  // near the pole of the torque
     const Eigen::Vector2d a = Acceleration(plant, x, u);
     const StateVector rate(x[2], x[3], a[0], a[1]);
     constexpr double e = 1e-6;

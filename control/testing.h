@@ -13,15 +13,15 @@
 #include "core/rng.h"
 #include "sim/double_pendulum.h"
 
-/// What tests of controllers share.
+/// Helpers that the tests of controllers share.
 namespace upswing {
 
-/// Eigenvalues and eigenvectors. Of matrices of any size, as fixed sizes take twice as long to
+/// Eigenvalues and eigenvectors. Uses dynamic sizes, because fixed sizes take twice as long to
 /// compile.
 using EigenSolver = Eigen::EigenSolver<Eigen::MatrixXd>;
 using SymmetricEigenSolver = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>;
 
-/// A plant within half of the standard one's parameters, with the motor at joint 1.
+/// A random plant within 50% of the standard plant's parameters, with the motor at joint 1.
 inline Plant DrawPlant(Rng& rng) {
   Plant plant;
   const Options options = OptionsOf(plant);
@@ -32,7 +32,7 @@ inline Plant DrawPlant(Rng& rng) {
   return plant;
 }
 
-/// A problem of control/riccati.h, and what SciPy says of it (testdata/make_riccati.py).
+/// A problem of control/riccati.h with SciPy's solution (testdata/make_riccati.py).
 struct RiccatiCase {
   std::string name;
   LinearModel model;
@@ -42,7 +42,7 @@ struct RiccatiCase {
   double spectral_radius;  // of A - B K
 };
 
-/// A matrix of at most four rows and columns, with zeros around it.
+/// A matrix of at most four rows and columns, padded with zeros.
 inline Eigen::Matrix4d MatrixOf(const nlohmann::json& rows) {
   Eigen::Matrix4d matrix = Eigen::Matrix4d::Zero();
   for (size_t i = 0; i < rows.size(); ++i) {
@@ -58,8 +58,8 @@ inline nlohmann::json TestData(const char* name) {
   return nlohmann::json::parse(std::ifstream(folder / "testdata" / name));
 }
 
-/// All cases of one input and at most four states; those of the pendulum first, and the standard
-/// one first of all.
+/// All cases with one input and at most four states. The pendulum's cases come first, and among
+/// them the standard plant.
 inline std::vector<RiccatiCase> SciPyCases() {
   std::vector<RiccatiCase> cases;
   const nlohmann::json file = TestData("riccati.json");

@@ -1,5 +1,5 @@
-// Symbols as in the paper: l cost, V least cost to come, Q cost of a step and what comes after; a
-// subscript is a derivative. k and K change the torque: u + k + K (x̂ - x).
+// Symbols as in the paper: l cost, V smallest cost to come, Q cost of a step plus the cost to come;
+// a subscript is a derivative. k and K change the torque to u + k + K (x̂ - x).
 #include "control/trajectory.h"
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 namespace upswing {
 namespace {
 
-/// Regularisation: least, first and largest, and by how much it changes at a time.
+/// Regularisation: smallest, first and largest value, and the factor of a change.
 constexpr double kLeast = 1e-6, kFirst = 1e-3, kLargest = 1e10, kFactor = 4;
 
 double Form(const Eigen::Matrix4d& Q, const StateVector& x) { return x.dot(Q * x); }
@@ -119,7 +119,7 @@ bool TrajectoryOptimizer::Backward(const TrajectoryCost& cost, const Trajectory&
     const Eigen::Matrix4d Qxx = l.xx + A.transpose() * VA;
     const Eigen::RowVector4d Qux = B.transpose() * VA;
     const double Quu = l.uu + B.dot(Vxx * B);
-    // As if to change the torque, and the state that it leads to, cost a little more.
+    // Regularisation acts like an extra cost on changing the torque and the state that follows.
     const double curvature = Quu + regularization * (1 + B.squaredNorm());
     const Eigen::RowVector4d change = Qux + regularization * B.transpose() * A;
     if (!(curvature > 0)) return false;
@@ -145,7 +145,7 @@ bool TrajectoryOptimizer::Forward(const TrajectoryCost& cost, Trajectory& trajec
     StateVector* const x = trial_x_.data() + t * kTrials;
     double* const u = trial_u_.data() + t * kTrials;
     for (int trial = 0; trial < kTrials; ++trial) {
-      const double share = std::pow(1.1, -trial * trial);  // 1 to 5e-10
+      const double share = std::pow(1.1, -trial * trial);  // from 1 to 5e-10
       const double change = share * k_[t] + K_[t].dot(x[trial] - trajectory.x[t]);
       u[trial] = std::clamp(trajectory.u[t] + change, -limit, limit);
       costs[static_cast<size_t>(trial)] += cost.Running(x[trial], u[trial]);

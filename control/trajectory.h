@@ -6,10 +6,10 @@
 
 #include "control/pendulum_model.h"
 
-/// Trajectory optimisation with a limited torque: differential dynamic programming with boxes,
-/// Tassa, Mansard, Todorov, "Control-limited differential dynamic programming" (ICRA 2014). Of the
-/// dynamics the first derivatives are taken, as in the iterative linear-quadratic regulator (Li,
-/// Todorov 2004). One motor makes the box an interval, whose best point is known at once.
+/// Trajectory optimisation with a limited torque, by differential dynamic programming with boxes:
+/// Tassa, Mansard, Todorov, "Control-limited differential dynamic programming" (ICRA 2014). It uses
+/// only first derivatives of the dynamics, as the iterative linear-quadratic regulator does (Li,
+/// Todorov 2004). With one motor the box is an interval, and its best point has a formula.
 namespace upswing {
 
 /// States x_0 … x_T under torques u_0 … u_{T-1} (N·m), one for each control period.
@@ -21,15 +21,15 @@ struct Trajectory {
   int steps() const { return static_cast<int>(u.size()); }  // T
 };
 
-/// A cost to second order about a state and a torque.
+/// A cost expanded to second order about a state and a torque.
 struct CostExpansion {
   StateVector x = StateVector::Zero();           // first derivatives
   double u = 0;                                  //
-  Eigen::Matrix4d xx = Eigen::Matrix4d::Zero();  // second derivatives; xx may not curve down
+  Eigen::Matrix4d xx = Eigen::Matrix4d::Zero();  // second derivatives; xx ≥ 0
   double uu = 0;                                 //
 };
 
-/// What is minimised: Σ Running(x_t, u_t) + Final(x_T).
+/// The minimised cost: Σ Running(x_t, u_t) + Final(x_T).
 class TrajectoryCost {
  public:
   virtual ~TrajectoryCost() = default;
@@ -37,12 +37,12 @@ class TrajectoryCost {
   virtual double Running(const StateVector& x, double u) const = 0;
   virtual double Final(const StateVector& x) const = 0;
   virtual CostExpansion ExpandRunning(const StateVector& x, double u) const = 0;
-  /// Of the state alone.
+  /// Expands the final cost, which depends only on the state.
   virtual CostExpansion ExpandFinal(const StateVector& x) const = 0;
 };
 
-/// d' Q d + R u² and at the end d' P d, where d is the deviation from upright, its angles in
-/// [-π, π].
+/// The cost d' Q d + R u² of each step and d' P d at the end, where d is the deviation from upright
+/// with angles in [-π, π].
 class QuadraticCost : public TrajectoryCost {
  public:
   QuadraticCost(const Eigen::Matrix4d& Q, double R, const Eigen::Matrix4d& P)
@@ -59,44 +59,44 @@ class QuadraticCost : public TrajectoryCost {
   Eigen::Matrix4d P_;
 };
 
-/// Finds locally best torques within the plant's limit. Keeps its buffers: one object serves many
-/// problems of one plant, one after the other.
+/// Finds locally best torques within the plant's limit. It keeps its buffers, so one object serves
+/// many problems of one plant, one after the other.
 class TrajectoryOptimizer {
  public:
   explicit TrajectoryOptimizer(const Plant& plant) : model_(plant) {}
 
-  /// Where torques (T), N·m, cut at the limit, lead from `start`, and at what cost.
+  /// The trajectory from `start` under torques (T), N·m, cut at the limit, and its cost.
   Trajectory Follow(const TrajectoryCost& cost, const StateVector& start,
                     const std::vector<double>& torques);
 
-  /// The same torques with feedback K (T) about `planned`, from another start.
+  /// The trajectory from `start` under the torques of `planned` with feedback K (T) about it.
   Trajectory Follow(const TrajectoryCost& cost, const StateVector& start, const Trajectory& planned,
                     std::span<const Eigen::RowVector4d> K);
 
-  /// The same trajectory with what it costs.
+  /// The trajectory with its cost filled in.
   static Trajectory Priced(const TrajectoryCost& cost, Trajectory trajectory);
 
-  /// Improves a trajectory with its cost until an iteration gains less than `tolerance` times
-  /// the cost, at most so many times. Returns the number of iterations.
+  /// Improves a trajectory with its cost. Stops when an iteration gains less than `tolerance` times
+  /// the cost, or after `iterations`. Returns the number of iterations.
   int Improve(const TrajectoryCost& cost, double tolerance, int iterations, Trajectory& trajectory);
 
-  /// Feedback about the trajectory of the last iteration, (T): u = u_t + K_t (x - x_t). Where the
-  /// torque is at its limit and would go beyond, it is 0.
+  /// Feedback (T) about the trajectory of the last iteration: u = u_t + K_t (x - x_t). K_t is 0
+  /// where the best torque lies beyond the limit.
   const std::vector<Eigen::RowVector4d>& gains() const { return K_; }
 
   PendulumModel& model() { return model_; }
 
  private:
-  /// Steps to try along the improvement, longest first; all are simulated at once.
+  /// Number of step sizes tried along the improvement, longest first; all are simulated at once.
   static constexpr int kTrials = 16;
 
   template <typename Torque>
   Trajectory Follow(const TrajectoryCost& cost, const StateVector& start, size_t steps,
                     const Torque& torque);
-  /// Computes k_ and K_ about the trajectory. False if the cost curves down along the torque:
-  /// then it wants more regularisation.
+  /// Computes k_ and K_ about the trajectory. Returns false if the cost curves down along the
+  /// torque; the caller then increases the regularisation.
   bool Backward(const TrajectoryCost& cost, const Trajectory& trajectory, double regularization);
-  /// The best of the trials, if it costs less than `trajectory`, which it then replaces.
+  /// Replaces `trajectory` with the best of the trials if that costs less.
   bool Forward(const TrajectoryCost& cost, Trajectory& trajectory);
 
   PendulumModel model_;

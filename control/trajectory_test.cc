@@ -36,8 +36,8 @@ TEST(Trajectory, EqualsSciPyWhereThePendulumIsLinear) {
 
 TEST(Trajectory, NoChangeOfATorqueIsBetter) {
   // Pontryagin's condition in discrete time: the derivative of the cost by each torque is 0 within
-  // the limits, and points outwards at them. By differences of whole simulations, which know
-  // nothing of the method.
+  // the limits and points outwards at them. The derivatives are differences of whole simulations,
+  // independent of the optimisation method.
   const Plant plant;
   LqrConfig config;
   const QuadraticCost cost = StandardCost(config, plant);
@@ -69,7 +69,7 @@ TEST(Trajectory, NoChangeOfATorqueIsBetter) {
       EXPECT_LT(std::abs(slope), 1e-3 * best.cost) << "step " << t;
     }
   }
-  EXPECT_GT(at_limit, 5);  // it uses the whole motor
+  EXPECT_GT(at_limit, 5);  // the motor reaches its limits
   EXPECT_LT(UprightDeviation(best.x.back()).norm(), 0.1);
 }
 

@@ -14,11 +14,11 @@ namespace upswing {
 namespace {
 
 constexpr int kGuesses = 16;
-/// Control periods of the longest guess: 5 s. What is longer is held upright to its end at first.
+/// Control periods of the longest guess: 5 s. At first, longer plans hold upright to their end.
 constexpr int kLongestGuess = 250;
 constexpr int kPlanIterations = 300;
-constexpr double kPlanTolerance = 1e-7;  // of the cost, in an iteration
-/// It moves to another place of the plan where that costs less than this share.
+constexpr double kPlanTolerance = 1e-7;  // relative gain of an iteration
+/// The policy moves to another place of the plan if that costs less than this share.
 constexpr double kCheaper = 0.25;
 
 }  // namespace
@@ -103,7 +103,7 @@ std::string TvlqrPolicy::description() const {
                 " s, followed by a time-varying linear-quadratic regulator");
 }
 
-/// Where some environments are, and a plant to look ahead with.
+/// The places of some environments, and a plant to look ahead with.
 struct TvlqrPolicy::Places : MemoryOf<Place> {
   Places(int num_envs, const Plant& plant) : MemoryOf<Place>(num_envs, Place()), model(plant) {}
 

@@ -11,7 +11,7 @@
 namespace upswing {
 namespace {
 
-/// Lets a policy act for some seconds; returns the deviations from upright, the first included.
+/// Simulates a policy for some seconds. Returns the deviations from upright, the first included.
 std::vector<StateVector> Simulate(const Policy& policy, const StateVector& start, double seconds,
                                   const Plant& plant) {
   PendulumModel model(plant);
@@ -47,7 +47,8 @@ TEST(Tvlqr, BeginsWhereItIs) {
   const Plant plant;
   const TvlqrPolicy policy(LqrConfig(), SwingUpConfig(), plant);
   for (const double sign : {1.0, -1.0}) {
-    // Upright it holds at once; in the middle of its plan, or of its mirror image, it goes on.
+    // Upright, the policy holds at once. In the middle of its plan or the mirror image, it
+    // continues.
     const auto held = Simulate(policy, FromUpright(sign * StateVector(0.03, 0, 0, 0)), 5, plant);
     for (const StateVector& d : held) EXPECT_LT(std::abs(d[0]), 0.3);
     const auto middle = static_cast<size_t>(policy.plan().trajectory.steps() / 3);

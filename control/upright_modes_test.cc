@@ -34,8 +34,9 @@ TEST(UprightModes, AreEigenvaluesOfTheLinearModel) {
 }
 
 TEST(UprightModes, DeltaIsZeroWhereTheMotorLosesAMode) {
-  // Where δ is 0, the motor's share of a left eigenvector of a growing mode is 0, by the linear
-  // model alone. It changes sign there, so that a bisection over the damping finds the plant.
+  // If δ is 0, the linear model gives a left eigenvector of a growing mode that the motor does not
+  // reach. The motor's share of it changes sign there, so bisection over the damping finds the
+  // plant.
   for (const int joint : {1, 2}) {
     const auto with_damping = [&](double damping) {
       Plant plant;

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""The installed library: its package, its headers and the examples, as a project of one's own would
-use them.
+"""Tests of the installed library: its package, its headers and the examples, used as your own
+project would use them.
 
-The build folder is that of the program in UPSWING (see apps/testing.py).
+UPSWING names the program; its build folder is used (see apps/testing.py).
 """
 
 import csv
@@ -23,7 +23,7 @@ LAYERS = re.search(r"UPSWING_LAYERS ([^)]*)\)",
 
 
 def run(*command, **more):
-    """What a command prints; its errors fail the test."""
+    """Returns a command's output; its errors fail the test."""
     done = subprocess.run([str(part) for part in command], check=False, encoding="utf-8",
                           stdout=subprocess.PIPE, stderr=subprocess.STDOUT, **more)
     assert done.returncode == 0, f"{command}: {done.returncode}\n{done.stdout}"
@@ -33,7 +33,7 @@ def run(*command, **more):
 PORTABLE = ["core", "nn", "sim", "rl", "control"]
 EXAMPLES = ["control_loop", "own_task", "train_and_judge"]
 
-# Everything that is built, each part as a project of its own that finds the library.
+# A project that finds the library, with one target for each part to build.
 PROJECT = f"""cmake_minimum_required(VERSION 3.25)
 project(everything LANGUAGES CXX)
 foreach(name IN ITEMS {" ".join(EXAMPLES)})
@@ -51,7 +51,7 @@ HEADERS = """find_package(upswing REQUIRED)
 add_library(all_of_them OBJECT all.cc)
 target_link_libraries(all_of_them PRIVATE upswing::judge upswing::control)
 """
-# Requests for the package, and whether it answers them: its own minor version has to match.
+# Requests for the package, and whether it accepts them: the minor version has to match.
 VERSION = re.search(r"project\(upswing VERSION (\d+\.\d+)",
                     (ROOT / "CMakeLists.txt").read_text(encoding="utf-8"))[1]
 WANTED = {VERSION: "1", "0.3": "0", "0.99": "0", "1.0": "0", f"{VERSION} COMPONENTS physics": "0",
@@ -67,12 +67,12 @@ endforeach()
 class Library(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        """Installs the library, and configures and builds all that uses it."""
+        """Installs the library, then configures and builds everything that uses it."""
         cls.temporary = tempfile.TemporaryDirectory()
         cls.addClassCleanup(cls.temporary.cleanup)
         cls.folder = Path(cls.temporary.name)
         run("cmake", "--install", BUILD, "--prefix", cls.folder / "before")
-        cls.prefix = (cls.folder / "before").rename(cls.folder / "moved")  # it need not stay
+        cls.prefix = (cls.folder / "before").rename(cls.folder / "moved")  # installations can move
         cls.include = cls.prefix / "include/upswing"
         source = cls.folder / "source"
         for path, text in (("CMakeLists.txt", PROJECT), ("docs/CMakeLists.txt", DOCS),
@@ -84,7 +84,7 @@ class Library(unittest.TestCase):
             (source / path).write_text(text, encoding="utf-8")
         cache = (BUILD / "CMakeCache.txt").read_text(encoding="utf-8")
         compiler = re.search(r"^CMAKE_CXX_COMPILER:\w+=(.*)", cache, re.MULTILINE)[1]
-        # What takes time when it runs is in the library, so nothing is optimized here.
+        # The slow code is in the library, so these programs need no optimisation.
         options = [f"-DCMAKE_CXX_COMPILER={compiler}", f"-DCMAKE_PREFIX_PATH={cls.prefix}",
                    "-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_CXX_FLAGS_RELEASE=-O0 -DNDEBUG",
                    "-DCMAKE_CXX_FLAGS=-Wall -Wextra -Wpedantic -Werror"]
@@ -94,13 +94,13 @@ class Library(unittest.TestCase):
         cls.environment = os.environ | {"CCACHE_BASEDIR": str(cls.folder), "CCACHE_NOHASHDIR": "1"}
         cls.configured = run("cmake", "-S", source, "-B", cls.build_folder, "-G", "Ninja", *options,
                              env=cls.environment)
-        # Whatever fails is told by its own test, which builds it again.
+        # Failures are reported by each part's own test, which builds it again.
         subprocess.run(["cmake", "--build", cls.build_folder, "--", "-k", "0"], check=False,
                        env=cls.environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
     @staticmethod
     def blocks():
-        """The C++ of the documentation."""
+        """The C++ code of the documentation."""
         text = (ROOT / "docs/howto/cpp-library.md").read_text(encoding="utf-8")
         return re.findall(r"^```cpp\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
 
@@ -113,7 +113,7 @@ class Library(unittest.TestCase):
         return "".join(f'#include "{header}"\n' for header in headers)
 
     def build(self, *targets):
-        """Builds targets, unless that was done before; returns the program of the last one."""
+        """Builds targets unless they are built already. Returns the program of the last one."""
         run("cmake", "--build", self.build_folder, "--target", *targets, env=self.environment)
         return self.build_folder / targets[-1] / targets[-1]
 
@@ -157,7 +157,7 @@ class Library(unittest.TestCase):
 
     def test_every_header_can_be_included(self):
         self.assertEqual({path.name for path in self.include.iterdir()}, set(LAYERS))
-        self.build("docs", "all_of_them")  # docs: with no more than what the portable ones need
+        self.build("docs", "all_of_them")  # docs links only portable layers
 
     def test_package_refuses_what_it_is_not(self):
         answers = dict(re.findall(r"^-- wants (.*?): (\d)$", self.configured, re.MULTILINE))

@@ -16,13 +16,13 @@ namespace upswing {
 namespace {
 
 constexpr int kLawSamples = 16;
-constexpr int kDrawsOfEach = 1000;     // of each
-constexpr double kTorqueShare = 5e-4;  // of the limit: tolerance of a sample's torque
-constexpr double kNearby = 1e-3;       // rad, rad/s: so near to a sample the torque does not jump
-const StateVector kRange(3.14, 3.14, 4, 4);  // ±, of a sample: rad, rad/s
-constexpr double kUprightShare = 0.005;      // of that, at most, about upright
+constexpr int kDrawsOfEach = 1000;     // per kind of state
+constexpr double kTorqueShare = 5e-4;  // tolerance of a sample's torque, as a share of the limit
+constexpr double kNearby = 1e-3;       // rad, rad/s: no jump of the torque this close to a sample
+const StateVector kRange(3.14, 3.14, 4, 4);  // ± range of samples, rad, rad/s
+constexpr double kUprightShare = 0.005;      // largest share of kRange about upright
 
-/// The settings that it was made with.
+/// The settings that the controller was made with.
 ControllerConfig ConfigOf(const LoadedPolicy& loaded) {
   ControllerConfig config;
   config.plant = loaded.plant;
@@ -37,7 +37,7 @@ std::vector<float> Floats(const auto& numbers) {
   return floats;
 }
 
-/// The upper triangle, row by row.
+/// The upper triangle of P, row by row.
 std::vector<double> Triangle(const Eigen::Matrix4d& P) {
   std::vector<double> numbers;
   for (int i = 0; i < 4; ++i) {
@@ -56,19 +56,20 @@ double TorqueAt(const LoadedPolicy& loaded, const StateVector& x) {
   return torque;
 }
 
-/// Whether the torque jumps by `least` or more around a state: there roundings choose.
+/// Whether the torque jumps by `least` or more around a state; rounding would decide there.
 bool Jumps(const LoadedPolicy& loaded, const StateVector& x, double least) {
   const double here = TorqueAt(loaded, x);
   for (int k = 0; k < 4; ++k) {
     const StateVector step = kNearby * StateVector::Unit(k);
-    // 0 for any linear law, however steep.
+    // The second difference, which is 0 for any linear law, however steep.
     const double bend = TorqueAt(loaded, x - step) - 2 * here + TorqueAt(loaded, x + step);
     if (std::abs(bend) >= least) return true;
   }
   return false;
 }
 
-/// A random state of floats: anywhere, or so close to upright that the torque is within its limit.
+/// A random state of floats: anywhere, or so close to upright that the torque stays within its
+/// limit.
 StateVector DrawState(const LoadedPolicy& loaded, Rng& rng, bool upright) {
   StateVector x;
   for (int k = 0; k < 4; ++k) x[k] = rng.Uniform(-1, 1) * kRange[k];
@@ -81,7 +82,7 @@ StateVector DrawState(const LoadedPolicy& loaded, Rng& rng, bool upright) {
   return rounded(FromUpright(lean));
 }
 
-/// States (every other one near upright) and their torques, none near a jump.
+/// Draws states, every other one near upright, and their torques. No state is near a jump.
 void DrawSamples(const LoadedPolicy& loaded, double tolerance, std::vector<float>& states,
                  std::vector<float>& torques) {
   Rng rng(0, "samples of a controller's C header");
@@ -119,7 +120,7 @@ std::vector<float> StepsFrom(const std::vector<float>& states, const std::vector
   return steps;
 }
 
-/// The tables by which export/c/catch.c simulates.
+/// Adds the tables with which export/c/catch.c simulates.
 void AddCatch(const LoadedPolicy& loaded, const LqrCatch& upright, CParts& parts) {
   const Plant& plant = loaded.plant;
   if (plant.coulomb1 != 0 || plant.coulomb2 != 0) {
@@ -177,7 +178,7 @@ CHeader ControllerHeaderOf(const LoadedPolicy& loaded, const std::string& prefix
   CHeader header;
   header.prefix = prefix;
   header.state_bytes = kind == "tvlqr" ? 12 : 4;
-  // The deviation; for others its copy that is simulated, too, and five arrays of a step.
+  // The deviation; a simulating controller also copies it, and needs five arrays for a step.
   header.stack_bytes = 4 * sizeof(float) * (simulates ? 7 : 1);
   CParts parts;
   parts.task = PendulumTask(config.plant.actuated_joint, 0);

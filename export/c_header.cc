@@ -14,8 +14,8 @@ std::string_view FileNamed(std::string_view name) {
   return std::ranges::find(files, name, &CFile::name)->text;
 }
 
-/// The text of a file, with those that it includes in their places; tables.h is what the header
-/// begins with.
+/// The text of a file with its includes inserted. Leaves out tables.h, which stands for the
+/// header's beginning.
 std::string Expanded(std::string_view name) {
   constexpr std::string_view kInclude = "#include \"";
   std::string text;
@@ -41,7 +41,7 @@ std::string ArrayText(const CArray& array, const std::string& prefix) {
                 comment, "\n  ", Wrapped(words, "  ", 2), "\n");
 }
 
-/// The arrays of constants in a list, for the checksum.
+/// The C text of the constant arrays, in order, with the list that the checksum uses.
 std::string TablesText(const std::vector<CArray>& arrays, const std::string& prefix) {
   std::string text = "static const struct {\n  const float *values;\n  long count;\n} ";
   text += Concat(prefix, "_tables[", arrays.size(), "] = {\n");
@@ -51,7 +51,7 @@ std::string TablesText(const std::vector<CArray>& arrays, const std::string& pre
   return text + "};\n";
 }
 
-/// What checksum_of_all in export/c/numbers.c computes of these arrays: FNV-1a.
+/// The checksum (FNV-1a) of these arrays, as checksum_of_all in export/c/numbers.c computes it.
 uint32_t ChecksumOf(const std::vector<CArray>& arrays) {
   uint32_t sum = 2166136261U;
   for (const CArray& array : arrays) {
@@ -134,7 +134,7 @@ void WriteHeader(const CParts& parts, CHeader& header) {
   text += parts.layers + TablesText(parts.constants, name);
   text += "/* Samples: states, one after the other, and what Upswing makes of them. */\n";
   for (const CArray& array : parts.samples) text += ArrayText(array, name);
-  // The files' own prefix is "policy".
+  // Files in export/c use the prefix "policy".
   const std::string code = Replaced(Expanded(parts.task.file), "policy_", name + "_");
   text += Concat('\n', Replaced(code, "POLICY_", caps + "_"), "\n#endif\n");
 }

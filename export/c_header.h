@@ -10,11 +10,10 @@
 #include "export/export.h"
 #include "export/exported_policy.h"
 
-/// A header in C: a comment, macros and tables, and a file of export/c with the files that it
-/// includes.
+/// C headers: a comment, macros and tables, and a file of export/c with the files that it includes.
 namespace upswing {
 
-/// A file of export/c, which CMake compiles in.
+/// A file of export/c, embedded by CMake.
 struct CFile {
   std::string_view name, text;
 };
@@ -26,38 +25,38 @@ struct CArray {
   std::vector<float> values;
 };
 
-/// What a header is made of. Names of macros and arrays lack the prefix.
+/// The parts of a C header. Names of macros and arrays lack the prefix.
 struct CParts {
-  ExportedTask task;   // whose state are the arguments of the control function
-  std::string origin;  // where the policy is from
+  ExportedTask task;   // its state gives the arguments of the control function
+  std::string origin;  // origin of the policy
   double limit = 0;    // N m
   double period = 0;   // s
-  std::string plant;   // what it takes from `made_for`; empty: nothing
+  std::string plant;   // what the policy takes from `made_for`; empty: nothing
   Plant made_for;
-  std::string work;  // of a call
-  /// Name, value with comment.
+  std::string work;  // work of a call
+  /// Name, and value with a comment.
   std::vector<std::pair<std::string, std::string>> macros;
-  std::vector<CArray> constants;  // of which there is a checksum
-  std::string layers;             // the definition of the table of layers, if there is one
-  std::vector<CArray> samples;    // for the self test
+  std::vector<CArray> constants;  // covered by the checksum
+  std::string layers;             // definition of the table of layers, if there is one
+  std::vector<CArray> samples;    // for the self-test
 };
 
-/// States, one control period after the other, and what a policy makes of them: by these a C header
-/// tests itself. S state variables, O outputs of the network.
+/// Samples for a C header's self-test: states one control period apart, with the policy's results.
+/// S state variables, O outputs of the network.
 struct CSamples {
   int count = 0;
   std::vector<float> states, outputs, torques;       // (count × S), (count × O), (count)
-  float output_tolerance = 0, torque_tolerance = 0;  // for other roundings
+  float output_tolerance = 0, torque_tolerance = 0;  // for other rounding
 };
 
-/// The same for every call. `layers` are those of the network that the header has.
+/// Draws the samples, the same in every call. `layers` are the layers of the header's network.
 CSamples DrawSamples(const ExportedPolicy& policy, const std::vector<LayerView>& layers);
 
-/// The C header of a controller: lqr, energy, pfl or tvlqr; see CHeaderOf, which checks the prefix.
-/// Throws BadInput for others.
+/// The C header of a controller: lqr, energy, pfl or tvlqr. CHeaderOf checks the prefix. Throws
+/// BadInput for other policies.
 CHeader ControllerHeaderOf(const LoadedPolicy& loaded, const std::string& prefix);
 
-/// Writes `text`, and counts the constants; `header` has the sizes in RAM and the prefix.
+/// Writes `text` and the number of constants. `header` already has the sizes in RAM and the prefix.
 void WriteHeader(const CParts& parts, CHeader& header);
 
 }  // namespace upswing

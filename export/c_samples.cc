@@ -14,11 +14,11 @@ namespace upswing {
 namespace {
 
 constexpr int kSamples = 16;
-constexpr int kMostDraws = 200;      // of them all
-constexpr double kTolerance = 1e-4;  // of the largest output
+constexpr int kMostDraws = 200;      // of all samples
+constexpr double kTolerance = 1e-4;  // relative to the largest output
 constexpr double kMostFloat = std::numeric_limits<float>::max();
 
-/// What the layers make of an observation, in double precision.
+/// The layers' output for an observation, in double precision.
 std::vector<double> Evaluate(const std::vector<LayerView>& layers, std::span<const float> obs) {
   std::vector<double> x(obs.begin(), obs.end());
   for (const LayerView& layer : layers) {
@@ -44,7 +44,7 @@ std::vector<double> Evaluate(const std::vector<LayerView>& layers, std::span<con
   return x;
 }
 
-/// The observations of the samples' states, each with the memory of those before it.
+/// Observations of the samples' states, each with a memory of the earlier ones.
 class Observer {
  public:
   explicit Observer(const ExportedPolicy& policy) : policy_(policy) {
@@ -54,7 +54,7 @@ class Observer {
     env_ = MakeEnv(config);
   }
 
-  /// That of a state (S), float numbers.
+  /// The observation of a state (S) that consists of floats.
   std::vector<float> Observe(std::span<const double> s) const {
     env_->SetState(0, s);
     const auto now = env_->obs().row(0);
@@ -65,7 +65,7 @@ class Observer {
     return obs;
   }
 
-  /// The policy has chosen a torque at this observation.
+  /// Records the torque that the policy chose at this observation.
   void Remember(std::span<const float> obs, double torque) {
     before_.assign(obs.begin(), obs.end());
     torque_ = torque;
@@ -74,11 +74,11 @@ class Observer {
  private:
   const ExportedPolicy& policy_;
   std::unique_ptr<VectorEnv> env_;  // without memory
-  std::vector<float> before_;       // (D) the last observation; empty: there is none
-  double torque_ = 0;               // chosen there
+  std::vector<float> before_;       // (D) previous observation; empty: none
+  double torque_ = 0;               // torque chosen at it
 };
 
-/// Whether rounding does not change which of the outputs is the largest.
+/// Whether rounding cannot change which output is the largest.
 bool IsClear(std::vector<double> outputs) {
   std::ranges::sort(outputs, std::greater());
   return outputs.size() == 1 || outputs[0] - outputs[1] > 10 * kTolerance * LargestSize(outputs);
@@ -101,7 +101,7 @@ CSamples DrawSamples(const ExportedPolicy& policy, const std::vector<LayerView>&
     std::vector<float> obs;
     do {
       for (size_t k = 0; k < state.size(); ++k) {
-        // Angles first, then as many velocities; as float has them.
+        // Angles come first, then equally many velocities; values are rounded to float.
         const double bound = k < state.size() / 2 ? kPi : kVelocity;
         state[k] = static_cast<float>(rng.Uniform(-bound, bound) * 0.999);
       }
@@ -122,7 +122,7 @@ CSamples DrawSamples(const ExportedPolicy& policy, const std::vector<LayerView>&
     samples.torques.push_back(static_cast<float>(torque));
     largest = std::max(largest, LargestSize(outputs));
   }
-  // A policy whose outputs are all nearly equal may choose any of its torques.
+  // If all outputs are nearly equal, the policy may choose any of its torques.
   const double of_limit = all_clear ? kTolerance * std::max(1.0, largest) : 2;
   const auto tolerance = [](double size) {
     return static_cast<float>(std::min(size + 1e-30, kMostFloat));

@@ -6,45 +6,46 @@
 
 #include "setup/loaded_policy.h"
 
-/// What `export` writes for programs in other languages.
+/// The exports of `export` for programs in other languages.
 namespace upswing {
 
-/// The task's formulas as numbers, by which a reader in another language tests its own: a JSON
-/// document of plants, states and what follows from them, the same with every call.
+/// Test vectors for implementations of the task in other languages: a JSON document of plants,
+/// states and the formulas' results. Every call returns the same.
 std::string TestVectorsJson();
 
-/// Copies policies (files or run folders) into a page's folder of agents as ID.safetensors and
-/// adds them to its agents.json, or replaces those of the same ID there. `id` names a single one;
-/// empty: by its run's folder, else by its agent. With `checkpoints` (0: without) as many policies
-/// along the way of each, from the untrained one to itself. Everything is read and checked before
-/// anything is written. Returns the names of the files. Throws BadInput; Failure if the folder
-/// cannot be written.
+/// Copies policies (files or run folders) into a page's folder of agents as ID.safetensors. Adds
+/// them to its agents.json, replacing entries with the same ID. `id` names a single policy; empty:
+/// named by its run's folder, else by its agent. Each policy has `checkpoints` versions
+/// in the page, from the untrained one to itself (0: only itself). Reads and checks everything
+/// before it writes anything. Returns the names of the files. Throws BadInput; Failure if the
+/// folder cannot be written.
 std::vector<std::string> ExportToPage(const std::vector<std::filesystem::path>& paths,
                                       const std::string& id, int64_t checkpoints,
                                       const std::filesystem::path& folder);
 
-/// A learned policy as a file in ONNX's format: `observation` (batch × D) in; `torque` and, by
-/// kind, `q_values`, `mean` and `log_std`, `probabilities`, `value` out; what they mean as metadata
-/// (docs/howto/export.md). Throws BadInput if it is none that was learned.
+/// A learned policy as a file in ONNX's format. Input: `observation` (batch × D). Outputs: `torque`
+/// and, by kind, `q_values`, `mean` and `log_std`, `probabilities`, `value`. Metadata explain them
+/// (docs/howto/export.md). Throws BadInput if the policy was not learned.
 std::string OnnxModelOf(const LoadedPolicy& loaded);
 
-/// A learned policy, or a controller whose law is small, as a C99 header without dependencies
+/// A learned policy, or a controller with a small law, as a C99 header without dependencies
 /// (docs/howto/export.md).
 struct CHeader {
-  std::string prefix;  // with which all of its names begin
+  std::string prefix;  // of all its names
   std::string text;
-  size_t constant_bytes = 0;  // of flash
-  size_t state_bytes = 0;     // of RAM, between calls
-  size_t stack_bytes = 0;     // of RAM, in a call: its arrays
-  size_t multiply_adds = 0;   // of a call, in the network's layers; 0 of a controller
+  size_t constant_bytes = 0;  // in flash
+  size_t state_bytes = 0;     // in RAM, between calls
+  size_t stack_bytes = 0;     // in RAM, arrays of a call
+  size_t multiply_adds = 0;   // per call, in the network's layers; 0 for a controller
 };
 
-/// `prefix`: small letters, digits and _, a letter first; see CPrefixOf. Throws BadInput if it is
-/// something else, or if the policy is neither.
+/// Writes the C header. `prefix`: small letters, digits and _, beginning with a letter; see
+/// CPrefixOf. Throws BadInput for another prefix, or for a policy that is neither learned nor such
+/// a controller.
 CHeader CHeaderOf(const LoadedPolicy& loaded, const std::string& prefix);
 
-/// A prefix for the header of this name, such as "my_policy" for my-policy.h; of standard output
-/// (-) from the policy's agent.
+/// The prefix for a header file, such as "my_policy" for my-policy.h. For standard output (-), the
+/// prefix comes from the policy's agent.
 std::string CPrefixOf(const std::string& file, const LoadedPolicy& loaded);
 
 }  // namespace upswing

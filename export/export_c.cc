@@ -12,12 +12,12 @@
 namespace upswing {
 namespace {
 
-constexpr size_t kMostParameters = 2'000'000;  // of which a header is some 23 MB
+constexpr size_t kMostParameters = 2'000'000;  // about 23 MB of header
 constexpr size_t kLongestPrefix = 32;
 constexpr int kBlockRows = 8;  // see linear in export/c/network.c
 
-/// The weights (out × in) in the order that linear in export/c/network.c reads: blocks of rows,
-/// each column by column; then the rows that are left.
+/// The weights (out × in) in the order of the function linear in export/c/network.c: blocks of
+/// rows, each column by column, then the remaining rows.
 std::vector<float> InBlocks(const LayerView& layer) {
   std::vector<float> ordered;
   ordered.reserve(layer.W.size());
@@ -35,22 +35,22 @@ std::vector<float> InBlocks(const LayerView& layer) {
 
 std::vector<float> Copy(std::span<const float> values) { return {values.begin(), values.end()}; }
 
-/// The layers that choose the torque: without the value stream of a dueling network, which does not
-/// change the best torque; only the mean of a Gaussian.
+/// The layers that choose the torque. Leaves out a dueling network's value stream, which does not
+/// change the best torque, and keeps only a Gaussian's mean.
 std::vector<LayerView> LayersOf(const ExportedPolicy& policy) {
   std::vector<LayerView> layers = policy.ActingLayers();
   if (!policy.is_discrete()) layers.back() = layers.back().Units(0, 1);
   return layers;
 }
 
-/// The name of a layer in C.
+/// The C name of a layer.
 std::string CName(std::string name) {
   for (char& c : name) c = c == '.' ? '_' : c;
   return name;
 }
 
-/// `text` as the beginning of C's names: small letters and digits, a letter first, with a _ in
-/// place of anything else between them.
+/// `text` as a C prefix: small letters and digits, beginning with a letter, with _ in place of
+/// other characters between them.
 std::string AsPrefix(std::string_view text) {
   std::string prefix = Cleaned(text, '_');
   if (!prefix.empty() && prefix[0] <= '9') prefix = "policy_" + prefix;
@@ -59,7 +59,7 @@ std::string AsPrefix(std::string_view text) {
   return prefix;
 }
 
-/// What the file says of where it is from.
+/// The policy's origin according to its file.
 std::string OriginOf(const PolicyInfo& info) {
   std::vector<std::string> parts;
   const auto add = [&](const char* what, const auto& value) {
@@ -74,8 +74,8 @@ std::string OriginOf(const PolicyInfo& info) {
   return parts.empty() ? "unknown" : CommentText(Join(parts, ", "));
 }
 
-/// The constants by which energy and height are computed (export/c/pendulum.c). The energy is
-/// linear in them, so they follow from Energy at some states.
+/// Constants of energy and height for export/c/pendulum.c. The energy is linear in them, so they
+/// follow from Energy at a few states.
 std::vector<float> EnergyConstants(const Plant& plant) {
   constexpr double kPi = std::numbers::pi;
   const double whole = 2 * EnergyTarget(plant);
@@ -93,9 +93,9 @@ std::vector<float> EnergyConstants(const Plant& plant) {
   return constants;
 }
 
-/// What the double pendulum's header needs of its plant.
+/// Adds the macros that the double pendulum's header needs.
 void AddPlant(const Plant& plant, CParts& parts) {
-  // As export/c/pendulum.c has them.
+  // export/c/pendulum.c uses the same limits.
   static_assert(kMaxVelocity1 == 10 && kMaxVelocity2 == 20);
   static_assert(kMemoryVelocity == 1 && kMemoryTorque == 5 && kMemorySize == 3);
   parts.plant = "by which it computes energy and height";
@@ -103,7 +103,7 @@ void AddPlant(const Plant& plant, CParts& parts) {
   parts.constants = {{"energy", "of the observed energy and height", EnergyConstants(plant)}};
 }
 
-/// The layers' arrays, and the list of the layers.
+/// Adds the layers' arrays and the list of layers.
 void AddLayers(const std::vector<LayerView>& layers, const std::string& prefix, CParts& parts) {
   std::string rows;
   for (const LayerView& layer : layers) {

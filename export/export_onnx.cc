@@ -15,7 +15,7 @@ using nlohmann::ordered_json;
 constexpr const char* kInput = "observation";
 constexpr const char* kTorque = "torque";
 
-/// Adds y = activation(norm(W x + b)); returns the name of y: `name`.
+/// Adds y = activation(norm(W x + b)). Returns y's name, `name`.
 std::string AddLayer(OnnxModel& model, const LayerView& layer, const std::string& x,
                      const std::string& name) {
   const auto vector = [&](const char* what, std::span<const float> values) {
@@ -39,8 +39,8 @@ std::string AddLayer(OnnxModel& model, const LayerView& layer, const std::string
   return model.AddNode(name, layer.activation == Activation::kTanh ? "Tanh" : "Relu", {y});
 }
 
-/// Adds layers one after the other; returns the name of what the last one makes: `last`, or, if
-/// that is empty, that of the layer.
+/// Adds layers one after the other. Returns the name of the final output: `last`, or the last
+/// layer's name if `last` is empty.
 std::string AddLayers(OnnxModel& model, std::span<const LayerView> layers, std::string x,
                       const std::string& last = "") {
   for (const LayerView& layer : layers) {
@@ -50,7 +50,7 @@ std::string AddLayers(OnnxModel& model, std::span<const LayerView> layers, std::
   return x;
 }
 
-/// Adds the output `torque`: that of the largest preference.
+/// Adds the output `torque`: the torque with the largest preference.
 void AddChoice(OnnxModel& model, const ExportedPolicy& policy, const std::string& preferences) {
   const std::vector<float> torques(policy.torques().begin(), policy.torques().end());
   const std::string table =
@@ -67,7 +67,7 @@ void AddQNetwork(OnnxModel& model, const ExportedPolicy& policy) {
   if (!shape.dueling())
     return AddChoice(model, policy, AddLayers(model, layers, kInput, "q_values"));
   const std::string features = AddLayers(model, layers.first(shape.hidden.size()), kInput);
-  // Q = V + A - mean(A) (Wang et al., 2016, Eq 9); the argmax is that of A.
+  // Q = V + A - mean(A) (Wang et al., 2016, Eq 9). Its argmax is the argmax of A.
   const std::string advantages = AddLayers(model, layers.last(2), features);
   const std::string value = AddLayers(model, layers.subspan(shape.hidden.size(), 2), features);
   const std::string mean =
@@ -78,8 +78,8 @@ void AddQNetwork(OnnxModel& model, const ExportedPolicy& policy) {
   AddChoice(model, policy, advantages);
 }
 
-/// Adds the distribution's outputs and the torque; returns the name of the action in units of its
-/// limit, which a critic may take.
+/// Adds the distribution's outputs and the torque. Returns the name of the action in units of its
+/// limit, an input of some critics.
 std::string AddActor(OnnxModel& model, const ExportedPolicy& policy) {
   const std::span<const LayerView> layers = policy.layers;
   const std::string features = AddLayers(model, layers.first(layers.size() - 1), kInput);

@@ -24,18 +24,18 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-/// A policy as it was on the way to another one, as a file.
+/// An earlier version of a policy, as a file.
 struct Checkpoint {
   int64_t step = 0;
   std::vector<std::byte> bytes;
 };
 
-/// A policy on its way into the page.
+/// A policy to be added to the page.
 struct PageAgent {
   std::string id;
   fs::path from;
-  std::vector<std::byte> bytes;  // of the policy file
-  ordered_json entry;            // in agents.json
+  std::vector<std::byte> bytes;  // the policy file
+  ordered_json entry;            // for agents.json
   std::vector<Checkpoint> checkpoints;
 
   std::string FileOf(const Checkpoint& checkpoint) const {
@@ -43,7 +43,7 @@ struct PageAgent {
   }
 };
 
-/// The run folder of a policy; empty if it is in no run folder.
+/// The run folder of a policy; empty if the policy is in no run folder.
 fs::path RunOf(const fs::path& file) {
   const fs::path folder = file.has_parent_path() ? file.parent_path() : ".";
   const bool is_run =
@@ -53,7 +53,7 @@ fs::path RunOf(const fs::path& file) {
   return has_name ? folder : fs::canonical(folder);
 }
 
-/// What the page needs to know of a policy, as its list has it. Throws BadInput.
+/// The page's list entry for a policy. Throws BadInput.
 ordered_json EntryOf(const LoadedPolicy& loaded, const std::string& id) {
   const PolicyInfo& info = loaded.policy->info();
   const auto need = [&](bool there, const char* key) {
@@ -99,7 +99,7 @@ std::vector<std::byte> SmallFile(const Training& training, const std::string& wh
   return WriteSafetensors(file).Joined();
 }
 
-/// Whether two policies compute the same.
+/// Whether two policies have the same tensors.
 bool SameTensors(const Policy& a, const Policy& b) {
   const Tensors first = a.ToTensors(), second = b.ToTensors();
   return std::ranges::equal(first.all(), second.all(), [](const auto& one, const auto& other) {
@@ -107,22 +107,21 @@ bool SameTensors(const Policy& a, const Policy& b) {
   });
 }
 
-/// Trains a learned policy again, with the settings in its file, and returns it as it was at
-/// `count`
-/// - 1 steps before: untrained, and at evaluations that lie evenly on the way to it. The parameters
-/// are rounded to bfloat16, which halves the file. Throws BadInput if it is no Q-network, if there
-/// are fewer evaluations, or if the training has another end, as on a processor with other vector
-/// instructions.
+/// Repeats the training of a learned policy with the settings in its file. Returns
+/// `count` - 1 earlier versions: the untrained one, then evenly spaced evaluations. Parameters are
+/// rounded to bfloat16, which halves the file. Throws BadInput if the policy is not a Q-network or
+/// there are fewer evaluations. Also throws it if the repeated training ends differently, as on a
+/// processor with other vector instructions.
 std::vector<Checkpoint> CheckpointsOf(const LoadedPolicy& loaded, int64_t count) {
   const std::string where = loaded.path;
   const PolicyInfo& info = loaded.policy->info();
   const int64_t end = info.step.value_or(0);
   Config config = ConfigIn(info.config, Concat(where, ": metadata \"config\""));
   config.train.steps = std::max<int64_t>(1, end);
-  config.train.stop_when_solved = false;  // it may have been trained on
+  config.train.stop_when_solved = false;  // the training may have continued past the solution
   Training training(config, ThisHost(ResolveThreads(0)));
 
-  // All of them: how many there will be is known at the end.
+  // Keep all versions first: their number is known only at the end.
   std::vector<Checkpoint> all{{0, SmallFile(training, where)}};
   while (training.state().steps < end && training.Step()) {
     if (training.state().steps < end && training.trainer().IsDue(config.train.eval_every)) {
@@ -219,7 +218,7 @@ std::vector<PageAgent> ReadAgents(const std::vector<fs::path>& paths, const std:
   return agents;
 }
 
-/// What is in the page so far. Throws BadInput if it is no list of agents.
+/// The page's present list. Throws BadInput if it is not a list of agents.
 ordered_json ReadIndex(const fs::path& file) {
   if (!fs::exists(file)) return {{"agents", ordered_json::array()}};
   try {
@@ -253,10 +252,10 @@ std::vector<std::string> ExportToPage(const std::vector<fs::path>& paths, const 
     throw BadInput(Concat(folder.string(), ": expected a folder, got a file"));
   }
   const fs::path index_file = folder / "agents.json";
-  (void)ReadIndex(index_file);  // before anything is written
+  (void)ReadIndex(index_file);  // check before writing anything
   MakeFolder(folder);
 
-  const FolderLock lock(folder);  // two at a time would lose entries of each other
+  const FolderLock lock(folder);  // concurrent exports would lose entries
   ordered_json index = ReadIndex(index_file);
   std::vector<std::string> names;
   const auto write = [&](const std::string& name, std::span<const std::byte> bytes) {

@@ -30,7 +30,7 @@ ordered_json PlantJson(const Plant& plant) {
 
 ordered_json StateJson(const PendulumState& s) { return {s.q1, s.q2, s.w1, s.w2}; }
 
-/// The nominal plant, or one with each of its numbers within 50% of that.
+/// The nominal plant, or a plant with each parameter within 50% of it.
 Plant DrawPlant(bool nominal, Rng& rng) {
   Randomization half;
   half.plant.fill(0.5);
@@ -47,8 +47,8 @@ PendulumState NearUpright(int i, Rng& rng) {
   return s;
 }
 
-/// One link half a degree inside or outside of the 30° that count as inverted, to the left or to
-/// the right, the other upright.
+/// One link half a degree inside or outside the 30° limit of inverted, to the left or right; the
+/// other link is upright.
 PendulumState AtTheEdge(int i, Rng& rng) {
   const double degrees = (i % 2 == 0 ? 29.5 : 30.5) * (i / 2 % 2 == 0 ? 1 : -1);
   const double lean = degrees * kPi / 180;
@@ -56,7 +56,7 @@ PendulumState AtTheEdge(int i, Rng& rng) {
   return {first ? kPi + lean : kPi, first ? -lean : lean, rng.Normal(), rng.Normal()};
 }
 
-/// Angles of more than a turn too, and velocities beyond those that the observation divides by.
+/// Any angles, more than a turn included, and velocities beyond the observation's divisors.
 PendulumState Anywhere(int /*i*/, Rng& rng) {
   return {rng.Uniform(-3 * kPi, 3 * kPi), rng.Uniform(-3 * kPi, 3 * kPi), rng.Uniform(-20, 20),
           rng.Uniform(-20, 20)};
@@ -64,7 +64,7 @@ PendulumState Anywhere(int /*i*/, Rng& rng) {
 
 ordered_json CaseJson(const Plant& plant, const PendulumState& s, double torque) {
   std::array<double, kRewardTerms> terms = RewardTerms(plant, s, torque);
-  for (double& term : terms) term += 0.0;  // no -0
+  for (double& term : terms) term += 0.0;  // turns -0 into 0
   return {{"plant", PlantJson(plant)},
           {"state", StateJson(s)},
           {"torque", torque},
@@ -115,7 +115,7 @@ ordered_json Models() {
   return models;
 }
 
-/// N·m, one for each control step.
+/// Random torques, N·m, one for each control step.
 std::vector<double> DrawTorques(int steps, const std::string& stream) {
   Rng rng(0, stream);
   std::vector<double> torques(static_cast<size_t>(steps));
@@ -123,7 +123,7 @@ std::vector<double> DrawTorques(int steps, const std::string& stream) {
   return torques;
 }
 
-/// What an agent sees from a start on: (steps + 1) observations.
+/// Observations from a start on: steps + 1 of them.
 ordered_json Observations(int memory, const PendulumState& start,
                           const std::vector<double>& torques) {
   PendulumEnvConfig config;
@@ -179,9 +179,9 @@ ordered_json Delays() {
 
 constexpr int kSize = kObservationSize;
 constexpr int kActorCases = 12;
-constexpr int kPieces = 10;  // of the range of torques
+constexpr int kPieces = 10;  // number of pieces of the torque range
 
-/// Parameters of an untrained network. Those of its output are larger than usual, so that not all
+/// Parameters of an untrained network. The output layer's are larger than usual, so that not all
 /// actions are near 0.
 AlignedVector<float> DrawParameters(const NetworkShape& shape, Rng& rng) {
   const Network network(shape);
@@ -194,7 +194,7 @@ AlignedVector<float> DrawParameters(const NetworkShape& shape, Rng& rng) {
   return parameters;
 }
 
-/// A policy of this kind whose critic takes `critic_inputs` numbers; 0: there is none.
+/// A policy of this kind with a critic of `critic_inputs` numbers; 0: no critic.
 NetworkPolicy DrawPolicy(ActionRule rule, const NetworkShape& actor, int critic_inputs, Rng& rng) {
   NetworkPolicyParts parts{rule, actor};
   parts.action_limit = {Plant().torque_limit};
@@ -207,7 +207,7 @@ NetworkPolicy DrawPolicy(ActionRule rule, const NetworkShape& actor, int critic_
   return {std::move(parts), InfoOf(Config())};
 }
 
-/// The bytes of a policy's file, two hexadecimal digits each.
+/// The bytes of a policy's file, each as two hexadecimal digits.
 std::string FileAsHex(const NetworkPolicy& policy) {
   std::string hex;
   for (const std::byte byte : WriteSafetensors(policy.ToTensors()).Joined()) {
@@ -216,8 +216,8 @@ std::string FileAsHex(const NetworkPolicy& policy) {
   return hex;
 }
 
-/// A Gaussian's probabilities of equal pieces of the range of torques, the ends with what is cut
-/// off there; a categorical's of its torques.
+/// The action probabilities. A Gaussian has one for each of kPieces equal pieces of the torque
+/// range; the end pieces include the clipped tails. A categorical policy has one for each torque.
 std::vector<double> Probabilities(ActionRule rule, std::span<const float> outputs) {
   if (rule == ActionRule::kCategorical) {
     const std::vector<double> logits(outputs.begin(), outputs.end());
@@ -254,7 +254,7 @@ ordered_json ActorCase(const NetworkPolicy& policy, std::vector<float>& obs) {
   return j;
 }
 
-/// Untrained actor policies of each kind of output, as files, and what they make of observations.
+/// Untrained actor policies with each kind of output, as files, and their results for observations.
 ordered_json ActorVectors() {
   struct Kind {
     ActionRule rule;

@@ -13,7 +13,7 @@
 namespace upswing {
 namespace {
 
-/// Throws BadInput unless these torques fit into floats.
+/// Throws BadInput unless these torques are within the range of float.
 void CheckTorques(std::span<const double> torques, const std::string& where) {
   for (const double torque : torques) {
     if (std::abs(torque) <= std::numeric_limits<float>::max()) continue;
@@ -21,7 +21,7 @@ void CheckTorques(std::span<const double> torques, const std::string& where) {
   }
 }
 
-/// The observation of the double pendulum (Observe of sim/double_pendulum.h).
+/// The inputs of the double pendulum's observation (Observe of sim/double_pendulum.h).
 std::vector<NamedInput> PendulumInputs(int memory) {
   const auto over = [](double scale, const char* unit) {
     return Concat(" over ", FormatNumber(scale), ' ', unit);
@@ -47,7 +47,7 @@ std::vector<NamedInput> PendulumInputs(int memory) {
   return inputs;
 }
 
-/// Throws BadInput of a task that has no row here.
+/// The description of the policy's task. Throws BadInput for a task without a description here.
 ExportedTask TaskOf(const LoadedPolicy& loaded) {
   for (const ExportedTask& task :
        {PendulumTask(loaded.plant.actuated_joint, loaded.memory()),

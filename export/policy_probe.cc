@@ -1,10 +1,10 @@
-// What the library's policy makes of many observations or states: by this the tests judge exports.
+// Evaluates the library's policy on many observations or states, so that tests can check exports.
 //
 //     policy_probe POLICY observations <rows >rows    each row D numbers
 //     policy_probe POLICY states       <rows >rows    each row S numbers, the start of an episode
 //
-// All numbers are doubles of this machine. For each row it writes the torque, then what an actor
-// puts out, then Q-values or V.
+// All numbers are doubles in this machine's byte order. Each output row is the torque, then an
+// actor's outputs, then Q-values or V.
 #include <cstdio>
 #include <string_view>
 #include <vector>

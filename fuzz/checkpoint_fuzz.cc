@@ -1,4 +1,4 @@
-// The checkpoint: the whole state of a training, which is then resumed.
+// Target: the checkpoint, which holds the whole state of a training and then resumes it.
 
 #include "core/error.h"
 #include "core/safetensors.h"
@@ -10,16 +10,16 @@ namespace upswing {
 
 namespace {
 
-/// Two trainings with the same settings, kept from one input to the next: loading overwrites the
-/// whole state, and making a training takes far longer than loading one.
+/// Two trainings with the same settings, reused for all inputs. Loading overwrites their whole
+/// state, and constructing a training takes far longer than loading one.
 struct Trainings {
   explicit Trainings(const Config& config)
       : first(config, ThisHost(1)), second(config, ThisHost(1)) {}
   Training first, second;
 };
 
-/// Those that a checkpoint belongs to: its settings stand in another file; here its metadata have
-/// a key that says which they are.
+/// The trainings that a checkpoint belongs to. The program keeps its settings in another file; here
+/// a metadata key names them.
 Trainings& TrainingsOf(const Tensors& file) {
   static Trainings in_mujoco(TinyConfig("mujoco"));
   static Trainings sac(TinyConfig("closed-form", "sac")), ppo(TinyConfig("closed-form", "ppo"));
@@ -42,7 +42,7 @@ bool TryInput(std::string_view input) {
   Training& again = trainings.second;
   if (!Accepts([&] { training.State(Archive::Loader(file)); })) return false;
 
-  // What was loaded can be saved, loaded again, and resumed.
+  // A loaded state can be saved, loaded again, and resumed.
   Tensors saved;
   training.State(Archive::Saver(saved));
   Expect(Accepts([&] { again.State(Archive::Loader(saved)); }), "to load what was saved");

@@ -1,4 +1,4 @@
-// The table of a run's evaluations, as `compare` and `export` read it.
+// Target: the table of a run's evaluations, which `compare` and `export` read.
 #include "fuzz/target.h"
 #include "run/run_record.h"
 
@@ -6,7 +6,7 @@ namespace upswing {
 
 bool TryInput(std::string_view input) {
   RunRecord run{"", Config(), ""};
-  // The last line of an unfinished run may be cut off; that of others must be whole.
+  // The last line of an unfinished run may be cut off; a finished run's must be complete.
   const bool whole =
       Accepts([&] { run.evaluations = ParseEvaluations(std::string(input), kInputName, false); });
   const bool cut =

@@ -1,4 +1,4 @@
-// Writes those inputs of the corpus that the program itself makes; to be run after a change of its
+// Writes the corpus inputs that the program itself creates. Run it after a change of the file
 // formats:
 //   fuzz_seeds fuzz/corpus
 #include <cstdio>
@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A checkpoint of the training that is called `kind` in the fuzz target.
+/// Saves a checkpoint of a training; the fuzz target knows this kind of training as `kind`.
 void SaveCheckpoint(Training& training, const std::string& kind, const fs::path& file) {
   Tensors checkpoint;
   if (kind != "closed-form") checkpoint.metadata[kind] = "";
@@ -32,7 +32,7 @@ void MakeSeeds(const fs::path& corpus) {
     const Config config = actor ? TinyConfig("closed-form", kind) : TinyConfig(kind);
     Training training(config, ThisHost(1));
     SaveCheckpoint(training, kind, corpus / "checkpoint/accepted" / (kind + "-new.safetensors"));
-    // Until the replay memory is full, and in the middle of a rollout.
+    // Step until the replay memory is full, and into the middle of a rollout.
     for (int step = 0; step < 9; ++step) training.Step();
     SaveCheckpoint(training, kind, corpus / "checkpoint/accepted" / (kind + ".safetensors"));
 
@@ -44,7 +44,7 @@ void MakeSeeds(const fs::path& corpus) {
         corpus / "policy/accepted" / ((actor ? kind : "dueling-" + kind) + ".safetensors");
     SaveTensors(training.agent().ExportPolicy(info)->ToTensors(), file);
   }
-  // The other kind of network, as short as can be.
+  // A minimal example of the other kind of network.
   const Plant plant;
   const PolicyInfo all = InfoOf(Config());
   PolicyInfo info;

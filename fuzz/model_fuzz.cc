@@ -1,4 +1,4 @@
-// A model in MJCF, as it comes with --model, in a run folder or in a policy.
+// Target: a model in MJCF, from --model, a run folder or a policy.
 #include "fuzz/target.h"
 #include "mujoco/engines.h"
 #include "mujoco/model.h"
@@ -13,7 +13,7 @@ bool TryInput(std::string_view input) {
   config.mjcf = mjcf;
   config.engine = &kMuJoCo;
   if (!Accepts([&] { config.plants = {PlantOf(*LoadModel(mjcf, kInputName))}; })) return false;
-  // It can be simulated.
+  // An accepted model can be simulated.
   PendulumEnv env(config);
   StepResult result = env.MakeResult();
   const double torque = 1;

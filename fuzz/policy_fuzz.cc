@@ -1,5 +1,5 @@
-// The policy file, which `eval`, `info`, `export` and others read from untrusted sources, and that
-// of `realaigym --search`.
+// Target: policy files, which `eval`, `info`, `export` and others read from untrusted sources, and
+// the policy files of `realaigym --search`.
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -19,8 +19,8 @@
 namespace upswing {
 namespace {
 
-/// A policy of the boards is written as it was read, chooses finite torques from any state that a
-/// simulation may reach, and moves the board for a while.
+/// Checks a board policy: it is written as it was read, chooses finite torques from any reachable
+/// state, and controls the board for a while.
 void TrySwingPolicy(const Tensors& tensors) {
   const SwingPolicy policy = ReadSwingPolicy(tensors);
   const Tensors again = policy.net.ToTensors(policy.numbers);
@@ -56,7 +56,7 @@ bool TryInput(std::string_view input) {
   });
   if (!loaded) return accepted;
 
-  // It chooses torques, and the program can print the command that trained it.
+  // An accepted policy chooses torques, and the program can print the command that trained it.
   const Policy& policy = *loaded->policy;
   const std::vector<float> obs(static_cast<size_t>(policy.obs_size()), 0.5F);
   double torque = 0;
@@ -67,7 +67,7 @@ bool TryInput(std::string_view input) {
     Expect(Printable(*command) == *command, "a command on one line");
   }
 
-  // What leaves as C is ASCII, and no text of the file ends the comment that it stands in.
+  // Exported C is ASCII, and no text from the file ends its comment.
   Accepts([&] { OnnxModelOf(*loaded); });
   Accepts([&] {
     const std::string c = CHeaderOf(*loaded, "policy").text;

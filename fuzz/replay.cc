@@ -1,5 +1,5 @@
-// Tries a target's corpus without libFuzzer: CORPUS/accepted/* must be accepted, CORPUS/refused/*
-// refused. Named files instead are tried one by one, to look at a finding.
+// Runs a target's corpus without libFuzzer: CORPUS/accepted/* must be accepted, CORPUS/refused/*
+// refused. If files are named instead, it tries them one by one, to examine a finding.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -15,18 +15,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// More than any input of a corpus needs at once: a reader that asks for more trusts a size that
-/// the file claims. libFuzzer's -malloc_limit_mb finds the same.
+/// Largest allocation that an input of a corpus needs. A parser that asks for more trusts a size
+/// claimed by the file. libFuzzer's -malloc_limit_mb detects the same.
 constexpr size_t kMostBytes = size_t{64} << 20;
 
 /// Tries one file. Returns whether it was accepted.
 bool Try(const fs::path& file) {
   std::printf("%s\n", file.c_str());
-  std::fflush(stdout);  // the last name is that of the file that ended the process
+  std::fflush(stdout);  // shows which file ended the process
   return upswing::TryInput(upswing::ReadTextFile(file));
 }
 
-/// Tries the files of a folder. Returns how many were not what the folder's name says.
+/// Tries the files of a folder. Returns how many contradict the folder's name.
 int TryFolder(const fs::path& folder) {
   const bool expected = folder.filename() == "accepted";
   std::vector<fs::path> files;

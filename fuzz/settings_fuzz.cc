@@ -1,4 +1,4 @@
-// A configuration file, as `train --config` reads it and a run folder holds it.
+// Target: a configuration file, which `train --config` reads and a run folder holds.
 #include "core/error.h"
 #include "core/text.h"
 #include "fuzz/target.h"
@@ -19,7 +19,7 @@ Config Parse(std::string_view text) {
 bool TryInput(std::string_view input) {
   Config config;
   if (!Accepts([&] { config = Parse(input); })) return false;
-  // What the program writes of it says the same.
+  // The program's output of the settings has the same meaning.
   const std::string text = ConfigToml(config, false);
   Expect(ConfigToml(Parse(text), false) == text, "to read the settings that were written");
   return true;

@@ -1,4 +1,4 @@
-// A study file.
+// Target: a study file.
 #include "fuzz/target.h"
 #include "study/study_file.h"
 
@@ -7,7 +7,7 @@ namespace upswing {
 bool TryInput(std::string_view input) {
   StudyFile study;
   StudyOutline outline;
-  // The outline is read of studies of other versions too.
+  // Study files of other versions have a readable outline, too.
   (void)Accepts([&] { outline = ParseStudyOutline(input, kInputName); });
   if (!Accepts([&] { study = ParseStudy(input, kInputName); })) return false;
   Expect(outline.title == study.title && outline.variants.size() == study.variants.size(),

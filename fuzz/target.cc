@@ -27,7 +27,7 @@ void Expect(bool holds, std::string_view expected) {
 
 }  // namespace upswing
 
-/// Where libFuzzer enters; any exception that TryInput lets through is a finding.
+/// The entry point of libFuzzer. Any exception that TryInput lets through is a finding.
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   upswing::TryInput({reinterpret_cast<const char*>(data), size});
   return 0;

@@ -3,22 +3,22 @@
 #include <functional>
 #include <string_view>
 
-/// What a fuzz target is made of. Each tests one reader of files from untrusted sources: libFuzzer
-/// generates inputs without end, the ordinary tests use those of its corpus.
+/// The interface of fuzz targets. Each target tests one parser of untrusted files. libFuzzer
+/// generates inputs endlessly; the ordinary tests use the inputs of the corpus.
 namespace upswing {
 
-/// Reads one input, as its target does, and works with what was read as the program would. Returns
-/// whether it was accepted. Each target defines it.
+/// Parses one input and uses the result as the program would. Returns whether the input was
+/// accepted. Each target defines this function.
 bool TryInput(std::string_view input);
 
-/// Runs a reader. Returns whether it took the input, false if it threw BadInput. Ends the process
-/// on anything else.
+/// Runs a parser. Returns true if it accepted the input, false if it threw BadInput. Any other
+/// exception ends the process.
 bool Accepts(const std::function<void()>& read);
 
-/// Ends the process, with a message, unless `holds`: what a target expects of what was accepted.
+/// Checks a property of an accepted input: ends the process, with a message, unless `holds`.
 void Expect(bool holds, std::string_view expected);
 
-/// What messages call an input, as others say its path.
+/// Name of an input in messages, in place of a path.
 inline constexpr const char* kInputName = "input";
 
 }  // namespace upswing

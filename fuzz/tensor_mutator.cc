@@ -1,12 +1,12 @@
-// Changes safetensors so that most of the reader still runs: nearly all of libFuzzer's own changes
-// would fail at the header's length or the checksum. A change is one of
-//   - any bytes of the file,
-//   - the header as text,
-//   - the text of one metadatum, or a number in it,
-//   - one number of a tensor,
-//   - one number of a tensor's shape, with data to fit,
-//   - a tensor that is missing or is there under another name;
-// after all but the first the header's length is right, and the checksum too where there is one.
+// Mutates safetensors so that most of the parser still runs. Nearly all of libFuzzer's own
+// mutations fail at the header's length or the checksum. A mutation changes one of these:
+//   - any bytes of the file
+//   - the header as text
+//   - the text of one metadatum, or a number in it
+//   - one number of a tensor
+//   - one number of a tensor's shape, with matching data
+//   - the presence or name of a tensor
+// After all but the first, the header's length is correct, and so is the checksum if there is one.
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -30,14 +30,14 @@ namespace {
 using nlohmann::json;
 using Random = std::minstd_rand;
 
-/// A tensor taken out of its file.
+/// A tensor separated from its file.
 struct LooseTensor {
   std::string name, dtype;
   std::vector<int64_t> shape;
   std::string data;
 };
 
-/// A file in pieces.
+/// A file separated into its parts.
 struct LooseFile {
   std::map<std::string, std::string> metadata;
   std::vector<LooseTensor> tensors;  // in the order of their data
@@ -45,7 +45,7 @@ struct LooseFile {
 
 size_t Below(Random& random, size_t count) { return random() % std::max<size_t>(1, count); }
 
-/// An integer that readers may handle wrongly.
+/// An integer that parsers may handle wrongly.
 int64_t OddInteger(Random& random) {
   constexpr auto kMost = std::numeric_limits<int64_t>::max();
   constexpr std::array<int64_t, 18> kIntegers{
@@ -61,14 +61,14 @@ double OddNumber(Random& random) {
   return kNumbers.at(Below(random, kNumbers.size()));
 }
 
-/// As libFuzzer changes bytes; at most twice as long and a little.
+/// Mutates bytes as libFuzzer does; the result has at most about twice the length.
 void MutateBytes(std::string& text) {
   const size_t size = text.size();
   text.resize(2 * size + 16);
   text.resize(LLVMFuzzerMutate(reinterpret_cast<uint8_t*>(text.data()), size, text.size()));
 }
 
-/// Puts an odd number where there is one, else changes bytes.
+/// Replaces a number by an odd one if there is one, else mutates bytes.
 void MutateText(std::string& text, Random& random) {
   const size_t from = text.find_first_of("0123456789", Below(random, text.size()));
   if (from == std::string::npos || random() % 2 == 0) return MutateBytes(text);
@@ -86,8 +86,8 @@ std::vector<int64_t> Integers(const json& entry, const char* name) {
   return list.get<std::vector<int64_t>>();
 }
 
-/// A file with this header: its length before it, its checksum in it where there is a place for
-/// one and it can be computed.
+/// A file with this header. Sets the header's length, and its checksum if the header has one and it
+/// can be computed.
 std::string Seal(std::string header, const std::string& data) {
   constexpr std::string_view kKey = "\"checksum\":\"";
   const size_t at = header.find(kKey);
@@ -95,7 +95,7 @@ std::string Seal(std::string header, const std::string& data) {
   if (at != std::string::npos && at + kKey.size() + 16 <= header.size() && object.is_object()) {
     const auto place = header.begin() + static_cast<ptrdiff_t>(at + kKey.size());
     std::fill_n(place, 16, '0');
-    std::map<size_t, size_t> pieces;  // where each tensor begins and ends
+    std::map<size_t, size_t> pieces;  // begin and end of each tensor
     for (const auto& [name, entry] : object.items()) {
       const std::vector<int64_t> offsets = Integers(entry, "data_offsets");
       if (offsets.size() == 2)
@@ -115,7 +115,7 @@ std::string Seal(std::string header, const std::string& data) {
   return file + header + data;
 }
 
-/// The header's text and the data behind it; nothing if the length is not that of a header.
+/// The header's text and the data after it; nothing if the length is not a header's.
 std::optional<std::pair<std::string, std::string>> Split(std::string_view file) {
   uint64_t length = 0;
   if (file.size() < sizeof(length)) return std::nullopt;
@@ -124,10 +124,10 @@ std::optional<std::pair<std::string, std::string>> Split(std::string_view file) 
   return std::pair(std::string(file.substr(8, length)), std::string(file.substr(8 + length)));
 }
 
-/// The pieces of a file. Throws where they are not as they should be.
+/// Separates a file into its parts. Throws if it is not well-formed.
 LooseFile TakeApart(const std::string& header, const std::string& data) {
   LooseFile file;
-  std::map<size_t, LooseTensor> order;  // by where their data begin; of empty ones only one
+  std::map<size_t, LooseTensor> order;  // by beginning of their data; one of several empty ones
   const json object = json::parse(header);
   for (const auto& [name, entry] : object.items()) {
     if (name == "__metadata__") {
@@ -223,7 +223,7 @@ std::string Mutated(std::string file, Random& random) {
     LooseFile loose = TakeApart(header, data);
     for (size_t changes = 1 + random() % 2; changes > 0; --changes) MutatePiece(loose, random);
     return PutTogether(loose);
-  } catch (const std::exception&) {  // an earlier change broke it
+  } catch (const std::exception&) {  // an earlier mutation broke the file
     MutateText(header, random);
     return Seal(header, data);
   }

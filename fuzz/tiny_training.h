@@ -5,7 +5,7 @@
 
 namespace upswing {
 
-/// A training of a few hundred parameters with nearly everything switched on, in `physics`.
+/// A training in `physics` with a few hundred parameters and nearly all features switched on.
 inline Config TinyConfig(const std::string& physics, const std::string& algorithm = "dqn") {
   Config config(algorithm);
   SetFlags(OptionsOf(config), {{"physics", physics},

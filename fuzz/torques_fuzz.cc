@@ -1,4 +1,4 @@
-// A table of torques, as `simulate --torque` reads it.
+// Target: a table of torques, which `simulate --torque` reads.
 #include <algorithm>
 #include <cmath>
 

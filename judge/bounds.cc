@@ -59,7 +59,7 @@ EpisodeBounds FindBounds(const BoundsConfig& config, ThreadPool& pool, const Pro
     std::vector<double>& start = bounds.starts[i];
     start.resize(4);
     OneEpisode(env, index)->GetState(0, start);
-    BestEpisodeSearch own = search;  // its buffers are not for two threads
+    BestEpisodeSearch own = search;  // a copy per thread: it has buffers
     const auto found = own.From(StateVector(start.data()), tables);
     for (size_t k = 0; k < tables.size(); ++k) {
       const auto judged = [&](const BestEpisode& episode) {
@@ -70,7 +70,7 @@ EpisodeBounds FindBounds(const BoundsConfig& config, ThreadPool& pool, const Pro
       best.of_return[i] = judged(found[k].of_return);
       best.of_time[i] = judged(found[k].of_time);
     }
-    // Torques of the table are torques.
+    // An episode with torques of the table counts for any torque, too.
     EvaluationEpisode& most = bounds.any.of_return[i];
     EvaluationEpisode& fastest = bounds.any.of_time[i];
     if (bounds.table.of_return[i].reward_sum > most.reward_sum) most = bounds.table.of_return[i];

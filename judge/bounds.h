@@ -5,10 +5,11 @@
 
 #include "judge/eval_report.h"
 
-/// The best that is found of the episodes of `eval`, and how near policies come to it.
+/// Bounds on the return and swing-up time of the episodes of `eval`: the best episodes that a
+/// search finds, to compare policies with.
 namespace upswing {
 
-/// The best that was found of each episode, judged in an engine: for the return, and for the
+/// The best episode found for each start, judged in an engine: one for the return, one for the
 /// swing-up time.
 struct BestEpisodes {
   std::vector<EvaluationEpisode> of_return, of_time;  // (N)
@@ -18,27 +19,27 @@ struct BoundsConfig {
   TrialArguments trial;  // the plant, the engine and the seed of the starts
   int64_t episodes = 100, torques = 9, guesses = 24;
 
-  /// Its numbers: name, range, help.
+  /// Declares the numeric settings in `options`: name, range, help.
   void Describe(Options& options);
 };
 
-/// What was found with any torque within the limit, and with a table of them, whose episodes count
-/// for the former where they are better. None of it is proved to be the best.
+/// The best episodes found with any torque within the limit, and with a table of torques. An
+/// episode with the table also counts for `any` if it is better. None is proved to be the best.
 struct EpisodeBounds {
   EvaluationRule rule;
   std::vector<std::vector<double>> starts;  // (N, S)
   BestEpisodes any, table;
 };
 
-/// Searches (control/best_episode.h), then judges what was found in the engine that the trial
-/// names. `progress` counts guesses and episodes, which take about as long. Throws BadInput,
-/// and as BestEpisodeSearch does.
+/// Searches (control/best_episode.h), then judges the found episodes in the trial's engine.
+/// `progress` counts guesses and episodes, which take about equally long. Throws BadInput, and as
+/// BestEpisodeSearch does.
 EpisodeBounds FindBounds(const BoundsConfig& config, ThreadPool& pool, const Progress& progress);
 
-/// Throws BadInput unless the policy is judged on the plant that the search knows.
+/// Throws BadInput unless the policy's plant is the plant that the search uses.
 void CheckComparable(const LoadedPolicy& loaded, const BoundsConfig& config);
 
-/// A row for each episode.
+/// The bounds as CSV, one row for each episode.
 std::string BoundsCsv(const EpisodeBounds& bounds);
 
 }  // namespace upswing

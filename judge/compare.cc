@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Episodes of a task on which policies are judged, at most, unless one run's evaluation has more.
+/// Largest number of episodes on which policies are judged, unless one run's evaluation has more.
 constexpr int64_t kMostJudged = 1000;
 
 std::string SummaryCsv(const std::vector<RunGroup>& groups) {
@@ -32,7 +32,7 @@ std::string SummaryCsv(const std::vector<RunGroup>& groups) {
     csv.Add("solved_low", s.solved_interval.low);
     csv.Add("solved_high", s.solved_interval.high);
     for (const RunFigure& figure : RunFigures()) {
-      // What is not reached is `inf`; an interval of one run is empty.
+      // Unreached figures are `inf`; the interval of a single run is empty.
       const Scores& scores = s.*figure.scores;
       const auto& interval = scores.iqm.interval;
       csv.Add(Concat(figure.name, "_median"), scores.median);
@@ -52,7 +52,7 @@ std::string SummaryCsv(const std::vector<RunGroup>& groups) {
 
 std::string RunsCsv(const std::vector<RunGroup>& groups) {
   CsvTable csv;
-  // Several of a run that was resumed elsewhere.
+  // A run that was resumed on another machine has several texts.
   const auto add = [&](const char* name, const std::set<std::string>& texts) {
     csv.Add(name, Join({texts.begin(), texts.end()}, " + "));
   };
@@ -113,7 +113,7 @@ std::vector<EnvConfig> FinalEvaluations(const Comparison& comparison, int task) 
       episodes += config.train.eval_episodes;
       if (!evaluations.empty() && episodes > kMostJudged) return evaluations;
       EnvConfig& env = evaluations.emplace_back(EvaluationEnvironments(config, step));
-      // Screened: the evaluations in MuJoCo count.
+      // Screened runs: the evaluations in MuJoCo count.
       const bool screened = config.eval_physics == kScreened;
       env.engine = screened ? &kMuJoCo : &FindEngine(config.eval_physics, "--eval-physics");
     }
@@ -136,7 +136,7 @@ std::shared_ptr<const Policy> PolicyFor(const LoadedPolicy& loaded, bool redesig
   }
 }
 
-/// Throws BadInput unless the motor is at the policy's joint.
+/// Throws BadInput unless the plant's motor is at the policy's joint.
 void ExpectJoint(const LoadedPolicy& loaded, bool redesign, const Plant& plant) {
   const double own = loaded.plant.actuated_joint, given = plant.actuated_joint;
   if (own == given || (loaded.design_for && redesign)) return;
@@ -149,7 +149,7 @@ struct Job {
   const LoadedPolicy& loaded;
   std::shared_ptr<const Policy> policy;
   std::vector<EnvConfig> evaluations;
-  JudgedPolicy judged;  // without its figures
+  JudgedPolicy judged;  // figures still empty
   int64_t episodes = 0;
 };
 
@@ -171,7 +171,7 @@ Evaluation Judge(const Job& job, ThreadPool& pool, const Progress& progress) {
   return Summarize(episodes, job.judged.spec.evaluation);
 }
 
-/// The policies to evaluate, per task; notes the others.
+/// The policies to evaluate on each task; adds a note for the others.
 std::vector<Job> JobsOf(const std::vector<LoadedPolicy>& policies, bool redesign,
                         Comparison& comparison) {
   const std::vector<std::string> titles = TitlesOf(policies);
@@ -179,7 +179,7 @@ std::vector<Job> JobsOf(const std::vector<LoadedPolicy>& policies, bool redesign
   std::vector<Job> jobs;
   for (size_t index = 0; index < policies.size(); ++index) {
     const LoadedPolicy& loaded = policies[index];
-    std::vector<std::string> others;  // tasks of which it is not a policy
+    std::vector<std::string> others;  // tasks that the policy does not fit
     for (int task = 0; task < tasks; ++task) {
       Job job{loaded, nullptr, FinalEvaluations(comparison, task), {}};
       const EnvConfig& first = job.evaluations.front();

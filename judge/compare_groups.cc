@@ -14,13 +14,13 @@
 namespace upswing {
 namespace {
 
-constexpr size_t kLongText = 48;  // longer ones are not shown
+constexpr size_t kLongText = 48;  // longer differences are not shown
 
-/// As the name of a setting: the content of the model.
+/// Name of the setting that holds the model's content.
 constexpr const char* kModelContent = "model";
 
-/// Name (`section.key`) and value of each setting of all algorithms that decides the training, and
-/// of the model's content: in one order, so that any two runs can be compared.
+/// Name (`section.key`) and value of each setting that decides the training, of all algorithms,
+/// plus the model's content. The order is the same for any two runs.
 using Settings = std::vector<std::pair<std::string, std::string>>;
 
 Settings SettingsOf(Config config) {
@@ -42,15 +42,15 @@ Settings SettingsOf(Config config) {
   return settings;
 }
 
-/// What its group is called.
+/// The label of a run's group.
 std::string LabelOf(const RunRecord& run) {
   return Concat(run.variant.empty() ? run.config.agent : run.variant,
                 run.config.mjcf.empty() ? "" : ", other model");
 }
 
-/// Whether a setting belongs to the task that a policy is evaluated on, and not to its training or
-/// to when and in which engine it is evaluated: model, plant, disturbance, randomisation, and how
-/// many episodes have to succeed.
+/// Whether a setting belongs to the task that a policy is evaluated on: model, plant, disturbance,
+/// randomisation, and how many episodes have to succeed. Settings of the training, and of when and
+/// in which engine it evaluates, do not belong to it.
 bool IsTask(const std::string& name) {
   constexpr std::array<std::string_view, 3> kBeginnings{"plant.", "disturbance.", "randomize."};
   return name == kModelContent || name == "train.eval_episodes" || name == "task.task" ||
@@ -58,10 +58,10 @@ bool IsTask(const std::string& name) {
              kBeginnings, [&](std::string_view beginning) { return name.starts_with(beginning); });
 }
 
-/// Whether a setting counts.
+/// Tells whether a setting counts.
 using Wanted = bool (*)(const std::string& name);
 
-/// The settings in which not all of `others` agree, such as `hidden [64, 64], head 32`.
+/// The settings that differ among `others`, such as `hidden [64, 64], head 32`.
 std::string Differences(
     const Settings& settings, const std::vector<const Settings*>& others,
     Wanted wanted = [](const std::string& name) { return name != "train.agent"; }) {
@@ -78,8 +78,8 @@ std::string Differences(
   return Join(parts, ", ");
 }
 
-/// Sets the differences of each group (with these `settings`) from the others. Groups with the same
-/// name get a second name: their differences from each other, or a number if there are many.
+/// Sets how each group (with these `settings`) differs from the others. Groups with the same name
+/// get a second name: their differences from each other, or a number if there are many.
 void TellGroupsApart(std::vector<RunGroup>& groups, const std::vector<Settings>& settings) {
   std::vector<const Settings*> all;
   std::map<std::string, std::vector<const Settings*>> namesakes;
@@ -100,7 +100,8 @@ void TellGroupsApart(std::vector<RunGroup>& groups, const std::vector<Settings>&
   }
 }
 
-/// What a reader of the figures should know.
+/// Adds notes on the groups' numbers of seeds and on budgets that readers of the figures should
+/// know.
 void NotePlans(const std::vector<RunGroup>& groups, std::vector<std::string>& notes) {
   std::set<std::pair<int64_t, bool>> of_all;
   std::map<size_t, std::vector<std::string>> few;  // labels by their number of seeds
@@ -136,7 +137,7 @@ void NotePlans(const std::vector<RunGroup>& groups, std::vector<std::string>& no
   }
 }
 
-/// Whether runs that should take the same time had different shares of their processors.
+/// Adds a note if comparable runs had different shares of their processors.
 void NoteLoads(const std::vector<RunRecord>& runs, std::vector<std::string>& notes) {
   std::map<std::pair<std::string, std::set<int64_t>>, std::vector<double>> busy;
   for (const RunRecord& run : runs) {
@@ -155,7 +156,7 @@ void NoteLoads(const std::vector<RunRecord>& runs, std::vector<std::string>& not
   }
 }
 
-/// What the times depend on besides the settings, where it is not the same for all.
+/// Adds notes on conditions that change the times and differ between runs, other than settings.
 void NoteTimes(const std::vector<RunRecord>& runs, std::vector<std::string>& notes) {
   std::map<int64_t, int> threads;  // number of threads → number of runs
   std::set<std::string> processors, vectors;
@@ -194,9 +195,9 @@ void NoteTimes(const std::vector<RunRecord>& runs, std::vector<std::string>& not
   }
 }
 
-/// Numbers the tasks that groups (`settings` are theirs) are evaluated on, in their order.
+/// Numbers the tasks that the groups (with these `settings`) are evaluated on, in their order.
 void TellTasksApart(Comparison& comparison, const std::vector<Settings>& settings) {
-  std::vector<const Settings*> tasks;  // of a group on each
+  std::vector<const Settings*> tasks;  // of a group on each task
   for (size_t i = 0; i < settings.size(); ++i) {
     const auto same = [&](const Settings* other) {
       return Differences(settings[i], {other}, IsTask).empty();
@@ -231,7 +232,7 @@ Comparison GroupRuns(const CompareRequest& request) {
   }
   Comparison comparison;
   std::vector<RunGroup>& groups = comparison.groups;
-  std::vector<Settings> settings;  // of each group
+  std::vector<Settings> settings;  // one per group
   for (const RunRecord& run : found.runs) {
     const auto same = [&](const RunGroup& group) {
       return group.runs.front().settings == run.settings;

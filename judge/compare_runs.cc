@@ -30,10 +30,10 @@ bool IsRun(const fs::path& folder) {
   return has(RunFolder::kConfig) && (has(RunFolder::kEvaluations) || has(RunFolder::kCheckpoint));
 }
 
-/// The result file of a finished run of a study, next to the run folder.
+/// The result file that a study writes next to a finished run's folder.
 fs::path DoneOf(const fs::path& run) { return run.string() + ".done"; }
 
-/// The seed of a run of a study, by its name; nothing if it has none.
+/// The seed in the name of a study's run; nothing if the name has none.
 std::optional<int64_t> SeedOf(const fs::path& path) {
   constexpr std::string_view kSeed = "seed";
   const std::string name = path.filename().string();
@@ -41,7 +41,7 @@ std::optional<int64_t> SeedOf(const fs::path& path) {
   return ParseInteger(std::string_view(name).substr(kSeed.size()));
 }
 
-/// Whether it is a run, or a study's of which no more than its result was kept.
+/// Whether a path is a run, or a study's run of which only the result file is left.
 bool IsKept(const fs::path& run) { return IsRun(run) || IsOwnFile(DoneOf(run)); }
 
 /// Adds the run folders in a folder, at any depth; links are not followed.
@@ -92,7 +92,7 @@ std::vector<fs::path> RunsIn(const fs::path& folder, Found& found) {
   return paths;
 }
 
-/// Reads runs; finished runs of studies from their result files.
+/// Reads runs. Prefers the result file of a study's finished run.
 class RunReader {
  public:
   RunReader(const CompareRequest& request, Found& found) : request_(request), found_(found) {}
@@ -104,7 +104,7 @@ class RunReader {
     try {
       run = ReadDone(path);
     } catch (const Error&) {
-      if (!is_run) throw;  // its folder holds the same facts
+      if (!is_run) throw;  // the run folder holds the same facts
     }
     if (!run && !is_run) {
       throw BadInput(Concat(DoneOf(path).string(), ": expected the settings of ",
@@ -116,7 +116,7 @@ class RunReader {
       run->conditions = RunConditions::Of(path);
       run->evaluations = ReadEvaluations(path, request_.unfinished);
     }
-    // STUDY/VARIANT/seed1: the variant has a name of its own.
+    // A study's layout is STUDY/VARIANT/seed1; the variant's folder names the variant.
     const fs::path below =
         path.lexically_relative(request_.root.empty() ? argument : request_.root);
     if (std::distance(below.begin(), below.end()) > 1) {
@@ -126,7 +126,7 @@ class RunReader {
   }
 
  private:
-  /// From a run's result file; nothing if there is none, or if the run went on since.
+  /// Reads a run's result file; nothing if there is none, or if the run has continued since.
   std::optional<RunRecord> ReadDone(const fs::path& path) {
     const auto seed = SeedOf(path);
     if (!seed) return std::nullopt;
@@ -148,7 +148,7 @@ class RunReader {
     return run;
   }
 
-  /// What all seeds of a variant have in common.
+  /// The settings that all seeds of a variant share.
   const RunRecord& VariantIn(const fs::path& folder) {
     const auto at = variants_.find(folder);
     if (at != variants_.end()) return at->second;
@@ -176,7 +176,7 @@ Found ReadRuns(const CompareRequest& request) {
       try {
         reader.Read(path, argument);
       } catch (const Error& error) {
-        // Most messages begin with the file.
+        // Most messages already begin with the file.
         const std::string what = error.what();
         if (what.starts_with(path.string())) {
           found.left_out.push_back(what);
@@ -189,12 +189,12 @@ Found ReadRuns(const CompareRequest& request) {
   return found;
 }
 
-/// Steps of the training up to the last evaluation.
+/// Training steps up to the last evaluation.
 int64_t LastStep(const RunRecord& run) {
   return run.evaluations.empty() ? 0 : run.evaluations.back().step;
 }
 
-/// Of runs that are the same training, keeps the one that went furthest, of equals the first.
+/// Keeps, of runs of the same training, the longest; if several are equal, the first.
 void DropDuplicates(Found& found) {
   const auto key = [](const RunRecord& run) {
     return std::pair(run.config.train.seed, run.settings);
@@ -218,8 +218,8 @@ void DropDuplicates(Found& found) {
   });
 }
 
-/// Takes out runs without an evaluation, and unfinished ones unless they are asked for; then they
-/// are noted.
+/// Removes runs without an evaluation. Also removes unfinished runs, unless they are requested;
+/// then it adds a note.
 void LeaveOutUnfinished(Found& found, bool unfinished) {
   std::erase_if(found.runs, [&](const RunRecord& run) {
     if (Finished(run)) return false;

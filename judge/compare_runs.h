@@ -9,7 +9,7 @@
 
 namespace upswing {
 
-/// The runs that are compared, and a line for each that is not.
+/// The runs to compare, and a line for each one that is left out.
 struct Found {
   std::vector<RunRecord> runs;
   std::vector<std::string> left_out, notes;
@@ -17,13 +17,13 @@ struct Found {
   void LeaveOut(const std::filesystem::path& path, std::string_view why);
 };
 
-/// Finds and reads them. What is no run, cannot be read, has no evaluation, is unfinished (unless
-/// asked for) or the same training as another is left out. Throws BadInput where a path is not
-/// there, or where a run stands twice.
+/// Finds and reads the runs of a request. Leaves out folders without a run, and runs that are
+/// unreadable, without an evaluation, unfinished (unless requested) or the same training as
+/// another. Throws BadInput if a path does not exist or a run is given twice.
 Found FindRuns(const CompareRequest& request);
 
-/// Finds, reads and groups runs by their settings: those of one group differ only in the seed and
-/// in settings that do not change the training, such as the number of threads. Throws as Compare.
+/// Finds, reads and groups runs by their settings. Runs of one group differ only in the seed and in
+/// settings that do not change the training, such as the number of threads. Throws as Compare does.
 Comparison GroupRuns(const CompareRequest& request);
 
 }  // namespace upswing

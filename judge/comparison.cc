@@ -14,8 +14,8 @@ Scores ScoresOf(std::vector<double> values) {
   return {std::move(values), low, median, high, iqm};
 }
 
-/// The evaluation that solved the run. A run that is not solved would have needed an unknown amount
-/// more than its budget: infinity.
+/// Time of the evaluation that solved the run. An unsolved run counts as infinity, because it needs
+/// an unknown amount more than its budget.
 double SolveSeconds(const RunRecord& run) {
   const auto at = SolvedAt(run);
   return at ? run.evaluations[*at].seconds : EvaluationRow::kUnknown;
@@ -25,7 +25,7 @@ double SolveSteps(const RunRecord& run) {
   return at ? static_cast<double>(run.evaluations[*at].step) : EvaluationRow::kUnknown;
 }
 
-/// The evaluation whose policy the run kept.
+/// The evaluation of the policy that the run kept.
 const EvaluationRow& Best(const RunRecord& run) {
   const EvaluationRule rule = run.config.Spec().evaluation;
   return *std::ranges::max_element(run.evaluations, {}, [&](const EvaluationRow& row) {
@@ -52,7 +52,7 @@ Stability StabilityOf(const RunGroup& group) {
   return s;
 }
 
-/// For times, of which shorter ones are better.
+/// Negated times, so that larger is better.
 std::vector<double> Negated(std::vector<double> values) {
   for (double& value : values) value = -value;
   return values;

@@ -11,7 +11,8 @@ namespace {
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
-// Solved after 1, 2 and 3 s; the fourth run never is, and ends with a worse policy than its best.
+// Three runs are solved after 1, 2 and 3 s. The fourth is never solved, and ends with a worse
+// policy than its best.
 const RunGroup kGroup{
     "a",
     {MadeRun(1, {{1, 2600}, {1, 2610}}), MadeRun(2, {{0, 9}, {1, 2400}, {1, 2500}}),
@@ -31,11 +32,11 @@ TEST(Comparison, ARunThatDidNotSolveNeedsMoreThanItsBudget) {
   EXPECT_EQ(s.solve_seconds.values, (std::vector<double>{1, 2, 3, kInf}));
   EXPECT_EQ(s.solve_steps.values, (std::vector<double>{1000, 2000, 3000, kInf}));
   EXPECT_EQ(s.solve_seconds.median, 2.5);
-  EXPECT_EQ(s.solve_seconds.iqm.value, 2.5);  // of 2 and 3
+  EXPECT_EQ(s.solve_seconds.iqm.value, 2.5);  // mean of 2 and 3
   EXPECT_EQ(s.solve_seconds.high, kInf);
   EXPECT_EQ(s.solve_seconds.iqm.interval->high, kInf);
 
-  // Half of the runs solve: the median is not reached.
+  // Only half of the runs solve, so the median is infinite.
   RunGroup half = kGroup;
   half.runs[0] = MadeRun(5, {{0, 0}, {1, 1}, {0, 0}, {1, 1}, {0, 0}});
   EXPECT_EQ(Summarize(half).solve_seconds.median, kInf);
@@ -66,7 +67,7 @@ TEST(Comparison, TorquesAreThoseOfTheBestEvaluation) {
 }
 
 TEST(Comparison, StabilityCountsEvaluationsAfterTheTwoThatSolve) {
-  EXPECT_EQ(Summarize(kGroup).stability.runs, 0);  // they stopped
+  EXPECT_EQ(Summarize(kGroup).stability.runs, 0);  // runs stop once solved
   RunGroup group;
   group.runs = {MadeRun(1, {{1, 0}, {1, 0}, {0.99, 0}, {1, 0}, {1, 0}}, 5000, false),
                 MadeRun(2, {{0, 0}, {1, 0}, {1, 0}, {0.4, 0}, {1, 0}}, 5000, false),
@@ -88,7 +89,7 @@ TEST(Comparison, PairsAreTheSameFromBothSides) {
   const std::vector<RunGroup> groups{Summarized(kGroup), Summarized(fast)};
   const PairSummary ab = ComparePair(groups, 0, 1);
   const PairSummary ba = ComparePair(groups, 1, 0);
-  EXPECT_DOUBLE_EQ(ba.sooner.value, (9 + 3 * 0.5) / 12);  // as soon as the soonest of the others
+  EXPECT_DOUBLE_EQ(ba.sooner.value, (9 + 3 * 0.5) / 12);  // tie with the fastest of the others
   EXPECT_DOUBLE_EQ(ab.sooner.value + ba.sooner.value, 1);
   EXPECT_EQ(ba.higher_return.value, 1);
   EXPECT_EQ(ab.return_difference.value, 2525 - 2700);

@@ -24,7 +24,7 @@ ordered_json FigureJson(const Quartiles& q) {
   return {{"median", q.median}, {"quartiles", {q.low, q.high}}};
 }
 
-/// Whether a figure says something.
+/// Whether a figure has a value to print.
 bool IsKnown(const EvaluationFigure& figure, bool upright, bool settled, bool valued) {
   using enum EvaluationFigure::Known;
   return figure.known == kAlways || (figure.known == kUpright && upright) ||
@@ -51,7 +51,7 @@ void AddCells(const EvalReport& report, const JudgedEpisode& episode, CsvTable& 
     add(Concat("tilt", body + 1, "_degrees"), e.tilt[body] * kDegrees);
   }
   for (size_t k = 0; k < e.terms.size(); ++k) add(spec.term_names[k], e.terms[k] + 0.0);
-  const bool held = !spec.evaluation.by_return();  // the goal is to be held
+  const bool held = !spec.evaluation.by_return();  // the goal has to be held
   const bool upright = held && e.swing_up_seconds, settled = held && e.settling_seconds;
   for (const EvaluationFigure& figure : EvaluationFigures()) {
     add(figure.name, figure.Of(e).value_or(0),

@@ -21,7 +21,7 @@ struct JudgedEpisode {
   // Of the double pendulum:
   Plant plant;
   Disturbance disturbance;
-  bool for_its_plant = false;  // had its own controller, see TrialArguments::known_plant
+  bool for_its_plant = false;  // had its own controller (TrialArguments::known_plant)
   EvaluationEpisode result;
 };
 
@@ -29,13 +29,13 @@ struct JudgedEpisode {
 struct EvalReport {
   std::string policy;              // path
   std::optional<ModelInfo> model;  // none: the built-in one
-  EnvConfig env;                   // what all episodes have in common
+  EnvConfig env;                   // common settings of all episodes
   EnvSpec spec;
   std::vector<JudgedEpisode> episodes;
   Evaluation figures;
   bool known_plant = false;    // a controller was designed for the plant of each episode
   bool knows_values = false;   // the policy's file defines the unit of its values
-  bool only_balances = false;  // a controller that does not swing up
+  bool only_balances = false;  // true for a controller that does not swing up
 };
 
 /// Evaluates a policy over `episodes` episodes of a trial's environments. With trial.known_plant a
@@ -54,8 +54,8 @@ void AddFigures(const Evaluation& e, const EnvSpec& spec, bool knows_values,
 /// The report as a JSON document.
 std::string EvalJson(const EvalReport& report);
 
-/// A row for each episode, counted from 0; a figure that it does not have (such as the swing-up
-/// time of one that is not upright at the end) is empty.
+/// A row for each episode, counted from 0. A missing figure is empty, such as the swing-up time of
+/// an episode that is not upright at the end.
 std::string EpisodesCsv(const EvalReport& report);
 
 }  // namespace upswing

@@ -9,10 +9,10 @@
 namespace upswing {
 namespace {
 
-constexpr int64_t kCurveResamples = 2000;  // at each point
+constexpr int64_t kCurveResamples = 2000;  // at each x
 constexpr double kIntervals = 200;         // of a grid
 
-/// y of one run at `x`.
+/// y of one run at `x`, interpolated.
 double At(const RunRecord& run, const CurveAxis& x_of, const CurveAxis& y_of, double x) {
   const auto& rows = run.evaluations;
   const auto after = std::ranges::lower_bound(rows, x, {}, x_of);
@@ -28,7 +28,7 @@ double Seconds(const EvaluationRow& row) { return row.seconds; }
 double SuccessPercent(const EvaluationRow& row) { return 100 * row.success_rate; }
 double Return(const EvaluationRow& row) { return row.mean_return; }
 
-/// Where the longest run ends.
+/// The x at which the longest run ends.
 double LastOf(const std::vector<RunGroup>& groups, const CurveAxis& x) {
   double last = 0;
   for (const RunGroup& group : groups) {
@@ -37,14 +37,14 @@ double LastOf(const std::vector<RunGroup>& groups, const CurveAxis& x) {
   return last;
 }
 
-/// Where the first run of the group ends.
+/// The x at which the first run of the group ends.
 double FirstEnd(const RunGroup& group, const CurveAxis& x) {
   double first = x(group.runs.front().evaluations.back());
   for (const RunRecord& run : group.runs) first = std::min(first, x(run.evaluations.back()));
   return first;
 }
 
-/// The groups in parts of almost the same size, of kMostCurves at most.
+/// Splits the groups into parts of almost equal size, at most kMostCurves each.
 std::vector<std::vector<RunGroup>> Parts(const std::vector<RunGroup>& groups) {
   const size_t count = (groups.size() + kMostCurves - 1) / kMostCurves;
   std::vector<std::vector<RunGroup>> parts(count);
@@ -52,7 +52,7 @@ std::vector<std::vector<RunGroup>> Parts(const std::vector<RunGroup>& groups) {
   return parts;
 }
 
-/// One quantity over another.
+/// A quantity and the quantity that it is drawn over.
 struct Axes {
   const char *x_label, *y_label;
   CurveAxis x, y;
@@ -74,7 +74,8 @@ Panel CurvesPanel(const std::vector<RunGroup>& groups, const Axes& axes, double 
   return panel;
 }
 
-/// From 0, or from below it, to the largest number of all lines.
+/// The range from 0, or from the smallest number if it is negative, to the largest number of all
+/// lines.
 std::pair<double, double> RangeFromZero(const std::vector<const Panel*>& panels) {
   double low = 0, high = 0;
   for (const Panel* panel : panels) {
@@ -103,7 +104,7 @@ Line LearningCurve(const RunGroup& group, const CurveAxis& x, const CurveAxis& y
     const Estimate iqm = EstimateIqm({values}, kCurveResamples);
     line.y.push_back(iqm.value);
     if (group.runs.size() < 2) continue;
-    // Where all runs agree the band has no width.
+    // If all runs agree, the band has zero width.
     line.low.push_back(iqm.interval ? iqm.interval->low : iqm.value);
     line.high.push_back(iqm.interval ? iqm.interval->high : iqm.value);
   }
@@ -136,7 +137,7 @@ Figure LearningCurves(const std::vector<RunGroup>& groups, const std::vector<Lev
                        {kSeconds, kReturn, Seconds, Return}};
   for (const std::vector<RunGroup>& part : parts) {
     for (size_t k = 0; k < std::size(axes); ++k) {
-      // One legend, at the right of the upper row, is enough.
+      // One legend, at the right of the upper row.
       const double end = LastOf(groups, axes[k].x);
       Panel& panel = figure.panels.emplace_back(CurvesPanel(part, axes[k], end, k == 1));
       for (const Level& level : levels) {

@@ -9,21 +9,22 @@
 
 namespace upswing {
 
-/// A number of an evaluation, for an axis of a figure.
+/// A number of an evaluation, for one axis of a figure.
 using CurveAxis = std::function<double(const EvaluationRow&)>;
 
-/// The interquartile mean of `y` over the runs at each x of the grid, as a curve with its pointwise
-/// 95% interval as a band (none for a single run). Between two evaluations of a run y is
-/// interpolated; after the last one it keeps its value.
+/// The interquartile mean of `y` over the runs at each x of the grid, as a curve. The band is its
+/// pointwise 95% interval (none for a single run). Between two evaluations of a run, y is
+/// interpolated; after the last one, y keeps its value.
 Line LearningCurve(const RunGroup& group, const CurveAxis& x, const CurveAxis& y,
                    const std::vector<double>& grid);
 
-/// Equally spaced x from the first at which every run of the group has been evaluated to `end`.
+/// Equally spaced x up to `end`, from the first x at which every run of the group has an
+/// evaluation.
 std::vector<double> CurveGrid(const RunGroup& group, const CurveAxis& x, double end);
 
 inline constexpr size_t kMostCurves = 5;  // in one panel
 
-/// A policy that does not learn, beside learning curves.
+/// A policy or controller without learning, drawn next to learning curves.
 struct Level {
   std::string name;
   double success_rate, mean_return;  // success_rate 0 to 1
@@ -31,8 +32,8 @@ struct Level {
 
 /// Success and return over steps and over training time: four panels with a curve for each group.
 /// More than kMostCurves groups are split into parts with four panels each, all with the same axes.
-/// A curve is dotted from where the first of its runs has ended and keeps its last value.
-/// Levels are horizontal lines.
+/// A curve is dotted where at least one of its runs has ended and keeps its last value. Levels are
+/// horizontal lines.
 Figure LearningCurves(const std::vector<RunGroup>& groups, const std::vector<Level>& levels = {});
 
 }  // namespace upswing

@@ -17,7 +17,7 @@ TEST(LearningCurve, InterpolatesAndKeepsTheLastValue) {
   const Line line = LearningCurve(one, Seconds, Return, {1, 1.5, 2, 2.75, 3, 9});
   EXPECT_EQ(line.name, "a");
   EXPECT_EQ(line.y, (std::vector<double>{10, 20, 30, 45, 50, 50}));
-  EXPECT_TRUE(line.low.empty());  // no interval of one run
+  EXPECT_TRUE(line.low.empty());  // one run has no interval
 }
 
 TEST(LearningCurve, IsTheInterquartileMeanWithItsInterval) {
@@ -60,7 +60,7 @@ TEST(LearningCurve, CurvesAreDottedFromWhereARunHasEndedOverStepsAndOverTime) {
     EXPECT_GE(*panel.lines[0].dotted_from, end);
     EXPECT_LT(*panel.lines[0].dotted_from, 1.01 * end);
   }
-  // Over time two runs of as many steps end apart.
+  // Two runs with equal steps end at different times.
   RunGroup slow = a;
   slow.runs[1].evaluations.back().seconds = 8;
   const Figure apart = LearningCurves({slow});

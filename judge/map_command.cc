@@ -23,11 +23,11 @@ using Clock = std::chrono::steady_clock;
 
 constexpr int64_t kMostEpisodes = 10000000;
 
-/// Conditions of a policy's training or of a controller's design.
+/// Conditions of a policy's training, or of a controller's design.
 struct DesignConditions {
-  MapPoint point;               // plant and disturbance; hanging
-  Randomization randomization;  // around them
-  bool known = false;           // the file has more than the plant
+  MapPoint point;               // plant and disturbance; starts hanging
+  Randomization randomization;  // around `point`
+  bool known = false;           // whether the file has more than the plant
   std::string word;             // "training" or "design"
 };
 
@@ -75,7 +75,7 @@ std::string ChangesOf(const MapConfig& config, const DesignConditions& design) {
   return Join(texts, ", ");
 }
 
-/// Label of the training's point on the axes.
+/// Label of the training's point, if it is on the map.
 std::string DotOf(const MapConfig& config, const DesignConditions& design, bool changed) {
   const MapAxis &x = config.x, &y = config.y;
   if (x.start && y.start && !changed) return "hanging";
@@ -93,7 +93,7 @@ MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded,
                    const DesignConditions& design) {
   MapConfig config;
   TrialArguments trial = a.trial;
-  trial.set.clear();  // it changes config.point, not the environments
+  trial.set.clear();  // `set` changes config.point, not the environments
   config.env = TrialEnvironments(trial, &loaded);
   config.point.plant = loaded.plant;
   config.x = ParseMapAxis(a.x, design.point, "--x");
@@ -115,7 +115,7 @@ MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded,
     }
   }
   config.start_given |= config.x.start || config.y.start;
-  // Without noise, all episodes from one start are equal.
+  // Without noise, all episodes from one start are the same.
   const int usual = config.start_given ? 1 : 10;
   config.episodes = a.episodes > 0 ? static_cast<int>(a.episodes) : usual;
   if (config.cells() * config.episodes > kMostEpisodes) {

@@ -11,27 +11,28 @@
 
 namespace upswing {
 
-/// How a map of a policy is asked for: its axes, and what is on neither of them.
+/// The arguments of a policy's map: its axes, and the conditions on neither axis.
 struct MapArguments {
   std::string x = "mass2=-50%:+50%", y = "length2=-50%:+50%", out;
   TrialArguments trial;  // its `set` may also name noise, delay and the start
-  int64_t episodes = 0;  // in a cell; 0: as many as are usual
+  int64_t episodes = 0;  // per cell; 0: the usual number
   double check = 0.02;   // share of the cells to repeat in MuJoCo
 
   MapArguments() { trial.physics = kClosedForm.name; }
 
-  /// The numbers among them: name, range, unit, help.
+  /// Declares the numeric settings in `options`: name, range, unit, help.
   void Describe(Options& options);
 };
 
-/// The map of a policy that the arguments ask for, with no cell run yet. Throws BadInput.
+/// The map that the arguments ask for, with no cell computed yet. Throws BadInput.
 MapResult PlanMap(const MapArguments& a, const LoadedPolicy& loaded);
 
-/// The folder for a map's files, which is free. Throws BadInput, also if nothing can be drawn here.
+/// The folder for a map's files, which does not exist yet. Throws BadInput, also if no figure can
+/// be drawn on this machine.
 std::filesystem::path MapFolder(const MapArguments& a, const LoadedPolicy& loaded,
                                 const MapResult& map);
 
-/// Runs all cells, and in MuJoCo the share that is to be checked there. `progress` counts episodes.
+/// Runs all cells, and repeats the share of cells to check in MuJoCo. `progress` counts episodes.
 void FillMap(const MapArguments& a, const LoadedPolicy& loaded, ThreadPool& pool,
              const Progress& progress, MapResult& map);
 

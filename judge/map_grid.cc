@@ -15,12 +15,12 @@
 namespace upswing {
 namespace {
 
-constexpr int64_t kDefaultCells = 31;  // odd, so that the middle of ±50% is a cell
+constexpr int64_t kDefaultCells = 31;  // odd: the middle of ±50% is a cell
 constexpr int64_t kMostCells = 1000;
-// Episodes in lock-step: whole vectors, while network and activations stay in the L2 cache.
+// Episodes that step together: whole vectors, with network and activations in the L2 cache.
 constexpr int kTaskEpisodes = 64;
 
-/// Episodes of one cell or more that run together: consecutive in the map's own count.
+/// Consecutive episodes of the map that run together, from one or more cells.
 struct EpisodeRange {
   int64_t first;
   int count;
@@ -89,7 +89,7 @@ std::vector<EpisodeResult> RunRange(const MapConfig& config, const Policy& polic
   return results;
 }
 
-/// Cuts the episodes of the cells into ranges; neighbouring cells share one.
+/// Splits the episodes of the cells into ranges; neighbouring cells may share a range.
 std::vector<EpisodeRange> RangesOf(std::span<const int64_t> cells, int64_t episodes) {
   std::vector<EpisodeRange> ranges;
   for (const int64_t cell : cells) {
@@ -170,7 +170,7 @@ MapAxis ParseMapAxis(const std::string& text, const MapPoint& training, const st
   const int64_t usual = step > 0 ? std::llround((to - from) / step) + 1 : kDefaultCells;
   const int64_t cells = pieces.size() == 3 ? ParseCells(pieces[2], place) : usual;
   for (int64_t i = 0; i < cells; ++i) {
-    // Weighted like this, the middle of the ends comes out exact.
+    // With these weights, the middle of the axis is exact.
     const double between =
         (from * static_cast<double>(cells - 1 - i) + to * static_cast<double>(i)) /
         static_cast<double>(cells - 1);
@@ -214,7 +214,7 @@ std::vector<MapCell> RunMap(const MapConfig& config, const Policy& policy,
   std::mutex mutex;
   double done = 0;
   const double total = static_cast<double>(cells.size()) * config.episodes;
-  std::atomic<bool> failed = false;  // then the other ranges are not run
+  std::atomic<bool> failed = false;  // stops the other ranges
   pool.ParallelFor(static_cast<int>(ranges.size()), [&](int range) {
     if (failed) return;
     const auto i = static_cast<size_t>(range);
@@ -229,7 +229,7 @@ std::vector<MapCell> RunMap(const MapConfig& config, const Policy& policy,
     }
   });
 
-  // The ranges follow one another as the cells do.
+  // The ranges follow the order of the cells.
   std::vector<EpisodeResult> episodes;
   for (const auto& part : results) episodes.insert(episodes.end(), part.begin(), part.end());
   std::vector<MapCell> map;
@@ -246,7 +246,7 @@ std::vector<int64_t> DrawCells(const MapConfig& config, double share) {
   std::iota(cells.begin(), cells.end(), int64_t{0});
   const auto wanted = static_cast<size_t>(
       std::max<int64_t>(1, std::llround(share * static_cast<double>(config.cells()))));
-  // The first part of a random order (Fisher and Yates).
+  // The first part of a Fisher-Yates shuffle.
   Rng rng(config.env.seed, "map: cells to check");
   for (size_t i = 0; i < wanted; ++i) std::swap(cells[i], cells[i + rng.Below(cells.size() - i)]);
   cells.resize(wanted);

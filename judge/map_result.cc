@@ -21,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-/// A number as a table has it: empty for none.
+/// A number as a table cell; empty if it is not finite.
 std::string Known(double number) { return std::isfinite(number) ? FormatNumber(number) : ""; }
 
 double RateOf(const MapResult& map, const MapCell& cell) {
@@ -74,7 +74,7 @@ Figure MapFigure(const MapResult& map) {
     swing_up.z.push_back(cell.swing_up_seconds);
     longest = std::max(longest, cell.successes > 0 ? cell.swing_up_seconds : 0);
   }
-  // Where nothing has to swing up, the times differ by nothing that colours could show.
+  // If nothing has to swing up, the times differ too little for colours to show.
   if (longest < 0.1) swing_up.high = 1;
   Figure figure;
   figure.title = WithModel(map.policy, map.model);
@@ -89,7 +89,7 @@ Figure MapFigure(const MapResult& map) {
   return figure;
 }
 
-/// The success of each policy in a panel.
+/// A figure with a success panel for each policy.
 Figure SuccessFigure(const std::vector<MapResult>& maps) {
   Figure figure;
   figure.columns = maps.size() == 4 ? 2 : static_cast<int>(std::min<size_t>(3, maps.size()));
@@ -103,14 +103,14 @@ Figure SuccessFigure(const std::vector<MapResult>& maps) {
     HeatMap success = SuccessMap(map);
     success.bar = i % columns == columns - 1 || i == count - 1;
     Panel& panel = figure.panels.emplace_back(MapPanel(map, map.title, std::move(success)));
-    // One legend of all dots, at the bottom left.
+    // One legend for all dots, at the bottom left.
     const bool names = i == (rows - 1) * columns;
     for (Line& line : panel.lines) line.name = names ? "training or design" : "";
   }
   return figure;
 }
 
-/// The map as a JSON object, where null stands for a number that is not finite.
+/// The map as a JSON object; numbers that are not finite become null.
 ordered_json JsonOf(const MapResult& map) {
   const auto axis = [](const MapAxis& a) -> ordered_json {
     return {{"name", a.name}, {"unit", a.unit}, {"values", a.values}};
@@ -175,7 +175,7 @@ double MapResult::median_swing_up() const {
 }
 
 std::string MapResult::success_interval() const {
-  // From one given start all episodes are the same, unless there is noise.
+  // All episodes from one given start are the same, unless there is noise.
   if (config.episodes == 1 && config.start_given) return "";
   const Interval interval = WilsonInterval(config.episodes, config.episodes);
   return fmt::format("{0} of {0}: 95% interval {1:.1f}% to 100%", config.episodes,

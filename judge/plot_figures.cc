@@ -14,16 +14,16 @@ namespace {
 using Rows = std::vector<RolloutRow>;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-// Where angles wrap, degrees: hanging and upright are both well inside.
+// Angles wrap here, degrees: hanging and upright are well away from it.
 constexpr double kLinkLow = -135, kJointLow = -180;
 
-/// The motion between two rows.
+/// A state of the motion, at a row or between two rows.
 struct Moment {
   double t;  // s
   PendulumState state;
 };
 
-/// The rows, with three moments interpolated between each two: the motion is no straight line.
+/// The rows, with three interpolated moments between neighbours, because the motion is curved.
 std::vector<Moment> MotionOf(const Rows& rows) {
   constexpr int kPieces = 4;
   std::vector<Moment> motion;
@@ -44,13 +44,13 @@ double Link1(const PendulumState& s) { return s.q1 * kDegrees; }
 double Link2(const PendulumState& s) { return (s.q1 + s.q2) * kDegrees; }
 double Joint2(const PendulumState& s) { return s.q2 * kDegrees; }
 
-/// An angle in degrees, between `low` and a turn above it.
+/// An angle in degrees, wrapped into [low, low + 360).
 double Wrapped(double degrees, double low) {
   return degrees - 360 * std::floor((degrees - low) / 360);
 }
 
-/// A curve of an angle (degrees) and another quantity. The angle wraps within [low, low + 360):
-/// there the curve ends at one edge and begins again at the other.
+/// A curve of a quantity over an angle (degrees) that wraps within [low, low + 360). At a wrap, the
+/// curve ends at one edge and starts again at the other.
 class WrappingCurve {
  public:
   explicit WrappingCurve(double low) : low_(low) {}
@@ -63,7 +63,7 @@ class WrappingCurve {
           std::lerp(last_other_, other, (edge - last_angle_) / (angle - last_angle_));
       const bool up = turns > last_turns_;
       Push(up ? low_ + 360 : low_, at_edge);
-      Push(kNone, kNone);  // leaves a gap
+      Push(kNone, kNone);  // a gap
       Push(up ? low_ : low_ + 360, at_edge);
     }
     Push(angle - 360 * turns, other);
@@ -105,7 +105,7 @@ Line AngleOverTime(const std::string& name, const std::vector<Moment>& motion, A
   return line;
 }
 
-/// Steps: a row's value is held until the next row.
+/// A step curve: a row's value holds until the next row.
 template <typename Y>
 Line Held(const std::string& name, const Rows& rows, Y y) {
   Line line;
@@ -172,7 +172,7 @@ Panel Rewards(const Rollout& rollout) {
 double Largest(const RolloutRow& row) { return *std::ranges::max_element(row.q); }
 double Smallest(const RolloutRow& row) { return *std::ranges::min_element(row.q); }
 
-/// V, or the largest Q-value in the span of all.
+/// A panel of V, or of the largest Q-value within the span of all.
 Panel Values(const Rows& rows) {
   if (rows.front().q.size() == 1) return PanelOf("value (reward)", {Held("", rows, Largest)});
   Line line = Held("greedy (band: all)", rows, Largest);
@@ -181,7 +181,7 @@ Panel Values(const Rows& rows) {
   return PanelOf("Q-value (reward)", {line});
 }
 
-/// The chosen torque within the central 68% of those that the policy would draw.
+/// A panel of the chosen torque within the central 68% of the torques that the policy would draw.
 Panel Spread(const Rollout& rollout) {
   const Rows& rows = rollout.rows;
   Line line =
@@ -191,16 +191,16 @@ Panel Spread(const Rollout& rollout) {
   return PanelOf(TorqueLabel(rollout.spec), {line});
 }
 
-/// How far below the best action's each action's Q-value is; of long episodes the mean over some
-/// steps, or the cells would make a large file.
+/// A panel of each action's Q-value minus the best action's. In long episodes a cell is the mean
+/// over some steps, because more cells would make a large file.
 Panel QValues(const Rollout& rollout, std::span<const double> torques) {
   const Rows& rows = rollout.rows;
   constexpr size_t kMostColumns = 250;
-  const size_t steps = std::max<size_t>(1, rows.size() - 1);  // the last row lasts no time
+  const size_t steps = std::max<size_t>(1, rows.size() - 1);  // the last row has no duration
   const size_t width = (steps + kMostColumns - 1) / kMostColumns;
   HeatMap map;
   map.label = "Q - largest Q (reward)";
-  // Actions from the lowest torque to the highest.
+  // Order the actions from the lowest torque to the highest.
   std::vector<size_t> actions(torques.size());
   std::iota(actions.begin(), actions.end(), size_t{0});
   std::ranges::sort(actions, {}, [&](size_t a) { return torques[a]; });
@@ -225,8 +225,8 @@ Panel QValues(const Rollout& rollout, std::span<const double> torques) {
   return panel;
 }
 
-/// The motion over time: of the double pendulum with its energy, of other tasks each state
-/// variable.
+/// Panels of the motion over time. The double pendulum has its energy, too; other tasks have a
+/// panel for each state variable.
 std::vector<Panel> StatePanels(const Rollout& rollout) {
   if (HasPlant(rollout.spec.task)) {
     const std::vector<Moment> motion = MotionOf(rollout.rows);
@@ -241,12 +241,12 @@ std::vector<Panel> StatePanels(const Rollout& rollout) {
   return panels;
 }
 
-/// What the axes of a phase portrait are.
+/// The axes of a phase portrait.
 struct PhaseAxes {
   const char *angle_label, *velocity_label;
   double (*angle)(const PendulumState&);  // degrees
   double PendulumState::*velocity;
-  double low, upright;  // where the angle wraps, and its value upright, degrees
+  double low, upright;  // wrap of the angle, and its value upright, degrees
 };
 
 Panel Portrait(const std::vector<Moment>& motion, const PhaseAxes& axes) {
@@ -254,7 +254,7 @@ Panel Portrait(const std::vector<Moment>& motion, const PhaseAxes& axes) {
   for (const Moment& m : motion) curve.Add(axes.angle(m.state), m.state.*axes.velocity);
   Panel panel = PanelOf(axes.velocity_label, {});
   panel.x_label = axes.angle_label;
-  // As far as it went, upright included, and a margin.
+  // The reached range of the angle, upright included, with a margin.
   double low = axes.upright, high = axes.upright;
   for (const double angle : curve.angles) {
     low = std::min(low, angle);

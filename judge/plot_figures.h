@@ -3,14 +3,14 @@
 #include "judge/rollout.h"
 #include "report/figure.h"
 
-/// What `plot` draws of one episode.
+/// The figures that `plot` draws of one episode.
 namespace upswing {
 
-/// The motion, torque, the reward's terms and, as far as the policy estimates them and the rollout
-/// has them, the spread of its torques and its values over time.
+/// Motion, torque and reward terms over time. Adds the spread of the policy's torques and its
+/// values if the policy estimates them and the rollout has them.
 Figure EpisodeFigure(const Rollout& rollout, const Policy& policy);
 
-/// Velocity over angle of both joints of the double pendulum.
+/// Phase portraits of both joints of the double pendulum: velocity over angle.
 Figure PhaseFigure(const Rollout& rollout);
 
 }  // namespace upswing

@@ -13,10 +13,10 @@
 namespace upswing {
 namespace {
 
-/// Control steps in a second, a whole number in all tasks.
+/// Control steps per second, a whole number in all tasks.
 double StepsPerSecond(const EnvSpec& spec) { return std::round(1 / spec.step_seconds); }
 
-/// (Q) in units of reward.
+/// The policy's values (Q) in units of reward.
 std::vector<double> ValuesOf(const Policy& policy, Matrix<const float> obs,
                              Policy::Memory& memory) {
   std::vector<float> numbers(static_cast<size_t>(policy.num_values()));
@@ -28,7 +28,7 @@ std::vector<double> ValuesOf(const Policy& policy, Matrix<const float> obs,
   return values;
 }
 
-/// What the policy estimates in a row, as far as it does.
+/// Adds the estimates that the policy has to a row.
 void AddEstimates(const Policy& policy, Matrix<const float> obs, Policy::Memory& memory,
                   RolloutRow& row) {
   if (policy.num_values() > 0) row.q = ValuesOf(policy, obs, memory);
@@ -37,7 +37,7 @@ void AddEstimates(const Policy& policy, Matrix<const float> obs, Policy::Memory&
   policy.Spread(obs, {&row.spread->low, 1, 1}, {&row.spread->high, 1, 1}, memory);
 }
 
-/// The double pendulum's reward for the state and the torque of a row.
+/// Sets the double pendulum's reward for the state and torque of a row.
 void RewardRow(const Plant& plant, RolloutRow& row) {
   const auto terms = RewardTerms(plant, StateOf(row), row.torque);
   row.terms.assign(terms.begin(), terms.end());
@@ -125,7 +125,8 @@ double Episode::TorqueAt(double steps) const {
 
 Rollout RunRollout(const RolloutConfig& config) {
   Episode episode(config);
-  // Behind the last step there is one more state: its row's step gives the motor's torque there.
+  // Step once more than the rollout has steps: the extra step computes the motor's torque in the
+  // last state.
   const int64_t steps = RolloutSteps(episode.rollout().spec, config.seconds);
   while (episode.steps() <= steps && !episode.done()) episode.Step();
   return episode.rollout();
@@ -134,7 +135,7 @@ Rollout RunRollout(const RolloutConfig& config) {
 std::string TorqueText(const Rollout& rollout) {
   const bool pendulum = HasPlant(rollout.spec.task);
   const std::vector<RolloutRow>& rows = rollout.rows;
-  // The torque of the double pendulum's last state leads nowhere.
+  // Leave out the double pendulum's last state, because no step follows it.
   const size_t steps = rows.size() - (pendulum && rows.size() > 1 ? 1 : 0);
   TorqueTally tally(1, rollout.spec.step_seconds);
   for (size_t k = 0; k < steps; ++k) {
@@ -173,7 +174,7 @@ std::string RolloutCsv(const Rollout& rollout) {
       cells.insert(cells.end(), {Energy(rollout.plant, s), TipHeight(rollout.plant, s), inverted});
     }
     cells.push_back(row.reward);
-    for (const double term : row.terms) cells.push_back(term + 0.0);  // no -0
+    for (const double term : row.terms) cells.push_back(term + 0.0);  // turns -0 into 0
     std::vector<std::string> texts;
     texts.reserve(cells.size());
     for (const double cell : cells) texts.push_back(FormatNumber(cell));

@@ -36,7 +36,7 @@ EnvConfig OtherTask(const TrialArguments& a, const LoadedPolicy& loaded) {
   return env;
 }
 
-/// Where figures go unless the user says.
+/// The folder for figures if the user names none.
 fs::path DefaultOut(const LoadedPolicy& loaded, const std::string& name) {
   const bool has_file = !loaded.path.empty();
   const fs::path file = loaded.path, run = file.parent_path();
@@ -45,7 +45,7 @@ fs::path DefaultOut(const LoadedPolicy& loaded, const std::string& name) {
   return FreePath(of_run ? run / name : fs::path("runs") / Concat(name, "-", stem));
 }
 
-/// A state as --start gives it: a number for each state variable, such as q1,q2,w1,w2 (rad, rad/s).
+/// Parses the value of --start: a number for each state variable, such as q1,q2,w1,w2 (rad, rad/s).
 /// Throws BadInput.
 std::vector<double> ParseStart(const std::string& text, const EnvSpec& spec) {
   const std::vector<std::string_view> pieces = Split(text, ',');

@@ -16,7 +16,7 @@
 /// episodes in all of them.
 namespace upswing {
 
-/// How a trial differs from the training.
+/// Differences of a trial from the training.
 struct TrialArguments {
   std::string model, physics = "mujoco";
   std::vector<std::string> set;
@@ -51,10 +51,10 @@ TrialConditions ConditionsOf(const TrialArguments& a);
 /// episode i. Throws BadInput.
 EnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded);
 
-/// An environment with the single episode `index` of `config`.
+/// An environment whose only episode is episode `index` of `config`.
 std::unique_ptr<VectorEnv> OneEpisode(EnvConfig config, int index);
 
-/// Conditions that differ from the defaults, such as `delay 0.02, …`; empty if none.
+/// Conditions that differ from the defaults, such as `delay 0.02, …`; empty if there are none.
 std::string ChangesText(const EnvConfig& env);
 
 /// Differences of a plant from the policy's own plant, such as `mass2 1.3 kg (training: 1), …`;

@@ -9,7 +9,7 @@
 #include "sim/pendulum_env.h"
 #include "sim/pendulum_v1.h"
 
-// Sanitizers have their own malloc, and other C libraries do not export the original one.
+// Sanitizers replace malloc themselves, and other C libraries do not export the original malloc.
 #if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define UPSWING_COUNTS_ALLOCATIONS 1
 #if defined(__has_feature)
@@ -52,7 +52,7 @@ void* aligned_alloc(size_t alignment, size_t size) noexcept {
 namespace upswing {
 namespace {
 
-/// Number of allocations in so many control steps.
+/// Number of allocations in `steps` control steps.
 int64_t Allocations(VectorEnv& env, int steps) {
   StepResult result = env.MakeResult();
   const std::vector<double> torque(40, 1.0);
@@ -63,7 +63,7 @@ int64_t Allocations(VectorEnv& env, int steps) {
   return g_allocations - before;
 }
 
-/// The same of 40 double pendulums, with resets.
+/// Number of allocations of 40 double pendulums in `steps` control steps, resets included.
 int64_t Allocations(const Engine* engine, int steps) {
   PendulumEnvConfig config;
   config.engine = engine;
@@ -92,7 +92,7 @@ TEST(Allocation, AStepOfATaskOfGymnasiumAllocatesNothing) {
   config.num_envs = 40;
   PendulumV1 pendulum(config);
   AcrobotV1 acrobot(config);
-  EXPECT_EQ(Allocations(pendulum, 300), 0);  // over a reset
+  EXPECT_EQ(Allocations(pendulum, 300), 0);  // past a reset
   EXPECT_EQ(Allocations(acrobot, 600), 0);
 }
 

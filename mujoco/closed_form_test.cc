@@ -22,14 +22,14 @@
 namespace upswing {
 namespace {
 
-/// Room for the result of a step of so many environments.
+/// Allocates the result of a step of `num_envs` environments.
 StepResult ResultOf(int num_envs) {
   PendulumEnvConfig config;
   config.num_envs = num_envs;
   return StepResult(PendulumSpec(config));
 }
 
-/// Calls test(path) on each path that this processor has, and goes back to the best.
+/// Calls test(path) on each SIMD path that this processor has, then selects the best path again.
 template <typename Test>
 void OnEachPath(const Test& test) {
   for (const std::string& path : SimdPaths()) {
@@ -59,8 +59,8 @@ std::array<double, 4> StepOfMuJoCo(const Plant& plant, const PendulumState& s, d
   return {data->qpos[0], data->qpos[1], data->qvel[0], data->qvel[1]};
 }
 
-/// det M = M11 M22 - M12² leaves 1/κ of its first part. MuJoCo subtracts them as they stand and
-/// loses so much of its accuracy; the closed form has the difference as a formula.
+/// Cancellation in det M = M11 M22 - M12²: 1/κ of the first product is left. MuJoCo subtracts the
+/// products and loses the factor κ in accuracy; the closed form uses a formula for the difference.
 double Cancellation(const ClosedFormBatch& batch, size_t i) {
   const double bc = batch.b[i] * std::cos(batch.q2[i]);
   const double M11 = batch.J1[i] + batch.J2[i] + 2 * bc;
@@ -77,9 +77,9 @@ TEST(ClosedForm, SineAndCosineAreWithinTwoUlp) {
     x[i] = rng.Uniform(-most, most);
   }
   for (int i = 0; i < 100000; ++i) x.push_back(std::ldexp(rng.Uniform(-1, 1), -i % 60));
-  // Up to 1e4 each multiple of π/2, from there to 1e6 every 101st.
+  // Every multiple of π/2 up to 1e4, then every 101st up to 1e6.
   for (int n = -636619; n <= 636619; n += std::abs(n) <= 6366 ? 1 : 101) {
-    double near = n * (kPi / 2);  // and the numbers on both sides
+    double near = n * (kPi / 2);  // and its floating-point neighbours
     for (int i = 0; i < 3; ++i) near = std::nextafter(near, -1e9);
     for (int i = 0; i < 7; ++i, near = std::nextafter(near, 1e9)) x.push_back(near);
   }
@@ -121,7 +121,7 @@ TEST(ClosedForm, StepsLikeMuJoCoOverTheWholeRangeOfPlants) {
     for (size_t i = 0; i < kTrials; ++i) {
       double scale = 1;
       for (const double x : expected[i]) scale = std::max(scale, std::abs(x));
-      // Links of much different length lose digits within MuJoCo.
+      // MuJoCo loses digits for links of very different length.
       const double tolerance = 1e-12 * std::max(1.0, Cancellation(start, i) / 100);
       for (size_t k = 0; k < 4; ++k) {
         EXPECT_NEAR(StateOf(batch, i)[k], expected[i][k], tolerance * scale) << i << ", " << k;
@@ -153,7 +153,7 @@ TEST(ClosedForm, FollowsMuJoCosReferenceTrajectoryFor10Seconds) {
 }
 
 TEST(ClosedForm, EnvironmentsOfDifferentMachinesMoveAsInMuJoCo) {
-  // Rotors and dry friction are written into models that were compiled once for all plants.
+  // Models that are compiled once for all plants have rotors and dry friction written into them.
   Rng rng(5, "plants");
   PendulumEnvConfig config;
   config.num_envs = 6;
@@ -182,7 +182,7 @@ TEST(ClosedForm, EnvironmentsOfDifferentMachinesMoveAsInMuJoCo) {
 }
 
 TEST(ClosedForm, JudgesAsTheFormulasDo) {
-  constexpr size_t kTrials = 2003;  // a last vector that is not full
+  constexpr size_t kTrials = 2003;  // the last vector is not full
   ClosedFormBatch batch(kTrials);
   std::vector<Plant> plants;
   std::vector<double> torque;
@@ -192,7 +192,7 @@ TEST(ClosedForm, JudgesAsTheFormulasDo) {
     torque.push_back(rng.Uniform(-1.2, 1.2) * plants[i].torque_limit);
     batch.SetPlant(i, plants[i]);
     PendulumState s = RandomState(rng);
-    if (i % 4 == 0) s.q2 = rng.Uniform(0.8, 1.2) * kPi - s.q1;  // more of them inverted
+    if (i % 4 == 0) s.q2 = rng.Uniform(0.8, 1.2) * kPi - s.q1;  // makes more states inverted
     if (i % 4 == 0) s.q1 = rng.Uniform(0.8, 1.2) * kPi;
     batch.SetState(i, s);
     batch.angle_before[i] = MotorAngle(plants[i], s) - rng.Uniform(-0.1, 0.1);
@@ -240,7 +240,7 @@ TEST(ClosedForm, PlaceAndNumberOfEnvironmentsChangeNoBit) {
     states[i] = RandomState(rng);
   }
   const RewardWeights weights;
-  // Environments `first` to `last` of these, after ten control periods.
+  // Environments `first` to `last` of the batch, after ten control periods.
   const auto run = [&](size_t first, size_t last) {
     const size_t n = last - first;
     ClosedFormBatch batch(n);
@@ -272,7 +272,7 @@ TEST(ClosedForm, PlaceAndNumberOfEnvironmentsChangeNoBit) {
     }
     by_path.emplace(path, all);
   });
-  // On every path: to the bit where multiply-adds are fused, closely where they are not.
+  // All paths agree: to the bit with fused multiply-adds, closely without.
   for (const auto& [path, result] : by_path) {
     const StepResult& best = by_path.at(SimdPaths().front());
     const bool fused = path.starts_with("avx") || path == "neon";

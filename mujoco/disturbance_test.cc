@@ -42,8 +42,8 @@ TEST(Disturbance, SettingsAreChecked) {
 
 TEST(Disturber, TorquesArriveAfterTheDelayAndNoneFromAnEarlierEpisode) {
   Disturber motors({{0, 0}, {0, 0.02}, {0, 0.06}}, 3, {0, 0.06}, 1, "test");
-  // Torques that three motors apply when 1, 2, 3, … are chosen for all; the last two begin a new
-  // episode before the step at which 5 is chosen.
+  // Torques that three motors apply when 1, 2, 3, … are chosen for all. The last two motors begin a
+  // new episode before the step at which 5 is chosen.
   const double expected[7][3] = {{1, 0, 0}, {2, 1, 0}, {3, 2, 0}, {4, 3, 1},
                                  {5, 0, 0}, {6, 5, 0}, {7, 6, 0}};
   std::vector<int64_t> steps{0, 0, 0};
@@ -75,7 +75,8 @@ TEST(Disturber, NoiseIsNormalAndIndependentOnAllFour) {
     lag += z[0] * last;
     last = z[0];
   }
-  // Five standard errors: of a mean or product 1/√n, of the variance √(2/n), of z⁴ √(96/n).
+  // Tolerance: five standard errors, 1/√n for a mean or product, √(2/n) for the variance, √(96/n)
+  // for z⁴.
   const double error = 5 / std::sqrt(kCount);
   for (int i = 0; i < 4; ++i) {
     EXPECT_NEAR(sum[i] / kCount, 0, error);
@@ -90,7 +91,7 @@ TEST(Disturber, NoiseIsNormalAndIndependentOnAllFour) {
 TEST(Disturber, EachEnvironmentHasItsOwnStream) {
   Disturber two({{1, 0}}, 2, {1, 0}, 7, "test");
   Disturber second({{0, 0}, {1, 0}}, 2, {1, 0}, 7, "test"), other({{1, 0}}, 2, {1, 0}, 7, "other");
-  (void)two.Measure(0, {}, 0);  // takes nothing from the second's stream
+  (void)two.Measure(0, {}, 0);  // leaves the second environment's stream unchanged
   const double noise = two.Measure(1, {}, 0).q1;
   EXPECT_EQ(noise, second.Measure(1, {}, 0).q1);
   EXPECT_NE(noise, other.Measure(1, {}, 0).q1);
@@ -105,22 +106,22 @@ TEST(DisturbedEnv, OnlyMeasurementsHaveNoise) {
   StepResult result = env.MakeResult();
   double largest = 0;
   for (int step = 0; step < 6; ++step) {
-    // Both from the same state under the same torque: the motion is the same, the measurements are
-    // not.
+    // Both start in the same state under the same torque: the motion is the same, the measurements
+    // differ.
     env.SetState(0, {0.3, 0.1, 0, 0});
     env.SetState(1, {0.3, 0.1, 0, 0});
     env.Step(std::vector<double>{2, 2}, result);
     EXPECT_EQ(env.state(0).w1, env.state(1).w1);
     EXPECT_EQ(result.reward[0], result.reward[1]);
     const auto seen = std::span(result.next_obs).subspan(kObservationSize, kObservationSize);
-    // Sine and cosine of one measured angle; height and energy of the measured state.
+    // Sine and cosine are of the measured angle; height and energy are of the measured state.
     EXPECT_NEAR(std::hypot(seen[0], seen[1]), 1, 1e-6);
     const PendulumState said{std::atan2(seen[1], seen[0]), std::atan2(seen[4], seen[3]),
                              seen[2] * kMaxVelocity1, seen[5] * kMaxVelocity2};
     const auto expected = Observe(env.plant(1), said);
     for (size_t k = 0; k < kObservationSize; ++k) EXPECT_NEAR(seen[k], expected[k], 1e-6);
     largest = std::max(largest, std::abs(said.w1 - env.state(1).w1));
-    // The next observation is the same measurement.
+    // The next observation repeats the same measurement.
     EXPECT_TRUE(std::ranges::equal(env.obs().row(1), seen));
   }
   EXPECT_GT(largest, 0.005);
@@ -133,7 +134,7 @@ TEST(DisturbedEnv, ADelayedMotorActsAsOneThatIsCommandedLater) {
   perfect.disturbances = {Disturbance()};
   PendulumEnv reference(perfect);
   StepResult result = env.MakeResult(), expected = reference.MakeResult();
-  for (int step = 0; step < 20; ++step) {  // over two resets
+  for (int step = 0; step < 20; ++step) {  // past two resets
     const int in_episode = step % 7;
     const auto chosen = [&](int k) {
       return k < 0 ? 0.0 : 4 * std::sin(1.0 + step - in_episode + k);
@@ -146,7 +147,7 @@ TEST(DisturbedEnv, ADelayedMotorActsAsOneThatIsCommandedLater) {
     EXPECT_EQ(result.torque, expected.torque);
     EXPECT_EQ(result.truncated, expected.truncated);
     for (int i = 0; i < 4; ++i) EXPECT_EQ(env.state(i).q2, reference.state(i).q2);
-    // Perfect sensors see the same.
+    // Environments with perfect sensors observe the true state.
     for (const int i : {0, 2}) {
       EXPECT_TRUE(std::ranges::equal(env.obs().row(i), reference.obs().row(i),
                                      [](float a, float b) { return std::abs(a - b) < 1e-6; }));
@@ -155,10 +156,10 @@ TEST(DisturbedEnv, ADelayedMotorActsAsOneThatIsCommandedLater) {
 }
 
 TEST(DisturbedEnv, LoadedStateContinuesWithTheSameBits) {
-  ExpectLoadedGoesOn(FourKinds(), 5);  // with torques under way
+  ExpectLoadedGoesOn(FourKinds(), 5);  // with delayed torques pending
 }
 
-/// Environments whose sensors differ, with each physics.
+/// Environments with different sensors, for each engine.
 class MeasuredEnvs : public testing::TestWithParam<const Engine*> {
  protected:
   static PendulumEnvConfig Config() {
@@ -181,7 +182,7 @@ TEST_P(MeasuredEnvs, ObservationsAreOfThePastCountsAndTheRestIsTrue) {
   StepResult result = env.MakeResult(), expected = reference.MakeResult();
   for (int episode = 0; episode < 3; ++episode) {
     const PendulumState start = env.state(1);
-    std::vector<PendulumState> past;  // the start is at index 3
+    std::vector<PendulumState> past;  // the start has index 3
     for (int k = -3; k <= 0; ++k) {
       const double t = k * kControlPeriod;
       past.push_back({start.q1 + t * start.w1, start.q2 + t * start.w2, start.w1, start.w2});
@@ -221,7 +222,7 @@ TEST(MeasuredEnv, BothPhysicsMeasureTheSame) {
   config.engine = &kMuJoCo;
   PendulumEnv mujoco(config);
   StepResult a = mujoco.MakeResult(), b = twin.MakeResult();
-  for (int step = 0; step < 120; ++step) {  // over two resets
+  for (int step = 0; step < 120; ++step) {  // past two resets
     const std::vector<double> torque(20, 5 * std::sin(0.3 * step));
     mujoco.Step(torque, a);
     twin.Step(torque, b);

@@ -12,7 +12,7 @@
 namespace upswing {
 namespace {
 
-// EGL 1.5's interface as far as it is used here, as in Khronos' EGL/egl.h and EGL/eglext.h.
+// The used part of EGL 1.5's interface, as in Khronos' EGL/egl.h and EGL/eglext.h.
 using Handle = void*;
 using Int = int32_t;
 constexpr Int kNone = 0x3038, kSurfaceType = 0x3033, kPbufferBit = 1, kRenderableType = 0x3040,
@@ -22,8 +22,8 @@ constexpr uint32_t kOpenGlApi = 0x30A2, kPlatformDevice = 0x313F, kPlatformSurfa
 const char* const kAdvice =
     "; pictures without a window need EGL (Debian's packages libegl1 and libgl1-mesa-dri)";
 
-/// The library, and the display that contexts are made on; for the whole life of the process, as
-/// others in it may have the same display.
+/// The EGL library, and the display for contexts. Both last as long as the process, because other
+/// code may use the same display.
 class Egl {
  public:
   static const Egl& Get() {
@@ -57,7 +57,7 @@ class Egl {
 
  private:
   Egl() {
-    // Its names must be seen by MuJoCo, which looks for eglGetProcAddress.
+    // MuJoCo looks up eglGetProcAddress, so the library's names must be global.
     library_ = dlopen("libEGL.so.1", RTLD_NOW | RTLD_GLOBAL);
     if (library_ == nullptr) {
       throw Failure(Concat("expected the library libEGL.so.1, found none", kAdvice));
@@ -91,8 +91,8 @@ class Egl {
     return reinterpret_cast<Function>(eglGetProcAddress(name));
   }
 
-  /// The first device that works, in the system's order: cards before software. Where devices
-  /// cannot be listed, Mesa without a display, and then whatever EGL takes by itself.
+  /// Opens the first device that works, in the system's order: cards before software. If devices
+  /// cannot be listed, tries Mesa without a display, then EGL's default.
   void OpenDisplay() {
     const auto platform =
         Extension<Handle (*)(uint32_t, Handle, const Int*)>("eglGetPlatformDisplayEXT");
@@ -110,7 +110,7 @@ class Egl {
     throw Failure(Concat("EGL: expected a device that can draw with OpenGL, found none", kAdvice));
   }
 
-  /// Whether OpenGL can draw on this display; then it is the one.
+  /// Whether OpenGL can draw on this display; if so, uses it.
   bool Works(Handle candidate) {
     if (candidate == nullptr || eglInitialize(candidate, nullptr, nullptr) == 0) return false;
     constexpr std::array<Int, 5> kWanted{kSurfaceType, kPbufferBit, kRenderableType, kOpenGlBit,
@@ -149,7 +149,7 @@ EglContext::~EglContext() {
 
 EglContext::Use::Use(const EglContext& context) {
   const Egl& egl = Egl::Get();
-  egl.eglBindAPI(kOpenGlApi);  // of this thread
+  egl.eglBindAPI(kOpenGlApi);  // current in this thread
   display_ = egl.eglGetCurrentDisplay();
   draw_ = egl.eglGetCurrentSurface(kDraw);
   read_ = egl.eglGetCurrentSurface(kRead);

@@ -4,18 +4,18 @@
 
 namespace upswing {
 
-/// An OpenGL context without a window or a display, by EGL, whose library is loaded at run time: a
-/// graphics card where there is one that may be used, else Mesa's software.
+/// An OpenGL context without a window or display, by EGL. The EGL library is loaded at run time.
+/// Uses a graphics card if one is available, else Mesa's software renderer.
 class EglContext {
  public:
-  /// Throws Failure that says what is missing and what to install.
+  /// Throws Failure with the missing part and what to install.
   EglContext();
   ~EglContext();
   EglContext(const EglContext&) = delete;
   EglContext& operator=(const EglContext&) = delete;
 
-  /// Makes the context this thread's own during its lifetime; the one before it comes back then.
-  /// Another thread may be next.
+  /// Makes the context current in this thread during its lifetime, then restores the previous one.
+  /// Afterwards, another thread may use it.
   class Use {
    public:
     explicit Use(const EglContext& context);
@@ -24,7 +24,7 @@ class EglContext {
     Use& operator=(const Use&) = delete;
 
    private:
-    void *display_, *draw_, *read_, *context_;  // before
+    void *display_, *draw_, *read_, *context_;  // the previous context
   };
 
  private:

@@ -13,7 +13,7 @@
 namespace upswing {
 namespace {
 
-constexpr int kSmallestSlice = 4;  // environments; fewer do not repay a task of their own
+constexpr int kSmallestSlice = 4;  // environments; fewer are not worth a task
 constexpr int kMostSlices = 20;
 
 /// Gives every simulation of the batch its own row of a model field.
@@ -45,7 +45,7 @@ ModelFields ExpandedFields(mjBatch* batch, bool rotors, bool friction, int env) 
           if_any(friction, "dof_frictionloss")};
 }
 
-/// A plant whose MJCF has every element that these plants need.
+/// A plant whose MJCF has every element that any of these plants needs.
 Plant Superset(const std::vector<Plant>& plants) {
   Plant superset;
   for (const Plant& plant : plants) {
@@ -55,12 +55,12 @@ Plant Superset(const std::vector<Plant>& plants) {
   return superset;
 }
 
-/// N double pendulums in MuJoCo, by its batch interface: one batch for each slice of a few
-/// environments, which our thread pool distributes, so that MuJoCo needs no pool of its own. A
-/// warning of MuJoCo also counts as a blow-up.
+/// N double pendulums in MuJoCo's batch interface. Each slice of a few environments is a batch. Our
+/// thread pool distributes the slices, so MuJoCo needs no pool of its own. A MuJoCo warning counts
+/// as a blow-up, too.
 class MuJoCoPhysics : public Physics {
  public:
-  /// Throws BadInput on a model that does not compile or is no double pendulum.
+  /// Throws BadInput if the model does not compile or is not a double pendulum.
   explicit MuJoCoPhysics(const PhysicsConfig& config);
 
   PendulumState state(int env) const override;
@@ -71,7 +71,7 @@ class MuJoCoPhysics : public Physics {
   void State(const Archive& archive) override;
 
  private:
-  /// Consecutive environments, which one thread steps at a time, with MuJoCo's batch of them.
+  /// Consecutive environments with their own MuJoCo batch, which one thread steps at a time.
   struct Slice {
     int first, count;
     BatchPtr batch;
@@ -90,8 +90,8 @@ class MuJoCoPhysics : public Physics {
   PhysicsConfig config_;
   int slice_size_;
   std::vector<Slice> slices_;
-  bool rotors_ = false, dry_friction_ = false;  // of the model
-  int substeps_ = 0;                            // physics steps in a control period
+  bool rotors_ = false, dry_friction_ = false;  // whether the model has them
+  int substeps_ = 0;                            // physics steps per control period
   int state_size_ = 0;                          // numbers in a state row
   std::vector<double> previous_angle_;          // (N) of the motor's joint before the step, rad
 };
@@ -99,14 +99,14 @@ class MuJoCoPhysics : public Physics {
 MuJoCoPhysics::MuJoCoPhysics(const PhysicsConfig& config)
     : config_(config),
       slice_size_(std::max(kSmallestSlice, (config.num_envs + kMostSlices - 1) / kMostSlices)) {
-  // The model, with the plant that all environments share, or the first of many.
+  // Compile the model with the common plant, or with the first of several.
   const ModelPtr model = config_.mjcf.empty()
                              ? CompileModel(Mjcf(Superset(config_.plants)), "model")
                              : LoadModel(config_.mjcf, "model");
   WritePlant(config_.plant(0), FieldsOf(*model));
   rotors_ = HasRotors(*model);
   dry_friction_ = HasDryFriction(*model);
-  // The built-in model has none of these. MuJoCo does not search for what is disabled.
+  // The built-in model has no springs, sensors and islands. Disabled, MuJoCo skips the search.
   if (config_.mjcf.empty()) {
     model->opt.disableflags |= mjDSBL_SPRING | mjDSBL_SENSOR | mjDSBL_ISLAND;
   }
@@ -159,7 +159,7 @@ void MuJoCoPhysics::SetState(int env, const PendulumState& s) {
 }
 
 void MuJoCoPhysics::SetPlant(int env, const Plant& plant) {
-  // From now on each environment has its own plant.
+  // From here on, each environment has its own plant.
   config_.plants.resize(static_cast<size_t>(config_.num_envs), config_.plants.front());
   config_.plants[static_cast<size_t>(env)] = plant;
   const Slice& slice = SliceOf(env);
@@ -202,7 +202,7 @@ void MuJoCoPhysics::Judge(int env, double torque, StepResult& result) const {
 }
 
 void MuJoCoPhysics::Step(std::span<const double> torque, StepResult& result) {
-  // One captured reference, so that the task fits into std::function without an allocation.
+  // The lambda captures only one reference, so std::function needs no allocation.
   const struct {
     std::span<const double> torque;
     StepResult& result;

@@ -7,13 +7,14 @@
 
 namespace upswing {
 
-/// MuJoCo's batch interface.
+/// The engine that uses MuJoCo's batch interface.
 extern const Engine kMuJoCo;
 
-/// Those of the program: MuJoCo's and the closed form.
+/// All engines of the program: MuJoCo and the closed form.
 Engines AllEngines();
 
-/// The one of them with this name. Throws BadInput whose message begins with `where`.
+/// The engine of AllEngines with this name. Throws BadInput with a message that begins with
+/// `where`.
 inline const Engine& FindEngine(std::string_view name, const std::string& where) {
   return FindEngine(AllEngines(), name, where);
 }

@@ -1,4 +1,5 @@
-// Identification in both engines: MuJoCo's physics is not that which the estimator predicts with.
+// Tests of identification in both engines. The estimator predicts with the closed form, not with
+// MuJoCo.
 #include "sim/identification.h"
 
 #include <gtest/gtest.h>
@@ -30,7 +31,7 @@ class IdentifyingEnvs : public testing::TestWithParam<const Engine*> {
     for (size_t k = 0; k < 7; ++k) config.randomization.plant[k] = 0.25;
     return config;
   }
-  /// Half-random torques that move the pendulum well for `seconds`.
+  /// Moves the pendulum with half-random torques for `seconds`, enough for identification.
   static void Excite(PendulumEnv& env, double seconds) {
     StepResult result = env.MakeResult();
     Rng rng(1, "test");
@@ -43,7 +44,7 @@ class IdentifyingEnvs : public testing::TestWithParam<const Engine*> {
       env.Step(torque, result);
     }
   }
-  /// How far the observed δ and the constants are off: the median and the largest of the plants.
+  /// Median and largest error of the observed δ and of the constants, over the plants.
   struct Errors {
     double median, largest;
   };
@@ -66,7 +67,7 @@ INSTANTIATE_TEST_SUITE_P(Physics, IdentifyingEnvs, EachEngine(), EngineName);
 
 TEST_P(IdentifyingEnvs, FindThePlantOfEachEpisode) {
   PendulumEnv env(Box());
-  EXPECT_GT(DeltaErrors(env).median, 0.05);  // at the start it is taken for the nominal one
+  EXPECT_GT(DeltaErrors(env).median, 0.05);  // estimate = nominal plant
   Excite(env, 1);
   EXPECT_LT(DeltaErrors(env).median, 0.01);
   Excite(env, 3);

@@ -26,9 +26,9 @@ TEST_P(RememberingEnvs, ObservationsEndWithTorquesAndChangesOfVelocities) {
   PendulumEnv env(Config(2)), plain(Config(0));
   ASSERT_EQ(env.spec().obs_size, kObservationSize + 6);
   StepResult result = env.MakeResult(), expected = plain.MakeResult();
-  std::vector<PendulumState> states{env.state(1)};  // of the running episode, newest last
-  std::vector<double> torques;                      // which followed them, N·m
-  for (int step = 1; step <= 12; ++step) {          // over two resets
+  std::vector<PendulumState> states{env.state(1)};  // of the running episode, latest last
+  std::vector<double> torques;                      // the torque after each state, N·m
+  for (int step = 1; step <= 12; ++step) {          // past two resets
     const double torque = step % 4 - 1.5;
     torques.push_back(torque);
     env.Step(std::vector<double>{0, torque, 7}, result);
@@ -39,7 +39,7 @@ TEST_P(RememberingEnvs, ObservationsEndWithTorquesAndChangesOfVelocities) {
 
     for (int i = 0; i < 3; ++i) {
       const size_t row = static_cast<size_t>(i) * (kObservationSize + 6);
-      // The observation without memory comes first, with the same bits.
+      // The observation begins with the observation without memory, with the same bits.
       EXPECT_TRUE(std::ranges::equal(
           std::span(result.next_obs).subspan(row, kObservationSize),
           std::span(expected.next_obs)
@@ -47,7 +47,7 @@ TEST_P(RememberingEnvs, ObservationsEndWithTorquesAndChangesOfVelocities) {
       EXPECT_TRUE(std::ranges::equal(env.obs().row(i).first(kObservationSize), plain.obs().row(i)));
     }
 
-    // The memory of the next observation; torques over 5 N·m.
+    // Check the memory of the next observation; torques are scaled by 5 N·m.
     const auto memory = env.obs().row(1).subspan(kObservationSize);
     if (done) {
       states = {env.state(1)};

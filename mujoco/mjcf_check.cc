@@ -17,15 +17,15 @@ constexpr int kMostElements = 200;  // the built-in model has 15
 constexpr int kMostLevels = 10;     // of nesting; the built-in model has 5
 constexpr size_t kMostName = 100;   // bytes
 
-constexpr double kLargest = 1e6;  // size of a number
+constexpr double kLargest = 1e6;  // largest magnitude of a number
 
-/// An element, and the attributes and elements that it may have, as words.
+/// An element with its allowed attributes and child elements, as words.
 struct Element {
   std::string name, attributes, children = {};
 };
 
-/// Attributes that hold a name. Others hold numbers and kKeywords; how many and which, MuJoCo
-/// checks.
+/// Attributes that hold a name. Other attributes hold numbers and kKeywords; MuJoCo checks which
+/// ones and how many.
 constexpr std::string_view kNames =
     "name class childclass model joint actuator body1 body2 target eulerseq";
 constexpr std::string_view kKeywords =
@@ -44,7 +44,7 @@ std::vector<Element> MakeElements() {
        "timestep gravity integrator iterations ls_iterations tolerance ls_tolerance solver "
        "jacobian cone density viscosity",
        "flag"},
-      // Without the flags that switch off gravity, springs, damping, the motor or its limit.
+      // The flags that switch off gravity, springs, damping, the motor or its limit are left out.
       {"flag",
        "contact constraint equality frictionloss limit warmstart eulerdamp refsafe midphase "
        "nativeccd island energy sensor"},
@@ -73,7 +73,7 @@ std::vector<Element> MakeElements() {
   };
 }
 
-/// The words of `text`, between any number of blanks.
+/// The words of `text`, separated by whitespace.
 std::vector<std::string> Words(std::string_view text) {
   constexpr std::string_view kBlanks = " \t\n\r";
   std::vector<std::string> words;
@@ -85,14 +85,14 @@ std::vector<std::string> Words(std::string_view text) {
   return words;
 }
 
-/// `text` in quotes; of a long text its beginning.
+/// `text` in quotes, cut if it is long.
 std::string Quoted(std::string_view text) {
   constexpr size_t kMostShown = 40;
   if (text.size() <= kMostShown) return Concat("\"", Printable(text), "\"");
   return Concat("\"", Printable(text.substr(0, kMostShown)), "…\"");
 }
 
-/// Checks one document; messages begin with `where`.
+/// Checks one document; error messages begin with `where`.
 class Checker {
  public:
   explicit Checker(const std::string& where) : where_(where), elements_(MakeElements()) {}
@@ -114,7 +114,7 @@ class Checker {
     throw BadInput(Concat(where_, ":", line, ": ", why));
   }
 
-  /// Such as "mismatched element".
+  /// The parser's error, such as "mismatched element".
   static std::string ErrorText(const tinyxml2::XMLDocument& document) {
     std::string text = document.ErrorName();
     for (const std::string_view prefix : {"XML_ERROR_", "XML_"}) {
@@ -176,7 +176,7 @@ class Checker {
            Concat("<", element.name, "> ", name, ": expected ", expected, ", got ", Quoted(text)));
   }
 
-  /// What the attribute of this name takes; empty if it takes the text.
+  /// A description of the attribute's valid values; empty if `text` is valid.
   static std::string Expected(const std::string& name, std::string_view text) {
     if (std::ranges::count(Words(kNames), name) > 0) {
       const bool fits = text.size() <= kMostName && Printable(text) == text;
@@ -194,7 +194,7 @@ class Checker {
 
   const std::string& where_;
   std::vector<Element> elements_;
-  int count_ = 0;  // elements so far
+  int count_ = 0;  // number of elements so far
 };
 
 }  // namespace
@@ -204,7 +204,7 @@ void CheckMjcf(const std::string& mjcf, const std::string& where) {
     throw BadInput(
         Concat(where, ": expected MJCF of at most ", kMostMjcfBytes, " bytes, got ", mjcf.size()));
   }
-  std::string text = mjcf.starts_with("\xef\xbb\xbf") ? mjcf.substr(3) : mjcf;  // the mark of UTF-8
+  std::string text = mjcf.starts_with("\xef\xbb\xbf") ? mjcf.substr(3) : mjcf;  // byte order mark
   std::ranges::replace_if(
       text, [](char c) { return c == '\t' || c == '\n' || c == '\r'; }, ' ');
   if (Printable(text) != text) {

@@ -15,7 +15,7 @@
 namespace upswing {
 namespace {
 
-/// The built-in model with the first occurrence of a text replaced.
+/// The built-in model with the first occurrence of `from` replaced by `to`.
 std::string Changed(const std::string& from, const std::string& to) {
   std::string mjcf = Mjcf(Plant());
   return mjcf.replace(mjcf.find(from), from.size(), to);
@@ -34,7 +34,7 @@ std::string ErrorOf(
   return "";
 }
 
-/// Expects one line that begins with the file's name, is not long, and in which `words` occurs.
+/// Expects one short line that begins with the file's name and contains `words`.
 void ExpectRefused(const std::string& mjcf, const std::string& words) {
   const std::string error = ErrorOf(mjcf);
   EXPECT_TRUE(error.starts_with("m.xml:")) << error;
@@ -53,7 +53,7 @@ TEST(MjcfCheck, TakesTheBuiltInModelOfAnyPlant) {
   EXPECT_EQ(ErrorOf(Mjcf(plant)), "");
 }
 
-// What others write: MuJoCo takes it, too, and it is a double pendulum.
+// Hand-written variants that MuJoCo accepts and that are double pendulums.
 TEST(MjcfCheck, TakesWhatIsWrittenByHand) {
   const std::string mjcf =
       "\xef\xbb\xbf"
@@ -131,8 +131,8 @@ TEST(MjcfCheck, SaysWhichAttributeWasNotExpectedAndWhere) {
                 "m.xml:7: <joint> takes no \"actuatorfrcrange\" here");
   ExpectRefused(Changed("damping=", "dampng="), "did you mean damping?");
   for (const auto& [from, to] : std::vector<std::pair<std::string, std::string>>{
-           {"<motor ", "<motor forcerange=\"-1 1\" "},  // a limit that is no parameter of the plant
-           {"<motor ", "<motor nsample=\"200000000\" "},  // a buffer of that size
+           {"<motor ", "<motor forcerange=\"-1 1\" "},    // a limit that is not in the plant
+           {"<motor ", "<motor nsample=\"200000000\" "},  // would allocate a buffer of that size
            {"<motor ", "<motor delay=\"0.1\" "},
            {"<motor ", "<motor user=\"1 2\" "},
            {"<body name=\"link2\"", "<body gravcomp=\"1\" name=\"link2\""},
@@ -148,7 +148,7 @@ TEST(MjcfCheck, SaysWhichAttributeWasNotExpectedAndWhere) {
   }
 }
 
-// What this check leaves to MuJoCo and to the check of the model.
+// Errors that this check leaves to MuJoCo and to LoadModel.
 TEST(MjcfCheck, LoadModelRefusesEveryOtherNumberAndWord) {
   for (const auto& [from, to] : std::vector<std::pair<std::string, std::string>>{
            {"\"0.005\"", "\"1e-9\""},
@@ -207,7 +207,7 @@ TEST(MjcfCheck, RefusesWhatIsNoPlainXml) {
   ExpectRefused("<!-- nothing -->", "expected <mujoco>");
   ExpectRefused("<mujoco>\ntext</mujoco>", "expected only elements and comments, got");
   ExpectRefused("<mujoco><![CDATA[text]]></mujoco>", "expected only elements and comments");
-  // Nested entities, each ten of the one before: they are not expanded.
+  // Nested entities, each ten times the previous one; the parser must not expand them.
   ExpectRefused(
       "<!DOCTYPE m [<!ENTITY a \"aaaaaaaaaa\"><!ENTITY b \"&a;&a;&a;&a;&a;\">]>\n"
       "<mujoco model=\"&b;\"/>",

@@ -12,9 +12,9 @@
 namespace upswing {
 namespace {
 
-/// Adds the dry friction c atan(s w) of models that have it, with c the frictionloss and s the user
-/// data of a joint. MuJoCo's own frictionloss is a constraint: at rest it holds, and it has no
-/// slope; as a passive force both engines agree to rounding.
+/// Adds the dry friction c atan(s w) to models that have it; c is a joint's frictionloss and s its
+/// user data. MuJoCo's own frictionloss is a constraint, which holds at rest and has no slope. As a
+/// passive force, both engines agree to rounding.
 void AddDryFriction(const mjModel* model, mjData* data) {
   if (!HasDryFriction(*model)) return;
   for (int i = 0; i < model->nv; ++i) {
@@ -23,9 +23,9 @@ void AddDryFriction(const mjModel* model, mjData* data) {
   }
 }
 
-/// Replaces MuJoCo's handlers, which print warnings and log them to a file in the current folder,
-/// and end the program on an error; adds ours of dry friction. Once, as they are global and threads
-/// compile models.
+/// Replaces MuJoCo's handlers, which print warnings, log them to a file in the current folder, and
+/// end the program on an error. Adds our handler of dry friction. Runs once, because handlers are
+/// global and several threads compile models.
 void SetHandlers() {
   static std::once_flag once;
   std::call_once(once, [] {
@@ -37,7 +37,7 @@ void SetHandlers() {
 
 constexpr int kLinkBodies[2] = {1, 2};  // body 0 is the world
 
-/// Compiles untrusted MJCF: every error of MuJoCo's is bad input.
+/// Compiles untrusted MJCF. Turns every MuJoCo error into BadInput.
 ModelPtr CompileGiven(const std::string& mjcf, const std::string& where) {
   try {
     return CompileModel(mjcf, where);
@@ -55,7 +55,7 @@ void CheckRanges(Plant plant, const std::string& where) {
   }
 }
 
-/// Throws BadInput about a model from `where` unless `valid`.
+/// Callable: throws BadInput about a model from `where` unless `valid`.
 class Expectation {
  public:
   explicit Expectation(const std::string& where) : where_(where) {}
@@ -67,7 +67,7 @@ class Expectation {
   const std::string& where_;
 };
 
-/// Two bodies, two hinges, two capsules, a motor, a timestep.
+/// Checks the structure: two bodies, two hinges, two capsules, a motor and the timestep.
 void CheckStructure(const mjModel& model, const Expectation& expect) {
   expect(model.nbody == 3 && model.body_parentid[2] == 1, "two bodies, the second on the first");
   expect(model.njnt == 2 && model.jnt_type[0] == mjJNT_HINGE && model.jnt_type[1] == mjJNT_HINGE &&
@@ -86,7 +86,7 @@ void CheckStructure(const mjModel& model, const Expectation& expect) {
              model.actuator_biastype[0] == mjBIAS_NONE,
          "a motor whose control is its torque");
   const double substeps = kControlPeriod / model.opt.timestep;
-  // A shorter timestep makes an evaluation take minutes.
+  // With a shorter timestep, an evaluation would take minutes.
   expect(substeps > 0.5 && substeps < 200.5 && std::abs(substeps - std::round(substeps)) < 1e-6,
          Concat("a timestep that divides ", kControlPeriod, " s, of at least 1e-04 s, got ",
                 model.opt.timestep));
@@ -98,7 +98,7 @@ void CheckStructure(const mjModel& model, const Expectation& expect) {
          "density and viscosity that are not negative");
 }
 
-/// Numbers of each joint that are not part of the plant.
+/// Checks the numbers of each joint that are not part of the plant.
 void CheckJoints(const mjModel& model, const Expectation& expect) {
   for (const int joint : {0, 1}) {
     const auto not_negative = [&](const mjtNum* numbers, std::string_view what) {
@@ -115,7 +115,7 @@ void CheckJoints(const mjModel& model, const Expectation& expect) {
                std::all_of(model.dof_dampingpoly + mjNPOLY * joint,
                            model.dof_dampingpoly + mjNPOLY * (joint + 1), is_zero),
            "one number for the stiffness and one for the damping of a joint");
-    // A mirrored motion is a motion, which learning in a mirror relies on.
+    // The mirror image of a motion must be a motion, because learning uses the mirror symmetry.
     expect(model.jnt_stiffness[joint] == 0 || model.qpos_spring[joint] == 0,
            Concat("springs at rest where the links hang (springref 0), got ",
                   FormatNumber(model.qpos_spring[joint]), " rad"));
@@ -125,8 +125,8 @@ void CheckJoints(const mjModel& model, const Expectation& expect) {
   }
 }
 
-/// Where the links are must follow from the plant, and writing the plant must change nothing that
-/// the file says. Armature, friction, stiffness, radius and integrator are the file's own affair.
+/// Checks that the links' positions follow from the plant, so that writing the plant keeps the
+/// file's model. Armature, friction, stiffness, radius and integrator may be anything.
 void CheckGeometry(const mjModel& model, const std::string& where, const Expectation& expect) {
   const ModelPtr ours = CompileModel(Mjcf(PlantOf(model)), where);
   const ModelPtr written(mj_copyModel(nullptr, &model));
@@ -151,14 +151,15 @@ std::string MuJoCoVersion() { return mj_versionString(); }
 
 ModelPtr CompileModel(const std::string& mjcf, const std::string& where) {
   SetHandlers();
-  // One at a time: the thread sanitizer sees parsers in two threads share a buffer within MuJoCo.
+  // Compile one model at a time: the thread sanitizer reports that parsers in two threads share a
+  // buffer within MuJoCo.
   static std::mutex compiling;
   const std::lock_guard lock(compiling);
   std::array<char, 1000> message{};
   const std::unique_ptr<mjSpec, MuJoCoDeleter> spec(
       mj_parseXMLString(mjcf.c_str(), nullptr, message.data(), message.size()));
   const auto complaint = [&](std::string text) {
-    std::ranges::replace(text, '\n', ' ');  // an error is one line
+    std::ranges::replace(text, '\n', ' ');  // keeps an error on one line
     return BadInput(Concat(where, ": ", Printable(Trim(text))));
   };
   if (spec == nullptr) throw complaint(message.data());

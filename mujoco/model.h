@@ -9,7 +9,7 @@
 
 #include "sim/double_pendulum.h"
 
-/// Owning handles of MuJoCo objects, and the plant's numbers within a compiled model.
+/// Owning handles of MuJoCo objects, and access to the plant's numbers in a compiled model.
 namespace upswing {
 
 struct MuJoCoDeleter {
@@ -22,28 +22,33 @@ using ModelPtr = std::unique_ptr<mjModel, MuJoCoDeleter>;
 using DataPtr = std::unique_ptr<mjData, MuJoCoDeleter>;
 using BatchPtr = std::unique_ptr<mjBatch, MuJoCoDeleter>;
 
-/// Such as "4.0.0".
+/// MuJoCo's version, such as "4.0.0".
 std::string MuJoCoVersion();
 
-/// Compiles MJCF. Throws BadInput with MuJoCo's own message, after `where` (a file's name).
+/// Compiles MJCF. Throws BadInput with `where` (a file's name) and MuJoCo's own message.
 ModelPtr CompileModel(const std::string& mjcf, const std::string& where);
 
-/// Compiles untrusted MJCF after CheckMjcf. Throws BadInput, too, unless the model is built like
-/// the built-in one: two solid capsules hanging on hinges about +y, a motor of the same limit both
-/// ways at one of them, gravity along -z, springs at rest hanging, limits of the joints the same
-/// both ways, a timestep that divides the control period, and a plant within the ranges of its
-/// settings. Armature, friction, stiffness, the capsules' radius and the integrator may differ.
+/// Compiles untrusted MJCF after CheckMjcf. Throws BadInput unless the model has the structure of
+/// the built-in one:
+/// - two solid capsules hanging on hinges about +y
+/// - a motor at one hinge, with the same limit both ways
+/// - gravity along -z
+/// - springs at rest when hanging, and joint limits that are the same both ways
+/// - a timestep that divides the control period
+/// - a plant within the ranges of its settings
+///
+/// Armature, friction, stiffness, the capsules' radius and the integrator may differ.
 ModelPtr LoadModel(const std::string& mjcf, const std::string& where);
 
-/// Differences of a loaded model from the built-in one that affect the motion, apart from the
-/// plant's parameters; such as "armature1 0.02 kg·m²".
+/// Differences of a loaded model from the built-in one that affect the motion, without the plant's
+/// parameters; such as "armature1 0.02 kg·m²".
 std::vector<std::string> DifferencesFromBuiltIn(const mjModel& model);
 
-/// The plant that a loaded model describes, without rotors and dry friction, which only the
-/// built-in one has.
+/// The plant that a loaded model describes. It has no rotors and no dry friction, which only the
+/// built-in model can have.
 Plant PlantOf(const mjModel& model);
 
-/// Pointers to the plant's numbers: in an mjModel, or in rows that a batch has expanded. The
+/// Pointers to the plant's numbers in an mjModel, or in rows that a batch has expanded. The
 /// comments give sizes.
 struct ModelFields {
   mjtNum* body_mass;           // (3)
@@ -56,20 +61,20 @@ struct ModelFields {
   mjtNum* actuator_ctrlrange;  // (1 × 2)
   int* actuator_trnid;         // (1 × 2)
   mjtNum* gravity;             // (3)
-  // Null where the model was compiled without rotors or without dry friction.
+  // Null if the model was compiled without rotors or without dry friction:
   mjtNum* dof_armature;      // (2)
   mjtNum* tendon_armature;   // (1)
   mjtNum* wrap_prm;          // (2)
   mjtNum* dof_frictionloss;  // (2)
 };
-/// Whether a model has what a plant's rotors, and what its dry friction is written to.
+/// Whether a model has the fields for a plant's rotors, and for its dry friction.
 bool HasRotors(const mjModel& model);
 bool HasDryFriction(const mjModel& model);
 ModelFields FieldsOf(mjModel& model);
 
-/// Writes a plant into a loaded model, as if its MJCF had these numbers. mj_setConst or
-/// mjb_setConst must follow. Throws BadInput if the plant has rotors or dry friction and the model
-/// was compiled without them.
+/// Writes a plant into a loaded model, as if its MJCF had these numbers. The caller then calls
+/// mj_setConst or mjb_setConst. Throws BadInput if the plant has rotors or dry friction and the
+/// model was compiled without them.
 void WritePlant(const Plant& plant, const ModelFields& fields);
 
 }  // namespace upswing

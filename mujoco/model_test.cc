@@ -50,8 +50,8 @@ double CapsuleInertia(double mass, double length) {
   return mass * moment / volume;
 }
 
-/// The equations of motion in closed form: M(q) q̈ = τ - c(q, q̇) - g(q) - d q̇, with absolute link
-/// angles' energies differentiated by hand. I1, I2: moments about the links' centres.
+/// The equations of motion in closed form: M(q) q̈ = τ - c(q, q̇) - g(q) - d q̇, from the energies
+/// in absolute link angles, differentiated by hand. I1, I2: moments about the links' centres.
 struct ClosedForm {
   Plant p;
   double I1, I2;
@@ -143,7 +143,7 @@ TEST(Model, MuJoCoStepsLikeTheClosedFormAt100RandomStatesAndPlants) {
     const ModelPtr model = ModelWith(plant);
     const DataPtr data(mj_makeData(model.get()));
     const ClosedForm closed{plant, model->body_inertia[3], model->body_inertia[6]};
-    // The capsule's inertia itself has a derivation of its own (midpoint rule: ~1e-9).
+    // The capsule's inertia has its own derivation (midpoint rule, error about 1e-9).
     EXPECT_NEAR(closed.I1, CapsuleInertia(plant.mass1, plant.length1), 1e-8 * closed.I1);
 
     const std::array<double, 4> x{rng.Uniform(-4, 4), rng.Uniform(-4, 4), rng.Uniform(-8, 8),
@@ -175,7 +175,7 @@ TEST(Model, DisablingContactsAndConstraintsChangesNoBit) {
   }
 }
 
-TEST(Model, ThreadsMayCompileAtTheSameTime) {  // which the thread sanitizer watches
+TEST(Model, ThreadsMayCompileAtTheSameTime) {  // for the thread sanitizer
   constexpr int kModels = 16;
   std::vector<ModelPtr> models(kModels);
   ThreadPool pool(4);

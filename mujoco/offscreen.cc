@@ -24,7 +24,7 @@ struct Offscreen::Graphics {
   std::optional<Painter> painter;
 
   explicit Graphics(PictureSize size) {
-    // Rendering needs of its model what all scenes have in common: floor, sky and light.
+    // The renderer only needs what all scenes share: floor, sky and light.
     PendulumScene room{Plant(), ""};
     const EglContext::Use use(context);
     painter.emplace(room.model(), mjFB_OFFSCREEN, size.width, size.height);
@@ -33,7 +33,7 @@ struct Offscreen::Graphics {
     try {
       const EglContext::Use use(context);
       painter.reset();
-    } catch (const Error&) {  // the driver is gone, and what it held with it
+    } catch (const Error&) {  // the driver is gone, and its resources too
     }
   }
 };

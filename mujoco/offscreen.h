@@ -22,20 +22,20 @@ struct PictureSize {
   bool operator==(const PictureSize&) const = default;
 };
 
-/// The size; throws BadInput if it is out of range.
+/// Returns `size`; throws BadInput if it is out of range.
 PictureSize CheckedSize(PictureSize size);
 
-/// Pictures without a window: MuJoCo's own rendering over EGL, which is loaded at run time. Any
-/// thread may use it, one at a time; several of these do not disturb each other.
+/// Pictures without a window: MuJoCo's rendering over EGL, which is loaded at run time. Any thread
+/// may use an object, one thread at a time. Several objects do not disturb each other.
 class Offscreen {
  public:
-  /// Throws BadInput if a size is out of range, and Failure with what to install where there is no
-  /// EGL or no device for it.
+  /// Throws BadInput if a size is out of range. Throws Failure with what to install if EGL or a
+  /// device for it is missing.
   explicit Offscreen(PictureSize size);
   ~Offscreen();
 
-  /// The picture of these panels side by side: pixels (height × width × 3), red, green, blue, the
-  /// top row first, until the next call.
+  /// Draws these panels next to each other. Returns pixels (height × width × 3), red, green, blue,
+  /// top row first; valid until the next call.
   std::span<const uint8_t> Render(std::span<const ScenePanel> panels);
 
   PictureSize size() const { return size_; }
@@ -45,7 +45,7 @@ class Offscreen {
 
   PictureSize size_;
   std::unique_ptr<Graphics> graphics_;
-  std::vector<uint8_t> pixels_, rows_;  // top row first, and as OpenGL has them
+  std::vector<uint8_t> pixels_, rows_;  // top row first; in OpenGL's order
 };
 
 }  // namespace upswing

@@ -21,8 +21,8 @@ namespace {
 using Pixels = std::vector<uint8_t>;
 using Angles = std::array<double, 2>;
 
-/// Tests of pictures; skipped where nothing can draw, unless UPSWING_REQUIRE_PICTURES says that it
-/// must.
+/// Fixture of picture tests. Skips them if this machine cannot draw, unless
+/// UPSWING_REQUIRE_PICTURES is set.
 class OffscreenTest : public testing::Test {
  protected:
   void SetUp() override {
@@ -38,7 +38,7 @@ class OffscreenTest : public testing::Test {
   }
 };
 
-/// Pictures of one pendulum.
+/// Draws pictures of one pendulum.
 class Artist {
  public:
   explicit Artist(PictureSize size, const Plant& plant = {}, const Camera& camera = {})
@@ -57,8 +57,8 @@ class Artist {
   PendulumScene scene_;
 };
 
-/// The middle of the pixels in which a colour prevails: column and row in [-1, 1], right and up;
-/// nothing if there are hardly any.
+/// The mean position of the pixels in a colour: column and row in [-1, 1], right and up. Nothing if
+/// there are hardly any.
 template <typename Wanted>
 std::optional<std::array<double, 2>> MiddleOf(const Pixels& pixels, PictureSize size,
                                               const Wanted& wanted) {
@@ -92,7 +92,8 @@ TEST_F(OffscreenTest, LinksAreWhereTheAnglesSay) {
     SCOPED_TRACE(testing::Message() << "q = " << q[0] << ", " << q[1]);
     const auto middle = MiddleOf(artist.Draw(q), size, IsBlue);
     ASSERT_TRUE(middle);
-    // Centre of both links (m) over what half of the picture shows (m): 1.16 of their reach, 1 m.
+    // Centre of both links (m) divided by half of the picture's height (m), 1.16 times their reach
+    // of 1 m.
     const double x = -(0.375 * std::sin(q[0]) + 0.125 * std::sin(q[0] + q[1])) / 1.16;
     const double z = -(0.375 * std::cos(q[0]) + 0.125 * std::cos(q[0] + q[1])) / 1.16;
     EXPECT_NEAR((*middle)[0], x, 0.04);
@@ -104,13 +105,13 @@ TEST_F(OffscreenTest, TorqueAndGoalAreShown) {
   const PictureSize size{240, 240};
   Artist artist(size);
   EXPECT_FALSE(MiddleOf(artist.Draw({0, 0}), size, IsOrange));
-  // Positive torque turns clockwise: from the top over the right.
+  // A positive torque turns clockwise: from the top to the right.
   const auto right = MiddleOf(artist.Draw({0, 0}, 3), size, IsOrange);
   const auto left = MiddleOf(artist.Draw({0, 0}, -3), size, IsOrange);
   ASSERT_TRUE(right && left);
   EXPECT_GT((*right)[0], 0.05);
   EXPECT_LT((*left)[0], -0.05);
-  // The goal becomes green when both links are upright.
+  // The goal turns green when both links are upright.
   EXPECT_FALSE(MiddleOf(artist.Draw({0, 0}), size, IsGreen));
   const auto goal = MiddleOf(artist.Draw({kPi + 0.2, 0}), size, IsGreen);
   ASSERT_TRUE(goal);
@@ -134,7 +135,7 @@ TEST_F(OffscreenTest, AnyThreadMayDraw) {
   Pixels there;
   std::thread([&] { there = artist.Draw({1, 2}); }).join();
   EXPECT_EQ(there, here);
-  // Two threads, each with its own, at the same time.
+  // Two threads draw at the same time, each with its own Offscreen.
   std::array<Pixels, 2> both;
   std::vector<std::thread> threads;
   for (Pixels& pixels : both) {

@@ -10,19 +10,20 @@
 namespace upswing {
 namespace {
 
-/// MuJoCo's fonts have no other characters, and a line must fit into a picture.
+/// `text` in printable ASCII and short enough for a picture; MuJoCo's fonts have no other
+/// characters.
 std::string Ascii(std::string_view text) {
   constexpr size_t kMost = 60;
   std::string out;
   for (const char c : text.substr(0, kMost)) {
     const auto byte = static_cast<unsigned char>(c);
-    if (byte >= 0x80 && byte < 0xC0) continue;  // within a character of several bytes
+    if (byte >= 0x80 && byte < 0xC0) continue;  // not the first byte of its character
     out += byte >= 0x20 && byte < 0x7F ? c : '?';
   }
   return out;
 }
 
-/// The font's size for pictures of so many pixels.
+/// The font size for pictures `height` pixels high.
 mjtFontScale FontFor(int height) {
   if (height < 380) return mjFONTSCALE_50;
   if (height < 900) return mjFONTSCALE_100;
@@ -32,7 +33,7 @@ mjtFontScale FontFor(int height) {
 }  // namespace
 
 int PanelColumns(int count, int width, int height) {
-  // The grid whose panels are largest, each counted as a square.
+  // Choose the grid with the largest panels, each counted as a square.
   int best = 1;
   double largest = 0;
   for (int columns = 1; columns <= count; ++columns) {
@@ -50,7 +51,7 @@ mjrRect PanelPlace(int index, int count, int width, int height) {
   const int columns = PanelColumns(count, width, height);
   const int rows = (count + columns - 1) / columns;
   const int column = index % columns, row = index / columns;
-  // From edge to edge, so that no pixel is left out; a last row that is not full is stretched.
+  // Panels share their edges, so that no pixel is left out. An incomplete last row is stretched.
   const int in_row = row == rows - 1 ? count - row * columns : columns;
   const int left = width * column / in_row, right = width * (column + 1) / in_row;
   const int top = height * row / rows, bottom = height * (row + 1) / rows;
@@ -59,7 +60,7 @@ mjrRect PanelPlace(int index, int count, int width, int height) {
 
 Painter::Painter(const mjModel& model, mjtFramebuffer buffer, int width, int height)
     : context_(std::make_unique<mjrContext>()) {
-  // MuJoCo keeps the functions of OpenGL in global variables.
+  // MuJoCo keeps OpenGL's functions in global variables.
   static std::mutex making;
   const std::lock_guard lock(making);
   mjr_defaultContext(context_.get());

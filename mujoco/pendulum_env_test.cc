@@ -13,7 +13,7 @@
 namespace upswing {
 namespace {
 
-/// Properties of the environment with each physics.
+/// Properties of the environment, for each engine.
 class PendulumEnvs : public testing::TestWithParam<const Engine*> {
  protected:
   static PendulumEnvConfig Config() {
@@ -36,7 +36,8 @@ PendulumEnvConfig PendulumEnvs::SmallConfig() {
 
 TEST_P(PendulumEnvs, TruncatesWithTheTrueSuccessorAndThenResets) {
   PendulumEnv env(SmallConfig());
-  // Another environment with the same start, which continues after the fifth step.
+  // A second set of environments with the same starts, but longer episodes that go on after step
+  // five.
   PendulumEnvConfig longer = SmallConfig();
   longer.episode_seconds = 1;
   PendulumEnv reference(longer);
@@ -52,7 +53,7 @@ TEST_P(PendulumEnvs, TruncatesWithTheTrueSuccessorAndThenResets) {
       EXPECT_EQ(result.terminated[i], 0);
     }
   }
-  // The next observation is that of a new start, not the successor.
+  // The next observation is a new start, not the successor.
   const auto next = std::span<const float>(result.next_obs);
   EXPECT_FALSE(std::ranges::equal(env.obs().values(), next));
   EXPECT_TRUE(std::ranges::equal(reference.obs().values(), next));
@@ -70,7 +71,7 @@ TEST_P(PendulumEnvs, APartOfTheEnvironmentsIsAsThoseOfTheWhole) {
   part.first_index = 1;
   PendulumEnv all(whole), last(part);
   StepResult expected = all.MakeResult(), result = last.MakeResult();
-  for (int step = 0; step < 8; ++step) {  // over a reset
+  for (int step = 0; step < 8; ++step) {  // past a reset
     all.Step(std::vector<double>{1, 2, 3}, expected);
     last.Step(std::vector<double>{2, 3}, result);
     ASSERT_EQ(all.state(1).q2, last.state(0).q2);
@@ -85,12 +86,12 @@ TEST_P(PendulumEnvs, ObservationsUseTheAssumedPlantOnly) {
   blind.assumed_plant = Plant();
   PendulumEnv usual(config), env(blind);
   StepResult expected = usual.MakeResult(), result = env.MakeResult();
-  for (int step = 0; step < 8; ++step) {  // over a reset
+  for (int step = 0; step < 8; ++step) {  // past a reset
     for (int i = 0; i < 3; ++i) {
       const auto seen = Observe(Plant(), env.state(i));
       ASSERT_TRUE(std::ranges::equal(env.obs().row(i), seen));
       ASSERT_FALSE(std::ranges::equal(usual.obs().row(i), seen));
-      ASSERT_EQ(env.state(i).q2, usual.state(i).q2);  // the motion is that of the true plant
+      ASSERT_EQ(env.state(i).q2, usual.state(i).q2);  // the motion uses the true plant
     }
     usual.Step(std::vector<double>{1, 2, 3}, expected);
     env.Step(std::vector<double>{1, 2, 3}, result);
@@ -123,7 +124,7 @@ TEST_P(PendulumEnvs, LinksLeanFromStraightUp) {
   };
   EXPECT_NEAR(of(kPi + 0.1, -0.3)[0], 0.1, 1e-12);
   EXPECT_NEAR(lean[1], -0.2, 1e-12);
-  EXPECT_NEAR(of(-3 * kPi - 0.1, 0)[0], -0.1, 1e-12);  // turns do not matter
+  EXPECT_NEAR(of(-3 * kPi - 0.1, 0)[0], -0.1, 1e-12);  // full turns do not matter
   EXPECT_NEAR(std::abs(of(0, 0)[1]), kPi, 1e-12);      // hanging
 }
 
@@ -139,20 +140,20 @@ TEST(PendulumEnv, APushAddsToTheMotorUntilTheNextState) {
     const PendulumState a = pushed.state(0), b = driven.state(0);
     return std::hypot(a.q1 - b.q1, a.q2 - b.q2, a.w1 - b.w1) + std::abs(a.w2 - b.w2);
   };
-  // About the first joint it is as the motor.
+  // A push about the first joint acts like the motor.
   pushed.Push(0, {1.5, 0});
   for (int step = 0; step < 10; ++step) {
     pushed.Step(std::array{0.5}, result);
     driven.Step(std::array{2.0}, result);
   }
   EXPECT_LT(difference(), 1e-12);
-  // Nothing of it is left in a new state.
+  // A new state ends the push.
   pushed.SetState(0, start);
   driven.SetState(0, start);
   pushed.Step(std::array{2.0}, result);
   driven.Step(std::array{2.0}, result);
   EXPECT_EQ(difference(), 0);
-  // About the second it is what no motor can do.
+  // A push about the second joint acts where the motor cannot.
   pushed.Push(0, {0, 1});
   pushed.Step(std::array{2.0}, result);
   driven.Step(std::array{2.0}, result);
@@ -294,7 +295,7 @@ TEST(PendulumEnv, BothPhysicsAgreeFromTheSameStarts) {
   PendulumEnv twin(config);
   StepResult a = mujoco.MakeResult(), b = twin.MakeResult();
   std::vector<double> torque(kEnvs);
-  for (int step = 0; step < 130; ++step) {  // over two resets
+  for (int step = 0; step < 130; ++step) {  // past two resets
     for (double& x : torque) x = rng.Uniform(-6, 6);
     mujoco.Step(torque, a);
     twin.Step(torque, b);

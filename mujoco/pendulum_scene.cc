@@ -17,8 +17,8 @@ using Color = std::array<float, 4>;  // red, green, blue, opacity
 constexpr Color kTorqueColor{0.96F, 0.55F, 0.10F, 1}, kTrailColor{0.95F, 0.50F, 0.15F, 0.8F},
     kGoalColor{0.45F, 0.55F, 0.65F, 0.55F}, kReachedColor{0.20F, 0.75F, 0.35F, 0.9F};
 
-/// The model to draw: @name stands for a number. The links are those of the plant, with the pivot
-/// at the origin; the rest is the room that they are in.
+/// The model to draw; @name stands for a number. The links are the plant's, with the pivot at the
+/// origin; the rest is the room around them.
 constexpr const char* kTemplate = R"(<mujoco model="picture">
   <option gravity="0 0 -@gravity"/>
   <visual>
@@ -66,7 +66,7 @@ constexpr const char* kTemplate = R"(<mujoco model="picture">
 </mujoco>
 )";
 
-/// The template with each @name replaced.
+/// The template with each @name replaced by its value.
 std::string Fill(const std::vector<std::pair<std::string, double>>& values) {
   std::string text = kTemplate;
   for (const auto& [name, value] : values) {
@@ -75,14 +75,15 @@ std::string Fill(const std::vector<std::pair<std::string, double>>& values) {
   return text;
 }
 
-/// The links' radii (m): those of the file where there is one.
+/// The links' radii (m): from the model file if there is one.
 std::array<double, 2> RadiiOf(const std::string& mjcf) {
   if (mjcf.empty()) return {kCapsuleRadius, kCapsuleRadius};
   const ModelPtr model = LoadModel(mjcf, "model");
   return {model->geom_size[0], model->geom_size[3]};
 }
 
-/// Compiles the model to draw. A radius beyond the links' lengths would hide all else.
+/// Compiles the model to draw. A share of `reach` (m) limits the radii, because a larger link would
+/// hide everything else.
 ModelPtr MakeModel(const Plant& plant, const std::string& mjcf, double reach) {
   const auto [given1, given2] = RadiiOf(mjcf);
   const double most = 0.15 * reach;
@@ -115,8 +116,8 @@ ModelPtr MakeModel(const Plant& plant, const std::string& mjcf, double reach) {
   return CompileModel(Fill(values), "picture");
 }
 
-/// Adds a shape from one point to another, in the plane of the motion's depth y; nothing if the
-/// scene is full.
+/// Adds a shape between two points, at depth y in front of or behind the plane of motion. Does
+/// nothing if the scene is full.
 void Add(mjvScene& scene, mjtGeom type, double width, const Point& from, const Point& to,
          const Color& color, float emission) {
   if (scene.ngeom >= scene.maxgeom) return;
@@ -129,7 +130,7 @@ void Add(mjvScene& scene, mjtGeom type, double width, const Point& from, const P
   geom.specular = 0.1F;
 }
 
-/// A point at a distance from the pivot, at an angle that grows as the joints' angles do.
+/// A point at a distance from the pivot; the angle grows as the joints' angles do.
 Point OnCircle(double radius, double angle, double depth) {
   return {-radius * std::sin(angle), depth, -radius * std::cos(angle)};
 }
@@ -153,14 +154,14 @@ PendulumScene::~PendulumScene() { mjv_freeScene(&scene_); }
 
 void PendulumScene::SetCamera(const Camera& camera, double aspect) {
   mjv_defaultFreeCamera(model_.get(), &camera_);
-  // What the links can reach and a margin, in the narrower of height and width.
+  // By default, the picture shows the links' reach with a margin, in height and width.
   const double half = 1.16 * reach_ / std::tan(20 * kPi / 180);
   camera_.distance = camera.distance > 0 ? camera.distance : half * std::max(1.0, 1 / aspect);
   camera_.azimuth = camera.azimuth;
   camera_.elevation = camera.elevation;
   camera_.lookat[0] = camera_.lookat[1] = 0;
   camera_.lookat[2] = camera.look_at_z;
-  // The floor's grid is laid about the camera that the scene has.
+  // The floor's grid is centred at the scene's camera.
   mjv_updateCamera(model_.get(), data_.get(), &camera_, &scene_);
 }
 
@@ -172,7 +173,7 @@ void PendulumScene::Update(const PendulumState& state, const Marks& marks) {
   mj_fwdPosition(model_.get(), data_.get());
   mj_fwdVelocity(model_.get(), data_.get());
   mjv_updateScene(model_.get(), data_.get(), &option_, &perturb_, &camera_, mjCAT_ALL, &scene_);
-  // The floor would cast specks of shadow upon itself.
+  // Otherwise the floor casts specks of shadow on itself.
   for (mjvGeom& geom : std::span(scene_.geoms, static_cast<size_t>(scene_.ngeom))) {
     if (geom.type == mjGEOM_PLANE) geom.castshadow = 0;
   }
@@ -208,7 +209,8 @@ void PendulumScene::AddGoal(const PendulumState& state) {
 }
 
 void PendulumScene::AddTorque(double torque, const PendulumState& state) {
-  // An arc before the motor, from its top, of a quarter turn and a half at the motor's limit.
+  // An arc in front of the motor that starts at the top. At the motor's limit it spans
+  // 135 degrees.
   const double share = std::clamp(torque / plant_.torque_limit, -1.0, 1.0);
   if (std::abs(share) < 0.01) return;
   const double radius = 0.2 * reach_, width = 0.014 * reach_, depth = -0.10 * reach_;
@@ -226,7 +228,7 @@ void PendulumScene::AddTorque(double torque, const PendulumState& state) {
     const auto at = [&](int i) { return around(begin + (end - begin) * i / pieces); };
     Add(scene_, mjGEOM_CAPSULE, width, at(k), at(k + 1), kTorqueColor, 0.4F);
   }
-  // The head, a cone along the same arc.
+  // The arrow head, a cone along the same arc.
   constexpr int kSlices = 12;
   for (int k = 0; k < kSlices; ++k) {
     const double slice = head / kSlices, angle = end + slice * k;
@@ -237,7 +239,7 @@ void PendulumScene::AddTorque(double torque, const PendulumState& state) {
 
 void PendulumScene::AddTrail(std::span<const std::array<double, 2>> trail) {
   for (size_t k = 1; k < trail.size(); ++k) {
-    const double age = static_cast<double>(k) / static_cast<double>(trail.size());  // 1: new
+    const double age = static_cast<double>(k) / static_cast<double>(trail.size());  // 1: newest
     Color color = kTrailColor;
     color[3] *= static_cast<float>(age * age);
     const Point from{trail[k - 1][0], 0, trail[k - 1][1]}, to{trail[k][0], 0, trail[k][1]};

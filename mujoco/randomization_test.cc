@@ -63,7 +63,8 @@ TEST(Randomization, PlantsAreUniformInTheBoxAndTheirNumbersIndependent) {
       for (size_t k = 0; k < 8; ++k) product[j][k] += u[j] * u[k];
     }
   }
-  // Five standard errors; for u uniform, var u = 1/3, var u² = 1/5 - 1/9, var (u v) = 1/9.
+  // Tolerance: five standard errors. For u uniform, var u = 1/3, var u² = 1/5 - 1/9, var (u v) =
+  // 1/9.
   for (size_t j = 0; j < 8; ++j) {
     EXPECT_NEAR(sum[j] / kCount, 0, 5 * std::sqrt(1 / 3.0 / kCount));
     EXPECT_LT(lowest[j], -0.99);
@@ -150,7 +151,7 @@ TEST_P(RandomizedEnvs, EveryEpisodeMovesAsItsOwnPlantDoes) {
   StepResult result = env.MakeResult();
   std::vector<double> masses;
   for (int episode = 0; episode < 4; ++episode) {
-    // The same three plants and starts, this time in environments that never had another.
+    // The same three plants and starts, in environments that only ever have one plant.
     PendulumEnvConfig fixed;
     fixed.engine = GetParam();
     fixed.num_envs = 3;
@@ -172,7 +173,7 @@ TEST_P(RandomizedEnvs, EveryEpisodeMovesAsItsOwnPlantDoes) {
       ASSERT_EQ(result.work, expected.work);
     }
   }
-  // Twelve episodes, twelve plants.
+  // Twelve episodes have twelve plants.
   std::ranges::sort(masses);
   EXPECT_EQ(std::ranges::adjacent_find(masses), masses.end());
 }
@@ -187,7 +188,7 @@ TEST_P(RandomizedEnvs, StartsAreThoseOfOnePlantAndStreamsAreNamed) {
   EXPECT_EQ(one.plant(1).mass1, 1);
   config.stream = "another";
   EXPECT_NE(random.plant(0).mass1, PendulumEnv(config).plant(0).mass1);
-  // An environment's plants do not depend on how many others there are.
+  // The plants of an environment do not depend on the number of environments.
   EXPECT_EQ(random.plant(1).gravity, PendulumEnv(Config(9)).plant(1).gravity);
   EXPECT_EQ(random.spec().action_limit.front(), 5);
 }
@@ -219,9 +220,9 @@ TEST_P(RandomizedEnvs, ARestartWithoutASeedIsAnotherEpisodeOfItsOwn) {
   env.Restart(0, std::nullopt);
   EXPECT_NE(env.state(0).w1, before);
   EXPECT_NE(env.plant(0).mass1, same.plant(0).mass1);
-  // The other environment is as it was.
+  // The other environment is unchanged.
   EXPECT_EQ(env.state(1).w1, same.state(1).w1);
-  // It is the episode that follows by itself, too.
+  // Without a seed, Restart begins the episode that would follow anyway.
   StepResult result = same.MakeResult();
   for (int step = 0; step < 5; ++step) same.Step(std::vector<double>{0, 0}, result);
   EXPECT_EQ(env.state(0).w1, same.state(0).w1);
@@ -247,7 +248,8 @@ TEST_P(RandomizedEnvs, AStepLeavesWhatIsHeldAsItIs) {
   EXPECT_EQ(result.reward[1], 0);
   EXPECT_EQ(result.torque[1], 0);
   EXPECT_NE(result.reward[0], 0);
-  // From then on it lags behind by a step, and is else the same, noise and delay included.
+  // From here on, environment 1 lags behind by one step, but is otherwise the same, noise and delay
+  // included.
   for (int step = 0; step < 9; ++step) {
     env.Step(torque, result);
     reference.Step(torque, expected);
@@ -262,7 +264,7 @@ TEST_P(RandomizedEnvs, LoadedStateContinuesWithTheSameBits) {
 }
 
 TEST(RandomizedEnv, BothPhysicsAgreeOverManyResets) {
-  constexpr int kEnvs = 9;  // more than one of MuJoCo's batches
+  constexpr int kEnvs = 9;  // more than one MuJoCo batch
   PendulumEnvConfig config;
   config.num_envs = kEnvs;
   config.episode_seconds = 0.2;
@@ -274,7 +276,7 @@ TEST(RandomizedEnv, BothPhysicsAgreeOverManyResets) {
   StepResult a = mujoco.MakeResult(), b = twin.MakeResult();
   Rng rng(1, "torques");
   std::vector<double> torque(kEnvs);
-  for (int step = 0; step < 305; ++step) {  // over thirty resets
+  for (int step = 0; step < 305; ++step) {  // past thirty resets
     for (double& x : torque) x = rng.Uniform(-8, 8);
     mujoco.Step(torque, a);
     twin.Step(torque, b);

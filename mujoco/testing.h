@@ -10,7 +10,7 @@
 #include "mujoco/engines.h"
 #include "sim/pendulum_env.h"
 
-/// What tests of environments share.
+/// Helpers that the tests of environments share.
 namespace upswing {
 
 /// The engines, as values of a parametrised test, and their names in it.
@@ -19,8 +19,9 @@ inline std::string EngineName(const testing::TestParamInfo<const Engine*>& info)
   return info.param == &kMuJoCo ? "MuJoCo" : "ClosedForm";
 }
 
-/// Expects environments that were saved after so many steps and loaded by others to continue with
-/// the same bits for twelve more steps. Episodes should be shorter, so that some of them end.
+/// Expects saved environments to continue with the same bits in others that load them. Saves after
+/// `steps_before` steps, then compares twelve more. Episodes should be short enough that some of
+/// them end.
 inline void ExpectLoadedGoesOn(const PendulumEnvConfig& config, int steps_before) {
   PendulumEnv saved(config), loaded(config);
   StepResult a = saved.MakeResult(), b = saved.MakeResult();

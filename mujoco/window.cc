@@ -22,7 +22,7 @@ static_assert(Key::kEscape == GLFW_KEY_ESCAPE && Key::kEnter == GLFW_KEY_ENTER &
               Key::kRight == GLFW_KEY_RIGHT && Key::kLeft == GLFW_KEY_LEFT &&
               Key::kF1 == GLFW_KEY_F1 && Key::kF7 == GLFW_KEY_F7 && Key::kSpace == GLFW_KEY_SPACE);
 
-/// GLFW's last message.
+/// The last message of GLFW.
 std::string GlfwError() {
   const char* text = nullptr;
   glfwGetError(&text);
@@ -34,7 +34,7 @@ Error NoWindow() {
       Concat("view: no window can be opened: ", GlfwError(), "; --record FILE draws without one"));
 }
 
-/// Whether the present context is drawn by the processor.
+/// Whether the current context is rendered in software.
 bool IsSoftware() {
   using GetString = const unsigned char* (*)(unsigned int);
   constexpr unsigned int kRenderer = 0x1F01;  // GL_RENDERER
@@ -47,10 +47,10 @@ bool IsSoftware() {
 }  // namespace
 
 struct Window::Impl {
-  /// GLFW for as long as there is a window.
+  /// Keeps GLFW initialised as long as there is a window.
   struct Library {
     Library() {
-      // MuJoCo looks for the functions of OpenGL in what is loaded for all to see.
+      // MuJoCo looks up OpenGL's functions among the global names.
       if (dlopen("libGL.so.1", RTLD_NOW | RTLD_GLOBAL) == nullptr) {
         dlopen("libEGL.so.1", RTLD_NOW | RTLD_GLOBAL);
       }
@@ -62,18 +62,18 @@ struct Window::Impl {
   Library library;
   GLFWwindow* window = nullptr;
   std::optional<Painter> painter;
-  std::vector<ScenePanel> panels;  // as drawn last
+  std::vector<ScenePanel> panels;  // last drawn panels
   std::vector<Key> keys;
-  double x = 0, y = 0;  // of the mouse, from the top left, in units of the window
-  int dragged = -1;     // panel whose link is pulled at; -1: none
+  double x = 0, y = 0;  // mouse position from the top left, in window units
+  int dragged = -1;     // panel whose link the mouse pulls; -1: none
   int last_button = -1;
   double last_click = -1;      // s
-  std::array<int, 4> place{};  // before full screen: left, top, width, height
+  std::array<int, 4> place{};  // window before full screen: left, top, width, height
 
   Impl(const std::string& title, PictureSize size) {
     Open(title, size, 4);
     if (IsSoftware()) {
-      // Smooth edges would cost most of the time.
+      // Antialiasing would take most of the time.
       glfwDestroyWindow(window);
       Open(title, size, 0);
     }
@@ -121,9 +121,9 @@ struct Window::Impl {
     return glfwGetKey(window, left) == GLFW_PRESS || glfwGetKey(window, right) == GLFW_PRESS;
   }
 
-  /// The panel below the mouse and where in it, right and up in [0, 1]; -1: none.
+  /// The panel under the mouse and the position in it, right and up in [0, 1]; -1: none.
   int PanelAt(double& right, double& up) const {
-    int width = 0, height = 0;  // in units of the window
+    int width = 0, height = 0;  // in window units
     glfwGetWindowSize(window, &width, &height);
     const auto count = static_cast<int>(panels.size());
     for (int i = 0; i < count; ++i) {
@@ -182,7 +182,7 @@ struct Window::Impl {
     }
   }
 
-  /// Selects the link below the mouse, or none.
+  /// Selects the link under the mouse, or none.
   void Select() {
     double right = 0, up = 0;
     const int at = PanelAt(right, up);

@@ -12,7 +12,7 @@
 
 namespace upswing {
 
-/// A key that was pressed: a letter or digit as the character (upper case), or one of these.
+/// A pressed key: a letter or digit as the upper-case character, or one of these constants.
 struct Key {
   enum Code {
     kSpace = ' ',
@@ -40,29 +40,29 @@ struct Overlay {
   std::vector<std::array<std::string, 2>> lines;
 };
 
-/// A window with MuJoCo's own rendering; its mouse moves the cameras, selects links and pulls at
-/// them as MuJoCo's `simulate` does. By GLFW; there can be one at a time, in the main thread.
+/// A window with MuJoCo's rendering, by GLFW. Its mouse moves the cameras, selects links and pulls
+/// at them, as in MuJoCo's `simulate`. Only the main thread may have one, and only one at a time.
 class Window {
  public:
-  /// Throws Failure where no window can be opened.
+  /// Throws Failure if no window can be opened.
   Window(const std::string& title, PictureSize size);
   ~Window();
   Window(const Window&) = delete;
   Window& operator=(const Window&) = delete;
 
-  /// Whether the user has closed it.
+  /// Whether the user has closed the window.
   bool closed() const;
   void SetTitle(const std::string& title);
   void ToggleFullScreen();
-  /// Its present size, pixels.
+  /// The present size, pixels.
   PictureSize size() const;
 
-  /// Draws the panels and what is written over them; `chart` may be null.
+  /// Draws the panels, and the overlays over them; `chart` may be null.
   void Draw(std::span<const ScenePanel> panels, std::span<const Overlay> overlays,
             mjvFigure* chart);
 
-  /// The keys that were pressed since the last call. The mouse has moved the scenes of the panels
-  /// that were drawn last, which must still be there.
+  /// The keys pressed since the last call. Mouse actions since then have changed the scenes of the
+  /// last drawn panels, so these must still exist.
   std::vector<Key> TakeEvents();
 
  private:

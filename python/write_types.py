@@ -14,7 +14,7 @@ PYTHON_TYPES = {"bool": "bool", "int": "int", "float": "float", "str": "str",
 
 
 def every_setting():
-    """The settings and aliases of all agents, each name once."""
+    """The settings and aliases of all agents, without duplicates."""
     options, aliases = {}, {}
     for agent, _ in _upswing.agents():
         described = _upswing.training_settings(agent)
@@ -57,7 +57,7 @@ def main():
     options, aliases = every_setting()
     environment = [option for option in options
                    if option["environment"] and option["name"] != "envs"]
-    # `train` has separate arguments for these.
+    # `train` has separate arguments for these settings.
     training = [option for option in options if option["name"] not in ("agent", "seed")]
     start = [{"name": name, "type": "float", "choices": [], "help": help_text, "unit": unit,
               "low": None, "high": None}

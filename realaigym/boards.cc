@@ -26,7 +26,7 @@ using nlohmann::ordered_json;
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
-/// See ControllerOf.
+/// Controller made by ControllerOf.
 class PolicyController : public BoardController {
  public:
   PolicyController(const LoadedPolicy& loaded, size_t count)
@@ -53,7 +53,7 @@ class PolicyController : public BoardController {
 
  private:
   void Observe(int step, const BoardMeasurement& m, size_t lane) {
-    // As PendulumEnv observes, from the plant of the policy.
+    // Observe as PendulumEnv does, with the policy's plant.
     const auto row = std::span(obs_).subspan(lane * size_, size_);
     const std::vector<float> before(row.begin(), row.end());
     const PendulumState measured{m.q1[lane], m.q2[lane], m.w1[lane], m.w2[lane]};
@@ -69,7 +69,7 @@ class PolicyController : public BoardController {
   }
 
   const LoadedPolicy& loaded_;
-  int period_;  // steps
+  int period_;  // in steps
   size_t size_;
   std::vector<float> obs_;
   std::vector<double> action_;
@@ -77,7 +77,7 @@ class PolicyController : public BoardController {
   std::optional<Identifier> identifier_;
 };
 
-/// The boards' own regulator of the linear model, with the weights of its baselines.
+/// The benchmark's own regulator of the linear model, with the weights of its baselines.
 class RegulatorController : public BoardController {
  public:
   explicit RegulatorController(Robot robot)
@@ -86,7 +86,7 @@ class RegulatorController : public BoardController {
   void Act(int /*step*/, const BoardMeasurement& m, size_t count, Lanes& torque) override {
     for (size_t lane = 0; lane < count; ++lane) {
       const auto [e1, e2] = Lean({m.q1[lane], m.q2[lane], 0, 0});
-      // Lean has the second link's absolute angle.
+      // Lean gives the absolute angle of link 2.
       const double q2 = Wrapped(e2 - e1);
       torque[lane] = -(K_[0] * e1 + K_[1] * q2 + K_[2] * m.w1[lane] + K_[3] * m.w2[lane]);
     }
@@ -102,7 +102,7 @@ Robot ParseRobot(const std::string& name, Robot usual) {
   throw BadInput(Concat("--robot: expected pendubot or acrobot, got \"", Printable(name), "\""));
 }
 
-/// Throws BadInput where a policy is of the other robot.
+/// Throws BadInput if a policy is for the other robot.
 void ExpectRobot(const std::string& name, Robot own, Robot asked) {
   if (own == asked) return;
   throw BadInput(Concat("--robot: expected ", NameOf(own), ", the robot of ", Printable(name),

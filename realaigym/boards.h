@@ -10,35 +10,36 @@
 #include "run/find_policy.h"
 #include "setup/loaded_policy.h"
 
-/// RealAIGym's boards (docs/howto/realaigym.md): scoring any policy by their rules.
+/// Scoring of policies by the rules of RealAIGym's boards (docs/howto/realaigym.md).
 namespace upswing {
 
-/// What competes: a policy found by a search, any policy of the double pendulum, or the
+/// A competitor on the board: a policy found by a search, any policy of the double pendulum, or the
 /// benchmark's own linear regulator.
 struct Competitor {
   std::string name;
   Robot robot = Robot::kPendubot;
   BoardControllerMaker make;
-  std::string plant = {};  // that it was made for; empty: the board's
+  std::string plant = {};  // plant of its design; empty: the board's
 };
 
-/// Acts with a policy of the double pendulum in so many simulations: each 20 ms, on observations as
-/// PendulumEnv makes them of the plant that the policy was made for. `loaded` outlives it.
+/// Controls `count` simulations with a policy of the double pendulum. It acts every 20 ms, on
+/// PendulumEnv's observations of the plant that the policy was made for. `loaded` must outlive it.
 std::unique_ptr<BoardController> ControllerOf(const LoadedPolicy& loaded, size_t count);
 
-/// The name of the benchmark's regulator, which holds and does not swing up.
+/// The name of the benchmark's regulator, which holds upright but does not swing up.
 inline constexpr const char* kBoardRegulator = "baseline-lqr";
 
-/// The competitor that the arguments name, for this robot ("" : the policy's own). Throws BadInput.
+/// The competitor that the arguments name, for this robot ("": the policy's own robot). Throws
+/// BadInput.
 Competitor GetCompetitor(const PolicyArguments& a, const std::string& robot);
 
-/// A policy that a search wrote. Throws BadInput.
+/// Loads a policy that a search wrote. Throws BadInput.
 SwingPolicy LoadSwingPolicy(const std::filesystem::path& path);
 
-/// The competitor of a search as it stands.
+/// The competitor with a search's current policy.
 Competitor CompetitorOf(const BoardSearch& search, const std::string& name);
 
-/// An entry of the board, or ours.
+/// An entry of the board, published or our own.
 struct BoardEntry {
   std::string name;
   double seconds, energy, torque_cost, smoothness, velocity_cost, performance;
@@ -55,18 +56,18 @@ struct BoardReport {
   BoardOutcome nominal;
   Robustness robustness;
   std::vector<BoardSample> trace;  // of the nominal simulation
-  double seconds;                  // that the simulations took
+  double seconds;                  // wall time of the simulations
   BoardEntry Entry() const;
 };
 
-/// Makes all simulations. `progress` counts them.
+/// Runs all simulations of the board's scores. `progress` counts them.
 BoardReport ScoreOnBoard(const Competitor& competitor, uint64_t seed, ThreadPool& pool,
                          const Progress& progress);
 
 std::string BoardJson(const BoardReport& report);
-/// The nominal motion in the boards' own format.
+/// The nominal motion as CSV in the boards' own format.
 std::string BoardCsv(const BoardReport& report);
-/// The six rows of robustness, as .svg or .png.
+/// Draws the six rows of robustness as .svg or .png.
 void DrawBoard(const BoardReport& report, const std::filesystem::path& file);
 
 }  // namespace upswing

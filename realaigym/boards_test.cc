@@ -11,7 +11,7 @@
 namespace upswing {
 namespace {
 
-/// Keeps what the first environment observes, and moves.
+/// Records the first environment's observations, and moves it.
 class Recorder : public Policy {
  public:
   explicit Recorder(int memory) {

@@ -12,9 +12,9 @@
 namespace upswing {
 namespace {
 
-// Numbers of the benchmark's own plant, without friction (docs/howto/realaigym.md).
+// Parameters of the benchmark's plant without friction (docs/howto/realaigym.md).
 
-/// Kinetic and potential energy, the latter 0 at the height of the pivot (J).
+/// Kinetic plus potential energy (J); the potential energy is 0 at the height of the pivot.
 double EnergyOf(const Manipulator& plant, const BoardState& s) {
   return plant.At({s[0], s[1], s[2], s[3]}).energy + plant.G1 + plant.G2;
 }
@@ -27,7 +27,7 @@ TEST(BoardPlant, AccelerationAndEnergyAreTheBenchmarks) {
   EXPECT_NEAR(EnergyOf(plant, {1, 0.5, 0.3, -0.7}), -1.3257887730, 1e-10);
 }
 
-/// The state after so many seconds from (1, 0.5, 0, 0) under a constant torque.
+/// The state `seconds` after (1, 0.5, 0, 0) under a constant torque.
 BoardState After(double seconds, double torque) {
   ClosedFormBatch batch(1);
   batch.SetManipulator(0, ManipulatorOf(BoardPlant()));
@@ -91,7 +91,7 @@ TEST(BoardPlant, LinearModelIsTheDerivativeOfTheMotion) {
 }
 
 TEST(BoardPlant, FrictionIsThatOfTheFormula) {
-  // Against the equations with rotors and friction, solved as they stand.
+  // Compares with the equations with rotors and friction, solved directly.
   Rng rng(1, "states");
   BoardPlant p;
   p.rotor_inertia = 8e-5;

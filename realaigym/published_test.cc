@@ -1,4 +1,4 @@
-// A published entry of the board, built anew from its own trajectory and scored by our rules.
+// Rebuilds a published entry of the board from its own trajectory, and scores it by our rules.
 
 #include <gtest/gtest.h>
 
@@ -21,11 +21,11 @@ namespace upswing {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr double kSpacing = 0.001;  // s, of what the entry fits its cubics to
-constexpr int kFileSpacing = 10;    // of these, from one row of the file to the next
-constexpr int kPiece = 150;         // of these, that a cubic is fitted to
+constexpr double kSpacing = 0.001;  // spacing of the samples that the entry fits its cubics to, s
+constexpr int kFileSpacing = 10;    // samples per row of the file
+constexpr int kPiece = 150;         // samples per cubic
 
-/// Samples every kSpacing from those of the file, by the cubic through the nearest four.
+/// Samples every kSpacing, interpolated by the cubic through the file's nearest four rows.
 std::vector<double> Refined(const std::vector<double>& rows) {
   std::vector<double> samples;
   for (size_t i = 0; i < kFileSpacing * rows.size(); ++i) {
@@ -39,10 +39,10 @@ std::vector<double> Refined(const std::vector<double>& rows) {
   return samples;
 }
 
-/// A quantity over time as the entry keeps it: cubics fitted to pieces of its samples, one by one.
+/// A quantity over time as the entry stores it: one fitted cubic per piece of samples.
 class Cubics {
  public:
-  /// Of whole pieces.
+  /// Fits the whole pieces of the samples.
   explicit Cubics(const std::vector<double>& samples) {
     EXPECT_EQ(samples.size() % kPiece, 0);
     Eigen::Matrix<double, kPiece, 4> powers;
@@ -77,7 +77,7 @@ Eigen::Vector2d Acceleration(const Eigen::Vector4d& x, double torque) {
   return {a[0], a[1]};
 }
 
-/// The swing-up that the entry follows: two angles (rad), two velocities (rad/s), the torque (N·m).
+/// The entry's swing-up: two angles (rad), two velocities (rad/s), the torque (N·m).
 std::vector<Cubics> ReadTrajectory() {
   const auto path =
       std::filesystem::path(__FILE__).parent_path() / "testdata/pendubot_tvlqr_trajectory.csv";
@@ -95,13 +95,13 @@ Eigen::Vector4d FirstFourAt(const std::vector<Cubics>& channels, double t) {
   return {channels[0].At(t), channels[1].At(t), channels[2].At(t), channels[3].At(t)};
 }
 
-/// TVLQR, an entry of the pendubot's boards: follows a swing-up with a time-varying regulator, and
-/// once near to upright holds it with another for good. Its numbers are those of
-/// leaderboard/pendubot/simulation_v2/con_ilqr_tvlqr_lqr.py in the repository that the trajectory's
-/// file names, and of the classes that it uses (tvlqr_controller.py, pcw_polynomial.py).
+/// TVLQR, an entry of the pendubot's boards. It follows a swing-up with a time-varying regulator,
+/// and once near upright holds it with another for good. Its parameters come from the repository
+/// that the trajectory's file names: leaderboard/pendubot/simulation_v2/con_ilqr_tvlqr_lqr.py and
+/// its classes (tvlqr_controller.py, pcw_polynomial.py).
 class PublishedTvlqr : public BoardController {
  public:
-  /// What it computes beforehand, once.
+  /// Precomputed trajectory and gains.
   struct Plan {
     Plan();
     std::vector<Cubics> trajectory;  // of ReadTrajectory
@@ -146,13 +146,13 @@ PublishedTvlqr::Plan::Plan()
   const Eigen::Matrix4d Q = Eigen::Vector4d(0.64, 0.56, 0.13, 0.037).asDiagonal();
   constexpr double kR = 0.82;
   std::array<std::vector<double>, 4> gains;
-  for (auto& each : gains) each.resize(trajectory.front().samples());  // the last is 0
+  for (auto& each : gains) each.resize(trajectory.front().samples());  // the last gain is 0
   Eigen::Matrix4d P = upright.P;
   for (size_t i = gains[0].size() - 1; i-- > 0;) {
     const double t = static_cast<double>(i) * kSpacing;
     const Eigen::Vector4d x = FirstFourAt(trajectory, t);
     const double u = trajectory[4].At(t);
-    // Euler's step of the linear model about here.
+    // Euler step of the model linearised here.
     Eigen::Matrix4d A = Eigen::Matrix4d::Identity();
     A.topRightCorner<2, 2>() += kSpacing * Eigen::Matrix2d::Identity();
     constexpr double kStep = 1e-5;
@@ -175,7 +175,7 @@ TEST(RealAiGymPublished, TvlqrHasItsPublishedScores) {
   const auto make = [&](size_t) { return std::make_unique<PublishedTvlqr>(plan); };
   const BoardOutcome o =
       SimulateOnBoard(Robot::kPendubot, std::array<BoardEpisode, 1>(), make, nullptr).front();
-  // To the last digit that is published, and a little for what lies between the file's rows.
+  // Tolerance: the last published digit, and a little for the motion between the file's rows.
   EXPECT_NEAR(o.swing_up_seconds, 4.13, 1e-9);
   EXPECT_NEAR(o.energy, 9.53, 0.006);
   EXPECT_NEAR(o.torque_cost, 1.26, 0.006);
@@ -192,11 +192,12 @@ TEST(RealAiGymPublished, TvlqrHasItsPublishedScores) {
   const Robustness judged =
       JudgeRobustness(cases, SimulateOnBoard(Robot::kPendubot, episodes, make, &pool));
   const auto& [model, velocity, torque, response, delay, pushes] = judged.rows;
-  // Where nothing is drawn; one cell of the model is at an edge that roundings can move.
+  // Rows without random draws. One cell of the model is at an edge that rounding can move.
   EXPECT_NEAR(model, 132.0 / 210, 1.1 / 210);
   EXPECT_EQ(response, 1);
   EXPECT_NEAR(delay, 9.0 / 21, 1e-12);
-  // Where noise and pushes are: two levels, two deviations of 50 draws, and what they make of R.
+  // Rows with noise and pushes. Tolerance: two levels, two standard deviations of 50 draws, and
+  // their effect on the score.
   EXPECT_NEAR(velocity, 19.0 / 21, 2.1 / 21);
   EXPECT_EQ(torque, 1);
   EXPECT_NEAR(pushes, 0.64, 2 * std::sqrt(0.64 * 0.36 / 50));

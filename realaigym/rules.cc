@@ -11,8 +11,8 @@
 namespace upswing {
 namespace {
 
-/// Six pushes with growing times, three of them, at random, about the joint with the motor. Those
-/// about the other one do nothing there (docs/howto/realaigym.md).
+/// Draws six pushes with growing times, and keeps three random ones for the motor's joint. Pushes
+/// about the other joint have no effect there (docs/howto/realaigym.md).
 std::array<BoardPush, 3> RandomPushes(Rng& rng) {
   std::array<int, 6> order;
   std::iota(order.begin(), order.end(), 0);
@@ -131,8 +131,8 @@ double Robustness::score() const {
 Robustness JudgeRobustness(const std::vector<RobustnessCase>& cases,
                            const std::vector<BoardOutcome>& outcomes) {
   Robustness result;
-  std::vector<int> rows;    // of each curve
-  std::vector<int> counts;  // of simulations at the curve's last value
+  std::vector<int> rows;    // row of each curve
+  std::vector<int> counts;  // simulations at the curve's last value
   double pushed = 0;
   for (size_t i = 0; i < cases.size(); ++i) {
     const RobustnessCase& each = cases[i];
@@ -159,7 +159,7 @@ Robustness JudgeRobustness(const std::vector<RobustnessCase>& cases,
     double& share = curve.share.back();
     share += (reached - share) / ++counts.back();
   }
-  // A level of noise passes where more than half of its repeats do.
+  // A noise level passes if more than half of its repeats do.
   std::array<int, kRobustnessRows> levels{};
   for (size_t k = 0; k < rows.size(); ++k) {
     const auto row = static_cast<size_t>(rows[k]);

@@ -10,28 +10,28 @@
 #include "control/riccati.h"
 #include "realaigym/plant.h"
 
-/// The rules of RealAIGym's simulation boards, version 2 (docs/howto/realaigym.md): what is
-/// simulated, and the scores of performance and robustness.
+/// The rules of RealAIGym's simulation boards, version 2 (docs/howto/realaigym.md): the
+/// simulations, and the scores of performance and robustness.
 namespace upswing {
 
-/// Which joint has the motor.
+/// The robot: the joint with the motor.
 enum class Robot { kPendubot = 1, kAcrobot = 2 };
 const char* NameOf(Robot robot);
-/// The one of this name; none if there is none.
+/// The robot with this name; nothing for an unknown name.
 std::optional<Robot> RobotNamed(std::string_view name);
 
-/// The regulator of the board's plant about upright in continuous time, as the benchmark's
-/// baselines have it: minimises ∫ x' Q x + R u² dt, Q diagonal.
+/// The continuous-time regulator of the board's plant about upright, as in the benchmark's
+/// baselines: minimises ∫ x' Q x + R u² dt, Q diagonal.
 Lqr SolveBoardLqr(Robot robot, const Eigen::Vector4d& Q, double R);
 
-/// A torque (N·m) about the motor's joint, beyond its limit too, for a moment: amplitude ·
+/// A short disturbing torque (N·m) about the motor's joint, also beyond its limit: amplitude ·
 /// exp(-(t - time)²/(2 width²)).
 struct BoardPush {
   double amplitude = 0;        // N·m
   double time = 0, width = 0;  // s
 };
 
-/// What is simulated: 10 s from hanging at rest.
+/// The conditions of a simulation: 10 s from hanging at rest.
 struct BoardEpisode {
   BoardPlant plant;
   double velocity_noise = 0;          // of the measured velocities, rad/s
@@ -40,31 +40,32 @@ struct BoardEpisode {
   int delay = 0;                      // of the measured state, steps
   std::array<BoardPush, 3> pushes{};  // about the motor's joint
   uint64_t seed = 0;                  // of the noise
-  int steps = kBoardSteps;            // fewer for a search; the same in a block
+  int steps = kBoardSteps;            // fewer for a search; equal within a block
 };
 
-/// Robustness asks an end with both angles this near to upright, and both velocities this slow.
+/// Largest angle and velocity errors, of both joints, at an end that counts for robustness.
 inline constexpr double kBoardGoalAngle = 0.35, kBoardGoalVelocity = 1;  // rad, rad/s
 bool AtGoal(const BoardState& state);
 
-/// What came of it. One that blew up has infinite costs.
+/// The outcome of a simulation. Costs are infinite if it blew up.
 struct BoardOutcome {
-  // Start of the last stretch above the line; the end if there is none.
+  // Start of the last stretch above the line, s; the end if there is none.
   double swing_up_seconds = 0;
   double energy = 0;         // J
   double max_torque = 0;     // N·m
   double torque_cost = 0;    // N²m²s
   double smoothness = 0;     // N·m
   double velocity_cost = 0;  // rad²/s
-  bool above_line = false;   // swung up at the end: what performance asks
-  bool at_goal = false;      // AtGoal at the end: what robustness asks
-  double held = 0;           // how near to the goal it was over the last 2 s, 0 to 1
-  double nearest = 0;        // how near to it at best, 0 to 1
+  bool above_line = false;   // swung up at the end: criterion of performance
+  bool at_goal = false;      // AtGoal at the end: criterion of robustness
+  double held = 0;           // closeness to the goal over the last 2 s, 0 to 1
+  double nearest = 0;        // largest closeness to the goal, 0 to 1
 };
 
 /// The performance score, version 2, from 0 to 1.
 double PerformanceScore(const BoardOutcome& outcome);
-/// Its five penalties, each from 0 to 1: time, energy, torque cost, smoothness, velocity cost.
+/// The five penalties of the performance score, each from 0 to 1: time, energy, torque cost,
+/// smoothness, velocity cost.
 std::array<double, 5> PerformancePenalties(const BoardOutcome& outcome);
 
 /// The rows of the robustness score.
@@ -72,8 +73,8 @@ enum class RobustnessRow { kModel, kVelocityNoise, kTorqueNoise, kResponse, kDel
 inline constexpr int kRobustnessRows = 6;
 inline constexpr std::array<const char*, kRobustnessRows> kRobustnessRowNames{
     "model", "velocity noise", "torque noise", "response", "delay", "pushes"};
-/// A parameter of the model that is varied, the others being those of the board: from `low` to
-/// `high`, in units of the board's value where it is a factor.
+/// The range of a varied model parameter; the other parameters are the board's. `low` and `high`
+/// are in units of the board's value if the variation is a factor.
 struct BoardVariation {
   const char* name;
   double BoardPlant::*parameter;
@@ -91,43 +92,43 @@ inline constexpr std::array<BoardVariation, 10> kBoardVariations{
      {"b2", &BoardPlant::damping2, -0.1, 0.1, false},
      {"cf1", &BoardPlant::friction1, -0.2, 0.2, false},
      {"cf2", &BoardPlant::friction2, -0.2, 0.2, false}}};
-inline constexpr int kBoardLevels = 21;     // of what a row varies
-inline constexpr int kBoardRepeats = 10;    // of a level of noise
-inline constexpr int kBoardPushCases = 50;  // profiles
+inline constexpr int kBoardLevels = 21;     // levels of a row's variation
+inline constexpr int kBoardRepeats = 10;    // repeats of a noise level
+inline constexpr int kBoardPushCases = 50;  // random push profiles
 
-/// Of a report: the nominal one, and those of the rows.
+/// Number of simulations in a report: the nominal one and those of the robustness rows.
 inline constexpr int kBoardSimulations =
     1 + kBoardLevels * (static_cast<int>(kBoardVariations.size()) + 2 * kBoardRepeats + 1 + 1) +
     kBoardPushCases;
 
-/// A simulation of the robustness score and its place there.
+/// A simulation of the robustness score with its row and parameter.
 struct RobustnessCase {
   RobustnessRow row;
-  int parameter;  // of kBoardVariations
-  double value;   // what is varied
+  int parameter;  // index in kBoardVariations
+  double value;   // value of the varied quantity
   BoardEpisode episode;
 };
 
-/// A case of a row at `level` from 0 to 1 of its range; the seed is that of noise and pushes.
+/// A case of a row at `level`, from 0 to 1 of its range. The seed draws noise and pushes.
 RobustnessCase MakeCase(RobustnessRow row, int parameter, double level, uint64_t seed);
 
-/// All of them, in the order of the rows.
+/// All robustness cases, in the order of the rows.
 std::vector<RobustnessCase> RobustnessCases(uint64_t seed);
 
-/// What a row shows: a share for each level, of a parameter of the model or of the repeats.
+/// The result of a row, or of one model parameter: for each level, the share of successes.
 struct RobustnessCurve {
   std::string name;
-  std::vector<double> values;  // what is varied
-  std::vector<double> share;   // of the simulations that ended at the goal
+  std::vector<double> values;  // of the varied quantity
+  std::vector<double> share;   // share of simulations that end at the goal
 };
 
 struct Robustness {
-  std::array<double, kRobustnessRows> rows{};  // shares that pass
-  std::vector<RobustnessCurve> curves;  // ten of the model, then the other rows but the pushes
+  std::array<double, kRobustnessRows> rows{};  // share of passed levels, or of pushes
+  std::vector<RobustnessCurve> curves;  // ten of the model, then the other rows without pushes
   double score() const;
 };
 
-/// Judges the outcomes of these cases.
+/// Computes the robustness scores from the outcomes of these cases.
 Robustness JudgeRobustness(const std::vector<RobustnessCase>& cases,
                            const std::vector<BoardOutcome>& outcomes);
 

@@ -16,8 +16,8 @@ namespace upswing {
 namespace {
 
 TEST(RealAiGymRules, TheFormulaGivesThePublishedScores) {
-  // Time, energy, torque cost, smoothness, velocity cost, and score of the pendubot's board. The
-  // columns are rounded there, smoothness to 0.001.
+  // Time, energy, torque cost, smoothness, velocity cost, and score from the pendubot's board. The
+  // board rounds its columns, smoothness to 0.001.
   const std::vector<std::array<double, 6>> board{
       {1.15, 7.67, 2.36, .007, 62.07, .682},  {1.15, 7.72, 2.43, .010, 64.33, .659},
       {.71, 9.83, 4.37, .014, 58.15, .596},   {4.13, 9.53, 1.25, .005, 211.34, .536},
@@ -75,7 +75,7 @@ TEST(RealAiGymRules, ALevelOfNoisePassesAboveOneHalf) {
   EXPECT_EQ(JudgeRobustness(cases, outcomes).score(), 0);
   for (BoardOutcome& o : outcomes) o.at_goal = true;
   EXPECT_NEAR(JudgeRobustness(cases, outcomes).score(), 1, 1e-12);
-  // The first level of velocity noise: five of ten are not more than one half, six are.
+  // First level of velocity noise: five of ten are not more than half, six are.
   for (size_t i = 210; i < 215; ++i) outcomes[i].at_goal = false;
   EXPECT_NEAR(JudgeRobustness(cases, outcomes).rows[1], 20.0 / 21, 1e-12);
   outcomes[214].at_goal = true;
@@ -89,10 +89,10 @@ TEST(RealAiGymRules, ALevelOfNoisePassesAboveOneHalf) {
   EXPECT_NEAR(judged.curves[10].share[0], 0.6, 1e-12);
 }
 
-/// Torques that depend on the step and what is measured.
+/// Torques that depend on the step and on the measured q1.
 double Script(int step, double q1) { return 2 * std::sin(0.01 * step) + 0.5 * std::sin(q1); }
 
-/// Acts by the script and notes what it measured of the first simulation.
+/// Acts by Script and records the measurements of the first simulation.
 class Scripted : public BoardController {
  public:
   explicit Scripted(std::vector<BoardState>* seen) : seen_(seen) {}
@@ -174,7 +174,7 @@ TEST(RealAiGymSimulation, NoiseIsOfItsSize) {
   const Played noisy = Play(episode);
   double sum = 0, squares = 0;
   for (size_t k = 0; k < 5000; ++k) {
-    EXPECT_EQ(noisy.seen[k][0], noisy.trace[k].state[0]);  // angles have none
+    EXPECT_EQ(noisy.seen[k][0], noisy.trace[k].state[0]);  // angles have no noise
     const double n = noisy.seen[k][2] - noisy.trace[k].state[2];
     sum += n;
     squares += n * n;
@@ -199,12 +199,12 @@ TEST(RealAiGymSimulation, APushActsBesideTheMotor) {
   const Played pushed = Play(episode), free = Play(BoardEpisode());
   EXPECT_EQ(pushed.trace[800].state, free.trace[800].state);
   EXPECT_NE(pushed.trace[1100].state, free.trace[1100].state);
-  // The torque of the tables is the motor's alone.
+  // The tables' torque is only the motor's.
   const BoardSample& now = pushed.trace[1000];
   EXPECT_EQ(now.torque, Script(1000, now.state[0]));
 }
 
-/// Asks for more than the motor has.
+/// Asks for more torque than the motor has.
 class Strong : public BoardController {
  public:
   void Act(int, const BoardMeasurement&, size_t count, Lanes& torque) override {
@@ -246,7 +246,7 @@ TEST(RealAiGymSimulation, WhatBlowsUpIsTheWorst) {
 TEST(RealAiGymRules, TheGoalIsAsNearAndAsSlowAsTheySay) {
   const double pi = std::numbers::pi;
   EXPECT_TRUE(AtGoal({pi, 0, 0, 0}));
-  EXPECT_TRUE(AtGoal({-5 * pi, 6 * pi, 0, 0}));  // after some turns
+  EXPECT_TRUE(AtGoal({-5 * pi, 6 * pi, 0, 0}));  // with full turns
   for (const double sign : {1, -1}) {
     EXPECT_TRUE(AtGoal({pi + sign * 0.349, sign * 0.349, sign * 0.999, -sign * 0.999}));
     EXPECT_FALSE(AtGoal({pi + sign * 0.351, 0, 0, 0}));

@@ -12,7 +12,7 @@
 namespace upswing {
 namespace {
 
-/// Throws BadInput unless what has to be is even.
+/// Throws BadInput unless the sizes that must be even are even.
 const BoardSearchConfig& Checked(const BoardSearchConfig& c) {
   for (const auto& [name, value] : {std::pair{"hidden", c.hidden},
                                     {"first_population", c.first_population},
@@ -30,25 +30,25 @@ std::vector<double> Deviations(const SwingNet& net, double of_network, double of
   return deviations;
 }
 
-/// The performance score, with something to climb where there is none yet.
+/// The performance score, plus a gradient for the search while the score is 0.
 double NominalFitness(const BoardOutcome& o, double weight) {
   const bool done = o.above_line && o.at_goal;
   const double idle = done ? 0 : 1e-4 * std::min(500.0, o.torque_cost);
   return (done ? weight * PerformanceScore(o) : 0) + 0.5 * o.held + 0.3 * o.nearest - idle;
 }
 
-/// A simulation of a candidate.
+/// A simulation drawn for a candidate.
 struct Drawn {
   double weight;  // in the robustness; 0: the nominal plant
   BoardEpisode episode;
 };
 
-constexpr int kShortSteps = 3000;         // 6 s: enough for a swing-up and to see whether it holds
-constexpr double kLinearDeviation = 0.1;  // of the regulator's numbers at first
+constexpr int kShortSteps = 3000;         // 6 s: enough for a swing-up and to see if it holds
+constexpr double kLinearDeviation = 0.1;  // initial deviation of the regulator's numbers
 
-/// The simulations of a candidate, as many as a group has: the nominal plant, then the rows, with
-/// what varies drawn evenly over its range. Noise of the velocities is left out: a SwingNet does
-/// not see them. Of rows that are easy there is one simulation, with half the weight.
+/// Draws the simulations of a candidate, as many as a group has: the nominal plant, then the rows
+/// with their variation drawn uniformly over its range. Velocity noise is left out, because a
+/// SwingNet does not use measured velocities. Easy rows have one simulation with half the weight.
 std::vector<Drawn> DrawEpisodes(Rng& rng) {
   std::vector<Drawn> drawn{{0, {}}};
   const auto draw = [&](RobustnessRow row, int count, double weight) {
@@ -241,7 +241,7 @@ bool BoardSearch::Step(ThreadPool* pool, Report& report) {
     snes_ = Snes(best_, Deviations(net_, config_.restart, kLinearDeviation), config_.mean_rate,
                  static_cast<uint64_t>(config_.seed));
   }
-  // The average of the last means: they wander about a good place.
+  // Average of the last means, which wander about a good point.
   constexpr double kKept = 0.97;
   for (size_t i = 0; i < average_.size(); ++i) {
     const double now = snes_.mean()[i];

@@ -13,14 +13,14 @@ namespace upswing {
 
 /// Separable natural evolution strategies: Schaul, Glasmachers, Schmidhuber, "High dimensions and
 /// heavy tails for natural evolution strategies" (GECCO 2011). Candidates are normal about a mean,
-/// each number with its own deviation; both follow the natural gradient of the ranks.
+/// with a deviation for each number. Mean and deviations follow the natural gradient of the ranks.
 class Snes {
  public:
   Snes(std::vector<double> mean, std::vector<double> deviation, double mean_rate, uint64_t seed);
 
-  /// Draws so many candidates, an even number: in pairs, mirrored at the mean.
+  /// Draws `population` candidates, an even number: pairs that mirror each other at the mean.
   const std::vector<std::vector<double>>& Ask(int population);
-  /// The candidates' fitness, larger is better.
+  /// Updates mean and deviations from the candidates' fitness; larger is better.
   void Tell(const std::vector<double>& fitness);
 
   const std::vector<double>& mean() const { return mean_; }
@@ -33,46 +33,46 @@ class Snes {
   std::vector<std::vector<double>> z_, candidates_;
 };
 
-/// How a policy for the boards is searched.
+/// Settings of a search for a board policy.
 struct BoardSearchConfig {
   std::string robot = NameOf(Robot::kPendubot);
   int64_t seed = 1, hidden = 16, starts = 12, alone = 250, generations = 1200, population = 64,
           first_population = 64;
   double deviation = 0.12, restart = 0.05, mean_rate = 2, performance_weight = 3, last_weight = 10;
 
-  /// One line per setting: name, range, unit, help.
+  /// Declares each setting in `options`: name, range, unit, help.
   void Describe(Options& options);
 };
 
-/// Searches a policy on the rules themselves: first on the nominal plant alone, then also on
-/// random plants, delays, noise and pushes, drawn anew in each generation from the ranges of the
-/// robustness score, but never the cases that it is judged by.
+/// Searches a policy directly on the rules: first on the nominal plant only, then also on random
+/// plants, delays, noise and pushes. Each generation draws these from the ranges of the robustness
+/// score, but never uses the scored cases.
 class BoardSearch {
  public:
   explicit BoardSearch(const BoardSearchConfig& config);
-  /// Begins with a policy instead of a random network; its robot and size are then the search's.
+  /// Begins with a policy instead of a random network, and takes its robot and size.
   BoardSearch(const BoardSearchConfig& config, const SwingPolicy& first);
 
   struct Report {
-    int generation;  // from the first one on
+    int generation;  // counted over all starts
     int start;       // 1, 2, …; 0: random plants
-    bool milestone;  // the last of a start, or every fiftieth
+    bool milestone;  // the last generation of a start, or every fiftieth
     double best_fitness;
   };
 
-  /// One generation; false after the last one.
+  /// Runs one generation; false after the last one.
   bool Step(ThreadPool* pool, Report& report);
 
   const SwingNet& net() const { return net_; }
-  /// The policy so far: the means of the last generations, averaged.
+  /// The current policy: the average of the last generations' means.
   const std::vector<double>& numbers() const { return average_; }
-  /// What it does on the nominal plant.
+  /// The current policy's outcome on the nominal plant.
   BoardOutcome Nominal() const;
   int generation() const { return generation_; }
   int generations() const;
 
  private:
-  /// Begins anew from a random network.
+  /// Restarts from a random network.
   void Begin(int64_t start);
   std::vector<double> NominalFitnesses(const std::vector<std::vector<double>>& candidates,
                                        ThreadPool* pool) const;

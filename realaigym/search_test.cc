@@ -11,7 +11,7 @@ namespace upswing {
 namespace {
 
 TEST(Snes, FindsTheBottomOfABowl) {
-  // Axes of different lengths, which the deviations learn.
+  // Axes with different scales, which the deviations must learn.
   const auto cost = [](const std::vector<double>& x) {
     double sum = 0;
     for (size_t i = 0; i < x.size(); ++i) {
@@ -24,7 +24,7 @@ TEST(Snes, FindsTheBottomOfABowl) {
   for (int generation = 0; generation < 300; ++generation) {
     const auto& candidates = snes.Ask(20);
     for (size_t i = 0; i < 6; ++i) {
-      ASSERT_NEAR(candidates[0][i] + candidates[1][i], 2 * snes.mean()[i], 1e-12);  // mirrored
+      ASSERT_NEAR(candidates[0][i] + candidates[1][i], 2 * snes.mean()[i], 1e-12);  // mirrored pair
     }
     std::vector<double> fitness;
     fitness.reserve(candidates.size());
@@ -72,7 +72,7 @@ TEST(BoardSearch, TheBestStartGoesOn) {
     while (search.Step(nullptr, report)) continue;
     return std::pair(report.best_fitness, search.numbers());
   };
-  const auto first = run(1, 1), second = run(1 + 1'000'003, 1);  // as the second start is seeded
+  const auto first = run(1, 1), second = run(1 + 1'000'003, 1);  // the seed of run 1's second start
   ASSERT_NE(first.first, second.first);
   EXPECT_EQ(run(1, 2).second, std::max(first, second).second);
 }
@@ -123,7 +123,7 @@ TEST(SwingNet, WhatIsNoPolicyIsRefused) {
   std::vector<double> numbers = net.Initial(1);
   numbers[3] = std::nan("");
   EXPECT_THROW(ReadSwingPolicy(net.ToTensors(numbers)), Error);
-  // Gains, rho and sharpness are exponents: e^1000 is no number.
+  // Gains, rho and sharpness are exponents: e^1000 is not finite.
   for (const size_t i : {0, 4, 5}) {
     numbers = net.Initial(1);
     numbers[i] = -51;

@@ -12,36 +12,36 @@
 namespace upswing {
 namespace {
 
-constexpr int kMostDelay = 32;  // steps, more than the longest of the rules
+constexpr int kMostDelay = 32;  // steps, more than the longest delay of the rules
 static_assert(kBoardLevels - 1 < kMostDelay);
 constexpr int kHeldSteps = 1000;  // the last 2 s
-constexpr int kNoted = 8;         // steps from one look at the nearness to the next
+constexpr int kNoted = 8;         // steps between two measurements of the nearness
 constexpr int kHeldLooks = kHeldSteps / kNoted;
 
-/// 1 upright at rest; 1/2 where the angles are off by 0.35 rad (their squares sum to 0.24), or by
-/// `velocity` in each velocity: what a search climbs.
+/// Nearness to the goal, the fitness of a search: 1 upright at rest; 1/2 if the angles are off by
+/// 0.35 rad (their squares sum to 0.24), or each velocity by `velocity`.
 double Nearness(double e1, double e2, double w1, double w2, double velocity) {
   const double angles = (e1 * e1 + e2 * e2) / 0.12;
   return 1 / (1 + 0.5 * (angles + (w1 * w1 + w2 * w2) / (velocity * velocity)));
 }
 
-/// Sums over a simulation, and what else its outcome is made of.
+/// Running sums of a simulation, and the other inputs of its outcome.
 struct Sums {
   Lanes energy{}, torque_cost{}, velocity_cost{}, max_torque{};
   Lanes change{}, changes_squared{};  // of the torque
-  Lanes last_below;                   // step below the line
+  Lanes last_below;                   // last step below the line
   Lanes nearest{}, held{};
 };
 
-/// A push of a simulation, after step `first` and not after `last`.
+/// A push of a simulation, active after step `first` up to step `last`.
 struct LanePush {
   int first, last;
   size_t lane;
   BoardPush push;
 };
 
-/// A block of simulations while it runs. Loops over kBoardBlock are written for the compiler's
-/// vectors; what few simulations have is listed.
+/// A running block of simulations. Loops over kBoardBlock are written for the compiler's
+/// vectorisation. Lists hold features that few simulations have.
 class Run {
  public:
   Run(Robot robot, std::span<const BoardEpisode> episodes)
@@ -65,7 +65,7 @@ class Run {
       if (episode.response != 1) responding_.push_back(lane);
       for (const BoardPush& push : episode.pushes) {
         if (push.amplitude == 0) continue;
-        constexpr double kWidths = 6;  // it is nothing beyond
+        constexpr double kWidths = 6;  // negligible beyond this
         pushes_.push_back({static_cast<int>((push.time - kWidths * push.width) / kBoardTimestep),
                            static_cast<int>((push.time + kWidths * push.width) / kBoardTimestep),
                            lane, push});
@@ -115,7 +115,7 @@ class Run {
     return seen_;
   }
 
-  /// From the torques that the controller wants to those that act.
+  /// Computes the acting torques from the torques that the controller wants.
   void Drive(int step) {
     const double time = step * kBoardTimestep;
     previous_ = torque_;
@@ -155,9 +155,10 @@ class Run {
     }
   }
 
-  /// After a step: what its torque did to the motor's joint, and where the tip was before.
+  /// Records, after a step, the work of its torque at the motor's joint, and the tip's position
+  /// before the step.
   void Note(int step) {
-    constexpr double kLine = 0.9;  // of the length of both links
+    constexpr double kLine = 0.9;  // share of the length of both links
     const auto& angle = block_.joint[0] == 1 ? block_.q1 : block_.q2;
     for (size_t i = 0; i < kBoardBlock; ++i) {
       const double torque = torque_[i], size = std::abs(torque);
@@ -166,7 +167,7 @@ class Run {
       sums_.change[i] += change;
       sums_.changes_squared[i] += change * change;
     }
-    if (step == steps_ - 1) return;  // of N samples there are N - 1 differences
+    if (step == steps_ - 1) return;  // N samples have N - 1 differences
     for (size_t i = 0; i < kBoardBlock; ++i) {
       const double torque = torque_[i];
       sums_.energy[i] += std::abs((angle[i] - block_.angle_before[i]) * torque);
@@ -191,7 +192,7 @@ class Run {
     o.swing_up_seconds = std::min(first, steps_ - 1) * kBoardTimestep;
     const BoardState end = StateOf(lane);
     o.at_goal = AtGoal(end);
-    // A simulation that has blown up is the worst.
+    // A simulation that has blown up gets the worst outcome.
     const auto [q1, q2, w1, w2] = end;
     if (!std::isfinite(q1 + q2 + w1 + w2 + o.energy + o.velocity_cost)) {
       constexpr double kWorst = std::numeric_limits<double>::infinity();
@@ -204,12 +205,12 @@ class Run {
   int steps_;
   ClosedFormBatch block_;
   std::vector<Rng> rngs_;
-  // Which have it.
+  // Simulations with velocity noise, torque noise, delay and slow response:
   std::vector<size_t> velocity_noise_, torque_noise_, delayed_, responding_;
   std::vector<LanePush> pushes_;
   std::vector<BoardMeasurement> past_;  // ring of the last kMostDelay states
   BoardMeasurement seen_{};
-  Lanes wanted_{}, torque_{}, previous_{};  // N·m: asked for; that acts, without pushes; before it
+  Lanes wanted_{}, torque_{}, previous_{};  // N·m: wanted; acting, without pushes; acting before
   Sums sums_;
 };
 

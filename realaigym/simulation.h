@@ -11,32 +11,32 @@
 
 namespace upswing {
 
-/// What a controller is told of a block of simulations: the state with noise and delay.
+/// Measurements of a block of simulations: the states with noise and delay.
 struct BoardMeasurement {
   Lanes q1, q2, w1, w2;  // rad, rad/s
 };
 
-/// Controls a block of simulations, each from its beginning on. It is called at every step of
-/// kBoardTimestep, and may hold a torque for longer.
+/// Controls a block of simulations from their beginnings. Act is called at every step of
+/// kBoardTimestep, and the controller may hold a torque for longer.
 class BoardController {
  public:
   virtual ~BoardController() = default;
-  /// Torques of the motor (N·m) for the first `count` simulations at step 0, 1, …
+  /// Sets the motor torques (N·m) of the first `count` simulations at step 0, 1, …
   virtual void Act(int step, const BoardMeasurement& measured, size_t count, Lanes& torque) = 0;
 };
 
-/// Makes the controller of the block of simulations that begins with number `first`.
+/// Makes the controller of the block whose first simulation has number `first`.
 using BoardControllerMaker = std::function<std::unique_ptr<BoardController>(size_t first)>;
 
-/// One step of one simulation, for tables: the state, and the torque that then acts.
+/// One step of a simulation, for tables: the state, and the torque that acts after it.
 struct BoardSample {
   double time;
   BoardState state;
   double torque;  // N·m
 };
 
-/// Simulates all episodes, in blocks on the pool's threads. With `trace`, it gets the steps of the
-/// first one. `progress` counts them.
+/// Simulates all episodes, in blocks on the pool's threads. `trace`, if given, gets the steps of
+/// the first episode. `progress` counts episodes.
 std::vector<BoardOutcome> SimulateOnBoard(Robot robot, std::span<const BoardEpisode> episodes,
                                           const BoardControllerMaker& make, ThreadPool* pool,
                                           std::vector<BoardSample>* trace = nullptr,

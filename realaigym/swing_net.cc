@@ -6,7 +6,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "realaigym/swing_net.cc"
 #include <hwy/foreach_target.h>
-// After foreach_target.h, which includes this file once for every target:
+// These includes follow foreach_target.h, which includes this file once for every target.
 #include "sim/sine_cosine-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -26,8 +26,8 @@ struct Activations {
 HWY_INLINE V From(const Lanes& x, size_t i) { return hn::LoadU(kDoubles, x.data() + i); }
 HWY_INLINE void To(V x, Lanes& lanes, size_t i) { hn::StoreU(x, kDoubles, lanes.data() + i); }
 
-/// x (27 + x²)/(27 + 9 x²) within ±3, ±1 beyond: near tanh, and its slope has no jump. Two at once,
-/// as a division takes longer than all else.
+/// x (27 + x²)/(27 + 9 x²) within ±3, ±1 beyond: close to tanh, with a continuous slope. Handles
+/// two vectors at once, because division takes longer than everything else.
 HWY_INLINE void Squash(VF& a, VF& b) {
   const VF limit = hn::Set(kFloats, 3.0F), c = hn::Set(kFloats, 27.0F),
            nine = hn::Set(kFloats, 9.0F);
@@ -40,7 +40,7 @@ HWY_INLINE void Squash(VF& a, VF& b) {
   b = y * (c + yy) * below_a * inverse;
 }
 
-/// The velocity that the last three angles tell, to second order, rad/s.
+/// The velocity from the last three angles, to second order, rad/s.
 HWY_INLINE V Velocity(const std::array<Lanes, 2>& past, V now, size_t i) {
   const V sum =
       MulAdd(Constant(3), now, NegMulAdd(Constant(4), From(past[0], i), From(past[1], i)));
@@ -53,7 +53,7 @@ HWY_INLINE V Wrap(V x) {
   return NegMulAdd(turns, Constant(2 * std::numbers::pi), x);
 }
 
-/// Weights one after the other: of one policy, or with kOwn of one for each lane.
+/// Consecutive weights: of one policy or, with kOwn, one for each lane.
 template <bool kOwn>
 class Reader {
  public:
@@ -68,7 +68,7 @@ class Reader {
   const float* next_;
 };
 
-/// A unit of n inputs: weights and bias.
+/// A unit with n inputs: weights, then bias.
 template <bool kOwn>
 HWY_INLINE VF Unit(Reader<kOwn>& weight, const VF* in, int n) {
   VF even = weight() * in[0], odd = weight() * in[1];
@@ -88,7 +88,7 @@ HWY_INLINE void Layer(Reader<kOwn>& weight, const VF* in, int n, VF* out, int hi
   }
 }
 
-/// kHidden: the units of a layer where the compiler is to know them, or 0.
+/// Evaluates a layer. kHidden: number of units if the compiler should know it, or 0.
 template <bool kOwn, int kHidden>
 void Network(const SwingBlock& block, Activations& a) {
   const int hidden = kHidden > 0 ? kHidden : block.hidden;
@@ -106,7 +106,7 @@ void Network(const SwingBlock& block, Activations& a) {
   }
 }
 
-/// The share of the linear torque, and that torque.
+/// The linear torque and its share in the blend.
 struct Linear {
   V share, torque;
 };
@@ -159,7 +159,7 @@ void ActOnBlock(SwingBlock& block, const BoardMeasurement& measured, Lanes& torq
                     Wrap(From(measured.q2, i)), From(w1, i), From(w2, i)};
     const Linear linear = LinearTorque(block, i, x);
     const V net = hn::PromoteTo(kDoubles, hn::Load(halves, a.out + i));
-    // Where it has no share the linear torque may be large: it is cut first.
+    // Outside its region the linear torque may be large, so it is clipped first.
     const V limit = Constant(kBoardTorqueLimit);
     const V cut = hn::Min(hn::Max(linear.torque, hn::Neg(limit)), limit);
     To(MulAdd(linear.share, cut - net, net), torque, i);

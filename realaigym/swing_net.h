@@ -9,14 +9,14 @@
 /// The arithmetic of SwingNet (swing_policy.h) for a block of simulations.
 namespace upswing {
 
-/// Largest number of units in each of its two layers, and their inputs: sine and cosine of q1, of
-/// q1 + q2 and of q2, w1/10 and w2/10.
+/// Largest number of units in each of the network's two layers, and number of inputs: sine and
+/// cosine of q1, of q1 + q2 and of q2, w1/10 and w2/10.
 inline constexpr int kSwingMostHidden = 32, kSwingInputs = 8;
 /// Limit of the network's torque, N·m.
 inline constexpr double kSwingTorque = 4;
 
-/// What a block is controlled by: `lanes_each` simulations, one after the other, have the same
-/// policy.
+/// Parameters of a block's controllers: each run of `lanes_each` consecutive simulations has its
+/// own policy.
 struct SwingBlock {
   int hidden;
   size_t lanes_each;             // kBoardBlock, kSwingGroup or 1
@@ -26,15 +26,16 @@ struct SwingBlock {
   std::array<double, 16> P;      // (4 × 4)
   std::array<Lanes, 2> q1, q2;   // angles one and two steps ago, rad
 };
-/// As many as a vector has floats.
+/// Number of floats in a vector.
 inline constexpr size_t kSwingGroup = 16;
 
-/// Numbers of a network with so many units: each unit has its weights, then its bias.
+/// Number of parameters of a network with `hidden` units per layer: each unit has its weights, then
+/// its bias.
 constexpr size_t SwingWeights(int hidden) {
   return static_cast<size_t>((kSwingInputs + 1) * hidden + (hidden + 1) * hidden + hidden + 1);
 }
 
-/// The torques for these angles, which then are those of one step ago.
+/// Computes the torques for the measured angles, then stores the angles as those of one step ago.
 void SwingTorques(SwingBlock& block, const BoardMeasurement& measured, Lanes& torque);
 
 }  // namespace upswing

@@ -14,14 +14,14 @@ namespace {
 constexpr const char* kFormat = "upswing-realaigym";
 constexpr int kVersion = 2;
 constexpr int kLeastHidden = 4;
-constexpr double kMostExponent = 50, kMostWeight = 1e6;  // of numbers in files
+constexpr double kMostExponent = 50, kMostWeight = 1e6;  // limits of numbers in files
 
 class SwingController : public BoardController {
  public:
   explicit SwingController(SwingBlock block) : block_(std::move(block)) {}
 
   void Act(int step, const BoardMeasurement& measured, size_t /*count*/, Lanes& torque) override {
-    if (step == 0) {  // at rest
+    if (step == 0) {  // the episode begins at rest
       block_.q1.fill(measured.q1);
       block_.q2.fill(measured.q2);
     }

@@ -12,7 +12,7 @@ constexpr double kStepSeconds = 0.2;
 constexpr int64_t kEpisodeSteps = 500;
 constexpr double kMaxOmega1 = 4 * kPi, kMaxOmega2 = 9 * kPi;  // rad/s
 constexpr double kMaxTorque = 1.0;                            // N·m
-constexpr double kGoalHeight = 1.0;  // of the free end over the first joint, m
+constexpr double kGoalHeight = 1.0;  // height of the free end above the first joint, m
 
 EnvSpec Spec() {
   EnvSpec spec;
@@ -30,7 +30,7 @@ EnvSpec Spec() {
   return spec;
 }
 
-/// The four state variables, or their derivatives by time.
+/// The four state variables, or their time derivatives.
 struct Variables {
   double theta1, theta2, omega1, omega2;
 };
@@ -41,14 +41,15 @@ Variables Sum(const Variables& a, double factor, const Variables& b) {
           a.omega2 + factor * b.omega2};
 }
 
-/// ds/dt by the equations of the book. Symbols there: m mass (kg), l length (m), lc from the joint
-/// to the centre of mass (m), I moment of inertia (kg·m²), g gravity (m/s²), tau torque (N·m).
+/// ds/dt by the equations of Sutton and Barto. Symbols: m mass (kg), l length (m), lc distance from
+/// the joint to the centre of mass (m), I moment of inertia (kg·m²), g gravity (m/s²), tau torque
+/// (N·m).
 Variables Derivative(const Variables& s, double tau) {
   constexpr double m1 = 1, m2 = 1, l1 = 1, lc1 = 0.5, lc2 = 0.5, I1 = 1, I2 = 1, g = 9.8;
   const double sin2 = std::sin(s.theta2), cos2 = std::cos(s.theta2);
   const double w1 = s.omega1, w2 = s.omega2;
 
-  // cos(x - π/2) of the book is sin x.
+  // The book's cos(x - π/2) is sin x.
   const double d1 = m1 * lc1 * lc1 + m2 * (l1 * l1 + lc2 * lc2 + 2 * l1 * lc2 * cos2) + I1 + I2;
   const double d2 = m2 * (lc2 * lc2 + l1 * lc2 * cos2) + I2;
   const double phi2 = m2 * lc2 * g * std::sin(s.theta1 + s.theta2);
@@ -60,13 +61,12 @@ Variables Derivative(const Variables& s, double tau) {
   return {w1, w2, a1, a2};
 }
 
-/// One step of the classical Runge-Kutta method over h, s.
+/// One classical Runge-Kutta step over h seconds.
 Variables RungeKutta(const Variables& s, double tau, double h) {
   const Variables k1 = Derivative(s, tau);
   const Variables k2 = Derivative(Sum(s, h / 2, k1), tau);
   const Variables k3 = Derivative(Sum(s, h / 2, k2), tau);
   const Variables k4 = Derivative(Sum(s, h, k3), tau);
-  // k1 + 2 k2 + 2 k3 + k4
   const Variables slope = Sum(Sum(Sum(k1, 2, k2), 2, k3), 1, k4);
   return Sum(s, h / 6, slope);
 }

@@ -1,6 +1,6 @@
 // Symbols: q1, q2 joint angles (rad; 0 hanging, q2 relative to link 1), w1, w2 their velocities
-// (rad/s), tau torque of the motor (N·m), s and c sine and cosine, 12 of the sum of both angles.
-// The plant's constants J1, J2, b, a, G1, G2, … are those of manipulator.h.
+// (rad/s), tau torque of the motor (N·m), s and c sine and cosine; the suffix 12 means the sum of
+// both angles. manipulator.h defines the plant's constants J1, J2, b, a, G1, G2, …
 #include "sim/closed_form.h"
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "sim/closed_form.cc"
 #include <hwy/foreach_target.h>
-// After foreach_target.h, which includes this file once for every target:
+// These includes follow foreach_target.h, which includes this file once for every target.
 #include <hwy/contrib/math/math-inl.h>
 
 #include "sim/sine_cosine-inl.h"
@@ -19,14 +19,14 @@ HWY_BEFORE_NAMESPACE();
 namespace upswing::HWY_NAMESPACE {
 namespace {
 
-/// MuJoCo's mjMAXVAL: beyond it, a state has blown up.
+/// MuJoCo's mjMAXVAL. A state with a larger number has blown up.
 constexpr double kLargestCoordinate = 1e10;
 
 HWY_INLINE V LoadFrom(const AlignedVector<double>& x, size_t i) {
   return hn::Load(kDoubles, x.data() + i);
 }
 
-/// Whether the motor is at joint 1, else it is at joint 2.
+/// Whether the motor drives joint 1 (else joint 2).
 HWY_INLINE hn::Mask<D> DrivesJoint1(const ClosedFormBatch& batch, size_t i) {
   return hn::Lt(LoadFrom(batch.joint, i), Constant(1.5));
 }
@@ -34,11 +34,11 @@ HWY_INLINE hn::Mask<D> DrivesJoint1(const ClosedFormBatch& batch, size_t i) {
 /// The constants of the equations of motion.
 struct Dynamics {
   V J2, b, G1, G2, d1, d2, f1, f2;
-  V tau1, tau2;  // at each joint; one of them is the motor's, the other 0
+  V tau1, tau2;  // torques at both joints, N·m: one is the motor's, the other 0
   V a2;          // 2 a
   V J12;         // J1 + J2
   V M22;         // J2 + a
-  V det;         // the part of det M that does not depend on q2
+  V det;         // part of det M that does not depend on q2
 };
 
 HWY_INLINE Dynamics LoadDynamics(const ClosedFormBatch& batch, size_t i) {
@@ -107,7 +107,7 @@ struct Angles {
 
 HWY_INLINE Angles AnglesOf(const Joints& q) { return {SineCosineOf(q.one), SineCosineOf(q.two)}; }
 
-/// Height of the tip over the pivot, over the length of both links.
+/// Height of the tip over the pivot, divided by the length of both links.
 HWY_INLINE V HeightOf(const ClosedFormBatch& batch, size_t i, const Angles& angles) {
   return hn::Neg(
       MulAdd(LoadFrom(batch.share1, i), angles.q1.c, LoadFrom(batch.share2, i) * angles.c12()));
@@ -146,10 +146,10 @@ HWY_INLINE Joints Acceleration(const Dynamics& p, const State& x, const Angles& 
           hn::Neg(MulAdd(M11, minus_r2, M12 * r1)) * inverse};
 }
 
-/// One classical Runge-Kutta step of K vectors of environments, whose operations the processor
-/// overlaps. For q̈ = a(q, w) its four slopes of q are the w of the stages, so that
+/// Makes one classical Runge-Kutta step of K vectors of environments, so that the processor
+/// overlaps their operations. For q̈ = a(q, w), the four slopes of q are the stages' w, so that
 ///   q += h w + h²/6 (a1 + a2 + a3),  w += h/6 (a1 + 2 a2 + 2 a3 + a4).
-/// `before` gets the angles of the first stage.
+/// `before` gets the sines and cosines of the first stage.
 template <bool kFriction, size_t K>
 HWY_INLINE void RungeKuttaStep(const Dynamics (&p)[K], double h, State (&x)[K],
                                Angles (&before)[K]) {
@@ -181,13 +181,13 @@ HWY_INLINE void RungeKuttaStep(const Dynamics (&p)[K], double h, State (&x)[K],
   }
 }
 
-/// Makes `steps` steps with the K vectors of environments from `first` on.
+/// Makes `steps` steps with the K vectors of environments that begin at `first`.
 template <bool kFriction, size_t K>
 HWY_INLINE void AdvanceVectors(ClosedFormBatch& batch, int steps, size_t first, double timestep) {
   const size_t lanes = hn::Lanes(kDoubles);
   Dynamics p[K];
   State x[K];
-  Angles before[K] = {};  // of the last step
+  Angles before[K] = {};  // before the last step
   HWY_UNROLL(2)
   for (size_t k = 0; k < K; ++k) {
     p[k] = LoadDynamics(batch, first + k * lanes);
@@ -217,7 +217,7 @@ void AdvanceRange(ClosedFormBatch& batch, int steps, size_t first, size_t last, 
   advance(batch, steps, first, last, timestep);
 }
 
-/// The task's view of one vector of states, each number as an array over the lanes.
+/// The task's results for one vector of states; each number is an array over the lanes.
 struct Verdict {
   alignas(64) float obs[kObservationSize][kWidest];
   alignas(64) double terms[kRewardTerms][kWidest];
@@ -229,7 +229,7 @@ struct Pose {
   Angle q1, q2;
   V c12;
   V energy;  // Ê: hanging at rest 0, upright at rest 1
-  V height;  // ĥ: of the tip, in [-1, 1]
+  V height;  // ĥ of the tip, in [-1, 1]
 };
 
 HWY_INLINE Pose PoseOf(const ClosedFormBatch& batch, size_t i, const State& x) {
@@ -287,14 +287,14 @@ HWY_INLINE void JudgeReward(const Pose& pose, const State& x, V tau, const Rewar
   hn::Store(reward, kDoubles, verdict.reward);
 }
 
-/// Whether all numbers are within MuJoCo's limit; comparisons with NaN are false.
+/// Whether all numbers are within MuJoCo's limit. NaN fails, because its comparisons are false.
 HWY_INLINE hn::Mask<D> IsSound(const State& x) {
   const V largest = Constant(kLargestCoordinate);
   return hn::And(hn::And(hn::Le(hn::Abs(x.q.one), largest), hn::Le(hn::Abs(x.q.two), largest)),
                  hn::And(hn::Le(hn::Abs(x.w.one), largest), hn::Le(hn::Abs(x.w.two), largest)));
 }
 
-/// Observe, RewardTerms and Inverted of double_pendulum.h, for the environments from `i` on.
+/// Observe, RewardTerms and Inverted of double_pendulum.h for one vector of environments from `i`.
 HWY_INLINE void JudgeVector(const ClosedFormBatch& batch, const RewardWeights& weights, size_t i,
                             Verdict& verdict) {
   const State x = LoadState(batch, i);
@@ -374,7 +374,7 @@ void ClosedFormBatch::SetPlant(size_t env, const Plant& plant) {
   joint[env] = plant.actuated_joint;
 
   const double m1 = plant.mass1, m2 = plant.mass2, l1 = plant.length1, l2 = plant.length2;
-  const double c1 = l1 / 2, c2 = l2 / 2;  // from the joint to the centre
+  const double c1 = l1 / 2, c2 = l2 / 2;  // distances from the joint to the centre
   T1[env] = m1 * l1 * l1 / 12 + m1 * c1 * c1 + m2 * l1 * l1;
   T2[env] = m2 * l2 * l2 / 12 + m2 * c2 * c2;
   energy_scale[env] = 1 / (2 * EnergyTarget(plant));

@@ -52,7 +52,7 @@ std::span<const double> Disturber::Apply(std::span<const double> torque,
   for (size_t i = 0; i < torque.size(); ++i) {
     applied_[i] = torque[i];
     const int delay = disturbances_[i].delay_steps();
-    // A ring as long as the delay: the new torque takes the place of the one that is due.
+    // The queue is a ring as long as the delay: the new torque replaces the one that is due now.
     if (delay > 0) std::swap(applied_[i], Queue(static_cast<int>(i))[steps[i] % delay]);
   }
   return applied_;

@@ -1,6 +1,6 @@
 // The double pendulum as formulas. Symbols: q1, q2 joint angles (rad; 0 hanging, q2 relative to
 // link 1), w1, w2 their velocities (rad/s), m mass (kg), l length (m), g gravity (m/s²), tau torque
-// of the motor (N·m). Every constant is that of the post "Balancing a Double Pendulum with DQN and
+// of the motor (N·m). All constants come from the post "Balancing a Double Pendulum with DQN and
 // MuJoCo".
 #include "sim/double_pendulum.h"
 
@@ -67,7 +67,7 @@ void RewardWeights::Describe(Options& o) {
 }
 
 CapsuleInertia::CapsuleInertia(double m, double r, double l) {
-  // The cylinder and the two half spheres have their shares of the mass by volume.
+  // The mass splits by volume between the cylinder and the two half spheres.
   const double cylinder = std::numbers::pi * r * r * l;
   const double sphere = 4.0 / 3.0 * std::numbers::pi * r * r * r;
   const double mc = m * cylinder / (cylinder + sphere);
@@ -101,9 +101,9 @@ double Energy(const Plant& plant, const PendulumState& s) {
   const double w12 = s.w1 + s.w2;  // absolute velocity of link 2
   const double potential = -m1 * g * (l1 / 2) * std::cos(s.q1) -
                            m2 * g * (l1 * std::cos(s.q1) + (l2 / 2) * std::cos(s.q1 + s.q2));
-  const double v1_squared = (l1 / 2) * (l1 / 2) * s.w1 * s.w1;  // of link 1's centre
+  const double v1_squared = (l1 / 2) * (l1 / 2) * s.w1 * s.w1;  // of the centre of link 1
   const double v2_squared = l1 * l1 * s.w1 * s.w1 + (l2 / 2) * (l2 / 2) * w12 * w12 +
-                            l1 * l2 * std::cos(s.q2) * s.w1 * w12;  // of link 2's centre
+                            l1 * l2 * std::cos(s.q2) * s.w1 * w12;  // of the centre of link 2
   const double kinetic =
       0.5 * (I1 * s.w1 * s.w1 + I2 * w12 * w12 + m1 * v1_squared + m2 * v2_squared);
   return kinetic + potential;
@@ -195,8 +195,8 @@ std::array<double, kRewardTerms> RewardTerms(const Plant& plant, const PendulumS
 }
 
 std::string Mjcf(const Plant& plant) {
-  // There are no contacts and no constraints: disabling these stages saves time and leaves the
-  // trajectory as it is.
+  // The model has no contacts and no constraints. Disabling these stages saves time and does not
+  // change the trajectory.
   std::string mjcf = R"(<mujoco model="double_pendulum">@size
   <option gravity="0 0 -@gravity" timestep="0.005" integrator="RK4">
     <flag contact="disable" constraint="disable"/>
@@ -216,7 +216,7 @@ std::string Mjcf(const Plant& plant) {
   </actuator>@tendon
 </mujoco>
 )";
-  // Each @name stands for a part that follows or for that parameter.
+  // @name stands for the parameter of this name, or for a part defined below.
   const auto fill = [&](const std::string& field, const std::string& text) {
     mjcf = Replaced(std::move(mjcf), field, text);
   };

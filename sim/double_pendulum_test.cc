@@ -32,8 +32,8 @@ TEST(Energy, HangingAndInvertedAreMinusAndPlusTheTarget) {
 }
 
 TEST(Energy, MatchesRodsCutIntoPieces) {
-  // A second derivation: each rod as many point masses, whose positions and velocities come from
-  // the geometry. Midpoint pieces of a rod underestimate its inertia by the share 1/n².
+  // A second derivation: each rod is a row of point masses, with positions and velocities from the
+  // geometry. Midpoint pieces underestimate a rod's inertia by the share 1/n².
   Rng rng(1, "energy");
   constexpr int n = 2000;
   for (int trial = 0; trial < 20; ++trial) {
@@ -71,7 +71,7 @@ TEST(Inverted, IsWithinThirtyDegreesForBothLinksAndAnyTurns) {
   EXPECT_TRUE(Inverted({3 * kPi, 2 * kPi, 0, 0}));
   EXPECT_TRUE(Inverted({kPi + 29.9 * degree, 0, 0, 0}));
   EXPECT_FALSE(Inverted({kPi + 30.1 * degree, 0, 0, 0}));
-  // The second link counts by its absolute angle.
+  // Link 2 counts by its absolute angle.
   EXPECT_TRUE(Inverted({kPi + 25 * degree, -50 * degree, 0, 0}));
   EXPECT_FALSE(Inverted({kPi + 25 * degree, 10 * degree, 0, 0}));
   EXPECT_FALSE(Inverted({kPi, kPi, 0, 0}));
@@ -94,7 +94,7 @@ TEST(Reward, TermsByHand) {
   const auto fast = RewardTerms(plant, {kPi, 0, 9, -1}, 0);
   EXPECT_EQ(fast[0], 1.5);
   EXPECT_DOUBLE_EQ(fast[3], -0.82);
-  // As fast, but not inverted: no penalty on velocities.
+  // Equally fast, but not inverted: no penalty on velocities.
   EXPECT_EQ(RewardTerms(plant, {0, 0, 9, -1}, 0)[3], 0);
 }
 
@@ -103,7 +103,7 @@ TEST(Observe, ByHand) {
   const float expected[] = {0, 1, 0.5F, 0.8660254F, 0.5F, -0.5F};
   for (size_t i = 0; i < 6; ++i) EXPECT_NEAR(obs[i], expected[i], 1e-6);
   EXPECT_NEAR(obs[6], NormalizedEnergy(Plant(), {kPi / 2, kPi / 6, 5, -10}), 1e-6);
-  EXPECT_NEAR(obs[7], 0.5 * std::sin(kPi / 6), 1e-6);  // link 1 level, link 2 30° beyond it
+  EXPECT_NEAR(obs[7], 0.5 * std::sin(kPi / 6), 1e-6);  // link 1 is level, link 2 is 30° beyond it
 }
 
 TEST(Task, EnergyAndHeightFollowTheCurrentPlant) {

@@ -46,7 +46,7 @@ void GymTask::GetState(int env, std::span<double> state) const {
 void GymTask::SetState(int env, std::span<const double> state) {
   for (size_t k = 0; k < limits_.state_bound.size(); ++k) {
     const double bound = limits_.state_bound[k];
-    if (std::abs(state[k]) <= bound) continue;  // false for nan
+    if (std::abs(state[k]) <= bound) continue;  // false for NaN
     throw BadInput(Concat(spec_.task, ": expected ", spec_.state_names[k], " from ", -bound, " to ",
                           bound, " ", spec_.state_units[k], ", got ", state[k]));
   }

@@ -18,8 +18,8 @@ struct GymTaskConfig {
   uint64_t first_index = 0;
 };
 
-/// N environments of a small task of Gymnasium's (https://gymnasium.farama.org) with one torque.
-/// This class limits the torque, counts steps, truncates, resets and saves; a derived class has the
+/// N environments of a small Gymnasium task (https://gymnasium.farama.org) with one torque. This
+/// class limits the torque, counts steps, truncates, resets and saves; a derived class has the
 /// equations. Letters: S state variables, D observation size, K reward terms.
 class GymTask : public VectorEnv {
  public:
@@ -32,40 +32,40 @@ class GymTask : public VectorEnv {
   void State(const Archive& archive) override;
 
  protected:
-  /// What the class needs to know besides `spec`, whose num_envs the settings replace.
+  /// Limits of the task, in addition to `spec`; the settings replace num_envs of `spec`.
   struct Limits {
-    int64_t episode_steps;            // an episode is truncated after so many
-    std::vector<double> start_bound;  // (S) it begins uniformly within ± this, or
-    std::vector<double> state_bound;  // (S) is set within ± this, where every step stays
+    int64_t episode_steps;            // length after which an episode is truncated
+    std::vector<double> start_bound;  // (S) a start state is uniform within ± this
+    std::vector<double> state_bound;  // (S) SetState accepts, and every step stays in, ± this
   };
 
-  /// A derived constructor calls Begin at its end.
+  /// A derived class calls Begin at the end of its constructor.
   GymTask(EnvSpec spec, Limits limits, const GymTaskConfig& config);
-  /// The first episode of every environment.
+  /// Begins the first episode of every environment.
   void Begin();
 
-  /// Moves the states (S × N, a row for each variable) by one step under `torque` (N), N·m, and
-  /// fills in all of `result` but next_obs, reward, torque and truncated.
+  /// Moves the states (S × N, one row for each variable) by one step under `torque` (N), N·m. Fills
+  /// `result` except next_obs, reward, torque and truncated.
   virtual void Move(Matrix<double> states, std::span<const double> torque,
                     StepResult& result) const = 0;
-  /// The observations (n × D) of n states (S × n).
+  /// Writes the observations (n × D) of n states (S × n).
   virtual void Observe(Matrix<const double> states, Matrix<float> obs) const = 0;
 
  private:
   int num_states() const { return static_cast<int>(limits_.state_bound.size()); }  // S
   Matrix<double> states() { return {states_, num_states(), num_envs()}; }
   Matrix<float> Observations() { return {obs_, num_envs(), spec_.obs_size}; }
-  /// A new episode of an environment, in a start state.
+  /// Begins a new episode of an environment in a random start state.
   void Reset(int env);
-  /// The same in its present state.
+  /// Begins a new episode of an environment in its present state.
   void BeginEpisode(int env);
 
   EnvSpec spec_;
   Limits limits_;
-  std::vector<Rng> rngs_;             // (N) of the start states
+  std::vector<Rng> rngs_;             // (N) for the start states
   std::vector<double> states_;        // (S, N)
   std::vector<float> obs_;            // (N, D)
-  std::vector<int64_t> step_counts_;  // (N) since the episode began
+  std::vector<int64_t> step_counts_;  // (N) steps since the episode began
 };
 
 }  // namespace upswing

@@ -1,4 +1,4 @@
-// Properties of both tasks of Gymnasium.
+// Properties that all Gymnasium tasks share.
 #include "sim/gym_task.h"
 
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@ namespace upswing {
 namespace {
 
 struct TaskCase {
-  std::string name;  // as a file's
+  std::string name;  // as in file names
   std::unique_ptr<VectorEnv> (*make)(const GymTaskConfig&);
   std::vector<double> start_bound, state_bound;  // (S)
   int episode_steps;
@@ -136,7 +136,7 @@ TEST_P(GymTasks, TruncatesAtTheTimeLimitWithTheTrueSuccessorAndThenResets) {
     Step(*env, {0, 0.01}, result);
     ASSERT_FALSE(result.done(0) || result.done(1)) << step;
   }
-  // Another environment in the same state, whose episode has just begun.
+  // A second set of environments in the same states, with episodes that have just begun.
   for (int i = 0; i < 2; ++i) reference->SetState(i, StateOf(*env, i));
   Step(*env, {0, 0.01}, result);
   Step(*reference, {0, 0.01}, expected);
@@ -160,7 +160,7 @@ TEST_P(GymTasks, APartOfTheEnvironmentsIsAsThoseOfTheWhole) {
   config.first_index = 2;
   const auto part = MakeEnv(config);
   StepResult expected(whole->spec()), result(part->spec());
-  for (int step = 0; step < GetParam().episode_steps + 10; ++step) {  // over a reset
+  for (int step = 0; step < GetParam().episode_steps + 10; ++step) {  // past a reset
     const double u = std::sin(step);
     Step(*whole, {0, 1, u, -u, 2}, expected);
     Step(*part, {u, -u}, result);
@@ -183,7 +183,7 @@ TEST_P(GymTasks, SavedAndLoadedGoesOnWithTheSameBits) {
   SaveAndLoad([&](const Archive& archive) { saved->State(archive); },
               [&](const Archive& archive) { loaded->State(archive); });
   EXPECT_TRUE(std::ranges::equal(saved->obs().values(), loaded->obs().values()));
-  for (int step = 0; step < GetParam().episode_steps; ++step) {  // over a reset
+  for (int step = 0; step < GetParam().episode_steps; ++step) {  // past a reset
     Step(*saved, {1, -1, 0.5}, a);
     Step(*loaded, {1, -1, 0.5}, b);
     ASSERT_EQ(a.next_obs, b.next_obs);
@@ -193,7 +193,7 @@ TEST_P(GymTasks, SavedAndLoadedGoesOnWithTheSameBits) {
   }
 }
 
-/// Whether an environment takes its own state with one array replaced.
+/// Whether an environment accepts its own state with one array replaced.
 template <typename T>
 bool Takes(std::unique_ptr<VectorEnv> env, const std::string& name, std::vector<T> values) {
   try {
@@ -235,7 +235,7 @@ TEST_P(GymTasks, StatesBeyondTheirBoundsCannotBeSet) {
     for (const double bad : {std::nextafter(bound[k], 100), -1e300, std::nan("")}) {
       state[k] = bad;
       EXPECT_THROW(env->SetState(0, state), Error);
-      EXPECT_EQ(StateOf(*env, 0), bound);  // as it was
+      EXPECT_EQ(StateOf(*env, 0), bound);  // unchanged
     }
   }
 }

@@ -1,4 +1,4 @@
-// The tasks of Gymnasium against its own trajectories (testdata/make_gymnasium.py).
+// Compares the Gymnasium tasks with Gymnasium's own trajectories (testdata/make_gymnasium.py).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -18,7 +18,7 @@
 namespace upswing {
 namespace {
 
-/// The columns of a file by their names; each row is one step.
+/// The columns of a file by name; each row is one step.
 using Table = std::map<std::string, std::vector<double>>;
 
 Table ReadTable(const std::string& name, const EnvSpec& spec) {
@@ -39,11 +39,12 @@ Table ReadTable(const std::string& name, const EnvSpec& spec) {
   return table;
 }
 
-/// Expects every row of the file from one step of an environment for each. A step is up to some
-/// hundred roundings of 1e-16 of numbers up to 1e3, weighted by its 0.2 s; NumPy's sines differ
-/// from the C library's in the last digit; and Gymnasium's theta of Pendulum-v1 grows to 60 rad,
-/// whose last digit is 7e-15. The largest difference so far is 2e-14: 1e-12 is ample. Observations
-/// are floats, which such a difference can round to the neighbour: 1.2e-7 of them.
+/// Expects every row of the file from one step of one environment per row. Tolerance: a step makes
+/// some hundred roundings of 1e-16 of numbers up to 1e3, weighted by its 0.2 s. NumPy's sines
+/// differ from the C library's in the last digit. Gymnasium's theta of Pendulum-v1 grows to 60 rad,
+/// with a last digit of 7e-15. The largest difference so far is 2e-14, so 1e-12 is ample.
+/// Observations are floats; such a difference can round them to the neighbour, 1.2e-7 of their
+/// size.
 template <typename Task>
 void ExpectStepsOf(const Table& table) {
   GymTaskConfig config;
@@ -73,7 +74,7 @@ void ExpectStepsOf(const Table& table) {
       const double tolerance = 1.2e-7 * std::max(1.0, std::abs(expected));
       ASSERT_NEAR(result.next_obs[i * D + j], expected, tolerance) << i << ", " << j;
     }
-    if (result.done(i)) continue;  // has a new state by now
+    if (result.done(i)) continue;  // an ended episode already has a new state
     env.GetState(env_index, state);
     for (size_t k = 0; k < S; ++k) {
       double difference = state[k] - table.at(Concat("next_", spec.state_names[k]))[i];
@@ -83,7 +84,7 @@ void ExpectStepsOf(const Table& table) {
   }
 }
 
-/// How many numbers are within 1e-12 of ± bound.
+/// Number of values within 1e-12 of ± bound.
 int64_t CountAt(double bound, const std::vector<double>& values) {
   return std::ranges::count_if(values,
                                [&](double x) { return std::abs(std::abs(x) - bound) < 1e-12; });
@@ -92,7 +93,7 @@ int64_t CountAt(double bound, const std::vector<double>& values) {
 TEST(Gymnasium, PendulumV1StepsAsTheirs) {
   const Table table = ReadTable("gymnasium_pendulum_v1.csv", PendulumV1({}).spec());
   ExpectStepsOf<PendulumV1>(table);
-  // Among the 600 steps are some at the bound of the velocity, and some beyond a full turn.
+  // The 600 steps include some at the velocity bound and some beyond a full turn.
   EXPECT_EQ(table.at("torque").size(), 600);
   EXPECT_GT(CountAt(8, table.at("next_omega")), 10);
   EXPECT_GT(std::ranges::max(table.at("next_theta")), 4 * kPi);
@@ -101,7 +102,7 @@ TEST(Gymnasium, PendulumV1StepsAsTheirs) {
 TEST(Gymnasium, AcrobotV1StepsAsTheirs) {
   const Table table = ReadTable("gymnasium_acrobot_v1.csv", AcrobotV1({}).spec());
   ExpectStepsOf<AcrobotV1>(table);
-  // Among the 800 steps are some at each velocity's bound, some that wrap, some at the goal.
+  // The 800 steps include some at each velocity bound, some that wrap, and some at the goal.
   EXPECT_EQ(table.at("torque").size(), 800);
   EXPECT_GT(CountAt(4 * kPi, table.at("next_omega1")), 5);
   EXPECT_GT(CountAt(9 * kPi, table.at("next_omega2")), 5);

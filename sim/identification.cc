@@ -1,6 +1,6 @@
 // Symbols as in sim/closed_form.h: J inertias, b coupling of the links (kg·m²), G moments of
-// gravity (N·m), d damping (N·m·s/rad); q angles, w velocities, a accelerations, M mass matrix,
-// P covariance. "Relative" is an estimate over the nominal plant's, without unit.
+// gravity (N·m), d damping (N·m·s/rad); q angles, w velocities, a accelerations, M mass matrix, P
+// covariance. "Relative" means an estimate over the nominal plant's value, without unit.
 #include "sim/identification.h"
 
 #include <algorithm>
@@ -13,27 +13,27 @@
 namespace upswing {
 namespace {
 
-constexpr double kPriorShare = 0.15;  // about the deviation of what is uniform within 25%
-constexpr double kNoise = 1e-3;       // rad/s, of a measured change of velocity
-// Share of what was not predicted that counts as noise too: the factors below are those of the
-// middle of the period, and somebody may push.
+constexpr double kPriorShare = 0.15;  // about the deviation of a uniform draw within 25%
+constexpr double kNoise = 1e-3;       // of a measured change of velocity, rad/s
+// Share of the prediction error that counts as noise too: the factors below hold only in the middle
+// of the period, and a person may push.
 constexpr double kSurprise = 0.3;
-// What a constant may drift in a control period, relative: the filter never stops learning.
+// Relative drift of a constant in a control period; it keeps the filter learning.
 constexpr double kDrift = 1e-3;
-// Estimates stay within these limits, so that the prediction remains a pendulum.
+// Limits of the relative estimates, which keep the prediction a pendulum.
 constexpr double kLeast = 0.25, kMost = 4;
-constexpr double kStrongestCoupling = 0.9;  // b² / (J1 J2): thin rods have at most 3/4
+constexpr double kStrongestCoupling = 0.9;  // of b² / (J1 J2), which is at most 3/4 for thin rods
 
 using Row = std::array<double, kConstants>;
 
-/// Index of P(i, j), i ≤ j, in the rows of its upper triangle.
+/// Index of P(i, j), i ≤ j, in the upper triangle stored by rows.
 constexpr size_t At(int i, int j) {
   return static_cast<size_t>(i * kConstants - i * (i - 1) / 2 + j - i);
 }
 double Get(std::span<const double> P, int i, int j) { return P[i <= j ? At(i, j) : At(j, i)]; }
 
-/// Takes in an equation h·x = y of the relative constants x with covariance P: a Kalman filter's
-/// update. `noise` is the standard deviation of y (rad/s) beside kNoise and kSurprise.
+/// Kalman filter's update with an equation h·x = y of the relative constants x with covariance P.
+/// `noise` is the standard deviation of y (rad/s) in addition to kNoise and kSurprise.
 void Correct(const Row& h, double y, double noise, std::span<double> x, std::span<double> P) {
   Row PH{};
   double innovation = y, spread = 0;
@@ -50,8 +50,8 @@ void Correct(const Row& h, double y, double noise, std::span<double> x, std::spa
   }
 }
 
-/// M q̈ + c + g + d q̇ is linear in the constants: their factors for both joints, in the middle of a
-/// control period.
+/// Factors of the constants in M q̈ + c + g + d q̇, which is linear in them, for both joints in the
+/// middle of a control period.
 struct Factors {
   Row one, two;
   double c2;  // cos q2
@@ -81,7 +81,7 @@ Identifier::Identifier(const Plant& nominal, int num_envs)
       last_(static_cast<size_t>(num_envs) * 4),
       prediction_(1) {
   prediction_.SetPlant(0, nominal);
-  // Each parameter's share by differences.
+  // Share of each parameter in the constants, by differences.
   for (double Plant::*parameter : {&Plant::mass1, &Plant::mass2, &Plant::length1, &Plant::length2,
                                    &Plant::damping1, &Plant::damping2, &Plant::gravity}) {
     constexpr double kStep = 1e-3;
@@ -141,9 +141,9 @@ void Identifier::Update(int env, double torque, const PendulumState& measured, d
   const Manipulator estimated = estimate(env);
   const PendulumState predicted = Predict(estimated, torque, before);
 
-  // With Φ θ = τ for the true constants θ, the estimated ones leave Φ θ' - τ, by which they miss
-  // the acceleration: M⁻¹ (Φ θ' - τ) h is what was measured less what was predicted. As a
-  // prediction it is exact, as a derivative Φ is nearly so.
+  // True constants θ satisfy Φ θ = τ. Estimated ones leave the residual Φ θ' - τ, and so a wrong
+  // acceleration: M⁻¹ (Φ θ' - τ) h is the measured minus the predicted change. The prediction is
+  // exact; Φ as its derivative is nearly so.
   Factors factors(before, measured);
   const MassMatrix M = estimated.Mass(factors.c2);
   const double scale = -kControlPeriod / M.det();
@@ -174,7 +174,7 @@ void Identifier::Observe(int env, const PendulumState& s, std::span<float> numbe
   const auto i = static_cast<size_t>(env);
   const Manipulator plant = estimate(env);
   size_t at = 0;
-  // Where a mode is out of the motor's reach just now, its numbers are without a limit.
+  // A mode that the motor cannot reach now has infinite numbers.
   const auto add = [&](double x) {
     numbers[at++] = std::isfinite(x) ? static_cast<float>(x) : 0.0F;
   };

@@ -15,14 +15,14 @@
 namespace upswing {
 namespace {
 
-/// The standard plant with each number off by up to `share`.
+/// The standard plant with each parameter changed by at most the relative amount `share`.
 Plant Near(double share, Rng& rng) {
   Randomization box;
   box.plant.fill(share);
   return box.Draw(Plant(), rng);
 }
 
-/// Where a plant moves in a control period.
+/// The state of a plant one control period later.
 PendulumState Move(const Plant& plant, const PendulumState& s, double torque) {
   ClosedFormBatch batch(1);
   batch.SetPlant(0, plant);
@@ -33,14 +33,14 @@ PendulumState Move(const Plant& plant, const PendulumState& s, double torque) {
 }
 
 TEST(Falling, EachModeMovesByItself) {
-  // ż = λ z + gain u with u held: in units of the motor's limit, ζ grows to
-  // e^(λh) ζ + (e^(λh) - 1) u/u*. The physics, next to upright, agrees.
+  // ż = λ z + gain u with u held. In units of the motor's limit, ζ grows to e^(λh) ζ + (e^(λh) - 1)
+  // u/u*. The physics agrees next to upright.
   Rng rng(1, "test");
   for (int n = 0; n < 40; ++n) {
     Plant plant = Near(0.5, rng);
     plant.actuated_joint = n % 2 + 1;
     const Manipulator constants = ManipulatorOf(plant);
-    // A deviation of 1e-5, whose square is lost in rounding, and a torque of that size.
+    // Rounding hides the square of a deviation of 1e-5; the torque has the same size.
     const auto small = [&] { return 1e-5 * rng.Uniform(-1, 1); };
     const PendulumState before{kPi + small(), small(), small(), small()};
     const double torque = plant.torque_limit * small();
@@ -53,7 +53,7 @@ TEST(Falling, EachModeMovesByItself) {
     for (size_t i = 0; i < 2; ++i) {
       const double growth = std::exp(rates[i] * kControlPeriod);
       const double expected = growth * falling.zeta[i] + (growth - 1) * torque / plant.torque_limit;
-      // A Runge-Kutta step errs by (λ h)⁵/120 of ζ, which is 1e-9 with λ = 8.
+      // A Runge-Kutta step has an error of (λ h)⁵/120 of ζ, which is 1e-9 for λ = 8.
       const double size = std::max(std::abs(falling.zeta[i]), 1e-5);
       EXPECT_NEAR(later.zeta[i], expected, 1e-6 * size) << "plant " << n << ", mode " << i;
     }
@@ -72,7 +72,8 @@ TEST(Falling, TheTorqueEndsBothFalls) {
     }
     const Falling end = FallingOf(constants, plant, s);
     for (size_t i = 0; i < 2; ++i) {
-      // As exp(-3.6 · 6 s) = 4e-10 and faster, less exactly as the torque is held for 0.02 s.
+      // The modes decay by exp(-3.6 · 6 s) = 4e-10 or more; holding the torque for 0.02 s makes
+      // this less exact.
       EXPECT_LT(std::abs(end.zeta[i]), 1e-3 * std::abs(start.zeta[0])) << joint;
     }
   }
@@ -100,8 +101,8 @@ TEST(Identifier, FindsTheConstants) {
 }
 
 TEST(Identifier, TheEnergyIsThatOfTheMotion) {
-  // Without damping and torque it is conserved; nothing else of the task tells it apart from
-  // others.
+  // Energy is conserved without damping and torque. No other number of the task distinguishes this
+  // plant from others.
   Plant plant;
   plant.damping1 = plant.damping2 = 0;
   Identifier identifier(plant, 1);

@@ -5,8 +5,8 @@
 namespace upswing {
 
 void Manipulator::AddRotors(double inertia, double gear) {
-  // The kinetic energy I/2 ((gear w1)² + (w1 - gear w2)²) adds (gear² + 1) I to M11, -gear I to M12
-  // and gear² I to M22.
+  // The rotors' kinetic energy I/2 ((gear w1)² + (w1 - gear w2)²) adds (gear² + 1) I to M11, -gear
+  // I to M12 and gear² I to M22.
   J1 += (gear * gear + gear + 1) * inertia;
   J2 -= gear * inertia;
   a += (gear * gear + gear) * inertia;
@@ -33,7 +33,7 @@ std::array<double, 2> Manipulator::Acceleration(const PendulumState& s,
 
 Manipulator ManipulatorOf(const Plant& plant) {
   const double m1 = plant.mass1, m2 = plant.mass2, l1 = plant.length1, g = plant.gravity;
-  const double c1 = l1 / 2, c2 = plant.length2 / 2;  // from the joint to the centre
+  const double c1 = l1 / 2, c2 = plant.length2 / 2;  // distances from the joint to the centre
   const double I1 = CapsuleInertia(m1, kCapsuleRadius, l1).across;
   const double I2 = CapsuleInertia(m2, kCapsuleRadius, plant.length2).across;
   Manipulator m;

@@ -4,7 +4,7 @@
 
 #include "sim/double_pendulum.h"
 
-/// The equations of motion of a double pendulum, in one form for every plant and every user:
+/// The equations of motion of a double pendulum, in one form for every plant and every caller:
 ///   M(q) q̈ = τ - c(q, q̇) - g(q) - d q̇ - f atan(100 q̇)
 ///   M = [[J1 + J2 + 2 b cos q2, J2 + b cos q2], [·, J2 + a]]
 /// The last term is dry friction, smoothed as in RealAIGym's plant (Wiebe et al., "Open source
@@ -17,13 +17,13 @@ struct MassMatrix {
   double det() const { return M11 * M22 - M12 * M12; }
 };
 
-/// The terms of the equations in one state.
+/// The terms of the equations of motion in one state.
 struct ManipulatorTerms : MassMatrix {
   double h1, h2;  // N·m: velocity, gravity, damping and dry friction; M q̈ + h = τ
-  double energy;  // kinetic and potential, J; at rest upright it is 0
+  double energy;  // kinetic and potential, J; 0 at rest upright
 };
 
-/// The constants of the equations of motion. Rotors of the motors change J1, J2 and a alone.
+/// The constants of the equations of motion. Motor rotors change only J1, J2 and a.
 struct Manipulator {
   double J1;      // inertia about joint 1 with link 2 as a point, and its armature, kg·m²
   double J2;      // inertia of link 2 about joint 2, kg·m²
@@ -34,8 +34,8 @@ struct Manipulator {
   double d1, d2;  // damping, N·m·s/rad
   double f1, f2;  // dry friction, N·m
 
-  /// Adds the rotors of two motors (kg·m² each) behind gears: one turns gear · w1, the other, which
-  /// link 1 carries, w1 - gear · w2.
+  /// Adds the rotors of two motors (kg·m² each) behind gears. One rotor turns at gear · w1. Link 1
+  /// carries the other, which turns at w1 - gear · w2.
   void AddRotors(double inertia, double gear);
 
   MassMatrix Mass(double cos_q2) const {

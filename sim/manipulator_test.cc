@@ -14,8 +14,8 @@
 namespace upswing {
 namespace {
 
-/// Kinetic minus potential energy (J) from the places and velocities of the bodies: two capsules
-/// that swing, an armature of each joint, and two rotors.
+/// Kinetic minus potential energy (J) from the positions and velocities of the bodies: two swinging
+/// capsules, an armature at each joint, and two rotors.
 double Lagrangian(const Plant& p, const std::array<double, 4>& x) {
   const auto& [q1, q2, w1, w2] = x;
   const double q12 = q1 + q2, w12 = w1 + w2;
@@ -36,7 +36,7 @@ double Lagrangian(const Plant& p, const std::array<double, 4>& x) {
   return upper + lower + armatures + rotors;
 }
 
-/// Coordinate `i` of x moved by h.
+/// x with coordinate `i` changed by h.
 std::array<double, 4> Moved(std::array<double, 4> x, size_t i, double h) {
   x[i] += h;
   return x;
@@ -47,7 +47,7 @@ double GeneralizedForce(const Plant& p, const std::array<double, 4>& x,
                         const std::array<double, 2>& a, size_t joint) {
   constexpr double h = 1e-4;
   const auto momentum = [&](const std::array<double, 4>& at) {
-    // L is quadratic in the velocities: a central difference is exact.
+    // L is quadratic in the velocities, so a central difference is exact.
     return (Lagrangian(p, Moved(at, 2 + joint, 1)) - Lagrangian(p, Moved(at, 2 + joint, -1))) / 2;
   };
   const std::array<double, 4> rate{x[2], x[3], a[0], a[1]};
@@ -81,7 +81,8 @@ TEST(Manipulator, SatisfiesLagrangesEquations) {
     const std::array<double, 2> friction{p.damping1 * s.w1 + p.coulomb1 * std::atan(100 * s.w1),
                                          p.damping2 * s.w2 + p.coulomb2 * std::atan(100 * s.w2)};
     for (const size_t joint : {0, 1}) {
-      // Differences err by about h² times third derivatives, some 10² of the largest term.
+      // The differences have an error of about h² times third derivatives, some 10² of the largest
+      // term.
       const double scale = 10 + std::abs(a[0]) + std::abs(a[1]);
       EXPECT_NEAR(GeneralizedForce(p, x, a, joint), tau[joint] - friction[joint], 1e-5 * scale)
           << trial << ", joint " << joint + 1;
@@ -119,7 +120,7 @@ TEST(Manipulator, IsWhatTheClosedFormSteps) {
     const double tau = rng.Uniform(-5, 5);
     const bool first = plant.actuated_joint == 1;
     const std::array<double, 2> torque{first ? tau : 0, first ? 0 : tau};
-    // A classical Runge-Kutta step written out.
+    // A classical Runge-Kutta step, written out.
     using X = std::array<double, 4>;
     const auto slope = [&](const X& x) -> X {
       const auto a = manipulator.Acceleration({x[0], x[1], x[2], x[3]}, torque);
@@ -137,7 +138,7 @@ TEST(Manipulator, IsWhatTheClosedFormSteps) {
     Set(batch, 0, plant, s, tau);
     Advance(batch, 1, 0, 1, h);
     const X got{batch.q1[0], batch.q2[0], batch.w1[0], batch.w2[0]};
-    // Formulas of det M differ: links of much different length lose digits in M11 M22 - M12².
+    // The formulas of det M differ: links of very different length lose digits in M11 M22 - M12².
     const MassMatrix M = manipulator.Mass(std::cos(s.q2));
     const double lost = std::max(1.0, M.M11 * M.M22 / M.det() / 100);
     for (size_t i = 0; i < 4; ++i) {
@@ -178,7 +179,7 @@ TEST(Manipulator, DryFrictionBringsAPendulumToRest) {
   ClosedFormBatch batch(1);
   Set(batch, 0, plant, {0.4, -0.2, 0, 0}, 0);
   Advance(batch, 12000, 0, 1);
-  // Linear decay of the amplitude ends in a creep at c · 100 · w = moment of gravity.
+  // The amplitude decays linearly and ends in a creep at c · 100 · w = moment of gravity.
   EXPECT_LT(std::abs(batch.w1[0]), 1e-2);
   EXPECT_LT(std::abs(batch.w2[0]), 1e-2);
   EXPECT_LT(std::abs(batch.q1[0]), 0.05);

@@ -10,11 +10,11 @@
 namespace upswing {
 namespace {
 
-/// The random streams beside that of the start states, for (seed, stream of the environments).
+/// The random streams other than the start states' stream, for (seed, stream of the environments).
 std::string PlantStream(const std::string& stream) { return Concat(stream, ": plant"); }
 std::string NoiseStream(const std::string& stream) { return Concat(stream, ": sensor noise"); }
 
-/// The sensors and motors of these settings; nothing if they are perfect.
+/// The sensors and motors of these settings; none if they are perfect.
 std::optional<Disturber> MakeDisturber(const PendulumEnvConfig& config) {
   const Randomization& random = config.randomization;
   Disturbance largest;
@@ -95,7 +95,7 @@ void PendulumEnv::SetState(int env, const PendulumState& s) {
   physics_->SetState(env, s);
   step_counts_[static_cast<size_t>(env)] = 0;
   if (disturber_) disturber_->Begin(env, s);
-  std::ranges::fill(Row(obs_, env), 0.0F);  // nothing to remember yet
+  std::ranges::fill(Row(obs_, env), 0.0F);  // a new episode has no memory
   const PendulumState measured = Measure(env, 0);
   std::ranges::copy(Observation(env, measured), Row(obs_, env).begin());
   if (!identifier_) return;
@@ -121,7 +121,7 @@ std::array<float, kObservationSize> PendulumEnv::Observation(int env,
 }
 
 void PendulumEnv::SpreadRows(std::vector<float>& table) const {
-  // From the last one backwards, so that no row is overwritten before it is moved.
+  // Moves the last row first, so that no row is overwritten before it is moved.
   for (int env = config_.num_envs - 1; env > 0; --env) {
     const auto from = table.begin() + static_cast<ptrdiff_t>(env) * kObservationSize;
     std::copy_backward(from, from + kObservationSize, Row(table, env).begin() + kObservationSize);
@@ -190,7 +190,7 @@ void PendulumEnv::StandIn(int env, StepResult& result) const {
 
 void PendulumEnv::Step(std::span<const double> torque, StepResult& result) {
   physics_->Step(disturber_ ? disturber_->Apply(torque, step_counts_) : torque, result);
-  if (spec_.obs_size > kObservationSize) SpreadRows(result.next_obs);  // the physics packs them
+  if (spec_.obs_size > kObservationSize) SpreadRows(result.next_obs);  // the physics packs the rows
   RestoreHeld();
   for (int env = 0; env < config_.num_envs; ++env) {
     const auto i = static_cast<size_t>(env);
@@ -213,7 +213,7 @@ void PendulumEnv::Step(std::span<const double> torque, StepResult& result) {
     if (result.terminated[i]) StandIn(env, result);
     result.truncated[i] = step_counts_[i] >= episode_steps_ && !result.terminated[i] ? 1 : 0;
   }
-  // The next observation is the successor, or that of a new start.
+  // The next observation is the successor, or the start of a new episode.
   std::ranges::copy(result.next_obs, obs_.begin());
   for (int env = 0; env < config_.num_envs; ++env) {
     if (result.done(static_cast<size_t>(env))) Reset(env);
@@ -223,7 +223,7 @@ void PendulumEnv::Step(std::span<const double> torque, StepResult& result) {
 
 void PendulumEnv::State(const Archive& archive) {
   for (size_t i = 0; i < plants_.size(); ++i) {
-    // A plant is saved as the random stream from which it was drawn, and drawn again on loading.
+    // A saved state holds the random stream of each plant; loading draws the plant again.
     plant_seeds_[i].State(archive.In(Concat("plant_seed.", i)));
     if (!archive.loading()) continue;
     plant_rngs_[i] = plant_seeds_[i];

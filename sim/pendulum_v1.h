@@ -6,11 +6,11 @@ namespace upswing {
 
 inline constexpr const char* kPendulumV1 = "pendulum-v1";
 
-/// Gymnasium's Pendulum-v1: a rod on a motor that is too weak to lift it in one go is swung up and
-/// balanced. https://gymnasium.farama.org/environments/classic_control/pendulum/
+/// Gymnasium's Pendulum-v1: a motor swings up a rod that it is too weak to lift in one go, and
+/// balances it. https://gymnasium.farama.org/environments/classic_control/pendulum/
 ///
 /// State: theta in [-π, π], rad, 0 upright; omega within ±8 rad/s. Gymnasium lets theta grow beyond
-/// π, which neither observation nor reward shows. Action: torque u within ±2 N·m.
+/// π; neither observation nor reward depends on the full turns. Action: torque u within ±2 N·m.
 ///
 /// | index | observation | range   | unit  |
 /// |-------|-------------|---------|-------|
@@ -23,15 +23,15 @@ inline constexpr const char* kPendulumV1 = "pendulum-v1";
 ///   theta' = theta + omega' dt
 /// Reward: angle -theta², velocity -0.1 omega², torque -0.001 u², of the state before the step.
 ///
-/// An episode begins with theta within ±π and omega within ±1, uniformly, and is truncated after
-/// 200 steps; nothing terminates it. The goal is to be within 5° of upright. An evaluation judges
-/// the return of a whole episode; Gymnasium names none that solves the task. Here it is -160 in the
-/// mean over the starts: what well-trained agents such as SAC reach is -145 to -157.
+/// An episode begins with theta uniform within ±π and omega uniform within ±1. It is truncated
+/// after 200 steps and never terminates. The goal is to be within 5° of upright. An evaluation
+/// judges the return of a whole episode. Gymnasium names no threshold; here it is a mean of -160
+/// over the starts. Well-trained agents such as SAC reach -145 to -157.
 class PendulumV1 final : public GymTask {
  public:
   explicit PendulumV1(const GymTaskConfig& config);
 
-  /// theta, of the one body.
+  /// Writes theta, the lean of the only body.
   void Lean(int env, std::span<double> lean) const override;
 
  private:

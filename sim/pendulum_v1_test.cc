@@ -10,7 +10,7 @@
 namespace upswing {
 namespace {
 
-/// One step of one environment from a state under a torque.
+/// Fixture: one step of one environment from a state under a torque.
 class PendulumV1Step : public testing::Test {
  protected:
   void Step(double theta, double omega, double torque) {
@@ -41,7 +41,7 @@ TEST_F(PendulumV1Step, TorqueBeyondItsLimitIsClamped) {
 }
 
 TEST_F(PendulumV1Step, WorkIsTorqueTimesAngle) {
-  Step(3.1, 2, -1.5);  // over the wrap at π
+  Step(3.1, 2, -1.5);  // crosses π, where the angle wraps
   EXPECT_LT(next_[0], 0);
   EXPECT_NEAR(result_.work[0], 1.5 * (next_[0] + 2 * kPi - 3.1), 1e-14);
 }
@@ -49,8 +49,8 @@ TEST_F(PendulumV1Step, WorkIsTorqueTimesAngle) {
 TEST_F(PendulumV1Step, TheGoalIsWithinFiveDegreesOfUpright) {
   for (const auto& [degrees, at_goal] : {std::pair(0.0, 1), {4.9, 1}, {5.1, 0}, {180.0, 0}}) {
     for (const double theta : {degrees * kPi / 180, -degrees * kPi / 180}) {
-      // Velocity and torque that hold the angle for a step: u = -5 sin theta, where that is
-      // allowed.
+      // A velocity and a torque that hold the angle for one step: u = -5 sin theta, if the limit
+      // allows it.
       Step(theta, 0, -5 * std::sin(theta));
       EXPECT_NEAR(std::abs(next_[0]), std::abs(theta), 1e-12);
       EXPECT_EQ(result_.at_goal[0], at_goal) << theta;

@@ -30,7 +30,7 @@ class ClosedFormPhysics : public Physics {
 
   void Step(std::span<const double> torque, StepResult& result) override {
     batch_.SetTorque(torque);
-    // Two captured references fit into std::function without an allocation.
+    // The lambda captures only two references, so std::function needs no allocation.
     ParallelFor(pool_, ClosedFormChunks(num_envs_), [this, &result](int chunk) {
       const size_t first = static_cast<size_t>(chunk) * kClosedFormChunk;
       const size_t last = std::min(first + kClosedFormChunk, num_envs_);

@@ -64,7 +64,7 @@ Disturbance Randomization::Draw(const Disturbance& nominal, Rng& rng) const {
   const int most = Disturbance{0, delay}.delay_steps();
   const int more = static_cast<int>(rng.Uniform() * (most + 1));
   drawn.delay = (nominal.delay_steps() + more) * kControlPeriod;
-  // Trainings of earlier versions drew no third number.
+  // Runs of earlier versions drew no third number.
   if (sensor_latency > 0) drawn.sensors.latency += rng.Uniform(0, sensor_latency);
   return drawn;
 }

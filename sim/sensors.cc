@@ -9,10 +9,10 @@
 namespace upswing {
 namespace {
 
-constexpr int kFilterUpdates = 20;  // in a control period
+constexpr int kFilterUpdates = 20;  // per control period
 static_assert(kFilterUpdates * kFilterPeriod == kControlPeriod);
 
-/// The true state at `age` s before the latest of these control steps (M × 4).
+/// The true state `age` seconds before the latest of these control steps (M × 4).
 PendulumState StateAgo(std::span<const double> past, double age) {
   const auto at = [&](size_t k) {
     const auto s = past.subspan(4 * k, 4);
@@ -23,7 +23,7 @@ PendulumState StateAgo(std::span<const double> past, double age) {
   return StateBetween(at(k + 1), at(k), kControlPeriod, 1 - (steps - static_cast<double>(k)));
 }
 
-/// What the encoders show of the state at `age` s before the latest control step.
+/// The encoder readings of the state `age` seconds before the latest control step.
 PendulumState Reading(std::span<const double> past, const SensorModel& model, double age) {
   const double N = model.encoder_counts, T = model.velocity_window;
   PendulumState s = StateAgo(past, age);
@@ -68,7 +68,7 @@ double Quantized(double angle, double counts) {
 
 Sensors::Sensors(int num_envs, const SensorModel& slowest) {
   const double age = std::max(slowest.latency + slowest.velocity_window, slowest.velocity_age());
-  // The oldest update of a filter is less than a control period before.
+  // The oldest filter update of a step is less than one control period before the step.
   moments_ = static_cast<size_t>(std::ceil(age / kControlPeriod)) + 2;
   past_.resize(static_cast<size_t>(num_envs) * 4 * moments_);
   torques_.resize(static_cast<size_t>(num_envs) * moments_);
@@ -77,7 +77,7 @@ Sensors::Sensors(int num_envs, const SensorModel& slowest) {
 
 void Sensors::Begin(int env, const PendulumState& start) {
   const auto& [q1, q2, w1, w2] = start;
-  // The first Measure puts the start in front of these.
+  // The first Measure puts the start state before these.
   const auto past = Past(env);
   for (size_t k = 0; k < moments_; ++k) {
     const double age = static_cast<double>(k + 1) * kControlPeriod;
@@ -102,7 +102,7 @@ PendulumState Sensors::Measure(int env, const SensorModel& model, const Pendulum
     std::ranges::copy(std::array{measured.w1, measured.w2}, y.begin());
     return measured;
   }
-  // y is the filter's exact answer to a ŵ that holds from one update to the next.
+  // y is the filter's exact response to a ŵ that is constant between two updates.
   const double share = 1 - std::exp(-kFilterPeriod / model.velocity_filter);
   for (int update = kFilterUpdates - 1; update >= 0; --update) {
     const PendulumState s = Reading(past, model, model.latency + update * kFilterPeriod);

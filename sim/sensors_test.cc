@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kTurn = 2 * std::numbers::pi;
 
-/// What perfect joints that have always moved at these velocities show at the start of an episode.
+/// Sensor output at the start of an episode, for joints that have always moved at these velocities.
 PendulumState AtStart(const SensorModel& model, const PendulumState& start) {
   Sensors sensors(1, model);
   sensors.Begin(0, start);
@@ -40,13 +40,13 @@ TEST(Encoder, AnglesAreRoundedToTheNearestCount) {
   EXPECT_EQ(Quantized(0.7, 4), 0);
   EXPECT_EQ(Quantized(0.8, 4), kTurn / 4);
   EXPECT_EQ(Quantized(-0.8, 4), -kTurn / 4);
-  EXPECT_EQ(Quantized(13.5, 4), 9 * kTurn / 4);  // turns add up
+  EXPECT_EQ(Quantized(13.5, 4), 9 * kTurn / 4);  // full turns are counted
   EXPECT_EQ(Quantized(0.7, 0), 0.7);
 }
 
 TEST(Sensors, VelocitiesAreDifferencesOfCounts) {
-  // A count is 0.0628 rad. Joint 1 is at 0.985 and 0.955 rad 5 and 15 ms before, counts 16 and 15;
-  // joint 2 at 0.205 and 0.215 rad, count 3 at both.
+  // A count is 0.0628 rad. Joint 1 is at 0.985 rad 5 ms ago and at 0.955 rad 15 ms ago, counts 16
+  // and 15. Joint 2 is at 0.205 and 0.215 rad, count 3 both times.
   constexpr double kCount = kTurn / 100;
   const PendulumState measured = AtStart({0.005, 100, 0.01, 0}, {1, 0.2, 3, -1});
   EXPECT_DOUBLE_EQ(measured.q1, 16 * kCount);
@@ -87,7 +87,7 @@ TEST(Sensors, LatencyAndWindowReachBackToEarlierControlSteps) {
 }
 
 TEST(Sensors, BetweenControlStepsTheyMeasureWhatThePhysicsDo) {
-  // A violent motion: the cubic is off by h⁴/384 of the fourth derivative.
+  // A violent motion: the cubic has an error of h⁴/384 times the fourth derivative.
   ClosedFormBatch batch(1);
   batch.SetState(0, {3, 0, 8, -15});
   std::array<SensorModel, kPhysicsSteps> models;
@@ -124,12 +124,12 @@ TEST(Sensors, TheFilterAnswersAStepByTheClosedFormula) {
     const PendulumState measured = sensors.Measure(0, model, {0.02 + 2 * t, 0, 2, 0}, 0);
     ASSERT_NEAR(measured.w1, 2 + (y0 - 2) * std::exp(-t / 0.05), 1e-12);
     ASSERT_EQ(measured.w2, 0);
-    ASSERT_EQ(measured.q1, 0.02 + 2 * t);  // only the velocities pass it
+    ASSERT_EQ(measured.q1, 0.02 + 2 * t);  // only velocities pass the filter
   }
 }
 
 TEST(Sensors, ASlowerFilterLagsByItsTimeConstant) {
-  // Against a ramp of velocity a·t the low-pass lags by τ, and by less than an update of it more.
+  // For a velocity ramp a·t, the low-pass lags by τ plus less than one update.
   const SensorModel model{0, 0, 0, 0.03};
   Sensors sensors(1, model);
   sensors.Begin(0, {});
@@ -142,7 +142,7 @@ TEST(Sensors, ASlowerFilterLagsByItsTimeConstant) {
 }
 
 TEST(Sensors, TheTorqueIsAsOldAsTheVelocities) {
-  // The velocities are 5 + 10/2 + 15 ms old: a quarter of the control period before the last.
+  // The velocities are 5 + 10/2 + 15 ms old: a quarter of the control period before the last one.
   const SensorModel model{0.005, 0, 0.01, 0.015};
   EXPECT_DOUBLE_EQ(model.velocity_age(), 0.025);
   Sensors sensors(1, {0.005, 0, 0.02, 0.03});
@@ -152,12 +152,12 @@ TEST(Sensors, TheTorqueIsAsOldAsTheVelocities) {
   EXPECT_NEAR(sensors.Torque(0, model), 0, 1e-12);
   sensors.Measure(0, model, {}, 8);
   EXPECT_NEAR(sensors.Torque(0, model), 0.75 * 4, 1e-12);
-  // The slowest filter that these sensors keep enough for.
+  // The slowest filter that these sensors keep enough states for.
   EXPECT_NEAR(sensors.Torque(0, {0, 0, 0, 0.03}), 0.5 * 4, 1e-12);
 }
 
 TEST(Sensors, RoundingNoiseOfTheVelocities) {
-  // Angles at random places within their counts; in the window joint 1 moves by 0 to 10 counts.
+  // Angles at random positions within their counts; joint 1 moves by 0 to 10 counts in the window.
   const SensorModel model{0, 1000, 0.01, 0};
   Sensors sensors(1, model);
   Rng rng(1, "test");

@@ -33,8 +33,8 @@ struct Angle {
 /// x - n π/2, rounded once, for an integer n.
 HWY_INLINE V ReduceByHalfPi(V x, V n) {
 #if HWY_NATIVE_FMA
-  // π/2 in three parts of 53 bits: the first difference is exact, the third only counts where the
-  // first two leave next to nothing.
+  // π/2 in three parts of 53 bits. The first difference is exact. The third part only matters where
+  // the first two nearly cancel.
   const V coarse = NegMulAdd(n, Constant(0x1.921fb54442d18p+0), x);
   const V fine = NegMulAdd(n, Constant(0x1.1a62633145c07p-54), coarse);
   return NegMulAdd(n, Constant(-0x1.f1976b7ed8fbcp-110), fine);
@@ -52,7 +52,7 @@ HWY_INLINE V ReduceByHalfPi(V x, V n) {
 /// then the quadrant n mod 4.
 HWY_INLINE Angle SineCosineOf(V x) {
   const hn::RebindToSigned<D> integers;
-  // Adding 1.5·2^52 rounds to an integer, which then stands in the last bits.
+  // Adding 1.5·2^52 rounds x to an integer, held in the last bits of the sum.
   const V to_integer = Constant(0x1.8p52);
   const V shifted = MulAdd(x, Constant(2 / std::numbers::pi), to_integer);
   const V r = ReduceByHalfPi(x, shifted - to_integer);
@@ -74,7 +74,7 @@ HWY_INLINE Angle SineCosineOf(V x) {
   q = MulAdd(q, z, Constant(-0.5));
   const V cosine = MulAdd(q, z, Constant(1));
 
-  // Odd quadrants swap the two; bit 1 of n is the sine's sign, bit 1 of n + 1 the cosine's.
+  // Odd quadrants swap sine and cosine. Bit 1 of n is the sine's sign, bit 1 of n + 1 the cosine's.
   const auto n = hn::BitCast(integers, shifted);
   const auto one = hn::Set(integers, 1);
   const auto odd = hn::RebindMask(kDoubles, hn::TestBit(n, one));

@@ -8,13 +8,13 @@
 #include "core/rng.h"
 #include "sim/double_pendulum.h"
 
-/// What tests of the double pendulum share.
+/// Helpers that the tests of the double pendulum share.
 namespace upswing {
 
 inline constexpr double kPi = std::numbers::pi;
 
-/// Parameters from the whole of their ranges, evenly on a logarithmic scale (or in the cube root,
-/// where a range begins at 0), without rotors and dry friction.
+/// A plant with parameters drawn from their whole ranges, without rotors and dry friction.
+/// Parameters are uniform on a logarithmic scale, or in the cube root where a range begins at 0.
 inline Plant RandomPlant(Rng& rng) {
   Plant plant;
   const Options options = OptionsOf(plant);
@@ -30,10 +30,10 @@ inline Plant RandomPlant(Rng& rng) {
   return plant;
 }
 
-/// The same with rotors and dry friction, as much of both as the physics' steps can follow.
+/// A RandomPlant with rotors and dry friction, both small enough for the physics' steps.
 inline Plant RandomMachine(Rng& rng) {
   Plant plant = RandomPlant(rng);
-  const double inertia = plant.mass2 * plant.length2 * plant.length2;  // about that of link 2
+  const double inertia = plant.mass2 * plant.length2 * plant.length2;  // about link 2's
   plant.gear_ratio = rng.Uniform(0, 10);
   plant.rotor_inertia = rng.Uniform(0, 0.1) * inertia;
   plant.coulomb1 = rng.Uniform(0, 0.2) * inertia;

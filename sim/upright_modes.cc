@@ -12,16 +12,16 @@ void SetPassiveJoint(const Manipulator& plant, int actuated_joint, UprightModes&
     return (std::sqrt(damping * damping + 4 * inertia * gravity) - damping) / (2 * inertia);
   };
   if (actuated_joint == 2) {
-    // Of joint 1, under no torque: M11 q̈1 + d1 q̇1 - (G1 + G2) q1 = -(M12 q̈2 - G2 q2). Both sides
-    // are 0 for one rate where pole and zero are the same: then no torque reaches that mode.
+    // Joint 1 without torque: M11 q̈1 + d1 q̇1 - (G1 + G2) q1 = -(M12 q̈2 - G2 q2). If pole and
+    // zero coincide, both sides are 0 at one rate, and no torque reaches that mode.
     const double pole = growth(plant.J1 + J2 + 2 * b, plant.d1, plant.G1 + G2);
     const double zero = std::sqrt(G2 / (J2 + b));
     modes.pole = pole;
     modes.delta = (zero - pole) / (zero + pole);
     return;
   }
-  // Of link 2 in absolute angles φ1, φ2: n12 φ̈1 + n22 φ̈2 + d2 (φ̇2 - φ̇1) = G2 φ2. Its zero is
-  // z = d2 / n12, by which delta is widened: n12 may be 0.
+  // Link 2 in absolute angles φ1, φ2: n12 φ̈1 + n22 φ̈2 + d2 (φ̇2 - φ̇1) = G2 φ2. Its zero is
+  // z = d2 / n12. n12 may be 0, so both parts of delta are multiplied by n12.
   const double n12 = b - plant.a, pole = growth(J2 + plant.a, plant.d2, G2);
   modes.pole = pole;
   modes.delta = (plant.d2 - pole * n12) / (plant.d2 + pole * n12);
@@ -39,8 +39,8 @@ UprightModes ModesOf(const Manipulator& plant, int actuated_joint) {
   const double k2 = d1 * d2 - M11 * G2 - M22 * G + 2 * M12 * G2;
   const double k1 = -d1 * G2 - d2 * G, k0 = plant.G1 * G2;
 
-  // The roots are real, two above 0. From above Newton's method falls to the largest one, and on
-  // the cubic without that to the next.
+  // The roots are real, and two are above 0. Newton's method descends from above to the largest
+  // root. On the cubic without that root it descends to the next one.
   const auto newton = [](double x, double c4, double c3, double c2, double c1, double c0) {
     for (int i = 0; i < 50; ++i) {
       const double value = (((c4 * x + c3) * x + c2) * x + c1) * x + c0;
@@ -51,7 +51,7 @@ UprightModes ModesOf(const Manipulator& plant, int actuated_joint) {
     }
     return x;
   };
-  // Without damping λ² are the roots of a quadratic; damping makes each smaller.
+  // Without damping, λ² is a root of a quadratic; damping makes each root smaller.
   const double undamped = -M11 * G2 - M22 * G + 2 * M12 * G2;
   const double start =
       std::sqrt((-undamped + std::sqrt(undamped * undamped - 4 * k4 * k0)) / (2 * k4));
@@ -59,7 +59,7 @@ UprightModes ModesOf(const Manipulator& plant, int actuated_joint) {
   // Division by (λ - fast): c3 λ³ + c2 λ² + c1 λ + c0
   const double c3 = k4, c2 = k3 + fast * c3, c1 = k2 + fast * c2, c0 = k1 + fast * c1;
   const double slow = newton(fast, 0, c3, c2, c1, c0);
-  // and the rest by (λ - slow): c3 λ² + e1 λ + e0
+  // Division of the cubic by (λ - slow): c3 λ² + e1 λ + e0
   const double e1 = c2 + slow * c3, e0 = c1 + slow * e1;
   const double decay = (e1 + std::sqrt(e1 * e1 - 4 * c3 * e0)) / (2 * c3);
   UprightModes modes{fast, slow, decay, 0, 0};
@@ -90,7 +90,7 @@ Falling FallingOf(const Manipulator& plant, const Plant& motor, const PendulumSt
                      y2 * (M12 * s.w1 + M22 * s.w2 + M12 * rate * q1 + (M22 * rate + d2) * q2);
     falling.zeta[i] = rate * z / ((joint == 1 ? y1 : y2) * motor.torque_limit);
   }
-  // The gain that places both poles at their mirror images: Anderson, Moore, section 4.3.
+  // The gain that moves both poles to their mirror images: Anderson, Moore, section 4.3.
   const auto [fast, slow] = rates;
   falling.torque = -2 * (fast + slow) / (fast - slow) * (falling.zeta[0] - falling.zeta[1]);
 

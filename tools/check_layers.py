@@ -10,12 +10,12 @@ import re
 import sys
 from pathlib import Path
 
-# Layers that need no operating system.
+# Layers that must not need an operating system.
 PORTABLE = {"core", "nn", "sim", "rl", "control", "setup"}
 BELOW_RUN = PORTABLE | {"io", "mujoco"}
 LIBRARIES = BELOW_RUN | {"report", "realaigym", "run", "study", "judge", "export", "view"}
 
-# What each folder may include besides itself.
+# Folders that each folder may include, besides itself.
 LAYERS = {
     "core": set(),
     "nn": {"core"},
@@ -40,7 +40,7 @@ LAYERS = {
     "examples": LIBRARIES,
 }
 
-# The files that may include each foreign library.
+# Files that may include each foreign library.
 ALLOWED_FILES = {
     "mujoco": re.compile(r"mujoco/"),
     "GLFW": re.compile(r"mujoco/window\.cc$"),
@@ -52,8 +52,7 @@ ALLOWED_FILES = {
     "Eigen": re.compile(r"(control|realaigym)/|nn/[^/]*_test\.cc$|bench/"),
 }
 
-# Layers that need no operating system, the headers that would bring one, and the files that may
-# have them: tests.
+# Tests and benchmarks of the portable layers may include headers of the operating system.
 MAY_ASK_SYSTEM = re.compile(r"(_test|_bench)\.cc$|/testing\.h$")
 SYSTEM = re.compile(r"(unistd|fcntl|poll|sched|signal|csignal|filesystem|fstream|cstdio|stdio)(\.h)?$|"
                     r"sys/")
@@ -65,7 +64,7 @@ INCLUDE = re.compile(r'\s*#\s*include\s*(["<])([^">]+)[">]')
 def includes(root):
     """Yields (file, line, quote, included path) of all sources; file is relative to root."""
     for folder in LAYERS:
-        # What is C++ of the page lies in one folder, apart from thousands of files of its packages.
+        # The page's C++ is in one folder, apart from the thousands of files of its packages.
         place = root / folder / "wasm" if folder == "web" else root / folder
         for path in sorted(place.rglob("*")):
             if not path.name.endswith(SOURCE_ENDINGS):
@@ -76,7 +75,7 @@ def includes(root):
 
 
 def offence(root, file, quote, included):
-    """What is wrong with one include, or None."""
+    """The problem of one include, or None."""
     folder = file.split("/")[0]
     target = included.split("/")[0]
     foreign = quote == "<" and not (root / included).is_file()
@@ -98,7 +97,8 @@ def offence(root, file, quote, included):
 
 
 def cycles(edges):
-    """The cycles between folders, each as a list of folders that begins with its first by name."""
+    """The cycles between folders, each as a list that begins with its alphabetically first
+    folder."""
     found = []
 
     def walk(path):
@@ -114,9 +114,9 @@ def cycles(edges):
 
 
 def check(root):
-    """All offenders, as lines of text."""
+    """All problems, as lines of text."""
     problems = []
-    edges = {}  # folder -> {folder it includes: where it first does so}
+    edges = {}  # folder -> {included folder: place of the first include}
     for file, line, quote, included in includes(root):
         if problem := offence(root, file, quote, included):
             problems.append(f"{file}:{line}: {problem}")

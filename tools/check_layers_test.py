@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The layer check finds each kind of offender, and nothing in a good tree."""
+"""Tests that the layer check finds each kind of problem, and nothing in a correct tree."""
 
 import subprocess
 import sys
@@ -29,7 +29,7 @@ GOOD = {
 
 class CheckLayers(unittest.TestCase):
     def check(self, changes):
-        """Runs the check on the good tree with `changes`; returns exit status and lines."""
+        """Runs the check on the correct tree with `changes`. Returns exit status and lines."""
         with tempfile.TemporaryDirectory() as root:
             for name, text in (GOOD | changes).items():
                 path = Path(root, name)

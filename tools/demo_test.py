@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""`./upswing demo`: what it serves and what it refuses. tools/web_test runs this with the built page
-in UPSWING_PAGE; nothing is installed or built."""
+"""Tests of `./upswing demo`: what it serves and refuses. tools/web_test runs this with the built
+page in UPSWING_PAGE; nothing is installed or built."""
 
 import json
 import os
@@ -44,7 +44,7 @@ class DemoTest(ProgramTest):
                               stderr=subprocess.PIPE, encoding="utf-8")
 
     def serve(self, *arguments):
-        """Starts the server; returns it and its address, from its first line."""
+        """Starts the server. Returns the process and the address in its first line."""
         server = subprocess.Popen(self.command(*arguments), cwd=self.work, env=self.environment,
                                   stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                   stderr=subprocess.DEVNULL, encoding="utf-8")
@@ -54,7 +54,7 @@ class DemoTest(ProgramTest):
         return server, line.split()[4]
 
     def fetch(self, address):
-        # Directly, even where a proxy is configured.
+        # A configured proxy is bypassed.
         opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
         with opener.open(address.replace("localhost", "127.0.0.1")) as reply:
             return reply.read()
@@ -76,7 +76,7 @@ class DemoTest(ProgramTest):
     def test_runs_are_in_the_page(self):
         self.succeed(*small(out="work/My Run"))
         self.assertEqual(self.demo("My Run", "--dist", "site").returncode, 0)
-        self.assertEqual(snapshot(self.page), snapshot(PAGE))  # a copy was made
+        self.assertEqual(snapshot(self.page), snapshot(PAGE))  # it serves a copy
         _, address = self.serve("My Run")
         for agents in (json.loads(self.fetch(address + "agents/agents.json")),
                        json.loads((self.work / "site/agents/agents.json").read_text())):

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Builds the documentation: ./upswing docs runs this in its virtual environment.
+"""Builds the documentation: ./upswing docs runs this script in its virtual environment.
 
   docs.py build FOLDER    a static site, which works from any folder and from file://
   docs.py serve FOLDER    serves a folder on this machine only
 
-The pages of docs/ and the generated pages of the reference are put together in build/docs-work, from
-where Sphinx builds. What has not changed is not built again.
+Sphinx builds from build/docs-work, which gets the pages of docs/ and the generated pages of the
+reference. Unchanged pages are not rebuilt.
 """
 
 import argparse
@@ -27,7 +27,7 @@ WORK = Path(os.environ.get("UPSWING_DOCS_WORK", ROOT / "build/docs-work"))
 SOURCE = WORK / "source"
 XML = WORK / "doxygen/xml"
 
-# Pages of the repository's root that the site has too.
+# Pages of the repository's root that the site also has.
 ROOT_PAGES = {"CHANGELOG.md": "development/changelog.md",
               "CONTRIBUTING.md": "development/contributing.md",
               "SECURITY.md": "development/security.md"}
@@ -41,7 +41,7 @@ LAYERS = {
 
 
 class Stage:
-    """The folder that Sphinx reads. Files that did not change keep their time."""
+    """The folder that Sphinx reads. Unchanged files keep their modification time."""
 
     def __init__(self, folder):
         self.folder = folder
@@ -56,7 +56,7 @@ class Stage:
             path.write_bytes(content)
 
     def remove_others(self, out):
-        """Removes files that are no longer part of it, and what was built from them."""
+        """Removes files that no longer belong to the folder, and everything built from them."""
         for path in self.folder.rglob("*"):
             if path.is_file() and path not in self.files:
                 path.unlink()
@@ -80,7 +80,7 @@ def stage_pages(stage):
 
 
 def stage_page(stage, path, name):
-    """Copies a page, with links that lead to the same places from where the copy is."""
+    """Copies a page, and adapts its links to the place of the copy."""
     folder = (SOURCE / name).parent
 
     def redirect(link):
@@ -98,10 +98,10 @@ def stage_page(stage, path, name):
         elif inside.startswith("docs" + os.sep):
             new = str(Path(inside).relative_to("docs"))
         elif (ROOT / inside).is_file():
-            new = f"files/{inside}" + (".txt" if inside.endswith(".md") else "")  # no page
+            new = f"files/{inside}" + (".txt" if inside.endswith(".md") else "")  # not a page
             stage.write(new, (ROOT / inside).read_bytes())
         else:
-            return link[0]  # Sphinx says what is wrong with it
+            return link[0]  # Sphinx reports the broken link
         target = os.path.relpath(SOURCE / new, folder) + ("#" + anchor if anchor else "")
         return f"{text}({target})"
 
@@ -110,7 +110,7 @@ def stage_page(stage, path, name):
 
 
 def outside_code(text, change):
-    """The text, changed outside fenced blocks."""
+    """The text with a change applied outside fenced blocks."""
     pieces, end = [], 0
     for block in FENCED.finditer(text):
         pieces += [change(text[end:block.start()]), block[0]]
@@ -134,7 +134,7 @@ def command_line_page():
 
 
 def settings_page():
-    """One table for each section; sections that algorithms share come once."""
+    """One table per section; sections shared by the algorithms appear once."""
     per_algorithm = {name: program.settings(agent) for name, agent in program.ALGORITHMS.items()}
     own = {"network", "agent"}
     shared = {name: setting for settings in per_algorithm.values()
@@ -220,7 +220,7 @@ def headers_of(layer):
             if path.name != "testing.h" and not path.name.endswith("-inl.h")]
 
 
-# Parts of a header that its page has: all but private ones.
+# Parts of a header that its page shows: everything except private parts.
 SECTIONS = ("briefdescription detaileddescription innerclass define enum func typedef var "
             "user-defined public-type public-func public-attrib public-static-func "
             "public-static-attrib protected-type protected-func protected-attrib "
@@ -271,19 +271,19 @@ EXCLUDE_SYMBOLS = Difference
 
 
 def for_doxygen(text):
-    """A header as Doxygen and Sphinx can show it."""
-    # Above the namespace, a comment describes the header. All names are in one namespace, which would
-    # be in front of each.
+    """A header rewritten so that Doxygen and Sphinx can show it."""
+    # A comment above the namespace describes the header. The namespace is removed, because it would
+    # precede each name.
     text = re.sub(r"((?:^///.*\n)+)namespace upswing \{\n", r"/// \\file\n\1", text, flags=re.MULTILINE)
     text = re.sub(r"^namespace upswing \{\n|^\}  // namespace upswing\n", "", text, flags=re.MULTILINE)
-    # A comment behind a member describes it.
+    # A comment after a member describes the member.
     text = re.sub(r"([;,]) +// +", r"\1  ///< ", text)
-    # Sphinx's parser of C++ does not take lambdas.
+    # Sphinx's C++ parser does not accept lambdas.
     return re.sub(r"=\s*\[\] *\{[^{}]*\}(\(\))?(?=[;,)])", "= {}", text)
 
 
 def run_doxygen():
-    """Writes the XML of the headers, unless it is there."""
+    """Writes the XML of the headers unless it is up to date."""
     headers = Stage(WORK / "headers")
     for name in layers():
         for header in headers_of(name):
@@ -299,7 +299,7 @@ def run_doxygen():
     shutil.rmtree(XML.parent, ignore_errors=True)
     XML.parent.mkdir(parents=True)
     subprocess.run(["doxygen", "-"], input=settings, check=True, encoding="utf-8")
-    # Breathe finds a header by its name in the index, which Doxygen writes without the folder.
+    # Breathe looks up a header by its name in the index, which Doxygen writes without the folder.
     index = XML / "index.xml"
 
     def with_folder(entry):
@@ -330,7 +330,7 @@ def build(out, jobs):
          "-d", doctrees, SOURCE, out], check=False, stdin=subprocess.DEVNULL,
         env=os.environ | {"UPSWING_ROOT": str(ROOT), "UPSWING_DOXYGEN_XML": str(XML)})
     if done.returncode != 0:
-        shutil.rmtree(doctrees, ignore_errors=True)  # else the next build would not warn again
+        shutil.rmtree(doctrees, ignore_errors=True)  # so that the next build warns again
         return 1
     return 0
 

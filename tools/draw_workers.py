@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Watches the folder of a study until all runs are done, then draws which worker trained which run when.
+"""Watches a study's folder until all runs are done, then draws which worker trained which run when.
 
     tools/draw_workers.py runs/my workers.svg
 """
@@ -29,8 +29,8 @@ def size(path):
 
 
 def watch(folder):
-    """The runs in their order, and for each its spans (worker, begin, last progress, end) in seconds;
-    the last span of a run ends when it was done."""
+    """The runs in order, each with its spans (worker, begin, last progress, end) in seconds. A
+    run's last span ends when the run is done."""
     plan = json.loads((folder / "plan.json").read_text(encoding="utf-8"))
     seeds = [seed for part in plan["seeds"].strip("[]").split(",")
              for low, _, high in [part.strip().partition("-")]
@@ -44,7 +44,7 @@ def watch(folder):
         for run, of_run in spans.items():
             if run in done:
                 continue
-            # Host and process.
+            # The claim's first two words: host and process.
             holder = " ".join(read(folder / f"{run}.claim").split()[:2])
             grown = size(folder / run / "metrics.csv")
             if holder and (not of_run or of_run[-1][0] != holder or of_run[-1][3] < now - 2):

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""tools/fetch_wheel: bad arguments are refused before any download, and existing files are kept."""
+"""Tests of tools/fetch_wheel: bad arguments are refused before any download; existing files are
+kept."""
 
 import subprocess
 import tempfile
@@ -31,7 +32,7 @@ class FetchWheel(unittest.TestCase):
         self.assert_refused([], "got 0 arguments")
         self.assert_refused(["mujoco", self.folder, "aarch64", "more"], "got 4 arguments")
         self.assert_refused(["eigen", self.folder], "expected mujoco, node, zig or highway, got 'eigen'")
-        # Its versions are pinned too, but it is no wheel to unpack.
+        # Its versions are pinned, too, but it is not a wheel to unpack.
         self.assert_refused(["python", self.folder], "expected mujoco, node, zig or highway, got 'python'")
 
     def test_machine_without_a_wheel(self):

@@ -28,7 +28,8 @@ from seeds.wilson import wilson
 FIGURES = ROOT / "docs/figures"
 CSV = FIGURES / "data"
 
-# The colour of each agent and controller, in every figure: a contrast of 3 or more on both backgrounds.
+# The colour of each agent and controller in every figure, with a contrast of 3 or more on both
+# backgrounds.
 AGENTS = {
     "d3qn": "#2f7de0", "dqn": "#8c8c3a", "double-dqn": "#b06ac8", "dueling-dqn": "#2a9d9d", "fast": "#d9662a",
     "sac": "#1a9b6c", "sac-fast": "#6f9a24", "ppo": "#d0478f", "ppo-discrete": "#b5707f",
@@ -37,7 +38,7 @@ AGENTS = {
 }
 CONTROLLERS = {"lqr", "energy", "pfl", "tvlqr", "mpc", "hybrid"}
 
-# Colours that change in the dark: name: (placeholder for matplotlib, light, dark).
+# Colours that change in dark mode: name: (placeholder for matplotlib, light, dark).
 VARIABLES = {
     "ink": ("#010101", "#1d2333", "#e6e8ee"),
     "muted": ("#020202", "#565c6e", "#a6abba"),
@@ -53,11 +54,11 @@ INK, MUTED, GRID, PAPER, LINK1, LINK2, TORQUE = (placeholder for placeholder, _,
 REWARD = {"energy": "#2f7de0", "height": "#2a9d9d", "balance": "#b98200", "velocity penalty": "#b06ac8",
           "torque penalty": "#d84a4a"}
 
-DRAWN = {}  # name of the figure: function that returns a matplotlib figure, or raises NoData
+DRAWN = {}  # figure name: function that returns a matplotlib figure, or raises NoData
 
 
 class NoData(Exception):
-    """A data file of the figure does not exist or is empty."""
+    """A figure's data file does not exist or is empty."""
 
 
 def figure(name):
@@ -90,19 +91,19 @@ def canvas(width, height):
 
 
 def panel(fig, left, top, width, height, **options):
-    """Axes at this place, in pixels from the top left."""
+    """Axes at this position, in pixels from the top left."""
     w, h = fig.get_size_inches() * 72
     return fig.add_axes((left / w, 1 - (top + height) / h, width / w, height / h), **options)
 
 
 def note(fig, x, y, text, **options):
-    """Text at this place, in pixels from the top left."""
+    """Adds text at this position, in pixels from the top left."""
     w, h = fig.get_size_inches() * 72
     return fig.text(x / w, 1 - y / h, text, va=options.pop("va", "center_baseline"), **options)
 
 
 def svg(fig):
-    """The figure as text: the same bytes for the same data."""
+    """The figure as SVG text: the same bytes for the same data."""
     file = io.StringIO()
     fig.savefig(file, format="svg", facecolor=PAPER,
                 metadata={"Date": None, "Creator": None, "Type": None, "Format": None})
@@ -222,7 +223,8 @@ CLEAR = 60                          # distance of every return from the break
 
 
 def ablation(name, agent, reference):
-    """One row for each variant: return at the end with its 95% interval, and how many seeds solved."""
+    """A row for each variant: final return with its 95% interval, and the number of solved
+    seeds."""
     columns, rows = table(name)
     at = next(k for k, column in enumerate(columns) if column.startswith("return at the end"))
     rows = [row for row in rows if interval(row[at])]
@@ -290,7 +292,7 @@ def entries(columns_of):
 
 
 def dots(fig, left, width, top, rows, values, names, limits, texts=None):
-    """A panel with one row for each entry: ours large and filled."""
+    """A panel with a row for each entry; our entries are large and filled."""
     axes = panel(fig, left, top, width, 22 * len(rows))
     axes.set_xlim(*limits)
     axes.set_ylim(len(rows) - 0.5, -0.5)
@@ -317,7 +319,7 @@ def dots(fig, left, width, top, rows, values, names, limits, texts=None):
 
 @figure("realaigym-scores")
 def realaigym_scores():
-    """Scores of performance and robustness, ours beside the published entries."""
+    """Scores of performance and robustness: our entries and the published ones."""
     blocks = list(entries(("S", "R")))
     _, top, _, rows = blocks[-1]
     fig = canvas(800, top + 22 * len(rows) + 40)
@@ -328,7 +330,7 @@ def realaigym_scores():
         for k, (name, left) in enumerate((("S", 150), ("R", 480))):
             cells = [row[columns.index(name)] for row in rows]
             axes = dots(fig, left, 260, top, rows, [number(cell) for cell in cells], k == 0,
-                        (0.3, 0.9) if name == "S" else (0.2, 1.2), cells)  # the right end is for the values
+                        (0.3, 0.9) if name == "S" else (0.2, 1.2), cells)  # values at the right
             axes.set_xticks([0.3, 0.4, 0.5, 0.6, 0.7] if name == "S" else [0.2, 0.4, 0.6, 0.8, 1])
             if robot != blocks[-1][0]:
                 axes.tick_params(axis="x", labelbottom=False)
@@ -337,7 +339,7 @@ def realaigym_scores():
 
 @figure("realaigym-robustness")
 def realaigym_robustness():
-    """The six rows of robustness, ours beside the published entries."""
+    """The six robustness rows: our entries and the published ones."""
     blocks = list(entries(CHALLENGES))
     _, top, _, rows = blocks[-1]
     fig = canvas(800, top + 22 * len(rows) + 62)
@@ -367,7 +369,8 @@ def edges(centers):
 
 @figure("maps")
 def maps():
-    """Success over the masses of both links, of an agent of one plant and of one that identifies its plant."""
+    """Success over the masses of both links, for an agent of one plant and an agent that identifies
+    its plant."""
     fig, image = canvas(800, 440), None
     for k, (agent, left) in enumerate((("d3qn", 70), ("d3qn-adaptive", 390))):
         rows = data_of(CSV / f"map-{agent}.csv")
@@ -403,7 +406,7 @@ def maps():
 
 @figure("lqr-catch")
 def lqr_catch():
-    """From where, at rest, the LQR catches the pendulum."""
+    """States at rest from which the LQR catches the pendulum."""
     rows = data_of(CSV / "lqr-catch.csv")
     first, *columns = rows[0]
     x, y = [float(column) for column in columns], [float(row[first]) for row in rows]
@@ -426,7 +429,7 @@ def lqr_catch():
 
 @figure("pareto")
 def pareto():
-    """What return misses to the bound, against torque change, of all agents and controllers."""
+    """Missing return to the bound, against torque change, for all agents and controllers."""
     columns, rows = table("overview")
     share, variation = (next(k for k, column in enumerate(columns) if column.startswith(name))
                         for name in ("return / bound", "torque variation"))
@@ -438,7 +441,7 @@ def pareto():
     axes = panel(fig, 80, 40, 700, 390)
     axes.set_xscale("log")
 
-    def height(percent):  # what is missing to the bound, on a logarithmic scale
+    def height(percent):  # missing share of the bound, on a logarithmic scale
         return -math.log10(max(100 - percent, 0.5))
 
     smallest, largest = min(x for _, x, _ in points), max(x for _, x, _ in points)
@@ -483,7 +486,7 @@ def pareto():
 
 
 def place_label(axes, name, at, taken):
-    """Write a name beside its dot where no dot, line or earlier name is."""
+    """Writes a name next to its dot, where no dot, line or earlier name is."""
     width, height = 8 * len(name), 15
     (left, bottom), (right, top) = axes.transAxes.transform([(0, 0), (1, 1)])
     for dx, dy, align in ((11, 0, "left"), (-11, 0, "right"), (0, 17, "center"), (0, -17, "center"), (11, 15, "left"),
@@ -514,7 +517,7 @@ def values_over_training():
             if row["agent"] == agent:
                 steps.setdefault(int(row["step"]), []).append(float(row["ratio"]))
         most = max(map(len, steps.values()))
-        steps = {step: ratios for step, ratios in sorted(steps.items()) if len(ratios) == most}  # all seeds are there
+        steps = {step: ratios for step, ratios in sorted(steps.items()) if len(ratios) == most}  # all seeds have it
         axes.fill_between(list(steps), [min(each) for each in steps.values()], [max(each) for each in steps.values()],
                           color=AGENTS[agent], alpha=0.2, linewidth=0)
         axes.plot(list(steps), [median(each) for each in steps.values()], color=AGENTS[agent], label=agent)
@@ -620,7 +623,7 @@ def seeds_distribution():
 # --- Data from the program ---
 
 def measure(program):
-    """Run the program for the figures that show its output."""
+    """Runs the program for the figures that show its output."""
     import tempfile
     agents = ROOT / "web/public/agents"
     CSV.mkdir(parents=True, exist_ok=True)
@@ -655,7 +658,7 @@ def keep_maps(folder, write):
 
 
 def keep_lqr(folder, write):
-    """A line for each q2, a column for each q1 [°]: 1 if upright in the end."""
+    """A line for each q2, a column for each q1 [°]: 1 if upright at the end."""
     grid = {}
     for row in rows_of(folder / "map.csv"):
         grid.setdefault(float(row["q2"]), {})[float(row["q1"])] = row["successes"]
@@ -664,7 +667,7 @@ def keep_lqr(folder, write):
 
 
 def collect_values(folder):
-    """Write values-over-training.csv from the evals.csv of runs named AGENT-seedN."""
+    """Writes values-over-training.csv from the evals.csv of runs named AGENT-seedN."""
     lines = []
     for path in sorted(folder.glob("*/evals.csv")):
         agent, _, seed = path.parent.name.rpartition("-seed")

@@ -13,7 +13,7 @@ from pages import pages
 
 DARK = "@media (prefers-color-scheme:dark)"
 
-# Drawn by the program itself, not by tools/figures.py. They show what a user gets.
+# Pictures drawn by the program itself, not by tools/figures.py: they show a user's output.
 OUTPUT = {"map.svg", "workers.svg"}
 
 
@@ -28,7 +28,7 @@ def shown():
 
 
 def matplotlib_is_pinned():
-    """Whether this Python has the matplotlib that drew the figures."""
+    """Whether this Python has the matplotlib version that drew the figures."""
     pinned = re.search(r"^matplotlib==(\S+)", (figures.ROOT / "tools/docs-requirements.txt").read_text("utf-8"), re.M)
     try:
         return bool(pinned) and metadata.version("matplotlib") == pinned[1]

@@ -1,4 +1,5 @@
-"""The Markdown pages of README and docs/: where they are, and how tools and tests read them."""
+"""The Markdown pages of README and docs/: their files, and helpers for tools and tests that read
+them."""
 
 import re
 
@@ -12,7 +13,7 @@ def pages():
 
 
 def without_code(text):
-    """The text with blanks for its fenced blocks, so that what stands in them does not count."""
+    """The text with fenced blocks replaced by blanks, so that their content does not count."""
     return FENCED.sub(lambda block: re.sub(r"[^\n]", " ", block[0]), text)
 
 

@@ -1,6 +1,6 @@
-// A training by the portable layers alone (core, nn, sim, rl, control, setup): in memory, in the
-// closed form, its checkpoint through the safetensors format. Linked with all of these libraries
-// and nothing else of ours; portable_test.py checks what it asks the system for.
+// Trains with only the portable layers (core, nn, sim, rl, control, setup): in memory, in closed
+// form, with a checkpoint in safetensors format. The program links all of these libraries and no
+// others of ours. portable_test.py checks its requirements on the system.
 #include <algorithm>
 #include <cstdio>
 #include <vector>
@@ -29,20 +29,20 @@ Config SmallSettings() {
   });
 }
 
-/// A small training of two threads.
+/// A small training with two threads.
 Training SmallTraining() {
   static constexpr const Engine* kEngines[] = {&kClosedForm};
   constexpr int64_t kMemory = int64_t{1} << 30;
   return Training(SmallSettings(), {kEngines, kMemory, 2});
 }
 
-/// Its checkpoint as a file in memory.
+/// The training's checkpoint as a file in memory.
 std::vector<std::byte> FileOf(Training& training) {
   const Tensors checkpoint = training.Checkpoint();
   return WriteSafetensors(checkpoint).Joined();
 }
 
-/// Whether two checkpoints have the same tensors, but for the time that the trainings took.
+/// Whether two checkpoints have the same tensors, without the trainings' times.
 bool Same(const Tensors& a, const Tensors& b) {
   if (a.all().size() != b.all().size()) return false;
   for (const auto& [name, tensor] : a.all()) {
@@ -54,7 +54,7 @@ bool Same(const Tensors& a, const Tensors& b) {
   return true;
 }
 
-/// A training that is saved half-way and loaded into another goes on as if it had not been.
+/// Checks that a training saved half-way and loaded into another one continues unchanged.
 void CheckThatItResumes() {
   Training whole = SmallTraining(), resumed = SmallTraining();
   while (whole.state().steps < 2000) whole.Step();

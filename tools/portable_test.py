@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""The layers core, nn, sim, rl, control and setup need no operating system: a program linked with all of
-them trains in memory, and asks for nothing but what is allowed here.
+"""Tests that the layers core, nn, sim, rl, control and setup need no operating system. A program
+linked with all of them trains in memory, and uses only the allowed symbols below.
 
 The program is portable_test in the build folder of the program in UPSWING (see apps/testing.py).
 """
@@ -15,8 +15,9 @@ ROOT = Path(os.environ.get("UPSWING_ROOT", Path(__file__).resolve().parent.paren
 UPSWING = Path(os.environ.get("UPSWING", ROOT / "build/release/apps/upswing"))
 PROGRAM = UPSWING.parent.parent / "portable_test"
 
-# What may be undefined, as nm shows it, and why. Everything else is refused: files (open, fopen,
-# stat, std::filesystem, std::ofstream), processes, sockets, MuJoCo (mj_…), protobuf, tinyxml2.
+# Symbols that may be undefined, as nm prints them, and why. All others are refused: files (open,
+# fopen, stat, std::filesystem, std::ofstream), processes, sockets, MuJoCo (mj_…), protobuf,
+# tinyxml2.
 ALLOWED = {
     "what a compiled C++ program needs to begin, to throw and to allocate":
         r"_ITM_\w+|__gmon_start__|__libc_start_main|__cxa_\w+|__gxx_personality_v0|_Unwind_Resume|"
@@ -42,19 +43,20 @@ ALLOWED = {
     "printf of the test's own result":
         r"printf|puts|putchar|__printf_chk",
 }
-# In the C++ library, what would open files or write to a terminal all the same.
+# Symbols of the C++ library that are refused anyway, because they open files or write to a
+# terminal.
 REFUSED = r"filesystem|basic_\w*file|fstream|std::(cout|cerr|clog|cin)\b|random_device"
 
 
 def undefined():
-    """The symbols that the program takes from shared libraries, demangled, without versions."""
+    """The symbols that the program imports from shared libraries, demangled, without versions."""
     lines = subprocess.run(["nm", "-D", "-C", "--undefined-only", PROGRAM], check=True,
                            encoding="utf-8", stdout=subprocess.PIPE).stdout.splitlines()
     return [re.sub(r"@.*", "", re.sub(r"^\s*[Uw] ", "", line)) for line in lines]
 
 
 def offenders(symbols):
-    """Those that are not allowed."""
+    """The symbols that are not allowed."""
     allowed = "|".join(f"(?:{pattern})" for pattern in ALLOWED.values())
     return [symbol for symbol in symbols
             if not re.fullmatch(allowed, symbol) or re.search(REFUSED, symbol)]

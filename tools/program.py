@@ -1,7 +1,7 @@
-"""What the program says of itself: its commands, flags, settings and named agents.
+"""The program's own description: its commands, flags, settings and named agents.
 
-Tools and tests that need one of these read it from here. The program is taken from the environment
-variable UPSWING, else from the release build.
+Tools and tests that need one of these use this module. The environment variable UPSWING names the
+program; without it, the release build is used.
 """
 
 import dataclasses
@@ -14,15 +14,15 @@ from pathlib import Path
 ROOT = Path(os.environ.get("UPSWING_ROOT", Path(__file__).resolve().parent.parent))
 UPSWING = Path(os.environ.get("UPSWING", ROOT / "build/release/apps/upswing"))
 
-# Commands of the launcher, which the program knows by name only.
+# Commands of the launcher; the program only knows their names.
 LAUNCHER_COMMANDS = {"demo", "docs", "python", "test"}
-# The named agent whose defaults stand for an algorithm.
+# The named agent with the defaults of each algorithm.
 ALGORITHMS = {"dqn": "d3qn", "sac": "sac", "ppo": "ppo"}
 
 
 @functools.cache
 def output_of(*command):
-    """The standard output of a command that succeeds."""
+    """The standard output of a command, which must succeed."""
     return subprocess.run(command, check=True, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                           encoding="utf-8").stdout
 
@@ -45,12 +45,12 @@ def _table(text, heading):
 
 
 def commands():
-    """{command: what it does}, in the order of --help."""
+    """{command: description}, in the order of --help."""
     return _table(program("--help"), "(?:Subcommands|Commands)")
 
 
 def agents():
-    """{named agent: what it is}, in the order of --help."""
+    """{named agent: description}, in the order of --help."""
     return _table(program("train", "--help"), "Named agents")
 
 
@@ -65,7 +65,7 @@ def help_of(command, *arguments):
 
 @functools.cache
 def flags(command):
-    """All flags of a command, whatever the algorithm."""
+    """All flags of a command, for all algorithms."""
     texts = [help_of(command)]
     if command == "train":
         texts += [help_of("train", "--agent", agent) for agent in ALGORITHMS.values()]
@@ -102,7 +102,7 @@ def settings(agent):
 
 
 def _cut(text, pattern):
-    """The text without its end that matches, and the group of the match."""
+    """The text without its matching end, and the group of the match."""
     end = re.search(pattern + "$", text)
     return (text[:end.start()], end[1]) if end else (text, "")
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Finds the worst habits of English in README.md and docs/, as far as a pattern can.
+"""Finds the worst habits of English in README.md and docs/ by patterns.
 
   prose.py [FILE.md...]    lists what it finds, and ends with 1 if anything is found
 """
@@ -10,9 +10,9 @@ from pathlib import Path
 
 from pages import pages, without_code
 
-MOST_WORDS = 40  # of a sentence
+MOST_WORDS = 40  # per sentence
 
-# What is found, and what to write instead.
+# Patterns, and what to write instead.
 HABITS = {
     r"\bbeside\b": "next to",
     r"\banew\b": "again",
@@ -30,7 +30,7 @@ HABITS = {
 
 
 def paragraphs(markdown):
-    """The prose: paragraphs, list items, headings and cells of tables, without what is no prose."""
+    """The prose of a page: paragraphs, list items, headings and table cells."""
     text = re.sub(r"(<!-- (?:table|generated): .*? -->).*?<!-- end -->", "\n", without_code(markdown),
                   flags=re.DOTALL)
     text = re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
@@ -52,12 +52,12 @@ def sentences(paragraph):
 
 
 def faults(markdown):
-    """(sentence, what is wrong with it) for each fault."""
+    """(sentence, fault) for each fault."""
     for paragraph in paragraphs(markdown):
         for sentence in sentences(paragraph):
             for habit, instead in HABITS.items():
                 found = re.search(habit, sentence, re.IGNORECASE)
-                # A question may well begin with "What is".
+                # A question may begin with "What is".
                 if found and not (found[0].lower().startswith("what") and sentence.endswith("?")):
                     yield sentence, f"\"{found[0]}\": {instead}"
             words = len(sentence.split())

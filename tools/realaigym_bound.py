@@ -13,8 +13,8 @@ import argparse
 import casadi as ca
 import numpy as np
 
-H = 0.004  # s, of a step; the boards' is 0.002
-RULE_STEPS = 4999  # of the boards' simulation, over which the change of the torque is taken
+H = 0.004  # step, s; the boards' step is 0.002 s
+RULE_STEPS = 4999  # of the boards' simulation, for the variance of the torque's change
 LINE = 0.45  # m
 
 M1, M2, L1, L2 = 0.5234602302310271, 0.6255677234174437, 0.2, 0.3
@@ -23,7 +23,7 @@ I1, I2, G = 0.031887199591513114, 0.05086984812807257, 9.81
 
 
 def derivative(x, u, joint):
-    """Of the state (q1, q2, w1, w2) under a torque about a joint."""
+    """The derivative of the state (q1, q2, w1, w2) under a torque about a joint."""
     q1, q2, w1, w2 = x[0], x[1], x[2], x[3]
     b = M2 * L1 * R2
     m11, m12, m22 = I1 + I2 + M2 * L1**2 + 2 * b * ca.cos(q2), I2 + b * ca.cos(q2), I2
@@ -55,7 +55,7 @@ class Problem:
         angle = x[joint - 1, :]
         energy = ca.sum2(ca.sqrt(((angle[1:] - angle[:-1]) * u) ** 2 + 1e-11))
         change = ca.horzcat(u[1:] - u[:-1], -u[n - 1])
-        # A change in 4 ms is two of half of it in 2 ms.
+        # A change in 4 ms counts as two changes of half its size in 2 ms.
         variance = ca.sum2(change**2) / 2 / RULE_STEPS - (u[0] / RULE_STEPS) ** 2
         sums = [energy, H * ca.sum2(u**2), variance * 1e4, H * ca.sum2(x[2, :] ** 2 + x[3, :] ** 2)]
         own = [costs[0], costs[1], costs[2] ** 2 * 1e4, costs[3]]
@@ -77,7 +77,8 @@ class Problem:
              "ipopt.tol": 1e-4, "ipopt.max_cpu_time": 25.0, "ipopt.mu_strategy": "adaptive"})
 
     def first_guess(self, rng, line):
-        """A sine of torque until step `line`, and the motion under it, bent to a goal."""
+        """A first guess: a sine of torque until step `line`, and the motion under it, bent to a
+        goal."""
         t = np.arange(self.steps) * H
         u = rng.uniform(0.5, 4) * np.sin(2 * np.pi * (rng.uniform(0.4, 1.6) * t + rng.uniform()))
         u *= np.arange(self.steps) < line
@@ -89,7 +90,8 @@ class Problem:
         return np.r_[x.T.ravel(), u, 8, 4, 0.02, 80], goal
 
     def improve(self, rng):
-        """The best of a few times to be above the line from; None if nothing is found."""
+        """The best result over a few times from which the tip is above the line; None if nothing is
+        found."""
         line = round(rng.uniform(0.5, min(2.6, self.steps * H - 0.4)) / H)
         z, goal = self.first_guess(rng, line)
         best = None

@@ -45,7 +45,7 @@ VALUE = re.compile(r"<!-- value: (\S+) ([^\n]+?) -->(.*?)<!-- end -->", re.DOTAL
 
 
 class Problem(Exception):
-    """What is wrong with a page or a table, in one line."""
+    """A problem of a page or a table, in one line."""
 
 
 # --- Tables -------------------------------------------------------------------------------------
@@ -77,7 +77,7 @@ def load(table_id, data=DATA):
 
 
 def cell_of(table, row_and_column):
-    """The cell that `ROW COLUMN` names; both may contain blanks."""
+    """The cell named by `ROW COLUMN`; both may contain blanks."""
     words = row_and_column.split(" ")
     names = [row[0].replace("`", "") for row in table["rows"]]
     headers = [header.replace("`", "") for header in table["columns"]]
@@ -107,20 +107,20 @@ def generated(name):
 
 @generated("hyperparameters")
 def hyperparameters_table(algorithm, *names):
-    """Named agents as columns (without names: all of the algorithm), and these settings as rows:
-    all of the network and of the algorithm, all of training and task that change what is learned,
+    """A table with named agents as columns (default: all of the algorithm) and settings as rows.
+    Rows: all settings of network and algorithm, those of training and task that change learning,
     and those of plant, sensors, random plants and reward in which the agents differ."""
     return settings_table(algorithm, names, LEARNING)
 
 
 @generated("differences")
 def differences_table(algorithm, *names):
-    """Named agents as columns, and the settings in which they differ as rows."""
+    """A table with named agents as columns and the settings in which they differ as rows."""
     return settings_table(algorithm, names, set())
 
 
 def settings_table(algorithm, names, sections):
-    """Rows: the settings of these sections, and those in which the agents differ."""
+    """A table of agents: the settings of these sections, and those in which the agents differ."""
     known = [name for name in program.agents() if program.algorithm_of(name) == algorithm]
     default = program.ALGORITHMS.get(algorithm)
     names = names or sorted(known, key=lambda name: name != default)
@@ -141,7 +141,7 @@ BOOKKEEPING = {"agent", "algorithm", "seed", "log_every", "checkpoint_every", "t
 
 
 def readable(value):
-    """A TOML value as a table shows it, such as 1,000,000."""
+    """A TOML value as tables show it, such as 1,000,000."""
     return f"{int(value):,}" if value.isdecimal() else value.strip('"[]')
 
 
@@ -157,7 +157,7 @@ def machines_table():
 
 
 def origin(table, page):
-    """Version, date, machine and commands of a measured table: the line below it."""
+    """The line below a measured table: version, date, machine and commands."""
     measured, commands = table["measured"], table["commands"]
     parts = [f"Version {measured['version']}", measured["date"]]
     if measured["machine"] != UNRECORDED:
@@ -191,7 +191,7 @@ def rendered(text, page=MACHINES_PAGE):
 
 
 def problems_of(text, page=MACHINES_PAGE):
-    """What is wrong with the text of a page."""
+    """The problems of a page's text."""
     seen = without_code(text)
     opened, closed = len(re.findall(r"<!-- (?:table|generated|value): ", seen)), seen.count("<!-- end -->")
     if opened != closed:
@@ -245,7 +245,7 @@ NONE = "–"  # not measured, or not applicable
 
 
 def recipe(table_id):
-    """Declares how a table is measured: a function that takes a Lab and returns columns and rows."""
+    """Declares how to measure a table: a function that takes a Lab and returns columns and rows."""
     def add(function):
         RECIPES[table_id] = function
         return function
@@ -253,9 +253,9 @@ def recipe(table_id):
 
 
 class Lab:
-    """Runs commands as a reader would, and keeps them for the record.
+    """Runs commands as a reader would, and records them.
 
-    `few` stands for a trial: two seeds and a handful of episodes."""
+    `few` means a trial: two seeds and a handful of episodes."""
 
     def __init__(self, folder, few):
         self.folder = folder
@@ -263,7 +263,7 @@ class Lab:
         self.commands = []
 
     def run(self, *arguments, record=True):
-        """The output of a command of the program. The record has `runs` for the folder."""
+        """The output of a command of the program. The record shows `runs` as the folder."""
         arguments = [str(argument) for argument in arguments]
         if record:
             self.commands.append("./upswing " + " ".join(arguments).replace(str(self.folder), "runs"))
@@ -288,8 +288,8 @@ PAGE_AGENTS = Path("web/public/agents")
 OVERVIEW_AGENTS = ("d3qn", "dqn", "double-dqn", "dueling-dqn", "fast", "sac", "sac-fast", "ppo",
                    "ppo-discrete", "d3qn-randomized", "d3qn-adaptive")
 CONTROLLERS = ("lqr", "energy", "pfl", "tvlqr", "mpc")
-SLOW = {"mpc"}  # plans at each decision: fewer random plants
-LONG = {"d3qn-randomized", "d3qn-adaptive"}  # train for minutes: their time is not measured
+SLOW = {"mpc"}  # plans at each decision, so it gets fewer random plants
+LONG = {"d3qn-randomized", "d3qn-adaptive"}  # train for minutes, so their time is not measured
 
 
 def percent(share):
@@ -298,7 +298,7 @@ def percent(share):
 
 @recipe("overview")
 def overview(lab):
-    """Policies are those of the page, else those of the first seed that is trained for the time."""
+    """Measures the page's policies. The first seed trained for the time replaces a missing one."""
     episodes = 2 if lab.few else 100
     policies, seconds = {}, {}
     for agent in OVERVIEW_AGENTS[4:5] if lab.few else OVERVIEW_AGENTS:
@@ -312,10 +312,10 @@ def overview(lab):
         seconds[agent] = format_number(statistics.median(times), 2)
         policies[agent] = str(shown if (ROOT / shown).exists() else outs[0])
     policies |= {name: name for name in (CONTROLLERS[:1] if lab.few else CONTROLLERS)}
-    swing_up = ["--swing-up", PAGE_AGENTS / "fast.safetensors"]  # of hybrid
+    swing_up = ["--swing-up", PAGE_AGENTS / "fast.safetensors"]  # for hybrid
     policies["hybrid"] = "hybrid"
     bounds = lab.json("bounds", *policies.values(), *swing_up, "--episodes", episodes)
-    # The last rows are those of the policies, in their order.
+    # The last rows of the bounds are the policies, in order.
     shares = dict(zip(policies, [row["share"] for row in bounds["rows"]][-len(policies):]))
     rows = []
     for name, policy in policies.items():
@@ -323,7 +323,7 @@ def overview(lab):
         nominal = lab.json("eval", policy, *more, "--episodes", episodes)
         plants = 2 if lab.few else 100 if name in SLOW else 1000
         box = lab.json("eval", policy, *more, "--randomize", 0.25, "--episodes", plants)
-        median = (nominal["swing_up_seconds"] or {}).get("median")  # null: none swings up
+        median = (nominal["swing_up_seconds"] or {}).get("median")  # null: no episode swings up
         rows.append([f"`{name}`", percent(nominal["success_rate"]),
                      NONE if median is None else f"{median:.2f}", percent(shares[name]),
                      percent(box["success_rate"]),
@@ -349,7 +349,7 @@ def time_to_solve(lab):
 
 
 def spread(figure, text):
-    """Such as `0.5 (0.3 to 0.7)`: the median and the range of the seeds that solved."""
+    """Text such as `0.5 (0.3 to 0.7)`: median and range over the seeds that solved."""
     if figure["median"] is None:
         return NONE
     values = [value for value in figure["values"] if value is not None]
@@ -357,7 +357,7 @@ def spread(figure, text):
 
 
 def format_number(value, digits):
-    """A number with so many significant digits, and never an exponent."""
+    """A number with `digits` significant digits, never with an exponent."""
     if value == 0:
         return "0"
     decimals = max(0, digits - 1 - int(f"{abs(value):e}".split("e")[1]))
@@ -365,7 +365,7 @@ def format_number(value, digits):
 
 
 def this_machine():
-    """Processor, cores, memory and system."""
+    """This machine: processor, cores, memory and system."""
     text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
     name = re.search(r"^model name\s*: (.*)", text, re.MULTILINE)
     kilobytes = int(re.search(r"MemTotal:\s*(\d+)",
@@ -377,7 +377,7 @@ def this_machine():
 
 
 def machine_id():
-    """The ID of this machine in machines.json, where it is added if it is new."""
+    """The ID of this machine in machines.json; adds a new machine."""
     known, mine = machines(), this_machine()
     for name, each in known.items():
         if each == mine:

@@ -63,7 +63,7 @@ PartitionName=high Nodes=ALL PriorityTier=2 PreemptMode=OFF
 
 
 def problem():
-    """Why there can be no cluster here; None if there can."""
+    """The reason why this machine cannot run a cluster; None if it can."""
     if os.geteuid() != 0:
         return "a cluster needs root (for namespaces)"
     path = os.environ.get("PATH", "") + ":/usr/sbin:/sbin"
@@ -76,8 +76,8 @@ def problem():
 
 
 def enter_namespaces():
-    """Starts this program again in processes, mounts, network and host name of its own; returns in
-    there. All that is started there ends with it."""
+    """Restarts this program in separate process, mount, network and host name namespaces. Returns
+    inside them. All processes started there end with it."""
     if os.environ.get(INSIDE) != "1":
         os.environ[INSIDE] = "1"
         os.execvp("unshare", [*UNSHARE, sys.executable, "-B", *sys.argv])
@@ -93,11 +93,12 @@ def enter_namespaces():
 
 
 class Cluster:
-    """Starts in `with Cluster() as cluster`, after enter_namespaces(); SLURM_CONF and PATH are set."""
+    """A cluster. Starts in `with Cluster() as cluster`, after enter_namespaces(); sets SLURM_CONF
+    and PATH."""
 
     def __init__(self):
         self.folder = Path(tempfile.mkdtemp(prefix="upswing-slurm-"))
-        self.folder.chmod(0o711)  # munge's socket is for all who may know of it
+        self.folder.chmod(0o711)  # users need access to munge's socket
         self.daemons = {}
 
     def __enter__(self):
@@ -141,18 +142,18 @@ class Cluster:
 
     def start_node(self, node):
         """Switches a node on."""
-        # The shell is the first process of the node: what it has left over is given to it.
+        # The shell is the node's first process, and adopts its orphaned processes.
         self.start(node, "unshare", "--uts", "--pid", "--kill-child", "--mount-proc", "sh", "-c",
                    'hostname "$1" && slurmd -D -N "$1" & wait', "sh", node)
 
     def lose(self, node):
-        """Takes its power away: all its processes end at once, and nobody is told."""
+        """Cuts a node's power: all its processes end at once, without notice."""
         daemon = self.daemons.pop(node)
         daemon.kill()
         daemon.wait()
 
     def wait(self, condition, seconds=60):
-        """Waits for a condition; if it does not come, what the daemons say is shown."""
+        """Waits for a condition. If the wait fails, shows the daemons' output."""
         end = time.monotonic() + seconds
         while not condition():
             ended = [name for name, daemon in self.daemons.items() if daemon.poll() is not None]
@@ -164,27 +165,27 @@ class Cluster:
             time.sleep(0.1)
 
     def ask(self, *command):
-        """What one of Slurm's commands says."""
+        """The output of a Slurm command."""
         return subprocess.run(list(map(str, command)), check=True, stdin=subprocess.DEVNULL,
                               stdout=subprocess.PIPE, encoding="utf-8").stdout
 
     def submit(self, *options, script):
-        """Queues a job; returns its number."""
+        """Queues a job. Returns its number."""
         return subprocess.run(["sbatch", "--parsable", *options], input=script, check=True,
                               stdout=subprocess.PIPE, encoding="utf-8").stdout.strip()
 
     def job(self, number):
-        """What Slurm knows of a job, or of a task such as 3_1: JobState, ExitCode, …"""
+        """Slurm's record of a job, or of a task such as 3_1: JobState, ExitCode, …"""
         told = self.ask("scontrol", "--oneliner", "show", "job", number)
         return dict(field.split("=", 1) for field in told.split() if "=" in field)
 
     def hurry(self, number):
-        """Lets a job begin that is queued again; Slurm would let it wait for two minutes."""
-        # Slurm kills one that begins in the second in which it was queued again: the credentials of
-        # that second are those that were revoked.
+        """Lets a requeued job begin; Slurm would make it wait for two minutes."""
+        # Slurm kills a job that begins in the second in which it was requeued, because the
+        # credentials of that second were revoked.
         time.sleep(2)
         def may_begin():
-            # Refused or forgotten as long as its last end is being worked on.
+            # Slurm refuses or forgets the update while it still handles the job's last end.
             subprocess.run(["scontrol", "update", f"JobId={number}", "StartTime=now"], check=False,
                            stderr=subprocess.DEVNULL)
             job = self.job(number)
@@ -192,12 +193,12 @@ class Cluster:
         self.wait(may_begin)
 
     def cancel_all(self):
-        """Ends all jobs, and waits until they have."""
+        """Cancels all jobs, and waits until they have ended."""
         self.ask("scancel", "--user=root")
         self.wait(lambda: self.ask("squeue", "--noheader") == "")
 
     def wait_for_nodes(self):
-        """Until both nodes answer."""
+        """Waits until both nodes respond."""
         answering = ["sinfo", "-h", "-N", "-p", "low", "-r", "-t", "idle,mixed,allocated", "-o", "%N"]
         self.wait(lambda: subprocess.run(
             answering, check=False, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""The Slurm of slurm_cluster.py does what the tests of the program rely on, shown with shell jobs."""
+"""Tests, with shell jobs, the behaviour of slurm_cluster.py's Slurm that the program's tests rely
+on."""
 
 import shutil
 import sys
@@ -10,7 +11,7 @@ from pathlib import Path
 
 from slurm_cluster import NODES, Cluster, enter_namespaces, problem
 
-# Notes when it begins, which signals come, and when it ends.
+# Records its beginning, the signals it receives, and its end.
 NOTES = """#!/bin/sh
 note() { echo "$*" >>"{folder}/notes"; }
 note begin "$(hostname)" "${SLURM_RESTART_COUNT:-0}"
@@ -32,7 +33,7 @@ class SlurmClusterTest(unittest.TestCase):
         self.addCleanup(self.cluster.cancel_all)
 
     def submit(self, *options, seconds=600):
-        """Queues a job that makes notes; returns its number."""
+        """Queues a job that writes notes. Returns its number."""
         script = NOTES.replace("{folder}", str(self.folder)).replace("{seconds}", str(seconds))
         return self.cluster.submit(*options, f"--output={self.folder}/log", script=script)
 
@@ -71,7 +72,7 @@ class SlurmClusterTest(unittest.TestCase):
         self.await_notes("begin node1 1")
 
     def test_before_its_time_limit_a_job_is_warned_and_may_queue_itself_again(self):
-        # Slurm looks after limits every half minute or so.
+        # Slurm checks time limits about every half minute.
         begin = time.monotonic()
         job = self.submit("--time=1", "--signal=B:USR2@30", "--requeue")
         self.await_notes("USR2", seconds=100)
@@ -90,7 +91,7 @@ class SlurmClusterTest(unittest.TestCase):
         self.cluster.lose("node2")
         try:
             self.cluster.wait(lambda: self.state(job) == "PENDING")
-            self.assertEqual(self.notes(), ["begin node2 0"])  # it was not told
+            self.assertEqual(self.notes(), ["begin node2 0"])  # the job got no signal
             self.cluster.ask("scontrol", "update", f"JobId={job}", "ReqNodeList=")
             self.cluster.hurry(job)
             self.await_notes("begin node1 1")

@@ -23,7 +23,7 @@ EDGES = [0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, math.inf]
 
 
 def episodes(policy, a):
-    """|delta| and success of each."""
+    """|delta| and success of each episode."""
     words = ["--randomize", a.share, "--episodes", a.episodes, "--seed", a.seed, "--physics", a.physics,
              "--episodes-csv", "-"]
     out = subprocess.run([ROOT / "upswing", "--no-setup", "eval", *shlex.split(policy), *map(str, words)],
@@ -34,7 +34,7 @@ def episodes(policy, a):
 
 
 def name_of(policy):
-    """Such as d3qn-adaptive-seed1 or mpc --known-plant."""
+    """A label such as d3qn-adaptive-seed1 or mpc --known-plant."""
     return policy if " " in policy else pathlib.Path(policy.removesuffix("/policy.safetensors")).stem
 
 

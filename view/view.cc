@@ -13,13 +13,13 @@ namespace {
 
 constexpr double kTrailSeconds = 1.2;
 
-/// Where the tip is: x, z over the pivot, m.
+/// Position of the tip: x, z relative to the pivot, m.
 std::array<double, 2> TipOf(const Plant& plant, const PendulumState& s) {
   return {-plant.length1 * std::sin(s.q1) - plant.length2 * std::sin(s.q1 + s.q2),
           TipHeight(plant, s)};
 }
 
-/// The lines below a picture; one alone where it is small.
+/// The status lines at the bottom of a picture; a single line if the picture is small.
 std::vector<std::array<std::string, 2>> StatusOf(const Episode& episode, double steps, bool small) {
   const PendulumState s = episode.StateAt(steps);
   const Plant plant = episode.rollout().plant;
@@ -42,7 +42,7 @@ View::View(const std::vector<RolloutConfig>& entries, const ViewLook& look, Pict
     const Plant plant = episodes_.back().rollout().plant;
     reach_ = std::max(reach_, plant.length1 + plant.length2);
   }
-  // All in rooms of the same size, so that they can be compared.
+  // Rooms have the same size, so that pendulums can be compared.
   for (const Episode& episode : episodes_) {
     scenes_.push_back(std::make_unique<PendulumScene>(episode.rollout().plant,
                                                       episode.config().env.mjcf, reach_));
@@ -103,7 +103,7 @@ std::span<const ScenePanel> View::At(double steps) {
 
 int64_t Record(View& view, const RecordConfig& config, const std::function<bool()>& stopped,
                const Progress& progress) {
-  // Frame i shows the time i · speed / fps; a picture alone, the end.
+  // Frame i shows the time i · speed / fps; a single picture shows the end.
   const RecordingKind kind = RecordingKindOf("--record", config.path);
   const bool alone = kind == RecordingKind::kPng;
   const double fps = config.fps > 0 ? config.fps : kind == RecordingKind::kGif ? 25 : 50;
@@ -115,7 +115,7 @@ int64_t Record(View& view, const RecordConfig& config, const std::function<bool(
   Offscreen offscreen(config.size);
   for (int64_t i = 0; i < frames; ++i) {
     const double seconds = alone ? config.seconds : static_cast<double>(i) * step;
-    // Rounded, as a control step's own time must find its own row.
+    // Rounded, so that the time of a control step finds its own row.
     const double steps = std::round(seconds / kControlPeriod * 1e6) / 1e6;
     for (Episode& episode : view.episodes()) {
       while (static_cast<double>(episode.steps()) <= steps) episode.Step();

@@ -12,36 +12,36 @@
 #include "mujoco/offscreen.h"
 #include "mujoco/painter.h"
 
-/// Policies at work, to be looked at: in a window or as a recording. What is shown are the states
-/// of the same episodes as `simulate` writes.
+/// Displays policies at work, in a window or as a recording. It shows the states of the same
+/// episodes that `simulate` writes.
 namespace upswing {
 
-/// What a picture shows beside the pendulums.
+/// Parts of a picture that can be switched off.
 struct ViewLook {
   Camera camera;
   bool text = true;   // names, time, torque
   bool marks = true;  // torque, goal and the tip's path
 };
 
-/// Episodes side by side in one picture.
+/// Episodes next to each other in one picture.
 class View {
  public:
-  /// `entries` are not empty; those that stand in the picture have its `size`.
+  /// `entries` must not be empty. The picture with all of them has `size`.
   View(const std::vector<RolloutConfig>& entries, const ViewLook& look, PictureSize size);
 
   std::vector<Episode>& episodes() { return episodes_; }
 
-  /// What the picture shows after so many control steps, which were made before. The panels refer
-  /// to this object's scenes.
+  /// The panels of the picture after `steps` control steps, which must already be computed. The
+  /// panels refer to this object's scenes.
   std::span<const ScenePanel> At(double steps);
 
-  /// Shows this episode alone; -1: all. Moves the cameras back to where they began.
+  /// Shows only this episode; -1: all. Resets the cameras.
   void Show(int index, PictureSize size);
   int shown() const { return shown_; }
-  /// What the torques are with which the hands pull, about the joints of an episode.
+  /// Torques of the mouse that pulls at an episode's links, about its joints, N·m.
   std::array<double, 2> PullTorques(size_t index) { return scenes_[index]->PullTorques(); }
   std::vector<std::unique_ptr<PendulumScene>>& scenes() { return scenes_; }
-  /// Gives an episode another policy or plant, from its present state on.
+  /// Gives an episode another policy or plant; the new episode starts in the entry's state.
   void Replace(size_t index, RolloutConfig entry);
   ViewLook& look() { return look_; }
 
@@ -57,17 +57,17 @@ class View {
   bool small_ = false;
 };
 
-/// How a recording is made.
+/// Settings of a recording.
 struct RecordConfig {
   std::string path;     // see RecordingKindOf
   double seconds = 10;  // of the episode
-  double fps = -1;      // frames a second of the film; negative: 50, of a GIF 25
-  double speed = 1;     // how much faster than the pendulum it is
+  double fps = -1;      // film's frames per second; negative: 50, for a GIF 25
+  double speed = 1;     // speed of the film relative to the pendulum
   PictureSize size;
 };
 
-/// Records; `stopped` is asked after each frame and ends it without a file. `progress` counts
-/// frames. Returns the number of frames; 0 if it was stopped.
+/// Records a film or picture. Checks `stopped` after each frame; if it is true, ends without a
+/// file. `progress` counts frames. Returns the number of frames; 0 if it was stopped.
 int64_t Record(View& view, const RecordConfig& config, const std::function<bool()>& stopped,
                const Progress& progress);
 

@@ -19,11 +19,11 @@ using Clock = std::chrono::steady_clock;
 using Lines = std::vector<std::array<std::string, 2>>;
 
 constexpr double kSlowest = 1.0 / 64, kFastest = 8;
-constexpr double kMostLag = 0.1;           // s of real time that are made up for in one picture
-constexpr double kPictureTime = 1.0 / 60;  // s, at least
+constexpr double kMostLag = 0.1;           // most real time to catch up in one picture, s
+constexpr double kPictureTime = 1.0 / 60;  // shortest time of a picture, s
 constexpr int kChartPoints = 250;
 
-/// The keys, as F1 shows them.
+/// The keys, listed by F1.
 const Lines& Help() {
   static const Lines help{{"Space", "pause, continue"},
                           {"Right, Left arrow", "step forward, step back"},
@@ -49,7 +49,7 @@ const Lines& Help() {
   return help;
 }
 
-/// The window at work: a clock, keys, and what they change.
+/// The running window: a clock, keys, and the state that they change.
 class Session {
  public:
   explicit Session(const WindowConfig& config)
@@ -72,7 +72,7 @@ class Session {
       for (const Key& key : window_.TakeEvents()) Press(key);
       if (!paused_) Advance(std::min(passed, kMostLag) * speed_ / kControlPeriod);
       Draw();
-      // Where nothing waits for the screen.
+      // Limit the rate where drawing does not wait for the screen.
       std::this_thread::sleep_until(now + std::chrono::duration<double>(kPictureTime));
     }
     return view_.episodes().front().rollout();
@@ -81,10 +81,10 @@ class Session {
  private:
   static constexpr std::array<double, 2> kNoPush{};
 
-  /// Whether its physics know of pushes.
+  /// Whether the episode's physics supports pushes.
   static bool CanPush(const Episode& episode) { return episode.config().env.engine == &kMuJoCo; }
 
-  /// Moves the shown time on by so many control steps.
+  /// Advances the shown time by `steps` control steps.
   void Advance(double steps) {
     double most = 1e18;
     if (config_.seconds >= 0) most = std::round(config_.seconds / kControlPeriod);
@@ -104,7 +104,7 @@ class Session {
     if (shown_ >= most) closed_ = true;
   }
 
-  /// Shows the end of what was made, from where single steps begin.
+  /// Jumps to the last computed step, where single steps begin.
   void Settle() { shown_ = static_cast<double>(view_.episodes().front().steps()); }
 
   void StepBack() {
@@ -123,7 +123,7 @@ class Session {
     shown_ = 0;
   }
 
-  /// Goes on from the present states with other entries.
+  /// Continues from the present states with changed entries.
   template <typename Change>
   void ChangeEntries(const Change& change) {
     Settle();
@@ -138,7 +138,7 @@ class Session {
     shown_ = 0;
   }
 
-  /// The policy of another entry, on this entry's plant.
+  /// Uses the policy of another entry on this entry's plant.
   void TakeOver(size_t number) {
     if (number >= config_.entries.size()) return;
     ChangeEntries([&](RolloutConfig& entry, int i) {
@@ -153,7 +153,7 @@ class Session {
     Notice(Concat("policy: ", config_.entries[number].title));
   }
 
-  /// The next plant of the list; after the last one a random plant within ±25%.
+  /// Switches to the next plant of the list; after the last one, to a random plant within ±25%.
   void NextPlant() {
     plant_ = (plant_ + 1) % (config_.plants.size() + 1);
     Plant plant;
@@ -226,7 +226,7 @@ class Session {
     }
   }
 
-  /// One episode alone, then the next, then all of them.
+  /// Shows the next single episode; after the last one, all of them.
   void ShowNext(int direction) {
     const auto count = static_cast<int>(view_.episodes().size());
     if (count == 1) return;
@@ -234,7 +234,7 @@ class Session {
     view_.Show(next, window_.size());
   }
 
-  /// Overlays and MuJoCo's own options of drawing.
+  /// Toggles an overlay or one of MuJoCo's drawing options.
   void Toggle(int code) {
     if (code >= Key::kF1 && code <= Key::kF3) {
       bool& overlay = overlays_.at(static_cast<size_t>(code - Key::kF1));
@@ -255,14 +255,14 @@ class Session {
     }
   }
 
-  /// A word about what happened, for a while.
+  /// Shows a short message for a while.
   void Notice(const std::string& text) {
     notice_ = text;
     notice_end_ = Clock::now() + std::chrono::seconds(3);
   }
 
   void Draw() {
-    view_.look().text = config_.look.text && !overlays_[0];  // help stands in their place
+    view_.look().text = config_.look.text && !overlays_[0];  // help uses the same place
     const std::span<const ScenePanel> panels = view_.At(shown_);
     std::vector<Overlay> overlays;
     if (overlays_[0]) overlays.push_back({mjGRID_TOPLEFT, Help()});
@@ -285,7 +285,7 @@ class Session {
 
   size_t Shown() const { return view_.shown() < 0 ? 0 : static_cast<size_t>(view_.shown()); }
 
-  /// What F2 shows of the first of the shown.
+  /// The lines of F2 about the first shown episode.
   Lines Information() {
     const Episode& episode = view_.episodes()[Shown()];
     const PendulumState s = episode.StateAt(shown_);
@@ -321,7 +321,7 @@ class Session {
     chart_.gridsize[1] = 3;
   }
 
-  /// The torques of the last seconds of all that are shown.
+  /// Fills the chart with the last seconds of all shown torques.
   void FillChart() {
     const auto last = static_cast<int64_t>(std::floor(shown_));
     const int64_t first = std::max<int64_t>(0, last - kChartPoints);
@@ -356,7 +356,7 @@ class Session {
   Window window_;
   double speed_;
   Rng plant_rng_;
-  double shown_ = 0;  // control steps from the beginning, with a fraction
+  double shown_ = 0;  // control steps from the start, with a fraction
   bool paused_ = false, motor_ = true, closed_ = false;
   size_t plant_ = 0;
   std::array<bool, 3> overlays_{};  // F1 to F3
@@ -368,7 +368,7 @@ class Session {
 }  // namespace
 
 Rollout ShowWindow(const WindowConfig& config) {
-  // On the heap: MuJoCo's chart is large.
+  // On the heap, because MuJoCo's chart is large.
   return std::make_unique<Session>(config)->Run();
 }
 

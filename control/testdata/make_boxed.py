@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Writes boxed.json: linear-quadratic problems with a limited torque, solved by SciPy, for our tests.
+"""Writes boxed.json, test data: linear-quadratic problems with a limited torque, solved by SciPy.
 
     build/scipy/bin/python control/testdata/make_boxed.py > control/testdata/boxed.json
 
-(build/scipy: see make_riccati.py.) The least of Σ x' Q x + R u² + x_T' P x_T over |u| ≤ limit is a
-bounded least-squares problem in the torques, which SciPy solves by an active-set method (BVLS).
+(make_riccati.py explains build/scipy.) Minimising Σ x' Q x + R u² + x_T' P x_T over |u| ≤ limit is
+a bounded least-squares problem in the torques. SciPy solves it by an active-set method (BVLS).
 """
 
 import json
@@ -21,7 +21,7 @@ STEPS = 40
 def solve(x0, limit, Q, R):
     A, B = pendulum()
     P = solve_discrete_are(A, B, Q, [[R]])
-    # x_t = A^t x0 + Σ A^(t-1-s) B u_s; each term of the cost is the square of a row.
+    # x_t = A^t x0 + Σ A^(t-1-s) B u_s; the square of each row is one term of the cost.
     roots = [np.linalg.cholesky(Q).T] * STEPS + [np.linalg.cholesky(P).T]
     rows, rest = [], []
     free, responses = np.array(x0), np.zeros((4, STEPS))
@@ -40,7 +40,7 @@ def solve(x0, limit, Q, R):
 
 def main():
     Q = np.diag([10.0, 10.0, 1.0, 1.0])
-    # So small that the pendulum is linear to about 1e-8 of itself.
+    # Deviations so small that the pendulum is linear to about 1e-8 of them.
     cases = [solve(x0, limit, Q, 1.0)
              for x0 in ([1e-5, 0, 0, 0], [0, 2e-5, 0, 0], [1e-5, -1e-5, 3e-5, 0], [0, 1e-5, 0, -8e-5])
              for limit in (1, 6e-4, 3e-4)]

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Writes riccati.json: solutions by SciPy of discrete algebraic Riccati equations, for our tests.
+"""Writes riccati.json, test data: SciPy's solutions of discrete algebraic Riccati equations.
 
     python3 -m venv build/scipy
     build/scipy/bin/pip install numpy==2.4.6 scipy==1.17.1
     build/scipy/bin/python control/testdata/make_riccati.py > control/testdata/riccati.json
 
-The tests need nothing but the file. SciPy solves by the QZ algorithm, not by doubling; its P are off by
-at most 2e-10 of their norm (against the same in 60 digits with mpmath). The model of the pendulum is
-written down here once more, in absolute angles, and held exactly over 0.02 s.
+The tests need only the file. SciPy solves by the QZ algorithm, not by doubling. Its P are off by at
+most 2e-10 of their norm, compared with mpmath in 60 digits. This script derives the pendulum's
+model a second time, in absolute angles, with the torque held exactly over 0.02 s.
 """
 
 import json
@@ -22,7 +22,7 @@ NOMINAL = {"mass1": 1.0, "mass2": 1.0, "length1": 0.5, "length2": 0.5,
 
 
 def capsule_inertia(m, l):
-    """Across the axis, about the centre (kg·m²)."""
+    """Moment of inertia across the axis, about the centre (kg·m²)."""
     cylinder, ball = RADIUS**2 * l, 4 / 3 * RADIUS**3
     mc, mb = m * cylinder / (cylinder + ball), m * ball / (cylinder + ball)
     half = mb / 2 * (83 / 320 * RADIUS**2 + (l / 2 + 3 / 8 * RADIUS)**2)

@@ -1,5 +1,5 @@
-// A policy file in one's own control loop: reads a line `q1 q2 w1 w2` (rad, rad/s) from standard
-// input every 0.02 s, and answers with the torque (N·m) to hold until the next.
+// Runs a policy file in your own control loop. Reads a line `q1 q2 w1 w2` (rad, rad/s) from
+// standard input every 0.02 s, and answers with the torque (N·m) to hold until the next line.
 //
 //     control_loop policy.safetensors <measurements >torques
 #include <cstdio>
@@ -28,7 +28,7 @@ int main(int argc, char** argv) try {
     const auto obs = Observe(loaded.plant, s);
     double torque = 0;
     policy.Act({obs.data(), 1, policy.obs_size()}, {&torque, 1, 1}, *memory);
-    std::cout << FormatNumber(torque) << std::endl;  // at once: the motor waits for it
+    std::cout << FormatNumber(torque) << std::endl;  // flush: the motor waits for it
   }
   if (!std::cin.eof()) throw BadInput("expected four numbers in a line: q1 q2 w1 w2");
 } catch (const Error& error) {

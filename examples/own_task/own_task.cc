@@ -1,5 +1,5 @@
-// A task of one's own, learned with DQN by the layers core, nn and rl alone: a cart on a rail that
-// must be brought to the middle and held there.
+// Your own task, learned with DQN using only the layers core, nn and rl: move a cart on a rail to
+// the middle and hold it there.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -16,11 +16,11 @@
 using namespace upswing;
 
 /// N carts of 1 kg, each with position x (m), velocity v (m/s) and a motor of ±1 N. An episode
-/// begins anywhere within ±1 m, at rest, and is cut after 8 s; a cart that leaves ±2 m has crashed.
-/// The reward of a step is 1 - |x|, less 0.1 v²; a crash costs 20.
+/// begins anywhere within ±1 m, at rest, and is truncated after 8 s. A cart that leaves ±2 m has
+/// crashed. The reward of a step is 1 - |x| - 0.1 v²; a crash costs 20.
 class CartEnv : public VectorEnv {
  public:
-  static constexpr double kStep = 0.1;             // s, for which a force is held
+  static constexpr double kStep = 0.1;             // s; a force is held for this time
   static constexpr int kEpisodeSteps = 80;         // 8 s
   static constexpr double kRail = 2, kGoal = 0.2;  // m
 
@@ -34,7 +34,7 @@ class CartEnv : public VectorEnv {
     spec_.term_names = {"position", "velocity", "crash"};
     spec_.state_names = {"x", "v"};
     spec_.state_units = {"m", "m/s"};
-    spec_.mirror_signs = {-1, -1};  // left and right are alike
+    spec_.mirror_signs = {-1, -1};  // left-right symmetry
     // Success: within kGoal of the middle throughout the last 4 of 8 s.
     spec_.evaluation = {.seconds = 8, .return_seconds = 8, .hold_seconds = 4};
     obs_.resize(2 * carts_.size());
@@ -119,7 +119,7 @@ class Printer : public TrainObserver {
 };
 
 int main() try {
-  DqnConfig dqn;  // defaults, but a small network that chooses from five forces
+  DqnConfig dqn;  // defaults, except a small network that chooses from five forces
   dqn.hidden = {32, 32};
   dqn.head = 16;
   dqn.levels = 5;

@@ -4,7 +4,7 @@
     ./upswing python examples/python/ppo.py --steps 2000000
 
 An environment resets in the step after the end of an episode (Gymnasium's NEXT_STEP, the default).
-That step is no transition; the loss leaves it out.
+That step is not a transition, and the loss leaves it out.
 """
 
 import argparse
@@ -24,7 +24,7 @@ REWARD_SCALE = 0.1
 
 
 class Agent(nn.Module):
-    """Actor and critic of two layers each; actions are in units of the torque's limit."""
+    """Actor and critic with two layers each; actions are in units of the torque limit."""
 
     def __init__(self, obs_size, action_size):
         super().__init__()
@@ -48,8 +48,8 @@ class Agent(nn.Module):
 
 
 def advantages_of(rewards, values, last_value, ends, resets):
-    """Generalised advantage estimates (T × N): episodes run out of time, so that their last value
-    counts; a step that only resets (`resets`) is no transition."""
+    """Generalised advantage estimates (T × N). Episodes end by time limit, so the value of the last
+    state counts. A step that only resets (`resets`) is not a transition."""
     advantages = torch.zeros_like(rewards)
     running = torch.zeros_like(last_value)
     for t in reversed(range(len(rewards))):
@@ -62,7 +62,7 @@ def advantages_of(rewards, values, last_value, ends, resets):
 
 
 def learn(agent, optimizer, batch):
-    """Some epochs of the clipped objective."""
+    """Runs some epochs on the clipped objective."""
     obs, actions, log_probs, advantages, returns = batch
     for _ in range(EPOCHS):
         for rows in torch.randperm(len(obs)).split(MINIBATCH):

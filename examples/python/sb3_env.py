@@ -1,4 +1,4 @@
-"""Our vector environment as one of Stable-Baselines3's, without a loop over environments."""
+"""Upswing's vector environment for Stable-Baselines3, without a loop over environments."""
 
 import gymnasium as gym
 import numpy as np
@@ -9,8 +9,8 @@ import upswing  # registers the environments  # noqa: F401  # pylint: disable=un
 
 
 class UpswingVecEnv(VecEnv):
-    """N double pendulums for Stable-Baselines3, which wants an ended episode's successor to be the
-    next one's start: Gymnasium's SAME_STEP.
+    """N double pendulums for Stable-Baselines3, which expects Gymnasium's SAME_STEP: the
+    observation after an episode's last step is the next episode's start.
 
     Args:
         num_envs: N
@@ -29,7 +29,7 @@ class UpswingVecEnv(VecEnv):
                          self.envs.single_action_space)
 
     def reset(self):
-        # Stable-Baselines3 gives each environment a seed of its own, or None.
+        # Stable-Baselines3 gives each environment its own seed, or None.
         seeds = list(self._seeds)
         obs, _ = self.envs.reset(seed=None if all(seed is None for seed in seeds) else seeds)
         self._reset_seeds()

@@ -3,12 +3,12 @@
 
     ./upswing python examples/python/sb3_sac.py --threads 1
 
-The settings are those of Upswing's agent sac-fast where SAC has them: one critic, three-step targets,
-layer normalisation, a decaying learning rate.
+The script uses the settings of Upswing's agent sac-fast that Stable-Baselines3's SAC supports:
+one critic, three-step targets, layer normalisation, a decaying learning rate.
 
-Every --eval-every steps, Upswing's `evaluate` evaluates the mean action as it does for its own agents:
-100 episodes of 20 s, first in closed form, then in MuJoCo if all succeed. Two passed evaluations in a
-row solve the task.
+Every --eval-every steps, Upswing's `evaluate` evaluates the mean action as for its own agents: 100
+episodes of 20 s, first in closed form, then in MuJoCo if all succeed. Two successive passed
+evaluations solve the task.
 """
 
 import argparse
@@ -30,7 +30,7 @@ class NormedReLU(torch.nn.Module):
 
 
 class Judge(BaseCallback):
-    """Evaluates now and then, and ends the training once the task is solved."""
+    """Evaluates at intervals, and ends the training once the task is solved."""
 
     def __init__(self, every):
         super().__init__()

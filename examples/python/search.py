@@ -21,7 +21,7 @@ SEEDS = (1, 2, 3)
 
 
 def worth(trial, agent, steps):
-    """What Optuna makes small."""
+    """The objective that Optuna minimises."""
     settings = {
         "learning_rate": trial.suggest_float("learning_rate", 3e-4, 1e-2, log=True),
         "gamma": 1 - trial.suggest_float("one_minus_gamma", 5e-3, 5e-2, log=True),
@@ -53,7 +53,7 @@ def study_of(a):
 
 
 def search(a):
-    """One process of the search."""
+    """Runs one process of the search."""
     study_of(a).optimize(lambda trial: worth(trial, a.agent, a.steps),
                          n_trials=-(-a.trials // a.processes))
 

@@ -1,4 +1,4 @@
-// Trains the agent `fast` on the double pendulum, in memory, and judges it on 100 new starts.
+// Trains the agent `fast` on the double pendulum, in memory, and evaluates it on 100 new starts.
 #include <cstdio>
 
 #include "core/error.h"
@@ -20,14 +20,14 @@ class Printer : public TrainObserver {
 };
 
 int main() try {
-  // Settings have the names of the program's flags: `upswing train --help`.
+  // Settings have the names of the flags in `upswing train --help`.
   Printer printer;
   Training training(BuildConfig("", {{"agent", "fast"}, {"seed", "1"}}), ThisHost(/*threads=*/2));
   training.AddObserver(printer);
   while (training.Step()) continue;
   std::printf("%s\n", training.state().solved ? "solved" : "not solved");
 
-  EnvConfig test;  // the double pendulum, hanging with a little noise
+  EnvConfig test;  // the double pendulum, hanging with little noise
   test.engine = &kMuJoCo;
   test.num_envs = 100;
   test.seed = 2;

@@ -18,21 +18,21 @@
 #include "judge/trial.h"
 #include "setup/loaded_policy.h"
 
-/// What the parts of the extension module share. The package's Python (python/upswing) wraps these
-/// classes and functions; nobody else calls them.
+/// Shared parts of the extension module. Only the package's Python code (python/upswing) uses its
+/// classes and functions.
 namespace upswing {
 
-/// Settings as Python gives them: name and text of each.
+/// Settings from Python: name and text of each.
 using SettingTexts = std::vector<std::pair<std::string, std::string>>;
 
-/// The same as flags: aliases first, so that what is more specific wins; messages begin with the
-/// name.
+/// Converts settings to flags. Aliases come first, so that a more specific setting wins; error
+/// messages begin with the name.
 std::vector<FlagValue> FlagsOf(const SettingTexts& settings);
 
-/// Whether a setting of a training is one of its environments too.
+/// Whether environments have this setting, not only trainings.
 bool IsEnvironmentSetting(const Option& option);
 
-/// Plant, sensors and motor that a policy is tried on.
+/// Plant, sensors and motor for trying a policy.
 struct TrialSurroundings {
   Plant plant;
   TrialConditions conditions;
@@ -43,7 +43,7 @@ struct TrialSurroundings {
   }
 };
 
-/// A new array of this shape, whose numbers are still to be set.
+/// A new array of this shape with uninitialised numbers.
 template <typename T>
 nanobind::ndarray<nanobind::numpy, T> NewArray(std::initializer_list<size_t> shape) {
   auto* numbers = new T[std::accumulate(shape.begin(), shape.end(), size_t{1}, std::multiplies())];
@@ -54,7 +54,7 @@ nanobind::ndarray<nanobind::numpy, T> NewArray(std::initializer_list<size_t> sha
 /// A plant's values by name.
 nanobind::dict PlantDict(const Plant& plant);
 
-/// A policy and memories to act with, one for each call that runs at a time.
+/// A policy with a pool of memories, one for each concurrent call.
 class PolicyHandle {
  public:
   explicit PolicyHandle(LoadedPolicy loaded) : loaded_(std::move(loaded)) {}
@@ -76,26 +76,26 @@ class PolicyHandle {
     std::unique_ptr<Policy::Memory> memory;
   };
   SizedMemory Take(int n);
-  /// For later calls, unless there are many.
+  /// Stores a memory for later calls, unless there are many already.
   void Keep(SizedMemory memory);
 
   LoadedPolicy loaded_;
   std::mutex mutex_;
-  std::vector<SizedMemory> free_;  // the longest unused first
+  std::vector<SizedMemory> free_;  // in order of last use, oldest first
 };
 
-/// A policy of the double pendulum that asks a Python function: observations (N × D, float32) →
-/// torques, N·m (N, or N × 1). Its observations remember `memory` steps.
+/// A policy of the double pendulum that calls a Python function: observations (N × D, float32) →
+/// torques, N·m (N, or N × 1). Its observations hold `memory` past steps.
 LoadedPolicy MakeFunctionPolicy(nanobind::callable function, int memory);
 
-/// Throws the Python exception of a signal that has come, such as that of Ctrl-C. Needs the
-/// interpreter's lock.
+/// Throws the Python exception of a pending signal, such as Ctrl-C. Needs the interpreter's lock.
 void CheckSignals();
 
-/// When long work is to let Python in: now and then, in the thread that made this alone.
+/// Tells when long work should give Python a turn: at intervals, and only in the thread that
+/// created this object.
 class Interrupts {
  public:
-  /// Whether this is that thread, and its last turn is a while ago.
+  /// Whether this is that thread and its last turn is long enough ago.
   bool due();
 
  private:
@@ -103,7 +103,7 @@ class Interrupts {
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
-// The parts, each with its classes and functions.
+// Functions that bind one part each, with its classes and functions.
 void BindErrors(nanobind::module_& m);
 void BindSettings(nanobind::module_& m);
 void BindEnvironments(nanobind::module_& m);

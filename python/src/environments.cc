@@ -1,4 +1,4 @@
-// Double pendulums behind Gymnasium's interface: actions in, arrays that view the results.
+// Double pendulums with Gymnasium's interface: takes actions, returns arrays that view the results.
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
@@ -35,7 +35,7 @@ using AnyArray = nb::ndarray<nb::ro, nb::device::cpu, nb::c_contig>;
 template <typename T>
 using View = nb::ndarray<nb::numpy, const T>;
 
-/// Number of torque levels; 0 for continuous actions. The names of the settings are PPO's.
+/// Number of torque levels; 0 for continuous actions. PPO's settings have the same names.
 int64_t LevelsOf(const std::string& actions, const std::string& levels) {
   PpoConfig config;
   const Options options = OptionsOf(config);
@@ -44,8 +44,8 @@ int64_t LevelsOf(const std::string& actions, const std::string& levels) {
   return config.discrete() ? config.levels : 0;
 }
 
-/// Settings of `num_envs` environments: the settings of the named agent (or of the default one)
-/// with these changes. Throws BadInput for settings that environments do not have.
+/// Settings of `num_envs` environments: those of the named or default agent with these changes.
+/// Throws BadInput for settings that environments do not have.
 Config ConfigOf(const std::string& num_envs, const SettingTexts& settings) {
   std::vector<FlagValue> flags = FlagsOf(settings);
   flags.push_back({"envs", num_envs, "num_envs"});
@@ -73,12 +73,12 @@ PendulumEnvConfig EnvConfigOf(const Config& config, ThreadPool& pool) {
   return environments;
 }
 
-/// N environments stepped together. Calls from several threads wait for each other. Results stay
-/// where they are, so that arrays can view them. Letters as in core/env.h; L torque levels.
+/// N environments stepped together. Concurrent calls wait for each other. Results stay at the same
+/// address, so that arrays can view them. Letters as in core/env.h; L torque levels.
 class Environments {
  public:
-  /// `same_step`: where an episode has ended, another one begins at once; else the next step begins
-  /// it and ignores the action (Gymnasium's AutoresetMode). Throws BadInput.
+  /// `same_step`: the next episode begins in the step that ends an episode; else the following step
+  /// begins it and ignores the action (Gymnasium's AutoresetMode). Throws BadInput.
   Environments(const std::string& num_envs, const SettingTexts& settings,
                const std::string& actions, const std::string& levels, bool same_step)
       : config_(ConfigOf(num_envs, settings)),
@@ -96,15 +96,15 @@ class Environments {
   const Config& config() const { return config_; }
   const std::vector<double>& levels() const { return levels_; }
   int threads() const { return pool_.threads(); }
-  /// What came of the last step; `next_obs` has the successors, also of finished episodes.
+  /// Results of the last step; `next_obs` has the successors, even in ended episodes.
   const StepResult& result() const { return result_; }
-  /// What to act on (N, D).
+  /// The observations to act on (N, D).
   std::span<const float> obs() const {
     return same_step_ ? env_.obs().values() : std::span<const float>(result_.next_obs);
   }
 
-  /// One step under actions: torques (N × A, N·m), or which of the levels (N), of a type that
-  /// Python may have.
+  /// Makes one step with actions: torques (N × A, N·m), or indices of levels (N), in any of the
+  /// number types of AnyArray.
   void Step(const AnyArray& action) {
     CheckShape(action);
     Alone([&] {
@@ -113,7 +113,7 @@ class Environments {
       } else {
         action.dtype() == nb::dtype<int32_t>() ? Take<int32_t>(action) : Take<int64_t>(action);
       }
-      // An environment whose episode has ended is at the start of another one already.
+      // An environment with an ended episode is already at the start of the next one.
       for (const int env : ended_) env_.Hold(env);
       env_.Step(actions_, result_);
       ended_.clear();
@@ -123,24 +123,24 @@ class Environments {
     });
   }
 
-  /// Begins an episode of each environment for which `mask` (N) is not 0. Those with a seed (N)
-  /// have the episodes of a first environment with that seed from then on.
+  /// Begins an episode in each environment with a nonzero `mask` (N). An environment with a seed
+  /// (N) has the episodes of a first environment with this seed from then on.
   void Reset(const std::vector<std::optional<uint64_t>>& seeds, const std::vector<uint8_t>& mask) {
     Alone([&] {
       for (size_t i = 0; i < mask.size(); ++i) {
         if (mask[i] == 0) continue;
         const int env = static_cast<int>(i);
-        // After an end the next episode has already begun, unseen.
+        // The environment has already begun the next episode, which Python has not seen yet.
         const bool begun = std::erase(ended_, env) > 0;
         if (!begun || seeds[i]) env_.Restart(env, seeds[i]);
-        result_.torque[i] = 0;  // none acts yet
+        result_.torque[i] = 0;  // no torque acts yet
         ShowStart(env);
       }
     });
   }
 
-  /// A picture of an environment's current state and last torque: a new array (height × width × 3),
-  /// red, green, blue, top row first.
+  /// Draws an environment's current state and last torque: a new array (height × width × 3), red,
+  /// green, blue, top row first.
   nb::ndarray<nb::numpy, uint8_t> Draw(int env, int width, int height) {
     auto pixels = NewArray<uint8_t>({static_cast<size_t>(height), static_cast<size_t>(width), 3});
     Alone([&] {
@@ -178,7 +178,7 @@ class Environments {
   }
 
  private:
-  /// Does `work` without the interpreter's lock, when no other call is at work.
+  /// Runs `work` without the interpreter's lock once no other call is running.
   template <typename Work>
   auto Alone(const Work& work) -> decltype(work()) {
     const nb::gil_scoped_release unlocked;
@@ -186,7 +186,7 @@ class Environments {
     return work();
   }
 
-  /// Throws BadInput unless there is an action for each environment.
+  /// Throws BadInput unless the shape has an action for each environment.
   void CheckShape(const AnyArray& action) const {
     const auto n = static_cast<size_t>(spec().num_envs);
     const bool torques = levels_.empty();
@@ -199,7 +199,7 @@ class Environments {
                           "), got (", Join(shape, ", "), action.ndim() == 1 ? ",)" : ")"));
   }
 
-  /// Sets actions_ from an array of this type. Throws BadInput.
+  /// Sets actions_ from an array of type Number. Throws BadInput.
   template <typename Number>
   void Take(const AnyArray& action) {
     const auto* numbers = static_cast<const Number*>(action.data());
@@ -214,7 +214,7 @@ class Environments {
         }
         actions_[i] = numbers[i];
       } else {
-        const auto level = static_cast<size_t>(numbers[i]);  // of a negative number: a large one
+        const auto level = static_cast<size_t>(numbers[i]);  // negative becomes large
         if (level >= levels_.size()) {
           throw wrong(i, Concat("a torque level from 0 to ", levels_.size() - 1), numbers[i]);
         }
@@ -223,7 +223,7 @@ class Environments {
     }
   }
 
-  /// Lets the present observation of an environment be that of the last step.
+  /// Makes the present observation of an environment the result of the last step.
   void ShowStart(int env) {
     const auto obs = env_.obs();
     const Matrix<float> shown(result_.next_obs, obs.rows(), obs.cols());
@@ -237,13 +237,13 @@ class Environments {
   std::vector<double> levels_;   // (L) N·m; empty: any torque
   std::vector<double> actions_;  // (N) N·m
   StepResult result_;
-  std::vector<int> ended_;  // environments whose next step begins another episode
+  std::vector<int> ended_;  // their next step begins an episode
   std::optional<Offscreen> offscreen_;
-  std::optional<PendulumScene> scene_;  // drawn last
+  std::optional<PendulumScene> scene_;  // of the last picture
   std::mutex mutex_;
 };
 
-/// An array (N × anything, or N) that views numbers of the environments.
+/// An array (N × anything, or N) that views the environments' numbers.
 template <typename T>
 View<T> ViewOf(const Environments& self, std::span<const T> values, bool matrix) {
   const auto n = static_cast<size_t>(self.spec().num_envs);
@@ -251,7 +251,8 @@ View<T> ViewOf(const Environments& self, std::span<const T> values, bool matrix)
   return {values.data(), matrix ? size_t{2} : size_t{1}, shape.data()};
 }
 
-/// A property that views a table of the last step's results, which lives as long as the array.
+/// A property that views a table of the last step's results. The environments live as long as the
+/// array.
 template <typename T>
 void AddView(nb::class_<Environments>& c, const char* name, std::vector<T> StepResult::*table,
              bool matrix) {

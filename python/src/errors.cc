@@ -1,4 +1,4 @@
-// Errors of the library as Python exceptions, and signals during long work.
+// Converts the library's errors to Python exceptions, and handles signals during long work.
 #include <algorithm>
 #include <regex>
 
@@ -11,7 +11,7 @@ namespace {
 
 namespace nb = nanobind;
 
-/// The exceptions' classes, which live as long as the interpreter.
+/// Classes of the exceptions; they live as long as the interpreter.
 PyObject* error_class = nullptr;
 PyObject* input_error_class = nullptr;
 PyObject* failure_class = nullptr;
@@ -24,7 +24,7 @@ PyObject* MakeClass(nb::module_& m, const char* name, const char* doc, PyObject*
   return made;
 }
 
-/// The message with Python's names: a flag at its beginning is an argument here.
+/// The message with Python's names: a flag at its beginning becomes an argument.
 std::string PythonMessage(const std::string& message) {
   static const std::regex kFlag("^--(set )?([a-z0-9-]+)");
   std::smatch match;

@@ -20,12 +20,12 @@ namespace {
 
 namespace nb = nanobind;
 
-/// Sets the arguments of a function of the package, given as name and text.
+/// Sets the arguments of a package function, each given as name and text.
 void SetArguments(const Options& options, const SettingTexts& arguments) {
   for (const auto& [name, text] : arguments) options.Set(name, text, name);
 }
 
-/// Sets what the flags say of the surroundings. Throws BadInput.
+/// Applies the flags to the trial's plant and conditions. Throws BadInput.
 void SetSurroundings(const std::vector<FlagValue>& flags, TrialArguments& trial) {
   TrialSurroundings scratch;
   const Options options = OptionsOf(scratch), plant = OptionsOf(scratch.plant);
@@ -38,13 +38,13 @@ void SetSurroundings(const std::vector<FlagValue>& flags, TrialArguments& trial)
   }
 }
 
-/// A Progress that calls a Python function, unless it is None, with the share that is done. Ctrl-C
-/// ends the work.
+/// A Progress that calls a Python function, if it is not None, with the finished share. Ctrl-C ends
+/// the work.
 class PythonProgress {
  public:
   explicit PythonProgress(nb::object function) : function_(std::move(function)) {}
 
-  /// Python is called in the caller's thread only.
+  /// Calls Python only in the caller's thread.
   void operator()(double done, double total) {
     if (!interrupts_.due()) return;
     const nb::gil_scoped_acquire lock;
@@ -57,7 +57,7 @@ class PythonProgress {
   Interrupts interrupts_;
 };
 
-/// Figures as JSON, and a table of the episodes as CSV.
+/// Evaluates a policy. Returns the figures as JSON and the episodes as CSV.
 std::pair<std::string, std::string> EvaluateHandle(const PolicyHandle& policy,
                                                    const SettingTexts& settings,
                                                    const SettingTexts& arguments,

@@ -1,4 +1,4 @@
-// Policies for Python: of files, of controllers, and of Python functions.
+// Policies for Python: from files, controllers and Python functions.
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/map.h>
 #include <nanobind/stl/optional.h>
@@ -29,7 +29,7 @@ using Observations = nb::ndarray<const float, nb::ndim<2>, nb::c_contig, nb::dev
 template <typename T>
 using Numbers = nb::ndarray<T, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
-/// Observations (N × D) for a policy. Throws BadInput.
+/// Checks observations (N × D) for a policy. Throws BadInput.
 Matrix<const float> Checked(const Observations& obs, const Policy& policy) {
   const auto D = static_cast<size_t>(policy.obs_size());
   if (obs.shape(1) != D) {
@@ -77,7 +77,7 @@ std::vector<double> ValueActions(const PolicyHandle& self) {
   return {actions.data(), actions.data() + actions.size()};
 }
 
-/// What its file says of it; None where it says nothing.
+/// The metadata of the policy's file; None if it lacks a value.
 nb::dict DescribeInfo(const PolicyHandle& self) {
   const PolicyInfo& info = self.policy().info();
   nb::dict d;

@@ -1,4 +1,4 @@
-// Settings: the same names, ranges and messages as everywhere.
+// Settings for Python, with the names, ranges and messages of the program.
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
@@ -60,7 +60,7 @@ nb::list Describe(const Options& options) {
   return list;
 }
 
-/// Names that stand for several settings.
+/// Aliases, each a name for several settings.
 nb::list Aliases(const Options& options) {
   nb::list list;
   for (const auto& alias : options.aliases()) {
@@ -74,14 +74,14 @@ nb::list Aliases(const Options& options) {
   return list;
 }
 
-/// Settings and aliases of a training by this agent.
+/// Settings and aliases of an agent's training.
 nb::tuple SettingsOfTraining(const std::string& agent) {
   Config config = BuildConfig("", {{"agent", agent, "agent"}});
   const Options options = OptionsOf(config);
   return nb::make_tuple(Describe(options), Aliases(options));
 }
 
-/// Settings and aliases of what a policy is tried on.
+/// Settings and aliases of a trial.
 nb::tuple SettingsOfTrial() {
   TrialSurroundings surroundings;
   const Options options = OptionsOf(surroundings);

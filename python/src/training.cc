@@ -1,4 +1,4 @@
-// Trainings driven from Python, in a run folder or in memory.
+// Trainings controlled from Python, in a run folder or in memory.
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
@@ -27,7 +27,7 @@ namespace nb = nanobind;
 
 using PolicyPointer = std::shared_ptr<PolicyHandle>;
 
-/// A row of a table as a dictionary; what counts is an int, and `terminated` a bool.
+/// A table row as a dictionary; counters become int, and `terminated` becomes bool.
 nb::dict ToDict(const Row& row) {
   constexpr std::array<std::string_view, 4> kCounts{"step", "episode", "episodes", "length"};
   nb::dict d;
@@ -43,21 +43,21 @@ nb::dict ToDict(const Row& row) {
   return d;
 }
 
-/// A policy of its own with the contents of another one, as its file would have it.
+/// A separate copy of a policy, as its file would store it.
 PolicyPointer CopyOf(const Policy& policy, const std::string& name) {
   LoadedPolicy loaded =
       ReadPolicy(ReadSafetensors(WriteSafetensors(policy.ToTensors()).Joined(), name));
   return std::make_shared<PolicyHandle>(std::move(loaded));
 }
 
-/// Tells Python's `tick` of a training: after a step at which something was due, and every tenth of
-/// a second. It returns False to stop the training.
+/// Calls Python's `tick` during a training: after a step with events, and every tenth of a second.
+/// The training stops if it returns False.
 class PythonDriver final : public TrainObserver {
  public:
   explicit PythonDriver(nb::callable tick) : tick_(std::move(tick)) {}
 
   void Begin(const Training& training) { training_ = &training; }
-  /// What an exception in Python stopped the training.
+  /// The exception in Python that stopped the training.
   std::exception_ptr error() const { return error_; }
   const PolicyPointer& best() const { return best_; }
 
@@ -82,7 +82,7 @@ class PythonDriver final : public TrainObserver {
     last_ = now;
     try {
       return Tell() ? TrainRequest::kGoOn : TrainRequest::kStop;
-    } catch (...) {  // the training is to end in order, with its checkpoint
+    } catch (...) {  // the training must end in order, with its checkpoint
       error_ = std::current_exception();
       return TrainRequest::kStop;
     }
@@ -117,7 +117,7 @@ class PythonDriver final : public TrainObserver {
   std::chrono::steady_clock::time_point last_{};
 };
 
-/// What is left of a training.
+/// The result of a training.
 nb::dict ResultOf(const Training& training, bool finished, const std::string& path,
                   const PolicyPointer& last, const PolicyPointer& best) {
   const TrainState& s = training.state();
@@ -143,9 +143,9 @@ nb::dict ResultOf(const Training& training, bool finished, const std::string& pa
   return d;
 }
 
-/// A training that begins or is resumed, without Python.
+/// A new or resumed training that needs no Python.
 struct Driven {
-  std::unique_ptr<TrainingRun> run;    // in a folder, or
+  std::unique_ptr<TrainingRun> run;    // in a folder, or else
   std::unique_ptr<Training> training;  // in memory
   bool finished = false;
 
@@ -163,7 +163,7 @@ struct Driven {
   }
 };
 
-/// `about` hears of the settings before anything is written.
+/// Makes the training. Calls `about` with the settings before anything is written.
 Driven Make(const std::vector<FlagValue>& flags, const std::string& config_file,
             const std::string& out, const std::string& resume,
             const std::function<void(const Config&)>& about) {
@@ -202,7 +202,7 @@ nb::dict Train(const SettingTexts& settings, const std::string& config, const st
     if (driver.error()) std::rethrow_exception(driver.error());
     last = CopyOf(*driven.its().policy(), "the last policy of this training");
     best = driver.best();
-    // A run that was resumed may have its best policy from before.
+    // A resumed run may have its best policy from an earlier part.
     if (!best && driven.run && driven.its().state().best_step > 0) {
       best = std::make_shared<PolicyHandle>(LoadPolicy(driven.run->path()));
     }

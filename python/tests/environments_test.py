@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""One environment: Gymnasium's own checks, the task as the program has it, bad input."""
+"""Tests of a single environment: Gymnasium's own checks, agreement with the program, bad input."""
 
 import csv
 import io
@@ -43,7 +43,8 @@ class Environments(unittest.TestCase):
             with self.subTest(settings), warnings.catch_warnings(record=True) as caught:
                 warnings.simplefilter("always")
                 check_env(gym.make(ID, **settings).unwrapped, skip_render_check=True)
-                # What is said of spaces is so on purpose: torques in N·m, velocities without bound.
+                # Gymnasium warns about spaces that are deliberate: torques in N·m, velocities
+                # without a bound.
                 said = [str(warning.message) for warning in caught]
                 self.assertEqual([text for text in said if "Box" not in text], [])
 
@@ -89,7 +90,8 @@ class Environments(unittest.TestCase):
             self.assertEqual(env.plant["mass2"], 1.2)
 
     def test_the_motor_is_at_either_joint(self):
-        # From hanging the torque moves most the joint that it acts on, and not both the same way.
+        # From hanging, a torque accelerates its own joint most, and the two joints in opposite
+        # directions.
         for joint, signs in ((1, [1, -1]), (2, [-1, 1])):
             env = gym.make(ID, actuated_joint=joint).unwrapped
             env.reset(seed=0, options={"state": [0, 0, 0, 0]})
@@ -187,9 +189,9 @@ class Rendering(unittest.TestCase):
     def test_pictures(self):
         hanging, upright = self.draw([0, 0, 0, 0]), self.draw([np.pi, 0, 0, 0])
         self.assertEqual((hanging.shape, hanging.dtype), ((480, 640, 3), np.uint8))
-        # Software that draws in several threads need not draw an edge twice the same.
+        # Software rendering with several threads may draw an edge differently each time.
         self.assertLess((hanging != self.draw([0, 0, 0, 0])).mean(), 0.001)
-        # The links are in the lower half when hanging and in the upper one when upright.
+        # The links are in the lower half when hanging and in the upper half when upright.
         changed = (hanging.astype(int) - upright).any(axis=2)
         self.assertGreater(changed[:240].sum(), 500)
         self.assertGreater(changed[240:].sum(), 500)
@@ -240,7 +242,7 @@ class BadInput(BadInputTest):
         for what, action in {"0 to 8, got 9": 9, "0 to 8, got -1": -1, "got float64": 2.0,
                              "got (1,)": [3]}.items():
             self.refuse(what, lambda action=action: env.step(action))
-        env.step(np.int8(8))  # of any integer type
+        env.step(np.int8(8))  # integers of any type are accepted
 
     def test_settings_as_the_program_has_them(self):
         for text, settings in {

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Evaluations and maps: the program's numbers, functions as policies, Ctrl-C, bad input."""
+"""Tests of evaluations and maps: the program's numbers, functions as policies, Ctrl-C, bad
+input."""
 
 import _thread
 import csv
@@ -74,7 +75,7 @@ class Evaluations(BadInputTest):
         many = upswing.evaluate("lqr", episodes=4100, **arguments).per_episode
         for name, column in upswing.evaluate("lqr", episodes=20, **arguments).per_episode.items():
             np.testing.assert_array_equal(many[name][:20], column)
-        self.assertEqual(len(set(many["q1"])), 4100)  # each has a start of its own
+        self.assertEqual(len(set(many["q1"])), 4100)  # every start is different
 
     def test_progress_and_exceptions(self):
         shares = []

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Policies: those of files act as the program does; broken and foreign files are refused."""
+"""Tests of policies: files act as in the program; broken and foreign files are refused."""
 
 import csv
 import hashlib

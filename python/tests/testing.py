@@ -1,4 +1,4 @@
-"""What the tests of the package share."""
+"""Helpers that the package's tests share."""
 
 import unittest
 
@@ -7,7 +7,7 @@ import upswing
 
 class BadInputTest(unittest.TestCase):
     def refuse(self, what, call, *arguments, **settings):
-        """Expects an InputError of one line that says `what`."""
+        """Asserts an InputError with a one-line message that contains `what`."""
         with self.assertRaises(upswing.InputError) as caught:
             call(*arguments, **settings)
         self.assertIn(what, str(caught.exception))

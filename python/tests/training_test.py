@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Trainings: the program's bits, callbacks, stopping, Ctrl-C, folders, bad input."""
+"""Tests of trainings: the program's bits, callbacks, stopping, Ctrl-C, folders, bad input."""
 
 import _thread
 import csv
@@ -97,7 +97,7 @@ class SameBits(InFolder):
         self.assertEqual(training.steps, 4000)
         self.assertEqual(sha(self.path / "part/policy.safetensors"),
                          sha(self.path / "whole/policy.safetensors"))
-        # Nothing is left to do; its best policy is from before.
+        # Nothing is left to train; the best policy is from the earlier part.
         again = upswing.train(resume=self.path / "part")
         again.best.save(self.path / "best")
         self.assertEqual(sha(self.path / "best"), sha(self.path / "whole/policy.safetensors"))
@@ -128,7 +128,7 @@ class Callbacks(InFolder):
             self.assertFalse(training.finished)
             self.assertEqual(training.steps, 1000)
             self.assertIsNone(training.best)
-        # A folder has a checkpoint of that step.
+        # The run folder has a checkpoint of step 4000.
         self.assertEqual(upswing.train(resume=self.path / "run").steps, 4000)
 
     def test_what_is_no_function_is_refused_at_once(self):
@@ -229,7 +229,7 @@ class BadInput(InFolder, BadInputTest):
             warnings.simplefilter("always")
             upswing.train("fast", **SMALL | {"learning_starts": 5000})
             warnings.simplefilter("error")
-            with self.assertRaises(UserWarning):  # before anything is written
+            with self.assertRaises(UserWarning):  # raised before anything is written
                 upswing.train("fast", out=self.path / "run", **SMALL | {"learning_starts": 5000})
         self.assertFalse((self.path / "run").exists())
         self.assertEqual(len(caught), 1)

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Many environments: what Gymnasium's own tests ask of its vector environments, held against single
-ones in Gymnasium's SyncVectorEnv, and views, copies, threads."""
+"""Tests of many environments: Gymnasium's own tests of vector environments, comparison with single
+environments in Gymnasium's SyncVectorEnv, and views, copies, threads."""
 
 import gc
 import threading
@@ -35,7 +35,7 @@ class Vector(unittest.TestCase):
         for mode in (AutoresetMode.SAME_STEP, "SameStep"):
             self.assertEqual(make(autoreset_mode=mode).metadata["autoreset_mode"],
                              AutoresetMode.SAME_STEP)
-        # The class is as it was.
+        # The class itself is unchanged.
         self.assertEqual(upswing.DoublePendulumVectorEnv.metadata["autoreset_mode"],
                          AutoresetMode.NEXT_STEP)
 
@@ -52,14 +52,15 @@ class Vector(unittest.TestCase):
                 self.assertEqual((array.shape, array.dtype), ((5,), dtype))
 
     def against_gymnasium(self, mode, **settings):
-        """Steps as Gymnasium's own vector of single environments does, over several episodes."""
+        """Asserts the same steps as Gymnasium's own vector of single environments, over several
+        episodes."""
         ours = make(3, autoreset_mode=mode, **settings)
         kinds = {"physics": "closed-form"} | settings
         theirs = SyncVectorEnv([lambda: gym.make(ID, **kinds)] * 3, autoreset_mode=mode)
         np.testing.assert_array_equal(ours.reset(seed=11)[0], theirs.reset(seed=11)[0])
         ours.action_space.seed(3)
         for step in range(60):
-            if step == 25:  # one of the three begins anew, so that they are no longer in step
+            if step == 25:  # one of the three restarts, so they are out of step
                 mask = np.array([False, True, False])
                 a, b = (envs.reset(seed=[None, 5, None], options={"reset_mask": mask})[0]
                         for envs in (ours, theirs))
@@ -106,7 +107,7 @@ class Vector(unittest.TestCase):
         self.assertFalse(terminated.any())
         self.assertFalse(np.array_equal(start, last))
         np.testing.assert_array_equal(envs.torque, 0)
-        # The new episode has its whole time: five steps from its start on.
+        # The new episode has its full length: five steps from its start.
         ends = [envs.step(zero)[3].any() for _ in range(5)]
         self.assertEqual(ends, [False] * 4 + [True])
 
@@ -143,7 +144,7 @@ class Vector(unittest.TestCase):
         np.testing.assert_array_equal(again.reset()[0], b)
         np.testing.assert_array_equal(envs.reset(seed=[1, None, 3])[0][[0, 2]], a[[0, 2]])
         self.assertEqual(len(np.unique(a[:, 0])), 3)
-        # Without any seed they are drawn.
+        # Without a seed, starts are random.
         self.assertFalse(np.array_equal(make().reset()[0], make().reset()[0]))
         for seed in (-1, [1, 2], [1, -2, 3], 1.5, "abc", [0.5, 1, 2]):
             with self.assertRaises((upswing.InputError, gym.error.Error)):
@@ -184,7 +185,7 @@ class Vector(unittest.TestCase):
                 np.testing.assert_array_equal(obs, kept[k + 1])
                 self.assertTrue(np.shares_memory(obs, first))
                 self.assertFalse(obs.flags.writeable)
-            # A view outlives its environments.
+            # A view stays valid after its environments are gone.
             expected = obs.copy()
             del views, first
             gc.collect()
@@ -223,7 +224,8 @@ class Vector(unittest.TestCase):
         finally:
             stop.set()
             counter.join()
-        # Each step takes milliseconds; a thread that had to wait for ten of them would count ten.
+        # Each step takes milliseconds. A counter blocked by the ten steps would only reach about
+        # ten.
         self.assertGreater(during, 20)
 
     def test_calls_from_several_threads_wait_for_each_other(self):
@@ -265,7 +267,7 @@ class Vector(unittest.TestCase):
         envs = make(2)
         envs.reset(seed=0, options={"state": [np.pi, 0, 0, 0]})
         _, rewards, *_ = envs.step(np.full((2, 1), 100.0))
-        np.testing.assert_array_equal(envs.torque, 5)  # limited
+        np.testing.assert_array_equal(envs.torque, 5)  # cut at the limit
         self.assertTrue(envs.at_goal.all())
         np.testing.assert_allclose(sum(envs.reward_terms.values()), rewards)
         self.assertEqual(envs.plants[1]["length2"], 0.5)
@@ -295,7 +297,7 @@ class Vector(unittest.TestCase):
             with self.assertRaises(upswing.InputError) as caught:
                 envs.step(action)
             self.assertIn(what, str(caught.exception))
-        np.testing.assert_array_equal(envs.states, before)  # nothing has moved
+        np.testing.assert_array_equal(envs.states, before)  # unchanged
         levels = make(actions="levels")
         levels.reset(seed=0)
         with self.assertRaises(upswing.InputError) as caught:

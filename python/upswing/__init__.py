@@ -15,7 +15,7 @@ the work itself, such as writing to a full disk, raises `Failure`, a `RuntimeErr
 
 from gymnasium.envs.registration import register as _register
 
-from . import _mujoco as _mujoco  # loads MuJoCo's library for the next module
+from . import _mujoco as _mujoco  # loads MuJoCo's library, which the next module needs
 from ._upswing import Error, Failure, InputError
 from ._upswing import version as __version__
 from .envs import DoublePendulumEnv, DoublePendulumVectorEnv

@@ -8,7 +8,8 @@ LIBRARY = "libmujoco.so.4.0.0"
 
 
 def load() -> None:
-    """Loads the library of the package; without it, the extension module uses its build's library."""
+    """Loads the library of the package. Without it, the extension module uses the library of its
+    build."""
     # Finds the package without importing it.
     spec = importlib.util.find_spec("mujoco")
     for folder in (spec and spec.submodule_search_locations) or ():

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Writes trajectories of Gymnasium's Pendulum-v1 and Acrobot-v1 beside this file, as CSV.
+"""Writes trajectories of Gymnasium's Pendulum-v1 and Acrobot-v1 next to this file, as CSV.
 
     pip install gymnasium==1.4.0
     sim/testdata/make_gymnasium.py
 
-A row is one step: `run`, the state before it, the torque, what Gymnasium returned, the state after.
-States and rewards have all digits of a double, observations those of a float. The starts and the
-torques are made so that angles wrap, velocities reach their bounds and Acrobot reaches its goal.
+A row is one step: `run`, the state before it, the torque, Gymnasium's results, the state after.
+States and rewards have all digits of a double, observations all digits of a float. The starts and
+torques make angles wrap, velocities reach their bounds and Acrobot reach its goal.
 """
 
 import csv
@@ -21,36 +21,36 @@ PI = math.pi
 
 
 def random_torque(rng, limit):
-    """A random torque within the limit, chosen anew at each step."""
+    """A random torque within the limit, drawn at each step."""
     return lambda state, step: rng.uniform(-limit, limit)
 
 
 def extreme_torque(rng, limit):
-    """Either end of the limit at random, held for five steps."""
+    """The lower or the upper limit at random, held for five steps."""
     ends = rng.choice([-limit, limit], size=1000)
     return lambda state, step: ends[step // 5]
 
 
 def pumping_torque(limit, velocity):
-    """Along the velocity with this index in the state, so that the energy grows."""
+    """Full torque along the velocity with this index in the state, so that the energy grows."""
     return lambda state, step: math.copysign(limit, state[velocity])
 
 
 def pendulum_step(env, state, torque):
-    """One step of Pendulum-v1; the torque is a double, so that the reward is one, too."""
+    """One step of Pendulum-v1. The torque is a double, so that the reward is a double, too."""
     env.state = np.array(state)
     return env.step(np.array([torque]))
 
 
 def acrobot_step(env, state, torque):
-    """One step of Acrobot-v1 with any torque: the only action in the table of torques."""
+    """One step of Acrobot-v1 with any torque: it replaces the table of torques by one entry."""
     env.state = np.array(state)
     env.AVAIL_TORQUE = [torque]
     return env.step(0)
 
 
 def rollout(env, step, start, torque_of, steps):
-    """Rows of one run; it does not stop at the goal."""
+    """Rows of one run, which continues past the goal."""
     state = [float(x) for x in start]
     for number in range(steps):
         torque = float(torque_of(state, number))
@@ -61,7 +61,7 @@ def rollout(env, step, start, torque_of, steps):
 
 
 def write(name, step, variables, obs_size, runs):
-    """One file: `runs` are pairs of a start and a torque, `steps` rows each."""
+    """Writes one file: `runs` are pairs of a start and a torque, `steps` rows each."""
     env = gymnasium.make(name).unwrapped
     header = ["run", *variables, "torque", "reward", "terminated",
               *[f"next_{variable}" for variable in variables],

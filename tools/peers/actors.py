@@ -1,27 +1,27 @@
-"""SAC and PPO: what all sides train with, and our side of the comparison."""
+"""SAC and PPO: the common settings of all libraries, and Upswing's measurements."""
 
 import tempfile
 from pathlib import Path
 
 import ours
 
-# Pendulum-v1 is Gymnasium's; the double pendulum takes any torque up to its limit.
+# The tasks: Gymnasium's Pendulum-v1, and the double pendulum with any torque up to its limit.
 TASKS = {"pendulum-v1": {"limit": 2.0, "ppo_gamma": 0.9},
          "double-pendulum": {"limit": 5.0, "ppo_gamma": 0.99}}
 
 LEARNING_RATE = 1e-3
 REPLAY = 100_000
 
-# SAC: one environment, and one round (two critics, actor, temperature) after each step.
+# SAC uses one environment, and one round (two critics, actor, temperature) after each step.
 SAC_GAMMA = 0.99
 TAU = 0.005
-ALPHA = 0.5  # the temperature that learning begins with; it aims at an entropy of -1
+ALPHA = 0.5  # initial temperature; the target entropy is -1
 LEARNING_STARTS = 100  # steps before the first round, with random actions
 WARM_UP = 200  # rounds before the clock starts
 
-# PPO: rollouts of all environments, each learned from in a few passes.
+# PPO collects rollouts of all environments, and learns from each in a few passes.
 ENVS = 4
-HORIZON = 1024  # steps of each environment in a rollout
+HORIZON = 1024  # steps of each environment per rollout
 ROLLOUT = ENVS * HORIZON
 EPOCHS = 2
 LAMBDA = 0.95
@@ -29,24 +29,24 @@ CLIP = 0.2
 INITIAL_STD = 2.0  # of actions, in units of the limit
 MAX_GRADIENT_NORM = 0.5  # of Upswing and Stable-Baselines3
 
-# Settings of our task. Pendulum-v1 has none of them: those that our agents change are at their
-# defaults again.
+# Settings of our task. Pendulum-v1 lacks these settings; here, those that our agents change have
+# their defaults again.
 OUR_TASK = {"pendulum-v1": {"physics": "mujoco", "random-start-share": 0.5},
             "double-pendulum": {"physics": "mujoco", "episode-seconds": 10, "random-start-share": 0,
                                 "start-noise": 0.1, "start-noise-end": 0.1}}
 
-# What is trained for if nothing else is asked for.
+# Training settings if none are requested.
 DEFAULTS = {"sac": {"width": 64, "batch": 100, "steps": 20_000},
             "ppo": {"width": 64, "batch": 256, "steps": 300_000}}
 
 
 def unclocked_steps(what):
-    """How many steps are trained before the clock starts."""
+    """Number of steps before the clock starts."""
     return LEARNING_STARTS + WARM_UP if what == "sac" else ROLLOUT
 
 
 def all_steps(what, steps):
-    """The steps of a training: for PPO whole rollouts, at least two."""
+    """Total number of steps: for PPO whole rollouts, at least two."""
     if what == "ppo":
         steps = max(2 * ROLLOUT, steps - steps % ROLLOUT)
     if steps <= unclocked_steps(what):
@@ -56,7 +56,7 @@ def all_steps(what, steps):
 
 
 def sac_settings():
-    """Our SAC without what the others lack."""
+    """Our SAC without the features that the others lack."""
     return {"agent": "sac", "envs": 1, "updates-per-step": 1, "actor-period": 1, "n-step": 1,
             "gamma": SAC_GAMMA, "tau": TAU, "alpha": ALPHA, "alpha-rate": LEARNING_RATE,
             "target-entropy": -1, "bins": 0, "smoothness": 0, "replay": REPLAY,
@@ -64,7 +64,7 @@ def sac_settings():
 
 
 def ppo_settings(task):
-    """Our PPO without what the others lack."""
+    """Our PPO without the features that the others lack."""
     return {"agent": "ppo", "envs": ENVS, "horizon": HORIZON, "epochs": EPOCHS,
             "gamma": TASKS[task]["ppo_gamma"], "lambda": LAMBDA, "clip": CLIP,
             "initial-std": INITIAL_STD, "max-std": 5, "entropy-bonus": 0,
@@ -73,7 +73,7 @@ def ppo_settings(task):
 
 
 def flags(what, task, width, batch, threads, seed):
-    """`upswing train` with these settings, but for steps and folder."""
+    """The arguments of `upswing train` with these settings, without steps and folder."""
     settings = sac_settings() if what == "sac" else ppo_settings(task)
     settings |= {"task": task, "hidden": f"{width},{width}", "batch": batch, "threads": threads,
                  "seed": seed, "reward-scale": 1, "learning-rate": LEARNING_RATE,
@@ -85,7 +85,7 @@ def flags(what, task, width, batch, threads, seed):
 
 
 def train(given, steps):
-    """Trains for so many steps, with one evaluation and one checkpoint at the end. Returns the CPU
+    """Trains for `steps` steps, with one evaluation and one checkpoint at the end. Returns the CPU
     time of the whole process, the log's rows and the evaluation's mean return."""
     with tempfile.TemporaryDirectory(prefix="upswing-peers-") as folder:
         out = Path(folder, "run")
@@ -99,9 +99,9 @@ def train(given, steps):
 
 
 def measure(what, task, width, batch, threads, steps, seed):
-    """A training to its last step, and the mean return of its last policy. The rate is that of the
-    log's rows after the first. A second training, which ends at that row, has the same start,
-    evaluation and checkpoint: its CPU time is taken off."""
+    """Measures a training to its last step, and the mean return of its last policy. The rate comes
+    from the log's rows after the first. A second training, which ends at the first row, has the
+    same start, evaluation and checkpoint; its CPU time is subtracted."""
     given = flags(what, task, width, batch, threads, seed)
     short, steps = unclocked_steps(what), all_steps(what, steps)
     cpu_short, _, _ = train(given, short)
@@ -114,10 +114,10 @@ def measure(what, task, width, batch, threads, steps, seed):
 
 
 def sac(**arguments):
-    """A training with SAC, of one round for each step."""
+    """Measures a training with SAC, with one round per step."""
     return measure("sac", **arguments)
 
 
 def ppo(**arguments):
-    """A training with PPO."""
+    """Measures a training with PPO."""
     return measure("ppo", **arguments)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks that pendulum.py is the same task as the program's.
+"""Checks that pendulum.py and the program have the same task.
 
   build/peers-venv/bin/python tools/peers/check_task.py
 
@@ -22,18 +22,18 @@ import numpy as np
 import ours
 import pendulum
 
-# Both sides run the same MuJoCo in double precision; what is left are the last digits of the
-# formulas, and those that ten seconds of motion make of them.
+# Both sides run the same MuJoCo in double precision. Only the last digits of the formulas differ,
+# and grow in ten seconds of motion.
 ROLLOUT_TOLERANCE = 1e-8
-# The replay memory holds single precision, from which the state is worked out (w up to 20 rad/s).
+# The replay memory has single precision, and the state is computed from it (w up to 20 rad/s).
 REPLAY_TOLERANCE = 1e-5
 
-STEPS = pendulum.EPISODE_STEPS + 100  # of the training, so that it has an end of an episode
+STEPS = pendulum.EPISODE_STEPS + 100  # of the training: enough for an episode to end
 OBS = 8
 
 
 def expect_close(what, expected, got, tolerance):
-    """Fails where numbers differ by more than the tolerance."""
+    """Fails if numbers differ by more than the tolerance."""
     expected, got = np.asarray(expected, float), np.asarray(got, float)
     if not np.max(np.abs(expected - got)) <= tolerance:
         raise ours.Failed(f"{what}: expected {expected.tolist()}, got {got.tolist()} "
@@ -41,7 +41,7 @@ def expect_close(what, expected, got, tolerance):
 
 
 def check_rollout(start, torques, folder):
-    """Compares a rollout from a start under such torques."""
+    """Compares a rollout from a start under these torques."""
     schedule, table = Path(folder, "torques.csv"), Path(folder, "rollout.csv")
     schedule.write_text("torque\n" + "".join(f"{tau}\n" for tau in torques), encoding="utf-8")
     ours.run([ours.PROGRAM, "simulate", "--torque", schedule,
@@ -66,7 +66,7 @@ def check_rollout(start, torques, folder):
 
 
 def read_replay(path):
-    """The replay memory of a checkpoint: a row is obs, next_obs, action, reward, discount."""
+    """The replay memory of a checkpoint; a row is obs, next_obs, action, reward, discount."""
     data = path.read_bytes()
     length = struct.unpack_from("<Q", data)[0]
     begin, end = json.loads(data[8:8 + length])["agent/replay/rows"]["data_offsets"]
@@ -74,7 +74,7 @@ def read_replay(path):
 
 
 def check_replay(folder):
-    """Makes each transition of a short training again from its own observation."""
+    """Repeats each transition of a short training from its own observation."""
     out = Path(folder, "run")
     flags = ours.train_flags(width=8, batch=8, threads=1, steps=STEPS, out=out)
     ours.run([ours.PROGRAM, "train", *flags, "--epsilon-start=1", "--epsilon-decay=1",

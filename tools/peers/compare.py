@@ -33,8 +33,8 @@ HERE = Path(__file__).resolve().parent
 
 
 class Peer:
-    """A library: its virtual environment, what goes into it, and the script of each measure, which
-    is called as sb3_dqn.py is and prints the same JSON line."""
+    """A library: its virtual environment, its requirements, and the script of each measure. The
+    scripts take the arguments of sb3_dqn.py and print the same JSON line."""
 
     def __init__(self, venv, requirements, pip_flags, scripts):
         self.venv, self.pip_flags = ours.ROOT / "build" / venv, pip_flags
@@ -52,19 +52,19 @@ PEERS = {
                                "ppo": "sb3_actor.py"})}
 SIDES = ["upswing", *PEERS]
 MEASURES = ours.MEASURES | {"sac": actors.sac, "ppo": actors.ppo}
-# What each measure takes, and what it is where nothing else is asked for.
+# Arguments of each measure, and their defaults.
 ARGUMENTS = ours.ARGUMENTS | {what: ["task", "width", "batch", "threads", "steps", "seed"]
                               for what in actors.DEFAULTS}
 DEFAULTS = {"gradient": {"width": 256, "batch": 128}, "training": {"width": 256, "batch": 128},
             "acrobot": {}} | actors.DEFAULTS
 
 def say(text):
-    """Progress goes to standard error, so that the table can be piped."""
+    """Prints progress to standard error, so that the table can be piped."""
     print(text, file=sys.stderr, flush=True)
 
 
 def install(peer):
-    """Makes a peer's virtual environment again unless it already holds its requirements."""
+    """Recreates a peer's virtual environment unless it already has its requirements."""
     wanted = peer.requirements.read_text(encoding="utf-8")
     done = peer.venv / "installed.txt"
     if done.is_file() and done.read_text(encoding="utf-8") == wanted:
@@ -81,7 +81,7 @@ def install(peer):
 
 
 def takes_part(side, what, threads, a):
-    """Whether a side has what is to be measured. RLtools has one thread and its own Pendulum-v1."""
+    """Whether a side supports the measure. RLtools has one thread and its own Pendulum-v1."""
     if side not in a.sides:
         return False
     if side == "rltools":
@@ -90,15 +90,15 @@ def takes_part(side, what, threads, a):
 
 
 def settings(a):
-    """{measure: {name: value}} of what can be chosen, but for threads and seeds."""
+    """{measure: {name: value}} of the selectable settings, without threads and seeds."""
     values = {"seconds": a.seconds, "task": a.task} | a.given
     return {what: {name: (DEFAULTS[what] | values)[name] for name in ARGUMENTS[what]
                    if name not in ("threads", "seed")} for what in a.measure}
 
 
 def measure(side, what, threads, seed, a):
-    """One measurement of one side: steps_per_second, cpu_seconds_per_step; of a whole training
-    also seconds, mean_return."""
+    """Measures one side once: steps_per_second, cpu_seconds_per_step; for a whole training also
+    seconds, mean_return."""
     arguments = settings(a)[what] | {"threads": threads}
     if "seed" in ARGUMENTS[what]:
         arguments["seed"] = seed
@@ -110,8 +110,8 @@ def measure(side, what, threads, seed, a):
 
 
 def measure_in_turns(a):
-    """All rounds; the order of the sides alternates from one round to the next. Returns
-    {(what, threads, side): list of measurements}."""
+    """Runs all rounds, with the order of the sides alternating between rounds. Returns {(what,
+    threads, side): list of measurements}."""
     results = {}
     for number in range(a.rounds):
         for what in a.measure:
@@ -129,7 +129,7 @@ def measure_in_turns(a):
 
 
 def processor():
-    """The processor's name by /proc/cpuinfo, else the machine's architecture."""
+    """The processor's name from /proc/cpuinfo, else the machine's architecture."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -139,14 +139,14 @@ def processor():
 
 
 def describe(a):
-    """What the figures are of."""
+    """Metadata of the measurements."""
     return {"date": time.strftime("%Y-%m-%dT%H:%M:%S%z"), "processor": processor(),
             "processors": os.cpu_count(), "load_average": os.getloadavg(), "task": a.task,
             "settings": settings(a), "rounds": a.rounds}
 
 
 def number(least, most, kind=int):
-    """A type for argparse: a number within a range."""
+    """An argparse type: a number within a range."""
     def parse(text):
         try:
             value = kind(text)
@@ -161,12 +161,12 @@ def number(least, most, kind=int):
 
 
 def several(kind):
-    """A type for argparse: values between commas, each once."""
+    """An argparse type: comma-separated values without duplicates."""
     return lambda text: list(dict.fromkeys(kind(piece) for piece in text.split(",")))
 
 
 def one_of(names):
-    """A type for argparse: a name."""
+    """An argparse type: a name."""
     def parse(text):
         if text not in names:
             raise argparse.ArgumentTypeError(f"expected one of {', '.join(names)}, got '{text}'")
@@ -207,7 +207,7 @@ def parse_arguments():
 
 
 def prepare(a):
-    """Installs the peers, and checks that the double pendulum is the same task on both sides."""
+    """Installs the peers, and checks that both sides have the same double pendulum task."""
     if "upswing" in a.sides and not shutil.which(ours.PROGRAM):
         raise ours.Failed(f"the program is not built: expected {ours.PROGRAM}, "
                           "which ./upswing train --help makes")
@@ -223,7 +223,7 @@ def prepare(a):
 
 
 def compare(a):
-    """Prepares, measures, prints."""
+    """Prepares, measures and prints."""
     prepare(a)
     context = describe(a)
     rows = tables.summarize(measure_in_turns(a), SIDES)

@@ -1,4 +1,4 @@
-"""Our side of the comparison: the program's settings, and the figures read from its files."""
+"""Upswing's side of the comparison: the program's settings, and figures from its files."""
 
 import csv
 import json
@@ -14,7 +14,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent.parent
 PROGRAM = Path(os.environ.get("UPSWING", ROOT / "build/release/apps/upswing"))
 
-# What both sides train with, besides width and batch.
+# Settings of both sides, besides width and batch.
 LEARNING_RATE = 5e-4
 GAMMA = 0.99
 TAU = 0.005
@@ -23,16 +23,17 @@ EPSILON = 0.05
 REPLAY = 100_000
 LEARNING_STARTS = 256  # steps before the first update
 
-EPISODES = 100  # of an evaluation on Acrobot-v1
-LOG_EVERY = 200  # steps from one row of metrics.csv to the next; learning begins before the second
+EPISODES = 100  # per evaluation on Acrobot-v1
+LOG_EVERY = 200  # steps between rows of metrics.csv; learning begins before the second row
 
 
 class Failed(Exception):
-    """An error whose message, one line, is for the user."""
+    """An error with a one-line message for the user."""
 
 
 def run(command, **more):
-    """Runs a command to its end and returns its output; raises Failed with the last line of its output."""
+    """Runs a command to its end and returns its output. Raises Failed with the last line of its
+    output."""
     done = subprocess.run(list(map(str, command)), stdin=subprocess.DEVNULL, capture_output=True,
                           encoding="utf-8", check=False, **more)
     if done.returncode != 0:
@@ -43,7 +44,7 @@ def run(command, **more):
 
 
 def train_flags(width, batch, threads, steps, out):
-    """`upswing train` as a plain DQN with one environment and one update a step."""
+    """`upswing train` as a plain DQN with one environment and one update per step."""
     settings = {
         "agent": "dqn", "hidden": f"{width},{width}", "batch": batch, "threads": threads,
         "steps": steps, "out": out, "envs": 1, "n-step": 1, "updates-per-step": 1,
@@ -52,7 +53,7 @@ def train_flags(width, batch, threads, steps, out):
         "epsilon-start": EPSILON, "epsilon-end": EPSILON, "replay": REPLAY,
         "learning-starts": LEARNING_STARTS, "episode-seconds": 10, "random-start-share": 0,
         "start-noise": 0.1, "start-noise-end": 0.1, "log-every": LOG_EVERY,
-        # One evaluation at the end, of one episode; no checkpoint but the last.
+        # One evaluation at the end, of one episode; only the last checkpoint.
         "eval-every": steps + 1, "eval-episodes": 1, "checkpoint-every": steps + 1,
     }
     flags = ["--no-double", "--no-dueling", "--no-layer-norm", "--no-prioritized", "--no-mirror",
@@ -61,20 +62,20 @@ def train_flags(width, batch, threads, steps, out):
 
 
 def children_cpu_seconds():
-    """CPU time of all child processes that have ended."""
+    """CPU time of all finished child processes."""
     usage = resource.getrusage(resource.RUSAGE_CHILDREN)
     return usage.ru_utime + usage.ru_stime
 
 
 def read_rows(path):
-    """The rows of a table, each a dictionary of numbers by the columns' names."""
+    """The rows of a table, each a dictionary from column name to number."""
     with open(path, encoding="utf-8", newline="") as file:
         return [{name: float(text) for name, text in row.items()} for row in csv.DictReader(file)]
 
 
 def train(width, batch, threads, steps):
-    """Trains for so many steps; the rate is that of the log's rows after learning began, the CPU
-    time that of the whole process."""
+    """Trains for `steps` steps. The rate comes from the log's rows after learning began; the CPU
+    time is of the whole process."""
     with tempfile.TemporaryDirectory(prefix="upswing-peers-") as folder:
         out = Path(folder, "run")
         cpu = children_cpu_seconds()
@@ -88,26 +89,26 @@ def train(width, batch, threads, steps):
 
 
 def training(width, batch, threads, seconds):
-    """Training steps per second, from a run of about so many seconds."""
+    """Training steps per second, from a run of about `seconds` seconds."""
     probe = train(width, batch, threads, 7 * LOG_EVERY)
     rows = max(5, math.ceil(seconds * probe["steps_per_second"] / LOG_EVERY))
     return train(width, batch, threads, (rows + 2) * LOG_EVERY)
 
 
 def read_bench(text):
-    """Rate and CPU time of the one benchmark in a JSON file of Google Benchmark."""
+    """Rate and CPU time of the only benchmark in a JSON file of Google Benchmark."""
     entries = [entry for entry in json.loads(text)["benchmarks"]
                if entry["name"].startswith("gradient/") and entry.get("run_type") != "aggregate"]
     if not entries:
         raise Failed("upswing bench gradient: expected a benchmark gradient/…, got none")
     rate = statistics.median(entry["items_per_second"] for entry in entries)
-    # Both times are those of an iteration, which may be of several steps.
+    # Both times are per iteration, which may have several steps.
     cpu_share = statistics.median(entry["cpu_time"] / entry["real_time"] for entry in entries)
     return {"steps_per_second": rate, "cpu_seconds_per_step": cpu_share / rate}
 
 
 def gradient(width, batch, threads, seconds):
-    """Gradient steps per second alone."""
+    """Gradient steps per second, without the rest of the training."""
     with tempfile.TemporaryDirectory(prefix="upswing-peers-") as folder:
         file = Path(folder, "bench.json")
         run([PROGRAM, "bench", "gradient", "--network", "plain", "--hidden", f"{width},{width}",
@@ -117,14 +118,13 @@ def gradient(width, batch, threads, seconds):
 
 
 def acrobot_settings():
-    """The settings of the named agent `acrobot`, as a dictionary of TOML's tables."""
+    """The settings of the named agent `acrobot`, as a dictionary of TOML tables."""
     return tomllib.loads(run([PROGRAM, "train", "--agent", "acrobot", "--print-config"]))
 
 
 def acrobot(threads, seed):
-    """A training of the named agent `acrobot` to its last step, and the mean return of its last
-    policy over EPISODES episodes. The rate is that of training alone, the CPU time that of the
-    whole process."""
+    """Trains the named agent `acrobot` to its last step, and evaluates its last policy over
+    EPISODES episodes. The rate counts only training; the CPU time is of the whole process."""
     steps = acrobot_settings()["train"]["steps"]
     with tempfile.TemporaryDirectory(prefix="upswing-peers-") as folder:
         out = Path(folder, "run")
@@ -139,7 +139,7 @@ def acrobot(threads, seed):
 
 
 MEASURES = {"gradient": gradient, "training": training, "acrobot": acrobot}
-# What each measure takes.
+# Arguments of each measure.
 ARGUMENTS = {"gradient": ["width", "batch", "threads", "seconds"],
              "training": ["width", "batch", "threads", "seconds"],
              "acrobot": ["threads", "seed"]}

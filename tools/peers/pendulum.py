@@ -1,7 +1,7 @@
 """The double pendulum and its task over MuJoCo's Python package, as a Gymnasium environment.
 
-The same model, observation, reward, torques and episodes as sim/double_pendulum.cc and
-sim/pendulum_env.cc with the built-in plant; check_task.py proves it against the program.
+It has the model, observation, reward, torques and episodes of sim/double_pendulum.cc and
+sim/pendulum_env.cc with the built-in plant; check_task.py compares it with the program.
 
 Symbols: q1, q2 joint angles (rad; 0 hanging, q2 relative to link 1), w1, w2 their velocities
 (rad/s), tau torque at joint 1 (N·m).
@@ -34,15 +34,15 @@ MJCF = """<mujoco model="double_pendulum">
 """
 
 TORQUE_LIMIT = 5.0  # N·m
-TORQUES = [TORQUE_LIMIT * quarter / 4 for quarter in range(-4, 5)]  # N·m, one for each action
-PHYSICS_STEPS = 4  # in a control period of 0.02 s
+TORQUES = [TORQUE_LIMIT * quarter / 4 for quarter in range(-4, 5)]  # N·m, one per action
+PHYSICS_STEPS = 4  # per control period of 0.02 s
 EPISODE_STEPS = 500  # control steps: 10 s
 START_NOISE = 0.1  # standard deviation of all four state variables, rad and rad/s
 
 LENGTH, MASS, GRAVITY = 0.5, 1.0, 9.81  # of each link (m, kg); m/s²
 ROD_INERTIA = MASS * LENGTH**2 / 12  # kg·m²
 ENERGY_TARGET = MASS * GRAVITY * LENGTH / 2 + MASS * GRAVITY * (LENGTH + LENGTH / 2)  # J, upright
-MAX_VELOCITY1, MAX_VELOCITY2 = 10.0, 20.0  # rad/s, by which the observation divides
+MAX_VELOCITY1, MAX_VELOCITY2 = 10.0, 20.0  # rad/s, divisors in the observation
 COS_30 = sqrt(3) / 2
 
 
@@ -56,12 +56,12 @@ def energy(q1, q2, w1, w2):
 
 
 def tip_height(q1, q2):
-    """Height of the second link's tip over the pivot (m)."""
+    """Height of the second link's tip above the pivot (m)."""
     return -LENGTH * (cos(q1) + cos(q1 + q2))
 
 
 def inverted(q1, q2):
-    """Both links within 30° of straight up."""
+    """Whether both links are within 30° of straight up."""
     return -cos(q1) >= COS_30 and -cos(q1 + q2) >= COS_30
 
 
@@ -82,7 +82,7 @@ def reward(q1, q2, w1, w2, tau):
 
 
 class DoublePendulum(gymnasium.Env):
-    """From hanging with noise, nine torques, 10 s to an episode, which then is truncated."""
+    """Starts hanging with noise. Nine torques; an episode is truncated after 10 s."""
 
     observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (8,), np.float32)
     action_space = gymnasium.spaces.Discrete(len(TORQUES))
@@ -93,7 +93,7 @@ class DoublePendulum(gymnasium.Env):
         self.steps = 0
 
     def state(self):
-        """q1, q2, w1, w2."""
+        """The state q1, q2, w1, w2."""
         return (*self.data.qpos.tolist(), *self.data.qvel.tolist())
 
     def set_state(self, state):
@@ -113,7 +113,7 @@ class DoublePendulum(gymnasium.Env):
         return observe(*self.state()), {}
 
     def torque(self, action):
-        """The torque that an action stands for (N·m)."""
+        """The torque of an action (N·m)."""
         return TORQUES[action]
 
     def step(self, action):
@@ -125,7 +125,7 @@ class DoublePendulum(gymnasium.Env):
 
 
 class TorquePendulum(DoublePendulum):
-    """The same with any torque up to the limit as its action (N·m)."""
+    """The same task with any torque up to the limit as action (N·m)."""
 
     action_space = gymnasium.spaces.Box(-TORQUE_LIMIT, TORQUE_LIMIT, (1,), np.float32)
 

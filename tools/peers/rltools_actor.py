@@ -4,9 +4,9 @@
   build/rltools-venv/bin/python tools/peers/rltools_actor.py sac --width 256 --batch 256
   build/rltools-venv/bin/python tools/peers/rltools_actor.py ppo --seed 3
 
-Compiles RLtools' headers with g++ first, as its own Python package does, and with OpenBLAS, once
-for each network and minibatch; then learns to the last step and evaluates the mean action
-over 100 episodes. The clock runs over all but the first steps (`unclocked_steps` in actors.py).
+First compiles RLtools' headers with g++ and OpenBLAS, as its own Python package does, once for each
+network and minibatch. Then learns to the last step and evaluates the mean action over 100 episodes.
+The clock leaves out the first steps (`unclocked_steps` in actors.py).
 """
 
 import argparse
@@ -24,11 +24,11 @@ import ours
 
 HERE = Path(__file__).resolve().parent
 PROGRAMS = ours.ROOT / "build/rltools"
-FLAGS = ["-std=c++17", "-O3", "-march=native", "-ffast-math"]  # those of RLtools' Python package
+FLAGS = ["-std=c++17", "-O3", "-march=native", "-ffast-math"]  # same as in RLtools' Python package
 
 
 def numbers(width, batch):
-    """What the sources call PEER_…"""
+    """The definitions PEER_… for the sources."""
     names = ["LEARNING_RATE", "REPLAY", "SAC_GAMMA", "TAU", "ALPHA", "LEARNING_STARTS", "ENVS",
              "HORIZON", "EPOCHS", "LAMBDA", "CLIP", "INITIAL_STD"]
     return {name: getattr(actors, name) for name in names} | {
@@ -37,10 +37,10 @@ def numbers(width, batch):
 
 
 def command(what, width, batch):
-    """g++ with all but the name of the program."""
+    """The g++ command without the name of the program."""
     headers = distribution("rltools").locate_file("rltools/external/rl_tools/include")
     blas = scipy_openblas32.get_lib_dir()
-    # This build of OpenBLAS has a prefix before its functions' names.
+    # This build of OpenBLAS adds a prefix to function names.
     defined = {"RL_TOOLS_DISABLE_TENSORBOARD": 1, "RL_TOOLS_BACKEND_ENABLE_OPENBLAS": 1,
                "RL_TOOLS_DISABLE_UNALIGNED_MEMORY_ALLOCATIONS": 1,
                "cblas_sgemm": "scipy_cblas_sgemm", "cblas_dgemm": "scipy_cblas_dgemm"}
@@ -51,7 +51,7 @@ def command(what, width, batch):
 
 
 def compiled(what, width, batch):
-    """The path of the program, which is made unless it is there."""
+    """The path of the program, which is compiled if it is missing."""
     words = command(what, width, batch)
     sources = [HERE / "rltools_training.h", HERE / f"rltools_{what}.cc"]
     key = "\n".join([*map(str, words), *(path.read_text(encoding="utf-8") for path in sources)])

@@ -1,4 +1,4 @@
-// RLtools' PPO on Pendulum-v1. Its defaults, but for what is set here.
+// RLtools' PPO on Pendulum-v1, with its defaults except for the settings below.
 
 #include "rltools_training.h"
 
@@ -11,7 +11,7 @@ struct Parameters : core::DefaultParameters<Numbers, Index, Pendulum> {
   static constexpr Index EPISODE_STEP_LIMIT = Pendulum::EPISODE_STEP_LIMIT;
   static constexpr Index STEP_LIMIT = kNoLimit;
   static constexpr Index BATCH_SIZE = PEER_BATCH;
-  static constexpr Index ACTOR_HIDDEN_DIM = PEER_WIDTH;  // of two hidden layers with ReLU
+  static constexpr Index ACTOR_HIDDEN_DIM = PEER_WIDTH;  // width of two hidden layers with ReLU
   static constexpr Index CRITIC_HIDDEN_DIM = PEER_WIDTH;
   using OPTIMIZER_PARAMETERS = AdamParameters;
   struct PPO_PARAMETERS : rlt::rl::algorithms::ppo::DefaultParameters<Numbers, Index, BATCH_SIZE> {

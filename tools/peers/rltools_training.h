@@ -1,10 +1,10 @@
 #pragma once
 
-// What RLtools' SAC and PPO have in common here: Pendulum-v1, a clock, an evaluation, one JSON
-// line. The numbers in capital letters come from rltools_actor.py, which compiles this.
+// Common parts of RLtools' SAC and PPO: Pendulum-v1, a clock, an evaluation, one JSON line.
+// rltools_actor.py compiles this file and defines the numbers in capital letters.
 
 #include <rl_tools/operations/cpu_mux.h>
-// RLtools wants its headers in this order, and all of them before the first use.
+// RLtools needs its headers in this order, all of them before the first use.
 // clang-format off
 #include <rl_tools/nn/optimizers/adam/instance/operations_generic.h>
 #include <rl_tools/nn/operations_cpu_mux.h>
@@ -39,10 +39,10 @@ using Numbers = rlt::numeric_types::Policy<float>;
 using Pendulum =
     rlt::rl::environments::Pendulum<rlt::rl::environments::pendulum::Specification<float, Index>>;
 
-/// More loop steps than any training has.
+/// More loop steps than in any training.
 inline constexpr Index kNoLimit = Index{1} << 40;
 
-/// Adam as RLtools sets it up, but for the learning rate.
+/// Adam with RLtools' defaults, except for the learning rate.
 struct AdamParameters : rlt::nn::optimizers::adam::DEFAULT_PARAMETERS_TENSORFLOW<Numbers> {
   static constexpr float ALPHA = PEER_LEARNING_RATE;
 };
@@ -72,8 +72,8 @@ double MeanReturn(Device& device, State& state) {
   return static_cast<double>(result.returns_mean);
 }
 
-/// Trains, and prints rates and mean return as one JSON line. The arguments are a seed, how many
-/// steps the clock leaves out, and all steps; a loop step is `steps_per_loop` of them.
+/// Trains, and prints rates and mean return as one JSON line. Arguments: seed, number of steps that
+/// the clock leaves out, total number of steps. A loop step makes `steps_per_loop` steps.
 template <class State>
 int Train(char** arguments, Index steps_per_loop) {
   const auto [seed, unclocked, steps] =

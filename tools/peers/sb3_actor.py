@@ -4,8 +4,8 @@
   build/peers-venv/bin/python tools/peers/sb3_actor.py sac --width 256 --batch 256
   build/peers-venv/bin/python tools/peers/sb3_actor.py ppo --task double-pendulum --seed 3
 
-Learns to the last step and then evaluates the mean action over 100 episodes. The clock runs over
-all but the first steps (`unclocked_steps` in actors.py).
+Learns to the last step and then evaluates the mean action over 100 episodes. The clock leaves out
+the first steps (`unclocked_steps` in actors.py).
 """
 
 import argparse
@@ -26,7 +26,7 @@ ENVIRONMENTS = {"pendulum-v1": "Pendulum-v1", "double-pendulum": TorquePendulum}
 
 
 def make_sac(task, width, batch, seed):
-    """SAC; its layers are followed by ReLU, its optimisers are Adam."""
+    """SAC with ReLU after its layers, and Adam optimisers."""
     return stable_baselines3.SAC(
         "MlpPolicy", make_vec_env(ENVIRONMENTS[task], 1, seed=seed),
         policy_kwargs={"net_arch": [width, width]}, batch_size=batch,
@@ -37,7 +37,7 @@ def make_sac(task, width, batch, seed):
 
 
 def make_ppo(task, width, batch, seed, envs):
-    """PPO. Its actions are torques: the spread at the beginning is multiplied by the limit."""
+    """PPO. Actions are torques, so the initial spread is multiplied by the limit."""
     std = actors.INITIAL_STD * actors.TASKS[task]["limit"]
     return stable_baselines3.PPO(
         "MlpPolicy", make_vec_env(ENVIRONMENTS[task], envs, seed=seed),

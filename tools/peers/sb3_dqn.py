@@ -6,8 +6,8 @@
   build/peers-venv/bin/python tools/peers/sb3_dqn.py acrobot --seed 3
 
 gradient: model.train on a full replay memory. training: model.learn with one update per step, after
-the warm-up. Both are on the double pendulum. acrobot: Gymnasium's
-Acrobot-v1 with the settings of our agent `acrobot`, trained to the last step, then evaluated.
+the warm-up. Both use the double pendulum. acrobot: trains on Gymnasium's Acrobot-v1 with the
+settings of our agent `acrobot`, then evaluates.
 """
 
 import argparse
@@ -29,19 +29,20 @@ WARM_UP = 200  # updates before the clock starts
 
 
 class Clock:
-    """Wall-clock and CPU time of this process since it was made."""
+    """Wall-clock and CPU time of this process since the object was created."""
 
     def __init__(self):
         self.wall, self.cpu = time.perf_counter(), time.process_time()
 
     def result(self, steps):
-        """The figures of so many steps."""
+        """The rates of `steps` steps."""
         wall, cpu = time.perf_counter() - self.wall, time.process_time() - self.cpu
         return {"steps_per_second": steps / wall, "cpu_seconds_per_step": cpu / steps}
 
 
 class Timed(BaseCallback):
-    """Starts the clock when learning has warmed up and stops the training when time is over."""
+    """Starts the clock after the warm-up of learning, and stops the training when the time is
+    over."""
 
     def __init__(self, seconds):
         super().__init__()
@@ -59,8 +60,7 @@ class Timed(BaseCallback):
 
 
 def make(width, batch, learning_starts):
-    """The agent. Its loss is smooth L1 (Huber with threshold 1), its optimiser Adam, its layers are
-    followed by ReLU."""
+    """The agent: smooth L1 loss (Huber with threshold 1), Adam, and ReLU after its layers."""
     return stable_baselines3.DQN(
         "MlpPolicy", DoublePendulum(), policy_kwargs={"net_arch": [width, width]}, batch_size=batch,
         learning_rate=ours.LEARNING_RATE, gamma=ours.GAMMA, tau=ours.TAU, target_update_interval=1,
@@ -91,17 +91,17 @@ def training(width, batch, seconds):
 
 
 def make_for_acrobot(settings, seed):
-    """The agent with the settings of ours that it has, too. It has neither dueling heads, Double
-    DQN, layer normalisation, prioritised replay, mirrored minibatches, scaled rewards nor an
-    averaged policy."""
+    """The agent with those of our settings that it supports. It lacks dueling heads, Double DQN,
+    layer normalisation, prioritised replay, mirrored minibatches, scaled rewards and averaged
+    policies."""
     train, network, agent = settings["train"], settings["network"], settings["agent"]
     envs = train["envs"]
-    updates = max(1, round(envs * agent["updates_per_step"]))  # after each step of all environments
-    # Ours decays by a factor at each episode, of about 130 steps; theirs linearly.
+    updates = max(1, round(envs * agent["updates_per_step"]))  # after a step of all environments
+    # Our epsilon decays by a factor per episode of about 130 steps; theirs decays linearly.
     decay_episodes = math.log(agent["epsilon_end"]) / math.log(agent["epsilon_decay"])
 
     def learning_rate(remaining):
-        """From the share of the steps that remain."""
+        """The learning rate, from the remaining share of the steps."""
         done = min(1.0, (1 - remaining) * train["steps"] / agent["learning_rate_steps"])
         return agent["learning_rate"] + done * (agent["learning_rate_end"] - agent["learning_rate"])
 
@@ -109,7 +109,7 @@ def make_for_acrobot(settings, seed):
         "MlpPolicy", make_vec_env("Acrobot-v1", envs, seed=seed),
         policy_kwargs={"net_arch": network["hidden"]}, batch_size=agent["batch"],
         learning_rate=learning_rate, gamma=agent["gamma"], n_steps=agent["n_step"],
-        # Their target moves once for all the updates of a step.
+        # Their target network moves once for all updates of a step.
         tau=1 - (1 - agent["tau"])**updates, target_update_interval=1,
         train_freq=1, gradient_steps=updates, max_grad_norm=agent["max_gradient_norm"],
         buffer_size=agent["replay"], learning_starts=agent["learning_starts"],

@@ -1,4 +1,4 @@
-"""Sums up the rounds of a comparison, and prints them as tables."""
+"""Summarises the rounds of a comparison, and prints them as tables."""
 
 import statistics
 import textwrap
@@ -6,7 +6,7 @@ import textwrap
 import actors
 import ours
 
-# What is the same on all sides, for each measure.
+# Settings shared by all sides, for each measure.
 DQN = (
     "gradient, training: DQN on the double pendulum. Plain network 8-W-W-9 with ReLU, batch of B "
     "transitions, single precision; no double, dueling or layer normalisation; one-step targets, "
@@ -33,7 +33,7 @@ SAME = {"gradient": DQN, "training": DQN, "acrobot": ACROBOT, "sac": SAC, "ppo":
 
 
 def print_heading(measures, values):
-    """What was measured: `values` has width, batch and more of each measure."""
+    """Describes the measurements: `values` has width, batch and more of each measure."""
     for what in measures:
         if values[what]:
             chosen = ", ".join(f"{name} {value}" for name, value in values[what].items())
@@ -43,9 +43,9 @@ def print_heading(measures, values):
 
 
 def summarize(results, sides):
-    """One row for each measurement, with medians, and our rate and CPU time over theirs where we
+    """One row per measurement, with medians, and ratios of our rate and CPU time to theirs if we
     took part. A ratio is the median over the rounds, so that load on both sides of a round cancels
-    out; the ratio of the fastest rounds estimates that of a machine without other load."""
+    out. The ratio of the fastest rounds estimates a machine without other load."""
     rows = []
     for (what, threads, side), rounds in results.items():
         row = {"measure": what, "threads": threads, "side": side, "rounds": rounds}
@@ -69,7 +69,7 @@ def summarize(results, sides):
 
 
 def print_table(rows):
-    """Medians, ranges and ratios."""
+    """Prints medians, ranges and ratios."""
     line = "{:<10}{:>7}  {:<18}{:>9}{:>18}{:>10}{:>10}{:>10}{:>10}"
     print(line.format("measure", "threads", "side", "steps/s", "(range)", "CPU µs", "our rate",
                       "fastest", "our CPU"))
@@ -85,7 +85,7 @@ def print_table(rows):
 
 
 def print_returns(rows):
-    """What was reached by whole trainings, and in how long."""
+    """Prints the results and durations of whole trainings."""
     line = "{:<10}{:>7}  {:<18}{:>10}{:>14}  {}"
     print("\n" + line.format("measure", "threads", "side", "seconds", "mean return", "(range)"))
     for row in rows:

@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""Environment steps per second from Python, beside the C++ rate of the same call and beside
-Gymnasium's own vector of environments over MuJoCo's Python package.
+"""Measures environment steps per second from Python, from C++ and by Gymnasium's own vector.
+
+The C++ rate is that of the same call. Gymnasium's vector steps MuJoCo's Python package.
 
     ./upswing python tools/peers/vector.py --rounds 5
 
-Each round measures every side once, in turns; medians of all rounds are printed, by the wall clock and
-by the processors' time of this process, which other load disturbs less. An environment step is one
-control period (four physics steps) of one double pendulum, with observation, reward and reset.
+Each round measures every side once, in turn. Prints medians of all rounds, by the wall clock and by
+this process's CPU time, which other load disturbs less. An environment step is one control period
+(four physics steps) of one double pendulum, with observation, reward and reset.
 """
 
 import argparse
@@ -31,8 +32,8 @@ GYMNASIUM = "MuJoCo's Python package, Gymnasium's SyncVectorEnv"
 def make(side, threads):
     """The vector environment of a side in Python."""
     if side == GYMNASIUM:
-        # Here alone: once imported, the package has MuJoCo time each stage of a step, in all engines
-        # of the process, which halves the speed of small models.
+        # Imported only here. The package makes MuJoCo time each stage of a step, in all engines of
+        # the process, which halves the speed of small models.
         sys.path.insert(0, str(Path(__file__).parent))
         from pendulum import TorquePendulum  # pylint: disable=import-outside-toplevel
         return gym.vector.SyncVectorEnv([TorquePendulum] * ENVS)
@@ -42,7 +43,7 @@ def make(side, threads):
 
 
 def in_cpp(physics, threads, seconds):
-    """`upswing bench`: the C++ rate, by the wall clock and by the processors' time."""
+    """The C++ rate by `upswing bench`, by the wall clock and by CPU time."""
     done = subprocess.run(
         [PROGRAM, "bench", "env", "--threads", str(threads), "--seconds", str(seconds),
          "--repetitions", "1", "--json", "-"], capture_output=True, check=True)
@@ -55,14 +56,14 @@ def in_cpp(physics, threads, seconds):
 
 
 def in_python(side, threads, seconds):
-    """The same of a vector environment, in a process of its own."""
+    """The rate of a vector environment, measured in a separate process."""
     done = subprocess.run([sys.executable, __file__, "--threads", str(threads), "--seconds",
                            str(seconds), "--side", side], stdout=subprocess.PIPE, check=True)
     return json.loads(done.stdout)
 
 
 def measure(side, threads, seconds):
-    """Steps a second, by the wall clock and by the processors' time."""
+    """Steps per second, by the wall clock and by CPU time."""
     envs = make(side, threads)
     envs.reset(seed=0)
     actions = [envs.action_space.sample() for _ in range(16)]

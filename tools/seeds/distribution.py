@@ -4,8 +4,8 @@
     ./upswing study configs/studies/ten-thousand.toml
     ./upswing python tools/seeds/distribution.py runs/ten-thousand --out docs/figures/seeds
 
-Prints the share that solves the task with its 95% interval and quantiles of steps and return.
-Writes GROUP.csv, a row for each seed, and histograms by gnuplot, GROUP.svg and GROUP.png.
+Prints the share of seeds that solve the task with its 95% interval, and quantiles of steps and
+return. Writes GROUP.csv, a row for each seed, and histograms by gnuplot, GROUP.svg and GROUP.png.
 """
 
 import argparse
@@ -25,7 +25,7 @@ COLUMNS = {"solve_steps": "steps until solved", "best_return": "return of the be
 
 
 def read(folder, group):
-    """Of each seed of the group, the columns: NaN where it never solved the task."""
+    """The columns of each seed of the group; NaN if the seed never solved the task."""
     try:
         with open(folder / "runs.csv", newline="", encoding="utf-8") as file:
             rows = [row for row in csv.DictReader(file) if row["group"] == group]
@@ -64,7 +64,7 @@ def write(seeds, values, file):
 
 
 def plot(seeds, values, title, file):
-    """Histograms of steps and return, their counts on a logarithmic axis: the tails are what matters."""
+    """Histograms of steps and return. Counts have a logarithmic axis, which shows the tails."""
     lines = [f"set terminal {'svg' if file.suffix == '.svg' else 'pngcairo'} size 1200,420 "
              "font 'sans,12' background 'white'", f"set output '{file}'",
              f"set multiplot layout 1,2 title \"{title}: {len(seeds):,} seeds\"",

@@ -19,18 +19,18 @@ from pathlib import Path
 
 import numpy as np
 
-# Each statistic says of two samples x and y (draws × n): -1, 0, 1 for x smaller, undecided, larger.
+# A statistic compares two samples x and y (draws × n): -1, 0, 1 for x smaller, undecided, larger.
 LEVEL = 0.05
 
 
 def interquartile_mean(x):
-    """Over the last axis, as docs/howto/compare.md defines it."""
+    """The interquartile mean over the last axis, as docs/howto/compare.md defines it."""
     cut = x.shape[-1] // 4
     return np.sort(x, axis=-1)[..., cut:x.shape[-1] - cut].mean(axis=-1)
 
 
 def by(figure):
-    """The sign of a figure's difference, as a paper with bare numbers is read."""
+    """The sign of a figure's difference, as in a paper that reports bare numbers."""
     return lambda x, y, rng: np.sign(figure(x) - figure(y))
 
 
@@ -50,7 +50,8 @@ def effect(x, y):
 
 
 def seeds_for(d):
-    """Seeds of each agent with which a test at 5% finds an effect of d in 80% of the studies."""
+    """Number of seeds per agent with which a test at 5% finds an effect of size d in 80% of the
+    studies."""
     return math.ceil(2 * (1.959963984540054 + 0.8416212335729143) ** 2 / max(d * d, 1e-12)) + 1
 
 
@@ -80,14 +81,14 @@ def mann_whitney(x, y, _rng):
 
 
 def interval(a, b, rng, resamples=1000):
-    """The 95% interval of the difference of two groups' IQMs: a percentile bootstrap."""
+    """The 95% interval of the difference of two groups' IQMs, by a percentile bootstrap."""
     drawn = (interquartile_mean(a[rng.integers(len(a), size=(resamples, len(a)))])
              - interquartile_mean(b[rng.integers(len(b), size=(resamples, len(b)))]))
     return np.quantile(drawn, [0.025, 0.975])
 
 
 def bootstrap(x, y, rng):
-    """Whether the 95% interval of the difference of IQMs is without 0."""
+    """Whether the 95% interval of the difference of IQMs excludes 0."""
     low, high = np.array([interval(a, b, rng) for a, b in zip(x, y)]).T
     return np.where(low > 0, 1, np.where(high < 0, -1, 0))
 
@@ -103,7 +104,7 @@ STATISTICS = {
 
 
 def read(folder, column):
-    """The scores of each group. A run that never solved its task counts with all its steps."""
+    """The scores of each group. An unsolved run counts with all its steps."""
     groups = defaultdict(list)
     try:
         with open(folder / "runs.csv", newline="", encoding="utf-8") as file:
@@ -117,7 +118,7 @@ def read(folder, column):
 
 
 def samples(scores, n, draws, rng):
-    """Studies of n seeds, each seed once (draws × n)."""
+    """Draws studies of n different seeds (draws × n)."""
     return np.array([scores[rng.choice(len(scores), n, replace=False)] for _ in range(draws)])
 
 
@@ -125,7 +126,7 @@ def count(x, y, truth, a):
     """A row for each size and statistic: shares of right, undecided and wrong conclusions."""
     for n in a.sizes:
         rng = np.random.default_rng(1)
-        if truth == 0:  # the same agent twice: both samples from one, without a common seed
+        if truth == 0:  # the same agent: two samples without a common seed
             both = samples(x, 2 * n, a.draws, rng)
             left, right = both[:, :n], both[:, n:]
         else:
