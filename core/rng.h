@@ -18,18 +18,18 @@ class Rng {
   /// 64 random bits.
   uint64_t Next();
 
-  /// Uniform in [0, 1), 53 bits.
+  /// Uniform random number in [0, 1) with 53 bits.
   double Uniform();
 
-  /// Uniform in [low, high).
+  /// Uniform random number in [low, high).
   double Uniform(double low, double high) { return low + (high - low) * Uniform(); }
 
   /// Uniform integer in [0, n), without bias (Lemire, 2019). n > 0.
   uint64_t Below(uint64_t n);
 
-  /// Standard normal (Box and Muller, 1958; the cosine branch alone, so that no value is kept).
+  /// Standard normal (Box and Muller, 1958). It uses only the cosine branch, so no value is kept.
   double Normal();
-  /// Two independent standard normals, of which the first is what Normal would give.
+  /// Two independent standard normals. The first is the value that Normal would return.
   std::array<double, 2> NormalPair();
 
   /// Saves or loads the stream's state.
