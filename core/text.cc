@@ -69,7 +69,7 @@ std::optional<CodePoint> FirstCodePoint(std::string_view text) {
     if ((byte(i) & 0xc0) != 0x80) return std::nullopt;
     value = value << 6 | (byte(i) & 0x3fU);
   }
-  // smallest character of each size
+  // Smallest character of each size.
   constexpr std::array<char32_t, 5> kSmallest{0, 0, 0x80, 0x800, 0x10000};
   const bool surrogate = value >= 0xd800 && value < 0xe000;
   if (value < kSmallest.at(size) || value > 0x10ffff || surrogate) return std::nullopt;

@@ -33,7 +33,7 @@ TEST(ThreadPool, ManyShortRoundsWithMoreThreadsThanProcessors) {
     const int n = 2 + round % 5;
     std::vector<int> done(static_cast<size_t>(n), -1);  // destroyed at the end of the round
     pool.ParallelFor(n, [&](int i) {
-      // without it, the caller may run all tasks before other threads wake
+      // Without it, the caller may run all tasks before other threads wake.
       std::this_thread::yield();
       done[static_cast<size_t>(i)] = round;
       by_others += std::this_thread::get_id() != caller ? 1 : 0;

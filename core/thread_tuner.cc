@@ -9,7 +9,7 @@ namespace {
 
 constexpr int kBlock = 4;   // number of calls that are timed together
 constexpr int kRounds = 7;  // pairs of blocks per trial; the median of their ratios decides
-// a ratio above this, or below its inverse for more threads, decides in one round
+// A ratio above this, or below its inverse for more threads, decides in one round.
 constexpr double kClear = 1.3;
 constexpr double kWorthwhile = .95;  // ratio below which more threads are worth it
 constexpr double kTrialShare = .01;  // share of the time that goes into trials

@@ -50,10 +50,10 @@ TEST(ClippedLoss, HasNoGradientWhereTheRatioHasGoneFarEnough) {
 TEST(ValueLoss, OfBothKindsAndItsGradient) {
   // Arguments V, V_old, R. The clipped value is V_old ± 0.2.
   EXPECT_NEAR(ValueLoss(3.0, 1.0, 2.0, 0.0).loss, 0.5, 1e-12);
-  // loss of the clipped value 1.2, although 2 is right
+  // Loss of the clipped value 1.2, although 2 is right.
   EXPECT_NEAR(ValueLoss(2.0, 1.0, 2.0, 0.2).loss, 0.32, 1e-12);
   EXPECT_EQ(ValueLoss(2.0, 1.0, 2.0, 0.2).gradient, 0);
-  // further off than the clipped value
+  // Further off than the clipped value.
   EXPECT_NEAR(ValueLoss(3.0, 1.0, 0.0, 0.2).loss, 4.5, 1e-12);
   for (const double epsilon : {0.0, 0.2}) {
     for (double value : {-1.0, 0.9, 1.1, 1.7, 3.0}) {

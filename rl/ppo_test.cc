@@ -343,7 +343,7 @@ TEST(Ppo, AStateThatIsNoneIsRefused) {
     Ppo other(config, ToyEnv::Spec(2), 1, pool);
     EXPECT_THROW(other.State(Archive::Loader(copy)), Error);
   };
-  // expected 40: 32 and 8 that wait
+  // Expected 40: 32 and 8 that wait.
   refused([](Tensors& t) { t.AddScalar<int64_t>("steps", 38); });
   refused([](Tensors& t) { t.AddScalar<int64_t>("updates", 7); });  // expected 8
   refused([](Tensors& t) { t.AddScalar<int64_t>("rollout/filled", 16); });

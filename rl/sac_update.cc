@@ -15,7 +15,7 @@ namespace {
 /// Copies some rows of x into the columns of y from `column` on.
 void CopyRows(Matrix<const float> x, RowRange rows, int column, Matrix<float> y) {
   for (int i = rows.first; i < rows.first + rows.count; ++i) {
-    // too few numbers for a call to copy
+    // Too few numbers for a call to copy.
     for (int k = 0; k < x.cols(); ++k) y(i, column + k) = x(i, k);
   }
 }

@@ -36,7 +36,7 @@ void SumTree::Find(std::span<const double> masses, std::span<int64_t> indices) c
         // not predict it.
         const double left = nodes_[node[k]];
         const uint64_t right = uint64_t{mass[k] >= left} & uint64_t{nodes_[node[k] + 1] > 0};
-        // subtracts left, or 0
+        // Subtracts left, or 0.
         mass[k] -= std::bit_cast<double>(std::bit_cast<uint64_t>(left) & -right);
         node[k] += right;
         // The eight descendants three levels below share a cache line.
