@@ -28,8 +28,8 @@ struct BenchOptions {
   int64_t repetitions = 3;          // repetitions of each case
 };
 
-/// The threads of a case. 0 means one thread per processor, up to 8, and a ThreadTuner that chooses
-/// how many of them work, as in a training without --threads.
+/// The threads of a case. 0 means one thread per processor, up to 8. A ThreadTuner then chooses how
+/// many threads work, as in a training without --threads.
 struct BenchPool : ThreadPool {
   explicit BenchPool(int threads) : ThreadPool(ResolveThreads(threads), threads == 0) {}
 };

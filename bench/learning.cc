@@ -89,9 +89,9 @@ SacConfig BareSac(const Widths& hidden, int64_t batch) {
   return config;
 }
 
-/// Operations of a round. Each of two critics: forward at s' with the targets, forward and backward
-/// at (s, a), and forward and backward to the inputs for the actor. Actor: forward at s', forward
-/// and backward at s.
+/// Operations of a round. Each of two critics: forward at s' with the targets; forward and backward
+/// at (s, a); forward and backward to the inputs, for the actor. Actor: forward at s', forward and
+/// backward at s.
 double RoundFlops(const SacConfig& config, const EnvSpec& spec) {
   const int D = spec.obs_size, A = spec.action_size();
   const MultiplyAdds critic(config.Shape(D + A, 1)), actor(config.Shape(D, 2 * A));

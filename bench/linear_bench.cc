@@ -1,6 +1,6 @@
-// The three products of a linear layer in four implementations: our kernels on each instruction
-// set, Eigen, libxsmm (where it is installed), and a register tile in plain C++ that the compiler
-// vectorises.
+// The three products of a linear layer in four implementations. These are our kernels on each
+// instruction set, Eigen, libxsmm (where it is installed), and a register tile in plain C++ that
+// the compiler vectorises.
 //
 // This file is compiled for the processor of the building machine.
 //

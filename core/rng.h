@@ -8,9 +8,9 @@
 
 namespace upswing {
 
-/// A named stream of random numbers: xoshiro256++ (Blackman and Vigna, 2021), seeded through
-/// SplitMix64 from the run's seed, the name of its use and an index (an environment, an episode).
-/// Two uses with different names or indices never share a stream.
+/// A named stream of random numbers: xoshiro256++ (Blackman and Vigna, 2021). SplitMix64 seeds it
+/// from the run's seed, the name of its use, and an index (an environment, an episode). Two uses
+/// with different names or indices never share a stream.
 class Rng {
  public:
   Rng(uint64_t seed, std::string_view stream, uint64_t index = 0);

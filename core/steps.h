@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-/// Control steps, counted over all environments: N environments together make N of them at a time.
+/// Control steps are counted over all environments: each step of N environments counts as N.
 namespace upswing {
 
 /// More control steps than any training makes.

@@ -27,7 +27,7 @@ std::vector<std::byte> ReadFile(const std::filesystem::path& path);
 /// Reads a whole file as text. Throws BadInput if that fails.
 std::string ReadTextFile(const std::filesystem::path& path);
 
-/// Error for a system call that failed with `error_number` (errno). `what` is what it was to do,
+/// Error for a system call that failed with `error_number` (errno). `what` describes the failure,
 /// such as "cannot write". Returns BadInput if another path could work, such as for a missing
 /// folder or permission. Returns Failure if the work itself failed, such as on a full disk.
 Error PathError(std::string_view what, const std::filesystem::path& path, int error_number);

@@ -123,8 +123,8 @@ TEST(Lease, ThatOfALivingProcessOfThisHostDoesNotRunOut) {
   EXPECT_FALSE(Lease::Take(path, "another one"));
 }
 
-// Two processes can hold a lease until they renew it: one gives back a new lease that it moved away
-// by mistake, and another takes the free name meanwhile.
+// Two processes can hold a lease until they renew it. One of them gives back a new lease that it
+// moved away by mistake, and another takes the free name meanwhile.
 TEST(Lease, OneOfManyThatFindItLostGetsIt) {
   const TempFolder folder;
   {

@@ -28,7 +28,7 @@ void AppendChunk(std::string& out, const char* type, const std::string& data) {
   AppendNumber(out, static_cast<uint32_t>(crc32(0, bytes, static_cast<uInt>(body.size()))));
 }
 
-/// The one of left, above and above left that is nearest to left + above - above left.
+/// Picks the neighbour (left, above or above left) nearest to left + above - above left.
 int Paeth(int left, int above, int corner) {
   const int p = left + above - corner;
   const int a = std::abs(p - left), b = std::abs(p - above), c = std::abs(p - corner);

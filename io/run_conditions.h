@@ -29,7 +29,7 @@ struct RunConditions {
 /// of threads, and version.
 std::string BeginFacts(int threads, const std::string& version);
 
-/// Facts for the last log line of a training: its seconds, and the share of them in which its
+/// Facts for the last log line of a training: its seconds, and the share of that time in which its
 /// threads worked.
 std::string EndFacts(double seconds, double busy);
 

@@ -50,8 +50,8 @@ class RunFolder {
                      Tensors& checkpoint);
 
   /// Opens a run after its checkpoint has been loaded. The caller holds the run's FolderLock.
-  /// Throws BadInput and changes nothing if a table is shorter than its size in the checkpoint, or
-  /// if a link shares it with another folder (see AppendFile).
+  /// Throws BadInput and changes nothing if a table is shorter than its size in the checkpoint. The
+  /// same holds if a link shares it with another folder (see AppendFile).
   RunFolder(std::filesystem::path path, const Tensors& checkpoint);
   /// Writes the rows that are not in the files yet, even after a failed training.
   ~RunFolder();
@@ -63,8 +63,8 @@ class RunFolder {
     return run / kCheckpoint;
   }
 
-  /// Adds rows to the tables. Episode rows, of which there are thousands a second, are written with
-  /// the next row of metrics, with the next checkpoint, or when many are waiting.
+  /// Adds rows to the tables. Episodes end thousands of times a second. Their rows are written with
+  /// the next row of metrics or checkpoint, or when many are waiting.
   void LogMetrics(const Row& row);
   void LogEpisode(const Row& row);
   void LogEvaluation(const Row& row);
@@ -82,7 +82,8 @@ class RunFolder {
     std::string pending;               // rows that are not in the file yet
     void Flush();
   };
-  /// Appends a row in the order of the table's own columns, which may be those of another version.
+  /// Appends a row in the order of the table's own columns. Another version may have begun the
+  /// table.
   void AppendRow(Table& table, const Row& row);
 
   std::filesystem::path path_;

@@ -21,9 +21,10 @@ constexpr double kEpsilon = std::numeric_limits<Real>::epsilon();
 
 size_t Size(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
 
-/// Compares each kernel with its definition as plain loops in double, on each instruction set of
-/// this machine, in the number type of this build (nn/real.h). The test parameter is the gap after
-/// each row of a table, in numbers. Without gaps, a sanitizer detects accesses beyond the last row.
+/// Compares each kernel with its definition as plain loops in double. It runs on each instruction
+/// set of this machine, in the number type of this build (nn/real.h). The test parameter is the gap
+/// after each row of a table, in numbers. Without gaps, a sanitizer detects accesses beyond the
+/// last row.
 class KernelTest : public ::testing::TestWithParam<std::tuple<std::string, int>> {
  public:
   static int Gap() { return std::get<1>(GetParam()); }
@@ -129,7 +130,7 @@ void CheckLinear(int B, int in, int out) {
 }
 
 TEST_P(KernelTest, LinearLayersMatchTheirDefinitions) {
-  // Sizes down to 1, some of them multiples of tiles and registers.
+  // Sizes down to 1. Some are multiples of tiles and registers.
   for (const auto& [B, in, out] : std::vector<std::tuple<int, int, int>>{
            {1, 1, 1}, {1, 8, 256}, {2, 3, 130}, {3, 5, 7}, {7, 64, 31}, {15, 8, 9}, {33, 65, 1}}) {
     CheckLinear(B, in, out);

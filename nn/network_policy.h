@@ -113,8 +113,8 @@ class NetworkPolicy : public Policy {
   /// samples, and the checksum if there is one. Memory is proportional to the file's size. Throws
   /// BadInput.
   ///
-  /// Only the checksum detects a changed parameter that moves no sample output by more than
-  /// rounding, such as a parameter of a unit that no sample activates.
+  /// Some changed parameters move no sample output by more than rounding, such as a parameter of a
+  /// unit that no sample activates. Only the checksum detects them.
   static NetworkPolicy From(const Tensors& file);
 
  private:

@@ -30,7 +30,7 @@ std::string FittedTitle(const Figure& figure);
 
 /// Whether the panel needs a legend: one of its lines has a name.
 bool HasLegend(const Panel& panel);
-/// Height of the legend below a heat map; 0 for a panel without a heat map.
+/// Height of the legend below a heat map; 0 without a heat map or a legend.
 double LegendBelow(const Panel& panel);
 /// Space for labels and legend below a panel's axes.
 double BottomMargin(const Panel& panel);

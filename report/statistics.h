@@ -8,8 +8,8 @@
 
 #include "core/sample.h"
 
-/// Statistics over independent runs, as Agarwal, Schwarzer, Castro, Courville and Bellemare
-/// recommend (2021, "Deep Reinforcement Learning at the Edge of the Statistical Precipice").
+/// Statistics over independent runs. Source: Agarwal, Schwarzer, Castro, Courville and Bellemare
+/// (2021), "Deep Reinforcement Learning at the Edge of the Statistical Precipice".
 /// docs/howto/compare.md has the formulas. A score may be infinite (a run that never solved its
 /// task), but not NaN.
 namespace upswing {
@@ -19,12 +19,12 @@ inline constexpr int64_t kResamples = 10000;  // default limit on bootstrap resa
 /// Scores of one agent. Each task is a stratum with the scores of its runs.
 using Strata = std::vector<std::vector<double>>;
 
-/// How many resamples a bootstrap takes: `most`, or fewer in inverse proportion where there are
-/// more than 1,000 scores, whose intervals are narrow.
+/// Number of resamples of a bootstrap: `most`, or fewer in inverse proportion if there are more
+/// than 1,000 scores. More scores already give narrow intervals.
 int64_t ResamplesOf(const Strata& strata, int64_t most = kResamples);
 
 /// An estimated statistic with its 95% interval. There is no interval if a stratum has fewer than
-/// two runs, or if all resamples agree, because the runs then give no information about the error.
+/// two runs or if all resamples agree. The runs then give no information about the error.
 struct Estimate {
   double value = 0;
   std::optional<Interval> interval = {};

@@ -20,8 +20,8 @@ void ExpectSame(const Estimate& got, const nlohmann::json& expected, const char*
   const auto value = expected["value"].get<double>();
   EXPECT_NEAR(got.value, value, 1e-12 * std::max(1.0, std::abs(value)));
   // The end of an interval over R resamples has a standard deviation of about s / √R. The file has
-  // the mean of five bootstraps of 2,000 resamples, and the largest distance of one of them from
-  // the mean, typically 1.2 s / √2000.
+  // the mean of five bootstraps of 2,000 resamples, and the largest distance of a bootstrap from
+  // that mean, typically 1.2 s / √2000.
   //
   // Our own 10,000 resamples differ from that mean by √2 s / √10000, which is half that distance.
   // The tolerance is four times as much, 4 standard deviations, so that chance does not exceed it.

@@ -66,8 +66,8 @@ struct Evaluation {
 
 /// A figure of episodes and evaluations: its names in files, and its places in the structs.
 struct EvaluationFigure {
-  /// When the figure is known: always; for episodes that end at the goal or settled, in tasks with
-  /// a goal to hold; or for policies that estimate values.
+  /// When the figure is known. kUpright, kSettled: for episodes that end at the goal or settled, in
+  /// tasks with a goal to hold. kValued: for policies that estimate values.
   enum class Known { kAlways, kUpright, kSettled, kValued };
 
   const char* name;    // name in JSON and in the table of episodes

@@ -15,9 +15,9 @@ namespace upswing {
 /// 0.
 double FeatureRank(Matrix<const float> features);
 
-/// Share of dormant units: columns of the features (B × W) after ReLU whose mean activation is at
-/// most 0.025 of the layer's mean (Sokar et al., 2023, Definition 3.1). It is 1 if all features are
-/// 0.
+/// Share of dormant units (Sokar et al., 2023, Definition 3.1). A unit is a column of the features
+/// (B × W) after ReLU. It is dormant if its mean activation is at most 0.025 of the layer's mean.
+/// The share is 1 if all features are 0.
 double DormantShare(Matrix<const float> features);
 
 /// Adds FeatureRank and DormantShare of the last minibatch's features (batch × width) to the

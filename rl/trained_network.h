@@ -45,9 +45,9 @@ class TrainedNetwork {
   void Backward(Matrix<const float> dy, RowRange rows, Matrix<float> dx = {}) {
     network_.BackwardInputs(theta_, transposed_, dy, rows, activations_, dx);
   }
-  /// Makes one step of Adam along the gradient that Backward has computed for the inputs x (B × D).
-  /// θ moves, and `target` follows it with rate tau. Returns the gradient's norm before it is
-  /// clipped to max_norm. Throws Failure if the norm is not finite.
+  /// Makes one step of Adam along the gradient of Backward for the inputs x (B × D). θ moves, and
+  /// `target` follows it with rate tau. Returns the gradient's norm before it is clipped to
+  /// max_norm. Throws Failure if the norm is not finite.
   double Step(Matrix<const float> x, double learning_rate, double max_norm, std::span<float> target,
               double tau, ThreadPool& pool);
 

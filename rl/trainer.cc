@@ -47,7 +47,7 @@ bool Trainer::Step() {
   s.steps += env_.num_envs();
   s.seconds += SecondsSince(begin);
 
-  // Do the work that is due: each interval of which a multiple has been reached or passed.
+  // Do the work that is due: a multiple of its interval has been reached or passed.
   CountEpisodes();
   if (IsDue(config.log_every)) {
     const Metrics metrics = agent_.TakeMetrics();

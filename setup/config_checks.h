@@ -8,8 +8,8 @@
 
 namespace upswing {
 
-/// Throws BadInput that begins with `where` if settings contradict each other although each is in
-/// its range, or if they do not exist in the task.
+/// Throws BadInput that begins with `where` if settings contradict each other, although each is in
+/// its range. Also throws it if a setting does not exist in the task.
 void CheckSettings(Config& config, const std::string& where);
 
 /// Warnings, one per line, about settings with which the agent would hardly learn.
