@@ -8,7 +8,7 @@ namespace upswing {
 /// success, passed and solved.
 struct EvaluationRule {
   double seconds = 0;  // length of an evaluation episode, s; a termination ends it earlier
-  // The return is the undiscounted reward of this first part of an episode, s.
+  /// The return is the undiscounted reward of this first part of an episode, s.
   double return_seconds = 0;
   // An episode succeeds if it is at the goal for the last `hold_seconds` of the episode. If
   // `hold_seconds` is 0, an episode succeeds if its return is at least `solved_return`.

@@ -134,7 +134,7 @@ class Tensors {
 
   std::string where_;
   std::map<std::string, Tensor> tensors_;
-  // Bytes that tensors_ views and that have no other owner.
+  /// Bytes that tensors_ views and that have no other owner.
   std::deque<std::vector<std::byte>> kept_;
 };
 

@@ -34,7 +34,7 @@ class ThreadPool {
   void ParallelFor(int n, const std::function<void(int)>& task);
 
  private:
-  // Defined in thread_pool.cc: this header needs no threads, which a browser may lack.
+  /// Defined in thread_pool.cc: this header needs no threads, which a browser may lack.
   struct Workers;
 
   int threads_;

@@ -44,7 +44,7 @@ class ThreadTuner {
   std::vector<int> choices_;  // 1, 2, 4, … threads
   size_t chosen_ = 0;         // index in choices_ of the number in use
   size_t candidate_ = 0;  // index in choices_ under trial; equal to chosen_ if no trial is running
-  // Whether the trial is testing more threads; it tests fewer threads afterwards.
+  /// Whether the trial is testing more threads; it tests fewer threads afterwards.
   bool upwards_ = true;
   int calls_ = 0;                       // calls in the current block
   std::array<double, 2> seconds_ = {};  // (chosen, candidate) time in this round

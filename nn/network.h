@@ -11,7 +11,7 @@ namespace upswing {
 
 /// The shape of a network: D → hidden… → A, or dueling, D → hidden… → { streams → 1, streams → A }.
 struct NetworkShape {
-  // Largest number of units in a layer, of inputs and of outputs.
+  /// Largest number of units in a layer, of inputs and of outputs.
   static constexpr int64_t kMaxWidth = 4096;
   static constexpr size_t kMaxLayers = 16;  // largest number of hidden layers
 

@@ -36,8 +36,8 @@ struct EvaluationEpisode {
   double goal_variation = 0;  // total variation of the torque per second
   double goal_changes = 0;    // number of torque changes per second
   double value = 0;           // largest value of the first observation, in units of reward
-  // Σ γᵏ r over the whole episode. `value` estimates it if the policy was trained with the same
-  // reward.
+  /// Σ γᵏ r over the whole episode. `value` estimates it if the policy was trained with the same
+  /// reward.
   double discounted_return = 0;
   std::vector<double> terms;  // (K) sum of each reward term over the first return_seconds
   std::vector<double> tilt;   // (bodies) mean lean over the last kSteadyTiltSeconds, rad

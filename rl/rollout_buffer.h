@@ -34,7 +34,7 @@ class RolloutBuffer {
 
   // The whole rollout, once it is full.
   Matrix<const float> all_obs() const { return All(obs_, obs_size_); }  // (T·N × D)
-  // (T·N × D) true successors
+  /// (T·N × D) true successors
   Matrix<const float> all_next_obs() const { return All(next_obs_, obs_size_); }
   Matrix<const float> all_actions() const { return All(action_, action_size_); }  // (T·N × A)
   Matrix<const float> log_probs() const { return Steps(log_prob_); }              // (T × N)
