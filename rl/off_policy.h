@@ -47,8 +47,8 @@ class OffPolicyAgent : public Agent {
   /// weighted mean error 0. `errors` is the weighted sum of Q(s, a) - y, clipped if the loss clips.
   ///
   /// Online and target values shift together, so that the target network's lag does not slow their
-  /// common level. This is reward centering (Naik et al., 2024, Eq 12). Its average reward r̄ is (1
-  /// - γ) times the sum of all shifts.
+  /// common level. This is reward centering (Naik et al., 2024, Eq 12). Its average reward r̄ is
+  /// (1 - γ) times the sum of all shifts.
   float CenteringShift(const Minibatch& batch, double errors) const;
   /// Adds a minibatch's mean loss, mean Q and mean |TD error| to the metrics. Throws Failure if the
   /// loss is not finite.
