@@ -1,4 +1,4 @@
-// Cases of `upswing bench` for the parts of an agent and for all of it: act, replay, train.
+// Cases of `upswing bench` for an agent and its parts: act, replay, train.
 #include <fmt/format.h>
 
 #include <memory>
@@ -21,7 +21,7 @@ BenchCase ActCase(int batch) {
   constexpr int kHidden = 256, kStream = 128;
   const NetworkShape shape{
       kObservationSize, {kHidden, kHidden}, kBenchActions, false, Activation::kRelu, kStream};
-  // The value stream is left out: half of the streams' hidden layer, and the value.
+  // Acting skips the value stream: half of the streams' hidden layer, and the value layer.
   const double multiply_adds = Network(shape).multiply_adds() - kStream * (kHidden + 1);
   return {
       .name = fmt::format("act/{0}-{0}/batch:{1}", kHidden, batch),
@@ -48,7 +48,7 @@ BenchCase ActCase(int batch) {
 }
 
 BenchCase TrainCase(const std::string& agent, const std::string& physics, int threads) {
-  // Without evaluations.
+  // Settings without evaluations.
   const Config config = BuildConfig({}, {{"agent", agent},
                                          {"physics", physics},
                                          {"steps", "1000000000"},

@@ -15,7 +15,7 @@
 namespace upswing {
 namespace {
 
-/// Random torque levels for a number of control steps, which then come again.
+/// Random torque levels for kSteps control steps, repeated in a cycle.
 class Torques {
  public:
   explicit Torques(int num_envs) : num_envs_(static_cast<size_t>(num_envs)) {
@@ -26,7 +26,7 @@ class Torques {
     }
   }
 
-  /// Of the next control step (N), N·m.
+  /// Torques (N) of the next control step, N·m.
   std::span<const double> Next() {
     step_ = (step_ + 1) % kSteps;
     return std::span(values_).subspan(step_ * num_envs_, num_envs_);
@@ -38,8 +38,8 @@ class Torques {
   std::vector<double> values_;  // (kSteps, N)
 };
 
-/// MuJoCo's steps as the environment makes them: with what the task says of each fourth, a few
-/// percent of the time.
+/// MuJoCo's steps as the environment makes them. Includes the task's calculations at every fourth
+/// step, a few percent of the time.
 BenchWork PhysicsInMuJoCo(int num_envs, int threads) {
   const auto pool = std::make_shared<BenchPool>(threads);
   PendulumEnvConfig config;
@@ -51,7 +51,7 @@ BenchWork PhysicsInMuJoCo(int num_envs, int threads) {
   return [=, keep = pool] { physics->Step(torques->Next(), *result); };
 }
 
-/// The closed form's steps alone, in chunks as the environment shares them out.
+/// Only the steps of the closed form, in chunks as the environment shares them.
 BenchWork PhysicsInClosedForm(int num_envs, int threads) {
   const auto n = static_cast<size_t>(num_envs);
   const auto batch = std::make_shared<ClosedFormBatch>(n);
@@ -67,7 +67,7 @@ BenchWork PhysicsInClosedForm(int num_envs, int threads) {
   };
 }
 
-/// Runge-Kutta steps, four to a control period.
+/// Case of Runge-Kutta steps, four per control period.
 BenchCase PhysicsCase(const std::string& physics, int num_envs, int threads) {
   const bool closed_form = &FindEngine(physics, "physics") == &kClosedForm;
   return {.name = fmt::format("physics/{}/envs:{}/threads:{}", physics, num_envs, threads),
@@ -80,7 +80,8 @@ BenchCase PhysicsCase(const std::string& physics, int num_envs, int threads) {
           }};
 }
 
-/// Whole environment steps: physics, observation, reward and, at the end of episodes, reset.
+/// Case of whole environment steps: physics, observation, reward and, at the end of episodes,
+/// reset.
 BenchCase EnvCase(const std::string& physics, int num_envs, int threads) {
   return {.name = fmt::format("env/{}/envs:{}/threads:{}", physics, num_envs, threads),
           .items = "steps",

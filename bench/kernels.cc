@@ -1,4 +1,4 @@
-// Cases of `upswing bench kernels`, and the peak that they are measured against.
+// Cases of `upswing bench kernels`, and the peak rate that they are compared with.
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 
@@ -24,7 +24,7 @@ AlignedVector<float> RandomNumbers(size_t n, Rng& rng) {
   return numbers;
 }
 
-/// A linear layer of `width` inputs and outputs, with a batch of B.
+/// A linear layer with `width` inputs and outputs and a batch of B.
 struct Layer {
   Layer(int width, int B)
       : x_values(RandomNumbers(static_cast<size_t>(B * width), rng)),
@@ -40,10 +40,10 @@ struct Layer {
   Rng rng{1, "benchmark"};
   AlignedVector<float> x_values, w_values, y_values, dw_values, bias;
   Matrix<const float> x, w;  // (B × width), (width × width)
-  Matrix<float> y, dw;       // the same
+  Matrix<float> y, dw;       // (B × width), (width × width)
 };
 
-/// The three products of a layer, as a gradient step has them.
+/// Adds the three products of a linear layer, as in a gradient step.
 void AddProducts(int width, int B, BenchCases& cases) {
   const auto add = [&](const char* name, auto multiply) {
     cases.push_back({.name = fmt::format("kernels/{0}/{1}x{1}/batch:{2}", name, width, B),
@@ -59,10 +59,10 @@ void AddProducts(int width, int B, BenchCases& cases) {
   add("backward_weight", [](Layer& l) { LinearBackwardWeight(l.x, l.x, l.dw); });
 }
 
-/// A whole step of Adam with Polyak averaging on n parameters.
+/// Case of a whole step of Adam with Polyak averaging on n parameters.
 BenchCase AdamCase(size_t n) {
-  constexpr double kFlops = 16;   // a parameter, a division and a square root among them
-  constexpr double kNumbers = 9;  // a parameter: five read, four written
+  constexpr double kFlops = 16;   // per parameter, with a division and a square root
+  constexpr double kNumbers = 9;  // per parameter: five read, four written
   const auto count = static_cast<double>(n);
   return {.name = fmt::format("kernels/adam_polyak/{}", n),
           .items = "passes",
@@ -93,8 +93,8 @@ BenchCase TransposeCase(int width) {
           }};
 }
 
-/// The STREAM triad on three arrays of so many bytes in all: what the memory gives that they fit
-/// into.
+/// Case of the STREAM triad on three arrays of `bytes` bytes in all. It measures the bandwidth of
+/// the memory that they fit into.
 BenchCase TriadCase(const char* memory, size_t bytes) {
   const size_t n = bytes / (3 * sizeof(float)) / 16 * 16;
   return {.name = fmt::format("kernels/triad/{}", memory),
@@ -108,7 +108,8 @@ BenchCase TriadCase(const char* memory, size_t bytes) {
           }};
 }
 
-/// Bytes of the data cache of a level, the largest for level 0; `otherwise` if it is not known.
+/// Bytes of the data cache of a level; level 0: the largest cache. `otherwise` if the size is
+/// unknown.
 size_t CacheBytes(int level, size_t otherwise) {
   size_t bytes = 0;
   for (const auto& cache : benchmark::CPUInfo::Get().caches) {
@@ -130,7 +131,7 @@ BenchCases KernelCases(const BenchOptions& /*options*/) {
   for (const size_t parameters : {13'000, 136'000}) cases.push_back(AdamCase(parameters));
   for (const int width : {64, 128, 256}) cases.push_back(TransposeCase(width));
 
-  // Half of the L2 cache; four times the largest cache, within bounds.
+  // Sizes: half of the L2 cache, and four times the largest cache, within bounds.
   constexpr size_t kMiB = 1 << 20;
   const size_t in_l2 = CacheBytes(2, kMiB / 2) / 2;
   const size_t in_dram = std::clamp(4 * CacheBytes(0, 32 * kMiB), 128 * kMiB, 1024 * kMiB);
@@ -140,8 +141,9 @@ BenchCases KernelCases(const BenchOptions& /*options*/) {
 }
 
 double MeasurePeakGflops(int threads) {
-  constexpr std::chrono::milliseconds kDuration(300);  // time enough to be alone on all processors
-  constexpr int64_t kRounds = 1 << 19;                 // a few milliseconds
+  // Long enough to be alone on all processors for some rounds.
+  constexpr std::chrono::milliseconds kDuration(300);
+  constexpr int64_t kRounds = 1 << 19;  // a few milliseconds
   using Clock = std::chrono::steady_clock;
   ThreadPool pool(threads);
   double best = 0;
@@ -150,7 +152,7 @@ double MeasurePeakGflops(int threads) {
     std::atomic<int64_t> multiply_adds{0};
     std::vector<Clock::time_point> began(static_cast<size_t>(threads));
     pool.ParallelFor(threads, [&](int thread) {
-      // None begins before all are there: a thread takes no second task before it ends its first.
+      // Wait until all threads are here. No thread takes a second task before its first has ended.
       ++arrived;
       while (arrived < threads) std::this_thread::yield();
       began[static_cast<size_t>(thread)] = Clock::now();

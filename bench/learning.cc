@@ -1,5 +1,5 @@
-// Cases of `upswing bench` for learning: gradient, sac, ppo. Agents are in the form that peers have
-// too: bare, without extensions.
+// Cases of `upswing bench` for learning: gradient, sac, ppo. Agents have no extensions, so that
+// they are comparable with other libraries.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -16,9 +16,9 @@
 namespace upswing {
 namespace {
 
-using Widths = std::vector<int64_t>;  // of the hidden layers
+using Widths = std::vector<int64_t>;  // widths of the hidden layers
 
-/// Multiply-adds for one row: of all layers, and of the first.
+/// Multiply-adds per row: of all layers, and of the first layer.
 struct MultiplyAdds {
   explicit MultiplyAdds(const NetworkShape& shape)
       : all(Network(shape).multiply_adds()),
@@ -32,7 +32,7 @@ std::string NameOf(std::string_view what, const AgentConfig& config, int threads
                      threads);
 }
 
-/// An off-policy agent samples a minibatch and learns from it.
+/// Case of an off-policy agent that samples a minibatch and learns from it.
 template <typename Learner, typename LearnerConfig>
 BenchCase UpdateCase(std::string_view what, const char* items, double flops,
                      const LearnerConfig& config, const EnvSpec& spec,
@@ -68,8 +68,8 @@ DqnConfig BareDqn(bool dueling, const Widths& hidden, int64_t batch) {
   return config;
 }
 
-/// Operations of a gradient step: all forward passes, the gradients of all inputs but the
-/// observations, the gradients of all weights.
+/// Operations of a gradient step: all forward passes, the gradients of all inputs except the
+/// observations, and the gradients of all weights.
 double UpdateFlops(const DqnConfig& config) {
   const MultiplyAdds network(config.Shape(kObservationSize, kBenchActions));
   const double forward = (config.double_q ? 3 : 2) * network.all;
@@ -89,8 +89,9 @@ SacConfig BareSac(const Widths& hidden, int64_t batch) {
   return config;
 }
 
-/// Operations of a round. Critics, two each: at s' with the targets, forward and backward at s, a;
-/// forward and backward to the inputs for the actor. Actor: at s', forward and backward at s.
+/// Operations of a round. Each of two critics: forward at s' with the targets; forward and backward
+/// at (s, a); forward and backward to the inputs, for the actor. Actor: forward at s', forward and
+/// backward at s.
 double RoundFlops(const SacConfig& config, const EnvSpec& spec) {
   const int D = spec.obs_size, A = spec.action_size();
   const MultiplyAdds critic(config.Shape(D + A, 1)), actor(config.Shape(D, 2 * A));
@@ -98,7 +99,7 @@ double RoundFlops(const SacConfig& config, const EnvSpec& spec) {
   return 2 * static_cast<double>(config.batch) * (critics + 4 * actor.all - actor.first);
 }
 
-/// Rollouts of about 4096 steps, which minibatches divide, and two epochs.
+/// Settings with rollouts of about 4096 steps, a multiple of the minibatch, and two epochs.
 PpoConfig BarePpo(const Widths& hidden, int64_t batch) {
   PpoConfig config;
   config.hidden = hidden;
@@ -110,15 +111,15 @@ PpoConfig BarePpo(const Widths& hidden, int64_t batch) {
   return config;
 }
 
-/// Operations of policy and value of one step: the forward pass when the rollout is made or valued,
-/// and in each epoch forward, backward and the gradient of the weights.
+/// Operations of policy and value per step: the forward pass of the rollout, and forward, backward
+/// and weight gradients in each epoch.
 double StepFlops(const PpoConfig& config, int obs_size) {
   const MultiplyAdds network(config.Shape(obs_size, 1));
   const double epoch = 3 * network.all - network.first;
   return 4 * (network.all + static_cast<double>(config.epochs) * epoch);
 }
 
-/// A rollout, and what is learned from it.
+/// Case of a rollout and the learning from it.
 BenchCase RolloutCase(const PpoConfig& config, int threads) {
   constexpr int kEnvs = 4;
   struct Parts {

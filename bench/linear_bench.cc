@@ -1,6 +1,8 @@
-// The three products of a linear layer in four implementations: our kernels on each kind of vector
-// instructions, Eigen, libxsmm (where it is installed) and a register tile in plain C++ that the
-// compiler vectorises. This file is compiled for the processor of the building machine.
+// The three products of a linear layer in four implementations. These are our kernels on each
+// instruction set, Eigen, libxsmm (where it is installed), and a register tile in plain C++ that
+// the compiler vectorises.
+//
+// This file is compiled for the processor of the building machine.
 //
 //   build/release/nn_bench --benchmark_filter=256x256 --benchmark_repetitions=5
 #include <benchmark/benchmark.h>
@@ -28,8 +30,8 @@ namespace {
 
 enum class Kind { kForward, kBackwardInput, kBackwardWeight };
 
-/// C (M × N) = A (M × K) · B (K × N), with a bias (N) added to each row if there is one. A is
-/// stored as (K × M) if `a_transposed`, which the gradient of the weights wants.
+/// C (M × N) = A (M × K) · B (K × N), plus a bias (N) on each row if there is one. A is stored as
+/// (K × M) if `a_transposed`, as the gradient of the weights needs it.
 struct Task {
   std::string name;
   bool a_transposed, has_bias;
@@ -43,7 +45,7 @@ struct Task {
   double flops() const { return 2.0 * M() * N() * K(); }
 };
 
-/// A task with its numbers, at a width of inputs and outputs and a batch of B.
+/// A task with its numbers, for `width` inputs and outputs and a batch of B.
 struct Problem {
   Problem(Kind kind, int width, int B) {
     Rng rng(1, "benchmark");
@@ -71,7 +73,7 @@ struct Problem {
   Task task;
 };
 
-/// One library's implementation of a task; the constructor makes its preparations.
+/// One library's implementation of a task. Ours, WithEigen and so on prepare it.
 using Doer = std::function<void()>;
 
 // ---- Our kernels.
@@ -101,7 +103,7 @@ Doer WithEigen(const Task& t) {
   };
 }
 
-// ---- libxsmm, whose matrices go column after column: Cᵀ = Bᵀ Aᵀ.
+// ---- libxsmm. Its matrices are column-major: Cᵀ = Bᵀ Aᵀ.
 
 #ifdef UPSWING_HAS_LIBXSMM
 Doer WithLibxsmm(const Task& t) {
@@ -115,7 +117,7 @@ Doer WithLibxsmm(const Task& t) {
       libxsmm_smmdispatch(t.N(), t.M(), t.K(), &lda, &ldb, &ldc, &alpha, &beta, &flags, nullptr);
   if (kernel == nullptr) return nullptr;
   return [&t, kernel] {
-    // Added to, C begins with the bias in each row.
+    // The kernel adds to C, so C begins with the bias in each row.
     for (int i = 0; t.has_bias && i < t.M(); ++i) std::ranges::copy(t.bias, t.c.row(i).begin());
     kernel(t.b.data(), t.a.data(), t.c.data());
   };
@@ -126,7 +128,8 @@ Doer WithLibxsmm(const Task& t) {
 
 constexpr int kTileCols = 32;
 
-/// The tile of C at (m, n), kRows × kTileCols: sums that the compiler can keep in registers.
+/// Computes the tile of C at (m, n), kRows × kTileCols, in sums that the compiler can keep in
+/// registers.
 template <int kRows>
 void PlainTile(const Task& t, int m, int n) {
   const ptrdiff_t a_m = t.a_transposed ? 1 : t.a.stride();
@@ -146,7 +149,7 @@ void PlainTile(const Task& t, int m, int n) {
   }
 }
 
-/// For sizes that tiles divide: N by kTileCols, M by 8, or any M, row by row.
+/// For sizes that tiles divide: N by kTileCols, and M by 8; any other M goes row by row.
 Doer WithPlainTile(const Task& t) {
   return [&t] {
     for (int n = 0; n < t.N(); n += kTileCols) {
@@ -157,11 +160,11 @@ Doer WithPlainTile(const Task& t) {
   };
 }
 
-// ---- All of them, checked against one another and then measured.
+// ---- All implementations, checked against each other and then measured.
 
 struct Hand {
   std::string name;
-  std::string simd;  // the path to take; empty: none of ours
+  std::string simd;  // path for our kernels; empty: another library
   Doer (*make)(const Task&);
 };
 
@@ -176,7 +179,7 @@ std::vector<Hand> Hands() {
   return hands;
 }
 
-/// Largest difference from sums in double, relative to what rounding allows for K terms of size 1.
+/// Largest error against sums in double, relative to the allowed rounding of K terms of size 1.
 double Error(const Task& t) {
   double largest = 0;
   for (int i = 0; i < t.M(); ++i) {
@@ -191,7 +194,7 @@ double Error(const Task& t) {
   return largest / (4 * std::numeric_limits<float>::epsilon() * (t.K() + 8.0));
 }
 
-/// Whether this implementation is correct; registers its benchmark if it is.
+/// Registers the benchmark of an implementation if it is correct. Returns whether it is correct.
 bool CheckAndRegister(const Hand& hand, const std::shared_ptr<Problem>& problem) {
   if (!hand.simd.empty()) UseSimdPath(hand.simd);
   const std::string name = hand.name + "/" + problem->task.name;

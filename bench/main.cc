@@ -19,7 +19,7 @@
 namespace upswing {
 namespace {
 
-/// A part of the benchmarks, by the name that the user types.
+/// A part of the benchmarks, named as the user types it.
 struct BenchPart {
   std::string name, help;
   BenchCases (*cases)(const BenchOptions&);
@@ -39,8 +39,8 @@ std::vector<BenchPart> Parts() {
   };
 }
 
-/// Hands the cases to Google Benchmark, which calls back several times for each of them. At a
-/// signal to stop, the measurement that runs is given up, and those that follow.
+/// Passes the cases to Google Benchmark, which calls back several times per case. A signal to stop
+/// ends the current measurement and skips all later ones.
 class BenchRunner {
  public:
   BenchRunner(const BenchCases& cases, const BenchOptions& options,
@@ -72,7 +72,7 @@ class BenchRunner {
     reporter_.ShowProgress(c);
     try {
       if (prepared_ != &c) {
-        work_ = nullptr;  // first free what it holds
+        work_ = nullptr;  // first free the memory of the previous case
         work_ = c.prepare();
         prepared_ = &c;
       }
@@ -82,7 +82,7 @@ class BenchRunner {
         Stop(state);
         break;
       }
-    } catch (...) {  // none may pass through Google Benchmark
+    } catch (...) {  // no exception may pass through Google Benchmark
       error_ = std::current_exception();
       return Stop(state);
     }
@@ -94,7 +94,7 @@ class BenchRunner {
     reporter_.Stop();
   }
 
-  /// Rates for the JSON file.
+  /// Adds rates for the JSON file.
   void Count(const BenchCase& c, benchmark::State& state) const {
     const auto calls = static_cast<double>(state.iterations());
     const auto rate = [&](const std::string& name, double amount) {
@@ -111,12 +111,12 @@ class BenchRunner {
   const BenchOptions& options_;
   const std::map<int, double>& peak_gflops_;
   BenchReporter reporter_;
-  const BenchCase* prepared_ = nullptr;  // the case that work_ is of
+  const BenchCase* prepared_ = nullptr;  // case of work_
   BenchWork work_;
   std::exception_ptr error_;
 };
 
-/// Throws BadInput for options that do not go together.
+/// Throws BadInput if options contradict each other.
 void CheckOptions(const BenchOptions& options) {
   const std::vector<std::string> names = NamesOf(Parts());
   for (const std::string& part : options.parts) {
@@ -225,7 +225,7 @@ constexpr CommandEntry kCommands[] = {
 }  // namespace
 }  // namespace upswing
 
-// An exception while another one is reported ends the program.
+// An exception during the report of another exception ends the program.
 int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape)
   return upswing::MainProgram(argc, argv, upswing::kCommands, "");
 }

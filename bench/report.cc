@@ -14,7 +14,7 @@
 namespace upswing {
 namespace {
 
-/// Seconds with three digits and the unit that suits them.
+/// Formats seconds with three digits and a suitable unit.
 std::string FormatTime(double seconds) {
   if (seconds < 1e-6) return fmt::format("{:.3g} ns", 1e9 * seconds);
   if (seconds < 1e-3) return fmt::format("{:.3g} µs", 1e6 * seconds);
@@ -62,8 +62,8 @@ bool BenchReporter::ReportContext(const Context& context) {
 
 void BenchReporter::ReportRuns(const std::vector<Run>& runs) {
   if (stopped_ || runs.empty()) return;
-  // Names are ours alone, without the settings that Google Benchmark appends; threads are those of
-  // the work.
+  // Use our own names, without the settings that Google Benchmark appends, and the number of
+  // threads of the work.
   const BenchCase& measured = FindCase(runs.front().run_name.function_name);
   std::vector<Run> named = runs;
   for (Run& run : named) {

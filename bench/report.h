@@ -12,11 +12,11 @@
 
 namespace upswing {
 
-/// Prints a table as the cases are measured, and keeps what Google Benchmark writes as JSON.
+/// Prints a table while the cases are measured, and keeps Google Benchmark's JSON.
 class BenchReporter : public benchmark::BenchmarkReporter {
  public:
-  /// All have to outlive it. `peak_gflops`: by number of threads, where it was measured. Where the
-  /// JSON goes to standard output, no table is printed.
+  /// All arguments must outlive it. `peak_gflops` has the measured peaks by number of threads. If
+  /// the JSON goes to standard output, no table is printed.
   BenchReporter(const BenchCases& cases, const BenchOptions& options,
                 const std::map<int, double>& peak_gflops);
 
@@ -26,10 +26,10 @@ class BenchReporter : public benchmark::BenchmarkReporter {
 
   /// Shows on a terminal which case is being measured.
   void ShowProgress(const BenchCase& running);
-  /// What is reported from now on was not measured to its end.
+  /// Marks all later reports as incomplete measurements.
   void Stop() { stopped_ = true; }
   size_t cases_done() const { return done_; }
-  /// JSON of all that was reported, in Google Benchmark's format with our context in it. After
+  /// JSON of all reports in Google Benchmark's format, with our context in it. Call it after
   /// Finalize.
   std::string Json() const;
 
@@ -46,7 +46,7 @@ class BenchReporter : public benchmark::BenchmarkReporter {
   bool quiet_;
   bool stopped_ = false;
   size_t done_ = 0;
-  double seconds_done_ = 0;  // that they took
+  double seconds_done_ = 0;  // time of the cases that are done
   size_t name_width_ = 0;
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };

@@ -4,8 +4,8 @@
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "bench/roofline.cc"
-#include <hwy/foreach_target.h>  // includes this file once for each target
-// must come after foreach_target
+#include <hwy/foreach_target.h>  // includes this file once per target
+// must come after foreach_target.h
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
@@ -16,8 +16,8 @@ using Floats = hn::ScalableTag<float>;
 using Vec = hn::Vec<Floats>;
 
 int64_t MultiplyAddChains(int64_t rounds, float& result) {
-  // More than enough chains to hide the latency, few enough for 16 registers. Each tends to its own
-  // fixed point, so that no number overflows or becomes denormal.
+  // Enough chains to hide the latency, and few enough for 16 registers. Each chain converges to its
+  // own fixed point, so that no number overflows or becomes denormal.
   constexpr int kChains = 12;
   const Floats d;
   const Vec factor = hn::Set(d, 0.75F);
@@ -57,7 +57,7 @@ int64_t MultiplyAddChains(int64_t rounds, float& result) {
 }
 
 void Triad(std::span<const float> b, std::span<const float> c, float factor, std::span<float> a) {
-  assert(a.size() % 16 == 0);  // the widest vectors
+  assert(a.size() % 16 == 0);  // 16 floats fill the widest vectors
   HWY_DYNAMIC_DISPATCH(Triad)(b, c, factor, a);
 }
 

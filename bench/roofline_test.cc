@@ -17,7 +17,7 @@ INSTANTIATE_TEST_SUITE_P(Paths, RooflineTest, ::testing::ValuesIn(SimdPaths()),
                          [](const auto& info) { return info.param; });
 
 TEST_P(RooflineTest, MultiplyAddChainsCountWhatTheyDo) {
-  // x ← 0.75 x + 0.25 tends to 1 on every chain, from any start.
+  // On every chain and from any start, x ← 0.75 x + 0.25 converges to 1.
   float result = 0;
   const int64_t rounds = 100;
   const int64_t chains = MultiplyAddChains(rounds, result) / rounds;
@@ -32,7 +32,7 @@ TEST_P(RooflineTest, TriadAddsWhatItShould) {
     c[i] = 1 / static_cast<float>(i + 1);
   }
   Triad(b, c, 0.5F, a);
-  // Halving is exact, so one rounding is left, fused or not.
+  // Halving is exact, so only one rounding remains, with or without a fused multiply-add.
   for (size_t i = 0; i < a.size(); ++i) EXPECT_EQ(a[i], b[i] + 0.5F * c[i]);
 }
 

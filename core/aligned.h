@@ -6,8 +6,9 @@
 
 namespace upswing {
 
-/// Allocates on cache lines. The order of vectorised sums depends on alignment, so without this
-/// their last bit could change with an array's address.
+/// Allocates memory that begins on a cache line. The order of a vectorised sum depends on the
+/// alignment of its array. Without a fixed alignment, the last bit of a sum could depend on the
+/// array's address.
 template <typename T>
 struct AlignedAllocator {
   using value_type = T;
@@ -22,7 +23,7 @@ struct AlignedAllocator {
   bool operator==(const AlignedAllocator&) const = default;
 };
 
-/// A vector of numbers for the kernels.
+/// A vector with the alignment that the kernels need.
 template <typename T>
 using AlignedVector = std::vector<T, AlignedAllocator<T>>;
 

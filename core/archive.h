@@ -32,23 +32,24 @@ inline constexpr Bounds<T> kAnyNumber{std::numeric_limits<T>::lowest(),
 /// Saves or loads state under names. A component has one `void State(const Archive&)` for both
 /// directions, so that saving and loading cannot drift apart.
 ///
-/// Files are not trusted: every number has bounds, which no training exceeds. Loading throws
-/// BadInput at a number that is not finite or out of bounds, and saving throws Failure, as such a
-/// state is not worth keeping. Only floating-point arrays need no bounds; they must be finite
-/// anyway.
+/// Files are not trusted: every number has bounds that no training exceeds. Loading throws BadInput
+/// if a number is not finite or out of bounds. Saving throws Failure in that case, because such a
+/// state is not worth keeping. Only floating-point arrays need no bounds; they must be finite in
+/// any case.
 class Archive {
  public:
-  /// An archive that adds to `file`. Arrays are viewed, not copied: save before they change.
+  /// An archive that adds to `file`. It views arrays and does not copy them: write the file before
+  /// they change.
   static Archive Saver(Tensors& file) { return {&file, nullptr, ""}; }
   /// An archive that reads from `file`.
   static Archive Loader(const Tensors& file) { return {nullptr, &file, ""}; }
 
   bool loading() const { return source_ != nullptr; }
 
-  /// The same archive, with names that begin with `name/`.
+  /// This archive with `name/` added to the prefix of all names.
   Archive In(std::string_view name) const { return {target_, source_, Concat(prefix_, name, "/")}; }
 
-  /// An array whose size is known before it is loaded.
+  /// Saves or loads an array of known size.
   template <typename T>
   void Array(std::string_view name, std::span<T> values,
              std::type_identity_t<Bounds<T>> bounds) const {
@@ -62,7 +63,7 @@ class Archive {
     Array(name, values, kAnyNumber<T>);
   }
 
-  /// An array that loading resizes, of at most `max_size` numbers.
+  /// Saves or loads an array of at most `max_size` numbers. Loading resizes it.
   template <typename T>
   void Vector(std::string_view name, std::vector<T>& values, size_t max_size) const {
     if (loading()) {
@@ -76,7 +77,7 @@ class Archive {
     Array(name, std::span(values));
   }
 
-  /// On loading, throws BadInput about the tensor `name` unless `valid`.
+  /// When loading, throws BadInput about the tensor `name` unless `valid`.
   void Check(bool valid, std::string_view name, std::string_view expected) const {
     if (loading() && !valid) {
       throw BadInput(
@@ -84,7 +85,7 @@ class Archive {
     }
   }
 
-  /// One number.
+  /// Saves or loads one number.
   template <typename T>
   requires std::same_as<T, int64_t> || std::same_as<T, double>
   void Scalar(std::string_view name, T& value, std::type_identity_t<Bounds<T>> bounds) const {
@@ -93,7 +94,7 @@ class Archive {
     CheckNumbers<T>(path, std::span(&value, 1), bounds);
     if (!loading()) target_->AddScalar(path, value);
   }
-  /// True or false, stored as 1 or 0.
+  /// Saves or loads a truth value, stored as 1 or 0.
   void Scalar(std::string_view name, bool& value) const {
     int64_t number = value ? 1 : 0;
     Scalar(name, number, {0, 1});

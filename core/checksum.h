@@ -11,9 +11,9 @@
 
 namespace upswing {
 
-/// Detects broken files, not forged ones. Like FNV-1a (its offset basis and prime), but over 8-byte
-/// words, the last of each Update padded with zeros, and with the high half folded into the low
-/// one.
+/// Checksum that detects broken files, not forged ones. It is FNV-1a (offset basis and prime) with
+/// two changes. It takes 8-byte words, and zeros pad the last word of each Update. It also folds
+/// the high half of the hash into the low half.
 class Checksum {
  public:
   void Update(std::span<const std::byte> bytes) {
@@ -21,7 +21,7 @@ class Checksum {
     if (!bytes.empty()) Mix(bytes);
   }
 
-  /// 16 hexadecimal digits.
+  /// The checksum as 16 hexadecimal digits.
   std::string Hex() const { return HexDigits(hash_, 16); }
 
  private:
@@ -29,7 +29,7 @@ class Checksum {
     uint64_t word = 0;
     std::memcpy(&word, bytes.data(), std::min<size_t>(8, bytes.size()));
     hash_ = (hash_ ^ word) * 0x100000001b3;
-    hash_ ^= hash_ >> 32;  // a product spreads bits upwards only
+    hash_ ^= hash_ >> 32;  // a product spreads bits only upwards
   }
   uint64_t hash_ = 0xcbf29ce484222325;
 };

@@ -19,7 +19,7 @@ size_t EndOfCell(std::string_view line, size_t at, const std::string& place) {
   return at;
 }
 
-/// The cells of a row, without blanks around them and without their quotes.
+/// The cells of a row, without surrounding blanks and quotes.
 std::vector<std::string> CellsOf(std::string_view line, const std::string& place) {
   std::vector<std::string> cells;
   for (size_t begin = 0; begin <= line.size();) {
@@ -45,7 +45,7 @@ std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::str
   columns.reserve(names.size());
   for (const std::string& name : names) columns.push_back({name, {}});
   std::vector<size_t> places;  // indices of the wanted columns in a row
-  size_t width = 0;            // cells of a row; 0 before the line of names
+  size_t width = 0;            // number of cells in a row; 0 before the line of names
   int line_number = 0;
   constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
@@ -84,7 +84,7 @@ std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::str
 
 void CsvTable::Add(std::string_view name, std::string_view given) {
   if (first_) names_ += Concat(name, ',');
-  const std::string text = Printable(given);  // a row stays one line
+  const std::string text = Printable(given);  // keeps the row on one line
   if (text.find_first_of(",\"") == text.npos) {
     rows_ += Concat(text, ',');
     return;

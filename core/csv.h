@@ -15,31 +15,34 @@ struct CsvColumn {
   std::vector<double> values;  // one for each row
 };
 
-/// The columns called `names` of a CSV text: a line of names, then rows of cells. A cell may be in
-/// double quotes, within which a comma is part of the text and two quotes stand for one. A
-/// byte-order mark at the beginning, lines that begin with #, empty lines and the contents of other
-/// columns are ignored. Messages begin with `where` (a path) and the line. Throws BadInput if a
-/// column is missing, a row has another number of cells than the first line, a quote is not closed
-/// in its line, or a cell is not a finite number.
+/// Reads the columns called `names` from a CSV text: a line of names, then rows of cells.
+///
+/// A cell may be in double quotes. Within the quotes, a comma is part of the text and two quotes
+/// stand for one. The reader ignores a byte-order mark, empty lines, lines that begin with #, and
+/// the cells of other columns.
+///
+/// Throws BadInput if a column is missing, a quote is not closed in its line, or a cell is not a
+/// finite number. Also throws it if a row and the line of names differ in their number of cells.
+/// Messages begin with `where` (a path) and the line.
 std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::string>& names,
                                const std::string& where);
 
-/// Builds a CSV text. The names of the first row's cells become its first line.
+/// Builder of a CSV text. The cell names of the first row become the first line of the text.
 class CsvTable {
  public:
-  /// Adds a cell to the row: a text, Printable and in quotes where a reader needs them, or a
-  /// number. A number that is not known is an empty text.
+  /// Adds a cell to the row. A text is made Printable and put in quotes if necessary. An empty text
+  /// stands for an unknown number.
   void Add(std::string_view name, std::string_view text);
   void Add(std::string_view name, double number) { Add(name, FormatNumber(number)); }
   void Add(std::string_view name, std::integral auto number) { Add(name, Concat(number)); }
-  /// Ends a row, which has a cell.
+  /// Ends a row, which must have at least one cell.
   void EndRow();
 
   std::string text() const { return names_ + rows_; }
 
  private:
   std::string names_, rows_;
-  bool first_ = true;  // row
+  bool first_ = true;  // whether the current row is the first
 };
 
 }  // namespace upswing

@@ -30,7 +30,7 @@ TEST(Csv, AsSpreadsheetsAndLibrariesWriteIt) {
             (std::vector<double>{4}));
 }
 
-/// The error message of ReadCsv for a text whose column b is wanted.
+/// The error message of ReadCsv when it reads column b of a text.
 std::string Complaint(std::string_view text) {
   try {
     ReadCsv(text, {"b"}, "t.csv");

@@ -9,7 +9,8 @@
 
 namespace upswing {
 
-/// "" if all numbers are finite, else what is wrong: `expected finite numbers, got nan at index 3`.
+/// Describes the first number that is not finite: `expected finite numbers, got nan at index 3`. ""
+/// if all numbers are finite.
 template <typename T>
 std::string FindNotFinite(std::span<const T> values) {
   const auto bad = std::ranges::find_if(values, [](T x) { return !std::isfinite(x); });

@@ -21,7 +21,7 @@ std::string FormatDuration(double seconds) {
 std::string Shortened(const std::string& text, size_t most) {
   if (text.size() <= most) return text;
   size_t begin = text.size() - (most - 1);
-  while ((text[begin] & 0xC0) == 0x80) ++begin;  // within a character of UTF-8
+  while ((text[begin] & 0xC0) == 0x80) ++begin;  // do not begin within a UTF-8 character
   return "…" + text.substr(begin);
 }
 

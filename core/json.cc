@@ -30,9 +30,9 @@ json ParseJsonObject(std::string_view text, int max_depth) {
   bool too_deep = false;
   const auto keep = [&](int depth, json::parse_event_t, const json&) {
     too_deep |= depth > max_depth;
-    return !too_deep;  // what is not kept takes no memory
+    return !too_deep;  // the parser allocates nothing for a value that is not kept
   };
-  // The parser's own message would quote bytes that need not be text.
+  // The parser's own message could quote bytes that are not text.
   json object = json::parse(text, keep, false);
   if (too_deep) throw BadInput(Concat("expected JSON at most ", max_depth, " levels deep"));
   if (!object.is_object()) throw BadInput("expected a JSON object");

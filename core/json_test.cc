@@ -18,7 +18,7 @@ TEST(Json, IntegersAreNeitherRoundedNorWrappedNorGuessed) {
   }
 }
 
-/// The message of the error that `read` gives.
+/// The message of the error that `read` throws.
 template <typename Read>
 std::string ErrorOf(const Read& read) {
   try {

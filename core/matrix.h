@@ -7,8 +7,8 @@
 
 namespace upswing {
 
-/// A view of `rows` × `cols` numbers, row after row, each `stride` numbers after the one before.
-/// Owns nothing.
+/// A view of `rows` × `cols` numbers in row-major order. `stride` is the distance between the
+/// starts of two rows, in numbers. Owns nothing.
 template <typename T>
 class Matrix {
  public:
@@ -19,10 +19,10 @@ class Matrix {
   Matrix(std::span<T> values, int rows, int cols) : Matrix(values.data(), rows, cols) {
     assert(values.size() >= size());
   }
-  /// A read-only view of the same numbers.
+  /// Converts to a read-only view of the same numbers.
   template <typename U>
   requires std::is_same_v<const U, T>
-  // NOLINTNEXTLINE(google-explicit-constructor): as a pointer converts
+  // NOLINTNEXTLINE(google-explicit-constructor): implicit, as T* converts to const T*
   Matrix(const Matrix<U>& other)
       : Matrix(other.data(), other.rows(), other.cols(), other.stride()) {}
 
@@ -36,17 +36,17 @@ class Matrix {
   T& operator()(int row, int col) const { return data_[Offset(row) + col]; }
   /// One row as a span (cols).
   std::span<T> row(int i) const { return {data_ + Offset(i), static_cast<size_t>(cols_)}; }
-  /// `count` rows from `first` on.
+  /// View of `count` rows from row `first`.
   Matrix Rows(int first, int count) const {
     assert(first >= 0 && first + count <= rows_);
     return {data_ + Offset(first), count, cols_, stride_};
   }
-  /// `count` columns from `first` on.
+  /// View of `count` columns from column `first`.
   Matrix Cols(int first, int count) const {
     assert(first >= 0 && first + count <= cols_);
     return {data_ + first, rows_, count, stride_};
   }
-  /// All numbers as one span (rows · cols); there must be no gaps between the rows.
+  /// All numbers as one span (rows · cols). The rows must have no gaps between them.
   std::span<T> values() const {
     assert(stride_ == cols_ || rows_ <= 1);
     return {data_, size()};

@@ -18,7 +18,7 @@ struct Overloaded : Ts... {
 template <class... Ts>
 Overloaded(Ts...) -> Overloaded<Ts...>;  // clang 14 needs it spelled out
 
-/// A TOML basic string.
+/// Quotes a text as a TOML basic string.
 std::string Quote(std::string_view text) {
   std::string quoted = "\"";
   for (const char c : text) {
@@ -53,7 +53,7 @@ std::string RangeInWords(Range range, double step) {
                 step > 0 ? " in steps of " + FormatNumber(step) : "");
 }
 
-/// A line of help: `HELP [UNIT] (VALUES; DEFAULT)`, without the parts that are empty.
+/// A help line `HELP [UNIT] (VALUES; DEFAULT)` without its empty parts.
 std::string HelpLine(const Option& option, const std::string& fallback) {
   std::vector<std::string> notes{
       option.choices.empty() ? RangeInWords(option.range, option.step) : Join(option.choices, ", "),
@@ -63,14 +63,14 @@ std::string HelpLine(const Option& option, const std::string& fallback) {
                 notes.empty() ? "" : Concat(" (", Join(notes, "; "), ")"));
 }
 
-/// Whether a number is a multiple of `step`, up to rounding; true if that is 0.
+/// Whether a number is a multiple of `step`, up to rounding. Always true if `step` is 0.
 bool IsMultiple(double value, double step) {
   constexpr double kRounding = 1e-9;
   return step == 0 || std::abs(value - step * std::round(value / step)) <= kRounding;
 }
 
-/// `; the nearest are 0.04 and 0.06` for a number within the range that is no multiple of `step`;
-/// else empty.
+/// Hint such as `; the nearest are 0.04 and 0.06` for a number in the range that is not a multiple
+/// of `step`. Empty otherwise.
 std::string NearestText(std::string_view text, Range range, double step) {
   const auto value = ParseNumber(text);
   if (!value || !range.Contains(*value) || IsMultiple(*value, step)) return "";
@@ -82,7 +82,8 @@ std::string NearestText(std::string_view text, Range range, double step) {
   return Concat("; the nearest are ", multiple(below), " and ", multiple(below + 1));
 }
 
-/// "64,64" or "[64, 64]"; nothing if an item is no integer or out of range.
+/// Parses a list such as "64,64" or "[64, 64]"; nothing if an item is not an integer or is out of
+/// range.
 std::optional<std::vector<int64_t>> ParseList(std::string_view text, Range range) {
   text = Trim(text);
   if (text.starts_with('[') && text.ends_with(']')) text = Trim(text.substr(1, text.size() - 2));
@@ -120,7 +121,7 @@ std::string Option::text() const {
 std::string Option::plain_text() const {
   std::string value = text();
   if (const auto* words = std::get_if<std::string*>(&target)) value = **words;
-  std::erase_if(value, [&](char c) {  // a list needs neither brackets nor blanks there
+  std::erase_if(value, [&](char c) {  // a list on a command line needs no brackets and blanks
     return std::holds_alternative<std::vector<int64_t>*>(target) &&
            (c == '[' || c == ']' || c == ' ');
   });

@@ -19,7 +19,7 @@ struct Range {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
 
-  /// False for NaN.
+  /// Whether the range contains `value`; false for NaN.
   bool Contains(double value) const { return value >= low && value <= high; }
 };
 inline constexpr Range kPositive{1e-9, 1e9};
@@ -29,103 +29,104 @@ inline constexpr Range kUnit{0, 1};  // a share or probability
 /// The flag of a setting or an alias, such as `--eval-every` for `eval_every`.
 std::string FlagOf(std::string name);
 
-/// One setting: what flags, configuration files, help and validation need to know of it.
+/// One setting, as flags, configuration files, help and validation use it.
 struct Option {
-  /// What a change of the setting changes.
+  /// Effect of a change of the setting.
   enum class Decides {
-    kTraining,  // the training
-    kSeed,      // only the random numbers of the training
-    kEnd,       // only the length of the run
-    kNothing,   // nothing that the run computes
+    kTraining,  // changes the training
+    kSeed,      // changes only the random numbers of the training
+    kEnd,       // changes only the length of the run
+    kNothing,   // changes nothing that the run computes
   };
   using Target = std::variant<bool*, int64_t*, double*, std::string*, std::vector<int64_t>*>;
 
   std::string section;  // TOML table
-  std::string name;     // TOML key; the flag has - for _
-  Target target;        // the variable that holds the value
-  Range range;          // numbers only
+  std::string name;     // TOML key; the flag has - in place of _
+  Target target;        // variable that holds the value
+  Range range;          // allowed values of a number
   std::string unit;     // such as "s"; may be empty
   std::string help;     // a noun phrase or an imperative
   Decides decides = Decides::kTraining;
-  std::vector<std::string> choices = {};  // texts only: allowed values; empty: any
-  double step = 0;                        // numbers only: must be a multiple of it; 0: any number
-  // Files of version 0.4.0 may lack the setting; they were made with its default.
+  std::vector<std::string> choices = {};  // allowed values of a text; empty: any
+  double step = 0;                        // a number must be a multiple of it; 0: any number
+  // Whether files of version 0.4.0 may lack the setting; those files have its default.
   bool implied = false;
   bool read_only = false;  // the setting belongs to a const struct
-  std::string usual = {};  // default in words, shown instead of the value; may be empty
+  std::string usual = {};  // default in words, shown in place of the value; may be empty
 
-  /// Whether another value makes another run, which cannot be resumed.
+  /// Whether another value makes a different run, which cannot resume this one.
   bool identity() const { return decides == Decides::kTraining || decides == Decides::kSeed; }
-  /// Such as `--eval-every`.
+  /// The flag, such as `--eval-every`.
   std::string flag() const;
-  /// The value of a setting whose target is a double.
+  /// The value of a setting that is a double.
   double number() const { return *std::get<double*>(target); }
-  /// The value as TOML writes it.
+  /// The value in TOML syntax.
   std::string text() const;
-  /// The value as a command line takes it, such as `64,64`.
+  /// The value as a command-line argument, such as `64,64`.
   std::string plain_text() const;
-  /// Flag and value as a shell's command line has them, such as `--hidden 64,64` or `--no-double`.
+  /// Flag and value for a shell's command line, such as `--hidden 64,64` or `--no-double`.
   std::string on_command_line() const;
-  /// Line of help: text, unit, choices or range, such as `length of a training episode [s] (0.02 to
-  /// 10)`.
+  /// Help line with text, unit, and choices or range, such as `length of a training episode [s]
+  /// (0.02 to 10)`.
   std::string about() const;
-  /// Line of help with the current value as the default: `… [s] (0.02 to 10; default 4)`.
+  /// Help line with the current value as the default: `… [s] (0.02 to 10; default 4)`.
   std::string about_with_default() const;
-  /// Such as `a number in [0, 1]` or `a multiple of 0.02 in [0, 1]`.
+  /// Description of the allowed values, such as `a number in [0, 1]` or `a multiple of 0.02 in [0,
+  /// 1]`.
   std::string expected() const;
-  /// Parses and checks `text`. Throws BadInput that begins with `where` (such as `--gamma` or
-  /// `FILE:3: gamma`).
+  /// Parses and checks `text`, then sets the value. Throws BadInput, whose message begins with
+  /// `where` (such as `--gamma` or `FILE:3: gamma`).
   void Set(std::string_view text, const std::string& where) const;
 };
 
-/// The settings of one or more components, in the order in which they were added. Every component
-/// has a `void Describe(Options&)`; each of its lines names target, key, range, unit and help of
-/// one setting and changes nothing. A setting's default is the initialiser of its member.
+/// The settings of one or more components, in the order of their addition. Every component has a
+/// `void Describe(Options&)` that changes nothing. Each of its lines names the target, key, range,
+/// unit and help of one setting. The default of a setting is the initialiser of its member.
 class Options {
  public:
-  /// Names the section that the following settings belong to.
+  /// Begins a section; the settings that are added next belong to it.
   void Section(std::string_view section) { section_ = section; }
 
-  /// A switch or a text.
+  /// Adds a switch or a text.
   template <typename T>
   requires std::same_as<T, bool> || std::same_as<T, std::string> Option& Add(
       T* target, std::string_view name, std::string_view help) {
     return AddOption(target, name, {}, "", help);
   }
-  /// A number.
+  /// Adds a number.
   template <typename T>
   requires std::same_as<T, int64_t> || std::same_as<T, double> Option& Add(
       T* target, std::string_view name, Range range, std::string_view unit, std::string_view help) {
     return AddOption(target, name, range, unit, help);
   }
-  /// A text that is one of `choices`.
+  /// Adds a text that must be one of `choices`.
   Option& AddChoice(std::string* target, std::string_view name, std::vector<std::string> choices,
                     std::string_view help);
-  /// A list of integers.
+  /// Adds a list of integers.
   Option& Add(std::vector<int64_t>* target, std::string_view name, Range range,
               std::string_view help) {
     return AddOption(target, name, range, "", help);
   }
 
-  /// One name that sets several settings, such as `mass` for `mass1` and `mass2`. Without `help`
-  /// the text is "set … and …".
+  /// Adds a name that sets several settings, such as `mass` for `mass1` and `mass2`. An empty
+  /// `help` becomes "set … and …".
   void Alias(std::string_view name, std::vector<std::string> members, std::string_view help = "");
 
-  /// Makes a later Set of any of these settings throw std::logic_error.
+  /// Makes every later Set of these settings throw std::logic_error.
   void MakeReadOnly() {
     for (Option& option : options_) option.read_only = true;
   }
 
-  /// Adds those of `others` whose names are not among these.
+  /// Adds each setting of `others` whose name is missing here.
   void AddMissing(const Options& others);
 
-  /// Sets the message of Find for a name that these settings lack.
+  /// Sets the message with which Find rejects a name that is not a setting.
   void Explain(std::string_view name, std::string_view why);
-  /// The text given to Explain; empty if none.
+  /// The message given to Explain for this name; empty if there is none.
   std::string WhyMissing(std::string_view name) const;
 
   const std::vector<Option>& all() const { return options_; }
-  /// The setting of this name; nullptr if there is none.
+  /// The setting called `name`; nullptr if there is none.
   const Option* Get(std::string_view name) const;
   struct AliasEntry {
     std::string section, name;
@@ -136,13 +137,13 @@ class Options {
   };
   const std::vector<AliasEntry>& aliases() const { return aliases_; }
 
-  /// The settings that a name or an alias stands for. Throws BadInput with the nearest name.
+  /// The settings that a name or an alias stands for. Throws BadInput with the nearest known name.
   std::vector<const Option*> Find(std::string_view name, const std::string& where) const;
 
-  /// Sets what the name or alias stands for; see Option::Set.
+  /// Sets each setting that the name or alias stands for; see Option::Set.
   void Set(std::string_view name, std::string_view text, const std::string& where) const;
 
-  /// The `wanted` settings as a TOML document; with `comments`, each with its description.
+  /// The `wanted` settings as a TOML document. With `comments`, each setting has its description.
   std::string Toml(bool comments, const std::function<bool(const Option&)>& wanted) const;
 
  private:
@@ -155,7 +156,7 @@ class Options {
   std::map<std::string, std::string, std::less<>> missing_;  // name → why there is none
 };
 
-/// The settings of a struct. They point into it; those of a const struct can only be read.
+/// The settings of a struct, as pointers into it. The settings of a const struct are read-only.
 template <typename Config>
 Options OptionsOf(Config& config) {
   Options options;
@@ -167,10 +168,10 @@ Options OptionsOf(Config& config) {
 /// A setting whose value differs between two structs.
 struct Difference {
   Option now;
-  std::optional<Option> before;  // nothing where the other struct has no such setting
+  std::optional<Option> before;  // nothing if the other struct lacks the setting
 };
 
-/// The settings of `now` that `before` lacks or has with another value, in the order of `now`.
+/// The settings of `now` that `before` lacks or has with a different value, in the order of `now`.
 std::vector<Difference> Differences(const Options& now, const Options& before);
 
 }  // namespace upswing

@@ -133,7 +133,7 @@ TEST(Step, LetsThroughMultiplesAndNamesTheNearestOnes) {
   Options options;
   options.Add(&pause, "pause", {0, 1}, "s", "between two steps").step = 0.02;
   for (int count = 0; count <= 50; ++count) {
-    // As people write it, and as arithmetic rounds it.
+    // Numbers as people write them, and as arithmetic rounds them.
     for (const double value :
          {count / 50.0, count * 0.02, std::max(0.0, 1 - (50 - count) * 0.02)}) {
       options.Set("pause", FormatNumber(value), "--pause");

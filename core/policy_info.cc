@@ -11,11 +11,11 @@ namespace {
 using nlohmann::json;
 
 constexpr Range kCounter{0, 9e15};   // integers that a double holds exactly
-constexpr Range kReturn{-1e9, 1e9};  // of an episode
+constexpr Range kReturn{-1e9, 1e9};  // allowed return of an episode
 constexpr Range kSeconds{1e-6, 1e3};
 constexpr size_t kMostInputs = 4096;
 constexpr size_t kLongestName = 64;
-constexpr int64_t kLongestMemory = 4096;  // steps; the network's inputs settle it
+constexpr int64_t kLongestMemory = 4096;  // steps; the network's inputs limit it further
 
 std::vector<std::string> Texts(const json& object, const std::string& name) {
   std::vector<std::string> texts;
@@ -67,19 +67,19 @@ std::string ObservationText(const ObservationInfo& observation) {
   return object.dump();
 }
 
-/// Reads one metadatum after the other.
+/// Reads the metadata of a policy file, one entry at a time.
 class Reader {
  public:
   Reader(const std::map<std::string, std::string>& metadata, const std::string& where)
       : metadata_(metadata), where_(where) {}
 
-  /// Its text; empty where there is none.
+  /// The text of an entry; empty if the entry is missing.
   std::string Text(const std::string& key) const {
     const auto found = metadata_.find(key);
     return found == metadata_.end() ? "" : found->second;
   }
 
-  /// A text of at most kLongestName characters, on one line; empty where there is none.
+  /// A text of at most kLongestName characters on one line; empty if the entry is missing.
   std::string Name(const std::string& key) const {
     std::string name = Text(key);
     if (name.size() <= kLongestName && Printable(name) == name) return name;
@@ -101,7 +101,7 @@ class Reader {
     throw Wrong(key, Concat("an integer in [0, ", FormatNumber(kCounter.high), "]"));
   }
 
-  /// What `parse` makes of its JSON; nothing where there is none.
+  /// The JSON of an entry after `parse`; nothing if the entry is missing.
   template <typename Parse>
   auto Json(const std::string& key, const Parse& parse) const
       -> std::optional<decltype(parse(std::string()))> {

@@ -46,8 +46,8 @@ uint64_t Rng::Next() {
 double Rng::Uniform() { return static_cast<double>(Next() >> 11) * 0x1p-53; }
 
 uint64_t Rng::Below(uint64_t n) {
-  // The high word of a 64×64-bit product is uniform once the few low words that favour some
-  // results are rejected.
+  // The high word of a 64×64-bit product is uniform after the rejection of the few low words that
+  // favour some results.
   __extension__ using uint128 = unsigned __int128;
   uint128 product = uint128{Next()} * n;
   if (static_cast<uint64_t>(product) < n) {

@@ -27,7 +27,8 @@ size_t FindChecksum(std::string_view header) {
   return key == std::string_view::npos ? key : key + kChecksumKey.size();
 }
 
-/// Bytes of a tensor of this shape; nothing on a negative size or overflow.
+/// Number of bytes of a tensor of this shape; nothing if a size is negative or the product
+/// overflows.
 std::optional<uint64_t> ByteCount(const std::vector<int64_t>& shape, Dtype dtype) {
   uint64_t count = SizeOf(dtype);
   for (const int64_t extent : shape) {
@@ -37,7 +38,7 @@ std::optional<uint64_t> ByteCount(const std::vector<int64_t>& shape, Dtype dtype
   return count;
 }
 
-/// The integers of a list in an entry. Throws BadInput.
+/// Reads a list of integers from an entry of the header. Throws BadInput.
 std::vector<int64_t> Integers(const json& entry, const std::string& name, size_t max_size) {
   std::vector<int64_t> integers;
   for (const json& item : JsonList(entry, name, max_size)) {
@@ -48,7 +49,8 @@ std::vector<int64_t> Integers(const json& entry, const std::string& name, size_t
   return integers;
 }
 
-/// One entry of the header, checked against the size of the file's data. Throws BadInput.
+/// Parses an entry of the header and checks it against the size of the file's data. Throws
+/// BadInput.
 SafetensorsEntry ParseEntry(const json& entry, size_t data_size) {
   if (!entry.is_object()) throw BadInput("expected an object of dtype, shape and data_offsets");
   const std::string& dtype_name = JsonText(entry, "dtype");
@@ -71,8 +73,8 @@ SafetensorsEntry ParseEntry(const json& entry, size_t data_size) {
   return {std::move(tensor), begin, end - begin};
 }
 
-/// Throws BadInput unless the tensors cover the data without gap or overlap, so that what is read
-/// of a file is never more than the file.
+/// Throws BadInput unless the tensors cover the data without gaps and overlaps. The tensors then
+/// take no more memory than the file.
 void CheckCovered(const std::map<std::string, SafetensorsEntry>& entries, size_t data_size) {
   std::vector<std::pair<size_t, size_t>> pieces;  // begin and size
   pieces.reserve(entries.size());
@@ -86,7 +88,7 @@ void CheckCovered(const std::map<std::string, SafetensorsEntry>& entries, size_t
   if (end != data_size) throw BadInput(Concat("expected ", end, " bytes of data, got ", data_size));
 }
 
-/// The text of a header, padded to whole words. Throws Failure if it would be too long to load or
+/// The text of a header, padded to whole words. Throws Failure if it is too long to load again or
 /// is not UTF-8.
 std::string HeaderText(const json& header) {
   try {
@@ -100,8 +102,8 @@ std::string HeaderText(const json& header) {
   }
 }
 
-/// Throws BadInput unless `header`, the text of a file's header, holds the checksum of itself (with
-/// zeros in place of the checksum) and of `tensors`.
+/// Throws BadInput unless the text `header` holds the checksum of itself and `tensors`. The
+/// checksum counts its own digits in the header as zeros.
 void VerifyChecksum(std::string header, const std::map<std::string, Tensor>& tensors) {
   const size_t at = FindChecksum(header);
   if (at == std::string::npos) throw BadInput("checksum: expected it where Upswing writes it");
@@ -109,7 +111,8 @@ void VerifyChecksum(std::string header, const std::map<std::string, Tensor>& ten
   header.replace(at, kNoChecksum.size(), kNoChecksum);
   Checksum checksum;
   checksum.Update(BytesOf(header));
-  // Tensor by tensor, as WriteSafetensors did: a tensor's last word is padded.
+  // Update the checksum tensor by tensor, as WriteSafetensors does, because zeros pad the last word
+  // of each tensor.
   std::vector<const Tensor*> order;
   for (const auto& [name, tensor] : tensors) order.push_back(&tensor);
   std::sort(order.begin(), order.end(),
@@ -173,7 +176,7 @@ std::vector<std::byte> Safetensors::Joined() const {
 }
 
 Safetensors WriteSafetensors(const Tensors& tensors) {
-  // Wide types first, so that each tensor is aligned to its own size.
+  // Put wide types first, so that each tensor is aligned to the size of its type.
   std::vector<std::pair<std::string, const Tensor*>> order;
   for (const auto& [name, tensor] : tensors.all()) order.emplace_back(name, &tensor);
   std::stable_sort(order.begin(), order.end(), [](const auto& a, const auto& b) {
@@ -193,7 +196,7 @@ Safetensors WriteSafetensors(const Tensors& tensors) {
   }
   std::string text = HeaderText(header);
 
-  // The checksum covers everything after the length, with zeros in its own place.
+  // The checksum covers everything after the length. Its own digits count as zeros.
   Checksum checksum;
   checksum.Update(BytesOf(text));
   for (const auto& [name, tensor] : order) checksum.Update(tensor->bytes);

@@ -11,52 +11,53 @@
 #include "core/error.h"
 #include "core/tensors.h"
 
-/// The safetensors format (https://huggingface.co/docs/safetensors, "Format"), in memory. In
-/// addition, the metadata hold a checksum of the whole, which reading verifies. What has an
-/// `upswing_version` must have one; what other programs wrote need not. The bytes are not trusted:
-/// reading takes no more memory than three times their size (numbers of bfloat16 become float), and
-/// a header has at most 1 MiB.
+/// The safetensors format (https://huggingface.co/docs/safetensors, "Format"), in memory.
+///
+/// The metadata also hold a checksum of the whole, which reading verifies. A file with an
+/// `upswing_version` must have a checksum; files of other programs need none. The bytes are not
+/// trusted. Reading takes at most three times their size in memory, because bfloat16 numbers become
+/// float. A header has at most 1 MiB.
 namespace upswing {
 
-/// Tensors as a file's bytes: `head`, then the tensors' own.
+/// The bytes of a file: `head`, then the bytes of the tensors.
 struct Safetensors {
-  std::vector<std::byte> head;                     // the header's length, the header
+  std::vector<std::byte> head;                     // length of the header, then the header
   std::vector<std::span<const std::byte>> bodies;  // views of the tensors
 
-  /// All of it in one piece.
+  /// All bytes in one piece.
   std::vector<std::byte> Joined() const;
 };
 
-/// With a checksum. Throws Failure if names and metadata are too long to be read again, or not
-/// UTF-8.
+/// Writes tensors with a checksum. Throws Failure if names and metadata are too long to be read
+/// again, or are not UTF-8.
 Safetensors WriteSafetensors(const Tensors& tensors);
 
-/// Reads and checks everything: sizes, shapes, offsets, checksum. `where` says where the bytes are
-/// from. Throws BadInput.
+/// Reads tensors and checks sizes, shapes, offsets and checksum. `where` names the source of the
+/// bytes in messages. Throws BadInput.
 Tensors ReadSafetensors(std::vector<std::byte> content, std::string where);
 
-/// A tensor whose bytes are still to be found, and where they stand behind the header.
+/// A tensor without its bytes, and the position of its bytes after the header.
 struct SafetensorsEntry {
   Tensor tensor;
   size_t begin, size;
 };
 
-/// The contents of a header.
+/// Contents of a header.
 struct SafetensorsHeader {
   std::map<std::string, std::string> metadata;
-  std::map<std::string, SafetensorsEntry> entries;  // of the tensors
+  std::map<std::string, SafetensorsEntry> entries;  // by tensor name
 };
 
-// For readers that want a part of a large file; the errors that these throw do not say where.
+// For readers of a part of a large file. The errors of these functions do not name the file.
 
-/// Length of the header that follows, from a file's first eight bytes, checked against the size of
+/// Reads the length of the header from a file's first eight bytes and checks it against the size of
 /// the file. Throws BadInput.
 uint64_t ReadSafetensorsLength(std::span<const std::byte> first_bytes, uint64_t file_size);
 
-/// Reads a header, whose tensors have `data_size` bytes together. Throws BadInput.
+/// Reads a header of tensors that have `data_size` bytes together. Throws BadInput.
 SafetensorsHeader ReadSafetensorsHeader(std::string_view text, size_t data_size);
 
-/// The error about a file that is not a whole one.
+/// The error for a file that is broken or incomplete.
 Error BrokenSafetensors(const std::string& where, std::string_view why);
 
 }  // namespace upswing

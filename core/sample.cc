@@ -11,7 +11,7 @@ double Quantile(std::span<const double> sorted, double share) {
   const auto below = static_cast<size_t>(place);
   const size_t above = std::min(below + 1, sorted.size() - 1);
   const double between = place - static_cast<double>(below);
-  // Interpolation between infinities, and 0 times infinity, would give NaN.
+  // Avoid NaN from interpolation between infinities and from 0 times infinity.
   if (between == 0 || std::isinf(sorted[below])) return sorted[below];
   return std::lerp(sorted[below], sorted[above], between);
 }
@@ -29,7 +29,7 @@ Interval WilsonInterval(int64_t successes, int64_t trials) {
   const double p = static_cast<double>(successes) / n;
   const double center = (p + kZ * kZ / (2 * n)) / (1 + kZ * kZ / n);
   const double half = kZ / (1 + kZ * kZ / n) * std::sqrt(p * (1 - p) / n + kZ * kZ / (4 * n * n));
-  // Rounding must not move the bounds 0 and 1.
+  // Keep the bounds 0 and 1 free from rounding.
   return {successes == 0 ? 0.0 : center - half, successes == trials ? 1.0 : center + half};
 }
 

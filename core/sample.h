@@ -24,7 +24,8 @@ struct Interval {
   double low = 0, high = 1;
 };
 
-/// 95% interval of a proportion (Wilson, 1927) after `successes` of `trials`; [0, 1] after none.
+/// 95% confidence interval of a proportion (Wilson, 1927) after `successes` of `trials`; [0, 1]
+/// without trials.
 Interval WilsonInterval(int64_t successes, int64_t trials);
 
 /// Mean and sample standard deviation.

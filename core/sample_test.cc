@@ -39,7 +39,7 @@ TEST(Sample, QuartilesAndMomentsByHand) {
 TEST(Sample, QuartilesOfASampleThatReachesInfinity) {
   constexpr double kInf = std::numeric_limits<double>::infinity();
   EXPECT_EQ(QuartilesOf({kInf, 1, 2}).median, 2);
-  EXPECT_EQ(QuartilesOf({kInf, 1, 2}).high, kInf);  // half of the way from 2
+  EXPECT_EQ(QuartilesOf({kInf, 1, 2}).high, kInf);  // halfway from 2 to infinity
   EXPECT_EQ(QuartilesOf({kInf, 1, 2, kInf}).median, kInf);
   EXPECT_EQ(QuartilesOf({kInf, kInf}).low, kInf);
 }

@@ -12,16 +12,16 @@ namespace upswing {
 namespace {
 
 struct Path {
-  int64_t target;  // Highway's bit
+  int64_t target;  // Highway's bit for the target
   std::string name;
 };
 
-/// Every path that can be compiled, best first.
+/// All paths that a compiler can produce, best first.
 const Path kPaths[] = {
     {HWY_AVX3, "avx512"}, {HWY_AVX2, "avx2"}, {HWY_NEON, "neon"}, {HWY_WASM, "wasm128"}};
 static_assert((HWY_DISABLED_TARGETS & (HWY_AVX3 | HWY_AVX2 | HWY_NEON | HWY_WASM)) == 0);
 
-/// The compiled paths that this processor supports, best first. The last is the compiler's own
+/// The compiled paths that this processor supports, best first. The last path is the compiler's
 /// baseline, which every processor of the architecture supports.
 const std::vector<Path>& Paths() {
   static const std::vector<Path> kUsable = [] {

@@ -7,17 +7,17 @@
 
 #include "core/error.h"
 
-// The rest is compiled once for each target, by including this file again.
+// foreach_target.h includes this file again to compile the rest once per target.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "core/simd_test.cc"
 #include <hwy/foreach_target.h>
-// After foreach_target.h, which includes this file once for every target:
+// Must come after foreach_target.h.
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
 namespace upswing::HWY_NAMESPACE {
 
-/// A kernel that returns the target for which it was compiled.
+/// A kernel that returns the target of its compilation.
 int64_t Target() { return HWY_TARGET; }
 
 }  // namespace upswing::HWY_NAMESPACE
@@ -29,7 +29,7 @@ namespace {
 
 HWY_EXPORT(Target);
 
-/// Highway's name of the target whose kernels are dispatched now.
+/// Highway's name of the target that kernels are dispatched to now.
 std::string Dispatched() { return hwy::TargetName(HWY_DYNAMIC_DISPATCH(Target)()); }
 
 TEST(Simd, TakesTheBestPathByDefault) {

@@ -2,14 +2,14 @@
 
 #include <cstdint>
 
-/// Control steps, counted over all environments: they rise by the number of environments.
+/// Control steps are counted over all environments: each step of N environments counts as N.
 namespace upswing {
 
-/// More than any training makes.
+/// More control steps than any training makes.
 inline constexpr int64_t kMostSteps = 2'000'000'000'000;
 
-/// Whether something that is due at each multiple of `every` (at least 1) is due after the step
-/// that leads from `before` to `now`.
+/// Whether an event that is due at each multiple of `every` (at least 1) falls in the step from
+/// `before` to `now`.
 inline bool IsDue(int64_t before, int64_t now, int64_t every) {
   return now / every != before / every;
 }

@@ -26,7 +26,7 @@ const DtypeFacts& FactsOf(Dtype dtype) {
                        [&](const DtypeFacts& facts) { return facts.dtype == dtype; });
 }
 
-/// The numbers of a tensor, whose bytes need not be aligned.
+/// The numbers of a tensor. Its bytes need not be aligned.
 template <typename T>
 std::vector<T> NumbersOf(const Tensor& tensor) {
   std::vector<T> numbers(tensor.bytes.size() / sizeof(T));

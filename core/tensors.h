@@ -12,13 +12,13 @@
 
 namespace upswing {
 
-/// Number types of tensors, with the names that safetensors gives them. BF16 (bfloat16, the upper
-/// half of F32's bits) is one of files alone: what is read of it is F32.
+/// Number types of tensors, with their safetensors names. BF16 (bfloat16, the upper half of F32's
+/// bits) occurs only in files: Widen makes it F32 after reading.
 enum class Dtype { kU8, kBF16, kF32, kF64, kI64, kU64 };
 
 std::string_view NameOf(Dtype dtype);
 size_t SizeOf(Dtype dtype);
-/// The type of this name; nothing if there is none.
+/// The number type with this name; nothing if there is none.
 std::optional<Dtype> DtypeCalled(std::string_view name);
 
 template <typename T>
@@ -35,22 +35,22 @@ inline constexpr Dtype kDtypeOf<int64_t> = Dtype::kI64;
 template <>
 inline constexpr Dtype kDtypeOf<uint64_t> = Dtype::kU64;
 
-/// An array of numbers; a view of its bytes.
+/// A view of an array of numbers.
 struct Tensor {
   Dtype dtype;
   std::vector<int64_t> shape;  // row-major; empty for a scalar
   std::span<const std::byte> bytes;
 
-  /// Such as `F32 [256, 8]`, for messages.
+  /// Type and shape for messages, such as `F32 [256, 8]`.
   std::string Describe() const;
 };
 
-/// Named tensors and text metadata in memory: what a policy or a checkpoint is made of, and what a
-/// safetensors file holds (core/safetensors.h).
+/// Named tensors and text metadata in memory. Policies, checkpoints and safetensors files
+/// (core/safetensors.h) consist of them.
 class Tensors {
  public:
   Tensors() = default;
-  /// Tensors that were read from `where`, which begins the messages about them.
+  /// Tensors that were read from `where`. Messages about them begin with it.
   explicit Tensors(std::string where) : where_(std::move(where)) {}
   Tensors(const Tensors&) = delete;
   Tensors& operator=(const Tensors&) = delete;
@@ -59,15 +59,15 @@ class Tensors {
 
   std::map<std::string, std::string> metadata;
 
-  /// Adds a view of `values`, which must stay valid as long as this is used. Without a shape: one
-  /// dimension.
+  /// Adds a view of `values`, which must stay valid while this object is in use. Without a shape,
+  /// the tensor has one dimension.
   template <typename T>
   void Add(const std::string& name, std::span<const T> values, std::vector<int64_t> shape = {}) {
     if (shape.empty()) shape = {static_cast<int64_t>(values.size())};
     tensors_[name] = {kDtypeOf<T>, std::move(shape), std::as_bytes(values)};
   }
 
-  /// The same with a copy of `values`.
+  /// Adds a copy of `values`. Without a shape, the tensor has one dimension.
   template <typename T>
   void AddCopy(const std::string& name, std::span<const T> values,
                std::vector<int64_t> shape = {}) {
@@ -83,46 +83,48 @@ class Tensors {
     tensors_[name].shape.clear();
   }
 
-  /// Adds a tensor whose bytes stay valid, such as those of Keep.
+  /// Adds a tensor of bytes that stay valid, such as the bytes of Keep.
   void Add(const std::string& name, Tensor tensor) { tensors_[name] = std::move(tensor); }
-  /// Holds bytes that tensors view.
+  /// Keeps bytes alive for tensors that view them.
   std::span<const std::byte> Keep(std::vector<std::byte> bytes) {
     return kept_.emplace_back(std::move(bytes));
   }
 
   const std::map<std::string, Tensor>& all() const { return tensors_; }
 
-  /// F32 whose numbers are all ones of bfloat16 becomes BF16: half the size, and nothing is lost.
+  /// Stores F32 tensors as BF16 where every number is a bfloat16. This halves their size without
+  /// loss.
   void Narrow();
-  /// BF16 becomes F32.
+  /// Turns BF16 tensors into F32.
   void Widen();
 
-  /// Copies a tensor into `values`. Throws BadInput, which says where, which tensor, what was
-  /// expected and what was found, unless it has this type and number of elements, and the shape if
-  /// one is given.
+  /// Copies a tensor into `values`. Throws BadInput unless the type, the number of elements and the
+  /// shape (if given) match. The message says where, which tensor, what was expected and what was
+  /// found.
   template <typename T>
   void Read(const std::string& name, std::span<T> values,
             const std::vector<int64_t>& shape = {}) const {
     ReadBytes(name, kDtypeOf<T>, shape, std::as_writable_bytes(values));
   }
 
-  /// Throws as Read does unless the tensor has this type and shape. To be called before memory for
-  /// it is allocated, so that a false size takes none.
+  /// Throws BadInput unless the tensor has this type and shape. Call it before you allocate memory
+  /// for the tensor, so that a false size takes no memory.
   void Expect(const std::string& name, Dtype dtype, const std::vector<int64_t>& shape) const;
 
-  /// Number of elements of a tensor of type T; throws as Read does.
+  /// Number of elements of a tensor of type T. Throws BadInput if the tensor is missing or has
+  /// another type.
   template <typename T>
   size_t Count(const std::string& name) const {
     return Find(name, kDtypeOf<T>).bytes.size() / sizeof(T);
   }
 
-  /// The metadata under a key; throws BadInput if there are none.
+  /// The metadata under a key. Throws BadInput if the key is missing.
   const std::string& Metadata(const std::string& key) const;
 
-  /// Whether they were read with a checksum, which was then right.
+  /// Whether the source had a checksum, which was then correct.
   bool has_checksum = false;
 
-  /// Where they were read from, such as a file's path, for messages.
+  /// Source of the tensors for messages, such as a file's path.
   const std::string& where() const { return where_; }
 
  private:
@@ -132,7 +134,8 @@ class Tensors {
 
   std::string where_;
   std::map<std::string, Tensor> tensors_;
-  std::deque<std::vector<std::byte>> kept_;  // bytes that tensors_ views and no caller owns
+  /// Bytes that tensors_ views and that have no other owner.
+  std::deque<std::vector<std::byte>> kept_;
 };
 
 }  // namespace upswing

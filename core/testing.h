@@ -6,10 +6,10 @@
 #include "core/archive.h"
 #include "core/safetensors.h"
 
-/// Helpers of tests.
+/// Helpers for tests.
 namespace upswing {
 
-/// Limits this thread, and any that it starts, to one processor during its lifetime.
+/// Limits this thread, and threads that it starts, to one processor until the object is destroyed.
 class OnOneProcessor {
  public:
   OnOneProcessor() {
@@ -29,7 +29,7 @@ class OnOneProcessor {
   cpu_set_t before_;
 };
 
-/// Saves by `save(archive)` and loads by `load(archive)`, through the bytes of a file.
+/// Saves with `save(archive)` and loads with `load(archive)`, through the bytes of a file.
 template <typename Save, typename Load>
 void SaveAndLoad(const Save& save, const Load& load) {
   Tensors saved;

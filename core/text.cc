@@ -10,7 +10,7 @@
 namespace upswing {
 namespace {
 
-/// Levenshtein distance: insertions, deletions and substitutions that turn `a` into `b`.
+/// Levenshtein distance: number of insertions, deletions and substitutions that turn `a` into `b`.
 size_t EditDistance(std::string_view a, std::string_view b) {
   std::vector<size_t> row(b.size() + 1);
   std::iota(row.begin(), row.end(), size_t{0});
@@ -25,7 +25,7 @@ size_t EditDistance(std::string_view a, std::string_view b) {
   return row.back();
 }
 
-/// How many characters two words have in common at the beginning and at the end.
+/// Number of characters that two words share at the beginning and at the end.
 size_t CommonEnds(std::string_view a, std::string_view b) {
   const size_t shorter = std::min(a.size(), b.size());
   const auto front = static_cast<size_t>(std::ranges::mismatch(a, b).in1 - a.begin());
@@ -42,19 +42,19 @@ std::optional<T> ParseWhole(std::string_view text) {
   return value;
 }
 
-/// from_chars accepts no leading plus.
+/// Removes a leading plus, which from_chars does not accept.
 std::string_view WithoutPlus(std::string_view text) {
   if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
   return text;
 }
 
-/// A character of UTF-8 text, and its number of bytes.
+/// A character of a UTF-8 text and its number of bytes.
 struct CodePoint {
   char32_t value;
   size_t size;
 };
 
-/// The first character of `text`; nothing if it does not begin with one in its shortest form.
+/// The first character of `text`; nothing unless it is valid UTF-8 in its shortest form.
 std::optional<CodePoint> FirstCodePoint(std::string_view text) {
   const auto byte = [&](size_t i) { return static_cast<unsigned char>(text[i]); };
   const size_t size = byte(0) < 0x80   ? 1
@@ -69,13 +69,14 @@ std::optional<CodePoint> FirstCodePoint(std::string_view text) {
     if ((byte(i) & 0xc0) != 0x80) return std::nullopt;
     value = value << 6 | (byte(i) & 0x3fU);
   }
-  constexpr std::array<char32_t, 5> kSmallest{0, 0, 0x80, 0x800, 0x10000};  // of each size
+  // Smallest character of each size.
+  constexpr std::array<char32_t, 5> kSmallest{0, 0, 0x80, 0x800, 0x10000};
   const bool surrogate = value >= 0xd800 && value < 0xe000;
   if (value < kSmallest.at(size) || value > 0x10ffff || surrogate) return std::nullopt;
   return CodePoint{value, size};
 }
 
-/// Whether a terminal would do anything else than show the character in its place.
+/// Whether a terminal may do anything with the character other than show it in its place.
 bool IsControl(char32_t c) {
   const auto in = [c](char32_t first, char32_t last) { return c >= first && c <= last; };
   return in(0, 0x1f) || in(0x7f, 0x9f) || c == 0x61c || in(0x200b, 0x200f) || in(0x2028, 0x202e) ||
@@ -83,7 +84,7 @@ bool IsControl(char32_t c) {
          in(0xe0000, 0xe007f);
 }
 
-/// Such as `\x1b`.
+/// An escape such as `\x1b`.
 std::string Escape(char kind, char32_t value, int digits) {
   return Concat('\\', kind, HexDigits(value, digits));
 }
@@ -125,7 +126,7 @@ std::string ConcatPieces(std::initializer_list<Piece> pieces) {
 
 std::string FormatNumber(double value) {
   std::array<char, 32> buffer;
-  // Integers are written in full: 100000 rather than 1e+05.
+  // Write integers in full: 100000, not 1e+05.
   const bool integer = std::abs(value) < 1e16 && value == std::trunc(value);
   char* const end = buffer.data() + buffer.size();
   const auto result = integer ? std::to_chars(buffer.data(), end, value, std::chars_format::fixed)
@@ -139,7 +140,7 @@ std::optional<double> ParseNumber(std::string_view text) {
 
 std::optional<int64_t> ParseInteger(std::string_view text) {
   if (const auto integer = ParseWhole<int64_t>(WithoutPlus(text))) return integer;
-  constexpr double kLargest = 9007199254740992;  // 2^53: up to here a double is exact
+  constexpr double kLargest = 9007199254740992;  // 2^53: doubles are exact up to here
   const auto number = ParseNumber(text);
   if (!number || !(std::abs(*number) <= kLargest) || *number != std::trunc(*number)) {
     return std::nullopt;
@@ -197,7 +198,7 @@ size_t Columns(std::string_view text) {
 
 std::string WrapText(std::string_view text, size_t columns, size_t indent) {
   std::string wrapped;
-  size_t column = indent;  // where the line ends so far
+  size_t column = indent;  // current length of the line
   for (const std::string_view word : Split(text, ' ')) {
     if (word.empty()) continue;
     const bool is_first = column == indent;
@@ -263,7 +264,7 @@ std::string DidYouMean(std::string_view word, const std::vector<std::string>& na
   if (EditDistance(word, *nearest) <= tolerance) return meant(*nearest);
   const auto abbreviated = std::ranges::find(names, letters_of(word), Initials);
   if (letters > 1 && abbreviated != names.end()) return meant(*abbreviated);
-  constexpr size_t kFewest = 3;  // letters that two words must share
+  constexpr size_t kFewest = 3;  // number of letters that two words must share
   const auto begins = std::ranges::find_if(names, [&](const std::string& name) {
     return std::min(letters, count_letters(name)) >= kFewest &&
            (word.starts_with(name) || name.starts_with(word));

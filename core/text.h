@@ -13,7 +13,7 @@
 
 namespace upswing {
 
-/// A text or a number on its way into Concat.
+/// An argument of Concat, as text.
 class Piece {
  public:
   explicit Piece(std::string_view text) : text_(text) {}
@@ -21,7 +21,7 @@ class Piece {
   explicit Piece(std::signed_integral auto number) : text_(Write(int64_t{number})) {}
   explicit Piece(std::unsigned_integral auto number) : text_(Write(uint64_t{number})) {}
   explicit Piece(double number) : text_(Write(number)) {}
-  Piece(const Piece&) = delete;  // its text may be its own digits
+  Piece(const Piece&) = delete;  // text_ may point to digits_
   Piece& operator=(const Piece&) = delete;
 
   std::string_view text() const { return text_; }
@@ -37,7 +37,7 @@ class Piece {
 
 std::string ConcatPieces(std::initializer_list<Piece> pieces);
 
-/// Joins its arguments into one string, numbers with six digits.
+/// Joins its arguments into one string. Numbers have six digits.
 template <typename... Parts>
 std::string Concat(const Parts&... parts) {
   return ConcatPieces({Piece(parts)...});
@@ -49,22 +49,22 @@ std::span<const std::byte> BytesOf(std::string_view text);
 /// The shortest text that reads back as the same double, such as `0.1` or `1e-05`.
 std::string FormatNumber(double value);
 
-/// The whole of `text` as a finite or infinite number; nothing if it is anything else.
+/// Parses all of `text` as a finite or infinite number; nothing if that fails.
 std::optional<double> ParseNumber(std::string_view text);
 
-/// The whole of `text` as an integer, such as `12` or `1e6`; nothing if it is anything else.
+/// Parses all of `text` as an integer, such as `12` or `1e6`; nothing if that fails.
 std::optional<int64_t> ParseInteger(std::string_view text);
 
-/// `text` without blanks at either end.
+/// `text` without the blanks at both ends.
 std::string_view Trim(std::string_view text);
 
-/// The pieces of `text` between separators, each trimmed; "a,,b" has three.
+/// Splits `text` at the separators and trims each piece; "a,,b" has three pieces.
 std::vector<std::string_view> Split(std::string_view text, char separator);
 
-/// `parts` with `separator` between them.
+/// Joins `parts` with `separator` between them.
 std::string Join(const std::vector<std::string>& parts, std::string_view separator);
 
-/// The names of the rows of a table.
+/// The member `name` of each row of a table.
 template <typename Rows>
 std::vector<std::string> NamesOf(const Rows& rows) {
   std::vector<std::string> names;
@@ -72,33 +72,33 @@ std::vector<std::string> NamesOf(const Rows& rows) {
   return names;
 }
 
-/// `text` with each `from` replaced by `to`.
+/// `text` with every `from` replaced by `to`.
 std::string Replaced(std::string text, std::string_view from, std::string_view to);
 
 /// The last `digits` hexadecimal digits of a number.
 std::string HexDigits(uint64_t number, int digits);
 
-/// The number of characters of a UTF-8 text, each of which takes a column.
+/// Number of characters of a UTF-8 text. Each character takes one column.
 size_t Columns(std::string_view text);
 
-/// `text` in lines of at most `columns` characters, broken at blanks. All lines but the first begin
-/// with `indent` blanks; the first one stands behind as many columns, which the caller fills. A
-/// longer word has a line of its own.
+/// Wraps `text` at blanks into lines of at most `columns` characters. All lines except the first
+/// begin with `indent` blanks. The caller fills the first `indent` columns of the first line. A
+/// word that is too long has its own line.
 std::string WrapText(std::string_view text, size_t columns, size_t indent = 0);
 
-/// `text`, which may come from an untrusted file, for one line of a terminal: control characters,
-/// bytes that are not UTF-8, and the characters that reorder text or break lines are replaced by
-/// escapes such as `\n`, `\x1b` or `\u202e`. Everything else, including backslashes, is kept.
+/// Makes `text`, which may come from an untrusted file, safe for one line of a terminal. Escapes
+/// such as `\n`, `\x1b` or `\u202e` replace control characters, bytes that are not UTF-8, and
+/// characters that reorder text or break lines. Everything else stays, including backslashes.
 std::string Printable(std::string_view text);
 
-/// `text` as one word of a POSIX shell's command line: unchanged if that is safe, else in single
-/// quotes. Control characters are kept, so a command with them is not fit to be printed.
+/// `text` as one word of a POSIX shell's command line: unchanged if that is safe, otherwise in
+/// single quotes. Control characters stay, so a command that contains them is not fit for printing.
 std::string ShellQuoted(std::string_view text);
 
-/// " (did you mean NAME?)" for the name nearest to `word` in edit distance, among equals the
-/// one that begins and ends most as it does; if none is near, for a name whose words have
-/// these initials, that begins with `word`, or that `word` begins with; "" if there is no such name
-/// either.
+/// " (did you mean NAME?)" for the name nearest to `word` in edit distance. Among equally near
+/// names, it takes the name that shares most letters with `word` at both ends. If no name is near,
+/// it takes a name with these initials (`--lr`: `--learning-rate`), or a name that begins with
+/// `word` or is a beginning of `word`. "" if there is no such name.
 std::string DidYouMean(std::string_view word, const std::vector<std::string>& names);
 
 }  // namespace upswing

@@ -80,16 +80,16 @@ TEST(Text, PrintableKeepsTextAndEscapesControlCharacters) {
   EXPECT_EQ(Printable("\x1b[2J\x07\x7f"), "\\x1b[2J\\x07\\x7f");
   EXPECT_EQ(Printable(std::string_view("\0", 1)), "\\x00");
   EXPECT_EQ(Printable("\u009b31m"), "\\u009b31m");  // a control sequence in one character
-  EXPECT_EQ(Printable("\u202egnp"), "\\u202egnp");  // written from right to left
+  EXPECT_EQ(Printable("\u202egnp"), "\\u202egnp");  // right-to-left override
   EXPECT_EQ(Printable("\U000e0041"), "\\U000e0041");
-  EXPECT_EQ(Printable("\uffff"), "\\uffff");  // no character, and none in XML
+  EXPECT_EQ(Printable("\uffff"), "\\uffff");  // not a character, and not allowed in XML
 }
 
 TEST(Text, PrintableEscapesEachByteThatIsNotUtf8) {
   EXPECT_EQ(Printable("\xff"), "\\xff");
   EXPECT_EQ(Printable("\xc3"), "\\xc3");                             // cut short
   EXPECT_EQ(Printable("\xc0\xaf"), "\\xc0\\xaf");                    // not the shortest form
-  EXPECT_EQ(Printable("\xed\xa0\x80"), "\\xed\\xa0\\x80");           // half of a pair
+  EXPECT_EQ(Printable("\xed\xa0\x80"), "\\xed\\xa0\\x80");           // half of a surrogate pair
   EXPECT_EQ(Printable("\xf4\x90\x80\x80"), "\\xf4\\x90\\x80\\x80");  // beyond Unicode
 }
 

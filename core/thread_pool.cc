@@ -14,8 +14,9 @@
 namespace upswing {
 namespace {
 
-/// Waits until `value` differs from `old`: first spinning, as pieces of work of well under a
-/// millisecond follow each other closely, then asleep, so that an idle pool costs nothing.
+/// Waits until `value` differs from `old`. It spins at first, because pieces of work far shorter
+/// than a millisecond follow each other closely. Then it sleeps, so that an idle pool costs
+/// nothing.
 template <typename T>
 void WaitWhile(const std::atomic<T>& value, T old) {
   for (int spin = 0; spin < 2000; ++spin) {
@@ -27,14 +28,14 @@ void WaitWhile(const std::atomic<T>& value, T old) {
   value.wait(old, std::memory_order_acquire);
 }
 
-// A ticket holds the number of tasks and the index of the next one in a single number. A thread
-// that takes a task by compare-and-swap of the ticket knows that the round is still running: it
-// cannot end before that task does.
+// A ticket packs the number of tasks and the index of the next task into one number. A thread takes
+// a task by compare-and-swap of the ticket. If that succeeds, the round is still running, because
+// it cannot end before the task does.
 constexpr int kTaskBits = 32;
 
 }  // namespace
 
-/// The threads besides the caller's.
+/// The worker threads: all threads except the caller's.
 struct ThreadPool::Workers {
   explicit Workers(int count);
   ~Workers() { Stop(); }
@@ -50,7 +51,7 @@ struct ThreadPool::Workers {
   const std::function<void(int)>* task_ = nullptr;
   std::atomic<uint64_t> ticket_{0};      // the next task to take
   std::atomic<uint32_t> round_{0};       // increases at each ParallelFor; idle threads wait for it
-  std::atomic<uint32_t> unfinished_{0};  // tasks of this round
+  std::atomic<uint32_t> unfinished_{0};  // tasks of this round that are not done
   std::atomic<int> used_;                // workers that wait for rounds; the others sleep
   std::atomic<bool> stopping_{false};
   std::mutex error_mutex_;
@@ -78,7 +79,7 @@ void ThreadPool::Workers::Stop() {
 }
 
 void ThreadPool::Workers::ParallelFor(int n, const std::function<void(int)>& task) {
-  assert(unfinished_ == 0);  // not from within a task
+  assert(unfinished_ == 0);  // fails on a call within a task
   task_ = &task;
   unfinished_ = static_cast<uint32_t>(n);
   ticket_ = static_cast<uint64_t>(n) << kTaskBits;
@@ -137,7 +138,7 @@ void ThreadPool::Use(int threads) {
 
 void ThreadPool::ParallelFor(int n, const std::function<void(int)>& task) {
   if (used_ > 1 && n > 1) return workers_->ParallelFor(n, task);
-  for (int i = 0; i < n; ++i) task(i);  // no thread needs to be woken
+  for (int i = 0; i < n; ++i) task(i);  // no need to wake a thread
 }
 
 void ParallelFor(ThreadPool* pool, int n, const std::function<void(int)>& task) {

@@ -31,9 +31,10 @@ TEST(ThreadPool, ManyShortRoundsWithMoreThreadsThanProcessors) {
   std::atomic<int> by_others{0};
   for (int round = 0; round < 500; ++round) {
     const int n = 2 + round % 5;
-    std::vector<int> done(static_cast<size_t>(n), -1);  // gone at the end of the round
+    std::vector<int> done(static_cast<size_t>(n), -1);  // destroyed at the end of the round
     pool.ParallelFor(n, [&](int i) {
-      std::this_thread::yield();  // or the caller might run all tasks before others wake
+      // Without it, the caller may run all tasks before other threads wake.
+      std::this_thread::yield();
       done[static_cast<size_t>(i)] = round;
       by_others += std::this_thread::get_id() != caller ? 1 : 0;
     });
@@ -90,7 +91,7 @@ TEST(ThreadPool, OfTwoExceptionsOneReachesTheCallerAndNoneIsLeft) {
                                     if (i == 1 || i == 2) throw std::runtime_error("task");
                                   }),
                  std::runtime_error);
-    EXPECT_EQ(calls, 6);  // the others are done nevertheless
+    EXPECT_EQ(calls, 6);  // the other tasks run despite the exceptions
     calls = 0;
     EXPECT_NO_THROW(pool.ParallelFor(6, [&](int) { ++calls; }));
     EXPECT_EQ(calls, 6);

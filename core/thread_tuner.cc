@@ -7,11 +7,12 @@
 namespace upswing {
 namespace {
 
-constexpr int kBlock = 4;       // calls that are timed together
-constexpr int kRounds = 7;      // pairs of blocks, whose median ratio decides
-constexpr double kClear = 1.3;  // a ratio that decides after one round; of more threads, 1 / it
-constexpr double kWorthwhile = .95;  // a ratio that is worth more threads
-constexpr double kTrialShare = .01;  // of the time goes into trials
+constexpr int kBlock = 4;   // number of calls that are timed together
+constexpr int kRounds = 7;  // pairs of blocks per trial; the median of their ratios decides
+// A ratio above this, or below its inverse for more threads, decides in one round.
+constexpr double kClear = 1.3;
+constexpr double kWorthwhile = .95;  // ratio below which more threads are worth it
+constexpr double kTrialShare = .01;  // share of the time that goes into trials
 
 double SteadySeconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
@@ -63,7 +64,7 @@ void ThreadTuner::NextCandidate() {
   std::ranges::nth_element(ratios_, ratios_.begin() + static_cast<int>(ratios_.size()) / 2);
   const double ratio = ratios_[ratios_.size() / 2];
   ratios_.clear();
-  // More threads have to be faster by a margin; fewer threads only not slower by it.
+  // More threads must be faster by a margin. Fewer threads must only not be slower by that margin.
   const bool better = ratio < (upwards_ ? kWorthwhile : 1 / kWorthwhile);
   if (better) chosen_ = candidate_;
   if (better && upwards_ && chosen_ + 1 < choices_.size()) {

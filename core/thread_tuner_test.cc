@@ -8,7 +8,7 @@
 namespace upswing {
 namespace {
 
-/// A tuner on a clock that the test moves: a call on t threads takes seconds(t).
+/// A tuner on a clock that the test controls: a call on t threads takes seconds(t).
 class TunedWork {
  public:
   explicit TunedWork(int threads, std::function<double(int)> seconds)
@@ -48,11 +48,11 @@ TEST(ThreadTuner, StaysOnOneThreadWhereMoreAreSlowerAndLosesUnderOnePercent) {
   work.Run(kCalls);
   EXPECT_EQ(work.threads(), 1);
   EXPECT_LT(work.now(), 1.01 * kCalls * 1e-4);
-  EXPECT_EQ(work.spent(4), 0);  // two threads were slower already
+  EXPECT_EQ(work.spent(4), 0);  // two threads are already slower
 }
 
 TEST(ThreadTuner, FindsTheFastestNumberInBetween) {
-  // Amdahl's law with a cost of each thread: fastest on four.
+  // Amdahl's law with a cost per thread. Four threads are fastest.
   TunedWork work(8, [](int t) { return 1e-4 * (0.2 + 0.8 / t + 0.04 * t); });
   work.Run(2000);
   EXPECT_EQ(work.threads(), 4);
@@ -72,7 +72,8 @@ TEST(ThreadTuner, FollowsAMachineThatGetsBusyAndIdleAgain) {
 }
 
 TEST(ThreadTuner, CallsOfAlternatingLengthDoNotMislead) {
-  // Every second call is ten times as long, as where an actor learns at every second step.
+  // Every second call takes ten times as long, as for an agent whose actor learns in every second
+  // update.
   int call = 0;
   TunedWork work(
       2, [&](int threads) { return (call++ % 2 == 0 ? 1e-4 : 1e-3) * (threads == 1 ? 1 : 1.5); });

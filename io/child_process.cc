@@ -18,20 +18,20 @@
 namespace upswing {
 namespace {
 
-/// What the new process does: it becomes the program, or ends with 127. Between fork and exec only
-/// plain system calls are safe.
+/// Runs in the new process, which becomes the program or ends with 127. Only plain system calls are
+/// safe between fork and exec.
 [[noreturn]] void BecomeProgram(const char* program, char* const* arguments, int log,
                                 pid_t parent) {
-  // In this order: the second call notices a parent that died before the first.
+  // Keep this order: getppid notices a parent that died before the call of prctl.
   const bool tied = prctl(PR_SET_PDEATHSIG, SIGKILL) == 0 && getppid() == parent;
   setpgid(0, 0);
-  // The program handles this signal once it runs; until then it would kill it.
+  // Ignore SIGUSR1, which would kill the process, until the program handles it.
   std::signal(SIGUSR1, SIG_IGN);
   const int nothing = open("/dev/null", O_RDONLY | O_CLOEXEC);
   if (tied && nothing >= 0 && dup2(nothing, STDIN_FILENO) >= 0 && dup2(log, STDOUT_FILENO) >= 0 &&
       dup2(log, STDERR_FILENO) >= 0) {
-    execv("/proc/self/exe", arguments);  // this very program, even if its file has been replaced
-    execv(program, arguments);           // where there is no /proc
+    execv("/proc/self/exe", arguments);  // runs this program even if its file was replaced
+    execv(program, arguments);           // for systems without /proc
     constexpr char kNotice[] = "upswing: cannot start itself\n";
     (void)!write(STDERR_FILENO, kNotice, sizeof(kNotice) - 1);
   }

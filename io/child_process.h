@@ -9,23 +9,24 @@
 
 namespace upswing {
 
-/// This program, run once more beside this process. It has no terminal: nothing comes in, what it
-/// prints goes to the end of a log, and the terminal's Ctrl-C does not reach it. It is killed when
-/// this process ends, however that comes about.
+/// A second process of this program. It has no terminal: its input is empty, its output goes to the
+/// end of a log, and the terminal's Ctrl-C does not reach it. The system kills it when this process
+/// ends for any reason.
 class ChildProcess {
  public:
-  /// Starts it with these arguments. Throws Failure. Only for a process without other threads.
+  /// Starts the process with these arguments. Throws Failure. Call it only when no other threads
+  /// run.
   ChildProcess(const std::vector<std::string>& arguments, const std::filesystem::path& log);
-  /// Kills it if it still runs.
+  /// Kills the process if it still runs.
   ~ChildProcess();
   ChildProcess(ChildProcess&& other) noexcept;
   ChildProcess& operator=(ChildProcess&&) = delete;
 
   void Signal(int signal) const;
-  /// Its number; -1 once it has ended.
+  /// Process ID; -1 once the process has ended.
   pid_t pid() const { return pid_; }
 
-  /// How it ended: the exit code, or 128 and the signal that ended it; nothing while it runs.
+  /// Exit code of the process, or 128 plus the signal that ended it; nothing while it runs.
   std::optional<int> Poll();
 
  private:

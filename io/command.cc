@@ -20,7 +20,7 @@ Error SystemFailure(std::string_view what) {
   return Failure(Concat("cannot ", what, ": ", std::strerror(errno)));
 }
 
-/// A nameless temporary file. Unlike pipes, three of them cannot block.
+/// A nameless temporary file. Three pipes could block each other; three files cannot.
 class Scratch {
  public:
   Scratch() : file_(std::tmpfile(), &std::fclose) {
@@ -28,7 +28,7 @@ class Scratch {
   }
   int descriptor() const { return fileno(file_.get()); }
 
-  /// Writes all of it and goes back to the beginning.
+  /// Writes the text and goes back to the beginning of the file.
   void Fill(const std::string& text) {
     std::fwrite(text.data(), 1, text.size(), file_.get());
     if (std::fflush(file_.get()) != 0 || std::ferror(file_.get()) != 0) {

@@ -19,7 +19,7 @@ constexpr std::array<uint32_t, 256> kCrcTable = [] {
   return table;
 }();
 
-/// TFRecord rotates checksums and adds a constant, so that data may themselves hold checksums.
+/// Rotates a checksum and adds a constant, as TFRecord does for data that may contain checksums.
 uint32_t MaskedCrc(std::string_view bytes) {
   const uint32_t crc = Crc32c(bytes);
   return ((crc >> 15) | (crc << 17)) + 0xa282ead8U;

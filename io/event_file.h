@@ -13,11 +13,11 @@ namespace upswing {
 /// TensorBoard's event file: records of protobuf events, framed as in TFRecord with masked CRC-32C.
 class EventFile {
  public:
-  /// Opens or makes the file; CutTo must follow. Throws as AppendFile does.
+  /// Opens or makes the file. Call CutTo next. Throws as AppendFile does.
   explicit EventFile(const std::filesystem::path& path) : file_(path) {}
 
-  /// Cuts it back to `size` bytes, at most its size; if that is 0, the version record is written.
-  /// Throws Failure.
+  /// Cuts the file to `size` bytes, at most its current size. Writes the version record if `size`
+  /// is 0. Throws Failure.
   void CutTo(int64_t size);
 
   /// Appends scalars (tag, value) at a step. Throws Failure.

@@ -11,30 +11,32 @@
 
 namespace upswing {
 
-/// The program ffmpeg, which reads from us and writes a file. It is killed unless it is finished.
+/// An ffmpeg process that reads from this program and writes a file. The destructor kills it unless
+/// Finish was called.
 class Ffmpeg {
  public:
-  /// Starts it with these words; it reads our bytes as pipe:0, and writes to the open file
-  /// `output`. Throws Failure, with what to install if it is missing.
+  /// Starts ffmpeg with these words. It reads as pipe:0 the bytes given to Write, and it writes to
+  /// the open file `output`. Throws Failure; if ffmpeg is missing, the message says what to
+  /// install.
   Ffmpeg(const std::vector<std::string>& words, int output);
   ~Ffmpeg();
   Ffmpeg(const Ffmpeg&) = delete;
   Ffmpeg& operator=(const Ffmpeg&) = delete;
 
-  /// Throws Failure with ffmpeg's own message if it ended.
+  /// Sends bytes to ffmpeg. Throws Failure with ffmpeg's own message if it has ended.
   void Write(std::span<const uint8_t> bytes);
 
-  /// Waits until it has written everything. Throws as Write does.
+  /// Waits until ffmpeg has written everything. Throws as Write does.
   void Finish();
 
  private:
-  /// Throws what it said; `status` is that of its end.
+  /// Throws Failure with ffmpeg's messages. `status` is its exit status.
   [[noreturn]] void Fail(int status);
   int Wait();
 
   pid_t child_ = -1;
-  Descriptor input_;   // its standard input
-  Descriptor errors_;  // a nameless file: what it said
+  Descriptor input_;   // standard input of ffmpeg
+  Descriptor errors_;  // nameless file for ffmpeg's messages
 };
 
 }  // namespace upswing

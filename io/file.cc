@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Writes all bytes, however many calls it takes; false with errno on failure.
+/// Writes all bytes, in as many calls as necessary; false with errno on failure.
 bool WriteAll(int fd, std::span<const std::byte> bytes) {
   while (!bytes.empty()) {
     const ssize_t written = write(fd, bytes.data(), bytes.size());
@@ -33,7 +33,7 @@ bool WriteAll(int fd, std::span<const std::byte> bytes) {
   return true;
 }
 
-/// Whether an error of a system call is due to the path that it was given.
+/// Whether an error of a system call is due to its path.
 bool IsOfPath(int error_number) {
   constexpr std::array kOfPath{EACCES, EEXIST, EINVAL,  EISDIR,    ELOOP, ENAMETOOLONG,
                                ENODEV, ENOENT, ENOTDIR, ENXIO,     EPERM, ENOTEMPTY,
@@ -41,8 +41,8 @@ bool IsOfPath(int error_number) {
   return std::ranges::find(kOfPath, error_number) != kOfPath.end();
 }
 
-/// The whole of what was opened. With `most_bytes`: only of a regular file that is no larger.
-/// Throws BadInput.
+/// Reads everything from an open file. With `most_bytes`, accepts only a regular file of at most
+/// that size. Throws BadInput.
 std::vector<std::byte> ReadAll(const Descriptor& fd, const fs::path& path,
                                std::optional<size_t> most_bytes) {
   const auto cannot = [&](std::string_view why) {
@@ -59,7 +59,7 @@ std::vector<std::byte> ReadAll(const Descriptor& fd, const fs::path& path,
     throw cannot(Concat("expected at most ", *most_bytes, " bytes, got ", size));
   };
   expect_fits(static_cast<uintmax_t>(info.st_size));
-  // A pipe has no size, so read until the end instead of trusting one.
+  // Read until the end, because a pipe has no size.
   std::vector<std::byte> bytes(static_cast<size_t>(info.st_size));
   size_t filled = 0;
   while (true) {
@@ -121,7 +121,7 @@ std::string ReadOwnFile(const fs::path& path, size_t most_bytes) {
 }
 
 std::vector<std::byte> ReadOwnBytes(const fs::path& path, size_t most_bytes) {
-  // O_NONBLOCK: opening a pipe would wait for a writer.
+  // Use O_NONBLOCK, because opening a pipe would wait for a writer.
   return ReadAll(Descriptor(open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)), path,
                  most_bytes);
 }

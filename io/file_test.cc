@@ -54,7 +54,7 @@ TEST_F(FileTest, ASmallFileIsARegularOneWithinItsBound) {
   for (const fs::path& file : {folder_ / "pipe", fs::path("/dev/zero")}) {
     EXPECT_EQ(ends(error_of(file, 11), ": expected a file, got a pipe or a device"), "");
   }
-  // A file of the system, whose size is said to be 0.
+  // A system file that reports a size of 0.
   EXPECT_EQ(
       error_of("/proc/self/status", 11).find("cannot read /proc/self/status: expected at most"),
       0U);

@@ -18,9 +18,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kMostGifBytes = 1e9;  // of frames that ffmpeg keeps until it knows their colours
+// Limit on the frames that ffmpeg must keep until it knows all colours.
+constexpr double kMostGifBytes = 1e9;
 
-/// The last frame.
+/// Writer of the last frame as a PNG file.
 class PngWriter : public FrameWriter {
  public:
   PngWriter(std::string path, const FrameFormat& format)
@@ -34,13 +35,13 @@ class PngWriter : public FrameWriter {
   std::vector<uint8_t> last_;
 };
 
-/// A file for each frame, in a new folder.
+/// Writer of one file per frame in a new folder.
 class FolderWriter : public FrameWriter {
  public:
   FolderWriter(const fs::path& path, const FrameFormat& format)
       : making_(path, Making::Kind::kFolder), format_(format) {}
   void Write(std::span<const uint8_t> rgb) override {
-    // The folder has its name when all are there, so none needs another name until then.
+    // Write frames directly: the folder gets its name only when all frames are there.
     AppendFile frame(making_.path() / fmt::format("frame-{:05}.png", count_++));
     frame.Append(EncodePng(rgb, format_.width, format_.height));
     frame.Sync();
@@ -53,7 +54,7 @@ class FolderWriter : public FrameWriter {
   int64_t count_ = 0;
 };
 
-/// A film, by ffmpeg.
+/// Writer of a film through ffmpeg.
 class FilmWriter : public FrameWriter {
  public:
   FilmWriter(const fs::path& path, const FrameFormat& format, RecordingKind kind)
@@ -65,7 +66,7 @@ class FilmWriter : public FrameWriter {
   }
 
  private:
-  /// What ffmpeg makes of raw frames.
+  /// The words that make ffmpeg read raw frames and write a film.
   static std::vector<std::string> Words(const FrameFormat& format, RecordingKind kind) {
     std::vector<std::string> words{"-f",
                                    "rawvideo",
@@ -86,7 +87,7 @@ class FilmWriter : public FrameWriter {
            "diff_mode=rectangle",
            "-f", "gif"});
     } else {
-      // Players want even sizes and colours at half the resolution.
+      // Players need even sizes and colours at half the resolution.
       add({"-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p", "-movflags", "+faststart",
            "-f", "mp4"});
     }
@@ -97,7 +98,7 @@ class FilmWriter : public FrameWriter {
   Ffmpeg ffmpeg_;
 };
 
-/// The path of a film to write: through a link, as with every file that a user names.
+/// The path for a film, with links resolved, as for every file that a user names.
 fs::path Target(const std::string& flag, const std::string& path) {
   const fs::path target = fs::exists(path) ? fs::canonical(path) : fs::path(path);
   if (fs::exists(target) && !fs::is_regular_file(target)) {
@@ -124,7 +125,7 @@ std::unique_ptr<FrameWriter> MakeFrameWriter(const std::string& flag, const std:
                                              const FrameFormat& format) {
   const RecordingKind kind = RecordingKindOf(flag, path);
   if (kind == RecordingKind::kFolder) {
-    const fs::path folder = fs::path(path).parent_path();  // without the slash
+    const fs::path folder = fs::path(path).parent_path();  // without the trailing slash
     CheckFree(folder, Concat("choose another ", flag));
     return std::make_unique<FolderWriter>(folder, format);
   }

@@ -6,39 +6,40 @@
 #include <span>
 #include <string>
 
-/// Pictures one after the other, as a film or as files.
+/// Recording of frames as a film or as picture files.
 namespace upswing {
 
-/// Takes the frames of a recording. What is recorded appears under its name when it is finished,
-/// and not at all if it never is.
+/// Receiver of the frames of a recording. The recording appears under its name only when it is
+/// finished.
 class FrameWriter {
  public:
   virtual ~FrameWriter() = default;
-  /// One frame: pixels (height × width × 3), the top row first. Throws Failure.
+  /// Writes one frame: pixels (height × width × 3), top row first. Throws Failure.
   virtual void Write(std::span<const uint8_t> rgb) = 0;
-  /// Throws as Write does.
+  /// Completes the recording. Throws as Write does.
   virtual void Finish() = 0;
 };
 
-/// Of a recording.
+/// Format of a recording.
 struct FrameFormat {
   int width, height;  // pixels
-  double fps;         // frames a second
-  int64_t frames;     // how many there will be
+  double fps;         // frames per second
+  int64_t frames;     // total number of frames
 };
 
 enum class RecordingKind {
-  kMp4,     // FILE.mp4, made by the program ffmpeg
-  kGif,     // FILE.gif, too
+  kMp4,     // FILE.mp4, made with ffmpeg
+  kGif,     // FILE.gif, made with ffmpeg
   kPng,     // FILE.png: the last frame
-  kFolder,  // FOLDER/: each frame as a PNG, frame-00000.png and so on
+  kFolder,  // FOLDER/: one PNG per frame, frame-00000.png and so on
 };
 
-/// What a path asks for. Throws BadInput, which names `flag`, for anything else.
+/// The kind of recording that a path asks for. Throws BadInput that names `flag` if the path fits
+/// no kind.
 RecordingKind RecordingKindOf(const std::string& flag, const std::string& path);
 
-/// Begins a recording. Throws BadInput, which names `flag`, if it cannot be written there, and
-/// Failure if it needs a program that is not there.
+/// Begins a recording. Throws BadInput that names `flag` if the path is not writable. Throws
+/// Failure if a required program is missing.
 std::unique_ptr<FrameWriter> MakeFrameWriter(const std::string& flag, const std::string& path,
                                              const FrameFormat& format);
 

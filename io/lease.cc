@@ -26,19 +26,19 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr size_t kMostText = 1000;  // of the file
+constexpr size_t kMostText = 1000;  // bytes of the file that count
 
-/// A file that is open, and what it is.
+/// An open file and its status.
 struct Opened {
   Descriptor descriptor;
   struct stat info {};
 };
 
-/// Opens a regular file to read, without following a link; nothing if there is none.
+/// Opens a regular file for reading without following a link; nothing if there is none.
 std::optional<Opened> Open(const fs::path& path) {
   Opened file{Descriptor(open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC)), {}};
   if (file.descriptor.get() < 0 || fstat(file.descriptor.get(), &file.info) != 0) {
-    // Stale: another host has removed it since this one looked.
+    // Stale: another host removed the file after this host looked at it.
     if (errno == ENOENT || errno == ESTALE) return std::nullopt;
     throw PathError("cannot read", path, errno);
   }
@@ -62,15 +62,15 @@ struct stat InfoOf(const Making& file) {
   return info;
 }
 
-/// The file server's clock.
+/// Time of the file server's clock, s.
 double ServerClock(const Making& file) {
   if (futimens(file.descriptor(), nullptr) != 0)
     throw PathError("cannot write", file.path(), errno);
   return SecondsOf(InfoOf(file).st_mtim);
 }
 
-/// The text of a lease: host, process, and who that is. Where the file could not be locked, no
-/// lock says whether that process lives.
+/// The text of a lease: host, process and holder. If the file could not be locked, "unlocked" comes
+/// first, because no lock then tells whether the process lives.
 std::string TextOf(std::string_view holder, bool locked) {
   return Concat(locked ? "" : "unlocked ", ThisHost(), " ", getpid(), " ", holder, "\n")
       .substr(0, kMostText);
@@ -82,23 +82,23 @@ std::string ReadText(const Opened& file) {
   return {text.data(), static_cast<size_t>(std::max<ssize_t>(0, size))};
 }
 
-/// Whether the holder of a lease that was read has given it up.
+/// Whether a lease is lost: its holder has ended, or it has expired.
 bool IsLost(const Opened& file, const std::string& text, double now, std::chrono::seconds lasts) {
-  // A shared lock, as NFS gives an exclusive one to those alone who may write.
+  // Try a shared lock, because NFS gives an exclusive lock only to processes that may write.
   if (text.starts_with(ThisHost() + " ")) {
     return flock(file.descriptor.get(), LOCK_SH | LOCK_NB) == 0;
   }
   return now - SecondsOf(file.info.st_mtim) > static_cast<double>(lasts.count());
 }
 
-/// Seconds since the last boot, of which a machine that slept was not awake for all.
+/// Seconds since the last boot, including the time that the machine slept.
 double SecondsSinceBoot() {
   timespec now{};
   clock_gettime(CLOCK_BOOTTIME, &now);
   return SecondsOf(now);
 }
 
-/// The file server's clock, or this machine's where nothing can be written.
+/// Time of the file server's clock, or of this machine's clock if the folder is not writable.
 double NowBeside(const fs::path& path) {
   try {
     return ServerClock(Making(path, Making::Kind::kFile));
@@ -113,7 +113,7 @@ double NowBeside(const fs::path& path) {
 
 struct Lease::State {
   fs::path path;
-  Descriptor descriptor;  // locked as long as this process lives
+  Descriptor descriptor;  // locked while this process lives
   struct stat info;
   double lasts;  // s
   std::atomic<double> renewed_at{SecondsSinceBoot()};
@@ -125,7 +125,7 @@ struct Lease::State {
         info(what),
         lasts(static_cast<double>(seconds.count())) {}
 
-  /// Whether the name still stands for our file.
+  /// Whether the path still belongs to our file.
   bool IsOurs() const {
     struct stat now {};
     return lstat(path.c_str(), &now) == 0 && SameFile(now, info);
@@ -134,7 +134,7 @@ struct Lease::State {
     if (held() && IsOurs() && futimens(descriptor.get(), nullptr) == 0) {
       renewed_at = SecondsSinceBoot();
     } else if (!IsOurs()) {
-      renewed_at = -lasts;  // it is another's
+      renewed_at = -lasts;  // another process holds the lease
     }
   }
   bool held() const { return SecondsSinceBoot() - renewed_at < lasts; }
@@ -160,7 +160,7 @@ std::optional<Lease> Lease::Take(const fs::path& path, std::string_view holder,
   if (write(own.descriptor(), text.data(), text.size()) != std::ssize(text)) {
     throw PathError("cannot write", own.path(), errno);
   }
-  // Some servers make the link and lose the answer.
+  // Count the links, because some servers make the link and lose the answer.
   const auto take = [&] {
     return link(own.path().c_str(), path.c_str()) == 0 || InfoOf(own).st_nlink == 2;
   };
@@ -170,8 +170,8 @@ std::optional<Lease> Lease::Take(const fs::path& path, std::string_view holder,
     const std::optional<Opened> other = Open(path);
     if (other && !IsLost(*other, ReadText(*other), ServerClock(own), lasts)) return std::nullopt;
     if (other) {
-      // Of several that find it lost one takes it away; who takes away another one's new lease
-      // gives it back.
+      // Of several processes that find the lease lost, one moves it away. A process that moves a
+      // new lease away by mistake gives it back.
       const fs::path gone = own.path().string() + "-lost";
       if (rename(path.c_str(), gone.c_str()) != 0) return std::nullopt;
       struct stat moved {};
@@ -183,7 +183,7 @@ std::optional<Lease> Lease::Take(const fs::path& path, std::string_view holder,
     taken = take();
   }
   if (!taken) return std::nullopt;
-  // A second descriptor of the same open file keeps the lock when `own` gives up its other name.
+  // A duplicate descriptor of the open file keeps the lock after `own` removes its temporary name.
   Descriptor kept(fcntl(own.descriptor(), F_DUPFD_CLOEXEC, 0));
   if (kept.get() < 0) throw PathError("cannot write", path, errno);
   auto state = std::make_unique<State>(path, std::move(kept), InfoOf(own), lasts);

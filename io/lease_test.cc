@@ -27,12 +27,12 @@ size_t FilesIn(const fs::path& folder) {
   return static_cast<size_t>(std::distance(fs::directory_iterator(folder), {}));
 }
 
-/// Makes a lease look as if it was renewed so long ago.
+/// Makes a lease look as if its last renewal was `by_seconds` earlier.
 void Age(const fs::path& path, int64_t by_seconds) {
   fs::last_write_time(path, fs::last_write_time(path) - seconds(by_seconds));
 }
 
-/// A lease as another host leaves it.
+/// Writes a lease as another host leaves it.
 void WriteForeign(const fs::path& path) { std::ofstream(path) << "elsewhere/0123abcd 17 worker\n"; }
 
 TEST(Lease, OneHolderAtATimeAndNothingIsLeft) {
@@ -73,7 +73,7 @@ TEST(Lease, ThatOfAProcessThatHasEndedIsFreeAtOnce) {
   const pid_t child = fork();
   if (child == 0) {
     const auto lease = Lease::Take(path, "soon gone");
-    _exit(lease ? 0 : 1);  // as if it was killed: it gives nothing back
+    _exit(lease ? 0 : 1);  // as if killed, without giving the lease back
   }
   int status = 0;
   ASSERT_EQ(waitpid(child, &status, 0), child);
@@ -118,13 +118,13 @@ TEST(Lease, ThatOfALivingProcessOfThisHostDoesNotRunOut) {
   const fs::path path = folder.path() / "seed1.claim";
   const auto lease = Lease::Take(path, "here");
   ASSERT_TRUE(lease);
-  Age(path, 1000);  // as after a night asleep
+  Age(path, 1000);  // as after a night of sleep
   EXPECT_FALSE(ReadLease(path)->lost);
   EXPECT_FALSE(Lease::Take(path, "another one"));
 }
 
-// Two can hold it until they renew it: while one gives back a new lease that it moved away by
-// mistake, another takes the free name.
+// Two processes can hold a lease until they renew it. One of them gives back a new lease that it
+// moved away by mistake, and another takes the free name meanwhile.
 TEST(Lease, OneOfManyThatFindItLostGetsIt) {
   const TempFolder folder;
   {

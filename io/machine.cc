@@ -18,7 +18,7 @@
 namespace upswing {
 namespace {
 
-/// What stands behind `key` and its colon in the first such line of a file of the system.
+/// Reads the text after `key` and a colon, from the first such line of a system file.
 std::optional<std::string> ReadEntry(const char* path, std::string_view key) {
   std::ifstream file(path);
   std::string line;
@@ -30,7 +30,7 @@ std::optional<std::string> ReadEntry(const char* path, std::string_view key) {
   return std::nullopt;
 }
 
-/// The number that a file or an entry such as `1024 kB` begins with.
+/// The number at the beginning of a file or of an entry such as `1024 kB`.
 std::optional<int64_t> LeadingInteger(const std::string& text) {
   return ParseInteger(Split(text, ' ').front());
 }
@@ -41,10 +41,11 @@ std::optional<int64_t> ReadInteger(const char* path) {
   return std::getline(file, line) ? LeadingInteger(line) : std::nullopt;
 }
 
-/// More threads hardly help where work is cut into a few slices, and idle ones cost time.
+/// More threads hardly help, because work is cut into only a few slices, and idle threads cost
+/// time.
 constexpr int kMostThreads = 8;
 
-/// How many of `present` processors a container's CPU quota amounts to (Linux, control groups 2:
+/// Processors, out of `present`, that a container's CPU quota allows (Linux, control groups 2:
 /// "QUOTA PERIOD" in microseconds, or "max PERIOD").
 int WithinQuota(int present) {
   std::ifstream file("/sys/fs/cgroup/cpu.max");
@@ -58,7 +59,7 @@ int WithinQuota(int present) {
 
 int UsableProcessors() {
   cpu_set_t usable;
-  // It fails on systems with more processors than a cpu_set_t can hold.
+  // The call fails on systems with more processors than fit in a cpu_set_t.
   const bool known = sched_getaffinity(0, sizeof(usable), &usable) == 0;
   const int present =
       known ? CPU_COUNT(&usable) : static_cast<int>(std::thread::hardware_concurrency());
@@ -101,7 +102,8 @@ int64_t AvailableMemory() {
     const int64_t in_swap = swap ? LeadingInteger(*swap).value_or(0) : 0;
     limit_to(kKilobyte * (LeadingInteger(*free).value_or(bytes / kKilobyte / 2) + in_swap));
   }
-  // Of a control group, version 2. What it uses would count the cache of files, which can go.
+  // Limit of a control group, version 2. Do not subtract its usage, which includes the file cache
+  // that the system can free.
   limit_to(ReadInteger("/sys/fs/cgroup/memory.max"));
   rlimit address_space{};
   if (getrlimit(RLIMIT_AS, &address_space) == 0 && address_space.rlim_cur != RLIM_INFINITY) {

@@ -5,24 +5,24 @@
 
 namespace upswing {
 
-/// The name of this machine in its network.
+/// Network name of this machine.
 std::string HostName();
 
-/// This machine until its next boot: its host name and the ID of its last one.
+/// Identifies this machine until its next boot: host name and boot ID.
 std::string ThisHost();
 
-/// "AMD EPYC 9454P", as the system has it; "unknown" where it does not say.
+/// Model of the processor, such as "AMD EPYC 9454P"; "unknown" if the system does not tell.
 std::string CpuModel();
 
-/// Number of processors that this process may use, by its affinity and its container's limit; at
+/// Number of processors that this process may use, from its affinity and its container's limit. At
 /// least 1.
 int UsableProcessors();
 
-/// `wanted`, or if that is 0 as many as UsableProcessors, but no more than 8.
+/// Number of threads: `wanted`, or if that is 0 UsableProcessors, at most 8.
 int ResolveThreads(int64_t wanted);
 
-/// Bytes of memory that this process can still ask for: what the machine has free, within the
-/// limits of the process and of its control group. The largest number where the system gives none.
+/// Bytes of memory that this process can still get: the machine's free memory within the limits of
+/// the process and of its control group. The largest number if the system does not tell.
 int64_t AvailableMemory();
 
 }  // namespace upswing

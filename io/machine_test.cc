@@ -10,7 +10,7 @@ namespace {
 TEST(ResolveThreads, TakesANumberAsItIs) {
   EXPECT_EQ(ResolveThreads(1), 1);
   EXPECT_EQ(ResolveThreads(3), 3);
-  EXPECT_EQ(ResolveThreads(12), 12);  // more than it would choose itself
+  EXPECT_EQ(ResolveThreads(12), 12);  // more than its own limit of 8
 }
 
 TEST(ResolveThreads, ChoosesAsManyAsItMayUseUpToEight) {

@@ -27,24 +27,24 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kMark = ".making-";
 constexpr size_t kDigits = 16, kHostDigits = 8;
-constexpr int kMostTries = 100;  // one suffices unless another process interferes
-// What another host is making may be unlocked here: on NFS and others, a folder's lock is known to
-// its own host alone. So long without a change says that nobody makes it any more.
+constexpr int kMostTries = 100;  // one try is enough unless another process interferes
+// A file or folder of another host without a change for this long is abandoned. Its lock tells
+// nothing: on NFS and others, only the own host knows a folder's lock.
 constexpr int64_t kAbandonedAfter = 3600;  // s
 
-/// Digits that stand for this host in names.
+/// Digits that identify this host in temporary names.
 std::string HostDigits() {
   Checksum host;
   host.Update(BytesOf(ThisHost()));
   return host.Hex().substr(0, kHostDigits);
 }
 
-/// The temporary name of something.
+/// A temporary name for `name`.
 std::string MakingName(std::string_view name) {
   return Concat('.', name, kMark, HostDigits(), RandomDigits().substr(kHostDigits));
 }
 
-/// Whether a temporary name is of this host.
+/// Whether a temporary name belongs to this host.
 bool IsOfThisHost(std::string_view name) {
   return name.substr(name.size() - kDigits, kHostDigits) == HostDigits();
 }
@@ -52,7 +52,7 @@ bool IsOfThisHost(std::string_view name) {
 /// Tries to lock an open file or folder; false if another process holds the lock.
 bool Lock(const Descriptor& fd) { return flock(fd.get(), LOCK_EX | LOCK_NB) == 0; }
 
-/// By this machine's clock, which may be off by some minutes.
+/// Seconds since the last change, by this machine's clock, which may be off by some minutes.
 int64_t SecondsSinceChange(const Descriptor& fd) {
   struct stat info {};
   if (fstat(fd.get(), &info) != 0) return 0;
@@ -94,9 +94,10 @@ bool IsMakingName(std::string_view name) {
 }
 
 void RemoveFolder(const fs::path& folder) {
-  // Under the name of something that is being made: what a killed process leaves is removed, but
-  // not by others while we are about it, who find it locked. Where this lock fails, the folder is
-  // locked already, or nothing can be here and nobody removes what he cannot lock.
+  // Rename the folder to a temporary name first, so that a later Making removes what a killed
+  // process leaves. The lock keeps others from removing it meanwhile. If locking fails, the folder
+  // is already locked, or this file system has no locks and others cannot lock and remove it
+  // either.
   const Descriptor held(open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   (void)Lock(held);
   const fs::path gone = folder.parent_path() / MakingName(folder.filename().string());
@@ -130,14 +131,14 @@ bool Making::TryOpen(Kind kind) {
   } else if (mkdirat(folder_.get(), name_.c_str(), 0777) == 0) {
     descriptor_ =
         Descriptor(openat(folder_.get(), name_.c_str(), O_RDONLY | O_DIRECTORY | kCommon));
-    // Another process removed it before it was locked.
+    // Another process removed the folder before it was locked.
     if (descriptor_.get() < 0 && errno == ENOENT) return false;
   }
   if (descriptor_.get() < 0) {
     if (errno == EEXIST) return false;
     throw PathError("cannot write", target_, errno);
   }
-  // On a file system without locks, nothing is removed either.
+  // On a file system without locks, other processes remove nothing either.
   const bool is_ours = Lock(descriptor_) || errno != EWOULDBLOCK;
   return is_ours && HasName(descriptor_);
 }
@@ -154,14 +155,14 @@ void Making::Publish() {
     throw PathError("cannot write", target_, errno);
   }
   published_ = true;
-  // Synchronises the new name to disk. Some file systems cannot; the change is atomic anyway.
+  // Synchronise the new name to disk. Some file systems cannot, but the change is atomic anyway.
   const Descriptor folder(openat(folder_.get(), ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (folder.get() >= 0) fsync(folder.get());
 }
 
 void Making::RemoveAbandoned() const {
   const int fd = openat(folder_.get(), ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd < 0) return;  // a folder that is writable but not readable
+  if (fd < 0) return;  // the folder is writable but not readable
   const std::unique_ptr<DIR, int (*)(DIR*)> entries(fdopendir(fd), &closedir);
   if (!entries) {
     close(fd);

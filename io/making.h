@@ -19,51 +19,53 @@ class Descriptor {
   int fd_;
 };
 
-/// 16 random hexadecimal digits, for a name that no other process takes.
+/// 16 random hexadecimal digits, for a name that no other process uses.
 std::string RandomDigits();
 
-/// A file or folder that is being made. It appears under its name complete or not at all: until it
-/// is complete it is called `.NAME.making-` and 16 hexadecimal digits, 8 of this host and 8 random,
-/// in the same folder, and is locked. One of this host without a lock was left behind by a process
-/// that was killed; the next Making in that folder removes it. One of another host, whose locks may
-/// not be seen here, is removed an hour after its last change.
+/// A file or folder under construction. It appears under its name complete or not at all.
+///
+/// Until then it is locked and has the name `.NAME.making-` plus 16 hexadecimal digits, 8 of this
+/// host and 8 random, in the same folder. An unlocked one of this host belonged to a process that
+/// was killed; the next Making in the folder removes it. The locks of another host may be invisible
+/// here, so one of another host is removed an hour after its last change.
 class Making {
  public:
   enum class Kind { kFile, kFolder };
 
-  /// Makes it under the temporary name, empty, with a mode by the umask. Throws as PathError does.
+  /// Makes it empty under the temporary name, with a mode from the umask. Throws as PathError does.
   Making(const std::filesystem::path& path, Kind kind);
-  /// Removes it unless it was published.
+  /// Removes it unless Publish was called.
   ~Making();
   Making(const Making&) = delete;
   Making& operator=(const Making&) = delete;
 
-  /// Of a file: open for writing.
+  /// Descriptor of a file, open for writing.
   int descriptor() const { return descriptor_.get(); }
   /// The temporary path.
   const std::filesystem::path& path() const { return path_; }
 
-  /// Gives it its final name. A file or link of that name is replaced, never followed; a folder
-  /// also replaces an empty folder. Throws as PathError does.
+  /// Gives it the final name. Replaces a file or link of that name and never follows a link. A
+  /// folder also replaces an empty folder. Throws as PathError does.
   void Publish();
 
  private:
   void RemoveAbandoned() const;
-  /// Makes and locks it under a random name; false if another name must be tried.
+  /// Makes and locks it under a random name; false if another name is needed.
   bool TryOpen(Kind kind);
 
-  std::filesystem::path target_;  // its final path
-  Descriptor folder_;             // the folder that holds it
+  std::filesystem::path target_;  // final path
+  Descriptor folder_;             // parent folder
   std::string name_;
   std::filesystem::path path_;
   Descriptor descriptor_;
   bool published_ = false;
 };
 
-/// Removes a folder with its contents, in one step as others see it. Throws as PathError does.
+/// Removes a folder with its contents; other processes see it vanish in one step. Throws as
+/// PathError does.
 void RemoveFolder(const std::filesystem::path& folder);
 
-/// Whether this is the temporary name of a Making.
+/// Whether `name` is a temporary name of a Making.
 bool IsMakingName(std::string_view name);
 
 }  // namespace upswing

@@ -43,7 +43,7 @@ TEST(Making, WhatIsNotPublishedIsRemoved) {
   EXPECT_EQ(CountIn(temp.path()), 0);
 }
 
-/// The digits in a temporary name of this host.
+/// The digits of this host in a temporary name.
 std::string OwnDigits() {
   const TempFolder temp;
   const std::string name = Making(temp / "a", Kind::kFile).path().filename();
@@ -61,7 +61,7 @@ TEST(Making, WhatAKilledProcessLeftIsRemovedByTheNextAndNothingElse) {
   for (const fs::path& other : others) fs::create_directory(other);
   const Making first(temp / "a", Kind::kFile);
   {
-    const Making second(temp / "b", Kind::kFolder);  // leaves the first alone, which is locked
+    const Making second(temp / "b", Kind::kFolder);  // does not remove the first, which is locked
     EXPECT_TRUE(fs::exists(first.path()));
     EXPECT_TRUE(fs::exists(second.path()));
   }
@@ -71,7 +71,7 @@ TEST(Making, WhatAKilledProcessLeftIsRemovedByTheNextAndNothingElse) {
 }
 
 TEST(Making, WhatAnotherHostMakesIsLeftAloneForAnHour) {
-  // Its locks may be unknown here.
+  // Another host's locks may be invisible here.
   const TempFolder temp;
   const fs::path folder = temp / ".run.making-0123456789abcdef";
   const fs::path file = temp / ".b.making-0123456789abcdef";

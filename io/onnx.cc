@@ -10,8 +10,8 @@
 namespace upswing {
 namespace {
 
-constexpr int64_t kOpset = 17;     // the first with LayerNormalization
-constexpr int64_t kIrVersion = 8;  // that of opset 17
+constexpr int64_t kOpset = 17;     // first opset with LayerNormalization
+constexpr int64_t kIrVersion = 8;  // IR version of opset 17
 constexpr const char* kBatch = "batch";
 
 static_assert(std::endian::native == std::endian::little, "raw_data is little-endian");
@@ -98,7 +98,7 @@ void OnnxModel::AddMetadata(const std::string& key, const std::string& text) {
 }
 
 std::string OnnxModel::Bytes() const {
-  // Protobuf's own limit.
+  // Limit of protobuf.
   if (proto_->model.ByteSizeLong() > size_t{std::numeric_limits<int32_t>::max()}) {
     throw BadInput("ONNX: expected a policy of less than 2 GiB");
   }

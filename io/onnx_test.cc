@@ -48,7 +48,7 @@ TEST(Onnx, HoldsWhatWasAdded) {
   ASSERT_EQ(W.raw_data().size(), sizeof(values));
   EXPECT_EQ(std::memcmp(W.raw_data().data(), values.data(), sizeof(values)), 0);
 
-  // Zeros of attributes are written too.
+  // Attributes with the value 0 are written too.
   const onnx::NodeProto& node = graph.node(0);
   EXPECT_EQ(node.op_type(), "Gemm");
   EXPECT_EQ(node.output(0), "y");

@@ -28,7 +28,7 @@ void AppendChunk(std::string& out, const char* type, const std::string& data) {
   AppendNumber(out, static_cast<uint32_t>(crc32(0, bytes, static_cast<uInt>(body.size()))));
 }
 
-/// Of left, above and above left, the nearest to left + above - above left.
+/// Picks the neighbour (left, above or above left) nearest to left + above - above left.
 int Paeth(int left, int above, int corner) {
   const int p = left + above - corner;
   const int a = std::abs(p - left), b = std::abs(p - above), c = std::abs(p - corner);
@@ -36,7 +36,7 @@ int Paeth(int left, int above, int corner) {
   return b <= c ? above : corner;
 }
 
-/// A row's differences from its neighbours; `above` has zeros for the first row.
+/// Differences of a row from its neighbours. `above` is zero for the first row.
 void FilterRow(Filter filter, std::span<const uint8_t> row, std::span<const uint8_t> above,
                std::span<uint8_t> out) {
   for (size_t i = 0; i < row.size(); ++i) {
@@ -49,7 +49,7 @@ void FilterRow(Filter filter, std::span<const uint8_t> row, std::span<const uint
   }
 }
 
-/// How much a filtered row is expected to cost: the sum of its bytes as signed numbers.
+/// Estimated cost of a filtered row: the sum of its bytes' absolute values as signed numbers.
 int64_t CostOf(std::span<const uint8_t> row) {
   int64_t sum = 0;
   for (const uint8_t byte : row) sum += byte < 128 ? byte : 256 - byte;

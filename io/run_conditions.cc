@@ -19,9 +19,9 @@ using nlohmann::json;
 using nlohmann::ordered_json;
 
 constexpr size_t kMostConditions = 1000;
-constexpr size_t kMostLogBytes = 1 << 22;  // no log that a training writes is larger
+constexpr size_t kMostLogBytes = 1 << 22;  // no training writes a larger log
 
-/// Adds the facts of one line.
+/// Adds the facts of one log line.
 void AddFacts(const json& facts, RunConditions& conditions) {
   const auto add = [&](const char* name, std::set<std::string>& texts) {
     if (facts.contains(name) && facts[name].is_string()) texts.insert(facts[name]);
@@ -32,7 +32,7 @@ void AddFacts(const json& facts, RunConditions& conditions) {
   if (facts.contains("threads")) {
     if (const auto threads = JsonInteger(facts["threads"])) conditions.threads.insert(*threads);
   }
-  constexpr double kLongEnough = 2;  // s: the share of a shorter time says little
+  constexpr double kLongEnough = 2;  // s; a share of a shorter time says little
   const auto number = [&](const char* name) {
     return facts.contains(name) && facts[name].is_number() ? facts[name].get<double>() : -1;
   };

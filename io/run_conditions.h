@@ -9,27 +9,28 @@
 
 namespace upswing {
 
-/// The machine of a run and its share of it: what its times depend on. Sets, because a run may have
-/// been resumed on another machine. Empty of runs of 0.4.0, whose log has no facts.
+/// The machine of a run and the run's share of it, which its times depend on. The members are sets,
+/// because a run can resume on another machine. They are empty for runs of 0.4.0, whose logs have
+/// no facts.
 struct RunConditions {
   std::set<int64_t> threads;
-  std::set<std::string> hosts, vectors, processors;  // vectors: instructions in use
-  std::optional<double> busy;  // the least share of the time that its threads were at work
+  std::set<std::string> hosts, vectors, processors;  // vectors: instruction sets in use
+  std::optional<double> busy;  // smallest share of the time in which its threads worked
 
-  /// Reads the facts of all log.txt lines of a run; empty where none can be read.
+  /// Reads the facts from all lines of a run's log.txt; empty if that fails.
   static RunConditions Of(const std::filesystem::path& run);
 
-  /// Adds the conditions to a result file, or reads them from one. Throws BadInput.
+  /// AddTo adds the conditions to a result file. From reads them from one and throws BadInput.
   void AddTo(nlohmann::ordered_json& j) const;
   static RunConditions From(const nlohmann::json& j);
 };
 
-/// The facts at the end of the log line with which a training begins or is resumed: this machine,
-/// the number of threads and the version, as JSON.
+/// Facts, as JSON, for the log line with which a training begins or resumes: this machine, number
+/// of threads, and version.
 std::string BeginFacts(int threads, const std::string& version);
 
-/// The facts at the end of its last line: for how many seconds it trained, and with which share of
-/// them its threads were at work.
+/// Facts for the last log line of a training: its seconds, and the share of that time in which its
+/// threads worked.
 std::string EndFacts(double seconds, double busy);
 
 }  // namespace upswing

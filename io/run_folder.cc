@@ -21,21 +21,21 @@ namespace fs = std::filesystem;
 constexpr std::string_view kEventsName = "events.out.tfevents.0.upswing";
 constexpr int64_t kLargestTable = int64_t{1} << 60;
 
-// The files that grow during a run, whose sizes are in the checkpoint.
+// Files that grow during a run. The checkpoint contains their sizes.
 constexpr std::array kTables{"metrics", "episodes", "evals", "events"};
 
 /// The name of a table's size in the checkpoint.
 std::string SizeName(std::string_view table) { return Concat("run/size/", table); }
 
-/// Adds the sizes of kTables.
+/// Adds the sizes of kTables to a checkpoint.
 void AddSizes(Tensors& checkpoint, const std::array<int64_t, kTables.size()>& sizes) {
   for (size_t i = 0; i < sizes.size(); ++i) {
     checkpoint.AddScalar(SizeName(kTables.at(i)), sizes.at(i));
   }
 }
 
-/// The size of a table by the checkpoint; it has `size` bytes now. Throws BadInput if it is
-/// shorter than that.
+/// The size of a table in the checkpoint. Throws BadInput if the table, which has `size` bytes now,
+/// is shorter.
 int64_t KnownSize(const Tensors& checkpoint, std::string_view table, const fs::path& path,
                   int64_t size) {
   int64_t known = 0;
@@ -45,7 +45,7 @@ int64_t KnownSize(const Tensors& checkpoint, std::string_view table, const fs::p
                         " bytes that its checkpoint records, got ", size));
 }
 
-/// The names in a table's first line; none if it is empty.
+/// Column names in a table's first line; none if the file is empty.
 std::vector<std::string> ColumnsOf(const AppendFile& file) {
   if (file.size() == 0) return {};
   std::string line;
@@ -55,21 +55,21 @@ std::vector<std::string> ColumnsOf(const AppendFile& file) {
   return columns;
 }
 
-/// `path` without slashes at its end.
+/// `path` without trailing slashes.
 fs::path WithoutSlash(fs::path path) {
   while (!path.has_filename() && path.has_relative_path()) path = path.parent_path();
   return path;
 }
 
-/// Where a run folder is to be made: `path` with its links resolved. Throws BadInput if something
-/// is there already, or if the folder could not be put there in one piece.
+/// Final path of a new run folder: `path` with its links resolved. Throws BadInput if something is
+/// already there, or if the folder cannot be put there in one piece.
 fs::path PlaceOf(const fs::path& path) {
   std::error_code error;
   const bool is_run = fs::exists(path / RunFolder::kConfig, error);
   CheckFree(path, Concat(is_run ? Concat("resume it with --resume ", path.string(), ", or ") : "",
                          "choose another --out"));
   if (!fs::exists(path, error)) return path;
-  // An empty folder is replaced, which a process that works in it would not notice.
+  // A process that works in an empty folder would not notice its replacement.
   if (fs::equivalent(path, fs::current_path(error), error)) {
     throw BadInput(Concat(path.string(), ": expected a new folder, got the current one (choose ",
                           "another --out)"));
@@ -104,7 +104,7 @@ RunFolder::RunFolder(fs::path path, const Tensors& checkpoint)
       evals_{"evaluation/", AppendFile(path_ / kEvaluations), {}, {}},
       events_(path_ / kEventsName),
       log_(path_ / kLog) {
-  // All are checked before one is cut.
+  // Check all sizes before any file is cut.
   const auto known = [&](std::string_view name, const auto& file) {
     return KnownSize(checkpoint, name, file.path(), file.size());
   };
@@ -122,7 +122,7 @@ RunFolder::RunFolder(fs::path path, const Tensors& checkpoint)
 RunFolder::~RunFolder() {
   try {
     episodes_.Flush();
-  } catch (const Error&) {  // a full disk: the training has said so
+  } catch (const Error&) {  // full disk; the training has already reported it
   }
 }
 
@@ -177,7 +177,7 @@ void RunFolder::Log(std::string_view line) {
 
 void RunFolder::SaveCheckpoint(Tensors& checkpoint) {
   episodes_.Flush();
-  // The tables must be on disk before the checkpoint that records their sizes.
+  // The tables must be on disk before the checkpoint with their sizes.
   for (const Table* table : {&metrics_, &episodes_, &evals_}) table->file.Sync();
   events_.Sync();
   AddSizes(checkpoint,

@@ -12,8 +12,8 @@
 namespace upswing {
 namespace {
 
-/// Throws BadInput for anything but a regular file: a pipe might never end. (That a file is missing
-/// is reported by the reader.)
+/// Throws BadInput for anything except a regular file, because a pipe may never end. A missing file
+/// is left to the reader, which reports it.
 void CheckRegular(const std::filesystem::path& path) {
   std::error_code error;
   if (!std::filesystem::exists(path, error) || std::filesystem::is_regular_file(path, error))

@@ -13,17 +13,17 @@ namespace upswing {
 /// Writes the file atomically, with a checksum. Throws Failure.
 void SaveTensors(const Tensors& tensors, const std::filesystem::path& path);
 
-/// A size that no policy's file exceeds: twice eight layers of 4096 units.
+/// Size limit for policy files: two networks of eight layers of 4096 units fit.
 inline constexpr size_t kMostPolicyBytes = size_t{1} << 31;
 
-/// Reads and checks everything: sizes, shapes, offsets, checksum. Throws BadInput, also if the file
-/// is larger than `most_bytes` or than the memory that is left.
+/// Reads a file and checks sizes, shapes, offsets and checksum. Throws BadInput, also if the file
+/// is larger than `most_bytes` or than the free memory.
 Tensors LoadTensors(const std::filesystem::path& path,
                     size_t most_bytes = std::numeric_limits<size_t>::max());
 
-/// Reads only the metadata and the tensors whose names begin with `prefix`, a small part of a large
-/// file, for display. The checksum, which covers the whole file, is not verified; use LoadTensors
-/// to work with the file. Throws BadInput.
+/// Reads only the metadata and the tensors whose names begin with `prefix`, to display a small part
+/// of a large file. Does not verify the checksum, which covers the whole file; use LoadTensors to
+/// work with the file. Throws BadInput.
 Tensors LoadPartOfTensors(const std::filesystem::path& path, std::string_view prefix);
 
 }  // namespace upswing

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 class TensorFileTest : public ::testing::Test {
  protected:
-  /// A file with every type, an empty tensor and sizes that do not fill words.
+  /// Saves a file with every type, an empty tensor and sizes that are not whole words.
   void SaveSample() const {
     const std::vector<uint8_t> bytes{1, 2, 3};
     const std::vector<float> floats{1.5F, -2, 3, 4, 5, 6};
@@ -39,10 +39,10 @@ class TensorFileTest : public ::testing::Test {
     SaveTensors(file, path_);
   }
 
-  /// The message of the error that loading these bytes gives.
+  /// The message of the error from loading these bytes.
   std::string LoadError(std::span<const std::byte> bytes) const {
-    // Not as the program writes, which waits until the disk has it, as some file systems do also
-    // for a file that is written anew.
+    // Do not write as the program does, which waits for the disk. Some file systems also wait when
+    // a file is overwritten.
     fs::remove(path_);
     std::ofstream(path_, std::ios::binary)
         .write(reinterpret_cast<const char*>(bytes.data()),
@@ -56,7 +56,8 @@ class TensorFileTest : public ::testing::Test {
     return "";
   }
 
-  /// A file with this header and so many zero bytes of data, without a checksum.
+  /// The message of the error from a file with this header and `data` zero bytes, without a
+  /// checksum.
   std::string HeaderError(const std::string& header, size_t data) const {
     const uint64_t length = header.size();
     std::string file(8, '\0');
@@ -137,7 +138,8 @@ TEST_F(TensorFileTest, EveryTruncationIsFound) {
 TEST_F(TensorFileTest, EveryFlippedBitIsFound) {
   SaveSample();
   const std::vector<std::byte> whole = ReadFile(path_);
-  // But for the key "checksum", under another name, of a file that says no upswing_version.
+  // A flipped bit in the key "checksum" stays unnoticed. The file then has no checksum, and without
+  // upswing_version it needs none.
   const size_t key = ReadTextFile(path_).find("checksum");
   for (size_t at = 0; at < whole.size(); ++at) {
     for (int bit = 0; bit < 8; bit += 3) {
@@ -189,7 +191,7 @@ TEST_F(TensorFileTest, APartOfABrokenFileIsRefusedAsTheWholeIs) {
   EXPECT_EQ(part_error(path_),
             HeaderError(R"({"a":{"dtype":"F32","shape":[2],"data_offsets":[0,4]}})", 4));
   EXPECT_NE(part_error(folder_ / "none"), "");
-  // Opening a pipe would wait for a writer.
+  // Do not open a pipe, which would wait for a writer.
   const fs::path pipe = folder_ / "pipe";
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
   EXPECT_THROW(LoadTensors(path_, fs::file_size(path_) - 1), Error);
@@ -259,7 +261,7 @@ TEST_F(TensorFileTest, SizeAndDepthOfHeadersAreLimited) {
 }
 
 TEST_F(TensorFileTest, APartIsNeverMoreThanTheFile) {
-  // Many tensors that all claim the same bytes.
+  // A header with many tensors that all claim the same bytes.
   std::string header;
   for (int i = 0; i < 100; ++i) {
     header += Concat(i == 0 ? "{" : ",", "\"a", i,
@@ -288,7 +290,7 @@ TEST_F(TensorFileTest, AFileWithAnUpswingVersionNeedsItsChecksum) {
   }
 }
 
-/// A component with every kind of state.
+/// A component with state of every kind.
 struct Component {
   std::vector<float> fixed = std::vector<float>(3);
   std::vector<double> growing;

@@ -4,10 +4,10 @@
 #include <filesystem>
 #include <string>
 
-/// Helpers of tests.
+/// Helpers for tests.
 namespace upswing {
 
-/// A new folder for a test, removed with its contents at the end. Tests may run in parallel.
+/// A new folder for a test. The destructor removes it with its contents. Tests may run in parallel.
 class TempFolder {
  public:
   TempFolder() {

@@ -22,7 +22,7 @@ void Adam::Step(const Size& size, std::span<const float> gradient, std::span<flo
                 std::span<float> target, ThreadPool& pool) {
   constexpr double kBeta1 = 0.9;
   constexpr double kBeta2 = 0.999;
-  constexpr size_t kChunk = 2048;  // numbers in a task
+  constexpr size_t kChunk = 2048;  // numbers per task
 
   if (!std::isfinite(size.gradient_norm)) {
     throw Failure(
@@ -31,7 +31,7 @@ void Adam::Step(const Size& size, std::span<const float> gradient, std::span<flo
   const bool clip = size.gradient_norm > size.max_norm;
   const double scale = clip ? size.max_norm / size.gradient_norm : 1.0;
 
-  // m̂ / (sqrt(v̂) + ε) with both bias corrections folded into step and ε, as the paper proposes.
+  // m̂ / (sqrt(v̂) + ε), with both bias corrections in step and ε, as the paper proposes.
   ++steps_;
   const double t = static_cast<double>(steps_);
   const double correction1 = 1.0 - std::pow(kBeta1, t);

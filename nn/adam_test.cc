@@ -10,7 +10,7 @@
 namespace upswing {
 namespace {
 
-/// One step with targets that stay where they are.
+/// Makes one step without targets.
 void Step(Adam& adam, const AlignedVector<float>& gradient, double learning_rate, double max_norm,
           AlignedVector<float>& p) {
   double squares = 0;
@@ -21,7 +21,7 @@ void Step(Adam& adam, const AlignedVector<float>& gradient, double learning_rate
 }
 
 TEST(Adam, TakesAnotherEpsilonAndNeedsNoTarget) {
-  // The first step is learning rate · g / (|g| + ε), by both bias corrections.
+  // Both bias corrections make the first step learning rate · g / (|g| + ε).
   Adam adam(1, 0.5);
   AlignedVector<float> p{1.0F};
   const AlignedVector<float> gradient{2.0F};
@@ -31,7 +31,7 @@ TEST(Adam, TakesAnotherEpsilonAndNeedsNoTarget) {
 }
 
 TEST(Adam, FollowsTheAlgorithmAsThePaperWritesIt) {
-  // Kingma and Ba, Algorithm 1, in double, with m̂ and v̂ written out.
+  // Reference: Kingma and Ba, Algorithm 1, in double, with explicit m̂ and v̂.
   Adam adam(1);
   AlignedVector<float> p{1.0F};
   double expected = 1.0, m = 0, v = 0;
@@ -49,7 +49,8 @@ TEST(Adam, FollowsTheAlgorithmAsThePaperWritesIt) {
 }
 
 TEST(Adam, ClipsByTheGlobalNorm) {
-  // A gradient of norm 5 clipped to 1 acts like that gradient divided by 5, also in later steps.
+  // A gradient of norm 5 that is clipped to 1 acts like that gradient divided by 5, also in later
+  // steps.
   Adam clipped(2), plain(2);
   AlignedVector<float> p{0, 0}, q{0, 0};
   Step(clipped, {3, 4}, 0.1, 1, p);
@@ -80,7 +81,7 @@ TEST(Adam, TargetsFollowAndThreadsChangeNoBit) {
   Adam(kMany).Step(size, gradient, p2, target2, three);
   EXPECT_EQ(p, p2);
   EXPECT_EQ(target, target2);
-  EXPECT_NEAR(p[kMany - 1], 0.9, 1e-6);  // the first step is the learning rate
+  EXPECT_NEAR(p[kMany - 1], 0.9, 1e-6);  // the first step has the size of the learning rate
   EXPECT_NEAR(target[kMany - 1], 2 + 0.5 * (0.9 - 2), 1e-6);
 }
 

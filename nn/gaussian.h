@@ -5,10 +5,12 @@
 #include <numbers>
 #include <span>
 
-/// Diagonal Gaussian policies, one action component at a time; of several, log-probabilities add
-/// up. u = μ + σ ε with ε ~ N(0, 1) is the unbounded action; a squashed policy's action is
-/// a = tanh(u), within ±1 (Haarnoja et al., 2018, Appendix C). What the environment gets is a times
-/// its limit, to which no probability here refers. T = float to work, double to check gradients.
+/// Diagonal Gaussian policies, one action component at a time. The log-probability of an action is
+/// the sum over its components.
+///
+/// u = μ + σ ε with ε ~ N(0, 1) is the unbounded action. The action of a squashed policy is
+/// a = tanh(u), within ±1 (Haarnoja et al., 2018, Appendix C). The environment receives limit · a;
+/// all probabilities here refer to a or u. T = float for training, double for gradient checks.
 namespace upswing {
 
 inline constexpr double kLogStdLow = -5, kLogStdHigh = 2;  // ln σ is clamped to this range
@@ -19,9 +21,9 @@ struct Gaussian {
   T mean = 0;            // μ
   T log_std = 0;         // ln σ
   T std = 1;             // σ
-  bool clamped = false;  // whether ln σ is at an end of its range, where it has no gradient
+  bool clamped = false;  // whether ln σ is at an end of its range and has no gradient
 
-  /// From a network's outputs.
+  /// Makes a Gaussian from the outputs of a network.
   static Gaussian From(T mean, T log_std) {
     constexpr T kLow = kLogStdLow, kHigh = kLogStdHigh;
     const T clamped = std::clamp(log_std, kLow, kHigh);
@@ -32,8 +34,9 @@ struct Gaussian {
 /// Φ(x), the distribution function of a standard normal.
 inline double NormalCdf(double x) { return std::erfc(-x / std::numbers::sqrt2) / 2; }
 
-/// How likely the actions are of a policy that is squashed, or cut off at ±1 (n + 2): -1 as what is
-/// cut off there, n equal pieces of the range between, and 1 as what is cut off there.
+/// Probabilities (n + 2) of the actions of a policy that is squashed or clipped to ±1. The first
+/// and the last are the probabilities of clipping to -1 and to 1. The others belong to n equal
+/// intervals between -1 and 1.
 inline void ActionProbabilities(const Gaussian<double>& policy, bool squashed,
                                 std::span<double> probabilities) {
   const size_t pieces = probabilities.size() - 2;
@@ -48,20 +51,21 @@ inline void ActionProbabilities(const Gaussian<double>& policy, bool squashed,
   probabilities.back() = 1 - below;
 }
 
-/// ln N(u; μ, σ²) of the sample that `epsilon` = (u - μ)/σ makes.
+/// ln N(u; μ, σ²) of the sample u = μ + σ · `epsilon`.
 template <typename T>
 T LogDensity(T epsilon, T log_std) {
   static const T kHalfLogTwoPi = std::log(2 * std::numbers::pi_v<T>) / 2;
   return -epsilon * epsilon / 2 - log_std - kHalfLogTwoPi;
 }
 
-/// ln(1 - tanh²(u)), the logarithm of the slope of tanh, of size = |u| and e = exp(-2 |u|), in its
-/// stable form 2 (ln 2 - u - softplus(-2u)); exact for any u, as |u| replaces u by symmetry.
+/// ln(1 - tanh²(u)), the logarithm of the slope of tanh, from size = |u| and e = exp(-2 |u|). This
+/// is the stable form 2 (ln 2 - u - softplus(-2u)). It is exact for any u, because by symmetry |u|
+/// can replace u.
 template <typename T>
 T LogTanhSlope(T size, T e) {
   return 2 * (std::numbers::ln2_v<T> - size - std::log1p(e));
 }
-/// The same of u.
+/// ln(1 - tanh²(u)), the logarithm of the slope of tanh.
 template <typename T>
 T LogTanhSlope(T u) {
   return LogTanhSlope(std::abs(u), std::exp(-2 * std::abs(u)));
@@ -74,7 +78,7 @@ struct Squashed {
   T log_prob = 0;             // ln π(a) = ln N(u) - ln(1 - a²)
 };
 
-/// Its definition; SquashSamples of linear.h is the same for many at once.
+/// Makes the sample of ε. SquashSamples of linear.h does the same for many samples at once.
 template <typename T>
 Squashed<T> Squash(const Gaussian<T>& policy, T epsilon) {
   // One e = exp(-2 |u|) serves tanh(|u|) = (1 - e) / (1 + e) and ln(1 - a²).
@@ -89,8 +93,8 @@ struct GaussianGradient {
   T mean = 0, log_std = 0;
 };
 
-/// Of α ln π(a) - Q(a) through the sample a = tanh(μ + σ ε), given dQ/da (Haarnoja et al., 2018,
-/// Eq 7):
+/// Gradient of α ln π(a) - Q(a) through the sample a = tanh(μ + σ ε), given dQ/da (Haarnoja et al.,
+/// 2018, Eq 7):
 ///   d/dμ = 2 α a - Q_a (1 - a²),  d/dlnσ = α (2 a σ ε - 1) - Q_a (1 - a²) σ ε.
 template <typename T>
 GaussianGradient<T> SquashedGradient(const Gaussian<T>& policy, const Squashed<T>& sample, T alpha,

@@ -30,7 +30,8 @@ TEST(Gaussian, ActionProbabilitiesAreScipys) {
     double mean, log_std;
     std::array<double, 6> probabilities;
   };
-  // scipy.stats.norm 1.17.1: what is cut off at -1, quarters of the range, what is cut off at 1.
+  // scipy.stats.norm 1.17.1: probability of clipping to -1, of four quarters of the range, and of
+  // clipping to 1.
   const std::array<Case, 6> cases{{
       {true, 0.3, -1, {0, 0.0104814094487, 0.19691609333, 0.543616575317, 0.248985921904, 0}},
       {true, 2, 1, {0, 0.174164009485, 0.0567747146974, 0.0658425962209, 0.703218679596, 0}},
@@ -61,15 +62,15 @@ TEST(Gaussian, ActionProbabilitiesAreScipys) {
 }
 
 TEST(Gaussian, LogTanhSlopeIsRightWhereTanhHasNoDigitsLeft) {
-  // ln(1 - tanh²(u)) = -2 ln cosh(u): by hand at 8, where 1 - tanh² is 4.5e-7, and in floats at 40,
-  // where tanh is 1.
+  // ln(1 - tanh²(u)) = -2 ln cosh(u). By hand at u = 8, where 1 - tanh² is 4.5e-7, and in float at
+  // u = 40, where tanh is 1.
   EXPECT_NEAR(LogTanhSlope(8.0), 2 * std::log(2.0) - 16, 1e-6);
   EXPECT_NEAR(LogTanhSlope(8.0), -2 * std::log(std::cosh(8.0)), 1e-12);
   EXPECT_NEAR(LogTanhSlope(-40.0F), 2 * std::log(2.0F) - 80, 1e-4F);
   EXPECT_NEAR(LogTanhSlope(0.0), 0, 1e-15);
 }
 
-/// α ln π(a) - Q(a) with Q(a) = sin(3 a), of the action that ε makes.
+/// α ln π(a) - Q(a) with Q(a) = sin(3 a), for the action of ε.
 double Loss(double mean, double log_std, double epsilon, double alpha) {
   const Squashed<double> sample = Squash(Gaussian<double>::From(mean, log_std), epsilon);
   return alpha * sample.log_prob - std::sin(3 * sample.action);

@@ -102,7 +102,7 @@ void Layer::TransposeWeights(RowRange rows, std::span<const Real> parameters,
 
 void Layer::Backward(std::span<const Real> parameters, std::span<const Real> transposed,
                      RowRange rows, LayerActivations& a, GradientPlace input) const {
-  // dy: with respect to y; for a ReLU already to what is before it, because of the gate.
+  // Gradient with respect to y. For a ReLU, the gate has made it the gradient before the ReLU.
   const Matrix<Real> dy = OutputGradient(rows, a).dx;
   const Matrix<Real> dlinear = RowsOf(a.grad_linear, rows, out_);
   if (activation_ == Activation::kTanh) TanhBackward(Output(rows, a).values(), dy.values());

@@ -11,24 +11,24 @@
 #include "core/rng.h"
 #include "nn/real.h"
 
-/// The layers that networks are made of. B = batch size.
+/// Layers of networks. B = batch size.
 namespace upswing {
 
-/// Some consecutive rows, of a batch or of a weight.
+/// Consecutive rows of a batch or of a weight.
 struct RowRange {
   int first, count;
 };
 
-/// The given rows of a matrix (… × cols) that begins where `values` does.
+/// View of some rows of a matrix (… × cols) whose first number is the first of `values`.
 template <typename Values>
 auto RowsOf(Values& values, RowRange rows, int cols) {
   return Matrix(std::span(values), rows.first + rows.count, cols).Rows(rows.first, rows.count);
 }
 
-/// A place for the gradient with respect to some numbers x.
+/// Destination of the gradient with respect to some numbers x.
 struct GradientPlace {
   Matrix<Real> dx;               // (B × n)
-  Matrix<const Real> gate = {};  // (B × n) dx = 0 where it is 0: x, if that is a ReLU's output
+  Matrix<const Real> gate = {};  // (B × n) x if it is the output of a ReLU: dx = 0 where gate = 0
 };
 
 enum class Activation { kNone, kRelu, kTanh };
@@ -37,40 +37,41 @@ enum class Activation { kNone, kRelu, kTanh };
 struct ParameterBlock {
   std::string name;  // such as "feature.0.weight"
   size_t offset;     // first number
-  int in, out;       // a weight is (in × out); in is 0 for a vector of `out` numbers
+  int in, out;       // a weight is (in × out); a vector of `out` numbers has in = 0
   size_t size() const { return static_cast<size_t>(std::max(1, in)) * static_cast<size_t>(out); }
 };
 
-/// Units of a layer with their numbers, for those that write a network in another form.
+/// A view of a layer's units and parameters, for writers of other network formats.
 struct LayerView {
   std::string name;      // such as "feature.0"
   Matrix<const Real> W;  // (in × out)
   std::span<const Real> b, gain,
-      norm_bias;  // (out); without layer normalisation the last are empty
+      norm_bias;  // (out); gain and norm_bias are empty without layer normalisation
   Activation activation;
 
   int in() const { return W.rows(); }
   int out() const { return W.cols(); }
   bool layer_norm() const { return !gain.empty(); }
-  /// Some consecutive units of a layer without layer normalisation.
+  /// View of consecutive units. The layer must not have layer normalisation.
   LayerView Units(int first, int count) const;
 };
 
-/// What forward and backward passes leave in each row of a batch.
+/// Results of forward and backward passes, per row of a batch.
 struct LayerActivations {
-  AlignedVector<Real> normal, inv_std;  // (B × out) x̂, (B); if layer_norm
+  AlignedVector<Real> normal, inv_std;  // x̂ (B × out) and its factor (B); only with layer_norm
   AlignedVector<Real> output;           // (B × out)
-  // Gradients (B × out) with respect to x · W + b and, if layer_norm, to what it makes of that.
+  // Gradients (B × out) with respect to x · W + b and, with layer_norm, to the output of the
+  // normalisation.
   AlignedVector<Real> grad_linear, grad_normal;
 };
 
-/// y (B × out) = activation(norm(x · W + b)), with x (B × in), W (in × out) and b (out), at its
-/// place in a network's flat parameters. Immutable; a forward and a backward pass concern the given
-/// rows of the batch.
+/// y (B × out) = activation(norm(x · W + b)), with x (B × in), W (in × out) and b (out). The layer
+/// has its place in a network's flat parameters. Immutable. Forward and Backward process only the
+/// given rows of the batch.
 class Layer {
  public:
-  /// W begins at `offset` of the parameters; b and, with layer normalisation (Ba et al., 2016)
-  /// before the activation, gain and bias (out each) follow it.
+  /// W begins at `offset` of the parameters, and b follows. With layer normalisation (Ba et al.,
+  /// 2016), which precedes the activation, its gain and bias (out each) follow b.
   Layer(std::string name, int in, int out, Activation activation, bool layer_norm, size_t offset);
 
   int in() const { return in_; }
@@ -79,42 +80,42 @@ class Layer {
   std::vector<ParameterBlock> Blocks() const;
   LayerView View(std::span<const Real> parameters) const;
 
-  /// PyTorch's defaults: W and b uniform in ±1/√in, gain 1 and its bias 0.
+  /// Sets PyTorch's defaults: W and b uniform in ±1/√in, gain 1 and norm bias 0.
   void Initialize(Rng& rng, std::span<Real> parameters) const;
 
-  /// b (out).
+  /// View of b (out).
   std::span<Real> Bias(std::span<Real> parameters) const { return Vector(parameters, bias_); }
 
-  /// Buffers for up to `max_batch` rows; those of gradients only if asked for.
+  /// Makes buffers for up to `max_batch` rows. They include gradients only if `gradients`.
   LayerActivations MakeActivations(int max_batch, bool gradients) const;
 
-  /// Returns y, given x (rows.count × in).
+  /// Computes and returns y (rows.count × out) for x (rows.count × in).
   Matrix<const Real> Forward(std::span<const Real> parameters, Matrix<const Real> x, RowRange rows,
                              LayerActivations& a) const;
 
-  /// The y of the last Forward.
+  /// The y (rows.count × out) of the last Forward.
   Matrix<const Real> Output(RowRange rows, const LayerActivations& a) const;
-  /// Where to put the gradient with respect to y before Backward.
+  /// Destination of the gradient with respect to y. Fill it before Backward.
   GradientPlace OutputGradient(RowRange rows, LayerActivations& a) const;
 
-  /// Writes some rows of W, transposed (out × in), into their place in `transposed`, which has W at
-  /// the offset of `parameters`.
+  /// Transposes some rows of W into `transposed`. Wᵀ (out × in) begins there at the offset that W
+  /// has in `parameters`.
   void TransposeWeights(RowRange rows, std::span<const Real> parameters,
                         std::span<Real> transposed) const;
 
-  /// Writes the gradients with respect to x · W + b and to x, where there is a place for the
-  /// latter, given all that TransposeWeights writes.
+  /// Writes the gradient with respect to x · W + b, and with respect to x if `input` has a
+  /// destination for it. It needs the transposed weights of all rows of W.
   void Backward(std::span<const Real> parameters, std::span<const Real> transposed, RowRange rows,
                 LayerActivations& a, GradientPlace input) const;
 
-  /// Writes the gradient with respect to some rows of W, and with the first rows to all vectors,
-  /// into its place in `gradient`: the sum over all rows of x (B × in). Returns the sum of its
-  /// squares.
+  /// Writes the gradient with respect to some rows of W, summed over all rows of x (B × in), to its
+  /// place in `gradient`. The call for the first rows also writes the gradients of all vectors.
+  /// Returns the sum of squares of the written numbers.
   Real BackwardWeights(RowRange rows, Matrix<const Real> x, const LayerActivations& a,
                        std::span<Real> gradient) const;
 
  private:
-  /// The vector (out) at this offset.
+  /// View of the vector (out) at `offset`.
   template <typename Parameter>
   std::span<Parameter> Vector(std::span<Parameter> parameters, size_t offset) const {
     return parameters.subspan(offset, out_);
@@ -124,7 +125,7 @@ class Layer {
   int in_, out_;
   Activation activation_;
   bool layer_norm_;
-  size_t weight_, bias_, gain_, norm_bias_;  // offsets
+  size_t weight_, bias_, gain_, norm_bias_;  // offsets in the parameters
 };
 
 }  // namespace upswing

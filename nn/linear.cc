@@ -1,5 +1,5 @@
-// The kernels of small networks, written once with Highway and compiled for each kind of vector
-// instructions; the matrix products are product.cc.
+// The kernels for small networks, written once with Highway and compiled for each instruction set.
+// product.cc has the matrix products.
 #include "nn/linear.h"
 
 #include <algorithm>
@@ -11,19 +11,19 @@
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "nn/linear.cc"
-#include <hwy/foreach_target.h>  // includes this file once for each target
-// must come after foreach_target
+#include <hwy/foreach_target.h>  // includes this file once per target
+// must come after foreach_target.h
 #include <hwy/highway.h>
-// its functions, for each target
+// must come after highway.h; compiled per target
 #include <hwy/contrib/math/math-inl.h>
 
 #include "nn/registers-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace upswing::HWY_NAMESPACE {
-/// y = xᵀ. Floats go by blocks of 4 × 4 in registers of four.
+/// y = xᵀ. Floats go through registers in blocks of 4 × 4.
 void Transpose(Matrix<const Real> x, Matrix<Real> y) {
-  int rows = 0;  // done by blocks
+  int rows = 0;  // transposed in blocks so far
   int cols = 0;
 #if HWY_TARGET != HWY_SCALAR
   if constexpr (sizeof(Real) == 4) {
@@ -48,7 +48,8 @@ void Transpose(Matrix<const Real> x, Matrix<Real> y) {
 }
 
 void SumRows(Matrix<const Real> x, std::span<Real> sum) {
-  // Four registers at a time: each addition waits for the one before it.
+  // Sum four registers at a time, because each addition waits for the previous one in the same
+  // register.
   const Tag d;
   const size_t lanes = hn::Lanes(d);
   size_t done = 0;
@@ -75,7 +76,7 @@ void SumRows(Matrix<const Real> x, std::span<Real> sum) {
 void LayerNormForward(Matrix<Real> x, std::span<const Real> gain, std::span<const Real> bias,
                       std::span<Real> inv_std, bool relu, Matrix<Real> y) {
   constexpr Real kEpsilon = Real(1e-5);
-  // Some rows at a time, each step for all of them: within a row each waits for the one before it.
+  // Process kRows rows at a time, step by step, because the steps of one row wait for each other.
   constexpr int kRows = 8;
   const Tag d;
   const auto n = static_cast<size_t>(x.cols());
@@ -157,7 +158,8 @@ void LayerNormBackwardGain(Matrix<const Real> x_hat, Matrix<const Real> dy, std:
 }
 
 /// tanh(x) = x P(x²) / Q(x²), a rational approximation with the coefficients of Eigen 3.4
-/// (generic_fast_tanh_float). Beyond ±7.9 the result is that of ±7.9, which is ±1 up to rounding.
+/// (generic_fast_tanh_float). Inputs beyond ±7.9 are clamped to ±7.9, where tanh is ±1 up to
+/// rounding.
 HWY_INLINE Vec TanhOf(Vec x) {
   constexpr Real kLargest = 7.90531110763549805F;
   constexpr Real kP[] = {4.89352455891786e-03F, 6.37261928875436e-04F,  1.48572235717979e-05F,
@@ -210,7 +212,7 @@ void SquashSamples(std::span<const Real> mean, std::span<const Real> log_std,
                            HWY_ATTR { Store<partial.value>(value, to.data() + i, count); };
     const Vec noise = load(epsilon), log_sigma = load(log_std), sigma = hn::Exp(d, log_sigma);
     const Vec u = hn::MulAdd(sigma, noise, load(mean)), size = hn::Abs(u);
-    // e = exp(-2 |u|) serves tanh and ln(1 - tanh²).
+    // tanh and ln(1 - tanh²) share e = exp(-2 |u|).
     const Vec e = hn::Exp(d, hn::Neg(hn::Add(size, size)));
     const Vec rest = hn::Add(size, hn::Log1p(d, e));
     const Vec slope = hn::Mul(two, hn::Sub(hn::Set(d, kLogTwo), rest));
@@ -304,7 +306,7 @@ void LinearBackwardInput(Matrix<const Real> dy, Matrix<const Real> w_transposed,
 
 void LinearBackwardWeight(Matrix<const Real> x, Matrix<const Real> dy, Matrix<Real> dw) {
   if (dw.cols() == 1 && dw.stride() == 1) {
-    // One column is computed as its transpose, a row that fills registers: the same sums.
+    // Compute one column as its transpose, a row that fills registers. The sums are the same.
     return Multiply({.M = 1,
                      .N = dw.rows(),
                      .K = x.rows(),

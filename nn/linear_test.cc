@@ -21,10 +21,10 @@ constexpr double kEpsilon = std::numeric_limits<Real>::epsilon();
 
 size_t Size(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
 
-/// Each kernel, in the number type of this build (nn/real.h), on each kind of vector instructions
-/// that this machine has, against its definition as plain loops in double; with tables whose rows
-/// have a gap of so many numbers behind them, and with tables that end with their last row, where a
-/// sanitizer sees what goes beyond.
+/// Compares each kernel with its definition as plain loops in double. It runs on each instruction
+/// set of this machine, in the number type of this build (nn/real.h). The test parameter is the gap
+/// after each row of a table, in numbers. Without gaps, a sanitizer detects accesses beyond the
+/// last row.
 class KernelTest : public ::testing::TestWithParam<std::tuple<std::string, int>> {
  public:
   static int Gap() { return std::get<1>(GetParam()); }
@@ -41,12 +41,12 @@ INSTANTIATE_TEST_SUITE_P(Paths, KernelTest,
                            return std::get<0>(info.param) + (gaps ? "_gaps" : "_no_gaps");
                          });
 
-/// A matrix that owns its numbers. The gap after each row holds large ones, which show if they are
-/// read, and must have the same bits at the end of the table.
+/// A matrix that owns its numbers. The gap after each row holds large numbers, which make a read
+/// from the gap visible. The destructor checks that the gaps still have the same bits.
 struct Table {
   AlignedVector<Real> values;
   Matrix<Real> view;
-  AlignedVector<Real> before;  // as `values`; all but its gaps is without meaning
+  AlignedVector<Real> before;  // earlier copy of `values`; only its gaps have a meaning
 
   Table(int rows, int cols, const char* stream)
       : values(Size(rows, cols + KernelTest::Gap())),
@@ -85,15 +85,15 @@ struct Table {
   }
 };
 
-/// A table that is only read: its gaps are not a number, so that not even 0 times one goes unseen.
-/// (Those of other tables are numbers, because what is computed with NaN may have the same bits.)
+/// A table for reading only. Its gaps hold NaN, so that even a product of a gap with 0 is visible.
+/// Gaps of other tables hold ordinary numbers, because NaN would hide a write of a computed NaN.
 struct Input : Table {
   Input(int rows, int cols, const char* stream) : Table(rows, cols, stream) {
     FillGaps([] { return std::numeric_limits<Real>::quiet_NaN(); });
   }
 };
 
-/// Bound of the rounding error of a sum of n products of numbers of size 1.
+/// Bound on the rounding error of a sum of n products of numbers of size 1.
 double Tolerance(int n) { return 4 * kEpsilon * (n + 8.0); }
 
 void CheckLinear(int B, int in, int out) {
@@ -130,7 +130,7 @@ void CheckLinear(int B, int in, int out) {
 }
 
 TEST_P(KernelTest, LinearLayersMatchTheirDefinitions) {
-  // Sizes that are and are not multiples of tiles and registers, down to one.
+  // Sizes down to 1. Some are multiples of tiles and registers.
   for (const auto& [B, in, out] : std::vector<std::tuple<int, int, int>>{
            {1, 1, 1}, {1, 8, 256}, {2, 3, 130}, {3, 5, 7}, {7, 64, 31}, {15, 8, 9}, {33, 65, 1}}) {
     CheckLinear(B, in, out);
@@ -138,7 +138,7 @@ TEST_P(KernelTest, LinearLayersMatchTheirDefinitions) {
 }
 
 TEST_P(KernelTest, ARowDoesNotDependOnTheRowsBesideIt) {
-  // To the bit: or else the number of threads would show.
+  // Require equal bits; otherwise results would depend on the number of threads.
   const int B = 37, in = 70, out = 45;
   const Input x(B, in, "x"), w(in, out, "w"), b(1, out, "b");
   Table together(B, out, ""), alone(1, out, "");
@@ -189,7 +189,8 @@ TEST_P(KernelTest, SumsMatchTheirDefinitions) {
 }
 
 TEST_P(KernelTest, LayerNormRowsGetMeanZeroAndVarianceOneBeforeGainAndBias) {
-  // Roundings of numbers of size 1, times up to 1 / sqrt(var + 1e-5); a row of one has var = 0.
+  // Roundings of numbers of size 1, times up to 1 / sqrt(var + 1e-5). A row of one number has
+  // var = 0.
   constexpr double kTolerance = 4500 * kEpsilon;
   for (const int n : {1, 5, 37, 256}) {
     const int B = 3;
@@ -231,7 +232,8 @@ TEST_P(KernelTest, LayerNormGradientMatchesFiniteDifferences) {
   LayerNormForward(x_hat.view, gain.row(), bias.row(), inv_std, false, y.view);
   LayerNormBackwardInput(x_hat, gain.row(), inv_std, dy, dx.view);
   for (int k = 0; k < n; ++k) {
-    EXPECT_NEAR(dx.view(0, k), (f(k, h) - f(k, -h)) / (2 * h), 1e-9);  // 1e-15 · 10 / h, and h²
+    // errors: rounding 1e-15 · 10 / h, truncation h²
+    EXPECT_NEAR(dx.view(0, k), (f(k, h) - f(k, -h)) / (2 * h), 1e-9);
   }
 }
 #endif
@@ -239,7 +241,7 @@ TEST_P(KernelTest, LayerNormGradientMatchesFiniteDifferences) {
 TEST_P(KernelTest, TanhAndItsBackwardPass) {
   constexpr Real tolerance = 4 * kEpsilon;
   const Real infinity = std::numeric_limits<Real>::infinity();
-  // Alone and among others, near 0, where it bends, and where it is ±1.
+  // Single numbers and whole registers: near 0, where tanh bends, and where it is ±1.
   std::vector<Real> x{Real(1e-30), Real(-1e-5), Real(0.3),  Real(-0.5), Real(1),  Real(-4),
                       Real(9),     Real(-19),   Real(1e30), -infinity,  0,        Real(0.02),
                       Real(-0.9),  Real(0.55),  Real(7.5),  Real(-2),   Real(0.1)};
@@ -278,7 +280,7 @@ TEST_P(KernelTest, SquashedSamplesAreThoseOfTheirDefinition) {
       const Squashed<Real> expected = Squash(policy, epsilon[i]);
       ASSERT_NEAR(deviation[i], policy.std, tolerance * policy.std);
       ASSERT_NEAR(action[i], expected.action, tolerance) << mean[i];
-      // ln π has terms as large as 2 |u|.
+      // ln π contains terms as large as 2 |u|.
       ASSERT_NEAR(log_prob[i], expected.log_prob,
                   tolerance * (4 + 4 * std::abs(mean[i]) + 4 * policy.std * std::abs(epsilon[i])));
     }
@@ -287,7 +289,7 @@ TEST_P(KernelTest, SquashedSamplesAreThoseOfTheirDefinition) {
 
 TEST_P(KernelTest, AdamAndPolyakInOnePass) {
   const AdamConstants c{Real(0.5), Real(0.9), Real(0.99), Real(0.01), Real(1e-3), Real(0.25)};
-  constexpr double kTolerance = 45 * kEpsilon;  // some roundings of numbers of size 1 to 10
+  constexpr double kTolerance = 45 * kEpsilon;  // a few roundings of numbers of size 1 to 10
   for (const int n : {1, 3, 50}) {
     const Input g(1, n, "g"), m0(1, n, "m"), v0(1, n, "v"), p0(1, n, "p"), t0(1, n, "t");
     Table m(1, n, "m"), v(1, n, "v"), p(1, n, "p"), t(1, n, "t");

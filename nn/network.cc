@@ -10,9 +10,10 @@
 namespace upswing {
 namespace {
 
-constexpr int kTaskRows = 64;  // of a weight
+constexpr int kTaskRows = 64;  // rows of a weight per task
 
-/// Throws BadInput on invalid sizes. Settings and policy files both end here.
+/// Throws BadInput if a size is invalid. Shapes from settings and from policy files both pass this
+/// check.
 NetworkShape Checked(NetworkShape shape) {
   constexpr int64_t kMax = NetworkShape::kMaxWidth;
   const auto valid = [](int64_t n) { return n >= 1 && n <= kMax; };
@@ -194,7 +195,7 @@ Real Network::BackwardWeights(int task, Matrix<const Real> x, const Activations&
   const auto& [layer, rows] = tasks_[task];
   const size_t head = num_hidden();
   Matrix<const Real> input = x;
-  if (layer > head) {  // the streams: value, then advantage
+  if (layer > head) {  // streams: value, then advantage
     const int G = static_cast<int>(shape_.streams);
     input = layers_[head].Output({0, x.rows()}, a[head]).Cols(layer == head + 1 ? 0 : G, G);
   } else if (layer > 0) {

@@ -15,10 +15,10 @@ namespace upswing {
 namespace {
 
 constexpr int kBlock = 128;  // rows in one forward pass: the activations stay in the L2 cache
-// Share of a normal distribution that is more than one standard deviation below its mean.
+// Probability that a normal number is more than one standard deviation below its mean.
 constexpr double kLowTail = 0.15865525393145707;
 
-/// Buffers of a forward pass of a block of rows.
+/// Buffers for a forward pass of one block of rows.
 struct Workspace : Policy::Memory {
   Network::Activations network, critic;
   AlignedVector<float> outputs;        // (block × outputs)
@@ -26,13 +26,13 @@ struct Workspace : Policy::Memory {
   std::vector<double> action;          // (A)
 };
 
-/// Calls `f(first, rows)` for each block of the rows.
+/// Calls `f(first, rows)` for each block of rows.
 template <typename F>
 void ForBlocks(int rows, const F& f) {
   for (int first = 0; first < rows; first += kBlock) f(first, std::min(kBlock, rows - first));
 }
 
-/// Throws BadInput unless the sizes of the parts fit each other. Networks check their own.
+/// Throws BadInput unless the sizes of the parts fit each other. Each network checks its own sizes.
 NetworkPolicyParts Checked(NetworkPolicyParts parts) {
   const auto A = parts.action_limit.size(), Q = parts.torques.size();
   const bool levels = parts.rule == ActionRule::kLevels;
@@ -57,11 +57,11 @@ NetworkPolicyParts Checked(NetworkPolicyParts parts) {
   return parts;
 }
 
-/// The smallest torque up to which these logits (Q) put at least `share` of their probability.
+/// The smallest torque at which the cumulative probability of these logits (Q) reaches `share`.
 double CategoricalQuantile(std::span<const double> torques, std::span<const float> logits,
                            double share) {
   const double largest = *std::ranges::max_element(logits);
-  std::map<double, double> weights;  // e^logit by torque, from the lowest on
+  std::map<double, double> weights;  // e^logit by torque, in ascending order
   double sum = 0;
   for (size_t i = 0; i < torques.size(); ++i) {
     const double weight = std::exp(logits[i] - largest);
@@ -76,7 +76,8 @@ double CategoricalQuantile(std::span<const double> torques, std::span<const floa
   return weights.rbegin()->first;
 }
 
-/// To nearest, ties to even. A number that is not finite is refused when it is written.
+/// Rounds to the nearest bfloat16, ties to even. Writing the file rejects numbers that are not
+/// finite.
 float RoundedToBfloat16(float x) {
   const auto bits = std::bit_cast<uint32_t>(x);
   return std::bit_cast<float>((bits + 0x7fff + (bits >> 16 & 1)) & 0xffff0000);

@@ -13,31 +13,31 @@
 
 namespace upswing {
 
-/// How a network's outputs choose an action. Names in files: NameOf.
+/// Rule by which the outputs of a network choose an action. NameOf gives its name in files.
 enum class ActionRule {
-  kLevels,            // a Q-value for each of the torques: that of the largest
-  kSquashedGaussian,  // (μ, ln σ) of each component: limit · tanh(μ)
-  kClippedGaussian,   // (μ, ln σ) of each component: limit · clamp(μ, -1, 1)
-  kCategorical,       // a logit for each of the torques: that of the largest
+  kLevels,            // a Q-value per torque: the torque of the largest
+  kSquashedGaussian,  // (μ, ln σ) per component: limit · tanh(μ)
+  kClippedGaussian,   // (μ, ln σ) per component: limit · clamp(μ, -1, 1)
+  kCategorical,       // a logit per torque: the torque of the largest
 };
 
-/// Such as "levels" or "squashed-gaussian".
+/// Name of the rule, such as "levels" or "squashed-gaussian".
 std::string NameOf(ActionRule rule);
 
-/// What a network policy is made of. D: observation size, A: action size, Q: number of torques.
+/// Parts of a network policy. D: observation size, A: action size, Q: number of torques.
 struct NetworkPolicyParts {
   ActionRule rule = ActionRule::kLevels;
   NetworkShape shape = {};                // D inputs, 2 A or Q outputs
-  AlignedVector<float> parameters = {};   // of the network
-  std::vector<double> torques = {};       // (Q) N·m; of Gaussians empty
-  std::vector<double> action_limit = {};  // (A) N·m; of kLevels empty, and A is 1
-  // A network that estimates the value of an observation, where the outputs are no values: its
-  // inputs are D numbers, or D + A, with the action in units of its limit behind the observation.
-  // No inputs: there is none.
+  AlignedVector<float> parameters = {};   // parameters of the network
+  std::vector<double> torques = {};       // (Q) N·m; empty for Gaussians
+  std::vector<double> action_limit = {};  // (A) N·m; empty for kLevels, where A = 1
+  // Network that estimates the value of an observation; only for rules whose outputs are not
+  // values. It has D inputs, or D + A inputs: the observation, then the action in units of its
+  // limit. No inputs: there is no critic.
   NetworkShape critic = {};
   AlignedVector<float> critic_parameters = {};
 
-  /// Whether an action is one of the torques.
+  /// Whether each action is one of `torques`.
   bool chooses_torque() const {
     return rule == ActionRule::kLevels || rule == ActionRule::kCategorical;
   }
@@ -46,17 +46,17 @@ struct NetworkPolicyParts {
   }
 };
 
-/// Result of the checks on loading.
+/// Result of the checks on loading a policy.
 struct SelfCheck {
-  bool has_checksum = false;  // a correct one: no bit has changed
-  double error = 0;           // largest |difference| of the samples' outputs when recomputed
+  bool has_checksum = false;  // whether the file has a checksum (a correct one)
+  double error = 0;           // largest |difference| between stored and recomputed sample outputs
   double tolerance = 0;       // largest error that counts as rounding
 };
 
-/// The policy of a network: a Q-network's best action (DQN), or the middle of the distribution that
-/// an actor learned (SAC, PPO). Stored in one `policy.safetensors` with its description, its
-/// origin, and sample inputs and outputs that every load recomputes
-/// (docs/reference/policy-format.md).
+/// The policy of a network: the best action of a Q-network (DQN), or the middle of the action
+/// distribution of an actor (SAC, PPO). One `policy.safetensors` file stores it with its
+/// description, its origin, and sample inputs and outputs (docs/reference/policy-format.md). Every
+/// load recomputes the samples.
 class NetworkPolicy : public Policy {
  public:
   /// Throws BadInput if the parts do not fit together.
@@ -72,13 +72,13 @@ class NetworkPolicy : public Policy {
   const PolicyInfo& info() const override { return info_; }
   size_t num_parameters() const override { return parts_.parameters.size(); }
 
-  /// Buffers of a forward pass, for any number of rows.
+  /// Makes buffers of a forward pass for any number of rows.
   std::unique_ptr<Memory> Start(int num_envs) const override;
-  /// Of a dueling network by its advantages alone, whose largest is that of the Q-values up to
-  /// rounding.
+  /// Writes the chosen actions. For a dueling network it compares only the advantages. Their argmax
+  /// is that of the Q-values up to rounding.
   void Act(Matrix<const float> obs, Matrix<double> action, Memory& memory) const override;
 
-  /// Q-values (N × Q), or the critic's V (N × 1).
+  /// Number of values: Q for Q-values (N × Q), or 1 for the critic's V (N × 1).
   int num_values() const override;
   void Values(Matrix<const float> obs, Matrix<float> values, Memory& memory) const override;
   Matrix<const double> value_actions() const override;
@@ -87,38 +87,40 @@ class NetworkPolicy : public Policy {
   void Spread(Matrix<const float> obs, Matrix<double> low, Matrix<double> high,
               Memory& memory) const override;
 
-  /// How many numbers the network puts out for an observation: 2 A or Q.
+  /// Number of network outputs per observation: 2 A or Q.
   int num_outputs() const { return parts_.shape.outputs; }
-  /// These (N × num_outputs).
+  /// Writes the network outputs (N × num_outputs).
   void Outputs(Matrix<const float> obs, Matrix<float> outputs, Memory& memory) const;
-  /// The action (A) that these outputs choose, and the ends of an actor's spread.
+  /// Computes the action (A) that the outputs choose, and the ends of an actor's spread.
   void Choose(std::span<const float> outputs, std::span<double> action) const;
   void Spread(std::span<const float> outputs, std::span<double> low, std::span<double> high) const;
 
-  /// The layers of the network, and of the critic where there is one, for exports. Views of this
-  /// policy.
+  /// Views of the layers of the network, and of the critic if there is one, for exports. They refer
+  /// to this policy.
   std::vector<LayerView> Layers() const { return network_.Views(parts_.parameters); }
   std::vector<LayerView> CriticLayers() const;
 
-  /// The checks on loading.
+  /// Result of the checks on loading.
   const SelfCheck& self_check() const { return self_check_; }
 
-  /// The same with its parameters rounded to bfloat16, for a file of half the size.
+  /// A copy with parameters rounded to bfloat16, for a file of half the size.
   NetworkPolicy Rounded() const;
 
-  /// What its file holds. Throws Failure if a parameter is not finite.
+  /// The contents of the policy file. Throws Failure if a parameter is not finite.
   Tensors ToTensors() const override;
 
-  /// Reads and checks what a file holds: format, metadata, shapes, finite numbers, samples, and the
-  /// checksum where it has one. A changed parameter that moves no output of the samples by more
-  /// than rounding, say of a unit that none of them activates, is detected by the checksum alone.
-  /// Takes memory in proportion to the file's size. Throws BadInput.
+  /// Reads a policy from a file's contents. Checks format, metadata, shapes, finite numbers,
+  /// samples, and the checksum if there is one. Memory is proportional to the file's size. Throws
+  /// BadInput.
+  ///
+  /// Some changed parameters move no sample output by more than rounding, such as a parameter of a
+  /// unit that no sample activates. Only the checksum detects them.
   static NetworkPolicy From(const Tensors& file);
 
  private:
-  /// Component k of the action that a Gaussian's u (nn/gaussian.h) stands for.
+  /// Component k of the action for a Gaussian's u (nn/gaussian.h).
   double Bounded(double u, size_t k) const;
-  /// Recomputes the stored outputs from the stored inputs. Throws BadInput.
+  /// Recomputes the stored outputs from the stored inputs. Throws BadInput if they differ.
   void CheckSamples(const Tensors& file);
 
   NetworkPolicyParts parts_;

@@ -1,5 +1,5 @@
-// The files of network policies (docs/reference/policy-format.md): the format, the parameters of
-// their networks, and sample inputs and outputs that every load recomputes.
+// Files of network policies (docs/reference/policy-format.md): the format, the parameters, and
+// sample inputs and outputs that every load recomputes.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -23,18 +23,18 @@ constexpr std::string_view kFormatVersion = "1";
 constexpr std::array<std::string_view, 4> kRuleNames{"levels", "squashed-gaussian",
                                                      "clipped-gaussian", "categorical"};
 constexpr const char* kCriticPrefix = "critic.";
-constexpr int kSamples = 16;      // stored inputs and outputs
-constexpr int kMostSamples = 64;  // in a file of another writer
+constexpr int kSamples = 16;      // number of stored samples
+constexpr int kMostSamples = 64;  // limit for files of other programs
 
-// Up to which share of the largest output two machines may differ, which sum in other orders. The
-// vector paths (AVX-512, AVX2, portable) differ among each other by at most 3e-7 for the networks
-// that come with the page and by 1.1e-6 for random ones of up to 16 layers or 4096 units; single
-// from double precision by 4e-7 and 2.3e-6.
+// Largest difference between two machines, which sum in different orders, as a share of the largest
+// output. The vector paths (AVX-512, AVX2, portable) differ from each other by at most 3e-7 for the
+// networks that come with the page. They differ by at most 1.1e-6 for random networks of up to 16
+// layers or 4096 units. Single and double precision differ by 4e-7 and 2.3e-6.
 constexpr double kTolerance = 1e-5;
 
 // ---- Shapes.
 
-/// The shape as the metadata hold it.
+/// The shape as metadata text.
 std::string ShapeToJson(const NetworkShape& shape, ActionRule rule) {
   json j{{"inputs", shape.inputs}, {"hidden", shape.hidden}, {"layer_norm", shape.layer_norm}};
   if (rule == ActionRule::kLevels) {
@@ -47,8 +47,8 @@ std::string ShapeToJson(const NetworkShape& shape, ActionRule rule) {
   return j.dump();
 }
 
-/// The shape from a file's metadata; its outputs are given, or those of the file for kLevels.
-/// Throws BadInput.
+/// Reads a shape from a file's metadata. For kLevels, the file gives the number of outputs;
+/// otherwise `outputs` does. Throws BadInput.
 NetworkShape ShapeFromJson(const Tensors& file, const std::string& key, ActionRule rule,
                            int outputs) {
   constexpr int64_t kMax = NetworkShape::kMaxWidth;
@@ -58,7 +58,7 @@ NetworkShape ShapeFromJson(const Tensors& file, const std::string& key, ActionRu
     shape.inputs = static_cast<int>(JsonInteger(j, "inputs", 1, kMax));
     shape.outputs = outputs;
     for (const json& width : JsonList(j, "hidden", NetworkShape::kMaxLayers)) {
-      // What is no integer is no width either.
+      // A width that is not an integer becomes the invalid width 0.
       shape.hidden.push_back(JsonInteger(width).value_or(0));
     }
     shape.layer_norm = JsonBool(j, "layer_norm");
@@ -80,7 +80,7 @@ NetworkShape ShapeFromJson(const Tensors& file, const std::string& key, ActionRu
   }
 }
 
-/// The network of a file. Throws BadInput if it has sizes that none has.
+/// Makes the network of a file. Throws BadInput if a size is invalid.
 Network NetworkOf(const NetworkShape& shape, const std::string& where) {
   try {
     return Network(shape);
@@ -91,7 +91,7 @@ Network NetworkOf(const NetworkShape& shape, const std::string& where) {
 
 // ---- Tensors.
 
-/// A file's tensor of this shape, with finite numbers. Throws BadInput.
+/// Reads a tensor of this shape and checks that its numbers are finite. Throws BadInput.
 template <typename T>
 std::vector<T> ReadFinite(const Tensors& file, const std::string& name,
                           const std::vector<int64_t>& shape) {
@@ -103,7 +103,7 @@ std::vector<T> ReadFinite(const Tensors& file, const std::string& name,
   throw BadInput(Concat(file.where(), ": tensor \"", name, "\": ", problem));
 }
 
-/// A vector of a file with 1 to kMaxWidth numbers. Throws BadInput.
+/// Reads a vector of 1 to kMaxWidth numbers. Throws BadInput.
 std::vector<double> ReadVector(const Tensors& file, const std::string& name) {
   const auto count = static_cast<int64_t>(file.Count<double>(name));
   if (count >= 1 && count <= NetworkShape::kMaxWidth) {
@@ -113,14 +113,14 @@ std::vector<double> ReadVector(const Tensors& file, const std::string& name) {
                         NetworkShape::kMaxWidth, " numbers, got ", count));
 }
 
-/// The shape of a parameter array in a file: weights as torch.nn.Linear has them, (out × in).
+/// The shape of a parameter array in a file. Weights are (out × in), as in torch.nn.Linear.
 std::vector<int64_t> FileShape(const ParameterBlock& block) {
   if (block.in == 0) return {block.out};
   return {block.out, block.in};
 }
 
-/// Adds the parameter arrays under names that begin with `prefix`. Throws Failure if a number is
-/// not finite.
+/// Adds the parameter arrays with names that begin with `prefix`. Throws Failure if a number is not
+/// finite.
 void AddParameters(Tensors& file, const std::string& prefix, const Network& network,
                    std::span<const float> parameters) {
   const std::string problem = FindNotFinite<float>(parameters);
@@ -135,15 +135,15 @@ void AddParameters(Tensors& file, const std::string& prefix, const Network& netw
   }
 }
 
-/// Throws BadInput unless the file has these arrays. To be called for all networks of a policy
-/// before memory is allocated for one, so that a false size takes none.
+/// Throws BadInput unless the file has the network's parameter arrays. Call it for all networks of
+/// a policy before you allocate memory for one, so that a false size takes no memory.
 void ExpectParameters(const Tensors& file, const std::string& prefix, const Network& network) {
   for (const ParameterBlock& block : network.blocks()) {
     file.Expect(prefix + block.name, Dtype::kF32, FileShape(block));
   }
 }
 
-/// Reads what AddParameters added. Throws BadInput.
+/// Reads the parameters that AddParameters wrote. Throws BadInput.
 AlignedVector<float> ReadParameters(const Tensors& file, const std::string& prefix,
                                     const Network& network) {
   AlignedVector<float> parameters(network.num_parameters());
@@ -157,7 +157,7 @@ AlignedVector<float> ReadParameters(const Tensors& file, const std::string& pref
 
 // ---- Samples.
 
-/// Names of a file's samples: of the outputs, and of the actions.
+/// Names of the sample tensors in a file.
 struct SampleNames {
   std::string output, action;
 };
@@ -172,7 +172,7 @@ std::vector<int64_t> ActionShape(const NetworkPolicyParts& parts, int samples) {
   return {samples, parts.action_size()};
 }
 
-/// What a policy makes of samples (n × D): outputs (n × O), actions (n × A) and, of an actor with a
+/// Results of a policy for n samples: outputs (n × O), actions (n × A) and, for an actor with a
 /// critic, V (n).
 struct SampleResults {
   std::vector<float> outputs, values;
@@ -193,8 +193,8 @@ struct SampleResults {
   }
 };
 
-/// Throws BadInput unless all recomputed outputs are those of the tensor `name` (rows × cols) up to
-/// rounding. `what` they are is for messages. Updates `check`.
+/// Throws BadInput unless the recomputed outputs (rows × cols) equal the tensor `name` up to
+/// rounding. `what` names the outputs in messages. Updates `check`.
 void CheckOutputs(const Tensors& file, const std::string& name, Matrix<const float> computed,
                   std::string_view what, SelfCheck& check) {
   const std::vector<float> expected =
@@ -206,7 +206,7 @@ void CheckOutputs(const Tensors& file, const std::string& name, Matrix<const flo
   for (size_t i = 0; i < expected.size(); ++i) {
     const float got = computed.values()[i];
     const double error = std::abs(double{got} - expected[i]);
-    if (!(error <= tolerance)) {  // nor if it is not a number
+    if (!(error <= tolerance)) {  // also true if the error is NaN
       throw BadInput(Concat(file.where(), ": self-check: expected ", what, " ", expected[i],
                             " up to ", tolerance, ", got ", got, " (sample ", i / computed.cols(),
                             ")"));
@@ -215,8 +215,8 @@ void CheckOutputs(const Tensors& file, const std::string& name, Matrix<const flo
   }
 }
 
-/// Whether `torque` is the one of `torques` (Q) with the largest of the preferences (Q), or with
-/// one that is at most `margin` below it: another machine may choose another of nearly equal ones.
+/// Whether `torque` is one of `torques` (Q) and its preference (Q) is at most `margin` below the
+/// largest one. Another machine may choose differently between nearly equal preferences.
 bool MayChoose(std::span<const double> torques, double torque, std::span<const float> preferences,
                double margin) {
   const double best = preferences[ArgMax(preferences)];
@@ -226,7 +226,7 @@ bool MayChoose(std::span<const double> torques, double torque, std::span<const f
   return false;
 }
 
-/// The rule of a policy file. Throws BadInput unless it is a file of this format.
+/// Reads the rule of a policy file. Throws BadInput unless the file has this format.
 ActionRule RuleOf(const Tensors& file) {
   const auto expect = [&](const std::string& key, std::string_view expected) {
     if (file.Metadata(key) != expected) {

@@ -23,7 +23,8 @@ AlignedVector<float> Random(size_t count, uint64_t seed) {
   return numbers;
 }
 
-/// An actor of two components (one, if categorical), with a critic of these inputs.
+/// Parts of an actor with two action components (one if categorical) and a critic with
+/// `critic_inputs` inputs.
 NetworkPolicyParts Parts(ActionRule rule, int critic_inputs) {
   NetworkPolicyParts parts;
   parts.rule = rule;
@@ -48,7 +49,7 @@ class ActorTest : public ::testing::TestWithParam<Case> {
   NetworkPolicyParts parts = Parts(GetParam().rule, GetParam().critic_inputs);
   NetworkPolicy policy{parts, PolicyInfo()};
 
-  /// What loading says after `change` has altered the file.
+  /// The error message of loading the file after `change` has altered it.
   template <typename Change>
   std::string ErrorAfter(const Change& change) {
     Tensors file = policy.ToTensors();
@@ -107,7 +108,7 @@ TEST_P(ActorTest, SpreadHasTheCentral68PercentOfItsDraws) {
     for (int draw = 0; draw < kDraws; ++draw) {
       double action = 0;
       if (GetParam().rule == ActionRule::kCategorical) {
-        // The largest of the logits with Gumbel noise.
+        // A sample by the Gumbel trick: the largest of the logits plus Gumbel noise.
         double best = -1e9;
         for (size_t i = 0; i < outputs.size(); ++i) {
           const double noisy = outputs[i] - std::log(-std::log(1 - rng.Uniform()));
@@ -122,7 +123,8 @@ TEST_P(ActorTest, SpreadHasTheCentral68PercentOfItsDraws) {
       below += action < low[k] ? 1 : 0;
       above += action > high[k] ? 1 : 0;
     }
-    // 16% at either end, or less where many draws are equal to that end; 5 standard errors.
+    // Tails of 16%, or less where many draws equal the end of the spread. Tolerance: 5 standard
+    // errors.
     constexpr double kTail = 0.1587, kError = 0.0092;
     EXPECT_LT(below, kDraws * (kTail + kError));
     EXPECT_LT(above, kDraws * (kTail + kError));
@@ -234,7 +236,8 @@ class QNetworkTest : public ::testing::Test {
     return {parts, info};
   }
 
-  /// Saves a policy, lets `change` alter the file's tensors and metadata, and loads it.
+  /// Saves a policy, alters the file's tensors and metadata with `change`, and loads it. Returns
+  /// the error message.
   template <typename Change>
   std::string ErrorAfter(const Change& change) {
     const Tensors file = MakePolicy().ToTensors();
@@ -300,7 +303,7 @@ TEST_F(QNetworkTest, RoundedItsFileHasAboutHalfTheSizeAndTheValuesAreNearlyTheSa
     EXPECT_EQ(tensor.dtype == Dtype::kBF16, is_parameter) << name;
   }
   const std::vector<std::byte> bytes = WriteSafetensors(file).Joined();
-  // But for the header, which says it.
+  // The sizes differ by the parameters and a few bytes of the header, which names their type.
   EXPECT_NEAR(before - bytes.size(), 2 * policy.num_parameters(), 64);
 
   const NetworkPolicy loaded = NetworkPolicy::From(ReadSafetensors(bytes, "saved"));

@@ -11,7 +11,7 @@
 namespace upswing {
 namespace {
 
-constexpr Real kUnwritten = Real(1e30);  // shows what a gradient leaves out
+constexpr Real kUnwritten = Real(1e30);  // marks numbers that a gradient did not write
 constexpr double kRounding = std::numeric_limits<Real>::epsilon();
 
 struct NetworkCase {
@@ -40,7 +40,7 @@ struct Objective {
         A(c.shape.outputs) {
     Rng rng(3, "network test");
     network.Initialize(rng, parameters);
-    // Gains and biases of the layer norm away from 1 and 0, so that their part shows.
+    // Move gains and biases of the layer norm away from 1 and 0, so that they affect the result.
     for (const ParameterBlock& block : network.blocks()) {
       if (block.name.find("norm") == std::string::npos) continue;
       for (size_t i = 0; i < block.size(); ++i) {
@@ -59,7 +59,8 @@ struct Objective {
     return std::inner_product(y.begin(), y.end(), dy.begin(), Real{0});
   }
 
-  /// With respect to the parameters, and to the inputs if there is a `dx` (B × D).
+  /// Gradient of f with respect to the parameters, and with respect to the inputs if there is a
+  /// `dx` (B × D).
   AlignedVector<Real> Gradient(Matrix<Real> dx = {}) {
     Value();
     AlignedVector<Real> gradient(parameters.size(), kUnwritten);
@@ -67,8 +68,8 @@ struct Objective {
     return gradient;
   }
 
-  /// df/dp, where p is one of the parameters or inputs. Central difference with h = 1e-6:
-  /// truncation ~h², rounding ~1e-16/h.
+  /// df/dp by central difference, where p is a parameter or an input. With h = 1e-6, the truncation
+  /// error is ~h² and the rounding error ~1e-16/h.
   double Numeric(Real& p) {
     constexpr double h = 1e-6;
     const Real before = p;
@@ -85,8 +86,8 @@ struct Objective {
 TEST_P(NetworkTest, GradientMatchesFiniteDifferences) {
   Objective f(GetParam(), 7);
   const AlignedVector<Real> gradient = f.Gradient();
-  // The norm of the difference is compared with that of the gradient, array by array; of a large
-  // network, over every 37th number, which is coprime to all widths.
+  // Compare the norm of the difference with the norm of the gradient, for each array. In a large
+  // network, check every 37th number; 37 is coprime to all widths.
   const size_t stride = f.parameters.size() > 5000 ? 37 : 1;
   for (const ParameterBlock& block : f.network.blocks()) {
     double error = 0, norm = 0;
@@ -104,7 +105,7 @@ TEST_P(NetworkTest, GradientOfTheInputsMatchesFiniteDifferences) {
   Objective f(GetParam(), 7);
   AlignedVector<Real> dx(f.x.size(), kUnwritten);
   const AlignedVector<Real> gradient = f.Gradient(Matrix<Real>(dx, f.B, f.D));
-  EXPECT_EQ(gradient, f.Gradient());  // to ask for dx changes nothing else
+  EXPECT_EQ(gradient, f.Gradient());  // a request for dx changes nothing else
   double error = 0, norm = 0;
   for (size_t i = 0; i < dx.size(); ++i) {
     const double numeric = f.Numeric(f.x[i]);
@@ -116,7 +117,7 @@ TEST_P(NetworkTest, GradientOfTheInputsMatchesFiniteDifferences) {
 }
 #endif
 
-/// y of one row x, as docs/reference/policy-format.md defines it, in double.
+/// y of one row x by the definition in docs/reference/policy-format.md, in double.
 std::vector<double> Definition(const Network& network, std::span<const Real> parameters,
                                std::span<const Real> x) {
   const auto after = [](const LayerView& layer, const std::vector<double>& input) {
@@ -216,7 +217,7 @@ INSTANTIATE_TEST_SUITE_P(
                       NetworkCase{"dueling_tanh", {8, {16, 12}, 9, false, kTanh, 10}},
                       NetworkCase{"one_layer", {3, {5}, 2, true, kRelu, 4}},
                       NetworkCase{"three_layers", {3, {5, 17, 6}, 2, true, kRelu, 9}},
-                      // Layers of 130 and 70 inputs, which are three tasks and two.
+                      // Layers of 130 and 70 inputs have three and two tasks.
                       NetworkCase{"split_layers", {8, {130}, 9, true, kRelu, 70}}),
     [](const auto& info) { return info.param.name; });
 
@@ -273,7 +274,7 @@ TEST(Network, ParametersHaveTheNamesAndTheOrderOfPolicyFiles) {
 }
 
 TEST(Network, DuelingIsTheValuePlusAdvantagesAboutTheirMean) {
-  // All weights zero: V and A are the last biases. V = 3, A = 1, 2, 6 → Q = 3 + (-2, -1, 3).
+  // With all weights zero, V and A are the last biases. V = 3, A = 1, 2, 6 → Q = 3 + (-2, -1, 3).
   const Network network({2, {4}, 3, false, kRelu, 2});
   AlignedVector<Real> parameters(network.num_parameters());
   for (const ParameterBlock& block : network.blocks()) {

@@ -8,14 +8,14 @@
 namespace upswing {
 namespace {
 
-/// `count` orthonormal vectors of `size` numbers, one after another; count ≤ size.
+/// Makes `count` orthonormal vectors of `size` numbers each; count ≤ size.
 std::vector<double> OrthonormalVectors(Rng& rng, int count, int size) {
   std::vector<double> values(static_cast<size_t>(count) * size);
   const Matrix<double> vectors(values.data(), count, size);
   for (int i = 0; i < count; ++i) {
     const std::span<double> v = vectors.row(i);
     for (double& x : v) x = rng.Normal();
-    // Twice: the second pass removes what rounding left of the first.
+    // Project twice: the second pass removes the rounding errors of the first.
     for (int pass = 0; pass < 2; ++pass) {
       for (int j = 0; j < i; ++j) {
         double along = 0;

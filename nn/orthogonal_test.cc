@@ -19,7 +19,7 @@ TEST(Orthogonal, RowsOrColumnsAreOrthogonalAndOfLengthGain) {
       for (int j = 0; j <= i; ++j) {
         double product = 0;
         for (int k = 0; k < std::max(in, out); ++k) product += double{at(i, k)} * at(j, k);
-        // Made in double; each number is rounded to float, 6e-8 of it.
+        // The vectors are computed in double and rounded to float, with a relative error of 6e-8.
         EXPECT_NEAR(product, i == j ? 2.25 : 0, 3e-7) << in << " × " << out;
       }
     }
@@ -36,7 +36,7 @@ TEST(Orthogonal, EachKindOfParameterHasItsOwnBeginning) {
     for (const float x : std::span(parameters).subspan(block.offset, block.size())) {
       squares += double{x} * x;
     }
-    // Each of the orthonormal vectors adds the gain squared.
+    // Each orthonormal vector adds the gain squared to the sum of squares.
     const double vectors = std::min(block.in, block.out);
     const bool norm = block.name.ends_with("norm.weight");
     const double expected = block.in == 0                   ? (norm ? 8.0 : 0.0)

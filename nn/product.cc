@@ -1,14 +1,14 @@
-// The matrix products of the kernels, written once with Highway and compiled for each kind of
-// vector instructions. The three products of a linear layer are one kernel, C = A · B, whose A is
-// read along its rows or its columns.
+// The matrix products of the kernels, written once with Highway and compiled for each instruction
+// set. One kernel, C = A · B, computes the three products of a linear layer. It reads A along rows
+// or along columns.
 #include "nn/product.h"
 
 #include <algorithm>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "nn/product.cc"
-#include <hwy/foreach_target.h>  // includes this file once for each target
-// must come after foreach_target
+#include <hwy/foreach_target.h>  // includes this file once per target
+// must come after foreach_target.h
 #include <hwy/highway.h>
 
 #include "nn/registers-inl.h"
@@ -16,12 +16,12 @@
 HWY_BEFORE_NAMESPACE();
 namespace upswing::HWY_NAMESPACE {
 
-// A tile of C, kRows × kVectors registers, stays in registers over the whole of K; weights of these
-// sizes stay in the L2 cache, and packing them would gain nothing.
+// A tile of C, kRows × kVectors registers, stays in registers over all of K. Weights of these sizes
+// stay in the L2 cache, so packing them would gain nothing.
 
-/// Tile shapes: registers for C, besides those for a row of B and a number of A. Tiles of
-/// fewer rows, for what remains of M and for single rows, are wider, because a multiply-add takes
-/// several cycles and as many must be in flight.
+/// Tile shapes: kRegisters registers hold C, and others hold a row of B and a number of A. Tiles
+/// for single rows and for the rest of M have fewer rows and are wider. A multiply-add takes
+/// several cycles, so as many of them must be in flight.
 #if HWY_TARGET == HWY_AVX3 || HWY_ARCH_ARM_A64  // of 32 registers
 constexpr int kTileRows = 8;
 constexpr int kRegisters = 16;
@@ -29,7 +29,7 @@ constexpr int kRegisters = 16;
 constexpr int kTileRows = 6;
 constexpr int kRegisters = 12;
 #endif
-constexpr int kWidestTile = 8;  // registers in a row
+constexpr int kWidestTile = 8;  // registers per row
 
 /// Calls `f(row, register)` for each register of a tile.
 template <int kRows, int kVectors, typename F>
@@ -41,12 +41,12 @@ HWY_INLINE void ForTile(const F& f) {
   }
 }
 
-/// The tile of C at (m, n); if kPartial, the last register of a row has `count` numbers.
+/// Computes the tile of C at (m, n). If kPartial, the last register of a row has `count` numbers.
 template <int kRows, int kVectors, bool kPartial>
 HWY_INLINE void MultiplyTile(const Product& p, int m, int n, size_t count) {
   const Tag d;
   const int lanes = static_cast<int>(hn::Lanes(d));
-  // Register v of a row of numbers.
+  // Loads register v of a row of numbers.
   const auto load = [&](const Real* row, int v) HWY_ATTR {
     return kPartial && v == kVectors - 1 ? Load<kPartial>(row + v * lanes, count)
                                          : hn::LoadU(d, row + v * lanes);
@@ -75,7 +75,7 @@ HWY_INLINE void MultiplyTile(const Product& p, int m, int n, size_t count) {
     b += p.b.stride();
   }
 
-  // Asked once a tile, not for each register.
+  // Test once per tile, not once per register.
   if (p.relu) {
     ForTile<kRows, kVectors>([&](int i, int v)
                                  HWY_ATTR { c[i][v] = hn::Max(c[i][v], hn::Zero(d)); });
@@ -99,8 +99,8 @@ HWY_INLINE void MultiplyTile(const Product& p, int m, int n, size_t count) {
   });
 }
 
-/// Rows m to `end` of C, from column n on: tiles of kRows × `vectors` registers, `vectors` at most
-/// kVectors, and then a narrower one for the remaining columns.
+/// Computes rows m to `end` of C from column n: tiles of kRows × `vectors` registers
+/// (`vectors` ≤ kVectors), then a narrower tile for the remaining columns.
 template <int kRows, int kVectors>
 void MultiplyColumns(const Product& p, int m, int end, int n, int vectors) {
   if constexpr (kVectors > 1) {
@@ -121,10 +121,12 @@ void MultiplyColumns(const Product& p, int m, int end, int n, int vectors) {
   for (int i = m; i < end; i += kRows) MultiplyTile<kRows, kVectors, true>(p, i, n, count);
 }
 
-/// All of C from row m on that can be cut into tiles of kRows rows; returns the first row after.
+/// Computes the rows of C from row m that fill tiles of kRows rows. Returns the first row after
+/// them.
 template <int kRows>
 int MultiplyRows(const Product& p, int m) {
-  // As few tiles as registers allow, of about equal width: narrow ones have too few sums in flight.
+  // Use as few tiles as the registers allow, of about equal width: narrow tiles have too few sums
+  // in flight.
   constexpr int kVectors = std::min(kRegisters / kRows, kWidestTile);
   const int lanes = static_cast<int>(hn::Lanes(Tag()));
   const int vectors = (p.N + lanes - 1) / lanes;
@@ -135,14 +137,15 @@ int MultiplyRows(const Product& p, int m) {
 }
 
 // ------------------------------------------------------------------------------------------------
-// Few columns fill no register. There each register holds one column of as many rows as it has
-// lanes: A's numbers are transposed on the way in where its rows lie along K, and B's broadcast.
-// Every sum runs over K in the order that it has in a tile.
+// Kernel for few columns, which do not fill a register. Each register holds one column of as many
+// rows as it has lanes. Loading transposes A where its rows lie along K, and broadcasts the numbers
+// of B. Every sum runs over K in the same order as in a tile.
 
 #if HWY_TARGET != HWY_SCALAR
-constexpr int kMostNarrow = 4;  // columns
+constexpr int kMostNarrow = 4;  // columns of C
 
-/// Four numbers of every fourth row from `from` on, one row behind the other in a register.
+/// Loads four numbers from every fourth row, beginning at `from`. In the register the rows follow
+/// each other.
 template <class D>
 HWY_INLINE hn::Vec<D> LoadFourthRows(D d, const Real* from, ptrdiff_t row) {
   if constexpr (hn::MaxLanes(D()) <= 4) {
@@ -155,8 +158,8 @@ HWY_INLINE hn::Vec<D> LoadFourthRows(D d, const Real* from, ptrdiff_t row) {
   }
 }
 
-/// A(m, k) of the rows from `a` on, one in a lane, for four k in turn; kAlongK: a_k = 1, else
-/// a_m = 1.
+/// Loads A(m, k) for four consecutive k, with one row per lane, beginning at `a`. kAlongK: a_k = 1,
+/// otherwise a_m = 1.
 template <bool kAlongK>
 HWY_INLINE void LoadRows(const Product& p, const Real* a, Vec (&rows)[4]) {
   const Tag d;
@@ -167,7 +170,8 @@ HWY_INLINE void LoadRows(const Product& p, const Real* a, Vec (&rows)[4]) {
   if constexpr (kAlongK) TransposeBlocks(d, rows);
 }
 
-/// kBlocks registers of rows from m on, of all kColumns columns. K is a multiple of four.
+/// Computes kBlocks registers of rows from row m, for all kColumns columns. K is a multiple of
+/// four.
 template <int kBlocks, int kColumns, bool kAlongK>
 HWY_INLINE void MultiplyNarrowBlocks(const Product& p, int m) {
   const Tag d;
@@ -210,7 +214,7 @@ HWY_INLINE void MultiplyNarrowBlocks(const Product& p, int m) {
   }
 }
 
-/// As many whole registers of rows as there are; returns the first row after them.
+/// Computes the rows that fill whole registers. Returns the first row after them.
 template <int kColumns, bool kAlongK>
 int MultiplyNarrowRows(const Product& p) {
   const int lanes = static_cast<int>(hn::Lanes(Tag()));

@@ -15,11 +15,11 @@ struct Product {
   ptrdiff_t a_m, a_k;
   Matrix<const Real> b;          // (K × N)
   Matrix<Real> c;                // (M × N)
-  const Real* bias = nullptr;    // (N), or null for none
+  const Real* bias = nullptr;    // (N); null: no bias
   bool relu = false;             // C = max(C, 0)
-  Matrix<const Real> gate = {};  // C = 0 where gate (M × N) is not positive; empty for none
+  Matrix<const Real> gate = {};  // (M × N) C = 0 where gate is not positive; empty: no gate
 
-  /// The part that computes `rows` rows from m on and `cols` columns from n on.
+  /// The part of the product for `rows` rows from row m and `cols` columns from column n.
   Product Part(int m, int rows, int n, int cols) const {
     return {rows,
             cols,
@@ -35,8 +35,8 @@ struct Product {
   }
 };
 
-/// Computes C, of at least one column, on vectors. The order of each sum depends on the sizes
-/// alone.
+/// Computes C (at least one column) with vector instructions. The order of each sum depends only on
+/// the sizes.
 void Multiply(const Product& product);
 
 }  // namespace upswing

@@ -2,9 +2,8 @@
 
 namespace upswing {
 
-/// The numbers of kernels and networks: float. With UPSWING_DOUBLE they are double, for tests
-/// alone: there finite differences check gradients to 6 digits (see nn_double_test in
-/// CMakeLists.txt).
+/// Number type of kernels and networks: float. UPSWING_DOUBLE makes it double, only for tests:
+/// finite differences then check gradients to 6 digits (see nn_double_test in CMakeLists.txt).
 #ifdef UPSWING_DOUBLE
 using Real = double;
 #else

@@ -1,4 +1,4 @@
-// Registers full of numbers, for the kernels of each kind of vector instructions.
+// Helpers for registers full of numbers, compiled for each instruction set.
 
 #if defined(UPSWING_NN_REGISTERS_INL_H) == defined(HWY_TARGET_TOGGLE)  // once for each target
 #ifdef UPSWING_NN_REGISTERS_INL_H
@@ -22,11 +22,11 @@ namespace hn = hwy::HWY_NAMESPACE;
 using Tag = hn::ScalableTag<Real>;
 using Vec = hn::Vec<Tag>;
 
-/// Whether masked stores leave the other numbers untouched, which threads that write next to each
-/// other need; on other targets Highway reads and rewrites the whole register.
+/// Whether a masked store leaves the other numbers untouched. Threads that write next to each other
+/// need this. On other targets, Highway reads and rewrites the whole register.
 constexpr bool kMasked = HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3;
 
-/// Up to `count` numbers, or a whole register of them.
+/// Loads `count` numbers if kPartial, otherwise a whole register.
 template <bool kPartial>
 HWY_INLINE Vec Load(const Real* from, size_t count) {
   const Tag d;
@@ -51,8 +51,8 @@ HWY_INLINE void Store(Vec value, Real* to, size_t count) {
 }
 
 #if HWY_TARGET != HWY_SCALAR
-/// Transposes 4 × 4 numbers of float: each register holds one row of four, or of several blocks
-/// side by side.
+/// Transposes 4 × 4 floats. Each register holds one row of four numbers, or one row of several
+/// blocks side by side.
 template <class D>
 HWY_INLINE void TransposeBlocks(D d, hn::Vec<D> (&rows)[4]) {
   const hn::Repartition<double, D> pairs;
@@ -67,8 +67,8 @@ HWY_INLINE void TransposeBlocks(D d, hn::Vec<D> (&rows)[4]) {
 }
 #endif
 
-// Passes over vectors: each applies `f(i, count, partial)` to whole registers and then, with
-// partial = true, to the `count` numbers that remain.
+// Passes over vectors. Each pass applies `f(i, count, partial)` to whole registers. Then it applies
+// f with partial = true to the `count` numbers that remain.
 
 template <typename F>
 HWY_INLINE void ForVectors(size_t n, const F& f) {
@@ -78,7 +78,7 @@ HWY_INLINE void ForVectors(size_t n, const F& f) {
   if (i < n) f(i, n - i, std::true_type());
 }
 
-/// Σ term(i, count, partial) over all vectors, with four independent sums.
+/// Σ term(i, count, partial) over all vectors, in four independent sums.
 template <typename F>
 HWY_INLINE Real SumVectors(size_t n, const F& term) {
   const Tag d;

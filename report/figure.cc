@@ -13,17 +13,18 @@
 namespace upswing {
 namespace {
 
-/// The palette of Okabe and Ito (2008), which colour-blind people can distinguish; yellow last, as
-/// it is faint on white.
+/// The palette of Okabe and Ito (2008), which colour-blind people can distinguish. Yellow is last,
+/// because it is faint on white.
 constexpr std::array kColors{"#0072B2", "#D55E00", "#009E73", "#CC79A7",
                              "#E69F00", "#56B4E9", "#000000", "#F0E442"};
 
-/// Viridis (van der Walt and Smith, 2015) at 17 places: equal steps look equal, in grey too.
+/// Viridis (van der Walt and Smith, 2015) at 17 points: equal steps look equal, even in grey.
 constexpr std::array kViridis{"#440154", "#48186a", "#472d7b", "#424086", "#3b528b", "#33638d",
                               "#2c728e", "#26828e", "#21918c", "#1fa088", "#28ae80", "#3fbc73",
                               "#5ec962", "#84d44b", "#addc30", "#d8e219", "#fde725"};
 
-/// A text as gnuplot takes it literally: in single quotes nothing is special but the quote.
+/// Quotes a text so that gnuplot takes it literally. Within single quotes, only the quote is
+/// special.
 std::string Quoted(const std::string& text) {
   std::string quoted = "'";
   for (const char c : Printable(text)) {
@@ -35,7 +36,7 @@ std::string Quoted(const std::string& text) {
 
 std::string Number(double x) { return std::isfinite(x) ? FormatNumber(x) : "NaN"; }
 
-/// Edges of cells halfway between their centres, one more than there are centres.
+/// Edges of cells: halfway between the centres, and one more than there are centres.
 std::vector<double> Edges(const std::vector<double>& centers) {
   std::vector<double> edges;
   const size_t n = centers.size();
@@ -63,19 +64,19 @@ void CheckSizes(const Panel& panel) {
   }
 }
 
-/// What differs between the two formats.
+/// Differences between the two output formats.
 struct Terminal {
   std::string name;
-  double font;         // size of text that is kFontSize pixels high
+  double font;         // font size of text that is kFontSize pixels high
   double legend_line;  // pixels between two entries at spacing 1
-  double marker;       // size of markers that look the same
-  std::string cell;    // borders of cells, so that there are no seams between them
+  double marker;       // size of markers that look the same in both formats
+  std::string cell;    // borders of cells, which hide seams between them
 };
 const Terminal kSvg{"svg dynamic", kFontSize, 18, 0.75, "noborder"};
-// pngcairo counts the font in points, of which 72 make 96 pixels, and blends edges.
+// pngcairo measures fonts in points, of which 72 make 96 pixels, and blends edges.
 const Terminal kPng{"pngcairo", kFontSize * 0.75, 14, 1, ""};
 
-/// The commands that draw one panel.
+/// gnuplot commands that draw one panel.
 class PanelScript {
  public:
   PanelScript(const Panel& panel, const Box& box, const Figure& figure, const Terminal& terminal)
@@ -101,7 +102,7 @@ class PanelScript {
   std::string ScreenX(double pixel) const { return "screen " + Number(pixel / width_); }
   std::string ScreenY(double pixel) const { return "screen " + Number(pixel / height_); }
 
-  /// $L0, $L1, … of the lines and $H of the heat map.
+  /// Writes the data blocks $L0, $L1, … for the lines and $H for the heat map.
   void Data() {
     for (size_t i = 0; i < panel_.lines.size(); ++i) {
       const Line& line = panel_.lines[i];
@@ -135,7 +136,8 @@ class PanelScript {
   void Axes() {
     Say("set lmargin at ", ScreenX(box_.left), "; set rmargin at ", ScreenX(box_.right));
     Say("set bmargin at ", ScreenY(box_.bottom), "; set tmargin at ", ScreenY(box_.top));
-    // Labels are placed in the margins, at the same distance for any width of the tick labels.
+    // Place labels in the margins, so that their distance does not depend on the width of the tick
+    // labels.
     Label(2, panel_.title, (box_.left + box_.right) / 2, box_.top + 14, false);
     const double bottom = box_.bottom - BottomMargin(panel_) + LegendBelow(panel_);
     Label(3, panel_.x_label, (box_.left + box_.right) / 2, bottom + 8, false);
@@ -143,14 +145,14 @@ class PanelScript {
     Say("unset label 5");
     Ticks("x", panel_.x_tick);
     Ticks("y", panel_.y_tick);
-    // Large numbers in thousands and millions, or they run into each other.
+    // Show large numbers in thousands or millions, so that tick labels do not overlap.
     const double largest = LargestX();
     if (largest < 1e4) Say("set format x");
     if (largest >= 1e4) Say("set format x '", largest < 1e6 ? "%.0s%c" : "%.1s%c", "'");
     Say(panel_.heat_map ? "unset grid" : "set grid back lt 1 lw 0.5 lc rgb '#d8d8d8'");
     Range("x", panel_.x_range, x_range_);
     Range("y", panel_.y_range, y_range_);
-    // Empty cells are grey.
+    // Draw empty cells in grey.
     Say("unset object 1");
     if (panel_.heat_map) {
       Say("set object 1 rectangle from graph 0,0 to graph 1,1 behind fc rgb '#e4e4e4' fs noborder");
@@ -178,7 +180,7 @@ class PanelScript {
   void Range(std::string_view axis, std::optional<std::pair<double, double>> wanted,
              std::optional<std::pair<double, double>> found) {
     if (!wanted) wanted = found;
-    if (!wanted && !has_numbers_) wanted = {0, 1};  // nothing to take a range from
+    if (!wanted && !has_numbers_) wanted = {0, 1};  // there are no data to take a range from
     if (wanted)
       return Say("set ", axis, "range [", Number(wanted->first), ":", Number(wanted->second), "]");
     Say("set ", axis, "range [*:*]; set autoscale ", axis == "x" ? "xfix" : "y");
@@ -196,7 +198,7 @@ class PanelScript {
     Label(5, map.label, box_.right + 84, (box_.bottom + box_.top) / 2, true);
   }
 
-  /// Beside the axes, or below those of a heat map, where nothing is hidden.
+  /// Places the legend next to the axes, or below a heat map, where it hides nothing.
   void Legend() {
     if (!HasLegend(panel_)) return Say("unset key");
     const auto entries =
@@ -213,7 +215,7 @@ class PanelScript {
         style);
   }
 
-  /// Heat map, then bands, then lines: each above what is before it.
+  /// Plots the heat map, then bands, then lines, each above the layers before it.
   void Plot() {
     std::vector<std::string> layers;
     if (has_cells_) {
@@ -239,7 +241,7 @@ class PanelScript {
     const std::string title = line.name.empty() ? " notitle" : " title " + Quoted(line.name);
     const std::string color = Concat(" lc rgb '", Color(i), "'");
     if (!line.points) {
-      // Beyond the palette's colours lines are dashed.
+      // Dash lines beyond the palette's colours.
       const std::string style = Concat(" with lines lw ", panel_.heat_map ? 1 : 2, color, " dt ");
       const size_t dash = 1 + i / kColors.size() % 4;
       if (!line.dotted_from) {
@@ -256,7 +258,7 @@ class PanelScript {
                               color, title));
       return;
     }
-    // On a heat map a white rim sets markers off from every colour.
+    // Give markers on a heat map a white rim, which separates them from every colour.
     if (panel_.heat_map)
       layers.push_back(Concat(data, "points", type, Size(1.5), " lc rgb 'white' notitle"));
     layers.push_back(Concat(data, "points", type,
@@ -272,7 +274,7 @@ class PanelScript {
 
   double Size(double marker) const { return marker * terminal_.marker; }
 
-  /// Red-orange first on a heat map: viridis has no such colour.
+  /// Colour of line i. On a heat map, red-orange comes first, because viridis does not contain it.
   std::string Color(size_t i) const {
     return kColors[(i + (panel_.heat_map ? 1 : 0)) % kColors.size()];
   }
@@ -282,11 +284,11 @@ class PanelScript {
   double width_, height_;
   Terminal terminal_;
   bool has_numbers_ = false, has_cells_ = false;
-  std::optional<std::pair<double, double>> x_range_, y_range_;  // of the heat map
+  std::optional<std::pair<double, double>> x_range_, y_range_;  // ranges of the heat map
   std::string text_;
 };
 
-/// The line of gnuplot's message with the error, without its place in the script.
+/// The error line of gnuplot's message, without its position in the script.
 std::string ErrorIn(const std::string& message) {
   std::string last;
   for (const std::string_view line : Split(message, '\n')) {
@@ -298,10 +300,10 @@ std::string ErrorIn(const std::string& message) {
   return last.empty() ? "it said nothing" : last;
 }
 
-/// Runs gnuplot on a script and returns its standard output. The user's own settings of gnuplot are
-/// not read. Throws Failure if it is missing, or with gnuplot's error message.
+/// Runs gnuplot on a script and returns its standard output. Does not read the user's gnuplot
+/// settings. Throws Failure if gnuplot is missing, or with gnuplot's error message.
 std::string RunGnuplot(const std::string& script) {
-  // Of "-" it would read each byte by itself.
+  // Use /dev/stdin, because gnuplot reads "-" byte by byte.
   const std::optional<CommandResult> done = RunCommand({"gnuplot", "-d", "/dev/stdin"}, script);
   if (!done) {
     throw Failure(
@@ -316,7 +318,7 @@ std::string RunGnuplot(const std::string& script) {
   return done->output;
 }
 
-constexpr size_t kFirstCaptionLabel = 10;  // the panels have lower numbers
+constexpr size_t kFirstCaptionLabel = 10;  // panels use lower label numbers
 
 std::string Script(const Figure& figure, const Terminal& terminal) {
   std::vector<std::string> palette;
@@ -342,7 +344,7 @@ std::string Script(const Figure& figure, const Terminal& terminal) {
   const std::vector<Box> boxes = Layout(figure);
   for (size_t i = 0; i < boxes.size(); ++i) {
     script += PanelScript(figure.panels[i], boxes[i], figure, terminal).text();
-    // The figure's title and caption are drawn once.
+    // Draw the figure's title and caption only once.
     script += "unset label 1\n";
     for (size_t k = 0; k < caption.size(); ++k) {
       script += Concat("unset label ", kFirstCaptionLabel + k, '\n');

@@ -18,13 +18,13 @@ namespace fs = std::filesystem;
 
 // Each of these characters is special in gnuplot, a shell or XML.
 const std::string kHostile = R"(it's "q" $HOME `ls` a_b^2 {/Bold x} \alpha 100% @m ~ & <b> ω₁)";
-// A bare > is allowed in XML.
+// XML allows a bare >.
 const std::string kHostileXml =
     R"(it's "q" $HOME `ls` a_b^2 {/Bold x} \alpha 100% @m ~ &amp; &lt;b> ω₁)";
 
 Line Curve(const std::string& name) { return {name, {0, 1, 2}, {1, 3, 2}, {0, 2, 1}, {2, 4, 3}}; }
 
-/// A panel of curves over a panel with a heat map.
+/// A figure with a panel of curves above a panel with a heat map.
 Figure Example() {
   Figure figure;
   figure.title = "the figure's title";
@@ -46,7 +46,7 @@ class FigureTest : public ::testing::Test {
   TempFolder folder_;
 };
 
-/// Whether every tag is closed in its order, as XML asks, and there is one root.
+/// Whether all tags are closed in order, as XML requires, and there is one root.
 bool WellFormed(const std::string& xml) {
   std::vector<std::string> open;
   int roots = 0;
@@ -92,7 +92,7 @@ TEST_F(FigureTest, CellsHaveTheColoursOfTheirNumbers) {
     for (size_t at = svg.find(color); at != std::string::npos; at = svg.find(color, at + 1)) ++n;
     return n;
   };
-  // The ends of viridis: in the colour bar once, and in each cell of that number.
+  // Both ends of viridis appear in the colour bar once, and in each cell with that number.
   const std::string low = "rgb( 68,   1,  84)";
   const std::string high = "rgb(253, 231,  37)";
   Figure figure = Example();
@@ -102,7 +102,7 @@ TEST_F(FigureTest, CellsHaveTheColoursOfTheirNumbers) {
   EXPECT_GE(count(one, low), 1);
   EXPECT_EQ(count(more, low), count(one, low) + 2);
   EXPECT_EQ(count(more, high), count(one, high) + 1);
-  // An empty cell has no polygon: with a number there, there is one more.
+  // An empty cell has no polygon. A number in that cell adds one.
   figure.panels[1].heat_map->z = {0, 0, 0, 5, 5, 5};
   EXPECT_EQ(count(Svg(figure), "<polygon"), count(more, "<polygon") + 1);
 }
@@ -137,7 +137,7 @@ TEST_F(FigureTest, TextsAreDrawnLiterally) {
 }
 
 TEST_F(FigureTest, NaNLeavesAGap) {
-  // Each piece of the curve begins with a move.
+  // Count moves: each piece of the curve begins with a move.
   const auto pieces = [&](double middle) {
     Figure figure;
     figure.panels.resize(1);
@@ -218,7 +218,7 @@ TEST_F(FigureTest, AnotherEndingIsBadInputAndWritesNothing) {
   EXPECT_TRUE(fs::is_empty(folder_.path()));
 }
 
-/// The message of the Failure of drawing with PATH = `path`; the old file stays.
+/// The message of the Failure when Draw runs with PATH = `path`. Checks that the old file stays.
 std::string FailureWithPath(const std::string& path, const fs::path& file) {
   WriteFileAtomically(file, "old");
   const std::string before = getenv("PATH");

@@ -9,11 +9,11 @@
 namespace upswing {
 namespace {
 
-constexpr double kCharacter = 7.2;    // mean width of a character of kFontSize
-constexpr double kLegendSample = 44;  // width of a legend's piece of line
+constexpr double kCharacter = 7.2;    // mean width of a character at kFontSize
+constexpr double kLegendSample = 44;  // width of the line sample in a legend
 constexpr double kTitleHeight = 28;
 
-/// How many characters of a font of this scale fit the figure's width.
+/// Number of characters at font scale `scale` that fit the figure's width.
 size_t CharactersIn(const Figure& figure, double scale) {
   return static_cast<size_t>((figure.width - 32) / (scale * kCharacter));
 }
@@ -24,7 +24,7 @@ double LegendWidth(const Panel& panel) {
   return kLegendSample + kCharacter * static_cast<double>(longest);
 }
 
-/// Space that a panel needs around its axes, pixels.
+/// Space around the axes of a panel, pixels.
 struct Margins {
   double left = 0, right = 0, top = 0, bottom = 0;
 

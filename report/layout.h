@@ -9,30 +9,30 @@
 namespace upswing {
 
 inline constexpr int kFontSize = 12;
-inline constexpr double kTitleScale = 1.2;  // font of the title over that of the rest
-inline constexpr double kLegendLine = 18;   // height of an entry
+inline constexpr double kTitleScale = 1.2;  // ratio of title font to the other fonts
+inline constexpr double kLegendLine = 18;   // height of a legend entry
 
-/// The area of a panel's axes, from the figure's lower left corner.
+/// The area of a panel's axes, measured from the figure's lower left corner.
 struct Box {
   double left, right, bottom, top;
 };
 
-/// The axes of each panel: of one size, and aligned in rows and columns. Throws BadInput if they do
-/// not fit.
+/// The axes of each panel: all of the same size, and aligned in rows and columns. Throws BadInput
+/// if they do not fit.
 std::vector<Box> Layout(const Figure& figure);
 
-inline constexpr double kCaptionLine = 16;  // height of a line of the caption
+inline constexpr double kCaptionLine = 16;  // height of a caption line
 
-/// The caption, broken into lines that fit the figure's width.
+/// The caption in lines that fit the figure's width.
 std::vector<std::string> CaptionLines(const Figure& figure);
-/// The title; of one that is too wide, its end after an ellipsis.
+/// The title; if it is too wide, an ellipsis and its end.
 std::string FittedTitle(const Figure& figure);
 
-/// Whether a line of the panel has a name.
+/// Whether the panel needs a legend: one of its lines has a name.
 bool HasLegend(const Panel& panel);
-/// Height of a heat map's legend, which lies below it; 0 without one.
+/// Height of the legend below a heat map; 0 without a heat map or a legend.
 double LegendBelow(const Panel& panel);
-/// Space that labels and legend need below a panel's axes.
+/// Space for labels and legend below a panel's axes.
 double BottomMargin(const Panel& panel);
 
 }  // namespace upswing

@@ -19,9 +19,9 @@ std::vector<double> Pooled(std::span<const std::vector<double>> strata) {
 
 constexpr double kZ95 = 1.959963984540054;  // 97.5% quantile of the standard normal
 
-/// Variance of the mean over the tasks of U / (m n) where the probability is p on each: that of
-/// Hanley and McNeil (1982) for scores with exponential distributions, with both m - 1 and n - 1 as
-/// (m + n) / 2 - 1 (Newcombe, 2006).
+/// Variance of the mean of U / (m n) over the tasks, if the probability is p on each task. This is
+/// the variance of Hanley and McNeil (1982) for exponentially distributed scores. (m + n) / 2 - 1
+/// replaces both m - 1 and n - 1 (Newcombe, 2006).
 double ImprovementVariance(double p, const Strata& x, const Strata& y) {
   double sum = 0;
   for (size_t task = 0; task < x.size(); ++task) {
@@ -34,7 +34,7 @@ double ImprovementVariance(double p, const Strata& x, const Strata& y) {
   return sum / (tasks * tasks);
 }
 
-/// A figure of two agents, which are resampled independently: the strata of one, then of the other.
+/// Estimates a statistic of two agents. The resamples of their strata are independent.
 Estimate EstimateOfTwo(const Strata& x, const Strata& y,
                        const std::function<double(std::span<const std::vector<double>>,
                                                   std::span<const std::vector<double>>)>& figure,
@@ -48,12 +48,12 @@ Estimate EstimateOfTwo(const Strata& x, const Strata& y,
   return {statistic(both), BootstrapInterval(both, statistic, resamples)};
 }
 
-/// Draws as many scores as there are from sorted ones, with replacement, in their order.
+/// Draws as many scores as `sorted` has, with replacement, and keeps them sorted.
 void Resample(const std::vector<double>& sorted, Rng& rng, std::vector<double>& drawn) {
   std::vector<uint32_t> times(sorted.size());
   for (size_t k = 0; k < sorted.size(); ++k) ++times[rng.Below(sorted.size())];
-  // Most are drawn at most four times: four are written whatever the number, as a branch could not
-  // be predicted. What is written too much is overwritten, or cut off at the end.
+  // Most scores are drawn at most four times. Always write four copies, because a branch would be
+  // unpredictable. Later scores overwrite surplus copies, and the end is cut off.
   constexpr size_t kUsual = 4;
   drawn.resize(sorted.size() + kUsual);
   size_t next = 0;
@@ -94,7 +94,8 @@ double InterquartileMean(std::vector<double> values) {
 double ProbabilityOfImprovement(std::span<const double> x, std::span<const double> y) {
   const std::vector<double> as = Sorted(x), bs = Sorted(y);
   double u = 0;
-  auto lower = bs.begin(), not_higher = bs.begin();  // the ends of those below a, and not above it
+  // Ends of the scores below a, and of the scores not above a.
+  auto lower = bs.begin(), not_higher = bs.begin();
   for (const double a : as) {
     while (lower != bs.end() && *lower < a) ++lower;
     while (not_higher != bs.end() && *not_higher <= a) ++not_higher;
@@ -128,7 +129,8 @@ Interval ImprovementScoreInterval(double estimate, const Strata& x, const Strata
     const double off = estimate - p;
     return off * off <= kZ95 * kZ95 * ImprovementVariance(p, x, y);
   };
-  // The farthest p inside between the estimate and `end`, to the last digit.
+  // The last p inside the interval on the way from the estimate to `end`, by bisection to the last
+  // digit.
   const auto farthest = [&](double end) {
     double in = estimate, out = end;
     for (int i = 0; i < 60; ++i) {

@@ -19,10 +19,12 @@ void ExpectSame(const Estimate& got, const nlohmann::json& expected, const char*
   SCOPED_TRACE(what);
   const auto value = expected["value"].get<double>();
   EXPECT_NEAR(got.value, value, 1e-12 * std::max(1.0, std::abs(value)));
-  // An end over R resamples has a standard deviation of about s / √R. The file has the mean of five
-  // bootstraps of 2,000, and how far the farthest of them is from it, which is typically 1.2 s /
-  // √2000. Our own 10,000 differ from that mean by √2 s / √10000 or half that distance; four times
-  // as much, which is 4 standard deviations, is none of chance.
+  // The end of an interval over R resamples has a standard deviation of about s / √R. The file has
+  // the mean of five bootstraps of 2,000 resamples, and the largest distance of a bootstrap from
+  // that mean, typically 1.2 s / √2000.
+  //
+  // Our own 10,000 resamples differ from that mean by √2 s / √10000, which is half that distance.
+  // The tolerance is four times as much, 4 standard deviations, so that chance does not exceed it.
   const auto tolerance = 2 * expected["spread"].get<double>() + 1e-9;
   ASSERT_TRUE(got.interval);
   EXPECT_NEAR(got.interval->low, expected["interval"][0].get<double>(), tolerance);
@@ -45,9 +47,9 @@ TEST(Statistics, AgreeWithRliable) {
 
 TEST(Statistics, InterquartileMeanByHand) {
   EXPECT_EQ(InterquartileMean({7}), 7);
-  EXPECT_EQ(InterquartileMean({1, 2, 9}), 4);           // floor(3/4) = 0 cut
-  EXPECT_EQ(InterquartileMean({100, 1, 2, 6}), 4);      // one at each end
-  EXPECT_EQ(InterquartileMean({-50, 1, 2, 6, 90}), 3);  // still one
+  EXPECT_EQ(InterquartileMean({1, 2, 9}), 4);           // floor(3/4) = 0 values cut
+  EXPECT_EQ(InterquartileMean({100, 1, 2, 6}), 4);      // one value cut at each end
+  EXPECT_EQ(InterquartileMean({-50, 1, 2, 6, 90}), 3);  // still one value cut at each end
   EXPECT_EQ(InterquartileMean({kInfinity, 1, 2, 6}), 4);
   EXPECT_EQ(InterquartileMean({kInfinity, kInfinity, 2, 6}), kInfinity);
 }
@@ -56,7 +58,7 @@ TEST(Statistics, ProbabilityOfImprovementByHand) {
   const std::vector<double> x{1, 3, 3}, y{2, 3};
   EXPECT_DOUBLE_EQ(ProbabilityOfImprovement(x, y), (0 + 0 + 1 + 0.5 + 1 + 0.5) / 6);
   EXPECT_DOUBLE_EQ(ProbabilityOfImprovement(x, y) + ProbabilityOfImprovement(y, x), 1);
-  // Two runs that never solve the task are as good as each other, and worse than one that does.
+  // Two runs that never solve the task are equally good, and worse than a run that solves it.
   const std::vector<double> never{-kInfinity, -kInfinity}, once{-kInfinity, -20};
   EXPECT_EQ(ProbabilityOfImprovement(never, never), 0.5);
   EXPECT_EQ(ProbabilityOfImprovement(once, never), 0.75);
@@ -70,11 +72,11 @@ TEST(Statistics, AnIntervalDependsOnTheScoresAlone) {
   EXPECT_GT(a.interval->high, a.value);
   EXPECT_FALSE(EstimateIqm({{1}}).interval);
   EXPECT_FALSE(EstimateImprovement({{1, 2}}, {{1}}).interval);
-  EXPECT_FALSE(EstimateIqm({{2, 2, 2}}).interval);  // none without a width
+  EXPECT_FALSE(EstimateIqm({{2, 2, 2}}).interval);  // no interval without a width
 }
 
 TEST(Statistics, EachStratumIsResampledOnItsOwn) {
-  // Without strata a resample would hold other shares of the two tasks, and the mean would move.
+  // Without strata, a resample could hold other shares of the two tasks, and the mean would change.
   const auto mean = [](const Strata& s) { return (s[0][0] + s[0][1] + s[1][0] + s[1][1]) / 4; };
   const auto interval = BootstrapInterval({{0, 2}, {5, 5}}, mean);
   EXPECT_EQ(interval->low, 2.5);
@@ -87,14 +89,14 @@ TEST(Statistics, AProbabilityHasAnIntervalWhereAllPairsAgreeToo) {
   ASSERT_TRUE(all.interval);
   EXPECT_EQ(all.interval->high, 1);
   const double p = all.interval->low;
-  // At its end the estimate is 1.96 standard deviations off.
+  // At the end of the interval, the estimate is 1.96 standard deviations away.
   const double variance = p * (1 - p) * (1 + 4 * ((1 - p) / (2 - p) + p / (1 + p))) / 25;
   EXPECT_NEAR(1 - p, 1.959963984540054 * std::sqrt(variance), 1e-12);
   EXPECT_NEAR(p, 0.643, 0.001);
   const Estimate none = EstimateImprovement({{1, 2, 3, 4, 5}}, {{6, 7, 8, 9, 10}});
   EXPECT_EQ(none.interval->low, 0);
   EXPECT_NEAR(none.interval->high, 1 - p, 1e-12);
-  // Runs that never solve give little information on which would be sooner.
+  // Runs that never solve the task say little about which agent would be faster.
   const Estimate ties = EstimateImprovement({{-kInfinity, -kInfinity, -kInfinity}},
                                             {{-kInfinity, -kInfinity, -kInfinity}});
   EXPECT_NEAR(ties.interval->low, 0.153, 0.001);
@@ -129,7 +131,7 @@ TEST(Statistics, AnIntervalOfRunsThatNeverSolvedReachesInfinity) {
   EXPECT_EQ(some.interval->high, kInfinity);
 }
 
-/// Share of the samples of `runs` normal numbers whose interval for the IQM holds the true one, 0.
+/// Share of samples, of `runs` normal numbers each, whose IQM interval contains the true IQM of 0.
 double Coverage(size_t runs) {
   constexpr int kSamples = 1000;
   int held = 0;
@@ -145,7 +147,7 @@ double Coverage(size_t runs) {
 
 TEST(Statistics, IntervalsOfFewRunsAreTooNarrowAndOfManyRight) {
   // 1,000 samples give the coverage to ±0.01 (one standard deviation at 0.85).
-  // docs/howto/compare.md has these figures.
+  // docs/howto/compare.md has these coverages.
   const double five = Coverage(5), ten = Coverage(10), thirty = Coverage(30);
   RecordProperty("five", std::to_string(five));
   RecordProperty("ten", std::to_string(ten));

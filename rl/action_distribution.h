@@ -9,11 +9,11 @@
 #include "nn/gaussian.h"
 #include "rl/softmax.h"
 
-/// The distributions that a policy gradient draws actions from, at one observation. T = float to
-/// work, double to check gradients.
+/// Action distributions of policy gradients at one observation. T = float for training, double for
+/// gradient checks.
 namespace upswing {
 
-/// Independent normal components u (A), in units of each action's limit; σ does not depend on the
+/// Independent normal components u (A), in units of each action's limit. σ does not depend on the
 /// observation.
 template <typename T>
 struct DiagonalGaussian {
@@ -52,11 +52,11 @@ struct DiagonalGaussian {
   T Epsilon(std::span<const T> u, size_t k) const { return (u[k] - mean[k]) / sigma[k]; }
 };
 
-/// One of K actions, p = softmax(logits).
+/// Distribution over K actions, p = softmax(logits).
 template <typename T>
 class Categorical {
  public:
-  /// Writes p (K), which must stay as it is.
+  /// Writes p (K). The caller must not change it afterwards.
   Categorical(std::span<const T> logits, std::span<T> p)
       : logits_(logits), p_(p), log_sum_(Softmax<T>(logits, p)) {}
 

@@ -6,7 +6,7 @@
 namespace upswing {
 namespace {
 
-/// Mean and variance (of the population) of n numbers.
+/// Mean and population variance of n numbers.
 struct Spread {
   double mean, variance;
 };
@@ -38,7 +38,7 @@ void GeneralizedAdvantages(const AdvantageInputs& in, double gamma, double lambd
 }
 
 void Standardize(std::span<float> values) {
-  constexpr double kLeast = 1e-8;  // standard deviation
+  constexpr double kLeast = 1e-8;  // smallest standard deviation
   const auto [mean, variance] = SpreadOf(values.size(), [&](size_t i) { return values[i]; });
   const double scale = 1 / (std::sqrt(variance) + kLeast);
   for (float& x : values) x = static_cast<float>((x - mean) * scale);

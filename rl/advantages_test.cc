@@ -8,8 +8,8 @@
 namespace upswing {
 namespace {
 
-/// Three steps of one environment, r = 1, 2, 3, V(s) = 10, 20, 30, V(s') = 21, 31, 41, of which
-/// the second ends as given.
+/// Advantages of three steps of one environment with r = 1, 2, 3, V(s) = 10, 20, 30, V(s') = 21,
+/// 31, 41. The arguments end the second step.
 std::vector<float> Advantages(double gamma, double lambda, bool terminated, bool truncated) {
   const std::vector<float> reward{1, 2, 3}, value{10, 20, 30}, next_value{21, 31, 41};
   const std::vector<uint8_t> ends{0, terminated, 0}, cuts{0, truncated, 0};
@@ -28,8 +28,8 @@ void ExpectNear(const std::vector<float>& got, const std::vector<double>& expect
   for (size_t i = 0; i < got.size(); ++i) EXPECT_NEAR(got[i], expected[i], 1e-5) << i;
 }
 
-// With γ = 1/2: δ₀ = 1 + 10.5 - 10 = 1.5, δ₁ = 2 + 15.5 - 20 = -2.5, without a future 2 - 20 = -18,
-// δ₂ = 3 + 20.5 - 30 = -6.5.
+// With γ = 1/2: δ₀ = 1 + 10.5 - 10 = 1.5 and δ₂ = 3 + 20.5 - 30 = -6.5. δ₁ = 2 + 15.5 - 20 = -2.5,
+// or without a future 2 - 20 = -18.
 
 TEST(Advantages, OfAnEpisodeThatGoesOn) {
   ExpectNear(Advantages(0.5, 0.8, false, false),
@@ -53,7 +53,7 @@ TEST(Advantages, WithoutLambdaAreTheOneStepErrors) {
 }
 
 TEST(Advantages, WithLambdaOneAreReturnsMinusValues) {
-  // Σ γᵏ r + γ³ V(s'), where V of each successor is that of the next row.
+  // Σ γᵏ r + γ³ V(s'), where V of each successor is the V of the next row.
   const std::vector<float> reward{1, 2, 3}, value{10, 20, 30}, next_value{20, 30, 41};
   const std::vector<uint8_t> none{0, 0, 0};
   std::vector<float> advantage(3);
@@ -68,7 +68,7 @@ TEST(Advantages, WithLambdaOneAreReturnsMinusValues) {
 }
 
 TEST(Advantages, EnvironmentsDoNotTouchEachOther) {
-  // Two environments, two steps: the first ends, the second goes on.
+  // Two environments, two steps: the first environment ends, the second goes on.
   const std::vector<float> reward{1, 1, 1, 1}, value{0, 0, 0, 0}, next_value{0, 0, 8, 8};
   const std::vector<uint8_t> ends{1, 0, 0, 0}, none(4);
   std::vector<float> advantage(4);

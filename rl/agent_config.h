@@ -12,53 +12,53 @@
 
 namespace upswing {
 
-/// What the memory that an agent takes follows from.
+/// Sizes that determine the memory use of an agent.
 struct AgentSize {
-  double parameters;    // of the networks that learn
-  double arrays;        // numbers in memory for each parameter, such as Adam's moments
-  double saved_arrays;  // the same in a checkpoint
-  double transition;    // numbers of a transition in the replay memory or rollout
-  double capacity;      // transitions that it holds
+  double parameters;    // parameters of the networks that learn
+  double arrays;        // numbers in memory per parameter, such as Adam's moments
+  double saved_arrays;  // numbers in a checkpoint per parameter
+  double transition;    // numbers per transition in the replay memory or rollout
+  double capacity;      // transitions in the replay memory or rollout
   double batch;         // rows of a minibatch
   double widest;        // units of the widest layer
   double layers;        // layers whose activations and gradients are kept
   const char* store = "replay memory";
-  const char* store_flag = "--replay";  // which makes it smaller
+  const char* store_flag = "--replay";  // flag that makes the store smaller
 };
 
-/// The settings of a learning algorithm, and all that the program asks of the algorithm.
+/// Settings of a learning algorithm, and everything that the program needs from the algorithm.
 struct AgentConfig {
   virtual ~AgentConfig() = default;
 
   /// One line per setting: name, range, unit, help.
   virtual void Describe(Options& options) = 0;
 
-  /// A new agent for such environments, whose work the pool shares.
+  /// Makes an agent for environments of this kind. The threads of the pool share its work.
   virtual std::unique_ptr<Agent> Make(const EnvSpec& spec, uint64_t seed,
                                       ThreadPool& pool) const = 0;
 
-  /// Throws BadInput, beginning with a setting's name, if settings, each of which is allowed,
-  /// contradict each other.
+  /// Throws BadInput if settings contradict each other although each is in its range. The message
+  /// begins with a setting's name.
   virtual void Check(int64_t num_envs) const = 0;
 
   virtual AgentSize Size(const EnvSpec& spec) const = 0;
 
-  /// Such as `double, dueling network 64-64 with heads of 32`.
+  /// The algorithm in words, such as `double, dueling network 64-64 with heads of 32`.
   virtual std::string Text() const = 0;
 
-  /// Settings that keep the agent from learning in so many steps, a line each.
+  /// Warnings, one per line, about settings that keep the agent from learning within `steps`.
   virtual std::vector<std::string> Warnings(int64_t steps, int64_t num_envs) const = 0;
-  /// Whether values include an entropy bonus, so that they differ from discounted returns.
+  /// Whether values include an entropy bonus and so differ from discounted returns.
   virtual bool HasSoftValues() const { return false; }
 };
 
 /// Widths of layers as text, such as `64-64`.
 std::string WidthsText(const std::vector<int64_t>& widths);
 
-/// The largest of them.
+/// The largest of `widths`.
 double Widest(const std::vector<int64_t>& widths);
 
-/// Adds a warning if the learning rate is 0 from its beginning to its end.
+/// Adds a warning if both ends of the learning-rate schedule are 0.
 void WarnOfNoRate(double begin, double end, std::vector<std::string>& warnings);
 
 }  // namespace upswing

@@ -16,7 +16,7 @@
 namespace upswing {
 namespace {
 
-/// The actions of an agent for this task. Throws BadInput.
+/// The actions of an agent for this task. Throws BadInput if the task has several torques.
 std::vector<double> TorquesOf(const DqnConfig& config, const EnvSpec& spec) {
   if (spec.action_size() == 1) return TorqueLevels(spec.action_limit.front(), config.levels);
   throw BadInput(
@@ -71,7 +71,7 @@ void Dqn::Act(Matrix<const float> obs, Matrix<double> action) {
   online_.network().ForwardPreferences(online_.theta(), obs, {0, obs.rows()}, act_activations_, q);
   Remember(obs);
 
-  // ε-greedy.
+  // Act ε-greedily.
   for (int env = 0; env < obs.rows(); ++env) {
     const bool random = explore_rng_.Uniform() < epsilon();
     const int chosen =
@@ -82,7 +82,7 @@ void Dqn::Act(Matrix<const float> obs, Matrix<double> action) {
 }
 
 void Dqn::Update(const Minibatch& batch) {
-  // Gradient of the mean Huber loss.
+  // Compute the gradient of the mean Huber loss.
   online_.Prepare(pool_);
   ForSlices(pool_, B_, [&](RowRange rows) { BackwardRows(batch, rows); });
   double loss = 0, q = 0, td = 0, errors = 0;
@@ -94,7 +94,7 @@ void Dqn::Update(const Minibatch& batch) {
   }
   CountErrors(loss / B_, q / B_, td / B_);
 
-  // θ moves against the gradient, and θ⁻ follows θ.
+  // Move θ against the gradient, and θ⁻ towards θ.
   const bool polyak = config_.target_period == 0;
   norm_sum_ += online_.Step({batch.obs.data(), B_, D_}, learning_rate(), config_.max_gradient_norm,
                             theta_target_, polyak ? config_.tau : 0.0, pool_);
@@ -136,8 +136,8 @@ void Dqn::BackwardRows(const Minibatch& batch, RowRange rows) {
   const Matrix<float> q(q_, B_, A), q_target(q_target_, B_, A), dq(dq_, B_, A);
   const Matrix<float> q_select(config_.double_q || config_.mirror ? q_select_ : q_target_, B_, A);
 
-  // y = r + γⁿ Q(s', a*; θ⁻), or with mirror y = r + γⁿ Q(σs', σa*; θ⁻); θ selects a* in Double
-  // DQN, else θ⁻.
+  // y = r + γⁿ Q(s', a*; θ⁻), or with mirror y = r + γⁿ Q(σs', σa*; θ⁻). θ selects a* in Double
+  // DQN, θ⁻ otherwise.
   online_.Forward(config_.double_q ? online_.theta() : theta_target_, s_next, rows, q_select);
   if (config_.mirror) {
     ForwardMirrored(s_next, rows, q_target);

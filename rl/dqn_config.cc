@@ -39,8 +39,8 @@ AgentSize DqnConfig::Size(const EnvSpec& spec) const {
   const int D = spec.obs_size;
   const Network network(Shape(D, static_cast<int>(levels)));
   return {static_cast<double>(network.num_parameters()),
-          // Online, target and kept parameters, gradient, Adam's two moments, and the forms that
-          // products want of online and target weights.
+          // Arrays: online, target and kept parameters, gradient, Adam's two moments, and
+          // transposed online and target weights.
           8, 5, 2.0 * D + 3, static_cast<double>(replay), static_cast<double>(batch),
           Widest(hidden), 3 * static_cast<double>(hidden.size())};
 }

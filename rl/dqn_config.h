@@ -9,7 +9,7 @@
 
 namespace upswing {
 
-/// Settings of the agent.
+/// Settings of the DQN agent.
 struct DqnConfig : AgentConfig, OffPolicyConfig {
   DqnConfig() {
     n_step = 5;
@@ -34,7 +34,7 @@ struct DqnConfig : AgentConfig, OffPolicyConfig {
   std::string Text() const override;
   std::vector<std::string> Warnings(int64_t steps, int64_t num_envs) const override;
 
-  /// The shape of the network, for observations of `obs_size` numbers and so many actions.
+  /// The shape of the network for observations of `obs_size` numbers and for `actions` actions.
   NetworkShape Shape(int obs_size, int actions) const;
 };
 

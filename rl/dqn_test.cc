@@ -53,13 +53,13 @@ TEST(TdTargets, VanillaAndDoubleByHand) {
   const Matrix<const float> Q(online.data(), 2, 3), Q_target(target.data(), 2, 3);
   const std::vector<float> reward{0.5F, -1}, discount{0.9F, 0.81F};
   std::vector<float> y(2);
-  TdTargets(Q_target, Q_target, reward, discount, y);  // max of the target: 7 and 9
+  TdTargets(Q_target, Q_target, reward, discount, y);  // largest target values: 7 and 9
   EXPECT_FLOAT_EQ(y[0], 0.5F + 0.9F * 7);
   EXPECT_FLOAT_EQ(y[1], -1 + 0.81F * 9);
-  TdTargets(Q, Q_target, reward, discount, y);  // the target at the online argmax: 2 and 1
+  TdTargets(Q, Q_target, reward, discount, y);  // target values at the online argmax: 2 and 1
   EXPECT_FLOAT_EQ(y[0], 0.5F + 0.9F * 2);
   EXPECT_FLOAT_EQ(y[1], -1 + 0.81F * 1);
-  TdTargets(Q, Q_target, reward, std::vector<float>{0, 0}, y);  // terminated: the reward alone
+  TdTargets(Q, Q_target, reward, std::vector<float>{0, 0}, y);  // terminated: only the reward
   EXPECT_EQ(y, reward);
 }
 
@@ -79,7 +79,7 @@ TEST(Torques, AreEvenlySpacedFromLimitToLimit) {
             (std::vector<double>{-5, -3.75, -2.5, -1.25, 0, 1.25, 2.5, 3.75, 5}));
 }
 
-/// Loss of a minibatch as the papers write it, in plain code from the exported networks.
+/// Loss of a minibatch by the papers' formulas, in plain code with the agent's parameters.
 double LossByHand(const DqnConfig& config, std::span<const float> online,
                   std::span<const float> target, const Minibatch& batch) {
   const Network network(config.Shape(1, 3));
@@ -93,7 +93,7 @@ double LossByHand(const DqnConfig& config, std::span<const float> online,
   double loss = 0;
   for (size_t i = 0; i < batch.action.size(); ++i) {
     const auto chosen = ArgMax(q(config.double_q ? online : target, batch.next_obs[i]));
-    // The mirror image has the opposite observation, and the torques in reverse.
+    // The mirror image has the opposite observation, and its torques are in reverse order.
     const double next = config.mirror
                             ? q(target, -batch.next_obs[i])[static_cast<size_t>(2 - chosen)]
                             : q(target, batch.next_obs[i])[static_cast<size_t>(chosen)];
@@ -114,7 +114,7 @@ TEST_P(DqnVariants, LossIsThatOfThePapersAndFalls) {
   Dqn agent(config, ToyEnv::Spec(1), 1, pool);
   const Minibatch batch = RandomBatch(16);
   const double first = LossByHand(config, agent.online(), agent.target(), batch);
-  // Apart from the first update online and target differ.
+  // After the first update, the online and target parameters differ.
   for (int update = 0; update < 60; ++update) {
     agent.TakeMetrics();
     const double expected = LossByHand(config, agent.online(), agent.target(), batch);
@@ -130,7 +130,7 @@ INSTANTIATE_TEST_SUITE_P(Flags, DqnVariants,
 
 TEST(Dqn, CenteringShiftsAllValuesByAShareOfTheMeanError) {
   DqnConfig config = SmallDqn();
-  config.learning_rate = config.learning_rate_end = 0;  // the shift is all that happens
+  config.learning_rate = config.learning_rate_end = 0;  // only the shift changes values
   config.tau = 0;
   config.reward_centering = 0.5;
   config.mirror = false;
@@ -167,7 +167,7 @@ TEST(Dqn, CenteringShiftsAllValuesByAShareOfTheMeanError) {
   }
 }
 
-/// Trains on the toy environment for a number of steps of all environments.
+/// Trains on the toy environment for `steps` steps of all environments.
 void Walk(Dqn& agent, ToyEnv& env, int steps) {
   StepResult result(env.spec());
   std::vector<double> torques(static_cast<size_t>(env.num_envs()));
@@ -181,7 +181,8 @@ void Walk(Dqn& agent, ToyEnv& env, int steps) {
 }
 
 TEST(Dqn, WeightsMultiplyTheGradientOfTheirTransition) {
-  // A transition of weight 1/2, twice, equals one of weight 1; one of weight 0 changes nothing.
+  // A transition of weight 1/2, twice, equals one of weight 1. A transition of weight 0 changes
+  // nothing.
   DqnConfig config = SmallDqn();
   config.batch = 4;
   config.max_gradient_norm = 1e9;
@@ -238,7 +239,7 @@ TEST(Dqn, TheExportedPolicyIsAnAverageOfTheLearnedOnes) {
   config.policy_tau = 0.25;
   ThreadPool pool(1);
   Dqn agent(config, ToyEnv::Spec(1), 1, pool);
-  // The average begins with the first network.
+  // The average begins with the first parameters.
   std::vector<float> average(agent.online().begin(), agent.online().end());
   for (int update = 0; update < 3; ++update) {
     agent.Update(RandomBatch(16));
@@ -270,7 +271,7 @@ TEST(Dqn, TheAverageGrowsLongerAsTheLearningRateFalls) {
   Walk(agent, env, 200);
   EXPECT_DOUBLE_EQ(agent.learning_rate(), 1e-3);
   EXPECT_DOUBLE_EQ(agent.importance_exponent(), 1);
-  // At a tenth of the rate the average moves a tenth as fast: by 0.05 of the difference.
+  // At a tenth of the learning rate, the average moves a tenth as fast: by 0.05 of the difference.
   const std::vector<float> first(agent.online().begin(), agent.online().end());
   agent.Update(RandomBatch(16));
   std::vector<float> average(first);
@@ -313,8 +314,8 @@ TEST(Dqn, TargetCanBeCopiedPeriodically) {
 }
 
 TEST(Dqn, ATruncationBootstrapsFromItsOwnLastObservationAndATerminationFromNothing) {
-  // Through the whole path: environment → agent → memory. Outward steps leave ±5; an episode of
-  // ten steps is truncated. A start is drawn near 0, so a reset observation would show.
+  // Tests the whole path: environment → agent → memory. Outward steps leave ±5; ten steps truncate
+  // an episode. Starts are near 0, so an observation after a reset would be visible.
   DqnConfig config = SmallDqn();
   config.updates_per_step = 0;
   ThreadPool pool(1);
@@ -379,7 +380,7 @@ TEST(Dqn, LearnsToStayNearZero) {
 TEST(Dqn, TheNumberOfThreadsChangesNoBit) {
   DqnConfig config = SmallDqn();
   config.batch = 128;  // four slices
-  // Layers of 130 and 70 inputs are five tasks, their 19,000 parameters three chunks of Adam.
+  // Layers of 130 and 70 inputs have five tasks. Their 19,000 parameters make three chunks of Adam.
   config.hidden = {130};
   config.head = 70;
   std::vector<float> parameters[2];
@@ -402,7 +403,7 @@ TEST(Dqn, LoadedStateContinuesWithTheSameBits) {
   Dqn saved(config, ToyEnv::Spec(2), 1, pool);
   ToyEnv env(2);
   Walk(saved, env, 101);
-  Dqn loaded(config, ToyEnv::Spec(2), 99, pool);  // another seed, which loading must replace
+  Dqn loaded(config, ToyEnv::Spec(2), 99, pool);  // another seed; loading must replace its state
   ToyEnv loaded_env(2, 99);
   const auto state = [](Dqn& agent, ToyEnv& walk) {
     return [&](const Archive& archive) {

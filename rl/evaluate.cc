@@ -16,7 +16,7 @@ int64_t StepsIn(double seconds, const EnvSpec& spec) {
   return std::llround(seconds / spec.step_seconds);
 }
 
-/// Accumulates the results of one episode, step by step.
+/// Running results of one episode.
 class EpisodeTally {
  public:
   EpisodeTally(const Policy& policy, const EnvSpec& spec)
@@ -51,7 +51,7 @@ class EpisodeTally {
     }
   }
 
-  /// Adds environment `i` of the next step's result.
+  /// Adds the result of environment `i` in the next step.
   void Add(const StepResult& result, size_t i) {
     if (ended_) return;
     episode_.work += result.work[i];
@@ -67,9 +67,10 @@ class EpisodeTally {
     ended_ = result.terminated[i];
   }
 
-  /// The results; call once, at the end.
+  /// Returns the results. Call it once, at the end.
   EvaluationEpisode Finish() {
-    // Where the goal ends an episode, it is reached; else an end is a numerical blow-up.
+    // A termination means success if the task judges by return; otherwise it is a numerical
+    // blow-up.
     const int64_t goal_since = torques_.goal_since();
     const bool at_goal = goal_since >= 0 && (!ended_ || rule_.by_return());
     const bool settled = settled_since_ >= 0 && at_goal;
@@ -86,18 +87,18 @@ class EpisodeTally {
 
  private:
   EvaluationRule rule_;
-  double seconds_;  // of a step
+  double seconds_;  // length of a step
   int64_t steps_, return_steps_, hold_steps_, tilt_steps_;
   double gamma_, discount_;   // γ, γᵏ
-  std::vector<double> lean_;  // (bodies) rad, now
+  std::vector<double> lean_;  // (bodies) rad, current lean
   TorqueTally torques_;
   int64_t settled_since_ = -1;
-  bool ended_ = false;  // terminated: further steps belong to another episode
+  bool ended_ = false;  // terminated; further steps belong to another episode
   EvaluationEpisode episode_;
 };
 
-/// Sets the policy's value of each environment's present state, if it estimates one and its units
-/// are known.
+/// Sets the policy's value of each environment's current state, if the policy estimates values and
+/// their units are known.
 void EstimateValues(const Policy& policy, const VectorEnv& env, std::span<EpisodeTally> tallies) {
   const ValueUnits units = ValueUnitsOf(policy);
   if (units.gamma == 0 || policy.num_values() == 0) return;
@@ -109,7 +110,7 @@ void EstimateValues(const Policy& policy, const VectorEnv& env, std::span<Episod
   }
 }
 
-/// A figure of those episodes that have it.
+/// The values of a figure, from the episodes that have one.
 std::vector<double> ValuesOf(const EvaluationFigure& figure,
                              const std::vector<const EvaluationEpisode*>& episodes) {
   std::vector<double> values;
@@ -124,13 +125,14 @@ double MiddleOf(double value) { return value; }
 double MiddleOf(const Moments& moments) { return moments.mean; }
 double MiddleOf(const Quartiles& quartiles) { return quartiles.median; }
 
-/// Acts for all environments, in slices that a pool can share. Calls `before(i)` for each
-/// environment i first.
+/// Acts for all environments, in slices that a pool can share. First calls `before(i)` for each
+/// environment i.
 class SharedActing {
  public:
   SharedActing(const Policy& policy, int num_envs, ThreadPool* pool)
       : policy_(policy), pool_(pool) {
-    // Enough slices to level out threads of unequal speed; fewer rows are not worth another thread.
+    // Make enough slices to balance threads of unequal speed. Fewer rows are not worth another
+    // thread.
     constexpr int kSmallestSlice = 16;
     const int most = pool == nullptr ? 1 : 2 * pool->threads();
     const int slices = std::clamp(num_envs / kSmallestSlice, 1, most);
@@ -154,8 +156,8 @@ class SharedActing {
  private:
   const Policy& policy_;
   ThreadPool* pool_;
-  int size_;                                               // rows in a slice
-  std::vector<std::unique_ptr<Policy::Memory>> memories_;  // one for each slice
+  int size_;                                               // rows per slice
+  std::vector<std::unique_ptr<Policy::Memory>> memories_;  // one per slice
 };
 
 }  // namespace
@@ -294,7 +296,8 @@ std::vector<EvaluationEpisode> EvaluateEpisodes(const Policy& policy, VectorEnv&
     tuner.Run([&] {
       act(env.obs(), action, [&](int i) {
         if (k > 1) tallies[i].Add(result, i);
-        // Before the step: after the last one an environment that timed out has been reset.
+        // Read the lean before the step, because an environment that times out resets itself in its
+        // last step.
         tallies[i].SeeLean(env, i);
       });
       ended = std::ranges::all_of(tallies, &EpisodeTally::ended);

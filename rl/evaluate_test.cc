@@ -10,7 +10,7 @@
 namespace upswing {
 namespace {
 
-/// The parts of a policy on one observation x that always chooses the same torque.
+/// Parts of a policy that observes one number and always chooses the same torque.
 NetworkPolicyParts ConstantParts(double torque) {
   NetworkPolicyParts parts{ActionRule::kLevels, {1, {1}, 1}};
   parts.parameters.resize(Network(parts.shape).num_parameters());
@@ -19,7 +19,7 @@ NetworkPolicyParts ConstantParts(double torque) {
 }
 NetworkPolicy Constant(double torque) { return {ConstantParts(torque), {}}; }
 
-/// Environment i is at the goal from its goal_from[i]-th state on, but for a gap.
+/// Environment i is at the goal from its state goal_from[i] on, except in a gap.
 class ScriptedEnv : public ToyEnv {
  public:
   explicit ScriptedEnv(std::vector<int> goal_from, int gap = -1)
@@ -48,7 +48,8 @@ class ScriptedEnv : public ToyEnv {
 };
 
 TEST(Evaluate, SuccessNeedsAllOfTheLastTenSeconds) {
-  // State 500 is at t = 10 s: at the goal from there on is a success, from the next one on is not.
+  // State 500 is at t = 10 s. At the goal from there on is a success; from the next state on is
+  // not.
   ScriptedEnv env({500, 501, 100, 2000});
   const Evaluation e = Evaluate(Constant(-2), env);
   EXPECT_EQ(e.episodes, 4);
@@ -71,7 +72,7 @@ PolicyInfo Units(double gamma, double reward_scale) {
 
 TEST(Evaluate, ReportsTheValueAndTheReturnThatItEstimates) {
   NetworkPolicyParts parts = ConstantParts(1);
-  parts.parameters.back() = 3;  // the output's bias: Q = 3 everywhere
+  parts.parameters.back() = 3;  // bias of the output: Q = 3 everywhere
   const NetworkPolicy policy(parts, Units(0.5, 2));
   ScriptedEnv env({500, 501});
   const Evaluation e = Evaluate(policy, env);
@@ -126,7 +127,8 @@ TEST(Evaluate, TheSummaryIsThatOfTheEpisodes) {
   EXPECT_EQ(summary.swing_up_seconds.median, 6);
 }
 
-/// Environment 0 leans 1° and -2° from its state 150 on, environment 1 always 10°; torque as given.
+/// Environment 0 leans 1° and -2° from its state 150 on; environment 1 always leans 10°. Step sets
+/// the torques.
 class LeaningEnv : public ScriptedEnv {
  public:
   LeaningEnv() : ScriptedEnv({100, 100}) { spec_.bodies = 2; }
@@ -138,7 +140,8 @@ class LeaningEnv : public ScriptedEnv {
   void Step(Matrix<const double> action, StepResult& r) override {
     ScriptedEnv::Step(action, r);
     ++k;
-    // Until state 100 a change of 1 N·m at each step, from then on one of 0.5 every fifth.
+    // Up to state 100 the torque changes by 1 N·m at each step, later by 0.5 N·m at every fifth
+    // step.
     for (double& x : r.torque) x = k <= 100 ? k % 2 : 0.5 * (k / 5 % 2);
   }
   static constexpr double kDegree = std::numbers::pi / 180;
@@ -150,10 +153,10 @@ TEST(Evaluate, SettlingTimeTorqueVariationAndTilt) {
   const std::vector<EvaluationEpisode> episodes = EvaluateEpisodes(Constant(0), env);
   EXPECT_TRUE(episodes[0].success && episodes[1].success);
   EXPECT_DOUBLE_EQ(episodes[0].settling_seconds.value(), 3);
-  EXPECT_FALSE(episodes[1].settling_seconds);  // more than 9° off
+  EXPECT_FALSE(episodes[1].settling_seconds);  // the lean is more than 9°
   EXPECT_NEAR(episodes[0].tilt[0], env.kDegree, 1e-12);
   EXPECT_NEAR(episodes[0].tilt[1], -2 * env.kDegree, 1e-12);
-  // 99 changes of 1 N·m, then one of 0.5 at each of 105, 110, …, 1000: 180 of them in 18 s.
+  // 99 changes of 1 N·m, then changes of 0.5 N·m at 105, 110, …, 1000: 180 of them in 18 s.
   EXPECT_DOUBLE_EQ(episodes[0].torque_variation, (99 + 180 * 0.5) / 20);
   EXPECT_DOUBLE_EQ(episodes[0].goal_variation, 180 * 0.5 / 18);
   EXPECT_DOUBLE_EQ(episodes[0].goal_changes, 10);
@@ -162,7 +165,7 @@ TEST(Evaluate, SettlingTimeTorqueVariationAndTilt) {
   EXPECT_EQ(e.settled, 1);
   EXPECT_DOUBLE_EQ(e.settling_seconds.median, 3);
   ASSERT_EQ(e.tilt.size(), 2U);
-  EXPECT_NEAR(e.tilt[1].mean, env.kDegree, 1e-12);  // of 2° and 0°
+  EXPECT_NEAR(e.tilt[1].mean, env.kDegree, 1e-12);  // mean of 2° and 0°
   EXPECT_DOUBLE_EQ(e.goal_changes.mean, 10);
 }
 
@@ -173,7 +176,7 @@ TEST(Evaluate, AStretchAtTheGoalCountsItsOwnChangesOnly) {
   EXPECT_TRUE(Evaluate(Constant(1), whole).tilt.empty());  // the task has no bodies
 }
 
-/// A dueling policy on one observation whose torque changes often with it.
+/// A dueling policy of one observation; its torque often changes with the observation.
 NetworkPolicy Fickle() {
   NetworkPolicyParts parts{ActionRule::kLevels, {1, {32, 32}, 9, true, Activation::kRelu, 16}};
   const Network network(parts.shape);

@@ -30,7 +30,7 @@ void NStep::Push(int env, std::span<const float> obs, std::span<const float> act
   std::ranges::copy(action, waiting_action.begin() + static_cast<ptrdiff_t>(last * action_size_));
   waiting_reward[last] = reward;
 
-  // A full window emits its oldest step; the end of an episode emits all that wait.
+  // A full window emits its oldest step. The end of an episode emits all waiting steps.
   const bool done = terminated || truncated;
   auto k = static_cast<size_t>(count_[e]);
   size_t first = 0;
@@ -43,7 +43,7 @@ void NStep::Push(int env, std::span<const float> obs, std::span<const float> act
           static_cast<float>(discount)});
   }
 
-  // The steps that still wait move to the front.
+  // Move the steps that still wait to the front.
   count_[e] = static_cast<int64_t>(k);
   if (first == 0) return;
   std::ranges::copy(waiting_obs.subspan(first * obs_size_), waiting_obs.begin());

@@ -10,13 +10,13 @@
 namespace upswing {
 
 /// Joins the steps of each environment into transitions over n steps (Sutton, 1988; Mnih et al.,
-/// 2016, Section 4). At the end of an episode the shorter rest is emitted too, each transition
-/// with the γᵏ of its true length k.
+/// 2016, Section 4). At the end of an episode, the last steps become shorter transitions. Each
+/// transition has the discount γᵏ of its true length k.
 class NStep {
  public:
   NStep(int num_envs, int n, double gamma, int obs_size, ActionSpace actions);
 
-  /// Adds one step of environment `env` and hands every transition that it completes to `emit`.
+  /// Adds one step of environment `env` and calls `emit` for every transition that is now complete.
   void Push(int env, std::span<const float> obs, std::span<const float> action, double reward,
             std::span<const float> next_obs, bool terminated, bool truncated,
             const std::function<void(const Transition&)>& emit);

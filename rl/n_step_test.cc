@@ -39,7 +39,8 @@ TEST(NStep, OneStepPassesThrough) {
 
 TEST(NStep, ThreeStepsAndTheShorterRestAtATruncation) {
   // γ = 0.5, rewards 1, 2, 4, 8. Full windows: 1 + 2/2 + 4/4 = 3 and 2 + 4/2 + 8/4 = 6, both with
-  // γ³. Tails: 4 + 8/2 = 8 with γ², 8 with γ; all bootstrap from the last observation.
+  // γ³. Tails: 4 + 8/2 = 8 with γ², and 8 with γ. The tails and the last window bootstrap from the
+  // last observation.
   NStep n_step(1, 3, 0.5, 1, kNine);
   std::vector<Emitted> out;
   for (int i = 0; i < 3; ++i) PushStep(n_step, 0, i, false, false, out);

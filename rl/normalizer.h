@@ -9,17 +9,17 @@
 
 namespace upswing {
 
-/// Running mean and standard deviation of each observation (D), of all that were ever added.
-/// Before the first addition it changes nothing.
+/// Running mean and standard deviation of each observation (D), over all added observations. Before
+/// the first addition, normalisation changes nothing.
 class Normalizer {
  public:
-  /// The smallest standard deviation that counts, in the unit of an observation: one that hardly
-  /// changed so far is not blown up.
+  /// Lower limit of the standard deviation, in the unit of an observation. It keeps small an
+  /// observation that has hardly changed so far.
   static constexpr double kLeastDeviation = 0.01;
 
   explicit Normalizer(int obs_size);
 
-  /// Adds observations (rows × D), by the pairwise update of Chan et al. (1983).
+  /// Adds observations (rows × D) by the pairwise update of Chan et al. (1983).
   void Add(Matrix<const float> obs);
 
   /// normal (D) = (obs - mean) / deviation.
@@ -35,7 +35,7 @@ class Normalizer {
   void State(const Archive& archive);
 
  private:
-  /// Writes what Apply uses.
+  /// Updates center_ and scale_ for Apply.
   void Update();
 
   int64_t count_ = 0;

@@ -47,7 +47,7 @@ TEST(Normalizer, ChangesNothingAtFirstAndDoesNotBlowUpAConstant) {
   const std::vector<float> constant{2, 2, 2};
   normalizer.Add({constant.data(), 3, 1});
   normalizer.Apply(obs, normal);
-  EXPECT_NEAR(normal[0], 100, 1e-3);  // 1 over the least deviation
+  EXPECT_NEAR(normal[0], 100, 1e-3);  // 1 divided by the least deviation
 }
 
 TEST(Normalizer, LoadedStatisticsAreTheSaved) {

@@ -8,7 +8,7 @@
 
 namespace upswing {
 
-/// Settings that all agents with a replay memory have.
+/// Settings of all agents with a replay memory.
 struct OffPolicyConfig {
   double gamma = 0.99;
   int64_t n_step = 3;
@@ -24,7 +24,7 @@ struct OffPolicyConfig {
   int64_t learning_rate_steps = 250000;
   double max_gradient_norm = 10;
 
-  // The parts of AgentConfig's functions that are about them.
+  // The parts of AgentConfig's functions that concern these settings.
   void Describe(Options& options);
   void Check() const;
   std::vector<std::string> Warnings(int64_t steps) const;

@@ -17,14 +17,14 @@
 namespace upswing {
 namespace {
 
-constexpr int kActRows = 32;           // environments that act in one task
+constexpr int kActRows = 32;           // environments per acting task
 constexpr double kAdamEpsilon = 1e-5;  // Andrychowicz et al. (2021)
-constexpr double kOutputGain = 0.01;   // of the actor's output layer: it begins near 0
-constexpr double kRateStep = 1.5;      // by which the KL target changes the learning rate
+constexpr double kOutputGain = 0.01;   // gain of the actor's output layer: actions begin near 0
+constexpr double kRateStep = 1.5;      // factor by which the KL target changes the learning rate
 
 int Blocks(int num_envs) { return (num_envs + kActRows - 1) / kActRows; }
 
-/// The settings, if they fit such a task. Throws BadInput.
+/// The settings if they fit the task. Throws BadInput if they do not.
 PpoConfig Checked(const PpoConfig& config, const EnvSpec& spec) {
   config.CheckBatch(spec.num_envs);
   if (config.discrete() && spec.action_size() != 1) {
@@ -131,7 +131,7 @@ void Ppo::Sample(RowRange rows, Matrix<const float> outputs, Rng& rng, Matrix<do
       const DiagonalGaussian<float> policy{outputs.row(i), log_std_, std_};
       policy.Sample(rng, stored.row(i));
       log_prob[i] = policy.LogProb(stored.row(i));
-      // The environment gets what is within the limit; π speaks of what was drawn.
+      // The environment gets the clamped action. π refers to the action as drawn.
       for (int k = 0; k < stored.cols(); ++k) {
         action(i, k) = limit_[k] * std::clamp(stored(i, k), -1.0F, 1.0F);
       }
@@ -162,7 +162,8 @@ void Ppo::Estimate() {
   const int T = static_cast<int>(config_.horizon), N = rollout_.num_envs();
   Values(rollout_.all_obs(), value_);
 
-  // The successor's value is that of the next row, but where an episode or the rollout ends.
+  // The successor's value is the value of the next row, except where an episode or the rollout
+  // ends.
   const Matrix<const uint8_t> terminated = rollout_.terminated(), truncated = rollout_.truncated();
   std::vector<int> ends;
   std::vector<float> end_obs;
@@ -198,7 +199,7 @@ void Ppo::Learn() {
   Estimate();
   double kl = 0;
   for (int64_t epoch = 0; epoch < config_.epochs; ++epoch) {
-    // A whole epoch, shuffled (Fisher and Yates).
+    // Shuffle a whole epoch (Fisher and Yates).
     for (size_t i = order_.size(); i > 1; --i) {
       std::swap(order_[i - 1], order_[shuffle_rng_.Below(i)]);
     }
@@ -210,7 +211,8 @@ void Ppo::Learn() {
     kl = (report_.kl - before) * static_cast<double>(B_) / static_cast<double>(order_.size());
   }
   AdaptRate(kl);
-  // From the next rollout on: this one's probabilities, old and new, were of the same statistics.
+  // Update the statistics after the epochs, because the old and new probabilities of a rollout need
+  // the same statistics.
   if (config_.normalize) normalizer_.Add(rollout_.all_obs());
   rollout_.Clear();
 }

@@ -23,12 +23,13 @@
 /// N environments, T steps of a rollout, B batch size, D observation size.
 namespace upswing {
 
-/// A PPO agent for N environments: rollouts of T steps each, from each of which it learns in a few
-/// epochs of shuffled minibatches.
+/// A PPO agent for N environments. It learns from rollouts of T steps, each in a few epochs of
+/// shuffled minibatches.
 class Ppo : public Agent {
  public:
-  /// Throws BadInput if minibatches do not divide a rollout, if minibatches are to be mirrored but
-  /// the task has no mirror symmetry, and if actions are levels but the task has several torques.
+  /// Throws BadInput if minibatches do not divide a rollout, or if actions are levels but the task
+  /// has several torques. Also throws BadInput if the config mirrors minibatches but the task has
+  /// no mirror symmetry.
   Ppo(const PpoConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool& pool);
 
   void Act(Matrix<const float> obs, Matrix<double> action) override;
@@ -40,7 +41,7 @@ class Ppo : public Agent {
 
   int64_t steps() const override { return steps_; }
   int64_t updates() const override { return updates_; }
-  /// Of the actor: as scheduled, times what the KL target made of it.
+  /// Learning rate of the actor: the scheduled rate times the factor of the KL target.
   double learning_rate() const { return scheduled_rate() * rate_factor_; }
   std::span<const float> actor() const { return actor_.theta(); }
   std::span<const float> critic() const { return critic_.theta(); }
@@ -48,7 +49,7 @@ class Ppo : public Agent {
   const Normalizer& normalizer() const { return normalizer_; }
 
  private:
-  /// Sums over some rows of a minibatch, or means over minibatches.
+  /// Sums over some rows of a minibatch, or sums of minibatch means.
   struct Sums {
     double policy_loss = 0, value_loss = 0, entropy = 0, kl = 0, clipped = 0, norm = 0;
     AlignedVector<float> dlog_std;  // (A) gradient with respect to ln σ
@@ -56,52 +57,53 @@ class Ppo : public Agent {
     void Add(const Sums& other);
   };
 
-  /// Draws the actions of some environments, whose outputs the actor has written.
+  /// Draws the actions of some environments from the actor's outputs.
   void Sample(RowRange rows, Matrix<const float> outputs, Rng& rng, Matrix<double> action);
-  /// V (n) of observations (n × D).
+  /// Computes V (n) of observations (n × D).
   void Values(Matrix<const float> obs, std::span<float> values);
-  /// Advantages and targets of the rollout.
+  /// Computes advantages and targets of the rollout.
   void Estimate();
-  /// A gradient step on the rows of the rollout that `rows` (B) names.
+  /// Makes a gradient step on the given rows (B) of the rollout.
   void Update(std::span<const int64_t> rows);
-  /// Copies some rows of the minibatch from the rollout, with normalised observations.
+  /// Copies some rows of the minibatch from the rollout and normalises the observations.
   void Gather(std::span<const int64_t> from, RowRange rows);
   void BackwardActor(RowRange rows, Sums& sums);
   void BackwardCritic(RowRange rows, Sums& sums);
-  /// Steps of actor, ln σ and critic along their gradients.
+  /// Moves actor, ln σ and critic along their gradients.
   void Step(const Sums& sums);
-  /// Clears the metrics' sums if they have been reported. Until the next rollout has been
-  /// learned from, the last one's stand.
+  /// Clears the metric sums if they have been reported. Until the next rollout, reports repeat the
+  /// sums of the last one.
   void BeginSums();
   void CountUpdate(const Sums& sums);
-  /// What the KL target may make of the scheduled learning rate.
+  /// Range of the KL target's factor for the learning rate.
   static constexpr Bounds<double> kRateFactor{1e-3, 10};
-  /// The KL-adaptive learning rate, given KL(π_old ‖ π) of the last epoch.
+  /// Adapts the factor of the learning rate to KL(π_old ‖ π) of the last epoch.
   void AdaptRate(double kl);
-  /// What goes from `begin` to `end` as the learning rate does.
+  /// Current value of a setting that follows the schedule of the learning rate from `begin` to
+  /// `end`.
   double Now(double begin, double end) const {
     return Scheduled(begin, end, steps_, config_.learning_rate_steps);
   }
   double scheduled_rate() const { return Now(config_.learning_rate, config_.learning_rate_end); }
   int64_t updates_due() const;
-  /// ln σ within its range, and σ.
+  /// Clamps ln σ to its range and computes σ.
   void SetStd();
-  int outputs() const;  // of the actor
+  int outputs() const;  // number of outputs of the actor
   Matrix<float> BatchObs() { return {obs_.data(), B_, D_}; }
   Matrix<float> BatchActions() { return {action_.data(), B_, static_cast<int>(limit_.size())}; }
 
   PpoConfig config_;
   int D_, B_;
   std::vector<double> limit_;        // (A) N·m
-  std::vector<double> torques_;      // (K) N·m, of levels; else empty
+  std::vector<double> torques_;      // (K) N·m; empty for continuous actions
   std::vector<float> mirror_signs_;  // (D)
   ThreadPool& pool_;
   ThreadTuner update_threads_;
-  std::vector<Rng> explore_rngs_;  // of each block of environments
+  std::vector<Rng> explore_rngs_;  // one per block of environments
   Rng shuffle_rng_, mirror_rng_;
 
   TrainedNetwork actor_, critic_;
-  AlignedVector<float> log_std_, std_;  // (A) ln σ, σ, of continuous actions
+  AlignedVector<float> log_std_, std_;  // (A) ln σ, σ; for continuous actions
   Adam log_std_adam_;
   Normalizer normalizer_;
   double rate_factor_ = 1;
@@ -112,15 +114,15 @@ class Ppo : public Agent {
   Network::Activations act_activations_;                          // of N rows
   AlignedVector<float> act_obs_, act_outputs_;                    // (N × D), (N × outputs)
 
-  // Of a minibatch.
+  // Buffers of a minibatch.
   AlignedVector<float> obs_, action_;     // (B × D) normalised, (B × A)
-  AlignedVector<float> y_, dy_, V_, dV_;  // (B × outputs), (B), and the gradients
+  AlignedVector<float> y_, dy_, V_, dV_;  // outputs (B × outputs), V (B), and their gradients
   AlignedVector<float> old_log_prob_, old_value_, batch_advantage_, batch_target_;  // (B)
   std::vector<uint8_t> mirrored_;                                                   // (B)
-  std::vector<Sums> sums_;                                                          // by slice
+  std::vector<Sums> sums_;                                                          // one per slice
 
   int64_t steps_ = 0, updates_ = 0;
-  // Since the first update after TakeMetrics, each a sum of minibatches' means.
+  // Metric sums since the first update after TakeMetrics. Each adds up the means of minibatches.
   bool reported_ = false;
   Sums report_;
   double explained_variance_ = 0;

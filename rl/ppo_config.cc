@@ -76,9 +76,10 @@ AgentSize PpoConfig::Size(const EnvSpec& spec) const {
   const Network actor(Shape(D, discrete() ? static_cast<int>(levels) : A));
   const Network critic(Shape(D, 1));
   return {static_cast<double>(actor.num_parameters() + critic.num_parameters()),
-          // Parameters, gradient, Adam's two moments, and what products want.
+          // Arrays: parameters, gradient, Adam's two moments, and transposed weights.
           5, 3,
-          // Observation and successor, action, ln π, reward, V, V', advantage, target, order, ends.
+          // A step: observation and successor, action, ln π, reward, V, V', advantage, target,
+          // order, ends.
           2.0 * D + A + 9, static_cast<double>(horizon * spec.num_envs), static_cast<double>(batch),
           Widest(hidden), 2 * 3 * static_cast<double>(hidden.size()), "rollout", "--horizon"};
 }

@@ -35,12 +35,12 @@ struct PpoConfig : AgentConfig {
   std::string Text() const override;
   std::vector<std::string> Warnings(int64_t steps, int64_t num_envs) const override;
 
-  /// Whether actions are levels, not continuous.
+  /// Whether actions are discrete levels.
   bool discrete() const { return actions == "levels"; }
-  /// The shape of actor or critic, for observations of `obs_size` numbers.
+  /// The shape of the actor or critic, for observations of `obs_size` numbers.
   NetworkShape Shape(int obs_size, int outputs) const;
-  /// Throws BadInput unless minibatches divide a rollout of so many environments, of at most
-  /// 10,000,000 steps.
+  /// Throws BadInput unless minibatches divide a rollout of `num_envs` environments, and the
+  /// rollout has at most 10,000,000 steps.
   void CheckBatch(int64_t num_envs) const;
 };
 

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-/// The losses of proximal policy optimisation for one step of a rollout. r = π(a|s)/π_old(a|s), A
-/// advantage, V value, R its target. T = float to work, double to check gradients.
+/// Losses of proximal policy optimisation for one step of a rollout. r = π(a|s)/π_old(a|s), A
+/// advantage, V value, R its target. T = float for training, double for gradient checks.
 namespace upswing {
 
 template <typename T>
@@ -12,9 +12,9 @@ struct LossTerm {
   T gradient;  // with respect to ln π(a|s), or to V
 };
 
-/// -min(r A, clip(r, 1 - ε, 1 + ε) A), which is to be small (Schulman et al., 2017, Eq 7). There is
-/// no gradient where the clipped product is the smaller one: at r > 1 + ε with A > 0, at r < 1 - ε
-/// with A < 0.
+/// Policy loss -min(r A, clip(r, 1 - ε, 1 + ε) A), to be minimised (Schulman et al., 2017, Eq 7).
+/// It has no gradient where the clipped product is smaller: at r > 1 + ε with A > 0, and at r < 1 -
+/// ε with A < 0.
 template <typename T>
 LossTerm<T> ClippedLoss(T ratio, T advantage, T epsilon) {
   const T whole = ratio * advantage;
@@ -23,8 +23,8 @@ LossTerm<T> ClippedLoss(T ratio, T advantage, T epsilon) {
   return {-whole, -whole};  // dr/dln π = r
 }
 
-/// ½ max((V - R)², (clip(V, V_old ± ε) - R)²): a value gains nothing by going further than ε from
-/// what it was when the rollout began. With ε = 0 simply ½ (V - R)².
+/// Value loss ½ max((V - R)², (clip(V, V_old ± ε) - R)²). A value gains nothing by moving further
+/// than ε from its value at the beginning of the rollout. With ε = 0, the loss is ½ (V - R)².
 template <typename T>
 LossTerm<T> ValueLoss(T value, T old_value, T target, T epsilon) {
   const T error = value - target;
@@ -36,8 +36,8 @@ LossTerm<T> ValueLoss(T value, T old_value, T target, T epsilon) {
   return {clipped, 0};
 }
 
-/// (r - 1) - ln r: an estimate of KL(π_old ‖ π) from actions of π_old, never below 0 (Schulman,
-/// "Approximating KL Divergence", 2020).
+/// (r - 1) - ln r: an estimate of KL(π_old ‖ π) from actions of π_old. It is never below 0
+/// (Schulman, "Approximating KL Divergence", 2020).
 template <typename T>
 T KlEstimate(T ratio, T log_ratio) {
   return (ratio - 1) - log_ratio;

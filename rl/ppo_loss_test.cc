@@ -42,17 +42,19 @@ TEST(ClippedLoss, HasNoGradientWhereTheRatioHasGoneFarEnough) {
   const double far_up = 1.21, far_down = 0.79;
   EXPECT_EQ(ClippedLoss(far_up, 1.0, 0.2).gradient, 0);
   EXPECT_EQ(ClippedLoss(far_down, -1.0, 0.2).gradient, 0);
-  // A step back is never hindered.
+  // A step back towards the old policy always has a gradient.
   EXPECT_NEAR(ClippedLoss(far_up, -1.0, 0.2).gradient, 1.21, 1e-12);
   EXPECT_NEAR(ClippedLoss(far_down, 1.0, 0.2).gradient, -0.79, 1e-12);
 }
 
 TEST(ValueLoss, OfBothKindsAndItsGradient) {
-  // V, V_old, R; the clipped value is V_old ± 0.2.
+  // Arguments V, V_old, R. The clipped value is V_old ± 0.2.
   EXPECT_NEAR(ValueLoss(3.0, 1.0, 2.0, 0.0).loss, 0.5, 1e-12);
-  EXPECT_NEAR(ValueLoss(2.0, 1.0, 2.0, 0.2).loss, 0.32, 1e-12);  // of 1.2, though 2 is right
+  // Loss of the clipped value 1.2, although 2 is right.
+  EXPECT_NEAR(ValueLoss(2.0, 1.0, 2.0, 0.2).loss, 0.32, 1e-12);
   EXPECT_EQ(ValueLoss(2.0, 1.0, 2.0, 0.2).gradient, 0);
-  EXPECT_NEAR(ValueLoss(3.0, 1.0, 0.0, 0.2).loss, 4.5, 1e-12);  // further off than the clipped one
+  // Further off than the clipped value.
+  EXPECT_NEAR(ValueLoss(3.0, 1.0, 0.0, 0.2).loss, 4.5, 1e-12);
   for (const double epsilon : {0.0, 0.2}) {
     for (double value : {-1.0, 0.9, 1.1, 1.7, 3.0}) {
       for (const double target : {-2.0, 1.05, 1.6}) {
@@ -101,7 +103,7 @@ TEST(DiagonalGaussian, SamplesHaveItsMeanDeviationAndEntropy) {
   }
   EXPECT_NEAR(policy.Entropy(), -log_prob, 0.013);
   const double two_pi_e = 2 * std::numbers::pi * std::numbers::e;
-  EXPECT_NEAR(policy.Entropy(), std::log(two_pi_e), 1e-12);  // σ₁ σ₂ = 1
+  EXPECT_NEAR(policy.Entropy(), std::log(two_pi_e), 1e-12);  // because σ₁ σ₂ = 1
 }
 
 TEST(DiagonalGaussian, GradientsOfTheLossAreThoseOfFiniteDifferences) {
@@ -120,7 +122,7 @@ TEST(DiagonalGaussian, GradientsOfTheLossAreThoseOfFiniteDifferences) {
     loss(&term);
     ASSERT_NE(term.gradient, 0);
     const std::vector<double> std{std::exp(log_std[0]), std::exp(log_std[1])};
-    std::vector<double> dmean(2), dlog_std{10, 20};  // to which is added
+    std::vector<double> dmean(2), dlog_std{10, 20};  // Backward adds to dlog_std
     DiagonalGaussian<double>{mean, log_std, std}.Backward(u, term.gradient, -0.05, dmean, dlog_std);
     for (size_t k = 0; k < 2; ++k) {
       const auto f = [&] { return loss(nullptr); };
@@ -131,7 +133,7 @@ TEST(DiagonalGaussian, GradientsOfTheLossAreThoseOfFiniteDifferences) {
 }
 
 TEST(Categorical, SamplesFollowSoftmax) {
-  const std::vector<double> logits{1000, 1001, 998};  // large ones do not overflow
+  const std::vector<double> logits{1000, 1001, 998};  // large logits do not overflow
   std::vector<double> p(3);
   const Categorical<double> policy(logits, p);
   const double sum = 1 + std::exp(1) + std::exp(-2);
@@ -142,7 +144,7 @@ TEST(Categorical, SamplesFollowSoftmax) {
   double entropy = 0;
   for (size_t k = 0; k < 3; ++k) {
     EXPECT_NEAR(std::exp(policy.LogProb(k)), expected[k], 1e-12);
-    EXPECT_NEAR(share[k], expected[k], 0.007);  // over 4 standard errors
+    EXPECT_NEAR(share[k], expected[k], 0.007);  // more than 4 standard errors
     entropy -= expected[k] * std::log(expected[k]);
   }
   EXPECT_NEAR(policy.Entropy(), entropy, 1e-12);

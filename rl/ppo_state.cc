@@ -1,4 +1,4 @@
-// What a PPO agent gives away: metrics, its policy, its state.
+// Metrics, exported policy and state of a PPO agent.
 #include <algorithm>
 #include <limits>
 #include <numeric>
@@ -11,8 +11,8 @@
 namespace upswing {
 namespace {
 
-/// Parameters that do to raw observations what `weights` do to normalised ones, in double:
-/// x̂ W + b = x (W / σ) + (b - (μ / σ) W), in the first layer.
+/// Parameters that act on raw observations as `weights` act on normalised observations, computed in
+/// double. In the first layer, x̂ W + b = x (W / σ) + (b - (μ / σ) W).
 AlignedVector<float> WithNormalizer(const Network& network, std::span<const float> weights,
                                     const Normalizer& normalizer) {
   AlignedVector<float> folded(weights.begin(),
@@ -35,8 +35,8 @@ AlignedVector<float> WithNormalizer(const Network& network, std::span<const floa
   return folded;
 }
 
-/// Parameters of an actor with outputs (μ, ln σ), whose ln σ are constants: no weights, and they
-/// are the biases. The output layer is the last one.
+/// Parameters of an actor with outputs (μ, ln σ). ln σ is constant: its weights are 0 and its
+/// biases are `log_std`. The output layer is the last layer.
 AlignedVector<float> WithLogStd(const Network& network, const AlignedVector<float>& weights,
                                 std::span<const float> log_std) {
   const ParameterBlock& W_block = network.blocks()[network.blocks().size() - 2];
@@ -119,7 +119,7 @@ void Ppo::State(const Archive& archive) {
                  config_.discrete() ? Bounds<float>{0, last_level} : Bounds<float>{-most, most},
                  config_.discrete());
 
-  // The order of one epoch is where the next begins to shuffle.
+  // The order must be a permutation; the next epoch shuffles it further.
   archive.Array("order", std::span(order_), {0, rollout_.size() - 1});
   std::vector<int64_t> sorted(order_);
   std::ranges::sort(sorted);

@@ -26,7 +26,7 @@ PpoConfig SmallPpo(const std::string& actions = "continuous") {
   return config;
 }
 
-/// Steps of all environments.
+/// Trains for `steps` steps of all environments.
 void Walk(Ppo& agent, VectorEnv& env, int steps) {
   StepResult result(env.spec());
   std::vector<double> torques(result.torque.size());
@@ -52,7 +52,7 @@ double ActionAt(const Ppo& agent, float x) {
   return action;
 }
 
-/// Episodes of one step from x = 1: the reward is -(a - 0.6)², largest at 0.6.
+/// Episodes of one step from x = 1. The reward -(a - 0.6)² is largest at 0.6.
 class Bandit : public ToyEnv {
  public:
   explicit Bandit(int num_envs) : ToyEnv(num_envs), x_(static_cast<size_t>(num_envs), 1.0F) {}
@@ -71,7 +71,7 @@ class Bandit : public ToyEnv {
   std::vector<float> x_;
 };
 
-/// Stands still with a reward of 1 at each step; each tenth truncates, or each terminates.
+/// Stands still with a reward of 1 per step. Every tenth step truncates, or every step terminates.
 class AlwaysOne : public ToyEnv {
  public:
   using ToyEnv::ToyEnv;
@@ -88,8 +88,9 @@ class PpoActions : public ::testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(Actions, PpoActions, ::testing::Values("continuous", "levels"));
 
 TEST_P(PpoActions, OnTheFirstMinibatchTheRatioIsOne) {
-  // One minibatch is a whole rollout and there is one epoch: π is still π_old. The statistics of
-  // the observations change after each rollout; were they not the same for both, KL would not be 0.
+  // The only minibatch is a whole rollout, so π is still π_old. The statistics of the observations
+  // change after each rollout. If old and new probabilities used different statistics, KL would not
+  // be 0.
   PpoConfig config = SmallPpo(GetParam());
   config.epochs = 1;
   config.batch = config.horizon * 4;
@@ -101,11 +102,11 @@ TEST_P(PpoActions, OnTheFirstMinibatchTheRatioIsOne) {
     const Metrics metrics = agent.TakeMetrics();
     EXPECT_EQ(Metric(metrics, "kl"), 0);
     EXPECT_EQ(Metric(metrics, "clip_share"), 0);
-    EXPECT_NEAR(Metric(metrics, "policy_loss"), 0, 1e-6);  // the mean of standardised advantages
+    EXPECT_NEAR(Metric(metrics, "policy_loss"), 0, 1e-6);  // mean of standardised advantages
     EXPECT_EQ(agent.updates(), rollout + 1);
     EXPECT_NE(agent.normalizer().deviation()[0], 1);
   }
-  // With a second epoch it moves.
+  // With a second epoch, the policy moves.
   config.epochs = 2;
   Ppo other(config, ToyEnv::Spec(4), 1, pool);
   Walk(other, env, 16);
@@ -123,7 +124,7 @@ TEST_P(PpoActions, FindsTheBestActionOfABandit) {
 }
 
 TEST_P(PpoActions, MirroringTeachesTheMirroredState) {
-  // x = -1 never occurs; by symmetry -0.6 is best there.
+  // x = -1 never occurs. By symmetry, -0.6 is best there.
   PpoConfig config = SmallPpo(GetParam());
   config.levels = 11;
   config.mirror = true;
@@ -148,8 +149,8 @@ TEST_P(PpoActions, LearnsToStayNearZero) {
 }
 
 TEST(Ppo, ATruncationHasAFutureAndATerminationHasNone) {
-  // A reward of 1 at each step: V = 1 / (1 - γ) = 10 if episodes are only cut off. Were the cut
-  // taken for an end, or the value of the next start for the future, V would be another.
+  // A reward of 1 per step: V = 1 / (1 - γ) = 10 if episodes are only truncated. V would differ if
+  // a truncation counted as a termination, or if the value of the next start counted as the future.
   PpoConfig config = SmallPpo();
   config.kl_target = 0;
   config.learning_rate = config.learning_rate_end = 1e-2;
@@ -164,7 +165,7 @@ TEST(Ppo, ATruncationHasAFutureAndATerminationHasNone) {
   policy->Values({&x, 1, 1}, {&value, 1, 1}, *policy->Start(1));
   EXPECT_NEAR(value, 10, 0.3);
 
-  // An end at each step: V is the reward of that step.
+  // Termination at each step: V is the reward of that step.
   Ppo ended(config, ToyEnv::Spec(8), 1, pool);
   env.ends = true;
   Walk(ended, env, 16 * 200);
@@ -174,7 +175,7 @@ TEST(Ppo, ATruncationHasAFutureAndATerminationHasNone) {
 }
 
 TEST_P(PpoActions, TheExportedPolicyIsTheAgentsMean) {
-  // Its network on normalised observations, without exploration.
+  // The exported policy is the actor's network on normalised observations, without exploration.
   PpoConfig config = SmallPpo(GetParam());
   ThreadPool pool(1);
   EnvSpec spec = ToyEnv::Spec(4);
@@ -213,8 +214,9 @@ TEST_P(PpoActions, TheExportedPolicyIsTheAgentsMean) {
 }
 
 TEST(Ppo, TheEnvironmentGetsTheClippedActionAndTheBufferTheRawOne) {
-  // σ = 5: most actions are beyond the limit. Were the clipped one stored, its probability under π
-  // would not be that of what was drawn, which KL on the first minibatch shows.
+  // With σ = 5, most actions exceed the limit. If the buffer stored clipped actions, their
+  // probability would differ from that of the drawn actions, and KL on the first minibatch would
+  // not be 0.
   PpoConfig config = SmallPpo();
   config.initial_std = 5;
   config.epochs = 1;
@@ -235,7 +237,7 @@ TEST(Ppo, TheEnvironmentGetsTheClippedActionAndTheBufferTheRawOne) {
     agent.Observe(result);
     agent.Learn();
   }
-  EXPECT_GT(clipped, 40);  // of 64; P(|u| > 1) = 0.84
+  EXPECT_GT(clipped, 40);  // 64 actions; P(|u| > 1) = 0.84
   EXPECT_EQ(Metric(agent.TakeMetrics(), "kl"), 0);
 }
 
@@ -278,13 +280,14 @@ TEST(Ppo, TheEntropyBonusRaisesTheDeviationToItsBoundAndEndsWithTheSchedule) {
   Bandit env(8);
   Walk(agent, env, 16 * 10);
   EXPECT_NEAR(Metric(agent.TakeMetrics(), "std"), 0.5, 1e-6);
-  Walk(agent, env, 16 * 130);  // 100 rollouts without a bonus: the best action is not drawn around
+  // 100 rollouts without a bonus: exploration around the best action shrinks
+  Walk(agent, env, 16 * 130);
   EXPECT_LT(Metric(agent.TakeMetrics(), "std"), 0.2);
 }
 
 TEST_P(PpoActions, TheNumberOfThreadsChangesNoBit) {
   PpoConfig config = SmallPpo(GetParam());
-  config.hidden = {130, 70};  // several tasks a layer, three chunks of Adam
+  config.hidden = {130, 70};  // several tasks per layer, three chunks of Adam
   config.batch = 128;
   config.mirror = true;
   std::vector<float> parameters[2];
@@ -302,12 +305,12 @@ TEST_P(PpoActions, LoadedStateContinuesWithTheSameBits) {
   PpoConfig config = SmallPpo(GetParam());
   config.mirror = true;
   config.value_clip = 0.2;
-  for (const int steps : {32, 41}) {  // between rollouts, and within one
+  for (const int steps : {32, 41}) {  // between two rollouts, and within one
     ThreadPool pool(1);
     Ppo saved(config, ToyEnv::Spec(2), 1, pool);
     ToyEnv env(2);
     Walk(saved, env, steps);
-    Ppo loaded(config, ToyEnv::Spec(2), 99, pool);  // another seed, which loading must replace
+    Ppo loaded(config, ToyEnv::Spec(2), 99, pool);  // another seed; loading must replace its state
     ToyEnv loaded_env(2, 99);
     const auto state = [](Ppo& agent, ToyEnv& walk) {
       return [&](const Archive& archive) {
@@ -340,8 +343,9 @@ TEST(Ppo, AStateThatIsNoneIsRefused) {
     Ppo other(config, ToyEnv::Spec(2), 1, pool);
     EXPECT_THROW(other.State(Archive::Loader(copy)), Error);
   };
-  refused([](Tensors& t) { t.AddScalar<int64_t>("steps", 38); });   // 40, of which 8 wait
-  refused([](Tensors& t) { t.AddScalar<int64_t>("updates", 7); });  // 8
+  // Expected 40: 32 and 8 that wait.
+  refused([](Tensors& t) { t.AddScalar<int64_t>("steps", 38); });
+  refused([](Tensors& t) { t.AddScalar<int64_t>("updates", 7); });  // expected 8
   refused([](Tensors& t) { t.AddScalar<int64_t>("rollout/filled", 16); });
   refused([](Tensors& t) {
     t.AddCopy<float>("rollout/action", std::vector<float>{0, 1, 2, 0, 1, 2, 0, 0.5F});
@@ -355,7 +359,7 @@ TEST(Ppo, AStateThatIsNoneIsRefused) {
 TEST(Ppo, SettingsThatDoNotFitAreRefused) {
   ThreadPool pool(1);
   PpoConfig config = SmallPpo();
-  config.batch = 24;  // of 16 × 4 = 64
+  config.batch = 24;  // does not divide 16 × 4 = 64
   try {
     const Ppo agent(config, ToyEnv::Spec(4), 1, pool);
     FAIL();

@@ -1,4 +1,4 @@
-// A gradient step of PPO. Symbols as in ppo.h.
+// A gradient step of PPO. Symbols: see rl/ppo.h.
 #include <algorithm>
 #include <cmath>
 
@@ -80,7 +80,7 @@ void Ppo::Gather(std::span<const int64_t> from, RowRange rows) {
     old_value_[i] = value_[place];
     batch_target_[i] = target_[place];
     if (!mirror) continue;
-    // The mirrored step was drawn as often as the step itself: it has the same π_old.
+    // The mirrored step has the same π_old, because it is as likely as the step itself.
     for (float& x : a.row(i)) x = config_.discrete() ? last_level - x : -x;
   }
 }

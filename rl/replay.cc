@@ -9,7 +9,7 @@
 namespace upswing {
 namespace {
 
-// (|TD error| + 1e-6)^α with α up to 1 and a TD error that is a float, with a margin for rounding.
+// Range of (|TD error| + 1e-6)^α for α up to 1 and a TD error in float, with a margin for rounding.
 constexpr Bounds<double> kPriorities{1e-7, 1e39};
 
 }  // namespace
@@ -74,10 +74,10 @@ Transition Replay::at(int64_t index) const {
 }
 
 void Replay::Gather(RowRange rows, Minibatch& batch) const {
-  // The memory is larger than any cache: prefetch all rows instead of waiting for each.
+  // Prefetch all rows instead of waiting for each, because the memory is larger than any cache.
   for (const int64_t index : Part(batch.index, rows)) {
     const float* row = rows_.data() + index * row_size();
-    constexpr size_t kLine = 16;  // floats in a line of the cache
+    constexpr size_t kLine = 16;  // floats in a cache line
     for (size_t at = 0; at < row_size() + kLine; at += kLine) {
       __builtin_prefetch(row + std::min(at, row_size() - 1));
     }
@@ -111,7 +111,7 @@ void Replay::SamplePrioritized(Rng& rng, double beta, ThreadPool& pool, Minibatc
     Gather(rows, batch);
   });
   for (const int64_t index : batch.index) smallest = std::min(smallest, priority(index));
-  // N and Σ p cancel in the ratio to the largest weight, that of the smallest priority.
+  // N and Σ p cancel in the ratio to the largest weight, which belongs to the smallest priority.
   for (size_t i = 0; i < B; ++i) {
     batch.weight[i] = static_cast<float>(std::pow(smallest / priority(batch.index[i]), beta));
   }
@@ -129,7 +129,7 @@ void Replay::State(const Archive& archive) {
   archive.Scalar("next", next_, {0, capacity_ - 1});
   archive.Vector("rows", rows_, static_cast<size_t>(capacity_) * row_size());
   archive.Check(rows_.size() % row_size() == 0, "rows", "whole transitions");
-  // Until the memory is full, the next place follows the last transition.
+  // Until the memory is full, the next place is the place after the last transition.
   const bool full = size() == capacity_;
   archive.Check(full || next_ == size(), "next", "the place after the last transition");
   if (priorities_) {

@@ -15,31 +15,31 @@
 
 namespace upswing {
 
-/// What an agent's actions are: so many numbers within bounds. A discrete agent has one, the number
-/// of the action.
+/// Description of an agent's actions: `size` numbers within bounds. A discrete action is one
+/// number, the index of the action.
 struct ActionSpace {
   int size = 1;  // A
   Bounds<float> bounds{-1, 1};
-  bool whole = false;  // integers alone
+  bool whole = false;  // whether only integers are allowed
 
-  /// The actions 0 … count - 1.
+  /// The discrete actions 0 … count - 1.
   static ActionSpace Discrete(size_t count) {
     return {1, {0, static_cast<float>(count - 1)}, true};
   }
-  /// Throws BadInput about the tensor `name` unless these (… × A) are such actions.
+  /// Throws BadInput about the tensor `name` unless all `actions` (… × A) are in this space.
   void Check(const Archive& archive, std::string_view name, std::span<const float> actions) const;
 };
 
-/// A transition over one or more steps, whose target is y = reward + discount · V(next_obs).
+/// A transition over one or more steps. Its target is y = reward + discount · V(next_obs).
 struct Transition {
   std::span<const float> obs;       // (D)
   std::span<const float> next_obs;  // (D)
   std::span<const float> action;    // (A)
-  float reward = 0;                 // Σ γᵏ r over its steps
-  float discount = 0;               // γ to the number of steps; 0 if the last one terminated
+  float reward = 0;                 // Σ γᵏ r over the steps
+  float discount = 0;               // γ to the number of steps; 0 if the last step terminated
 };
 
-/// A minibatch, gathered: row i of each array is one transition.
+/// A minibatch: row i of each array belongs to one transition.
 struct Minibatch {
   AlignedVector<float> obs, next_obs;     // (B × D)
   AlignedVector<float> action;            // (B × A)
@@ -51,16 +51,16 @@ struct Minibatch {
   int size() const { return static_cast<int>(reward.size()); }  // B
 };
 
-/// Mirrors a random half of a minibatch: observations are multiplied by `signs` (D), and an action
-/// moves to the other side of the middle of its bounds, where its torque has the opposite sign.
+/// Mirrors a random half of a minibatch. Observations are multiplied by `signs` (D). An action is
+/// reflected at the middle of its bounds, so that its torque changes sign.
 void MirrorHalf(Rng& rng, std::span<const float> signs, const ActionSpace& actions,
                 Minibatch& batch);
 
-/// Replay memory of the newest `capacity` transitions (Lin, 1992). One row of 2 D + A + 2 floats
-/// holds a whole transition, so that sampling one touches one place in memory; a million with D = 8
-/// and A = 1 take 76 MB. Memory is allocated as it fills.
+/// Replay memory of the newest `capacity` transitions (Lin, 1992). A row of 2 D + A + 2 floats
+/// holds a whole transition, so that sampling it touches one place in memory. A million transitions
+/// with D = 8 and A = 1 take 76 MB. Memory is allocated as it fills.
 ///
-/// It draws uniformly, or by priorities (proportional prioritisation; Schaul et al., 2016).
+/// Sampling is uniform, or by priorities (proportional prioritisation; Schaul et al., 2016).
 class Replay {
  public:
   Replay(int64_t capacity, int obs_size, ActionSpace actions, bool prioritized = false);
@@ -68,21 +68,21 @@ class Replay {
   int64_t size() const { return static_cast<int64_t>(rows_.size() / row_size()); }
   int64_t capacity() const { return capacity_; }
 
-  /// Adds a transition; a full memory drops its oldest one.
+  /// Adds a transition. A full memory drops its oldest transition.
   void Add(const Transition& transition);
 
-  /// Fills the minibatch with transitions drawn uniformly, with replacement; size() > 0.
+  /// Fills the minibatch with transitions drawn uniformly, with replacement. Needs size() > 0.
   void Sample(Rng& rng, Minibatch& batch) const;
 
   /// Draws transition i with P(i) = p_i / Σ p, one from each of B equal parts of the sum. Its
-  /// weight is (N · P(i))^-β, N = size(), over the largest of the minibatch (Section 3.4). `beta`
-  /// is β.
+  /// weight is (N · P(i))^-β with N = size(), divided by the largest such weight in the minibatch
+  /// (Section 3.4). `beta` is β.
   void SamplePrioritized(Rng& rng, double beta, ThreadPool& pool, Minibatch& batch) const;
 
-  /// Sets the priorities of the minibatch's transitions. Stored is p = (|TD error| + 1e-6)^α, the
-  /// paper's p^α (Section 3.3); `alpha` is α. A new transition has the largest so far.
+  /// Sets the priorities of the minibatch's transitions to p = (|TD error| + 1e-6)^α, the paper's
+  /// p^α (Section 3.3); `alpha` is α. A new transition gets the largest priority so far.
   void Prioritize(const Minibatch& batch, std::span<const float> td_error, double alpha);
-  /// p of the transition at a place below size(); only with prioritised replay.
+  /// Priority p of the transition at a place below size(). Only for prioritised replay.
   double priority(int64_t index) const { return priorities_->at(index); }
 
   /// The transition at a place below size().
@@ -94,7 +94,7 @@ class Replay {
  private:
   size_t row_size() const { return 2 * obs_size_ + action_size() + 2; }
   size_t action_size() const { return static_cast<size_t>(actions_.size); }  // A
-  /// Copies the transitions of batch.index into these rows of the minibatch.
+  /// Copies the transitions at batch.index into the given rows of the minibatch.
   void Gather(RowRange rows, Minibatch& batch) const;
 
   int64_t capacity_;
@@ -103,7 +103,7 @@ class Replay {
   int64_t next_ = 0;         // place of the next transition
   std::vector<float> rows_;  // (size × row_size): obs, next_obs, action, reward, discount
   std::optional<SumTree> priorities_;
-  double largest_priority_ = 1;  // so far
+  double largest_priority_ = 1;  // largest priority so far
 };
 
 }  // namespace upswing

@@ -12,7 +12,7 @@
 namespace upswing {
 namespace {
 
-/// Transition number i of two observations each.
+/// Transition number i, with two numbers per observation.
 struct Numbered {
   std::array<float, 2> obs, next_obs;
   float action;
@@ -74,7 +74,7 @@ TEST(Replay, DrawsByPriorityAndWeighsAsThePaperDoes) {
   ThreadPool pool(2);
   Replay replay(4, 2, kNine, true);
   for (int i = 0; i < 4; ++i) replay.Add(Numbered(i).transition);
-  // Before any update all are drawn with the same probability, and have weight 1.
+  // Before any update, all transitions have the same probability and weight 1.
   Rng rng(1, "replay test");
   Minibatch batch(4, 2);
   replay.SamplePrioritized(rng, 0.5, pool, batch);
@@ -111,7 +111,7 @@ TEST(Replay, ANewTransitionHasTheLargestPrioritySoFar) {
   batch.index = {0, 1, 2};
   replay.Prioritize(batch, std::vector<float>{0.1F, 8, 0.2F}, 1);
   replay.Prioritize(batch, std::vector<float>{0.1F, 0.3F, 0.2F}, 1);
-  replay.Add(Numbered(3).transition);  // in place of the oldest
+  replay.Add(Numbered(3).transition);  // replaces the oldest transition
   EXPECT_NEAR(replay.priority(0), 8, 1e-5);
   EXPECT_NEAR(replay.priority(1), 0.3, 1e-5);
 }

@@ -7,8 +7,8 @@
 namespace upswing {
 
 double FeatureRank(Matrix<const float> features) {
-  // XXᵀ has the same nonzero eigenvalues; its trace is Σ λ, the sum of its squared entries Σ λ².
-  // By columns, so that the products of a row with all rows before it advance together.
+  // XXᵀ has the same nonzero eigenvalues. Its trace is Σ λ, and the sum of its squared entries is Σ
+  // λ². A copy by columns lets the products of a row with all earlier rows advance together.
   const int rows = features.rows(), cols = features.cols();
   std::vector<float> columns(static_cast<size_t>(rows) * cols);
   for (int i = 0; i < rows; ++i) {
@@ -43,7 +43,7 @@ double DormantShare(Matrix<const float> features) {
 
 void AddFeatureMetrics(std::span<const float> features, int64_t batch, int64_t width,
                        Metrics& metrics) {
-  constexpr int64_t kMostRows = 256;  // enough of a large minibatch
+  constexpr int64_t kMostRows = 256;  // enough rows of a large minibatch
   const Matrix<const float> rows(features.data(), static_cast<int>(std::min(batch, kMostRows)),
                                  static_cast<int>(width));
   metrics.emplace_back("feature_rank", FeatureRank(rows));

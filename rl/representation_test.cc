@@ -20,7 +20,7 @@ TEST(FeatureRank, CountsDirections) {
 }
 
 TEST(DormantShare, CountsUnitsThatHardlyFire) {
-  // Means 1, 0.01, 0 and 2.99: the layer's mean is 1, so the threshold 0.025.
+  // The means are 1, 0.01, 0 and 2.99. The layer's mean is 1, so the threshold is 0.025.
   const std::vector<float> features{2, 0.02F, 0, 2.99F, /**/ 0, 0, 0, 2.99F};
   EXPECT_EQ(DormantShare({features.data(), 2, 4}), 0.5);
   const std::vector<float> none(8);

@@ -10,8 +10,8 @@
 
 namespace upswing {
 
-/// What N environments do in T steps: row t · N + i is step t of environment i. D: observation
-/// size, A: numbers of an action.
+/// T steps of N environments: row t · N + i is step t of environment i. D: observation size, A:
+/// numbers of an action.
 class RolloutBuffer {
  public:
   RolloutBuffer(int64_t steps, int num_envs, int obs_size, int action_size);
@@ -20,28 +20,29 @@ class RolloutBuffer {
   int64_t filled() const { return filled_; }  // steps so far
   bool full() const { return filled_ == steps_; }
   void Clear() { filled_ = 0; }
-  /// T · N
+  /// Number of rows when full: T · N.
   int64_t size() const { return steps_ * num_envs_; }
 
-  /// The place of the next step's observations (N × D), actions (N × A) and their ln π (N), which
-  /// are to be filled before Add.
+  /// Space for the next step: observations (N × D), actions (N × A) and their ln π (N). Fill it
+  /// before you call Add.
   Matrix<float> obs() { return Rows(obs_, obs_size_); }
   Matrix<float> action() { return Rows(action_, action_size_); }
   std::span<float> log_prob() { return Rows(log_prob_, 1).values(); }
 
-  /// The step's result; rewards are multiplied by `reward_scale`.
+  /// Adds the result of the step. Multiplies rewards by `reward_scale`.
   void Add(const StepResult& result, double reward_scale);
 
-  // All of it, once it is full.
-  Matrix<const float> all_obs() const { return All(obs_, obs_size_); }            // (T·N × D)
-  Matrix<const float> all_next_obs() const { return All(next_obs_, obs_size_); }  // of successors
+  // The whole rollout, once it is full.
+  Matrix<const float> all_obs() const { return All(obs_, obs_size_); }  // (T·N × D)
+  /// (T·N × D) true successors
+  Matrix<const float> all_next_obs() const { return All(next_obs_, obs_size_); }
   Matrix<const float> all_actions() const { return All(action_, action_size_); }  // (T·N × A)
   Matrix<const float> log_probs() const { return Steps(log_prob_); }              // (T × N)
   Matrix<const float> rewards() const { return Steps(reward_); }                  // (T × N)
   Matrix<const uint8_t> terminated() const { return Steps(terminated_); }         // (T × N)
   Matrix<const uint8_t> truncated() const { return Steps(truncated_); }           // (T × N)
 
-  /// Saves or loads the steps so far; actions are within `action_bounds`, whole numbers if
+  /// Saves or loads the steps so far. Actions must be within `action_bounds`, and integers if
   /// `whole`.
   void State(const Archive& archive, Bounds<float> action_bounds, bool whole);
 

@@ -23,15 +23,15 @@
 namespace upswing {
 
 /// Soft targets y (B) = r + discount · (min(Q1', Q2') - α ln π(a'|s')) with a' ~ π(s') (Eq 3 and
-/// 5). Over n steps the entropy enters at the last one only, and rewards in between are those of
-/// the policy that acted. discount is γⁿ, or 0 after a termination. All are (B).
+/// 5). All arrays are (B). The discount is γⁿ, or 0 after a termination. Over n steps, only the
+/// last step has an entropy term, and the rewards come from the policy that acted.
 void SoftTargets(std::span<const float> q1, std::span<const float> q2,
                  std::span<const float> log_prob, double alpha, std::span<const float> reward,
                  std::span<const float> discount, std::span<float> y);
 
-/// The gradient with respect to ln α of -ln α · (ln π + H), H the target entropy (Eq 18, with ln α
-/// for α): below 0, so that α rises, while the policy's entropy -ln π is below its target.
-/// ln α is kept within ±kMostLogAlpha.
+/// Gradient of -ln α · (ln π + H) with respect to ln α, where H is the target entropy (Eq 18, with
+/// ln α for α). It is below 0 while the policy's entropy -ln π is below H, so that α rises. ln α
+/// stays within ±kMostLogAlpha.
 inline double TemperatureGradient(double mean_log_prob, double target_entropy) {
   return -(mean_log_prob + target_entropy);
 }
@@ -41,7 +41,7 @@ inline constexpr float kMostLogAlpha = 20;
 /// An SAC agent for N environments.
 class Sac : public OffPolicyAgent {
  public:
-  /// Throws BadInput if minibatches are to be mirrored but the task has no mirror symmetry.
+  /// Throws BadInput if the config mirrors minibatches but the task has no mirror symmetry.
   Sac(const SacConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool& pool);
 
   void Act(Matrix<const float> obs, Matrix<double> action) override;
@@ -52,28 +52,28 @@ class Sac : public OffPolicyAgent {
   double alpha() const;
   std::span<const float> actor() const { return actor_.theta(); }
   std::span<const float> critic(size_t i) const { return critics_.at(i).network.theta(); }
-  /// One round on a given minibatch: a step of the critics and, each actor_period, of actor and
-  /// temperature.
+  /// Makes one update on the given minibatch: a step of the critics, and every actor_period updates
+  /// a step of actor and temperature.
   void Update(const Minibatch& batch) override;
 
  private:
   struct Critic {
     TrainedNetwork network;
-    AlignedVector<float> target;       // its parameters' Polyak average, (num_parameters)
-    AlignedVector<float> outputs, dy;  // (B × outputs) and the loss's gradient
-    AlignedVector<float> value, loss;  // (B), the loss times the transition's weight
+    AlignedVector<float> target;       // (num_parameters) Polyak average of the parameters
+    AlignedVector<float> outputs, dy;  // (B × outputs) outputs and the gradient of the loss
+    AlignedVector<float> value, loss;  // (B) value, and loss times the transition's weight
     AlignedVector<float> dinputs;      // (B × (D + A)) dQ/d(s, a), for the actor
   };
 
-  /// Components of actions that were drawn; see SquashSamples.
+  /// Action samples by component; see SquashSamples.
   struct Samples {
     AlignedVector<float> mean, log_std, epsilon, deviation, action, log_prob;
   };
 
-  /// Less what a change of the mean action costs; see smoothness.
+  /// The reward for learning, minus the penalty on changes of the mean action (smoothness).
   double RewardOf(const StepResult& result, size_t env) override;
-  /// Samples a ~ π(s) of some rows: fills samples_, and behind `inputs`' (B × (D + A))
-  /// observations the actions.
+  /// Samples a ~ π(s) for some rows. Writes samples_, log_prob_ and the rows (s, a) of `inputs` (B
+  /// × (D + A)).
   void SampleRows(Matrix<const float> obs, RowRange rows, Matrix<float> inputs);
   void CriticRows(const Minibatch& batch, RowRange rows);
   void ActorRows(const Minibatch& batch, RowRange rows);
@@ -82,11 +82,12 @@ class Sac : public OffPolicyAgent {
   void CenterCritics(const Minibatch& batch);
   void UpdateActor(const Minibatch& batch);
   void UpdateTemperature();
-  /// Q of some rows after their outputs: the output itself, or the mean of a categorical one.
+  /// Computes Q of some rows from the outputs: the output itself, or the mean of a categorical
+  /// output.
   void ValueRows(Critic& critic, RowRange rows) const;
-  /// Adds a minibatch to the metrics and writes td_error_.
+  /// Adds a minibatch to the metrics and sets td_error_.
   void CountMinibatch();
-  /// Fills samples_' noise.
+  /// Draws the noise of samples_.
   void DrawNoise();
   static size_t Size(int rows, int cols) { return static_cast<size_t>(rows) * cols; }
   size_t num_critics() const { return config_.twin ? 2 : 1; }
@@ -98,24 +99,24 @@ class Sac : public OffPolicyAgent {
   Rng noise_rng_;
 
   TrainedNetwork actor_;
-  AlignedVector<float> theta_policy_;  // Polyak average of the actor that is judged; see policy_tau
+  AlignedVector<float> theta_policy_;  // Polyak average of the actor that is evaluated (policy_tau)
   std::vector<Critic> critics_;        // one or two
   AlignedVector<float> log_alpha_;     // (1)
   Adam alpha_adam_;
 
-  // Of an update: B rows.
+  // Buffers of an update, B rows.
   AlignedVector<float> actor_outputs_, actor_dy_;  // (B × 2 A)
   Samples samples_;                                // (B × A)
   AlignedVector<float> log_prob_;                  // (B) ln π(a|s)
-  AlignedVector<float> inputs_, policy_inputs_;    // (B × (D + A)): s, a; s, a ~ π
+  AlignedVector<float> inputs_, policy_inputs_;    // (B × (D + A)) s, a; s, a ~ π
   AlignedVector<float> y_;                         // (B)
 
   Network::Activations act_activations_;
-  AlignedVector<float> act_outputs_;     // (N × 2 A) of the last Act
-  std::vector<float> mean_, last_mean_;  // (N × A) mean actions of this step and the last
+  AlignedVector<float> act_outputs_;     // (N × 2 A) outputs of the last Act
+  std::vector<float> mean_, last_mean_;  // (N × A) mean actions of this and the last step
   std::vector<int64_t> begins_;          // (N) 1 in the first step of an episode
 
-  // Sums since TakeMetrics.
+  // Metric sums since TakeMetrics.
   double entropy_sum_ = 0;
   int64_t report_actor_updates_ = 0;
 };

@@ -63,7 +63,8 @@ AgentSize SacConfig::Size(const EnvSpec& spec) const {
   const Network critic(Shape(D + A, static_cast<int>(std::max<int64_t>(1, bins))));
   return {static_cast<double>(actor.num_parameters()) +
               critics * static_cast<double>(critic.num_parameters()),
-          // Online, target or kept, gradient, Adam's two moments, and what products want.
+          // Arrays: online, target or kept parameters, gradient, Adam's two moments, and transposed
+          // weights.
           6, 4, 2.0 * D + A + 2, static_cast<double>(replay), static_cast<double>(batch),
           std::max(Widest(hidden), static_cast<double>(bins)),
           (1 + critics) * 3 * static_cast<double>(hidden.size())};

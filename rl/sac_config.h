@@ -9,7 +9,7 @@
 
 namespace upswing {
 
-/// Settings of the agent; see rl/sac.h.
+/// Settings of the SAC agent; see rl/sac.h.
 struct SacConfig : AgentConfig, OffPolicyConfig {
   SacConfig() { reward_centering = 0; }
   std::vector<int64_t> hidden = {256, 256};
@@ -34,7 +34,7 @@ struct SacConfig : AgentConfig, OffPolicyConfig {
   std::vector<std::string> Warnings(int64_t steps, int64_t num_envs) const override;
   bool HasSoftValues() const override { return entropy_reward; }
 
-  /// The shape of a network of this many inputs and outputs.
+  /// The shape of a network with `inputs` inputs and `outputs` outputs.
   NetworkShape Shape(int inputs, int outputs) const;
 };
 

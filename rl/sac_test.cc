@@ -44,7 +44,7 @@ Minibatch RandomBatch(int size) {
 
 std::vector<float> Copy(std::span<const float> values) { return {values.begin(), values.end()}; }
 
-/// Trains on an environment for a number of steps of all environments.
+/// Trains on an environment for `steps` steps of all environments.
 void Walk(Sac& agent, VectorEnv& env, int steps) {
   StepResult result(env.spec());
   std::vector<double> torques(static_cast<size_t>(env.num_envs()));
@@ -57,7 +57,7 @@ void Walk(Sac& agent, VectorEnv& env, int steps) {
   }
 }
 
-/// What the exported policy does at an observation.
+/// The action of the exported policy at an observation.
 double ActionAt(const Sac& agent, float x) {
   const auto policy = agent.ExportPolicy({});
   double action = 99;
@@ -66,7 +66,8 @@ double ActionAt(const Sac& agent, float x) {
 }
 
 TEST(SoftTargets, ByHand) {
-  // The smaller of both values, less α ln π; a discount of 0 (a termination) leaves the reward.
+  // Use the smaller of both values minus α ln π. A discount of 0 (a termination) leaves only the
+  // reward.
   const std::vector<float> q1{3, 1, 5}, q2{2, 4, 7}, log_prob{-1, 0.5F, 2};
   const std::vector<float> reward{1, 2, 3}, discount{0.9F, 0.81F, 0};
   std::vector<float> y(3);
@@ -77,8 +78,8 @@ TEST(SoftTargets, ByHand) {
 }
 
 TEST(Sac, CenteringFindsTheLevelOfValues) {
-  // With a reward of 1 in each step and γ = 0.9, the mean value is 10; entropy that counts as
-  // reward adds to it. Nothing but the shift moves the values.
+  // With a reward of 1 per step and γ = 0.9, the mean value is 10. Entropy that counts as reward
+  // adds to it. Only the shift moves the values.
   const auto level = [](bool entropy_reward) {
     SacConfig config = SmallSac();
     config.learning_rate = config.learning_rate_end = config.tau = 0;
@@ -101,7 +102,8 @@ TEST(Sac, CenteringFindsTheLevelOfValues) {
 }
 
 TEST(Temperature, RisesWhileEntropyIsBelowItsTarget) {
-  // Entropy is -ln π: 0.2 below the target of -1 at ln π = 1.2, above it at 0.5.
+  // Entropy is -ln π. At ln π = 1.2 it is 0.2 below the target of -1; at 0.5 it is above the
+  // target.
   EXPECT_LT(TemperatureGradient(1.2, -1), 0);
   EXPECT_GT(TemperatureGradient(0.5, -1), 0);
   EXPECT_EQ(TemperatureGradient(1, -1), 0);
@@ -132,7 +134,7 @@ TEST(Sac, AFixedTemperatureStays) {
   EXPECT_NEAR(agent.alpha(), 0.3, 1e-6);
 }
 
-/// Observations of 0, one step each, reward 1 - (a - 0.4)²: a bandit.
+/// A bandit: observations are 0, an episode has one step, and the reward is 1 - (a - 0.4)².
 class PeakBandit : public ToyEnv {
  public:
   explicit PeakBandit(int num_envs) : ToyEnv(num_envs) { SetStartNoise(0); }
@@ -169,7 +171,7 @@ TEST(Sac, FindsTheBestActionOfABandit) {
   }
 }
 
-/// A reward of 1 for ever; episodes are truncated, never terminated.
+/// A reward of 1 at every step. Episodes are truncated, never terminated.
 class Constant : public ToyEnv {
  public:
   explicit Constant(int num_envs) : ToyEnv(num_envs) { episode_steps = 3; }
@@ -180,7 +182,7 @@ class Constant : public ToyEnv {
 };
 
 TEST(Sac, AConstantRewardIsWorthItsSumForEver) {
-  // α = 0, so Q = 1 / (1 - γ): truncations must bootstrap.
+  // α = 0, so Q = 1 / (1 - γ) if truncations bootstrap.
   SacConfig config = SmallSac();
   config.tune_alpha = false;
   config.alpha = 0;
@@ -210,7 +212,7 @@ TEST(Sac, LearnsToStayNearZero) {
 }
 
 TEST(Sac, TheActorsStepLeavesTheCriticsAlone) {
-  // Two agents that differ in whether the actor learns have the same critics after one update.
+  // Two agents, one with an actor that learns, have the same critics after one update.
   SacConfig config = SmallSac();
   ThreadPool pool(1);
   config.actor_period = 1;
@@ -237,7 +239,7 @@ TEST(Sac, TheExportedPolicyIsTheActorsMeanAndItsCriticsValue) {
   const Network actor(config.Shape(1, 2)), critic(config.Shape(2, 1));
   auto a = actor.MakeActivations(1, false), c = critic.MakeActivations(1, false);
   const auto policy = agent.ExportPolicy({});
-  for (const float x : {-300.0F, -0.7F, 0.0F, 0.2F, 1e4F}) {  // saturated ones too
+  for (const float x : {-300.0F, -0.7F, 0.0F, 0.2F, 1e4F}) {  // includes saturated actions
     float outputs[2], q = 0, value = 0;
     actor.Forward(agent.actor(), {&x, 1, 1}, {0, 1}, a, {outputs, 1, 2});
     const double mean = std::tanh(double{outputs[0]});

@@ -12,10 +12,11 @@
 namespace upswing {
 namespace {
 
-/// Writes some rows of x into y, from this column on.
+/// Copies some rows of x into the columns of y from `column` on.
 void CopyRows(Matrix<const float> x, RowRange rows, int column, Matrix<float> y) {
   for (int i = rows.first; i < rows.first + rows.count; ++i) {
-    for (int k = 0; k < x.cols(); ++k) y(i, column + k) = x(i, k);  // few: no call is worth it
+    // Too few numbers for a call to copy.
+    for (int k = 0; k < x.cols(); ++k) y(i, column + k) = x(i, k);
   }
 }
 
@@ -37,7 +38,7 @@ void Sac::Update(const Minibatch& batch) {
 }
 
 void Sac::DrawNoise() {
-  // Both numbers of Box and Muller (1958) for two samples.
+  // Use both numbers of Box and Muller (1958), for two samples.
   AlignedVector<float>& epsilon = samples_.epsilon;
   for (size_t i = 0; i < epsilon.size(); i += 2) {
     const std::array<double, 2> pair = noise_rng_.NormalPair();
@@ -79,7 +80,7 @@ void Sac::ValueRows(Critic& critic, RowRange rows) const {
 void Sac::CriticRows(const Minibatch& batch, RowRange rows) {
   const Matrix<const float> s(batch.obs.data(), B_, D_), s_next(batch.next_obs.data(), B_, D_);
   const Matrix<float> sa(inputs_, B_, D_ + A_), next_sa(policy_inputs_, B_, D_ + A_);
-  // y = r + γⁿ (min Q'(s', a') - α ln π(a'|s')), a' ~ π(s'); without entropy_reward, α = 0
+  // y = r + γⁿ (min Q'(s', a') - α ln π(a'|s')), a' ~ π(s'); α = 0 without entropy_reward
   SampleRows(s_next, rows, next_sa);
   for (Critic& critic : critics_) {
     critic.network.Forward(critic.target, next_sa, rows, {critic.outputs, B_, bins_.outputs()});
@@ -89,7 +90,7 @@ void Sac::CriticRows(const Minibatch& batch, RowRange rows) {
               Part(log_prob_, rows), config_.entropy_reward ? alpha() : 0.0,
               Part(batch.reward, rows), Part(batch.discount, rows), Part(y_, rows));
 
-  // The gradient of the mean loss between Q(s, a) and y.
+  // Compute the gradient of the mean loss between Q(s, a) and y.
   CopyRows(s, rows, 0, sa);
   CopyRows({batch.action.data(), B_, A_}, rows, D_, sa);
   for (Critic& critic : critics_) {
@@ -139,7 +140,7 @@ void Sac::ActorRows(const Minibatch& batch, RowRange rows) {
     critic.network.Forward(sa, rows, {critic.outputs, B_, bins_.outputs()});
     ValueRows(critic, rows);
   }
-  // dQ/da of the critic whose value is smaller; nothing of the other one.
+  // Compute dQ/da of the critic with the smaller value. The other critic contributes nothing.
   for (Critic& critic : critics_) {
     const Critic& other = &critic == &critics_.front() ? critics_.back() : critics_.front();
     const Matrix<float> outputs(critic.outputs, B_, bins_.outputs());
@@ -151,7 +152,7 @@ void Sac::ActorRows(const Minibatch& batch, RowRange rows) {
     }
     critic.network.Backward(dy, rows, {critic.dinputs, B_, D_ + A_});
   }
-  // The gradient of the mean of α ln π(a|s) - min Q(s, a).
+  // Compute the gradient of the mean of α ln π(a|s) - min Q(s, a).
   const auto temperature = static_cast<float>(alpha());
   const Matrix<float> dy(actor_dy_, B_, 2 * A_);
   for (int i = rows.first; i < rows.first + rows.count; ++i) {
@@ -206,7 +207,7 @@ void Sac::CountMinibatch() {
       loss += critic.loss[i];
       td += std::abs(error);
       q += critic.value[i];
-      // A transition's priority is the mean of both.
+      // The priority uses the mean |TD error| of the critics.
       td_error_[i] += static_cast<float>(std::abs(error) / static_cast<double>(critics_.size()));
     }
   }

@@ -7,8 +7,8 @@
 
 namespace upswing {
 
-/// Writes p = softmax(x) and returns ln Σ exp(x), without overflow. T = float to work, double to
-/// check gradients.
+/// Writes p = softmax(x) and returns ln Σ exp(x), without overflow. T = float for training, double
+/// for gradient checks.
 template <typename T>
 T Softmax(std::span<const T> x, std::span<T> p) {
   const T largest = *std::ranges::max_element(x);

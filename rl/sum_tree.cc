@@ -20,7 +20,8 @@ void SumTree::Set(int64_t index, double value) {
 }
 
 void SumTree::Find(std::span<const double> masses, std::span<int64_t> indices) const {
-  // Some at a time, level by level: each step waits for memory, those of others do not.
+  // Search for several masses together, level by level. Each step waits for memory, and the waits
+  // then overlap.
   constexpr size_t kTogether = 16;
   for (size_t first = 0; first < masses.size(); first += kTogether) {
     const size_t count = std::min(kTogether, masses.size() - first);
@@ -31,13 +32,14 @@ void SumTree::Find(std::span<const double> masses, std::span<int64_t> indices) c
     for (size_t level = 1; level < leaves_; level *= 2) {
       for (size_t k = 0; k < kTogether; ++k) {
         node[k] *= 2;
-        // To the right, unless rounding alone leads there. Without a branch, as it could not be
-        // predicted.
+        // Go right, unless only rounding leads there. Use no branch, because the processor could
+        // not predict it.
         const double left = nodes_[node[k]];
         const uint64_t right = uint64_t{mass[k] >= left} & uint64_t{nodes_[node[k] + 1] > 0};
-        mass[k] -= std::bit_cast<double>(std::bit_cast<uint64_t>(left) & -right);  // or 0
+        // Subtracts left, or 0.
+        mass[k] -= std::bit_cast<double>(std::bit_cast<uint64_t>(left) & -right);
         node[k] += right;
-        // Its eight nodes three levels below share a line of the cache.
+        // The eight descendants three levels below share a cache line.
         __builtin_prefetch(nodes_.data() + std::min(8 * node[k], leaves_));
       }
     }

@@ -8,11 +8,11 @@
 
 namespace upswing {
 
-/// Numbers that are not negative, with a binary tree of their sums: setting one and finding where a
-/// partial sum is reached take O(log n) (Schaul et al., 2016, Appendix B.2.1).
+/// Numbers ≥ 0 with a binary tree of their sums. Setting a number and finding a partial sum take
+/// O(log n) (Schaul et al., 2016, Appendix B.2.1).
 ///
-/// Each sum is that of its two children, so that the same numbers give the same bits, regardless of
-/// the order in which they were set.
+/// Each sum is the sum of its two children. The same numbers therefore give the same bits in any
+/// order of setting them.
 class SumTree {
  public:
   /// A tree of `capacity` numbers, all 0.
@@ -22,8 +22,8 @@ class SumTree {
   double at(int64_t index) const { return nodes_[leaves_ + index]; }
   double total() const { return nodes_[1]; }
 
-  /// For each mass, below total(), the index at which the running sum of the numbers first exceeds
-  /// it. Never one whose number is 0.
+  /// For each mass, below total(), finds the index at which the running sum of the numbers first
+  /// exceeds the mass. Never finds an index whose number is 0.
   void Find(std::span<const double> masses, std::span<int64_t> indices) const;
 
   /// Saves or loads the first `count` numbers.

@@ -11,7 +11,7 @@
 namespace upswing {
 namespace {
 
-/// The index at which the running sum exceeds `mass`, by a scan over all numbers.
+/// The index at which the running sum exceeds `mass`, found by a scan over all numbers.
 int64_t FindSlowly(const std::vector<double>& values, double mass) {
   for (size_t i = 0; i < values.size(); ++i) {
     if (mass < values[i]) return static_cast<int64_t>(i);
@@ -44,7 +44,7 @@ TEST(SumTree, FindsWhatAScanFinds) {
     Rng rng(1, "sum tree", static_cast<uint64_t>(capacity));
     SumTree tree(capacity);
     std::vector<double> values(static_cast<size_t>(capacity));
-    // Whole numbers below 8, among them zeros: every sum is exact.
+    // Integers below 8, some of them 0: every sum is exact.
     for (int round = 0; round < 2000; ++round) {
       const uint64_t index = rng.Below(values.size());
       values[index] = static_cast<double>(rng.Below(8));
@@ -70,7 +70,7 @@ TEST(SumTree, FindsEachNumberAsOftenAsItIsLarge) {
 TEST(SumTree, RoundingNeverLeadsToAZero) {
   SumTree tree(8);
   for (int i = 0; i < 5; ++i) tree.Set(i, 0.1);
-  // A mass that is the total, which a product of random number and total may round to.
+  // A mass equal to the total: the product of a random number and the total can round to it.
   EXPECT_EQ(FindOne(tree, tree.total()), 4);
   EXPECT_EQ(FindOne(tree, 2 * tree.total()), 4);
 }

@@ -8,10 +8,10 @@
 
 #include "rl/agent.h"
 
-/// What tests of agents share.
+/// Helpers for tests of agents.
 namespace upswing {
 
-/// One of an agent's metrics. Fails the test if there is none of that name.
+/// The metric called `name`. Fails the test if there is none.
 inline double Metric(const Metrics& metrics, const std::string& name) {
   const auto found = std::ranges::find(metrics, name, &Metrics::value_type::first);
   EXPECT_NE(found, metrics.end()) << name;

@@ -5,8 +5,8 @@
 
 namespace upswing {
 
-/// So many torques, at least 2, evenly spaced from -limit to limit (N·m): a discrete agent's
-/// actions.
+/// Actions of a discrete agent: `count` torques (at least 2), evenly spaced from -torque_limit to
+/// torque_limit (N·m).
 inline std::vector<double> TorqueLevels(double torque_limit, int64_t count) {
   std::vector<double> levels;
   const auto intervals = static_cast<double>(count - 1);

@@ -7,9 +7,9 @@
 
 namespace upswing {
 
-/// A walk on a line, to test learners without physics: the position (one number, the observation)
-/// moves by the torque; the reward is 1 while it is within 0.5 of 0. Leaving ±5 terminates, ten
-/// steps truncate.
+/// A walk on a line, for tests of learners without physics. The observation is the position (one
+/// number). The torque moves the position, and the reward is 1 while it is within 0.5 of 0. Leaving
+/// ±5 terminates the episode; ten steps truncate it.
 class ToyEnv : public VectorEnv {
  public:
   explicit ToyEnv(int num_envs, uint64_t seed = 0)
@@ -17,7 +17,7 @@ class ToyEnv : public VectorEnv {
     spec_ = Spec(num_envs);
     for (float& x : x_) x = Start();
   }
-  /// What such environments are.
+  /// Description of toy environments.
   static EnvSpec Spec(int num_envs) {
     EnvSpec spec;
     spec.task = "toy";

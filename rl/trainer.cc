@@ -1,4 +1,4 @@
-// The training loop. N environments, K reward terms; steps are control steps over all environments.
+// The training loop. N environments, K reward terms. Steps are control steps over all environments.
 #include "rl/trainer.h"
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 namespace upswing {
 namespace {
 
-constexpr size_t kRecentEpisodes = 100;  // in the mean return that the progress line shows
+constexpr size_t kRecentEpisodes = 100;  // episodes in the mean return of the progress line
 constexpr double kMostSeconds = 1e12;    // more than any training lasts
 
 using Clock = std::chrono::steady_clock;
@@ -36,7 +36,7 @@ bool Trainer::Step() {
   TrainState& s = state_;
   const auto begin = Clock::now();
 
-  // One step of all environments, then the updates that are due.
+  // Make one step of all environments, then the updates that are due.
   const Matrix<double> action(action_, env_.num_envs(), env_.spec().action_size());
   env_.SetStartNoise(config.StartNoise(s.steps));
   agent_.Act(env_.obs(), action);
@@ -47,7 +47,7 @@ bool Trainer::Step() {
   s.steps += env_.num_envs();
   s.seconds += SecondsSince(begin);
 
-  // What is due at this step, as a multiple of its interval has been reached or passed.
+  // Do the work that is due: a multiple of its interval has been reached or passed.
   CountEpisodes();
   if (IsDue(config.log_every)) {
     const Metrics metrics = agent_.TakeMetrics();
@@ -89,7 +89,8 @@ void Trainer::Evaluate(bool scheduled) {
   const bool confirm = e.passed && matters && setup_.confirm;
   if (confirm) e = setup_.confirm(*policy, s.steps);
   s.last_success_rate = e.success_rate();
-  // Until the task is solved, the best policy's own figures come from the milder judge.
+  // Before the task is solved, the best result comes from the milder evaluation. A confirmed policy
+  // then replaces it without comparison.
   if (IsBest(e) || (confirm && !s.solved)) KeepAsBest(e);
   if (scheduled) CountStreak(e);
   for (TrainObserver* observer : observers_) observer->OnEvaluation(s, e);

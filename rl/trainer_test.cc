@@ -10,7 +10,7 @@
 namespace upswing {
 namespace {
 
-/// Small trainings on the toy environment, whose evaluations are scripted.
+/// Small trainings on the toy environment with scripted evaluations.
 class TrainerTest : public ::testing::Test, protected TrainObserver {
  protected:
   TrainerTest() {
@@ -24,7 +24,7 @@ class TrainerTest : public ::testing::Test, protected TrainObserver {
     dqn_.levels = 3;
   }
 
-  /// A training and all that it is made of.
+  /// A training and all of its parts.
   struct Parts {
     ThreadPool pool{1};
     ToyEnv env{4};
@@ -54,7 +54,7 @@ class TrainerTest : public ::testing::Test, protected TrainObserver {
         Evaluation e;
         e.episodes = 4;
         e.successes = confirmations_.at(confirmed_.size());
-        e.reward_sum.mean = 0.5;  // less than any other evaluation's
+        e.reward_sum.mean = 0.5;  // less than in any other evaluation
         e.passed = e.successes == 4;
         confirmed_.push_back(step);
         return e;
@@ -63,7 +63,7 @@ class TrainerTest : public ::testing::Test, protected TrainObserver {
     return {dqn_, std::move(setup), *this};
   }
 
-  /// Trains to the end; returns the state there.
+  /// Trains to the end and returns the final state.
   TrainState Run() {
     Parts parts = Make();
     while (parts.trainer.Step()) continue;
@@ -80,11 +80,12 @@ class TrainerTest : public ::testing::Test, protected TrainObserver {
 
   TrainConfig config_;
   DqnConfig dqn_;
-  std::vector<int64_t> scripted_;  // successes of 4, one for each evaluation
+  std::vector<int64_t> scripted_;  // successes out of 4, one per evaluation
   int evaluations_ = 0;
-  // Of the stricter judge, if there is one: successes of 4, and the steps at which it was asked.
+  // The stricter evaluation, if there is one: successes out of 4, and the steps at which it was
+  // called.
   std::vector<int64_t> confirmations_, confirmed_;
-  // What it was told.
+  // The calls that the observer received.
   std::vector<std::pair<int64_t, double>> episodes_;  // step and return
   std::vector<int64_t> metrics_, best_;               // steps
 };
@@ -94,7 +95,7 @@ TEST_F(TrainerTest, StopsWhenTwoEvaluationsInARowArePassed) {
   const TrainState state = Run();
   EXPECT_TRUE(state.solved);
   EXPECT_EQ(state.steps, 400);
-  EXPECT_EQ(state.streak_step, 300);  // the first of the two
+  EXPECT_EQ(state.streak_step, 300);  // first of the two passed evaluations
 }
 
 TEST_F(TrainerTest, AnUnscheduledFinalEvaluationDoesNotCount) {
@@ -128,7 +129,7 @@ TEST_F(TrainerTest, SolvedIsConfirmedOnceAndThatPolicyIsTheBest) {
   EXPECT_EQ(state.streak_step, 100);
   EXPECT_EQ(confirmed_, (std::vector<int64_t>{200}));
   EXPECT_EQ(state.best_step, 200);
-  EXPECT_EQ(state.best_return, 0.5);  // as the stricter judge has it
+  EXPECT_EQ(state.best_return, 0.5);  // from the stricter evaluation
   EXPECT_EQ(best_, (std::vector<int64_t>{100, 200}));
 }
 
@@ -184,7 +185,7 @@ TEST_F(TrainerTest, StoppedAndResumedEqualsNeverStopped) {
     saved = bytes(part.trainer);
   }
   EXPECT_EQ(episodes_, expected_episodes);
-  // All but the clock.
+  // Compare everything except the clock.
   const Tensors a = ReadSafetensors(bytes(whole.trainer), "whole");
   const Tensors b = ReadSafetensors(saved, "parts");
   for (const auto& [name, tensor] : a.all()) {

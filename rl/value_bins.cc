@@ -35,7 +35,7 @@ float ValueBins::Loss(std::span<const float> outputs, float target,
     gradient[0] = error;
     return error * error / 2;
   }
-  // In units of bins from the lower end; beyond a few standard deviations the histogram is empty.
+  // Measure in bins from the lower end. The histogram is empty beyond a few standard deviations.
   constexpr double kReach = 6 * kStdInBins;
   const double bins = count_;
   const double at = std::clamp((target - low_) / width_, 0.5, bins - 0.5);

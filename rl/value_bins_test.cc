@@ -29,7 +29,8 @@ TEST(ValueBins, WithoutBinsTheOutputIsTheValue) {
 }
 
 TEST(ValueBins, TheBestLogitsStandForTheTarget) {
-  // Cross-entropy is least where the softmax is the target's histogram, whose mean is the target.
+  // Cross-entropy is smallest where the softmax is the target's histogram. The mean of the
+  // histogram is the target.
   const ValueBins bins(40, -4, 16);
   for (const float target : {-2.0F, 0.3F, 7.77F, 13.0F}) {
     std::vector<float> logits(40), gradient(40);

@@ -23,7 +23,7 @@ ModelFile ReadModel(const std::string& path) {
   return model;
 }
 
-/// ParseConfig of a file in the folder of a run or a study, with the model in the same folder.
+/// Runs ParseConfig on a file in the folder of a run or a study. The model is in the same folder.
 Config ParseInFolder(const fs::path& file, const std::string& text,
                      const std::vector<FlagValue>& flags) {
   return ParseConfig(text, file.string(), flags, [&](const std::string& path, bool /*in_file*/) {
@@ -48,7 +48,7 @@ Config ReadRunConfig(const fs::path& run, const std::vector<FlagValue>& flags) {
   const std::string text = ReadOwnFile(file);
   std::vector<std::string> missing = MissingSettings(text, file.string(), false);
   if (missing.empty()) return ParseInFolder(file, text, flags);
-  constexpr size_t kMostNames = 6;  // that make a line which can still be read
+  constexpr size_t kMostNames = 6;  // more names make the line unreadable
   const size_t more = missing.size() - std::min(missing.size(), kMostNames);
   missing.resize(missing.size() - more);
   throw BadInput(Concat(file.string(), ": expected every setting of this version, got none of ",
@@ -74,7 +74,7 @@ std::string CompleteToml(Config config) {
 
 std::string SettingsMark(const Config& config) {
   Config own = config;
-  own.model.clear();  // the content of a model counts, not its path
+  own.model.clear();  // the model's content counts, not its path
   Checksum sum;
   const Options options = OptionsOf(own);
   for (const Option& option : options.all()) {

@@ -6,36 +6,38 @@
 
 #include "setup/config.h"
 
-/// Settings of trainings, and models, in files.
+/// Training settings and models in files.
 namespace upswing {
 
-/// ParseConfig of a configuration file (none if empty, standard input if `-`).
+/// Runs ParseConfig on a configuration file: an empty path means no file, `-` means standard input.
 Config BuildConfig(const std::filesystem::path& file, const std::vector<FlagValue>& flags);
 
-/// The settings of a run folder, changed by the flags. Throws BadInput, too, if the run's own file
-/// lacks one: that run is of another version, and today's default is not what it was made with.
+/// Reads the settings of a run folder and applies the flags. Also throws BadInput if the run's file
+/// lacks a setting. Such a run is from another version, and today's default may differ from the
+/// value it used.
 Config ReadRunConfig(const std::filesystem::path& run, const std::vector<FlagValue>& flags = {});
 
-/// The settings of a variant in a study's folder, a regular file. A model in it is the copy beside
-/// it. Throws BadInput.
+/// Reads the settings of a variant from a regular file in a study's folder. A model is the copy in
+/// the same folder. Throws BadInput.
 Config ReadSettings(const std::filesystem::path& file);
 
-/// Names the copy of a model file in the run's folder, wherever that lies, in place of the file.
+/// Changes the model's path to the name of its copy in the run's folder, which stays valid when the
+/// folder moves.
 void NameModelCopy(Config& config);
 
-/// Sets what differs in a run among many: it has one thread unless more are asked for, and its
-/// model lies beside it.
+/// Adapts the settings for one of many runs: one thread unless the user set a number, and the
+/// model's copy next to the run.
 void MakeReadyForMany(Config& config);
 
-/// ConfigToml with comments, for a file that may lie anywhere: the model's path is absolute.
+/// ConfigToml with comments, for a file in any place: the model's path is absolute.
 std::string CompleteToml(Config config);
 
-/// What identifies the settings of trainings, but for seed, steps and whether they stop when
-/// solved: a checksum.
+/// Checksum that identifies the settings of a training. It ignores seed, steps and whether the
+/// training stops when solved.
 std::string SettingsMark(const Config& config);
 
-/// The plant to try something on: `base`, or that of the model file if there is one, with the
-/// given changes ("mass2=1.2"). Reads the model into `mjcf`. Throws BadInput.
+/// The plant for a trial: `base`, or the plant of the model file if there is one, with the changes
+/// in `set` ("mass2=1.2"). Writes the model's text to `mjcf`. Throws BadInput.
 Plant ChangedPlant(const Plant& base, const std::string& model, const std::vector<std::string>& set,
                    std::string& mjcf);
 

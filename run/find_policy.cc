@@ -17,13 +17,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Which controller a setting is of.
+/// The controller that a setting belongs to.
 std::string SectionOf(const FlagValue& flag) {
   ControllerConfig config;
   return OptionsOf(config).Find(flag.name, FlagOf(flag.name)).front()->section;
 }
 
-/// Loads the policy of --swing-up. Throws BadInput that names the flag.
+/// Loads the policy for --swing-up. Throws BadInput that names the flag.
 LoadedPolicy SwingUpNamed(const std::string& name) {
   LoadedPolicy loaded;
   try {
@@ -36,7 +36,7 @@ LoadedPolicy SwingUpNamed(const std::string& name) {
                         ", which was trained on another model"));
 }
 
-/// Throws BadInput for settings of controllers that are not among the names.
+/// Throws BadInput if a setting belongs to no controller in `names`.
 void CheckSettings(const PolicyArguments& settings, const std::vector<std::string>& names) {
   const std::string got = names.empty() ? "none" : Join(names, ", ");
   if (settings.has_settings() && std::ranges::none_of(names, IsController)) {
@@ -149,7 +149,7 @@ LoadedPolicy ReadPolicy(const Tensors& file) {
 
 namespace {
 
-/// The last `parts` of a policy's path, of a run without the file.
+/// The last `parts` parts of a policy's path, without the file name for a run.
 std::string EndOfPath(const LoadedPolicy& loaded, int parts) {
   if (loaded.path.empty()) return loaded.name;
   const fs::path path = loaded.path;

@@ -10,24 +10,24 @@
 
 namespace upswing {
 
-/// What a finished run of many leaves in a file of its own, seedN.done, by which other processes
-/// know that it is done.
+/// Result file seedN.done of a finished run of a study. Other processes recognise by it that the
+/// run is done.
 struct FinishedRun {
-  TrainState state{0, 0};  // at its end; the running episodes are not in the file
-  std::string settings;    // SettingsMark of what it was trained with
+  TrainState state{0, 0};  // final state, without the running episodes
+  std::string settings;    // SettingsMark of the training's settings
   int64_t planned_steps = 0;
   bool stop_when_solved = false;
   std::string version;
   RunConditions conditions;
   std::string evaluations;  // evals.csv
 
-  /// Writes it to a file.
+  /// Writes the result to a file.
   void Write(const std::filesystem::path& path) const;
-  /// Reads it; nothing if there is no such file. Throws BadInput if it is broken.
+  /// Reads a result file; nothing if it does not exist. Throws BadInput if it is broken.
   static std::optional<FinishedRun> Read(const std::filesystem::path& path);
 };
 
-/// Where a run stands by its checkpoint; nothing if there is no run. Throws BadInput.
+/// Reads the state of a run from its checkpoint; nothing if there is no run. Throws BadInput.
 std::optional<TrainState> ReadTrainState(const std::filesystem::path& run, const EnvSpec& spec);
 
 }  // namespace upswing

@@ -7,31 +7,31 @@
 
 namespace upswing {
 
-/// What every report of results says of a model that is not the built-in one.
+/// Description of a model that is not built in, for every report of results.
 struct ModelInfo {
-  std::string file;                      // as it was given; empty: it came with the policy
-  std::string content;                   // checksum of its text, 16 hexadecimal digits
-  std::vector<std::string> differences;  // as DifferencesFromBuiltIn has them
+  std::string file;     // path as the user gave it; empty: the model came with the policy
+  std::string content;  // checksum of its text, 16 hexadecimal digits
+  std::vector<std::string> differences;  // output of DifferencesFromBuiltIn
 
-  /// "FILE, not the built-in one (content 0123456789abcdef)".
+  /// Caption such as "FILE, not the built-in one (content 0123456789abcdef)".
   std::string Caption() const;
-  /// The same with the differences.
+  /// Caption with the differences.
   std::string Text() const;
-  /// The three as an object.
+  /// The three members as a JSON object.
   nlohmann::ordered_json Json() const;
 };
 
-/// Nothing for the built-in model (`mjcf` is empty). Throws BadInput if it is no double pendulum
-/// that the program can use.
+/// Describes a model; nothing for the built-in model (`mjcf` is empty). Throws BadInput if it is
+/// not a double pendulum that the program can use.
 std::optional<ModelInfo> InfoOfModel(const std::string& mjcf, const std::string& file);
 
-/// A title with the model's caption behind it, where there is one.
+/// A title, followed by the model's caption if there is one.
 std::string WithModel(const std::string& title, const std::optional<ModelInfo>& model);
 
-/// What ModelContent says of the built-in model.
+/// Result of ModelContent for the built-in model.
 inline constexpr const char* kBuiltIn = "built-in";
 
-/// The model's checksum, or kBuiltIn: distinguishes models in a table.
+/// Checksum of a model, or kBuiltIn. It distinguishes models in a table.
 std::string ModelContent(const std::string& mjcf);
 
 }  // namespace upswing

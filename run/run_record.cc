@@ -26,7 +26,7 @@ std::vector<EvaluationRow> ParseEvaluations(std::string text, const std::string&
       throw BadInput(Concat(where, ": expected a finished run, got a half-written last line ",
                             "(train --resume repairs it)"));
     }
-    text.erase(text.rfind('\n') + 1);  // everything if there is no whole line
+    text.erase(text.rfind('\n') + 1);  // erases everything if there is no complete line
   }
   const auto columns =
       ReadCsv(text,

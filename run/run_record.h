@@ -15,13 +15,13 @@ namespace upswing {
 /// An evaluation during a training: a row of evals.csv.
 struct EvaluationRow {
   int64_t step;         // control steps over all environments
-  double seconds;       // of training so far, evaluations excluded
-  double success_rate;  // share of the episodes
+  double seconds;       // training time so far, without evaluations
+  double success_rate;  // share of successful episodes
   double mean_return;
-  // Means over the episodes, in the task's unit of actions and that a second.
+  // Means over the episodes, in the task's unit of actions and in that unit per second.
   double rms_torque = 0, torque_variation = 0;
-  double upright_variation = kUnknown;  // of the episodes that succeed, from upright to their end
-  double value_ratio = kUnknown;        // ValueRatio
+  double upright_variation = kUnknown;  // of the successful episodes, from upright to their end
+  double value_ratio = kUnknown;        // see ValueRatio
 
   static constexpr double kUnknown = std::numeric_limits<double>::infinity();
 };
@@ -31,26 +31,28 @@ struct RunRecord {
   std::filesystem::path path;
   Config config;
   std::string settings;                         // SettingsMark
-  std::vector<EvaluationRow> evaluations = {};  // in the order of their steps
-  RunConditions conditions = {};                // what its times depend on
-  std::string variant = {};                     // its name within a study, or empty
+  std::vector<EvaluationRow> evaluations = {};  // in the order of steps
+  RunConditions conditions = {};                // conditions that its times depend on
+  std::string variant = {};                     // name within a study; empty outside of a study
 };
 
-/// Reads evals.csv of a run folder; a file that does not exist yet is an empty table. Throws
-/// BadInput with file and line, also if steps or seconds decrease. An incomplete last line, as a
-/// killed run leaves it, is an error, too, unless `may_be_cut`: then it is left out.
+/// Reads evals.csv of a run folder; a missing file is an empty table. Throws BadInput with file and
+/// line, also if steps or seconds decrease.
+///
+/// A killed run can leave an incomplete last line. It is an error unless `may_be_cut`, which drops
+/// it.
 std::vector<EvaluationRow> ReadEvaluations(const std::filesystem::path& run, bool may_be_cut);
 
 /// Parses the text of evals.csv; `where` is its path.
 std::vector<EvaluationRow> ParseEvaluations(std::string text, const std::string& where,
                                             bool may_be_cut);
 
-/// Where a run has solved its task: index of the first of the first two passed evaluations in a
-/// row; an unscheduled final evaluation does not count. Nothing if it has not
-/// solved it.
+/// Index of the evaluation at which a run has solved its task: the first of the first two passed
+/// evaluations in a row. An unscheduled final evaluation does not count. Nothing if the run has not
+/// solved the task.
 std::optional<size_t> SolvedAt(const RunRecord& run);
 
-/// Whether the run has ended: its budget is used up, or it was to stop once solved and is solved.
+/// Whether the run has ended: its budget is used up, or it has solved the task and stops then.
 bool Finished(const RunRecord& run);
 
 }  // namespace upswing

@@ -20,13 +20,13 @@ TEST(Runs, SolvedAtTheFirstOfTwoPerfectEvaluationsInARow) {
 TEST(Runs, AnUnscheduledFinalEvaluationDoesNotCount) {
   RunRecord run = MadeRun(1, {{0, 0}, {1, 0}, {1, 0}}, 2504);
   EXPECT_EQ(SolvedAt(run), 1U);
-  run.evaluations.back().step = 2504;  // the end of the budget, between two multiples
+  run.evaluations.back().step = 2504;  // end of the budget, between two multiples
   EXPECT_FALSE(SolvedAt(run));
   EXPECT_TRUE(Finished(run));
-  run.evaluations.back().step = 3000 + 4;  // the first multiple of 8 after 3,000
+  run.evaluations.back().step = 3000 + 4;  // first multiple of 8 after 3,000
   EXPECT_EQ(SolvedAt(run), 1U);
 
-  // A run that ended at step 2,504 and was resumed: that evaluation changes nothing.
+  // A run that ended at step 2,504 and was resumed: the evaluation at that step does not count.
   RunRecord resumed = MadeRun(1, {{0, 0}, {1, 0}, {0.5, 0}, {1, 0}}, 4000);
   resumed.evaluations[2].step = 2504;
   resumed.evaluations[3].step = 3000;

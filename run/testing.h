@@ -7,11 +7,11 @@
 
 #include "run/run_record.h"
 
-/// What tests of comparisons share.
+/// Helpers for tests of comparisons.
 namespace upswing {
 
-/// A run of 8 environments with an evaluation every 1,000 steps, each of which took a second; one
-/// evaluation for each pair of success rate and return.
+/// A run of 8 environments with an evaluation every 1,000 steps, each 1,000 steps taking one
+/// second. `evaluations` has the success rate and return of each evaluation.
 inline RunRecord MadeRun(int64_t seed, const std::vector<std::pair<double, double>>& evaluations,
                          int64_t budget = 5000, bool stop_when_solved = true) {
   RunRecord run{"run" + std::to_string(seed), Config(), ""};

@@ -4,7 +4,7 @@
 
 namespace upswing {
 
-/// This computer with all engines of the program, and so many threads.
+/// This computer with all engines of the program and `threads` threads.
 Host ThisHost(int threads);
 
 }  // namespace upswing

@@ -20,13 +20,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The time that this process has taken since the clock was made, of the wall and of its threads.
+/// Wall time and processor time of this process since the construction.
 class WorkClock {
  public:
   double seconds() const {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
   }
-  /// Share of the time in which `threads` threads were at work, about 0 to 1.
+  /// Share of the time in which `threads` threads worked, about 0 to 1.
   double busy(int threads) const {
     const double at_work = static_cast<double>(std::clock() - cpu_begin_) / CLOCKS_PER_SEC;
     return at_work / std::max(1e-9, seconds() * threads);
@@ -70,7 +70,7 @@ std::unique_ptr<TrainingRun> TrainingRun::Resume(const fs::path& path,
     throw BadInput(
         Concat("--resume ", path.string(), ": expected a run folder with a config.toml"));
   }
-  FolderLock lock(path);  // before anything of it is read
+  FolderLock lock(path);  // taken before the run is read
   Config config = ReadRunConfig(path, flags);
   NameModelCopy(config);
   std::unique_ptr<TrainingRun> run(new TrainingRun(path, config));

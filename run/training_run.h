@@ -11,32 +11,33 @@
 
 namespace upswing {
 
-/// What a user may request during a training.
+/// A user's request during a training.
 enum class TrainRequest { kGoOn, kCheckpoint, kStop };
 
-/// Whether one of the flags sets the number of steps.
+/// Whether a flag sets the number of steps.
 bool StepsGiven(const std::vector<FlagValue>& flags);
 
-/// A training in a run folder, into which it writes tables, log, checkpoints and the best policy.
+/// A training in a run folder. It writes tables, log, checkpoints and the best policy there.
 class TrainingRun : private TrainObserver {
  public:
-  /// A new run in the folder `out`, with its first checkpoint; if `out` is empty in
-  /// runs/AGENT-seedSEED, or with -2, -3, … where that is taken. Throws BadInput, with nothing
-  /// written.
+  /// Makes a new run in the folder `out`, with its first checkpoint. If `out` is empty, the folder
+  /// is runs/AGENT-seedSEED, or that with -2, -3, … if it exists. Throws BadInput and writes
+  /// nothing.
   static std::unique_ptr<TrainingRun> Make(const std::filesystem::path& out, Config config);
 
-  /// The run in a folder, with some settings changed. Throws BadInput, with nothing changed, if
-  /// another process works there, if the run is not whole, or if it is another version's.
+  /// Opens the run in a folder and changes some settings. Throws BadInput and changes nothing if
+  /// another process works there, or if the run is incomplete or from another version.
   static std::unique_ptr<TrainingRun> Resume(const std::filesystem::path& path,
                                              const std::vector<FlagValue>& flags = {});
 
   const Training& training() const { return training_; }
   const std::filesystem::path& path() const { return path_; }
 
-  /// Trains to the end, or until `poll`, called after each step, requests to stop; then the state
-  /// is on disk. The view observes each event after the folder has it, and must outlive the
-  /// training. To be called once. Returns whether the training has ended. Throws Failure that names
-  /// the step and the last complete checkpoint.
+  /// Trains to the end, or until `poll`, which is called after each step, requests a stop. The
+  /// state is then on disk. Returns whether the training has ended. Call it once.
+  ///
+  /// The view observes each event after the folder and must outlive the training. Throws Failure
+  /// that names the step and the last complete checkpoint.
   bool Train(TrainObserver& view, const std::function<TrainRequest()>& poll);
 
  private:

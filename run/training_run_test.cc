@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Small trainings in folders of their own.
+/// Small trainings, each in its own folder.
 class TrainingRunTest : public ::testing::Test {
  protected:
   static constexpr int64_t kNever = std::numeric_limits<int64_t>::max();
@@ -37,7 +37,7 @@ class TrainingRunTest : public ::testing::Test {
                             {"threads", "1"}});
   }
 
-  /// Trains a run until this step. Returns whether it has ended.
+  /// Trains a run until `step`. Returns whether it has ended.
   static bool TrainUntil(int64_t step, TrainingRun& run) {
     TrainObserver no_view;
     return run.Train(no_view, [&] {
@@ -46,7 +46,7 @@ class TrainingRunTest : public ::testing::Test {
     });
   }
 
-  /// Trains a run until this step, where it fails as on a full disk.
+  /// Trains a run until `step`, where it fails as on a full disk.
   static void FailAt(int64_t step, const std::string& why, TrainingRun& run) {
     TrainObserver no_view;
     run.Train(no_view, [&] {
@@ -55,7 +55,7 @@ class TrainingRunTest : public ::testing::Test {
     });
   }
 
-  /// Everything that does not depend on the clock.
+  /// Compares everything that does not depend on the clock.
   static void ExpectSame(const fs::path& a, const fs::path& b) {
     EXPECT_EQ(ReadFile(a / RunFolder::kPolicy), ReadFile(b / RunFolder::kPolicy));
     EXPECT_EQ(ReadTextFile(a / RunFolder::kEpisodes), ReadTextFile(b / RunFolder::kEpisodes));

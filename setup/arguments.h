@@ -5,20 +5,20 @@
 
 #include "core/options.h"
 
-/// What several commands, and the Python package's functions of these names, are told: each in one
-/// place, with its range and help.
+/// Arguments shared by several commands and by the Python functions of the same names. Each has its
+/// range and help in one place.
 namespace upswing {
 
-/// "seed", of `what`.
+/// Argument "seed" of `what`.
 void DescribeSeed(Options& o, int64_t* seed, const std::string& what);
 
-/// "threads", which ResolveThreads reads.
+/// Argument "threads", for ResolveThreads.
 void DescribeThreads(Options& o, int64_t* threads);
 
-/// "physics", which FindEngine reads.
+/// Argument "physics", for FindEngine.
 void DescribePhysics(Options& o, std::string* physics);
 
-/// "episodes" of an evaluation.
+/// Argument "episodes": number of episodes of an evaluation.
 void DescribeEvalEpisodes(Options& o, int64_t* episodes);
 
 }  // namespace upswing

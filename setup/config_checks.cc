@@ -10,7 +10,7 @@
 namespace upswing {
 namespace {
 
-/// Such as `1.5 GB`.
+/// Size as text, such as `1.5 GB`.
 std::string Gigabytes(double bytes) {
   const auto tenths = std::llround(1e-8 * bytes);
   return Concat(tenths / 10, ".", tenths % 10, " GB");
@@ -18,8 +18,8 @@ std::string Gigabytes(double bytes) {
 
 AgentSize SizeOfLearner(const Config& config) { return config.learner().Size(config.Spec()); }
 
-/// Throws BadInput for a setting of the double pendulum with another value than its default in a
-/// task without that setting.
+/// Throws BadInput if a setting of the double pendulum differs from its default in a task without
+/// that setting.
 void CheckTask(Config& config, const std::string& where) {
   if (HasPlant(config.task)) return;
   Config defaults;
@@ -45,7 +45,7 @@ void CheckSettings(Config& config, const std::string& where) {
 }
 
 std::vector<std::string> Warnings(const Config& config) {
-  // All environments step together: a training ends with the step that reaches its budget.
+  // All environments step together, so the last step can exceed the budget.
   const int64_t envs = config.train.envs;
   const int64_t steps = (config.train.steps + envs - 1) / envs * envs;
   std::vector<std::string> warnings = config.learner().Warnings(steps, envs);
@@ -60,7 +60,7 @@ TrainingSize SizeOf(const Config& config) {
   const AgentSize l = SizeOfLearner(config);
   const double replay = kFloat * l.transition * l.capacity;
   const double saved = kFloat * l.saved_arrays * l.parameters;
-  // The first checkpoint, without a replay memory, is in memory together with the training.
+  // The first checkpoint, without a replay memory, is in memory at the same time as the training.
   return {
       kFloat * (l.arrays * l.parameters + l.batch * l.widest * l.layers) + std::max(saved, replay),
       saved + replay};

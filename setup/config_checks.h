@@ -8,21 +8,21 @@
 
 namespace upswing {
 
-/// Throws BadInput that begins with `where` if settings, each of which is allowed, contradict each
-/// other, or do not exist in the task.
+/// Throws BadInput that begins with `where` if settings contradict each other, although each is in
+/// its range. Also throws it if a setting does not exist in the task.
 void CheckSettings(Config& config, const std::string& where);
 
-/// Settings that are allowed but hardly intended, because nothing would be learned: a line each.
+/// Warnings, one per line, about settings with which the agent would hardly learn.
 std::vector<std::string> Warnings(const Config& config);
 
 /// Approximate size of a training.
 struct TrainingSize {
-  double memory;      // bytes at most, with a full replay memory
-  double checkpoint;  // bytes of the file then
+  double memory;      // largest memory use, bytes: with a full replay memory
+  double checkpoint;  // size of the checkpoint file at that time, bytes
 };
 TrainingSize SizeOf(const Config& config);
 
-/// Throws BadInput if `runs` trainings at a time do not fit into so many bytes.
+/// Throws BadInput if `runs` simultaneous trainings do not fit into `available` bytes.
 void CheckMemory(const Config& config, int64_t available, int64_t runs = 1);
 
 }  // namespace upswing

@@ -22,7 +22,7 @@ const NamedAgent& FindAgent(const std::string& name, const std::string& where) {
 }
 
 /// A text setting that other settings depend on: its value in the last layer that sets it, and the
-/// place, for messages.
+/// place of that value for messages.
 struct EarlySetting {
   std::string value, where;
   bool in_file = false;
@@ -64,7 +64,8 @@ struct ChosenAgent {
   std::string algorithm;
 };
 
-/// Throws BadInput if there is no such agent, or if it has another algorithm than requested.
+/// Chooses the named agent. Throws BadInput if it does not exist or has another algorithm than
+/// requested.
 ChosenAgent ChooseAgent(const toml::table& table, const std::string& where,
                         const std::vector<FlagValue>& flags) {
   EarlySetting setting = FindEarly("train", "agent", table, where, flags);

@@ -21,7 +21,7 @@ struct Controller {
 
 using Made = std::shared_ptr<const Policy>;
 
-/// A swing-up by a law, which LQR catches.
+/// Makes a controller that swings up by a law and catches by LQR.
 Made WithCatch(const ControllerConfig& config, const std::string& kind, const std::string& what,
                const Options& settings, LawPolicy::Law law) {
   return std::make_shared<HybridPolicy>(
@@ -30,7 +30,7 @@ Made WithCatch(const ControllerConfig& config, const std::string& kind, const st
       config.plant);
 }
 
-/// Throws BadInput unless the motor is at joint 1, as these laws assume.
+/// Throws BadInput unless the motor is at joint 1, as these control laws assume.
 void ExpectPendubot(const char* kind, const Plant& plant) {
   if (plant.actuated_joint == 1) return;
   throw BadInput(

@@ -9,8 +9,8 @@
 namespace upswing {
 namespace {
 
-/// Throws BadInput unless its observations are those that this program makes of the double
-/// pendulum. Names are for people.
+/// Throws BadInput unless the policy's observations are those of this program's double pendulum.
+/// Names of observations are not compared, because they are only for people.
 void CheckObservation(const LoadedPolicy& loaded, const std::string& where) {
   const int inputs = loaded.policy->obs_size();
   const int remembered = inputs - kObservationSize - (loaded.identifies() ? kIdentifiedSize : 0);

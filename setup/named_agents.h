@@ -11,7 +11,7 @@ struct NamedAgent {
   std::string_view toml;
 };
 
-/// All of them, by name.
+/// All agents of configs/, sorted by name.
 std::span<const NamedAgent> EmbeddedAgents();
 
 }  // namespace upswing

@@ -10,36 +10,36 @@
 
 namespace upswing {
 
-/// Settings of environments of any task. Of the settings below, tasks other than the double
-/// pendulum take the number of environments and their random streams.
+/// Settings of environments of any task. Tasks other than the double pendulum use only the number
+/// of environments and their random streams.
 struct EnvConfig : PendulumEnvConfig {
   std::string task = kDoublePendulum;
 };
 
-/// What the program asks of a task.
+/// A task, as the program uses it.
 struct Task {
   const char* name;
   std::unique_ptr<VectorEnv> (*make)(const EnvConfig& config);
-  /// What `make`'s environments are, without making physics.
+  /// The EnvSpec of the environments of `make`, without making physics.
   EnvSpec (*spec)(const EnvConfig& config);
-  bool has_plant;           // with engine, sensors and curriculum: can be mapped, viewed, changed
-  const char* usual_start;  // of an episode that is no other's; null: a start of its own
+  bool has_plant;           // with engine, sensors, curriculum; can be mapped, viewed, changed
+  const char* usual_start;  // start of an episode that names none; null: the task draws one
 };
 
 /// The tasks' names, the default first.
 std::vector<std::string> TaskNames();
 
-/// The task of this name. Throws BadInput.
+/// The task called `name`. Throws BadInput if there is none.
 const Task& TaskNamed(std::string_view name);
 
 inline bool HasPlant(std::string_view task) { return TaskNamed(task).has_plant; }
 
-/// Throws BadInput as the task does.
+/// Makes the environments of a task. Throws BadInput as the task does.
 inline std::unique_ptr<VectorEnv> MakeEnv(const EnvConfig& config) {
   return TaskNamed(config.task).make(config);
 }
 
-/// What MakeEnv's environments are, without making them.
+/// The EnvSpec of the environments of MakeEnv, without making them.
 inline EnvSpec SpecOf(const EnvConfig& config) { return TaskNamed(config.task).spec(config); }
 
 }  // namespace upswing

@@ -8,13 +8,14 @@
 namespace upswing {
 namespace {
 
-/// A setting of an earlier version. Files may have it with today's built-in value.
+/// A setting that an earlier version had. Files may still contain it with the value that is now
+/// fixed.
 struct RemovedSetting {
   std::string_view section, name, value;
 };
 constexpr RemovedSetting kRemoved[] = {{"network", "precision", "float32"}};
 
-/// Whether this setting was removed. Throws BadInput for another value than today's.
+/// Whether this setting was removed. Throws BadInput if its value is not the one that is now fixed.
 bool IsRemoved(std::string_view section, std::string_view name, const toml::node& node,
                const std::string& where) {
   for (const RemovedSetting& removed : kRemoved) {

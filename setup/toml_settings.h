@@ -12,17 +12,17 @@
 
 namespace upswing {
 
-/// Parses a TOML document. Throws BadInput with `where`, which names it, and the line.
+/// Parses a TOML document. Throws BadInput with `where`, the document's name, and the line.
 toml::table ParseToml(std::string_view text, const std::string& where);
 
-/// Name of a document and line of one of its nodes: `FILE:3`.
+/// Place of a node of a document: name and line, such as `FILE:3`.
 std::string PlaceOf(const toml::node& node, const std::string& where);
 
-/// A TOML value as the text that Option::Set takes; nothing for a type that no setting has.
+/// A TOML value as text for Option::Set; nothing for a type that no setting has.
 std::optional<std::string> TextOf(const toml::node& node);
 
-/// Sets the options that a table names in their sections; if `alone`, also outside of sections.
-/// Returns what it set. Throws BadInput with the line.
+/// Sets the options in the sections of a table; if `alone`, also options outside of sections.
+/// Returns the settings that it applied. Throws BadInput with the line.
 std::vector<FlagValue> ApplyTable(const Options& options, const toml::table& table,
                                   const std::string& where, bool alone);
 

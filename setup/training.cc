@@ -12,13 +12,13 @@ namespace {
 
 constexpr std::string_view kCheckpointFormat = "upswing-checkpoint-1";
 
-/// The settings, if there is memory for such a training. Throws BadInput.
+/// Returns the settings if there is enough memory for the training. Throws BadInput otherwise.
 Config Checked(Config config, const Host& host) {
   CheckMemory(config, host.memory);
   return config;
 }
 
-/// Environments as the settings have them, whose work the pool shares.
+/// Makes the environments of the settings. The threads of the pool share their work.
 std::unique_ptr<VectorEnv> MakeTrainingEnv(const Config& config, Engines engines,
                                            ThreadPool& pool) {
   EnvConfig env = config.Environments();

@@ -10,33 +10,34 @@
 
 namespace upswing {
 
-/// The environments of the evaluation at a step of a training with these settings: an episode in
-/// each. The engine is the training's.
+/// The environments of the evaluation at a step of a training with these settings: one per episode.
+/// The engine is the training's.
 EnvConfig EvaluationEnvironments(const Config& config, int64_t step);
 
-/// Whether evaluations are in the closed form, and MuJoCo confirms what solves the task. With the
-/// same setting a model of your own, which has no closed form, is evaluated in MuJoCo.
+/// Whether evaluations run in the closed form and MuJoCo confirms the evaluations that solve the
+/// task. With the same setting, a model of your own, which has no closed form, is evaluated in
+/// MuJoCo.
 bool IsScreened(const Config& config);
 
-/// What a training finds on its computer.
+/// Computer on which a training runs.
 struct Host {
   Engines engines;
-  int64_t memory;  // bytes that are free
+  int64_t memory;  // free memory, bytes
   int threads = 1;
 };
 
-/// A training made of its settings: environments, agent and training loop. It writes no file; see
-/// TrainingRun.
+/// A training: environments, agent and training loop, made from its settings. It writes no file;
+/// TrainingRun does.
 class Training {
  public:
-  /// Throws BadInput if it would not fit into the free memory, or if the host lacks an engine of
-  /// the settings.
+  /// Throws BadInput if the training does not fit into the free memory, or if the host lacks an
+  /// engine of the settings.
   Training(Config config, const Host& host);
 
-  /// Calls this observer from now on; see Trainer::AddObserver.
+  /// Adds an observer; see Trainer::AddObserver.
   void AddObserver(TrainObserver& observer) { trainer_.AddObserver(observer); }
 
-  /// One step of all environments; see Trainer::Step.
+  /// Makes one step of all environments; see Trainer::Step.
   bool Step() { return trainer_.Step(); }
   const Trainer& trainer() const { return trainer_; }
   const TrainState& state() const { return trainer_.state(); }
@@ -45,22 +46,23 @@ class Training {
   const EnvSpec& spec() const { return env_->spec(); }
   int threads() const { return pool_.threads(); }
 
-  /// The policy as it stands, without exploration.
+  /// The current policy, without exploration.
   std::unique_ptr<Policy> policy() const;
 
   /// Saves or loads the whole state, without the settings.
   void State(const Archive& archive) { trainer_.State(archive); }
 
-  /// The whole state, with the settings that it belongs to. Views the arrays: to be saved before
-  /// the next Step.
+  /// The whole state with its settings. The tensors view the arrays: save them before the next
+  /// Step.
   Tensors Checkpoint();
-  /// Throws BadInput unless the checkpoint is one of this version and of these settings.
+  /// Loads a checkpoint. Throws BadInput unless it is from this version and these settings.
   void Load(const Tensors& checkpoint);
 
  private:
   TrainSetup MakeSetup(const Engines& engines);
-  /// Evaluation of a policy from fresh starts with the reward's standard weights, on the training
-  /// plant or, where plants are random, on a fresh one for each episode; disturbed as in training.
+  /// Evaluates a policy from new start states with the reward's standard weights, with the
+  /// disturbances of the training. Plants are the training plant, or a new random plant per episode
+  /// if training randomizes plants.
   Evaluation Evaluate(const Engine& engine, const Policy& policy, int64_t step);
 
   Config config_;

@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kWorkersLog = "workers.log";
 
-/// The last line that is not empty.
+/// The last line of a log file that is not empty.
 std::string LastLine(const fs::path& path) {
   std::string last = "its log is empty";
   const std::string text = ReadEnd(path, 1 << 16);
@@ -35,15 +35,16 @@ std::string LastLine(const fs::path& path) {
   return last.starts_with(kProgram) ? last.substr(kProgram.size()) : last;
 }
 
-// ---- Before anything runs.
+// ---- Checks before anything runs.
 
-/// Throws unless the folder is free or has the file `mark`.
+/// Throws BadInput unless the folder is free or has the file `mark`.
 void CheckFolder(const fs::path& folder, const fs::path& mark) {
   if (IsFile(folder / mark)) return;
   CheckFree(folder, Concat("it has no ", mark.string(), " to resume from; choose another --out"));
 }
 
-/// Throws if `what`, made with the settings `before`, cannot be resumed with `now`.
+/// Throws BadInput if `what`, made with the settings `before`, cannot be resumed with the settings
+/// `now`.
 void CheckSame(Config before, const Config& now, bool more_steps, const std::string& what) {
   if (!before.mjcf.empty()) before.model = now.model;
   if (more_steps) before.train.steps = std::max(before.train.steps, now.train.steps);
@@ -59,7 +60,8 @@ void CheckSame(Config before, const Config& now, bool more_steps, const std::str
   }
 }
 
-/// Throws if a run in a variant's folder, or the folder's settings file, has other settings.
+/// Throws BadInput if a run in a variant's folder, or the folder's settings file, has other
+/// settings.
 void CheckRuns(const fs::path& folder, const Config& config, bool more_steps) {
   std::error_code error;
   const std::string mark = SettingsMark(config);
@@ -87,9 +89,9 @@ std::vector<SeedRun> ListRuns(const StudyPlan& plan) {
   return runs;
 }
 
-// ---- While they run.
+// ---- Supervision of the running workers.
 
-/// The worker processes of this machine, and the progress of all runs.
+/// The worker processes on this machine, and the progress of all runs.
 class LocalWorkers {
  public:
   LocalWorkers(const ManyRuns& many, std::vector<SeedRun>& runs, ManyRunsObserver& observer)
@@ -99,7 +101,8 @@ class LocalWorkers {
     }
   }
 
-  /// Returns when all runs have ended; after a request to stop, when the workers have.
+  /// Returns when all runs have ended. After a request to stop, returns when the workers have
+  /// ended.
   void Run() {
     while (true) {
       const TrainRequest request = observer_.Poll();
@@ -119,22 +122,22 @@ class LocalWorkers {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
     Look();
-    if (many_.jobs == 0) running_.clear();     // others' go on
-    for (const SeedRun* run : running_) {      // they were stopped
-      if (fs::exists(run->claim())) continue;  // it goes on on another host
+    if (many_.jobs == 0) running_.clear();     // runs of other workers go on
+    for (const SeedRun* run : running_) {      // runs of stopped workers
+      if (fs::exists(run->claim())) continue;  // the run goes on on another host
       auto* stopped = *std::ranges::find(open_, run);
       stopped->Read();
       observer_.End(*stopped);
     }
     std::error_code error;
-    if (deaths_.empty()) fs::remove(log_, error);  // else it may say why
+    if (deaths_.empty()) fs::remove(log_, error);  // otherwise it may contain the reason
   }
 
  private:
   using Clock = std::chrono::steady_clock;
   static constexpr std::chrono::milliseconds kOften{60}, kSeldom{500};
 
-  /// Takes note of the workers that have ended.
+  /// Removes the workers that have ended from the list.
   void Reap() {
     for (auto it = workers_.begin(); it != workers_.end();) {
       const pid_t pid = it->pid();
@@ -147,7 +150,8 @@ class LocalWorkers {
     }
   }
 
-  /// What a worker that died was at is left to another one, unless it is what kills them.
+  /// Leaves the run of a worker that died to another worker. A run whose workers die twice has
+  /// failed.
   void EndedBadly(pid_t pid, int code) {
     constexpr int kMostDeaths = 2;
     const auto how = [code](const fs::path& log) {
@@ -161,12 +165,12 @@ class LocalWorkers {
       if (Lease::Take(run->claim(), "reports its end")) WriteFailed(*run, how(run->log()));
       return;
     }
-    if (++deaths_[nullptr] < kMostDeaths) return;  // between two runs
+    if (++deaths_[nullptr] < kMostDeaths) return;  // the worker died between two runs
     throw Failure(Concat("a worker ended: ", how(log_)));
   }
 
-  /// Sees which runs have ended, run now, or wait. They are begun in their order, so beyond many
-  /// that wait none has begun.
+  /// Finds out which runs have ended, are running or wait. Runs begin in order, so it stops after
+  /// many waiting runs.
   void Look() {
     constexpr int kEnough = 64;
     std::vector<const SeedRun*> before = std::move(running_);
@@ -190,7 +194,7 @@ class LocalWorkers {
     }
   }
 
-  /// Starts workers while runs wait for one or have lost theirs.
+  /// Starts workers for waiting runs and for runs that have lost their worker.
   void StartWorkers(Clock::time_point now) {
     const auto jobs = static_cast<size_t>(many_.jobs);
     if (workers_.size() >= jobs || open_.empty() || now < start_at_) return;
@@ -205,7 +209,7 @@ class LocalWorkers {
       workers_.emplace_back(std::vector<std::string>{"study", "--work", many_.plan.folder.string()},
                             log_);
     }
-    start_at_ = now + std::chrono::seconds(1);  // they need a while to claim their runs
+    start_at_ = now + std::chrono::seconds(1);  // workers need time to claim their runs
   }
 
   void SignalAll(int signal) {
@@ -215,11 +219,11 @@ class LocalWorkers {
   const ManyRuns& many_;
   ManyRunsObserver& observer_;
   fs::path log_;
-  std::list<SeedRun*> open_;  // neither done nor failed
+  std::list<SeedRun*> open_;  // runs that are neither done nor failed
   std::vector<const SeedRun*> running_;
   size_t waiting_ = 0;  // unclaimed runs
   std::list<ChildProcess> workers_;
-  std::map<const SeedRun*, int> deaths_;  // of workers on a run; under null on none
+  std::map<const SeedRun*, int> deaths_;  // deaths of workers per run; null: between runs
   Clock::time_point look_at_{}, start_at_{};
   bool stopping_ = false;
 };
@@ -227,7 +231,7 @@ class LocalWorkers {
 }  // namespace
 
 FolderLock Prepare(const ManyRuns& many, const std::function<void()>& checked) {
-  // Nothing is touched before all is checked, nor while another process is at work there.
+  // Touch nothing before all checks have passed, nor while another process works there.
   const StudyPlan& plan = many.plan;
   const bool is_study = !many.mark_file.empty();
   CheckFolder(plan.folder, is_study ? fs::path(many.mark_file) : fs::path(kSettingsName));
@@ -242,7 +246,7 @@ FolderLock Prepare(const ManyRuns& many, const std::function<void()>& checked) {
   WritePlan(plan);
   if (is_study) WriteIfOther(plan.folder / many.mark_file, many.mark_text);
   for (const SeedRun& run : RunsOf(plan)) {
-    fs::remove(run.failed());                                                  // it is tried again
+    fs::remove(run.failed());  // so that it is tried again
     if (fs::exists(run.claim())) (void)Lease::Take(run.claim(), "tidies up");  // if it is lost
   }
   return lock ? std::move(*lock) : FolderLock(plan.folder);

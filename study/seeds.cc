@@ -9,7 +9,7 @@
 namespace upswing {
 namespace {
 
-constexpr int64_t kLargestSeed = 9'000'000'000'000'000;  // as --seed has it
+constexpr int64_t kLargestSeed = 9'000'000'000'000'000;  // limit of --seed
 constexpr int64_t kMostSeeds = 10'000;
 
 std::optional<int64_t> ParseSeed(std::string_view text) {

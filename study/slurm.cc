@@ -52,7 +52,7 @@ wait "$worker"
 finish $?
 )sh";
 
-constexpr const char* kNumberName = "array";  // in SlurmFolder: what sbatch answered
+constexpr const char* kNumberName = "array";  // file in SlurmFolder with sbatch's answer
 
 Error NoSbatch() {
   return Failure(
@@ -60,11 +60,12 @@ Error NoSbatch() {
       "node of the cluster");
 }
 
-/// A path for a script: absolute, and free of what would end its line.
+/// An absolute path for a script. Throws BadInput if a character would end its line or change its
+/// meaning.
 std::string PathForScript(const fs::path& path) {
   std::string text = fs::absolute(path).lexically_normal().string();
   if (text.size() > 1 && text.ends_with('/')) text.pop_back();
-  // After a backslash Slurm would not replace %A and the like.
+  // Reject a backslash: after it, Slurm would not replace %A and similar patterns.
   if (Printable(text) != text || text.find('\\') != text.npos) {
     throw BadInput(
         Concat("--slurm: expected a folder name of printable characters without \\, got ", text));
@@ -72,21 +73,21 @@ std::string PathForScript(const fs::path& path) {
   return text;
 }
 
-/// A path in an option of Slurm, where %A and the like are replaced.
+/// Escapes a path for an option of Slurm, which replaces patterns such as %A.
 std::string WithoutPatterns(const std::string& path) {
   std::string text;
   for (const char c : path) text += c == '%' ? "%%" : std::string(1, c);
   return text;
 }
 
-/// Whether options of sbatch say how many tasks there are.
+/// Whether options of sbatch set the tasks of an array.
 bool HaveArray(const std::string& options) {
   return std::ranges::any_of(Split(options, ' '), [](std::string_view word) {
     return word.starts_with("--ar") || (word.starts_with("-a") && !word.starts_with("--"));
   });
 }
 
-/// What a command of Slurm complains of, on one line.
+/// The error message of a Slurm command, on one line.
 std::string Complaint(const CommandResult& result) {
   std::vector<std::string> lines;
   for (std::string_view line : Split(result.errors, '\n')) {
@@ -160,7 +161,7 @@ std::optional<SlurmArray> SlurmArray::LastOf(const fs::path& folder) {
 }
 
 std::optional<SlurmArray> SlurmArray::Parse(std::string_view text) {
-  // NUMBER or NUMBER;CLUSTER
+  // Format: NUMBER or NUMBER;CLUSTER.
   const std::vector<std::string_view> parts = Split(Trim(text), ';');
   const auto is_plain = [](std::string_view part) {
     return !part.empty() && std::ranges::all_of(part, [](char c) {
@@ -181,7 +182,7 @@ std::optional<int64_t> SlurmArray::TasksLeft() const {
   const auto done = RunCommand(words);
   if (!done) return std::nullopt;
   if (!done->succeeded()) {
-    // A while after its end Slurm forgets a job.
+    // Slurm forgets a job some time after its end.
     if (done->errors.find("Invalid job id") != std::string::npos) return 0;
     return std::nullopt;
   }

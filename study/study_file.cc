@@ -16,14 +16,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The settings of one table of the study, checked; a model's path is relative to the study's
-/// folder.
+/// Reads and checks the settings of one table of the study. Makes a model's path relative to the
+/// study's folder.
 std::vector<FlagValue> ReadSettings(const toml::node& node, const std::string& name,
                                     const std::string& where) {
   const auto* table = node.as_table();
   const std::string place = PlaceOf(node, where);
   if (table == nullptr) throw BadInput(Concat(place, ": ", name, ": expected a table of settings"));
-  Config scratch;  // takes the values, which checks them
+  Config scratch;  // checks the values by taking them
   std::vector<FlagValue> settings = ApplyTable(EverySetting(scratch), *table, where, true);
   for (FlagValue& setting : settings) {
     if (setting.name == "seed") {
@@ -38,19 +38,19 @@ std::vector<FlagValue> ReadSettings(const toml::node& node, const std::string& n
   return settings;
 }
 
-/// The settings of a variant, checked together. Throws BadInput.
+/// Builds the settings of a variant and checks them together. Throws BadInput.
 Config BuildVariant(const std::string& name, const std::vector<FlagValue>& settings,
                     const std::string& place, const std::string& where) {
   try {
     return BuildConfig("", settings);
   } catch (const Error& error) {
     const std::string_view what = error.what();
-    if (what.starts_with(where)) throw;  // it says the line
+    if (what.starts_with(where)) throw;  // the message already has the line
     throw BadInput(Concat(place, ": variant \"", name, "\": ", what));
   }
 }
 
-/// The variants, in the order of the file.
+/// Reads the variants in the order of the file.
 std::vector<Variant> ReadVariants(const toml::table& study, const std::string& where) {
   std::vector<FlagValue> common;
   if (const toml::node* node = study.get("settings")) {
@@ -104,7 +104,7 @@ void CheckKeys(const toml::table& study, const std::string& where) {
   }
 }
 
-/// The text of a key at the beginning of the file; empty if it is not there.
+/// The text of a top-level key; empty if the key is missing.
 std::string ReadText(const toml::table& study, const std::string& key, const std::string& where) {
   const toml::node* node = study.get(key);
   if (node == nullptr) return "";

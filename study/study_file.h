@@ -10,26 +10,25 @@
 
 namespace upswing {
 
-/// What a study file asks for.
+/// Contents of a study file.
 struct StudyFile {
   std::string title;              // may be empty
-  std::vector<Variant> variants;  // in the order in which they stand in the file; at least one
-  std::vector<int64_t> seeds;     // empty: the file names none
-  std::optional<Keep> keep;       // nothing: the file does not say
+  std::vector<Variant> variants;  // at least one, in the order of the file
+  std::vector<int64_t> seeds;     // empty: not in the file
+  std::optional<Keep> keep;       // nothing: not in the file
 };
 
-/// Reads the text of a study file; the path of a model is relative to its folder. `where` is its
-/// path.
-/// Throws BadInput with the line.
+/// Parses the text of a study file. `where` is its path; the path of a model is relative to its
+/// folder. Throws BadInput with the line.
 StudyFile ParseStudy(std::string_view text, const std::string& where);
 
-/// What identifies a study, without its settings.
+/// Title and variant names of a study, without its settings.
 struct StudyOutline {
   std::string title;
   std::vector<std::string> variants;  // names
 };
 
-/// Reads only the outline, which is the same in files of other versions of the program. Throws
+/// Parses only the outline, which has the same format in all versions of the program. Throws
 /// BadInput.
 StudyOutline ParseStudyOutline(std::string_view text, const std::string& where);
 

@@ -32,7 +32,7 @@ Keep ParseKeep(std::string_view text, const std::string& where) {
 int64_t SeedRun::Steps() const {
   if (finished) return state->steps;
   const int64_t at_checkpoint = state ? state->steps : 0;
-  // A row begins with its step; the last one may be half written.
+  // Each row begins with its step. The last row may be incomplete, so use the one before.
   const std::string tail = ReadEnd(path / RunFolder::kMetrics, 1024);
   const std::vector<std::string_view> rows = Split(tail, '\n');
   if (rows.size() < 3) return at_checkpoint;
@@ -54,7 +54,7 @@ bool SeedRun::ReadIfFinished() {
   }
   if (result) state = result->state;
   finished = AtEnd();
-  if (!finished) state.reset();  // that of fewer steps
+  if (!finished) state.reset();  // a state with fewer steps than now planned
   return finished;
 }
 

@@ -11,19 +11,19 @@
 
 namespace upswing {
 
-/// One set of settings that is trained with many seeds.
+/// A set of settings that is trained with many seeds.
 struct Variant {
-  std::string name;  // its subfolder; empty: the folder of all runs
+  std::string name;  // name of its subfolder; empty: the runs are directly in the study's folder
   Config config;     // its seed is ignored
 };
 
-/// What is kept of a finished run.
+/// Files of a finished run that are kept.
 enum class Keep {
   kAll,
-  kPolicy,  // its best policy, settings, evaluations and log
-  kTables,  // its rows of the study's tables
+  kPolicy,  // best policy, settings, evaluations and log
+  kTables,  // rows in the study's tables
 };
-/// The value that "all", "policy" or "tables" names. Throws BadInput that begins with `where`.
+/// Parses "all", "policy" or "tables". Throws BadInput that begins with `where`.
 Keep ParseKeep(std::string_view text, const std::string& where);
 
 /// Many trainings: each variant with each seed, in FOLDER/VARIANT/seedN.
@@ -34,62 +34,62 @@ struct StudyPlan {
   Keep keep = Keep::kAll;
 };
 
-/// One of them. What is known of it stands in files beside its folder, so that any process of any
-/// host that has the folder can go on with it.
+/// A run of a plan. Its state is in files next to its folder. Any process on any host with access
+/// to the folder can therefore continue it.
 struct SeedRun {
   const Variant* variant;
-  std::string settings;  // the variant's SettingsMark
+  std::string settings;  // SettingsMark of the variant
   int64_t seed;
   std::string name;                 // such as `seed3` or `dqn/seed3`
-  std::filesystem::path path;       // of its folder
-  std::optional<TrainState> state;  // where it stands; nothing: it has not begun
-  std::string problem;              // why it failed; empty if it did not
-  bool finished = false;            // it says so itself, in done()
+  std::filesystem::path path;       // path of its folder
+  std::optional<TrainState> state;  // current state; nothing: not begun
+  std::string problem;              // reason of the failure; empty: not failed
+  bool finished = false;            // whether the file done() says that it is finished
 
-  std::filesystem::path log() const { return With(".log"); }        // what it printed
-  std::filesystem::path claim() const { return With(".claim"); }    // the Lease of who trains it
+  std::filesystem::path log() const { return With(".log"); }        // output of the run
+  std::filesystem::path claim() const { return With(".claim"); }    // Lease of its worker
   std::filesystem::path done() const { return With(".done"); }      // its result
-  std::filesystem::path failed() const { return With(".failed"); }  // why it failed, one line
-  /// Whether it stands at its end, though perhaps it does not say so yet.
+  std::filesystem::path failed() const { return With(".failed"); }  // failure reason, one line
+  /// Whether its state is at the end. done() may not say so yet.
   bool AtEnd() const { return state && state->Finished(variant->config.train); }
-  /// Whether it is said that it failed.
+  /// Whether the file failed() exists.
   bool HasFailed() const;
-  /// Whether it was done, and what resuming it takes was not kept.
+  /// Whether it is done, but its files no longer suffice to resume it.
   bool IsReduced() const;
-  /// Steps made, of its checkpoint or, where that is further, of its metrics.
+  /// Steps made, from the checkpoint or the metrics, whichever is further.
   int64_t Steps() const;
-  /// Reads again whether it is finished, and its state then. Throws BadInput.
+  /// Reads whether it is finished, and its final state. Throws BadInput.
   bool ReadIfFinished();
-  /// Reads state and problem again. Throws BadInput.
+  /// Reads state and problem. Throws BadInput.
   void Read();
-  /// The same, but an error becomes the run's problem.
+  /// Reads state and problem. An error becomes the run's problem.
   void Refresh();
 
  private:
   std::filesystem::path With(const char* ending) const { return path.string() + ending; }
 };
 
-/// All runs of a plan, which must outlive them, the first seed of each variant first; nothing is
-/// read.
+/// All runs of a plan, the first seed of each variant first. The plan must outlive them. Reads no
+/// files.
 std::vector<SeedRun> RunsOf(const StudyPlan& plan);
 
-/// Writes the plan into its folder: plan.json, and the settings of each variant in
-/// VARIANT/settings.toml, with the model where it is not the built-in one.
+/// Writes plan.json into the plan's folder, and the settings of each variant into
+/// VARIANT/settings.toml. Also writes the model of a variant if it is not built in.
 void WritePlan(const StudyPlan& plan);
 
-/// The plan in a folder. Throws BadInput if there is none, if it is another version's, or if
-/// settings are no longer those of the plan.
+/// Reads the plan in a folder. Throws BadInput if there is none, if it is from another version, or
+/// if a variant's settings no longer match the plan.
 StudyPlan ReadPlan(const std::filesystem::path& folder);
 
-/// What the plan in a folder keeps; everything if there is none that can be read.
+/// The `keep` of the plan in a folder; kAll if there is no readable plan.
 Keep KeepOf(const std::filesystem::path& folder);
 
-/// The names of the files.
+/// Names of the files.
 inline constexpr const char* kPlanName = "plan.json";
-inline constexpr const char* kSettingsName = "settings.toml";  // of a variant, without seed
+inline constexpr const char* kSettingsName = "settings.toml";  // one per variant, without seed
 
-/// Throws BadInput that begins with `place` unless a variant can have this name, which its folder
-/// has too: letters, digits, - and _.
+/// Throws BadInput that begins with `place` unless `name` is valid for a variant and its folder:
+/// letters, digits, - and _.
 void CheckVariantName(const std::string& name, const std::string& place);
 
 }  // namespace upswing

@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Removes the files of a finished run but those that are to be kept.
+/// Removes the files of a finished run that `keep` does not keep.
 void Reduce(const SeedRun& run, Keep keep) {
   if (keep == Keep::kAll) return;
   fs::remove(run.log());
@@ -27,8 +27,8 @@ void Reduce(const SeedRun& run, Keep keep) {
   }
 }
 
-/// Writes the result file of a run and removes the files that are not kept. The caller has the
-/// claim.
+/// Writes the result file of a run and removes the files that are not kept. The caller must hold
+/// the claim.
 void Finish(const SeedRun& run, Keep keep) {
   const Config& config = run.variant->config;
   const auto at_end = ReadTrainState(run.path, config.Spec());
@@ -46,10 +46,11 @@ void Finish(const SeedRun& run, Keep keep) {
   Reduce(run, keep);
 }
 
-/// Begins a run, or resumes what a worker left of it.
+/// Begins a run, or resumes one that a worker left.
 std::unique_ptr<TrainingRun> MakeOrResume(const SeedRun& run) {
   const TrainConfig& train = run.variant->config.train;
-  if (run.IsReduced() && fs::exists(run.path)) RemoveFolder(run.path);  // the same bits come again
+  // Training again gives the same bits.
+  if (run.IsReduced() && fs::exists(run.path)) RemoveFolder(run.path);
   if (fs::exists(run.path / RunFolder::kConfig)) {
     return TrainingRun::Resume(
         run.path,
@@ -63,7 +64,7 @@ std::unique_ptr<TrainingRun> MakeOrResume(const SeedRun& run) {
   return TrainingRun::Make(run.path, std::move(config));
 }
 
-/// One worker.
+/// Worker that trains the runs of a plan.
 class Worker {
  public:
   Worker(const StudyPlan& plan, const TrainSeedRun& train, const std::function<bool()>& stopped)
@@ -73,7 +74,7 @@ class Worker {
     std::vector<SeedRun> runs = RunsOf(plan_);
     std::list<SeedRun*> open;
     for (SeedRun& run : runs) open.push_back(&run);
-    // Again, as long as that brings any: another worker may have lost one meanwhile.
+    // Repeat while a round trains a run, because another worker may have lost a run meanwhile.
     for (bool tried = true; tried && !open.empty() && !outcome_.stopped;) {
       tried = false;
       outcome_.claimed_by_others = 0;
@@ -100,9 +101,10 @@ class Worker {
       if (auto taken = Lease::Take(run.claim(), "trains it")) lease.emplace(std::move(*taken));
       if (ended) return Turn::kNothingToDo;  // its worker died before it gave the claim back
       if (!lease) return Turn::kClaimedByOthers;
-      if (run.HasFailed() || run.ReadIfFinished()) return Turn::kNothingToDo;  // meanwhile
+      // Another worker ended it meanwhile.
+      if (run.HasFailed() || run.ReadIfFinished()) return Turn::kNothingToDo;
       Train(run, *lease);
-    } catch (const FolderBusy&) {  // the worker that lost the claim is still running there
+    } catch (const FolderBusy&) {  // a worker that lost the claim is still running there
       return Turn::kClaimedByOthers;
     } catch (const std::exception& error) {
       if (lease && !lease->held()) return Turn::kClaimedByOthers;
@@ -111,8 +113,8 @@ class Worker {
     return Turn::kTried;
   }
 
-  /// Writes why a run failed. Throws the error if that fails, or after several failures in a row: a
-  /// broken host must not fail all other runs.
+  /// Writes the reason of a run's failure. Throws Failure if that fails, or after several failures
+  /// in a row, because a broken host must not fail all other runs.
   void CountFailure(const SeedRun& run, const std::exception& error) {
     constexpr int kMostInARow = 3;
     try {

@@ -9,38 +9,41 @@
 
 namespace upswing {
 
-/// What a worker that was told to stop ends with, as sysexits.h has it: try again later.
+/// Exit code of a worker that was told to stop: "try again later" in sysexits.h.
 inline constexpr int kTryAgain = 75;
 
-/// Trains a run, which `make` makes or resumes, to its end or until a signal stops it. Calls `ours`
-/// after each step and, once that returns false, throws and writes nothing more. Returns whether
+/// Trains a run to its end or until a signal stops it. `make` makes or resumes the run. Calls
+/// `ours` after each step; once that returns false, throws and writes nothing more. Returns whether
 /// the training has ended.
 using TrainSeedRun = std::function<bool(const SeedRun& run,
                                         const std::function<std::unique_ptr<TrainingRun>()>& make,
                                         const std::function<bool()>& ours)>;
 
-/// How a worker ended.
+/// Result of a worker.
 struct WorkerOutcome {
-  int64_t done = 0, failed = 0;   // runs
+  int64_t done = 0, failed = 0;   // number of runs
   int64_t claimed_by_others = 0;  // runs that other workers train
   bool stopped = false;
 };
 
-/// Trains the runs of a plan that are not done, one after the other, beside any number of other
-/// workers on this host and others: each claims a run before it works on it. Ends when there is
-/// none that it could claim. A run that another worker left is resumed from its checkpoint. Of a
-/// run that fails the reason is written beside it, and no worker tries it again until the study is
-/// begun anew. A run that was done twice does no harm: its bits are the same. Throws Failure if
-/// several runs in a row failed here, or if nothing can be written.
-/// Begins no other run once `stopped` returns true.
+/// Trains the unfinished runs of a plan one after the other. Any number of workers on this host and
+/// others can do so at the same time: each claims a run before it works on it. Ends when no run is
+/// left to claim.
+///
+/// Resumes a run that another worker left from its checkpoint. If a run fails, writes the reason
+/// next to it; no worker tries that run again until the study is started again. A run that is done
+/// twice does no harm, because its bits are the same.
+///
+/// Begins no new run once `stopped` returns true. Throws Failure if several runs in a row fail
+/// here, or if nothing can be written.
 WorkerOutcome WorkOn(const StudyPlan& plan, const TrainSeedRun& train,
                      const std::function<bool()>& stopped);
 
-/// Writes evaluations.csv into the folder of a plan: the rows of evals.csv of all runs that are
-/// done, with their variant and seed.
+/// Writes evaluations.csv into the folder of a plan: the rows of evals.csv of all finished runs,
+/// with variant and seed.
 void WriteEvaluations(const StudyPlan& plan);
 
-/// Writes that a run has failed, and why.
+/// Writes the reason of a run's failure to its file failed().
 void WriteFailed(const SeedRun& run, const std::string& why);
 
 }  // namespace upswing
