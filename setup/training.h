@@ -43,6 +43,7 @@ class Training {
   const TrainState& state() const { return trainer_.state(); }
   const Config& config() const { return config_; }
   const Agent& agent() const { return *agent_; }
+  const VectorEnv& env() const { return *env_; }
   const EnvSpec& spec() const { return env_->spec(); }
   int threads() const { return pool_.threads(); }
 

@@ -352,6 +352,14 @@ UPSWING_EXPORT(learner_policy) int LearnerPolicy(Learner* learner, int best) {
   });
 }
 
+/// Leaves q1 and q2 (rad) of each pendulum of the training as 32-bit floats.
+UPSWING_EXPORT(learner_poses) int LearnerPoses(Learner* learner) {
+  return Guarded([&] {
+    bytes = learner->Poses();
+    return 1;
+  });
+}
+
 /// Leaves the settings of a named agent as JSON: name, value, range, unit and help of each.
 UPSWING_EXPORT(agent_settings) int AgentSettings(const char* agent, size_t size) {
   return Guarded([&] {

@@ -67,6 +67,19 @@ json Learner::Report() {
 
 std::vector<std::byte> Learner::policy() const { return FileOf(*training_.policy()); }
 
+std::vector<std::byte> Learner::Poses() const {
+  const VectorEnv& env = training_.env();
+  std::vector<double> state(env.spec().state_names.size());
+  std::vector<float> poses;
+  for (int i = 0; i < env.num_envs(); ++i) {
+    env.GetState(i, state);
+    poses.push_back(static_cast<float>(state[0]));
+    poses.push_back(static_cast<float>(state[1]));
+  }
+  const auto bytes = std::as_bytes(std::span(poses));
+  return {bytes.begin(), bytes.end()};
+}
+
 void Learner::OnEpisode(const TrainState& state, const FinishedEpisode& episode) {
   episodes_.push_back({{"step", state.steps}, {"return", episode.reward_sum}});
 }

@@ -29,6 +29,10 @@ class Learner : private TrainObserver {
   std::vector<std::byte> policy() const;
   const std::vector<std::byte>& best() const { return best_; }
 
+  /// The pendulums of the training as they are now: q1 and q2 [rad] of each environment, as bytes
+  /// of 32-bit floats.
+  std::vector<std::byte> Poses() const;
+
  private:
   void OnEpisode(const TrainState& state, const FinishedEpisode& episode) override;
   void OnEvaluation(const TrainState& state, const Evaluation& evaluation) override;

@@ -54,6 +54,12 @@ export class Learner {
     return file.byteLength > 0 ? file : null;
   }
 
+  /// Both angles (rad) of each pendulum that it trains with now: q1, q2, q1, q2 …
+  poses(): Float32Array<ArrayBuffer> {
+    this.core.expect(this.core.exports.learner_poses(this.learner));
+    return new Float32Array(this.core.file);
+  }
+
   close(): void {
     this.core.exports.learner_close(this.learner);
   }
