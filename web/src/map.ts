@@ -44,6 +44,7 @@ export class ValueMap {
   x = AXES.q1;
   y = AXES.q2;
   quantity: Quantity = 'value';
+  atRest = false; // whether the velocities are 0, not as they are now
   /// The last complete map (size × size), rows from below: V in units of the network, or torque (N·m).
   /// Null before there is one.
   cells: Float32Array | null = null;
@@ -75,7 +76,7 @@ export class ValueMap {
     const end = performance.now() + milliseconds;
     if (this.plant !== world.plant) this.restart();
     this.plant = world.plant;
-    this.around ??= world.state;
+    this.around ??= this.atRest ? { ...world.state, w1: 0, w2: 0 } : world.state;
     do {
       const [column, row] = [this.next % this.size, Math.floor(this.next / this.size)];
       const decision = world.decisionAt(this.stateAt(column, row, this.around));

@@ -22,7 +22,7 @@ async function openLearn(page: Page): Promise<void> {
   await open(page, '#learn');
   await page.evaluate(() => {
     upswing.learn.stop();
-    for (const input of document.querySelectorAll<HTMLInputElement>('#learn input')) {
+    for (const input of document.querySelectorAll<HTMLInputElement>('#learn-panel input')) {
       if (input.type === 'range') continue;
       input.value = input.defaultValue;
       if (input.checked !== input.defaultChecked) input.click();
@@ -250,9 +250,9 @@ test('four seeds at once, each of which can be watched, and one of them takes ov
   await openLearn(page);
   await page.evaluate(() => {
     const keep = upswing.keepLearned.bind(upswing);
-    upswing.keepLearned = async (file) => {
+    upswing.keepLearned = async (file, shown) => {
       document.body.dataset.kept = `${document.body.dataset.kept ?? ''}${file.name};`;
-      await keep(file);
+      await keep(file, shown);
     };
   });
   await page.getByLabel('show the untrained one too').check();
@@ -333,7 +333,7 @@ test('settings are those of the program, which says what is wrong with them', as
   stage: page,
 }) => {
   await openLearn(page);
-  await page.locator('#learn summary').click();
+  await page.locator('#learn-panel summary').click();
   const rate = page.getByLabel('learning rate');
   await expect(rate).toHaveValue('0.002');
   await rate.fill('-1');

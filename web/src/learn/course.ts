@@ -4,6 +4,8 @@ import type { Curve } from '../view/charts';
 export interface Checkpoint {
   step: number;
   file: ArrayBuffer | (() => Promise<ArrayBuffer>); // which may have to be fetched
+  /// What had happened by then, if that is known.
+  after?: { trials: number; updates: number; seconds: number };
 }
 
 /// A training as it is drawn, and as one goes back and forth in it.

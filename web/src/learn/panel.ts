@@ -3,7 +3,7 @@ import { button, element } from '../page/dom';
 import { saveFile } from '../page/save';
 import { onThemeChange } from '../page/theme';
 import { LearnChart, stepsOf } from './chart';
-import type { Course, Recording } from './course';
+import type { Checkpoint, Course, Recording } from './course';
 import { Knobs } from './knobs';
 import './learn.css';
 import { Scrubber } from './scrubber';
@@ -23,7 +23,7 @@ export interface LearnPage extends LearnStage {
     recording(id: string): Recording | null;
   };
   /// Keeps a policy that was learned here as the visitor's own.
-  keepLearned(file: File): Promise<void>;
+  keepLearned(file: File, shown: boolean): Promise<void>;
 }
 
 export class LearnPanel {
@@ -116,6 +116,19 @@ export class LearnPanel {
     return session !== null && this.taken.has(session) && page.agents.ownIsLearned;
   }
 
+  /// Puts what was learned, or is learning, on the stage again, unless it is the visitor's own agent.
+  show(): void {
+    const { course, onStage } = this.scrubber;
+    if (course && !onStage && !this.keeps) this.scrubber.take(course);
+    this.draw();
+  }
+
+  /// The pendulums that the shown training swings now: q1, q2 [rad] of each.
+  get ghosts(): ArrayLike<number> {
+    const { session, scrubber } = this;
+    return session?.running && scrubber.follows ? session.poses : [];
+  }
+
   /// At each frame.
   follow(): void {
     this.scrubber.attempt();
@@ -172,16 +185,22 @@ export class LearnPanel {
   private async takeOver(): Promise<void> {
     const { session, scrubber } = this;
     if (!session?.last?.solved || session.state !== 'finished' || this.taken.has(session)) return;
-    if (!scrubber.follows || !scrubber.onStage) return;
     this.taken.add(session);
     const { ownName, ownIsLearned } = this.page.agents;
-    if (ownName === null || ownIsLearned) await this.keep();
+    if (ownName !== null && !ownIsLearned) return;
+    const { newest } = session;
+    const file = newest && fileOf(session, newest);
+    if (file) await this.page.keepLearned(file, scrubber.follows && scrubber.onStage);
   }
 
-  /// Keeps the best policy as the visitor's own.
+  /// Keeps the policy on the stage as the visitor's own; one that was brought is replaced only if the
+  /// visitor says so.
   private async keep(): Promise<void> {
     const file = this.file();
-    if (file) await this.page.keepLearned(file);
+    const { ownName, ownIsLearned } = this.page.agents;
+    const question = `This replaces your own policy, ${ownName}, in this browser. Replace it?`;
+    if (!file || (ownName !== null && !ownIsLearned && !confirm(question))) return;
+    await this.page.keepLearned(file, true);
   }
 
   private save(): void {
@@ -189,11 +208,11 @@ export class LearnPanel {
     if (file) saveFile(file, 'policy.safetensors');
   }
 
+  /// The policy on the stage; if that is not of this training, its newest.
   private file(): File | null {
-    const { session } = this;
-    const bytes = session?.best ?? session?.policy;
-    if (!session || !bytes) return null;
-    return new File([bytes], `learned here, ${session.agent}, seed ${session.seed}`);
+    const { session, scrubber } = this;
+    const shown = scrubber.follows || !scrubber.onStage ? session?.newest : scrubber.checkpoint;
+    return session && shown ? fileOf(session, shown) : null;
   }
 
   private listCourses(): void {
@@ -245,20 +264,23 @@ export class LearnPanel {
     this.say(session ? sentence(session) : OF_RECORDING);
   }
 
-  /// Of a training in this page as it is, of a recorded one as it was at that step.
+  /// Of a training in this page as it is, or as it was at the step that is on the stage.
   private drawNumbers(course: Course): void {
     const write = (id: string, text: string) => (element(`learn-${id}`).textContent = text);
     const { session, scrubber } = this;
-    const at = session ? Infinity : scrubber.step;
+    const now = session !== null && scrubber.follows;
+    const at = now ? Infinity : scrubber.step;
     const success = course.evaluations.findLast(({ step }) => step <= at)?.success;
     const count = (number: number | undefined) => number?.toLocaleString('en') ?? '–';
-    const counted = (of: 'episodeCount' | 'updates') =>
-      count(session ? (session.last?.[of] ?? 0) : undefined);
-    write('steps', count(session ? session.steps : scrubber.step));
-    write('trials', counted('episodeCount'));
-    write('updates', counted('updates'));
-    write('rate', session ? session.updatesPerSecond.toFixed(0) : '–');
-    write('time', session ? `${session.seconds.toFixed(1)} s` : '–');
+    const last = session?.last;
+    const after = !now
+      ? scrubber.checkpoint?.after
+      : { trials: last?.episodeCount ?? 0, updates: last?.updates ?? 0, seconds: session.seconds };
+    write('steps', count(now ? session.steps : scrubber.step));
+    write('trials', count(after?.trials));
+    write('updates', count(after?.updates));
+    write('rate', now ? session.updatesPerSecond.toFixed(0) : '–');
+    write('time', after ? `${after.seconds.toFixed(1)} s` : '–');
     write('success', success === undefined ? '–' : `${(100 * success).toFixed(0)}%`);
     const where =
       scrubber.follows && session ? 'as it is now' : `after ${count(scrubber.step)} steps`;
@@ -271,6 +293,12 @@ export class LearnPanel {
     this.said = text;
     element('learn-status').textContent = text;
   }
+}
+
+function fileOf({ agent, seed }: Session, { file, step }: Checkpoint): File | null {
+  if (!(file instanceof ArrayBuffer)) return null;
+  const steps = step.toLocaleString('en');
+  return new File([file], `learned here, ${agent}, seed ${seed}, ${steps} steps`);
 }
 
 const OF_RECORDING =

@@ -23,6 +23,7 @@ export class Scrubber {
   course: Course | null = null;
   follows = true; // the newest
   step = 0; // of the policy on the stage
+  checkpoint: Checkpoint | null = null; // that policy, and what is known of it
   private readonly stage: LearnStage;
   private readonly onShown: () => void;
   private shown: Policy | null = null;
@@ -113,22 +114,26 @@ export class Scrubber {
     before?.controller.close();
   }
 
-  private async show({ step, file }: Checkpoint): Promise<void> {
+  private async show(checkpoint: Checkpoint): Promise<void> {
     const request = ++this.requests;
     const { world } = this.stage;
+    const { step, file } = checkpoint;
     this.given = file;
-    if (file instanceof ArrayBuffer) return this.put(new Policy(file), step);
+    if (file instanceof ArrayBuffer) return this.put(new Policy(file), checkpoint);
     const { policy: before } = world;
     const policy = await policyOf({ step, file });
     // Unless another one was asked for meanwhile.
-    if (policy && request === this.requests && world.policy === before) this.put(policy, step);
+    if (policy && request === this.requests && world.policy === before)
+      this.put(policy, checkpoint);
     else policy?.controller.close();
   }
 
-  private put(policy: Policy, step: number): void {
+  private put(policy: Policy, checkpoint: Checkpoint): void {
     const before = this.shown;
+    const { step } = checkpoint;
     this.stage.world.policy = this.shown = this.replaceable = policy;
     this.step = step;
+    this.checkpoint = checkpoint;
     element('first-name').textContent = `after ${step.toLocaleString('en')} steps`;
     before?.controller.close();
     this.onShown();

@@ -20,6 +20,7 @@ export class Session implements Course {
   checkpoints: Checkpoint[] = [];
   policy: ArrayBuffer | null = null; // as it stands
   best: ArrayBuffer | null = null; // at an evaluation
+  poses: Float32Array = new Float32Array(); // q1, q2 (rad) of each pendulum that it trains with
   updatesPerSecond = 0; // lately, evaluations included
   seconds = 0; // of the worker, since it began, without pauses
   private apart = APART;
@@ -55,7 +56,9 @@ export class Session implements Course {
     return this.last?.steps ?? 0;
   }
 
+  /// The policy as it stands; once the task is solved, the best.
   get newest(): Checkpoint | null {
+    if (this.best && this.last?.solved) return { step: this.last.bestStep, file: this.best };
     return this.policy && { step: this.steps, file: this.policy };
   }
 
@@ -90,6 +93,7 @@ export class Session implements Course {
 
   private hear(news: News): void {
     if (news.kind === 'failed') return this.fail(news.reason);
+    if (news.kind === 'poses') return void (this.poses = news.poses);
     const { report, policy, best, seconds } = news;
     if (this.last && seconds > this.seconds) {
       const rate = (report.updates - this.last.updates) / (seconds - this.seconds);
@@ -101,7 +105,8 @@ export class Session implements Course {
     this.episodes.push(...report.episodes);
     this.evaluations.push(...report.evaluations);
     if (best) this.best = best;
-    this.keep({ step: report.steps, file: policy }, report.finished);
+    const { steps: step, episodeCount: trials, updates } = report;
+    this.keep({ step, file: policy, after: { trials, updates, seconds } }, report.finished);
     if (report.finished) {
       this.state = 'finished';
       this.worker.terminate();

@@ -25,6 +25,7 @@ export type News =
       best: ArrayBuffer | null;
       seconds: number; // since it began, evaluations included, pauses not
     }
+  | { kind: 'poses'; poses: Float32Array<ArrayBuffer> } // of the pendulums: q1, q2 of each (rad)
   | { kind: 'failed'; reason: string };
 
 let learner: Learner | null = null;
@@ -46,6 +47,11 @@ function tell(): void {
   send({ kind: 'report', report, policy, best, seconds }, best ? [policy, best] : [policy]);
 }
 
+function show(): void {
+  const poses = learner!.poses();
+  send({ kind: 'poses', poses }, [poses.buffer]);
+}
+
 function send(news: News, transfer: Transferable[] = []): void {
   postMessage(news, { transfer });
 }
@@ -59,6 +65,7 @@ function work(): void {
     let more = true;
     while (more && performance.now() - begin < SLICE) more = learner.run(4);
     if (!more || performance.now() - told >= TELL) tell();
+    if (more) show();
     if (more) schedule();
     else end();
   } catch (error) {

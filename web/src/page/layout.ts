@@ -5,16 +5,15 @@ import { prefersStill } from './motion';
 const wide = matchMedia('(min-width: 75em)');
 
 /// Keeps the Q-values on one screen with the pendulum: the first chart where these stand beside it,
-/// below the pendulum where they do not. In the tour the map stands there too.
+/// below the pendulum where they do not. Outside of Everything the map is the ground of the stage.
 export function placeCharts(): void {
   const { view } = document.documentElement.dataset;
-  const tour = view === 'tour';
   const [charts, beside] = [element('charts'), element('beside')];
   const q = element('q-figure');
   const map = element('map-figure');
   const place = wide.matches && view === 'everything' ? charts : beside;
   if (q.parentElement !== place) place.prepend(q);
-  if (tour) beside.append(map);
+  if (view !== 'everything') beside.append(map);
   else if (map.parentElement !== charts) element('phase-figure').before(map);
 }
 wide.addEventListener('change', placeCharts);

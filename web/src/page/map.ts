@@ -39,7 +39,8 @@ export class MapPanel {
       if (!shares) return;
       const [x, y] = shares;
       const { map } = this;
-      start({ [map.x.name]: valueAt(map.x, x), [map.y.name]: valueAt(map.y, y) });
+      const rest = map.atRest ? { w1: 0, w2: 0 } : {};
+      start({ ...rest, [map.x.name]: valueAt(map.x, x), [map.y.name]: valueAt(map.y, y) });
     });
     new IntersectionObserver(([entry]) => (this.seen = entry!.isIntersecting)).observe(canvas);
   }
@@ -48,10 +49,22 @@ export class MapPanel {
     return this.chart.canvas;
   }
 
+  /// As the ground of the stage: of poses at rest. With `learning` it is colours alone, which follow
+  /// one policy after another.
+  ground(is: boolean, learning: boolean): void {
+    if (is !== this.map.atRest) this.reset();
+    if (is !== this.map.atRest || learning !== this.chart.bare) this.clear();
+    this.map.atRest = is;
+    this.chart.bare = learning;
+  }
+
   /// At each frame.
   draw(world: World, history: History): void {
     if (!this.seen || !world.policy) return;
-    if (this.policy !== world.policy) this.clear();
+    if (this.policy !== world.policy) {
+      if (this.chart.bare && this.policy && this.map.cells) this.key = '';
+      else this.clear();
+    }
     this.policy = world.policy;
     if (!world.policy.isQuick) {
       element('map-value').textContent = 'not for one that plans';
@@ -66,8 +79,10 @@ export class MapPanel {
   private work(world: World): void {
     const { map } = this;
     const { plant } = world;
-    const keyOf = (state: State) =>
-      JSON.stringify([{ ...state, [map.x.name]: 0, [map.y.name]: 0 }, plant]);
+    const keyOf = (state: State) => {
+      const rest = map.atRest ? { w1: 0, w2: 0 } : {};
+      return JSON.stringify([{ ...state, ...rest, [map.x.name]: 0, [map.y.name]: 0 }, plant]);
+    };
     if (map.cells && keyOf(world.state) === this.key) return;
     const begunIn = map.work(world, MILLISECONDS);
     if (!begunIn) return;

@@ -97,13 +97,15 @@ export class Page {
       return this.tour.go(view.step);
     }
     const { shared, problems } = decode(hash, RANGES, (id) => this.agents.has(id));
-    // What was learned at the end of the tour stays.
-    if (this.tour.learns && this.learn.keeps && !shared.agent) {
+    // What was learned stays on the stage.
+    const learns = view.name === 'learn' || this.tour.learns;
+    if (learns && this.learn.keeps && !shared.agent) {
       Object.assign(shared, { agent: OWN, on: true });
     }
     this.tour.leave();
     this.world.agentOn = false;
     if (!(await this.begin(shared))) return;
+    if (view.name === 'learn') this.learn.show();
     if (problems.length > 0) warn(problemText(problems));
   }
 
@@ -157,9 +159,11 @@ export class Page {
     this.changed();
   }
 
-  /// Keeps a policy that was learned here as the visitor's own.
-  keepLearned(file: File): Promise<void> {
-    return this.openFile(file, true);
+  /// Keeps a policy that was learned here as the visitor's own, on the stage if it is to be `shown`.
+  async keepLearned(file: File, shown: boolean): Promise<void> {
+    if (shown) return this.openFile(file, true);
+    await this.agents.open(file, true);
+    this.agentPanel.show();
   }
 
   private listen(): void {
@@ -315,7 +319,11 @@ export class Page {
     this.scene.draw(world, this.clock.state, trail);
     this.twin.draw(this.clock, prefersStill());
     this.tour.follow(world, this.scene);
+    const { view, step } = document.documentElement.dataset;
+    const learning = view === 'learn' || step === 'learn';
+    this.map.ground(view !== 'everything', learning);
     this.learn.follow();
+    this.scene.ghosts = learning && !prefersStill() ? this.learn.ghosts : [];
     if (this.paused) this.pose.follow(world.state);
     this.dashboard.draw(world, this.history);
     this.map.draw(world, this.history);

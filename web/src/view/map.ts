@@ -31,6 +31,7 @@ export class MapChart {
   private readonly image: HTMLCanvasElement = document.createElement('canvas');
   private pixels: ImageData | null = null; // of it
   private shown: Float32Array | null = null; // 0 to 1, on its way to the map
+  bare = false; // colours alone, without the names of the axes and the way
 
   /// Forgets the map: the next one is shown at once, and not on the way from this one.
   clear(): void {
@@ -49,7 +50,8 @@ export class MapChart {
     const { canvas } = this;
     canvas.clear();
     const { width, height } = canvas;
-    this.nameAxes(map.x, map.y);
+    if (!this.bare) this.nameAxes(map.x, map.y);
+    else if (!map.cells || Number.isNaN(low)) return;
     if (!map.cells) return canvas.text('computing …', width / 2, height / 2, 'center');
     if (Number.isNaN(low)) return canvas.text('not estimated', width / 2, height / 2, 'center');
     // All the same are in the middle.
@@ -60,6 +62,7 @@ export class MapChart {
       shown[i]! += EASE * (shareOf(cell) - shown[i]!);
     });
     this.paint(map.size, map.quantity === 'torque' ? TORQUES : VALUES);
+    if (this.bare) return canvas.context.drawImage(this.image, 0, 0, width, height);
     canvas.context.drawImage(this.image, LEFT, 0, width - LEFT, height - BOTTOM);
     this.drawWay(map, way, now);
   }

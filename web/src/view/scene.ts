@@ -1,4 +1,3 @@
-import { CONTROL_PERIOD } from '../pendulum';
 import type { Plant, State } from '../pendulum';
 import type { Push, Vec } from '../simulator';
 import { pointOn } from '../world';
@@ -6,13 +5,13 @@ import type { Moment, World } from '../world';
 import { Canvas } from './canvas';
 import { drawLabel } from './labels';
 import type { Label } from './labels';
+import { drawHousing, drawHub, drawJoint, drawLight, drawRod, drawTrace } from './machine';
 import { Sparks } from './sparks';
 
-export const TRAIL_SECONDS = 1.3; // of the pendulum's time
-const TRAIL_SHADES = 13;
+export const TRAIL_SECONDS = 20; // of the pendulum's time: a whole swing-up
 const FADING = 0.8; // s, in which the arrow of a shove fades: it acts for 0.1 s
-const FLASH_STEPS = 5; // control steps between two flashes
 const PIVOT: Vec = { x: 0, z: 0 };
+const CIRCLE = 0.86; // of the box's shorter side: the circle that the tip can reach
 const LARGEST_ARC = (150 / 180) * Math.PI; // at the motor's limit
 
 /// The pendulum in its plane, seen so that positive angles and torques are clockwise.
@@ -20,9 +19,14 @@ export class Scene {
   readonly canvas: Canvas;
   readonly sparks = new Sparks();
   labels: readonly Label[] = [];
+  /// Other pendulums, drawn faintly: q1, q2 [rad] of each.
+  ghosts: ArrayLike<number> = [];
+  /// What glows, as a word about it was touched: link1, link2, motor or goal.
+  lit: string | null = null;
 
-  /// Pixels per metre.
+  /// Pixels per metre, and the place of the pivot on the canvas [px].
   private scale = 1;
+  private pivot = { x: 0, y: 0 };
 
   constructor(id: string) {
     this.canvas = new Canvas(id);
@@ -30,14 +34,12 @@ export class Scene {
 
   /// A place on the canvas as a point of the pendulum's plane (m).
   toPlane(px: number, py: number): Vec {
-    const { width, height } = this.canvas;
-    return { x: (px - width / 2) / this.scale, z: (height / 2 - py) / this.scale };
+    return { x: (px - this.pivot.x) / this.scale, z: (this.pivot.y - py) / this.scale };
   }
 
   /// The inverse: a point of the plane (m) as a place on the canvas.
   at({ x, z }: Vec): [number, number] {
-    const { width, height } = this.canvas;
-    return [width / 2 + this.scale * x, height / 2 - this.scale * z];
+    return [this.pivot.x + this.scale * x, this.pivot.y - this.scale * z];
   }
 
   /// Pixels of this many metres.
@@ -45,23 +47,40 @@ export class Scene {
     return metres * this.scale;
   }
 
+  /// Puts the pendulum in the middle of the canvas's box: the canvas itself may fill the whole window.
+  private fit(reach: number): void {
+    const canvas = this.canvas.element.getBoundingClientRect();
+    const box = this.canvas.element.parentElement!.getBoundingClientRect();
+    this.scale = (CIRCLE * Math.min(box.width, box.height)) / (2 * reach);
+    this.pivot = {
+      x: box.left - canvas.left + box.width / 2,
+      y: box.top - canvas.top + box.height / 2,
+    };
+  }
+
   /// Draws the pendulum in this state, and the path of its tip over `trail`, oldest first.
   draw(world: World, state: State, trail: readonly Moment[]): void {
     const { canvas } = this;
     const { plant } = world;
-    const reach = Math.max(1, plant.length1 + plant.length2);
-    this.scale = (0.44 * Math.min(canvas.width, canvas.height)) / reach;
+    const reach = plant.length1 + plant.length2;
+    this.fit(Math.max(1, reach));
     canvas.clear();
-    this.drawGuides(plant.length1 + plant.length2, world.uprightFor !== null);
-    this.drawFlashes(plant, trail);
-    this.drawTrail(world, state, trail);
+    drawLight(canvas, this.at(PIVOT), this.scale * reach, this.glow('goal', world));
+    this.drawGhosts(plant);
+    const tipOf = (s: State) => this.at(pointOn(plant, s, 2, plant.length2).position);
+    const points = [...trail.map((moment) => tipOf(moment.state)), tipOf(state)];
+    const ages = [...trail.map(({ t }) => world.time - t), 0];
+    drawTrace(canvas, points, ages, TRAIL_SECONDS);
 
     const elbow = pointOn(plant, state, 1, plant.length1).position;
     const tip = pointOn(plant, state, 2, plant.length2).position;
+    const size = Math.max(9, 0.045 * this.scale); // px, radius of the shaft
+    const motorGlows = this.lit === 'motor';
+    drawHousing(canvas, this.at(PIVOT), 2 * size, motorGlows);
     this.drawLink(PIVOT, elbow, 'link1', plant.mass1);
     this.drawLink(elbow, tip, 'link2', plant.mass2);
-    this.drawMotor();
-    canvas.disc(...this.at(elbow), 4.5, 'panel');
+    drawHub(canvas, this.at(PIVOT), size, state.q1);
+    drawJoint(canvas, this.at(elbow), 0.55 * size);
     this.drawTorque(world.torque / plant.torque_limit);
     this.drawPush(world, state);
     this.sparks.draw(canvas, ...this.at(elbow), 0.75 * this.scale);
@@ -69,6 +88,27 @@ export class Scene {
       const [x, y] = this.place(at, elbow, tip);
       drawLabel(canvas, text, x, y);
     }
+  }
+
+  /// How brightly something shines, from 0 to 1.
+  private glow(thing: 'goal', { uprightFor }: World): number {
+    return this.lit === thing ? 1 : uprightFor !== null ? 0.8 : 0.4;
+  }
+
+  private drawGhosts(plant: Plant): void {
+    const { context } = this.canvas;
+    context.globalAlpha = 0.13;
+    context.lineCap = 'round';
+    const width = Math.max(3, 0.02 * this.scale);
+    for (let i = 0; i + 1 < this.ghosts.length; i += 2) {
+      const state = { q1: this.ghosts[i]!, q2: this.ghosts[i + 1]!, w1: 0, w2: 0 };
+      const elbow = this.at(pointOn(plant, state, 1, plant.length1).position);
+      const tip = this.at(pointOn(plant, state, 2, plant.length2).position);
+      this.canvas.line([this.at(PIVOT), elbow], 'link1', width);
+      this.canvas.line([elbow, tip], 'link2', width);
+    }
+    context.lineCap = 'butt';
+    context.globalAlpha = 1;
   }
 
   /// Where the label of something is written.
@@ -86,80 +126,10 @@ export class Scene {
     return [x + aside, y];
   }
 
-  /// How far the tip reaches, and the cone within which a link is upright, like the light of a lamp that
-  /// is on (`lit`) while both are.
-  private drawGuides(reach: number, lit: boolean): void {
-    const { context } = this.canvas;
-    const [x, y] = this.at(PIVOT);
-    const radius = this.scale * reach;
-    context.beginPath();
-    context.arc(x, y, radius, 0, 2 * Math.PI);
-    context.strokeStyle = this.canvas.color('grid');
-    context.lineWidth = 1;
-    context.stroke();
-    context.beginPath();
-    context.moveTo(x, y);
-    context.arc(x, y, radius, (-120 / 180) * Math.PI, (-60 / 180) * Math.PI);
-    context.closePath();
-    context.fillStyle = this.canvas.color('cone');
-    context.fill();
-    if (lit) context.fill();
-    context.strokeStyle = this.canvas.color('cone-edge');
-    context.lineWidth = lit ? 3 : 1.5;
-    context.stroke();
-  }
-
-  /// Where both links were, at equal times, as in a photograph by flashes.
-  private drawFlashes(plant: Plant, moments: readonly Moment[]): void {
-    const { context } = this.canvas;
-    const width = Math.max(4, 0.025 * this.scale);
-    context.lineCap = 'round';
-    moments.forEach(({ t, state }, i) => {
-      if (Math.round(t / CONTROL_PERIOD) % FLASH_STEPS !== 0) return;
-      context.globalAlpha = (0.22 * i) / moments.length;
-      const elbow = this.at(pointOn(plant, state, 1, plant.length1).position);
-      const tip = this.at(pointOn(plant, state, 2, plant.length2).position);
-      this.canvas.line([this.at(PIVOT), elbow], 'link1', width);
-      this.canvas.line([elbow, tip], 'link2', width);
-    });
-    context.globalAlpha = 1;
-    context.lineCap = 'butt';
-  }
-
-  private drawMotor(): void {
-    const place = this.at(PIVOT);
-    const radius = Math.max(9, 0.045 * this.scale);
-    this.canvas.disc(...place, radius, 'ink');
-    this.canvas.disc(...place, 0.45 * radius, 'stage');
-  }
-
-  /// Older parts are fainter.
-  private drawTrail({ plant, time }: World, state: State, moments: readonly Moment[]): void {
-    const tip = (s: State) => this.at(pointOn(plant, s, 2, plant.length2).position);
-    const points = [...moments.map((moment) => tip(moment.state)), tip(state)];
-    const shades = moments.map(({ t }) => {
-      const age = Math.min(Math.max((time - t) / TRAIL_SECONDS, 0), 1);
-      return Math.floor(TRAIL_SHADES * (1 - age)) / TRAIL_SHADES;
-    });
-    const { context } = this.canvas;
-    context.lineJoin = 'round';
-    for (let begin = 0; begin < moments.length;) {
-      let end = begin + 1;
-      while (end < moments.length && shades[end] === shades[begin]) ++end;
-      context.globalAlpha = 0.6 * shades[begin]!;
-      this.canvas.line(points.slice(begin, end + 1), 'link2', 2);
-      begin = end;
-    }
-    context.globalAlpha = 1;
-  }
-
   /// A link of 1 kg is as thick as its capsule, or more so that a finger finds it; a heavier one thicker.
-  private drawLink(from: Vec, to: Vec, color: string, mass: number): void {
-    const { context } = this.canvas;
+  private drawLink(from: Vec, to: Vec, name: 'link1' | 'link2', mass: number): void {
     const thickness = Math.max(10, 0.06 * this.scale) * Math.min(Math.max(mass, 0.25), 3) ** 0.5;
-    context.lineCap = 'round';
-    this.canvas.line([this.at(from), this.at(to)], color, thickness);
-    context.lineCap = 'butt';
+    drawRod(this.canvas, this.at(from), this.at(to), name, thickness, this.lit === name);
   }
 
   /// An arc about the pivot, from above, clockwise for a positive torque; its length is the share of
