@@ -5,6 +5,9 @@ import { readPolicy } from './program';
 
 /// The guided tour: how a visitor comes to it and leaves it, and that what it says is so.
 
+// The numbers of steps.
+const SHOVE = 4;
+
 /// Opens the page as a new visitor does, or at a step of the tour.
 async function visit(page: Page, hash = ''): Promise<void> {
   await open(page, hash);
@@ -94,6 +97,27 @@ test('a link with settings shows everything, and who chose a view finds it again
   await expect(page.locator('#tour')).toBeVisible();
   await comeBack();
   await expect(page.locator('#tour')).toBeVisible();
+});
+
+test('only the keys that a step names act, and another step goes on', async ({ stage: page }) => {
+  await stopAt(page, 1);
+  const now = () =>
+    page.evaluate(() => ({ on: upswing.world.agentOn, state: upswing.world.state }));
+  await expect.poll(async () => (await now()).on).toBe(true);
+  await advance(page, 0.5);
+  const before = await now();
+  for (const key of ['Space', 'g', 'r', '.', 'ArrowLeft']) await page.keyboard.press(key);
+  expect(await now()).toEqual(before);
+  await advance(page, 0.2);
+  expect(await page.evaluate(() => upswing.world.shoved)).toBeNull();
+  await expect(page.locator('#badge')).not.toHaveText(/paused/);
+  await open(page, '#everything');
+  await page.locator('#pause').click();
+  await open(page, `#tour=${SHOVE}`);
+  await expect(page.locator('#badge')).not.toHaveText(/paused/);
+  await page.keyboard.press('ArrowLeft');
+  await advance(page, 0.2);
+  expect(await page.evaluate(() => upswing.world.shoved)).not.toBeNull();
 });
 
 test('you are the motor: an arrow is its whole torque, and holding one lifts nothing', async ({

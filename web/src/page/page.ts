@@ -72,7 +72,10 @@ export class Page {
     this.tour = new Tour(
       this,
       (id) => agents.has(id),
-      () => this.changed(),
+      () => {
+        this.setPaused(false);
+        this.changed();
+      },
     );
     world.onMoment = (moment) => this.history.add(moment);
   }
@@ -175,7 +178,8 @@ export class Page {
     const reset = () => this.reset();
     const shoveLeft = () => this.world.shoveTo(-1);
     const shoveRight = () => this.world.shoveTo(1);
-    listenToKeys({ toggleAgent, togglePause, step, reset, shoveLeft, shoveRight });
+    const actions = { toggleAgent, togglePause, step, reset, shoveLeft, shoveRight };
+    listenToKeys(actions, () => this.tour.keys);
     button('agent-on', toggleAgent);
     button('pause', togglePause);
     button('step', step);

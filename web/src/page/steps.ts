@@ -32,6 +32,7 @@ export interface Stage {
 export interface Step {
   readonly id: string; // "step-ID" is its element
   readonly agents: readonly string[]; // without which it is left out
+  readonly keys?: readonly string[]; // of the page's, that it names; the others do nothing
   readonly labels?: (world: World) => Label[]; // on the stage
   /// When it is shown.
   begin(): Promise<void>;
@@ -48,6 +49,7 @@ const ADAPTIVE_AGENT = 'd3qn-adaptive';
 const LIGHT = 0.75; // kg
 const HELD = 2; // s upright that count as balanced
 const FAILED = 10; // s without, that count as failed
+const ARROWS = ['ArrowLeft', 'ArrowRight'];
 const GOAL: Label = { at: 'goal', text: 'both links in here' };
 
 const heldFor = (world: World) => world.uprightFor ?? 0;
@@ -127,6 +129,7 @@ function shove(stage: Stage): Step {
   return {
     id: 'shove',
     agents: [NOMINAL_AGENT],
+    keys: ARROWS,
     async begin() {
       await stage.take({ agent: NOMINAL_AGENT, on: true });
       shoved = 0;
@@ -224,6 +227,7 @@ function values(stage: Stage): Step {
   return {
     id: 'values',
     agents: [NOMINAL_AGENT],
+    keys: ARROWS,
     async begin() {
       speed.value = '1';
       element('tour-speed-value').textContent = '1×';

@@ -36,6 +36,11 @@ export class Tour {
     return this.now ? this.steps.indexOf(this.now) + 1 : 0;
   }
 
+  /// The keys that the step names; null outside of the tour.
+  get keys(): readonly string[] | null {
+    return this.now && (this.now.keys ?? []);
+  }
+
   /// Whether the step is shown in which an agent learns.
   get learns(): boolean {
     return this.now?.id === 'learn';
