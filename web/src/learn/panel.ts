@@ -14,6 +14,14 @@ import { Session } from './session';
 /// default agent, as it was recorded.
 
 const SEEDS_AT_ONCE = 4;
+/// The most that a trial of 20 s can bring while its links are never both up: energy 1.5, height 1.
+const MOST_WHILE_DOWN = (20 / CONTROL_PERIOD) * 2.5;
+
+/// How a training goes, in words.
+export interface Story {
+  readonly count: string; // with each news
+  readonly milestone: string;
+}
 
 /// What the panel does with the page.
 export interface LearnPage extends LearnStage {
@@ -95,19 +103,26 @@ export class LearnPanel {
     this.draw();
   }
 
-  /// How it goes, in a sentence.
-  get story(): string {
+  /// How it goes: a count that runs, and the last milestone.
+  get story(): Story {
     const { session } = this;
-    if (session?.state === 'failed') return sentence(session);
-    if (!session?.last || session.state === 'stopped') return '';
-    if (session.state !== 'learning') return sentence(session);
-    const steps = session.steps.toLocaleString('en');
-    const success = session.evaluations.at(-1)?.success ?? 0;
-    const tested =
-      success > 0 ? `, it succeeds in ${(100 * success).toFixed(0)}% of its tests` : '';
+    if (!session || session.state === 'stopped') return { count: '', milestone: '' };
+    if (session.state === 'failed' || !session.last) {
+      return { count: '', milestone: sentence(session) };
+    }
     const { episodeCount } = session.last;
-    const trials = episodeCount > 0 ? ` in ${episodeCount} trials` : '';
-    return `After ${steps} steps${trials}, ${swinging(session.steps)}${tested} …`;
+    const count = `Trial ${episodeCount.toLocaleString('en')}, ${swinging(session.steps)}`;
+    return { count, milestone: milestone(session) };
+  }
+
+  /// Puts what learns or has learned back on the stage, and lets it go on. False if nothing has.
+  show(): boolean {
+    const { session } = this;
+    if (!session?.last || session.state === 'stopped') return false;
+    session.resume();
+    this.scrubber.follow();
+    void this.takeOver();
+    return true;
   }
 
   /// Whether what was learned since the page was opened is the visitor's own policy now.
@@ -286,6 +301,20 @@ function brief({ state, last, seconds }: Session): string {
 function swinging(steps: number): string {
   const minutes = (steps * CONTROL_PERIOD) / 60;
   return minutes < 1 ? 'less than a minute of swinging' : `${minutes.toFixed(0)} min of swinging`;
+}
+
+/// The last thing that happened for the first time.
+function milestone(session: Session): string {
+  const { state, episodes, evaluations, settings } = session;
+  if (state !== 'starting' && state !== 'learning') return sentence(session);
+  const most = evaluations.find(({ success }) => success > 0.5);
+  if (most) return `It passes most of its tests: ${Math.round(100 * most.success)} of 100.`;
+  const first = evaluations.find(({ success }) => success > 0);
+  if (first) return `It passes its first tests: ${Math.round(100 * first.success)} of 100.`;
+  // With other weights of the reward a return says nothing of it.
+  if (Object.keys(settings).some((name) => name.endsWith('_weight'))) return 'Learning …';
+  const trial = episodes.findIndex((episode) => episode.return > MOST_WHILE_DOWN);
+  return trial < 0 ? 'Learning …' : `It stays up for the first time: trial ${trial + 1}.`;
 }
 
 function sentence(session: Session): string {

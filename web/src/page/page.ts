@@ -77,7 +77,10 @@ export class Page {
         this.changed();
       },
     );
-    world.onMoment = (moment) => this.history.add(moment);
+    world.onMoment = (moment) => {
+      this.history.add(moment);
+      this.tour.moment(moment);
+    };
   }
 
   /// Memory that the core has taken (bytes), which it never gives back.
@@ -96,12 +99,12 @@ export class Page {
     placeCharts();
     this.setPaused(false);
     if (view.name === 'tour') {
-      this.learn.pause();
+      if (this.tour.number === 0) this.learn.pause();
       return this.tour.go(view.step);
     }
     const { shared, problems } = decode(hash, RANGES, (id) => this.agents.has(id));
-    // What was learned at the end of the tour stays.
-    if (this.tour.learns && this.learn.keeps && !shared.agent) {
+    // What was learned in the tour stays.
+    if (this.tour.number > 0 && this.learn.keeps && !shared.agent) {
       Object.assign(shared, { agent: OWN, on: true });
     }
     this.tour.leave();
@@ -240,12 +243,6 @@ export class Page {
     if (!valid) this.restarted();
     this.world.look();
     this.clock.settle();
-  }
-
-  /// Of the lower link (kg).
-  setMass(mass2: number): void {
-    this.settings.setPlant({ ...this.world.plant, mass2 });
-    this.changed();
   }
 
   /// From hanging.

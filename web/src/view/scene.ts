@@ -20,6 +20,7 @@ export class Scene {
   readonly canvas: Canvas;
   readonly sparks = new Sparks();
   labels: readonly Label[] = [];
+  ghost: State | null = null; // of another try
 
   /// Pixels per metre.
   private scale = 1;
@@ -55,6 +56,7 @@ export class Scene {
     this.drawGuides(plant.length1 + plant.length2, world.uprightFor !== null);
     this.drawFlashes(plant, trail);
     this.drawTrail(world, state, trail);
+    this.drawGhost(plant);
 
     const elbow = pointOn(plant, state, 1, plant.length1).position;
     const tip = pointOn(plant, state, 2, plant.length2).position;
@@ -233,5 +235,18 @@ export class Scene {
     context.fillStyle = this.canvas.color(color);
     context.fill();
     context.restore();
+  }
+
+  /// Another try, faintly behind this one.
+  private drawGhost(plant: Plant): void {
+    if (!this.ghost) return;
+    const { context } = this.canvas;
+    const elbow = this.at(pointOn(plant, this.ghost, 1, plant.length1).position);
+    const tip = this.at(pointOn(plant, this.ghost, 2, plant.length2).position);
+    context.globalAlpha = 0.35;
+    context.lineCap = context.lineJoin = 'round';
+    this.canvas.line([this.at(PIVOT), elbow, tip], 'quiet', Math.max(8, 0.04 * this.scale));
+    context.lineCap = 'butt';
+    context.globalAlpha = 1;
   }
 }
