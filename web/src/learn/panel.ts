@@ -14,8 +14,15 @@ import { Session } from './session';
 /// default agent, as it was recorded.
 
 const SEEDS_AT_ONCE = 4;
-/// The most that a trial of 20 s can bring while its links are never both up: energy 1.5, height 1.
-const MOST_WHILE_DOWN = (20 / CONTROL_PERIOD) * 2.5;
+/// What a trial of 4 s proves by bringing more than so much: a step brings 1.5 for energy and 1 for height
+/// at most, and 5 more only while both links are up.
+const DOWN = (2.5 * 4) / CONTROL_PERIOD;
+const UP = 5 / CONTROL_PERIOD; // for a second
+const PROOFS = [
+  [DOWN + 2 * UP, 'for two seconds'],
+  [DOWN + UP, 'for a second'],
+  [DOWN, 'for a moment'],
+] as const;
 
 /// How a training goes, in words.
 export interface Story {
@@ -313,8 +320,11 @@ function milestone(session: Session): string {
   if (first) return `It passes its first tests: ${Math.round(100 * first.success)} of 100.`;
   // With other weights of the reward a return says nothing of it.
   if (Object.keys(settings).some((name) => name.endsWith('_weight'))) return 'Learning …';
-  const trial = episodes.findIndex((episode) => episode.return > MOST_WHILE_DOWN);
-  return trial < 0 ? 'Learning …' : `It stays up for the first time: trial ${trial + 1}.`;
+  for (const [proof, long] of PROOFS) {
+    const trial = episodes.findIndex((episode) => episode.return > proof);
+    if (trial >= 0) return `Upright ${long}: trial ${trial + 1}.`;
+  }
+  return 'Learning …';
 }
 
 function sentence(session: Session): string {
