@@ -88,5 +88,10 @@ test('at 400% the tour goes down, not sideways, and all of it can be reached', a
       await page.evaluate(() => document.documentElement.scrollWidth),
       `step ${step}`,
     ).toBeLessThanOrEqual(320);
+    // A finger meets every number of a step.
+    for (const dot of await page.locator('#dots button').all()) {
+      const { width, height } = (await dot.boundingBox())!;
+      expect(Math.min(width, height)).toBeGreaterThanOrEqual(24);
+    }
   }
 });

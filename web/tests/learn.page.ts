@@ -53,26 +53,45 @@ test('in the tour an agent learns from nothing and stays, and is what Node and t
   await openLearn(page);
   await page.getByLabel('Seed', { exact: true }).fill(String(SEED));
   await page.getByRole('link', { name: 'Tour' }).click();
-  await page.getByRole('button', { name: 'Step 9:' }).click();
+  await page.getByRole('button', { name: 'Step 3:' }).click();
   const step = page.locator('#step-learn');
+  /// All that a screen reader hears.
+  await page.evaluate(() => {
+    const heard: string[] = [];
+    Object.assign(globalThis, { heard });
+    const observer = new MutationObserver((changes) => {
+      for (const { target } of changes) {
+        const element = target instanceof Element ? target : target.parentElement!;
+        const live = element.closest('[aria-live]')?.getAttribute('aria-live');
+        if (live === 'polite' && element.textContent) heard.push(element.textContent);
+      }
+    });
+    observer.observe(document.body, { childList: true, characterData: true, subtree: true });
+  });
   await step.getByRole('button', { name: 'Learn' }).click();
-  await expect(step.locator('.answer')).toContainText(/After [\d,]+ steps in \d+ trials/);
+  await expect(page.locator('#tour-count')).toHaveText(/^Trial [\d,]+, .* of swinging$/);
   expect(page.workers().length).toBe(1);
   const learned = () => page.evaluate(() => upswing.world.policy!.metadata.get('agent'));
   await expect.poll(learned).toBe('fast');
-  // It ends when the visitor goes back, until it has learned.
-  await page.locator('#tour-back').click();
-  await expect.poll(() => page.workers().length).toBe(0);
-  await expect.poll(learned).toBe('d3qn');
-  await page.locator('#tour-next').click();
-  await step.getByRole('button', { name: 'Learn' }).click();
-  await expect(step.locator('.answer')).toContainText('Solved after');
-  await expect(page.locator('#agent')).toHaveValue('own');
+  // It goes on while the visitor is elsewhere, and comes back.
   await page.locator('#tour-back').click();
   await expect.poll(learned).toBe('d3qn');
   await page.locator('#tour-next').click();
   await expect.poll(learned).toBe('fast');
-  await page.locator('#tour-end').click();
+  await expect(step.locator('.answer')).toContainText('Solved after');
+  await expect.poll(() => page.workers().length).toBe(0);
+  await expect(page.locator('#agent')).toHaveValue('own');
+  const heard = await page.evaluate(() => (globalThis as never as { heard: string[] }).heard);
+  // Each milestone once, and once more what was the last when the visitor comes back.
+  const milestones = heard.filter((text) => /Learning|first|most|Solved/.test(text));
+  expect(new Set(milestones).size).toBeGreaterThanOrEqual(milestones.length - 1);
+  expect(heard.length).toBeLessThanOrEqual(12);
+  await page.locator('#tour-back').click();
+  await expect.poll(learned).toBe('d3qn');
+  await page.locator('#tour-next').click();
+  await expect.poll(learned).toBe('fast');
+  await page.getByRole('button', { name: 'Step 9:' }).click();
+  await page.getByRole('link', { name: 'Everything, with your own agent' }).click();
   await expect(page.locator('#charts')).toBeVisible();
   await expect(page.locator('#agent')).toHaveValue('own');
   await expect(page.locator('#agent-on')).toHaveAttribute('aria-pressed', 'true');

@@ -5,6 +5,9 @@ import { readPolicy } from './program';
 
 /// The guided tour: how a visitor comes to it and leaves it, and that what it says is so.
 
+// The numbers of steps.
+const [MOTOR, LEARN, AGENT, SHOVE, BET, VALUES, MAP] = [2, 3, 4, 5, 6, 7, 8];
+
 /// Opens the page as a new visitor does, or at a step of the tour.
 async function visit(page: Page, hash = ''): Promise<void> {
   await open(page, hash);
@@ -53,7 +56,7 @@ test('from step to step, by buttons, numbers and address, and back', async ({ st
     await expect(heading(page)).toBeFocused();
   }
   // On the keyboard's way the numbers come last.
-  await page.locator('#tour-end').focus();
+  await page.locator('#tour-back').focus();
   await page.keyboard.press('Tab');
   await expect(page.locator('#dots button').first()).toBeFocused();
   await expect(page).toHaveURL(new RegExp(`#tour=${steps.length}$`));
@@ -96,10 +99,31 @@ test('a link with settings shows everything, and who chose a view finds it again
   await expect(page.locator('#tour')).toBeVisible();
 });
 
+test('only the keys that a step names act, and another step goes on', async ({ stage: page }) => {
+  await stopAt(page, 1);
+  const now = () =>
+    page.evaluate(() => ({ on: upswing.world.agentOn, state: upswing.world.state }));
+  await expect.poll(async () => (await now()).on).toBe(true);
+  await advance(page, 0.5);
+  const before = await now();
+  for (const key of ['Space', 'g', 'r', '.', 'ArrowLeft']) await page.keyboard.press(key);
+  expect(await now()).toEqual(before);
+  await advance(page, 0.2);
+  expect(await page.evaluate(() => upswing.world.shoved)).toBeNull();
+  await expect(page.locator('#badge')).not.toHaveText(/paused/);
+  await open(page, '#everything');
+  await page.locator('#pause').click();
+  await open(page, `#tour=${SHOVE}`);
+  await expect(page.locator('#badge')).not.toHaveText(/paused/);
+  await page.keyboard.press('ArrowLeft');
+  await advance(page, 0.2);
+  expect(await page.evaluate(() => upswing.world.shoved)).not.toBeNull();
+});
+
 test('you are the motor: an arrow is its whole torque, and holding one lifts nothing', async ({
   stage: page,
 }) => {
-  await stopAt(page, 2);
+  await stopAt(page, MOTOR);
   for (const [key, button, torque] of [
     ['ArrowLeft', 'Turn to the left', 5],
     ['ArrowRight', 'Turn to the right', -5],
@@ -115,22 +139,91 @@ test('you are the motor: an arrow is its whole torque, and holding one lifts not
     expect((await run(page, 0.02)).at(-1)![5]).toBe(torque);
     await page.mouse.up();
     expect((await run(page, 0.02)).at(-1)![5]).toBe(0);
-    // The tour looks at the height once in a few frames: the pendulum stays up until it has.
-    await expect(answer(page)).toContainText(/Your best: \d+% of the way up/);
-    await page.evaluate(() => upswing.reset());
+    await expect(page.locator('#motor-best')).toHaveText('0.0 s');
+    await page.getByRole('button', { name: 'Start over' }).click();
+    expect(await page.evaluate(() => upswing.world.state.q1)).toBe(0);
   }
   await page.getByRole('button', { name: 'Next' }).click();
-  await page.keyboard.down('ArrowLeft'); // a shove again
+  await page.keyboard.down('ArrowLeft');
   expect(await page.evaluate(() => upswing.world.byHand)).toBe(0);
   await page.keyboard.up('ArrowLeft');
 });
 
+test('the game counts the seconds with both links up, and the best try comes back as a ghost', async ({
+  stage: page,
+}) => {
+  await stopAt(page, MOTOR);
+  const now = page.locator('#motor-now');
+  const best = page.locator('#motor-best');
+  const send = page.getByRole('button', { name: 'Copy my result' });
+  await expect(send).toBeDisabled();
+  /// Falls from near upright; the longest time (s) with both links up, by the same clock.
+  const fall = (q1: number) =>
+    page.evaluate((q1) => {
+      const { world } = upswing;
+      document.getElementById('motor-again')!.click();
+      world.reset({ q1, q2: 0, w1: 0, w2: 0 });
+      let longest = 0;
+      for (let k = 0; k < 200 * 4; ++k) {
+        world.advance();
+        if (k % 4 === 0) longest = Math.max(longest, world.uprightFor ?? 0);
+      }
+      return longest;
+    }, q1);
+  const ghosts = () => page.evaluate(() => upswing.scene.ghost);
+  expect(await ghosts()).toBeNull();
+  const short = await fall(Math.PI - 0.3);
+  await expect(best).toHaveText(`${short.toFixed(1)} s`);
+  const long = await fall(Math.PI - 0.01);
+  expect(long).toBeGreaterThan(short + 0.2);
+  await expect(best).toHaveText(`${long.toFixed(1)} s`);
+  await expect(answer(page)).toHaveText(`Your best: ${long.toFixed(1)} s.`);
+  await page.getByRole('button', { name: 'Start over' }).click();
+  await expect(now).toHaveText('0.0 s');
+  await advance(page, 0.2);
+  await expect.poll(ghosts).not.toBeNull();
+  const ghost = (await ghosts())!;
+  expect(Math.cos(ghost.q1)).toBeLessThan(-0.9); // up, while this try hangs
+  await fall(Math.PI - 0.3);
+  await expect(answer(page)).toHaveText(`${short.toFixed(1)} s this time.`);
+
+  // A hand that holds it up counts nothing.
+  await page.evaluate(() => {
+    upswing.world.reset({ q1: Math.PI, q2: 0, w1: 0, w2: 0 });
+    upswing.world.drag = { link: 2, along: 0.5, target: { x: 0, z: 1 } };
+    for (let k = 0; k < 200 * 10; ++k) upswing.world.advance();
+  });
+  expect(await balanced(page)).toBeGreaterThan(5);
+  await page.evaluate(() => (upswing.world.drag = null));
+  await expect(now).toHaveText('0.0 s');
+  await expect(best).toHaveText(`${long.toFixed(1)} s`);
+
+  await page.context().grantPermissions(['clipboard-read', 'clipboard-write']);
+  await send.click();
+  await expect(page.locator('#message')).toContainText('in the clipboard');
+  expect(await page.evaluate(() => navigator.clipboard.readText())).toMatch(
+    new RegExp(`up for ${long.toFixed(1)} s by hand\\. Can you\\? http.*/#tour=2$`),
+  );
+
+  // Half speed helps, and has a best of its own; both are there at the next visit.
+  const speed = () => page.evaluate(() => upswing.clock.speed);
+  await page.getByLabel('half speed').check();
+  expect(await speed()).toBe(0.5);
+  await expect(best).toHaveText('0.0 s');
+  await visit(page, `#tour=${LEARN}`);
+  expect(await speed()).toBe(1);
+  await visit(page, `#tour=${MOTOR}`);
+  await expect(page.getByLabel('half speed')).not.toBeChecked();
+  await expect(best).toHaveText(`${long.toFixed(1)} s`);
+});
+
 test('the agent has the same motor, and learned for 80 minutes', async ({ stage: page }) => {
-  await stopAt(page, 2);
+  await stopAt(page, MOTOR);
   await page.keyboard.down('ArrowRight');
   await run(page, 1.3);
   await page.keyboard.up('ArrowRight');
-  await page.getByRole('button', { name: 'Next' }).click(); // it takes over in the middle of a swing
+  // It takes over in the middle of a swing.
+  await page.getByRole('button', { name: `Step ${AGENT}:` }).click();
   await expect(page.locator('#agent')).toHaveValue('d3qn');
   await page.getByRole('button', { name: 'Give it the motor' }).click();
   const rows = await run(page, 15);
@@ -143,7 +236,7 @@ test('the agent has the same motor, and learned for 80 minutes', async ({ stage:
 });
 
 test('it catches one shove, falls after seven, and gets up again', async ({ stage: page }) => {
-  await stopAt(page, 4);
+  await stopAt(page, SHOVE);
   for (const name of ['Shove to the left', 'Shove to the right']) {
     for (const [count, falls] of [
       [1, false],
@@ -161,34 +254,36 @@ test('it catches one shove, falls after seven, and gets up again', async ({ stag
   }
 });
 
-test('the agent fails below 0.8 kg, the one that learned on many does not', async ({
+test('a bet: with the light link the agent of many pendulums holds, the one of one does not', async ({
   stage: page,
 }) => {
-  await stopAt(page, 5);
-  const mass = page.locator('#tour-mass');
-  const [low, high] = await Promise.all(['min', 'max'].map((end) => mass.getAttribute(end)));
-  expect([low, high]).toEqual(['0.7', '1.3']);
-  const fails = [0.7, 0.75];
-  for (const kilograms of [...fails, 0.8, 0.85, 0.9, 1.1, 1.2, 1.3]) {
-    await mass.fill(String(kilograms)); // and it starts over
-    expect(await page.evaluate(() => upswing.world.state.q1)).toBe(0);
-    const failed = (await held(page, 20)) < 5;
-    expect(failed, `${kilograms} kg`).toBe(fails.includes(kilograms));
+  await stopAt(page, BET);
+  await expect(page.locator('#twin-scene')).toBeVisible();
+  await expect(page.locator('#first-name')).toHaveText('learned on one');
+  await expect(page.locator('#twin-name')).toHaveText('learned on many');
+  expect(await page.evaluate(() => upswing.world.twin!.plant.mass2)).toBe(0.75);
+  await advance(page, 2); // nobody moves before the bet
+  expect(await page.evaluate(() => upswing.world.state.q1)).toBe(0);
+  await expect(answer(page)).toHaveText('');
+  for (const [name, result] of [
+    ['Learned on one', 'You lost'],
+    ['Learned on many', 'You were right'],
+  ] as const) {
+    const bet = page.getByRole('button', { name });
+    await bet.click();
+    await expect(bet).toHaveAttribute('aria-pressed', 'true');
+    await expect.poll(() => page.evaluate(() => upswing.world.agentOn)).toBe(true);
+    await expect(answer(page)).toHaveText('Both try …');
+    expect(await held(page, 20)).toBeLessThan(5);
+    expect(await page.evaluate(() => upswing.world.twin!.uprightFor)).toBeGreaterThan(10);
+    await expect(answer(page)).toContainText(`${result}: the one that learned on many`);
   }
   await page.getByRole('button', { name: 'Next' }).click();
-  expect(await held(page, 20)).toBeLessThan(5);
-  await page.getByRole('radio', { name: 'on many' }).check();
-  await expect(page.locator('#agent')).toHaveValue('d3qn-adaptive');
-  expect(await page.evaluate(() => upswing.world.plant.mass2)).toBe(0.75);
-  expect(await held(page, 20)).toBeGreaterThan(10);
-  await expect(answer(page)).toContainText('It holds: it feels out');
-  await page.getByRole('radio', { name: 'learned on one' }).check(); // it has to swing up itself
-  expect(await held(page, 20)).toBeLessThan(5);
-  await expect(answer(page)).toContainText('fails again and again');
+  await expect(page.locator('#twin-scene')).toBeHidden();
 });
 
 test('the bars are what it expects, and the highest is taken', async ({ stage: page }) => {
-  await stopAt(page, 7);
+  await stopAt(page, VALUES);
   await expect(page.locator('#q')).toBeVisible();
   await page.evaluate(() => upswing.reset());
   const best: number[] = [];
@@ -209,14 +304,33 @@ test('the bars are what it expects, and the highest is taken', async ({ stage: p
   expect(await balanced(page)).toBeGreaterThan(2);
   expect(best.at(-1)!).toBeGreaterThan(1.5 * best[0]!); // at the top it expects most
   expect(best.at(-1)!).toBeGreaterThan(0.95 * Math.max(...best));
+
+  // The bars hang from the best torque, each as long as what it costs; in words, in points of reward.
+  const [cost, all] = await page.evaluate(() => {
+    const { decision, policy } = upswing.world;
+    if (decision?.kind !== 'q') throw new Error('no Q-values');
+    const [low, high] = [Math.min(...decision.q), Math.max(...decision.q)];
+    return [(high - low) / policy!.rewardScale, high / policy!.rewardScale];
+  });
+  await expect(page.locator('#q-value')).toHaveText(
+    `the worst torque costs ${cost!.toFixed(1)} of ${all!.toFixed(0)} points`,
+  );
+  await expect(page.locator('#q-value')).toBeVisible();
+
+  // A shove by keyboard throws it down.
+  for (let k = 0; k < 7; ++k) {
+    await page.keyboard.press('ArrowLeft');
+    await run(page, 0.2);
+  }
+  expect(await held(page, 4)).toBeLessThan(4);
 });
 
 test('every pose at once: the brightest is upright, and a click starts there', async ({
   stage: page,
 }) => {
-  await visit(page, '#tour=8');
+  await visit(page, `#tour=${MAP}`);
   await expect(page.locator('#map-value')).toHaveText(/^\d+ to \d+$/);
-  await stopAt(page, 8);
+  await stopAt(page, MAP);
   /// Of a grid of poses at rest, the one of which the agent expects most, and least.
   const [most, least] = await page.evaluate(() => {
     const poses: [number, number, number][] = [];
@@ -246,6 +360,53 @@ test('every pose at once: the brightest is upright, and a click starts there', a
   expect(q1).toBeCloseTo(Math.PI / 2, 1);
   expect(q2).toBeCloseTo(-Math.PI / 2, 1);
   expect(await held(page, 20)).toBeGreaterThan(5);
+
+  // The same by keyboard: from the middle, upright, six times 15° to either side.
+  await page.locator('#map').focus();
+  for (const key of ['ArrowLeft', 'ArrowDown']) {
+    for (let k = 0; k < 6; ++k) await page.keyboard.press(key);
+  }
+  await expect(page.locator('#map-mark')).toHaveText('upper angle 90°, lower angle −90°');
+  expect(await page.evaluate(() => upswing.world.byHand)).toBe(0);
+  await page.keyboard.press('Enter');
+  const started = await page.evaluate(() => upswing.world.state);
+  expect(started.q1).toBeCloseTo(Math.PI / 2, 9);
+  expect(started.q2).toBeCloseTo(-Math.PI / 2, 9);
+  expect(await held(page, 20)).toBeGreaterThan(5);
+});
+
+test('the end has three doors, and an invitation', async ({ stage: page }) => {
+  await visit(page, '#tour=99');
+  await expect(heading(page)).toHaveText('What you saw');
+  await expect(page.getByRole('button', { name: 'Next' })).toBeHidden();
+  await page.context().grantPermissions(['clipboard-read', 'clipboard-write']);
+  await page.getByRole('button', { name: 'Copy an invitation' }).click();
+  await expect(page.locator('#message')).toContainText('in the clipboard');
+  expect(await page.evaluate(() => navigator.clipboard.readText())).toMatch(
+    /^A double pendulum learns.* http.*\/#tour$/,
+  );
+  await page.getByRole('link', { name: 'Everything at once' }).click();
+  await expect(page.locator('#charts')).toBeVisible();
+});
+
+test('where motion is not wanted, every step waits for a button', async ({ stage: page }) => {
+  await page.emulateMedia({ reducedMotion: 'reduce' });
+  const count = await page.locator('.step').count();
+  await visit(page, '#tour=1');
+  for (let step = 1; step <= count; ++step) {
+    if (step > 1) await page.getByRole('button', { name: 'Next' }).click();
+    await run(page, 1);
+    expect(await page.evaluate(() => upswing.world.state), `step ${step}`).toEqual({
+      ...{ q1: 0, q2: 0, w1: 0, w2: 0 },
+    });
+    const start = page.locator('#tour-start');
+    await expect(start).toBeVisible({ visible: [SHOVE, VALUES, MAP, count].includes(step) });
+    if (!(await start.isVisible())) continue;
+    await start.click();
+    await expect(start).toBeHidden();
+    await run(page, 1);
+    expect(await page.evaluate(() => upswing.world.state.w1), `step ${step}`).not.toBe(0);
+  }
 });
 
 const SIZES = [
@@ -265,15 +426,15 @@ test('at any size pendulum, words, control and buttons are on one screen', async
     if (step > 1) await page.locator('#tour-next').click();
     for (const [width, height] of SIZES) {
       await page.setViewportSize({ width, height });
-      const seen = await page.evaluate(async (step) => {
+      const seen = await page.evaluate(async (bars) => {
         scrollTo({ top: 0, behavior: 'instant' });
         const one = (selector: string) =>
           [...document.querySelectorAll(selector)].filter((found) => found.checkVisibility());
         const now = '.step:not([inert])';
         const groups = [
-          ...[one('#scene'), one('#tour-next, #tour-end'), one(`${now} h2`)],
+          ...[one('#scene'), one(`#tour-next, ${now} #tour-end`), one(`${now} h2`)],
           one(`${now} fieldset, #map`),
-          ...(step === 7 ? [one('#q')] : []),
+          ...(bars ? [one('#q')] : []),
         ];
         const shares = new Promise<number[]>((resolve) => {
           const observer = new IntersectionObserver((entries) => {
@@ -287,7 +448,7 @@ test('at any size pendulum, words, control and buttons are on one screen', async
           least: Math.min(...(await shares)),
           scrolls: document.documentElement.scrollWidth > innerWidth,
         };
-      }, step);
+      }, step === VALUES);
       expect(seen, `step ${step}, ${width} × ${height}`).toEqual({
         counts: seen.counts.map(() => 1),
         least: 1,

@@ -14,6 +14,21 @@ import { Session } from './session';
 /// default agent, as it was recorded.
 
 const SEEDS_AT_ONCE = 4;
+/// What a trial of 4 s proves by bringing more than so much: a step brings 1.5 for energy and 1 for height
+/// at most, and 5 more only while both links are up.
+const DOWN = (2.5 * 4) / CONTROL_PERIOD;
+const UP = 5 / CONTROL_PERIOD; // for a second
+const PROOFS = [
+  [DOWN + 2 * UP, 'for two seconds'],
+  [DOWN + UP, 'for a second'],
+  [DOWN, 'for a moment'],
+] as const;
+
+/// How a training goes, in words.
+export interface Story {
+  readonly count: string; // with each news
+  readonly milestone: string;
+}
 
 /// What the panel does with the page.
 export interface LearnPage extends LearnStage {
@@ -95,19 +110,22 @@ export class LearnPanel {
     this.draw();
   }
 
-  /// How it goes, in a sentence.
-  get story(): string {
+  /// How it goes: a count that runs, and the last milestone.
+  get story(): Story {
     const { session } = this;
-    if (session?.state === 'failed') return sentence(session);
-    if (!session?.last || session.state === 'stopped') return '';
-    if (session.state !== 'learning') return sentence(session);
-    const steps = session.steps.toLocaleString('en');
-    const success = session.evaluations.at(-1)?.success ?? 0;
-    const tested =
-      success > 0 ? `, it succeeds in ${(100 * success).toFixed(0)}% of its tests` : '';
+    if (!session || session.state === 'stopped') return { count: '', milestone: '' };
+    if (session.state === 'failed' || !session.last) {
+      return { count: '', milestone: sentence(session) };
+    }
     const { episodeCount } = session.last;
-    const trials = episodeCount > 0 ? ` in ${episodeCount} trials` : '';
-    return `After ${steps} steps${trials}, ${swinging(session.steps)}${tested} …`;
+    const count = `Trial ${episodeCount.toLocaleString('en')}, ${swinging(session.steps)}`;
+    return { count, milestone: milestone(session) };
+  }
+
+  /// Lets what waits go on.
+  resume(): void {
+    for (const session of this.sessions) session.resume();
+    this.draw();
   }
 
   /// Whether what was learned since the page was opened is the visitor's own policy now.
@@ -314,6 +332,23 @@ function brief({ state, last, seconds }: Session): string {
 function swinging(steps: number): string {
   const minutes = (steps * CONTROL_PERIOD) / 60;
   return minutes < 1 ? 'less than a minute of swinging' : `${minutes.toFixed(0)} min of swinging`;
+}
+
+/// The last thing that happened for the first time.
+function milestone(session: Session): string {
+  const { state, episodes, evaluations, settings } = session;
+  if (state !== 'starting' && state !== 'learning') return sentence(session);
+  const most = evaluations.find(({ success }) => success > 0.5);
+  if (most) return `It passes most of its tests: ${Math.round(100 * most.success)} of 100.`;
+  const first = evaluations.find(({ success }) => success > 0);
+  if (first) return `It passes its first tests: ${Math.round(100 * first.success)} of 100.`;
+  // With other weights of the reward a return says nothing of it.
+  if (Object.keys(settings).some((name) => name.endsWith('_weight'))) return 'Learning …';
+  for (const [proof, long] of PROOFS) {
+    const trial = episodes.findIndex((episode) => episode.return > proof);
+    if (trial >= 0) return `Upright ${long}: trial ${trial + 1}.`;
+  }
+  return 'Learning …';
 }
 
 function sentence(session: Session): string {

@@ -1,6 +1,11 @@
-import { note } from './message';
+import { copy } from './clipboard';
 
 const DELAY = 300; // ms: browsers refuse an address that changes with each pixel of a slider
+
+/// The page's address with this behind the #.
+export function addressOf(hash: string): string {
+  return new URL(`#${hash}`, location.href).href;
+}
 
 /// Keeps the address what the page shows, so that it can be shared at any time.
 export class Address {
@@ -19,14 +24,8 @@ export class Address {
   }
 
   /// A link with this behind the #, to the clipboard or on the screen; `without` says what it leaves out.
-  async share(hash: string, without: string): Promise<void> {
-    const link = new URL(`#${hash}`, location.href).href;
-    try {
-      await navigator.clipboard.writeText(link);
-      note(`The link is in the clipboard${without}.`);
-    } catch {
-      note(`The link${without}: ${link}`);
-    }
+  share(hash: string, without: string): Promise<void> {
+    return copy(addressOf(hash), `The link${without}`);
   }
 
   private write(): void {

@@ -61,7 +61,8 @@ export class Dashboard {
     this.phase.draw(moments);
   }
 
-  private drawTorque(moments: readonly Moment[], { time: now, plant, decision }: World): void {
+  private drawTorque(moments: readonly Moment[], world: World): void {
+    const { time: now, plant, decision, policy } = world;
     const limit = plant.torque_limit;
     this.torque.draw(moments, now, {
       unit: 'N·m',
@@ -74,7 +75,7 @@ export class Dashboard {
         [limit, signed(limit)],
       ],
     });
-    this.decision.draw(decision);
+    this.decision.draw(decision, policy?.rewardScale ?? 1);
   }
 
   /// The numbers change a few times a second, so that they can be read.
@@ -117,8 +118,12 @@ export function decisionText(decision: Decision, rewardScale: number): string {
   const reward = (x: number) => withMinus((x / rewardScale).toFixed(1));
   const value = Number.isNaN(decision.value) ? '' : reward(decision.value);
   switch (decision.kind) {
-    case 'q':
-      return `best ${reward(decision.q[decision.action]!)}${value && `, state ${value}`}`;
+    case 'q': {
+      const best = decision.q[decision.action]!;
+      const cost = reward(best - Math.min(...decision.q));
+      const all = withMinus((best / rewardScale).toFixed(0));
+      return `the worst torque costs ${cost} of ${all} points`;
+    }
     case 'gaussian': {
       const { torque, low, high } = decision;
       return `${fixed(torque)} N·m, σ ${fixed((high - low) / 2)}${value && `, V ${value}`}`;

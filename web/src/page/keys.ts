@@ -13,8 +13,9 @@ export interface Actions {
 }
 
 /// The page by keyboard. Keys that mean something where the focus is are left alone, and all of them
-/// can be switched off, for those who speak to their computer or touch keys by accident.
-export function listenToKeys(actions: Actions): void {
+/// can be switched off, for those who speak to their computer or touch keys by accident. `named` has the
+/// only keys that act at the moment; null: all of them.
+export function listenToKeys(actions: Actions, named: () => readonly string[] | null): void {
   const on = element<HTMLInputElement>('keys');
   on.checked = recall(KEY) !== 'off';
   on.addEventListener('change', () => remember(KEY, on.checked ? 'on' : 'off'));
@@ -31,8 +32,9 @@ export function listenToKeys(actions: Actions): void {
     if (!on.checked || event.ctrlKey || event.altKey || event.metaKey) return;
     if (target.closest('input, select, textarea, math')) return; // a formula scrolls
     if (event.key === ' ' && target.closest('button, summary')) return;
-    const action = keys.get(event.key.length === 1 ? event.key.toLowerCase() : event.key);
-    if (!action) return;
+    const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+    const action = keys.get(key);
+    if (!action || named()?.includes(key) === false) return;
     event.preventDefault();
     // Of a key that is held down, only steps repeat.
     if (!event.repeat || event.key === '.') action();

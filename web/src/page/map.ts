@@ -1,6 +1,6 @@
 import type { History } from '../history';
 import { AXES, ValueMap, valueAt } from '../map';
-import type { Quantity, Variable } from '../map';
+import type { Axis, Quantity, Variable } from '../map';
 import type { State } from '../pendulum';
 import type { Policy } from '../policy';
 import { signed } from '../view/charts';
@@ -12,6 +12,13 @@ const CELLS = 36; // of a side
 const MILLISECONDS = 2; // of a frame
 const FRAMES = 3; // it is drawn at each third, and computed at the others
 const WAY = 4; // s of the trajectory that are drawn
+const MARKS = 24; // places of the mark on a side
+const ARROWS: Readonly<Record<string, readonly [number, number]>> = {
+  ArrowLeft: [-1, 0],
+  ArrowRight: [1, 0],
+  ArrowUp: [0, 1],
+  ArrowDown: [0, -1],
+};
 
 /// The map of what the agent expects: what is chosen for it, and clicks on it.
 export class MapPanel {
@@ -27,6 +34,7 @@ export class MapPanel {
   private seen = false; // on the screen
   private range: [number, number] = [0, 1];
   private frame = 0;
+  private mark: [number, number] | null = null; // shares of both axes, by keyboard
 
   /// `start` is told where a click wants the pendulum to be.
   constructor(start: (where: Partial<State>) => void) {
@@ -36,13 +44,37 @@ export class MapPanel {
     }
     canvas.addEventListener('click', ({ offsetX, offsetY }) => {
       const shares = this.chart.toShares(offsetX, offsetY);
-      if (!shares) return;
-      const [x, y] = shares;
-      const { map } = this;
-      const rest = map.atRest ? { w1: 0, w2: 0 } : {};
-      start({ ...rest, [map.x.name]: valueAt(map.x, x), [map.y.name]: valueAt(map.y, y) });
+      if (shares) start(this.stateAt(shares));
     });
+    canvas.addEventListener('keydown', (event) => {
+      const { mark } = this;
+      if (event.key === 'Enter' && mark) start(this.stateAt(mark));
+      else if (!this.moveMark(event.key)) return;
+      event.preventDefault();
+      event.stopPropagation(); // or the page's own keys would shove
+    });
+    canvas.addEventListener('blur', () => (this.mark = null));
     new IntersectionObserver(([entry]) => (this.seen = entry!.isIntersecting)).observe(canvas);
+  }
+
+  private stateAt([x, y]: [number, number]): Partial<State> {
+    const { map } = this;
+    const rest = map.atRest ? { w1: 0, w2: 0 } : {};
+    return { ...rest, [map.x.name]: valueAt(map.x, x), [map.y.name]: valueAt(map.y, y) };
+  }
+
+  /// An arrow moves the mark by 15° or as much of a velocity, at first from the middle. False for other
+  /// keys.
+  private moveMark(key: string): boolean {
+    const [dx, dy] = ARROWS[key] ?? [0, 0];
+    if (dx === 0 && dy === 0) return false;
+    const [x, y] = this.mark ?? [0.5, 0.5];
+    const within = (share: number) => Math.min(Math.max(share, 0), 1);
+    this.mark = [within(x + dx / MARKS), within(y + dy / MARKS)];
+    const { map } = this;
+    const place = [map.x, map.y].map((axis, i) => placeText(axis, valueAt(axis, this.mark![i]!)));
+    element('map-mark').textContent = place.join(', ');
+    return true;
   }
 
   get canvas() {
@@ -72,7 +104,7 @@ export class MapPanel {
     }
     if (++this.frame % FRAMES !== 0) return this.work(world);
     const way = history.from(world.time - WAY).map(({ state }) => state);
-    this.chart.draw(this.map, ...this.range, way, world.state);
+    this.chart.draw(this.map, ...this.range, way, world.state, this.mark);
   }
 
   /// Computes, unless the map is that of the present state already.
@@ -124,4 +156,12 @@ export class MapPanel {
     this.chart.clear();
     element('map-value').textContent = '';
   }
+}
+
+/// A place of the mark, in words.
+function placeText({ name, turns }: Axis, value: number): string {
+  const link = name === 'q1' || name === 'w1' ? 'upper' : 'lower';
+  return turns
+    ? `${link} angle ${signed(Math.round((180 / Math.PI) * value))}°`
+    : `${link} velocity ${signed(value)} rad/s`;
 }

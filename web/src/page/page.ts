@@ -72,9 +72,15 @@ export class Page {
     this.tour = new Tour(
       this,
       (id) => agents.has(id),
-      () => this.changed(),
+      () => {
+        this.setPaused(false);
+        this.changed();
+      },
     );
-    world.onMoment = (moment) => this.history.add(moment);
+    world.onMoment = (moment) => {
+      this.history.add(moment);
+      this.tour.moment(moment);
+    };
   }
 
   /// Memory that the core has taken (bytes), which it never gives back.
@@ -93,12 +99,12 @@ export class Page {
     placeCharts();
     this.setPaused(false);
     if (view.name === 'tour') {
-      this.learn.pause();
+      if (this.tour.number === 0) this.learn.pause();
       return this.tour.go(view.step);
     }
     const { shared, problems } = decode(hash, RANGES, (id) => this.agents.has(id));
     // What was learned stays on the stage.
-    const learns = view.name === 'learn' || this.tour.learns;
+    const learns = view.name === 'learn' || this.tour.number > 0;
     if (learns && this.learn.keeps && !shared.agent) {
       Object.assign(shared, { agent: OWN, on: true });
     }
@@ -179,7 +185,8 @@ export class Page {
     const reset = () => this.reset();
     const shoveLeft = () => this.world.shoveTo(-1);
     const shoveRight = () => this.world.shoveTo(1);
-    listenToKeys({ toggleAgent, togglePause, step, reset, shoveLeft, shoveRight });
+    const actions = { toggleAgent, togglePause, step, reset, shoveLeft, shoveRight };
+    listenToKeys(actions, () => this.tour.keys);
     button('agent-on', toggleAgent);
     button('pause', togglePause);
     button('step', step);
@@ -240,12 +247,6 @@ export class Page {
     if (!valid) this.restarted();
     this.world.look();
     this.clock.settle();
-  }
-
-  /// Of the lower link (kg).
-  setMass(mass2: number): void {
-    this.settings.setPlant({ ...this.world.plant, mass2 });
-    this.changed();
   }
 
   /// From hanging.
@@ -323,7 +324,7 @@ export class Page {
     const learning = view === 'learn' || step === 'learn';
     this.map.ground(view !== 'everything', learning);
     this.learn.follow();
-    this.scene.ghosts = learning && !prefersStill() ? this.learn.ghosts : [];
+    if (learning && !prefersStill()) this.scene.ghosts = this.learn.ghosts;
     if (this.paused) this.pose.follow(world.state);
     this.dashboard.draw(world, this.history);
     this.map.draw(world, this.history);

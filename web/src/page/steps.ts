@@ -1,12 +1,15 @@
-import { NOMINAL, relativeHeight } from '../pendulum';
+import { NOMINAL } from '../pendulum';
+import type { State } from '../pendulum';
 import type { Label } from '../view/labels';
-import type { World } from '../world';
-import { button, element } from './dom';
+import type { Moment, World } from '../world';
+import { addressOf } from './address';
+import { copy } from './clipboard';
+import { button, element, write } from './dom';
+import { Game } from './game';
 import { prefersStill } from './motion';
 import { MotorKeys } from './motor';
 import { OWN } from './share';
 import type { Shared } from './share';
-import { Slider } from './sliders';
 
 /// The steps of the tour: what each does with the page, and what it says to what has happened. Their
 /// words and controls are in index.html.
@@ -21,22 +24,34 @@ export interface Stage {
   begin(shared: Partial<Shared>): Promise<boolean>;
   setAgentOn(on: boolean): void;
   setSpeed(speed: number): void;
-  setMass(kilograms: number): void; // of the lower link
   /// From hanging.
   reset(): void;
   /// What the map shows at first.
   resetMap(): void;
-  readonly learn: { start(): void; stop(): void; readonly story: string; readonly keeps: boolean };
+  readonly learn: {
+    start(): void;
+    resume(): void;
+    show(): void;
+    readonly story: { readonly count: string; readonly milestone: string };
+    readonly keeps: boolean;
+  };
 }
 
 export interface Step {
   readonly id: string; // "step-ID" is its element
   readonly agents: readonly string[]; // without which it is left out
+  readonly keys?: readonly string[]; // of the page's, that it names; the others do nothing
   readonly labels?: (world: World) => Label[]; // on the stage
   /// When it is shown.
   begin(): Promise<void>;
   /// When another is shown.
   end?(): void;
+  /// Whether its pendulum moves by itself; where motion is not wanted, it waits for a button.
+  readonly moves?: boolean;
+  /// Drawn behind the pendulum, if there is one.
+  readonly ghost?: () => State | null;
+  /// At each control step.
+  moment?(moment: Moment): void;
   /// When a click on the map has started it somewhere.
   started?(): void;
   /// Ten times a second. What to say to what the visitor did, empty for nothing.
@@ -47,7 +62,8 @@ const NOMINAL_AGENT = 'd3qn';
 const ADAPTIVE_AGENT = 'd3qn-adaptive';
 const LIGHT = 0.75; // kg
 const HELD = 2; // s upright that count as balanced
-const FAILED = 10; // s without, that count as failed
+const WON = 5; // s upright that win a race
+const ARROWS = ['ArrowLeft', 'ArrowRight'];
 const GOAL: Label = { at: 'goal', text: 'both links in here' };
 
 const heldFor = (world: World) => world.uprightFor ?? 0;
@@ -73,29 +89,49 @@ function watch(stage: Stage): Step {
 
 function motor(stage: Stage): Step {
   const keys = new MotorKeys(stage.world);
-  let best = 0; // share of the way up
-  let byHand = false;
+  const game = new Game(
+    stage.world,
+    (speed) => stage.setSpeed(speed),
+    () => stage.reset(),
+  );
   return {
     id: 'motor',
     agents: [],
     labels: ({ torque }) => (torque === 0 ? [GOAL] : [GOAL, { at: 'motor', text: 'your torque' }]),
     async begin() {
-      best = 0;
-      byHand = false;
       keys.enabled = true;
-      await stage.begin({ agent: NOMINAL_AGENT, on: false });
+      if (await stage.begin({ agent: NOMINAL_AGENT, on: false })) game.open();
     },
     end() {
       keys.enabled = false;
+      game.next();
     },
-    answer(world) {
-      best = Math.max(best, (relativeHeight(world.plant, world.state) + 1) / 2);
-      byHand ||= heldFor(world) > 1;
-      if (byHand) return 'You balanced it by hand! Hardly anybody does.';
-      if (best < 0.02) return '';
-      const atTop = relativeHeight(world.plant, world.state) > 0.8;
-      const hint = atTop ? 'Now catch it at the top …' : 'Push in time with the swing.';
-      return `Your best: ${Math.round(100 * best)}% of the way up. ${hint}`;
+    ghost: () => game.ghost,
+    moment: ({ state }) => game.moment(state),
+    answer() {
+      game.draw();
+      return game.answer;
+    },
+  };
+}
+
+function learn(stage: Stage): Step {
+  const start = button('tour-learn', () => stage.learn.start());
+  return {
+    id: 'learn',
+    agents: [NOMINAL_AGENT],
+    async begin() {
+      const learned = stage.learn.keeps;
+      const on = learned && !prefersStill();
+      if (!(await stage.begin({ agent: learned ? OWN : NOMINAL_AGENT, on }))) return;
+      stage.learn.resume();
+      stage.learn.show();
+    },
+    answer() {
+      const { count, milestone } = stage.learn.story;
+      start.textContent = milestone === '' ? 'Learn' : 'Start over';
+      write(element('tour-count'), count);
+      return milestone;
     },
   };
 }
@@ -107,7 +143,7 @@ function agent(stage: Stage): Step {
     agents: [NOMINAL_AGENT],
     labels: ({ torque }) => (torque === 0 ? [] : [{ at: 'motor', text: 'its torque' }]),
     async begin() {
-      await stage.take({ agent: NOMINAL_AGENT, on: false });
+      await enter(stage, { agent: NOMINAL_AGENT, on: false });
     },
     answer(world) {
       on.ariaPressed = String(world.agentOn);
@@ -127,8 +163,10 @@ function shove(stage: Stage): Step {
   return {
     id: 'shove',
     agents: [NOMINAL_AGENT],
+    moves: true,
+    keys: ARROWS,
     async begin() {
-      await stage.take({ agent: NOMINAL_AGENT, on: true });
+      await enter(stage, { agent: NOMINAL_AGENT, on: true });
       shoved = 0;
       fell = false;
     },
@@ -137,7 +175,8 @@ function shove(stage: Stage): Step {
         shoved = world.time;
         if (heldFor(world) > HELD) fell = false; // it begins anew
       }
-      if (shoved === 0) return heldFor(world) > HELD ? '' : 'Wait until it is up …';
+      if (shoved === 0)
+        return heldFor(world) > HELD || !world.agentOn ? '' : 'Wait until it is up …';
       if (heldFor(world) === 0) fell = true;
       if (fell && heldFor(world) > HELD) return 'Down, and up again by itself.';
       if (fell) return 'Down it goes …';
@@ -147,72 +186,50 @@ function shove(stage: Stage): Step {
   };
 }
 
-function mass(stage: Stage): Step {
-  let changed = 0; // when (s); 0 if never
-  const slider = new Slider(
-    {
-      ...{ name: 'tour-mass', label: 'Mass of the orange link', unit: 'kg' },
-      ...{ min: 0.7, max: 1.3, limits: [0.7, 1.3], step: 0.05, initial: NOMINAL.mass2 },
-    },
-    (kilograms) => {
-      stage.setMass(kilograms);
-      stage.reset();
-      changed = stage.world.time;
-    },
-  );
-  slider.trained = [NOMINAL.mass2, NOMINAL.mass2];
-  element('tour-mass-slider').append(slider.element);
+/// A race of two agents with a pendulum that one of them does not know.
+function bet(stage: Stage): Step {
+  let onMany = false; // what the visitor bets on
+  let decided = '';
+  const race = { agent: NOMINAL_AGENT, twin: ADAPTIVE_AGENT, plant: { ...NOMINAL, mass2: LIGHT } };
+  const choices = [
+    [button('bet-one', () => void run(false)), false],
+    [button('bet-many', () => void run(true)), true],
+  ] as const;
+
+  /// Both hang, and begin if there is a bet.
+  const begin = async (on: boolean) => {
+    decided = '';
+    if (!(await stage.begin({ ...race, on }))) return;
+    element('first-name').textContent = 'learned on one';
+    element('twin-name').textContent = 'learned on many';
+  };
+  const run = (many: boolean) => {
+    onMany = many;
+    for (const [choice, of] of choices) choice.ariaPressed = String(of === many);
+    return begin(true);
+  };
   return {
-    id: 'mass',
-    agents: [NOMINAL_AGENT],
-    labels: ({ plant }) => [{ at: 'link2', text: `${plant.mass2} kg` }],
+    id: 'bet',
+    agents: [NOMINAL_AGENT, ADAPTIVE_AGENT],
+    labels: () => [{ at: 'link2', text: `${LIGHT} kg` }],
     async begin() {
-      slider.value = NOMINAL.mass2;
-      changed = 0;
-      await stage.take({ agent: NOMINAL_AGENT, on: true });
+      for (const [choice] of choices) choice.ariaPressed = 'false';
+      await begin(false);
     },
     answer(world) {
-      const seconds = world.time - changed;
-      if (changed === 0) return '';
-      if (heldFor(world) > HELD) return `It still holds ${slider.value} kg.`;
-      if (seconds < FAILED) return `It tries ${slider.value} kg …`;
-      return `It cannot hold ${slider.value} kg: too far from the 1 kg that it learned with.`;
+      if (!world.agentOn || !world.twin) return '';
+      const [one, many] = [heldFor(world), heldFor(world.twin)];
+      const holds =
+        many > WON && one < HELD ? MANY_HOLDS : one > WON && many < HELD ? ONE_HOLDS : '';
+      if (holds)
+        decided = `${onMany === (holds === MANY_HOLDS) ? 'You were right' : 'You lost'}: ${holds}`;
+      return decided || 'Both try …';
     },
   };
 }
 
-function many(stage: Stage): Step {
-  let begun = 0; // s
-  const choice = element<HTMLFieldSetElement>('tour-agents');
-  const input = (id: string) => choice.querySelector<HTMLInputElement>(`[value=${id}]`)!;
-  const plant = { ...NOMINAL, mass2: LIGHT };
-  choice.addEventListener('change', () => {
-    const agent = input(ADAPTIVE_AGENT).checked ? ADAPTIVE_AGENT : NOMINAL_AGENT;
-    begun = stage.world.time;
-    void stage.begin({ agent, plant, on: true });
-  });
-  return {
-    id: 'many',
-    agents: [NOMINAL_AGENT, ADAPTIVE_AGENT],
-    labels: () => [{ at: 'link2', text: `${LIGHT} kg` }],
-    async begin() {
-      input(NOMINAL_AGENT).checked = true;
-      begun = 0;
-      await stage.begin({ agent: NOMINAL_AGENT, plant, on: true });
-    },
-    answer(world) {
-      const holds = heldFor(world) > HELD;
-      if (!input(ADAPTIVE_AGENT).checked) {
-        if (holds) return 'It holds, for now …';
-        const tried = world.time - begun > FAILED;
-        return tried ? 'This one fails again and again.' : 'It tries …';
-      }
-      return holds
-        ? 'It holds: it feels out which pendulum it has, and balances that one.'
-        : 'It tries …';
-    },
-  };
-}
+const MANY_HOLDS = 'the one that learned on many feels out its pendulum and holds it.';
+const ONE_HOLDS = 'the one that learned on one holds it.';
 
 function values(stage: Stage): Step {
   const speed = element<HTMLInputElement>('tour-speed');
@@ -224,14 +241,16 @@ function values(stage: Stage): Step {
   return {
     id: 'values',
     agents: [NOMINAL_AGENT],
+    moves: true,
+    keys: ARROWS,
     async begin() {
       speed.value = '1';
       element('tour-speed-value').textContent = '1×';
-      await stage.begin({ agent: NOMINAL_AGENT, on: true });
+      await stage.begin({ agent: NOMINAL_AGENT, on: !prefersStill() });
     },
     answer: (world) =>
       heldFor(world) > HELD
-        ? 'Upright, a small torque is the highest bar. Drag it down, and see the bars change.'
+        ? 'Upright, a small torque costs least. Drag it, or shove it with ← and →, and see.'
         : '',
   };
 }
@@ -241,10 +260,11 @@ function map(stage: Stage): Step {
   return {
     id: 'map',
     agents: [NOMINAL_AGENT],
+    moves: true,
     async begin() {
       clicked = false;
       stage.resetMap();
-      await stage.take({ agent: NOMINAL_AGENT, on: true });
+      await enter(stage, { agent: NOMINAL_AGENT, on: true });
     },
     started() {
       clicked = true;
@@ -259,24 +279,30 @@ function map(stage: Stage): Step {
   };
 }
 
-function learn(stage: Stage): Step {
-  const start = button('tour-learn', () => stage.learn.start());
+/// What was seen, and where to go from here.
+function end(stage: Stage): Step {
+  button('tour-send', () => void copy(`${INVITATION} ${addressOf('tour')}`, 'An invitation'));
   return {
-    id: 'learn',
+    id: 'end',
     agents: [NOMINAL_AGENT],
+    moves: true,
     async begin() {
-      const learned = stage.learn.keeps;
-      await stage.begin({ agent: learned ? OWN : NOMINAL_AGENT, on: learned });
-    },
-    end: () => stage.learn.stop(),
-    answer() {
-      const { story } = stage.learn;
-      start.textContent = story === '' ? 'Learn' : 'Start over';
-      return story;
+      const agent = stage.learn.keeps ? OWN : NOMINAL_AGENT;
+      await stage.begin({ agent, on: !prefersStill() });
+      element('tour-end').textContent = stage.learn.keeps
+        ? 'Everything, with your own agent'
+        : 'Everything at once';
     },
   };
 }
 
+const INVITATION = 'A double pendulum learns to stand up, in your browser. Can you do it by hand?';
+
+/// The pendulum moves on; where motion is not wanted, it hangs and waits.
+function enter(stage: Stage, shared: Partial<Shared>): Promise<boolean> {
+  return prefersStill() ? stage.begin({ ...shared, on: false }) : stage.take(shared);
+}
+
 export function makeSteps(stage: Stage): Step[] {
-  return [watch, motor, agent, shove, mass, many, values, map, learn].map((make) => make(stage));
+  return [watch, motor, learn, agent, shove, bet, values, map, end].map((make) => make(stage));
 }

@@ -1,5 +1,6 @@
-import type { World } from '../world';
+import type { Moment, World } from '../world';
 import { button, element, write } from './dom';
+import { prefersStill } from './motion';
 import { makeSteps } from './steps';
 import type { Stage, Step } from './steps';
 import type { Scene } from '../view/scene';
@@ -11,6 +12,7 @@ export class Tour {
   private readonly steps: readonly Step[];
   private readonly dots: HTMLButtonElement[];
   private readonly onStep: () => void;
+  private readonly start: HTMLButtonElement; // where motion is not wanted
   private now: Step | null = null;
   private frame = 0;
 
@@ -29,6 +31,10 @@ export class Tour {
     element('dots').append(...this.dots);
     button('tour-back', () => void this.go(this.number - 1, true));
     button('tour-next', () => void this.go(this.number + 1, true));
+    this.start = button('tour-start', () => {
+      stage.setAgentOn(true);
+      this.start.hidden = true;
+    });
   }
 
   /// The step that is shown, from 1 on; 0 outside of the tour.
@@ -36,9 +42,9 @@ export class Tour {
     return this.now ? this.steps.indexOf(this.now) + 1 : 0;
   }
 
-  /// Whether the step is shown in which an agent learns.
-  get learns(): boolean {
-    return this.now?.id === 'learn';
+  /// The keys that the step names; null outside of the tour.
+  get keys(): readonly string[] | null {
+    return this.now && (this.now.keys ?? []);
   }
 
   /// Shows a step, the nearest that there is; where the visitor goes there, with the focus on it, and so
@@ -51,10 +57,12 @@ export class Tour {
     for (const step of this.steps) section(step).inert = step !== now;
     this.dots.forEach((dot, k) => (dot.ariaCurrent = k === i ? 'step' : null));
     element<HTMLButtonElement>('tour-back').disabled = i === 0;
-    const last = i === this.steps.length - 1;
-    element('tour-next').hidden = last;
-    element('tour-end').hidden = !last;
+    element('tour-next').hidden = i === this.steps.length - 1;
+    this.start.hidden = !(now.moves && prefersStill());
+    section(now).append(this.start);
     document.documentElement.dataset.step = now.id;
+    // One try after another is no news.
+    element('live').ariaLive = now.id === 'learn' ? 'off' : 'polite';
     this.say('');
     if (focus) {
       history.pushState(null, '', `#tour=${i + 1}`);
@@ -69,15 +77,23 @@ export class Tour {
     this.now?.started?.();
   }
 
+  /// At each control step.
+  moment(moment: Moment): void {
+    this.now?.moment?.(moment);
+  }
+
   leave(): void {
     this.now?.end?.();
     this.now = null;
     delete document.documentElement.dataset.step;
+    element('live').ariaLive = 'polite';
   }
 
   /// At each frame.
   follow(world: World, scene: Scene): void {
     scene.labels = this.now?.labels?.(world) ?? [];
+    const ghost = prefersStill() ? null : this.now?.ghost?.();
+    scene.ghosts = ghost ? [ghost.q1, ghost.q2] : [];
     if (this.now && this.frame++ % FRAMES === 0) this.say(this.now.answer?.(world) ?? '');
   }
 

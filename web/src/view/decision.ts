@@ -13,6 +13,8 @@ const BOTTOM = 16; // pixels, for the torques below a chart
 const NAME = 13; // pixels, for the name of their axis
 const ROOMY = 90; // pixels of height, from which on it is named
 const TOP = 4;
+const MARK = 8; // pixels, over a bar that hangs
+const SCALE = 38; // pixels, for the costs beside such bars
 const CUT_OFF = 0.005; // share of a distribution that is worth a number
 const EASE = 0.2; // of the way to a bar's new height and colour, at each drawing
 
@@ -20,10 +22,11 @@ const EASE = 0.2; // of the way to a bar's new height and colour, at each drawin
 export class DecisionChart {
   readonly canvas = new Canvas('q');
   private below = 0; // pixels, that the name of the axis takes
-  private room = 1; // of Q-values: from the bottom of the chart to the largest
-  private bars: { height: number; chosen: number }[] = []; // as they are drawn; shares of 1
+  private room = 1; // points of reward, from the best Q-value to the bottom of the chart
+  private bars: { value: number; chosen: number }[] = []; // as they are drawn
 
-  draw(decision: Decision | null): void {
+  /// A Q-value is `rewardScale` times a reward.
+  draw(decision: Decision | null, rewardScale: number): void {
     this.canvas.clear();
     if (!decision) return;
     this.nameAxis();
@@ -31,7 +34,7 @@ export class DecisionChart {
       this.canvas.text('not finite', this.canvas.width / 2, this.canvas.height / 2, 'center');
       return; // and keep the scale
     }
-    if (decision.kind === 'q') this.drawQ(decision);
+    if (decision.kind === 'q') this.drawQ(decision, rewardScale);
     else if (decision.kind === 'gaussian') this.drawGaussian(decision);
     else if (decision.kind === 'categorical') this.drawProbabilities(decision);
     else this.drawComputed(decision);
@@ -48,43 +51,73 @@ export class DecisionChart {
     return this.canvas.height - BOTTOM - this.below;
   }
 
-  /// Q-values differ by little beside what they all have in common, so the bars hang from the largest.
-  private drawQ({ q, action, torques }: QDecision): void {
-    const best = q[action]!;
+  /// Q-values differ by little beside what they all have in common: a bar hangs from the best one down, as
+  /// far as its torque costs reward. Above it is a mark in the colour of what was chosen lately.
+  private drawQ({ q, action, torques }: QDecision, rewardScale: number): void {
+    const { canvas, bottom } = this;
+    const cost = (i: number) => (q[action]! - q[i]!) / rewardScale;
     // The scale grows at once and shrinks slowly.
-    const spread = Math.max(0.05, 1.1 * (best - Math.min(...q)));
-    this.room = Math.max(spread, 0.95 * this.room);
-    this.drawBars(torques, action, (i) => 1 - (best - q[i]!) / this.room);
+    const most = 1.1 * Math.max(...torques.map((_, i) => cost(i)));
+    this.room = Math.max(most, 0.1, 0.95 * this.room);
+    const top = TOP + MARK;
+    const y = (points: number) => top + (points / this.room) * (bottom - top);
+    const round = roundBelow(0.9 * this.room);
+    for (const points of [0, round]) {
+      const ends: [number, number][] = [
+        [SCALE, y(points)],
+        [canvas.width, y(points)],
+      ];
+      canvas.line(ends, 'grid', 1);
+    }
+    canvas.text('best', SCALE - 4, top, 'right');
+    canvas.text(signed(-round), SCALE - 4, y(round), 'right');
+    this.drawBars(torques, action, SCALE, cost, (cost) => [top, y(cost) - top]);
+    this.bars.forEach(({ chosen }, i) => {
+      const width = (canvas.width - SCALE) / torques.length;
+      canvas.context.globalAlpha = chosen;
+      canvas.rectangle(SCALE + i * width + 2.5, TOP, width - 5, MARK - 1, 'torque');
+    });
+    canvas.context.globalAlpha = 1;
   }
 
   /// Bars from 0 to 1.
   private drawProbabilities({ probabilities, action, torques }: CategoricalDecision): void {
-    this.drawBars(torques, action, (i) => probabilities[i]!);
+    const { bottom } = this;
+    const height = (share: number) => (bottom - TOP) * share;
+    const box = (share: number) => [bottom - height(share), height(share)] as const;
+    this.drawBars(torques, action, 0, (i) => probabilities[i]!, box);
   }
 
-  private drawBars(torques: Float64Array, action: number, share: (i: number) => number): void {
+  /// Bars from `left` on, each with its torque; `box` is the top and the height (pixels) of a value.
+  private drawBars(
+    torques: Float64Array,
+    action: number,
+    left: number,
+    value: (i: number) => number,
+    box: (value: number) => readonly [number, number],
+  ): void {
     const { canvas, bottom } = this;
-    const width = canvas.width / torques.length;
+    const width = (canvas.width - left) / torques.length;
     const labelled = Math.ceil(LABEL_WIDTH / width); // each, or each second, …
     if (this.bars.length !== torques.length) {
-      this.bars = Array.from(torques, (_, i) => ({ height: share(i), chosen: 0 }));
+      this.bars = Array.from(torques, (_, i) => ({ value: value(i), chosen: 0 }));
     }
     torques.forEach((torque, i) => {
       // Eased: the agent chooses 50 times a second, and the colour is how often it chose this one lately.
       const bar = this.bars[i]!;
-      bar.height += EASE * (share(i) - bar.height);
+      bar.value += EASE * (value(i) - bar.value);
       bar.chosen += EASE * (Number(i === action) - bar.chosen);
-      const height = (bottom - TOP) * bar.height;
-      const box = [i * width + 2.5, bottom - height, width - 5, height] as const;
-      canvas.rectangle(...box, 'bar');
+      const [top, height] = box(bar.value);
+      const place = [left + i * width + 2.5, top, width - 5, height] as const;
+      canvas.rectangle(...place, 'bar');
       canvas.context.globalAlpha = bar.chosen;
-      canvas.rectangle(...box, 'torque');
+      canvas.rectangle(...place, 'torque');
       canvas.context.globalAlpha = 1;
       canvas.context.strokeStyle = canvas.color('grid');
       canvas.context.lineWidth = 1;
-      canvas.context.strokeRect(...box);
+      canvas.context.strokeRect(...place);
       if (i % labelled === 0) {
-        canvas.text(signed(torque), (i + 0.5) * width, bottom + 9, 'center');
+        canvas.text(signed(torque), left + (i + 0.5) * width, bottom + 9, 'center');
       }
     });
   }
@@ -161,4 +194,10 @@ function isFinite(decision: Decision): boolean {
   if (decision.kind === 'categorical') return decision.probabilities.every(Number.isFinite);
   if (decision.kind === 'computed') return Number.isFinite(decision.torque);
   return Number.isFinite(decision.low + decision.high);
+}
+
+/// The largest of 1, 2, 5, 10, 20, … (and 0.5, 0.2, …) that is not larger.
+function roundBelow(value: number): number {
+  const power = 10 ** Math.floor(Math.log10(value));
+  return power * (value >= 5 * power ? 5 : value >= 2 * power ? 2 : 1);
 }

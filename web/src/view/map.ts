@@ -45,8 +45,16 @@ export class MapChart {
     return [Math.min((px - LEFT) / (width - LEFT), 1), Math.min(1 - py / (height - BOTTOM), 1)];
   }
 
-  /// `low` and `high` are the ends of the colours; `way` is where the pendulum was, oldest first.
-  draw(map: ValueMap, low: number, high: number, way: readonly State[], now: State): void {
+  /// `low` and `high` are the ends of the colours; `way` is where the pendulum was, oldest first; `mark` is
+  /// a place as shares of both axes.
+  draw(
+    map: ValueMap,
+    low: number,
+    high: number,
+    way: readonly State[],
+    now: State,
+    mark: readonly [number, number] | null,
+  ): void {
     const { canvas } = this;
     canvas.clear();
     const { width, height } = canvas;
@@ -65,6 +73,28 @@ export class MapChart {
     if (this.bare) return canvas.context.drawImage(this.image, 0, 0, width, height);
     canvas.context.drawImage(this.image, LEFT, 0, width - LEFT, height - BOTTOM);
     this.drawWay(map, way, now);
+    if (mark) this.drawMark(...mark);
+  }
+
+  /// A cross with a dark rim.
+  private drawMark(x: number, y: number): void {
+    const { canvas } = this;
+    const [px, py] = [LEFT + x * (canvas.width - LEFT), (1 - y) * (canvas.height - BOTTOM)];
+    for (const [color, width] of [
+      ['map-rim', 6],
+      ['map-way', 3],
+    ] as const) {
+      for (const [dx, dy] of [
+        [11, 0],
+        [0, 11],
+      ] as const) {
+        const ends: [number, number][] = [
+          [px - dx, py - dy],
+          [px + dx, py + dy],
+        ];
+        canvas.line(ends, color, width);
+      }
+    }
   }
 
   private paint(size: number, colors: readonly Color[]): void {

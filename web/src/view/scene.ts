@@ -97,7 +97,7 @@ export class Scene {
 
   private drawGhosts(plant: Plant): void {
     const { context } = this.canvas;
-    context.globalAlpha = 0.13;
+    context.globalAlpha = this.ghosts.length > 2 ? 0.13 : 0.35;
     context.lineCap = 'round';
     const width = Math.max(3, 0.02 * this.scale);
     for (let i = 0; i + 1 < this.ghosts.length; i += 2) {

@@ -1,0 +1,111 @@
+import { CONTROL_PERIOD, relativeHeight } from '../pendulum';
+import type { State } from '../pendulum';
+import type { World } from '../world';
+import { addressOf } from './address';
+import { copy } from './clipboard';
+import { button, element, write } from './dom';
+import { recall, remember } from './storage';
+
+/// A visitor as the motor: how long both links stay up. The best try comes back as a ghost.
+
+const LONGEST = 30 / CONTROL_PERIOD; // states of a try that a ghost repeats
+const FALLEN = -0.5; // relative height of the tip, from which on the next try begins
+const HALF = 0.5; // speed, with help
+const BALANCED = 1; // s
+
+export class Game {
+  private readonly world: World;
+  private readonly setSpeed: (speed: number) => void;
+  private readonly half = element<HTMLInputElement>('motor-half');
+  private readonly send = button('motor-send', () => void this.copyResult());
+  private states: State[] = []; // of this try, one for each control step
+  private up = 0; // s, in this try, without a break
+  private longest = 0; // s, in this try
+  private held = 0; // s, world time at which a hand last held the pendulum
+  private best = 0; // s, at this speed
+  private key = ''; // under which that is remembered
+  private said = ''; // of the last try
+  private bestStates: readonly State[] = [];
+
+  /// `again` hangs the pendulum.
+  constructor(world: World, setSpeed: (speed: number) => void, again: () => void) {
+    this.world = world;
+    this.setSpeed = setSpeed;
+    button('motor-again', () => {
+      again();
+      this.next();
+    });
+    this.half.addEventListener('change', () => this.changeSpeed());
+  }
+
+  /// When the step begins.
+  open(): void {
+    this.half.checked = false;
+    this.changeSpeed();
+  }
+
+  /// Where the pendulum of the best try was, as long after its begin as it is now after that of this try.
+  get ghost(): State | null {
+    return this.bestStates[this.states.length] ?? null;
+  }
+
+  /// What to say.
+  get answer(): string {
+    if (this.up > BALANCED) return 'You balanced it by hand! Few do.';
+    return this.said || (this.states.length > 0 ? 'Push in time with the swing.' : '');
+  }
+
+  /// At each control step.
+  moment(state: State): void {
+    const { world } = this;
+    if (world.drag) this.held = world.time;
+    this.states.push(state);
+    this.up = Math.min(world.uprightFor ?? 0, world.time - this.held);
+    this.longest = Math.max(this.longest, this.up);
+    if (this.longest > this.best) {
+      this.best = this.longest;
+      this.bestStates = this.states;
+    }
+    const fallen = relativeHeight(world.plant, state) < FALLEN;
+    if (this.states.length >= LONGEST || (this.longest > 0 && fallen)) this.next();
+  }
+
+  /// At each frame.
+  draw(): void {
+    write(element('motor-now'), seconds(this.up));
+    write(element('motor-best'), seconds(this.best));
+    this.send.disabled = this.best < 0.1;
+  }
+
+  /// Ends a try and begins another one.
+  next(): void {
+    if (this.longest > 0) {
+      const isBest = this.bestStates === this.states;
+      if (isBest) remember(this.key, String(this.best));
+      this.said = isBest
+        ? `Your best: ${seconds(this.best)}.`
+        : `${seconds(this.longest)} this time.`;
+    }
+    this.states = [];
+    this.up = this.longest = 0;
+  }
+
+  private changeSpeed(): void {
+    this.next();
+    this.setSpeed(this.half.checked ? HALF : 1);
+    this.key = this.half.checked ? 'best-half' : 'best'; // what is easier has a best of its own
+    this.best = Math.max(Number(recall(this.key)) || 0, 0);
+    this.bestStates = [];
+    this.said = '';
+  }
+
+  private copyResult(): Promise<void> {
+    const slowly = this.half.checked ? ', at half speed' : '';
+    const text = `I held both links of a double pendulum up for ${seconds(this.best)} by hand${slowly}. Can you?`;
+    return copy(`${text} ${addressOf('tour=2')}`, 'Your result');
+  }
+}
+
+function seconds(time: number): string {
+  return `${time.toFixed(1)} s`;
+}
