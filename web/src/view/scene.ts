@@ -20,6 +20,8 @@ export class Scene {
   readonly canvas: Canvas;
   readonly sparks = new Sparks();
   labels: readonly Label[] = [];
+  /// The thing that is lit, as its noun in the text is pointed at: link1, link2, motor or goal.
+  lit: string | null = null;
 
   /// Pixels per metre.
   private scale = 1;
