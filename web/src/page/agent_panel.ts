@@ -1,10 +1,12 @@
 import { BadInput } from '../bad_input';
-import { quoted } from '../text';
+import { printable, quoted } from '../text';
 import { LearningCurve } from '../view/charts';
 import type { Agent, Agents } from './agents';
 import { element } from './dom';
 import { hideMessage, warn } from './message';
 import { onThemeChange } from './theme';
+
+const NAME = 40; // characters, of a file that is refused
 
 /// Who hears what happens in the panel.
 export interface AgentListener {
@@ -59,7 +61,7 @@ export class AgentPanel {
 
   /// The same with a visitor's own file, or one that the page has `learned`.
   open(file: File, learned: boolean): Promise<boolean> {
-    const refusal = `This is not a policy of Upswing. ${quoted(file.name)} cannot be used`;
+    const refusal = `This is not a policy of Upswing. "${printable(file.name, NAME)}" cannot be used`;
     return this.load(() => this.agents.open(file, learned), refusal);
   }
 
