@@ -1,9 +1,10 @@
 import { defineConfig } from 'vitest/config';
+import { addresses } from './build/addresses.ts';
 import { mujoco } from './build/mujoco.ts';
 
 export default defineConfig({
   base: './', // served from any folder
-  plugins: [mujoco()],
+  plugins: [mujoco(), addresses()],
   optimizeDeps: { exclude: ['@mujoco/mujoco'] },
   build: {
     outDir: '../build/web',

@@ -1,7 +1,7 @@
 import loadMujoco from '@mujoco/mujoco';
 import { beforeAll, expect, test } from 'vitest';
 import { readPolicy } from '../tests/program';
-import { AXES, shareOf, ValueMap, valueAt, valueOf } from './map';
+import { AXES, isEven, rangeOfValues, shareOf, valueAt, ValueMap, valueOf } from './map';
 import { NOMINAL } from './pendulum';
 import { Policy } from './policy';
 import { Simulator } from './simulator';
@@ -114,4 +114,22 @@ test('a map is of the state that it was begun in', () => {
   world.reset({ ...STATE, w1: 5 });
   expect(map.work(world, 1e9)).toEqual(STATE);
   expect(map.work(world, 1e9)!.w1).toBe(5);
+});
+
+test('the colours of a map whose values hardly differ are nearly the same', () => {
+  const share = (cells: Float32Array, scale: number) => {
+    const [low, high] = rangeOfValues(cells, scale);
+    return [(Math.min(...cells) - low) / (high - low), (Math.max(...cells) - low) / (high - low)];
+  };
+  // An untrained network (0.02 of a reward apart, at a reward scale of 0.1): about the middle.
+  const untrained = Float32Array.of(0.051, 0.053);
+  expect(isEven(untrained, 0.1)).toBe(true);
+  for (const one of share(untrained, 0.1)) expect(Math.abs(one - 0.5)).toBeLessThan(0.01);
+  // 979 to 992.6 is 1.4% apart.
+  const [from, to] = share(Float32Array.of(979, 992.6), 1) as [number, number];
+  expect(to - from).toBeLessThan(0.3);
+  // Values that differ use the whole scale.
+  const different = Float32Array.of(-10, 700);
+  expect(isEven(different, 1)).toBe(false);
+  expect(share(different, 1)).toEqual([0, 1]);
 });

@@ -99,3 +99,31 @@ export class ValueMap {
     };
   }
 }
+
+/// The least and the largest.
+export function endsOf(cells: Float32Array): [number, number] {
+  return [cells.reduce((a, b) => Math.min(a, b)), cells.reduce((a, b) => Math.max(a, b))];
+}
+
+/// How far values (V / reward scale) lie apart at least where the colours use their whole scale: what
+/// balancing earns in a few steps, and a share of the values themselves.
+const LEAST = 20; // reward
+const LEAST_SHARE = 0.05;
+
+function leastRange([low, high]: [number, number], rewardScale: number): number {
+  return Math.max(LEAST * rewardScale, (LEAST_SHARE * Math.abs(low + high)) / 2);
+}
+
+/// Whether values hardly differ.
+export function isEven(cells: Float32Array, rewardScale: number): boolean {
+  const ends = endsOf(cells);
+  return ends[1] - ends[0] < leastRange(ends, rewardScale);
+}
+
+/// The ends of the colours: least and largest value, or farther apart where a map is even, so that it
+/// looks so.
+export function rangeOfValues(cells: Float32Array, rewardScale: number): [number, number] {
+  const ends = endsOf(cells);
+  const wider = Math.max(0, leastRange(ends, rewardScale) - (ends[1] - ends[0])) / 2;
+  return [ends[0] - wider, ends[1] + wider];
+}

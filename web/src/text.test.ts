@@ -1,5 +1,5 @@
 import { expect, test } from 'vitest';
-import { isCommand, printable, quoted } from './text';
+import { isCommand, printable, quoted, withMinus } from './text';
 
 test('plain text stays as it is', () => {
   expect(printable('Dueling Double DQN, größer (π)')).toBe('Dueling Double DQN, größer (π)');
@@ -44,4 +44,14 @@ test.each([
   `./upswing train ${'x'.repeat(3000)}`,
 ])('%j is not shown for pasting', (text) => {
   expect(isCommand(text)).toBe(false);
+});
+
+test.each([
+  ['-1.50 N·m', '−1.50 N·m'],
+  ['-0.00', '0.00'],
+  ['-0 rad/s', '0 rad/s'],
+  ['-180°', '−180°'],
+  ['0.25', '0.25'],
+])('%j has a true minus sign, or none: %j', (text, shown) => {
+  expect(withMinus(text)).toBe(shown);
 });

@@ -24,3 +24,8 @@ export function isCommand(text: string): boolean {
   const word = /(?:[\w@%+=:,./-]|'[^'\p{C}\p{Zl}\p{Zp}]*'|\\')+/u.source;
   return text.length <= 2000 && new RegExp(`^\\./upswing train(?: ${word})*$`, 'u').test(text);
 }
+
+/// A number's text with a true minus sign, as wide as a digit, and none where only zeros are left.
+export function withMinus(text: string): string {
+  return text.replace(/^-(?=[^1-9]*[1-9])/, '−').replace(/^-/, '');
+}

@@ -47,6 +47,8 @@ export class World {
   /// Where on the pendulum a hand holds it, and where the hand is.
   drag: { link: 1 | 2; along: number; target: Vec } | null = null;
   onMoment: (moment: Moment) => void = () => {};
+  /// Hears when state, plant, policy or decision may be others.
+  onChange: () => void = () => {};
   /// Another pendulum, to which happens what happens to this one: start, plant, hand, shoves, errors of
   /// sensors and motor. Its policy is its own.
   twin: World | null = null;
@@ -87,6 +89,7 @@ export class World {
     this.simulator.plant = plant;
     this.identifies = false;
     if (this.twin) this.twin.plant = plant;
+    this.onChange();
   }
 
   get policy(): Policy | null {
@@ -163,6 +166,7 @@ export class World {
     --this.untilControl;
     if (valid) this.advanceTwin();
     else this.reset();
+    this.onChange();
     return valid;
   }
 
@@ -184,6 +188,7 @@ export class World {
   /// Updates the agent's decision for the present state without acting, for a paused pendulum.
   look(): void {
     this.decision = this.policy?.act(this.observe()) ?? null;
+    this.onChange();
   }
 
   /// What the agent would decide in another state, with the memory that it has now.

@@ -153,6 +153,7 @@ test('further down it is explained, and the chart goes on', async ({ stage: page
   await open(page);
   await bring(page, actorFiles()[0]!);
   await expect(page.locator('#q-name')).toHaveText('Policy');
+  await page.getByText('How the agent decides').click();
   const summary = page.getByText('Actors: SAC and PPO');
   await summary.click();
   await expect(page.getByText('the central 68% of them')).toBeInViewport();

@@ -103,21 +103,40 @@ test('a pendulum that is posed is judged at once', async ({ stage: page }) => {
   await expect(page.locator('#badge')).toHaveText('paused, upright');
 });
 
-test('what "Try this" promises is so', async ({ stage: page }) => {
+/// What a preset says of the default agent and the adaptive one, as they balance or do not.
+const CLAIMS: Readonly<Record<string, string>> = {
+  'no, no': 'neither balances',
+  'no, yes': 'the adaptive one balances',
+  'yes, yes': 'both balance',
+};
+
+test('what the laboratory promises is so, of each agent', async ({ stage: page }) => {
   await open(page);
-  await expect(page.locator('#try summary')).toBeInViewport();
-  const tries = await page
-    .locator('a[data-balances]')
-    .evaluateAll((links) =>
-      links.map((link) => [link.getAttribute('href')!, (link as HTMLElement).dataset.balances!]),
-    );
-  expect(tries.length).toBeGreaterThan(5);
-  for (const [hash, balances] of tries) {
+  await expect(page.locator('#presets a').first()).toBeInViewport({ ratio: 1 });
+  await expect(page.locator('#presets a')).toHaveCount(6);
+  const tries = await page.locator('a[data-balances]').evaluateAll((links) =>
+    links.map((link) => {
+      const { balances, twinBalances } = (link as HTMLElement).dataset;
+      const claim = link.querySelector('em')?.textContent;
+      return { hash: link.getAttribute('href')!, balances, twinBalances, claim };
+    }),
+  );
+  expect(tries.length).toBeGreaterThan(10);
+  for (const { hash, balances, twinBalances, claim } of tries) {
+    if (claim !== undefined) expect(claim, hash).toBe(CLAIMS[`${balances}, ${twinBalances}`]);
     await page.evaluate((link) => upswing.open(link), hash);
     await startFrom(page, 0);
     await advance(page, 20);
-    const held = await balanced(page);
-    if (balances === 'yes') expect(held, hash).toBeGreaterThan(10);
-    else expect(held, hash).toBeLessThan(5);
+    const twin = await page.evaluate(
+      () => upswing.world.twin && (upswing.world.twin.uprightFor ?? 0),
+    );
+    expect(twin === null, hash).toBe(twinBalances === undefined);
+    for (const [held, promise] of [
+      [await balanced(page), balances],
+      [twin ?? 0, twinBalances],
+    ] as const) {
+      if (promise === 'yes') expect(held, hash).toBeGreaterThan(10);
+      if (promise === 'no') expect(held, hash).toBeLessThan(5);
+    }
   }
 });

@@ -195,6 +195,7 @@ test('a broken policy is refused with a reason, and the agent stays', async ({
     writeFileSync(path, bytes);
     if (name.startsWith('huge')) truncateSync(path, 17 * 1024 * 1024); // makes it longer
     await page.locator('#file').setInputFiles(path);
+    await expect(page.locator('#message-text')).toHaveText(/^This is not a policy of Upswing\. /);
     await expect(page.locator('#message')).toContainText(`"${name}" cannot be used`);
     await expect(page.locator('#message')).toContainText(reason);
     await expect(page.locator('#agent')).toHaveValue('d3qn');

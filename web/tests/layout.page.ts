@@ -129,7 +129,6 @@ test('an example leads back to the pendulum, also when it is chosen again', asyn
   await page.setViewportSize({ width: 390, height: 700 });
   await page.emulateMedia({ reducedMotion: 'reduce' });
   await open(page);
-  await page.locator('#try summary').click();
   const example = page.locator('#try a').first();
   for (let k = 0; k < 2; ++k) {
     await page.locator('#pause').click();

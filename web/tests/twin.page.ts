@@ -55,8 +55,7 @@ test('a link brings both agents, and the adaptive one holds what the other canno
   stage: page,
 }) => {
   await open(page, '#everything');
-  await page.getByText('Try this', { exact: true }).click();
-  await page.getByRole('link', { name: 'Both side by side' }).click();
+  await page.getByRole('link', { name: 'Light link' }).click();
   await expect(page.locator('#twin-name')).toHaveText('Adaptive Dueling Double DQN');
   await expect(page.locator('#first-name')).toHaveText('Dueling Double DQN');
   await expect(page).toHaveURL(/twin=d3qn-adaptive/);

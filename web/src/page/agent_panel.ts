@@ -1,10 +1,12 @@
 import { BadInput } from '../bad_input';
-import { quoted } from '../text';
+import { printable, quoted } from '../text';
 import { LearningCurve } from '../view/charts';
 import type { Agent, Agents } from './agents';
 import { element } from './dom';
 import { hideMessage, warn } from './message';
 import { onThemeChange } from './theme';
+
+const NAME = 40; // characters, of a file that is refused
 
 /// Who hears what happens in the panel.
 export interface AgentListener {
@@ -54,15 +56,17 @@ export class AgentPanel {
 
   /// Changes to another agent; if it cannot be loaded, says why, keeps the old one and returns false.
   choose(id: string): Promise<boolean> {
-    return this.load(() => this.agents.get(id), `Agent ${quoted(id)}`);
+    return this.load(() => this.agents.get(id), `Agent ${quoted(id)} cannot be used`);
   }
 
   /// The same with a visitor's own file, or one that the page has `learned`.
   open(file: File, learned: boolean): Promise<boolean> {
-    return this.load(() => this.agents.open(file, learned), quoted(file.name));
+    const refusal = `This is not a policy of Upswing. "${printable(file.name, NAME)}" cannot be used`;
+    return this.load(() => this.agents.open(file, learned), refusal);
   }
 
-  private async load(get: () => Promise<Agent>, name: string): Promise<boolean> {
+  /// `refusal` is what to say before the reason.
+  private async load(get: () => Promise<Agent>, refusal: string): Promise<boolean> {
     const request = ++this.requests;
     element('agent-what').textContent = 'Loading …';
     try {
@@ -73,7 +77,7 @@ export class AgentPanel {
     } catch (error) {
       if (!(error instanceof BadInput)) throw error;
       if (request !== this.requests) return false;
-      warn(`${name} cannot be used: ${error.message}.`);
+      warn(`${refusal}: ${error.message}.`);
       this.show();
       return false;
     }

@@ -2,10 +2,11 @@ import type { History } from '../history';
 import { energy, energyTarget, rewardTerms, tipHeight } from '../pendulum';
 import type { State } from '../pendulum';
 import type { Decision } from '../decision';
-import { PhasePortrait, SECONDS_SHOWN, signed, Strip, withMinus } from '../view/charts';
+import { PhasePortrait, SECONDS_SHOWN, signed, Strip } from '../view/charts';
+import { withMinus } from '../text';
 import { DecisionChart } from '../view/decision';
 import type { Moment, World } from '../world';
-import { element } from './dom';
+import { element, write } from './dom';
 
 const FRAMES = 2; // the charts take turns: each is drawn at every second frame
 /// What the chart of a decision shows.
@@ -87,17 +88,18 @@ export class Dashboard {
     tell('height', `${fixed(tipHeight(plant, state))} m of ${fixed(reach)} m`);
     tell('torque', `${fixed(world.torque)} N·m`);
     const name = decision ? NAMES[decision.kind] : 'Policy';
-    element('q-name').textContent = name;
+    write(element('q-name'), name);
     element('q').dataset.name = name;
     tell('q', policy && decision ? decisionText(decision, policy.rewardScale) : '');
-    element('reward').textContent = rewardText(rewardTerms(plant, state, world.torque));
+    write(element('reward'), rewardText(rewardTerms(plant, state, world.torque)));
   }
 }
 
 /// Writes a number beside its chart, and into the chart's name for screen readers.
 function tell(chart: string, text: string): void {
-  element(`${chart}-value`).textContent = text;
-  element(chart).ariaLabel = `${element(chart).dataset.name}: ${text}`;
+  write(element(`${chart}-value`), text);
+  const label = `${element(chart).dataset.name}: ${text}`;
+  if (element(chart).ariaLabel !== label) element(chart).ariaLabel = label;
 }
 
 /// Two decimals.
@@ -110,7 +112,7 @@ function rewardText(terms: number[]): string {
   const text = terms.map(
     (term, i) => (i > 0 ? `${term < 0 ? '−' : '+'} ` : '') + Math.abs(term).toFixed(2),
   );
-  return `${text.join(' ')} = ${sum.toFixed(2)}`;
+  return `${text.join(' ')} = ${fixed(sum)}`;
 }
 
 /// What it would do, and what it expects in units of the reward.

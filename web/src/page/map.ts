@@ -1,5 +1,5 @@
 import type { History } from '../history';
-import { AXES, ValueMap, valueAt } from '../map';
+import { AXES, endsOf, isEven, rangeOfValues, ValueMap, valueAt } from '../map';
 import type { Axis, Quantity, Variable } from '../map';
 import type { State } from '../pendulum';
 import type { Policy } from '../policy';
@@ -32,6 +32,8 @@ export class MapPanel {
   private policy: Policy | null = null; // that the map is of
   private key = ''; // what the complete map was computed from
   private seen = false; // on the screen
+  /// Whether the map is not yet that of the present state.
+  busy = false;
   private range: [number, number] = [0, 1];
   private frame = 0;
   private mark: [number, number] | null = null; // shares of both axes, by keyboard
@@ -92,6 +94,7 @@ export class MapPanel {
 
   /// At each frame.
   draw(world: World, history: History): void {
+    this.busy = false;
     if (!this.seen || !world.policy) return;
     if (this.policy !== world.policy) {
       if (this.chart.bare && this.policy && this.map.cells) this.key = '';
@@ -111,25 +114,39 @@ export class MapPanel {
   private work(world: World): void {
     const { map } = this;
     const { plant } = world;
+    this.busy = true;
     const keyOf = (state: State) => {
       const rest = map.atRest ? { w1: 0, w2: 0 } : {};
       return JSON.stringify([{ ...state, ...rest, [map.x.name]: 0, [map.y.name]: 0 }, plant]);
     };
-    if (map.cells && keyOf(world.state) === this.key) return;
+    if (map.cells && keyOf(world.state) === this.key) {
+      this.busy = false;
+      return;
+    }
     const begunIn = map.work(world, MILLISECONDS);
     if (!begunIn) return;
     this.key = keyOf(begunIn);
-    this.range = this.rangeOf(map.cells!, world);
-    const unit = map.quantity === 'torque' ? ' N·m' : '';
-    const scale = map.quantity === 'torque' ? 1 : (world.policy?.rewardScale ?? 1);
-    const [low, high] = this.range.map((end) => signed(end / scale));
-    const known = this.range.every(Number.isFinite);
-    element('map-value').textContent = known ? `${low} to ${high}${unit}` : 'not estimated';
+    const [low, high] = (this.range = this.rangeOf(map.cells!, world));
+    element('map-value').textContent = Number.isFinite(high - low)
+      ? this.said(world)
+      : 'not estimated';
   }
 
-  private rangeOf(cells: Float32Array, { plant }: World): [number, number] {
+  /// What the colours stand for.
+  private said({ plant, policy }: World): string {
+    const { cells, quantity } = this.map;
+    if (quantity === 'torque')
+      return `${signed(-plant.torque_limit)} to ${signed(plant.torque_limit)} N·m`;
+    const [low, high] = endsOf(cells!).map((end) => signed(end / (policy?.rewardScale ?? 1)));
+    return isEven(cells!, policy?.rewardScale ?? 1)
+      ? `${low} to ${high}: nearly even`
+      : `${low} to ${high}`;
+  }
+
+  /// The ends of the colours.
+  private rangeOf(cells: Float32Array, { plant, policy }: World): [number, number] {
     if (this.map.quantity === 'torque') return [-plant.torque_limit, plant.torque_limit];
-    return [cells.reduce((a, b) => Math.min(a, b)), cells.reduce((a, b) => Math.max(a, b))];
+    return rangeOfValues(cells, policy?.rewardScale ?? 1);
   }
 
   /// Both axes show different variables: the other one gives way.

@@ -11,12 +11,14 @@ import { Clock } from './clock';
 import { Badge } from './badge';
 import { Dashboard } from './dashboard';
 import { button, element } from './dom';
+import { Frames } from './frames';
 import { Hand } from './hand';
 import { listenToKeys } from './keys';
 import { listenToExamples, placeCharts } from './layout';
 import { MapPanel } from './map';
 import { warn } from './message';
 import { prefersStill } from './motion';
+import { lightNouns } from './nouns';
 import { Pose } from './pose';
 import { save } from './save';
 import { RANGES, Settings } from './settings';
@@ -46,6 +48,10 @@ export class Page {
   readonly twin: Twin;
   private readonly address = new Address(() => this.hash());
   private readonly agentPanel: AgentPanel;
+  private readonly frames = new Frames(
+    (seconds) => this.frame(seconds),
+    () => !this.paused,
+  );
   private takes = 0; // of agents and settings; the last one counts
   private paused = false;
 
@@ -81,6 +87,7 @@ export class Page {
       this.history.add(moment);
       this.tour.moment(moment);
     };
+    world.onChange = () => this.frames.wake();
   }
 
   /// Memory that the core has taken (bytes), which it never gives back.
@@ -136,21 +143,19 @@ export class Page {
     return taken;
   }
 
-  /// Handles input, then advances and draws at every frame.
+  /// Handles input, then advances and draws: at every frame, or while paused after a change.
   run(): void {
     this.listen();
-    let before = performance.now();
-    const frame = (now: number) => {
-      const seconds = Math.max(0, now - before) / 1000;
-      before = now;
-      if (!this.paused && !this.clock.advance(seconds)) {
-        this.restarted();
-        warn('The pendulum spun too fast to be computed; it hangs again.');
-      }
-      this.draw();
-      requestAnimationFrame(frame);
-    };
-    requestAnimationFrame(frame);
+    this.frames.start();
+  }
+
+  private frame(seconds: number): void {
+    if (!this.paused && !this.clock.advance(seconds)) {
+      this.restarted();
+      warn('The pendulum spun too fast to be computed; it hangs again.');
+    }
+    this.draw();
+    if (this.map.busy) this.frames.wake();
   }
 
   /// Changes to another agent; if it cannot be loaded, says why, keeps the old one and returns false.
@@ -208,6 +213,10 @@ export class Page {
     addEventListener('hashchange', ({ newURL }) => void this.open(new URL(newURL).hash));
     listenToExamples(() => void this.open());
     onThemeChange(() => this.repaint());
+    const wake = () => this.frames.wake();
+    for (const event of ['input', 'change', 'click', 'keydown']) addEventListener(event, wake);
+    this.frames.watch(this.canvases.map((canvas) => canvas.element));
+    lightNouns(this.scene, wake);
   }
 
   private async forgetOwn(): Promise<void> {
@@ -231,6 +240,7 @@ export class Page {
     this.clock.settle();
     element('pause').textContent = paused ? 'Resume' : 'Pause';
     this.pose.shown = paused;
+    this.frames.wake();
   }
 
   setSpeed(speed: number): void {
@@ -291,6 +301,7 @@ export class Page {
   private changed(): void {
     if (this.paused) this.world.look();
     this.address.changed();
+    this.frames.wake();
   }
 
   /// What belongs into the address, or into a link for others, who have not the visitor's own policy.
@@ -307,11 +318,14 @@ export class Page {
     });
   }
 
+  private get canvases() {
+    const { scene, twin, map, dashboard } = this;
+    return [scene.canvas, twin.scene.canvas, map.canvas, ...dashboard.canvases];
+  }
+
   private repaint(): void {
-    const scenes = [this.scene.canvas, this.twin.scene.canvas];
-    for (const canvas of [...scenes, this.map.canvas, ...this.dashboard.canvases]) {
-      canvas.forgetColors();
-    }
+    for (const canvas of this.canvases) canvas.forgetColors();
+    this.frames.wake();
   }
 
   private draw(): void {

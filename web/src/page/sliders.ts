@@ -1,4 +1,5 @@
 import type { Range } from '../pendulum';
+import { withMinus } from '../text';
 
 /// Sliders with a label, a value, a reset button, and a mark for what the agent was trained on.
 
@@ -105,7 +106,7 @@ export class Slider {
 
   private show(): void {
     const { unit, format = (value) => `${Number(value.toPrecision(4))} ${unit}` } = this.spec;
-    const text = format(this.value);
+    const text = withMinus(format(this.value));
     this.output.textContent = text;
     this.input.ariaValueText = text;
     this.back.disabled = this.value === this.spec.initial;

@@ -1,3 +1,4 @@
+import { withMinus } from '../text';
 import type { Moment } from '../world';
 import { Canvas } from './canvas';
 
@@ -144,11 +145,6 @@ const LINKS: readonly [string, Of, Of][] = [
 function fromUpright(angle: number): number {
   const turns = (angle + Math.PI) / (2 * Math.PI);
   return (turns - Math.round(turns)) * 2 * Math.PI;
-}
-
-/// A number's text with a minus sign as wide as a digit.
-export function withMinus(text: string): string {
-  return text.replace(/^-/, '−');
 }
 
 /// Three significant digits.

@@ -5,6 +5,8 @@ import { Canvas } from './canvas';
 import { signed } from './charts';
 
 type Color = readonly [number, number, number];
+type Names = [string, string, string]; // at the ends of an axis, and in its middle
+type Widths = [number, number, number]; // pixels
 
 // Of V, from the least to the most, ever lighter; and of torques, from left over none to right.
 const VALUES: readonly Color[] = [
@@ -22,7 +24,7 @@ const TORQUES: readonly Color[] = [
   [4, 110, 100],
 ];
 const EASE = 0.25; // of the way to a new map, at each drawing
-const ROOMY = 180; // pixels, from which on the ends of an axis are named too
+const APART = 8; // pixels, between two names at least
 const [LEFT, BOTTOM] = [16, 18]; // pixels, for the names of the axes
 
 /// A map of V or torque as colours, with the way of the pendulum through it.
@@ -148,17 +150,26 @@ export class MapChart {
   private nameAxes(x: Axis, y: Axis): void {
     const { canvas } = this;
     const { width, height } = canvas;
-    const [from, middle, to] = width < ROOMY ? ['', briefly(ends(x)[1]), ''] : ends(x);
+    const [from, middle, to] = this.fitting(ends(x), width - LEFT);
     canvas.text(from, LEFT, height - 8);
     canvas.text(middle, (LEFT + width) / 2, height - 8, 'center');
     canvas.text(to, width, height - 8, 'right');
-    const [low, centre, high] = height < ROOMY ? ['', briefly(ends(y)[1]), ''] : ends(y);
+    const [low, centre, high] = this.fitting(ends(y), height - BOTTOM);
     canvas.context.save();
     canvas.context.rotate(-Math.PI / 2);
     canvas.text(low, BOTTOM - height, 7);
     canvas.text(centre, (BOTTOM - height) / 2, 7, 'center');
     canvas.text(high, 0, 7, 'right');
     canvas.context.restore();
+  }
+
+  /// The names of an axis of this length: all, or that of the middle alone, which is shorter then.
+  private fitting(names: Names, length: number): Names {
+    const { context } = this.canvas;
+    context.font = '12px system-ui, sans-serif'; // as Canvas.text() has it
+    const [from, middle, to] = names.map((name) => context.measureText(name).width) as Widths;
+    const half = length / 2 - middle / 2 - APART;
+    return from < half && to < half ? names : ['', briefly(names[1]), ''];
   }
 }
 
@@ -177,7 +188,7 @@ function briefly(name: string): string {
 }
 
 /// What stands at the ends and in the middle of an axis.
-function ends({ name, reach }: Axis): [string, string, string] {
+function ends({ name, reach }: Axis): Names {
   if (name === 'q1') return ['hanging', 'upper link upright', 'hanging'];
   if (name === 'q2') return ['folded', 'lower link straight', 'folded'];
   const link = name === 'w1' ? 'upper' : 'lower';

@@ -1,0 +1,90 @@
+import { expect } from '@playwright/test';
+import type { Page } from '@playwright/test';
+import { onScreen, open, startFrom, test } from './page';
+
+/// Faces, numbers, nouns, and what others show of the page.
+
+/// How far what is seen has moved by itself, since the page was opened (layout shift).
+async function shift(page: Page): Promise<number> {
+  return page.evaluate(
+    () =>
+      new Promise<number>((resolve) => {
+        let sum = 0;
+        new PerformanceObserver((list) => {
+          for (const entry of list.getEntries()) sum += (entry as never as { value: number }).value;
+        }).observe({ type: 'layout-shift', buffered: true });
+        setTimeout(() => resolve(sum), 1000);
+      }),
+  );
+}
+
+for (const [width, height] of [
+  [1440, 900],
+  [844, 390],
+  [390, 844],
+] as const) {
+  test(`nothing moves while everything loads, at ${width} × ${height}`, async ({ page }) => {
+    await page.setViewportSize({ width, height });
+    await open(page);
+    await page.waitForLoadState('networkidle');
+    expect(await shift(page)).toBeLessThan(0.05);
+  });
+}
+
+test('both faces are those of the page, and their licence is beside them', async ({ page }) => {
+  await open(page);
+  const loaded = await page.evaluate(async () => {
+    await document.fonts.ready;
+    return [...document.fonts].filter(({ status }) => status === 'loaded').map((f) => f.family);
+  });
+  expect(loaded.map((name) => name.replaceAll('"', ''))).toEqual(
+    expect.arrayContaining(['Hanken Grotesk', 'Bricolage Grotesque']),
+  );
+  const licence = await page.request.get('./fonts/OFL.txt');
+  expect(await licence.text()).toContain('SIL Open Font License, Version 1.1');
+});
+
+test('a negative number has a true minus sign', async ({ stage: page }) => {
+  await open(page);
+  await startFrom(page, 0, -0.5, -2, 0);
+  await expect(page.locator('output[for=pose-q2]')).toHaveText('−29°');
+  await expect(page.locator('output[for=pose-w1]')).toHaveText('−2 rad/s');
+  await expect(page.locator('#height-value')).toHaveText(/^−0\.\d\d m of/);
+  await page.evaluate(() => upswing.world.reset({ q1: 0, q2: 0, w1: 0, w2: 0 }));
+  await expect(page.locator('#energy-value')).toHaveText('−9.81 J of 9.81 J');
+});
+
+test('a noun lights its thing, under a mouse and from a tap to the next', async ({
+  stage: page,
+}) => {
+  await open(page);
+  const lit = () => page.evaluate(() => upswing.scene.lit);
+  const noun = page.locator('#explain .noun[data-thing=motor]');
+  await noun.hover();
+  await expect.poll(lit).toBe('motor');
+  await page.mouse.move(1, 1);
+  await expect.poll(lit).toBeNull();
+  await noun.dispatchEvent('pointerdown', { pointerType: 'touch' });
+  await expect.poll(lit).toBe('motor');
+  const { x, y } = await onScreen(page, 0.9, 0.9);
+  await page.mouse.click(Math.max(x, 1), Math.max(y, 1));
+  await expect.poll(lit).toBeNull();
+  const colors = await page
+    .locator('#explain .noun')
+    .evaluateAll((nouns) => nouns.map((one) => getComputedStyle(one).color));
+  expect(new Set(colors).size).toBe(4);
+});
+
+test('what others show of the page: a card of 1200 × 630, at most 150 kB', async ({ page }) => {
+  await open(page);
+  const card = page.locator('meta[property="og:image"]');
+  const response = await page.request.get((await card.getAttribute('content'))!);
+  const bytes = await response.body();
+  expect(bytes.length).toBeLessThan(150_000);
+  expect([bytes.readUInt32BE(16), bytes.readUInt32BE(20)]).toEqual([1200, 630]);
+  await expect(page.locator('meta[name="twitter:card"]')).toHaveAttribute(
+    'content',
+    'summary_large_image',
+  );
+  await expect(page.locator('footer')).toContainText('Sangil Lee');
+});

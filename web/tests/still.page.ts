@@ -1,0 +1,55 @@
+import { expect } from '@playwright/test';
+import type { Page } from '@playwright/test';
+import { open, test } from './page';
+
+/// A page that stands still draws nothing, and draws again after any change.
+
+/// Counts the frames that the page asks for from now on.
+async function countFrames(page: Page): Promise<() => Promise<number>> {
+  await page.evaluate(() => {
+    const { requestAnimationFrame: soon } = globalThis;
+    Object.assign(globalThis, { framesAsked: 0 });
+    globalThis.requestAnimationFrame = (draw) => {
+      ++(globalThis as never as { framesAsked: number }).framesAsked;
+      return soon(draw);
+    };
+  });
+  return () => page.evaluate(() => (globalThis as never as { framesAsked: number }).framesAsked);
+}
+
+/// Until no frame is asked for during a second.
+async function settle(frames: () => Promise<number>): Promise<number> {
+  let before = -1;
+  await expect(async () => {
+    const now = await frames();
+    const still = now === before;
+    before = now;
+    expect(still).toBe(true);
+  }).toPass({ intervals: [1000] });
+  return before;
+}
+
+test('a paused page asks for no frame until something changes', async ({ page }) => {
+  await open(page, '#agent=fast&on=1');
+  await page.locator('#pause').click();
+  const frames = await countFrames(page);
+  let asked = await settle(frames);
+  await page.waitForTimeout(2000);
+  expect(await frames()).toBe(asked);
+  const changes: [string, () => Promise<unknown>][] = [
+    ['a slider', () => page.locator('#pose-q1').fill('90')],
+    ['the theme', () => page.locator('#theme').click()],
+    ['a step', () => page.locator('#step').click()],
+    ['a script', () => page.evaluate(() => upswing.world.reset())],
+    ['the size of the window', () => page.setViewportSize({ width: 900, height: 700 })],
+    ['another agent', () => page.locator('#agent').selectOption('dqn')],
+  ];
+  for (const [what, change] of changes) {
+    await change();
+    await expect.poll(frames, { message: what }).toBeGreaterThan(asked);
+    asked = await settle(frames);
+  }
+  await page.locator('#pause').click();
+  await page.waitForTimeout(10_000);
+  expect(await frames()).toBeGreaterThan(asked + 50); // it moves
+});
