@@ -1,6 +1,7 @@
 import { core } from '../core';
 import { agentSettings } from './learner';
 import type { LearnSettings, Setting } from './learner';
+import { isSwitch } from './recipe';
 
 /// What can be changed of a training: some of the program's own settings, by their names there, with its
 /// ranges and its words.
@@ -33,11 +34,27 @@ export class Knobs {
     this.place = place;
   }
 
+  /// What can be changed of a named agent; undefined if it does not learn here.
+  settingsOf(agent: string): readonly Setting[] | undefined {
+    if (!Object.hasOwn(KNOBS, agent)) return undefined;
+    const settings = agentSettings(core(), agent);
+    return KNOBS[agent]!.map((name) => settings.get(name)!);
+  }
+
+  /// Sets some of those that are shown, the others to the agent's own values.
+  set(settings: LearnSettings): void {
+    this.reset();
+    for (const { input, setting } of this.inputs) {
+      const value = settings[setting.name];
+      if (value === undefined) continue;
+      if (input.type === 'checkbox') input.checked = value === 'true';
+      else input.value = value;
+    }
+  }
+
   /// Shows those of a named agent, at its own values.
   show(agent: string): void {
-    const settings = agentSettings(core(), agent);
-    const found = KNOBS[agent]!.map((name) => settings.get(name)!);
-    this.inputs = found.map((setting) => ({ setting, input: inputOf(setting) }));
+    this.inputs = this.settingsOf(agent)!.map((setting) => ({ setting, input: inputOf(setting) }));
     this.place.replaceChildren(
       ...this.inputs.map(({ input, setting }) => {
         const label = document.createElement('label');
@@ -66,10 +83,6 @@ export class Knobs {
       value !== usual && (isSwitch(usual) || Number(value) !== Number(usual));
     return Object.fromEntries(values.filter(differ).map(([{ name }, value]) => [name, value]));
   }
-}
-
-function isSwitch(value: string): boolean {
-  return value === 'true' || value === 'false';
 }
 
 function inputOf({ name, value, low, high }: Setting): HTMLInputElement {

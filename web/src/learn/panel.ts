@@ -1,11 +1,17 @@
+import { addressOf } from '../page/address';
+import { copy } from '../page/clipboard';
 import { CONTROL_PERIOD } from '../pendulum';
+import type { Scene } from '../view/scene';
 import { button, element } from '../page/dom';
 import { saveFile } from '../page/save';
 import { onThemeChange } from '../page/theme';
 import { LearnChart, stepsOf } from './chart';
 import type { Checkpoint, Course, Recording } from './course';
+import { film, filmType } from './film';
+import { Filmstrip } from './filmstrip';
 import { Knobs } from './knobs';
 import './learn.css';
+import { decodeRecipe, encodeRecipe } from './recipe';
 import { Scrubber } from './scrubber';
 import type { LearnStage } from './scrubber';
 import { Session } from './session';
@@ -37,6 +43,9 @@ export interface LearnPage extends LearnStage {
     readonly ownIsLearned: boolean;
     recording(id: string): Recording | null;
   };
+  readonly scene: Scene;
+  /// Hears when a training has begun.
+  learned(): void;
   /// Keeps a policy that was learned here as the visitor's own.
   keepLearned(file: File, shown: boolean): Promise<void>;
 }
@@ -50,6 +59,7 @@ export class LearnPanel {
   private readonly four = element<HTMLInputElement>('learn-four');
   private readonly agent = element<HTMLSelectElement>('learn-agent');
   private readonly scrubber: Scrubber;
+  private readonly strip: Filmstrip;
   private sessions: Session[] = [];
   private recording: Recording | null = null; // if it was asked for
   private readonly taken = new WeakSet<Session>(); // whose best policy has taken over
@@ -59,12 +69,16 @@ export class LearnPanel {
   /// `recorded` is the agent whose training can be gone through.
   constructor(page: LearnPage, recorded: string) {
     this.page = page;
+    this.strip = new Filmstrip(page.world.simulator);
     this.scrubber = new Scrubber(page, () => this.draw());
     button('learn-start', () => this.toggle());
     button('learn-again', () => this.start());
     button('learn-save', () => this.save());
     button('learn-keep', () => void this.keep());
     button('learn-reset', () => this.knobs.reset());
+    button('learn-share', () => void copy(addressOf(this.address), 'The link to this training'));
+    const filming = button('learn-film', () => void this.film(filming));
+    filming.hidden = filmType === undefined;
     button('learn-recorded', () => this.showRecording(recorded));
     element('learn-recorded').hidden = page.agents.recording(recorded) === null;
     this.agent.addEventListener('change', () => this.knobs.show(this.agent.value));
@@ -96,6 +110,26 @@ export class LearnPanel {
       (_, i) => new Session(this.agent.value, first + i, this.knobs.changed, () => this.news()),
     );
     this.choose(this.sessions[0]!);
+    this.page.learned();
+  }
+
+  /// Trains what an address asks for, if it asks for something else than what is there. Returns what it
+  /// does not understand.
+  open(hash: string): readonly string[] {
+    const { recipe, problems } = decodeRecipe(hash, (agent) => this.knobs.settingsOf(agent));
+    if (recipe && encodeRecipe(recipe) !== this.address) {
+      this.agent.value = recipe.agent;
+      this.knobs.show(recipe.agent);
+      this.knobs.set(recipe.settings);
+      this.seed.value = String(recipe.seed);
+      this.start();
+    }
+    return problems;
+  }
+
+  /// What an address says of the training that is shown; the view alone if there is none.
+  get address(): string {
+    return this.session ? encodeRecipe(this.session) : 'learn';
   }
 
   /// Ends what still learns.
@@ -221,6 +255,15 @@ export class LearnPanel {
     await this.page.keepLearned(file, true);
   }
 
+  private async film(button: HTMLButtonElement): Promise<void> {
+    button.disabled = true;
+    button.textContent = 'Filming …';
+    const { scene } = this.page;
+    await film(scene.canvas, () => scene.square, 'upswing.webm');
+    button.textContent = 'Film it for 5 s';
+    button.disabled = false;
+  }
+
   private save(): void {
     const file = this.file();
     if (file) saveFile(file, 'policy.safetensors');
@@ -258,6 +301,7 @@ export class LearnPanel {
       course,
       scrubber.shows ? scrubber.step : null,
     );
+    this.strip.show(session?.state === 'finished' ? session : null);
     const active = this.sessions.filter((one) => one.active);
     const paused = active.length > 0 && active.every(({ state }) => state === 'paused');
     const label = active.length === 0 ? 'Learn' : paused ? 'Go on' : 'Pause';

@@ -15,6 +15,9 @@ export function placeCharts(): void {
   if (q.parentElement !== place) place.prepend(q);
   if (view !== 'everything') beside.append(map);
   else if (map.parentElement !== charts) element('phase-figure').before(map);
+  const grown = element('learn-figure');
+  if (view === 'tour') element('step-learn').append(grown);
+  else element('learn-view').prepend(grown);
 }
 wide.addEventListener('change', placeCharts);
 

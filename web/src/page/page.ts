@@ -109,16 +109,21 @@ export class Page {
       if (this.tour.number === 0) this.learn.pause();
       return this.tour.go(view.step);
     }
-    const { shared, problems } = decode(hash, RANGES, (id) => this.agents.has(id));
+    const learns = view.name === 'learn';
+    const { shared, problems }: { shared: Partial<Shared>; problems: string[] } = learns
+      ? { shared: {}, problems: [] }
+      : decode(hash, RANGES, (id) => this.agents.has(id));
     // What was learned stays on the stage.
-    const learns = view.name === 'learn' || this.tour.number > 0;
-    if (learns && this.learn.keeps && !shared.agent) {
+    if ((learns || this.tour.number > 0) && this.learn.keeps && !shared.agent) {
       Object.assign(shared, { agent: OWN, on: true });
     }
     this.tour.leave();
     this.world.agentOn = false;
     if (!(await this.begin(shared))) return;
-    if (view.name === 'learn') this.learn.show();
+    if (learns) {
+      problems.push(...this.learn.open(hash));
+      this.learn.show();
+    }
     if (problems.length > 0) warn(problemText(problems));
   }
 
@@ -167,6 +172,11 @@ export class Page {
   async openFile(file: File, learned = false): Promise<void> {
     if (!(await this.agentPanel.open(file, learned))) return;
     this.settings.setPlant(this.agent!.policy.plant);
+    this.changed();
+  }
+
+  /// A training has begun: the address is its recipe.
+  learned(): void {
     this.changed();
   }
 
@@ -307,7 +317,7 @@ export class Page {
   /// What belongs into the address, or into a link for others, who have not the visitor's own policy.
   private hash(forOthers = false): string {
     if (this.tour.number > 0) return `tour=${this.tour.number}`;
-    if (document.documentElement.dataset.view === 'learn') return 'learn';
+    if (document.documentElement.dataset.view === 'learn') return this.learn.address;
     return encode({
       agent: forOthers && this.agent?.id === OWN ? null : (this.agent?.id ?? null),
       twin: this.twin.id === OWN ? null : this.twin.id,

@@ -14,6 +14,12 @@ const PIVOT: Vec = { x: 0, z: 0 };
 const CIRCLE = 0.86; // of the box's shorter side: the circle that the tip can reach
 const LARGEST_ARC = (150 / 180) * Math.PI; // at the motor's limit
 
+/// What a scene shows of a world.
+export type Shown = Pick<
+  World,
+  'plant' | 'time' | 'torque' | 'uprightFor' | 'push' | 'drag' | 'shoved'
+>;
+
 /// The pendulum in its plane, seen so that positive angles and torques are clockwise.
 export class Scene {
   readonly canvas: Canvas;
@@ -59,7 +65,7 @@ export class Scene {
   }
 
   /// Draws the pendulum in this state, and the path of its tip over `trail`, oldest first.
-  draw(world: World, state: State, trail: readonly Moment[]): void {
+  draw(world: Shown, state: State, trail: readonly Moment[]): void {
     const { canvas } = this;
     const { plant } = world;
     const reach = plant.length1 + plant.length2;
@@ -74,7 +80,7 @@ export class Scene {
 
     const elbow = pointOn(plant, state, 1, plant.length1).position;
     const tip = pointOn(plant, state, 2, plant.length2).position;
-    const size = Math.max(9, 0.045 * this.scale); // px, radius of the shaft
+    const size = this.thick(9, 0.045); // px, radius of the shaft
     const motorGlows = this.lit === 'motor';
     drawHousing(canvas, this.at(PIVOT), 2 * size, motorGlows);
     this.drawLink(PIVOT, elbow, 'link1', plant.mass1);
@@ -90,8 +96,18 @@ export class Scene {
     }
   }
 
+  /// Pixels of this many metres, but not less than `least`, where the pendulum is not tiny.
+  private thick(least: number, metres: number): number {
+    return Math.max(Math.min(least, 2 * metres * this.scale), metres * this.scale);
+  }
+
+  /// The square that shows the whole pendulum: its middle and half its side (px of the canvas).
+  get square(): { x: number; y: number; half: number } {
+    return { ...this.pivot, half: 1.2 * this.scale };
+  }
+
   /// How brightly something shines, from 0 to 1.
-  private glow(thing: 'goal', { uprightFor }: World): number {
+  private glow(thing: 'goal', { uprightFor }: Shown): number {
     return this.lit === thing ? 1 : uprightFor !== null ? 0.8 : 0.4;
   }
 
@@ -128,7 +144,7 @@ export class Scene {
 
   /// A link of 1 kg is as thick as its capsule, or more so that a finger finds it; a heavier one thicker.
   private drawLink(from: Vec, to: Vec, name: 'link1' | 'link2', mass: number): void {
-    const thickness = Math.max(10, 0.06 * this.scale) * Math.min(Math.max(mass, 0.25), 3) ** 0.5;
+    const thickness = this.thick(10, 0.06) * Math.min(Math.max(mass, 0.25), 3) ** 0.5;
     drawRod(this.canvas, this.at(from), this.at(to), name, thickness, this.lit === name);
   }
 
@@ -149,7 +165,7 @@ export class Scene {
     this.arrowHead(x + radius * Math.cos(end), y + radius * Math.sin(end), direction, 'torque');
   }
 
-  private drawPush(world: World, state: State): void {
+  private drawPush(world: Shown, state: State): void {
     const { push, drag, plant } = world;
     const { context } = this.canvas;
     if (drag) {

@@ -1,0 +1,44 @@
+import { saveFile } from '../page/save';
+import type { Canvas } from '../view/canvas';
+
+const SECONDS = 5;
+const SIDE = 720; // px
+const TYPES = ['video/webm;codecs=vp9', 'video/webm', 'video/mp4'];
+
+/// The kind of film that this browser makes; undefined if it makes none.
+export const filmType =
+  typeof MediaRecorder === 'undefined'
+    ? undefined
+    : TYPES.find((type) => MediaRecorder.isTypeSupported(type));
+
+/// Films what a canvas shows about its `middle` for five seconds, and saves the film under this name.
+/// `middle` gives place and half the side of a square (px of the style sheet).
+export async function film(
+  canvas: Canvas,
+  middle: () => { x: number; y: number; half: number },
+  name: string,
+): Promise<void> {
+  const picture = document.createElement('canvas');
+  picture.width = picture.height = SIDE;
+  const context = picture.getContext('2d')!;
+  const recorder = new MediaRecorder(picture.captureStream(), { mimeType: filmType! });
+  const pieces: Blob[] = [];
+  recorder.ondataavailable = ({ data }) => pieces.push(data);
+  const stopped = new Promise((resolve) => (recorder.onstop = resolve));
+  const end = performance.now() + 1000 * SECONDS;
+  const ground = canvas.color('page');
+  const frame = (): void => {
+    const { x, y, half } = middle();
+    const ratio = canvas.element.width / canvas.width;
+    context.fillStyle = ground;
+    context.fillRect(0, 0, SIDE, SIDE);
+    const [left, top, side] = [x - half, y - half, 2 * half].map((length) => length * ratio);
+    context.drawImage(canvas.element, left!, top!, side!, side!, 0, 0, SIDE, SIDE);
+    if (performance.now() < end) requestAnimationFrame(frame);
+    else recorder.stop();
+  };
+  recorder.start();
+  frame();
+  await stopped;
+  saveFile(new Blob(pieces, { type: recorder.mimeType }), name);
+}

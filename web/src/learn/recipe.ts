@@ -1,0 +1,65 @@
+import { quoted } from '../text';
+import type { LearnSettings, Setting } from './learner';
+
+/// What makes a training: the same recipe grows the same agent, bit for bit, in any browser.
+export interface Recipe {
+  agent: string;
+  seed: number;
+  settings: LearnSettings; // those that differ from the agent's own
+}
+
+const LARGEST_SEED = 1e9;
+
+/// The part of an address after #, such as learn=fast&seed=42&balance_weight=0.
+export function encodeRecipe({ agent, seed, settings }: Recipe): string {
+  return new URLSearchParams({ learn: agent, seed: String(seed), ...settings }).toString();
+}
+
+/// Reads such an address; null if it names no agent. `settingsOf` gives the settings that a recipe may
+/// change, or undefined for an agent that cannot learn here. What is not understood is left out and
+/// reported in `problems`.
+export function decodeRecipe(
+  hash: string,
+  settingsOf: (agent: string) => readonly Setting[] | undefined,
+): { recipe: Recipe | null; problems: string[] } {
+  const fields = new URLSearchParams(hash.replace(/^#/, ''));
+  const agent = fields.get('learn');
+  if (!agent) return { recipe: null, problems: [] };
+  const known = settingsOf(agent);
+  if (!known) return { recipe: null, problems: [`no agent ${quoted(agent)} learns here`] };
+  const problems: string[] = [];
+  const settings: Record<string, string> = {};
+  let seed = 1;
+  for (const [name, text] of fields) {
+    if (name === 'learn') continue;
+    const range = name === 'seed' ? SEED : known.find((one) => one.name === name);
+    const problem = range ? problemOf(range, text) : `unknown ${quoted(name)}`;
+    if (problem) problems.push(problem);
+    else if (name === 'seed') seed = Number(text);
+    else settings[name] = text;
+  }
+  return { recipe: { agent, seed, settings }, problems };
+}
+
+const SEED = { name: 'seed', value: '1', low: 0, high: LARGEST_SEED, whole: true };
+
+/// Why a value does not fit a setting; empty if it does.
+function problemOf(
+  setting: Pick<Setting, 'name' | 'value' | 'low' | 'high'> & { whole?: boolean },
+  text: string,
+): string {
+  const { name, value, low, high, whole } = setting;
+  if (isSwitch(value)) {
+    return isSwitch(text) ? '' : `${name}: expected true or false, got ${quoted(text)}`;
+  }
+  const number = text.trim() === '' ? NaN : Number(text);
+  const within = number >= (low ?? -Infinity) && number <= (high ?? Infinity);
+  if (within && Number.isFinite(number) && (!whole || Number.isInteger(number))) return '';
+  const range = low !== null && high !== null ? ` from ${low} to ${high}` : '';
+  return `${name}: expected a ${whole ? 'whole ' : ''}number${range}, got ${quoted(text)}`;
+}
+
+/// Whether a setting's value is true or false, not a number.
+export function isSwitch(value: string): boolean {
+  return value === 'true' || value === 'false';
+}
