@@ -106,7 +106,7 @@ test('a pendulum that is posed is judged at once', async ({ stage: page }) => {
 /// What a preset says of the default agent and the adaptive one, as they balance or do not.
 const CLAIMS: Readonly<Record<string, string>> = {
   'no, no': 'neither balances',
-  'no, yes': 'the adaptive one balances',
+  'no, yes': 'only the adaptive one balances',
   'yes, yes': 'both balance',
 };
 

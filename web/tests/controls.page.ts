@@ -120,7 +120,7 @@ test('while paused, the keyboard sets the start', async ({ stage: page }) => {
   expect(posed).toEqual({ q1: Math.PI, q2: -1, w1: 2, w2: 1 }); // the others as they were
   await page.keyboard.press('ArrowLeft');
   const lower = page.getByLabel('Angle of the lower link to it', { exact: true });
-  await expect(lower).toHaveAttribute('aria-valuetext', '-57°');
+  await expect(lower).toHaveAttribute('aria-valuetext', '−57°');
   await lower.focus();
   await page.keyboard.press('Home');
   await page.keyboard.press('ArrowRight');
