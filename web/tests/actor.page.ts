@@ -34,7 +34,7 @@ test('the chart is that of the policy, and Q-values come back with a Q-network',
     await expect(page.locator('label[for=torque_limit]')).toContainText('agent: ±5');
     await page.locator('#agent').selectOption('d3qn');
     await expect(page.locator('#q-name')).toHaveText('Q-values');
-    await expect(page.locator('#q-value')).toHaveText(/^best /);
+    await expect(page.locator('#q-value')).toHaveText(/^the worst torque costs /);
   }
 });
 
