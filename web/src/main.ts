@@ -26,6 +26,7 @@ try {
   }
   element('badge').hidden = false;
   page.run();
+  document.getElementById('first-picture')!.remove();
 } catch (error) {
   const reason = error instanceof Error ? error.message : String(error);
   const problem = element('problem');

@@ -73,11 +73,12 @@ export class Filmstrip {
     const { plant, time, state, uprightFor } = world;
     const last = { ...{ plant, time, uprightFor }, ...STILL };
     this.pictures[i] = () => scene.draw(last, state, history.from(begun));
-    requestAnimationFrame(() => this.repaint());
+    // After a new canvas has got its size.
+    requestAnimationFrame(() => requestAnimationFrame(() => this.repaint()));
     world.policy = null;
     policy.controller.close();
     const trial = after ? `trial ${after.trials.toLocaleString('en')}` : 'best';
-    this.captions[i]!.textContent = `${trial}: ${upright.toFixed(1)} s up`;
+    this.captions[i]!.textContent = `${trial}\n${upright.toFixed(1)} s up`;
   }
 
   private add(i: number): Scene {

@@ -88,14 +88,17 @@ function beamOf(color: string, radius: number): HTMLCanvasElement {
   return canvas;
 }
 
-/// The path of the tip like a long exposure: `ages` (s) belong to `points`, oldest first.
+/// The path of the tip like a long exposure: `ages` (s) belong to `points`, oldest first;
+/// `reach` is the radius of the circle (px).
 export function drawTrace(
   canvas: Canvas,
   points: readonly Place[],
   ages: readonly number[],
   seconds: number,
+  reach: number,
 ): void {
   const { context } = canvas;
+  const fine = Math.min(1, reach / 200); // of a small picture
   const shadeOf = (age: number) => {
     const light = 0.3 * Math.max(0, 1 - age / seconds) + 0.7 * Math.max(0, 1 - age / FRESH);
     return Math.ceil(SHADES * light);
@@ -117,7 +120,7 @@ export function drawTrace(
     ] as const) {
       context.globalAlpha = alpha * light;
       context.strokeStyle = canvas.color(color);
-      context.lineWidth = width;
+      context.lineWidth = fine * width;
       context.stroke();
     }
     begin = end;

@@ -76,7 +76,7 @@ export class Scene {
     const tipOf = (s: State) => this.at(pointOn(plant, s, 2, plant.length2).position);
     const points = [...trail.map((moment) => tipOf(moment.state)), tipOf(state)];
     const ages = [...trail.map(({ t }) => world.time - t), 0];
-    drawTrace(canvas, points, ages, TRAIL_SECONDS);
+    drawTrace(canvas, points, ages, TRAIL_SECONDS, this.scale * reach);
 
     const elbow = pointOn(plant, state, 1, plant.length1).position;
     const tip = pointOn(plant, state, 2, plant.length2).position;
