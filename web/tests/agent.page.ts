@@ -71,6 +71,7 @@ test('a link brings controllers that were not learned', async ({ stage: page }) 
   await advance(page, 2);
   expect(await balanced(page)).toBe(2);
   await page.locator('#agent').selectOption('mpc');
+  await page.locator('#map').scrollIntoViewIfNeeded();
   await expect(page.locator('#map-value')).toHaveText('not for one that plans');
   await expect(page).toHaveURL(/agent=mpc&twin=mpc/);
 });

@@ -102,6 +102,11 @@ test('in the tour an agent learns from nothing and stays, and is what Node and t
   await page.getByRole('link', { name: 'Learn', exact: true }).click();
   await expect(status(page)).toContainText('Solved after ');
   await expect(page.locator('#learn-success')).toHaveText('100%');
+  await expect(page).toHaveURL(new RegExp(`#learn=fast&seed=${SEED}$`));
+  const tries = page.locator('#learn-strip li');
+  await expect(tries).toHaveCount(6);
+  await expect(tries.first()).toHaveText(/^trial 0\s0\.0 s up$/);
+  await expect(tries.last()).toHaveText(/^trial \d+\s[1-9]\.\d s up$/);
 
   // The same seed, in Node, and what it reports on the way.
   const learner = new Learner(await Core.start(await coreModule()), 'fast', SEED);
@@ -135,6 +140,9 @@ test('in the tour an agent learns from nothing and stays, and is what Node and t
   await scrub.fill('0');
   await expect(page.locator('#learn-where')).toHaveText('on the stage: after 0 steps');
   expect(await swingsUp(page)).toBe(false);
+  // Numbers and file are those of the agent on the stage.
+  await expect(page.locator('#learn-trials')).toHaveText('0');
+  expect(Buffer.from(await saved(page)).toString('latin1')).toContain('"step":"0"');
   await scrub.press('End');
   await expect(page.locator('#learn-where')).toHaveText('on the stage: as it is now');
   expect(await swingsUp(page)).toBe(true);
@@ -207,6 +215,41 @@ test('the default agent: from an untrained policy to the one of the page, fetche
   const message = page.locator('#message');
   await expect(message).toContainText('The agent after 20,000 steps cannot be shown');
   expect(await page.evaluate(() => upswing.world.policy!.metadata.get('step'))).toBe('240000');
+});
+
+test('a link grows an agent by its recipe, on a stage with the pendulums that train', async ({
+  page,
+}) => {
+  await open(page, '#learn=sac-fast&seed=5&balance_weight=0');
+  await expect(page.locator('#learn-start')).toHaveText('Pause');
+  await expect(page.locator('#learn-agent')).toHaveValue('sac-fast');
+  await expect(page.locator('#learn-seed')).toHaveValue('5');
+  await expect(page.locator('#learn-knobs [name=balance_weight]')).toHaveValue('0');
+  const ghosts = () => page.evaluate(() => upswing.scene.ghosts.length);
+  await expect.poll(ghosts).toBe(2 * 32);
+  await expect(page).toHaveURL(/#learn=sac-fast&seed=5&balance_weight=0$/);
+  await page.locator('#learn-start').click();
+  await expect.poll(ghosts).toBe(0);
+
+  await page.goto('./#learn=fast&seed=-3&steps=1');
+  await expect(page.locator('#message-text')).toContainText('seed: expected a whole number from 0');
+  await expect(page.locator('#message-text')).toContainText('unknown "steps"');
+  await page.locator('#learn-start').click();
+});
+
+test('what was learned while you were elsewhere is on the stage when you come back', async ({
+  page,
+}) => {
+  await open(page, `#learn=fast&seed=${SEED}`);
+  await expect(page.locator('#learn-steps')).not.toHaveText('0');
+  await page.getByRole('link', { name: 'Everything', exact: true }).click();
+  await expect(page.locator('#agent')).toHaveValue('d3qn');
+  await expect.poll(() => page.workers().length).toBe(0);
+  await expect(page.locator('#agent option[value=own]')).toHaveCount(1);
+  await expect(page.locator('#agent')).toHaveValue('d3qn');
+  await page.getByRole('link', { name: 'Learn', exact: true }).click();
+  await expect(page.locator('#agent')).toHaveValue('own');
+  expect(await swingsUp(page)).toBe(true);
 });
 
 test('pause, go on, another seed, start over', async ({ stage: page }) => {

@@ -433,7 +433,7 @@ test('at any size pendulum, words, control and buttons are on one screen', async
         const now = '.step:not([inert])';
         const groups = [
           ...[one('#scene'), one(`#tour-next, ${now} #tour-end`), one(`${now} h2`)],
-          one(`${now} fieldset, #map`),
+          one(`${now} fieldset, [data-step="map"] #map`),
           ...(bars ? [one('#q')] : []),
         ];
         const shares = new Promise<number[]>((resolve) => {

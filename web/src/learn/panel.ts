@@ -357,10 +357,10 @@ export class LearnPanel {
   }
 }
 
-function fileOf({ agent, seed }: Session, { file, step }: Checkpoint): File | null {
+function fileOf({ agent, seed, newest }: Session, { file, step }: Checkpoint): File | null {
   if (!(file instanceof ArrayBuffer)) return null;
-  const steps = step.toLocaleString('en');
-  return new File([file], `learned here, ${agent}, seed ${seed}, ${steps} steps`);
+  const earlier = step === newest?.step ? '' : `, ${step.toLocaleString('en')} steps`;
+  return new File([file], `learned here, ${agent}, seed ${seed}${earlier}`);
 }
 
 const OF_RECORDING =

@@ -8,6 +8,7 @@ export class Canvas {
   height = 0;
   private seen = true; // on the screen, or near it
   private colors = new Map<string, string>();
+  private family: string | null = null;
 
   constructor(id: string) {
     this.element = document.getElementById(id) as HTMLCanvasElement;
@@ -35,6 +36,12 @@ export class Canvas {
     return color;
   }
 
+  /// The page's text face at a size, such as '600 14px'.
+  font(size: string): string {
+    this.family ??= getComputedStyle(this.element).fontFamily;
+    return `${size} ${this.family}`;
+  }
+
   /// To be called when the theme changed.
   forgetColors(): void {
     this.colors.clear();
@@ -45,7 +52,7 @@ export class Canvas {
   }
 
   text(text: string, x: number, y: number, align: CanvasTextAlign = 'left', color = 'quiet'): void {
-    this.context.font = '12px system-ui, sans-serif';
+    this.context.font = this.font('12px');
     this.context.fillStyle = this.color(color);
     this.context.textAlign = align;
     this.context.textBaseline = 'middle';

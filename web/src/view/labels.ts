@@ -9,7 +9,7 @@ export interface Label {
 /// Writes a label at a place on the canvas, an edge of the background around its letters.
 export function drawLabel(canvas: Canvas, text: string, x: number, y: number): void {
   const { context } = canvas;
-  context.font = '600 14px system-ui, sans-serif';
+  context.font = canvas.font('600 15px');
   const width = context.measureText(text).width;
   const left = Math.min(Math.max(x, 4), canvas.width - width - 12);
   context.textAlign = 'left';

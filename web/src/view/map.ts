@@ -166,7 +166,7 @@ export class MapChart {
   /// The names of an axis of this length: all, or that of the middle alone, which is shorter then.
   private fitting(names: Names, length: number): Names {
     const { context } = this.canvas;
-    context.font = '12px system-ui, sans-serif'; // as Canvas.text() has it
+    context.font = this.canvas.font('12px'); // as Canvas.text() has it
     const [from, middle, to] = names.map((name) => context.measureText(name).width) as Widths;
     const half = length / 2 - middle / 2 - APART;
     return from < half && to < half ? names : ['', briefly(names[1]), ''];

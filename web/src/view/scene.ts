@@ -67,6 +67,7 @@ export class Scene {
   /// Draws the pendulum in this state, and the path of its tip over `trail`, oldest first.
   draw(world: Shown, state: State, trail: readonly Moment[]): void {
     const { canvas } = this;
+    if (canvas.width === 0) return; // hidden
     const { plant } = world;
     const reach = plant.length1 + plant.length2;
     this.fit(Math.max(1, reach));
