@@ -41,7 +41,7 @@ async function learn(page, seed) {
         upswing.learn.start();
         const frame = () => {
           ++frames;
-          const session = upswing.learn.chosen;
+          const session = upswing.learn.session;
           const seconds = (performance.now() - began) / 1000;
           if (session.state === 'finished' || session.state === 'failed') {
             resolve({ seconds, frames: frames / seconds, ...session.last });
