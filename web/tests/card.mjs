@@ -6,7 +6,7 @@ import { ready, serve, visit } from './visit.mjs';
 const SECONDS = 2.4; // of the swing-up
 
 const STYLE = `
-  header nav, #theme, #tour, aside, #charts, #explain, #learn, #buttons, #hint, #badge, footer,
+  header nav, #theme, #tour, aside, #charts, #explain, #learn-panel, #buttons, #hint, #badge, footer,
   #beside, #message { display: none !important }
   body { margin: 0 !important; padding: 0 !important; max-width: none !important; overflow: hidden }
   header { position: fixed; z-index: 1; inset: 0 auto 0 64px; width: 540px; flex-direction: column;

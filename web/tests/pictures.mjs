@@ -15,11 +15,10 @@ async function stop() {
   await new Promise((resolve) => setTimeout(resolve, 500));
 }
 
-/// The agent swings up from hanging; stopped on the way.
+/// The first step of the tour: the agent swings up from hanging; stopped on the way.
 async function swingUp(page) {
-  await page.goto(`${server.address}#everything`);
+  await page.goto(`${server.address}#tour=1`);
   await ready(page);
-  await page.click('#agent-on');
   await page.waitForFunction(() => {
     const { q1, q2 } = upswing.world.state;
     return Math.cos(q1) < 0.1 && Math.cos(q1 + q2) < -0.3;
@@ -40,7 +39,7 @@ async function pull(page) {
   await page.evaluate(stop);
 }
 
-/// The last step of the tour, a moment after a click on the map.
+/// The map in the tour, a moment after a click on it.
 async function everyPose(page) {
   await page.goto(`${server.address}#tour=8`);
   await ready(page);
@@ -65,11 +64,14 @@ for (const [name, options, scene] of [
 }
 
 /// The README's film: the agent swings up, is shoved twice, and recovers. 25 frames a second.
-await visit({ viewport: { width: 900, height: 760 } }, async (page) => {
+await visit({ viewport: { width: 1200, height: 760 }, colorScheme: 'dark' }, async (page) => {
   const folder = mkdtempSync(join(tmpdir(), 'upswing-film-'));
-  await page.goto(`${server.address}#agent=d3qn&on=1`);
+  await page.goto(`${server.address}#tour=5`);
   await ready(page);
   await page.evaluate(stop);
+  await page.evaluate(() => {
+    for (const found of document.querySelectorAll('header, #badge')) found.style.opacity = '0';
+  });
   for (let frame = 0; frame < 220; ++frame) {
     await page.evaluate(async (frame) => {
       if (frame === 85) upswing.world.shoveTo(1);
@@ -79,11 +81,11 @@ await visit({ viewport: { width: 900, height: 760 } }, async (page) => {
       await new Promise(requestAnimationFrame);
       await new Promise(requestAnimationFrame);
     }, frame);
-    const clip = { x: 17, y: 86, width: 548, height: 540 };
+    const clip = { x: 32, y: 16, width: 728, height: 728 }; // the stage without the words
     await page.screenshot({ path: join(folder, `${String(frame).padStart(3, '0')}.png`), clip });
   }
   const palette =
-    'scale=420:-1:flags=lanczos,split[a][b];[a]palettegen=max_colors=48[p];[b][p]paletteuse=dither=none';
+    'scale=420:-1:flags=lanczos,split[a][b];[a]palettegen=max_colors=64[p];[b][p]paletteuse=dither=none';
   const frames = ['-framerate', '25', '-i', join(folder, '%03d.png')];
   execFileSync('ffmpeg', ['-y', '-v', 'error', ...frames, '-vf', palette, `${docs}recovery.gif`]);
   rmSync(folder, { recursive: true });

@@ -11,7 +11,8 @@ export const filmType =
     ? undefined
     : TYPES.find((type) => MediaRecorder.isTypeSupported(type));
 
-/// Films what a canvas shows about its `middle` for five seconds, and saves the film under this name.
+/// Films what a canvas shows about its `middle` for five seconds, and saves the film under this name, which
+/// gets an extension. Throws what the recorder throws.
 /// `middle` gives place and half the side of a square (px of the style sheet).
 export async function film(
   canvas: Canvas,
@@ -40,5 +41,7 @@ export async function film(
   recorder.start();
   frame();
   await stopped;
-  saveFile(new Blob(pieces, { type: recorder.mimeType }), name);
+  for (const track of recorder.stream.getTracks()) track.stop();
+  const type = recorder.mimeType;
+  saveFile(new Blob(pieces, { type }), `${name}.${type.includes('mp4') ? 'mp4' : 'webm'}`);
 }

@@ -11,7 +11,8 @@ const TRIES = 6;
 const SECONDS = 7; // of a try
 const STILL = { torque: 0, push: null, drag: null, shoved: null };
 
-/// Six tries of an agent on its way, each as one long exposure: from the untrained policy to the best.
+/// Six tries of an agent on its way, each as one long exposure: from the untrained policy to the last, or to
+/// the best if the task is solved.
 export class Filmstrip {
   private readonly place = element('learn-strip');
   private readonly simulator: World['simulator'];
@@ -77,7 +78,7 @@ export class Filmstrip {
     requestAnimationFrame(() => requestAnimationFrame(() => this.repaint()));
     world.policy = null;
     policy.controller.close();
-    const trial = after ? `trial ${after.trials.toLocaleString('en')}` : 'best';
+    const trial = after ? `trial ${after.trials.toLocaleString('en')}` : 'at the end';
     this.captions[i]!.textContent = `${trial}\n${upright.toFixed(1)} s up`;
   }
 
@@ -103,6 +104,5 @@ function triesOf({ checkpoints, newest }: Session): Checkpoint[] {
     { length: TRIES - 1 },
     (_, i) => checkpoints[Math.round((i * last) / TRIES)]!,
   );
-  const end = newest && { ...newest, after: newest.after ?? checkpoints[last]?.after };
-  return end ? [...some, end as Checkpoint] : some;
+  return newest ? [...some, newest] : some;
 }

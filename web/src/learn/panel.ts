@@ -3,6 +3,8 @@ import { copy } from '../page/clipboard';
 import { CONTROL_PERIOD } from '../pendulum';
 import type { Scene } from '../view/scene';
 import { button, element } from '../page/dom';
+import { note, warn } from '../page/message';
+import { prefersStill } from '../page/motion';
 import { saveFile } from '../page/save';
 import { onThemeChange } from '../page/theme';
 import { LearnChart, stepsOf } from './chart';
@@ -99,7 +101,7 @@ export class LearnPanel {
     new ResizeObserver(() => this.draw()).observe(this.chart.canvas.element);
   }
 
-  /// Trains anew, with the seed and the settings that are chosen.
+  /// Starts a training with the chosen seed and settings.
   start(): void {
     for (const session of this.sessions) session.stop();
     const first = Math.min(Math.max(Math.round(Number(this.seed.value)) || 0, 0), 1e9);
@@ -110,35 +112,36 @@ export class LearnPanel {
       (_, i) => new Session(this.agent.value, first + i, this.knobs.changed, () => this.news()),
     );
     this.choose(this.sessions[0]!);
-    this.page.learned();
   }
 
   /// Trains what an address asks for, if it asks for something else than what is there. Returns what it
   /// does not understand.
   open(hash: string): readonly string[] {
     const { recipe, problems } = decodeRecipe(hash, (agent) => this.knobs.settingsOf(agent));
-    if (recipe && encodeRecipe(recipe) !== this.address) {
+    const known = this.sessions.some((one) => recipe && encodeRecipe(one) === encodeRecipe(recipe));
+    if (recipe && !known) {
+      this.four.checked = false;
       this.agent.value = recipe.agent;
       this.knobs.show(recipe.agent);
       this.knobs.set(recipe.settings);
       this.seed.value = String(recipe.seed);
-      this.start();
+      if (!prefersStill()) this.start();
     }
     return problems;
   }
 
-  /// What an address says of the training that is shown; the view alone if there is none.
+  /// The shown training as the part of an address after #; without one, the view alone.
   get address(): string {
     return this.session ? encodeRecipe(this.session) : 'learn';
   }
 
-  /// Ends what still learns.
+  /// Ends all trainings.
   stop(): void {
     for (const session of this.sessions) session.stop();
     this.draw();
   }
 
-  /// Lets what learns wait, as nobody sees it.
+  /// Pauses all trainings.
   pause(): void {
     for (const session of this.sessions) session.pause();
     this.draw();
@@ -156,7 +159,7 @@ export class LearnPanel {
     return { count, milestone: milestone(session) };
   }
 
-  /// Lets what waits go on.
+  /// Resumes paused trainings.
   resume(): void {
     for (const session of this.sessions) session.resume();
     this.draw();
@@ -171,8 +174,18 @@ export class LearnPanel {
   /// Puts what was learned, or is learning, on the stage again, unless it is the visitor's own agent.
   show(): void {
     const { course, onStage } = this.scrubber;
-    if (course && !onStage && !this.keeps) this.scrubber.take(course);
+    if (course && !onStage && !this.keeps) this.scrubber.take(course, !prefersStill());
     this.draw();
+  }
+
+  /// Whether there is a training or a recording.
+  get begun(): boolean {
+    return this.scrubber.course !== null;
+  }
+
+  /// Leaves the stage to another view or step.
+  leave(): void {
+    this.scrubber.leave();
   }
 
   /// The pendulums that the shown training swings now: q1, q2 [rad] of each.
@@ -218,6 +231,7 @@ export class LearnPanel {
     this.scrubber.take(course);
     this.listCourses();
     this.draw();
+    this.page.learned();
   }
 
   /// A training had news: drawn once a frame, however many there are.
@@ -253,13 +267,18 @@ export class LearnPanel {
     const question = `This replaces your own policy, ${ownName}, in this browser. Replace it?`;
     if (!file || (ownName !== null && !ownIsLearned && !confirm(question))) return;
     await this.page.keepLearned(file, true);
+    note('It stays in this browser: it is the agent "yours" in every list.');
   }
 
   private async film(button: HTMLButtonElement): Promise<void> {
     button.disabled = true;
     button.textContent = 'Filming …';
     const { scene } = this.page;
-    await film(scene.canvas, () => scene.square, 'upswing.webm');
+    try {
+      await film(scene.canvas, () => scene.square, 'upswing');
+    } catch {
+      warn('This browser could not film the stage.');
+    }
     button.textContent = 'Film it for 5 s';
     button.disabled = false;
   }
@@ -349,7 +368,7 @@ export class LearnPanel {
     write('where', `on the stage: ${where}`);
   }
 
-  /// Said once, for those who listen.
+  /// Writes the status when it changes, for screen readers.
   private say(text: string): void {
     if (text === this.said) return;
     this.said = text;
@@ -397,7 +416,7 @@ function milestone(session: Session): string {
 
 function sentence(session: Session): string {
   const { state, last, reason, seconds, settings } = session;
-  if (state === 'failed') return `It cannot learn so: ${reason}.`;
+  if (state === 'failed') return `Training failed: ${reason}.`;
   if (state === 'paused') return 'Paused.';
   if (state === 'stopped') return 'Ended.';
   if (state !== 'finished' || !last) return 'Learning …';

@@ -51,21 +51,26 @@ export class Scrubber {
     return this.shown !== null && this.stage.world.policy === this.shown;
   }
 
-  /// Takes another training, and follows it from now on.
-  take(course: Course): void {
+  /// Takes another training, and follows it from now on; its policy acts at once if it `moves`.
+  take(course: Course, moves = true): void {
     this.course = course;
     this.given = null;
     this.replaceable = this.stage.world.policy;
-    this.follow();
+    this.follow(moves);
     void this.showUntrained(this.withUntrained);
   }
 
+  /// Leaves the stage to others until a policy is shown again.
+  leave(): void {
+    this.replaceable = null;
+  }
+
   /// Shows the policy that is newest, now and later.
-  follow(): void {
+  follow(moves = true): void {
     this.follows = true;
     const newest = this.course?.newest;
     if (newest) void this.show(newest);
-    this.restart();
+    if (moves) this.restart();
   }
 
   /// After news. If somebody has chosen another agent meanwhile, that stays.

@@ -18,6 +18,7 @@ export class Game {
   private readonly setSpeed: (speed: number) => void;
   private readonly half = element<HTMLInputElement>('motor-half');
   private readonly send = button('motor-send', () => void this.copyResult());
+  private counts = false; // whether the visitor is the motor
   private states: State[] = []; // of this try, one for each control step
   private up = 0; // s, in this try, without a break
   private longest = 0; // s, in this try
@@ -40,11 +41,20 @@ export class Game {
 
   /// When the step begins.
   open(): void {
+    this.counts = true;
+    this.states = [];
+    this.up = this.longest = 0;
     this.half.checked = false;
     this.changeSpeed();
   }
 
-  /// Where the pendulum of the best try was, as long after its begin as it is now after that of this try.
+  /// Ends the game: from now on nothing counts.
+  close(): void {
+    this.next();
+    this.counts = false;
+  }
+
+  /// The state of the best try at the same time since its start; null without one.
   get ghost(): State | null {
     return this.bestStates[this.states.length] ?? null;
   }
@@ -57,6 +67,7 @@ export class Game {
 
   /// At each control step.
   moment(state: State): void {
+    if (!this.counts) return;
     const { world } = this;
     if (world.drag) this.held = world.time;
     this.states.push(state);

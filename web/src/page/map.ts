@@ -83,13 +83,16 @@ export class MapPanel {
     return this.chart.canvas;
   }
 
-  /// As the ground of the stage: of poses at rest. With `learning` it is colours alone, which follow
-  /// one policy after another.
+  /// As the ground of the stage: of poses at rest. With `learning` it shows only colours, which follow
+  /// the policies of a training.
   ground(is: boolean, learning: boolean): void {
     if (is !== this.map.atRest) this.reset();
     if (is !== this.map.atRest || learning !== this.chart.bare) this.clear();
     this.map.atRest = is;
+    if (this.chart.bare === learning) return;
     this.chart.bare = learning;
+    this.canvas.element.tabIndex = learning ? -1 : 0; // behind the pendulum it is a picture
+    this.canvas.element.ariaHidden = String(learning);
   }
 
   /// At each frame.

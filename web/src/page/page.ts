@@ -106,7 +106,6 @@ export class Page {
     placeCharts();
     this.setPaused(false);
     if (view.name === 'tour') {
-      if (this.tour.number === 0) this.learn.pause();
       return this.tour.go(view.step);
     }
     const learns = view.name === 'learn';
@@ -115,7 +114,7 @@ export class Page {
       : decode(hash, RANGES, (id) => this.agents.has(id));
     // What was learned stays on the stage.
     if ((learns || this.tour.number > 0) && this.learn.keeps && !shared.agent) {
-      Object.assign(shared, { agent: OWN, on: true });
+      Object.assign(shared, { agent: OWN, on: !prefersStill() });
     }
     this.tour.leave();
     this.world.agentOn = false;
@@ -347,6 +346,8 @@ export class Page {
     const { view, step } = document.documentElement.dataset;
     const learning = view === 'learn' || step === 'learn';
     this.map.ground(view !== 'everything', learning);
+    this.map.canvas.element.toggleAttribute('data-idle', learning && !this.learn.begun);
+    if (!learning) this.learn.leave();
     this.learn.follow();
     if (learning && !prefersStill()) this.scene.ghosts = this.learn.ghosts;
     if (this.paused) this.pose.follow(world.state);

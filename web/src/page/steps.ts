@@ -104,7 +104,7 @@ function motor(stage: Stage): Step {
     },
     end() {
       keys.enabled = false;
-      game.next();
+      game.close();
     },
     ghost: () => game.ghost,
     moment: ({ state }) => game.moment(state),
@@ -219,8 +219,9 @@ function bet(stage: Stage): Step {
     answer(world) {
       if (!world.agentOn || !world.twin) return '';
       const [one, many] = [heldFor(world), heldFor(world.twin)];
-      const holds =
-        many > WON && one < HELD ? MANY_HOLDS : one > WON && many < HELD ? ONE_HOLDS : '';
+      let holds = '';
+      if (many > WON && one < HELD) holds = MANY_HOLDS;
+      if (one > WON && many < HELD) holds = ONE_HOLDS;
       if (holds)
         decided = `${onMany === (holds === MANY_HOLDS) ? 'You were right' : 'You lost'}: ${holds}`;
       return decided || 'Both try …';
