@@ -123,6 +123,7 @@ test('at any size the chart is seen with the pendulum, and its numbers in full',
     for (const [width, height] of SIZES) {
       await page.setViewportSize({ width, height });
       const seen = await page.evaluate(async () => {
+        await document.fonts.ready;
         // What follows the size is drawn again a frame later.
         for (let k = 0; k < 3; ++k) await new Promise(requestAnimationFrame);
         document.getElementById('stage')!.scrollIntoView({ behavior: 'instant' });
