@@ -85,7 +85,7 @@ await visit({ viewport: { width: 1200, height: 760 }, colorScheme: 'dark' }, asy
     await page.screenshot({ path: join(folder, `${String(frame).padStart(3, '0')}.png`), clip });
   }
   const palette =
-    'scale=420:-1:flags=lanczos,split[a][b];[a]palettegen=max_colors=64[p];[b][p]paletteuse=dither=none';
+    'scale=420:-1:flags=lanczos,split[a][b];[a]palettegen=max_colors=160[p];[b][p]paletteuse=dither=none';
   const frames = ['-framerate', '25', '-i', join(folder, '%03d.png')];
   execFileSync('ffmpeg', ['-y', '-v', 'error', ...frames, '-vf', palette, `${docs}recovery.gif`]);
   rmSync(folder, { recursive: true });
