@@ -52,7 +52,6 @@ export class ValueMap {
   private next = 0; // cell of it
   private around: State | null = null; // the other variables, of the map that is being computed
   private plant: Readonly<Plant> | null = null; // of which it is
-  private policy: World['policy'] = null; // likewise
 
   constructor(size: number) {
     this.size = size;
@@ -75,9 +74,8 @@ export class ValueMap {
   /// begins it anew.
   work(world: World, milliseconds: number): State | null {
     const end = performance.now() + milliseconds;
-    if (this.plant !== world.plant || this.policy !== world.policy) this.restart();
+    if (this.plant !== world.plant) this.restart();
     this.plant = world.plant;
-    this.policy = world.policy;
     this.around ??= this.atRest ? { ...world.state, w1: 0, w2: 0 } : world.state;
     do {
       const [column, row] = [this.next % this.size, Math.floor(this.next / this.size)];

@@ -31,6 +31,7 @@ export class MapPanel {
   };
   private policy: Policy | null = null; // that the map is of
   private key = ''; // what the complete map was computed from
+  private mixed = false; // whether the policy has changed since the map was begun
   private seen = false; // on the screen
   /// Whether the map is not yet that of the present state.
   busy = false;
@@ -100,7 +101,8 @@ export class MapPanel {
     this.busy = false;
     if (!this.seen || !world.policy) return;
     if (this.policy !== world.policy) {
-      if (this.chart.bare && this.policy && this.map.cells) this.key = '';
+      // A training brings policies faster than a map is complete: it goes on, and is made once more.
+      if (this.chart.bare && this.policy) this.mixed = true;
       else this.clear();
     }
     this.policy = world.policy;
@@ -122,13 +124,14 @@ export class MapPanel {
       const rest = map.atRest ? { w1: 0, w2: 0 } : {};
       return JSON.stringify([{ ...state, ...rest, [map.x.name]: 0, [map.y.name]: 0 }, plant]);
     };
-    if (map.cells && keyOf(world.state) === this.key) {
+    if (map.cells && !this.mixed && keyOf(world.state) === this.key) {
       this.busy = false;
       return;
     }
     const begunIn = map.work(world, MILLISECONDS);
     if (!begunIn) return;
-    this.key = keyOf(begunIn);
+    this.key = this.mixed ? '' : keyOf(begunIn);
+    this.mixed = false;
     const [low, high] = (this.range = this.rangeOf(map.cells!, world));
     element('map-value').textContent = Number.isFinite(high - low)
       ? this.said(world)
