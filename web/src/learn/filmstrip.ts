@@ -73,9 +73,9 @@ export class Filmstrip {
     }
     const { plant, time, state, uprightFor } = world;
     const last = { ...{ plant, time, uprightFor }, ...STILL };
-    this.pictures[i] = () => scene.draw(last, state, history.from(begun));
-    // After a new canvas has got its size.
-    requestAnimationFrame(() => requestAnimationFrame(() => this.repaint()));
+    const paint = () => scene.draw(last, state, history.from(begun));
+    this.pictures[i] = paint;
+    paint();
     world.policy = null;
     policy.controller.close();
     const trial = after ? `trial ${after.trials.toLocaleString('en')}` : 'at the end';

@@ -13,7 +13,7 @@ import { film, filmType } from './film';
 import { Filmstrip } from './filmstrip';
 import { Knobs } from './knobs';
 import './learn.css';
-import { decodeRecipe, encodeRecipe } from './recipe';
+import { decodeRecipe, encodeRecipe, LARGEST_SEED } from './recipe';
 import { Scrubber } from './scrubber';
 import type { LearnStage } from './scrubber';
 import { Session } from './session';
@@ -104,7 +104,7 @@ export class LearnPanel {
   /// Starts a training with the chosen seed and settings.
   start(): void {
     for (const session of this.sessions) session.stop();
-    const first = Math.min(Math.max(Math.round(Number(this.seed.value)) || 0, 0), 1e9);
+    const first = Math.min(Math.max(Math.round(Number(this.seed.value)) || 0, 0), LARGEST_SEED);
     this.seed.value = String(first);
     const count = this.four.checked ? SEEDS_AT_ONCE : 1;
     this.sessions = Array.from(

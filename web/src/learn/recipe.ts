@@ -8,7 +8,7 @@ export interface Recipe {
   settings: LearnSettings; // those that differ from the agent's own
 }
 
-const LARGEST_SEED = 1e9;
+export const LARGEST_SEED = 1e9;
 
 /// The part of an address after #, such as learn=fast&seed=42&balance_weight=0.
 export function encodeRecipe({ agent, seed, settings }: Recipe): string {

@@ -95,8 +95,10 @@ export class Canvas {
     const ratio = Math.min(window.devicePixelRatio || 1, 2);
     this.width = this.element.clientWidth;
     this.height = this.element.clientHeight;
-    this.element.width = Math.round(this.width * ratio);
-    this.element.height = Math.round(this.height * ratio);
+    const [width, height] = [this.width, this.height].map((side) => Math.round(side * ratio));
+    // Setting a size empties a canvas, even if the size is the same.
+    if (this.element.width !== width!) this.element.width = width!;
+    if (this.element.height !== height!) this.element.height = height!;
     this.context.setTransform(ratio, 0, 0, ratio, 0, 0);
   }
 }

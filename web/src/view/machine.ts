@@ -45,7 +45,7 @@ export function drawLight(canvas: Canvas, [x, y]: Place, reach: number, strength
     return context.stroke();
   }
   context.globalAlpha = strength;
-  const beam = beamOf(color, Math.ceil(FAR * reach));
+  const beam = beamOf(canvas, color, Math.ceil(FAR * reach));
   context.drawImage(beam, x - beam.width / 2, y - beam.height / 2);
   context.beginPath();
   context.arc(x, y, reach, -Math.PI / 2 - UPRIGHT, -Math.PI / 2 + UPRIGHT);
@@ -55,14 +55,16 @@ export function drawLight(canvas: Canvas, [x, y]: Place, reach: number, strength
   context.globalAlpha = 1;
 }
 
-let drawn = { color: '', radius: 0, canvas: document.createElement('canvas') };
+/// The light that each canvas drew last: stages of different sizes do not make it again in turn.
+const beams = new WeakMap<Canvas, { color: string; radius: number; beam: HTMLCanvasElement }>();
 
 /// The light alone, in the middle of a canvas of this radius; the last one is kept.
-function beamOf(color: string, radius: number): HTMLCanvasElement {
-  if (drawn.color === color && drawn.radius === radius) return drawn.canvas;
-  const canvas = document.createElement('canvas');
-  canvas.width = canvas.height = 2 * radius;
-  const context = canvas.getContext('2d')!;
+function beamOf(owner: Canvas, color: string, radius: number): HTMLCanvasElement {
+  const kept = beams.get(owner);
+  if (kept?.color === color && kept.radius === radius) return kept.beam;
+  const beam = document.createElement('canvas');
+  beam.width = beam.height = 2 * radius;
+  const context = beam.getContext('2d')!;
   // From below, once round: dark, light about the top, dark.
   const light = context.createConicGradient(Math.PI / 2, radius, radius);
   const at = (angle: number) => 0.5 + angle / (2 * Math.PI);
@@ -84,8 +86,8 @@ function beamOf(color: string, radius: number): HTMLCanvasElement {
   context.globalCompositeOperation = 'destination-in';
   context.fillStyle = lamp;
   context.fillRect(0, 0, 2 * radius, 2 * radius);
-  drawn = { color, radius, canvas };
-  return canvas;
+  beams.set(owner, { color, radius, beam });
+  return beam;
 }
 
 /// The path of the tip like a long exposure: `ages` (s) belong to `points`, oldest first;
