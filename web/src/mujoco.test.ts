@@ -3,7 +3,7 @@ import type { MainModule } from '@mujoco/mujoco';
 import { beforeAll, expect, test } from 'vitest';
 import { mjcf, NOMINAL, PHYSICS_STEPS } from './pendulum';
 import type { Plant, State } from './pendulum';
-import { Simulator } from './simulator';
+import { Mujoco } from './mujoco';
 import type { Push } from './simulator';
 import { pointOn } from './world';
 
@@ -37,7 +37,7 @@ test('a plant that is written into the model is the one that a new model would h
   const data = new mujoco.MjData(model);
   data.qpos.set([START.q1, START.q2]);
   data.qvel.set([START.w1, START.w2]);
-  const simulator = new Simulator(mujoco);
+  const simulator = new Mujoco(mujoco);
   simulator.state = START;
   simulator.plant = OTHER;
   expectSame(simulator.state, START, 1e-15);
@@ -72,7 +72,7 @@ test.each([
   model.delete();
 
   const after = (acting: Push | null) => {
-    const simulator = new Simulator(mujoco);
+    const simulator = new Mujoco(mujoco);
     simulator.state = START;
     simulator.step(0, acting);
     return simulator.state;
@@ -86,7 +86,7 @@ test.each([
 });
 
 test('a state that blows up is told, and the pendulum hangs again', () => {
-  const simulator = new Simulator(mujoco);
+  const simulator = new Mujoco(mujoco);
   simulator.state = { q1: 0, q2: 0, w1: 1e9, w2: -1e9 };
   let sound = true;
   for (let k = 0; sound && k < 200; ++k) sound = simulator.step(0, null);

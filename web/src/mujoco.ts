@@ -1,27 +1,15 @@
 import type { MainModule, MjData, MjModel } from '@mujoco/mujoco';
 import { CAPSULE_RADIUS, capsuleInertia, HANGING, mjcf, NOMINAL } from './pendulum';
 import type { Plant, State } from './pendulum';
-
-const FASTEST = 150; // rad/s, 0.75 rad in a step
-
-/// A point in the pendulum's plane: x to the right, z up, the pivot at 0 (m); or a force (N).
-export interface Vec {
-  x: number;
-  z: number;
-}
-
-/// A force on the pendulum: on link 1 or 2, at `along` m from its hinge.
-export interface Push {
-  link: 1 | 2;
-  along: number;
-  force: Vec;
-}
+import { isSound } from './simulator';
+import type { Push, Simulator } from './simulator';
 
 /// The double pendulum in MuJoCo. Only this file uses MuJoCo's interface.
-export class Simulator {
+export class Mujoco implements Simulator {
   private readonly mujoco: MainModule;
   private readonly model: MjModel;
   private readonly data: MjData;
+  private _plant: Readonly<Plant> = { ...NOMINAL };
 
   constructor(mujoco: MainModule) {
     this.mujoco = mujoco;
@@ -31,9 +19,8 @@ export class Simulator {
     mujoco.mj_forward(this.model, this.data);
   }
 
-  /// Another pendulum.
-  another(): Simulator {
-    return new Simulator(this.mujoco);
+  another(): Mujoco {
+    return new Mujoco(this.mujoco);
   }
 
   get state(): State {
@@ -47,8 +34,13 @@ export class Simulator {
     this.mujoco.mj_forward(this.model, this.data);
   }
 
-  /// Changes the plant, as if the MJCF had been written with it; the state stays.
-  set plant(plant: Plant) {
+  get plant(): Readonly<Plant> {
+    return this._plant;
+  }
+
+  /// Changes the plant, as if the MJCF had been written with it.
+  set plant(plant: Readonly<Plant>) {
+    this._plant = { ...plant };
     const { model, mujoco } = this;
     const state = this.state;
     const masses = [plant.mass1, plant.mass2] as const;
@@ -70,8 +62,6 @@ export class Simulator {
     this.state = state;
   }
 
-  /// One physics step, 0.005 s, under a torque (N·m) and perhaps a push. False if the state has blown
-  /// up, or spins so fast that steps of this size do not follow it: then it hangs again.
   step(torque: number, push: Push | null): boolean {
     const { data } = this;
     const before = data.time;
@@ -79,9 +69,7 @@ export class Simulator {
     data.xfrc_applied.fill(0);
     if (push) this.apply(push);
     this.mujoco.mj_step(this.model, data);
-    const { q1, q2, w1, w2 } = this.state;
-    const slow = Math.abs(w1) < FASTEST && Math.abs(w2) < FASTEST;
-    if (data.time > before && Number.isFinite(q1 + q2) && slow) return true;
+    if (data.time > before && isSound(this.state)) return true;
     this.mujoco.mj_resetData(this.model, data);
     this.state = HANGING;
     return false;

@@ -71,7 +71,7 @@ export class LearnPanel {
   /// `recorded` is the agent whose training can be gone through.
   constructor(page: LearnPage, recorded: string) {
     this.page = page;
-    this.strip = new Filmstrip(page.world.simulator);
+    this.strip = new Filmstrip(page.world);
     this.scrubber = new Scrubber(page, () => this.draw());
     button('learn-start', () => this.toggle());
     button('learn-again', () => this.start());

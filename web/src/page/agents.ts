@@ -201,6 +201,7 @@ export function parseEntry(value: unknown): Entry | null {
 export class Agents {
   private readonly entries: Map<string, Entry>;
   private readonly loaded = new Map<string, Agent>();
+  private readonly underWay = new Map<string, Promise<Agent>>();
   private own: KeptFile | null; // what the visitor brought, now or at an earlier visit
 
   private constructor(entries: Entry[], own: KeptFile | null) {
@@ -231,6 +232,11 @@ export class Agents {
     return this.own ? [...list, { id: OWN, title: ownTitle(this.own) }] : list;
   }
 
+  /// Whether an agent is here already.
+  isHere(id: string): boolean {
+    return this.loaded.has(id);
+  }
+
   /// Whether there is an agent of this id.
   has(id: string): boolean {
     return this.entries.has(id) || COMPUTED.has(id) || (id === OWN && this.own !== null);
@@ -248,8 +254,15 @@ export class Agents {
     if (id === OWN && this.own) return this.addOwn(this.own);
     const entry = this.entries.get(id);
     if (!entry) return this.make(id);
+    // Asked for twice, it is fetched once.
+    const fetched = this.underWay.get(id) ?? this.fetchAgent(entry);
+    this.underWay.set(id, fetched);
+    return fetched.finally(() => this.underWay.delete(id));
+  }
+
+  private async fetchAgent(entry: Entry): Promise<Agent> {
     const policy = new Policy(await fetchPolicy(entry.file));
-    const { command, curve } = entry;
+    const { id, command, curve } = entry;
     const what = plainly(policy, id === entry.agent ? id : OWN);
     return this.add({
       ...{ id, title: titleOf(entry), what, text: describe(policy) },

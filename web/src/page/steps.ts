@@ -22,6 +22,10 @@ export interface Stage {
   take(shared: Partial<Shared>): Promise<boolean>;
   /// The same, from hanging.
   begin(shared: Partial<Shared>): Promise<boolean>;
+  /// Changes to another agent; all else stays. False if it cannot be loaded, or another was asked for
+  /// meanwhile.
+  choose(agent: string): Promise<boolean>;
+  readonly agents: { has(id: string): boolean; isHere(id: string): boolean };
   setAgentOn(on: boolean): void;
   setSpeed(speed: number): void;
   /// From hanging.
@@ -59,6 +63,7 @@ export interface Step {
 }
 
 const NOMINAL_AGENT = 'd3qn';
+const SMALL_AGENT = 'fast'; // a twentieth of its size
 const ADAPTIVE_AGENT = 'd3qn-adaptive';
 const LIGHT = 0.75; // kg
 const HELD = 2; // s upright that count as balanced
@@ -79,8 +84,13 @@ function watch(stage: Stage): Step {
     agents: [NOMINAL_AGENT],
     labels: () => [GOAL, { at: 'motor', text: 'the motor' }],
     async begin() {
-      again.textContent = prefersStill() ? 'Swing up' : 'Swing up again';
-      await stage.begin({ agent: NOMINAL_AGENT, on: !prefersStill() });
+      const on = !prefersStill();
+      again.textContent = on ? 'Swing up again' : 'Swing up';
+      const { agents } = stage;
+      if (agents.isHere(NOMINAL_AGENT) || !agents.has(SMALL_AGENT))
+        return void (await stage.begin({ agent: NOMINAL_AGENT, on }));
+      // The small one is here within a moment; the other takes over in the middle of the swing.
+      if (await stage.begin({ agent: SMALL_AGENT, on })) void stage.choose(NOMINAL_AGENT);
     },
     answer: (world) =>
       heldFor(world) > HELD ? 'Balanced. How hard can it be? Go on and try it yourself.' : '',
