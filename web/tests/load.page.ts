@@ -31,7 +31,7 @@ test('the pendulum swings before the default agent and MuJoCo are here, which th
   });
   await page.goto('./');
   const state = () => page.evaluate(() => upswing.world.state);
-  await expect.poll(async () => Math.abs((await state()).q1)).toBeGreaterThan(0.5);
+  await page.waitForFunction(() => Math.abs(globalThis.upswing?.world.state.q1 ?? 0) > 0.5);
   await expect(page.locator('#agent')).toHaveValue('fast');
   const before = await page.evaluate(() => {
     upswing.clock.advance = () => true; // time stands still

@@ -229,7 +229,7 @@ test('the agent has the same motor, and learned for 80 minutes', async ({ stage:
   const rows = await run(page, 15);
   expect(Math.max(...rows.map((row) => Math.abs(row[5]!)))).toBe(5);
   expect(await balanced(page)).toBeGreaterThan(5);
-  await expect(answer(page)).toContainText('in 80 minutes of swinging');
+  await expect(answer(page)).toContainText('It practised for 80 minutes of swinging');
   const text = Buffer.from(readPolicy('d3qn')).toString('latin1');
   const steps = Number(/"step":"(\d+)"/.exec(text)![1]);
   expect(Math.abs((steps * 0.02) / 4800 - 1)).toBeLessThan(0.1);
@@ -276,10 +276,26 @@ test('a bet: with the light link the agent of many pendulums holds, the one of o
     await expect(answer(page)).toHaveText('Both try …');
     expect(await held(page, 20)).toBeLessThan(5);
     expect(await page.evaluate(() => upswing.world.twin!.uprightFor)).toBeGreaterThan(10);
-    await expect(answer(page)).toContainText(`${result}: the one that learned on many`);
+    await expect(answer(page)).toContainText(`${result}: only the agent that learned on many`);
   }
   await page.getByRole('button', { name: 'Next' }).click();
   await expect(page.locator('#twin-scene')).toBeHidden();
+});
+
+test('a bet that both agents win or lose is a draw', async ({ stage: page }) => {
+  await stopAt(page, BET);
+  for (const [change, verdict] of [
+    [{ mass2: 1 }, 'A draw: both balance it.'],
+    [{ gravity: 24.79 }, 'A draw: neither balances it within 20 s.'],
+  ] as const) {
+    await page.getByRole('button', { name: 'Learned on many' }).click();
+    await expect(answer(page)).toHaveText('Both try …');
+    await page.evaluate((change) => {
+      upswing.world.plant = { ...upswing.world.plant, ...change };
+    }, change);
+    await advance(page, 21);
+    await expect(answer(page)).toHaveText(verdict);
+  }
 });
 
 test('the bars are what it expects, and the highest is taken', async ({ stage: page }) => {
@@ -330,6 +346,9 @@ test('every pose at once: the brightest is upright, and a click starts there', a
 }) => {
   await visit(page, `#tour=${MAP}`);
   await expect(page.locator('#map-value')).toHaveText(/^\d+ to \d+$/);
+  // What the colours stand for: the ends of its scale are those of the map.
+  const ends = (await page.locator('#map-value').textContent())!.split(' to ');
+  await expect(page.locator('#step-map .scale')).toHaveText(`expected reward${ends.join('')}`);
   await stopAt(page, MAP);
   /// Of a grid of poses at rest, the one of which the agent expects most, and least.
   const [most, least] = await page.evaluate(() => {

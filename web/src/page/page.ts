@@ -31,6 +31,7 @@ import { Twin } from './twin';
 import { showView, viewOf } from './views';
 
 const REMEMBERED = 60; // s of history
+const LEARN_KEYS = ['g', 'r', 'ArrowLeft', 'ArrowRight']; // a pause there is one of the training
 
 /// The parts of the page and what its buttons do.
 export class Page {
@@ -97,6 +98,10 @@ export class Page {
   /// Memory that the core has taken (bytes), which it never gives back.
   get coreBytes(): number {
     return core().exports.memory.buffer.byteLength;
+  }
+
+  get agentTitle(): string {
+    return this.agent?.title ?? '';
   }
 
   private get agent(): Agent | null {
@@ -227,7 +232,9 @@ export class Page {
     const shoveLeft = () => this.world.shoveTo(-1);
     const shoveRight = () => this.world.shoveTo(1);
     const actions = { toggleAgent, togglePause, step, reset, shoveLeft, shoveRight };
-    listenToKeys(actions, () => this.tour.keys);
+    listenToKeys(actions, () =>
+      this.learning && this.tour.number === 0 ? LEARN_KEYS : this.tour.keys,
+    );
     button('agent-on', toggleAgent);
     button('pause', togglePause);
     button('step', step);

@@ -37,7 +37,7 @@ export class Twin {
   /// The agents that can be chosen.
   list(): void {
     const options = this.agents.list.map(({ id, title }) => new Option(title, id));
-    this.select.replaceChildren(new Option('nobody', ''), ...options);
+    this.select.replaceChildren(new Option('none', ''), ...options);
     this.select.value = this.id ?? '';
   }
 
