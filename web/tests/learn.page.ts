@@ -8,7 +8,7 @@ import { Core } from '../src/core';
 import { Learner } from '../src/learn/learner';
 import type { News, Order } from '../src/learn/worker';
 import { coreModule } from './core';
-import { advance, balanced, open, startFrom, test } from './page';
+import { advance, balanced, open, test } from './page';
 import { policyPath, runProgram } from './program';
 
 /// Seed 9 needs among the fewest steps of seeds 1 to 20.
@@ -40,9 +40,15 @@ async function saved(page: Page): Promise<Uint8Array> {
   return readFileSync(await (await download).path());
 }
 
+/// From now on only advance() moves the pendulum.
+function stopTime(page: Page): Promise<void> {
+  return page.evaluate(() => void (upswing.clock.advance = () => true));
+}
+
 /// Whether the agent on the stage is up 15 s after it hung.
 async function swingsUp(page: Page): Promise<boolean> {
-  await startFrom(page, 0);
+  await stopTime(page);
+  await page.evaluate(() => upswing.world.reset());
   await advance(page, 15);
   return (await balanced(page)) > 5;
 }
@@ -186,7 +192,7 @@ test('the default agent: from an untrained policy to the one of the page, fetche
       return upright.length;
     });
   const scrub = page.locator('#learn-scrub');
-  await startFrom(page, 0);
+  await stopTime(page);
   expect(await successes()).toBe(5);
   await scrub.press('Home');
   await expect(where).toHaveText('on the stage: after 0 steps');
@@ -438,7 +444,7 @@ test('settings are those of the program, which says what is wrong with them', as
   stage: page,
 }) => {
   await openLearn(page);
-  await page.locator('#learn-panel summary').click();
+  await page.getByText('Training settings', { exact: true }).click();
   const rate = page.getByLabel('learning rate');
   await expect(rate).toHaveValue('0.002');
   await rate.fill('-1');

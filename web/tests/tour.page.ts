@@ -286,10 +286,11 @@ test('a bet that both agents win or lose is a draw', async ({ stage: page }) => 
   await stopAt(page, BET);
   for (const [change, verdict] of [
     [{ mass2: 1 }, 'A draw: both balance it.'],
-    [{ gravity: 24.79 }, 'A draw: neither balances it within 20 s.'],
+    [{ torque_limit: 0.5 }, 'A draw: neither balances it within 20 s.'],
   ] as const) {
     await page.getByRole('button', { name: 'Learned on many' }).click();
-    await expect(answer(page)).toHaveText('Both try …');
+    await expect.poll(() => page.evaluate(() => upswing.world.plant.mass2)).toBe(0.75);
+    await expect.poll(() => page.evaluate(() => upswing.world.agentOn)).toBe(true);
     await page.evaluate((change) => {
       upswing.world.plant = { ...upswing.world.plant, ...change };
     }, change);
@@ -414,10 +415,11 @@ test('where motion is not wanted, every step waits for a button', async ({ stage
   await visit(page, '#tour=1');
   for (let step = 1; step <= count; ++step) {
     if (step > 1) await page.getByRole('button', { name: 'Next' }).click();
+    const state = () => page.evaluate(() => upswing.world.state);
+    const hanging = { q1: 0, q2: 0, w1: 0, w2: 0 };
+    await expect.poll(state, `step ${step}`).toEqual(hanging); // when its agents are here
     await run(page, 1);
-    expect(await page.evaluate(() => upswing.world.state), `step ${step}`).toEqual({
-      ...{ q1: 0, q2: 0, w1: 0, w2: 0 },
-    });
+    expect(await state(), `step ${step}`).toEqual(hanging);
     const start = page.locator('#tour-start');
     await expect(start).toBeVisible({ visible: [SHOVE, VALUES, MAP, count].includes(step) });
     if (!(await start.isVisible())) continue;

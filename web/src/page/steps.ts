@@ -210,8 +210,8 @@ function bet(stage: Stage): Step {
 
   /// Both hang, and begin if there is a bet.
   const begin = async (on: boolean) => {
-    decided = '';
     if (!(await stage.begin({ ...race, on }))) return;
+    decided = '';
     begun = stage.world.time;
   };
   const run = (many: boolean) => {
