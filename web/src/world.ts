@@ -198,6 +198,11 @@ export class World {
     this.onChange();
   }
 
+  /// The observation that the last decision is about.
+  get seen(): Float32Array {
+    return this.observation ?? this.observe();
+  }
+
   /// What the agent would decide in another state, with the memory that it has now.
   decisionAt(state: State): Decision | null {
     const { policy } = this;

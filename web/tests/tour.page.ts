@@ -302,6 +302,24 @@ test('a bet that both agents win or lose is a draw', async ({ stage: page }) => 
 test('the bars are what it expects, and the highest is taken', async ({ stage: page }) => {
   await stopAt(page, VALUES);
   await expect(page.locator('#q')).toBeVisible();
+  // Where there is room, its neurons are over the bars, and change with what it sees.
+  await expect(page.locator('#neurons')).toBeHidden();
+  await page.setViewportSize({ width: 1280, height: 900 });
+  const neurons = page.locator('#neurons');
+  await expect(neurons).toBeVisible();
+  const picture = () => neurons.evaluate((canvas: HTMLCanvasElement) => canvas.toDataURL());
+  await page.evaluate(() => upswing.reset());
+  await advance(page, 0.1);
+  const settled = async () => {
+    let last = '';
+    const rests = async () => last === (last = await picture());
+    await expect.poll(rests, { intervals: [500] }).toBe(true);
+    return last;
+  };
+  const before = await settled();
+  await advance(page, 1);
+  expect(await settled()).not.toBe(before);
+
   await page.evaluate(() => upswing.reset());
   const best: number[] = [];
   for (let k = 0; k < 40; ++k) {
