@@ -23,7 +23,7 @@ export class Policy {
   /// Factor by which rewards, and so its values, were multiplied during training.
   readonly rewardScale: number;
   private readonly file: ArrayBuffer | null; // null: a controller
-  private _neurons: Neurons | null | undefined; // undefined: nobody has asked yet
+  private _neurons: Neurons | null | undefined; // undefined: not made yet
 
   /// Reads and checks the file, as the program does, or makes the controller of a name. Throws BadInput.
   constructor(from: ArrayBuffer | string) {

@@ -131,7 +131,7 @@ test.describe('what is missing or broken is told', () => {
     await expect(page.locator('#agent-text')).toContainText('8-48-32');
   });
 
-  test('MuJoCo alone: the page has physics of its own, and says so', async ({ page }) => {
+  test('without MuJoCo the page uses its own physics, and says so', async ({ page }) => {
     await page.route(/mujoco.*\.wasm$/, (route) => route.fulfill({ status: 404 }));
     await page.goto('./#agent=fast&on=1');
     await expect(page.locator('#message')).toContainText('MuJoCo could not start');

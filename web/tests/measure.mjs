@@ -49,8 +49,8 @@ async function measure(page) {
   return { ...start, kilobytes: sizes.reduce((sum, size) => sum + size) / 1000, one, two, mpc };
 }
 
-/// Seconds until a new visitor sees the pendulum swing, on a line of so many bits a second, whose
-/// answers take 40 ms; without a number as fast as this machine is.
+/// Seconds until a new visitor sees the pendulum swing. With `bits`, the network carries that many bits a
+/// second and answers after 40 ms; 0: as fast as this machine is.
 async function firstSwing(page, bits) {
   if (bits) {
     const devtools = await page.context().newCDPSession(page);
