@@ -3,7 +3,7 @@ import { readFileSync } from 'node:fs';
 import { expect, test } from 'vitest';
 import { readPolicy } from '../tests/program';
 import { Policy } from './policy';
-import { Simulator } from './simulator';
+import { Mujoco } from './mujoco';
 import { World } from './world';
 
 /// The agents that come with the page.
@@ -26,7 +26,7 @@ function lean(angle: number): number {
 test.each(list.agents.map(({ id }) => id))(
   '%s is up within 10 s and stands, not at a lean',
   (id) => {
-    const world = new World(new Simulator(mujoco));
+    const world = new World(new Mujoco(mujoco));
     world.policy = new Policy(readPolicy(id));
     world.agentOn = true;
     const leans: number[] = [];

@@ -35,6 +35,7 @@ interface Exports {
   ): void;
   numbers(): number;
   pendulum_at(): void;
+  pendulum_step(): void;
   identifier_open(): number;
   identifier_close(identifier: number): void;
   identifier_begin(identifier: number): void;

@@ -1,24 +1,29 @@
 import { Agents } from './page/agents';
-import { startSimulator } from './page/boot';
+import { fetchCore, fetchMujoco } from './page/boot';
 import { element } from './page/dom';
 import { focusWideFormulas, placeCharts } from './page/layout';
+import { warn } from './page/message';
 import { Page } from './page/page';
 import { showView, viewOf } from './page/views';
+import { ClosedForm } from './simulator';
 import { printable } from './text';
 import { World } from './world';
 
+const LONGEST_REASON = 300; // characters
+
 document.documentElement.dataset.script = 'running'; // for public/watch.js and style.css
 
-try {
+/// Starts the page with the physics of our own core.
+async function start(): Promise<Page> {
   showView(viewOf(location.hash));
   placeCharts();
   focusWideFormulas();
   const progress = element<HTMLProgressElement>('progress');
-  const [simulator, agents] = await Promise.all([
-    startSimulator((share) => (progress.value = share)),
+  const [agents] = await Promise.all([
     Agents.fetch(),
+    fetchCore((share) => (progress.value = share)),
   ]);
-  const page = new Page(new World(simulator), agents);
+  const page = new Page(new World(new ClosedForm()), agents);
   globalThis.upswing = page;
   await page.open();
   for (const group of document.querySelectorAll<HTMLFieldSetElement>('fieldset')) {
@@ -27,12 +32,26 @@ try {
   element('badge').hidden = false;
   page.run();
   document.getElementById('first-picture')!.remove();
-} catch (error) {
-  const reason = error instanceof Error ? error.message : String(error);
-  const problem = element('problem');
-  problem.textContent = `The page could not start: ${printable(reason, 300)}. Try to reload it.`;
-  problem.hidden = false;
+  return page;
+}
+
+function reasonOf(error: unknown): string {
   console.error(error);
-} finally {
-  element('loading').hidden = true;
+  return printable(error instanceof Error ? error.message : String(error), LONGEST_REASON);
+}
+
+const page = await start().catch((error: unknown) => {
+  const problem = element('problem');
+  problem.textContent = `The page could not start: ${reasonOf(error)}. Try to reload it.`;
+  problem.hidden = false;
+  return null;
+});
+element('loading').hidden = true;
+
+// MuJoCo is larger than all else together: the pendulum does not wait for it.
+try {
+  if (page) page.continueIn(await fetchMujoco());
+} catch (error) {
+  const how = 'The pendulum follows the equations of motion of Upswing’s own core';
+  warn(`${how}, as MuJoCo could not start: ${reasonOf(error)}.`);
 }

@@ -4,12 +4,12 @@ import { readPolicy } from '../tests/program';
 import { AXES, isEven, rangeOfValues, shareOf, valueAt, ValueMap, valueOf } from './map';
 import { NOMINAL } from './pendulum';
 import { Policy } from './policy';
-import { Simulator } from './simulator';
+import { Mujoco } from './mujoco';
 import { World } from './world';
 
 let world: World;
 beforeAll(async () => {
-  world = new World(new Simulator(await loadMujoco()));
+  world = new World(new Mujoco(await loadMujoco()));
 });
 
 const STATE = { q1: 2.8, q2: 0.3, w1: -0.7, w2: 1.1 };

@@ -4,6 +4,7 @@ import { DISTURBANCE_LIMITS } from './disturbance';
 import type { Disturbance } from './disturbance';
 import { CONTROL_PERIOD, PLANT_LIMITS, plantIn } from './pendulum';
 import type { Parameter, Plant, Range } from './pendulum';
+import { Neurons } from './neurons';
 import { BadInput } from './bad_input';
 import { printable } from './text';
 
@@ -21,9 +22,12 @@ export class Policy {
   readonly plant: Plant;
   /// Factor by which rewards, and so its values, were multiplied during training.
   readonly rewardScale: number;
+  private readonly file: ArrayBuffer | null; // null: a controller
+  private _neurons: Neurons | null | undefined; // undefined: not made yet
 
   /// Reads and checks the file, as the program does, or makes the controller of a name. Throws BadInput.
   constructor(from: ArrayBuffer | string) {
+    this.file = typeof from === 'string' ? null : from;
     try {
       const controller = new CoreController(from);
       this.controller = controller;
@@ -36,6 +40,12 @@ export class Policy {
     }
     this.plant = plantIn(JSON.parse(this.about('plant')) as Plant);
     this.rewardScale = Number(this.metadata.get('reward_scale') ?? 1);
+  }
+
+  /// Its neurons, for those who watch; null where there are none to show.
+  get neurons(): Neurons | null {
+    if (this._neurons === undefined) this._neurons = this.file && Neurons.of(this.file);
+    return this._neurons;
   }
 
   get isLearned(): boolean {

@@ -1,5 +1,5 @@
-import type { MainModule, MjData, MjModel } from '@mujoco/mujoco';
-import { CAPSULE_RADIUS, capsuleInertia, HANGING, mjcf, NOMINAL } from './pendulum';
+import { core } from './core';
+import { HANGING, NOMINAL, plantNumbers } from './pendulum';
 import type { Plant, State } from './pendulum';
 
 const FASTEST = 150; // rad/s, 0.75 rad in a step
@@ -17,83 +17,43 @@ export interface Push {
   force: Vec;
 }
 
-/// The double pendulum in MuJoCo. Only this file uses MuJoCo's interface.
-export class Simulator {
-  private readonly mujoco: MainModule;
-  private readonly model: MjModel;
-  private readonly data: MjData;
-
-  constructor(mujoco: MainModule) {
-    this.mujoco = mujoco;
-    // Compiled once: plants are written into the model.
-    this.model = mujoco.MjModel.from_xml_string(mjcf(NOMINAL))!;
-    this.data = new mujoco.MjData(this.model);
-    mujoco.mj_forward(this.model, this.data);
-  }
-
-  /// Another pendulum.
-  another(): Simulator {
-    return new Simulator(this.mujoco);
-  }
-
-  get state(): State {
-    const { qpos, qvel } = this.data;
-    return { q1: qpos[0], q2: qpos[1], w1: qvel[0], w2: qvel[1] };
-  }
-
-  set state(s: State) {
-    this.data.qpos.set([s.q1, s.q2]);
-    this.data.qvel.set([s.w1, s.w2]);
-    this.mujoco.mj_forward(this.model, this.data);
-  }
-
-  /// Changes the plant, as if the MJCF had been written with it; the state stays.
-  set plant(plant: Plant) {
-    const { model, mujoco } = this;
-    const state = this.state;
-    const masses = [plant.mass1, plant.mass2] as const;
-    const lengths = [plant.length1, plant.length2] as const;
-    for (const link of [0, 1] as const) {
-      const [mass, length, body] = [masses[link], lengths[link], link + 1]; // body 0 is the world
-      const { across, along } = capsuleInertia(mass, CAPSULE_RADIUS, length);
-      model.body_mass[body] = mass;
-      model.body_inertia.set([across, across, along], 3 * body);
-      model.body_ipos[3 * body + 2] = -length / 2;
-      model.geom_pos[3 * link + 2] = -length / 2;
-      model.geom_size[3 * link + 1] = length / 2;
-    }
-    model.body_pos[3 * 2 + 2] = -plant.length1;
-    model.dof_damping.set([plant.damping1, plant.damping2]);
-    model.actuator_ctrlrange.set([-plant.torque_limit, plant.torque_limit]);
-    model.opt.gravity.set([0, 0, -plant.gravity]);
-    mujoco.mj_setConst(model, this.data); // leaves the pendulum hanging
-    this.state = state;
-  }
-
+/// The double pendulum's physics.
+export interface Simulator {
+  state: State;
+  /// A new plant leaves the state as it is.
+  plant: Readonly<Plant>;
+  /// Another pendulum of the same engine.
+  another(): Simulator;
   /// One physics step, 0.005 s, under a torque (N·m) and perhaps a push. False if the state has blown
   /// up, or spins so fast that steps of this size do not follow it: then it hangs again.
-  step(torque: number, push: Push | null): boolean {
-    const { data } = this;
-    const before = data.time;
-    data.ctrl[0] = torque;
-    data.xfrc_applied.fill(0);
-    if (push) this.apply(push);
-    this.mujoco.mj_step(this.model, data);
-    const { q1, q2, w1, w2 } = this.state;
-    const slow = Math.abs(w1) < FASTEST && Math.abs(w2) < FASTEST;
-    if (data.time > before && Number.isFinite(q1 + q2) && slow) return true;
-    this.mujoco.mj_resetData(this.model, data);
-    this.state = HANGING;
-    return false;
+  step(torque: number, push: Push | null): boolean;
+}
+
+/// Whether steps of this size follow the state.
+export function isSound({ q1, q2, w1, w2 }: State): boolean {
+  return Number.isFinite(q1 + q2) && Math.abs(w1) < FASTEST && Math.abs(w2) < FASTEST;
+}
+
+/// The pendulum's equations of motion in our own core (web/wasm/step.h), which is here long before MuJoCo.
+export class ClosedForm implements Simulator {
+  state: State = { ...HANGING };
+  plant: Readonly<Plant> = { ...NOMINAL };
+
+  another(): ClosedForm {
+    return new ClosedForm();
   }
 
-  /// MuJoCo takes forces at a link's centre: the push, and the torque about +y of moving it there.
-  private apply({ link, along, force }: Push): void {
-    const centre = -this.model.body_ipos[3 * link + 2];
-    const { q1, q2 } = this.state;
-    const angle = link === 1 ? q1 : q1 + q2;
-    const arm = { x: -Math.sin(angle) * (along - centre), z: -Math.cos(angle) * (along - centre) };
-    this.data.xfrc_applied.set([force.x, 0, force.z], 6 * link);
-    this.data.xfrc_applied[6 * link + 4] = arm.z * force.x - arm.x * force.z;
+  step(torque: number, push: Push | null): boolean {
+    const { q1, q2, w1, w2 } = this.state;
+    const { link, along, force } = push ?? NONE;
+    const before = [...plantNumbers(this.plant), q1, q2, w1, w2];
+    const numbers = [...before, torque, link, along, force.x, force.z];
+    const after = core().formula(numbers, core().exports.pendulum_step);
+    const state = { q1: after[0]!, q2: after[1]!, w1: after[2]!, w2: after[3]! };
+    const sound = isSound(state);
+    this.state = sound ? state : { ...HANGING };
+    return sound;
   }
 }
+
+const NONE = { link: 0, along: 0, force: { x: 0, z: 0 } };

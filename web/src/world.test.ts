@@ -4,7 +4,7 @@ import { beforeAll, beforeEach, expect, test } from 'vitest';
 import { policyPath, readPolicy, simulate } from '../tests/program';
 import { HANGING, NOMINAL } from './pendulum';
 import { Policy } from './policy';
-import { Simulator } from './simulator';
+import { Mujoco } from './mujoco';
 import { pointOn, World } from './world';
 import type { Moment } from './world';
 
@@ -14,7 +14,7 @@ beforeAll(async () => {
   mujoco = await loadMujoco();
 });
 beforeEach(() => {
-  world = new World(new Simulator(mujoco));
+  world = new World(new Mujoco(mujoco));
 });
 
 const tvlqr = new Policy('tvlqr'); // plans for seconds

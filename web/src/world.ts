@@ -39,7 +39,7 @@ export interface Moment {
 
 /// The pendulum with its motor, its agent, and the hand that disturbs it. Independent of the page.
 export class World {
-  readonly simulator: Simulator;
+  simulator: Simulator;
   readonly disturbance: Disturbance = { ...PERFECT };
   agentOn = false;
   /// N·m, that a visitor asks of the motor while the agent is off.
@@ -112,6 +112,13 @@ export class World {
 
   get state(): State {
     return this.simulator.state;
+  }
+
+  /// Goes on in another engine, from the same state and with the same plant.
+  continueIn(simulator: Simulator): void {
+    simulator.plant = this._plant;
+    simulator.state = this.state;
+    this.simulator = simulator;
   }
 
   /// Time (s) since the page was opened; a reset does not set it back.
@@ -189,6 +196,11 @@ export class World {
   look(): void {
     this.decision = this.policy?.act(this.observe()) ?? null;
     this.onChange();
+  }
+
+  /// The observation that the last decision is about.
+  get seen(): Float32Array {
+    return this.observation ?? this.observe();
   }
 
   /// What the agent would decide in another state, with the memory that it has now.

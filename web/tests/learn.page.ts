@@ -8,7 +8,7 @@ import { Core } from '../src/core';
 import { Learner } from '../src/learn/learner';
 import type { News, Order } from '../src/learn/worker';
 import { coreModule } from './core';
-import { advance, balanced, open, startFrom, test } from './page';
+import { advance, balanced, open, test } from './page';
 import { policyPath, runProgram } from './program';
 
 /// Seed 9 needs among the fewest steps of seeds 1 to 20.
@@ -40,9 +40,15 @@ async function saved(page: Page): Promise<Uint8Array> {
   return readFileSync(await (await download).path());
 }
 
+/// From now on only advance() moves the pendulum.
+function stopTime(page: Page): Promise<void> {
+  return page.evaluate(() => void (upswing.clock.advance = () => true));
+}
+
 /// Whether the agent on the stage is up 15 s after it hung.
 async function swingsUp(page: Page): Promise<boolean> {
-  await startFrom(page, 0);
+  await stopTime(page);
+  await page.evaluate(() => upswing.world.reset());
   await advance(page, 15);
   return (await balanced(page)) > 5;
 }
@@ -135,7 +141,7 @@ test('in the tour an agent learns from nothing and stays, and is what Node and t
 
   // Along the curve: from flailing to balance, the untrained one beside it.
   const scrub = page.locator('#learn-scrub');
-  await page.getByLabel('show the untrained one too').check();
+  await page.getByLabel('show the untrained agent too').check();
   await expect(page.locator('#twin-name')).toHaveText('untrained');
   await scrub.fill('0');
   await expect(page.locator('#learn-where')).toHaveText('on the stage: after 0 steps');
@@ -186,7 +192,7 @@ test('the default agent: from an untrained policy to the one of the page, fetche
       return upright.length;
     });
   const scrub = page.locator('#learn-scrub');
-  await startFrom(page, 0);
+  await stopTime(page);
   expect(await successes()).toBe(5);
   await scrub.press('Home');
   await expect(where).toHaveText('on the stage: after 0 steps');
@@ -202,7 +208,7 @@ test('the default agent: from an untrained policy to the one of the page, fetche
   expect(await successes()).toBe(5);
   expect(checkpoints().length).toBe(2);
 
-  await page.getByLabel('show the untrained one too').check();
+  await page.getByLabel('show the untrained agent too').check();
   await expect(page.locator('#twin-name')).toHaveText('untrained');
   const step = await page.evaluate(() => upswing.world.twin!.policy!.metadata.get('step'));
   expect(step).toBe('0');
@@ -221,7 +227,7 @@ test('a link grows an agent by its recipe, on a stage with the pendulums that tr
   page,
 }) => {
   await open(page, '#learn=sac-fast&seed=5&balance_weight=0');
-  await expect(page.locator('#learn-start')).toHaveText('Pause');
+  await expect(page.locator('#learn-start')).toHaveText('Pause training');
   await expect(page.locator('#learn-agent')).toHaveValue('sac-fast');
   await expect(page.locator('#learn-seed')).toHaveValue('5');
   await expect(page.locator('#learn-knobs [name=balance_weight]')).toHaveValue('0');
@@ -252,6 +258,48 @@ test('what was learned while you were elsewhere is on the stage when you come ba
   expect(await swingsUp(page)).toBe(true);
 });
 
+test('the view has one pause, that of the training', async ({ stage: page }) => {
+  await openLearn(page);
+  await page.getByRole('button', { name: 'Learn', exact: true }).click();
+  await expect(page.getByRole('button', { name: /pause/i })).toHaveCount(1);
+  await page.locator('#learn-title').click(); // no button has the focus
+  await page.keyboard.press('Space');
+  await expect(page.locator('#badge')).not.toHaveText(/paused/);
+  await page.getByRole('button', { name: 'Pause training' }).click();
+  await expect(status(page)).toHaveText('Paused.');
+});
+
+test('on a phone pendulum, button and curve share the first screen', async ({ stage: page }) => {
+  await page.setViewportSize({ width: 390, height: 844 });
+  await openLearn(page);
+  await page.locator('#learn-start').click();
+  await expect(page.locator('#learn-updates')).not.toHaveText('0');
+  expect(await page.evaluate(() => scrollY)).toBe(0);
+  for (const id of ['scene-box', 'learn-start', 'learn-curve', 'learn-scrub']) {
+    await expect(page.locator(`#${id}`)).toBeInViewport({ ratio: 1 });
+  }
+});
+
+test('a film has the agent and its score as a title', async ({ stage: page }) => {
+  await openLearn(page);
+  await page.getByRole('button', { name: 'How the default agent learned' }).click();
+  await expect(page.locator('#learn-where')).toHaveText('on the stage: after 240,000 steps');
+  const lines = await page.evaluate(async () => {
+    const drawn = new Set<string>();
+    const { fillText } = CanvasRenderingContext2D.prototype;
+    CanvasRenderingContext2D.prototype.fillText = function (...given) {
+      if (!this.canvas.isConnected) drawn.add(given[0]); // the film's own canvas is on no page
+      fillText.apply(this, given);
+    };
+    document.getElementById('learn-film')!.click();
+    await new Promise((resolve) => setTimeout(resolve, 500));
+    CanvasRenderingContext2D.prototype.fillText = fillText;
+    return [...drawn];
+  });
+  expect(lines).toEqual(['Dueling Double DQN', 'after 240,000 steps, success 100%']);
+  await expect(page.locator('#learn-film')).toHaveText('Film 5 s');
+});
+
 test('pause, go on, another seed, start over', async ({ stage: page }) => {
   await openLearn(page);
   await page.getByLabel('Seed', { exact: true }).fill('7');
@@ -259,14 +307,14 @@ test('pause, go on, another seed, start over', async ({ stage: page }) => {
   await expect(page.locator('#learn-updates')).not.toHaveText('0');
   await page.locator('#learn-start').click();
   await expect(status(page)).toHaveText('Paused.');
-  await expect(page.locator('#learn-start')).toHaveText('Go on');
+  await expect(page.locator('#learn-start')).toHaveText('Resume training');
   const steps = async () =>
     Number((await page.locator('#learn-steps').innerText()).replace(',', ''));
   // What was under way when it was told arrives, and then nothing.
   let before = -1;
   const rests = async () => before === (before = await steps());
   await expect.poll(rests, { intervals: [1000] }).toBe(true);
-  await page.getByRole('button', { name: 'Go on' }).click();
+  await page.getByRole('button', { name: 'Resume training' }).click();
   await expect.poll(steps).toBeGreaterThan(before);
   // Watched from the click on: a moment later it may have more steps again.
   await page.evaluate(
@@ -317,7 +365,7 @@ test('four seeds at once, each of which can be watched, and one of them takes ov
       await keep(file, shown);
     };
   });
-  await page.getByLabel('show the untrained one too').check();
+  await page.getByLabel('show the untrained agent too').check();
   await page.getByLabel('four seeds at once').check();
   await page.getByRole('button', { name: 'Learn', exact: true }).click();
   const seeds = page.getByRole('radio', { name: /seed/ });
@@ -396,7 +444,7 @@ test('settings are those of the program, which says what is wrong with them', as
   stage: page,
 }) => {
   await openLearn(page);
-  await page.locator('#learn-panel summary').click();
+  await page.getByText('Training settings', { exact: true }).click();
   const rate = page.getByLabel('learning rate');
   await expect(rate).toHaveValue('0.002');
   await rate.fill('-1');

@@ -20,6 +20,30 @@ test('the page loads at most 2.3 MB compressed, and asks nobody else', async ({ 
   expect(sizes.reduce((sum, size) => sum + size, 0)).toBeLessThan(2.3e6);
 });
 
+test('the pendulum swings before the default agent and MuJoCo are here, which then go on with it', async ({
+  page,
+}) => {
+  let arrive = () => {};
+  const arrived = new Promise<void>((resolve) => (arrive = resolve));
+  await page.route(/mujoco.*\.wasm$|d3qn\.safetensors$/, async (route) => {
+    await arrived;
+    await route.continue();
+  });
+  await page.goto('./');
+  const state = () => page.evaluate(() => upswing.world.state);
+  await page.waitForFunction(() => Math.abs(globalThis.upswing?.world.state.q1 ?? 0) > 0.5);
+  await expect(page.locator('#agent')).toHaveValue('fast');
+  const before = await page.evaluate(() => {
+    upswing.clock.advance = () => true; // time stands still
+    return upswing.world.state;
+  });
+  arrive();
+  await page.waitForFunction(() => upswing.isComplete);
+  await expect(page.locator('#agent')).toHaveValue('d3qn');
+  expect(await state()).toEqual(before);
+  expect(await page.evaluate(() => upswing.world.agentOn)).toBe(true);
+});
+
 test.describe('what the policy of the page forbids', () => {
   test.use({ complains: true });
   test('text is never run as code', async ({ page }) => {
@@ -105,6 +129,15 @@ test.describe('what is missing or broken is told', () => {
     await page.locator('#agent').selectOption('fast');
     await expect(page.locator('#agent-on')).toBeEnabled();
     await expect(page.locator('#agent-text')).toContainText('8-48-32');
+  });
+
+  test('without MuJoCo the page uses its own physics, and says so', async ({ page }) => {
+    await page.route(/mujoco.*\.wasm$/, (route) => route.fulfill({ status: 404 }));
+    await page.goto('./#agent=fast&on=1');
+    await expect(page.locator('#message')).toContainText('MuJoCo could not start');
+    await expect(page.locator('#message')).toContainText('.wasm is missing');
+    await expect(page.locator('#problem')).toBeHidden();
+    await expect(page.locator('#badge')).toHaveText(/balanced for/);
   });
 
   for (const what of ['missing', 'no answer'] as const) {

@@ -49,6 +49,25 @@ async function measure(page) {
   return { ...start, kilobytes: sizes.reduce((sum, size) => sum + size) / 1000, one, two, mpc };
 }
 
+/// Seconds until a new visitor sees the pendulum swing. With `bits`, the network carries that many bits a
+/// second and answers after 40 ms; 0: as fast as this machine is.
+async function firstSwing(page, bits) {
+  if (bits) {
+    const devtools = await page.context().newCDPSession(page);
+    await devtools.send('Network.emulateNetworkConditions', {
+      offline: false,
+      latency: 40,
+      downloadThroughput: bits / 8,
+      uploadThroughput: bits / 8,
+    });
+  }
+  await page.goto(server.address, { waitUntil: 'commit' });
+  const swings = await page.waitForFunction(
+    () => Math.abs(globalThis.upswing?.world.state.q1 ?? 0) > 0.05 && performance.now() / 1000,
+  );
+  return swings.jsonValue();
+}
+
 /// Frames a second, in the page.
 function framesIn(seconds) {
   return new Promise((resolve) => {
@@ -65,12 +84,23 @@ function framesIn(seconds) {
 
 const visits = [];
 for (let k = 0; k < VISITS; ++k) visits.push(await visit({}, measure));
+const swings = {};
+for (const bits of [0, 1.6e6]) {
+  const seconds = [];
+  for (let k = 0; k < VISITS; ++k) {
+    seconds.push(await visit({}, (page) => firstSwing(page, bits)));
+  }
+  swings[bits] = medianOf(seconds);
+}
 await server.close();
 const of = (name) => medianOf(visits.map((one) => one[name]));
 const percent = (share) => `${(100 * share).toFixed(0)}%`;
 console.log(`first load     ${of('kilobytes').toFixed(0)} kB, compressed with gzip`);
 console.log(`first paint    ${of('paint').toFixed(0)} ms`);
 console.log(`ready          ${of('ready').toFixed(0)} ms`);
+console.log(
+  `first swing    ${swings[0].toFixed(2)} s, at 1.6 Mbit/s ${swings[1.6e6].toFixed(2)} s`,
+);
 for (const [name, what] of [
   ['one', 'one pendulum'],
   ['two', 'two pendulums'],

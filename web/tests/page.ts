@@ -97,6 +97,7 @@ export async function open(page: Page, hash = '#everything'): Promise<void> {
     }, hash);
   }
   await expect(page.locator('#agent-on')).toBeEnabled();
+  await page.waitForFunction(() => upswing.isComplete);
 }
 
 /// Simulates `seconds` at once.

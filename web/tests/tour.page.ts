@@ -229,7 +229,7 @@ test('the agent has the same motor, and learned for 80 minutes', async ({ stage:
   const rows = await run(page, 15);
   expect(Math.max(...rows.map((row) => Math.abs(row[5]!)))).toBe(5);
   expect(await balanced(page)).toBeGreaterThan(5);
-  await expect(answer(page)).toContainText('in 80 minutes of swinging');
+  await expect(answer(page)).toContainText('It practised for 80 minutes of swinging');
   const text = Buffer.from(readPolicy('d3qn')).toString('latin1');
   const steps = Number(/"step":"(\d+)"/.exec(text)![1]);
   expect(Math.abs((steps * 0.02) / 4800 - 1)).toBeLessThan(0.1);
@@ -276,15 +276,50 @@ test('a bet: with the light link the agent of many pendulums holds, the one of o
     await expect(answer(page)).toHaveText('Both try …');
     expect(await held(page, 20)).toBeLessThan(5);
     expect(await page.evaluate(() => upswing.world.twin!.uprightFor)).toBeGreaterThan(10);
-    await expect(answer(page)).toContainText(`${result}: the one that learned on many`);
+    await expect(answer(page)).toContainText(`${result}: only the agent that learned on many`);
   }
   await page.getByRole('button', { name: 'Next' }).click();
   await expect(page.locator('#twin-scene')).toBeHidden();
 });
 
+test('a bet that both agents win or lose is a draw', async ({ stage: page }) => {
+  await stopAt(page, BET);
+  for (const [change, verdict] of [
+    [{ mass2: 1 }, 'A draw: both balance it.'],
+    [{ torque_limit: 0.5 }, 'A draw: neither balances it within 20 s.'],
+  ] as const) {
+    await page.getByRole('button', { name: 'Learned on many' }).click();
+    await expect.poll(() => page.evaluate(() => upswing.world.plant.mass2)).toBe(0.75);
+    await expect.poll(() => page.evaluate(() => upswing.world.agentOn)).toBe(true);
+    await page.evaluate((change) => {
+      upswing.world.plant = { ...upswing.world.plant, ...change };
+    }, change);
+    await advance(page, 21);
+    await expect(answer(page)).toHaveText(verdict);
+  }
+});
+
 test('the bars are what it expects, and the highest is taken', async ({ stage: page }) => {
   await stopAt(page, VALUES);
   await expect(page.locator('#q')).toBeVisible();
+  // Where there is room, its neurons are over the bars, and change with what it sees.
+  await expect(page.locator('#neurons')).toBeHidden();
+  await page.setViewportSize({ width: 1280, height: 900 });
+  const neurons = page.locator('#neurons');
+  await expect(neurons).toBeVisible();
+  const picture = () => neurons.evaluate((canvas: HTMLCanvasElement) => canvas.toDataURL());
+  await page.evaluate(() => upswing.reset());
+  await advance(page, 0.1);
+  const settled = async () => {
+    let last = '';
+    const rests = async () => last === (last = await picture());
+    await expect.poll(rests, { intervals: [500] }).toBe(true);
+    return last;
+  };
+  const before = await settled();
+  await advance(page, 1);
+  expect(await settled()).not.toBe(before);
+
   await page.evaluate(() => upswing.reset());
   const best: number[] = [];
   for (let k = 0; k < 40; ++k) {
@@ -330,6 +365,9 @@ test('every pose at once: the brightest is upright, and a click starts there', a
 }) => {
   await visit(page, `#tour=${MAP}`);
   await expect(page.locator('#map-value')).toHaveText(/^\d+ to \d+$/);
+  // What the colours stand for: the ends of its scale are those of the map.
+  const ends = (await page.locator('#map-value').textContent())!.split(' to ');
+  await expect(page.locator('#step-map .scale')).toHaveText(`expected reward${ends.join('')}`);
   await stopAt(page, MAP);
   /// Of a grid of poses at rest, the one of which the agent expects most, and least.
   const [most, least] = await page.evaluate(() => {
@@ -395,10 +433,11 @@ test('where motion is not wanted, every step waits for a button', async ({ stage
   await visit(page, '#tour=1');
   for (let step = 1; step <= count; ++step) {
     if (step > 1) await page.getByRole('button', { name: 'Next' }).click();
+    const state = () => page.evaluate(() => upswing.world.state);
+    const hanging = { q1: 0, q2: 0, w1: 0, w2: 0 };
+    await expect.poll(state, `step ${step}`).toEqual(hanging); // when its agents are here
     await run(page, 1);
-    expect(await page.evaluate(() => upswing.world.state), `step ${step}`).toEqual({
-      ...{ q1: 0, q2: 0, w1: 0, w2: 0 },
-    });
+    expect(await state(), `step ${step}`).toEqual(hanging);
     const start = page.locator('#tour-start');
     await expect(start).toBeVisible({ visible: [SHOVE, VALUES, MAP, count].includes(step) });
     if (!(await start.isVisible())) continue;

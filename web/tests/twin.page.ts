@@ -23,7 +23,7 @@ test('with the same agent they stay together to the bit, whatever happens to the
   await open(page, '#agent=fast&on=1');
   await startFrom(page, 0);
   await run(page, 1).catch(() => {}); // the first one alone
-  await page.getByLabel('Beside it').selectOption('fast');
+  await page.getByLabel('Second agent').selectOption('fast');
   await expect(page.locator('#twin-scene')).toBeVisible();
   const together = async (seconds: number) => {
     const { first, twin } = await run(page, seconds);
@@ -46,7 +46,7 @@ test('with the same agent they stay together to the bit, whatever happens to the
   expect((await together(0.5)).torque).toBe(0);
   await page.getByRole('button', { name: 'Reset', exact: true }).click();
   expect((await together(0)).state).toEqual({ q1: 0, q2: 0, w1: 0, w2: 0 });
-  await page.getByLabel('Beside it').selectOption('');
+  await page.getByLabel('Second agent').selectOption('');
   await expect(page.locator('#twin-scene')).toBeHidden();
   expect(await page.evaluate(() => upswing.world.twin)).toBeNull();
 });
@@ -71,10 +71,10 @@ test('a second agent that is not there is told', async ({ page }) => {
   await open(page, '#agent=fast&twin=none');
   await expect(page.locator('#message')).toContainText('unknown agent "none"');
   await page.route(/ppo\.safetensors$/, (route) => route.fulfill({ status: 200, body: 'broken' }));
-  await page.getByLabel('Beside it').selectOption('ppo');
+  await page.getByLabel('Second agent').selectOption('ppo');
   await expect(page.locator('#message')).toContainText('Agent "ppo" cannot be used');
   await expect(page.locator('#twin-scene')).toBeHidden();
-  await expect(page.getByLabel('Beside it')).toHaveValue('');
+  await expect(page.getByLabel('Second agent')).toHaveValue('');
 });
 
 test('at any size both are seen whole', async ({ stage: page }) => {

@@ -14,6 +14,7 @@
 #include "sim/identification.h"
 #include "sim/sensors.h"
 #include "web/wasm/learner.h"
+#include "web/wasm/step.h"
 
 #define UPSWING_EXPORT(name) extern "C" __attribute__((export_name(#name)))
 
@@ -253,6 +254,15 @@ UPSWING_EXPORT(pendulum_at) void PendulumAt() {
     *to++ = x;
   }
   for (const double x : RewardTerms(plant, s, torque)) *to++ = x;
+}
+
+/// One physics step of a plant (8) in a state (4) under a torque and a push: link (0: none),
+/// distance from its hinge, and force along x and z. Leaves the state after it (4).
+UPSWING_EXPORT(pendulum_step) void PendulumStep() {
+  const PendulumState before{number[8], number[9], number[10], number[11]};
+  const Push push{static_cast<int>(number[13]), number[14], number[15], number[16]};
+  const PendulumState s = Step(PlantAt(number.data()), before, number[12], push);
+  std::ranges::copy(std::array{s.q1, s.q2, s.w1, s.w2}, number.begin());
 }
 
 /// An estimator of the plant of one pendulum, from its nominal plant (8).

@@ -3,6 +3,7 @@ import type { Canvas } from '../view/canvas';
 
 const SECONDS = 5;
 const SIDE = 720; // px
+const TITLE = 80; // px, of the title below
 const TYPES = ['video/webm;codecs=vp9', 'video/webm', 'video/mp4'];
 
 /// The kind of film that this browser makes; undefined if it makes none.
@@ -13,14 +14,16 @@ export const filmType =
 
 /// Films what a canvas shows about its `middle` for five seconds, and saves the film under this name, which
 /// gets an extension. Throws what the recorder throws.
-/// `middle` gives place and half the side of a square (px of the style sheet).
+/// `middle` gives place and half the side of a square (px of the style sheet), `title` two lines below it.
 export async function film(
   canvas: Canvas,
   middle: () => { x: number; y: number; half: number },
   name: string,
+  title: () => readonly [string, string],
 ): Promise<void> {
   const picture = document.createElement('canvas');
-  picture.width = picture.height = SIDE;
+  picture.width = SIDE;
+  picture.height = SIDE + TITLE;
   const context = picture.getContext('2d')!;
   const recorder = new MediaRecorder(picture.captureStream(), { mimeType: filmType! });
   const pieces: Blob[] = [];
@@ -32,9 +35,15 @@ export async function film(
     const { x, y, half } = middle();
     const ratio = canvas.element.width / canvas.width;
     context.fillStyle = ground;
-    context.fillRect(0, 0, SIDE, SIDE);
+    context.fillRect(0, 0, SIDE, SIDE + TITLE);
     const [left, top, side] = [x - half, y - half, 2 * half].map((length) => length * ratio);
     context.drawImage(canvas.element, left!, top!, side!, side!, 0, 0, SIDE, SIDE);
+    context.textAlign = 'center';
+    title().forEach((line, i) => {
+      context.font = canvas.font(i === 0 ? '600 30px' : '24px');
+      context.fillStyle = canvas.color(i === 0 ? 'ink' : 'quiet');
+      context.fillText(line, SIDE / 2, SIDE + 28 + 34 * i, SIDE - 40);
+    });
     if (performance.now() < end) requestAnimationFrame(frame);
     else recorder.stop();
   };

@@ -15,16 +15,16 @@ const STILL = { torque: 0, push: null, drag: null, shoved: null };
 /// the best if the task is solved.
 export class Filmstrip {
   private readonly place = element('learn-strip');
-  private readonly simulator: World['simulator'];
+  private readonly stage: World;
   private world: World | null = null;
   private readonly scenes: Scene[] = [];
   private readonly captions: HTMLElement[] = [];
   private shown: Session | null = null;
   private pictures: (() => void)[] = [];
 
-  /// `simulator` is that of the stage, of which the strip takes another one.
-  constructor(simulator: World['simulator']) {
-    this.simulator = simulator;
+  /// The strip takes another simulator of the stage's engine.
+  constructor(stage: World) {
+    this.stage = stage;
     // A canvas is empty after its size has changed.
     new ResizeObserver(() => requestAnimationFrame(() => this.repaint())).observe(this.place);
     onThemeChange(() => {
@@ -57,7 +57,7 @@ export class Filmstrip {
   private draw({ file, after }: Checkpoint, i: number): void {
     if (!(file instanceof ArrayBuffer)) return;
     const scene = this.scenes[i] ?? this.add(i);
-    this.world ??= new World(this.simulator.another());
+    this.world ??= new World(this.stage.simulator.another());
     const { world } = this;
     const policy = new Policy(file);
     const history = new History(TRAIL_SECONDS);

@@ -46,6 +46,7 @@ export interface LearnPage extends LearnStage {
     recording(id: string): Recording | null;
   };
   readonly scene: Scene;
+  readonly agentTitle: string; // of the agent that was last chosen from the list
   /// Hears when a training has begun.
   learned(): void;
   /// Keeps a policy that was learned here as the visitor's own.
@@ -71,7 +72,7 @@ export class LearnPanel {
   /// `recorded` is the agent whose training can be gone through.
   constructor(page: LearnPage, recorded: string) {
     this.page = page;
-    this.strip = new Filmstrip(page.world.simulator);
+    this.strip = new Filmstrip(page.world);
     this.scrubber = new Scrubber(page, () => this.draw());
     button('learn-start', () => this.toggle());
     button('learn-again', () => this.start());
@@ -270,16 +271,34 @@ export class LearnPanel {
     note('It stays in this browser: it is the agent "yours" in every list.');
   }
 
+  /// The agent on the stage and how well it does, as a film's title.
+  private get title(): readonly [string, string] {
+    const { session, scrubber, page } = this;
+    const { course } = scrubber;
+    if (!course || !scrubber.onStage) return [page.agentTitle, ''];
+    const step = session && scrubber.follows ? session.steps : scrubber.step;
+    const success = successAt(course, step);
+    const score = success === undefined ? '' : `, success ${(100 * success).toFixed(0)}%`;
+    const chosen = [...this.agent.options].find(({ value }) => value === session?.agent);
+    const name = session ? `${chosen?.text ?? session.agent}, ${session.name}` : course.name;
+    return [name, `after ${step.toLocaleString('en')} steps${score}`];
+  }
+
   private async film(button: HTMLButtonElement): Promise<void> {
     button.disabled = true;
     button.textContent = 'Filming …';
     const { scene } = this.page;
     try {
-      await film(scene.canvas, () => scene.square, 'upswing');
+      await film(
+        scene.canvas,
+        () => scene.square,
+        'upswing',
+        () => this.title,
+      );
     } catch {
       warn('This browser could not film the stage.');
     }
-    button.textContent = 'Film it for 5 s';
+    button.textContent = 'Film 5 s';
     button.disabled = false;
   }
 
@@ -323,7 +342,7 @@ export class LearnPanel {
     this.strip.show(session?.state === 'finished' ? session : null);
     const active = this.sessions.filter((one) => one.active);
     const paused = active.length > 0 && active.every(({ state }) => state === 'paused');
-    const label = active.length === 0 ? 'Learn' : paused ? 'Go on' : 'Pause';
+    const label = active.length === 0 ? 'Learn' : paused ? 'Resume training' : 'Pause training';
     element('learn-start').textContent = label;
     element<HTMLButtonElement>('learn-again').disabled = this.sessions.length === 0;
     const has = session !== null && session.policy !== null;
@@ -351,7 +370,7 @@ export class LearnPanel {
     const { session, scrubber } = this;
     const now = session !== null && scrubber.follows;
     const at = now ? Infinity : scrubber.step;
-    const success = course.evaluations.findLast(({ step }) => step <= at)?.success;
+    const success = successAt(course, at);
     const count = (number: number | undefined) => number?.toLocaleString('en') ?? '–';
     const last = session?.last;
     const after = !now
@@ -383,7 +402,12 @@ function fileOf({ agent, seed, newest }: Session, { file, step }: Checkpoint): F
 }
 
 const OF_RECORDING =
-  'This is how the default agent learned, before it came here: drag the line under the chart.';
+  'The default agent learned like this. Drag the line under the chart to see earlier versions.';
+
+/// The share of successes in the last test up to a step.
+function successAt({ evaluations }: Course, at: number): number | undefined {
+  return evaluations.findLast(({ step }) => step <= at)?.success;
+}
 
 function brief({ state, last, seconds }: Session): string {
   if (state === 'failed') return 'failed';

@@ -62,6 +62,7 @@ export class Scrubber {
 
   /// Leaves the stage to others until a policy is shown again.
   leave(): void {
+    ++this.requests; // what is on its way does not arrive
     this.replaceable = null;
   }
 

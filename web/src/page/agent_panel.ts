@@ -25,6 +25,8 @@ export class AgentPanel {
   private readonly listener: AgentListener;
   private readonly curve = new LearningCurve();
   private requests = 0; // the last one counts
+  /// Whether an agent is on its way.
+  busy = false;
 
   constructor(agents: Agents, listener: AgentListener) {
     this.agents = agents;
@@ -69,14 +71,17 @@ export class AgentPanel {
   private async load(get: () => Promise<Agent>, refusal: string): Promise<boolean> {
     const request = ++this.requests;
     element('agent-what').textContent = 'Loading …';
+    this.busy = true;
     try {
       const agent = await get();
       if (request !== this.requests) return false; // another was asked for meanwhile
       this.agent = agent;
+      this.busy = false;
       hideMessage();
     } catch (error) {
       if (!(error instanceof BadInput)) throw error;
       if (request !== this.requests) return false;
+      this.busy = false;
       warn(`${refusal}: ${error.message}.`);
       this.show();
       return false;

@@ -70,20 +70,23 @@ const PLAIN: ReadonlyMap<string, string> = new Map([
   ],
   [
     'double-dqn',
-    `DQN that learned with two networks, as one alone promises itself too much. ${CAN}`,
+    `DQN that learned with two networks, because a single one expects too much reward. ${CAN}`,
   ],
-  ['dueling-dqn', `DQN that learned apart how good a moment is and what each torque adds. ${CAN}`],
+  [
+    'dueling-dqn',
+    `DQN that learned separately how good a state is and what each torque adds. ${CAN}`,
+  ],
   ['fast', `The same method with a small network, which learns within seconds. ${CAN}`],
   [
     'd3qn-adaptive',
-    'It learned on many pendulums and feels out which one it has: it balances other masses, lengths and gravity too.',
+    'It learned on many pendulums and estimates which one it has: it balances other masses, lengths and gravity too.',
   ],
   [
     'd3qn-randomized',
     'It learned on many pendulums and remembers its last steps to tell them apart: it balances many others too.',
   ],
-  ['sac', `It learned by trial, from all that it had tried, and may use any torque. ${CAN}`],
-  ['ppo', `It learned by trial, from its latest trials alone, and may use any torque. ${CAN}`],
+  ['sac', `It learned by trial, from all its past trials, and may use any torque. ${CAN}`],
+  ['ppo', `It learned by trial, from its latest trials only, and may use any torque. ${CAN}`],
 ]);
 
 /// Controllers that are made from the equations of motion (docs/controllers.md): title, and how they act.
@@ -105,7 +108,7 @@ const COMPUTED: ReadonlyMap<string, readonly [string, string]> = new Map([
   ],
   [
     'tvlqr',
-    ['TVLQR: a planned swing-up', 'It planned one swing-up and corrects what departs from it.'],
+    ['TVLQR: a planned swing-up', 'It planned one swing-up and corrects deviations from it.'],
   ],
   [
     'mpc',
@@ -129,7 +132,7 @@ function plainly({ controller }: Policy, agent: string): string {
   const { strongest } = controller;
   return (
     PLAIN.get(agent) ??
-    `A policy that chooses torques up to ${signed(strongest)} N·m; see what it can.`
+    `A policy that chooses torques up to ${signed(strongest)} N·m. Run it to see what it can do.`
   );
 }
 
@@ -201,6 +204,7 @@ export function parseEntry(value: unknown): Entry | null {
 export class Agents {
   private readonly entries: Map<string, Entry>;
   private readonly loaded = new Map<string, Agent>();
+  private readonly underWay = new Map<string, Promise<Agent>>();
   private own: KeptFile | null; // what the visitor brought, now or at an earlier visit
 
   private constructor(entries: Entry[], own: KeptFile | null) {
@@ -231,6 +235,11 @@ export class Agents {
     return this.own ? [...list, { id: OWN, title: ownTitle(this.own) }] : list;
   }
 
+  /// Whether an agent is here already.
+  isHere(id: string): boolean {
+    return this.loaded.has(id);
+  }
+
   /// Whether there is an agent of this id.
   has(id: string): boolean {
     return this.entries.has(id) || COMPUTED.has(id) || (id === OWN && this.own !== null);
@@ -248,8 +257,15 @@ export class Agents {
     if (id === OWN && this.own) return this.addOwn(this.own);
     const entry = this.entries.get(id);
     if (!entry) return this.make(id);
+    // Asked for twice, it is fetched once.
+    const fetched = this.underWay.get(id) ?? this.fetchAgent(entry);
+    this.underWay.set(id, fetched);
+    return fetched.finally(() => this.underWay.delete(id));
+  }
+
+  private async fetchAgent(entry: Entry): Promise<Agent> {
     const policy = new Policy(await fetchPolicy(entry.file));
-    const { command, curve } = entry;
+    const { id, command, curve } = entry;
     const what = plainly(policy, id === entry.agent ? id : OWN);
     return this.add({
       ...{ id, title: titleOf(entry), what, text: describe(policy) },

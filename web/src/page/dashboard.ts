@@ -5,6 +5,7 @@ import type { Decision } from '../decision';
 import { PhasePortrait, SECONDS_SHOWN, signed, Strip } from '../view/charts';
 import { withMinus } from '../text';
 import { DecisionChart } from '../view/decision';
+import { NeuronChart } from '../view/neurons';
 import type { Moment, World } from '../world';
 import { element, write } from './dom';
 
@@ -25,10 +26,12 @@ export class Dashboard {
   private readonly torque = new Strip('torque', 'torque', (m) => m.torque);
   private readonly phase = new PhasePortrait();
   private readonly decision = new DecisionChart();
+  private readonly neurons = new NeuronChart();
   private frame = 0;
 
   get canvases() {
-    return [this.energy, this.height, this.torque, this.phase, this.decision].map((c) => c.canvas);
+    const { energy, height, torque, phase, decision, neurons } = this;
+    return [energy, height, torque, phase, decision, neurons].map((c) => c.canvas);
   }
 
   draw(world: World, history: History): void {
@@ -77,6 +80,7 @@ export class Dashboard {
       ],
     });
     this.decision.draw(decision, policy?.rewardScale ?? 1);
+    if (this.neurons.canvas.shown) this.neurons.draw(policy?.neurons ?? null, world.seen);
   }
 
   /// The numbers change a few times a second, so that they can be read.

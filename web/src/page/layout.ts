@@ -12,7 +12,10 @@ export function placeCharts(): void {
   const q = element('q-figure');
   const map = element('map-figure');
   const place = wide.matches && view === 'everything' ? charts : beside;
-  if (q.parentElement !== place) place.prepend(q);
+  if (q.parentElement !== place) {
+    if (place === beside) element('neuron-figure').after(q);
+    else place.prepend(q);
+  }
   if (view !== 'everything') beside.append(map);
   else if (map.parentElement !== charts) element('phase-figure').before(map);
   const grown = element('learn-figure');

@@ -5,6 +5,7 @@ import type { State } from '../pendulum';
 import type { Policy } from '../policy';
 import { signed } from '../view/charts';
 import { MapChart } from '../view/map';
+import { Scale } from '../view/scale';
 import type { World } from '../world';
 import { element } from './dom';
 
@@ -38,6 +39,9 @@ export class MapPanel {
   private range: [number, number] = [0, 1];
   private frame = 0;
   private mark: [number, number] | null = null; // shares of both axes, by keyboard
+  private readonly scales = [...document.querySelectorAll<HTMLElement>('.scale')].map(
+    (place) => new Scale(place),
+  );
 
   /// `start` is told where a click wants the pendulum to be.
   constructor(start: (where: Partial<State>) => void) {
@@ -133,9 +137,11 @@ export class MapPanel {
     this.key = this.mixed ? '' : keyOf(begunIn);
     this.mixed = false;
     const [low, high] = (this.range = this.rangeOf(map.cells!, world));
-    element('map-value').textContent = Number.isFinite(high - low)
-      ? this.said(world)
-      : 'not estimated';
+    const known = Number.isFinite(high - low);
+    element('map-value').textContent = known ? this.said(world) : 'not estimated';
+    const unit = map.quantity === 'torque' ? 1 : (world.policy?.rewardScale ?? 1);
+    for (const scale of this.scales)
+      scale.show(map.quantity, known ? [low / unit, high / unit] : null);
   }
 
   /// What the colours stand for.
@@ -178,6 +184,7 @@ export class MapPanel {
     this.map.clear();
     this.chart.clear();
     element('map-value').textContent = '';
+    for (const scale of this.scales) scale.show(this.map.quantity, null);
   }
 }
 

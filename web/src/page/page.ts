@@ -2,6 +2,7 @@ import { core } from '../core';
 import { History } from '../history';
 import { LearnPanel } from '../learn/panel';
 import type { State } from '../pendulum';
+import type { Mujoco } from '../mujoco';
 import { Scene, TRAIL_SECONDS } from '../view/scene';
 import type { World } from '../world';
 import { Address } from './address';
@@ -30,6 +31,7 @@ import { Twin } from './twin';
 import { showView, viewOf } from './views';
 
 const REMEMBERED = 60; // s of history
+const LEARN_KEYS = ['g', 'r', 'ArrowLeft', 'ArrowRight']; // a pause there is one of the training
 
 /// The parts of the page and what its buttons do.
 export class Page {
@@ -54,6 +56,8 @@ export class Page {
   );
   private takes = 0; // of agents and settings; the last one counts
   private paused = false;
+  private learning = false; // whether view or step is that of a training
+  private mujoco = false; // whether MuJoCo moves the pendulums
 
   constructor(world: World, agents: Agents) {
     this.world = world;
@@ -79,6 +83,7 @@ export class Page {
       this,
       (id) => agents.has(id),
       () => {
+        this.arranged();
         this.setPaused(false);
         this.changed();
       },
@@ -93,6 +98,10 @@ export class Page {
   /// Memory that the core has taken (bytes), which it never gives back.
   get coreBytes(): number {
     return core().exports.memory.buffer.byteLength;
+  }
+
+  get agentTitle(): string {
+    return this.agent?.title ?? '';
   }
 
   private get agent(): Agent | null {
@@ -117,6 +126,7 @@ export class Page {
       Object.assign(shared, { agent: OWN, on: !prefersStill() });
     }
     this.tour.leave();
+    this.arranged();
     this.world.agentOn = false;
     if (!(await this.begin(shared))) return;
     if (learns) {
@@ -145,6 +155,18 @@ export class Page {
     const taken = await this.take(shared);
     if (taken) this.reset();
     return taken;
+  }
+
+  /// Whether agent and physics are those that stay.
+  get isComplete(): boolean {
+    return this.mujoco && !this.agentPanel.busy;
+  }
+
+  /// The pendulums go on in MuJoCo.
+  continueIn(simulator: Mujoco): void {
+    this.mujoco = true;
+    this.world.continueIn(simulator);
+    this.twin.continueIn(simulator.another());
   }
 
   /// Handles input, then advances and draws: at every frame, or while paused after a change.
@@ -176,7 +198,17 @@ export class Page {
 
   /// A training has begun: the address is its recipe.
   learned(): void {
+    this.arranged();
     this.changed();
+  }
+
+  /// After another view or step is shown, or a training has begun: what stands on the stage.
+  private arranged(): void {
+    const { view, step } = document.documentElement.dataset;
+    this.learning = view === 'learn' || step === 'learn';
+    this.map.ground(view !== 'everything', this.learning);
+    this.map.canvas.element.toggleAttribute('data-idle', this.learning && !this.learn.begun);
+    if (!this.learning) this.learn.leave();
   }
 
   /// Keeps a policy that was learned here as the visitor's own, on the stage if it is to be `shown`.
@@ -200,7 +232,9 @@ export class Page {
     const shoveLeft = () => this.world.shoveTo(-1);
     const shoveRight = () => this.world.shoveTo(1);
     const actions = { toggleAgent, togglePause, step, reset, shoveLeft, shoveRight };
-    listenToKeys(actions, () => this.tour.keys);
+    listenToKeys(actions, () =>
+      this.learning && this.tour.number === 0 ? LEARN_KEYS : this.tour.keys,
+    );
     button('agent-on', toggleAgent);
     button('pause', togglePause);
     button('step', step);
@@ -343,13 +377,8 @@ export class Page {
     this.scene.draw(world, this.clock.state, trail);
     this.twin.draw(this.clock, prefersStill());
     this.tour.follow(world, this.scene);
-    const { view, step } = document.documentElement.dataset;
-    const learning = view === 'learn' || step === 'learn';
-    this.map.ground(view !== 'everything', learning);
-    this.map.canvas.element.toggleAttribute('data-idle', learning && !this.learn.begun);
-    if (!learning) this.learn.leave();
     this.learn.follow();
-    if (learning && !prefersStill()) this.scene.ghosts = this.learn.ghosts;
+    if (this.learning && !prefersStill()) this.scene.ghosts = this.learn.ghosts;
     if (this.paused) this.pose.follow(world.state);
     this.dashboard.draw(world, this.history);
     this.map.draw(world, this.history);

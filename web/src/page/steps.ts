@@ -22,6 +22,10 @@ export interface Stage {
   take(shared: Partial<Shared>): Promise<boolean>;
   /// The same, from hanging.
   begin(shared: Partial<Shared>): Promise<boolean>;
+  /// Changes to another agent; all else stays. False if it cannot be loaded, or another was asked for
+  /// meanwhile.
+  choose(agent: string): Promise<boolean>;
+  readonly agents: { has(id: string): boolean; isHere(id: string): boolean };
   setAgentOn(on: boolean): void;
   setSpeed(speed: number): void;
   /// From hanging.
@@ -59,10 +63,12 @@ export interface Step {
 }
 
 const NOMINAL_AGENT = 'd3qn';
+const SMALL_AGENT = 'fast'; // a twentieth of its size
 const ADAPTIVE_AGENT = 'd3qn-adaptive';
 const LIGHT = 0.75; // kg
 const HELD = 2; // s upright that count as balanced
 const WON = 5; // s upright that win a race
+const LONGEST = 20; // s, of a race
 const ARROWS = ['ArrowLeft', 'ArrowRight'];
 const GOAL: Label = { at: 'goal', text: 'both links in here' };
 
@@ -79,11 +85,16 @@ function watch(stage: Stage): Step {
     agents: [NOMINAL_AGENT],
     labels: () => [GOAL, { at: 'motor', text: 'the motor' }],
     async begin() {
-      again.textContent = prefersStill() ? 'Swing up' : 'Swing up again';
-      await stage.begin({ agent: NOMINAL_AGENT, on: !prefersStill() });
+      const on = !prefersStill();
+      again.textContent = on ? 'Swing up again' : 'Swing up';
+      const { agents } = stage;
+      if (agents.isHere(NOMINAL_AGENT) || !agents.has(SMALL_AGENT))
+        return void (await stage.begin({ agent: NOMINAL_AGENT, on }));
+      // The small one is here within a moment; the other takes over in the middle of the swing.
+      if (await stage.begin({ agent: SMALL_AGENT, on })) void stage.choose(NOMINAL_AGENT);
     },
     answer: (world) =>
-      heldFor(world) > HELD ? 'Balanced. How hard can it be? Go on and try it yourself.' : '',
+      heldFor(world) > HELD ? 'Balanced. Can you do that? Press Next and try it.' : '',
   };
 }
 
@@ -148,7 +159,7 @@ function agent(stage: Stage): Step {
     answer(world) {
       on.ariaPressed = String(world.agentOn);
       return world.agentOn && heldFor(world) > HELD
-        ? 'The same motor as yours. It learned this in 80 minutes of swinging, computed within seconds.'
+        ? 'It practised for 80 minutes of swinging, which a computer simulates within seconds.'
         : '';
     },
   };
@@ -173,15 +184,15 @@ function shove(stage: Stage): Step {
     answer(world) {
       if (world.push) {
         shoved = world.time;
-        if (heldFor(world) > HELD) fell = false; // it begins anew
+        if (heldFor(world) > HELD) fell = false; // the next fall is another one
       }
       if (shoved === 0)
         return heldFor(world) > HELD || !world.agentOn ? '' : 'Wait until it is up …';
       if (heldFor(world) === 0) fell = true;
-      if (fell && heldFor(world) > HELD) return 'Down, and up again by itself.';
-      if (fell) return 'Down it goes …';
-      if (world.time - shoved < HELD) return 'It works to catch that …';
-      return 'It caught that one. Now several, quickly.';
+      if (fell && heldFor(world) > HELD) return 'It fell, and swung up again by itself.';
+      if (fell) return 'It falls …';
+      if (world.time - shoved < HELD) return 'It catches the shove …';
+      return 'It caught that shove. Now try several, quickly.';
     },
   };
 }
@@ -190,6 +201,7 @@ function shove(stage: Stage): Step {
 function bet(stage: Stage): Step {
   let onMany = false; // what the visitor bets on
   let decided = '';
+  let begun = 0; // s, in the world's time
   const race = { agent: NOMINAL_AGENT, twin: ADAPTIVE_AGENT, plant: { ...NOMINAL, mass2: LIGHT } };
   const choices = [
     [button('bet-one', () => void run(false)), false],
@@ -198,10 +210,9 @@ function bet(stage: Stage): Step {
 
   /// Both hang, and begin if there is a bet.
   const begin = async (on: boolean) => {
-    decided = '';
     if (!(await stage.begin({ ...race, on }))) return;
-    element('first-name').textContent = 'learned on one';
-    element('twin-name').textContent = 'learned on many';
+    decided = '';
+    begun = stage.world.time;
   };
   const run = (many: boolean) => {
     onMany = many;
@@ -217,20 +228,24 @@ function bet(stage: Stage): Step {
       await begin(false);
     },
     answer(world) {
+      write(element('first-name'), 'learned on one');
+      write(element('twin-name'), 'learned on many');
       if (!world.agentOn || !world.twin) return '';
       const [one, many] = [heldFor(world), heldFor(world.twin)];
-      let holds = '';
-      if (many > WON && one < HELD) holds = MANY_HOLDS;
-      if (one > WON && many < HELD) holds = ONE_HOLDS;
-      if (holds)
-        decided = `${onMany === (holds === MANY_HOLDS) ? 'You were right' : 'You lost'}: ${holds}`;
+      const verdict = onMany ? ['You were right', 'You lost'] : ['You lost', 'You were right'];
+      if (many > WON && one < HELD) decided = `${verdict[0]}: ${MANY_HOLDS}`;
+      if (one > WON && many < HELD) decided = `${verdict[1]}: ${ONE_HOLDS}`;
+      if (one > WON && many > WON) decided = BOTH_HOLD;
+      if (!decided && world.time - begun > LONGEST) decided = NONE_HOLDS;
       return decided || 'Both try …';
     },
   };
 }
 
-const MANY_HOLDS = 'the one that learned on many feels out its pendulum and holds it.';
-const ONE_HOLDS = 'the one that learned on one holds it.';
+const MANY_HOLDS = 'only the agent that learned on many balances it.';
+const ONE_HOLDS = 'only the agent that learned on one balances it.';
+const BOTH_HOLD = 'A draw: both balance it.';
+const NONE_HOLDS = `A draw: neither balances it within ${LONGEST} s.`;
 
 function values(stage: Stage): Step {
   const speed = element<HTMLInputElement>('tour-speed');
@@ -251,7 +266,7 @@ function values(stage: Stage): Step {
     },
     answer: (world) =>
       heldFor(world) > HELD
-        ? 'Upright, a small torque costs least. Drag it, or shove it with ← and →, and see.'
+        ? 'Upright, small torques are best. Drag the pendulum, or shove it with ← and →, and watch the bars.'
         : '',
   };
 }

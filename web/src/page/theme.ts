@@ -1,10 +1,9 @@
+import { forcedColors, systemDark } from '../view/night';
 import { recall, remember } from './storage';
 
 /// Dark or light: the system's choice, until the visitor makes another, which is kept.
 
 const KEY = 'theme';
-const system = matchMedia('(prefers-color-scheme: dark)');
-const forced = matchMedia('(forced-colors: active)');
 const { dataset } = document.documentElement;
 const listeners: (() => void)[] = [];
 
@@ -12,7 +11,7 @@ const kept = recall(KEY);
 if (kept === 'dark' || kept === 'light') dataset.theme = kept;
 
 export function changeTheme(): void {
-  const now = dataset.theme ?? (system.matches ? 'dark' : 'light');
+  const now = dataset.theme ?? (systemDark.matches ? 'dark' : 'light');
   const theme = now === 'dark' ? 'light' : 'dark';
   dataset.theme = theme;
   remember(KEY, theme);
@@ -22,6 +21,6 @@ export function changeTheme(): void {
 /// Calls `listener` when colours change: by the button, or by the system.
 export function onThemeChange(listener: () => void): void {
   listeners.push(listener);
-  system.addEventListener('change', listener);
-  forced.addEventListener('change', listener);
+  systemDark.addEventListener('change', listener);
+  forcedColors.addEventListener('change', listener);
 }

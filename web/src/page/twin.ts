@@ -3,6 +3,7 @@ import { BadInput } from '../bad_input';
 import type { Policy } from '../policy';
 import { quoted } from '../text';
 import { Scene, TRAIL_SECONDS } from '../view/scene';
+import type { Simulator } from '../simulator';
 import { World } from '../world';
 import type { Agents } from './agents';
 import type { Clock } from './clock';
@@ -36,7 +37,7 @@ export class Twin {
   /// The agents that can be chosen.
   list(): void {
     const options = this.agents.list.map(({ id, title }) => new Option(title, id));
-    this.select.replaceChildren(new Option('nobody', ''), ...options);
+    this.select.replaceChildren(new Option('none', ''), ...options);
     this.select.value = this.id ?? '';
   }
 
@@ -75,6 +76,11 @@ export class Twin {
     this.restarted();
     element('twin-box').hidden = absent;
     element('twin-name').textContent = name;
+  }
+
+  /// Goes on in another engine.
+  continueIn(simulator: Simulator): void {
+    this.world.continueIn(simulator);
   }
 
   /// After a new start: what happened before is dropped.

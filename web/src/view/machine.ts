@@ -1,11 +1,11 @@
 import type { Canvas } from './canvas';
+import { forcedColors, isNight } from './night';
 
 /// The machine on the stage: motor, links, the light of the goal, and the trace of the tip. Places and
 /// sizes are in pixels of the canvas. With forced colours everything is flat.
 
 type Place = readonly [number, number];
 
-const forced = matchMedia('(forced-colors: active)');
 const UPRIGHT = Math.PI / 6; // a link is upright within this angle
 const SOFT = 0.09; // rad, over which the light fades at its sides
 /// Angle from the top (rad) and strength of the light.
@@ -37,7 +37,7 @@ export function drawLight(canvas: Canvas, [x, y]: Place, reach: number, strength
   context.stroke();
   context.globalAlpha = 1;
   const color = canvas.color('cone-edge');
-  if (forced.matches) {
+  if (forcedColors.matches) {
     context.beginPath();
     context.arc(x, y, reach, -Math.PI / 2 - UPRIGHT, -Math.PI / 2 + UPRIGHT);
     context.strokeStyle = color;
@@ -107,7 +107,7 @@ export function drawTrace(
   };
   context.save();
   context.lineJoin = 'round';
-  context.globalCompositeOperation = canvas.color('blend') === WHITE ? 'lighter' : 'source-over';
+  context.globalCompositeOperation = isNight() ? 'lighter' : 'source-over'; // by night light adds
   for (let begin = 0; begin < points.length - 1;) {
     const shade = shadeOf(ages[begin]!);
     let end = begin + 1;
@@ -129,8 +129,6 @@ export function drawTrace(
   }
   context.restore();
 }
-
-const WHITE = 'rgb(255, 255, 255)'; // of --blend, where light adds
 
 /// A path from middle to middle between points, rounded at the points; with its `first` and its `last`
 /// point, if these are the ends of the whole trace.
@@ -172,12 +170,12 @@ export function drawRod(
   context.lineCap = 'round';
   const base = canvas.color(color);
   if (glows) for (const more of [0.5, 1, 1.6]) stroke(faded(base, 0.25), thickness * (1 + more));
-  if (!forced.matches) {
+  if (!forcedColors.matches) {
     const below: Place = [0.18 * thickness, 0.3 * thickness];
     for (const more of [0.4, 0.2, 0]) stroke('rgb(0 0 0 / 0.09)', thickness * (1 + more), below);
   }
   stroke(base, thickness);
-  if (!forced.matches) {
+  if (!forcedColors.matches) {
     // Lit from above: the side that looks up is bright, whichever way the link turns.
     const length = Math.hypot(to[0] - from[0], to[1] - from[1]) || 1;
     let [nx, ny] = [(from[1] - to[1]) / length, (to[0] - from[0]) / length];
@@ -214,7 +212,7 @@ function metal(canvas: Canvas, [x, y]: Place, radius: number, dark: string, brig
   shine.addColorStop(1, dark);
   context.beginPath();
   context.arc(x, y, radius, 0, 2 * Math.PI);
-  context.fillStyle = forced.matches ? canvas.color('ink') : shine;
+  context.fillStyle = forcedColors.matches ? canvas.color('ink') : shine;
   context.fill();
 }
 
@@ -223,7 +221,7 @@ export function drawHousing(canvas: Canvas, place: Place, radius: number, glows:
   const { context } = canvas;
   const [x, y] = place;
   if (glows) canvas.disc(x, y, 1.35 * radius, 'spread');
-  if (!forced.matches) {
+  if (!forcedColors.matches) {
     context.fillStyle = 'rgb(0 0 0 / 0.1)';
     for (const more of [1.18, 1.1, 1.02]) {
       context.beginPath();
@@ -250,7 +248,7 @@ export function drawHub(canvas: Canvas, place: Place, radius: number, q1: number
   context.beginPath();
   context.arc(0, 0, 0.55 * radius, 0.25 * Math.PI, 0.75 * Math.PI, true);
   context.closePath();
-  context.fillStyle = forced.matches ? canvas.color('stage') : '#1b2130';
+  context.fillStyle = forcedColors.matches ? canvas.color('stage') : '#1b2130';
   context.fill();
   context.restore();
 }

@@ -1,5 +1,5 @@
 import { shareOf } from '../map';
-import type { Axis, ValueMap } from '../map';
+import type { Axis, Quantity, ValueMap } from '../map';
 import type { State } from '../pendulum';
 import { Canvas } from './canvas';
 import { signed } from './charts';
@@ -9,20 +9,22 @@ type Names = [string, string, string]; // at the ends of an axis, and in its mid
 type Widths = [number, number, number]; // pixels
 
 // Of V, from the least to the most, ever lighter; and of torques, from left over none to right.
-const VALUES: readonly Color[] = [
-  [20, 14, 54],
-  [83, 36, 122],
-  [180, 54, 114],
-  [241, 120, 70],
-  [252, 233, 160],
-];
-const TORQUES: readonly Color[] = [
-  [190, 72, 8],
-  [240, 190, 150],
-  [246, 243, 235],
-  [140, 208, 198],
-  [4, 110, 100],
-];
+export const COLORS: Readonly<Record<Quantity, readonly Color[]>> = {
+  value: [
+    [20, 14, 54],
+    [83, 36, 122],
+    [180, 54, 114],
+    [241, 120, 70],
+    [252, 233, 160],
+  ],
+  torque: [
+    [190, 72, 8],
+    [240, 190, 150],
+    [246, 243, 235],
+    [140, 208, 198],
+    [4, 110, 100],
+  ],
+};
 const EASE = 0.25; // of the way to a new map, at each drawing
 const APART = 8; // pixels, between two names at least
 const [LEFT, BOTTOM] = [16, 18]; // pixels, for the names of the axes
@@ -71,7 +73,7 @@ export class MapChart {
     map.cells.forEach((cell, i) => {
       shown[i]! += EASE * (shareOf(cell) - shown[i]!);
     });
-    this.paint(map.size, map.quantity === 'torque' ? TORQUES : VALUES);
+    this.paint(map.size, COLORS[map.quantity]);
     if (this.bare) return canvas.context.drawImage(this.image, 0, 0, width, height);
     canvas.context.drawImage(this.image, LEFT, 0, width - LEFT, height - BOTTOM);
     this.drawWay(map, way, now);

@@ -1,0 +1,57 @@
+import type { Neurons } from '../neurons';
+import { Canvas } from './canvas';
+
+const LEFT = 84; // px, for the names of the rows
+const GAP = 4; // px, between rows
+const EASE = 0.3; // of the way to a new brightness, at each drawing
+const FADE = 0.98; // by which the brightest of a row fades, so that it follows what happens
+
+/// The numbers that an agent sees, and under them its neurons layer by layer, each as bright as it is active; an input below 0 in another
+/// colour.
+export class NeuronChart {
+  readonly canvas = new Canvas('neurons');
+  private neurons: Neurons | null = null; // that the rows are of
+  private rows: { shown: Float32Array; most: number }[] = [];
+
+  draw(neurons: Neurons | null, observation: Float32Array): void {
+    const { canvas } = this;
+
+    canvas.clear();
+    if (!neurons) return;
+    const layers = [observation, ...neurons.active(observation)];
+    if (this.neurons !== neurons) {
+      this.rows = layers.map(({ length }) => ({ shown: new Float32Array(length), most: 0 }));
+    }
+    this.neurons = neurons;
+    const height = (canvas.height - GAP * (layers.length - 1)) / layers.length;
+    layers.forEach((layer, i) => {
+      const y = i * (height + GAP);
+      const name = i === 0 ? `${layer.length} inputs` : `${layer.length} neurons`;
+      canvas.text(name, LEFT - 8, y + height / 2, 'right');
+      this.drawRow(layer, this.rows[i]!, y, height);
+    });
+  }
+
+  private drawRow(
+    layer: Float32Array,
+    row: { shown: Float32Array; most: number },
+    y: number,
+    height: number,
+  ): void {
+    const { canvas } = this;
+    const { context } = canvas;
+    const width = (canvas.width - LEFT) / layer.length;
+    const space = width > 8 ? 2 : width > 3 ? 1 : 0;
+    canvas.rectangle(LEFT, y, canvas.width - LEFT, height, 'bar');
+    row.most = Math.max(FADE * row.most, 1e-6, ...layer.map(Math.abs));
+    layer.forEach((value, k) => {
+      row.shown[k]! += EASE * (value / row.most - row.shown[k]!);
+      const share = Math.abs(row.shown[k]!);
+      if (share < 0.02) return;
+      context.globalAlpha = Math.min(1, share);
+      const color = row.shown[k]! > 0 ? 'torque' : 'link2';
+      canvas.rectangle(LEFT + k * width + space / 2, y, width - space, height, color);
+    });
+    context.globalAlpha = 1;
+  }
+}

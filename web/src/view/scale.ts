@@ -1,0 +1,32 @@
+import type { Quantity } from '../map';
+import { signed } from './charts';
+import { COLORS } from './map';
+
+const NAMES = { value: 'expected reward', torque: 'torque, N·m' } as const;
+
+/// What the colours of the map stand for: a bar of them, between the numbers at its ends.
+export class Scale {
+  private readonly place: HTMLElement;
+  private readonly parts = ['span', 'span', 'i', 'span'].map((tag) => document.createElement(tag));
+
+  constructor(place: HTMLElement) {
+    this.place = place;
+    place.replaceChildren(...this.parts);
+    this.show('value', null);
+  }
+
+  /// `ends` are the least and the largest; null where nothing is known, and the scale is hidden.
+  show(quantity: Quantity, ends: readonly [number, number] | null): void {
+    const [name, low, bar, high] = this.parts as [
+      HTMLElement,
+      HTMLElement,
+      HTMLElement,
+      HTMLElement,
+    ];
+    const colors = COLORS[quantity].map((color) => `rgb(${color.join(' ')})`);
+    bar.style.background = `linear-gradient(to right, ${colors.join()})`;
+    name.textContent = NAMES[quantity];
+    [low.textContent, high.textContent] = (ends ?? [0, 0]).map(signed) as [string, string];
+    this.place.style.visibility = ends ? '' : 'hidden';
+  }
+}
