@@ -140,7 +140,7 @@ class RealAIGym(ProgramTest):
     def test_bad_input(self):
         self.search()
         refuse = self.refuse
-        refuse(["realaigym"], "expected a policy to score or --search FILE, got neither")
+        refuse(["realaigym"], "expected a policy to score, --search FILE or --hardware LOG, got none")
         refuse(["realaigym", "p.safetensors", "--search", "q.safetensors"], "--search")
         refuse(["realaigym", "p.safetensors", "--hidden", 8], "--hidden", "--search")
         refuse(["realaigym", "nothing.safetensors"], "nothing.safetensors: no such file")

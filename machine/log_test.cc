@@ -14,8 +14,6 @@
 namespace upswing {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-
 /// The only log of a text.
 MachineLog Parsed(std::string_view csv) {
   const std::vector<MachineLog> pieces = ParseLog(csv, nullptr, "log.csv");
@@ -116,10 +114,10 @@ TEST(MachineLog, OwnColumnsAndUnits) {
   ASSERT_EQ(logs.size(), 1);
   const MachineLog& log = logs.front();
   EXPECT_DOUBLE_EQ(log.time[1], 0.002);
-  EXPECT_DOUBLE_EQ(log.angle[0][0], kPi / 2);
-  EXPECT_DOUBLE_EQ(log.angle[0][1], -kPi / 4);
-  EXPECT_DOUBLE_EQ(log.velocity[0][0], 2 * kPi);
-  EXPECT_DOUBLE_EQ(log.velocity[0][1], kPi);
+  EXPECT_DOUBLE_EQ(log.angle[0][0], std::numbers::pi / 2);
+  EXPECT_DOUBLE_EQ(log.angle[0][1], -std::numbers::pi / 4);
+  EXPECT_DOUBLE_EQ(log.velocity[0][0], 2 * std::numbers::pi);
+  EXPECT_DOUBLE_EQ(log.velocity[0][1], std::numbers::pi);
   EXPECT_EQ(log.commanded[0], (Joints{1.5, 0}));  // joint 2 has no motor
   EXPECT_EQ(log.measured[1], (Joints{-2, 0}));
 }
@@ -220,7 +218,7 @@ TEST(MachineLog, ReadsTheMeasuredData) {
     rows += piece.rows();
   }
   EXPECT_EQ(rows, 53340);
-  EXPECT_NEAR(pieces[0].angle[0][0], 2.615775 - kPi, 1e-6);
+  EXPECT_NEAR(pieces[0].angle[0][0], 2.615775 - std::numbers::pi, 1e-6);
   EXPECT_NEAR(pieces[0].angle[0][1], 3.541416 - 2.615775, 1e-12);
 }
 

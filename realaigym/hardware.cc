@@ -6,7 +6,6 @@
 #include "core/error.h"
 #include "core/json.h"
 #include "core/text.h"
-#include "realaigym/plant.h"
 
 namespace upswing {
 namespace {
@@ -87,8 +86,7 @@ BoardOutcome OutcomeOf(const MachineLog& log) {
   o.smoothness = Smoothness(u, 0) + Smoothness(u, 1);
   o.swing_up_seconds = SwingUpSeconds(log);
   const double end = log.time.back();
-  constexpr double kEnough = 0.99 * kBoardSteps * kBoardTimestep;  // s
-  o.above_line = o.swing_up_seconds < end && end >= kEnough;
+  o.above_line = o.swing_up_seconds < end && end >= kHardwareSeconds;
   if (!o.above_line) o.swing_up_seconds = end;
   return o;
 }

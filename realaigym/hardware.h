@@ -19,8 +19,12 @@ ScoreScales HardwareScales(Robot robot, bool pushed);
 /// The robot of a log: the joint with more commanded torque has the motor.
 Robot RobotOf(const MachineLog& log);
 
-/// Measures of a run: angles and velocities as logged, torque as commanded. A run that ends before
-/// 9.9 s is a failure. Throws BadInput if the log lacks velocities or commanded torques.
+/// Shortest run that can succeed, s.
+inline constexpr double kHardwareSeconds = 0.99 * kBoardSteps * kBoardTimestep;
+
+/// Measures of a run: angles and velocities as logged, torque as commanded. A run that is shorter
+/// than kHardwareSeconds is a failure. Throws BadInput if the log lacks velocities or commanded
+/// torques.
 BoardOutcome OutcomeOf(const MachineLog& log);
 
 struct HardwareRun {
