@@ -80,8 +80,10 @@ void CheckLostCycles(const std::vector<Cycle>& cycles, double median, Findings& 
 }
 
 void CheckGaps(const std::vector<Cycle>& cycles, double median, Findings& findings) {
+  constexpr int kMostGaps = 10;  // with a line each
+  int gaps = 0;
   for (const Cycle& cycle : cycles) {
-    if (cycle.seconds <= GapOf(median)) continue;
+    if (cycle.seconds <= GapOf(median) || ++gaps > kMostGaps) continue;
     findings.push_back({Aspect::kClock,
                         0,
                         Severity::kFault,
@@ -89,6 +91,8 @@ void CheckGaps(const std::vector<Cycle>& cycles, double median, Findings& findin
                         RangeOf(cycle),
                         {{"gap", cycle.seconds}}});
   }
+  if (gaps <= kMostGaps) return;
+  findings.push_back({Aspect::kClock, 0, Severity::kFault, Counted(gaps - kMostGaps, "more gap")});
 }
 
 }  // namespace

@@ -167,12 +167,14 @@ struct Response {
   double residual() const { return 1 - std::pow(pairs.correlation(), 2); }
 };
 
+constexpr double kMostPairs = 1e5;  // rows of a fit; more take long and tell no more
+
 /// Command of joint `from`, delayed and lagged, against the measured torque of joint `to`.
 Response Respond(Pieces pieces, int from, int to, int rows, double lag) {
   Response response{rows, lag, {}};
   for (const MachineLog& piece : pieces) {
     double torque = 0;
-    for (int k = rows; k < piece.rows(); ++k) {
+    for (int k = rows; k < piece.rows() && response.pairs.n < kMostPairs; ++k) {
       const int sent = k - rows;
       double command = piece.commanded[sent][from];
       if (!piece.push.empty()) command += piece.push[sent][from];

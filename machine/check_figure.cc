@@ -72,12 +72,25 @@ Panel PanelOf(const std::string& title, const std::string& label, Pieces pieces,
   return panel;
 }
 
+/// The warnings and faults, in words.
+std::string CaptionOf(const LogCheck& check) {
+  std::vector<std::string> texts;
+  for (const Finding& finding : check.findings) {
+    if (finding.severity == Severity::kNote) continue;
+    const std::string joint = finding.joint > 0 ? Concat(" ", finding.joint) : "";
+    texts.push_back(Concat(NameOf(finding.severity), " of ", NameOf(finding.aspect), joint, ": ",
+                           finding.text));
+  }
+  return texts.empty() ? "no warning and no fault" : Join(texts, ". ");
+}
+
 }  // namespace
 
 void DrawCheck(const LogCheck& check, Pieces pieces, const std::filesystem::path& file) {
   const MachineLog& first = pieces.front();
   Figure figure;
   figure.title = check.name;
+  figure.caption = CaptionOf(check);
   figure.width = 1100;
   const auto mark = [&](Panel& panel, std::initializer_list<Aspect> aspects,
                         std::vector<Joints> MachineLog::*values) {
@@ -112,10 +125,13 @@ void DrawCheck(const LogCheck& check, Pieces pieces, const std::filesystem::path
   cycles.x_label = "time (s)";
   cycles.y_label = "ms";
   cycles.lines.push_back(LineOf("", pieces, cycle));
+  double longest = 0;
+  for (const double ms : cycles.lines.back().y) longest = std::fmax(longest, ms);
+  if (longest > 0) cycles.y_range = {0, 1.1 * longest};
   Mark(cycles, check, pieces, {Aspect::kClock},
        [&](const MachineLog& log, int k, int /*joint*/) { return cycle(log, k); });
   figure.panels.push_back(std::move(cycles));
-  figure.height = 60 + 230 * static_cast<int>(figure.panels.size());
+  figure.height = 100 + 230 * static_cast<int>(figure.panels.size());
   Draw(figure, file);
 }
 

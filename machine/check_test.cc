@@ -119,6 +119,14 @@ TEST(MachineCheck, LostCyclesAndGaps) {
       "stands still in 1 row", Severity::kWarning);
 }
 
+TEST(MachineCheck, ManyGapsGetALineTogether) {
+  MachineLog log = GoodLog();
+  for (int k = 0; k < log.rows(); ++k) log.time[k] += 0.5 * (k / 200);  // 24 gaps
+  const Findings found = Check(log);
+  EXPECT_EQ(std::ranges::count(found, Severity::kFault, &Finding::severity), 11);
+  EXPECT_TRUE(std::ranges::count(found, "14 more gaps", &Finding::text) == 1);
+}
+
 TEST(MachineCheck, Clocks) {
   OnlyFinding(
       [](MachineLog& log) {

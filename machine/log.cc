@@ -20,6 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr size_t kMostPieces = 10000;
 constexpr double kMostMagnitude = 1e12;  // larger numbers are garbage, and their squares overflow
 
 /// A unit that a column may have.
@@ -279,6 +280,10 @@ std::vector<MachineLog> ParseLog(std::string_view csv, const LogColumns* columns
   for (int begin = 0; begin < static_cast<int>(whole.piece.size());) {
     int end = begin;
     while (end < rows && whole.piece[end] == whole.piece[begin]) ++end;
+    if (pieces.size() == kMostPieces) {
+      throw BadInput(Concat(where, ": row ", begin + 1, ": ", columns->piece, ": expected at most ",
+                            kMostPieces, " pieces, got more"));
+    }
     pieces.push_back(PieceOf(whole.log, begin, end));
     pieces.back().name = Concat(where, " ", columns->piece, " ", FormatNumber(whole.piece[begin]));
     begin = end;

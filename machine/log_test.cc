@@ -155,6 +155,15 @@ TEST(MachineLog, APieceBeginsWhereItsColumnChanges) {
             "own.csv: row 6: expected at least 2 rows, got 1");
 }
 
+TEST(MachineLog, AColumnOfPiecesThatIsAnotherColumn) {
+  const LogColumns columns = ParseLogColumns(
+      "time = \"t\"\nangle1 = \"a\"\nangle2 = \"a\"\npiece = \"a\"\n", "columns.toml");
+  std::string csv = "t,a\n";
+  for (int k = 0; k < 10001; ++k) csv += Concat("0,", k, "\n1,", k, "\n");
+  EXPECT_EQ(Complaint([&] { ParseLog(csv, &columns, "own.csv"); }),
+            "own.csv: row 20001: a: expected at most 10000 pieces, got more");
+}
+
 TEST(MachineLog, BadColumnFilesGetOneLineWithThePlace) {
   const std::string good = "time = \"t\"\nangle1 = \"a\"\nangle2 = \"b\"\n";
   EXPECT_EQ(ComplaintAboutColumns("time = \"t\"\nangle1 = \"a\"\n"),
