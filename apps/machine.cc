@@ -77,7 +77,7 @@ void AddMachine(CommandLine& line) {
   line.Flag("--json", a.as_json, "print JSON instead of text");
   line.Footer(
       "check prints a line for each finding. A note is a fact, such as the rate. A warning\n"
-      "needs a look. A fault misleads whoever uses the log as it is: degrees, swapped columns,\n"
+      "needs a look. A fault misleads an analysis of the log: degrees, swapped columns,\n"
       "a stuck encoder. Exit code: 0 without a fault, 1 with one, 2 if a log cannot be read.\n\n"
       "A file of columns:\n"
       "  time = {column = \"t\", unit = \"ms\"}         # s, ms, us\n"
