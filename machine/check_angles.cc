@@ -72,15 +72,17 @@ std::vector<Repeat> RepeatsOf(Pieces pieces, int joint) {
   return repeats;
 }
 
-/// Whether a joint stops or starts more suddenly than a motor can make it.
-bool IsSudden(const Repeat& repeat) {
+/// Whether a joint stops or starts more suddenly than a motor can make it, and by more than a few
+/// steps of the encoder.
+bool IsSudden(const Repeat& repeat, double quantum) {
   constexpr double kSpeed = 0.5, kAcceleration = 300;  // rad/s, rad/s²
   const double speed = std::max(std::abs(repeat.entry), std::abs(repeat.exit));
-  return speed > kSpeed && speed > kAcceleration * repeat.step;
+  return speed > kSpeed && speed > kAcceleration * repeat.step &&
+         speed * repeat.step > 4.5 * quantum;
 }
 
 /// Finds repeats within motion: at the end of the range the encoder saturates, elsewhere it sticks.
-void CheckRepeats(Pieces pieces, int joint, Findings& findings) {
+void CheckRepeats(Pieces pieces, int joint, double quantum, Findings& findings) {
   double low = 0, high = 0;
   for (const MachineLog& piece : pieces) {
     for (const Joints& q : piece.angle) {
@@ -92,7 +94,7 @@ void CheckRepeats(Pieces pieces, int joint, Findings& findings) {
   int count[2] = {};
   const std::vector<Repeat> repeats = RepeatsOf(pieces, joint);
   for (const Repeat& repeat : repeats) {
-    if (!IsSudden(repeat)) continue;
+    if (!IsSudden(repeat, quantum)) continue;
     const double q = repeat.piece->angle[repeat.first][joint];
     const int stuck = std::abs(q) > std::numbers::pi && (q == low || q == high) ? 0 : 1;
     ++count[stuck];
@@ -205,7 +207,8 @@ void CheckGrowth(const MachineLog& piece, Findings& findings) {
 
 void CheckAngles(Pieces pieces, Findings& findings) {
   for (const int joint : {0, 1}) {
-    if (const auto quantum = QuantumOf(pieces, joint)) {
+    const std::optional<double> quantum = QuantumOf(pieces, joint);
+    if (quantum) {
       findings.push_back({Aspect::kAngle,
                           joint + 1,
                           Severity::kNote,
@@ -214,7 +217,7 @@ void CheckAngles(Pieces pieces, Findings& findings) {
                           {},
                           {{"quantum", *quantum}}});
     }
-    CheckRepeats(pieces, joint, findings);
+    CheckRepeats(pieces, joint, quantum.value_or(0), findings);
     CheckSpeeds(pieces, joint, findings);
   }
 }

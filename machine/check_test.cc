@@ -245,15 +245,29 @@ TEST(MachineCheck, StuckEncoder) {
       "does not move although joint 1 does", Severity::kWarning);
 }
 
+TEST(MachineCheck, ACoarseEncoderDoesNotStick) {
+  MachineLog log = GoodLog();
+  log.velocity.clear();
+  const double quantum = 2 * std::numbers::pi / 256;
+  for (Joints& q : log.angle) {
+    for (double& angle : q) angle = quantum * std::round(angle / quantum);
+  }
+  for (const Finding& f : Check(log)) EXPECT_EQ(f.severity, Severity::kNote) << f.text;
+}
+
 TEST(MachineCheck, SaturatedSensors) {
   const Finding angle = OnlyFinding(
       [](MachineLog& log) {  // turns on and on until the encoder's end
         log.velocity.clear();
-        for (int k = 0; k < log.rows(); ++k) log.angle[k][0] = std::min(12.5, 5 * log.time[k]);
+        for (int k = 0; k < log.rows(); ++k) {
+          const double t = log.time[k];
+          log.angle[k][0] = std::min(12.5, 5 * t + 0.1 * std::sin(std::numbers::pi * t));
+        }
       },
       "saturates at 12.5 rad");
   ASSERT_TRUE(angle.rows);
-  EXPECT_EQ(angle.rows->first, 1251);
+  EXPECT_NEAR(angle.rows->begin, 2.48, 0.1);
+  EXPECT_EQ(angle.rows->last, 5000);
   const Finding velocity = OnlyFinding(
       [](MachineLog& log) {
         for (Joints& v : log.velocity) v[1] = std::clamp(v[1], -3.7, 3.7);
