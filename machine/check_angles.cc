@@ -32,7 +32,7 @@ std::optional<double> QuantumOf(Pieces pieces, int joint) {
     const double ratio = step / quantum;
     if (ratio > 20) continue;
     near += 1;
-    multiples += std::abs(ratio - std::round(ratio)) < 0.05;
+    multiples += std::abs(ratio - std::round(ratio)) < 0.02;
   }
   if (near < 6 || multiples < 0.95 * near) return {};
   return quantum;
