@@ -42,8 +42,8 @@ std::optional<double> QuantumOf(Pieces pieces, int joint) {
 struct Repeat {
   const MachineLog* piece;
   int first, last;     // row indices
-  double entry, exit;  // speeds just before and after, rad/s; 0 at the ends of the piece
-  double step;         // shorter cycle before or after, s
+  double entry, exit;  // |changes of speed| at both ends, rad/s per cycle; 0 at the piece's ends
+  double step;         // its first cycle, s
 };
 
 /// All repeats of at least five rows.
@@ -51,9 +51,11 @@ std::vector<Repeat> RepeatsOf(Pieces pieces, int joint) {
   constexpr int kRows = 5;
   std::vector<Repeat> repeats;
   for (const MachineLog& piece : pieces) {
-    const auto difference = [&](int k) {  // from row k - 1 to row k, rad/s
+    const auto difference = [&](int k) {  // |speed| from row k - 1 to row k, rad/s
+      if (k < 1 || k >= piece.rows()) return 0.0;
       const double seconds = piece.time[k] - piece.time[k - 1];
-      return seconds > 0 ? (piece.angle[k][joint] - piece.angle[k - 1][joint]) / seconds : 0;
+      const double change = std::abs(piece.angle[k][joint] - piece.angle[k - 1][joint]);
+      return seconds > 0 ? change / seconds : 0;
     };
     for (int first = 0; first < piece.rows();) {
       int last = first;
@@ -61,9 +63,10 @@ std::vector<Repeat> RepeatsOf(Pieces pieces, int joint) {
         ++last;
       }
       if (last - first + 1 >= kRows) {
-        const bool ends = last + 1 == piece.rows();
-        repeats.push_back({&piece, first, last, first > 0 ? difference(first) : 0,
-                           ends ? 0 : difference(last + 1),
+        // The change of speed may fall into two cycles.
+        repeats.push_back({&piece, first, last,
+                           std::max(difference(first), difference(first - 1) / 2),
+                           std::max(difference(last + 1), difference(last + 2) / 2),
                            piece.time[first + 1] - piece.time[first]});
       }
       first = last + 1;
@@ -76,7 +79,7 @@ std::vector<Repeat> RepeatsOf(Pieces pieces, int joint) {
 /// steps of the encoder.
 bool IsSudden(const Repeat& repeat, double quantum) {
   constexpr double kSpeed = 0.5, kAcceleration = 300;  // rad/s, rad/s²
-  const double speed = std::max(std::abs(repeat.entry), std::abs(repeat.exit));
+  const double speed = std::max(repeat.entry, repeat.exit);
   return speed > kSpeed && speed > kAcceleration * repeat.step &&
          speed * repeat.step > 4.5 * quantum;
 }
