@@ -144,10 +144,9 @@ void PrintHardware(const HardwareReport& report) {
 }
 
 int ScoreLogs(const RealAiGymArguments& a) {
-  std::optional<Robot> robot;
-  for (const FlagValue& flag : a.search) {
-    if (flag.name == "robot") robot = RobotNamed(flag.text);
-  }
+  BoardSearchConfig config;  // has --robot
+  SetFlags(OptionsOf(config), a.search);
+  const std::optional<Robot> robot = a.search.empty() ? std::nullopt : RobotNamed(config.robot);
   std::vector<MachineLog> logs;
   for (const std::string& file : a.hardware) {
     for (MachineLog& log : ReadLog(file)) logs.push_back(std::move(log));
