@@ -78,10 +78,10 @@ std::string CaptionOf(const LogCheck& check) {
   for (const Finding& finding : check.findings) {
     if (finding.severity == Severity::kNote) continue;
     const std::string joint = finding.joint > 0 ? Concat(" ", finding.joint) : "";
-    texts.push_back(Concat(NameOf(finding.severity), " of ", NameOf(finding.aspect), joint, ": ",
-                           finding.text));
+    texts.push_back(Concat(NameOf(finding.aspect), joint, ": ", finding.text, " (",
+                           NameOf(finding.severity), ")"));
   }
-  return texts.empty() ? "no warning and no fault" : Join(texts, ". ");
+  return texts.empty() ? "no warning and no fault" : Join(texts, "; ");
 }
 
 }  // namespace
