@@ -73,7 +73,7 @@ void CheckLostCycles(const std::vector<Cycle>& cycles, double median, Findings& 
                       0,
                       share > kMuch ? Severity::kWarning : Severity::kNote,
                       fmt::format("{} ({:.2g}%) lost at {}, longest {:.3g} ms",
-                                  Counted(std::lround(lost), "cycle"), 100 * share,
+                                  Counted(std::lround(std::min(lost, 1e15)), "cycle"), 100 * share,
                                   Counted(places, "place"), 1e3 * longest->seconds),
                       RangeOf(*longest),
                       {{"lost", lost}, {"places", places}}});
