@@ -23,6 +23,7 @@ void AddStudy(CommandLine& line);
 void AddExport(CommandLine& line);
 void AddView(CommandLine& line);
 void AddRealAiGym(CommandLine& line);
+void AddMachine(CommandLine& line);
 
 /// Adds the policy argument (a file, a run folder or a controller) and the controllers' settings.
 void AddPolicy(CommandLine& line, PolicyArguments& a);

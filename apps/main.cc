@@ -18,6 +18,7 @@ constexpr CommandEntry kCommands[] = {
     {"study", "Train variants of the settings, each with many seeds", AddStudy},
     {"export", "Export policies as ONNX or C, or into the page", AddExport},
     {"realaigym", "Score a policy by the rules of RealAIGym, or search for one", AddRealAiGym},
+    {"machine", "Check the logs of a real machine", AddMachine},
     {"bench", "Measure the speed of the program on this machine", nullptr},
     {"demo", "Serve the page in which policies swing up the pendulum live", nullptr},
     {"docs", "Build the documentation, or the whole web site", nullptr},

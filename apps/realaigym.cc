@@ -17,6 +17,7 @@
 #include "io/streams.h"
 #include "io/tensor_file.h"
 #include "realaigym/boards.h"
+#include "realaigym/hardware.h"
 #include "report/figure.h"
 #include "run/find_policy.h"
 
@@ -26,6 +27,7 @@ namespace {
 struct RealAiGymArguments {
   PolicyArguments policy;
   std::string figure, csv, search_out, from;
+  std::vector<std::string> hardware;
   std::vector<FlagValue> search;
   int64_t threads = 0, case_seed = 1;
   bool as_json = false;
@@ -105,12 +107,75 @@ Competitor Search(const RealAiGymArguments& a, ThreadPool& pool) {
   return CompetitorOf(search, a.search_out);
 }
 
+void PrintHardwareRow(const std::string& name, const std::string& success, double seconds,
+                      const std::array<double, 5>& numbers) {
+  fmt::print("  {:<36} {:>7} {:>6} {:>7} {:>7} {:>7} {:>7} {:>6}\n", Shortened(name, 36), success,
+             Cell(seconds, 2), Cell(numbers[0], 2), Cell(numbers[1], 2), Cell(numbers[2], 3),
+             Cell(numbers[3], 1), Cell(numbers[4], 3));
+}
+
+void PrintHardware(const HardwareReport& report) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  const char* pushed = report.pushed ? " with pushes" : "";
+  fmt::print("Runs of RealAIGym's {}{}, hardware, version 2\n", NameOf(report.robot), pushed);
+  fmt::print("  {:<36} {:>7} {:>6} {:>7} {:>7} {:>7} {:>7} {:>6}\n", "", "success", "time",
+             "energy", "cost", "smooth", "speed", "score");
+  fmt::print("  {:<36} {:>7} {:>6} {:>7} {:>7} {:>7} {:>7} {:>6}\n", "", "", "s", "J", "N²m²s",
+             "N·m", "rad²/s", "S");
+  for (const HardwareRun& run : report.runs) {
+    const BoardOutcome& o = run.outcome;
+    PrintHardwareRow(Printable(run.name), o.above_line ? "yes" : "no",
+                     o.above_line ? o.swing_up_seconds : kNone,
+                     {o.energy, o.torque_cost, o.smoothness, o.velocity_cost, run.score});
+  }
+  PrintHardwareRow("mean", fmt::format("{}/{}", report.successes(), report.runs.size()), kNone,
+                   {kNone, kNone, kNone, kNone, report.mean()});
+  fmt::print("  published: measures of the best run, mean score of ten runs\n");
+  for (const HardwareEntry& e : PublishedHardwareEntries(report.robot, report.pushed)) {
+    PrintHardwareRow(e.name, fmt::format("{}/10", e.successes), e.seconds,
+                     {e.energy, e.torque_cost, e.smoothness, e.velocity_cost, e.mean});
+  }
+  for (const HardwareRun& run : report.runs) {
+    if (run.outcome.above_line) continue;
+    fmt::print("  {}: {} after {:.2f} s\n", Printable(run.name),
+               run.seconds < kHardwareSeconds ? "the run ends" : "the tip is not above 0.45 m",
+               run.seconds);
+  }
+}
+
+int ScoreLogs(const RealAiGymArguments& a) {
+  BoardSearchConfig config;  // has --robot
+  SetFlags(OptionsOf(config), a.search);
+  const std::optional<Robot> robot = a.search.empty() ? std::nullopt : RobotNamed(config.robot);
+  std::vector<MachineLog> logs;
+  for (const std::string& file : a.hardware) {
+    for (MachineLog& log : ReadLog(file)) logs.push_back(std::move(log));
+  }
+  const HardwareReport report = ScoreHardware(logs, robot);
+  if (a.as_json) {
+    fmt::print("{}\n", HardwareJson(report));
+  } else {
+    PrintHardware(report);
+  }
+  return 0;
+}
+
 int RunRealAiGym(const RealAiGymArguments& a) {
+  if (!a.hardware.empty()) {
+    const bool own_flags =
+        std::ranges::all_of(a.search, [](const FlagValue& flag) { return flag.name == "robot"; });
+    if (own_flags && a.policy.empty() && a.search_out.empty() && a.from.empty() &&
+        a.figure.empty() && a.csv.empty()) {
+      return ScoreLogs(a);
+    }
+    throw BadInput("--hardware: expected only --robot and --json with it");
+  }
   const bool searches = !a.search_out.empty();
   if (searches == !a.policy.empty()) {
     throw BadInput(searches
                        ? "--search: expected no policy with it"
-                       : "realaigym: expected a policy to score or --search FILE, got neither");
+                       : "realaigym: expected a policy to score, --search FILE or --hardware LOG, "
+                         "got none");
   }
   if (IsStandardStream(a.search_out)) throw BadInput("--search: expected a file, got -");
   if (!searches && !a.from.empty())
@@ -167,6 +232,8 @@ void AddRealAiGym(CommandLine& line) {
   line.Text("--search", a.search_out, "FILE",
             "policy file to write: search a policy, then score it");
   line.Text("--from", a.from, "FILE", "policy that the search starts from (default a random one)");
+  line.Texts("--hardware", a.hardware, "LOG",
+             "logs of runs on the real robot to score by the hardware rules, .csv or .csv.gz");
   line.Text("--figure", a.figure, "FILE", "figure of the robustness score to draw, .svg or .png");
   line.Text("--csv", a.csv, "FILE",
             "CSV file to write, the motion in the format of RealAIGym; -: standard output, without "
@@ -185,14 +252,17 @@ void AddRealAiGym(CommandLine& line) {
       "friction, at 500 Hz. Robustness: 722 simulations with model errors, noise on\n"
       "velocities and torque, a motor that responds too little or too much, delay and\n"
       "pushes; each score is the share of simulations that end upright. A policy with a\n"
-      "longer control period keeps its period. All results are simulated.\n\n"
+      "longer control period keeps its period. These results are simulated.\n\n"
+      "--hardware scores logs of the real robot. The joint with more torque has the motor,\n"
+      "unless --robot names the robot. A log with tau_pert belongs to the board with pushes.\n\n"
       "Examples:\n"
       "  ./upswing realaigym --search pendubot.safetensors         takes some minutes\n"
       "  ./upswing realaigym pendubot.safetensors --figure rows.svg\n"
       "  ./upswing realaigym --search better.safetensors --from pendubot.safetensors\n"
       "  ./upswing realaigym --search acrobot.safetensors --robot acrobot --seed 2\n"
       "  ./upswing realaigym pendubot.safetensors --csv sim_swingup.csv --json\n"
-      "  ./upswing realaigym baseline-lqr              the regulator of the baselines\n");
+      "  ./upswing realaigym baseline-lqr              the regulator of the baselines\n"
+      "  ./upswing realaigym --hardware run01.csv run02.csv.gz --json\n");
 }
 
 }  // namespace upswing

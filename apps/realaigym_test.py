@@ -13,11 +13,13 @@ from testing import ROOT, UPSWING, ProgramTest, read_tensors, write_tensors
 
 SMALL = ["--starts", 2, "--alone", 8, "--generations", 2, "--first-population", 64, "--population", 4,
          "--hidden", 8]
+SWING_UP = ROOT / "docs/figures/realaigym-pendubot.safetensors"
 POLICY = ROOT / "web/public/agents/fast.safetensors"
 
 
-def score(rows):
-    """The performance score, version 2, of a motion in the boards' format."""
+def score(rows, cost_scale=20, smooth_scale=0.1):
+    """The performance score, version 2, of a motion in the boards' format. The normalisers default
+    to those of the simulation boards."""
     l1, l2 = 0.2, 0.3
     t = [row["time"] for row in rows]
     q = [(row["pos_meas1"], row["pos_meas2"]) for row in rows]
@@ -36,7 +38,8 @@ def score(rows):
         mean = sum(changes) / len(changes)
         smooth += math.sqrt(sum((x - mean) ** 2 for x in changes) / len(changes))
     penalties = [math.tanh(math.pi * x / scale) for x, scale in
-                 ((swing_up, 20), (energy, 60), (cost, 20), (smooth, 0.1), (velocity, 400))]
+                 ((swing_up, 20), (energy, 60), (cost, cost_scale), (smooth, smooth_scale),
+                  (velocity, 400))]
     return 1 - sum(penalties) / 5 if swing_up < t[-1] else 0
 
 
@@ -117,6 +120,47 @@ class RealAIGym(ProgramTest):
         self.assertEqual({row["tau_con1"] for row in rows}, {"0"})
         self.refuse(["realaigym", "p.safetensors", "--robot", "pendubot"], "--robot", "acrobot")
 
+    def test_runs_on_hardware(self):
+        # A simulated motion in the format of a log, once without and once with pushes.
+        text = self.succeed("realaigym", SWING_UP, "--csv", "-")
+        self.write("run.csv", text)
+        rows = [{k: float(x) for k, x in row.items()} for row in csv.DictReader(io.StringIO(text))]
+        lines = text.splitlines()
+        self.write("pushed.csv", "\n".join([lines[0] + ",tau_pert1,tau_pert2"] +
+                                           [line + ",0,0" for line in lines[1:]]))
+        self.write("short.csv", "\n".join(lines[:4000]))
+        self.write("slow.csv", "\n".join(",".join(line.split(",")[:3]) for line in lines))
+
+        def scores(*arguments):
+            return json.loads(self.succeed("realaigym", "--hardware", *arguments, "--json"))
+
+        found = scores("run.csv", "short.csv")
+        self.assertEqual((found["robot"], found["pushed"], found["successes"]),
+                         ("pendubot", False, 1))
+        expected = score(rows, 100, 4)
+        self.assertGreater(expected, 0.5)
+        self.assertAlmostEqual(found["runs"][0]["score"], expected, delta=1e-9)
+        self.assertEqual(found["runs"][1]["score"], 0)
+        self.assertAlmostEqual(found["mean_score"], expected / 2, delta=1e-9)
+        # The acrobot's board with pushes has other normalisers.
+        self.assertAlmostEqual(scores("pushed.csv")["mean_score"], expected, delta=1e-9)
+        found = scores("pushed.csv", "--robot", "acrobot")
+        self.assertEqual((found["robot"], found["pushed"]), ("acrobot", True))
+        self.assertAlmostEqual(found["mean_score"], score(rows, 20, 1), delta=1e-9)
+        table = self.succeed("realaigym", "--hardware", "run.csv", "short.csv")
+        self.assertRegex(table, fr"(?m)^  run.csv +yes .* {expected:.3f}$")
+        self.assertRegex(table, r"(?m)^  mean +1/2 ")
+        self.assertRegex(table, r"(?m)^  MC-PILCO +10/10 .* 0\.591$")
+        self.assertIn("  short.csv: the run ends after 8.00 s\n", table)
+
+        refuse = self.refuse
+        refuse(["realaigym", "--hardware", "run.csv", "pushed.csv"], "pushed.csv", "with pushes")
+        refuse(["realaigym", "--hardware", "slow.csv"], "slow.csv", "velocities")
+        refuse(["realaigym", "--hardware", "none.csv"], "none.csv")
+        refuse(["realaigym", "--hardware", "run.csv", "--csv", "x.csv"], "--hardware")
+        refuse(["realaigym", "--hardware", "run.csv", "--robot", "cartpole"], "--robot")
+        refuse(["realaigym", "p.safetensors", "--hardware", "run.csv"], "--hardware")
+
     def test_figure(self):
         self.search("--figure", "rows.svg")
         self.assertIn("delay", (self.folder / "rows.svg").read_text(encoding="utf-8"))
@@ -140,7 +184,7 @@ class RealAIGym(ProgramTest):
     def test_bad_input(self):
         self.search()
         refuse = self.refuse
-        refuse(["realaigym"], "expected a policy to score or --search FILE, got neither")
+        refuse(["realaigym"], "expected a policy to score, --search FILE or --hardware LOG, got none")
         refuse(["realaigym", "p.safetensors", "--search", "q.safetensors"], "--search")
         refuse(["realaigym", "p.safetensors", "--hidden", 8], "--hidden", "--search")
         refuse(["realaigym", "nothing.safetensors"], "nothing.safetensors: no such file")

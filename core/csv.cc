@@ -37,7 +37,27 @@ std::vector<std::string> CellsOf(std::string_view line, const std::string& place
   return cells;
 }
 
+/// Whether the readers ignore this line.
+bool IsIgnored(std::string_view line) { return line.empty() || line.starts_with('#'); }
+
+std::string_view WithoutByteOrderMark(std::string_view text) {
+  constexpr std::string_view kMark = "\xef\xbb\xbf";
+  if (text.starts_with(kMark)) text.remove_prefix(kMark.size());
+  return text;
+}
+
 }  // namespace
+
+std::vector<std::string> CsvNames(std::string_view text, const std::string& where) {
+  text = WithoutByteOrderMark(text);
+  for (int number = 1; !text.empty(); ++number) {
+    const size_t end = std::min(text.find('\n'), text.size());
+    const std::string_view line = Trim(text.substr(0, end));
+    if (!IsIgnored(line)) return CellsOf(line, Concat(where, ":", number, ": "));
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+  return {};
+}
 
 std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::string>& names,
                                const std::string& where) {
@@ -47,11 +67,9 @@ std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::str
   std::vector<size_t> places;  // indices of the wanted columns in a row
   size_t width = 0;            // number of cells in a row; 0 before the line of names
   int line_number = 0;
-  constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
-  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
-  for (const std::string_view line : Split(text, '\n')) {
+  for (const std::string_view line : Split(WithoutByteOrderMark(text), '\n')) {
     ++line_number;
-    if (line.empty() || line.starts_with('#')) continue;
+    if (IsIgnored(line)) continue;
     const std::string place = Concat(where, ":", line_number, ": ");
     const std::vector<std::string> cells = CellsOf(line, place);
     if (width == 0) {

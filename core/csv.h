@@ -27,6 +27,10 @@ struct CsvColumn {
 std::vector<CsvColumn> ReadCsv(std::string_view text, const std::vector<std::string>& names,
                                const std::string& where);
 
+/// The names of the columns: the cells of the first line that ReadCsv does not ignore. Empty without
+/// such a line. Throws BadInput if a quote is not closed.
+std::vector<std::string> CsvNames(std::string_view text, const std::string& where);
+
 /// Builder of a CSV text. The cell names of the first row become the first line of the text.
 class CsvTable {
  public:

@@ -30,6 +30,16 @@ TEST(Csv, AsSpreadsheetsAndLibrariesWriteIt) {
             (std::vector<double>{4}));
 }
 
+TEST(Csv, NamesOfTheColumns) {
+  using Names = std::vector<std::string>;
+  EXPECT_EQ(CsvNames("\xef\xbb\xbf# by hand\r\n\n \"a\", b\r\n1,2\n", "t.csv"),
+            (Names{"a", "b"}));
+  EXPECT_EQ(CsvNames("a,,b", "t.csv"), (Names{"a", "", "b"}));
+  EXPECT_EQ(CsvNames("\n# only a comment", "t.csv"), Names());
+  EXPECT_EQ(CsvNames("", "t.csv"), Names());
+  EXPECT_THROW(CsvNames("\"a,b\n", "t.csv"), Error);
+}
+
 /// The error message of ReadCsv when it reads column b of a text.
 std::string Complaint(std::string_view text) {
   try {

@@ -7,6 +7,7 @@
 #include <vector>
 
 /// Logs of machines with two joints, real or simulated: one row for each cycle of the control loop.
+/// docs/reference/machine-log.md describes the files.
 namespace upswing {
 
 /// One number for each joint.
@@ -15,16 +16,49 @@ using Joints = std::array<double, 2>;
 /// A log in SI units. Angles are those of PendulumState: 0 hanging, joint 2 relative to link 1. All
 /// torques act at the joints, after the gears. The vectors have a value for each row, or are empty
 /// if the file does not have the quantity.
+///
+/// In RealAIGym's logs, `time` is the host's clock at the end of each cycle, and the angles of row
+/// k were read when commanded[k-1] was sent.
 struct MachineLog {
-  std::string name;  // of the file, for messages
-  std::vector<double> time;        // clock at the end of the cycle, s
-  std::vector<Joints> angle;       // rad, never empty
-  std::vector<Joints> velocity;    // rad/s
-  std::vector<Joints> commanded;   // sent to the motors in this cycle, before clipping, N·m
-  std::vector<Joints> measured;    // from the motors' currents, N·m
-  std::vector<Joints> push;        // added to the commanded torque after clipping, N·m
+  std::string name;               // of the file (and piece), for messages
+  int first_row = 1;              // number of the first row in the file, from 1
+  std::vector<double> time;       // clock at the end of the cycle, s; never decreases
+  std::vector<Joints> angle;      // rad, never empty
+  std::vector<Joints> velocity;   // rad/s
+  std::vector<Joints> commanded;  // sent to the motors in this cycle, before clipping, N·m
+  std::vector<Joints> measured;   // from the motors' currents, N·m
+  std::vector<Joints> push;       // added to the commanded torque after clipping, N·m
 
   int rows() const { return static_cast<int>(time.size()); }
 };
+
+/// A column of a file and its unit.
+struct LogColumn {
+  std::string name;  // empty: the file lacks the quantity
+  double scale = 1;  // SI units in the file's unit
+};
+
+/// The columns of a log file, by quantity and joint.
+struct LogColumns {
+  LogColumn time;
+  std::array<LogColumn, 2> angle, velocity, commanded, measured, push;
+  std::string piece;      // column whose value changes where the next piece begins; may be empty
+  bool absolute = false;  // whether angle and velocity of joint 2 are against the vertical
+  double hanging = 0;     // angle that hangs, in the file's unit
+};
+
+/// Parses a TOML text that names the columns of a file. Throws BadInput with `where` and the line.
+LogColumns ParseLogColumns(std::string_view toml, const std::string& where);
+
+/// Parses a CSV text. Without `columns`, the names must be those of RealAIGym's logs. Returns the
+/// pieces, each with at least two rows; most files have a single piece. Throws BadInput with
+/// `where` and the line or row.
+std::vector<MachineLog> ParseLog(std::string_view csv, const LogColumns* columns,
+                                 const std::string& where);
+
+/// Reads a CSV file, which may be compressed by gzip. `columns` is a TOML file that names its
+/// columns, or empty for the names of RealAIGym. Throws BadInput.
+std::vector<MachineLog> ReadLog(const std::filesystem::path& file,
+                                const std::filesystem::path& columns = {});
 
 }  // namespace upswing

@@ -50,6 +50,18 @@ struct BoardEntry {
 /// The published entries of the simulation boards, version 2, best performance first.
 std::vector<BoardEntry> PublishedEntries(Robot robot);
 
+/// A published entry of a hardware board, version 2. The measures are those of its best run.
+struct HardwareEntry {
+  std::string name;
+  int successes;  // of ten runs
+  double seconds, energy, torque_cost, smoothness, velocity_cost;
+  double best, mean;  // scores of ten runs; a failure counts 0
+};
+
+/// The published entries of the hardware boards, version 2, best mean first. The entries with
+/// pushes are those that were scored with HardwareScales.
+std::vector<HardwareEntry> PublishedHardwareEntries(Robot robot, bool pushed);
+
 /// A competitor's scores.
 struct BoardReport {
   Competitor competitor;

@@ -54,20 +54,21 @@ bool AtGoal(const BoardState& state) {
          std::abs(w2) < kBoardGoalVelocity;
 }
 
-std::array<double, 5> PerformancePenalties(const BoardOutcome& o) {
-  constexpr std::array<double, 5> kScale{20, 60, 20, 0.1, 400};
+std::array<double, 5> PerformancePenalties(const BoardOutcome& o, const ScoreScales& n) {
+  const std::array<double, 5> scales{n.swing_up_seconds, n.energy, n.torque_cost, n.smoothness,
+                                     n.velocity_cost};
   const std::array<double, 5> costs{o.swing_up_seconds, o.energy, o.torque_cost, o.smoothness,
                                     o.velocity_cost};
   std::array<double, 5> penalties;
   for (size_t i = 0; i < 5; ++i) {
-    penalties[i] = std::tanh(std::numbers::pi * costs[i] / kScale[i]);
+    penalties[i] = std::tanh(std::numbers::pi * costs[i] / scales[i]);
   }
   return penalties;
 }
 
-double PerformanceScore(const BoardOutcome& outcome) {
+double PerformanceScore(const BoardOutcome& outcome, const ScoreScales& scales) {
   if (!outcome.above_line) return 0;
-  const auto penalties = PerformancePenalties(outcome);
+  const auto penalties = PerformancePenalties(outcome, scales);
   return 1 - std::accumulate(penalties.begin(), penalties.end(), 0.0) / 5;
 }
 

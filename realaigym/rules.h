@@ -62,11 +62,22 @@ struct BoardOutcome {
   double nearest = 0;        // largest closeness to the goal, 0 to 1
 };
 
+/// The normaliser n of each measure c in the performance score, whose penalties are tanh(π c/n).
+/// The defaults are those of the simulation boards.
+struct ScoreScales {
+  double swing_up_seconds = 20;  // s
+  double energy = 60;            // J
+  double torque_cost = 20;       // N²m²s
+  double smoothness = 0.1;       // N·m
+  double velocity_cost = 400;    // rad²/s
+};
+
 /// The performance score, version 2, from 0 to 1.
-double PerformanceScore(const BoardOutcome& outcome);
+double PerformanceScore(const BoardOutcome& outcome, const ScoreScales& scales = {});
 /// The five penalties of the performance score, each from 0 to 1: time, energy, torque cost,
 /// smoothness, velocity cost.
-std::array<double, 5> PerformancePenalties(const BoardOutcome& outcome);
+std::array<double, 5> PerformancePenalties(const BoardOutcome& outcome,
+                                           const ScoreScales& scales = {});
 
 /// The rows of the robustness score.
 enum class RobustnessRow { kModel, kVelocityNoise, kTorqueNoise, kResponse, kDelay, kPush };

@@ -13,7 +13,7 @@ from pathlib import Path
 # Layers that must not need an operating system.
 PORTABLE = {"core", "nn", "sim", "rl", "control", "setup"}
 BELOW_RUN = PORTABLE | {"io", "mujoco"}
-LIBRARIES = BELOW_RUN | {"report", "realaigym", "run", "study", "judge", "export", "view"}
+LIBRARIES = BELOW_RUN | {"report", "machine", "realaigym", "run", "study", "judge", "export", "view"}
 
 # Folders that each folder may include, besides itself.
 LAYERS = {
@@ -27,7 +27,8 @@ LAYERS = {
     "report": {"io", "core"},
     "setup": PORTABLE - {"setup"},
     "run": BELOW_RUN,
-    "realaigym": BELOW_RUN | {"run", "report"},
+    "machine": BELOW_RUN | {"run", "report"},
+    "realaigym": BELOW_RUN | {"run", "report", "machine"},
     "study": BELOW_RUN | {"run"},
     "judge": BELOW_RUN | {"run", "study", "report"},
     "export": BELOW_RUN | {"run", "report"},
@@ -44,7 +45,7 @@ LAYERS = {
 ALLOWED_FILES = {
     "mujoco": re.compile(r"mujoco/"),
     "GLFW": re.compile(r"mujoco/window\.cc$"),
-    "zlib.h": re.compile(r"io/png\.cc$"),
+    "zlib.h": re.compile(r"io/(png\.cc|gzip(_test)?\.cc)$"),
     "google": re.compile(r"io/"),
     "nanobind": re.compile(r"python/"),
     "hwy": re.compile(r"(core/simd(_test)?|nn/(linear|product|registers-inl)|bench/roofline|"

@@ -36,7 +36,7 @@ LAYERS = {
     "core": "Contracts and basics", "nn": "Networks", "sim": "Tasks", "rl": "Learning",
     "control": "Controllers", "io": "Files and processes", "mujoco": "MuJoCo",
     "report": "Statistics and figures", "setup": "Settings and named agents",
-    "realaigym": "RealAIGym", "run": "Runs on disk", "study": "Studies", "judge": "Evaluation",
+    "machine": "Logs of machines", "realaigym": "RealAIGym", "run": "Runs on disk", "study": "Studies", "judge": "Evaluation",
     "export": "Export", "view": "Films and pictures"}
 
 

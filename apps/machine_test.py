@@ -1,0 +1,180 @@
+#!/usr/bin/env python3
+"""Tests of `upswing machine`: the check of logs."""
+
+import gzip
+import json
+import math
+import os
+import unittest
+from pathlib import Path
+
+from testing import ROOT, ProgramTest
+
+REAL = Path(os.environ.get("UPSWING_REAL", ROOT / "../shared/real"))
+NAMES = ["time", "pos_meas1", "pos_meas2", "vel_meas1", "vel_meas2", "tau_con1", "tau_con2",
+         "tau_meas1", "tau_meas2"]
+
+
+def rows():
+    """A log of 4 s at 500 Hz without faults, as rows of numbers."""
+    def command(t):
+        return math.sin(11 * t) + math.sin(2 * t * t), math.cos(13 * t + t * t)
+
+    for k in range(2000):
+        t = 0.002 * k
+        before = command(max(0, t - 0.004))
+        yield [t, 1.2 * math.sin(3 * t), 0.8 * math.sin(5 * t),
+               3.6 * math.cos(3 * t) + 0.01 * (-1) ** k, 4 * math.cos(5 * t) + 0.01 * (-1) ** k,
+               *command(t), 0.95 * before[0], 0.95 * before[1]]
+
+
+def log(change=lambda k, row: row, names=NAMES):
+    """The text of a log in which `change` made each row from row number k."""
+    lines = [",".join(names)]
+    lines += [",".join(map(str, change(k, row))) for k, row in enumerate(rows(), 1)]
+    return "\n".join(lines) + "\n"
+
+
+def scaled(**factors):
+    """A change that multiplies columns by factors."""
+    return lambda k, row: [x * factors.get(name, 1) for name, x in zip(NAMES, row)]
+
+
+class Machine(ProgramTest):
+    def faults(self, text, *more):
+        """Checks a log, and returns its faults as {aspect and joint: text}."""
+        done = self.run_here("machine", "check", self.write("log.csv", text), "--json", *more)
+        self.assertEqual(done.stderr, "")
+        found = json.loads(done.stdout)["logs"][0]
+        faults = {f"{f['aspect']} {f.get('joint', '')}".strip(): f["text"]
+                  for f in found["findings"] if f["severity"] == "fault"}
+        self.assertEqual(done.returncode, 1 if faults else 0)
+        self.assertEqual(found["faulty"], bool(faults))
+        return faults
+
+    def test_a_good_log(self):
+        self.assertEqual(self.faults(log()), {})
+        text = self.succeed("machine", "check", "log.csv")
+        self.assertIn("log.csv: 2000 rows, 4.00 s\n", text)
+        self.assertIn("  note     clock       500 Hz, cycles of 2 ms", text)
+        self.assertIn("  note     torque 1    measured follows commanded after 2 rows and a lag of 0 "
+                      "ms, gain 0.95, correlation 1.000\n", text)
+        with gzip.open(self.folder / "log.csv.gz", "wb") as file:
+            file.write((self.folder / "log.csv").read_bytes())
+        self.assertEqual(self.succeed("machine", "check", "log.csv.gz"),
+                         text.replace("log.csv:", "log.csv.gz:"))
+        both = json.loads(self.succeed("machine", "check", "log.csv", "log.csv.gz", "--json"))
+        self.assertEqual([found["name"] for found in both["logs"]], ["log.csv", "log.csv.gz"])
+
+    def test_faults(self):
+        degrees = 180 / math.pi
+
+        def late(k, row):
+            return [row[0] + (1 if k > 500 else 0)] + row[1:]
+
+        def swapped(k, row):
+            return row[:3] + [row[4], row[3]] + row[5:]
+
+        def stuck(k, row):
+            return row[:2] + [0.8 * math.sin(5 * 1.8)] + row[3:] if 900 <= k < 950 else row
+
+        for change, expected in (
+                (late, {"clock": "a gap of 1.002 s"}),
+                (swapped, {"velocity 1": "follows the angle of joint 2: suspect swapped columns",
+                           "velocity 2": "follows the angle of joint 1: suspect swapped columns"}),
+                (stuck, {"angle 2": "the encoder sticks at 0.3297 rad while the joint moves"}),
+                (scaled(pos_meas1=degrees, vel_meas1=degrees),
+                 {"angle 1": "moves at 206.2 rad/s: suspect degrees"}),
+                (scaled(vel_meas2=degrees),
+                 {"velocity 2": "57.3 times the change of the angle: suspect velocities in deg/s"}),
+                (scaled(vel_meas2=-1),
+                 {"velocity 2": "-1 times the change of the angle: opposite sign"}),
+                (scaled(tau_meas1=1000),
+                 {"torque 1": "measured 950 times commanded: suspect measured torque in mN·m"})):
+            self.assertEqual(self.faults(log(change)), expected)
+
+    def test_own_columns(self):
+        self.write("columns.toml", """
+            time = {column = "t", unit = "ms"}
+            angle1 = {column = "a", unit = "deg"}
+            angle2 = {column = "b", unit = "deg"}
+            absolute = true
+            hanging = 180
+            piece = "part"
+        """)
+
+        def own(k, row):
+            a = 180 + math.degrees(row[1])
+            return [k // 1001, 1000 * row[0], a, a + math.degrees(row[2])]
+
+        text = log(own, ["part", "t", "a", "b"])
+        self.assertEqual(self.faults(text, "--columns", "columns.toml"), {})
+        shown = self.succeed("machine", "check", "log.csv", "--columns", "columns.toml")
+        self.assertIn("log.csv: 2000 rows, 4.00 s in 2 pieces\n", shown)
+        # The same file with other columns, and the columns of RealAIGym.
+        self.refuse(["machine", "check", "log.csv"], "log.csv", "--columns", "pos_meas1")
+        self.write("other.toml", "time = 't'\nangle1 = 'a'\nangle2 = 'c'\n")
+        self.refuse(["machine", "check", "log.csv", "--columns", "other.toml"], "log.csv:1", '"c"')
+        self.write("wrong.toml", "time = 't'\nangel1 = 'a'\n")
+        self.refuse(["machine", "check", "log.csv", "--columns", "wrong.toml"], "wrong.toml:2",
+                    "did you mean angle1?")
+
+    def test_figure(self):
+        self.write("log.csv", log(scaled(vel_meas2=-1)))
+        done = self.run_here("machine", "check", "log.csv", "--figure", "log.svg")
+        self.assertEqual((done.returncode, done.stderr), (1, ""))
+        self.assertIn("written log.svg\n", done.stdout)
+        figure = (self.folder / "log.svg").read_text(encoding="utf-8")
+        for text in ("angles", "velocities", "torques", "cycles", "opposite sign"):
+            self.assertIn(text, figure)
+
+    def test_bad_input(self):
+        def with_cell(number, column, cell):
+            return log(lambda k, row: row[:column] + [cell] + row[column + 1:] if k == number else row)
+
+        refuse = self.refuse
+        good = self.write("log.csv", log())
+        for text, *words in (
+                (with_cell(7, 1, "nan"), "bad.csv:8: pos_meas1", "finite number", '"nan"'),
+                (with_cell(7, 1, ""), "bad.csv:8: pos_meas1", "finite number", '""'),
+                (with_cell(7, 6, "inf"), "bad.csv:8: tau_con2", '"inf"'),
+                (with_cell(7, 6, "x"), "bad.csv:8: tau_con2", '"x"'),
+                (with_cell(7, 6, "1,2"), "bad.csv:8", "expected 9 columns, got 10"),
+                (with_cell(7, 0, "0.001"), "bad.csv: row 7: time", "at least 0.01 s", "0.001 s"),
+                (with_cell(7, 2, "1e30"), "bad.csv: row 7: pos_meas2", "1e+30"),
+                (log(names=["t", *NAMES[1:]]), "bad.csv", "time"),
+                (log(names=[*NAMES[:2], "pos", *NAMES[3:]]), "bad.csv:1", '"pos_meas2"'),
+                (",".join(NAMES) + "\n", "bad.csv", "at least 2 rows, got 0"),
+                ("", "bad.csv")):
+            refuse(["machine", "check", self.write("bad.csv", text)], *words)
+        (self.folder / "cut.csv.gz").write_bytes(gzip.compress(log().encode())[:5000])
+        refuse(["machine", "check", "cut.csv.gz"], "cut.csv.gz", "only its beginning")
+        bomb = gzip.compress(b"time,pos1,pos2\n" + b"0,0,0\n" * 12_000_000)
+        (self.folder / "bomb.csv.gz").write_bytes(bomb)
+        self.assertLess(len(bomb), 1_000_000)
+        refuse(["machine", "check", "bomb.csv.gz"], "bomb.csv.gz", "67108864", "decompression")
+        refuse(["machine", "check", "none.csv"], "none.csv", "No such file")
+        refuse(["machine", "check", "."], "folder")
+        refuse(["machine", "check"], "expected a log, got none")
+        refuse(["machine", "polish", good], "action check", '"polish"')
+        refuse(["machine"], "expected ACTION", "got none")
+        refuse(["machine", "check", good, good, "--figure", "log.svg"], "--figure", "got 2")
+        refuse(["machine", "check", good, "--figure", "log.txt"], "log.txt")
+        refuse(["machine", "check", good, "--figure", "no/log.svg"], "--figure", "no")
+
+    @unittest.skipUnless((REAL / "C.1").is_dir(), "no measured data in UPSWING_REAL")
+    def test_measured_logs(self):
+        text = self.succeed("machine", "check", REAL / "C.1/sysid/20230629-143906.csv.gz")
+        self.assertIn("exactly the backward difference", text)
+        self.assertIn("steps of 0.000381 rad (16471 per turn)", text)
+        self.assertIn("  warning  motion 2    does not move although joint 1 does", text)
+        runs = sorted((REAL / "C.1/swingup").glob("pendubot-tvlqr-*.csv.gz"))
+        table = self.succeed("realaigym", "--hardware", *runs)
+        self.assertRegex(table, r"  mean +3/5 .* 0\.130\n")
+        self.assertRegex(table, r"  TVLQR +8/10 .* 0\.175\n")
+        scores = json.loads(self.succeed("realaigym", "--hardware", *runs, "--json"))
+        self.assertAlmostEqual(scores["runs"][1]["score"], 0.21401097079397924, delta=1e-9)
+
+
+if __name__ == "__main__":
+    unittest.main()

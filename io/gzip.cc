@@ -1,0 +1,64 @@
+#include "io/gzip.h"
+
+#include <zlib.h>
+
+#include <array>
+
+#include "core/error.h"
+
+namespace upswing {
+namespace {
+
+/// zlib's state for inflating gzip members.
+class Inflater {
+ public:
+  explicit Inflater(std::string_view bytes) {
+    stream_.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
+    stream_.avail_in = static_cast<uInt>(bytes.size());
+    constexpr int kGzipOnly = 16;  // expects a header of gzip, not of zlib
+    if (inflateInit2(&stream_, MAX_WBITS + kGzipOnly) != Z_OK) throw Failure("zlib does not work");
+  }
+  ~Inflater() { inflateEnd(&stream_); }
+  Inflater(const Inflater&) = delete;
+  Inflater& operator=(const Inflater&) = delete;
+
+  /// Appends the next piece of text. Returns zlib's status.
+  int Next(std::string& text) {
+    stream_.next_out = reinterpret_cast<Bytef*>(buffer_.data());
+    stream_.avail_out = static_cast<uInt>(buffer_.size());
+    const int status = inflate(&stream_, Z_NO_FLUSH);
+    text.append(buffer_.data(), buffer_.size() - stream_.avail_out);
+    return status;
+  }
+  bool at_end() const { return stream_.avail_in == 0; }
+  void NextMember() { inflateReset(&stream_); }
+
+ private:
+  z_stream stream_{};
+  std::array<char, 65536> buffer_{};
+};
+
+}  // namespace
+
+bool IsGzip(std::string_view bytes) { return bytes.starts_with("\x1f\x8b"); }
+
+std::string Gunzip(std::string_view bytes, const std::string& where, size_t most_bytes) {
+  Inflater inflater(bytes);
+  std::string text;
+  while (true) {
+    const int status = inflater.Next(text);
+    if (text.size() > most_bytes) {
+      throw BadInput(Concat("cannot read ", where, ": expected at most ", most_bytes,
+                            " bytes after decompression, got more"));
+    }
+    if (status == Z_STREAM_END) {
+      if (inflater.at_end()) return text;
+      inflater.NextMember();
+    } else if (status != Z_OK) {
+      throw BadInput(Concat("cannot read ", where, ": expected a gzip file, got ",
+                            inflater.at_end() ? "only its beginning" : "a damaged one"));
+    }
+  }
+}
+
+}  // namespace upswing

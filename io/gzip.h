@@ -1,0 +1,18 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "io/file.h"
+
+namespace upswing {
+
+/// Whether the bytes begin as a gzip file does.
+bool IsGzip(std::string_view bytes);
+
+/// Inflates a gzip file, which may have several members. Stops as soon as the text is larger than
+/// `most_bytes`. Throws BadInput, with `where` (a path), for a damaged or a larger file.
+std::string Gunzip(std::string_view bytes, const std::string& where,
+                   size_t most_bytes = kMostTextBytes);
+
+}  // namespace upswing

@@ -1,0 +1,75 @@
+#include "io/gzip.h"
+
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include "core/error.h"
+
+namespace upswing {
+namespace {
+
+/// Compresses a text as the program gzip does.
+std::string Gzip(const std::string& text) {
+  z_stream stream{};
+  EXPECT_EQ(deflateInit2(&stream, 9, Z_DEFLATED, MAX_WBITS + 16, 9, Z_DEFAULT_STRATEGY), Z_OK);
+  std::string out(deflateBound(&stream, text.size()), '\0');
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(text.data()));
+  stream.avail_in = static_cast<uInt>(text.size());
+  stream.next_out = reinterpret_cast<Bytef*>(out.data());
+  stream.avail_out = static_cast<uInt>(out.size());
+  EXPECT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
+  out.resize(stream.total_out);
+  deflateEnd(&stream);
+  return out;
+}
+
+/// A text larger than the inflater's buffer.
+std::string LongText() {
+  std::string text;
+  for (int i = 0; i < 40000; ++i) text += std::to_string(i * 7919 % 10007) + ",";
+  return text;
+}
+
+TEST(Gzip, InflatesWhatWasCompressed) {
+  for (const std::string& text : {std::string(), std::string("time,pos1\n0,1\n"), LongText()}) {
+    const std::string bytes = Gzip(text);
+    EXPECT_TRUE(IsGzip(bytes));
+    EXPECT_FALSE(IsGzip(text));
+    EXPECT_EQ(Gunzip(bytes, "file"), text);
+    EXPECT_EQ(Gunzip(bytes + Gzip("more"), "file"), text + "more");  // members in a row
+  }
+}
+
+TEST(Gzip, RefusesEveryShorterFile) {
+  const std::string bytes = Gzip("time,pos1\n0,1\n");
+  for (size_t size = 0; size < bytes.size(); ++size) {
+    EXPECT_THROW(Gunzip(bytes.substr(0, size), "file"), Error) << size;
+  }
+}
+
+TEST(Gzip, RefusesDamagedData) {
+  const std::string bytes = Gzip(LongText());
+  for (const size_t place : {size_t{2}, bytes.size() / 2, bytes.size() - 6, bytes.size() - 1}) {
+    std::string damaged = bytes;
+    damaged[place] = static_cast<char>(damaged[place] ^ 0x10);
+    EXPECT_THROW(Gunzip(damaged, "file"), Error) << place;
+  }
+  EXPECT_THROW(Gunzip(bytes + "rest", "file"), Error);
+}
+
+TEST(Gzip, StopsAtTheLimit) {
+  const std::string bytes = Gzip(std::string(10'000'000, 'x'));  // about 10 kB
+  EXPECT_LT(bytes.size(), 20000);
+  EXPECT_EQ(Gunzip(bytes, "file", 10'000'000).size(), 10'000'000);
+  try {
+    Gunzip(bytes, "file", 9'999'999);
+    FAIL() << "expected an error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.exit_code(), 2);
+    EXPECT_STREQ(error.what(),
+                 "cannot read file: expected at most 9999999 bytes after decompression, got more");
+  }
+}
+
+}  // namespace
+}  // namespace upswing
