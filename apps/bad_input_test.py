@@ -268,7 +268,7 @@ class ModelTest(ProgramTest):
     def test_what_the_settings_cannot_express_is_not_silently_changed(self):
         body = '<joint name="b"'
         for text in (MODEL.replace('ctrlrange="-5 5"', 'ctrlrange="-1 5"'),
-                     MODEL.replace(body, '<inertial pos="0 0 -0.25" mass="1" '
+                     MODEL.replace(body, '<inertial pos="0.1 0 -0.25" mass="1" '
                                               'diaginertia="0.1 0.1 0.1"/>' + body)):
             with self.subTest(model=text):
                 self.refuse_model(text, "expected")

@@ -13,6 +13,7 @@
 #include "io/machine.h"
 #include "io/streams.h"
 #include "run/find_policy.h"
+#include "run/plant_file.h"
 #include "setup/controllers.h"
 
 namespace upswing {
@@ -20,6 +21,7 @@ namespace {
 
 struct BoundsArguments {
   BoundsConfig config;
+  std::string plant;  // see ReadPlantFile
   std::vector<std::string> policies;
   std::vector<FlagValue> flags;  // includes the settings of controllers
   std::string csv;
@@ -60,7 +62,20 @@ std::vector<std::string> MadeFor(const BoundsArguments& a) {
                                                        : std::vector<std::string>();
 }
 
-int RunBounds(const BoundsArguments& a) {
+/// The arguments with the settings of the plant file before those of --set. The search knows the
+/// plant and has no sensors, so that it leaves out the file's disturbance.
+BoundsArguments WithPlant(BoundsArguments a) {
+  if (a.plant.empty()) return a;
+  std::vector<std::string> set;
+  for (const FlagValue& flag : ReadPlantFile(a.plant).PlantFlags()) {
+    set.push_back(Concat(flag.name, "=", flag.text));
+  }
+  a.config.trial.set.insert(a.config.trial.set.begin(), set.begin(), set.end());
+  return a;
+}
+
+int RunBounds(const BoundsArguments& arguments) {
+  const BoundsArguments a = WithPlant(arguments);
   if (!a.csv.empty()) CheckWritable("--csv", a.csv);
   // Controllers are designed for the plant of the search.
   const std::vector<LoadedPolicy> policies = GetPolicies(a.policies, {"", a.flags, MadeFor(a)});
@@ -115,6 +130,7 @@ void AddBounds(CommandLine& line) {
   Options own;
   a.config.Describe(own);
   line.Arguments(own);
+  AddPlant(line, a.plant);
   AddSet(line, a.config.trial.set, "change of the plant, such as mass2=1.2");
   AddSeed(line, a.config.trial.seed, "start states");
   AddPhysics(line, a.config.trial.physics);

@@ -2,6 +2,7 @@
 
 #include "core/text.h"
 #include "run/find_policy.h"
+#include "run/plant_file.h"
 #include "setup/arguments.h"
 #include "setup/controllers.h"
 
@@ -17,8 +18,9 @@ void AddPolicy(CommandLine& line, PolicyArguments& a) {
 void AddControllers(CommandLine& line, PolicyArguments& a) {
   const ControllerConfig defaults;
   line.Settings(OptionsOf(defaults), a.flags);
-  line.Repeated("--made-for", a.made_for, "NAME=VALUE",
-                "change of the controller's design plant, such as mass2=1.2 (repeatable)",
+  line.Repeated("--made-for", a.made_for, "NAME=VALUE|FILE",
+                "change of the controller's design plant, such as mass2=1.2, or a plant file as in "
+                "--plant (repeatable)",
                 "controller");
 }
 
@@ -53,6 +55,12 @@ void AddSet(CommandLine& line, std::vector<std::string>& set, const std::string&
   line.Repeated("--set", set, "NAME=VALUE", help + " (repeatable)");
 }
 
+void AddPlant(CommandLine& line, std::string& plant) {
+  line.Text("--plant", plant, "FILE|NAME",
+            Concat("plant file (TOML with a table [plant]) or shipped plant (",
+                   Join(ShippedPlants(), ", "), "), which other flags change"));
+}
+
 void AddUnknownPlant(CommandLine& line, bool& unknown_plant) {
   line.Flag("--unknown-plant", unknown_plant,
             "scale observed energy and height by the training's plant, not the episode's");
@@ -60,6 +68,7 @@ void AddUnknownPlant(CommandLine& line, bool& unknown_plant) {
 
 void AddTrialOptions(CommandLine& line, TrialArguments& a, const std::string& seed_of) {
   AddSeed(line, a.seed, seed_of);
+  AddPlant(line, a.plant);
   AddSet(line, a.set, "change of the plant, such as mass2=1.2");
   line.Text("--model", a.model, "FILE", "MJCF file that replaces the policy's model");
   AddPhysics(line, a.physics);
@@ -67,7 +76,7 @@ void AddTrialOptions(CommandLine& line, TrialArguments& a, const std::string& se
   const TrialConditions defaults;
   line.Settings(OptionsOf(defaults), a.flags);
   // Mistakes on the command line are reported before any file is read.
-  line.Check([&a] { (void)ConditionsOf(a); });
+  line.Check([&a] { (void)ConditionsOf(a.flags); });
 }
 
 void AddEpisodeOptions(CommandLine& line, TrialArguments& a) {

@@ -46,11 +46,14 @@ void AddManyOptions(CommandLine& line, std::string& seeds, int64_t& jobs);
 /// Adds --set, the argument of ApplyChanges.
 void AddSet(CommandLine& line, std::vector<std::string>& set, const std::string& help);
 
+/// Adds --plant, the argument of ReadPlantFile.
+void AddPlant(CommandLine& line, std::string& plant);
+
 /// Adds --unknown-plant: on another plant, observations are still scaled as in training.
 void AddUnknownPlant(CommandLine& line, bool& unknown_plant);
 
-/// Adds --set, --model, --physics, --seed (of `seed_of`), --unknown-plant, and the settings of
-/// Disturbance and Randomization: the conditions of `eval`, `simulate` and `plot`.
+/// Adds --plant, --set, --model, --physics, --seed (of `seed_of`), --unknown-plant, and the
+/// settings of Disturbance and Randomization: the conditions of `eval`, `simulate` and `plot`.
 void AddTrialOptions(CommandLine& line, TrialArguments& a, const std::string& seed_of);
 
 /// Adds --start and --episode: the single episode of `simulate`, `plot` and `view`.

@@ -79,6 +79,7 @@ void AddEval(CommandLine& line) {
       "  ./upswing eval runs/d3qn-seed1\n"
       "  ./upswing eval policy.safetensors --episodes 1000 --seed 7 --json\n"
       "  ./upswing eval runs/d3qn-seed1 --set mass2=1.05 --set gravity=9.7\n"
+      "  ./upswing eval runs/d3qn-seed1 --plant realaigym\n"
       "  ./upswing eval runs/d3qn-seed1 --sensor-noise 0.02 --delay 0.02\n"
       "  ./upswing eval runs/d3qn-seed1 --randomize 0.25 --episodes 1000\n"
       "  ./upswing eval runs/d3qn-seed1 --randomize 0.25 --episodes-csv episodes.csv\n"
@@ -94,8 +95,9 @@ void AddEval(CommandLine& line) {
       "--set takes mass1, mass2, length1, length2, damping1, damping2, gravity,\n"
       "torque_limit, actuated_joint, rotor_inertia, gear_ratio, coulomb1 and coulomb2 (dry "
       "friction),\n"
-      "and mass, length and damping for both links. With --randomize each\n"
-      "episode draws its plant from a box around the nominal one. Observed energy and\n"
+      "center1, center2, inertia1, inertia2, armature, and mass, length and damping for both\n"
+      "links. A plant file of --plant has the same names. With --randomize each episode\n"
+      "draws its plant from a box around the nominal one. Observed energy and\n"
       "height are scaled by the episode's plant, which reveals the plant to the policy.\n"
       "With --unknown-plant they are scaled by the plant of the training.\n",
       kEvaluationSeconds, kHoldSeconds, kReturnSeconds));

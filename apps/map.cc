@@ -123,6 +123,7 @@ void AddMap(CommandLine& line) {
   Options own;
   a.Describe(own);
   line.Arguments(own);
+  AddPlant(line, a.trial.plant);
   AddSet(line, a.trial.set, "value of a quantity on neither axis, such as gravity=9.7");
   AddPhysics(line, a.trial.physics);
   AddUnknownPlant(line, a.trial.unknown_plant);
@@ -135,7 +136,8 @@ void AddMap(CommandLine& line) {
       "Quantities for axes and --set:\n"
       "  plant    mass1, mass2, length1, length2, damping1, damping2 (mass, length,\n"
       "           damping for both links), gravity, torque_limit, actuated_joint (1 or 2),\n"
-      "           rotor_inertia, gear_ratio, coulomb1, coulomb2\n"
+      "           rotor_inertia, gear_ratio, coulomb1, coulomb2, center1, center2,\n"
+      "           inertia1, inertia2, armature\n"
       "  sensors  sensor_noise [rad, rad/s], sensor_latency [s], encoder_counts,\n"
       "           velocity_window [s], velocity_filter [s]\n"
       "  motor    delay [s], in control periods of 0.02 s, one cell each\n"

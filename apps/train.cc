@@ -27,17 +27,24 @@ namespace fs = std::filesystem;
 
 /// The arguments of `train`.
 struct TrainArguments {
-  std::string config, out, resume, seeds;
+  std::string config, plant, out, resume, seeds;
   int64_t jobs = 0;  // 0: one per processor
   bool print_config = false;
   std::vector<FlagValue> flags;
+
+  /// The settings of a new training.
+  Config BuildSettings() const {
+    std::vector<FlagValue> all = flags;
+    if (!plant.empty()) all.push_back({"plant", plant});
+    return BuildConfig(config, all);
+  }
 };
 
 /// Trains one agent with many seeds.
 int RunSeeds(const TrainArguments& arguments) {
   ManyRuns many;
   StudyPlan& plan = many.plan;
-  plan.variants = {{"", BuildConfig(arguments.config, arguments.flags)}};
+  plan.variants = {{"", arguments.BuildSettings()}};
   Config& config = plan.variants.front().config;
   MakeReadyForMany(config);
   many.what = config.agent;
@@ -51,7 +58,7 @@ int RunSeeds(const TrainArguments& arguments) {
 
 /// Prints the settings that the training would use.
 int PrintConfig(const TrainArguments& arguments) {
-  const Config config = arguments.resume.empty() ? BuildConfig(arguments.config, arguments.flags)
+  const Config config = arguments.resume.empty() ? arguments.BuildSettings()
                                                  : ReadRunConfig(arguments.resume, arguments.flags);
   WriteOutput("-", CompleteToml(config));
   return 0;
@@ -62,7 +69,7 @@ int RunTrain(const TrainArguments& arguments) {
   if (!arguments.seeds.empty()) return RunSeeds(arguments);
   // A signal may interrupt the reading of settings; a training instead ends with a checkpoint.
   std::optional<Config> config;
-  if (arguments.resume.empty()) config = BuildConfig(arguments.config, arguments.flags);
+  if (arguments.resume.empty()) config = arguments.BuildSettings();
   InstallSignalHandlers(kStoppingTraining);
   const std::unique_ptr<TrainingRun> run =
       config ? TrainingRun::Make(arguments.out, std::move(*config))
@@ -87,6 +94,9 @@ void ShowChosenDefaults(const CommandLine& line, const CommandLine::ShowOptions&
   // --algorithm without --agent shows the agent with the algorithm's name.
   for (const char* flag : {"--algorithm", "--agent"}) {
     if (const std::string agent = line.Last(flag); !agent.empty()) flags = {{"agent", agent, flag}};
+  }
+  if (const std::string plant = line.Last("--plant"); !plant.empty()) {
+    flags.push_back({"plant", plant});
   }
   const std::string run = line.Last("--resume"),
                     file = line.Last("--config");  // "-": standard input
@@ -117,6 +127,7 @@ void AddTrain(CommandLine& line) {
             "(default runs/AGENT)");
   line.Text("--config", arguments.config, "FILE",
             "TOML file of settings; -: standard input; flags override the file");
+  AddPlant(line, arguments.plant);
   line.Text("--resume", arguments.resume, "RUN",
             "run to resume from its checkpoint; only --steps, --threads, --checkpoint-every and "
             "--stop-when-solved may change; a solved run continues with --no-stop-when-solved");
@@ -133,6 +144,7 @@ void AddTrain(CommandLine& line) {
               "  ./upswing train --agent dqn --seed 3 --out runs/a\n"
               "  ./upswing train --gamma 0.98 --hidden 128,128             set any setting\n"
               "  ./upswing train --mass2 1.2 --no-stop-when-solved --steps 500000\n"
+              "  ./upswing train --plant realaigym --gravity 9.7 --out runs/board\n"
               "  ./upswing train --randomize 0.25 --delay 0.02  draw a plant for each episode\n"
               "  ./upswing train --resume runs/a --no-stop-when-solved --steps 2000000\n"
               "  ./upswing train --agent fast --print-config > my.toml     edit, then --config\n"
@@ -142,10 +154,10 @@ void AddTrain(CommandLine& line) {
               "143. SIGUSR1 writes a checkpoint, and the training continues. Other exit codes:\n"
               "0: done; 1: failed; 2: bad usage or input.\n");
   line.Check([&line] {
-    if (line.Has("--resume") && (line.Has("--out") || line.Has("--config"))) {
-      throw BadInput(
-          "--resume: expected neither --out nor --config with it: the run has its own settings and "
-          "folder");
+    for (const std::string other : {"--out", "--config", "--plant"}) {
+      if (!line.Has("--resume") || !line.Has(other)) continue;
+      throw BadInput(Concat("--resume: expected no ", other,
+                            " with it: the run has its own settings and folder"));
     }
     CheckManyArguments(line);
   });

@@ -267,7 +267,7 @@ std::vector<const Option*> Options::Find(std::string_view name, const std::strin
   }
   if (found.empty()) {
     std::string hint = DidYouMean(name, known);
-    constexpr size_t kMostNames = 30;  // more would make the line unreadable
+    constexpr size_t kMostNames = 40;  // more would make the line unreadable
     if (hint.empty() && known.size() < kMostNames)
       hint = Concat("; expected one of ", Join(known, ", "));
     throw BadInput(Concat(where, ": expected a setting, got \"", name, "\"", hint));

@@ -178,6 +178,10 @@ PageAgent ReadAgent(const fs::path& path, const std::string& given_id, int64_t c
                           ": expected a policy for a plant without rotors and dry friction, as in "
                           "the page, got one with them"));
   }
+  if (loaded.plant.has_own_links() || loaded.plant.armature != kArmature) {
+    throw BadInput(Concat(where, ": expected a policy for links that are solid capsules and an ",
+                          "armature of ", kArmature, " kg·m², as in the page, got others"));
+  }
   const fs::path run = RunOf(loaded.path);
   std::string id = Cleaned(run.filename().string(), '-');
   if (id.empty()) id = Cleaned(loaded.policy->info().agent, '-');

@@ -34,7 +34,7 @@ void CheckComparable(const LoadedPolicy& loaded, const BoundsConfig& config) {
   if (PlantValues(searched) == PlantValues(judged)) return;
   throw BadInput(Concat("bounds: expected a policy for ", PlantText(searched), ", got ",
                         loaded.name, " for ", PlantText(judged),
-                        "; change the plant of the search with --set"));
+                        "; change the plant of the search with --plant or --set"));
 }
 
 EpisodeBounds FindBounds(const BoundsConfig& config, ThreadPool& pool, const Progress& progress) {

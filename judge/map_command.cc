@@ -95,7 +95,8 @@ MapConfig ConfigOf(const MapArguments& a, const LoadedPolicy& loaded,
   TrialArguments trial = a.trial;
   trial.set.clear();  // `set` changes config.point, not the environments
   config.env = TrialEnvironments(trial, &loaded);
-  config.point.plant = loaded.plant;
+  config.point.plant = config.env.plants.front();
+  config.point.disturbance = config.env.disturbance(0);
   config.x = ParseMapAxis(a.x, design.point, "--x");
   config.y = ParseMapAxis(a.y, design.point, "--y");
   CheckDifferent(config.x, config.y);

@@ -11,6 +11,7 @@
 #include "io/run_folder.h"
 #include "mujoco/engines.h"
 #include "run/config_files.h"
+#include "run/plant_file.h"
 #include "setup/task.h"
 
 namespace upswing {
@@ -27,6 +28,7 @@ EnvConfig OtherTask(const TrialArguments& a, const LoadedPolicy& loaded) {
   };
   if (!a.set.empty()) refuse("--set");
   if (!a.model.empty()) refuse("--model");
+  if (!a.plant.empty()) refuse("--plant");
   if (a.unknown_plant) refuse("--unknown-plant");
   if (!a.flags.empty()) refuse(FlagOf(a.flags.front().name));
   EnvConfig env;
@@ -64,9 +66,9 @@ std::vector<double> ParseStart(const std::string& text, const EnvSpec& spec) {
 
 }  // namespace
 
-TrialConditions ConditionsOf(const TrialArguments& a) {
+TrialConditions ConditionsOf(const std::vector<FlagValue>& flags) {
   TrialConditions conditions;
-  SetFlags(OptionsOf(conditions), a.flags);
+  SetFlags(OptionsOf(conditions), flags);
   return conditions;
 }
 
@@ -74,7 +76,18 @@ EnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded)
   EnvConfig env;
   if (loaded != nullptr && !HasPlant(loaded->task)) return OtherTask(a, *loaded);
   env.engine = &FindEngine(a.physics, "--physics");
-  const TrialConditions conditions = ConditionsOf(a);
+  Plant plant = loaded != nullptr ? loaded->plant : Plant();
+  std::vector<FlagValue> flags;
+  if (!a.plant.empty()) {
+    if (!a.model.empty()) {
+      throw BadInput("--plant: expected no --model with it, which has its own plant");
+    }
+    PlantFile file = ReadPlantFile(a.plant);
+    plant = file.plant;
+    flags = std::move(file.disturbance);
+  }
+  flags.insert(flags.end(), a.flags.begin(), a.flags.end());
+  const TrialConditions conditions = ConditionsOf(flags);
   env.disturbances = {conditions.disturbance};
   env.randomization = conditions.randomization;
   if (a.unknown_plant && loaded == nullptr) {
@@ -86,8 +99,7 @@ EnvConfig TrialEnvironments(const TrialArguments& a, const LoadedPolicy* loaded)
     if (loaded->identifies()) env.identified_from = loaded->plant;
     if (a.unknown_plant) env.assumed_plant = loaded->plant;
   }
-  env.plants = {
-      ChangedPlant(loaded != nullptr ? loaded->plant : Plant(), a.model, a.set, env.mjcf)};
+  env.plants = {ChangedPlant(plant, a.model, a.set, env.mjcf)};
   env.seed = static_cast<uint64_t>(a.seed);
   env.stream = "evaluation";
   return env;

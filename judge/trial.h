@@ -19,6 +19,7 @@ namespace upswing {
 /// Differences of a trial from the training.
 struct TrialArguments {
   std::string model, physics = "mujoco";
+  std::string plant;  // name of a plant file or a shipped plant; empty: the policy's
   std::vector<std::string> set;
   std::vector<FlagValue> flags;  // settings of Disturbance and Randomization
   int64_t seed = 0;
@@ -43,8 +44,8 @@ struct TrialConditions {
   }
 };
 
-/// The conditions that the arguments set. Throws BadInput.
-TrialConditions ConditionsOf(const TrialArguments& a);
+/// The conditions that flags set, later ones over earlier ones. Throws BadInput.
+TrialConditions ConditionsOf(const std::vector<FlagValue>& flags);
 
 /// The environments of a trial: the environments of the policy's training with the changes of the
 /// arguments; without a policy (null), environments of the built-in plant. Environment i has

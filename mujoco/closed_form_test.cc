@@ -162,6 +162,9 @@ TEST(ClosedForm, EnvironmentsOfDifferentMachinesMoveAsInMuJoCo) {
     config.plants[i].rotor_inertia = i % 2 == 0 ? 0 : rng.Uniform(0, 1e-3);
     config.plants[i].gear_ratio = rng.Uniform(1, 8);
     if (i > 2) config.plants[i].coulomb1 = config.plants[i].coulomb2 = 0.02;
+    if (i < 4) config.plants[i].center2 = 0.2;
+    if (i % 2 == 1) config.plants[i].inertia1 = 0.03;
+    if (i > 3) config.plants[i].armature = rng.Uniform(0.002, 0.02);
   }
   PendulumEnv closed_form(config);
   config.engine = &kMuJoCo;
@@ -188,7 +191,7 @@ TEST(ClosedForm, JudgesAsTheFormulasDo) {
   std::vector<double> torque;
   Rng rng(3, "plants");
   for (size_t i = 0; i < kTrials; ++i) {
-    plants.push_back(RandomPlant(rng));
+    plants.push_back(i % 2 == 0 ? RandomPlant(rng) : RandomMachine(rng));
     torque.push_back(rng.Uniform(-1.2, 1.2) * plants[i].torque_limit);
     batch.SetPlant(i, plants[i]);
     PendulumState s = RandomState(rng);

@@ -25,7 +25,8 @@ T* Expand(mjBatch* batch, const char* field, int env) {
   return rows + env * size;
 }
 
-ModelFields ExpandedFields(mjBatch* batch, bool rotors, bool friction, int env) {
+/// The fields of an environment, as FieldsOf gives them.
+ModelFields ExpandedFields(mjBatch* batch, bool built_in, bool rotors, bool friction, int env) {
   const auto if_any = [&](bool any, const char* field) {
     return any ? Expand(batch, field, env) : nullptr;
   };
@@ -39,7 +40,7 @@ ModelFields ExpandedFields(mjBatch* batch, bool rotors, bool friction, int env) 
           Expand(batch, "actuator_ctrlrange", env),
           Expand<int>(batch, "actuator_trnid", env),
           Expand(batch, "opt.gravity", env),
-          if_any(rotors, "dof_armature"),
+          if_any(built_in, "dof_armature"),
           if_any(rotors, "tendon_armature"),
           if_any(rotors, "wrap_prm"),
           if_any(friction, "dof_frictionloss")};
@@ -78,6 +79,9 @@ class MuJoCoPhysics : public Physics {
     mjtNum *qpos, *qvel, *ctrl, *push;  // in row 0 of the state table
   };
   Slice MakeSlice(const mjModel& model, int first, int count) const;
+  ModelFields FieldsAt(mjBatch* batch, int row) const {
+    return ExpandedFields(batch, config_.mjcf.empty(), rotors_, dry_friction_, row);
+  }
   const Slice& SliceOf(int env) const { return slices_[static_cast<size_t>(env / slice_size_)]; }
   /// The part of an environment's state that starts at `first` in row 0 of its slice.
   mjtNum* Component(mjtNum* first, int env) const {
@@ -103,7 +107,7 @@ MuJoCoPhysics::MuJoCoPhysics(const PhysicsConfig& config)
   const ModelPtr model = config_.mjcf.empty()
                              ? CompileModel(Mjcf(Superset(config_.plants)), "model")
                              : LoadModel(config_.mjcf, "model");
-  WritePlant(config_.plant(0), FieldsOf(*model));
+  WritePlant(config_.plant(0), FieldsOf(*model, config_.mjcf.empty()));
   rotors_ = HasRotors(*model);
   dry_friction_ = HasDryFriction(*model);
   // The built-in model has no springs, sensors and islands. Disabled, MuJoCo skips the search.
@@ -130,7 +134,7 @@ MuJoCoPhysics::Slice MuJoCoPhysics::MakeSlice(const mjModel& model, int first, i
   if (batch == nullptr) throw Failure(Concat("MuJoCo: ", message.data()));
   if (config_.plants.size() > 1) {
     for (int i = 0; i < count; ++i) {
-      WritePlant(config_.plant(first + i), ExpandedFields(batch.get(), rotors_, dry_friction_, i));
+      WritePlant(config_.plant(first + i), FieldsAt(batch.get(), i));
     }
     mjb_setConst(batch.get(), nullptr, 0);
   }
@@ -164,7 +168,7 @@ void MuJoCoPhysics::SetPlant(int env, const Plant& plant) {
   config_.plants[static_cast<size_t>(env)] = plant;
   const Slice& slice = SliceOf(env);
   const int row = env - slice.first;
-  WritePlant(plant, ExpandedFields(slice.batch.get(), rotors_, dry_friction_, row));
+  WritePlant(plant, FieldsAt(slice.batch.get(), row));
   mjb_setConst(slice.batch.get(), &row, 1);
 }
 

@@ -125,12 +125,25 @@ void CheckJoints(const mjModel& model, const Expectation& expect) {
   }
 }
 
+/// Rotation from a body's principal axes of inertia to its frame, row by row.
+std::array<mjtNum, 9> PrincipalAxes(const mjModel& model, int body) {
+  std::array<mjtNum, 9> R;
+  mju_quat2Mat(R.data(), model.body_iquat + 4 * body);
+  return R;
+}
+
+/// Moment of inertia of a body about its centre of mass and the hinges' axis, kg·m².
+double InertiaAcross(const mjModel& model, int body) {
+  const std::array<mjtNum, 9> R = PrincipalAxes(model, body);
+  double I = 0;
+  for (int k = 0; k < 3; ++k) I += R[3 + k] * R[3 + k] * model.body_inertia[3 * body + k];
+  return I;
+}
+
 /// Checks that the links' positions follow from the plant, so that writing the plant keeps the
 /// file's model. Armature, friction, stiffness, radius and integrator may be anything.
 void CheckGeometry(const mjModel& model, const std::string& where, const Expectation& expect) {
   const ModelPtr ours = CompileModel(Mjcf(PlantOf(model)), where);
-  const ModelPtr written(mj_copyModel(nullptr, &model));
-  WritePlant(PlantOf(model), FieldsOf(*written));
   const auto same = [&](const mjtNum* a, const mjtNum* b, int n, std::string_view what) {
     for (int i = 0; i < n; ++i) expect(std::abs(a[i] - b[i]) < 1e-9, what);
   };
@@ -139,8 +152,18 @@ void CheckGeometry(const mjModel& model, const std::string& where, const Expecta
   same(model.body_quat, ours->body_quat, 12, "links that hang along -z");
   same(model.body_pos, ours->body_pos, 9, "the second link at the end of the first");
   same(model.geom_pos, ours->geom_pos, 6, "capsules along -z from their hinge");
-  same(model.body_ipos, ours->body_ipos, 9, "the mass of each link to be that of its capsule");
-  same(model.body_inertia, written->body_inertia, 9, "the inertia of solid capsules");
+  same(model.body_ipos, ours->body_ipos, 9,
+       "the centre of mass of each link on its axis, below its hinge");
+  for (const int body : kLinkBodies) {
+    // Writing a plant makes the first two moments equal, which moves nothing but air.
+    expect(std::abs(PrincipalAxes(model, body)[5]) < 1e-9,
+           "the third principal axis of each link's inertia at a right angle to its hinge");
+  }
+  if (model.opt.density > 0 || model.opt.viscosity > 0) {
+    const ModelPtr written(mj_copyModel(nullptr, &model));
+    WritePlant(PlantOf(model), FieldsOf(*written, false));
+    same(model.body_inertia, written->body_inertia, 9, "the inertia of solid capsules in air");
+  }
   same(model.actuator_ctrlrange, ours->actuator_ctrlrange, 2, "a symmetric control range");
   same(model.opt.gravity, ours->opt.gravity, 3, "gravity along -z");
 }
@@ -216,10 +239,24 @@ Plant PlantOf(const mjModel& model) {
   plant.gravity = -model.opt.gravity[2];
   plant.torque_limit = model.actuator_ctrlrange[1];
   plant.actuated_joint = model.actuator_trnid[0] + 1;
+  constexpr double kRounding = 1e-9;  // m, and share of an inertia
+  for (const int body : kLinkBodies) {
+    const int geom = body - 1;
+    const double length = 2 * model.geom_size[3 * geom + 1];
+    const double center = -model.body_ipos[3 * body + 2], I = InertiaAcross(model, body);
+    const double capsule =
+        CapsuleInertia(model.body_mass[body], model.geom_size[3 * geom], length).across;
+    if (std::abs(center - length / 2) > kRounding) {
+      (body == 1 ? plant.center1 : plant.center2) = center;
+    }
+    if (std::abs(I - capsule) > kRounding * capsule) {
+      (body == 1 ? plant.inertia1 : plant.inertia2) = I;
+    }
+  }
   return plant;
 }
 
-ModelFields FieldsOf(mjModel& model) {
+ModelFields FieldsOf(mjModel& model, bool built_in) {
   const bool rotors = HasRotors(model);
   return {model.body_mass,
           model.body_inertia,
@@ -231,7 +268,7 @@ ModelFields FieldsOf(mjModel& model) {
           model.actuator_ctrlrange,
           model.actuator_trnid,
           model.opt.gravity,
-          rotors ? model.dof_armature : nullptr,
+          built_in ? model.dof_armature : nullptr,
           rotors ? model.tendon_armature : nullptr,
           rotors ? model.wrap_prm : nullptr,
           HasDryFriction(model) ? model.dof_frictionloss : nullptr};
@@ -244,16 +281,18 @@ bool HasDryFriction(const mjModel& model) { return model.nuser_jnt == 1; }
 void WritePlant(const Plant& plant, const ModelFields& fields) {
   const std::array<double, 2> masses{plant.mass1, plant.mass2};
   const std::array<double, 2> lengths{plant.length1, plant.length2};
+  const std::array<double, 2> centers{plant.center1, plant.center2};
+  const std::array<double, 2> inertias{plant.inertia1, plant.inertia2};
   for (const int body : kLinkBodies) {
     const int geom = body - 1;
-    const double length = lengths[static_cast<size_t>(geom)];
-    const double mass = masses[static_cast<size_t>(geom)];
-    const CapsuleInertia inertia(mass, fields.geom_size[3 * geom], length);
+    const double length = lengths[geom], mass = masses[geom];
+    const CapsuleInertia capsule(mass, fields.geom_size[3 * geom], length);
+    const double across = inertias[geom] > 0 ? inertias[geom] : capsule.across;
     fields.body_mass[body] = mass;
-    fields.body_inertia[3 * body] = inertia.across;
-    fields.body_inertia[3 * body + 1] = inertia.across;
-    fields.body_inertia[3 * body + 2] = inertia.along;
-    fields.body_ipos[3 * body + 2] = -length / 2;
+    fields.body_inertia[3 * body] = across;
+    fields.body_inertia[3 * body + 1] = across;
+    fields.body_inertia[3 * body + 2] = std::min(capsule.along, across);
+    fields.body_ipos[3 * body + 2] = -(centers[geom] > 0 ? centers[geom] : length / 2);
     fields.geom_pos[3 * geom + 2] = -length / 2;
     fields.geom_size[3 * geom + 1] = length / 2;
   }
@@ -266,8 +305,14 @@ void WritePlant(const Plant& plant, const ModelFields& fields) {
   fields.gravity[0] = fields.gravity[1] = 0;
   fields.gravity[2] = -plant.gravity;
 
-  if (fields.tendon_armature != nullptr) {
+  if (fields.dof_armature != nullptr) {
     fields.dof_armature[0] = Armature1(plant);
+    fields.dof_armature[1] = plant.armature;
+  } else if (plant.armature != kArmature) {
+    throw BadInput(Concat("armature: expected ", kArmature,
+                          ", because a model file has its own armatures, got ", plant.armature));
+  }
+  if (fields.tendon_armature != nullptr) {
     fields.tendon_armature[0] = plant.rotor_inertia;
     fields.wrap_prm[0] = 1;
     fields.wrap_prm[1] = -plant.gear_ratio;

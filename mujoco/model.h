@@ -30,7 +30,8 @@ ModelPtr CompileModel(const std::string& mjcf, const std::string& where);
 
 /// Compiles untrusted MJCF after CheckMjcf. Throws BadInput unless the model has the structure of
 /// the built-in one:
-/// - two solid capsules hanging on hinges about +y
+/// - two capsules hanging on hinges about +y, whose mass may have its own distribution (`inertial`)
+///   with the centre on the link's axis
 /// - a motor at one hinge, with the same limit both ways
 /// - gravity along -z
 /// - springs at rest when hanging, and joint limits that are the same both ways
@@ -44,8 +45,9 @@ ModelPtr LoadModel(const std::string& mjcf, const std::string& where);
 /// parameters; such as "armature1 0.02 kg·m²".
 std::vector<std::string> DifferencesFromBuiltIn(const mjModel& model);
 
-/// The plant that a loaded model describes. It has no rotors and no dry friction, which only the
-/// built-in model can have.
+/// The plant that a loaded model describes. It has own centres of mass and inertias where the links
+/// are not solid capsules. It has no rotors, no dry friction and the default armature, which only
+/// the built-in model takes from a plant.
 Plant PlantOf(const mjModel& model);
 
 /// Pointers to the plant's numbers in an mjModel, or in rows that a batch has expanded. The
@@ -61,8 +63,8 @@ struct ModelFields {
   mjtNum* actuator_ctrlrange;  // (1 × 2)
   int* actuator_trnid;         // (1 × 2)
   mjtNum* gravity;             // (3)
+  mjtNum* dof_armature;        // (2) null if the model is from a file, which has its own
   // Null if the model was compiled without rotors or without dry friction:
-  mjtNum* dof_armature;      // (2)
   mjtNum* tendon_armature;   // (1)
   mjtNum* wrap_prm;          // (2)
   mjtNum* dof_frictionloss;  // (2)
@@ -70,11 +72,12 @@ struct ModelFields {
 /// Whether a model has the fields for a plant's rotors, and for its dry friction.
 bool HasRotors(const mjModel& model);
 bool HasDryFriction(const mjModel& model);
-ModelFields FieldsOf(mjModel& model);
+/// The fields of a model. `built_in`: it is the built-in one, not from a file.
+ModelFields FieldsOf(mjModel& model, bool built_in = true);
 
 /// Writes a plant into a loaded model, as if its MJCF had these numbers. The caller then calls
 /// mj_setConst or mjb_setConst. Throws BadInput if the plant has rotors or dry friction and the
-/// model was compiled without them.
+/// model was compiled without them, or another armature than the default for a model from a file.
 void WritePlant(const Plant& plant, const ModelFields& fields);
 
 }  // namespace upswing

@@ -8,13 +8,14 @@
 
 #include "core/error.h"
 #include "core/rng.h"
+#include "core/text.h"
 #include "core/thread_pool.h"
+#include "sim/closed_form.h"
 
 namespace upswing {
 namespace {
 
-constexpr double kArmature = 0.01;  // kg·m²
-constexpr double kRadius = 0.04;    // m
+constexpr double kRadius = 0.04;  // m
 
 Plant ModeratePlant(Rng& rng) {
   Plant p;
@@ -23,6 +24,15 @@ Plant ModeratePlant(Rng& rng) {
   p.damping2 = rng.Uniform(0, 1);
   p.gravity = rng.Uniform(1, 20);
   p.torque_limit = rng.Uniform(1, 10);
+  return p;
+}
+
+/// A ModeratePlant with own centres of mass, inertias and armature.
+Plant ModerateMachine(Rng& rng) {
+  Plant p = ModeratePlant(rng);
+  for (double* x : {&p.center1, &p.center2}) *x = rng.Uniform(0.1, 3);
+  for (double* x : {&p.inertia1, &p.inertia2}) *x = rng.Uniform(0.001, 2);
+  p.armature = rng.Uniform(0, 0.1);
   return p;
 }
 
@@ -58,7 +68,8 @@ struct ClosedForm {
 
   std::array<double, 4> Derivative(const std::array<double, 4>& x, double tau) const {
     const auto [q1, q2, w1, w2] = x;
-    const double c1 = p.length1 / 2, c2 = p.length2 / 2;
+    const double c1 = p.center1 > 0 ? p.center1 : p.length1 / 2;
+    const double c2 = p.center2 > 0 ? p.center2 : p.length2 / 2;
     const double coupling = p.mass2 * p.length1 * c2;
     const double m22 = I2 + p.mass2 * c2 * c2;
     const double m12 = m22 + coupling * std::cos(q2);
@@ -69,7 +80,7 @@ struct ClosedForm {
     const double g1 = (p.mass1 * c1 + p.mass2 * p.length1) * p.gravity * std::sin(q1) + g2;
     const double f1 = tau + h * (2 * w1 * w2 + w2 * w2) - g1 - p.damping1 * w1;
     const double f2 = -h * w1 * w1 - g2 - p.damping2 * w2;
-    const double M11 = m11 + kArmature, M22 = m22 + kArmature;
+    const double M11 = m11 + p.armature, M22 = m22 + p.armature;
     const double det = M11 * M22 - m12 * m12;
     return {w1, w2, (M22 * f1 - m12 * f2) / det, (M11 * f2 - m12 * f1) / det};
   }
@@ -109,7 +120,7 @@ TEST(Model, HangingHasTheMassMatrixAndInertiasOfTheSpecification) {
 TEST(Model, APlantWrittenAtRunTimeEqualsOneThatWasCompiled) {
   Rng rng(1, "plants");
   for (int trial = 0; trial < 20; ++trial) {
-    const Plant plant = ModeratePlant(rng);
+    const Plant plant = trial % 2 == 0 ? ModeratePlant(rng) : ModerateMachine(rng);
     const ModelPtr written = ModelWith(plant);
     const ModelPtr compiled = CompileModel(Mjcf(plant), "test");
     const auto same = [](const mjtNum* a, const mjtNum* b, int n) {
@@ -124,6 +135,7 @@ TEST(Model, APlantWrittenAtRunTimeEqualsOneThatWasCompiled) {
     same(written->body_invweight0, compiled->body_invweight0, 2 * nbody);
     same(written->dof_invweight0, compiled->dof_invweight0, 2);
     same(written->dof_damping, compiled->dof_damping, 2);
+    same(written->dof_armature, compiled->dof_armature, 2);
     same(written->geom_pos, compiled->geom_pos, 6);
     same(written->geom_size, compiled->geom_size, 6);
     same(written->actuator_ctrlrange, compiled->actuator_ctrlrange, 2);
@@ -132,6 +144,8 @@ TEST(Model, APlantWrittenAtRunTimeEqualsOneThatWasCompiled) {
     const Plant back = PlantOf(*compiled);
     EXPECT_NEAR(back.length2, plant.length2, 1e-15);
     EXPECT_EQ(back.mass1, plant.mass1);
+    EXPECT_NEAR(back.center1, plant.center1, 1e-15);
+    EXPECT_NEAR(back.inertia2, plant.inertia2, 1e-14);
     EXPECT_EQ(back.torque_limit, plant.torque_limit);
   }
 }
@@ -139,12 +153,14 @@ TEST(Model, APlantWrittenAtRunTimeEqualsOneThatWasCompiled) {
 TEST(Model, MuJoCoStepsLikeTheClosedFormAt100RandomStatesAndPlants) {
   Rng rng(2, "closed form");
   for (int trial = 0; trial < 100; ++trial) {
-    const Plant plant = ModeratePlant(rng);
+    const Plant plant = trial % 2 == 0 ? ModeratePlant(rng) : ModerateMachine(rng);
     const ModelPtr model = ModelWith(plant);
     const DataPtr data(mj_makeData(model.get()));
     const ClosedForm closed{plant, model->body_inertia[3], model->body_inertia[6]};
     // The capsule's inertia has its own derivation (midpoint rule, error about 1e-9).
-    EXPECT_NEAR(closed.I1, CapsuleInertia(plant.mass1, plant.length1), 1e-8 * closed.I1);
+    const double I1 =
+        plant.has_own_links() ? plant.inertia1 : CapsuleInertia(plant.mass1, plant.length1);
+    EXPECT_NEAR(closed.I1, I1, 1e-8 * closed.I1);
 
     const std::array<double, 4> x{rng.Uniform(-4, 4), rng.Uniform(-4, 4), rng.Uniform(-8, 8),
                                   rng.Uniform(-8, 8)};
@@ -223,6 +239,95 @@ TEST(Model, RefusesAPlantBeyondTheRangesOfItsSettings) {
   EXPECT_NE(error_of("0 0 -9.81", "0 0 9.81").find("m.xml: gravity: expected"), std::string::npos);
   EXPECT_NE(error_of("damping=\"0.2\"", "damping=\"101\"").find("damping1"), std::string::npos);
   EXPECT_NE(error_of("\"-5 5\"", "\"-5000 5000\"").find("torque_limit"), std::string::npos);
+}
+
+/// The built-in model with an `inertial` in link 2.
+std::string WithInertial(const std::string& attributes) {
+  std::string mjcf = Mjcf(Plant());
+  const std::string body = "<body name=\"link2\" pos=\"0 0 -0.5\">";
+  mjcf.insert(mjcf.find(body) + body.size(), Concat("<inertial ", attributes, "/>"));
+  return mjcf;
+}
+
+TEST(Model, TakesCentreOfMassAndInertiaFromAFile) {
+  // The same body: by its principal moments, in a turned frame, and by a tensor.
+  for (const char* attributes :
+       {R"(mass="1.2" pos="0 0 -0.4" diaginertia="0.02 0.03 0.015")",
+        R"(mass="1.2" pos="0 0 -0.4" euler="0 0 90" diaginertia="0.03 0.02 0.015")",
+        R"(mass="1.2" pos="0 0 -0.4" fullinertia="0.02 0.03 0.015 0 0 0")"}) {
+    const Plant plant = PlantOf(*LoadModel(WithInertial(attributes), "m.xml"));
+    EXPECT_EQ(plant.mass2, 1.2);
+    EXPECT_NEAR(plant.center2, 0.4, 1e-15) << attributes;
+    EXPECT_NEAR(plant.inertia2, 0.03, 1e-15) << attributes;
+    EXPECT_EQ(plant.center1, 0);
+    EXPECT_EQ(plant.inertia1, 0);
+  }
+}
+
+TEST(Model, AFileWithOwnLinksMovesLikeItsPlantInTheClosedForm) {
+  const std::string mjcf =
+      WithInertial(R"(mass="1.2" pos="0 0 -0.4" diaginertia="0.02 0.03 0.01")");
+  const ModelPtr model = LoadModel(mjcf, "m.xml");
+  WritePlant(PlantOf(*model), FieldsOf(*model, false));  // keeps the motion
+  const DataPtr data(mj_makeData(model.get()));
+  mj_setConst(model.get(), data.get());
+  ClosedFormBatch batch(1);
+  batch.SetPlant(0, PlantOf(*model));
+  batch.SetState(0, {1, 0.5, -2, 3});
+  std::copy_n(std::array{1.0, 0.5}.data(), 2, data->qpos);
+  std::copy_n(std::array{-2.0, 3.0}.data(), 2, data->qvel);
+  for (int step = 0; step < 20; ++step) mj_step(model.get(), data.get());
+  Advance(batch, 20, 0, 1);
+  EXPECT_NEAR(data->qpos[0], batch.q1[0], 1e-11);
+  EXPECT_NEAR(data->qpos[1], batch.q2[0], 1e-11);
+}
+
+TEST(Model, RefusesMassThatThePlantCannotDescribe) {
+  const auto error_of = [](const std::string& attributes) -> std::string {
+    try {
+      LoadModel(WithInertial(attributes), "m.xml");
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  const std::string tensor = R"( mass="1" diaginertia="0.02 0.02 0.015")";
+  EXPECT_EQ(error_of(R"(pos="0 0 -0.4")" + tensor), "");
+  EXPECT_NE(error_of(R"(pos="0.1 0 -0.4")" + tensor).find("on its axis"), std::string::npos);
+  EXPECT_NE(error_of(R"(pos="0 0 0")" + tensor).find("below its hinge"), std::string::npos);
+  EXPECT_NE(error_of(R"(pos="0 0 0.1")" + tensor).find("m.xml: center2: expected"),
+            std::string::npos);
+  // The third axis along the hinge: writing a plant would change another moment.
+  EXPECT_NE(error_of(R"(pos="0 0 -0.4" euler="90 0 0")" + tensor).find("third principal axis"),
+            std::string::npos);
+}
+
+TEST(Model, RefusesInAirWhatOnlyAirFeels) {
+  const auto loads = [](const std::string& moments) {
+    std::string mjcf =
+        WithInertial(Concat("mass=\"1\" pos=\"0 0 -0.4\" diaginertia=\"", moments, "\""));
+    const std::string option = "<option ";
+    mjcf.insert(mjcf.find(option) + option.size(), "density=\"1.2\" ");
+    try {
+      LoadModel(mjcf, "m.xml");
+      return true;
+    } catch (const Error&) {
+      return false;
+    }
+  };
+  const std::string along = FormatNumber(upswing::CapsuleInertia(1.0, 0.04, 0.5).along);
+  EXPECT_TRUE(loads("0.03 0.03 " + along));
+  EXPECT_FALSE(loads("0.02 0.03 " + along));
+}
+
+TEST(Model, AFileKeepsItsOwnArmature) {
+  const ModelPtr model = LoadModel(Mjcf(Plant()), "m.xml");
+  Plant plant;
+  plant.armature = 0.02;
+  EXPECT_NO_THROW(WritePlant(Plant(), FieldsOf(*model, false)));
+  EXPECT_THROW(WritePlant(plant, FieldsOf(*model, false)), Error);
+  EXPECT_NO_THROW(WritePlant(plant, FieldsOf(*model)));
+  EXPECT_EQ(model->dof_armature[1], 0.02);
 }
 
 TEST(Model, RefusesWhatThePlantsParametersWouldHide) {

@@ -26,7 +26,7 @@ def every_setting():
 def python_type(option):
     if option["choices"]:
         return f"Literal[{', '.join(map(repr, option['choices']))}]"
-    if option["name"] == "model":
+    if option["name"] in ("model", "plant"):
         return "Union[str, os.PathLike[str]]"
     return PYTHON_TYPES[option["type"]]
 
@@ -59,6 +59,10 @@ def main():
                    if option["environment"] and option["name"] != "envs"]
     # `train` has separate arguments for these settings.
     training = [option for option in options if option["name"] not in ("agent", "seed")]
+    plant = {"name": "plant", "type": "str", "choices": [], "unit": "", "low": None, "high": None,
+             "help": "plant file (TOML with a table [plant]) or shipped plant, changed by settings"}
+    environment.append(plant)
+    training.append(plant)
     start = [{"name": name, "type": "float", "choices": [], "help": help_text, "unit": unit,
               "low": None, "high": None}
              for name, help_text, unit in (

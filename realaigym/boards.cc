@@ -15,6 +15,7 @@
 #include "io/tensor_file.h"
 #include "report/figure.h"
 #include "run/find_policy.h"
+#include "run/plant_file.h"
 #include "setup/controllers.h"
 #include "sim/identification.h"
 
@@ -109,6 +110,13 @@ void ExpectRobot(const std::string& name, Robot own, Robot asked) {
                         " (motor at joint ", static_cast<int>(own), "), got ", NameOf(asked)));
 }
 
+/// The text of a design plant; empty for the board's.
+std::string DesignText(const Plant& plant) {
+  Plant board = ReadPlantFile("realaigym").plant;
+  board.actuated_joint = plant.actuated_joint;
+  return PlantValues(plant) == PlantValues(board) ? "" : PlantText(plant);
+}
+
 Competitor OfSearch(const std::string& name, SwingPolicy policy) {
   const auto kept = std::make_shared<SwingPolicy>(std::move(policy));
   return {name, kept->net.robot(), [kept](size_t) { return kept->net.Control(kept->numbers); }};
@@ -156,7 +164,7 @@ Competitor GetCompetitor(const PolicyArguments& a, const std::string& robot) {
   const auto own = static_cast<Robot>(static_cast<int>(loaded->plant.actuated_joint));
   ExpectRobot(loaded->name, own, ParseRobot(robot, own));
   return {loaded->name, own, [loaded](size_t) { return ControllerOf(*loaded, kBoardBlock); },
-          PlantText(loaded->plant)};
+          DesignText(loaded->plant)};
 }
 
 std::vector<BoardEntry> PublishedEntries(Robot robot) {

@@ -7,6 +7,7 @@
 #include "control/linearize.h"
 #include "core/rng.h"
 #include "realaigym/rules.h"
+#include "run/plant_file.h"
 #include "sim/closed_form.h"
 
 namespace upswing {
@@ -25,6 +26,21 @@ TEST(BoardPlant, AccelerationAndEnergyAreTheBenchmarks) {
   EXPECT_NEAR(a1, 23.421661493, 1e-9);
   EXPECT_NEAR(a2, -67.143867013, 1e-9);
   EXPECT_NEAR(EnergyOf(plant, {1, 0.5, 0.3, -0.7}), -1.3257887730, 1e-10);
+}
+
+TEST(BoardPlant, IsTheShippedPlant) {
+  const Plant plant = ReadPlantFile("realaigym").plant;
+  EXPECT_EQ(plant.torque_limit, kBoardTorqueLimit);
+  EXPECT_EQ(plant.gear_ratio, kBoardGearRatio);
+  const Manipulator shipped = ManipulatorOf(plant), board = ManipulatorOf(BoardPlant());
+  // The inertia about the joint is a sum, whose rounding is about 1e-17.
+  EXPECT_NEAR(shipped.J1, board.J1, 1e-16);
+  EXPECT_NEAR(shipped.J2, board.J2, 1e-16);
+  for (double Manipulator::*constant :
+       {&Manipulator::b, &Manipulator::a, &Manipulator::G1, &Manipulator::G2, &Manipulator::d1,
+        &Manipulator::d2, &Manipulator::f1, &Manipulator::f2}) {
+    EXPECT_NEAR(shipped.*constant, board.*constant, 1e-15);
+  }
 }
 
 /// The state `seconds` after (1, 0.5, 0, 0) under a constant torque.

@@ -11,6 +11,7 @@
 #include "io/streams.h"
 #include "mujoco/mjcf_check.h"
 #include "mujoco/model.h"
+#include "run/plant_file.h"
 
 namespace upswing {
 namespace {
@@ -38,7 +39,7 @@ Config ParseInFolder(const fs::path& file, const std::string& text,
 Config BuildConfig(const fs::path& file, const std::vector<FlagValue>& flags) {
   const std::string text = file.empty() ? "" : ReadInput(file.string());
   const std::string where = file.empty() ? "" : InputName(file.string());
-  return ParseConfig(text, where, flags, [&](const std::string& path, bool in_file) {
+  return ParseConfig(text, where, WithPlantFile(flags), [&](const std::string& path, bool in_file) {
     return ReadModel(in_file ? (file.parent_path() / path).string() : path);
   });
 }

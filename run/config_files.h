@@ -10,6 +10,8 @@
 namespace upswing {
 
 /// Runs ParseConfig on a configuration file: an empty path means no file, `-` means standard input.
+/// A flag called `plant` names a plant file (run/plant_file.h), which is a layer between the
+/// configuration file and the other flags.
 Config BuildConfig(const std::filesystem::path& file, const std::vector<FlagValue>& flags);
 
 /// Reads the settings of a run folder and applies the flags. Also throws BadInput if the run's file

@@ -10,6 +10,7 @@
 #include "io/run_folder.h"
 #include "io/tensor_file.h"
 #include "mujoco/model.h"
+#include "run/plant_file.h"
 #include "setup/controllers.h"
 
 namespace upswing {
@@ -34,6 +35,27 @@ LoadedPolicy SwingUpNamed(const std::string& name) {
   if (loaded.mjcf.empty()) return loaded;
   throw BadInput(Concat("--swing-up: expected a policy of the built-in model, got ", name,
                         ", which was trained on another model"));
+}
+
+/// Applies --made-for: a plant file, if there is one, then the changes. Returns the plant file.
+/// Throws BadInput.
+PlantFile ChangeDesignPlant(const std::vector<std::string>& made_for, Plant& plant) {
+  std::vector<std::string> changes, files;
+  for (const std::string& text : made_for) {
+    (text.find('=') == std::string::npos ? files : changes).push_back(text);
+  }
+  if (files.size() > 1) {
+    throw BadInput(
+        Concat("--made-for: expected at most one plant file, got ", Join(files, " and ")));
+  }
+  PlantFile file;
+  if (!files.empty()) {
+    file = ReadPlantFile(files.front(), "--made-for", "NAME=VALUE, ");
+    file.name = files.front();
+    plant = file.plant;
+  }
+  ApplyChanges(OptionsOf(plant), changes, "--made-for");
+  return file;
 }
 
 /// Throws BadInput if a setting belongs to no controller in `names`.
@@ -89,7 +111,7 @@ LoadedPolicy GetPolicy(const PolicyArguments& a) {
     config.plant = swing_up.plant;
     config.swing_up_policy = swing_up.policy;
   }
-  ApplyChanges(OptionsOf(config.plant), a.made_for, "--made-for");
+  const PlantFile made_for = ChangeDesignPlant(a.made_for, config.plant);
   const bool is_controller = IsController(a.name), is_path = fs::exists(a.name);
   if (is_controller && is_path) {
     throw BadInput(Concat(a.name, ": expected a controller or a file, got the name of both; ./",
@@ -101,7 +123,7 @@ LoadedPolicy GetPolicy(const PolicyArguments& a) {
       other.plant = plant;
       return MakeController(name, other);
     };
-    return {TitleOf(a.name, config),
+    return {TitleOf(a.name, config, made_for.name, made_for.plant),
             "",
             design_for(config.plant),
             kDoublePendulum,

@@ -12,8 +12,9 @@ namespace upswing {
 /// A policy as named on a command line.
 struct PolicyArguments {
   std::string name;  // name of a controller (setup/controllers.h), a file or a run folder
-  std::vector<FlagValue> flags;       // settings of the controller
-  std::vector<std::string> made_for;  // changes of the controller's design plant, such as mass2=1.2
+  std::vector<FlagValue> flags;  // settings of the controller
+  // The controller's design plant: changes such as mass2=1.2, and at most one plant file.
+  std::vector<std::string> made_for;
 
   bool has_settings() const { return !flags.empty() || !made_for.empty(); }
   bool empty() const { return name.empty() && !has_settings(); }

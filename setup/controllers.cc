@@ -125,7 +125,8 @@ std::shared_ptr<const Policy> MakeController(const std::string& name,
                         name, "\""));
 }
 
-std::string TitleOf(const std::string& name, const ControllerConfig& config) {
+std::string TitleOf(const std::string& name, const ControllerConfig& config,
+                    const std::string& plant_name, const Plant& named) {
   const auto changes = [](const Options& now, const Options& usual) {
     std::vector<std::string> texts;
     for (const auto& [option, before] : Differences(now, usual)) {
@@ -135,7 +136,8 @@ std::string TitleOf(const std::string& name, const ControllerConfig& config) {
   };
   const ControllerConfig usual;
   std::vector<std::string> texts = changes(OptionsOf(config), OptionsOf(usual));
-  const auto plant = changes(OptionsOf(config.plant), OptionsOf(usual.plant));
+  auto plant = changes(OptionsOf(config.plant), OptionsOf(named));
+  if (!plant_name.empty()) plant.insert(plant.begin(), plant_name);
   if (!plant.empty()) texts.push_back(Concat("for ", Join(plant, " and ")));
   return texts.empty() ? name : Concat(name, " (", Join(texts, ", "), ")");
 }

@@ -45,7 +45,9 @@ std::shared_ptr<const Policy> MakeController(const std::string& name,
                                              const ControllerConfig& config);
 
 /// Name of the controller with all settings that differ from the defaults: `lqr (lqr_torque 0.1,
-/// for mass2 1.2)`.
-std::string TitleOf(const std::string& name, const ControllerConfig& config);
+/// for mass2 1.2)`. `plant_name` names the file of the plant `named`, from which the design may
+/// differ.
+std::string TitleOf(const std::string& name, const ControllerConfig& config,
+                    const std::string& plant_name = "", const Plant& named = Plant());
 
 }  // namespace upswing

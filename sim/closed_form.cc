@@ -373,10 +373,11 @@ void ClosedFormBatch::SetPlant(size_t env, const Plant& plant) {
   limit[env] = plant.torque_limit;
   joint[env] = plant.actuated_joint;
 
-  const double m1 = plant.mass1, m2 = plant.mass2, l1 = plant.length1, l2 = plant.length2;
-  const double c1 = l1 / 2, c2 = l2 / 2;  // distances from the joint to the centre
-  T1[env] = m1 * l1 * l1 / 12 + m1 * c1 * c1 + m2 * l1 * l1;
-  T2[env] = m2 * l2 * l2 / 12 + m2 * c2 * c2;
+  const auto links = TaskLinksOf(plant);
+  const auto& [m1, l1, c1, I1] = links[0];
+  const auto& [m2, l2, c2, I2] = links[1];
+  T1[env] = I1 + m1 * c1 * c1 + m2 * l1 * l1;
+  T2[env] = I2 + m2 * c2 * c2;
   energy_scale[env] = 1 / (2 * EnergyTarget(plant));
   share1[env] = l1 / (l1 + l2);
   share2[env] = l2 / (l1 + l2);

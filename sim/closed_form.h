@@ -46,7 +46,7 @@ struct ClosedFormBatch {
   Array limit;                // torque limit, N·m
   Array joint;                // the joint that the motor drives: 1 or 2
 
-  // Constants of the task, which takes the links as thin rods.
+  // Constants of the task, from TaskLinksOf.
   Array T1, T2;          // inertias like J1 and J2, without armatures, kg·m²
   Array energy_scale;    // 1 / (2 EnergyTarget), 1/J
   Array share1, share2;  // l1 / (l1 + l2), l2 / (l1 + l2)

@@ -37,6 +37,21 @@ void Plant::Describe(Options& o) {
   o.Add(&coulomb2, "coulomb2", {0, 10}, "N·m",
         "dry friction of joint 2: c in c·atan(100 w), w the joint's velocity")
       .implied = true;
+  constexpr Range kCenter{0, 10}, kInertia{0, 10000};
+  o.Add(&center1, "center1", kCenter, "m",
+        "distance from joint 1 to the centre of mass of link 1; 0: half of length1")
+      .implied = true;
+  o.Add(&center2, "center2", kCenter, "m",
+        "distance from joint 2 to the centre of mass of link 2; 0: half of length2")
+      .implied = true;
+  o.Add(&inertia1, "inertia1", kInertia, "kg·m²",
+        "moment of inertia of link 1 about its centre of mass; 0: that of a solid capsule")
+      .implied = true;
+  o.Add(&inertia2, "inertia2", kInertia, "kg·m²",
+        "moment of inertia of link 2 about its centre of mass; 0: that of a solid capsule")
+      .implied = true;
+  o.Add(&armature, "armature", {0, 10}, "kg·m²", "armature of each joint, without rotors").implied =
+      true;
   o.Alias("mass", {"mass1", "mass2"});
   o.Alias("length", {"length1", "length2"});
   o.Alias("damping", {"damping1", "damping2"});
@@ -76,8 +91,22 @@ CapsuleInertia::CapsuleInertia(double m, double r, double l) {
   along = mc * r * r / 2 + ms * 2 * r * r / 5;
 }
 
+std::array<Link, 2> LinksOf(const Plant& p) {
+  const auto link = [](double m, double l, double c, double I) {
+    return Link{m, l, c > 0 ? c : l / 2, I > 0 ? I : CapsuleInertia(m, kCapsuleRadius, l).across};
+  };
+  return {link(p.mass1, p.length1, p.center1, p.inertia1),
+          link(p.mass2, p.length2, p.center2, p.inertia2)};
+}
+
+std::array<Link, 2> TaskLinksOf(const Plant& p) {
+  if (p.has_own_links()) return LinksOf(p);
+  const auto rod = [](double m, double l) { return Link{m, l, l / 2, m * l * l / 12}; };
+  return {rod(p.mass1, p.length1), rod(p.mass2, p.length2)};
+}
+
 double Armature1(const Plant& plant) {
-  return kArmature + plant.gear_ratio * plant.gear_ratio * plant.rotor_inertia;
+  return plant.armature + plant.gear_ratio * plant.gear_ratio * plant.rotor_inertia;
 }
 
 PendulumState StateBetween(const PendulumState& a, const PendulumState& b, double h, double share) {
@@ -94,24 +123,24 @@ PendulumState StateBetween(const PendulumState& a, const PendulumState& b, doubl
 }
 
 double Energy(const Plant& plant, const PendulumState& s) {
-  const double m1 = plant.mass1, m2 = plant.mass2, l1 = plant.length1, l2 = plant.length2;
+  const auto links = TaskLinksOf(plant);
+  const auto& [m1, l1, c1, I1] = links[0];
+  const auto& [m2, l2, c2, I2] = links[1];
   const double g = plant.gravity;
-  const double I1 = m1 * l1 * l1 / 12;
-  const double I2 = m2 * l2 * l2 / 12;
   const double w12 = s.w1 + s.w2;  // absolute velocity of link 2
-  const double potential = -m1 * g * (l1 / 2) * std::cos(s.q1) -
-                           m2 * g * (l1 * std::cos(s.q1) + (l2 / 2) * std::cos(s.q1 + s.q2));
-  const double v1_squared = (l1 / 2) * (l1 / 2) * s.w1 * s.w1;  // of the centre of link 1
-  const double v2_squared = l1 * l1 * s.w1 * s.w1 + (l2 / 2) * (l2 / 2) * w12 * w12 +
-                            l1 * l2 * std::cos(s.q2) * s.w1 * w12;  // of the centre of link 2
+  const double potential =
+      -m1 * g * c1 * std::cos(s.q1) - m2 * g * (l1 * std::cos(s.q1) + c2 * std::cos(s.q1 + s.q2));
+  const double v1_squared = c1 * c1 * s.w1 * s.w1;  // of the centre of link 1
+  const double v2_squared = l1 * l1 * s.w1 * s.w1 + c2 * c2 * w12 * w12 +
+                            2 * l1 * c2 * std::cos(s.q2) * s.w1 * w12;  // of the centre of link 2
   const double kinetic =
       0.5 * (I1 * s.w1 * s.w1 + I2 * w12 * w12 + m1 * v1_squared + m2 * v2_squared);
   return kinetic + potential;
 }
 
 double EnergyTarget(const Plant& plant) {
-  return plant.mass1 * plant.gravity * plant.length1 / 2 +
-         plant.mass2 * plant.gravity * (plant.length1 + plant.length2 / 2);
+  const auto [link1, link2] = TaskLinksOf(plant);
+  return link1.m * plant.gravity * link1.c + link2.m * plant.gravity * (link1.l + link2.c);
 }
 
 double NormalizedEnergy(const Plant& plant, const PendulumState& s) {
@@ -203,10 +232,10 @@ std::string Mjcf(const Plant& plant) {
   </option>
   <worldbody>
     <body name="link1">
-      <joint name="joint1" type="hinge" axis="0 1 0" damping="@damping1" armature="@armature1"@friction1/>
+      <joint name="joint1" type="hinge" axis="0 1 0" damping="@damping1" armature="@armature1"@friction1/>@inertial1
       <geom type="capsule" size="0.04" fromto="0 0 0 0 0 -@length1" mass="@mass1"/>
       <body name="link2" pos="0 0 -@length1">
-        <joint name="joint2" type="hinge" axis="0 1 0" damping="@damping2" armature="0.01"@friction2/>
+        <joint name="joint2" type="hinge" axis="0 1 0" damping="@damping2" armature="@armature"@friction2/>@inertial2
         <geom type="capsule" size="0.04" fromto="0 0 0 0 0 -@length2" mass="@mass2"/>
       </body>
     </body>
@@ -236,6 +265,17 @@ std::string Mjcf(const Plant& plant) {
          friction ? Concat(" frictionloss=\"@coulomb", joint, "\" user=\"", kFrictionSlope, '"')
                   : "");
   }
+  const auto inertial = [&](const Link& link, const std::string& indent) {
+    // The moment of inertia about the link's axis moves nothing. MuJoCo takes at most twice I.
+    const double along = std::min(CapsuleInertia(link.m, kCapsuleRadius, link.l).along, link.I);
+    const std::string I = FormatNumber(link.I);
+    return Concat(indent, "<inertial pos=\"0 0 -", FormatNumber(link.c), "\" mass=\"",
+                  FormatNumber(link.m), "\" diaginertia=\"", I, ' ', I, ' ', FormatNumber(along),
+                  "\"/>");
+  };
+  const auto [link1, link2] = LinksOf(plant);
+  fill("@inertial1", plant.has_own_links() ? inertial(link1, "\n      ") : "");
+  fill("@inertial2", plant.has_own_links() ? inertial(link2, "\n        ") : "");
   const Options options = OptionsOf(plant);
   for (const Option& option : options.all()) fill("@" + option.name, option.text());
   return mjcf;

@@ -33,8 +33,8 @@ inline constexpr double kArmature = 0.01;       // of both joints, kg·m²
 inline constexpr double kCapsuleRadius = 0.04;  // of both links, m
 inline constexpr double kFrictionSlope = 100;   // of the dry friction's arctangent, s/rad
 
-/// The parameters that can be set at run time. The radius of the capsules is fixed; inertia and
-/// centre of mass follow from mass and length.
+/// The parameters that can be set at run time. By default the links are solid capsules of a fixed
+/// radius, whose inertia and centre of mass follow from mass and length.
 struct Plant {
   double mass1 = 1.0, mass2 = 1.0;        // kg
   double length1 = 0.5, length2 = 0.5;    // m
@@ -45,11 +45,18 @@ struct Plant {
   double rotor_inertia = 0;               // of the motor at each joint, kg·m²
   double gear_ratio = 6;                  // turns of the rotor for one turn of its joint
   double coulomb1 = 0, coulomb2 = 0;      // dry friction c of each joint, in c atan(100 w), N·m
+  double center1 = 0, center2 = 0;        // joint to centre of mass, m; 0: the capsule's middle
+  double inertia1 = 0, inertia2 = 0;      // about the centre of mass, kg·m²; 0: the capsule's
+  double armature = kArmature;            // of both joints, kg·m²
 
   /// Declares each setting in `options`: name, range, unit, help.
   void Describe(Options& options);
 
   bool has_dry_friction() const { return coulomb1 != 0 || coulomb2 != 0; }
+  /// Whether a link has its own centre of mass or inertia, instead of a capsule's.
+  bool has_own_links() const {
+    return center1 != 0 || center2 != 0 || inertia1 != 0 || inertia2 != 0;
+  }
 };
 
 /// Name and value of each parameter of the plant. Parameters that a file may lack (Option::implied)
@@ -64,6 +71,19 @@ struct CapsuleInertia {
   CapsuleInertia(double m, double r, double l);
 };
 
+/// A link as a rigid body: mass m (kg), length l (m), distance c of the centre of mass from the
+/// link's joint (m), moment of inertia I about the centre of mass and the hinge's axis (kg·m²).
+struct Link {
+  double m, l, c, I;
+};
+
+/// The links that move: solid capsules, or with the plant's own centres of mass and inertias.
+std::array<Link, 2> LinksOf(const Plant& plant);
+
+/// The links whose energy the task takes: thin rods, whose inertia is m l²/12. If the plant has own
+/// links, those of LinksOf.
+std::array<Link, 2> TaskLinksOf(const Plant& plant);
+
 /// Armature of joint 1, with the rotor of its motor, kg·m².
 double Armature1(const Plant& plant);
 
@@ -77,7 +97,8 @@ struct PendulumState {
 /// cubic that matches the angles and velocities of both.
 PendulumState StateBetween(const PendulumState& a, const PendulumState& b, double h, double share);
 
-/// Mechanical energy (J), with thin-rod inertias m l²/12 and heights measured from the pivot.
+/// Mechanical energy (J) of TaskLinksOf, with heights measured from the pivot. It leaves out
+/// armature and rotors.
 double Energy(const Plant& plant, const PendulumState& s);
 
 /// Energy at rest upright (J); the energy hanging at rest is its negative.
@@ -161,8 +182,9 @@ struct RewardWeights {
   void Describe(Options& options);
 };
 
-/// The model as MJCF, with all digits of the plant's numbers. A fixed tendon of length q1 -
-/// gear_ratio q2 stands for the rotor of joint 2's motor. For dry friction, each joint has its c as
+/// The model as MJCF, with all digits of the plant's numbers. Own links have an element `inertial`
+/// each. A fixed tendon of length q1 - gear_ratio q2 stands for the
+/// rotor of joint 2's motor. For dry friction, each joint has its c as
 /// frictionloss and its slope as user data. The frictionloss constraint is switched off;
 /// mujoco/model.h adds the friction where it finds the user data.
 std::string Mjcf(const Plant& plant);

@@ -82,8 +82,10 @@ Identifier::Identifier(const Plant& nominal, int num_envs)
       prediction_(1) {
   prediction_.SetPlant(0, nominal);
   // Share of each parameter in the constants, by differences.
-  for (double Plant::*parameter : {&Plant::mass1, &Plant::mass2, &Plant::length1, &Plant::length2,
-                                   &Plant::damping1, &Plant::damping2, &Plant::gravity}) {
+  for (double Plant::*parameter :
+       {&Plant::mass1, &Plant::mass2, &Plant::length1, &Plant::length2, &Plant::damping1,
+        &Plant::damping2, &Plant::gravity, &Plant::center1, &Plant::center2, &Plant::inertia1,
+        &Plant::inertia2}) {
     constexpr double kStep = 1e-3;
     Plant more = nominal, less = nominal;
     more.*parameter *= 1 + kStep;

@@ -34,8 +34,8 @@ extern const std::array<float, kIdentifiedSize> kIdentifiedMirrorSigns;
 /// The estimated plants of N environments.
 class Identifier {
  public:
-  /// Begins with the nominal plant. Its masses, lengths, dampings and gravity each have a standard
-  /// deviation of 15%.
+  /// Begins with the nominal plant. Its masses, lengths, dampings, gravity, own centres of mass and
+  /// own inertias each have a standard deviation of 15%.
   Identifier(const Plant& nominal, int num_envs);
 
   /// Begins an episode of an environment in a measured state, with the nominal plant as the

@@ -32,15 +32,15 @@ std::array<double, 2> Manipulator::Acceleration(const PendulumState& s,
 }
 
 Manipulator ManipulatorOf(const Plant& plant) {
-  const double m1 = plant.mass1, m2 = plant.mass2, l1 = plant.length1, g = plant.gravity;
-  const double c1 = l1 / 2, c2 = plant.length2 / 2;  // distances from the joint to the centre
-  const double I1 = CapsuleInertia(m1, kCapsuleRadius, l1).across;
-  const double I2 = CapsuleInertia(m2, kCapsuleRadius, plant.length2).across;
+  const auto links = LinksOf(plant);
+  const auto& [m1, l1, c1, I1] = links[0];
+  const auto& [m2, l2, c2, I2] = links[1];
+  const double g = plant.gravity;
   Manipulator m;
-  m.J1 = I1 + m1 * c1 * c1 + m2 * l1 * l1 + kArmature;
+  m.J1 = I1 + m1 * c1 * c1 + m2 * l1 * l1 + plant.armature;
   m.J2 = I2 + m2 * c2 * c2;
   m.b = m2 * l1 * c2;
-  m.a = kArmature;
+  m.a = plant.armature;
   m.G1 = (m1 * c1 + m2 * l1) * g;
   m.G2 = m2 * c2 * g;
   m.d1 = plant.damping1;

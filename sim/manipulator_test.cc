@@ -14,23 +14,28 @@
 namespace upswing {
 namespace {
 
+/// The given number, or the usual one if it is 0.
+double Or(double given, double usual) { return given != 0 ? given : usual; }
+
 /// Kinetic minus potential energy (J) from the positions and velocities of the bodies: two swinging
-/// capsules, an armature at each joint, and two rotors.
+/// links, an armature at each joint, and two rotors.
 double Lagrangian(const Plant& p, const std::array<double, 4>& x) {
   const auto& [q1, q2, w1, w2] = x;
   const double q12 = q1 + q2, w12 = w1 + w2;
   const auto square = [](double v) { return v * v; };
-  const auto link = [&](double m, double l, double w, double vx, double vz, double z) {
-    const double I = CapsuleInertia(m, kCapsuleRadius, l).across;
+  const auto link = [&](double m, double I, double w, double vx, double vz, double z) {
     return (m * (vx * vx + vz * vz) + I * w * w) / 2 - m * p.gravity * z;
   };
-  const double l1 = p.length1, c1 = l1 / 2, c2 = p.length2 / 2;
-  const double upper = link(p.mass1, p.length1, w1, c1 * w1 * std::cos(q1), c1 * w1 * std::sin(q1),
-                            -c1 * std::cos(q1));
-  const double lower = link(
-      p.mass2, p.length2, w12, l1 * w1 * std::cos(q1) + c2 * w12 * std::cos(q12),
-      l1 * w1 * std::sin(q1) + c2 * w12 * std::sin(q12), -l1 * std::cos(q1) - c2 * std::cos(q12));
-  const double armatures = kArmature / 2 * (w1 * w1 + w2 * w2);
+  const double l1 = p.length1, l2 = p.length2, c1 = Or(p.center1, l1 / 2);
+  const double c2 = Or(p.center2, l2 / 2);
+  const double I1 = Or(p.inertia1, CapsuleInertia(p.mass1, kCapsuleRadius, l1).across);
+  const double I2 = Or(p.inertia2, CapsuleInertia(p.mass2, kCapsuleRadius, l2).across);
+  const double upper =
+      link(p.mass1, I1, w1, c1 * w1 * std::cos(q1), c1 * w1 * std::sin(q1), -c1 * std::cos(q1));
+  const double lower = link(p.mass2, I2, w12, l1 * w1 * std::cos(q1) + c2 * w12 * std::cos(q12),
+                            l1 * w1 * std::sin(q1) + c2 * w12 * std::sin(q12),
+                            -l1 * std::cos(q1) - c2 * std::cos(q12));
+  const double armatures = p.armature / 2 * (w1 * w1 + w2 * w2);
   const double rotors =
       p.rotor_inertia / 2 * (square(p.gear_ratio * w1) + square(w1 - p.gear_ratio * w2));
   return upper + lower + armatures + rotors;
@@ -73,6 +78,11 @@ TEST(Manipulator, SatisfiesLagrangesEquations) {
     p.gear_ratio = rng.Uniform(0, 10);
     p.coulomb1 = rng.Uniform(0, 0.5);
     p.coulomb2 = rng.Uniform(0, 0.5);
+    if (trial % 2 == 1) {
+      for (double* x : {&p.center1, &p.center2}) *x = rng.Uniform(0.1, 2);
+      for (double* x : {&p.inertia1, &p.inertia2}) *x = rng.Uniform(0.01, 1);
+      p.armature = rng.Uniform(0, 0.1);
+    }
     const PendulumState s{rng.Uniform(-3, 3), rng.Uniform(-3, 3), rng.Uniform(-2, 2),
                           rng.Uniform(-0.03, 0.03)};
     const std::array<double, 2> tau{rng.Uniform(-5, 5), rng.Uniform(-5, 5)};
@@ -101,6 +111,24 @@ TEST(Manipulator, EnergyIsThatOfTheLagrangian) {
     const double expected = Lagrangian(p, {s.q1, s.q2, s.w1, s.w2}) - 2 * resting + upright;
     EXPECT_NEAR(ManipulatorOf(p).At(s).energy, expected,
                 1e-11 * (1 + std::abs(resting)) + 1e-12 * std::abs(expected));
+  }
+}
+
+TEST(Manipulator, TheTaskHasTheTrueEnergyOfOwnLinks) {
+  Rng rng(5, "plants");
+  for (int trial = 0; trial < 100; ++trial) {
+    Plant p = RandomMachine(rng);
+    p.armature = p.rotor_inertia = 0;
+    if (!p.has_own_links()) p.inertia1 = 0.05;
+    const Manipulator m = ManipulatorOf(p);
+    const PendulumState s{rng.Uniform(-3, 3), rng.Uniform(-3, 3), rng.Uniform(-5, 5),
+                          rng.Uniform(-5, 5)};
+    const double energy = Energy(p, s);  // 0 at the height of the pivot
+    EXPECT_NEAR(energy, m.At(s).energy + m.G1 + m.G2, 1e-11 * (1 + std::abs(energy)));
+    // 0 hanging, 1 upright, with the true moments of gravity.
+    EXPECT_NEAR(EnergyTarget(p), m.G1 + m.G2, 1e-13 * (m.G1 + m.G2));
+    EXPECT_NEAR(NormalizedEnergy(p, {}), 0, 1e-14);
+    EXPECT_NEAR(NormalizedEnergy(p, {std::acos(-1.0), 0, 0, 0}), 1, 1e-14);
   }
 }
 

@@ -30,7 +30,8 @@ inline Plant RandomPlant(Rng& rng) {
   return plant;
 }
 
-/// A RandomPlant with rotors and dry friction, both small enough for the physics' steps.
+/// A RandomPlant with rotors and dry friction, both small enough for the physics' steps. It has its
+/// own armature, and often own centres of mass and inertias.
 inline Plant RandomMachine(Rng& rng) {
   Plant plant = RandomPlant(rng);
   const double inertia = plant.mass2 * plant.length2 * plant.length2;  // about link 2's
@@ -38,6 +39,12 @@ inline Plant RandomMachine(Rng& rng) {
   plant.rotor_inertia = rng.Uniform(0, 0.1) * inertia;
   plant.coulomb1 = rng.Uniform(0, 0.2) * inertia;
   plant.coulomb2 = rng.Uniform(0, 0.2) * inertia;
+  plant.armature = rng.Uniform(0.001, 0.05);
+  const auto often = [&](double value) { return rng.Uniform() < 0.7 ? value : 0; };
+  plant.center1 = often(rng.Uniform(0.2, 1.2) * plant.length1);
+  plant.center2 = often(rng.Uniform(0.2, 1.2) * plant.length2);
+  plant.inertia1 = often(rng.Uniform(0.02, 0.3) * plant.mass1 * plant.length1 * plant.length1);
+  plant.inertia2 = often(rng.Uniform(0.02, 0.3) * plant.mass2 * plant.length2 * plant.length2);
   return plant;
 }
 

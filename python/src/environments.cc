@@ -52,6 +52,7 @@ Config ConfigOf(const std::string& num_envs, const SettingTexts& settings) {
   Config scratch;
   const Options every = EverySetting(scratch);
   for (const FlagValue& flag : flags) {
+    if (flag.name == "plant") continue;  // a plant file
     for (const Option* option : every.Find(flag.name, flag.where)) {
       if (IsEnvironmentSetting(*option)) continue;
       throw BadInput(Concat(flag.where, ": expected a setting of an environment, got ", flag.name,

@@ -61,6 +61,7 @@ class PythonProgress {
 std::pair<std::string, std::string> EvaluateHandle(const PolicyHandle& policy,
                                                    const SettingTexts& settings,
                                                    const SettingTexts& arguments,
+                                                   const std::string& plant,
                                                    const std::string& model, bool unknown_plant,
                                                    const nb::object& progress) {
   TrialArguments trial;
@@ -76,6 +77,7 @@ std::pair<std::string, std::string> EvaluateHandle(const PolicyHandle& policy,
                           policy.loaded().task, " has no such setting"));
   }
   SetSurroundings(FlagsOf(settings), trial);
+  trial.plant = plant;
   trial.model = model;
   trial.unknown_plant = unknown_plant;
   PythonProgress told(progress);
@@ -95,7 +97,8 @@ nb::ndarray<nb::numpy, T> Grid(const MapResult& map, const Get& get) {
 
 nb::tuple MapHandle(const PolicyHandle& policy, const SettingTexts& settings,
                     const SettingTexts& arguments, const std::string& x, const std::string& y,
-                    bool unknown_plant, const std::string& out, const nb::object& progress) {
+                    const std::string& plant, bool unknown_plant, const std::string& out,
+                    const nb::object& progress) {
   MapArguments a;
   int64_t threads = 0;
   Options own;
@@ -108,6 +111,7 @@ nb::tuple MapHandle(const PolicyHandle& policy, const SettingTexts& settings,
   if (!y.empty()) a.y = y;
   for (const FlagValue& flag : FlagsOf(settings))
     a.trial.set.push_back(flag.name + "=" + flag.text);
+  a.trial.plant = plant;
   a.trial.unknown_plant = unknown_plant;
   a.out = out;
   PythonProgress told(progress);
@@ -136,9 +140,9 @@ nb::tuple MapHandle(const PolicyHandle& policy, const SettingTexts& settings,
 
 void BindEvaluation(nb::module_& m) {
   m.def("evaluate", &EvaluateHandle, nb::arg("policy"), nb::arg("settings"), nb::arg("arguments"),
-        nb::arg("model"), nb::arg("unknown_plant"), nb::arg("progress").none());
+        nb::arg("plant"), nb::arg("model"), nb::arg("unknown_plant"), nb::arg("progress").none());
   m.def("map", &MapHandle, nb::arg("policy"), nb::arg("settings"), nb::arg("arguments"),
-        nb::arg("x"), nb::arg("y"), nb::arg("unknown_plant"), nb::arg("out"),
+        nb::arg("x"), nb::arg("y"), nb::arg("plant"), nb::arg("unknown_plant"), nb::arg("out"),
         nb::arg("progress").none());
 }
 

@@ -6,9 +6,11 @@ import io
 import os
 import pickle
 import subprocess
+import tempfile
 import threading
 import unittest
 import warnings
+from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
@@ -99,6 +101,23 @@ class Environments(unittest.TestCase):
             np.testing.assert_array_equal(np.sign(env.state[2:]), signs)
         with self.assertRaisesRegex(ValueError, "actuated_joint: expected a multiple of 1"):
             gym.make(ID, actuated_joint=1.5)
+
+    def test_a_plant_comes_from_a_file(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "m.toml"
+            path.write_text("[plant]\nmass1 = 0.8\ncenter2 = 0.15\n[disturbance]\ndelay = 0.02\n")
+            env = gym.make(ID, plant=path, mass2=1.2).unwrapped
+            same = gym.make(ID, mass1=0.8, center2=0.15, delay=0.02, mass2=1.2).unwrapped
+            self.assertEqual(env.plant, same.plant)
+            self.assertEqual(env.plant["mass2"], 1.2)
+            for one, two in zip(play(env, [[3.0]] * 20, seed=1), play(same, [[3.0]] * 20, seed=1)):
+                np.testing.assert_array_equal(one, two)
+        board = gym.make(ID, plant="realaigym", physics="closed-form").unwrapped
+        self.assertEqual(board.action_space, gym.spaces.Box(-6, 6, (1,), np.float32))
+        one = upswing.load_policy("lqr", made_for="realaigym")
+        self.assertEqual(one.info["plant"]["armature"], 0)
+        figures = upswing.evaluate("lqr", plant="realaigym", episodes=1, torque_limit=5)
+        self.assertEqual((figures["plant"]["center1"], figures["plant"]["torque_limit"]), (0.2, 5))
 
     def test_the_reward_is_the_sum_of_its_terms(self):
         env = gym.make(ID, energy_weight=0.5, random_start_share=1)

@@ -46,7 +46,8 @@ class DoublePendulumEnv(gym.Env[npt.NDArray[np.float32], Any], EzPickle):
             `environment` in `upswing.settings()`: agent, which sets the defaults; physics ("mujoco"
             or "closed-form"), episode_seconds, random_start_share, start_noise, memory; the plant
             (mass1, …, torque_limit, actuated_joint, rotor_inertia, gear_ratio, coulomb1, coulomb2,
-            model); sensor_noise, delay, encoder_counts, velocity_window, velocity_filter,
+            center1, center2, inertia1, inertia2, armature, model); plant, a plant file (TOML with a
+            table [plant]) or a shipped plant such as "realaigym", which these change; sensor_noise, delay, encoder_counts, velocity_window, velocity_filter,
             sensor_latency; randomize, …; the reward weights
 
     >>> env = gym.make("upswing/DoublePendulum-v0", physics="closed-form", mass2=1.2, delay=0.02)

@@ -46,6 +46,7 @@ def evaluate(
     episodes: int = 100,
     seed: int = 0,
     physics: str = "mujoco",
+    plant: str | os.PathLike[str] | None = None,
     model: str | os.PathLike[str] | None = None,
     unknown_plant: bool = False,
     threads: int = 0,
@@ -67,6 +68,8 @@ def evaluate(
         episodes: number of episodes
         seed: seed of start states, noise and random plants
         physics: "mujoco" or "closed-form"
+        plant: plant file (TOML with a table [plant]) or shipped plant such as "realaigym", instead
+            of the policy's own plant; `settings` change it
         model: MJCF file that replaces the policy's model
         unknown_plant: scale observed energy and height by the training's plant, not the episode's
         threads: number of threads (0: one per processor, at most 8)
@@ -81,7 +84,7 @@ def evaluate(
     arguments = {"episodes": episodes, "seed": seed, "threads": threads, "physics": physics}
     figures, table = _upswing.evaluate(
         handle_of(policy, memory), texts_of(dict(settings)), texts_of(arguments),
-        "" if model is None else os.fspath(model), bool(unknown_plant), progress)
+        "" if plant is None else os.fspath(plant), "" if model is None else os.fspath(model), bool(unknown_plant), progress)
     return Evaluation(json.loads(figures), _columns(table))
 
 
@@ -128,6 +131,7 @@ def map(  # pylint: disable=redefined-builtin
     seed: int = 0,
     physics: str = "closed-form",
     check: float = 0.02,
+    plant: str | os.PathLike[str] | None = None,
     unknown_plant: bool = False,
     threads: int = 0,
     memory: int = 0,
@@ -147,6 +151,7 @@ def map(  # pylint: disable=redefined-builtin
         seed: seed of starts and noise
         physics: "closed-form" or "mujoco"
         check: share of cells to repeat in MuJoCo
+        plant: plant file or shipped plant, as for `evaluate`
         unknown_plant: scale observed energy and height by the training's plant, not the cell's
         threads: number of threads (0: one per processor, at most 8)
         memory: for a function, the number of past control steps in its observations
@@ -161,5 +166,5 @@ def map(  # pylint: disable=redefined-builtin
         arguments["episodes"] = episodes
     figures, successes, swing_up_seconds = _upswing.map(
         handle_of(policy, memory), texts_of(dict(settings)), texts_of(arguments), x or "", y or "",
-        bool(unknown_plant), "" if out is None else os.fspath(out), progress)
+        "" if plant is None else os.fspath(plant), bool(unknown_plant), "" if out is None else os.fspath(out), progress)
     return Map(json.loads(figures), successes, swing_up_seconds)

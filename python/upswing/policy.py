@@ -130,19 +130,26 @@ PolicyLike = Union[Policy, str, "os.PathLike[str]", Callable[[npt.NDArray[np.flo
 
 
 def load_policy(
-    path: str | os.PathLike[str], *, made_for: Mapping[str, float] | None = None, **settings: Any
+    path: str | os.PathLike[str],
+    *,
+    made_for: Mapping[str, float] | str | os.PathLike[str] | None = None,
+    **settings: Any,
 ) -> Policy:
     """Loads a policy.
 
     Args:
         path: policy file, run folder (for its best policy) or name of a controller, such as "lqr"
-        made_for: changes of a controller's design plant, such as {"mass2": 1.2}
+        made_for: changes of a controller's design plant, such as {"mass2": 1.2}; or a plant file or
+            shipped plant, such as "realaigym"
         **settings: settings of a controller, such as lqr_torque
 
     Raises:
         InputError: the policy does not exist, or its file is broken or of another kind
     """
-    changes = [f"{name}={text_of(value)}" for name, value in (made_for or {}).items()]
+    if isinstance(made_for, (str, os.PathLike)):
+        changes = [os.fspath(made_for)]
+    else:
+        changes = [f"{name}={text_of(value)}" for name, value in (made_for or {}).items()]
     return _load(os.fspath(path), texts_of(settings), changes)
 
 

@@ -93,7 +93,8 @@ def train(
             or evals.csv as a dictionary; the training stops if one returns False
         on_best: function that gets the best policy so far, at its evaluation; the training stops if
             it returns False
-        **settings: any setting of the agent, see `upswing.settings(agent)`
+        **settings: any setting of the agent, see `upswing.settings(agent)`; also plant, a plant file
+            (TOML with a table [plant]) or a shipped plant, between `config` and these settings
 
     Returns:
         Training: result of the training

@@ -169,6 +169,12 @@ UPSWING_EXPORT(policy_open) Controller* PolicyOpen(const std::byte* file, size_t
           "expected a policy for a plant without rotors and dry friction, as in the page, got one "
           "with them");
     }
+    if (controller->loaded.plant.has_own_links() ||
+        controller->loaded.plant.armature != kArmature) {
+      throw BadInput(
+          "expected a policy for links that are solid capsules and the usual armature, as in the "
+          "page, got others");
+    }
     SetText(About(*controller, tensors.metadata));
     return controller.release();
   });

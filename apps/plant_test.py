@@ -1,0 +1,146 @@
+#!/usr/bin/env python3
+"""Tests of plant files (--plant): the commands that take them, their layer below the other flags, and
+machines whose links are not solid capsules."""
+
+import csv
+import io
+import json
+import unittest
+
+from testing import MODEL, ProgramTest, read_tensors, small
+
+MACHINE = """[plant]
+mass1 = 0.8
+length2 = 0.4
+center1 = 0.3
+center2 = 0.15
+inertia1 = 0.02
+inertia2 = 0.015
+armature = 0.002
+rotor_inertia = 1e-4
+coulomb2 = 0.01
+
+[disturbance]
+delay = 0.02
+
+[actuator]
+ignored = true
+"""
+VALUES = {"mass1": 0.8, "length2": 0.4, "center1": 0.3, "center2": 0.15, "inertia1": 0.02,
+          "inertia2": 0.015, "armature": 0.002, "rotor_inertia": 1e-4, "coulomb2": 0.01}
+SETS = [argument for name, value in VALUES.items() for argument in ("--set", f"{name}={value}")]
+START = ("--start", "0.5,0.2,-1,2", "--seconds", "1")
+
+
+class PlantTest(ProgramTest):
+    def setUp(self):
+        super().setUp()
+        self.write("m.toml", MACHINE)
+
+    def table(self, *arguments):
+        """The rows of `simulate` as lists of numbers."""
+        text = self.succeed("simulate", *START, *arguments)
+        return [[float(x) for x in row] for row in list(csv.reader(io.StringIO(text)))[1:]]
+
+    def test_a_file_is_the_settings_that_it_has(self):
+        for physics in ("mujoco", "closed-form"):
+            self.assertEqual(self.table("--plant", "m.toml", "--physics", physics),
+                             self.table(*SETS, "--delay", "0.02", "--physics", physics))
+        self.assertNotEqual(self.table("--plant", "m.toml"), self.table())
+
+    def test_both_engines_move_it_alike(self):
+        for plant in (["m.toml"], ["realaigym"], ["m.toml", "--set", "actuated_joint=2"]):
+            one, two = (self.table("--plant", *plant, "--physics", physics)
+                        for physics in ("mujoco", "closed-form"))
+            for a, b in zip(one, two, strict=True):
+                for x, y in zip(a, b, strict=True):
+                    self.assertAlmostEqual(x, y, delta=1e-6 * max(1, abs(x)))
+
+    def test_flags_override_it(self):
+        more = ("--set", "mass1=1.1", "--delay", "0")
+        sets = [text for text in SETS if text != "mass1=0.8"]
+        sets.remove("--set")
+        self.assertEqual(self.table("--plant", "m.toml", *more), self.table(*sets, *more))
+
+    def test_evaluations_say_it(self):
+        done = json.loads(self.succeed("eval", "lqr", "--plant", "m.toml", "--episodes", 1, "--json"))
+        self.assertLessEqual(VALUES.items(), done["plant"].items())
+        self.assertEqual(done["disturbance"]["delay"], 0.02)
+        known = ("--episodes", 1, "--episodes-csv", "-")
+        self.assertEqual(
+            self.succeed("eval", "energy", "--plant", "m.toml", "--set", "coulomb2=0", "--made-for",
+                         "m.toml", "--made-for", "coulomb2=0", *known),
+            self.succeed("eval", "energy", "--plant", "m.toml", "--set", "coulomb2=0",
+                         "--known-plant", *known))
+        self.assertEqual(
+            self.succeed("eval", "lqr", "--made-for", "realaigym", "--made-for", "mass1=0.6", *known),
+            self.succeed("eval", "lqr", "--made-for", "mass1=0.6", "--made-for", "realaigym", *known))
+
+    def test_maps_bounds_and_views(self):
+        grid = ("--x", "center2=0.1:0.2:2", "--y", "inertia1=0.01:0.03:2", "--episodes", 1, "--check", 1)
+        mapped = json.loads(self.succeed("map", "lqr", "--plant", "m.toml", *grid, "--out", "map",
+                                         "--json", "--set", "mass2=1.2"))
+        self.assertLessEqual({"armature": 0.002, "mass1": 0.8, "mass2": 1.2}.items(),
+                             mapped["plant"].items())
+        self.assertIn("delay 0.02", mapped["changes"])
+        few = ("--set", "coulomb2=0", "--episodes", 1, "--guesses", 2, "--torques", 3, "--physics", "closed-form")
+        self.assertEqual(self.succeed("bounds", "lqr", "--plant", "m.toml", *few),
+                         self.succeed("bounds", "lqr", *SETS, *few))
+        self.succeed("view", "--headless", "--csv", "v.csv", *START, "--plant", "m.toml")
+        self.succeed("simulate", "--csv", "s.csv", *START, "--plant", "m.toml")
+        self.assertEqual((self.folder / "v.csv").read_text(), (self.folder / "s.csv").read_text())
+
+    def test_a_run_holds_the_values(self):
+        self.write("c.toml", "[plant]\nmass1 = 2\nmass2 = 2\n")
+        self.succeed(*small(config="c.toml", plant="m.toml", length2=0.45, coulomb2=0,
+                            rotor_inertia=0, steps=400, eval_every=400,
+                            eval_episodes=1, physics="mujoco"))
+        config = (self.folder / "run/config.toml").read_text()
+        for line in ("mass1 = 0.8 ", "mass2 = 1 ", "length2 = 0.45 ", "center1 = 0.3 ",
+                     "inertia2 = 0.015 ", "armature = 0.002 ", "delay = 0.02 "):
+            self.assertIn("\n" + line, config)
+        plant = json.loads(read_tensors(self.folder / "run/policy.safetensors")[0]["plant"])
+        here = {name: VALUES[name] for name in VALUES if name not in ("rotor_inertia", "coulomb2")}
+        self.assertLessEqual((here | {"length2": 0.45}).items(), plant.items())
+        self.refuse(["export", "run", "--page", "page"], "solid capsules")
+        self.succeed("export", "run", "--c", "p.h")
+        self.succeed("train", "--resume", "run", "--steps", 500)
+        self.refuse(["train", "--resume", "run", "--plant", "m.toml"], "--resume: expected no --plant")
+
+    def test_a_plant_without_own_links_is_in_no_policy_file(self):
+        self.succeed(*small(steps=400, eval_every=400, eval_episodes=1))
+        plant = json.loads(read_tensors(self.folder / "run/policy.safetensors")[0]["plant"])
+        self.assertEqual(set(plant), {"mass1", "mass2", "length1", "length2", "damping1", "damping2",
+                                      "gravity", "torque_limit"})
+
+    def test_a_controller_for_the_board(self):
+        board = json.loads(self.succeed("realaigym", "tvlqr", "--made-for", "realaigym", "--json"))
+        self.assertEqual(board["policy"], "tvlqr (for realaigym)")
+        self.assertTrue(board["performance"]["swung_up"])
+        self.assertGreater(board["performance"]["score"], 0.45)
+        self.assertNotIn("designed for", self.succeed("realaigym", "tvlqr", "--made-for", "realaigym"))
+        changed = self.succeed("realaigym", "tvlqr", "--made-for", "realaigym", "--made-for", "mass1=0.6")
+        self.assertIn("tvlqr (for realaigym and mass1 0.6)", changed)
+        self.assertIn("designed for mass1 0.6", changed)
+
+    def test_mistakes(self):
+        self.write("bad.toml", "[plant]\nmas1 = 1\n")
+        self.write("other.toml", "[sensor]\n")
+        self.write("m.xml", MODEL)
+        for command in (["simulate"], ["eval", "lqr"], ["plot", "lqr"], ["map", "lqr"], ["bounds"],
+                        ["view", "--headless", "--csv", "v.csv"], small()):
+            self.refuse([*command, "--plant", "bad.toml"], "bad.toml:2: [plant]", "did you mean mass1?")
+            self.refuse([*command, "--plant", "none"], "--plant: expected a plant file", "realaigym",
+                        'got "none"')
+        self.refuse(["simulate", "--plant", "other.toml"], "other.toml:1", "did you mean sensors?")
+        self.refuse(["eval", "lqr", "--made-for", "bad.toml"], "bad.toml:2: [plant]")
+        self.refuse(["eval", "lqr", "--made-for", "m.toml", "--made-for", "realaigym"],
+                    "--made-for: expected at most one plant file")
+        self.refuse(["simulate", "--plant", "m.toml", "--model", "m.xml"], "--plant", "--model")
+        self.refuse(["simulate", "--model", "m.xml", "--set", "armature=0.02"], "armature: expected 0.01")
+        self.refuse(small(plant="m.toml", task="pendulum-v1", agent="pendulum-v1", envs=None),
+                    "pendulum-v1")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,108 @@
+#include "run/plant_file.h"
+
+#include <algorithm>
+#include <array>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "io/file.h"
+#include "io/streams.h"
+#include "run/shipped_plants.h"
+#include "setup/toml_settings.h"
+
+namespace upswing {
+namespace {
+
+/// Largest size of a plant file, bytes.
+constexpr size_t kMostPlantBytes = 1 << 20;
+
+/// Tables of a plant file with the other parts of a machine.
+constexpr std::array<std::string_view, 5> kOtherTables{"actuator", "sensors", "loop", "covariance",
+                                                       "source"};
+
+/// The settings of a plant file.
+struct PlantSettings {
+  Plant plant;
+  Disturbance disturbance;
+
+  void Describe(Options& o) {
+    plant.Describe(o);
+    disturbance.Describe(o);
+  }
+};
+
+/// Removes kOtherTables. Throws BadInput unless each table left is one of a plant file.
+void TakeOwnTables(toml::table& table, const std::string& where) {
+  std::vector<std::string> known{"plant", "disturbance"};
+  for (const std::string_view other : kOtherTables) {
+    known.emplace_back(other);
+    if (table[other].is_table()) table.erase(other);
+  }
+  for (const auto& [key, node] : table) {
+    const std::string name(key.str());
+    if (!node.is_table() || std::ranges::find(known, name) != known.end()) continue;
+    throw BadInput(Concat(PlaceOf(node, where), ": expected one of the tables ", Join(known, ", "),
+                          ", got [", Printable(name), "]", DidYouMean(name, known)));
+  }
+  if (table["plant"].is_table()) return;
+  throw BadInput(Concat(where, ": expected a table [plant], got none"));
+}
+
+}  // namespace
+
+std::vector<FlagValue> PlantFile::PlantFlags() const {
+  std::vector<FlagValue> flags;
+  const Options options = OptionsOf(plant);
+  for (const Option& option : options.all()) {
+    flags.push_back({option.name, option.text(), Concat(name, ": ", option.name)});
+  }
+  return flags;
+}
+
+std::vector<std::string> ShippedPlants() { return NamesOf(EmbeddedPlants()); }
+
+PlantFile ParsePlantFile(std::string_view toml, const std::string& where) {
+  toml::table table = ParseToml(toml, where);
+  TakeOwnTables(table, where);
+  PlantSettings settings;
+  PlantFile file;
+  const Options of_plant = OptionsOf(settings.plant);
+  for (FlagValue& flag : ApplyTable(OptionsOf(settings), table, where, false)) {
+    const std::string& first = OptionsOf(settings).Find(flag.name, where).front()->name;
+    if (of_plant.Get(first) == nullptr) file.disturbance.push_back(std::move(flag));
+  }
+  file.plant = settings.plant;
+  file.name = where;
+  return file;
+}
+
+PlantFile ReadPlantFile(const std::string& name, const std::string& flag,
+                        const std::string& else_taken) {
+  const auto plants = EmbeddedPlants();
+  const auto shipped = std::ranges::find(plants, name, &ShippedPlant::name);
+  if (shipped != plants.end()) return ParsePlantFile(shipped->toml, Concat("plant ", name));
+  if (!std::filesystem::exists(name)) {
+    const std::vector<std::string> names = ShippedPlants();
+    throw BadInput(Concat(flag, ": expected ", else_taken, "a plant file (TOML) or one of ",
+                          Join(names, ", "), ", got \"", Printable(name), "\"",
+                          DidYouMean(name, names)));
+  }
+  return ParsePlantFile(ReadOwnFile(name, kMostPlantBytes), name);
+}
+
+std::vector<FlagValue> WithPlantFile(const std::vector<FlagValue>& flags) {
+  std::vector<FlagValue> result, others;
+  for (const FlagValue& flag : flags) {
+    if (flag.name != "plant") {
+      others.push_back(flag);
+      continue;
+    }
+    const PlantFile file = ReadPlantFile(flag.text, flag.where.empty() ? "--plant" : flag.where);
+    result = file.PlantFlags();
+    result.insert(result.end(), file.disturbance.begin(), file.disturbance.end());
+  }
+  result.insert(result.end(), others.begin(), others.end());
+  return result;
+}
+
+}  // namespace upswing
