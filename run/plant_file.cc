@@ -18,7 +18,7 @@ constexpr size_t kMostPlantBytes = 1 << 20;
 
 /// Tables of a plant file with the other parts of a machine.
 constexpr std::array<std::string_view, 5> kOtherTables{"actuator", "sensors", "loop", "covariance",
-                                                       "source"};
+                                                       "sessions"};
 
 /// The settings of a plant file.
 struct PlantSettings {
@@ -31,9 +31,11 @@ struct PlantSettings {
   }
 };
 
-/// Removes kOtherTables. Throws BadInput unless each table left is one of a plant file.
+/// Removes kOtherTables and the machine's name. Throws BadInput unless each table left is one of a
+/// plant file.
 void TakeOwnTables(toml::table& table, const std::string& where) {
   std::vector<std::string> known{"plant", "disturbance"};
+  if (table["name"].is_string()) table.erase("name");
   for (const std::string_view other : kOtherTables) {
     known.emplace_back(other);
     if (table[other].is_table()) table.erase(other);
@@ -76,18 +78,24 @@ PlantFile ParsePlantFile(std::string_view toml, const std::string& where) {
   return file;
 }
 
-PlantFile ReadPlantFile(const std::string& name, const std::string& flag,
+PlantDocument ReadPlantDocument(const std::string& name, const std::string& flag,
                         const std::string& else_taken) {
   const auto plants = EmbeddedPlants();
   const auto shipped = std::ranges::find(plants, name, &ShippedPlant::name);
-  if (shipped != plants.end()) return ParsePlantFile(shipped->toml, Concat("plant ", name));
+  if (shipped != plants.end()) return {std::string(shipped->toml), Concat("plant ", name)};
   if (!std::filesystem::exists(name)) {
     const std::vector<std::string> names = ShippedPlants();
     throw BadInput(Concat(flag, ": expected ", else_taken, "a plant file (TOML) or one of ",
                           Join(names, ", "), ", got \"", Printable(name), "\"",
                           DidYouMean(name, names)));
   }
-  return ParsePlantFile(ReadOwnFile(name, kMostPlantBytes), name);
+  return {ReadOwnFile(name, kMostPlantBytes), name};
+}
+
+PlantFile ReadPlantFile(const std::string& name, const std::string& flag,
+                        const std::string& else_taken) {
+  const auto [toml, where] = ReadPlantDocument(name, flag, else_taken);
+  return ParsePlantFile(toml, where);
 }
 
 std::vector<FlagValue> WithPlantFile(const std::vector<FlagValue>& flags) {

@@ -27,6 +27,16 @@ std::vector<std::string> ShippedPlants();
 /// the file in messages. Throws BadInput.
 PlantFile ParsePlantFile(std::string_view toml, const std::string& where);
 
+/// The text of a plant file, and its name for messages.
+struct PlantDocument {
+  std::string toml, where;
+};
+
+/// The text of the shipped plant of this name, or of the plant file at this path. Messages name the
+/// argument `flag`, and what else it takes. Throws BadInput.
+PlantDocument ReadPlantDocument(const std::string& name, const std::string& flag,
+                        const std::string& else_taken = "");
+
 /// The shipped plant of this name, or the plant file at this path. Messages name the argument
 /// `flag`, and what else it takes. Throws BadInput.
 PlantFile ReadPlantFile(const std::string& name, const std::string& flag = "--plant",

@@ -50,7 +50,7 @@ ALLOWED_FILES = {
     "nanobind": re.compile(r"python/"),
     "hwy": re.compile(r"(core/simd(_test)?|nn/(linear|product|registers-inl)|bench/roofline|"
                       r"sim/(closed_form|sine_cosine-inl)|realaigym/swing_net)\.(h|cc)$"),
-    "Eigen": re.compile(r"(control|realaigym)/|nn/[^/]*_test\.cc$|bench/"),
+    "Eigen": re.compile(r"(control|machine|realaigym)/|nn/[^/]*_test\.cc$|bench/"),
 }
 
 # Tests and benchmarks of the portable layers may include headers of the operating system.

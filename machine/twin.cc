@@ -1,0 +1,288 @@
+#include "machine/twin.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "run/plant_file.h"
+#include "setup/toml_settings.h"
+#include "sim/disturbance.h"
+
+namespace upswing {
+namespace {
+
+using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+constexpr size_t kMostUncertain = 32;
+constexpr size_t kMostSessions = 1000;
+
+/// Reads the table [covariance]: for each value, a list with its covariances with all of them.
+void ReadCovariance(const toml::table& table, const std::string& where, Twin& twin) {
+  const Options options = OptionsOf(twin);
+  if (table.size() > kMostUncertain) {
+    throw BadInput(Concat(PlaceOf(table, where), ": [covariance]: expected at most ",
+                          kMostUncertain, " values, got ", table.size()));
+  }
+  // The order of the rows in the file gives the order of the columns.
+  std::vector<std::pair<toml::source_position, std::string>> order;
+  for (const auto& [name, node] : table) {
+    order.emplace_back(name.source().begin, std::string(name.str()));
+  }
+  std::ranges::sort(order, [](const auto& a, const auto& b) { return a.first < b.first; });
+  const size_t n = order.size();
+  for (const auto& [position, name] : order) {
+    const toml::node& node = *table.get(name);
+    const std::string place = Concat(PlaceOf(node, where), ": ", name);
+    options.Find(name, Concat(PlaceOf(node, where), ": [covariance]"));
+    const toml::array* row = node.as_array();
+    if (row == nullptr || row->size() != n) {
+      throw BadInput(Concat(place, ": expected a list of ", n, " numbers, one for each row, got ",
+                            row == nullptr ? "no list" : std::to_string(row->size())));
+    }
+    for (const toml::node& item : *row) {
+      const std::optional<double> value = item.value<double>();
+      if (!value || !std::isfinite(*value)) {
+        throw BadInput(Concat(place, ": expected finite numbers, got another value"));
+      }
+      twin.covariance.push_back(*value);
+    }
+    twin.uncertain.push_back(name);
+  }
+}
+
+/// A factor L of the covariance L L'. Throws BadInput if the matrix is not a covariance.
+Matrix Factor(const Twin& twin, const std::string& where) {
+  const int n = static_cast<int>(twin.uncertain.size());
+  const Eigen::Map<const Matrix> covariance(twin.covariance.data(), n, n);
+  // Scaled to ones on the diagonal, so that the test does not depend on units.
+  const Eigen::VectorXd deviation = covariance.diagonal().cwiseMax(0).cwiseSqrt();
+  Matrix correlation = Matrix::Zero(n, n);
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) {
+      const double scale = deviation(i) * deviation(j);
+      correlation(i, j) = scale > 0 ? covariance(i, j) / scale : covariance(i, j);
+    }
+  }
+  constexpr double kRounding = 1e-6;
+  if (!correlation.isApprox(correlation.transpose(), kRounding)) {
+    throw BadInput(Concat(where, ": [covariance]: expected a symmetric matrix, got another one"));
+  }
+  const Eigen::LDLT<Matrix> factors(correlation);
+  const Eigen::VectorXd D = factors.vectorD();
+  if (covariance.diagonal().minCoeff() < 0 || D.minCoeff() < -kRounding) {
+    throw BadInput(Concat(where, ": [covariance]: expected a positive matrix, got one with ",
+                          "negative variances"));
+  }
+  Matrix L = factors.matrixL();
+  L = factors.transpositionsP().transpose() * L;
+  return deviation.asDiagonal() * L * D.cwiseMax(0).cwiseSqrt().asDiagonal();
+}
+
+/// Reads the table [sessions]: for each session, a table of its values.
+void ReadSessions(const toml::table& table, const std::string& where, Twin& twin) {
+  if (table.size() > kMostSessions) {
+    throw BadInput(Concat(PlaceOf(table, where), ": [sessions]: expected at most ", kMostSessions,
+                          " sessions, got ", table.size()));
+  }
+  for (const auto& [name, node] : table) {
+    if (!node.is_table()) {
+      throw BadInput(Concat(PlaceOf(node, where), ": ", Printable(name.str()),
+                            ": expected a table, got another type"));
+    }
+    Session& session = twin.sessions.emplace_back();
+    session.name = std::string(name.str());
+    ApplyTable(OptionsOf(session), *node.as_table(), where, /*alone=*/true);
+  }
+}
+
+/// The sensors of the control loop, and the time that a torque takes, as the age of what they show.
+Disturbance DisturbanceOf(const Twin& twin) {
+  Disturbance d;
+  const double share = twin.sensors.velocity_share;
+  d.sensors.latency =
+      std::clamp(twin.loop.period + twin.actuator.delay + twin.actuator.lag, 0.0, kLongestLatency);
+  if (twin.sensors.quantum > 0) {
+    d.sensors.encoder_counts = std::round(2 * std::numbers::pi / twin.sensors.quantum);
+  }
+  d.sensors.velocity_window = std::min(twin.loop.period, kLongestWindow);
+  d.sensors.velocity_filter = std::min(twin.loop.period * (1 - share) / share, kSlowestFilter);
+  return d;
+}
+
+std::string Quoted(std::string_view text) {
+  std::string quoted = "\"";
+  for (const char c : Printable(text)) {
+    if (c == '"' || c == '\\') quoted += '\\';
+    quoted += c;
+  }
+  return quoted + '"';
+}
+
+}  // namespace
+
+void Actuator::Describe(Options& o) {
+  constexpr double kLongest = 0.1;  // s
+  o.Section("actuator");
+  o.Add(&delay, "delay", {-kLongest, kLongest}, "s",
+        "time from reading the angles to the response of the torque sent with them");
+  o.Add(&lag, "lag", {0, kLongest}, "s", "time constant of the torque");
+  o.Add(&passive_limit, "passive_limit", {0, 1000}, "N·m",
+        "largest torque of the joint that is not actuated");
+  o.Add(&current_delay, "current_delay", {-kLongest, kLongest}, "s", "age of the reported torque");
+  o.Add(&current_inertia, "current_inertia", {0, 1}, "kg·m²",
+        "part of the reported torque that opposes the joint's acceleration");
+}
+
+void MachineSensors::Describe(Options& o) {
+  o.Section("sensors");
+  o.Add(&quantum, "quantum", {0, 1}, "rad", "step of a measured angle");
+  o.Add(&angle_range, "angle_range", {1, 1e6}, "rad", "largest measured angle");
+  o.Add(&torque_quantum, "torque_quantum", {0, 10}, "N·m", "step of a reported torque");
+  o.Add(&zero1, "zero1", {-1, 1}, "rad", "measured angle of joint 1 that hangs");
+  o.Add(&zero2, "zero2", {-1, 1}, "rad", "measured angle of a straight joint 2");
+  o.Add(&velocity_share, "velocity_share", {0.001, 1}, "",
+        "share of the newest difference of angles in the low-passed velocity");
+  o.Add(&velocity_dead_zone, "velocity_dead_zone", {0, 100}, "rad/s",
+        "velocity below which the loop takes 0");
+}
+
+void LoopTiming::Describe(Options& o) {
+  o.Section("loop");
+  o.Add(&period, "period", {1e-4, 1}, "s", "median time between two cycles");
+  o.Add(&jitter, "jitter", {0, 0.1}, "s", "standard deviation of this time");
+  o.Add(&late_share, "late_share", kUnit, "", "share of the cycles that are late");
+  o.Add(&late, "late", {0, 1}, "s", "largest lateness of these");
+}
+
+void Session::Describe(Options& o) {
+  o.Add(&zero1, "zero1", {-1, 1}, "rad", "measured angle of joint 1 that hangs");
+  o.Add(&zero2, "zero2", {-1, 1}, "rad", "measured angle of a straight joint 2");
+  o.Add(&coulomb1, "coulomb1", {0, 10}, "N·m", "dry friction of joint 1");
+  o.Add(&coulomb2, "coulomb2", {0, 10}, "N·m", "dry friction of joint 2");
+}
+
+std::string SessionOf(const std::string& log) {
+  std::string session;
+  for (const char c : log) {
+    if (c < '0' || c > '9') session += c;
+  }
+  constexpr int kFolders = 2;
+  size_t begin = session.size();
+  for (int i = 0; i <= kFolders && begin != std::string::npos && begin > 0; ++i) {
+    begin = session.rfind('/', begin - 1);
+  }
+  if (begin != std::string::npos && begin < session.size()) session.erase(0, begin + 1);
+  return session.substr(0, session.find(".csv"));
+}
+
+void Twin::Describe(Options& options) {
+  plant.Describe(options);
+  actuator.Describe(options);
+  sensors.Describe(options);
+  loop.Describe(options);
+}
+
+Twin ParseTwin(std::string_view text, const std::string& where) {
+  toml::table table = ParseToml(text, where);
+  Twin twin;
+  const auto take = [&](std::string_view key, const auto& read) {
+    if (const toml::node* node = table.get(key)) {
+      read(*node, Concat(PlaceOf(*node, where), ": ", key));
+      table.erase(key);
+    }
+  };
+  take("name", [&](const toml::node& node, const std::string& place) {
+    if (!node.is_string()) throw BadInput(Concat(place, ": expected a text, got another type"));
+    twin.name = node.as_string()->get();
+  });
+  const auto table_of = [](const toml::node& node, const std::string& place) {
+    if (!node.is_table()) throw BadInput(Concat(place, ": expected a table, got another type"));
+    return *node.as_table();
+  };
+  table.erase("disturbance");  // follows from the other values
+  take("covariance", [&](const toml::node& node, const std::string& place) {
+    ReadCovariance(table_of(node, place), where, twin);
+  });
+  take("sessions", [&](const toml::node& node, const std::string& place) {
+    ReadSessions(table_of(node, place), where, twin);
+  });
+  ApplyTable(OptionsOf(twin), table, where, /*alone=*/false);
+  if (!twin.uncertain.empty()) Factor(twin, where);
+  return twin;
+}
+
+Twin ReadTwin(const std::string& name, const std::string& flag) {
+  const auto [toml, where] = ReadPlantDocument(name, flag);
+  return ParseTwin(toml, Printable(where));
+}
+
+std::string TwinText(const Twin& twin) {
+  std::string text = Concat("name = ", Quoted(twin.name), "\n\n");
+  text += OptionsOf(twin).Toml(/*comments=*/true, [](const Option&) { return true; });
+  const Disturbance disturbance = DisturbanceOf(twin);
+  text += "\n" + OptionsOf(disturbance).Toml(/*comments=*/true, [](const Option&) { return true; });
+  for (const Session& session : twin.sessions) {
+    text += Concat("\n[sessions.", Quoted(session.name), "]\n");
+    const Options options = OptionsOf(session);
+    for (const Option& option : options.all()) {
+      text += Concat(option.name, " = ", option.text(), "\n");
+    }
+  }
+  if (twin.uncertain.empty()) return text;
+  text += "\n[covariance]  # of the values with these names, in this order\n";
+  const size_t n = twin.uncertain.size();
+  for (size_t i = 0; i < n; ++i) {
+    std::vector<std::string> row;
+    for (size_t j = 0; j < n; ++j) row.push_back(FormatNumber(twin.covariance[i * n + j]));
+    text += Concat(twin.uncertain[i], " = [", Join(row, ", "), "]\n");
+  }
+  return text;
+}
+
+Twin InSession(const Twin& twin, const MachineLog& log) {
+  Twin own = twin;
+  const std::string name = SessionOf(log.name);
+  for (const Session& session : twin.sessions) {
+    if (session.name != name) continue;
+    own.sensors.zero1 = session.zero1;
+    own.sensors.zero2 = session.zero2;
+    own.plant.coulomb1 = session.coulomb1;
+    own.plant.coulomb2 = session.coulomb2;
+  }
+  return own;
+}
+
+Twin DrawTwin(const Twin& twin, Rng& rng) {
+  Twin drawn = twin;
+  const int n = static_cast<int>(twin.uncertain.size());
+  if (n == 0) return drawn;
+  Eigen::VectorXd z(n);
+  for (double& number : z) number = rng.Normal();
+  const Eigen::VectorXd change = Factor(twin, twin.name) * z;
+  const Options options = OptionsOf(drawn);
+  for (int i = 0; i < n; ++i) {
+    const Option& option = *options.Get(twin.uncertain[static_cast<size_t>(i)]);
+    double& value = *std::get<double*>(option.target);
+    value = std::clamp(value + change(i), option.range.low, option.range.high);
+  }
+  return drawn;
+}
+
+int ActuatedJoint(const MachineLog& log, const Twin& twin) {
+  if (log.commanded.empty()) return 0;
+  Joints largest{};
+  for (const Joints& torque : log.commanded) {
+    for (int j = 0; j < 2; ++j) largest[j] = std::max(largest[j], std::abs(torque[j]));
+  }
+  // A compensating motor adds friction compensation to a command within its limit.
+  const double compensating = 2 * std::max(twin.actuator.passive_limit, 0.0);
+  for (int j = 0; j < 2; ++j) {
+    if (largest[1 - j] <= compensating && largest[j] > 2 * compensating) return j + 1;
+  }
+  return 0;
+}
+
+}  // namespace upswing
