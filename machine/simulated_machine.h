@@ -1,0 +1,96 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+
+#include "core/rng.h"
+#include "machine/log.h"
+#include "machine/motion.h"
+#include "machine/twin.h"
+
+/// The machine that a twin describes: motors, links, encoders and control loop, in time.
+namespace upswing {
+
+/// What the encoders and drives report.
+struct MachineReading {
+  Joints angle;   // rad
+  Joints torque;  // N·m
+};
+
+/// Motors, links and encoders. A negative delay of the twin's motors becomes the age of the
+/// readings: only the sum of both can be told from logs.
+class SimulatedMachine {
+ public:
+  /// Begins at time 0 in a state, whose angles are true ones, without torque.
+  SimulatedMachine(const Twin& twin, const PendulumState& start);
+
+  /// Lets time pass until `time`, s.
+  void Advance(double time);
+  /// Sends torques (N·m) now. The motors hold them until the next ones.
+  void Command(const Joints& torque);
+  /// Reads encoders and drives now.
+  MachineReading Read() const;
+
+  double time() const { return moments_.back().time; }
+  /// The true state now.
+  const PendulumState& state() const { return moments_.back().state; }
+
+ private:
+  struct Moment {
+    double time;
+    PendulumState state;
+    Joints acceleration;  // rad/s²
+  };
+  /// The moment `age` seconds ago, by interpolation.
+  Moment Ago(double age) const;
+
+  Twin twin_;
+  Manipulator body_;
+  Drive drive_;
+  int cursor_ = 0;
+  double angle_age_, torque_age_;  // s
+  std::deque<Moment> moments_;     // the newest last; at least as long as the ages
+};
+
+/// The velocities (rad/s) that the control loop computes from measured angles: finite differences,
+/// low-passed.
+class VelocityEstimate {
+ public:
+  explicit VelocityEstimate(const MachineSensors& sensors) : sensors_(sensors) {}
+  /// Takes the angles (rad) read at a time (s).
+  Joints Update(double time, const Joints& angle);
+
+ private:
+  MachineSensors sensors_;
+  bool first_ = true;
+  double time_ = 0;
+  Joints angle_{}, velocity_{};
+};
+
+/// What a controller sees in a cycle.
+struct CycleInput {
+  double time;      // s
+  Joints angle;     // rad
+  Joints velocity;  // of VelocityEstimate, rad/s
+};
+
+/// Computes the torques (N·m) of both joints.
+using CycleController = std::function<Joints(const CycleInput&)>;
+
+/// A closed loop on a simulated machine.
+struct LoopRun {
+  double seconds = 10;
+  PendulumState start = {};                 // true angles
+  std::function<Joints(double)> push = {};  // torques (N·m) added at a time (s); empty: none
+  // The loop stops at a larger angle (rad) or velocity (rad/s).
+  double largest_angle = 1e9, largest_velocity = 1e9;
+  int actuated_joint = 0;  // the other motor is limited to passive_limit; 0: both are alike
+  uint64_t seed = 0;       // of the cycles' periods
+};
+
+/// Runs a controller on the twin's machine in the twin's loop, and returns the log. A cycle reads
+/// the angles while it sends the torques of the cycle before.
+MachineLog RunLoop(const Twin& twin, const LoopRun& run, const CycleController& controller);
+
+}  // namespace upswing
