@@ -1,0 +1,469 @@
+#include "machine/fit.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+
+#include "core/error.h"
+#include "core/text.h"
+
+// Symbols: θ values shared by all windows, x start state of a window, r residuals, J = ∂r/∂θ,
+// K = ∂r/∂x; H.. blocks of the Gauss-Newton matrix, g. gradients.
+namespace upswing {
+namespace {
+
+using Eigen::Matrix4d;
+using Eigen::MatrixXd;
+using Eigen::Vector4d;
+using Eigen::VectorXd;
+
+// Standard deviations of a start state about its cubic (rad, rad/s), and the weight of that prior.
+const Vector4d kStartDeviation(0.002, 0.002, 0.06, 0.06);
+constexpr double kStartWeight = 0.05;
+// Limits of the scales of the robust cost.
+constexpr double kSmallestScale = 1e-5, kLargestScale = 0.1;  // rad
+constexpr double kSmallestTorqueScale = 1e-3;                 // N·m
+
+/// Typical size of a value, for finite differences.
+double ScaleOf(const std::string& name) {
+  static const std::map<std::string, double, std::less<>> kScales{
+      {"delay", 0.002},   {"lag", 0.005},    {"current_delay", 0.002}, {"current_inertia", 0.002},
+      {"zero1", 0.02},    {"zero2", 0.02},   {"armature", 0.003},      {"damping1", 0.02},
+      {"damping2", 0.02}, {"coulomb1", 0.1}, {"coulomb2", 0.1},        {"inertia1", 0.01},
+      {"inertia2", 0.01}};
+  const auto found = kScales.find(name);
+  return found == kScales.end() ? 0.2 : found->second;
+}
+
+/// An entry of θ: a setting of the twin; or, with a session, that session's deviation from it.
+struct Value {
+  std::string name;
+  double scale;
+  int session;  // -1: all
+  Range range;
+};
+
+/// Which residuals a value changes, and what has to be computed anew for it.
+bool ChangesDrive(const std::string& name) { return name == "delay" || name == "lag"; }
+
+/// Prior standard deviation of a session's value about the machine's: of the encoders' zeros (rad),
+/// and of dry friction (N·m), which changes with temperature and wear. 0: the same in all sessions.
+double SessionDeviation(const std::string& name) {
+  if (name == "zero1" || name == "zero2") return 0.05;
+  return name == "coulomb1" || name == "coulomb2" ? 0.03 : 0;
+}
+
+/// A window with its free start state.
+struct Shot {
+  Window window;
+  Vector4d x, cubic;
+  int session;
+};
+
+/// The twin of one session, ready to predict: equations of motion and torques of each log.
+struct Model {
+  Manipulator body;
+  Joints zero;
+  double current_delay, current_inertia;
+};
+
+/// Residuals of a window, two columns each: angles, and reported torques (no rows without).
+struct Residuals {
+  Eigen::MatrixX2d angle, torque;
+};
+
+/// A window's share in the normal equations.
+struct Share {
+  double cost = 0, squares = 0, torque_squares = 0;  // squares: means over rows
+  Matrix4d Hxx;
+  Vector4d gx;
+  MatrixXd Hxt, Htt;  // (4 × n), (n × n)
+  VectorXd gt;
+};
+
+class Problem {
+ public:
+  Problem(std::span<const MachineLog> logs, const Twin& first,
+          const std::vector<std::string>& names, const FitConfig& config, ThreadPool* pool)
+      : logs_(logs), twin_(first), pool_(pool) {
+    twin_.sessions.clear();
+    twin_.uncertain.clear();
+    twin_.covariance.clear();
+    std::map<std::string, int> sessions;
+    for (const MachineLog& log : logs) {
+      const auto [place, is_new] =
+          sessions.emplace(SessionOf(log.name), static_cast<int>(sessions_.size()));
+      if (is_new) sessions_.push_back(place->first);
+      session_of_.push_back(place->second);
+    }
+    const Options options = OptionsOf(twin_);
+    for (const std::string& name : names) {
+      const Option& option = *options.Find(name, "identify").front();
+      values_.push_back({name, ScaleOf(name), -1, option.range});
+      if (SessionDeviation(name) == 0) continue;
+      for (int s = 0; s < static_cast<int>(sessions_.size()); ++s) {
+        values_.push_back({name, ScaleOf(name), s, {}});
+      }
+    }
+    theta_.resize(size());
+    for (int i = 0; i < size(); ++i) {
+      theta_(i) = values_[i].session < 0 ? options.Get(values_[i].name)->number() : 0;
+      // Without any lag, a small change of it changes nothing.
+      if (values_[i].name == "lag" && theta_(i) == 0) theta_(i) = values_[i].scale;
+    }
+    for (const Window& w :
+         CutWindows(logs, config.windows, first.plant.length1, first.plant.length2)) {
+      const Vector4d x(w.start.q1, w.start.q2, w.start.w1, w.start.w2);
+      shots_.push_back({w, x, x, session_of_[w.log]});
+    }
+  }
+
+  int size() const { return static_cast<int>(values_.size()); }
+  int windows() const { return static_cast<int>(shots_.size()); }
+
+  /// The twin with the values θ of a session.
+  Twin TwinAt(const VectorXd& theta, int session) const {
+    Twin twin = twin_;
+    const Options options = OptionsOf(twin);
+    for (int i = 0; i < size(); ++i) {
+      if (values_[i].session >= 0 && values_[i].session != session) continue;
+      // A session's deviation comes after the machine's value.
+      const Option& option = *options.Get(values_[i].name);
+      double& value = *std::get<double*>(option.target);
+      value = values_[i].session < 0 ? theta(i) : value + theta(i);
+      value = std::clamp(value, option.range.low, option.range.high);
+    }
+    return twin;
+  }
+
+  /// One step of the method; false if no step decreases the cost any more.
+  bool Step(double tolerance) {
+    SetScales();
+    const std::vector<Share> shares = Linearize();
+    double before = 0;
+    MatrixXd H = MatrixXd::Zero(size(), size());
+    VectorXd g = VectorXd::Zero(size());
+    AddPrior(theta_, H, g, before);
+    for (const Share& share : shares) before += share.cost;
+    for (; damping_ < 1e6; damping_ *= 8) {
+      MatrixXd A = H;
+      VectorXd b = g;
+      std::vector<Matrix4d> inverses;
+      for (const Share& s : shares) {
+        Matrix4d Hxx = s.Hxx;
+        Hxx.diagonal() *= 1 + damping_;
+        inverses.push_back(Hxx.inverse());
+        A += s.Htt - s.Hxt.transpose() * inverses.back() * s.Hxt;
+        b += s.gt - s.Hxt.transpose() * inverses.back() * s.gx;
+      }
+      A.diagonal() *= 1 + damping_;
+      A.diagonal().array() += 1e-12;
+      VectorXd theta = theta_ - A.ldlt().solve(b);
+      for (int i = 0; i < size(); ++i) {
+        const Value& v = values_[i];
+        theta(i) = std::clamp(theta(i), v.range.low, v.range.high);
+      }
+      const VectorXd change = theta - theta_;
+      std::vector<Vector4d> starts;
+      for (size_t w = 0; w < shares.size(); ++w) {
+        const Share& s = shares[w];
+        starts.push_back(shots_[w].x - inverses[w] * (s.gx + s.Hxt * change));
+      }
+      const double after = CostAt(theta, starts);
+      if (!(after < before)) continue;
+      theta_ = theta;
+      for (size_t w = 0; w < shots_.size(); ++w) shots_[w].x = starts[w];
+      damping_ = std::max(damping_ / 5, 1e-7);
+      return before - after > tolerance * std::abs(before);
+    }
+    return false;
+  }
+
+  FitResult Result() {
+    const std::vector<Share> shares = Linearize();
+    // The sandwich estimate: right also where the model's residuals are not white.
+    MatrixXd A = MatrixXd::Zero(size(), size()), meat = A;
+    VectorXd unused = VectorXd::Zero(size());
+    double cost = 0;
+    AddPrior(theta_, A, unused, cost);
+    std::vector<double> errors, torque_errors;
+    for (const Share& s : shares) {
+      const MatrixXd half = s.Hxt.transpose() * s.Hxx.inverse();
+      A += s.Htt - half * s.Hxt;
+      const VectorXd g = s.gt - half * s.gx;
+      meat += g * g.transpose();
+      errors.push_back(std::sqrt(s.squares));
+      if (s.torque_squares > 0) torque_errors.push_back(std::sqrt(s.torque_squares));
+    }
+    // A value at the limit of its range is taken as known.
+    for (int i = 0; i < size(); ++i) {
+      const Value& v = values_[i];
+      if (theta_(i) > v.range.low && theta_(i) < v.range.high) continue;
+      A.row(i).setZero();
+      A.col(i).setZero();
+      meat.row(i).setZero();
+      meat.col(i).setZero();
+      A(i, i) = 1;
+    }
+    A.diagonal().array() += 1e-12;
+    const MatrixXd inverse = A.ldlt().solve(MatrixXd::Identity(size(), size()));
+    FitResult result = Combine(inverse * meat * inverse);
+    result.windows = windows();
+    result.error = Median(errors);
+    result.torque_error = Median(torque_errors);
+    return result;
+  }
+
+ private:
+  /// The machine's values. Their covariance includes the variance between sessions.
+  FitResult Combine(const MatrixXd& covariance) const {
+    FitResult result;
+    result.twin = TwinAt(theta_, -1);
+    std::vector<int> own;  // the entries of θ without a session
+    std::vector<double> between;
+    for (int i = 0; i < size(); ++i) {
+      if (values_[i].session < 0) {
+        own.push_back(i);
+        between.push_back(0);
+        result.twin.uncertain.push_back(values_[i].name);
+      } else {
+        between.back() += theta_(i) * theta_(i) / static_cast<double>(sessions_.size());
+      }
+    }
+    for (size_t i = 0; i < own.size(); ++i) {
+      for (size_t j = 0; j < own.size(); ++j) {
+        const double both = (covariance(own[i], own[j]) + covariance(own[j], own[i])) / 2;
+        result.twin.covariance.push_back(both + (i == j ? between[i] : 0));
+      }
+    }
+    for (int s = 0; s < static_cast<int>(sessions_.size()); ++s) {
+      const Twin own = TwinAt(theta_, s);
+      result.twin.sessions.push_back({sessions_[s], own.sensors.zero1, own.sensors.zero2,
+                                      own.plant.coulomb1, own.plant.coulomb2});
+    }
+    return result;
+  }
+
+  void AddPrior(const VectorXd& theta, MatrixXd& H, VectorXd& g, double& cost) const {
+    for (int i = 0; i < size(); ++i) {
+      if (values_[i].session < 0) continue;
+      const double deviation = SessionDeviation(values_[i].name);
+      const double weight = 1 / (deviation * deviation);
+      H(i, i) += weight;
+      g(i) += weight * theta(i);
+      cost += weight * theta(i) * theta(i);
+    }
+  }
+
+  /// Models of all sessions, and drives of all logs, at θ.
+  std::vector<Model> ModelsAt(const VectorXd& theta) const {
+    std::vector<Model> models;
+    for (int s = 0; s < static_cast<int>(sessions_.size()); ++s)
+      models.push_back(ModelAt(theta, s));
+    return models;
+  }
+  Model ModelAt(const VectorXd& theta, int session) const {
+    const Twin twin = TwinAt(theta, session);
+    return {BodyOf(twin),
+            {twin.sensors.zero1, twin.sensors.zero2},
+            twin.actuator.current_delay,
+            twin.actuator.current_inertia};
+  }
+  std::vector<Drive> DrivesAt(const VectorXd& theta) const {
+    const Twin twin = TwinAt(theta, 0);
+    std::vector<Drive> drives;
+    for (const MachineLog& log : logs_) drives.push_back(Drive::Commanded(log, twin));
+    return drives;
+  }
+
+  Residuals ResidualsOf(const Shot& shot, const Vector4d& x, const Model& model, const Drive& drive,
+                        Motion& motion) const {
+    const MachineLog& log = logs_[shot.window.log];
+    const auto [index, first, last, start] = shot.window;
+    Predict(model.body, drive, model.zero, {x(0), x(1), x(2), x(3)}, log, first, last,
+            model.current_delay, motion);
+    const int rows = last - first;
+    Residuals r;
+    r.angle.resize(rows, 2);
+    r.torque.resize(log.measured.empty() ? 0 : rows, 2);
+    int cursor = 0;
+    for (int k = 0; k < rows; ++k) {
+      for (int j = 0; j < 2; ++j) r.angle(k, j) = motion.angle[k][j] - log.angle[first + k][j];
+      if (log.measured.empty()) continue;
+      const Joints torque = drive.At(log.time[first + k] - model.current_delay, cursor);
+      for (int j = 0; j < 2; ++j) {
+        r.torque(k, j) = torque[j] - model.current_inertia * motion.acceleration[k][j] -
+                         log.measured[first + k][j];
+      }
+    }
+    return r;
+  }
+
+  static double MeanSquare(const Eigen::MatrixX2d& r) {
+    return r.rows() == 0 ? 0 : r.squaredNorm() / static_cast<double>(r.rows());
+  }
+
+  /// Cost of a window's residuals: ln(1 + r²/s²) of the mean square of both kinds.
+  double Cost(const Residuals& r) const {
+    return std::log1p(MeanSquare(r.angle) / (scale_ * scale_)) +
+           std::log1p(MeanSquare(r.torque) / (torque_scale_ * torque_scale_));
+  }
+  static double StartCost(const Shot& shot, const Vector4d& x) {
+    return kStartWeight * (x - shot.cubic).cwiseQuotient(kStartDeviation).squaredNorm();
+  }
+
+  double CostAt(const VectorXd& theta, const std::vector<Vector4d>& starts) const {
+    const std::vector<Model> models = ModelsAt(theta);
+    const std::vector<Drive> drives = DrivesAt(theta);
+    std::vector<double> costs(shots_.size());
+    ParallelFor(pool_, windows(), [&](int w) {
+      Motion motion;
+      const Shot& shot = shots_[w];
+      costs[w] = Cost(ResidualsOf(shot, starts[w], models[shot.session], drives[shot.window.log],
+                                  motion)) +
+                 StartCost(shot, starts[w]);
+    });
+    MatrixXd H = MatrixXd::Zero(size(), size());
+    VectorXd g = VectorXd::Zero(size());
+    double cost = 0;
+    AddPrior(theta, H, g, cost);
+    for (const double c : costs) cost += c;
+    return cost;
+  }
+
+  std::vector<Share> Linearize() const {
+    // Models and drives at θ, and with each value a little larger and smaller.
+    const auto moved = [&](int i, double sign) {
+      VectorXd theta = theta_;
+      theta(i) += sign * Difference(i);
+      return theta;
+    };
+    const std::vector<Model> models = ModelsAt(theta_);
+    const std::vector<Drive> drives = DrivesAt(theta_);
+    std::vector<std::array<std::vector<Drive>, 2>> moved_drives(size());
+    std::vector<std::array<std::vector<Model>, 2>> moved_models(size());
+    for (int i = 0; i < size(); ++i) {
+      for (const int side : {0, 1}) {
+        const VectorXd theta = moved(i, side == 0 ? 1 : -1);
+        if (ChangesDrive(values_[i].name)) moved_drives[i][side] = DrivesAt(theta);
+        moved_models[i][side] = ModelsAt(theta);
+      }
+    }
+    std::vector<Share> shares(shots_.size());
+    ParallelFor(pool_, windows(), [&](int w) {
+      const Shot& shot = shots_[w];
+      const int log = shot.window.log;
+      Motion motion;
+      const Residuals r = ResidualsOf(shot, shot.x, models[shot.session], drives[log], motion);
+      const int rows = static_cast<int>(r.angle.size()), more = static_cast<int>(r.torque.size());
+      MatrixXd J = MatrixXd::Zero(rows + more, size()), K(rows + more, 4);
+      const auto difference = [&](const Residuals& a, const Residuals& b, double h) {
+        VectorXd d(rows + more);
+        d.head(rows) = (a.angle - b.angle).reshaped() / (2 * h);
+        d.tail(more) = (a.torque - b.torque).reshaped() / (2 * h);
+        return d;
+      };
+      for (int i = 0; i < size(); ++i) {
+        if (values_[i].session >= 0 && values_[i].session != shot.session) continue;
+        std::array<Residuals, 2> sides;
+        for (const int side : {0, 1}) {
+          const auto& own = moved_drives[i][side];
+          sides[side] = ResidualsOf(shot, shot.x, moved_models[i][side][shot.session],
+                                    own.empty() ? drives[log] : own[log], motion);
+        }
+        J.col(i) = difference(sides[0], sides[1], Difference(i));
+      }
+      for (int i = 0; i < 4; ++i) {
+        const double h = 1e-5;
+        Vector4d above = shot.x, below = shot.x;
+        above(i) += h;
+        below(i) -= h;
+        K.col(i) =
+            difference(ResidualsOf(shot, above, models[shot.session], drives[log], motion),
+                       ResidualsOf(shot, below, models[shot.session], drives[log], motion), h);
+      }
+      shares[w] = ShareOf(shot, r, J, K);
+    });
+    return shares;
+  }
+
+  double Difference(int i) const { return 1e-4 * values_[i].scale; }
+
+  Share ShareOf(const Shot& shot, const Residuals& r, const MatrixXd& J, const MatrixXd& K) const {
+    Share s;
+    s.squares = MeanSquare(r.angle);
+    s.torque_squares = MeanSquare(r.torque);
+    s.cost = Cost(r) + StartCost(shot, shot.x);
+    // The robust cost weighs a window's residuals by 1 / (1 + r²/s²).
+    const int rows = static_cast<int>(r.angle.size()), more = static_cast<int>(r.torque.size());
+    VectorXd weight(rows + more), residual(rows + more);
+    const auto weight_of = [](double square, double scale, double n) {
+      return 1 / (1 + square / (scale * scale)) / (scale * scale * n);
+    };
+    weight.head(rows).setConstant(weight_of(s.squares, scale_, rows / 2.0));
+    weight.tail(more).setConstant(weight_of(s.torque_squares, torque_scale_, more / 2.0));
+    residual << r.angle.reshaped(), r.torque.reshaped();
+    const MatrixXd WK = weight.asDiagonal() * K, WJ = weight.asDiagonal() * J;
+    const Vector4d prior = kStartWeight * kStartDeviation.cwiseAbs2().cwiseInverse();
+    s.Hxx = K.transpose() * WK;
+    s.Hxx.diagonal() += prior;
+    s.gx = WK.transpose() * residual + prior.cwiseProduct(shot.x - shot.cubic);
+    s.Hxt = WK.transpose() * J;
+    s.Htt = J.transpose() * WJ;
+    s.gt = WJ.transpose() * residual;
+    return s;
+  }
+
+  /// Sets the scales of the robust cost to the windows' median errors.
+  void SetScales() {
+    const std::vector<Model> models = ModelsAt(theta_);
+    const std::vector<Drive> drives = DrivesAt(theta_);
+    std::vector<double> errors(shots_.size()), torque_errors(shots_.size());
+    ParallelFor(pool_, windows(), [&](int w) {
+      Motion motion;
+      const Shot& shot = shots_[w];
+      const Residuals r =
+          ResidualsOf(shot, shot.x, models[shot.session], drives[shot.window.log], motion);
+      errors[w] = std::sqrt(MeanSquare(r.angle));
+      torque_errors[w] = std::sqrt(MeanSquare(r.torque));
+    });
+    scale_ = std::clamp(Median(errors), kSmallestScale, kLargestScale);
+    torque_scale_ = std::max(Median(torque_errors), kSmallestTorqueScale);
+  }
+
+  std::span<const MachineLog> logs_;
+  Twin twin_;
+  ThreadPool* pool_;
+  std::vector<std::string> sessions_;
+  std::vector<int> session_of_;  // of each log
+  std::vector<Value> values_;
+  VectorXd theta_;
+  std::vector<Shot> shots_;
+  double damping_ = 1e-3;
+  double scale_ = kLargestScale, torque_scale_ = 1;  // rad, N·m
+};
+
+}  // namespace
+
+FitResult Fit(std::span<const MachineLog> logs, const Twin& first,
+              const std::vector<std::string>& names, const FitConfig& config, ThreadPool* pool,
+              const Progress& progress) {
+  Problem problem(logs, first, names, config, pool);
+  if (problem.windows() == 0) {
+    throw BadInput(Concat("identify: expected logs with a motion of ", config.windows.seconds,
+                          " s away from upright, got none in ", logs.size(), " logs"));
+  }
+  for (int i = 0; i < config.iterations; ++i) {
+    const bool goes_on = problem.Step(config.tolerance);
+    if (progress) progress(goes_on ? i + 1 : config.iterations, config.iterations);
+    if (!goes_on) break;
+  }
+  return problem.Result();
+}
+
+}  // namespace upswing

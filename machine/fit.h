@@ -1,0 +1,39 @@
+#pragma once
+
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/progress.h"
+#include "core/thread_pool.h"
+#include "machine/motion.h"
+#include "machine/windows.h"
+
+/// Identification of a twin by multiple shooting (Bock, 1983): many windows of the logs, each with
+/// a free start state, and values that all windows share. Levenberg and Marquardt's method with a
+/// robust cost; the start states are eliminated window by window.
+namespace upswing {
+
+/// Settings of an identification.
+struct FitConfig {
+  WindowRules windows{.seconds = 1, .hop = 0.5, .highest = 0.8, .motion = 0.05};
+  int iterations = 15;
+  double tolerance = 1e-3;  // least relative decrease of the cost in an iteration
+};
+
+/// The result of an identification.
+struct FitResult {
+  Twin twin;  // with its sessions; the covariance includes the variance between them
+  int windows = 0;
+  double error = 0;         // median over the windows of the rms of both angles' error, rad
+  double torque_error = 0;  // the same of the reported torques, N·m; NaN without
+};
+
+/// Identifies the twin's values called `names`; the others keep those of `first`, which is also the
+/// initial guess. Throws BadInput if no window of the logs keeps the rules, or a name is unknown.
+FitResult Fit(std::span<const MachineLog> logs, const Twin& first,
+              const std::vector<std::string>& names, const FitConfig& config, ThreadPool* pool,
+              const Progress& progress = nullptr);
+
+}  // namespace upswing

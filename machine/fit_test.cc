@@ -1,0 +1,147 @@
+#include "machine/fit.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <map>
+
+#include "core/rng.h"
+#include "machine/simulated_machine.h"
+
+namespace upswing {
+namespace {
+
+/// A plant like that of RealAIGym's machine.
+Twin FirstGuess() {
+  Twin twin;
+  twin.plant.mass1 = 0.52;
+  twin.plant.mass2 = 0.63;
+  twin.plant.length1 = 0.2;
+  twin.plant.length2 = 0.3;
+  twin.plant.center1 = 0.17;
+  twin.plant.center2 = 0.26;
+  twin.plant.inertia1 = 0.01;
+  twin.plant.inertia2 = 0.008;
+  twin.plant.armature = 0.004;
+  twin.plant.damping1 = twin.plant.damping2 = 0.002;
+  twin.plant.coulomb1 = 0.12;
+  twin.plant.coulomb2 = 0.1;
+  twin.plant.torque_limit = 6;
+  twin.actuator.passive_limit = 0.5;
+  return twin;
+}
+
+/// A machine whose values differ from the guess by up to 25%.
+Twin SomeMachine(Rng& rng) {
+  Twin twin = FirstGuess();
+  Plant& p = twin.plant;
+  for (double* value : {&p.center1, &p.center2, &p.inertia1, &p.inertia2, &p.armature, &p.damping1,
+                        &p.damping2, &p.coulomb1, &p.coulomb2}) {
+    *value *= rng.Uniform(0.75, 1.25);
+  }
+  twin.actuator.delay = rng.Uniform(0, 0.005);
+  twin.actuator.lag = rng.Uniform(0.002, 0.008);
+  twin.actuator.current_delay = rng.Uniform(0, 0.004);
+  twin.actuator.current_inertia = rng.Uniform(0.001, 0.003);
+  twin.sensors.zero1 = rng.Uniform(-0.03, 0.03);
+  twin.sensors.zero2 = rng.Uniform(-0.03, 0.03);
+  twin.sensors.quantum = 25.0 / 65535;
+  twin.sensors.torque_quantum = 24.0 / 4095;
+  twin.loop = {.period = 0.002, .jitter = 0.0001, .late_share = 0.02, .late = 0.004};
+  return twin;
+}
+
+/// Logs of 10 s with random multi-sine torques on both joints.
+std::vector<MachineLog> LogsOf(const Twin& machine, int count, uint64_t seed) {
+  std::vector<MachineLog> logs;
+  for (int i = 0; i < count; ++i) {
+    Rng rng(seed, "log", static_cast<uint64_t>(i));
+    std::array<std::array<double, 3>, 2> amplitude{}, frequency{}, phase{};
+    for (int j = 0; j < 2; ++j) {
+      for (int k = 0; k < 3; ++k) {
+        amplitude[j][k] = rng.Uniform(0.3, 0.9) / (1 + j);
+        frequency[j][k] = rng.Uniform(2, 12);
+        phase[j][k] = rng.Uniform(0, 6);
+      }
+    }
+    const CycleController torques = [&](const CycleInput& in) {
+      Joints torque{};
+      for (int j = 0; j < 2; ++j) {
+        for (int k = 0; k < 3; ++k) {
+          torque[j] += amplitude[j][k] * std::sin(frequency[j][k] * in.time + phase[j][k]);
+        }
+      }
+      return torque;
+    };
+    logs.push_back(
+        RunLoop(machine, {.seconds = 10, .seed = seed + static_cast<uint64_t>(i)}, torques));
+    logs.back().name = "log";
+  }
+  return logs;
+}
+
+const std::vector<std::string> kValues{"center1",         "center2",  "inertia1", "inertia2",
+                                       "armature",        "damping1", "damping2", "coulomb1",
+                                       "coulomb2",        "delay",    "lag",      "current_delay",
+                                       "current_inertia", "zero1",    "zero2"};
+
+double ValueOf(const Twin& twin, const std::string& name) {
+  const Options options = OptionsOf(twin);
+  return options.Get(name)->number();
+}
+
+/// UPSWING_DRAWS sets the number of machines; the tests of the release take a few.
+TEST(Fit, FindsTheMachineBehindItsLogs) {
+  const char* given = std::getenv("UPSWING_DRAWS");
+  const int draws = given != nullptr ? std::atoi(given) : 2;
+  ThreadPool pool(2);
+  std::map<std::string, std::vector<double>> errors;
+  std::map<std::string, int> covered;
+  for (int draw = 0; draw < draws; ++draw) {
+    Rng rng(7, "machine", static_cast<uint64_t>(draw));
+    const Twin machine = SomeMachine(rng);
+    const auto logs =
+        LogsOf(machine, given != nullptr ? 6 : 3, 100 + 10 * static_cast<uint64_t>(draw));
+    const FitResult fit = Fit(logs, FirstGuess(), kValues, {}, &pool);
+    const Manipulator truth = BodyOf(machine), found = BodyOf(fit.twin);
+    const auto note = [&](const char* name, double got, double true_value) {
+      errors[name].push_back(got / true_value - 1);
+    };
+    note("J1", found.J1, truth.J1);
+    note("J2", found.J2, truth.J2);
+    note("b", found.b, truth.b);
+    note("a", found.a, truth.a);
+    note("G1", found.G1, truth.G1);
+    note("G2", found.G2, truth.G2);
+    note("coulomb1", found.f1, truth.f1);
+    note("coulomb2", found.f2, truth.f2);
+    errors["delay, s"].push_back(fit.twin.actuator.delay - machine.actuator.delay);
+    const size_t n = fit.twin.uncertain.size();
+    for (size_t i = 0; i < n; ++i) {
+      const std::string& name = fit.twin.uncertain[i];
+      const double deviation = std::sqrt(fit.twin.covariance[i * n + i]);
+      const double error = ValueOf(fit.twin, name) - ValueOf(machine, name);
+      covered[name] += std::abs(error) <= 1.96 * deviation ? 1 : 0;
+    }
+  }
+  double all = 0;
+  for (const auto& [name, list] : errors) {
+    const double limit = name == "delay, s" ? 0.0005 : name.starts_with("coulomb") ? 0.05 : 0.02;
+    double worst = 0;
+    for (const double error : list) worst = std::max(worst, std::abs(error));
+    EXPECT_LE(worst, limit) << name;
+    if (given != nullptr) std::printf("%-12s largest error %.5f\n", name.c_str(), worst);
+  }
+  for (const auto& [name, count] : covered) {
+    all += count;
+    if (given != nullptr) std::printf("%-16s %d of %d covered\n", name.c_str(), count, draws);
+  }
+  const double share = all / (draws * static_cast<double>(covered.size()));
+  if (given != nullptr) std::printf("covered %.3f\n", share);
+  EXPECT_GE(share, 0.85);
+}
+
+}  // namespace
+}  // namespace upswing
