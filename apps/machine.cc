@@ -3,14 +3,25 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <iterator>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "apps/commands.h"
+#include "apps/progress.h"
 #include "core/error.h"
+#include "core/format.h"
+#include "core/json.h"
 #include "core/text.h"
+#include "io/file.h"
 #include "io/streams.h"
 #include "machine/check.h"
+#include "machine/identify.h"
 #include "report/figure.h"
 
 namespace upswing {
@@ -19,7 +30,10 @@ namespace {
 struct MachineArguments {
   std::string action;
   std::vector<std::string> logs;
-  std::string columns, figure;
+  std::string columns, figure, plant, out;
+  std::vector<std::string> against;
+  int64_t folds = 5, threads = 0;
+  double seconds = 1;
   bool as_json = false;
 };
 
@@ -56,29 +70,242 @@ int RunCheck(const MachineArguments& a) {
   return std::ranges::any_of(checks, &LogCheck::faulty) ? 1 : 0;
 }
 
-int RunMachine(const MachineArguments& a) {
-  if (a.action != "check") {
-    throw BadInput(Concat("machine: expected the action check, got \"", a.action, "\""));
+std::vector<MachineLog> ReadLogs(std::span<const std::string> files, const std::string& columns) {
+  std::vector<MachineLog> logs;
+  for (const std::string& file : files) {
+    for (MachineLog& piece : ReadLog(file, columns)) logs.push_back(std::move(piece));
   }
-  if (a.logs.empty()) throw BadInput("machine check: expected a log, got none");
-  return RunCheck(a);
+  return logs;
+}
+
+std::string ErrorText(const Estimate& e, double factor = 1, const char* unit = "") {
+  if (!e.interval) return fmt::format("{:.3f}{}", factor * e.value, unit);
+  return fmt::format("{:.3f} ({:.3f}–{:.3f}){}", factor * e.value, factor * e.interval->low,
+                     factor * e.interval->high, unit);
+}
+
+void PrintErrors(std::span<const ErrorRow> rows, std::span<const Predictor> predictors) {
+  size_t width = 8;
+  for (const ErrorRow& row : rows) width = std::max(width, Columns(Printable(row.session)));
+  const auto pad = [](const std::string& text, size_t columns) {
+    return text + std::string(columns - std::min(columns, Columns(text)), ' ');
+  };
+  constexpr size_t kCell = 22;
+  std::string heads;
+  for (const Predictor& p : predictors) heads += pad(Printable(p.name), kCell);
+  for (const bool reported : {false, true}) {
+    if (std::ranges::none_of(rows, [&](const auto& r) { return r.reported == reported; })) continue;
+    fmt::print("\nmedian error of the angles, rad (95% over runs), driven by {} torques\n",
+               reported ? "reported" : "commanded");
+    fmt::print("  {}    s runs windows  {}\n", pad("", width), heads);
+    for (const ErrorRow& row : rows) {
+      if (row.reported != reported) continue;
+      std::string cells;
+      for (const Estimate& error : row.errors) cells += pad(ErrorText(error), kCell);
+      fmt::print("  {} {:>4} {:>4} {:>7}  {}\n",
+                 pad(row.session.empty() ? "all runs" : Printable(row.session), width),
+                 FormatNumber(row.seconds), row.runs, row.windows, cells);
+    }
+  }
+  if (predictors.size() < 2) return;
+  fmt::print("\nerror smaller than {}'s by, % (95% over runs)\n",
+             Printable(predictors.back().name));
+  for (const ErrorRow& row : rows) {
+    if (!row.session.empty()) continue;
+    const auto [value, interval] = row.improvement;
+    fmt::print(
+        "  all runs, {} s, {} torques: {:.0f}{}\n", FormatNumber(row.seconds),
+        row.reported ? "reported" : "commanded", 100 * value,
+        interval ? fmt::format(" ({:.0f}–{:.0f})", 100 * interval->low, 100 * interval->high) : "");
+  }
+}
+
+/// The models that --against names.
+std::vector<Predictor> Others(const MachineArguments& a, std::span<const MachineLog> logs) {
+  std::vector<Predictor> others;
+  for (const std::string& file : a.against) {
+    const Twin twin = ReadTwin(file, "--against");
+    others.push_back(PredictorOf(twin.name, twin, logs));
+  }
+  return others;
+}
+
+nlohmann::ordered_json ErrorsJson(std::span<const ErrorRow> rows,
+                                  std::span<const Predictor> predictors) {
+  const auto json_of = [](const Estimate& e) {
+    nlohmann::ordered_json json{{"value", e.value}};
+    if (e.interval) json["interval"] = {e.interval->low, e.interval->high};
+    return json;
+  };
+  auto list = nlohmann::ordered_json::array();
+  for (const ErrorRow& row : rows) {
+    nlohmann::ordered_json errors;
+    for (size_t p = 0; p < predictors.size(); ++p) {
+      errors[predictors[p].name] = json_of(row.errors[p]);
+    }
+    list.push_back({{"session", row.session},
+                    {"seconds", row.seconds},
+                    {"torques", row.reported ? "reported" : "commanded"},
+                    {"runs", row.runs},
+                    {"windows", row.windows},
+                    {"median_error_rad", errors},
+                    {"improvement", json_of(row.improvement)}});
+  }
+  return list;
+}
+
+constexpr std::array kHorizons{0.2, 0.5, 1.0};
+
+int RunValidate(const MachineArguments& a) {
+  if (a.logs.size() < 2) {
+    throw BadInput("machine validate: expected a twin and at least one log");
+  }
+  const Twin twin = ReadTwin(a.logs.front(), "machine validate");
+  const std::vector<MachineLog> logs = ReadLogs(std::span(a.logs).subspan(1), a.columns);
+  std::vector<Predictor> predictors{PredictorOf(twin.name, twin, logs)};
+  std::ranges::move(Others(a, logs), std::back_inserter(predictors));
+  ThreadPool pool(ResolveThreads(a.threads));
+  const auto rows = CompareErrors(logs, predictors, kHorizons, &pool);
+  if (rows.empty()) {
+    throw BadInput(
+        "machine validate: expected logs with a motion of 0.2 s away from upright, got "
+        "none");
+  }
+  if (!a.figure.empty()) DrawErrors(logs, predictors, a.figure, &pool);
+  if (a.as_json) {
+    fmt::print("{}\n", PrintableJson({{"errors", ErrorsJson(rows, predictors)}}));
+    return 0;
+  }
+  PrintErrors(rows, predictors);
+  if (!a.figure.empty()) fmt::print("written {}\n", Printable(a.figure));
+  return 0;
+}
+
+void PrintTwin(const Identification& found) {
+  const Twin& twin = found.fit.twin;
+  const Options options = OptionsOf(twin);
+  const size_t n = twin.uncertain.size();
+  fmt::print("\nvalue                 ± standard deviation\n");
+  for (size_t i = 0; i < n; ++i) {
+    const Option& option = *options.Get(twin.uncertain[i]);
+    fmt::print("  {:<16} {:>10.5f} ± {:.5f} {}\n", option.name, option.number(),
+               std::sqrt(std::max(0.0, twin.covariance[i * n + i])), option.unit);
+  }
+  fmt::print("\nsession                          zero 1  zero 2  friction 1  friction 2\n");
+  for (const Session& s : twin.sessions) {
+    fmt::print("  {:<30} {:>7.4f} {:>7.4f} {:>11.4f} {:>11.4f}\n", Shortened(Printable(s.name), 30),
+               s.zero1, s.zero2, s.coulomb1, s.coulomb2);
+  }
+}
+
+int RunIdentify(const MachineArguments& a) {
+  if (a.plant.empty()) {
+    throw BadInput("machine identify: expected --plant FILE with masses and lengths, got none");
+  }
+  if (a.out.empty()) throw BadInput("machine identify: expected --out FILE, got none");
+  CheckWritable("--out", a.out);
+  const Twin first = ReadTwin(a.plant, "--plant");
+  const std::vector<MachineLog> logs = ReadLogs(a.logs, a.columns);
+  IdentifyConfig config;
+  config.folds = static_cast<int>(a.folds);
+  config.fit.windows.seconds = a.seconds;
+  config.fit.windows.hop = a.seconds / 2;
+  ThreadPool pool(ResolveThreads(a.threads));
+  Identification found;
+  {
+    EpisodeProgress progress(a.as_json);
+    found = Identify(logs, first, config, &pool, std::ref(progress));
+  }
+  Twin& twin = found.fit.twin;
+  twin.name = std::filesystem::path(a.out).stem().string();
+  WriteNamedFile(a.out, TwinText(twin));
+  std::vector<Predictor> predictors;
+  if (!found.left_out.empty()) {
+    predictors.push_back({"left-out runs", found.left_out});
+  } else {
+    predictors.push_back(PredictorOf("same runs", twin, logs));
+  }
+  if (a.against.empty()) predictors.push_back(PredictorOf(first.name, first, logs));
+  std::ranges::move(Others(a, logs), std::back_inserter(predictors));
+  const auto rows = CompareErrors(logs, predictors, kHorizons, &pool);
+  if (!a.figure.empty()) DrawErrors(logs, predictors, a.figure, &pool);
+  if (a.as_json) {
+    auto structures = nlohmann::ordered_json::array();
+    for (const auto& [structure, error] : found.structures) {
+      structures.push_back({{"name", structure.name}, {"left_out_error_rad", error}});
+    }
+    fmt::print("{}\n", PrintableJson({{"twin", a.out},
+                                      {"windows", found.fit.windows},
+                                      {"structures", structures},
+                                      {"chosen", found.chosen},
+                                      {"errors", ErrorsJson(rows, predictors)}}));
+    return 0;
+  }
+  fmt::print("{} in {} logs\n", Counted(found.fit.windows, "window"), logs.size());
+  if (!found.structures.empty()) {
+    fmt::print("\nmodel                                    error on left-out runs, 1 s, rad\n");
+    for (size_t s = 0; s < found.structures.size(); ++s) {
+      fmt::print("{} {:<40} {:.4f}\n", static_cast<int>(s) == found.chosen ? "*" : " ",
+                 found.structures[s].structure.name, found.structures[s].error);
+    }
+  }
+  PrintTwin(found);
+  PrintErrors(rows, predictors);
+  fmt::print("written {}\n", Printable(a.out));
+  if (!a.figure.empty()) fmt::print("written {}\n", Printable(a.figure));
+  return 0;
+}
+
+int RunMachine(const MachineArguments& a) {
+  constexpr std::array kActions{"check", "identify", "validate"};
+  if (std::ranges::find(kActions, a.action) == kActions.end()) {
+    throw BadInput(
+        Concat("machine: expected check, identify or validate, got \"", Printable(a.action), "\""));
+  }
+  if (a.logs.empty()) throw BadInput(Concat("machine ", a.action, ": expected a log, got none"));
+  if (a.action == "check") return RunCheck(a);
+  if (!a.figure.empty()) {
+    CheckFigureName(a.figure);
+    CheckWritable("--figure", a.figure);
+    CheckCanDraw();
+  }
+  return a.action == "identify" ? RunIdentify(a) : RunValidate(a);
 }
 
 }  // namespace
 
 void AddMachine(CommandLine& line) {
   MachineArguments& a = line.Runs(RunMachine);
-  line.Text("action", a.action, "ACTION", "check: look for faults in logs");
+  line.Text("action", a.action, "ACTION",
+            "check: look for faults in logs; identify: fit a twin, a model of the machine, to "
+            "logs; validate: compare a twin's predictions with logs");
   line.Require("action");
-  line.Texts("log", a.logs, "LOG", "logs of a machine with two joints, .csv or .csv.gz");
+  line.Texts("log", a.logs, "LOG",
+             "logs of a machine with two joints, .csv or .csv.gz; validate: first the twin's file");
   line.Text("--columns", a.columns, "FILE",
             "TOML file that names the columns and units (default: those of RealAIGym)");
   line.Text("--figure", a.figure, "FILE", "figure of a log to draw, .svg or .png");
+  line.Text("--plant", a.plant, "FILE",
+            "identify: plant file or shipped plant with masses, lengths and first guesses");
+  line.Text("--out", a.out, "FILE", "identify: TOML file of the twin to write");
+  line.Repeated("--against", a.against, "FILE",
+                "identify, validate: another twin or plant to compare with; repeat for more");
+  Options own;
+  own.Section("identify");
+  own.Add(&a.folds, "folds", {0, 100}, "",
+          "folds of the cross-validation that chooses the model; 0: none");
+  own.Add(&a.seconds, "seconds", {0.05, 10}, "s", "length of a window");
+  line.Arguments(own);
+  AddThreads(line, a.threads);
   line.Flag("--json", a.as_json, "print JSON instead of text");
   line.Footer(
       "check prints a line for each finding. A note is a fact, such as the rate. A warning\n"
       "needs a look. A fault misleads an analysis of the log: degrees, swapped columns,\n"
       "a stuck encoder. Exit code: 0 without a fault, 1 with one, 2 if a log cannot be read.\n\n"
+      "identify fits masses, centres, inertias, friction, delay and lag to windows of the\n"
+      "logs. Each window has a free start state. The commanded torques drive the model; the\n"
+      "reported ones are a second measurement. Cross-validation chooses the model.\n"
+      "The twin's covariance includes the differences between sessions.\n\n"
       "A file of columns:\n"
       "  time = {column = \"t\", unit = \"ms\"}         # s, ms, us\n"
       "  angle1 = {column = \"theta1\", unit = \"deg\"}  # rad, deg\n"
@@ -91,6 +318,10 @@ void AddMachine(CommandLine& line) {
       "Examples:\n"
       "  ./upswing machine check trajectory.csv\n"
       "  ./upswing machine check logs/*.csv.gz --json\n"
+      "  ./upswing machine identify logs/*.csv --plant realaigym-c1 \\\n"
+      "    --out twin.toml\n"
+      "  ./upswing machine validate twin.toml new/*.csv \\\n"
+      "    --against realaigym-c1\n"
       "  ./upswing machine check swing.csv --columns columns.toml --figure swing.svg\n");
 }
 

@@ -1,0 +1,138 @@
+#include "machine/identify.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "core/error.h"
+
+namespace upswing {
+namespace {
+
+constexpr double kJudgedSeconds = 1;  // length of the windows that choose a structure
+
+/// The fold of each log: the logs of a session are dealt in turn.
+std::vector<int> Folds(std::span<const MachineLog> logs, int folds) {
+  std::map<std::string, int> dealt;
+  std::vector<int> fold;
+  for (const MachineLog& log : logs) fold.push_back(dealt[SessionOf(log.name)]++ % folds);
+  return fold;
+}
+
+bool HasMotors(std::span<const MachineLog> logs) {
+  return std::ranges::any_of(logs, [](const MachineLog& log) {
+    return std::ranges::any_of(log.commanded,
+                               [](const Joints& u) { return u[0] != 0 || u[1] != 0; });
+  });
+}
+
+}  // namespace
+
+std::vector<Structure> Structures(bool has_motors) {
+  std::vector<Structure> structures;
+  std::vector<std::string> values{"center1", "inertia1", "inertia2"};
+  const auto add = [&](const char* name, const std::vector<std::string>& more) {
+    values.insert(values.end(), more.begin(), more.end());
+    structures.push_back({name, values});
+  };
+  if (!has_motors) {
+    add("rigid links", {"length1"});
+    add("and viscous friction", {"damping1", "damping2"});
+    add("and dry friction", {"coulomb1", "coulomb2"});
+    add("and zeros of each session", {"zero1", "zero2"});
+    return structures;
+  }
+  add("rigid links", {"center2"});
+  add("and viscous friction", {"damping1", "damping2"});
+  add("and dry friction", {"coulomb1", "coulomb2"});
+  add("and inertia of the motors", {"armature"});
+  add("and delay and lag of the motors", {"delay", "lag", "current_delay", "current_inertia"});
+  add("and zeros of each session", {"zero1", "zero2"});
+  return structures;
+}
+
+Identification Identify(std::span<const MachineLog> logs, const Twin& first,
+                        const IdentifyConfig& config, ThreadPool* pool, const Progress& progress) {
+  const std::vector<Structure> structures = Structures(HasMotors(logs));
+  Identification result;
+  const int n = static_cast<int>(logs.size());
+  const double fits = 1.0 + config.folds * static_cast<double>(structures.size());
+  double done = 0;
+  const auto fit = [&](std::span<const MachineLog> own, const Twin& guess, const Structure& s) {
+    const auto part = [&](double step, double steps) {
+      if (progress) progress(done + step / steps, fits);
+    };
+    FitResult r = Fit(own, guess, s.values, config.fit, pool, part);
+    ++done;
+    return r;
+  };
+
+  result.chosen = static_cast<int>(structures.size()) - 1;
+  if (config.folds >= 2) {
+    const std::vector<int> fold = Folds(logs, config.folds);
+    double best = 0;
+    std::vector<Twin> guesses(config.folds, first);
+    for (int s = 0; s < static_cast<int>(structures.size()); ++s) {
+      std::vector<Twin> twins(n, first);
+      for (int f = 0; f < config.folds; ++f) {
+        std::vector<MachineLog> others;
+        for (int i = 0; i < n; ++i) {
+          if (fold[i] != f) others.push_back(logs[i]);
+        }
+        // Each structure begins with the values of the one before it.
+        guesses[f] = fit(others, guesses[f], structures[s]).twin;
+        for (int i = 0; i < n; ++i) {
+          if (fold[i] == f) twins[i] = InSession(guesses[f], logs[i]);
+        }
+      }
+      std::vector<std::vector<double>> errors(n);
+      ParallelFor(pool, n, [&](int i) {
+        errors[i] = WindowErrors(logs[i], twins[i], kJudgedSeconds, false);
+      });
+      std::vector<double> all;
+      for (const auto& own : errors) all.insert(all.end(), own.begin(), own.end());
+      const double error = Median(all);
+      result.structures.push_back({structures[s], error});
+      if (s > 0 && !(error < best)) continue;
+      best = error;
+      result.chosen = s;
+      result.left_out = twins;
+    }
+  }
+  result.fit = fit(logs, first, structures[result.chosen]);
+  MeasureLoop(logs, result.fit.twin);
+  return result;
+}
+
+void MeasureLoop(std::span<const MachineLog> logs, Twin& twin) {
+  std::vector<double> periods, steps, torque_steps;
+  const auto note_step = [](double step, std::vector<double>& list) {
+    if (std::abs(step) > 1e-9) list.push_back(std::abs(step));
+  };
+  for (const MachineLog& log : logs) {
+    for (int k = 1; k < log.rows(); ++k) {
+      periods.push_back(log.time[k] - log.time[k - 1]);
+      note_step(log.angle[k][0] - log.angle[k - 1][0], steps);
+      if (log.measured.empty()) continue;
+      note_step(log.measured[k][0] - log.measured[k - 1][0], torque_steps);
+    }
+  }
+  if (periods.empty()) return;
+  // Of logs with different rates, the one with most rows counts.
+  twin.loop.period = Median(periods);
+  std::vector<double> on_time, late;
+  for (const double period : periods) {
+    if (period < 0.5 * twin.loop.period || period > 5 * twin.loop.period) continue;
+    (period > 1.25 * twin.loop.period ? late : on_time).push_back(period);
+  }
+  double squares = 0;
+  for (const double p : on_time) squares += (p - twin.loop.period) * (p - twin.loop.period);
+  const auto count = [](const auto& list) { return static_cast<double>(list.size()); };
+  twin.loop.jitter = on_time.empty() ? 0 : std::sqrt(squares / count(on_time));
+  twin.loop.late_share = late.empty() ? 0 : count(late) / (count(late) + count(on_time));
+  twin.loop.late = late.empty() ? 0 : std::ranges::max(late) - twin.loop.period;
+  if (!steps.empty()) twin.sensors.quantum = std::ranges::min(steps);
+  if (!torque_steps.empty()) twin.sensors.torque_quantum = std::ranges::min(torque_steps);
+}
+
+}  // namespace upswing

@@ -1,0 +1,197 @@
+#include "machine/validate.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+
+#include "core/format.h"
+#include "core/text.h"
+#include "report/figure.h"
+
+namespace upswing {
+namespace {
+
+/// The errors of all windows of each run (runs × windows).
+using RunErrors = std::vector<std::vector<double>>;
+
+double PooledMedian(const RunErrors& runs, std::span<const double> chosen) {
+  std::vector<double> all;
+  for (const double run : chosen) {
+    const auto& errors = runs[static_cast<size_t>(run)];
+    all.insert(all.end(), errors.begin(), errors.end());
+  }
+  return Median(all);
+}
+
+/// A statistic of runs with its interval over runs. Strata are the sessions' runs, by index.
+Estimate OverRuns(const Strata& sessions, const std::function<double(std::span<const double>)>& f) {
+  const auto statistic = [&](const Strata& strata) {
+    std::vector<double> chosen;
+    for (const auto& stratum : strata) chosen.insert(chosen.end(), stratum.begin(), stratum.end());
+    return f(chosen);
+  };
+  constexpr int64_t kBootstraps = 2000;
+  return {statistic(sessions), BootstrapInterval(sessions, statistic, kBootstraps)};
+}
+
+WindowRules RulesOf(double seconds) { return {.seconds = seconds}; }
+
+std::vector<double> ErrorsIn(const MachineLog& log, const Twin& twin,
+                             std::span<const Window> windows, bool reported) {
+  const Drive drive = reported ? Drive::Measured(log, twin) : Drive::Commanded(log, twin);
+  const Manipulator body = BodyOf(twin, reported);
+  const Joints zero{twin.sensors.zero1, twin.sensors.zero2};
+  Motion motion;
+  std::vector<double> errors;
+  for (const Window& w : windows) {
+    Predict(body, drive, zero, w.start, log, w.first, w.last, 0, motion);
+    double sum = 0;
+    for (int k = w.first; k < w.last; ++k) {
+      for (int j = 0; j < 2; ++j) {
+        const double error = motion.angle[k - w.first][j] - log.angle[k][j];
+        sum += error * error;
+      }
+    }
+    errors.push_back(std::sqrt(sum / (w.last - w.first)));
+  }
+  return errors;
+}
+
+std::vector<Window> WindowsOf(const MachineLog& log, const Twin& twin, double seconds) {
+  return CutWindows(std::span(&log, 1), RulesOf(seconds), twin.plant.length1, twin.plant.length2);
+}
+
+}  // namespace
+
+Predictor PredictorOf(const std::string& name, const Twin& twin, std::span<const MachineLog> logs) {
+  Predictor predictor{name, {}};
+  for (const MachineLog& log : logs) predictor.twins.push_back(InSession(twin, log));
+  return predictor;
+}
+
+std::vector<double> WindowErrors(const MachineLog& log, const Twin& twin, double seconds,
+                                 bool reported) {
+  return ErrorsIn(log, twin, WindowsOf(log, twin, seconds), reported);
+}
+
+std::vector<ErrorRow> CompareErrors(std::span<const MachineLog> logs,
+                                    std::span<const Predictor> predictors,
+                                    std::span<const double> seconds, ThreadPool* pool) {
+  std::map<std::string, std::vector<double>> sessions;  // indices of logs
+  for (size_t i = 0; i < logs.size(); ++i) {
+    sessions[SessionOf(logs[i].name)].push_back(static_cast<double>(i));
+  }
+  std::vector<ErrorRow> rows;
+  for (const bool reported : {false, true}) {
+    for (const double length : seconds) {
+      std::vector<RunErrors> errors(predictors.size(), RunErrors(logs.size()));
+      ParallelFor(pool, static_cast<int>(logs.size()), [&](int i) {
+        if (reported && logs[i].measured.empty()) return;
+        // The same windows for all predictors.
+        const auto windows = WindowsOf(logs[i], predictors.front().twins[i], length);
+        for (size_t p = 0; p < predictors.size(); ++p) {
+          errors[p][i] = ErrorsIn(logs[i], predictors[p].twins[i], windows, reported);
+        }
+      });
+      const auto add = [&](const std::string& session, const Strata& strata) {
+        ErrorRow row{session, length, reported, 0, 0, {}, {}};
+        for (const auto& runs : strata) {
+          for (const double run : runs) {
+            const int n = static_cast<int>(errors.front()[static_cast<size_t>(run)].size());
+            row.runs += n > 0 ? 1 : 0;
+            row.windows += n;
+          }
+        }
+        if (row.windows == 0) return;
+        for (const RunErrors& own : errors) {
+          row.errors.push_back(
+              OverRuns(strata, [&](const auto& chosen) { return PooledMedian(own, chosen); }));
+        }
+        row.improvement = OverRuns(strata, [&](const auto& chosen) {
+          return 1 - PooledMedian(errors.front(), chosen) / PooledMedian(errors.back(), chosen);
+        });
+        rows.push_back(row);
+      };
+      Strata all;
+      for (const auto& [session, runs] : sessions) {
+        add(session, {runs});
+        all.push_back(runs);
+      }
+      if (sessions.size() > 1) add("", all);
+    }
+  }
+  return rows;
+}
+
+void DrawErrors(std::span<const MachineLog> logs, std::span<const Predictor> predictors,
+                const std::filesystem::path& file, ThreadPool* pool) {
+  Figure figure;
+  figure.title = "Prediction of measured motion";
+  figure.height = 900;
+  constexpr std::array kLengths{0.1, 0.2, 0.35, 0.5, 0.75, 1.0};
+  Panel errors;
+  errors.x_label = "length of the prediction, s";
+  errors.y_label = "median error, rad";
+  for (const Predictor& p : predictors) errors.lines.emplace_back().name = p.name;
+  for (const double length : kLengths) {
+    std::vector<RunErrors> runs(predictors.size(), RunErrors(logs.size()));
+    ParallelFor(pool, static_cast<int>(logs.size()), [&](int i) {
+      const auto windows = WindowsOf(logs[i], predictors.front().twins[i], length);
+      for (size_t p = 0; p < predictors.size(); ++p) {
+        runs[p][i] = ErrorsIn(logs[i], predictors[p].twins[i], windows, false);
+      }
+    });
+    for (size_t p = 0; p < predictors.size(); ++p) {
+      std::vector<double> all;
+      for (const auto& own : runs[p]) all.insert(all.end(), own.begin(), own.end());
+      errors.lines[p].x.push_back(length);
+      errors.lines[p].y.push_back(Median(all));
+    }
+  }
+  figure.panels.push_back(errors);
+
+  // The window whose error is the median of the first log that has windows.
+  for (size_t i = 0; i < logs.size(); ++i) {
+    const MachineLog& log = logs[i];
+    const auto windows = WindowsOf(log, predictors.front().twins[i], 1);
+    if (windows.empty()) continue;
+    const auto own = ErrorsIn(log, predictors.front().twins[i], windows, false);
+    auto sorted = own;
+    std::ranges::sort(sorted);
+    const auto place = std::ranges::find(own, sorted[sorted.size() / 2]) - own.begin();
+    const Window& w = windows[static_cast<size_t>(place)];
+    Panel angles;
+    angles.title = Printable(log.name);
+    angles.x_label = "time, s";
+    angles.y_label = "angle, rad";
+    for (int j = 0; j < 2; ++j) {
+      Line& measured = angles.lines.emplace_back();
+      measured.name = Concat("joint ", j + 1, ", measured");
+      for (int k = w.first; k < w.last; ++k) {
+        measured.x.push_back(log.time[k]);
+        measured.y.push_back(log.angle[k][j]);
+      }
+    }
+    for (const Predictor& p : predictors) {
+      const Twin& twin = p.twins[i];
+      Motion motion;
+      Predict(BodyOf(twin), Drive::Commanded(log, twin), {twin.sensors.zero1, twin.sensors.zero2},
+              w.start, log, w.first, w.last, 0, motion);
+      for (int j = 0; j < 2; ++j) {
+        Line& predicted = angles.lines.emplace_back();
+        predicted.name = Concat("joint ", j + 1, ", ", p.name);
+        for (int k = w.first; k < w.last; ++k) {
+          predicted.x.push_back(log.time[k]);
+          predicted.y.push_back(motion.angle[k - w.first][j]);
+        }
+        predicted.dotted_from = -1e9;
+      }
+    }
+    figure.panels.push_back(angles);
+    break;
+  }
+  Draw(figure, file);
+}
+
+}  // namespace upswing

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/thread_pool.h"
+#include "machine/motion.h"
+#include "machine/windows.h"
+#include "report/statistics.h"
+
+/// How well models predict measured motion. The error of a window is the rms over its rows of the
+/// length of the vector of both angles' errors (rad).
+namespace upswing {
+
+/// A model's name, and its twin for each of the logs.
+struct Predictor {
+  std::string name;
+  std::vector<Twin> twins;  // (number of logs)
+};
+
+/// A predictor with the same twin for all logs, in each log's session if the twin knows it.
+Predictor PredictorOf(const std::string& name, const Twin& twin, std::span<const MachineLog> logs);
+
+/// The errors of the windows of a log. `reported`: driven by the torques that the motors reported
+/// instead of the commanded ones.
+std::vector<double> WindowErrors(const MachineLog& log, const Twin& twin, double seconds,
+                                 bool reported);
+
+/// A row of a comparison: median errors over the windows of some runs, with intervals over runs.
+struct ErrorRow {
+  std::string session;    // of the runs; empty: all runs
+  double seconds = 0;     // length of the windows
+  bool reported = false;  // driven by reported torques
+  int runs = 0, windows = 0;
+  std::vector<Estimate> errors;  // (number of predictors) rad
+  // 1 - error of the first predictor / error of the last one.
+  Estimate improvement;
+};
+
+/// Compares predictors on logs: for each length of windows, a row for each session and one for all
+/// runs, with commanded and with reported torques.
+std::vector<ErrorRow> CompareErrors(std::span<const MachineLog> logs,
+                                    std::span<const Predictor> predictors,
+                                    std::span<const double> seconds, ThreadPool* pool);
+
+/// Draws the errors over the length of the windows, and the measured and predicted angles of the
+/// log's window with the median error of the first predictor, as .svg or .png.
+void DrawErrors(std::span<const MachineLog> logs, std::span<const Predictor> predictors,
+                const std::filesystem::path& file, ThreadPool* pool);
+
+}  // namespace upswing
