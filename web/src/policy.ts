@@ -36,7 +36,8 @@ export class Policy {
       this.metadata = new Map(Object.entries(controller.about.metadata));
     } catch (error) {
       if (!(error instanceof BadInput)) throw error;
-      throw new BadInput(printable(error.message, LONGEST_REASON));
+      // The core names its source, which the page names itself.
+      throw new BadInput(printable(error.message.replace(/^the file: /, ''), LONGEST_REASON));
     }
     this.plant = plantIn(JSON.parse(this.about('plant')) as Plant);
     this.rewardScale = Number(this.metadata.get('reward_scale') ?? 1);

@@ -239,7 +239,7 @@ test('a link grows an agent by its recipe, on a stage with the pendulums that tr
 
   await page.goto('./#learn=fast&seed=-3&steps=1');
   await expect(page.locator('#message-text')).toContainText('seed: expected a whole number from 0');
-  await expect(page.locator('#message-text')).toContainText('unknown "steps"');
+  await expect(page.locator('#message-text')).toContainText('unknown setting "steps"');
   await page.locator('#learn-start').click();
 });
 

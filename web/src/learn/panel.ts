@@ -11,7 +11,7 @@ import { LearnChart, stepsOf } from './chart';
 import type { Checkpoint, Course, Recording } from './course';
 import { film, filmType } from './film';
 import { Filmstrip } from './filmstrip';
-import { Knobs } from './knobs';
+import { Knobs, LEARNERS } from './knobs';
 import './learn.css';
 import { decodeRecipe, encodeRecipe, LARGEST_SEED } from './recipe';
 import { Scrubber } from './scrubber';
@@ -118,7 +118,9 @@ export class LearnPanel {
   /// Trains what an address asks for, if it asks for something else than what is there. Returns what it
   /// does not understand.
   open(hash: string): readonly string[] {
-    const { recipe, problems } = decodeRecipe(hash, (agent) => this.knobs.settingsOf(agent));
+    const { recipe, problems } = decodeRecipe(hash, LEARNERS, (agent) =>
+      this.knobs.settingsOf(agent),
+    );
     const known = this.sessions.some((one) => recipe && encodeRecipe(one) === encodeRecipe(recipe));
     if (recipe && !known) {
       this.four.checked = false;
