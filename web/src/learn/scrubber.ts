@@ -41,11 +41,6 @@ export class Scrubber {
     this.onShown = onShown;
   }
 
-  /// Whether one of its policies is or was on the stage, or is on its way there.
-  get shows(): boolean {
-    return this.given !== null;
-  }
-
   /// Whether the agent on the stage is one of this training.
   get onStage(): boolean {
     return this.shown !== null && this.stage.world.policy === this.shown;
@@ -58,6 +53,12 @@ export class Scrubber {
     this.replaceable = this.stage.world.policy;
     this.follow(moves);
     void this.showUntrained(this.withUntrained);
+  }
+
+  /// Puts its policy back on the stage, where a copy has become the visitor's own agent.
+  again(): void {
+    const policy = this.follows ? this.course?.newest : this.checkpoint;
+    if (policy) void this.show(policy);
   }
 
   /// Leaves the stage to others until a policy is shown again.
