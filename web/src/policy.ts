@@ -43,7 +43,7 @@ export class Policy {
     this.rewardScale = Number(this.metadata.get('reward_scale') ?? 1);
   }
 
-  /// Its neurons, for those who watch; null where there are none to show.
+  /// Its neurons, for display; null where there are none to show.
   get neurons(): Neurons | null {
     if (this._neurons === undefined) this._neurons = this.file && Neurons.of(this.file);
     return this._neurons;

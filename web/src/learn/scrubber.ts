@@ -18,7 +18,7 @@ export interface LearnStage {
 }
 
 /// Which policy of a training is on the stage, where it makes one attempt after another: the newest, or an
-/// earlier one. Beside it, if one likes, the untrained one.
+/// earlier one. Next to it stands the untrained one, if the visitor asks for it.
 export class Scrubber {
   course: Course | null = null;
   follows = true; // the newest
@@ -75,7 +75,7 @@ export class Scrubber {
     if (moves) this.restart();
   }
 
-  /// After news. If somebody has chosen another agent meanwhile, that stays.
+  /// After news. If the visitor has chosen another agent meanwhile, that stays.
   update(): void {
     const newest = this.course?.newest;
     if (this.untrained === null && this.withUntrained) void this.showUntrained(true);
@@ -108,7 +108,7 @@ export class Scrubber {
     this.stage.reset();
   }
 
-  /// Whether the policy that knew nothing is shown beside the other.
+  /// Whether the untrained policy is shown next to the other.
   async showUntrained(wanted: boolean): Promise<void> {
     this.withUntrained = wanted;
     const request = ++this.untrainedRequests;

@@ -12,7 +12,7 @@ const NOT_IN_IT = 'it does not contain its sender’s own policy';
 /// What a link contains: the agent, whether it is on, and every setting that was changed.
 export interface Shared extends Disturbance {
   agent: string | null;
-  twin: string | null; // the agent beside it
+  twin: string | null; // the second agent
   on: boolean;
   speed: number;
   plant: Plant;
