@@ -41,7 +41,7 @@ class CoreMemory implements Memory {
 /// A policy in the core, and what its decisions are made of.
 export class CoreController implements Controller {
   readonly about: Readonly<About>;
-  /// Frees its memory now; else that happens some time after nobody holds it any more.
+  /// Frees its memory now; else that happens some time after its last reference is gone.
   readonly close: () => void;
   private readonly policy: number;
   private readonly observation: number; // where one is put

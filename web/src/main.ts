@@ -52,6 +52,6 @@ element('loading').hidden = true;
 try {
   if (page) page.continueIn(await fetchMujoco());
 } catch (error) {
-  const how = 'The pendulum follows the equations of motion of Upswing’s own core';
-  warn(`${how}, as MuJoCo could not start: ${reasonOf(error)}.`);
+  const instead = 'Upswing’s own equations of motion move the pendulum instead.';
+  warn(`MuJoCo could not start: ${reasonOf(error)}. ${instead}`);
 }

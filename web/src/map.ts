@@ -71,7 +71,7 @@ export class ValueMap {
 
   /// Computes for so long at most, one cell at least. When a map has become complete, the state that it
   /// was begun in, else null; the next call begins another one, of the state then. A change of the plant
-  /// begins it anew.
+  /// begins it again.
   work(world: World, milliseconds: number): State | null {
     const end = performance.now() + milliseconds;
     if (this.plant !== world.plant) this.restart();

@@ -1,4 +1,4 @@
-/// The neurons of a Q-network while it decides, for those who watch. Decisions themselves are the core's.
+/// The neurons of a Q-network while it decides, for display only: the core computes the decisions.
 
 const EPSILON = 1e-5; // of the layer normalisation
 

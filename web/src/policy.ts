@@ -36,13 +36,14 @@ export class Policy {
       this.metadata = new Map(Object.entries(controller.about.metadata));
     } catch (error) {
       if (!(error instanceof BadInput)) throw error;
-      throw new BadInput(printable(error.message, LONGEST_REASON));
+      // The core names its source, which the page names itself.
+      throw new BadInput(printable(error.message.replace(/^the file: /, ''), LONGEST_REASON));
     }
     this.plant = plantIn(JSON.parse(this.about('plant')) as Plant);
     this.rewardScale = Number(this.metadata.get('reward_scale') ?? 1);
   }
 
-  /// Its neurons, for those who watch; null where there are none to show.
+  /// Its neurons, for display; null where there are none to show.
   get neurons(): Neurons | null {
     if (this._neurons === undefined) this._neurons = this.file && Neurons.of(this.file);
     return this._neurons;

@@ -104,7 +104,7 @@ export class World {
     this.look();
   }
 
-  /// The policy begins anew.
+  /// The policy starts again, without memory.
   private forget(): void {
     this.memory?.close();
     this.memory = this._policy?.controller.begin() ?? null;
@@ -114,7 +114,7 @@ export class World {
     return this.simulator.state;
   }
 
-  /// Goes on in another engine, from the same state and with the same plant.
+  /// Continues in another engine, from the same state and with the same plant.
   continueIn(simulator: Simulator): void {
     simulator.plant = this._plant;
     simulator.state = this.state;

@@ -45,6 +45,22 @@ function stopTime(page: Page): Promise<void> {
   return page.evaluate(() => void (upswing.clock.advance = () => true));
 }
 
+/// What a film of the stage says below its picture.
+function filmTitle(page: Page): Promise<string[]> {
+  return page.evaluate(async () => {
+    const drawn = new Set<string>();
+    const { fillText } = CanvasRenderingContext2D.prototype;
+    CanvasRenderingContext2D.prototype.fillText = function (...given) {
+      if (!this.canvas.isConnected) drawn.add(given[0]); // the film's own canvas is on no page
+      fillText.apply(this, given);
+    };
+    document.getElementById('learn-film')!.click();
+    await new Promise((resolve) => setTimeout(resolve, 500));
+    CanvasRenderingContext2D.prototype.fillText = fillText;
+    return [...drawn];
+  });
+}
+
 /// Whether the agent on the stage is up 15 s after it hung.
 async function swingsUp(page: Page): Promise<boolean> {
   await stopTime(page);
@@ -192,6 +208,10 @@ test('the default agent: from an untrained policy to the one of the page, fetche
       return upright.length;
     });
   const scrub = page.locator('#learn-scrub');
+  // It was tested after its best policy too, in episodes that are longer than a trial.
+  await expect(scrub).toHaveAttribute('max', '250016');
+  await expect(page.locator('#learn-return-of')).toHaveText('in a test');
+  await expect(page.getByRole('button', { name: 'Share this training' })).toBeDisabled();
   await stopTime(page);
   expect(await successes()).toBe(5);
   await scrub.press('Home');
@@ -239,7 +259,7 @@ test('a link grows an agent by its recipe, on a stage with the pendulums that tr
 
   await page.goto('./#learn=fast&seed=-3&steps=1');
   await expect(page.locator('#message-text')).toContainText('seed: expected a whole number from 0');
-  await expect(page.locator('#message-text')).toContainText('unknown "steps"');
+  await expect(page.locator('#message-text')).toContainText('unknown setting "steps"');
   await page.locator('#learn-start').click();
 });
 
@@ -253,8 +273,13 @@ test('what was learned while you were elsewhere is on the stage when you come ba
   await expect.poll(() => page.workers().length).toBe(0);
   await expect(page.locator('#agent option[value=own]')).toHaveCount(1);
   await expect(page.locator('#agent')).toHaveValue('d3qn');
+  await expect(page.locator('#learn-where')).toHaveText('on the stage: another agent');
   await page.getByRole('link', { name: 'Learn', exact: true }).click();
   await expect(page.locator('#agent')).toHaveValue('own');
+  await expect(page.locator('#learn-where')).toHaveText('on the stage: as it is now');
+  const [agent, progress] = await filmTitle(page);
+  expect(agent).toBe(`a small Dueling Double DQN, seed ${SEED}`);
+  expect(progress).toMatch(/^after [\d,]+ steps, success 100%$/);
   expect(await swingsUp(page)).toBe(true);
 });
 
@@ -284,19 +309,10 @@ test('a film has the agent and its score as a title', async ({ stage: page }) =>
   await openLearn(page);
   await page.getByRole('button', { name: 'How the default agent learned' }).click();
   await expect(page.locator('#learn-where')).toHaveText('on the stage: after 240,000 steps');
-  const lines = await page.evaluate(async () => {
-    const drawn = new Set<string>();
-    const { fillText } = CanvasRenderingContext2D.prototype;
-    CanvasRenderingContext2D.prototype.fillText = function (...given) {
-      if (!this.canvas.isConnected) drawn.add(given[0]); // the film's own canvas is on no page
-      fillText.apply(this, given);
-    };
-    document.getElementById('learn-film')!.click();
-    await new Promise((resolve) => setTimeout(resolve, 500));
-    CanvasRenderingContext2D.prototype.fillText = fillText;
-    return [...drawn];
-  });
-  expect(lines).toEqual(['Dueling Double DQN', 'after 240,000 steps, success 100%']);
+  expect(await filmTitle(page)).toEqual([
+    'Dueling Double DQN',
+    'after 240,000 steps, success 100%',
+  ]);
   await expect(page.locator('#learn-film')).toHaveText('Film 5 s');
 });
 
@@ -333,6 +349,16 @@ test('pause, go on, another seed, start over', async ({ stage: page }) => {
   await page.locator('#learn-start').click();
 });
 
+test('four seeds from the largest on are four that a link can have', async ({ stage: page }) => {
+  await openLearn(page);
+  await page.getByLabel('four seeds at once').check();
+  await page.getByLabel('Seed', { exact: true }).fill('1000000000');
+  await page.getByRole('button', { name: 'Learn', exact: true }).click();
+  await page.getByRole('radio', { name: /seed/ }).nth(3).check();
+  await expect(page).toHaveURL(/#learn=fast&seed=1000000000$/);
+  await page.locator('#learn-start').click();
+});
+
 test('four seeds at once, each of which can be watched, and one of them takes over once', async ({
   page,
 }) => {
@@ -362,7 +388,7 @@ test('four seeds at once, each of which can be watched, and one of them takes ov
     const keep = upswing.keepLearned.bind(upswing);
     upswing.keepLearned = async (file, shown) => {
       document.body.dataset.kept = `${document.body.dataset.kept ?? ''}${file.name};`;
-      await keep(file, shown);
+      return keep(file, shown);
     };
   });
   await page.getByLabel('show the untrained agent too').check();

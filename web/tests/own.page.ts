@@ -48,7 +48,7 @@ test('a reload keeps it, until it is removed', async ({ stage: page }) => {
   await expect(page.locator('#own')).toBeHidden();
   await page.goto('about:blank');
   await open(page, '#agent=own');
-  await expect(page.locator('#message')).toContainText("somebody's own policy");
+  await expect(page.locator('#message')).toContainText('sender’s own policy');
   await expect(page.locator('#agent option[value=own]')).toHaveCount(0);
 });
 

@@ -119,7 +119,7 @@ test('an address that is not understood is told, and the rest of it holds', asyn
   const message = page.locator('#message');
   await expect(message).toContainText('unknown agent "none"');
   await expect(message).toContainText('mass1: expected 0.01 to 100, got "-3"');
-  await expect(message).toContainText('unknown "colour"');
+  await expect(message).toContainText('unknown setting "colour"');
   expect(await page.evaluate(() => upswing.world.plant)).toMatchObject({ mass1: 1, mass2: 1.5 });
 });
 

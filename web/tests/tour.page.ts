@@ -278,6 +278,11 @@ test('a bet: with the light link the agent of many pendulums holds, the one of o
     expect(await page.evaluate(() => upswing.world.twin!.uprightFor)).toBeGreaterThan(10);
     await expect(answer(page)).toContainText(`${result}: only the agent that learned on many`);
   }
+  // A verdict stays, even where both balance later.
+  await page.evaluate(() => (upswing.world.plant = { ...upswing.world.plant, mass2: 1 }));
+  expect(await held(page, 20)).toBeGreaterThan(5);
+  await page.waitForTimeout(1000); // the step looks ten times a second, at least once meanwhile
+  await expect(answer(page)).toContainText('You were right: only the agent');
   await page.getByRole('button', { name: 'Next' }).click();
   await expect(page.locator('#twin-scene')).toBeHidden();
 });

@@ -17,7 +17,8 @@ export class LearnChart {
     const width = canvas.width - LEFT - RIGHT;
     const steps = stepsOf(courses);
     const means = new Map(courses.map((course) => [course, meansOf(course)]));
-    const highest = Math.max(1000, ...[...means.values()].flat().map(({ value }) => value));
+    const largest = Math.max(1000, ...[...means.values()].flat().map(({ value }) => value));
+    const highest = 500 * Math.ceil(largest / 500);
     const x = (step: number) => LEFT + (step / steps) * width;
     const ofReturn = (value: number) => 6 + (bottom - 6) * (1 - Math.max(0, value) / highest);
     const ofSuccess = (share: number) => 6 + (bottom - 6) * (1 - share);
@@ -53,9 +54,10 @@ export class LearnChart {
   }
 }
 
-/// How many steps the chart shows.
+/// How many steps the chart shows. A recorded training was tested after its best policy, too.
 export function stepsOf(courses: readonly Course[]): number {
-  return Math.max(20_000, ...courses.map(({ steps }) => steps));
+  const ends = courses.map(({ steps, evaluations }) => [steps, evaluations.at(-1)?.step ?? 0]);
+  return Math.max(20_000, ...ends.flat());
 }
 
 /// The mean return of the trials that ended at each step: environments that begin together end so.

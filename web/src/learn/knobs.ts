@@ -25,6 +25,8 @@ const KNOBS: Readonly<Record<string, readonly string[]>> = {
     ...REWARD,
   ],
 };
+/// The named agents that learn in the page.
+export const LEARNERS = Object.keys(KNOBS);
 
 export class Knobs {
   private readonly place: HTMLElement;
@@ -34,9 +36,8 @@ export class Knobs {
     this.place = place;
   }
 
-  /// What can be changed of a named agent; undefined if it does not learn here.
-  settingsOf(agent: string): readonly Setting[] | undefined {
-    if (!Object.hasOwn(KNOBS, agent)) return undefined;
+  /// What can be changed of one of the `LEARNERS`.
+  settingsOf(agent: string): readonly Setting[] {
     const settings = agentSettings(core(), agent);
     return KNOBS[agent]!.map((name) => settings.get(name)!);
   }
@@ -54,7 +55,7 @@ export class Knobs {
 
   /// Shows those of a named agent, at its own values.
   show(agent: string): void {
-    this.inputs = this.settingsOf(agent)!.map((setting) => ({ setting, input: inputOf(setting) }));
+    this.inputs = this.settingsOf(agent).map((setting) => ({ setting, input: inputOf(setting) }));
     this.place.replaceChildren(
       ...this.inputs.map(({ input, setting }) => {
         const label = document.createElement('label');

@@ -11,7 +11,7 @@ import { LearnChart, stepsOf } from './chart';
 import type { Checkpoint, Course, Recording } from './course';
 import { film, filmType } from './film';
 import { Filmstrip } from './filmstrip';
-import { Knobs } from './knobs';
+import { Knobs, LEARNERS } from './knobs';
 import './learn.css';
 import { decodeRecipe, encodeRecipe, LARGEST_SEED } from './recipe';
 import { Scrubber } from './scrubber';
@@ -50,7 +50,8 @@ export interface LearnPage extends LearnStage {
   /// Hears when a training has begun.
   learned(): void;
   /// Keeps a policy that was learned here as the visitor's own.
-  keepLearned(file: File, shown: boolean): Promise<void>;
+  /// True if it is on the stage now.
+  keepLearned(file: File, shown: boolean): Promise<boolean>;
 }
 
 export class LearnPanel {
@@ -67,6 +68,7 @@ export class LearnPanel {
   private recording: Recording | null = null; // if it was asked for
   private readonly taken = new WeakSet<Session>(); // whose best policy has taken over
   private said = '';
+  private drawnOnStage = false; // whether the last drawing said that its agent is on the stage
   private scheduled = false;
 
   /// `recorded` is the agent whose training can be gone through.
@@ -105,9 +107,10 @@ export class LearnPanel {
   /// Starts a training with the chosen seed and settings.
   start(): void {
     for (const session of this.sessions) session.stop();
-    const first = Math.min(Math.max(Math.round(Number(this.seed.value)) || 0, 0), LARGEST_SEED);
-    this.seed.value = String(first);
     const count = this.four.checked ? SEEDS_AT_ONCE : 1;
+    const largest = LARGEST_SEED - (count - 1);
+    const first = Math.min(Math.max(Math.round(Number(this.seed.value)) || 0, 0), largest);
+    this.seed.value = String(first);
     this.sessions = Array.from(
       { length: count },
       (_, i) => new Session(this.agent.value, first + i, this.knobs.changed, () => this.news()),
@@ -118,7 +121,9 @@ export class LearnPanel {
   /// Trains what an address asks for, if it asks for something else than what is there. Returns what it
   /// does not understand.
   open(hash: string): readonly string[] {
-    const { recipe, problems } = decodeRecipe(hash, (agent) => this.knobs.settingsOf(agent));
+    const { recipe, problems } = decodeRecipe(hash, LEARNERS, (agent) =>
+      this.knobs.settingsOf(agent),
+    );
     const known = this.sessions.some((one) => recipe && encodeRecipe(one) === encodeRecipe(recipe));
     if (recipe && !known) {
       this.four.checked = false;
@@ -172,10 +177,10 @@ export class LearnPanel {
     return session !== null && this.taken.has(session) && page.agents.ownIsLearned;
   }
 
-  /// Puts what was learned, or is learning, on the stage again, unless it is the visitor's own agent.
+  /// Puts what was learned, or is learning, on the stage again.
   show(): void {
     const { course, onStage } = this.scrubber;
-    if (course && !onStage && !this.keeps) this.scrubber.take(course, !prefersStill());
+    if (course && !onStage) this.scrubber.take(course, !prefersStill());
     this.draw();
   }
 
@@ -198,6 +203,7 @@ export class LearnPanel {
   /// At each frame.
   follow(): void {
     this.scrubber.attempt();
+    if (this.scrubber.onStage !== this.drawnOnStage) this.draw();
   }
 
   /// What can be shown.
@@ -257,7 +263,9 @@ export class LearnPanel {
     if (ownName !== null && !ownIsLearned) return;
     const { newest } = session;
     const file = newest && fileOf(session, newest);
-    if (file) await this.page.keepLearned(file, scrubber.follows && scrubber.onStage);
+    if (!file) return;
+    const shown = await this.page.keepLearned(file, scrubber.follows && scrubber.onStage);
+    if (shown) scrubber.again();
   }
 
   /// Keeps the policy on the stage as the visitor's own; one that was brought is replaced only if the
@@ -267,8 +275,8 @@ export class LearnPanel {
     const { ownName, ownIsLearned } = this.page.agents;
     const question = `This replaces your own policy, ${ownName}, in this browser. Replace it?`;
     if (!file || (ownName !== null && !ownIsLearned && !confirm(question))) return;
-    await this.page.keepLearned(file, true);
-    note('It stays in this browser: it is the agent "yours" in every list.');
+    if (await this.page.keepLearned(file, true)) this.scrubber.again();
+    note('It stays in this browser. The lists of agents mark it with "(yours)".');
   }
 
   /// The agent on the stage and how well it does, as a film's title.
@@ -310,8 +318,14 @@ export class LearnPanel {
   /// The policy on the stage; if that is not of this training, its newest.
   private file(): File | null {
     const { session, scrubber } = this;
-    const shown = scrubber.follows || !scrubber.onStage ? session?.newest : scrubber.checkpoint;
+    const shown = this.isAtNewest ? session?.newest : scrubber.checkpoint;
     return session && shown ? fileOf(session, shown) : null;
+  }
+
+  /// Whether numbers and file are those of the newest policy: it is followed, or the stage shows an agent
+  /// that is not of this training.
+  private get isAtNewest(): boolean {
+    return this.scrubber.follows || !this.scrubber.onStage;
   }
 
   private listCourses(): void {
@@ -333,12 +347,14 @@ export class LearnPanel {
 
   private draw(): void {
     const { session, scrubber } = this;
-    const { course } = scrubber;
+    const { course, onStage } = scrubber;
+    this.drawnOnStage = onStage;
     this.chart.draw(
       course && !session ? [course] : this.sessions,
       course,
-      scrubber.shows ? scrubber.step : null,
+      onStage ? scrubber.step : null,
     );
+    element('learn-return-of').textContent = course && !session ? 'in a test' : 'of a trial';
     this.strip.show(session?.state === 'finished' ? session : null);
     const active = this.sessions.filter((one) => one.active);
     const paused = active.length > 0 && active.every(({ state }) => state === 'paused');
@@ -348,6 +364,7 @@ export class LearnPanel {
     const has = session !== null && session.policy !== null;
     element<HTMLButtonElement>('learn-save').disabled = !has;
     element<HTMLButtonElement>('learn-keep').disabled = !has;
+    element<HTMLButtonElement>('learn-share').disabled = session === null;
     this.scrub.disabled = !course || course.checkpoints.length < 2;
     if (!course) return;
     const outputs = [...element('learn-courses').querySelectorAll('output')];
@@ -357,7 +374,7 @@ export class LearnPanel {
     // Not under the finger that moves it.
     if (!this.scrub.matches(':active')) {
       this.scrub.max = String(stepsOf(session ? this.sessions : [course]));
-      this.scrub.value = String(scrubber.follows ? course.steps : scrubber.step);
+      this.scrub.value = String(this.isAtNewest ? course.steps : scrubber.step);
     }
     this.scrub.ariaValueText = `after ${scrubber.step.toLocaleString('en')} steps`;
     this.drawNumbers(course);
@@ -368,7 +385,7 @@ export class LearnPanel {
   private drawNumbers(course: Course): void {
     const write = (id: string, text: string) => (element(`learn-${id}`).textContent = text);
     const { session, scrubber } = this;
-    const now = session !== null && scrubber.follows;
+    const now = session !== null && this.isAtNewest;
     const at = now ? Infinity : scrubber.step;
     const success = successAt(course, at);
     const count = (number: number | undefined) => number?.toLocaleString('en') ?? '–';
@@ -382,9 +399,8 @@ export class LearnPanel {
     write('rate', now ? session.updatesPerSecond.toFixed(0) : '–');
     write('time', after ? `${after.seconds.toFixed(1)} s` : '–');
     write('success', success === undefined ? '–' : `${(100 * success).toFixed(0)}%`);
-    const where =
-      scrubber.follows && session ? 'as it is now' : `after ${count(scrubber.step)} steps`;
-    write('where', `on the stage: ${where}`);
+    const where = now ? 'as it is now' : `after ${count(scrubber.step)} steps`;
+    write('where', `on the stage: ${scrubber.onStage ? where : 'another agent'}`);
   }
 
   /// Writes the status when it changes, for screen readers.

@@ -12,28 +12,28 @@ const setting = (
   ...{ unit: '', help: '' },
 });
 const SETTINGS = [setting('gamma', '0.99', 0, 1), setting('double', 'true', null, null)];
-const settingsOf = (agent: string) => (agent === 'fast' ? SETTINGS : undefined);
+const decode = (hash: string) => decodeRecipe(hash, ['fast', 'sac-fast'], () => SETTINGS);
 
 test('a recipe survives its address', () => {
   const recipe = { agent: 'fast', seed: 42, settings: { gamma: '0.9', double: 'false' } };
   expect(encodeRecipe(recipe)).toBe('learn=fast&seed=42&gamma=0.9&double=false');
-  expect(decodeRecipe(`#${encodeRecipe(recipe)}`, settingsOf)).toEqual({ recipe, problems: [] });
+  expect(decode(`#${encodeRecipe(recipe)}`)).toEqual({ recipe, problems: [] });
 });
 
 test('the view alone is no recipe', () => {
-  expect(decodeRecipe('#learn', settingsOf)).toEqual({ recipe: null, problems: [] });
+  expect(decode('#learn')).toEqual({ recipe: null, problems: [] });
 });
 
 test.each([
-  ['learn=sac', null, 'no agent "sac" learns here'],
+  ['learn=sac', null, 'learn: expected fast or sac-fast, got "sac"'],
   ['learn=fast&seed=-1', {}, 'seed: expected a whole number from 0 to 1000000000, got "-1"'],
   ['learn=fast&seed=1.5', {}, 'seed: expected a whole number from 0 to 1000000000, got "1.5"'],
   ['learn=fast&gamma=2', {}, 'gamma: expected a number from 0 to 1, got "2"'],
   ['learn=fast&gamma=', {}, 'gamma: expected a number from 0 to 1, got ""'],
   ['learn=fast&double=1', {}, 'double: expected true or false, got "1"'],
-  ['learn=fast&steps=1', {}, 'unknown "steps"'],
+  ['learn=fast&steps=1', {}, 'unknown setting "steps"'],
 ])('%s is refused in a line', (hash, settings, problem) => {
-  const { recipe, problems } = decodeRecipe(hash, settingsOf);
+  const { recipe, problems } = decode(hash);
   expect(problems).toEqual([problem]);
   expect(recipe).toEqual(settings && { agent: 'fast', seed: 1, settings });
 });

@@ -15,25 +15,29 @@ export function encodeRecipe({ agent, seed, settings }: Recipe): string {
   return new URLSearchParams({ learn: agent, seed: String(seed), ...settings }).toString();
 }
 
-/// Reads such an address; null if it names no agent. `settingsOf` gives the settings that a recipe may
-/// change, or undefined for an agent that cannot learn here. What is not understood is left out and
-/// reported in `problems`.
+/// Reads such an address; null if it names none of the `agents` that can learn here. `settingsOf` gives the
+/// settings of an agent that a recipe may change. What is not understood is left out and reported in
+/// `problems`.
 export function decodeRecipe(
   hash: string,
-  settingsOf: (agent: string) => readonly Setting[] | undefined,
+  agents: readonly string[],
+  settingsOf: (agent: string) => readonly Setting[],
 ): { recipe: Recipe | null; problems: string[] } {
   const fields = new URLSearchParams(hash.replace(/^#/, ''));
   const agent = fields.get('learn');
   if (!agent) return { recipe: null, problems: [] };
+  if (!agents.includes(agent)) {
+    const problem = `learn: expected ${agents.join(' or ')}, got ${quoted(agent)}`;
+    return { recipe: null, problems: [problem] };
+  }
   const known = settingsOf(agent);
-  if (!known) return { recipe: null, problems: [`no agent ${quoted(agent)} learns here`] };
   const problems: string[] = [];
   const settings: Record<string, string> = {};
   let seed = 1;
   for (const [name, text] of fields) {
     if (name === 'learn') continue;
     const range = name === 'seed' ? SEED : known.find((one) => one.name === name);
-    const problem = range ? problemOf(range, text) : `unknown ${quoted(name)}`;
+    const problem = range ? problemOf(range, text) : `unknown setting ${quoted(name)}`;
     if (problem) problems.push(problem);
     else if (name === 'seed') seed = Number(text);
     else settings[name] = text;

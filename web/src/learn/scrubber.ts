@@ -18,7 +18,7 @@ export interface LearnStage {
 }
 
 /// Which policy of a training is on the stage, where it makes one attempt after another: the newest, or an
-/// earlier one. Beside it, if one likes, the untrained one.
+/// earlier one. Next to it stands the untrained one, if the visitor asks for it.
 export class Scrubber {
   course: Course | null = null;
   follows = true; // the newest
@@ -41,11 +41,6 @@ export class Scrubber {
     this.onShown = onShown;
   }
 
-  /// Whether one of its policies is or was on the stage, or is on its way there.
-  get shows(): boolean {
-    return this.given !== null;
-  }
-
   /// Whether the agent on the stage is one of this training.
   get onStage(): boolean {
     return this.shown !== null && this.stage.world.policy === this.shown;
@@ -58,6 +53,12 @@ export class Scrubber {
     this.replaceable = this.stage.world.policy;
     this.follow(moves);
     void this.showUntrained(this.withUntrained);
+  }
+
+  /// Puts its policy back on the stage, where a copy has become the visitor's own agent.
+  again(): void {
+    const policy = this.follows ? this.course?.newest : this.checkpoint;
+    if (policy) void this.show(policy);
   }
 
   /// Leaves the stage to others until a policy is shown again.
@@ -74,7 +75,7 @@ export class Scrubber {
     if (moves) this.restart();
   }
 
-  /// After news. If somebody has chosen another agent meanwhile, that stays.
+  /// After news. If the visitor has chosen another agent meanwhile, that stays.
   update(): void {
     const newest = this.course?.newest;
     if (this.untrained === null && this.withUntrained) void this.showUntrained(true);
@@ -107,7 +108,7 @@ export class Scrubber {
     this.stage.reset();
   }
 
-  /// Whether the policy that knew nothing is shown beside the other.
+  /// Whether the untrained policy is shown next to the other.
   async showUntrained(wanted: boolean): Promise<void> {
     this.withUntrained = wanted;
     const request = ++this.untrainedRequests;

@@ -63,7 +63,7 @@ export class AgentPanel {
 
   /// The same with a visitor's own file, or one that the page has `learned`.
   open(file: File, learned: boolean): Promise<boolean> {
-    const refusal = `This is not a policy of Upswing. "${printable(file.name, NAME)}" cannot be used`;
+    const refusal = `"${printable(file.name, NAME)}" cannot be used as a policy`;
     return this.load(() => this.agents.open(file, learned), refusal);
   }
 

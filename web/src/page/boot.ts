@@ -8,7 +8,7 @@ import { fetchBytes } from './fetch';
 const CORE_BYTES = 1_050_000; // approximately; servers that compress do not send the length
 const MAX_WASM_BYTES = 64 * 1024 * 1024;
 
-/// Fetches and starts our own core, which the page computes with; `onProgress` hears the share that has
+/// Fetches and starts our own core, which the page computes with. `onProgress` hears the share that has
 /// arrived. Throws BadInput.
 export async function fetchCore(onProgress: (share: number) => void): Promise<void> {
   if (typeof WebAssembly !== 'object') {

@@ -9,7 +9,7 @@ export function button(id: string, onClick: () => void): HTMLButtonElement {
   return found;
 }
 
-/// Writes what has changed: the browser lays out anew whatever is written to.
+/// Writes only a text that has changed: each write makes the browser lay out again.
 export function write(place: Element, text: string): void {
   if (place.textContent !== text) place.textContent = text;
 }

@@ -190,10 +190,12 @@ export class Page {
   }
 
   /// Changes to a visitor's own policy and to the plant that it was trained on.
-  async openFile(file: File, learned = false): Promise<void> {
-    if (!(await this.agentPanel.open(file, learned))) return;
+  /// False if it cannot be loaded, or another was asked for meanwhile.
+  async openFile(file: File, learned = false): Promise<boolean> {
+    if (!(await this.agentPanel.open(file, learned))) return false;
     this.settings.setPlant(this.agent!.policy.plant);
     this.changed();
+    return true;
   }
 
   /// A training has begun: the address is its recipe.
@@ -211,11 +213,13 @@ export class Page {
     if (!this.learning) this.learn.leave();
   }
 
-  /// Keeps a policy that was learned here as the visitor's own, on the stage if it is to be `shown`.
-  async keepLearned(file: File, shown: boolean): Promise<void> {
+  /// Keeps a policy that was learned here as the visitor's own, on the stage if it is to be `shown`. True
+  /// if it is there now.
+  async keepLearned(file: File, shown: boolean): Promise<boolean> {
     if (shown) return this.openFile(file, true);
     await this.agents.open(file, true);
     this.agentPanel.show();
+    return false;
   }
 
   private listen(): void {

@@ -43,11 +43,11 @@ test.each([
   ['mass1=1e99', 'mass1: expected 0.2 to 3, got "1e99"'],
   ['mass1=NaN', 'mass1: expected 0.2 to 3, got "NaN"'],
   ['mass1=', 'mass1: expected 0.2 to 3, got ""'],
-  ['mass3=1', 'unknown "mass3"'],
-  [`${'x'.repeat(5000)}=1`, `unknown "${'x'.repeat(59)}…"`],
+  ['mass3=1', 'unknown setting "mass3"'],
+  [`${'x'.repeat(5000)}=1`, `unknown setting "${'x'.repeat(59)}…"`],
   [`mass1=${'1'.repeat(5000)}`, `mass1: expected 0.2 to 3, got "${'1'.repeat(59)}…"`],
-  ['a%0Ab=1', 'unknown "a\ufffdb"'],
-  ['__proto__=1', 'unknown "__proto__"'],
+  ['a%0Ab=1', 'unknown setting "a\ufffdb"'],
+  ['__proto__=1', 'unknown setting "__proto__"'],
 ])('%s is told and left out', (hash, problem) => {
   expect(decode(hash, RANGES, has)).toEqual({ shared: BEGINNING, problems: [problem] });
 });
@@ -57,6 +57,6 @@ test("an agent that is not there is left out, and a visitor's own is told apart"
   expect([shared.agent, shared.twin]).toEqual([null, null]);
   expect(problems).toEqual([
     'unknown agent "unknown"',
-    "it was made with somebody's own policy, which is not in it",
+    'it does not contain its sender’s own policy',
   ]);
 });

@@ -7,12 +7,12 @@ import { quoted } from '../text';
 /// Stands for a visitor's own policy, which no link can contain.
 export const OWN = 'own';
 
-const NOT_IN_IT = "it was made with somebody's own policy, which is not in it";
+const NOT_IN_IT = 'it does not contain its sender’s own policy';
 
 /// What a link contains: the agent, whether it is on, and every setting that was changed.
 export interface Shared extends Disturbance {
   agent: string | null;
-  twin: string | null; // the agent beside it
+  twin: string | null; // the second agent
   on: boolean;
   speed: number;
   plant: Plant;
@@ -73,7 +73,7 @@ export function decode(
     } else if (name === 'everything' || name === 'learn') {
       // the view; it has no value
     } else if (!range) {
-      problems.push(`unknown ${quoted(name)}`);
+      problems.push(`unknown setting ${quoted(name)}`);
     } else if (text.trim() === '' || !(value >= range[0] && value <= range[1])) {
       problems.push(`${name}: expected ${range[0]} to ${range[1]}, got ${quoted(text)}`);
     } else if (name === 'delay') {

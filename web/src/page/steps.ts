@@ -232,16 +232,23 @@ function bet(stage: Stage): Step {
       write(element('twin-name'), 'learned on many');
       if (!world.agentOn || !world.twin) return '';
       const [one, many] = [heldFor(world), heldFor(world.twin)];
-      const verdict = onMany ? ['You were right', 'You lost'] : ['You lost', 'You were right'];
-      if (many > WON && one < HELD) decided = `${verdict[0]}: ${MANY_HOLDS}`;
-      if (one > WON && many < HELD) decided = `${verdict[1]}: ${ONE_HOLDS}`;
-      if (one > WON && many > WON) decided = BOTH_HOLD;
-      if (!decided && world.time - begun > LONGEST) decided = NONE_HOLDS;
+      decided ||= verdictOf(onMany, one, many, world.time - begun);
       return decided || 'Both try …';
     },
   };
 }
 
+/// How the race ends for a bet on the agent of many pendulums, or on the other; empty while it goes on. `one` and
+/// `many` are how long (s) each has balanced, `raced` is how long (s) they have tried.
+function verdictOf(onMany: boolean, one: number, many: number, raced: number): string {
+  if (many > WON && one < HELD) return `${onMany ? RIGHT : LOST}: ${MANY_HOLDS}`;
+  if (one > WON && many < HELD) return `${onMany ? LOST : RIGHT}: ${ONE_HOLDS}`;
+  if (one > WON && many > WON) return BOTH_HOLD;
+  return raced > LONGEST && one < HELD && many < HELD ? NONE_HOLDS : '';
+}
+
+const RIGHT = 'You were right';
+const LOST = 'You lost';
 const MANY_HOLDS = 'only the agent that learned on many balances it.';
 const ONE_HOLDS = 'only the agent that learned on one balances it.';
 const BOTH_HOLD = 'A draw: both balance it.';

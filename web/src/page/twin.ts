@@ -11,7 +11,7 @@ import { situation } from './dashboard';
 import { element, write } from './dom';
 import { warn } from './message';
 
-/// A second pendulum beside the first, with an agent of its own, to which happens what happens to that.
+/// A second pendulum next to the first. It has its own agent, and the same start, shoves and sliders.
 export class Twin {
   id: string | null = null; // of its agent; null while there is none
   readonly scene = new Scene('twin-scene');
@@ -78,7 +78,7 @@ export class Twin {
     element('twin-name').textContent = name;
   }
 
-  /// Goes on in another engine.
+  /// Continues in another engine.
   continueIn(simulator: Simulator): void {
     this.world.continueIn(simulator);
   }

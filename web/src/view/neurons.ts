@@ -6,16 +6,21 @@ const GAP = 4; // px, between rows
 const EASE = 0.3; // of the way to a new brightness, at each drawing
 const FADE = 0.98; // by which the brightest of a row fades, so that it follows what happens
 
-/// The numbers that an agent sees, and under them its neurons layer by layer, each as bright as it is active; an input below 0 in another
-/// colour.
+/// The neurons of a layer, or the inputs.
+interface Row {
+  shown: Float32Array; // brightness, eased; below 0 for an input below 0
+  most: number; // largest size lately, which is drawn brightest
+}
+
+/// The numbers that an agent sees, and under them its neurons layer by layer. Each is as bright as it is
+/// active. An input below 0 has another colour.
 export class NeuronChart {
   readonly canvas = new Canvas('neurons');
   private neurons: Neurons | null = null; // that the rows are of
-  private rows: { shown: Float32Array; most: number }[] = [];
+  private rows: Row[] = [];
 
   draw(neurons: Neurons | null, observation: Float32Array): void {
     const { canvas } = this;
-
     canvas.clear();
     if (!neurons) return;
     const layers = [observation, ...neurons.active(observation)];
@@ -32,12 +37,7 @@ export class NeuronChart {
     });
   }
 
-  private drawRow(
-    layer: Float32Array,
-    row: { shown: Float32Array; most: number },
-    y: number,
-    height: number,
-  ): void {
+  private drawRow(layer: Float32Array, row: Row, y: number, height: number): void {
     const { canvas } = this;
     const { context } = canvas;
     const width = (canvas.width - LEFT) / layer.length;
