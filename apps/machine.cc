@@ -213,7 +213,7 @@ int RunIdentify(const MachineArguments& a) {
   ThreadPool pool(ResolveThreads(a.threads));
   Identification found;
   {
-    EpisodeProgress progress(a.as_json);
+    EpisodeProgress progress(a.as_json, "fits");
     found = Identify(logs, first, config, &pool, std::ref(progress));
   }
   Twin& twin = found.fit.twin;

@@ -64,7 +64,7 @@ void EpisodeProgress::operator()(double done, double total) {
   const double seconds = std::chrono::duration<double>(now - begin_).count();
   const double rate = done / seconds;
   const std::string episodes =
-      Concat(rate < 10 ? fmt::format("{:.2g}", rate) : FormatCount(rate), " episodes/s");
+      Concat(rate < 10 ? fmt::format("{:.2g}", rate) : FormatCount(rate), " ", unit_, "/s");
   const std::string left = FormatDuration((total - done) / rate) + " left";
   if (plain) {
     last_plain_ = now;

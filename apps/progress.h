@@ -39,12 +39,13 @@ class ProgressLine {
   Clock::time_point last_{};
 };
 
-/// A progress line for work on episodes: their rate and the time left. Without a terminal, it
-/// prints a plain line on standard error every ten seconds.
+/// A progress line for work on episodes or other units: their rate and the time left. Without a
+/// terminal, it prints a plain line on standard error every ten seconds.
 class EpisodeProgress {
  public:
-  /// Shows no bar if `quiet`.
-  explicit EpisodeProgress(bool quiet) : quiet_(quiet) {}
+  /// Shows no bar if `quiet`. `unit` names what is counted.
+  explicit EpisodeProgress(bool quiet, const char* unit = "episodes")
+      : quiet_(quiet), unit_(unit) {}
 
   /// A Progress. A new `total` begins a new piece of work at the time of the last call.
   void operator()(double done, double total);
@@ -53,6 +54,7 @@ class EpisodeProgress {
   using Clock = std::chrono::steady_clock;
   double total_ = 0;
   bool quiet_;
+  const char* unit_;
   ProgressLine line_;
   Clock::time_point begin_ = Clock::now();
   Clock::time_point last_call_ = begin_;

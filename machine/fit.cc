@@ -29,6 +29,8 @@ constexpr double kStartWeight = 0.05;
 constexpr double kSmallestScale = 1e-5, kLargestScale = 0.1;  // rad
 constexpr double kSmallestTorqueScale = 1e-3;                 // N·m
 
+constexpr double kSmallestLink = 1e-5;  // of a link's centre (m) and inertia (kg·m²)
+
 /// Typical size of a value, for finite differences.
 double ScaleOf(const std::string& name) {
   static const std::map<std::string, double, std::less<>> kScales{
@@ -94,6 +96,12 @@ class Problem {
     twin_.sessions.clear();
     twin_.uncertain.clear();
     twin_.covariance.clear();
+    // Zeros stand for the capsules' centres and inertias.
+    const auto [link1, link2] = LinksOf(twin_.plant);
+    twin_.plant.center1 = link1.c;
+    twin_.plant.center2 = link2.c;
+    twin_.plant.inertia1 = link1.I;
+    twin_.plant.inertia2 = link2.I;
     std::map<std::string, int> sessions;
     for (const MachineLog& log : logs) {
       const auto [place, is_new] =
@@ -104,7 +112,9 @@ class Problem {
     const Options options = OptionsOf(twin_);
     for (const std::string& name : names) {
       const Option& option = *options.Find(name, "identify").front();
-      values_.push_back({name, ScaleOf(name), -1, option.range});
+      Range range = option.range;
+      if (name.starts_with("center") || name.starts_with("inertia")) range.low = kSmallestLink;
+      values_.push_back({name, ScaleOf(name), -1, range});
       if (SessionDeviation(name) == 0) continue;
       for (int s = 0; s < static_cast<int>(sessions_.size()); ++s) {
         values_.push_back({name, ScaleOf(name), s, {}});
