@@ -80,9 +80,11 @@ BoardEpisode DrawEpisode(const Twin& twin, Rng& rng) {
   episode.zero = {machine.sensors.zero1 - twin.sensors.zero1,
                   machine.sensors.zero2 - twin.sensors.zero2};
   double time = 0;
+  bool passive = rng.Uniform() < 0.5;
   for (BoardPush& push : episode.pushes) {
-    time += rng.Uniform(0.5, 3);
-    push = {rng.Uniform(-0.7, 0.7), time, rng.Uniform(0.05, 0.1)};
+    time += rng.Uniform(0.5, 2.5);
+    push = {rng.Uniform(-0.6, 0.6), time, rng.Uniform(0.05, 0.1), passive};
+    passive = !passive;
   }
   episode.seed = rng.Next();
   return episode;

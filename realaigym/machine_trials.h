@@ -24,7 +24,7 @@ Joints CompensationAt(const Twin& twin, const Joints& velocity);
 /// The twin's machine as an episode of a search: friction less its compensation, delay, lag and
 /// encoders. The zeros are 0.
 BoardEpisode NominalEpisode(const Twin& twin);
-/// An episode of a machine drawn from the posterior, with three pushes at the motor's joint.
+/// An episode of a machine drawn from the posterior, with two pushes at each joint.
 BoardEpisode DrawEpisode(const Twin& twin, Rng& rng);
 
 /// Makes the controller of a trial.

@@ -13,7 +13,7 @@ namespace {
 
 /// Draws six pushes with growing times, and keeps three random ones for the motor's joint. Pushes
 /// about the other joint have no effect there (docs/howto/realaigym.md).
-std::array<BoardPush, 3> RandomPushes(Rng& rng) {
+std::array<BoardPush, 4> RandomPushes(Rng& rng) {
   std::array<int, 6> order;
   std::iota(order.begin(), order.end(), 0);
   for (size_t i = order.size() - 1; i > 0; --i) std::swap(order[i], order[rng.Below(i + 1)]);
@@ -25,7 +25,7 @@ std::array<BoardPush, 3> RandomPushes(Rng& rng) {
     push.width = rng.Uniform(0.05, 0.1);
     push.amplitude = rng.Uniform(0.5, 5) * (rng.Uniform() < 0.5 ? -1 : 1);
   }
-  std::array<BoardPush, 3> ours;
+  std::array<BoardPush, 4> ours{};
   for (size_t k = 0; k < 3; ++k) ours[k] = all[static_cast<size_t>(order[k])];
   return ours;
 }

@@ -24,11 +24,12 @@ std::optional<Robot> RobotNamed(std::string_view name);
 /// baselines: minimises ∫ x' Q x + R u² dt, Q diagonal.
 Lqr SolveBoardLqr(Robot robot, const Eigen::Vector4d& Q, double R);
 
-/// A short disturbing torque (N·m) about the motor's joint, also beyond its limit: amplitude ·
-/// exp(-(t - time)²/(2 width²)).
+/// A short disturbing torque (N·m), also beyond the motor's limit: amplitude · exp(-(t - time)²/(2
+/// width²)).
 struct BoardPush {
   double amplitude = 0;        // N·m
   double time = 0, width = 0;  // s
+  bool passive = false;        // about the joint without the motor
 };
 
 /// The conditions of a simulation: 10 s from hanging at rest.
@@ -41,7 +42,7 @@ struct BoardEpisode {
   double torque_noise = 0;               // N·m
   double response = 1;                   // k of u = u_before + k (u_wanted - u_before)
   int delay = 0;                         // of the measured state, steps
-  std::array<BoardPush, 3> pushes{};     // about the motor's joint
+  std::array<BoardPush, 4> pushes{};
   uint64_t seed = 0;                     // of the noise
   int steps = kBoardSteps;               // fewer for a search; equal within a block
 };

