@@ -5,6 +5,9 @@
 #include <chrono>
 #include <cmath>
 #include <functional>
+#include <span>
+#include <tuple>
+#include <utility>
 
 #include "apps/commands.h"
 #include "apps/progress.h"
@@ -12,12 +15,17 @@
 #include "apps/signals.h"
 #include "core/error.h"
 #include "core/format.h"
+#include "core/json.h"
+#include "core/sample.h"
 #include "core/text.h"
 #include "io/machine.h"
 #include "io/streams.h"
 #include "io/tensor_file.h"
+#include "machine/windows.h"
 #include "realaigym/boards.h"
 #include "realaigym/hardware.h"
+#include "realaigym/machine_trials.h"
+#include "realaigym/published_tvlqr.h"
 #include "report/figure.h"
 #include "run/find_policy.h"
 
@@ -26,8 +34,10 @@ namespace {
 
 struct RealAiGymArguments {
   PolicyArguments policy;
-  std::string figure, csv, search_out, from;
-  std::vector<std::string> hardware;
+  std::string figure, csv, search_out, from, twin;
+  std::vector<std::string> hardware, law;
+  int64_t draws = 1000;
+  bool no_pushes = false;
   std::vector<FlagValue> search;
   int64_t threads = 0, case_seed = 1;
   bool as_json = false;
@@ -79,6 +89,7 @@ Competitor Search(const RealAiGymArguments& a, ThreadPool& pool) {
   SetFlags(OptionsOf(config), a.search);
   BoardSearch search =
       a.from.empty() ? BoardSearch(config) : BoardSearch(config, LoadSwingPolicy(a.from));
+  if (!a.twin.empty()) search.SearchOn(ReadTwin(a.twin, "--twin"));
   InstallSignalHandlers("\nwriting the best policy so far\n");
   const auto begin = std::chrono::steady_clock::now();
   BoardSearch::Report report;
@@ -143,6 +154,53 @@ void PrintHardware(const HardwareReport& report) {
   }
 }
 
+/// Runs the TVLQR of the logs on a twin, and compares successes.
+int CompareTvlqr(const RealAiGymArguments& a, std::span<const MachineLog> logs,
+                 const HardwareReport& real) {
+  const Twin twin = ReadTwin(a.twin, "--twin");
+  std::vector<MachineLog> of_law;
+  for (const std::string& file : a.law.empty() ? a.hardware : a.law) {
+    for (MachineLog& log : ReadLog(file)) of_law.push_back(std::move(log));
+  }
+  const PublishedTvlqr law(of_law, real.robot);
+  std::vector<double> misfits;
+  for (const MachineLog& log : of_law) misfits.push_back(law.Misfit(log));
+  const TrialRules rules{.count = static_cast<int>(a.draws),
+                         .seed = static_cast<uint64_t>(a.case_seed)};
+  ThreadPool pool(ResolveThreads(a.threads));
+  HardwareReport report;
+  {
+    EpisodeProgress progress(a.as_json);
+    report = RunTvlqrTrials(twin, real.robot, law, logs, rules, &pool, std::ref(progress));
+  }
+  int successes = real.successes(), runs = static_cast<int>(real.runs.size());
+  for (const HardwareEntry& e : PublishedHardwareEntries(real.robot, real.pushed)) {
+    if (e.name == "TVLQR") std::tie(successes, runs) = std::pair(e.successes, 10);
+  }
+  const Interval interval = WilsonInterval(successes, runs);
+  const double share = report.successes() / static_cast<double>(a.draws);
+  if (a.as_json) {
+    fmt::print("{}\n", PrintableJson(
+                           nlohmann::ordered_json{{"robot", NameOf(real.robot)},
+                                                  {"pushed", real.pushed},
+                                                  {"law_misfit", Median(misfits)},
+                                                  {"real_successes", successes},
+                                                  {"real_runs", runs},
+                                                  {"real_interval", {interval.low, interval.high}},
+                                                  {"twin", share},
+                                                  {"mean_score", report.mean()}}));
+    return 0;
+  }
+  fmt::print(
+      "TVLQR of the {}{}, rebuilt from {} (commands differ by {:.3f} N·m)\n"
+      "  real machine: {} of {} succeed, 95% interval {:.0f}–{:.0f}%\n"
+      "  {}: {:.1f}% of {} succeed, mean score {:.3f}\n",
+      NameOf(real.robot), real.pushed ? ", pushed" : "", Counted(of_law.size(), "run"),
+      Median(misfits), successes, runs, 100 * interval.low, 100 * interval.high,
+      Printable(twin.name), 100 * share, Counted(a.draws, "machine"), report.mean());
+  return 0;
+}
+
 int ScoreLogs(const RealAiGymArguments& a) {
   BoardSearchConfig config;  // has --robot
   SetFlags(OptionsOf(config), a.search);
@@ -152,11 +210,45 @@ int ScoreLogs(const RealAiGymArguments& a) {
     for (MachineLog& log : ReadLog(file)) logs.push_back(std::move(log));
   }
   const HardwareReport report = ScoreHardware(logs, robot);
+  if (!a.twin.empty()) return CompareTvlqr(a, logs, report);
   if (a.as_json) {
     fmt::print("{}\n", HardwareJson(report));
   } else {
     PrintHardware(report);
   }
+  return 0;
+}
+
+/// Scores a competitor on machines drawn from a twin's posterior.
+int ScoreOnTwin(const RealAiGymArguments& a, const Competitor& competitor, ThreadPool& pool) {
+  const Twin twin = ReadTwin(a.twin, "--twin");
+  const TrialRules rules{.count = static_cast<int>(a.draws),
+                         .pushes = !a.no_pushes,
+                         .seed = static_cast<uint64_t>(a.case_seed)};
+  HardwareReport report;
+  {
+    EpisodeProgress progress(a.as_json);
+    report = RunTrials(twin, competitor.robot, OnMachine(competitor.make, twin, competitor.robot),
+                       rules, &pool, std::ref(progress));
+  }
+  const Interval interval = WilsonInterval(report.successes(), a.draws);
+  if (a.as_json) {
+    fmt::print("{}\n", PrintableJson({{"policy", competitor.name},
+                                      {"twin", twin.name},
+                                      {"pushed", report.pushed},
+                                      {"draws", a.draws},
+                                      {"successes", report.successes()},
+                                      {"interval", {interval.low, interval.high}},
+                                      {"mean_score", report.mean()}}));
+    return 0;
+  }
+  fmt::print(
+      "{} on {} of {}{}: {} of {} swing up and stay, {:.1f}% (95%: {:.1f}–{:.1f}%), mean "
+      "score {:.3f}\n",
+      Printable(competitor.name), Counted(a.draws, "machine"), Printable(twin.name),
+      report.pushed ? ", pushed" : "", report.successes(), a.draws,
+      100.0 * report.successes() / static_cast<double>(a.draws), 100 * interval.low,
+      100 * interval.high, report.mean());
   return 0;
 }
 
@@ -205,6 +297,7 @@ int RunRealAiGym(const RealAiGymArguments& a) {
   ThreadPool pool(ResolveThreads(a.threads));
   const Competitor competitor = searches ? Search(a, pool) : GetCompetitor(a.policy, robot);
   if (StopSignal() != 0) return 128 + StopSignal();
+  if (!a.twin.empty()) return ScoreOnTwin(a, competitor, pool);
   BoardReport report;
   {
     EpisodeProgress progress(a.as_json);
@@ -234,6 +327,11 @@ void AddRealAiGym(CommandLine& line) {
   line.Text("--from", a.from, "FILE", "policy that the search starts from (default a random one)");
   line.Texts("--hardware", a.hardware, "LOG",
              "logs of runs on the real robot to score by the hardware rules, .csv or .csv.gz");
+  line.Texts("--law", a.law, "LOG",
+             "with --hardware and --twin: runs without pushes to rebuild the TVLQR from");
+  line.Text("--twin", a.twin, "FILE",
+            "score or search on machines drawn from this twin, by the hardware rules");
+  line.Flag("--no-pushes", a.no_pushes, "no pushes on the twin's machines");
   line.Text("--figure", a.figure, "FILE", "figure of the robustness score to draw, .svg or .png");
   line.Text("--csv", a.csv, "FILE",
             "CSV file to write, the motion in the format of RealAIGym; -: standard output, without "
@@ -242,7 +340,8 @@ void AddRealAiGym(CommandLine& line) {
   Options own;
   own.Section("cases");
   own.Add(&a.case_seed, "case_seed", {0, 1e15}, "",
-          "seed of noise and pushes in the robustness score");
+          "seed of noise and pushes in the robustness score, and of a twin's machines");
+  own.Add(&a.draws, "draws", {1, 1e6}, "", "number of machines drawn from the twin");
   line.Arguments(own);
   BoardSearchConfig config;
   line.Settings(OptionsOf(config), a.search);

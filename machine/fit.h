@@ -18,8 +18,8 @@ namespace upswing {
 /// Settings of an identification.
 struct FitConfig {
   WindowRules windows{.seconds = 1, .hop = 0.5, .highest = 0.8, .motion = 0.05};
-  int iterations = 15;
-  double tolerance = 1e-3;  // least relative decrease of the cost in an iteration
+  int iterations = 40;
+  double tolerance = 1e-5;  // least relative decrease of the cost in an iteration
 };
 
 /// The result of an identification.

@@ -117,6 +117,13 @@ TEST(Fit, FindsTheMachineBehindItsLogs) {
     note("G2", found.G2, truth.G2);
     note("coulomb1", found.f1, truth.f1);
     note("coulomb2", found.f2, truth.f2);
+    if (given != nullptr) {
+      std::printf("%d delay %+.5f lag %+.5f current delay %+.5f\n", draw,
+                  fit.twin.actuator.delay - machine.actuator.delay,
+                  fit.twin.actuator.lag - machine.actuator.lag,
+                  fit.twin.actuator.current_delay - machine.actuator.current_delay);
+      std::fflush(stdout);
+    }
     errors["delay, s"].push_back(fit.twin.actuator.delay - machine.actuator.delay);
     const size_t n = fit.twin.uncertain.size();
     for (size_t i = 0; i < n; ++i) {

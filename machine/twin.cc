@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 
 #include "core/error.h"
@@ -96,6 +97,22 @@ void ReadSessions(const toml::table& table, const std::string& where, Twin& twin
     session.name = std::string(name.str());
     ApplyTable(OptionsOf(session), *node.as_table(), where, /*alone=*/true);
   }
+}
+
+/// Removes values from the covariance.
+void Forget(Twin& twin, const std::function<bool(const std::string&)>& forgets) {
+  std::vector<std::string> names;
+  std::vector<double> covariance;
+  const size_t n = twin.uncertain.size();
+  for (size_t i = 0; i < n; ++i) {
+    if (forgets(twin.uncertain[i])) continue;
+    names.push_back(twin.uncertain[i]);
+    for (size_t j = 0; j < n; ++j) {
+      if (!forgets(twin.uncertain[j])) covariance.push_back(twin.covariance[i * n + j]);
+    }
+  }
+  twin.uncertain = names;
+  twin.covariance = covariance;
 }
 
 /// The sensors of the control loop, and the time that a torque takes, as the age of what they show.
@@ -251,6 +268,9 @@ Twin InSession(const Twin& twin, const MachineLog& log) {
     own.sensors.zero2 = session.zero2;
     own.plant.coulomb1 = session.coulomb1;
     own.plant.coulomb2 = session.coulomb2;
+    const Options known = OptionsOf(session);
+    Forget(own, [&](const std::string& value) { return known.Get(value) != nullptr; });
+    break;
   }
   return own;
 }

@@ -84,7 +84,8 @@ struct Twin {
   void Describe(Options& options);
 };
 
-/// The machine in a log's session; the twin itself if the log is of another session.
+/// The machine in a log's session, whose zeros and friction are known; the twin itself if the log
+/// is of another session.
 Twin InSession(const Twin& twin, const MachineLog& log);
 
 /// Reads a twin from a TOML document named `where`. Throws BadInput for an unknown name, a value

@@ -123,6 +123,8 @@ TEST(InSession, TakesTheSessionsValues) {
   log.name = "day/run-3.csv";
   EXPECT_EQ(InSession(twin, log).plant.coulomb1, 0.12);
   EXPECT_EQ(InSession(twin, log).sensors.zero2, -0.03);
+  EXPECT_EQ(InSession(twin, log).uncertain, (std::vector<std::string>{"center2", "lag"}));
+  EXPECT_EQ(InSession(twin, log).covariance, (std::vector<double>{4e-6, 0, 0, 1e-8}));
   log.name = "day/unknown.csv";
   EXPECT_EQ(InSession(twin, log).plant.coulomb1, 0.1);
 }

@@ -34,13 +34,16 @@ struct BoardPush {
 /// The conditions of a simulation: 10 s from hanging at rest.
 struct BoardEpisode {
   BoardPlant plant;
-  double velocity_noise = 0;          // of the measured velocities, rad/s
-  double torque_noise = 0;            // N·m
-  double response = 1;                // k of u = u_before + k (u_wanted - u_before)
-  int delay = 0;                      // of the measured state, steps
-  std::array<BoardPush, 3> pushes{};  // about the motor's joint
-  uint64_t seed = 0;                  // of the noise
-  int steps = kBoardSteps;            // fewer for a search; equal within a block
+  std::optional<Manipulator> body = {};  // equations of motion in place of the plant's
+  double quantum = 0;                    // step of the measured angles, rad
+  std::array<double, 2> zero{};          // measured angles of a pendulum that hangs, rad
+  double velocity_noise = 0;             // of the measured velocities, rad/s
+  double torque_noise = 0;               // N·m
+  double response = 1;                   // k of u = u_before + k (u_wanted - u_before)
+  int delay = 0;                         // of the measured state, steps
+  std::array<BoardPush, 3> pushes{};     // about the motor's joint
+  uint64_t seed = 0;                     // of the noise
+  int steps = kBoardSteps;               // fewer for a search; equal within a block
 };
 
 /// Largest angle and velocity errors, of both joints, at an end that counts for robustness.

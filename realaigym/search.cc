@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "core/text.h"
+#include "realaigym/machine_trials.h"
 #include "realaigym/swing_net.h"
 
 namespace upswing {
@@ -37,20 +38,14 @@ double NominalFitness(const BoardOutcome& o, double weight) {
   return (done ? weight * PerformanceScore(o) : 0) + 0.5 * o.held + 0.3 * o.nearest - idle;
 }
 
-/// A simulation drawn for a candidate.
-struct Drawn {
-  double weight;  // in the robustness; 0: the nominal plant
-  BoardEpisode episode;
-};
-
 constexpr int kShortSteps = 3000;         // 6 s: enough for a swing-up and to see if it holds
 constexpr double kLinearDeviation = 0.1;  // initial deviation of the regulator's numbers
 
 /// Draws the simulations of a candidate, as many as a group has: the nominal plant, then the rows
 /// with their variation drawn uniformly over its range. Velocity noise is left out, because a
 /// SwingNet does not use measured velocities. Easy rows have one simulation with half the weight.
-std::vector<Drawn> DrawEpisodes(Rng& rng) {
-  std::vector<Drawn> drawn{{0, {}}};
+std::vector<DrawnEpisode> BoardEpisodes(Rng& rng) {
+  std::vector<DrawnEpisode> drawn{{0, {}}};
   const auto draw = [&](RobustnessRow row, int count, double weight) {
     std::array<int, kBoardVariations.size()> parameters;
     std::iota(parameters.begin(), parameters.end(), 0);
@@ -170,8 +165,9 @@ int BoardSearch::generations() const {
 
 std::vector<double> BoardSearch::NominalFitnesses(
     const std::vector<std::vector<double>>& candidates, ThreadPool* pool) const {
-  std::vector<BoardEpisode> episodes(candidates.size());
-  for (BoardEpisode& episode : episodes) episode.steps = kShortSteps;
+  BoardEpisode nominal = twin_ ? NominalEpisode(*twin_, net_.robot()) : BoardEpisode{};
+  nominal.steps = kShortSteps;
+  const std::vector<BoardEpisode> episodes(candidates.size(), nominal);
   const auto make = [&](size_t first) {
     const std::vector<std::span<const double>> numbers(
         candidates.begin() + static_cast<std::ptrdiff_t>(first),
@@ -188,10 +184,10 @@ std::vector<double> BoardSearch::NominalFitnesses(
 
 std::vector<double> BoardSearch::Fitnesses(const std::vector<std::vector<double>>& candidates,
                                            double performance_weight, ThreadPool* pool) {
-  const std::vector<Drawn> drawn = DrawEpisodes(rng_);
+  const std::vector<DrawnEpisode> drawn = DrawEpisodes();
   std::vector<BoardEpisode> all;
   for (size_t k = 0; k < candidates.size(); ++k) {
-    for (const Drawn& each : drawn) all.push_back(each.episode);
+    for (const DrawnEpisode& each : drawn) all.push_back(each.episode);
   }
   const std::vector<std::span<const double>> numbers(candidates.begin(), candidates.end());
   const auto make = [&](size_t first) {
@@ -200,13 +196,22 @@ std::vector<double> BoardSearch::Fitnesses(const std::vector<std::vector<double>
   const std::vector<BoardOutcome> outcomes = SimulateOnBoard(net_.robot(), all, make, pool);
   std::vector<double> fitness(candidates.size(), 0.0);
   for (size_t i = 0; i < all.size(); ++i) {
-    const Drawn& each = drawn[i % kSwingGroup];
+    const DrawnEpisode& each = drawn[i % kSwingGroup];
     const BoardOutcome& o = outcomes[i];
     fitness[i / kSwingGroup] += each.weight == 0
                                     ? NominalFitness(o, performance_weight)
                                     : each.weight * ((o.at_goal ? 0.6 : 0) + 0.4 * o.held);
   }
   return fitness;
+}
+
+std::vector<DrawnEpisode> BoardSearch::DrawEpisodes() {
+  if (!twin_) return BoardEpisodes(rng_);
+  std::vector<DrawnEpisode> drawn{{0, NominalEpisode(*twin_, net_.robot())}};
+  while (drawn.size() < kSwingGroup) {
+    drawn.push_back({1.0 / (kSwingGroup - 1), DrawEpisode(*twin_, net_.robot(), rng_)});
+  }
+  return drawn;
 }
 
 void BoardSearch::Begin(int64_t start) {
@@ -251,7 +256,7 @@ bool BoardSearch::Step(ThreadPool* pool, Report& report) {
 }
 
 BoardOutcome BoardSearch::Nominal() const {
-  const std::array<BoardEpisode, 1> nominal;
+  const std::array nominal{twin_ ? NominalEpisode(*twin_, net_.robot()) : BoardEpisode{}};
   return SimulateOnBoard(
              net_.robot(), nominal, [&](size_t) { return net_.Control(average_); }, nullptr)
       .front();

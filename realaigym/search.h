@@ -2,11 +2,13 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/options.h"
 #include "core/rng.h"
 #include "core/thread_pool.h"
+#include "machine/twin.h"
 #include "realaigym/swing_policy.h"
 
 namespace upswing {
@@ -44,6 +46,12 @@ struct BoardSearchConfig {
   void Describe(Options& options);
 };
 
+/// A simulation drawn for a candidate.
+struct DrawnEpisode {
+  double weight;  // in the robustness; 0: the nominal plant
+  BoardEpisode episode;
+};
+
 /// Searches a policy directly on the rules: first on the nominal plant only, then also on random
 /// plants, delays, noise and pushes. Each generation draws these from the ranges of the robustness
 /// score, but never uses the scored cases.
@@ -52,6 +60,9 @@ class BoardSearch {
   explicit BoardSearch(const BoardSearchConfig& config);
   /// Begins with a policy instead of a random network, and takes its robot and size.
   BoardSearch(const BoardSearchConfig& config, const SwingPolicy& first);
+  /// Searches for a real machine: all simulations are of the twin's machine, and each generation
+  /// draws machines of its posterior, with pushes (realaigym/machine_trials.h).
+  void SearchOn(const Twin& twin) { twin_ = twin; }
 
   struct Report {
     int generation;  // counted over all starts
@@ -79,7 +90,10 @@ class BoardSearch {
   std::vector<double> Fitnesses(const std::vector<std::vector<double>>& candidates,
                                 double performance_weight, ThreadPool* pool);
 
+  std::vector<DrawnEpisode> DrawEpisodes();
+
   BoardSearchConfig config_;
+  std::optional<Twin> twin_;
   SwingNet net_;
   Snes snes_;
   Rng rng_;

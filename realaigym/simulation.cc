@@ -25,6 +25,11 @@ double Nearness(double e1, double e2, double w1, double w2, double velocity) {
   return 1 / (1 + 0.5 * (angles + (w1 * w1 + w2 * w2) / (velocity * velocity)));
 }
 
+/// The nearest multiple of a quantum; 0: the number itself.
+double Rounded(double number, double quantum) {
+  return quantum > 0 ? std::nearbyint(number / quantum) * quantum : number;
+}
+
 /// Running sums of a simulation, and the other inputs of its outcome.
 struct Sums {
   Lanes energy{}, torque_cost{}, velocity_cost{}, max_torque{};
@@ -57,7 +62,8 @@ class Run {
     std::ranges::fill(block_.share2, kPlant.length2 / kLength);
     for (size_t lane = 0; lane < episodes.size(); ++lane) {
       const BoardEpisode& episode = episodes[lane];
-      block_.SetManipulator(lane, ManipulatorOf(episode.plant));
+      block_.SetManipulator(lane, episode.body.value_or(ManipulatorOf(episode.plant)));
+      if (episode.quantum > 0 || episode.zero != std::array<double, 2>{}) encoders_.push_back(lane);
       rngs_.emplace_back(episode.seed, "realaigym: noise");
       if (episode.velocity_noise > 0) velocity_noise_.push_back(lane);
       if (episode.torque_noise > 0) torque_noise_.push_back(lane);
@@ -98,6 +104,11 @@ class Run {
     std::ranges::copy(block_.q2, seen_.q2.begin());
     std::ranges::copy(block_.w1, seen_.w1.begin());
     std::ranges::copy(block_.w2, seen_.w2.begin());
+    for (const size_t lane : encoders_) {
+      const BoardEpisode& episode = episodes_[lane];
+      seen_.q1[lane] = Rounded(seen_.q1[lane] + episode.zero[0], episode.quantum);
+      seen_.q2[lane] = Rounded(seen_.q2[lane] + episode.zero[1], episode.quantum);
+    }
     if (!delayed_.empty()) past_[static_cast<size_t>(step % kMostDelay)] = seen_;
     for (const size_t lane : delayed_) {
       const int then = std::max(0, step - episodes_[lane].delay);
@@ -205,8 +216,8 @@ class Run {
   int steps_;
   ClosedFormBatch block_;
   std::vector<Rng> rngs_;
-  // Simulations with velocity noise, torque noise, delay and slow response:
-  std::vector<size_t> velocity_noise_, torque_noise_, delayed_, responding_;
+  // Simulations with inexact encoders, velocity noise, torque noise, delay and slow response:
+  std::vector<size_t> encoders_, velocity_noise_, torque_noise_, delayed_, responding_;
   std::vector<LanePush> pushes_;
   std::vector<BoardMeasurement> past_;  // ring of the last kMostDelay states
   BoardMeasurement seen_{};

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "core/progress.h"
+#include "core/rng.h"
+#include "core/thread_pool.h"
+#include "machine/simulated_machine.h"
+#include "machine/twin.h"
+#include "realaigym/hardware.h"
+#include "realaigym/rules.h"
+
+/// Controllers on machines of a twin's posterior, by the rules of RealAIGym's hardware boards.
+namespace upswing {
+
+/// Share of the twin's dry friction that the motors compensate, of both joints. The rules allow
+/// it. Less than all keeps the sum from driving a joint whose friction is below the twin's.
+inline constexpr double kCompensated = 0.8;
+
+/// The torque (N·m) that compensates a twin's friction at these velocities (rad/s).
+Joints CompensationAt(const Twin& twin, const Joints& velocity);
+
+/// The twin's machine as an episode of a search: friction less its compensation, delay, lag and
+/// encoders. The zeros are 0.
+BoardEpisode NominalEpisode(const Twin& twin, Robot robot);
+/// An episode of a machine drawn from the posterior, with three pushes at the motor's joint.
+BoardEpisode DrawEpisode(const Twin& twin, Robot robot, Rng& rng);
+
+/// Makes the controller of a trial.
+using TrialController = std::function<CycleController()>;
+
+/// A controller of the boards as a machine's controller, with friction compensation. Angles count
+/// from the twin's mean zeros. It acts on a grid of kBoardTimestep; a late cycle gets
+/// interpolated angles, so that the controller's own differences stay velocities.
+TrialController OnMachine(const BoardControllerMaker& make, const Twin& twin, Robot robot);
+
+struct TrialRules {
+  int count = 1000;
+  bool pushes = true;  // two at each joint, of 0.2 to 0.5 N·m and 0.05 to 0.1 s, as in 2024
+  // The pushes of a trial (N·m at a time in s) in place of random ones; empty: random.
+  std::function<std::function<Joints(double)>(int trial)> push_of = {};
+  uint64_t seed = 1;             // of the machines, pushes and periods
+  double largest_velocity = 30;  // rad/s: the rules' safety limit, which ends a run
+};
+
+/// Runs of 10 s from hanging on machines drawn from the posterior. The report is that of real runs.
+HardwareReport RunTrials(const Twin& twin, Robot robot, const TrialController& make,
+                         const TrialRules& rules, ThreadPool* pool,
+                         const Progress& progress = nullptr);
+
+}  // namespace upswing
