@@ -105,32 +105,40 @@ Identification Identify(std::span<const MachineLog> logs, const Twin& first,
 }
 
 void MeasureLoop(std::span<const MachineLog> logs, Twin& twin) {
-  std::vector<double> periods, steps, torque_steps;
+  std::vector<double> periods, jitters, steps, torque_steps;
+  twin.loop.late = 0;
+  double cycles = 0, late = 0;
   const auto note_step = [](double step, std::vector<double>& list) {
     if (std::abs(step) > 1e-9) list.push_back(std::abs(step));
   };
   for (const MachineLog& log : logs) {
+    std::vector<double> own;
     for (int k = 1; k < log.rows(); ++k) {
-      periods.push_back(log.time[k] - log.time[k - 1]);
+      own.push_back(log.time[k] - log.time[k - 1]);
       note_step(log.angle[k][0] - log.angle[k - 1][0], steps);
-      if (log.measured.empty()) continue;
-      note_step(log.measured[k][0] - log.measured[k - 1][0], torque_steps);
+      if (!log.measured.empty())
+        note_step(log.measured[k][0] - log.measured[k - 1][0], torque_steps);
     }
+    if (own.empty()) continue;
+    const double period = Median(own);
+    double squares = 0, on_time = 0;
+    for (const double p : own) {
+      if (p > 1.25 * period) {
+        late += p > 5 * period ? 0 : 1;  // longer ones are gaps
+        if (p <= 5 * period) twin.loop.late = std::max(twin.loop.late, p - period);
+      } else {
+        squares += (p - period) * (p - period);
+        ++on_time;
+      }
+    }
+    cycles += static_cast<double>(own.size());
+    periods.push_back(period);
+    jitters.push_back(std::sqrt(squares / on_time));
   }
   if (periods.empty()) return;
-  // Of logs with different rates, the one with most rows counts.
   twin.loop.period = Median(periods);
-  std::vector<double> on_time, late;
-  for (const double period : periods) {
-    if (period < 0.5 * twin.loop.period || period > 5 * twin.loop.period) continue;
-    (period > 1.25 * twin.loop.period ? late : on_time).push_back(period);
-  }
-  double squares = 0;
-  for (const double p : on_time) squares += (p - twin.loop.period) * (p - twin.loop.period);
-  const auto count = [](const auto& list) { return static_cast<double>(list.size()); };
-  twin.loop.jitter = on_time.empty() ? 0 : std::sqrt(squares / count(on_time));
-  twin.loop.late_share = late.empty() ? 0 : count(late) / (count(late) + count(on_time));
-  twin.loop.late = late.empty() ? 0 : std::ranges::max(late) - twin.loop.period;
+  twin.loop.jitter = Median(jitters);
+  twin.loop.late_share = late / cycles;
   if (!steps.empty()) twin.sensors.quantum = std::ranges::min(steps);
   if (!torque_steps.empty()) twin.sensors.torque_quantum = std::ranges::min(torque_steps);
 }

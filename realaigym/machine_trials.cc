@@ -58,7 +58,7 @@ struct BoardOnMachine {
   BoardMeasurement measured{};
   Lanes torque{};
   double last_time = 0;
-  Joints last_angle{}, last_velocity{};
+  Joints last_angle{};
   int steps = 0;
 };
 
@@ -94,14 +94,11 @@ TrialController OnMachine(const BoardControllerMaker& make, const Twin& twin, Ro
     own->controller = make(0);
     return [own, twin, robot](const CycleInput& in) -> Joints {
       const Joints angle{in.angle[0] - twin.sensors.zero1, in.angle[1] - twin.sensors.zero2};
-      // The steps of the controller's grid since the last cycle, usually one.
-      const double since = in.time - own->last_time;
-      const int steps =
-          own->steps == 0
-              ? 1
-              : std::clamp(static_cast<int>(std::lround(since / kBoardTimestep)), 1, 50);
-      for (int k = 1; k <= steps; ++k) {
-        const double share = static_cast<double>(k) / steps;
+      // The controller acts at the points of its even grid since the last cycle.
+      const double since = std::max(in.time - own->last_time, 1e-9);
+      for (; own->steps * kBoardTimestep <= in.time; ++own->steps) {
+        const double share =
+            std::clamp((own->steps * kBoardTimestep - own->last_time) / since, 0.0, 1.0);
         const auto at = [&](int j) {
           return own->steps == 0 ? angle[j]
                                  : own->last_angle[j] + share * (angle[j] - own->last_angle[j]);
@@ -110,9 +107,8 @@ TrialController OnMachine(const BoardControllerMaker& make, const Twin& twin, Ro
         own->measured.q2[0] = at(1);
         own->measured.w1[0] = in.velocity[0];
         own->measured.w2[0] = in.velocity[1];
-        own->controller->Act(own->steps + k - 1, own->measured, 1, own->torque);
+        own->controller->Act(own->steps, own->measured, 1, own->torque);
       }
-      own->steps += steps;
       own->last_time = in.time;
       own->last_angle = angle;
       Joints torque = CompensationAt(twin, in.velocity);

@@ -31,8 +31,8 @@ BoardEpisode DrawEpisode(const Twin& twin, Robot robot, Rng& rng);
 using TrialController = std::function<CycleController()>;
 
 /// A controller of the boards as a machine's controller, with friction compensation. Angles count
-/// from the twin's mean zeros. It acts on a grid of kBoardTimestep; a late cycle gets
-/// interpolated angles, so that the controller's own differences stay velocities.
+/// from the twin's mean zeros. The controller acts on an even grid of kBoardTimestep with
+/// interpolated angles, so that its own differences of angles are velocities in spite of jitter.
 TrialController OnMachine(const BoardControllerMaker& make, const Twin& twin, Robot robot);
 
 struct TrialRules {
