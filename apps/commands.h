@@ -24,6 +24,8 @@ void AddExport(CommandLine& line);
 void AddView(CommandLine& line);
 void AddRealAiGym(CommandLine& line);
 void AddMachine(CommandLine& line);
+void AddRun(CommandLine& line);
+void AddFake(CommandLine& line);
 
 /// Adds the policy argument (a file, a run folder or a controller) and the controllers' settings.
 void AddPolicy(CommandLine& line, PolicyArguments& a);

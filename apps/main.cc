@@ -19,6 +19,8 @@ constexpr CommandEntry kCommands[] = {
     {"export", "Export policies as ONNX or C, or into the page", AddExport},
     {"realaigym", "Score a policy by the rules of RealAIGym, or search for one", AddRealAiGym},
     {"machine", "Check the logs of a real machine", AddMachine},
+    {"run", "Drive a real machine or its twin with a policy", AddRun},
+    {"fake", "Play a machine for `run`: a twin behind UDP or a terminal", AddFake},
     {"bench", "Measure the speed of the program on this machine", nullptr},
     {"demo", "Serve the page in which policies swing up the pendulum live", nullptr},
     {"docs", "Build the documentation, or the whole web site", nullptr},

@@ -35,6 +35,7 @@ class PolicyController : public BoardController {
         period_(static_cast<int>(std::lround(kControlPeriod / kBoardTimestep))),
         size_(static_cast<size_t>(loaded.policy->obs_size())),
         obs_(count * size_),
+        before_(size_),
         action_(count),
         memory_(loaded.policy->Start(static_cast<int>(count))) {
     if (loaded.identifies()) identifier_.emplace(loaded.plant, static_cast<int>(count));
@@ -56,7 +57,7 @@ class PolicyController : public BoardController {
   void Observe(int step, const BoardMeasurement& m, size_t lane) {
     // Observe as PendulumEnv does, with the policy's plant.
     const auto row = std::span(obs_).subspan(lane * size_, size_);
-    const std::vector<float> before(row.begin(), row.end());
+    std::ranges::copy(row, before_.begin());
     const PendulumState measured{m.q1[lane], m.q2[lane], m.w1[lane], m.w2[lane]};
     std::ranges::copy(upswing::Observe(loaded_.plant, measured), row.begin());
     if (identifier_) {
@@ -66,13 +67,13 @@ class PolicyController : public BoardController {
       identifier_->Observe(env, measured, row.subspan(kObservationSize, kIdentifiedSize));
     }
     const auto steps = static_cast<int>(loaded_.memory());
-    if (steps > 0 && step > 0) Remember(before, action_[lane], steps, row);
+    if (steps > 0 && step > 0) Remember(before_, action_[lane], steps, row);
   }
 
   const LoadedPolicy& loaded_;
   int period_;  // in steps
   size_t size_;
-  std::vector<float> obs_;
+  std::vector<float> obs_, before_;
   std::vector<double> action_;
   std::unique_ptr<Policy::Memory> memory_;
   std::optional<Identifier> identifier_;

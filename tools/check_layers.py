@@ -13,7 +13,7 @@ from pathlib import Path
 # Layers that must not need an operating system.
 PORTABLE = {"core", "nn", "sim", "rl", "control", "setup"}
 BELOW_RUN = PORTABLE | {"io", "mujoco"}
-LIBRARIES = BELOW_RUN | {"report", "machine", "realaigym", "run", "study", "judge", "export", "view"}
+LIBRARIES = BELOW_RUN | {"report", "machine", "realaigym", "loop", "run", "study", "judge", "export", "view"}
 
 # Folders that each folder may include, besides itself.
 LAYERS = {
@@ -29,6 +29,7 @@ LAYERS = {
     "run": BELOW_RUN,
     "machine": BELOW_RUN | {"run", "report"},
     "realaigym": BELOW_RUN | {"run", "report", "machine"},
+    "loop": BELOW_RUN | {"run", "report", "machine", "realaigym"},
     "study": BELOW_RUN | {"run"},
     "judge": BELOW_RUN | {"run", "study", "report"},
     "export": BELOW_RUN | {"run", "report"},

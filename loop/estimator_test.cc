@@ -1,0 +1,130 @@
+#include "loop/estimator.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "core/rng.h"
+#include "loop/testing.h"
+
+namespace upswing {
+namespace {
+
+/// Errors of an estimator on a twin's machine under changing torques.
+struct Errors {
+  double angle = 0, velocity = 0;              // rms of the state now, rad and rad/s
+  double angle_ahead = 0, velocity_ahead = 0;  // rms of the state when the torque acts
+};
+
+Errors ErrorsOf(const Twin& machine_twin, Estimator estimator, double loss = 0) {
+  constexpr double kPeriod = 0.002;
+  constexpr int kCycles = 2000, kSettling = 50;
+  const double horizon =
+      kPeriod + std::max(machine_twin.actuator.delay, 0.0) + machine_twin.actuator.lag;
+  SimulatedMachine machine(machine_twin, {0.5, -0.3, 0, 0});
+  Rng rng(3, "test: loss");
+  struct Ahead {
+    double time;
+    PendulumState state;
+  };
+  std::vector<Ahead> predictions;
+  std::vector<PendulumState> truth;
+  Errors e;
+  const auto add = [](double& sum, double a, double b) { sum += (a - b) * (a - b); };
+  for (int k = 0; k < kCycles; ++k) {
+    const double time = k * kPeriod;
+    machine.Advance(time);
+    truth.push_back(machine.state());
+    const LinkReading reading{machine.Read(), time, time, false};
+    const Joints sent{1.5 * std::sin(5 * time) + std::sin(17 * time), 0.3 * std::cos(11 * time)};
+    machine.Command(sent);
+    estimator.Update(time, sent, rng.Uniform() < loss ? nullptr : &reading);
+    predictions.push_back({time + horizon, estimator.ahead()});
+    if (k < kSettling) continue;
+    add(e.angle, estimator.now().q1, machine.state().q1);
+    add(e.angle, estimator.now().q2, machine.state().q2);
+    add(e.velocity, estimator.now().w1, machine.state().w1);
+    add(e.velocity, estimator.now().w2, machine.state().w2);
+  }
+  for (int k = kSettling; k < kCycles; ++k) {
+    const double at = predictions[k].time / kPeriod;
+    const auto before = static_cast<int>(at);
+    if (before + 1 >= kCycles) break;
+    const PendulumState s = StateBetween(truth[before], truth[before + 1], kPeriod, at - before);
+    add(e.angle_ahead, predictions[k].state.q1, s.q1);
+    add(e.angle_ahead, predictions[k].state.q2, s.q2);
+    add(e.velocity_ahead, predictions[k].state.w1, s.w1);
+    add(e.velocity_ahead, predictions[k].state.w2, s.w2);
+  }
+  for (double* sum : {&e.angle, &e.velocity, &e.angle_ahead, &e.velocity_ahead}) {
+    *sum = std::sqrt(*sum / (2 * (kCycles - kSettling)));
+  }
+  return e;
+}
+
+TEST(Estimator, WithoutATwinIsVelocityEstimate) {
+  MachineSensors sensors;
+  sensors.velocity_share = 0.2;
+  sensors.velocity_dead_zone = 0.1;
+  Estimator estimator(sensors, 0.002);
+  VelocityEstimate reference(sensors);
+  for (int k = 0; k < 100; ++k) {
+    const LinkReading reading{
+        {{0.1 * std::sin(0.1 * k), 0.001 * k}, {}}, 0.002 * k, 0.002 * k, false};
+    const Joints w = reference.Update(reading.time, reading.angle);
+    estimator.Update(reading.time, {}, k == 50 ? nullptr : &reading);
+    if (k == 50) estimator.Update(reading.time, {}, &reading);
+    EXPECT_EQ(estimator.now().q1, reading.angle[0]);
+    EXPECT_EQ(estimator.ahead().w1, w[0]);
+    EXPECT_EQ(estimator.ahead().w2, w[1]);
+  }
+  EXPECT_EQ(estimator.energy(), 0);
+}
+
+TEST(Estimator, WithATwinPredictsTheStateInWhichTheTorqueActs) {
+  const Twin twin = TestTwin();
+  const Errors model = ErrorsOf(twin, Estimator(twin, 0.002));
+  // Angles to half an encoder's step, velocities to a tenth of a step per cycle, 0.19 rad/s.
+  EXPECT_LT(model.angle, 0.5 * twin.sensors.quantum);
+  EXPECT_LT(model.velocity, 0.03);
+  EXPECT_LT(model.angle_ahead, twin.sensors.quantum);
+  EXPECT_LT(model.velocity_ahead, 0.03);
+  MachineSensors sensors = twin.sensors;
+  sensors.velocity_share = 0.2;
+  const Errors plain = ErrorsOf(twin, Estimator(sensors, 0.002));
+  EXPECT_GT(plain.velocity, 10 * model.velocity);
+  EXPECT_GT(plain.velocity_ahead, 10 * model.velocity_ahead);
+}
+
+TEST(Estimator, ReadingsMayBeOldOrMissing) {
+  Twin late = TestTwin();
+  late.actuator.delay = -0.004;  // readings of 4 ms ago
+  EXPECT_LT(ErrorsOf(late, Estimator(late, 0.002)).velocity_ahead, 0.05);
+  const Twin twin = TestTwin();
+  EXPECT_LT(ErrorsOf(twin, Estimator(twin, 0.002), 0.3).velocity_ahead, 0.05);
+}
+
+TEST(Estimator, AWrongTwinStillFollowsTheAngles) {
+  Twin heavy = TestTwin();
+  heavy.plant.mass2 *= 1.2;
+  heavy.plant.coulomb1 = 0;
+  const Errors errors = ErrorsOf(TestTwin(), Estimator(heavy, 0.002));
+  EXPECT_LT(errors.angle, 0.001);
+  EXPECT_LT(errors.velocity, 0.2);
+}
+
+TEST(Estimator, KnowsTheEnergy) {
+  const Twin twin = TestTwin();
+  Estimator estimator(twin, 0.002);
+  LinkReading reading{{{0.02, -0.01}, {}}, 0, 0, false};  // the zeros: hanging
+  estimator.Update(0, {}, &reading);
+  EXPECT_NEAR(estimator.energy(), 0, 1e-9);
+  Estimator upright(twin, 0.002);
+  reading.angle[0] += 3.14159265358979;
+  upright.Update(0, {}, &reading);
+  EXPECT_NEAR(upright.energy(), 1, 1e-9);
+}
+
+}  // namespace
+}  // namespace upswing

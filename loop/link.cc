@@ -1,0 +1,140 @@
+#include "loop/link.h"
+
+#include <sched.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <ctime>
+#include <utility>
+
+#include "core/text.h"
+
+namespace upswing {
+namespace {
+
+constexpr int64_t kSecond = 1'000'000'000;  // ns
+
+}  // namespace
+
+int64_t MonotonicNanoseconds() {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return now.tv_sec * kSecond + now.tv_nsec;
+}
+
+TwinLink::TwinLink(const Twin& twin, const PendulumState& start, uint64_t seed)
+    : timing_(twin.loop),
+      limit_(twin.plant.torque_limit),
+      machine_(twin, start),
+      rng_(seed, "loop: lateness") {}
+
+void TwinLink::WaitUntil(double time) {
+  double late = std::max(0.0, timing_.jitter * rng_.Normal());
+  if (rng_.Uniform() < timing_.late_share) late += rng_.Uniform(0, timing_.late);
+  machine_.Advance(std::max(time + late, machine_.time()));
+}
+
+std::optional<LinkReading> TwinLink::Exchange(const Joints& torque, bool enabled,
+                                              double /*until*/) {
+  const LinkReading reading{machine_.Read(), machine_.time(), machine_.time(), false};
+  Joints applied{};
+  for (size_t j = 0; enabled && j < 2; ++j) applied[j] = std::clamp(torque[j], -limit_, limit_);
+  machine_.Command(applied);
+  return reading;
+}
+
+ChannelLink::ChannelLink(Channel channel)
+    : channel_(std::move(channel)), begin_(MonotonicNanoseconds()) {}
+
+double ChannelLink::Now() const {
+  return static_cast<double>(MonotonicNanoseconds() - begin_) / kSecond;
+}
+
+void ChannelLink::WaitUntil(double time) {
+  const int64_t at = begin_ + std::llround(time * kSecond);
+  const timespec moment{at / kSecond, at % kSecond};
+  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &moment, nullptr) == EINTR) {
+  }
+}
+
+bool ChannelLink::Take(const Frame& frame) {
+  if (frame.kind != Frame::Kind::kReading) return false;
+  const bool first = counts_.received == 0;
+  const uint32_t before = filter_.last();
+  switch (filter_.Judge(frame.sequence)) {
+    case SequenceFilter::Verdict::kDuplicate:
+      ++counts_.duplicates;
+      return false;
+    case SequenceFilter::Verdict::kOld:
+      ++counts_.old;
+      return false;
+    case SequenceFilter::Verdict::kNew:
+      break;
+  }
+  ++counts_.received;
+  if (!first) counts_.lost += frame.sequence - before - 1;
+  return true;
+}
+
+LinkReading ChannelLink::ReadingOf(const Frame& frame) const {
+  const uint32_t ago = sequence_ - frame.answers;
+  const bool known = ago < sent_at_.size() && ago < sequence_;
+  return {{frame.angle, frame.torque},
+          known ? sent_at_[frame.answers % sent_at_.size()] : Now(),
+          1e-6 * static_cast<double>(frame.microseconds),
+          (frame.flags & Frame::kLocked) != 0};
+}
+
+std::optional<LinkReading> ChannelLink::Exchange(const Joints& torque, bool enabled, double until) {
+  const uint32_t own = ++sequence_;
+  const int64_t now = MonotonicNanoseconds();
+  Frame command{.flags = enabled ? Frame::kEnabled : uint16_t{0},
+                .sequence = own,
+                .answers = filter_.last(),
+                .microseconds = static_cast<uint64_t>((now - begin_) / 1000)};
+  if (enabled) command.torque = torque;
+  sent_at_[own % sent_at_.size()] = Now();
+  counts_.sent += channel_.Send(Encode(command)) ? 1 : 0;
+
+  std::optional<LinkReading> newest;
+  std::array<std::byte, 1024> buffer;
+  while (true) {
+    for (size_t got = 0; (got = channel_.Receive(buffer)) > 0;) {
+      reader_.Add(std::span(buffer).first(got));
+      while (const auto frame = reader_.Next()) {
+        if (!Take(*frame)) continue;
+        newest = ReadingOf(*frame);
+        if (frame->answers == own) return newest;
+      }
+    }
+    const double left = until - Now();
+    if (left <= 0) return newest;
+    channel_.Wait(left);
+  }
+}
+
+LinkCounts ChannelLink::counts() const {
+  LinkCounts counts = counts_;
+  counts.broken = reader_.skipped();
+  return counts;
+}
+
+std::string EnterRealTime() {
+  std::string problems;
+  const auto add = [&](const char* what) {
+    problems += Concat(problems.empty() ? "" : ", ", what, " (", std::strerror(errno), ")");
+  };
+  // Only memory that exists: later allocations, of other threads, must not fail at a limit.
+  if (mlockall(MCL_CURRENT) != 0) add("locked memory");
+  prctl(PR_SET_TIMERSLACK, 1UL);  // without a real-time priority, timers may be 50 µs late
+  sched_param priority{};
+  priority.sched_priority = 50;
+  if (sched_setscheduler(0, SCHED_FIFO, &priority) != 0) add("real-time priority");
+  return problems;
+}
+
+}  // namespace upswing

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <cmath>
+#include <memory>
+#include <string>
+
+#include "loop/control_loop.h"
+#include "machine/twin.h"
+
+/// Helpers for tests of control loops.
+namespace upswing {
+
+/// A machine like RealAIGym's, with a delay and a lag of its motors and no jitter.
+inline Twin TestTwin() {
+  Twin twin;
+  twin.plant.mass1 = 0.5;
+  twin.plant.mass2 = 0.6;
+  twin.plant.length1 = 0.2;
+  twin.plant.length2 = 0.3;
+  twin.plant.damping1 = twin.plant.damping2 = 0.005;
+  twin.plant.coulomb1 = twin.plant.coulomb2 = 0.05;
+  twin.actuator.delay = 0.003;
+  twin.actuator.lag = 0.004;
+  twin.actuator.passive_limit = 0.5;
+  twin.sensors.quantum = 25.0 / 65535;
+  twin.sensors.angle_range = 12.5;
+  twin.sensors.zero1 = 0.02;
+  twin.sensors.zero2 = -0.01;
+  return twin;
+}
+
+/// Swings the motor's joint by a sine of the time.
+class SineController : public BoardController {
+ public:
+  explicit SineController(double amplitude) : amplitude_(amplitude) {}
+  void Act(int step, const BoardMeasurement& /*measured*/, size_t /*count*/,
+           Lanes& torque) override {
+    torque[0] = amplitude_ * std::sin(6 * step * kBoardTimestep);
+  }
+
+ private:
+  double amplitude_;  // N·m
+};
+
+inline Competitor Sine(double amplitude) {
+  return {"sine", Robot::kPendubot,
+          [amplitude](size_t) { return std::make_unique<SineController>(amplitude); }, "any"};
+}
+
+/// A loop on a link, cycle by cycle.
+struct LoopBench {
+  Twin twin = TestTwin();
+  Limits limits;
+  LoopConfig config{.seconds = 2};
+  Competitor competitor = Sine(1.5);
+  std::unique_ptr<MachineLink> link;
+  std::string log_path;
+  std::unique_ptr<Estimator> estimator;
+  std::unique_ptr<Supervisor> supervisor;
+  std::unique_ptr<LoopController> controller;
+  std::unique_ptr<LogWriter> log;
+  std::unique_ptr<ControlLoop> loop;
+
+  void Make() {
+    estimator = std::make_unique<Estimator>(twin, 1.0 / static_cast<double>(config.hz));
+    supervisor = std::make_unique<Supervisor>(limits, PendulumState{}, Joints{5, 0.5},
+                                              twin.sensors.angle_range, twin.sensors.quantum);
+    controller = std::make_unique<LoopController>(competitor, config.hz);
+    log = std::make_unique<LogWriter>(log_path);
+    loop = std::make_unique<ControlLoop>(config, *link, *estimator, *supervisor, *controller, *log);
+  }
+};
+
+}  // namespace upswing
