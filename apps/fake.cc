@@ -41,7 +41,7 @@ int RunFake(const FakeArguments& a) {
   FakeConfig config = a.config;
   if (!a.stuck.empty()) ParseStuck(a.stuck, config.machine);
   const auto seed = static_cast<uint64_t>(a.seed);
-  Twin twin = ParseTwin(ReadOwnFile(a.twin), Printable(a.twin));
+  Twin twin = ReadTwin(a.twin, "fake");
   if (a.draw) {
     Rng rng(seed, "loop: machine");
     twin = DrawTwin(twin, rng);

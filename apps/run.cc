@@ -32,8 +32,6 @@ struct RunArguments {
 constexpr std::string_view kBraking =
     "\nbraking; once more ends at once, and the machine's watchdog switches the motors off\n";
 
-Twin ReadTwin(const std::string& file) { return ParseTwin(ReadOwnFile(file), Printable(file)); }
-
 /// The policy as named. A controller without --made-for is designed for the twin.
 Competitor CompetitorFor(const RunArguments& a, const std::optional<Twin>& twin) {
   if (!twin || !IsController(a.policy.name) || !a.policy.made_for.empty()) {
@@ -156,7 +154,8 @@ int RunRun(const RunArguments& a) {
   if (!a.log.empty()) CheckWritable("--log", a.log);
   const bool in_process = address.kind == LinkAddress::Kind::kTwin;
   std::optional<Twin> twin;
-  if (in_process || !a.twin.empty()) twin = ReadTwin(a.twin.empty() ? address.place : a.twin);
+  if (in_process || !a.twin.empty())
+    twin = a.twin.empty() ? ReadTwin(address.place, "--link") : ReadTwin(a.twin, "--twin");
   if (in_process && !a.twin.empty()) {
     throw BadInput("--twin: expected a link by UDP or a serial line with it, got a twin as --link");
   }
@@ -171,7 +170,8 @@ void AddRun(CommandLine& line) {
   RunArguments& a = line.Runs(RunRun);
   AddPolicy(line, a.policy);
   line.Text("--link", a.link, "LINK",
-            "machine: a twin's file, udp:HOST:PORT or serial:DEVICE[:BAUD] (default 921600 bit/s)");
+            "machine: a twin (file or shipped plant), udp:HOST:PORT or serial:DEVICE[:BAUD] "
+            "(default 921600 bit/s)");
   line.Text("--twin", a.twin, "FILE",
             "twin of the machine at a UDP or serial link, for the estimate of its state");
   line.Text("--robot", a.robot, "ROBOT",
