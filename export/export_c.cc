@@ -132,6 +132,10 @@ void AddLayers(const std::vector<LayerView>& layers, const std::string& prefix, 
 }
 
 CHeader NetworkHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
+  if (IsForeign(loaded.task)) {
+    throw BadInput(Concat(loaded.path, ": expected a policy of a task of the program, got one of ",
+                          loaded.task, ", for which there is no C code; --onnx exports it"));
+  }
   const ExportedPolicy policy = ViewForExport(loaded);
   const std::vector<LayerView> layers = LayersOf(policy);
   const CSamples samples = DrawSamples(policy, layers);
