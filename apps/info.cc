@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <cmath>
 #include <filesystem>
 #include <optional>
 
@@ -145,7 +146,9 @@ void PrintRun(const fs::path& path, bool has_policy) {
   fmt::print("  checkpoint  step {} of {}, {} episodes, {} of training\n", FormatCount(state.steps),
              FormatCount(config.train.steps), FormatCount(state.episodes),
              FormatDuration(state.seconds));
-  if (state.solved) {
+  if (std::isinf(spec.evaluation.solved_return)) {
+    fmt::print("  task        {}, never solved, as no solved_return was given\n", spec.task);
+  } else if (state.solved) {
     fmt::print("  solved      at step {}, after {} of training\n", FormatCount(state.streak_step),
                FormatDuration(state.streak_seconds));
   } else {

@@ -17,6 +17,11 @@ constexpr const char* kInput = "observation";
 const char* ActionName(const ExportedPolicy& policy) {
   return policy.is_foreign() ? "action" : "torque";
 }
+/// The name of a discrete policy's actions, for descriptions of outputs.
+const char* ChoicesText(const ExportedPolicy& policy) {
+  return policy.is_foreign() ? "action of the metadata `actions`"
+                             : "torque of the metadata `torques`";
+}
 /// The action in units of its limit, within the model.
 const char* UnitActionName(const ExportedPolicy& policy) {
   return policy.is_foreign() ? "unit_action" : "action";
@@ -70,7 +75,7 @@ void AddChoice(OnnxModel& model, const ExportedPolicy& policy, const std::string
 void AddQNetwork(OnnxModel& model, const ExportedPolicy& policy) {
   const NetworkShape& shape = policy.policy->parts().shape;
   const std::span<const LayerView> layers = policy.layers;
-  model.AddOutput("q_values", shape.outputs, "Q-value of each torque of the metadata `torques`");
+  model.AddOutput("q_values", shape.outputs, Concat("Q-value of each ", ChoicesText(policy)));
   if (!shape.dueling())
     return AddChoice(model, policy, AddLayers(model, layers, kInput, "q_values"));
   const std::string features = AddLayers(model, layers.first(shape.hidden.size()), kInput);
@@ -96,7 +101,7 @@ std::string AddActor(OnnxModel& model, const ExportedPolicy& policy) {
   const int A = policy.action_size();
   if (policy.is_discrete()) {
     model.AddOutput("probabilities", last.out(),
-                    "with which it drew each torque of the metadata `torques` as it learned");
+                    Concat("with which it drew each ", ChoicesText(policy), " as it learned"));
     const std::string logits = AddLayer(model, last, features, "logits");
     model.AddNode("probabilities", "Softmax", {logits}, {{"axis", int64_t{1}}});
     AddChoice(model, policy, logits);
@@ -153,12 +158,11 @@ void AddMetadata(OnnxModel& model, const ExportedPolicy& policy) {
   add("policy", loaded.policy->description());
   add("observation", observation);
   add("control_period", policy.spec.step_seconds);
-  if (policy.is_foreign()) {
+  if (!policy.is_foreign()) add("torque_limit", policy.limit);
+  if (policy.is_foreign() && !policy.is_discrete()) {
     add("action_limit", policy.policy->parts().action_limit);
-  } else {
-    add("torque_limit", policy.limit);
   }
-  if (policy.is_discrete()) add("torques", policy.torques());
+  if (policy.is_discrete()) add(policy.is_foreign() ? "actions" : "torques", policy.torques());
   if (HasPlant(loaded.task)) {
     ordered_json plant;
     for (const auto& [name, value] : PlantValues(loaded.plant)) plant[name] = value;

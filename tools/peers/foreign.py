@@ -33,7 +33,7 @@ CASES = {
         "env": "CartPole-v1", "algorithm": "ppo", "steps": 50_000, "hidden": [64, 64], "rate": 3e-4,
         "envs": 8, "horizon": 128, "batch": 256, "epochs": 10, "gamma": 0.99, "lambda": 0.95},
     "lander-ppo": {
-        "env": "LunarLander-v3", "continuous": True, "algorithm": "ppo", "steps": 200_000,
+        "env": "LunarLander-v3", "continuous": True, "algorithm": "ppo", "steps": 100_000,
         "hidden": [64, 64], "rate": 3e-4, "envs": 8, "horizon": 256, "batch": 64, "epochs": 10,
         "gamma": 0.99, "lambda": 0.95},
     "mountain-car-sac": {
@@ -45,11 +45,11 @@ CASES = {
         "hidden": [64, 64], "rate": 1e-3, "batch": 256, "replay": 50_000, "starts": 1000, "every": 1,
         "gamma": 0.99, "tau": 0.005},
     "cheetah-sac": {
-        "env": "HalfCheetah-v5", "algorithm": "sac", "steps": 10_000, "hidden": [256, 256],
+        "env": "HalfCheetah-v5", "algorithm": "sac", "steps": 5_000, "hidden": [256, 256],
         "rate": 3e-4, "batch": 256, "replay": 50_000, "starts": 1000, "every": 1, "gamma": 0.99,
         "tau": 0.005},
     "hopper-ppo": {
-        "env": "Hopper-v5", "algorithm": "ppo", "steps": 100_000, "hidden": [64, 64], "rate": 3e-4,
+        "env": "Hopper-v5", "algorithm": "ppo", "steps": 51_200, "hidden": [64, 64], "rate": 3e-4,
         "envs": 1, "horizon": 2048, "batch": 64, "epochs": 10, "gamma": 0.99, "lambda": 0.95},
 }
 SIDES = ["upswing", "stable-baselines3"]
@@ -200,14 +200,15 @@ def main():
     parser.add_argument("--sides", default=",".join(SIDES), help="sides to run (default both)")
     parser.add_argument("--seeds", type=int, default=5, help="number of seeds (default 5)")
     parser.add_argument("--json", type=Path, help="file of the results, to write or to add to")
-    parser.add_argument("--table", type=Path, help="file of results to print, without trainings")
+    parser.add_argument("--table", type=Path, nargs="+",
+                        help="files of results to print, without trainings")
     parser.add_argument("--one", nargs=3, metavar=("SIDE", "CASE", "SEED"),
                         help="train once and print a JSON line")
     a = parser.parse_args()
     if a.one:
         one(a.one[0], a.one[1], int(a.one[2]))
     elif a.table:
-        table(json.loads(a.table.read_text()))
+        table([result for path in a.table for result in json.loads(path.read_text())])
     elif a.json:
         table(measure(a.cases.split(","), a.sides.split(","), a.seeds, a.json))
     else:
