@@ -133,6 +133,11 @@ class Learns(unittest.TestCase):
                 self.assertLess(action[0].mean(), -0.5)
                 self.assertGreater(action[1].mean(), 0.5)
 
+    def test_dqn_chooses_from_levels_of_a_box(self):
+        policy = upswing.train("dqn", env=Reach(-3.0, 3.0), max_episode_steps=20, levels=3,
+                               **SHORT).last
+        np.testing.assert_array_equal(policy.value_actions, [-3, 0, 3])
+
     def test_a_time_limit_has_a_future_and_a_termination_has_none(self):
         settings = SHORT | {"steps": 4000, "gamma": 0.9, "n_step": 1, "learning_rate": 0.01,
                             "layer_norm": False, "tau": 0.1, "updates_per_step": 0.5}
@@ -181,6 +186,22 @@ class Bits(unittest.TestCase):
             self.assertEqual(upswing.train("sac", env=env, max_episode_steps=10, **SHORT).episodes,
                              60)
         self.assertEqual(len(seen), 1)
+
+
+class Closing(unittest.TestCase):
+    def test_only_environments_of_the_training_are_closed(self):
+        closed = []
+
+        class Noted(Reach):
+            def close(self):
+                closed.append(self)
+
+        env = Noted()
+        upswing.train("sac", env=env, num_envs=2, max_episode_steps=20, **SHORT)
+        self.assertEqual((len(closed), env in closed), (3, False))
+        closed.clear()
+        upswing.train("sac", env=Noted, num_envs=2, max_episode_steps=20, **SHORT)
+        self.assertEqual(len(closed), 4)
 
 
 class Files(InFolder):
@@ -297,6 +318,8 @@ class BadInput(InFolder, BadInputTest):
         self.refuse_env("env: expected an environment that copy.deepcopy can copy", locked)
         self.refuse_env("num_envs: expected none with a vector environment of 2, got 3",
                         SyncVectorEnv([Reach] * 2), num_envs=3)
+        self.refuse_env("got CartPoleVectorEnv, whose reset resets every environment",
+                        gym.make_vec("CartPole-v1", 2, vectorization_mode="vector_entry_point"))
         self.refuse_env("env: expected an environment that works, but its step raised ValueError: "
                         "the gear is broken", Broken("raise", at=1))
         self.refuse_env("env: step: expected finite observations, got nan", Broken("nan", at=1))

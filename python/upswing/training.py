@@ -15,7 +15,8 @@ import numpy as np
 from typing_extensions import Unpack
 
 from . import _upswing
-from ._foreign import EnvLike, Interrupts, Source
+from ._foreign import EnvLike, Source
+from ._lanes import Interrupts
 from .policy import Policy
 from ._settings import text_of, texts_of
 from ._types import TrainingSettings
@@ -189,6 +190,8 @@ def train(
     finally:
         if line is not None:
             line.clear()
+        if source is not None:
+            source.close()
     best, last = result.pop("best"), result.pop("last")
     return Training(best=Policy(best) if best is not None else None, last=Policy(last),
                     evaluations=rows["evaluation"], metrics=rows["metrics"], **result)
