@@ -3,6 +3,7 @@
 bits, files, Ctrl-C, bad input."""
 
 import hashlib
+import json
 import os
 import signal
 import subprocess
@@ -325,6 +326,26 @@ class BadInput(InFolder, BadInputTest):
         self.refuse_env("env: step: expected finite observations, got nan", Broken("nan", at=1))
         self.refuse_env("env: step: expected observations of shape (2,)", Broken("shape", at=1))
         self.refuse_env("env: expected finite rewards, got inf", Broken("reward", at=1))
+
+    def test_descriptions(self):
+        good = {"name": "A", "observations": 2, "action_limit": [1], "choices": [],
+                "episode_steps": 9}
+        for text, what in (("", "expected a description of an environment"), ("[]", "a JSON object"),
+                           ({"name": "A\n"}, '"name"'), ({"observations": 0}, '"observations"'),
+                           ({"action_limit": []}, '"action_limit"'),
+                           ({"action_limit": [0]}, '"action_limit"'),
+                           ({"action_limit": [1] * 2000}, '"action_limit"'),
+                           ({"choices": [1]}, '"choices"'), ({"episode_steps": 1e99}, "episode_steps"),
+                           ({"solved_return": "x"}, "solved_return"),
+                           ({}, "gymnasium/A: expected a task of the program")):
+            text = json.dumps(good | text) if isinstance(text, dict) else text
+            done = program("train", "--agent", "ppo", "--task", "gymnasium", "--environment", text,
+                           "--out", self.path / "run")
+            self.assertEqual((done.returncode, done.stderr.count("\n")), (2, 1), done.stderr)
+            self.assertIn(what, done.stderr)
+        self.refuse("environment: expected none, because the task double-pendulum", upswing.train,
+                    environment="x")
+        self.assertEqual(os.listdir(self.path), [])
 
     def test_settings(self):
         for name in ("num_envs", "eval_env", "max_episode_steps", "solved_return"):
