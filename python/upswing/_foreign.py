@@ -47,7 +47,12 @@ class Source:
         trial = _evaluation_env(first, self._make_more, eval_env)
         if trial.unwrapped is not getattr(eval_env, "unwrapped", None):
             self._made.append(trial)
-        self._make_evaluation = _evaluation_copier(first, self._make_more, eval_env, trial)
+        if isinstance(first, VectorEnv) and eval_env is None:
+            self._make_evaluation: Callable[[], Any] = lambda: _part_of(first)
+        else:
+            # Copies are copies of the trial, which no training changes.
+            self._make_evaluation = (_copier(env, trial, "env") if eval_env is None
+                                     else _copier(eval_env, trial, "eval_env"))
         self._evaluation: list[Env] = [trial]
         self.space = Spaces(_single(first, "observation_space"), _single(first, "action_space"))
         evaluated = Spaces(trial.observation_space, trial.action_space)
@@ -56,7 +61,7 @@ class Source:
                 f"eval_env: expected the spaces of env, {self.space}, got {evaluated}; pass an "
                 "environment with the same spaces")
         self.discrete = bool(self.space.choices)
-        self._limit = _limit_of(first, max_episode_steps)
+        self._limit = _limit_of(first, trial, max_episode_steps)
         self.cause: BaseException | None = None
         if isinstance(first, VectorEnv):
             check_reset(first)
@@ -95,7 +100,8 @@ class Source:
         """The error for an exception of an environment in `what`, "reset" or "step"."""
         self.cause = error
         where = "" if index is None else f"environment {index}: "
-        return _upswing.Failure(f"{where}{what} raised {one_line(error)}")
+        failure: RuntimeError = _upswing.Failure(f"{where}{what} raised {one_line(error)}")
+        return failure
 
     def close(self) -> None:
         """Closes the environments that this object made."""
@@ -124,7 +130,7 @@ class Source:
             raise _upswing.InputError(f"env: expected finite rewards, got {reward}")
 
     def _describe(self, solved_return: float | None) -> str:
-        env = self._first
+        env = self._evaluation[0]
         name = env.spec.id if env.spec is not None else type(env.unwrapped).__name__
         description: dict[str, Any] = {
             "name": re.sub(r"[^A-Za-z0-9_./:-]", "-", name)[:50],
@@ -222,26 +228,17 @@ def _evaluation_env(first: Any, more: Callable[[], Any], eval_env: EnvLike | Non
     return env
 
 
-def _evaluation_copier(first: Any, more: Callable[[], Any], eval_env: EnvLike | None,
-                       trial: Any) -> Callable[[], Any]:
-    """A function that makes further environments of evaluations."""
-    if eval_env is not None:
-        return _copier(eval_env, trial, "eval_env")
-    return (lambda: _part_of(first)) if isinstance(first, VectorEnv) else more
-
-
 def _part_of(env: VecEnv) -> Any:
     """A single environment like those of a vector environment."""
     functions = getattr(env.unwrapped, "env_fns", None)
-    try:
+    with contextlib.suppress(Exception), warnings.catch_warnings():  # the error below says what to do
+        warnings.simplefilter("ignore")
         if functions:
             return _symmetric(functions[0]())
         if env.spec is not None:
             of_vector = ("num_envs", "vectorization_mode", "vector_kwargs", "autoreset_mode")
             settings = {k: v for k, v in env.spec.kwargs.items() if k not in of_vector}
             return _symmetric(gym.make(env.spec.id, **settings))
-    except Exception:  # the next line says what to do
-        pass
     raise _upswing.InputError(
         "eval_env: expected an environment or a function that makes one, because evaluations need "
         f"single environments and {type(env.unwrapped).__name__} does not say how to make them, "
@@ -258,17 +255,17 @@ def _count_of(first: Any, num_envs: int | None) -> int:
     return int(first.num_envs)
 
 
-def _limit_of(env: Any, asked: int | None) -> int:
-    """Largest length of an episode in steps. Raises InputError."""
+def _limit_of(env: Any, single: Env, asked: int | None) -> int:
+    """Largest length of an episode in steps. `single` is an environment like `env`, which may be a
+    vector environment. Raises InputError."""
     own = env.spec.max_episode_steps if env.spec is not None else None
-    if own is None and isinstance(env, VectorEnv):
-        parts = getattr(env.unwrapped, "envs", None)
-        part = parts[0].spec if parts else None
-        own = part.max_episode_steps if part is not None else None
+    if own is None and isinstance(env, VectorEnv) and single.spec is not None:
+        own = single.spec.max_episode_steps
     if asked is None and own is None:
         raise _upswing.InputError(
-            f"max_episode_steps: expected a number of steps, because {type(env.unwrapped).__name__} "
-            "has no time limit of its own and an episode might never end, got none")
+            "max_episode_steps: expected a number of steps, because "
+            f"{type(single.unwrapped).__name__} has no time limit of its own and an episode might "
+            "never end, got none")
     limits = [limit for limit in (own, asked) if limit is not None]
     limit = min(whole_number("max_episode_steps", value) for value in limits)
     if limit < 1:
