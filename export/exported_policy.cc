@@ -47,9 +47,10 @@ std::vector<NamedInput> PendulumInputs(int memory) {
   return inputs;
 }
 
-/// The description of a foreign task, whose observation only its environment explains.
+/// The description of a foreign task, whose observation only its environment explains. The
+/// observation stands for the state.
 ExportedTask ForeignTaskOf(const LoadedPolicy& loaded) {
-  ExportedTask task{loaded.task, "", "acts in " + loaded.task, "", {}, {}};
+  ExportedTask task{loaded.task, "foreign.c", "acts in " + loaded.task, "", {}, {}};
   for (int i = 0; i < loaded.policy->obs_size(); ++i) {
     task.observation.push_back({Concat("observation ", i), "as the environment gives it"});
   }
@@ -133,6 +134,7 @@ ExportedPolicy ViewForExport(const LoadedPolicy& loaded) {
   if (IsForeign(loaded.task)) {
     exported.spec.task = loaded.task;
     exported.spec.action_unit = "";
+    exported.spec.state_names = NamesOf(exported.task.observation);
     exported.spec.step_seconds = *loaded.policy->info().control_period;
   } else {
     EnvConfig env;

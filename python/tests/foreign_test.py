@@ -5,6 +5,7 @@ bits, files, Ctrl-C, bad input."""
 import hashlib
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -230,19 +231,42 @@ class Files(InFolder):
         for command in (["eval", run], ["map", run], ["view", run], ["plot", run],
                         ["simulate", run], ["train", "--resume", run],
                         ["train", "--config", run / "config.toml", "--out", self.path / "x"],
-                        ["export", run, "--c", self.path / "x.h"],
+                        ["export", run, "--c", self.path / "x.h"],  # two numbers per action
                         ["export", run, "--page", self.path / "page"],
                         ["train", "--task", "gymnasium", "--out", self.path / "x"]):
             with self.subTest(command[0]):
                 done = program(*command)
                 self.assertEqual(done.returncode, 2, done.stdout)
                 self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
-                self.assertRegex(done.stderr, "gymnasium/Reach|upswing.train")
+                self.assertRegex(done.stderr, "gymnasium/Reach|upswing.train|one number per action")
         self.assertEqual(sorted(os.listdir(self.path)), ["run"])
         with self.assertRaisesRegex(upswing.InputError, "gymnasium/Reach: expected a task"):
             upswing.evaluate(run)
         onnx = program("export", run, "--onnx", self.path / "policy.onnx")
         self.assertEqual(onnx.returncode, 0, onnx.stderr)
+
+    @unittest.skipUnless(shutil.which("gcc"), "no gcc")
+    def test_c_code_acts_as_the_policy(self):
+        (self.path / "main.c").write_text(
+            '#include "policy.h"\n#include <stdio.h>\n'
+            "int main(void) {\n  float obs[POLICY_OBSERVATION_SIZE], action;\n"
+            "  policy_state state;\n  policy_init(&state);\n"
+            "  while (fread(obs, sizeof(obs), 1, stdin) == 1) {\n"
+            "    if (policy_control(&state, obs, &action) != POLICY_OK) return 1;\n"
+            "    fwrite(&action, sizeof(action), 1, stdout);\n  }\n"
+            "  return policy_selftest() == POLICY_OK ? 0 : 2;\n}\n")
+        for agent, env in (("fast", "CartPole-v1"), ("sac", lambda: Reach(-2.0, 2.0))):
+            policy = upswing.train(agent, env=env, max_episode_steps=20, **SHORT).last
+            policy.save(self.path / "policy.safetensors")
+            done = program("export", self.path / "policy.safetensors", "--c", self.path / "policy.h")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            subprocess.run(["gcc", "-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "main.c",
+                            "-o", "main", "-lm"], cwd=self.path, check=True)
+            obs = np.random.default_rng(1).normal(size=(200, policy.obs_size)).astype(np.float32)
+            done = subprocess.run([self.path / "main"], input=obs.tobytes(), capture_output=True,
+                                  check=True)
+            np.testing.assert_allclose(np.frombuffer(done.stdout, np.float32),
+                                       policy.act(obs)[:, 0], atol=1e-4)
 
     def test_ctrl_c_leaves_a_checkpoint(self):
         run = self.path / "run"
