@@ -176,14 +176,16 @@ def table(results):
     for name, case in CASES.items():
         rows = {side: [r for r in results if (r["side"], r["case"]) == (side, name)]
                 for side in SIDES}
-        count = min(map(len, rows.values()))
+        seeds = set.intersection(*({r["seed"] for r in own} for own in rows.values()))
+        rows = {side: [r for r in own if r["seed"] in seeds] for side, own in rows.items()}
+        count = len(seeds)
         if count == 0:
             continue
         returns, seconds = {}, {}
         for side, own in rows.items():
             values = [r["return"] for r in own]
             spread = statistics.stdev(values) if len(values) > 1 else 0
-            returns[side] = f"{statistics.fmean(values):.0f} ± {spread:.0f}"
+            returns[side] = f"{round(statistics.fmean(values))} ± {spread:.0f}"
             seconds[side] = statistics.fmean(r["cpu_seconds"] for r in own)
         print(f"| {case['env']}{' (continuous)' if case.get('continuous') else ''} "
               f"| {case['algorithm'].upper()} | {case['steps']:,} | {count} "
