@@ -401,7 +401,7 @@ class HeaderTest(ProgramTest):
         simulates = ["-DPOLICY_LOOK_AHEAD=9"]
         ways = [("pendulum", []), ("pendulum", ["-DPOLICY_MEMORY_SIZE=12"]),
                 ("pendulum", ["-DPOLICY_RULE='s'"]), ("pendulum", ["-DPOLICY_RULE='c'"]),
-                ("pendulum_v1", []), ("acrobot_v1", []), ("lqr", []), ("swing_up", simulates),
+                ("pendulum_v1", []), ("acrobot_v1", []), ("foreign", []), ("lqr", []), ("swing_up", simulates),
                 ("swing_up", [*simulates, "-DPOLICY_LAW='p'"]),
                 ("tvlqr", [*simulates, "-DPOLICY_PLAN_STEPS=1"])]
         parts = {"numbers", "network", "network_test", "regulator", "catch", "controller"}

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <cmath>
 #include <filesystem>
 #include <optional>
 
@@ -52,6 +53,8 @@ std::string ObservationText(const LoadedPolicy& loaded) {
 /// The result of the evaluation at which the policy was the best.
 std::string EvaluationText(const PolicyInfo& info) {
   if (!info.success_rate || !info.mean_return) return "unknown";
+  // Without a return that counts as success, every episode of a foreign task fails.
+  if (IsForeign(info.task)) return fmt::format("mean return {:.4g}", *info.mean_return);
   return fmt::format("success {:.0f}%, mean return {:.0f}", 100 * *info.success_rate,
                      *info.mean_return);
 }
@@ -88,6 +91,26 @@ void PrintController(const LoadedPolicy& loaded) {
   }
 }
 
+/// Prints the actions that a policy may choose. `learned` is the policy, if it is a network's.
+void PrintActions(const LoadedPolicy& loaded, const NetworkPolicy* learned) {
+  std::span<const double> levels, limits;
+  if (learned != nullptr) levels = learned->parts().torques;
+  if (learned != nullptr) limits = learned->parts().action_limit;
+  if (IsForeign(loaded.task)) {
+    fmt::print("  actions     {}\n", levels.empty()
+                                         ? fmt::format("within ±{}", fmt::join(limits, ", ±"))
+                                         : fmt::format("one of {}", fmt::join(levels, ", ")));
+    return;
+  }
+  EnvConfig env;
+  env.task = loaded.task;
+  fmt::print("  torques     {}, every {} s\n",
+             levels.empty()
+                 ? "any within the torque limit"
+                 : fmt::format("{} {}", fmt::join(levels, ", "), SpecOf(env).action_unit),
+             *loaded.policy->info().control_period);
+}
+
 void PrintPolicy(const LoadedPolicy& loaded) {
   const Policy& policy = *loaded.policy;
   const PolicyInfo& info = policy.info();
@@ -95,16 +118,8 @@ void PrintPolicy(const LoadedPolicy& loaded) {
   fmt::print("  what        {}, {} parameters\n", policy.description(),
              FormatCount(policy.num_parameters()));
   if (!HasPlant(loaded.task)) fmt::print("  task        {}\n", loaded.task);
-  EnvConfig env;
-  env.task = loaded.task;
   const auto* learned = dynamic_cast<const NetworkPolicy*>(&policy);
-  std::span<const double> levels;
-  if (learned != nullptr) levels = learned->parts().torques;
-  fmt::print("  torques     {}, every {} s\n",
-             levels.empty()
-                 ? "any within the torque limit"
-                 : fmt::format("{} {}", fmt::join(levels, ", "), SpecOf(env).action_unit),
-             *info.control_period);
+  PrintActions(loaded, learned);
   fmt::print("  made by     agent {}, seed {}, step {}, upswing {}\n", Known(info.agent),
              Known(info.seed), Known(info.step), Known(info.upswing_version));
   fmt::print("  evaluated   {}\n", EvaluationText(info));
@@ -131,7 +146,9 @@ void PrintRun(const fs::path& path, bool has_policy) {
   fmt::print("  checkpoint  step {} of {}, {} episodes, {} of training\n", FormatCount(state.steps),
              FormatCount(config.train.steps), FormatCount(state.episodes),
              FormatDuration(state.seconds));
-  if (state.solved) {
+  if (std::isinf(spec.evaluation.solved_return)) {
+    fmt::print("  task        {}, never solved, as no solved_return was given\n", spec.task);
+  } else if (state.solved) {
     fmt::print("  solved      at step {}, after {} of training\n", FormatCount(state.streak_step),
                FormatDuration(state.streak_seconds));
   } else {

@@ -18,6 +18,9 @@ struct EnvSpec {
   int num_envs = 1;                      // N
   int obs_size = 0;                      // D
   std::vector<double> action_limit;      // (A) component i of an action is in ± action_limit[i]
+  // (Q) The only actions of a task with discrete actions, where A = 1. Empty: any action within the
+  // limit.
+  std::vector<double> choices = {};
   std::string action_unit = "N·m";       // unit of the action's components
   double step_seconds = 0;               // control period, s
   std::vector<std::string> term_names;   // (K) names of the reward's terms

@@ -73,9 +73,29 @@ std::string PlantParagraph(const CParts& parts) {
          "\n *\n";
 }
 
+/// What goes in and out of a policy of a foreign task.
+std::string ForeignInputs(const CParts& parts, const std::string& caps) {
+  return Concat(" * In: the observation (", caps,
+                "_OBSERVATION_SIZE), as the environment gives it.\n",
+                " * Out: the action, within +-", FormatNumber(parts.limit), ".\n *\n");
+}
+
+/// What goes in and out of a policy of a pendulum. `states` are the lines of its state.
+std::string PendulumInputs(const CParts& parts, const std::string& states) {
+  return Concat(" * In, in this order; an angle may have made any number of turns:\n", states,
+                " * Out: the torque ", parts.task.motor, ", N m, within +-",
+                FormatNumber(parts.limit), ", to be held for ", FormatNumber(parts.period),
+                R"c( s. A positive one
+ * pushes the joint's angle up. Which way round counts as positive does not matter, as long as it is
+ * the same for all of these.
+ *
+)c");
+}
+
 std::string HeadComment(const CParts& parts, const CHeader& header) {
   const std::string &name = header.prefix, caps = UpperCase(name);
   const std::string period = FormatNumber(parts.period);
+  const bool foreign = parts.task.state.empty();
   std::string states;
   std::vector<std::string> names;
   for (const NamedInput& input : parts.task.state) {
@@ -83,22 +103,17 @@ std::string HeadComment(const CParts& parts, const CHeader& header) {
     states +=
         Concat(" *   ", input.name, std::string(8 - input.name.size(), ' '), input.meaning, '\n');
   }
-  return Concat(
-      "/* A policy that ", parts.task.goal, ", as one C99 header.\n *\n",
+  const std::string comment = Concat(
+      "/* A policy that ", foreign ? CommentText(parts.task.goal) : parts.task.goal,
+      ", as one C99 header.\n *\n",
       Paragraph(Concat(parts.origin, ". Written by Upswing ", UPSWING_VERSION, '.')),
       "\n *\n *   static ", name, "_state state;\n *   float torque;\n *   if (", name,
       "_selftest() != ", caps, "_OK) stop();\n *   ", name,
       "_init(&state);   before the first step, and after any pause\n *   for (;;) {   every ",
-      period, " s\n *     ", name, "_control(&state, ", Join(names, ", "),
-      ", &torque);\n *     set_motor(torque);\n *   }\n *\n",
-      " * In, in this order; an angle may have made any number of turns:\n", states,
-      " * Out: the torque ", parts.task.motor, ", N m, within +-", FormatNumber(parts.limit),
-      ", to be held for ", period, R"c( s. A positive one
- * pushes the joint's angle up. Which way round counts as positive does not matter, as long as it is
- * the same for all of these.
- *
-)c",
-      PlantParagraph(parts),
+      foreign ? "step" : period + " s", "\n *     ", name, "_control(&state, ",
+      foreign ? "observation" : Join(names, ", "), ", &torque);\n *     ",
+      foreign ? "act" : "set_motor", "(torque);\n *   }\n *\n",
+      foreign ? ForeignInputs(parts, caps) : PendulumInputs(parts, states), PlantParagraph(parts),
       R"c( * What is not finite, and null pointers, the status tells: the torque is then 0, and what was
  * remembered is forgotten, as after )c",
       name, "_init.\n *\n",
@@ -109,6 +124,7 @@ std::string HeadComment(const CParts& parts, const CHeader& header) {
                        " bytes on the stack in a call. Work of a call: ", parts.work)),
       "\n *\n * All arithmetic is in float. Nothing is allocated, and nothing is static but "
       "constants. */\n");
+  return foreign ? Replaced(comment, "torque", "action") : comment;
 }
 
 }  // namespace
@@ -124,7 +140,9 @@ void WriteHeader(const CParts& parts, CHeader& header) {
   };
   const auto number = [](double value) { return CLiteral(static_cast<float>(value)); };
   define("PERIOD", number(parts.period) + " /* s, between two calls */");
-  define("TORQUE_LIMIT", number(parts.limit) + " /* N m, no torque is beyond it */");
+  define("TORQUE_LIMIT",
+         number(parts.limit) + (parts.task.state.empty() ? " /* no action is beyond it */"
+                                                         : " /* N m, no torque is beyond it */"));
   define("CONSTANT_BYTES", Concat(header.constant_bytes, 'L'));
   for (const auto& [macro, value] : parts.macros) define(macro, value);
   define("TABLES", Concat(parts.constants.size()));

@@ -48,6 +48,7 @@ std::vector<double> Evaluate(const std::vector<LayerView>& layers, std::span<con
 class Observer {
  public:
   explicit Observer(const ExportedPolicy& policy) : policy_(policy) {
+    if (policy.is_foreign()) return;
     EnvConfig config;
     config.task = policy.loaded->task;
     config.plants = {policy.loaded->plant};
@@ -56,6 +57,7 @@ class Observer {
 
   /// The observation of a state (S) that consists of floats.
   std::vector<float> Observe(std::span<const double> s) const {
+    if (policy_.is_foreign()) return {s.begin(), s.end()};
     env_->SetState(0, s);
     const auto now = env_->obs().row(0);
     std::vector<float> obs(now.begin(), now.end());
@@ -73,7 +75,7 @@ class Observer {
 
  private:
   const ExportedPolicy& policy_;
-  std::unique_ptr<VectorEnv> env_;  // without memory
+  std::unique_ptr<VectorEnv> env_;  // without memory; none for a foreign task
   std::vector<float> before_;       // (D) previous observation; empty: none
   double torque_ = 0;               // torque chosen at it
 };

@@ -133,6 +133,10 @@ void AddLayers(const std::vector<LayerView>& layers, const std::string& prefix, 
 
 CHeader NetworkHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
   const ExportedPolicy policy = ViewForExport(loaded);
+  if (policy.action_size() != 1) {
+    throw BadInput(Concat(loaded.path, ": expected a policy of one number per action, got ",
+                          policy.action_size(), "; --onnx exports it"));
+  }
   const std::vector<LayerView> layers = LayersOf(policy);
   const CSamples samples = DrawSamples(policy, layers);
   const int outputs = layers.back().out(), memory = loaded.memory();
@@ -143,8 +147,9 @@ CHeader NetworkHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
   parts.task = policy.task;
   if (HasPlant(loaded.task)) AddPlant(loaded.plant, parts);
   if (policy.is_discrete()) {
-    parts.constants.push_back(
-        {"torques", "N m", {policy.torques().begin(), policy.torques().end()}});
+    parts.constants.push_back({"torques",
+                               policy.spec.action_unit.empty() ? "" : "N m",
+                               {policy.torques().begin(), policy.torques().end()}});
   }
   AddLayers(layers, prefix, parts);
 
@@ -163,8 +168,11 @@ CHeader NetworkHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
                         "; ", OriginOf(loaded.policy->info()));
   parts.limit = policy.limit;
   parts.period = policy.spec.step_seconds;
-  parts.work = Concat(header.multiply_adds, " multiply-adds, ", parts.task.state.size(),
-                      " sines and cosines", tanhs > 0 ? Concat(", ", tanhs, " of tanh") : "", '.');
+  const std::string angles = policy.is_foreign()
+                                 ? std::string()
+                                 : Concat(", ", parts.task.state.size(), " sines and cosines");
+  parts.work = Concat(header.multiply_adds, " multiply-adds", angles,
+                      tanhs > 0 ? Concat(", ", tanhs, " of tanh") : "", '.');
   std::string observation = "/* of the observation:\n";
   int index = 0;
   for (const auto& [name, meaning] : policy.task.observation) {
@@ -178,7 +186,7 @@ CHeader NetworkHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
                   {"RULE", policy.is_discrete() ? "'l' /* the largest output's torque */"
                            : squashed           ? "'s' /* the mean, squashed */"
                                                 : "'c' /* the mean, clipped */"},
-                  {"STATE_SIZE", Concat(parts.task.state.size())},
+                  {"STATE_SIZE", Concat(policy.spec.state_names.size())},
                   {"SAMPLES", Concat(samples.count)},
                   {"OUTPUT_TOLERANCE", CLiteral(samples.output_tolerance)},
                   {"TORQUE_TOLERANCE", CLiteral(samples.torque_tolerance)}};
@@ -186,9 +194,10 @@ CHeader NetworkHeaderOf(const LoadedPolicy& loaded, const std::string& prefix) {
     parts.macros.emplace_back("MEMORY_SIZE",
                               Concat(kMemorySize * memory, " /* for ", memory, " past steps */"));
   }
-  parts.samples = {{"sample_states", "", samples.states},
-                   {"sample_outputs", "", samples.outputs},
-                   {"sample_torques", "N m", samples.torques}};
+  parts.samples = {
+      {"sample_states", "", samples.states},
+      {"sample_outputs", "", samples.outputs},
+      {"sample_torques", policy.spec.action_unit.empty() ? "" : "N m", samples.torques}};
   WriteHeader(parts, header);
   return header;
 }

@@ -13,7 +13,19 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr const char* kInput = "observation";
-constexpr const char* kTorque = "torque";
+/// The output with the action.
+const char* ActionName(const ExportedPolicy& policy) {
+  return policy.is_foreign() ? "action" : "torque";
+}
+/// The name of a discrete policy's actions, for descriptions of outputs.
+const char* ChoicesText(const ExportedPolicy& policy) {
+  return policy.is_foreign() ? "action of the metadata `actions`"
+                             : "torque of the metadata `torques`";
+}
+/// The action in units of its limit, within the model.
+const char* UnitActionName(const ExportedPolicy& policy) {
+  return policy.is_foreign() ? "unit_action" : "action";
+}
 
 /// Adds y = activation(norm(W x + b)). Returns y's name, `name`.
 std::string AddLayer(OnnxModel& model, const LayerView& layer, const std::string& x,
@@ -50,20 +62,20 @@ std::string AddLayers(OnnxModel& model, std::span<const LayerView> layers, std::
   return x;
 }
 
-/// Adds the output `torque`: the torque with the largest preference.
+/// Adds the output of the action: the torque with the largest preference.
 void AddChoice(OnnxModel& model, const ExportedPolicy& policy, const std::string& preferences) {
   const std::vector<float> torques(policy.torques().begin(), policy.torques().end());
   const std::string table =
       model.AddConstant("torques", torques, {static_cast<int64_t>(torques.size())});
   const std::string index = model.AddNode("choice", "ArgMax", {preferences},
                                           {{"axis", int64_t{1}}, {"keepdims", int64_t{1}}});
-  model.AddNode(kTorque, "Gather", {table, index}, {{"axis", int64_t{0}}});
+  model.AddNode(ActionName(policy), "Gather", {table, index}, {{"axis", int64_t{0}}});
 }
 
 void AddQNetwork(OnnxModel& model, const ExportedPolicy& policy) {
   const NetworkShape& shape = policy.policy->parts().shape;
   const std::span<const LayerView> layers = policy.layers;
-  model.AddOutput("q_values", shape.outputs, "Q-value of each torque of the metadata `torques`");
+  model.AddOutput("q_values", shape.outputs, Concat("Q-value of each ", ChoicesText(policy)));
   if (!shape.dueling())
     return AddChoice(model, policy, AddLayers(model, layers, kInput, "q_values"));
   const std::string features = AddLayers(model, layers.first(shape.hidden.size()), kInput);
@@ -84,24 +96,27 @@ std::string AddActor(OnnxModel& model, const ExportedPolicy& policy) {
   const std::span<const LayerView> layers = policy.layers;
   const std::string features = AddLayers(model, layers.first(layers.size() - 1), kInput);
   const LayerView& last = layers.back();
-  const auto limit = static_cast<float>(policy.policy->parts().action_limit[0]);
+  const std::vector<double>& limits = policy.policy->parts().action_limit;
+  const std::vector<float> limit(limits.begin(), limits.end());
+  const int A = policy.action_size();
   if (policy.is_discrete()) {
     model.AddOutput("probabilities", last.out(),
-                    "with which it drew each torque of the metadata `torques` as it learned");
+                    Concat("with which it drew each ", ChoicesText(policy), " as it learned"));
     const std::string logits = AddLayer(model, last, features, "logits");
     model.AddNode("probabilities", "Softmax", {logits}, {{"axis", int64_t{1}}});
     AddChoice(model, policy, logits);
     if (!policy.critic_takes_action()) return "";
-    const std::string whole = model.AddConstant("limit", {&limit, 1}, {1});
-    return model.AddNode("action", "Div", {kTorque, whole});
+    const std::string whole = model.AddConstant("limit", limit, {A});
+    return model.AddNode(UnitActionName(policy), "Div", {ActionName(policy), whole});
   }
   const bool squashed = policy.rule() == ActionRule::kSquashedGaussian;
   const char* bound = squashed ? "tanh(mean)" : "the mean, cut off at -1 and 1";
-  model.AddOutput("mean", 1,
-                  Concat("of the unbounded action; the torque is the limit times ", bound));
-  model.AddOutput("log_std", 1, "logarithm of its standard deviation as it learned");
-  AddLayer(model, last.Units(0, 1), features, "mean");
-  const std::string raw = AddLayer(model, last.Units(1, 1), features, "log_std.raw");
+  model.AddOutput(
+      "mean", A,
+      Concat("of the unbounded action; the ", ActionName(policy), " is the limit times ", bound));
+  model.AddOutput("log_std", A, "logarithm of its standard deviation as it learned");
+  AddLayer(model, last.Units(0, A), features, "mean");
+  const std::string raw = AddLayer(model, last.Units(A, A), features, "log_std.raw");
   const auto low = static_cast<float>(kLogStdLow), high = static_cast<float>(kLogStdHigh);
   const auto scalar = [&](const char* name, const float& value) {
     return model.AddConstant(name, {&value, 1}, {});
@@ -110,10 +125,10 @@ std::string AddActor(OnnxModel& model, const ExportedPolicy& policy) {
   const float minus_one = -1, one = 1;
   const std::string action =
       squashed
-          ? model.AddNode("action", "Tanh", {"mean"})
-          : model.AddNode("action", "Clip",
+          ? model.AddNode(UnitActionName(policy), "Tanh", {"mean"})
+          : model.AddNode(UnitActionName(policy), "Clip",
                           {"mean", scalar("action.low", minus_one), scalar("action.high", one)});
-  model.AddNode(kTorque, "Mul", {action, model.AddConstant("limit", {&limit, 1}, {1})});
+  model.AddNode(ActionName(policy), "Mul", {action, model.AddConstant("limit", limit, {A})});
   return action;
 }
 
@@ -143,8 +158,11 @@ void AddMetadata(OnnxModel& model, const ExportedPolicy& policy) {
   add("policy", loaded.policy->description());
   add("observation", observation);
   add("control_period", policy.spec.step_seconds);
-  add("torque_limit", policy.limit);
-  if (policy.is_discrete()) add("torques", policy.torques());
+  if (!policy.is_foreign()) add("torque_limit", policy.limit);
+  if (policy.is_foreign() && !policy.is_discrete()) {
+    add("action_limit", policy.policy->parts().action_limit);
+  }
+  if (policy.is_discrete()) add(policy.is_foreign() ? "actions" : "torques", policy.torques());
   if (HasPlant(loaded.task)) {
     ordered_json plant;
     for (const auto& [name, value] : PlantValues(loaded.plant)) plant[name] = value;
@@ -175,7 +193,9 @@ std::string OnnxModelOf(const LoadedPolicy& loaded) {
     const std::string action = AddActor(model, policy);
     if (!policy.critic.empty()) AddCritic(model, policy, action);
   }
-  model.AddOutput(kTorque, 1, "N m, to hold for the metadata `control_period`, s");
+  model.AddOutput(ActionName(policy), policy.action_size(),
+                  policy.is_foreign() ? "of the environment's action space"
+                                      : "N m, to hold for the metadata `control_period`, s");
   AddMetadata(model, policy);
   return model.Bytes();
 }

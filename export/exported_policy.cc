@@ -47,8 +47,19 @@ std::vector<NamedInput> PendulumInputs(int memory) {
   return inputs;
 }
 
+/// The description of a foreign task, whose observation only its environment explains. The
+/// observation stands for the state.
+ExportedTask ForeignTaskOf(const LoadedPolicy& loaded) {
+  ExportedTask task{loaded.task, "foreign.c", "acts in " + loaded.task, "", {}, {}};
+  for (int i = 0; i < loaded.policy->obs_size(); ++i) {
+    task.observation.push_back({Concat("observation ", i), "as the environment gives it"});
+  }
+  return task;
+}
+
 /// The description of the policy's task. Throws BadInput for a task without a description here.
 ExportedTask TaskOf(const LoadedPolicy& loaded) {
+  if (IsForeign(loaded.task)) return ForeignTaskOf(loaded);
   for (const ExportedTask& task :
        {PendulumTask(loaded.plant.actuated_joint, loaded.memory()),
         ExportedTask{kPendulumV1,
@@ -110,22 +121,29 @@ ExportedPolicy ViewForExport(const LoadedPolicy& loaded) {
                           ": expected a policy without identification of the plant, which exports "
                           "do not contain, got one with it"));
   }
-  EnvConfig env;
-  env.task = loaded.task;
   const std::string where = loaded.path;
   ExportedPolicy exported;
   exported.loaded = &loaded;
-  exported.spec = SpecOf(env);
   exported.task = TaskOf(loaded);
   exported.policy = dynamic_cast<const NetworkPolicy*>(loaded.policy.get());
-  if (exported.policy == nullptr || exported.policy->action_size() != 1) {
-    throw BadInput(Concat(where, ": expected a learned policy for one motor, got ",
-                          loaded.policy->description()));
+  if (exported.policy == nullptr) {
+    throw BadInput(
+        Concat(where, ": expected a learned policy, got ", loaded.policy->description()));
   }
   const NetworkPolicyParts& parts = exported.policy->parts();
+  if (IsForeign(loaded.task)) {
+    exported.spec.task = loaded.task;
+    exported.spec.action_unit = "";
+    exported.spec.state_names = NamesOf(exported.task.observation);
+    exported.spec.step_seconds = *loaded.policy->info().control_period;
+  } else {
+    EnvConfig env;
+    env.task = loaded.task;
+    exported.spec = SpecOf(env);
+  }
   CheckTorques(parts.torques, where);
   CheckTorques(parts.action_limit, where);
-  exported.limit = exported.is_discrete() ? LargestSize(parts.torques) : parts.action_limit[0];
+  exported.limit = LargestSize(exported.is_discrete() ? parts.torques : parts.action_limit);
   exported.layers = exported.policy->Layers();
   exported.critic = exported.policy->CriticLayers();
   for (LayerView& layer : exported.critic) layer.name = "critic." + layer.name;

@@ -39,7 +39,7 @@ struct ExportedPolicy {
   const NetworkPolicy* policy = nullptr;  // of `loaded`
   std::vector<LayerView> layers;          // of the policy's network; see Network::Views
   std::vector<LayerView> critic;          // of an actor's critic, if any: "critic.…"
-  double limit = 0;                       // largest torque, N·m
+  double limit = 0;                       // largest torque, N·m, or largest number of an action
   ExportedTask task;
 
   ActionRule rule() const { return policy->parts().rule; }
@@ -49,6 +49,9 @@ struct ExportedPolicy {
   /// Whether the critic takes the action, in units of its limit, after the observation.
   bool critic_takes_action() const { return !critic.empty() && critic.front().in() > obs_size(); }
   int obs_size() const { return policy->obs_size(); }
+  int action_size() const { return policy->action_size(); }
+  /// Whether the task's environment is outside the program.
+  bool is_foreign() const { return IsForeign(spec.task); }
   /// The layers whose outputs choose the action: the features and, in a dueling network, the
   /// advantages.
   std::vector<LayerView> ActingLayers() const;

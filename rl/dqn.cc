@@ -18,7 +18,7 @@ namespace {
 
 /// The actions of an agent for this task. Throws BadInput if the task has several torques.
 std::vector<double> TorquesOf(const DqnConfig& config, const EnvSpec& spec) {
-  if (spec.action_size() == 1) return TorqueLevels(spec.action_limit.front(), config.levels);
+  if (spec.action_size() == 1) return ActionTable(spec, config.levels);
   throw BadInput(
       Concat("dqn: expected a task with one torque, got ", spec.action_size(), " in ", spec.task));
 }
@@ -40,7 +40,7 @@ float HuberLoss(float delta) {
 float HuberGradient(float delta) { return std::clamp(delta, -1.0F, 1.0F); }
 
 Dqn::Dqn(const DqnConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool& pool)
-    : OffPolicyAgent(config, spec, ActionSpace::Discrete(static_cast<size_t>(config.levels)), seed,
+    : OffPolicyAgent(config, spec, ActionSpace::Discrete(TorquesOf(config, spec).size()), seed,
                      pool),
       config_(config),
       D_(spec.obs_size),

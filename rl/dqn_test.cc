@@ -74,6 +74,21 @@ TEST(Huber, TheGradientIsClippedAndBelongsToTheLoss) {
   }
 }
 
+TEST(Torques, AreTheChoicesOfATaskThatHasThem) {
+  EnvSpec spec = ToyEnv::Spec(1);
+  spec.action_limit = {4};
+  EXPECT_EQ(ActionTable(spec, 3), (std::vector<double>{-4, 0, 4}));
+  spec.choices = {3, 4};
+  EXPECT_EQ(ActionTable(spec, 3), spec.choices);
+  // The agent's networks have an output for each choice.
+  DqnConfig config;
+  config.mirror = false;
+  ThreadPool pool(1);
+  const auto policy = Dqn(config, spec, 1, pool).ExportPolicy({});
+  EXPECT_EQ(policy->num_values(), 2);
+  EXPECT_EQ(policy->value_actions()(1, 0), 4);
+}
+
 TEST(Torques, AreEvenlySpacedFromLimitToLimit) {
   EXPECT_EQ(TorqueLevels(5, 9),
             (std::vector<double>{-5, -3.75, -2.5, -1.25, 0, 1.25, 2.5, 3.75, 5}));

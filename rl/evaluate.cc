@@ -64,7 +64,8 @@ class EpisodeTally {
       episode_.reward_sum += result.reward[i];
       for (size_t j = 0; j < terms; ++j) episode_.terms[j] += result.reward_terms[i * terms + j];
     }
-    ended_ = result.terminated[i];
+    // The last step may time out, because the rule's time is over then.
+    ended_ = result.terminated[i] != 0 || (result.truncated[i] != 0 && torques_.steps() < steps_);
   }
 
   /// Returns the results. Call it once, at the end.
@@ -93,7 +94,7 @@ class EpisodeTally {
   std::vector<double> lean_;  // (bodies) rad, current lean
   TorqueTally torques_;
   int64_t settled_since_ = -1;
-  bool ended_ = false;  // terminated; further steps belong to another episode
+  bool ended_ = false;  // ended early; further steps belong to another episode
   EvaluationEpisode episode_;
 };
 

@@ -125,8 +125,8 @@ ValueUnits ValueUnitsOf(const Policy& policy);
 double ValueRatio(double value, double discounted_return);
 
 /// Lets `policy` control every environment from its current state for the time of the task's rule.
-/// Returns one result per environment. Episodes must not time out earlier. The pool shares the
-/// work, which changes no bit. `progress` counts episodes.
+/// Returns one result per environment. An episode may end earlier. The pool shares the work, which
+/// changes no bit. `progress` counts episodes.
 std::vector<EvaluationEpisode> EvaluateEpisodes(const Policy& policy, VectorEnv& env,
                                                 ThreadPool* pool = nullptr,
                                                 const Progress& progress = {});

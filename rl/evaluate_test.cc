@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <numbers>
 
 #include "nn/network_policy.h"
@@ -100,6 +101,16 @@ TEST(Evaluate, ABlownUpEpisodeFailsEvenIfLaterStatesAreAtTheGoal) {
   const Evaluation e = Summarize(episodes, env.spec().evaluation);
   EXPECT_EQ(e.successes, 1);
   EXPECT_DOUBLE_EQ(e.seconds.mean, 19);
+}
+
+TEST(Evaluate, ATimeLimitBeforeTheEndOfTheTimeEndsAnEpisode) {
+  // A toy episode has 10 steps, the rule 20. The walk stays where it begins.
+  ToyEnv env(3);
+  for (int i = 0; i < 3; ++i) env.SetState(i, std::array{0.0});
+  for (const EvaluationEpisode& episode : EvaluateEpisodes(Constant(0), env)) {
+    EXPECT_EQ(episode.seconds, 10);
+    EXPECT_EQ(episode.reward_sum, 10);
+  }
 }
 
 TEST(Evaluate, TheVeryLastStateAtTheGoalIsAnEndAtTheGoal) {

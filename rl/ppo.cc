@@ -44,7 +44,7 @@ Ppo::Ppo(const PpoConfig& config, const EnvSpec& spec, uint64_t seed, ThreadPool
       D_(spec.obs_size),
       B_(static_cast<int>(config.batch)),
       limit_(spec.action_limit),
-      torques_(config.discrete() ? TorqueLevels(limit_[0], config.levels) : std::vector<double>()),
+      torques_(config.discrete() ? ActionTable(spec, config.levels) : std::vector<double>()),
       mirror_signs_(spec.mirror_signs),
       pool_(pool),
       update_threads_(&pool),

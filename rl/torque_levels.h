@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/env.h"
+
 namespace upswing {
 
 /// Actions of a discrete agent: `count` torques (at least 2), evenly spaced from -torque_limit to
@@ -14,6 +16,11 @@ inline std::vector<double> TorqueLevels(double torque_limit, int64_t count) {
     levels.push_back(torque_limit * (2 * static_cast<double>(i) - intervals) / intervals);
   }
   return levels;
+}
+
+/// The actions of a discrete agent: the task's choices, or else `count` levels of its only torque.
+inline std::vector<double> ActionTable(const EnvSpec& spec, int64_t count) {
+  return spec.choices.empty() ? TorqueLevels(spec.action_limit.front(), count) : spec.choices;
 }
 
 }  // namespace upswing

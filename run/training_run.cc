@@ -43,16 +43,18 @@ bool StepsGiven(const std::vector<FlagValue>& flags) {
   return std::ranges::any_of(flags, [](const FlagValue& flag) { return flag.name == "steps"; });
 }
 
-TrainingRun::TrainingRun(fs::path path, const Config& config)
-    : path_(std::move(path)), training_(config, ThisHost(ResolveThreads(config.train.threads))) {
+TrainingRun::TrainingRun(fs::path path, const Config& config, ForeignMaker make_foreign)
+    : path_(std::move(path)),
+      training_(config, ThisHost(ResolveThreads(config.train.threads), std::move(make_foreign))) {
   training_.AddObserver(*this);
 }
 
-std::unique_ptr<TrainingRun> TrainingRun::Make(const fs::path& out, Config config) {
+std::unique_ptr<TrainingRun> TrainingRun::Make(const fs::path& out, Config config,
+                                               ForeignMaker make_foreign) {
   NameModelCopy(config);
   const fs::path usual = Concat("runs/", config.agent, "-seed", config.train.seed);
   const fs::path path = out.empty() ? FreePath(usual) : out;
-  std::unique_ptr<TrainingRun> run(new TrainingRun(path, config));
+  std::unique_ptr<TrainingRun> run(new TrainingRun(path, config, std::move(make_foreign)));
   const Config& made = run->training_.config();
   std::vector<std::pair<std::string, std::string>> files{
       {RunFolder::kConfig, ConfigToml(made, false)}};

@@ -23,7 +23,9 @@ class TrainingRun : private TrainObserver {
   /// Makes a new run in the folder `out`, with its first checkpoint. If `out` is empty, the folder
   /// is runs/AGENT-seedSEED, or that with -2, -3, … if it exists. Throws BadInput and writes
   /// nothing.
-  static std::unique_ptr<TrainingRun> Make(const std::filesystem::path& out, Config config);
+  /// `make_foreign` makes the environments of a foreign task.
+  static std::unique_ptr<TrainingRun> Make(const std::filesystem::path& out, Config config,
+                                           ForeignMaker make_foreign = {});
 
   /// Opens the run in a folder and changes some settings. Throws BadInput and changes nothing if
   /// another process works there, or if the run is incomplete or from another version.
@@ -41,7 +43,7 @@ class TrainingRun : private TrainObserver {
   bool Train(TrainObserver& view, const std::function<TrainRequest()>& poll);
 
  private:
-  TrainingRun(std::filesystem::path path, const Config& config);
+  TrainingRun(std::filesystem::path path, const Config& config, ForeignMaker make_foreign = {});
   bool Loop(const std::function<TrainRequest()>& poll);
   void SaveCheckpoint();
   void LogIfPossible(const std::string& line);

@@ -45,6 +45,9 @@ void Config::Describe(Options& o) {
   train.Describe(o);
   o.Section("task");
   o.AddChoice(&task, "task", TaskNames(), "task to learn").implied = true;
+  o.Add(&environment, "environment",
+        "environment of the task gymnasium, as upswing.train(env=...) in Python describes it")
+      .implied = true;
   DescribeEnvironment(o);
   learner().Describe(o);
 }
@@ -95,6 +98,7 @@ Options EverySetting(Config& scratch) {
 EnvConfig Config::Environments() const {
   EnvConfig env;
   env.task = task;
+  env.environment = environment;
   env.plants = {plant};
   env.disturbances = {disturbance};
   env.randomization = randomization;

@@ -35,6 +35,7 @@ struct Config {
   std::string model;           // path of an MJCF file; empty: the built-in model
   TrainConfig train;
   std::string task = kDoublePendulum;  // one of TaskNames
+  std::string environment;             // description of a foreign task's environment
   double episode_seconds = 4, random_start_share = 0.9, random_start_velocity = 5;
   int64_t memory = 0;
   bool identify = false;

@@ -21,6 +21,10 @@ AgentSize SizeOfLearner(const Config& config) { return config.learner().Size(con
 /// Throws BadInput if a setting of the double pendulum differs from its default in a task without
 /// that setting.
 void CheckTask(Config& config, const std::string& where) {
+  if (!IsForeign(config.task) && !config.environment.empty()) {
+    throw BadInput(Concat(where.empty() ? "" : where + ": ", "environment: expected none, because ",
+                          "the task ", config.task, " is not ", kGymnasium, ", got one"));
+  }
   if (HasPlant(config.task)) return;
   Config defaults;
   Options now, usual;

@@ -86,6 +86,59 @@ ChosenAgent ChooseAgent(const toml::table& table, const std::string& where,
   return {agent.name, place, std::move(settings), algorithm};
 }
 
+/// Defaults of trainings on a foreign task: as usual for each algorithm, over the network and the
+/// settings of the named agent, which are tuned for the tasks of the program.
+std::string_view ForeignDefaults(std::string_view algorithm) {
+  if (algorithm == "dqn") {
+    return "[train]\nenvs = 1\neval_episodes = 10\n"
+           "[agent]\nmirror = false\nreward_scale = 1.0\nreward_centering = 0.0\n"
+           "updates_per_step = 0.25\nlearning_starts = 1000\nlearning_rate = 1e-3\n"
+           "tau = 0.01\n";
+  }
+  if (algorithm == "sac") {
+    return "[train]\nenvs = 1\neval_episodes = 10\n"
+           "[agent]\nmirror = false\nreward_scale = 1.0\nreward_centering = 0.0\n"
+           "updates_per_step = 1.0\nlearning_starts = 1000\nlearning_rate = 3e-4\n"
+           "learning_rate_end = 3e-4\nalpha = 1.0\nalpha_rate = 3e-4\nactor_rate = 1.0\n"
+           "actor_period = 1\nn_step = 1\nprioritized = false\ntwin = true\ntau = 0.005\n"
+           "entropy_reward = true\ntarget_entropy = -1.0\nsmoothness = 0.0\n";
+  }
+  return "[train]\nenvs = 8\neval_episodes = 10\n"
+         "[agent]\nmirror = false\nreward_scale = 1.0\nnormalize = false\nhorizon = 256\n"
+         "epochs = 10\nbatch = 64\nlearning_rate = 3e-4\nlearning_rate_end = 0.0\n"
+         "kl_target = 0.0\nentropy_bonus = 0.0\nentropy_bonus_end = 0.0\n";
+}
+
+/// Applies the settings of a named agent to a foreign task: its network and its learning.
+void ApplyToForeign(const Options& options, const ChosenAgent& agent) {
+  toml::table learner;
+  for (const char* section : {"network", "agent"}) {
+    if (const auto* settings = agent.settings[section].as_table())
+      learner.insert(section, *settings);
+  }
+  ApplyTable(options, learner, agent.place, false);
+  const std::string place = Concat("defaults of ", agent.algorithm);
+  ApplyTable(options, ParseToml(ForeignDefaults(agent.algorithm), place), place, false);
+}
+
+/// Completes settings by the environment of a foreign task: its discrete actions, and a learning
+/// rate that decays until the last step unless `decay_given`. Throws BadInput.
+void FitToForeign(const Options& options, bool decay_given, Config& config) {
+  const ForeignTask task = ForeignTask::Parse(config.environment, "environment");
+  if (!decay_given) options.Set("learning_rate_steps", options.Get("steps")->text(), "steps");
+  if (task.choices.empty()) {
+    if (config.algorithm == "ppo") config.ppo.actions = "continuous";
+    return;
+  }
+  if (config.algorithm == "sac") {
+    throw BadInput(Concat("agent: expected an agent of dqn or ppo, because the actions of ",
+                          task.name, " are discrete, got ", config.agent, ", an agent of sac"));
+  }
+  const auto count = static_cast<int64_t>(task.choices.size());
+  config.dqn.levels = config.ppo.levels = count;
+  config.ppo.actions = "levels";
+}
+
 }  // namespace
 
 Options KnownOptions(Config& config) {
@@ -126,6 +179,7 @@ Config ParseConfig(std::string_view text, const std::string& where,
                    const std::vector<FlagValue>& flags, const ModelReader& read_model) {
   const toml::table table = ParseToml(text, where);
   const ChosenAgent agent = ChooseAgent(table, where, flags);
+  const bool foreign = FindEarly("task", "task", table, where, flags).value == kGymnasium;
   Config config(agent.algorithm);
   config.agent = agent.name;
   const Options options = KnownOptions(config);
@@ -139,11 +193,20 @@ Config ParseConfig(std::string_view text, const std::string& where,
     config.mjcf = model.mjcf;
   }
 
-  ApplyTable(options, agent.settings, agent.place, false);
+  if (foreign) {
+    ApplyToForeign(options, agent);
+  } else {
+    ApplyTable(options, agent.settings, agent.place, false);
+  }
   ApplyTable(options, table, where, false);
   SetFlags(options, flags);
   config.agent = agent.name;
   config.model = model.path;
+  if (foreign) {
+    const EarlySetting decay = FindEarly("agent", "learning_rate_steps", table, where, flags);
+    const bool decay_in_file = table["agent"]["learning_rate_steps"].is_number();
+    FitToForeign(options, decay_in_file || !decay.where.empty(), config);
+  }
   CheckSettings(config, where);
   return config;
 }

@@ -42,6 +42,10 @@ void CheckObservation(const LoadedPolicy& loaded, const std::string& where) {
 
 /// Throws BadInput unless the policy is for a task of this program.
 void CheckTask(const LoadedPolicy& loaded, const std::string& where) {
+  if (IsForeign(loaded.task)) {  // only the environment knows its spaces
+    if (loaded.policy->info().control_period) return;
+    throw BadInput(Concat(where, ": no metadata \"control_period\""));
+  }
   const std::vector<std::string> names = TaskNames();
   if (std::ranges::find(names, loaded.task) == names.end()) {
     throw BadInput(Concat(where, ": metadata \"task\": expected one of ", Join(names, ", "),
@@ -117,8 +121,9 @@ PolicyInfo InfoOf(const Config& config) {
   info.seed = config.train.seed;
   info.upswing_version = UPSWING_VERSION;
   info.config = ConfigToml(config, true);
-  info.task = config.task;
-  info.control_period = config.Spec().step_seconds;
+  const EnvSpec spec = config.Spec();
+  info.task = spec.task;
+  info.control_period = spec.step_seconds;
   if (!HasPlant(config.task)) return info;
   for (const auto& [name, value] : PlantValues(config.plant)) info.plant[name] = value;
   info.observation = ObservationInfoOf(config.memory, config.identify);

@@ -21,6 +21,17 @@ constexpr Task RowOf(const char* name) {
           nullptr};
 }
 
+EnvSpec ForeignSpec(const EnvConfig& config) {
+  if (config.task != kGymnasium) throw NoForeignEnvironment(config.task);  // of a policy file
+  return ForeignTask::Parse(config.environment, "environment").Spec(config.num_envs);
+}
+
+std::unique_ptr<VectorEnv> MakeForeignEnv(const EnvConfig& config) {
+  const EnvSpec spec = ForeignSpec(config);
+  if (!config.make_foreign) throw NoForeignEnvironment(spec.task);
+  return config.make_foreign(config);
+}
+
 constexpr Task kTasks[] = {
     {kDoublePendulum,
      [](const EnvConfig& config) -> std::unique_ptr<VectorEnv> {
@@ -29,6 +40,7 @@ constexpr Task kTasks[] = {
      [](const EnvConfig& config) { return PendulumSpec(config); }, true, "0,0,0,0"},
     RowOf<PendulumV1>(kPendulumV1),
     RowOf<AcrobotV1>(kAcrobotV1),
+    {kGymnasium, MakeForeignEnv, ForeignSpec, false, nullptr},
 };
 
 }  // namespace
@@ -37,7 +49,7 @@ std::vector<std::string> TaskNames() { return NamesOf(kTasks); }
 
 const Task& TaskNamed(std::string_view name) {
   for (const Task& task : kTasks) {
-    if (name == task.name) return task;
+    if (name == task.name || (task.name == kGymnasium && IsForeign(name))) return task;
   }
   throw BadInput(Concat("task: expected one of ", Join(TaskNames(), ", "), ", got \"", name, "\""));
 }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/env.h"
+#include "setup/foreign_task.h"
 #include "sim/pendulum_env.h"
 
 namespace upswing {
@@ -14,6 +15,10 @@ namespace upswing {
 /// of environments and their random streams.
 struct EnvConfig : PendulumEnvConfig {
   std::string task = kDoublePendulum;
+  // Of a foreign task:
+  std::string environment;      // description, see ForeignTask::Parse
+  ForeignMaker make_foreign;    // empty: this program cannot make the environments
+  bool for_evaluation = false;  // environments need not go on after their first episode
 };
 
 /// A task, as the program uses it.

@@ -19,10 +19,11 @@ Config Checked(Config config, const Host& host) {
 }
 
 /// Makes the environments of the settings. The threads of the pool share their work.
-std::unique_ptr<VectorEnv> MakeTrainingEnv(const Config& config, Engines engines,
+std::unique_ptr<VectorEnv> MakeTrainingEnv(const Config& config, const Host& host,
                                            ThreadPool& pool) {
   EnvConfig env = config.Environments();
-  env.engine = &FindEngine(engines, config.physics, "--physics");
+  env.engine = &FindEngine(host.engines, config.physics, "--physics");
+  env.make_foreign = host.make_foreign;
   env.pool = &pool;
   return MakeEnv(env);
 }
@@ -40,13 +41,15 @@ EnvConfig EvaluationEnvironments(const Config& config, int64_t step) {
   env.start = StartStates();
   env.weights = RewardWeights();
   env.stream = Concat("evaluation at step ", step);
+  env.for_evaluation = true;
   return env;
 }
 
 Training::Training(Config config, const Host& host)
     : config_(Checked(std::move(config), host)),
+      make_foreign_(host.make_foreign),
       pool_(host.threads, config_.train.threads == 0),
-      env_(MakeTrainingEnv(config_, host.engines, pool_)),
+      env_(MakeTrainingEnv(config_, host, pool_)),
       agent_(config_.MakeAgent(env_->spec(), pool_)),
       trainer_(MakeSetup(host.engines), *agent_, *env_) {}
 
@@ -77,6 +80,7 @@ Evaluation Training::Evaluate(const Engine& engine, const Policy& policy, int64_
   EnvConfig config = EvaluationEnvironments(config_, step);
   config.pool = &pool_;
   config.engine = &engine;
+  config.make_foreign = make_foreign_;
   const std::unique_ptr<VectorEnv> env = MakeEnv(config);
   return upswing::Evaluate(policy, *env, &pool_);
 }

@@ -24,6 +24,7 @@ struct Host {
   Engines engines;
   int64_t memory;  // free memory, bytes
   int threads = 1;
+  ForeignMaker make_foreign = {};  // for trainings on a foreign task
 };
 
 /// A training: environments, agent and training loop, made from its settings. It writes no file;
@@ -67,6 +68,7 @@ class Training {
   Evaluation Evaluate(const Engine& engine, const Policy& policy, int64_t step);
 
   Config config_;
+  ForeignMaker make_foreign_;
   ThreadPool pool_;
   std::unique_ptr<VectorEnv> env_;
   std::unique_ptr<Agent> agent_;

@@ -88,6 +88,10 @@ class PolicyHandle {
 /// torques, N·m (N, or N × 1). Its observations hold `memory` past steps.
 LoadedPolicy MakeFunctionPolicy(nanobind::callable function, int memory);
 
+/// A maker of environments that Python makes and steps, by a function in Python (CallbackEnv). The
+/// function must outlive the maker and its environments. None: an empty maker.
+ForeignMaker MakerOf(const nanobind::object& make);
+
 /// Throws the Python exception of a pending signal, such as Ctrl-C. Needs the interpreter's lock.
 void CheckSignals();
 

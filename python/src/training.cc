@@ -165,7 +165,7 @@ struct Driven {
 
 /// Makes the training. Calls `about` with the settings before anything is written.
 Driven Make(const std::vector<FlagValue>& flags, const std::string& config_file,
-            const std::string& out, const std::string& resume,
+            const std::string& out, const std::string& resume, const ForeignMaker& make_foreign,
             const std::function<void(const Config&)>& about) {
   Driven driven;
   if (!resume.empty()) {
@@ -176,16 +176,17 @@ Driven Make(const std::vector<FlagValue>& flags, const std::string& config_file,
   Config config = BuildConfig(config_file, flags);
   about(config);
   if (!out.empty()) {
-    driven.run = TrainingRun::Make(out, std::move(config));
+    driven.run = TrainingRun::Make(out, std::move(config), make_foreign);
     return driven;
   }
   const int threads = ResolveThreads(config.train.threads);
-  driven.training = std::make_unique<Training>(std::move(config), ThisHost(threads));
+  driven.training = std::make_unique<Training>(std::move(config), ThisHost(threads, make_foreign));
   return driven;
 }
 
 nb::dict Train(const SettingTexts& settings, const std::string& config, const std::string& out,
-               const std::string& resume, const nb::callable& tick, const nb::callable& warn) {
+               const std::string& resume, const nb::object& make_foreign, const nb::callable& tick,
+               const nb::callable& warn) {
   const std::vector<FlagValue> flags = FlagsOf(settings);
   PythonDriver driver(tick);
   const auto warn_about = [&](const Config& settings_now) {
@@ -193,11 +194,12 @@ nb::dict Train(const SettingTexts& settings, const std::string& config, const st
     const nb::gil_scoped_acquire lock;
     for (const std::string& line : lines) warn(line);
   };
+  const ForeignMaker maker = MakerOf(make_foreign);
   Driven driven;
   PolicyPointer last, best;
   {
     const nb::gil_scoped_release unlocked;
-    driven = Make(flags, config, out, resume, warn_about);
+    driven = Make(flags, config, out, resume, maker, warn_about);
     driven.Train(driver);
     if (driver.error()) std::rethrow_exception(driver.error());
     last = CopyOf(*driven.its().policy(), "the last policy of this training");
@@ -215,7 +217,7 @@ nb::dict Train(const SettingTexts& settings, const std::string& config, const st
 
 void BindTraining(nb::module_& m) {
   m.def("train", &Train, nb::arg("settings"), nb::arg("config"), nb::arg("out"), nb::arg("resume"),
-        nb::arg("tick"), nb::arg("warn"));
+        nb::arg("make_foreign").none(), nb::arg("tick"), nb::arg("warn"));
 }
 
 }  // namespace upswing

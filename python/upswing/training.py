@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import os
 import sys
@@ -14,6 +15,8 @@ import numpy as np
 from typing_extensions import Unpack
 
 from . import _upswing
+from ._foreign import EnvLike, Source
+from ._lanes import Interrupts
 from .policy import Policy
 from ._settings import text_of, texts_of
 from ._types import TrainingSettings
@@ -65,6 +68,11 @@ class Training:
 def train(
     agent: str | None = None,
     *,
+    env: EnvLike | None = None,
+    num_envs: int | None = None,
+    eval_env: EnvLike | None = None,
+    max_episode_steps: int | None = None,
+    solved_return: float | None = None,
     seed: int | None = None,
     out: str | os.PathLike[str] | None = None,
     config: str | os.PathLike[str] | None = None,
@@ -81,8 +89,23 @@ def train(
     The training writes no files without `out`. Ctrl-C raises KeyboardInterrupt after the current
     step; a run folder then has a checkpoint for `resume`.
 
+    With `env` the task is a Gymnasium environment: Python steps it, the C++ code learns. The
+    observations are a Box of one dimension. The actions are a Box (agents of SAC and PPO; agents
+    of DQN if it has one component) or Discrete (agents of DQN and PPO). The agent gives its
+    algorithm and its network; other settings have the defaults in docs/howto/gymnasium.md. Such a
+    run cannot resume.
+
     Args:
-        agent: named agent, see `upswing.agents` (default "d3qn")
+        agent: named agent, see `upswing.agents` (default "d3qn"; with `env` "fast" for Discrete
+            actions and "sac" for a Box)
+        env: id of a Gymnasium environment, an environment (copied for more), a vector environment,
+            or a function that makes an environment
+        num_envs: number of parallel environments (default 1, PPO 8; a vector environment has its
+            own number)
+        eval_env: environment for evaluations, like `env` (default: a copy of `env`)
+        max_episode_steps: largest number of steps of an episode (default: of the environment)
+        solved_return: mean return of an evaluation that passes; two passed evaluations in a row
+            end the training (default: train to the last step)
         seed: seed of all random numbers
         out: new run folder, as the program writes it
         config: TOML file of settings; keyword arguments override it
@@ -105,8 +128,11 @@ def train(
 
     >>> training = upswing.train(agent="fast", seed=1, hidden=[64, 64], mass2=1.1)
     >>> training.best.save("policy.safetensors")
+    >>> upswing.train("ppo", env="LunarLander-v3", steps=500_000, num_envs=16, out="runs/lander")
     """
-    named: dict[str, Any] = {"agent": agent, "seed": seed}
+    source, of_env = _source_of(agent, env, num_envs, eval_env, max_episode_steps, solved_return,
+                                resume, config, dict(settings))
+    named: dict[str, Any] = {"agent": agent, "seed": seed} | of_env
     if resume is not None and (out is not None or config is not None):
         raise _upswing.InputError(
             "resume: expected neither out nor config with it: the run has its own settings and "
@@ -120,7 +146,8 @@ def train(
                            ("on_evaluation", on_evaluation), ("on_best", on_best)):
         if function is not None and not callable(function):
             raise _upswing.InputError(f"{name}: expected a function, got {function!r}")
-    line = _ProgressLine(sys.stderr) if progress or progress is None else None
+    judged = source is None or solved_return is not None
+    line = _ProgressLine(sys.stderr, judged) if progress or progress is None else None
     if line is not None and progress is None and not line.terminal:
         line = None
     rows: dict[str, list[Row]] = {"evaluation": [], "metrics": []}
@@ -143,19 +170,63 @@ def train(
                     wanted = False
         if line is not None:
             line.show(events, state)
+        if interrupts is not None:
+            interrupts.check()
         return wanted
 
     def warn(text: str) -> None:
         warnings.warn(text, stacklevel=3)
 
+    interrupts = Interrupts() if source is not None else None
+    make = source.make if source is not None else None
     try:
-        result = _upswing.train(texts, _path(config), _path(out), _path(resume), tick, warn)
+        with interrupts or contextlib.nullcontext():
+            result = _upswing.train(texts, _path(config), _path(out), _path(resume), make, tick,
+                                    warn)
+    except _upswing.Failure as failure:
+        if source is None or source.cause is None:
+            raise
+        raise failure from source.cause
     finally:
         if line is not None:
             line.clear()
+        if source is not None:
+            source.close()
     best, last = result.pop("best"), result.pop("last")
     return Training(best=Policy(best) if best is not None else None, last=Policy(last),
                     evaluations=rows["evaluation"], metrics=rows["metrics"], **result)
+
+
+def _source_of(agent: str | None, env: EnvLike | None, num_envs: int | None,
+               eval_env: EnvLike | None, max_episode_steps: int | None,
+               solved_return: float | None, resume: Any, config: Any,
+               settings: dict[str, Any]) -> tuple[Source | None, dict[str, Any]]:
+    """The environments of `env`, and the settings that follow from it. Raises InputError."""
+    arguments = {"num_envs": num_envs, "eval_env": eval_env,
+                 "max_episode_steps": max_episode_steps, "solved_return": solved_return}
+    if env is None:
+        for name, value in arguments.items():
+            if value is not None:
+                raise _upswing.InputError(f"{name}: expected env with it, got none")
+        return None, {}
+    if resume is not None:
+        raise _upswing.InputError(
+            "resume: expected none with env: the state of its environments cannot be saved, so "
+            "that their runs cannot resume")
+    for name, instead in (("envs", "num_envs"), ("task", "env"), ("environment", "env")):
+        if name in settings:
+            raise _upswing.InputError(f"{name}: expected none with env; set {instead}")
+    source = Source(env, num_envs, eval_env, max_episode_steps, solved_return)
+    for name in ("levels", "actions"):
+        if name in settings and source.discrete:
+            raise _upswing.InputError(
+                f"{name}: expected none with discrete actions, got {settings[name]!r}")
+    found: dict[str, Any] = {"task": "gymnasium", "environment": source.description}
+    if source.num_envs > 0 or num_envs is not None:
+        found["envs"] = source.num_envs
+    if agent is None and config is None:
+        found["agent"] = "fast" if source.discrete else "sac"
+    return source, found
 
 
 def _path(path: str | os.PathLike[str] | None) -> str:
@@ -165,8 +236,9 @@ def _path(path: str | os.PathLike[str] | None) -> str:
 class _ProgressLine:
     """A line with the progress of a training, and a permanent line per evaluation."""
 
-    def __init__(self, file: TextIO) -> None:
+    def __init__(self, file: TextIO, judged: bool) -> None:
         self._file = file
+        self._judged = judged  # whether episodes can succeed
         self.terminal = file.isatty()
         self._last = 0.0
         self._shown = False
@@ -175,9 +247,9 @@ class _ProgressLine:
         for kind, what in events:
             if kind == "evaluation":
                 self.clear()
+                success = f"  success {100 * what['success_rate']:>4.0f}%" if self._judged else ""
                 print(f"{what['step']:>12,} steps {state['seconds']:>10.1f} s  return "
-                      f"{what['mean_return']:>6.0f}  success {100 * what['success_rate']:>4.0f}%",
-                      file=self._file, flush=True)
+                      f"{what['mean_return']:>6.0f}{success}", file=self._file, flush=True)
         now = time.monotonic()
         if not self.terminal or now - self._last < 0.2:
             return
