@@ -156,7 +156,7 @@ class Machine(ProgramTest):
         refuse(["machine", "check", "none.csv"], "none.csv", "No such file")
         refuse(["machine", "check", "."], "folder")
         refuse(["machine", "check"], "expected a log, got none")
-        refuse(["machine", "polish", good], "action check", '"polish"')
+        refuse(["machine", "polish", good], "check, identify or validate", '"polish"')
         refuse(["machine"], "expected ACTION", "got none")
         refuse(["machine", "check", good, good, "--figure", "log.svg"], "--figure", "got 2")
         refuse(["machine", "check", good, "--figure", "log.txt"], "log.txt")
