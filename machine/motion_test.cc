@@ -157,5 +157,20 @@ TEST(CutWindows, SkipUprightMotionGapsAndRest) {
   }
 }
 
+TEST(CutWindows, JumpOverALongGap) {
+  MachineLog log;
+  for (int k = 0; k < 1000; ++k) {
+    const double t = 0.002 * k;
+    log.time.push_back(t + (k >= 500 ? 1e9 : 0));
+    log.angle.push_back({0.5 * std::sin(9 * t), 0});
+  }
+  const auto windows = CutWindows(std::span(&log, 1), {.seconds = 0.1, .hop = 0.05}, 0.2, 0.3);
+  // No window twice: a start within the gap does not count.
+  for (size_t i = 1; i < windows.size(); ++i) EXPECT_GT(windows[i].first, windows[i - 1].first);
+  ASSERT_FALSE(windows.empty());
+  EXPECT_LT(windows.front().last, 500);
+  EXPECT_GE(windows.back().first, 500);
+}
+
 }  // namespace
 }  // namespace upswing
