@@ -45,7 +45,7 @@ PendulumState StepMotion(const Manipulator& body, const Drive& drive, const Pend
                          double time, double h, int& cursor, Joints& acceleration);
 
 /// The equations of motion of a twin. `reported`: driven by reported torques instead of commanded
-/// ones. Reported torques lack current_inertia · q̈, so the armature is smaller by current_inertia.
+/// ones. Reported torques lack current_inertia · q̈, so each joint has less armature.
 Manipulator BodyOf(const Twin& twin, bool reported = false);
 
 /// A predicted motion at the rows of a log.
