@@ -10,10 +10,12 @@
 #include <iterator>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "apps/commands.h"
 #include "apps/progress.h"
+#include "apps/say.h"
 #include "core/error.h"
 #include "core/format.h"
 #include "core/json.h"
@@ -37,14 +39,17 @@ struct MachineArguments {
   bool as_json = false;
 };
 
+/// What a finding is about, such as `velocity 2`.
+std::string AboutText(const Finding& finding) {
+  const std::string aspect = NameOf(finding.aspect);
+  return finding.joint > 0 ? Concat(aspect, " ", finding.joint) : aspect;
+}
+
 void PrintCheck(const LogCheck& check) {
   fmt::print("{}: {} rows, {:.2f} s{}\n", Printable(check.name), check.rows, check.seconds,
              check.pieces > 1 ? fmt::format(" in {} pieces", check.pieces) : "");
   for (const Finding& finding : check.findings) {
-    const std::string about = finding.joint > 0
-                                  ? fmt::format("{} {}", NameOf(finding.aspect), finding.joint)
-                                  : NameOf(finding.aspect);
-    fmt::print("  {:<8} {:<11} {}{}\n", NameOf(finding.severity), about, finding.text,
+    fmt::print("  {:<8} {:<11} {}{}\n", NameOf(finding.severity), AboutText(finding), finding.text,
                finding.rows ? ", " + RowsText(*finding.rows) : "");
   }
 }
@@ -70,10 +75,18 @@ int RunCheck(const MachineArguments& a) {
   return std::ranges::any_of(checks, &LogCheck::faulty) ? 1 : 0;
 }
 
+/// Reads logs, and warns of those with faults.
 std::vector<MachineLog> ReadLogs(std::span<const std::string> files, const std::string& columns) {
   std::vector<MachineLog> logs;
   for (const std::string& file : files) {
-    for (MachineLog& piece : ReadLog(file, columns)) logs.push_back(std::move(piece));
+    std::vector<MachineLog> pieces = ReadLog(file, columns);
+    const LogCheck check = CheckLog(file, pieces);
+    const auto fault = std::ranges::find(check.findings, Severity::kFault, &Finding::severity);
+    if (fault != check.findings.end()) {
+      SayError(Concat("warning: ", Printable(file), ": ", AboutText(*fault), ": ", fault->text,
+                      "; machine check lists all faults"));
+    }
+    std::ranges::move(pieces, std::back_inserter(logs));
   }
   return logs;
 }
@@ -110,24 +123,41 @@ void PrintErrors(std::span<const ErrorRow> rows, std::span<const Predictor> pred
   if (predictors.size() < 2) return;
   fmt::print("\nerror smaller than {}'s by, % (95% over runs)\n",
              Printable(predictors.back().name));
+  // A single session has no row for all runs: its own row has them.
+  const bool has_all =
+      std::ranges::any_of(rows, [](const ErrorRow& row) { return row.session.empty(); });
   for (const ErrorRow& row : rows) {
-    if (!row.session.empty()) continue;
+    if (has_all && !row.session.empty()) continue;
     const auto [value, interval] = row.improvement;
     fmt::print(
-        "  all runs, {} s, {} torques: {:.0f}{}\n", FormatNumber(row.seconds),
+        "  {}, {} s, {} torques: {:.0f}{}\n",
+        row.session.empty() ? "all runs" : Printable(row.session), FormatNumber(row.seconds),
         row.reported ? "reported" : "commanded", 100 * value,
         interval ? fmt::format(" ({:.0f}–{:.0f})", 100 * interval->low, 100 * interval->high) : "");
   }
 }
 
-/// The models that --against names.
-std::vector<Predictor> Others(const MachineArguments& a, std::span<const MachineLog> logs) {
-  std::vector<Predictor> others;
-  for (const std::string& file : a.against) {
-    const Twin twin = ReadTwin(file, "--against");
-    others.push_back(PredictorOf(twin.name, twin, logs));
+/// Adds the models that --against names. A model whose name is taken gets its file as the name.
+void AddOthers(std::span<const Twin> twins, const MachineArguments& a,
+               std::span<const MachineLog> logs, std::vector<Predictor>& predictors) {
+  for (size_t i = 0; i < twins.size(); ++i) {
+    const bool is_taken =
+        std::ranges::find(predictors, twins[i].name, &Predictor::name) != predictors.end();
+    predictors.push_back(PredictorOf(is_taken ? a.against[i] : twins[i].name, twins[i], logs));
   }
-  return others;
+}
+
+/// Reads the models that --against names.
+std::vector<Twin> ReadOthers(const MachineArguments& a) {
+  std::vector<Twin> twins;
+  for (const std::string& file : a.against) {
+    if (std::ranges::count(a.against, file) > 1) {
+      throw BadInput(Concat("--against: expected different files, got \"", Printable(file),
+                            "\" more than once"));
+    }
+    twins.push_back(ReadTwin(file, "--against"));
+  }
+  return twins;
 }
 
 nlohmann::ordered_json ErrorsJson(std::span<const ErrorRow> rows,
@@ -160,16 +190,21 @@ int RunValidate(const MachineArguments& a) {
   if (a.logs.size() < 2) {
     throw BadInput("machine validate: expected a twin and at least one log");
   }
-  const Twin twin = ReadTwin(a.logs.front(), "machine validate");
+  const std::string& file = a.logs.front();
+  if (file.ends_with(".csv") || file.ends_with(".csv.gz")) {
+    throw BadInput(Concat("machine validate: expected the twin's file before the logs, got \"",
+                          Printable(file), "\""));
+  }
+  const Twin twin = ReadTwin(file, "machine validate");
+  const std::vector<Twin> others = ReadOthers(a);
   const std::vector<MachineLog> logs = ReadLogs(std::span(a.logs).subspan(1), a.columns);
   std::vector<Predictor> predictors{PredictorOf(twin.name, twin, logs)};
-  std::ranges::move(Others(a, logs), std::back_inserter(predictors));
+  AddOthers(others, a, logs, predictors);
   ThreadPool pool(ResolveThreads(a.threads));
   const auto rows = CompareErrors(logs, predictors, kHorizons, &pool);
   if (rows.empty()) {
     throw BadInput(
-        "machine validate: expected logs with a motion of 0.2 s away from upright, got "
-        "none");
+        "machine validate: expected logs with a motion of 0.2 s away from upright, got none");
   }
   if (!a.figure.empty()) DrawErrors(logs, predictors, a.figure, &pool);
   if (a.as_json) {
@@ -188,8 +223,14 @@ void PrintTwin(const Identification& found) {
   fmt::print("\nvalue                 ± standard deviation\n");
   for (size_t i = 0; i < n; ++i) {
     const Option& option = *options.Get(twin.uncertain[i]);
-    fmt::print("  {:<16} {:>10.5f} ± {:.5f} {}\n", option.name, option.number(),
-               std::sqrt(std::max(0.0, twin.covariance[i * n + i])), option.unit);
+    const double variance = twin.covariance[i * n + i];
+    if (variance > 0) {
+      fmt::print("  {:<16} {:>10.5f} ± {:.5f} {}\n", option.name, option.number(),
+                 std::sqrt(variance), option.unit);
+    } else {
+      fmt::print("  {:<16} {:>10.5f}   {}, at its limit or not visible in the logs\n", option.name,
+                 option.number(), option.unit);
+    }
   }
   fmt::print("\nsession                          zero 1  zero 2  friction 1  friction 2\n");
   for (const Session& s : twin.sessions) {
@@ -198,13 +239,43 @@ void PrintTwin(const Identification& found) {
   }
 }
 
-int RunIdentify(const MachineArguments& a) {
+void PrintIdentification(const Identification& found, size_t logs) {
+  fmt::print("{} in {}\n", Counted(found.fit.windows, "window"),
+             Counted(static_cast<int64_t>(logs), "log"));
+  if (!found.structures.empty()) {
+    fmt::print("\nmodel                                    error on left-out runs, 1 s, rad\n");
+    for (size_t s = 0; s < found.structures.size(); ++s) {
+      fmt::print("{} {:<40} {:.4f}\n", static_cast<int>(s) == found.chosen ? "*" : " ",
+                 found.structures[s].structure.name, found.structures[s].error);
+    }
+  }
+  PrintTwin(found);
+}
+
+nlohmann::ordered_json IdentificationJson(const Identification& found, const std::string& file) {
+  auto structures = nlohmann::ordered_json::array();
+  for (const auto& [structure, error] : found.structures) {
+    structures.push_back({{"name", structure.name}, {"left_out_error_rad", error}});
+  }
+  return {{"twin", file},
+          {"windows", found.fit.windows},
+          {"structures", structures},
+          {"chosen", found.chosen}};
+}
+
+void CheckIdentifyArguments(const MachineArguments& a) {
   if (a.plant.empty()) {
     throw BadInput("machine identify: expected --plant FILE with masses and lengths, got none");
   }
   if (a.out.empty()) throw BadInput("machine identify: expected --out FILE, got none");
+  if (a.folds == 1) throw BadInput("--folds: expected 0, or 2 or more, got 1");
   CheckWritable("--out", a.out);
+}
+
+int RunIdentify(const MachineArguments& a) {
+  CheckIdentifyArguments(a);
   const Twin first = ReadTwin(a.plant, "--plant");
+  const std::vector<Twin> others = ReadOthers(a);
   const std::vector<MachineLog> logs = ReadLogs(a.logs, a.columns);
   IdentifyConfig config;
   config.folds = static_cast<int>(a.folds);
@@ -219,49 +290,46 @@ int RunIdentify(const MachineArguments& a) {
   Twin& twin = found.fit.twin;
   twin.name = std::filesystem::path(a.out).stem().string();
   WriteNamedFile(a.out, TwinText(twin));
-  std::vector<Predictor> predictors;
-  if (!found.left_out.empty()) {
-    predictors.push_back({"left-out runs", found.left_out});
-  } else {
-    predictors.push_back(PredictorOf("same runs", twin, logs));
-  }
+  // Errors on runs that a twin has not seen, if there was a cross-validation.
+  std::vector<Predictor> predictors{found.left_out.empty()
+                                        ? PredictorOf("same runs", twin, logs)
+                                        : Predictor{"left-out runs", found.left_out}};
   if (a.against.empty()) predictors.push_back(PredictorOf(first.name, first, logs));
-  std::ranges::move(Others(a, logs), std::back_inserter(predictors));
+  AddOthers(others, a, logs, predictors);
   const auto rows = CompareErrors(logs, predictors, kHorizons, &pool);
   if (!a.figure.empty()) DrawErrors(logs, predictors, a.figure, &pool);
   if (a.as_json) {
-    auto structures = nlohmann::ordered_json::array();
-    for (const auto& [structure, error] : found.structures) {
-      structures.push_back({{"name", structure.name}, {"left_out_error_rad", error}});
-    }
-    fmt::print("{}\n", PrintableJson({{"twin", a.out},
-                                      {"windows", found.fit.windows},
-                                      {"structures", structures},
-                                      {"chosen", found.chosen},
-                                      {"errors", ErrorsJson(rows, predictors)}}));
+    nlohmann::ordered_json json = IdentificationJson(found, a.out);
+    json["errors"] = ErrorsJson(rows, predictors);
+    fmt::print("{}\n", PrintableJson(json));
     return 0;
   }
-  fmt::print("{} in {} logs\n", Counted(found.fit.windows, "window"), logs.size());
-  if (!found.structures.empty()) {
-    fmt::print("\nmodel                                    error on left-out runs, 1 s, rad\n");
-    for (size_t s = 0; s < found.structures.size(); ++s) {
-      fmt::print("{} {:<40} {:.4f}\n", static_cast<int>(s) == found.chosen ? "*" : " ",
-                 found.structures[s].structure.name, found.structures[s].error);
-    }
-  }
-  PrintTwin(found);
+  PrintIdentification(found, logs.size());
   PrintErrors(rows, predictors);
   fmt::print("written {}\n", Printable(a.out));
   if (!a.figure.empty()) fmt::print("written {}\n", Printable(a.figure));
   return 0;
 }
 
-int RunMachine(const MachineArguments& a) {
-  constexpr std::array kActions{"check", "identify", "validate"};
-  if (std::ranges::find(kActions, a.action) == kActions.end()) {
-    throw BadInput(
-        Concat("machine: expected check, identify or validate, got \"", Printable(a.action), "\""));
+/// Refuses options of other actions.
+void CheckOptions(const CommandLine& line, const std::string& action) {
+  struct Owned {
+    const char* option;
+    std::vector<std::string> actions;
+  };
+  const std::array<Owned, 5> kOwned{{{"--plant", {"identify"}},
+                                     {"--out", {"identify"}},
+                                     {"--folds", {"identify"}},
+                                     {"--seconds", {"identify"}},
+                                     {"--against", {"identify", "validate"}}}};
+  for (const auto& [option, actions] : kOwned) {
+    if (!line.Has(option) || std::ranges::count(actions, action) > 0) continue;
+    throw BadInput(Concat("machine ", Printable(action), ": expected no ", option,
+                          ", which belongs to ", Join(actions, " and ")));
   }
+}
+
+int RunMachine(const MachineArguments& a) {
   if (a.logs.empty()) throw BadInput(Concat("machine ", a.action, ": expected a log, got none"));
   if (a.action == "check") return RunCheck(a);
   if (!a.figure.empty()) {
@@ -293,11 +361,19 @@ void AddMachine(CommandLine& line) {
   Options own;
   own.Section("identify");
   own.Add(&a.folds, "folds", {0, 100}, "",
-          "folds of the cross-validation that chooses the model; 0: none");
+          "number of folds of the cross-validation that chooses the model; 0: none");
   own.Add(&a.seconds, "seconds", {0.05, 10}, "s", "length of a window");
   line.Arguments(own);
   AddThreads(line, a.threads);
   line.Flag("--json", a.as_json, "print JSON instead of text");
+  line.Check([&line, &a] {
+    constexpr std::array kActions{"check", "identify", "validate"};
+    if (std::ranges::find(kActions, a.action) == kActions.end()) {
+      throw BadInput(Concat("machine: expected check, identify or validate, got \"",
+                            Printable(a.action), "\""));
+    }
+    CheckOptions(line, a.action);
+  });
   line.Footer(
       "check prints a line for each finding. A note is a fact, such as the rate. A warning\n"
       "needs a look. A fault misleads an analysis of the log: degrees, swapped columns,\n"

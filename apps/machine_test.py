@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Tests of `upswing machine`: the check of logs."""
+"""Tests of `upswing machine`: check, identify and validate."""
 
 import gzip
 import json
@@ -156,11 +156,66 @@ class Machine(ProgramTest):
         refuse(["machine", "check", "none.csv"], "none.csv", "No such file")
         refuse(["machine", "check", "."], "folder")
         refuse(["machine", "check"], "expected a log, got none")
-        refuse(["machine", "polish", good], "check, identify or validate", '"polish"')
+        refuse(["machine", "polish", good], "expected check, identify or validate", '"polish"')
         refuse(["machine"], "expected ACTION", "got none")
         refuse(["machine", "check", good, good, "--figure", "log.svg"], "--figure", "got 2")
         refuse(["machine", "check", good, "--figure", "log.txt"], "log.txt")
         refuse(["machine", "check", good, "--figure", "no/log.svg"], "--figure", "no")
+
+    def test_bad_arguments_of_identify_and_validate(self):
+        self.write("plant.toml", "[plant]\nmass1 = 0.5\n")
+        good = self.write("log.csv", log())
+        identify = ["machine", "identify", good, "--plant", "plant.toml"]
+        out = ["--out", "twin.toml"]
+        for arguments, *words in (
+                (["machine", "check", good, *out], "expected no --out", "identify"),
+                (["machine", "check", good, "--against", "plant.toml"], "no --against",
+                 "identify and validate"),
+                (["machine", "validate", "plant.toml", good, "--seconds", "1"], "no --seconds"),
+                (["machine", "validate", good, "plant.toml"], "the twin's file before the logs"),
+                (["machine", "validate", "plant.toml"], "a twin and at least one log"),
+                (["machine", "validate", "plant.toml", good, "--against", "plant.toml",
+                  "--against", "plant.toml"], "--against", "more than once"),
+                (identify, "expected --out FILE"),
+                (["machine", "identify", good, *out], "expected --plant FILE"),
+                ([*identify, "--out", "no/twin.toml"], "--out no/twin.toml"),
+                ([*identify, *out, "--folds", "1"], "--folds: expected 0, or 2 or more, got 1"),
+                ([*identify, *out], "--folds: expected two logs or more", "got 1")):
+            self.refuse(arguments, *words)
+        for text, *words in (
+                ("", "expected a table [plant]"),
+                ("[plant]\n[sessions.day]\nzero = 1\n", "twin.toml:3", "did you mean zero1?"),
+                ("[plant]\n[covariance]\nlag = 1\n", "twin.toml:3: lag", "list of 1"),
+                ("[plant]\n[covariance]\nlag = [-1]\n", "twin.toml", "positive")):
+            self.refuse(["machine", "validate", self.write("twin.toml", text), good], *words)
+        (self.folder / "twin.toml").unlink()
+        # Angles that no model follows, and a clock with gaps of days.
+        for name, row in (("huge.csv", lambda k, r: [r[0], 1e11 * (-1) ** k, 9e11, *r[3:]]),
+                          ("slow.csv", lambda k, r: [1e6 * k, *r[1:]])):
+            done = self.run_here(*identify[:2], self.write(name, log(row)), *identify[3:], *out,
+                                 "--folds", "0")
+            self.assertEqual((done.returncode, done.stdout), (2, ""))
+            self.assertIn("upswing: identify: expected logs", done.stderr.splitlines()[-1])
+        self.assertFalse((self.folder / "twin.toml").exists())
+
+    def test_a_log_with_faults_warns(self):
+        self.write("plant.toml", "[plant]\nmass1 = 0.5\n")
+        self.write("log.csv", log(scaled(vel_meas2=-1)))
+        done = self.run_here("machine", "validate", "plant.toml", "log.csv")
+        self.assertEqual(done.returncode, 0)
+        self.assertRegex(done.stderr, r"\Aupswing: warning: log.csv: velocity 2: .*opposite sign"
+                                      r"; machine check lists all faults\n\Z")
+
+    def test_models_with_equal_names(self):
+        self.write("log.csv", log())
+        for folder in ("a", "b"):
+            (self.folder / folder).mkdir()
+            self.write(f"{folder}/plant.toml", "[plant]\nmass1 = 0.5\n")
+        rows = json.loads(self.succeed("machine", "validate", "a/plant.toml", "log.csv",
+                                       "--against", "b/plant.toml", "--json"))["errors"]
+        errors = rows[0]["median_error_rad"]
+        self.assertEqual(list(errors), ["plant", "b/plant.toml"])
+        self.assertEqual(errors["plant"], errors["b/plant.toml"])
 
     @unittest.skipUnless((REAL / "C.1").is_dir(), "no measured data in UPSWING_REAL")
     def test_measured_logs(self):

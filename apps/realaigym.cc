@@ -260,7 +260,7 @@ int RunRealAiGym(const RealAiGymArguments& a) {
         a.figure.empty() && a.csv.empty()) {
       return ScoreLogs(a);
     }
-    throw BadInput("--hardware: expected only --robot and --json with it");
+    throw BadInput("--hardware: expected no policy, --search, --from, --figure or --csv with it");
   }
   const bool searches = !a.search_out.empty();
   if (searches == !a.policy.empty()) {
@@ -286,6 +286,9 @@ int RunRealAiGym(const RealAiGymArguments& a) {
   for (const auto& [flag, path] :
        {std::pair{"--search", &a.search_out}, {"--csv", &a.csv}, {"--figure", &a.figure}}) {
     if (!path->empty()) CheckWritable(flag, *path);
+  }
+  if (!a.twin.empty() && !(a.csv.empty() && a.figure.empty())) {
+    throw BadInput("--twin: expected no --csv or --figure with it");
   }
   if (!a.figure.empty()) CheckFigureName(a.figure);
   const bool to_output = IsStandardStream(a.csv);
@@ -346,6 +349,13 @@ void AddRealAiGym(CommandLine& line) {
   BoardSearchConfig config;
   line.Settings(OptionsOf(config), a.search);
   AddThreads(line, a.threads);
+  line.Check([&line] {
+    for (const std::string flag : {"--law", "--draws", "--no-pushes"}) {
+      if (line.Has(flag) && !line.Has("--twin")) {
+        throw BadInput(Concat(flag, ": expected --twin FILE with it, got none"));
+      }
+    }
+  });
   line.Footer(
       "Performance: one simulation of 10 s from hanging, on RealAIGym's plant C.1 without\n"
       "friction, at 500 Hz. Robustness: 722 simulations with model errors, noise on\n"
@@ -361,7 +371,8 @@ void AddRealAiGym(CommandLine& line) {
       "  ./upswing realaigym --search acrobot.safetensors --robot acrobot --seed 2\n"
       "  ./upswing realaigym pendubot.safetensors --csv sim_swingup.csv --json\n"
       "  ./upswing realaigym baseline-lqr              the regulator of the baselines\n"
-      "  ./upswing realaigym --hardware run01.csv run02.csv.gz --json\n");
+      "  ./upswing realaigym --hardware run01.csv run02.csv.gz --json\n"
+      "  ./upswing realaigym pendubot.safetensors --twin realaigym-twin\n");
 }
 
 }  // namespace upswing

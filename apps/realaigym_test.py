@@ -155,6 +155,10 @@ class RealAIGym(ProgramTest):
 
         refuse = self.refuse
         refuse(["realaigym", "--hardware", "run.csv", "pushed.csv"], "pushed.csv", "with pushes")
+        refuse(["realaigym", "--hardware", "run.csv", "--law", "run.csv"], "--law", "--twin")
+        refuse(["realaigym", SWING_UP, "--no-pushes"], "--no-pushes", "--twin")
+        refuse(["realaigym", SWING_UP, "--twin", "realaigym-twin", "--csv", "x.csv"], "--twin",
+               "no --csv")
         refuse(["realaigym", "--hardware", "slow.csv"], "slow.csv", "velocities")
         refuse(["realaigym", "--hardware", "none.csv"], "none.csv")
         refuse(["realaigym", "--hardware", "run.csv", "--csv", "x.csv"], "--hardware")

@@ -7,9 +7,10 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <set>
+#include <utility>
 
 #include "core/error.h"
+#include "core/format.h"
 #include "core/text.h"
 
 // Symbols: θ values shared by all windows, x start state of a window, r residuals, J = ∂r/∂θ,
@@ -29,7 +30,9 @@ constexpr double kStartWeight = 0.05;
 constexpr double kSmallestScale = 1e-5, kLargestScale = 0.1;  // rad
 constexpr double kSmallestTorqueScale = 1e-3;                 // N·m
 
-constexpr double kSmallestLink = 1e-5;  // of a link's centre (m) and inertia (kg·m²)
+// Smallest distance of a link's centre of mass (m), and smallest inertia of a link (kg·m²). A plant
+// file's 0 means a capsule.
+constexpr double kSmallestLink = 1e-5;
 
 /// Typical size of a value, for finite differences.
 double ScaleOf(const std::string& name) {
@@ -48,40 +51,50 @@ struct Value {
   double scale;
   int session;  // -1: all
   Range range;
+  double guess = 0;  // at first
 };
 
-/// Which residuals a value changes, and what has to be computed anew for it.
+/// Whether a value changes the torques. If so, its derivatives need the drives of all logs again.
 bool ChangesDrive(const std::string& name) { return name == "delay" || name == "lag"; }
 
-/// Prior standard deviation of a session's value about the machine's: of the encoders' zeros (rad),
-/// and of dry friction (N·m), which changes with temperature and wear. 0: the same in all sessions.
+/// Prior standard deviation of a session's value about the machine's value: encoders' zeros in rad,
+/// dry friction in N·m. 0: all sessions share the value.
 double SessionDeviation(const std::string& name) {
   if (name == "zero1" || name == "zero2") return 0.05;
   return name == "coulomb1" || name == "coulomb2" ? 0.03 : 0;
 }
 
+/// Prior standard deviation of a value about the first guess; 0: none. Motors take milliseconds:
+/// without reported torques, much larger delays can imitate friction.
+double PriorDeviation(const std::string& name) {
+  return name == "delay" || name == "lag" || name == "current_delay" ? 0.005 : 0;  // s
+}
+
 /// A window with its free start state.
 struct Shot {
-  Window window;
-  Vector4d x, cubic;
-  int session;
+  LogWindow window;
+  Vector4d x, cubic;  // start state now, and the cubic's (rad, rad/s)
+  int session;        // index
 };
 
-/// The twin of one session, ready to predict: equations of motion and torques of each log.
+/// The twin in a session, ready to predict.
 struct Model {
   Manipulator body;
-  Joints zero;
-  double current_delay, current_inertia;
+  Joints zero;             // rad
+  double current_delay;    // s
+  double current_inertia;  // kg·m²
 };
 
-/// Residuals of a window, two columns each: angles, and reported torques (no rows without).
+/// Residuals of a window, predicted minus measured. A column for each joint.
 struct Residuals {
-  Eigen::MatrixX2d angle, torque;
+  Eigen::MatrixX2d angle;   // (rows × 2), rad
+  Eigen::MatrixX2d torque;  // (rows × 2), N·m; no rows if the log lacks reported torques
 };
 
 /// A window's share in the normal equations.
 struct Share {
-  double cost = 0, squares = 0, torque_squares = 0;  // squares: means over rows
+  double cost = 0;
+  double squares = 0, torque_squares = 0;  // means over rows, rad² and (N·m)²
   Matrix4d Hxx;
   Vector4d gx;
   MatrixXd Hxt, Htt;  // (4 × n), (n × n)
@@ -123,10 +136,11 @@ class Problem {
     theta_.resize(size());
     for (int i = 0; i < size(); ++i) {
       theta_(i) = values_[i].session < 0 ? options.Get(values_[i].name)->number() : 0;
-      // Without any lag, a small change of it changes nothing.
+      // The model counts lags below 10 µs as equal, so the derivative at lag 0 is 0.
       if (values_[i].name == "lag" && theta_(i) == 0) theta_(i) = values_[i].scale;
+      values_[i].guess = theta_(i);
     }
-    for (const Window& w :
+    for (const LogWindow& w :
          CutWindows(logs, config.windows, first.plant.length1, first.plant.length2)) {
       const Vector4d x(w.start.q1, w.start.q2, w.start.w1, w.start.w2);
       shots_.push_back({w, x, x, session_of_[w.log]});
@@ -261,12 +275,13 @@ class Problem {
 
   void AddPrior(const VectorXd& theta, MatrixXd& H, VectorXd& g, double& cost) const {
     for (int i = 0; i < size(); ++i) {
-      if (values_[i].session < 0) continue;
-      const double deviation = SessionDeviation(values_[i].name);
-      const double weight = 1 / (deviation * deviation);
+      const Value& v = values_[i];
+      const double deviation = v.session >= 0 ? SessionDeviation(v.name) : PriorDeviation(v.name);
+      if (deviation == 0) continue;
+      const double weight = 1 / (deviation * deviation), off = theta(i) - v.guess;
       H(i, i) += weight;
-      g(i) += weight * theta(i);
-      cost += weight * theta(i) * theta(i);
+      g(i) += weight * off;
+      cost += weight * off * off;
     }
   }
 
@@ -466,14 +481,23 @@ FitResult Fit(std::span<const MachineLog> logs, const Twin& first,
   Problem problem(logs, first, names, config, pool);
   if (problem.windows() == 0) {
     throw BadInput(Concat("identify: expected logs with a motion of ", config.windows.seconds,
-                          " s away from upright, got none in ", logs.size(), " logs"));
+                          " s away from upright, got none in ",
+                          Counted(static_cast<int64_t>(logs.size()), "log")));
   }
   for (int i = 0; i < config.iterations; ++i) {
     const bool goes_on = problem.Step(config.tolerance);
     if (progress) progress(goes_on ? i + 1 : config.iterations, config.iterations);
     if (!goes_on) break;
   }
-  return problem.Result();
+  FitResult result = problem.Result();
+  constexpr double kHopeless = 10;  // median error in a window, rad
+  const bool is_finite =
+      std::ranges::all_of(result.twin.covariance, [](double x) { return std::isfinite(x); });
+  if (!(result.error < kHopeless) || !is_finite) {
+    throw BadInput(Concat("identify: expected logs that a model can follow, got a median error of ",
+                          result.error, " rad; machine check finds faults of logs"));
+  }
+  return result;
 }
 
 }  // namespace upswing

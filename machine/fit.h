@@ -27,11 +27,12 @@ struct FitResult {
   Twin twin;  // with its sessions; the covariance includes the variance between them
   int windows = 0;
   double error = 0;         // median over the windows of the rms of both angles' error, rad
-  double torque_error = 0;  // the same of the reported torques, N·m; NaN without
+  double torque_error = 0;  // median rms error of the reported torques, N·m; NaN without them
 };
 
-/// Identifies the twin's values called `names`; the others keep those of `first`, which is also the
-/// initial guess. Throws BadInput if no window of the logs keeps the rules, or a name is unknown.
+/// Identifies the twin's values called `names`. `first` is the initial guess, and has the values of
+/// all others. Throws BadInput if no window of the logs keeps the rules, if a name is unknown, or
+/// if the predictions stay hopelessly wrong.
 FitResult Fit(std::span<const MachineLog> logs, const Twin& first,
               const std::vector<std::string>& names, const FitConfig& config, ThreadPool* pool,
               const Progress& progress = nullptr);

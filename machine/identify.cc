@@ -11,11 +11,20 @@ namespace {
 
 constexpr double kJudgedSeconds = 1;  // length of the windows that choose a structure
 
-/// The fold of each log: the logs of a session are dealt in turn.
+/// The fold of each log: the logs of a session are dealt in turn. If all sessions have a single
+/// log, the sessions are dealt instead. Throws BadInput for a single log.
 std::vector<int> Folds(std::span<const MachineLog> logs, int folds) {
+  if (logs.size() < 2) {
+    throw BadInput(
+        "--folds: expected two logs or more for a cross-validation, got 1; "
+        "--folds 0 goes without");
+  }
   std::map<std::string, int> dealt;
   std::vector<int> fold;
   for (const MachineLog& log : logs) fold.push_back(dealt[SessionOf(log.name)]++ % folds);
+  if (dealt.size() == logs.size()) {
+    for (int i = 0; i < static_cast<int>(logs.size()); ++i) fold[i] = i % folds;
+  }
   return fold;
 }
 

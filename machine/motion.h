@@ -39,13 +39,13 @@ class Drive {
   std::vector<Joints> starts_;    // (n) torques at each event, N·m; empty: interpolated values
 };
 
-/// One step of Runge-Kutta of order 4 from a time (s), under the torques of a drive. `acceleration`
-/// (rad/s²) is that of the state before the step, and becomes that of the state after it.
+/// One step of Runge-Kutta of order 4 of length `h` (s) from `time` (s), under the torques of a
+/// drive. `acceleration` (rad/s²): in, of the state before the step; out, of the state after it.
 PendulumState StepMotion(const Manipulator& body, const Drive& drive, const PendulumState& now,
                          double time, double h, int& cursor, Joints& acceleration);
 
-/// The equations of motion of a twin that is driven by commanded torques, or by reported torques,
-/// which lack the part that opposes the acceleration.
+/// The equations of motion of a twin. `reported`: driven by reported torques instead of commanded
+/// ones. Reported torques lack current_inertia · q̈, so each joint has less armature.
 Manipulator BodyOf(const Twin& twin, bool reported = false);
 
 /// A predicted motion at the rows of a log.

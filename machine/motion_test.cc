@@ -134,7 +134,7 @@ TEST(CutWindows, StartInTheTrueState) {
   }
   const auto windows = CutWindows(std::span(&log, 1), {.seconds = 0.2, .hop = 0.1}, 0.2, 0.3);
   ASSERT_EQ(windows.size(), 7u);  // from 0.05 s on, up to 0.05 s before the end
-  for (const Window& w : windows) {
+  for (const LogWindow& w : windows) {
     const double t = log.time[w.first];
     EXPECT_NEAR(w.start.q1, 0.4 * std::sin(5 * t), 1e-5);
     EXPECT_NEAR(w.start.w1, 2.0 * std::cos(5 * t), 1e-3);
@@ -151,10 +151,25 @@ TEST(CutWindows, SkipUprightMotionGapsAndRest) {
     const bool upright = k >= 500 && k < 750, rests = k >= 750;
     log.angle.push_back({upright ? std::numbers::pi : rests ? 0.1 : 0.5 * std::sin(9 * t), 0});
   }
-  for (const Window& w : CutWindows(std::span(&log, 1), {.seconds = 0.1, .hop = 0.05}, 0.2, 0.3)) {
+  for (const LogWindow& w : CutWindows(std::span(&log, 1), {.seconds = 0.1, .hop = 0.05}, 0.2, 0.3)) {
     EXPECT_LE(w.last, 500);
     EXPECT_FALSE(w.first < 250 && w.last > 250);
   }
+}
+
+TEST(CutWindows, JumpOverALongGap) {
+  MachineLog log;
+  for (int k = 0; k < 1000; ++k) {
+    const double t = 0.002 * k;
+    log.time.push_back(t + (k >= 500 ? 1e9 : 0));
+    log.angle.push_back({0.5 * std::sin(9 * t), 0});
+  }
+  const auto windows = CutWindows(std::span(&log, 1), {.seconds = 0.1, .hop = 0.05}, 0.2, 0.3);
+  // No window twice: a start within the gap does not count.
+  for (size_t i = 1; i < windows.size(); ++i) EXPECT_GT(windows[i].first, windows[i - 1].first);
+  ASSERT_FALSE(windows.empty());
+  EXPECT_LT(windows.front().last, 500);
+  EXPECT_GE(windows.back().first, 500);
 }
 
 }  // namespace

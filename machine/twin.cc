@@ -3,8 +3,11 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <functional>
 #include <numbers>
+#include <optional>
+#include <utility>
 
 #include "core/error.h"
 #include "core/text.h"
@@ -205,6 +208,8 @@ void Twin::Describe(Options& options) {
 Twin ParseTwin(std::string_view text, const std::string& where) {
   toml::table table = ParseToml(text, where);
   Twin twin;
+  twin.name.clear();
+  const bool has_plant = table.contains("plant");
   const auto take = [&](std::string_view key, const auto& read) {
     if (const toml::node* node = table.get(key)) {
       read(*node, Concat(PlaceOf(*node, where), ": ", key));
@@ -215,7 +220,8 @@ Twin ParseTwin(std::string_view text, const std::string& where) {
     if (!node.is_string()) throw BadInput(Concat(place, ": expected a text, got another type"));
     twin.name = node.as_string()->get();
   });
-  const auto table_of = [](const toml::node& node, const std::string& place) {
+  // By reference: a copy would not know its lines.
+  const auto table_of = [](const toml::node& node, const std::string& place) -> const toml::table& {
     if (!node.is_table()) throw BadInput(Concat(place, ": expected a table, got another type"));
     return *node.as_table();
   };
@@ -227,13 +233,16 @@ Twin ParseTwin(std::string_view text, const std::string& where) {
     ReadSessions(table_of(node, place), where, twin);
   });
   ApplyTable(OptionsOf(twin), table, where, /*alone=*/false);
+  if (!has_plant) throw BadInput(Concat(where, ": expected a table [plant], got none"));
   if (!twin.uncertain.empty()) Factor(twin, where);
   return twin;
 }
 
 Twin ReadTwin(const std::string& name, const std::string& flag) {
   const auto [toml, where] = ReadPlantDocument(name, flag);
-  return ParseTwin(toml, Printable(where));
+  Twin twin = ParseTwin(toml, Printable(where));
+  if (twin.name.empty()) twin.name = std::filesystem::path(name).stem().string();
+  return twin;
 }
 
 std::string TwinText(const Twin& twin) {

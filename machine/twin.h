@@ -53,9 +53,9 @@ struct LoopTiming {
   void Describe(Options& options);
 };
 
-/// A session: logs between which nobody touched the machine. From session to session, the encoders'
-/// zeros change, because they are set while the links hang and dry friction holds them; and dry
-/// friction changes with temperature and wear.
+/// A session: logs between which the machine was not touched. Two things change from session to
+/// session. The encoders are set to zero while the links hang, and dry friction holds the links a
+/// little off. Dry friction itself changes with temperature and wear.
 struct Session {
   std::string name;
   double zero1 = 0, zero2 = 0;        // as in MachineSensors, rad
@@ -88,12 +88,14 @@ struct Twin {
 /// is of another session.
 Twin InSession(const Twin& twin, const MachineLog& log);
 
-/// Reads a twin from a TOML document named `where`. Throws BadInput for an unknown name, a value
-/// outside its range, or a covariance that is not symmetric and positive.
+/// Reads a twin from a TOML document. `where` names it in messages. Values that the document leaves
+/// out have their defaults; a twin without a name has an empty one. Throws BadInput if there is no
+/// table [plant], for an unknown setting, for a value outside its range, and for a covariance that
+/// is not symmetric and positive.
 Twin ParseTwin(std::string_view text, const std::string& where);
 
-/// Reads a twin from a plant file, or a shipped plant of this name. Values that the file leaves out
-/// have their defaults. `flag` names the argument in messages. Throws BadInput.
+/// Reads a twin from a plant file, or the shipped plant called `name`. A twin without a name gets
+/// the file's. `flag` names the argument in messages. Throws BadInput.
 Twin ReadTwin(const std::string& name, const std::string& flag);
 
 /// The twin as a TOML document that ParseTwin reads. It is a plant file too (run/plant_file.h),

@@ -108,6 +108,8 @@ TEST(Twin, RefusesUnknownNamesAndRanges) {
   EXPECT_NE(MessageFor("[actuator]\nlag = 5").find("t.toml:2"), std::string::npos);
   EXPECT_NE(MessageFor("name = 3").find("a text"), std::string::npos);
   EXPECT_NE(MessageFor("[sessions]\na = 1").find("a table"), std::string::npos);
+  EXPECT_NE(MessageFor("[sessions.day]\nzero = 1").find("t.toml:2"), std::string::npos);
+  EXPECT_NE(MessageFor("[actuator]\nlag = 0.01").find("[plant]"), std::string::npos);
 }
 
 TEST(SessionOf, LeavesOutDigitsAndFarFolders) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
+#include <limits>
 #include <map>
 
 #include "core/format.h"
@@ -38,13 +40,13 @@ Estimate OverRuns(const Strata& sessions, const std::function<double(std::span<c
 WindowRules RulesOf(double seconds) { return {.seconds = seconds}; }
 
 std::vector<double> ErrorsIn(const MachineLog& log, const Twin& twin,
-                             std::span<const Window> windows, bool reported) {
+                             std::span<const LogWindow> windows, bool reported) {
   const Drive drive = reported ? Drive::Measured(log, twin) : Drive::Commanded(log, twin);
   const Manipulator body = BodyOf(twin, reported);
   const Joints zero{twin.sensors.zero1, twin.sensors.zero2};
   Motion motion;
   std::vector<double> errors;
-  for (const Window& w : windows) {
+  for (const LogWindow& w : windows) {
     Predict(body, drive, zero, w.start, log, w.first, w.last, 0, motion);
     double sum = 0;
     for (int k = w.first; k < w.last; ++k) {
@@ -53,13 +55,82 @@ std::vector<double> ErrorsIn(const MachineLog& log, const Twin& twin,
         sum += error * error;
       }
     }
-    errors.push_back(std::sqrt(sum / (w.last - w.first)));
+    // A prediction that overflows is infinitely wrong. Medians cannot sort NaN.
+    const double error = std::sqrt(sum / (w.last - w.first));
+    errors.push_back(std::isfinite(error) ? error : std::numeric_limits<double>::infinity());
   }
   return errors;
 }
 
-std::vector<Window> WindowsOf(const MachineLog& log, const Twin& twin, double seconds) {
+std::vector<LogWindow> WindowsOf(const MachineLog& log, const Twin& twin, double seconds) {
   return CutWindows(std::span(&log, 1), RulesOf(seconds), twin.plant.length1, twin.plant.length2);
+}
+
+/// The median errors over the length of the windows.
+Panel ErrorsPanel(std::span<const MachineLog> logs, std::span<const Predictor> predictors,
+                  ThreadPool* pool) {
+  constexpr std::array kLengths{0.1, 0.2, 0.35, 0.5, 0.75, 1.0};  // s
+  Panel errors;
+  errors.x_label = "length of the prediction, s";
+  errors.y_label = "median error, rad";
+  for (const Predictor& p : predictors) errors.lines.emplace_back().name = p.name;
+  for (const double length : kLengths) {
+    std::vector<RunErrors> runs(predictors.size(), RunErrors(logs.size()));
+    ParallelFor(pool, static_cast<int>(logs.size()), [&](int i) {
+      const auto windows = WindowsOf(logs[i], predictors.front().twins[i], length);
+      for (size_t p = 0; p < predictors.size(); ++p) {
+        runs[p][i] = ErrorsIn(logs[i], predictors[p].twins[i], windows, false);
+      }
+    });
+    for (size_t p = 0; p < predictors.size(); ++p) {
+      std::vector<double> all;
+      for (const auto& own : runs[p]) all.insert(all.end(), own.begin(), own.end());
+      errors.lines[p].x.push_back(length);
+      errors.lines[p].y.push_back(Median(all));
+    }
+  }
+  return errors;
+}
+
+/// The window of a log with the median error of a twin.
+const LogWindow& MedianWindow(const MachineLog& log, const Twin& twin,
+                           std::span<const LogWindow> windows) {
+  const std::vector<double> errors = ErrorsIn(log, twin, windows, false);
+  auto sorted = errors;
+  std::ranges::sort(sorted);
+  const auto place = std::ranges::find(errors, sorted[sorted.size() / 2]) - errors.begin();
+  return windows[static_cast<size_t>(place)];
+}
+
+/// The measured and predicted angles of log `i` in one of its windows.
+Panel AnglesPanel(std::span<const MachineLog> logs, std::span<const Predictor> predictors, size_t i,
+                  std::span<const LogWindow> windows) {
+  const MachineLog& log = logs[i];
+  const LogWindow& w = MedianWindow(log, predictors.front().twins[i], windows);
+  Panel angles;
+  angles.title = Printable(log.name);
+  angles.x_label = "time, s";
+  angles.y_label = "angle, rad";
+  const auto add = [&](int joint, const std::string& name, const auto& angle_at) -> Line& {
+    Line& line = angles.lines.emplace_back();
+    line.name = Concat("joint ", joint + 1, ", ", name);
+    for (int k = w.first; k < w.last; ++k) {
+      line.x.push_back(log.time[k]);
+      line.y.push_back(angle_at(k)[joint]);
+    }
+    return line;
+  };
+  for (int j = 0; j < 2; ++j) add(j, "measured", [&](int k) { return log.angle[k]; });
+  for (const Predictor& p : predictors) {
+    const Twin& twin = p.twins[i];
+    Motion motion;
+    Predict(BodyOf(twin), Drive::Commanded(log, twin), {twin.sensors.zero1, twin.sensors.zero2},
+            w.start, log, w.first, w.last, 0, motion);
+    for (int j = 0; j < 2; ++j) {
+      add(j, p.name, [&](int k) { return motion.angle[k - w.first]; }).dotted_from = -1e9;
+    }
+  }
+  return angles;
 }
 
 }  // namespace
@@ -129,66 +200,11 @@ void DrawErrors(std::span<const MachineLog> logs, std::span<const Predictor> pre
   Figure figure;
   figure.title = "Prediction of measured motion";
   figure.height = 900;
-  constexpr std::array kLengths{0.1, 0.2, 0.35, 0.5, 0.75, 1.0};
-  Panel errors;
-  errors.x_label = "length of the prediction, s";
-  errors.y_label = "median error, rad";
-  for (const Predictor& p : predictors) errors.lines.emplace_back().name = p.name;
-  for (const double length : kLengths) {
-    std::vector<RunErrors> runs(predictors.size(), RunErrors(logs.size()));
-    ParallelFor(pool, static_cast<int>(logs.size()), [&](int i) {
-      const auto windows = WindowsOf(logs[i], predictors.front().twins[i], length);
-      for (size_t p = 0; p < predictors.size(); ++p) {
-        runs[p][i] = ErrorsIn(logs[i], predictors[p].twins[i], windows, false);
-      }
-    });
-    for (size_t p = 0; p < predictors.size(); ++p) {
-      std::vector<double> all;
-      for (const auto& own : runs[p]) all.insert(all.end(), own.begin(), own.end());
-      errors.lines[p].x.push_back(length);
-      errors.lines[p].y.push_back(Median(all));
-    }
-  }
-  figure.panels.push_back(errors);
-
-  // The window whose error is the median of the first log that has windows.
+  figure.panels.push_back(ErrorsPanel(logs, predictors, pool));
   for (size_t i = 0; i < logs.size(); ++i) {
-    const MachineLog& log = logs[i];
-    const auto windows = WindowsOf(log, predictors.front().twins[i], 1);
+    const auto windows = WindowsOf(logs[i], predictors.front().twins[i], 1);
     if (windows.empty()) continue;
-    const auto own = ErrorsIn(log, predictors.front().twins[i], windows, false);
-    auto sorted = own;
-    std::ranges::sort(sorted);
-    const auto place = std::ranges::find(own, sorted[sorted.size() / 2]) - own.begin();
-    const Window& w = windows[static_cast<size_t>(place)];
-    Panel angles;
-    angles.title = Printable(log.name);
-    angles.x_label = "time, s";
-    angles.y_label = "angle, rad";
-    for (int j = 0; j < 2; ++j) {
-      Line& measured = angles.lines.emplace_back();
-      measured.name = Concat("joint ", j + 1, ", measured");
-      for (int k = w.first; k < w.last; ++k) {
-        measured.x.push_back(log.time[k]);
-        measured.y.push_back(log.angle[k][j]);
-      }
-    }
-    for (const Predictor& p : predictors) {
-      const Twin& twin = p.twins[i];
-      Motion motion;
-      Predict(BodyOf(twin), Drive::Commanded(log, twin), {twin.sensors.zero1, twin.sensors.zero2},
-              w.start, log, w.first, w.last, 0, motion);
-      for (int j = 0; j < 2; ++j) {
-        Line& predicted = angles.lines.emplace_back();
-        predicted.name = Concat("joint ", j + 1, ", ", p.name);
-        for (int k = w.first; k < w.last; ++k) {
-          predicted.x.push_back(log.time[k]);
-          predicted.y.push_back(motion.angle[k - w.first][j]);
-        }
-        predicted.dotted_from = -1e9;
-      }
-    }
-    figure.panels.push_back(angles);
+    figure.panels.push_back(AnglesPanel(logs, predictors, i, windows));
     break;
   }
   Draw(figure, file);

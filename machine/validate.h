@@ -28,7 +28,8 @@ Predictor PredictorOf(const std::string& name, const Twin& twin, std::span<const
 std::vector<double> WindowErrors(const MachineLog& log, const Twin& twin, double seconds,
                                  bool reported);
 
-/// A row of a comparison: median errors over the windows of some runs, with intervals over runs.
+/// A row of a comparison: median errors over the windows of some runs, with 95% intervals over
+/// bootstrapped runs.
 struct ErrorRow {
   std::string session;    // of the runs; empty: all runs
   double seconds = 0;     // length of the windows
@@ -45,8 +46,9 @@ std::vector<ErrorRow> CompareErrors(std::span<const MachineLog> logs,
                                     std::span<const Predictor> predictors,
                                     std::span<const double> seconds, ThreadPool* pool);
 
-/// Draws the errors over the length of the windows, and the measured and predicted angles of the
-/// log's window with the median error of the first predictor, as .svg or .png.
+/// Draws two panels as .svg or .png: the errors over the length of the windows, and the measured
+/// and predicted angles of a window. The window is of the first log with a window of 1 s, and has
+/// that log's median error of the first predictor.
 void DrawErrors(std::span<const MachineLog> logs, std::span<const Predictor> predictors,
                 const std::filesystem::path& file, ThreadPool* pool);
 

@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "core/error.h"
+#include "core/text.h"
 #include "machine/identify.h"
 #include "machine/simulated_machine.h"
 #include "machine/testing.h"
@@ -78,6 +80,23 @@ TEST(Identify, ChoosesFrictionAndFindsTheSessions) {
   EXPECT_NEAR(found.fit.twin.sessions[0].zero1, 0.02, 0.003);
   EXPECT_NEAR(found.fit.twin.sessions[1].zero1, -0.03, 0.003);
   EXPECT_EQ(found.left_out.size(), logs.size());
+}
+
+TEST(Identify, LeavesOutLogsOfSessionsWithASingleLog) {
+  std::vector<MachineLog> logs = LogsOfTwoDays();
+  logs.resize(2);
+  logs[0].name = "slow.csv";
+  logs[1].name = "fast.csv";
+  IdentifyConfig config;
+  config.folds = 2;
+  config.fit.iterations = 1;
+  const Identification found = Identify(logs, RealPlant(), config, nullptr);
+  ASSERT_EQ(found.left_out.size(), 2u);
+  // The twin of the other log does not know the session.
+  ASSERT_EQ(found.left_out[0].sessions.size(), 1u);
+  EXPECT_EQ(found.left_out[0].sessions[0].name, "fast");
+  logs.resize(1);
+  EXPECT_THROW(Identify(logs, RealPlant(), config, nullptr), Error);
 }
 
 TEST(Identify, FindsAFreeSwingWithoutMotors) {

@@ -64,9 +64,9 @@ double Median(std::vector<double> values) {
   return (*middle + *std::max_element(values.begin(), middle)) / 2;
 }
 
-std::vector<Window> CutWindows(std::span<const MachineLog> logs, const WindowRules& rules,
+std::vector<LogWindow> CutWindows(std::span<const MachineLog> logs, const WindowRules& rules,
                                double length1, double length2) {
-  std::vector<Window> windows;
+  std::vector<LogWindow> windows;
   for (int index = 0; index < static_cast<int>(logs.size()); ++index) {
     const MachineLog& log = logs[index];
     if (log.rows() < kCubicRows) continue;
@@ -79,7 +79,14 @@ std::vector<Window> CutWindows(std::span<const MachineLog> logs, const WindowRul
       const auto row = [&](double time) {
         return static_cast<int>(std::ranges::lower_bound(log.time, time) - log.time.begin());
       };
-      const int first = row(start), last = row(log.time[first] + rules.seconds);
+      const int first = row(start);
+      // A start within a gap moves to the gap's end, with as many hops as that takes.
+      const double ahead = log.time[first] - start;
+      if (ahead > rules.hop) {
+        start += (std::ceil(ahead / rules.hop) - 1) * rules.hop;
+        continue;
+      }
+      const int last = row(log.time[first] + rules.seconds);
       if (KeepsRules(log, first, last, rules, length1, length2, longest_gap)) {
         windows.push_back({index, first, last, StateAt(log, first)});
       }

@@ -9,6 +9,7 @@
 /// Short pieces of logs, over which a model predicts the motion from a start state.
 namespace upswing {
 
+/// Which windows of a log are used.
 struct WindowRules {
   double seconds = 0.5;  // length
   double hop = 0.25;     // time between the starts of two windows
@@ -19,14 +20,14 @@ struct WindowRules {
 };
 
 /// A window of a log: rows `first` to before `last`.
-struct Window {
+struct LogWindow {
   int log, first, last;
   PendulumState start;  // at the first row, from a cubic through the rows within 20 ms
 };
 
-/// The windows of these logs that keep the rules and have no gap longer than five periods.
-/// `length1`, `length2`: of the links, m.
-std::vector<Window> CutWindows(std::span<const MachineLog> logs, const WindowRules& rules,
+/// The windows of these logs that keep the rules and have no gap longer than five median cycles.
+/// `length1`, `length2`: lengths of the links, m.
+std::vector<LogWindow> CutWindows(std::span<const MachineLog> logs, const WindowRules& rules,
                                double length1, double length2);
 
 /// The median of some numbers; NaN if there are none.

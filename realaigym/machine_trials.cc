@@ -11,7 +11,7 @@
 namespace upswing {
 namespace {
 
-/// The part of a machine's friction that remains when a twin's friction is compensated.
+/// Subtracts the compensation of a twin's dry friction from a machine's dry friction.
 void Compensate(const Twin& twin, Manipulator& body) {
   body.f1 -= kCompensated * twin.plant.coulomb1;
   body.f2 -= kCompensated * twin.plant.coulomb2;
@@ -52,14 +52,14 @@ std::function<Joints(double)> HardwarePushes(Rng& rng) {
   };
 }
 
-/// State of OnMachine's controllers.
+/// State of a controller made by OnMachine.
 struct BoardOnMachine {
   std::unique_ptr<BoardController> controller;
   BoardMeasurement measured{};
-  Lanes torque{};
-  double last_time = 0;
-  Joints last_angle{};
-  int steps = 0;
+  Lanes torque{};        // N·m
+  double last_time = 0;  // of the cycle before, s
+  Joints last_angle{};   // in the cycle before, rad
+  int steps = 0;         // steps of the controller so far
 };
 
 }  // namespace

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <tuple>
+#include <utility>
 
 #include "core/error.h"
 #include "core/text.h"
@@ -17,7 +17,8 @@ constexpr double kGridStep = 0.002;  // of the reference, s
 
 // Published settings of the runs (experiments/design_C.1/tvlqr_*.py of the benchmark): friction
 // compensation c atan(100 w) + d w, low-pass and dead zone of the velocities.
-constexpr double kComp1 = 0.16, kComp2 = 0.12, kCompDamping = 0.001;
+constexpr double kComp1 = 0.16, kComp2 = 0.12;  // N·m
+constexpr double kCompDamping = 0.001;          // N·m·s/rad
 constexpr MachineSensors kFilter{.velocity_share = 0.2, .velocity_dead_zone = 0.1};
 // The regulator takes over at the end of the reference within these angles and velocities. The real
 // switch, an ellipsoid, needs the reference beyond the first switch, which the logs do not show.
@@ -53,8 +54,8 @@ Eigen::Vector4d Derivative(const Manipulator& m, const Eigen::Vector4d& x,
 
 /// A log's states (measured angles, filtered velocities) and torques without compensation.
 struct Path {
-  std::vector<Eigen::Vector4d> x;
-  std::vector<Eigen::Vector2d> u;
+  std::vector<Eigen::Vector4d> x;  // rad, rad/s
+  std::vector<Eigen::Vector2d> u;  // N·m
 };
 
 Path PathOf(const MachineLog& log) {
@@ -194,7 +195,7 @@ TrialController PublishedTvlqr::OnMachine() const {
   return [this]() -> CycleController {
     return [this, upright = false](const CycleInput& in) mutable -> Joints {
       const State x(in.angle[0], in.angle[1], in.velocity[0], in.velocity[1]);
-      upright = upright || Catches(in.time, x);  // the regulator never gives back
+      upright = upright || Catches(in.time, x);  // the regulator keeps control
       const Eigen::Vector2d u = Torque(in.time, x, upright);
       const Joints friction = Compensation(in.velocity);
       return {u(0) + friction[0], u(1) + friction[1]};

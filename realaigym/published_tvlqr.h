@@ -38,10 +38,10 @@ class PublishedTvlqr {
 
   Robot robot_;
   double step_;                     // between two points of the reference, s
-  std::vector<State> x_;            // x̄
+  std::vector<State> x_;            // x̄, (rad, rad, rad/s, rad/s)
   std::vector<Eigen::Vector2d> u_;  // ū, N·m
-  std::vector<Gain> K_;
-  Gain regulator_;
+  std::vector<Gain> K_;             // at each point of the reference
+  Gain regulator_;                  // gain about upright
 };
 
 /// Runs like real ones (not empty) on machines drawn from the twin's posterior: in their session,

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
+#include <string_view>
+#include <utility>
 
 #include "core/error.h"
 #include "core/text.h"
@@ -35,7 +38,12 @@ struct PlantSettings {
 /// plant file.
 void TakeOwnTables(toml::table& table, const std::string& where) {
   std::vector<std::string> known{"plant", "disturbance"};
-  if (table["name"].is_string()) table.erase("name");
+  if (const toml::node* name = table.get("name")) {
+    if (!name->is_string()) {
+      throw BadInput(Concat(PlaceOf(*name, where), ": name: expected a text, got another type"));
+    }
+    table.erase("name");
+  }
   for (const std::string_view other : kOtherTables) {
     known.emplace_back(other);
     if (table[other].is_table()) table.erase(other);
@@ -79,7 +87,7 @@ PlantFile ParsePlantFile(std::string_view toml, const std::string& where) {
 }
 
 PlantDocument ReadPlantDocument(const std::string& name, const std::string& flag,
-                        const std::string& else_taken) {
+                                const std::string& else_taken) {
   const auto plants = EmbeddedPlants();
   const auto shipped = std::ranges::find(plants, name, &ShippedPlant::name);
   if (shipped != plants.end()) return {std::string(shipped->toml), Concat("plant ", name)};

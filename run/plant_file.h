@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "setup/config.h"
@@ -35,7 +36,7 @@ struct PlantDocument {
 /// The text of the shipped plant of this name, or of the plant file at this path. Messages name the
 /// argument `flag`, and what else it takes. Throws BadInput.
 PlantDocument ReadPlantDocument(const std::string& name, const std::string& flag,
-                        const std::string& else_taken = "");
+                                const std::string& else_taken = "");
 
 /// The shipped plant of this name, or the plant file at this path. Messages name the argument
 /// `flag`, and what else it takes. Throws BadInput.
