@@ -151,7 +151,8 @@ TEST(CutWindows, SkipUprightMotionGapsAndRest) {
     const bool upright = k >= 500 && k < 750, rests = k >= 750;
     log.angle.push_back({upright ? std::numbers::pi : rests ? 0.1 : 0.5 * std::sin(9 * t), 0});
   }
-  for (const LogWindow& w : CutWindows(std::span(&log, 1), {.seconds = 0.1, .hop = 0.05}, 0.2, 0.3)) {
+  for (const LogWindow& w :
+       CutWindows(std::span(&log, 1), {.seconds = 0.1, .hop = 0.05}, 0.2, 0.3)) {
     EXPECT_LE(w.last, 500);
     EXPECT_FALSE(w.first < 250 && w.last > 250);
   }

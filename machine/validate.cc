@@ -94,7 +94,7 @@ Panel ErrorsPanel(std::span<const MachineLog> logs, std::span<const Predictor> p
 
 /// The window of a log with the median error of a twin.
 const LogWindow& MedianWindow(const MachineLog& log, const Twin& twin,
-                           std::span<const LogWindow> windows) {
+                              std::span<const LogWindow> windows) {
   const std::vector<double> errors = ErrorsIn(log, twin, windows, false);
   auto sorted = errors;
   std::ranges::sort(sorted);

@@ -65,7 +65,7 @@ double Median(std::vector<double> values) {
 }
 
 std::vector<LogWindow> CutWindows(std::span<const MachineLog> logs, const WindowRules& rules,
-                               double length1, double length2) {
+                                  double length1, double length2) {
   std::vector<LogWindow> windows;
   for (int index = 0; index < static_cast<int>(logs.size()); ++index) {
     const MachineLog& log = logs[index];

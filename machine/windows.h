@@ -28,7 +28,7 @@ struct LogWindow {
 /// The windows of these logs that keep the rules and have no gap longer than five median cycles.
 /// `length1`, `length2`: lengths of the links, m.
 std::vector<LogWindow> CutWindows(std::span<const MachineLog> logs, const WindowRules& rules,
-                               double length1, double length2);
+                                  double length1, double length2);
 
 /// The median of some numbers; NaN if there are none.
 double Median(std::vector<double> values);
