@@ -216,11 +216,19 @@ class Problem {
     double cost = 0;
     AddPrior(theta_, A, unused, cost);
     std::vector<double> errors, torque_errors;
-    for (const Share& s : shares) {
+    // Windows overlap, so neighbours share rows: the scores of several in a row count as one.
+    constexpr size_t kBlock = 6;
+    VectorXd block = VectorXd::Zero(size());
+    for (size_t w = 0; w < shares.size(); ++w) {
+      const Share& s = shares[w];
       const MatrixXd half = s.Hxt.transpose() * s.Hxx.inverse();
       A += s.Htt - half * s.Hxt;
-      const VectorXd g = s.gt - half * s.gx;
-      meat += g * g.transpose();
+      block += s.gt - half * s.gx;
+      if (w + 1 == shares.size() || shots_[w + 1].window.log != shots_[w].window.log ||
+          (w + 1) % kBlock == 0) {
+        meat += block * block.transpose();
+        block.setZero();
+      }
       errors.push_back(std::sqrt(s.squares));
       if (s.torque_squares > 0) torque_errors.push_back(std::sqrt(s.torque_squares));
     }
