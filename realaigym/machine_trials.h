@@ -10,6 +10,7 @@
 #include "machine/twin.h"
 #include "realaigym/hardware.h"
 #include "realaigym/rules.h"
+#include "realaigym/simulation.h"
 
 /// Controllers on machines of a twin's posterior, by the rules of RealAIGym's hardware boards.
 namespace upswing {

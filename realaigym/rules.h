@@ -43,8 +43,8 @@ struct BoardEpisode {
   double response = 1;                   // k of u = u_before + k (u_wanted - u_before)
   int delay = 0;                         // of the measured state, steps
   std::array<BoardPush, 4> pushes{};
-  uint64_t seed = 0;                     // of the noise
-  int steps = kBoardSteps;               // fewer for a search; equal within a block
+  uint64_t seed = 0;        // of the noise
+  int steps = kBoardSteps;  // fewer for a search; equal within a block
 };
 
 /// Largest angle and velocity errors, of both joints, at an end that counts for robustness.
