@@ -76,9 +76,9 @@ PlantFile ParsePlantFile(std::string_view toml, const std::string& where) {
   TakeOwnTables(table, where);
   PlantSettings settings;
   PlantFile file;
-  const Options of_plant = OptionsOf(settings.plant);
-  for (FlagValue& flag : ApplyTable(OptionsOf(settings), table, where, false)) {
-    const std::string& first = OptionsOf(settings).Find(flag.name, where).front()->name;
+  const Options of_plant = OptionsOf(settings.plant), all = OptionsOf(settings);
+  for (FlagValue& flag : ApplyTable(all, table, where, false)) {
+    const std::string& first = all.Find(flag.name, where).front()->name;
     if (of_plant.Get(first) == nullptr) file.disturbance.push_back(std::move(flag));
   }
   file.plant = settings.plant;
