@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/error.h"
 #include "core/text.h"
 #include "machine/testing.h"
 #include "realaigym/published_tvlqr.h"
@@ -65,6 +66,20 @@ TEST(RunTrials, SameSeedSameRunsForAnyNumberOfThreads) {
     EXPECT_EQ(a.runs[i].outcome.velocity_cost, b.runs[i].outcome.velocity_cost);
   }
   EXPECT_NE(a.runs[0].outcome.velocity_cost, a.runs[1].outcome.velocity_cost);
+}
+
+TEST(PublishedTvlqr, RefusesRunsWithoutASwingUp) {
+  MachineLog hangs;
+  for (int k = 0; k < 100; ++k) {
+    hangs.time.push_back(0.002 * k);
+    hangs.angle.push_back({0, 0});
+    hangs.commanded.push_back({0, 0});
+  }
+  MachineLog upright = hangs;
+  for (Joints& q : upright.angle) q[0] = std::numbers::pi;
+  for (const MachineLog& log : {hangs, upright}) {
+    EXPECT_THROW(PublishedTvlqr(std::span(&log, 1), Robot::kPendubot), Error);
+  }
 }
 
 /// The published controller on the twin does what it did on the machine.

@@ -88,8 +88,7 @@ bool IsNearUpright(const Eigen::Vector4d& x) {
 
 }  // namespace
 
-PublishedTvlqr::PublishedTvlqr(std::span<const MachineLog> logs, Robot robot)
-    : robot_(robot), step_(kGridStep) {
+PublishedTvlqr::PublishedTvlqr(std::span<const MachineLog> logs, Robot robot) : robot_(robot) {
   double end = 1e9;
   std::vector<Path> paths;
   for (const MachineLog& log : logs) {
@@ -103,8 +102,9 @@ PublishedTvlqr::PublishedTvlqr(std::span<const MachineLog> logs, Robot robot)
     end = std::min(end, log.time[static_cast<size_t>(caught - paths.back().x.begin())]);
   }
   if (end == 1e9) throw BadInput("--law: expected a run that reaches upright, got none");
+  if (end < kGridStep) throw BadInput("--law: expected runs that begin away from upright");
   // All runs follow the same law until the first one is caught.
-  for (double time = 0; time < end; time += step_) {
+  for (double time = 0; time < end; time += kGridStep) {
     Eigen::Vector4d x = Eigen::Vector4d::Zero();
     Eigen::Vector2d u = Eigen::Vector2d::Zero();
     for (size_t i = 0; i < logs.size(); ++i) {
@@ -145,11 +145,11 @@ void PublishedTvlqr::Linearise() {
     B /= M.det();
     if (pendubot) B.col(1).setZero();
     const Eigen::Matrix4d Ad =
-        Eigen::Matrix4d::Identity() + A * step_ + A * A * (step_ * step_ / 2);
-    const Eigen::Matrix<double, 4, 2> Bd = B * step_ + A * B * (step_ * step_ / 2);
-    const Eigen::Matrix2d G = R * step_ + Bd.transpose() * S * Bd;
+        Eigen::Matrix4d::Identity() + A * kGridStep + A * A * (kGridStep * kGridStep / 2);
+    const Eigen::Matrix<double, 4, 2> Bd = B * kGridStep + A * B * (kGridStep * kGridStep / 2);
+    const Eigen::Matrix2d G = R * kGridStep + Bd.transpose() * S * Bd;
     K_[k] = G.inverse() * Bd.transpose() * S * Ad;
-    S = Q * step_ + Ad.transpose() * S * (Ad - Bd * K_[k]);
+    S = Q * kGridStep + Ad.transpose() * S * (Ad - Bd * K_[k]);
   }
   // The regulators' costs are not published for both robots. These gains explain the logged
   // commands of all runs near upright to 1e-4 N·m.
@@ -164,7 +164,7 @@ Eigen::Vector2d PublishedTvlqr::Torque(double time, const State& x, bool upright
   if (upright) {
     return -regulator_ * State(Wrapped(x(0) - std::numbers::pi), Wrapped(x(1)), x(2), x(3));
   }
-  const double place = std::clamp(time / step_, 0.0, static_cast<double>(x_.size()) - 1 - 1e-9);
+  const double place = std::clamp(time / kGridStep, 0.0, static_cast<double>(x_.size()) - 1 - 1e-9);
   const auto k = static_cast<size_t>(place);
   const double share = place - static_cast<double>(k);
   const State reference = x_[k] + share * (x_[k + 1] - x_[k]);
@@ -172,7 +172,7 @@ Eigen::Vector2d PublishedTvlqr::Torque(double time, const State& x, bool upright
 }
 
 bool PublishedTvlqr::Catches(double time, const State& x) const {
-  return time >= step_ * static_cast<double>(x_.size()) && IsNearUpright(x);
+  return time >= kGridStep * static_cast<double>(x_.size()) && IsNearUpright(x);
 }
 
 double PublishedTvlqr::Misfit(const MachineLog& log) const {
@@ -182,7 +182,7 @@ double PublishedTvlqr::Misfit(const MachineLog& log) const {
   double sum = 0;
   int rows = 0;
   for (int k = 0; k < log.rows(); ++k) {
-    if (log.time[k] > step_ * static_cast<double>(x_.size()) - kBeforeSwitch) break;
+    if (log.time[k] > kGridStep * static_cast<double>(x_.size()) - kBeforeSwitch) break;
     const auto row = static_cast<size_t>(k);
     const double error = Torque(log.time[k], path.x[row], false)(j) - path.u[row](j);
     sum += error * error;

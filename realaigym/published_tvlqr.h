@@ -37,7 +37,6 @@ class PublishedTvlqr {
   void Linearise();
 
   Robot robot_;
-  double step_;                     // between two points of the reference, s
   std::vector<State> x_;            // x̄, (rad, rad, rad/s, rad/s)
   std::vector<Eigen::Vector2d> u_;  // ū, N·m
   std::vector<Gain> K_;             // at each point of the reference
