@@ -1,7 +1,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -34,23 +33,5 @@ class Checksum {
   }
   uint64_t hash_ = 0xcbf29ce484222325;
 };
-
-/// CRC-32 of IEEE 802.3, as zlib and most microcontrollers compute it. Detects broken frames of a
-/// link to a machine.
-constexpr uint32_t Crc32(std::span<const std::byte> bytes) {
-  constexpr auto kTable = [] {
-    std::array<uint32_t, 256> table{};
-    for (uint32_t i = 0; i < 256; ++i) {
-      table[i] = i;
-      for (int bit = 0; bit < 8; ++bit) {
-        table[i] = (table[i] >> 1) ^ ((table[i] & 1) != 0 ? 0xedb88320U : 0U);
-      }
-    }
-    return table;
-  }();
-  uint32_t crc = 0xffffffff;
-  for (const std::byte b : bytes) crc = kTable[(crc ^ static_cast<uint8_t>(b)) & 255] ^ (crc >> 8);
-  return ~crc;
-}
 
 }  // namespace upswing

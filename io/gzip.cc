@@ -61,4 +61,9 @@ std::string Gunzip(std::string_view bytes, const std::string& where, size_t most
   }
 }
 
+uint32_t Crc32(std::span<const std::byte> bytes) {
+  const auto* data = reinterpret_cast<const Bytef*>(bytes.data());
+  return static_cast<uint32_t>(crc32_z(0, data, bytes.size()));
+}
+
 }  // namespace upswing

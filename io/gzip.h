@@ -1,5 +1,8 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -14,5 +17,8 @@ bool IsGzip(std::string_view bytes);
 /// `most_bytes`. Throws BadInput, with `where` (a path), for a damaged or a larger file.
 std::string Gunzip(std::string_view bytes, const std::string& where,
                    size_t most_bytes = kMostTextBytes);
+
+/// CRC-32 of IEEE 802.3, as PNG files and most microcontrollers compute it.
+uint32_t Crc32(std::span<const std::byte> bytes);
 
 }  // namespace upswing

@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/text.h"
+#include "io/gzip.h"
 
 namespace upswing {
 namespace {
@@ -24,8 +26,7 @@ void AppendChunk(std::string& out, const char* type, const std::string& data) {
   AppendNumber(out, static_cast<uint32_t>(data.size()));
   const std::string body = type + data;
   out += body;
-  const auto* bytes = reinterpret_cast<const Bytef*>(body.data());
-  AppendNumber(out, static_cast<uint32_t>(crc32(0, bytes, static_cast<uInt>(body.size()))));
+  AppendNumber(out, Crc32(BytesOf(body)));
 }
 
 /// Picks the neighbour (left, above or above left) nearest to left + above - above left.

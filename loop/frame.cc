@@ -5,7 +5,7 @@
 #include <concepts>
 #include <cstring>
 
-#include "core/checksum.h"
+#include "io/gzip.h"
 
 namespace upswing {
 namespace {

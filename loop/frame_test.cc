@@ -7,9 +7,9 @@
 #include <limits>
 #include <vector>
 
-#include "core/checksum.h"
 #include "core/rng.h"
 #include "core/text.h"
+#include "io/gzip.h"
 
 namespace upswing {
 namespace {
