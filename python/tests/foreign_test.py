@@ -6,12 +6,9 @@ import hashlib
 import json
 import os
 import shutil
-import signal
 import subprocess
-import sys
 import tempfile
 import threading
-import time
 import unittest
 import warnings
 from pathlib import Path
@@ -22,7 +19,7 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import upswing
-from testing import BadInputTest
+from testing import BadInputTest, interrupted
 
 TINY = {"hidden": [16], "threads": 1, "progress": False}
 # A training of a fraction of a second.
@@ -281,13 +278,8 @@ class Files(InFolder):
                   "                  eval_episodes=1, learning_starts=50, threads=1)\n"
                   "except KeyboardInterrupt:\n"
                   "    print('interrupted')\n")
-        with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE,
-                              encoding="utf-8") as process:
-            while process.poll() is None and not (run / "policy.safetensors").exists():
-                time.sleep(0.05)
-            process.send_signal(signal.SIGINT)
-            output, _ = process.communicate(timeout=60)
-        self.assertEqual((output, process.returncode), ("interrupted\n", 0))
+        done = interrupted(script, (run / "policy.safetensors").exists, timeout=60)
+        self.assertEqual(done, ("interrupted\n", 0))
         info = program("info", run)
         self.assertEqual(info.returncode, 0, info.stderr)
         self.assertRegex(info.stdout, "checkpoint  step [1-9]")

@@ -1,5 +1,9 @@
 """Helpers that the package's tests share."""
 
+import signal
+import subprocess
+import sys
+import time
 import unittest
 
 import upswing
@@ -12,3 +16,14 @@ class BadInputTest(unittest.TestCase):
             call(*arguments, **settings)
         self.assertIn(what, str(caught.exception))
         self.assertNotIn("\n", str(caught.exception))
+
+
+def interrupted(script, has_begun, timeout):
+    """Runs a Python script, sends Ctrl-C once `has_begun()`, and returns its output and exit code."""
+    with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE,
+                          encoding="utf-8") as process:
+        while process.poll() is None and not has_begun():
+            time.sleep(0.05)
+        process.send_signal(signal.SIGINT)
+        output, _ = process.communicate(timeout=timeout)
+    return output, process.returncode

@@ -5,12 +5,10 @@ import _thread
 import csv
 import hashlib
 import os
-import signal
 import subprocess
 import sys
 import tempfile
 import threading
-import time
 import tomllib
 import typing
 import unittest
@@ -20,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 import upswing
-from testing import BadInputTest
+from testing import BadInputTest, interrupted
 
 # A training of a fraction of a second that evaluates twice.
 SMALL = {"hidden": [32], "head": 16, "steps": 4000, "eval_every": 2000, "eval_episodes": 4,
@@ -157,13 +155,8 @@ class Callbacks(InFolder):
                   "                  steps=100000000, threads=1, eval_every=100000000)\n"
                   "except KeyboardInterrupt:\n"
                   "    print('interrupted')\n")
-        with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE,
-                              encoding="utf-8") as process:
-            while process.poll() is None and not (run / "metrics.csv").exists():
-                time.sleep(0.05)
-            process.send_signal(signal.SIGINT)
-            output, _ = process.communicate(timeout=1200)
-        self.assertEqual((output, process.returncode), ("interrupted\n", 0))
+        done = interrupted(script, (run / "metrics.csv").exists, timeout=1200)
+        self.assertEqual(done, ("interrupted\n", 0))
         steps = program("info", run).stdout
         self.assertIn("step", steps)
         self.assertTrue(any(run.glob("checkpoint*.safetensors")))

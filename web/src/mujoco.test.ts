@@ -2,10 +2,11 @@ import loadMujoco from '@mujoco/mujoco';
 import type { MainModule } from '@mujoco/mujoco';
 import { beforeAll, expect, test } from 'vitest';
 import { mjcf, NOMINAL, PHYSICS_STEPS } from './pendulum';
-import type { Plant, State } from './pendulum';
+import type { State } from './pendulum';
 import { Mujoco } from './mujoco';
 import type { Push } from './simulator';
 import { pointOn } from './world';
+import { OTHER } from '../tests/plant';
 
 let mujoco: MainModule;
 beforeAll(async () => {
@@ -13,16 +14,6 @@ beforeAll(async () => {
 });
 
 const START: State = { q1: 0.4, q2: -0.3, w1: 1.2, w2: -2 };
-const OTHER: Plant = {
-  mass1: 1.3,
-  mass2: 0.7,
-  length1: 0.45,
-  length2: 0.62,
-  damping1: 0.1,
-  damping2: 0.3,
-  gravity: 8.1,
-  torque_limit: 4,
-};
 
 const numbers = ({ q1, q2, w1, w2 }: State) => [q1, q2, w1, w2];
 

@@ -2,22 +2,13 @@ import loadMujoco from '@mujoco/mujoco';
 import { expect, test } from 'vitest';
 import { Mujoco } from './mujoco';
 import { HANGING, NOMINAL } from './pendulum';
-import type { Plant, State } from './pendulum';
+import type { State } from './pendulum';
 import { ClosedForm } from './simulator';
 import type { Push } from './simulator';
 import { World } from './world';
+import { OTHER } from '../tests/plant';
 
 const mujoco = await loadMujoco();
-const OTHER: Plant = {
-  mass1: 1.3,
-  mass2: 0.7,
-  length1: 0.45,
-  length2: 0.62,
-  damping1: 0.1,
-  damping2: 0.3,
-  gravity: 8.1,
-  torque_limit: 4,
-};
 
 function difference(a: State, b: State): number {
   const names = ['q1', 'q2', 'w1', 'w2'] as const;
