@@ -7,7 +7,6 @@
 #include "apps/signals.h"
 #include "core/error.h"
 #include "core/text.h"
-#include "io/file.h"
 #include "loop/fake_machine.h"
 #include "loop/link.h"
 #include "loop/supervisor.h"

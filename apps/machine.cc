@@ -55,13 +55,8 @@ void PrintCheck(const LogCheck& check) {
 }
 
 int RunCheck(const MachineArguments& a) {
-  if (!a.figure.empty()) {
-    CheckFigureName(a.figure);
-    CheckWritable("--figure", a.figure);
-    if (a.logs.size() > 1) {
-      throw BadInput(Concat("--figure: expected one log with it, got ", a.logs.size()));
-    }
-    CheckCanDraw();
+  if (!a.figure.empty() && a.logs.size() > 1) {
+    throw BadInput(Concat("--figure: expected one log with it, got ", a.logs.size()));
   }
   std::vector<LogCheck> checks;
   for (const std::string& file : a.logs) {
@@ -91,10 +86,9 @@ std::vector<MachineLog> ReadLogs(std::span<const std::string> files, const std::
   return logs;
 }
 
-std::string ErrorText(const Estimate& e, double factor = 1, const char* unit = "") {
-  if (!e.interval) return fmt::format("{:.3f}{}", factor * e.value, unit);
-  return fmt::format("{:.3f} ({:.3f}–{:.3f}){}", factor * e.value, factor * e.interval->low,
-                     factor * e.interval->high, unit);
+std::string ErrorText(const Estimate& e) {
+  if (!e.interval) return fmt::format("{:.3f}", e.value);
+  return fmt::format("{:.3f} ({:.3f}–{:.3f})", e.value, e.interval->low, e.interval->high);
 }
 
 void PrintErrors(std::span<const ErrorRow> rows, std::span<const Predictor> predictors) {
@@ -331,12 +325,12 @@ void CheckOptions(const CommandLine& line, const std::string& action) {
 
 int RunMachine(const MachineArguments& a) {
   if (a.logs.empty()) throw BadInput(Concat("machine ", a.action, ": expected a log, got none"));
-  if (a.action == "check") return RunCheck(a);
   if (!a.figure.empty()) {
     CheckFigureName(a.figure);
     CheckWritable("--figure", a.figure);
     CheckCanDraw();
   }
+  if (a.action == "check") return RunCheck(a);
   return a.action == "identify" ? RunIdentify(a) : RunValidate(a);
 }
 

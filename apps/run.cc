@@ -11,7 +11,6 @@
 #include "apps/signals.h"
 #include "core/error.h"
 #include "core/text.h"
-#include "io/file.h"
 #include "io/streams.h"
 #include "loop/control_loop.h"
 #include "setup/controllers.h"
@@ -41,7 +40,7 @@ Competitor CompetitorFor(const RunArguments& a, const std::optional<Twin>& twin)
   if (!loaded->design_for || loaded->task != kDoublePendulum)
     return GetCompetitor(a.policy, a.robot);
   loaded->plant = twin->plant;
-  if (!a.robot.empty()) loaded->plant.actuated_joint = a.robot == "pendubot" ? 1 : 2;
+  if (!a.robot.empty()) loaded->plant.actuated_joint = static_cast<int>(*RobotNamed(a.robot));
   try {
     loaded->policy = loaded->design_for(loaded->plant);
   } catch (const Error&) {

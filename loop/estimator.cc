@@ -28,7 +28,7 @@ Estimator::Estimator(const Twin& twin, double period) : Estimator(twin.sensors, 
 
 PendulumState Estimator::Follow(PendulumState state, double begin, double seconds) const {
   const Model& m = *model_;
-  const int steps = std::max(1, static_cast<int>(std::ceil(seconds / kMotionStep - 1e-9)));
+  const int steps = MotionSteps(seconds);
   const double h = seconds / steps;
   if (h <= 0) return state;
   int cursor = 0;

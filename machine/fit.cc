@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <utility>
 
@@ -51,6 +50,7 @@ struct Value {
   double scale;
   int session;  // -1: all
   Range range;
+  double prior;      // weight of the prior about `guess`; 0: none
   double guess = 0;  // at first
 };
 
@@ -69,6 +69,9 @@ double SessionDeviation(const std::string& name) {
 double PriorDeviation(const std::string& name) {
   return name == "delay" || name == "lag" || name == "current_delay" ? 0.005 : 0;  // s
 }
+
+/// The weight of a prior with this standard deviation; 0: none.
+double WeightOf(double deviation) { return deviation > 0 ? 1 / (deviation * deviation) : 0; }
 
 /// A window with its free start state.
 struct Shot {
@@ -127,10 +130,10 @@ class Problem {
       const Option& option = *options.Find(name, "identify").front();
       Range range = option.range;
       if (name.starts_with("center") || name.starts_with("inertia")) range.low = kSmallestLink;
-      values_.push_back({name, ScaleOf(name), -1, range});
+      values_.push_back({name, ScaleOf(name), -1, range, WeightOf(PriorDeviation(name))});
       if (SessionDeviation(name) == 0) continue;
       for (int s = 0; s < static_cast<int>(sessions_.size()); ++s) {
-        values_.push_back({name, ScaleOf(name), s, {}});
+        values_.push_back({name, ScaleOf(name), s, {}, WeightOf(SessionDeviation(name))});
       }
     }
     theta_.resize(size());
@@ -169,10 +172,10 @@ class Problem {
   bool Step(double tolerance) {
     SetScales();
     const std::vector<Share> shares = Linearize();
-    double before = 0;
+    double before = PriorCost(theta_);
     MatrixXd H = MatrixXd::Zero(size(), size());
     VectorXd g = VectorXd::Zero(size());
-    AddPrior(theta_, H, g, before);
+    AddPrior(H, g);
     for (const Share& share : shares) before += share.cost;
     for (; damping_ < 1e6; damping_ *= 8) {
       MatrixXd A = H;
@@ -212,9 +215,7 @@ class Problem {
     const std::vector<Share> shares = Linearize();
     // The sandwich estimate: right also where the model's residuals are not white.
     MatrixXd A = MatrixXd::Zero(size(), size()), meat = A;
-    VectorXd unused = VectorXd::Zero(size());
-    double cost = 0;
-    AddPrior(theta_, A, unused, cost);
+    for (int i = 0; i < size(); ++i) A(i, i) = values_[i].prior;
     std::vector<double> errors, torque_errors;
     // Windows overlap, so neighbours share rows: the scores of several in a row count as one.
     constexpr size_t kBlock = 6;
@@ -281,15 +282,18 @@ class Problem {
     return result;
   }
 
-  void AddPrior(const VectorXd& theta, MatrixXd& H, VectorXd& g, double& cost) const {
+  double PriorCost(const VectorXd& theta) const {
+    double cost = 0;
     for (int i = 0; i < size(); ++i) {
-      const Value& v = values_[i];
-      const double deviation = v.session >= 0 ? SessionDeviation(v.name) : PriorDeviation(v.name);
-      if (deviation == 0) continue;
-      const double weight = 1 / (deviation * deviation), off = theta(i) - v.guess;
-      H(i, i) += weight;
-      g(i) += weight * off;
-      cost += weight * off * off;
+      const double off = theta(i) - values_[i].guess;
+      cost += values_[i].prior * off * off;
+    }
+    return cost;
+  }
+  void AddPrior(MatrixXd& H, VectorXd& g) const {
+    for (int i = 0; i < size(); ++i) {
+      H(i, i) += values_[i].prior;
+      g(i) += values_[i].prior * (theta_(i) - values_[i].guess);
     }
   }
 
@@ -361,10 +365,7 @@ class Problem {
                                   motion)) +
                  StartCost(shot, starts[w]);
     });
-    MatrixXd H = MatrixXd::Zero(size(), size());
-    VectorXd g = VectorXd::Zero(size());
-    double cost = 0;
-    AddPrior(theta, H, g, cost);
+    double cost = PriorCost(theta);
     for (const double c : costs) cost += c;
     return cost;
   }

@@ -98,9 +98,7 @@ Identification Identify(std::span<const MachineLog> logs, const Twin& first,
       ParallelFor(pool, n, [&](int i) {
         errors[i] = WindowErrors(logs[i], twins[i], kJudgedSeconds, false);
       });
-      std::vector<double> all;
-      for (const auto& own : errors) all.insert(all.end(), own.begin(), own.end());
-      const double error = Median(all);
+      const double error = PooledMedian(errors);
       result.structures.push_back({structures[s], error});
       if (s > 0 && !(error < best)) continue;
       best = error;

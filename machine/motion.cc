@@ -30,9 +30,7 @@ void Drive::Forget(double time) {
 Drive Drive::Commanded(const MachineLog& log, const Twin& twin) {
   Drive drive(twin.actuator.delay, twin.actuator.lag);
   if (log.commanded.empty()) return drive;
-  const int actuated = ActuatedJoint(log, twin);
-  Joints limit{twin.plant.torque_limit, twin.plant.torque_limit};
-  if (actuated != 0) limit[2 - actuated] = twin.actuator.passive_limit;
+  const Joints limit = TorqueLimits(twin, ActuatedJoint(log, twin));
   // The command of a row is sent while the angles of the next row are read.
   for (int row = 0; row + 1 < log.rows(); ++row) {
     Joints command = log.commanded[row];
@@ -92,6 +90,10 @@ Manipulator BodyOf(const Twin& twin, bool reported) {
   return body;
 }
 
+int MotionSteps(double seconds) {
+  return std::max(1, static_cast<int>(std::ceil(seconds / kMotionStep - 1e-9)));
+}
+
 PendulumState StepMotion(const Manipulator& body, const Drive& drive, const PendulumState& now,
                          double time, double h, int& cursor, Joints& acceleration) {
   const Joints u1 = drive.At(time + h / 2, cursor), u2 = drive.At(time + h, cursor);
@@ -120,7 +122,7 @@ void Predict(const Manipulator& body, const Drive& drive, const Joints& zero,
   motion.velocity.resize(rows);
   motion.acceleration.resize(rows);
   const double begin = log.time[first], end = log.time[last - 1];
-  const int steps = std::max(1, static_cast<int>(std::ceil((end - begin) / kMotionStep - 1e-9)));
+  const int steps = MotionSteps(end - begin);
   const double h = std::max((end - begin) / steps, 1e-9);
 
   PendulumState now = start;

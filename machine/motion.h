@@ -57,6 +57,8 @@ struct Motion {
 
 /// Longest step of the integration (Runge-Kutta of order 4), s.
 inline constexpr double kMotionStep = 0.002;
+/// Number of equal steps for a time of `seconds`, at least 1.
+int MotionSteps(double seconds);
 
 /// The motion from row `first` to before row `last`, from a state at the first row's time. The
 /// state's angles are measured ones: joints that hang show Twin::sensors' zeros.

@@ -4,14 +4,10 @@
 #include <cmath>
 
 namespace upswing {
-namespace {
 
-/// The nearest multiple of a quantum; 0: the number itself.
 double Rounded(double number, double quantum) {
   return quantum > 0 ? std::round(number / quantum) * quantum : number;
 }
-
-}  // namespace
 
 SimulatedMachine::SimulatedMachine(const Twin& twin, const PendulumState& start)
     : twin_(twin),
@@ -24,7 +20,7 @@ SimulatedMachine::SimulatedMachine(const Twin& twin, const PendulumState& start)
 
 void SimulatedMachine::Advance(double time) {
   const double begin = moments_.back().time;
-  const int steps = std::max(1, static_cast<int>(std::ceil((time - begin) / kMotionStep - 1e-9)));
+  const int steps = MotionSteps(time - begin);
   const double h = (time - begin) / steps;
   if (h <= 0) return;
   for (int i = 0; i < steps; ++i) {
@@ -91,8 +87,7 @@ MachineLog RunLoop(const Twin& twin, const LoopRun& run, const CycleController& 
   SimulatedMachine machine(twin, run.start);
   VelocityEstimate velocity(twin.sensors);
   Rng rng(run.seed, "machine: periods");
-  Joints limit{twin.plant.torque_limit, twin.plant.torque_limit};
-  if (run.actuated_joint != 0) limit[2 - run.actuated_joint] = twin.actuator.passive_limit;
+  const Joints limit = TorqueLimits(twin, run.actuated_joint);
   MachineLog log;
   log.name = twin.name;
   Joints command{}, push{};

@@ -314,4 +314,10 @@ int ActuatedJoint(const MachineLog& log, const Twin& twin) {
   return 0;
 }
 
+Joints TorqueLimits(const Twin& twin, int actuated_joint) {
+  Joints limit{twin.plant.torque_limit, twin.plant.torque_limit};
+  if (actuated_joint != 0) limit[2 - actuated_joint] = twin.actuator.passive_limit;
+  return limit;
+}
+
 }  // namespace upswing

@@ -110,4 +110,7 @@ Twin DrawTwin(const Twin& twin, Rng& rng);
 /// acrobot or pendubot, the motor of the other joint only compensates friction.
 int ActuatedJoint(const MachineLog& log, const Twin& twin);
 
+/// The motors' torque limits (N·m) under a controller of this joint, as ActuatedJoint counts them.
+Joints TorqueLimits(const Twin& twin, int actuated_joint);
+
 }  // namespace upswing

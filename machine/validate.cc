@@ -17,7 +17,8 @@ namespace {
 /// The errors of all windows of each run (runs × windows).
 using RunErrors = std::vector<std::vector<double>>;
 
-double PooledMedian(const RunErrors& runs, std::span<const double> chosen) {
+/// The median over the windows of the chosen runs, which may repeat.
+double MedianOf(const RunErrors& runs, std::span<const double> chosen) {
   std::vector<double> all;
   for (const double run : chosen) {
     const auto& errors = runs[static_cast<size_t>(run)];
@@ -66,6 +67,21 @@ std::vector<LogWindow> WindowsOf(const MachineLog& log, const Twin& twin, double
   return CutWindows(std::span(&log, 1), RulesOf(seconds), twin.plant.length1, twin.plant.length2);
 }
 
+/// The errors of each predictor in windows of `length` seconds, the same windows for all.
+std::vector<RunErrors> ErrorsOf(std::span<const MachineLog> logs,
+                                std::span<const Predictor> predictors, double length, bool reported,
+                                ThreadPool* pool) {
+  std::vector<RunErrors> errors(predictors.size(), RunErrors(logs.size()));
+  ParallelFor(pool, static_cast<int>(logs.size()), [&](int i) {
+    if (reported && logs[i].measured.empty()) return;
+    const auto windows = WindowsOf(logs[i], predictors.front().twins[i], length);
+    for (size_t p = 0; p < predictors.size(); ++p) {
+      errors[p][i] = ErrorsIn(logs[i], predictors[p].twins[i], windows, reported);
+    }
+  });
+  return errors;
+}
+
 /// The median errors over the length of the windows.
 Panel ErrorsPanel(std::span<const MachineLog> logs, std::span<const Predictor> predictors,
                   ThreadPool* pool) {
@@ -75,18 +91,10 @@ Panel ErrorsPanel(std::span<const MachineLog> logs, std::span<const Predictor> p
   errors.y_label = "median error, rad";
   for (const Predictor& p : predictors) errors.lines.emplace_back().name = p.name;
   for (const double length : kLengths) {
-    std::vector<RunErrors> runs(predictors.size(), RunErrors(logs.size()));
-    ParallelFor(pool, static_cast<int>(logs.size()), [&](int i) {
-      const auto windows = WindowsOf(logs[i], predictors.front().twins[i], length);
-      for (size_t p = 0; p < predictors.size(); ++p) {
-        runs[p][i] = ErrorsIn(logs[i], predictors[p].twins[i], windows, false);
-      }
-    });
+    const std::vector<RunErrors> runs = ErrorsOf(logs, predictors, length, false, pool);
     for (size_t p = 0; p < predictors.size(); ++p) {
-      std::vector<double> all;
-      for (const auto& own : runs[p]) all.insert(all.end(), own.begin(), own.end());
       errors.lines[p].x.push_back(length);
-      errors.lines[p].y.push_back(Median(all));
+      errors.lines[p].y.push_back(PooledMedian(runs[p]));
     }
   }
   return errors;
@@ -156,15 +164,7 @@ std::vector<ErrorRow> CompareErrors(std::span<const MachineLog> logs,
   std::vector<ErrorRow> rows;
   for (const bool reported : {false, true}) {
     for (const double length : seconds) {
-      std::vector<RunErrors> errors(predictors.size(), RunErrors(logs.size()));
-      ParallelFor(pool, static_cast<int>(logs.size()), [&](int i) {
-        if (reported && logs[i].measured.empty()) return;
-        // The same windows for all predictors.
-        const auto windows = WindowsOf(logs[i], predictors.front().twins[i], length);
-        for (size_t p = 0; p < predictors.size(); ++p) {
-          errors[p][i] = ErrorsIn(logs[i], predictors[p].twins[i], windows, reported);
-        }
-      });
+      const std::vector<RunErrors> errors = ErrorsOf(logs, predictors, length, reported, pool);
       const auto add = [&](const std::string& session, const Strata& strata) {
         ErrorRow row{session, length, reported, 0, 0, {}, {}};
         for (const auto& runs : strata) {
@@ -177,10 +177,10 @@ std::vector<ErrorRow> CompareErrors(std::span<const MachineLog> logs,
         if (row.windows == 0) return;
         for (const RunErrors& own : errors) {
           row.errors.push_back(
-              OverRuns(strata, [&](const auto& chosen) { return PooledMedian(own, chosen); }));
+              OverRuns(strata, [&](const auto& chosen) { return MedianOf(own, chosen); }));
         }
         row.improvement = OverRuns(strata, [&](const auto& chosen) {
-          return 1 - PooledMedian(errors.front(), chosen) / PooledMedian(errors.back(), chosen);
+          return 1 - MedianOf(errors.front(), chosen) / MedianOf(errors.back(), chosen);
         });
         rows.push_back(row);
       };

@@ -4,6 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
+
+#include "core/sample.h"
+#include "machine/check.h"
 
 namespace upswing {
 namespace {
@@ -58,10 +62,14 @@ bool KeepsRules(const MachineLog& log, int first, int last, const WindowRules& r
 
 double Median(std::vector<double> values) {
   if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  if (values.size() % 2 == 1) return *middle;
-  return (*middle + *std::max_element(values.begin(), middle)) / 2;
+  std::ranges::sort(values);
+  return Quantile(values, 0.5);
+}
+
+double PooledMedian(std::span<const std::vector<double>> lists) {
+  std::vector<double> all;
+  for (const auto& list : lists) all.insert(all.end(), list.begin(), list.end());
+  return Median(std::move(all));
 }
 
 std::vector<LogWindow> CutWindows(std::span<const MachineLog> logs, const WindowRules& rules,
@@ -70,9 +78,7 @@ std::vector<LogWindow> CutWindows(std::span<const MachineLog> logs, const Window
   for (int index = 0; index < static_cast<int>(logs.size()); ++index) {
     const MachineLog& log = logs[index];
     if (log.rows() < kCubicRows) continue;
-    std::vector<double> periods;
-    for (int k = 1; k < log.rows(); ++k) periods.push_back(log.time[k] - log.time[k - 1]);
-    const double longest_gap = 5 * Median(periods);
+    const double longest_gap = 5 * MedianCycle(std::span(&log, 1));
     const double end = log.time.back() - kMargin;
     for (double start = log.time.front() + kMargin; start + rules.seconds < end;
          start += rules.hop) {

@@ -32,5 +32,7 @@ std::vector<LogWindow> CutWindows(std::span<const MachineLog> logs, const Window
 
 /// The median of some numbers; NaN if there are none.
 double Median(std::vector<double> values);
+/// The median of the numbers of all lists.
+double PooledMedian(std::span<const std::vector<double>> lists);
 
 }  // namespace upswing

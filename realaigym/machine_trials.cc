@@ -135,8 +135,7 @@ HardwareReport RunTrials(const Twin& twin, Robot robot, const TrialController& m
     if (rules.pushes) run.push = rules.push_of ? rules.push_of(i) : HardwarePushes(rng);
     run.seed = rng.Next();
     const MachineLog log = RunLoop(machine, run, make());
-    const std::vector<MachineLog> one{log};
-    runs[static_cast<size_t>(i)] = ScoreHardware(one, robot).runs.front();
+    runs[static_cast<size_t>(i)] = ScoreHardware(std::span(&log, 1), robot).runs.front();
     runs[static_cast<size_t>(i)].name = "draw " + std::to_string(i + 1);
     if (!progress) return;
     const std::lock_guard lock(mutex);

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "core/rng.h"
+#include "machine/simulated_machine.h"
 #include "sim/closed_form.h"
 
 namespace upswing {
@@ -25,11 +26,6 @@ double Nearness(double e1, double e2, double w1, double w2, double velocity) {
   return 1 / (1 + 0.5 * (angles + (w1 * w1 + w2 * w2) / (velocity * velocity)));
 }
 
-/// The nearest multiple of a quantum; 0: the number itself.
-double Rounded(double number, double quantum) {
-  return quantum > 0 ? std::nearbyint(number / quantum) * quantum : number;
-}
-
 /// Running sums of a simulation, and the other inputs of its outcome.
 struct Sums {
   Lanes energy{}, torque_cost{}, velocity_cost{}, max_torque{};
@@ -43,6 +39,7 @@ struct LanePush {
   int first, last;
   size_t lane;
   BoardPush push;
+  Manipulator body;
 };
 
 /// A running block of simulations. Loops over kBoardBlock are written for the compiler's
@@ -62,7 +59,8 @@ class Run {
     std::ranges::fill(block_.share2, kPlant.length2 / kLength);
     for (size_t lane = 0; lane < episodes.size(); ++lane) {
       const BoardEpisode& episode = episodes[lane];
-      block_.SetManipulator(lane, episode.body.value_or(ManipulatorOf(episode.plant)));
+      const Manipulator body = episode.body ? *episode.body : ManipulatorOf(episode.plant);
+      block_.SetManipulator(lane, body);
       if (episode.quantum > 0 || episode.zero != std::array<double, 2>{}) encoders_.push_back(lane);
       rngs_.emplace_back(episode.seed, "realaigym: noise");
       if (episode.velocity_noise > 0) velocity_noise_.push_back(lane);
@@ -74,7 +72,7 @@ class Run {
         constexpr double kWidths = 6;  // negligible beyond this
         pushes_.push_back({static_cast<int>((push.time - kWidths * push.width) / kBoardTimestep),
                            static_cast<int>((push.time + kWidths * push.width) / kBoardTimestep),
-                           lane, push});
+                           lane, push, body});
       }
     }
   }
@@ -142,12 +140,12 @@ class Run {
       const double below = torque_[i] < kBoardTorqueLimit ? torque_[i] : kBoardTorqueLimit;
       block_.tau[i] = torque_[i] = below > -kBoardTorqueLimit ? below : -kBoardTorqueLimit;
     }
-    for (const auto& [first, last, lane, push] : pushes_) {
+    for (const auto& [first, last, lane, push, body] : pushes_) {
       if (step <= first || step > last) continue;
       const double z = (time - push.time) / push.width;
       const double torque = push.amplitude * std::exp(-z * z / 2);
       if (push.passive) {
-        Kick(lane, torque);
+        Kick(lane, body, torque);
       } else {
         block_.tau[lane] += torque;
       }
@@ -155,9 +153,7 @@ class Run {
   }
 
   /// Adds what a torque (N·m) about the joint without the motor does to the velocities in a step.
-  void Kick(size_t lane, double torque) {
-    const BoardEpisode& episode = episodes_[lane];
-    const Manipulator body = episode.body.value_or(ManipulatorOf(episode.plant));
+  void Kick(size_t lane, const Manipulator& body, double torque) {
     const MassMatrix M = body.Mass(std::cos(block_.q2[lane]));
     const double impulse = torque * kBoardTimestep / M.det();
     const bool first = block_.joint[lane] != 1;
