@@ -2,7 +2,7 @@
 # which find_package(upswing) finds them. The folder can be moved: nothing in it is an absolute path.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
-set(UPSWING_LAYERS core nn sim rl control io mujoco report setup machine realaigym run study judge export view)
+set(UPSWING_LAYERS core nn sim rl control io mujoco report setup machine realaigym loop run study judge export view)
 set(UPSWING_PACKAGE ${CMAKE_INSTALL_LIBDIR}/cmake/upswing)
 set(UPSWING_INSTALLED_MUJOCO ${CMAKE_INSTALL_LIBDIR}/upswing/mujoco)
 

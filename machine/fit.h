@@ -17,7 +17,7 @@ namespace upswing {
 
 /// Settings of an identification.
 struct FitConfig {
-  WindowRules windows{.seconds = 1, .hop = 0.5, .highest = 0.8, .motion = 0.05};
+  WindowRules windows = {1, 0.5};  // seconds, hop
   int iterations = 40;
   double tolerance = 1e-5;  // least relative decrease of the cost in an iteration
 };
