@@ -24,6 +24,7 @@ constexpr CommandEntry kCommands[] = {
     {"bench", "Measure the speed of the program on this machine", nullptr},
     {"demo", "Serve the page in which policies swing up the pendulum live", nullptr},
     {"docs", "Build the documentation, or the whole web site", nullptr},
+    {"package", "Build packages: tarball, Debian package, Python wheels", nullptr},
     {"python", "Run Python with the package upswing", nullptr},
     {"test", "Build and run all tests", nullptr},
 };

@@ -24,11 +24,15 @@ install(FILES ${CMAKE_CURRENT_BINARY_DIR}/upswing-config.cmake
               ${CMAKE_CURRENT_BINARY_DIR}/upswing-config-version.cmake cmake/mujoco.cmake
         DESTINATION ${UPSWING_PACKAGE})
 
-# The wheel's MuJoCo comes along, with its headers and licences.
+# Packages have shared libraries of their own in lib/upswing, and the wheel's MuJoCo comes along with its
+# headers and licences.
+file(RELATIVE_PATH FROM_BIN /${CMAKE_INSTALL_BINDIR} /${CMAKE_INSTALL_LIBDIR}/upswing)
+set_target_properties(upswing PROPERTIES INSTALL_RPATH "$ORIGIN/${FROM_BIN}")
 if(NOT mujoco_FOUND)
   install(DIRECTORY ${UPSWING_MUJOCO}/ DESTINATION ${UPSWING_INSTALLED_MUJOCO})
-  file(RELATIVE_PATH FROM_BIN /${CMAKE_INSTALL_BINDIR} /${UPSWING_INSTALLED_MUJOCO}/lib)
-  set_target_properties(upswing PROPERTIES INSTALL_RPATH "$ORIGIN/${FROM_BIN}")
+  set_property(TARGET upswing APPEND PROPERTY INSTALL_RPATH "$ORIGIN/${FROM_BIN}/mujoco/lib")
 endif()
 install(TARGETS upswing)
-install(FILES LICENSE README.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(FILES LICENSE README.md CHANGELOG.md CITATION.cff DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(DIRECTORY examples DESTINATION ${CMAKE_INSTALL_DATADIR}/upswing PATTERN "*_test.py" EXCLUDE
+        PATTERN "__pycache__" EXCLUDE)

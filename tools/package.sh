@@ -1,0 +1,88 @@
+# shellcheck shell=sh
+# ./upswing package: builds packages for people without a compiler. Read by ./upswing, whose functions it
+# uses, after tools/web.sh, tools/demo.sh and tools/docs.sh.
+: "${root:?}" "${setup:?}" "${packages:?}" "${window_packages:?}"
+
+package_usage() {
+  cat <<'END_OF_USAGE'
+Usage: ./upswing package [KIND...] [--arch ARCH] [--out FOLDER] [--allow-changes]
+
+Builds packages of the last commit: the same commit gives the same bits. Installs what it needs. Build on
+Debian 12, whose glibc is the oldest that the packages then run with.
+
+  KIND             tarball, deb or wheels; default: all
+  --arch ARCH      x86-64 (default) or arm64, which is cross-compiled. Wheels for arm64 need those for
+                   x86-64 first
+  --out FOLDER     folder for the packages and their checksums (default build/packages)
+  --allow-changes  build with uncommitted changes, too
+
+Wheels need Python 3.11 and one from 3.12 on, each with headers. Debian 12 has only the first of them.
+
+Examples:
+  ./upswing package
+  ./upswing package tarball --arch arm64
+END_OF_USAGE
+}
+
+deb_packages="help2man lintian git"
+arm64_packages="g++-aarch64-linux-gnu qemu-user libhwy-dev:arm64 libfmt-dev:arm64 \
+libtomlplusplus-dev:arm64 libprotobuf-dev:arm64 libtinyxml2-dev:arm64 zlib1g-dev:arm64 \
+libpython3-dev:arm64"
+
+package() {
+  arch=x86-64 out='' changes='' kinds=''
+  while [ $# -gt 0 ]; do
+    case $1 in
+      -h | --help) package_usage; exit 0 ;;
+      --arch=*) arch=${1#*=} ;;
+      --out=*) out=${1#*=} ;;
+      --arch | --out)
+        [ $# -gt 1 ] || bad_input "$1: expected a value, got none"
+        case $1 in --arch) arch=$2 ;; *) out=$2 ;; esac
+        shift
+        ;;
+      --allow-changes) changes=$1 ;;
+      tarball | deb | wheels) kinds="$kinds $1" ;;
+      -*) bad_input "unknown flag $1 (see ./upswing package --help)" ;;
+      *) bad_input "expected tarball, deb or wheels, got \"$1\"" ;;
+    esac
+    shift
+  done
+  case $arch in
+    x86-64 | arm64) ;;
+    *) bad_input "--arch: expected x86-64 or arm64, got \"$arch\"" ;;
+  esac
+  [ "$setup" = yes ] || bad_input "expected ./upswing package without --no-setup"
+  [ "$(uname -m)" = x86_64 ] || bad_input "expected a machine of x86-64, got $(uname -m)"
+
+  packages="$packages $window_packages $deb_packages python3-dev"
+  viewer=yes
+  set_up_docs
+  set_up release upswing
+  build_docs
+  build_demo
+  [ "$arch" = x86-64 ] || set_up_arm64
+  set_up_package
+  # shellcheck disable=SC2086  # a list of words
+  (lock && exec "$root/build/package/venv/bin/python" -B tools/package/package.py $kinds \
+    --arch "$arch" ${out:+--out "$out"} $changes) </dev/null
+}
+
+# Installs what writes the SBOM and builds wheels.
+set_up_package() {
+  (lock && make_venv "packages" "$root/build/package/venv" python3 tools/package/requirements.txt) \
+    </dev/null || exit 1
+}
+
+# Cross-compiles the program.
+set_up_arm64() {
+  # shellcheck disable=SC2086  # a list of words
+  (
+    case $(dpkg --print-foreign-architectures) in
+      *arm64*) ;;
+      *) [ "$(id -u)" != 0 ] || dpkg --add-architecture arm64 ;;
+    esac
+    install_packages $arm64_packages
+    build arm64 upswing
+  ) </dev/null || exit 1
+}

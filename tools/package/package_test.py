@@ -1,0 +1,143 @@
+#!/usr/bin/env python3
+"""Tests of the packages: the same bits twice, and a program that runs from a read-only folder with
+spaces, without HOME. Wheels take minutes to compile; the workflow that makes releases tests them.
+
+UPSWING names the program, of which the packages are made (see apps/testing.py). Needs the virtual
+environment build/package/venv, which ./upswing package and ./upswing test make.
+"""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tarfile
+import tempfile
+import tomllib
+import unittest
+from pathlib import Path
+
+ROOT = Path(os.environ.get("UPSWING_ROOT", Path(__file__).resolve().parent.parent.parent))
+sys.path.insert(0, str(ROOT / "apps"))
+from testing import UPSWING, read_tensors, small  # noqa: E402  pylint: disable=wrong-import-position
+
+FOLDER = Path(__file__).resolve().parent
+PYTHON = ROOT / "build/package/venv/bin/python"
+READY = PYTHON.exists() and UPSWING.parent.parent.name == "release"
+
+
+def call(*command, **more):
+    return subprocess.run([str(word) for word in command], check=False, encoding="utf-8",
+                          stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                          **more)
+
+
+@unittest.skipUnless(READY or "UPSWING_REQUIRE_PACKAGE" in os.environ,
+                     "needs a release build and what ./upswing package installs")
+class PackageTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        temporary = tempfile.TemporaryDirectory(prefix="upswing-")
+        cls.addClassCleanup(temporary.cleanup)
+        cls.folder = Path(temporary.name)
+        shutil.copytree(ROOT / "web/public", cls.folder / "page")
+        shutil.copytree(ROOT / "docs/start", cls.folder / "docs")
+        done = cls.package("first", "tarball", "deb")
+        assert done.returncode == 0, done.stderr
+        (archive,) = (cls.folder / "first").glob("*.tar.gz")
+        with tarfile.open(archive) as files:
+            files.extractall(cls.folder / "a folder with spaces", filter="tar")
+        (cls.tree,) = (cls.folder / "a folder with spaces").iterdir()
+
+    @classmethod
+    def package(cls, out, *arguments):
+        return call(PYTHON, "-B", FOLDER / "package.py", *arguments, "--allow-changes",
+                    "--page", cls.folder / "page", "--docs", cls.folder / "docs",
+                    "--out", cls.folder / out, "--work", cls.folder / "work")
+
+    def test_same_commit_gives_same_bits(self):
+        os.utime(self.folder / "page/icon.svg", (1, 1))
+        (self.folder / "page/icon.svg").chmod(0o600)
+        done = self.package("second", "tarball", "deb")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        first, second = self.folder / "first", self.folder / "second"
+        names = sorted(path.name for path in first.iterdir())
+        self.assertEqual([Path(name).suffix for name in names], ["", ".gz", ".deb"])
+        self.assertEqual(names, sorted(path.name for path in second.iterdir()))
+        for name in names:
+            self.assertTrue((first / name).read_bytes() == (second / name).read_bytes(), name)
+        self.assertEqual(call("sha256sum", "--check", "SHA256SUMS", cwd=first).returncode, 0)
+
+    def test_trains_from_a_read_only_folder_without_home(self):
+        def policy(program, out):
+            done = call(program, *small(agent="d3qn-small", out=out), env={})
+            self.assertEqual(done.returncode, 0, done.stderr)
+            return read_tensors(out / "policy.safetensors")[1]
+
+        for path in [self.tree, *self.tree.rglob("*")]:
+            if not path.is_symlink():
+                path.chmod(path.stat().st_mode & ~0o222)
+        self.assertEqual(policy(self.tree / "bin/upswing", self.folder / "packaged"),
+                         policy(UPSWING, self.folder / "built"))
+
+    def test_has_all_libraries_and_their_notices(self):
+        listed = call("ldd", self.tree / "bin/upswing").stdout
+        self.assertNotIn("not found", listed)
+        components = tomllib.loads((FOLDER / "components.toml").read_text("utf-8"))["component"]
+        parts = " ".join(component["part"] for component in components)
+        libraries = list((self.tree / "lib/upswing").glob("*.so*"))
+        self.assertGreater(len(libraries), 3)
+        for library in libraries:
+            self.assertIn(f"lib/upswing/{library.name.split('.so')[0]}.so", parts)
+        documents = self.tree / "share/doc/upswing"
+        notice = (documents / "NOTICE").read_text("utf-8")
+        bom = json.loads((documents / "sbom.cdx.json").read_text("utf-8"))
+        self.assertEqual(len(bom["components"]), len(components))
+        for entry in bom["components"]:
+            self.assertTrue(entry["licenses"])
+            self.assertIn(entry["name"] + (f" {entry['version']}" if "version" in entry else ""), notice)
+
+    def test_command_of_a_wheel(self):
+        site = self.folder / "site"
+        (site / "upswing").mkdir(parents=True)
+        (site / "upswing/bin").symlink_to(self.tree / "bin")
+        (site / "mujoco").symlink_to(self.tree / "lib/upswing/mujoco/lib")
+        command = shutil.copy(ROOT / "python/upswing_command.py", self.folder / "command")
+        done = call(sys.executable, command, "info", env={"PYTHONPATH": str(site)})
+        self.assertIn("MuJoCo 4.0.0", done.stdout, done.stderr)
+
+    @unittest.skipUnless(shutil.which("lintian"), "needs lintian")
+    def test_lintian_is_content(self):
+        (deb,) = (self.folder / "first").glob("*.deb")
+        found = [line for line in call("lintian", "--allow-root", deb).stdout.splitlines()
+                 if re.match(r"[EW]: ", line)]
+        self.assertEqual(found, [])
+
+    def test_refuses_uncommitted_changes(self):
+        clone = self.folder / "clone"
+        self.assertEqual(call("git", "clone", "-q", "--shared", ROOT, clone).returncode, 0)
+        shutil.copytree(FOLDER, clone / "tools/package", dirs_exist_ok=True)
+        (clone / "new.txt").touch()
+        done = call(PYTHON, "-B", clone / "tools/package/package.py", "--out", self.folder / "none")
+        self.assertEqual(done.returncode, 2)
+        self.assertRegex(done.stderr, r"^upswing: package: expected a clean checkout, got changes in \d+ "
+                                      r"files, such as .*\n$")
+        self.assertFalse((self.folder / "none").exists())
+
+
+class LauncherTest(unittest.TestCase):
+    def test_bad_arguments(self):
+        for words, message in ((["zip"], 'expected tarball, deb or wheels, got "zip"'),
+                               (["--arch", "riscv"], 'expected x86-64 or arm64, got "riscv"'),
+                               (["--out"], "--out: expected a value, got none"),
+                               (["--fast"], "unknown flag --fast")):
+            with self.subTest(words=words):
+                done = call(ROOT / "upswing", "--no-setup", "package", *words)
+                self.assertEqual((done.returncode, done.stdout), (2, ""))
+                self.assertIn(message, done.stderr)
+                self.assertEqual(len(done.stderr.splitlines()), 1)
+
+
+if __name__ == "__main__":
+    unittest.main()
