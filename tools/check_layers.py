@@ -45,7 +45,7 @@ LAYERS = {
 # Files that may include each foreign library.
 ALLOWED_FILES = {
     "mujoco": re.compile(r"mujoco/"),
-    "GLFW": re.compile(r"mujoco/window\.cc$"),
+    "GLFW": re.compile(r"mujoco/glfw-inl\.h$"),
     "zlib.h": re.compile(r"io/(png|gzip)\.cc$"),
     "google": re.compile(r"io/"),
     "nanobind": re.compile(r"python/"),
