@@ -26,6 +26,7 @@ void AddRealAiGym(CommandLine& line);
 void AddMachine(CommandLine& line);
 void AddRun(CommandLine& line);
 void AddFake(CommandLine& line);
+void AddDemo(CommandLine& line);
 
 /// Adds the policy argument (a file, a run folder or a controller) and the controllers' settings.
 void AddPolicy(CommandLine& line, PolicyArguments& a);

@@ -22,7 +22,7 @@ constexpr CommandEntry kCommands[] = {
     {"run", "Drive a real machine or its twin with a policy", AddRun},
     {"fake", "Play a machine for `run`: a twin behind UDP or a terminal", AddFake},
     {"bench", "Measure the speed of the program on this machine", nullptr},
-    {"demo", "Serve the page in which policies swing up the pendulum live", nullptr},
+    {"demo", "Serve the page in which policies swing up the pendulum live", AddDemo},
     {"docs", "Build the documentation, or the whole web site", nullptr},
     {"package", "Build packages: tarball, Debian package, Python wheels", nullptr},
     {"python", "Run Python with the package upswing", nullptr},

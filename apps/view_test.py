@@ -290,6 +290,20 @@ class BadInput(ViewTest):
         done = self.run_here("view", FAST, env=environment)
         self.assert_one_line(done, 1, "view: ", "window", "--record FILE")
 
+    def test_libraries_of_the_window_are_missing(self):
+        if "built without" in self.run_here("view", FAST, env=os.environ | {"DISPLAY": ":none"}).stderr:
+            self.skipTest("this build has no window")
+        for missing, *words in ((["libglfw.so.3"], "libglfw.so.3", "package libglfw3"),
+                                (["libGL.so.1", "libEGL.so.1"], "libGL.so.1", "package libgl1")):
+            folder = self.folder / missing[0]
+            folder.mkdir()
+            for name in missing:
+                (folder / name).write_text("no library", encoding="utf-8")
+            hidden = os.environ | {"LD_LIBRARY_PATH": str(folder)}
+            self.refuse(["view", FAST], "view: ", "window", *words, "--record FILE", code=1, env=hidden)
+            # Nothing else needs them.
+            self.succeed("view", FAST, "--headless", "--csv", "-", env=hidden)
+
 
 class Launcher(unittest.TestCase):
     def test_what_is_installed_follows_from_the_arguments(self):

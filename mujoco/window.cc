@@ -1,7 +1,5 @@
 #include "mujoco/window.h"
 
-#define GLFW_INCLUDE_NONE
-#include <GLFW/glfw3.h>
 #include <dlfcn.h>
 
 #include <algorithm>
@@ -9,8 +7,8 @@
 #include <cstring>
 #include <optional>
 
-#include "core/error.h"
 #include "core/text.h"
+#include "mujoco/glfw-inl.h"
 
 namespace upswing {
 namespace {
@@ -22,23 +20,18 @@ static_assert(Key::kEscape == GLFW_KEY_ESCAPE && Key::kEnter == GLFW_KEY_ENTER &
               Key::kRight == GLFW_KEY_RIGHT && Key::kLeft == GLFW_KEY_LEFT &&
               Key::kF1 == GLFW_KEY_F1 && Key::kF7 == GLFW_KEY_F7 && Key::kSpace == GLFW_KEY_SPACE);
 
-/// The last message of GLFW.
-std::string GlfwError() {
+/// The error that GLFW has just met.
+Error GlfwError() {
   const char* text = nullptr;
-  glfwGetError(&text);
-  return text == nullptr ? "no reason given" : Printable(text);
-}
-
-Error NoWindow() {
-  return Failure(
-      Concat("view: no window can be opened: ", GlfwError(), "; --record FILE draws without one"));
+  Glfw().GetError(&text);
+  return NoWindow(text == nullptr ? "no reason given" : Printable(text));
 }
 
 /// Whether the current context is rendered in software.
 bool IsSoftware() {
   using GetString = const unsigned char* (*)(unsigned int);
   constexpr unsigned int kRenderer = 0x1F01;  // GL_RENDERER
-  const auto get = reinterpret_cast<GetString>(glfwGetProcAddress("glGetString"));
+  const auto get = reinterpret_cast<GetString>(Glfw().GetProcAddress("glGetString"));
   const auto* text = get == nullptr ? nullptr : reinterpret_cast<const char*>(get(kRenderer));
   return text != nullptr &&
          (std::strstr(text, "llvmpipe") != nullptr || std::strstr(text, "softpipe") != nullptr);
@@ -51,12 +44,13 @@ struct Window::Impl {
   struct Library {
     Library() {
       // MuJoCo looks up OpenGL's functions among the global names.
-      if (dlopen("libGL.so.1", RTLD_NOW | RTLD_GLOBAL) == nullptr) {
-        dlopen("libEGL.so.1", RTLD_NOW | RTLD_GLOBAL);
+      if (dlopen("libGL.so.1", RTLD_NOW | RTLD_GLOBAL) == nullptr &&
+          dlopen("libEGL.so.1", RTLD_NOW | RTLD_GLOBAL) == nullptr) {
+        throw NoWindow("expected the library libGL.so.1, found none (Debian's package libgl1)");
       }
-      if (glfwInit() == GLFW_FALSE) throw NoWindow();
+      if (Glfw().Init() == GLFW_FALSE) throw GlfwError();
     }
-    ~Library() { glfwTerminate(); }
+    ~Library() { Glfw().Terminate(); }
   };
 
   Library library;
@@ -74,21 +68,22 @@ struct Window::Impl {
     Open(title, size, 4);
     if (IsSoftware()) {
       // Antialiasing would take most of the time.
-      glfwDestroyWindow(window);
+      Glfw().DestroyWindow(window);
       Open(title, size, 0);
     }
-    glfwSwapInterval(1);
-    glfwSetWindowUserPointer(window, this);
-    glfwSetKeyCallback(window, [](GLFWwindow* w, int key, int, int action, int mods) {
+    Glfw().SwapInterval(1);
+    Glfw().SetWindowUserPointer(window, this);
+    Glfw().SetKeyCallback(window, [](GLFWwindow* w, int key, int, int action, int mods) {
       const bool is_step = key == GLFW_KEY_LEFT || key == GLFW_KEY_RIGHT;
       if (action == GLFW_RELEASE || (action == GLFW_REPEAT && !is_step)) return;
       Of(w).keys.push_back({key, (mods & GLFW_MOD_SHIFT) != 0, (mods & GLFW_MOD_CONTROL) != 0});
     });
-    glfwSetCursorPosCallback(window, [](GLFWwindow* w, double x, double y) { Of(w).Move(x, y); });
-    glfwSetMouseButtonCallback(window, [](GLFWwindow* w, int button, int action, int) {
+    Glfw().SetCursorPosCallback(window,
+                                [](GLFWwindow* w, double x, double y) { Of(w).Move(x, y); });
+    Glfw().SetMouseButtonCallback(window, [](GLFWwindow* w, int button, int action, int) {
       Of(w).Click(button, action == GLFW_PRESS);
     });
-    glfwSetScrollCallback(window, [](GLFWwindow* w, double, double turn) {
+    Glfw().SetScrollCallback(window, [](GLFWwindow* w, double, double turn) {
       Of(w).MoveCameras(mjMOUSE_ZOOM, 0, -0.05 * turn);
     });
     PendulumScene room{Plant(), ""};
@@ -98,33 +93,34 @@ struct Window::Impl {
 
   ~Impl() {
     painter.reset();
-    glfwDestroyWindow(window);
+    Glfw().DestroyWindow(window);
   }
 
-  static Impl& Of(GLFWwindow* w) { return *static_cast<Impl*>(glfwGetWindowUserPointer(w)); }
+  static Impl& Of(GLFWwindow* w) { return *static_cast<Impl*>(Glfw().GetWindowUserPointer(w)); }
 
   void Open(const std::string& title, PictureSize size, int samples) {
-    glfwWindowHint(GLFW_SAMPLES, samples);
-    window = glfwCreateWindow(size.width, size.height, Printable(title).c_str(), nullptr, nullptr);
-    if (window == nullptr) throw NoWindow();
-    glfwMakeContextCurrent(window);
+    Glfw().WindowHint(GLFW_SAMPLES, samples);
+    window =
+        Glfw().CreateWindow(size.width, size.height, Printable(title).c_str(), nullptr, nullptr);
+    if (window == nullptr) throw GlfwError();
+    Glfw().MakeContextCurrent(window);
   }
 
   PictureSize Pixels() const {
     PictureSize size;
-    glfwGetFramebufferSize(window, &size.width, &size.height);
+    Glfw().GetFramebufferSize(window, &size.width, &size.height);
     return {std::max(size.width, 1), std::max(size.height, 1)};
   }
 
-  bool Pressed(int button) const { return glfwGetMouseButton(window, button) == GLFW_PRESS; }
+  bool Pressed(int button) const { return Glfw().GetMouseButton(window, button) == GLFW_PRESS; }
   bool Held(int left, int right) const {
-    return glfwGetKey(window, left) == GLFW_PRESS || glfwGetKey(window, right) == GLFW_PRESS;
+    return Glfw().GetKey(window, left) == GLFW_PRESS || Glfw().GetKey(window, right) == GLFW_PRESS;
   }
 
   /// The panel under the mouse and the position in it, right and up in [0, 1]; -1: none.
   int PanelAt(double& right, double& up) const {
     int width = 0, height = 0;  // in window units
-    glfwGetWindowSize(window, &width, &height);
+    Glfw().GetWindowSize(window, &width, &height);
     const auto count = static_cast<int>(panels.size());
     for (int i = 0; i < count; ++i) {
       const mjrRect place = PanelPlace(i, count, width, height);
@@ -137,7 +133,7 @@ struct Window::Impl {
 
   void Move(double new_x, double new_y) {
     int width = 0, height = 0;
-    glfwGetWindowSize(window, &width, &height);
+    Glfw().GetWindowSize(window, &width, &height);
     const double dx = (new_x - x) / height, dy = (new_y - y) / height;
     x = new_x;
     y = new_y;
@@ -167,7 +163,7 @@ struct Window::Impl {
   }
 
   void Click(int button, bool pressed) {
-    const double now = glfwGetTime();
+    const double now = Glfw().GetTime();
     if (!pressed) {
       LetGo();
       return;
@@ -227,24 +223,24 @@ Window::Window(const std::string& title, PictureSize size)
     : impl_(std::make_unique<Impl>(title, size)) {}
 Window::~Window() = default;
 
-bool Window::closed() const { return glfwWindowShouldClose(impl_->window) != 0; }
+bool Window::closed() const { return Glfw().WindowShouldClose(impl_->window) != 0; }
 void Window::SetTitle(const std::string& title) {
-  glfwSetWindowTitle(impl_->window, Printable(title).c_str());
+  Glfw().SetWindowTitle(impl_->window, Printable(title).c_str());
 }
 PictureSize Window::size() const { return impl_->Pixels(); }
 
 void Window::ToggleFullScreen() {
   GLFWwindow* window = impl_->window;
   auto& [left, top, width, height] = impl_->place;
-  if (glfwGetWindowMonitor(window) != nullptr) {
-    glfwSetWindowMonitor(window, nullptr, left, top, width, height, 0);
-  } else if (GLFWmonitor* monitor = glfwGetPrimaryMonitor(); monitor != nullptr) {
-    glfwGetWindowPos(window, &left, &top);
-    glfwGetWindowSize(window, &width, &height);
-    const GLFWvidmode* mode = glfwGetVideoMode(monitor);
-    glfwSetWindowMonitor(window, monitor, 0, 0, mode->width, mode->height, mode->refreshRate);
+  if (Glfw().GetWindowMonitor(window) != nullptr) {
+    Glfw().SetWindowMonitor(window, nullptr, left, top, width, height, 0);
+  } else if (GLFWmonitor* monitor = Glfw().GetPrimaryMonitor(); monitor != nullptr) {
+    Glfw().GetWindowPos(window, &left, &top);
+    Glfw().GetWindowSize(window, &width, &height);
+    const GLFWvidmode* mode = Glfw().GetVideoMode(monitor);
+    Glfw().SetWindowMonitor(window, monitor, 0, 0, mode->width, mode->height, mode->refreshRate);
   }
-  glfwSwapInterval(1);
+  Glfw().SwapInterval(1);
 }
 
 void Window::Draw(std::span<const ScenePanel> panels, std::span<const Overlay> overlays,
@@ -260,11 +256,11 @@ void Window::Draw(std::span<const ScenePanel> panels, std::span<const Overlay> o
     const mjrRect place{width * 11 / 20, 0, width * 9 / 20, height * 3 / 10};
     mjr_figure(place, chart, &painter.context());
   }
-  glfwSwapBuffers(impl_->window);
+  Glfw().SwapBuffers(impl_->window);
 }
 
 std::vector<Key> Window::TakeEvents() {
-  glfwPollEvents();
+  Glfw().PollEvents();
   return std::exchange(impl_->keys, {});
 }
 

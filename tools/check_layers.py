@@ -45,8 +45,8 @@ LAYERS = {
 # Files that may include each foreign library.
 ALLOWED_FILES = {
     "mujoco": re.compile(r"mujoco/"),
-    "GLFW": re.compile(r"mujoco/window\.cc$"),
-    "zlib.h": re.compile(r"io/(png\.cc|gzip(_test)?\.cc)$"),
+    "GLFW": re.compile(r"mujoco/glfw-inl\.h$"),
+    "zlib.h": re.compile(r"io/(png|gzip)\.cc$"),
     "google": re.compile(r"io/"),
     "nanobind": re.compile(r"python/"),
     "hwy": re.compile(r"(core/simd(_test)?|nn/(linear|product|registers-inl)|bench/roofline|"

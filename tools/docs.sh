@@ -24,6 +24,8 @@ Examples:
 END_OF_USAGE
 }
 
+bad_input() { say "$command: $*"; exit 2; }
+
 docs() {
   action=build dist=''
   while [ $# -gt 0 ]; do
@@ -51,7 +53,7 @@ docs() {
     "without --no-setup"
   case $action in
     serve) exec python3 -B "$root/tools/docs.py" serve "$docs" ;;
-    site) build_demo && write_site ;;
+    site) add_page && write_site ;;
     build) echo "$docs/index.html: the documentation; to look at it: ./upswing docs --serve" ;;
   esac
 }
@@ -60,8 +62,13 @@ docs() {
 set_site() {
   [ "$action" = build ] || bad_input "expected --serve or --site, once"
   action=site
-  case $1 in "") bad_input "--site: expected a folder, got an empty text" ;; esac
-  set_demo_option --dist "$1"
+  [ -n "$1" ] || bad_input "--site: expected a folder, got an empty text"
+  dist=${1%/}
+  dist=${dist:-/}
+  [ ! -e "$dist" ] || { [ -d "$dist" ] && [ -z "$(ls -A -- "$dist")" ]; } ||
+    bad_input "$dist: expected a new or empty folder, got one that holds files, or a file"
+  [ -d "$(dirname -- "$dist")" ] ||
+    bad_input "--site: expected the existing folder $(dirname -- "$dist") for $(basename -- "$dist")"
 }
 
 # Installs Doxygen and Sphinx. Where set_up follows, one lock after the other is held.
@@ -74,6 +81,20 @@ set_up_docs() {
 build_docs() {
   (lock && exec "$docs_venv/bin/python" -B tools/docs.py build "$docs") </dev/null >&2 ||
     fail "the documentation could not be built (see above)"
+}
+
+# The page of ./upswing demo, which the site contains.
+add_page() {
+  [ "$setup" = no ] || build_demo
+  [ -f "$page/index.html" ] || fail "the page is not built: run ./upswing demo once without --no-setup"
+}
+
+# quoted WORD: as one word of a shell's command line.
+quoted() {
+  case $1 in
+    *[!A-Za-z0-9_./,:=+@%-]*) printf "'%s'" "$(printf '%s' "$1" | sed "s/'/'\\\\''/g")" ;;
+    *) printf '%s' "$1" ;;
+  esac
 }
 
 # The landing page, the page and the documentation; they appear in their folder whole or not at all.

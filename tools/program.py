@@ -15,7 +15,7 @@ ROOT = Path(os.environ.get("UPSWING_ROOT", Path(__file__).resolve().parent.paren
 UPSWING = Path(os.environ.get("UPSWING", ROOT / "build/release/apps/upswing"))
 
 # Commands of the launcher; the program only knows their names.
-LAUNCHER_COMMANDS = {"demo", "docs", "package", "python", "test"}
+LAUNCHER_COMMANDS = {"docs", "package", "python", "test"}
 # The named agent with the defaults of each algorithm.
 ALGORITHMS = {"dqn": "d3qn", "sac": "sac", "ppo": "ppo"}
 
