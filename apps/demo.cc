@@ -33,7 +33,7 @@ struct DemoArguments {
 fs::path PageFolder() {
   const char* given = std::getenv("UPSWING_PAGE");
   const bool is_given = given != nullptr && *given != '\0';
-  const fs::path page =
+  fs::path page =
       is_given ? fs::path(given) : ProgramPath().parent_path().parent_path() / "share/upswing/page";
   if (IsFile(page / "index.html")) return page;
   throw Failure(
@@ -45,8 +45,8 @@ fs::path PageFolder() {
                         "the sources builds the page"));
 }
 
-/// Copies what is in `from` into the existing folder `to`. The copies have the modes of new files,
-/// because an installed page may be read-only.
+/// Copies what is in `from` into the existing folder `to`. New folders are writable, also where an
+/// installed page is not.
 void CopyContent(const fs::path& from, const fs::path& to) {
   for (const auto& entry : fs::directory_iterator(from)) {
     const fs::path target = to / entry.path().filename();

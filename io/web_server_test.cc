@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "io/file.h"
 #include "io/gzip.h"
 #include "io/testing.h"
@@ -233,9 +234,10 @@ TEST_F(WebServerTest, SendsLargeFilesWhole) {
 TEST_F(WebServerTest, AConnectionServesSeveralRequests) {
   const std::string get = "GET / HTTP/1.1\r\nHost: localhost\r\n\r\n";
   // All at once; then letter by letter.
-  const std::string once = Exchange(get + get + "GET /none" + kLast);
+  const std::string all = Concat(get, get, "GET /none", kLast);
+  const std::string once = Exchange(all);
   const Descriptor socket = Connect();
-  for (const char c : get + get + "GET /none" + kLast) Send(socket, {&c, 1});
+  for (const char c : all) Send(socket, {&c, 1});
   EXPECT_EQ(ReceiveAll(socket), once);
   size_t pages = 0;
   for (size_t at = 0; (at = once.find("<!doctype html>", at)) != std::string::npos; ++at) ++pages;
@@ -280,6 +282,7 @@ TEST_F(WebServerTest, EndsConnectionsThatWaitTooLong) {
 
 TEST_F(WebServerTest, MoreConnectionsThanItHoldsWait) {
   std::vector<Descriptor> all;
+  all.reserve(100);
   for (int i = 0; i < 100; ++i) all.push_back(Connect());
   for (int i = 99; i >= 64; --i) Send(all[static_cast<size_t>(i)], "GET /" + kLast);
   for (int i = 0; i < 64; ++i) Send(all[static_cast<size_t>(i)], "GET /" + kLast);

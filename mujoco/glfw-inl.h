@@ -20,15 +20,14 @@ class GlfwFunctions {
  public:
   /// Loads the library. Throws Failure with what to install.
   static const GlfwFunctions& Get() {
-    static const GlfwFunctions functions;
-    return functions;
+    static const GlfwFunctions kFunctions;
+    return kFunctions;
   }
 
  private:
   /// The address of any function.
   struct Symbol {
-    // NOLINTNEXTLINE(google-explicit-constructor): implicit, so that a table has no casts
-    template <typename Function>
+    template <typename Function>  // NOLINTNEXTLINE(google-explicit-constructor): no casts below
     operator Function*() const {
       return reinterpret_cast<Function*>(address);
     }
