@@ -59,8 +59,8 @@ TEST(Twin, IsAPlantFile) {
   EXPECT_EQ(file.plant.center2, 0.25);
   EXPECT_EQ(file.plant.coulomb1, 0.1);
   // One cycle of 2 ms, and delay and lag of the motors.
-  const auto latency = std::ranges::find(file.disturbance, "sensor_latency", &FlagValue::name);
-  ASSERT_NE(latency, file.disturbance.end());
+  const auto latency = std::ranges::find(file.conditions, "sensor_latency", &FlagValue::name);
+  ASSERT_NE(latency, file.conditions.end());
   EXPECT_NEAR(std::stod(latency->text), 0.005, 1e-12);
 }
 
