@@ -15,6 +15,7 @@
 #include "run/plant_file.h"
 #include "setup/toml_settings.h"
 #include "sim/disturbance.h"
+#include "sim/posterior.h"
 
 namespace upswing {
 namespace {
@@ -269,7 +270,8 @@ Twin DrawTwin(const Twin& twin, Rng& rng) {
   for (int i = 0; i < n; ++i) {
     const Option& option = *options.Get(twin.uncertain[static_cast<size_t>(i)]);
     double& value = *std::get<double*>(option.target);
-    value = std::clamp(value + change(i), option.range.low, option.range.high);
+    const Range range = UncertainRange(option);
+    value = std::clamp(value + change(i), range.low, range.high);
   }
   return drawn;
 }

@@ -89,10 +89,14 @@ TEST(Twin, DrawsWithItsCovariance) {
 TEST(Twin, DrawsStayWithinTheRanges) {
   Twin twin = SomeTwin();
   twin.plant.coulomb1 = 0.001;
-  twin.uncertain = {"coulomb1"};
-  twin.covariance = {1};
+  twin.uncertain = {"coulomb1", "center2"};
+  twin.covariance = {1, 0, 0, 1};
   Rng rng(1, "test");
-  for (int i = 0; i < 100; ++i) EXPECT_GE(DrawTwin(twin, rng).plant.coulomb1, 0);
+  for (int i = 0; i < 100; ++i) {
+    const Plant plant = DrawTwin(twin, rng).plant;
+    EXPECT_GE(plant.coulomb1, 0);
+    EXPECT_GT(plant.center2, 0);  // 0 is half of the length
+  }
 }
 
 TEST(Twin, RefusesCovariancesThatAreNone) {

@@ -60,6 +60,11 @@ std::optional<std::vector<double>> FactorRow(const std::vector<double>& covarian
 
 }  // namespace
 
+Range UncertainRange(const Option& option) {
+  const bool of_link = option.name.starts_with("center") || option.name.starts_with("inertia");
+  return {of_link ? kSmallestLink : option.range.low, option.range.high};
+}
+
 bool Posterior::Knows(std::string_view name) {
   return name == kLatency || std::ranges::any_of(kUncertain, [&](const UncertainParameter& p) {
            return p.name == name;
@@ -104,11 +109,10 @@ Posterior Posterior::Parse(std::string_view text, const std::string& where) {
     std::optional<std::vector<double>> L = FactorRow(covariance, posterior.rows_);
     if (!L) throw BadInput(Concat(where, ": expected a positive matrix, got another one"));
     posterior.rows_.push_back(std::move(*L));
-    Value value{nullptr, options.Get(name)->range};
+    Value value{nullptr, UncertainRange(*options.Get(name))};
     for (const UncertainParameter& p : kUncertain) {
       if (p.name == name) value.of_plant = p.value;
     }
-    if (name.starts_with("center") || name.starts_with("inertia")) value.range.low = kSmallestLink;
     posterior.values_.push_back(value);
   }
   return posterior;

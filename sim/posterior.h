@@ -4,11 +4,16 @@
 #include <string_view>
 #include <vector>
 
+#include "core/options.h"
 #include "core/rng.h"
 #include "sim/disturbance.h"
 #include "sim/double_pendulum.h"
 
 namespace upswing {
+
+/// The range of an uncertain value: that of its setting. A centre or inertia of a link stays above
+/// 0, which stands for a capsule.
+Range UncertainRange(const Option& option);
 
 /// A joint normal distribution of a machine's values about the nominal ones, such as the posterior
 /// of an identification. The values are settings of the plant, and the sensors' latency.
@@ -26,9 +31,8 @@ class Posterior {
   /// message that begins with `where`, unless the matrix is positive.
   static Posterior Parse(std::string_view text, const std::string& where);
 
-  /// Adds random deviations to a plant and its sensors. A value beyond its range is cut at it. A
-  /// centre or inertia stays above 0, which stands for a capsule. Takes a normal number from the
-  /// stream for each value.
+  /// Adds random deviations to a plant and its sensors. A value beyond its UncertainRange is cut at
+  /// it. Takes a normal number from the stream for each value.
   void Deviate(Plant& plant, Disturbance& disturbance, Rng& rng) const;
 
   /// The largest values that Deviate may return.
